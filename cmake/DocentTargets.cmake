@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+# One helper for every folder: sources are found by glob, headers sit beside them, and a target may link
+# only what its row of the layer table allows (tests/tools/check_layers.py checks the includes).
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  # The hash leaves the working directory out, so that one build folder reuses what another compiled.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_NOHASHDIR=1 ${CCACHE_PROGRAM})
+  if(DOCENT_PRECOMPILE)
+    # Precompiled headers are cached too, and paths are hashed relative to the source, so that one checkout reuses
+    # what another compiled.
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_NOHASHDIR=1 CCACHE_BASEDIR=${PROJECT_SOURCE_DIR}
+      CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE_PROGRAM})
+  endif()
+endif()
+
+add_library(docent_compile_options INTERFACE)
+target_compile_options(docent_compile_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow
+  # GCC 12 at -O3 takes Eigen's guarded four-wide loads of three-vectors for reads past the end, and inserts at
+  # the end of a std::vector for writes past it.
+  -Wno-array-bounds $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>
+  # The same GCC at -O3 fears overlapping copies in `"text" + string` (its bug 105651).
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<STREQUAL:${CMAKE_CXX_FLAGS_RELEASE},-O3>>:-Wno-restrict>
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${DOCENT_PRECOMPILE}>>:-fpch-preprocess>
+  $<$<BOOL:${DOCENT_WERROR}>:-Werror>
+  # A vector of the machine's width changes Eigen's layout: every target must agree on it.
+  $<$<AND:$<BOOL:${DOCENT_MARCH}>,$<STREQUAL:${CMAKE_SYSTEM_PROCESSOR},x86_64>>:-march=${DOCENT_MARCH}>)
+if(DOCENT_SANITIZE)  # a plain if: the comma of "address,undefined" would end a generator expression
+  target_compile_options(docent_compile_options INTERFACE -fsanitize=${DOCENT_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(docent_compile_options INTERFACE -fsanitize=${DOCENT_SANITIZE})
+endif()
+target_include_directories(docent_compile_options INTERFACE "${PROJECT_SOURCE_DIR}")
+
+# The headers that nearly every file reads, parsed once a target. Off by default, so that a build without it
+# shows a missing include; the presets switch it on.
+function(docent_precompile name)
+  if(DOCENT_PRECOMPILE)
+    target_precompile_headers(${name} PRIVATE <algorithm> <functional> <map> <memory> <optional> <string> <vector>
+      <Eigen/Core> <Eigen/Geometry> ${ARGN})
+  endif()
+endfunction()
+
+# docent_add_library(NAME [FOLDERS folder...] PUBLIC libs... PRIVATE libs...)
+function(docent_add_library name)
+  cmake_parse_arguments(ARG "" "" "FOLDERS;EXCLUDE;PUBLIC;PRIVATE" ${ARGN})
+  if(NOT ARG_FOLDERS)
+    set(ARG_FOLDERS ".")
+  endif()
+  set(sources "")
+  foreach(folder IN LISTS ARG_FOLDERS)
+    file(GLOB_RECURSE found CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cpp"
+      "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.h")
+    list(APPEND sources ${found})
+  endforeach()
+  foreach(pattern IN LISTS ARG_EXCLUDE)
+    list(FILTER sources EXCLUDE REGEX "${pattern}")
+  endforeach()
+  add_library(${name} STATIC ${sources})
+  set_target_properties(${name} PROPERTIES LINKER_LANGUAGE CXX)
+  target_link_libraries(${name} PUBLIC docent_compile_options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  docent_precompile(${name})
+endfunction()
+
+# docent_add_tests(NAME LIBS libs...): every *_test.cpp below the folder, discovered by ctest.
+function(docent_add_tests name)
+  cmake_parse_arguments(ARG "" "" "LIBS;DEPENDS" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
+  if(NOT sources)
+    return()
+  endif()
+  add_executable(${name} ${sources})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE DOCENT_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+    DOCENT_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  docent_precompile(${name} <gtest/gtest.h> <gmock/gmock.h>)
+  if(ARG_DEPENDS)
+    add_dependencies(${name} ${ARG_DEPENDS})
+  endif()
+  gtest_discover_tests(${name} PROPERTIES TIMEOUT 600 DISCOVERY_TIMEOUT 60)
+endfunction()
