@@ -1,0 +1,394 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/geometry/camera_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <ostream>
+#include <sstream>
+#include <vector>
+
+#include "engine/geometry/polynomial.h"
+
+namespace docent::engine {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+// Tangent of the largest angle for lenses that see less than 90 degrees to the side (89.94 degrees).
+constexpr double kMaxRadius = 1000.0;
+// The one-to-one range ends a little before the radius where the picture's growth is exactly zero.
+constexpr double kRangeMargin = 1 - 1e-6;
+constexpr int kMaxNewtonSteps = 100;
+
+// Up to where the polynomial, positive at zero, stays positive; `limit` where it always does.
+double PositiveUpTo(const std::vector<double>& coefficients, double limit) {
+  const std::vector<double> changes = SignChanges(coefficients, limit);
+  return changes.empty() ? limit : changes.front() * kRangeMargin;
+}
+
+// Largest radius (tangent of the angle) of the Brown model's one-to-one range. The Jacobian of the distortion
+// is symmetric; at radius r its radial part has the eigenvalues d(r) and (r d(r))', and its tangential part's
+// are at least -6 |p| r. Where it is positive definite on a disc the mapping is one-to-one there.
+double LargestBrownRadius(const std::array<double, 5>& k) {
+  const double tangential = -6 * std::hypot(k[2], k[3]);
+  const std::vector<double> across = {1, tangential, k[0], 0, k[1], 0, k[4]};
+  const std::vector<double> along = {1, tangential, 3 * k[0], 0, 5 * k[1], 0, 7 * k[4]};
+  return std::min(PositiveUpTo(across, kMaxRadius), PositiveUpTo(along, kMaxRadius));
+}
+
+double LargestKannalaBrandtAngle(const std::array<double, 5>& k) {
+  return PositiveUpTo({1, 0, 3 * k[0], 0, 5 * k[1], 0, 7 * k[2], 0, 9 * k[3]}, kPi);
+}
+
+// atan(x) / x and tan(x) / x, also at zero.
+double ArcTangentRatio(double x) {
+  return std::abs(x) < 1e-4 ? 1 - x * x / 3 : std::atan(x) / x;
+}
+double TangentRatio(double x) {
+  return std::abs(x) < 1e-4 ? 1 + x * x / 3 : std::tan(x) / x;
+}
+
+// Distorted radius of the Brown model without its tangential part, and its derivative.
+double BrownRadius(const std::array<double, 5>& k, double r, double* derivative) {
+  const double s = r * r;
+  *derivative = 1 + s * (3 * k[0] + s * (5 * k[1] + s * 7 * k[4]));
+  return r * (1 + s * (k[0] + s * (k[1] + s * k[4])));
+}
+
+double KannalaBrandtRadius(const std::array<double, 5>& k, double angle, double* derivative) {
+  const double s = angle * angle;
+  *derivative = 1 + s * (3 * k[0] + s * (5 * k[1] + s * (7 * k[2] + s * 9 * k[3])));
+  return angle * (1 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3]))));
+}
+
+// Solves radius(x) = target on [0, limit], where radius grows from zero to at least the target: Newton's
+// steps, halving the bracket instead wherever one leaves it.
+double InvertRadius(double (*radius)(const std::array<double, 5>&, double, double*),
+                    const std::array<double, 5>& k, double target, double limit) {
+  double low = 0, high = limit, x = std::min(target, limit);
+  for (int i = 0; i < kMaxNewtonSteps; ++i) {
+    double derivative;
+    const double error = radius(k, x, &derivative) - target;
+    (error > 0 ? high : low) = x;
+    double next = x - error / derivative;
+    if (!(next >= low && next <= high)) {
+      next = 0.5 * (low + high);
+    }
+    const double step = std::abs(next - x);
+    x = next;
+    if (step <= 4 * std::numeric_limits<double>::epsilon() * x) {
+      break;
+    }
+  }
+  return x;
+}
+
+// The Brown model on the plane z = 1 with its (symmetric) Jacobian. `Out` takes x, y, xx, xy, yy as
+// CameraModel::PicturePoint does. Inlined, what its caller does not use is not worked out.
+template <typename Out>
+inline void BrownDistort(const std::array<double, 5>& k, double x, double y, Out* out) {
+  const double s = x * x + y * y;
+  const double radial = 1 + s * (k[0] + s * (k[1] + s * k[4]));
+  const double twice_slope = 2 * (k[0] + s * (2 * k[1] + s * 3 * k[4]));  // of radial by s
+  const double px = k[3], py = k[2];
+  const double scale = radial + 2 * (px * x + py * y);
+  out->x = scale * x + px * s;
+  out->y = scale * y + py * s;
+  out->xx = scale + (twice_slope * x + 4 * px) * x;
+  out->xy = twice_slope * x * y + 2 * (px * y + py * x);
+  out->yy = scale + (twice_slope * y + 4 * py) * y;
+}
+
+struct BrownError {
+  double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  double norm = 0;
+
+  BrownError(const std::array<double, 5>& k, const Eigen::Vector2d& at, const Eigen::Vector2d& distorted) {
+    BrownDistort(k, at.x(), at.y(), this);
+    x -= distorted.x();
+    y -= distorted.y();
+    norm = std::hypot(x, y);
+  }
+  Eigen::Vector2d NewtonStep() const {
+    const double determinant = xx * yy - xy * xy;
+    return {(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant};
+  }
+};
+
+// Inverse of BrownDistort within the radius, or empty. Starts at the solution without tangential part and
+// goes on with Newton steps that are halved until they bring the picture nearer.
+std::optional<Eigen::Vector2d> BrownUndistort(const std::array<double, 5>& k,
+                                              const Eigen::Vector2d& distorted, double max_radius,
+                                              double max_image_radius) {
+  const double image_radius = distorted.norm();
+  const bool is_radial = k[2] == 0 && k[3] == 0;
+  if (image_radius == 0 && is_radial) {
+    return Eigen::Vector2d::Zero().eval();
+  }
+  if (!std::isfinite(image_radius) || (is_radial && image_radius > max_image_radius)) {
+    return std::nullopt;
+  }
+  Eigen::Vector2d x = distorted;
+  if (image_radius > 0) {
+    const double radius = InvertRadius(BrownRadius, k, std::min(image_radius, max_image_radius), max_radius);
+    x *= radius / image_radius;
+  }
+  if (is_radial) {
+    return x;
+  }
+  const double tolerance = 1e-14 * (1 + image_radius);
+  BrownError error(k, x, distorted);
+  for (int i = 0; i < kMaxNewtonSteps && error.norm > tolerance; ++i) {
+    Eigen::Vector2d step = error.NewtonStep();
+    Eigen::Vector2d next = x - step;
+    BrownError next_error(k, next, distorted);
+    for (int halving = 0; halving < 30 && (next.norm() > max_radius || next_error.norm > error.norm);
+         ++halving) {
+      step *= 0.5;
+      next = x - step;
+      next_error = BrownError(k, next, distorted);
+    }
+    if (!(next.norm() <= max_radius) || !(next_error.norm < error.norm)) {
+      break;
+    }
+    x = next;
+    error = next_error;
+  }
+  if (!(error.norm <= 1e-10 * (1 + image_radius))) {
+    return std::nullopt;
+  }
+  return x;
+}
+
+const char* Name(LensModel lens) {
+  switch (lens) {
+    case LensModel::kRadialTangential:
+      return "radial-tangential";
+    case LensModel::kFov:
+      return "FOV";
+    case LensModel::kKannalaBrandt:
+      return "Kannala-Brandt";
+  }
+  return "unknown";
+}
+
+std::string Sentence(const char* what, double value, const char* should) {
+  std::ostringstream text;
+  text << what << " is " << value << " but must be " << should << ".";
+  return text.str();
+}
+
+std::optional<std::string> ComplainAboutDistortion(LensModel lens, const std::array<double, 5>& distortion) {
+  const std::size_t used = lens == LensModel::kRadialTangential ? 5 : lens == LensModel::kFov ? 1 : 4;
+  for (std::size_t i = 0; i < distortion.size(); ++i) {
+    const std::string what =
+        "Distortion coefficient " + std::to_string(i + 1) + " of the " + Name(lens) + " lens";
+    if (!(std::abs(distortion[i]) <= 1e4)) {
+      return Sentence(what.c_str(), distortion[i], "a finite number of moderate size");
+    }
+    if (i >= used && distortion[i] != 0) {
+      return Sentence(what.c_str(), distortion[i], "zero, because this lens does not use it");
+    }
+  }
+  if (lens == LensModel::kFov && !(distortion[0] >= 0 && distortion[0] < kPi)) {
+    return Sentence("The FOV lens's omega", distortion[0], "at least 0 and less than pi radians");
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+CameraModel::CameraModel() : CameraModel(LensModel::kRadialTangential, {1, 1, 1, 1, 0, 0}, {}) {}
+
+CameraModel::CameraModel(LensModel lens, const Intrinsics& intrinsics,
+                         const std::array<double, 5>& distortion)
+    : lens_(lens), intrinsics_(intrinsics), distortion_(distortion) {
+  double slope;
+  switch (lens) {
+    case LensModel::kRadialTangential: {
+      const double radius = LargestBrownRadius(distortion);
+      max_radius_squared_ = radius * radius;
+      max_angle_ = std::atan(radius);
+      max_image_radius_ = BrownRadius(distortion, radius, &slope);
+      break;
+    }
+    case LensModel::kFov: {
+      const double omega = distortion[0];
+      max_radius_squared_ = kMaxRadius * kMaxRadius;
+      max_angle_ = std::atan(kMaxRadius);
+      fov_scale_ = TangentRatio(omega / 2);
+      max_image_radius_ = kMaxRadius * fov_scale_ * ArcTangentRatio(kMaxRadius * fov_scale_ * omega);
+      break;
+    }
+    case LensModel::kKannalaBrandt:
+      max_angle_ = LargestKannalaBrandtAngle(distortion);
+      max_image_radius_ = KannalaBrandtRadius(distortion, max_angle_, &slope);
+      break;
+  }
+}
+
+std::optional<std::string> CameraModel::Validate(LensModel lens, const Intrinsics& intrinsics,
+                                                 const std::array<double, 5>& distortion) {
+  const Intrinsics& in = intrinsics;
+  for (const auto& [what, size] :
+       {std::pair{"The picture's width", in.width_px}, {"The picture's height", in.height_px}}) {
+    if (size < 1 || size > 65535) {
+      return Sentence(what, size, "between 1 and 65535 pixels");
+    }
+  }
+  for (const auto& [what, focal] :
+       {std::pair{"The focal length fx", in.fx}, {"The focal length fy", in.fy}}) {
+    // 360 degrees across the picture make 0.16 widths; no lens is a thousand times longer than its sensor.
+    if (!(focal >= 0.01 * in.width_px && focal <= 1000.0 * in.width_px)) {
+      return Sentence(what, focal, "between 0.01 and 1000 times the picture's width in pixels");
+    }
+  }
+  for (const auto& [what, center] :
+       {std::pair{"The principal point cx", in.cx}, {"The principal point cy", in.cy}}) {
+    if (!(std::abs(center) <= 1e6)) {
+      return Sentence(what, center, "a finite number of pixels");
+    }
+  }
+  if (auto complaint = ComplainAboutDistortion(lens, distortion)) {
+    return complaint;
+  }
+  // A lens that folds back within the picture was calibrated wrongly. A few pixels in the corners may be.
+  constexpr int kGrid = 9;
+  const CameraModel camera(lens, intrinsics, distortion);
+  int without_ray = 0;
+  for (int i = 0; i < kGrid * kGrid; ++i) {
+    const Eigen::Vector2d pixel((i % kGrid + 0.5) / kGrid * in.width_px - 0.5,
+                                (i / kGrid + 0.5) / kGrid * in.height_px - 0.5);
+    without_ray += camera.Unproject(pixel) ? 0 : 1;
+  }
+  if (without_ray > kGrid * kGrid / 2) {
+    return "The distortion of the " + std::string(Name(lens)) +
+           " lens leaves more than half of the picture without a ray: check the coefficients and their "
+           "order.";
+  }
+  return std::nullopt;
+}
+
+// Through the plane z = 1, which Brown's and the FOV lens map to the picture with a symmetric Jacobian.
+bool CameraModel::ProjectThroughPlane(const Eigen::Vector3d& point, bool with_jacobian,
+                                      PicturePoint* result) const {
+  const double z = point.z();
+  const double radius_squared = point.x() * point.x() + point.y() * point.y();
+  if (!(z > 0) || !(radius_squared <= max_radius_squared_ * z * z)) {
+    return false;
+  }
+  const double inverse_z = 1 / z;
+  const double x = point.x() * inverse_z, y = point.y() * inverse_z;
+  if (lens_ == LensModel::kRadialTangential) {
+    BrownDistort(distortion_, x, y, result);
+  } else {
+    const double full = fov_scale_ * distortion_[0];
+    const double scaled = std::sqrt(radius_squared) * inverse_z * full, squared = scaled * scaled;
+    const double ratio = ArcTangentRatio(scaled), scale = fov_scale_ * ratio;
+    // (1 / (1 + s^2) - atan(s) / s) / s^2 tends to -2/3.
+    const double shape = squared < 1e-6 ? -2.0 / 3 : (1 / (1 + squared) - ratio) / squared;
+    const double curvature = fov_scale_ * full * full * shape;
+    *result = {scale * x, scale * y, scale + curvature * x * x, curvature * x * y, scale + curvature * y * y,
+               0,         0};
+  }
+  if (with_jacobian) {
+    result->xx *= inverse_z;
+    result->xy *= inverse_z;
+    result->yy *= inverse_z;
+    result->xz = -(result->xx * x + result->xy * y);
+    result->yz = -(result->xy * x + result->yy * y);
+  }
+  return true;
+}
+
+// Through the angle from the axis: Kannala and Brandt's lens, also beyond 90 degrees.
+bool CameraModel::ProjectByAngle(const Eigen::Vector3d& point, PicturePoint* result) const {
+  const double x = point.x(), y = point.y(), z = point.z();
+  const double radius_squared = x * x + y * y, radius = std::sqrt(radius_squared);
+  const double angle = std::atan2(radius, z);
+  if (!(angle <= max_angle_) || (radius == 0 && !(z > 0))) {
+    return false;
+  }
+  double slope;
+  const double image_radius = KannalaBrandtRadius(distortion_, angle, &slope);
+  const bool is_axis = radius < 1e-8 * z;
+  const double scale = is_axis ? 1 / z : image_radius / radius;
+  // The curvature is multiplied by x and y, so that it may be dropped on the axis.
+  const double by_depth = slope / (radius_squared + z * z);
+  const double curvature = is_axis ? 0 : (by_depth * z - scale) / radius_squared;
+  *result = {
+      scale * x,     scale * y,    scale + curvature * x * x, curvature * x * y, scale + curvature * y * y,
+      -by_depth * x, -by_depth * y};
+  return true;
+}
+
+bool CameraModel::Project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
+                          Eigen::Matrix<double, 2, 3>* jacobian) const {
+  PicturePoint point;
+  if (!(lens_ == LensModel::kKannalaBrandt
+            ? ProjectByAngle(point_in_camera, &point)
+            : ProjectThroughPlane(point_in_camera, jacobian != nullptr, &point))) {
+    return false;
+  }
+  const double fx = intrinsics_.fx, fy = intrinsics_.fy;
+  *pixel = {fx * point.x + intrinsics_.cx, fy * point.y + intrinsics_.cy};
+  if (jacobian != nullptr) {
+    *jacobian << fx * point.xx, fx * point.xy, fx * point.xz, fy * point.xy, fy * point.yy, fy * point.yz;
+  }
+  return true;
+}
+
+std::optional<Eigen::Vector2d> CameraModel::Project(const Eigen::Vector3d& point_in_camera) const {
+  Eigen::Vector2d pixel;
+  if (!Project(point_in_camera, &pixel, nullptr)) {
+    return std::nullopt;
+  }
+  return pixel;
+}
+
+std::optional<Eigen::Vector3d> CameraModel::Unproject(const Eigen::Vector2d& pixel) const {
+  const Eigen::Vector2d image((pixel.x() - intrinsics_.cx) / intrinsics_.fx,
+                              (pixel.y() - intrinsics_.cy) / intrinsics_.fy);
+  if (lens_ == LensModel::kRadialTangential) {
+    const std::optional<Eigen::Vector2d> normalized =
+        BrownUndistort(distortion_, image, std::sqrt(max_radius_squared_), max_image_radius_);
+    if (!normalized) {
+      return std::nullopt;
+    }
+    return Eigen::Vector3d(normalized->x(), normalized->y(), 1).normalized();
+  }
+  const double image_radius = image.norm();
+  if (!(image_radius <= max_image_radius_)) {
+    return std::nullopt;
+  }
+  if (lens_ == LensModel::kFov) {
+    const double scale = TangentRatio(image_radius * distortion_[0]) / fov_scale_;
+    return Eigen::Vector3d(scale * image.x(), scale * image.y(), 1).normalized();
+  }
+  if (image_radius < 1e-8) {
+    return Eigen::Vector3d(image.x(), image.y(), 1).normalized();
+  }
+  const double angle = InvertRadius(KannalaBrandtRadius, distortion_, image_radius, max_angle_);
+  const double scale = std::sin(angle) / image_radius;
+  return Eigen::Vector3d(scale * image.x(), scale * image.y(), std::cos(angle));
+}
+
+bool CameraModel::operator==(const CameraModel& other) const {
+  const Intrinsics& a = intrinsics_;
+  const Intrinsics& b = other.intrinsics_;
+  return lens_ == other.lens_ && distortion_ == other.distortion_ && a.width_px == b.width_px &&
+         a.height_px == b.height_px && a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy;
+}
+
+std::ostream& operator<<(std::ostream& out, const CameraModel& camera) {
+  const CameraModel::Intrinsics& in = camera.intrinsics();
+  out << Name(camera.lens()) << ' ' << in.width_px << 'x' << in.height_px << " fx " << in.fx << " fy "
+      << in.fy << " cx " << in.cx << " cy " << in.cy << " distortion";
+  for (const double coefficient : camera.distortion()) {
+    out << ' ' << coefficient;
+  }
+  return out;
+}
+
+}  // namespace docent::engine

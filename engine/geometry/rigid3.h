@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <iosfwd>
+
+// Rotations and rigid transforms. A variable is named a_from_b and maps coordinates in b to coordinates in a:
+// x_in_a = a_from_b * x_in_b, and c_from_a = c_from_b * b_from_a. Lengths in metres, angles in radians.
+namespace docent::engine {
+
+// [v]x, the matrix with Hat(v) * w = v.cross(w).
+Eigen::Matrix3d Hat(const Eigen::Vector3d& v);
+
+// A rotation of three-space (SO(3)), stored as a unit quaternion.
+class Rotation3 {
+ public:
+  Rotation3() : quaternion_(Eigen::Quaterniond::Identity()) {}
+  // Normalizes; the quaternion must not be zero.
+  explicit Rotation3(const Eigen::Quaterniond& quaternion) : quaternion_(quaternion.normalized()) {}
+  explicit Rotation3(const Eigen::Matrix3d& matrix) : quaternion_(Eigen::Quaterniond(matrix).normalized()) {}
+
+  // Exponential map: the rotation by |rotation_vector| radians about its direction; exact also near zero.
+  static Rotation3 Exp(const Eigen::Vector3d& rotation_vector);
+  // Inverse of Exp; the result's norm is at most pi.
+  Eigen::Vector3d Log() const;
+
+  const Eigen::Quaterniond& quaternion() const { return quaternion_; }
+  Eigen::Matrix3d matrix() const { return quaternion_.toRotationMatrix(); }
+  Rotation3 inverse() const { return FromUnit(quaternion_.conjugate()); }
+  // Angle of the rotation, in [0, pi].
+  double Angle() const { return Log().norm(); }
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& v) const { return quaternion_ * v; }
+  Rotation3 operator*(const Rotation3& other) const { return Rotation3(quaternion_ * other.quaternion_); }
+
+ private:
+  static Rotation3 FromUnit(const Eigen::Quaterniond& q) {
+    Rotation3 result;
+    result.quaternion_ = q;
+    return result;
+  }
+  Eigen::Quaterniond quaternion_;
+};
+
+// A rigid transform (SE(3)): x_in_a = rotation * x_in_b + translation.
+struct Rigid3 {
+  Rotation3 rotation;
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Rigid3() = default;
+  Rigid3(const Rotation3& rotation_in, const Eigen::Vector3d& translation_in)
+      : rotation(rotation_in), translation(translation_in) {}
+
+  // Twist (v, w), translation part first, rotation part last: the usual exponential map of SE(3). Small
+  // updates are applied on the left: camera_from_map = Exp(twist) * camera_from_map, so that the twist lives
+  // in the camera frame.
+  static Rigid3 Exp(const Eigen::Matrix<double, 6, 1>& twist);
+  Eigen::Matrix<double, 6, 1> Log() const;
+
+  Rigid3 inverse() const {
+    const Rotation3 inverse_rotation = rotation.inverse();
+    return {inverse_rotation, -(inverse_rotation * translation)};
+  }
+  // For camera_from_map: the camera's centre in the map, metres.
+  Eigen::Vector3d OriginInSource() const { return -(rotation.inverse() * translation); }
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return rotation * x + translation; }
+  // Homogeneous (X, w): w = 1 finite, w = 0 a direction.
+  Eigen::Vector4d operator*(const Eigen::Vector4d& x) const {
+    Eigen::Vector4d result;
+    result << rotation * Eigen::Vector3d(x.head<3>()) + translation * x[3], x[3];
+    return result;
+  }
+  Rigid3 operator*(const Rigid3& other) const {
+    return {rotation * other.rotation, rotation * other.translation + translation};
+  }
+};
+
+// True where the transforms differ by at most these amounts (metres, radians).
+bool IsNear(const Rigid3& a, const Rigid3& b, double translation_tolerance, double rotation_tolerance);
+std::ostream& operator<<(std::ostream& out, const Rotation3& rotation);
+std::ostream& operator<<(std::ostream& out, const Rigid3& transform);
+
+}  // namespace docent::engine

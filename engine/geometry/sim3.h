@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <iosfwd>
+#include <optional>
+#include <span>
+
+#include "engine/geometry/rigid3.h"
+
+namespace docent::engine {
+
+// A similarity (Sim(3)): x_in_a = scale * (rotation * x_in_b) + translation, scale > 0.
+struct Sim3 {
+  Rotation3 rotation;
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  double scale = 1.0;
+
+  Sim3 inverse() const;
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return scale * (rotation * x) + translation; }
+  Sim3 operator*(const Sim3& other) const;
+};
+
+// The similarity a_from_b that minimises sum |a_i - a_from_b * b_i|^2 (Umeyama 1991). Empty with fewer than
+// three points or points on one line. With fixed_scale the scale stays 1 and two spread-out clouds may
+// differ.
+std::optional<Sim3> AlignSim3(std::span<const Eigen::Vector3d> points_in_a,
+                              std::span<const Eigen::Vector3d> points_in_b, bool fixed_scale = false);
+
+std::ostream& operator<<(std::ostream& out, const Sim3& transform);
+
+}  // namespace docent::engine

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/map/map.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace docent::engine {
+
+namespace {
+
+auto FindObservation(std::vector<Observation>& observations, MapPointId point) {
+  return std::lower_bound(
+      observations.begin(), observations.end(), point,
+      [](const Observation& observation, MapPointId id) { return observation.point < id; });
+}
+
+}  // namespace
+
+Map::Map(const MapSnapshot& snapshot)
+    : next_keyframe_(snapshot.next_keyframe), next_point_(snapshot.next_point), revision_(snapshot.revision) {
+  for (const KeyFrame& keyframe : snapshot.keyframes) keyframes_[keyframe.id].keyframe = keyframe;
+  points_.reserve(snapshot.points.size());
+  for (const MapPoint& point : snapshot.points) points_.push_back({.point = point, .observers = {}});
+  alive_points_ = points_.size();
+  for (const Observation& observation : snapshot.observations) AddObservation(observation);
+}
+
+Map::KeyFrameRecord& Map::AddKeyFrame(KeyFrame keyframe) {
+  keyframe.id = next_keyframe_++;
+  KeyFrameRecord& record = keyframes_[keyframe.id];
+  record.keyframe = std::move(keyframe);
+  return record;
+}
+
+MapPointId Map::AddPoint(MapPoint point) {
+  point.id = next_point_++;
+  points_.push_back({.point = point, .observers = {}});
+  ++alive_points_;
+  return point.id;
+}
+
+Map::PointRecord* Map::FindPoint(MapPointId id) {
+  const auto it =
+      std::lower_bound(points_.begin(), points_.end(), id,
+                       [](const PointRecord& record, MapPointId wanted) { return record.point.id < wanted; });
+  return it != points_.end() && it->point.id == id && it->alive ? &*it : nullptr;
+}
+
+Map::KeyFrameRecord* Map::FindKeyFrame(KeyFrameId id) {
+  const auto it = keyframes_.find(id);
+  return it != keyframes_.end() ? &it->second : nullptr;
+}
+
+bool Map::AddObservation(const Observation& observation) {
+  KeyFrameRecord* keyframe = FindKeyFrame(observation.keyframe);
+  PointRecord* point = FindPoint(observation.point);
+  if (!keyframe || !point) return false;
+  const auto it = FindObservation(keyframe->observations, observation.point);
+  if (it != keyframe->observations.end() && it->point == observation.point) return false;
+  keyframe->observations.insert(it, observation);
+  point->observers.insert(
+      std::upper_bound(point->observers.begin(), point->observers.end(), observation.keyframe),
+      observation.keyframe);
+  return true;
+}
+
+void Map::RemoveObservation(KeyFrameId keyframe, MapPointId point) {
+  KeyFrameRecord* keyframe_record = FindKeyFrame(keyframe);
+  PointRecord* point_record = FindPoint(point);
+  if (!keyframe_record || !point_record) return;
+  const auto it = FindObservation(keyframe_record->observations, point);
+  if (it == keyframe_record->observations.end() || it->point != point) return;
+  if (point_record->observers.size() <= 2 || point_record->point.source_keyframe == keyframe) {
+    RemovePoint(point);
+    return;
+  }
+  keyframe_record->observations.erase(it);
+  std::erase(point_record->observers, keyframe);
+}
+
+void Map::RemovePoint(MapPointId id) {
+  PointRecord* record = FindPoint(id);
+  if (!record) return;
+  for (const KeyFrameId observer : record->observers) {
+    std::vector<Observation>& observations = keyframes_.at(observer).observations;
+    const auto it = FindObservation(observations, id);
+    if (it != observations.end() && it->point == id) observations.erase(it);
+  }
+  record->observers.clear();
+  record->alive = false;
+  --alive_points_;
+}
+
+void Map::RemoveKeyFrame(KeyFrameId id) {
+  KeyFrameRecord* record = FindKeyFrame(id);
+  if (!record) return;
+  const std::vector<Observation> observations = record->observations;
+  for (const Observation& observation : observations) RemoveObservation(id, observation.point);
+  // A map that was stored may hold points that their own source keyframe does not observe.
+  for (const PointRecord& point : points_) {
+    if (point.alive && point.point.source_keyframe == id) RemovePoint(point.point.id);
+  }
+  keyframes_.erase(id);
+}
+
+void Map::UpdateDepth(KeyFrameRecord* record) {
+  std::vector<double> depths;
+  depths.reserve(record->observations.size());
+  for (const Observation& observation : record->observations) {
+    const PointRecord* point = FindPoint(observation.point);
+    if (!point || point->point.infinite()) continue;
+    const double depth = (record->keyframe.camera_from_map * point->point.position()).z();
+    if (depth > 0) depths.push_back(depth);
+  }
+  if (depths.size() < 4) return;
+  const auto median = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), median, depths.end());
+  record->keyframe.mean_depth = *median;
+  for (double& depth : depths) depth = std::abs(depth - record->keyframe.mean_depth);
+  std::nth_element(depths.begin(), median, depths.end());
+  record->keyframe.depth_sigma = 1.4826 * *median;
+}
+
+void Map::UpdateNormal(PointRecord* record) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const KeyFrameId observer : record->observers) {
+    const Rigid3& camera_from_map = keyframes_.at(observer).keyframe.camera_from_map;
+    if (record->point.infinite()) {
+      sum -= record->point.position();
+    } else {
+      sum += (camera_from_map.OriginInSource() - record->point.position()).normalized();
+    }
+  }
+  if (sum.norm() > 1e-6) record->point.normal = sum.normalized().cast<float>();
+}
+
+std::vector<std::pair<KeyFrameId, int>> Map::Covisible(KeyFrameId id) {
+  std::map<KeyFrameId, int> shared;
+  const KeyFrameRecord* record = FindKeyFrame(id);
+  if (!record) return {};
+  for (const Observation& observation : record->observations) {
+    const PointRecord* point = FindPoint(observation.point);
+    if (!point) continue;
+    for (const KeyFrameId observer : point->observers) {
+      if (observer != id) ++shared[observer];
+    }
+  }
+  std::vector<std::pair<KeyFrameId, int>> sorted(shared.begin(), shared.end());
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  return sorted;
+}
+
+std::shared_ptr<const MapSnapshot> Map::Snapshot() {
+  std::erase_if(points_, [](const PointRecord& record) { return !record.alive; });
+  auto snapshot = std::make_shared<MapSnapshot>();
+  snapshot->revision = ++revision_;
+  snapshot->next_keyframe = next_keyframe_;
+  snapshot->next_point = next_point_;
+  snapshot->keyframes.reserve(keyframes_.size());
+  for (const auto& [id, record] : keyframes_) {
+    snapshot->keyframes.push_back(record.keyframe);
+    snapshot->observations.insert(snapshot->observations.end(), record.observations.begin(),
+                                  record.observations.end());
+  }
+  snapshot->points.reserve(points_.size());
+  for (const PointRecord& record : points_) snapshot->points.push_back(record.point);
+  return snapshot;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "engine/map/map_snapshot.h"
+
+namespace docent::engine {
+
+// The map that the mapper works on: the data of a MapSnapshot with the links between keyframes and points
+// kept in both directions. Owned by one mapper and touched by its thread alone; everyone else sees
+// Snapshot(). Always holds: a point is observed by at least one keyframe, observers and observations agree,
+// the point's source keyframe is in the map.
+class Map {
+ public:
+  struct PointRecord {
+    MapPoint point;
+    std::vector<KeyFrameId> observers;  // ascending
+    bool alive = true;
+    int seen_inlier = 0, seen_outlier = 0, not_found = 0;  // as the trackers tell
+  };
+  struct KeyFrameRecord {
+    KeyFrame keyframe;
+    std::vector<Observation> observations;  // by ascending point
+  };
+
+  Map() = default;
+  // The snapshot must be valid (see Validate).
+  explicit Map(const MapSnapshot& snapshot);
+
+  bool empty() const { return keyframes_.empty(); }
+  std::map<KeyFrameId, KeyFrameRecord>& keyframes() { return keyframes_; }
+  const std::map<KeyFrameId, KeyFrameRecord>& keyframes() const { return keyframes_; }
+  // All points by ascending id, dead ones among them until the next Snapshot().
+  std::vector<PointRecord>& points() { return points_; }
+  const std::vector<PointRecord>& points() const { return points_; }
+
+  KeyFrameRecord& AddKeyFrame(KeyFrame keyframe);  // gives it an id
+  MapPointId AddPoint(MapPoint point);             // gives it an id; observations follow
+  PointRecord* FindPoint(MapPointId id);           // null when unknown or dead
+  KeyFrameRecord* FindKeyFrame(KeyFrameId id);
+
+  // False when the keyframe sees the point already.
+  bool AddObservation(const Observation& observation);
+  // Removes the point when fewer than two observations are left, or its source keyframe lost sight of it.
+  void RemoveObservation(KeyFrameId keyframe, MapPointId point);
+  void RemovePoint(MapPointId id);
+  void RemoveKeyFrame(KeyFrameId id);
+
+  // Median depth and spread of the points that a keyframe sees.
+  void UpdateDepth(KeyFrameRecord* record);
+  // Points towards the mean of the directions to its observers.
+  void UpdateNormal(PointRecord* record);
+
+  // Keyframes that share points with this one, most shared first: (id, count).
+  std::vector<std::pair<KeyFrameId, int>> Covisible(KeyFrameId id);
+
+  // An immutable copy of what is alive, with the next revision; drops dead points.
+  std::shared_ptr<const MapSnapshot> Snapshot();
+  std::size_t AlivePoints() const { return alive_points_; }
+
+ private:
+  std::map<KeyFrameId, KeyFrameRecord> keyframes_;
+  std::vector<PointRecord> points_;
+  std::size_t alive_points_ = 0;
+  KeyFrameId next_keyframe_ = 0;
+  MapPointId next_point_ = 0;
+  std::uint64_t revision_ = 0;
+};
+
+}  // namespace docent::engine

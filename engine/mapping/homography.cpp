@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/homography.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace docent::engine {
+namespace {
+
+// Two directions perpendicular to a unit vector and to each other.
+Eigen::Matrix<double, 2, 3> TangentBasis(const Eigen::Vector3d& ray) {
+  Eigen::Matrix<double, 2, 3> basis;
+  const Eigen::Vector3d first = ray.unitOrthogonal();
+  basis.row(0) = first;
+  basis.row(1) = ray.cross(first);
+  return basis;
+}
+
+}  // namespace
+
+std::optional<Eigen::Matrix3d> SolveFourPoint(std::span<const Eigen::Vector3d, 4> rays_in_a,
+                                              std::span<const Eigen::Vector3d, 4> rays_in_b) {
+  // With the first three rays as a basis, the fourth's coordinates fix how far each ray is stretched.
+  Eigen::Matrix3d basis_a, basis_b;
+  basis_a << rays_in_a[0], rays_in_a[1], rays_in_a[2];
+  basis_b << rays_in_b[0], rays_in_b[1], rays_in_b[2];
+  constexpr double kMinVolume = 1e-7;  // of unit rays: about a triangle 0.5 degrees across
+  if (!(std::abs(basis_a.determinant()) > kMinVolume && std::abs(basis_b.determinant()) > kMinVolume))
+    return std::nullopt;
+  const Eigen::Matrix3d inverse_a = basis_a.inverse();
+  const Eigen::Vector3d along_a = inverse_a * rays_in_a[3], along_b = basis_b.inverse() * rays_in_b[3];
+  const Eigen::Vector3d stretch = along_b.cwiseQuotient(along_a);
+  // All four in front of both cameras: every stretch is positive.
+  if (!(stretch.minCoeff() > 0) || !stretch.allFinite()) return std::nullopt;
+  return basis_b * stretch.asDiagonal() * inverse_a;
+}
+
+std::optional<Eigen::Matrix3d> ScaleHomography(const Eigen::Matrix3d& homography) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(homography.transpose() * homography,
+                                                             Eigen::EigenvaluesOnly);
+  const double middle = eigen.eigenvalues()[1];
+  if (!(middle > 1e-12 * eigen.eigenvalues()[2])) return std::nullopt;
+  return homography / std::sqrt(middle);
+}
+
+std::optional<Eigen::Matrix3d> FitHomography(std::span<const Eigen::Vector3d> rays_in_a,
+                                             std::span<const Eigen::Vector3d> rays_in_b) {
+  if (rays_in_a.size() < 4 || rays_in_a.size() != rays_in_b.size()) return std::nullopt;
+  // Each pair asks that H ray_a has no component across ray_b: two rows on H's entries, row by row.
+  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::Matrix<double, 2, 9> rows;
+  for (std::size_t i = 0; i < rays_in_a.size(); ++i) {
+    const Eigen::Matrix<double, 2, 3> tangents = TangentBasis(rays_in_b[i]);
+    for (int row = 0; row < 3; ++row)
+      rows.block<2, 3>(0, 3 * row) = tangents.col(row) * rays_in_a[i].transpose();
+    normal.noalias() += rows.transpose() * rows;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(normal);
+  // One null direction is the answer, a second one means that the rays do not determine it.
+  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues()[1] > 1e-12 * eigen.eigenvalues()[8]))
+    return std::nullopt;
+  const Eigen::Matrix<double, 9, 1> entries = eigen.eigenvectors().col(0);
+  Eigen::Matrix3d homography = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(entries.data());
+  const auto scaled = ScaleHomography(homography);
+  if (!scaled) return std::nullopt;
+  homography = *scaled;
+  std::size_t opposite = 0;
+  for (std::size_t i = 0; i < rays_in_a.size(); ++i)
+    opposite += rays_in_b[i].dot(homography * rays_in_a[i]) < 0;
+  if (2 * opposite > rays_in_a.size()) homography = -homography;
+  return homography;
+}
+
+std::vector<PlaneMotion> DecomposeHomography(const Eigen::Matrix3d& b_from_a) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(b_from_a.transpose() * b_from_a);
+  // Descending: largest >= 1 >= smallest. Where rounding leaves the middle one a little off 1, its own value
+  // is the unit.
+  const double middle = eigen.eigenvalues()[1];
+  if (!(middle > 1e-12)) return {};
+  const double largest = eigen.eigenvalues()[2] / middle, smallest = eigen.eigenvalues()[0] / middle;
+  if (!(largest - smallest > 1e-9)) return {};
+  const Eigen::Matrix3d homography = b_from_a / std::sqrt(middle);
+  const Eigen::Vector3d v1 = eigen.eigenvectors().col(2), v2 = eigen.eigenvectors().col(1);
+  const Eigen::Vector3d v3 = eigen.eigenvectors().col(0);
+  const double along = std::sqrt(std::max(1 - smallest, 0.0)) / std::sqrt(largest - smallest);
+  const double across = std::sqrt(std::max(largest - 1, 0.0)) / std::sqrt(largest - smallest);
+
+  std::vector<PlaneMotion> motions;
+  for (const double sign : {1.0, -1.0}) {
+    // v2 and u span a plane on which H keeps all lengths: a rotation does the same to both.
+    const Eigen::Vector3d u = along * v1 + sign * across * v3;
+    Eigen::Matrix3d before, after;
+    before << v2, u, v2.cross(u);
+    const Eigen::Vector3d turned_v2 = homography * v2, turned_u = homography * u;
+    after << turned_v2, turned_u, turned_v2.cross(turned_u);
+    const Eigen::Matrix3d rotation_matrix = after * before.transpose();
+    const Eigen::Vector3d normal = v2.cross(u);
+    const Eigen::Vector3d translation = (homography - rotation_matrix) * normal;
+    const Rotation3 rotation{rotation_matrix};
+    motions.push_back({{rotation, translation}, normal});
+    motions.push_back({{rotation, -translation}, -normal});
+  }
+  return motions;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/initializer.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace docent::engine {
+
+namespace {
+
+constexpr float kMinCorrelation = 0.8f;
+constexpr float kMaxRoundTripPx = 0.7f;  // of the corner's level: there and back again
+constexpr float kMaxStepPx = 4.0f;       // of each level: how far alignment may move from its prediction
+
+// Follows one place of `from` into `to`, coarse to fine, down to the corner's own level.
+std::optional<Eigen::Vector2f> FollowPatch(const ImageFeatures& from, const Eigen::Vector2f& pixel,
+                                           const ImageFeatures& to, const Eigen::Vector2f& prediction,
+                                           int level) {
+  Eigen::Vector2d guess = prediction.cast<double>();
+  PatchTemplate patch;
+  for (int l = kPyramidLevels - 1; l >= level; --l) {
+    const auto index = static_cast<std::size_t>(l);
+    const Eigen::Vector2f source = LevelFromLevelZero(pixel.cast<double>(), l).cast<float>();
+    const bool finest = l == level;
+    const bool cut = CutPatch(from.levels[index], source, Eigen::Matrix2f::Identity(), &patch);
+    std::optional<PatchAlignment> aligned;
+    if (cut) {
+      aligned =
+          AlignPatch(patch, to.levels[index], LevelFromLevelZero(guess, l).cast<float>(), kMaxStepPx, 12);
+    }
+    if (aligned && aligned->correlation > kMinCorrelation) {
+      guess = LevelZeroFromLevel(aligned->pixel.cast<double>(), l);
+    } else if (finest) {
+      return std::nullopt;
+    }
+  }
+  return guess.cast<float>();
+}
+
+// The best corners of a level, at most `count`, thinned so that they cover the picture.
+std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t level, int count) {
+  const cv::Mat& image = features.levels[level];
+  const double cell = std::max(8.0, std::sqrt(static_cast<double>(image.total()) / (1.3 * count)));
+  const int columns = static_cast<int>(image.cols / cell) + 1, rows = static_cast<int>(image.rows / cell) + 1;
+  struct Best {
+    float score = 0;
+    Corner corner;
+  };
+  std::vector<Best> best(static_cast<std::size_t>(columns * rows));
+  for (const Corner& corner : features.corners[level]) {
+    if (!PatchFits(image, corner.x, corner.y, 3.0f)) continue;
+    const float score = ShiTomasiScore(image, corner.x, corner.y);
+    Best& place = best[static_cast<std::size_t>(static_cast<int>(corner.y / cell) * columns +
+                                                static_cast<int>(corner.x / cell))];
+    if (score > place.score) place = {score, corner};
+  }
+  std::erase_if(best, [](const Best& place) { return place.score < 30.0f; });
+  std::stable_sort(best.begin(), best.end(), [](const Best& a, const Best& b) { return a.score > b.score; });
+  std::vector<Corner> corners;
+  for (const Best& place : best) {
+    if (static_cast<int>(corners.size()) >= count) break;
+    corners.push_back(place.corner);
+  }
+  return corners;
+}
+
+}  // namespace
+
+Initializer::Initializer(const InitializerOptions& options, std::shared_ptr<const CameraModel> camera,
+                         std::uint64_t seed)
+    : options_(options), camera_(std::move(camera)), random_(seed) {}
+
+void Initializer::Reset() {
+  trails_.clear();
+  first_.reset();
+  previous_.reset();
+  hint_.clear();
+}
+
+void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
+  trails_.clear();
+  for (std::size_t level = 0; level < options_.corners.size(); ++level) {
+    for (const Corner& corner : SpreadCorners(*features, level, options_.corners[level])) {
+      const Eigen::Vector2f pixel =
+          LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), static_cast<int>(level)).cast<float>();
+      trails_.push_back({pixel, pixel, static_cast<int>(level)});
+    }
+  }
+  trails_at_start_ = trails_.size();
+  age_frames_ = 0;
+  first_time_ = time;
+  first_ = previous_ = features;
+  hint_ = static_cast<int>(trails_.size()) < options_.min_alive
+              ? "too little texture: point at something with detail"
+              : "move sideways";
+}
+
+void Initializer::Follow(const ImageFeatures& features) {
+  const auto rotation = AlignRotation(previous_->small_blurry, *camera_, features.small_blurry, *camera_);
+  const Rotation3 now_from_previous = rotation && rotation->converged ? rotation->b_from_a : Rotation3();
+  std::erase_if(trails_, [&](Trail& trail) {
+    const auto ray = camera_->Unproject(trail.now.cast<double>());
+    if (!ray) return true;
+    const auto prediction = camera_->Project(now_from_previous * *ray);
+    if (!prediction || !camera_->IsInside(*prediction, 6)) return true;
+    const auto now = FollowPatch(*previous_, trail.now, features, prediction->cast<float>(), trail.level);
+    if (!now || !camera_->IsInside(now->cast<double>(), 6)) return true;
+    const auto back = FollowPatch(features, *now, *previous_, trail.now, trail.level);
+    if (!back || (*back - trail.now).norm() > kMaxRoundTripPx * static_cast<float>(1 << trail.level))
+      return true;
+    trail.now = *now;
+    return false;
+  });
+}
+
+std::optional<InitialPair> Initializer::Track(Timestamp time,
+                                              const std::shared_ptr<const ImageFeatures>& features) {
+  if (!first_) {
+    Start(time, features);
+    return std::nullopt;
+  }
+  ++age_frames_;
+  Follow(*features);
+  previous_ = features;
+  const bool faded =
+      trails_.size() < static_cast<std::size_t>(options_.min_alive) ||
+      static_cast<double>(trails_.size()) < options_.min_alive_ratio * static_cast<double>(trails_at_start_);
+  if (faded || age_frames_ > options_.max_age_frames) {
+    Start(time, features);
+    return std::nullopt;
+  }
+  if (age_frames_ % options_.attempt_interval != 0) return std::nullopt;
+  std::vector<float> motion;
+  motion.reserve(trails_.size());
+  for (const Trail& trail : trails_) motion.push_back((trail.now - trail.first).norm());
+  const auto middle = motion.begin() + static_cast<std::ptrdiff_t>(motion.size() / 2);
+  std::nth_element(motion.begin(), middle, motion.end());
+  if (*middle < options_.min_motion_px * camera_->width_px() / 640.0) {
+    hint_ = Advice(TwoViewVerdict::kStill);
+    return std::nullopt;
+  }
+  return Attempt(time, features);
+}
+
+std::optional<InitialPair> Initializer::Attempt(Timestamp time,
+                                                const std::shared_ptr<const ImageFeatures>& features) {
+  std::vector<Eigen::Vector3d> rays_a, rays_b;
+  InitialPair pair;
+  for (const Trail& trail : trails_) {
+    const auto a = camera_->Unproject(trail.first.cast<double>()),
+               b = camera_->Unproject(trail.now.cast<double>());
+    if (!a || !b) continue;
+    rays_a.push_back(*a);
+    rays_b.push_back(*b);
+    pair.matches.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
+  }
+  TwoViewOptions options = options_.two_view;
+  options.pixel_angle = camera_->PixelAngle();
+  options.seed = random_.Next();
+  pair.geometry = EstimateTwoViews(rays_a, rays_b, options);
+  hint_ = Advice(pair.geometry.verdict);
+  if (pair.geometry.verdict != TwoViewVerdict::kGeneral && pair.geometry.verdict != TwoViewVerdict::kPlanar) {
+    return std::nullopt;
+  }
+  pair.camera = camera_;
+  pair.a = {first_time_, first_};
+  pair.b = {time, features};
+  Reset();
+  return pair;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "engine/base/time.h"
+#include "engine/geometry/camera_model.h"
+#include "engine/geometry/rigid3.h"
+#include "engine/mapping/two_view_geometry.h"
+#include "engine/tracking/tracked_frame.h"
+
+namespace docent::engine {
+
+// A frame that a tracker offers to the mapper as a keyframe (ptamm §2.2), with what it saw there.
+struct KeyFrameCandidate {
+  Timestamp time{};
+  std::shared_ptr<const CameraModel> camera;
+  std::shared_ptr<const ImageFeatures> features;
+  Rigid3 camera_from_map;
+  std::vector<PointMatch> matches;  // inliers only
+};
+
+// How often each point was looked for, found and believed since the last report: the trackers' verdict on it.
+struct PointReport {
+  MapPointId point = kNoId;
+  int inlier = 0, outlier = 0, not_found = 0;
+};
+
+// Two views with matched corners and the pose between them: enough to start a map.
+struct InitialPair {
+  struct View {
+    Timestamp time{};
+    std::shared_ptr<const ImageFeatures> features;
+  };
+  struct Match {
+    Eigen::Vector2f pixel_a, pixel_b;  // level 0
+    std::uint8_t level = 0;            // that the corner was found on, in view a
+  };
+  std::shared_ptr<const CameraModel> camera;
+  View a, b;
+  std::vector<Match> matches;
+  TwoViewResult geometry;  // one inlier flag and point a match
+};
+
+}  // namespace docent::engine

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/map_adjustment.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+namespace docent::engine {
+
+namespace {
+
+// Translates between the map's ids and the problem's indices.
+struct Assembly {
+  BundleProblem problem;
+  std::vector<KeyFrameId> cameras;
+  std::vector<MapPointId> points;
+};
+
+Assembly Assemble(Map* map, const std::set<KeyFrameId>& free, const std::set<KeyFrameId>& fixed,
+                  const std::set<MapPointId>& points) {
+  Assembly assembly;
+  std::map<MapPointId, int> point_index;
+  for (const MapPointId id : points) {
+    const Map::PointRecord* record = map->FindPoint(id);
+    point_index[id] = static_cast<int>(assembly.points.size());
+    assembly.points.push_back(id);
+    assembly.problem.points.push_back({record->point.position(), false});
+  }
+  const auto add = [&](KeyFrameId id, bool hold) {
+    const Map::KeyFrameRecord* record = map->FindKeyFrame(id);
+    const int camera = static_cast<int>(assembly.cameras.size());
+    assembly.cameras.push_back(id);
+    assembly.problem.cameras.push_back({record->keyframe.camera, record->keyframe.camera_from_map, hold});
+    for (const Observation& observation : record->observations) {
+      const auto point = point_index.find(observation.point);
+      if (point == point_index.end()) continue;
+      assembly.problem.measurements.push_back({camera, point->second, observation.pixel.cast<double>(),
+                                               static_cast<double>(1 << observation.level), false});
+    }
+  };
+  for (const KeyFrameId id : free) add(id, map->FindKeyFrame(id)->keyframe.fixed);
+  for (const KeyFrameId id : fixed) add(id, true);
+  return assembly;
+}
+
+BundleSummary Solve(const BundleOptions& options, Assembly* assembly, Map* map) {
+  const BundleSummary summary = AdjustBundle(options, &assembly->problem);
+  if (summary.outcome == BundleSummary::Outcome::kFailed) return summary;
+  for (std::size_t i = 0; i < assembly->cameras.size(); ++i) {
+    if (!assembly->problem.cameras[i].fixed) {
+      map->FindKeyFrame(assembly->cameras[i])->keyframe.camera_from_map =
+          assembly->problem.cameras[i].camera_from_map;
+    }
+  }
+  for (std::size_t i = 0; i < assembly->points.size(); ++i) {
+    map->FindPoint(assembly->points[i])->point.point_in_map.head<3>() = assembly->problem.points[i].position;
+  }
+  // An adjustment that was cut short has not yet earned the right to call a measurement wrong.
+  if (summary.outcome != BundleSummary::Outcome::kInterrupted) {
+    for (const BundleProblem::Measurement& measurement : assembly->problem.measurements) {
+      if (measurement.outlier) {
+        map->RemoveObservation(assembly->cameras[static_cast<std::size_t>(measurement.camera)],
+                               assembly->points[static_cast<std::size_t>(measurement.point)]);
+      }
+    }
+  }
+  for (const MapPointId id : assembly->points) {
+    if (Map::PointRecord* record = map->FindPoint(id)) map->UpdateNormal(record);
+  }
+  for (const KeyFrameId id : assembly->cameras) map->UpdateDepth(map->FindKeyFrame(id));
+  return summary;
+}
+
+std::set<MapPointId> FinitePointsSeenBy(Map* map, const std::set<KeyFrameId>& keyframes) {
+  std::set<MapPointId> points;
+  for (const KeyFrameId id : keyframes) {
+    for (const Observation& observation : map->FindKeyFrame(id)->observations) {
+      const Map::PointRecord* record = map->FindPoint(observation.point);
+      if (record && !record->point.infinite()) points.insert(observation.point);
+    }
+  }
+  return points;
+}
+
+}  // namespace
+
+BundleSummary AdjustLocally(const MapAdjustmentOptions& options, KeyFrameId keyframe,
+                            const std::atomic<bool>* interrupt, Map* map) {
+  if (!map->FindKeyFrame(keyframe)) return {};
+  std::set<KeyFrameId> free = {keyframe};
+  for (const auto& [id, shared] : map->Covisible(keyframe)) {
+    if (static_cast<int>(free.size()) > options.window) break;
+    free.insert(id);
+  }
+  const std::set<MapPointId> points = FinitePointsSeenBy(map, free);
+  std::map<KeyFrameId, int> others;
+  for (const MapPointId id : points) {
+    for (const KeyFrameId observer : map->FindPoint(id)->observers) {
+      if (!free.contains(observer)) ++others[observer];
+    }
+  }
+  std::vector<std::pair<int, KeyFrameId>> by_count;
+  for (const auto& [id, count] : others) by_count.emplace_back(-count, id);
+  std::sort(by_count.begin(), by_count.end());
+  std::set<KeyFrameId> fixed;
+  for (const auto& [count, id] : by_count) {
+    if (static_cast<int>(fixed.size()) >= options.max_fixed) break;
+    fixed.insert(id);
+  }
+  Assembly assembly = Assemble(map, free, fixed, points);
+  BundleOptions bundle;
+  bundle.max_iterations = options.local_iterations;
+  bundle.interrupt = interrupt;
+  return Solve(bundle, &assembly, map);
+}
+
+BundleSummary AdjustGlobally(const MapAdjustmentOptions& options, const std::atomic<bool>* interrupt,
+                             Map* map) {
+  std::set<KeyFrameId> all;
+  for (const auto& [id, record] : map->keyframes()) all.insert(id);
+  Assembly assembly = Assemble(map, all, {}, FinitePointsSeenBy(map, all));
+  BundleOptions bundle;
+  bundle.max_iterations = options.global_iterations;
+  bundle.interrupt = interrupt;
+  return Solve(bundle, &assembly, map);
+}
+
+}  // namespace docent::engine

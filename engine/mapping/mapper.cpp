@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/mapper.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "engine/geometry/triangulation.h"
+
+namespace docent::engine {
+
+namespace {
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+Mapper::Mapper(const MapperOptions& options) : options_(options), searcher_(options.search) {}
+
+void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
+  map_ = snapshot ? Map(*snapshot) : Map();
+  searcher_.Clear();
+  newest_ = kNoId;
+  to_refind_.clear();
+  keyframes_since_global_ = 0;
+  global_interrupted_ = false;
+  locally_adjusted_ = true;
+  const std::lock_guard lock(mutex_);
+  queue_.clear();
+  reports_.clear();
+  snapshot_ = std::move(snapshot);
+}
+
+bool Mapper::Offer(KeyFrameCandidate candidate) {
+  const std::lock_guard lock(mutex_);
+  if (queue_.size() >= options_.max_queue) return false;
+  queue_.emplace_back(std::move(candidate));
+  interrupt_ = true;
+  return true;
+}
+
+bool Mapper::Start(InitialPair pair) {
+  const std::lock_guard lock(mutex_);
+  if (queue_.size() >= options_.max_queue) return false;
+  queue_.emplace_back(std::move(pair));
+  interrupt_ = true;
+  return true;
+}
+
+void Mapper::Report(std::vector<PointReport> reports) {
+  const std::lock_guard lock(mutex_);
+  reports_.insert(reports_.end(), reports.begin(), reports.end());
+}
+
+std::size_t Mapper::QueueLength() const {
+  const std::lock_guard lock(mutex_);
+  return queue_.size();
+}
+
+std::shared_ptr<const MapSnapshot> Mapper::Snapshot() const {
+  const std::lock_guard lock(mutex_);
+  return snapshot_;
+}
+
+std::vector<MapperEvent> Mapper::TakeEvents() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(events_, {});
+}
+
+MapperTimes Mapper::Times() const {
+  const std::lock_guard lock(mutex_);
+  return times_;
+}
+
+bool Mapper::Settled() const {
+  return QueueLength() == 0 && locally_adjusted_;
+}
+
+void Mapper::Tell(MapperEvent::Kind kind, Timestamp time, std::string detail) {
+  const std::lock_guard lock(mutex_);
+  events_.push_back({kind, time, std::move(detail)});
+}
+
+void Mapper::Publish() {
+  auto snapshot = map_.Snapshot();
+  const std::lock_guard lock(mutex_);
+  snapshot_ = std::move(snapshot);
+}
+
+bool Mapper::Step() {
+  const auto start = std::chrono::steady_clock::now();
+  std::optional<Task> task;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!queue_.empty()) {
+      task = std::move(queue_.front());
+      queue_.pop_front();
+    }
+    interrupt_ = !queue_.empty();
+  }
+  bool worked = true;
+  bool adjusting = false;
+  if (task) {
+    if (const auto* candidate = std::get_if<KeyFrameCandidate>(&*task)) {
+      InsertKeyFrame(*candidate);
+    } else {
+      StartMap(std::get<InitialPair>(*task));
+    }
+  } else if (!to_refind_.empty()) {
+    RefindNewPoints();
+  } else if (!locally_adjusted_) {
+    adjusting = true;
+    LocalAdjustment();
+  } else if (global_interrupted_ || keyframes_since_global_ > 4 + map_.keyframes().size() / 6) {
+    adjusting = true;
+    GlobalAdjustment();
+  } else {
+    worked = false;
+  }
+  if (worked) {
+    const double seconds = SecondsSince(start);
+    const std::lock_guard lock(mutex_);
+    (adjusting ? times_.bundle_adjustment : times_.other) += seconds;
+  }
+  return worked;
+}
+
+void Mapper::StartMap(const InitialPair& pair) {
+  map_ = Map();
+  searcher_.Clear();
+  to_refind_.clear();
+  keyframes_since_global_ = 0;
+  const double scale = options_.initial_baseline_m;
+  Rigid3 b_from_a = pair.geometry.b_from_a;
+  b_from_a.translation *= scale / b_from_a.translation.norm();
+
+  KeyFrame first;
+  first.fixed = true;
+  first.time = pair.a.time;
+  first.camera = pair.camera;
+  first.features = pair.a.features;
+  KeyFrame second = first;
+  second.fixed = false;
+  second.time = pair.b.time;
+  second.features = pair.b.features;
+  second.camera_from_map = b_from_a;
+  const KeyFrameId a = map_.AddKeyFrame(first).keyframe.id;
+  const KeyFrameId b = map_.AddKeyFrame(second).keyframe.id;
+  for (std::size_t i = 0; i < pair.matches.size(); ++i) {
+    if (!pair.geometry.inlier[i]) continue;
+    const InitialPair::Match& match = pair.matches[i];
+    MapPoint point;
+    point.point_in_map << scale * pair.geometry.points_in_a[i], 1.0;
+    point.source_keyframe = a;
+    point.source_level = match.level;
+    point.source_pixel = LevelFromLevelZero(match.pixel_a.cast<double>(), match.level).cast<float>();
+    const MapPointId id = map_.AddPoint(point);
+    map_.AddObservation({a, id, match.pixel_a, match.level});
+    map_.AddObservation({b, id, match.pixel_b, match.level});
+    map_.UpdateNormal(map_.FindPoint(id));
+  }
+  newest_ = b;
+  AdjustGlobally(options_.adjustment, nullptr, &map_);
+  for (auto& [id, record] : map_.keyframes()) map_.UpdateDepth(&record);
+  // The first corners are few; the rest of the picture joins at once, from both sides.
+  CreatePoints(options_.creation, b, a, &map_, &searcher_);
+  CreatePoints(options_.creation, a, b, &map_, &searcher_);
+  AdjustGlobally(options_.adjustment, nullptr, &map_);
+  if (static_cast<int>(map_.AlivePoints()) < options_.min_initial_points) {
+    Tell(MapperEvent::Kind::kStartFailed, pair.b.time,
+         "only " + std::to_string(map_.AlivePoints()) + " points agree");
+    map_ = Map();
+    newest_ = kNoId;
+    const std::lock_guard lock(mutex_);
+    snapshot_.reset();
+    return;
+  }
+  locally_adjusted_ = true;
+  Publish();
+  Tell(MapperEvent::Kind::kMapStarted, pair.b.time, std::to_string(map_.AlivePoints()) + " points");
+}
+
+void Mapper::ApplyReports() {
+  constexpr int kEnough = 20;
+  std::vector<PointReport> reports;
+  {
+    const std::lock_guard lock(mutex_);
+    reports.swap(reports_);
+  }
+  for (const PointReport& report : reports) {
+    Map::PointRecord* record = map_.FindPoint(report.point);
+    if (!record) continue;
+    record->seen_inlier += report.inlier;
+    record->seen_outlier += report.outlier;
+    record->not_found += report.not_found;
+    const int tries = record->seen_inlier + record->seen_outlier + record->not_found;
+    // A point that is found in the wrong place, or that was never found beyond its two first views, harms.
+    const bool wrong = record->seen_outlier > kEnough && record->seen_outlier > record->seen_inlier;
+    const bool phantom = tries > kEnough && record->observers.size() <= 2 && record->seen_inlier * 5 < tries;
+    if (wrong || phantom) map_.RemovePoint(report.point);
+  }
+}
+
+void Mapper::InsertKeyFrame(const KeyFrameCandidate& candidate) {
+  if (map_.empty()) return;
+  ApplyReports();
+  KeyFrame keyframe;
+  keyframe.time = candidate.time;
+  keyframe.camera = candidate.camera;
+  keyframe.features = candidate.features;
+  keyframe.camera_from_map = candidate.camera_from_map;
+  Map::KeyFrameRecord& record = map_.AddKeyFrame(keyframe);
+  const KeyFrameId id = record.keyframe.id;
+  for (const PointMatch& match : candidate.matches) {
+    map_.AddObservation({id, match.point, match.pixel, match.level});
+  }
+  map_.UpdateDepth(&record);
+  Refind(id, nullptr);
+  map_.UpdateDepth(&record);
+  std::vector<MapPointId> created;
+  for (const KeyFrameId partner : Partners(id)) {
+    const auto points = CreatePoints(options_.creation, id, partner, &map_, &searcher_);
+    created.insert(created.end(), points.begin(), points.end());
+  }
+  to_refind_.insert(to_refind_.end(), created.begin(), created.end());
+  newest_ = id;
+  ++keyframes_since_global_;
+  locally_adjusted_ = false;
+  Publish();
+  Tell(MapperEvent::Kind::kKeyFrame, candidate.time,
+       std::to_string(created.size()) + " new points, " + std::to_string(map_.AlivePoints()) + " in all");
+}
+
+std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
+  const Map::KeyFrameRecord& record = *map_.FindKeyFrame(id);
+  const Eigen::Vector3d center = record.keyframe.camera_from_map.OriginInSource();
+  struct Scored {
+    double score;
+    KeyFrameId id;
+  };
+  std::vector<Scored> scored;
+  for (const auto& [other, shared] : map_.Covisible(id)) {
+    if (shared < 15) break;
+    const Rigid3& pose = map_.FindKeyFrame(other)->keyframe.camera_from_map;
+    const double baseline = (pose.OriginInSource() - center).norm() / record.keyframe.mean_depth;
+    if (baseline < options_.min_partner_baseline || baseline > options_.max_partner_baseline) continue;
+    // Much overlap for matching, a baseline of about 0.15 depths for triangulating.
+    const double fit = std::min(baseline / 0.15, 0.15 / baseline);
+    scored.push_back({-shared * std::sqrt(fit), other});
+  }
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const Scored& a, const Scored& b) { return a.score < b.score; });
+  std::vector<KeyFrameId> partners;
+  for (const Scored& partner : scored) {
+    if (static_cast<int>(partners.size()) >= options_.partners) break;
+    partners.push_back(partner.id);
+  }
+  return partners;
+}
+
+void Mapper::Refind(KeyFrameId id, const std::vector<MapPointId>* ids) {
+  Map::KeyFrameRecord& record = *map_.FindKeyFrame(id);
+  const auto find = [&](Map::PointRecord& point) {
+    if (!point.alive || point.point.source_keyframe == id) return;
+    if (std::binary_search(point.observers.begin(), point.observers.end(), id)) return;
+    const Map::KeyFrameRecord* source = map_.FindKeyFrame(point.point.source_keyframe);
+    if (!source) return;
+    const auto predicted = searcher_.Predict(point.point, source->keyframe, *record.keyframe.camera,
+                                             record.keyframe.camera_from_map);
+    if (!predicted) return;
+    const auto found = searcher_.Find(point.point, source->keyframe, *predicted, *record.keyframe.features,
+                                      options_.refind_radius_px, false);
+    if (!found) return;
+    // Twice the level's sigma, as for a new point: what lies further off would only be thrown out again.
+    const double error = (found->pixel.cast<double>() - predicted->pixel).norm();
+    if (error > 3.0 * (1 << predicted->level)) return;
+    map_.AddObservation({id, point.point.id, found->pixel, static_cast<std::uint8_t>(predicted->level)});
+  };
+  if (ids) {
+    for (const MapPointId point : *ids) {
+      if (Map::PointRecord* found = map_.FindPoint(point)) find(*found);
+    }
+  } else {
+    for (Map::PointRecord& point : map_.points()) find(point);
+  }
+}
+
+void Mapper::RefindNewPoints() {
+  // New points are looked for in the keyframes that share most with the newest one.
+  constexpr std::size_t kNeighbours = 8;
+  if (newest_ != kNoId) {
+    auto neighbours = map_.Covisible(newest_);
+    if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
+    for (const auto& [id, shared] : neighbours) Refind(id, &to_refind_);
+  }
+  to_refind_.clear();
+}
+
+void Mapper::LocalAdjustment() {
+  const BundleSummary summary = AdjustLocally(options_.adjustment, newest_, &interrupt_, &map_);
+  if (summary.outcome != BundleSummary::Outcome::kInterrupted) locally_adjusted_ = true;
+  Publish();
+}
+
+void Mapper::GlobalAdjustment() {
+  const BundleSummary summary = AdjustGlobally(options_.adjustment, &interrupt_, &map_);
+  global_interrupted_ = summary.outcome == BundleSummary::Outcome::kInterrupted;
+  if (global_interrupted_) return;
+  keyframes_since_global_ = 0;
+  Publish();
+  if (map_.empty()) return;
+  Tell(MapperEvent::Kind::kGlobalAdjustment, map_.keyframes().rbegin()->second.keyframe.time,
+       summary.Brief());
+}
+
+}  // namespace docent::engine

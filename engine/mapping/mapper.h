@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "engine/mapping/keyframe_candidate.h"
+#include "engine/mapping/map_adjustment.h"
+#include "engine/mapping/point_creation.h"
+
+namespace docent::engine {
+
+struct MapperOptions {
+  std::size_t max_queue = 3;           // keyframes waiting (ptamm §2.2)
+  double initial_baseline_m = 0.1;     // ptamm §2.3
+  int partners = 3;                    // keyframes in which a new one's corners are looked for
+  double min_partner_baseline = 0.03;  // of the mean depth
+  double max_partner_baseline = 0.6;
+  int min_initial_points = 60;  // after the first adjustment, else the start is given up
+  float refind_radius_px = 6;   // level 0
+  PointCreationOptions creation;
+  MapAdjustmentOptions adjustment;
+  SearchOptions search;
+};
+
+// What the mapper did, for events and reports.
+struct MapperEvent {
+  enum class Kind { kMapStarted, kStartFailed, kKeyFrame, kGlobalAdjustment };
+  Kind kind = Kind::kKeyFrame;
+  Timestamp time{};
+  std::string detail;
+};
+
+// Seconds of work by task.
+struct MapperTimes {
+  double bundle_adjustment = 0, other = 0;
+};
+
+// Grows and refines one map (ptamm §2.3, Fig. 2b): starts it from two views, takes keyframes in, makes
+// points, adjusts, finds points again. Work is done by Step() on one thread at a time; Offer(), Report(),
+// Snapshot() and the other questions may be asked from any thread. Long adjustments stop when a keyframe is
+// offered.
+class Mapper {
+ public:
+  explicit Mapper(const MapperOptions& options);
+
+  // Goes on with a map from the library, or with nothing (null). Drops whatever waits. Not during a Step().
+  void Adopt(std::shared_ptr<const MapSnapshot> snapshot);
+
+  // False when the queue is full. Times of one map ascend.
+  bool Offer(KeyFrameCandidate candidate);
+  bool Start(InitialPair pair);
+  void Report(std::vector<PointReport> reports);
+  std::size_t QueueLength() const;
+
+  // Does the most urgent piece of work; false when there was none.
+  bool Step();
+  // True while nothing urgent waits: no keyframe, and the newest one is adjusted.
+  bool Settled() const;
+
+  // The newest published state; null while there is no map.
+  std::shared_ptr<const MapSnapshot> Snapshot() const;
+  std::vector<MapperEvent> TakeEvents();
+  MapperTimes Times() const;
+
+ private:
+  using Task = std::variant<KeyFrameCandidate, InitialPair>;
+
+  void StartMap(const InitialPair& pair);
+  void InsertKeyFrame(const KeyFrameCandidate& candidate);
+  void ApplyReports();
+  // Looks for the map's points (or only for those in `ids`) in a keyframe that does not see them yet.
+  void Refind(KeyFrameId keyframe, const std::vector<MapPointId>* ids);
+  std::vector<KeyFrameId> Partners(KeyFrameId keyframe);
+  void RefindNewPoints();
+  void LocalAdjustment();
+  void GlobalAdjustment();
+  void Publish();
+  void Tell(MapperEvent::Kind kind, Timestamp time, std::string detail);
+
+  const MapperOptions options_;
+  // Touched by the stepping thread alone.
+  Map map_;
+  PointSearcher searcher_;
+  KeyFrameId newest_ = kNoId;
+  std::vector<MapPointId> to_refind_;
+  std::size_t keyframes_since_global_ = 0;
+  bool global_interrupted_ = false;
+
+  std::atomic<bool> interrupt_{false};
+  std::atomic<bool> locally_adjusted_{true};
+  mutable std::mutex mutex_;  // guards what follows; held for copies of pointers and small lists only
+  std::deque<Task> queue_;
+  std::vector<PointReport> reports_;
+  std::shared_ptr<const MapSnapshot> snapshot_;
+  std::vector<MapperEvent> events_;
+  MapperTimes times_;
+};
+
+}  // namespace docent::engine

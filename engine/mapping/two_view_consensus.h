@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "engine/mapping/two_view_models.h"
+
+// Robust estimation of one two-view model from ray pairs with outliers: random sampling with a truncated
+// quadratic score (MSAC, Torr and Zisserman 2000) and local optimisation of every new best (LO-RANSAC, Chum,
+// Matas and Kittler 2003). Deterministic under the seed; any thread.
+namespace docent::engine {
+
+struct ConsensusOptions {
+  double inlier_px = 1.5;  // Sampson residual
+  int max_iterations = 300;
+  double confidence = 0.999;
+  // A smaller consensus is of no interest: sampling ends once one of this size would have been met.
+  int min_inliers = 0;
+  std::uint64_t seed = 1;
+};
+
+struct Consensus {
+  bool found = false;
+  Eigen::Matrix3d model = Eigen::Matrix3d::Identity();
+  Eigen::ArrayXd squared_px;  // residuals of all pairs
+  double cost = 0;            // truncated sum of squares, pixels squared
+  int inliers = 0;
+};
+
+// Models of four (homography), two (rotation) and five (essential matrix) pairs.
+Consensus FindRotation(const RayPairs& pairs, const ConsensusOptions& options);
+Consensus FindHomography(const RayPairs& pairs, const ConsensusOptions& options);
+Consensus FindEssential(const RayPairs& pairs, const ConsensusOptions& options);
+
+// Optimises a pose locally and takes it over where it explains the pairs better than `best`.
+void OfferPose(const RayPairs& pairs, const ConsensusOptions& options, const Rigid3& b_from_a,
+               Consensus* best);
+
+}  // namespace docent::engine

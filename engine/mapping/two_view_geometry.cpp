@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/two_view_geometry.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "engine/geometry/triangulation.h"
+#include "engine/mapping/five_point.h"
+#include "engine/mapping/homography.h"
+#include "engine/mapping/two_view_consensus.h"
+#include "engine/mapping/two_view_models.h"
+#include "engine/mapping/two_view_selection.h"
+
+namespace docent::engine {
+namespace {
+
+constexpr double kDegreesPerRadian = 57.295779513082321;
+// Two constraints a pair instead of one: the radius that holds the same share of a normal distribution.
+constexpr double kTwoDimensional = 1.25;
+// A point whose rays differ by less than this many inlier thresholds has no depth worth the name.
+constexpr double kMinParallaxThresholds = 2.0;
+
+bool IsUnitRay(const Eigen::Vector3d& ray) {
+  return std::abs(ray.squaredNorm() - 1) < 1e-6;
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// One estimation: the pairs, the three models, and the questions that the verdict asks of them.
+class TwoViewEstimator {
+ public:
+  TwoViewEstimator(const RayPairs& pairs, const TwoViewOptions& options) : pairs_(pairs), options_(options) {
+    consensus_options_ = {.inlier_px = options.inlier_px,
+                          .max_iterations = options.max_iterations,
+                          .confidence = options.confidence,
+                          .seed = options.seed};
+    wide_options_ = consensus_options_;
+    wide_options_.inlier_px *= kTwoDimensional;
+  }
+
+  // Sets the verdict and, where there is one, the pose; the caller's vectors are filled by Fill.
+  TwoViewVerdict Decide() {
+    if (MedianDisplacementPx() <= options_.inlier_px) return TwoViewVerdict::kStill;
+    essential_ = FindEssential(pairs_, consensus_options_);
+    // Neither matters where it explains less than half of what the loosest model does.
+    wide_options_.min_inliers = std::max(essential_.inliers, MinInliersByRatio()) / 2;
+    rotation_ = FindRotation(pairs_, wide_options_);
+    homography_ = FindHomography(pairs_, wide_options_);
+    OfferSimplerModels();
+    if (!essential_.found) return TwoViewVerdict::kInconsistent;
+    const int most = std::max({rotation_.inliers, homography_.inliers, essential_.inliers});
+    if (most < MinInliersByRatio()) return TwoViewVerdict::kInconsistent;
+    if (most < options_.min_inliers) return TwoViewVerdict::kTooFewMatches;
+
+    noise_px_ = EstimateNoise(pairs_, essential_, options_.inlier_px);
+    model_ = SelectModel(rotation_, homography_, essential_, options_.inlier_px, noise_px_);
+    if (model_ == ModelKind::kRotation) return RotationVerdict();
+    if (!RotationLeavesParallax()) return TwoViewVerdict::kTooLittleParallax;
+    return DecidePose();
+  }
+
+  const Rigid3& b_from_a() const { return b_from_a_; }
+  double median_parallax_deg() const { return median_parallax_deg_; }
+  // Pairs that the pose explains, at a depth that can be told.
+  const std::vector<bool>& inlier() const { return inlier_; }
+
+ private:
+  int MinInliersByRatio() const {
+    return static_cast<int>(std::ceil(options_.min_inlier_ratio * static_cast<double>(pairs_.size())));
+  }
+
+  // Over both pictures' noise, how far rays moved with the camera taken as still.
+  Eigen::ArrayXd SquaredDisplacementPx() const {
+    return 2 * RotationResiduals(pairs_, Eigen::Matrix3d::Identity());
+  }
+  double MedianDisplacementPx() const {
+    const Eigen::ArrayXd squared = SquaredDisplacementPx();
+    return std::sqrt(Median({squared.data(), squared.data() + squared.size()}));
+  }
+
+  // Five noisy pairs with little parallax seldom find what a plane's or a rotation's fit over all pairs
+  // offers: a better start for the essential matrix.
+  void OfferSimplerModels() {
+    if (homography_.found && 2 * homography_.inliers > essential_.inliers) {
+      if (const auto scaled = ScaleHomography(homography_.model)) {
+        const auto motions = DecomposeHomography(*scaled);
+        for (std::size_t i = 0; i < motions.size();
+             i += 2) {  // the sign of the translation does not matter here
+          const Eigen::Vector3d& translation = motions[i].b_from_a.translation;
+          if (translation.norm() > 1e-9)
+            OfferPose(pairs_, consensus_options_, {motions[i].b_from_a.rotation, translation.normalized()},
+                      &essential_);
+        }
+      }
+    }
+    if (rotation_.found && 2 * rotation_.inliers > essential_.inliers)
+      for (int axis = 0; axis < 3; ++axis)
+        OfferPose(pairs_, consensus_options_, {Rotation3(rotation_.model), Eigen::Vector3d::Unit(axis)},
+                  &essential_);
+  }
+
+  TwoViewVerdict RotationVerdict() const {
+    const double angle_px = Rotation3(rotation_.model).Angle() / pairs_.pixel_angle;
+    return angle_px < options_.inlier_px ? TwoViewVerdict::kStill : TwoViewVerdict::kPureRotation;
+  }
+
+  // Small errors of the calibration let a pure rotation look like structure. So what the best rotation leaves
+  // must stand out from the noise, and from what a lens model may be wrong by.
+  bool RotationLeavesParallax() const {
+    constexpr double kMinNoises = 1.6, kMinPx = 0.6;
+    const double limit = options_.inlier_px * options_.inlier_px;
+    const Weights counted = (essential_.squared_px < limit).cast<double>();
+    const Eigen::Matrix3d rotation = FitRotation(pairs_, counted);
+    std::vector<double> squared;
+    for (const Eigen::Matrix3d* model : {&rotation, &rotation_.model}) {
+      const Eigen::ArrayXd residuals = RotationResiduals(pairs_, *model);
+      std::vector<double> of_inliers;
+      for (Eigen::Index i = 0; i < pairs_.size(); ++i)
+        if (counted[i] != 0) of_inliers.push_back(residuals[i]);
+      squared.push_back(Median(std::move(of_inliers)));
+    }
+    // 1.386 sigma^2 is the median of the sum of two squared normal variables.
+    const double deviation = std::sqrt(std::min(squared[0], squared[1]) / 1.386);
+    return deviation > std::max(kMinNoises * noise_px_, kMinPx);
+  }
+
+  TwoViewVerdict DecidePose() {
+    const std::vector<PoseCandidate> ranked =
+        RankPoses(pairs_, homography_, essential_, options_.inlier_px, noise_px_);
+    b_from_a_ = ranked.front().b_from_a;
+    const Eigen::ArrayXd squared = EssentialResiduals(pairs_, EssentialFromPose(b_from_a_));
+    const std::vector<Depth> depths =
+        JudgeDepths(pairs_, b_from_a_, kMinParallaxThresholds * options_.inlier_px);
+    Classify(squared, depths);
+    if (consistent_ < MinInliersByRatio()) return TwoViewVerdict::kInconsistent;
+    if (HasSecondMotion(squared) || LooksStillButForOneThing()) return TwoViewVerdict::kInconsistent;
+    MeasureParallax();
+    // Many points without depth beside some with: a thing that moves before a turning camera looks the same.
+    constexpr double kMaxFarShare = 0.3;
+    if (median_parallax_deg_ < options_.min_parallax_deg || far_ > kMaxFarShare * consistent_)
+      return TwoViewVerdict::kTooLittleParallax;
+    if (IsAmbiguous(ranked)) return TwoViewVerdict::kAmbiguousPlane;
+    if (std::count(inlier_.begin(), inlier_.end(), true) < options_.min_inliers)
+      return TwoViewVerdict::kTooFewMatches;
+    return model_ == ModelKind::kHomography ? TwoViewVerdict::kPlanar : TwoViewVerdict::kGeneral;
+  }
+
+  // consistent_: explained by the pose and not behind; far_: of these, too far for a depth.
+  void Classify(const Eigen::ArrayXd& squared, const std::vector<Depth>& depths) {
+    const double limit = options_.inlier_px * options_.inlier_px;
+    inlier_.assign(depths.size(), false);
+    explained_.assign(depths.size(), false);
+    for (std::size_t i = 0; i < depths.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      if (!(squared[row] < limit) || depths[i] == Depth::kBehind) continue;
+      explained_[i] = true;
+      ++consistent_;
+      far_ += depths[i] == Depth::kTooFar;
+      // On a plane the homography says more than the epipolar line: a match that slid along the line is
+      // wrong.
+      const bool on_plane = model_ != ModelKind::kHomography ||
+                            homography_.squared_px[row] < limit * kTwoDimensional * kTwoDimensional;
+      inlier_[i] = on_plane && depths[i] == Depth::kInFront;
+    }
+  }
+
+  void MeasureParallax() {
+    const Eigen::Matrix3d rotation = b_from_a_.rotation.matrix();
+    std::vector<double> angles;
+    for (std::size_t i = 0; i < explained_.size(); ++i) {
+      if (!explained_[i]) continue;
+      const auto row = static_cast<Eigen::Index>(i);
+      const double chord = (rotation * pairs_.RayA(row) - pairs_.RayB(row)).norm();
+      angles.push_back(2 * std::asin(std::min(chord / 2, 1.0)));
+    }
+    median_parallax_deg_ = kDegreesPerRadian * Median(std::move(angles));
+  }
+
+  // Whether many of the pairs that the pose leaves out move as one: then it may be the pose that follows a
+  // moving thing. Rotation (the still camera's among them) is what a background shows when the camera does
+  // not move.
+  bool HasSecondMotion(const Eigen::ArrayXd& squared) const {
+    constexpr double kClearlyOut = 2.0, kMinShare = 0.06;
+    constexpr int kMinPairs = 10;
+    const double limit = std::pow(kClearlyOut * options_.inlier_px, 2);
+    std::vector<Eigen::Vector3d> rays_in_a, rays_in_b;
+    for (Eigen::Index i = 0; i < pairs_.size(); ++i) {
+      const double plane = model_ == ModelKind::kHomography
+                               ? homography_.squared_px[i] / (kTwoDimensional * kTwoDimensional)
+                               : 0.0;
+      if (std::max(squared[i], plane) < limit) continue;
+      rays_in_a.push_back(pairs_.RayA(i));
+      rays_in_b.push_back(pairs_.RayB(i));
+    }
+    ConsensusOptions options = wide_options_;
+    options.min_inliers =
+        std::max(kMinPairs, static_cast<int>(kMinShare * static_cast<double>(pairs_.size())));
+    return FindRotation(MakeRayPairs(rays_in_a, rays_in_b, pairs_.pixel_angle), options).inliers >=
+           options.min_inliers;
+  }
+
+  // A share of the picture did not move at all and has no parallax either, while the rest has: more likely a
+  // still camera and a moving thing than a camera that moved without turning before a far background.
+  bool LooksStillButForOneThing() const {
+    constexpr double kMinStillShare = 0.08, kMinFarShare = 0.5;
+    constexpr double kStillNoises = 3.0;  // holds nine in ten of what does not move
+    const double still_px = std::max(kTwoDimensional * options_.inlier_px, kStillNoises * noise_px_);
+    constexpr double kFarRatio = 1.5;  // the rotation is only known within the noise
+    const Eigen::ArrayXd squared = SquaredDisplacementPx();
+    const Eigen::ArrayXd squared_parallax = 2 * RotationResiduals(pairs_, b_from_a_.rotation.matrix());
+    int still = 0, still_and_far = 0;
+    for (Eigen::Index i = 0; i < pairs_.size(); ++i) {
+      if (squared[i] > still_px * still_px) continue;
+      ++still;
+      still_and_far += squared_parallax[i] < std::pow(kFarRatio * still_px, 2);
+    }
+    return still > kMinStillShare * consistent_ && still_and_far > kMinFarShare * still;
+  }
+
+  const RayPairs& pairs_;
+  const TwoViewOptions& options_;
+  ConsensusOptions consensus_options_, wide_options_;
+  Consensus rotation_, homography_, essential_;
+  double noise_px_ = 0;
+  ModelKind model_ = ModelKind::kRotation;
+  Rigid3 b_from_a_;
+  std::vector<bool> inlier_, explained_;
+  int consistent_ = 0, far_ = 0;
+  double median_parallax_deg_ = 0;
+};
+
+}  // namespace
+
+const char* Advice(TwoViewVerdict verdict) {
+  switch (verdict) {
+    case TwoViewVerdict::kGeneral:
+    case TwoViewVerdict::kPlanar:
+      return "";
+    case TwoViewVerdict::kStill:
+      return "move sideways";
+    case TwoViewVerdict::kPureRotation:
+      return "move sideways instead of turning";
+    case TwoViewVerdict::kTooLittleParallax:
+      return "move further sideways";
+    case TwoViewVerdict::kAmbiguousPlane:
+      return "move sideways in another direction, or look at something with depth";
+    case TwoViewVerdict::kTooFewMatches:
+      return "look at something with more texture, and move slowly";
+    case TwoViewVerdict::kInconsistent:
+      return "wait until nothing moves in the picture, then move sideways";
+  }
+  return "";
+}
+
+TwoViewResult EstimateTwoViews(std::span<const Eigen::Vector3d> rays_in_a,
+                               std::span<const Eigen::Vector3d> rays_in_b, const TwoViewOptions& options) {
+  const std::size_t count = std::min(rays_in_a.size(), rays_in_b.size());
+  TwoViewResult result;
+  result.points_in_a.assign(count, Eigen::Vector3d::Zero());
+  result.inlier.assign(count, false);
+  // What is no unit ray (not a number, zero) takes no part.
+  std::vector<Eigen::Vector3d> usable_a, usable_b;
+  std::vector<std::size_t> index;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!IsUnitRay(rays_in_a[i]) || !IsUnitRay(rays_in_b[i])) continue;
+    usable_a.push_back(rays_in_a[i]);
+    usable_b.push_back(rays_in_b[i]);
+    index.push_back(i);
+  }
+  constexpr int kFewest = 8;  // below it even noise fits an essential matrix
+  if (static_cast<int>(index.size()) < std::max(options.min_inliers, kFewest)) return result;
+
+  const RayPairs pairs = MakeRayPairs(usable_a, usable_b, options.pixel_angle);
+  TwoViewEstimator estimator(pairs, options);
+  result.verdict = estimator.Decide();
+  result.median_parallax_deg = estimator.median_parallax_deg();
+  if (result.verdict != TwoViewVerdict::kGeneral && result.verdict != TwoViewVerdict::kPlanar) return result;
+  result.b_from_a = estimator.b_from_a();
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    if (!estimator.inlier()[i]) continue;
+    const auto point = Triangulate(usable_a[i], usable_b[i], result.b_from_a);
+    if (!point) continue;
+    result.points_in_a[index[i]] = *point;
+    result.inlier[index[i]] = true;
+    ++result.inlier_count;
+  }
+  return result;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/geometry/rigid3.h"
+
+// The relative pose of two calibrated views and the structure between them, without any prior: ptamm §2.3's
+// five-point start, made safe against planes, pure rotation and still cameras.
+namespace docent::engine {
+
+struct TwoViewOptions {
+  double pixel_angle = 1.0 / 500;  // radians a pixel: CameraModel::PixelAngle()
+  double inlier_px = 1.5;          // residual at which a correspondence counts as inlier
+  int max_iterations = 300;        // RANSAC, stopped earlier at `confidence`
+  double confidence = 0.999;
+  int min_inliers = 50;
+  double min_inlier_ratio = 0.6;
+  double min_parallax_deg = 1.0;  // median over the inliers, below it depth is a guess
+  std::uint64_t seed = 1;
+};
+
+enum class TwoViewVerdict {
+  kGeneral,            // essential matrix, scene with depth
+  kPlanar,             // homography, the right one of its decompositions is clear
+  kStill,              // the picture did not move
+  kPureRotation,       // explained by a rotation: nothing to triangulate
+  kTooLittleParallax,  // translation is there but depth would be a guess
+  kAmbiguousPlane,     // two poses explain the plane equally well
+  kTooFewMatches,
+  kInconsistent  // no rigid motion explains enough of the matches (moving objects, wrong matches)
+};
+// The sentence the wearer reads, e.g. "move sideways".
+const char* Advice(TwoViewVerdict verdict);
+
+struct TwoViewResult {
+  TwoViewVerdict verdict = TwoViewVerdict::kTooFewMatches;
+  Rigid3 b_from_a;                           // |translation| = 1; valid for kGeneral and kPlanar
+  std::vector<Eigen::Vector3d> points_in_a;  // one a correspondence, baseline 1; valid where inlier
+  std::vector<bool> inlier;                  // in front of both views, small residual, finite depth
+  int inlier_count = 0;
+  double median_parallax_deg = 0;
+};
+
+// rays_in_a[i] and rays_in_b[i] are unit rays of the same scene point. Scores an essential matrix
+// (five-point, Nister 2004 / Stewenius 2006, LO-RANSAC), a homography and a pure rotation against each other
+// with a model-selection criterion (Torr 1998: GRIC), and never guesses between them. Refines the chosen
+// pose. Deterministic under the seed.
+TwoViewResult EstimateTwoViews(std::span<const Eigen::Vector3d> rays_in_a,
+                               std::span<const Eigen::Vector3d> rays_in_b, const TwoViewOptions& options);
+
+}  // namespace docent::engine

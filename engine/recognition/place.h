@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "engine/map/map_snapshot.h"
+#include "engine/vision/small_blurry_image.h"
+
+namespace docent::engine {
+
+// A keyframe that looks like the present picture, in one of the maps. Appearance only: nothing is verified.
+struct PlaceCandidate {
+  std::uint64_t map_key = 0;
+  std::shared_ptr<const MapSnapshot> map;
+  KeyFrameId keyframe = kNoId;
+  double difference = 0;  // mean squared difference of the thumbnails
+};
+
+// Whoever knows all maps (the library's place index) answers this; the engine asks it when it is lost.
+// May be called from several threads at once.
+class PlaceFinder {
+ public:
+  virtual ~PlaceFinder() = default;
+  // The best `count` candidates, most alike first, at most `per_map` of one map. With only_map != 0 the
+  // search stays in that map (ptamm §3.3). Never throws for lack of maps: the answer is empty.
+  virtual std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage& image, int count, int per_map,
+                                                 std::uint64_t only_map) const = 0;
+};
+
+}  // namespace docent::engine

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/map_tracker.h"
+
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+
+#include "engine/recognition/absolute_pose.h"
+
+namespace docent::engine {
+
+namespace {
+
+constexpr int kCellsAcross = 4;
+
+}  // namespace
+
+MapTracker::MapTracker(const MapTrackerOptions& options, std::shared_ptr<const CameraModel> camera)
+    : options_(options), camera_(std::move(camera)), searcher_(options.search) {}
+
+void MapTracker::Clear() {
+  searcher_.Clear();
+  last_inliers_.clear();
+}
+
+// The points of the keyframes that see most of what the last frame saw; without a last frame, of those
+// nearest to the guessed pose. A point that only far-off keyframes know is likely hidden here, and would
+// count as a failure of tracking that it is not (ptamm §5.2).
+void MapTracker::CollectLocal(const MapSnapshot& map, const Rigid3& camera_from_map) {
+  ranked_.clear();
+  const Eigen::Vector3d center = camera_from_map.OriginInSource();
+  auto observation = map.observations.begin();
+  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
+    const KeyFrame& keyframe = map.keyframes[i];
+    int shared = 0;
+    // Both lists ascend by point.
+    auto inlier = last_inliers_.begin();
+    for (; observation != map.observations.end() && observation->keyframe == keyframe.id; ++observation) {
+      while (inlier != last_inliers_.end() && *inlier < observation->point) ++inlier;
+      if (inlier != last_inliers_.end() && *inlier == observation->point) ++shared;
+    }
+    const double distance = (keyframe.camera_from_map.OriginInSource() - center).norm() / keyframe.mean_depth;
+    const double turn =
+        1.0 - std::abs((camera_from_map.rotation.inverse() * keyframe.camera_from_map.rotation)
+                           .quaternion()
+                           .w());  // grows with the angle between the views, 0 for none
+    // Shared points come first; the nearness decides among keyframes that share none.
+    ranked_.emplace_back(-shared + 1.0 - 1.0 / (1.0 + distance + 10 * turn), i);
+  }
+  const std::size_t count = std::min(ranked_.size(), options_.local_keyframes);
+  std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(count), ranked_.end());
+  local_.clear();
+  for (std::size_t rank = 0; rank < count; ++rank) {
+    const KeyFrameId id = map.keyframes[ranked_[rank].second].id;
+    auto it = std::lower_bound(map.observations.begin(), map.observations.end(), id,
+                               [](const Observation& o, KeyFrameId wanted) { return o.keyframe < wanted; });
+    for (; it != map.observations.end() && it->keyframe == id; ++it) local_.push_back(it->point);
+  }
+  std::sort(local_.begin(), local_.end());
+  local_.erase(std::unique(local_.begin(), local_.end()), local_.end());
+}
+
+void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_from_map, Random* random) {
+  visible_.clear();
+  candidates_.clear();
+  coarse_.clear();
+  fine_.clear();
+  const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
+  const Eigen::Vector3d translation = camera_from_map.translation;
+  const double min_cosine = options_.search.min_view_cosine;
+  CollectLocal(map, camera_from_map);
+  auto next = map.points.begin();
+  for (const MapPointId id : local_) {
+    next = std::lower_bound(next, map.points.end(), id, [](const MapPoint& candidate, MapPointId wanted) {
+      return candidate.id < wanted;
+    });
+    if (next == map.points.end()) break;
+    const MapPoint& point = *next;
+    if (point.id != id) continue;
+    const Eigen::Vector3d x = rotation * point.point_in_map.head<3>() + point.point_in_map[3] * translation;
+    if (!(x.z() > 0)) continue;
+    const Eigen::Vector3d normal = rotation * point.normal.cast<double>();
+    const double facing = -normal.dot(x);
+    if (facing <= 0 || facing * facing < min_cosine * min_cosine * x.squaredNorm()) continue;
+    const auto pixel = camera_->Project(x);
+    if (!pixel || !camera_->IsInside(*pixel, kPatchSize / 2)) continue;
+    visible_.push_back(&point);
+  }
+  // Points are drawn at random so that a choice among many is spread over the picture and over the map.
+  const auto wanted = static_cast<std::size_t>(options_.max_fine);
+  for (std::size_t i = 0; i < visible_.size() && fine_.size() + coarse_.size() < wanted; ++i) {
+    const std::size_t j = i + random->Below(static_cast<std::uint32_t>(visible_.size() - i));
+    std::swap(visible_[i], visible_[j]);
+    const MapPoint* point = visible_[i];
+    const KeyFrame* source = map.FindKeyFrame(point->source_keyframe);
+    if (!source) continue;
+    const auto predicted = searcher_.Predict(*point, *source, *camera_, camera_from_map);
+    if (!predicted) continue;
+    const auto index = static_cast<std::uint32_t>(candidates_.size());
+    candidates_.push_back({point, source, *predicted});
+    const bool top = predicted->level >= 2 && static_cast<int>(coarse_.size()) < options_.max_coarse;
+    (top ? coarse_ : fine_).push_back(index);
+  }
+}
+
+void MapTracker::Search(const std::vector<std::uint32_t>& which, const ImageFeatures& features, float radius,
+                        bool direct) {
+  for (const std::uint32_t index : which) {
+    const Candidate& candidate = candidates_[index];
+    const auto found =
+        searcher_.Find(*candidate.point, *candidate.source, candidate.predicted, features, radius, direct);
+    attempts_.push_back({candidate.point->id, found.has_value(), false});
+    if (!found) continue;
+    measured_.push_back(index);
+    measurements_.push_back({candidate.point->point_in_map, found->pixel.cast<double>(),
+                             1.0 / static_cast<double>(1 << candidate.predicted.level), 1.0});
+    matches_.push_back(
+        {candidate.point->id, found->pixel, static_cast<std::uint8_t>(candidate.predicted.level), false});
+  }
+}
+
+void MapTracker::Repredict(const Rigid3& camera_from_map) {
+  std::size_t kept = 0;
+  for (const std::uint32_t index : fine_) {
+    Candidate& candidate = candidates_[index];
+    const auto predicted = searcher_.Predict(*candidate.point, *candidate.source, *camera_, camera_from_map);
+    if (!predicted) continue;
+    candidate.predicted = *predicted;
+    fine_[kept++] = index;
+  }
+  fine_.resize(kept);
+}
+
+// Many of these matches are wrong, as the search is wide: three-point RANSAC finds those that belong
+// together.
+std::optional<Rigid3> MapTracker::PoseFromPatches(const ImageFeatures& features, Random* random) {
+  std::vector<std::uint32_t> chosen = coarse_;
+  for (const std::uint32_t index : fine_) {
+    if (static_cast<int>(chosen.size()) >= options_.max_recovery) break;
+    if (candidates_[index].predicted.level >= 1) chosen.push_back(index);
+  }
+  Search(chosen, features, options_.wide_radius_px, false);
+  std::vector<Eigen::Vector3d> rays, points;
+  for (const PoseMeasurement& measurement : measurements_) {
+    const auto ray = camera_->Unproject(measurement.pixel);
+    if (!ray || measurement.point_in_map[3] == 0) continue;
+    rays.push_back(*ray);
+    points.push_back(measurement.point_in_map.head<3>());
+  }
+  AbsolutePoseOptions options;
+  options.pixel_angle = camera_->PixelAngle();
+  options.inlier_px = options_.recovery_inlier_px;
+  options.min_inliers = options_.min_coarse;
+  options.seed = random->Next();
+  const auto pose = EstimateAbsolutePose(rays, points, options);
+  if (!pose) return std::nullopt;
+  return pose->camera_from_map;
+}
+
+MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& features,
+                                 const Rigid3& predicted, Effort effort, Random* random) {
+  MapTrackResult result;
+  result.camera_from_map = predicted;
+  matches_.clear();
+  attempts_.clear();
+  measured_.clear();
+  measurements_.clear();
+  CollectVisible(map, predicted, random);
+
+  if (effort == Effort::kRecovery) {
+    const auto recovered = PoseFromPatches(features, random);
+    if (!recovered) return result;
+    last_inliers_.clear();
+    return Track(map, features, *recovered, Effort::kUsual, random);
+  }
+  const bool wide = effort == Effort::kWide;
+  Search(coarse_, features, wide ? options_.wide_radius_px : options_.coarse_radius_px, false);
+  result.coarse_attempted = static_cast<int>(coarse_.size());
+  result.coarse_found = static_cast<int>(measurements_.size());
+  float radius = wide ? options_.coarse_radius_px : options_.fine_radius_alone_px;
+  if (result.coarse_found >= options_.min_coarse) {
+    const PoseRefinement coarse =
+        RefinePose(*camera_, predicted, options_.refinement, &measurements_, &scratch_);
+    if (coarse.converged && coarse.inliers >= options_.min_coarse / 2) {
+      result.camera_from_map = coarse.camera_from_map;
+      radius = options_.fine_radius_px;
+      Repredict(coarse.camera_from_map);
+    }
+  }
+  Search(fine_, features, radius, true);
+  result.attempted = static_cast<int>(attempts_.size());
+  result.found = static_cast<int>(measurements_.size());
+  const PoseRefinement fine =
+      RefinePose(*camera_, result.camera_from_map, options_.refinement, &measurements_, &scratch_);
+  result.camera_from_map = fine.camera_from_map;
+  result.covariance = fine.covariance;
+  result.converged = fine.converged;
+  result.sigma = fine.sigma;
+  result.inliers = 0;
+
+  std::bitset<kCellsAcross * kCellsAcross> cells;
+  scratch_.clear();
+  std::size_t match = 0;
+  for (Attempt& attempt : attempts_) {
+    if (!attempt.found) continue;
+    const PoseMeasurement& measurement = measurements_[match];
+    attempt.inlier = matches_[match].inlier = measurement.weight > options_.refinement.min_weight;
+    if (attempt.inlier) {
+      ++result.inliers;
+      const int column = std::clamp(
+          static_cast<int>(measurement.pixel.x() * kCellsAcross / camera_->width_px()), 0, kCellsAcross - 1);
+      const int row = std::clamp(
+          static_cast<int>(measurement.pixel.y() * kCellsAcross / camera_->height_px()), 0, kCellsAcross - 1);
+      cells.set(static_cast<std::size_t>(row * kCellsAcross + column));
+      scratch_.push_back((result.camera_from_map * measurement.point_in_map).z());
+    }
+    ++match;
+  }
+  last_inliers_.clear();
+  for (const Attempt& attempt : attempts_) {
+    if (attempt.inlier) last_inliers_.push_back(attempt.point);
+  }
+  std::sort(last_inliers_.begin(), last_inliers_.end());
+  result.occupied_cells = static_cast<int>(cells.count());
+  if (!scratch_.empty()) {
+    const auto middle = scratch_.begin() + static_cast<std::ptrdiff_t>(scratch_.size() / 2);
+    std::nth_element(scratch_.begin(), middle, scratch_.end());
+    result.median_depth = *middle;
+  }
+  return result;
+}
+
+}  // namespace docent::engine

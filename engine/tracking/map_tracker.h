@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "engine/base/random.h"
+#include "engine/map/map_snapshot.h"
+#include "engine/tracking/point_search.h"
+#include "engine/tracking/pose_refinement.h"
+#include "engine/tracking/tracked_frame.h"
+
+// Finds the pose of one frame in one map from a guess: coarse stage, fine stage, robust pose (ptamm §2.1).
+// Knows nothing of time: prediction, loss and recovery are the Tracker's.
+namespace docent::engine {
+
+struct MapTrackerOptions {
+  int max_coarse = 60;               // ptamm §2.1: up to 50 on the top levels
+  int min_coarse = 12;               // found ones, for the coarse pose to be believed
+  int max_recovery = 220;            // patches of the upper levels looked for after a loss
+  double recovery_inlier_px = 5;     // level 0: corners of upper levels are that coarse
+  int max_fine = 600;                // ptamm §2.1 allows 1000; beyond 600 the pose gains nothing that shows
+  std::size_t local_keyframes = 20;  // whose points are looked for: those that share most with the last frame
+  float coarse_radius_px = 30;       // level 0, about the prediction
+  float wide_radius_px = 70;         // the second try before a frame is called lost
+  float fine_radius_px = 7;          // after a coarse pose
+  float fine_radius_alone_px = 14;   // when the coarse stage had nothing to say
+  SearchOptions search;
+  PoseRefinementOptions refinement;
+};
+
+struct MapTrackResult {
+  Rigid3 camera_from_map;
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  int attempted = 0, found = 0, inliers = 0;
+  int coarse_attempted = 0, coarse_found = 0;
+  double sigma = 0;        // robust, of the normalised residuals
+  int occupied_cells = 0;  // of a 4x4 grid over the picture: how well the inliers are spread
+  bool converged = false;
+  double median_depth = 0;  // metres, of the inliers
+  // found / attempted (ptamm §2.1).
+  double Quality() const { return attempted > 0 ? static_cast<double>(inliers) / attempted : 0; }
+};
+
+class MapTracker {
+ public:
+  MapTracker(const MapTrackerOptions& options, std::shared_ptr<const CameraModel> camera);
+
+  enum class Effort {
+    kUsual,     // the prediction is a good one
+    kWide,      // the motion was a surprise: look further
+    kRecovery,  // the guess may be altogether wrong: look far, and stop early where the large patches
+                // disagree
+  };
+  // Estimates the pose. The matches of the last call stay in matches().
+  MapTrackResult Track(const MapSnapshot& map, const ImageFeatures& features, const Rigid3& predicted,
+                       Effort effort, Random* random);
+
+  const std::vector<PointMatch>& matches() const { return matches_; }
+  // Every point looked for in the last call: whether it was found, and whether it agreed with the pose.
+  struct Attempt {
+    MapPointId point;
+    bool found, inlier;
+  };
+  const std::vector<Attempt>& attempts() const { return attempts_; }
+  // To be called when another map is tracked from now on.
+  void Clear();
+  // The frame just tracked was not believed: the next one chooses its points by the guessed pose alone.
+  void Forget() { last_inliers_.clear(); }
+
+ private:
+  struct Candidate {
+    const MapPoint* point;
+    const KeyFrame* source;
+    PredictedPoint predicted;
+  };
+  void CollectLocal(const MapSnapshot& map, const Rigid3& camera_from_map);
+  void CollectVisible(const MapSnapshot& map, const Rigid3& camera_from_map, Random* random);
+  void Search(const std::vector<std::uint32_t>& which, const ImageFeatures& features, float radius,
+              bool direct);
+  std::optional<Rigid3> PoseFromPatches(const ImageFeatures& features, Random* random);
+  void Repredict(const Rigid3& camera_from_map);
+
+  MapTrackerOptions options_;
+  std::shared_ptr<const CameraModel> camera_;
+  PointSearcher searcher_;
+  std::vector<PointMatch> matches_;
+  std::vector<Attempt> attempts_;
+  std::vector<MapPointId> last_inliers_;  // of the last frame, by ascending id
+  // Scratch, kept to save allocations.
+  std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
+  std::vector<MapPointId> local_;
+  std::vector<const MapPoint*> visible_;
+  std::vector<const KeyFrame*> sources_;
+  std::vector<Candidate> candidates_;
+  std::vector<std::uint32_t> coarse_, fine_;
+  std::vector<std::uint32_t> measured_;  // candidate of each measurement
+  std::vector<PoseMeasurement> measurements_;
+  std::vector<double> scratch_;
+};
+
+}  // namespace docent::engine

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/point_search.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace docent::engine {
+
+namespace {
+
+constexpr std::size_t kCacheSlots = 16384;
+// The patch is cut again when the warp differs by more than this from the one it was cut for.
+constexpr float kWarpTolerance = 0.08f;
+// Range of area ratios between a patch's pixels and those of the level that it is searched on.
+constexpr float kMinAreaRatio = 0.25f;
+constexpr float kMaxAreaRatio = 3.0f;
+
+}  // namespace
+
+void PointSearcher::Clear() {
+  cache_.clear();
+}
+
+PointSearcher::Cached& PointSearcher::Entry(const MapPoint& point) {
+  if (cache_.empty()) cache_.resize(kCacheSlots);
+  Cached& entry = cache_[point.id % kCacheSlots];
+  if (entry.id != point.id || entry.source_keyframe != point.source_keyframe ||
+      entry.source_level != point.source_level || entry.source_pixel != point.source_pixel) {
+    entry.id = point.id;
+    entry.source_keyframe = point.source_keyframe;
+    entry.source_level = point.source_level;
+    entry.source_pixel = point.source_pixel;
+    entry.has_rays = entry.has_patch = false;
+  }
+  return entry;
+}
+
+std::optional<PredictedPoint> PointSearcher::Predict(const MapPoint& point, const KeyFrame& source,
+                                                     const CameraModel& camera,
+                                                     const Rigid3& camera_from_map) {
+  PredictedPoint predicted;
+  predicted.point_in_camera = camera_from_map.rotation * point.position();
+  if (!point.infinite()) predicted.point_in_camera += camera_from_map.translation;
+  if (!camera.Project(predicted.point_in_camera, &predicted.pixel, &predicted.jacobian)) return std::nullopt;
+  if (!camera.IsInside(predicted.pixel, kPatchSize / 2)) return std::nullopt;
+
+  const Eigen::Matrix3d camera_from_map_rotation = camera_from_map.rotation.matrix();
+  const Eigen::Vector3d normal_in_camera = camera_from_map_rotation * point.normal.cast<double>();
+  if (-normal_in_camera.dot(predicted.point_in_camera) <
+      options_.min_view_cosine * predicted.point_in_camera.norm()) {
+    return std::nullopt;
+  }
+
+  Cached& entry = Entry(point);
+  if (!entry.has_rays) {
+    const Eigen::Vector2d pixel = point.source_pixel.cast<double>();
+    const auto ray = source.camera->Unproject(LevelZeroFromLevel(pixel, point.source_level));
+    const auto right =
+        source.camera->Unproject(LevelZeroFromLevel(pixel + Eigen::Vector2d::UnitX(), point.source_level));
+    const auto down =
+        source.camera->Unproject(LevelZeroFromLevel(pixel + Eigen::Vector2d::UnitY(), point.source_level));
+    if (!ray || !right || !down) return std::nullopt;
+    entry.ray = ray->cast<float>();
+    entry.ray_right = right->cast<float>();
+    entry.ray_down = down->cast<float>();
+    entry.has_rays = true;
+  }
+
+  // The steps of one source pixel on the surface, through its tangent plane.
+  const Eigen::Matrix3d source_from_map = source.camera_from_map.rotation.matrix();
+  const Eigen::Vector3d normal_in_source = source_from_map * point.normal.cast<double>();
+  Eigen::Vector3d point_in_source = source_from_map * point.position();
+  if (!point.infinite()) point_in_source += source.camera_from_map.translation;
+  const double distance = normal_in_source.dot(point_in_source);
+  const Eigen::Vector3d ray = entry.ray.cast<double>();
+  const Eigen::Vector3d ray_right = entry.ray_right.cast<double>(), ray_down = entry.ray_down.cast<double>();
+  const double along = normal_in_source.dot(ray);
+  const double along_right = normal_in_source.dot(ray_right), along_down = normal_in_source.dot(ray_down);
+  if (!(along < -0.05 && along_right < -0.05 && along_down < -0.05)) return std::nullopt;
+  const Eigen::Vector3d center = ray * (distance / along);
+  Eigen::Matrix<double, 3, 2> steps_in_source;
+  steps_in_source.col(0) = ray_right * (distance / along_right) - center;
+  steps_in_source.col(1) = ray_down * (distance / along_down) - center;
+  const Eigen::Matrix<double, 3, 2> steps_in_camera =
+      camera_from_map_rotation * (source_from_map.transpose() * steps_in_source);
+  predicted.pixel_from_source = (predicted.jacobian * steps_in_camera).cast<float>();
+
+  float area = std::abs(predicted.pixel_from_source.determinant());
+  predicted.level = 0;
+  while (area > kMaxAreaRatio && predicted.level < kPyramidLevels - 1) {
+    ++predicted.level;
+    area *= 0.25f;
+  }
+  if (!(area >= kMinAreaRatio && area <= kMaxAreaRatio)) return std::nullopt;
+  return predicted;
+}
+
+bool PointSearcher::PreparePatch(const MapPoint& point, const KeyFrame& source,
+                                 const PredictedPoint& predicted, Cached* entry) {
+  const float scale = 1.0f / static_cast<float>(1 << predicted.level);
+  if (entry->has_patch && entry->level == predicted.level &&
+      (entry->pixel_from_source - predicted.pixel_from_source).cwiseAbs().maxCoeff() * scale <
+          kWarpTolerance) {
+    return true;
+  }
+  entry->level = predicted.level;
+  entry->pixel_from_source = predicted.pixel_from_source;
+  const Eigen::Matrix2f source_from_patch = (predicted.pixel_from_source * scale).inverse();
+  entry->has_patch = CutPatch(source.features->levels[point.source_level], point.source_pixel,
+                              source_from_patch, &entry->patch);
+  return entry->has_patch;
+}
+
+std::optional<FoundPoint> PointSearcher::Find(const MapPoint& point, const KeyFrame& source,
+                                              const PredictedPoint& predicted, const ImageFeatures& features,
+                                              float radius_px, bool direct) {
+  Cached& entry = Entry(point);
+  if (!PreparePatch(point, source, predicted, &entry)) return std::nullopt;
+  const auto level = static_cast<std::size_t>(predicted.level);
+  const cv::Mat& image = features.levels[level];
+  const Eigen::Vector2f center = LevelFromLevelZero(predicted.pixel, predicted.level).cast<float>();
+  const float radius = radius_px / static_cast<float>(1 << level) + 1.0f;
+
+  const std::vector<int>& row_begin = features.row_begin[level];
+  const std::vector<Corner>& corners = features.corners[level];
+  const int first_row = std::clamp(static_cast<int>(center.y() - radius), 0, image.rows - 1);
+  const int last_row = std::clamp(static_cast<int>(center.y() + radius) + 1, 0, image.rows);
+  float best = options_.min_corner_correlation;
+  const Corner* best_corner = nullptr;
+  for (int i = row_begin[static_cast<std::size_t>(first_row)];
+       i < row_begin[static_cast<std::size_t>(last_row)]; ++i) {
+    const Corner& corner = corners[static_cast<std::size_t>(i)];
+    const float dx = static_cast<float>(corner.x) - center.x(),
+                dy = static_cast<float>(corner.y) - center.y();
+    if (dx * dx + dy * dy > radius * radius) continue;
+    const float correlation = PatchCorrelation(entry.patch, image, corner.x, corner.y);
+    if (correlation > best) {
+      best = correlation;
+      best_corner = &corner;
+    }
+  }
+  if (best_corner) {
+    const auto aligned = AlignPatch(entry.patch, image, {best_corner->x, best_corner->y});
+    if (aligned && aligned->correlation >= options_.min_correlation) {
+      return FoundPoint{LevelZeroFromLevel(aligned->pixel.cast<double>(), predicted.level).cast<float>(),
+                        aligned->correlation};
+    }
+  }
+  if (direct && PatchFits(image, center.x(), center.y(), 2.0f)) {
+    const auto aligned = AlignPatch(entry.patch, image, center, options_.max_direct_shift_px);
+    if (aligned && aligned->correlation >= options_.min_direct_correlation) {
+      return FoundPoint{LevelZeroFromLevel(aligned->pixel.cast<double>(), predicted.level).cast<float>(),
+                        aligned->correlation};
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+namespace docent::engine {
+
+Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera, std::uint64_t seed)
+    : options_(options),
+      camera_(std::move(camera)),
+      random_(seed),
+      map_tracker_(options.map_tracker, camera_),
+      initializer_(options.initializer, camera_, random_.Next()) {}
+
+void Tracker::Reset() {
+  map_.reset();
+  map_key_ = 0;
+  starting_ = pair_given_ = tracking_ = false;
+  entering_key_ = 0;
+  entering_frames_ = 0;
+  initializer_.Reset();
+  map_tracker_.Clear();
+  reports_.clear();
+  candidate_.reset();
+  pair_.reset();
+}
+
+void Tracker::StartNewMap() {
+  Reset();
+  starting_ = true;
+}
+
+void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_key) {
+  const bool same = map_key == map_key_;
+  map_ = map && !map->keyframes.empty() ? std::move(map) : nullptr;
+  map_key_ = map_ ? map_key : 0;
+  if (!map_) {
+    tracking_ = false;
+    return;
+  }
+  if (pair_given_) {
+    // Our own pair became a map: its newest keyframe is where the camera was a moment ago.
+    starting_ = pair_given_ = false;
+    map_tracker_.Clear();
+    motion_.Reset(map_->keyframes.back().time, map_->keyframes.back().camera_from_map);
+    tracking_ = true;
+  } else if (!same) {
+    map_tracker_.Clear();
+    reports_.clear();
+    tracking_ = false;
+    lost_since_ = Timestamp::min();
+  }
+}
+
+std::shared_ptr<ImageFeatures> Tracker::NextFeatures(const Frame& frame) {
+  std::shared_ptr<ImageFeatures> features;
+  for (const auto& pooled : pool_) {
+    // Keyframes keep theirs; what nobody else holds is written again.
+    if (pooled.use_count() == 1) {
+      features = pooled;
+      break;
+    }
+  }
+  if (!features) {
+    std::erase_if(pool_, [](const auto& pooled) { return pooled.use_count() == 1; });
+    if (pool_.size() > 8) pool_.erase(pool_.begin());
+    features = std::make_shared<ImageFeatures>();
+    pool_.push_back(features);
+  }
+  cv::Mat gray;
+  if (frame.picture.channels() == 1) {
+    gray = frame.picture;
+  } else {
+    gray = features->levels[0];
+    cv::cvtColor(frame.picture, gray, cv::COLOR_BGR2GRAY);
+  }
+  ExtractFeatures(gray, options_.features, fast_threshold_, features.get());
+  fast_threshold_ = features->fast_threshold;
+  return features;
+}
+
+std::optional<Rotation3> Tracker::RotationFromPrevious() const {
+  if (!previous_) return std::nullopt;
+  const auto aligned = AlignRotation(previous_->small_blurry, *camera_, features_->small_blurry, *camera_);
+  if (!aligned || !aligned->converged) return std::nullopt;
+  return aligned->b_from_a;
+}
+
+bool Tracker::Believable(const MapTrackResult& result) const {
+  return result.converged && result.sigma <= options_.max_sigma && result.inliers >= options_.min_inliers &&
+         result.occupied_cells >= options_.min_cells && result.Quality() >= options_.lost_quality;
+}
+
+bool Tracker::Recovered(const MapTrackResult& result) const {
+  return result.converged && result.sigma <= options_.max_sigma &&
+         result.inliers >= options_.min_recovery_inliers &&
+         result.occupied_cells >= options_.min_recovery_cells &&
+         result.Quality() >= options_.min_recovery_quality;
+}
+
+TrackedFrame Tracker::Track(const Frame& frame, const PlaceFinder* places) {
+  const auto start = std::chrono::steady_clock::now();
+  TrackedFrame out;
+  out.frame = frame;
+  candidate_.reset();
+  pair_.reset();
+  previous_ = std::exchange(features_, nullptr);
+  features_ = NextFeatures(frame);
+  ++frames_since_keyframe_;
+
+  if (starting_) {
+    out.state = TrackingState::kInitializing;
+    if (pair_given_) {
+      out.hint = "hold on, making a map";
+    } else {
+      pair_ = initializer_.Track(frame.time, features_);
+      pair_given_ = pair_.has_value();
+      out.hint = initializer_.hint();
+    }
+  } else if (tracking_) {
+    TrackMap(frame, &out);
+  } else {
+    Recover(frame, places, &out);
+  }
+  out.tracking_time = std::chrono::steady_clock::now() - start;
+  return out;
+}
+
+void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
+  const Rigid3 predicted = motion_.Predict(frame.time);
+  MapTrackResult result =
+      map_tracker_.Track(*map_, *features_, predicted, MapTracker::Effort::kUsual, &random_);
+  if (!Believable(result)) {
+    // A second try, wider and turned as the whole picture turned.
+    const auto rotation = RotationFromPrevious();
+    const Rigid3 turned = rotation ? motion_.PredictWithRotation(*rotation) : predicted;
+    result = map_tracker_.Track(*map_, *features_, turned, MapTracker::Effort::kWide, &random_);
+  }
+  if (!Believable(result)) {
+    map_tracker_.Forget();
+    tracking_ = false;
+    lost_since_ = frame.time;
+    motion_.Miss(frame.time);
+    out->state = TrackingState::kLost;
+    out->hint = "look back at what was mapped";
+    return;
+  }
+  out->state = TrackingState::kSixDof;
+  Accept(frame, result, out);
+}
+
+void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out) {
+  const bool good = result.Quality() >= options_.good_quality;
+  if (out->state == TrackingState::kRelocalized) {
+    motion_.Reset(frame.time, result.camera_from_map);
+  } else {
+    motion_.Update(frame.time, result.camera_from_map);
+  }
+  tracking_ = true;
+  out->map = map_;
+  out->map_key = map_key_;
+  out->camera_from_map = result.camera_from_map;
+  out->covariance = result.covariance;
+  out->quality = result.Quality();
+  out->quality_class = good ? TrackingQuality::kGood : TrackingQuality::kBad;
+  out->finite_points = result.inliers;
+  out->matches = map_tracker_.matches();
+  if (!good) out->hint = "few points are found: slow down";
+  CollectReports();
+  if (good && options_.build_maps && frames_since_keyframe_ >= options_.frames_between_keyframes &&
+      WantsKeyFrame(options_.keyframes, *map_, result.camera_from_map, result)) {
+    KeyFrameCandidate candidate;
+    candidate.time = frame.time;
+    candidate.camera = camera_;
+    candidate.features = features_;
+    candidate.camera_from_map = result.camera_from_map;
+    for (const PointMatch& match : out->matches) {
+      if (match.inlier) candidate.matches.push_back(match);
+    }
+    candidate_ = std::move(candidate);
+  }
+}
+
+void Tracker::CollectReports() {
+  if (!options_.build_maps) return;
+  for (const MapTracker::Attempt& attempt : map_tracker_.attempts()) {
+    PointReport& report = reports_[attempt.point];
+    report.point = attempt.point;
+    if (attempt.inlier) {
+      ++report.inlier;
+    } else if (attempt.found) {
+      ++report.outlier;
+    } else {
+      ++report.not_found;
+    }
+  }
+}
+
+bool Tracker::RecoverNearby(const Frame& frame, TrackedFrame* out) {
+  if (frame.time - lost_since_ > FromSeconds(options_.short_loss_s)) return false;
+  const auto rotation = RotationFromPrevious();
+  const Rigid3 guess = rotation ? motion_.PredictWithRotation(*rotation) : motion_.Predict(frame.time);
+  const MapTrackResult result =
+      map_tracker_.Track(*map_, *features_, guess, MapTracker::Effort::kRecovery, &random_);
+  if (Recovered(result)) {
+    out->state = TrackingState::kRelocalized;
+    Accept(frame, result, out);
+    return true;
+  }
+  map_tracker_.Forget();
+  motion_.Reset(frame.time, guess);
+  return false;
+}
+
+std::vector<Tracker::TurnedPlace> Tracker::BestPlaces(const PlaceFinder& places) const {
+  std::vector<TurnedPlace> turned;
+  for (const PlaceCandidate& candidate : places.FindPlaces(
+           features_->small_blurry, options_.candidates_looked_at, options_.candidates_of_a_map, 0)) {
+    const KeyFrame* keyframe = candidate.map ? candidate.map->FindKeyFrame(candidate.keyframe) : nullptr;
+    if (!keyframe) continue;
+    const auto rotation =
+        AlignRotation(keyframe->features->small_blurry, *keyframe->camera, features_->small_blurry, *camera_);
+    if (!rotation) continue;
+    // What overlaps little agrees easily.
+    turned.push_back({candidate,
+                      Rigid3(rotation->b_from_a, Eigen::Vector3d::Zero()) * keyframe->camera_from_map,
+                      rotation->rms / std::sqrt(rotation->overlap)});
+  }
+  std::stable_sort(turned.begin(), turned.end(),
+                   [](const TurnedPlace& a, const TurnedPlace& b) { return a.misfit < b.misfit; });
+  if (turned.size() > options_.candidates) turned.resize(options_.candidates);
+  return turned;
+}
+
+void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
+  out->state = map_ || !options_.build_maps ? TrackingState::kLost : TrackingState::kInitializing;
+  out->hint = "look back at what was mapped";
+  if (map_ && RecoverNearby(frame, out)) return;
+  if (!places) return;
+  MapTrackResult result;
+  // A map that is about to be entered is followed, not searched anew.
+  if (entering_frames_ > 0) {
+    const auto found = places->FindPlaces(features_->small_blurry, 1, 1, entering_key_);
+    if (!found.empty()) {
+      const auto rotation = RotationFromPrevious();
+      const Rigid3 turn(rotation ? *rotation : Rotation3(), Eigen::Vector3d::Zero());
+      map_tracker_.Clear();
+      result = map_tracker_.Track(*found.front().map, *features_, turn * entering_pose_,
+                                  MapTracker::Effort::kWide, &random_);
+      if (Recovered(result)) {
+        entering_pose_ = result.camera_from_map;
+        if (++entering_frames_ < options_.agreeing_frames) return;
+        map_ = found.front().map;
+        map_key_ = entering_key_;
+        entering_frames_ = 0;
+        reports_.clear();
+        out->state = TrackingState::kRelocalized;
+        out->hint.clear();
+        Accept(frame, result, out);
+        return;
+      }
+    }
+    entering_frames_ = 0;
+  }
+  for (const TurnedPlace& place : BestPlaces(*places)) {
+    const PlaceCandidate& candidate = place.candidate;
+    map_tracker_.Clear();
+    result = map_tracker_.Track(*candidate.map, *features_, place.camera_from_map,
+                                MapTracker::Effort::kRecovery, &random_);
+    if (!Recovered(result)) continue;
+    if (candidate.map_key == map_key_) {
+      out->state = TrackingState::kRelocalized;
+      out->hint.clear();
+      Accept(frame, result, out);
+    } else {
+      entering_key_ = candidate.map_key;
+      entering_pose_ = result.camera_from_map;
+      entering_frames_ = 1;
+    }
+    return;
+  }
+  map_tracker_.Clear();
+}
+
+std::optional<KeyFrameCandidate> Tracker::TakeKeyFrameCandidate() {
+  if (candidate_) frames_since_keyframe_ = 0;
+  return std::exchange(candidate_, std::nullopt);
+}
+
+std::optional<InitialPair> Tracker::TakeInitialPair() {
+  return std::exchange(pair_, std::nullopt);
+}
+
+std::vector<PointReport> Tracker::TakeReports() {
+  std::vector<PointReport> reports;
+  reports.reserve(reports_.size());
+  for (const auto& [id, report] : reports_) reports.push_back(report);
+  reports_.clear();
+  return reports;
+}
+
+}  // namespace docent::engine

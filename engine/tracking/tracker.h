@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "engine/base/random.h"
+#include "engine/mapping/initializer.h"
+#include "engine/mapping/keyframe_candidate.h"
+#include "engine/recognition/place.h"
+#include "engine/tracking/keyframe_selection.h"
+#include "engine/tracking/map_tracker.h"
+#include "engine/tracking/motion_model.h"
+#include "engine/tracking/tracked_frame.h"
+#include "engine/vision/features.h"
+
+namespace docent::engine {
+
+struct TrackerOptions {
+  FeatureOptions features;
+  MapTrackerOptions map_tracker;
+  InitializerOptions initializer;
+  KeyFrameSelectionOptions keyframes;
+  double good_quality = 0.30;  // ptamm §2.1
+  double lost_quality = 0.13;  // ptamm §2.1
+  int min_inliers = 20;        // fewer do not make a pose, whatever their share
+  int min_cells = 3;           // of the 4x4 grid that inliers must occupy
+  // Robust, of the normalised residuals: where nothing fits, the robust threshold grows until chance matches
+  // pass it. A true pose leaves less than one.
+  double max_sigma = 4.0;
+  int frames_between_keyframes = 4;  // so that the mapper's answer to the last one is in the map
+  // Recovery: what a pose found after a loss must show before it counts (ptamm §6.3).
+  int min_recovery_inliers = 40;
+  double min_recovery_quality = 0.25;
+  int min_recovery_cells = 5;
+  double short_loss_s = 2.0;      // within it the track is first sought where it was lost
+  int candidates_looked_at = 10;  // keyframes that resemble the picture, turned to fit it best
+  int candidates_of_a_map = 4;    // of these, at most
+  std::size_t candidates = 3;     // the best of these are verified, each frame
+  int agreeing_frames = 3;        // before another map is entered (ptamm §6.3)
+  bool build_maps = true;         // else a frame without a map is lost, not initializing
+};
+
+// Tracks one camera: waits for a start, follows the map, notices loss and comes back by the place finder.
+// Lives on its camera's thread; never waits for the mapper. Not thread safe.
+class Tracker {
+ public:
+  Tracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera, std::uint64_t seed);
+
+  // The newest state of the map being tracked, or another map to go to (then the track is lost at first,
+  // unless the map starts from this tracker's own initial pair); null for none. map_key 0 means none.
+  void SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_key);
+  // Forgets the start that is being waited for and the track.
+  void Reset();
+  // Begins to look for a new map's first views; until SetMap gives one, frames are `initializing`.
+  void StartNewMap();
+  bool starting() const { return starting_; }
+
+  // The whole way of one frame. `places` may be null: then a lost track is sought in its own map only.
+  TrackedFrame Track(const Frame& frame, const PlaceFinder* places);
+
+  // What the last frame offers to the mapper; each is given out once.
+  std::optional<KeyFrameCandidate> TakeKeyFrameCandidate();
+  std::optional<InitialPair> TakeInitialPair();
+  std::vector<PointReport> TakeReports();
+  // When the last frame recovered into another map than the one that was set: its key and snapshot are in the
+  // TrackedFrame, and SetMap() is expected to follow with the same key.
+  std::uint64_t map_key() const { return map_key_; }
+
+ private:
+  std::shared_ptr<ImageFeatures> NextFeatures(const Frame& frame);
+  void TrackMap(const Frame& frame, TrackedFrame* out);
+  void Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
+  bool RecoverNearby(const Frame& frame, TrackedFrame* out);
+  // A keyframe that resembles the frame, and the pose that the resemblance suggests.
+  struct TurnedPlace {
+    PlaceCandidate candidate;
+    Rigid3 camera_from_map;
+    double misfit = 0;  // of the thumbnails, after turning
+  };
+  std::vector<TurnedPlace> BestPlaces(const PlaceFinder& places) const;
+  bool Believable(const MapTrackResult& result) const;
+  bool Recovered(const MapTrackResult& result) const;
+  void Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out);
+  void CollectReports();
+  std::optional<Rotation3> RotationFromPrevious() const;
+
+  const TrackerOptions options_;
+  std::shared_ptr<const CameraModel> camera_;
+  Random random_;
+  MapTracker map_tracker_;
+  Initializer initializer_;
+  MotionModel motion_;
+
+  std::shared_ptr<const MapSnapshot> map_;
+  std::uint64_t map_key_ = 0;
+  bool starting_ = false;    // a start is being looked for, or the mapper is making a map of it
+  bool pair_given_ = false;  // the mapper is making a map of our pair
+  bool tracking_ = false;
+  Timestamp lost_since_{};
+  int frames_since_keyframe_ = 0;
+  // Poses in another map that agree with each other, before it is entered.
+  std::uint64_t entering_key_ = 0;
+  int entering_frames_ = 0;
+  Rigid3 entering_pose_;
+
+  std::shared_ptr<const ImageFeatures> features_, previous_;
+  std::vector<std::shared_ptr<ImageFeatures>> pool_;
+  std::array<int, kPyramidLevels> fast_threshold_{};
+  std::map<MapPointId, PointReport> reports_;
+  std::optional<KeyFrameCandidate> candidate_;
+  std::optional<InitialPair> pair_;
+};
+
+}  // namespace docent::engine

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/map/map.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "engine/base/random.h"
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::CameraAt;
+using testing_world::PinholeCamera;
+
+// A blank picture will do for what this file asks.
+KeyFrame BlankKeyFrame(const Rigid3& camera_from_map = {}) {
+  static const auto camera = PinholeCamera(64, 64);
+  static const auto features = [] {
+    auto made = std::make_shared<ImageFeatures>();
+    for (int level = 0; level < kPyramidLevels; ++level)
+      made->levels[static_cast<std::size_t>(level)] =
+          cv::Mat(64 >> level, 64 >> level, CV_8UC1, cv::Scalar(0));
+    return std::shared_ptr<const ImageFeatures>(made);
+  }();
+  KeyFrame keyframe;
+  keyframe.camera = camera;
+  keyframe.features = features;
+  keyframe.camera_from_map = camera_from_map;
+  return keyframe;
+}
+
+MapPoint PointFrom(KeyFrameId source) {
+  MapPoint point;
+  point.point_in_map = {0.1, 0.2, 2, 1};
+  point.source_keyframe = source;
+  point.source_pixel = {20, 20};
+  return point;
+}
+
+Observation Seen(KeyFrameId keyframe, MapPointId point) {
+  return {keyframe, point, Eigen::Vector2f(10, 12), 1};
+}
+
+// What the map's header promises, asked in full.
+void ExpectConsistent(const Map& map) {
+  std::set<std::pair<KeyFrameId, MapPointId>> from_keyframes, from_points;
+  for (const auto& [id, record] : map.keyframes()) {
+    EXPECT_EQ(id, record.keyframe.id);
+    EXPECT_TRUE(std::is_sorted(record.observations.begin(), record.observations.end(),
+                               [](const auto& a, const auto& b) { return a.point < b.point; }));
+    for (const Observation& observation : record.observations) {
+      EXPECT_EQ(observation.keyframe, id);
+      EXPECT_TRUE(from_keyframes.emplace(id, observation.point).second) << "seen twice";
+    }
+  }
+  std::size_t alive = 0;
+  for (const Map::PointRecord& record : map.points()) {
+    if (!record.alive) {
+      EXPECT_TRUE(record.observers.empty());
+      continue;
+    }
+    ++alive;
+    EXPECT_TRUE(map.keyframes().contains(record.point.source_keyframe)) << "source is gone";
+    EXPECT_TRUE(std::is_sorted(record.observers.begin(), record.observers.end()));
+    for (const KeyFrameId observer : record.observers) from_points.emplace(observer, record.point.id);
+  }
+  EXPECT_EQ(from_keyframes, from_points);
+  EXPECT_EQ(alive, map.AlivePoints());
+}
+
+// A new point with the two observations that it is made of.
+MapPointId AddSeenPoint(Map* map, KeyFrameId source, KeyFrameId other) {
+  const MapPointId id = map->AddPoint(PointFrom(source));
+  map->AddObservation(Seen(source, id));
+  map->AddObservation(Seen(other, id));
+  return id;
+}
+
+class RandomMap {
+ public:
+  explicit RandomMap(std::uint64_t seed) : random_(seed) {
+    for (int i = 0; i < 3; ++i) AddKeyFrame();
+  }
+
+  void Change(Map* map) {
+    std::vector<KeyFrameId> keyframes;
+    for (const auto& [id, record] : map->keyframes()) keyframes.push_back(id);
+    const std::uint32_t action = random_.Below(100);
+    if (keyframes.size() < 3 || action < 4) {
+      NoteKeyFrame(map->AddKeyFrame(BlankKeyFrame()).keyframe.id);
+      return;
+    }
+    const KeyFrameId one = keyframes[random_.Below(static_cast<std::uint32_t>(keyframes.size()))];
+    const KeyFrameId other = keyframes[random_.Below(static_cast<std::uint32_t>(keyframes.size()))];
+    const MapPointId point =
+        map->points().empty()
+            ? 0
+            : map->points()[random_.Below(static_cast<std::uint32_t>(map->points().size()))].point.id;
+    if (action < 40) {
+      if (one != other) {
+        EXPECT_TRUE(points_.insert(AddSeenPoint(map, one, other)).second) << "id given twice";
+      }
+    } else if (action < 70) {
+      map->AddObservation(Seen(one, point));
+    } else if (action < 85) {
+      map->RemoveObservation(one, point);
+    } else if (action < 93) {
+      map->RemovePoint(point);
+    } else if (action < 96) {
+      map->RemoveKeyFrame(one);
+    } else {
+      map->Snapshot();
+    }
+  }
+
+  Map& map() { return map_; }
+
+ private:
+  void AddKeyFrame() { NoteKeyFrame(map_.AddKeyFrame(BlankKeyFrame()).keyframe.id); }
+  void NoteKeyFrame(KeyFrameId id) { EXPECT_TRUE(keyframes_.insert(id).second) << "id given twice"; }
+
+  Random random_;
+  Map map_;
+  std::set<KeyFrameId> keyframes_;
+  std::set<MapPointId> points_;
+};
+
+TEST(Map, StaysConsistentUnderAnySequenceOfChanges) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    RandomMap world(seed);
+    for (int step = 0; step < 400; ++step) {
+      world.Change(&world.map());
+      if (step % 10 == 0) ExpectConsistent(world.map());
+    }
+    ExpectConsistent(world.map());
+    const auto snapshot = world.map().Snapshot();
+    EXPECT_EQ(Validate(*snapshot), "");
+    EXPECT_EQ(snapshot->points.size(), world.map().AlivePoints());
+    EXPECT_GT(snapshot->points.size(), 3u);
+  }
+}
+
+TEST(Map, GivesNoIdASecondTimeEvenAfterBeingStored) {
+  for (std::uint64_t seed = 20; seed < 23; ++seed) {
+    RandomMap world(seed);
+    for (int round = 0; round < 10; ++round) {
+      for (int step = 0; step < 60; ++step) world.Change(&world.map());
+      // The newest ids die before the map is stored.
+      const auto last = world.map().AddPoint(PointFrom(world.map().keyframes().begin()->first));
+      world.map().RemovePoint(last);
+      const auto newest = world.map().AddKeyFrame(BlankKeyFrame()).keyframe.id;
+      world.map().RemoveKeyFrame(newest);
+      world.map() = Map(*world.map().Snapshot());
+      EXPECT_GT(world.map().AddKeyFrame(BlankKeyFrame()).keyframe.id, newest);
+      const auto next = world.map().AddPoint(PointFrom(world.map().keyframes().begin()->first));
+      EXPECT_GT(next, last);
+      world.map().RemovePoint(next);
+    }
+  }
+}
+
+TEST(Map, ComesBackFromItsSnapshotUnchanged) {
+  RandomMap world(5);
+  for (int step = 0; step < 500; ++step) world.Change(&world.map());
+  const auto first = world.map().Snapshot();
+  Map copy(*first);
+  ExpectConsistent(copy);
+  const auto second = copy.Snapshot();
+  EXPECT_GT(second->revision, first->revision);
+  EXPECT_EQ(second->next_keyframe, first->next_keyframe);
+  EXPECT_EQ(second->next_point, first->next_point);
+  ASSERT_EQ(second->keyframes.size(), first->keyframes.size());
+  ASSERT_EQ(second->points.size(), first->points.size());
+  ASSERT_EQ(second->observations.size(), first->observations.size());
+  for (std::size_t i = 0; i < first->keyframes.size(); ++i) {
+    EXPECT_EQ(second->keyframes[i].id, first->keyframes[i].id);
+    EXPECT_EQ(second->keyframes[i].features, first->keyframes[i].features);
+  }
+  for (std::size_t i = 0; i < first->points.size(); ++i) {
+    EXPECT_EQ(second->points[i].id, first->points[i].id);
+    EXPECT_EQ(second->points[i].point_in_map, first->points[i].point_in_map);
+  }
+  for (std::size_t i = 0; i < first->observations.size(); ++i) {
+    EXPECT_EQ(second->observations[i].keyframe, first->observations[i].keyframe);
+    EXPECT_EQ(second->observations[i].point, first->observations[i].point);
+    EXPECT_EQ(second->observations[i].pixel, first->observations[i].pixel);
+  }
+}
+
+TEST(Map, PublishesWhatDoesNotChangeAfterwards) {
+  Map map;
+  const auto a = map.AddKeyFrame(BlankKeyFrame()).keyframe.id,
+             b = map.AddKeyFrame(BlankKeyFrame()).keyframe.id;
+  const auto point = AddSeenPoint(&map, a, b);
+  const auto snapshot = map.Snapshot();
+  map.FindPoint(point)->point.point_in_map.x() = 5;
+  map.RemovePoint(point);
+  map.RemoveKeyFrame(b);
+  ASSERT_NE(snapshot->FindPoint(point), nullptr);
+  EXPECT_EQ(snapshot->FindPoint(point)->point_in_map.x(), 0.1);
+  EXPECT_EQ(snapshot->keyframes.size(), 2u);
+  EXPECT_EQ(map.Snapshot()->FindPoint(point), nullptr);
+}
+
+TEST(Map, DropsAPointThatTooFewSeeOrWhoseSourceLosesIt) {
+  Map map;
+  std::vector<KeyFrameId> keyframes;
+  for (int i = 0; i < 4; ++i) keyframes.push_back(map.AddKeyFrame(BlankKeyFrame()).keyframe.id);
+  const auto few = AddSeenPoint(&map, keyframes[0], keyframes[1]);
+  map.RemoveObservation(keyframes[1], few);
+  EXPECT_EQ(map.FindPoint(few), nullptr);
+
+  const auto many = AddSeenPoint(&map, keyframes[0], keyframes[1]);
+  map.AddObservation(Seen(keyframes[2], many));
+  map.RemoveObservation(keyframes[1], many);
+  ASSERT_NE(map.FindPoint(many), nullptr);
+  map.AddObservation(Seen(keyframes[3], many));
+  map.RemoveObservation(keyframes[0], many);
+  EXPECT_EQ(map.FindPoint(many), nullptr);
+  ExpectConsistent(map);
+}
+
+TEST(Map, KeepsNoPointWhoseSourceKeyframeIsGone) {
+  Map map;
+  std::vector<KeyFrameId> keyframes;
+  for (int i = 0; i < 4; ++i) keyframes.push_back(map.AddKeyFrame(BlankKeyFrame()).keyframe.id);
+  // A stored map may hold a point that its own source does not observe.
+  const MapPointId point = map.AddPoint(PointFrom(keyframes[0]));
+  for (int i = 1; i < 4; ++i) map.AddObservation(Seen(keyframes[static_cast<std::size_t>(i)], point));
+  map.RemoveKeyFrame(keyframes[0]);
+  ExpectConsistent(map);
+  EXPECT_EQ(Validate(*map.Snapshot()), "");
+}
+
+TEST(Map, RefusesObservationsTwiceOrOfWhatIsNotThere) {
+  Map map;
+  const auto a = map.AddKeyFrame(BlankKeyFrame()).keyframe.id,
+             b = map.AddKeyFrame(BlankKeyFrame()).keyframe.id;
+  const auto point = AddSeenPoint(&map, a, b);
+  EXPECT_FALSE(map.AddObservation(Seen(a, point)));
+  EXPECT_FALSE(map.AddObservation(Seen(99, point)));
+  EXPECT_FALSE(map.AddObservation(Seen(a, 99)));
+  map.RemovePoint(point);
+  EXPECT_FALSE(map.AddObservation(Seen(a, point)));
+  map.RemovePoint(point);
+  map.RemovePoint(77);
+  map.RemoveObservation(a, point);
+  map.RemoveKeyFrame(55);
+  EXPECT_EQ(map.AlivePoints(), 0u);
+  ExpectConsistent(map);
+}
+
+TEST(Map, KnowsWhichKeyframesShareMost) {
+  Map map;
+  std::vector<KeyFrameId> keyframes;
+  for (int i = 0; i < 4; ++i) keyframes.push_back(map.AddKeyFrame(BlankKeyFrame()).keyframe.id);
+  for (int i = 0; i < 5; ++i) AddSeenPoint(&map, keyframes[0], keyframes[2]);
+  for (int i = 0; i < 3; ++i) AddSeenPoint(&map, keyframes[1], keyframes[0]);
+  AddSeenPoint(&map, keyframes[1], keyframes[3]);
+  using Shared = std::vector<std::pair<KeyFrameId, int>>;
+  EXPECT_EQ(map.Covisible(keyframes[0]), (Shared{{keyframes[2], 5}, {keyframes[1], 3}}));
+  EXPECT_EQ(map.Covisible(keyframes[3]), (Shared{{keyframes[1], 1}}));
+  EXPECT_TRUE(map.Covisible(1234).empty());
+}
+
+TEST(Map, MeasuresDepthByTheMedianOfFinitePointsInFront) {
+  Map map;
+  const auto a = map.AddKeyFrame(BlankKeyFrame(CameraAt({0, 0, -1}))).keyframe.id;
+  const auto b = map.AddKeyFrame(BlankKeyFrame()).keyframe.id;
+  for (const double z : {1.0, 1.5, 2.0, 2.5, 50.0, -40.0}) {
+    const auto id = AddSeenPoint(&map, a, b);
+    map.FindPoint(id)->point.point_in_map = {0, 0, z, 1};
+  }
+  const auto infinite = AddSeenPoint(&map, a, b);
+  map.FindPoint(infinite)->point.point_in_map = {0, 0, 1, 0};
+  map.UpdateDepth(map.FindKeyFrame(a));
+  EXPECT_DOUBLE_EQ(map.FindKeyFrame(a)->keyframe.mean_depth, 3.0);
+  // Distances from the median: 1, 0.5, 0, 0.5, 48.
+  EXPECT_NEAR(map.FindKeyFrame(a)->keyframe.depth_sigma, 1.4826 * 0.5, 1e-9);
+}
+
+TEST(Map, TurnsNormalsTowardsTheObservers) {
+  Map map;
+  const auto a = map.AddKeyFrame(BlankKeyFrame(CameraAt({-1, 0, 0}))).keyframe.id;
+  const auto b = map.AddKeyFrame(BlankKeyFrame(CameraAt({1, 0, 0}))).keyframe.id;
+  const auto id = AddSeenPoint(&map, a, b);
+  map.FindPoint(id)->point.point_in_map = {0, 0, 2, 1};
+  map.UpdateNormal(map.FindPoint(id));
+  EXPECT_LT((map.FindPoint(id)->point.normal - Eigen::Vector3f(0, 0, -1)).norm(), 1e-6f);
+  map.FindPoint(id)->point.point_in_map = {1, 0, 0, 0};
+  map.UpdateNormal(map.FindPoint(id));
+  EXPECT_LT((map.FindPoint(id)->point.normal - Eigen::Vector3f(-1, 0, 0)).norm(), 1e-6f);
+}
+
+}  // namespace
+}  // namespace docent::engine

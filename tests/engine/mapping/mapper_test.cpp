@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/mapper.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "engine/vision/features.h"
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::CameraAt;
+using testing_world::RenderedWorld;
+using Kind = MapperEvent::Kind;
+
+constexpr double kBaseline = 0.1;  // metres: the mapper's own unit, so that its map has the world's scale
+
+const std::shared_ptr<const CameraModel>& Camera() {
+  static const auto camera = testing_world::PinholeCamera(400, 300);
+  return camera;
+}
+
+// Two true views: corners of the first and where they are in the second.
+InitialPair TruePair(const RenderedWorld& world, const Rigid3& a, const Rigid3& b, std::size_t most) {
+  InitialPair pair;
+  pair.camera = Camera();
+  pair.a = {FromSeconds(0), MakeFeatures(world.Render(*Camera(), a, 1.5, 1))};
+  pair.b = {FromSeconds(0.5), MakeFeatures(world.Render(*Camera(), b, 1.5, 2))};
+  pair.geometry.verdict = TwoViewVerdict::kGeneral;
+  pair.geometry.b_from_a = b * a.inverse();
+  const double baseline = pair.geometry.b_from_a.translation.norm();
+  pair.geometry.b_from_a.translation /= baseline;
+  for (int level = 2; level >= 0; --level) {
+    for (const Corner& corner : pair.a.features->corners[static_cast<std::size_t>(level)]) {
+      const Eigen::Vector2d pixel = LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), level);
+      const auto hit = world.AtPixel(*Camera(), a, pixel);
+      if (pair.matches.size() >= most || !hit || !world.Sees(*Camera(), b, hit->point)) continue;
+      pair.matches.push_back({pixel.cast<float>(), Camera()->Project(b * hit->point)->cast<float>(),
+                              static_cast<std::uint8_t>(level)});
+      pair.geometry.points_in_a.push_back(a * hit->point / baseline);
+      pair.geometry.inlier.push_back(true);
+    }
+  }
+  pair.geometry.inlier_count = static_cast<int>(pair.matches.size());
+  return pair;
+}
+
+// A frame tracked perfectly in the mapper's map, whose frame is the first view's.
+KeyFrameCandidate TrueCandidate(const RenderedWorld& world, const MapSnapshot& map, const Rigid3& pose,
+                                double seconds) {
+  KeyFrameCandidate candidate;
+  candidate.time = FromSeconds(seconds);
+  candidate.camera = Camera();
+  candidate.features =
+      MakeFeatures(world.Render(*Camera(), pose, 1.5, static_cast<std::uint64_t>(1000 * seconds)));
+  candidate.camera_from_map = pose;
+  for (const MapPoint& point : map.points) {
+    const auto pixel = Camera()->Project(pose * point.position());
+    if (pixel && Camera()->IsInside(*pixel, 10) && point.id % 2 == 0)
+      candidate.matches.push_back({point.id, pixel->cast<float>(), point.source_level, true});
+  }
+  return candidate;
+}
+
+int CountEvents(Mapper* mapper, Kind kind) {
+  const auto events = mapper->TakeEvents();
+  return static_cast<int>(
+      std::count_if(events.begin(), events.end(), [kind](const auto& event) { return event.kind == kind; }));
+}
+
+void WorkUntilIdle(Mapper* mapper) {
+  for (int step = 0; step < 200 && mapper->Step(); ++step) {
+  }
+}
+
+class Mapping : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    world_ = new RenderedWorld(RenderedWorld::Room(61));
+    pair_ = new InitialPair(TruePair(*world_, CameraAt({0, 0, 0}), CameraAt({kBaseline, 0, 0}), 250));
+    Mapper mapper({});
+    mapper.Start(*pair_);
+    mapper.Step();
+    started_ = mapper.Snapshot();
+  }
+  static void TearDownTestSuite() {
+    delete world_;
+    delete pair_;
+    world_ = nullptr;
+    pair_ = nullptr;
+    started_.reset();
+  }
+  static double MedianDistanceToSurface(const MapSnapshot& map) {
+    std::vector<double> distances;
+    for (const MapPoint& point : map.points) distances.push_back(world_->DistanceToSurface(point.position()));
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    return *middle;
+  }
+
+  static RenderedWorld* world_;
+  static InitialPair* pair_;
+  static std::shared_ptr<const MapSnapshot> started_;
+};
+RenderedWorld* Mapping::world_ = nullptr;
+InitialPair* Mapping::pair_ = nullptr;
+std::shared_ptr<const MapSnapshot> Mapping::started_;
+
+TEST_F(Mapping, StartsAMapFromTwoViews) {
+  Mapper mapper({});
+  EXPECT_EQ(mapper.Snapshot(), nullptr);
+  EXPECT_TRUE(mapper.Settled());
+  EXPECT_FALSE(mapper.Step());
+  ASSERT_TRUE(mapper.Start(*pair_));
+  EXPECT_FALSE(mapper.Settled());
+  EXPECT_TRUE(mapper.Step());
+  EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 1);
+  EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 0) << "events are given out once";
+  const auto map = mapper.Snapshot();
+  ASSERT_NE(map, nullptr);
+  EXPECT_EQ(Validate(*map), "");
+  ASSERT_EQ(map->keyframes.size(), 2u);
+  EXPECT_TRUE(map->keyframes[0].fixed);
+  EXPECT_TRUE(IsNear(map->keyframes[0].camera_from_map, Rigid3(), 1e-12, 1e-12));
+  EXPECT_LT((map->keyframes[1].camera_from_map.OriginInSource() - Eigen::Vector3d(kBaseline, 0, 0)).norm(),
+            0.012);
+  EXPECT_GT(map->points.size(), pair_->matches.size() * 3 / 4);
+  EXPECT_LT(MedianDistanceToSurface(*map), 0.05);
+  EXPECT_TRUE(mapper.Settled());
+}
+
+TEST_F(Mapping, TellsWhenAStartFails) {
+  InitialPair poor = TruePair(*world_, CameraAt({0, 0, 0}), CameraAt({kBaseline, 0, 0}), 30);
+  // A blank second picture: nothing can join the thirty.
+  poor.b.features = MakeFeatures(cv::Mat(300, 400, CV_8UC1, cv::Scalar(120)));
+  Mapper mapper({});
+  mapper.Start(poor);
+  WorkUntilIdle(&mapper);
+  const auto events = mapper.TakeEvents();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].kind, Kind::kStartFailed);
+  EXPECT_FALSE(events[0].detail.empty());
+  EXPECT_EQ(mapper.Snapshot(), nullptr);
+  EXPECT_TRUE(mapper.Settled());
+  // A keyframe that comes too late is dropped without harm, and the next start succeeds.
+  mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.2, 0, 0}), 1));
+  WorkUntilIdle(&mapper);
+  EXPECT_EQ(mapper.Snapshot(), nullptr);
+  mapper.Start(*pair_);
+  mapper.Step();
+  EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 1);
+}
+
+TEST_F(Mapping, GrowsByKeyframesUntilSettled) {
+  Mapper mapper({});
+  mapper.Adopt(started_);
+  EXPECT_EQ(mapper.Snapshot(), started_);
+  const std::vector<Rigid3> poses = {CameraAt({0.3, 0, 0}), CameraAt({0.5, 0.1, 0}, {0, -5, 0}),
+                                     CameraAt({-0.2, 0, 0.2}), CameraAt({-0.4, -0.1, 0.1}, {0, 8, 0})};
+  double seconds = 1;
+  for (const Rigid3& pose : poses) {
+    const auto before = mapper.Snapshot();
+    ASSERT_TRUE(mapper.Offer(TrueCandidate(*world_, *before, pose, seconds++)));
+    EXPECT_FALSE(mapper.Settled());
+    WorkUntilIdle(&mapper);
+    EXPECT_TRUE(mapper.Settled());
+    const auto after = mapper.Snapshot();
+    EXPECT_EQ(after->keyframes.size(), before->keyframes.size() + 1);
+    EXPECT_GT(after->revision, before->revision);
+    EXPECT_EQ(Validate(*after), "");
+    EXPECT_GT(after->points.size(), before->points.size());
+    EXPECT_LT((after->keyframes.back().camera_from_map.OriginInSource() - pose.OriginInSource()).norm(),
+              0.03);
+  }
+  EXPECT_EQ(CountEvents(&mapper, Kind::kKeyFrame), 4);
+  EXPECT_LT(MedianDistanceToSurface(*mapper.Snapshot()), 0.04);
+  EXPECT_GT(mapper.Times().bundle_adjustment, 0);
+  EXPECT_GT(mapper.Times().other, 0);
+}
+
+TEST_F(Mapping, TakesNoMoreThanItsQueueHolds) {
+  MapperOptions options;
+  options.max_queue = 2;
+  Mapper mapper(options);
+  mapper.Adopt(started_);
+  EXPECT_TRUE(mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.25, 0, 0}), 1)));
+  EXPECT_TRUE(mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.45, 0, 0}), 2)));
+  EXPECT_FALSE(mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.65, 0, 0}), 3)));
+  EXPECT_FALSE(mapper.Start(*pair_));
+  EXPECT_EQ(mapper.QueueLength(), 2u);
+  mapper.Adopt(started_);
+  EXPECT_EQ(mapper.QueueLength(), 0u);
+  EXPECT_FALSE(mapper.Step());
+}
+
+TEST_F(Mapping, TakesInAWaitingKeyframeBeforeItAdjusts) {
+  Mapper mapper({});
+  mapper.Adopt(started_);
+  mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.25, 0, 0}), 1));
+  ASSERT_TRUE(mapper.Step());
+  EXPECT_FALSE(mapper.Settled()) << "the newest keyframe has yet to be adjusted";
+  mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.45, 0, 0}), 2));
+  ASSERT_TRUE(mapper.Step());
+  EXPECT_EQ(mapper.Snapshot()->keyframes.size(), 4u);
+  WorkUntilIdle(&mapper);
+  EXPECT_TRUE(mapper.Settled());
+}
+
+TEST_F(Mapping, StaysWholeWhileKeyframesInterruptIt) {
+  Mapper mapper({});
+  mapper.Adopt(started_);
+  std::vector<KeyFrameCandidate> candidates;
+  for (int i = 0; i < 5; ++i)
+    candidates.push_back(TrueCandidate(*world_, *started_, CameraAt({0.2 + 0.1 * i, 0.03 * i, 0}), 1 + i));
+  std::jthread tracker([&] {
+    for (const KeyFrameCandidate& candidate : candidates)
+      while (!mapper.Offer(candidate)) std::this_thread::yield();
+  });
+  while (mapper.Snapshot()->keyframes.size() < 7) {
+    mapper.Step();
+    EXPECT_EQ(Validate(*mapper.Snapshot()), "");
+    std::this_thread::yield();
+  }
+  tracker.join();
+  WorkUntilIdle(&mapper);
+  EXPECT_TRUE(mapper.Settled());
+  EXPECT_EQ(mapper.Snapshot()->keyframes.size(), 7u);
+  EXPECT_EQ(Validate(*mapper.Snapshot()), "");
+}
+
+TEST_F(Mapping, RemovesPointsThatTheTrackersFindInTheWrongPlace) {
+  Mapper mapper({});
+  mapper.Adopt(started_);
+  const MapPointId bad = started_->points[3].id, good = started_->points[5].id;
+  mapper.Report({{bad, 1, 40, 3}, {good, 40, 3, 3}, {123456, 0, 99, 0}});
+  mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.25, 0, 0}), 1));
+  ASSERT_TRUE(mapper.Step());
+  EXPECT_EQ(mapper.Snapshot()->FindPoint(bad), nullptr);
+  EXPECT_NE(mapper.Snapshot()->FindPoint(good), nullptr);
+  EXPECT_EQ(Validate(*mapper.Snapshot()), "");
+}
+
+TEST_F(Mapping, IsTheSameOnEveryRun) {
+  std::shared_ptr<const MapSnapshot> maps[2];
+  for (auto& map : maps) {
+    Mapper mapper({});
+    mapper.Start(*pair_);
+    mapper.Step();
+    mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.25, 0, 0}), 1));
+    WorkUntilIdle(&mapper);
+    map = mapper.Snapshot();
+  }
+  ASSERT_EQ(maps[0]->points.size(), maps[1]->points.size());
+  ASSERT_EQ(maps[0]->observations.size(), maps[1]->observations.size());
+  for (std::size_t i = 0; i < maps[0]->points.size(); ++i)
+    EXPECT_EQ(maps[0]->points[i].point_in_map, maps[1]->points[i].point_in_map);
+}
+
+}  // namespace
+}  // namespace docent::engine

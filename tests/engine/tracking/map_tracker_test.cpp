@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/map_tracker.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <numbers>
+
+#include "engine/tracking/tracker.h"
+#include "engine/vision/features.h"
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::CameraAt;
+using testing_world::RenderedWorld;
+using Effort = MapTracker::Effort;
+
+double Degrees(double radians) {
+  return radians * 180 / std::numbers::pi;
+}
+
+class TrackingInAMap : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    world_ = new RenderedWorld(RenderedWorld::Room(21));
+    camera_ = testing_world::PinholeCamera(400, 300);
+    map_ =
+        testing_world::TrueMap(*world_, camera_,
+                               {CameraAt({0, 0, 0}), CameraAt({0.3, 0, 0}), CameraAt({-0.3, 0.1, 0.2})}, 350)
+            .Snapshot();
+  }
+  static void TearDownTestSuite() {
+    delete world_;
+    world_ = nullptr;
+    map_.reset();
+    camera_.reset();
+  }
+  static std::shared_ptr<const ImageFeatures> Show(const RenderedWorld& world, const Rigid3& view,
+                                                   std::uint64_t seed = 3) {
+    return MakeFeatures(world.Render(*camera_, view, 1.5, seed));
+  }
+  static void ExpectAt(const MapTrackResult& result, const Rigid3& truth) {
+    EXPECT_TRUE(result.converged);
+    EXPECT_LT((result.camera_from_map.OriginInSource() - truth.OriginInSource()).norm(), 0.006);
+    EXPECT_LT(Degrees((result.camera_from_map.rotation * truth.rotation.inverse()).Angle()), 0.15);
+  }
+  // What the tracker asks at least of a pose before anything is made of it.
+  static bool Believed(const MapTrackResult& result) {
+    const TrackerOptions tracker;
+    return result.converged && result.sigma <= tracker.max_sigma && result.inliers >= tracker.min_inliers &&
+           result.occupied_cells >= tracker.min_cells && result.Quality() >= tracker.lost_quality;
+  }
+
+  static RenderedWorld* world_;
+  static std::shared_ptr<const CameraModel> camera_;
+  static std::shared_ptr<const MapSnapshot> map_;
+};
+RenderedWorld* TrackingInAMap::world_ = nullptr;
+std::shared_ptr<const CameraModel> TrackingInAMap::camera_;
+std::shared_ptr<const MapSnapshot> TrackingInAMap::map_;
+
+const std::vector<Rigid3>& Views() {
+  static const std::vector<Rigid3> views = {CameraAt({0.1, 0.05, 0.1}, {1, -2, 3}),
+                                            CameraAt({-0.2, 0, -0.2}, {-3, 4, -6}),
+                                            CameraAt({0.25, -0.1, 0.3}, {2, 0, 0})};
+  return views;
+}
+
+TEST_F(TrackingInAMap, FindsThePoseFromAPerturbedPrediction) {
+  MapTracker tracker({}, camera_);
+  Random random(1);
+  for (const Rigid3& view : Views()) {
+    const auto features = Show(*world_, view);
+    for (int trial = 0; trial < 4; ++trial) {
+      const Rigid3 predicted =
+          CameraAt({random.Uniform(-0.03, 0.03), random.Uniform(-0.03, 0.03), random.Uniform(-0.03, 0.03)},
+                   {random.Uniform(-2, 2), random.Uniform(-2, 2), random.Uniform(-2, 2)}) *
+          view;
+      const MapTrackResult result = tracker.Track(*map_, *features, predicted, Effort::kUsual, &random);
+      ExpectAt(result, view);
+      EXPECT_GT(result.Quality(), 0.5);
+      EXPECT_GT(result.inliers, 100);
+      EXPECT_GE(result.occupied_cells, 10);
+      EXPECT_TRUE(Believed(result));
+    }
+  }
+}
+
+TEST_F(TrackingInAMap, TellsWhatItLookedForAndFound) {
+  MapTracker tracker({}, camera_);
+  Random random(2);
+  const auto features = Show(*world_, Views()[0]);
+  const MapTrackResult result = tracker.Track(*map_, *features, Views()[0], Effort::kUsual, &random);
+  EXPECT_EQ(static_cast<int>(tracker.attempts().size()), result.attempted);
+  EXPECT_EQ(static_cast<int>(tracker.matches().size()), result.found);
+  const auto inlying = [](const auto& item) { return item.inlier; };
+  EXPECT_EQ(std::count_if(tracker.attempts().begin(), tracker.attempts().end(), inlying), result.inliers);
+  EXPECT_EQ(std::count_if(tracker.matches().begin(), tracker.matches().end(), inlying), result.inliers);
+  for (const PointMatch& match : tracker.matches()) {
+    const MapPoint* point = map_->FindPoint(match.point);
+    ASSERT_NE(point, nullptr);
+    if (!match.inlier) continue;
+    const auto truth = camera_->Project(Views()[0] * point->position());
+    EXPECT_LT((match.pixel.cast<double>() - *truth).norm(), 3.0 * (1 << match.level));
+  }
+  std::vector<double> depths;
+  for (const PointMatch& match : tracker.matches())
+    if (match.inlier) depths.push_back((Views()[0] * map_->FindPoint(match.point)->position()).z());
+  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2),
+                   depths.end());
+  EXPECT_NEAR(result.median_depth, depths[depths.size() / 2], 0.02);
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(result.covariance);
+  EXPECT_EQ(factor.info(), Eigen::Success) << "the covariance is not positive definite";
+  EXPECT_LT(std::sqrt(result.covariance.topLeftCorner<3, 3>().trace()), 0.01);
+}
+
+TEST_F(TrackingInAMap, ComesBackFromABadGuess) {
+  Random random(3);
+  const std::vector<Rigid3> offsets = {CameraAt({0.15, 0, 0}, {0, 6, 0}),
+                                       CameraAt({-0.1, 0.1, 0.1}, {-5, 0, 5}),
+                                       CameraAt({0, 0, 0.2}, {3, -5, 0})};
+  for (const Rigid3& view : Views()) {
+    const auto features = Show(*world_, view);
+    for (const Rigid3& offset : offsets) {
+      MapTracker tracker({}, camera_);
+      const MapTrackResult result =
+          tracker.Track(*map_, *features, offset * view, Effort::kRecovery, &random);
+      ExpectAt(result, view);
+      EXPECT_TRUE(Believed(result));
+    }
+  }
+}
+
+TEST_F(TrackingInAMap, BelievesNothingOfAnotherWorld) {
+  const RenderedWorld other = RenderedWorld::Room(4711);
+  Random random(4);
+  for (const Rigid3& view : Views()) {
+    const auto features = Show(other, view);
+    for (const Effort effort : {Effort::kUsual, Effort::kWide, Effort::kRecovery}) {
+      MapTracker tracker({}, camera_);
+      const MapTrackResult result = tracker.Track(*map_, *features, view, effort, &random);
+      EXPECT_FALSE(Believed(result)) << "effort " << static_cast<int>(effort) << ": " << result.inliers
+                                     << " of " << result.attempted << ", sigma " << result.sigma;
+    }
+  }
+}
+
+TEST_F(TrackingInAMap, BelievesNothingOfABlankPictureOrAnEmptyMap) {
+  Random random(5);
+  const auto blank = MakeFeatures(cv::Mat(300, 400, CV_8UC1, cv::Scalar(90)));
+  const auto features = Show(*world_, Views()[0]);
+  for (const Effort effort : {Effort::kUsual, Effort::kWide, Effort::kRecovery}) {
+    MapTracker tracker({}, camera_);
+    EXPECT_FALSE(tracker.Track(*map_, *blank, Views()[0], effort, &random).converged);
+    EXPECT_FALSE(tracker.Track(MapSnapshot(), *features, Views()[0], effort, &random).converged);
+  }
+}
+
+TEST_F(TrackingInAMap, SeesNothingFromBehindTheWalls) {
+  MapTracker tracker({}, camera_);
+  Random random(6);
+  const auto features = Show(*world_, Views()[0]);
+  const MapTrackResult result =
+      tracker.Track(*map_, *features, CameraAt({0, 0, 6}, {0, 180, 0}), Effort::kUsual, &random);
+  EXPECT_EQ(result.attempted, 0);
+  EXPECT_FALSE(result.converged);
+}
+
+TEST_F(TrackingInAMap, AnswersTheSameToTheSameSeed) {
+  MapTrackResult results[2];
+  for (MapTrackResult& result : results) {
+    MapTracker tracker({}, camera_);
+    Random random(7);
+    for (const Rigid3& view : Views())
+      result = tracker.Track(*map_, *Show(*world_, view), view, Effort::kUsual, &random);
+  }
+  EXPECT_EQ(results[0].camera_from_map.translation, results[1].camera_from_map.translation);
+  EXPECT_EQ(results[0].camera_from_map.rotation.quaternion().coeffs(),
+            results[1].camera_from_map.rotation.quaternion().coeffs());
+  EXPECT_EQ(results[0].inliers, results[1].inliers);
+  EXPECT_EQ(results[0].covariance, results[1].covariance);
+}
+
+}  // namespace
+}  // namespace docent::engine

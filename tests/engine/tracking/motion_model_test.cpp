@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/motion_model.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using testing_world::CameraAt;
+
+// A camera that keeps its twist: 0.3 m/s and 30 degrees a second.
+Rigid3 Screw(double seconds) {
+  Vector6 twist;
+  twist << 0.3, -0.1, 0.05, 0.1, 0.5, -0.1;
+  return Rigid3::Exp(seconds * twist) * CameraAt({1, 2, 3}, {10, 20, 30});
+}
+
+TEST(MotionModel, LearnsAConstantVelocity) {
+  MotionModel model;
+  model.Reset(FromSeconds(0), Screw(0));
+  for (int i = 1; i <= 20; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
+  EXPECT_TRUE(IsNear(model.Predict(FromSeconds(21 / 30.0)), Screw(21 / 30.0), 1e-4, 1e-4));
+  EXPECT_TRUE(IsNear(model.Predict(FromSeconds(23 / 30.0)), Screw(23 / 30.0), 1e-4, 1e-4));
+}
+
+TEST(MotionModel, StandsStillAfterAResetAndAtItsOwnTime) {
+  MotionModel model;
+  for (int i = 0; i <= 5; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
+  EXPECT_TRUE(IsNear(model.Predict(FromSeconds(5 / 30.0)), Screw(5 / 30.0), 1e-12, 1e-12));
+  EXPECT_TRUE(IsNear(model.Predict(FromSeconds(1 / 30.0)), Screw(5 / 30.0), 1e-12, 1e-12));
+  model.Reset(FromSeconds(1), Screw(1));
+  EXPECT_TRUE(IsNear(model.Predict(FromSeconds(2)), Screw(1), 1e-12, 1e-12));
+}
+
+TEST(MotionModel, DoesNotRunAwayThroughAGapInTheVideo) {
+  MotionModel model;
+  model.Reset(FromSeconds(0), Screw(0));
+  for (int i = 1; i <= 20; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
+  const Rigid3 later = model.Predict(FromSeconds(100));
+  EXPECT_TRUE(IsNear(later, Screw(20 / 30.0 + 0.2), 1e-3, 1e-3));
+}
+
+TEST(MotionModel, SlowsDownWhileNothingIsFound) {
+  MotionModel model;
+  model.Reset(FromSeconds(0), Screw(0));
+  for (int i = 1; i <= 20; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
+  double step = 1;
+  for (int i = 21; i < 40; ++i) {
+    const Rigid3 before = model.last();
+    model.Miss(FromSeconds(i / 30.0));
+    const double next_step = (model.last() * before.inverse()).Log().norm();
+    EXPECT_LT(next_step, 0.6 * step);
+    step = next_step;
+  }
+  EXPECT_LT(step, 1e-5);
+}
+
+TEST(MotionModel, TwoPicturesOfOneTimeDoNotBreakIt) {
+  MotionModel model;
+  model.Reset(FromSeconds(1), Screw(0));
+  model.Update(FromSeconds(1), Screw(0.1));
+  EXPECT_TRUE(model.Predict(FromSeconds(1.1)).translation.allFinite());
+  EXPECT_TRUE(IsNear(model.last(), Screw(0.1), 1e-12, 1e-12));
+}
+
+TEST(MotionModel, TurnsOnTheSpotWhenOnlyTheRotationIsKnown) {
+  MotionModel model;
+  model.Reset(FromSeconds(0), Screw(0));
+  const Rotation3 turn = Rotation3::Exp({0.1, -0.2, 0.05});
+  const Rigid3 predicted = model.PredictWithRotation(turn);
+  EXPECT_LT((predicted.OriginInSource() - Screw(0).OriginInSource()).norm(), 1e-12);
+  EXPECT_LT((predicted.rotation.inverse() * (turn * Screw(0).rotation)).Angle(), 1e-12);
+}
+
+}  // namespace
+}  // namespace docent::engine

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/pose_refinement.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <numbers>
+
+#include "engine/base/random.h"
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+double Gaussian(Random* random) {
+  const double radius = std::sqrt(-2 * std::log(1 - random->Uniform()));
+  return radius * std::cos(2 * std::numbers::pi * random->Uniform());
+}
+
+const CameraModel kLens(LensModel::kRadialTangential, {640, 480, 400, 402, 320, 238},
+                        {-0.2, 0.05, 1e-3, -5e-4, 0});
+
+Rigid3 Truth() {
+  return testing_world::CameraAt({0.3, -0.2, -0.1}, {4, -8, 11});
+}
+
+Rigid3 Perturbed(Random* random, double distance_m, double angle_deg) {
+  Vector6 twist;
+  for (int i = 0; i < 3; ++i) {
+    twist[i] = random->Uniform(-distance_m, distance_m);
+    twist[i + 3] = random->Uniform(-angle_deg, angle_deg) * std::numbers::pi / 180;
+  }
+  return Rigid3::Exp(twist) * Truth();
+}
+
+// Points spread over the picture, one to four metres away, on four pyramid levels; the noise is that of the
+// level. infinite: directions instead.
+void AddMeasurements(int count, double noise_sigmas, bool infinite, Random* random,
+                     std::vector<PoseMeasurement>* measurements) {
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector2d pixel(random->Uniform(10, 630), random->Uniform(10, 470));
+    const double sigma = 1 << random->Below(4);
+    PoseMeasurement measurement;
+    const Eigen::Vector3d ray = *kLens.Unproject(pixel);
+    if (infinite) {
+      measurement.point_in_map << Truth().rotation.inverse() * ray, 0;
+    } else {
+      measurement.point_in_map << Truth().inverse() * Eigen::Vector3d(random->Uniform(1, 4) * ray), 1;
+    }
+    measurement.pixel = pixel + noise_sigmas * sigma * Eigen::Vector2d(Gaussian(random), Gaussian(random));
+    measurement.inverse_sigma = 1 / sigma;
+    measurements->push_back(measurement);
+  }
+}
+
+PoseRefinement Refine(const Rigid3& start, std::vector<PoseMeasurement>* measurements) {
+  std::vector<double> scratch;
+  return RefinePose(kLens, start, {}, measurements, &scratch);
+}
+
+Vector6 Error(const PoseRefinement& refined) {
+  return (refined.camera_from_map * Truth().inverse()).Log();
+}
+
+TEST(PoseRefinement, IsExactWithoutNoise) {
+  Random random(1);
+  for (int trial = 0; trial < 30; ++trial) {
+    std::vector<PoseMeasurement> measurements;
+    AddMeasurements(60, 0, false, &random, &measurements);
+    const PoseRefinement refined = Refine(Perturbed(&random, 0.1, 4), &measurements);
+    EXPECT_TRUE(refined.converged);
+    EXPECT_EQ(refined.inliers, 60);
+    EXPECT_LT(Error(refined).norm(), 1e-5);
+  }
+}
+
+TEST(PoseRefinement, FindsThePoseAmongThirtyPercentOutliers) {
+  Random random(2);
+  for (int trial = 0; trial < 30; ++trial) {
+    std::vector<PoseMeasurement> measurements;
+    AddMeasurements(140, 0.7, false, &random, &measurements);
+    AddMeasurements(60, 0.7, false, &random, &measurements);
+    for (std::size_t i = 140; i < 200; ++i)
+      measurements[i].pixel += 0.5 / measurements[i].inverse_sigma *
+                               Eigen::Vector2d(random.Uniform(40, 120), random.Uniform(-120, 120));
+    const PoseRefinement refined = Refine(Perturbed(&random, 0.04, 1.5), &measurements);
+    EXPECT_TRUE(refined.converged);
+    EXPECT_LT(Error(refined).head<3>().norm(), 0.015);
+    EXPECT_LT(Error(refined).tail<3>().norm(), 0.006);
+    EXPECT_NEAR(refined.sigma, 0.7, 0.35);
+    int wrongly_believed = 0, wrongly_doubted = 0;
+    for (std::size_t i = 0; i < 200; ++i) {
+      const bool believed = measurements[i].weight > 1e-3;
+      (i < 140 ? wrongly_doubted : wrongly_believed) += i < 140 ? !believed : believed;
+    }
+    EXPECT_EQ(wrongly_believed, 0);
+    EXPECT_LT(wrongly_doubted, 4);
+  }
+}
+
+TEST(PoseRefinement, TellsACovarianceThatItsErrorsHave) {
+  Random random(3);
+  constexpr int kTrials = 400;
+  double squared_distance = 0;
+  Matrix6 scatter = Matrix6::Zero(), told = Matrix6::Zero();
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<PoseMeasurement> measurements;
+    AddMeasurements(100, 1, false, &random, &measurements);
+    const PoseRefinement refined = Refine(Perturbed(&random, 0.02, 1), &measurements);
+    ASSERT_TRUE(refined.converged);
+    const Vector6 error = Error(refined);
+    squared_distance += error.dot(refined.covariance.ldlt().solve(error)) / kTrials;
+    scatter += error * error.transpose() / kTrials;
+    told += refined.covariance / kTrials;
+  }
+  // Six degrees of freedom: six in the mean. Tukey's weights make the told covariance a little too large.
+  EXPECT_GT(squared_distance, 4.2);
+  EXPECT_LT(squared_distance, 7.0);
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_GT(told(i, i), 0.8 * scatter(i, i)) << i;
+    EXPECT_LT(told(i, i), 1.7 * scatter(i, i)) << i;
+  }
+}
+
+TEST(PoseRefinement, GrowsSurerWithMoreMeasurements) {
+  Random random(4);
+  std::vector<PoseMeasurement> few, many;
+  AddMeasurements(50, 1, false, &random, &few);
+  AddMeasurements(800, 1, false, &random, &many);
+  const double ratio = Refine(Truth(), &few).covariance.trace() / Refine(Truth(), &many).covariance.trace();
+  EXPECT_GT(ratio, 8);
+  EXPECT_LT(ratio, 32);
+}
+
+TEST(PoseRefinement, DoesNotConvergeOnWhatHoldsNoPose) {
+  Random random(5);
+  std::vector<PoseMeasurement> none, two, same, infinite, line;
+  AddMeasurements(2, 0, false, &random, &two);
+  AddMeasurements(1, 0, false, &random, &same);
+  same.resize(50, same[0]);
+  AddMeasurements(100, 0.5, true, &random, &infinite);
+  // Points of one line in space: the camera may turn about it.
+  const Rigid3 map_from_camera = Truth().inverse();
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::Vector3d x(-1 + 0.04 * i, 0.3 - 0.01 * i, 2 + 0.02 * i);
+    PoseMeasurement measurement;
+    measurement.point_in_map << map_from_camera * x, 1;
+    measurement.pixel = *kLens.Project(x);
+    line.push_back(measurement);
+  }
+  EXPECT_FALSE(Refine(Truth(), &none).converged);
+  EXPECT_FALSE(Refine(Truth(), &two).converged);
+  EXPECT_FALSE(Refine(Truth(), &same).converged);
+  EXPECT_FALSE(Refine(Truth(), &infinite).converged);
+  EXPECT_FALSE(Refine(Truth(), &line).converged);
+}
+
+TEST(PoseRefinement, DoesNotBelieveWhatLiesBehindTheCamera) {
+  Random random(6);
+  std::vector<PoseMeasurement> measurements;
+  AddMeasurements(80, 0.5, false, &random, &measurements);
+  for (std::size_t i = 0; i < 20; ++i) {
+    const Eigen::Vector3d x = Truth() * Eigen::Vector3d(measurements[i].point_in_map.head<3>());
+    measurements[i].point_in_map.head<3>() = Truth().inverse() * Eigen::Vector3d(-x);
+  }
+  const PoseRefinement refined = Refine(Truth(), &measurements);
+  EXPECT_TRUE(refined.converged);
+  EXPECT_LE(refined.inliers, 60);
+  EXPECT_LT(Error(refined).norm(), 0.02);
+  for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(measurements[i].weight, 0);
+}
+
+TEST(PoseRefinement, HoldsTheRotationByInfinitePointsAndNothingElse) {
+  Random random(7);
+  std::vector<PoseMeasurement> finite, mixed;
+  AddMeasurements(12, 1, false, &random, &finite);
+  mixed = finite;
+  AddMeasurements(400, 1, true, &random, &mixed);
+  const PoseRefinement alone = Refine(Perturbed(&random, 0.02, 1), &finite);
+  const PoseRefinement both = Refine(Perturbed(&random, 0.02, 1), &mixed);
+  ASSERT_TRUE(alone.converged && both.converged);
+  EXPECT_LT(Error(both).tail<3>().norm(), 0.003);
+  EXPECT_LT((both.covariance.bottomRightCorner<3, 3>().trace()),
+            0.1 * (alone.covariance.bottomRightCorner<3, 3>().trace()));
+
+  // With the rotation known the place still depends on the finite points alone: pushing all infinite
+  // measurements by a translation of the camera is impossible, so a translated start comes back.
+  Rigid3 moved = Truth();
+  moved.translation += Eigen::Vector3d(0.05, -0.03, 0.04);
+  const PoseRefinement back = Refine(moved, &mixed);
+  EXPECT_LT(Error(back).head<3>().norm(), 0.05);
+  EXPECT_LT((back.camera_from_map.translation - both.camera_from_map.translation).norm(), 2e-3);
+}
+
+}  // namespace
+}  // namespace docent::engine

@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/tracker.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+#include <vector>
+
+#include "engine/mapping/mapper.h"
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::CameraAt;
+using testing_world::RenderedWorld;
+
+constexpr double kFramesASecond = 30;
+constexpr int kWalk = 110;         // frames of the first walk
+constexpr int kShortlyHidden = 8;  // frames with a hand before the lens
+constexpr int kLookAgain = 20;
+constexpr int kFrames = kWalk + kShortlyHidden + kLookAgain;
+
+const std::shared_ptr<const CameraModel>& Camera() {
+  static const auto camera = testing_world::PinholeCamera(320, 240);
+  return camera;
+}
+
+bool Hidden(int frame) {
+  return frame >= kWalk && frame < kWalk + kShortlyHidden;
+}
+
+// Out to the side, with the sway of a hand, and back.
+Rigid3 Pose(int frame) {
+  const double t = frame / kFramesASecond;
+  return CameraAt({0.45 * std::sin(0.9 * t), 0.05 * std::sin(2.1 * t), 0.15 * (1 - std::cos(1.3 * t))},
+                  {1.5 * std::sin(1.7 * t), -4 * std::sin(0.9 * t), 2 * std::sin(1.1 * t)});
+}
+
+// The pictures of one walk, rendered once.
+const std::vector<cv::Mat>& Pictures() {
+  static const std::vector<cv::Mat> pictures = [] {
+    const RenderedWorld world = RenderedWorld::Room(71);
+    std::vector<cv::Mat> rendered;
+    for (int i = 0; i < kFrames; ++i) {
+      const auto seed = static_cast<std::uint64_t>(i) + 1;
+      if (Hidden(i)) {
+        const RenderedWorld nothing{std::vector<testing_world::Wall>()};
+        rendered.push_back(nothing.Render(*Camera(), Pose(i), 1.5, seed));
+      } else {
+        rendered.push_back(world.Render(*Camera(), Pose(i), 1.5, seed));
+      }
+    }
+    return rendered;
+  }();
+  return pictures;
+}
+
+Frame FrameOf(int index) {
+  Frame frame;
+  frame.time = FromSeconds(index / kFramesASecond);
+  frame.index = static_cast<std::uint64_t>(index);
+  frame.picture = Pictures()[static_cast<std::size_t>(index)];
+  return frame;
+}
+
+// Every keyframe of one map, compared by thumbnail.
+class OneMap : public PlaceFinder {
+ public:
+  OneMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t key) : map_(std::move(map)), key_(key) {}
+  std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage& image, int count, int per_map,
+                                         std::uint64_t only_map) const override {
+    std::vector<PlaceCandidate> found;
+    if (only_map != 0 && only_map != key_) return found;
+    for (const KeyFrame& keyframe : map_->keyframes)
+      found.push_back({key_, map_, keyframe.id, Difference(keyframe.features->small_blurry, image)});
+    std::sort(found.begin(), found.end(),
+              [](const auto& a, const auto& b) { return a.difference < b.difference; });
+    found.resize(std::min<std::size_t>(found.size(), static_cast<std::size_t>(std::min(count, per_map))));
+    return found;
+  }
+
+ private:
+  std::shared_ptr<const MapSnapshot> map_;
+  std::uint64_t key_;
+};
+
+// Tracker and mapper in turn on one thread, as lockstep runs them.
+class Lockstep {
+ public:
+  explicit Lockstep(std::uint64_t seed) : tracker_({}, Camera(), seed), mapper_({}) {
+    tracker_.StartNewMap();
+  }
+
+  TrackedFrame Feed(const Frame& frame) {
+    TrackedFrame tracked = tracker_.Track(frame, nullptr);
+    if (auto pair = tracker_.TakeInitialPair()) mapper_.Start(std::move(*pair));
+    if (auto candidate = tracker_.TakeKeyFrameCandidate()) {
+      mapper_.Report(tracker_.TakeReports());
+      mapper_.Offer(std::move(*candidate));
+    }
+    for (int step = 0; step < 20 && !mapper_.Settled(); ++step) mapper_.Step();
+    mapper_.Step();
+    if (mapper_.Snapshot() != told_) {
+      told_ = mapper_.Snapshot();
+      tracker_.SetMap(told_, 1);
+    }
+    return tracked;
+  }
+  std::shared_ptr<const MapSnapshot> map() const { return told_; }
+
+ private:
+  Tracker tracker_;
+  Mapper mapper_;
+  std::shared_ptr<const MapSnapshot> told_;
+};
+
+struct Walk {
+  std::vector<TrackedFrame> frames;
+  std::shared_ptr<const MapSnapshot> map;
+};
+
+Walk TakeWalk(std::uint64_t seed) {
+  Walk walk;
+  Lockstep lockstep(seed);
+  for (int i = 0; i < kFrames; ++i) walk.frames.push_back(lockstep.Feed(FrameOf(i)));
+  walk.map = lockstep.map();
+  return walk;
+}
+
+const Walk& OneWalk() {
+  static const Walk walk = TakeWalk(1);
+  return walk;
+}
+
+// Scale, rotation and translation that lay the tracked camera centres on the true ones.
+Eigen::Matrix4d WorldFromMap(const std::vector<TrackedFrame>& frames) {
+  std::vector<Eigen::Vector3d> tracked, truth;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!HasPose(frames[i].state)) continue;
+    tracked.push_back(frames[i].camera_from_map.OriginInSource());
+    truth.push_back(Pose(static_cast<int>(i)).OriginInSource());
+  }
+  Eigen::Matrix3Xd from(3, tracked.size()), to(3, truth.size());
+  for (std::size_t i = 0; i < tracked.size(); ++i) {
+    from.col(static_cast<Eigen::Index>(i)) = tracked[i];
+    to.col(static_cast<Eigen::Index>(i)) = truth[i];
+  }
+  return Eigen::umeyama(from, to, true);
+}
+
+double DistanceFromTruth(const Eigen::Matrix4d& world_from_map, const Rigid3& camera_from_map,
+                         const Rigid3& truth) {
+  const Eigen::Vector4d center = camera_from_map.OriginInSource().homogeneous();
+  return ((world_from_map * center).head<3>() - truth.OriginInSource()).norm();
+}
+
+TEST(Tracker, StartsAMapAndFollowsItClosely) {
+  const Walk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr) << "no map was started; last hint: " << walk.frames[kWalk - 1].hint;
+  EXPECT_EQ(walk.frames[0].state, TrackingState::kInitializing);
+  EXPECT_FALSE(walk.frames[1].hint.empty());
+  int first = 0;
+  while (first < kWalk && !HasPose(walk.frames[static_cast<std::size_t>(first)].state)) ++first;
+  EXPECT_LT(first, 60);
+  const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
+  double squares = 0;
+  for (int i = first; i < kWalk; ++i) {
+    const TrackedFrame& frame = walk.frames[static_cast<std::size_t>(i)];
+    ASSERT_EQ(frame.state, TrackingState::kSixDof) << i << ": " << frame.hint;
+    EXPECT_EQ(frame.map_key, 1u);
+    ASSERT_NE(frame.map, nullptr);
+    EXPECT_EQ(frame.frame.index, static_cast<std::uint64_t>(i));
+    EXPECT_GE(frame.finite_points, TrackerOptions().min_inliers);
+    EXPECT_GT(frame.quality, TrackerOptions().lost_quality);
+    for (const PointMatch& match : frame.matches) EXPECT_NE(frame.map->FindPoint(match.point), nullptr);
+    const double error = DistanceFromTruth(world_from_map, frame.camera_from_map, Pose(i));
+    squares += error * error;
+  }
+  EXPECT_LT(std::sqrt(squares / (kWalk - first)), 0.012) << "metres";
+  EXPECT_GT(walk.map->keyframes.size(), 3u);
+  EXPECT_EQ(Validate(*walk.map), "");
+}
+
+TEST(Tracker, PutsTheMapOnTheWalls) {
+  const Walk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  const RenderedWorld world = RenderedWorld::Room(71);
+  const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
+  std::vector<double> distances;
+  for (const MapPoint& point : walk.map->points)
+    distances.push_back(world.DistanceToSurface((world_from_map * point.point_in_map).head<3>()));
+  std::sort(distances.begin(), distances.end());
+  ASSERT_GT(distances.size(), 200u);
+  EXPECT_LT(distances[distances.size() / 2], 0.02);
+  EXPECT_LT(distances[distances.size() * 9 / 10], 0.1);
+}
+
+TEST(Tracker, IsLostWhileTheLensIsCoveredAndComesBack) {
+  const Walk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  for (int i = kWalk; i < kWalk + kShortlyHidden; ++i) {
+    const TrackedFrame& frame = walk.frames[static_cast<std::size_t>(i)];
+    EXPECT_EQ(frame.state, TrackingState::kLost) << i;
+    EXPECT_FALSE(frame.hint.empty());
+  }
+  int back = kWalk + kShortlyHidden;
+  while (back < kFrames && !HasPose(walk.frames[static_cast<std::size_t>(back)].state)) ++back;
+  ASSERT_LT(back, kWalk + kShortlyHidden + 6) << "not recovered in time";
+  EXPECT_EQ(walk.frames[static_cast<std::size_t>(back)].state, TrackingState::kRelocalized);
+  const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
+  for (int i = back; i < kFrames; ++i) {
+    const TrackedFrame& frame = walk.frames[static_cast<std::size_t>(i)];
+    EXPECT_TRUE(HasPose(frame.state)) << i;
+    EXPECT_LT(DistanceFromTruth(world_from_map, frame.camera_from_map, Pose(i)), 0.05) << i;
+  }
+}
+
+TEST(Tracker, AnswersToTheByteTheSameOnEveryRun) {
+  const Walk again = TakeWalk(1);
+  const Walk& walk = OneWalk();
+  for (std::size_t i = 0; i < walk.frames.size(); ++i) {
+    const TrackedFrame &a = walk.frames[i], &b = again.frames[i];
+    ASSERT_EQ(a.state, b.state) << i;
+    EXPECT_EQ(a.hint, b.hint);
+    EXPECT_EQ(a.finite_points, b.finite_points);
+    const Eigen::Matrix3d rotation_a = a.camera_from_map.rotation.matrix(),
+                          rotation_b = b.camera_from_map.rotation.matrix();
+    EXPECT_EQ(std::memcmp(rotation_a.data(), rotation_b.data(), sizeof(double) * 9), 0) << i;
+    EXPECT_EQ(std::memcmp(a.camera_from_map.translation.data(), b.camera_from_map.translation.data(),
+                          sizeof(double) * 3),
+              0)
+        << i;
+    EXPECT_EQ(std::memcmp(a.covariance.data(), b.covariance.data(), sizeof(double) * 36), 0) << i;
+  }
+  ASSERT_EQ(walk.map->points.size(), again.map->points.size());
+  for (std::size_t i = 0; i < walk.map->points.size(); ++i)
+    EXPECT_EQ(std::memcmp(walk.map->points[i].point_in_map.data(), again.map->points[i].point_in_map.data(),
+                          sizeof(double) * 4),
+              0);
+}
+
+TEST(Tracker, FindsItsPlaceInAMapThatItIsGivenWithTheHelpOfAPlaceFinder) {
+  const Walk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  const OneMap places(walk.map, 9);
+  TrackerOptions options;
+  options.build_maps = false;
+  Tracker tracker(options, Camera(), 3);
+  tracker.SetMap(walk.map, 9);
+  const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
+  int first = -1;
+  for (int i = 40; i < 60; ++i) {
+    const TrackedFrame frame = tracker.Track(FrameOf(i), &places);
+    if (first < 0 && HasPose(frame.state)) {
+      first = i;
+      EXPECT_EQ(frame.state, TrackingState::kRelocalized);
+    }
+    if (first < 0) continue;
+    EXPECT_TRUE(HasPose(frame.state)) << i;
+    EXPECT_LT(DistanceFromTruth(world_from_map, frame.camera_from_map, Pose(i)), 0.05) << i;
+    EXPECT_FALSE(tracker.TakeKeyFrameCandidate()) << "a tour adds nothing";
+  }
+  EXPECT_GE(first, 40);
+  EXPECT_LT(first, 46);
+}
+
+TEST(Tracker, EntersAnotherMapOnlyAfterSeveralFramesAgree) {
+  const Walk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  const OneMap places(walk.map, 9);
+  TrackerOptions options;
+  options.build_maps = false;
+  Tracker tracker(options, Camera(), 3);
+  int first = 0;
+  for (int i = 40; i < 60 && first == 0; ++i) {
+    const TrackedFrame frame = tracker.Track(FrameOf(i), &places);
+    if (!HasPose(frame.state)) continue;
+    first = i;
+    EXPECT_EQ(frame.map_key, 9u);
+    EXPECT_EQ(tracker.map_key(), 9u);
+  }
+  EXPECT_GE(first, 40 + options.agreeing_frames - 1);
+  EXPECT_LT(first, 50);
+}
+
+TEST(Tracker, IsLostAsSoonAsThePictureIsOfAnotherPlace) {
+  const Walk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  const OneMap places(walk.map, 9);
+  const RenderedWorld other = RenderedWorld::Room(7177);
+  TrackerOptions options;
+  options.build_maps = false;
+  Tracker tracker(options, Camera(), 3);
+  tracker.SetMap(walk.map, 9);
+  TrackedFrame last;
+  for (int i = 40; i < 55; ++i) last = tracker.Track(FrameOf(i), &places);
+  ASSERT_EQ(last.state, TrackingState::kSixDof);
+  for (int i = 55; i < 60; ++i) {
+    Frame frame = FrameOf(i);
+    frame.picture = other.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i));
+    EXPECT_EQ(tracker.Track(frame, &places).state, TrackingState::kLost) << i;
+  }
+}
+
+TEST(Tracker, EntersNoMapOfAnotherPlace) {
+  const Walk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  const OneMap places(walk.map, 9);
+  const RenderedWorld other = RenderedWorld::Room(7177);
+  TrackerOptions options;
+  options.build_maps = false;
+  Tracker tracker(options, Camera(), 3);
+  tracker.SetMap(walk.map, 9);
+  for (int i = 40; i < 55; ++i) {
+    Frame frame = FrameOf(i);
+    frame.picture = other.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i));
+    EXPECT_EQ(tracker.Track(frame, &places).state, TrackingState::kLost);
+  }
+}
+
+TEST(Tracker, OffersEachKeyframeOnceAndNoneBeforeThereIsAMap) {
+  Tracker tracker({}, Camera(), 1);
+  tracker.StartNewMap();
+  EXPECT_TRUE(tracker.starting());
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(tracker.Track(FrameOf(i), nullptr).state, TrackingState::kInitializing);
+    EXPECT_FALSE(tracker.TakeKeyFrameCandidate());
+  }
+  tracker.Reset();
+  EXPECT_FALSE(tracker.starting());
+}
+
+}  // namespace
+}  // namespace docent::engine
