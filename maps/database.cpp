@@ -1,0 +1,331 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/database.h"
+
+#include <sqlite3.h>
+
+#include <array>
+#include <limits>
+#include <utility>
+
+#include "engine/base/error.h"
+
+namespace docent::maps {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kBusyTimeoutMs = 5000;       // another process's transaction takes milliseconds
+constexpr int kCloseTimeoutMs = 200;       // tidying up is not worth a wait
+constexpr int kMaxValueBytes = 512 << 20;  // of one blob or text
+
+std::string Reason(sqlite3* connection, int result) {
+  switch (result & 0xFF) {
+    case SQLITE_NOTADB:
+      return "is not a library of maps (it is no SQLite file)";
+    case SQLITE_CORRUPT:
+      return "is damaged (" + std::string(sqlite3_errmsg(connection)) + "); use a copy of it that is whole";
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return "is being written by another program; try again when that has ended";
+    case SQLITE_READONLY:
+      if (result == SQLITE_READONLY_ROLLBACK || result == SQLITE_READONLY_RECOVERY) {
+        return "was left in the middle of a change by a program that was killed; open it once for writing to "
+               "repair it";
+      }
+      return "may not be written";
+    case SQLITE_FULL:
+      return "cannot be saved because the disk is full";
+    case SQLITE_CANTOPEN:
+      return "cannot be opened";
+    case SQLITE_TOOBIG:
+      return "cannot hold a picture, model or table above " + std::to_string(kMaxValueBytes >> 20) + " MiB";
+    default:
+      return "cannot be used (" +
+             std::string(connection ? sqlite3_errmsg(connection) : sqlite3_errstr(result)) + ")";
+  }
+}
+
+[[noreturn]] void Fail(const std::string& file, sqlite3* connection, int result) {
+  throw Error(file + " " + Reason(connection, result));
+}
+
+fs::path Beside(const fs::path& path, const char* suffix) {
+  fs::path result = path;
+  result += suffix;
+  return result;
+}
+
+void CheckIsFile(const fs::path& path, const std::string& file) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (status.type() == fs::file_type::not_found) throw Error(file + " does not exist");
+  if (status.type() == fs::file_type::directory) throw Error(file + " is a folder, not a library of maps");
+  if (status.type() != fs::file_type::regular)
+    throw Error(file + " cannot be opened: it is not a plain file");
+}
+
+// "file:" URI of an absolute path (RFC 3986: all but unreserved characters and slashes are escaped).
+std::string Uri(const fs::path& path, const char* query) {
+  constexpr std::string_view kHex = "0123456789ABCDEF";
+  constexpr std::string_view kPlain = "-._~/";
+  std::string uri = "file:";
+  for (const char character : path.string()) {
+    const auto byte = static_cast<unsigned char>(character);
+    const bool alphanumeric =
+        (byte >= '0' && byte <= '9') || (byte >= 'A' && byte <= 'Z') || (byte >= 'a' && byte <= 'z');
+    if (alphanumeric || kPlain.find(character) != std::string_view::npos) {
+      uri += character;
+    } else {
+      uri += {'%', kHex[byte >> 4], kHex[byte & 15]};
+    }
+  }
+  return uri + query;
+}
+
+// SQLite's own descriptor. The file is looked into through this one only: a second descriptor would, when it
+// is closed, drop the locks that this process holds on the file.
+sqlite3_file* OpenFile(sqlite3* connection) {
+  sqlite3_file* file = nullptr;
+  if (sqlite3_file_control(connection, "main", SQLITE_FCNTL_FILE_POINTER, &file) != SQLITE_OK) return nullptr;
+  return file && file->pMethods ? file : nullptr;
+}
+
+// Whether the file says that it goes with a write-ahead log (file format, offset 19).
+bool GoesWithLog(sqlite3* connection) {
+  sqlite3_file* const file = OpenFile(connection);
+  if (!file) return false;
+  std::array<unsigned char, 20> header{};
+  if (file->pMethods->xRead(file, header.data(), static_cast<int>(header.size()), 0) != SQLITE_OK)
+    return false;
+  return header[19] == 2;
+}
+
+// Whether there is no live log beside the file: a process that writes keeps both -wal and -shm there.
+bool LogAtRest(const fs::path& path) {
+  std::error_code error;
+  if (fs::exists(Beside(path, "-shm"), error)) return false;
+  const fs::path log = Beside(path, "-wal");
+  return !fs::exists(log, error) || fs::file_size(log, error) == 0;
+}
+
+}  // namespace
+
+Statement::Statement(sqlite3* connection, const std::string& file, std::string_view sql)
+    : connection_(connection), file_(file) {
+  sqlite3_stmt* statement = nullptr;
+  const int result =
+      sqlite3_prepare_v2(connection, sql.data(), static_cast<int>(sql.size()), &statement, nullptr);
+  statement_.reset(statement);
+  Check(result);
+}
+
+void Statement::Finalizer::operator()(sqlite3_stmt* statement) const {
+  sqlite3_finalize(statement);
+}
+
+void Statement::Check(int result) const {
+  if (result != SQLITE_OK) Fail(file_, connection_, sqlite3_extended_errcode(connection_));
+}
+
+Statement& Statement::Bind(int parameter, std::int64_t value) {
+  Check(sqlite3_bind_int64(statement_.get(), parameter, value));
+  return *this;
+}
+
+Statement& Statement::Bind(int parameter, std::string_view text) {
+  Check(sqlite3_bind_text64(statement_.get(), parameter, text.data() ? text.data() : "", text.size(),
+                            SQLITE_TRANSIENT, SQLITE_UTF8));
+  return *this;
+}
+
+Statement& Statement::Bind(int parameter, std::span<const std::uint8_t> bytes) {
+  static constexpr std::uint8_t kNothing = 0;  // a null pointer would bind NULL
+  Check(sqlite3_bind_blob64(statement_.get(), parameter, bytes.empty() ? &kNothing : bytes.data(),
+                            bytes.size(), SQLITE_STATIC));
+  return *this;
+}
+
+Statement& Statement::BindNull(int parameter) {
+  Check(sqlite3_bind_null(statement_.get(), parameter));
+  return *this;
+}
+
+bool Statement::Step() {
+  const int result = sqlite3_step(statement_.get());
+  if (result == SQLITE_ROW) return true;
+  if (result != SQLITE_DONE) Fail(file_, connection_, sqlite3_extended_errcode(connection_));
+  return false;
+}
+
+void Statement::Run() {
+  while (Step()) continue;
+}
+
+void Statement::Reset() {
+  sqlite3_reset(statement_.get());
+  sqlite3_clear_bindings(statement_.get());
+}
+
+void Statement::CheckType(int column, int type) const {
+  if (sqlite3_column_type(statement_.get(), column) == type) return;
+  const char* name = sqlite3_column_name(statement_.get(), column);
+  throw Error(file_ + " is damaged: a value of column '" + (name ? name : "?") + "' has the wrong type");
+}
+
+std::int64_t Statement::Integer(int column) const {
+  CheckType(column, SQLITE_INTEGER);
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+std::string Statement::Text(int column) const {
+  CheckType(column, SQLITE_TEXT);
+  const unsigned char* text = sqlite3_column_text(statement_.get(), column);
+  if (!text) Fail(file_, connection_, SQLITE_NOMEM);
+  const int size = sqlite3_column_bytes(statement_.get(), column);
+  return {reinterpret_cast<const char*>(text), static_cast<std::size_t>(size)};
+}
+
+std::span<const std::uint8_t> Statement::Blob(int column) const {
+  CheckType(column, SQLITE_BLOB);
+  const void* bytes = sqlite3_column_blob(statement_.get(), column);
+  const int size = sqlite3_column_bytes(statement_.get(), column);
+  if (!bytes) {
+    // An overflow page that cannot be read shows up here and not as a failed step.
+    const int code = sqlite3_extended_errcode(connection_);
+    if (size > 0 || (code != SQLITE_OK && code != SQLITE_ROW)) Fail(file_, connection_, code);
+    return {};
+  }
+  return {static_cast<const std::uint8_t*>(bytes), static_cast<std::size_t>(size)};
+}
+
+bool Statement::IsNull(int column) const {
+  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
+}
+
+void Database::Closer::operator()(sqlite3* connection) const {
+  sqlite3_close_v2(connection);
+}
+
+void Database::OpenConnection(const std::string& name, int flags) {
+  sqlite3* connection = nullptr;
+  const int result = sqlite3_open_v2(name.c_str(), &connection,
+                                     flags | SQLITE_OPEN_FULLMUTEX | SQLITE_OPEN_EXRESCODE, nullptr);
+  connection_.reset(connection);
+  if (result != SQLITE_OK) Fail(file_, connection, result);
+  sqlite3_busy_timeout(connection, kBusyTimeoutMs);
+  sqlite3_limit(connection, SQLITE_LIMIT_LENGTH, kMaxValueBytes);
+  // The file is input: its schema may run nothing, and its pages are checked as they are read.
+  sqlite3_db_config(connection, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(connection, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(connection, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(connection, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  sqlite3_db_config(connection, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+}
+
+void Database::ConnectReadOnly() {
+  const fs::path path = fs::absolute(file_);
+  CheckIsFile(path, file_);
+  immutable_ = false;
+  const bool at_rest = LogAtRest(path);
+  OpenConnection(path.string(), SQLITE_OPEN_READONLY);
+  if (at_rest && GoesWithLog(connection_.get())) {
+    // Written by a process that could not tidy up, or copied without its log. SQLite would now make a log
+    // beside the file; promising that it does not change keeps the folder as it is.
+    OpenConnection(Uri(path, "?immutable=1"), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
+    immutable_ = true;
+  }
+  Execute("PRAGMA cell_size_check = ON");
+}
+
+Database Database::OpenReadOnly(const fs::path& path) {
+  Database database(path.string(), true);
+  database.ConnectReadOnly();
+  return database;
+}
+
+Database Database::OpenReadWrite(const fs::path& path, bool create) {
+  Database database(path.string(), false);
+  const fs::path absolute = fs::absolute(path);
+  std::error_code error;
+  if (!create || fs::exists(absolute, error)) {
+    CheckIsFile(absolute, database.file_);
+  } else if (!fs::is_directory(absolute.parent_path(), error)) {
+    throw Error(database.file_ + " cannot be created: there is no folder " + absolute.parent_path().string());
+  }
+  database.OpenConnection(absolute.string(), SQLITE_OPEN_READWRITE | (create ? SQLITE_OPEN_CREATE : 0));
+  if (sqlite3_db_readonly(database.connection_.get(), "main") == 1) {
+    throw Error(database.file_ + " may not be written; open it read only or change its permissions");
+  }
+  database.Execute("PRAGMA cell_size_check = ON");
+  return database;
+}
+
+void Database::StartWriting() {
+  Statement mode = Prepare("PRAGMA journal_mode = WAL");
+  if (!mode.Step() || mode.Text(0) != "wal") {
+    throw Error(file_ + " cannot be written safely here: its file system does not support a write-ahead log");
+  }
+  mode.Run();
+  Execute("PRAGMA synchronous = FULL");
+  sqlite3_db_config(connection_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+  writing_ = true;
+}
+
+Database::~Database() {
+  if (!connection_ || !writing_) return;
+  // Failing here loses nothing: the log is simply left for the next process that writes.
+  sqlite3_busy_timeout(connection_.get(), kCloseTimeoutMs);
+  sqlite3_exec(connection_.get(), "PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode = DELETE", nullptr,
+               nullptr, nullptr);
+}
+
+void Database::Refresh() {
+  if (immutable_) ConnectReadOnly();
+}
+
+void Database::Execute(const char* sql) const {
+  if (sqlite3_exec(connection_.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK) {
+    Fail(file_, connection_.get(), sqlite3_extended_errcode(connection_.get()));
+  }
+}
+
+std::int64_t Database::Number(std::string_view sql) const {
+  Statement query = Prepare(sql);
+  if (!query.Step()) throw Error(file_ + " is damaged: an entry of the library is missing");
+  return query.Integer(0);
+}
+
+std::int64_t Database::Changes() const {
+  return sqlite3_changes64(connection_.get());
+}
+
+bool Database::EndsWithWholePage() const {
+  sqlite3_file* const file = OpenFile(connection_.get());
+  sqlite3_int64 size = 0;
+  if (!file || file->pMethods->xFileSize(file, &size) != SQLITE_OK) return false;
+  if (size % Number("PRAGMA page_size") == 0) return true;
+  const fs::path log = Beside(fs::absolute(file_), "-wal");
+  std::error_code error;
+  return fs::exists(log, error) && fs::file_size(log, error) > 0;
+}
+
+Transaction::Transaction(const Database& database, Kind kind) : database_(database) {
+  database_.Execute(kind == Kind::kWrite ? "BEGIN IMMEDIATE" : "BEGIN");
+}
+
+Transaction::~Transaction() {
+  if (!open_) return;
+  try {
+    database_.Execute("ROLLBACK");
+  } catch (const Error&) {
+    // SQLite has already rolled back by itself after some failures, which is what was wanted.
+  }
+}
+
+void Transaction::Commit() {
+  database_.Execute("COMMIT");
+  open_ = false;
+}
+
+}  // namespace docent::maps

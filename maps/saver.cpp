@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/saver.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace docent::maps {
+
+Saver::Saver(Library* library, std::size_t capacity)
+    : library_(library),
+      capacity_(std::max<std::size_t>(1, capacity)),
+      worker_("map-saver", [this](const std::stop_token& stop) { Run(stop); }) {}
+
+Saver::~Saver() {
+  worker_.RequestStop();  // Run ends only when nothing waits
+  worker_.Join();
+}
+
+void Saver::Submit(MapRecord record) {
+  {
+    std::unique_lock lock(mutex_);
+    const auto same_map = [&] {
+      return std::find_if(waiting_.begin(), waiting_.end(),
+                          [&](const MapRecord& waiting) { return waiting.key == record.key; });
+    };
+    changed_.wait(lock, [&] { return same_map() != waiting_.end() || waiting_.size() < capacity_; });
+    if (const auto place = same_map(); place != waiting_.end()) {
+      if (record.snapshot) place->snapshot = std::move(record.snapshot);
+      if (record.scene) place->scene = std::move(record.scene);
+    } else {
+      waiting_.push_back(std::move(record));
+    }
+  }
+  changed_.notify_all();
+}
+
+void Saver::Forget(std::uint64_t key) {
+  std::unique_lock lock(mutex_);
+  std::erase_if(waiting_, [&](const MapRecord& waiting) { return waiting.key == key; });
+  changed_.wait(lock, [&] { return running_ != key; });
+  lock.unlock();
+  changed_.notify_all();
+}
+
+void Saver::Flush() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return Idle(); });
+}
+
+std::exception_ptr Saver::TakeError() {
+  std::scoped_lock lock(mutex_);
+  return std::exchange(error_, nullptr);
+}
+
+std::size_t Saver::pending() const {
+  std::scoped_lock lock(mutex_);
+  return waiting_.size() + (running_ ? 1 : 0);
+}
+
+void Saver::Run(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (changed_.wait(lock, stop, [this] { return !waiting_.empty(); })) {
+    MapRecord record = std::move(waiting_.front());
+    waiting_.pop_front();
+    running_ = record.key;
+    lock.unlock();
+    changed_.notify_all();
+    std::exception_ptr error;
+    try {
+      library_->Save(record);
+    } catch (...) {
+      error = std::current_exception();
+    }
+    record = {};  // large things are let go before anybody is told
+    lock.lock();
+    if (!error_) error_ = error;
+    running_.reset();
+    changed_.notify_all();
+  }
+}
+
+}  // namespace docent::maps

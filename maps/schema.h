@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "maps/database.h"
+
+// The tables of a library (maps/README.md describes them) and the marks by which a file is known to be one.
+namespace docent::maps {
+
+inline constexpr std::int64_t kApplicationId = 0x446F6374;  // "Doct", PRAGMA application_id
+inline constexpr std::int64_t kSchemaVersion = 1;           // PRAGMA user_version
+
+// Whether the file holds nothing at all yet, as after it was created.
+bool IsBlank(const Database& database);
+// Writes the tables into a blank file, in one transaction. Does nothing when another process was faster.
+void CreateSchema(const Database& database);
+// Throws docent::Error with one sentence when the file is not a library, is of a newer version, or has other
+// tables than a library has. Reads only.
+void CheckIsLibrary(const Database& database);
+
+}  // namespace docent::maps

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/verify.h"
+
+#include <functional>
+#include <map>
+#include <set>
+
+#include "engine/base/error.h"
+#include "maps/rows.h"
+#include "maps/snapshot_reader.h"
+
+namespace docent::maps {
+
+namespace {
+
+constexpr std::size_t kMaxSentences = 100;  // more tell nobody more
+
+class Report {
+ public:
+  void Add(std::string sentence) {
+    if (sentences_.size() < kMaxSentences) sentences_.push_back(std::move(sentence));
+  }
+  // Runs `check` and notes what it throws.
+  void Try(const std::function<void()>& check) {
+    try {
+      check();
+    } catch (const Error& error) {
+      Add(error.what());
+    }
+  }
+  std::vector<std::string> Take() { return std::move(sentences_); }
+
+ private:
+  std::vector<std::string> sentences_;
+};
+
+void CheckPages(const Database& database, Report* report) {
+  Statement check = database.Prepare("PRAGMA integrity_check(20)");
+  while (check.Step()) {
+    if (const std::string line = check.Text(0); line != "ok") {
+      report->Add(database.file() + " is damaged: " + line.substr(0, line.find('\n')));
+    }
+  }
+}
+
+// The maps whose entries can be read; the others are reported.
+std::vector<MapInfo> ReadableMaps(const Database& database, Report* report) {
+  std::vector<std::uint64_t> keys;
+  report->Try([&] {
+    Statement query = database.Prepare("SELECT key FROM maps ORDER BY key");
+    while (query.Step()) keys.push_back(static_cast<std::uint64_t>(query.Integer(0)));
+  });
+  std::vector<MapInfo> maps;
+  std::uint64_t next_key = 1;
+  for (const std::uint64_t key : keys) {
+    report->Try([&] {
+      if (auto info = ReadMapRow(database, key)) maps.push_back(std::move(*info));
+    });
+    next_key = std::max(next_key, key + 1);
+  }
+  report->Try([&] {
+    const LibraryRow library = ReadLibraryRow(database);
+    if (library.map_count != keys.size()) {
+      report->Add(database.file() + " is damaged: it says it has " + std::to_string(library.map_count) +
+                  " maps but " + std::to_string(keys.size()) + " are there");
+    }
+    if (library.next_key < next_key)
+      report->Add(database.file() + " is damaged: the next map would get a used key");
+  });
+  return maps;
+}
+
+void CheckMap(const Database& database, const MapInfo& info, int threads,
+              std::set<std::string>* wanted_assets, Report* report) {
+  report->Try(
+      [&] { WithPlace(database, info, [&] { ReadSnapshot(database, info, MakeSizesOnly, threads); }); });
+  report->Try([&] {
+    WithPlace(database, info, [&] {
+      const ScenePart scene = ReadScenePart(database, info.key);
+      wanted_assets->insert(scene.asset_ids.begin(), scene.asset_ids.end());
+    });
+  });
+  report->Try([&] {
+    Statement count = database.Prepare("SELECT count(*) FROM pictures WHERE map_key = ?");
+    count.Bind(1, static_cast<std::int64_t>(info.key));
+    if (count.Step() && static_cast<std::uint64_t>(count.Integer(0)) != info.keyframes) {
+      report->Add(database.file() + ": map '" + info.name + "' (" + std::to_string(info.key) + "): it has " +
+                  std::to_string(count.Integer(0)) + " pictures for " + std::to_string(info.keyframes) +
+                  " keyframes");
+    }
+  });
+}
+
+void CheckAssets(const Database& database, const std::set<std::string>& wanted, Report* report) {
+  std::set<std::string> ids = wanted;
+  report->Try([&] {
+    Statement query = database.Prepare("SELECT id FROM assets");
+    while (query.Step()) ids.insert(query.Text(0));
+  });
+  for (const std::string& id : ids) {
+    try {
+      ReadAsset(database, id);
+    } catch (const Error& error) {
+      const std::string what = error.what();
+      report->Add(what.starts_with(database.file()) ? what : database.file() + ": " + what);
+    }
+  }
+}
+
+// Rows of maps that are not there.
+void CheckStrays(const Database& database, Report* report) {
+  for (const char* table : {"parts", "pictures"}) {
+    report->Try([&] {
+      const std::int64_t strays = database.Number(std::string("SELECT count(*) FROM ") + table +
+                                                  " WHERE map_key NOT IN (SELECT key FROM maps)");
+      if (strays != 0) {
+        report->Add(database.file() + " is damaged: " + std::to_string(strays) + " rows of its table '" +
+                    table + "' belong to no map");
+      }
+    });
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> VerifyAll(const Database& database, int threads) {
+  Report report;
+  report.Try([&] { CheckPages(database, &report); });
+  const std::vector<MapInfo> maps = ReadableMaps(database, &report);
+  std::set<std::string> wanted_assets;
+  for (const MapInfo& info : maps) CheckMap(database, info, threads, &wanted_assets, &report);
+  CheckAssets(database, wanted_assets, &report);
+  CheckStrays(database, &report);
+  return report.Take();
+}
+
+}  // namespace docent::maps

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
+
+#include "engine/base/random.h"
+#include "maps/library.h"
+#include "tests/maps/map_samples.h"
+
+// What a second process does to a library: an author who is killed at any moment, and one who writes while a
+// visitor reads. The second process is this program again, run for one test that is skipped otherwise.
+namespace docent::maps {
+namespace {
+
+constexpr const char* kFileVariable = "DOCENT_AUTHOR_FILE";
+constexpr const char* kPipeVariable = "DOCENT_AUTHOR_PIPE";
+
+// The map of a round: made from the round alone, so that who reads it can say whether it is whole.
+std::shared_ptr<engine::MapSnapshot> MapOfRound(std::uint64_t round) {
+  auto map = MakeSampleMap(round, {.keyframes = 2 + static_cast<int>(round % 3), .points = 200});
+  map->revision = round;
+  return map;
+}
+
+TEST(AuthorProcess, SavesRoundAfterRoundUntilItIsKilled) {
+  const char* file = std::getenv(kFileVariable);
+  if (!file) GTEST_SKIP() << "runs only as the second process of other tests";
+  const int pipe = std::atoi(std::getenv(kPipeVariable));
+  Library library = Library::Open(file, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+  const auto maps = library.List();
+  const std::uint64_t key = maps.empty() ? library.NewKey() : maps.front().key;
+  for (std::uint64_t round = maps.empty() ? 1 : maps.front().revision + 1;; ++round) {
+    library.Save({key, "Desk", Policy::kOpen, MapOfRound(round), MakeSampleScene(round, 1)});
+    // Told after the save: from here on this round may not be lost.
+    if (write(pipe, &round, sizeof(round)) != static_cast<ssize_t>(sizeof(round))) break;
+  }
+}
+
+class Author {
+ public:
+  explicit Author(const std::filesystem::path& file) {
+    int ends[2];
+    if (pipe(ends) != 0) throw std::runtime_error("no pipe");
+    process_ = fork();
+    if (process_ == 0) {
+      close(ends[0]);
+      setenv(kFileVariable, file.c_str(), 1);
+      setenv(kPipeVariable, std::to_string(ends[1]).c_str(), 1);
+      const int silence = open("/dev/null", O_WRONLY);
+      dup2(silence, STDOUT_FILENO);
+      execl("/proc/self/exe", "docent_maps_tests", "--gtest_filter=AuthorProcess.*", nullptr);
+      _exit(127);
+    }
+    close(ends[1]);
+    pipe_ = ends[0];
+  }
+  ~Author() {
+    if (process_ > 0) Kill();
+  }
+  // The round of the next save that is done; 0 when the author ended.
+  std::uint64_t WaitForSave() {
+    std::uint64_t round = 0;
+    return read(pipe_, &round, sizeof(round)) == static_cast<ssize_t>(sizeof(round)) ? round : 0;
+  }
+  // Kills and answers the last round that was told.
+  std::uint64_t Kill() {
+    kill(process_, SIGKILL);
+    waitpid(process_, nullptr, 0);
+    process_ = 0;
+    std::uint64_t last = 0;
+    while (const std::uint64_t round = WaitForSave()) last = round;
+    close(pipe_);
+    return last;
+  }
+
+ private:
+  pid_t process_ = 0;
+  int pipe_ = -1;
+};
+
+void ExpectWhole(const StoredMap& stored) {
+  EXPECT_EQ(FirstDifference(*stored.snapshot, *MapOfRound(stored.info.revision)), "");
+  EXPECT_EQ(FirstDifference(stored.scene, *MakeSampleScene(stored.info.revision, 1)), "");
+}
+
+TEST(Crash, AnAuthorKilledAtAnyMomentLosesAtMostTheSaveItWasIn) {
+  const TemporaryFolder folder;
+  const auto file = folder / "a.docent";
+  Random random(1);
+  std::uint64_t told = 0;
+  for (int kills = 0; kills < 40; ++kills) {
+    {
+      Author author(file);
+      // Some are killed while they open, some in the middle of a save, some between two.
+      if (kills % 4 != 0) told = std::max(told, author.WaitForSave());
+      std::this_thread::sleep_for(std::chrono::microseconds(random.Below(kills % 4 != 0 ? 60'000 : 120'000)));
+      told = std::max(told, author.Kill());
+    }
+    if (told == 0) continue;  // the file may not even have been begun
+    for (const Access access : {Access::kReadOnly, Access::kReadWrite}) {
+      if (access == Access::kReadWrite && kills % 2 == 0) continue;  // the next author finds the log as it is
+      const Library library = Library::Open(file, access, CreateIfMissing::kNo, QuickOptions());
+      EXPECT_EQ(library.Verify(), std::vector<std::string>{});
+      const auto maps = library.List();
+      ASSERT_EQ(maps.size(), 1u);
+      EXPECT_GE(maps[0].revision, told) << "a save that had returned is lost";
+      EXPECT_LE(maps[0].revision, told + 1);
+      ExpectWhole(library.Load(maps[0].key));
+      told = maps[0].revision;
+    }
+  }
+  EXPECT_GT(told, 20u) << "the authors never came to save";
+}
+
+TEST(TwoProcesses, AVisitorSeesWholeSavesWhileAnAuthorWrites) {
+  const TemporaryFolder folder;
+  const auto file = folder / "a.docent";
+  Author author(file);
+  ASSERT_EQ(author.WaitForSave(), 1u);
+  const Library visitor = Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  std::uint64_t last = 0;
+  for (int visits = 0; visits < 25; ++visits) {
+    const std::uint64_t told = author.WaitForSave();
+    const StoredMap stored = visitor.Load(visitor.List().front().key);
+    EXPECT_GE(stored.info.revision, told);
+    EXPECT_GE(stored.info.revision, last);
+    last = stored.info.revision;
+    ExpectWhole(stored);
+  }
+  EXPECT_TRUE(visitor.Verify().empty());
+}
+
+TEST(TwoProcesses, AFileThatWasClosedStandsAlone) {
+  const TemporaryFolder folder;
+  const auto file = folder / "a.docent";
+  std::uint64_t key = 0;
+  {
+    Library library = Library::Open(file, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+    key = library.NewKey();
+    library.Save({key, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
+  }
+  EXPECT_EQ(FilesIn(folder.path()), "a.docent");
+  const Bytes before = ReadWholeFile(file);
+  {
+    const Library visitor = Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+    EXPECT_EQ(FirstDifference(*visitor.Load(key).snapshot, *MakeSampleMap(1)), "");
+    EXPECT_EQ(FilesIn(folder.path()), "a.docent") << "while it is open";
+  }
+  EXPECT_EQ(FilesIn(folder.path()), "a.docent");
+  EXPECT_EQ(ReadWholeFile(file), before);
+}
+
+TEST(TwoProcesses, AFileThatWasLeftInLogModeIsReadWithoutANewFileBesideIt) {
+  const TemporaryFolder folder;
+  const auto file = folder / "a.docent";
+  Author(file).WaitForSave();  // killed: header says log
+  Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  {
+    // A visitor keeps the log from being tidied away; what it holds moves into the file all the same.
+    const Library visitor = Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+    EXPECT_EQ(visitor.List().size(), 1u);
+    Library author = Library::Open(file, Access::kReadWrite, CreateIfMissing::kNo, QuickOptions());
+    author.Rename(author.List().front().key, "Table");
+  }
+  std::filesystem::create_directory(folder / "copy");
+  std::filesystem::copy_file(file, folder / "copy/a.docent");
+  std::filesystem::permissions(folder / "copy",
+                               std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+  const Library copy =
+      Library::Open(folder / "copy/a.docent", Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  const auto maps = copy.List();
+  ASSERT_EQ(maps.size(), 1u);
+  EXPECT_EQ(maps[0].name, "Table");
+  ExpectWhole(copy.Load(maps[0].key));
+  EXPECT_EQ(FilesIn(folder / "copy"), "a.docent");
+  std::filesystem::permissions(folder / "copy", std::filesystem::perms::owner_all);
+}
+
+}  // namespace
+}  // namespace docent::maps

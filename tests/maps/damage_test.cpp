@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include "engine/base/error.h"
+#include "engine/base/random.h"
+#include "maps/library.h"
+#include "maps/schema.h"
+#include "tests/maps/map_samples.h"
+
+namespace docent::maps {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// A library with two maps and an asset, closed, and the folder it lies in.
+class Damage : public ::testing::Test {
+ protected:
+  Damage() {
+    Library library = Open(Access::kReadWrite, CreateIfMissing::kYes);
+    library.Save({library.NewKey(), "Desk", Policy::kOpen, desk_, scene_});
+    library.Save({library.NewKey(), "Door", Policy::kBounded, door_, nullptr});
+  }
+  Library Open(Access access, CreateIfMissing create = CreateIfMissing::kNo) const {
+    return Library::Open(file_, access, create, QuickOptions());
+  }
+  void RunSql(const std::string& sql) const {
+    sqlite3* connection = nullptr;
+    ASSERT_EQ(sqlite3_open(file_.c_str(), &connection), SQLITE_OK);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_free(message);
+    sqlite3_close(connection);
+  }
+  std::vector<std::string> Verify() const { return Open(Access::kReadOnly).Verify(); }
+  // Opening fails with one sentence about the file, changes none of its bytes and leaves nothing beside it.
+  void ExpectRefused(const std::string& part_of_sentence) const {
+    const Bytes before = ReadWholeFile(file_);
+    const auto modes = {std::pair{Access::kReadOnly, CreateIfMissing::kNo},
+                        std::pair{Access::kReadWrite, CreateIfMissing::kNo},
+                        std::pair{Access::kReadWrite, CreateIfMissing::kYes}};
+    for (const auto& [access, create] : modes) {
+      const std::string error = ErrorOf([&, a = access, c = create] { Open(a, c); });
+      EXPECT_THAT(error, StartsWith(file_.string()));
+      EXPECT_THAT(error, HasSubstr(part_of_sentence));
+      EXPECT_EQ(error.find('\n'), std::string::npos);
+      EXPECT_EQ(ReadWholeFile(file_), before);
+      EXPECT_EQ(FilesIn(folder_.path()), "a.docent");
+    }
+  }
+  // Whatever can be read of a damaged file is what was saved, and a verdict of "all is well" is true.
+  void ExpectErrorOrTruth() {
+    bool whole = false;
+    const std::string error = ErrorOf([&] {
+      const Library library = Open(Access::kReadOnly);
+      whole = library.Verify().empty();
+      const auto keys = {std::pair{1, desk_.get()}, std::pair{2, door_.get()}};
+      for (const auto& [key, expected] : keys) {
+        const std::string map_error = ErrorOf([&, k = key, e = expected] {
+          const StoredMap stored = library.Load(static_cast<std::uint64_t>(k));
+          EXPECT_EQ(FirstDifference(*stored.snapshot, *e), "");
+          EXPECT_EQ(stored.info.name, k == 1 ? "Desk" : "Door");
+          EXPECT_EQ(stored.info.policy, k == 1 ? Policy::kOpen : Policy::kBounded);
+          if (k == 1) {
+            EXPECT_EQ(FirstDifference(stored.scene, *scene_), "");
+          }
+        });
+        EXPECT_TRUE(!whole || map_error == "no error") << map_error;
+        if (map_error != "no error") ++errors_;
+      }
+    });
+    if (error != "no error") ++errors_;
+    EXPECT_FALSE(whole && error != "no error") << error;
+  }
+
+  TemporaryFolder folder_;
+  const std::filesystem::path file_ = folder_ / "a.docent";
+  std::shared_ptr<engine::MapSnapshot> desk_ = MakeSampleMap(1, {.keyframes = 2, .points = 30});
+  std::shared_ptr<engine::MapSnapshot> door_ = MakeSampleMap(2, {.keyframes = 3, .points = 60});
+  std::shared_ptr<SceneRecord> scene_ = MakeSampleScene(3, 1);
+  int errors_ = 0;
+};
+
+TEST_F(Damage, AFileThatIsNotThereOrNoFileAtAllIsRefused) {
+  EXPECT_THAT(ErrorOf([&] { Library::Open(folder_ / "b.docent", Access::kReadOnly); }),
+              HasSubstr("does not exist"));
+  EXPECT_THAT(ErrorOf([&] { Library::Open(folder_ / "b.docent", Access::kReadWrite); }),
+              HasSubstr("does not exist"));
+  EXPECT_THAT(ErrorOf([&] { Library::Open(folder_.path(), Access::kReadOnly); }), HasSubstr("is a folder"));
+  EXPECT_THAT(ErrorOf([&] { Library::Open("/dev/null", Access::kReadOnly); }), HasSubstr("not a plain file"));
+  EXPECT_THAT(
+      ErrorOf([&] { Library::Open(folder_ / "x/b.docent", Access::kReadWrite, CreateIfMissing::kYes); }),
+      HasSubstr("there is no folder"));
+  EXPECT_EQ(FilesIn(folder_.path()), "a.docent");
+}
+
+TEST_F(Damage, AFileOfAnotherKindIsRefused) {
+  const std::string text(5000, 'x');
+  WriteWholeFile(file_, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  ExpectRefused("is not a library of maps");
+}
+
+TEST_F(Damage, AnSqliteFileOfAnotherProgramIsRefused) {
+  RunSql("PRAGMA application_id = 7");
+  ExpectRefused("SQLite file of another program");
+}
+
+TEST_F(Damage, ALibraryOfANewerProgramIsRefused) {
+  RunSql("PRAGMA user_version = 2");
+  ExpectRefused("written by a newer Docent (format 2;");
+}
+
+TEST_F(Damage, ALibraryWithOtherTablesIsRefused) {
+  RunSql("CREATE TRIGGER t AFTER UPDATE ON maps BEGIN DELETE FROM pictures; END");
+  ExpectRefused("its table 't' is not one");
+}
+
+TEST_F(Damage, AnEmptyFileIsRefusedUnlessALibraryIsToBeMade) {
+  WriteWholeFile(file_, {});
+  EXPECT_THAT(ErrorOf([&] { Open(Access::kReadOnly); }), HasSubstr("is empty"));
+  EXPECT_THAT(ErrorOf([&] { Open(Access::kReadWrite); }), HasSubstr("is empty"));
+  EXPECT_TRUE(ReadWholeFile(file_).empty());
+  EXPECT_TRUE(Open(Access::kReadWrite, CreateIfMissing::kYes).List().empty());
+}
+
+TEST_F(Damage, AFileCutOffAnywhereIsRefused) {
+  const Bytes whole = ReadWholeFile(file_);
+  Random random(5);
+  for (int i = 0; i < 60; ++i) {
+    const std::size_t size =
+        i < 20 ? 1 + i * 37 : 1 + random.Below(static_cast<std::uint32_t>(whole.size() - 1));
+    WriteWholeFile(file_, std::span(whole).first(size));
+    const std::string error = ErrorOf([&] { Open(Access::kReadOnly).List(); });
+    EXPECT_THAT(error, StartsWith(file_.string())) << size;
+    EXPECT_THAT(ErrorOf([&] { Open(Access::kReadWrite); }), StartsWith(file_.string())) << size;
+    EXPECT_EQ(ReadWholeFile(file_).size(), size);
+    EXPECT_EQ(FilesIn(folder_.path()), "a.docent");
+  }
+}
+
+TEST_F(Damage, FlippedBytesNeverGiveWrongData) {
+  const Bytes whole = ReadWholeFile(file_);
+  Random random(11);
+  for (int i = 0; i < 400; ++i) {
+    Bytes damaged = whole;
+    // Headers of pages decide most, so half of the flips go there.
+    const auto page = random.Below(static_cast<std::uint32_t>(whole.size() / 4096)) * 4096;
+    const std::size_t at =
+        i % 2 == 0 ? page + random.Below(120) : random.Below(static_cast<std::uint32_t>(whole.size()));
+    damaged[at] ^= static_cast<std::uint8_t>(1 + random.Below(255));
+    WriteWholeFile(file_, damaged);
+    ExpectErrorOrTruth();
+    ASSERT_FALSE(HasFailure()) << "byte " << at;
+  }
+  EXPECT_GT(errors_, 100) << "the flips hit nothing";
+}
+
+TEST_F(Damage, VerifyNamesWhatIsDamaged) {
+  const auto cases = {
+      std::pair{
+          "UPDATE parts SET data = substr(data, 1, length(data) - 9) WHERE map_key = 1 AND part = 'points'",
+          "map 'Desk' (1): the table of points is damaged: its checksum does not match"},
+      std::pair{"DELETE FROM pictures WHERE map_key = 2 AND keyframe = 1",
+                "map 'Door' (2): the picture of keyframe 1 is missing"},
+      std::pair{"UPDATE pictures SET data = (SELECT data FROM pictures WHERE map_key = 2 AND keyframe = 0) "
+                "WHERE map_key = 1 AND keyframe = 0",
+                "map 'Desk' (1): the picture belongs to another map"},
+      std::pair{"UPDATE maps SET policy = 'open' WHERE key = 2",
+                "the entry of map 2: its checksum does not match"},
+      std::pair{"DELETE FROM parts WHERE part = 'scene' AND map_key = 1",
+                "map 'Desk' (1): its part 'scene' is missing"},
+      std::pair{"DELETE FROM assets", "the asset asset-3 is missing"},
+      std::pair{"UPDATE assets SET data = x'00'", "asset 'model 3.glb' is damaged"},
+      std::pair{"DELETE FROM maps WHERE key = 1", "it says it has 2 maps but 1 are there"},
+      std::pair{"DELETE FROM library", "its first entry is missing"},
+  };
+  const Bytes whole = ReadWholeFile(file_);
+  EXPECT_EQ(Verify(), std::vector<std::string>{});
+  for (const auto& [sql, sentence] : cases) {
+    WriteWholeFile(file_, whole);
+    RunSql(sql);
+    EXPECT_THAT(Verify(), Contains(HasSubstr(sentence))) << sql;
+    for (const std::string& line : Verify()) EXPECT_THAT(line, StartsWith(file_.string()));
+  }
+}
+
+}  // namespace
+}  // namespace docent::maps

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "engine/map/map_snapshot.h"
+#include "maps/library.h"
+#include "maps/map_record.h"
+
+// Maps made of numbers under a seed, and folders that clean up after themselves, for the tests of the
+// library.
+namespace docent::maps {
+
+struct SampleOptions {
+  int keyframes = 3;
+  int points = 40;
+  int width_px = 96, height_px = 80;
+};
+
+// Keyframes along a path with pictures of noise over a gradient, two cameras, finite and infinite points,
+// each seen from some keyframes. Valid, and different for each seed.
+std::shared_ptr<engine::MapSnapshot> MakeSampleMap(std::uint64_t seed, const SampleOptions& options = {});
+// One more keyframe at `center`, with the picture of `seed`.
+void AddSampleKeyFrame(std::uint64_t seed, const Eigen::Vector3d& center, engine::MapSnapshot* map);
+
+AssetRecord MakeSampleAsset(std::uint64_t seed, std::size_t bytes);
+std::shared_ptr<SceneRecord> MakeSampleScene(std::uint64_t seed, int assets);
+
+// Empty when they are equal field by field and pixel by pixel, else the first difference.
+std::string FirstDifference(const engine::MapSnapshot& a, const engine::MapSnapshot& b);
+std::string FirstDifference(const SceneRecord& a, const SceneRecord& b);
+
+// A folder that is gone when the test is over.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// Features of the right sizes without corners: quick, for tests that look at what is stored.
+LibraryOptions QuickOptions();
+
+Bytes ReadWholeFile(const std::filesystem::path& path);
+void WriteWholeFile(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+// The names in a folder, sorted, separated by spaces.
+std::string FilesIn(const std::filesystem::path& folder);
+// The sentence of the docent::Error that `body` throws; "no error" when it throws none.
+std::string ErrorOf(const std::function<void()>& body);
+
+}  // namespace docent::maps

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/policy.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "maps/library.h"
+#include "tests/maps/map_samples.h"
+
+namespace docent::maps {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr Policy kAll[] = {Policy::kOpen, Policy::kBounded, Policy::kAugmentOnly, Policy::kReadOnly};
+
+TEST(Policy, IsWrittenAsTheCommandLineSaysAndReadBack) {
+  for (const Policy policy : kAll) EXPECT_EQ(ParsePolicy(ToString(policy)), policy);
+  EXPECT_STREQ(ToString(Policy::kAugmentOnly), "augment-only");
+  EXPECT_EQ(ParsePolicy("Open"), std::nullopt);
+  EXPECT_EQ(ParsePolicy(""), std::nullopt);
+}
+
+TEST(Policy, AsksTheBoundsOnlyOfABoundedMap) {
+  const Bounds bounds{{0, 0, 0}, {1, 2, 3}};
+  const Eigen::Vector3d inside(1, 1, 3), outside(1, 2.001, 1);
+  EXPECT_TRUE(KeyFrameAllowed(Policy::kOpen, std::nullopt, outside));
+  EXPECT_TRUE(KeyFrameAllowed(Policy::kBounded, bounds, inside));
+  EXPECT_FALSE(KeyFrameAllowed(Policy::kBounded, bounds, outside));
+  EXPECT_FALSE(KeyFrameAllowed(Policy::kBounded, std::nullopt, inside));
+  EXPECT_FALSE(KeyFrameAllowed(Policy::kBounded, bounds, {std::nan(""), 1, 1}));
+  EXPECT_FALSE(KeyFrameAllowed(Policy::kAugmentOnly, bounds, inside));
+  EXPECT_FALSE(KeyFrameAllowed(Policy::kReadOnly, bounds, inside));
+}
+
+TEST(Policy, BoundsHoldAllKeyframesAndAreNotOpenedByAFewWildPoints) {
+  engine::MapSnapshot map;
+  EXPECT_EQ(ComputeBounds(map), std::nullopt);
+  engine::KeyFrame keyframe;
+  keyframe.camera_from_map.translation = {0, 0, 5};  // centre at (0, 0, -5)
+  map.keyframes.push_back(keyframe);
+  EXPECT_EQ(ComputeBounds(map), (Bounds{{0, 0, -5}, {0, 0, -5}}));
+  for (int i = 0; i <= 1000; ++i) {
+    engine::MapPoint point;
+    point.point_in_map << i / 1000.0, -i / 500.0, 1, 1;
+    if (i >= 997) point.point_in_map.head<3>() *= 1e6;
+    map.points.push_back(point);
+  }
+  engine::MapPoint infinite;
+  infinite.point_in_map << 1, 0, 0, 0;
+  map.points.push_back(infinite);
+  const Bounds bounds = *ComputeBounds(map);
+  EXPECT_NEAR(bounds.min.y(), -1.98, 0.02);
+  EXPECT_NEAR(bounds.max.x(), 0.99, 0.01);
+  EXPECT_EQ(bounds.min.z(), -5);
+  EXPECT_EQ(bounds.max.z(), 1);
+}
+
+// One library with a map of the policy, and what each way of writing answers.
+class EveryPolicy : public ::testing::TestWithParam<Policy> {
+ protected:
+  EveryPolicy()
+      : library_(
+            Library::Open(folder_ / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions())) {
+    key_ = library_.NewKey();
+    library_.Save({key_, "Desk", GetParam(), map_, scene_});
+  }
+  bool structure() const { return GetParam() == Policy::kOpen || GetParam() == Policy::kBounded; }
+  bool content() const { return GetParam() != Policy::kReadOnly; }
+  // Runs `write`; a refusal must name the policy and change nothing.
+  void ExpectAnswer(bool allowed, const std::function<void()>& write) {
+    const auto before = library_.Load(key_);
+    const std::string error = ErrorOf(write);
+    if (allowed) {
+      EXPECT_EQ(error, "no error");
+      return;
+    }
+    EXPECT_THAT(error, HasSubstr(std::string("its policy is ") + ToString(GetParam())));
+    const auto after = library_.Load(key_);
+    EXPECT_EQ(after.info, before.info);
+    EXPECT_EQ(FirstDifference(*after.snapshot, *before.snapshot), "");
+    EXPECT_EQ(FirstDifference(after.scene, before.scene), "");
+  }
+
+  TemporaryFolder folder_;
+  std::shared_ptr<engine::MapSnapshot> map_ = MakeSampleMap(1);
+  std::shared_ptr<SceneRecord> scene_ = MakeSampleScene(1, 1);
+  Library library_;
+  std::uint64_t key_ = 0;
+};
+
+TEST_P(EveryPolicy, IsAskedWhenAKeyframeIsAddedInside) {
+  auto changed = std::make_shared<engine::MapSnapshot>(*map_);
+  AddSampleKeyFrame(5, {0.05, 0, 0}, changed.get());
+  ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
+}
+
+TEST_P(EveryPolicy, IsAskedWhenAKeyframeIsAddedOutside) {
+  auto changed = std::make_shared<engine::MapSnapshot>(*map_);
+  AddSampleKeyFrame(5, {50, 0, 0}, changed.get());
+  ExpectAnswer(GetParam() == Policy::kOpen, [&] {
+    library_.Save({key_, "", Policy::kOpen, changed, nullptr});
+  });
+}
+
+TEST_P(EveryPolicy, IsAskedWhenAKeyframeMovesOrGoesAway) {
+  auto changed = std::make_shared<engine::MapSnapshot>(*map_);
+  changed->keyframes[1].camera_from_map.translation.x() += 0.001;
+  ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
+  changed = std::make_shared<engine::MapSnapshot>(*map_);
+  changed->keyframes.clear();
+  changed->points.clear();
+  changed->observations.clear();
+  ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
+}
+
+TEST_P(EveryPolicy, IsAskedWhenAPictureIsExchanged) {
+  auto changed = std::make_shared<engine::MapSnapshot>(*map_);
+  changed->keyframes[0].features = MakeSampleMap(77)->keyframes[0].features;
+  ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
+}
+
+TEST_P(EveryPolicy, IsAskedWhenAPointOrAnObservationChanges) {
+  auto changed = std::make_shared<engine::MapSnapshot>(*map_);
+  changed->points[0].point_in_map.x() += 1;
+  ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
+  changed = std::make_shared<engine::MapSnapshot>(*map_);
+  changed->observations.pop_back();
+  ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
+}
+
+TEST_P(EveryPolicy, IsAskedWhenContentChanges) {
+  ExpectAnswer(content(), [&] { library_.Save({key_, "", Policy::kOpen, nullptr, MakeSampleScene(9, 2)}); });
+}
+
+TEST_P(EveryPolicy, LetsContentAndAnUnchangedStructureBeSavedTogether) {
+  const auto loaded = library_.Load(key_).snapshot;
+  ExpectAnswer(content(), [&] { library_.Save({key_, "", Policy::kOpen, loaded, MakeSampleScene(9, 2)}); });
+}
+
+TEST_P(EveryPolicy, DoesNotMindASaveThatChangesNothing) {
+  const auto before = library_.Find(key_);
+  library_.Save({key_, "", Policy::kOpen, library_.Load(key_).snapshot, scene_});
+  EXPECT_EQ(library_.Find(key_), before);
+}
+
+TEST_P(EveryPolicy, IsAskedForANewName) {
+  ExpectAnswer(content(), [&] { library_.Rename(key_, "Table"); });
+}
+
+TEST_P(EveryPolicy, IsAskedForRemoval) {
+  ExpectAnswer(structure(), [&] { library_.Remove(key_); });
+}
+
+TEST_P(EveryPolicy, IsLoosenedBySetPolicyAlone) {
+  library_.Save({key_, "", Policy::kOpen, nullptr, nullptr});
+  EXPECT_EQ(library_.Find(key_).policy, GetParam());
+  library_.SetPolicy(key_, Policy::kOpen);
+  auto changed = std::make_shared<engine::MapSnapshot>(*map_);
+  AddSampleKeyFrame(5, {50, 0, 0}, changed.get());
+  library_.Save({key_, "", Policy::kOpen, changed, MakeSampleScene(3, 0)});
+  EXPECT_EQ(FirstDifference(*library_.Load(key_).snapshot, *changed), "");
+}
+
+TEST_P(EveryPolicy, CannotBeChangedInALibraryThatWasOpenedReadOnly) {
+  Library visitor =
+      Library::Open(folder_ / "a.docent", Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  const std::function<void()> writes[] = {
+      [&] { visitor.NewKey(); },
+      [&] {
+        visitor.Save({key_, "", Policy::kOpen, MakeSampleMap(8), nullptr});
+      },
+      [&] {
+        visitor.Save({key_, "", Policy::kOpen, nullptr, MakeSampleScene(8, 1)});
+      },
+      [&] { visitor.Rename(key_, "Table"); },
+      [&] { visitor.Remove(key_); },
+      [&] { visitor.SetPolicy(key_, Policy::kOpen); },
+  };
+  for (const auto& write : writes) EXPECT_THAT(ErrorOf(write), HasSubstr("was opened read only"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Policies, EveryPolicy, ::testing::ValuesIn(kAll));
+
+TEST(BoundedMap, KeepsItsOriginalBoundsHoweverItGrowsUntilItIsOpened) {
+  const TemporaryFolder folder;
+  Library library =
+      Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+  const std::uint64_t key = library.NewKey();
+  auto map = MakeSampleMap(1);
+  library.Save({key, "Desk", Policy::kOpen, map, nullptr});
+  EXPECT_EQ(library.Find(key).bounds, std::nullopt);
+  library.SetPolicy(key, Policy::kBounded);
+  const auto bounds = library.Find(key).bounds;
+  ASSERT_TRUE(bounds);
+  EXPECT_EQ(bounds, ComputeBounds(*map));
+  AddSampleKeyFrame(5, bounds->max, map.get());
+  library.Save({key, "", Policy::kOpen, map, nullptr});
+  for (const Policy policy : {Policy::kReadOnly, Policy::kBounded}) library.SetPolicy(key, policy);
+  EXPECT_EQ(library.Find(key).bounds, bounds);
+  library.SetPolicy(key, Policy::kOpen);
+  EXPECT_EQ(library.Find(key).bounds, std::nullopt);
+
+  const std::uint64_t empty = library.NewKey();
+  library.Save({empty, "Empty", Policy::kOpen, nullptr, nullptr});
+  EXPECT_THAT(ErrorOf([&] { library.SetPolicy(empty, Policy::kBounded); }), HasSubstr("without keyframes"));
+}
+
+}  // namespace
+}  // namespace docent::maps

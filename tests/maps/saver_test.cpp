@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/saver.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "engine/base/error.h"
+#include "tests/maps/map_samples.h"
+
+namespace docent::maps {
+namespace {
+
+using ::testing::HasSubstr;
+
+class SaverTest : public ::testing::Test {
+ protected:
+  SaverTest() {
+    LibraryOptions options = QuickOptions();
+    options.clock = [this] {
+      ++saves_;
+      while (hold_) std::this_thread::yield();
+      return WallTime{};
+    };
+    library_.emplace(Library::Open(folder_ / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, options));
+  }
+  void WaitUntilASaveRuns() const {
+    while (saves_ == 0) std::this_thread::yield();
+  }
+
+  TemporaryFolder folder_;
+  std::atomic<bool> hold_ = false;  // a save that has begun waits while this is set
+  std::atomic<int> saves_ = 0;
+  std::optional<Library> library_;
+};
+
+TEST_F(SaverTest, SavesInTheBackgroundAndFlushWaitsForAll) {
+  Saver saver(&*library_);
+  const std::uint64_t a = library_->NewKey(), b = library_->NewKey();
+  const auto desk = MakeSampleMap(1), door = MakeSampleMap(2);
+  saver.Submit({a, "Desk", Policy::kOpen, desk, MakeSampleScene(1, 1)});
+  saver.Submit({b, "Door", Policy::kOpen, door, nullptr});
+  saver.Flush();
+  EXPECT_EQ(saver.pending(), 0u);
+  EXPECT_EQ(saver.TakeError(), nullptr);
+  EXPECT_EQ(FirstDifference(*library_->Load(a).snapshot, *desk), "");
+  EXPECT_EQ(FirstDifference(*library_->Load(b).snapshot, *door), "");
+}
+
+TEST_F(SaverTest, TheLatestOfAMapWinsAndASceneIsNotLostToALaterSnapshot) {
+  const std::uint64_t a = library_->NewKey(), b = library_->NewKey();
+  Saver saver(&*library_);
+  hold_ = true;
+  saver.Submit({a, "Busy", Policy::kOpen, MakeSampleMap(1), nullptr});
+  WaitUntilASaveRuns();
+  const auto scene = MakeSampleScene(5, 1);
+  const auto last = MakeSampleMap(10);
+  saver.Submit({b, "Door", Policy::kOpen, MakeSampleMap(2), scene});
+  for (std::uint64_t seed = 3; seed < 10; ++seed)
+    saver.Submit({b, "", Policy::kOpen, MakeSampleMap(seed), nullptr});
+  saver.Submit({b, "", Policy::kOpen, last, nullptr});
+  EXPECT_EQ(saver.pending(), 2u);
+  hold_ = false;
+  saver.Flush();
+  EXPECT_EQ(saver.TakeError(), nullptr);
+  EXPECT_EQ(saves_, 2);
+  EXPECT_EQ(library_->Find(b).name, "Door");
+  EXPECT_EQ(FirstDifference(*library_->Load(b).snapshot, *last), "");
+  EXPECT_EQ(FirstDifference(library_->LoadScene(b), *scene), "");
+}
+
+TEST_F(SaverTest, HandsAFailureToWhoeverAsksAndGoesOn) {
+  const std::uint64_t key = library_->NewKey();
+  Saver saver(&*library_);
+  saver.Submit({key + 50, "Nowhere", Policy::kOpen, MakeSampleMap(1), nullptr});
+  saver.Submit({key, "Desk", Policy::kOpen, MakeSampleMap(2), nullptr});
+  saver.Flush();
+  const std::exception_ptr error = saver.TakeError();
+  ASSERT_NE(error, nullptr);
+  EXPECT_THAT(ErrorOf([&] { std::rethrow_exception(error); }), HasSubstr("map 'Nowhere'"));
+  EXPECT_EQ(saver.TakeError(), nullptr);
+  EXPECT_EQ(library_->List().size(), 1u);
+}
+
+TEST_F(SaverTest, WritesWhatStillWaitsBeforeItEnds) {
+  const std::uint64_t first = library_->NewKey();
+  for (int i = 1; i < 8; ++i) library_->NewKey();
+  {
+    Saver saver(&*library_);
+    for (std::uint64_t key = first; key < first + 8; ++key) {
+      saver.Submit({key, "Map " + std::to_string(key), Policy::kOpen, MakeSampleMap(key), nullptr});
+    }
+  }
+  EXPECT_EQ(library_->List().size(), 8u);
+}
+
+TEST_F(SaverTest, ForgetsAMapThatIsToBeRemoved) {
+  const std::uint64_t a = library_->NewKey(), b = library_->NewKey();
+  Saver saver(&*library_);
+  hold_ = true;
+  saver.Submit({a, "Busy", Policy::kOpen, MakeSampleMap(1), nullptr});
+  WaitUntilASaveRuns();
+  saver.Submit({b, "Gone", Policy::kOpen, MakeSampleMap(2), nullptr});
+  saver.Forget(b);
+  hold_ = false;
+  saver.Forget(a);  // runs already, so it is waited for
+  EXPECT_EQ(library_->Find(a).name, "Busy");
+  library_->Remove(a);
+  saver.Flush();
+  EXPECT_TRUE(library_->List().empty());
+}
+
+TEST_F(SaverTest, AFullQueueMakesAnotherMapWaitButNotANewerStateOfTheSame) {
+  const std::uint64_t a = library_->NewKey(), b = library_->NewKey(), c = library_->NewKey();
+  Saver saver(&*library_, 1);
+  hold_ = true;
+  saver.Submit({a, "A", Policy::kOpen, MakeSampleMap(1), nullptr});
+  WaitUntilASaveRuns();
+  saver.Submit({b, "B", Policy::kOpen, MakeSampleMap(2), nullptr});
+  saver.Submit({b, "B", Policy::kOpen, MakeSampleMap(3), nullptr});
+  std::atomic<bool> submitted = false;
+  std::jthread other([&] {
+    saver.Submit({c, "C", Policy::kOpen, MakeSampleMap(4), nullptr});
+    submitted = true;
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_FALSE(submitted);
+  hold_ = false;
+  other.join();
+  saver.Flush();
+  EXPECT_EQ(library_->List().size(), 3u);
+}
+
+TEST_F(SaverTest, ManyThreadsSubmitListAndLoadAtOnce) {
+  const std::uint64_t first = library_->NewKey();
+  for (int i = 1; i < 4; ++i) library_->NewKey();
+  Saver saver(&*library_, 2);
+  {
+    std::vector<std::jthread> threads;
+    for (std::uint64_t key = first; key < first + 4; ++key) {
+      threads.emplace_back([&, key] {
+        for (std::uint64_t round = 0; round < 10; ++round) {
+          saver.Submit(
+              {key, "Map " + std::to_string(key), Policy::kOpen, MakeSampleMap(100 * key + round), nullptr});
+          for (const MapInfo& info : library_->List()) library_->Load(info.key);
+        }
+      });
+    }
+  }
+  saver.Flush();
+  EXPECT_EQ(saver.TakeError(), nullptr);
+  for (std::uint64_t key = first; key < first + 4; ++key) {
+    EXPECT_EQ(FirstDifference(*library_->Load(key).snapshot, *MakeSampleMap(100 * key + 9)), "");
+  }
+}
+
+}  // namespace
+}  // namespace docent::maps
