@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "content/edits.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "content/edit_script.h"
+#include "engine/base/error.h"
+
+namespace docent::content {
+namespace {
+
+// Index of the entity of this name; throws Error when there is none.
+std::size_t IndexOf(const Scene& scene, const std::string& name) {
+  const Entity* found = scene.Find(name);
+  if (found == nullptr) throw Error("There is no '" + name + "' in this map.");
+  return static_cast<std::size_t>(found - scene.entities.data());
+}
+
+class AddEdit : public Edit {
+ public:
+  AddEdit(Entity entity, std::string text) : entity_(std::move(entity)), text_(std::move(text)) {}
+
+  void Apply(Scene* scene) override {
+    if (entity_.name.empty()) throw Error("A thing without a name cannot be placed.");
+    if (scene->Find(entity_.name) != nullptr)
+      throw Error("There is already a '" + entity_.name + "' in this map.");
+    scene->entities.push_back(entity_);
+  }
+  void Undo(Scene* scene) override {
+    scene->entities.erase(scene->entities.begin() +
+                          static_cast<std::ptrdiff_t>(IndexOf(*scene, entity_.name)));
+  }
+  std::string Text() const override { return text_; }
+
+ private:
+  Entity entity_;
+  std::string text_;
+};
+
+// An edit that changes one entity where it stands and takes it back by restoring what it was.
+class ChangeEdit : public Edit {
+ public:
+  explicit ChangeEdit(std::string name) : name_(std::move(name)) {}
+
+  void Apply(Scene* scene) final {
+    Entity& entity = scene->entities[IndexOf(*scene, name_)];
+    Entity changed = entity;
+    Change(&changed);
+    before_ = std::exchange(entity, std::move(changed));
+  }
+  void Undo(Scene* scene) final { scene->entities[IndexOf(*scene, name_)] = before_; }
+
+ protected:
+  // May throw; works on a copy.
+  virtual void Change(Entity* entity) = 0;
+  const std::string& name() const { return name_; }
+
+ private:
+  std::string name_;
+  Entity before_;
+};
+
+class Move : public ChangeEdit {
+ public:
+  Move(std::string name, const Eigen::Vector3d& position)
+      : ChangeEdit(std::move(name)), position_(position) {}
+  std::string Text() const override {
+    return "move " + QuoteWord(name()) + " " + NumberText(position_.x()) + " " + NumberText(position_.y()) +
+           " " + NumberText(position_.z());
+  }
+
+ protected:
+  void Change(Entity* entity) override {
+    if (!position_.allFinite())
+      throw Error("'" + name() + "' cannot be moved to a place that is not a number.");
+    if (entity->kind == Entity::Kind::kModel) {
+      entity->model.map_from_model.translation = position_;
+    } else {
+      entity->signpost.anchor = position_;
+    }
+  }
+
+ private:
+  Eigen::Vector3d position_;
+};
+
+class Rotate : public ChangeEdit {
+ public:
+  Rotate(std::string name, double angle_deg) : ChangeEdit(std::move(name)), angle_deg_(angle_deg) {}
+  std::string Text() const override { return "rotate " + QuoteWord(name()) + " " + NumberText(angle_deg_); }
+
+ protected:
+  void Change(Entity* entity) override {
+    if (!std::isfinite(angle_deg_)) throw Error("'" + name() + "' cannot be turned by what is not a number.");
+    if (entity->kind != Entity::Kind::kModel) {
+      throw Error("'" + name() + "' is a signpost, which turns to its reader by itself.");
+    }
+    const Eigen::Vector3d turn = Eigen::Vector3d::UnitY() * (angle_deg_ * std::numbers::pi / 180);
+    engine::Rotation3& rotation = entity->model.map_from_model.rotation;
+    rotation = rotation * engine::Rotation3::Exp(turn);
+  }
+
+ private:
+  double angle_deg_;
+};
+
+class Scale : public ChangeEdit {
+ public:
+  Scale(std::string name, double factor) : ChangeEdit(std::move(name)), factor_(factor) {}
+  std::string Text() const override { return "scale " + QuoteWord(name()) + " " + NumberText(factor_); }
+
+ protected:
+  void Change(Entity* entity) override {
+    double& size =
+        entity->kind == Entity::Kind::kModel ? entity->model.map_from_model.scale : entity->signpost.height_m;
+    const double scaled = size * factor_;
+    // The bounds keep the size within what a saved scene may hold.
+    if (!(factor_ > 0) || !(scaled >= 1e-6) || !(scaled <= 1e6)) {
+      throw Error("'" + name() + "' cannot be scaled by " + NumberText(factor_) + ".");
+    }
+    size = scaled;
+  }
+
+ private:
+  double factor_;
+};
+
+class Remove : public Edit {
+ public:
+  explicit Remove(std::string name) : name_(std::move(name)) {}
+
+  void Apply(Scene* scene) override {
+    index_ = IndexOf(*scene, name_);
+    entity_ = std::move(scene->entities[index_]);
+    scene->entities.erase(scene->entities.begin() + static_cast<std::ptrdiff_t>(index_));
+  }
+  void Undo(Scene* scene) override {
+    scene->entities.insert(scene->entities.begin() + static_cast<std::ptrdiff_t>(index_), entity_);
+  }
+  std::string Text() const override { return "remove " + QuoteWord(name_); }
+
+ private:
+  std::string name_;
+  std::size_t index_ = 0;
+  Entity entity_;
+};
+
+std::string AtPixel(PixelRequest pixel) {
+  return " at pixel " + NumberText(pixel.u_px) + " " + NumberText(pixel.v_px);
+}
+
+}  // namespace
+
+std::unique_ptr<Edit> PlaceModelEdit(Entity entity, std::string file, PixelRequest pixel,
+                                     std::optional<double> scale, std::optional<double> yaw_deg) {
+  std::string text = "place " + QuoteWord(file) + AtPixel(pixel);
+  if (scale) text += " scale " + NumberText(*scale);
+  if (yaw_deg) text += " yaw " + NumberText(*yaw_deg);
+  return std::make_unique<AddEdit>(std::move(entity), std::move(text));
+}
+
+std::unique_ptr<Edit> AddSignpostEdit(Entity entity, PixelRequest pixel) {
+  std::string text = "signpost " + QuoteText(entity.signpost.text) + AtPixel(pixel);
+  if (!entity.signpost.to_map.empty()) text += " to " + QuoteWord(entity.signpost.to_map);
+  return std::make_unique<AddEdit>(std::move(entity), std::move(text));
+}
+
+std::unique_ptr<Edit> MoveEdit(std::string name, const Eigen::Vector3d& position_in_map) {
+  return std::make_unique<Move>(std::move(name), position_in_map);
+}
+std::unique_ptr<Edit> RotateEdit(std::string name, double angle_deg) {
+  return std::make_unique<Rotate>(std::move(name), angle_deg);
+}
+std::unique_ptr<Edit> ScaleEdit(std::string name, double factor) {
+  return std::make_unique<Scale>(std::move(name), factor);
+}
+std::unique_ptr<Edit> RemoveEdit(std::string name) {
+  return std::make_unique<Remove>(std::move(name));
+}
+
+void EditHistory::Do(std::unique_ptr<Edit> edit, Scene* scene) {
+  edit->Apply(scene);
+  done_.push_back(std::move(edit));
+  undone_.clear();
+}
+
+bool EditHistory::Undo(Scene* scene) {
+  if (done_.empty()) return false;
+  done_.back()->Undo(scene);
+  undone_.push_back(std::move(done_.back()));
+  done_.pop_back();
+  return true;
+}
+
+bool EditHistory::Redo(Scene* scene) {
+  if (undone_.empty()) return false;
+  undone_.back()->Apply(scene);
+  done_.push_back(std::move(undone_.back()));
+  undone_.pop_back();
+  return true;
+}
+
+std::vector<std::string> EditHistory::Lines() const {
+  std::vector<std::string> lines;
+  for (const std::unique_ptr<Edit>& edit : done_) lines.push_back(edit->Text());
+  return lines;
+}
+
+}  // namespace docent::content

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "content/model_bounds.h"
+
+#include <cmath>
+#include <limits>
+
+namespace docent::content {
+namespace {
+
+// model_from_vertex of each joint of a skin (§3.7.3.3: the node that carries the skinned mesh does not move
+// it).
+std::vector<glm::mat4> JointMatrices(const Skin& skin, const std::vector<glm::mat4>& nodes) {
+  std::vector<glm::mat4> matrices(skin.joints.size());
+  for (std::size_t i = 0; i < matrices.size(); ++i) {
+    matrices[i] = nodes[static_cast<std::size_t>(skin.joints[i])] * skin.inverse_bind[i];
+  }
+  return matrices;
+}
+
+glm::vec3 SkinnedPosition(const Vertex& vertex, const std::vector<glm::mat4>& joints,
+                          const glm::mat4& otherwise) {
+  const glm::vec4 position(vertex.position, 1);
+  if (joints.empty() || vertex.weights == glm::vec4(0)) return glm::vec3(otherwise * position);
+  glm::vec4 sum(0);
+  for (int k = 0; k < 4; ++k) {
+    if (vertex.weights[k] > 0) sum += vertex.weights[k] * (joints[vertex.joints[k]] * position);
+  }
+  return glm::vec3(sum);
+}
+
+}  // namespace
+
+std::optional<std::pair<glm::vec3, glm::vec3>> RestBounds(const Model& model) {
+  const std::vector<glm::mat4> nodes = NodeMatrices(model, -1, 0);
+  glm::vec3 least(std::numeric_limits<float>::max()), most(std::numeric_limits<float>::lowest());
+  bool any = false;
+  for (std::size_t i = 0; i < model.nodes.size(); ++i) {
+    const Node& node = model.nodes[i];
+    if (node.mesh < 0) continue;
+    std::vector<glm::mat4> joints;
+    if (node.skin >= 0) joints = JointMatrices(model.skins[static_cast<std::size_t>(node.skin)], nodes);
+    for (const Primitive& primitive : model.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
+      for (const Vertex& vertex : primitive.vertices) {
+        const glm::vec3 position = SkinnedPosition(vertex, joints, nodes[i]);
+        if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z)) {
+          return std::nullopt;
+        }
+        least = glm::min(least, position);
+        most = glm::max(most, position);
+        any = true;
+      }
+    }
+  }
+  if (!any) return std::pair(glm::vec3(0), glm::vec3(0));
+  return std::pair(least, most);
+}
+
+}  // namespace docent::content

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "content/scene.h"
+
+#include <algorithm>
+
+namespace docent::content {
+
+const Entity* Scene::Find(const std::string& name) const {
+  const auto found = std::find_if(entities.begin(), entities.end(),
+                                  [&](const Entity& entity) { return entity.name == name; });
+  return found == entities.end() ? nullptr : &*found;
+}
+
+std::string Scene::FreeName(const std::string& base) const {
+  if (Find(base) == nullptr) return base;
+  for (int number = 2;; ++number) {
+    const std::string name = base + "-" + std::to_string(number);
+    if (Find(name) == nullptr) return name;
+  }
+}
+
+}  // namespace docent::content

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "content/assimp_loader.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "content/asset.h"
+#include "content/gltf_resources.h"
+#include "engine/base/error.h"
+
+namespace docent::content {
+namespace {
+
+class OtherFormats : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        std::filesystem::temp_directory_path() /
+        ("docent_formats_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) +
+         "_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()));
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::filesystem::path Write(const std::string& name, const std::string& bytes) {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    return folder_ / name;
+  }
+  std::filesystem::path folder_;
+};
+
+constexpr const char* kSquare =
+    "mtllib square.mtl\nv 0 0 0\nv 2 0 0\nv 2 3 0\nv 0 3 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+    "usemtl red\nf 1/1 2/2 3/3 4/4\n";
+
+// A PNG of one texel.
+std::string OneTexel() {
+  const auto bytes = DecodeDataUri(
+      "data:image/"
+      "png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5Er"
+      "kJggg==");
+  return {bytes->begin(), bytes->end()};
+}
+
+TEST_F(OtherFormats, AnObjBecomesTrianglesWithItsMaterialAndTexture) {
+  Write("square.mtl", "newmtl red\nKd 0.5 0.25 0\nd 0.5\nmap_Kd red paint.png\n");
+  Write("red paint.png", OneTexel());
+  const Asset asset = ImportAsset(Write("square.obj", kSquare));
+  ASSERT_EQ(asset.model->meshes.size(), 1u);
+  const Primitive& primitive = asset.model->meshes[0].primitives[0];
+  EXPECT_EQ(primitive.indices.size(), 6u);
+  EXPECT_EQ(asset.model->bounds_max, glm::vec3(2, 3, 0));
+  ASSERT_GE(primitive.material, 0);
+  const Material& material = asset.model->materials[static_cast<std::size_t>(primitive.material)];
+  EXPECT_EQ(material.name, "red");
+  EXPECT_FLOAT_EQ(material.base_color.r, 0.5f);
+  EXPECT_FLOAT_EQ(material.base_color.a, 0.5f);
+  EXPECT_EQ(material.alpha, Material::Alpha::kBlend);
+  EXPECT_EQ(material.base_color_texture.texture, 0);
+  ASSERT_EQ(asset.model->images.size(), 1u);
+  for (const Vertex& vertex : primitive.vertices) {
+    // OBJ counts v from the bottom, glTF from the top.
+    EXPECT_FLOAT_EQ(vertex.uv0.y, 1 - vertex.position.y / 3);
+  }
+  // The asset stands alone.
+  std::filesystem::remove_all(folder_);
+  EXPECT_EQ(AssetFromGlb(asset.name, asset.glb).model->images.size(), 1u);
+}
+
+TEST_F(OtherFormats, ATextureThatCannotBeShownIsAWarning) {
+  Write("square.mtl", "newmtl red\nKd 1 1 1\nmap_Kd ../../../etc/passwd\n");
+  const Asset asset = ImportAsset(Write("square.obj", kSquare));
+  EXPECT_TRUE(asset.model->images.empty());
+  ASSERT_EQ(asset.model->warnings.size(), 1u);
+  EXPECT_THAT(asset.model->warnings[0], ::testing::HasSubstr("passwd"));
+}
+
+TEST_F(OtherFormats, APlyKeepsItsVertexColours) {
+  const Asset asset =
+      ImportAsset(Write("tri.PLY",
+                        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                        "property float z\nproperty uchar red\nproperty uchar green\n"
+                        "property uchar blue\nelement face 1\nproperty list uchar int vertex_indices\n"
+                        "end_header\n0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n"));
+  ASSERT_EQ(asset.model->meshes.size(), 1u);
+  EXPECT_EQ(asset.model->meshes[0].primitives[0].vertices[0].color, glm::vec4(1, 0, 0, 1));
+}
+
+TEST_F(OtherFormats, DamagedFilesAreRefusedInOneSentence) {
+  for (const char* name : {"a.obj", "a.ply", "a.stl", "a.fbx", "a.dae", "a.3ds", "a.off"}) {
+    const std::filesystem::path path = Write(name, "this is no model\n");
+    try {
+      const Asset asset = ImportAsset(path);
+      EXPECT_TRUE(asset.model->meshes.empty()) << name;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), ::testing::HasSubstr(name));
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+    }
+  }
+  EXPECT_THROW(ImportAsset(folder_ / "missing.obj"), Error);
+}
+
+TEST_F(OtherFormats, LimitsHoldForThemToo) {
+  LoadLimits limits;
+  limits.max_vertices = 3;
+  const std::filesystem::path path = Write("square.obj", kSquare);
+  EXPECT_THROW(ImportAsset(path, limits), Error);
+  limits = {};
+  limits.max_file_bytes = 20;
+  EXPECT_THROW(ImportAsset(path, limits), Error);
+}
+
+TEST(AssimpFormats, GltfNeverGoesThroughAssimp) {
+  EXPECT_FALSE(IsAssimpFormat("a.gltf"));
+  EXPECT_FALSE(IsAssimpFormat("a.GLB"));
+  EXPECT_TRUE(IsAssimpFormat("a.OBJ"));
+}
+
+}  // namespace
+}  // namespace docent::content

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+// Hand-made hostile files: each must be refused with the right sentence.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "content/asset.h"
+#include "content/gltf_images.h"
+#include "content/gltf_resources.h"
+#include "tests/content/make_gltf.h"
+
+namespace docent::content {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A folder of its own below the temporary one, removed at the end.
+class HostileFiles : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              ("docent_hostile_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "_" +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_ / "model" / "textures");
+    Write("secret.bin", std::string(64, 's'));
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  void Write(const std::string& name, const std::string& bytes) {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+  }
+
+  // The sentence that a glTF with one buffer of this URI is refused with, empty when it loads.
+  std::string RefusalOfBuffer(const std::string& uri) {
+    nlohmann::json json = {{"asset", {{"version", "2.0"}}}};
+    json["buffers"] = {{{"uri", uri}, {"byteLength", 36}}};
+    Write("model/test.gltf", json.dump());
+    try {
+      ImportAsset(folder_ / "model" / "test.gltf");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(HostileFiles, NoUriLeadsOutOfTheModelsFolder) {
+  Write("model/inside.bin", std::string(64, 'i'));
+  Write("model/textures/deep er.bin", std::string(64, 'i'));
+  EXPECT_EQ(RefusalOfBuffer("inside.bin"), "");
+  EXPECT_EQ(RefusalOfBuffer("textures/deep%20er.bin"), "");
+  EXPECT_EQ(RefusalOfBuffer("./textures/deep er.bin"), "");
+  for (const char* uri :
+       {"../secret.bin", "textures/../../secret.bin", "%2e%2e/secret.bin", "..%2Fsecret.bin", "/etc/passwd",
+        "%2Fetc%2Fpasswd", "file:///etc/passwd", "http://example.com/a.bin", "https:inside.bin",
+        "..\\secret.bin", "textures/../inside.bin"}) {
+    EXPECT_THAT(RefusalOfBuffer(uri), HasSubstr("outside the model's folder")) << uri;
+  }
+  EXPECT_THAT(RefusalOfBuffer((folder_ / "model" / "inside.bin").string()),
+              HasSubstr("outside the model's folder"));
+  EXPECT_THAT(RefusalOfBuffer("missing.bin"), HasSubstr("which is not there"));
+  EXPECT_THAT(RefusalOfBuffer("a%00b"), HasSubstr("no file name"));
+  EXPECT_THAT(RefusalOfBuffer("a%2"), HasSubstr("no file name"));
+}
+
+TEST_F(HostileFiles, LinksAreFollowedBeforeTheFolderIsJudged) {
+  std::filesystem::create_symlink(folder_ / "secret.bin", folder_ / "model" / "link.bin");
+  EXPECT_THAT(RefusalOfBuffer("link.bin"), HasSubstr("by a link"));
+  Write("model/inside.bin", std::string(64, 'i'));
+  std::filesystem::create_symlink("inside.bin", folder_ / "model" / "good.bin");
+  EXPECT_EQ(RefusalOfBuffer("good.bin"), "");
+}
+
+TEST_F(HostileFiles, OnlyRegularFilesAreRead) {
+  EXPECT_THAT(RefusalOfBuffer("textures"), HasSubstr("is not a file"));
+  EXPECT_THROW(ImportAsset(folder_ / "model"), Error);
+  EXPECT_THROW(ImportAsset("/dev/zero"), Error);
+  EXPECT_THROW(ImportAsset(folder_ / "nothing.glb"), Error);
+}
+
+TEST_F(HostileFiles, AnAssetOfALibraryMayPointToNoFile) {
+  nlohmann::json json = {{"asset", {{"version", "2.0"}}}};
+  json["buffers"] = {{{"uri", "inside.bin"}, {"byteLength", 36}}};
+  EXPECT_THROW(AssetFromGlb("test.glb", MakeGlb(json.dump(), {})), Error);
+}
+
+TEST(HostileGltf, ABillionVerticesAreRefusedBeforeTheyAreAllocated) {
+  GltfFile file = TriangleFile();
+  file.json["accessors"][0]["count"] = 1'000'000'000;
+  EXPECT_THAT(file.Refusal(), HasSubstr("claims 1000000000 elements of 12 bytes"));
+  file.json["accessors"][0].erase("bufferView");
+  EXPECT_THAT(file.Refusal(), HasSubstr("more than the whole file has bytes"));
+}
+
+TEST(HostileGltf, ProductsThatWouldWrapAreRefused) {
+  for (const std::uint64_t count : {0x5555555555555556ull, 0x8000000000000000ull, 0xFFFFFFFFFFFFFFFFull}) {
+    GltfFile file = TriangleFile();
+    file.json["accessors"][0]["count"] = count;
+    EXPECT_NE(file.Refusal(), "") << count;
+  }
+  for (const char* member : {"byteOffset", "byteLength"}) {
+    GltfFile file = TriangleFile();
+    file.json["bufferViews"][0][member] = 0xFFFFFFFFFFFFFFF0ull;
+    EXPECT_NE(file.Refusal(), "") << member;
+    file.json["bufferViews"][0][member] = 9007199254740000ull;
+    EXPECT_NE(file.Refusal(), "") << member;
+  }
+  GltfFile file = TriangleFile();
+  file.json["accessors"][0]["byteOffset"] = -4;
+  EXPECT_NE(file.Refusal(), "");
+}
+
+TEST(HostileGltf, AGlbCutOffAnywhereIsRefused) {
+  const std::vector<std::uint8_t> whole = TriangleFile().Glb();
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    const std::vector<std::uint8_t> part(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length));
+    EXPECT_THROW(AssetFromGlb("cut.glb", part), Error) << length;
+  }
+  EXPECT_NO_THROW(AssetFromGlb("whole.glb", whole));
+}
+
+TEST(HostileGltf, AnyByteMayBeDamaged) {
+  const std::vector<std::uint8_t> whole = TriangleFile().Glb();
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    for (const int flip : {0x01, 0x20, 0x80, 0xFF}) {
+      std::vector<std::uint8_t> damaged = whole;
+      damaged[at] = static_cast<std::uint8_t>(damaged[at] ^ flip);
+      try {
+        AssetFromGlb("damaged.glb", damaged);
+      } catch (const Error&) {
+        continue;  // refused with a sentence; anything else ends the test
+      }
+    }
+  }
+}
+
+TEST(HostileGltf, JsonBombsStopAtTheirLimits) {
+  const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
+  const auto refusal = [](const std::string& text) -> std::string {
+    try {
+      LoadGltf("bomb.gltf", {text.begin(), text.end()}, std::nullopt);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal("{\"extras\":" + deep + "}"), HasSubstr("nested deeper"));
+  std::string wide = "{\"extras\":[0";
+  for (int i = 0; i < 2'100'000; ++i) wide += ",0";
+  EXPECT_THAT(refusal(wide + "]}"), HasSubstr("values"));
+  EXPECT_THAT(refusal("{\"asset\":"), HasSubstr("not valid JSON"));
+  EXPECT_THAT(refusal("hello"), HasSubstr("neither"));
+  EXPECT_THAT(refusal(""), HasSubstr("empty"));
+}
+
+TEST(HostileGltf, NodesMustBeATree) {
+  GltfFile circle = TriangleFile();
+  circle.json["nodes"] = {{{"children", {1}}}, {{"children", {0}}}};
+  EXPECT_THAT(circle.Refusal(), HasSubstr("its own ancestor"));
+  GltfFile self = TriangleFile();
+  self.json["nodes"] = {{{"children", {0}}}};
+  EXPECT_THAT(self.Refusal(), HasSubstr("its own ancestor"));
+  GltfFile shared = TriangleFile();
+  shared.json["nodes"] = {{{"children", {2}}}, {{"children", {2}}}, nlohmann::json::object()};
+  EXPECT_THAT(shared.Refusal(), HasSubstr("child of two nodes"));
+  GltfFile missing = TriangleFile();
+  missing.json["nodes"] = {{{"children", {7}}}};
+  EXPECT_THAT(missing.Refusal(), HasSubstr("nodes[0].children[0] is 7, and the file has 1 nodes"));
+}
+
+TEST(HostileGltf, ALongChainOfNodesNeedsNoDeepStack) {
+  GltfFile file = TriangleFile();
+  constexpr int kNodes = 100'000;
+  nlohmann::json nodes = nlohmann::json::array();
+  for (int i = 0; i + 1 < kNodes; ++i) nodes.push_back({{"children", {i + 1}}});
+  nodes.push_back({{"mesh", 0}});
+  file.json["nodes"] = nodes;
+  EXPECT_EQ(file.Load()->nodes.size(), static_cast<std::size_t>(kNodes));
+}
+
+TEST(HostileGltf, NumbersThatAreNotFiniteAreRefused) {
+  for (const float value :
+       {std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    GltfFile file = TriangleFile();
+    std::memcpy(file.bin.data() + 16, &value, sizeof(value));
+    EXPECT_THAT(file.Refusal(), HasSubstr("not finite"));
+  }
+  GltfFile far = TriangleFile();
+  far.json["nodes"] = {{{"mesh", 0}, {"scale", {3e38, 1, 1}}, {"translation", {3e38, 0, 0}}}};
+  EXPECT_THAT(far.Refusal(), HasSubstr("largest number"));
+}
+
+TEST(HostileGltf, IndicesBeyondTheVerticesAreRefused) {
+  GltfFile file = TriangleFile();
+  file.json["meshes"][0]["primitives"][0]["indices"] = file.AddIndices({0, 1, 3});
+  EXPECT_THAT(file.Refusal(), HasSubstr("names vertex 3 of 3"));
+}
+
+TEST(HostileGltf, SmallFilesThatUnrollWithoutEndMeetTheLimits) {
+  GltfFile file = TriangleFile();
+  nlohmann::json& primitives = file.json["meshes"][0]["primitives"];
+  while (primitives.size() < 100) primitives.push_back(primitives[0]);
+  LoadLimits limits;
+  limits.max_vertices = 250;
+  EXPECT_THAT(file.Refusal(limits), HasSubstr("above 250 vertices"));
+  limits = {};
+  limits.max_indices = 90;
+  EXPECT_THAT(file.Refusal(limits), HasSubstr("above 30 triangles"));
+  limits = {};
+  limits.max_drawn_indices = 270;
+  EXPECT_THAT(file.Refusal(limits), HasSubstr("more than 90 triangles"));
+  EXPECT_EQ(file.Refusal(), "");
+}
+
+TEST(HostileGltf, RequiredExtensionsThatAreNotReadAreNamed) {
+  GltfFile file = TriangleFile();
+  file.json["extensionsUsed"] = file.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
+  EXPECT_THAT(file.Refusal(), HasSubstr("KHR_draco_mesh_compression"));
+  GltfFile old = TriangleFile();
+  old.json["asset"]["version"] = "1.0";
+  EXPECT_THAT(old.Refusal(), HasSubstr("glTF 1.0"));
+}
+
+TEST(HostileGltf, APictureTooLargeIsRefusedFromItsHeaderAlone) {
+  // A PNG header of 20000 x 4 pixels and nothing behind it.
+  std::vector<std::uint8_t> png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n', 0,    0, 0,
+                                   13,   'I', 'H', 'D', 'R',  0,    0,    0x4E, 0x20, 0, 0,
+                                   0,    4,   8,   6,   0,    0,    0,    0,    0,    0, 0};
+  const auto size = ReadImageSize(png);
+  ASSERT_TRUE(size.has_value());
+  EXPECT_EQ(size->width_px, 20000);
+  EXPECT_EQ(size->height_px, 4);
+  LoadLimits limits;
+  std::uint64_t pixels_left = 1'000'000;
+  const auto refusal = [&]() -> std::string {
+    try {
+      DecodeImage("a.glb", "images[0]", png, limits, &pixels_left);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal(), HasSubstr("20000 x 4"));
+  limits.max_image_side_px = 30000;
+  pixels_left = 79'999;
+  EXPECT_THAT(refusal(), HasSubstr("brings the model's pictures above"));
+  pixels_left = 80'000;
+  EXPECT_THAT(refusal(), HasSubstr("damaged"));
+}
+
+TEST(HostileGltf, SkinsMustHaveTheJointsThatVerticesHangOn) {
+  GltfFile file = TriangleFile();
+  nlohmann::json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
+  attributes["JOINTS_0"] =
+      file.AddAccessor<std::uint8_t>({0, 9, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0}, 5121, "VEC4", 3);
+  attributes["WEIGHTS_0"] = file.AddFloats({1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4", 3);
+  file.json["nodes"] = {{{"mesh", 0}, {"skin", 0}}, nlohmann::json::object()};
+  file.json["skins"] = {{{"joints", {1}}}};
+  EXPECT_THAT(file.Refusal(), HasSubstr("joint 1 of a skin with 1"));
+  file.json["skins"] = {{{"joints", {1, 0}}}};
+  EXPECT_EQ(file.Refusal(), "") << "joint 9 has no weight and does not count";
+}
+
+}  // namespace
+}  // namespace docent::content
