@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/recorder.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <opencv2/videoio.hpp>
+
+#include "tests/ui/ui_testing.h"
+#include "ui/map_view.h"
+
+namespace docent::ui {
+namespace {
+
+std::filesystem::path Scratch(const std::string& name) {
+  return std::filesystem::temp_directory_path() / ("docent-ui-" + std::to_string(getpid()) + "-" + name);
+}
+
+TEST(Recorder, WritesAVideoThatReadsBackWithTheSamePictures) {
+  const std::filesystem::path path = Scratch("video.mp4");
+  {
+    Recorder recorder(path.string(), 25);
+    for (int i = 0; i < 20; ++i)
+      recorder.Write(cv::Mat(121, 161, CV_8UC3, cv::Scalar(10 + 10 * i, 120, 240 - 10 * i)));
+    recorder.Close();
+  }
+  cv::VideoCapture video(path.string(), cv::CAP_FFMPEG);
+  ASSERT_TRUE(video.isOpened());
+  EXPECT_NEAR(video.get(cv::CAP_PROP_FPS), 25, 0.01);
+  int count = 0;
+  for (cv::Mat picture; video.read(picture); ++count) {
+    EXPECT_EQ(picture.size(), cv::Size(160, 120));
+    const cv::Scalar mean = cv::mean(picture);
+    EXPECT_NEAR(mean[0], 10 + 10 * count, 8);
+    EXPECT_NEAR(mean[2], 240 - 10 * count, 8);
+  }
+  EXPECT_EQ(count, 20);
+  std::filesystem::remove(path);
+}
+
+TEST(Recorder, RefusesWhatItCannotWriteWithASentence) {
+  const auto message = [](const std::string& path, double rate) {
+    try {
+      Recorder recorder(path, rate);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(message("/no such folder/video.mp4", 30).find("/no such folder/video.mp4"), std::string::npos);
+  EXPECT_NE(message(Scratch("video.txt").string(), 30).find(".mp4"), std::string::npos);
+  EXPECT_NE(message(Scratch("video.mp4").string(), 0).find("rate"), std::string::npos);
+}
+
+TEST(Recorder, LeavesNoFileWithoutPictures) {
+  const std::filesystem::path path = Scratch("empty.mp4");
+  Recorder(path.string(), 30).Close();
+  EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+TEST(MapView, LooksStraightDownFromAbove) {
+  Orbit orbit;
+  orbit.target = {1, 2, 3};
+  orbit.distance_m = 4;
+  orbit.elevation = 10;  // clamped to a right angle
+  const engine::Rigid3 camera_from_map = CameraFromMap(orbit);
+  EXPECT_LT((camera_from_map.OriginInSource() - Eigen::Vector3d(1, -2, 3)).norm(), 1e-9);
+  EXPECT_LT((camera_from_map * orbit.target - Eigen::Vector3d(0, 0, 4)).norm(), 1e-9);
+}
+
+using MapViewPicture = OffscreenTest;
+
+TEST_F(MapViewPicture, ShowsThePointsOfAMapInColour) {
+  engine::MapSnapshot map;
+  Random random(5);
+  for (engine::MapPointId i = 0; i < 300; ++i) {
+    engine::MapPoint point;
+    point.id = i;
+    point.point_in_map << random.Uniform(-1, 1), random.Uniform(-0.1, 0.1), random.Uniform(1, 3), 1;
+    map.points.push_back(point);
+  }
+  MapView view;
+  cv::Mat empty, full;
+  const Orbit orbit = OrbitAbove(map);
+  EXPECT_LT((orbit.target - Eigen::Vector3d(0, 0, 2)).norm(), 0.3);
+  view.Draw({}, nullptr, orbit);
+  view.ReadBack(&empty);
+  view.Draw(map, nullptr, orbit);
+  view.ReadBack(&full);
+  cv::Mat red;
+  cv::inRange(full, cv::Scalar(0, 0, 180), cv::Scalar(130, 130, 255), red);
+  EXPECT_GT(cv::countNonZero(red), 600);
+  cv::inRange(empty, cv::Scalar(0, 0, 180), cv::Scalar(130, 130, 255), red);
+  EXPECT_EQ(cv::countNonZero(red), 0);
+}
+
+}  // namespace
+}  // namespace docent::ui

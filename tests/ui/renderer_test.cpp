@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/ui/ui_testing.h"
+#include "ui/content_layer.h"
+#include "ui/gl_objects.h"
+
+namespace docent::ui {
+namespace {
+
+using RendererTest = OffscreenTest;
+
+int CountDifferent(const cv::Mat& a, const cv::Mat& b) {
+  cv::Mat difference;
+  cv::absdiff(a, b, difference);
+  return cv::countNonZero(difference.reshape(1));
+}
+
+TEST_F(RendererTest, KeepsEveryByteOfTheVideoWhereNothingStands) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  const cv::Mat video = NoisePicture(640, 480, CV_8UC3);
+  const engine::TrackedFrame tracked = Tracked(video);
+  EXPECT_EQ(CountDifferent(DrawPicture(&renderer, tracked, camera, {}), video), 0);
+
+  content::Scene scene;
+  scene.entities.push_back(Facing(SquareModel(0.4f, glm::vec4(1, 0, 0, 1)), {0, 0, 2}));
+  const cv::Mat drawn = DrawPicture(&renderer, tracked, camera, scene);
+  EXPECT_EQ(drawn.at<cv::Vec3b>(242, 319), cv::Vec3b(0, 0, 255));
+  // The square spans 81 pixels around the middle; beside it the video is untouched.
+  const cv::Rect around(319 - 50, 242 - 50, 100, 100);
+  cv::Mat rest = drawn.clone(), expected = video.clone();
+  rest(around).setTo(0);
+  expected(around).setTo(0);
+  EXPECT_EQ(CountDifferent(rest, expected), 0);
+  EXPECT_GT(CountDifferent(drawn, video), 3 * 70 * 70);
+}
+
+TEST_F(RendererTest, ShowsGreyVideoAndPicturesWithinLargerOnes) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  const cv::Mat gray = NoisePicture(640, 480, CV_8UC1);
+  cv::Mat colored;
+  cv::cvtColor(gray, colored, cv::COLOR_GRAY2BGR);
+  EXPECT_EQ(CountDifferent(DrawPicture(&renderer, Tracked(gray), camera, {}), colored), 0);
+  const cv::Mat large = NoisePicture(701, 500, CV_8UC3);
+  const cv::Mat part = large(cv::Rect(13, 7, 640, 480));
+  EXPECT_EQ(CountDifferent(DrawPicture(&renderer, Tracked(part), camera, {}), part), 0);
+}
+
+TEST_F(RendererTest, HidesWhatStandsBehindWhateverTheOrderOfPlacing) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  const engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
+  const content::Entity near = Facing(SquareModel(0.2f, glm::vec4(1, 0, 0, 1)), {0, 0, 1.0});
+  const content::Entity far = Facing(SquareModel(1.0f, glm::vec4(0, 1, 0, 1)), {0, 0, 1.02});
+  for (const bool near_first : {true, false}) {
+    content::Scene scene;
+    scene.entities = near_first ? std::vector{near, far} : std::vector{far, near};
+    const cv::Mat drawn = DrawPicture(&renderer, tracked, camera, scene);
+    EXPECT_EQ(drawn.at<cv::Vec3b>(242, 319), cv::Vec3b(0, 0, 255));
+    EXPECT_EQ(drawn.at<cv::Vec3b>(242, 419), cv::Vec3b(0, 255, 0));
+  }
+}
+
+TEST_F(RendererTest, BlendsTransparentContentOverTheVideoAndOverEachOther) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  const engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(200, 100, 40)));
+  content::Scene scene;
+  scene.entities.push_back(Facing(SquareModel(0.2f, glm::vec4(1, 0, 0, 0.25f)), {0, 0, 1.0}));
+  scene.entities.push_back(Facing(SquareModel(1.0f, glm::vec4(0, 1, 0, 0.5f)), {0, 0, 1.5}));
+  const cv::Mat drawn = DrawPicture(&renderer, tracked, camera, scene);
+  const cv::Vec3b once = drawn.at<cv::Vec3b>(242, 419), twice = drawn.at<cv::Vec3b>(242, 319);
+  EXPECT_NEAR(once[0], 0.5 * 200, 2);
+  EXPECT_NEAR(once[1], 0.5 * 255 + 0.5 * 100, 2);
+  EXPECT_NEAR(twice[1], 0.75 * (0.5 * 255 + 0.5 * 100), 2);
+  EXPECT_NEAR(twice[2], 0.25 * 255 + 0.75 * 0.5 * 40, 2);
+}
+
+TEST_F(RendererTest, DrawsEachPictureWithItsOwnPoseAndForgetsTheOneBefore) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  content::Scene scene;
+  const Eigen::Vector3d place(0.1, -0.05, 2);
+  scene.entities.push_back(Facing(SquareModel(0.05f, glm::vec4(1)), place));
+  Random random(3);
+  for (int i = 0; i < 6; ++i) {
+    engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
+    tracked.camera_from_map = {
+        engine::Rotation3::Exp({random.Uniform(-0.2, 0.2), random.Uniform(-0.2, 0.2), random.Uniform(-1, 1)}),
+        {random.Uniform(-0.3, 0.3), random.Uniform(-0.3, 0.3), random.Uniform(-0.3, 0.3)}};
+    const Eigen::Vector2d seen = Centroid(DrawPicture(&renderer, tracked, camera, scene));
+    const std::optional<Eigen::Vector2d> expected =
+        camera.Project(Eigen::Vector3d(tracked.camera_from_map * place));
+    ASSERT_TRUE(expected.has_value());
+    EXPECT_LT((seen - *expected).norm(), 0.5) << "frame " << i;
+  }
+}
+
+TEST_F(RendererTest, DrawsNoContentWithoutAPose) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  content::Scene scene;
+  scene.entities.push_back(Facing(SquareModel(1, glm::vec4(1)), {0, 0, 1}));
+  engine::TrackedFrame tracked = Tracked(NoisePicture(640, 480, CV_8UC3));
+  tracked.state = engine::TrackingState::kLost;
+  EXPECT_EQ(CountDifferent(DrawPicture(&renderer, tracked, camera, scene), tracked.frame.picture), 0);
+}
+
+TEST_F(RendererTest, MovesASkinnedMeshWithItsJoint) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  auto model = SquareModel(0.05f, glm::vec4(1));
+  for (content::Vertex& vertex : model->meshes[0].primitives[0].vertices)
+    vertex.weights = glm::vec4(1, 0, 0, 0);
+  content::Node joint;
+  joint.translation = glm::vec3(0.3f, 0, 0);
+  model->nodes.push_back(joint);
+  model->roots.push_back(1);
+  model->skins.push_back({{1}, {glm::mat4(1.0f)}});
+  model->nodes[0].skin = 0;
+  content::Entity entity = Facing(model, {0, 0, 2});
+  entity.model.map_from_model.rotation = {};
+  content::Scene scene;
+  scene.entities.push_back(entity);
+  const cv::Mat drawn = DrawPicture(&renderer, Tracked(cv::Mat::zeros(480, 640, CV_8UC3)), camera, scene);
+  const Eigen::Vector2d expected = *camera.Project(Eigen::Vector3d(0.3, 0, 2));
+  EXPECT_LT((Centroid(drawn) - expected).norm(), 0.5);
+}
+
+TEST_F(RendererTest, FreesTheGraphicsMemoryOfModelsThatAreGone) {
+  ContentLayer layer(4, 256);
+  const RenderTarget target(640, 480, 1, false);
+  const engine::CameraModel camera = StronglyDistorted();
+  content::Scene scene;
+  scene.entities.push_back(Facing(SquareModel(1, glm::vec4(1)), {0, 0, 1}));
+  scene.entities.push_back(Facing(SquareModel(1, glm::vec4(1)), {0, 0, 2}));
+  layer.Draw(camera, {}, scene, 0, target);
+  EXPECT_EQ(layer.cached_models(), 2u);
+  scene.entities.pop_back();
+  layer.Draw(camera, {}, scene, 0, target);
+  layer.Draw(camera, {}, scene, 0, target);
+  EXPECT_EQ(layer.cached_models(), 1u);
+}
+
+TEST_F(RendererTest, DrawsTheWearerIntoTheSearchWithAFigureThatMoves) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(90, 90, 90)));
+  tracked.state = engine::TrackingState::kLost;
+  View view;
+  view.tracked = &tracked;
+  view.camera = &camera;
+  cv::Mat early, late;
+  view.animation_seconds = 0.5;
+  renderer.Draw(view);
+  renderer.ReadBack(&early);
+  view.animation_seconds = 1.0;
+  renderer.Draw(view);
+  renderer.ReadBack(&late);
+  const cv::Rect middle(220, 140, 200, 200);
+  EXPECT_GT(CountDifferent(early(middle), late(middle)), 1000);
+}
+
+TEST_F(RendererTest, SurvivesAnyTextInItsLabels) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
+  tracked.hint = std::string(100000, 'W');
+  View view;
+  view.tracked = &tracked;
+  view.camera = &camera;
+  view.overlay.map_name = "\xff\xfe\x80 broken \xc3";
+  view.overlay.message = std::string("nul\0inside", 10) + "\x01\x02";
+  renderer.Draw(view);
+  cv::Mat picture;
+  renderer.ReadBack(&picture);
+  EXPECT_EQ(picture.size(), cv::Size(640, 480));
+}
+
+}  // namespace
+}  // namespace docent::ui

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "content/scene.h"
+#include "engine/base/error.h"
+#include "engine/base/random.h"
+#include "ui/context.h"
+#include "ui/renderer.h"
+
+// What the tests of the floor share: an offscreen context or a reason to skip, and small models made by hand.
+namespace docent::ui {
+
+class OffscreenTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    try {
+      context_ = std::make_unique<OffscreenContext>();
+    } catch (const Error& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+  std::unique_ptr<OffscreenContext> context_;
+};
+
+inline engine::CameraModel StronglyDistorted() {
+  return {engine::LensModel::kRadialTangential,
+          {640, 480, 404.243, 405.456, 318.7, 241.9},
+          {-0.31, 0.09, 0.0016, -0.0011, 0}};
+}
+
+inline cv::Mat NoisePicture(int width_px, int height_px, int type) {
+  cv::Mat picture(height_px, width_px, type);
+  Random random(7);
+  for (int y = 0; y < picture.rows; ++y) {
+    for (std::size_t x = 0; x < picture.cols * picture.elemSize(); ++x)
+      picture.ptr(y)[x] = static_cast<std::uint8_t>(random.Below(256));
+  }
+  return picture;
+}
+
+// A square in the model's xy plane, `side` long, seen from both sides, in one unlit colour (linear).
+inline std::shared_ptr<content::Model> SquareModel(float side, const glm::vec4& color) {
+  auto model = std::make_shared<content::Model>();
+  content::Material material;
+  material.base_color = color;
+  material.unlit = true;
+  material.double_sided = true;
+  if (color.a < 1) material.alpha = content::Material::Alpha::kBlend;
+  model->materials.push_back(material);
+  content::Primitive primitive;
+  for (const glm::vec2& corner : {glm::vec2(-1, -1), glm::vec2(1, -1), glm::vec2(1, 1), glm::vec2(-1, 1)}) {
+    content::Vertex vertex;
+    vertex.position = glm::vec3(corner * (0.5f * side), 0);
+    primitive.vertices.push_back(vertex);
+  }
+  primitive.indices = {0, 1, 2, 0, 2, 3};
+  primitive.material = 0;
+  model->meshes.push_back({"square", {primitive}});
+  content::Node node;
+  node.mesh = 0;
+  model->nodes.push_back(node);
+  model->roots.push_back(0);
+  model->bounds_min = glm::vec3(-side, -side, 0);
+  model->bounds_max = glm::vec3(side, side, 0);
+  return model;
+}
+
+// The model at a point of the map, its +z axis against the ray from the map's origin, so that it faces a
+// camera there.
+inline content::Entity Facing(std::shared_ptr<const content::Model> model, const Eigen::Vector3d& place) {
+  auto asset = std::make_shared<content::Asset>();
+  asset->model = std::move(model);
+  content::Entity entity;
+  entity.kind = content::Entity::Kind::kModel;
+  entity.model.asset = asset;
+  entity.model.map_from_model.rotation =
+      engine::Rotation3(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), -place));
+  entity.model.map_from_model.translation = place;
+  return entity;
+}
+
+// A tracked frame with a pose at the map's origin over this picture.
+inline engine::TrackedFrame Tracked(const cv::Mat& picture) {
+  engine::TrackedFrame tracked;
+  tracked.frame.picture = picture;
+  tracked.state = engine::TrackingState::kSixDof;
+  return tracked;
+}
+
+inline cv::Mat DrawPicture(Renderer* renderer, const engine::TrackedFrame& tracked,
+                           const engine::CameraModel& camera, const content::Scene& scene) {
+  View view;
+  view.tracked = &tracked;
+  view.camera = &camera;
+  view.scene = &scene;
+  view.overlay.hud = false;
+  renderer->Draw(view);
+  cv::Mat picture;
+  renderer->ReadBack(&picture);
+  return picture;
+}
+
+// Centre of what is brighter than black in a picture, weighted by its green, pixels; (-1, -1) for nothing.
+inline Eigen::Vector2d Centroid(const cv::Mat& picture) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double weight = 0;
+  for (int y = 0; y < picture.rows; ++y) {
+    for (int x = 0; x < picture.cols; ++x) {
+      const double green = picture.at<cv::Vec3b>(y, x)[1];
+      sum += green * Eigen::Vector2d(x, y);
+      weight += green;
+    }
+  }
+  return weight > 0 ? Eigen::Vector2d(sum / weight) : Eigen::Vector2d(-1, -1);
+}
+
+}  // namespace docent::ui

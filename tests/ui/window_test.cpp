@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/window.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <thread>
+
+#include "tests/ui/ui_testing.h"
+#include "ui/authoring_panel.h"
+#include "ui/command_text.h"
+#include "ui/letterbox.h"
+
+namespace docent::ui {
+namespace {
+
+// A screen of its own for these tests, on a display number that the server chooses.
+class VirtualScreen {
+ public:
+  VirtualScreen() {
+    int channel[2];
+    if (pipe(channel) != 0) return;
+    child_ = fork();
+    if (child_ == 0) {
+      const std::string descriptor = std::to_string(channel[1]);
+      const int nowhere = open("/dev/null", O_WRONLY);
+      dup2(nowhere, STDERR_FILENO);
+      execlp("Xvfb", "Xvfb", "-displayfd", descriptor.c_str(), "-screen", "0", "1024x768x24", "-nolisten",
+             "tcp", static_cast<char*>(nullptr));
+      _exit(127);
+    }
+    close(channel[1]);
+    char c = 0;
+    while (read(channel[0], &c, 1) == 1 && c != '\n') display_ += c;
+    close(channel[0]);
+    if (!display_.empty()) setenv("DISPLAY", (":" + display_).c_str(), 1);
+  }
+  ~VirtualScreen() {
+    unsetenv("DISPLAY");
+    if (child_ <= 0) return;
+    kill(child_, SIGTERM);
+    waitpid(child_, nullptr, 0);
+  }
+  bool works() const { return !display_.empty(); }
+
+ private:
+  pid_t child_ = -1;
+  std::string display_;
+};
+
+bool HasXdotool() {
+  return std::system("command -v xdotool > /dev/null 2>&1") == 0;
+}
+
+// Draws until a click arrives or the patience ends; the click, if any.
+std::optional<InputEvent> AwaitClick(Window* window, const std::function<void()>& draw) {
+  for (int i = 0; i < 600; ++i) {
+    for (const InputEvent& event : window->PollEvents()) {
+      if (event.kind == InputEvent::Kind::kClick) return event;
+    }
+    draw();
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return std::nullopt;
+}
+
+TEST(Window, SaysInASentenceThatThereIsNoDisplay) {
+  unsetenv("DISPLAY");
+  unsetenv("WAYLAND_DISPLAY");
+  try {
+    Window window("none", 100, 100);
+    FAIL() << "a window without a display";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("no display"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Window, ShowsThePictureAndPlacesWhatIsClicked) {
+  VirtualScreen screen;
+  if (!screen.works()) GTEST_SKIP() << "Xvfb is not installed";
+  if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+  Window window("Docent", 800, 600);
+  Renderer renderer;
+  std::vector<std::string> commands;
+  AuthoringPanel panel(&window, [&](std::string command) { commands.push_back(std::move(command)); },
+                       {"cake.glb"});
+  panel.state().tool = AuthoringPanel::Tool::kModel;
+  const engine::CameraModel camera = StronglyDistorted();
+  const engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(30, 60, 90)));
+  View view;
+  view.tracked = &tracked;
+  view.camera = &camera;
+  const auto draw = [&] {
+    renderer.Draw(view);
+    const Eigen::Vector2i size = window.FramebufferSize();
+    renderer.Present(size.x(), size.y());
+    panel.Draw();
+    window.Show();
+  };
+  draw();
+  // Held long enough that no frame misses it; the window of a bare server has its corner at the screen's.
+  std::thread hand([] {
+    const int status =
+        std::system("xdotool mousemove 200 400 && xdotool mousedown 1 && sleep 0.15 && xdotool mouseup 1");
+    EXPECT_EQ(status, 0);
+  });
+  const std::optional<InputEvent> click = AwaitClick(&window, draw);
+  hand.join();
+  ASSERT_TRUE(click.has_value());
+  EXPECT_EQ(click->button, 0);
+  EXPECT_FALSE(panel.WantsMouse());
+  const Eigen::Vector2i size = window.WindowSize();
+  const Letterbox box = FitPicture(640, 480, size.x(), size.y());
+  const Eigen::Vector2d pixel = box.PictureFromWindow(click->position);
+  EXPECT_TRUE(camera.IsInside(pixel));
+  EXPECT_TRUE(panel.ClickPicture(pixel));
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(commands[0], PlaceCommand("cake.glb", pixel, 1, 0));
+}
+
+TEST(Letterbox, MapsWindowPointsToPicturePixels) {
+  const Letterbox box = FitPicture(640, 480, 1280, 1000);
+  EXPECT_EQ(box.width, 1280);
+  EXPECT_EQ(box.height, 960);
+  EXPECT_EQ(box.y, 20);
+  EXPECT_LT((box.PictureFromWindow({1, 21}) - Eigen::Vector2d(0, 0)).norm(), 1e-12);
+  EXPECT_LT((box.PictureFromWindow({1279, 979}) - Eigen::Vector2d(639, 479)).norm(), 1e-12);
+}
+
+TEST(CommandText, QuotesWhatAPersonTyped) {
+  EXPECT_EQ(NewMapCommand("Desk 3"), "map new \"Desk 3\"");
+  EXPECT_EQ(NewMapCommand("a \"b\" \\ c"), "map new \"a \\\"b\\\" \\\\ c\"");
+  EXPECT_EQ(PlaceCommand("cake.glb", {320, 240.504}, 1, 0), "place \"cake.glb\" at pixel 320 240.5");
+  EXPECT_EQ(PlaceCommand("cake.glb", {1, 2}, 0.25, -90),
+            "place \"cake.glb\" at pixel 1 2 scale 0.25 yaw -90");
+  EXPECT_EQ(SignpostCommand("up\ndown", {1, 2}, "Bay 7"), "signpost \"up\\ndown\" at pixel 1 2 to \"Bay 7\"");
+}
+
+}  // namespace
+}  // namespace docent::ui

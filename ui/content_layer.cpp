@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/content_layer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ui/shaders.h"
+#include "ui/signpost_model.h"
+
+namespace docent::ui {
+namespace {
+
+constexpr std::size_t kMaxLenses = 4;
+constexpr std::uint64_t kSignLifeFrames = 300;
+constexpr int kMaxAtlasSidePx = 4096;
+
+int MaxAtlasSide() {
+  GLint side = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &side);
+  return std::clamp(static_cast<int>(side), 256, kMaxAtlasSidePx);
+}
+
+// The pixels of a face, in the atlas, that a part of its view covers, with a border for smoothed edges.
+PixelRectangle RectangleOf(const LensFace& face, const MeshDrawer::Cover& cover) {
+  const auto pixels = [](float low, float high, int size) {
+    const int first = std::max(0, static_cast<int>(std::floor(low * static_cast<float>(size))) - 1);
+    const int end = std::min(size, static_cast<int>(std::ceil(high * static_cast<float>(size))) + 1);
+    return std::pair(first, end - first);
+  };
+  const auto [x, width] = pixels(cover.low.x, cover.high.x, face.width_px);
+  const auto [y, height] = pixels(cover.low.y, cover.high.y, face.height_px);
+  return {face.x_px + x, face.y_px + y, width, height};
+}
+
+}  // namespace
+
+ContentLayer::ContentLayer(int samples, int max_texture_px)
+    : samples_(samples),
+      mesh_drawer_(max_texture_px),
+      warp_program_("lens warp", kFullScreenVertexShader, kWarpFragmentShader) {
+  warp_program_.AssignTextureUnits({"lookup", "atlas"});
+}
+
+ContentLayer::~ContentLayer() = default;
+
+void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
+                        const content::Scene& scene, double animation_seconds, const RenderTarget& picture) {
+  ++frame_;
+  const std::vector<ModelInstance> instances =
+      Instances(scene, camera_from_map.OriginInSource(), animation_seconds);
+  mesh_drawer_.Prepare(instances, glm::vec3(0.0f, -1.0f, 0.0f));
+  if (instances.empty()) return;
+  Lens& lens = FindLens(camera);
+  const PixelRectangle region = DrawAtlas(camera_from_map, &lens);
+  if (region.empty()) return;
+
+  picture.BindForDrawing();
+  warp_program_.Use();
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, lens.lookup.name());
+  glActiveTexture(GL_TEXTURE1);
+  glBindTexture(GL_TEXTURE_2D, lens.atlas->texture());
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(region.x, region.y, region.width, region.height);
+  glBindVertexArray(empty_vertex_array_.name());
+  DrawFullScreenTriangle();
+  glDisable(GL_SCISSOR_TEST);
+  glDisable(GL_BLEND);
+}
+
+PixelRectangle ContentLayer::DrawAtlas(const engine::Rigid3& camera_from_map, Lens* lens) {
+  struct Pass {
+    const LensFace* face;
+    PinholeView view;
+    PixelRectangle rectangle;
+  };
+  std::vector<Pass> passes;
+  std::vector<PixelRectangle> drawn;
+  for (const LensFace& face : lens->warp.faces) {
+    const engine::Rigid3 face_from_camera(face.face_from_camera, Eigen::Vector3d::Zero());
+    const PinholeView view{face_from_camera * camera_from_map, face.bounds};
+    const MeshDrawer::Cover cover = mesh_drawer_.Covered(view);
+    if (cover.empty()) continue;
+    drawn.push_back(RectangleOf(face, cover));
+    passes.push_back({&face, view, drawn.back()});
+  }
+  // Transparent again what was drawn last time; clearing and averaging the whole atlas would cost more than
+  // the content itself when there is little of it.
+  std::vector<PixelRectangle> changed = lens->drawn;
+  changed.insert(changed.end(), drawn.begin(), drawn.end());
+  lens->atlas->BindForDrawing();
+  glEnable(GL_SCISSOR_TEST);
+  glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
+  for (const PixelRectangle& rectangle : changed) {
+    glScissor(rectangle.x, rectangle.y, rectangle.width, rectangle.height);
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  }
+  for (const Pass& pass : passes) {
+    glViewport(pass.face->x_px, pass.face->y_px, pass.face->width_px, pass.face->height_px);
+    glScissor(pass.rectangle.x, pass.rectangle.y, pass.rectangle.width, pass.rectangle.height);
+    mesh_drawer_.Draw(pass.view);
+  }
+  glDisable(GL_SCISSOR_TEST);
+  for (const PixelRectangle& rectangle : changed)
+    lens->atlas->Resolve(rectangle.x, rectangle.y, rectangle.width, rectangle.height);
+  lens->drawn = drawn;
+  return PictureFromAtlas(lens->warp, lens->camera, drawn);
+}
+
+ContentLayer::Lens& ContentLayer::FindLens(const engine::CameraModel& camera) {
+  const auto found = std::find_if(lenses_.begin(), lenses_.end(),
+                                  [&](const std::unique_ptr<Lens>& lens) { return lens->camera == camera; });
+  if (found != lenses_.end()) {
+    std::rotate(found, found + 1, lenses_.end());
+    return *lenses_.back();
+  }
+  if (lenses_.size() >= kMaxLenses) lenses_.erase(lenses_.begin());
+  LensWarp warp = MakeLensWarp(camera, MaxAtlasSide());
+  auto lens = std::make_unique<Lens>();
+  lens->camera = camera;
+  lens->atlas = std::make_unique<RenderTarget>(warp.atlas_width_px, warp.atlas_height_px, samples_, true);
+  // New graphics memory holds anything: all of it counts as drawn until it has been cleared once.
+  lens->drawn = {{0, 0, warp.atlas_width_px, warp.atlas_height_px}};
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, lens->lookup.name());
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RG32F, camera.width_px(), camera.height_px(), 0, GL_RG, GL_FLOAT,
+               warp.lookup.data());
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  warp.lookup = {};
+  lens->warp = std::move(warp);
+  lenses_.push_back(std::move(lens));
+  return *lenses_.back();
+}
+
+std::vector<ModelInstance> ContentLayer::Instances(const content::Scene& scene,
+                                                   const Eigen::Vector3d& eye_in_map,
+                                                   double animation_seconds) {
+  std::vector<ModelInstance> instances;
+  instances.reserve(scene.entities.size());
+  for (const content::Entity& entity : scene.entities) {
+    ModelInstance instance;
+    if (entity.kind == content::Entity::Kind::kModel) {
+      if (entity.model.asset == nullptr || entity.model.asset->model == nullptr) continue;
+      instance.model = entity.model.asset->model;
+      instance.map_from_model = GlmFrom(entity.model.map_from_model);
+      instance.animation = entity.model.animation;
+      instance.seconds = animation_seconds;
+    } else {
+      Sign& sign = signs_[{entity.signpost.text, entity.signpost.to_map}];
+      if (sign.model == nullptr) sign.model = MakeSignpostModel(entity.signpost);
+      sign.last_frame = frame_;
+      instance.model = sign.model;
+      instance.map_from_model = GlmFrom(SignpostPose(entity.signpost, eye_in_map));
+    }
+    instances.push_back(std::move(instance));
+  }
+  std::erase_if(signs_, [&](const auto& sign) { return sign.second.last_frame + kSignLifeFrames < frame_; });
+  return instances;
+}
+
+}  // namespace docent::ui

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <epoxy/gl.h>
+
+#include <initializer_list>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+// Owners of OpenGL objects: each frees its object when it goes, moves, and never copies. They need the
+// context in which they were made to be current from construction to destruction. Private to ui/: only source
+// files and headers that sources alone include may include this one.
+namespace docent::ui {
+
+template <void (*Generate)(GLuint*), void (*Delete)(GLuint)>
+class GlHandle {
+ public:
+  GlHandle() { Generate(&name_); }
+  ~GlHandle() {
+    if (name_ != 0) Delete(name_);
+  }
+  GlHandle(GlHandle&& other) noexcept : name_(std::exchange(other.name_, 0)) {}
+  GlHandle& operator=(GlHandle&& other) noexcept {
+    std::swap(name_, other.name_);
+    return *this;
+  }
+  GlHandle(const GlHandle&) = delete;
+  GlHandle& operator=(const GlHandle&) = delete;
+  GLuint name() const { return name_; }
+
+ private:
+  GLuint name_ = 0;
+};
+
+namespace gl_detail {
+inline void GenerateTexture(GLuint* name) {
+  glGenTextures(1, name);
+}
+inline void DeleteTexture(GLuint name) {
+  glDeleteTextures(1, &name);
+}
+inline void GenerateBuffer(GLuint* name) {
+  glGenBuffers(1, name);
+}
+inline void DeleteBuffer(GLuint name) {
+  glDeleteBuffers(1, &name);
+}
+inline void GenerateVertexArray(GLuint* name) {
+  glGenVertexArrays(1, name);
+}
+inline void DeleteVertexArray(GLuint name) {
+  glDeleteVertexArrays(1, &name);
+}
+inline void GenerateFramebuffer(GLuint* name) {
+  glGenFramebuffers(1, name);
+}
+inline void DeleteFramebuffer(GLuint name) {
+  glDeleteFramebuffers(1, &name);
+}
+inline void GenerateRenderbuffer(GLuint* name) {
+  glGenRenderbuffers(1, name);
+}
+inline void DeleteRenderbuffer(GLuint name) {
+  glDeleteRenderbuffers(1, &name);
+}
+}  // namespace gl_detail
+
+using GlTexture = GlHandle<gl_detail::GenerateTexture, gl_detail::DeleteTexture>;
+using GlBuffer = GlHandle<gl_detail::GenerateBuffer, gl_detail::DeleteBuffer>;
+using GlVertexArray = GlHandle<gl_detail::GenerateVertexArray, gl_detail::DeleteVertexArray>;
+using GlFramebuffer = GlHandle<gl_detail::GenerateFramebuffer, gl_detail::DeleteFramebuffer>;
+using GlRenderbuffer = GlHandle<gl_detail::GenerateRenderbuffer, gl_detail::DeleteRenderbuffer>;
+
+// A linked vertex and fragment shader. Throws docent::Error with the driver's log when they do not compile.
+class GlProgram {
+ public:
+  GlProgram(const char* name, const std::string& vertex_source, const std::string& fragment_source);
+  ~GlProgram();
+  GlProgram(const GlProgram&) = delete;
+  GlProgram& operator=(const GlProgram&) = delete;
+
+  void Use() const { glUseProgram(name_); }
+  // Location of a uniform, -1 where the compiler removed it (OpenGL ignores writes to -1).
+  GLint Uniform(const char* uniform) const;
+  // Binds samplers to texture units 0, 1, 2 … in this order, once and for all.
+  void AssignTextureUnits(std::initializer_list<const char*> samplers) const;
+
+ private:
+  GLuint name_ = 0;
+  mutable std::unordered_map<std::string, GLint> locations_;
+};
+
+// Colour (RGBA8) and depth to draw into, with a texture of the result. With samples > 1 drawing goes to
+// multisampled buffers and Resolve averages them into the texture.
+class RenderTarget {
+ public:
+  // samples is lowered to what the driver offers; with_depth is implied by samples > 1.
+  RenderTarget(int width_px, int height_px, int samples, bool with_depth);
+
+  int width_px() const { return width_px_; }
+  int height_px() const { return height_px_; }
+  // Binds the framebuffer to draw into, with the viewport over all of it.
+  void BindForDrawing() const;
+  // Makes what was drawn inside this rectangle (OpenGL's origin) readable as texture().
+  void Resolve(int x, int y, int width, int height) const;
+  GLuint texture() const { return texture_.name(); }
+  // The framebuffer whose colour is texture().
+  GLuint readable_framebuffer() const { return framebuffer_.name(); }
+
+ private:
+  int width_px_, height_px_, samples_;
+  GlTexture texture_;
+  GlFramebuffer framebuffer_;
+  GlFramebuffer multisampled_framebuffer_;
+  GlRenderbuffer multisampled_color_, depth_;
+};
+
+// Draws one triangle that covers the whole viewport; its vertex shader is kFullScreenVertexShader.
+void DrawFullScreenTriangle();
+
+}  // namespace docent::ui

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/map_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <vector>
+
+#include "engine/geometry/camera_model.h"
+#include "ui/canvas.h"
+#include "ui/content_layer.h"
+#include "ui/heads_up.h"
+#include "ui/picture_target.h"
+
+namespace docent::ui {
+namespace {
+
+constexpr double kHalfViewHeight = 0.42;  // tangent, of the view's half height
+const Eigen::Vector3d kUp = -Eigen::Vector3d::UnitY();
+
+engine::CameraModel Pinhole(int width_px, int height_px) {
+  const double focal_px = 0.5 * height_px / kHalfViewHeight;
+  return {engine::LensModel::kRadialTangential,
+          {width_px, height_px, focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1)},
+          {}};
+}
+
+// The value below which this share of the numbers lies; empties give 0.
+double Quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  const auto index = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + index, values.end());
+  return values[index];
+}
+
+// 1, 2 or 5 times a power of ten, not above `length`.
+double RoundLength(double length) {
+  const double power = std::pow(10.0, std::floor(std::log10(length)));
+  for (const double step : {5.0, 2.0}) {
+    if (step * power <= length) return step * power;
+  }
+  return power;
+}
+
+class Drawing {
+ public:
+  Drawing(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map, Canvas* canvas)
+      : camera_(camera), camera_from_map_(camera_from_map), canvas_(canvas) {}
+
+  // A level grid through the target, `step_m` wide.
+  void Grid(const Orbit& orbit, double step_m) {
+    constexpr int kLines = 10;
+    const Eigen::Vector3d middle(std::round(orbit.target.x() / step_m) * step_m, orbit.target.y(),
+                                 std::round(orbit.target.z() / step_m) * step_m);
+    const double reach = kLines * step_m;
+    for (int i = -kLines; i <= kLines; ++i) {
+      const double offset = i * step_m;
+      const Color color{0.5f, 0.6f, 0.7f, i == 0 ? 0.4f : 0.18f};
+      Line(middle + Eigen::Vector3d(offset, 0, -reach), middle + Eigen::Vector3d(offset, 0, reach), color);
+      Line(middle + Eigen::Vector3d(-reach, 0, offset), middle + Eigen::Vector3d(reach, 0, offset), color);
+    }
+  }
+
+  // Far ones first, so that near ones lie over them.
+  void Points(const engine::MapSnapshot& map) {
+    struct Dot {
+      double depth;
+      Eigen::Vector2d pixel;
+      Color color;
+    };
+    std::vector<Dot> dots;
+    for (const engine::MapPoint& point : map.points) {
+      if (point.infinite()) continue;
+      const Eigen::Vector3d in_camera = camera_from_map_ * point.position();
+      const std::optional<Eigen::Vector2d> pixel = camera_.Project(in_camera);
+      if (pixel && camera_.IsInside(*pixel, -4))
+        dots.push_back({in_camera.z(), *pixel, LevelColor(point.source_level)});
+    }
+    std::sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) { return a.depth > b.depth; });
+    for (const Dot& dot : dots) canvas_->Disk(dot.pixel, 1.6, dot.color);
+  }
+
+ private:
+  // Cut into pieces, so that a line that passes behind the eye still shows its visible part.
+  void Line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Color& color) {
+    constexpr int kPieces = 20;
+    std::optional<Eigen::Vector2d> previous;
+    for (int i = 0; i <= kPieces; ++i) {
+      const double t = static_cast<double>(i) / kPieces;
+      const std::optional<Eigen::Vector2d> pixel =
+          camera_.Project(camera_from_map_ * Eigen::Vector3d((1 - t) * from + t * to));
+      if (pixel && previous && (camera_.IsInside(*pixel, -200) || camera_.IsInside(*previous, -200)))
+        canvas_->Line(*previous, *pixel, 1.0, color);
+      previous = pixel;
+    }
+  }
+
+  const engine::CameraModel& camera_;
+  engine::Rigid3 camera_from_map_;
+  Canvas* canvas_;
+};
+
+void DrawCaption(const engine::MapSnapshot& map, const std::string& title, double grid_m, Canvas* canvas) {
+  char counts[160];
+  std::snprintf(counts, sizeof counts, "%zu points, %zu keyframes, grid %g m", map.points.size(),
+                map.keyframes.size(), grid_m);
+  TextStyle title_style;
+  title_style.size_px = 20;
+  title_style.bold = true;
+  title_style.max_width_px = std::max(40, canvas->width_px() - 40);
+  title_style.max_height_px = 60;
+  TextStyle count_style = title_style;
+  count_style.size_px = 14;
+  count_style.bold = false;
+  count_style.color = {0.75f, 0.8f, 0.85f, 1.0f};
+  const double title_height = canvas->Text(title, title_style, {16, 12}).y();
+  canvas->Text(counts, count_style, {16, 14 + title_height});
+}
+
+}  // namespace
+
+engine::Rigid3 CameraFromMap(const Orbit& orbit) {
+  const double half_pi = std::numbers::pi / 2;
+  const double elevation = std::clamp(orbit.elevation, -half_pi, half_pi);
+  // Level axes of the map: at azimuth 0 the eye stands at -z and looks along +z, with +x to its right.
+  const Eigen::Vector3d ahead(std::sin(orbit.azimuth), 0, std::cos(orbit.azimuth));
+  const Eigen::Vector3d right(std::cos(orbit.azimuth), 0, -std::sin(orbit.azimuth));
+  const Eigen::Vector3d forward = std::cos(elevation) * ahead - std::sin(elevation) * kUp;
+  const Eigen::Vector3d down = forward.cross(right);
+  Eigen::Matrix3d rotation;
+  rotation.row(0) = right;
+  rotation.row(1) = down;
+  rotation.row(2) = forward;
+  const Eigen::Vector3d eye = orbit.target - orbit.distance_m * forward;
+  return {engine::Rotation3(rotation), -(rotation * eye)};
+}
+
+Orbit OrbitAbove(const engine::MapSnapshot& map, double width_over_height) {
+  std::vector<Eigen::Vector3d> places;
+  for (const engine::MapPoint& point : map.points) {
+    if (!point.infinite()) places.push_back(point.position());
+  }
+  Eigen::Vector3d low, high;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Eigen::Vector3d& place : places) values.push_back(place[axis]);
+    low[axis] = Quantile(values, 0.05);
+    high[axis] = Quantile(values, 0.95);
+    for (const engine::KeyFrame& keyframe : map.keyframes) {
+      const double at = keyframe.camera_from_map.OriginInSource()[axis];
+      low[axis] = places.empty() ? at : std::min(low[axis], at);
+      high[axis] = places.empty() ? at : std::max(high[axis], at);
+    }
+  }
+  Orbit orbit;
+  orbit.target = 0.5 * (low + high);
+  const double radius = 0.5 * (high - low).norm();
+  const double tangent = kHalfViewHeight * std::min(1.0, width_over_height);
+  orbit.distance_m = radius > 0 ? 1.1 * radius * std::hypot(1.0, 1.0 / tangent) : 1.0;
+  return orbit;
+}
+
+struct MapView::Impl {
+  explicit Impl(const MapViewOptions& options_in)
+      : options(options_in),
+        camera(Pinhole(options_in.width_px, options_in.height_px)),
+        content(options_in.samples, options_in.max_texture_px) {}
+
+  MapViewOptions options;
+  engine::CameraModel camera;
+  PictureTarget picture;
+  ContentLayer content;
+  Canvas below, above;
+};
+
+MapView::MapView(const MapViewOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+
+MapView::~MapView() = default;
+
+void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, const Orbit& orbit,
+                   const std::string& title) {
+  const int width_px = impl_->options.width_px, height_px = impl_->options.height_px;
+  const RenderTarget& target = impl_->picture.Bind(width_px, height_px);
+  impl_->picture.DrawVideo(cv::Mat());
+  const engine::Rigid3 camera_from_map = CameraFromMap(orbit);
+  const double grid_m = RoundLength(std::max(1e-6, 0.25 * orbit.distance_m * kHalfViewHeight));
+
+  impl_->below.Begin(width_px, height_px);
+  Drawing drawing(impl_->camera, camera_from_map, &impl_->below);
+  drawing.Grid(orbit, grid_m);
+  drawing.Points(map);
+  DrawKeyFrames(map, impl_->camera, camera_from_map, &impl_->below);
+  impl_->below.End();
+  if (scene != nullptr) impl_->content.Draw(impl_->camera, camera_from_map, *scene, 0.0, target);
+  impl_->above.Begin(width_px, height_px);
+  DrawCaption(map, title, grid_m, &impl_->above);
+  target.BindForDrawing();
+  impl_->above.End();
+}
+
+void MapView::Present(int width_px, int height_px) {
+  impl_->picture.Present(width_px, height_px);
+}
+
+void MapView::ReadBack(cv::Mat* picture) {
+  impl_->picture.ReadBack(picture);
+}
+
+}  // namespace docent::ui

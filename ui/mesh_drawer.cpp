@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/mesh_drawer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "ui/shaders.h"
+
+namespace docent::ui {
+namespace {
+
+// Light of a bright room. Units are such that a white matt surface facing the light is just short of white.
+constexpr glm::vec3 kLightRadiance(2.1f, 2.03f, 1.9f);
+constexpr glm::vec3 kSkyRadiance(0.46f, 0.48f, 0.52f);
+constexpr glm::vec3 kFloorRadiance(0.2f, 0.18f, 0.16f);
+// The depth buffer's far plane is at most this many times as far as its near plane.
+constexpr double kMaxDepthRatio = 20000.0;
+constexpr int kMaxJoints = 16384;  // of everything in view together; beyond them skins keep their rest pose
+
+const content::Material& DefaultMaterial() {
+  static const content::Material kMaterial;
+  return kMaterial;
+}
+
+struct TextureSlot {
+  const char* sampler;
+  const char* used;
+  const char* uv_set;
+  const char* uv_transform;
+  bool is_color;
+};
+constexpr std::array<TextureSlot, 5> kSlots = {{
+    {"base_color_map", "base_color_use.used", "base_color_use.uv_set", "base_color_use.uv_transform", true},
+    {"metallic_roughness_map", "metallic_roughness_use.used", "metallic_roughness_use.uv_set",
+     "metallic_roughness_use.uv_transform", false},
+    {"normal_map", "normal_use.used", "normal_use.uv_set", "normal_use.uv_transform", false},
+    {"occlusion_map", "occlusion_use.used", "occlusion_use.uv_set", "occlusion_use.uv_transform", false},
+    {"emissive_map", "emissive_use.used", "emissive_use.uv_set", "emissive_use.uv_transform", true},
+}};
+constexpr int kJointUnit = static_cast<int>(kSlots.size());
+
+// The lit side is the one that a person at the map's first camera sees: above, before it, a little to its
+// right.
+glm::vec3 DirectionToLight(const glm::vec3& up) {
+  const glm::vec3 towards_viewer = glm::vec3(0.45f, 0.0f, -0.75f);
+  const glm::vec3 level = towards_viewer - up * glm::dot(up, towards_viewer);
+  return glm::normalize(up + level);
+}
+
+void Extend(const Box& box, const glm::mat4& transform, Box* result) {
+  if (box.empty()) return;
+  for (int i = 0; i < 8; ++i) result->Include(glm::vec3(transform * glm::vec4(box.Corner(i), 1.0f)));
+}
+
+// Whether a sphere of the map may show in a view: not behind it, nor outside one of the frustum's sides.
+bool IsVisible(const glm::vec3& center, float radius, const TangentBounds& bounds,
+               const glm::mat4& eye_from_map) {
+  const glm::vec3 eye(eye_from_map * glm::vec4(center, 1.0f));
+  const double x = eye.x, y = -eye.y, z = -eye.z;
+  const auto beyond = [&](double across, double tangent, double sign) {
+    return sign * (across - tangent * z) > radius * std::sqrt(1.0 + tangent * tangent);
+  };
+  return z + radius > 0 && !beyond(x, bounds.right, 1) && !beyond(x, bounds.left, -1) &&
+         !beyond(y, bounds.bottom, 1) && !beyond(y, bounds.top, -1);
+}
+
+}  // namespace
+
+MeshDrawer::MeshDrawer(int max_texture_px)
+    : cache_(max_texture_px), program_("mesh", kMeshVertexShader, kMeshFragmentShader) {
+  program_.AssignTextureUnits({kSlots[0].sampler, kSlots[1].sampler, kSlots[2].sampler, kSlots[3].sampler,
+                               kSlots[4].sampler, "joint_columns"});
+  const std::uint32_t white = 0xFFFFFFFFu;
+  white_ = MakeTexture(1, 1, GL_RGBA, &white, false);
+}
+
+void MeshDrawer::Prepare(std::span<const ModelInstance> instances, const glm::vec3& up_in_map) {
+  up_in_map_ = up_in_map;
+  items_.clear();
+  joints_.clear();
+  cache_.Sweep();
+  for (const ModelInstance& instance : instances) AddInstance(instance);
+  if (joints_.empty()) joints_.emplace_back(1.0f);  // a sampler needs something to look at
+  glBindBuffer(GL_TEXTURE_BUFFER, joint_buffer_.name());
+  glBufferData(GL_TEXTURE_BUFFER, static_cast<GLsizeiptr>(joints_.size() * sizeof(glm::mat4)), joints_.data(),
+               GL_STREAM_DRAW);
+  glBindTexture(GL_TEXTURE_BUFFER, joint_texture_.name());
+  glTexBuffer(GL_TEXTURE_BUFFER, GL_RGBA32F, joint_buffer_.name());
+}
+
+void MeshDrawer::AddInstance(const ModelInstance& instance) {
+  if (instance.model == nullptr) return;
+  const content::Model& model = *instance.model;
+  const int animation =
+      instance.animation < static_cast<int>(model.animations.size()) ? std::max(instance.animation, -1) : -1;
+  const std::vector<glm::mat4> nodes = content::NodeMatrices(model, animation, instance.seconds);
+  std::vector<int> open(model.roots.begin(), model.roots.end());
+  while (!open.empty()) {
+    const int node = open.back();
+    open.pop_back();
+    open.insert(open.end(), model.nodes[node].children.begin(), model.nodes[node].children.end());
+    if (model.nodes[node].mesh >= 0) AddNode(instance, nodes, node);
+  }
+}
+
+void MeshDrawer::AddNode(const ModelInstance& instance, const std::vector<glm::mat4>& nodes, int node_index) {
+  const content::Model& model = *instance.model;
+  const content::Node& node = model.nodes[node_index];
+  ModelResources& resources = cache_.Get(instance.model);
+  const int first_joint = node.skin >= 0 ? AddJoints(instance, nodes, node.skin) : -1;
+  for (const GpuPrimitive& primitive : resources.primitives(node.mesh)) {
+    if (primitive.index_count == 0) continue;
+    Item item;
+    item.model = instance.model;
+    item.resources = &resources;
+    item.primitive = &primitive;
+    item.material = primitive.material >= 0 ? &model.materials[primitive.material] : &DefaultMaterial();
+    const bool skinned = first_joint >= 0 && !primitive.joint_boxes.empty();
+    item.first_joint = skinned ? first_joint : -1;
+    // glTF 2.0 §3.7.3.3: a skinned mesh's own node does not move it.
+    item.map_from_mesh = skinned ? instance.map_from_model : instance.map_from_model * nodes[node_index];
+    Box box;
+    if (skinned) {
+      const std::size_t joint_count = std::min(primitive.joint_boxes.size(), joints_.size() - first_joint);
+      for (std::size_t i = 0; i < joint_count; ++i)
+        Extend(primitive.joint_boxes[i], item.map_from_mesh * joints_[first_joint + i], &box);
+    } else {
+      Extend(primitive.box, item.map_from_mesh, &box);
+    }
+    item.box = box;
+    item.center = 0.5f * (box.low + box.high);
+    item.radius = 0.5f * glm::length(box.high - box.low);
+    // A pose that is not a number has no place in the picture, and would poison the depth range.
+    if (std::isfinite(item.radius) && std::isfinite(glm::dot(item.center, item.center)))
+      items_.push_back(std::move(item));
+  }
+}
+
+int MeshDrawer::AddJoints(const ModelInstance& instance, const std::vector<glm::mat4>& nodes,
+                          int skin_index) {
+  const content::Skin& skin = instance.model->skins[skin_index];
+  if (joints_.size() + skin.joints.size() > kMaxJoints) return -1;
+  const int first = static_cast<int>(joints_.size());
+  for (std::size_t i = 0; i < skin.joints.size(); ++i)
+    joints_.push_back(nodes[skin.joints[i]] *
+                      (i < skin.inverse_bind.size() ? skin.inverse_bind[i] : glm::mat4(1.0f)));
+  return first;
+}
+
+MeshDrawer::Cover MeshDrawer::Covered(const PinholeView& view) const {
+  const glm::mat4 eye_from_map = GlEyeFromMap(view.camera_from_map);
+  Cover cover;
+  for (const Item& item : items_) {
+    if (!IsVisible(item.center, item.radius, view.bounds, eye_from_map)) continue;
+    for (int i = 0; i < 8; ++i) {
+      const glm::vec3 eye(eye_from_map * glm::vec4(item.box.Corner(i), 1.0f));
+      // A box that reaches behind the camera may cover anything.
+      if (-eye.z <= 0.01f * item.radius) return {glm::vec2(0.0f), glm::vec2(1.0f)};
+      const glm::vec2 place = GlTextureFromTangent(view.bounds, eye.x / -eye.z, -eye.y / -eye.z);
+      cover.low = glm::min(cover.low, place);
+      cover.high = glm::max(cover.high, place);
+    }
+  }
+  cover.low = glm::max(cover.low, glm::vec2(0.0f));
+  cover.high = glm::min(cover.high, glm::vec2(1.0f));
+  return cover;
+}
+
+void MeshDrawer::Draw(const PinholeView& view) {
+  const glm::mat4 eye_from_map = GlEyeFromMap(view.camera_from_map);
+  struct Visible {
+    const Item* item;
+    float depth;  // of the sphere's middle
+  };
+  std::vector<Visible> opaque, blended;
+  double nearest = 1e30, farthest = 0;
+  for (const Item& item : items_) {
+    if (!IsVisible(item.center, item.radius, view.bounds, eye_from_map)) continue;
+    const float depth = -(eye_from_map * glm::vec4(item.center, 1.0f)).z;
+    nearest = std::min(nearest, static_cast<double>(depth - item.radius));
+    farthest = std::max(farthest, static_cast<double>(depth + item.radius));
+    const bool blends = item.material->alpha == content::Material::Alpha::kBlend;
+    (blends ? blended : opaque).push_back({&item, depth});
+  }
+  if (opaque.empty() && blended.empty()) return;
+  farthest *= 1.01;
+  const double near_m = std::max(nearest * 0.99, farthest / kMaxDepthRatio);
+  SetScene(view, GlClipFromGlEye(view.bounds, near_m, farthest) * eye_from_map);
+
+  const auto nearer = [](const Visible& a, const Visible& b) { return a.depth < b.depth; };
+  std::stable_sort(opaque.begin(), opaque.end(), nearer);  // hidden fragments then cost nothing
+  std::stable_sort(blended.begin(), blended.end(), nearer);
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LEQUAL);
+  glDepthMask(GL_TRUE);
+  glDisable(GL_BLEND);
+  for (const Visible& visible : opaque) DrawItem(*visible.item);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  glDepthMask(GL_FALSE);
+  for (auto visible = blended.rbegin(); visible != blended.rend(); ++visible) DrawItem(*visible->item);
+  glDepthMask(GL_TRUE);
+  glDisable(GL_BLEND);
+  glDisable(GL_CULL_FACE);
+  glDisable(GL_DEPTH_TEST);
+  glBindVertexArray(0);
+}
+
+void MeshDrawer::SetScene(const PinholeView& view, const glm::mat4& clip_from_map) {
+  program_.Use();
+  const auto set_vector = [&](const char* name, const glm::vec3& v) {
+    glUniform3fv(program_.Uniform(name), 1, &v[0]);
+  };
+  glUniformMatrix4fv(program_.Uniform("clip_from_map"), 1, GL_FALSE, &clip_from_map[0][0]);
+  set_vector("eye_in_map", GlmFrom(view.camera_from_map.OriginInSource()));
+  set_vector("up_in_map", up_in_map_);
+  set_vector("direction_to_light", DirectionToLight(up_in_map_));
+  set_vector("light_radiance", kLightRadiance);
+  set_vector("sky_radiance", kSkyRadiance);
+  set_vector("floor_radiance", kFloorRadiance);
+  glActiveTexture(GL_TEXTURE0 + kJointUnit);
+  glBindTexture(GL_TEXTURE_BUFFER, joint_texture_.name());
+}
+
+void MeshDrawer::DrawItem(const Item& item) {
+  const bool mirrors = glm::determinant(glm::mat3(item.map_from_mesh)) < 0.0f;
+  SetMaterial(item);
+  glUniformMatrix4fv(program_.Uniform("map_from_mesh"), 1, GL_FALSE, &item.map_from_mesh[0][0]);
+  glUniform1i(program_.Uniform("first_joint"), item.first_joint);
+  glUniform1i(program_.Uniform("turn_normals"), mirrors);
+  glFrontFace(mirrors ? GL_CW : GL_CCW);
+  glBindVertexArray(item.primitive->vertex_array.name());
+  const auto draw = [&] {
+    glDrawElements(GL_TRIANGLES, item.primitive->index_count, GL_UNSIGNED_INT, nullptr);
+  };
+  if (!item.material->double_sided) {
+    glEnable(GL_CULL_FACE);
+    glCullFace(GL_BACK);
+    draw();
+  } else if (item.material->alpha == content::Material::Alpha::kBlend) {
+    glEnable(GL_CULL_FACE);  // far sides first, so that the near ones blend over them
+    glCullFace(GL_FRONT);
+    draw();
+    glCullFace(GL_BACK);
+    draw();
+  } else {
+    glDisable(GL_CULL_FACE);
+    draw();
+  }
+  glFrontFace(GL_CCW);
+}
+
+void MeshDrawer::SetMaterial(const Item& item) {
+  const content::Material& material = *item.material;
+  SetTexture(item, 0, material.base_color_texture);
+  SetTexture(item, 1, material.metallic_roughness_texture);
+  SetTexture(item, 2, material.normal_texture);
+  SetTexture(item, 3, material.occlusion_texture);
+  SetTexture(item, 4, material.emissive_texture);
+  glUniform4fv(program_.Uniform("base_color"), 1, &material.base_color[0]);
+  glUniform3fv(program_.Uniform("emissive"), 1, &material.emissive[0]);
+  glUniform1f(program_.Uniform("metallic"), material.metallic);
+  glUniform1f(program_.Uniform("roughness"), material.roughness);
+  glUniform1f(program_.Uniform("normal_scale"), material.normal_scale);
+  glUniform1f(program_.Uniform("occlusion_strength"), material.occlusion_strength);
+  glUniform1i(program_.Uniform("alpha_mode"), static_cast<int>(material.alpha));
+  glUniform1f(program_.Uniform("alpha_cutoff"), material.alpha_cutoff);
+  glUniform1i(program_.Uniform("unlit"), material.unlit);
+}
+
+void MeshDrawer::SetTexture(const Item& item, int unit, const content::TextureUse& use) {
+  const TextureSlot& slot = kSlots[unit];
+  glActiveTexture(GL_TEXTURE0 + unit);  // first, because an upload binds its texture to the active unit
+  const GLuint texture = item.resources->Texture(*item.model, use.texture, slot.is_color);
+  glBindTexture(GL_TEXTURE_2D, texture != 0 ? texture : white_.name());
+  glUniform1i(program_.Uniform(slot.used), texture != 0);
+  glUniform1i(program_.Uniform(slot.uv_set), use.uv_set);
+  glUniformMatrix3fv(program_.Uniform(slot.uv_transform), 1, GL_FALSE, &use.uv_transform[0][0]);
+}
+
+}  // namespace docent::ui

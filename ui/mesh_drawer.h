@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "content/model.h"
+#include "ui/axes.h"
+#include "ui/gl_objects.h"
+#include "ui/model_resources.h"
+
+namespace docent::ui {
+
+// A model as it stands in the map at one moment.
+struct ModelInstance {
+  std::shared_ptr<const content::Model> model;
+  glm::mat4 map_from_model{1.0f};
+  int animation = -1;
+  double seconds = 0;
+};
+
+// A pinhole looking at the map.
+struct PinholeView {
+  engine::Rigid3 camera_from_map;
+  TangentBounds bounds;
+};
+
+// Draws model instances with depth into the bound framebuffer: opaque and masked primitives first, blended
+// ones after them from far to near. Output is sRGB with premultiplied alpha. One thread, one context.
+class MeshDrawer {
+ public:
+  explicit MeshDrawer(int max_texture_px);
+
+  // Poses the instances; what Draw shows until the next call. Shares ownership of the models until then.
+  void Prepare(std::span<const ModelInstance> instances, const glm::vec3& up_in_map);
+  // The part of the view that what was prepared may cover, as texture coordinates (0..1, OpenGL's origin);
+  // empty when it covers nothing, and drawing may be left out.
+  struct Cover {
+    glm::vec2 low{1.0f}, high{0.0f};
+    bool empty() const { return low.x >= high.x || low.y >= high.y; }
+  };
+  Cover Covered(const PinholeView& view) const;
+  // Draws what was prepared into the current viewport. The depth range is fitted to what is drawn.
+  void Draw(const PinholeView& view);
+  // Models whose graphics memory is held.
+  std::size_t cached_models() const { return cache_.size(); }
+
+ private:
+  struct Item {
+    std::shared_ptr<const content::Model> model;
+    ModelResources* resources = nullptr;
+    const GpuPrimitive* primitive = nullptr;
+    const content::Material* material = nullptr;
+    glm::mat4 map_from_mesh{1.0f};
+    int first_joint = -1;
+    Box box;                 // in the map
+    glm::vec3 center{0.0f};  // of the sphere around that box
+    float radius = 0;
+  };
+
+  void AddInstance(const ModelInstance& instance);
+  void AddNode(const ModelInstance& instance, const std::vector<glm::mat4>& nodes, int node_index);
+  int AddJoints(const ModelInstance& instance, const std::vector<glm::mat4>& nodes, int skin_index);
+  void SetScene(const PinholeView& view, const glm::mat4& clip_from_map);
+  void DrawItem(const Item& item);
+  void SetMaterial(const Item& item);
+  void SetTexture(const Item& item, int unit, const content::TextureUse& use);
+
+  ModelCache cache_;
+  GlProgram program_;
+  GlTexture white_;
+  GlBuffer joint_buffer_;
+  GlTexture joint_texture_;
+  std::vector<glm::mat4> joints_;
+  std::vector<Item> items_;
+  glm::vec3 up_in_map_{0.0f, -1.0f, 0.0f};
+};
+
+}  // namespace docent::ui

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <glm/glm.hpp>
+#include <map>
+#include <memory>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "content/model.h"
+#include "ui/gl_objects.h"
+
+namespace docent::ui {
+
+// An axis-aligned box; empty while low > high.
+struct Box {
+  glm::vec3 low{1e30f}, high{-1e30f};
+  bool empty() const { return low.x > high.x; }
+  void Include(const glm::vec3& point) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+  }
+  glm::vec3 Corner(int index) const {
+    return glm::vec3(index & 1 ? high.x : low.x, index & 2 ? high.y : low.y, index & 4 ? high.z : low.z);
+  }
+};
+
+// A content::Primitive on the graphics card, and what is known of it without asking there.
+struct GpuPrimitive {
+  GlVertexArray vertex_array;
+  GlBuffer vertices, indices;
+  GLsizei index_count = 0;
+  int material = -1;
+  Box box;  // of the vertices as stored
+  // For a skinned primitive: the box of the vertices that each joint moves. A posed vertex is a mean of where
+  // its joints put it, so the union of the moved boxes contains the posed primitive.
+  std::vector<Box> joint_boxes;
+};
+
+// The graphics memory of one content::Model; textures are uploaded when they are first asked for.
+class ModelResources {
+ public:
+  // Pictures wider or higher than max_texture_px are stored smaller.
+  ModelResources(const content::Model& model, int max_texture_px);
+
+  const std::vector<GpuPrimitive>& primitives(int mesh) const { return meshes_[mesh]; }
+  // 0 when the model has no such texture. Colour textures hold sRGB, the others plain numbers.
+  GLuint Texture(const content::Model& model, int texture, bool is_color);
+
+ private:
+  int max_texture_px_;
+  std::vector<std::vector<GpuPrimitive>> meshes_;
+  std::map<std::pair<int, bool>, GlTexture> textures_;
+};
+
+// Resources of every model in use; those of a model that nobody holds any more are freed by Sweep.
+class ModelCache {
+ public:
+  explicit ModelCache(int max_texture_px) : max_texture_px_(max_texture_px) {}
+  ModelResources& Get(const std::shared_ptr<const content::Model>& model);
+  void Sweep();
+  std::size_t size() const { return entries_.size(); }
+
+ private:
+  struct Entry {
+    std::weak_ptr<const content::Model> model;
+    std::unique_ptr<ModelResources> resources;
+  };
+  int max_texture_px_;
+  std::unordered_map<const content::Model*, Entry> entries_;
+};
+
+// A texture of a picture in memory, with mipmaps. format: GL_RGBA or GL_BGRA; bytes are packed rows.
+GlTexture MakeTexture(int width_px, int height_px, GLenum format, const void* bytes, bool is_srgb);
+
+}  // namespace docent::ui

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/signpost_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+
+#include "ui/text.h"
+
+namespace docent::ui {
+namespace {
+
+constexpr int kMaxTextWidthPx = 900, kMaxTextHeightPx = 640;  // with padding and strip below 1024
+constexpr int kPaddingPx = 28, kStripHeightPx = 84, kStripTextPx = 44;
+constexpr double kWantedAspect = 1.9;
+constexpr float kPoleHeight = 0.7f, kPoleRadius = 0.035f, kThickness = 0.07f, kCornerRadius = 0.09f;
+
+const cv::Scalar kBoardColor(70, 44, 22, 255), kStripColor(38, 122, 232, 255), kLineColor(225, 236, 244, 255);
+constexpr Color kTextColor{0.97f, 0.96f, 0.92f, 1.0f};
+
+// The text at the largest size at which all of it fits, wrapped to a pleasant shape.
+cv::Mat LayOutText(const std::string& text) {
+  cv::Mat best;
+  for (const double size_px : {64.0, 48.0, 34.0, 24.0}) {
+    double best_misfit = 1e30;
+    for (const int width : {300, 420, 580, 740, kMaxTextWidthPx}) {
+      TextStyle style;
+      style.size_px = size_px;
+      style.bold = true;
+      style.centered = true;
+      style.max_width_px = width;
+      style.max_height_px = kMaxTextHeightPx;
+      style.color = kTextColor;
+      bool is_cut = false;
+      const cv::Mat picture = DrawText(text, style, &is_cut);
+      const double misfit =
+          std::abs(std::log(static_cast<double>(picture.cols) / picture.rows / kWantedAspect)) +
+          (is_cut ? 100.0 : 0.0);
+      if (misfit < best_misfit) {
+        best_misfit = misfit;
+        best = picture;
+      }
+    }
+    if (best_misfit < 100.0) break;
+  }
+  return best;
+}
+
+// Lays premultiplied BGRA over an opaque picture, with its top left corner at (x, y); cut at the border.
+void Lay(const cv::Mat& over, int x, int y, cv::Mat* picture) {
+  const cv::Rect inside = cv::Rect(x, y, over.cols, over.rows) & cv::Rect(0, 0, picture->cols, picture->rows);
+  for (int row = inside.y; row < inside.y + inside.height; ++row) {
+    for (int column = inside.x; column < inside.x + inside.width; ++column) {
+      const cv::Vec4b& source = over.at<cv::Vec4b>(row - y, column - x);
+      cv::Vec4b& target = picture->at<cv::Vec4b>(row, column);
+      for (int i = 0; i < 3; ++i)
+        target[i] =
+            static_cast<std::uint8_t>(std::min(255, source[i] + (target[i] * (255 - source[3]) + 127) / 255));
+    }
+  }
+}
+
+void DrawArrow(const cv::Point& tail, int length, cv::Mat* picture) {
+  const int half = length / 3;
+  const cv::Point tip(tail.x + length, tail.y);
+  const std::vector<cv::Point> head = {
+      tip, {tip.x - half - 4, tip.y - half}, {tip.x - half - 4, tip.y + half}};
+  cv::line(*picture, tail, {tip.x - half, tip.y}, kLineColor, 9, cv::LINE_AA);
+  cv::fillConvexPoly(*picture, head, kLineColor, cv::LINE_AA);
+}
+
+// The whole front of the board, BGRA, opaque.
+cv::Mat DrawBoard(const content::Signpost& signpost) {
+  const cv::Mat text = LayOutText(signpost.text.empty() ? " " : signpost.text);
+  const bool points_on = !signpost.to_map.empty();
+  cv::Mat target_name;
+  constexpr int kArrowPx = 62;
+  if (points_on) {
+    TextStyle style;
+    style.size_px = kStripTextPx;
+    style.max_width_px = kMaxTextWidthPx - 2 * kArrowPx;
+    style.max_height_px = kStripHeightPx - 8;
+    style.color = kTextColor;
+    target_name = DrawText(signpost.to_map, style);
+  }
+  const int strip = points_on ? kStripHeightPx : 0;
+  const int height = text.rows + 2 * kPaddingPx + strip;
+  const int width = std::max({text.cols + 3 * kPaddingPx, height * 5 / 4,
+                              points_on ? target_name.cols + 2 * kArrowPx + 2 * kPaddingPx : 0});
+  cv::Mat board(height, width, CV_8UC4, kBoardColor);
+  Lay(text, (width - text.cols) / 2, (height - strip - text.rows) / 2, &board);
+  if (points_on) {
+    board.rowRange(height - strip, height) = kStripColor;
+    const int left = (width - target_name.cols - kArrowPx - kPaddingPx) / 2;
+    DrawArrow({left, height - strip / 2}, kArrowPx, &board);
+    Lay(target_name, left + kArrowPx + kPaddingPx, height - strip + (strip - target_name.rows) / 2, &board);
+  }
+  return board;
+}
+
+void AddTriangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, content::Primitive* primitive) {
+  primitive->indices.insert(primitive->indices.end(), {a, b, c});
+}
+
+content::Vertex MakeVertex(const glm::vec3& position, const glm::vec3& normal, const glm::vec2& uv = {}) {
+  content::Vertex vertex;
+  vertex.position = position;
+  vertex.normal = normal;
+  vertex.uv0 = uv;
+  return vertex;
+}
+
+// A rounded rectangle around (0, 0), counter-clockwise.
+std::vector<glm::vec2> RoundedOutline(const glm::vec2& half_size) {
+  constexpr int kSteps = 6;
+  std::vector<glm::vec2> outline;
+  const glm::vec2 inner = half_size - kCornerRadius;
+  for (int corner = 0; corner < 4; ++corner) {
+    const glm::vec2 center(corner == 0 || corner == 3 ? inner.x : -inner.x, corner < 2 ? inner.y : -inner.y);
+    for (int i = 0; i <= kSteps; ++i) {
+      const float angle = static_cast<float>(std::numbers::pi / 2) *
+                          (static_cast<float>(corner) + static_cast<float>(i) / kSteps);
+      outline.push_back(center + kCornerRadius * glm::vec2(std::cos(angle), std::sin(angle)));
+    }
+  }
+  return outline;
+}
+
+// One flat side of the board: a fan over the outline at this z, seen from `facing` (+1 or -1 along z).
+content::Primitive BoardSide(const std::vector<glm::vec2>& outline, const glm::vec2& half_size,
+                             float facing) {
+  content::Primitive side;
+  const float middle = kPoleHeight + half_size.y;
+  for (const glm::vec2& point : outline) {
+    const glm::vec2 uv((point.x / half_size.x + 1.0f) / 2.0f, (1.0f - point.y / half_size.y) / 2.0f);
+    side.vertices.push_back(
+        MakeVertex({point.x, middle + point.y, facing * kThickness / 2}, {0, 0, facing}, uv));
+  }
+  for (std::uint32_t i = 2; i < outline.size(); ++i) {
+    if (facing > 0) {
+      AddTriangle(0, i - 1, i, &side);
+    } else {
+      AddTriangle(0, i, i - 1, &side);
+    }
+  }
+  return side;
+}
+
+void AddRim(const std::vector<glm::vec2>& outline, const glm::vec2& half_size, content::Primitive* body) {
+  const float middle = kPoleHeight + half_size.y;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const glm::vec2 a = outline[i], b = outline[(i + 1) % outline.size()];
+    if (glm::length(b - a) < 1e-6f) continue;
+    const glm::vec2 along = glm::normalize(b - a);
+    const glm::vec3 normal(along.y, -along.x, 0);
+    const auto first = static_cast<std::uint32_t>(body->vertices.size());
+    for (const glm::vec2& point : {a, b}) {
+      for (const float z : {kThickness / 2, -kThickness / 2})
+        body->vertices.push_back(MakeVertex({point.x, middle + point.y, z}, normal));
+    }
+    AddTriangle(first, first + 1, first + 2, body);
+    AddTriangle(first + 2, first + 1, first + 3, body);
+  }
+}
+
+// A frustum of a cone about the y axis, closed at the top.
+void AddCone(float bottom, float top, float bottom_radius, float top_radius, content::Primitive* body) {
+  constexpr int kSides = 16;
+  const auto first = static_cast<std::uint32_t>(body->vertices.size());
+  const float slope = (bottom_radius - top_radius) / (top - bottom);
+  for (int i = 0; i <= kSides; ++i) {
+    const float angle = static_cast<float>(2 * std::numbers::pi) * static_cast<float>(i) / kSides;
+    const glm::vec3 out(std::sin(angle), 0, std::cos(angle));
+    const glm::vec3 normal = glm::normalize(out + glm::vec3(0, slope, 0));
+    body->vertices.push_back(MakeVertex(out * bottom_radius + glm::vec3(0, bottom, 0), normal));
+    body->vertices.push_back(MakeVertex(out * top_radius + glm::vec3(0, top, 0), normal));
+    body->vertices.push_back(MakeVertex(out * top_radius + glm::vec3(0, top, 0), {0, 1, 0}));
+  }
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    const std::uint32_t at = first + 3 * i;
+    AddTriangle(at, at + 3, at + 1, body);
+    AddTriangle(at + 1, at + 3, at + 4, body);
+    if (i > 0) AddTriangle(first + 2, at + 2, at + 5, body);
+  }
+}
+
+content::Image ImageFrom(const cv::Mat& bgra) {
+  content::Image image;
+  image.width_px = bgra.cols;
+  image.height_px = bgra.rows;
+  image.rgba.resize(std::size_t{4} * bgra.cols * bgra.rows);
+  cv::Mat rgba(bgra.rows, bgra.cols, CV_8UC4, image.rgba.data());
+  cv::cvtColor(bgra, rgba, cv::COLOR_BGRA2RGBA);
+  return image;
+}
+
+}  // namespace
+
+std::shared_ptr<const content::Model> MakeSignpostModel(const content::Signpost& signpost) {
+  const cv::Mat board = DrawBoard(signpost);
+  const glm::vec2 half_size(0.5f * static_cast<float>(board.cols) / static_cast<float>(board.rows), 0.5f);
+  const std::vector<glm::vec2> outline = RoundedOutline(half_size);
+
+  auto model = std::make_shared<content::Model>();
+  model->name = "signpost";
+  model->images.push_back(ImageFrom(board));
+  content::Texture texture;
+  texture.image = 0;
+  texture.repeat_u = texture.repeat_v = false;
+  model->textures.push_back(texture);
+  content::Material front;
+  front.base_color_texture.texture = 0;
+  front.unlit = true;  // letters must be readable whatever the light
+  content::Material body_material;
+  body_material.base_color = glm::vec4(0.55f, 0.47f, 0.38f, 1.0f);
+  body_material.metallic = 0.0f;
+  body_material.roughness = 0.6f;
+  model->materials = {front, body_material};
+
+  content::Primitive front_side = BoardSide(outline, half_size, 1.0f);
+  front_side.material = 0;
+  content::Primitive body = BoardSide(outline, half_size, -1.0f);
+  body.material = 1;
+  AddRim(outline, half_size, &body);
+  AddCone(0.0f, 0.05f, 0.2f, 0.15f, &body);
+  AddCone(0.05f, kPoleHeight, kPoleRadius, kPoleRadius, &body);
+  model->meshes.push_back({"signpost", {std::move(front_side), std::move(body)}});
+  content::Node node;
+  node.mesh = 0;
+  model->nodes.push_back(node);
+  model->roots.push_back(0);
+  const float half_width = std::max(half_size.x, 0.2f);
+  model->bounds_min = glm::vec3(-half_width, 0, -0.2f);
+  model->bounds_max = glm::vec3(half_width, kPoleHeight + 1.0f, 0.2f);
+  return model;
+}
+
+engine::Sim3 SignpostPose(const content::Signpost& signpost, const Eigen::Vector3d& eye_in_map) {
+  const double up_length = signpost.up.norm();
+  const Eigen::Vector3d up =
+      up_length > 0 ? Eigen::Vector3d(signpost.up / up_length) : -Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d to_reader = eye_in_map - signpost.anchor;
+  Eigen::Vector3d front = to_reader - up * up.dot(to_reader);
+  if (front.norm() <= 1e-9 * (1.0 + to_reader.norm())) front = up.unitOrthogonal();
+  front.normalize();
+  Eigen::Matrix3d rotation;
+  rotation << up.cross(front), up, front;
+  engine::Sim3 pose;
+  pose.rotation = engine::Rotation3(rotation);
+  pose.translation = signpost.anchor;
+  pose.scale = signpost.height_m;
+  return pose;
+}
+
+}  // namespace docent::ui

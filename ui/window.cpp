@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/window.h"
+
+#include <epoxy/gl.h>
+// GLFW brings its own OpenGL header unless told that there is one.
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+#include <utility>
+
+#include "engine/base/error.h"
+
+namespace docent::ui {
+namespace {
+
+// GLFW is one library for the whole process: started with the first window, ended with the last.
+int window_count = 0;
+
+std::string LastProblem() {
+  const char* description = nullptr;
+  glfwGetError(&description);
+  return description == nullptr ? std::string("unknown reason") : std::string(description);
+}
+
+// Empty for keys that Docent has no word for.
+std::string NameOf(int key) {
+  if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z)
+    return std::string(1, static_cast<char>('a' + key - GLFW_KEY_A));
+  if (key >= GLFW_KEY_0 && key <= GLFW_KEY_9)
+    return std::string(1, static_cast<char>('0' + key - GLFW_KEY_0));
+  if (key >= GLFW_KEY_F1 && key <= GLFW_KEY_F12) return "f" + std::to_string(1 + key - GLFW_KEY_F1);
+  switch (key) {
+    case GLFW_KEY_ESCAPE:
+      return "escape";
+    case GLFW_KEY_SPACE:
+      return "space";
+    case GLFW_KEY_ENTER:
+      return "enter";
+    case GLFW_KEY_TAB:
+      return "tab";
+    case GLFW_KEY_DELETE:
+      return "delete";
+    case GLFW_KEY_BACKSPACE:
+      return "backspace";
+    case GLFW_KEY_LEFT:
+      return "left";
+    case GLFW_KEY_RIGHT:
+      return "right";
+    case GLFW_KEY_UP:
+      return "up";
+    case GLFW_KEY_DOWN:
+      return "down";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+struct Window::Impl {
+  GLFWwindow* window = nullptr;
+  std::vector<InputEvent> events;
+
+  static Impl& Of(GLFWwindow* window) { return *static_cast<Impl*>(glfwGetWindowUserPointer(window)); }
+
+  static void OnButton(GLFWwindow* window, int button, int action, int modifiers) {
+    if (action != GLFW_PRESS) return;
+    InputEvent event;
+    event.kind = InputEvent::Kind::kClick;
+    glfwGetCursorPos(window, &event.position.x(), &event.position.y());
+    event.button = button;
+    event.control = (modifiers & GLFW_MOD_CONTROL) != 0;
+    event.shift = (modifiers & GLFW_MOD_SHIFT) != 0;
+    Of(window).events.push_back(std::move(event));
+  }
+  static void OnKey(GLFWwindow* window, int key, int, int action, int modifiers) {
+    if (action == GLFW_RELEASE) return;
+    InputEvent event;
+    event.key = NameOf(key);
+    event.control = (modifiers & GLFW_MOD_CONTROL) != 0;
+    event.shift = (modifiers & GLFW_MOD_SHIFT) != 0;
+    if (!event.key.empty()) Of(window).events.push_back(std::move(event));
+  }
+  static void OnResize(GLFWwindow* window, int width_px, int height_px) {
+    InputEvent event;
+    event.kind = InputEvent::Kind::kResize;
+    event.width_px = width_px;
+    event.height_px = height_px;
+    Of(window).events.push_back(std::move(event));
+  }
+  static void OnClose(GLFWwindow* window) {
+    InputEvent event;
+    event.kind = InputEvent::Kind::kClose;
+    Of(window).events.push_back(std::move(event));
+  }
+};
+
+Window::Window(const std::string& title, int width_px, int height_px) : impl_(std::make_unique<Impl>()) {
+  if (window_count == 0 && glfwInit() != GLFW_TRUE)
+    throw Error("Cannot open a window: there is no display (" + LastProblem() + "); use --headless.");
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
+  impl_->window = glfwCreateWindow(width_px, height_px, title.c_str(), nullptr, nullptr);
+  if (impl_->window == nullptr) {
+    const std::string problem = LastProblem();
+    if (window_count == 0) glfwTerminate();
+    throw Error("Cannot open a window: the display offers no OpenGL 3.3 core context (" + problem + ").");
+  }
+  ++window_count;
+  glfwSetWindowUserPointer(impl_->window, impl_.get());
+  glfwSetMouseButtonCallback(impl_->window, Impl::OnButton);
+  glfwSetKeyCallback(impl_->window, Impl::OnKey);
+  glfwSetFramebufferSizeCallback(impl_->window, Impl::OnResize);
+  glfwSetWindowCloseCallback(impl_->window, Impl::OnClose);
+  glfwMakeContextCurrent(impl_->window);
+  glfwSwapInterval(1);
+}
+
+Window::~Window() {
+  glfwDestroyWindow(impl_->window);
+  if (--window_count == 0) glfwTerminate();
+}
+
+void Window::MakeCurrent() {
+  glfwMakeContextCurrent(impl_->window);
+}
+
+std::vector<InputEvent> Window::PollEvents() {
+  glfwPollEvents();
+  return std::exchange(impl_->events, {});
+}
+
+void Window::Show() {
+  glfwSwapBuffers(impl_->window);
+}
+
+bool Window::IsClosing() const {
+  return glfwWindowShouldClose(impl_->window) == GLFW_TRUE;
+}
+
+Eigen::Vector2i Window::FramebufferSize() const {
+  Eigen::Vector2i size;
+  glfwGetFramebufferSize(impl_->window, &size.x(), &size.y());
+  return size;
+}
+
+Eigen::Vector2i Window::WindowSize() const {
+  Eigen::Vector2i size;
+  glfwGetWindowSize(impl_->window, &size.x(), &size.y());
+  return size;
+}
+
+GLFWwindow* Window::handle() const {
+  return impl_->window;
+}
+
+}  // namespace docent::ui
