@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/calibration/calibration_file.h"
+
+#include <array>
+#include <vector>
+
+#include "app/calibration/yaml_reader.h"
+#include "app/files/checked_file.h"
+#include "app/files/text_file.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+using engine::CameraModel;
+using engine::LensModel;
+using Distortion = std::array<double, 5>;
+
+std::optional<LensModel> LensFromName(const std::string& name) {
+  static constexpr std::array<std::pair<const char*, LensModel>, 12> kNames = {{
+      {"pinhole", LensModel::kRadialTangential},
+      {"radial-tangential", LensModel::kRadialTangential},
+      {"radial_tangential", LensModel::kRadialTangential},
+      {"radtan", LensModel::kRadialTangential},
+      {"plumb_bob", LensModel::kRadialTangential},
+      {"rational_polynomial", LensModel::kRadialTangential},
+      {"none", LensModel::kRadialTangential},
+      {"fov", LensModel::kFov},
+      {"kannala_brandt", LensModel::kKannalaBrandt},
+      {"equidistant", LensModel::kKannalaBrandt},
+      {"fisheye", LensModel::kKannalaBrandt},
+      {"equi", LensModel::kKannalaBrandt},
+  }};
+  for (const auto& [known, lens] : kNames) {
+    if (name == known) return lens;
+  }
+  return std::nullopt;
+}
+
+LensModel NeedLens(const YamlReader& file, const std::string& field, const std::string& name) {
+  const std::optional<LensModel> lens = LensFromName(name);
+  if (!lens) {
+    throw Error(file.name() + ": the field '" + field + "' names the lens model '" + name +
+                "', which is none of pinhole, fov and kannala_brandt.");
+  }
+  return *lens;
+}
+
+CameraModel Checked(const YamlReader& file, LensModel lens, const CameraModel::Intrinsics& intrinsics,
+                    const Distortion& distortion) {
+  if (const auto problem = CameraModel::Validate(lens, intrinsics, distortion)) {
+    throw Error(file.name() + " does not describe a camera: " + *problem + ".");
+  }
+  return CameraModel(lens, intrinsics, distortion);
+}
+
+// A coefficient list of any length; what the lens model does not know must be zero.
+Distortion NeedDistortion(const YamlReader& file, const std::string& field, LensModel lens,
+                          const std::vector<double>& values) {
+  const std::size_t used = lens == LensModel::kRadialTangential ? 5
+                           : lens == LensModel::kKannalaBrandt  ? 4
+                                                                : 1;
+  Distortion distortion{};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i < used) {
+      distortion[i] = values[i];
+    } else if (values[i] != 0) {
+      throw Error(file.name() + ": the field '" + field + "' has " + std::to_string(values.size()) +
+                  " coefficients, but the lens model knows only the first " + std::to_string(used) + ".");
+    }
+  }
+  return distortion;
+}
+
+CameraModel FromOwn(const YamlReader& file) {
+  const LensModel lens = NeedLens(file, "model", file.TextOr("model", "pinhole"));
+  const CameraModel::Intrinsics intrinsics{file.Integer("width"), file.Integer("height"), file.Number("fx"),
+                                           file.Number("fy"),     file.Number("cx"),      file.Number("cy")};
+  Distortion distortion{};
+  switch (lens) {
+    case LensModel::kRadialTangential:
+      distortion = {file.NumberOr("k1", 0), file.NumberOr("k2", 0), file.NumberOr("p1", 0),
+                    file.NumberOr("p2", 0), file.NumberOr("k3", 0)};
+      break;
+    case LensModel::kFov:
+      distortion[0] = file.Number("omega");
+      break;
+    case LensModel::kKannalaBrandt:
+      distortion = {file.Number("k1"), file.Number("k2"), file.Number("k3"), file.Number("k4"), 0};
+      break;
+  }
+  return Checked(file, lens, intrinsics, distortion);
+}
+
+// OpenCV's own files and ROS camera_info: a 3x3 camera matrix and a list of coefficients.
+CameraModel FromMatrix(const YamlReader& file, const std::string& matrix_field) {
+  const std::vector<double> k = file.Numbers(matrix_field);
+  if (k.size() != 9) throw Error(file.name() + ": the field '" + matrix_field + "' is not a 3x3 matrix.");
+  if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
+    throw Error(file.name() + ": the field '" + matrix_field + "' has skew or is no camera matrix.");
+  }
+  const auto need = [&](std::initializer_list<const char*> fields) {
+    const std::string field = file.FirstOf(fields);
+    return field.empty() ? std::string(*fields.begin()) : field;
+  };
+  const CameraModel::Intrinsics intrinsics{file.Integer(need({"image_width", "width"})),
+                                           file.Integer(need({"image_height", "height"})),
+                                           k[0],
+                                           k[4],
+                                           k[2],
+                                           k[5]};
+  LensModel lens = LensModel::kRadialTangential;
+  if (const std::string field = file.FirstOf({"distortion_model", "model"}); !field.empty()) {
+    lens = NeedLens(file, field, file.Text(field));
+  } else if (file.NumberOr("fisheye_model", 0) != 0) {  // as OpenCV's calibration sample writes it
+    lens = LensModel::kKannalaBrandt;
+  }
+  const std::string field = need({"distortion_coefficients", "distortion_coeffs", "dist_coeffs", "D", "d"});
+  return Checked(file, lens, intrinsics, NeedDistortion(file, field, lens, file.Numbers(field)));
+}
+
+CameraModel FromEuroc(const YamlReader& file) {
+  const std::vector<double> focal_and_center = file.Numbers("intrinsics");
+  if (focal_and_center.size() != 4)
+    throw Error(file.name() + ": the field 'intrinsics' is not [fx, fy, cx, cy].");
+  const std::vector<double> size = file.Numbers("resolution");
+  if (size.size() != 2 || size[0] < 1 || size[1] < 1 || size[0] > 1e6 || size[1] > 1e6) {
+    throw Error(file.name() + ": the field 'resolution' is not [width, height].");
+  }
+  const std::string camera_model = file.TextOr("camera_model", "pinhole");
+  if (camera_model != "pinhole") {
+    throw Error(file.name() + ": the field 'camera_model' is '" + camera_model +
+                "', only 'pinhole' is known.");
+  }
+  const LensModel lens = NeedLens(file, "distortion_model", file.TextOr("distortion_model", "none"));
+  const std::string field = file.Has("distortion_coeffs") ? "distortion_coeffs" : "distortion_coefficients";
+  const CameraModel::Intrinsics intrinsics{static_cast<int>(size[0]), static_cast<int>(size[1]),
+                                           focal_and_center[0],       focal_and_center[1],
+                                           focal_and_center[2],       focal_and_center[3]};
+  return Checked(file, lens, intrinsics, NeedDistortion(file, field, lens, file.Numbers(field)));
+}
+
+}  // namespace
+
+CameraModel ParseCalibration(const std::string& text, const std::string& name) {
+  const YamlReader file(text, name);
+  if (const std::string matrix = file.FirstOf({"camera_matrix", "Camera_Matrix", "K", "k"});
+      !matrix.empty()) {
+    return FromMatrix(file, matrix);
+  }
+  if (file.Has("intrinsics")) return FromEuroc(file);
+  return FromOwn(file);
+}
+
+CameraModel ReadCalibration(const std::filesystem::path& path) {
+  return ParseCalibration(ReadTextFile(path, std::size_t{1} << 20), "'" + path.string() + "'");
+}
+
+std::string FormatCalibration(const CameraModel& camera) {
+  const auto& in = camera.intrinsics();
+  const auto& d = camera.distortion();
+  std::string text;
+  const auto line = [&text](const char* field, double value) {
+    text += std::string(field) + ": " + FormatNumber(value, 17) + "\n";
+  };
+  text += "width: " + std::to_string(in.width_px) + "\nheight: " + std::to_string(in.height_px) + "\n";
+  line("fx", in.fx), line("fy", in.fy), line("cx", in.cx), line("cy", in.cy);
+  switch (camera.lens()) {
+    case LensModel::kRadialTangential:
+      line("k1", d[0]), line("k2", d[1]), line("p1", d[2]), line("p2", d[3]), line("k3", d[4]);
+      break;
+    case LensModel::kFov:
+      text += "model: fov\n";
+      line("omega", d[0]);
+      break;
+    case LensModel::kKannalaBrandt:
+      text += "model: kannala_brandt\n";
+      line("k1", d[0]), line("k2", d[1]), line("k3", d[2]), line("k4", d[3]);
+      break;
+  }
+  return text;
+}
+
+void WriteCalibration(const std::filesystem::path& path, const CameraModel& camera) {
+  CheckedFile file(path);
+  file.Write(FormatCalibration(camera));
+  file.Close();
+}
+
+std::optional<std::filesystem::path> FindCalibration(const std::filesystem::path& folder) {
+  for (const char* name : {"calibration.yaml", "camera.yaml", "camera_info.yaml", "sensor.yaml",
+                           "mav0/cam0/sensor.yaml", "cam0/sensor.yaml"}) {
+    std::filesystem::path path = folder / name;
+    if (std::filesystem::is_regular_file(path)) return path;
+  }
+  return std::nullopt;
+}
+
+void CheckPictureSize(const CameraModel& camera, int width_px, int height_px, const std::string& source,
+                      const std::string& calibration) {
+  if (camera.width_px() == width_px && camera.height_px() == height_px) return;
+  throw Error("The pictures of " + source + " are " + std::to_string(width_px) + "x" +
+              std::to_string(height_px) + " pixels, but " + calibration + " is for " +
+              std::to_string(camera.width_px()) + "x" + std::to_string(camera.height_px()) +
+              "; use the calibration of this camera at this size.");
+}
+
+}  // namespace docent::app

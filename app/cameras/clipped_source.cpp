@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/cameras/clipped_source.h"
+
+#include <optional>
+#include <utility>
+
+namespace docent::app {
+
+namespace {
+
+class ClippedSource : public FrameSource {
+ public:
+  ClippedSource(std::unique_ptr<FrameSource> source, Timestamp from, Timestamp until)
+      : source_(std::move(source)), from_(from), until_(until) {
+    info_ = source_->info();
+    info_.frame_count.reset();  // how many of them lie between is not known before they are read
+  }
+
+  bool Next(engine::Frame* frame) override {
+    while (!ended_ && source_->Next(frame)) {
+      if (!first_) first_ = frame->time;
+      const Timestamp since_first = frame->time - *first_;
+      if (until_ > Timestamp{} && since_first >= until_) break;
+      if (since_first >= from_) return true;
+    }
+    ended_ = true;
+    return false;
+  }
+
+ private:
+  std::unique_ptr<FrameSource> source_;
+  Timestamp from_, until_;
+  std::optional<Timestamp> first_;
+  bool ended_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameSource> ClipSource(std::unique_ptr<FrameSource> source, Timestamp from,
+                                        Timestamp until) {
+  if (from <= Timestamp{} && until <= Timestamp{}) return source;
+  return std::make_unique<ClippedSource>(std::move(source), from, until);
+}
+
+}  // namespace docent::app

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/cameras/file_sources.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/videoio.hpp>
+#include <utility>
+
+#include "app/calibration/calibration_file.h"
+#include "app/cameras/decode_picture.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Quoted(const fs::path& path) {
+  return "'" + path.string() + "'";
+}
+
+std::string NameOf(const fs::path& path) {
+  const fs::path whole = fs::absolute(path).lexically_normal();
+  return whole.has_filename() ? whole.filename().string() : whole.parent_path().filename().string();
+}
+
+std::optional<fs::path> IfFile(const fs::path& path) {
+  return fs::is_regular_file(path) ? std::optional(path) : std::nullopt;
+}
+
+class VideoSource : public FrameSource {
+ public:
+  VideoSource(const fs::path& video, const std::optional<fs::path>& timestamps_path)
+      : path_(video), timestamps_path_(timestamps_path) {
+    if (!fs::exists(video)) throw Error("There is no file " + Quoted(video) + ".");
+    if (timestamps_path) times_ = ReadTimestamps(*timestamps_path);
+    if (!capture_.open(video.string(), cv::CAP_FFMPEG)) {
+      throw Error(Quoted(video) +
+                  " cannot be opened as a video; it is cut off, damaged, or no video at all.");
+    }
+    const double fps = capture_.get(cv::CAP_PROP_FPS);
+    if (std::isfinite(fps) && fps > 0 && fps < 10000) info_.nominal_fps = fps;
+    const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);  // an estimate in some containers
+    if (std::isfinite(count) && count >= 1 && count < 1e9) announced_count_ = count;
+    if (timestamps_path) {
+      info_.frame_count = times_.size();
+      info_.nominal_fps = MedianFps(times_);
+    } else if (announced_count_) {
+      info_.frame_count = static_cast<std::uint64_t>(*announced_count_);
+    }
+    info_.name = NameOf(video);
+  }
+
+  void SetInfo(SourceInfo info) { info_ = std::move(info); }
+
+  bool Next(engine::Frame* frame) override {
+    if (ended_) return false;
+    if (!capture_.grab()) {
+      ended_ = true;
+      CheckEnd();
+      return false;
+    }
+    if (timestamps_path_ && index_ == times_.size()) {
+      ended_ = true;
+      throw Error(Quoted(*timestamps_path_) + " has " + std::to_string(times_.size()) + " times, but " +
+                  Quoted(path_) + " goes on after that many pictures.");
+    }
+    cv::Mat picture;
+    if (!capture_.retrieve(picture) || picture.empty()) {
+      ended_ = true;
+      throw Error("Picture " + std::to_string(index_) + " of " + Quoted(path_) + " cannot be decoded.");
+    }
+    frame->time = timestamps_path_ ? times_[index_] : ContainerTime();
+    frame->index = index_++;
+    frame->picture = std::move(picture);
+    return true;
+  }
+
+ private:
+  // The container's time where it grows. The decoder tells none for pictures that it still holds when the
+  // file ends, and raw streams have none at all: those go on with the step before.
+  Timestamp ContainerTime() {
+    const double milliseconds = capture_.get(cv::CAP_PROP_POS_MSEC);
+    const Timestamp told = std::isfinite(milliseconds) && milliseconds >= 0 && milliseconds < 1e12
+                               ? FromSeconds(milliseconds * 1e-3)
+                               : Timestamp{};
+    if (index_ == 0) {
+      step_ = FromSeconds(1 / info_.nominal_fps);
+      return last_time_ = told;
+    }
+    if (told > last_time_) {
+      step_ = told - last_time_;
+      return last_time_ = told;
+    }
+    return last_time_ += step_;
+  }
+
+  void CheckEnd() const {
+    if (timestamps_path_) {
+      if (index_ < times_.size()) {
+        throw Error(Quoted(path_) + " breaks off at picture " + std::to_string(index_) + " of the " +
+                    std::to_string(times_.size()) + " that " + Quoted(*timestamps_path_) + " lists.");
+      }
+      return;
+    }
+    if (index_ == 0) throw Error(Quoted(path_) + " holds no picture that can be decoded.");
+    if (!announced_count_) return;
+    // Some containers announce a length in seconds only, so both measures must agree that something is
+    // missing.
+    const double missing = *announced_count_ - static_cast<double>(index_);
+    const double fps = capture_.get(cv::CAP_PROP_FPS);
+    const double missing_s = *announced_count_ / fps - ToSeconds(last_time_ + step_);
+    const double allowed = std::max(2.0, 0.01 * *announced_count_);
+    if (missing > allowed && missing_s > allowed / fps) {
+      throw Error(Quoted(path_) + " breaks off at picture " + std::to_string(index_) + " of the " +
+                  std::to_string(static_cast<std::uint64_t>(*announced_count_)) + " that it announces.");
+    }
+  }
+
+  fs::path path_;
+  std::optional<fs::path> timestamps_path_;
+  std::vector<Timestamp> times_;
+  cv::VideoCapture capture_;
+  std::optional<double> announced_count_;
+  std::uint64_t index_ = 0;
+  Timestamp last_time_{}, step_{};
+  bool ended_ = false;
+};
+
+class ImageListSource : public FrameSource {
+ public:
+  explicit ImageListSource(std::vector<TimedPath> pictures) : pictures_(std::move(pictures)) {
+    std::vector<Timestamp> times;
+    for (const TimedPath& picture : pictures_) times.push_back(picture.time);
+    info_.frame_count = pictures_.size();
+    info_.nominal_fps = MedianFps(times);
+  }
+
+  void SetInfo(SourceInfo info) { info_ = std::move(info); }
+
+  bool Next(engine::Frame* frame) override {
+    if (index_ == pictures_.size()) return false;
+    const TimedPath& next = pictures_[index_];
+    cv::Mat picture;
+    try {
+      picture = ReadPicture(next.path, &buffer_);
+      if (size_.area() == 0) size_ = picture.size();
+      if (picture.size() != size_) {
+        throw Error(Quoted(next.path) + " is " + std::to_string(picture.cols) + "x" +
+                    std::to_string(picture.rows) + " pixels, but the pictures before it are " +
+                    std::to_string(size_.width) + "x" + std::to_string(size_.height) + ".");
+      }
+    } catch (const Error&) {
+      index_ = pictures_.size();  // a source that broke off has ended
+      throw;
+    }
+    frame->time = next.time;
+    frame->index = index_++;
+    frame->picture = std::move(picture);
+    return true;
+  }
+
+ private:
+  std::vector<TimedPath> pictures_;
+  std::vector<std::uint8_t> buffer_;
+  cv::Size size_;
+  std::size_t index_ = 0;
+};
+
+template <typename Source>
+std::unique_ptr<FrameSource> WithFolderInfo(std::unique_ptr<Source> source, const fs::path& folder) {
+  SourceInfo info = source->info();
+  info.name = NameOf(folder);
+  info.calibration_path = FindCalibration(folder);
+  info.ground_truth_path = IfFile(folder / "groundtruth.txt");
+  info.segments_path = IfFile(folder / "segments.txt");
+  source->SetInfo(std::move(info));
+  return source;
+}
+
+}  // namespace
+
+std::unique_ptr<FrameSource> OpenVideo(const fs::path& video,
+                                       const std::optional<fs::path>& timestamps_path) {
+  return std::make_unique<VideoSource>(video, timestamps_path);
+}
+
+std::unique_ptr<FrameSource> OpenFolder(const fs::path& folder, const CameraOptions& options) {
+  const std::optional<SequenceLayout> layout = FindLayout(folder);
+  if (!layout) {
+    throw Error(
+        "The folder " + Quoted(folder) +
+        " holds no image sequence: neither rgb.txt, mav0/cam0/data.csv, video.mp4 nor numbered pictures.");
+  }
+  const fs::path video = folder / "video.mp4";
+  switch (*layout) {
+    case SequenceLayout::kTum:
+      return WithFolderInfo(std::make_unique<ImageListSource>(ReadTumList(folder)), folder);
+    case SequenceLayout::kEuroc:
+      return WithFolderInfo(std::make_unique<ImageListSource>(ReadEurocList(folder)), folder);
+    case SequenceLayout::kTimedVideo:
+      return WithFolderInfo(std::make_unique<VideoSource>(video, folder / "timestamps.txt"), folder);
+    case SequenceLayout::kVideo:
+      return WithFolderInfo(std::make_unique<VideoSource>(video, std::nullopt), folder);
+    case SequenceLayout::kNumberedImages:
+      return WithFolderInfo(std::make_unique<ImageListSource>(ListNumberedImages(folder, options.image_fps)),
+                            folder);
+  }
+  throw Error("The folder " + Quoted(folder) + " holds no image sequence.");
+}
+
+}  // namespace docent::app

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "engine/geometry/camera_model.h"
+#include "engine/tracking/tracked_frame.h"
+
+// Where pictures come from. OpenCamera reads the words of `--camera` and answers with one interface for
+// devices, videos, folders and the simulator. One thread at a time may use a source; the session owns it.
+namespace docent::app {
+
+// What is known of a source before its first picture.
+struct SourceInfo {
+  std::string name;   // for people and reports: the folder's or file's own name
+  bool live = false;  // a device: pictures come at their own pace and never end
+  std::optional<std::uint64_t> frame_count;
+  double nominal_fps = 30;                                 // pictures a second, positive
+  std::optional<std::filesystem::path> calibration_path;   // found in the folder
+  std::optional<engine::CameraModel> known_camera;         // sources that know their lens without a file
+  std::optional<std::filesystem::path> ground_truth_path;  // groundtruth.txt beside the pictures
+  std::optional<std::filesystem::path> segments_path;      // segments.txt beside the pictures
+};
+
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+
+  // The next picture; false at the end, and from then on. Every picture is a fresh buffer that nobody writes
+  // to again; times grow strictly. Sets time, index and picture; leaves `camera` alone. Throws Error when the
+  // source breaks off; the pictures before the break have been delivered by then.
+  virtual bool Next(engine::Frame* frame) = 0;
+
+  const SourceInfo& info() const { return info_; }
+
+ protected:
+  SourceInfo info_;
+};
+
+// A picture format asked of a device; zero means "whatever it likes".
+struct DeviceFormat {
+  int width_px = 0, height_px = 0;
+  double fps = 0;
+};
+
+struct CameraOptions {
+  DeviceFormat device_format;                      // devices only
+  std::chrono::milliseconds device_timeout{2000};  // devices only: how long to wait for one picture
+  double image_fps = 30;                           // plain numbered images, which have no times
+  std::uint64_t seed = 1;                          // the simulator's noise
+};
+
+// `source` is a word of command-line.md: a device, a file, a folder, or sim:SCENE. Throws Error with one
+// sentence when it cannot be opened.
+std::unique_ptr<FrameSource> OpenCamera(const std::string& source, const CameraOptions& options = {});
+
+// "640x480@30" or "640x480". Throws Error otherwise.
+DeviceFormat ParseDeviceFormat(const std::string& text);
+
+// Keeps the decoding libraries from writing to standard error by themselves: what went wrong is said by the
+// Error. To be called once, before the first source is opened; variables that are set already stay.
+void QuietDecoders();
+
+}  // namespace docent::app

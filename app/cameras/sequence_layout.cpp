@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/cameras/sequence_layout.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string_view>
+
+#include "app/files/text_file.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string At(const fs::path& path, int line) {
+  return "'" + path.string() + "', line " + std::to_string(line);
+}
+
+void CheckOrder(std::optional<Timestamp> previous, Timestamp time, const fs::path& path, int line) {
+  if (previous && time <= *previous) {
+    throw Error(At(path, line) + ": the time " + FormatSeconds(time) + " does not come after the " +
+                FormatSeconds(*previous) + " before it.");
+  }
+}
+
+bool HasImageExtension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  constexpr std::array<std::string_view, 10> kKnown = {".png", ".jpg", ".jpeg", ".bmp",  ".pgm",
+                                                       ".ppm", ".tif", ".tiff", ".webp", ".pnm"};
+  return std::find(kKnown.begin(), kKnown.end(), extension) != kKnown.end();
+}
+
+bool HasDigit(const std::string& text) {
+  return std::any_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+std::vector<fs::path> NumberedImages(const fs::path& folder) {
+  std::vector<fs::path> images;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    if (HasImageExtension(entry.path()) && HasDigit(entry.path().stem().string()))
+      images.push_back(entry.path());
+  }
+  if (error) throw Error("Cannot read the folder '" + folder.string() + "': " + error.message() + ".");
+  std::sort(images.begin(), images.end(), [](const fs::path& a, const fs::path& b) {
+    return NaturalLess(a.filename().string(), b.filename().string());
+  });
+  return images;
+}
+
+}  // namespace
+
+std::optional<fs::path> FindEurocCamera(const fs::path& folder) {
+  for (const char* below : {"mav0/cam0", "cam0", "."}) {
+    const fs::path camera = (folder / below).lexically_normal();
+    if (fs::is_regular_file(camera / "data.csv")) return camera;
+  }
+  return std::nullopt;
+}
+
+std::optional<SequenceLayout> FindLayout(const fs::path& folder) {
+  if (fs::is_regular_file(folder / "rgb.txt")) return SequenceLayout::kTum;
+  if (FindEurocCamera(folder)) return SequenceLayout::kEuroc;
+  if (fs::is_regular_file(folder / "video.mp4")) {
+    return fs::is_regular_file(folder / "timestamps.txt") ? SequenceLayout::kTimedVideo
+                                                          : SequenceLayout::kVideo;
+  }
+  if (!NumberedImages(folder).empty()) return SequenceLayout::kNumberedImages;
+  return std::nullopt;
+}
+
+std::vector<TimedPath> ReadTumList(const fs::path& folder) {
+  const fs::path list = folder / "rgb.txt";
+  const std::string text = ReadTextFile(list);
+  std::vector<TimedPath> pictures;
+  for (const TextLine& line : ContentLines(text)) {
+    const std::size_t blank = line.text.find_first_of(" \t");
+    const std::optional<Timestamp> time = ParseSeconds(line.text.substr(0, blank));
+    if (!time || blank == std::string_view::npos) {
+      throw Error(At(list, line.number) +
+                  ": expected a time in seconds and a file, as in '1.25 rgb/1.25.png'.");
+    }
+    CheckOrder(pictures.empty() ? std::nullopt : std::optional(pictures.back().time), *time, list,
+               line.number);
+    pictures.push_back({*time, folder / Trim(line.text.substr(blank))});
+  }
+  if (pictures.empty()) throw Error("'" + list.string() + "' names no pictures.");
+  return pictures;
+}
+
+std::vector<TimedPath> ReadEurocList(const fs::path& folder) {
+  const std::optional<fs::path> camera = FindEurocCamera(folder);
+  if (!camera) throw Error("There is no data.csv in '" + folder.string() + "'.");
+  const fs::path list = *camera / "data.csv";
+  const std::string text = ReadTextFile(list);
+  std::vector<TimedPath> pictures;
+  for (const TextLine& line : ContentLines(text)) {
+    const std::size_t comma = line.text.find(',');
+    const std::optional<std::int64_t> nanoseconds = ParseInteger(Trim(line.text.substr(0, comma)));
+    if (!nanoseconds || comma == std::string_view::npos) {
+      throw Error(At(list, line.number) + ": expected a time in nanoseconds, a comma and a file.");
+    }
+    const Timestamp time(*nanoseconds);
+    CheckOrder(pictures.empty() ? std::nullopt : std::optional(pictures.back().time), time, list,
+               line.number);
+    pictures.push_back({time, *camera / "data" / Trim(line.text.substr(comma + 1))});
+  }
+  if (pictures.empty()) throw Error("'" + list.string() + "' names no pictures.");
+  return pictures;
+}
+
+std::vector<TimedPath> ListNumberedImages(const fs::path& folder, double fps) {
+  std::vector<TimedPath> pictures;
+  for (fs::path& path : NumberedImages(folder)) {
+    const auto time = FromSeconds(static_cast<double>(pictures.size()) / fps);
+    pictures.push_back({time, std::move(path)});
+  }
+  if (pictures.empty()) throw Error("There are no numbered pictures in '" + folder.string() + "'.");
+  return pictures;
+}
+
+std::vector<Timestamp> ReadTimestamps(const fs::path& path) {
+  const std::string text = ReadTextFile(path);
+  std::vector<Timestamp> times;
+  for (const TextLine& line : ContentLines(text)) {
+    const std::optional<Timestamp> time = ParseSeconds(line.text);
+    if (!time) throw Error(At(path, line.number) + ": expected one time in seconds.");
+    CheckOrder(times.empty() ? std::nullopt : std::optional(times.back()), *time, path, line.number);
+    times.push_back(*time);
+  }
+  if (times.empty()) throw Error("'" + path.string() + "' holds no times.");
+  return times;
+}
+
+double MedianFps(const std::vector<Timestamp>& times) {
+  if (times.size() < 2) return 30;
+  std::vector<Timestamp> steps;
+  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return 1 / ToSeconds(*middle);
+}
+
+}  // namespace docent::app

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/cameras/simulated_source.h"
+
+#include <utility>
+
+namespace docent::app {
+
+namespace {
+
+class SimulatedSource : public FrameSource {
+ public:
+  explicit SimulatedSource(std::shared_ptr<const Simulation> simulation)
+      : simulation_(std::move(simulation)) {
+    info_.name = simulation_->name();
+    info_.frame_count = static_cast<std::uint64_t>(simulation_->frame_count());
+    info_.nominal_fps = simulation_->options().frame_rate_hz;
+    info_.known_camera = simulation_->camera();
+  }
+
+  bool Next(engine::Frame* frame) override {
+    if (index_ == simulation_->frame_count()) return false;
+    cv::Mat picture;
+    simulation_->Render(index_, &picture);
+    frame->time = simulation_->time(index_);
+    frame->index = static_cast<std::uint64_t>(index_++);
+    frame->picture = std::move(picture);
+    return true;
+  }
+
+ private:
+  std::shared_ptr<const Simulation> simulation_;
+  int index_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameSource> OpenSimulation(const std::string& scene, const CameraOptions& options) {
+  SimulationOptions simulation;
+  simulation.seed = options.seed;
+  return OpenSimulation(MakeSimulation(scene, simulation));
+}
+
+std::unique_ptr<FrameSource> OpenSimulation(std::shared_ptr<const Simulation> simulation) {
+  return std::make_unique<SimulatedSource>(std::move(simulation));
+}
+
+}  // namespace docent::app

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "app/cameras/frame_source.h"
+#include "app/simulator/simulation.h"
+
+namespace docent::app {
+
+// The simulator as a camera: `scene` is what follows "sim:". The source knows its lens. Throws Error for an
+// unknown scene.
+std::unique_ptr<FrameSource> OpenSimulation(const std::string& scene, const CameraOptions& options = {});
+
+// The same over a simulation that somebody else asks for the truth.
+std::unique_ptr<FrameSource> OpenSimulation(std::shared_ptr<const Simulation> simulation);
+
+}  // namespace docent::app

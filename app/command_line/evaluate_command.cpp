@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <utility>
+
+#include "app/command_line/program.h"
+#include "app/command_line/run_arguments.h"
+
+namespace docent::app {
+
+void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
+                        std::function<void(const EvaluateOptions&, Verbosity)> run) {
+  CLI::App* command = AddSubcommand(
+      program, "evaluate", "Run the engine on sequences with ground truth, and report how good it was",
+      "docent evaluate kitchen room --output report --pace lockstep");
+  const auto options = std::make_shared<EvaluateOptions>();
+  const auto pace = std::make_shared<std::optional<Pace>>();
+  command->add_option("SEQUENCE", options->sequences, "Folders with image sequences, or sim:SCENE")
+      ->required();
+  command->add_option("--output", options->output, "Folder for report.json, report.html and each run's files")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--calibration", options->calibrations, "Calibration of each sequence, in their order")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
+  AddPaceOption(command, pace.get());
+  AddEngineOption(command, &options->engine);
+  AddSeedOption(command, &options->seed);
+  command->callback([=, run = std::move(run)] {
+    if (options->calibrations.size() > options->sequences.size()) {
+      throw CLI::ValidationError("--calibration", "more calibrations than sequences");
+    }
+    options->pace = pace->value_or(Pace::kEager);
+    invocation->run = [=] { run(*options, invocation->verbosity); };
+  });
+}
+
+}  // namespace docent::app

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/guide_files.h"
+
+#include "app/script/script_file.h"
+
+namespace docent::app {
+
+GuideFiles::GuideFiles(const GuideRequest& request, const engine::CameraModel& camera) : camera_(camera) {
+  if (request.output) {
+    output_.emplace(*request.output);
+    augmentations_.emplace(*request.output);
+  }
+  if (request.record_script) script_.emplace(*request.record_script);
+}
+
+void GuideFiles::Add(const ShownFrame& frame) {
+  if (!output_) return;
+  output_->Add(frame.tracked, frame.shown.map_name);
+  if (frame.shown.scene)
+    augmentations_->Add(frame.tracked, camera_, frame.shown.map_name, *frame.shown.scene);
+}
+
+void GuideFiles::Add(const TimedCommand& command) {
+  if (script_) script_->Write(FormatScriptLine(command) + '\n');
+}
+
+void GuideFiles::Add(const std::vector<Event>& events) {
+  if (!output_) return;
+  for (const Event& event : events) output_->Add(event);
+}
+
+void GuideFiles::Close() {
+  if (output_) output_->Close();
+  if (augmentations_) augmentations_->Close();
+  if (script_) script_->Close();
+}
+
+}  // namespace docent::app

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <ctime>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "app/command_line/program.h"
+#include "engine/base/error.h"
+#include "maps/library.h"
+
+namespace docent::app {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// What any of the subcommands of `maps` takes.
+struct MapsOptions {
+  std::filesystem::path library;
+  std::string name, new_name, policy;
+  bool as_json = false;
+};
+using MapsAction = void (*)(const MapsOptions& options);
+
+std::string FormatWallTime(maps::WallTime time) {
+  const std::time_t seconds = std::chrono::system_clock::to_time_t(
+      std::chrono::time_point_cast<std::chrono::system_clock::duration>(time));
+  std::tm utc{};
+  char text[32] = "";
+  if (gmtime_r(&seconds, &utc) != nullptr) std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+maps::Library OpenToRead(const MapsOptions& options) {
+  return maps::Library::Open(options.library, maps::Access::kReadOnly);
+}
+maps::Library OpenToWrite(const MapsOptions& options) {
+  return maps::Library::Open(options.library, maps::Access::kReadWrite);
+}
+
+Json ToJson(const maps::MapInfo& map) {
+  return {{"name", map.name},
+          {"policy", maps::ToString(map.policy)},
+          {"keyframes", map.keyframes},
+          {"points", map.points},
+          {"observations", map.observations},
+          {"revision", map.revision},
+          {"created", FormatWallTime(map.created)},
+          {"modified", FormatWallTime(map.modified)}};
+}
+
+void Print(const Json& json) {
+  std::printf("%s\n", json.dump(2, ' ', false, Json::error_handler_t::replace).c_str());
+}
+
+void List(const MapsOptions& options) {
+  const std::vector<maps::MapInfo> infos = OpenToRead(options).List();
+  if (options.as_json) {
+    Json json = {{"maps", Json::array()}};
+    for (const maps::MapInfo& map : infos) json["maps"].push_back(ToJson(map));
+    Print(json);
+    return;
+  }
+  if (infos.empty()) std::puts("The library holds no map.");
+  for (const maps::MapInfo& map : infos) {
+    std::printf("%-24s %-12s %6llu keyframes %8llu points  %s\n", map.name.c_str(),
+                maps::ToString(map.policy), static_cast<unsigned long long>(map.keyframes),
+                static_cast<unsigned long long>(map.points), FormatWallTime(map.modified).c_str());
+  }
+}
+
+// Extent of the camera's way and of the finite points, metres of the map.
+Json Describe(const maps::StoredMap& map) {
+  Json json = ToJson(map.info);
+  int panorama = 0, infinite = 0;
+  Eigen::AlignedBox3d cameras;
+  for (const engine::KeyFrame& keyframe : map.snapshot->keyframes) {
+    if (keyframe.kind == engine::KeyFrameKind::kPanorama) ++panorama;
+    cameras.extend(keyframe.camera_from_map.OriginInSource());
+  }
+  for (const engine::MapPoint& point : map.snapshot->points) infinite += point.infinite() ? 1 : 0;
+  json["panorama_keyframes"] = panorama;
+  json["infinite_points"] = infinite;
+  const Eigen::Vector3d size = cameras.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(cameras.sizes());
+  json["camera_extent_m"] = {size.x(), size.y(), size.z()};
+  json["assets"] = Json::array();
+  for (const maps::AssetRecord& asset : map.scene.assets) json["assets"].push_back(asset.name);
+  return json;
+}
+
+void Show(const MapsOptions& options) {
+  const maps::Library library = OpenToRead(options);
+  const Json json = Describe(library.Load(library.FindByName(options.name).key));
+  if (options.as_json) {
+    Print(json);
+    return;
+  }
+  for (const auto& [field, value] : json.items()) {
+    const std::string text = value.is_string() ? value.get<std::string>()
+                                               : value.dump(-1, ' ', false, Json::error_handler_t::replace);
+    std::printf("%-20s %s\n", field.c_str(), text.c_str());
+  }
+}
+
+void Verify(const MapsOptions& options) {
+  const maps::Library library = OpenToRead(options);
+  const std::vector<std::string> problems = library.Verify();
+  if (problems.empty()) {
+    std::printf("%s: all is well\n", library.file().c_str());
+    return;
+  }
+  for (const std::string& problem : problems) std::printf("%s\n", problem.c_str());
+  throw Error("'" + library.file() + "' is damaged: " + std::to_string(problems.size()) +
+              (problems.size() == 1 ? " problem." : " problems."));
+}
+
+void Rename(const MapsOptions& options) {
+  maps::Library library = OpenToWrite(options);
+  library.Rename(library.FindByName(options.name).key, options.new_name);
+}
+
+void Remove(const MapsOptions& options) {
+  maps::Library library = OpenToWrite(options);
+  library.Remove(library.FindByName(options.name).key);
+}
+
+void SetMapPolicy(const MapsOptions& options) {
+  maps::Library library = OpenToWrite(options);
+  library.SetPolicy(library.FindByName(options.name).key, *maps::ParsePolicy(options.policy));
+}
+
+}  // namespace
+
+void AddMapsCommand(CLI::App* program, Invocation* invocation) {
+  CLI::App* group = AddSubcommand(program, "maps", "Care for the maps of a library",
+                                  "docent maps list --library museum.docent");
+  group->require_subcommand(1);
+  const auto options = std::make_shared<MapsOptions>();
+  const auto add = [&](const char* name, const char* description, const char* example, MapsAction action) {
+    CLI::App* command = AddSubcommand(group, name, description, example);
+    command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+    command->callback([=] { invocation->run = [=] { action(*options); }; });
+    return command;
+  };
+  const auto add_name = [&](CLI::App* command) {
+    command->add_option("NAME", options->name, "Name of the map")->required();
+    return command;
+  };
+  const auto add_json = [&](CLI::App* command) {
+    command->add_flag("--json", options->as_json, "Print JSON");
+  };
+
+  add_json(add("list", "List the maps", "docent maps list --library museum.docent --json", List));
+  add_json(
+      add_name(add("show", "Show one map", "docent maps show \"Desk 3\" --library museum.docent", Show)));
+  add("verify", "Read everything and say what is damaged", "docent maps verify --library museum.docent",
+      Verify);
+  add_name(add("rename", "Give a map another name",
+               "docent maps rename \"Desk 3\" Kiosk --library museum.docent", Rename))
+      ->add_option("NEW_NAME", options->new_name, "Its new name")
+      ->required();
+  add_name(add("remove", "Remove a map and what stands in it",
+               "docent maps remove Kiosk --library museum.docent", Remove));
+  add_name(add("policy", "Say what may be done to a map",
+               "docent maps policy Kiosk read-only --library museum.docent", SetMapPolicy))
+      ->add_option("POLICY", options->policy, "open, bounded, augment-only or read-only")
+      ->required()
+      ->check(CLI::IsMember({"open", "bounded", "augment-only", "read-only"}));
+}
+
+}  // namespace docent::app

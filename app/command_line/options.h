@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/cameras/frame_source.h"
+#include "engine/base/time.h"
+
+// What the person asked for, as plain structs: the command line is parsed into these early, and nothing
+// behind them knows of words and dashes.
+namespace docent::app {
+
+enum class Verbosity { kQuiet, kNormal, kVerbose };
+
+enum class Pace {
+  kLockstep,  // tracker and mapper in turn on one thread: equal to the byte between runs
+  kEager,     // threaded, drops nothing
+  kRealtime,  // by the pictures' own times; drops those that come too late
+};
+enum class EngineKind {
+  kHybrid,  // with panorama maps
+  kSixDof,  // plain PTAM
+};
+const char* ToString(Pace pace);
+const char* ToString(EngineKind engine);
+
+struct CameraArguments {
+  std::vector<std::string> sources;                 // one or two
+  std::vector<std::filesystem::path> calibrations;  // for the first sources; the others' are found
+  CameraOptions options;                            // device format; `seed` is RunArguments::seed
+  Timestamp from{}, until{};                        // part of the source, from its first picture; 0: no bound
+};
+
+// What every subcommand that tracks takes.
+struct RunArguments {
+  CameraArguments cameras;
+  std::optional<Pace> pace;  // empty: see ResolvePace
+  EngineKind engine = EngineKind::kSixDof;
+  bool headless = false;
+  std::optional<std::filesystem::path> output;  // folder
+  std::optional<std::filesystem::path> record;  // video of the augmented view
+  std::uint64_t seed = 1;
+};
+
+struct AuthorOptions {
+  RunArguments run;
+  std::filesystem::path library;
+  std::optional<std::filesystem::path> script, record_script;
+};
+
+struct TourOptions {
+  RunArguments run;
+  std::filesystem::path library;
+};
+
+struct EvaluateOptions {
+  std::vector<std::string> sequences;  // folders or sim:SCENE
+  std::filesystem::path output;
+  std::vector<std::filesystem::path> calibrations;  // for the first sequences; the others' are found
+  Pace pace = Pace::kEager;
+  EngineKind engine = EngineKind::kSixDof;
+  std::uint64_t seed = 1;
+};
+
+struct DemoOptions {
+  bool headless = false;
+  std::optional<std::filesystem::path> output, record;
+  std::uint64_t seed = 1;
+};
+
+// The pace that was asked for, or else realtime for devices and windows and eager for headless files.
+Pace ResolvePace(const RunArguments& run, bool any_live);
+
+}  // namespace docent::app

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/run_arguments.h"
+
+#include <CLI/CLI.hpp>
+#include <map>
+
+#include "app/files/text_file.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+template <typename Choice>
+std::string JoinedNames(const std::map<std::string, Choice>& names) {
+  std::string joined;
+  for (const auto& [name, choice] : names) joined += (joined.empty() ? "" : "|") + name;
+  return joined;
+}
+
+// A word that stands for one of a few values; anything else is an error that names them all.
+template <typename Choice, typename Target>
+void AddChoice(CLI::App* command, const std::string& option, Target* target, const std::string& description,
+               const std::map<std::string, Choice>& names) {
+  command
+      ->add_option_function<std::string>(
+          option,
+          [=](const std::string& word) {
+            const auto found = names.find(word);
+            if (found == names.end()) {
+              throw CLI::ValidationError(option, "'" + word + "' is none of " + JoinedNames(names));
+            }
+            *target = found->second;
+          },
+          description)
+      ->type_name(JoinedNames(names));
+}
+
+void AddSeconds(CLI::App* command, const std::string& option, Timestamp* target,
+                const std::string& description) {
+  command
+      ->add_option_function<std::string>(
+          option,
+          [=](const std::string& text) {
+            const auto time = ParseSeconds(text);
+            if (!time || *time < Timestamp{}) {
+              throw CLI::ValidationError(option, "'" + text + "' is no number of seconds");
+            }
+            *target = *time;
+          },
+          description)
+      ->type_name("SECONDS");
+}
+
+}  // namespace
+
+void AddPaceOption(CLI::App* command, std::optional<Pace>* pace) {
+  AddChoice<Pace>(command, "--pace", pace, "How pictures are fed",
+                  {{"lockstep", Pace::kLockstep}, {"eager", Pace::kEager}, {"realtime", Pace::kRealtime}});
+}
+
+void AddEngineOption(CLI::App* command, EngineKind* engine) {
+  AddChoice<EngineKind>(
+      command, "--engine", engine,
+      "Plain six degrees of freedom (the default), or with panorama maps (not in this version)",
+      {{"hybrid", EngineKind::kHybrid}, {"sixdof", EngineKind::kSixDof}});
+}
+
+void AddSeedOption(CLI::App* command, std::uint64_t* seed) {
+  // Read as text: the parser's own numbers would let -1 wrap round to the largest seed.
+  command
+      ->add_option_function<std::string>(
+          "--seed",
+          [=](const std::string& text) {
+            const auto value = ParseInteger(text);
+            if (!value || *value < 0)
+              throw CLI::ValidationError("--seed", "'" + text + "' is no whole number from 0 on");
+            *seed = static_cast<std::uint64_t>(*value);
+          },
+          "Fixes every random choice")
+      ->type_name("N");
+}
+
+void AddRunArguments(CLI::App* command, RunArguments* run) {
+  command
+      ->add_option(
+          "--camera", run->cameras.sources,
+          "A device, a video file, a folder with an image sequence, or sim:SCENE; twice for the wearable")
+      ->required()
+      ->type_name("SOURCE")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--calibration", run->cameras.calibrations, "Calibration of each camera, in their order")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
+  command
+      ->add_option_function<std::string>(
+          "--camera-format",
+          [run](const std::string& text) {
+            try {
+              run->cameras.options.device_format = ParseDeviceFormat(text);
+            } catch (const Error& error) {
+              throw CLI::ValidationError("--camera-format", error.what());
+            }
+          },
+          "Size and rate that a device should deliver")
+      ->type_name("640x480@30");
+  AddSeconds(command, "--from", &run->cameras.from, "Begin so long after the first picture");
+  AddSeconds(command, "--until", &run->cameras.until, "End so long after the first picture");
+  AddPaceOption(command, &run->pace);
+  AddEngineOption(command, &run->engine);
+  AddSeedOption(command, &run->seed);
+  command->add_flag("--headless", run->headless, "Open no window");
+  command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");
+  command->add_option("--record", run->record, "Write the augmented view as a video")->type_name("FILE.mp4");
+}
+
+void CheckRunArguments(const RunArguments& run) {
+  if (run.cameras.sources.size() > 2) throw CLI::ValidationError("--camera", "at most two cameras");
+  if (run.cameras.calibrations.size() > run.cameras.sources.size()) {
+    throw CLI::ValidationError("--calibration", "more calibrations than cameras");
+  }
+  if (run.cameras.until > Timestamp{} && run.cameras.until <= run.cameras.from) {
+    throw CLI::ValidationError("--until", "does not lie after --from");
+  }
+}
+
+}  // namespace docent::app

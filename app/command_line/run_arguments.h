@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "app/command_line/options.h"
+
+namespace CLI {
+class App;
+}
+
+// The options that several subcommands share, so that a word means the same everywhere.
+namespace docent::app {
+
+void AddPaceOption(CLI::App* command, std::optional<Pace>* pace);
+void AddEngineOption(CLI::App* command, EngineKind* engine);
+void AddSeedOption(CLI::App* command, std::uint64_t* seed);
+// --camera, --calibration, --camera-format, --from, --until and all of the above, --headless, --output,
+// --record.
+void AddRunArguments(CLI::App* command, RunArguments* run);
+// What only shows when everything is read: more calibrations than cameras, an end before the beginning, no
+// output where there is no window either. Throws CLI::ValidationError.
+void CheckRunArguments(const RunArguments& run);
+
+}  // namespace docent::app

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+
+#include "app/command_line/run_guide.h"
+#include "app/command_line/runs.h"
+#include "app/script/script_file.h"
+
+namespace docent::app {
+
+void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
+  RefuseHybrid(options.run.engine);
+  GuideRequest request;
+  request.may_write = true;
+  request.title = "Docent - author";
+  if (options.script) {
+    request.script = ReadScript(*options.script);
+    request.script_name = options.script->string();
+    request.model_folder = options.script->parent_path();
+  }
+  CalibratedCamera camera = OpenArgumentCamera(options.run);
+  maps::Library library =
+      maps::Library::Open(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  request.library = &library;
+  request.pace = ResolvePace(options.run, camera.source->info().live);
+  request.headless = options.run.headless;
+  request.seed = options.run.seed;
+  request.output = options.run.output;
+  request.record = options.run.record;
+  request.record_script = options.record_script;
+  const auto maps = RunGuide(request, &camera, verbosity);
+  if (verbosity == Verbosity::kQuiet) return;
+  for (const Session::MapState& map : maps) {
+    if (map.discarded || !map.snapshot) continue;
+    std::printf("%s: %zu keyframes, %zu points, %zu things\n", map.name.c_str(),
+                map.snapshot->keyframes.size(), map.snapshot->points.size(), map.scene->entities.size());
+  }
+}
+
+void RunTour(const TourOptions& options, Verbosity verbosity) {
+  RefuseHybrid(options.run.engine);
+  CalibratedCamera camera = OpenArgumentCamera(options.run);
+  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadOnly);
+  GuideRequest request;
+  request.library = &library;
+  request.title = "Docent - tour";
+  request.pace = ResolvePace(options.run, camera.source->info().live);
+  request.headless = options.run.headless;
+  request.seed = options.run.seed;
+  request.output = options.run.output;
+  request.record = options.run.record;
+  std::uint64_t frames = 0, named = 0;
+  request.on_frame = [&](const ShownFrame& frame) {
+    ++frames;
+    if (engine::HasPose(frame.tracked.state)) ++named;
+  };
+  RunGuide(request, &camera, verbosity);
+  if (verbosity == Verbosity::kQuiet) return;
+  std::printf("%llu of %llu frames with a pose in one of %zu maps\n", static_cast<unsigned long long>(named),
+              static_cast<unsigned long long>(frames), library.List().size());
+}
+
+}  // namespace docent::app

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
+#include <utility>
+
+#include "app/cameras/clipped_source.h"
+#include "app/cameras/simulated_source.h"
+#include "app/command_line/run_guide.h"
+#include "app/command_line/runs.h"
+#include "app/demo/exhibit_model.h"
+#include "app/demo/museum_director.h"
+#include "app/evaluation/html_report.h"
+#include "app/evaluation/json_report.h"
+#include "app/evaluation/simulated_truth.h"
+#include "app/files/text_file.h"
+#include "engine/base/error.h"
+#include "ui/context.h"
+#include "ui/map_view.h"
+
+namespace docent::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kScene = "museum:3";
+
+fs::path OutputFolder(const DemoOptions& options) {
+  if (options.output) {
+    MakeFolder(*options.output);
+    return *options.output;
+  }
+  std::string pattern = (fs::temp_directory_path() / "docent-demo-XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) throw Error("Cannot make a folder '" + pattern + "'.");
+  return pattern;
+}
+
+void WriteModel(const fs::path& path) {
+  const std::vector<std::uint8_t> glb = MakeExhibitGlb();
+  CheckedFile file(path);
+  file.Write(std::string_view(reinterpret_cast<const char*>(glb.data()), glb.size()));
+  file.Close();
+}
+
+void WritePicture(const fs::path& path, const cv::Mat& picture) {
+  if (!cv::imwrite(path.string(), picture)) throw Error("Cannot write '" + path.string() + "'.");
+}
+
+// "Bay 3" in a file's name.
+std::string FileName(std::string name) {
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == ' ' || c == '/'; }, '-');
+  return name;
+}
+
+// One half of the demonstration: a part of the simulated way, with its record for the report.
+class DemoRun {
+ public:
+  DemoRun(std::shared_ptr<const Simulation> simulation, int first_frame, int end_frame, std::string name)
+      : simulation_(std::move(simulation)), first_frame_(first_frame), end_frame_(end_frame) {
+    run_.run.name = std::move(name);
+  }
+
+  void Run(GuideRequest request, Verbosity verbosity) {
+    const auto start = std::chrono::steady_clock::now();
+    RunRecorder recorder;
+    request.on_frame = [&, then = std::move(request.on_frame)](const ShownFrame& frame) {
+      recorder.Add(frame.tracked);
+      if (then) then(frame);
+    };
+    const Timestamp begin = simulation_->time(0);
+    auto source = OpenSimulation(simulation_);
+    const Timestamp until =
+        end_frame_ < simulation_->frame_count() ? simulation_->time(end_frame_) - begin : Timestamp{};
+    CalibratedCamera camera = Calibrate(
+        ClipSource(std::move(source), simulation_->time(first_frame_) - begin, until), std::nullopt);
+    maps_ = RunGuide(request, &camera, verbosity);
+    run_.run.frames = recorder.frames();
+    for (const Session::MapState& map : maps_) {
+      if (!map.snapshot) continue;
+      run_.run.maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
+      run_.run.maps.back().discarded = map.discarded;
+    }
+    run_.run.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    run_.run.peak_memory_mb = PeakMemoryMegabytes();
+    run_.truth = GroundTruthOf(*simulation_);
+    run_.segments = SegmentsOf(*simulation_);
+    run_.report = EvaluateRun(run_.run, run_.truth, run_.segments);
+  }
+
+  const EvaluatedRun& evaluated() const { return run_; }
+  const std::vector<Session::MapState>& maps() const { return maps_; }
+
+ private:
+  std::shared_ptr<const Simulation> simulation_;
+  const int first_frame_, end_frame_;
+  EvaluatedRun run_;
+  std::vector<Session::MapState> maps_;
+};
+
+GuideRequest CommonRequest(const DemoOptions& options, maps::Library* library, const fs::path& output) {
+  GuideRequest request;
+  request.library = library;
+  request.headless = options.headless;
+  // Without a window nobody waits for the pictures' own time, and lockstep shows the same on every machine.
+  request.pace = options.headless ? Pace::kLockstep : Pace::kRealtime;
+  request.seed = options.seed;
+  request.output = output;
+  return request;
+}
+
+// One picture of the tour for each map: the frame in which it has been seen for a second.
+class TourPictures {
+ public:
+  explicit TourPictures(fs::path folder) : folder_(std::move(folder)) {}
+  void Add(const ShownFrame& frame, const cv::Mat& picture) {
+    if (!engine::HasPose(frame.tracked.state)) return;
+    constexpr int kFrames = 30;
+    if (++seen_[frame.shown.map_name] != kFrames) return;
+    WritePicture(folder_ / ("tour-" + FileName(frame.shown.map_name) + ".png"), picture);
+  }
+
+ private:
+  const fs::path folder_;
+  std::map<std::string, int> seen_;
+};
+
+void DrawMaps(const std::vector<Session::MapState>& maps, const fs::path& folder) {
+  ui::OffscreenContext context;
+  ui::MapView view;
+  cv::Mat picture;
+  for (const Session::MapState& map : maps) {
+    if (map.discarded || !map.snapshot) continue;
+    view.Draw(*map.snapshot, map.scene.get(), ui::OrbitAbove(*map.snapshot), map.name);
+    view.ReadBack(&picture);
+    WritePicture(folder / ("map-" + FileName(map.name) + ".png"), picture);
+  }
+}
+
+void PrintSummary(const DrawingCheck& check, std::size_t maps, const fs::path& folder) {
+  std::printf(
+      "%zu maps built and furnished; on the tour %d of %d frames at a bay named a map, %d the right one\n",
+      maps, check.named(), check.visit_frames(), check.named_rightly());
+  if (!check.errors_px().empty()) {
+    std::printf("drawn %zu times, half of them within %s pixels of where they were put, 95 %% within %s\n",
+                check.errors_px().size(), FormatNumber(Quantile(check.errors_px(), 0.5), 3).c_str(),
+                FormatNumber(Quantile(check.errors_px(), 0.95), 3).c_str());
+  }
+  std::printf("%s\n", folder.string().c_str());
+}
+
+}  // namespace
+
+void RunDemo(const DemoOptions& options, Verbosity verbosity) {
+  const fs::path folder = OutputFolder(options);
+  SimulationOptions simulation_options;
+  simulation_options.seed = options.seed;
+  const std::shared_ptr<const Simulation> simulation = MakeSimulation(kScene, simulation_options);
+  const fs::path library_path = folder / "museum.docent";
+  std::error_code error;
+  fs::remove(library_path, error);  // of an earlier demonstration in the same folder
+  WriteModel(folder / "exhibit.glb");
+
+  MuseumDirector director(*simulation, "exhibit.glb");
+  DemoRun author(simulation, 0, director.first_visit_frame(), "author");
+  {
+    maps::Library library =
+        maps::Library::Open(library_path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    GuideRequest request = CommonRequest(options, &library, folder / "author");
+    request.may_write = true;
+    request.model_folder = folder;
+    request.record_script = folder / "author" / "script.txt";
+    request.title = "Docent demonstration - the author";
+    request.director = [&](const ShownFrame& frame) { return director.Direct(frame); };
+    author.Run(std::move(request), verbosity);
+  }
+
+  DemoRun tour(simulation, director.first_visit_frame(), simulation->frame_count(), "tour");
+  DrawingCheck check(*simulation, director.truths());
+  {
+    maps::Library library = maps::Library::Open(library_path, maps::Access::kReadOnly);
+    GuideRequest request = CommonRequest(options, &library, folder / "tour");
+    request.title = "Docent demonstration - the tour";
+    request.record = options.record ? *options.record : folder / "tour.mp4";
+    TourPictures pictures(folder);
+    request.on_frame = [&](const ShownFrame& frame) { check.Add(frame); };
+    request.on_picture = [&](const ShownFrame& frame, const cv::Mat& picture) {
+      pictures.Add(frame, picture);
+    };
+    tour.Run(std::move(request), verbosity);
+  }
+  DrawMaps(tour.maps(), folder);
+  WriteJsonReport(folder / "report.json", {author.evaluated().report, tour.evaluated().report});
+  WriteHtmlReport(folder / "report.html", {author.evaluated(), tour.evaluated()});
+  if (verbosity != Verbosity::kQuiet) {
+    PrintSummary(check, tour.maps().size(), folder);
+  } else {
+    std::printf("%s\n", folder.string().c_str());
+  }
+}
+
+}  // namespace docent::app

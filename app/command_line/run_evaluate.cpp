@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <set>
+#include <utility>
+
+#include "app/cameras/simulated_source.h"
+#include "app/command_line/progress.h"
+#include "app/command_line/runs.h"
+#include "app/evaluation/html_report.h"
+#include "app/evaluation/json_report.h"
+#include "app/evaluation/simulated_truth.h"
+#include "app/output/run_output.h"
+#include "app/session/frame_loop.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+// A sequence with what is known to be true of it.
+struct Sequence {
+  CalibratedCamera camera;
+  std::vector<TimedPose> truth;
+  std::vector<TimedLabel> segments;
+};
+
+Sequence OpenSequence(const EvaluateOptions& options, std::size_t index) {
+  const std::string& word = options.sequences[index];
+  std::optional<std::filesystem::path> calibration;
+  if (index < options.calibrations.size()) calibration = options.calibrations[index];
+  Sequence sequence;
+  if (word.starts_with("sim:")) {
+    SimulationOptions simulation_options;
+    simulation_options.seed = options.seed;
+    const std::shared_ptr<const Simulation> simulation = MakeSimulation(word.substr(4), simulation_options);
+    sequence.truth = GroundTruthOf(*simulation);
+    sequence.segments = SegmentsOf(*simulation);
+    sequence.camera = Calibrate(OpenSimulation(simulation), calibration);
+    return sequence;
+  }
+  CameraOptions camera_options;
+  camera_options.seed = options.seed;
+  sequence.camera = Calibrate(OpenCamera(word, camera_options), calibration);
+  const SourceInfo& info = sequence.camera.source->info();
+  if (info.live) throw Error("'" + word + "' is a live camera; evaluate takes recorded sequences.");
+  if (info.ground_truth_path) sequence.truth = ReadGroundTruth(*info.ground_truth_path);
+  if (info.segments_path) sequence.segments = ReadSegments(*info.segments_path);
+  return sequence;
+}
+
+SessionOptions OptionsFor(const EvaluateOptions& options) {
+  SessionOptions session;
+  session.threaded = options.pace != Pace::kLockstep;
+  session.first_map = "map";
+  session.seed = options.seed;
+  return session;
+}
+
+// Tracks the whole sequence in a fresh session and leaves its files in `folder`.
+RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const std::string& name,
+                Verbosity verbosity) {
+  RunRecord record;
+  record.name = name;
+  ResetPeakMemory();
+  const auto start = std::chrono::steady_clock::now();
+  RunOutput output(options.output / name);
+  RunRecorder recorder;
+  Session session(OptionsFor(options), {camera->model}, nullptr);
+  Progress progress(name, camera->source->info().frame_count, verbosity);
+  FrameLoopOptions loop;
+  loop.pace = options.pace;
+  const auto write_events = [&] {
+    for (const Event& event : session.TakeEvents()) output.Add(event);
+  };
+  try {
+    RunFrames(camera, &session, loop,
+              [&](const engine::TrackedFrame& frame) {
+                recorder.Add(frame);
+                output.Add(frame, session.ShownWith(frame).map_name);
+                write_events();
+                progress.Update(recorder.frames().size());
+              },
+              {});
+    session.Finish();
+  } catch (...) {
+    write_events();
+    output.Close();
+    throw;
+  }
+  write_events();
+  output.Close();
+  record.frames = recorder.frames();
+  for (const Session::MapState& map : session.Maps()) {
+    if (!map.snapshot) continue;
+    record.maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
+    record.maps.back().discarded = map.discarded;
+  }
+  const engine::MapperTimes times = session.MappingTimes();
+  record.mapping.bundle_adjustment_s = times.bundle_adjustment;
+  record.mapping.other_s = times.other;
+  record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  record.peak_memory_mb = PeakMemoryMegabytes();
+  return record;
+}
+
+// Names the sequence's folder below the output: no separators, and no two alike.
+std::string FreeFolderName(std::string name, std::set<std::string>* taken) {
+  for (char& c : name) {
+    if (c == '/' || c == ':') c = '-';
+  }
+  if (name.empty() || name == "." || name == "..") name = "sequence";
+  std::string free = name;
+  for (int number = 2; !taken->insert(free).second; ++number) free = name + "-" + std::to_string(number);
+  return free;
+}
+
+}  // namespace
+
+void RefuseHybrid(EngineKind engine) {
+  if (engine == EngineKind::kHybrid) {
+    throw Error("This version makes no panorama maps yet; use --engine sixdof, which is the default.");
+  }
+}
+
+void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity) {
+  RefuseHybrid(options.engine);
+  std::vector<EvaluatedRun> runs;
+  std::vector<SequenceReport> reports;
+  std::set<std::string> taken;
+  std::exception_ptr failure;
+  for (std::size_t i = 0; i < options.sequences.size() && !failure; ++i) {
+    try {
+      Sequence sequence = OpenSequence(options, i);
+      MakeFolder(options.output);  // not before there is something to put into it
+      const std::string name = FreeFolderName(sequence.camera.source->info().name, &taken);
+      EvaluatedRun run;
+      run.run = Track(options, &sequence.camera, name, verbosity);
+      run.truth = std::move(sequence.truth);
+      run.segments = std::move(sequence.segments);
+      run.report = EvaluateRun(run.run, run.truth, run.segments);
+      reports.push_back(run.report);
+      if (verbosity != Verbosity::kQuiet) {
+        std::printf("%s\n", FormatSummary(run.report).c_str());
+        std::fflush(stdout);
+      }
+      runs.push_back(std::move(run));
+    } catch (const Error&) {
+      // What was evaluated before is reported all the same.
+      failure = std::current_exception();
+    }
+  }
+  if (!runs.empty()) {
+    WriteJsonReport(options.output / "report.json", reports);
+    WriteHtmlReport(options.output / "report.html", runs);
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace docent::app

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <utility>
+
+#include "app/command_line/program.h"
+#include "app/command_line/run_arguments.h"
+
+namespace docent::app {
+
+void AddTourCommand(CLI::App* program, Invocation* invocation,
+                    std::function<void(const TourOptions&, Verbosity)> run) {
+  CLI::App* command =
+      AddSubcommand(program, "tour", "Use the maps of a library; nothing in it changes",
+                    "docent tour --library museum.docent --camera /dev/video0 --calibration camera.yaml");
+  const auto options = std::make_shared<TourOptions>();
+  command->add_option("--library", options->library, "The library's file")->required();
+  AddRunArguments(command, &options->run);
+  command->callback([=, run = std::move(run)] {
+    CheckRunArguments(options->run);
+    invocation->run = [=] { run(*options, invocation->verbosity); };
+  });
+}
+
+}  // namespace docent::app

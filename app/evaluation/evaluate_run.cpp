@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/evaluation/evaluate_run.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+namespace docent::app {
+
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+// A frame with a pose and with a true pose.
+struct Pair {
+  std::size_t frame = 0;
+  engine::Rigid3 map_from_camera, truth_from_camera;
+};
+
+class RootMeanSquare {
+ public:
+  void Add(double value) {
+    sum_ += value * value;
+    ++count_;
+  }
+  std::optional<double> Get() const {
+    return count_ == 0 ? std::nullopt : std::optional(std::sqrt(sum_ / static_cast<double>(count_)));
+  }
+
+ private:
+  double sum_ = 0;
+  std::size_t count_ = 0;
+};
+
+// The rotation truth_from_map that is nearest to all truth_from_camera * camera_from_map in the sum of
+// squared chords (Hartley et al., "Rotation Averaging", 2013, section 5.3).
+engine::Rotation3 AlignRotations(const std::vector<Pair>& pairs) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const Pair& pair : pairs) {
+    sum += (pair.truth_from_camera.rotation * pair.map_from_camera.rotation.inverse()).matrix();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
+  if (rotation.determinant() < 0) {
+    rotation = svd.matrixU() * Eigen::Vector3d(1, 1, -1).asDiagonal() * svd.matrixV().transpose();
+  }
+  return engine::Rotation3(rotation);
+}
+
+double DriftDegrees(const Pair& first, const Pair& last) {
+  const auto turn = [](const engine::Rigid3& a, const engine::Rigid3& b) {
+    return a.rotation.inverse() * b.rotation;
+  };
+  const engine::Rotation3 true_turn = turn(first.truth_from_camera, last.truth_from_camera);
+  return (true_turn.inverse() * turn(first.map_from_camera, last.map_from_camera)).Angle() * kDegrees;
+}
+
+void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<FrameResult>* frames) {
+  if (pairs.empty()) return;
+  const engine::Rotation3 truth_from_map_rotation = AlignRotations(pairs);
+  RootMeanSquare rotation_error;
+  for (const Pair& pair : pairs) {
+    const engine::Rotation3 aligned = truth_from_map_rotation * pair.map_from_camera.rotation;
+    const double error_deg = (pair.truth_from_camera.rotation.inverse() * aligned).Angle() * kDegrees;
+    (*frames)[pair.frame].rotation_error_deg = error_deg;
+    rotation_error.Add(error_deg);
+  }
+  map->rotation_rmse_deg = rotation_error.Get();
+  map->rotation_drift_deg = DriftDegrees(pairs.front(), pairs.back());
+
+  std::vector<Eigen::Vector3d> in_truth, in_map;
+  for (const Pair& pair : pairs) {
+    in_truth.push_back(pair.truth_from_camera.translation);
+    in_map.push_back(pair.map_from_camera.translation);
+  }
+  const std::optional<engine::Sim3> truth_from_map = engine::AlignSim3(in_truth, in_map);
+  if (!truth_from_map) return;
+  RootMeanSquare position_error;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    FrameResult& frame = (*frames)[pairs[i].frame];
+    frame.position_in_truth = *truth_from_map * in_map[i];
+    frame.position_error_m = (*frame.position_in_truth - in_truth[i]).norm();
+    position_error.Add(*frame.position_error_m);
+  }
+  map->ate_rmse_m = position_error.Get();
+  map->scale = truth_from_map->scale;
+}
+
+// One result a map, in the order in which the frames entered them.
+std::vector<MapResult> ListMaps(const RunRecord& run) {
+  std::vector<MapResult> maps;
+  const auto find = [&maps](std::uint64_t key) {
+    return std::find_if(maps.begin(), maps.end(), [key](const MapResult& map) { return map.key == key; });
+  };
+  for (const FrameRecord& frame : run.frames) {
+    if (!engine::HasPose(frame.state)) continue;
+    const auto found = find(frame.map_key);
+    if (found != maps.end()) {
+      ++found->frames;
+      continue;
+    }
+    MapResult map;
+    map.key = frame.map_key;
+    map.frames = 1;
+    maps.push_back(map);
+  }
+  for (const MapRecord& record : run.maps) {
+    auto found = find(record.key);
+    if (found == maps.end()) {
+      maps.emplace_back().key = record.key;
+      found = std::prev(maps.end());
+    }
+    found->name = record.name;
+    found->discarded = record.discarded;
+  }
+  return maps;
+}
+
+void CountFrames(const RunRecord& run, SequenceReport* report) {
+  std::map<std::uint64_t, bool> discarded;
+  for (const MapRecord& map : run.maps) discarded[map.key] = map.discarded;
+  std::vector<double> tracking_ms;
+  report->frames = static_cast<int>(run.frames.size());
+  report->frame_results.resize(run.frames.size());
+  for (std::size_t i = 0; i < run.frames.size(); ++i) {
+    const FrameRecord& frame = run.frames[i];
+    if (frame.state != engine::TrackingState::kDropped) tracking_ms.push_back(frame.tracking_ms);
+    if (!engine::HasPose(frame.state)) continue;
+    if (discarded[frame.map_key]) {
+      ++report->discarded_frames;
+      continue;
+    }
+    report->frame_results[i].tracked = true;
+    ++report->tracked;
+    if (frame.state == engine::TrackingState::kRelocalized) ++report->relocalizations;
+    if (!report->first_tracked_frame) report->first_tracked_frame = static_cast<int>(i);
+  }
+  if (report->first_tracked_frame) {
+    report->tracked_ratio =
+        static_cast<double>(report->tracked) / (report->frames - *report->first_tracked_frame);
+  }
+  report->tracking_median_ms = Quantile(tracking_ms, 0.5);
+  report->tracking_p95_ms = Quantile(tracking_ms, 0.95);
+  report->tracking_max_ms = Quantile(tracking_ms, 1);
+}
+
+void SumMaps(const RunRecord& run, SequenceReport* report) {
+  for (const MapRecord& map : run.maps) {
+    if (map.discarded) continue;
+    report->keyframes.sixdof += map.keyframes.sixdof;
+    report->keyframes.panorama += map.keyframes.panorama;
+    report->keyframes.localized += map.keyframes.localized;
+    report->points.finite += map.points.finite;
+    report->points.infinite += map.points.infinite;
+    report->points.converted += map.points.converted;
+  }
+}
+
+void CompareWithTruth(const RunRecord& run, const std::vector<TimedPose>& truth,
+                      const EvaluationOptions& options, SequenceReport* report) {
+  std::map<std::uint64_t, std::vector<Pair>> pairs_of_map;
+  for (std::size_t i = 0; i < run.frames.size(); ++i) {
+    const FrameRecord& frame = run.frames[i];
+    if (!report->frame_results[i].tracked) continue;
+    const TimedPose* pose = FindPose(truth, frame.time, options.max_time_difference);
+    if (!pose) continue;
+    pairs_of_map[frame.map_key].push_back({i, frame.camera_from_map.inverse(), pose->truth_from_camera});
+  }
+  for (std::size_t i = 0; i < report->maps.size(); ++i) {
+    MapResult& map = report->maps[i];
+    if (map.discarded) continue;
+    CompareMap(pairs_of_map[map.key], &map, &report->frame_results);
+    const bool larger = !report->largest_map || map.frames > report->maps[*report->largest_map].frames;
+    if (map.frames > 0 && larger) report->largest_map = i;
+  }
+  if (!report->largest_map) return;
+  const MapResult& largest = report->maps[*report->largest_map];
+  report->ate_rmse_m = largest.ate_rmse_m;
+  report->scale = largest.scale;
+  report->rotation_rmse_deg = largest.rotation_rmse_deg;
+  report->rotation_drift_deg = largest.rotation_drift_deg;
+}
+
+std::vector<SegmentResult> EvaluateSegments(const RunRecord& run, const std::vector<TimedLabel>& labels,
+                                            const std::vector<FrameResult>& results) {
+  std::vector<SegmentResult> segments;
+  std::vector<RootMeanSquare> errors;
+  std::map<std::string, std::size_t> index_of_label;
+  for (std::size_t i = 0; i < run.frames.size(); ++i) {
+    const TimedLabel* label = FindLabel(labels, run.frames[i].time);
+    if (!label) continue;
+    const auto [entry, is_new] = index_of_label.try_emplace(label->label, segments.size());
+    if (is_new) {
+      segments.emplace_back().label = label->label;
+      errors.emplace_back();
+    }
+    SegmentResult& segment = segments[entry->second];
+    ++segment.frames;
+    if (results[i].tracked) ++segment.tracked;
+    if (results[i].position_error_m) errors[entry->second].Add(*results[i].position_error_m);
+  }
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    segments[i].tracked_ratio = static_cast<double>(segments[i].tracked) / segments[i].frames;
+    segments[i].ate_rmse_m = errors[i].Get();
+  }
+  return segments;
+}
+
+}  // namespace
+
+double Quantile(std::vector<double> values, double part) {
+  if (values.empty()) return 0;
+  const double rank = std::ceil(part * static_cast<double>(values.size()));
+  const auto index = static_cast<std::size_t>(std::clamp(rank, 1.0, static_cast<double>(values.size()))) - 1;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(index), values.end());
+  return values[index];
+}
+
+SequenceReport EvaluateRun(const RunRecord& run, const std::vector<TimedPose>& truth,
+                           const std::vector<TimedLabel>& segments, const EvaluationOptions& options) {
+  SequenceReport report;
+  report.name = run.name;
+  report.mapping = run.mapping;
+  report.wall_s = run.wall_s;
+  report.peak_memory_mb = run.peak_memory_mb;
+  report.maps = ListMaps(run);
+  CountFrames(run, &report);
+  SumMaps(run, &report);
+  CompareWithTruth(run, truth, options, &report);
+  report.segments = EvaluateSegments(run, segments, report.frame_results);
+  return report;
+}
+
+}  // namespace docent::app

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/evaluation/json_report.h"
+
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "app/files/checked_file.h"
+
+namespace docent::app {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <typename Value>
+Json OrNull(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json ToJson(const MapResult& map) {
+  return {{"name", map.name},
+          {"discarded", map.discarded},
+          {"frames", map.frames},
+          {"ate_rmse_m", OrNull(map.ate_rmse_m)},
+          {"rotation_rmse_deg", OrNull(map.rotation_rmse_deg)},
+          {"rotation_drift_deg", OrNull(map.rotation_drift_deg)},
+          {"scale", OrNull(map.scale)}};
+}
+
+Json ToJson(const SegmentResult& segment) {
+  return {{"label", segment.label},
+          {"frames", segment.frames},
+          {"tracked", segment.tracked},
+          {"tracked_ratio", segment.tracked_ratio},
+          {"ate_rmse_m", OrNull(segment.ate_rmse_m)}};
+}
+
+Json ToJson(const SequenceReport& report) {
+  Json json = {
+      {"name", report.name},
+      {"frames", report.frames},
+      {"tracked", report.tracked},
+      {"tracked_ratio", report.tracked_ratio},
+      {"first_tracked_frame", OrNull(report.first_tracked_frame)},
+      {"relocalizations", report.relocalizations},
+      {"ate_rmse_m", OrNull(report.ate_rmse_m)},
+      {"rotation_rmse_deg", OrNull(report.rotation_rmse_deg)},
+      {"rotation_drift_deg", OrNull(report.rotation_drift_deg)},
+      {"scale", OrNull(report.scale)},
+      {"keyframes",
+       {{"sixdof", report.keyframes.sixdof},
+        {"panorama", report.keyframes.panorama},
+        {"localized", report.keyframes.localized}}},
+      {"points",
+       {{"finite", report.points.finite},
+        {"infinite", report.points.infinite},
+        {"converted", report.points.converted}}},
+      {"tracking_ms",
+       {{"median", report.tracking_median_ms},
+        {"p95", report.tracking_p95_ms},
+        {"max", report.tracking_max_ms}}},
+      {"mapping_s",
+       {{"bundle_adjustment", report.mapping.bundle_adjustment_s},
+        {"panorama_localization", report.mapping.panorama_localization_s},
+        {"infinite_triangulation", report.mapping.infinite_triangulation_s},
+        {"other", report.mapping.other_s}}},
+      {"wall_s", report.wall_s},
+      {"peak_memory_mb", report.peak_memory_mb},
+      {"discarded_frames", report.discarded_frames},
+      {"maps", Json::array()},
+      {"segments", Json::array()},
+  };
+  for (const MapResult& map : report.maps) json["maps"].push_back(ToJson(map));
+  for (const SegmentResult& segment : report.segments) json["segments"].push_back(ToJson(segment));
+  return json;
+}
+
+std::string Format(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+}  // namespace
+
+std::string FormatJsonReport(const std::vector<SequenceReport>& reports) {
+  Json json = {{"sequences", Json::array()}};
+  for (const SequenceReport& report : reports) json["sequences"].push_back(ToJson(report));
+  // A folder's name need not be UTF-8; a report that cannot be written for its name would be worse than a
+  // '?'.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports) {
+  CheckedFile file(path);
+  file.Write(FormatJsonReport(reports));
+  file.Close();
+}
+
+std::string FormatSummary(const SequenceReport& report) {
+  std::string text = report.name + ": ";
+  if (!report.first_tracked_frame) {
+    text += "never tracked in " + std::to_string(report.frames) + " frames";
+  } else {
+    text += Format("%.1f %%", report.tracked_ratio * 100) + " tracked from frame " +
+            std::to_string(*report.first_tracked_frame) + " of " + std::to_string(report.frames) + " on";
+  }
+  if (report.ate_rmse_m) text += ", ATE " + Format("%.1f cm", *report.ate_rmse_m * 100);
+  if (report.rotation_rmse_deg) text += ", rotation " + Format("%.2f deg", *report.rotation_rmse_deg);
+  text += ", " + Format("%.1f ms", report.tracking_median_ms) +
+          " a frame (95 %: " + Format("%.1f ms", report.tracking_p95_ms) + ")";
+  if (report.discarded_frames > 0) {
+    text +=
+        "; " + std::to_string(report.discarded_frames) + " frames in maps given up later count as untracked";
+  }
+  return text;
+}
+
+}  // namespace docent::app

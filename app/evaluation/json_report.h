@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "app/evaluation/evaluate_run.h"
+
+namespace docent::app {
+
+// report.json: one object a sequence under `sequences`, with the fields of command-line.md and, beyond them,
+// `discarded_frames`, `maps` and `segments`. What is not known is null.
+std::string FormatJsonReport(const std::vector<SequenceReport>& reports);
+void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports);
+
+// One line a sequence for the terminal, such as "kitchen: 97.2 % tracked, ATE 5.1 cm, 4.0 ms a frame".
+std::string FormatSummary(const SequenceReport& report);
+
+}  // namespace docent::app

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "engine/base/time.h"
+#include "engine/tracking/tracked_frame.h"
+
+// What a run leaves for its evaluation: plain numbers, no pictures and no maps, so that it can be kept whole
+// and made up by tests.
+namespace docent::app {
+
+struct KeyFrameCounts {
+  int sixdof = 0, panorama = 0;
+  int localized = 0;  // panorama keyframes that have got a position of their own
+  bool operator==(const KeyFrameCounts&) const = default;
+};
+
+struct PointCounts {
+  int finite = 0, infinite = 0;
+  int converted = 0;  // infinite points that became finite
+  bool operator==(const PointCounts&) const = default;
+};
+
+// One picture of one camera.
+struct FrameRecord {
+  Timestamp time{};
+  engine::TrackingState state = engine::TrackingState::kInitializing;
+  std::uint64_t map_key = 0;       // 0 when there is none
+  engine::Rigid3 camera_from_map;  // valid when HasPose(state); as it was told live, never smoothed
+  int finite_points = 0, infinite_points = 0;
+  double quality = 0;
+  double tracking_ms = 0;
+  KeyFrameCounts map_keyframes;  // size of the map at that time
+  PointCounts map_points;
+};
+
+struct MapRecord {
+  std::uint64_t key = 0;
+  std::string name;
+  bool discarded = false;  // given up during the run (a false start): its frames count as untracked
+  KeyFrameCounts keyframes;
+  PointCounts points;
+  std::vector<Eigen::Vector3d> positions;  // of finite points, map frame, for the view from above
+};
+
+// Seconds that the mapper spent, by task.
+struct MappingTimes {
+  double bundle_adjustment_s = 0, panorama_localization_s = 0, infinite_triangulation_s = 0, other_s = 0;
+};
+
+struct RunRecord {
+  std::string name;                 // of the sequence
+  std::vector<FrameRecord> frames;  // one camera, by time, dropped ones too
+  std::vector<MapRecord> maps;
+  MappingTimes mapping;
+  double wall_s = 0;
+  double peak_memory_mb = 0;
+};
+
+// Fills frames and maps from what the session delivers. One thread.
+class RunRecorder {
+ public:
+  void Add(const engine::TrackedFrame& frame);
+  const std::vector<FrameRecord>& frames() const { return frames_; }
+
+ private:
+  std::vector<FrameRecord> frames_;
+  std::uint64_t counted_map_ = 0, counted_revision_ = 0;  // what `keyframes_` and `points_` were counted in
+  KeyFrameCounts keyframes_;
+  PointCounts points_;
+};
+
+// Counts and positions of a map as it is now; `converted` and `localized` are the mapper's to add.
+MapRecord MakeMapRecord(std::uint64_t key, const std::string& name, const engine::MapSnapshot& map);
+
+// Highest resident memory of this process since it began or since ResetPeakMemory, in megabytes (2^20 bytes);
+// 0 where the system does not say.
+double PeakMemoryMegabytes();
+void ResetPeakMemory();
+
+}  // namespace docent::app

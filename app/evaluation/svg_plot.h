@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace docent::app {
+
+// A plot as inline SVG: axes with round ticks, lines, dots and bands. Collect everything, then call Finish
+// once; the ranges fit what was added. Values that are not finite are left out, and a line is parted there.
+class SvgPlot {
+ public:
+  struct Point {
+    double x = 0, y = 0;
+  };
+
+  SvgPlot(std::string title, std::string x_label, std::string y_label);
+
+  // `color` is a CSS colour; a label that is not empty goes to the legend.
+  void AddLine(std::vector<Point> points, const std::string& color, const std::string& label);
+  void AddDots(std::vector<Point> points, const std::string& color, const std::string& label,
+               double radius_px = 1.2);
+  // A coloured strip over the whole height from x = begin to end.
+  void AddBand(double begin, double end, const std::string& color);
+  // A legend entry without a line of its own, for bands.
+  void AddLegend(const std::string& color, const std::string& label);
+  // Both axes get the same scale, for views from above.
+  void KeepAspect() { keep_aspect_ = true; }
+  // No y axis: only bands.
+  void HideYAxis() { hide_y_axis_ = true; }
+  void SetHeight(int height_px) { height_px_ = height_px; }
+
+  std::string Finish() const;
+
+ private:
+  struct Series {
+    std::vector<Point> points;
+    std::string color;
+    double radius_px = 0;  // 0: a line
+  };
+  struct Band {
+    double begin = 0, end = 0;
+    std::string color;
+  };
+  struct Frame;
+
+  Frame FitFrame() const;
+  std::string DrawAxes(const Frame& frame) const;
+  std::string DrawSeries(const Frame& frame, const Series& series) const;
+  std::string DrawLegend() const;
+
+  std::string title_, x_label_, y_label_;
+  std::vector<Series> series_;
+  std::vector<Band> bands_;
+  std::vector<std::pair<std::string, std::string>> legend_;  // colour, label
+  bool keep_aspect_ = false, hide_y_axis_ = false;
+  int height_px_ = 260;
+};
+
+// Text for HTML and SVG: & < > " ' replaced.
+std::string EscapeHtml(const std::string& text);
+// About `count` round values that cover [low, high].
+std::vector<double> RoundTicks(double low, double high, int count);
+
+}  // namespace docent::app

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/files/checked_file.h"
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+CheckedFile::CheckedFile(const std::filesystem::path& path) : path_(path), part_(path) {
+  part_ += ".part";
+  file_ = std::fopen(part_.c_str(), "wb");
+  if (!file_) Fail(errno);
+}
+
+CheckedFile::~CheckedFile() {
+  if (file_) std::fclose(file_);
+}
+
+void CheckedFile::Fail(int error) const {
+  throw Error("Cannot write '" + path_.string() + "': " + std::strerror(error) + ".");
+}
+
+void CheckedFile::Write(std::string_view text) {
+  if (std::fwrite(text.data(), 1, text.size(), file_) != text.size()) Fail(errno);
+}
+
+void CheckedFile::Flush() {
+  if (std::fflush(file_) != 0) Fail(errno);
+}
+
+void CheckedFile::Close() {
+  Flush();
+  std::FILE* file = file_;
+  file_ = nullptr;
+  if (std::fclose(file) != 0) Fail(errno);
+  std::error_code error;
+  std::filesystem::rename(part_, path_, error);
+  if (error) Fail(error.value());
+}
+
+void MakeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder)) {
+    throw Error("Cannot make the folder '" + folder.string() +
+                "': " + (error ? error.message() : std::string("something else has that name")) + ".");
+  }
+}
+
+}  // namespace docent::app

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/base/time.h"
+
+// Reading small files of the outside world: whole files with a bounded size, lines with their numbers, and
+// numbers that are checked before they are believed. Nothing here depends on the locale.
+namespace docent::app {
+
+// The whole file. Throws Error when it is missing, a folder, unreadable, or larger than max_bytes.
+std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{64} << 20);
+// The same into a buffer that is used again, for pictures.
+void ReadBytes(const std::filesystem::path& path, std::size_t max_bytes, std::vector<std::uint8_t>* bytes);
+
+// A line that says something: comments (from '#' on) and blanks around it are gone, empty lines left out.
+struct TextLine {
+  int number = 0;         // counts from 1
+  std::string_view text;  // into the text that was split
+};
+std::vector<TextLine> ContentLines(std::string_view text);
+
+// The fields of a line, parted by any run of the separators.
+std::vector<std::string_view> SplitFields(std::string_view line, std::string_view separators = " \t");
+
+std::string_view Trim(std::string_view text);
+
+// Empty unless the whole text is one finite number.
+std::optional<double> ParseNumber(std::string_view text);
+std::optional<std::int64_t> ParseInteger(std::string_view text);
+// A time in decimal seconds, exact to the nanosecond (a double holds 1.4e9 seconds to 0.2 us only). Digits
+// beyond the ninth are rounded. Empty unless the whole text is one number of at most 250 years.
+std::optional<Timestamp> ParseSeconds(std::string_view text);
+// Seconds with nine decimals; ParseSeconds gives the same time back.
+std::string FormatSeconds(Timestamp time);
+// The shortest text with at most `digits` significant digits ("nan" and "inf" for what is not finite).
+std::string FormatNumber(double value, int digits = 9);
+
+// True when `a` comes before `b` in the order that people expect: runs of digits compare as numbers.
+bool NaturalLess(std::string_view a, std::string_view b);
+
+}  // namespace docent::app

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "engine/base/time.h"
+#include "maps/policy.h"
+
+// Every change that a person can make, as data. The window, script files and tests all speak these structs;
+// the session carries them out. They know nothing of how that is done.
+namespace docent::app {
+
+struct NewMap {
+  std::string name;
+  bool operator==(const NewMap&) const = default;
+};
+// Stop extending the current map and leave it.
+struct StopMap {
+  bool operator==(const StopMap&) const = default;
+};
+struct UseMap {
+  std::string name;
+  bool operator==(const UseMap&) const = default;
+};
+struct SetPolicy {
+  std::string name;  // of the map
+  maps::Policy policy = maps::Policy::kOpen;
+  bool operator==(const SetPolicy&) const = default;
+};
+// A pixel stands for the map's surface that is seen there in the frame of the command.
+struct PlaceModel {
+  std::string file;  // as it was written; relative to the script's folder or the working folder
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double scale = 1;    // map metres a metre of the model
+  double yaw_deg = 0;  // about the surface's normal
+  bool operator==(const PlaceModel&) const = default;
+};
+struct PlaceSignpost {
+  std::string text;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  std::string to_map;  // empty when it points nowhere
+  bool operator==(const PlaceSignpost&) const = default;
+};
+struct MoveEntity {
+  std::string name;
+  Eigen::Vector3d by_in_map = Eigen::Vector3d::Zero();  // metres along the map's axes, without `to_pixel`
+  std::optional<Eigen::Vector2d> to_pixel;
+  bool operator==(const MoveEntity&) const = default;
+};
+struct RotateEntity {
+  std::string name;
+  double angle_deg = 0;  // about its own up axis
+  bool operator==(const RotateEntity&) const = default;
+};
+struct ScaleEntity {
+  std::string name;
+  double factor = 1;  // positive
+  bool operator==(const ScaleEntity&) const = default;
+};
+struct RemoveEntity {
+  std::string name;
+  bool operator==(const RemoveEntity&) const = default;
+};
+struct Undo {
+  bool operator==(const Undo&) const = default;
+};
+struct Redo {
+  bool operator==(const Redo&) const = default;
+};
+struct Save {
+  bool operator==(const Save&) const = default;
+};
+
+using Command = std::variant<NewMap, StopMap, UseMap, SetPolicy, PlaceModel, PlaceSignpost, MoveEntity,
+                             RotateEntity, ScaleEntity, RemoveEntity, Undo, Redo, Save>;
+
+struct TimedCommand {
+  Timestamp time{};  // from the first frame, not negative
+  int line = 0;      // of the script; 0 when it comes from somewhere else
+  Command command;
+};
+
+}  // namespace docent::app

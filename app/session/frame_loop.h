@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <stop_token>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/command_line/options.h"
+#include "app/script/commands.h"
+#include "app/session/calibrated_camera.h"
+#include "app/session/session.h"
+
+namespace docent::app {
+
+// Commands that come while the pictures run, from a window. Any thread.
+class CommandInbox {
+ public:
+  // A command and the frame that the person saw when giving it: a pixel of it means what was seen there.
+  struct Entry {
+    Command command;
+    std::shared_ptr<const engine::TrackedFrame> frame;
+  };
+  void Push(Entry entry) {
+    const std::scoped_lock lock(mutex_);
+    entries_.push_back(std::move(entry));
+  }
+  std::vector<Entry> TakeAll() {
+    const std::scoped_lock lock(mutex_);
+    return std::exchange(entries_, {});
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<Entry> entries_;
+};
+
+// One camera's way through a session.
+struct FrameLoopOptions {
+  Pace pace = Pace::kEager;
+  int camera = 0;                      // index in the session
+  std::vector<TimedCommand> script;    // by ascending time
+  std::string script_name;             // for sentences
+  std::filesystem::path model_folder;  // where the script's models are
+  CommandInbox* inbox = nullptr;       // may be null
+  // Told of every command that was carried out, with its time from the first picture, and of what was wrong
+  // with one from the inbox (a script's fault ends the run instead). On the camera's thread; may be empty.
+  std::function<void(const TimedCommand&)> carried_out;
+  std::function<void(const std::string&)> refused;
+};
+
+// Feeds the pictures of a source to a session until the source ends or stop is requested, carries out the
+// script's commands, and hands every frame on, dropped ones too. `shown` runs on the calling thread, which is
+// the camera's. Throws Error for what the source or a command's line has wrong; what was done before stands.
+//
+//   lockstep   one picture after the other; the session runs its mapper in between
+//   eager      as fast as the tracker is, but never further ahead of the mapper than a camera would be
+//   realtime   by the pictures' times; what is overtaken by its successor is dropped, as a camera drops it
+void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,
+               const std::function<void(const engine::TrackedFrame&)>& shown, const std::stop_token& stop);
+
+}  // namespace docent::app

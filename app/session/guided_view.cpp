@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/guided_view.h"
+
+#include <algorithm>
+
+namespace docent::app {
+
+ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
+  ui::View view;
+  view.tracked = &frame.tracked;
+  view.camera = &camera;
+  view.scene = frame.shown.scene.get();
+  view.animation_seconds = frame.seconds;
+  view.overlay.map_name = frame.shown.map_name;
+  view.overlay.message = frame.message;
+  return view;
+}
+
+void ViewRecorder::Write(const cv::Mat& picture, std::uint64_t index) {
+  // A source that leaves a long gap (a device that was unplugged) is not filled up.
+  constexpr std::uint64_t kLongestGap = 300;
+  if (last_index_ && index > *last_index_ + 1) {
+    const std::uint64_t missing = std::min(index - *last_index_ - 1, kLongestGap);
+    for (std::uint64_t i = 0; i < missing; ++i) recorder_.Write(cv::Mat());
+  }
+  recorder_.Write(picture);
+  last_index_ = index;
+}
+
+}  // namespace docent::app

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/mapping_thread.h"
+
+#include <utility>
+
+namespace docent::app {
+
+MappingThread::MappingThread(const engine::MapperOptions& options, bool threaded, Tell tell)
+    : mapper_(options), tell_(std::move(tell)) {
+  if (!threaded) return;
+  worker_.emplace("mapper", [this](const std::stop_token& stop) {
+    try {
+      Run(stop);
+    } catch (...) {
+      {
+        const std::scoped_lock lock(mutex_);
+        failed_ = true;
+      }
+      changed_.notify_all();
+      throw;
+    }
+  });
+}
+
+void MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot) {
+  {
+    const std::scoped_lock lock(mutex_);
+    wanted_key_ = key;
+    adoption_ = Adoption{key, std::move(snapshot)};
+    pair_.reset();
+    starting_ = false;
+    work_ = true;
+  }
+  changed_.notify_all();
+  if (!worker_) TakeOver();
+}
+
+void MappingThread::Start(std::uint64_t key, engine::InitialPair pair) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (key != wanted_key_) return;
+    pair_ = std::move(pair);
+    starting_ = work_ = true;
+  }
+  changed_.notify_all();
+}
+
+bool MappingThread::Offer(std::uint64_t key, engine::KeyFrameCandidate candidate,
+                          std::vector<engine::PointReport> reports) {
+  {
+    const std::scoped_lock lock(mutex_);
+    // A keyframe that came before the adoption was carried out would be dropped by it, or worse, join the
+    // map before.
+    if (key != wanted_key_ || adoption_) return false;
+    mapper_.Report(std::move(reports));
+    if (!mapper_.Offer(std::move(candidate))) return false;
+    work_ = true;
+  }
+  changed_.notify_all();
+  return true;
+}
+
+void MappingThread::TakeOver() {
+  std::unique_lock lock(mutex_);
+  while (adoption_) {
+    // The copy of a large map takes a while; adoption_ stays set meanwhile, so that nobody offers to it.
+    const Adoption adoption = *adoption_;
+    lock.unlock();
+    mapper_.Adopt(adoption.snapshot);
+    mapper_.TakeEvents();  // of the map before
+    key_ = adoption.key;
+    told_ = adoption.snapshot;
+    lock.lock();
+    if (adoption_->key == adoption.key && adoption_->snapshot == adoption.snapshot) adoption_.reset();
+  }
+  if (pair_) mapper_.Start(std::move(*pair_));
+  pair_.reset();
+}
+
+bool MappingThread::StepOnce() {
+  const bool worked = mapper_.Step();
+  News news;
+  news.key = key_;
+  news.events = mapper_.TakeEvents();
+  if (auto snapshot = mapper_.Snapshot(); snapshot != told_) news.snapshot = told_ = std::move(snapshot);
+  if (news.snapshot || !news.events.empty()) {
+    tell_(news);
+    using Kind = engine::MapperEvent::Kind;
+    for (const engine::MapperEvent& event : news.events) {
+      if (event.kind != Kind::kMapStarted && event.kind != Kind::kStartFailed) continue;
+      const std::scoped_lock lock(mutex_);
+      if (wanted_key_ == key_) starting_ = false;
+    }
+  }
+  return worked;
+}
+
+void MappingThread::RunInTurn() {
+  TakeOver();
+  for (int step = 0; step < kMaxSteps && !mapper_.Settled(); ++step) StepOnce();
+  StepOnce();
+}
+
+void MappingThread::Run(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    {
+      std::unique_lock lock(mutex_);
+      if (!changed_.wait(lock, stop, [this] { return work_; })) return;
+      work_ = false;
+    }
+    TakeOver();
+    bool more = true;
+    while (more && !stop.stop_requested()) {
+      more = StepOnce();
+      {
+        const std::scoped_lock lock(mutex_);
+        if (adoption_ || pair_) more = false;  // work_ is set as well: the outer loop goes on with them
+      }
+      changed_.notify_all();
+    }
+  }
+}
+
+bool MappingThread::Busy() const {
+  return adoption_.has_value() || starting_ || mapper_.QueueLength() > 1;
+}
+
+void MappingThread::WaitUntilCalm(const std::stop_token& stop) {
+  if (!worker_) return;
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, stop, [this] { return failed_ || !Busy(); });
+}
+
+void MappingThread::Finish() {
+  if (!worker_) return;
+  worker_->RequestStop();
+  worker_->Join();
+}
+
+}  // namespace docent::app

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/session.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "app/files/text_file.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+Session::Session(const SessionOptions& options,
+                 std::vector<std::shared_ptr<const engine::CameraModel>> cameras, maps::Library* library)
+    : options_(options),
+      library_(library),
+      mapping_(options.mapper, options.threaded && options.may_write,
+               [this](const MappingThread::News& news) { Hear(news); }) {
+  engine::TrackerOptions tracker_options = options.tracker;
+  tracker_options.build_maps = options.may_write;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    Camera camera;
+    camera.tracker = std::make_unique<engine::Tracker>(tracker_options, cameras[i], options.seed + i);
+    camera.model = std::move(cameras[i]);
+    cameras_.push_back(std::move(camera));
+  }
+  if (library_ != nullptr) {
+    LoadMaps();
+    if (options.may_write) saver_.emplace(library_, 64);
+  }
+  if (!options.first_map.empty()) {
+    const std::scoped_lock lock(mutex_);
+    Carry(NewMap{options.first_map}, engine::TrackedFrame());
+  }
+}
+
+Session::~Session() {
+  try {
+    Finish();
+  } catch (const std::exception& error) {
+    // Whoever wants to know calls Finish before.
+    spdlog::error("{}", error.what());
+  }
+}
+
+void Session::LoadMaps() {
+  for (const maps::MapInfo& info : library_->List()) {
+    const maps::StoredMap stored = library_->Load(info.key);
+    SessionMap& map = maps_[info.key];
+    map.key = info.key;
+    map.name = info.name;
+    map.policy = info.policy;
+    map.bounds = info.bounds;
+    map.snapshot = map.saved_snapshot = stored.snapshot;
+    map.scene = map.saved_scene = std::make_shared<content::Scene>(
+        SceneFromRecord(stored.scene, library_->file() + ", map '" + info.name + "'", &assets_));
+    index_.SetMap(info.key, stored.snapshot);
+  }
+}
+
+void Session::AddEvent(Timestamp time, std::string event, std::string detail) {
+  events_.push_back({time, std::move(event), std::move(detail)});
+}
+
+void Session::FollowOrders(Camera* camera) {
+  engine::Tracker& tracker = *camera->tracker;
+  std::shared_ptr<const engine::MapSnapshot> snapshot;
+  std::uint64_t key = 0;
+  Camera::Order order = Camera::Order::kNone;
+  {
+    const std::scoped_lock lock(mutex_);
+    order = std::exchange(camera->order, Camera::Order::kNone);
+    if (order == Camera::Order::kStart) camera->starting = true;
+    if (order == Camera::Order::kLeave || order == Camera::Order::kGo) camera->starting = false;
+    if (const auto found = maps_.find(camera->map_key); found != maps_.end()) {
+      snapshot = found->second.snapshot;
+      key = camera->map_key;
+    }
+    if (snapshot) camera->starting = false;
+  }
+  if (order == Camera::Order::kStart) {
+    tracker.StartNewMap();
+  } else if (order != Camera::Order::kNone) {
+    tracker.Reset();
+  }
+  tracker.SetMap(std::move(snapshot), key);
+}
+
+engine::TrackedFrame Session::Process(const engine::Frame& frame) {
+  Camera& camera = cameras_.at(static_cast<std::size_t>(frame.camera));
+  FollowOrders(&camera);
+  engine::TrackedFrame tracked = camera.tracker->Track(frame, &index_);
+  React(&camera, &tracked);
+  if (options_.may_write) {
+    OfferToMapper(&camera, tracked);
+    if (!options_.threaded) mapping_.RunInTurn();
+    Autosave(frame.time);
+  }
+  return tracked;
+}
+
+void Session::React(Camera* camera, engine::TrackedFrame* frame) {
+  const std::scoped_lock lock(mutex_);
+  camera->last_time = frame->frame.time;
+  const bool has_pose = engine::HasPose(frame->state);
+  if (has_pose && frame->map_key != camera->map_key) {
+    EnterMap(camera, frame->map_key, frame->frame.time);
+  } else if (frame->state == engine::TrackingState::kRelocalized) {
+    AddEvent(frame->frame.time, "relocalized", maps_[frame->map_key].name);
+  }
+  if (has_pose) {
+    camera->lost_since.reset();
+  } else if (frame->state == engine::TrackingState::kLost && !camera->lost_since) {
+    camera->lost_since = frame->frame.time;
+  }
+  WatchProbation(camera, *frame);
+}
+
+void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
+  const std::uint64_t before = std::exchange(camera->map_key, key);
+  const SessionMap& map = maps_.at(key);
+  AddEvent(time, "map", "entered " + map.name);
+  if (!options_.may_write || growing_key_ == key) return;
+  // The map before rests now: it is saved as it stands, and grows again when somebody comes back to it.
+  if (const auto found = maps_.find(before); found != maps_.end() && !found->second.discarded) {
+    found->second.on_probation = false;
+    SaveMap(&found->second, time);
+  }
+  GrowOn(map);
+}
+
+bool Session::MayGrow(const SessionMap& map, const engine::Rigid3& camera_from_map) const {
+  return options_.may_write && !map.discarded &&
+         maps::KeyFrameAllowed(map.policy, map.bounds, camera_from_map.OriginInSource());
+}
+
+void Session::OfferToMapper(Camera* camera, const engine::TrackedFrame& frame) {
+  engine::Tracker& tracker = *camera->tracker;
+  std::optional<engine::InitialPair> pair = tracker.TakeInitialPair();
+  std::optional<engine::KeyFrameCandidate> candidate = tracker.TakeKeyFrameCandidate();
+  if (!pair && !candidate) return;
+  std::uint64_t key = 0;
+  {
+    const std::scoped_lock lock(mutex_);
+    key = camera->map_key;
+    const auto found = maps_.find(key);
+    if (found == maps_.end() || key != growing_key_) return;
+    if (pair && found->second.snapshot) return;
+    if (candidate && !MayGrow(found->second, frame.camera_from_map)) candidate.reset();
+  }
+  if (pair) mapping_.Start(key, std::move(*pair));
+  if (candidate) mapping_.Offer(key, std::move(*candidate), tracker.TakeReports());
+}
+
+void Session::Hear(const MappingThread::News& news) {
+  using Kind = engine::MapperEvent::Kind;
+  const std::scoped_lock lock(mutex_);
+  const auto found = maps_.find(news.key);
+  // News that comes late, of a map that was closed or given up meanwhile, is let go.
+  if (found == maps_.end() || news.key != growing_key_ || found->second.discarded) return;
+  SessionMap& map = found->second;
+  if (news.snapshot) {
+    map.snapshot = news.snapshot;
+    index_.SetMap(map.key, news.snapshot);
+  }
+  for (const engine::MapperEvent& event : news.events) {
+    switch (event.kind) {
+      case Kind::kMapStarted:
+        map.started = event.time;
+        map.on_probation = true;
+        AddEvent(event.time, "map", "started " + map.name + ": " + event.detail);
+        break;
+      case Kind::kStartFailed:
+        AddEvent(event.time, "warning", "no start for " + map.name + ": " + event.detail);
+        for (Camera& camera : cameras_) {
+          if (camera.map_key == map.key && camera.starting) camera.order = Camera::Order::kStart;
+        }
+        break;
+      case Kind::kKeyFrame:
+        AddEvent(event.time, "keyframe", "sixdof in " + map.name + ": " + event.detail);
+        break;
+      case Kind::kGlobalAdjustment:
+        // Its last words are how long it took, which differs from run to run; events of one input do not.
+        AddEvent(event.time, "adjustment",
+                 map.name + ": " + event.detail.substr(0, event.detail.rfind(", ")));
+        break;
+    }
+  }
+}
+
+void Session::WatchProbation(Camera* camera, const engine::TrackedFrame& frame) {
+  const auto found = maps_.find(camera->map_key);
+  if (found == maps_.end() || !found->second.on_probation) return;
+  SessionMap& map = found->second;
+  const Timestamp now = frame.frame.time;
+  if (map.snapshot->keyframes.size() >= options_.probation_keyframes ||
+      (!camera->lost_since && now - map.started > options_.probation)) {
+    map.on_probation = false;
+    return;
+  }
+  if (!camera->lost_since || now - *camera->lost_since <= options_.probation_loss) return;
+  if (*camera->lost_since - map.started > options_.probation) {
+    map.on_probation = false;
+    return;
+  }
+  Discard(map.key, now,
+          "its track was lost " + FormatNumber(ToSeconds(*camera->lost_since - map.started), 3) +
+              " s after the start, with " + std::to_string(map.snapshot->keyframes.size()) + " keyframes");
+}
+
+void Session::Discard(std::uint64_t key, Timestamp time, const std::string& reason) {
+  SessionMap& map = maps_.at(key);
+  map.discarded = true;
+  index_.RemoveMap(key);
+  AddEvent(time, "map", "discarded " + map.name + ": " + reason);
+  SessionMap& next = AddMap(map.name);
+  // What was placed in the false start has lost its ground with it.
+  for (const content::Entity& entity : map.scene->entities) {
+    AddEvent(time, "warning", "'" + entity.name + "' went with the discarded map");
+  }
+  growing_key_ = next.key;
+  mapping_.Adopt(next.key, nullptr);
+  for (Camera& camera : cameras_) {
+    if (camera.map_key != key) continue;
+    camera.map_key = next.key;
+    camera.order = Camera::Order::kStart;
+    camera.lost_since.reset();
+  }
+}
+
+Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
+  const std::scoped_lock lock(mutex_);
+  const auto found = maps_.find(frame.map_key);
+  if (found == maps_.end()) return {};
+  return {found->second.name, found->second.scene};
+}
+
+std::vector<std::string> Session::MapNames() const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<std::string> names;
+  for (const auto& [key, map] : maps_) {
+    if (!map.discarded) names.push_back(map.name);
+  }
+  return names;
+}
+
+std::vector<Session::MapState> Session::Maps() const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<MapState> states;
+  for (const auto& [key, map] : maps_) {
+    states.push_back({key, map.name, map.policy, map.snapshot, map.scene, map.discarded});
+  }
+  return states;
+}
+
+std::vector<Event> Session::TakeEvents() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(events_, {});
+}
+
+void Session::Finish() {
+  if (std::exchange(finished_, true)) return;
+  mapping_.Finish();
+  if (!saver_) return;
+  {
+    const std::scoped_lock lock(mutex_);
+    Timestamp time{};
+    for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
+    for (auto& [key, map] : maps_) SaveMap(&map, time);
+  }
+  saver_->Flush();
+  if (!save_failure_) save_failure_ = saver_->TakeError();
+  if (save_failure_) std::rethrow_exception(save_failure_);
+}
+
+}  // namespace docent::app

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "app/output/run_output.h"
+#include "app/script/commands.h"
+#include "app/session/library_scene.h"
+#include "app/session/mapping_thread.h"
+#include "app/session/session_map.h"
+#include "engine/tracking/tracker.h"
+#include "maps/library.h"
+#include "maps/place_index.h"
+#include "maps/saver.h"
+
+namespace docent::app {
+
+struct SessionOptions {
+  engine::TrackerOptions tracker;  // build_maps is set by the session from its rights
+  engine::MapperOptions mapper;
+  bool threaded = true;   // mapper on its own thread; false: lockstep, equal to the byte between runs
+  bool may_write = true;  // false: maps are used as they are, nothing grows and nothing is placed
+  std::string first_map;  // begin a map of this name by itself; empty: wait for `map new`
+  std::uint64_t seed = 1;
+  Timestamp autosave_interval = std::chrono::seconds(10);  // of the pictures' time
+  // A new map whose track is lost this early, for this long, with so few keyframes, was a false start.
+  Timestamp probation = std::chrono::seconds(2);
+  Timestamp probation_loss = std::chrono::seconds(1);
+  std::size_t probation_keyframes = 5;
+  double signpost_height = 0.12;  // of the distance at which it is put up
+};
+
+// What stands behind authoring, touring, evaluating and demonstrating alike: cameras that are tracked in the
+// maps of a library, one map at a time that grows, and the content of all of them. The ways of using Docent
+// differ in what they pass to it: a library or none, the right to write or not.
+//
+// Threads: Process(frame) and Execute() belong to the thread of the frame's camera (frame.camera says which);
+// everything else may be called from any thread. Process never waits for the mapper or for a disk. Times are
+// those of the pictures; no clock of the machine has any influence on what happens.
+//
+// What holds: a map grows only while its policy and the session's rights allow it, and only by frames that
+// are tracked in it. Whoever recovers into another map takes the session there: that map then grows, and its
+// content is what is shown. A start that does not hold (see SessionOptions::probation) is given up and looked
+// for again under the same name, with an event that says why.
+class Session {
+ public:
+  // library may be null (nothing is kept) and must outlive the session. Its maps are all loaded; throws Error
+  // when one of them does not hold. A session that may write needs a library opened for writing.
+  Session(const SessionOptions& options, std::vector<std::shared_ptr<const engine::CameraModel>> cameras,
+          maps::Library* library);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  // The whole way of one picture.
+  engine::TrackedFrame Process(const engine::Frame& frame);
+  // Holds a feeder back that is faster than a camera; see MappingThread::WaitUntilCalm.
+  void WaitUntilCalm(const std::stop_token& stop) { mapping_.WaitUntilCalm(stop); }
+
+  // Carries out a command at a frame that was processed before; a pixel means what that frame shows. Throws
+  // Error with one sentence, without its full stop, when it cannot be carried out; then nothing has changed.
+  // Relative model files are looked for in model_folder first (a script's own folder), then in the working
+  // folder.
+  void Execute(const Command& command, const engine::TrackedFrame& frame,
+               const std::filesystem::path& model_folder = {});
+  // Reads the model of a command ahead of its time, so that its fault shows before anything is built, and no
+  // frame waits for it. Throws Error.
+  void Preload(const Command& command, const std::filesystem::path& model_folder);
+
+  // What is shown with a frame: the name of its map, and what stands in it. Scene null when there is none.
+  struct Shown {
+    std::string map_name;
+    std::shared_ptr<const content::Scene> scene;
+  };
+  Shown ShownWith(const engine::TrackedFrame& frame) const;
+  std::vector<std::string> MapNames() const;
+  // What the session knows of a map; discarded ones are in DiscardedMaps.
+  struct MapState {
+    std::uint64_t key = 0;
+    std::string name;
+    maps::Policy policy = maps::Policy::kOpen;
+    std::shared_ptr<const engine::MapSnapshot> snapshot;  // may be null
+    std::shared_ptr<const content::Scene> scene;
+    bool discarded = false;
+  };
+  std::vector<MapState> Maps() const;  // by key, discarded ones too
+  engine::MapperTimes MappingTimes() const { return mapping_.Times(); }
+  std::vector<Event> TakeEvents();
+
+  // Ends the mapper, saves what is unsaved and waits for the disk. Throws the first failure of either.
+  void Finish();
+
+ private:
+  // Where a camera is and where it was told to go. Guarded by mutex_ except for tracker, which is its
+  // thread's.
+  struct Camera {
+    enum class Order { kNone, kStart, kLeave, kGo };
+    std::unique_ptr<engine::Tracker> tracker;
+    std::shared_ptr<const engine::CameraModel> model;
+    std::uint64_t map_key = 0;  // of the map it is tracked in; 0 while it looks in all maps
+    Order order = Order::kNone;
+    bool starting = false;                // it looks for the first views of map_key
+    std::optional<Timestamp> lost_since;  // while it is lost in map_key
+    Timestamp last_time{};
+  };
+
+  // session.cpp
+  void LoadMaps();
+  void FollowOrders(Camera* camera);
+  void React(Camera* camera, engine::TrackedFrame* frame);
+  void OfferToMapper(Camera* camera, const engine::TrackedFrame& frame);
+  bool MayGrow(const SessionMap& map, const engine::Rigid3& camera_from_map) const;
+  void WatchProbation(Camera* camera, const engine::TrackedFrame& frame);
+  void Discard(std::uint64_t key, Timestamp time, const std::string& reason);
+  void Hear(const MappingThread::News& news);
+  void EnterMap(Camera* camera, std::uint64_t key, Timestamp time);
+  void AddEvent(Timestamp time, std::string event, std::string detail);
+
+  // session_commands.cpp; all with mutex_ held unless they say otherwise
+  void Carry(const NewMap& command, const engine::TrackedFrame& frame);
+  void Carry(const StopMap& command, const engine::TrackedFrame& frame);
+  void Carry(const UseMap& command, const engine::TrackedFrame& frame);
+  void Carry(const SetPolicy& command, const engine::TrackedFrame& frame);
+  void Carry(const PlaceModel& command, const engine::TrackedFrame& frame);
+  void Carry(const PlaceSignpost& command, const engine::TrackedFrame& frame);
+  void Carry(const MoveEntity& command, const engine::TrackedFrame& frame);
+  void Carry(const RotateEntity& command, const engine::TrackedFrame& frame);
+  void Carry(const ScaleEntity& command, const engine::TrackedFrame& frame);
+  void Carry(const RemoveEntity& command, const engine::TrackedFrame& frame);
+  void Carry(const Undo& command, const engine::TrackedFrame& frame);
+  void Carry(const Redo& command, const engine::TrackedFrame& frame);
+  void Carry(const Save& command, const engine::TrackedFrame& frame);
+  SessionMap& AddMap(const std::string& name);
+  SessionMap* FindByName(const std::string& name);
+  SessionMap& MapToEdit(const engine::TrackedFrame& frame);
+  void Edit(SessionMap* map, std::unique_ptr<content::Edit> edit);
+  std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
+  void LeaveMap(std::uint64_t key);
+  void GrowOn(const SessionMap& map);
+
+  // session_saving.cpp
+  void SaveMap(SessionMap* map, Timestamp time);
+  void Autosave(Timestamp time);
+  void ReportSaveFailure(Timestamp time);
+
+  const SessionOptions options_;
+  maps::Library* const library_;
+  maps::PlaceIndex index_;
+
+  mutable std::mutex mutex_;  // guards all that follows but the mapping thread; never held while tracking
+  std::vector<Camera> cameras_;
+  std::map<std::uint64_t, SessionMap> maps_;
+  std::uint64_t growing_key_ = 0;  // the map that the mapper works on; 0 for none
+  std::uint64_t next_key_ = 1;     // without a library
+  std::vector<Event> events_;
+  AssetCache assets_;                                                    // by id
+  std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by the file as commands name it
+  std::filesystem::path model_folder_;
+  std::optional<Timestamp> last_save_;
+  std::optional<maps::Saver> saver_;  // with a library opened for writing
+  std::exception_ptr save_failure_;
+  bool finished_ = false;
+  MappingThread mapping_;  // last: its callback uses the rest
+};
+
+}  // namespace docent::app

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <numbers>
+#include <utility>
+
+#include "app/script/script_file.h"
+#include "app/session/session.h"
+#include "app/session/surface_at_pixel.h"
+#include "content/asset.h"
+#include "content/placement.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+void CheckName(const std::string& name) {
+  if (name.empty()) throw Error("a map needs a name");
+}
+
+const content::Entity& FindEntity(const content::Scene& scene, const std::string& name) {
+  const content::Entity* entity = scene.Find(name);
+  if (entity == nullptr) throw Error("there is no '" + name + "' in this map");
+  return *entity;
+}
+
+}  // namespace
+
+void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
+                      const std::filesystem::path& model_folder) {
+  const std::scoped_lock lock(mutex_);
+  if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
+    throw Error("nothing can be changed on a tour; use docent author");
+  }
+  model_folder_ = model_folder;
+  std::visit([&](const auto& chosen) { Carry(chosen, frame); }, command);
+  AddEvent(frame.frame.time, "command", FormatCommand(command));
+}
+
+void Session::Preload(const Command& command, const std::filesystem::path& model_folder) {
+  const auto* place = std::get_if<PlaceModel>(&command);
+  if (place == nullptr) return;
+  const std::scoped_lock lock(mutex_);
+  model_folder_ = model_folder;
+  LoadAsset(place->file);
+}
+
+std::shared_ptr<const content::Asset> Session::LoadAsset(const std::string& file) {
+  auto& model = models_[(model_folder_ / file).string()];
+  if (model) return model;
+  std::filesystem::path path = model_folder_ / file;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) path = file;
+  auto asset = std::make_shared<content::Asset>(content::ImportAsset(path));
+  // The same bytes may stand in a map already: one copy serves both.
+  auto& kept = assets_[asset->id];
+  if (!kept) kept = std::move(asset);
+  return model = kept;
+}
+
+SessionMap* Session::FindByName(const std::string& name) {
+  for (auto& [key, map] : maps_) {
+    if (!map.discarded && map.name == name) return &map;
+  }
+  return nullptr;
+}
+
+SessionMap& Session::AddMap(const std::string& name) {
+  const std::uint64_t key = saver_ ? library_->NewKey() : next_key_++;
+  SessionMap& map = maps_[key];
+  map.key = key;
+  map.name = name;
+  return map;
+}
+
+// The map of `key` rests from now on: it is saved as it stands, or forgotten if it never began.
+void Session::LeaveMap(std::uint64_t key) {
+  if (growing_key_ == key) {
+    growing_key_ = 0;
+    mapping_.Adopt(0, nullptr);
+  }
+  const auto found = maps_.find(key);
+  if (found == maps_.end() || found->second.discarded) return;
+  SessionMap& map = found->second;
+  Timestamp time{};
+  for (Camera& camera : cameras_) {
+    time = std::max(time, camera.last_time);
+    if (camera.map_key != key) continue;
+    camera.map_key = 0;
+    camera.starting = false;
+    camera.lost_since.reset();
+    camera.order = Camera::Order::kLeave;
+  }
+  map.on_probation = false;
+  if (map.snapshot) {
+    if (options_.may_write) SaveMap(&map, time);
+    return;
+  }
+  AddEvent(time, "warning", "no map " + map.name + " was made: no two views were found to start it from");
+  maps_.erase(found);
+}
+
+void Session::GrowOn(const SessionMap& map) {
+  const bool grows = options_.may_write && !map.rests && maps::MayChangeStructure(map.policy);
+  growing_key_ = grows ? map.key : 0;
+  mapping_.Adopt(growing_key_, grows ? map.snapshot : nullptr);
+}
+
+void Session::Carry(const NewMap& command, const engine::TrackedFrame& frame) {
+  CheckName(command.name);
+  if (FindByName(command.name) != nullptr) throw Error("there is already a map '" + command.name + "'");
+  if (growing_key_ != 0) LeaveMap(growing_key_);
+  const SessionMap& map = AddMap(command.name);
+  GrowOn(map);
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    const bool begins = static_cast<int>(i) == frame.frame.camera;
+    cameras_[i].map_key = map.key;
+    cameras_[i].lost_since.reset();
+    cameras_[i].order = begins ? Camera::Order::kStart : Camera::Order::kGo;
+  }
+}
+
+void Session::Carry(const StopMap&, const engine::TrackedFrame& frame) {
+  const std::uint64_t key = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
+  if (key == 0) throw Error("there is no current map to stop");
+  maps_.at(key).rests = true;
+  LeaveMap(key);
+}
+
+void Session::Carry(const UseMap& command, const engine::TrackedFrame& frame) {
+  SessionMap* map = FindByName(command.name);
+  if (map == nullptr) throw Error("there is no map '" + command.name + "'");
+  if (!map->snapshot) throw Error("the map '" + command.name + "' has not begun yet");
+  map->rests = false;
+  const std::uint64_t before = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
+  if (before == map->key) return GrowOn(*map);
+  if (before != 0) LeaveMap(before);
+  for (Camera& camera : cameras_) {
+    camera.map_key = map->key;
+    camera.lost_since.reset();
+    camera.order = Camera::Order::kGo;
+  }
+  GrowOn(*map);
+}
+
+void Session::Carry(const SetPolicy& command, const engine::TrackedFrame& frame) {
+  SessionMap* map = FindByName(command.name);
+  if (map == nullptr) throw Error("there is no map '" + command.name + "'");
+  if (!map->snapshot) throw Error("the map '" + command.name + "' has not begun yet");
+  std::optional<maps::Bounds> bounds;
+  if (saver_) {
+    // The library fixes the bounds from what it holds, so everything must be there first. This is the one
+    // command that waits for the disk.
+    SaveMap(map, frame.frame.time);
+    saver_->Flush();
+    library_->SetPolicy(map->key, command.policy);
+    bounds = library_->Find(map->key).bounds;
+  } else if (command.policy == maps::Policy::kBounded) {
+    bounds = map->bounds ? map->bounds : maps::ComputeBounds(*map->snapshot);
+  }
+  map->policy = command.policy;
+  map->bounds = bounds;
+  if (cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key == map->key) GrowOn(*map);
+}
+
+SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
+  std::uint64_t key = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
+  if (engine::HasPose(frame.state)) key = frame.map_key;
+  const auto found = maps_.find(key);
+  if (found == maps_.end() || !found->second.snapshot) throw Error("there is no current map");
+  if (found->second.discarded) throw Error("the map of this frame has been given up");
+  if (!maps::MayChangeContent(found->second.policy)) {
+    throw Error("the map '" + found->second.name + "' is " + maps::ToString(found->second.policy) +
+                ": its content stays as it is");
+  }
+  return found->second;
+}
+
+void Session::Edit(SessionMap* map, std::unique_ptr<content::Edit> edit) {
+  auto scene = std::make_shared<content::Scene>(*map->scene);
+  map->history.Do(std::move(edit), scene.get());
+  map->scene = std::move(scene);
+}
+
+void Session::Carry(const PlaceModel& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
+  const content::SurfaceHit hit = SurfaceAtPixel(frame, *camera.model, command.pixel);
+  content::Entity entity;
+  entity.kind = content::Entity::Kind::kModel;
+  entity.name = map.scene->FreeName(std::filesystem::path(command.file).stem().string());
+  entity.model.asset = LoadAsset(command.file);
+  entity.model.map_from_model = content::UprightPose(hit.point, hit.normal, UpInMap(*frame.map),
+                                                     command.yaw_deg * std::numbers::pi / 180, command.scale);
+  Edit(&map, content::PlaceModelEdit(std::move(entity), command.file, {command.pixel.x(), command.pixel.y()},
+                                     command.scale, command.yaw_deg));
+}
+
+void Session::Carry(const PlaceSignpost& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
+  const content::SurfaceHit hit = SurfaceAtPixel(frame, *camera.model, command.pixel);
+  content::Entity entity;
+  entity.kind = content::Entity::Kind::kSignpost;
+  int number = 1;
+  do {
+    entity.name = "sign-" + std::to_string(number++);
+  } while (map.scene->Find(entity.name) != nullptr);
+  entity.signpost.text = command.text;
+  entity.signpost.anchor = hit.point;
+  entity.signpost.up = UpInMap(*frame.map);
+  // A map's metres mean nothing to the person: what looks right from where it was put up is.
+  entity.signpost.height_m = options_.signpost_height * (frame.camera_from_map * hit.point).norm();
+  entity.signpost.to_map = command.to_map;
+  Edit(&map, content::AddSignpostEdit(std::move(entity), {command.pixel.x(), command.pixel.y()}));
+}
+
+void Session::Carry(const MoveEntity& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const content::Entity& entity = FindEntity(*map.scene, command.name);
+  Eigen::Vector3d place = entity.kind == content::Entity::Kind::kModel
+                              ? entity.model.map_from_model.translation
+                              : entity.signpost.anchor;
+  if (command.to_pixel) {
+    const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
+    place = SurfaceAtPixel(frame, *camera.model, *command.to_pixel).point;
+  } else {
+    place += command.by_in_map;
+  }
+  Edit(&map, content::MoveEdit(command.name, place));
+}
+
+void Session::Carry(const RotateEntity& command, const engine::TrackedFrame& frame) {
+  Edit(&MapToEdit(frame), content::RotateEdit(command.name, command.angle_deg));
+}
+
+void Session::Carry(const ScaleEntity& command, const engine::TrackedFrame& frame) {
+  Edit(&MapToEdit(frame), content::ScaleEdit(command.name, command.factor));
+}
+
+void Session::Carry(const RemoveEntity& command, const engine::TrackedFrame& frame) {
+  Edit(&MapToEdit(frame), content::RemoveEdit(command.name));
+}
+
+void Session::Carry(const Undo&, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  auto scene = std::make_shared<content::Scene>(*map.scene);
+  if (!map.history.Undo(scene.get())) throw Error("there is nothing to undo in '" + map.name + "'");
+  map.scene = std::move(scene);
+}
+
+void Session::Carry(const Redo&, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  auto scene = std::make_shared<content::Scene>(*map.scene);
+  if (!map.history.Redo(scene.get())) throw Error("there is nothing to redo in '" + map.name + "'");
+  map.scene = std::move(scene);
+}
+
+void Session::Carry(const Save&, const engine::TrackedFrame& frame) {
+  if (!saver_) throw Error("there is no library to save to");
+  for (auto& [key, map] : maps_) SaveMap(&map, frame.frame.time);
+}
+
+}  // namespace docent::app

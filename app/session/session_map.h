@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "content/edits.h"
+#include "content/scene.h"
+#include "engine/base/time.h"
+#include "engine/map/map_snapshot.h"
+#include "maps/policy.h"
+
+namespace docent::app {
+
+// One map as a session knows it, whether it came from the library or is being made. Owned by the session,
+// which guards it; snapshots and scenes never change once they are in here, so copies of the pointers may
+// leave.
+struct SessionMap {
+  std::uint64_t key = 0;
+  std::string name;
+  maps::Policy policy = maps::Policy::kOpen;
+  std::optional<maps::Bounds> bounds;                   // of a bounded map
+  std::shared_ptr<const engine::MapSnapshot> snapshot;  // null while its start is being looked for
+  std::shared_ptr<const content::Scene> scene = std::make_shared<content::Scene>();  // never null
+  content::EditHistory history;
+
+  // What the library holds of it, or will hold when the saver has caught up; null when never saved.
+  std::shared_ptr<const engine::MapSnapshot> saved_snapshot;
+  std::shared_ptr<const content::Scene> saved_scene;
+
+  bool rests = false;  // the person stopped it: it grows no further until it is taken up again by name
+
+  // Of a map made in this session: a start that does not hold is given up (see Session).
+  bool on_probation = false;
+  bool discarded = false;
+  Timestamp started{};  // of the frame that completed its first pair
+
+  bool NeedsSave() const { return snapshot && (snapshot != saved_snapshot || scene != saved_scene); }
+};
+
+}  // namespace docent::app

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "app/session/session.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+// Hands what has changed of a map to the saver, which writes it in the background.
+void Session::SaveMap(SessionMap* map, Timestamp time) {
+  if (!saver_ || map->discarded || !map->NeedsSave() || map->snapshot->keyframes.empty()) return;
+  maps::MapRecord record;
+  record.key = map->key;
+  record.name = map->name;
+  record.policy = map->policy;
+  const bool structure = map->snapshot != map->saved_snapshot;
+  const bool content = map->scene != map->saved_scene;
+  if (structure) record.snapshot = map->snapshot;
+  if (content) record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*map->scene));
+  map->saved_snapshot = map->snapshot;
+  map->saved_scene = map->scene;
+  saver_->Submit(std::move(record));
+  AddEvent(time, "save",
+           map->name + (structure ? ": " + std::to_string(map->snapshot->keyframes.size()) + " keyframes, " +
+                                        std::to_string(map->snapshot->points.size()) + " points"
+                                  : ": content"));
+}
+
+void Session::Autosave(Timestamp time) {
+  const std::scoped_lock lock(mutex_);
+  if (!saver_) return;
+  if (!last_save_) last_save_ = time;
+  if (time - *last_save_ < options_.autosave_interval) return;
+  last_save_ = time;
+  ReportSaveFailure(time);
+  for (auto& [key, map] : maps_) {
+    if (!map.on_probation) SaveMap(&map, time);
+  }
+}
+
+// A save that failed does not end the session: what it did not write is written by the next one, and the
+// person hears of it at once. Finish throws it in the end.
+void Session::ReportSaveFailure(Timestamp time) {
+  const std::exception_ptr failure = saver_->TakeError();
+  if (!failure) return;
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& error) {
+    spdlog::warn("{}", error.what());
+    AddEvent(time, "warning", error.what());
+  }
+  for (auto& [key, map] : maps_) {
+    if (key == growing_key_) map.saved_snapshot.reset();
+    map.saved_scene.reset();
+  }
+  save_failure_ = failure;
+}
+
+}  // namespace docent::app

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/simulator/scene.h"
+
+namespace docent::app {
+
+std::span<const SceneRecipe> SceneRecipes() {
+  static constexpr SceneRecipe kRecipes[] = {
+      {"room", "how many times the camera turns on the spot, away from the table and back", 0, 0, 20,
+       BuildRoom},
+      {"museum", "how many look-alike bays", 4, 1, 24, BuildMuseum},
+      {"desks", "how many look-alike desks", 6, 1, 24, BuildDesks},
+      {"cylinder", "radius of the camera's circle in centimetres", 10, 0, 40, BuildCylinder},
+      {"loop", "once around a block of cabinets", 0, 0, 0, BuildLoop},
+      {"grass", "over a lawn of one repeated texture", 0, 0, 0, BuildGrass},
+  };
+  return kRecipes;
+}
+
+}  // namespace docent::app

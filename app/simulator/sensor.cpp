@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/simulator/sensor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "engine/base/random.h"
+
+namespace docent::app {
+namespace {
+
+constexpr std::size_t kNoiseCount = std::size_t{1} << 17;
+
+}  // namespace
+
+Sensor::Sensor(const Options& options) : options_(options) {
+  Random random(options.seed);
+  for (double& phase : phases_rad_) phase = random.Uniform(0, 2 * std::numbers::pi);
+  const int width = options.size.width, height = options.size.height;
+  if (options.vignetting > 0) {
+    const double middle_x = 0.5 * (width - 1), middle_y = 0.5 * (height - 1);
+    const double corner = middle_x * middle_x + middle_y * middle_y;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const double share =
+            ((x - middle_x) * (x - middle_x) + (y - middle_y) * (y - middle_y)) / std::max(corner, 1.0);
+        shade_q12_.push_back(
+            static_cast<std::uint16_t>(std::lround(4096 * (1 - options.vignetting * share))));
+      }
+    }
+  }
+  if (options.noise_sigma > 0) {
+    noise_q12_.resize(kNoiseCount);
+    for (std::int32_t& noise : noise_q12_) {
+      // A sum of twelve uniform numbers is normal enough, and the same with every mathematics library.
+      double sum = -6;
+      for (int i = 0; i < 12; ++i) sum += random.Uniform();
+      noise = static_cast<std::int32_t>(std::lround(sum * options.noise_sigma * 4096));
+    }
+  }
+}
+
+double Sensor::Gain(double time_s) const {
+  const double turn = 2 * std::numbers::pi;
+  const double wandering =
+      std::sin(turn * 0.07 * time_s + phases_rad_[0]) + 0.5 * std::sin(turn * 0.23 * time_s + phases_rad_[1]);
+  return std::exp(options_.exposure_drift * wandering);
+}
+
+void Sensor::Apply(int frame, double time_s, cv::Mat* bgr) const {
+  if (options_.exposure_drift == 0 && shade_q12_.empty() && noise_q12_.empty()) return;
+  const int gain_q12 = static_cast<int>(std::lround(4096 * Gain(time_s)));
+  Random random(options_.seed ^ (0xD1B54A32D192ED03ull * (static_cast<std::uint64_t>(frame) + 1)));
+  const int channels = 3 * bgr->cols;
+  const std::vector<std::int32_t> silence(noise_q12_.empty() ? static_cast<std::size_t>(channels) : 0, 0);
+  std::vector<std::int32_t> gains(static_cast<std::size_t>(channels), gain_q12);
+  for (int y = 0; y < bgr->rows; ++y) {
+    if (!shade_q12_.empty()) {
+      const std::uint16_t* shade = shade_q12_.data() + static_cast<std::size_t>(y) * bgr->cols;
+      for (int x = 0; x < bgr->cols; ++x) {
+        const std::int32_t gain = (gain_q12 * shade[x]) >> 12;
+        gains[3 * x] = gains[3 * x + 1] = gains[3 * x + 2] = gain;
+      }
+    }
+    const std::int32_t* noise = silence.data();
+    if (!noise_q12_.empty()) {
+      noise = noise_q12_.data() + random.Below(static_cast<std::uint32_t>(kNoiseCount - channels));
+    }
+    uchar* row = bgr->ptr<uchar>(y);
+    for (int i = 0; i < channels; ++i) {
+      row[i] = static_cast<uchar>(std::clamp((row[i] * gains[i] + noise[i] + 2048) >> 12, 0, 255));
+    }
+  }
+}
+
+}  // namespace docent::app

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace docent::app {
+
+// What happens to the light behind the lens: vignetting, a slowly wandering exposure, and noise. A picture's
+// result depends on its number and the seed alone, not on what was made before. Immutable; any thread.
+class Sensor {
+ public:
+  struct Options {
+    cv::Size size;
+    double vignetting = 0;      // part of the light lost in the corners, [0, 1)
+    double exposure_drift = 0;  // standard size of the wandering of the logarithm of the gain
+    double noise_sigma = 0;     // grey levels of 255
+    std::uint64_t seed = 1;
+  };
+  explicit Sensor(const Options& options);
+
+  // Turns light (CV_8UC3) into the sensor's picture in place.
+  void Apply(int frame, double time_s, cv::Mat* bgr) const;
+  // Gain of the exposure at a time, about 1.
+  double Gain(double time_s) const;
+
+ private:
+  Options options_;
+  std::vector<std::uint16_t> shade_q12_;  // a pixel; empty without vignetting
+  std::vector<std::int32_t> noise_q12_;   // normal numbers, read from a random place on for each row
+  double phases_rad_[2] = {0, 0};
+};
+
+}  // namespace docent::app

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/simulator/simulation.h"
+
+#include <charconv>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "engine/base/error.h"
+
+namespace docent::app {
+namespace {
+
+constexpr int kLargestSide_px = 8192;
+constexpr double kLongestDuration_s = 86400;
+
+engine::CameraModel CameraOf(const Scene& scene, const SimulationOptions& options) {
+  if (options.camera) return *options.camera;
+  return scene.camera ? *scene.camera : SimulatedCamera();
+}
+
+const SceneRecipe& RecipeOf(const std::string& name) {
+  for (const SceneRecipe& recipe : SceneRecipes()) {
+    if (recipe.name == name) return recipe;
+  }
+  throw Error("There is no simulated scene \"" + name + "\"; the scenes are:\n" + ListOfScenes());
+}
+
+int ParameterOf(const SceneRecipe& recipe, const std::string& spec, const std::string& text) {
+  int value = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || stop != end || value < recipe.lowest_parameter ||
+      value > recipe.highest_parameter) {
+    std::ostringstream message;
+    message << "The simulated scene \"" << spec << "\" needs a whole number from " << recipe.lowest_parameter
+            << " to " << recipe.highest_parameter << " after the colon: " << recipe.parameter_meaning << ".";
+    throw Error(message.str());
+  }
+  return value;
+}
+
+}  // namespace
+
+std::optional<std::string> SimulationOptions::Validate() const {
+  // Written so that a number that is not one fails too.
+  if (!(frame_rate_hz > 0 && frame_rate_hz <= 1000))
+    return "The frame rate of a simulation lies above 0 and up to 1000 Hz.";
+  if (!(duration_s >= 0 && duration_s <= kLongestDuration_s))
+    return "The duration of a simulation lies from 0 s to one day.";
+  if (!(exposure_s >= 0 && exposure_s * frame_rate_hz <= 1)) {
+    return "The exposure of a simulation lies from 0 s to the time between two frames.";
+  }
+  if (blur_samples < 1 || blur_samples > 64) return "The motion blur of a simulation takes 1 to 64 samples.";
+  if (!(noise_sigma >= 0 && noise_sigma <= 100))
+    return "The noise of a simulation lies from 0 to 100 grey levels.";
+  if (!(exposure_drift >= 0 && exposure_drift <= 1))
+    return "The exposure drift of a simulation lies from 0 to 1.";
+  if (!(vignetting >= 0 && vignetting < 1)) return "The vignetting of a simulation lies from 0 to below 1.";
+  if (camera && (camera->width_px() > kLargestSide_px || camera->height_px() > kLargestSide_px)) {
+    return "The picture of a simulation has at most 8192 pixels along a side.";
+  }
+  return std::nullopt;
+}
+
+SimulationOptions SimulationOptions::Clean() {
+  SimulationOptions options;
+  options.noise_sigma = options.exposure_drift = options.vignetting = 0;
+  return options;
+}
+
+engine::CameraModel SimulatedCamera(int width_px) {
+  const double scale = width_px / 640.0;
+  engine::CameraModel::Intrinsics intrinsics;
+  intrinsics.width_px = width_px;
+  intrinsics.height_px = static_cast<int>(std::lround(480 * scale));
+  intrinsics.fx = 402.0 * scale;
+  intrinsics.fy = 403.2 * scale;
+  // The centre of the top-left pixel is (0, 0), so a scale acts about its corner.
+  intrinsics.cx = (317.6 + 0.5) * scale - 0.5;
+  intrinsics.cy = (241.3 + 0.5) * scale - 0.5;
+  return {engine::LensModel::kRadialTangential, intrinsics, {-0.105, 0.012, 0.0005, -0.0004, 0}};
+}
+
+Simulation::Simulation(const std::string& name, Scene scene, const SimulationOptions& options)
+    : name_(name),
+      options_(options),
+      scene_(std::move(scene)),
+      camera_(CameraOf(scene_, options)),
+      renderer_(&scene_.surfaces, camera_),
+      sensor_({{camera_.width_px(), camera_.height_px()},
+               options.vignetting,
+               options.exposure_drift,
+               options.noise_sigma,
+               options.seed}) {
+  double duration_s = scene_.trajectory.duration_s();
+  if (options.duration_s > 0) duration_s = std::min(duration_s, options.duration_s);
+  // The last frame is not lost to the rounding of the product.
+  frame_count_ = static_cast<int>(std::floor(duration_s * options.frame_rate_hz + 1e-6)) + 1;
+}
+
+Timestamp Simulation::time(int frame) const {
+  return FromSeconds(frame / options_.frame_rate_hz);
+}
+
+engine::Rigid3 Simulation::world_from_camera(int frame) const {
+  return scene_.trajectory.WorldFromCamera(ToSeconds(time(frame)));
+}
+
+const std::string& Simulation::label(int frame) const {
+  return scene_.trajectory.LabelAt(ToSeconds(time(frame)));
+}
+
+void Simulation::Render(int frame, cv::Mat* bgr) const {
+  const double time_s = ToSeconds(time(frame));
+  if (options_.blur_samples == 1) {
+    renderer_.Render(scene_.trajectory.WorldFromCamera(time_s).inverse(), bgr);
+  } else {
+    const int samples = options_.blur_samples;
+    cv::Mat sum, sample, wide;
+    for (int i = 0; i < samples; ++i) {
+      const double offset_s = options_.exposure_s * ((i + 0.5) / samples - 0.5);
+      renderer_.Render(scene_.trajectory.WorldFromCamera(time_s + offset_s).inverse(), &sample);
+      sample.convertTo(wide, CV_16UC3);
+      if (i == 0) {
+        sum = wide.clone();
+      } else {
+        sum += wide;
+      }
+    }
+    sum.convertTo(*bgr, CV_8UC3, 1.0 / samples);
+  }
+  sensor_.Apply(frame, time_s, bgr);
+}
+
+std::optional<Eigen::Vector3d> Simulation::SurfaceAt(int frame, const Eigen::Vector2d& pixel) const {
+  return SurfaceAlong(world_from_camera(frame), pixel);
+}
+
+std::optional<Eigen::Vector3d> Simulation::SurfaceAlong(const engine::Rigid3& world_from_camera,
+                                                        const Eigen::Vector2d& pixel) const {
+  const std::optional<Eigen::Vector3d> ray = camera_.Unproject(pixel);
+  if (!ray) return std::nullopt;
+  const auto hit =
+      scene_.surfaces.Intersect(world_from_camera.translation, world_from_camera.rotation * *ray);
+  if (!hit) return std::nullopt;
+  return hit->point;
+}
+
+bool Simulation::IsVisible(int frame, const Eigen::Vector3d& point_in_world) const {
+  const engine::Rigid3 pose = world_from_camera(frame);
+  const std::optional<Eigen::Vector2d> pixel = camera_.Project(pose.inverse() * point_in_world);
+  if (!pixel || !camera_.IsInside(*pixel)) return false;
+  const Eigen::Vector3d way = point_in_world - pose.translation;
+  const auto hit = scene_.surfaces.Intersect(pose.translation, way.normalized());
+  return !hit || hit->distance > way.norm() - 0.01;
+}
+
+std::unique_ptr<Simulation> MakeSimulation(const std::string& scene_spec, const SimulationOptions& options) {
+  if (const auto fault = options.Validate()) throw Error(*fault);
+  const std::size_t colon = scene_spec.find(':');
+  const SceneRecipe& recipe = RecipeOf(scene_spec.substr(0, colon));
+  SceneRequest request;
+  request.parameter = colon == std::string::npos
+                          ? recipe.default_parameter
+                          : ParameterOf(recipe, scene_spec, scene_spec.substr(colon + 1));
+  request.seed = options.seed;
+  request.identical_places = options.identical_places;
+  return std::make_unique<Simulation>(scene_spec, recipe.build(request), options);
+}
+
+std::string ListOfScenes() {
+  std::ostringstream list;
+  for (const SceneRecipe& recipe : SceneRecipes()) {
+    list << "  " << recipe.name;
+    if (recipe.highest_parameter > recipe.lowest_parameter) {
+      list << "[:N]  N from " << recipe.lowest_parameter << " to " << recipe.highest_parameter << " ("
+           << recipe.default_parameter << " if not given): " << recipe.parameter_meaning;
+    } else {
+      list << "  " << recipe.parameter_meaning;
+    }
+    list << "\n";
+  }
+  return list.str();
+}
+
+}  // namespace docent::app

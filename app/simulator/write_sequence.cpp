@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/simulator/write_sequence.h"
+
+#include <system_error>
+
+#include "app/output/sequence_writer.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+namespace {
+
+// Whether the folder was there (empty) before. Throws where it is anything else.
+bool ExistsEmpty(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!std::filesystem::exists(folder, error)) {
+    if (error) throw Error("Cannot look at '" + folder.string() + "': " + error.message() + ".");
+    return false;
+  }
+  if (!std::filesystem::is_directory(folder, error)) {
+    throw Error("'" + folder.string() + "' is not a folder; a sequence needs a new or an empty one.");
+  }
+  const bool is_empty = std::filesystem::is_empty(folder, error);
+  if (error) throw Error("Cannot look into the folder '" + folder.string() + "': " + error.message() + ".");
+  if (!is_empty) {
+    throw Error("The folder '" + folder.string() +
+                "' is not empty; choose another, so that no pictures are overwritten or mixed.");
+  }
+  return true;
+}
+
+void TakeAway(const std::filesystem::path& folder, bool keep_folder) {
+  // The first error is the one to report; what cannot be removed stays.
+  std::error_code ignored;
+  if (!keep_folder) {
+    std::filesystem::remove_all(folder, ignored);
+    return;
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    std::filesystem::remove_all(entry.path(), ignored);
+  }
+}
+
+}  // namespace
+
+void WriteSequence(const Simulation& simulation, const std::filesystem::path& folder,
+                   const std::function<void(int written, int total)>& progress) {
+  const bool existed = ExistsEmpty(folder);
+  try {
+    SequenceWriter writer(folder, simulation.camera(), PictureFormat::kPng);
+    for (int frame = 0; frame < simulation.frame_count(); ++frame) {
+      SequencePicture picture;
+      picture.time = simulation.time(frame);
+      simulation.Render(frame, &picture.picture);
+      picture.truth_from_camera = simulation.world_from_camera(frame);
+      picture.label = simulation.label(frame);
+      writer.Add(picture);
+      if (progress) progress(frame + 1, simulation.frame_count());
+    }
+    writer.Close();
+  } catch (...) {
+    TakeAway(folder, existed);
+    throw;
+  }
+}
+
+}  // namespace docent::app

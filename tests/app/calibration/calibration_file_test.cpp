@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/calibration/calibration_file.h"
+
+#include <gmock/gmock.h>
+
+#include <opencv2/core.hpp>
+
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using engine::CameraModel;
+using engine::LensModel;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr char kOwn[] =
+    "# a comment\nwidth: 752\nheight: 480\nfx: 458.654\nfy: 457.296\ncx: 367.215\ncy: 248.375\n"
+    "k1: -0.28340811\nk2: 0.07395907\np1: 0.00019359\np2: 1.76187114e-05\n";
+
+const CameraModel kEuroc(LensModel::kRadialTangential, {752, 480, 458.654, 457.296, 367.215, 248.375},
+                         {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0});
+
+std::string Without(const std::string& field) {
+  std::string text = kOwn;
+  const std::size_t begin = text.find(field + ":");
+  return text.erase(begin, text.find('\n', begin) - begin + 1);
+}
+
+TEST(Calibration, ReadsDocentsOwnFile) {
+  EXPECT_EQ(ParseCalibration(kOwn, "own"), kEuroc);
+}
+
+TEST(Calibration, ReadsEurocSensorFilesInSpiteOfTheirFirstLine) {
+  const std::string text =
+      "%YAML:1.0\n# General\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, 0.0,\n"
+      "         0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [752, "
+      "480]\n"
+      "camera_model: pinhole\nintrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv\n"
+      "distortion_model: radial-tangential\n"
+      "distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n";
+  EXPECT_EQ(ParseCalibration(text, "sensor.yaml"), kEuroc);
+}
+
+TEST(Calibration, ReadsWhatOpenCvWrites) {
+  const TemporaryFolder folder;
+  const auto path = folder / "opencv.yaml";
+  {
+    cv::FileStorage file(path.string(), cv::FileStorage::WRITE);
+    const cv::Mat matrix = (cv::Mat_<double>(3, 3) << 458.654, 0, 367.215, 0, 457.296, 248.375, 0, 0, 1);
+    const cv::Mat distortion =
+        (cv::Mat_<double>(1, 5) << -0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0);
+    file << "image_width" << 752 << "image_height" << 480 << "camera_matrix" << matrix
+         << "distortion_coefficients" << distortion;
+  }
+  EXPECT_EQ(ReadCalibration(path), kEuroc);
+}
+
+TEST(Calibration, ReadsRosCameraInfoFilesAndMessages) {
+  const std::string file =
+      "image_width: 752\nimage_height: 480\ncamera_name: left\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+      "  data: [458.654, 0, 367.215, 0, 457.296, 248.375, 0, 0, 1]\ndistortion_model: plumb_bob\n"
+      "distortion_coefficients:\n  rows: 1\n  cols: 5\n"
+      "  data: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0]\n";
+  EXPECT_EQ(ParseCalibration(file, "camera_info"), kEuroc);
+  const std::string message =
+      "header:\n  seq: 1\nheight: 480\nwidth: 752\ndistortion_model: \"plumb_bob\"\n"
+      "D: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0]\n"
+      "K: [458.654, 0.0, 367.215, 0.0, 457.296, 248.375, 0.0, 0.0, 1.0]\nbinning_x: 0\n";
+  EXPECT_EQ(ParseCalibration(message, "message"), kEuroc);
+}
+
+TEST(Calibration, ReadsTheOtherLensModels) {
+  const std::string head = "width: 640\nheight: 480\nfx: 300\nfy: 301\ncx: 320\ncy: 240\n";
+  EXPECT_EQ(ParseCalibration(head + "model: fov\nomega: 0.9\n", "fov"),
+            CameraModel(LensModel::kFov, {640, 480, 300, 301, 320, 240}, {0.9, 0, 0, 0, 0}));
+  EXPECT_EQ(ParseCalibration(head + "model: kannala_brandt\nk1: 0.1\nk2: -0.02\nk3: 0.003\nk4: -0.0004\n",
+                             "fisheye"),
+            CameraModel(LensModel::kKannalaBrandt, {640, 480, 300, 301, 320, 240},
+                        {0.1, -0.02, 0.003, -0.0004, 0}));
+}
+
+TEST(Calibration, ThatIsWrittenReadsBackEqual) {
+  const TemporaryFolder folder;
+  for (const CameraModel& camera :
+       {kEuroc, CameraModel(LensModel::kFov, {640, 480, 300.1, 1e3 / 3, 320, 240}, {0.9, 0, 0, 0, 0}),
+        CameraModel(LensModel::kKannalaBrandt, {640, 480, 300, 301, 320, 240},
+                    {0.1, -0.02, 0.003, -0.0004, 0})}) {
+    WriteCalibration(folder / "camera.yaml", camera);
+    EXPECT_EQ(ReadCalibration(folder / "camera.yaml"), camera);
+  }
+}
+
+TEST(Calibration, NamesFileAndFieldWhenOneIsMissing) {
+  for (const char* field : {"width", "height", "fx", "fy", "cx", "cy"}) {
+    EXPECT_THAT(ErrorOf([&] { ParseCalibration(Without(field), "'desk.yaml'"); }),
+                AllOf(HasSubstr("'desk.yaml'"), HasSubstr(std::string("'") + field + "'")));
+  }
+}
+
+TEST(Calibration, ThatMakesNoCameraIsRefusedWithASentence) {
+  const auto sentence = [](const std::string& text) {
+    return ErrorOf([&] { ParseCalibration(text, "file"); });
+  };
+  EXPECT_THAT(sentence(Without("fx") + "fx: nan\n"), HasSubstr("'fx'"));
+  EXPECT_THAT(sentence(Without("fx") + "fx: wide\n"), HasSubstr("'fx'"));
+  EXPECT_THAT(sentence(Without("fx") + "fx: -500\n"), HasSubstr("file"));
+  EXPECT_THAT(sentence(Without("width") + "width: 0\n"), HasSubstr("file"));
+  EXPECT_THAT(sentence(Without("width") + "width: 752.5\n"), HasSubstr("'width'"));
+  EXPECT_THAT(sentence(std::string(kOwn) + "model: omnidirectional\n"), HasSubstr("'omnidirectional'"));
+  EXPECT_THAT(sentence("- 1\n- 2\n"), HasSubstr("no calibration"));
+  EXPECT_THAT(sentence(""), HasSubstr("no calibration"));
+  EXPECT_THAT(sentence("fx: [1, 2"), HasSubstr("YAML"));
+  EXPECT_THAT(sentence(std::string(100'000, '[')), HasSubstr("nested"));
+  EXPECT_THAT(sentence("camera_matrix: [1, 2, 3]\n"), HasSubstr("3x3"));
+}
+
+TEST(Calibration, WithCoefficientsThatTheLensDoesNotKnowIsRefused) {
+  const std::string head =
+      "image_width: 752\nimage_height: 480\ncamera_matrix: [458, 0, 367, 0, 457, 248, 0, 0, 1]\n"
+      "distortion_model: rational_polynomial\ndistortion_coefficients: [-0.28, 0.07, 0, 0, 0, ";
+  EXPECT_NO_THROW(ParseCalibration(head + "0, 0, 0]\n", "file"));
+  EXPECT_THAT(ErrorOf([&] { ParseCalibration(head + "0, 0.5, 0]\n", "file"); }), HasSubstr("8 coefficients"));
+}
+
+TEST(Calibration, OfAnotherSizeThanThePicturesIsRefused) {
+  EXPECT_NO_THROW(CheckPictureSize(kEuroc, 752, 480, "desk", "camera.yaml"));
+  EXPECT_THAT(ErrorOf([] { CheckPictureSize(kEuroc, 640, 480, "desk", "camera.yaml"); }),
+              AllOf(HasSubstr("640x480"), HasSubstr("752x480"), HasSubstr("camera.yaml")));
+}
+
+TEST(Calibration, IsFoundInSequenceFolders) {
+  const TemporaryFolder folder;
+  EXPECT_FALSE(FindCalibration(folder.path()));
+  const auto sensor = folder.Write("mav0/cam0/sensor.yaml", "");
+  EXPECT_EQ(FindCalibration(folder.path()), sensor);
+  const auto own = folder.Write("calibration.yaml", kOwn);
+  EXPECT_EQ(FindCalibration(folder.path()), own);
+}
+
+TEST(Calibration, OfEveryRecordedSequenceIsRead) {
+  const std::filesystem::path sequences = DOCENT_SOURCE_DIR "/../shared/sequences";
+  if (!std::filesystem::exists(sequences)) GTEST_SKIP() << "the recorded sequences are not on this machine";
+  for (const auto& entry : std::filesystem::directory_iterator(sequences)) {
+    if (!entry.is_directory()) continue;
+    const auto path = FindCalibration(entry.path());
+    ASSERT_TRUE(path) << entry.path();
+    EXPECT_GT(ReadCalibration(*path).width_px(), 0) << *path;
+  }
+}
+
+}  // namespace
+}  // namespace docent::app

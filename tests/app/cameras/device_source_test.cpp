@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/cameras/device_source.h"
+
+#include <gmock/gmock.h>
+#include <linux/videodev2.h>
+
+#include <cerrno>
+#include <cstring>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::uint32_t kWidth = 8, kHeight = 4;
+
+// A camera that answers as a driver does: one pixel format, three buffers, grey pictures numbered by
+// brightness.
+struct FakeCamera {
+  std::uint32_t pixel_format = V4L2_PIX_FMT_GREY;
+  std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
+  int open_error = 0;
+  int pictures_until_unplugged = 1000, pictures_until_silent = 1000, broken_pictures = 0;
+  std::vector<std::vector<std::uint8_t>> buffers;
+  std::vector<std::uint32_t> queue;
+  int delivered = 0, mapped = 0, opened = 0;
+  bool streaming = false;
+};
+
+class FakeSystem : public DeviceSystem {
+ public:
+  explicit FakeSystem(FakeCamera* camera) : camera_(camera) {}
+
+  int Open(const std::string&) override {
+    if (camera_->open_error != 0) return Fail(camera_->open_error);
+    ++camera_->opened;
+    return 7;
+  }
+  void Close(int) override { --camera_->opened; }
+  void* Map(int, std::size_t, long offset) override {
+    ++camera_->mapped;
+    return camera_->buffers[static_cast<std::size_t>(offset)].data();
+  }
+  void Unmap(void*, std::size_t) override { --camera_->mapped; }
+  int Wait(int, int) override {
+    if (camera_->delivered >= camera_->pictures_until_unplugged) return Fail(ENODEV);
+    return camera_->delivered >= camera_->pictures_until_silent ? 0 : 1;
+  }
+
+  int Control(int, unsigned long request, void* argument) override {
+    switch (request) {
+      case VIDIOC_QUERYCAP: {
+        auto* capability = static_cast<v4l2_capability*>(argument);
+        capability->capabilities = camera_->capabilities;
+        std::memcpy(capability->card, "Fake", 5);
+        return 0;
+      }
+      case VIDIOC_S_FMT:
+        return SetFormat(static_cast<v4l2_format*>(argument));
+      case VIDIOC_G_PARM:
+        static_cast<v4l2_streamparm*>(argument)->parm.capture = {V4L2_CAP_TIMEPERFRAME, 0, {1, 15}, 0, 0, {}};
+        return 0;
+      case VIDIOC_S_PARM:
+        return 0;
+      case VIDIOC_REQBUFS:
+        static_cast<v4l2_requestbuffers*>(argument)->count = 3;
+        camera_->buffers.assign(3, std::vector<std::uint8_t>(kWidth * kHeight * 2));
+        return 0;
+      case VIDIOC_QUERYBUF: {
+        auto* buffer = static_cast<v4l2_buffer*>(argument);
+        buffer->length = kWidth * kHeight * 2;
+        buffer->m.offset = buffer->index;
+        return 0;
+      }
+      case VIDIOC_QBUF:
+        camera_->queue.push_back(static_cast<v4l2_buffer*>(argument)->index);
+        return 0;
+      case VIDIOC_STREAMON:
+        camera_->streaming = true;
+        return 0;
+      case VIDIOC_STREAMOFF:
+        camera_->streaming = false;
+        return 0;
+      case VIDIOC_DQBUF:
+        return Deliver(static_cast<v4l2_buffer*>(argument));
+      case VIDIOC_ENUM_FMT: {
+        auto* format = static_cast<v4l2_fmtdesc*>(argument);
+        if (format->index > 0) return Fail(EINVAL);
+        format->pixelformat = camera_->pixel_format;
+        return 0;
+      }
+      default:
+        return Fail(EINVAL);
+    }
+  }
+
+ private:
+  static int Fail(int error) {
+    errno = error;
+    return -1;
+  }
+  int SetFormat(v4l2_format* format) {
+    format->fmt.pix.pixelformat = camera_->pixel_format;  // drivers answer with what they have
+    format->fmt.pix.width = kWidth;
+    format->fmt.pix.height = kHeight;
+    format->fmt.pix.bytesperline = 0;
+    return 0;
+  }
+  int Deliver(v4l2_buffer* buffer) {
+    if (camera_->queue.empty()) return Fail(EAGAIN);
+    buffer->index = camera_->queue.front();
+    camera_->queue.erase(camera_->queue.begin());
+    const int number = camera_->delivered++;
+    std::memset(camera_->buffers[buffer->index].data(), number, kWidth * kHeight);
+    buffer->bytesused = number < camera_->broken_pictures ? 3 : kWidth * kHeight;
+    buffer->timestamp = {100, number * 1000};
+    return 0;
+  }
+
+  FakeCamera* camera_;
+};
+
+std::unique_ptr<FrameSource> Open(FakeCamera* camera, CameraOptions options = {}) {
+  return OpenDevice("/dev/video9", options, std::make_unique<FakeSystem>(camera));
+}
+
+TEST(Device, StreamsPicturesAndLetsGoOfEverything) {
+  FakeCamera camera;
+  {
+    const auto source = Open(&camera);
+    EXPECT_TRUE(source->info().live);
+    EXPECT_DOUBLE_EQ(source->info().nominal_fps, 15);
+    std::vector<engine::Frame> frames(10);
+    for (engine::Frame& frame : frames) ASSERT_TRUE(source->Next(&frame));
+    for (int i = 0; i < 10; ++i) {  // a picture stays as it was when its buffer is used again
+      const engine::Frame& frame = frames[static_cast<std::size_t>(i)];
+      EXPECT_EQ(frame.picture.at<std::uint8_t>(3, 7), i);
+      EXPECT_EQ(frame.time, std::chrono::seconds(100) + std::chrono::milliseconds(i));
+      EXPECT_EQ(frame.index, static_cast<std::uint64_t>(i));
+    }
+    EXPECT_TRUE(camera.streaming);
+  }
+  EXPECT_FALSE(camera.streaming);
+  EXPECT_EQ(camera.mapped, 0);
+  EXPECT_EQ(camera.opened, 0);
+}
+
+TEST(Device, ThatIsUnpluggedSaysSo) {
+  FakeCamera camera;
+  camera.pictures_until_unplugged = 2;
+  const auto source = Open(&camera);
+  engine::Frame frame;
+  ASSERT_TRUE(source->Next(&frame));
+  ASSERT_TRUE(source->Next(&frame));
+  EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("unplugged"));
+}
+
+TEST(Device, ThatFallsSilentSaysSo) {
+  FakeCamera camera;
+  camera.pictures_until_silent = 1;
+  const auto source = Open(&camera);
+  engine::Frame frame;
+  ASSERT_TRUE(source->Next(&frame));
+  EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("no picture for 2000 ms"));
+}
+
+TEST(Device, SkipsAFewBrokenPicturesButNotEndlessly) {
+  FakeCamera camera;
+  camera.broken_pictures = 5;
+  engine::Frame frame;
+  ASSERT_TRUE(Open(&camera)->Next(&frame));
+  EXPECT_EQ(frame.picture.at<std::uint8_t>(0, 0), 5);
+  FakeCamera broken;
+  broken.broken_pictures = 1000;
+  const auto source = Open(&broken);
+  EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("broken pictures"));
+}
+
+TEST(Device, ThatCannotBeUsedSaysWhy) {
+  const auto sentence = [](FakeCamera camera, CameraOptions options = {}) {
+    const std::string text = ErrorOf([&] { Open(&camera, options); });
+    EXPECT_EQ(camera.opened, 0);
+    EXPECT_EQ(camera.mapped, 0);
+    return text;
+  };
+  FakeCamera camera;
+  camera.open_error = ENOENT;
+  EXPECT_THAT(sentence(camera), HasSubstr("There is no camera"));
+  camera.open_error = EACCES;
+  EXPECT_THAT(sentence(camera), HasSubstr("group 'video'"));
+  camera.open_error = EBUSY;
+  EXPECT_THAT(sentence(camera), HasSubstr("in use"));
+  camera.open_error = 0;
+  camera.capabilities = V4L2_CAP_VIDEO_OUTPUT;
+  EXPECT_THAT(sentence(camera), HasSubstr("not one that streams"));
+  camera = {};
+  camera.pixel_format = V4L2_PIX_FMT_RGB565;
+  EXPECT_THAT(sentence(camera), HasSubstr("no picture format"));
+  camera = {};
+  CameraOptions options;
+  options.device_format = {1920, 1080, 0};
+  EXPECT_THAT(sentence(camera, options), HasSubstr("1920x1080"));
+}
+
+TEST(Device, IsDescribedWithItsFormats) {
+  FakeCamera camera;
+  FakeSystem system(&camera);
+  const auto device = DescribeDevice("/dev/video9", &system);
+  ASSERT_TRUE(device);
+  EXPECT_EQ(device->card, "Fake");
+  ASSERT_EQ(device->formats.size(), 1u);
+  EXPECT_EQ(device->formats[0].fourcc, "GREY");
+  EXPECT_EQ(camera.opened, 0);
+}
+
+TEST(DevicePictures, AreConvertedWithTheirStride) {
+  // Grey in YUYV is Y with U = V = 128; rows are two bytes longer than their pixels.
+  std::vector<std::uint8_t> bytes;
+  for (int row = 0; row < 2; ++row) {
+    for (int column = 0; column < 4; ++column)
+      bytes.insert(bytes.end(), {static_cast<std::uint8_t>(100 + row), 128});
+    bytes.insert(bytes.end(), {0, 0});
+  }
+  const cv::Mat picture = ConvertDevicePicture(V4L2_PIX_FMT_YUYV, bytes, {4, 2}, 10, "picture");
+  ASSERT_EQ(picture.size(), cv::Size(4, 2));
+  EXPECT_LT(picture.at<cv::Vec3b>(0, 0)[1], picture.at<cv::Vec3b>(1, 3)[1]);
+  EXPECT_EQ(picture.at<cv::Vec3b>(1, 0)[0], picture.at<cv::Vec3b>(1, 3)[2]);
+  bytes.resize(bytes.size() - 3);
+  EXPECT_THAT(ErrorOf([&] {
+                ConvertDevicePicture(V4L2_PIX_FMT_YUYV, bytes, {4, 2}, 10, "picture");
+              }),
+              HasSubstr("bytes"));
+}
+
+TEST(DevicePictures, InMotionJpegAreDecodedAndTheirSizeIsChecked) {
+  std::vector<std::uint8_t> bytes;
+  ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(8, 16, CV_8UC3, cv::Scalar(10, 200, 30)), bytes));
+  EXPECT_EQ(ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bytes, {16, 8}, 16, "picture").type(), CV_8UC3);
+  EXPECT_THAT(ErrorOf([&] {
+                ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bytes, {8, 8}, 8, "picture");
+              }),
+              HasSubstr("another size"));
+}
+
+TEST(Device, ThatIsNoVideoDeviceSaysSo) {
+  EXPECT_THAT(ErrorOf([] { OpenCamera("/dev/null"); }), HasSubstr("not a video device"));
+  EXPECT_THAT(ErrorOf([] { OpenCamera("/dev/video987"); }), HasSubstr("There is no camera"));
+}
+
+}  // namespace
+}  // namespace docent::app

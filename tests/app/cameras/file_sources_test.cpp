@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/cameras/file_sources.h"
+
+#include <gmock/gmock.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "app/cameras/clipped_source.h"
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr int kWidth = 64, kHeight = 48;
+
+// A picture that tells its number: as bright as it.
+cv::Mat Numbered(int number) {
+  return cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(10 * number + 5));
+}
+
+void WritePng(const std::filesystem::path& path, const cv::Mat& picture) {
+  std::filesystem::create_directories(path.parent_path());
+  ASSERT_TRUE(cv::imwrite(path.string(), picture));
+}
+
+void WriteVideo(const std::filesystem::path& path, int count) {
+  cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25,
+                         cv::Size(kWidth, kHeight));
+  ASSERT_TRUE(writer.isOpened());
+  cv::Mat picture;
+  for (int i = 0; i < count; ++i) {
+    cv::cvtColor(Numbered(i), picture, cv::COLOR_GRAY2BGR);
+    writer.write(picture);
+  }
+}
+
+std::vector<engine::Frame> ReadFrames(FrameSource* source) {
+  std::vector<engine::Frame> frames;
+  for (engine::Frame frame; source->Next(&frame);) frames.push_back(frame);
+  return frames;
+}
+
+class Cameras : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { QuietDecoders(); }
+
+  // A TUM folder of three pictures.
+  void MakeTum() {
+    for (int i = 0; i < 3; ++i) WritePng(folder_ / ("rgb/" + std::to_string(i) + ".png"), Numbered(i));
+    folder_.Write("rgb.txt",
+                  "# list\n1305031102.175304001 rgb/0.png\n1305031102.2 rgb/1.png\n1305031103 rgb/2.png\n");
+  }
+  std::string SentenceOfReading() const {
+    return ErrorOf([&] { ReadFrames(OpenCamera(folder_.path().string()).get()); });
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Cameras, ReadTumFoldersWithExactTimes) {
+  MakeTum();
+  folder_.Write("groundtruth.txt", "");
+  const auto source = OpenCamera(folder_.path().string());
+  EXPECT_EQ(source->info().frame_count, 3u);
+  EXPECT_EQ(source->info().name, folder_.path().filename().string());
+  EXPECT_EQ(source->info().ground_truth_path, folder_ / "groundtruth.txt");
+  const auto frames = ReadFrames(source.get());
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].time, Timestamp(1305031102175304001));
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(frames[static_cast<std::size_t>(i)].index, static_cast<std::uint64_t>(i));
+    EXPECT_EQ(frames[static_cast<std::size_t>(i)].picture.type(), CV_8UC1);
+    EXPECT_EQ(frames[static_cast<std::size_t>(i)].picture.at<std::uint8_t>(7, 7), 10 * i + 5);
+  }
+  engine::Frame more;
+  EXPECT_FALSE(source->Next(&more));
+}
+
+TEST_F(Cameras, ReadEurocFoldersInNanoseconds) {
+  for (const char* camera : {"mav0/cam0", "cam0"}) {
+    const TemporaryFolder folder;
+    WritePng(folder / (std::string(camera) + "/data/a.png"), Numbered(3));
+    folder.Write(std::string(camera) + "/data.csv",
+                 "#timestamp [ns],filename\r\n1403715273262142976,a.png\r\n");
+    const auto frames = ReadFrames(OpenCamera(folder.path().string()).get());
+    ASSERT_EQ(frames.size(), 1u);
+    EXPECT_EQ(frames[0].time, Timestamp(1403715273262142976));
+  }
+}
+
+TEST_F(Cameras, ReadNumberedPicturesInTheOrderOfTheirNumbers) {
+  for (int i = 8; i <= 11; ++i) WritePng(folder_ / ("frame" + std::to_string(i) + ".png"), Numbered(i));
+  CameraOptions options;
+  options.image_fps = 10;
+  const auto frames = ReadFrames(OpenCamera(folder_.path().string(), options).get());
+  ASSERT_EQ(frames.size(), 4u);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(frames[static_cast<std::size_t>(i)].picture.at<std::uint8_t>(0, 0), 10 * (i + 8) + 5);
+    EXPECT_EQ(frames[static_cast<std::size_t>(i)].time, std::chrono::milliseconds(100 * i));
+  }
+}
+
+TEST_F(Cameras, GiveVideosTheTimesOfTheirList) {
+  WriteVideo(folder_ / "video.mp4", 4);
+  folder_.Write("timestamps.txt", "# seconds\n10.000000\n10.033333\n10.5\n11\n");
+  const auto frames = ReadFrames(OpenCamera(folder_.path().string()).get());
+  ASSERT_EQ(frames.size(), 4u);
+  EXPECT_EQ(frames[1].time, Timestamp(10'033'333'000));
+  EXPECT_EQ(frames[3].time, std::chrono::seconds(11));
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(frames[static_cast<std::size_t>(i)].picture.at<cv::Vec3b>(20, 20)[1], 10 * i + 5, 4);
+  }
+}
+
+TEST_F(Cameras, GiveVideosWithoutAListTheirOwnTimes) {
+  WriteVideo(folder_ / "v.mp4", 10);
+  const auto frames = ReadFrames(OpenCamera((folder_ / "v.mp4").string()).get());
+  ASSERT_EQ(frames.size(), 10u);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    EXPECT_NEAR(ToSeconds(frames[i].time), 0.04 * static_cast<double>(i), 1e-6);
+}
+
+TEST_F(Cameras, DeliverWhatCameBeforeAVideoBreaksOffAndThenSayWhere) {
+  WriteVideo(folder_ / "video.mp4", 3);
+  folder_.Write("timestamps.txt", "1\n2\n3\n4\n5\n");
+  const auto source = OpenCamera(folder_.path().string());
+  engine::Frame frame;
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(source->Next(&frame));
+  EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }),
+              AllOf(HasSubstr("breaks off at picture 3"), HasSubstr("of the 5")));
+  EXPECT_FALSE(source->Next(&frame));
+}
+
+TEST_F(Cameras, SayWhenAVideoGoesOnAfterItsList) {
+  WriteVideo(folder_ / "video.mp4", 3);
+  folder_.Write("timestamps.txt", "1\n2\n");
+  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("has 2 times"), HasSubstr("goes on")));
+}
+
+TEST_F(Cameras, SayThatACutOffVideoCannotBeOpened) {
+  WriteVideo(folder_ / "whole.mp4", 20);
+  const std::string bytes = ReadAll(folder_ / "whole.mp4");
+  folder_.Write("video.mp4", bytes.substr(0, bytes.size() / 2));
+  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("video.mp4"), HasSubstr("cannot be opened")));
+}
+
+TEST_F(Cameras, SayWhenAPictureBreaksOff) {
+  cv::Mat noise(kHeight, kWidth, CV_8UC3);
+  cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 255);
+  for (const char* name : {"rgb/0.jpg", "rgb/0.png"}) {
+    WritePng(folder_ / name, noise);
+    const std::string bytes = ReadAll(folder_ / name);
+    folder_.Write(name, bytes.substr(0, bytes.size() * 2 / 3));
+    folder_.Write("rgb.txt", std::string("0 ") + name + "\n");
+    EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr(name), HasSubstr("breaks off")));
+  }
+  folder_.Write("rgb/0.png", "no picture at all");
+  EXPECT_THAT(SentenceOfReading(), HasSubstr("cannot be decoded"));
+  folder_.Write("rgb/0.png", "");
+  EXPECT_THAT(SentenceOfReading(), HasSubstr("empty"));
+}
+
+TEST_F(Cameras, SayWhichPictureIsMissingOrOfAnotherSize) {
+  MakeTum();
+  WritePng(folder_ / "rgb/1.png", cv::Mat(20, 20, CV_8UC1, cv::Scalar(0)));
+  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("rgb/1.png"), HasSubstr("20x20"), HasSubstr("64x48")));
+  std::filesystem::remove(folder_ / "rgb/1.png");
+  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("There is no file"), HasSubstr("rgb/1.png")));
+}
+
+TEST_F(Cameras, NameTheLineOfABadList) {
+  MakeTum();
+  folder_.Write("rgb.txt", "1 rgb/0.png\n1 rgb/1.png\n");
+  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("line 2"), HasSubstr("does not come after")));
+  folder_.Write("rgb.txt", "1 rgb/0.png\n\nsoon rgb/1.png\n");
+  EXPECT_THAT(SentenceOfReading(), HasSubstr("line 3"));
+  folder_.Write("rgb.txt", "1\n");
+  EXPECT_THAT(SentenceOfReading(), HasSubstr("line 1"));
+  folder_.Write("rgb.txt", "# nothing\n");
+  EXPECT_THAT(SentenceOfReading(), HasSubstr("no pictures"));
+}
+
+TEST_F(Cameras, SayWhatIsNoSource) {
+  const auto sentence = [](const std::string& source) { return ErrorOf([&] { OpenCamera(source); }); };
+  EXPECT_THAT(sentence((folder_ / "none").string()), HasSubstr("There is no camera, video or folder"));
+  EXPECT_THAT(sentence(folder_.path().string()), HasSubstr("no image sequence"));
+  EXPECT_THAT(sentence(""), HasSubstr("no name"));
+  EXPECT_THAT(sentence("sim:nowhere"), HasSubstr("nowhere"));
+  EXPECT_THAT(sentence(folder_.Write("text.mp4", "hello").string()),
+              HasSubstr("cannot be opened as a video"));
+}
+
+TEST_F(Cameras, CanBeClippedToAPart) {
+  for (int i = 0; i < 10; ++i) WritePng(folder_ / (std::to_string(i) + ".png"), Numbered(i));
+  CameraOptions options;
+  options.image_fps = 10;
+  const auto source = ClipSource(OpenCamera(folder_.path().string(), options), std::chrono::milliseconds(200),
+                                 std::chrono::milliseconds(500));
+  const auto frames = ReadFrames(source.get());
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].index, 2u);
+  EXPECT_EQ(frames[2].time, std::chrono::milliseconds(400));
+}
+
+TEST(DeviceFormats, AreParsedOrRefused) {
+  const DeviceFormat format = ParseDeviceFormat("640x480@29.97");
+  EXPECT_EQ(format.width_px, 640);
+  EXPECT_EQ(format.height_px, 480);
+  EXPECT_DOUBLE_EQ(format.fps, 29.97);
+  EXPECT_EQ(ParseDeviceFormat("1280x720").fps, 0);
+  for (const char* text :
+       {"", "640", "640x", "x480", "640x480@", "640x480@0", "-1x2", "640@30x480", "640x480x3"}) {
+    EXPECT_THAT(ErrorOf([&] { ParseDeviceFormat(text); }), HasSubstr("no camera format")) << text;
+  }
+}
+
+TEST_F(Cameras, ReadTheRecordedSequencesToTheirEnd) {
+  const std::filesystem::path sequences = DOCENT_SOURCE_DIR "/../shared/sequences";
+  if (!std::filesystem::exists(sequences)) GTEST_SKIP() << "the recorded sequences are not on this machine";
+  const std::pair<const char*, std::size_t> expected[] = {
+      {"still", 40}, {"checkerboard", 240}, {"cylinder-dev-5", 100}};
+  for (const auto& [name, count] : expected) {
+    EXPECT_EQ(ReadFrames(OpenCamera((sequences / name).string()).get()).size(), count) << name;
+  }
+}
+
+}  // namespace
+}  // namespace docent::app

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/options.h"
+
+#include <gmock/gmock.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <optional>
+
+#include "app/command_line/program.h"
+
+namespace docent::app {
+namespace {
+
+// The parser as the program sets it up, with one subcommand; answers with the options it was run with.
+template <typename Options>
+std::optional<Options> Parse(void (*add)(CLI::App*, Invocation*,
+                                         std::function<void(const Options&, Verbosity)>),
+                             const std::string& words) {
+  CLI::App program("test", "docent");
+  program.require_subcommand(1);
+  Invocation invocation;
+  auto parsed = std::make_shared<std::optional<Options>>();
+  add(&program, &invocation, [parsed](const Options& options, Verbosity) { *parsed = options; });
+  try {
+    program.parse(words, false);
+  } catch (const CLI::ParseError&) {
+    return std::nullopt;
+  }
+  invocation.run();
+  return *parsed;
+}
+
+TEST(AuthorOptions, TakeEveryWordOfTheManual) {
+  const auto options = Parse<AuthorOptions>(
+      AddAuthorCommand,
+      "author --library museum.docent --camera left --camera right --calibration l.yaml --calibration r.yaml "
+      "--camera-format 640x480@30 --pace lockstep --engine hybrid --headless --output out --record view.mp4 "
+      "--seed 42 --script in.txt --record-script out.txt --from 1.5 --until 20");
+  ASSERT_TRUE(options);
+  EXPECT_EQ(options->library, "museum.docent");
+  EXPECT_EQ(options->run.cameras.sources, (std::vector<std::string>{"left", "right"}));
+  EXPECT_EQ(options->run.cameras.calibrations, (std::vector<std::filesystem::path>{"l.yaml", "r.yaml"}));
+  EXPECT_EQ(options->run.cameras.options.device_format.width_px, 640);
+  EXPECT_EQ(options->run.cameras.from, std::chrono::milliseconds(1500));
+  EXPECT_EQ(options->run.cameras.until, std::chrono::seconds(20));
+  EXPECT_EQ(options->run.pace, Pace::kLockstep);
+  EXPECT_EQ(options->run.engine, EngineKind::kHybrid);
+  EXPECT_TRUE(options->run.headless);
+  EXPECT_EQ(options->run.output, "out");
+  EXPECT_EQ(options->run.record, "view.mp4");
+  EXPECT_EQ(options->run.seed, 42u);
+  EXPECT_EQ(options->script, "in.txt");
+  EXPECT_EQ(options->record_script, "out.txt");
+}
+
+TEST(AuthorOptions, RefuseWhatMakesNoSense) {
+  const auto refused = [](const std::string& words) {
+    return !Parse<AuthorOptions>(AddAuthorCommand, "author --library l --camera c" + words);
+  };
+  EXPECT_FALSE(refused(""));
+  EXPECT_TRUE(refused(" --camera d --camera e"));
+  EXPECT_TRUE(refused(" --calibration a --calibration b"));
+  EXPECT_TRUE(refused(" --pace slow"));
+  EXPECT_TRUE(refused(" --engine fast"));
+  EXPECT_TRUE(refused(" --camera-format big"));
+  EXPECT_TRUE(refused(" --seed -1"));
+  EXPECT_TRUE(refused(" --from -1"));
+  EXPECT_TRUE(refused(" --from 5 --until 4"));
+  EXPECT_TRUE(refused(" stray"));
+  EXPECT_FALSE(Parse<AuthorOptions>(AddAuthorCommand, "author --library l"));
+  EXPECT_FALSE(Parse<AuthorOptions>(AddAuthorCommand, "author --camera c"));
+}
+
+TEST(TourOptions, NeedLibraryAndCamera) {
+  const auto options = Parse<TourOptions>(AddTourCommand, "tour --library l --camera sim:museum");
+  ASSERT_TRUE(options);
+  EXPECT_EQ(options->run.cameras.sources.front(), "sim:museum");
+  EXPECT_EQ(options->run.seed, 1u);
+  EXPECT_FALSE(Parse<TourOptions>(AddTourCommand, "tour --library l"));
+}
+
+TEST(EvaluateOptions, TakeSeveralSequencesInAnyOrderOfWords) {
+  const auto options = Parse<EvaluateOptions>(
+      AddEvaluateCommand,
+      "evaluate --calibration a.yaml kitchen --output out room --pace lockstep --engine sixdof");
+  ASSERT_TRUE(options);
+  EXPECT_EQ(options->sequences, (std::vector<std::string>{"kitchen", "room"}));
+  EXPECT_EQ(options->calibrations, (std::vector<std::filesystem::path>{"a.yaml"}));
+  EXPECT_EQ(options->pace, Pace::kLockstep);
+  EXPECT_EQ(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate a --output b")->pace, Pace::kEager);
+  EXPECT_FALSE(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate --output out"));
+  EXPECT_FALSE(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen"));
+}
+
+TEST(DemoOptions, NeedAFolderWithoutAWindow) {
+  EXPECT_TRUE(Parse<DemoOptions>(AddDemoCommand, "demo"));
+  EXPECT_FALSE(Parse<DemoOptions>(AddDemoCommand, "demo --headless"));
+  EXPECT_EQ(Parse<DemoOptions>(AddDemoCommand, "demo --headless --output out")->output, "out");
+}
+
+TEST(Pace, IsRealtimeForDevicesAndWindowsAndEagerForHeadlessFiles) {
+  RunArguments run;
+  EXPECT_EQ(ResolvePace(run, false), Pace::kRealtime);
+  run.headless = true;
+  EXPECT_EQ(ResolvePace(run, false), Pace::kEager);
+  EXPECT_EQ(ResolvePace(run, true), Pace::kRealtime);
+  run.pace = Pace::kLockstep;
+  EXPECT_EQ(ResolvePace(run, true), Pace::kLockstep);
+}
+
+}  // namespace
+}  // namespace docent::app

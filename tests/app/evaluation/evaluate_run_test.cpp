@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/evaluation/evaluate_run.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "app/evaluation/html_report.h"
+#include "app/evaluation/json_report.h"
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using engine::TrackingState;
+using ::testing::DoubleNear;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::Optional;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+Timestamp TimeOf(int frame) {
+  return Timestamp(frame * 33'000'000LL);
+}
+
+// A camera that goes round on a rising helix and turns as it goes.
+std::vector<TimedPose> Helix(int count) {
+  std::vector<TimedPose> poses;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 0.1 * i;
+    poses.push_back({TimeOf(i),
+                     {engine::Rotation3::Exp({0.02 * i, 0.03 * i, -0.01 * i}),
+                      Eigen::Vector3d(2 * std::cos(angle), 0.05 * i, 2 * std::sin(angle))}});
+  }
+  return poses;
+}
+
+// What an engine that makes no mistake would say in a map whose frame and scale are its own.
+const engine::Sim3 kTruthFromMap = [] {
+  engine::Sim3 transform;
+  transform.rotation = engine::Rotation3::Exp({0.5, -1, 0.2});
+  transform.translation = {3, -4, 5};
+  transform.scale = 2.5;
+  return transform;
+}();
+
+FrameRecord PerfectFrame(const TimedPose& truth, std::uint64_t map_key = 1) {
+  FrameRecord frame;
+  frame.time = truth.time;
+  frame.state = TrackingState::kSixDof;
+  frame.map_key = map_key;
+  frame.tracking_ms = 4;
+  const engine::Rigid3 map_from_camera(kTruthFromMap.rotation.inverse() * truth.truth_from_camera.rotation,
+                                       kTruthFromMap.inverse() * truth.truth_from_camera.translation);
+  frame.camera_from_map = map_from_camera.inverse();
+  return frame;
+}
+
+RunRecord PerfectRun(const std::vector<TimedPose>& truth) {
+  RunRecord run;
+  run.name = "helix";
+  for (const TimedPose& pose : truth) run.frames.push_back(PerfectFrame(pose));
+  return run;
+}
+
+void MoveInTruth(FrameRecord* frame, const Eigen::Vector3d& by) {
+  engine::Rigid3 map_from_camera = frame->camera_from_map.inverse();
+  map_from_camera.translation += kTruthFromMap.rotation.inverse() * by / kTruthFromMap.scale;
+  frame->camera_from_map = map_from_camera.inverse();
+}
+
+TEST(Evaluation, OfAPerfectRunFindsTheSimilarityAndNoError) {
+  const auto truth = Helix(60);
+  const SequenceReport report = EvaluateRun(PerfectRun(truth), truth, {});
+  EXPECT_THAT(report.ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
+  EXPECT_THAT(report.scale, Optional(DoubleNear(2.5, 1e-9)));
+  EXPECT_THAT(report.rotation_rmse_deg, Optional(DoubleNear(0, 1e-5)));
+  EXPECT_THAT(report.rotation_drift_deg, Optional(DoubleNear(0, 1e-5)));
+  EXPECT_EQ(report.tracked_ratio, 1);
+  EXPECT_EQ(report.first_tracked_frame, 0);
+}
+
+TEST(Evaluation, MeasuresTheAteThatWasPutIn) {
+  const auto truth = Helix(400);
+  RunRecord run = PerfectRun(truth);
+  // Errors of 5 cm whose signs alternate leave the best similarity where it is, up to second order.
+  for (std::size_t i = 0; i < run.frames.size(); ++i)
+    MoveInTruth(&run.frames[i], {0, i % 2 == 0 ? 0.05 : -0.05, 0});
+  EXPECT_THAT(EvaluateRun(run, truth, {}).ate_rmse_m, Optional(DoubleNear(0.05, 5e-4)));
+}
+
+TEST(Evaluation, MeasuresRotationErrorAndDriftSeparately) {
+  const auto truth = Helix(201);
+  RunRecord run = PerfectRun(truth);
+  // The camera's own x axis turns away evenly, by 4 degrees over the run: the alignment halves the largest
+  // error.
+  for (std::size_t i = 0; i < run.frames.size(); ++i) {
+    const double angle = 4 * kDegree * static_cast<double>(i) / 200;
+    engine::Rigid3& pose = run.frames[i].camera_from_map;
+    pose = engine::Rigid3(engine::Rotation3::Exp({angle, 0, 0}), Eigen::Vector3d::Zero()) * pose;
+  }
+  const SequenceReport report = EvaluateRun(run, truth, {});
+  EXPECT_THAT(report.rotation_drift_deg, Optional(DoubleNear(4, 1e-6)));
+  ASSERT_TRUE(report.rotation_rmse_deg);
+  EXPECT_GT(*report.rotation_rmse_deg,
+            1.0);  // an even spread over 4 degrees about its mean has 4 / sqrt(12) = 1.15
+  EXPECT_LT(*report.rotation_rmse_deg, 2.4);  // and unaligned it would be 4 / sqrt(3) = 2.3
+}
+
+TEST(Evaluation, CountsFramesWithAPoseFromTheFirstTrackedOneOn) {
+  const auto truth = Helix(10);
+  RunRecord run = PerfectRun(truth);
+  run.frames[0].state = run.frames[1].state = TrackingState::kInitializing;
+  run.frames[5].state = TrackingState::kLost;
+  run.frames[6].state = TrackingState::kRelocalized;
+  run.frames[7].state = TrackingState::kPanorama;
+  run.frames[8].state = TrackingState::kDropped;
+  const SequenceReport report = EvaluateRun(run, truth, {});
+  EXPECT_EQ(report.frames, 10);
+  EXPECT_EQ(report.tracked, 6);
+  EXPECT_EQ(report.first_tracked_frame, 2);
+  EXPECT_DOUBLE_EQ(report.tracked_ratio, 6.0 / 8);
+  EXPECT_EQ(report.relocalizations, 1);
+}
+
+TEST(Evaluation, CountsFramesOfDiscardedMapsAsUntracked) {
+  const auto truth = Helix(50);
+  RunRecord run = PerfectRun(truth);
+  for (int i = 0; i < 30; ++i) run.frames[static_cast<std::size_t>(i)].map_key = 9;
+  run.maps = {{1, "kept", false, {3, 0, 0}, {100, 0, 0}, {}},
+              {9, "false start", true, {2, 0, 0}, {50, 0, 0}, {}}};
+  const SequenceReport report = EvaluateRun(run, truth, {});
+  EXPECT_EQ(report.tracked, 20);
+  EXPECT_EQ(report.discarded_frames, 30);
+  EXPECT_EQ(report.first_tracked_frame, 30);
+  EXPECT_EQ(report.keyframes.sixdof, 3);
+  ASSERT_TRUE(report.largest_map);
+  EXPECT_EQ(report.maps[*report.largest_map].name, "kept");
+  EXPECT_THAT(FormatSummary(report), HasSubstr("30 frames in maps given up"));
+}
+
+TEST(Evaluation, AlignsEveryMapByItselfAndReportsTheLargest) {
+  const auto truth = Helix(100);
+  RunRecord run = PerfectRun(truth);
+  for (std::size_t i = 60; i < 100; ++i) {  // the second map has another frame, and errors of 10 cm
+    run.frames[i].map_key = 2;
+    MoveInTruth(&run.frames[i], {5, i % 2 == 0 ? 0.1 : -0.1, 5});
+  }
+  const SequenceReport report = EvaluateRun(run, truth, {{TimeOf(0), "build"}, {TimeOf(60), "visit"}});
+  ASSERT_EQ(report.maps.size(), 2u);
+  EXPECT_THAT(report.ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
+  EXPECT_THAT(report.maps[1].ate_rmse_m, Optional(DoubleNear(0.1, 0.01)));
+  ASSERT_EQ(report.segments.size(), 2u);
+  EXPECT_EQ(report.segments[1].label, "visit");
+  EXPECT_EQ(report.segments[1].frames, 40);
+  EXPECT_EQ(report.segments[1].tracked_ratio, 1);
+  EXPECT_THAT(report.segments[1].ate_rmse_m, Optional(DoubleNear(0.1, 0.01)));
+  EXPECT_THAT(report.segments[0].ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
+}
+
+TEST(Evaluation, OfAPureRotationHasNoAteButARotationError) {
+  auto truth = Helix(50);
+  RunRecord run = PerfectRun(truth);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    truth[i].truth_from_camera.translation.setZero();
+    run.frames[i].camera_from_map.translation.setZero();
+  }
+  const SequenceReport report = EvaluateRun(run, truth, {});
+  EXPECT_FALSE(report.ate_rmse_m);
+  EXPECT_FALSE(report.scale);
+  EXPECT_THAT(report.rotation_rmse_deg, Optional(DoubleNear(0, 1e-5)));
+}
+
+TEST(Evaluation, UsesOnlyTruthThatIsNearInTime) {
+  const auto truth = Helix(50);
+  RunRecord run = PerfectRun(truth);
+  for (FrameRecord& frame : run.frames) frame.time += std::chrono::seconds(100);
+  EXPECT_FALSE(EvaluateRun(run, truth, {}).rotation_rmse_deg);
+}
+
+TEST(Evaluation, OfNothingIsEmpty) {
+  const SequenceReport report = EvaluateRun({}, {}, {});
+  EXPECT_EQ(report.tracked_ratio, 0);
+  EXPECT_FALSE(report.first_tracked_frame);
+  EXPECT_THAT(FormatSummary(report), HasSubstr("never tracked"));
+}
+
+TEST(Quantiles, AreNearestRanks) {
+  EXPECT_EQ(Quantile({}, 0.5), 0);
+  EXPECT_EQ(Quantile({3, 1, 2}, 0.5), 2);
+  std::vector<double> values;
+  for (int i = 1; i <= 100; ++i) values.push_back(i);
+  EXPECT_EQ(Quantile(values, 0.95), 95);
+  EXPECT_EQ(Quantile(values, 1), 100);
+}
+
+TEST(JsonReport, HasEveryFieldAndNullWhereNothingIsKnown) {
+  SequenceReport report;
+  report.name = "a \"b\" \xff";
+  const auto json = nlohmann::json::parse(FormatJsonReport({report}));
+  const auto& sequence = json.at("sequences").at(0);
+  for (const char* field :
+       {"name", "frames", "tracked", "tracked_ratio", "first_tracked_frame", "relocalizations", "ate_rmse_m",
+        "rotation_rmse_deg", "rotation_drift_deg", "scale", "wall_s", "peak_memory_mb"}) {
+    EXPECT_TRUE(sequence.contains(field)) << field;
+  }
+  EXPECT_TRUE(sequence.at("ate_rmse_m").is_null());
+  for (const char* field : {"sixdof", "panorama", "localized"})
+    EXPECT_EQ(sequence.at("keyframes").at(field), 0);
+  for (const char* field : {"finite", "infinite", "converted"}) EXPECT_EQ(sequence.at("points").at(field), 0);
+  for (const char* field : {"median", "p95", "max"}) EXPECT_EQ(sequence.at("tracking_ms").at(field), 0);
+  for (const char* field :
+       {"bundle_adjustment", "panorama_localization", "infinite_triangulation", "other"}) {
+    EXPECT_EQ(sequence.at("mapping_s").at(field), 0);
+  }
+}
+
+TEST(HtmlReport, IsOnePageThatLoadsNothingAndEscapesNames) {
+  EvaluatedRun evaluated;
+  evaluated.truth = Helix(300);
+  evaluated.run = PerfectRun(evaluated.truth);
+  evaluated.run.name = "<script>alert(1)</script>";
+  evaluated.run.maps = {{1, "Desk & \"3\"", false, {}, {}, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 2}}}};
+  evaluated.report = EvaluateRun(evaluated.run, evaluated.truth, {});
+  const std::string html = FormatHtmlReport({evaluated});
+  EXPECT_THAT(html, Not(HasSubstr("<script")));
+  EXPECT_THAT(html, Not(HasSubstr("src=")));
+  EXPECT_THAT(html, Not(HasSubstr("href=")));
+  EXPECT_THAT(html, Not(HasSubstr("nan")));
+  EXPECT_THAT(html, HasSubstr("Desk &amp; &quot;3&quot;"));
+  for (const char* title : {"Tracking by state", "Keyframes", "Points", "Time of tracking", "from above",
+                            "Error of the position", "Error of the rotation"}) {
+    EXPECT_THAT(html, HasSubstr(title));
+  }
+}
+
+TEST(GroundTruth, NamesTheLineOfWhatItCannotRead) {
+  const auto sentence = [](const std::string& text) {
+    return ErrorOf([&] { ParseGroundTruth(text, "truth"); });
+  };
+  EXPECT_EQ(ParseGroundTruth("# head\n1.5 1 2 3 0 0 0 1\n", "truth").at(0).time,
+            std::chrono::milliseconds(1500));
+  EXPECT_THAT(sentence("1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0\n"), HasSubstr("truth, line 2"));
+  EXPECT_THAT(sentence("1 1 2 3 0 0 0 2\n"), HasSubstr("quaternion"));
+  EXPECT_THAT(sentence("1 1 2 nan 0 0 0 1\n"), HasSubstr("finite"));
+  EXPECT_THAT(sentence("2 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n"), HasSubstr("line 2"));
+  EXPECT_THAT(sentence("# nothing\n"), HasSubstr("no poses"));
+}
+
+TEST(GroundTruth, IsFoundByTheNearestTime) {
+  const auto truth = Helix(3);
+  EXPECT_EQ(FindPose(truth, TimeOf(1) + std::chrono::milliseconds(9), std::chrono::milliseconds(10)),
+            &truth[1]);
+  EXPECT_EQ(FindPose(truth, TimeOf(2) - std::chrono::milliseconds(9), std::chrono::milliseconds(10)),
+            &truth[2]);
+  EXPECT_EQ(FindPose(truth, TimeOf(1) + std::chrono::milliseconds(16), std::chrono::milliseconds(10)),
+            nullptr);
+  EXPECT_EQ(FindPose(truth, TimeOf(9), std::chrono::milliseconds(10)), nullptr);
+}
+
+}  // namespace
+}  // namespace docent::app

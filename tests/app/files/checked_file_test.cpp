@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/files/checked_file.h"
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+
+#include <csignal>
+
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(CheckedFile, HasItsNameOnlyWhenItIsComplete) {
+  const TemporaryFolder folder;
+  const auto path = folder.Write("list.txt", "old");
+  {
+    CheckedFile file(path);
+    file.Write("new");
+    file.Flush();
+    EXPECT_EQ(ReadAll(path), "old");
+    EXPECT_EQ(ReadAll(folder / "list.txt.part"), "new");
+    file.Close();
+  }
+  EXPECT_EQ(ReadAll(path), "new");
+  EXPECT_FALSE(std::filesystem::exists(folder / "list.txt.part"));
+}
+
+TEST(CheckedFile, ThatIsNotClosedLeavesTheOldOneAlone) {
+  const TemporaryFolder folder;
+  const auto path = folder.Write("list.txt", "old");
+  { CheckedFile(path).Write("half"); }
+  EXPECT_EQ(ReadAll(path), "old");
+  EXPECT_EQ(ReadAll(folder / "list.txt.part"), "half");
+}
+
+TEST(CheckedFile, InAFolderThatIsNotThereSaysSo) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(ErrorOf([&] { CheckedFile file(folder / "none/list.txt"); }), HasSubstr("none/list.txt"));
+}
+
+TEST(CheckedFile, ThatOutgrowsTheRoomItHasSaysSo) {
+  const TemporaryFolder folder;
+  const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit old_limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &old_limit), 0);
+  rlimit limit = old_limit;
+  limit.rlim_cur = 4096;
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &limit), 0);
+  const std::string sentence = ErrorOf([&] {
+    CheckedFile file(folder / "list.txt");
+    file.Write(std::string(100'000, 'x'));
+    file.Close();
+  });
+  setrlimit(RLIMIT_FSIZE, &old_limit);
+  std::signal(SIGXFSZ, old_handler);
+  EXPECT_THAT(sentence, HasSubstr("Cannot write"));
+  EXPECT_THAT(sentence, HasSubstr("list.txt"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "list.txt"));
+}
+
+}  // namespace
+}  // namespace docent::app

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/files/text_file.h"
+
+#include <gtest/gtest.h>
+
+namespace docent::app {
+namespace {
+
+TEST(Seconds, AreExactToTheNanosecond) {
+  EXPECT_EQ(ParseSeconds("1403715273.262142976"), Timestamp(1403715273262142976));
+  EXPECT_EQ(ParseSeconds("-0.000000001"), Timestamp(-1));
+  EXPECT_EQ(ParseSeconds("7"), Timestamp(7'000'000'000));
+  EXPECT_EQ(ParseSeconds(".5"), Timestamp(500'000'000));
+  EXPECT_EQ(ParseSeconds("0.0000000005"), Timestamp(1));
+  EXPECT_EQ(ParseSeconds("1e-3"), Timestamp(1'000'000));
+}
+
+TEST(Seconds, ThatAreNoNumberAreRefused) {
+  for (const char* text : {"", "-", ".", "1.2.3", "1,5", "nan", "inf", "1e300", "12s", " 1"}) {
+    EXPECT_FALSE(ParseSeconds(text)) << text;
+  }
+}
+
+TEST(Seconds, ComeBackFromTheirText) {
+  for (const std::int64_t count : {0LL, 1LL, -1LL, 999'999'999LL, 1403715273262142976LL, -1'500'000'000LL}) {
+    EXPECT_EQ(ParseSeconds(FormatSeconds(Timestamp(count))), Timestamp(count))
+        << FormatSeconds(Timestamp(count));
+  }
+}
+
+TEST(ContentLines, KeepTheirNumbersAndLoseCommentsAndBlanks) {
+  const auto lines = ContentLines("\xEF\xBB\xBF# head\r\n\r\n  a b # tail\r\nlast");
+  ASSERT_EQ(lines.size(), 2u);
+  EXPECT_EQ(lines[0].number, 3);
+  EXPECT_EQ(lines[0].text, "a b");
+  EXPECT_EQ(lines[1].number, 4);
+  EXPECT_EQ(lines[1].text, "last");
+}
+
+TEST(NaturalOrder, ComparesRunsOfDigitsAsNumbers) {
+  EXPECT_TRUE(NaturalLess("frame2.png", "frame10.png"));
+  EXPECT_FALSE(NaturalLess("frame10.png", "frame2.png"));
+  EXPECT_TRUE(NaturalLess("a9b1", "a9b2"));
+  EXPECT_TRUE(NaturalLess("a", "a1"));
+  EXPECT_FALSE(NaturalLess("a1", "a1"));
+  EXPECT_NE(NaturalLess("a01", "a1"), NaturalLess("a1", "a01"));
+}
+
+TEST(Numbers, AreWrittenWithoutTheLocaleAndReadBack) {
+  EXPECT_EQ(FormatNumber(0.1), "0.1");
+  EXPECT_EQ(FormatNumber(-0.0), "0");
+  EXPECT_EQ(ParseNumber(FormatNumber(1.0 / 3, 17)), 1.0 / 3);
+  EXPECT_FALSE(ParseNumber("nan"));
+  EXPECT_FALSE(ParseNumber("1e999"));
+}
+
+}  // namespace
+}  // namespace docent::app

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/session.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "app/cameras/simulated_source.h"
+#include "app/demo/exhibit_model.h"
+#include "app/session/frame_loop.h"
+#include "app/session/surface_at_pixel.h"
+#include "app/simulator/simulation.h"
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+std::shared_ptr<const Simulation> Room(double seconds) {
+  SimulationOptions options;
+  options.duration_s = seconds;
+  return MakeSimulation("museum:2", options);
+}
+
+CalibratedCamera CameraOf(const std::shared_ptr<const Simulation>& simulation) {
+  return Calibrate(OpenSimulation(simulation), std::nullopt);
+}
+
+struct Seen {
+  std::vector<engine::TrackedFrame> frames;
+  int poses = 0;
+};
+
+// Feeds a whole simulation to a session.
+Seen Feed(const std::shared_ptr<const Simulation>& simulation, Pace pace, Session* session,
+          std::vector<TimedCommand> script = {}, const std::filesystem::path& model_folder = {}) {
+  CalibratedCamera camera = CameraOf(simulation);
+  FrameLoopOptions loop;
+  loop.pace = pace;
+  loop.script = std::move(script);
+  loop.script_name = "script";
+  loop.model_folder = model_folder;
+  Seen seen;
+  RunFrames(&camera, session, loop,
+            [&](const engine::TrackedFrame& frame) {
+              seen.frames.push_back(frame);
+              seen.poses += engine::HasPose(frame.state);
+            },
+            {});
+  session->Finish();
+  return seen;
+}
+
+SessionOptions Options(Pace pace, const std::string& first_map) {
+  SessionOptions options;
+  options.threaded = pace != Pace::kLockstep;
+  options.first_map = first_map;
+  return options;
+}
+
+std::vector<std::shared_ptr<const engine::CameraModel>> LensOf(const Simulation& simulation) {
+  return {std::make_shared<engine::CameraModel>(simulation.camera())};
+}
+
+TEST(Session, MapsEagerlyOnAThreadOfItsOwnAndDropsNothing) {
+  const auto simulation = Room(3);
+  Session session(Options(Pace::kEager, "map"), LensOf(*simulation), nullptr);
+  const Seen seen = Feed(simulation, Pace::kEager, &session);
+  EXPECT_EQ(seen.frames.size(), static_cast<std::size_t>(simulation->frame_count()));
+  EXPECT_GT(seen.poses, simulation->frame_count() / 2);
+  const auto maps = session.Maps();
+  ASSERT_EQ(maps.size(), 1u);
+  EXPECT_GT(maps[0].snapshot->keyframes.size(), 2u);
+  EXPECT_EQ(engine::Validate(*maps[0].snapshot), "");
+}
+
+TEST(Session, GivesEqualPosesOnEveryRunInLockstep) {
+  const auto simulation = Room(2.5);
+  std::vector<Seen> runs;
+  for (int run = 0; run < 2; ++run) {
+    Session session(Options(Pace::kLockstep, "map"), LensOf(*simulation), nullptr);
+    runs.push_back(Feed(simulation, Pace::kLockstep, &session));
+  }
+  ASSERT_GT(runs[0].poses, 10);
+  ASSERT_EQ(runs[0].frames.size(), runs[1].frames.size());
+  for (std::size_t i = 0; i < runs[0].frames.size(); ++i) {
+    const engine::TrackedFrame &a = runs[0].frames[i], &b = runs[1].frames[i];
+    ASSERT_EQ(a.state, b.state) << i;
+    EXPECT_EQ(a.camera_from_map.translation, b.camera_from_map.translation) << i;
+    EXPECT_EQ(a.camera_from_map.rotation.quaternion().coeffs(),
+              b.camera_from_map.rotation.quaternion().coeffs())
+        << i;
+  }
+}
+
+TEST(Session, KeepsWhatIsPlacedUndoneAndRedoneInTheLibrary) {
+  const auto simulation = Room(4);
+  const TemporaryFolder folder;
+  const std::vector<std::uint8_t> glb = MakeExhibitGlb();
+  folder.Write("exhibit.glb", {glb.begin(), glb.end()});
+  {
+    maps::Library library =
+        maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    Session session(Options(Pace::kLockstep, ""), LensOf(*simulation), &library);
+    const auto at = [](double seconds, Command command) {
+      return TimedCommand{FromSeconds(seconds), 1, std::move(command)};
+    };
+    const Eigen::Vector2d pixel(320, 290);
+    Feed(simulation, Pace::kLockstep, &session,
+         {at(0, NewMap{"Desk"}), at(3, PlaceModel{"exhibit.glb", pixel, 0.3, 20}),
+          at(3, PlaceSignpost{"here", pixel, ""}), at(3.1, ScaleEntity{"exhibit", 2}), at(3.2, Undo{}),
+          at(3.3, Undo{}), at(3.4, Redo{}), at(3.5, SetPolicy{"Desk", maps::Policy::kAugmentOnly}),
+          at(3.6, PlaceSignpost{"there", pixel, "Desk"})},
+         folder.path());
+  }
+  maps::Library library = maps::Library::Open(folder / "l.docent", maps::Access::kReadOnly);
+  EXPECT_THAT(library.Verify(), IsEmpty());
+  const maps::MapInfo info = library.FindByName("Desk");
+  EXPECT_EQ(info.policy, maps::Policy::kAugmentOnly);
+  SessionOptions tour;
+  tour.may_write = false;
+  Session session(tour, LensOf(*simulation), &library);
+  const auto maps = session.Maps();
+  ASSERT_EQ(maps.size(), 1u);
+  ASSERT_EQ(maps[0].scene->entities.size(), 3u);
+  EXPECT_EQ(maps[0].scene->Find("exhibit")->model.map_from_model.scale, 0.3);
+  EXPECT_EQ(maps[0].scene->Find("sign-2")->signpost.to_map, "Desk");
+  EXPECT_THAT(ErrorOf([&] { session.Execute(NewMap{"More"}, {}); }), HasSubstr("tour"));
+  const std::uint64_t keyframes = info.keyframes;
+  const Seen seen = Feed(simulation, Pace::kEager, &session);
+  EXPECT_GT(seen.poses, simulation->frame_count() / 3);
+  EXPECT_EQ(library.FindByName("Desk").keyframes, keyframes);
+}
+
+TEST(Session, RefusesACommandThatCannotBeCarriedOutAndNamesItsLine) {
+  const auto simulation = Room(0.5);
+  const auto refusal = [&](Command command) {
+    Session session(Options(Pace::kLockstep, ""), LensOf(*simulation), nullptr);
+    return ErrorOf([&] {
+      Feed(simulation, Pace::kLockstep, &session, {{FromSeconds(0.1), 7, std::move(command)}});
+    });
+  };
+  EXPECT_THAT(refusal(StopMap{}), HasSubstr("script, line 7: there is no current map"));
+  EXPECT_THAT(refusal(UseMap{"Attic"}), HasSubstr("there is no map 'Attic'"));
+  EXPECT_THAT(refusal(Undo{}), HasSubstr("no current map"));
+  EXPECT_THAT(refusal(Save{}), HasSubstr("no library"));
+  EXPECT_THAT(refusal(PlaceModel{"missing.glb", {1, 1}, 1, 0}), HasSubstr("line 7"));
+}
+
+TEST(SurfaceAtPixel, FindsUpwardsAgainstTheLowerEdgeOfThePictures) {
+  engine::MapSnapshot map;
+  const engine::Rotation3 tilt = engine::Rotation3::Exp({0.3, 0, 0});
+  for (const double sign : {-1.0, 1.0}) {
+    engine::KeyFrame keyframe;
+    keyframe.camera_from_map.rotation = engine::Rotation3::Exp({sign * 0.2, 0, 0}) * tilt;
+    map.keyframes.push_back(keyframe);
+  }
+  const Eigen::Vector3d expected = -(tilt.inverse() * Eigen::Vector3d::UnitY());
+  EXPECT_LT((UpInMap(map) - expected).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace docent::app

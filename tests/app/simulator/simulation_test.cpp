@@ -1,0 +1,383 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/simulator/simulation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "engine/base/error.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+SimulationOptions SmallAndClean() {
+  SimulationOptions options = SimulationOptions::Clean();
+  options.camera = SimulatedCamera(320);
+  return options;
+}
+
+bool SamePicture(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
+}
+
+std::string ErrorOf(const std::string& scene, const SimulationOptions& options = {}) {
+  try {
+    MakeSimulation(scene, options);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// Labels in the order in which they begin.
+std::vector<std::string> LabelSequence(const Simulation& simulation) {
+  std::vector<std::string> labels;
+  for (int i = 0; i < simulation.frame_count(); ++i) {
+    if (labels.empty() || labels.back() != simulation.label(i)) labels.push_back(simulation.label(i));
+  }
+  return labels;
+}
+
+double GreyAt(const cv::Mat& grey, const Eigen::Vector2d& pixel) {
+  const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
+  const double fx = pixel.x() - x, fy = pixel.y() - y;
+  const auto at = [&](int column, int row) { return static_cast<double>(grey.at<uchar>(row, column)); };
+  return (1 - fy) * ((1 - fx) * at(x, y) + fx * at(x + 1, y)) +
+         fy * ((1 - fx) * at(x, y + 1) + fx * at(x + 1, y + 1));
+}
+
+class EveryScene : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Simulation, EveryScene,
+                         ::testing::Values("room:1", "museum:2", "desks:2", "cylinder:10", "loop", "grass"),
+                         [](const auto& scene) {
+                           const std::string name = scene.param;
+                           return name.substr(0, name.find(':'));
+                         });
+
+// The truth and the pictures belong together: what frame i shows at a pixel, frame j shows where the truth
+// says. A truth that is two pixels off must fit worse.
+TEST_P(EveryScene, ShowsTheSamePointInTwoFramesWhereTheTruthSays) {
+  const auto simulation = MakeSimulation(GetParam(), SmallAndClean());
+  const engine::CameraModel& camera = simulation->camera();
+  const int step = 8;
+  double at_truth = 0, beside_truth = 0;
+  int compared = 0;
+  for (int i = 5; i + step < simulation->frame_count(); i += simulation->frame_count() / 4) {
+    const int j = i + step;
+    cv::Mat picture_i, picture_j, grey_i, grey_j;
+    simulation->Render(i, &picture_i);
+    simulation->Render(j, &picture_j);
+    cv::cvtColor(picture_i, grey_i, cv::COLOR_BGR2GRAY);
+    cv::cvtColor(picture_j, grey_j, cv::COLOR_BGR2GRAY);
+    for (int y = 12; y < camera.height_px() - 12; y += 9) {
+      for (int x = 12; x < camera.width_px() - 12; x += 9) {
+        const auto point = simulation->SurfaceAt(i, {x, y});
+        if (!point || !simulation->IsVisible(j, *point)) continue;
+        const auto pixel = camera.Project(simulation->world_from_camera(j).inverse() * *point);
+        if (!pixel || !camera.IsInside(*pixel, 4)) continue;
+        const double grey = grey_i.at<uchar>(y, x);
+        at_truth += std::abs(grey - GreyAt(grey_j, *pixel));
+        beside_truth += std::abs(grey - GreyAt(grey_j, *pixel + Eigen::Vector2d(2, 0)));
+        ++compared;
+      }
+    }
+  }
+  ASSERT_GT(compared, 500);
+  EXPECT_LT(at_truth / compared, 6.0) << "grey levels";
+  EXPECT_LT(at_truth, 0.6 * beside_truth);
+}
+
+TEST_P(EveryScene, IsTheSameToTheByteForTheSameSeedAndAnotherForAnother) {
+  SimulationOptions options;
+  options.camera = SimulatedCamera(160);
+  options.blur_samples = 2;
+  cv::Mat first, again, other;
+  const auto simulation = MakeSimulation(GetParam(), options);
+  simulation->Render(0, &again);
+  simulation->Render(7, &first);
+  const auto twin = MakeSimulation(GetParam(), options);
+  twin->Render(7, &again);
+  EXPECT_TRUE(SamePicture(first, again)) << "a picture must not depend on what was rendered before";
+  EXPECT_TRUE(engine::IsNear(simulation->world_from_camera(7), twin->world_from_camera(7), 1e-12, 1e-12));
+  options.seed = 2;
+  MakeSimulation(GetParam(), options)->Render(7, &other);
+  EXPECT_FALSE(SamePicture(first, other));
+}
+
+TEST_P(EveryScene, IsRichInCornersAtEveryScaleAndEverywhereInThePicture) {
+  const auto simulation = MakeSimulation(GetParam(), SimulationOptions{});
+  for (int part = 0; part < 5; ++part) {
+    const int frame = (simulation->frame_count() - 1) * part / 4;
+    cv::Mat picture, grey;
+    simulation->Render(frame, &picture);
+    cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+    constexpr int kFewest[] = {700, 400, 150, 50};
+    for (int level = 0; level < 4; ++level) {
+      std::vector<cv::KeyPoint> corners;
+      cv::FAST(grey, corners, 10);
+      std::set<std::pair<int, int>> cells;
+      for (const cv::KeyPoint& corner : corners) {
+        cells.insert({static_cast<int>(corner.pt.x * 8 / static_cast<float>(grey.cols)),
+                      static_cast<int>(corner.pt.y * 6 / static_cast<float>(grey.rows))});
+      }
+      EXPECT_GT(static_cast<int>(corners.size()), kFewest[level]) << "frame " << frame << ", level " << level;
+      EXPECT_GT(cells.size(), 24u) << "of 48 cells, frame " << frame << ", level " << level;
+      cv::pyrDown(grey, grey);
+    }
+  }
+}
+
+TEST_P(EveryScene, MovesNoFasterThanAPersonAndHasALabelAndAPlace) {
+  const auto simulation = MakeSimulation(GetParam(), SmallAndClean());
+  EXPECT_FALSE(simulation->places().empty());
+  double fastest = 0, quickest_turn = 0;
+  for (int i = 0; i < simulation->frame_count(); ++i) {
+    EXPECT_FALSE(simulation->label(i).empty());
+    if (i == 0) continue;
+    const engine::Rigid3 step =
+        simulation->world_from_camera(i - 1).inverse() * simulation->world_from_camera(i);
+    const double seconds = ToSeconds(simulation->time(i) - simulation->time(i - 1));
+    fastest = std::max(fastest, step.translation.norm() / seconds);
+    quickest_turn = std::max(quickest_turn, step.rotation.Angle() / seconds);
+  }
+  EXPECT_LT(fastest, 2.0) << "metres a second";
+  EXPECT_LT(quickest_turn, 2.6) << "radians a second";
+}
+
+TEST_P(EveryScene, IsPictureFilling) {
+  const auto simulation = MakeSimulation(GetParam(), SmallAndClean());
+  cv::Mat picture;
+  for (int part = 0; part < 4; ++part) {
+    const int frame = (simulation->frame_count() - 1) * part / 3;
+    simulation->Render(frame, &picture);
+    ASSERT_EQ(picture.type(), CV_8UC3);
+    ASSERT_EQ(picture.size(), cv::Size(320, 240));
+    int black = 0;
+    for (auto pixel = picture.begin<cv::Vec3b>(); pixel != picture.end<cv::Vec3b>(); ++pixel) {
+      black += *pixel == cv::Vec3b() ? 1 : 0;
+    }
+    EXPECT_LT(black, 320 * 240 / 100) << "black pixels of frame " << frame;
+  }
+}
+
+TEST(Simulation, LabelsAMuseumAsBuildTravelVisit) {
+  const auto simulation = MakeSimulation("museum", SmallAndClean());
+  const std::vector<std::string> expected = {"build0", "travel", "build1", "travel", "build2",
+                                             "travel", "build3", "travel", "visit2", "travel",
+                                             "visit0", "travel", "visit3", "travel", "visit1"};
+  EXPECT_EQ(LabelSequence(*simulation), expected);
+  EXPECT_EQ(simulation->places().size(), 4u);
+}
+
+TEST(Simulation, VisitsEveryPlaceOnceForAnyNumberOfThem) {
+  for (int places = 1; places <= 5; ++places) {
+    const auto simulation = MakeSimulation("desks:" + std::to_string(places), SmallAndClean());
+    std::map<std::string, int> count;
+    for (const std::string& label : LabelSequence(*simulation)) ++count[label];
+    for (int k = 0; k < places; ++k) {
+      EXPECT_EQ(count["build" + std::to_string(k)], 1) << places << " places, " << k;
+      EXPECT_EQ(count["visit" + std::to_string(k)], 1) << places << " places, " << k;
+    }
+    EXPECT_EQ(count["travel"], 2 * places - 1);
+  }
+}
+
+TEST(Simulation, MovesSidewaysByAThirdOfAMetreInTheFirstTwoSecondsOfEveryBuild) {
+  for (const char* scene : {"museum", "desks", "room"}) {
+    const auto simulation = MakeSimulation(scene, SmallAndClean());
+    for (int i = 0; i < simulation->frame_count(); ++i) {
+      const bool begins = i == 0 || simulation->label(i) != simulation->label(i - 1);
+      if (!begins || simulation->label(i).rfind("visit", 0) == 0 || simulation->label(i) == "travel")
+        continue;
+      const engine::Rigid3 start = simulation->world_from_camera(i);
+      double sideways = 0;
+      for (int j = i; j < i + 60; ++j) {
+        sideways = std::max(sideways,
+                            std::abs((start.inverse() * simulation->world_from_camera(j).translation).x()));
+      }
+      EXPECT_GT(sideways, 0.28) << scene << ", " << simulation->label(i) << ", metres";
+      const auto middle = simulation->SurfaceAt(i, {160, 120});
+      ASSERT_TRUE(middle);
+      EXPECT_LT((*middle - start.translation).norm(), 3.5)
+          << scene << ", " << simulation->label(i) << ", metres";
+    }
+  }
+}
+
+TEST(Simulation, SeesEveryPlaceWhileItIsBuiltAndVisited) {
+  for (const char* scene : {"museum:3", "desks:3"}) {
+    const auto simulation = MakeSimulation(scene, SmallAndClean());
+    for (const SimulatedPlace& place : simulation->places()) {
+      int built = 0, seen = 0;
+      for (int i = 0; i < simulation->frame_count(); ++i) {
+        if (simulation->label(i) != "build" + place.name && simulation->label(i) != "visit" + place.name)
+          continue;
+        ++built;
+        const auto pixel =
+            simulation->camera().Project(simulation->world_from_camera(i).inverse() * place.anchor_in_world);
+        if (pixel && simulation->camera().IsInside(*pixel)) ++seen;
+      }
+      EXPECT_GT(built, 200);
+      EXPECT_GT(seen, built * 9 / 10) << scene << ", place " << place.name;
+    }
+  }
+}
+
+TEST(Simulation, TurnsInTheRoomExactlyOnTheSpotAndBack) {
+  EXPECT_EQ(LabelSequence(*MakeSimulation("room", SmallAndClean())), std::vector<std::string>{"general"});
+  const auto simulation = MakeSimulation("room:2", SmallAndClean());
+  const std::vector<std::string> expected = {"general", "rotation", "general", "rotation", "general"};
+  EXPECT_EQ(LabelSequence(*simulation), expected);
+  std::optional<engine::Rigid3> first;
+  double widest = 0;
+  for (int i = 0; i < simulation->frame_count(); ++i) {
+    if (simulation->label(i) != "rotation") {
+      first.reset();
+      continue;
+    }
+    const engine::Rigid3 pose = simulation->world_from_camera(i);
+    if (!first) first = pose;
+    EXPECT_LT((pose.translation - first->translation).norm(), 1e-9) << "frame " << i;
+    widest = std::max(widest, (first->rotation.inverse() * pose.rotation).Angle());
+  }
+  EXPECT_GT(widest, 1.9) << "radians";
+}
+
+TEST(Simulation, TurnsInTheCylinderAsThePaperSays) {
+  for (const int radius_cm : {0, 5, 30}) {
+    const auto simulation = MakeSimulation("cylinder:" + std::to_string(radius_cm));
+    ASSERT_EQ(simulation->frame_count(), 100);
+    EXPECT_NEAR(2 * std::atan(320 / simulation->camera().intrinsics().fx) * 180 / std::numbers::pi, 64, 1e-9);
+    for (const int frame : {0, 40, 99}) {
+      const engine::Rigid3 pose = simulation->world_from_camera(frame);
+      // World to camera is [R | (0, 0, -r)]: the camera's centre lies r before the axis, along its own view.
+      EXPECT_LT((pose.inverse().translation - Eigen::Vector3d(0, 0, -radius_cm / 100.0)).norm(), 2e-4);
+      const auto wall = simulation->SurfaceAt(frame, {319.5, 239.5});
+      ASSERT_TRUE(wall);
+      EXPECT_NEAR(std::hypot(wall->x(), wall->z()), 0.5, 4e-4);
+    }
+    EXPECT_NEAR(simulation->world_from_camera(99).rotation.Angle(), std::numbers::pi / 2, 1e-6);
+  }
+}
+
+TEST(Simulation, FillsIdenticalPlacesWithTheSameThings) {
+  for (const bool identical : {true, false}) {
+    SimulationOptions options = SmallAndClean();
+    options.identical_places = identical;
+    const auto simulation = MakeSimulation("desks:3", options);
+    // The same view of the first and of the second desk, which stands 2.1 m to the right.
+    const engine::Rigid3 pose = simulation->world_from_camera(0);
+    engine::Rigid3 beside = pose;
+    beside.translation.x() +=
+        simulation->places()[1].anchor_in_world.x() - simulation->places()[0].anchor_in_world.x();
+    int same = 0, compared = 0;
+    for (int y = 100; y < 240; y += 10) {
+      for (int x = 60; x < 260; x += 10) {
+        const auto a = simulation->SurfaceAlong(pose, {x, y}), b = simulation->SurfaceAlong(beside, {x, y});
+        if (!a || !b) continue;
+        ++compared;
+        same += std::abs((*a - pose.translation).norm() - (*b - beside.translation).norm()) < 1e-6 ? 1 : 0;
+      }
+    }
+    ASSERT_GT(compared, 200);
+    if (identical) {
+      EXPECT_EQ(same, compared);
+    } else {
+      EXPECT_LT(same, compared * 9 / 10);
+    }
+  }
+}
+
+TEST(Simulation, BlursAlongTheMotionAndKeepsTheMiddleOfTheExposure) {
+  SimulationOptions options = SmallAndClean();
+  options.frame_rate_hz = 10;
+  const auto sharp = MakeSimulation("room", options);
+  options.blur_samples = 12;
+  options.exposure_s = 0.1;
+  const auto blurred = MakeSimulation("room", options);
+  cv::Mat sharp_picture, blurred_picture, edges;
+  sharp->Render(8, &sharp_picture);
+  blurred->Render(8, &blurred_picture);
+  const auto detail = [&](const cv::Mat& picture) {
+    cv::Laplacian(picture, edges, CV_32F);
+    return cv::norm(edges, cv::NORM_L1);
+  };
+  EXPECT_LT(detail(blurred_picture), 0.8 * detail(sharp_picture));
+  // Smoothed alike, the two agree: nothing has been shifted.
+  cv::GaussianBlur(sharp_picture, sharp_picture, {0, 0}, 4);
+  cv::GaussianBlur(blurred_picture, blurred_picture, {0, 0}, 4);
+  EXPECT_LT(
+      cv::norm(sharp_picture, blurred_picture, cv::NORM_L1) / static_cast<double>(3 * sharp_picture.total()),
+      1.5);
+}
+
+TEST(Simulation, CountsFramesFromTheRateAndTheDuration) {
+  SimulationOptions options = SmallAndClean();
+  options.frame_rate_hz = 20;
+  options.duration_s = 2.5;
+  const auto simulation = MakeSimulation("room", options);
+  EXPECT_EQ(simulation->frame_count(), 51);
+  EXPECT_EQ(simulation->time(0), Timestamp{0});
+  EXPECT_EQ(simulation->time(50), FromSeconds(2.5));
+}
+
+TEST(Simulation, NamesTheScenesWhenAskedForAnUnknownOne) {
+  const std::string message = ErrorOf("attic");
+  EXPECT_THAT(message, HasSubstr("attic"));
+  for (const char* scene : {"room", "museum", "desks", "cylinder", "loop", "grass"})
+    EXPECT_THAT(message, HasSubstr(scene));
+  EXPECT_THAT(ErrorOf(""), HasSubstr("museum"));
+}
+
+TEST(Simulation, SaysWhichNumbersASceneTakes) {
+  for (const char* scene :
+       {"museum:0", "museum:99", "museum:", "museum:two", "museum:2x", "museum:-1", "museum:99999999999"}) {
+    EXPECT_THAT(ErrorOf(scene), HasSubstr("from 1 to 24")) << scene;
+  }
+  EXPECT_NE(ErrorOf("grass:1"), "");
+}
+
+TEST(Simulation, SaysWhatIsWrongWithOptions) {
+  const auto fault = [](auto change) {
+    SimulationOptions options;
+    change(options);
+    return ErrorOf("grass", options);
+  };
+  EXPECT_THAT(fault([](auto& options) { options.frame_rate_hz = 0; }), HasSubstr("frame rate"));
+  EXPECT_THAT(fault([](auto& options) { options.frame_rate_hz = std::nan(""); }), HasSubstr("frame rate"));
+  EXPECT_THAT(fault([](auto& options) { options.duration_s = -1; }), HasSubstr("duration"));
+  EXPECT_THAT(fault([](auto& options) { options.exposure_s = 1; }), HasSubstr("exposure"));
+  EXPECT_THAT(fault([](auto& options) { options.blur_samples = 0; }), HasSubstr("blur"));
+  EXPECT_THAT(fault([](auto& options) { options.noise_sigma = -1; }), HasSubstr("noise"));
+  EXPECT_THAT(fault([](auto& options) { options.exposure_drift = 2; }), HasSubstr("drift"));
+  EXPECT_THAT(fault([](auto& options) { options.vignetting = 1; }), HasSubstr("vignetting"));
+  EXPECT_THAT(fault([](auto& options) { options.camera = SimulatedCamera(9000); }), HasSubstr("8192"));
+}
+
+TEST(Simulation, ReportsHowLongAPictureTakes) {
+  const auto simulation = MakeSimulation("museum:2");
+  cv::Mat picture;
+  simulation->Render(0, &picture);
+  const auto start = std::chrono::steady_clock::now();
+  constexpr int kPictures = 10;
+  for (int i = 0; i < kPictures; ++i) simulation->Render(i * 20, &picture);
+  const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - start;
+  RecordProperty("milliseconds_per_picture", std::to_string(taken.count() / kPictures));
+  EXPECT_EQ(picture.size(), cv::Size(640, 480));
+}
+
+}  // namespace
+}  // namespace docent::app
