@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/bench/bench_sequence.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "app/cameras/frame_source.h"
+#include "app/session/calibrated_camera.h"
+#include "engine/mapping/mapper.h"
+
+namespace docent::bench {
+
+namespace {
+
+constexpr std::size_t kSimulatedFrames = 300;
+
+void ReadPictures(BenchSequence* sequence) {
+  const char* named = std::getenv("DOCENT_BENCH_SEQUENCE");
+  app::QuietDecoders();
+  app::CalibratedCamera camera = app::Calibrate(app::OpenCamera(named ? named : "sim:room"), std::nullopt);
+  sequence->name = camera.source->info().name;
+  sequence->camera = camera.model;
+  engine::Frame frame;
+  while (camera.source->Next(&frame)) {
+    camera.CheckPicture(frame.picture);
+    if (frame.picture.channels() == 3) {
+      cv::Mat gray;
+      cv::cvtColor(frame.picture, gray, cv::COLOR_BGR2GRAY);
+      frame.picture = gray;
+    }
+    sequence->frames.push_back(frame);
+    if (!named && sequence->frames.size() == kSimulatedFrames) break;
+  }
+}
+
+// As a session in lockstep does.
+void MakeMap(BenchSequence* sequence) {
+  engine::Tracker tracker({}, sequence->camera, 1);
+  engine::Mapper mapper({});
+  tracker.StartNewMap();
+  for (const engine::Frame& frame : sequence->frames) {
+    std::optional<MapPlaces> places;
+    if (sequence->map) places.emplace(sequence->map);
+    sequence->tracked.push_back(tracker.Track(frame, places ? &*places : nullptr));
+    if (auto pair = tracker.TakeInitialPair()) mapper.Start(std::move(*pair));
+    if (auto candidate = tracker.TakeKeyFrameCandidate()) {
+      mapper.Report(tracker.TakeReports());
+      mapper.Offer(std::move(*candidate));
+    }
+    for (int step = 0; step < 20 && !mapper.Settled(); ++step) mapper.Step();
+    mapper.Step();
+    for (const engine::MapperEvent& event : mapper.TakeEvents()) {
+      if (event.kind == engine::MapperEvent::Kind::kStartFailed) tracker.StartNewMap();
+    }
+    if (mapper.Snapshot() == sequence->map) continue;
+    sequence->map = mapper.Snapshot();
+    tracker.SetMap(sequence->map, MapPlaces::kKey);
+  }
+}
+
+BenchSequence MakeSequence() {
+  cv::setNumThreads(1);
+  BenchSequence sequence;
+  ReadPictures(&sequence);
+  MakeMap(&sequence);
+  return sequence;
+}
+
+}  // namespace
+
+const BenchSequence& Sequence() {
+  static const BenchSequence sequence = MakeSequence();
+  return sequence;
+}
+
+std::vector<engine::PlaceCandidate> MapPlaces::FindPlaces(const engine::SmallBlurryImage& image, int count,
+                                                          int per_map, std::uint64_t only_map) const {
+  std::vector<engine::PlaceCandidate> found;
+  if (only_map != 0 && only_map != kKey) return found;
+  for (const engine::KeyFrame& keyframe : map_->keyframes) {
+    const double difference = engine::Difference(keyframe.features->small_blurry, image);
+    if (std::isfinite(difference)) found.push_back({kKey, map_, keyframe.id, difference});
+  }
+  const auto wanted = static_cast<std::size_t>(std::max(0, std::min(count, per_map)));
+  const auto end = found.begin() + static_cast<std::ptrdiff_t>(std::min(wanted, found.size()));
+  std::partial_sort(found.begin(), end, found.end(),
+                    [](const auto& a, const auto& b) { return a.difference < b.difference; });
+  found.erase(end, found.end());
+  return found;
+}
+
+double ThreadMilliseconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+double Quantile(std::vector<double>* values, double part) {
+  if (values->empty()) return 0;
+  std::sort(values->begin(), values->end());
+  const auto index = static_cast<std::size_t>(part * static_cast<double>(values->size() - 1) + 0.5);
+  return (*values)[index];
+}
+
+}  // namespace docent::bench

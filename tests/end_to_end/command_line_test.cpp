@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// The real program, run as a person runs it: what it prints, where, and with which exit status.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "app/calibration/calibration_file.h"
+#include "app/cameras/frame_source.h"
+#include "app/evaluation/ground_truth.h"
+#include "maps/library.h"
+#include "tests/app/support/temporary_folder.h"
+
+extern char** environ;
+
+namespace docent::app {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+struct Outcome {
+  int exit_status = -1;
+  std::string output, errors;
+};
+
+Outcome RunDocent(std::vector<std::string> arguments) {
+  const TemporaryFolder folder;
+  const std::string output = (folder / "out").string(), errors = (folder / "err").string();
+  arguments.insert(arguments.begin(), DOCENT_BINARY_DIR "/docent");
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT, 0600);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT, 0600);
+  pid_t child = 0;
+  const int spawned = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  Outcome outcome;
+  if (spawned != 0) {
+    ADD_FAILURE() << "cannot start " << argv[0];
+    return outcome;
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  outcome.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  outcome.output = ReadAll(output);
+  outcome.errors = ReadAll(errors);
+  return outcome;
+}
+
+// One clear line on standard error, nothing else, and that exit status.
+void ExpectComplaint(const std::vector<std::string>& arguments, int exit_status, const std::string& part) {
+  const Outcome outcome = RunDocent(arguments);
+  SCOPED_TRACE(testing::PrintToString(arguments));
+  EXPECT_EQ(outcome.exit_status, exit_status);
+  EXPECT_THAT(outcome.output, IsEmpty());
+  EXPECT_THAT(outcome.errors, AllOf(StartsWith("docent: "), HasSubstr(part), EndsWith("\n")));
+  EXPECT_EQ(std::count(outcome.errors.begin(), outcome.errors.end(), '\n'), 1) << outcome.errors;
+}
+
+TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
+  const Outcome top = RunDocent({"--help"});
+  EXPECT_EQ(top.exit_status, 0);
+  EXPECT_THAT(top.errors, IsEmpty());
+  const std::vector<std::vector<std::string>> commands = {
+      {},
+      {"demo"},
+      {"author"},
+      {"tour"},
+      {"evaluate"},
+      {"cameras"},
+      {"simulate"},
+      {"maps"},
+      {"maps", "list"},
+      {"maps", "show"},
+      {"maps", "verify"},
+      {"maps", "rename"},
+      {"maps", "remove"},
+      {"maps", "policy"},
+      {"content"},
+      {"content", "list"},
+      {"content", "remove"},
+  };
+  for (std::vector<std::string> command : commands) {
+    if (command.size() == 1) {
+      EXPECT_THAT(top.output, HasSubstr("\n  " + command[0] + " "));
+    }
+    command.push_back("--help");
+    const Outcome outcome = RunDocent(command);
+    EXPECT_EQ(outcome.exit_status, 0) << testing::PrintToString(command);
+    EXPECT_THAT(outcome.output, AllOf(HasSubstr("Usage:"), HasSubstr("Example:\n  docent")));
+    EXPECT_THAT(outcome.errors, IsEmpty());
+  }
+}
+
+TEST(CommandLine, PrintsItsVersion) {
+  const Outcome outcome = RunDocent({"--version"});
+  EXPECT_EQ(outcome.exit_status, 0);
+  EXPECT_THAT(outcome.output, StartsWith("docent "));
+}
+
+TEST(CommandLine, AnswersAWrongArgumentWithOneLineAndStatusTwo) {
+  ExpectComplaint({}, 2, "subcommand");
+  ExpectComplaint({"dance"}, 2, "There is no subcommand 'dance' (see docent --help)");
+  ExpectComplaint({"maps"}, 2, "docent maps --help");
+  ExpectComplaint({"maps", "list"}, 2, "--library is required");
+  ExpectComplaint({"maps", "dance"}, 2, "There is no subcommand 'dance'");
+  ExpectComplaint({"maps", "list", "--libary", "x"}, 2, "There is no option '--libary'");
+  ExpectComplaint({"maps", "list", "stray", "--library", "x"}, 2, "'stray' is too much");
+  ExpectComplaint({"maps", "policy", "Desk", "shut", "--library", "x"}, 2, "shut");
+  ExpectComplaint({"maps", "show", "--library", "x"}, 2, "NAME is required");
+  ExpectComplaint({"simulate", "room"}, 2, "--output is required");
+  ExpectComplaint({"simulate", "room", "--output", "x", "--fps", "-3"}, 2, "--fps");
+  ExpectComplaint({"simulate", "room", "--output", "x", "--seed", "many"}, 2, "many");
+  ExpectComplaint({"--quiet", "--verbose", "cameras"}, 2, "excludes");
+}
+
+TEST(CommandLine, AnswersAFailureWithOneLineAndStatusOne) {
+  const TemporaryFolder folder;
+  ExpectComplaint({"maps", "list", "--library", (folder / "none.docent").string()}, 1, "none.docent");
+  const auto broken = folder.Write("broken.docent", "this is no database");
+  ExpectComplaint({"maps", "list", "--library", broken.string()}, 1, "broken.docent");
+  ExpectComplaint({"maps", "verify", "--library", broken.string()}, 1, "broken.docent");
+  ExpectComplaint({"content", "list", "--library", broken.string()}, 1, "broken.docent");
+  EXPECT_EQ(ReadAll(broken), "this is no database");
+  ExpectComplaint({"simulate", "nowhere", "--output", (folder / "out").string()}, 1, "nowhere");
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  ExpectComplaint({"simulate", "room", "--output", (broken / "out").string()}, 1, "broken.docent");
+}
+
+TEST(CommandLine, ListsCamerasAsTextAndJson) {
+  EXPECT_EQ(RunDocent({"cameras"}).exit_status, 0);
+  const Outcome outcome = RunDocent({"cameras", "--json"});
+  EXPECT_EQ(outcome.exit_status, 0);
+  EXPECT_TRUE(nlohmann::json::parse(outcome.output).at("cameras").is_array());
+}
+
+TEST(CommandLine, SimulatesASequenceThatTheCamerasRead) {
+  const TemporaryFolder folder;
+  const Outcome outcome = RunDocent(
+      {"simulate", "cylinder:10", "--output", folder.path().string(), "--duration", "0.3", "--seed", "7"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.errors;
+  EXPECT_THAT(outcome.errors, IsEmpty());
+  const auto source = OpenCamera(folder.path().string());
+  ASSERT_TRUE(source->info().calibration_path);
+  const engine::CameraModel camera = ReadCalibration(*source->info().calibration_path);
+  engine::Frame frame;
+  std::uint64_t count = 0;
+  for (; source->Next(&frame); ++count)
+    CheckPictureSize(camera, frame.picture.cols, frame.picture.rows, "a", "b");
+  EXPECT_GE(count, 5u);
+  EXPECT_EQ(ReadGroundTruth(*source->info().ground_truth_path).size(), count);
+
+  const TemporaryFolder again;
+  const Outcome quiet = RunDocent({"simulate", "cylinder:10", "--output", again.path().string(), "--duration",
+                                   "0.3", "--seed", "7", "--quiet"});
+  EXPECT_EQ(quiet.exit_status, 0);
+  EXPECT_THAT(quiet.output + quiet.errors, IsEmpty());
+  const std::string list = ReadAll(folder / "rgb.txt");
+  EXPECT_EQ(list, ReadAll(again / "rgb.txt"));
+  const std::size_t begin = list.find("rgb/");
+  const std::string first = list.substr(begin, list.find('\n', begin) - begin);
+  EXPECT_EQ(ReadAll(folder / first), ReadAll(again / first));
+}
+
+TEST(CommandLine, CaresForAnEmptyLibrary) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "museum.docent").string();
+  { maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes); }
+  EXPECT_THAT(RunDocent({"maps", "list", "--library", path}).output, HasSubstr("no map"));
+  const Outcome json = RunDocent({"maps", "list", "--library", path, "--json"});
+  EXPECT_TRUE(nlohmann::json::parse(json.output).at("maps").empty());
+  EXPECT_THAT(RunDocent({"maps", "verify", "--library", path}).output, HasSubstr("all is well"));
+  EXPECT_THAT(RunDocent({"content", "list", "--library", path}).output, HasSubstr("Nothing"));
+  ExpectComplaint({"maps", "show", "Desk", "--library", path}, 1, "Desk");
+  ExpectComplaint({"maps", "rename", "Desk", "Kiosk", "--library", path}, 1, "Desk");
+  ExpectComplaint({"maps", "remove", "Desk", "--library", path}, 1, "Desk");
+  ExpectComplaint({"maps", "policy", "Desk", "read-only", "--library", path}, 1, "Desk");
+  ExpectComplaint({"content", "remove", "sign-1", "--map", "Desk", "--library", path}, 1, "Desk");
+}
+
+}  // namespace
+}  // namespace docent::app

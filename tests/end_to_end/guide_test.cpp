@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+// The real program on simulated input: evaluate, author and tour as a person runs them.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/demo/exhibit_model.h"
+#include "app/evaluation/simulated_truth.h"
+#include "app/files/text_file.h"
+#include "app/simulator/simulation.h"
+#include "content/asset.h"
+#include "maps/library.h"
+#include "tests/app/support/temporary_folder.h"
+
+extern char** environ;
+
+namespace docent::app {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+pid_t StartDocent(std::vector<std::string> arguments, const std::string& output, const std::string& errors) {
+  arguments.insert(arguments.begin(), DOCENT_BINARY_DIR "/docent");
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT, 0600);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT, 0600);
+  pid_t child = 0;
+  const int spawned = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  EXPECT_EQ(spawned, 0) << "cannot start " << argv[0];
+  return child;
+}
+
+struct Outcome {
+  int exit_status = -1;
+  std::string output, errors;
+};
+
+Outcome RunDocent(const std::vector<std::string>& arguments) {
+  const TemporaryFolder folder;
+  const std::string output = (folder / "out").string(), errors = (folder / "err").string();
+  const pid_t child = StartDocent(arguments, output, errors);
+  int status = 0;
+  waitpid(child, &status, 0);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), ReadAll(output), ReadAll(errors)};
+}
+
+void ExpectOneLineAndStatus1(const std::vector<std::string>& arguments, const std::string& part) {
+  const Outcome outcome = RunDocent(arguments);
+  SCOPED_TRACE(testing::PrintToString(arguments));
+  EXPECT_EQ(outcome.exit_status, 1);
+  EXPECT_THAT(outcome.errors, AllOf(StartsWith("docent: "), HasSubstr(part)));
+  EXPECT_EQ(std::count(outcome.errors.begin(), outcome.errors.end(), '\n'), 1) << outcome.errors;
+}
+
+using Row = std::map<std::string, std::string>;  // by column
+
+std::vector<Row> ReadFrames(const std::filesystem::path& path) {
+  std::istringstream text(ReadAll(path));
+  std::string line;
+  std::getline(text, line);
+  const auto split = [](const std::string& whole) {
+    std::vector<std::string> fields(1);
+    for (const char c : whole) c == ',' ? fields.emplace_back() : fields.back() += c;
+    return fields;
+  };
+  const std::vector<std::string> header = split(line);
+  std::vector<Row> rows;
+  while (std::getline(text, line)) {
+    const std::vector<std::string> fields = split(line);
+    EXPECT_EQ(fields.size(), header.size()) << line;
+    Row row;
+    for (std::size_t i = 0; i < std::min(fields.size(), header.size()); ++i) row[header[i]] = fields[i];
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+// A museum of two bays: where it is built and visited, and the script that authors it.
+struct Museum {
+  std::unique_ptr<Simulation> simulation = MakeSimulation("museum:2");
+  std::string camera = "sim:museum:2";
+  std::string visits_from;
+  std::string script;
+
+  explicit Museum(const std::string& model) {
+    const Timestamp begin = simulation->time(0);
+    const auto segments = SegmentsOf(*simulation);
+    for (std::size_t i = 0; i < segments.size(); ++i) {
+      const std::string& label = segments[i].label;
+      const Timestamp start = segments[i].time - begin;
+      if (label.starts_with("visit") && visits_from.empty()) visits_from = FormatSeconds(start);
+      if (!label.starts_with("build")) continue;
+      const Timestamp length = segments[i + 1].time - segments[i].time;
+      const std::string place = FormatSeconds(start + length * 3 / 5);
+      script += FormatSeconds(start) + " map new \"Bay " + label.substr(5) + "\"\n";
+      script += place + " place " + model + " at pixel 320 290 scale 0.3\n";
+      script += place + " signpost \"This is bay " + label.substr(5) + "\" at pixel 400 280\n";
+      script += FormatSeconds(start + length) + " map stop\n";
+    }
+  }
+};
+
+std::string WriteModel(const TemporaryFolder& folder) {
+  const std::vector<std::uint8_t> glb = MakeExhibitGlb();
+  folder.Write("exhibit.glb", {glb.begin(), glb.end()});
+  return "exhibit.glb";
+}
+
+std::vector<std::string> AuthorArguments(const TemporaryFolder& folder, const Museum& museum) {
+  return {"author",
+          "--library",
+          (folder / "l.docent").string(),
+          "--camera",
+          museum.camera,
+          "--until",
+          museum.visits_from,
+          "--headless",
+          "--script",
+          (folder / "script.txt").string(),
+          "--output",
+          (folder / "author").string()};
+}
+
+TEST(Guide, EvaluatesTwiceInLockstepWithTheSameBytes) {
+  const TemporaryFolder folder;
+  std::vector<std::string> trajectories, events;
+  std::vector<std::vector<Row>> frames;
+  for (const char* name : {"first", "second"}) {
+    const auto output = folder / name;
+    const Outcome outcome =
+        RunDocent({"evaluate", "sim:cylinder:20", "--output", output.string(), "--pace", "lockstep"});
+    ASSERT_EQ(outcome.exit_status, 0) << outcome.errors;
+    const auto report = nlohmann::json::parse(ReadAll(output / "report.json"));
+    const auto& sequence = report.at("sequences").at(0);
+    EXPECT_EQ(sequence.at("frames"), 100);
+    EXPECT_GT(sequence.at("tracked"), 30);
+    frames.push_back(ReadFrames(output / "cylinder-20" / "frames.csv"));
+    for (Row& row : frames.back()) row.erase("tracking_ms");
+    trajectories.push_back(ReadAll(output / "cylinder-20" / "trajectory.txt"));
+    events.push_back(ReadAll(output / "cylinder-20" / "events.csv"));
+    EXPECT_THAT(ReadAll(output / "report.html"), HasSubstr("cylinder"));
+  }
+  EXPECT_EQ(frames[0].size(), 100u);
+  EXPECT_EQ(frames[0], frames[1]);
+  EXPECT_FALSE(trajectories[0].empty());
+  EXPECT_EQ(trajectories[0], trajectories[1]);
+  EXPECT_EQ(events[0], events[1]);
+}
+
+TEST(Guide, AuthorsMapsThatATourNamesRightlyAndLeavesUntouched) {
+  const TemporaryFolder folder;
+  const Museum museum(WriteModel(folder));
+  folder.Write("script.txt", museum.script);
+  const std::vector<std::string> author = AuthorArguments(folder, museum);
+  const Outcome authored = RunDocent(author);
+  ASSERT_EQ(authored.exit_status, 0) << authored.errors;
+  const maps::Library library = maps::Library::Open(folder / "l.docent", maps::Access::kReadOnly);
+  EXPECT_THAT(library.Verify(), IsEmpty());
+  EXPECT_EQ(library.List().size(), 2u);
+  EXPECT_EQ(library.LoadScene(library.FindByName("Bay 0").key).assets.size(), 1u);
+
+  const std::string before = ReadAll(folder / "l.docent");
+  const Outcome toured =
+      RunDocent({"tour", "--library", (folder / "l.docent").string(), "--camera", museum.camera, "--from",
+                 museum.visits_from, "--headless", "--output", (folder / "tour").string()});
+  ASSERT_EQ(toured.exit_status, 0) << toured.errors;
+  EXPECT_EQ(before, ReadAll(folder / "l.docent"));
+
+  const auto labels = SegmentsOf(*museum.simulation);
+  int frames = 0, right = 0, wrong = 0;
+  for (const Row& row : ReadFrames(folder / "tour" / "frames.csv")) {
+    const TimedLabel* label = FindLabel(labels, *ParseSeconds(row.at("timestamp")));
+    if (label == nullptr || !label->label.starts_with("visit")) continue;
+    ++frames;
+    if (row.at("map").empty()) continue;
+    ++(row.at("map") == "Bay " + label->label.substr(5) ? right : wrong);
+  }
+  EXPECT_GT(right, frames * 8 / 10) << "of " << frames;
+  EXPECT_EQ(wrong, 0);
+  const std::string drawn = ReadAll(folder / "tour" / "augmentations.csv");
+  EXPECT_THAT(drawn, AllOf(HasSubstr(",Bay 0,exhibit,"), HasSubstr(",Bay 1,sign-1,")));
+}
+
+TEST(Guide, LeavesALibraryThatVerifiesWhenItIsKilledWhileAuthoring) {
+  const TemporaryFolder folder;
+  const Museum museum(WriteModel(folder));
+  folder.Write("script.txt", museum.script);
+  const pid_t child =
+      StartDocent(AuthorArguments(folder, museum), (folder / "out").string(), (folder / "err").string());
+  // The first map is on its way to the disk, or has just come there, when the second one is begun. What was
+  // written lies in the log beside the library until SQLite moves it over.
+  const auto written = [&](const char* file) {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(folder / file, error);
+    return error ? std::uintmax_t{0} : bytes;
+  };
+  siginfo_t ended{};
+  while (written("l.docent") + written("l.docent-wal") < 100'000) {
+    waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT);
+    if (ended.si_pid == child) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  kill(child, SIGKILL);
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status)) << ReadAll(folder / "err");
+  const maps::Library library = maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite);
+  EXPECT_THAT(library.Verify(), IsEmpty());
+  for (const maps::MapInfo& info : library.List())
+    EXPECT_GE(library.Load(info.key).snapshot->keyframes.size(), 2u);
+}
+
+TEST(Guide, EndsWithOneLineWhenItsInputIsBad) {
+  const TemporaryFolder folder;
+  const std::string library = (folder / "l.docent").string(), output = (folder / "out").string();
+  ExpectOneLineAndStatus1({"evaluate", (folder / "nowhere").string(), "--output", output}, "nowhere");
+  const auto video = folder.Write("cut.mp4", std::string("\0\0\0\x20"
+                                                         "ftypisom\0\0\2\0isomiso2",
+                                                         24));
+  const auto calibration = folder.Write("c.yaml", "width: 640\nheight: 480\nfy: 500\ncx: 320\ncy: 240\n");
+  ExpectOneLineAndStatus1({"evaluate", video.string(), "--output", output}, "cut.mp4");
+  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
+                           "--calibration", calibration.string()},
+                          "fx");
+  const auto damaged = folder.Write("damaged.docent", std::string(5000, 'x'));
+  ExpectOneLineAndStatus1(
+      {"tour", "--library", damaged.string(), "--camera", "sim:cylinder:20", "--headless"}, "damaged.docent");
+  ExpectOneLineAndStatus1(
+      {"tour", "--library", (folder / "none.docent").string(), "--camera", "sim:cylinder:20", "--headless"},
+      "none.docent");
+  folder.Write("hostile.gltf", R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":4000000000,
+      "uri":"../../../etc/passwd"}],"bufferViews":[{"buffer":0,"byteLength":4000000000}]})");
+  const auto script = folder.Write("hostile.txt", "0 map new A\n1 place hostile.gltf at pixel 320 240\n");
+  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
+                           "--script", script.string()},
+                          "line 2");
+  const auto early = folder.Write("early.txt", "0 map new A\n0.1 signpost \"x\" at pixel 320 240\n");
+  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
+                           "--script", early.string()},
+                          "early.txt, line 2");
+  ExpectOneLineAndStatus1({"evaluate", "sim:cylinder:20", "--engine", "hybrid", "--output", output},
+                          "panorama");
+}
+
+}  // namespace
+}  // namespace docent::app

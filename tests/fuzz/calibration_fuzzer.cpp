@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Any bytes as a calibration: either a camera or one sentence.
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "app/calibration/calibration_file.h"
+#include "engine/base/error.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    const auto camera =
+        docent::app::ParseCalibration(std::string(reinterpret_cast<const char*>(data), size), "fuzz");
+    // What was accepted must come back from its own text.
+    if (!(docent::app::ParseCalibration(docent::app::FormatCalibration(camera), "again") == camera))
+      __builtin_trap();
+  } catch (const docent::Error&) {
+  }
+  return 0;
+}

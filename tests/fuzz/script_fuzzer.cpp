@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Any bytes as a script of commands: either commands that come back from their own text, or one sentence.
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "app/script/script_file.h"
+#include "engine/base/error.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  std::vector<docent::app::TimedCommand> commands;
+  try {
+    commands = docent::app::ParseScript({reinterpret_cast<const char*>(data), size}, "fuzz");
+  } catch (const docent::Error&) {
+    return 0;
+  }
+  std::string text;
+  for (const auto& command : commands) text += docent::app::FormatScriptLine(command) + "\n";
+  const auto again = docent::app::ParseScript(text, "again");  // an Error here is a finding
+  if (again.size() != commands.size()) __builtin_trap();
+  for (std::size_t i = 0; i < again.size(); ++i) {
+    if (again[i].command != commands[i].command || again[i].time != commands[i].time) __builtin_trap();
+  }
+  return 0;
+}
