@@ -8,7 +8,6 @@
 namespace docent::app {
 
 void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
-  RefuseHybrid(options.run.engine);
   GuideRequest request;
   request.may_write = true;
   request.title = "Docent - author";
@@ -37,7 +36,6 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
 }
 
 void RunTour(const TourOptions& options, Verbosity verbosity) {
-  RefuseHybrid(options.run.engine);
   CalibratedCamera camera = OpenArgumentCamera(options.run);
   maps::Library library = maps::Library::Open(options.library, maps::Access::kReadOnly);
   GuideRequest request;

@@ -53,6 +53,7 @@ Sequence OpenSequence(const EvaluateOptions& options, std::size_t index) {
 SessionOptions OptionsFor(const EvaluateOptions& options) {
   SessionOptions session;
   session.threaded = options.pace != Pace::kLockstep;
+  session.tracker.hybrid = options.engine == EngineKind::kHybrid;
   session.first_map = "map";
   session.seed = options.seed;
   return session;
@@ -99,6 +100,8 @@ RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const 
   }
   const engine::MapperTimes times = session.MappingTimes();
   record.mapping.bundle_adjustment_s = times.bundle_adjustment;
+  record.mapping.panorama_localization_s = times.panorama_localization;
+  record.mapping.infinite_triangulation_s = times.infinite_triangulation;
   record.mapping.other_s = times.other;
   record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   record.peak_memory_mb = PeakMemoryMegabytes();
@@ -118,14 +121,7 @@ std::string FreeFolderName(std::string name, std::set<std::string>* taken) {
 
 }  // namespace
 
-void RefuseHybrid(EngineKind engine) {
-  if (engine == EngineKind::kHybrid) {
-    throw Error("This version makes no panorama maps yet; use --engine sixdof, which is the default.");
-  }
-}
-
 void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity) {
-  RefuseHybrid(options.engine);
   std::vector<EvaluatedRun> runs;
   std::vector<SequenceReport> reports;
   std::set<std::string> taken;

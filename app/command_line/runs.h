@@ -7,7 +7,6 @@
 namespace docent::app {
 
 // Throws Error when panorama maps are asked for, which this version does not make.
-void RefuseHybrid(EngineKind engine);
 
 void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity);
 void RunAuthor(const AuthorOptions& options, Verbosity verbosity);

@@ -12,14 +12,21 @@ namespace {
 KeyFrameCounts CountKeyFrames(const engine::MapSnapshot& map) {
   KeyFrameCounts counts;
   for (const engine::KeyFrame& keyframe : map.keyframes) {
-    ++(keyframe.kind == engine::KeyFrameKind::kPanorama ? counts.panorama : counts.sixdof);
+    if (keyframe.kind == engine::KeyFrameKind::kPanorama) {
+      ++counts.panorama;
+    } else {
+      ++(keyframe.panorama == engine::kNoId ? counts.sixdof : counts.localized);
+    }
   }
   return counts;
 }
 
 PointCounts CountPoints(const engine::MapSnapshot& map) {
   PointCounts counts;
-  for (const engine::MapPoint& point : map.points) ++(point.infinite() ? counts.infinite : counts.finite);
+  for (const engine::MapPoint& point : map.points) {
+    ++(point.infinite() ? counts.infinite : counts.finite);
+    counts.converted += point.was_infinite;
+  }
   return counts;
 }
 

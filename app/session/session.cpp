@@ -77,10 +77,13 @@ void Session::FollowOrders(Camera* camera) {
       snapshot = found->second.snapshot;
       key = camera->map_key;
     }
-    if (snapshot) camera->starting = false;
+    // A map of directions alone waits for its start still.
+    if (snapshot && snapshot->HasFinitePoints()) camera->starting = false;
   }
   if (order == Camera::Order::kStart) {
     tracker.StartNewMap();
+  } else if (order == Camera::Order::kStartAgain) {
+    tracker.StartFailed();
   } else if (order != Camera::Order::kNone) {
     tracker.Reset();
   }
@@ -146,7 +149,7 @@ void Session::OfferToMapper(Camera* camera, const engine::TrackedFrame& frame) {
     key = camera->map_key;
     const auto found = maps_.find(key);
     if (found == maps_.end() || key != growing_key_) return;
-    if (pair && found->second.snapshot) return;
+    if (pair && found->second.snapshot && found->second.snapshot->HasFinitePoints()) return;
     if (candidate && !MayGrow(found->second, frame.camera_from_map)) candidate.reset();
   }
   if (pair) mapping_.Start(key, std::move(*pair));
@@ -174,11 +177,25 @@ void Session::Hear(const MappingThread::News& news) {
       case Kind::kStartFailed:
         AddEvent(event.time, "warning", "no start for " + map.name + ": " + event.detail);
         for (Camera& camera : cameras_) {
-          if (camera.map_key == map.key && camera.starting) camera.order = Camera::Order::kStart;
+          if (camera.map_key == map.key && camera.starting) {
+            camera.order = map.snapshot ? Camera::Order::kStartAgain : Camera::Order::kStart;
+          }
         }
         break;
       case Kind::kKeyFrame:
         AddEvent(event.time, "keyframe", "sixdof in " + map.name + ": " + event.detail);
+        break;
+      case Kind::kPanoramaOpened:
+        AddEvent(event.time, "panorama", "opened in " + map.name + ": " + event.detail);
+        break;
+      case Kind::kPanoramaKeyFrame:
+        AddEvent(event.time, "keyframe", "panorama in " + map.name + ": " + event.detail);
+        break;
+      case Kind::kLocalized:
+        AddEvent(event.time, "keyframe", "localized in " + map.name + ": " + event.detail);
+        break;
+      case Kind::kConverted:
+        AddEvent(event.time, "points", map.name + ": " + event.detail);
         break;
       case Kind::kGlobalAdjustment:
         // Its last words are how long it took, which differs from run to run; events of one input do not.
@@ -191,9 +208,16 @@ void Session::Hear(const MappingThread::News& news) {
 
 void Session::WatchProbation(Camera* camera, const engine::TrackedFrame& frame) {
   const auto found = maps_.find(camera->map_key);
-  if (found == maps_.end() || !found->second.on_probation) return;
+  if (found == maps_.end()) return;
   SessionMap& map = found->second;
   const Timestamp now = frame.frame.time;
+  if (options_.may_write && map.snapshot && !map.snapshot->HasFinitePoints()) {
+    // Directions alone are soon had again.
+    if (camera->lost_since && now - *camera->lost_since > options_.probation_loss)
+      Discard(map.key, now, "its track was lost before it knew depth");
+    return;
+  }
+  if (!map.on_probation) return;
   if (map.snapshot->keyframes.size() >= options_.probation_keyframes ||
       (!camera->lost_since && now - map.started > options_.probation)) {
     map.on_probation = false;

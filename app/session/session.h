@@ -103,7 +103,7 @@ class Session {
   // Where a camera is and where it was told to go. Guarded by mutex_ except for tracker, which is its
   // thread's.
   struct Camera {
-    enum class Order { kNone, kStart, kLeave, kGo };
+    enum class Order { kNone, kStart, kStartAgain, kLeave, kGo };
     std::unique_ptr<engine::Tracker> tracker;
     std::shared_ptr<const engine::CameraModel> model;
     std::uint64_t map_key = 0;  // of the map it is tracked in; 0 while it looks in all maps

@@ -10,7 +10,7 @@ namespace docent::app {
 
 // Hands what has changed of a map to the saver, which writes it in the background.
 void Session::SaveMap(SessionMap* map, Timestamp time) {
-  if (!saver_ || map->discarded || !map->NeedsSave() || map->snapshot->keyframes.empty()) return;
+  if (!saver_ || map->discarded || !map->NeedsSave() || !map->snapshot->HasFinitePoints()) return;
   maps::MapRecord record;
   record.key = map->key;
   record.name = map->name;

@@ -172,7 +172,13 @@ void Map::MakeFinite(PointRecord* record, const Eigen::Vector3d& position) {
   record->point.point_in_map << position, 1.0;
   record->point.panorama = kNoId;
   record->point.was_infinite = true;
-  UpdateNormal(record);
+  const std::vector<KeyFrameId> observers = record->observers;
+  for (const KeyFrameId observer : observers) {
+    KeyFrameRecord& keyframe = keyframes_.at(observer);
+    if (keyframe.keyframe.kind == KeyFrameKind::kSixDof) continue;
+    keyframe.observations.erase(FindObservation(keyframe.observations, record->point.id));
+    std::erase(record->observers, observer);
+  }
 }
 
 void Map::UpdateDirection(PointRecord* record) {
@@ -226,7 +232,7 @@ std::vector<std::pair<KeyFrameId, int>> Map::Covisible(KeyFrameId id) {
   if (!record) return {};
   for (const Observation& observation : record->observations) {
     const PointRecord* point = FindPoint(observation.point);
-    if (!point) continue;
+    if (!point || point->point.infinite()) continue;
     for (const KeyFrameId observer : point->observers) {
       if (observer != id) ++shared[observer];
     }

@@ -13,7 +13,8 @@ namespace docent::engine {
 // The map that the mapper works on: the data of a MapSnapshot with the links between keyframes and points
 // kept in both directions. Owned by one mapper and touched by its thread alone; everyone else sees
 // Snapshot(). Always holds: a point is observed by at least one keyframe, observers and observations agree,
-// the point's source keyframe is in the map.
+// the point's source keyframe is in the map. Finite points are observed by localized keyframes alone,
+// infinite ones by keyframes of their panorama map.
 class Map {
  public:
   struct PointRecord {
@@ -58,7 +59,8 @@ class Map {
   PanoramaId OpenPanorama(KeyFrameId reference);
   // Another localized keyframe at the same centre takes over as reference.
   void SetReference(PanoramaId panorama, KeyFrameId reference);
-  // An infinite point has been triangulated. Its observations in dependent keyframes stay.
+  // An infinite point whose source is localized has been triangulated. What dependent keyframes saw of it is
+  // forgotten; a second observation is the caller's to add.
   void MakeFinite(PointRecord* record, const Eigen::Vector3d& position);
   // The direction of an infinite point: the mean of the rays under which its keyframes see it.
   void UpdateDirection(PointRecord* record);
@@ -68,7 +70,7 @@ class Map {
   // Points towards the mean of the directions to its observers.
   void UpdateNormal(PointRecord* record);
 
-  // Keyframes that share points with this one, most shared first: (id, count).
+  // Keyframes that share finite points with this one, most shared first: (id, count).
   std::vector<std::pair<KeyFrameId, int>> Covisible(KeyFrameId id);
 
   // An immutable copy of what is alive, with the next revision; drops dead points.

@@ -35,6 +35,8 @@ class Initializer {
   // A pair once the geometry is certain; then Reset() has happened.
   std::optional<InitialPair> Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
 
+  // Of the first view that is waited with; far in the past when there is none.
+  Timestamp first_time() const { return first_ ? first_time_ : Timestamp::min(); }
   // Why there is no map so far; empty right after Reset().
   const std::string& hint() const { return hint_; }
   // Corners being followed: where each was in the first view and is now, level-0 pixels.

@@ -51,7 +51,7 @@ struct InitialPair {
   std::shared_ptr<const CameraModel> camera;
   View a, b;
   std::vector<Match> matches;
-  Rigid3 a_from_map;  // where the first view is, if the map exists already as a panorama; else identity
+  Rigid3 a_from_map;       // where the first view is, if the map exists already as a panorama; else identity
   TwoViewResult geometry;  // one inlier flag and point a match
 };
 

@@ -5,6 +5,8 @@
 #include <map>
 #include <set>
 
+#include "engine/mapping/panorama_registration.h"
+
 namespace docent::engine {
 
 namespace {
@@ -46,6 +48,7 @@ Assembly Assemble(Map* map, const std::set<KeyFrameId>& free, const std::set<Key
 BundleSummary Solve(const BundleOptions& options, Assembly* assembly, Map* map) {
   const BundleSummary summary = AdjustBundle(options, &assembly->problem);
   if (summary.outcome == BundleSummary::Outcome::kFailed) return summary;
+  const PanoramaRegistration registration(*map);
   for (std::size_t i = 0; i < assembly->cameras.size(); ++i) {
     if (!assembly->problem.cameras[i].fixed) {
       map->FindKeyFrame(assembly->cameras[i])->keyframe.camera_from_map =
@@ -68,6 +71,7 @@ BundleSummary Solve(const BundleOptions& options, Assembly* assembly, Map* map) 
     if (Map::PointRecord* record = map->FindPoint(id)) map->UpdateNormal(record);
   }
   for (const KeyFrameId id : assembly->cameras) map->UpdateDepth(map->FindKeyFrame(id));
+  registration.Follow(map);
   return summary;
 }
 
@@ -117,7 +121,9 @@ BundleSummary AdjustLocally(const MapAdjustmentOptions& options, KeyFrameId keyf
 BundleSummary AdjustGlobally(const MapAdjustmentOptions& options, const std::atomic<bool>* interrupt,
                              Map* map) {
   std::set<KeyFrameId> all;
-  for (const auto& [id, record] : map->keyframes()) all.insert(id);
+  for (const auto& [id, record] : map->keyframes()) {
+    if (record.keyframe.kind == KeyFrameKind::kSixDof) all.insert(id);
+  }
   Assembly assembly = Assemble(map, all, {}, FinitePointsSeenBy(map, all));
   BundleOptions bundle;
   bundle.max_iterations = options.global_iterations;

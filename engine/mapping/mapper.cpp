@@ -24,6 +24,11 @@ void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
   searcher_.Clear();
   newest_ = kNoId;
   to_refind_.clear();
+  to_localize_.clear();
+  to_convert_.clear();
+  for (const auto& [id, record] : map_.keyframes()) {
+    if (record.keyframe.kind == KeyFrameKind::kPanorama) to_localize_.push_back({id, 0});
+  }
   keyframes_since_global_ = 0;
   global_interrupted_ = false;
   locally_adjusted_ = true;
@@ -100,59 +105,84 @@ bool Mapper::Step() {
     }
     interrupt_ = !queue_.empty();
   }
-  bool worked = true;
-  bool adjusting = false;
+  double MapperTimes::*account = &MapperTimes::other;
   if (task) {
     if (const auto* candidate = std::get_if<KeyFrameCandidate>(&*task)) {
       InsertKeyFrame(*candidate);
     } else {
       StartMap(std::get<InitialPair>(*task));
     }
-  } else if (!to_refind_.empty()) {
-    RefindNewPoints();
-  } else if (!locally_adjusted_) {
-    adjusting = true;
-    LocalAdjustment();
-  } else if (global_interrupted_ || keyframes_since_global_ > 4 + map_.keyframes().size() / 6) {
-    adjusting = true;
-    GlobalAdjustment();
   } else {
-    worked = false;
+    account = DoNextTask();
   }
-  if (worked) {
-    const double seconds = SecondsSince(start);
-    const std::lock_guard lock(mutex_);
-    (adjusting ? times_.bundle_adjustment : times_.other) += seconds;
+  if (account == nullptr) return false;
+  const double seconds = SecondsSince(start);
+  const std::lock_guard lock(mutex_);
+  times_.*account += seconds;
+  return true;
+}
+
+// The most urgent piece of work that no keyframe asks for; the account that its time goes to, null for none.
+double MapperTimes::*Mapper::DoNextTask() {
+  if (!to_refind_.empty()) {
+    RefindNewPoints();
+    return &MapperTimes::other;
   }
-  return worked;
+  if (!locally_adjusted_) {
+    LocalAdjustment();
+    return &MapperTimes::bundle_adjustment;
+  }
+  if (LocalizeOne()) return &MapperTimes::panorama_localization;
+  if (ConvertOne()) return &MapperTimes::infinite_triangulation;
+  if (global_interrupted_ || keyframes_since_global_ > 4 + map_.keyframes().size() / 6) {
+    GlobalAdjustment();
+    return &MapperTimes::bundle_adjustment;
+  }
+  return nullptr;
+}
+
+bool Mapper::IsFinite() const {
+  return std::any_of(map_.points().begin(), map_.points().end(),
+                     [](const Map::PointRecord& record) { return record.alive && !record.point.infinite(); });
 }
 
 void Mapper::StartMap(const InitialPair& pair) {
-  map_ = Map();
+  // A map of directions alone gains depth; any other is begun anew.
+  const bool panorama = !map_.panoramas().empty() && !IsFinite();
+  const Map before = panorama ? map_ : Map();
+  if (!panorama) map_ = Map();
   searcher_.Clear();
   to_refind_.clear();
+  to_convert_.clear();
   keyframes_since_global_ = 0;
   const double scale = options_.initial_baseline_m;
   Rigid3 b_from_a = pair.geometry.b_from_a;
   b_from_a.translation *= scale / b_from_a.translation.norm();
 
-  KeyFrame first;
-  first.fixed = true;
-  first.time = pair.a.time;
-  first.camera = pair.camera;
-  first.features = pair.a.features;
-  KeyFrame second = first;
-  second.fixed = false;
-  second.time = pair.b.time;
-  second.features = pair.b.features;
-  second.camera_from_map = b_from_a;
-  const KeyFrameId a = map_.AddKeyFrame(first).keyframe.id;
-  const KeyFrameId b = map_.AddKeyFrame(second).keyframe.id;
+  // The first view may be a keyframe already; and it holds the map's frame from now on.
+  KeyFrameId a = kNoId;
+  for (auto& [id, record] : map_.keyframes()) {
+    record.keyframe.fixed = false;
+    if (record.keyframe.time == pair.a.time) a = id;
+  }
+  KeyFrame view;
+  view.camera = pair.camera;
+  view.camera_from_map = pair.a_from_map;
+  view.time = pair.a.time;
+  view.features = pair.a.features;
+  if (a == kNoId) a = map_.AddKeyFrame(view).keyframe.id;
+  map_.FindKeyFrame(a)->keyframe.fixed = true;
+  if (panorama) map_.SetReference(map_.panoramas().front().id, a);
+  const Rigid3 map_from_a = map_.FindKeyFrame(a)->keyframe.camera_from_map.inverse();
+  view.time = pair.b.time;
+  view.features = pair.b.features;
+  view.camera_from_map = b_from_a * map_from_a.inverse();
+  const KeyFrameId b = map_.AddKeyFrame(view).keyframe.id;
   for (std::size_t i = 0; i < pair.matches.size(); ++i) {
     if (!pair.geometry.inlier[i]) continue;
     const InitialPair::Match& match = pair.matches[i];
     MapPoint point;
-    point.point_in_map << scale * pair.geometry.points_in_a[i], 1.0;
+    point.point_in_map << map_from_a * Eigen::Vector3d(scale * pair.geometry.points_in_a[i]), 1.0;
     point.source_keyframe = a;
     point.source_level = match.level;
     point.source_pixel = LevelFromLevelZero(match.pixel_a.cast<double>(), match.level).cast<float>();
@@ -168,18 +198,24 @@ void Mapper::StartMap(const InitialPair& pair) {
   CreatePoints(options_.creation, b, a, &map_, &searcher_);
   CreatePoints(options_.creation, a, b, &map_, &searcher_);
   AdjustGlobally(options_.adjustment, nullptr, &map_);
-  if (static_cast<int>(map_.AlivePoints()) < options_.min_initial_points) {
-    Tell(MapperEvent::Kind::kStartFailed, pair.b.time,
-         "only " + std::to_string(map_.AlivePoints()) + " points agree");
-    map_ = Map();
+  const auto agreeing =
+      std::count_if(map_.points().begin(), map_.points().end(),
+                    [](const Map::PointRecord& record) { return record.alive && !record.point.infinite(); });
+  if (agreeing < options_.min_initial_points) {
+    Tell(MapperEvent::Kind::kStartFailed, pair.b.time, "only " + std::to_string(agreeing) + " points agree");
+    map_ = before;
+    searcher_.Clear();
     newest_ = kNoId;
+    if (panorama) return;  // what was published goes on
     const std::lock_guard lock(mutex_);
     snapshot_.reset();
     return;
   }
+  DropInfiniteTwins(a, &map_);
+  if (panorama) to_convert_.emplace_back(a, b);
   locally_adjusted_ = true;
   Publish();
-  Tell(MapperEvent::Kind::kMapStarted, pair.b.time, std::to_string(map_.AlivePoints()) + " points");
+  Tell(MapperEvent::Kind::kMapStarted, pair.b.time, std::to_string(agreeing) + " points");
 }
 
 void Mapper::ApplyReports() {
@@ -198,39 +234,185 @@ void Mapper::ApplyReports() {
     const int tries = record->seen_inlier + record->seen_outlier + record->not_found;
     // A point that is found in the wrong place, or that was never found beyond its two first views, harms.
     const bool wrong = record->seen_outlier > kEnough && record->seen_outlier > record->seen_inlier;
-    const bool phantom = tries > kEnough && record->observers.size() <= 2 && record->seen_inlier * 5 < tries;
+    const std::size_t first_views = record->point.infinite() ? 1 : 2;
+    const bool phantom =
+        tries > kEnough && record->observers.size() <= first_views && record->seen_inlier * 5 < tries;
     if (wrong || phantom) map_.RemovePoint(report.point);
   }
 }
 
+// A map without depth yet: its first keyframe is the reference of a panorama map, and stands at the origin.
+void Mapper::StartFromPanorama(const KeyFrameCandidate& candidate) {
+  KeyFrame keyframe;
+  keyframe.fixed = true;
+  keyframe.time = candidate.time;
+  keyframe.camera = candidate.camera;
+  keyframe.features = candidate.features;
+  const KeyFrameId id = map_.AddKeyFrame(keyframe).keyframe.id;
+  map_.OpenPanorama(id);
+  const int rays = AddInfinitePoints(options_.infinite, id, {}, &map_);
+  if (rays < options_.min_initial_directions) {
+    map_ = Map();  // a dark or empty picture; the next one may be better
+    return;
+  }
+  newest_ = id;
+  Publish();
+  Tell(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " directions");
+}
+
 void Mapper::InsertKeyFrame(const KeyFrameCandidate& candidate) {
+  if (candidate.choice == KeyFrameChoice::kFirst) {
+    if (map_.empty()) StartFromPanorama(candidate);
+    return;
+  }
   if (map_.empty()) return;
   ApplyReports();
+  if (candidate.choice == KeyFrameChoice::kPanorama) {
+    InsertPanorama(candidate);
+    return;
+  }
   KeyFrame keyframe;
   keyframe.time = candidate.time;
   keyframe.camera = candidate.camera;
   keyframe.features = candidate.features;
   keyframe.camera_from_map = candidate.camera_from_map;
-  Map::KeyFrameRecord& record = map_.AddKeyFrame(keyframe);
-  const KeyFrameId id = record.keyframe.id;
+  InsertSixDof(candidate, &map_.AddKeyFrame(keyframe));
+}
+
+void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecord* record) {
+  const KeyFrameId id = record->keyframe.id;
   for (const PointMatch& match : candidate.matches) {
-    map_.AddObservation({id, match.point, match.pixel, match.level});
+    const Map::PointRecord* point = map_.FindPoint(match.point);
+    if (point && !point->point.infinite()) map_.AddObservation({id, match.point, match.pixel, match.level});
   }
-  map_.UpdateDepth(&record);
+  map_.UpdateDepth(record);
   Refind(id, nullptr);
-  map_.UpdateDepth(&record);
+  map_.UpdateDepth(record);
   std::vector<MapPointId> created;
   for (const KeyFrameId partner : Partners(id)) {
     const auto points = CreatePoints(options_.creation, id, partner, &map_, &searcher_);
     created.insert(created.end(), points.begin(), points.end());
   }
   to_refind_.insert(to_refind_.end(), created.begin(), created.end());
+  int rays = 0;
+  if (candidate.choice == KeyFrameChoice::kLocalizedPanorama) {
+    map_.OpenPanorama(id);
+    rays = AddInfinitePoints(options_.infinite, id, {}, &map_);
+  }
+  PlanConversions(id);
   newest_ = id;
   ++keyframes_since_global_;
   locally_adjusted_ = false;
   Publish();
-  Tell(MapperEvent::Kind::kKeyFrame, candidate.time,
-       std::to_string(created.size()) + " new points, " + std::to_string(map_.AlivePoints()) + " in all");
+  if (candidate.choice == KeyFrameChoice::kLocalizedPanorama) {
+    Tell(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " directions");
+  } else {
+    Tell(MapperEvent::Kind::kKeyFrame, candidate.time,
+         std::to_string(created.size()) + " new points, " + std::to_string(map_.AlivePoints()) + " in all");
+  }
+}
+
+void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
+  const auto panorama =
+      std::find_if(map_.panoramas().begin(), map_.panoramas().end(),
+                   [&](const PanoramaMap& known) { return known.id == candidate.panorama; });
+  if (panorama == map_.panoramas().end()) return;
+  const KeyFrame& reference = map_.FindKeyFrame(panorama->reference)->keyframe;
+  KeyFrame keyframe;
+  keyframe.kind = KeyFrameKind::kPanorama;
+  keyframe.panorama = candidate.panorama;
+  keyframe.time = candidate.time;
+  keyframe.camera = candidate.camera;
+  keyframe.features = candidate.features;
+  // It turned about the reference's centre; where it really stood is not known (hybrid-slam §2).
+  const Rotation3& rotation = candidate.camera_from_map.rotation;
+  keyframe.camera_from_map = Rigid3(rotation, -(rotation * reference.camera_from_map.OriginInSource()));
+  keyframe.mean_depth = reference.mean_depth;
+  keyframe.depth_sigma = reference.depth_sigma;
+  const KeyFrameId id = map_.AddKeyFrame(keyframe).keyframe.id;
+  std::vector<Eigen::Vector2f> taken;
+  for (const PointMatch& match : candidate.matches) {
+    const Map::PointRecord* point = map_.FindPoint(match.point);
+    if (!point) continue;
+    if (!point->point.infinite()) {
+      taken.push_back(match.pixel);
+    } else if (point->point.panorama == candidate.panorama) {
+      map_.AddObservation({id, match.point, match.pixel, match.level});
+    }
+  }
+  const int rays = AddInfinitePoints(options_.infinite, id, taken, &map_);
+  to_localize_.push_back({id, 0});
+  Publish();
+  Tell(MapperEvent::Kind::kPanoramaKeyFrame, candidate.time, std::to_string(rays) + " new directions");
+}
+
+bool Mapper::LocalizeOne() {
+  std::size_t finite = 0;
+  if (to_localize_.empty()) return false;
+  for (const Map::PointRecord& record : map_.points()) finite += record.alive && !record.point.infinite();
+  for (std::size_t i = 0; i < to_localize_.size(); ++i) {
+    // Worth another try when the map has grown.
+    constexpr double kGrowth = 1.1;
+    Unlocalized& waiting = to_localize_[i];
+    if (static_cast<double>(finite) < kGrowth * static_cast<double>(waiting.tried_with_points) + 1) continue;
+    waiting.tried_with_points = finite;
+    const KeyFrameId id = waiting.keyframe;
+    const Map::KeyFrameRecord* record = map_.FindKeyFrame(id);
+    if (!record) {
+      to_localize_.erase(to_localize_.begin() + static_cast<std::ptrdiff_t>(i));
+      return true;
+    }
+    if (!LocalizePanoramaKeyFrame(options_.localization, id, id + 1, &map_, &searcher_)) return true;
+    to_localize_.erase(to_localize_.begin() + static_cast<std::ptrdiff_t>(i));
+    PlanConversions(id);
+    newest_ = id;
+    ++keyframes_since_global_;
+    locally_adjusted_ = false;
+    Publish();
+    Tell(MapperEvent::Kind::kLocalized, record->keyframe.time, "keyframe " + std::to_string(id));
+    return true;
+  }
+  return false;
+}
+
+void Mapper::PlanConversions(KeyFrameId id) {
+  // Pairs with this keyframe that look the same way from places far enough apart.
+  constexpr double kMaxTurn = 0.8;  // radians
+  const KeyFrame& keyframe = map_.FindKeyFrame(id)->keyframe;
+  const Eigen::Vector3d center = keyframe.camera_from_map.OriginInSource();
+  std::vector<std::pair<double, std::pair<KeyFrameId, KeyFrameId>>> pairs;
+  for (const auto& [other, record] : map_.keyframes()) {
+    if (other == id || record.keyframe.kind == KeyFrameKind::kPanorama) continue;
+    const double depth = std::min(record.keyframe.mean_depth, keyframe.mean_depth);
+    const double baseline = (record.keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
+    if (baseline < options_.min_partner_baseline || baseline > 2 * options_.max_partner_baseline) continue;
+    const double turn =
+        (keyframe.camera_from_map.rotation * record.keyframe.camera_from_map.rotation.inverse()).Angle();
+    if (turn > kMaxTurn) continue;
+    if (record.keyframe.panorama != kNoId) pairs.push_back({turn, {other, id}});
+    if (keyframe.panorama != kNoId) pairs.push_back({turn, {id, other}});
+  }
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  const auto wanted = static_cast<std::size_t>(options_.conversion_partners);
+  for (std::size_t i = 0; i < pairs.size() && i < wanted; ++i) to_convert_.push_back(pairs[i].second);
+}
+
+bool Mapper::ConvertOne() {
+  if (to_convert_.empty()) return false;
+  const auto [reference, partner] = to_convert_.front();
+  to_convert_.pop_front();
+  PointCreationOptions creation = options_.creation;
+  creation.min_parallax_deg = options_.min_infinite_parallax_deg;
+  const InfiniteConversion conversion =
+      ConvertInfinitePoints(creation, reference, partner, &map_, &searcher_);
+  if (conversion.converted.empty() && conversion.merged == 0) return true;
+  to_refind_.insert(to_refind_.end(), conversion.converted.begin(), conversion.converted.end());
+  Publish();
+  Tell(MapperEvent::Kind::kConverted, map_.FindKeyFrame(partner)->keyframe.time,
+       std::to_string(conversion.converted.size()) + " directions became points, " +
+           std::to_string(conversion.merged) + " were known");
+  return true;
 }
 
 std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
@@ -263,7 +445,7 @@ std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
 void Mapper::Refind(KeyFrameId id, const std::vector<MapPointId>* ids) {
   Map::KeyFrameRecord& record = *map_.FindKeyFrame(id);
   const auto find = [&](Map::PointRecord& point) {
-    if (!point.alive || point.point.source_keyframe == id) return;
+    if (!point.alive || point.point.infinite() || point.point.source_keyframe == id) return;
     if (std::binary_search(point.observers.begin(), point.observers.end(), id)) return;
     const Map::KeyFrameRecord* source = map_.FindKeyFrame(point.point.source_keyframe);
     if (!source) return;

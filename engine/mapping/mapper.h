@@ -13,6 +13,7 @@
 
 #include "engine/mapping/keyframe_candidate.h"
 #include "engine/mapping/map_adjustment.h"
+#include "engine/mapping/panorama_mapping.h"
 #include "engine/mapping/point_creation.h"
 
 namespace docent::engine {
@@ -26,13 +27,28 @@ struct MapperOptions {
   int min_initial_points = 60;  // after the first adjustment, else the start is given up
   float refind_radius_px = 6;   // level 0
   PointCreationOptions creation;
+  InfinitePointOptions infinite;
+  LocalizationOptions localization;
+  int min_initial_directions = 40;  // in the first picture, for a map to begin as a panorama
+  // Of the infinite points: what is seen from two panorama maps is mostly further away (hybrid-slam §5.2).
+  double min_infinite_parallax_deg = 1.5;
+  int conversion_partners = 4;  // keyframes in which a localized keyframe's infinite points are looked for
   MapAdjustmentOptions adjustment;
   SearchOptions search;
 };
 
 // What the mapper did, for events and reports.
 struct MapperEvent {
-  enum class Kind { kMapStarted, kStartFailed, kKeyFrame, kGlobalAdjustment };
+  enum class Kind {
+    kMapStarted,
+    kStartFailed,
+    kKeyFrame,
+    kPanoramaOpened,
+    kPanoramaKeyFrame,
+    kLocalized,
+    kConverted,
+    kGlobalAdjustment
+  };
   Kind kind = Kind::kKeyFrame;
   Timestamp time{};
   std::string detail;
@@ -40,7 +56,7 @@ struct MapperEvent {
 
 // Seconds of work by task.
 struct MapperTimes {
-  double bundle_adjustment = 0, other = 0;
+  double bundle_adjustment = 0, panorama_localization = 0, infinite_triangulation = 0, other = 0;
 };
 
 // Grows and refines one map (ptamm §2.3, Fig. 2b): starts it from two views, takes keyframes in, makes
@@ -73,8 +89,24 @@ class Mapper {
  private:
   using Task = std::variant<KeyFrameCandidate, InitialPair>;
 
+  // A dependent panorama keyframe that waits to be localized, and what the map knew when that was last tried.
+  struct Unlocalized {
+    KeyFrameId keyframe;
+    std::size_t tried_with_points;
+  };
+
+  double MapperTimes::*DoNextTask();
   void StartMap(const InitialPair& pair);
+  void StartFromPanorama(const KeyFrameCandidate& candidate);
   void InsertKeyFrame(const KeyFrameCandidate& candidate);
+  void InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecord* record);
+  void InsertPanorama(const KeyFrameCandidate& candidate);
+  // Tries one waiting panorama keyframe; false when none is worth trying.
+  bool LocalizeOne();
+  // Looks for the infinite points of one pair of keyframes; false when no pair waits.
+  bool ConvertOne();
+  void PlanConversions(KeyFrameId keyframe);
+  bool IsFinite() const;  // the map knows depth
   void ApplyReports();
   // Looks for the map's points (or only for those in `ids`) in a keyframe that does not see them yet.
   void Refind(KeyFrameId keyframe, const std::vector<MapPointId>* ids);
@@ -91,6 +123,8 @@ class Mapper {
   PointSearcher searcher_;
   KeyFrameId newest_ = kNoId;
   std::vector<MapPointId> to_refind_;
+  std::vector<Unlocalized> to_localize_;
+  std::deque<std::pair<KeyFrameId, KeyFrameId>> to_convert_;  // (reference, partner)
   std::size_t keyframes_since_global_ = 0;
   bool global_interrupted_ = false;
 

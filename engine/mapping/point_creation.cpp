@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "engine/geometry/triangulation.h"
+#include "engine/mapping/free_corners.h"
 
 namespace docent::engine {
 
@@ -62,6 +63,9 @@ DepthRange GuessRange(const std::vector<KnownDepth>& known, const KeyFrame& targ
   }
   return range;
 }
+
+// How far the background is looked for, in mean depths of the keyframe.
+constexpr double kFarthestDepths = 30;
 
 struct EpipolarMatch {
   Eigen::Vector2d pixel;  // level 0 of the partner
@@ -211,58 +215,22 @@ class PairSearch {
   std::uint32_t scratch_id_ = 0;
 };
 
-// Which places of a level are taken: a coarse raster about the matched features.
-class Occupancy {
+// How many points each part of the picture has.
+class CellCounts {
  public:
-  Occupancy(const cv::Mat& image, float cell)
-      : cell_(cell), columns_(static_cast<int>(static_cast<float>(image.cols) / cell) + 1) {
-    taken_.resize(static_cast<std::size_t>(columns_) *
-                  (static_cast<std::size_t>(static_cast<float>(image.rows) / cell) + 1));
-  }
-  void Take(const Eigen::Vector2f& pixel) {
-    const std::size_t at = Index(pixel);
-    if (at < taken_.size()) taken_[at] = true;
-  }
-  bool Taken(const Eigen::Vector2f& pixel) const {
-    const std::size_t at = Index(pixel);
-    return at >= taken_.size() || taken_[at];
+  explicit CellCounts(const CameraModel& camera)
+      : width_px_(camera.width_px()), height_px_(camera.height_px()) {}
+  int& At(const Eigen::Vector2f& pixel) {  // level 0
+    const int column = std::clamp(static_cast<int>(pixel.x()) * kColumns / width_px_, 0, kColumns - 1);
+    const int row = std::clamp(static_cast<int>(pixel.y()) * kRows / height_px_, 0, kRows - 1);
+    return counts_[static_cast<std::size_t>(row * kColumns + column)];
   }
 
  private:
-  std::size_t Index(const Eigen::Vector2f& pixel) const {
-    return static_cast<std::size_t>(static_cast<int>(pixel.y() / cell_) * columns_ +
-                                    static_cast<int>(pixel.x() / cell_));
-  }
-  float cell_;
-  int columns_;
-  std::vector<bool> taken_;
+  static constexpr int kColumns = 8, kRows = 6;
+  int width_px_, height_px_;
+  std::array<int, kColumns * kRows> counts_{};
 };
-
-struct ScoredCorner {
-  float score;
-  Corner corner;
-};
-
-std::vector<ScoredCorner> FreeCorners(const PointCreationOptions& options, const Map::KeyFrameRecord& target,
-                                      std::size_t level, Occupancy* occupancy) {
-  const ImageFeatures& features = *target.keyframe.features;
-  const cv::Mat& image = features.levels[level];
-  for (const Observation& observation : target.observations) {
-    // A point of a neighbouring level stands for the same structure.
-    if (std::abs(static_cast<int>(observation.level) - static_cast<int>(level)) > 1) continue;
-    occupancy->Take(
-        LevelFromLevelZero(observation.pixel.cast<double>(), static_cast<int>(level)).cast<float>());
-  }
-  std::vector<ScoredCorner> corners;
-  for (const Corner& corner : features.corners[level]) {
-    if (!PatchFits(image, corner.x, corner.y, 2.0f) || occupancy->Taken({corner.x, corner.y})) continue;
-    const float score = ShiTomasiScore(image, corner.x, corner.y);
-    if (score >= options.min_corner_score) corners.push_back({score, corner});
-  }
-  std::stable_sort(corners.begin(), corners.end(),
-                   [](const ScoredCorner& a, const ScoredCorner& b) { return a.score > b.score; });
-  return corners;
-}
 
 }  // namespace
 
@@ -274,15 +242,20 @@ std::vector<MapPointId> CreatePoints(const PointCreationOptions& options, KeyFra
   if (!target || !partner || target == partner) return created;
   const std::vector<KnownDepth> known = KnownDepths(*map, *target);
   PairSearch search(options, target->keyframe, partner->keyframe, searcher);
+  CellCounts cells(*target->keyframe.camera);
+  for (const Observation& observation : target->observations) ++cells.At(observation.pixel);
   for (int level = kPyramidLevels - 1; level >= 0; --level) {
     const auto index = static_cast<std::size_t>(level);
     Occupancy occupancy(target->keyframe.features->levels[index], options.min_distance_px);
     int accepted = 0;
-    for (const ScoredCorner& scored : FreeCorners(options, *target, index, &occupancy)) {
+    for (const ScoredCorner& scored :
+         FreeCorners(*target, index, options.min_faint_corner_score, &occupancy)) {
       if (accepted >= options.max_points[index]) break;
       const Eigen::Vector2f pixel(scored.corner.x, scored.corner.y);
       if (occupancy.Taken(pixel)) continue;
       const Eigen::Vector2d pixel_zero = LevelZeroFromLevel(pixel.cast<double>(), level);
+      int& in_cell = cells.At(pixel_zero.cast<float>());
+      if (scored.score < options.min_corner_score && in_cell >= options.few_points) continue;
       const auto ray = target->keyframe.camera->Unproject(pixel_zero);
       if (!ray) continue;
       const DepthRange range = GuessRange(known, target->keyframe, pixel_zero.cast<float>());
@@ -302,10 +275,74 @@ std::vector<MapPointId> CreatePoints(const PointCreationOptions& options, KeyFra
       map->UpdateNormal(map->FindPoint(id));
       occupancy.Take(pixel);
       created.push_back(id);
+      ++in_cell;
       ++accepted;
     }
   }
   return created;
+}
+
+namespace {
+
+// The finite point that a keyframe sees at this place already; null for none.
+Map::PointRecord* KnownAt(Map* map, const Map::KeyFrameRecord& keyframe, const Eigen::Vector2f& pixel,
+                          int level) {
+  constexpr float kSamePx = 1.5f;  // of the level
+  const float limit = kSamePx * static_cast<float>(1 << level);
+  for (const Observation& observation : keyframe.observations) {
+    if ((observation.pixel - pixel).squaredNorm() > limit * limit) continue;
+    Map::PointRecord* record = map->FindPoint(observation.point);
+    if (record && !record->point.infinite()) return record;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+InfiniteConversion ConvertInfinitePoints(const PointCreationOptions& options, KeyFrameId reference_id,
+                                         KeyFrameId partner_id, Map* map, PointSearcher* searcher) {
+  InfiniteConversion conversion;
+  Map::KeyFrameRecord* reference = map->FindKeyFrame(reference_id);
+  Map::KeyFrameRecord* partner = map->FindKeyFrame(partner_id);
+  if (!reference || !partner || reference == partner) return conversion;
+  PairSearch search(options, reference->keyframe, partner->keyframe, searcher);
+  const std::vector<KnownDepth> known = KnownDepths(*map, *reference);
+  const std::vector<Observation> observations = reference->observations;
+  for (const Observation& observation : observations) {
+    Map::PointRecord* record = map->FindPoint(observation.point);
+    if (!record || !record->point.infinite() || record->point.source_keyframe != reference_id) continue;
+    const auto ray = reference->keyframe.camera->Unproject(observation.pixel.cast<double>());
+    if (!ray) continue;
+    const int level = record->point.source_level;
+    // What lies beside known things may be as near as they are; the background may be anywhere.
+    DepthRange range = GuessRange(known, reference->keyframe, observation.pixel);
+    range.far = std::max(range.far, kFarthestDepths * reference->keyframe.mean_depth);
+    const auto match = search.Search(record->point.source_pixel, level, *ray, range);
+    if (!match) continue;
+    const auto position = search.Intersect(*ray, *match, level);
+    if (!position) continue;
+    // Perhaps the map knew it all along, from elsewhere.
+    const MapPointId id = record->point.id;
+    if (Map::PointRecord* same = KnownAt(map, *partner, match->pixel.cast<float>(), match->level)) {
+      const auto again =
+          reference->keyframe.camera->Project(reference->keyframe.camera_from_map * same->point.position());
+      if (!again || (*again - observation.pixel.cast<double>()).norm() >
+                        options.max_reprojection_sigma * (1 << level)) {
+        continue;
+      }
+      const MapPointId same_id = same->point.id;
+      map->RemovePoint(id);
+      map->AddObservation({reference_id, same_id, observation.pixel, observation.level});
+      ++conversion.merged;
+      continue;
+    }
+    map->MakeFinite(record, *position);
+    map->AddObservation(
+        {partner_id, id, match->pixel.cast<float>(), static_cast<std::uint8_t>(match->level)});
+    map->UpdateNormal(map->FindPoint(id));
+    conversion.converted.push_back(id);
+  }
+  return conversion;
 }
 
 }  // namespace docent::engine

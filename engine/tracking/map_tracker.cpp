@@ -160,13 +160,16 @@ void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_fro
     CollectLocal(map, camera_from_map);
     local_age_frames_ = 0;
   }
-  if (panorama_ != kNoId && (!same_map || panorama_ != local_panorama_)) {
-    CollectPanorama(map);
+  if (!same_map) local_panorama_ = kNoId;  // its points went with the snapshot
+  if (panorama_ != local_panorama_) {
+    local_infinite_.clear();
+    if (panorama_ != kNoId) CollectPanorama(map);
     local_panorama_ = panorama_;
   }
   local_map_ = &map;
   local_revision_ = map.revision;
   Project(local_, camera_from_map);
+  visible_finite_ = static_cast<int>(visible_.size());
   AddCandidates(camera_from_map, static_cast<std::size_t>(options_.max_fine), random);
   if (panorama_ == kNoId) return;
   Project(local_infinite_, camera_from_map);
@@ -177,8 +180,9 @@ void MapTracker::Search(const std::vector<std::uint32_t>& which, const ImageFeat
                         bool direct) {
   for (const std::uint32_t index : which) {
     const Candidate& candidate = candidates_[index];
+    const float reach = candidate.point->infinite() ? std::max(radius, options_.infinite_radius_px) : radius;
     const auto found =
-        searcher_.Find(*candidate.point, *candidate.source, candidate.predicted, features, radius, direct);
+        searcher_.Find(*candidate.point, *candidate.source, candidate.predicted, features, reach, direct);
     attempts_.push_back({candidate.point->id, found.has_value(), false});
     if (!found) continue;
     measured_.push_back(index);
@@ -238,6 +242,10 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   CollectVisible(map, predicted, random);
 
   if (effort == Effort::kRecovery) {
+    // Of directions alone there is no pose without a guess; the guess has turned as the picture has.
+    if (static_cast<int>(local_infinite_.size()) > 0 && panorama_ != kNoId &&
+        visible_finite_ < options_.min_coarse)
+      return Track(map, features, predicted, Effort::kWide, random);
     const auto recovered = PoseFromPatches(features, random);
     if (!recovered) return result;
     Forget();

@@ -27,7 +27,10 @@ struct MapTrackerOptions {
   float wide_radius_px = 70;         // the second try before a frame is called lost
   float fine_radius_px = 7;          // after a coarse pose
   float fine_radius_alone_px = 14;   // when the coarse stage had nothing to say
-  int max_infinite = 250;            // of the points, where a panorama map is enabled
+  // Infinite points are off their prediction by what the camera has moved since its panorama map was opened;
+  // all by about the same, so that they still tell the rotation when the finite points are gone.
+  float infinite_radius_px = 20;
+  int max_infinite = 250;     // of the points, where a panorama map is enabled
   int min_points_a_cell = 2;  // for a cell of the coverage grid to count as covered (hybrid-slam §4.1)
   SearchOptions search;
   PoseRefinementOptions refinement;
@@ -124,6 +127,7 @@ class MapTracker {
   PanoramaId local_panorama_ = kNoId;
   int local_age_frames_ = 0;
   std::vector<LocalPoint> visible_;
+  int visible_finite_ = 0;
   std::vector<std::uint8_t> taken_;  // cells of the picture where finite points are expected
   std::vector<Candidate> candidates_;
   std::vector<std::uint32_t> coarse_, fine_;

@@ -8,12 +8,28 @@
 
 namespace docent::engine {
 
+namespace {
+
+double FieldOfView(const CameraModel& camera) {
+  const double middle = camera.height_px() / 2.0;
+  const auto left = camera.Unproject({0, middle});
+  const auto right = camera.Unproject({camera.width_px() - 1.0, middle});
+  return left && right ? std::acos(std::clamp(left->dot(*right), -1.0, 1.0)) : 1.0;
+}
+
+Rigid3 WithCenter(const Rotation3& rotation, const Eigen::Vector3d& center) {
+  return Rigid3(rotation, -(rotation * center));
+}
+
+}  // namespace
+
 Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera, std::uint64_t seed)
     : options_(options),
       camera_(std::move(camera)),
       random_(seed),
       map_tracker_(options.map_tracker, camera_),
-      initializer_(options.initializer, camera_, random_.Next()) {}
+      initializer_(options.initializer, camera_, random_.Next()),
+      selector_(options.selector, FieldOfView(*camera_)) {}
 
 void Tracker::Reset() {
   map_.reset();
@@ -23,9 +39,15 @@ void Tracker::Reset() {
   entering_frames_ = 0;
   initializer_.Reset();
   map_tracker_.Clear();
+  map_tracker_.EnablePanorama(kNoId);
+  selector_.Reset();
   reports_.clear();
   candidate_.reset();
   pair_.reset();
+}
+
+void Tracker::StartFailed() {
+  pair_given_ = false;
 }
 
 void Tracker::StartNewMap() {
@@ -41,13 +63,31 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     tracking_ = false;
     return;
   }
-  if (pair_given_) {
+  if (starting_ && !map_->HasFinitePoints()) {
+    // Our own first picture became a map of directions.
+    if (same && tracking_) return;
+    const KeyFrame& first = map_->keyframes.front();
+    map_tracker_.Clear();
+    motion_.Reset(first.time, first.camera_from_map);
+    // The corners that are followed must begin where the pose is known.
+    first_view_from_map_ = first.camera_from_map;
+    if (initializer_.first_time() != first.time) initializer_.Reset();
+    selector_.Offered(KeyFrameChoice::kFirst, first.time);
+    observed_ = ObservedMotion::kPanorama;
+    tracking_ = true;
+    lost_since_ = Timestamp::min();
+  } else if (pair_given_) {
     // Our own pair became a map: its newest keyframe is where the camera was a moment ago.
     starting_ = pair_given_ = false;
     map_tracker_.Clear();
+    map_tracker_.EnablePanorama(kNoId);
+    selector_.Reset();
     motion_.Reset(map_->keyframes.back().time, map_->keyframes.back().camera_from_map);
+    observed_ = ObservedMotion::kSixDof;
     tracking_ = true;
   } else if (!same) {
+    map_tracker_.EnablePanorama(kNoId);
+    selector_.Reset();
     map_tracker_.Clear();
     reports_.clear();
     tracking_ = false;
@@ -90,7 +130,9 @@ std::optional<Rotation3> Tracker::RotationFromPrevious() const {
 }
 
 bool Tracker::Believable(const MapTrackResult& result) const {
-  return result.converged && result.sigma <= options_.max_sigma && result.inliers >= options_.min_inliers &&
+  const bool sure = result.observed == ObservedMotion::kPanorama || result.Quality() >= options_.sure_quality;
+  const int min_inliers = sure ? options_.min_sure_inliers : options_.min_inliers;
+  return result.converged && result.sigma <= options_.max_sigma && result.inliers >= min_inliers &&
          result.occupied_cells >= options_.min_cells && result.Quality() >= options_.lost_quality;
 }
 
@@ -111,26 +153,58 @@ TrackedFrame Tracker::Track(const Frame& frame, const PlaceFinder* places) {
   features_ = NextFeatures(frame);
   ++frames_since_keyframe_;
 
-  if (starting_) {
-    out.state = TrackingState::kInitializing;
-    if (pair_given_) {
-      out.hint = "hold on, making a map";
-    } else {
-      pair_ = initializer_.Track(frame.time, features_);
-      pair_given_ = pair_.has_value();
-      out.hint = initializer_.hint();
-    }
+  if (starting_ && !map_) {
+    LookForStart(frame, &out);
   } else if (tracking_) {
     TrackMap(frame, &out);
   } else {
     Recover(frame, places, &out);
   }
+  if (starting_ && map_) LookForStart(frame, &out);
   out.tracking_time = std::chrono::steady_clock::now() - start;
   return out;
 }
 
+// Follows corners for two views that start a map; beside it a map of directions may already be tracked.
+void Tracker::LookForStart(const Frame& frame, TrackedFrame* out) {
+  if (!map_) out->state = TrackingState::kInitializing;
+  if (pair_given_) {
+    if (!map_) out->hint = "hold on, making a map";
+    return;
+  }
+  const bool posed = HasPose(out->state);
+  if (map_ && !posed) {
+    // The first view's pose would be lost with the track.
+    initializer_.Reset();
+    return;
+  }
+  const bool directions = options_.hybrid && options_.build_maps;
+  if (!map_ && directions) initializer_.Reset();  // its first view is to be the map's, too
+  pair_ = initializer_.Track(frame.time, features_);
+  if (pair_) {
+    pair_->a_from_map = first_view_from_map_;
+    pair_given_ = true;
+  }
+  if (initializer_.first_time() == frame.time) first_view_from_map_ = posed ? out->camera_from_map : Rigid3();
+  out->hint = initializer_.hint();
+  if (!map_ && directions) OfferKeyFrame(KeyFrameChoice::kFirst, frame, Rigid3(), {});
+}
+
+// The panorama map whose points are looked for: the one that is open, or one whose centre the camera is back
+// in when the map of finite points does not fill the picture.
+PanoramaId Tracker::PanoramaFor(const Rigid3& predicted) const {
+  if (map_->panoramas.empty()) return kNoId;
+  if (selector_.mode() == KeyFrameSelector::Mode::kPanorama) return selector_.OpenPanorama(*map_);
+  const bool needed =
+      observed_ == ObservedMotion::kPanorama || finite_coverage_ < options_.selector.min_coverage;
+  return needed ? selector_.PanoramaNear(predicted, median_depth_, *map_) : kNoId;
+}
+
 void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
-  const Rigid3 predicted = motion_.Predict(frame.time);
+  Rigid3 predicted = motion_.Predict(frame.time);
+  if (observed_ == ObservedMotion::kPanorama)
+    predicted = WithCenter(predicted.rotation, motion_.last().OriginInSource());
+  map_tracker_.EnablePanorama(PanoramaFor(predicted));
   MapTrackResult result =
       map_tracker_.Track(*map_, *features_, predicted, MapTracker::Effort::kUsual, &random_);
   if (!Believable(result)) {
@@ -156,32 +230,68 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   const bool good = result.Quality() >= options_.good_quality;
   if (out->state == TrackingState::kRelocalized) {
     motion_.Reset(frame.time, result.camera_from_map);
+    selector_.Reset();
   } else {
     motion_.Update(frame.time, result.camera_from_map);
+    if (result.observed == ObservedMotion::kHybrid) out->state = TrackingState::kHybrid;
+    if (result.observed == ObservedMotion::kPanorama) out->state = TrackingState::kPanorama;
   }
   tracking_ = true;
+  observed_ = result.observed;
+  finite_coverage_ = result.finite_coverage;
+  if (result.finite_inliers > 0 && result.median_depth > 0) median_depth_ = result.median_depth;
   out->map = map_;
   out->map_key = map_key_;
   out->camera_from_map = result.camera_from_map;
   out->covariance = result.covariance;
   out->quality = result.Quality();
   out->quality_class = good ? TrackingQuality::kGood : TrackingQuality::kBad;
-  out->finite_points = result.inliers;
+  out->finite_points = result.finite_inliers;
+  out->infinite_points = result.inliers - result.finite_inliers;
   out->matches = map_tracker_.matches();
   if (!good) out->hint = "few points are found: slow down";
   CollectReports();
-  if (good && options_.build_maps && frames_since_keyframe_ >= options_.frames_between_keyframes &&
-      WantsKeyFrame(options_.keyframes, *map_, result.camera_from_map, result)) {
-    KeyFrameCandidate candidate;
-    candidate.time = frame.time;
-    candidate.camera = camera_;
-    candidate.features = features_;
-    candidate.camera_from_map = result.camera_from_map;
-    for (const PointMatch& match : out->matches) {
-      if (match.inlier) candidate.matches.push_back(match);
+  if (good && options_.build_maps) ChooseKeyFrame(frame, result, *out);
+}
+
+void Tracker::ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, const TrackedFrame& out) {
+  const bool wants_six_dof = result.observed != ObservedMotion::kPanorama &&
+                             WantsKeyFrame(options_.keyframes, *map_, result.camera_from_map, result);
+  KeyFrameChoice choice = wants_six_dof ? KeyFrameChoice::kSixDof : KeyFrameChoice::kNone;
+  if (options_.hybrid) {
+    // What carries the camera is what grows.
+    if (selector_.mode() == KeyFrameSelector::Mode::kSixDof && result.observed == ObservedMotion::kPanorama) {
+      if (const PanoramaMap* panorama = map_->FindPanorama(map_tracker_.panorama()))
+        selector_.Reopen(*panorama, *map_);
     }
-    candidate_ = std::move(candidate);
+    choice = selector_.Select({.time = frame.time,
+                               .camera_from_map = result.camera_from_map,
+                               .observed = result.observed,
+                               .finite_coverage = result.finite_coverage,
+                               .coverage = result.coverage,
+                               .points = result.inliers,
+                               .median_depth = median_depth_,
+                               .wants_six_dof = wants_six_dof},
+                              *map_);
   }
+  if (choice == KeyFrameChoice::kNone || frames_since_keyframe_ < options_.frames_between_keyframes) return;
+  OfferKeyFrame(choice, frame, result.camera_from_map, out.matches);
+}
+
+void Tracker::OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rigid3& camera_from_map,
+                            const std::vector<PointMatch>& matches) {
+  KeyFrameCandidate candidate;
+  candidate.choice = choice;
+  candidate.panorama = map_tracker_.panorama();
+  candidate.time = frame.time;
+  candidate.camera = camera_;
+  candidate.features = features_;
+  candidate.camera_from_map = camera_from_map;
+  for (const PointMatch& match : matches) {
+    if (match.inlier) candidate.matches.push_back(match);
+  }
+  candidate_ = std::move(candidate);
+  selector_.Offered(choice, frame.time);
 }
 
 void Tracker::CollectReports() {
@@ -203,6 +313,7 @@ bool Tracker::RecoverNearby(const Frame& frame, TrackedFrame* out) {
   if (frame.time - lost_since_ > FromSeconds(options_.short_loss_s)) return false;
   const auto rotation = RotationFromPrevious();
   const Rigid3 guess = rotation ? motion_.PredictWithRotation(*rotation) : motion_.Predict(frame.time);
+  map_tracker_.EnablePanorama(PanoramaFor(guess));
   const MapTrackResult result =
       map_tracker_.Track(*map_, *features_, guess, MapTracker::Effort::kRecovery, &random_);
   if (Recovered(result)) {
@@ -248,6 +359,7 @@ void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFram
       const auto rotation = RotationFromPrevious();
       const Rigid3 turn(rotation ? *rotation : Rotation3(), Eigen::Vector3d::Zero());
       map_tracker_.Clear();
+      map_tracker_.EnablePanorama(entering_panorama_);
       result = map_tracker_.Track(*found.front().map, *features_, turn * entering_pose_,
                                   MapTracker::Effort::kWide, &random_);
       if (Recovered(result)) {
@@ -268,6 +380,8 @@ void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFram
   for (const TurnedPlace& place : BestPlaces(*places)) {
     const PlaceCandidate& candidate = place.candidate;
     map_tracker_.Clear();
+    const KeyFrame* keyframe = candidate.map->FindKeyFrame(candidate.keyframe);
+    map_tracker_.EnablePanorama(keyframe ? keyframe->panorama : kNoId);
     result = map_tracker_.Track(*candidate.map, *features_, place.camera_from_map,
                                 MapTracker::Effort::kRecovery, &random_);
     if (!Recovered(result)) continue;
@@ -277,6 +391,7 @@ void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFram
       Accept(frame, result, out);
     } else {
       entering_key_ = candidate.map_key;
+      entering_panorama_ = map_tracker_.panorama();
       entering_pose_ = result.camera_from_map;
       entering_frames_ = 1;
     }

@@ -11,6 +11,7 @@
 #include "engine/mapping/keyframe_candidate.h"
 #include "engine/recognition/place.h"
 #include "engine/tracking/keyframe_selection.h"
+#include "engine/tracking/keyframe_selector.h"
 #include "engine/tracking/map_tracker.h"
 #include "engine/tracking/motion_model.h"
 #include "engine/tracking/tracked_frame.h"
@@ -23,10 +24,18 @@ struct TrackerOptions {
   MapTrackerOptions map_tracker;
   InitializerOptions initializer;
   KeyFrameSelectionOptions keyframes;
+  KeyFrameSelectorOptions selector;
+  // Panorama maps (hybrid-slam): a turn on the spot is tracked by directions, and a new map begins as one
+  // with its first picture. Off: general motion alone, as in ptamm.
+  bool hybrid = false;
   double good_quality = 0.30;  // ptamm §2.1
   double lost_quality = 0.13;  // ptamm §2.1
   int min_inliers = 20;        // fewer do not make a pose, whatever their share
-  int min_cells = 3;           // of the 4x4 grid that inliers must occupy
+  // Enough where only the rotation is asked for, or where nearly all that was looked for is there: a bare
+  // wall.
+  int min_sure_inliers = 12;
+  double sure_quality = 0.5;
+  int min_cells = 3;  // of the 4x4 grid that inliers must occupy
   // Robust, of the normalised residuals: where nothing fits, the robust threshold grows until chance matches
   // pass it. A true pose leaves less than one.
   double max_sigma = 4.0;
@@ -57,6 +66,8 @@ class Tracker {
   // Begins to look for a new map's first views; until SetMap gives one, frames are `initializing`.
   void StartNewMap();
   bool starting() const { return starting_; }
+  // The first view and pose from which the mapper could not make a map were nothing: look on.
+  void StartFailed();
 
   // The whole way of one frame. `places` may be null: then a lost track is sought in its own map only.
   TrackedFrame Track(const Frame& frame, const PlaceFinder* places);
@@ -71,7 +82,12 @@ class Tracker {
 
  private:
   std::shared_ptr<ImageFeatures> NextFeatures(const Frame& frame);
+  void LookForStart(const Frame& frame, TrackedFrame* out);
   void TrackMap(const Frame& frame, TrackedFrame* out);
+  PanoramaId PanoramaFor(const Rigid3& predicted) const;
+  void ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, const TrackedFrame& out);
+  void OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rigid3& camera_from_map,
+                     const std::vector<PointMatch>& matches);
   void Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
   bool RecoverNearby(const Frame& frame, TrackedFrame* out);
   // A keyframe that resembles the frame, and the pose that the resemblance suggests.
@@ -93,18 +109,24 @@ class Tracker {
   MapTracker map_tracker_;
   Initializer initializer_;
   MotionModel motion_;
+  KeyFrameSelector selector_;
 
   std::shared_ptr<const MapSnapshot> map_;
   std::uint64_t map_key_ = 0;
   bool starting_ = false;    // a start is being looked for, or the mapper is making a map of it
   bool pair_given_ = false;  // the mapper is making a map of our pair
   bool tracking_ = false;
+  // The last pose told the rotation alone; then the centre stays where it was.
+  ObservedMotion observed_ = ObservedMotion::kSixDof;
+  double finite_coverage_ = 1, median_depth_ = 1;  // of the last frame that told them
+  Rigid3 first_view_from_map_;                     // the pose of the initializer's first view
   Timestamp lost_since_{};
   int frames_since_keyframe_ = 0;
   // Poses in another map that agree with each other, before it is entered.
   std::uint64_t entering_key_ = 0;
   int entering_frames_ = 0;
   Rigid3 entering_pose_;
+  PanoramaId entering_panorama_ = kNoId;
 
   std::shared_ptr<const ImageFeatures> features_, previous_;
   std::vector<std::shared_ptr<ImageFeatures>> pool_;
