@@ -17,7 +17,11 @@ auto FindObservation(std::vector<Observation>& observations, MapPointId point) {
 }  // namespace
 
 Map::Map(const MapSnapshot& snapshot)
-    : next_keyframe_(snapshot.next_keyframe), next_point_(snapshot.next_point), revision_(snapshot.revision) {
+    : panoramas_(snapshot.panoramas),
+      next_keyframe_(snapshot.next_keyframe),
+      next_point_(snapshot.next_point),
+      next_panorama_(snapshot.next_panorama),
+      revision_(snapshot.revision) {
   for (const KeyFrame& keyframe : snapshot.keyframes) keyframes_[keyframe.id].keyframe = keyframe;
   points_.reserve(snapshot.points.size());
   for (const MapPoint& point : snapshot.points) points_.push_back({.point = point, .observers = {}});
@@ -70,7 +74,8 @@ void Map::RemoveObservation(KeyFrameId keyframe, MapPointId point) {
   if (!keyframe_record || !point_record) return;
   const auto it = FindObservation(keyframe_record->observations, point);
   if (it == keyframe_record->observations.end() || it->point != point) return;
-  if (point_record->observers.size() <= 2 || point_record->point.source_keyframe == keyframe) {
+  const std::size_t fewest = point_record->point.infinite() ? 1 : 2;
+  if (point_record->observers.size() <= fewest || point_record->point.source_keyframe == keyframe) {
     RemovePoint(point);
     return;
   }
@@ -100,7 +105,88 @@ void Map::RemoveKeyFrame(KeyFrameId id) {
   for (const PointRecord& point : points_) {
     if (point.alive && point.point.source_keyframe == id) RemovePoint(point.point.id);
   }
+  const PanoramaId panorama = record->keyframe.panorama;
+  const bool reference = record->keyframe.kind == KeyFrameKind::kSixDof && panorama != kNoId;
   keyframes_.erase(id);
+  if (reference) ClosePanorama(panorama);
+}
+
+// Without its reference nothing says where a panorama map stands.
+void Map::ClosePanorama(PanoramaId id) {
+  std::vector<KeyFrameId> dependents;
+  for (auto& [keyframe, record] : keyframes_) {
+    if (record.keyframe.panorama != id) continue;
+    if (record.keyframe.kind == KeyFrameKind::kPanorama) {
+      dependents.push_back(keyframe);
+    } else {
+      record.keyframe.panorama = kNoId;
+    }
+  }
+  for (const KeyFrameId dependent : dependents) RemoveKeyFrame(dependent);
+  for (const PointRecord& point : points_) {
+    if (point.alive && point.point.panorama == id) RemovePoint(point.point.id);
+  }
+  std::erase_if(panoramas_, [id](const PanoramaMap& panorama) { return panorama.id == id; });
+}
+
+PanoramaId Map::OpenPanorama(KeyFrameId reference) {
+  KeyFrame& keyframe = FindKeyFrame(reference)->keyframe;
+  const PanoramaId before = keyframe.panorama;
+  const PanoramaId id = next_panorama_++;
+  keyframe.kind = KeyFrameKind::kSixDof;
+  keyframe.panorama = id;
+  panoramas_.push_back({id, reference});
+  if (before == kNoId) return id;
+  for (PointRecord& record : points_) {
+    if (!record.alive || record.point.panorama != before || record.point.source_keyframe != reference)
+      continue;
+    record.point.panorama = id;
+    // What others saw of it was seen about another centre.
+    const std::vector<KeyFrameId> observers = record.observers;
+    for (const KeyFrameId observer : observers) {
+      if (observer != reference) RemoveObservation(observer, record.point.id);
+    }
+    UpdateDirection(&record);
+  }
+  // Nor does it belong among those who see the other points of the panorama it left.
+  const std::vector<Observation> observations = FindKeyFrame(reference)->observations;
+  for (const Observation& observation : observations) {
+    const PointRecord* point = FindPoint(observation.point);
+    if (point && point->point.panorama == before) RemoveObservation(reference, observation.point);
+  }
+  return id;
+}
+
+void Map::SetReference(PanoramaId panorama, KeyFrameId reference) {
+  for (PanoramaMap& known : panoramas_) {
+    if (known.id != panorama) continue;
+    FindKeyFrame(known.reference)->keyframe.kind = KeyFrameKind::kPanorama;
+    known.reference = reference;
+  }
+  KeyFrame& keyframe = FindKeyFrame(reference)->keyframe;
+  keyframe.kind = KeyFrameKind::kSixDof;
+  keyframe.panorama = panorama;
+}
+
+void Map::MakeFinite(PointRecord* record, const Eigen::Vector3d& position) {
+  record->point.point_in_map << position, 1.0;
+  record->point.panorama = kNoId;
+  record->point.was_infinite = true;
+  UpdateNormal(record);
+}
+
+void Map::UpdateDirection(PointRecord* record) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const KeyFrameId observer : record->observers) {
+    KeyFrameRecord& keyframe = keyframes_.at(observer);
+    const auto it = FindObservation(keyframe.observations, record->point.id);
+    if (it == keyframe.observations.end() || it->point != record->point.id) continue;
+    const auto ray = keyframe.keyframe.camera->Unproject(it->pixel.cast<double>());
+    if (ray) sum += keyframe.keyframe.camera_from_map.rotation.inverse() * *ray;
+  }
+  if (sum.norm() < 1e-6) return;
+  record->point.point_in_map << sum.normalized(), 0.0;
+  record->point.normal = -sum.normalized().cast<float>();
 }
 
 void Map::UpdateDepth(KeyFrameRecord* record) {
@@ -157,6 +243,8 @@ std::shared_ptr<const MapSnapshot> Map::Snapshot() {
   snapshot->revision = ++revision_;
   snapshot->next_keyframe = next_keyframe_;
   snapshot->next_point = next_point_;
+  snapshot->next_panorama = next_panorama_;
+  snapshot->panoramas = panoramas_;
   snapshot->keyframes.reserve(keyframes_.size());
   for (const auto& [id, record] : keyframes_) {
     snapshot->keyframes.push_back(record.keyframe);

@@ -38,6 +38,9 @@ class Map {
   std::vector<PointRecord>& points() { return points_; }
   const std::vector<PointRecord>& points() const { return points_; }
 
+  // By ascending id.
+  const std::vector<PanoramaMap>& panoramas() const { return panoramas_; }
+
   KeyFrameRecord& AddKeyFrame(KeyFrame keyframe);  // gives it an id
   MapPointId AddPoint(MapPoint point);             // gives it an id; observations follow
   PointRecord* FindPoint(MapPointId id);           // null when unknown or dead
@@ -49,6 +52,16 @@ class Map {
   void RemoveObservation(KeyFrameId keyframe, MapPointId point);
   void RemovePoint(MapPointId id);
   void RemoveKeyFrame(KeyFrameId id);
+
+  // Makes a localized keyframe the reference of a new panorama map. One that was a dependent keyframe leaves
+  // its panorama map, and the infinite points that it is the source of come with it (hybrid-slam §5.1).
+  PanoramaId OpenPanorama(KeyFrameId reference);
+  // Another localized keyframe at the same centre takes over as reference.
+  void SetReference(PanoramaId panorama, KeyFrameId reference);
+  // An infinite point has been triangulated. Its observations in dependent keyframes stay.
+  void MakeFinite(PointRecord* record, const Eigen::Vector3d& position);
+  // The direction of an infinite point: the mean of the rays under which its keyframes see it.
+  void UpdateDirection(PointRecord* record);
 
   // Median depth and spread of the points that a keyframe sees.
   void UpdateDepth(KeyFrameRecord* record);
@@ -63,11 +76,15 @@ class Map {
   std::size_t AlivePoints() const { return alive_points_; }
 
  private:
+  void ClosePanorama(PanoramaId id);
+
   std::map<KeyFrameId, KeyFrameRecord> keyframes_;
   std::vector<PointRecord> points_;
+  std::vector<PanoramaMap> panoramas_;
   std::size_t alive_points_ = 0;
   KeyFrameId next_keyframe_ = 0;
   MapPointId next_point_ = 0;
+  PanoramaId next_panorama_ = 0;
   std::uint64_t revision_ = 0;
 };
 

@@ -40,6 +40,25 @@ std::string CheckKeyFrames(const MapSnapshot& map) {
   return {};
 }
 
+std::string CheckPanoramas(const MapSnapshot& map) {
+  PanoramaId next = 0;
+  for (const PanoramaMap& panorama : map.panoramas) {
+    const std::string name = "panorama map " + std::to_string(panorama.id);
+    if (panorama.id < next || panorama.id >= map.next_panorama) return name + " is out of order";
+    next = panorama.id + 1;
+    const KeyFrame* reference = map.FindKeyFrame(panorama.reference);
+    if (!reference) return name + " names a reference keyframe that is not there";
+    if (reference->kind != KeyFrameKind::kSixDof || reference->panorama != panorama.id)
+      return name + " has a reference keyframe that does not belong to it";
+  }
+  for (const KeyFrame& keyframe : map.keyframes) {
+    const bool dependent = keyframe.kind == KeyFrameKind::kPanorama;
+    if (keyframe.panorama == kNoId ? dependent : !map.FindPanorama(keyframe.panorama))
+      return "keyframe " + std::to_string(keyframe.id) + " names a panorama map that is not there";
+  }
+  return {};
+}
+
 std::string CheckPoints(const MapSnapshot& map) {
   MapPointId next = 0;
   for (const MapPoint& point : map.points) {
@@ -51,6 +70,8 @@ std::string CheckPoints(const MapSnapshot& map) {
       return name + " has no valid position";
     }
     if (!point.normal.allFinite()) return name + " has no valid normal";
+    if (point.infinite() ? !map.FindPanorama(point.panorama) : point.panorama != kNoId)
+      return name + " names a panorama map that is not there";
     const KeyFrame* source = map.FindKeyFrame(point.source_keyframe);
     if (!source) return name + " names a source keyframe that is not there";
     if (point.source_level >= kPyramidLevels) return name + " names a pyramid level that is not there";
@@ -93,9 +114,17 @@ const KeyFrame* MapSnapshot::FindKeyFrame(KeyFrameId id) const {
 const MapPoint* MapSnapshot::FindPoint(MapPointId id) const {
   return FindById(points, id);
 }
+const PanoramaMap* MapSnapshot::FindPanorama(PanoramaId id) const {
+  return FindById(panoramas, id);
+}
+
+bool MapSnapshot::HasFinitePoints() const {
+  return std::any_of(points.begin(), points.end(), [](const MapPoint& point) { return !point.infinite(); });
+}
 
 std::string Validate(const MapSnapshot& map) {
   if (std::string problem = CheckKeyFrames(map); !problem.empty()) return problem;
+  if (std::string problem = CheckPanoramas(map); !problem.empty()) return problem;
   if (std::string problem = CheckPoints(map); !problem.empty()) return problem;
   return CheckObservations(map);
 }

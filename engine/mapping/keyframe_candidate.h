@@ -12,8 +12,19 @@
 
 namespace docent::engine {
 
+// What a frame is to become (hybrid-slam §4).
+enum class KeyFrameChoice : std::uint8_t {
+  kNone,
+  kSixDof,
+  kLocalizedPanorama,  // six degrees of freedom, and the reference of a new panorama map
+  kPanorama,           // turned only: a dependent keyframe of the panorama map that is open
+  kFirst,              // the first of an empty map, which is a panorama map until it knows depth
+};
+
 // A frame that a tracker offers to the mapper as a keyframe (ptamm §2.2), with what it saw there.
 struct KeyFrameCandidate {
+  KeyFrameChoice choice = KeyFrameChoice::kSixDof;
+  PanoramaId panorama = kNoId;  // that a kPanorama joins
   Timestamp time{};
   std::shared_ptr<const CameraModel> camera;
   std::shared_ptr<const ImageFeatures> features;
@@ -40,6 +51,7 @@ struct InitialPair {
   std::shared_ptr<const CameraModel> camera;
   View a, b;
   std::vector<Match> matches;
+  Rigid3 a_from_map;  // where the first view is, if the map exists already as a panorama; else identity
   TwoViewResult geometry;  // one inlier flag and point a match
 };
 

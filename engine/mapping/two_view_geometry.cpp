@@ -59,7 +59,9 @@ class TwoViewEstimator {
     if (most < MinInliersByRatio()) return TwoViewVerdict::kInconsistent;
     if (most < options_.min_inliers) return TwoViewVerdict::kTooFewMatches;
 
-    noise_px_ = EstimateNoise(pairs_, essential_, options_.inlier_px);
+    scatter_px_ = EstimateScatter(pairs_, essential_, options_.inlier_px);
+    // Corners are hardly ever better placed than a quarter pixel; and beyond the threshold nothing was seen.
+    noise_px_ = std::clamp(scatter_px_, 0.25, options_.inlier_px);
     model_ = SelectModel(rotation_, homography_, essential_, options_.inlier_px, noise_px_);
     if (model_ == ModelKind::kRotation) return RotationVerdict();
     if (!RotationLeavesParallax()) return TwoViewVerdict::kTooLittleParallax;
@@ -128,7 +130,11 @@ class TwoViewEstimator {
     }
     // 1.386 sigma^2 is the median of the sum of two squared normal variables.
     const double deviation = std::sqrt(std::min(squared[0], squared[1]) / 1.386);
-    return deviation > std::max(kMinNoises * noise_px_, kMinPx);
+    if (deviation > std::max(kMinNoises * noise_px_, kMinPx)) return true;
+    // Corners followed so well that they show less than that: clearly more than they scatter, and more of
+    // them than chance or one ill-followed thing could sway.
+    constexpr double kClearNoises = 2.8, kMinClear = 100, kMinScatterPx = 0.1;
+    return counted.sum() >= kMinClear && deviation > kClearNoises * std::max(scatter_px_, kMinScatterPx);
   }
 
   TwoViewVerdict DecidePose() {
@@ -228,7 +234,7 @@ class TwoViewEstimator {
   const TwoViewOptions& options_;
   ConsensusOptions consensus_options_, wide_options_;
   Consensus rotation_, homography_, essential_;
-  double noise_px_ = 0;
+  double scatter_px_ = 0, noise_px_ = 0;  // as seen; and as it is at least
   ModelKind model_ = ModelKind::kRotation;
   Rigid3 b_from_a_;
   std::vector<bool> inlier_, explained_;

@@ -66,14 +66,12 @@ bool IsVariant(const Rigid3& a, const Rigid3& b) {
 
 }  // namespace
 
-double EstimateNoise(const RayPairs& pairs, const Consensus& essential, double inlier_px) {
+double EstimateScatter(const RayPairs& pairs, const Consensus& essential, double inlier_px) {
   std::vector<double> squared;
   for (Eigen::Index i = 0; i < pairs.size(); ++i)
     if (essential.squared_px[i] < inlier_px * inlier_px) squared.push_back(essential.squared_px[i]);
   // The median of a squared normal variable is 0.455 of its variance.
-  const double deviation = std::sqrt(Median(std::move(squared)) / 0.455);
-  // Corners are hardly ever better placed than a quarter pixel; and beyond the threshold nothing was seen.
-  return std::clamp(deviation, 0.25, inlier_px);
+  return std::sqrt(Median(std::move(squared)) / 0.455);
 }
 
 ModelKind SelectModel(const Consensus& rotation, const Consensus& homography, const Consensus& essential,

@@ -12,7 +12,7 @@ enum class ModelKind { kRotation, kHomography, kEssential };
 
 // Standard deviation of a picture coordinate, pixels, from the residuals that the best-fitting essential
 // matrix leaves on its inliers: the loosest of the three models shows the noise alone.
-double EstimateNoise(const RayPairs& pairs, const Consensus& essential, double inlier_px);
+double EstimateScatter(const RayPairs& pairs, const Consensus& essential, double inlier_px);
 
 // The model with the lowest geometric robust information criterion (Torr 1998: GRIC), which weighs what a
 // model leaves unexplained against its dimension (2, 2, 3 of the 4 coordinates of a pair) and parameters (3,

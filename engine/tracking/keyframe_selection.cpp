@@ -10,13 +10,18 @@ namespace docent::engine {
 
 namespace {
 
-std::ptrdiff_t CountObservations(const MapSnapshot& map, KeyFrameId id) {
+// Of finite points.
+std::ptrdiff_t CountObservations(const MapSnapshot& map, KeyFrameId id, bool with_infinite) {
   const auto before = [](const Observation& observation, KeyFrameId wanted) {
     return observation.keyframe < wanted;
   };
   const auto first = std::lower_bound(map.observations.begin(), map.observations.end(), id, before);
   const auto last = std::lower_bound(first, map.observations.end(), id + 1, before);
-  return last - first;
+  if (!with_infinite) return last - first;
+  return std::count_if(first, last, [&](const Observation& observation) {
+    const MapPoint* point = map.FindPoint(observation.point);
+    return point && !point->infinite();
+  });
 }
 
 }  // namespace
@@ -27,8 +32,9 @@ bool WantsKeyFrame(const KeyFrameSelectionOptions& options, const MapSnapshot& m
   const double depth = tracked.median_depth > 0 ? tracked.median_depth : 1.0;
   double nearest = std::numeric_limits<double>::max();
   double nearest_distance = 0, nearest_turn_deg = 0;
-  KeyFrameId nearest_id = kNoId;
+  const KeyFrame* nearest_keyframe = nullptr;
   for (const KeyFrame& keyframe : map.keyframes) {
+    if (keyframe.kind == KeyFrameKind::kPanorama) continue;  // its place is not known
     const double distance = (keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
     const double turn_deg = (camera_from_map.rotation * keyframe.camera_from_map.rotation.inverse()).Angle() *
                             180 / std::numbers::pi;
@@ -37,15 +43,16 @@ bool WantsKeyFrame(const KeyFrameSelectionOptions& options, const MapSnapshot& m
       nearest = novelty;
       nearest_distance = distance;
       nearest_turn_deg = turn_deg;
-      nearest_id = keyframe.id;
+      nearest_keyframe = &keyframe;
     }
   }
   if (nearest > 1.0) return true;
   const bool moved =
       nearest_distance > options.min_distance_when_few || nearest_turn_deg > options.min_turn_when_few_deg;
-  if (!moved || nearest_id == kNoId) return false;
-  const auto known = static_cast<double>(CountObservations(map, nearest_id));
-  return tracked.inliers < options.min_found_ratio * std::min(known, 600.0);
+  if (!moved || !nearest_keyframe) return false;
+  const auto known =
+      static_cast<double>(CountObservations(map, nearest_keyframe->id, nearest_keyframe->panorama != kNoId));
+  return tracked.finite_inliers < options.min_found_ratio * std::min(known, options.max_known);
 }
 
 }  // namespace docent::engine

@@ -2,6 +2,7 @@
 #include "engine/tracking/map_tracker.h"
 
 #include <algorithm>
+#include <array>
 #include <bitset>
 #include <cmath>
 
@@ -11,7 +12,16 @@ namespace docent::engine {
 
 namespace {
 
-constexpr int kCellsAcross = 4;
+constexpr int kCellsAcross = 4;                         // of the grid that inliers must be spread over
+constexpr int kCoverageColumns = 4, kCoverageRows = 3;  // hybrid-slam §4.1
+// An infinite point is left out where a finite one, or another, falls into the same cell (hybrid-slam §3.1).
+constexpr int kTakenCellPx = 16;
+
+std::size_t CellOf(const Eigen::Vector2d& pixel, const CameraModel& camera, int columns, int rows) {
+  const int column = std::clamp(static_cast<int>(pixel.x() * columns / camera.width_px()), 0, columns - 1);
+  const int row = std::clamp(static_cast<int>(pixel.y() * rows / camera.height_px()), 0, rows - 1);
+  return static_cast<std::size_t>(row * columns + column);
+}
 
 }  // namespace
 
@@ -20,7 +30,7 @@ MapTracker::MapTracker(const MapTrackerOptions& options, std::shared_ptr<const C
 
 void MapTracker::Clear() {
   searcher_.Clear();
-  last_inliers_.clear();
+  Forget();
 }
 
 // The points of the keyframes that see most of what the last frame saw; without a last frame, of those
@@ -32,6 +42,11 @@ void MapTracker::CollectLocal(const MapSnapshot& map, const Rigid3& camera_from_
   auto observation = map.observations.begin();
   for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
     const KeyFrame& keyframe = map.keyframes[i];
+    if (keyframe.kind == KeyFrameKind::kPanorama) {
+      // What it knows is looked for by its panorama map.
+      while (observation != map.observations.end() && observation->keyframe == keyframe.id) ++observation;
+      continue;
+    }
     int shared = 0;
     // Both lists ascend by point.
     auto inlier = last_inliers_.begin();
@@ -49,34 +64,59 @@ void MapTracker::CollectLocal(const MapSnapshot& map, const Rigid3& camera_from_
   }
   const std::size_t count = std::min(ranked_.size(), options_.local_keyframes);
   std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(count), ranked_.end());
-  local_.clear();
+  ids_.clear();
   for (std::size_t rank = 0; rank < count; ++rank) {
     const KeyFrameId id = map.keyframes[ranked_[rank].second].id;
     auto it = std::lower_bound(map.observations.begin(), map.observations.end(), id,
                                [](const Observation& o, KeyFrameId wanted) { return o.keyframe < wanted; });
-    for (; it != map.observations.end() && it->keyframe == id; ++it) local_.push_back(it->point);
+    for (; it != map.observations.end() && it->keyframe == id; ++it) ids_.push_back(it->point);
   }
-  std::sort(local_.begin(), local_.end());
-  local_.erase(std::unique(local_.begin(), local_.end()), local_.end());
+  TakePoints(map, false);
 }
 
-void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_from_map, Random* random) {
-  visible_.clear();
-  candidates_.clear();
-  coarse_.clear();
-  fine_.clear();
-  const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
-  const Eigen::Vector3d translation = camera_from_map.translation;
-  const double min_cosine = options_.search.min_view_cosine;
-  CollectLocal(map, camera_from_map);
+// The infinite points that keyframes of the enabled panorama map see.
+void MapTracker::CollectPanorama(const MapSnapshot& map) {
+  ids_.clear();
+  auto observation = map.observations.begin();
+  for (const KeyFrame& keyframe : map.keyframes) {
+    if (keyframe.panorama != panorama_) continue;
+    observation =
+        std::lower_bound(observation, map.observations.end(), keyframe.id,
+                         [](const Observation& o, KeyFrameId wanted) { return o.keyframe < wanted; });
+    for (; observation != map.observations.end() && observation->keyframe == keyframe.id; ++observation) {
+      ids_.push_back(observation->point);
+    }
+  }
+  TakePoints(map, true);
+}
+
+// The points of ids_, each once.
+void MapTracker::TakePoints(const MapSnapshot& map, bool infinite) {
+  std::sort(ids_.begin(), ids_.end());
+  ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
+  std::vector<LocalPoint>& points = infinite ? local_infinite_ : local_;
+  points.clear();
   auto next = map.points.begin();
-  for (const MapPointId id : local_) {
+  for (const MapPointId id : ids_) {
     next = std::lower_bound(next, map.points.end(), id, [](const MapPoint& candidate, MapPointId wanted) {
       return candidate.id < wanted;
     });
     if (next == map.points.end()) break;
-    const MapPoint& point = *next;
-    if (point.id != id) continue;
+    if (next->id != id || next->infinite() != infinite) continue;
+    if (infinite && next->panorama != panorama_) continue;
+    if (const KeyFrame* source = map.FindKeyFrame(next->source_keyframe)) points.push_back({&*next, source});
+  }
+}
+
+// Those of the points that fall into the picture, into visible_.
+void MapTracker::Project(const std::vector<LocalPoint>& points, const Rigid3& camera_from_map) {
+  visible_.clear();
+  const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
+  const Eigen::Vector3d translation = camera_from_map.translation;
+  const double min_cosine = options_.search.min_view_cosine;
+  const int columns = camera_->width_px() / kTakenCellPx + 1;
+  for (const LocalPoint& local : points) {
+    const MapPoint& point = *local.point;
     const Eigen::Vector3d x = rotation * point.point_in_map.head<3>() + point.point_in_map[3] * translation;
     if (!(x.z() > 0)) continue;
     const Eigen::Vector3d normal = rotation * point.normal.cast<double>();
@@ -84,16 +124,21 @@ void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_fro
     if (facing <= 0 || facing * facing < min_cosine * min_cosine * x.squaredNorm()) continue;
     const auto pixel = camera_->Project(x);
     if (!pixel || !camera_->IsInside(*pixel, kPatchSize / 2)) continue;
-    visible_.push_back(&point);
+    std::uint8_t& cell = taken_[static_cast<std::size_t>(
+        static_cast<int>(pixel->y()) / kTakenCellPx * columns + static_cast<int>(pixel->x()) / kTakenCellPx)];
+    if (point.infinite() && cell != 0) continue;
+    cell = 1;
+    visible_.push_back(local);
   }
-  // Points are drawn at random so that a choice among many is spread over the picture and over the map.
-  const auto wanted = static_cast<std::size_t>(options_.max_fine);
-  for (std::size_t i = 0; i < visible_.size() && fine_.size() + coarse_.size() < wanted; ++i) {
+}
+
+// Points are drawn at random so that a choice among many is spread over the picture and over the map.
+void MapTracker::AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random) {
+  const std::size_t before = candidates_.size();
+  for (std::size_t i = 0; i < visible_.size() && candidates_.size() - before < wanted; ++i) {
     const std::size_t j = i + random->Below(static_cast<std::uint32_t>(visible_.size() - i));
     std::swap(visible_[i], visible_[j]);
-    const MapPoint* point = visible_[i];
-    const KeyFrame* source = map.FindKeyFrame(point->source_keyframe);
-    if (!source) continue;
+    const auto& [point, source] = visible_[i];
     const auto predicted = searcher_.Predict(*point, *source, *camera_, camera_from_map);
     if (!predicted) continue;
     const auto index = static_cast<std::uint32_t>(candidates_.size());
@@ -101,6 +146,31 @@ void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_fro
     const bool top = predicted->level >= 2 && static_cast<int>(coarse_.size()) < options_.max_coarse;
     (top ? coarse_ : fine_).push_back(index);
   }
+}
+
+void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_from_map, Random* random) {
+  candidates_.clear();
+  coarse_.clear();
+  fine_.clear();
+  taken_.assign(static_cast<std::size_t>((camera_->width_px() / kTakenCellPx + 1) *
+                                         (camera_->height_px() / kTakenCellPx + 1)),
+                0);
+  const bool same_map = local_map_ == &map && local_revision_ == map.revision;
+  if (!same_map || ++local_age_frames_ >= options_.local_frames || last_inliers_.empty()) {
+    CollectLocal(map, camera_from_map);
+    local_age_frames_ = 0;
+  }
+  if (panorama_ != kNoId && (!same_map || panorama_ != local_panorama_)) {
+    CollectPanorama(map);
+    local_panorama_ = panorama_;
+  }
+  local_map_ = &map;
+  local_revision_ = map.revision;
+  Project(local_, camera_from_map);
+  AddCandidates(camera_from_map, static_cast<std::size_t>(options_.max_fine), random);
+  if (panorama_ == kNoId) return;
+  Project(local_infinite_, camera_from_map);
+  AddCandidates(camera_from_map, static_cast<std::size_t>(options_.max_infinite), random);
 }
 
 void MapTracker::Search(const std::vector<std::uint32_t>& which, const ImageFeatures& features, float radius,
@@ -170,7 +240,7 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   if (effort == Effort::kRecovery) {
     const auto recovered = PoseFromPatches(features, random);
     if (!recovered) return result;
-    last_inliers_.clear();
+    Forget();
     return Track(map, features, *recovered, Effort::kUsual, random);
   }
   const bool wide = effort == Effort::kWide;
@@ -194,40 +264,49 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
       RefinePose(*camera_, result.camera_from_map, options_.refinement, &measurements_, &scratch_);
   result.camera_from_map = fine.camera_from_map;
   result.covariance = fine.covariance;
+  result.observed = fine.observed;
   result.converged = fine.converged;
   result.sigma = fine.sigma;
-  result.inliers = 0;
+  CountInliers(&result);
+  return result;
+}
 
+void MapTracker::CountInliers(MapTrackResult* result) {
   std::bitset<kCellsAcross * kCellsAcross> cells;
+  std::array<int, kCoverageColumns * kCoverageRows> finite{}, all{};
   scratch_.clear();
+  last_inliers_.clear();
   std::size_t match = 0;
   for (Attempt& attempt : attempts_) {
     if (!attempt.found) continue;
     const PoseMeasurement& measurement = measurements_[match];
     attempt.inlier = matches_[match].inlier = measurement.weight > options_.refinement.min_weight;
-    if (attempt.inlier) {
-      ++result.inliers;
-      const int column = std::clamp(
-          static_cast<int>(measurement.pixel.x() * kCellsAcross / camera_->width_px()), 0, kCellsAcross - 1);
-      const int row = std::clamp(
-          static_cast<int>(measurement.pixel.y() * kCellsAcross / camera_->height_px()), 0, kCellsAcross - 1);
-      cells.set(static_cast<std::size_t>(row * kCellsAcross + column));
-      scratch_.push_back((result.camera_from_map * measurement.point_in_map).z());
-    }
     ++match;
-  }
-  last_inliers_.clear();
-  for (const Attempt& attempt : attempts_) {
-    if (attempt.inlier) last_inliers_.push_back(attempt.point);
+    if (!attempt.inlier) continue;
+    ++result->inliers;
+    cells.set(CellOf(measurement.pixel, *camera_, kCellsAcross, kCellsAcross));
+    const std::size_t cell = CellOf(measurement.pixel, *camera_, kCoverageColumns, kCoverageRows);
+    ++all[cell];
+    last_inliers_.push_back(attempt.point);
+    if (measurement.point_in_map[3] == 0) continue;
+    ++result->finite_inliers;
+    ++finite[cell];
+    scratch_.push_back((result->camera_from_map * measurement.point_in_map).z());
   }
   std::sort(last_inliers_.begin(), last_inliers_.end());
-  result.occupied_cells = static_cast<int>(cells.count());
+  result->occupied_cells = static_cast<int>(cells.count());
+  const auto share = [&](const auto& counts) {
+    return static_cast<double>(std::count_if(counts.begin(), counts.end(),
+                                             [&](int n) { return n >= options_.min_points_a_cell; })) /
+           static_cast<double>(counts.size());
+  };
+  result->finite_coverage = share(finite);
+  result->coverage = share(all);
   if (!scratch_.empty()) {
     const auto middle = scratch_.begin() + static_cast<std::ptrdiff_t>(scratch_.size() / 2);
     std::nth_element(scratch_.begin(), middle, scratch_.end());
-    result.median_depth = *middle;
+    result->median_depth = *middle;
   }
-  return result;
 }
 
 }  // namespace docent::engine

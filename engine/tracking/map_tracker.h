@@ -21,11 +21,14 @@ struct MapTrackerOptions {
   int max_recovery = 220;            // patches of the upper levels looked for after a loss
   double recovery_inlier_px = 5;     // level 0: corners of upper levels are that coarse
   int max_fine = 600;                // ptamm §2.1 allows 1000; beyond 600 the pose gains nothing that shows
+  int local_frames = 6;              // for which the choice of points near the camera is good
   std::size_t local_keyframes = 20;  // whose points are looked for: those that share most with the last frame
   float coarse_radius_px = 30;       // level 0, about the prediction
   float wide_radius_px = 70;         // the second try before a frame is called lost
   float fine_radius_px = 7;          // after a coarse pose
   float fine_radius_alone_px = 14;   // when the coarse stage had nothing to say
+  int max_infinite = 250;            // of the points, where a panorama map is enabled
+  int min_points_a_cell = 2;  // for a cell of the coverage grid to count as covered (hybrid-slam §4.1)
   SearchOptions search;
   PoseRefinementOptions refinement;
 };
@@ -33,7 +36,12 @@ struct MapTrackerOptions {
 struct MapTrackResult {
   Rigid3 camera_from_map;
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  ObservedMotion observed = ObservedMotion::kSixDof;
   int attempted = 0, found = 0, inliers = 0;
+  int finite_inliers = 0;  // of the inliers
+  // Shares of a 4x3 grid over the picture in which enough inliers lie, finite ones and all (hybrid-slam
+  // §4.1).
+  double finite_coverage = 0, coverage = 0;
   int coarse_attempted = 0, coarse_found = 0;
   double sigma = 0;        // robust, of the normalised residuals
   int occupied_cells = 0;  // of a 4x4 grid over the picture: how well the inliers are spread
@@ -66,17 +74,33 @@ class MapTracker {
   const std::vector<Attempt>& attempts() const { return attempts_; }
   // To be called when another map is tracked from now on.
   void Clear();
+  // Infinite points of this panorama map are looked for from now on beside the finite points; kNoId for none.
+  void EnablePanorama(PanoramaId panorama) { panorama_ = panorama; }
+  PanoramaId panorama() const { return panorama_; }
   // The frame just tracked was not believed: the next one chooses its points by the guessed pose alone.
-  void Forget() { last_inliers_.clear(); }
+  void Forget() {
+    last_inliers_.clear();
+    local_map_ = nullptr;
+  }
 
  private:
+  // A point that may be looked for, with its source; both live in the snapshot that they were taken from.
+  struct LocalPoint {
+    const MapPoint* point;
+    const KeyFrame* source;
+  };
   struct Candidate {
     const MapPoint* point;
     const KeyFrame* source;
     PredictedPoint predicted;
   };
   void CollectLocal(const MapSnapshot& map, const Rigid3& camera_from_map);
+  void CollectPanorama(const MapSnapshot& map);
+  void TakePoints(const MapSnapshot& map, bool infinite);
   void CollectVisible(const MapSnapshot& map, const Rigid3& camera_from_map, Random* random);
+  void Project(const std::vector<LocalPoint>& points, const Rigid3& camera_from_map);
+  void AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random);
+  void CountInliers(MapTrackResult* result);
   void Search(const std::vector<std::uint32_t>& which, const ImageFeatures& features, float radius,
               bool direct);
   std::optional<Rigid3> PoseFromPatches(const ImageFeatures& features, Random* random);
@@ -85,14 +109,22 @@ class MapTracker {
   MapTrackerOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   PointSearcher searcher_;
+  PanoramaId panorama_ = kNoId;
   std::vector<PointMatch> matches_;
   std::vector<Attempt> attempts_;
   std::vector<MapPointId> last_inliers_;  // of the last frame, by ascending id
   // Scratch, kept to save allocations.
   std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
-  std::vector<MapPointId> local_;
-  std::vector<const MapPoint*> visible_;
-  std::vector<const KeyFrame*> sources_;
+  std::vector<MapPointId> ids_;
+  // What may be seen from about here, finite and infinite; taken anew when the map has changed and every few
+  // frames, as the camera goes on.
+  std::vector<LocalPoint> local_, local_infinite_;
+  const MapSnapshot* local_map_ = nullptr;
+  std::uint64_t local_revision_ = 0;
+  PanoramaId local_panorama_ = kNoId;
+  int local_age_frames_ = 0;
+  std::vector<LocalPoint> visible_;
+  std::vector<std::uint8_t> taken_;  // cells of the picture where finite points are expected
   std::vector<Candidate> candidates_;
   std::vector<std::uint32_t> coarse_, fine_;
   std::vector<std::uint32_t> measured_;  // candidate of each measurement

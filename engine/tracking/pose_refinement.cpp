@@ -37,6 +37,9 @@ Residual Evaluate(const CameraModel& camera, const Rigid3& camera_from_map,
   return residual;
 }
 
+// Fewer rays than this hold no rotation that is worth the name.
+constexpr std::ptrdiff_t kFewestInfinite = 8;
+
 double RobustSigma(std::vector<double>* squared_errors) {
   if (squared_errors->empty()) return 0;
   const auto middle = squared_errors->begin() + static_cast<std::ptrdiff_t>(squared_errors->size() / 2);
@@ -45,55 +48,80 @@ double RobustSigma(std::vector<double>* squared_errors) {
   return std::sqrt(*middle) / 1.1774;
 }
 
-}  // namespace
+// One kind of points, finite or infinite, in one iteration.
+struct Kind {
+  double sigma = 0;      // robust, of the normalised residuals
+  double threshold = 0;  // of the loss
+};
 
-PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
-                          const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          std::vector<double>* scratch) {
+Kind JudgeKind(const CameraModel& camera, const Rigid3& camera_from_map,
+               const std::vector<PoseMeasurement>& measurements, bool infinite,
+               const PoseRefinementOptions& options, bool tukey, std::vector<double>* scratch) {
+  scratch->clear();
+  for (const PoseMeasurement& measurement : measurements) {
+    const double w = measurement.point_in_map[3];
+    if ((w == 0) != infinite) continue;
+    const Eigen::Vector3d x = camera_from_map.rotation * Eigen::Vector3d(measurement.point_in_map.head<3>()) +
+                              w * camera_from_map.translation;
+    const auto pixel = camera.Project(x);
+    if (!pixel) continue;
+    scratch->push_back((measurement.pixel - *pixel).squaredNorm() * measurement.inverse_sigma *
+                       measurement.inverse_sigma);
+  }
+  Kind kind;
+  kind.sigma = RobustSigma(scratch);
+  kind.threshold = std::max(kind.sigma, options.min_sigma) * (tukey ? options.tukey_factor : 1.345);
+  return kind;
+}
+
+double LossWeight(double error, double threshold, bool tukey) {
+  if (!tukey) return error <= threshold ? 1 : threshold / error;
+  const double ratio = error / threshold;
+  return ratio < 1 ? (1 - ratio * ratio) * (1 - ratio * ratio) : 0;
+}
+
+// turn_only: the camera stays where it is, and only its rotation is estimated.
+PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const PoseRefinementOptions& options,
+                      bool turn_only, std::vector<PoseMeasurement>* measurements,
+                      std::vector<double>* scratch) {
   PoseRefinement result;
   result.camera_from_map = start;
   result.covariance.setZero();
   Matrix6 normal;
+  Kind kinds[2];  // finite, infinite
   for (int iteration = 0; iteration <= options.iterations; ++iteration) {
     // The last pass only weighs and counts at the final pose.
     const bool last = iteration == options.iterations;
-    scratch->clear();
-    for (const PoseMeasurement& measurement : *measurements) {
-      const double w = measurement.point_in_map[3];
-      const Eigen::Vector3d x =
-          result.camera_from_map.rotation * Eigen::Vector3d(measurement.point_in_map.head<3>()) +
-          w * result.camera_from_map.translation;
-      const auto pixel = camera.Project(x);
-      if (pixel) {
-        scratch->push_back((measurement.pixel - *pixel).squaredNorm() * measurement.inverse_sigma *
-                           measurement.inverse_sigma);
-      }
-    }
-    result.sigma = RobustSigma(scratch);
-    const double sigma = std::max(result.sigma, options.min_sigma);
     const bool tukey = iteration >= options.iterations / 2;
-    const double threshold = sigma * (tukey ? options.tukey_factor : 1.345);
-
+    for (const bool infinite : {false, true}) {
+      kinds[infinite] =
+          JudgeKind(camera, result.camera_from_map, *measurements, infinite, options, tukey, scratch);
+    }
     normal.setZero();
     Vector6 gradient = Vector6::Zero();
-    result.inliers = 0;
+    result.inliers = result.finite_inliers = 0;
     for (PoseMeasurement& measurement : *measurements) {
       const Residual residual = Evaluate(camera, result.camera_from_map, measurement);
-      if (!residual.valid) {
-        measurement.weight = 0;
-        continue;
+      const bool infinite = measurement.point_in_map[3] == 0;
+      measurement.weight = 0;
+      if (!residual.valid) continue;
+      measurement.weight = LossWeight(residual.error.norm(), kinds[infinite].threshold, tukey);
+      if (measurement.weight > options.min_weight) {
+        ++result.inliers;
+        result.finite_inliers += !infinite;
       }
-      const double error = residual.error.norm();
-      if (tukey) {
-        const double ratio = error / threshold;
-        measurement.weight = ratio < 1 ? (1 - ratio * ratio) * (1 - ratio * ratio) : 0;
-      } else {
-        measurement.weight = error <= threshold ? 1 : threshold / error;
-      }
-      if (measurement.weight > options.min_weight) ++result.inliers;
-      normal.noalias() += measurement.weight * residual.jacobian.transpose() * residual.jacobian;
-      gradient.noalias() += measurement.weight * residual.jacobian.transpose() * residual.error;
+      const double weight = measurement.weight * (infinite && !turn_only ? options.infinite_weight : 1.0);
+      normal.noalias() += weight * residual.jacobian.transpose() * residual.jacobian;
+      gradient.noalias() += weight * residual.jacobian.transpose() * residual.error;
     }
+    if (turn_only) {
+      // What little finite points are left must not drag the centre away.
+      normal.leftCols<3>().setZero();
+      normal.topRows<3>().setZero();
+      normal.topLeftCorner<3, 3>().diagonal().setConstant(normal.diagonal().maxCoeff());
+      gradient.head<3>().setZero();
+    }
+    result.sigma = result.finite_inliers > 0 && !turn_only ? kinds[0].sigma : kinds[1].sigma;
     if (last) break;
     const Eigen::LDLT<Matrix6> factor(normal);
     const Vector6 pivots = factor.vectorD();
@@ -105,7 +133,10 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
     const Vector6 update = factor.solve(gradient);
     result.camera_from_map = Rigid3::Exp(update) * result.camera_from_map;
     // Root mean square shift of the projections that this update made, in sigmas of their levels.
-    const double shift = std::sqrt(std::max(0.0, update.dot(normal * update)) / (result.inliers + 1.0));
+    const int infinite_inliers = result.inliers - result.finite_inliers;
+    const double counted =
+        result.finite_inliers + (turn_only ? 1.0 : options.infinite_weight) * infinite_inliers;
+    const double shift = std::sqrt(std::max(0.0, update.dot(normal * update)) / (counted + 1.0));
     // Tukey's weights may swing forever by a little; what no eye can see counts as standing still.
     result.converged = shift < 0.1;
     // Shifts too small to matter end the loop early, but Tukey must have had its say.
@@ -114,6 +145,32 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
   }
   const double sigma = std::max(result.sigma, options.min_sigma);
   result.covariance = sigma * sigma * normal.ldlt().solve(Matrix6::Identity());
+  if (turn_only) {
+    result.covariance.leftCols<3>().setZero();
+    result.covariance.topRows<3>().setZero();
+  }
+  return result;
+}
+
+}  // namespace
+
+PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
+                          const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
+                          std::vector<double>* scratch) {
+  const auto finite = std::count_if(measurements->begin(), measurements->end(),
+                                    [](const PoseMeasurement& m) { return m.point_in_map[3] != 0; });
+  const auto infinite = static_cast<std::ptrdiff_t>(measurements->size()) - finite;
+  const bool may_turn = infinite >= kFewestInfinite;
+  if (finite >= options.min_finite || !may_turn) {
+    PoseRefinement result = Refine(camera, start, options, false, measurements, scratch);
+    if (result.finite_inliers >= options.min_finite || !may_turn) {
+      result.observed =
+          result.inliers > result.finite_inliers ? ObservedMotion::kHybrid : ObservedMotion::kSixDof;
+      return result;
+    }
+  }
+  PoseRefinement result = Refine(camera, start, options, true, measurements, scratch);
+  result.observed = ObservedMotion::kPanorama;
   return result;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "engine/geometry/camera_model.h"
@@ -18,22 +19,38 @@ struct PoseMeasurement {
 };
 
 struct PoseRefinementOptions {
-  int iterations = 10;          // ptamm §2.1: ten are adequate
-  double tukey_factor = 4.685;  // times the robust sigma: 95 % efficiency under Gaussian noise
-  double min_sigma = 0.5;       // of the normalised residuals: below it the noise is better than the model
-  double min_weight = 1e-3;     // a measurement with less is an outlier
+  int iterations = 10;            // ptamm §2.1: ten are adequate
+  double tukey_factor = 4.685;    // times the robust sigma: 95 % efficiency under Gaussian noise
+  double min_sigma = 0.5;         // of the normalised residuals: below it the noise is better than the model
+  double min_weight = 1e-3;       // a measurement with less is an outlier
+  double infinite_weight = 0.01;  // of an infinite point beside finite ones (hybrid-slam §3.1)
+  // With fewer finite points there is no telling where the camera moved: beside infinite ones it is taken to
+  // have turned only (hybrid-slam §4.3).
+  int min_finite = 15;
+};
+
+// What the measurements could tell of the pose.
+enum class ObservedMotion : std::uint8_t {
+  kSixDof,    // rotation and translation, from finite points
+  kHybrid,    // the same, with infinite points beside
+  kPanorama,  // the rotation alone; the camera's centre is where it was at the start
 };
 
 struct PoseRefinement {
   Rigid3 camera_from_map;
-  Eigen::Matrix<double, 6, 6> covariance;  // of the left twist in the camera frame
-  double sigma = 0;                        // robust, of the normalised residuals
+  // Of the left twist in the camera frame; zero for a translation that was not estimated.
+  Eigen::Matrix<double, 6, 6> covariance;
+  ObservedMotion observed = ObservedMotion::kSixDof;
+  double sigma = 0;  // robust, of the normalised residuals
   int inliers = 0;
-  bool converged = false;  // also false where the measurements do not hold all six degrees of freedom
+  int finite_inliers = 0;  // of these
+  bool converged = false;  // also false where the measurements do not hold the degrees of freedom asked for
 };
 
-// Robust Gauss-Newton on reprojection errors from `start` (ptamm eq. 1-3): Huber while far away, Tukey for
-// the last iterations. Does not allocate beyond *scratch.
+// Robust Gauss-Newton on reprojection errors of finite and infinite points from `start` (ptamm eq. 1-3,
+// hybrid-slam eq. 1-2): Huber while far away, Tukey for the last iterations. The scale of the errors is
+// estimated for each kind by itself: what little translation does to infinite points is no noise of finite
+// ones. Does not allocate beyond *scratch.
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
                           std::vector<double>* scratch);

@@ -20,7 +20,8 @@ using ::testing::HasSubstr;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// Two keyframes with ids 2 and 5, points 3 (finite) and 7 (infinite), both seen by both.
+// Two keyframes with ids 2 and 5, the second turned about the first, points 3 (finite) and 7 (infinite), both
+// seen by both.
 MapSnapshot GoodMap() {
   MapSnapshot map;
   auto features = std::make_shared<ImageFeatures>();
@@ -32,12 +33,17 @@ MapSnapshot GoodMap() {
     keyframe.id = id;
     keyframe.camera = testing_world::PinholeCamera(64, 48);
     keyframe.features = features;
+    keyframe.panorama = 1;
+    keyframe.kind = id == 2 ? KeyFrameKind::kSixDof : KeyFrameKind::kPanorama;
     map.keyframes.push_back(keyframe);
   }
+  map.panoramas = {{1, 2}};
+  map.next_panorama = 2;
   for (const MapPointId id : {3u, 7u}) {
     MapPoint point;
     point.id = id;
     point.point_in_map = id == 3 ? Eigen::Vector4d(0.1, 0.2, 2, 1) : Eigen::Vector4d(0, 0.6, 0.8, 0);
+    if (id == 7) point.panorama = 1;
     point.source_keyframe = 2;
     point.source_level = 1;
     point.source_pixel = {31, 23};
@@ -69,6 +75,23 @@ TEST(MapSnapshot, FindsByIdAndKnowsWhatIsMissing) {
     EXPECT_EQ(map.FindKeyFrame(id), nullptr);
     EXPECT_EQ(map.FindPoint(id), nullptr);
   }
+}
+
+TEST(MapSnapshot, NamesThePanoramaMapThatIsWrong) {
+  ExpectComplaint([](MapSnapshot* m) { m->next_panorama = 1; }, "panorama map 1 is out of order");
+  ExpectComplaint([](MapSnapshot* m) { m->panoramas.push_back(m->panoramas[0]); },
+                  "panorama map 1 is out of order");
+  ExpectComplaint([](MapSnapshot* m) { m->panoramas[0].reference = 4; },
+                  "reference keyframe that is not there");
+  ExpectComplaint([](MapSnapshot* m) { m->panoramas[0].reference = 5; }, "does not belong to it");
+  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].panorama = kNoId; },
+                  "keyframe 5 names a panorama map that is not there");
+  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].panorama = 0; },
+                  "keyframe 5 names a panorama map that is not there");
+  ExpectComplaint([](MapSnapshot* m) { m->points[1].panorama = kNoId; },
+                  "point 7 names a panorama map that is not there");
+  ExpectComplaint([](MapSnapshot* m) { m->points[0].panorama = 1; },
+                  "point 3 names a panorama map that is not there");
 }
 
 TEST(MapSnapshot, NamesTheKeyframeThatIsWrong) {

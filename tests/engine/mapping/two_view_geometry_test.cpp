@@ -174,6 +174,41 @@ TEST(TwoViewGeometry, TurningAndMovingBeforeAWallGivesTheMotion) {
   EXPECT_GE(accepted, kSeeds - 2);
 }
 
+// A wall curved about the circle that the camera turns on: all points are equally far, so that a turn alone
+// explains nearly everything and only well-followed corners tell the difference.
+TEST(TwoViewGeometry, WellFollowedCornersOnAWallCurvedAboutTheCameraGiveTheMotion) {
+  const auto curved = [](const Eigen::Vector3d& ray, Random*) {
+    // |(0, 0, 0.05) + t ray| = 0.5 in the plane of the circle.
+    const double a = ray.x() * ray.x() + ray.z() * ray.z(), b = 0.05 * ray.z(), c = 0.05 * 0.05 - 0.25;
+    return (-b + std::sqrt(b * b - a * c)) / a;
+  };
+  int accepted = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    Random random(seed * 7919);
+    const double angle = Radians(25);
+    const TwoViews views =
+        MakeTwoViews(curved, Motion({0.05 * std::sin(angle), 0, 0.05 * std::cos(angle) - 0.05}, {0, -25, 0}),
+                     {.count = 400, .noise_px = 0.1}, &random);
+    const TwoViewResult result = Estimate(views, seed, 0);
+    if (!IsAccepted(result.verdict)) continue;
+    ++accepted;
+    EXPECT_LT(RotationErrorDeg(result.b_from_a, views.b_from_a), 0.4) << seed;
+    EXPECT_LT(DirectionErrorDeg(result.b_from_a, views.b_from_a), 8) << seed;
+  }
+  EXPECT_GE(accepted, kSeeds / 2);
+}
+
+TEST(TwoViewGeometry, AWellFollowedTurnIsRefusedThoughTheFocalLengthIsOnePercentWrong) {
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    for (const double turn_deg : {8.0, 16.0, 24.0}) {
+      Random random(seed * 7919);
+      const TwoViews views = MakeTwoViews(Volume(2, 6), Motion({0, 0, 0}, {1, turn_deg, 0}),
+                                          {.count = 400, .noise_px = 0.1, .focal_error = 1.01}, &random);
+      EXPECT_FALSE(IsAccepted(Estimate(views, seed, 0).verdict)) << seed << " " << turn_deg;
+    }
+  }
+}
+
 TEST(TwoViewGeometry, APlaneIsCalledAPlaneAndARoomIsNot) {
   int planes = 0, rooms = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {

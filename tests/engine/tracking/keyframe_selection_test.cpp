@@ -27,7 +27,7 @@ MapSnapshot MapWith(const std::vector<Rigid3>& poses) {
 
 MapTrackResult Tracked(int inliers, double median_depth) {
   MapTrackResult tracked;
-  tracked.inliers = tracked.found = inliers;
+  tracked.inliers = tracked.found = tracked.finite_inliers = inliers;
   tracked.attempted = inliers + 20;
   tracked.median_depth = median_depth;
   tracked.converged = true;
