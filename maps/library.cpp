@@ -36,7 +36,8 @@ void CheckName(const std::string& name) {
 }
 
 MapParts PartsOf(const engine::MapSnapshot& snapshot) {
-  return {MakeStoredKeyFrames(snapshot), snapshot.points, snapshot.observations};
+  return {MakeStoredKeyFrames(snapshot), snapshot.points, snapshot.observations, snapshot.panoramas,
+          snapshot.next_panorama};
 }
 
 ScenePart PartOf(const SceneRecord& scene) {

@@ -35,12 +35,14 @@ void MakeBackup(const Database& database, std::int64_t format) {
   }
 }
 
-// Format 2 keeps the thumbnails of each map in a row of their own.
-void AddThumbnails(const Database& database) {
+// Format 2 keeps the thumbnails of each map in a row of their own, and knows panorama maps.
+void UpgradeToFormat2(const Database& database) {
   CreateTable(database, "thumbnails");
   for (const MapInfo& info : ReadMapRows(database)) {
-    WithPlace(database, info,
-              [&] { WriteThumbnails(database, info.key, ThumbnailsFromPictures(database, info)); });
+    WithPlace(database, info, [&] {
+      WriteThumbnails(database, info.key, ThumbnailsFromPictures(database, info));
+      WritePanoramas(database, info.key, {});
+    });
   }
 }
 
@@ -58,7 +60,7 @@ void UpgradeFormat(const Database& database) {
   MakeBackup(database, format);
   Transaction transaction(database, Transaction::Kind::kWrite);
   // Another process may have been faster.
-  if (SchemaVersion(database) < kThumbnailsSince) AddThumbnails(database);
+  if (SchemaVersion(database) < 2) UpgradeToFormat2(database);
   SetSchemaVersion(database, kSchemaVersion);
   transaction.Commit();
 }
