@@ -300,6 +300,17 @@ std::int64_t Database::Changes() const {
   return sqlite3_changes64(connection_.get());
 }
 
+void Database::CopyTo(const fs::path& path) const {
+  Database copy(path.string(), false);
+  copy.OpenConnection(fs::absolute(path).string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+  copy.Execute("PRAGMA synchronous = FULL");
+  const std::unique_ptr<sqlite3_backup, int (*)(sqlite3_backup*)> backup(
+      sqlite3_backup_init(copy.connection_.get(), "main", connection_.get(), "main"), sqlite3_backup_finish);
+  if (!backup) Fail(copy.file_, copy.connection_.get(), sqlite3_extended_errcode(copy.connection_.get()));
+  const int result = sqlite3_backup_step(backup.get(), -1);
+  if (result != SQLITE_DONE) Fail(copy.file_, copy.connection_.get(), result);
+}
+
 bool Database::EndsWithWholePage() const {
   sqlite3_file* const file = OpenFile(connection_.get());
   sqlite3_int64 size = 0;

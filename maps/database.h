@@ -86,6 +86,10 @@ class Database {
   // may be on its way.) SQLite itself would take the missing bytes for zeros.
   bool EndsWithWholePage() const;
 
+  // Copies the whole file as it is now, log included, into a new one, which is on disk when this returns.
+  // Not inside a transaction.
+  void CopyTo(const std::filesystem::path& path) const;
+
   const std::string& file() const { return file_; }
   bool read_only() const { return read_only_; }
 

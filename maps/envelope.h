@@ -32,6 +32,8 @@ inline constexpr EnvelopeKind kKeyFrameTableKind = {{'D', 'K', 'F', 'R'}, "the t
 inline constexpr EnvelopeKind kPointTableKind = {{'D', 'P', 'N', 'T'}, "the table of points", 61};
 inline constexpr EnvelopeKind kObservationTableKind = {{'D', 'O', 'B', 'S'}, "the table of observations", 17};
 inline constexpr EnvelopeKind kSceneKind = {{'D', 'S', 'C', 'N'}, "the scene", 0};
+inline constexpr EnvelopeKind kPanoramaTableKind = {{'D', 'P', 'A', 'N'}, "the table of panorama maps", 0};
+inline constexpr EnvelopeKind kThumbnailTableKind = {{'D', 'T', 'H', 'M'}, "the table of thumbnails", 0};
 inline constexpr EnvelopeKind kPictureKind = {{'D', 'P', 'I', 'C'}, "the picture", 0};
 
 // Writes the head; the caller appends `count` records.

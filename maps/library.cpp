@@ -11,9 +11,11 @@
 #include "engine/base/error.h"
 #include "engine/vision/features.h"
 #include "maps/database.h"
+#include "maps/migration.h"
 #include "maps/rows.h"
 #include "maps/schema.h"
 #include "maps/snapshot_reader.h"
+#include "maps/thumbnail_rows.h"
 #include "maps/verify.h"
 
 namespace docent::maps {
@@ -34,7 +36,8 @@ void CheckName(const std::string& name) {
 }
 
 MapParts PartsOf(const engine::MapSnapshot& snapshot) {
-  return {MakeStoredKeyFrames(snapshot), snapshot.points, snapshot.observations};
+  return {MakeStoredKeyFrames(snapshot), snapshot.points, snapshot.observations, snapshot.panoramas,
+          snapshot.next_panorama};
 }
 
 ScenePart PartOf(const SceneRecord& scene) {
@@ -91,6 +94,7 @@ Database OpenDatabase(const std::filesystem::path& path, Access access, CreateIf
   if (create == CreateIfMissing::kYes && IsBlank(database)) CreateSchema(database);
   CheckIsLibrary(database);
   database.StartWriting();
+  UpgradeFormat(database);
   return database;
 }
 
@@ -193,6 +197,7 @@ class Library::Impl {
                       const std::vector<StoredKeyFrame>& stored_before, MapInfo* info) {
     WritePictures(database_, info->key, snapshot, parts.keyframes, stored_before);
     WriteParts(database_, info->key, parts);
+    WriteThumbnails(database_, info->key, MakeThumbnails(snapshot));
     info->revision = snapshot.revision;
     info->next_keyframe = snapshot.next_keyframe;
     info->next_point = snapshot.next_point;
@@ -272,6 +277,21 @@ SceneRecord Library::LoadScene(std::uint64_t key) const {
     SceneRecord scene;
     WithPlace(impl_->database(), impl_->Get(key), [&] { scene = impl_->ReadScene(key); });
     return scene;
+  });
+}
+
+void Library::LoadThumbnails(const TakeThumbnails& take) const {
+  impl_->Read([&] {
+    for (const MapInfo& info : ReadMapRows(impl_->database())) {
+      std::vector<KeyFrameThumbnail> thumbnails;
+      std::string problem;
+      try {
+        WithPlace(impl_->database(), info, [&] { thumbnails = ReadThumbnails(impl_->database(), info); });
+      } catch (const Error& error) {
+        problem = error.what();
+      }
+      take(info, std::move(thumbnails), problem);
+    }
   });
 }
 

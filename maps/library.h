@@ -11,6 +11,7 @@
 
 #include "maps/map_record.h"
 #include "maps/policy.h"
+#include "maps/thumbnail_array.h"
 
 // A library of maps: one SQLite file, NAME.docent (maps/README.md describes it).
 //
@@ -53,6 +54,11 @@ class Library {
   MapInfo FindByName(const std::string& name) const;  // throws when there is none
   StoredMap Load(std::uint64_t key) const;
   SceneRecord LoadScene(std::uint64_t key) const;
+  // Hands out what a place index needs of every map, by ascending key: a few kilobytes a keyframe, without
+  // touching points or pictures. A map whose thumbnails are damaged is told as an empty list and a sentence.
+  using TakeThumbnails = std::function<void(const MapInfo& info, std::vector<KeyFrameThumbnail> thumbnails,
+                                            const std::string& problem)>;
+  void LoadThumbnails(const TakeThumbnails& take) const;
 
   // A key that no map of this library has or ever had; reserved on disk, so that two processes never share
   // one.

@@ -25,7 +25,7 @@ bool SameKeyFrame(const StoredKeyFrame& stored_a, const StoredKeyFrame& stored_b
   const engine::KeyFrame& a = stored_a.keyframe;
   const engine::KeyFrame& b = stored_b.keyframe;
   return stored_a.picture_hash == stored_b.picture_hash && a.id == b.id && a.kind == b.kind &&
-         a.fixed == b.fixed && a.time == b.time &&
+         a.panorama == b.panorama && a.fixed == b.fixed && a.time == b.time &&
          a.camera_from_map.translation == b.camera_from_map.translation &&
          (a.camera_from_map.rotation.quaternion().coeffs() - b.camera_from_map.rotation.quaternion().coeffs())
                  .cwiseAbs()
@@ -34,7 +34,8 @@ bool SameKeyFrame(const StoredKeyFrame& stored_a, const StoredKeyFrame& stored_b
 }
 
 bool SamePoint(const engine::MapPoint& a, const engine::MapPoint& b) {
-  return a.id == b.id && a.point_in_map == b.point_in_map && a.source_keyframe == b.source_keyframe &&
+  return a.id == b.id && a.point_in_map == b.point_in_map && a.panorama == b.panorama &&
+         a.was_infinite == b.was_infinite && a.source_keyframe == b.source_keyframe &&
          a.source_level == b.source_level && a.source_pixel == b.source_pixel && a.normal == b.normal;
 }
 
@@ -259,6 +260,10 @@ bool SameStructure(const MapParts& a, const MapParts& b) {
   return std::equal(a.keyframes.begin(), a.keyframes.end(), b.keyframes.begin(), b.keyframes.end(),
                     SameKeyFrame) &&
          std::equal(a.points.begin(), a.points.end(), b.points.begin(), b.points.end(), SamePoint) &&
+         a.next_panorama == b.next_panorama &&
+         std::equal(
+             a.panoramas.begin(), a.panoramas.end(), b.panoramas.begin(), b.panoramas.end(),
+             [](const auto& p, const auto& q) { return p.id == q.id && p.reference == q.reference; }) &&
          std::equal(a.observations.begin(), a.observations.end(), b.observations.begin(),
                     b.observations.end(), SameObservation);
 }

@@ -32,6 +32,8 @@ struct MapParts {
   std::vector<StoredKeyFrame> keyframes;
   std::vector<engine::MapPoint> points;
   std::vector<engine::Observation> observations;
+  std::vector<engine::PanoramaMap> panoramas;
+  engine::PanoramaId next_panorama = 0;
 };
 
 // The text of a scene and the ids of its assets.

@@ -7,6 +7,8 @@
 
 #include "engine/base/error.h"
 #include "maps/checksum.h"
+#include "maps/panorama_codec.h"
+#include "maps/schema.h"
 
 namespace docent::maps {
 
@@ -195,6 +197,8 @@ MapParts ReadParts(const Database& database, const MapInfo& info) {
   parts.keyframes = DecodeKeyFrames(info.key, ReadPart(database, info.key, "keyframes"), cameras);
   parts.points = DecodePoints(info.key, ReadPart(database, info.key, "points"));
   parts.observations = DecodeObservations(info.key, ReadPart(database, info.key, "observations"));
+  if (SchemaVersion(database) >= kPanoramasSince)
+    DecodePanoramas(info.key, ReadPart(database, info.key, "panoramas"), &parts);
   if (parts.keyframes.size() != info.keyframes || parts.points.size() != info.points ||
       parts.observations.size() != info.observations) {
     throw Error("its keyframes, points or observations are fewer or more than its entry says");
@@ -208,6 +212,7 @@ void WriteParts(const Database& database, std::uint64_t key, const MapParts& par
   WritePart(database, key, "keyframes", EncodeKeyFrames(key, parts.keyframes, cameras));
   WritePart(database, key, "points", EncodePoints(key, parts.points));
   WritePart(database, key, "observations", EncodeObservations(key, parts.observations));
+  WritePanoramas(database, key, parts);
 }
 
 void ReadPictures(const Database& database, std::uint64_t key, const std::vector<StoredKeyFrame>& keyframes,
@@ -244,6 +249,10 @@ void WritePictures(const Database& database, std::uint64_t key, const engine::Ma
     remove.Reset();
     remove.Bind(1, Signed(key)).Bind(2, std::int64_t{id}).Run();
   }
+}
+
+void WritePanoramas(const Database& database, std::uint64_t key, const MapParts& parts) {
+  WritePart(database, key, "panoramas", EncodePanoramas(key, parts));
 }
 
 ScenePart ReadScenePart(const Database& database, std::uint64_t key) {
@@ -309,8 +318,9 @@ void RemoveUnusedAssets(const Database& database) {
 }
 
 void RemoveMapRows(const Database& database, std::uint64_t key) {
-  for (const char* sql : {"DELETE FROM maps WHERE key = ?", "DELETE FROM parts WHERE map_key = ?",
-                          "DELETE FROM pictures WHERE map_key = ?"}) {
+  for (const char* sql :
+       {"DELETE FROM maps WHERE key = ?", "DELETE FROM parts WHERE map_key = ?",
+        "DELETE FROM pictures WHERE map_key = ?", "DELETE FROM thumbnails WHERE map_key = ?"}) {
     database.Prepare(sql).Bind(1, Signed(key)).Run();
   }
 }

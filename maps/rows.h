@@ -35,6 +35,8 @@ std::optional<std::uint64_t> FindMapByName(const Database& database, const std::
 // Keyframes, points and observations without pictures; the counts agree with `info`.
 MapParts ReadParts(const Database& database, const MapInfo& info);
 void WriteParts(const Database& database, std::uint64_t key, const MapParts& parts);
+// The part that WriteParts writes as well: for upgrading a map that has none.
+void WritePanoramas(const Database& database, std::uint64_t key, const MapParts& parts);
 // Hands the bytes of each keyframe's picture to `take`, in the keyframes' order; every keyframe has one.
 using TakePicture = std::function<void(std::size_t keyframe_index, std::span<const std::uint8_t> bytes)>;
 void ReadPictures(const Database& database, std::uint64_t key, const std::vector<StoredKeyFrame>& keyframes,

@@ -13,17 +13,18 @@ namespace docent::maps {
 namespace {
 
 struct Table {
+  std::int64_t since;  // format
   const char* name;
   const char* sql;
 };
 
 // Never edited: a change of the tables is a new schema version and a step that upgrades to it.
-constexpr std::array<Table, 5> kTables = {{
-    {"library",
+constexpr std::array<Table, 6> kTables = {{
+    {1, "library",
      "CREATE TABLE library (id INTEGER PRIMARY KEY CHECK (id = 1), next_key INTEGER NOT NULL, map_count "
      "INTEGER NOT "
      "NULL, checksum INTEGER NOT NULL) STRICT"},
-    {"maps",
+    {1, "maps",
      "CREATE TABLE maps (key INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, policy TEXT NOT NULL, "
      "created_ns INTEGER "
      "NOT NULL, modified_ns INTEGER NOT NULL, revision INTEGER NOT NULL, next_keyframe INTEGER NOT NULL, "
@@ -31,18 +32,20 @@ constexpr std::array<Table, 5> kTables = {{
      "INTEGER NOT NULL, keyframe_count INTEGER NOT NULL, point_count INTEGER NOT NULL, observation_count "
      "INTEGER NOT "
      "NULL, bounds BLOB, checksum INTEGER NOT NULL) STRICT"},
-    {"parts",
+    {1, "parts",
      "CREATE TABLE parts (map_key INTEGER NOT NULL, part TEXT NOT NULL, data BLOB NOT NULL, PRIMARY KEY "
      "(map_key, "
      "part)) STRICT"},
-    {"pictures",
+    {1, "pictures",
      "CREATE TABLE pictures (map_key INTEGER NOT NULL, keyframe INTEGER NOT NULL, data BLOB NOT NULL, "
      "PRIMARY KEY "
      "(map_key, keyframe)) STRICT"},
-    {"assets",
+    {1, "assets",
      "CREATE TABLE assets (id TEXT PRIMARY KEY, name TEXT NOT NULL, data BLOB NOT NULL, checksum INTEGER NOT "
      "NULL) "
      "STRICT"},
+    {kThumbnailsSince, "thumbnails",
+     "CREATE TABLE thumbnails (map_key INTEGER PRIMARY KEY, data BLOB NOT NULL) STRICT"},
 }};
 
 }  // namespace
@@ -58,8 +61,22 @@ void CreateSchema(const Database& database) {
   for (const Table& table : kTables) database.Execute(table.sql);
   WriteLibraryRow(database, {});
   database.Execute(("PRAGMA application_id = " + std::to_string(kApplicationId)).c_str());
-  database.Execute(("PRAGMA user_version = " + std::to_string(kSchemaVersion)).c_str());
+  SetSchemaVersion(database, kSchemaVersion);
   transaction.Commit();
+}
+
+std::int64_t SchemaVersion(const Database& database) {
+  return database.Number("PRAGMA user_version");
+}
+
+void SetSchemaVersion(const Database& database, std::int64_t version) {
+  database.Execute(("PRAGMA user_version = " + std::to_string(version)).c_str());
+}
+
+void CreateTable(const Database& database, std::string_view name) {
+  for (const Table& table : kTables) {
+    if (table.name == name) database.Execute(table.sql);
+  }
 }
 
 void CheckIsLibrary(const Database& database) {
@@ -69,7 +86,7 @@ void CheckIsLibrary(const Database& database) {
   if (database.Number("PRAGMA application_id") != kApplicationId) {
     throw Error(file + " is not a library of maps (it is an SQLite file of another program)");
   }
-  const std::int64_t version = database.Number("PRAGMA user_version");
+  const std::int64_t version = SchemaVersion(database);
   if (version > kSchemaVersion) {
     throw Error(file + " was written by a newer Docent (format " + std::to_string(version) +
                 "; this program knows formats up to " + std::to_string(kSchemaVersion) +
@@ -79,15 +96,18 @@ void CheckIsLibrary(const Database& database) {
   if (!database.EndsWithWholePage())
     throw Error(file + " is damaged: it is cut off; use a copy of it that is whole");
   Statement entries = database.Prepare("SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL");
-  std::size_t found = 0;
+  std::size_t found = 0, expected = 0;
+  for (const Table& table : kTables) expected += table.since <= version ? 1 : 0;
   while (entries.Step()) {
     const std::string type = entries.Text(0), name = entries.Text(1), sql = entries.Text(2);
     bool known = false;
-    for (const Table& table : kTables) known |= type == "table" && name == table.name && sql == table.sql;
+    for (const Table& table : kTables) {
+      known |= table.since <= version && type == "table" && name == table.name && sql == table.sql;
+    }
     if (!known) throw Error(file + " is damaged: its table '" + name + "' is not one of a library of maps");
     ++found;
   }
-  if (found != kTables.size()) throw Error(file + " is damaged: a table of the library is missing");
+  if (found != expected) throw Error(file + " is damaged: a table of the library is missing");
 }
 
 }  // namespace docent::maps

@@ -75,6 +75,8 @@ std::shared_ptr<const engine::MapSnapshot> ReadSnapshot(
   snapshot->next_point = info.next_point;
   snapshot->points = std::move(parts.points);
   snapshot->observations = std::move(parts.observations);
+  snapshot->panoramas = std::move(parts.panoramas);
+  snapshot->next_panorama = parts.next_panorama;
   for (const StoredKeyFrame& stored : parts.keyframes) snapshot->keyframes.push_back(stored.keyframe);
   const int useful = std::clamp(static_cast<int>(parts.keyframes.size()), 1, std::max(1, threads));
   ReadFeatures(database, info.key, parts.keyframes, make_features, useful, snapshot.get());

@@ -7,7 +7,9 @@
 
 #include "engine/base/error.h"
 #include "maps/rows.h"
+#include "maps/schema.h"
 #include "maps/snapshot_reader.h"
+#include "maps/thumbnail_rows.h"
 
 namespace docent::maps {
 
@@ -70,6 +72,15 @@ std::vector<MapInfo> ReadableMaps(const Database& database, Report* report) {
   return maps;
 }
 
+void CheckThumbnails(const Database& database, const MapInfo& info) {
+  const std::vector<KeyFrameThumbnail> thumbnails = ReadThumbnails(database, info);
+  const std::vector<StoredKeyFrame> keyframes = ReadParts(database, info).keyframes;
+  for (std::size_t i = 0; i < thumbnails.size(); ++i) {
+    if (thumbnails[i].keyframe != keyframes[i].keyframe.id)
+      throw Error("its thumbnails are those of other keyframes");
+  }
+}
+
 void CheckMap(const Database& database, const MapInfo& info, int threads,
               std::set<std::string>* wanted_assets, Report* report) {
   report->Try(
@@ -80,6 +91,9 @@ void CheckMap(const Database& database, const MapInfo& info, int threads,
       wanted_assets->insert(scene.asset_ids.begin(), scene.asset_ids.end());
     });
   });
+  if (SchemaVersion(database) >= kThumbnailsSince) {
+    report->Try([&] { WithPlace(database, info, [&] { CheckThumbnails(database, info); }); });
+  }
   report->Try([&] {
     Statement count = database.Prepare("SELECT count(*) FROM pictures WHERE map_key = ?");
     count.Bind(1, static_cast<std::int64_t>(info.key));
@@ -109,7 +123,9 @@ void CheckAssets(const Database& database, const std::set<std::string>& wanted, 
 
 // Rows of maps that are not there.
 void CheckStrays(const Database& database, Report* report) {
-  for (const char* table : {"parts", "pictures"}) {
+  std::vector<const char*> tables = {"parts", "pictures"};
+  if (SchemaVersion(database) >= kThumbnailsSince) tables.push_back("thumbnails");
+  for (const char* table : tables) {
     report->Try([&] {
       const std::int64_t strays = database.Number(std::string("SELECT count(*) FROM ") + table +
                                                   " WHERE map_key NOT IN (SELECT key FROM maps)");

@@ -44,6 +44,7 @@ struct RunArguments {
   std::optional<std::filesystem::path> output;  // folder
   std::optional<std::filesystem::path> record;  // video of the augmented view
   std::uint64_t seed = 1;
+  std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory
 };
 
 struct AuthorOptions {

@@ -110,9 +110,31 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
   AddPaceOption(command, &run->pace);
   AddEngineOption(command, &run->engine);
   AddSeedOption(command, &run->seed);
+  AddMemoryOption(command, &run->memory_budget_bytes);
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");
   command->add_option("--record", run->record, "Write the augmented view as a video")->type_name("FILE.mp4");
+}
+
+void AddMemoryOption(CLI::App* command, std::size_t* bytes) {
+  command
+      ->add_option_function<std::string>(
+          "--memory-budget",
+          [=](const std::string& text) {
+            constexpr std::pair<std::string_view, int> kUnits[] = {{"KiB", 10}, {"MiB", 20}, {"GiB", 30}};
+            constexpr std::int64_t kMax = 1
+                                          << 20;  // of any unit: far from where the product would wrap round
+            for (const auto& [unit, shift] : kUnits) {
+              if (!text.ends_with(unit)) continue;
+              const auto number = ParseInteger(text.substr(0, text.size() - unit.size()));
+              if (!number || *number < 1 || *number > kMax) break;
+              *bytes = static_cast<std::size_t>(*number) << shift;
+              return;
+            }
+            throw CLI::ValidationError("--memory-budget", "'" + text + "' is no size such as 512MiB or 1GiB");
+          },
+          "Memory for maps; those not used for longest make room (default 1GiB)")
+      ->type_name("SIZE");
 }
 
 void CheckRunArguments(const RunArguments& run) {

@@ -13,6 +13,7 @@ namespace docent::app {
 void AddPaceOption(CLI::App* command, std::optional<Pace>* pace);
 void AddEngineOption(CLI::App* command, EngineKind* engine);
 void AddSeedOption(CLI::App* command, std::uint64_t* seed);
+void AddMemoryOption(CLI::App* command, std::size_t* bytes);
 // --camera, --calibration, --camera-format, --from, --until and all of the above, --headless, --output,
 // --record.
 void AddRunArguments(CLI::App* command, RunArguments* run);

@@ -23,6 +23,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   request.pace = ResolvePace(options.run, camera.source->info().live);
   request.headless = options.run.headless;
   request.seed = options.run.seed;
+  request.memory_budget_bytes = options.run.memory_budget_bytes;
   request.output = options.run.output;
   request.record = options.run.record;
   request.record_script = options.record_script;
@@ -44,6 +45,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   request.pace = ResolvePace(options.run, camera.source->info().live);
   request.headless = options.run.headless;
   request.seed = options.run.seed;
+  request.memory_budget_bytes = options.run.memory_budget_bytes;
   request.output = options.run.output;
   request.record = options.run.record;
   std::uint64_t frames = 0, named = 0;

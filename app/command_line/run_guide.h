@@ -24,6 +24,7 @@ struct GuideRequest {
   Pace pace = Pace::kEager;
   bool headless = false;
   std::uint64_t seed = 1;
+  std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory
   std::optional<std::filesystem::path> output, record, record_script;
   std::vector<TimedCommand> script;
   std::string script_name;

@@ -44,21 +44,6 @@ Session::~Session() {
   }
 }
 
-void Session::LoadMaps() {
-  for (const maps::MapInfo& info : library_->List()) {
-    const maps::StoredMap stored = library_->Load(info.key);
-    SessionMap& map = maps_[info.key];
-    map.key = info.key;
-    map.name = info.name;
-    map.policy = info.policy;
-    map.bounds = info.bounds;
-    map.snapshot = map.saved_snapshot = stored.snapshot;
-    map.scene = map.saved_scene = std::make_shared<content::Scene>(
-        SceneFromRecord(stored.scene, library_->file() + ", map '" + info.name + "'", &assets_));
-    index_.SetMap(info.key, stored.snapshot);
-  }
-}
-
 void Session::AddEvent(Timestamp time, std::string event, std::string detail) {
   events_.push_back({time, std::move(event), std::move(detail)});
 }
@@ -93,7 +78,8 @@ void Session::FollowOrders(Camera* camera) {
 engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   Camera& camera = cameras_.at(static_cast<std::size_t>(frame.camera));
   FollowOrders(&camera);
-  engine::TrackedFrame tracked = camera.tracker->Track(frame, &index_);
+  engine::TrackedFrame tracked =
+      camera.tracker->Track(frame, pager_ ? static_cast<const engine::PlaceFinder*>(&*pager_) : &index_);
   React(&camera, &tracked);
   if (options_.may_write) {
     OfferToMapper(&camera, tracked);
@@ -124,6 +110,8 @@ void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
   const std::uint64_t before = std::exchange(camera->map_key, key);
   const SessionMap& map = maps_.at(key);
   AddEvent(time, "map", "entered " + map.name);
+  HoldMapsInUse();
+  ExpectNeighbours(map);
   if (!options_.may_write || growing_key_ == key) return;
   // The map before rests now: it is saved as it stands, and grows again when somebody comes back to it.
   if (const auto found = maps_.find(before); found != maps_.end() && !found->second.discarded) {

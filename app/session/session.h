@@ -19,6 +19,7 @@
 #include "app/session/session_map.h"
 #include "engine/tracking/tracker.h"
 #include "maps/library.h"
+#include "maps/map_pager.h"
 #include "maps/place_index.h"
 #include "maps/saver.h"
 
@@ -37,6 +38,7 @@ struct SessionOptions {
   Timestamp probation_loss = std::chrono::seconds(1);
   std::size_t probation_keyframes = 5;
   double signpost_height = 0.12;  // of the distance at which it is put up
+  maps::PagerOptions memory;      // how many of the library's maps are in memory at once
 };
 
 // What stands behind authoring, touring, evaluating and demonstrating alike: cameras that are tracked in the
@@ -53,8 +55,9 @@ struct SessionOptions {
 // for again under the same name, with an event that says why.
 class Session {
  public:
-  // library may be null (nothing is kept) and must outlive the session. Its maps are all loaded; throws Error
-  // when one of them does not hold. A session that may write needs a library opened for writing.
+  // library may be null (nothing is kept) and must outlive the session. Its maps are known from the start and
+  // read when they are wanted (see maps::MapPager); throws Error when one that is read at the start does not
+  // hold. A session that may write needs a library opened for writing.
   Session(const SessionOptions& options, std::vector<std::shared_ptr<const engine::CameraModel>> cameras,
           maps::Library* library);
   ~Session();
@@ -88,7 +91,7 @@ class Session {
     std::uint64_t key = 0;
     std::string name;
     maps::Policy policy = maps::Policy::kOpen;
-    std::shared_ptr<const engine::MapSnapshot> snapshot;  // may be null
+    std::shared_ptr<const engine::MapSnapshot> snapshot;  // null: not begun yet, or not in memory
     std::shared_ptr<const content::Scene> scene;
     bool discarded = false;
   };
@@ -115,6 +118,11 @@ class Session {
 
   // session.cpp
   void LoadMaps();
+  void KeepLoaded(const maps::StoredMap& stored);
+  bool LetGo(std::uint64_t key);
+  void BringToMemory(const Command& command);  // without mutex_
+  void HoldMapsInUse();
+  void ExpectNeighbours(const SessionMap& map);
   void FollowOrders(Camera* camera);
   void React(Camera* camera, engine::TrackedFrame* frame);
   void OfferToMapper(Camera* camera, const engine::TrackedFrame& frame);
@@ -169,7 +177,9 @@ class Session {
   std::optional<maps::Saver> saver_;  // with a library opened for writing
   std::exception_ptr save_failure_;
   bool finished_ = false;
-  MappingThread mapping_;  // last: its callback uses the rest
+  // Last, because their threads call back into the rest.
+  std::optional<maps::MapPager> pager_;  // with a library
+  MappingThread mapping_;
 };
 
 }  // namespace docent::app

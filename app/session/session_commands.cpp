@@ -28,10 +28,11 @@ const content::Entity& FindEntity(const content::Scene& scene, const std::string
 
 void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
                       const std::filesystem::path& model_folder) {
-  const std::scoped_lock lock(mutex_);
   if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
     throw Error("nothing can be changed on a tour; use docent author");
   }
+  BringToMemory(command);
+  const std::scoped_lock lock(mutex_);
   model_folder_ = model_folder;
   std::visit([&](const auto& chosen) { Carry(chosen, frame); }, command);
   AddEvent(frame.frame.time, "command", FormatCommand(command));
@@ -70,6 +71,7 @@ SessionMap& Session::AddMap(const std::string& name) {
   SessionMap& map = maps_[key];
   map.key = key;
   map.name = name;
+  map.changed = true;
   return map;
 }
 
@@ -140,6 +142,7 @@ void Session::Carry(const UseMap& command, const engine::TrackedFrame& frame) {
     camera.lost_since.reset();
     camera.order = Camera::Order::kGo;
   }
+  HoldMapsInUse();
   GrowOn(*map);
 }
 

@@ -21,14 +21,19 @@ struct SessionMap {
   std::uint64_t key = 0;
   std::string name;
   maps::Policy policy = maps::Policy::kOpen;
-  std::optional<maps::Bounds> bounds;                   // of a bounded map
-  std::shared_ptr<const engine::MapSnapshot> snapshot;  // null while its start is being looked for
+  std::optional<maps::Bounds> bounds;  // of a bounded map
+  std::shared_ptr<const engine::MapSnapshot>
+      snapshot;  // null while its start is looked for, or not in memory
   std::shared_ptr<const content::Scene> scene = std::make_shared<content::Scene>();  // never null
   content::EditHistory history;
 
   // What the library holds of it, or will hold when the saver has caught up; null when never saved.
   std::shared_ptr<const engine::MapSnapshot> saved_snapshot;
   std::shared_ptr<const content::Scene> saved_scene;
+
+  bool in_library =
+      false;             // it was there when the session began: without a snapshot it is merely not in memory
+  bool changed = false;  // in this session: it stays in memory until the end
 
   bool rests = false;  // the person stopped it: it grows no further until it is taken up again by name
 

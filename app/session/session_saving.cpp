@@ -21,6 +21,7 @@ void Session::SaveMap(SessionMap* map, Timestamp time) {
   if (content) record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*map->scene));
   map->saved_snapshot = map->snapshot;
   map->saved_scene = map->scene;
+  map->changed = true;
   saver_->Submit(std::move(record));
   AddEvent(time, "save",
            map->name + (structure ? ": " + std::to_string(map->snapshot->keyframes.size()) + " keyframes, " +

@@ -109,8 +109,8 @@ TEST_F(Damage, AnSqliteFileOfAnotherProgramIsRefused) {
 }
 
 TEST_F(Damage, ALibraryOfANewerProgramIsRefused) {
-  RunSql("PRAGMA user_version = 2");
-  ExpectRefused("written by a newer Docent (format 2;");
+  RunSql("PRAGMA user_version = 3");
+  ExpectRefused("written by a newer Docent (format 3;");
 }
 
 TEST_F(Damage, ALibraryWithOtherTablesIsRefused) {
@@ -172,6 +172,9 @@ TEST_F(Damage, VerifyNamesWhatIsDamaged) {
                 "the entry of map 2: its checksum does not match"},
       std::pair{"DELETE FROM parts WHERE part = 'scene' AND map_key = 1",
                 "map 'Desk' (1): its part 'scene' is missing"},
+      std::pair{"DELETE FROM thumbnails WHERE map_key = 2", "map 'Door' (2): its thumbnails are missing"},
+      std::pair{"UPDATE thumbnails SET data = (SELECT data FROM thumbnails WHERE map_key = 1)",
+                "map 'Door' (2): the table of thumbnails belongs to another map"},
       std::pair{"DELETE FROM assets", "the asset asset-3 is missing"},
       std::pair{"UPDATE assets SET data = x'00'", "asset 'model 3.glb' is damaged"},
       std::pair{"DELETE FROM maps WHERE key = 1", "it says it has 2 maps but 1 are there"},

@@ -8,6 +8,8 @@
 #include "engine/base/random.h"
 #include "maps/checksum.h"
 #include "maps/envelope.h"
+#include "maps/panorama_codec.h"
+#include "maps/thumbnail_rows.h"
 #include "tests/maps/map_samples.h"
 
 namespace docent::maps {
@@ -101,10 +103,51 @@ TEST(MapCodec, APictureOfAnotherSizeOrContentIsRefusedBeforeItIsUnpacked) {
   EXPECT_THAT(ErrorOf([&] { DecodePicture(7, other, bytes); }), HasSubstr("not the one that was saved"));
 }
 
+TEST(MapCodec, PanoramaMapsAreBelievedOnlyWhereTheirMembersAre) {
+  const auto map = MakeSampleMap(1, {.keyframes = 6, .points = 40});
+  const MapParts parts = {MakeStoredKeyFrames(*map), map->points, map->observations, map->panoramas,
+                          map->next_panorama};
+  MapParts without = parts;
+  without.panoramas.clear();
+  without.next_panorama = 0;
+  for (StoredKeyFrame& stored : without.keyframes) stored.keyframe.panorama = engine::kNoId;
+  for (engine::MapPoint& point : without.points) {
+    point.panorama = engine::kNoId;
+    point.was_infinite = false;
+  }
+  const Bytes bytes = EncodePanoramas(7, parts);
+  MapParts decoded = without;
+  DecodePanoramas(7, bytes, &decoded);
+  EXPECT_TRUE(SameStructure(decoded, parts));
+  EXPECT_FALSE(SameStructure(without, parts));
+  for (const std::uint64_t count : {std::uint64_t{7}, std::uint64_t{1} << 60, ~std::uint64_t{0}}) {
+    decoded = without;
+    EXPECT_THROW(DecodePanoramas(7, Forged(bytes, 16, count), &decoded), Error);
+  }
+  MapParts fewer = without;
+  fewer.points.pop_back();  // the last one is infinite
+  EXPECT_THAT(ErrorOf([&] { DecodePanoramas(7, bytes, &fewer); }), HasSubstr("names what is not there"));
+}
+
+TEST(MapCodec, ThumbnailsAreBelievedOnlyWhenTheirBytesAreThere) {
+  const std::vector<KeyFrameThumbnail> thumbnails = {{2, {3, 2, {1, -2, 3, -4, 5, -6}}}, {5, {1, 1, {127}}}};
+  const Bytes bytes = EncodeThumbnails(7, thumbnails);
+  EXPECT_EQ(DecodeThumbnails(7, bytes), thumbnails);
+  for (const std::uint64_t count : {std::uint64_t{1}, std::uint64_t{3}, ~std::uint64_t{0}})
+    EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 16, count)), Error);
+  EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 24, std::uint32_t{5})), Error) << "twice the same keyframe";
+  EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 28, std::uint16_t{0})), Error);
+  EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 28, std::uint16_t{0xFFFF})), Error);
+}
+
 TEST(MapCodec, AMapThatIsReadAndWrittenAgainAndAgainHasNotChanged) {
   Random random(3);
   const engine::MapSnapshot sample = *MakeSampleMap(1, {.keyframes = 1});
-  const StoredKeyFrame pattern = MakeStoredKeyFrames(sample)[0];
+  const StoredKeyFrame pattern = [&] {
+    StoredKeyFrame keyframe = MakeStoredKeyFrames(sample)[0];
+    keyframe.keyframe.panorama = engine::kNoId;  // is kept elsewhere
+    return keyframe;
+  }();
   MapParts first;
   for (int i = 0; i < 20'000; ++i) {
     StoredKeyFrame stored = pattern;

@@ -23,6 +23,8 @@ using engine::MapSnapshot;
 
 namespace {
 
+constexpr engine::PanoramaId kSamplePanorama = 3;  // the one of each map, about its first keyframe
+
 cv::Mat MakePicture(std::uint64_t seed, int width_px, int height_px) {
   Random random(seed);
   cv::Mat gray(height_px, width_px, CV_8UC1);
@@ -58,6 +60,7 @@ KeyFrame MakeKeyFrame(engine::KeyFrameId id, const Eigen::Vector3d& center, std:
   KeyFrame keyframe;
   keyframe.id = id;
   keyframe.kind = id % 5 == 4 ? engine::KeyFrameKind::kPanorama : engine::KeyFrameKind::kSixDof;
+  if (keyframe.kind == engine::KeyFrameKind::kPanorama) keyframe.panorama = kSamplePanorama;
   keyframe.fixed = id == 0;
   keyframe.time = Timestamp(1'000'000'007 * static_cast<std::int64_t>(id + 1));
   keyframe.camera_from_map.rotation = engine::Rotation3::Exp(RandomVector(random, 1.0));
@@ -73,7 +76,8 @@ bool Same(const KeyFrame& a, const KeyFrame& b) {
   const cv::Mat& picture_a = a.features->levels[0];
   const cv::Mat& picture_b = b.features->levels[0];
   // A rotation is normalized when it is read, which may move the last bit.
-  return a.id == b.id && a.kind == b.kind && a.fixed == b.fixed && a.time == b.time &&
+  return a.id == b.id && a.kind == b.kind && a.panorama == b.panorama && a.fixed == b.fixed &&
+         a.time == b.time &&
          a.camera_from_map.rotation.quaternion().coeffs().isApprox(
              b.camera_from_map.rotation.quaternion().coeffs(), 1e-15) &&
          a.camera_from_map.translation == b.camera_from_map.translation && a.mean_depth == b.mean_depth &&
@@ -96,12 +100,19 @@ std::shared_ptr<MapSnapshot> MakeSampleMap(std::uint64_t seed, const SampleOptio
     map->keyframes.push_back(MakeKeyFrame(id, center, random.Next(), cameras[i % 3 == 2 ? 1 : 0]));
   }
   map->next_keyframe = map->keyframes.empty() ? 0 : map->keyframes.back().id + 1;
+  if (!map->keyframes.empty()) {
+    map->panoramas.push_back({kSamplePanorama, map->keyframes.front().id});
+    map->next_panorama = kSamplePanorama + 2;
+    map->keyframes.front().panorama = kSamplePanorama;
+  }
   for (int i = 0; i < options.points && !map->keyframes.empty(); ++i) {
     MapPoint point;
     point.id = static_cast<engine::MapPointId>(2 * i);
     const Eigen::Vector3d position = RandomVector(random, 2.0);
     const bool infinite = i % 4 == 3;
     point.point_in_map << (infinite ? position.normalized() : position), infinite ? 0.0 : 1.0;
+    if (infinite) point.panorama = kSamplePanorama;
+    point.was_infinite = i % 8 == 2;
     point.source_keyframe = map->keyframes[random.Below(static_cast<std::uint32_t>(options.keyframes))].id;
     point.source_level = static_cast<std::uint8_t>(random.Below(engine::kPyramidLevels));
     const int scale = 1 << point.source_level;
@@ -146,6 +157,11 @@ std::shared_ptr<SceneRecord> MakeSampleScene(std::uint64_t seed, int assets) {
 std::string FirstDifference(const MapSnapshot& a, const MapSnapshot& b) {
   if (a.revision != b.revision) return "revision";
   if (a.next_keyframe != b.next_keyframe || a.next_point != b.next_point) return "next ids";
+  if (a.next_panorama != b.next_panorama || a.panoramas.size() != b.panoramas.size()) return "panorama maps";
+  for (std::size_t i = 0; i < a.panoramas.size(); ++i) {
+    if (a.panoramas[i].id != b.panoramas[i].id || a.panoramas[i].reference != b.panoramas[i].reference)
+      return "panorama map at index " + std::to_string(i);
+  }
   if (a.keyframes.size() != b.keyframes.size()) return "number of keyframes";
   if (a.points.size() != b.points.size()) return "number of points";
   if (a.observations.size() != b.observations.size()) return "number of observations";
@@ -155,7 +171,8 @@ std::string FirstDifference(const MapSnapshot& a, const MapSnapshot& b) {
   for (std::size_t i = 0; i < a.points.size(); ++i) {
     const MapPoint &p = a.points[i], &q = b.points[i];
     if (p.id != q.id || p.point_in_map != q.point_in_map || p.source_keyframe != q.source_keyframe ||
-        p.source_level != q.source_level || p.source_pixel != q.source_pixel || p.normal != q.normal) {
+        p.source_level != q.source_level || p.source_pixel != q.source_pixel || p.normal != q.normal ||
+        p.panorama != q.panorama || p.was_infinite != q.was_infinite) {
       return "point at index " + std::to_string(i);
     }
   }

@@ -111,6 +111,14 @@ TEST_P(EveryPolicy, IsAskedWhenAKeyframeMovesOrGoesAway) {
   changed->keyframes.clear();
   changed->points.clear();
   changed->observations.clear();
+  changed->panoramas.clear();
+  ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
+}
+
+TEST_P(EveryPolicy, IsAskedWhenAPanoramaMapOpens) {
+  auto changed = std::make_shared<engine::MapSnapshot>(*map_);
+  changed->panoramas.push_back({changed->next_panorama, changed->keyframes[1].id});
+  changed->keyframes[1].panorama = changed->next_panorama++;
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
 }
 

@@ -131,6 +131,15 @@ TEST(Session, KeepsWhatIsPlacedUndoneAndRedoneInTheLibrary) {
   const std::uint64_t keyframes = info.keyframes;
   const Seen seen = Feed(simulation, Pace::kEager, &session);
   EXPECT_GT(seen.poses, simulation->frame_count() / 3);
+
+  // The same where maps are read when they are wanted: by what the camera sees, or by their name.
+  tour.memory.read_at_start_bytes = 0;
+  Session seeing(tour, LensOf(*simulation), &library), naming(tour, LensOf(*simulation), &library);
+  EXPECT_EQ(seeing.Maps().at(0).snapshot, nullptr);
+  EXPECT_EQ(Feed(simulation, Pace::kEager, &seeing).poses, seen.poses);
+  EXPECT_EQ(seeing.Maps().at(0).scene->entities.size(), 3u);
+  naming.Execute(UseMap{"Desk"}, {});
+  EXPECT_NE(naming.Maps().at(0).snapshot, nullptr);
   EXPECT_EQ(library.FindByName("Desk").keyframes, keyframes);
 }
 

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "app/session/session.h"
+
+// Which of the library's maps are in memory: the pager reads and lets go, the session says what it has in
+// use.
+namespace docent::app {
+
+void Session::LoadMaps() {
+  for (const maps::MapInfo& info : library_->List()) {
+    SessionMap& map = maps_[info.key];
+    map.key = info.key;
+    map.name = info.name;
+    map.policy = info.policy;
+    map.bounds = info.bounds;
+    map.saved_scene = map.scene;
+    map.in_library = true;
+  }
+  maps::MapPager::Callbacks callbacks;
+  callbacks.loaded = [this](const maps::StoredMap& stored) { KeepLoaded(stored); };
+  callbacks.let_go = [this](std::uint64_t key) { return LetGo(key); };
+  callbacks.failed = [this](std::uint64_t, const std::string& problem) {
+    const std::scoped_lock lock(mutex_);
+    Timestamp time{};
+    for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
+    AddEvent(time, "warning", problem);
+  };
+  pager_.emplace(library_, &index_, options_.memory, std::move(callbacks));
+  pager_->Open();
+}
+
+void Session::KeepLoaded(const maps::StoredMap& stored) {
+  AssetCache assets;
+  {
+    const std::scoped_lock lock(mutex_);
+    assets = assets_;
+  }
+  // Models are decoded without the lock: frames go on meanwhile.
+  auto scene = std::make_shared<const content::Scene>(
+      SceneFromRecord(stored.scene, library_->file() + ", map '" + stored.info.name + "'", &assets));
+  const std::scoped_lock lock(mutex_);
+  assets_.merge(assets);
+  // A map that somebody else saved since the session began is not one of it.
+  const auto found = maps_.find(stored.info.key);
+  if (found == maps_.end() || found->second.changed) return;
+  SessionMap& map = found->second;
+  map.snapshot = map.saved_snapshot = stored.snapshot;
+  map.scene = map.saved_scene = std::move(scene);
+}
+
+bool Session::LetGo(std::uint64_t key) {
+  const std::scoped_lock lock(mutex_);
+  const auto found = maps_.find(key);
+  if (found == maps_.end()) return true;
+  SessionMap& map = found->second;
+  const bool used = std::any_of(cameras_.begin(), cameras_.end(),
+                                [&](const Camera& camera) { return camera.map_key == key; });
+  if (used || map.changed || map.NeedsSave() || key == growing_key_) return false;
+  map.snapshot.reset();
+  map.saved_snapshot.reset();
+  map.scene = map.saved_scene = std::make_shared<content::Scene>();
+  std::erase_if(assets_, [](const auto& asset) { return asset.second.use_count() == 1; });
+  return true;
+}
+
+// The map that a command names, where it works on the map itself.
+void Session::BringToMemory(const Command& command) {
+  const auto* use = std::get_if<UseMap>(&command);
+  const auto* policy = std::get_if<SetPolicy>(&command);
+  if (!pager_ || (!use && !policy)) return;
+  std::uint64_t key = 0;
+  {
+    const std::scoped_lock lock(mutex_);
+    const SessionMap* const map = FindByName(use ? use->name : policy->name);
+    if (map != nullptr && map->in_library && !map->snapshot) key = map->key;
+  }
+  if (key != 0) pager_->Load(key);
+}
+
+void Session::HoldMapsInUse() {
+  if (!pager_) return;
+  std::vector<std::uint64_t> keys;
+  for (const Camera& camera : cameras_) keys.push_back(camera.map_key);
+  pager_->Hold(keys);
+}
+
+// Where the signposts of a map point to, somebody will go.
+void Session::ExpectNeighbours(const SessionMap& map) {
+  if (!pager_) return;
+  std::vector<std::uint64_t> keys;
+  for (const content::Entity& entity : map.scene->entities) {
+    if (entity.kind != content::Entity::Kind::kSignpost || entity.signpost.to_map.empty()) continue;
+    const SessionMap* const neighbour = FindByName(entity.signpost.to_map);
+    if (neighbour != nullptr && neighbour->in_library) keys.push_back(neighbour->key);
+  }
+  pager_->Expect(keys);
+}
+
+}  // namespace docent::app

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/migration.h"
+
+#include <string>
+#include <system_error>
+
+#include "engine/base/error.h"
+#include "maps/rows.h"
+#include "maps/schema.h"
+#include "maps/thumbnail_rows.h"
+
+namespace docent::maps {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// A copy that is there already is an earlier one of the same format: it is kept, because it may be the only
+// one from before something went wrong.
+void MakeBackup(const Database& database, std::int64_t format) {
+  const fs::path path = BackupPath(fs::absolute(database.file()), format);
+  std::error_code error;
+  if (fs::exists(path, error)) return;
+  fs::path unfinished = path;
+  unfinished += ".part";
+  fs::remove(unfinished, error);
+  try {
+    database.CopyTo(unfinished);
+    fs::rename(unfinished, path);
+  } catch (const std::exception& problem) {
+    fs::remove(unfinished, error);
+    throw Error(database.file() +
+                " is of an older format and cannot be upgraded, because no copy of it can be " +
+                "made beside it (" + problem.what() + "); make room there, or open it read only");
+  }
+}
+
+// Format 2 keeps the thumbnails of each map in a row of their own, and knows panorama maps.
+void UpgradeToFormat2(const Database& database) {
+  CreateTable(database, "thumbnails");
+  for (const MapInfo& info : ReadMapRows(database)) {
+    WithPlace(database, info, [&] {
+      WriteThumbnails(database, info.key, ThumbnailsFromPictures(database, info));
+      WritePanoramas(database, info.key, {});
+    });
+  }
+}
+
+}  // namespace
+
+fs::path BackupPath(const fs::path& library, std::int64_t format) {
+  fs::path path = library;
+  path += ".format-" + std::to_string(format);
+  return path;
+}
+
+void UpgradeFormat(const Database& database) {
+  const std::int64_t format = SchemaVersion(database);
+  if (format == kSchemaVersion) return;
+  MakeBackup(database, format);
+  Transaction transaction(database, Transaction::Kind::kWrite);
+  // Another process may have been faster.
+  if (SchemaVersion(database) < 2) UpgradeToFormat2(database);
+  SetSchemaVersion(database, kSchemaVersion);
+  transaction.Commit();
+}
+
+}  // namespace docent::maps

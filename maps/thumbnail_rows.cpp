@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/thumbnail_rows.h"
+
+#include <string>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "maps/envelope.h"
+#include "maps/rows.h"
+#include "maps/schema.h"
+
+namespace docent::maps {
+
+Bytes EncodeThumbnails(std::uint64_t map_key, std::span<const KeyFrameThumbnail> thumbnails) {
+  ByteWriter writer = BeginEnvelope(kThumbnailTableKind, map_key, thumbnails.size());
+  for (const auto& [keyframe, thumbnail] : thumbnails) {
+    writer.Put(std::uint32_t{keyframe});
+    writer.Put(thumbnail.width);
+    writer.Put(thumbnail.height);
+    writer.PutBytes(
+        {reinterpret_cast<const std::uint8_t*>(thumbnail.pixels.data()), thumbnail.pixels.size()});
+  }
+  return FinishEnvelope(std::move(writer));
+}
+
+std::vector<KeyFrameThumbnail> DecodeThumbnails(std::uint64_t map_key, std::span<const std::uint8_t> bytes) {
+  auto [reader, count] = OpenEnvelope(kThumbnailTableKind, map_key, bytes);
+  constexpr std::size_t kSmallestRecord = 9;
+  if (count > reader.remaining() / kSmallestRecord)
+    throw Error("the table of thumbnails is damaged: its length does not match");
+  std::vector<KeyFrameThumbnail> thumbnails(count);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    auto& [keyframe, thumbnail] = thumbnails[i];
+    keyframe = reader.Get<std::uint32_t>();
+    thumbnail.width = reader.Get<std::uint16_t>();
+    thumbnail.height = reader.Get<std::uint16_t>();
+    const auto pixels = reader.GetBytes(std::size_t{thumbnail.width} * thumbnail.height);
+    if (reader.failed() || pixels.empty() || (i > 0 && thumbnails[i - 1].keyframe >= keyframe))
+      throw Error("the table of thumbnails is damaged: a thumbnail is not valid");
+    thumbnail.pixels.assign(pixels.begin(), pixels.end());
+  }
+  if (reader.remaining() != 0) throw Error("the table of thumbnails is damaged: its length does not match");
+  return thumbnails;
+}
+
+std::vector<KeyFrameThumbnail> MakeThumbnails(const engine::MapSnapshot& snapshot) {
+  std::vector<KeyFrameThumbnail> thumbnails;
+  thumbnails.reserve(snapshot.keyframes.size());
+  for (const engine::KeyFrame& keyframe : snapshot.keyframes) {
+    PackedThumbnail thumbnail = Pack(keyframe.features->small_blurry);
+    // Whoever made the features may have had no use for a thumbnail.
+    if (thumbnail.width == 0) thumbnail = Pack(engine::MakeSmallBlurryImage(keyframe.features->levels[0]));
+    thumbnails.push_back({keyframe.id, std::move(thumbnail)});
+  }
+  return thumbnails;
+}
+
+void WriteThumbnails(const Database& database, std::uint64_t key,
+                     std::span<const KeyFrameThumbnail> thumbnails) {
+  const Bytes bytes = EncodeThumbnails(key, thumbnails);
+  database.Prepare("INSERT OR REPLACE INTO thumbnails (map_key, data) VALUES (?, ?)")
+      .Bind(1, static_cast<std::int64_t>(key))
+      .Bind(2, std::span<const std::uint8_t>(bytes))
+      .Run();
+}
+
+std::vector<KeyFrameThumbnail> ReadThumbnails(const Database& database, const MapInfo& info) {
+  if (SchemaVersion(database) < kThumbnailsSince) return ThumbnailsFromPictures(database, info);
+  Statement query = database.Prepare("SELECT data FROM thumbnails WHERE map_key = ?");
+  query.Bind(1, static_cast<std::int64_t>(info.key));
+  if (!query.Step()) throw Error("its thumbnails are missing");
+  std::vector<KeyFrameThumbnail> thumbnails = DecodeThumbnails(info.key, query.Blob(0));
+  if (thumbnails.size() != info.keyframes) throw Error("its thumbnails are fewer or more than its keyframes");
+  return thumbnails;
+}
+
+std::vector<KeyFrameThumbnail> ThumbnailsFromPictures(const Database& database, const MapInfo& info) {
+  const MapParts parts = ReadParts(database, info);
+  std::vector<KeyFrameThumbnail> thumbnails(parts.keyframes.size());
+  ReadPictures(
+      database, info.key, parts.keyframes, [&](std::size_t index, std::span<const std::uint8_t> bytes) {
+        const cv::Mat gray = DecodePicture(info.key, parts.keyframes[index], bytes);
+        thumbnails[index] = {parts.keyframes[index].keyframe.id, Pack(engine::MakeSmallBlurryImage(gray))};
+      });
+  return thumbnails;
+}
+
+}  // namespace docent::maps

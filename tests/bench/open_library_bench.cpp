@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <benchmark/benchmark.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <opencv2/core.hpp>
+
+#include "engine/vision/features.h"
+#include "maps/library.h"
+#include "maps/place_index.h"
+
+// Opening a library of many maps for a tour: its entries and thumbnails are read and the place index is made;
+// maps stay on disk. 150 keyframes a map, of small pictures, whose thumbnails are as large as usual ones. The
+// library is written to the folder for temporary files first, 0.8 GB of it for 1000 maps.
+namespace docent::bench {
+namespace {
+
+constexpr int kKeyFramesOfAMap = 150;
+
+std::shared_ptr<const engine::MapSnapshot> MakeMap(int number) {
+  constexpr int kWidth = 80, kHeight = 64;
+  auto map = std::make_shared<engine::MapSnapshot>();
+  const engine::CameraModel::Intrinsics intrinsics{kWidth, kHeight, 70, 70, 40, 32};
+  const auto camera = std::make_shared<const engine::CameraModel>(engine::LensModel::kRadialTangential,
+                                                                  intrinsics, std::array<double, 5>{});
+  for (int i = 0; i < kKeyFramesOfAMap; ++i) {
+    cv::Mat gray(kHeight, kWidth, CV_8UC1);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x)
+        gray.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(
+            128 + 100 * std::sin(0.01 * (number + 1) * x) * std::cos(0.05 * (i + 1) + 0.1 * y));
+    }
+    auto features = std::make_shared<engine::ImageFeatures>();
+    features->levels[0] = gray;
+    for (std::size_t level = 1; level < features->levels.size(); ++level)
+      features->levels[level] = cv::Mat(kHeight >> level, kWidth >> level, CV_8UC1);
+    engine::KeyFrame keyframe;
+    keyframe.id = map->next_keyframe++;
+    keyframe.camera = camera;
+    keyframe.features = features;
+    map->keyframes.push_back(keyframe);
+  }
+  return map;
+}
+
+void OpenLibrary(benchmark::State& state) {
+  const std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("docent-bench-" + std::to_string(getpid()) + ".docent");
+  {
+    maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    for (int i = 0; i < state.range(0); ++i)
+      library.Save({library.NewKey(), "map " + std::to_string(i), maps::Policy::kOpen, MakeMap(i), nullptr});
+  }
+  std::size_t keyframes = 0;
+  for (auto _ : state) {
+    const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
+    maps::PlaceIndex index;
+    std::size_t wanted = 0;
+    for (const maps::MapInfo& info : library.List()) wanted += info.keyframes;
+    index.Reserve(wanted);
+    library.LoadThumbnails([&](const maps::MapInfo& info, std::vector<maps::KeyFrameThumbnail> thumbnails,
+                               const std::string&) { index.SetThumbnails(info.key, thumbnails); });
+    keyframes = index.keyframes();
+  }
+  state.counters["keyframes"] = static_cast<double>(keyframes);
+  state.counters["file_mb"] = static_cast<double>(std::filesystem::file_size(path)) * 1e-6;
+  std::filesystem::remove(path);
+}
+BENCHMARK(OpenLibrary)
+    ->ArgName("maps")
+    ->Arg(30)
+    ->Arg(1000)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime();
+
+}  // namespace
+}  // namespace docent::bench
