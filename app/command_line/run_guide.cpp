@@ -53,6 +53,7 @@ class GuideRun {
     loop_.model_folder = request.model_folder;
     loop_.inbox = &inbox_;
     loop_.refused = [this](const std::string& reason) { message_ = reason; };
+    loop_.trouble = [this](const std::string& sentence, Timestamp) { message_ = sentence; };
   }
 
   using Show = std::function<void(std::shared_ptr<const ShownFrame>)>;
@@ -198,6 +199,8 @@ CalibratedCamera OpenArgumentCamera(const RunArguments& run) {
   }
   CameraOptions options = run.cameras.options;
   options.seed = run.seed;
+  options.reconnect = true;
+  options.lock_controls_after = 30;  // a second: what automatic exposure takes to settle
   auto source = OpenCamera(run.cameras.sources.front(), options);
   if (run.cameras.from > Timestamp{} || run.cameras.until > Timestamp{}) {
     source = ClipSource(std::move(source), run.cameras.from, run.cameras.until);

@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "engine/base/error.h"
 
@@ -90,6 +91,29 @@ class Commander {
   Timestamp last_time_{};  // scripts never go back in time
 };
 
+// Hands on what a source lost before this picture, as its index tells. After an absence the index goes on
+// where it was, so that nothing is made up for the time in between.
+class GapReporter {
+ public:
+  void Report(const engine::Frame& frame, const std::function<void(const engine::TrackedFrame&)>& shown) {
+    const auto last = std::exchange(last_, std::pair(frame.index, frame.time));
+    if (!last || frame.index <= last->first + 1) return;
+    const std::uint64_t steps = frame.index - last->first;
+    for (std::uint64_t i = 1; i < steps; ++i) {
+      engine::TrackedFrame dropped;
+      dropped.frame.camera = frame.camera;
+      dropped.frame.index = last->first + i;
+      dropped.frame.time = last->second + (frame.time - last->second) * static_cast<std::int64_t>(i) /
+                                              static_cast<std::int64_t>(steps);
+      dropped.state = engine::TrackingState::kDropped;
+      shown(dropped);
+    }
+  }
+
+ private:
+  std::optional<std::pair<std::uint64_t, Timestamp>> last_;
+};
+
 void PreloadModels(const FrameLoopOptions& options, Session* session) {
   for (const TimedCommand& command : options.script) {
     try {
@@ -108,9 +132,17 @@ void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOption
   RealtimeClock clock(camera->source->info());
   std::optional<Timestamp> first_time;
   Commander commander(options, session);
+  GapReporter gaps;
+  std::string trouble;
   engine::Frame frame;
   while (!stop.stop_requested() && camera->source->Next(&frame)) {
     frame.camera = options.camera;
+    if (std::string now = camera->source->trouble(); now != trouble) {
+      trouble = std::move(now);
+      if (options.trouble) options.trouble(trouble, frame.time);
+    }
+    if (frame.picture.empty()) continue;
+    if (camera->source->info().live) gaps.Report(frame, shown);
     if (!first_time) {
       first_time = frame.time;
       camera->CheckPicture(frame.picture);

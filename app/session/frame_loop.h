@@ -51,6 +51,9 @@ struct FrameLoopOptions {
   // with one from the inbox (a script's fault ends the run instead). On the camera's thread; may be empty.
   std::function<void(const TimedCommand&)> carried_out;
   std::function<void(const std::string&)> refused;
+  // Told when the source has no pictures to give, with a sentence for the wearer and the time on its clock,
+  // and with an empty sentence when it is back. On the camera's thread; may be empty.
+  std::function<void(const std::string&, Timestamp)> trouble;
 };
 
 // Feeds the pictures of a source to a session until the source ends or stop is requested, carries out the
@@ -60,6 +63,9 @@ struct FrameLoopOptions {
 //   lockstep   one picture after the other; the session runs its mapper in between
 //   eager      as fast as the tracker is, but never further ahead of the mapper than a camera would be
 //   realtime   by the pictures' times; what is overtaken by its successor is dropped, as a camera drops it
+//
+// A live source drops by itself: what is missing between two of its pictures is handed on as dropped, each
+// frame with its time and no picture.
 void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,
                const std::function<void(const engine::TrackedFrame&)>& shown, const std::stop_token& stop);
 
