@@ -56,6 +56,8 @@ struct FrameLoopOptions {
   std::function<void(const std::string&, Timestamp)> trouble;
 };
 
+using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
+
 // Feeds the pictures of a source to a session until the source ends or stop is requested, carries out the
 // script's commands, and hands every frame on, dropped ones too. `shown` runs on the calling thread, which is
 // the camera's. Throws Error for what the source or a command's line has wrong; what was done before stands.
@@ -67,6 +69,21 @@ struct FrameLoopOptions {
 // A live source drops by itself: what is missing between two of its pictures is handed on as dropped, each
 // frame with its time and no picture.
 void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,
-               const std::function<void(const engine::TrackedFrame&)>& shown, const std::stop_token& stop);
+               const FrameCallback& shown, const std::stop_token& stop);
+
+// One of several cameras of a session.
+struct CameraRun {
+  CalibratedCamera* camera = nullptr;
+  FrameLoopOptions options;  // of one pace for all; options.camera is the place in the list
+  FrameCallback shown;       // on this camera's thread
+};
+
+// The same for several cameras side by side, until the first one's pictures end: the first on the calling
+// thread, each other on a thread of its own. In lockstep all take turns on the calling thread, by the times
+// of their pictures, which also hold them together in the other paces: none runs further ahead of the others
+// than one picture. Cameras whose first pictures lie more than ten seconds apart have clocks of their own:
+// they are taken to begin together, and times are the first camera's. The first fault stops all and is
+// thrown.
+void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const std::stop_token& stop);
 
 }  // namespace docent::app
