@@ -44,6 +44,7 @@ struct RunArguments {
   std::optional<std::filesystem::path> output;  // folder
   std::optional<std::filesystem::path> record;  // video of the augmented view
   std::uint64_t seed = 1;
+  double baseline_m = 0;  // measured between the two cameras; 0: not
 };
 
 struct AuthorOptions {
