@@ -267,4 +267,12 @@ void DrawHeadsUp(const View& view, Canvas* canvas) {
                bottom, canvas);
 }
 
+void DrawInsetFrame(const engine::TrackedFrame& tracked, const Inset& inset, Canvas* canvas) {
+  const double stroke = 3 * UnitPx(*canvas);
+  const Color color = engine::HasPose(tracked.state) ? QualityColor(tracked.quality_class) : kPoor;
+  canvas->Box({inset.x - stroke, inset.y - stroke},
+              {inset.x + inset.width - 1 + stroke, inset.y + inset.height - 1 + stroke}, stroke, color,
+              stroke);
+}
+
 }  // namespace docent::ui

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ui/canvas.h"
+#include "ui/inset.h"
 #include "ui/renderer.h"
 
 // The flat layers over the picture. Each adds to a canvas between its Begin and End; nothing here keeps
@@ -21,5 +22,8 @@ void DrawKeyFrames(const engine::MapSnapshot& map, const engine::CameraModel& ca
 // State, map, quality bar, hint and message; while there is no pose also the figure that invites the wearer
 // to search (a lens wandering over a compass) or to move (a camera gliding sideways).
 void DrawHeadsUp(const View& view, Canvas* canvas);
+
+// The frame around another camera's small picture: its colour says how that camera is tracked.
+void DrawInsetFrame(const engine::TrackedFrame& tracked, const Inset& inset, Canvas* canvas);
 
 }  // namespace docent::ui

@@ -16,13 +16,32 @@ RenderTarget& PictureTarget::Bind(int width_px, int height_px) {
   return *target_;
 }
 
+namespace {
+
+bool IsUsable(const cv::Mat& picture) {
+  return !picture.empty() && (picture.type() == CV_8UC3 || picture.type() == CV_8UC1);
+}
+
+}  // namespace
+
 void PictureTarget::DrawVideo(const cv::Mat& picture) {
-  const bool usable = !picture.empty() && (picture.type() == CV_8UC3 || picture.type() == CV_8UC1);
-  if (!usable) {
+  if (!IsUsable(picture)) {
     glClearColor(0.08f, 0.09f, 0.11f, 1.0f);
     glClear(GL_COLOR_BUFFER_BIT);
     return;
   }
+  DrawPicture(picture, {0, 0, target_->width_px(), target_->height_px()});
+}
+
+void PictureTarget::DrawInset(const cv::Mat& picture, const Inset& inset) {
+  if (target_ == nullptr || !IsUsable(picture)) return;
+  target_->BindForDrawing();
+  glViewport(inset.x, inset.y, inset.width, inset.height);
+  DrawPicture(picture, inset);
+  glViewport(0, 0, target_->width_px(), target_->height_px());
+}
+
+void PictureTarget::DrawPicture(const cv::Mat& picture, const Inset& area) {
   const int channels = picture.channels();
   // OpenGL skips whole pixels at the end of a row; the rare row step that is no multiple of a pixel is
   // packed.
@@ -49,7 +68,8 @@ void PictureTarget::DrawVideo(const cv::Mat& picture) {
   glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
   video_program_.Use();
-  glUniform2i(video_program_.Uniform("target_size"), target_->width_px(), target_->height_px());
+  glUniform2i(video_program_.Uniform("target_origin"), area.x, area.y);
+  glUniform2i(video_program_.Uniform("target_size"), area.width, area.height);
   glUniform1i(video_program_.Uniform("is_gray"), channels == 1);
   glBindVertexArray(empty_vertex_array_.name());
   glDisable(GL_BLEND);

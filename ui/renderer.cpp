@@ -40,6 +40,14 @@ void Renderer::Draw(const View& view) {
   if (view.overlay.hud) DrawHeadsUp(view, &impl_->canvas);
   target.BindForDrawing();
   impl_->canvas.End();
+  if (view.overlay.inset == nullptr || view.overlay.inset->frame.picture.empty()) return;
+  const cv::Mat& other = view.overlay.inset->frame.picture;
+  const Inset inset = PlaceInset(width_px, height_px, other.cols, other.rows);
+  impl_->picture.DrawInset(other, inset);
+  impl_->canvas.Begin(width_px, height_px);
+  DrawInsetFrame(*view.overlay.inset, inset, &impl_->canvas);
+  target.BindForDrawing();
+  impl_->canvas.End();
 }
 
 void Renderer::Present(int width_px, int height_px) {

@@ -19,6 +19,9 @@ struct Overlay {
   bool hud = true;         // state, map name, hint; the lost indicator while there is no pose
   std::string map_name;    // empty when there is none
   std::string message;     // one sentence at the bottom, empty for none
+  // The newest frame of another camera, shown small in a corner (see inset.h) in a frame whose colour is its
+  // state; null for none. May be of any size.
+  const engine::TrackedFrame* inset = nullptr;
 };
 
 // Everything of one picture: video, pose and content always belong to the same frame.

@@ -14,12 +14,14 @@ void main() {
 // texel by texel, so that it keeps its exact values.
 const char* const kVideoFragmentShader = R"glsl(#version 330 core
 uniform sampler2D video;
+uniform ivec2 target_origin;
 uniform ivec2 target_size;
 uniform bool is_gray;
 out vec4 color;
 void main() {
-  vec3 bgr = textureSize(video, 0) == target_size ? texelFetch(video, ivec2(gl_FragCoord.xy), 0).rgb
-                                                  : texture(video, gl_FragCoord.xy / vec2(target_size)).rgb;
+  vec2 place = gl_FragCoord.xy - vec2(target_origin);
+  vec3 bgr = textureSize(video, 0) == target_size ? texelFetch(video, ivec2(place), 0).rgb
+                                                  : texture(video, place / vec2(target_size)).rgb;
   color = vec4(is_gray ? bgr.rrr : bgr.bgr, 1.0);
 }
 )glsl";

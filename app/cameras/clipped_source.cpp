@@ -18,6 +18,7 @@ class ClippedSource : public FrameSource {
 
   bool Next(engine::Frame* frame) override {
     while (!ended_ && source_->Next(frame)) {
+      if (frame->picture.empty()) return true;  // a device that is away
       if (!first_) first_ = frame->time;
       const Timestamp since_first = frame->time - *first_;
       if (until_ > Timestamp{} && since_first >= until_) break;
@@ -26,6 +27,8 @@ class ClippedSource : public FrameSource {
     ended_ = true;
     return false;
   }
+  std::string trouble() const override { return source_->trouble(); }
+  Delivery delivery() const override { return source_->delivery(); }
 
  private:
   std::unique_ptr<FrameSource> source_;

@@ -2,6 +2,7 @@
 #include <linux/videodev2.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <functional>
 
@@ -29,26 +30,6 @@ std::string FourCc(std::uint32_t code) {
   return text.substr(0, text.find_last_not_of(' ') + 1);
 }
 
-std::vector<double> Rates(DeviceSystem* system, int file, std::uint32_t pixel_format,
-                          const DeviceSize& size) {
-  std::vector<double> rates;
-  for (std::uint32_t i = 0; i < kMaxEntries; ++i) {
-    v4l2_frmivalenum entry{};
-    entry.index = i;
-    entry.pixel_format = pixel_format;
-    entry.width = static_cast<std::uint32_t>(size.width_px);
-    entry.height = static_cast<std::uint32_t>(size.height_px);
-    if (system->Control(file, VIDIOC_ENUM_FRAMEINTERVALS, &entry) < 0) break;
-    const bool discrete = entry.type == V4L2_FRMIVAL_TYPE_DISCRETE;
-    const v4l2_fract& interval = discrete ? entry.discrete : entry.stepwise.min;
-    if (interval.numerator > 0)
-      rates.push_back(static_cast<double>(interval.denominator) / interval.numerator);
-    if (!discrete) break;  // one entry stands for a whole range; its shortest interval is the highest rate
-  }
-  std::sort(rates.begin(), rates.end(), std::greater<>());
-  return rates;
-}
-
 std::vector<DeviceSize> Sizes(DeviceSystem* system, int file, std::uint32_t pixel_format) {
   std::vector<DeviceSize> sizes;
   for (std::uint32_t i = 0; i < kMaxEntries; ++i) {
@@ -60,37 +41,49 @@ std::vector<DeviceSize> Sizes(DeviceSystem* system, int file, std::uint32_t pixe
     DeviceSize size;
     size.width_px = static_cast<int>(discrete ? entry.discrete.width : entry.stepwise.max_width);
     size.height_px = static_cast<int>(discrete ? entry.discrete.height : entry.stepwise.max_height);
-    size.fps = Rates(system, file, pixel_format, size);
+    size.fps = DeviceRates(system, file, pixel_format, size.width_px, size.height_px);
     sizes.push_back(std::move(size));
     if (!discrete) break;
   }
   return sizes;
 }
 
-std::vector<DeviceControl> Controls(DeviceSystem* system, int file) {
-  std::vector<DeviceControl> controls;
-  v4l2_queryctrl query{};
-  query.id = V4L2_CTRL_FLAG_NEXT_CTRL;
-  for (std::uint32_t i = 0; i < kMaxEntries && system->Control(file, VIDIOC_QUERYCTRL, &query) >= 0; ++i) {
-    v4l2_control value{};
-    value.id = query.id;
-    const bool shown =
-        (query.flags & V4L2_CTRL_FLAG_DISABLED) == 0 && query.type != V4L2_CTRL_TYPE_CTRL_CLASS;
-    if (shown && system->Control(file, VIDIOC_G_CTRL, &value) >= 0) {
-      controls.push_back({FromDriver(query.name, sizeof query.name), query.minimum, query.maximum, query.step,
-                          query.default_value, value.value});
-    }
-    query.id |= V4L2_CTRL_FLAG_NEXT_CTRL;
-  }
-  return controls;
-}
-
 }  // namespace
 
+std::vector<double> DeviceRates(DeviceSystem* system, int file, std::uint32_t pixel_format, int width_px,
+                                int height_px) {
+  std::vector<double> rates;
+  for (std::uint32_t i = 0; i < kMaxEntries; ++i) {
+    v4l2_frmivalenum entry{};
+    entry.index = i;
+    entry.pixel_format = pixel_format;
+    entry.width = static_cast<std::uint32_t>(width_px);
+    entry.height = static_cast<std::uint32_t>(height_px);
+    if (system->Control(file, VIDIOC_ENUM_FRAMEINTERVALS, &entry) < 0) break;
+    const bool discrete = entry.type == V4L2_FRMIVAL_TYPE_DISCRETE;
+    const v4l2_fract& interval = discrete ? entry.discrete : entry.stepwise.min;
+    if (interval.numerator > 0)
+      rates.push_back(static_cast<double>(interval.denominator) / interval.numerator);
+    if (!discrete) break;  // one entry stands for a whole range; its shortest interval is the highest rate
+  }
+  std::sort(rates.begin(), rates.end(), std::greater<>());
+  return rates;
+}
+
+std::string PermissionAdvice() {
+  return "ask for membership in the group 'video' (sudo usermod -aG video USER), then log in again.";
+}
+
 std::optional<DeviceDescription> DescribeDevice(const std::string& path, DeviceSystem* system) {
-  const int file = system->Open(path);
-  if (file < 0) return std::nullopt;
   std::optional<DeviceDescription> device;
+  const int file = system->Open(path);
+  if (file < 0) {
+    if (errno != EACCES) return std::nullopt;
+    device.emplace();
+    device->path = path;
+    device->trouble = "You may not open it; " + PermissionAdvice();
+    return device;
+  }
   v4l2_capability capability{};
   if (system->Control(file, VIDIOC_QUERYCAP, &capability) >= 0) {
     const std::uint32_t can = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? capability.device_caps
@@ -109,7 +102,7 @@ std::optional<DeviceDescription> DescribeDevice(const std::string& path, DeviceS
                                    FromDriver(entry.description, sizeof entry.description),
                                    Sizes(system, file, entry.pixelformat)});
       }
-      device->controls = Controls(system, file);
+      device->controls = ListControls(system, file);
     }
   }
   system->Close(file);

@@ -8,6 +8,8 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <ctime>
+#include <thread>
 
 namespace docent::app {
 
@@ -44,6 +46,13 @@ class KernelDeviceSystem : public DeviceSystem {
     }
     return result;
   }
+
+  std::chrono::nanoseconds Now() override {
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return std::chrono::seconds(now.tv_sec) + std::chrono::nanoseconds(now.tv_nsec);
+  }
+  void Sleep(std::chrono::milliseconds duration) override { std::this_thread::sleep_for(duration); }
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -20,6 +21,9 @@ class DeviceSystem {
   virtual void Unmap(void* memory, std::size_t length_bytes) = 0;
   // 1 when a picture waits, 0 after the time-out, -1 with errno; ENODEV when the device is gone.
   virtual int Wait(int file, int timeout_ms) = 0;
+  // The clock that the kernel stamps pictures with, CLOCK_MONOTONIC.
+  virtual std::chrono::nanoseconds Now() = 0;
+  virtual void Sleep(std::chrono::milliseconds duration) = 0;
 };
 
 // The kernel's own.

@@ -27,14 +27,32 @@ struct SourceInfo {
   std::optional<std::filesystem::path> segments_path;      // segments.txt beside the pictures
 };
 
+// What a live source has delivered so far, and what of its pictures was lost on which way.
+struct Delivery {
+  std::uint64_t delivered = 0;
+  std::uint64_t missed = 0;  // gaps in the device's own numbering: nobody had a buffer for them
+  std::uint64_t late = 0;    // overtaken by a newer picture before anybody asked for them
+  std::uint64_t broken = 0;  // could not be decoded
+  int reconnections = 0;
+  Timestamp median_latency{};  // from the device's time of a picture to its delivery, of the newest ones
+};
+
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
 
   // The next picture; false at the end, and from then on. Every picture is a fresh buffer that nobody writes
-  // to again; times grow strictly. Sets time, index and picture; leaves `camera` alone. Throws Error when the
-  // source breaks off; the pictures before the break have been delivered by then.
+  // to again; times grow strictly. Sets time, index and picture; leaves `camera` alone. An index that jumps
+  // says how many pictures were lost before this one. Throws Error when the source breaks off; the pictures
+  // before the break have been delivered by then.
+  //
+  // A source that is waited for (CameraOptions::reconnect) answers with an empty picture a few times a second
+  // while its device is away, and trouble() says why; time is then the present on the source's clock.
   virtual bool Next(engine::Frame* frame) = 0;
+
+  // One sentence for the wearer while there is no picture to be had; empty when all is well.
+  virtual std::string trouble() const { return {}; }
+  virtual Delivery delivery() const { return {}; }
 
   const SourceInfo& info() const { return info_; }
 
@@ -46,13 +64,18 @@ class FrameSource {
 struct DeviceFormat {
   int width_px = 0, height_px = 0;
   double fps = 0;
+  std::uint32_t pixel_format = 0;  // V4L2's four-letter code
 };
 
 struct CameraOptions {
   DeviceFormat device_format;                      // devices only
   std::chrono::milliseconds device_timeout{2000};  // devices only: how long to wait for one picture
-  double image_fps = 30;                           // plain numbered images, which have no times
-  std::uint64_t seed = 1;                          // the simulator's noise
+  bool reconnect = false;  // devices only: one that is unplugged is waited for instead of being an Error
+  // Devices only: after so many pictures, automatic exposure, gain, white balance and focus are held as they
+  // have settled, because a tracker needs the same things to look the same; 0 leaves them alone.
+  int lock_controls_after = 0;
+  double image_fps = 30;   // plain numbered images, which have no times
+  std::uint64_t seed = 1;  // the simulator's noise
 };
 
 // `source` is a word of command-line.md: a device, a file, a folder, or sim:SCENE. Throws Error with one

@@ -12,7 +12,8 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
                       std::function<void(const AuthorOptions&, Verbosity)> run) {
   CLI::App* command =
       AddSubcommand(program, "author", "Build and extend maps, and place content in them",
-                    "docent author --library museum.docent --camera /dev/video0 --calibration camera.yaml");
+                    "docent author --library museum.docent --camera /dev/video0 --calibration camera.yaml\n"
+                    "  docent author --library room.docent --camera sim:hand --camera sim:shoulder");
   const auto options = std::make_shared<AuthorOptions>();
   command->add_option("--library", options->library, "The library's file; made when it is not there")
       ->required();

@@ -17,11 +17,8 @@ using Json = nlohmann::ordered_json;
 void PrintJson(const std::vector<DeviceDescription>& devices) {
   Json json = {{"cameras", Json::array()}};
   for (const DeviceDescription& device : devices) {
-    Json entry = {{"path", device.path},
-                  {"card", device.card},
-                  {"driver", device.driver},
-                  {"formats", Json::array()},
-                  {"controls", Json::array()}};
+    Json entry = {{"path", device.path},       {"card", device.card},      {"driver", device.driver},
+                  {"trouble", device.trouble}, {"formats", Json::array()}, {"controls", Json::array()}};
     for (const DevicePixelFormat& format : device.formats) {
       Json sizes = Json::array();
       for (const DeviceSize& size : format.sizes) {
@@ -44,8 +41,12 @@ void PrintJson(const std::vector<DeviceDescription>& devices) {
 }
 
 void PrintText(const std::vector<DeviceDescription>& devices) {
-  if (devices.empty()) std::puts("There is no camera.");
+  if (devices.empty()) std::puts("There is no camera: no /dev/video device captures pictures.");
   for (const DeviceDescription& device : devices) {
+    if (!device.trouble.empty()) {
+      std::printf("%s  %s\n", device.path.c_str(), device.trouble.c_str());
+      continue;
+    }
     std::printf("%s  %s (%s)\n", device.path.c_str(), device.card.c_str(), device.driver.c_str());
     for (const DevicePixelFormat& format : device.formats) {
       std::printf("  %s  %s\n", format.fourcc.c_str(), format.description.c_str());

@@ -5,7 +5,8 @@
 
 namespace docent::app {
 
-GuideFiles::GuideFiles(const GuideRequest& request, const engine::CameraModel& camera) : camera_(camera) {
+GuideFiles::GuideFiles(const GuideRequest& request, const engine::CameraModel& first_camera)
+    : camera_(first_camera) {
   if (request.output) {
     output_.emplace(*request.output);
     augmentations_.emplace(*request.output);
@@ -16,7 +17,7 @@ GuideFiles::GuideFiles(const GuideRequest& request, const engine::CameraModel& c
 void GuideFiles::Add(const ShownFrame& frame) {
   if (!output_) return;
   output_->Add(frame.tracked, frame.shown.map_name);
-  if (frame.shown.scene)
+  if (frame.shown.scene && frame.tracked.frame.camera == 0)
     augmentations_->Add(frame.tracked, camera_, frame.shown.map_name, *frame.shown.scene);
 }
 

@@ -10,10 +10,11 @@
 
 namespace docent::app {
 
-// The text files that a guided run leaves, where they were asked for. On the camera's thread.
+// The text files that a guided run leaves, where they were asked for. One thread at a time.
 class GuideFiles {
  public:
-  GuideFiles(const GuideRequest& request, const engine::CameraModel& camera);
+  // What was drawn over the first camera's pictures is noted through its lens.
+  GuideFiles(const GuideRequest& request, const engine::CameraModel& first_camera);
 
   void Add(const ShownFrame& frame);
   void Add(const TimedCommand& command);

@@ -9,6 +9,7 @@
 #include "app/script/script_file.h"
 #include "engine/base/error.h"
 #include "ui/authoring_panel.h"
+#include "ui/inset.h"
 #include "ui/letterbox.h"
 #include "ui/window.h"
 
@@ -17,7 +18,7 @@ namespace docent::app {
 void FrameSlot::Put(std::shared_ptr<const ShownFrame> frame) {
   {
     const std::scoped_lock lock(mutex_);
-    frame_ = std::move(frame);
+    frames_.at(static_cast<std::size_t>(frame->tracked.frame.camera)) = std::move(frame);
   }
   changed_.notify_one();
 }
@@ -30,15 +31,19 @@ void FrameSlot::Close() {
   changed_.notify_one();
 }
 
-std::shared_ptr<const ShownFrame> FrameSlot::Take() {
+bool FrameSlot::HasFrame() const {
+  return std::any_of(frames_.begin(), frames_.end(), [](const auto& frame) { return frame != nullptr; });
+}
+
+std::vector<std::shared_ptr<const ShownFrame>> FrameSlot::Take() {
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, std::chrono::microseconds(16667), [this] { return frame_ || closed_; });
-  return std::exchange(frame_, nullptr);
+  changed_.wait_for(lock, std::chrono::microseconds(16667), [this] { return HasFrame() || closed_; });
+  return std::exchange(frames_, std::vector<std::shared_ptr<const ShownFrame>>(frames_.size()));
 }
 
 bool FrameSlot::closed() const {
   const std::scoped_lock lock(mutex_);
-  return closed_ && !frame_;
+  return closed_ && !HasFrame();
 }
 
 namespace {
@@ -46,26 +51,30 @@ namespace {
 // The window with all that is drawn in it, and what the person's hands do there.
 class GuideWindow {
  public:
-  GuideWindow(const GuideRequest& request, const engine::CameraModel& camera, double frames_per_second,
-              CommandInbox* inbox)
+  GuideWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras,
+              std::span<CommandInbox> inboxes)
       : request_(request),
-        camera_(camera),
-        inbox_(inbox),
-        window_(request.title, camera.width_px(), camera.height_px()) {
-    if (request.record) recorder_.emplace(*request.record, frames_per_second);
+        cameras_(cameras),
+        inboxes_(inboxes),
+        window_(request.title, cameras.front().model->width_px(), cameras.front().model->height_px()),
+        shown_(cameras.size()) {
+    if (request.record) recorder_.emplace(*request.record, cameras.front().source->info().nominal_fps);
     if (request.may_write)
       panel_.emplace(
           &window_, [this](const std::string& line) { Emit(line); }, Models());
   }
 
   // False when it was closed.
-  bool Turn(std::shared_ptr<const ShownFrame> frame) {
+  bool Turn(std::vector<std::shared_ptr<const ShownFrame>> frames) {
     HandleEvents();
     if (window_.IsClosing() || closing_) return false;
-    if (frame && frame->tracked.state != engine::TrackingState::kDropped) {
-      shown_ = std::move(frame);
-      DrawPicture();
+    bool fresh = false;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (!frames[i] || frames[i]->tracked.state == engine::TrackingState::kDropped) continue;
+      shown_[i] = std::move(frames[i]);
+      fresh = true;
     }
+    if (fresh) DrawPicture();
     const Eigen::Vector2i size = window_.FramebufferSize();
     renderer_.Present(std::max(1, size.x()), std::max(1, size.y()));
     if (panel_) panel_->Draw();
@@ -92,14 +101,25 @@ class GuideWindow {
     return models;
   }
 
+  const std::shared_ptr<const ShownFrame>& large() const { return shown_[large_]; }
+  const engine::CameraModel& camera() const { return *cameras_[large_].model; }
+
+  void Swap() {
+    if (shown_.size() < 2 || !shown_[1 - large_]) return;
+    large_ = 1 - large_;
+    DrawPicture();
+  }
+
   void DrawPicture() {
-    ui::View view = ViewOf(*shown_, camera_);
+    if (!large()) return;
+    ui::View view = ViewOf(*large(), camera());
+    if (shown_.size() > 1 && shown_[1 - large_]) view.overlay.inset = &shown_[1 - large_]->tracked;
     view.overlay.points = points_;
     view.overlay.keyframes = keyframes_;
     view.overlay.hud = hud_;
     if (panel_) {
       panel_->ApplyTo(&view.overlay);
-      map_names_.insert(shown_->shown.map_name);
+      map_names_.insert(large()->shown.map_name);
       map_names_.erase("");
       panel_->SetMapNames({map_names_.begin(), map_names_.end()});
     }
@@ -107,8 +127,12 @@ class GuideWindow {
     renderer_.Draw(view);
     if (!recorder_ && !request_.on_picture) return;
     renderer_.ReadBack(&picture_);
-    if (recorder_) recorder_->Write(picture_, shown_->tracked.frame.index);
-    if (request_.on_picture) request_.on_picture(*shown_, picture_);
+    // The video has the first camera's rate and size: it is written at that camera's pictures.
+    const std::uint64_t index = shown_[0] ? shown_[0]->tracked.frame.index : 0;
+    if (recorder_ && shown_[0] && index != recorded_ && SizeOfFirst(picture_))
+      recorder_->Write(picture_, index);
+    recorded_ = index;
+    if (request_.on_picture) request_.on_picture(*large(), picture_);
   }
 
   // A line of the script language becomes a command at the frame that is on the screen.
@@ -116,9 +140,9 @@ class GuideWindow {
     refusal_.clear();
     try {
       for (const TimedCommand& command : ParseScript("0 " + line, "window")) {
-        const auto frame = shown_ ? std::shared_ptr<const engine::TrackedFrame>(shown_, &shown_->tracked)
-                                  : std::shared_ptr<const engine::TrackedFrame>();
-        inbox_->Push({command.command, frame});
+        const auto frame = large() ? std::shared_ptr<const engine::TrackedFrame>(large(), &large()->tracked)
+                                   : std::shared_ptr<const engine::TrackedFrame>();
+        inboxes_[large_].Push({command.command, frame});
       }
     } catch (const Error& error) {
       refusal_ = error.what();
@@ -129,7 +153,7 @@ class GuideWindow {
     using Kind = ui::InputEvent::Kind;
     for (const ui::InputEvent& event : window_.PollEvents()) {
       if (event.kind == Kind::kKey && !(panel_ && panel_->WantsKeyboard())) HandleKey(event);
-      if (event.kind == Kind::kClick && event.button == 0 && panel_ && !panel_->WantsMouse()) {
+      if (event.kind == Kind::kClick && event.button == 0 && !(panel_ && panel_->WantsMouse())) {
         HandleClick(event);
       }
     }
@@ -143,6 +167,7 @@ class GuideWindow {
       if (event.key == "s") Emit("save");
       return;
     }
+    if (event.key == "tab") Swap();
     if (event.key == "escape" || event.key == "q") closing_ = true;
     bool& points = panel_ ? panel_->state().show_points : points_;
     bool& keyframes = panel_ ? panel_->state().show_keyframes : keyframes_;
@@ -154,20 +179,31 @@ class GuideWindow {
 
   void HandleClick(const ui::InputEvent& event) {
     const Eigen::Vector2i size = window_.WindowSize();
-    if (!shown_ || size.x() < 1 || size.y() < 1) return;
-    const ui::Letterbox box = ui::FitPicture(camera_.width_px(), camera_.height_px(), size.x(), size.y());
+    if (!large() || size.x() < 1 || size.y() < 1) return;
+    const int width = camera().width_px(), height = camera().height_px();
+    const ui::Letterbox box = ui::FitPicture(width, height, size.x(), size.y());
     const Eigen::Vector2d pixel = box.PictureFromWindow(event.position);
-    if (camera_.IsInside(pixel)) panel_->ClickPicture(pixel);
+    if (shown_.size() > 1 && shown_[1 - large_]) {
+      const engine::CameraModel& other = *cameras_[1 - large_].model;
+      if (ui::PlaceInset(width, height, other.width_px(), other.height_px()).Contains(pixel)) return Swap();
+    }
+    if (panel_ && camera().IsInside(pixel)) panel_->ClickPicture(pixel);
+  }
+  bool SizeOfFirst(const cv::Mat& picture) const {
+    const engine::CameraModel& first = *cameras_.front().model;
+    return picture.cols == first.width_px() && picture.rows == first.height_px();
   }
 
   const GuideRequest& request_;
-  const engine::CameraModel& camera_;
-  CommandInbox* const inbox_;
+  const std::span<const CalibratedCamera> cameras_;
+  const std::span<CommandInbox> inboxes_;
   ui::Window window_;
   ui::Renderer renderer_;
   std::optional<ui::AuthoringPanel> panel_;
   std::optional<ViewRecorder> recorder_;
-  std::shared_ptr<const ShownFrame> shown_;
+  std::vector<std::shared_ptr<const ShownFrame>> shown_;  // by camera
+  std::size_t large_ = 0;                                 // the camera that is shown large
+  std::optional<std::uint64_t> recorded_;
   std::set<std::string> map_names_;
   std::string refusal_;
   cv::Mat picture_;
@@ -176,9 +212,9 @@ class GuideWindow {
 
 }  // namespace
 
-void ShowInWindow(const GuideRequest& request, const engine::CameraModel& camera, double frames_per_second,
-                  FrameSlot* slot, CommandInbox* inbox) {
-  GuideWindow window(request, camera, frames_per_second, inbox);
+void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,
+                  std::span<CommandInbox> inboxes) {
+  GuideWindow window(request, cameras, inboxes);
   while (!slot->closed() && !Interruption::requested()) {
     if (!window.Turn(slot->Take())) break;
   }

@@ -5,36 +5,42 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <stop_token>
+#include <span>
+#include <vector>
 
 #include "app/command_line/run_guide.h"
 
 namespace docent::app {
 
-// Where the camera's thread leaves frames for the window's: one place, and the newest frame takes it, so that
-// a slow screen never holds the camera back.
+// Where the cameras' threads leave frames for the window's: one place for each camera, and its newest frame
+// takes it, so that a slow screen never holds a camera back.
 class FrameSlot {
  public:
+  explicit FrameSlot(std::size_t cameras) : frames_(cameras) {}
   void Put(std::shared_ptr<const ShownFrame> frame);
   // No more frames will come.
   void Close();
-  // The newest frame not taken yet; waits up to a sixtieth of a second for one. Null when there is none.
-  std::shared_ptr<const ShownFrame> Take();
+  // The newest frames not taken yet, by camera; waits up to a sixtieth of a second for one. Null where there
+  // is none.
+  std::vector<std::shared_ptr<const ShownFrame>> Take();
   bool closed() const;
 
  private:
+  bool HasFrame() const;
+
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::shared_ptr<const ShownFrame> frame_;
+  std::vector<std::shared_ptr<const ShownFrame>> frames_;
   bool closed_ = false;
 };
 
-// Shows frames in a window until they end or the person closes it; authors put commands into the inbox with
-// its panel. On the main thread (GLFW's rule). Throws Error when there is no display.
+// Shows frames in a window until they end or the person closes it; authors put commands into the inbox of the
+// frame's camera with its panel. With two cameras the first is shown large and the other small; a click on
+// the small picture swaps them. On the main thread (GLFW's rule). Throws Error when there is no display.
 //
-//   escape or q  close            p  points      k  keyframes      h  status
+//   escape or q  close            p  points      k  keyframes      h  status      tab  swap cameras
 //   control-z    undo             control-y  redo                  control-s  save
-void ShowInWindow(const GuideRequest& request, const engine::CameraModel& camera, double frames_per_second,
-                  FrameSlot* slot, CommandInbox* inbox);
+void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,
+                  std::span<CommandInbox> inboxes);
 
 }  // namespace docent::app

@@ -45,6 +45,7 @@ struct RunArguments {
   std::optional<std::filesystem::path> record;  // video of the augmented view
   std::uint64_t seed = 1;
   std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory
+  double baseline_m = 0;  // measured between the two cameras; 0: not
 };
 
 struct AuthorOptions {

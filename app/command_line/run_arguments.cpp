@@ -111,6 +111,17 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
   AddEngineOption(command, &run->engine);
   AddSeedOption(command, &run->seed);
   AddMemoryOption(command, &run->memory_budget_bytes);
+  command
+      ->add_option_function<std::string>(
+          "--baseline",
+          [run](const std::string& text) {
+            const auto metres = ParseNumber(text);
+            if (!metres || *metres <= 0)
+              throw CLI::ValidationError("--baseline", "'" + text + "' is no length in metres");
+            run->baseline_m = *metres;
+          },
+          "Distance of two cameras that are fixed to one another; tells the scale of their maps")
+      ->type_name("METRES");
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");
   command->add_option("--record", run->record, "Write the augmented view as a video")->type_name("FILE.mp4");
@@ -141,6 +152,9 @@ void CheckRunArguments(const RunArguments& run) {
   if (run.cameras.sources.size() > 2) throw CLI::ValidationError("--camera", "at most two cameras");
   if (run.cameras.calibrations.size() > run.cameras.sources.size()) {
     throw CLI::ValidationError("--calibration", "more calibrations than cameras");
+  }
+  if (run.baseline_m > 0 && run.cameras.sources.size() < 2) {
+    throw CLI::ValidationError("--baseline", "lies between two cameras; give --camera twice");
   }
   if (run.cameras.until > Timestamp{} && run.cameras.until <= run.cameras.from) {
     throw CLI::ValidationError("--until", "does not lie after --from");

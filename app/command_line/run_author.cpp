@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
 
 #include "app/command_line/run_guide.h"
@@ -6,6 +7,15 @@
 #include "app/script/script_file.h"
 
 namespace docent::app {
+
+namespace {
+
+bool AnyLive(const std::vector<CalibratedCamera>& cameras) {
+  return std::any_of(cameras.begin(), cameras.end(),
+                     [](const CalibratedCamera& camera) { return camera.source->info().live; });
+}
+
+}  // namespace
 
 void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   GuideRequest request;
@@ -16,18 +26,19 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
     request.script_name = options.script->string();
     request.model_folder = options.script->parent_path();
   }
-  CalibratedCamera camera = OpenArgumentCamera(options.run);
+  std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
   maps::Library library =
       maps::Library::Open(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   request.library = &library;
-  request.pace = ResolvePace(options.run, camera.source->info().live);
+  request.pace = ResolvePace(options.run, AnyLive(cameras));
+  request.baseline_m = options.run.baseline_m;
   request.headless = options.run.headless;
   request.seed = options.run.seed;
   request.memory_budget_bytes = options.run.memory_budget_bytes;
   request.output = options.run.output;
   request.record = options.run.record;
   request.record_script = options.record_script;
-  const auto maps = RunGuide(request, &camera, verbosity);
+  const auto maps = RunGuide(request, cameras, verbosity);
   if (verbosity == Verbosity::kQuiet) return;
   for (const Session::MapState& map : maps) {
     if (map.discarded || !map.snapshot) continue;
@@ -37,12 +48,13 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
 }
 
 void RunTour(const TourOptions& options, Verbosity verbosity) {
-  CalibratedCamera camera = OpenArgumentCamera(options.run);
+  std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
   maps::Library library = maps::Library::Open(options.library, maps::Access::kReadOnly);
   GuideRequest request;
   request.library = &library;
   request.title = "Docent - tour";
-  request.pace = ResolvePace(options.run, camera.source->info().live);
+  request.pace = ResolvePace(options.run, AnyLive(cameras));
+  request.baseline_m = options.run.baseline_m;
   request.headless = options.run.headless;
   request.seed = options.run.seed;
   request.memory_budget_bytes = options.run.memory_budget_bytes;
@@ -53,7 +65,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
     ++frames;
     if (engine::HasPose(frame.tracked.state)) ++named;
   };
-  RunGuide(request, &camera, verbosity);
+  RunGuide(request, cameras, verbosity);
   if (verbosity == Verbosity::kQuiet) return;
   std::printf("%llu of %llu frames with a pose in one of %zu maps\n", static_cast<unsigned long long>(named),
               static_cast<unsigned long long>(frames), library.List().size());

@@ -78,7 +78,7 @@ class DemoRun {
         end_frame_ < simulation_->frame_count() ? simulation_->time(end_frame_) - begin : Timestamp{};
     CalibratedCamera camera = Calibrate(
         ClipSource(std::move(source), simulation_->time(first_frame_) - begin, until), std::nullopt);
-    maps_ = RunGuide(request, &camera, verbosity);
+    maps_ = RunGuide(request, {&camera, 1}, verbosity);
     run_.run.frames = recorder.frames();
     for (const Session::MapState& map : maps_) {
       if (!map.snapshot) continue;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/run_guide.h"
 
+#include <mutex>
 #include <utility>
 
 #include "app/cameras/clipped_source.h"
@@ -8,6 +9,7 @@
 #include "app/command_line/guide_window.h"
 #include "app/command_line/interruption.h"
 #include "app/command_line/progress.h"
+#include "app/files/text_file.h"
 #include "engine/base/error.h"
 #include "engine/base/worker.h"
 #include "ui/context.h"
@@ -23,9 +25,14 @@ class OffscreenView {
     if (request.record) recorder_.emplace(*request.record, frames_per_second);
   }
 
-  void Add(const ShownFrame& frame, const engine::CameraModel& camera) {
-    if (frame.tracked.state == engine::TrackingState::kDropped) return;
-    renderer_.Draw(ViewOf(frame, camera));
+  // other: the newest frame of the second camera; may be null.
+  void Add(const ShownFrame& frame, const engine::CameraModel& camera, const ShownFrame* other) {
+    const std::uint64_t index = frame.tracked.frame.index;
+    if (frame.tracked.state == engine::TrackingState::kDropped || last_index_ == index) return;
+    last_index_ = index;
+    ui::View view = ViewOf(frame, camera);
+    if (other != nullptr) view.overlay.inset = &other->tracked;
+    renderer_.Draw(view);
     renderer_.ReadBack(&picture_);
     if (recorder_) recorder_->Write(picture_, frame.tracked.frame.index);
     if (request_.on_picture) request_.on_picture(frame, picture_);
@@ -39,33 +46,42 @@ class OffscreenView {
   ui::OffscreenContext context_;
   ui::Renderer renderer_;
   std::optional<ViewRecorder> recorder_;
+  std::optional<std::uint64_t> last_index_;
   cv::Mat picture_;
 };
 
-// One run: the camera's loop with the files it leaves. Everything here is on the camera's thread.
+// What a live camera lost on the way, for events.csv.
+std::string InWords(const SourceInfo& info, const Delivery& delivery) {
+  return info.name + ": " + std::to_string(delivery.delivered) + " pictures, " +
+         std::to_string(delivery.missed) + " missed by the device, " + std::to_string(delivery.late) +
+         " overtaken, " + std::to_string(delivery.broken) + " broken, " +
+         std::to_string(delivery.reconnections) + " reconnections, latency " +
+         FormatNumber(1e3 * ToSeconds(delivery.median_latency), 3) + " ms";
+}
+
+std::vector<std::shared_ptr<const engine::CameraModel>> ModelsOf(std::span<CalibratedCamera> cameras) {
+  std::vector<std::shared_ptr<const engine::CameraModel>> models;
+  for (const CalibratedCamera& camera : cameras) models.push_back(camera.model);
+  return models;
+}
+
+// One run: the cameras' loops with the files they leave.
 class GuideRun {
  public:
-  GuideRun(const GuideRequest& request, CalibratedCamera* camera)
-      : request_(request), camera_(camera), session_(OptionsOf(request), {camera->model}, request.library) {
-    loop_.pace = request.pace;
-    loop_.script = request.script;
-    loop_.script_name = request.script_name;
-    loop_.model_folder = request.model_folder;
-    loop_.inbox = &inbox_;
-    loop_.refused = [this](const std::string& reason) { message_ = reason; };
-  }
+  GuideRun(const GuideRequest& request, std::span<CalibratedCamera> cameras)
+      : request_(request),
+        cameras_(cameras),
+        session_(OptionsOf(request), ModelsOf(cameras), request.library),
+        inboxes_(cameras.size()),
+        watched_(cameras.size()) {}
 
+  // On the thread of the frame's camera.
   using Show = std::function<void(std::shared_ptr<const ShownFrame>)>;
 
   // Whatever happens, what was built is saved and the files are closed; then the first fault is thrown.
   void Run(const Show& show, std::stop_token window_closed) {
-    GuideFiles files(request_, *camera_->model);
-    loop_.carried_out = [&](const TimedCommand& command) {
-      message_.clear();
-      files.Add(command);
-    };
-    std::stop_source stop;
-    const std::stop_callback forward(window_closed, [&stop] { stop.request_stop(); });
+    files_.emplace(request_, *cameras_.front().model);
+    const std::stop_callback forward(window_closed, [this] { stop_.request_stop(); });
     std::exception_ptr fault;
     const auto guarded = [&fault](const auto& action) {
       try {
@@ -75,31 +91,35 @@ class GuideRun {
       }
     };
     guarded([&] {
-      RunFrames(
-          camera_, &session_, loop_,
-          [&](const engine::TrackedFrame& tracked) {
-            if (Interruption::requested()) stop.request_stop();
-            auto frame = MakeShown(tracked);
-            files.Add(*frame);
-            files.Add(session_.TakeEvents());
-            if (request_.on_frame) request_.on_frame(*frame);
-            Direct(frame);
-            show(std::move(frame));
-          },
-          stop.get_token());
+      std::vector<CameraRun> runs;
+      for (std::size_t i = 0; i < cameras_.size(); ++i) runs.push_back(RunOf(i, show));
+      RunCameras(runs, &session_, stop_.get_token());
     });
     guarded([&] { session_.Finish(); });
     guarded([&] {
-      files.Add(session_.TakeEvents());
-      files.Close();
+      files_->Add(session_.TakeEvents());
+      for (std::size_t i = 0; i < cameras_.size(); ++i) {
+        const FrameSource& source = *cameras_[i].source;
+        if (source.info().live && watched_[i].last)
+          files_->Add({Event{watched_[i].last->tracked.frame.time, "camera",
+                             InWords(source.info(), source.delivery())}});
+      }
+      files_->Close();
     });
     if (fault) std::rethrow_exception(fault);
   }
 
-  CommandInbox* inbox() { return &inbox_; }
+  std::span<CommandInbox> inboxes() { return inboxes_; }
   std::vector<Session::MapState> Maps() const { return session_.Maps(); }
 
  private:
+  // What is known of one camera, on its own thread.
+  struct Watched {
+    std::optional<Timestamp> first_time;
+    std::string message;
+    std::shared_ptr<const ShownFrame> last;
+  };
+
   static SessionOptions OptionsOf(const GuideRequest& request) {
     SessionOptions options;
     options.threaded = request.pace != Pace::kLockstep;
@@ -107,52 +127,114 @@ class GuideRun {
     options.seed = request.seed;
     options.memory.budget_bytes = request.memory_budget_bytes;
     options.memory.wait_for_maps = request.pace != Pace::kRealtime;
+    options.baseline_m = request.baseline_m;
     return options;
+  }
+
+  CameraRun RunOf(std::size_t i, const Show& show) {
+    Watched& watched = watched_[i];
+    CameraRun run;
+    run.camera = &cameras_[i];
+    run.options.pace = request_.pace;
+    run.options.camera = static_cast<int>(i);
+    if (i == 0) {
+      run.options.script = request_.script;
+      run.options.script_name = request_.script_name;
+    }
+    run.options.model_folder = request_.model_folder;
+    run.options.inbox = &inboxes_[i];
+    run.options.refused = [&watched](const std::string& reason) { watched.message = reason; };
+    run.options.carried_out = [this, &watched](const TimedCommand& command) {
+      watched.message.clear();
+      const std::scoped_lock lock(files_mutex_);
+      files_->Add(command);
+    };
+    run.options.trouble = [this, &watched, &show](const std::string& sentence, Timestamp time) {
+      watched.message = sentence;
+      {
+        const std::scoped_lock lock(files_mutex_);
+        files_->Add({Event{time, "camera", sentence.empty() ? "back again" : sentence}});
+      }
+      if (!watched.last) return;
+      // There is no new picture to say it in: the last one comes again.
+      auto frame = std::make_shared<ShownFrame>(*watched.last);
+      frame->message = sentence;
+      show(std::move(frame));
+    };
+    run.shown = [this, &watched, &show](const engine::TrackedFrame& tracked) {
+      if (Interruption::requested()) stop_.request_stop();
+      auto frame = MakeShown(tracked, &watched);
+      {
+        const std::scoped_lock lock(files_mutex_);
+        files_->Add(*frame);
+        files_->Add(session_.TakeEvents());
+        if (request_.on_frame) request_.on_frame(*frame);
+      }
+      if (tracked.frame.camera == 0) Direct(frame);
+      if (tracked.state != engine::TrackingState::kDropped) watched.last = frame;
+      show(std::move(frame));
+    };
+    return run;
   }
 
   void Direct(const std::shared_ptr<const ShownFrame>& frame) {
     if (!request_.director) return;
     const std::shared_ptr<const engine::TrackedFrame> tracked(frame, &frame->tracked);
-    for (Command& command : request_.director(*frame)) inbox_.Push({std::move(command), tracked});
+    for (Command& command : request_.director(*frame)) inboxes_[0].Push({std::move(command), tracked});
   }
 
-  std::shared_ptr<ShownFrame> MakeShown(const engine::TrackedFrame& tracked) {
+  std::shared_ptr<ShownFrame> MakeShown(const engine::TrackedFrame& tracked, Watched* watched) {
     auto frame = std::make_shared<ShownFrame>();
     frame->tracked = tracked;
     frame->shown = session_.ShownWith(tracked);
-    if (!first_time_) first_time_ = tracked.frame.time;
-    frame->seconds = ToSeconds(tracked.frame.time - *first_time_);
-    frame->message = message_;
+    if (!watched->first_time) watched->first_time = tracked.frame.time;
+    frame->seconds = ToSeconds(tracked.frame.time - *watched->first_time);
+    frame->message = watched->message;
     return frame;
   }
 
   const GuideRequest& request_;
-  CalibratedCamera* const camera_;
+  const std::span<CalibratedCamera> cameras_;
   Session session_;
-  FrameLoopOptions loop_;
-  CommandInbox inbox_;
-  std::optional<Timestamp> first_time_;
-  std::string message_;
+  std::vector<CommandInbox> inboxes_;  // by camera, like watched_
+  std::vector<Watched> watched_;
+  std::stop_source stop_;
+  std::mutex files_mutex_;
+  std::optional<GuideFiles> files_;
 };
 
-void RunHeadless(const GuideRequest& request, CalibratedCamera* camera, GuideRun* run, Verbosity verbosity) {
-  const SourceInfo& info = camera->source->info();
+void RunHeadless(const GuideRequest& request, std::span<CalibratedCamera> cameras, GuideRun* run,
+                 Verbosity verbosity) {
+  const SourceInfo& info = cameras.front().source->info();
   std::optional<OffscreenView> view;
   if (request.record || request.on_picture) view.emplace(request, info.nominal_fps);
   Progress progress(info.name, info.frame_count, verbosity);
   std::uint64_t count = 0;
+  std::mutex other_mutex;
+  std::shared_ptr<const ShownFrame> other;
   run->Run(
       [&](std::shared_ptr<const ShownFrame> frame) {
-        if (view) view->Add(*frame, *camera->model);
+        // The first camera's thread is this one, whose context draws.
+        if (frame->tracked.frame.camera != 0) {
+          if (frame->tracked.state == engine::TrackingState::kDropped) return;
+          const std::scoped_lock lock(other_mutex);
+          other = std::move(frame);
+          return;
+        }
+        std::shared_ptr<const ShownFrame> inset;
+        {
+          const std::scoped_lock lock(other_mutex);
+          inset = other;
+        }
+        if (view) view->Add(*frame, *cameras.front().model, inset.get());
         progress.Update(++count);
       },
       {});
   if (view) view->Close();
 }
 
-void RunWindowed(const GuideRequest& request, CalibratedCamera* camera, GuideRun* run) {
-  FrameSlot slot;
-  const double frames_per_second = camera->source->info().nominal_fps;
+void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> cameras, GuideRun* run) {
+  FrameSlot slot(cameras.size());
   Worker worker("camera", [&](const std::stop_token& stop) {
     try {
       run->Run([&](std::shared_ptr<const ShownFrame> frame) { slot.Put(std::move(frame)); }, stop);
@@ -164,7 +246,7 @@ void RunWindowed(const GuideRequest& request, CalibratedCamera* camera, GuideRun
   });
   std::exception_ptr fault;
   try {
-    ShowInWindow(request, *camera->model, frames_per_second, &slot, run->inbox());
+    ShowInWindow(request, cameras, &slot, run->inboxes());
   } catch (...) {
     fault = std::current_exception();
   }
@@ -182,31 +264,34 @@ void RunWindowed(const GuideRequest& request, CalibratedCamera* camera, GuideRun
 
 }  // namespace
 
-std::vector<Session::MapState> RunGuide(const GuideRequest& request, CalibratedCamera* camera,
+std::vector<Session::MapState> RunGuide(const GuideRequest& request, std::span<CalibratedCamera> cameras,
                                         Verbosity verbosity) {
   const Interruption interruption;
-  GuideRun run(request, camera);
+  GuideRun run(request, cameras);
   if (request.headless) {
-    RunHeadless(request, camera, &run, verbosity);
+    RunHeadless(request, cameras, &run, verbosity);
   } else {
-    RunWindowed(request, camera, &run);
+    RunWindowed(request, cameras, &run);
   }
   return run.Maps();
 }
 
-CalibratedCamera OpenArgumentCamera(const RunArguments& run) {
-  if (run.cameras.sources.size() > 1) {
-    throw Error("This version tracks one camera at a time; give --camera once.");
-  }
+std::vector<CalibratedCamera> OpenArgumentCameras(const RunArguments& run) {
   CameraOptions options = run.cameras.options;
   options.seed = run.seed;
-  auto source = OpenCamera(run.cameras.sources.front(), options);
-  if (run.cameras.from > Timestamp{} || run.cameras.until > Timestamp{}) {
-    source = ClipSource(std::move(source), run.cameras.from, run.cameras.until);
+  options.reconnect = true;
+  options.lock_controls_after = 30;  // a second: what automatic exposure takes to settle
+  std::vector<CalibratedCamera> cameras;
+  for (std::size_t i = 0; i < run.cameras.sources.size(); ++i) {
+    auto source = OpenCamera(run.cameras.sources[i], options);
+    if (run.cameras.from > Timestamp{} || run.cameras.until > Timestamp{}) {
+      source = ClipSource(std::move(source), run.cameras.from, run.cameras.until);
+    }
+    std::optional<std::filesystem::path> calibration;
+    if (i < run.cameras.calibrations.size()) calibration = run.cameras.calibrations[i];
+    cameras.push_back(Calibrate(std::move(source), calibration));
   }
-  std::optional<std::filesystem::path> calibration;
-  if (!run.cameras.calibrations.empty()) calibration = run.cameras.calibrations.front();
-  return Calibrate(std::move(source), calibration);
+  return cameras;
 }
 
 }  // namespace docent::app

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,8 +15,9 @@
 #include "app/session/guided_view.h"
 #include "maps/library.h"
 
-// What authoring, touring and the demonstration share: one camera through a session over a library, seen in a
-// window or not at all.
+// What authoring, touring and the demonstration share: one camera, or the two of a wearable, through a
+// session over a library, seen in a window or not at all. The script and the director act for the first
+// camera.
 namespace docent::app {
 
 struct GuideRequest {
@@ -33,19 +35,20 @@ struct GuideRequest {
   // What is done of itself on seeing a frame, as if a person did it in the window; may be empty. On the
   // camera's thread.
   std::function<std::vector<Command>(const ShownFrame&)> director;
-  // Told of every frame on the camera's thread; may be empty.
+  double baseline_m = 0;  // see SessionOptions
+  // Told of every frame on its camera's thread, one at a time; may be empty.
   std::function<void(const ShownFrame&)> on_frame;
   // Told of every drawn frame with its picture, on the thread that draws; may be empty. Without a window
   // frames are drawn only for this and for `record`.
   std::function<void(const ShownFrame&, const cv::Mat&)> on_picture;
 };
 
-// Runs until the camera ends, the window is closed, or the person interrupts; saves and closes everything
-// then, also when it ends by an Error. Answers with the maps as they were at the end.
-std::vector<Session::MapState> RunGuide(const GuideRequest& request, CalibratedCamera* camera,
+// Runs until the first camera ends, the window is closed, or the person interrupts; saves and closes
+// everything then, also when it ends by an Error. Answers with the maps as they were at the end.
+std::vector<Session::MapState> RunGuide(const GuideRequest& request, std::span<CalibratedCamera> cameras,
                                         Verbosity verbosity);
 
-// The camera that the arguments name, clipped to --from and --until. Throws Error.
-CalibratedCamera OpenArgumentCamera(const RunArguments& run);
+// The cameras that the arguments name, clipped to --from and --until. Throws Error.
+std::vector<CalibratedCamera> OpenArgumentCameras(const RunArguments& run);
 
 }  // namespace docent::app

@@ -4,10 +4,14 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <exception>
+#include <memory>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "engine/base/error.h"
+#include "engine/base/worker.h"
 
 namespace docent::app {
 
@@ -15,30 +19,54 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Plays pictures by their own times.
+// Plays pictures by their own times. Shared by the cameras of a session; any thread.
 class RealtimeClock {
  public:
-  explicit RealtimeClock(const SourceInfo& info)
-      : live_(info.live), period_(FromSeconds(1.0 / info.nominal_fps)) {}
-
+  // The present is the time of this picture, if nobody said so before.
+  void Start(Timestamp time) {
+    const std::scoped_lock lock(mutex_);
+    if (!start_) start_ = Clock::now() - time;
+  }
   // Waits until the picture is due. False when its successor is due already.
-  bool WaitFor(Timestamp time, const std::stop_token& stop) {
-    if (live_) return true;  // a device keeps time itself, and drops what nobody fetches
-    const Clock::time_point now = Clock::now();
-    if (!start_) start_ = now - time;
-    const Clock::time_point due = *start_ + time;
-    if (now > due + period_) return false;
+  bool WaitFor(Timestamp time, Timestamp period, const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
+    const Clock::time_point due = *start_ + time;
+    if (Clock::now() > due + period) return false;
     woken_.wait_until(lock, stop, due, [] { return false; });
     return true;
   }
 
  private:
-  const bool live_;
-  const Timestamp period_;
   std::optional<Clock::time_point> start_;  // when a picture of time 0 would have been due
   std::mutex mutex_;
   std::condition_variable_any woken_;
+};
+
+// Holds cameras together that are fed as fast as they are tracked: none goes on to a picture that lies more
+// than the slack after one that another camera has not finished. Any thread.
+class PictureGate {
+ public:
+  PictureGate(std::size_t cameras, Timestamp slack) : times_(cameras, Timestamp::min()), slack_(slack) {}
+
+  void Wait(std::size_t camera, Timestamp time, const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    times_[camera] = time;
+    changed_.notify_all();
+    changed_.wait(lock, stop,
+                  [&] { return time <= *std::min_element(times_.begin(), times_.end()) + slack_; });
+  }
+  // This camera has no more pictures, or none for now.
+  void Leave(std::size_t camera) {
+    const std::scoped_lock lock(mutex_);
+    times_[camera] = Timestamp::max() - slack_;
+    changed_.notify_all();
+  }
+
+ private:
+  std::vector<Timestamp> times_;  // of the picture that each is at
+  const Timestamp slack_;
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
 };
 
 // Carries out what is due, from the script and from the inbox, and tells of it.
@@ -90,6 +118,29 @@ class Commander {
   Timestamp last_time_{};  // scripts never go back in time
 };
 
+// Hands on what a source lost before this picture, as its index tells. After an absence the index goes on
+// where it was, so that nothing is made up for the time in between.
+class GapReporter {
+ public:
+  void Report(const engine::Frame& frame, const std::function<void(const engine::TrackedFrame&)>& shown) {
+    const auto last = std::exchange(last_, std::pair(frame.index, frame.time));
+    if (!last || frame.index <= last->first + 1) return;
+    const std::uint64_t steps = frame.index - last->first;
+    for (std::uint64_t i = 1; i < steps; ++i) {
+      engine::TrackedFrame dropped;
+      dropped.frame.camera = frame.camera;
+      dropped.frame.index = last->first + i;
+      dropped.frame.time = last->second + (frame.time - last->second) * static_cast<std::int64_t>(i) /
+                                              static_cast<std::int64_t>(steps);
+      dropped.state = engine::TrackingState::kDropped;
+      shown(dropped);
+    }
+  }
+
+ private:
+  std::optional<std::pair<std::uint64_t, Timestamp>> last_;
+};
+
 void PreloadModels(const FrameLoopOptions& options, Session* session) {
   for (const TimedCommand& command : options.script) {
     try {
@@ -100,37 +151,174 @@ void PreloadModels(const FrameLoopOptions& options, Session* session) {
   }
 }
 
-}  // namespace
+// One camera's way through a session, a picture at a time.
+class CameraFeed {
+ public:
+  CameraFeed(const CameraRun& run, Session* session, RealtimeClock* clock)
+      : run_(run),
+        session_(session),
+        clock_(clock),
+        live_(run.camera->source->info().live),
+        period_(FromSeconds(1 / run.camera->source->info().nominal_fps)),
+        commander_(run.options, session) {}
 
-void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,
-               const std::function<void(const engine::TrackedFrame&)>& shown, const std::stop_token& stop) {
-  PreloadModels(options, session);
-  RealtimeClock clock(camera->source->info());
-  std::optional<Timestamp> first_time;
-  Commander commander(options, session);
-  engine::Frame frame;
-  while (!stop.stop_requested() && camera->source->Next(&frame)) {
-    frame.camera = options.camera;
-    if (!first_time) {
-      first_time = frame.time;
-      camera->CheckPicture(frame.picture);
+  // Goes on to the next picture; false at the end of the source or when stop is requested.
+  bool Fetch(const std::stop_token& stop) {
+    FrameSource& source = *run_.camera->source;
+    while (!stop.stop_requested()) {
+      frame_ = engine::Frame();
+      if (!source.Next(&frame_)) return false;
+      frame_.camera = run_.options.camera;
+      frame_.time -= clock_offset_;
+      if (std::string now = source.trouble(); now != trouble_) {
+        trouble_ = std::move(now);
+        if (run_.options.trouble) run_.options.trouble(trouble_, frame_.time);
+      }
+      if (frame_.picture.empty()) continue;
+      if (live_) gaps_.Report(frame_, run_.shown);
+      if (!first_time_) {
+        first_time_ = frame_.time;
+        run_.camera->CheckPicture(frame_.picture);
+      }
+      return true;
     }
+    return false;
+  }
+  Timestamp time() const { return frame_.time; }
+  Timestamp period() const { return period_; }
+  bool live() const { return live_; }
+
+  // Between the first Fetch and the first Handle: this source's clock is ahead by so much.
+  void SetClockOffset(Timestamp offset) {
+    clock_offset_ = offset;
+    frame_.time -= offset;
+    *first_time_ -= offset;
+  }
+
+  // The picture that was fetched.
+  void Handle(const std::stop_token& stop) {
+    const Pace pace = run_.options.pace;
     engine::TrackedFrame tracked;
-    if (options.pace == Pace::kRealtime && !clock.WaitFor(frame.time - *first_time, stop)) {
-      tracked.frame = frame;
+    // A device keeps time itself, and drops what nobody fetches.
+    if (pace == Pace::kRealtime && !live_ && !clock_->WaitFor(frame_.time, period_, stop)) {
+      tracked.frame = frame_;
       tracked.state = engine::TrackingState::kDropped;
-      shown(tracked);
-      continue;
+      run_.shown(tracked);
+      return;
     }
     // A file delivers faster than a camera and would run away from the mapper, which in the world has the
     // whole time between pictures; so whoever feeds waits, never the tracker.
-    if (options.pace == Pace::kEager) session->WaitUntilCalm(stop);
-    tracked = session->Process(frame);
-    commander.CarryOutDue(frame.time - *first_time, tracked);
-    shown(tracked);
-    frame = engine::Frame();
+    if (pace == Pace::kEager) session_->WaitUntilCalm(stop);
+    tracked = session_->Process(frame_);
+    commander_.CarryOutDue(frame_.time - *first_time_, tracked);
+    run_.shown(tracked);
   }
-  if (!stop.stop_requested()) commander.CheckAllDone();
+
+  void CheckAllDone() const { commander_.CheckAllDone(); }
+
+ private:
+  const CameraRun& run_;
+  Session* const session_;
+  RealtimeClock* const clock_;
+  const bool live_;
+  const Timestamp period_;
+  Commander commander_;
+  GapReporter gaps_;
+  engine::Frame frame_;
+  std::optional<Timestamp> first_time_;
+  Timestamp clock_offset_{};
+  std::string trouble_;
+};
+
+// All cameras on this thread, always the one whose picture is the oldest; the first of two that are as old.
+void TakeTurns(std::vector<CameraFeed>* feeds, const std::stop_token& stop) {
+  std::vector<CameraFeed*> going;
+  for (CameraFeed& feed : *feeds) going.push_back(&feed);
+  while (!stop.stop_requested()) {
+    const auto oldest = std::min_element(going.begin(), going.end(),
+                                         [](const auto* a, const auto* b) { return a->time() < b->time(); });
+    (*oldest)->Handle(stop);
+    if ((*oldest)->Fetch(stop)) continue;
+    if (*oldest == &feeds->front()) return;
+    going.erase(oldest);
+  }
+}
+
+void RunSideBySide(std::vector<CameraFeed>* feeds, Pace pace, std::stop_source* stopping) {
+  const std::stop_token stop = stopping->get_token();
+  PictureGate gate(feeds->size(), feeds->front().period());
+  for (std::size_t i = 0; i < feeds->size(); ++i) {
+    if ((*feeds)[i].live()) gate.Leave(i);  // devices keep time together by themselves
+  }
+  const auto run = [&](std::size_t i) {
+    CameraFeed& feed = (*feeds)[i];
+    try {
+      do {
+        if (pace == Pace::kEager && !feed.live()) gate.Wait(i, feed.time(), stop);
+        feed.Handle(stop);
+      } while (!stop.stop_requested() && feed.Fetch(stop));
+      gate.Leave(i);
+    } catch (...) {
+      gate.Leave(i);
+      stopping->request_stop();
+      throw;
+    }
+  };
+  std::vector<std::unique_ptr<Worker>> others;
+  for (std::size_t i = 1; i < feeds->size(); ++i) {
+    others.push_back(std::make_unique<Worker>("camera " + std::to_string(i),
+                                              [&run, i](const std::stop_token&) { run(i); }));
+  }
+  std::exception_ptr fault;
+  try {
+    run(0);
+  } catch (...) {
+    fault = std::current_exception();
+  }
+  stopping->request_stop();
+  for (const auto& other : others) {
+    try {
+      other->Join();
+    } catch (...) {
+      if (!fault) fault = std::current_exception();
+    }
+  }
+  if (fault) std::rethrow_exception(fault);
+}
+
+}  // namespace
+
+void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const std::stop_token& stop) {
+  constexpr Timestamp kSameClock = std::chrono::seconds(10);
+  for (const CameraRun& run : cameras) PreloadModels(run.options, session);
+  std::stop_source stopping;
+  const std::stop_callback forward(stop, [&stopping] { stopping.request_stop(); });
+  RealtimeClock clock;
+  std::vector<CameraFeed> feeds;
+  feeds.reserve(cameras.size());
+  for (const CameraRun& run : cameras) {
+    CameraFeed& feed = feeds.emplace_back(run, session, &clock);
+    if (!feed.Fetch(stop)) {
+      if (!stop.stop_requested()) feed.CheckAllDone();
+      return;
+    }
+    const Timestamp ahead = feed.time() - feeds.front().time();
+    if (ahead > kSameClock || ahead < -kSameClock) feed.SetClockOffset(ahead);
+    clock.Start(feeds.front().time());
+  }
+  const Pace pace = cameras.front().options.pace;
+  if (pace == Pace::kLockstep) {
+    TakeTurns(&feeds, stopping.get_token());
+  } else {
+    RunSideBySide(&feeds, pace, &stopping);
+  }
+  if (stop.stop_requested()) return;
+  for (const CameraFeed& feed : feeds) feed.CheckAllDone();
+}
+
+void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,
+               const FrameCallback& shown, const std::stop_token& stop) {
+  RunCameras({{camera, options, shown}}, session, stop);
 }
 
 }  // namespace docent::app

@@ -51,7 +51,12 @@ struct FrameLoopOptions {
   // with one from the inbox (a script's fault ends the run instead). On the camera's thread; may be empty.
   std::function<void(const TimedCommand&)> carried_out;
   std::function<void(const std::string&)> refused;
+  // Told when the source has no pictures to give, with a sentence for the wearer and the time on its clock,
+  // and with an empty sentence when it is back. On the camera's thread; may be empty.
+  std::function<void(const std::string&, Timestamp)> trouble;
 };
+
+using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
 
 // Feeds the pictures of a source to a session until the source ends or stop is requested, carries out the
 // script's commands, and hands every frame on, dropped ones too. `shown` runs on the calling thread, which is
@@ -60,7 +65,25 @@ struct FrameLoopOptions {
 //   lockstep   one picture after the other; the session runs its mapper in between
 //   eager      as fast as the tracker is, but never further ahead of the mapper than a camera would be
 //   realtime   by the pictures' times; what is overtaken by its successor is dropped, as a camera drops it
+//
+// A live source drops by itself: what is missing between two of its pictures is handed on as dropped, each
+// frame with its time and no picture.
 void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,
-               const std::function<void(const engine::TrackedFrame&)>& shown, const std::stop_token& stop);
+               const FrameCallback& shown, const std::stop_token& stop);
+
+// One of several cameras of a session.
+struct CameraRun {
+  CalibratedCamera* camera = nullptr;
+  FrameLoopOptions options;  // of one pace for all; options.camera is the place in the list
+  FrameCallback shown;       // on this camera's thread
+};
+
+// The same for several cameras side by side, until the first one's pictures end: the first on the calling
+// thread, each other on a thread of its own. In lockstep all take turns on the calling thread, by the times
+// of their pictures, which also hold them together in the other paces: none runs further ahead of the others
+// than one picture. Cameras whose first pictures lie more than ten seconds apart have clocks of their own:
+// they are taken to begin together, and times are the first camera's. The first fault stops all and is
+// thrown.
+void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const std::stop_token& stop);
 
 }  // namespace docent::app

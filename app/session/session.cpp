@@ -15,6 +15,7 @@ Session::Session(const SessionOptions& options,
                  std::vector<std::shared_ptr<const engine::CameraModel>> cameras, maps::Library* library)
     : options_(options),
       library_(library),
+      association_(cameras.size()),
       mapping_(options.mapper, options.threaded && options.may_write,
                [this](const MappingThread::News& news) { Hear(news); }) {
   engine::TrackerOptions tracker_options = options.tracker;
@@ -48,8 +49,11 @@ void Session::AddEvent(Timestamp time, std::string event, std::string detail) {
   events_.push_back({time, std::move(event), std::move(detail)});
 }
 
-void Session::FollowOrders(Camera* camera) {
+SearchPlaces Session::FollowOrders(std::size_t index, Timestamp time) {
+  Camera* const camera = &cameras_[index];
   engine::Tracker& tracker = *camera->tracker;
+  std::uint64_t searched = 0;
+  std::optional<SearchPlaces::Prediction> prediction;
   std::shared_ptr<const engine::MapSnapshot> snapshot;
   std::uint64_t key = 0;
   Camera::Order order = Camera::Order::kNone;
@@ -64,6 +68,11 @@ void Session::FollowOrders(Camera* camera) {
     }
     // A map of directions alone waits for its start still.
     if (snapshot && snapshot->HasFinitePoints()) camera->starting = false;
+    searched = association_.SearchedMap();
+    if (snapshot && index < 2 && !association_.IsTracked(index)) {
+      if (const auto pose = rig_.Predict(static_cast<int>(index), time, key))
+        prediction = SearchPlaces::Prediction{key, snapshot, *pose};
+    }
   }
   if (order == Camera::Order::kStart) {
     tracker.StartNewMap();
@@ -73,14 +82,16 @@ void Session::FollowOrders(Camera* camera) {
     tracker.Reset();
   }
   tracker.SetMap(std::move(snapshot), key);
+  const engine::PlaceFinder* const all = pager_ ? static_cast<const engine::PlaceFinder*>(&*pager_) : &index_;
+  return SearchPlaces(all, searched, std::move(prediction));
 }
 
 engine::TrackedFrame Session::Process(const engine::Frame& frame) {
-  Camera& camera = cameras_.at(static_cast<std::size_t>(frame.camera));
-  FollowOrders(&camera);
-  engine::TrackedFrame tracked =
-      camera.tracker->Track(frame, pager_ ? static_cast<const engine::PlaceFinder*>(&*pager_) : &index_);
-  React(&camera, &tracked);
+  const auto index = static_cast<std::size_t>(frame.camera);
+  Camera& camera = cameras_.at(index);
+  const SearchPlaces places = FollowOrders(index, frame.time);
+  engine::TrackedFrame tracked = camera.tracker->Track(frame, &places);
+  React(index, &tracked);
   if (options_.may_write) {
     OfferToMapper(&camera, tracked);
     if (!options_.threaded) mapping_.RunInTurn();
@@ -89,21 +100,65 @@ engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   return tracked;
 }
 
-void Session::React(Camera* camera, engine::TrackedFrame* frame) {
+void Session::React(std::size_t index, engine::TrackedFrame* frame) {
   const std::scoped_lock lock(mutex_);
+  Camera* const camera = &cameras_[index];
   camera->last_time = frame->frame.time;
+  if (!engine::HasPose(frame->state)) {
+    association_.Lost(index);
+  } else if (camera->order != Camera::Order::kNone || !maps_.contains(frame->map_key) ||
+             !association_.Tracked(index, frame->map_key)) {
+    association_.Lost(index);
+    Refuse(camera, frame);
+  }
   const bool has_pose = engine::HasPose(frame->state);
   if (has_pose && frame->map_key != camera->map_key) {
     EnterMap(camera, frame->map_key, frame->frame.time);
   } else if (frame->state == engine::TrackingState::kRelocalized) {
-    AddEvent(frame->frame.time, "relocalized", maps_[frame->map_key].name);
+    const std::string by = cameras_.size() > 1 ? " by camera " + std::to_string(index) : std::string();
+    AddEvent(frame->frame.time, "relocalized", maps_[frame->map_key].name + by);
   }
   if (has_pose) {
     camera->lost_since.reset();
+    WatchRig(index, *frame);
   } else if (frame->state == engine::TrackingState::kLost && !camera->lost_since) {
     camera->lost_since = frame->frame.time;
   }
-  WatchProbation(camera, *frame);
+  // Of several cameras, one that is tracked shows that a start holds.
+  if (has_pose || !association_.AnyTracked()) WatchProbation(camera, *frame);
+}
+
+// The frame's pose is in a map that is not the cameras' any more: while it was worked out, another camera was
+// found elsewhere, or somebody chose another map.
+void Session::Refuse(Camera* camera, engine::TrackedFrame* frame) {
+  frame->state = engine::TrackingState::kLost;
+  frame->quality_class = engine::TrackingQuality::kLost;
+  frame->map.reset();
+  frame->map_key = 0;
+  frame->matches.clear();
+  frame->finite_points = frame->infinite_points = 0;
+  frame->hint = "look where the other camera looks";
+  if (camera->order == Camera::Order::kNone) camera->order = Camera::Order::kGo;
+}
+
+void Session::WatchRig(std::size_t index, const engine::TrackedFrame& frame) {
+  if (cameras_.size() < 2 || index > 1) return;
+  rig_.Add(static_cast<int>(index), frame.frame.time, frame.map_key, frame.camera_from_map);
+  const auto& estimate = rig_.estimate();
+  const bool rigid = estimate && estimate->rigid;
+  if (rigid == rig_told_) return;
+  rig_told_ = rigid;
+  if (!estimate) return;
+  std::string words = maps_.at(frame.map_key).name + ": " + estimate->Words();
+  if (rigid && options_.baseline_m > 0) {
+    words += ", one unit of the map is " + FormatNumber(options_.baseline_m / estimate->Baseline(), 4) + " m";
+  }
+  AddEvent(frame.frame.time, "rig", words);
+}
+
+std::optional<RigEstimate> Session::Rig() const {
+  const std::scoped_lock lock(mutex_);
+  return rig_.estimate();
 }
 
 void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
@@ -112,6 +167,13 @@ void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
   AddEvent(time, "map", "entered " + map.name);
   HoldMapsInUse();
   ExpectNeighbours(map);
+  // The others give up where they are looking and come (ptamm §3.3).
+  for (Camera& other : cameras_) {
+    if (other.map_key == key) continue;
+    other.map_key = key;
+    other.lost_since.reset();
+    other.order = Camera::Order::kGo;
+  }
   if (!options_.may_write || growing_key_ == key) return;
   // The map before rests now: it is saved as it stands, and grows again when somebody comes back to it.
   if (const auto found = maps_.find(before); found != maps_.end() && !found->second.discarded) {
@@ -160,6 +222,9 @@ void Session::Hear(const MappingThread::News& news) {
       case Kind::kMapStarted:
         map.started = event.time;
         map.on_probation = true;
+        for (std::size_t i = 0; i < cameras_.size(); ++i) {
+          if (cameras_[i].map_key == map.key && cameras_[i].starting) association_.Tracked(i, map.key);
+        }
         AddEvent(event.time, "map", "started " + map.name + ": " + event.detail);
         break;
       case Kind::kStartFailed:
@@ -233,10 +298,11 @@ void Session::Discard(std::uint64_t key, Timestamp time, const std::string& reas
   }
   growing_key_ = next.key;
   mapping_.Adopt(next.key, nullptr);
+  association_.Begin(next.key);
   for (Camera& camera : cameras_) {
     if (camera.map_key != key) continue;
     camera.map_key = next.key;
-    camera.order = Camera::Order::kStart;
+    camera.order = camera.began ? Camera::Order::kStart : Camera::Order::kGo;
     camera.lost_since.reset();
   }
 }

@@ -14,8 +14,11 @@
 
 #include "app/output/run_output.h"
 #include "app/script/commands.h"
+#include "app/session/camera_association.h"
+#include "app/session/camera_rig.h"
 #include "app/session/library_scene.h"
 #include "app/session/mapping_thread.h"
+#include "app/session/search_places.h"
 #include "app/session/session_map.h"
 #include "engine/tracking/tracker.h"
 #include "maps/library.h"
@@ -39,6 +42,9 @@ struct SessionOptions {
   std::size_t probation_keyframes = 5;
   double signpost_height = 0.12;  // of the distance at which it is put up
   maps::PagerOptions memory;      // how many of the library's maps are in memory at once
+  // Metres between the first two cameras of a rigid rig, measured by hand; 0 when nobody did. A recognised
+  // rig then tells how many metres a map's unit has.
+  double baseline_m = 0;
 };
 
 // What stands behind authoring, touring, evaluating and demonstrating alike: cameras that are tracked in the
@@ -51,7 +57,8 @@ struct SessionOptions {
 //
 // What holds: a map grows only while its policy and the session's rights allow it, and only by frames that
 // are tracked in it. Whoever recovers into another map takes the session there: that map then grows, and its
-// content is what is shown. A start that does not hold (see SessionOptions::probation) is given up and looked
+// content is what is shown. Several cameras are those of one wearer and work in one map together: see
+// CameraAssociation. A start that does not hold (see SessionOptions::probation) is given up and looked
 // for again under the same name, with an event that says why.
 class Session {
  public:
@@ -96,6 +103,8 @@ class Session {
     bool discarded = false;
   };
   std::vector<MapState> Maps() const;  // by key, discarded ones too
+  // How the first two cameras stand to each other in the present map; empty while that is not known.
+  std::optional<RigEstimate> Rig() const;
   engine::MapperTimes MappingTimes() const { return mapping_.Times(); }
   std::vector<Event> TakeEvents();
 
@@ -112,6 +121,7 @@ class Session {
     std::uint64_t map_key = 0;  // of the map it is tracked in; 0 while it looks in all maps
     Order order = Order::kNone;
     bool starting = false;                // it looks for the first views of map_key
+    bool began = false;                   // the present map is, or was, started by this camera
     std::optional<Timestamp> lost_since;  // while it is lost in map_key
     Timestamp last_time{};
   };
@@ -123,8 +133,11 @@ class Session {
   void BringToMemory(const Command& command);  // without mutex_
   void HoldMapsInUse();
   void ExpectNeighbours(const SessionMap& map);
-  void FollowOrders(Camera* camera);
-  void React(Camera* camera, engine::TrackedFrame* frame);
+  // What its camera does next, and where it may look for itself.
+  SearchPlaces FollowOrders(std::size_t index, Timestamp time);
+  void React(std::size_t index, engine::TrackedFrame* frame);
+  void Refuse(Camera* camera, engine::TrackedFrame* frame);
+  void WatchRig(std::size_t index, const engine::TrackedFrame& frame);
   void OfferToMapper(Camera* camera, const engine::TrackedFrame& frame);
   bool MayGrow(const SessionMap& map, const engine::Rigid3& camera_from_map) const;
   void WatchProbation(Camera* camera, const engine::TrackedFrame& frame);
@@ -167,6 +180,9 @@ class Session {
   mutable std::mutex mutex_;  // guards all that follows but the mapping thread; never held while tracking
   std::vector<Camera> cameras_;
   std::map<std::uint64_t, SessionMap> maps_;
+  CameraAssociation association_;
+  CameraRig rig_;
+  bool rig_told_ = false;          // that it is rigid
   std::uint64_t growing_key_ = 0;  // the map that the mapper works on; 0 for none
   std::uint64_t next_key_ = 1;     // without a library
   std::vector<Event> events_;

@@ -93,6 +93,7 @@ void Session::LeaveMap(std::uint64_t key) {
     camera.lost_since.reset();
     camera.order = Camera::Order::kLeave;
   }
+  if (association_.map() == key) association_.Release();
   map.on_probation = false;
   if (map.snapshot) {
     if (options_.may_write) SaveMap(&map, time);
@@ -118,8 +119,10 @@ void Session::Carry(const NewMap& command, const engine::TrackedFrame& frame) {
     const bool begins = static_cast<int>(i) == frame.frame.camera;
     cameras_[i].map_key = map.key;
     cameras_[i].lost_since.reset();
+    cameras_[i].began = begins;
     cameras_[i].order = begins ? Camera::Order::kStart : Camera::Order::kGo;
   }
+  association_.Begin(map.key);
 }
 
 void Session::Carry(const StopMap&, const engine::TrackedFrame& frame) {
@@ -137,6 +140,7 @@ void Session::Carry(const UseMap& command, const engine::TrackedFrame& frame) {
   const std::uint64_t before = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
   if (before == map->key) return GrowOn(*map);
   if (before != 0) LeaveMap(before);
+  association_.Release();
   for (Camera& camera : cameras_) {
     camera.map_key = map->key;
     camera.lost_since.reset();

@@ -11,6 +11,9 @@ std::span<const SceneRecipe> SceneRecipes() {
       {"desks", "how many look-alike desks", 6, 1, 24, BuildDesks},
       {"cylinder", "radius of the camera's circle in centimetres", 10, 0, 40, BuildCylinder},
       {"loop", "once around a block of cabinets", 0, 0, 0, BuildLoop},
+      {"hand", "0 for a hand-held camera, 1 for one that is fixed to the shoulder's", 0, 0, 1, BuildHand},
+      {"shoulder", "the same person's camera on the shoulder: 0 free, 1 fixed to the hand's", 0, 0, 1,
+       BuildShoulder},
       {"grass", "over a lawn of one repeated texture", 0, 0, 0, BuildGrass},
   };
   return kRecipes;

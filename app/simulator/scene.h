@@ -11,6 +11,7 @@
 #include "app/simulator/surfaces.h"
 #include "app/simulator/trajectory.h"
 #include "engine/geometry/camera_model.h"
+#include "engine/geometry/rigid3.h"
 
 namespace docent::app {
 
@@ -26,6 +27,9 @@ struct Scene {
   Trajectory trajectory{0};
   std::vector<SimulatedPlace> places;
   std::optional<engine::CameraModel> camera;  // the lens that the scene asks for, if any
+  engine::Rigid3 carrier_from_camera;         // how the camera sits on what follows the trajectory
+  double sensor_gain = 1;                     // of its exposure, against the other cameras of the world
+  std::uint64_t sensor_number = 0;            // cameras of one world have noise of their own
 };
 
 // What a scene is built from.
@@ -56,6 +60,13 @@ Scene BuildDesks(const SceneRequest& request);
 Scene BuildCylinder(const SceneRequest& request);
 // A lawn of one repeated texture. `general`.
 Scene BuildGrass(const SceneRequest& request);
+// What a person sees who works at the room's table with one camera in the hand and one on the shoulder, 94
+// degrees across: scenes of one seed are views of the same walk. parameter: 0 the cameras move each on its
+// own, 1 they are fixed to one another as WearableRig says. `general`.
+Scene BuildHand(const SceneRequest& request);
+Scene BuildShoulder(const SceneRequest& request);
+// hand_from_shoulder of the rigid pair.
+engine::Rigid3 WearableRig();
 // Once around a block of cabinets in a hall (`loop`) and a little further (`revisit`).
 Scene BuildLoop(const SceneRequest& request);
 

@@ -37,6 +37,9 @@ struct Hall {
 };
 void AddHall(const Hall& hall, Scene* scene);
 
+// The furnished room with a table full of things in its middle (see BuildRoom).
+void FurnishRoom(Random* random, Scene* scene);
+
 // How the camera looks at a place, in the place's stand: camera height above the floor, the nearest it comes,
 // how far ahead the middle of what it looks at lies, and at what height.
 struct Viewing {

@@ -102,13 +102,17 @@ Eigen::Vector3d GazeAt(double time_s) {
 
 }  // namespace
 
+void FurnishRoom(Random* random, Scene* scene) {
+  AddTable(random, scene);
+  Furnish(random, scene);
+  scene->places.push_back({"table", {0, -kTableHeight, 0}});
+}
+
 Scene BuildRoom(const SceneRequest& request) {
   Random random(request.seed);
   Scene scene;
   scene.trajectory = Trajectory(random.Next());
-  AddTable(&random, &scene);
-  Furnish(&random, &scene);
-  scene.places.push_back({"table", {0, -kTableHeight, 0}});
+  FurnishRoom(&random, &scene);
 
   Trajectory& trajectory = scene.trajectory;
   const double step = 0.5, stretch = 9;  // seconds between waypoints, and of motion between two turns

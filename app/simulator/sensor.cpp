@@ -45,11 +45,11 @@ double Sensor::Gain(double time_s) const {
   const double turn = 2 * std::numbers::pi;
   const double wandering =
       std::sin(turn * 0.07 * time_s + phases_rad_[0]) + 0.5 * std::sin(turn * 0.23 * time_s + phases_rad_[1]);
-  return std::exp(options_.exposure_drift * wandering);
+  return options_.gain * std::exp(options_.exposure_drift * wandering);
 }
 
 void Sensor::Apply(int frame, double time_s, cv::Mat* bgr) const {
-  if (options_.exposure_drift == 0 && shade_q12_.empty() && noise_q12_.empty()) return;
+  if (options_.exposure_drift == 0 && options_.gain == 1 && shade_q12_.empty() && noise_q12_.empty()) return;
   const int gain_q12 = static_cast<int>(std::lround(4096 * Gain(time_s)));
   Random random(options_.seed ^ (0xD1B54A32D192ED03ull * (static_cast<std::uint64_t>(frame) + 1)));
   const int channels = 3 * bgr->cols;

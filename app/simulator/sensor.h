@@ -17,6 +17,7 @@ class Sensor {
     double exposure_drift = 0;  // standard size of the wandering of the logarithm of the gain
     double noise_sigma = 0;     // grey levels of 255
     std::uint64_t seed = 1;
+    double gain = 1;  // of the exposure about which it wanders
   };
   explicit Sensor(const Options& options);
 

@@ -92,7 +92,8 @@ Simulation::Simulation(const std::string& name, Scene scene, const SimulationOpt
                options.vignetting,
                options.exposure_drift,
                options.noise_sigma,
-               options.seed}) {
+               options.seed + 0x9E3779B97F4A7C15ull * scene_.sensor_number,
+               scene_.sensor_gain}) {
   double duration_s = scene_.trajectory.duration_s();
   if (options.duration_s > 0) duration_s = std::min(duration_s, options.duration_s);
   // The last frame is not lost to the rounding of the product.
@@ -103,8 +104,12 @@ Timestamp Simulation::time(int frame) const {
   return FromSeconds(frame / options_.frame_rate_hz);
 }
 
+engine::Rigid3 Simulation::PoseAt(double time_s) const {
+  return scene_.trajectory.WorldFromCamera(time_s) * scene_.carrier_from_camera;
+}
+
 engine::Rigid3 Simulation::world_from_camera(int frame) const {
-  return scene_.trajectory.WorldFromCamera(ToSeconds(time(frame)));
+  return PoseAt(ToSeconds(time(frame)));
 }
 
 const std::string& Simulation::label(int frame) const {
@@ -114,13 +119,13 @@ const std::string& Simulation::label(int frame) const {
 void Simulation::Render(int frame, cv::Mat* bgr) const {
   const double time_s = ToSeconds(time(frame));
   if (options_.blur_samples == 1) {
-    renderer_.Render(scene_.trajectory.WorldFromCamera(time_s).inverse(), bgr);
+    renderer_.Render(PoseAt(time_s).inverse(), bgr);
   } else {
     const int samples = options_.blur_samples;
     cv::Mat sum, sample, wide;
     for (int i = 0; i < samples; ++i) {
       const double offset_s = options_.exposure_s * ((i + 0.5) / samples - 0.5);
-      renderer_.Render(scene_.trajectory.WorldFromCamera(time_s + offset_s).inverse(), &sample);
+      renderer_.Render(PoseAt(time_s + offset_s).inverse(), &sample);
       sample.convertTo(wide, CV_16UC3);
       if (i == 0) {
         sum = wide.clone();

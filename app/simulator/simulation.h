@@ -76,6 +76,8 @@ class Simulation {
   bool IsVisible(int frame, const Eigen::Vector3d& point_in_world) const;
 
  private:
+  engine::Rigid3 PoseAt(double time_s) const;
+
   std::string name_;
   SimulationOptions options_;
   Scene scene_;

@@ -201,6 +201,39 @@ TEST(Guide, AuthorsMapsThatATourNamesRightlyAndLeavesUntouched) {
   EXPECT_THAT(drawn, AllOf(HasSubstr(",Bay 0,exhibit,"), HasSubstr(",Bay 1,sign-1,")));
 }
 
+TEST(Guide, AuthorsWithTwoCamerasInOneMapAndToursWithBoth) {
+  const TemporaryFolder folder;
+  const std::string library = (folder / "room.docent").string(), output = (folder / "out").string();
+  folder.Write("walk.txt", std::string("0.2 map new \"Table\"\n"));
+  const std::vector<std::string> cameras = {"--camera", "sim:hand", "--camera", "sim:shoulder", "--headless"};
+  const auto with_cameras = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), cameras.begin(), cameras.end());
+    return RunDocent(arguments);
+  };
+  const Outcome authored =
+      with_cameras({"author", "--library", library, "--script", (folder / "walk.txt").string(), "--until",
+                    "4", "--output", output, "--record", (folder / "view.mp4").string()});
+  ASSERT_EQ(authored.exit_status, 0) << authored.errors;
+  const auto joined = [](const std::vector<Row>& rows, const std::string& camera) {
+    int frames = 0, poses = 0;
+    for (const Row& row : rows) {
+      if (row.at("camera") != camera) continue;
+      ++frames;
+      poses += row.at("map") == "Table";
+    }
+    return frames > 0 ? static_cast<double>(poses) / frames : 0;
+  };
+  for (const char* camera : {"0", "1"}) EXPECT_GT(joined(ReadFrames(folder / "out/frames.csv"), camera), 0.8);
+  EXPECT_TRUE(std::filesystem::exists(folder / "out/trajectory_1.txt"));
+  EXPECT_GT(std::filesystem::file_size(folder / "view.mp4"), 10000u);
+
+  const Outcome toured = with_cameras({"tour", "--library", library, "--until", "1.5", "--pace", "lockstep",
+                                       "--output", (folder / "tour").string()});
+  ASSERT_EQ(toured.exit_status, 0) << toured.errors;
+  for (const char* camera : {"0", "1"})
+    EXPECT_GT(joined(ReadFrames(folder / "tour/frames.csv"), camera), 0.8);
+}
+
 TEST(Guide, LeavesALibraryThatVerifiesWhenItIsKilledWhileAuthoring) {
   const TemporaryFolder folder;
   const Museum museum(WriteModel(folder));

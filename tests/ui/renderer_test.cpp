@@ -8,6 +8,7 @@
 #include "tests/ui/ui_testing.h"
 #include "ui/content_layer.h"
 #include "ui/gl_objects.h"
+#include "ui/inset.h"
 
 namespace docent::ui {
 namespace {
@@ -50,6 +51,31 @@ TEST_F(RendererTest, ShowsGreyVideoAndPicturesWithinLargerOnes) {
   const cv::Mat large = NoisePicture(701, 500, CV_8UC3);
   const cv::Mat part = large(cv::Rect(13, 7, 640, 480));
   EXPECT_EQ(CountDifferent(DrawPicture(&renderer, Tracked(part), camera, {}), part), 0);
+}
+
+TEST_F(RendererTest, ShowsAnotherCameraSmallInACornerAndNothingElsewhere) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  const engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(10, 20, 30)));
+  engine::TrackedFrame other = Tracked(cv::Mat(200, 400, CV_8UC3, cv::Scalar(200, 100, 50)));
+  View view;
+  view.tracked = &tracked;
+  view.camera = &camera;
+  view.overlay.hud = false;
+  view.overlay.inset = &other;
+  renderer.Draw(view);
+  cv::Mat drawn;
+  renderer.ReadBack(&drawn);
+  const Inset inset = PlaceInset(640, 480, 400, 200);
+  EXPECT_NEAR(static_cast<double>(inset.width) / inset.height, 2, 0.05);
+  EXPECT_TRUE(inset.Contains({inset.x + 1, inset.y + 1}));
+  EXPECT_FALSE(inset.Contains({inset.x - 1, inset.y + 1}));
+  const cv::Mat inside = drawn(cv::Rect(inset.x + 5, inset.y + 5, inset.width - 10, inset.height - 10));
+  EXPECT_EQ(CountDifferent(inside, cv::Mat(inside.size(), CV_8UC3, cv::Scalar(200, 100, 50))), 0);
+  // Six pixels around it belong to its frame.
+  drawn(cv::Rect(inset.x - 6, std::max(0, inset.y - 6), inset.width + 12, inset.height + 12))
+      .setTo(cv::Scalar(10, 20, 30));
+  EXPECT_EQ(CountDifferent(drawn, cv::Mat(480, 640, CV_8UC3, cv::Scalar(10, 20, 30))), 0);
 }
 
 TEST_F(RendererTest, HidesWhatStandsBehindWhateverTheOrderOfPlacing) {

@@ -6,8 +6,10 @@
 
 #include <cerrno>
 #include <cstring>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 
+#include "app/cameras/device_picture.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
@@ -20,12 +22,19 @@ constexpr std::uint32_t kWidth = 8, kHeight = 4;
 // A camera that answers as a driver does: one pixel format, three buffers, grey pictures numbered by
 // brightness.
 struct FakeCamera {
+  bool plugged_in = true;
+  int backlog = 0;                  // pictures that wait already, besides the one that is waited for
+  std::uint32_t missed_before = 0;  // of the device's numbers, before every picture but the first
+  std::map<std::uint32_t, std::int32_t> controls;
+  std::chrono::milliseconds now{100500};
+  int width = kWidth;
   std::uint32_t pixel_format = V4L2_PIX_FMT_GREY;
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   int open_error = 0;
   int pictures_until_unplugged = 1000, pictures_until_silent = 1000, broken_pictures = 0;
   std::vector<std::vector<std::uint8_t>> buffers;
   std::vector<std::uint32_t> queue;
+  std::uint32_t sequence = 0;
   int delivered = 0, mapped = 0, opened = 0;
   bool streaming = false;
 };
@@ -36,6 +45,9 @@ class FakeSystem : public DeviceSystem {
 
   int Open(const std::string&) override {
     if (camera_->open_error != 0) return Fail(camera_->open_error);
+    if (!camera_->plugged_in) return Fail(ENOENT);
+    camera_->sequence = 0;
+    camera_->queue.clear();
     ++camera_->opened;
     return 7;
   }
@@ -45,25 +57,39 @@ class FakeSystem : public DeviceSystem {
     return camera_->buffers[static_cast<std::size_t>(offset)].data();
   }
   void Unmap(void*, std::size_t) override { --camera_->mapped; }
-  int Wait(int, int) override {
+  std::chrono::nanoseconds Now() override { return camera_->now; }
+  void Sleep(std::chrono::milliseconds duration) override { camera_->now += duration; }
+  int Wait(int, int timeout_ms) override {
+    if (!camera_->plugged_in) return Fail(ENODEV);
+    if (timeout_ms == 0) return camera_->backlog > 0 ? 1 : 0;
     if (camera_->delivered >= camera_->pictures_until_unplugged) return Fail(ENODEV);
     return camera_->delivered >= camera_->pictures_until_silent ? 0 : 1;
   }
 
   int Control(int, unsigned long request, void* argument) override {
+    if (!camera_->plugged_in) return Fail(ENODEV);
     switch (request) {
+      case VIDIOC_G_CTRL:
+      case VIDIOC_S_CTRL: {
+        auto* control = static_cast<v4l2_control*>(argument);
+        const auto found = camera_->controls.find(control->id);
+        if (found == camera_->controls.end()) return Fail(EINVAL);
+        (request == VIDIOC_G_CTRL ? control->value : found->second) =
+            request == VIDIOC_G_CTRL ? found->second : control->value;
+        return 0;
+      }
       case VIDIOC_QUERYCAP: {
         auto* capability = static_cast<v4l2_capability*>(argument);
         capability->capabilities = camera_->capabilities;
         std::memcpy(capability->card, "Fake", 5);
         return 0;
       }
+      case VIDIOC_TRY_FMT:
       case VIDIOC_S_FMT:
         return SetFormat(static_cast<v4l2_format*>(argument));
       case VIDIOC_G_PARM:
+      case VIDIOC_S_PARM:  // drivers answer with what they have
         static_cast<v4l2_streamparm*>(argument)->parm.capture = {V4L2_CAP_TIMEPERFRAME, 0, {1, 15}, 0, 0, {}};
-        return 0;
-      case VIDIOC_S_PARM:
         return 0;
       case VIDIOC_REQBUFS:
         static_cast<v4l2_requestbuffers*>(argument)->count = 3;
@@ -104,7 +130,7 @@ class FakeSystem : public DeviceSystem {
   }
   int SetFormat(v4l2_format* format) {
     format->fmt.pix.pixelformat = camera_->pixel_format;  // drivers answer with what they have
-    format->fmt.pix.width = kWidth;
+    format->fmt.pix.width = static_cast<std::uint32_t>(camera_->width);
     format->fmt.pix.height = kHeight;
     format->fmt.pix.bytesperline = 0;
     return 0;
@@ -113,7 +139,11 @@ class FakeSystem : public DeviceSystem {
     if (camera_->queue.empty()) return Fail(EAGAIN);
     buffer->index = camera_->queue.front();
     camera_->queue.erase(camera_->queue.begin());
+    if (camera_->streaming && camera_->backlog > 0 && camera_->sequence > 0) --camera_->backlog;
     const int number = camera_->delivered++;
+    buffer->flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+    if (camera_->sequence > 0) camera_->sequence += camera_->missed_before;
+    buffer->sequence = camera_->sequence++;
     std::memset(camera_->buffers[buffer->index].data(), number, kWidth * kHeight);
     buffer->bytesused = number < camera_->broken_pictures ? 3 : kWidth * kHeight;
     buffer->timestamp = {100, number * 1000};
@@ -156,6 +186,103 @@ TEST(Device, ThatIsUnpluggedSaysSo) {
   ASSERT_TRUE(source->Next(&frame));
   ASSERT_TRUE(source->Next(&frame));
   EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("unplugged"));
+}
+
+TEST(Device, ThatIsWaitedForGoesOnWhenItIsBack) {
+  FakeCamera camera;
+  CameraOptions options;
+  options.reconnect = true;
+  const auto source = Open(&camera, options);
+  engine::Frame frame;
+  ASSERT_TRUE(source->Next(&frame));
+  EXPECT_FALSE(frame.picture.empty());
+  const Timestamp before = frame.time;
+  camera.plugged_in = false;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(source->Next(&frame));
+    EXPECT_TRUE(frame.picture.empty());
+    EXPECT_THAT(source->trouble(), HasSubstr("unplugged"));
+    EXPECT_EQ(camera.opened, 0);  // its number is free for when it comes back
+    EXPECT_EQ(camera.mapped, 0);
+  }
+  camera.width = kWidth * 2;
+  camera.plugged_in = true;
+  ASSERT_TRUE(source->Next(&frame));
+  EXPECT_TRUE(frame.picture.empty());
+  EXPECT_THAT(source->trouble(), HasSubstr("at 8x4"));
+  camera.width = kWidth;
+  ASSERT_TRUE(source->Next(&frame));
+  EXPECT_FALSE(frame.picture.empty());
+  EXPECT_EQ(source->trouble(), "");
+  EXPECT_GT(frame.time, before);
+  EXPECT_EQ(frame.index, 1u);
+  EXPECT_EQ(source->delivery().reconnections, 1);
+}
+
+TEST(Device, CountsThePicturesThatTheDriverMissed) {
+  FakeCamera camera;
+  camera.missed_before = 2;
+  const auto source = Open(&camera);
+  engine::Frame frame;
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    ASSERT_TRUE(source->Next(&frame));
+    EXPECT_EQ(frame.index, 3 * i);
+  }
+  EXPECT_EQ(source->delivery().missed, 8u);
+  EXPECT_EQ(source->delivery().delivered, 5u);
+}
+
+TEST(Device, GivesTheNewestPictureAndCountsTheOvertaken) {
+  FakeCamera camera;
+  const auto source = Open(&camera);
+  engine::Frame frame;
+  ASSERT_TRUE(source->Next(&frame));
+  camera.backlog = 2;
+  ASSERT_TRUE(source->Next(&frame));
+  EXPECT_EQ(frame.picture.at<std::uint8_t>(0, 0), 2);  // the backlog holds 1 and 2
+  EXPECT_EQ(frame.index, 2u);
+  EXPECT_EQ(source->delivery().late, 1u);
+}
+
+TEST(Device, HoldsItsAutomaticControlsOnceTheyHaveSettledAndPutsThemBack) {
+  FakeCamera camera;
+  camera.controls = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
+                     {V4L2_CID_EXPOSURE_ABSOLUTE, 123},
+                     {V4L2_CID_AUTOGAIN, 1},
+                     {V4L2_CID_FOCUS_AUTO, 0}};
+  const auto before = camera.controls;
+  CameraOptions options;
+  options.lock_controls_after = 2;
+  {
+    const auto source = Open(&camera, options);
+    engine::Frame frame;
+    ASSERT_TRUE(source->Next(&frame));
+    EXPECT_EQ(camera.controls, before);
+    ASSERT_TRUE(source->Next(&frame));
+    EXPECT_EQ(camera.controls[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_MANUAL);
+    EXPECT_EQ(camera.controls[V4L2_CID_EXPOSURE_ABSOLUTE], 123);
+    EXPECT_EQ(camera.controls[V4L2_CID_AUTOGAIN], 0);
+  }
+  EXPECT_EQ(camera.controls, before);
+}
+
+TEST(Device, TellsTheLatencyOfItsPictures) {
+  FakeCamera camera;
+  const auto source = Open(&camera);
+  engine::Frame frame;
+  ASSERT_TRUE(source->Next(&frame));  // taken at 100 s, and it is 100.5 s now
+  EXPECT_EQ(source->delivery().median_latency, std::chrono::milliseconds(500));
+}
+
+TEST(Device, ThatMayNotBeOpenedIsListedWithWhatToDo) {
+  FakeCamera camera;
+  camera.open_error = EACCES;
+  FakeSystem system(&camera);
+  const auto device = DescribeDevice("/dev/video9", &system);
+  ASSERT_TRUE(device);
+  EXPECT_THAT(device->trouble, HasSubstr("group 'video'"));
+  camera.open_error = ENODEV;
+  EXPECT_FALSE(DescribeDevice("/dev/video9", &system));
 }
 
 TEST(Device, ThatFallsSilentSaysSo) {
@@ -243,6 +370,52 @@ TEST(DevicePictures, InMotionJpegAreDecodedAndTheirSizeIsChecked) {
                 ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bytes, {8, 8}, 8, "picture");
               }),
               HasSubstr("another size"));
+}
+
+TEST(DevicePictures, InMotionJpegMayLeaveOutTheUsualTablesButNotTheirEnd) {
+  cv::Mat picture(48, 64, CV_8UC3);
+  for (int row = 0; row < picture.rows; ++row) {
+    for (int column = 0; column < picture.cols; ++column) {
+      picture.at<cv::Vec3b>(row, column) =
+          cv::Vec3b(static_cast<std::uint8_t>(4 * row), static_cast<std::uint8_t>(3 * column), 100);
+    }
+  }
+  std::vector<std::uint8_t> bytes;
+  ASSERT_TRUE(cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 95}));
+  const cv::Mat whole = ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bytes, {64, 48}, 0, "picture");
+  EXPECT_LT(cv::norm(whole, picture, cv::NORM_L1) / static_cast<double>(picture.total()), 12);
+  // Cameras leave out the DHT segments (FF C4, length) that the encoder above writes as in the standard.
+  std::vector<std::uint8_t> bare;
+  for (std::size_t i = 0; i < bytes.size();) {
+    if (bytes[i] == 0xFF && i + 3 < bytes.size() && bytes[i + 1] == 0xC4) {
+      i += 2 + static_cast<std::size_t>(bytes[i + 2] << 8 | bytes[i + 3]);
+    } else {
+      bare.push_back(bytes[i++]);
+    }
+  }
+  ASSERT_LT(bare.size(), bytes.size());
+  EXPECT_EQ(cv::norm(ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bare, {64, 48}, 0, "picture"), whole), 0);
+  bytes.resize(bytes.size() - 100);
+  EXPECT_THAT(ErrorOf([&] {
+                ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bytes, {64, 48}, 0, "picture");
+              }),
+              HasSubstr("cannot be decoded"));
+}
+
+TEST(DevicePictures, InNv12TakeTheirColourFromTheSecondPlane) {
+  // Two rows of luma and one of interleaved chroma, two bytes of padding after each.
+  std::vector<std::uint8_t> bytes = {100, 100, 100, 100, 0,   0,   100, 100, 100,
+                                     100, 0,   0,   128, 128, 128, 240, 0,   0};
+  const cv::Mat picture = ConvertDevicePicture(V4L2_PIX_FMT_NV12, bytes, {4, 2}, 6, "picture");
+  ASSERT_EQ(picture.type(), CV_8UC3);
+  const auto grey = picture.at<cv::Vec3b>(1, 0), red = picture.at<cv::Vec3b>(1, 3);
+  EXPECT_EQ(grey[0], grey[2]);
+  EXPECT_GT(red[2], red[0] + 100);  // Cr above its middle is red
+  bytes.resize(15);
+  EXPECT_THAT(ErrorOf([&] {
+                ConvertDevicePicture(V4L2_PIX_FMT_NV12, bytes, {4, 2}, 6, "picture");
+              }),
+              HasSubstr("bytes"));
 }
 
 TEST(Device, ThatIsNoVideoDeviceSaysSo) {

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <linux/videodev2.h>
+
+#include <chrono>
+#include <cstdint>
+#include <opencv2/core/types.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "app/cameras/device_system.h"
+#include "app/cameras/frame_source.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+// The device does not answer any more: it was unplugged, or its driver let go of it.
+class DeviceGone : public Error {
+ public:
+  using Error::Error;
+};
+
+// A V4L2 device from one plugging in to the next unplugging: opened, its format and rate agreed, its buffers
+// mapped and streaming. Everything is let go of by the destructor, also when the constructor throws. One
+// thread; the system must outlive it. All functions throw DeviceGone when the device is gone and Error for
+// everything else that is wrong with it.
+class DeviceStream {
+ public:
+  // Throws Error with one sentence: no such device, busy, not permitted, no camera, no known pixel format.
+  DeviceStream(const std::string& path, const DeviceFormat& wanted, DeviceSystem* system);
+  ~DeviceStream() { Stop(); }
+  DeviceStream(const DeviceStream&) = delete;
+  DeviceStream& operator=(const DeviceStream&) = delete;
+
+  // A buffer that is ours until Return. The bytes lie in memory that is shared with the driver.
+  struct Loan {
+    v4l2_buffer buffer{};
+    std::span<const std::uint8_t> bytes;
+    bool broken() const { return (buffer.flags & V4L2_BUF_FLAG_ERROR) != 0; }
+    std::uint32_t sequence() const { return buffer.sequence; }
+  };
+
+  // False when no picture came within the time.
+  bool Wait(std::chrono::milliseconds timeout);
+  // Empty when there was nothing after all.
+  std::optional<Loan> Take();
+  void Return(Loan* loan);
+  // When the picture was taken, on CLOCK_MONOTONIC: the kernel's own stamp, or the present for the few
+  // drivers that stamp with another clock.
+  Timestamp TimeOf(const Loan& loan) const;
+
+  int file() const { return file_; }
+  std::size_t buffer_count() const { return buffers_.size(); }
+  std::uint32_t pixel_format() const { return pixel_format_; }
+  cv::Size size() const { return size_; }
+  std::size_t stride_bytes() const { return stride_bytes_; }
+  double fps() const { return fps_; }  // what the device says it delivers; 30 when it says nothing
+
+ private:
+  struct MappedBuffer {
+    void* memory = nullptr;
+    std::size_t length_bytes = 0;
+  };
+  void Open();
+  void NegotiateFormat(const DeviceFormat& wanted);
+  std::optional<v4l2_pix_format> Ask(unsigned long request, std::uint32_t pixel_format,
+                                     const DeviceFormat& wanted);
+  void NegotiateRate(double fps);
+  void StartStreaming();
+  void Stop() noexcept;
+  [[noreturn]] void Fail(const std::string& what, int error) const;
+
+  const std::string path_;
+  DeviceSystem* const system_;
+  int file_ = -1;
+  bool streaming_ = false;
+  std::uint32_t pixel_format_ = 0;
+  cv::Size size_;
+  std::size_t stride_bytes_ = 0;
+  double fps_ = 30;
+  std::vector<MappedBuffer> buffers_;
+};
+
+}  // namespace docent::app

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/camera_association.h"
+
+#include <algorithm>
+
+namespace docent::app {
+
+bool CameraAssociation::AnyTracked() const {
+  return std::find(tracked_.begin(), tracked_.end(), true) != tracked_.end();
+}
+
+std::uint64_t CameraAssociation::SearchedMap() const {
+  return AnyTracked() || beginning_ ? map_ : 0;
+}
+
+bool CameraAssociation::Tracked(std::size_t camera, std::uint64_t map) {
+  tracked_.at(camera) = false;
+  const std::uint64_t searched = SearchedMap();
+  if (searched != 0 && searched != map) return false;
+  tracked_[camera] = true;
+  map_ = map;
+  beginning_ = false;
+  return true;
+}
+
+void CameraAssociation::Begin(std::uint64_t map) {
+  Release();
+  map_ = map;
+  beginning_ = true;
+}
+
+void CameraAssociation::Release() {
+  tracked_.assign(tracked_.size(), false);
+  map_ = 0;
+  beginning_ = false;
+}
+
+}  // namespace docent::app

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/camera_rig.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "engine/base/random.h"
+
+namespace docent::app {
+namespace {
+
+using engine::Rigid3;
+using engine::Rotation3;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+double Normal(Random* random) {
+  return std::sqrt(-2 * std::log(1 - random->Uniform())) * std::cos(2 * std::numbers::pi * random->Uniform());
+}
+
+Eigen::Vector3d NormalVector(Random* random, double sigma) {
+  return sigma * Eigen::Vector3d(Normal(random), Normal(random), Normal(random));
+}
+
+// A head that looks about while it walks: the first camera's pose.
+Rigid3 FirstFromMap(double seconds) {
+  const Rotation3 look =
+      Rotation3::Exp({0.1 * std::sin(1.3 * seconds), 0.5 * std::sin(0.9 * seconds), 0.05 * seconds});
+  const Eigen::Vector3d place(0.4 * std::sin(seconds), 0.1 * std::cos(2 * seconds), 0.2 * seconds);
+  return Rigid3(look, place).inverse();
+}
+
+const Rigid3 kTruth(Rotation3::Exp({0.05, 0.3, -0.1}), {0.2, 0.13, -0.05});
+const double kBaseline = kTruth.translation.norm();
+
+struct Errors {
+  double baseline = 0, turn_deg = 0;  // baseline: part of the true one
+};
+Errors Compare(const RigEstimate& estimate) {
+  return {std::abs(estimate.Baseline() / kBaseline - 1),
+          (estimate.second_from_first.rotation.inverse() * kTruth.rotation).Angle() / kDegree};
+}
+
+// Two cameras at 30 and 25 frames a second, each pose with the noise of a tracker, one in ten far off.
+// arm: relative motion of the second camera, by time.
+CameraRig Watch(double seconds, const std::function<Rigid3(double)>& arm, std::uint64_t map_key = 1) {
+  CameraRig rig;
+  Random random(5);
+  const auto noisy = [&](const Rigid3& pose) {
+    const bool outlier = random.Below(10) == 0;
+    return Rigid3(Rotation3::Exp(NormalVector(&random, outlier ? 0.2 : 0.1 * kDegree)) * pose.rotation,
+                  pose.translation + NormalVector(&random, outlier ? 0.2 : 0.002));
+  };
+  for (int tick = 0; tick * 1e-3 < seconds; ++tick) {
+    const double time = tick * 1e-3;
+    if (tick % 33 == 0) rig.Add(0, FromSeconds(time), map_key, noisy(FirstFromMap(time)));
+    if (tick % 40 == 7)
+      rig.Add(1, FromSeconds(time), map_key, noisy(arm(time) * kTruth * FirstFromMap(time)));
+  }
+  return rig;
+}
+
+TEST(RelativePose, IsFoundThoughATenthOfTheSamplesIsFarOff) {
+  Random random(3);
+  std::vector<Rigid3> samples;
+  for (int i = 0; i < 300; ++i) {
+    const bool outlier = i % 10 == 0;
+    samples.emplace_back(Rotation3::Exp(NormalVector(&random, outlier ? 1 : 0.2 * kDegree)) * kTruth.rotation,
+                         kTruth.translation + NormalVector(&random, outlier ? 1 : 0.004));
+  }
+  const RigEstimate estimate = RobustRelativePose(samples);
+  EXPECT_LT(Compare(estimate).baseline, 0.01);
+  EXPECT_LT(Compare(estimate).turn_deg, 0.05);
+  // The spread is that of the good samples.
+  EXPECT_NEAR(estimate.position_spread, 0.004, 0.001);
+  EXPECT_NEAR(estimate.turn_spread_deg, 0.2, 0.05);
+}
+
+TEST(Rig, ThatIsRigidIsRecognisedFromCamerasThatDoNotExposeTogether) {
+  const CameraRig rig = Watch(8, [](double) { return Rigid3(); });
+  ASSERT_TRUE(rig.estimate());
+  EXPECT_TRUE(rig.estimate()->rigid) << rig.estimate()->Words();
+  EXPECT_LT(Compare(*rig.estimate()).baseline, 0.01);
+  EXPECT_LT(Compare(*rig.estimate()).turn_deg, 0.3);
+}
+
+TEST(Rig, OfAnArmThatMovesStaysFree) {
+  const CameraRig rig = Watch(8, [](double time) {
+    return Rigid3(Rotation3::Exp({0, 0.3 * std::sin(time), 0}), {0.1 * std::sin(1.7 * time), 0, 0});
+  });
+  ASSERT_TRUE(rig.estimate());
+  EXPECT_FALSE(rig.estimate()->rigid) << rig.estimate()->Words();
+  EXPECT_FALSE(rig.Predict(1, FromSeconds(8), 1));
+}
+
+TEST(Rig, ThatOnlyStoodStillIsNotCalledRigid) {
+  CameraRig rig;
+  for (int i = 0; i < 300; ++i) {
+    rig.Add(0, std::chrono::milliseconds(33 * i), 1, Rigid3());
+    rig.Add(1, std::chrono::milliseconds(33 * i), 1, kTruth);
+  }
+  ASSERT_TRUE(rig.estimate());
+  EXPECT_FALSE(rig.estimate()->rigid);
+}
+
+TEST(Rig, PredictsEitherCameraFromTheOther) {
+  CameraRig rig = Watch(8, [](double) { return Rigid3(); });
+  ASSERT_TRUE(rig.estimate() && rig.estimate()->rigid);
+  rig.Add(0, FromSeconds(8), 1, FirstFromMap(8));
+  rig.Add(1, FromSeconds(8), 1, kTruth * FirstFromMap(8));
+  const auto second = rig.Predict(1, FromSeconds(8.03), 1), first = rig.Predict(0, FromSeconds(8.03), 1);
+  ASSERT_TRUE(second && first);
+  EXPECT_TRUE(IsNear(*second, kTruth * FirstFromMap(8), 0.01 * kBaseline, 0.3 * kDegree));
+  EXPECT_TRUE(IsNear(*first, FirstFromMap(8), 0.01 * kBaseline, 0.3 * kDegree));
+  EXPECT_FALSE(rig.Predict(1, FromSeconds(9), 1)) << "from a pose that is a second old";
+  EXPECT_FALSE(rig.Predict(1, FromSeconds(8), 2)) << "in another map";
+}
+
+TEST(Rig, BeginsAnewInAnotherMapBecauseItsScaleIsAnother) {
+  CameraRig rig = Watch(8, [](double) { return Rigid3(); });
+  rig.Add(0, FromSeconds(9), 2, Rigid3());
+  EXPECT_FALSE(rig.estimate());
+}
+
+}  // namespace
+}  // namespace docent::app

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two cameras in one session, on the simulated pair.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <mutex>
+#include <set>
+
+#include "app/cameras/simulated_source.h"
+#include "app/session/frame_loop.h"
+#include "app/session/session.h"
+#include "app/simulator/scene.h"
+#include "app/simulator/simulation.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+// The scene's own lens at half the size, to be quick.
+engine::CameraModel Halved(const engine::CameraModel& camera) {
+  engine::CameraModel::Intrinsics intrinsics = camera.intrinsics();
+  intrinsics.width_px /= 2;
+  intrinsics.height_px /= 2;
+  intrinsics.fx /= 2;
+  intrinsics.fy /= 2;
+  intrinsics.cx = (intrinsics.cx + 0.5) / 2 - 0.5;
+  intrinsics.cy = (intrinsics.cy + 0.5) / 2 - 0.5;
+  return {camera.lens(), intrinsics, camera.distortion()};
+}
+
+std::shared_ptr<const Simulation> View(const std::string& scene, double seconds) {
+  SimulationOptions options;
+  options.camera = Halved(MakeSimulation(scene, options)->camera());
+  options.frame_rate_hz = 20;
+  options.duration_s = seconds;
+  return MakeSimulation(scene, options);
+}
+
+struct Walk {
+  std::vector<engine::TrackedFrame> frames[2];
+  std::vector<Session::MapState> maps;
+  std::vector<Event> events;
+  std::optional<RigEstimate> rig;
+};
+
+// Feeds both views of a walk to one session that makes a map.
+Walk Take(const std::string& hand, const std::string& shoulder, double seconds, Pace pace) {
+  CalibratedCamera cameras[2] = {Calibrate(OpenSimulation(View(hand, seconds)), std::nullopt),
+                                 Calibrate(OpenSimulation(View(shoulder, seconds)), std::nullopt)};
+  SessionOptions options;
+  options.threaded = pace != Pace::kLockstep;
+  options.first_map = "table";
+  Session session(options, {cameras[0].model, cameras[1].model}, nullptr);
+  Walk walk;
+  std::vector<CameraRun> runs(2);
+  for (int i = 0; i < 2; ++i) {
+    runs[i].camera = &cameras[i];
+    runs[i].options.camera = i;
+    runs[i].options.pace = pace;
+    runs[i].shown = [&walk, i](const engine::TrackedFrame& frame) {
+      walk.frames[i].push_back(frame);
+      walk.frames[i].back().frame.picture.release();
+    };
+  }
+  RunCameras(runs, &session, {});
+  walk.rig = session.Rig();
+  session.Finish();
+  walk.maps = session.Maps();
+  walk.events = session.TakeEvents();
+  return walk;
+}
+
+// Frames with a pose among those from the first one with a pose on.
+double TrackedAfterJoining(const std::vector<engine::TrackedFrame>& frames) {
+  const auto tracked = [](const engine::TrackedFrame& frame) { return engine::HasPose(frame.state); };
+  const auto first = std::find_if(frames.begin(), frames.end(), tracked);
+  if (first == frames.end()) return 0;
+  return static_cast<double>(std::count_if(first, frames.end(), tracked)) /
+         static_cast<double>(frames.end() - first);
+}
+
+TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
+  const Walk walk = Take("hand", "shoulder", 24, Pace::kLockstep);
+  EXPECT_GE(TrackedAfterJoining(walk.frames[0]), 0.98);
+  EXPECT_GE(TrackedAfterJoining(walk.frames[1]), 0.98);
+  ASSERT_FALSE(walk.maps.empty());
+  const Session::MapState& map = walk.maps.back();
+  ASSERT_TRUE(map.snapshot && !map.discarded);
+  // Keyframes tell by their lens which camera took them.
+  std::map<engine::KeyFrameId, int> taken_by;
+  int keyframes[2] = {0, 0};
+  for (const engine::KeyFrame& keyframe : map.snapshot->keyframes) {
+    const int camera = keyframe.camera->lens() == engine::LensModel::kFov ? 1 : 0;
+    taken_by[keyframe.id] = camera;
+    ++keyframes[camera];
+  }
+  EXPECT_GE(keyframes[0], 5);
+  EXPECT_GE(keyframes[1], 5);
+  // Each camera comes to where it finds enough points of the other one's keyframes to be tracked by those
+  // alone (ptamm Fig. 5).
+  for (int camera = 0; camera < 2; ++camera) {
+    int most = 0;
+    for (const engine::TrackedFrame& frame : walk.frames[camera]) {
+      int others = 0;
+      for (const engine::PointMatch& match : frame.matches) {
+        const engine::MapPoint* point =
+            match.inlier && frame.map ? frame.map->FindPoint(match.point) : nullptr;
+        if (point == nullptr || !taken_by.contains(point->source_keyframe)) continue;
+        others += taken_by[point->source_keyframe] != camera;
+      }
+      most = std::max(most, others);
+    }
+    RecordProperty("points_of_the_other_" + std::to_string(camera), most);
+    EXPECT_GE(most, 2 * engine::TrackerOptions().min_recovery_inliers) << "camera " << camera;
+  }
+  EXPECT_FALSE(walk.rig && walk.rig->rigid) << "these cameras move each on its own: " << walk.rig->Words();
+}
+
+TEST(Wearable, RecognisesThatItsCamerasAreFixedToOneAnother) {
+  const Walk walk = Take("hand:1", "shoulder:1", 16, Pace::kLockstep);
+  ASSERT_TRUE(walk.rig);
+  EXPECT_TRUE(walk.rig->rigid) << walk.rig->Words();
+  const engine::Rigid3 truth = WearableRig().inverse();  // shoulder_from_hand
+  const double turn_deg =
+      (walk.rig->second_from_first.rotation.inverse() * truth.rotation).Angle() * 57.29578;
+  EXPECT_LT(turn_deg, 0.3);
+  // The map has a scale of its own: the truth in its units follows from how far the hand moved.
+  const auto hand = View("hand:1", 16);
+  double in_map = 0, in_world = 0;
+  const engine::TrackedFrame* before = nullptr;
+  for (const engine::TrackedFrame& frame : walk.frames[0]) {
+    if (!engine::HasPose(frame.state)) continue;
+    if (before != nullptr && frame.frame.index < before->frame.index + 20) continue;
+    if (before != nullptr) {
+      const auto at = [&](const engine::TrackedFrame& f) {
+        return hand->world_from_camera(static_cast<int>(f.frame.index)).translation;
+      };
+      in_map += (frame.camera_from_map.OriginInSource() - before->camera_from_map.OriginInSource()).norm();
+      in_world += (at(frame) - at(*before)).norm();
+    }
+    before = &frame;
+  }
+  ASSERT_GT(in_world, 0.5);
+  const double baseline_m = walk.rig->Baseline() * in_world / in_map;
+  EXPECT_NEAR(baseline_m, truth.translation.norm(), 0.01 * truth.translation.norm());
+  EXPECT_TRUE(std::any_of(walk.events.begin(), walk.events.end(),
+                          [](const Event& event) { return event.event == "rig"; }));
+}
+
+TEST(Wearable, WorksOnThreadsOfItsOwn) {
+  const Walk walk = Take("hand", "shoulder", 8, Pace::kEager);
+  EXPECT_EQ(walk.frames[0].size(), 161u);
+  EXPECT_GE(walk.frames[1].size(), 150u);  // the run ends with the first camera
+  EXPECT_GE(TrackedAfterJoining(walk.frames[0]), 0.9);
+  EXPECT_GE(TrackedAfterJoining(walk.frames[1]), 0.9);
+}
+
+}  // namespace
+}  // namespace docent::app
