@@ -12,6 +12,10 @@
 
 namespace docent::engine {
 
+// In a source that the build makes from vocabulary.bin.
+extern const unsigned char vocabulary_bytes[];
+extern const std::size_t vocabulary_bytes_size;
+
 namespace {
 
 constexpr std::size_t kBranching = VocabularyTree::kBranching;
@@ -197,6 +201,11 @@ std::size_t VocabularyTree::NearestLeaves(const Descriptor& descriptor,
   }
   for (std::size_t i = 0; i < kept_count; ++i) leaves[i] = kept[i].index;
   return kept_count;
+}
+
+const VocabularyTree& DefaultVocabulary() {
+  static const VocabularyTree tree = VocabularyTree::FromBytes({vocabulary_bytes, vocabulary_bytes_size});
+  return tree;
 }
 
 }  // namespace docent::engine

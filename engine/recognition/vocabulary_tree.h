@@ -59,4 +59,8 @@ class VocabularyTree {
   std::vector<Descriptor> centers_;  // by level, then node
 };
 
+// The vocabulary that comes with the program, out of vocabulary.bin as it was when this was built (the README
+// says what it was trained on).
+const VocabularyTree& DefaultVocabulary();
+
 }  // namespace docent::engine

@@ -8,7 +8,9 @@
 #include <set>
 
 #include "engine/base/error.h"
+#include "engine/vision/features.h"
 #include "tests/engine/recognition/made_descriptors.h"
+#include "tests/engine/rendered_world.h"
 
 namespace docent::engine {
 namespace {
@@ -122,6 +124,35 @@ TEST(VocabularyBytes, AreNotBelievedWhenAnythingIsWrong) {
         static_cast<std::uint8_t>(1u << random.Below(8));
     EXPECT_NE(ErrorOf(damaged), "");
   }
+}
+
+// The descriptors of a world that it was not trained on.
+std::vector<Descriptor> DescriptorsOfARoom() {
+  const auto camera = testing_world::PinholeCamera(640, 480);
+  std::vector<Descriptor> descriptors;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const cv::Mat picture =
+        testing_world::RenderedWorld::Room(seed).Render(*camera, testing_world::CameraAt({0, 0, 0}), 1.5);
+    for (const DescribedPlace& place : DescribeCorners(*MakeFeatures(picture)))
+      descriptors.push_back(place.oriented.descriptor);
+  }
+  return descriptors;
+}
+
+TEST(DefaultVocabulary, TellsAPicturesCornersApart) {
+  std::set<std::uint32_t> leaves;
+  double centre_distance = 0;
+  const std::vector<Descriptor> descriptors = DescriptorsOfARoom();
+  ASSERT_GT(descriptors.size(), 1000u);
+  double pair_distance = 0;
+  for (std::size_t i = 0; i < descriptors.size(); ++i) {
+    const std::uint32_t leaf = DefaultVocabulary().Leaf(descriptors[i]);
+    leaves.insert(leaf);
+    centre_distance += SquaredDistance(descriptors[i], DefaultVocabulary().LeafCenter(leaf));
+    pair_distance += SquaredDistance(descriptors[i], descriptors[(i + 500) % descriptors.size()]);
+  }
+  EXPECT_GT(leaves.size(), descriptors.size() / 4);
+  EXPECT_LT(centre_distance, 0.5 * pair_distance);
 }
 
 }  // namespace
