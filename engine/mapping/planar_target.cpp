@@ -10,6 +10,7 @@
 
 #include "engine/base/error.h"
 #include "engine/recognition/absolute_pose.h"
+#include "engine/recognition/vocabulary_tree.h"
 #include "engine/vision/features.h"
 #include "engine/vision/patch.h"
 
@@ -20,6 +21,8 @@ namespace {
 constexpr int kMinSide = 64;  // of a picture that features are extracted from
 constexpr std::size_t kMinDescriptors = 100;
 constexpr double kElsewhere_px = 8;  // of the model: further apart are two places
+// A descriptor is kept in several leaves and looked for in more: finds nearly what comparing with all does.
+constexpr std::size_t kKeptLeaves = 4, kSearchedLeaves = 8;
 constexpr int kPointsALevel = 250;
 constexpr float kMinPointScore = 60;  // Shi-Tomasi, grey values squared
 
@@ -117,6 +120,12 @@ PlanarTarget::PlanarTarget(const cv::Mat& gray, double width_m, const PlanarTarg
   if (descriptors_.size() < kMinDescriptors)
     throw Error(
         "This picture shows too little detail to be found by; choose one with many corners all over.");
+  leaves_.resize(VocabularyTree::kLeaves);
+  std::array<std::uint32_t, kKeptLeaves> leaves;
+  for (std::uint32_t i = 0; i < descriptors_.size(); ++i) {
+    const std::size_t count = DefaultVocabulary().NearestLeaves(descriptors_[i].descriptor, leaves);
+    for (std::size_t k = 0; k < count; ++k) leaves_[leaves[k]].push_back(i);
+  }
 }
 
 void PlanarTarget::MakePoints() {
@@ -172,20 +181,25 @@ Eigen::Vector3d PlanarTarget::InTarget(const Eigen::Vector2d& model_pixel) const
 std::vector<PlanarTarget::DescriptorMatch> PlanarTarget::MatchDescriptors(
     const ImageFeatures& features) const {
   std::vector<DescriptorMatch> matches;
+  std::array<std::uint32_t, kSearchedLeaves> leaves;
   for (const DescribedPlace& place : DescribeCorners(features, options_.corners)) {
     int best = std::numeric_limits<int>::max(), second = best;
     const ModelDescriptor* nearest = nullptr;
-    for (const ModelDescriptor& candidate : descriptors_) {
-      const int distance = SquaredDistance(place.oriented.descriptor, candidate.descriptor);
-      if (distance >= second) continue;
-      const bool same_place =
-          nearest && (candidate.pixel - nearest->pixel).squaredNorm() < kElsewhere_px * kElsewhere_px;
-      if (distance < best) {
-        if (!same_place) second = best;
-        best = distance;
-        nearest = &candidate;
-      } else if (!same_place) {
-        second = distance;
+    const std::size_t count = DefaultVocabulary().NearestLeaves(place.oriented.descriptor, leaves);
+    for (std::size_t k = 0; k < count; ++k) {
+      for (const std::uint32_t index : leaves_[leaves[k]]) {
+        const ModelDescriptor& candidate = descriptors_[index];
+        const int distance = SquaredDistance(place.oriented.descriptor, candidate.descriptor);
+        if (distance >= second) continue;
+        const bool same_place =
+            nearest && (candidate.pixel - nearest->pixel).squaredNorm() < kElsewhere_px * kElsewhere_px;
+        if (distance < best) {
+          if (!same_place) second = best;
+          best = distance;
+          nearest = &candidate;
+        } else if (!same_place) {
+          second = distance;
+        }
       }
     }
     if (!nearest || best > options_.max_distance || !(best < options_.max_ratio * second)) continue;

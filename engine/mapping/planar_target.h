@@ -97,6 +97,7 @@ class PlanarTarget {
   std::array<cv::Mat, kModelLevels> levels_;
   std::array<std::vector<ModelPoint>, kModelLevels> points_;  // by the level they are corners of, best first
   std::vector<ModelDescriptor> descriptors_;
+  std::vector<std::vector<std::uint32_t>> leaves_;  // indices of descriptors, by vocabulary leaf
 };
 
 }  // namespace docent::engine
