@@ -20,8 +20,8 @@ struct PlanarTargetOptions {
   CornerDescriptionOptions corners  // of the frame, for detection
       = {.corners = {300, 200, 120, 60}, .min_score = 20};
   int max_distance = 60000;  // squared, of matched descriptors
-  double max_ratio = 0.7;    // of squared distances, against the best one elsewhere on the target
-  int min_matches = 10;      // that agree on a pose, before alignment is asked
+  double max_ratio = 0.64;   // of squared distances, against the best one elsewhere on the target
+  int min_matches = 7;       // that agree on a pose, before alignment is asked
   double consensus_px = 4;   // corners of coarse levels lie this far off
   int points_a_stage = 120;  // aligned at most
   float min_correlation = 0.75f;
@@ -56,9 +56,8 @@ class PlanarTarget {
   double width_m() const { return width_m_; }
   double height_m() const { return height_m_; }
 
-  // Finds the target anywhere in a frame, seen up to about 60 degrees aslant and no smaller than about a
-  // fifth of a 640 pixel wide picture. Some milliseconds; deterministic under the seed. Empty where it is not
-  // seen.
+  // Finds the target anywhere in a frame, most often where it is seen up to about 50 degrees aslant and is at
+  // least 150 pixels wide. Some milliseconds; deterministic under the seed. Empty where it is not seen.
   std::optional<TargetSighting> Detect(const ImageFeatures& features, const CameraModel& camera,
                                        std::uint64_t seed) const;
   // The target near a pose that is right to within about ten pixels of the frame. Empty where it is not
