@@ -52,7 +52,7 @@ TEST(TargetInitializer, StartsAMapInMetresFromASidewaysStep) {
   const Rigid3 pose_a = pose_at(start->pair.a.time), pose_b = pose_at(start->pair.b.time);
   const Rigid3 b_from_a = pose_b * pose_a.inverse();
   const double baseline_m = b_from_a.translation.norm();
-  EXPECT_NEAR(start->baseline_m, baseline_m, 0.08 * baseline_m);
+  EXPECT_NEAR(start->baseline_m, baseline_m, 0.03 * baseline_m);
   EXPECT_TRUE(IsNear(start->a_from_target, pose_a * Scene().world_from_target, 0.01, 0.008));
   EXPECT_NEAR(start->pair.geometry.b_from_a.translation.norm(), 1, 1e-9);
   EXPECT_LT((start->pair.geometry.b_from_a.rotation.inverse() * b_from_a.rotation).Angle(), 0.008);
