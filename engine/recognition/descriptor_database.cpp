@@ -236,4 +236,15 @@ bool DescriptorDatabase::operator==(const DescriptorDatabase& other) const {
   });
 }
 
+void AddObservation(const ImageFeatures& features, const Observation& observation, int levels_around,
+                    DescriptorDatabase* database) {
+  std::vector<DescribedPlace> places;
+  DescribePlace(features, observation.pixel, observation.level - levels_around,
+                observation.level + levels_around, &places);
+  for (const DescribedPlace& place : places) {
+    database->Add(
+        {place.oriented.descriptor, observation.keyframe, observation.point, place.pixel, place.level});
+  }
+}
+
 }  // namespace docent::engine

@@ -107,4 +107,9 @@ class DescriptorDatabase {
   std::size_t size_ = 0;
 };
 
+// Adds the descriptors of an observation in its keyframe's picture: on its level and `levels_around` coarser
+// and finer ones, as far as the patch fits into them, so that it is recognised from nearer and further too.
+void AddObservation(const ImageFeatures& features, const Observation& observation, int levels_around,
+                    DescriptorDatabase* database);
+
 }  // namespace docent::engine

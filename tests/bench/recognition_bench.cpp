@@ -129,5 +129,23 @@ void DetectATarget(benchmark::State& state) {
 }
 BENCHMARK(DetectATarget)->Unit(benchmark::kMillisecond);
 
+// From a pose that is a little off, as from frame to frame.
+void AlignATarget(benchmark::State& state) {
+  const cv::Mat& picture = Sequence().frames.front().picture;
+  const engine::PlanarTarget target(picture, 1.0);
+  const auto features = engine::MakeFeatures(picture);
+  const auto sighting = target.Detect(*features, *Sequence().camera, 1);
+  if (!sighting) {
+    state.SkipWithError("the picture is not found in itself");
+    return;
+  }
+  const engine::Rigid3 off(engine::Rotation3::Exp({0.005, -0.005, 0.005}), {0.005, 0.005, 0.005});
+  double found = 0;
+  for (auto _ : state)
+    found = target.Align(*features, *Sequence().camera, off * sighting->camera_from_target).has_value();
+  state.counters["found"] = found;
+}
+BENCHMARK(AlignATarget)->Unit(benchmark::kMillisecond);
+
 }  // namespace
 }  // namespace docent::bench

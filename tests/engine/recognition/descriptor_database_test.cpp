@@ -8,7 +8,9 @@
 #include <set>
 #include <vector>
 
+#include "engine/vision/features.h"
 #include "tests/engine/recognition/made_descriptors.h"
+#include "tests/engine/rendered_world.h"
 
 namespace docent::engine {
 namespace {
@@ -302,6 +304,41 @@ TEST(KeyFrameVotes, CountWhatIsCommonForLess) {
   // By counting alone the others would reach half of its score.
   EXPECT_LT(votes[1].score, 0.4 * votes[0].score);
   EXPECT_EQ(common.size(), 1u);
+}
+
+TEST(DescribedObservations, AreFoundFromAnotherPlaceAndTwiceAsFarAway) {
+  const auto world = testing_world::RenderedWorld::SingleWall(2, 4);
+  const auto camera = testing_world::PinholeCamera(640, 480);
+  const Rigid3 pose = testing_world::CameraAt({0, 0, 0});
+  const Map map = testing_world::TrueMap(world, camera, {pose}, 400);
+  const auto& record = map.keyframes().begin()->second;
+  DescriptorDatabase database(DefaultVocabulary());
+  for (const Observation& observation : record.observations)
+    AddObservation(*record.keyframe.features, observation, 1, &database);
+  EXPECT_GT(database.size(), 2 * record.observations.size());
+  for (const Rigid3& other : {testing_world::CameraAt({0.3, 0.1, -0.2}, {0, -5, 30}),
+                              testing_world::CameraAt({0, 0.1, -1.8}, {0, 0, -20})}) {
+    const auto places = DescribeCorners(*MakeFeatures(world.Render(*camera, other, 1.5)));
+    std::vector<Descriptor> queries;
+    for (const DescribedPlace& place : places) queries.push_back(place.oriented.descriptor);
+    const auto matches = database.FindMatches(queries, {});
+    int right = 0;
+    for (const Match& match : matches) {
+      const auto point = std::find_if(map.points().begin(), map.points().end(), [&](const auto& candidate) {
+        return candidate.point.id == match.entry.point;
+      });
+      ASSERT_NE(point, map.points().end());
+      const auto expected = camera->Project(other * point->point.position());
+      right += expected && (expected->cast<float>() - places[match.query].pixel).norm() <
+                               static_cast<float>(3 << places[match.query].level);
+    }
+    EXPECT_GT(right, 20);  // a pose needs eight
+    EXPECT_GT(right, static_cast<int>(matches.size()) / 2) << matches.size();
+  }
+  // What the map forgets, the database forgets with it.
+  for (const Observation& observation : record.observations)
+    database.RemoveObservation(observation.keyframe, observation.point);
+  EXPECT_EQ(database.size(), 0u);
 }
 
 }  // namespace
