@@ -112,6 +112,7 @@ int RunProgram(int argc, const char* const* argv) {
 
   AddCamerasCommand(&program, &invocation);
   AddSimulateCommand(&program, &invocation);
+  AddTrainVocabularyCommand(&program, &invocation);
   AddMapsCommand(&program, &invocation);
   AddContentCommand(&program, &invocation);
   AddDemoCommand(&program, &invocation, RunDemo);

@@ -30,6 +30,7 @@ CLI::App* AddSubcommand(CLI::App* parent, const std::string& name, const std::st
 
 void AddCamerasCommand(CLI::App* program, Invocation* invocation);
 void AddSimulateCommand(CLI::App* program, Invocation* invocation);
+void AddTrainVocabularyCommand(CLI::App* program, Invocation* invocation);
 void AddMapsCommand(CLI::App* program, Invocation* invocation);
 void AddContentCommand(CLI::App* program, Invocation* invocation);
 

@@ -84,6 +84,7 @@ TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
       {"evaluate"},
       {"cameras"},
       {"simulate"},
+      {"train-vocabulary"},
       {"maps"},
       {"maps", "list"},
       {"maps", "show"},

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+
+#include "app/cameras/file_sources.h"
+#include "app/command_line/program.h"
+#include "app/command_line/progress.h"
+#include "app/command_line/run_arguments.h"
+#include "app/files/checked_file.h"
+#include "app/simulator/simulation.h"
+#include "engine/base/error.h"
+#include "engine/recognition/vocabulary_tree.h"
+#include "engine/vision/features.h"
+
+namespace docent::app {
+
+namespace {
+
+using Descriptors = std::vector<engine::Descriptor>;
+
+struct TrainingOptions {
+  std::filesystem::path folder, output;
+  int pictures = 60;  // of each sequence and each simulated scene
+  std::uint64_t seed = 1;
+};
+
+void AddPicture(const cv::Mat& picture, Descriptors* descriptors) {
+  cv::Mat gray = picture;
+  if (picture.channels() == 3) cv::cvtColor(picture, gray, cv::COLOR_BGR2GRAY);
+  if (gray.cols < 64 || gray.rows < 64) return;  // nothing that features can be extracted from
+  for (const engine::DescribedPlace& place : engine::DescribeCorners(*engine::MakeFeatures(gray)))
+    descriptors->push_back(place.oriented.descriptor);
+}
+
+// The folder itself, or those of its folders that hold sequences, by name.
+std::vector<std::filesystem::path> FindSequences(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error))
+    throw Error("'" + folder.string() + "' is no folder; give one that holds sequences.");
+  if (FindLayout(folder)) return {folder};
+  std::vector<std::filesystem::path> sequences;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+    if (entry.is_directory(error) && FindLayout(entry.path())) sequences.push_back(entry.path());
+  if (error) throw Error("Cannot look into the folder '" + folder.string() + "': " + error.message() + ".");
+  if (sequences.empty())
+    throw Error("There is no sequence in '" + folder.string() +
+                "'; one is a folder with rgb.txt, mav0/cam0, video.mp4 or numbered pictures.");
+  std::sort(sequences.begin(), sequences.end());
+  return sequences;
+}
+
+// Every so many pictures of a sequence, from the first one on.
+void AddSequence(const std::filesystem::path& folder, int pictures, Descriptors* descriptors) {
+  const auto source = OpenFolder(folder);
+  constexpr std::uint64_t kUnknownLength = 1000;
+  const std::uint64_t step = std::max<std::uint64_t>(
+      1, source->info().frame_count.value_or(kUnknownLength) / static_cast<std::uint64_t>(pictures));
+  engine::Frame frame;
+  int taken = 0;
+  for (std::uint64_t index = 0; taken < pictures && source->Next(&frame); ++index) {
+    if (index % step != 0) continue;
+    AddPicture(frame.picture, descriptors);
+    ++taken;
+  }
+}
+
+void AddScene(const char* scene, const TrainingOptions& options, Descriptors* descriptors) {
+  SimulationOptions simulated;
+  simulated.seed = options.seed;
+  const auto simulation = MakeSimulation(scene, simulated);
+  const int step = std::max(1, simulation->frame_count() / options.pictures);
+  for (int taken = 0; taken < options.pictures && taken * step < simulation->frame_count(); ++taken) {
+    cv::Mat picture;
+    simulation->Render(taken * step, &picture);
+    AddPicture(picture, descriptors);
+  }
+}
+
+void Train(const TrainingOptions& options, Verbosity verbosity) {
+  const std::vector<std::filesystem::path> sequences = FindSequences(options.folder);
+  const auto scenes = SceneRecipes();
+  Descriptors descriptors;
+  {
+    Progress progress("Sequences and scenes described", sequences.size() + scenes.size(), verbosity);
+    std::uint64_t done = 0;
+    progress.Update(done);
+    for (const std::filesystem::path& sequence : sequences) {
+      AddSequence(sequence, options.pictures, &descriptors);
+      progress.Update(++done);
+    }
+    for (const SceneRecipe& scene : scenes) {
+      AddScene(scene.name, options, &descriptors);
+      progress.Update(++done);
+    }
+  }
+  const std::size_t count = descriptors.size();
+  Progress progress("Centres settled", engine::VocabularyTree::kCenters, verbosity);
+  const engine::VocabularyTree tree = engine::VocabularyTree::Train(
+      std::move(descriptors), options.seed, [&](std::size_t settled) { progress.Update(settled); });
+  const std::vector<std::uint8_t> bytes = tree.ToBytes();
+  CheckedFile file(options.output);
+  file.Write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  file.Close();
+  if (verbosity != Verbosity::kQuiet) {
+    std::printf("%zu descriptors of %zu sequences and %zu simulated scenes sorted into %u leaves in %s\n",
+                count, sequences.size(), scenes.size(), engine::VocabularyTree::kLeaves,
+                options.output.string().c_str());
+  }
+}
+
+}  // namespace
+
+void AddTrainVocabularyCommand(CLI::App* program, Invocation* invocation) {
+  CLI::App* command = AddSubcommand(
+      program, "train-vocabulary",
+      "Train the tree of descriptors by which places are recognised, from pictures of the sequences in a\n"
+      "folder and of all simulated scenes. The program carries one; a new one takes effect when it is built\n"
+      "in as engine/recognition/vocabulary.bin.",
+      "docent train-vocabulary sequences --output vocabulary.bin");
+  const auto options = std::make_shared<TrainingOptions>();
+  command->add_option("DIR", options->folder, "A sequence, or a folder of sequences")->required();
+  command->add_option("--output", options->output, "File to write")->required();
+  command->add_option("--pictures", options->pictures, "Pictures taken of each sequence and scene")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  AddSeedOption(command, &options->seed);
+  command->callback(
+      [=] { invocation->run = [options, invocation] { Train(*options, invocation->verbosity); }; });
+}
+
+}  // namespace docent::app

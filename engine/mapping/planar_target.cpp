@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/planar_target.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "engine/base/error.h"
+#include "engine/recognition/absolute_pose.h"
+#include "engine/recognition/vocabulary_tree.h"
+#include "engine/vision/features.h"
+#include "engine/vision/patch.h"
+
+namespace docent::engine {
+
+namespace {
+
+constexpr int kMinSide = 64;  // of a picture that features are extracted from
+constexpr std::size_t kMinDescriptors = 100;
+constexpr double kElsewhere_px = 8;  // of the model: further apart are two places
+// A descriptor is kept in several leaves and looked for in more: finds nearly what comparing with all does.
+constexpr std::size_t kKeptLeaves = 4, kSearchedLeaves = 8;
+constexpr int kPointsALevel = 250;
+constexpr float kMinPointScore = 60;  // Shi-Tomasi, grey values squared
+
+// Whole-pixel local maxima of the Shi-Tomasi score on a grid, best first.
+std::vector<Corner> SpreadPoints(const ImageFeatures& features) {
+  const cv::Mat& image = features.levels[0];
+  const double cell = std::max(5.0, std::sqrt(static_cast<double>(image.total()) / (1.5 * kPointsALevel)));
+  const int columns = static_cast<int>(image.cols / cell) + 1, rows = static_cast<int>(image.rows / cell) + 1;
+  struct Scored {
+    float score = kMinPointScore;
+    Corner corner;
+  };
+  std::vector<Scored> best(static_cast<std::size_t>(columns * rows));
+  for (const Corner& corner : features.corners[0]) {
+    const float score = ShiTomasiScore(image, corner.x, corner.y);
+    Scored& place = best[static_cast<std::size_t>(static_cast<int>(corner.y / cell) * columns +
+                                                  static_cast<int>(corner.x / cell))];
+    if (score > place.score) place = {score, corner};
+  }
+  std::erase_if(best, [](const Scored& place) { return place.score <= kMinPointScore; });
+  std::stable_sort(best.begin(), best.end(),
+                   [](const Scored& a, const Scored& b) { return a.score > b.score; });
+  std::vector<Corner> corners;
+  for (const Scored& place : best) corners.push_back(place.corner);
+  return corners;
+}
+
+// Keeps the matches that are turned like most others: true ones agree to within what slant does.
+template <class Match>
+void KeepCommonTurn(std::vector<Match>* matches) {
+  constexpr std::size_t kBins = 24;
+  constexpr float kTurn = 2 * std::numbers::pi_v<float>;
+  std::array<int, kBins> votes{};
+  const auto bin_of = [](float turn) {
+    const float part = turn / kTurn - std::floor(turn / kTurn);
+    return std::min(static_cast<std::size_t>(part * kBins), kBins - 1);
+  };
+  for (const Match& match : *matches) ++votes[bin_of(match.turn_rad)];
+  std::size_t best = 0;
+  int most = -1;
+  for (std::size_t i = 0; i < kBins; ++i) {
+    const int around = votes[(i + kBins - 1) % kBins] + votes[i] + votes[(i + 1) % kBins];
+    if (around > most) {
+      most = around;
+      best = i;
+    }
+  }
+  std::erase_if(*matches, [&](const Match& match) {
+    const std::size_t apart = (bin_of(match.turn_rad) + kBins - best) % kBins;
+    return apart > 3 && apart < kBins - 3;
+  });
+}
+
+// The other pose from which a distant plane looks nearly the same: tilted to the other side of the line of
+// sight (Schweighofer and Pinz 2006).
+Rigid3 TiltedOtherWay(const Rigid3& camera_from_target) {
+  const Eigen::Vector3d sight = camera_from_target.translation.normalized();
+  return {Rotation3::Exp(std::numbers::pi * sight) * camera_from_target.rotation *
+              Rotation3::Exp(Eigen::Vector3d(0, 0, std::numbers::pi)),
+          camera_from_target.translation};
+}
+
+}  // namespace
+
+PlanarTarget::PlanarTarget(const cv::Mat& gray, double width_m, const PlanarTargetOptions& options)
+    : options_(options), width_m_(width_m) {
+  if (!(width_m > 0) || !std::isfinite(width_m))
+    throw Error("The width of a target is a positive number of metres.");
+  if (gray.cols < kMinSide || gray.rows < kMinSide) {
+    throw Error("A target's picture has at least " + std::to_string(kMinSide) +
+                " pixels on each side, and this one " + std::to_string(gray.cols) + " by " +
+                std::to_string(gray.rows) + ".");
+  }
+  height_m_ = width_m * gray.rows / gray.cols;
+  const double reduction =
+      std::min(1.0, static_cast<double>(options.model_size_px) / std::max(gray.cols, gray.rows));
+  cv::resize(gray, levels_[0],
+             {std::max(1, static_cast<int>(std::lround(gray.cols * reduction))),
+              std::max(1, static_cast<int>(std::lround(gray.rows * reduction)))},
+             0, 0, cv::INTER_AREA);
+  for (std::size_t level = 1; level < kModelLevels; ++level) {
+    const cv::Mat& finer = levels_[level - 1];
+    if (finer.cols < 2 * kPatchSize || finer.rows < 2 * kPatchSize) break;
+    const cv::Size half(finer.cols / 2, finer.rows / 2);
+    cv::resize(finer(cv::Rect(cv::Point(), half * 2)), levels_[level], half, 0, 0, cv::INTER_AREA);
+  }
+  MakePoints();
+  // Frames have levels a factor two apart and descriptors bear a third more or less: steps of a square root
+  // of two down to where the target is small, and the same seen aslant from eight sides.
+  for (const double scale : {1.0, 0.71, 0.5, 0.35, 0.25}) {
+    DescribeView(scale, 1, 0);
+    if (scale < 0.3) continue;
+    for (int side = 0; side < 4; ++side) DescribeView(scale, 0.6, side * std::numbers::pi / 4);
+  }
+  if (descriptors_.size() < kMinDescriptors)
+    throw Error(
+        "This picture shows too little detail to be found by; choose one with many corners all over.");
+  leaves_.resize(VocabularyTree::kLeaves);
+  std::array<std::uint32_t, kKeptLeaves> leaves;
+  for (std::uint32_t i = 0; i < descriptors_.size(); ++i) {
+    const std::size_t count = DefaultVocabulary().NearestLeaves(descriptors_[i].descriptor, leaves);
+    for (std::size_t k = 0; k < count; ++k) leaves_[leaves[k]].push_back(i);
+  }
+}
+
+void PlanarTarget::MakePoints() {
+  std::uint32_t id = 0;
+  for (std::size_t level = 0; level < kModelLevels; ++level) {
+    if (levels_[level].cols < kMinSide || levels_[level].rows < kMinSide) break;
+    for (const Corner& corner : SpreadPoints(*MakeFeatures(levels_[level]))) {
+      points_[level].push_back(
+          {id++, LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), static_cast<int>(level))});
+    }
+  }
+}
+
+void PlanarTarget::DescribeView(double scale, double squeeze, double squeeze_rad) {
+  const cv::Mat& model = levels_[0];
+  const cv::Size size(static_cast<int>(model.cols * scale), static_cast<int>(model.rows * scale));
+  if (size.width < kMinSide || size.height < kMinSide) return;
+  cv::Mat view;
+  cv::resize(model, view, size, 0, 0, cv::INTER_AREA);
+  const Eigen::Array2d scales(static_cast<double>(size.width) / model.cols,
+                              static_cast<double>(size.height) / model.rows);
+  Eigen::Matrix2d slant = Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d middle(0.5 * (size.width - 1), 0.5 * (size.height - 1));
+  if (squeeze < 1) {
+    const Eigen::Vector2d along(std::cos(squeeze_rad), std::sin(squeeze_rad));
+    slant -= (1 - squeeze) * along * along.transpose();
+    const Eigen::Vector2d offset = middle - slant * middle;
+    const cv::Matx23d warp(slant(0, 0), slant(0, 1), offset.x(), slant(1, 0), slant(1, 1), offset.y());
+    cv::Mat smooth;
+    cv::GaussianBlur(view, smooth, {}, 0.6);  // what is squeezed would alias
+    cv::warpAffine(smooth, view, warp, size, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  }
+  CornerDescriptionOptions corners = options_.corners;
+  corners.corners = {static_cast<int>((squeeze < 1 ? 280 : 400) * scale) + 40, 0, 0, 0};
+  const Eigen::Matrix2d back = slant.inverse();
+  for (const DescribedPlace& place : DescribeCorners(*MakeFeatures(view), corners)) {
+    const Eigen::Vector2d in_scaled = middle + back * (place.pixel.cast<double>() - middle);
+    const Eigen::Vector2d pixel = (in_scaled.array() + 0.5) / scales - 0.5;
+    // Beyond the picture's edge there is but its smear.
+    if (pixel.x() < 4 || pixel.y() < 4 || pixel.x() > model.cols - 5 || pixel.y() > model.rows - 5) continue;
+    const double turn = place.oriented.direction_rad;
+    const Eigen::Vector2d direction = back * Eigen::Vector2d(std::cos(turn), std::sin(turn));
+    descriptors_.push_back(
+        {place.oriented.descriptor, pixel, static_cast<float>(std::atan2(direction.y(), direction.x()))});
+  }
+}
+
+Eigen::Vector3d PlanarTarget::InTarget(const Eigen::Vector2d& model_pixel) const {
+  return {((model_pixel.x() + 0.5) / levels_[0].cols - 0.5) * width_m_,
+          ((model_pixel.y() + 0.5) / levels_[0].rows - 0.5) * height_m_, 0};
+}
+
+std::vector<PlanarTarget::DescriptorMatch> PlanarTarget::MatchDescriptors(
+    const ImageFeatures& features) const {
+  std::vector<DescriptorMatch> matches;
+  std::array<std::uint32_t, kSearchedLeaves> leaves;
+  for (const DescribedPlace& place : DescribeCorners(features, options_.corners)) {
+    int best = std::numeric_limits<int>::max(), second = best;
+    const ModelDescriptor* nearest = nullptr;
+    const std::size_t count = DefaultVocabulary().NearestLeaves(place.oriented.descriptor, leaves);
+    for (std::size_t k = 0; k < count; ++k) {
+      for (const std::uint32_t index : leaves_[leaves[k]]) {
+        const ModelDescriptor& candidate = descriptors_[index];
+        const int distance = SquaredDistance(place.oriented.descriptor, candidate.descriptor);
+        if (distance >= second) continue;
+        const bool same_place =
+            nearest && (candidate.pixel - nearest->pixel).squaredNorm() < kElsewhere_px * kElsewhere_px;
+        if (distance < best) {
+          if (!same_place) second = best;
+          best = distance;
+          nearest = &candidate;
+        } else if (!same_place) {
+          second = distance;
+        }
+      }
+    }
+    if (!nearest || best > options_.max_distance || !(best < options_.max_ratio * second)) continue;
+    matches.push_back(
+        {place.pixel.cast<double>(), nearest->pixel, place.oriented.direction_rad - nearest->direction_rad});
+  }
+  KeepCommonTurn(&matches);
+  return matches;
+}
+
+std::optional<TargetSighting> PlanarTarget::Detect(const ImageFeatures& features, const CameraModel& camera,
+                                                   std::uint64_t seed) const {
+  std::vector<Eigen::Vector3d> rays, points;
+  for (const DescriptorMatch& match : MatchDescriptors(features)) {
+    const auto ray = camera.Unproject(match.pixel);
+    if (!ray) continue;
+    rays.push_back(*ray);
+    points.push_back(InTarget(match.model_pixel));
+  }
+  AbsolutePoseOptions options;
+  options.pixel_angle = camera.PixelAngle();
+  options.inlier_px = options_.consensus_px;
+  options.max_iterations = 1000;
+  options.min_inliers = options_.min_matches;
+  options.seed = seed;
+  const auto consensus = EstimateAbsolutePose(rays, points, options);
+  if (!consensus) return std::nullopt;
+  auto sighting = Align(features, camera, consensus->camera_from_map);
+  // A plane far away has two poses that look nearly alike: alignment from either tells which fits.
+  const auto other = Align(
+      features, camera, TiltedOtherWay(sighting ? sighting->camera_from_target : consensus->camera_from_map));
+  const auto evidence = [](const std::optional<TargetSighting>& s) {
+    return s ? static_cast<double>(s->points.size()) / (0.1 + s->rms_px) : 0.0;
+  };
+  return evidence(other) > evidence(sighting) ? other : sighting;
+}
+
+}  // namespace docent::engine

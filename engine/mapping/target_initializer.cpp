@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/target_initializer.h"
+
+#include <algorithm>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "engine/geometry/triangulation.h"
+
+namespace docent::engine {
+
+namespace {
+
+constexpr const char* kFindTarget = "point the camera at the target";
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+InitializerOptions FollowOnly() {
+  InitializerOptions options;
+  options.attempt_interval = std::numeric_limits<int>::max();
+  options.max_age_frames = std::numeric_limits<int>::max();
+  options.min_alive = 0;  // the target alone will do
+  return options;
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Adds one match with its point in a; the baseline is the unit.
+void Append(const InitialPair::Match& match, const Eigen::Vector3d& point_in_a, double baseline_m,
+            InitialPair* pair) {
+  pair->matches.push_back(match);
+  pair->geometry.points_in_a.push_back(point_in_a / baseline_m);
+  pair->geometry.inlier.push_back(true);
+  ++pair->geometry.inlier_count;
+}
+
+// Points of the target that both views saw; answers with the angles under which they are seen, degrees.
+std::vector<double> AppendTargetPoints(const TargetView& a, const TargetView& b, const Rigid3& b_from_a,
+                                       InitialPair* pair) {
+  std::vector<double> parallax_deg;
+  const double baseline_m = b_from_a.translation.norm();
+  auto other = b.sighting.points.begin();
+  for (const TargetSighting::Point& point : a.sighting.points) {
+    while (other != b.sighting.points.end() && other->id < point.id) ++other;
+    if (other == b.sighting.points.end()) break;
+    if (other->id != point.id) continue;
+    const Eigen::Vector3d in_a = a.sighting.camera_from_target * point.point_in_target;
+    Append({point.pixel.cast<float>(), other->pixel.cast<float>(), 0}, in_a, baseline_m, pair);
+    parallax_deg.push_back(ParallaxAngle(Eigen::Vector3d::Zero(), b_from_a.OriginInSource(), in_a) *
+                           kDegrees);
+  }
+  return parallax_deg;
+}
+
+// Whether a point is where the view shows it.
+bool Agrees(const CameraModel& camera, const Eigen::Vector3d& point_in_camera, const Eigen::Vector2f& pixel,
+            double max_residual_px) {
+  const auto projected = camera.Project(point_in_camera);
+  return projected && (projected->cast<float>() - pixel).norm() < max_residual_px;
+}
+
+void AppendFollowed(const CameraModel& camera, const std::vector<InitialPair::Match>& followed,
+                    const Rigid3& b_from_a, const TargetStartOptions& options, InitialPair* pair) {
+  constexpr float kSamePlace_px = 4;
+  const std::size_t on_target = pair->matches.size();
+  for (const InitialPair::Match& match : followed) {
+    const bool known = std::any_of(
+        pair->matches.begin(), pair->matches.begin() + static_cast<std::ptrdiff_t>(on_target),
+        [&](const auto& other) { return (other.pixel_a - match.pixel_a).norm() < kSamePlace_px; });
+    if (known) continue;
+    const auto ray_a = camera.Unproject(match.pixel_a.cast<double>());
+    const auto ray_b = camera.Unproject(match.pixel_b.cast<double>());
+    if (!ray_a || !ray_b) continue;
+    const auto point = Triangulate(*ray_a, *ray_b, b_from_a);
+    if (!point || ParallaxAngle(Eigen::Vector3d::Zero(), b_from_a.OriginInSource(), *point) * kDegrees <
+                      options.min_point_parallax_deg) {
+      continue;
+    }
+    const double limit_px = options.max_residual_px * (1 << match.level);
+    if (Agrees(camera, *point, match.pixel_a, limit_px) &&
+        Agrees(camera, b_from_a * *point, match.pixel_b, limit_px)) {
+      Append(match, *point, b_from_a.translation.norm(), pair);
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraModel>& camera,
+                                           const TargetView& a, const TargetView& b,
+                                           const std::vector<InitialPair::Match>& followed,
+                                           const TargetStartOptions& options, std::string* hint) {
+  TargetStart start;
+  start.a_from_target = a.sighting.camera_from_target;
+  const Rigid3 b_from_a = b.sighting.camera_from_target * a.sighting.camera_from_target.inverse();
+  start.baseline_m = b_from_a.translation.norm();
+  // Where nothing moved there is no unit to measure in.
+  if (!(start.baseline_m > 1e-9)) {
+    *hint = Advice(TwoViewVerdict::kStill);
+    return std::nullopt;
+  }
+  InitialPair& pair = start.pair;
+  pair.camera = camera;
+  pair.a = a.view;
+  pair.b = b.view;
+  const std::vector<double> parallax_deg = AppendTargetPoints(a, b, b_from_a, &pair);
+  pair.geometry.median_parallax_deg = Median(parallax_deg);
+  if (pair.geometry.median_parallax_deg < options.min_parallax_deg) {
+    *hint = Advice(TwoViewVerdict::kTooLittleParallax);
+    return std::nullopt;
+  }
+  AppendFollowed(*camera, followed, b_from_a, options, &pair);
+  if (pair.geometry.inlier_count < options.min_matches) {
+    *hint = Advice(TwoViewVerdict::kTooFewMatches);
+    return std::nullopt;
+  }
+  // Beside the target there is depth, or there is nothing but the target.
+  pair.geometry.verdict =
+      pair.matches.size() > parallax_deg.size() ? TwoViewVerdict::kGeneral : TwoViewVerdict::kPlanar;
+  pair.geometry.b_from_a = b_from_a;
+  pair.geometry.b_from_a.translation /= start.baseline_m;
+  hint->clear();
+  return start;
+}
+
+TargetInitializer::TargetInitializer(std::shared_ptr<const PlanarTarget> target,
+                                     const TargetStartOptions& options,
+                                     std::shared_ptr<const CameraModel> camera, std::uint64_t seed)
+    : target_(std::move(target)),
+      options_(options),
+      camera_(std::move(camera)),
+      random_(seed),
+      follower_(FollowOnly(), camera_, seed) {
+  Reset();
+}
+
+void TargetInitializer::Reset() {
+  follower_.Reset();
+  first_.reset();
+  sighting_.reset();
+  previous_.reset();
+  hint_ = kFindTarget;
+}
+
+std::optional<TargetSighting> TargetInitializer::Sight(const ImageFeatures& features) {
+  if (sighting_ && previous_) {
+    // What a hand does between two frames is mostly a rotation.
+    const auto rotation = AlignRotation(previous_->small_blurry, *camera_, features.small_blurry, *camera_);
+    const Rotation3 now_from_previous = rotation && rotation->converged ? rotation->b_from_a : Rotation3();
+    if (auto tracked = target_->Align(
+            features, *camera_,
+            Rigid3(now_from_previous, Eigen::Vector3d::Zero()) * sighting_->camera_from_target)) {
+      return tracked;
+    }
+    if (auto tracked = target_->Align(features, *camera_, sighting_->camera_from_target)) return tracked;
+  }
+  return target_->Detect(features, *camera_, random_.Next());
+}
+
+std::optional<TargetStart> TargetInitializer::Track(Timestamp time,
+                                                    const std::shared_ptr<const ImageFeatures>& features) {
+  sighting_ = Sight(*features);
+  previous_ = features;
+  if (first_) {
+    follower_.Track(time, features);
+    // The follower takes a new first view when too few corners are left of the old one: nothing has moved
+    // since then.
+    const bool begun_anew = !trails().empty() && std::all_of(trails().begin(), trails().end(),
+                                                             [](const Initializer::Trail& trail) {
+                                                               return trail.first == trail.now;
+                                                             });
+    if (begun_anew) first_.reset();
+  }
+  if (!sighting_) {
+    hint_ = kFindTarget;
+    return std::nullopt;
+  }
+  const TargetView now{{time, features}, *sighting_};
+  if (!first_) {
+    follower_.Reset();
+    follower_.Track(time, features);
+    first_ = now;
+    hint_ = Advice(TwoViewVerdict::kStill);
+    return std::nullopt;
+  }
+  std::vector<InitialPair::Match> followed;
+  for (const Initializer::Trail& trail : trails())
+    followed.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
+  auto start = MakeTargetStart(camera_, *first_, now, followed, options_, &hint_);
+  if (start) Reset();
+  return start;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/planar_target.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "engine/base/error.h"
+#include "engine/base/random.h"
+#include "engine/vision/features.h"
+#include "tests/engine/mapping/target_scene.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::LookAtBoard;
+using testing_world::TargetScene;
+
+const TargetScene& Scene() {
+  static const TargetScene scene(31);
+  return scene;
+}
+const PlanarTarget& Target() {
+  static const PlanarTarget target(Scene().picture, Scene().width_m);
+  return target;
+}
+const std::shared_ptr<const CameraModel>& Camera() {
+  static const auto camera = testing_world::PinholeCamera(640, 480);
+  return camera;
+}
+
+struct View {
+  double distance, slant_deg, rise_deg, roll_deg;
+};
+
+std::shared_ptr<const ImageFeatures> Look(const View& view, double noise = 1.5) {
+  const Rigid3 pose = LookAtBoard(view.distance, view.slant_deg, view.rise_deg, view.roll_deg);
+  return MakeFeatures(Scene().world.Render(*Camera(), pose, noise));
+}
+Rigid3 Truth(const View& view) {
+  return LookAtBoard(view.distance, view.slant_deg, view.rise_deg, view.roll_deg) * Scene().world_from_target;
+}
+double AngleBetween(const Rigid3& a, const Rigid3& b) {
+  return (a.rotation.inverse() * b.rotation).Angle() * 180 / std::numbers::pi;
+}
+
+TEST(PlanarTarget, IsFoundAtItsTruePlaceFromAllSides) {
+  for (const View& view : {View{1.6, 0, 0, 0},
+                           {2, 30, 0, 0},
+                           {2, -45, 10, 90},
+                           {2, 10, -45, 180},
+                           {3, 20, 20, -35},
+                           {4, 0, 30, 10},
+                           {1.2, 15, 5, -100},
+                           {2.5, 50, -10, 20}}) {
+    SCOPED_TRACE(testing::Message() << view.distance << " m, " << view.slant_deg << ", " << view.rise_deg
+                                    << ", " << view.roll_deg);
+    const auto sighting = Target().Detect(*Look(view), *Camera(), 1);
+    ASSERT_TRUE(sighting);
+    EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation).norm(),
+              0.005 * view.distance);
+    EXPECT_LT(AngleBetween(sighting->camera_from_target, Truth(view)), 0.5);
+    EXPECT_LT(sighting->rms_px, 0.6);
+  }
+}
+
+TEST(PlanarTarget, NamesPointsWhereTheyAre) {
+  const View view{2, 20, 10, 15};
+  const auto sighting = Target().Detect(*Look(view), *Camera(), 1);
+  ASSERT_TRUE(sighting);
+  ASSERT_GE(sighting->points.size(), 50u);
+  for (std::size_t i = 0; i < sighting->points.size(); ++i) {
+    const TargetSighting::Point& point = sighting->points[i];
+    if (i > 0) {
+      EXPECT_GT(point.id, sighting->points[i - 1].id);
+    }
+    EXPECT_EQ(point.point_in_target.z(), 0);
+    EXPECT_LE(std::abs(point.point_in_target.x()), Target().width_m() / 2);
+    EXPECT_LE(std::abs(point.point_in_target.y()), Target().height_m() / 2);
+    const auto expected = Camera()->Project(Truth(view) * point.point_in_target);
+    ASSERT_TRUE(expected);
+    EXPECT_LT((*expected - point.pixel).norm(), 2.5);
+  }
+}
+
+TEST(PlanarTarget, IsMeasuredInItsOwnWidth) {
+  const View view{2, 20, 0, 0};
+  const PlanarTarget half(Scene().picture, Scene().width_m / 2);
+  const auto sighting = half.Detect(*Look(view), *Camera(), 1);
+  ASSERT_TRUE(sighting);
+  EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation / 2).norm(), 0.005);
+}
+
+TEST(PlanarTarget, IsFoundInOtherLightAndBlurred) {
+  const View view{2, 25, 10, 30};
+  const cv::Mat picture = Scene().world.Render(
+      *Camera(), LookAtBoard(view.distance, view.slant_deg, view.rise_deg, view.roll_deg), 1.5);
+  cv::Mat dim, blurred;
+  picture.convertTo(dim, -1, 0.45, 10);
+  cv::GaussianBlur(picture, blurred, {}, 1.8);
+  for (const cv::Mat& changed : {dim, blurred}) {
+    const auto sighting = Target().Detect(*MakeFeatures(changed), *Camera(), 1);
+    ASSERT_TRUE(sighting);
+    EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation).norm(), 0.02);
+    EXPECT_LT(AngleBetween(sighting->camera_from_target, Truth(view)), 0.7);
+  }
+}
+
+TEST(PlanarTarget, IsFoundWhenAThirdIsHidden) {
+  const View view{2, 10, 0, 0};
+  cv::Mat picture = Scene().world.Render(*Camera(), LookAtBoard(2, 10, 0, 0), 1.5);
+  picture(cv::Rect(0, 0, 250, 480)) = cv::Scalar(60);
+  const auto sighting = Target().Detect(*MakeFeatures(picture), *Camera(), 1);
+  ASSERT_TRUE(sighting);
+  EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation).norm(), 0.02);
+}
+
+TEST(PlanarTarget, IsFoundThroughAWideLens) {
+  const CameraModel camera(LensModel::kFov, {640, 480, 330, 330, 322, 236}, {0.9});
+  const Rigid3 pose = LookAtBoard(1.5, 25, 10, 5);
+  const auto sighting = Target().Detect(*MakeFeatures(Scene().world.Render(camera, pose, 1.5)), camera, 1);
+  ASSERT_TRUE(sighting);
+  const Rigid3 truth = pose * Scene().world_from_target;
+  EXPECT_LT((sighting->camera_from_target.translation - truth.translation).norm(), 0.01);
+  EXPECT_LT(AngleBetween(sighting->camera_from_target, truth), 0.5);
+}
+
+TEST(PlanarTarget, IsNeverFoundInOtherPictures) {
+  for (std::uint64_t seed = 500; seed < 512; ++seed) {
+    const TargetScene other(seed);
+    const auto features = MakeFeatures(other.world.Render(*Camera(), LookAtBoard(2, 15, 5, 10), 1.5));
+    EXPECT_FALSE(Target().Detect(*features, *Camera(), seed)) << seed;
+  }
+  Random random(3);
+  cv::Mat noise(480, 640, CV_8UC1);
+  for (int y = 0; y < noise.rows; ++y)
+    for (int x = 0; x < noise.cols; ++x)
+      noise.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
+  EXPECT_FALSE(Target().Detect(*MakeFeatures(noise), *Camera(), 1));
+  EXPECT_FALSE(Target().Detect(*MakeFeatures(cv::Mat(480, 640, CV_8UC1, cv::Scalar(90))), *Camera(), 1));
+}
+
+TEST(PlanarTarget, IsNotFoundMirroredOrFromBehind) {
+  const TargetScene& scene = Scene();
+  cv::Mat mirrored;
+  cv::flip(scene.world.Render(*Camera(), LookAtBoard(2, 15, 5, 0), 1.5), mirrored, 1);
+  EXPECT_FALSE(Target().Detect(*MakeFeatures(mirrored), *Camera(), 1));
+}
+
+TEST(PlanarTargetAlignment, ReachesTheTruthFromNearIt) {
+  const View view{2, 20, 10, 15};
+  const auto features = Look(view);
+  Random random(4);
+  int reached = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    Eigen::Matrix<double, 6, 1> twist;
+    for (int i = 0; i < 6; ++i) twist[i] = random.Uniform(-1, 1) * (i < 3 ? 0.03 : 0.012);
+    const auto sighting = Target().Align(*features, *Camera(), Rigid3::Exp(twist) * Truth(view));
+    if (!sighting) continue;
+    ++reached;
+    EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation).norm(), 0.01);
+    EXPECT_LT(AngleBetween(sighting->camera_from_target, Truth(view)), 0.4);
+  }
+  EXPECT_GE(reached, 18);
+}
+
+TEST(PlanarTargetAlignment, RefusesAPoseFromWhichItIsNotSeen) {
+  const View view{2, 20, 10, 15};
+  const auto features = Look(view);
+  const Rigid3 aside = Rigid3(Rotation3(), {0.6, 0.2, 0}) * Truth(view);
+  EXPECT_FALSE(Target().Align(*features, *Camera(), aside));
+  const Rigid3 behind(Rotation3::Exp({0, std::numbers::pi, 0}) * Truth(view).rotation,
+                      Truth(view).translation);
+  EXPECT_FALSE(Target().Align(*features, *Camera(), behind));
+}
+
+TEST(MakingAPlanarTarget, RefusesWhatCannotBeFoundOrMeasured) {
+  EXPECT_THROW(PlanarTarget(Scene().picture, 0), Error);
+  EXPECT_THROW(PlanarTarget(Scene().picture, -1), Error);
+  EXPECT_THROW(PlanarTarget(Scene().picture, std::nan("")), Error);
+  EXPECT_THROW(PlanarTarget(cv::Mat(50, 300, CV_8UC1, cv::Scalar(0)), 1), Error);
+  EXPECT_THROW(PlanarTarget(cv::Mat(300, 300, CV_8UC1, cv::Scalar(90)), 1), Error);
+}
+
+}  // namespace
+}  // namespace docent::engine

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <numbers>
+#include <opencv2/core.hpp>
+
+#include "engine/mapping/planar_target.h"
+#include "tests/engine/rendered_world.h"
+
+// A painted board before a painted wall, and the picture of it that a person would hand in: what the tests of
+// planar targets look at. World frame x right, y down, z forward, metres.
+namespace docent::engine::testing_world {
+
+struct TargetScene {
+  RenderedWorld world{{}};
+  cv::Mat picture;  // of the board, CV_8UC1
+  double width_m = 0;
+  Rigid3 world_from_target;
+
+  // The board's middle is 2 m ahead.
+  explicit TargetScene(std::uint64_t seed, bool with_things = false) {
+    const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), middle(0, 0, 2);
+    const Wall board = PaintedWall(middle, x, y, 0.8, 0.6, seed);
+    std::vector<Wall> walls = {board, PaintedWall({0, 0, 3.2}, x, y, 5, 4, seed + 100)};
+    if (with_things) {
+      walls.push_back(PaintedWall({-1.3, 0.1, 2.2}, x, y, 0.35, 0.6, seed + 200));
+      walls.push_back(PaintedWall({1.3, -0.1, 1.8}, x, y, 0.35, 0.6, seed + 300));
+    }
+    world = RenderedWorld(walls);
+    board.paint.convertTo(picture, CV_8UC1);
+    width_m = picture.cols * kTexelSize;
+    // The paint's first texel lies on the board's edge, a picture's first pixel half a pixel inside.
+    const Eigen::Vector3d off((picture.cols - 1) * kTexelSize / 2 - 0.8,
+                              (picture.rows - 1) * kTexelSize / 2 - 0.6, 0);
+    world_from_target = Rigid3(Rotation3(), middle + off);
+  }
+};
+
+// A camera that looks at the board's middle from a distance, `slant_deg` to the right of its normal and
+// `rise_deg` above it, turned about its line of sight; camera_from_world.
+inline Rigid3 LookAtBoard(double distance, double slant_deg, double rise_deg, double roll_deg) {
+  const auto radians = [](double degrees) { return degrees * std::numbers::pi / 180; };
+  const Rotation3 world_from_camera = Rotation3::Exp({0, -radians(slant_deg), 0}) *
+                                      Rotation3::Exp({-radians(rise_deg), 0, 0}) *
+                                      Rotation3::Exp({0, 0, radians(roll_deg)});
+  const Eigen::Vector3d center =
+      Eigen::Vector3d(0, 0, 2) - distance * (world_from_camera * Eigen::Vector3d::UnitZ());
+  return Rigid3(world_from_camera, center).inverse();
+}
+
+}  // namespace docent::engine::testing_world

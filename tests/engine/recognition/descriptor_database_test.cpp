@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/recognition/descriptor_database.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "engine/vision/features.h"
+#include "tests/engine/recognition/made_descriptors.h"
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_descriptors::Disturbed;
+using testing_descriptors::MadeDescriptor;
+using testing_descriptors::MadeTree;
+using Entry = DescriptorDatabase::Entry;
+using Match = DescriptorDatabase::Match;
+using Vote = DescriptorDatabase::Vote;
+
+// A map's worth of points with a look of their own.
+class Looks {
+ public:
+  explicit Looks(std::size_t points) {
+    Random random(21);
+    for (std::size_t i = 0; i < points; ++i) looks_.push_back(MadeDescriptor(&random));
+  }
+  const Descriptor& operator[](std::size_t point) const { return looks_[point]; }
+
+  // A keyframe that sees points first, first + step ...
+  std::vector<Entry> KeyFrame(KeyFrameId id, std::size_t first, std::size_t count, int noise = 6) const {
+    Random random(1000 + id);
+    std::vector<Entry> entries;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t point = (first + i) % looks_.size();
+      entries.push_back({Disturbed(looks_[point], noise, &random), id, static_cast<MapPointId>(point),
+                         Eigen::Vector2f(static_cast<float>(random.Below(640)), 3),
+                         static_cast<std::uint8_t>(random.Below(4))});
+    }
+    return entries;
+  }
+
+ private:
+  std::vector<Descriptor> looks_;
+};
+const Looks& Points() {
+  static const Looks looks(2000);
+  return looks;
+}
+
+void AddAll(const std::vector<Entry>& entries, DescriptorDatabase* database) {
+  for (const Entry& entry : entries) database->Add(entry);
+}
+
+std::vector<Descriptor> DescriptorsOf(const std::vector<Entry>& entries) {
+  std::vector<Descriptor> descriptors;
+  for (const Entry& entry : entries) descriptors.push_back(entry.descriptor);
+  return descriptors;
+}
+
+void ExpectSameAnswers(const DescriptorDatabase& a, const DescriptorDatabase& b) {
+  const std::vector<Descriptor> queries = DescriptorsOf(Points().KeyFrame(999, 150, 300, 10));
+  for (const bool each_keyframe : {false, true}) {
+    DescriptorDatabase::MatchOptions options;
+    options.each_keyframe = each_keyframe;
+    const auto first = a.FindMatches(queries, options), second = b.FindMatches(queries, options);
+    ASSERT_EQ(first.size(), second.size());
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      EXPECT_EQ(first[i].query, second[i].query);
+      EXPECT_EQ(first[i].entry, second[i].entry);
+      EXPECT_EQ(first[i].distance, second[i].distance);
+    }
+  }
+  const auto votes_a = a.FindKeyFrames(queries, 100), votes_b = b.FindKeyFrames(queries, 100);
+  ASSERT_EQ(votes_a.size(), votes_b.size());
+  for (std::size_t i = 0; i < votes_a.size(); ++i) {
+    EXPECT_EQ(votes_a[i].keyframe, votes_b[i].keyframe);
+    EXPECT_EQ(votes_a[i].score, votes_b[i].score);
+  }
+}
+
+TEST(DescriptorDatabase, IsAsBeforeAfterKeyFramesWereAddedAndRemoved) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    Random random(seed);
+    DescriptorDatabase database(MadeTree());
+    for (KeyFrameId id = 0; id < 6; ++id) AddAll(Points().KeyFrame(id, 60 * id, 150), &database);
+    const DescriptorDatabase before = database;
+    // The entries of several come mixed, and some of the old ones go away and return.
+    std::vector<Entry> fresh;
+    for (KeyFrameId id = 100; id < 105; ++id) {
+      const auto entries = Points().KeyFrame(id, random.Below(2000), 50 + random.Below(200));
+      fresh.insert(fresh.end(), entries.begin(), entries.end());
+    }
+    for (std::size_t i = fresh.size(); i > 1; --i)
+      std::swap(fresh[i - 1], fresh[random.Below(static_cast<std::uint32_t>(i))]);
+    AddAll(fresh, &database);
+    const KeyFrameId gone = random.Below(6);
+    database.RemoveKeyFrame(gone);
+    EXPECT_FALSE(database == before);
+    EXPECT_FALSE(database.Contains(gone));
+    std::vector<KeyFrameId> order = {100, 101, 102, 103, 104};
+    for (std::size_t i = order.size(); i > 1; --i)
+      std::swap(order[i - 1], order[random.Below(static_cast<std::uint32_t>(i))]);
+    for (const KeyFrameId id : order) database.RemoveKeyFrame(id);
+    AddAll(Points().KeyFrame(gone, 60 * gone, 150), &database);
+    EXPECT_TRUE(database == before);
+    EXPECT_EQ(database.size(), before.size());
+    ExpectSameAnswers(database, before);
+  }
+}
+
+TEST(DescriptorDatabase, HoldsWhatARandomHistoryLeaves) {
+  Random random(5);
+  DescriptorDatabase database(MadeTree());
+  std::vector<Entry> expected;
+  for (int step = 0; step < 400; ++step) {
+    const KeyFrameId keyframe = random.Below(12);
+    switch (random.Below(8)) {
+      case 0:
+        database.RemoveKeyFrame(keyframe);
+        std::erase_if(expected, [&](const Entry& entry) { return entry.keyframe == keyframe; });
+        break;
+      case 1:
+      case 2: {
+        const MapPointId point = random.Below(40);
+        database.RemoveObservation(keyframe, point);
+        std::erase_if(expected,
+                      [&](const Entry& entry) { return entry.keyframe == keyframe && entry.point == point; });
+        break;
+      }
+      default:
+        for (int i = 0; i < 5; ++i) {
+          const MapPointId point = random.Below(40);
+          const Entry entry{Disturbed(Points()[point], 5, &random), keyframe, point, {1, 2}, 0};
+          database.Add(entry);
+          expected.push_back(entry);
+        }
+    }
+    ASSERT_EQ(database.size(), expected.size());
+  }
+  DescriptorDatabase again(MadeTree());
+  AddAll(expected, &again);
+  EXPECT_TRUE(database == again);
+  std::set<KeyFrameId> keyframes;
+  for (const Entry& entry : expected) keyframes.insert(entry.keyframe);
+  EXPECT_EQ(database.KeyFrameCount(), keyframes.size());
+  database.Clear();
+  EXPECT_TRUE(database == DescriptorDatabase(MadeTree()));
+}
+
+TEST(DescriptorDatabase, ComparesEveryPartOfItsEntries) {
+  const Entry entry{Points()[0], 1, 2, {3, 4}, 1};
+  std::vector<Entry> others(5, entry);
+  others[0].descriptor = Points()[1];
+  others[1].keyframe = 7;
+  others[2].point = 7;
+  others[3].pixel.y() = 7;
+  others[4].level = 2;
+  DescriptorDatabase one(MadeTree());
+  one.Add(entry);
+  for (const Entry& other : others) {
+    DescriptorDatabase two(MadeTree());
+    two.Add(other);
+    EXPECT_FALSE(one == two);
+  }
+}
+
+TEST(DescriptorMatches, LeadToThePointThatLooksTheSame) {
+  DescriptorDatabase database(MadeTree());
+  for (KeyFrameId id = 0; id < 10; ++id) AddAll(Points().KeyFrame(id, 100 * id, 300), &database);
+  const std::vector<Entry> seen = Points().KeyFrame(50, 200, 400);
+  const auto matches = database.FindMatches(DescriptorsOf(seen), {});
+  EXPECT_GT(matches.size(), 300u);
+  std::set<MapPointId> points;
+  std::size_t last = 0;
+  for (const Match& match : matches) {
+    EXPECT_EQ(match.entry.point, seen[match.query].point);
+    EXPECT_EQ(match.distance, SquaredDistance(seen[match.query].descriptor, match.entry.descriptor));
+    EXPECT_TRUE(points.insert(match.entry.point).second);
+    EXPECT_GE(match.query, last);
+    last = match.query;
+  }
+}
+
+TEST(DescriptorMatches, AreTheNearestOfAllEntriesMostOften) {
+  DescriptorDatabase database(MadeTree());
+  std::vector<Entry> all;
+  for (KeyFrameId id = 0; id < 4; ++id) {
+    const auto entries = Points().KeyFrame(id, 300 * id, 300);
+    all.insert(all.end(), entries.begin(), entries.end());
+  }
+  AddAll(all, &database);
+  DescriptorDatabase::MatchOptions options;
+  options.leaves = 8;
+  options.max_ratio = 1;
+  options.mutual = false;
+  const std::vector<Descriptor> queries = DescriptorsOf(Points().KeyFrame(50, 100, 300, 12));
+  std::size_t exact = 0;
+  for (const Match& match : database.FindMatches(queries, options)) {
+    int least = match.distance;
+    for (const Entry& entry : all)
+      least = std::min(least, SquaredDistance(queries[match.query], entry.descriptor));
+    exact += least == match.distance;
+  }
+  EXPECT_GT(exact, 270u);
+}
+
+TEST(DescriptorMatches, AreRefusedWhereTwoPointsLookAlike) {
+  DescriptorDatabase database(MadeTree());
+  Random random(8);
+  database.Add({Disturbed(Points()[0], 3, &random), 1, 10, {1, 1}, 0});
+  const Descriptor query = Disturbed(Points()[0], 3, &random);
+  EXPECT_EQ(database.FindMatches(std::span(&query, 1), {}).size(), 1u);
+  // The same point seen again leaves no doubt, another one does.
+  database.Add({Disturbed(Points()[0], 3, &random), 2, 10, {1, 1}, 0});
+  EXPECT_EQ(database.FindMatches(std::span(&query, 1), {}).size(), 1u);
+  database.Add({Disturbed(Points()[0], 3, &random), 3, 11, {1, 1}, 0});
+  EXPECT_EQ(database.FindMatches(std::span(&query, 1), {}).size(), 0u);
+  // In each keyframe by itself there is one.
+  DescriptorDatabase::MatchOptions options;
+  options.each_keyframe = true;
+  const auto matches = database.FindMatches(std::span(&query, 1), options);
+  ASSERT_EQ(matches.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(matches[i].entry.keyframe, i + 1);
+  options.except_keyframe = 2;
+  EXPECT_EQ(database.FindMatches(std::span(&query, 1), options).size(), 2u);
+  options.each_keyframe = false;
+  options.only_keyframe = 3;
+  const auto only = database.FindMatches(std::span(&query, 1), options);
+  ASSERT_EQ(only.size(), 1u);
+  EXPECT_EQ(only[0].entry.point, 11u);
+}
+
+TEST(DescriptorMatches, GiveAPointToTheNearestDescriptorAlone) {
+  DescriptorDatabase database(MadeTree());
+  Random random(9);
+  const Descriptor look = Points()[5];
+  database.Add({look, 1, 10, {1, 1}, 0});
+  const std::vector<Descriptor> queries = {Disturbed(look, 5, &random), Disturbed(look, 1, &random),
+                                           Disturbed(look, 7, &random)};
+  for (const bool mutual : {false, true}) {
+    DescriptorDatabase::MatchOptions options;
+    options.mutual = mutual;
+    const auto matches = database.FindMatches(queries, options);
+    ASSERT_EQ(matches.size(), 1u);
+    EXPECT_EQ(matches[0].query, 1u);
+  }
+}
+
+TEST(DescriptorMatches, AreNotMadeForWhatLooksLikeNothingThere) {
+  DescriptorDatabase database(MadeTree());
+  AddAll(Points().KeyFrame(1, 0, 500), &database);
+  const auto matches = database.FindMatches(DescriptorsOf(Points().KeyFrame(2, 1000, 500)), {});
+  EXPECT_LT(matches.size(), 5u);
+  EXPECT_TRUE(DescriptorDatabase(MadeTree()).FindMatches(std::span(&Points()[0], 1), {}).empty());
+  EXPECT_TRUE(database.FindMatches({}, {}).empty());
+}
+
+TEST(KeyFrameVotes, RankKeyFramesByWhatTheyShare) {
+  DescriptorDatabase database(MadeTree());
+  for (KeyFrameId id = 0; id < 10; ++id) AddAll(Points().KeyFrame(id, 100 * id, 200), &database);
+  // Looks like a place between keyframes 4 (three quarters) and 5 (three quarters less a little).
+  const auto votes = database.FindKeyFrames(DescriptorsOf(Points().KeyFrame(50, 440, 200)), 3);
+  ASSERT_EQ(votes.size(), 3u);
+  EXPECT_EQ(votes[0].keyframe, 4u);
+  EXPECT_EQ(votes[1].keyframe, 5u);
+  EXPECT_GT(votes[1].score, 1.5 * votes[2].score);
+}
+
+TEST(KeyFrameVotes, GiveAKeyFrameItselfTheFullScore) {
+  DescriptorDatabase database(MadeTree());
+  for (KeyFrameId id = 0; id < 5; ++id) AddAll(Points().KeyFrame(id, 50 * id, 200), &database);
+  const std::vector<Descriptor> own = DescriptorsOf(Points().KeyFrame(3, 150, 200));
+  const auto votes = database.FindKeyFrames(own, 10);
+  ASSERT_GE(votes.size(), 2u);
+  EXPECT_EQ(votes[0].keyframe, 3u);
+  EXPECT_NEAR(votes[0].score, 1, 1e-12);
+  for (const Vote& vote : votes) {
+    EXPECT_GT(vote.score, 0);
+    EXPECT_LE(vote.score, 1 + 1e-12);
+  }
+  for (const Vote& vote : database.FindKeyFrames(own, 10, 3)) EXPECT_NE(vote.keyframe, 3u);
+  EXPECT_TRUE(database.FindKeyFrames({}, 10).empty());
+}
+
+TEST(KeyFrameVotes, CountWhatIsCommonForLess) {
+  DescriptorDatabase database(MadeTree());
+  // All keyframes share points 0 to 99; each has a hundred of its own.
+  for (KeyFrameId id = 0; id < 8; ++id) {
+    AddAll(Points().KeyFrame(id, 0, 100), &database);
+    AddAll(Points().KeyFrame(id, 200 + 100 * id, 100), &database);
+  }
+  const auto common = database.FindKeyFrames(DescriptorsOf(Points().KeyFrame(50, 0, 100)), 1);
+  std::vector<Entry> seen = Points().KeyFrame(50, 0, 100);
+  const auto own = Points().KeyFrame(50, 500, 100);
+  seen.insert(seen.end(), own.begin(), own.end());
+  const auto votes = database.FindKeyFrames(DescriptorsOf(seen), 2);
+  ASSERT_EQ(votes.size(), 2u);
+  EXPECT_EQ(votes[0].keyframe, 3u);
+  // By counting alone the others would reach half of its score.
+  EXPECT_LT(votes[1].score, 0.4 * votes[0].score);
+  EXPECT_EQ(common.size(), 1u);
+}
+
+TEST(DescribedObservations, AreFoundFromAnotherPlaceAndTwiceAsFarAway) {
+  const auto world = testing_world::RenderedWorld::SingleWall(2, 4);
+  const auto camera = testing_world::PinholeCamera(640, 480);
+  const Rigid3 pose = testing_world::CameraAt({0, 0, 0});
+  const Map map = testing_world::TrueMap(world, camera, {pose}, 400);
+  const auto& record = map.keyframes().begin()->second;
+  DescriptorDatabase database(DefaultVocabulary());
+  for (const Observation& observation : record.observations)
+    AddObservation(*record.keyframe.features, observation, 1, &database);
+  EXPECT_GT(database.size(), 2 * record.observations.size());
+  for (const Rigid3& other : {testing_world::CameraAt({0.3, 0.1, -0.2}, {0, -5, 30}),
+                              testing_world::CameraAt({0, 0.1, -1.8}, {0, 0, -20})}) {
+    const auto places = DescribeCorners(*MakeFeatures(world.Render(*camera, other, 1.5)));
+    std::vector<Descriptor> queries;
+    for (const DescribedPlace& place : places) queries.push_back(place.oriented.descriptor);
+    const auto matches = database.FindMatches(queries, {});
+    int right = 0;
+    for (const Match& match : matches) {
+      const auto point = std::find_if(map.points().begin(), map.points().end(), [&](const auto& candidate) {
+        return candidate.point.id == match.entry.point;
+      });
+      ASSERT_NE(point, map.points().end());
+      const auto expected = camera->Project(other * point->point.position());
+      right += expected && (expected->cast<float>() - places[match.query].pixel).norm() <
+                               static_cast<float>(3 << places[match.query].level);
+    }
+    EXPECT_GT(right, 20);  // a pose needs eight
+    EXPECT_GT(right, static_cast<int>(matches.size()) / 2) << matches.size();
+  }
+  // What the map forgets, the database forgets with it.
+  for (const Observation& observation : record.observations)
+    database.RemoveObservation(observation.keyframe, observation.point);
+  EXPECT_EQ(database.size(), 0u);
+}
+
+}  // namespace
+}  // namespace docent::engine

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/base/random.h"
+#include "engine/recognition/vocabulary_tree.h"
+
+// Descriptors made of random numbers, for the tests of whatever sorts and finds them.
+namespace docent::engine::testing_descriptors {
+
+// Of the usual length, each element its own.
+inline Descriptor MadeDescriptor(Random* random) {
+  std::array<double, kDescriptorSize> values;
+  double squared = 0;
+  for (double& value : values) {
+    value = random->Uniform() * random->Uniform();
+    squared += value * value;
+  }
+  Descriptor descriptor;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    descriptor.values[i] =
+        static_cast<std::uint8_t>(std::min(255.0, kDescriptorLength * values[i] / std::sqrt(squared)));
+  }
+  return descriptor;
+}
+
+// With up to `most` more or less on each element.
+inline Descriptor Disturbed(Descriptor descriptor, int most, Random* random) {
+  for (std::uint8_t& value : descriptor.values) {
+    const int change = static_cast<int>(random->Below(static_cast<std::uint32_t>(2 * most + 1))) - most;
+    value = static_cast<std::uint8_t>(std::clamp(value + change, 0, 255));
+  }
+  return descriptor;
+}
+
+// `count` descriptors about `clusters` middles.
+inline std::vector<Descriptor> Clustered(std::size_t count, std::size_t clusters, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<Descriptor> middles, descriptors;
+  for (std::size_t i = 0; i < clusters; ++i) middles.push_back(MadeDescriptor(&random));
+  for (std::size_t i = 0; i < count; ++i) descriptors.push_back(Disturbed(middles[i % clusters], 8, &random));
+  return descriptors;
+}
+
+inline const VocabularyTree& MadeTree() {
+  static const VocabularyTree tree = VocabularyTree::Train(Clustered(20000, 6000, 77), 1);
+  return tree;
+}
+
+}  // namespace docent::engine::testing_descriptors

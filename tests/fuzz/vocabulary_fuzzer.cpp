@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Any bytes as a vocabulary: either a tree or one sentence.
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "engine/recognition/vocabulary_tree.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using docent::engine::VocabularyTree;
+  try {
+    const VocabularyTree tree = VocabularyTree::FromBytes({data, size});
+    // What was accepted must come back as the same bytes.
+    if (tree.ToBytes() != std::vector<std::uint8_t>(data, data + size)) __builtin_trap();
+  } catch (const docent::Error&) {
+  }
+  return 0;
+}
