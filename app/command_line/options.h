@@ -39,7 +39,7 @@ struct CameraArguments {
 struct RunArguments {
   CameraArguments cameras;
   std::optional<Pace> pace;  // empty: see ResolvePace
-  EngineKind engine = EngineKind::kSixDof;
+  EngineKind engine = EngineKind::kHybrid;
   bool headless = false;
   std::optional<std::filesystem::path> output;  // folder
   std::optional<std::filesystem::path> record;  // video of the augmented view
@@ -64,7 +64,7 @@ struct EvaluateOptions {
   std::filesystem::path output;
   std::vector<std::filesystem::path> calibrations;  // for the first sequences; the others' are found
   Pace pace = Pace::kEager;
-  EngineKind engine = EngineKind::kSixDof;
+  EngineKind engine = EngineKind::kHybrid;
   std::uint64_t seed = 1;
 };
 

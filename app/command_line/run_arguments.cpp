@@ -62,7 +62,7 @@ void AddPaceOption(CLI::App* command, std::optional<Pace>* pace) {
 void AddEngineOption(CLI::App* command, EngineKind* engine) {
   AddChoice<EngineKind>(
       command, "--engine", engine,
-      "Plain six degrees of freedom (the default), or with panorama maps (not in this version)",
+      "With panorama maps for turns on the spot (the default), or plain six degrees of freedom",
       {{"hybrid", EngineKind::kHybrid}, {"sixdof", EngineKind::kSixDof}});
 }
 

@@ -31,6 +31,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
       maps::Library::Open(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   request.library = &library;
   request.pace = ResolvePace(options.run, AnyLive(cameras));
+  request.engine = options.run.engine;
   request.baseline_m = options.run.baseline_m;
   request.headless = options.run.headless;
   request.seed = options.run.seed;
@@ -54,6 +55,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   request.library = &library;
   request.title = "Docent - tour";
   request.pace = ResolvePace(options.run, AnyLive(cameras));
+  request.engine = options.run.engine;
   request.baseline_m = options.run.baseline_m;
   request.headless = options.run.headless;
   request.seed = options.run.seed;

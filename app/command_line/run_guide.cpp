@@ -125,6 +125,7 @@ class GuideRun {
     options.threaded = request.pace != Pace::kLockstep;
     options.may_write = request.may_write;
     options.seed = request.seed;
+    options.tracker.hybrid = request.engine == EngineKind::kHybrid;
     options.memory.budget_bytes = request.memory_budget_bytes;
     options.memory.wait_for_maps = request.pace != Pace::kRealtime;
     options.baseline_m = request.baseline_m;

@@ -24,6 +24,7 @@ struct GuideRequest {
   maps::Library* library = nullptr;
   bool may_write = false;
   Pace pace = Pace::kEager;
+  EngineKind engine = EngineKind::kHybrid;
   bool headless = false;
   std::uint64_t seed = 1;
   std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory

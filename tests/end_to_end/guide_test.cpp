@@ -291,8 +291,6 @@ TEST(Guide, EndsWithOneLineWhenItsInputIsBad) {
   ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
                            "--script", early.string()},
                           "early.txt, line 2");
-  ExpectOneLineAndStatus1({"evaluate", "sim:cylinder:20", "--engine", "hybrid", "--output", output},
-                          "panorama");
 }
 
 }  // namespace
