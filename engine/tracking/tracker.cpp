@@ -35,6 +35,7 @@ void Tracker::Reset() {
   map_.reset();
   map_key_ = 0;
   starting_ = pair_given_ = tracking_ = false;
+  anchor_.reset();
   entering_key_ = 0;
   entering_frames_ = 0;
   initializer_.Reset();
@@ -90,6 +91,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     selector_.Reset();
     map_tracker_.Clear();
     reports_.clear();
+    anchor_.reset();
     tracking_ = false;
     lost_since_ = Timestamp::min();
   }
@@ -215,6 +217,7 @@ void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
   }
   if (!Believable(result)) {
     map_tracker_.Forget();
+    if (options_.hybrid && FollowPicture(frame, result, out)) return;
     tracking_ = false;
     lost_since_ = frame.time;
     motion_.Miss(frame.time);
@@ -224,6 +227,38 @@ void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
   }
   out->state = TrackingState::kSixDof;
   Accept(frame, result, out);
+}
+
+// On a bare wall there are edges and shades, but hardly a corner: the whole picture still tells how the
+// camera has turned (ptamm §3.2). Only where few points are to be expected; where many are and fail, the pose
+// is wrong.
+bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out) {
+  if (!anchor_ || tried.attempted > options_.bare_points ||
+      frame.time - last_points_ > FromSeconds(options_.max_picture_s))
+    return false;
+  const Rotation3 predicted = motion_.Predict(frame.time).rotation;
+  const auto align = [&] {
+    return AlignRotation(anchor_->small_blurry, *camera_, features_->small_blurry, *camera_,
+                         predicted * anchor_pose_.rotation.inverse());
+  };
+  auto turn = align();
+  if ((!turn || turn->overlap < options_.min_picture_overlap) && previous_) {
+    anchor_ = previous_;
+    anchor_pose_ = motion_.last();
+    turn = align();
+  }
+  if (!turn || !turn->converged || turn->overlap < options_.min_picture_overlap) return false;
+  const double spread = cv::norm(features_->small_blurry.pixels, cv::NORM_L2SQR) /
+                        static_cast<double>(features_->small_blurry.pixels.total());
+  if (turn->rms * turn->rms > (1 - options_.min_picture_agreement) * spread) return false;
+  MapTrackResult result;
+  result.camera_from_map =
+      WithCenter(turn->b_from_a * anchor_pose_.rotation, motion_.last().OriginInSource());
+  result.observed = ObservedMotion::kPanorama;
+  result.attempted = tried.attempted;
+  Accept(frame, result, out);
+  out->hint = "a bare place: only turns are followed";
+  return true;
 }
 
 void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out) {
@@ -248,10 +283,16 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   out->quality_class = good ? TrackingQuality::kGood : TrackingQuality::kBad;
   out->finite_points = result.finite_inliers;
   out->infinite_points = result.inliers - result.finite_inliers;
-  out->matches = map_tracker_.matches();
+  const bool by_points = result.inliers > 0;
+  if (by_points) {
+    anchor_ = features_;
+    anchor_pose_ = result.camera_from_map;
+    last_points_ = frame.time;
+    out->matches = map_tracker_.matches();
+    CollectReports();
+  }
   if (!good) out->hint = "few points are found: slow down";
-  CollectReports();
-  if (good && options_.build_maps) ChooseKeyFrame(frame, result, *out);
+  if ((good || !by_points) && options_.build_maps) ChooseKeyFrame(frame, result, *out);
 }
 
 void Tracker::ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, const TrackedFrame& out) {

@@ -28,9 +28,14 @@ struct TrackerOptions {
   // Panorama maps (hybrid-slam): a turn on the spot is tracked by directions, and a new map begins as one
   // with its first picture. Off: general motion alone, as in ptamm.
   bool hybrid = false;
-  double good_quality = 0.30;  // ptamm §2.1
-  double lost_quality = 0.13;  // ptamm §2.1
-  int min_inliers = 20;        // fewer do not make a pose, whatever their share
+  // A bare wall: where no more points than this can be looked for, a turn is followed by the whole picture.
+  int bare_points = 60;
+  double min_picture_agreement = 0.8;  // share of the picture's variance that the turn must explain
+  double min_picture_overlap = 0.5;    // with the picture that the turn is measured from
+  double max_picture_s = 5.0;          // without points in between: small errors add up
+  double good_quality = 0.30;          // ptamm §2.1
+  double lost_quality = 0.13;          // ptamm §2.1
+  int min_inliers = 20;                // fewer do not make a pose, whatever their share
   // Enough where only the rotation is asked for, or where nearly all that was looked for is there: a bare
   // wall.
   int min_sure_inliers = 12;
@@ -84,6 +89,7 @@ class Tracker {
   std::shared_ptr<ImageFeatures> NextFeatures(const Frame& frame);
   void LookForStart(const Frame& frame, TrackedFrame* out);
   void TrackMap(const Frame& frame, TrackedFrame* out);
+  bool FollowPicture(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out);
   PanoramaId PanoramaFor(const Rigid3& predicted) const;
   void ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, const TrackedFrame& out);
   void OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rigid3& camera_from_map,
@@ -121,6 +127,10 @@ class Tracker {
   double finite_coverage_ = 1, median_depth_ = 1;  // of the last frame that told them
   Rigid3 first_view_from_map_;                     // the pose of the initializer's first view
   Timestamp lost_since_{};
+  // The newest picture whose pose points told, or of a long turn a later one: FollowPicture's measure.
+  std::shared_ptr<const ImageFeatures> anchor_;
+  Rigid3 anchor_pose_;
+  Timestamp last_points_{};  // when points told the pose
   int frames_since_keyframe_ = 0;
   // Poses in another map that agree with each other, before it is entered.
   std::uint64_t entering_key_ = 0;
