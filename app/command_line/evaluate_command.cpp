@@ -25,6 +25,8 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
       ->allow_extra_args(false);
   AddPaceOption(command, pace.get());
   AddEngineOption(command, &options->engine);
+  command->add_flag("--turn-about-camera", options->turn_about_camera,
+                    "Take every turn to be about the camera's own centre, not the wearer's; for comparison");
   AddSeedOption(command, &options->seed);
   command->callback([=, run = std::move(run)] {
     if (options->calibrations.size() > options->sequences.size()) {

@@ -54,6 +54,7 @@ SessionOptions OptionsFor(const EvaluateOptions& options) {
   SessionOptions session;
   session.threaded = options.pace != Pace::kLockstep;
   session.tracker.hybrid = options.engine == EngineKind::kHybrid;
+  session.tracker.turn_center.enabled = !options.turn_about_camera;
   session.first_map = "map";
   session.seed = options.seed;
   return session;

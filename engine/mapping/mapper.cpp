@@ -324,9 +324,9 @@ void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
   keyframe.time = candidate.time;
   keyframe.camera = candidate.camera;
   keyframe.features = candidate.features;
-  // It turned about the reference's centre; where it really stood is not known (hybrid-slam §2).
-  const Rotation3& rotation = candidate.camera_from_map.rotation;
-  keyframe.camera_from_map = Rigid3(rotation, -(rotation * reference.camera_from_map.OriginInSource()));
+  // Where it really stood is not known (hybrid-slam §2): near the reference's centre, as far off as the turn
+  // of a camera in the hand took it.
+  keyframe.camera_from_map = candidate.camera_from_map;
   keyframe.mean_depth = reference.mean_depth;
   keyframe.depth_sigma = reference.depth_sigma;
   const KeyFrameId id = map_.AddKeyFrame(keyframe).keyframe.id;

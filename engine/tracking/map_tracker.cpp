@@ -33,6 +33,11 @@ void MapTracker::Clear() {
   Forget();
 }
 
+void MapTracker::SetPivot(const Eigen::Vector3d& pivot) {
+  if (pivot.isZero(0) != pivot_.isZero(0)) local_panorama_ = kNoId;  // its points are elsewhere now
+  pivot_ = pivot;
+}
+
 // The points of the keyframes that see most of what the last frame saw; without a last frame, of those
 // nearest to the guessed pose. A point that only far-off keyframes know is likely hidden here, and would
 // count as a failure of tracking that it is not (ptamm §5.2).
@@ -96,6 +101,12 @@ void MapTracker::TakePoints(const MapSnapshot& map, bool infinite) {
   ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
   std::vector<LocalPoint>& points = infinite ? local_infinite_ : local_;
   points.clear();
+  double nearness = 0;  // of infinite points; 1 / metres
+  if (infinite && !pivot_.isZero(0)) {
+    const PanoramaMap* panorama = map.FindPanorama(panorama_);
+    const KeyFrame* reference = panorama ? map.FindKeyFrame(panorama->reference) : nullptr;
+    if (reference && reference->mean_depth > 0) nearness = 1 / reference->mean_depth;
+  }
   auto next = map.points.begin();
   for (const MapPointId id : ids_) {
     next = std::lower_bound(next, map.points.end(), id, [](const MapPoint& candidate, MapPointId wanted) {
@@ -104,7 +115,11 @@ void MapTracker::TakePoints(const MapSnapshot& map, bool infinite) {
     if (next == map.points.end()) break;
     if (next->id != id || next->infinite() != infinite) continue;
     if (infinite && next->panorama != panorama_) continue;
-    if (const KeyFrame* source = map.FindKeyFrame(next->source_keyframe)) points.push_back({&*next, source});
+    const KeyFrame* source = map.FindKeyFrame(next->source_keyframe);
+    if (!source) continue;
+    Eigen::Vector4d place = next->point_in_map;
+    if (infinite) place += nearness * source->camera_from_map.OriginInSource().homogeneous();
+    points.push_back({&*next, source, place});
   }
 }
 
@@ -117,7 +132,7 @@ void MapTracker::Project(const std::vector<LocalPoint>& points, const Rigid3& ca
   const int columns = camera_->width_px() / kTakenCellPx + 1;
   for (const LocalPoint& local : points) {
     const MapPoint& point = *local.point;
-    const Eigen::Vector3d x = rotation * point.point_in_map.head<3>() + point.point_in_map[3] * translation;
+    const Eigen::Vector3d x = rotation * local.place.head<3>() + local.place[3] * translation;
     if (!(x.z() > 0)) continue;
     const Eigen::Vector3d normal = rotation * point.normal.cast<double>();
     const double facing = -normal.dot(x);
@@ -138,11 +153,11 @@ void MapTracker::AddCandidates(const Rigid3& camera_from_map, std::size_t wanted
   for (std::size_t i = 0; i < visible_.size() && candidates_.size() - before < wanted; ++i) {
     const std::size_t j = i + random->Below(static_cast<std::uint32_t>(visible_.size() - i));
     std::swap(visible_[i], visible_[j]);
-    const auto& [point, source] = visible_[i];
-    const auto predicted = searcher_.Predict(*point, *source, *camera_, camera_from_map);
+    const auto& [point, source, place] = visible_[i];
+    const auto predicted = searcher_.Predict(*point, *source, *camera_, camera_from_map, place);
     if (!predicted) continue;
     const auto index = static_cast<std::uint32_t>(candidates_.size());
-    candidates_.push_back({point, source, *predicted});
+    candidates_.push_back({point, source, place, *predicted});
     const bool top = predicted->level >= 2 && static_cast<int>(coarse_.size()) < options_.max_coarse;
     (top ? coarse_ : fine_).push_back(index);
   }
@@ -186,8 +201,9 @@ void MapTracker::Search(const std::vector<std::uint32_t>& which, const ImageFeat
     attempts_.push_back({candidate.point->id, found.has_value(), false});
     if (!found) continue;
     measured_.push_back(index);
-    measurements_.push_back({candidate.point->point_in_map, found->pixel.cast<double>(),
-                             1.0 / static_cast<double>(1 << candidate.predicted.level), 1.0});
+    measurements_.push_back({candidate.place, found->pixel.cast<double>(),
+                             1.0 / static_cast<double>(1 << candidate.predicted.level), 1.0,
+                             candidate.point->infinite()});
     matches_.push_back(
         {candidate.point->id, found->pixel, static_cast<std::uint8_t>(candidate.predicted.level), false});
   }
@@ -197,7 +213,8 @@ void MapTracker::Repredict(const Rigid3& camera_from_map) {
   std::size_t kept = 0;
   for (const std::uint32_t index : fine_) {
     Candidate& candidate = candidates_[index];
-    const auto predicted = searcher_.Predict(*candidate.point, *candidate.source, *camera_, camera_from_map);
+    const auto predicted =
+        searcher_.Predict(*candidate.point, *candidate.source, *camera_, camera_from_map, candidate.place);
     if (!predicted) continue;
     candidate.predicted = *predicted;
     fine_[kept++] = index;
@@ -217,7 +234,7 @@ std::optional<Rigid3> MapTracker::PoseFromPatches(const ImageFeatures& features,
   std::vector<Eigen::Vector3d> rays, points;
   for (const PoseMeasurement& measurement : measurements_) {
     const auto ray = camera_->Unproject(measurement.pixel);
-    if (!ray || measurement.point_in_map[3] == 0) continue;
+    if (!ray || measurement.infinite()) continue;
     rays.push_back(*ray);
     points.push_back(measurement.point_in_map.head<3>());
   }
@@ -258,7 +275,7 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   float radius = wide ? options_.coarse_radius_px : options_.fine_radius_alone_px;
   if (result.coarse_found >= options_.min_coarse) {
     const PoseRefinement coarse =
-        RefinePose(*camera_, predicted, options_.refinement, &measurements_, &scratch_);
+        RefinePose(*camera_, predicted, options_.refinement, &measurements_, &scratch_, pivot_);
     if (coarse.converged && coarse.inliers >= options_.min_coarse / 2) {
       result.camera_from_map = coarse.camera_from_map;
       radius = options_.fine_radius_px;
@@ -269,7 +286,7 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   result.attempted = static_cast<int>(attempts_.size());
   result.found = static_cast<int>(measurements_.size());
   const PoseRefinement fine =
-      RefinePose(*camera_, result.camera_from_map, options_.refinement, &measurements_, &scratch_);
+      RefinePose(*camera_, result.camera_from_map, options_.refinement, &measurements_, &scratch_, pivot_);
   result.camera_from_map = fine.camera_from_map;
   result.covariance = fine.covariance;
   result.observed = fine.observed;
@@ -296,7 +313,7 @@ void MapTracker::CountInliers(MapTrackResult* result) {
     const std::size_t cell = CellOf(measurement.pixel, *camera_, kCoverageColumns, kCoverageRows);
     ++all[cell];
     last_inliers_.push_back(attempt.point);
-    if (measurement.point_in_map[3] == 0) continue;
+    if (measurement.infinite()) continue;
     ++result->finite_inliers;
     ++finite[cell];
     scratch_.push_back((result->camera_from_map * measurement.point_in_map).z());

@@ -67,6 +67,8 @@ class MapTracker {
   // Estimates the pose. The matches of the last call stay in matches().
   MapTrackResult Track(const MapSnapshot& map, const ImageFeatures& features, const Rigid3& predicted,
                        Effort effort, Random* random);
+  // What the camera turns about where only its rotation can be told (camera frame); zero: its own centre.
+  void SetPivot(const Eigen::Vector3d& pivot);
 
   const std::vector<PointMatch>& matches() const { return matches_; }
   // Every point looked for in the last call: whether it was found, and whether it agreed with the pose.
@@ -91,10 +93,15 @@ class MapTracker {
   struct LocalPoint {
     const MapPoint* point;
     const KeyFrame* source;
+    // Homogeneous, in the map. While the camera turns about a point that is not its own centre, a direction
+    // is taken to be as far from its source as the panorama map's reference sees the scene: nearer to the
+    // truth than infinity.
+    Eigen::Vector4d place;
   };
   struct Candidate {
     const MapPoint* point;
     const KeyFrame* source;
+    Eigen::Vector4d place;
     PredictedPoint predicted;
   };
   void CollectLocal(const MapSnapshot& map, const Rigid3& camera_from_map);
@@ -113,6 +120,7 @@ class MapTracker {
   std::shared_ptr<const CameraModel> camera_;
   PointSearcher searcher_;
   PanoramaId panorama_ = kNoId;
+  Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();
   std::vector<PointMatch> matches_;
   std::vector<Attempt> attempts_;
   std::vector<MapPointId> last_inliers_;  // of the last frame, by ascending id

@@ -37,11 +37,11 @@ PointSearcher::Cached& PointSearcher::Entry(const MapPoint& point) {
 }
 
 std::optional<PredictedPoint> PointSearcher::Predict(const MapPoint& point, const KeyFrame& source,
-                                                     const CameraModel& camera,
-                                                     const Rigid3& camera_from_map) {
+                                                     const CameraModel& camera, const Rigid3& camera_from_map,
+                                                     const Eigen::Vector4d& place) {
   PredictedPoint predicted;
-  predicted.point_in_camera = camera_from_map.rotation * point.position();
-  if (!point.infinite()) predicted.point_in_camera += camera_from_map.translation;
+  const Eigen::Vector3d position = place.head<3>();
+  predicted.point_in_camera = camera_from_map.rotation * position + place[3] * camera_from_map.translation;
   if (!camera.Project(predicted.point_in_camera, &predicted.pixel, &predicted.jacobian)) return std::nullopt;
   if (!camera.IsInside(predicted.pixel, kPatchSize / 2)) return std::nullopt;
 
@@ -70,8 +70,8 @@ std::optional<PredictedPoint> PointSearcher::Predict(const MapPoint& point, cons
   // The steps of one source pixel on the surface, through its tangent plane.
   const Eigen::Matrix3d source_from_map = source.camera_from_map.rotation.matrix();
   const Eigen::Vector3d normal_in_source = source_from_map * point.normal.cast<double>();
-  Eigen::Vector3d point_in_source = source_from_map * point.position();
-  if (!point.infinite()) point_in_source += source.camera_from_map.translation;
+  const Eigen::Vector3d point_in_source =
+      source_from_map * position + place[3] * source.camera_from_map.translation;
   const double distance = normal_in_source.dot(point_in_source);
   const Eigen::Vector3d ray = entry.ray.cast<double>();
   const Eigen::Vector3d ray_right = entry.ray_right.cast<double>(), ray_down = entry.ray_down.cast<double>();

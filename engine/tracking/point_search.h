@@ -47,8 +47,14 @@ class PointSearcher {
 
   // Empty when the point cannot be seen from there: behind, outside, edge-on, or at a scale that no level
   // fits. source is the keyframe that point.source_keyframe names.
+  // place: homogeneous, where it is taken to be in the map; point_in_camera is then as homogeneous.
   std::optional<PredictedPoint> Predict(const MapPoint& point, const KeyFrame& source,
-                                        const CameraModel& camera, const Rigid3& camera_from_map);
+                                        const CameraModel& camera, const Rigid3& camera_from_map,
+                                        const Eigen::Vector4d& place);
+  std::optional<PredictedPoint> Predict(const MapPoint& point, const KeyFrame& source,
+                                        const CameraModel& camera, const Rigid3& camera_from_map) {
+    return Predict(point, source, camera, camera_from_map, point.point_in_map);
+  }
 
   // Looks for the point within radius_px (level 0) of its prediction: at the corners there, and, where
   // allowed, by alignment from the predicted place itself.

@@ -20,7 +20,8 @@ struct Residual {
   bool valid = false;
 };
 
-Residual Evaluate(const CameraModel& camera, const Rigid3& camera_from_map,
+// pivot: what the three rotational degrees of freedom turn about, camera frame.
+Residual Evaluate(const CameraModel& camera, const Rigid3& camera_from_map, const Eigen::Vector3d& pivot,
                   const PoseMeasurement& measurement) {
   Residual residual;
   const double w = measurement.point_in_map[3];
@@ -31,8 +32,13 @@ Residual Evaluate(const CameraModel& camera, const Rigid3& camera_from_map,
   if (!camera.Project(x, &pixel, &projection)) return residual;
   residual.error = (measurement.pixel - pixel) * measurement.inverse_sigma;
   projection *= measurement.inverse_sigma;
-  residual.jacobian.leftCols<3>() = w * projection;
-  residual.jacobian.rightCols<3>() = -projection * Hat(x);
+  // A presumed distance must not move the camera.
+  if (measurement.infinite()) {
+    residual.jacobian.leftCols<3>().setZero();
+  } else {
+    residual.jacobian.leftCols<3>() = w * projection;
+  }
+  residual.jacobian.rightCols<3>() = -projection * Hat(x - w * pivot);
   residual.valid = true;
   return residual;
 }
@@ -60,7 +66,7 @@ Kind JudgeKind(const CameraModel& camera, const Rigid3& camera_from_map,
   scratch->clear();
   for (const PoseMeasurement& measurement : measurements) {
     const double w = measurement.point_in_map[3];
-    if ((w == 0) != infinite) continue;
+    if (measurement.infinite() != infinite) continue;
     const Eigen::Vector3d x = camera_from_map.rotation * Eigen::Vector3d(measurement.point_in_map.head<3>()) +
                               w * camera_from_map.translation;
     const auto pixel = camera.Project(x);
@@ -80,10 +86,12 @@ double LossWeight(double error, double threshold, bool tukey) {
   return ratio < 1 ? (1 - ratio * ratio) * (1 - ratio * ratio) : 0;
 }
 
-// turn_only: the camera stays where it is, and only its rotation is estimated.
+// turn_about: only the rotation about this point of the camera frame is estimated; null for the whole pose.
 PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const PoseRefinementOptions& options,
-                      bool turn_only, std::vector<PoseMeasurement>* measurements,
+                      const Eigen::Vector3d* turn_about, std::vector<PoseMeasurement>* measurements,
                       std::vector<double>* scratch) {
+  const bool turn_only = turn_about != nullptr;
+  const Eigen::Vector3d pivot = turn_only ? *turn_about : Eigen::Vector3d::Zero();
   PoseRefinement result;
   result.camera_from_map = start;
   result.covariance.setZero();
@@ -101,8 +109,8 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
     Vector6 gradient = Vector6::Zero();
     result.inliers = result.finite_inliers = 0;
     for (PoseMeasurement& measurement : *measurements) {
-      const Residual residual = Evaluate(camera, result.camera_from_map, measurement);
-      const bool infinite = measurement.point_in_map[3] == 0;
+      const Residual residual = Evaluate(camera, result.camera_from_map, pivot, measurement);
+      const bool infinite = measurement.infinite();
       measurement.weight = 0;
       if (!residual.valid) continue;
       measurement.weight = LossWeight(residual.error.norm(), kinds[infinite].threshold, tukey);
@@ -131,7 +139,13 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
       return result;
     }
     const Vector6 update = factor.solve(gradient);
-    result.camera_from_map = Rigid3::Exp(update) * result.camera_from_map;
+    if (turn_only) {
+      const Rigid3 about_pivot(result.camera_from_map.rotation, result.camera_from_map.translation - pivot);
+      const Rigid3 turned = Rigid3::Exp(update) * about_pivot;
+      result.camera_from_map = Rigid3(turned.rotation, turned.translation + pivot);
+    } else {
+      result.camera_from_map = Rigid3::Exp(update) * result.camera_from_map;
+    }
     // Root mean square shift of the projections that this update made, in sigmas of their levels.
     const int infinite_inliers = result.inliers - result.finite_inliers;
     const double counted =
@@ -156,20 +170,20 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
 
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          std::vector<double>* scratch) {
+                          std::vector<double>* scratch, const Eigen::Vector3d& pivot) {
   const auto finite = std::count_if(measurements->begin(), measurements->end(),
-                                    [](const PoseMeasurement& m) { return m.point_in_map[3] != 0; });
+                                    [](const PoseMeasurement& m) { return !m.infinite(); });
   const auto infinite = static_cast<std::ptrdiff_t>(measurements->size()) - finite;
   const bool may_turn = infinite >= kFewestInfinite;
   if (finite >= options.min_finite || !may_turn) {
-    PoseRefinement result = Refine(camera, start, options, false, measurements, scratch);
+    PoseRefinement result = Refine(camera, start, options, nullptr, measurements, scratch);
     if (result.finite_inliers >= options.min_finite || !may_turn) {
       result.observed =
           result.inliers > result.finite_inliers ? ObservedMotion::kHybrid : ObservedMotion::kSixDof;
       return result;
     }
   }
-  PoseRefinement result = Refine(camera, start, options, true, measurements, scratch);
+  PoseRefinement result = Refine(camera, start, options, &pivot, measurements, scratch);
   result.observed = ObservedMotion::kPanorama;
   return result;
 }

@@ -12,10 +12,14 @@ namespace docent::engine {
 
 // One point found in the frame: where it is in the map, where it was seen, and how well.
 struct PoseMeasurement {
-  Eigen::Vector4d point_in_map;
-  Eigen::Vector2d pixel;     // level 0
-  double inverse_sigma = 1;  // 1 / pixels; 2^-level (ptamm §2.1)
-  double weight = 1;         // out: robust weight at the end, 0 for an outlier
+  Eigen::Vector4d point_in_map;  // homogeneous
+  Eigen::Vector2d pixel;         // level 0
+  double inverse_sigma = 1;      // 1 / pixels; 2^-level (ptamm §2.1)
+  double weight = 1;             // out: robust weight at the end, 0 for an outlier
+  // It tells a direction alone; its w is 0 or says how near it is presumed to be.
+  bool direction = false;
+
+  bool infinite() const { return direction || point_in_map[3] == 0; }
 };
 
 struct PoseRefinementOptions {
@@ -33,7 +37,7 @@ struct PoseRefinementOptions {
 enum class ObservedMotion : std::uint8_t {
   kSixDof,    // rotation and translation, from finite points
   kHybrid,    // the same, with infinite points beside
-  kPanorama,  // the rotation alone; the camera's centre is where it was at the start
+  kPanorama,  // the rotation alone; the pivot (or the camera's own centre) is where it was at the start
 };
 
 struct PoseRefinement {
@@ -50,9 +54,11 @@ struct PoseRefinement {
 // Robust Gauss-Newton on reprojection errors of finite and infinite points from `start` (ptamm eq. 1-3,
 // hybrid-slam eq. 1-2): Huber while far away, Tukey for the last iterations. The scale of the errors is
 // estimated for each kind by itself: what little translation does to infinite points is no noise of finite
-// ones. Does not allocate beyond *scratch.
+// ones. Where only the rotation is told, the camera turns about `pivot` (camera frame; zero: its own centre).
+// Does not allocate beyond *scratch.
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          std::vector<double>* scratch);
+                          std::vector<double>* scratch,
+                          const Eigen::Vector3d& pivot = Eigen::Vector3d::Zero());
 
 }  // namespace docent::engine

@@ -17,10 +17,6 @@ double FieldOfView(const CameraModel& camera) {
   return left && right ? std::acos(std::clamp(left->dot(*right), -1.0, 1.0)) : 1.0;
 }
 
-Rigid3 WithCenter(const Rotation3& rotation, const Eigen::Vector3d& center) {
-  return Rigid3(rotation, -(rotation * center));
-}
-
 }  // namespace
 
 Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera, std::uint64_t seed)
@@ -29,13 +25,16 @@ Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraMode
       random_(seed),
       map_tracker_(options.map_tracker, camera_),
       initializer_(options.initializer, camera_, random_.Next()),
-      selector_(options.selector, FieldOfView(*camera_)) {}
+      selector_(options.selector, FieldOfView(*camera_)),
+      turn_center_(options.turn_center) {}
 
 void Tracker::Reset() {
   map_.reset();
   map_key_ = 0;
   starting_ = pair_given_ = tracking_ = false;
   anchor_.reset();
+  turn_center_.Reset();
+  pivot_.setZero();
   entering_key_ = 0;
   entering_frames_ = 0;
   initializer_.Reset();
@@ -89,6 +88,8 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
   } else if (!same) {
     map_tracker_.EnablePanorama(kNoId);
     selector_.Reset();
+    turn_center_.Reset();
+    pivot_.setZero();
     map_tracker_.Clear();
     reports_.clear();
     anchor_.reset();
@@ -205,8 +206,9 @@ PanoramaId Tracker::PanoramaFor(const Rigid3& predicted) const {
 void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
   Rigid3 predicted = motion_.Predict(frame.time);
   if (observed_ == ObservedMotion::kPanorama)
-    predicted = WithCenter(predicted.rotation, motion_.last().OriginInSource());
+    predicted = TurnedAbout(pivot_, motion_.last(), predicted.rotation);
   map_tracker_.EnablePanorama(PanoramaFor(predicted));
+  map_tracker_.SetPivot(pivot_);
   MapTrackResult result =
       map_tracker_.Track(*map_, *features_, predicted, MapTracker::Effort::kUsual, &random_);
   if (!Believable(result)) {
@@ -230,30 +232,32 @@ void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
 }
 
 // On a bare wall there are edges and shades, but hardly a corner: the whole picture still tells how the
-// camera has turned (ptamm §3.2). Only where few points are to be expected; where many are and fail, the pose
-// is wrong.
+// camera has turned (ptamm §3.2). Only where few points are to be expected, or are there; where many are and
+// fail, the pose is wrong.
 bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out) {
-  if (!anchor_ || tried.attempted > options_.bare_points ||
-      frame.time - last_points_ > FromSeconds(options_.max_picture_s))
-    return false;
+  const bool bare = tried.attempted <= options_.bare_points || tried.Quality() >= options_.sure_quality;
+  if (!anchor_ || !bare || frame.time - last_points_ > FromSeconds(options_.max_picture_s)) return false;
+  const SmallBlurryImage& picture = features_->small_blurry;
+  const double spread =
+      cv::norm(picture.pixels, cv::NORM_L2SQR) / static_cast<double>(picture.pixels.total());
   const Rotation3 predicted = motion_.Predict(frame.time).rotation;
+  std::optional<RotationAlignment> turn;
   const auto align = [&] {
-    return AlignRotation(anchor_->small_blurry, *camera_, features_->small_blurry, *camera_,
-                         predicted * anchor_pose_.rotation.inverse());
+    turn = AlignRotation(anchor_->small_blurry, *camera_, picture, *camera_,
+                         predicted * anchor_pose_.rotation.inverse(), 10, pivot_ / median_depth_);
+    return turn && turn->converged && turn->overlap >= options_.min_picture_overlap &&
+           turn->rms * turn->rms <= (1 - options_.min_picture_agreement) * spread;
   };
-  auto turn = align();
-  if ((!turn || turn->overlap < options_.min_picture_overlap) && previous_) {
+  // The older the picture that the turn is measured from, the less errors add up; the newer, the more it has
+  // in common with this one.
+  if (!align()) {
+    if (!previous_ || anchor_ == previous_) return false;
     anchor_ = previous_;
     anchor_pose_ = motion_.last();
-    turn = align();
+    if (!align()) return false;
   }
-  if (!turn || !turn->converged || turn->overlap < options_.min_picture_overlap) return false;
-  const double spread = cv::norm(features_->small_blurry.pixels, cv::NORM_L2SQR) /
-                        static_cast<double>(features_->small_blurry.pixels.total());
-  if (turn->rms * turn->rms > (1 - options_.min_picture_agreement) * spread) return false;
   MapTrackResult result;
-  result.camera_from_map =
-      WithCenter(turn->b_from_a * anchor_pose_.rotation, motion_.last().OriginInSource());
+  result.camera_from_map = TurnedAbout(pivot_, anchor_pose_, turn->b_from_a * anchor_pose_.rotation);
   result.observed = ObservedMotion::kPanorama;
   result.attempted = tried.attempted;
   Accept(frame, result, out);
@@ -266,6 +270,7 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   if (out->state == TrackingState::kRelocalized) {
     motion_.Reset(frame.time, result.camera_from_map);
     selector_.Reset();
+    turn_center_.Reset();
   } else {
     motion_.Update(frame.time, result.camera_from_map);
     if (result.observed == ObservedMotion::kHybrid) out->state = TrackingState::kHybrid;
@@ -275,6 +280,10 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   observed_ = result.observed;
   finite_coverage_ = result.finite_coverage;
   if (result.finite_inliers > 0 && result.median_depth > 0) median_depth_ = result.median_depth;
+  if (result.observed != ObservedMotion::kPanorama) {
+    turn_center_.Add(frame.time, result.camera_from_map, result.covariance, median_depth_);
+    pivot_ = turn_center_.InCamera(median_depth_);
+  }
   out->map = map_;
   out->map_key = map_key_;
   out->camera_from_map = result.camera_from_map;

@@ -15,6 +15,7 @@
 #include "engine/tracking/map_tracker.h"
 #include "engine/tracking/motion_model.h"
 #include "engine/tracking/tracked_frame.h"
+#include "engine/tracking/turn_center.h"
 #include "engine/vision/features.h"
 
 namespace docent::engine {
@@ -25,6 +26,7 @@ struct TrackerOptions {
   InitializerOptions initializer;
   KeyFrameSelectionOptions keyframes;
   KeyFrameSelectorOptions selector;
+  TurnCenterOptions turn_center;
   // Panorama maps (hybrid-slam): a turn on the spot is tracked by directions, and a new map begins as one
   // with its first picture. Off: general motion alone, as in ptamm.
   bool hybrid = false;
@@ -116,6 +118,8 @@ class Tracker {
   Initializer initializer_;
   MotionModel motion_;
   KeyFrameSelector selector_;
+  TurnCenter turn_center_;
+  Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();  // of the turn that goes on, camera frame
 
   std::shared_ptr<const MapSnapshot> map_;
   std::uint64_t map_key_ = 0;

@@ -65,6 +65,7 @@ constexpr int kStride = 2;
 struct Sample {
   Eigen::Vector3d ray;                             // unit, camera frame
   Eigen::Matrix<float, 2, 3> pixel_from_rotation;  // d thumbnail pixel / d small rotation of the ray
+  Eigen::Matrix<float, 2, 3> pixel_from_ray;       // d thumbnail pixel / d ray
   int x = 0, y = 0;                                // thumbnail pixels
   bool valid = false;                              // the lens has a ray here
 };
@@ -108,6 +109,7 @@ SampleTable MakeSampleTable(const CameraModel& camera, cv::Size size, int scale)
       if (ray && camera.Project(*ray, &pixel, &jacobian)) {
         sample.ray = *ray;
         sample.pixel_from_rotation = (jacobian * -Hat(*ray) / scale).cast<float>();
+        sample.pixel_from_ray = (jacobian / scale).cast<float>();
         sample.valid = true;
       }
       table.samples.push_back(sample);
@@ -215,8 +217,12 @@ Comparison Summarise(const Sums& sums) {
 class RotationAligner {
  public:
   RotationAligner(const cv::Mat& a, const CameraModel& camera_a, const cv::Mat& b,
-                  const CameraModel& camera_b, int scale_a, int scale_b)
-      : image_a_(a), image_b_(b) {
+                  const CameraModel& camera_b, int scale_a, int scale_b, const Eigen::Vector3d& pivot)
+      : image_a_(a),
+        image_b_(b),
+        pivot_(pivot),
+        hat_of_pivot_(Hat(pivot).cast<float>()),
+        turns_about_itself_(pivot.isZero(0)) {
     // The tables outlive this aligner: one AlignRotation looks up at most four, fewer than are remembered.
     table_a_ = &FindSampleTable(camera_a, a.size(), scale_a);
     table_b_ = &FindSampleTable(camera_b, b.size(), scale_b);
@@ -236,7 +242,7 @@ class RotationAligner {
         const Sample& sample = table_a_->samples[static_cast<std::size_t>(row * table_a_->columns + column)];
         if (!sample.valid) continue;
         ++sums.valid;
-        const auto pixel = table_b_->camera.Project(rotation * sample.ray);
+        const auto pixel = table_b_->camera.Project(rotation * (sample.ray - pivot_) + pivot_);
         if (!pixel) continue;
         const float x = static_cast<float>(ThumbnailFromPicture(pixel->x(), table_b_->scale));
         const float y = static_cast<float>(ThumbnailFromPicture(pixel->y(), table_b_->scale));
@@ -248,9 +254,9 @@ class RotationAligner {
         ++sums.compared;
         const Eigen::Vector4f& reference = image_a_.At(sample.x, sample.y);
         const Eigen::Vector4f current = image_b_.Interpolate(x, y);
-        const Eigen::RowVector3f slope_a = reference.segment<2>(1).transpose() * sample.pixel_from_rotation;
+        const Eigen::RowVector3f slope_a = reference.segment<2>(1).transpose() * PixelFromRotation(sample);
         const Eigen::RowVector3f slope_b =
-            current.segment<2>(1).transpose() * there.pixel_from_rotation * rotation_f;
+            current.segment<2>(1).transpose() * PixelFromRotation(there) * rotation_f;
         Eigen::Matrix<float, 6, 1> columns;
         columns << 0.5f * (slope_b + static_cast<float>(gain) * slope_a).transpose(), reference[0], 1.0f,
             current[0];
@@ -262,6 +268,10 @@ class RotationAligner {
   }
 
  private:
+  Eigen::Matrix<float, 2, 3> PixelFromRotation(const Sample& sample) const {
+    if (turns_about_itself_) return sample.pixel_from_rotation;
+    return sample.pixel_from_rotation + sample.pixel_from_ray * hat_of_pivot_;
+  }
   // There the blur mixed in mirrored grey values, which do not move as the scene does.
   static bool IsNearBorder(const GradientImage& image, float x, float y) {
     constexpr float kBorder = 4;  // thumbnail pixels; 1.6 sigma of the usual blur
@@ -275,6 +285,9 @@ class RotationAligner {
   }
 
   GradientImage image_a_, image_b_;
+  Eigen::Vector3d pivot_;
+  Eigen::Matrix3f hat_of_pivot_;
+  bool turns_about_itself_;
   const SampleTable* table_a_ = nullptr;
   const SampleTable* table_b_ = nullptr;
 };
@@ -366,14 +379,15 @@ double Difference(const SmallBlurryImage& a, const SmallBlurryImage& b) {
 
 std::optional<RotationAlignment> AlignRotation(const SmallBlurryImage& a, const CameraModel& camera_a,
                                                const SmallBlurryImage& b, const CameraModel& camera_b,
-                                               const Rotation3& initial, int max_iterations) {
+                                               const Rotation3& initial, int max_iterations,
+                                               const Eigen::Vector3d& pivot) {
   if (a.pixels.empty() || b.pixels.empty()) return std::nullopt;
-  const RotationAligner fine(a.pixels, camera_a, b.pixels, camera_b, a.scale, b.scale);
+  const RotationAligner fine(a.pixels, camera_a, b.pixels, camera_b, a.scale, b.scale, pivot);
   Descent descent{initial, fine.Compare(initial, 1.0)};
   constexpr int kMinSizeForCoarse = 32;
   if (std::min({a.pixels.cols, a.pixels.rows, b.pixels.cols, b.pixels.rows}) >= kMinSizeForCoarse) {
     const RotationAligner coarse(Coarser(a.pixels), camera_a, Coarser(b.pixels), camera_b, 2 * a.scale,
-                                 2 * b.scale);
+                                 2 * b.scale, pivot);
     const Descent guess = Descend(coarse, {initial, coarse.Compare(initial, 1.0)}, max_iterations);
     // The coarse pictures suggest; the thumbnails themselves decide.
     const Comparison comparison = fine.Compare(guess.b_from_a, 1.0);

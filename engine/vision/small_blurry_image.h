@@ -33,10 +33,12 @@ struct RotationAlignment {
   double overlap = 0;  // fraction of thumbnail pixels that fall inside the other
   bool converged = false;
 };
-// camera_a, camera_b: models of the full pictures. initial: b_from_a to start from. Empty when the overlap
-// falls below a quarter.
+// camera_a, camera_b: models of the full pictures. initial: b_from_a to start from. pivot: what the camera
+// turned about, camera frame, in units of the distance of what it sees; zero: its own centre. Empty when the
+// overlap falls below a quarter.
 std::optional<RotationAlignment> AlignRotation(const SmallBlurryImage& a, const CameraModel& camera_a,
                                                const SmallBlurryImage& b, const CameraModel& camera_b,
-                                               const Rotation3& initial = {}, int max_iterations = 10);
+                                               const Rotation3& initial = {}, int max_iterations = 10,
+                                               const Eigen::Vector3d& pivot = Eigen::Vector3d::Zero());
 
 }  // namespace docent::engine

@@ -234,5 +234,57 @@ TEST(PoseRefinement, TurnsAboutTheCentreItStartsFromByInfinitePointsAlone) {
   }
 }
 
+// Directions with a presumed distance, seen by a camera that has turned about a point behind it.
+TEST(PoseRefinement, TurnsAboutThePivotWhereOnlyTheRotationIsTold) {
+  Random random(12);
+  const Eigen::Vector3d pivot(0.1, 0, -0.6);
+  constexpr double kDistance = 2.5;
+  const Rigid3 source = Truth();
+  const Rotation3 turn = Rotation3::Exp({0.02, 0.3, -0.01});
+  const Eigen::Vector3d fixed_in_map = source.inverse() * pivot;
+  const Rigid3 turned(turn * source.rotation, pivot - turn * source.rotation * fixed_in_map);
+  std::vector<PoseMeasurement> measurements;
+  while (measurements.size() < 60) {
+    const Eigen::Vector3d ray = *kLens.Unproject({random.Uniform(10, 630), random.Uniform(10, 470)});
+    PoseMeasurement measurement;
+    measurement.direction = true;
+    measurement.point_in_map << (source.rotation.inverse() * ray + source.OriginInSource() / kDistance),
+        1 / kDistance;
+    const auto pixel = kLens.Project((turned * measurement.point_in_map).head<3>());
+    if (!pixel || !kLens.IsInside(*pixel, 4)) continue;
+    measurement.pixel = *pixel;
+    measurements.push_back(measurement);
+  }
+  const Rotation3 guess = Rotation3::Exp({-0.02, 0.04, 0.03}) * turned.rotation;
+  const Rigid3 start(guess, pivot - guess * fixed_in_map);
+  std::vector<double> scratch;
+  const PoseRefinement refined = RefinePose(kLens, start, {}, &measurements, &scratch, pivot);
+  EXPECT_TRUE(refined.converged);
+  EXPECT_EQ(refined.observed, ObservedMotion::kPanorama);
+  EXPECT_EQ(refined.inliers, 60);
+  EXPECT_EQ(refined.finite_inliers, 0);
+  EXPECT_LT((refined.camera_from_map * turned.inverse()).Log().norm(), 1e-6);
+}
+
+// However near a direction is presumed to be: the finite points alone say where the camera is.
+TEST(PoseRefinement, LetsNoPresumedDistanceMoveTheCamera) {
+  Random random(13);
+  std::vector<PoseMeasurement> finite;
+  AddMeasurements(80, 0.5, false, &random, &finite);
+  std::vector<PoseMeasurement> mixed = finite;
+  AddMeasurements(80, 0.5, true, &random, &mixed);
+  for (PoseMeasurement& measurement : mixed) {
+    if (measurement.point_in_map[3] != 0) continue;
+    measurement.direction = true;
+    measurement.point_in_map += (Truth().OriginInSource() / 0.7).homogeneous() - Eigen::Vector4d(0, 0, 0, 1);
+    measurement.point_in_map[3] = 1 / 0.7;
+  }
+  const Rigid3 start = Perturbed(&random, 0.02, 1);
+  const PoseRefinement alone = Refine(start, &finite), together = Refine(start, &mixed);
+  EXPECT_EQ(together.observed, ObservedMotion::kHybrid);
+  EXPECT_LT((alone.camera_from_map.OriginInSource() - together.camera_from_map.OriginInSource()).norm(),
+            3e-4);
+}
+
 }  // namespace
 }  // namespace docent::engine

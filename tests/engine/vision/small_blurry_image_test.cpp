@@ -265,5 +265,32 @@ TEST(RotationAlignment, AnswersTheSameOnEveryThread) {
   for (const double difference : differences) EXPECT_EQ(difference, 0);
 }
 
+// What is painted lies on a sphere about the first camera; the second has turned about a point behind the
+// first, and so has gone to the side.
+TEST(AlignRotation, TakesTheTurnAboutAPointBehindTheCamera) {
+  const CameraModel camera(LensModel::kRadialTangential, {320, 240, 260, 260, 160, 120}, {});
+  const PaintedSphere sphere(5);
+  const Eigen::Vector3d pivot(0, 0, -0.5);  // of the sphere's radius
+  const Rotation3 turn = Rotation3::Exp({0, Radians(6), 0});
+  cv::Mat there(camera.height_px(), camera.width_px(), CV_8UC1, cv::Scalar(0));
+  const Eigen::Vector3d center = pivot - turn.inverse() * pivot;
+  for (int y = 0; y < there.rows; ++y) {
+    for (int x = 0; x < there.cols; ++x) {
+      const Eigen::Vector3d direction = turn.inverse() * *camera.Unproject({x, y});
+      const double along = direction.dot(center);
+      const double distance = -along + std::sqrt(along * along + 1 - center.squaredNorm());
+      there.at<std::uint8_t>(y, x) =
+          cv::saturate_cast<std::uint8_t>(sphere.Grey(center + distance * direction));
+    }
+  }
+  const SmallBlurryImage a = MakeSmallBlurryImage(sphere.Render(camera, {})), b = MakeSmallBlurryImage(there);
+  const auto found = AlignRotation(a, camera, b, camera, {}, 10, pivot);
+  const auto as_if_still = AlignRotation(a, camera, b, camera, {}, 10);
+  ASSERT_TRUE(found && as_if_still);
+  EXPECT_TRUE(found->converged);
+  EXPECT_LT(Degrees((found->b_from_a * turn.inverse()).Angle()), 0.1);
+  EXPECT_GT(Degrees(as_if_still->b_from_a.Angle()), 8.0) << "half as much again, from going to the side";
+}
+
 }  // namespace
 }  // namespace docent::engine
