@@ -17,20 +17,22 @@ double SecondsSince(std::chrono::steady_clock::time_point start) {
 
 }  // namespace
 
-Mapper::Mapper(const MapperOptions& options) : options_(options), searcher_(options.search) {}
+Mapper::Mapper(const MapperOptions& options)
+    : options_(options), searcher_(options.search), descriptors_(DefaultVocabulary()) {}
 
 void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
   map_ = snapshot ? Map(*snapshot) : Map();
   searcher_.Clear();
+  descriptors_.Clear();
   newest_ = kNoId;
   to_refind_.clear();
   to_localize_.clear();
   to_convert_.clear();
   for (const auto& [id, record] : map_.keyframes()) {
-    if (record.keyframe.kind == KeyFrameKind::kPanorama) to_localize_.push_back({id, 0});
+    if (record.keyframe.kind == KeyFrameKind::kPanorama) to_localize_.push_back({id});
   }
   keyframes_since_global_ = 0;
-  global_interrupted_ = false;
+  global_interrupted_ = thin_out_ = false;
   locally_adjusted_ = true;
   const std::lock_guard lock(mutex_);
   queue_.clear();
@@ -138,6 +140,10 @@ double MapperTimes::*Mapper::DoNextTask() {
     GlobalAdjustment();
     return &MapperTimes::bundle_adjustment;
   }
+  if (thin_out_) {
+    ThinOut();
+    return &MapperTimes::other;
+  }
   return nullptr;
 }
 
@@ -152,6 +158,7 @@ void Mapper::StartMap(const InitialPair& pair) {
   const Map before = panorama ? map_ : Map();
   if (!panorama) map_ = Map();
   searcher_.Clear();
+  descriptors_.Clear();
   to_refind_.clear();
   to_convert_.clear();
   keyframes_since_global_ = 0;
@@ -241,25 +248,6 @@ void Mapper::ApplyReports() {
   }
 }
 
-// A map without depth yet: its first keyframe is the reference of a panorama map, and stands at the origin.
-void Mapper::StartFromPanorama(const KeyFrameCandidate& candidate) {
-  KeyFrame keyframe;
-  keyframe.fixed = true;
-  keyframe.time = candidate.time;
-  keyframe.camera = candidate.camera;
-  keyframe.features = candidate.features;
-  const KeyFrameId id = map_.AddKeyFrame(keyframe).keyframe.id;
-  map_.OpenPanorama(id);
-  const int rays = AddInfinitePoints(options_.infinite, id, {}, &map_);
-  if (rays < options_.min_initial_directions) {
-    map_ = Map();  // a dark or empty picture; the next one may be better
-    return;
-  }
-  newest_ = id;
-  Publish();
-  Tell(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " directions");
-}
-
 void Mapper::InsertKeyFrame(const KeyFrameCandidate& candidate) {
   if (candidate.choice == KeyFrameChoice::kFirst) {
     if (map_.empty()) StartFromPanorama(candidate);
@@ -310,109 +298,6 @@ void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecor
     Tell(MapperEvent::Kind::kKeyFrame, candidate.time,
          std::to_string(created.size()) + " new points, " + std::to_string(map_.AlivePoints()) + " in all");
   }
-}
-
-void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
-  const auto panorama =
-      std::find_if(map_.panoramas().begin(), map_.panoramas().end(),
-                   [&](const PanoramaMap& known) { return known.id == candidate.panorama; });
-  if (panorama == map_.panoramas().end()) return;
-  const KeyFrame& reference = map_.FindKeyFrame(panorama->reference)->keyframe;
-  KeyFrame keyframe;
-  keyframe.kind = KeyFrameKind::kPanorama;
-  keyframe.panorama = candidate.panorama;
-  keyframe.time = candidate.time;
-  keyframe.camera = candidate.camera;
-  keyframe.features = candidate.features;
-  // Where it really stood is not known (hybrid-slam §2): near the reference's centre, as far off as the turn
-  // of a camera in the hand took it.
-  keyframe.camera_from_map = candidate.camera_from_map;
-  keyframe.mean_depth = reference.mean_depth;
-  keyframe.depth_sigma = reference.depth_sigma;
-  const KeyFrameId id = map_.AddKeyFrame(keyframe).keyframe.id;
-  std::vector<Eigen::Vector2f> taken;
-  for (const PointMatch& match : candidate.matches) {
-    const Map::PointRecord* point = map_.FindPoint(match.point);
-    if (!point) continue;
-    if (!point->point.infinite()) {
-      taken.push_back(match.pixel);
-    } else if (point->point.panorama == candidate.panorama) {
-      map_.AddObservation({id, match.point, match.pixel, match.level});
-    }
-  }
-  const int rays = AddInfinitePoints(options_.infinite, id, taken, &map_);
-  to_localize_.push_back({id, 0});
-  Publish();
-  Tell(MapperEvent::Kind::kPanoramaKeyFrame, candidate.time, std::to_string(rays) + " new directions");
-}
-
-bool Mapper::LocalizeOne() {
-  std::size_t finite = 0;
-  if (to_localize_.empty()) return false;
-  for (const Map::PointRecord& record : map_.points()) finite += record.alive && !record.point.infinite();
-  for (std::size_t i = 0; i < to_localize_.size(); ++i) {
-    // Worth another try when the map has grown.
-    constexpr double kGrowth = 1.1;
-    Unlocalized& waiting = to_localize_[i];
-    if (static_cast<double>(finite) < kGrowth * static_cast<double>(waiting.tried_with_points) + 1) continue;
-    waiting.tried_with_points = finite;
-    const KeyFrameId id = waiting.keyframe;
-    const Map::KeyFrameRecord* record = map_.FindKeyFrame(id);
-    if (!record) {
-      to_localize_.erase(to_localize_.begin() + static_cast<std::ptrdiff_t>(i));
-      return true;
-    }
-    if (!LocalizePanoramaKeyFrame(options_.localization, id, id + 1, &map_, &searcher_)) return true;
-    to_localize_.erase(to_localize_.begin() + static_cast<std::ptrdiff_t>(i));
-    PlanConversions(id);
-    newest_ = id;
-    ++keyframes_since_global_;
-    locally_adjusted_ = false;
-    Publish();
-    Tell(MapperEvent::Kind::kLocalized, record->keyframe.time, "keyframe " + std::to_string(id));
-    return true;
-  }
-  return false;
-}
-
-void Mapper::PlanConversions(KeyFrameId id) {
-  // Pairs with this keyframe that look the same way from places far enough apart.
-  constexpr double kMaxTurn = 0.8;  // radians
-  const KeyFrame& keyframe = map_.FindKeyFrame(id)->keyframe;
-  const Eigen::Vector3d center = keyframe.camera_from_map.OriginInSource();
-  std::vector<std::pair<double, std::pair<KeyFrameId, KeyFrameId>>> pairs;
-  for (const auto& [other, record] : map_.keyframes()) {
-    if (other == id || record.keyframe.kind == KeyFrameKind::kPanorama) continue;
-    const double depth = std::min(record.keyframe.mean_depth, keyframe.mean_depth);
-    const double baseline = (record.keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
-    if (baseline < options_.min_partner_baseline || baseline > 2 * options_.max_partner_baseline) continue;
-    const double turn =
-        (keyframe.camera_from_map.rotation * record.keyframe.camera_from_map.rotation.inverse()).Angle();
-    if (turn > kMaxTurn) continue;
-    if (record.keyframe.panorama != kNoId) pairs.push_back({turn, {other, id}});
-    if (keyframe.panorama != kNoId) pairs.push_back({turn, {id, other}});
-  }
-  std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  const auto wanted = static_cast<std::size_t>(options_.conversion_partners);
-  for (std::size_t i = 0; i < pairs.size() && i < wanted; ++i) to_convert_.push_back(pairs[i].second);
-}
-
-bool Mapper::ConvertOne() {
-  if (to_convert_.empty()) return false;
-  const auto [reference, partner] = to_convert_.front();
-  to_convert_.pop_front();
-  PointCreationOptions creation = options_.creation;
-  creation.min_parallax_deg = options_.min_infinite_parallax_deg;
-  const InfiniteConversion conversion =
-      ConvertInfinitePoints(creation, reference, partner, &map_, &searcher_);
-  if (conversion.converted.empty() && conversion.merged == 0) return true;
-  to_refind_.insert(to_refind_.end(), conversion.converted.begin(), conversion.converted.end());
-  Publish();
-  Tell(MapperEvent::Kind::kConverted, map_.FindKeyFrame(partner)->keyframe.time,
-       std::to_string(conversion.converted.size()) + " directions became points, " +
-           std::to_string(conversion.merged) + " were known");
-  return true;
 }
 
 std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
@@ -491,10 +376,22 @@ void Mapper::GlobalAdjustment() {
   global_interrupted_ = summary.outcome == BundleSummary::Outcome::kInterrupted;
   if (global_interrupted_) return;
   keyframes_since_global_ = 0;
+  thin_out_ = true;
   Publish();
   if (map_.empty()) return;
   Tell(MapperEvent::Kind::kGlobalAdjustment, map_.keyframes().rbegin()->second.keyframe.time,
        summary.Brief());
+}
+
+void Mapper::ThinOut() {
+  const KeyFrameId redundant = FindRedundantKeyFrame(options_.redundancy, newest_, &map_);
+  thin_out_ = redundant != kNoId;
+  if (!thin_out_) return;
+  const Timestamp time = map_.FindKeyFrame(redundant)->keyframe.time;
+  RemoveRedundantKeyFrame(redundant, &map_);
+  searcher_.Clear();
+  Publish();
+  Tell(MapperEvent::Kind::kKeyFrameRemoved, time, "keyframe " + std::to_string(redundant));
 }
 
 }  // namespace docent::engine

@@ -13,8 +13,10 @@
 
 #include "engine/mapping/keyframe_candidate.h"
 #include "engine/mapping/map_adjustment.h"
+#include "engine/mapping/map_descriptors.h"
 #include "engine/mapping/panorama_mapping.h"
 #include "engine/mapping/point_creation.h"
+#include "engine/mapping/redundancy.h"
 
 namespace docent::engine {
 
@@ -29,6 +31,8 @@ struct MapperOptions {
   PointCreationOptions creation;
   InfinitePointOptions infinite;
   LocalizationOptions localization;
+  LooksOptions looks;
+  RedundancyOptions redundancy;
   int min_initial_directions = 40;  // in the first picture, for a map to begin as a panorama
   // Of the infinite points: what is seen from two panorama maps is mostly further away (hybrid-slam §5.2).
   double min_infinite_parallax_deg = 1.5;
@@ -47,6 +51,7 @@ struct MapperEvent {
     kPanoramaKeyFrame,
     kLocalized,
     kConverted,
+    kKeyFrameRemoved,
     kGlobalAdjustment
   };
   Kind kind = Kind::kKeyFrame;
@@ -91,8 +96,9 @@ class Mapper {
 
   // A dependent panorama keyframe that waits to be localized, and what the map knew when that was last tried.
   struct Unlocalized {
-    KeyFrameId keyframe;
-    std::size_t tried_with_points;
+    KeyFrameId keyframe = kNoId;
+    std::size_t tried_with_points = 0;
+    bool looks_due = false;  // active search failed; its looks have not been asked yet
   };
 
   double MapperTimes::*DoNextTask();
@@ -103,6 +109,8 @@ class Mapper {
   void InsertPanorama(const KeyFrameCandidate& candidate);
   // Tries one waiting panorama keyframe; false when none is worth trying.
   bool LocalizeOne();
+  // guess: see LocalizePanoramaKeyFrame.
+  bool Localize(KeyFrameId keyframe, const Rigid3* guess);
   // Looks for the infinite points of one pair of keyframes; false when no pair waits.
   bool ConvertOne();
   void PlanConversions(KeyFrameId keyframe);
@@ -114,6 +122,7 @@ class Mapper {
   void RefindNewPoints();
   void LocalAdjustment();
   void GlobalAdjustment();
+  void ThinOut();  // removes one redundant keyframe
   void Publish();
   void Tell(MapperEvent::Kind kind, Timestamp time, std::string detail);
 
@@ -121,12 +130,14 @@ class Mapper {
   // Touched by the stepping thread alone.
   Map map_;
   PointSearcher searcher_;
+  MapDescriptors descriptors_;
   KeyFrameId newest_ = kNoId;
   std::vector<MapPointId> to_refind_;
   std::vector<Unlocalized> to_localize_;
   std::deque<std::pair<KeyFrameId, KeyFrameId>> to_convert_;  // (reference, partner)
   std::size_t keyframes_since_global_ = 0;
   bool global_interrupted_ = false;
+  bool thin_out_ = false;  // the map has settled since keyframes were last looked through
 
   std::atomic<bool> interrupt_{false};
   std::atomic<bool> locally_adjusted_{true};

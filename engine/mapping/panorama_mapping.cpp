@@ -21,15 +21,15 @@ struct Found {
   int level;
 };
 
-std::vector<Found> FindFinitePoints(const KeyFrame& keyframe, float radius_px, Map* map,
-                                    PointSearcher* searcher) {
+std::vector<Found> FindFinitePoints(const KeyFrame& keyframe, const Rigid3& camera_from_map, float radius_px,
+                                    Map* map, PointSearcher* searcher) {
   std::vector<Found> found;
   for (const Map::PointRecord& record : map->points()) {
     if (!record.alive || record.point.infinite()) continue;
     const Map::KeyFrameRecord* source = map->FindKeyFrame(record.point.source_keyframe);
     if (!source) continue;
     const auto predicted =
-        searcher->Predict(record.point, source->keyframe, *keyframe.camera, keyframe.camera_from_map);
+        searcher->Predict(record.point, source->keyframe, *keyframe.camera, camera_from_map);
     if (!predicted) continue;
     const auto match =
         searcher->Find(record.point, source->keyframe, *predicted, *keyframe.features, radius_px, false);
@@ -128,10 +128,12 @@ int AddInfinitePoints(const InfinitePointOptions& options, KeyFrameId id,
 }
 
 bool LocalizePanoramaKeyFrame(const LocalizationOptions& options, KeyFrameId id, std::uint64_t seed, Map* map,
-                              PointSearcher* searcher) {
+                              PointSearcher* searcher, const Rigid3* guess) {
   Map::KeyFrameRecord* record = map->FindKeyFrame(id);
   if (!record || record->keyframe.kind != KeyFrameKind::kPanorama) return false;
-  std::vector<Found> found = FindFinitePoints(record->keyframe, options.search_radius_px, map, searcher);
+  std::vector<Found> found =
+      FindFinitePoints(record->keyframe, guess != nullptr ? *guess : record->keyframe.camera_from_map,
+                       options.search_radius_px, map, searcher);
   if (static_cast<int>(found.size()) < options.min_inliers) return false;
   std::vector<PoseMeasurement> measurements;
   const auto start = PoseFrom(options, record->keyframe, map, seed, &found, &measurements);
@@ -189,6 +191,32 @@ int DropInfiniteTwins(KeyFrameId id, Map* map) {
     ++dropped;
   }
   return dropped;
+}
+
+int DropInfiniteOutliers(PanoramaId panorama, Map* map) {
+  // Of the level; what a camera that is taken to turn about a point moves beside it shifts all of a picture
+  // alike, and less than this between keyframes that see the same point.
+  constexpr double kMaxErrorPx = 6;
+  std::vector<Observation> outliers;
+  for (const auto& [id, record] : map->keyframes()) {
+    if (record.keyframe.panorama != panorama) continue;
+    const Rotation3& camera_from_map = record.keyframe.camera_from_map.rotation;
+    const double pixel_angle = record.keyframe.camera->PixelAngle();
+    for (const Observation& observation : record.observations) {
+      const Map::PointRecord* point = map->FindPoint(observation.point);
+      if (!point || !point->point.infinite() || point->observers.size() < 3) continue;
+      const auto ray = record.keyframe.camera->Unproject(observation.pixel.cast<double>());
+      if (!ray) continue;
+      const Eigen::Vector3d expected = camera_from_map * point->point.position();
+      const double angle = std::atan2(ray->cross(expected).norm(), ray->dot(expected));
+      if (angle > kMaxErrorPx * (1 << observation.level) * pixel_angle) outliers.push_back(observation);
+    }
+  }
+  for (const Observation& observation : outliers) {
+    map->RemoveObservation(observation.keyframe, observation.point);
+    if (Map::PointRecord* point = map->FindPoint(observation.point)) map->UpdateDirection(point);
+  }
+  return static_cast<int>(outliers.size());
 }
 
 }  // namespace docent::engine

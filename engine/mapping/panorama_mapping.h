@@ -38,9 +38,14 @@ struct LocalizationOptions {
 // Looks for the map's finite points in a dependent panorama keyframe by active search, and estimates its pose
 // from them: three-point RANSAC, then robust refinement over its inliers. If that holds by all counts, the
 // keyframe is localized: it becomes the reference of a panorama map of its own, with the inliers as
-// observations (hybrid-slam §5.1). False when it does not; then nothing has changed.
+// observations (hybrid-slam §5.1). False when it does not; then nothing has changed. guess: where to look
+// from instead of the keyframe's own pose; null for none.
 bool LocalizePanoramaKeyFrame(const LocalizationOptions& options, KeyFrameId keyframe, std::uint64_t seed,
-                              Map* map, PointSearcher* searcher);
+                              Map* map, PointSearcher* searcher, const Rigid3* guess = nullptr);
+
+// Removes observations of infinite points of a panorama map under another direction than the point's, which
+// is the mean of all. Returns how many.
+int DropInfiniteOutliers(PanoramaId panorama, Map* map);
 
 // Removes the infinite points of a localized keyframe that a finite point, seen at the same place, stands
 // for. Returns how many.

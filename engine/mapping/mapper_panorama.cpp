@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// The mapper's tasks on panorama maps (hybrid-slam §5).
+#include <algorithm>
+#include <string>
+
+#include "engine/mapping/mapper.h"
+
+namespace docent::engine {
+
+// A map without depth yet: its first keyframe is the reference of a panorama map, and stands at the origin.
+void Mapper::StartFromPanorama(const KeyFrameCandidate& candidate) {
+  KeyFrame keyframe;
+  keyframe.fixed = true;
+  keyframe.time = candidate.time;
+  keyframe.camera = candidate.camera;
+  keyframe.features = candidate.features;
+  const KeyFrameId id = map_.AddKeyFrame(keyframe).keyframe.id;
+  map_.OpenPanorama(id);
+  const int rays = AddInfinitePoints(options_.infinite, id, {}, &map_);
+  if (rays < options_.min_initial_directions) {
+    map_ = Map();  // a dark or empty picture; the next one may be better
+    return;
+  }
+  newest_ = id;
+  Publish();
+  Tell(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " directions");
+}
+
+void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
+  const auto panorama =
+      std::find_if(map_.panoramas().begin(), map_.panoramas().end(),
+                   [&](const PanoramaMap& known) { return known.id == candidate.panorama; });
+  if (panorama == map_.panoramas().end()) return;
+  const KeyFrame& reference = map_.FindKeyFrame(panorama->reference)->keyframe;
+  KeyFrame keyframe;
+  keyframe.kind = KeyFrameKind::kPanorama;
+  keyframe.panorama = candidate.panorama;
+  keyframe.time = candidate.time;
+  keyframe.camera = candidate.camera;
+  keyframe.features = candidate.features;
+  // Where it really stood is not known (hybrid-slam §2): near the reference's centre, as far off as the turn
+  // of a camera in the hand took it.
+  keyframe.camera_from_map = candidate.camera_from_map;
+  keyframe.mean_depth = reference.mean_depth;
+  keyframe.depth_sigma = reference.depth_sigma;
+  const KeyFrameId id = map_.AddKeyFrame(keyframe).keyframe.id;
+  std::vector<Eigen::Vector2f> taken;
+  for (const PointMatch& match : candidate.matches) {
+    const Map::PointRecord* point = map_.FindPoint(match.point);
+    if (!point) continue;
+    if (!point->point.infinite()) {
+      taken.push_back(match.pixel);
+    } else if (point->point.panorama == candidate.panorama) {
+      map_.AddObservation({id, match.point, match.pixel, match.level});
+    }
+  }
+  const int rays = AddInfinitePoints(options_.infinite, id, taken, &map_);
+  DropInfiniteOutliers(candidate.panorama, &map_);
+  to_localize_.push_back({id});
+  Publish();
+  Tell(MapperEvent::Kind::kPanoramaKeyFrame, candidate.time, std::to_string(rays) + " new directions");
+}
+
+bool Mapper::LocalizeOne() {
+  if (to_localize_.empty()) return false;
+  std::erase_if(to_localize_, [&](const Unlocalized& waiting) {
+    const Map::KeyFrameRecord* record = map_.FindKeyFrame(waiting.keyframe);
+    return !record || record->keyframe.kind != KeyFrameKind::kPanorama;
+  });
+  std::size_t finite = 0;
+  for (const Map::PointRecord& record : map_.points()) finite += record.alive && !record.point.infinite();
+  for (Unlocalized& waiting : to_localize_) {
+    // Worth another try when the map has grown.
+    constexpr double kGrowth = 1.1;
+    if (static_cast<double>(finite) < kGrowth * static_cast<double>(waiting.tried_with_points) + 1) continue;
+    waiting.tried_with_points = finite;
+    waiting.looks_due = !Localize(waiting.keyframe, nullptr);
+    return true;
+  }
+  // Where active search saw nothing, its pose may be too far off: what looks like its corners says another.
+  const auto due = std::find_if(to_localize_.begin(), to_localize_.end(),
+                                [](const Unlocalized& waiting) { return waiting.looks_due; });
+  if (due == to_localize_.end()) return false;
+  if (descriptors_.UpdateOne(options_.looks, &map_)) return true;
+  due->looks_due = false;
+  const KeyFrameId id = due->keyframe;
+  const auto guess = descriptors_.SuggestPose(options_.looks, map_.FindKeyFrame(id)->keyframe, id + 1, &map_);
+  if (guess) Localize(id, &*guess);
+  return true;
+}
+
+bool Mapper::Localize(KeyFrameId id, const Rigid3* guess) {
+  if (!LocalizePanoramaKeyFrame(options_.localization, id, id + 1, &map_, &searcher_, guess)) return false;
+  PlanConversions(id);
+  newest_ = id;
+  ++keyframes_since_global_;
+  locally_adjusted_ = false;
+  Publish();
+  Tell(MapperEvent::Kind::kLocalized, map_.FindKeyFrame(id)->keyframe.time,
+       "keyframe " + std::to_string(id) + (guess != nullptr ? ", by its looks" : ""));
+  return true;
+}
+
+void Mapper::PlanConversions(KeyFrameId id) {
+  // Pairs with this keyframe that look the same way from places far enough apart.
+  constexpr double kMaxTurn = 0.8;  // radians
+  const KeyFrame& keyframe = map_.FindKeyFrame(id)->keyframe;
+  const Eigen::Vector3d center = keyframe.camera_from_map.OriginInSource();
+  std::vector<std::pair<double, std::pair<KeyFrameId, KeyFrameId>>> pairs;
+  for (const auto& [other, record] : map_.keyframes()) {
+    if (other == id || record.keyframe.kind == KeyFrameKind::kPanorama) continue;
+    const double depth = std::min(record.keyframe.mean_depth, keyframe.mean_depth);
+    const double baseline = (record.keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
+    if (baseline < options_.min_partner_baseline || baseline > 2 * options_.max_partner_baseline) continue;
+    const double turn =
+        (keyframe.camera_from_map.rotation * record.keyframe.camera_from_map.rotation.inverse()).Angle();
+    if (turn > kMaxTurn) continue;
+    if (record.keyframe.panorama != kNoId) pairs.push_back({turn, {other, id}});
+    if (keyframe.panorama != kNoId) pairs.push_back({turn, {id, other}});
+  }
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  const auto wanted = static_cast<std::size_t>(options_.conversion_partners);
+  for (std::size_t i = 0; i < pairs.size() && i < wanted; ++i) to_convert_.push_back(pairs[i].second);
+}
+
+bool Mapper::ConvertOne() {
+  if (to_convert_.empty()) return false;
+  const auto [reference, partner] = to_convert_.front();
+  to_convert_.pop_front();
+  PointCreationOptions creation = options_.creation;
+  creation.min_parallax_deg = options_.min_infinite_parallax_deg;
+  const InfiniteConversion conversion =
+      ConvertInfinitePoints(creation, reference, partner, &map_, &searcher_);
+  if (conversion.converted.empty() && conversion.merged == 0) return true;
+  to_refind_.insert(to_refind_.end(), conversion.converted.begin(), conversion.converted.end());
+  Publish();
+  Tell(MapperEvent::Kind::kConverted, map_.FindKeyFrame(partner)->keyframe.time,
+       std::to_string(conversion.converted.size()) + " directions became points, " +
+           std::to_string(conversion.merged) + " were known");
+  return true;
+}
+
+}  // namespace docent::engine
