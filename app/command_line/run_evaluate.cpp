@@ -104,6 +104,7 @@ RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const 
   record.mapping.panorama_localization_s = times.panorama_localization;
   record.mapping.infinite_triangulation_s = times.infinite_triangulation;
   record.mapping.other_s = times.other;
+  record.mapping.longest_hold_s = times.longest_hold;
   record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   record.peak_memory_mb = PeakMemoryMegabytes();
   return record;

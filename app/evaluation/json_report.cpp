@@ -65,6 +65,7 @@ Json ToJson(const SequenceReport& report) {
         {"panorama_localization", report.mapping.panorama_localization_s},
         {"infinite_triangulation", report.mapping.infinite_triangulation_s},
         {"other", report.mapping.other_s}}},
+      {"keyframe_held_ms", 1e3 * report.mapping.longest_hold_s},
       {"wall_s", report.wall_s},
       {"peak_memory_mb", report.peak_memory_mb},
       {"discarded_frames", report.discarded_frames},

@@ -50,6 +50,7 @@ struct MapRecord {
 // Seconds that the mapper spent, by task.
 struct MappingTimes {
   double bundle_adjustment_s = 0, panorama_localization_s = 0, infinite_triangulation_s = 0, other_s = 0;
+  double longest_hold_s = 0;  // see engine::MapperTimes
 };
 
 struct RunRecord {

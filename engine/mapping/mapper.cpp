@@ -44,6 +44,7 @@ bool Mapper::Offer(KeyFrameCandidate candidate) {
   const std::lock_guard lock(mutex_);
   if (queue_.size() >= options_.max_queue) return false;
   queue_.emplace_back(std::move(candidate));
+  if (stepping_ && !offered_during_step_) offered_during_step_ = std::chrono::steady_clock::now();
   interrupt_ = true;
   return true;
 }
@@ -52,6 +53,7 @@ bool Mapper::Start(InitialPair pair) {
   const std::lock_guard lock(mutex_);
   if (queue_.size() >= options_.max_queue) return false;
   queue_.emplace_back(std::move(pair));
+  if (stepping_ && !offered_during_step_) offered_during_step_ = std::chrono::steady_clock::now();
   interrupt_ = true;
   return true;
 }
@@ -106,6 +108,7 @@ bool Mapper::Step() {
       queue_.pop_front();
     }
     interrupt_ = !queue_.empty();
+    stepping_ = true;
   }
   double MapperTimes::*account = &MapperTimes::other;
   if (task) {
@@ -117,9 +120,13 @@ bool Mapper::Step() {
   } else {
     account = DoNextTask();
   }
-  if (account == nullptr) return false;
   const double seconds = SecondsSince(start);
   const std::lock_guard lock(mutex_);
+  stepping_ = false;
+  if (offered_during_step_)
+    times_.longest_hold = std::max(times_.longest_hold, SecondsSince(*offered_during_step_));
+  offered_during_step_.reset();
+  if (account == nullptr) return false;
   times_.*account += seconds;
   return true;
 }

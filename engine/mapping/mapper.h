@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -62,6 +63,7 @@ struct MapperEvent {
 // Seconds of work by task.
 struct MapperTimes {
   double bundle_adjustment = 0, panorama_localization = 0, infinite_triangulation = 0, other = 0;
+  double longest_hold = 0;  // for which a piece of work made an offered keyframe wait
 };
 
 // Grows and refines one map (ptamm §2.3, Fig. 2b): starts it from two views, takes keyframes in, makes
@@ -143,6 +145,8 @@ class Mapper {
   std::atomic<bool> locally_adjusted_{true};
   mutable std::mutex mutex_;  // guards what follows; held for copies of pointers and small lists only
   std::deque<Task> queue_;
+  std::optional<std::chrono::steady_clock::time_point> offered_during_step_;
+  bool stepping_ = false;
   std::vector<PointReport> reports_;
   std::shared_ptr<const MapSnapshot> snapshot_;
   std::vector<MapperEvent> events_;
