@@ -5,6 +5,7 @@
 
 #include "app/command_line/program.h"
 #include "app/command_line/run_arguments.h"
+#include "app/files/text_file.h"
 
 namespace docent::app {
 
@@ -21,8 +22,25 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
   command->add_option("--script", options->script, "Carry out the commands of this file")->type_name("FILE");
   command->add_option("--record-script", options->record_script, "Write what is done as a script")
       ->type_name("FILE");
+  command
+      ->add_option("--target", options->target,
+                   "Start new maps from this printed picture, in metres; see --target-width")
+      ->type_name("PICTURE");
+  command
+      ->add_option_function<std::string>(
+          "--target-width",
+          [options](const std::string& text) {
+            const auto metres = ParseNumber(text);
+            if (!metres || *metres <= 0)
+              throw CLI::ValidationError("--target-width", "'" + text + "' is no length in metres");
+            options->target_width_m = *metres;
+          },
+          "How wide the target is as it hangs there")
+      ->type_name("METRES");
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
+    if (options->target.has_value() != (options->target_width_m > 0))
+      throw CLI::ValidationError("--target", "--target and --target-width are given together");
     invocation->run = [=] { run(*options, invocation->verbosity); };
   });
 }

@@ -51,6 +51,8 @@ struct RunArguments {
 struct AuthorOptions {
   RunArguments run;
   std::filesystem::path library;
+  std::optional<std::filesystem::path> target;  // a printed picture that new maps start from
+  double target_width_m = 0;
   std::optional<std::filesystem::path> script, record_script;
 };
 

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
+#include <opencv2/imgproc.hpp>
 
+#include "app/cameras/decode_picture.h"
 #include "app/command_line/run_guide.h"
 #include "app/command_line/runs.h"
 #include "app/script/script_file.h"
+#include "engine/base/error.h"
+#include "engine/mapping/planar_target.h"
 
 namespace docent::app {
 
@@ -13,6 +17,17 @@ namespace {
 bool AnyLive(const std::vector<CalibratedCamera>& cameras) {
   return std::any_of(cameras.begin(), cameras.end(),
                      [](const CalibratedCamera& camera) { return camera.source->info().live; });
+}
+
+std::shared_ptr<const engine::PlanarTarget> ReadTarget(const std::filesystem::path& path, double width_m) {
+  std::vector<std::uint8_t> bytes;
+  cv::Mat picture = ReadPicture(path, &bytes);
+  if (picture.channels() == 3) cv::cvtColor(picture, picture, cv::COLOR_BGR2GRAY);
+  try {
+    return std::make_shared<engine::PlanarTarget>(picture, width_m);
+  } catch (const Error& error) {
+    throw Error("'" + path.string() + "': " + error.what());
+  }
 }
 
 }  // namespace
@@ -26,6 +41,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
     request.script_name = options.script->string();
     request.model_folder = options.script->parent_path();
   }
+  if (options.target) request.target = ReadTarget(*options.target, options.target_width_m);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
   maps::Library library =
       maps::Library::Open(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);

@@ -129,6 +129,7 @@ class GuideRun {
     options.memory.budget_bytes = request.memory_budget_bytes;
     options.memory.wait_for_maps = request.pace != Pace::kRealtime;
     options.baseline_m = request.baseline_m;
+    options.tracker.target = request.target;
     return options;
   }
 

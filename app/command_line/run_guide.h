@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,6 +19,10 @@
 // What authoring, touring and the demonstration share: one camera, or the two of a wearable, through a
 // session over a library, seen in a window or not at all. The script and the director act for the first
 // camera.
+namespace docent::engine {
+class PlanarTarget;
+}
+
 namespace docent::app {
 
 struct GuideRequest {
@@ -36,7 +41,8 @@ struct GuideRequest {
   // What is done of itself on seeing a frame, as if a person did it in the window; may be empty. On the
   // camera's thread.
   std::function<std::vector<Command>(const ShownFrame&)> director;
-  double baseline_m = 0;  // see SessionOptions
+  double baseline_m = 0;                               // see SessionOptions
+  std::shared_ptr<const engine::PlanarTarget> target;  // see engine::TrackerOptions; may be null
   // Told of every frame on its camera's thread, one at a time; may be empty.
   std::function<void(const ShownFrame&)> on_frame;
   // Told of every drawn frame with its picture, on the thread that draws; may be empty. Without a window

@@ -53,6 +53,7 @@ struct InitialPair {
   std::vector<Match> matches;
   Rigid3 a_from_map;       // where the first view is, if the map exists already as a panorama; else identity
   TwoViewResult geometry;  // one inlier flag and point a match
+  double baseline_m = 0;   // the true distance of the views; 0 where nothing tells it
 };
 
 }  // namespace docent::engine

@@ -169,7 +169,7 @@ void Mapper::StartMap(const InitialPair& pair) {
   to_refind_.clear();
   to_convert_.clear();
   keyframes_since_global_ = 0;
-  const double scale = options_.initial_baseline_m;
+  const double scale = pair.baseline_m > 0 ? pair.baseline_m : options_.initial_baseline_m;
   Rigid3 b_from_a = pair.geometry.b_from_a;
   b_from_a.translation *= scale / b_from_a.translation.norm();
 

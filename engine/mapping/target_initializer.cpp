@@ -98,9 +98,9 @@ std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraMod
   TargetStart start;
   start.a_from_target = a.sighting.camera_from_target;
   const Rigid3 b_from_a = b.sighting.camera_from_target * a.sighting.camera_from_target.inverse();
-  start.baseline_m = b_from_a.translation.norm();
+  start.pair.baseline_m = b_from_a.translation.norm();
   // Where nothing moved there is no unit to measure in.
-  if (!(start.baseline_m > 1e-9)) {
+  if (!(start.pair.baseline_m > 1e-9)) {
     *hint = Advice(TwoViewVerdict::kStill);
     return std::nullopt;
   }
@@ -123,7 +123,7 @@ std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraMod
   pair.geometry.verdict =
       pair.matches.size() > parallax_deg.size() ? TwoViewVerdict::kGeneral : TwoViewVerdict::kPlanar;
   pair.geometry.b_from_a = b_from_a;
-  pair.geometry.b_from_a.translation /= start.baseline_m;
+  pair.geometry.b_from_a.translation /= start.pair.baseline_m;
   hint->clear();
   return start;
 }

@@ -20,9 +20,9 @@ struct TargetStartOptions {
 
 // Two views in which a target was seen: the start of a map in metres.
 struct TargetStart {
-  InitialPair pair;       // as from two views alone: |translation| = 1, and the points in that unit
-  double baseline_m = 0;  // the length that the unit stands for
-  Rigid3 a_from_target;   // metres
+  // As from two views alone: |translation| = 1, and the points in that unit; pair.baseline_m tells the unit.
+  InitialPair pair;
+  Rigid3 a_from_target;  // metres
 };
 
 // A view, where the target was in it, and its corners that were followed to the other view.
@@ -51,6 +51,8 @@ class TargetInitializer {
   // A start once it is certain; then Reset() has happened.
   std::optional<TargetStart> Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
 
+  // Of the first view that is waited with; far in the past when there is none.
+  Timestamp first_time() const { return first_ ? first_->view.time : Timestamp::min(); }
   // Why there is no map so far.
   const std::string& hint() const { return hint_; }
   // Where the target was in the last frame; empty when it was not seen there.

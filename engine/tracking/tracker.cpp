@@ -26,7 +26,30 @@ Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraMode
       map_tracker_(options.map_tracker, camera_),
       initializer_(options.initializer, camera_, random_.Next()),
       selector_(options.selector, FieldOfView(*camera_)),
-      turn_center_(options.turn_center) {}
+      turn_center_(options.turn_center) {
+  if (options.target) target_initializer_.emplace(options.target, options.target_start, camera_, seed);
+}
+
+void Tracker::ResetStart() {
+  initializer_.Reset();
+  if (target_initializer_) target_initializer_->Reset();
+}
+
+Timestamp Tracker::FirstViewTime() const {
+  return target_initializer_ ? target_initializer_->first_time() : initializer_.first_time();
+}
+
+std::optional<InitialPair> Tracker::TrackStart(const Frame& frame, std::string* hint) {
+  std::optional<InitialPair> pair;
+  if (target_initializer_) {
+    if (auto start = target_initializer_->Track(frame.time, features_)) pair = std::move(start->pair);
+    *hint = target_initializer_->hint();
+  } else {
+    pair = initializer_.Track(frame.time, features_);
+    *hint = initializer_.hint();
+  }
+  return pair;
+}
 
 void Tracker::Reset() {
   map_.reset();
@@ -37,7 +60,7 @@ void Tracker::Reset() {
   pivot_.setZero();
   entering_key_ = 0;
   entering_frames_ = 0;
-  initializer_.Reset();
+  ResetStart();
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(kNoId);
   selector_.Reset();
@@ -71,7 +94,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     motion_.Reset(first.time, first.camera_from_map);
     // The corners that are followed must begin where the pose is known.
     first_view_from_map_ = first.camera_from_map;
-    if (initializer_.first_time() != first.time) initializer_.Reset();
+    if (FirstViewTime() != first.time) ResetStart();
     selector_.Offered(KeyFrameChoice::kFirst, first.time);
     observed_ = ObservedMotion::kPanorama;
     tracking_ = true;
@@ -178,18 +201,17 @@ void Tracker::LookForStart(const Frame& frame, TrackedFrame* out) {
   const bool posed = HasPose(out->state);
   if (map_ && !posed) {
     // The first view's pose would be lost with the track.
-    initializer_.Reset();
+    ResetStart();
     return;
   }
   const bool directions = options_.hybrid && options_.build_maps;
-  if (!map_ && directions) initializer_.Reset();  // its first view is to be the map's, too
-  pair_ = initializer_.Track(frame.time, features_);
+  if (!map_ && directions) ResetStart();  // its first view is to be the map's, too
+  pair_ = TrackStart(frame, &out->hint);
   if (pair_) {
     pair_->a_from_map = first_view_from_map_;
     pair_given_ = true;
   }
-  if (initializer_.first_time() == frame.time) first_view_from_map_ = posed ? out->camera_from_map : Rigid3();
-  out->hint = initializer_.hint();
+  if (FirstViewTime() == frame.time) first_view_from_map_ = posed ? out->camera_from_map : Rigid3();
   if (!map_ && directions) OfferKeyFrame(KeyFrameChoice::kFirst, frame, Rigid3(), {});
 }
 

@@ -9,6 +9,7 @@
 #include "engine/base/random.h"
 #include "engine/mapping/initializer.h"
 #include "engine/mapping/keyframe_candidate.h"
+#include "engine/mapping/target_initializer.h"
 #include "engine/recognition/place.h"
 #include "engine/tracking/keyframe_selection.h"
 #include "engine/tracking/keyframe_selector.h"
@@ -24,6 +25,9 @@ struct TrackerOptions {
   FeatureOptions features;
   MapTrackerOptions map_tracker;
   InitializerOptions initializer;
+  // When given, maps start from this picture, in metres (hybrid-slam §5.5), and not from any two views.
+  std::shared_ptr<const PlanarTarget> target;
+  TargetStartOptions target_start;
   KeyFrameSelectionOptions keyframes;
   KeyFrameSelectorOptions selector;
   TurnCenterOptions turn_center;
@@ -90,6 +94,10 @@ class Tracker {
  private:
   std::shared_ptr<ImageFeatures> NextFeatures(const Frame& frame);
   void LookForStart(const Frame& frame, TrackedFrame* out);
+  // Whichever of the two ways to start a map is used.
+  std::optional<InitialPair> TrackStart(const Frame& frame, std::string* hint);
+  void ResetStart();
+  Timestamp FirstViewTime() const;
   void TrackMap(const Frame& frame, TrackedFrame* out);
   bool FollowPicture(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out);
   PanoramaId PanoramaFor(const Rigid3& predicted) const;
@@ -116,6 +124,7 @@ class Tracker {
   Random random_;
   MapTracker map_tracker_;
   Initializer initializer_;
+  std::optional<TargetInitializer> target_initializer_;
   MotionModel motion_;
   KeyFrameSelector selector_;
   TurnCenter turn_center_;

@@ -11,6 +11,7 @@
 #include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -287,6 +288,14 @@ TEST(Guide, EndsWithOneLineWhenItsInputIsBad) {
   ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
                            "--script", script.string()},
                           "line 2");
+  const std::string target = (folder / "poster.png").string();
+  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
+                           "--target", target, "--target-width", "0.4"},
+                          "poster.png");
+  cv::imwrite(target, cv::Mat(300, 400, CV_8UC1, cv::Scalar(200)));
+  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
+                           "--target", target, "--target-width", "0.4"},
+                          "too little detail");
   const auto early = folder.Write("early.txt", "0 map new A\n0.1 signpost \"x\" at pixel 320 240\n");
   ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
                            "--script", early.string()},

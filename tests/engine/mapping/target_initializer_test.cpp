@@ -52,7 +52,7 @@ TEST(TargetInitializer, StartsAMapInMetresFromASidewaysStep) {
   const Rigid3 pose_a = pose_at(start->pair.a.time), pose_b = pose_at(start->pair.b.time);
   const Rigid3 b_from_a = pose_b * pose_a.inverse();
   const double baseline_m = b_from_a.translation.norm();
-  EXPECT_NEAR(start->baseline_m, baseline_m, 0.03 * baseline_m);
+  EXPECT_NEAR(start->pair.baseline_m, baseline_m, 0.03 * baseline_m);
   EXPECT_TRUE(IsNear(start->a_from_target, pose_a * Scene().world_from_target, 0.01, 0.008));
   EXPECT_NEAR(start->pair.geometry.b_from_a.translation.norm(), 1, 1e-9);
   EXPECT_LT((start->pair.geometry.b_from_a.rotation.inverse() * b_from_a.rotation).Angle(), 0.008);
@@ -70,7 +70,7 @@ TEST(TargetInitializer, StartsAMapInMetresFromASidewaysStep) {
     ASSERT_TRUE(hit);
     beside += hit->wall != 0;
     const Eigen::Vector3d in_world =
-        pose_a.inverse() * Eigen::Vector3d(start->baseline_m * geometry.points_in_a[i]);
+        pose_a.inverse() * Eigen::Vector3d(start->pair.baseline_m * geometry.points_in_a[i]);
     errors.push_back((in_world - hit->point).norm() / hit->point.z());
   }
   EXPECT_GT(beside, 10);
@@ -129,7 +129,7 @@ TEST(TargetStart, NeedsParallaxAndPoints) {
   ASSERT_TRUE(start);
   EXPECT_EQ(hint, "");
   EXPECT_EQ(start->pair.geometry.verdict, TwoViewVerdict::kPlanar);
-  EXPECT_NEAR(start->baseline_m, 0.3, 0.01);
+  EXPECT_NEAR(start->pair.baseline_m, 0.3, 0.01);
   TargetStartOptions many;
   many.min_matches = 1000;
   EXPECT_FALSE(MakeTargetStart(Camera(), a, far, {}, many, &hint));
