@@ -13,6 +13,11 @@ std::uint64_t CameraAssociation::SearchedMap() const {
   return AnyTracked() || beginning_ ? map_ : 0;
 }
 
+std::uint64_t CameraAssociation::SearchedMap(std::size_t camera) const {
+  const auto others = static_cast<std::ptrdiff_t>(tracked_.at(camera));
+  return std::count(tracked_.begin(), tracked_.end(), true) > others || beginning_ ? map_ : 0;
+}
+
 bool CameraAssociation::Tracked(std::size_t camera, std::uint64_t map) {
   tracked_.at(camera) = false;
   const std::uint64_t searched = SearchedMap();

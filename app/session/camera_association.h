@@ -33,6 +33,8 @@ class CameraAssociation {
 
   // Where a camera that is lost looks for itself: this map alone, or every map when 0.
   std::uint64_t SearchedMap() const;
+  // The same for one of the cameras: by itself it may leave for a map that fits better, and the others come.
+  std::uint64_t SearchedMap(std::size_t camera) const;
   // The map that the cameras are in, or were in last.
   std::uint64_t map() const { return map_; }
   bool IsTracked(std::size_t camera) const { return tracked_.at(camera); }

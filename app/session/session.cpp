@@ -68,7 +68,7 @@ SearchPlaces Session::FollowOrders(std::size_t index, Timestamp time) {
     }
     // A map of directions alone waits for its start still.
     if (snapshot && snapshot->HasFinitePoints()) camera->starting = false;
-    searched = association_.SearchedMap();
+    searched = association_.SearchedMap(index);
     if (snapshot && index < 2 && !association_.IsTracked(index)) {
       if (const auto pose = rig_.Predict(static_cast<int>(index), time, key))
         prediction = SearchPlaces::Prediction{key, snapshot, *pose};

@@ -24,6 +24,7 @@ Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraMode
       camera_(std::move(camera)),
       random_(seed),
       map_tracker_(options.map_tracker, camera_),
+      rival_tracker_(options.map_tracker, camera_),
       initializer_(options.initializer, camera_, random_.Next()),
       selector_(options.selector, FieldOfView(*camera_)),
       turn_center_(options.turn_center) {
@@ -183,6 +184,7 @@ TrackedFrame Tracker::Track(const Frame& frame, const PlaceFinder* places) {
     LookForStart(frame, &out);
   } else if (tracking_) {
     TrackMap(frame, &out);
+    if (HasPose(out.state) && places && !options_.build_maps) LookForBetterMap(frame, *places, &out);
   } else {
     Recover(frame, places, &out);
   }
@@ -379,97 +381,6 @@ void Tracker::CollectReports() {
       ++report.not_found;
     }
   }
-}
-
-bool Tracker::RecoverNearby(const Frame& frame, TrackedFrame* out) {
-  if (frame.time - lost_since_ > FromSeconds(options_.short_loss_s)) return false;
-  const auto rotation = RotationFromPrevious();
-  const Rigid3 guess = rotation ? motion_.PredictWithRotation(*rotation) : motion_.Predict(frame.time);
-  map_tracker_.EnablePanorama(PanoramaFor(guess));
-  const MapTrackResult result =
-      map_tracker_.Track(*map_, *features_, guess, MapTracker::Effort::kRecovery, &random_);
-  if (Recovered(result)) {
-    out->state = TrackingState::kRelocalized;
-    Accept(frame, result, out);
-    return true;
-  }
-  map_tracker_.Forget();
-  motion_.Reset(frame.time, guess);
-  return false;
-}
-
-std::vector<Tracker::TurnedPlace> Tracker::BestPlaces(const PlaceFinder& places) const {
-  std::vector<TurnedPlace> turned;
-  for (const PlaceCandidate& candidate : places.FindPlaces(
-           features_->small_blurry, options_.candidates_looked_at, options_.candidates_of_a_map, 0)) {
-    const KeyFrame* keyframe = candidate.map ? candidate.map->FindKeyFrame(candidate.keyframe) : nullptr;
-    if (!keyframe) continue;
-    const auto rotation =
-        AlignRotation(keyframe->features->small_blurry, *keyframe->camera, features_->small_blurry, *camera_);
-    if (!rotation) continue;
-    // What overlaps little agrees easily.
-    turned.push_back({candidate,
-                      Rigid3(rotation->b_from_a, Eigen::Vector3d::Zero()) * keyframe->camera_from_map,
-                      rotation->rms / std::sqrt(rotation->overlap)});
-  }
-  std::stable_sort(turned.begin(), turned.end(),
-                   [](const TurnedPlace& a, const TurnedPlace& b) { return a.misfit < b.misfit; });
-  if (turned.size() > options_.candidates) turned.resize(options_.candidates);
-  return turned;
-}
-
-void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
-  out->state = map_ || !options_.build_maps ? TrackingState::kLost : TrackingState::kInitializing;
-  out->hint = "look back at what was mapped";
-  if (map_ && RecoverNearby(frame, out)) return;
-  if (!places) return;
-  MapTrackResult result;
-  // A map that is about to be entered is followed, not searched anew.
-  if (entering_frames_ > 0) {
-    const auto found = places->FindPlaces(features_->small_blurry, 1, 1, entering_key_);
-    if (!found.empty()) {
-      const auto rotation = RotationFromPrevious();
-      const Rigid3 turn(rotation ? *rotation : Rotation3(), Eigen::Vector3d::Zero());
-      map_tracker_.Clear();
-      map_tracker_.EnablePanorama(entering_panorama_);
-      result = map_tracker_.Track(*found.front().map, *features_, turn * entering_pose_,
-                                  MapTracker::Effort::kWide, &random_);
-      if (Recovered(result)) {
-        entering_pose_ = result.camera_from_map;
-        if (++entering_frames_ < options_.agreeing_frames) return;
-        map_ = found.front().map;
-        map_key_ = entering_key_;
-        entering_frames_ = 0;
-        reports_.clear();
-        out->state = TrackingState::kRelocalized;
-        out->hint.clear();
-        Accept(frame, result, out);
-        return;
-      }
-    }
-    entering_frames_ = 0;
-  }
-  for (const TurnedPlace& place : BestPlaces(*places)) {
-    const PlaceCandidate& candidate = place.candidate;
-    map_tracker_.Clear();
-    const KeyFrame* keyframe = candidate.map->FindKeyFrame(candidate.keyframe);
-    map_tracker_.EnablePanorama(keyframe ? keyframe->panorama : kNoId);
-    result = map_tracker_.Track(*candidate.map, *features_, place.camera_from_map,
-                                MapTracker::Effort::kRecovery, &random_);
-    if (!Recovered(result)) continue;
-    if (candidate.map_key == map_key_) {
-      out->state = TrackingState::kRelocalized;
-      out->hint.clear();
-      Accept(frame, result, out);
-    } else {
-      entering_key_ = candidate.map_key;
-      entering_panorama_ = map_tracker_.panorama();
-      entering_pose_ = result.camera_from_map;
-      entering_frames_ = 1;
-    }
-    return;
-  }
-  map_tracker_.Clear();
 }
 
 std::optional<KeyFrameCandidate> Tracker::TakeKeyFrameCandidate() {

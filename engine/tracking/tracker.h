@@ -60,7 +60,11 @@ struct TrackerOptions {
   int candidates_of_a_map = 4;    // of these, at most
   std::size_t candidates = 3;     // the best of these are verified, each frame
   int agreeing_frames = 3;        // before another map is entered (ptamm §6.3)
-  bool build_maps = true;         // else a frame without a map is lost, not initializing
+  // Overlapping maps (ptamm §5.3): while a map that does not grow is poorly seen, another one may fit better.
+  double poor_quality = 0.5;
+  double better_quality = 1.3;   // times the present quality, to be entered
+  int frames_between_looks = 3;  // for such a map
+  bool build_maps = true;        // else a frame without a map is lost, not initializing
 };
 
 // Tracks one camera: waits for a start, follows the map, notices loss and comes back by the place finder.
@@ -92,6 +96,12 @@ class Tracker {
   std::uint64_t map_key() const { return map_key_; }
 
  private:
+  // A keyframe that resembles the frame, and the pose that the resemblance suggests.
+  struct TurnedPlace {
+    PlaceCandidate candidate;
+    Rigid3 camera_from_map;
+    double misfit = 0;  // of the thumbnails, after turning
+  };
   std::shared_ptr<ImageFeatures> NextFeatures(const Frame& frame);
   void LookForStart(const Frame& frame, TrackedFrame* out);
   // Whichever of the two ways to start a map is used.
@@ -105,14 +115,17 @@ class Tracker {
   void OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rigid3& camera_from_map,
                      const std::vector<PointMatch>& matches);
   void Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
+  void LookForBetterMap(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
+  // Tracks the map that is about to be entered, in `tracker`; its snapshot, or null when it is not there.
+  std::shared_ptr<const MapSnapshot> FollowEntering(const PlaceFinder& places, MapTracker* tracker,
+                                                    MapTrackResult* result);
+  MapTrackResult TryPlace(const TurnedPlace& place, MapTracker* tracker);
+  void Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, const MapTrackResult& result,
+             TrackedFrame* out);
+  void BeginEntering(const TurnedPlace& place, const MapTracker& tracker, const MapTrackResult& result);
   bool RecoverNearby(const Frame& frame, TrackedFrame* out);
-  // A keyframe that resembles the frame, and the pose that the resemblance suggests.
-  struct TurnedPlace {
-    PlaceCandidate candidate;
-    Rigid3 camera_from_map;
-    double misfit = 0;  // of the thumbnails, after turning
-  };
-  std::vector<TurnedPlace> BestPlaces(const PlaceFinder& places) const;
+  // The best of those that resemble the frame; but_map: none of that map.
+  std::vector<TurnedPlace> BestPlaces(const PlaceFinder& places, std::uint64_t but_map = 0) const;
   bool Believable(const MapTrackResult& result) const;
   bool Recovered(const MapTrackResult& result) const;
   void Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out);
@@ -123,6 +136,7 @@ class Tracker {
   std::shared_ptr<const CameraModel> camera_;
   Random random_;
   MapTracker map_tracker_;
+  MapTracker rival_tracker_;  // of another map, while one is tracked
   Initializer initializer_;
   std::optional<TargetInitializer> target_initializer_;
   MotionModel motion_;
@@ -145,6 +159,7 @@ class Tracker {
   Rigid3 anchor_pose_;
   Timestamp last_points_{};  // when points told the pose
   int frames_since_keyframe_ = 0;
+  int frames_since_look_ = 0;  // for a better map
   // Poses in another map that agree with each other, before it is entered.
   std::uint64_t entering_key_ = 0;
   int entering_frames_ = 0;

@@ -42,6 +42,18 @@ TEST(Association, KeepsTwoCamerasInOneMapAndMovesThemTogether) {
   EXPECT_TRUE(cameras.IsTracked(kHand) && cameras.IsTracked(kShoulder));
 }
 
+TEST(Association, LetsACameraThatIsTrackedAloneLeaveForAMapThatFitsBetter) {
+  CameraAssociation cameras(2);
+  EXPECT_TRUE(cameras.Tracked(kHand, 1));
+  EXPECT_EQ(cameras.SearchedMap(kHand), kEverywhere);
+  EXPECT_EQ(cameras.SearchedMap(kShoulder), 1u);
+  EXPECT_TRUE(cameras.Tracked(kHand, 2));
+  EXPECT_EQ(cameras.map(), 2u);
+  EXPECT_TRUE(cameras.Tracked(kShoulder, 2));
+  EXPECT_EQ(cameras.SearchedMap(kHand), 2u);
+  EXPECT_FALSE(cameras.Tracked(kHand, 1)) << "the other one holds it";
+}
+
 TEST(Association, BelievesTheFirstOfTwoThatAreFoundAtTheSameMoment) {
   CameraAssociation cameras(2);
   EXPECT_TRUE(cameras.Tracked(kShoulder, 3));
