@@ -70,16 +70,19 @@ void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<Fram
   map->rotation_rmse_deg = rotation_error.Get();
   map->rotation_drift_deg = DriftDegrees(pairs.front(), pairs.back());
 
+  std::vector<std::size_t> positioned;  // frames
   std::vector<Eigen::Vector3d> in_truth, in_map;
   for (const Pair& pair : pairs) {
+    if (!(*frames)[pair.frame].has_position) continue;
+    positioned.push_back(pair.frame);
     in_truth.push_back(pair.truth_from_camera.translation);
     in_map.push_back(pair.map_from_camera.translation);
   }
   const std::optional<engine::Sim3> truth_from_map = engine::AlignSim3(in_truth, in_map);
   if (!truth_from_map) return;
   RootMeanSquare position_error;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    FrameResult& frame = (*frames)[pairs[i].frame];
+  for (std::size_t i = 0; i < positioned.size(); ++i) {
+    FrameResult& frame = (*frames)[positioned[i]];
     frame.position_in_truth = *truth_from_map * in_map[i];
     frame.position_error_m = (*frame.position_in_truth - in_truth[i]).norm();
     position_error.Add(*frame.position_error_m);
@@ -134,6 +137,8 @@ void CountFrames(const RunRecord& run, SequenceReport* report) {
     }
     report->frame_results[i].tracked = true;
     ++report->tracked;
+    report->frame_results[i].has_position = !InMapOfDirections(frame);
+    if (InMapOfDirections(frame)) ++report->directions_only_frames;
     if (frame.state == engine::TrackingState::kRelocalized) ++report->relocalizations;
     if (!report->first_tracked_frame) report->first_tracked_frame = static_cast<int>(i);
   }

@@ -159,7 +159,7 @@ std::string MapPlot(const EvaluatedRun& run, const MapRecord& map) {
   std::vector<Eigen::Vector3d> centers;
   for (std::size_t i = 0; i < run.run.frames.size(); ++i) {
     const FrameRecord& frame = run.run.frames[i];
-    if (frame.map_key == map.key && engine::HasPose(frame.state)) {
+    if (frame.map_key == map.key && engine::HasPose(frame.state) && !InMapOfDirections(frame)) {
       centers.push_back(frame.camera_from_map.OriginInSource());
     }
   }
@@ -237,6 +237,12 @@ std::string MapTable(const SequenceReport& r) {
   if (r.discarded_frames > 0) {
     html += " " + std::to_string(r.discarded_frames) +
             " frames had a pose in a map that was given up later; they count as untracked.";
+  }
+  if (r.directions_only_frames > 0) {
+    html += " " + std::to_string(r.directions_only_frames) +
+            " frames were tracked while their map held directions alone; they have a rotation but no "
+            "position, and "
+            "the ATE is without them.";
   }
   return html + "</p>\n";
 }

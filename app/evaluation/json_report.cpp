@@ -68,6 +68,7 @@ Json ToJson(const SequenceReport& report) {
       {"wall_s", report.wall_s},
       {"peak_memory_mb", report.peak_memory_mb},
       {"discarded_frames", report.discarded_frames},
+      {"directions_only_frames", report.directions_only_frames},
       {"maps", Json::array()},
       {"segments", Json::array()},
   };

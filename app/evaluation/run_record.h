@@ -38,6 +38,11 @@ struct FrameRecord {
   PointCounts map_points;
 };
 
+// The frame was tracked in a map that knew no depth yet: its position is not one.
+inline bool InMapOfDirections(const FrameRecord& frame) {
+  return frame.map_points.infinite > 0 && frame.map_points.finite == 0;
+}
+
 struct MapRecord {
   std::uint64_t key = 0;
   std::string name;

@@ -161,6 +161,41 @@ TEST(Evaluation, AlignsEveryMapByItselfAndReportsTheLargest) {
   EXPECT_THAT(report.segments[0].ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
 }
 
+// An instant start: the first frames turn about a place that nobody knows, whatever numbers stand for it.
+TEST(Evaluation, TakesNoPositionFromAMapOfDirectionsAlone) {
+  const auto truth = Helix(120);
+  RunRecord run = PerfectRun(truth);
+  for (std::size_t i = 0; i < run.frames.size(); ++i) {
+    FrameRecord& frame = run.frames[i];
+    frame.map_points = {i < 40 ? 0 : 500, 200, 0};
+    // After the start a panorama inside the map: there the camera stands where its centre is.
+    if (i < 40 || i > 100) frame.state = TrackingState::kPanorama;
+    if (i < 40) MoveInTruth(&frame, {7, -3, 1});
+  }
+  run.frames[10].state = TrackingState::kRelocalized;
+  // A rotation counts all the same: frame 5 is off by one degree.
+  engine::Rigid3& pose = run.frames[5].camera_from_map;
+  pose = engine::Rigid3(engine::Rotation3::Exp({kDegree, 0, 0}), Eigen::Vector3d::Zero()) * pose;
+  const SequenceReport report = EvaluateRun(run, truth, {{TimeOf(0), "start"}, {TimeOf(40), "walk"}});
+  EXPECT_EQ(report.tracked, 120);
+  EXPECT_EQ(report.tracked_ratio, 1);
+  EXPECT_EQ(report.directions_only_frames, 40);
+  EXPECT_THAT(report.ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
+  EXPECT_THAT(report.scale, Optional(DoubleNear(2.5, 1e-9)));
+  EXPECT_FALSE(report.frame_results[39].position_error_m);
+  EXPECT_TRUE(report.frame_results[40].position_error_m);
+  EXPECT_TRUE(report.frame_results[110].position_error_m);
+  ASSERT_TRUE(report.frame_results[5].rotation_error_deg);
+  EXPECT_NEAR(*report.frame_results[5].rotation_error_deg, 1, 0.02);
+  EXPECT_FALSE(report.segments[0].ate_rmse_m);
+  EXPECT_EQ(report.segments[0].tracked_ratio, 1);
+  EXPECT_THAT(report.segments[1].ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
+  const auto json = nlohmann::json::parse(FormatJsonReport({report}));
+  EXPECT_EQ(json.at("sequences").at(0).at("directions_only_frames"), 40);
+  EXPECT_THAT(FormatHtmlReport({{run, truth, {}, report}}),
+              HasSubstr("40 frames were tracked while their map held"));
+}
+
 TEST(Evaluation, OfAPureRotationHasNoAteButARotationError) {
   auto truth = Helix(50);
   RunRecord run = PerfectRun(truth);
