@@ -43,6 +43,9 @@ struct MapResult {
   std::optional<double> scale;       // truth metres a map metre
   std::optional<double> rotation_rmse_deg;   // after the rotation that aligns the orientations best
   std::optional<double> rotation_drift_deg;  // of the turn from the first to the last frame
+  // The same about the true turn's own axis, as hybrid-slam §7.3 tells it: positive when the engine turned
+  // too far. Empty where the camera ended looking as it began, as there is no axis then.
+  std::optional<double> turn_error_deg;
 };
 
 // All frames with one label.
@@ -62,7 +65,8 @@ struct SequenceReport {
   double tracked_ratio = 0;        // tracked over all frames from the first tracked one on, that one included
   std::optional<int> first_tracked_frame;
   int relocalizations = 0;
-  std::optional<double> ate_rmse_m, rotation_rmse_deg, rotation_drift_deg, scale;  // of the largest map
+  // Of the largest map.
+  std::optional<double> ate_rmse_m, rotation_rmse_deg, rotation_drift_deg, turn_error_deg, scale;
   KeyFrameCounts keyframes;  // sums over the maps that were kept
   PointCounts points;
   double tracking_median_ms = 0, tracking_p95_ms = 0, tracking_max_ms = 0;  // of frames that were not dropped

@@ -204,6 +204,7 @@ std::string FigureTable(const SequenceReport& r) {
   html += Row("ATE RMSE", Fixed(r.ate_rmse_m ? std::optional(*r.ate_rmse_m * 100) : std::nullopt, 2, " cm"));
   html += Row("rotation RMSE", Fixed(r.rotation_rmse_deg, 3, "°"));
   html += Row("rotation drift, last frame against first", Fixed(r.rotation_drift_deg, 3, "°"));
+  html += Row("of it about the axis of the true turn", Fixed(r.turn_error_deg, 3, "°"));
   html += Row("scale", Fixed(r.scale, 4, ""));
   html += Row("keyframes", std::to_string(r.keyframes.sixdof) + " sixdof, " +
                                std::to_string(r.keyframes.panorama) + " panorama, " +
@@ -287,13 +288,14 @@ std::string FormatHtmlReport(const std::vector<EvaluatedRun>& runs) {
       "font-size:13px}svg .grid{stroke:#e3e3e3;fill:none}\n</style></head><body>\n<h1>Docent: "
       "evaluation</h1>\n";
   html +=
-      "<table><tr><th>sequence</th><th>tracked</th><th>ATE RMSE</th><th>rotation</th><th>ms a "
-      "frame</th></tr>\n";
+      "<table><tr><th>sequence</th><th>tracked</th><th>ATE RMSE</th><th>rotation</th><th>turn, last against "
+      "first</th>"
+      "<th>ms a frame</th></tr>\n";
   for (const EvaluatedRun& run : runs) {
     const SequenceReport& r = run.report;
     html += "<tr><td>" + EscapeHtml(r.name) + "</td><td>" + Fixed(r.tracked_ratio * 100, 1) + " %</td><td>" +
             Centimetres(r.ate_rmse_m) + "</td><td>" + Fixed(r.rotation_rmse_deg, 3, "°") + "</td><td>" +
-            Fixed(r.tracking_median_ms, 2) + "</td></tr>\n";
+            Fixed(r.turn_error_deg, 3, "°") + "</td><td>" + Fixed(r.tracking_median_ms, 2) + "</td></tr>\n";
   }
   html += "</table>\n";
   for (const EvaluatedRun& run : runs) html += Section(run);

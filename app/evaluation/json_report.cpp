@@ -25,6 +25,7 @@ Json ToJson(const MapResult& map) {
           {"ate_rmse_m", OrNull(map.ate_rmse_m)},
           {"rotation_rmse_deg", OrNull(map.rotation_rmse_deg)},
           {"rotation_drift_deg", OrNull(map.rotation_drift_deg)},
+          {"turn_error_deg", OrNull(map.turn_error_deg)},
           {"scale", OrNull(map.scale)}};
 }
 
@@ -47,6 +48,7 @@ Json ToJson(const SequenceReport& report) {
       {"ate_rmse_m", OrNull(report.ate_rmse_m)},
       {"rotation_rmse_deg", OrNull(report.rotation_rmse_deg)},
       {"rotation_drift_deg", OrNull(report.rotation_drift_deg)},
+      {"turn_error_deg", OrNull(report.turn_error_deg)},
       {"scale", OrNull(report.scale)},
       {"keyframes",
        {{"sixdof", report.keyframes.sixdof},

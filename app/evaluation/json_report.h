@@ -10,7 +10,8 @@
 namespace docent::app {
 
 // report.json: one object a sequence under `sequences`, with the fields of command-line.md and, beyond them,
-// `discarded_frames`, `directions_only_frames`, `maps` and `segments`. What is not known is null.
+// `discarded_frames`, `directions_only_frames`, `turn_error_deg`, `maps` and `segments`. What is not known is
+// null.
 std::string FormatJsonReport(const std::vector<SequenceReport>& reports);
 void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports);
 
