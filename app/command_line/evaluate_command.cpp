@@ -25,6 +25,8 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
       ->allow_extra_args(false);
   AddPaceOption(command, pace.get());
   AddEngineOption(command, &options->engine);
+  command->add_flag("--compare", options->compare,
+                    "Run each sequence with the other engine too, and show both side by side");
   AddSeedOption(command, &options->seed);
   command->callback([=, run = std::move(run)] {
     if (options->calibrations.size() > options->sequences.size()) {

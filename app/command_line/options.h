@@ -45,7 +45,7 @@ struct RunArguments {
   std::optional<std::filesystem::path> record;  // video of the augmented view
   std::uint64_t seed = 1;
   std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory
-  double baseline_m = 0;  // measured between the two cameras; 0: not
+  double baseline_m = 0;                                   // measured between the two cameras; 0: not
 };
 
 struct AuthorOptions {
@@ -65,6 +65,7 @@ struct EvaluateOptions {
   std::vector<std::filesystem::path> calibrations;  // for the first sequences; the others' are found
   Pace pace = Pace::kEager;
   EngineKind engine = EngineKind::kHybrid;
+  bool compare = false;  // run the other engine too
   std::uint64_t seed = 1;
 };
 

@@ -246,6 +246,7 @@ SequenceReport EvaluateRun(const RunRecord& run, const std::vector<TimedPose>& t
                            const std::vector<TimedLabel>& segments, const EvaluationOptions& options) {
   SequenceReport report;
   report.name = run.name;
+  report.engine = run.engine;
   report.mapping = run.mapping;
   report.wall_s = run.wall_s;
   report.peak_memory_mb = run.peak_memory_mb;

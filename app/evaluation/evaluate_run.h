@@ -57,7 +57,7 @@ struct SegmentResult {
 };
 
 struct SequenceReport {
-  std::string name;
+  std::string name, engine;  // as in RunRecord
   int frames = 0;
   int tracked = 0;                 // with a pose in a map that was kept
   int discarded_frames = 0;        // with a pose in a map that was discarded; counted as untracked

@@ -40,6 +40,7 @@ Json ToJson(const SegmentResult& segment) {
 Json ToJson(const SequenceReport& report) {
   Json json = {
       {"name", report.name},
+      {"engine", report.engine.empty() ? Json(nullptr) : Json(report.engine)},
       {"frames", report.frames},
       {"tracked", report.tracked},
       {"tracked_ratio", report.tracked_ratio},
@@ -87,17 +88,20 @@ std::string Format(const char* format, double value) {
 
 }  // namespace
 
-std::string FormatJsonReport(const std::vector<SequenceReport>& reports) {
+std::string FormatJsonReport(const std::vector<SequenceReport>& reports,
+                             const std::vector<SequenceReport>& compared) {
   Json json = {{"sequences", Json::array()}};
   for (const SequenceReport& report : reports) json["sequences"].push_back(ToJson(report));
+  for (const SequenceReport& report : compared) json["compared"].push_back(ToJson(report));
   // A folder's name need not be UTF-8; a report that cannot be written for its name would be worse than a
   // '?'.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports) {
+void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports,
+                     const std::vector<SequenceReport>& compared) {
   CheckedFile file(path);
-  file.Write(FormatJsonReport(reports));
+  file.Write(FormatJsonReport(reports, compared));
   file.Close();
 }
 
