@@ -27,6 +27,8 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
   AddEngineOption(command, &options->engine);
   command->add_flag("--turn-about-camera", options->turn_about_camera,
                     "Take every turn to be about the camera's own centre, not the wearer's; for comparison");
+  command->add_flag("--compare", options->compare,
+                    "Run each sequence with the other engine too, and show both side by side");
   AddSeedOption(command, &options->seed);
   command->callback([=, run = std::move(run)] {
     if (options->calibrations.size() > options->sequences.size()) {

@@ -68,6 +68,7 @@ struct EvaluateOptions {
   Pace pace = Pace::kEager;
   EngineKind engine = EngineKind::kHybrid;
   bool turn_about_camera = false;  // see TurnCenterOptions::enabled
+  bool compare = false;            // run the other engine too
   std::uint64_t seed = 1;
 };
 

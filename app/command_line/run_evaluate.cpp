@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cstdio>
 #include <exception>
+#include <memory>
 #include <set>
 #include <utility>
 
@@ -10,7 +11,9 @@
 #include "app/command_line/runs.h"
 #include "app/evaluation/html_report.h"
 #include "app/evaluation/json_report.h"
+#include "app/evaluation/panorama_picture.h"
 #include "app/evaluation/simulated_truth.h"
+#include "app/files/checked_file.h"
 #include "app/output/run_output.h"
 #include "app/session/frame_loop.h"
 #include "engine/base/error.h"
@@ -60,11 +63,28 @@ SessionOptions OptionsFor(const EvaluateOptions& options) {
   return session;
 }
 
-// Tracks the whole sequence in a fresh session and leaves its files in `folder`.
+// Stitches what a map knows by turning, into the output folder and for the report.
+void StitchMap(const std::filesystem::path& folder, const Session::MapState& map,
+               std::vector<ShownPanorama>* shown) {
+  for (const PanoramaPicture& panorama : StitchPanoramas(*map.snapshot)) {
+    const std::string number = std::to_string(map.key) + "-" + std::to_string(panorama.panorama);
+    ShownPanorama picture;
+    picture.caption = "panorama-" + number + ".png: " + std::to_string(panorama.keyframes) +
+                      " keyframes of the map '" + map.name + "'";
+    picture.png = EncodePng(panorama.picture);
+    CheckedFile file(folder / ("panorama-" + number + ".png"));
+    file.Write({reinterpret_cast<const char*>(picture.png.data()), picture.png.size()});
+    file.Close();
+    shown->push_back(std::move(picture));
+  }
+}
+
+// Tracks the whole sequence in a fresh session and leaves its files in the folder of that name.
 RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const std::string& name,
-                Verbosity verbosity) {
+                Verbosity verbosity, std::vector<ShownPanorama>* panoramas) {
   RunRecord record;
   record.name = name;
+  record.engine = ToString(options.engine);
   ResetPeakMemory();
   const auto start = std::chrono::steady_clock::now();
   RunOutput output(options.output / name);
@@ -79,7 +99,7 @@ RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const 
   try {
     RunFrames(camera, &session, loop,
               [&](const engine::TrackedFrame& frame) {
-                recorder.Add(frame);
+                recorder.Add(frame, MakeMappingTimes(session.MappingTimes()));
                 output.Add(frame, session.ShownWith(frame).map_name);
                 write_events();
                 progress.Update(recorder.frames().size());
@@ -94,19 +114,15 @@ RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const 
   write_events();
   output.Close();
   record.frames = recorder.frames();
+  record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  record.peak_memory_mb = PeakMemoryMegabytes();
+  record.mapping = MakeMappingTimes(session.MappingTimes());
   for (const Session::MapState& map : session.Maps()) {
     if (!map.snapshot) continue;
     record.maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
     record.maps.back().discarded = map.discarded;
+    if (!map.discarded) StitchMap(options.output / name, map, panoramas);
   }
-  const engine::MapperTimes times = session.MappingTimes();
-  record.mapping.bundle_adjustment_s = times.bundle_adjustment;
-  record.mapping.panorama_localization_s = times.panorama_localization;
-  record.mapping.infinite_triangulation_s = times.infinite_triangulation;
-  record.mapping.other_s = times.other;
-  record.mapping.longest_hold_s = times.longest_hold;
-  record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  record.peak_memory_mb = PeakMemoryMegabytes();
   return record;
 }
 
@@ -121,11 +137,34 @@ std::string FreeFolderName(std::string name, std::set<std::string>* taken) {
   return free;
 }
 
+EvaluatedRun Evaluate(const EvaluateOptions& options, Sequence sequence, const std::string& name,
+                      Verbosity verbosity) {
+  EvaluatedRun run;
+  run.run = Track(options, &sequence.camera, name, verbosity, &run.panoramas);
+  run.truth = std::move(sequence.truth);
+  run.segments = std::move(sequence.segments);
+  run.report = EvaluateRun(run.run, run.truth, run.segments);
+  if (verbosity != Verbosity::kQuiet) {
+    std::printf("%s\n", FormatSummary(run.report).c_str());
+    std::fflush(stdout);
+  }
+  return run;
+}
+
+void WriteReports(const std::filesystem::path& folder, const std::vector<EvaluatedRun>& runs) {
+  std::vector<SequenceReport> reports, compared;
+  for (const EvaluatedRun& run : runs) {
+    reports.push_back(run.report);
+    if (run.compared) compared.push_back(run.compared->report);
+  }
+  WriteJsonReport(folder / "report.json", reports, compared);
+  WriteHtmlReport(folder / "report.html", runs);
+}
+
 }  // namespace
 
 void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity) {
   std::vector<EvaluatedRun> runs;
-  std::vector<SequenceReport> reports;
   std::set<std::string> taken;
   std::exception_ptr failure;
   for (std::size_t i = 0; i < options.sequences.size() && !failure; ++i) {
@@ -133,26 +172,19 @@ void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity) {
       Sequence sequence = OpenSequence(options, i);
       MakeFolder(options.output);  // not before there is something to put into it
       const std::string name = FreeFolderName(sequence.camera.source->info().name, &taken);
-      EvaluatedRun run;
-      run.run = Track(options, &sequence.camera, name, verbosity);
-      run.truth = std::move(sequence.truth);
-      run.segments = std::move(sequence.segments);
-      run.report = EvaluateRun(run.run, run.truth, run.segments);
-      reports.push_back(run.report);
-      if (verbosity != Verbosity::kQuiet) {
-        std::printf("%s\n", FormatSummary(run.report).c_str());
-        std::fflush(stdout);
-      }
-      runs.push_back(std::move(run));
+      runs.push_back(Evaluate(options, std::move(sequence), name, verbosity));
+      if (!options.compare) continue;
+      EvaluateOptions other = options;
+      other.engine = options.engine == EngineKind::kHybrid ? EngineKind::kSixDof : EngineKind::kHybrid;
+      const std::string other_name = FreeFolderName(name + "-" + ToString(other.engine), &taken);
+      runs.back().compared =
+          std::make_shared<EvaluatedRun>(Evaluate(other, OpenSequence(options, i), other_name, verbosity));
     } catch (const Error&) {
       // What was evaluated before is reported all the same.
       failure = std::current_exception();
     }
   }
-  if (!runs.empty()) {
-    WriteJsonReport(options.output / "report.json", reports);
-    WriteHtmlReport(options.output / "report.html", runs);
-  }
+  if (!runs.empty()) WriteReports(options.output, runs);
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -49,12 +49,28 @@ engine::Rotation3 AlignRotations(const std::vector<Pair>& pairs) {
   return engine::Rotation3(rotation);
 }
 
-double DriftDegrees(const Pair& first, const Pair& last) {
+// What the engine turned from the first to the last frame against what the camera did, in the first camera's
+// frame.
+struct Turn {
+  engine::Rotation3 truth, error;  // error = truth^-1 * tracked
+};
+
+Turn CompareTurn(const Pair& first, const Pair& last) {
   const auto turn = [](const engine::Rigid3& a, const engine::Rigid3& b) {
     return a.rotation.inverse() * b.rotation;
   };
-  const engine::Rotation3 true_turn = turn(first.truth_from_camera, last.truth_from_camera);
-  return (true_turn.inverse() * turn(first.map_from_camera, last.map_from_camera)).Angle() * kDegrees;
+  const engine::Rotation3 truth = turn(first.truth_from_camera, last.truth_from_camera);
+  return {truth, truth.inverse() * turn(first.map_from_camera, last.map_from_camera)};
+}
+
+// The part of the error about the true turn's axis: the twist of the error's swing and twist.
+std::optional<double> ErrorAboutTheAxis(const Turn& turn) {
+  constexpr double kLeastTurn = 5 / kDegrees;
+  const Eigen::Vector3d axis = turn.truth.Log();
+  if (axis.norm() < kLeastTurn) return std::nullopt;
+  const Eigen::Quaterniond& q = turn.error.quaternion();
+  const double half = std::atan2(q.vec().dot(axis.normalized()), q.w());
+  return std::remainder(2 * half, 2 * std::numbers::pi) * kDegrees;
 }
 
 void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<FrameResult>* frames) {
@@ -68,18 +84,23 @@ void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<Fram
     rotation_error.Add(error_deg);
   }
   map->rotation_rmse_deg = rotation_error.Get();
-  map->rotation_drift_deg = DriftDegrees(pairs.front(), pairs.back());
+  const Turn turn = CompareTurn(pairs.front(), pairs.back());
+  map->rotation_drift_deg = turn.error.Angle() * kDegrees;
+  map->turn_error_deg = ErrorAboutTheAxis(turn);
 
+  std::vector<std::size_t> positioned;  // frames
   std::vector<Eigen::Vector3d> in_truth, in_map;
   for (const Pair& pair : pairs) {
+    if (!(*frames)[pair.frame].has_position) continue;
+    positioned.push_back(pair.frame);
     in_truth.push_back(pair.truth_from_camera.translation);
     in_map.push_back(pair.map_from_camera.translation);
   }
   const std::optional<engine::Sim3> truth_from_map = engine::AlignSim3(in_truth, in_map);
   if (!truth_from_map) return;
   RootMeanSquare position_error;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    FrameResult& frame = (*frames)[pairs[i].frame];
+  for (std::size_t i = 0; i < positioned.size(); ++i) {
+    FrameResult& frame = (*frames)[positioned[i]];
     frame.position_in_truth = *truth_from_map * in_map[i];
     frame.position_error_m = (*frame.position_in_truth - in_truth[i]).norm();
     position_error.Add(*frame.position_error_m);
@@ -134,6 +155,8 @@ void CountFrames(const RunRecord& run, SequenceReport* report) {
     }
     report->frame_results[i].tracked = true;
     ++report->tracked;
+    report->frame_results[i].has_position = !InMapOfDirections(frame);
+    if (InMapOfDirections(frame)) ++report->directions_only_frames;
     if (frame.state == engine::TrackingState::kRelocalized) ++report->relocalizations;
     if (!report->first_tracked_frame) report->first_tracked_frame = static_cast<int>(i);
   }
@@ -181,6 +204,7 @@ void CompareWithTruth(const RunRecord& run, const std::vector<TimedPose>& truth,
   report->scale = largest.scale;
   report->rotation_rmse_deg = largest.rotation_rmse_deg;
   report->rotation_drift_deg = largest.rotation_drift_deg;
+  report->turn_error_deg = largest.turn_error_deg;
 }
 
 std::vector<SegmentResult> EvaluateSegments(const RunRecord& run, const std::vector<TimedLabel>& labels,
@@ -222,6 +246,7 @@ SequenceReport EvaluateRun(const RunRecord& run, const std::vector<TimedPose>& t
                            const std::vector<TimedLabel>& segments, const EvaluationOptions& options) {
   SequenceReport report;
   report.name = run.name;
+  report.engine = run.engine;
   report.mapping = run.mapping;
   report.wall_s = run.wall_s;
   report.peak_memory_mb = run.peak_memory_mb;

@@ -16,6 +16,9 @@
 // Each map has a frame and a scale of its own, so poses are compared map by map: the similarity
 // truth_from_map of least squares over its camera centres (Umeyama 1991), then the root mean square of what
 // remains. The figures of the whole sequence are those of the largest map, the one with most tracked frames.
+// A map that holds directions alone, as one does from its first picture until its camera has moved, says
+// which way the camera looks and nothing of where it is: its frames are tracked and have a rotation, but they
+// have no part in the alignment and the error of positions.
 namespace docent::app {
 
 struct EvaluationOptions {
@@ -25,6 +28,7 @@ struct EvaluationOptions {
 // One frame against the truth; empty members where there is nothing to compare.
 struct FrameResult {
   bool tracked = false;                              // has a pose in a map that was kept
+  bool has_position = false;                         // and that map knew depth
   std::optional<Eigen::Vector3d> position_in_truth;  // by the map's alignment
   std::optional<double> position_error_m;
   std::optional<double> rotation_error_deg;  // after aligning rotations
@@ -39,6 +43,9 @@ struct MapResult {
   std::optional<double> scale;       // truth metres a map metre
   std::optional<double> rotation_rmse_deg;   // after the rotation that aligns the orientations best
   std::optional<double> rotation_drift_deg;  // of the turn from the first to the last frame
+  // The same about the true turn's own axis, as hybrid-slam §7.3 tells it: positive when the engine turned
+  // too far. Empty where the camera ended looking as it began, as there is no axis then.
+  std::optional<double> turn_error_deg;
 };
 
 // All frames with one label.
@@ -50,14 +57,16 @@ struct SegmentResult {
 };
 
 struct SequenceReport {
-  std::string name;
+  std::string name, engine;  // as in RunRecord
   int frames = 0;
-  int tracked = 0;           // with a pose in a map that was kept
-  int discarded_frames = 0;  // with a pose in a map that was discarded; counted as untracked
-  double tracked_ratio = 0;  // tracked over all frames from the first tracked one on, that one included
+  int tracked = 0;                 // with a pose in a map that was kept
+  int discarded_frames = 0;        // with a pose in a map that was discarded; counted as untracked
+  int directions_only_frames = 0;  // of the tracked ones: in a map without depth, so without a position
+  double tracked_ratio = 0;        // tracked over all frames from the first tracked one on, that one included
   std::optional<int> first_tracked_frame;
   int relocalizations = 0;
-  std::optional<double> ate_rmse_m, rotation_rmse_deg, rotation_drift_deg, scale;  // of the largest map
+  // Of the largest map.
+  std::optional<double> ate_rmse_m, rotation_rmse_deg, rotation_drift_deg, turn_error_deg, scale;
   KeyFrameCounts keyframes;  // sums over the maps that were kept
   PointCounts points;
   double tracking_median_ms = 0, tracking_p95_ms = 0, tracking_max_ms = 0;  // of frames that were not dropped

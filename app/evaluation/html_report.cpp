@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/evaluation/html_report.h"
 
-#include <Eigen/Eigenvalues>
-#include <array>
-#include <cmath>
+#include <algorithm>
 #include <cstdio>
-#include <limits>
+#include <optional>
 
+#include "app/evaluation/run_plots.h"
 #include "app/evaluation/svg_plot.h"
 #include "app/files/checked_file.h"
 #include "app/files/text_file.h"
@@ -14,24 +13,6 @@
 namespace docent::app {
 
 namespace {
-
-constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
-
-struct StateColor {
-  engine::TrackingState state;
-  const char* color;
-};
-constexpr std::array<StateColor, 7> kStateColors = {{
-    {engine::TrackingState::kInitializing, "#d9d9d9"},
-    {engine::TrackingState::kSixDof, "#2c8a4b"},
-    {engine::TrackingState::kHybrid, "#8cc26b"},
-    {engine::TrackingState::kPanorama, "#4a90c2"},
-    {engine::TrackingState::kRelocalized, "#f2b134"},
-    {engine::TrackingState::kLost, "#c8413c"},
-    {engine::TrackingState::kDropped, "#7a5aa6"},
-}};
-constexpr std::array<const char*, 6> kMapColors = {"#2c8a4b", "#4a90c2", "#c8413c",
-                                                   "#f2b134", "#7a5aa6", "#3aa6a0"};
 
 std::string Fixed(double value, int decimals) {
   char text[64];
@@ -41,153 +22,6 @@ std::string Fixed(double value, int decimals) {
 
 std::string Fixed(const std::optional<double>& value, int decimals, const char* unit) {
   return value ? Fixed(*value, decimals) + unit : "unknown";
-}
-
-double SecondsFromStart(const EvaluatedRun& run, std::size_t frame) {
-  return ToSeconds(run.run.frames[frame].time - run.run.frames.front().time);
-}
-
-template <typename Value>
-std::vector<SvgPlot::Point> OverTime(const EvaluatedRun& run, const Value& value) {
-  std::vector<SvgPlot::Point> points;
-  for (std::size_t i = 0; i < run.run.frames.size(); ++i)
-    points.push_back({SecondsFromStart(run, i), static_cast<double>(value(i))});
-  return points;
-}
-
-std::string StatePlot(const EvaluatedRun& run) {
-  SvgPlot plot("Tracking by state", "seconds", "");
-  plot.HideYAxis();
-  plot.SetHeight(120);
-  const std::size_t count = run.run.frames.size();
-  for (const StateColor& entry : kStateColors) {
-    bool used = false;
-    for (const FrameRecord& frame : run.run.frames) used = used || frame.state == entry.state;
-    if (used) plot.AddLegend(entry.color, engine::ToString(entry.state));
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    const double begin = SecondsFromStart(run, i);
-    const double end = i + 1 < count ? SecondsFromStart(run, i + 1) : begin;
-    for (const StateColor& entry : kStateColors) {
-      if (entry.state == run.run.frames[i].state) plot.AddBand(begin, end, entry.color);
-    }
-  }
-  return plot.Finish();
-}
-
-std::string KeyFramePlot(const EvaluatedRun& run) {
-  const auto& frames = run.run.frames;
-  SvgPlot plot("Keyframes of the current map", "seconds", "keyframes");
-  plot.AddLine(OverTime(run, [&](std::size_t i) { return frames[i].map_keyframes.sixdof; }), "#2c8a4b",
-               "sixdof");
-  plot.AddLine(OverTime(run, [&](std::size_t i) { return frames[i].map_keyframes.panorama; }), "#4a90c2",
-               "panorama");
-  return plot.Finish();
-}
-
-std::string PointPlot(const EvaluatedRun& run) {
-  const auto& frames = run.run.frames;
-  SvgPlot plot("Points of the current map, and those found in the frame", "seconds", "points");
-  plot.AddLine(OverTime(run, [&](std::size_t i) { return frames[i].map_points.finite; }), "#2c8a4b",
-               "finite");
-  plot.AddLine(OverTime(run, [&](std::size_t i) { return frames[i].map_points.infinite; }), "#4a90c2",
-               "infinite");
-  plot.AddLine(
-      OverTime(run, [&](std::size_t i) { return frames[i].finite_points + frames[i].infinite_points; }),
-      "#f2b134", "found");
-  return plot.Finish();
-}
-
-std::string TrackingTimePlot(const EvaluatedRun& run) {
-  SvgPlot plot("Time of tracking", "seconds", "ms a frame");
-  plot.AddLine(OverTime(run,
-                        [&](std::size_t i) {
-                          const FrameRecord& frame = run.run.frames[i];
-                          return frame.state == engine::TrackingState::kDropped ? kNothing
-                                                                                : frame.tracking_ms;
-                        }),
-               "#4a90c2", "");
-  return plot.Finish();
-}
-
-// The plane that shows most of these positions: their mean and their two longest axes. For a camera that is
-// carried about, that is the view from above, whichever way the truth's axes point.
-struct View {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero(), right = Eigen::Vector3d::UnitX(),
-                  up = Eigen::Vector3d::UnitZ();
-  SvgPlot::Point Look(const Eigen::Vector3d& x) const { return {right.dot(x - center), up.dot(x - center)}; }
-};
-
-View FitView(const std::vector<Eigen::Vector3d>& positions) {
-  View view;
-  if (positions.size() < 3) return view;
-  for (const Eigen::Vector3d& x : positions) view.center += x / static_cast<double>(positions.size());
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& x : positions) spread += (x - view.center) * (x - view.center).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);  // by ascending eigenvalue
-  view.right = axes.eigenvectors().col(2);
-  view.up = axes.eigenvectors().col(1);
-  return view;
-}
-
-std::string AlignedTrajectoryPlot(const EvaluatedRun& run) {
-  std::vector<Eigen::Vector3d> truth;
-  for (const TimedPose& pose : run.truth) truth.push_back(pose.truth_from_camera.translation);
-  const View view = FitView(truth);
-  SvgPlot plot("Trajectory from above, each map aligned with the truth", "metres", "metres");
-  plot.KeepAspect();
-  plot.SetHeight(520);
-  std::vector<SvgPlot::Point> line;
-  for (const Eigen::Vector3d& x : truth) line.push_back(view.Look(x));
-  plot.AddLine(std::move(line), "#9a9a9a", "truth");
-  for (std::size_t m = 0; m < run.report.maps.size(); ++m) {
-    const MapResult& map = run.report.maps[m];
-    if (!map.ate_rmse_m) continue;
-    std::vector<SvgPlot::Point> points;
-    for (std::size_t i = 0; i < run.run.frames.size(); ++i) {
-      const auto& position = run.report.frame_results[i].position_in_truth;
-      const bool here = position && run.run.frames[i].map_key == map.key;
-      points.push_back(here ? view.Look(*position) : SvgPlot::Point{kNothing, kNothing});
-    }
-    plot.AddLine(std::move(points), kMapColors[m % kMapColors.size()], map.name);
-  }
-  return plot.Finish();
-}
-
-// The map as the engine sees it, in its own frame and scale: camera centres and finite points.
-std::string MapPlot(const EvaluatedRun& run, const MapRecord& map) {
-  std::vector<Eigen::Vector3d> centers;
-  for (std::size_t i = 0; i < run.run.frames.size(); ++i) {
-    const FrameRecord& frame = run.run.frames[i];
-    if (frame.map_key == map.key && engine::HasPose(frame.state)) {
-      centers.push_back(frame.camera_from_map.OriginInSource());
-    }
-  }
-  std::vector<Eigen::Vector3d> everything = centers;
-  everything.insert(everything.end(), map.positions.begin(), map.positions.end());
-  const View view = FitView(everything);
-  SvgPlot plot("The map '" + map.name + "' from its broad side", "map metres", "map metres");
-  plot.KeepAspect();
-  plot.SetHeight(420);
-  std::vector<SvgPlot::Point> dots, line;
-  for (const Eigen::Vector3d& x : map.positions) dots.push_back(view.Look(x));
-  for (const Eigen::Vector3d& x : centers) line.push_back(view.Look(x));
-  plot.AddDots(std::move(dots), "#2c8a4b", "finite points");
-  plot.AddDots(std::move(line), "#c8413c", "camera", 1.0);
-  return plot.Finish();
-}
-
-std::string ErrorPlots(const EvaluatedRun& run) {
-  const auto& results = run.report.frame_results;
-  SvgPlot position("Error of the position", "seconds", "centimetres");
-  position.AddLine(
-      OverTime(run, [&](std::size_t i) { return results[i].position_error_m.value_or(kNothing) * 100; }),
-      "#c8413c", "");
-  SvgPlot rotation("Error of the rotation", "seconds", "degrees");
-  rotation.AddLine(
-      OverTime(run, [&](std::size_t i) { return results[i].rotation_error_deg.value_or(kNothing); }),
-      "#c8413c", "");
-  return position.Finish() + rotation.Finish();
 }
 
 std::string Row(const std::string& name, const std::string& value) {
@@ -204,6 +38,7 @@ std::string FigureTable(const SequenceReport& r) {
   html += Row("ATE RMSE", Fixed(r.ate_rmse_m ? std::optional(*r.ate_rmse_m * 100) : std::nullopt, 2, " cm"));
   html += Row("rotation RMSE", Fixed(r.rotation_rmse_deg, 3, "°"));
   html += Row("rotation drift, last frame against first", Fixed(r.rotation_drift_deg, 3, "°"));
+  html += Row("of it about the axis of the true turn", Fixed(r.turn_error_deg, 3, "°"));
   html += Row("scale", Fixed(r.scale, 4, ""));
   html += Row("keyframes", std::to_string(r.keyframes.sixdof) + " sixdof, " +
                                std::to_string(r.keyframes.panorama) + " panorama, " +
@@ -238,6 +73,12 @@ std::string MapTable(const SequenceReport& r) {
     html += " " + std::to_string(r.discarded_frames) +
             " frames had a pose in a map that was given up later; they count as untracked.";
   }
+  if (r.directions_only_frames > 0) {
+    html += " " + std::to_string(r.directions_only_frames) +
+            " frames were tracked while their map held directions alone; they have a rotation but no "
+            "position, and "
+            "the ATE is without them.";
+  }
   return html + "</p>\n";
 }
 
@@ -253,19 +94,87 @@ std::string SegmentTable(const SequenceReport& r) {
   return html + "</table>\n";
 }
 
-std::string Section(const EvaluatedRun& run) {
-  std::string html = "<section><h2>" + EscapeHtml(run.report.name) + "</h2>\n" + FigureTable(run.report);
-  if (!run.run.frames.empty()) {
-    html += StatePlot(run) + KeyFramePlot(run) + PointPlot(run) + TrackingTimePlot(run);
-    if (!run.truth.empty()) html += AlignedTrajectoryPlot(run) + ErrorPlots(run);
-    if (run.report.largest_map) {
-      for (const MapRecord& map : run.run.maps) {
-        if (map.key == run.report.maps[*run.report.largest_map].key) html += MapPlot(run, map);
-      }
-    }
+// RFC 4648, section 4.
+std::string Base64(const std::vector<std::uint8_t>& bytes) {
+  constexpr const char* kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t three = 0;
+    for (std::size_t j = 0; j < 3; ++j) three = three << 8 | (i + j < bytes.size() ? bytes[i + j] : 0u);
+    for (std::size_t j = 0; j < 4; ++j)
+      text += i + j <= bytes.size() ? kLetters[three >> (18 - 6 * j) & 63] : '=';
   }
-  if (!run.report.maps.empty()) html += MapTable(run.report);
-  return html + SegmentTable(run.report) + "</section>\n";
+  return text;
+}
+
+std::string PanoramaPictures(const EvaluatedRun& run) {
+  if (run.panoramas.empty()) return {};
+  std::string html = "<h3>Panorama maps</h3>\n";
+  for (const ShownPanorama& panorama : run.panoramas) {
+    html += "<figure><img alt=\"" + EscapeHtml(panorama.caption) + "\" src=\"data:image/png;base64," +
+            Base64(panorama.png) + "\"><figcaption>" + EscapeHtml(panorama.caption) +
+            "</figcaption></figure>\n";
+  }
+  return html;
+}
+
+const MapRecord* LargestMap(const EvaluatedRun& run) {
+  if (!run.report.largest_map) return nullptr;
+  for (const MapRecord& map : run.run.maps) {
+    if (map.key == run.report.maps[*run.report.largest_map].key) return &map;
+  }
+  return nullptr;
+}
+
+// What `draw` makes of the run, and beside it of the same sequence by the other engine.
+template <typename Draw>
+std::string SideBySide(const EvaluatedRun& run, const Draw& draw) {
+  const auto drawn = [&draw](const EvaluatedRun& one) {
+    return one.run.frames.empty() ? std::string() : draw(one);
+  };
+  if (!run.compared) return drawn(run);
+  const auto column = [&](const EvaluatedRun& one) {
+    return "<div><h4>" + EscapeHtml(one.run.engine) + "</h4>" + drawn(one) + "</div>";
+  };
+  return "<div class=\"pair\">" + column(run) + column(*run.compared) + "</div>\n";
+}
+
+std::string Figures(const EvaluatedRun& run) {
+  const PlotRanges ranges = run.compared ? Both(RangesOf(run), RangesOf(*run.compared)) : RangesOf(run);
+  const auto with_ranges = [&ranges](auto plot) {
+    return [&ranges, plot](const EvaluatedRun& one) { return plot(one, ranges); };
+  };
+  const auto of_map = [](auto plot) {
+    return [plot](const EvaluatedRun& one) {
+      const MapRecord* map = LargestMap(one);
+      return map ? plot(one, *map) : std::string();
+    };
+  };
+  std::string html = SideBySide(run, StatePlot) + SideBySide(run, with_ranges(KeyFramePlot)) +
+                     SideBySide(run, with_ranges(PointPlot)) + SideBySide(run, with_ranges(FinitePointPlot)) +
+                     SideBySide(run, with_ranges(MappingPlot)) +
+                     SideBySide(run, with_ranges(TrackingTimePlot));
+  if (!run.truth.empty()) html += SideBySide(run, AlignedTrajectoryPlot) + SideBySide(run, ErrorPlots);
+  return html + SideBySide(run, of_map(PointViewPlot)) + SideBySide(run, of_map(PlaceViewPlot)) +
+         SideBySide(run, PanoramaPictures);
+}
+
+std::string Tables(const EvaluatedRun& run) {
+  return (run.report.maps.empty() ? std::string() : MapTable(run.report)) + SegmentTable(run.report);
+}
+
+std::string Section(const EvaluatedRun& run) {
+  std::string html = "<section><h2>" + EscapeHtml(run.report.name) + "</h2>\n";
+  html += SideBySide(run, [](const EvaluatedRun& one) { return FigureTable(one.report); });
+  html += Figures(run) + SideBySide(run, Tables);
+  return html + "</section>\n";
+}
+
+std::string SummaryRow(const SequenceReport& r, const std::string& name) {
+  return "<tr><td>" + EscapeHtml(name) + "</td><td>" + EscapeHtml(r.engine) + "</td><td>" +
+         Fixed(r.tracked_ratio * 100, 1) + " %</td><td>" + Centimetres(r.ate_rmse_m) + "</td><td>" +
+         Fixed(r.rotation_rmse_deg, 3, "°") + "</td><td>" + Fixed(r.turn_error_deg, 3, "°") + "</td><td>" +
+         Fixed(r.tracking_median_ms, 2) + "</td></tr>\n";
 }
 
 }  // namespace
@@ -278,16 +187,19 @@ std::string FormatHtmlReport(const std::vector<EvaluatedRun>& runs) {
       "table{border-collapse:collapse;margin:1em 0}th,td{padding:.15em .8em;text-align:left;"
       "border-bottom:1px solid #ddd;font-variant-numeric:tabular-nums}th{font-weight:600}\n"
       "svg{width:100%;height:auto;margin:.6em 0;font:12px system-ui,sans-serif}svg .title{font-weight:600;"
-      "font-size:13px}svg .grid{stroke:#e3e3e3;fill:none}\n</style></head><body>\n<h1>Docent: "
-      "evaluation</h1>\n";
+      "font-size:13px}svg .grid{stroke:#e3e3e3;fill:none}\n"
+      "body.wide{max-width:1800px}.pair{display:grid;grid-template-columns:1fr 1fr;gap:0 "
+      "2em}.pair>div{min-width:0}"
+      "h4{margin:.4em 0 0}figure{margin:1em 0}img{max-width:100%}\n</style></head>";
+  const bool wide =
+      std::any_of(runs.begin(), runs.end(), [](const EvaluatedRun& run) { return run.compared != nullptr; });
+  html += std::string(wide ? "<body class=\"wide\">" : "<body>") + "\n<h1>Docent: evaluation</h1>\n";
   html +=
-      "<table><tr><th>sequence</th><th>tracked</th><th>ATE RMSE</th><th>rotation</th><th>ms a "
-      "frame</th></tr>\n";
+      "<table><tr><th>sequence</th><th>engine</th><th>tracked</th><th>ATE RMSE</th><th>rotation</th>"
+      "<th>turn, last against first</th><th>ms a frame</th></tr>\n";
   for (const EvaluatedRun& run : runs) {
-    const SequenceReport& r = run.report;
-    html += "<tr><td>" + EscapeHtml(r.name) + "</td><td>" + Fixed(r.tracked_ratio * 100, 1) + " %</td><td>" +
-            Centimetres(r.ate_rmse_m) + "</td><td>" + Fixed(r.rotation_rmse_deg, 3, "°") + "</td><td>" +
-            Fixed(r.tracking_median_ms, 2) + "</td></tr>\n";
+    html += SummaryRow(run.report, run.report.name);
+    if (run.compared) html += SummaryRow(run.compared->report, run.report.name);
   }
   html += "</table>\n";
   for (const EvaluatedRun& run : runs) html += Section(run);

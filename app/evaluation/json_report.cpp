@@ -25,6 +25,7 @@ Json ToJson(const MapResult& map) {
           {"ate_rmse_m", OrNull(map.ate_rmse_m)},
           {"rotation_rmse_deg", OrNull(map.rotation_rmse_deg)},
           {"rotation_drift_deg", OrNull(map.rotation_drift_deg)},
+          {"turn_error_deg", OrNull(map.turn_error_deg)},
           {"scale", OrNull(map.scale)}};
 }
 
@@ -39,6 +40,7 @@ Json ToJson(const SegmentResult& segment) {
 Json ToJson(const SequenceReport& report) {
   Json json = {
       {"name", report.name},
+      {"engine", report.engine.empty() ? Json(nullptr) : Json(report.engine)},
       {"frames", report.frames},
       {"tracked", report.tracked},
       {"tracked_ratio", report.tracked_ratio},
@@ -47,6 +49,7 @@ Json ToJson(const SequenceReport& report) {
       {"ate_rmse_m", OrNull(report.ate_rmse_m)},
       {"rotation_rmse_deg", OrNull(report.rotation_rmse_deg)},
       {"rotation_drift_deg", OrNull(report.rotation_drift_deg)},
+      {"turn_error_deg", OrNull(report.turn_error_deg)},
       {"scale", OrNull(report.scale)},
       {"keyframes",
        {{"sixdof", report.keyframes.sixdof},
@@ -69,6 +72,7 @@ Json ToJson(const SequenceReport& report) {
       {"wall_s", report.wall_s},
       {"peak_memory_mb", report.peak_memory_mb},
       {"discarded_frames", report.discarded_frames},
+      {"directions_only_frames", report.directions_only_frames},
       {"maps", Json::array()},
       {"segments", Json::array()},
   };
@@ -85,17 +89,20 @@ std::string Format(const char* format, double value) {
 
 }  // namespace
 
-std::string FormatJsonReport(const std::vector<SequenceReport>& reports) {
+std::string FormatJsonReport(const std::vector<SequenceReport>& reports,
+                             const std::vector<SequenceReport>& compared) {
   Json json = {{"sequences", Json::array()}};
   for (const SequenceReport& report : reports) json["sequences"].push_back(ToJson(report));
+  for (const SequenceReport& report : compared) json["compared"].push_back(ToJson(report));
   // A folder's name need not be UTF-8; a report that cannot be written for its name would be worse than a
   // '?'.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports) {
+void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports,
+                     const std::vector<SequenceReport>& compared) {
   CheckedFile file(path);
-  file.Write(FormatJsonReport(reports));
+  file.Write(FormatJsonReport(reports, compared));
   file.Close();
 }
 

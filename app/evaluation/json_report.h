@@ -10,9 +10,13 @@
 namespace docent::app {
 
 // report.json: one object a sequence under `sequences`, with the fields of command-line.md and, beyond them,
-// `discarded_frames`, `maps` and `segments`. What is not known is null.
-std::string FormatJsonReport(const std::vector<SequenceReport>& reports);
-void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports);
+// `engine`, `discarded_frames`, `directions_only_frames`, `turn_error_deg`, `maps` and `segments`. What is
+// not known is null. `compared`: the same sequences by the other engine, under a field of that name; left out
+// when empty.
+std::string FormatJsonReport(const std::vector<SequenceReport>& reports,
+                             const std::vector<SequenceReport>& compared = {});
+void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports,
+                     const std::vector<SequenceReport>& compared = {});
 
 // One line a sequence for the terminal, such as "kitchen: 97.2 % tracked, ATE 5.1 cm, 4.0 ms a frame".
 std::string FormatSummary(const SequenceReport& report);

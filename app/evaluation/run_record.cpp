@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "app/files/text_file.h"
+#include "app/session/surface_at_pixel.h"
 
 namespace docent::app {
 
@@ -32,7 +33,7 @@ PointCounts CountPoints(const engine::MapSnapshot& map) {
 
 }  // namespace
 
-void RunRecorder::Add(const engine::TrackedFrame& frame) {
+void RunRecorder::Add(const engine::TrackedFrame& frame, const MappingTimes& mapping) {
   FrameRecord record;
   record.time = frame.frame.time;
   record.state = frame.state;
@@ -41,6 +42,7 @@ void RunRecorder::Add(const engine::TrackedFrame& frame) {
   record.finite_points = frame.finite_points;
   record.infinite_points = frame.infinite_points;
   record.quality = frame.quality;
+  record.mapping = mapping;
   record.tracking_ms = ToSeconds(frame.tracking_time) * 1e3;
   if (frame.map) {
     // Maps change far less often than frames come.
@@ -63,9 +65,32 @@ MapRecord MakeMapRecord(std::uint64_t key, const std::string& name, const engine
   record.keyframes = CountKeyFrames(map);
   record.points = CountPoints(map);
   for (const engine::MapPoint& point : map.points) {
-    if (!point.infinite()) record.positions.push_back(point.position());
+    if (point.infinite()) continue;
+    record.positions.push_back(point.position());
+    record.converted.push_back(point.was_infinite);
   }
+  for (const engine::KeyFrame& keyframe : map.keyframes) {
+    if (keyframe.kind == engine::KeyFrameKind::kPanorama) continue;
+    auto& centers = keyframe.panorama == engine::kNoId ? record.sixdof_centers : record.localized_centers;
+    centers.push_back(keyframe.camera_from_map.OriginInSource());
+  }
+  for (const engine::PanoramaMap& panorama : map.panoramas) {
+    if (const engine::KeyFrame* reference = map.FindKeyFrame(panorama.reference))
+      record.panorama_centers.push_back(reference->camera_from_map.OriginInSource());
+  }
+  if (map.keyframes.empty()) return record;
+  record.up = UpInMap(map);
+  const Eigen::Vector3d axis =
+      map.keyframes.front().camera_from_map.rotation.inverse() * Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d level = axis - axis.dot(record.up) * record.up;
+  // A camera that begins looking straight down has no way ahead; any level one will do.
+  record.forward = level.norm() > 1e-3 ? level.normalized() : record.up.unitOrthogonal();
   return record;
+}
+
+MappingTimes MakeMappingTimes(const engine::MapperTimes& times) {
+  return {times.bundle_adjustment, times.panorama_localization, times.infinite_triangulation, times.other,
+          times.longest_hold};
 }
 
 double PeakMemoryMegabytes() {

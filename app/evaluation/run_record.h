@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/base/time.h"
+#include "engine/mapping/mapper.h"
 #include "engine/tracking/tracked_frame.h"
 
 // What a run leaves for its evaluation: plain numbers, no pictures and no maps, so that it can be kept whole
@@ -25,6 +26,12 @@ struct PointCounts {
   bool operator==(const PointCounts&) const = default;
 };
 
+// Seconds that the mapper spent, by task.
+struct MappingTimes {
+  double bundle_adjustment_s = 0, panorama_localization_s = 0, infinite_triangulation_s = 0, other_s = 0;
+  double longest_hold_s = 0;  // see engine::MapperTimes
+};
+
 // One picture of one camera.
 struct FrameRecord {
   Timestamp time{};
@@ -36,7 +43,13 @@ struct FrameRecord {
   double tracking_ms = 0;
   KeyFrameCounts map_keyframes;  // size of the map at that time
   PointCounts map_points;
+  MappingTimes mapping = {};  // since the run began
 };
+
+// The frame was tracked in a map that knew no depth yet: its position is not one.
+inline bool InMapOfDirections(const FrameRecord& frame) {
+  return frame.map_points.infinite > 0 && frame.map_points.finite == 0;
+}
 
 struct MapRecord {
   std::uint64_t key = 0;
@@ -45,16 +58,16 @@ struct MapRecord {
   KeyFrameCounts keyframes;
   PointCounts points;
   std::vector<Eigen::Vector3d> positions;  // of finite points, map frame, for the view from above
-};
-
-// Seconds that the mapper spent, by task.
-struct MappingTimes {
-  double bundle_adjustment_s = 0, panorama_localization_s = 0, infinite_triangulation_s = 0, other_s = 0;
-  double longest_hold_s = 0;  // see engine::MapperTimes
+  std::vector<bool> converted = {};        // whether each of them was a direction before
+  // Of keyframes whose place is known, and of the places where panorama maps stand.
+  std::vector<Eigen::Vector3d> sixdof_centers = {}, localized_centers = {}, panorama_centers = {};
+  // How it is looked at: upwards, and the way the first keyframe looks, level; unit vectors of the map.
+  Eigen::Vector3d up = -Eigen::Vector3d::UnitY(), forward = Eigen::Vector3d::UnitZ();
 };
 
 struct RunRecord {
   std::string name;                 // of the sequence
+  std::string engine = {};          // "hybrid" or "sixdof"; empty when nobody said
   std::vector<FrameRecord> frames;  // one camera, by time, dropped ones too
   std::vector<MapRecord> maps;
   MappingTimes mapping;
@@ -65,7 +78,8 @@ struct RunRecord {
 // Fills frames and maps from what the session delivers. One thread.
 class RunRecorder {
  public:
-  void Add(const engine::TrackedFrame& frame);
+  // mapping: the seconds spent until now.
+  void Add(const engine::TrackedFrame& frame, const MappingTimes& mapping = {});
   const std::vector<FrameRecord>& frames() const { return frames_; }
 
  private:
@@ -77,6 +91,8 @@ class RunRecorder {
 
 // Counts and positions of a map as it is now; `converted` and `localized` are the mapper's to add.
 MapRecord MakeMapRecord(std::uint64_t key, const std::string& name, const engine::MapSnapshot& map);
+
+MappingTimes MakeMappingTimes(const engine::MapperTimes& times);
 
 // Highest resident memory of this process since it began or since ResetPeakMemory, in megabytes (2^20 bytes);
 // 0 where the system does not say.

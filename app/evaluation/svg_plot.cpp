@@ -62,13 +62,19 @@ SvgPlot::SvgPlot(std::string title, std::string x_label, std::string y_label)
 
 void SvgPlot::AddLine(std::vector<Point> points, const std::string& color, const std::string& label) {
   if (!label.empty()) AddLegend(color, label);
-  series_.push_back({std::move(points), color, 0});
+  series_.push_back({std::move(points), color, 0, false});
 }
 
 void SvgPlot::AddDots(std::vector<Point> points, const std::string& color, const std::string& label,
                       double radius_px) {
   if (!label.empty()) AddLegend(color, label);
-  series_.push_back({std::move(points), color, radius_px});
+  series_.push_back({std::move(points), color, radius_px, false});
+}
+
+void SvgPlot::AddStems(std::vector<Point> points, const std::string& color, const std::string& label) {
+  if (!label.empty()) AddLegend(color, label);
+  if (!points.empty()) Include({points.front().x, 0});
+  series_.push_back({std::move(points), color, 0, true});
 }
 
 void SvgPlot::AddBand(double begin, double end, const std::string& color) {
@@ -86,13 +92,13 @@ void SvgPlot::AddLegend(const std::string& color, const std::string& label) {
 SvgPlot::Frame SvgPlot::FitFrame() const {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Frame frame{kInfinity, -kInfinity, kInfinity, -kInfinity, static_cast<double>(height_px_ - kBottomPx)};
-  for (const Series& series : series_) {
-    for (const Point& point : series.points) {
-      if (!IsFinite(point)) continue;
-      frame.x_low = std::min(frame.x_low, point.x), frame.x_high = std::max(frame.x_high, point.x);
-      frame.y_low = std::min(frame.y_low, point.y), frame.y_high = std::max(frame.y_high, point.y);
-    }
-  }
+  const auto fit = [&frame](const Point& point) {
+    if (!IsFinite(point)) return;
+    frame.x_low = std::min(frame.x_low, point.x), frame.x_high = std::max(frame.x_high, point.x);
+    frame.y_low = std::min(frame.y_low, point.y), frame.y_high = std::max(frame.y_high, point.y);
+  };
+  for (const Series& series : series_) std::for_each(series.points.begin(), series.points.end(), fit);
+  std::for_each(included_.begin(), included_.end(), fit);
   for (const Band& band : bands_) {
     frame.x_low = std::min(frame.x_low, band.begin), frame.x_high = std::max(frame.x_high, band.end);
   }
@@ -142,6 +148,15 @@ std::string SvgPlot::DrawSeries(const Frame& frame, const Series& series) const 
     }
     return svg + "</g>";
   }
+  if (series.stems) {
+    for (const Point& point : series.points) {
+      if (!IsFinite(point) || point.y == 0) continue;
+      svg += "M" + Px(frame.X(point.x)) + " " + Px(frame.Y(0)) + "V" + Px(frame.Y(point.y));
+    }
+    if (svg.empty()) return svg;
+    return "<path fill=\"none\" stroke=\"" + EscapeHtml(series.color) + "\" stroke-width=\"1.3\" d=\"" + svg +
+           "\"/>";
+  }
   // Views from above bend every way, so thinning by columns would spoil them.
   const std::size_t run = keep_aspect_ ? 0 : series.points.size() / (kWidthPx / 2);
   bool pen_down = false;
@@ -162,7 +177,7 @@ std::string SvgPlot::DrawLegend() const {
   double x = kWidthPx - kRightPx;
   for (auto entry = legend_.rbegin(); entry != legend_.rend(); ++entry) {
     const double width =
-        22 + 6.6 * static_cast<double>(entry->second.size());  // about 6.6 px a letter at 12 px
+        22 + 7.1 * static_cast<double>(entry->second.size());  // about 7.1 px a letter at 12 px
     x -= width;
     svg += "<rect x=\"" + Px(x) + "\" y=\"9\" width=\"10\" height=\"10\" fill=\"" + EscapeHtml(entry->first) +
            "\"/>" + Text(x + 14, 18, "start", entry->second);

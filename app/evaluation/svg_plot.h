@@ -21,6 +21,10 @@ class SvgPlot {
   void AddLine(std::vector<Point> points, const std::string& color, const std::string& label);
   void AddDots(std::vector<Point> points, const std::string& color, const std::string& label,
                double radius_px = 1.2);
+  // A line from zero to each point.
+  void AddStems(std::vector<Point> points, const std::string& color, const std::string& label);
+  // The ranges shall reach this far, so that two plots beside each other have the same.
+  void Include(const Point& point) { included_.push_back(point); }
   // A coloured strip over the whole height from x = begin to end.
   void AddBand(double begin, double end, const std::string& color);
   // A legend entry without a line of its own, for bands.
@@ -38,6 +42,7 @@ class SvgPlot {
     std::vector<Point> points;
     std::string color;
     double radius_px = 0;  // 0: a line
+    bool stems = false;
   };
   struct Band {
     double begin = 0, end = 0;
@@ -53,6 +58,7 @@ class SvgPlot {
   std::string title_, x_label_, y_label_;
   std::vector<Series> series_;
   std::vector<Band> bands_;
+  std::vector<Point> included_;
   std::vector<std::pair<std::string, std::string>> legend_;  // colour, label
   bool keep_aspect_ = false, hide_y_axis_ = false;
   int height_px_ = 260;

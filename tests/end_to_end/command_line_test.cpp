@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The real program, run as a person runs it: what it prints, where, and with which exit status.
-#include <fcntl.h>
 #include <gmock/gmock.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -15,9 +11,7 @@
 #include "app/cameras/frame_source.h"
 #include "app/evaluation/ground_truth.h"
 #include "maps/library.h"
-#include "tests/app/support/temporary_folder.h"
-
-extern char** environ;
+#include "tests/end_to_end/run_docent.h"
 
 namespace docent::app {
 namespace {
@@ -28,39 +22,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-struct Outcome {
-  int exit_status = -1;
-  std::string output, errors;
-};
-
-Outcome RunDocent(std::vector<std::string> arguments) {
-  const TemporaryFolder folder;
-  const std::string output = (folder / "out").string(), errors = (folder / "err").string();
-  arguments.insert(arguments.begin(), DOCENT_BINARY_DIR "/docent");
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT, 0600);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT, 0600);
-  pid_t child = 0;
-  const int spawned = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  Outcome outcome;
-  if (spawned != 0) {
-    ADD_FAILURE() << "cannot start " << argv[0];
-    return outcome;
-  }
-  int status = 0;
-  waitpid(child, &status, 0);
-  outcome.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  outcome.output = ReadAll(output);
-  outcome.errors = ReadAll(errors);
-  return outcome;
-}
 
 // One clear line on standard error, nothing else, and that exit status.
 void ExpectComplaint(const std::vector<std::string>& arguments, int exit_status, const std::string& part) {

@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The real program on simulated input: evaluate, author and tour as a person runs them.
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -23,9 +17,7 @@
 #include "app/simulator/simulation.h"
 #include "content/asset.h"
 #include "maps/library.h"
-#include "tests/app/support/temporary_folder.h"
-
-extern char** environ;
+#include "tests/end_to_end/run_docent.h"
 
 namespace docent::app {
 namespace {
@@ -35,65 +27,12 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-pid_t StartDocent(std::vector<std::string> arguments, const std::string& output, const std::string& errors) {
-  arguments.insert(arguments.begin(), DOCENT_BINARY_DIR "/docent");
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT, 0600);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT, 0600);
-  pid_t child = 0;
-  const int spawned = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  EXPECT_EQ(spawned, 0) << "cannot start " << argv[0];
-  return child;
-}
-
-struct Outcome {
-  int exit_status = -1;
-  std::string output, errors;
-};
-
-Outcome RunDocent(const std::vector<std::string>& arguments) {
-  const TemporaryFolder folder;
-  const std::string output = (folder / "out").string(), errors = (folder / "err").string();
-  const pid_t child = StartDocent(arguments, output, errors);
-  int status = 0;
-  waitpid(child, &status, 0);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), ReadAll(output), ReadAll(errors)};
-}
-
 void ExpectOneLineAndStatus1(const std::vector<std::string>& arguments, const std::string& part) {
   const Outcome outcome = RunDocent(arguments);
   SCOPED_TRACE(testing::PrintToString(arguments));
   EXPECT_EQ(outcome.exit_status, 1);
   EXPECT_THAT(outcome.errors, AllOf(StartsWith("docent: "), HasSubstr(part)));
   EXPECT_EQ(std::count(outcome.errors.begin(), outcome.errors.end(), '\n'), 1) << outcome.errors;
-}
-
-using Row = std::map<std::string, std::string>;  // by column
-
-std::vector<Row> ReadFrames(const std::filesystem::path& path) {
-  std::istringstream text(ReadAll(path));
-  std::string line;
-  std::getline(text, line);
-  const auto split = [](const std::string& whole) {
-    std::vector<std::string> fields(1);
-    for (const char c : whole) c == ',' ? fields.emplace_back() : fields.back() += c;
-    return fields;
-  };
-  const std::vector<std::string> header = split(line);
-  std::vector<Row> rows;
-  while (std::getline(text, line)) {
-    const std::vector<std::string> fields = split(line);
-    EXPECT_EQ(fields.size(), header.size()) << line;
-    Row row;
-    for (std::size_t i = 0; i < std::min(fields.size(), header.size()); ++i) row[header[i]] = fields[i];
-    rows.push_back(std::move(row));
-  }
-  return rows;
 }
 
 // A museum of two bays: where it is built and visited, and the script that authors it.

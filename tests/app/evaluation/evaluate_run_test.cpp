@@ -110,6 +110,33 @@ TEST(Evaluation, MeasuresRotationErrorAndDriftSeparately) {
   EXPECT_LT(*report.rotation_rmse_deg, 2.4);  // and unaligned it would be 4 / sqrt(3) = 2.3
 }
 
+// The experiment of hybrid-slam §7.3: what is the error about the axis that the camera turned about?
+TEST(Evaluation, MeasuresHowMuchTooFarTheEngineTurned) {
+  const auto run_with = [](double turned_deg, double roll_deg) {
+    std::vector<TimedPose> truth;
+    RunRecord run;
+    for (int i = 0; i <= 90; ++i) {
+      truth.push_back({TimeOf(i), {engine::Rotation3::Exp({0, i * kDegree, 0}), Eigen::Vector3d::Zero()}});
+      TimedPose told = truth.back();
+      const double part = i / 90.0;
+      told.truth_from_camera.rotation = engine::Rotation3::Exp({0, turned_deg * part * kDegree, 0}) *
+                                        engine::Rotation3::Exp({0, 0, roll_deg * part * kDegree});
+      run.frames.push_back(PerfectFrame(told));
+    }
+    return EvaluateRun(run, truth, {});
+  };
+  EXPECT_THAT(run_with(90, 0).turn_error_deg, Optional(DoubleNear(0, 1e-5)));
+  EXPECT_THAT(run_with(94, 0).turn_error_deg, Optional(DoubleNear(4, 1e-5)));
+  EXPECT_THAT(run_with(87.5, 0).turn_error_deg, Optional(DoubleNear(-2.5, 1e-5)));
+  EXPECT_THAT(run_with(94, 0).maps.at(0).turn_error_deg, Optional(DoubleNear(4, 1e-5)));
+  // A roll about another axis is drift, and no error of this turn.
+  EXPECT_THAT(run_with(90, 3).turn_error_deg, Optional(DoubleNear(0, 0.01)));
+  EXPECT_THAT(run_with(90, 3).rotation_drift_deg, Optional(DoubleNear(3, 1e-5)));
+  auto back = Helix(30);
+  for (TimedPose& pose : back) pose.truth_from_camera.rotation = engine::Rotation3();
+  EXPECT_FALSE(EvaluateRun(PerfectRun(back), back, {}).turn_error_deg);
+}
+
 TEST(Evaluation, CountsFramesWithAPoseFromTheFirstTrackedOneOn) {
   const auto truth = Helix(10);
   RunRecord run = PerfectRun(truth);
@@ -161,6 +188,41 @@ TEST(Evaluation, AlignsEveryMapByItselfAndReportsTheLargest) {
   EXPECT_THAT(report.segments[0].ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
 }
 
+// An instant start: the first frames turn about a place that nobody knows, whatever numbers stand for it.
+TEST(Evaluation, TakesNoPositionFromAMapOfDirectionsAlone) {
+  const auto truth = Helix(120);
+  RunRecord run = PerfectRun(truth);
+  for (std::size_t i = 0; i < run.frames.size(); ++i) {
+    FrameRecord& frame = run.frames[i];
+    frame.map_points = {i < 40 ? 0 : 500, 200, 0};
+    // After the start a panorama inside the map: there the camera stands where its centre is.
+    if (i < 40 || i > 100) frame.state = TrackingState::kPanorama;
+    if (i < 40) MoveInTruth(&frame, {7, -3, 1});
+  }
+  run.frames[10].state = TrackingState::kRelocalized;
+  // A rotation counts all the same: frame 5 is off by one degree.
+  engine::Rigid3& pose = run.frames[5].camera_from_map;
+  pose = engine::Rigid3(engine::Rotation3::Exp({kDegree, 0, 0}), Eigen::Vector3d::Zero()) * pose;
+  const SequenceReport report = EvaluateRun(run, truth, {{TimeOf(0), "start"}, {TimeOf(40), "walk"}});
+  EXPECT_EQ(report.tracked, 120);
+  EXPECT_EQ(report.tracked_ratio, 1);
+  EXPECT_EQ(report.directions_only_frames, 40);
+  EXPECT_THAT(report.ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
+  EXPECT_THAT(report.scale, Optional(DoubleNear(2.5, 1e-9)));
+  EXPECT_FALSE(report.frame_results[39].position_error_m);
+  EXPECT_TRUE(report.frame_results[40].position_error_m);
+  EXPECT_TRUE(report.frame_results[110].position_error_m);
+  ASSERT_TRUE(report.frame_results[5].rotation_error_deg);
+  EXPECT_NEAR(*report.frame_results[5].rotation_error_deg, 1, 0.02);
+  EXPECT_FALSE(report.segments[0].ate_rmse_m);
+  EXPECT_EQ(report.segments[0].tracked_ratio, 1);
+  EXPECT_THAT(report.segments[1].ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
+  const auto json = nlohmann::json::parse(FormatJsonReport({report}));
+  EXPECT_EQ(json.at("sequences").at(0).at("directions_only_frames"), 40);
+  EXPECT_THAT(FormatHtmlReport({{run, truth, {}, report}}),
+              HasSubstr("40 frames were tracked while their map held"));
+}
+
 TEST(Evaluation, OfAPureRotationHasNoAteButARotationError) {
   auto truth = Helix(50);
   RunRecord run = PerfectRun(truth);
@@ -204,7 +266,7 @@ TEST(JsonReport, HasEveryFieldAndNullWhereNothingIsKnown) {
   const auto& sequence = json.at("sequences").at(0);
   for (const char* field :
        {"name", "frames", "tracked", "tracked_ratio", "first_tracked_frame", "relocalizations", "ate_rmse_m",
-        "rotation_rmse_deg", "rotation_drift_deg", "scale", "wall_s", "peak_memory_mb"}) {
+        "rotation_rmse_deg", "rotation_drift_deg", "turn_error_deg", "scale", "wall_s", "peak_memory_mb"}) {
     EXPECT_TRUE(sequence.contains(field)) << field;
   }
   EXPECT_TRUE(sequence.at("ate_rmse_m").is_null());

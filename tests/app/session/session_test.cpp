@@ -143,6 +143,46 @@ TEST(Session, KeepsWhatIsPlacedUndoneAndRedoneInTheLibrary) {
   EXPECT_EQ(library.FindByName("Desk").keyframes, keyframes);
 }
 
+// A camera that only turns gives a map of directions, which has no place for anything.
+TEST(Session, NeverSavesAMapOfDirectionsAlone) {
+  const auto simulation = std::shared_ptr<const Simulation>(MakeSimulation("cylinder:0"));
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  SessionOptions options = Options(Pace::kLockstep, "Turn");
+  options.tracker.hybrid = true;
+  options.autosave_interval = std::chrono::milliseconds(200);
+  Session session(options, LensOf(*simulation), &library);
+  const Seen seen = Feed(simulation, Pace::kLockstep, &session);
+  EXPECT_GT(seen.poses, simulation->frame_count() * 9 / 10);
+  const auto maps = session.Maps();
+  ASSERT_EQ(maps.size(), 1u);
+  ASSERT_NE(maps[0].snapshot, nullptr);
+  EXPECT_GT(maps[0].snapshot->keyframes.size(), 3u);
+  EXPECT_FALSE(maps[0].snapshot->HasFinitePoints());
+  EXPECT_THAT(library.List(), IsEmpty());
+  for (const Event& event : session.TakeEvents()) EXPECT_NE(event.event, "save") << event.detail;
+}
+
+TEST(Session, SavesAMapThatBeganWithDirectionsOnceItKnowsDepth) {
+  const auto simulation = Room(4);
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  SessionOptions options = Options(Pace::kLockstep, "Bay");
+  options.tracker.hybrid = true;
+  Session session(options, LensOf(*simulation), &library);
+  const Seen seen = Feed(simulation, Pace::kLockstep, &session);
+  ASSERT_GT(seen.frames.size(), 2u);
+  EXPECT_EQ(seen.frames[1].state, engine::TrackingState::kPanorama);
+  EXPECT_EQ(seen.frames[1].map_key, seen.frames.back().map_key);
+  ASSERT_EQ(library.List().size(), 1u);
+  const auto saved = library.Load(library.FindByName("Bay").key).snapshot;
+  EXPECT_TRUE(saved->HasFinitePoints());
+  EXPECT_FALSE(saved->panoramas.empty());
+  EXPECT_EQ(engine::Validate(*saved), "");
+}
+
 TEST(Session, RefusesACommandThatCannotBeCarriedOutAndNamesItsLine) {
   const auto simulation = Room(0.5);
   const auto refusal = [&](Command command) {

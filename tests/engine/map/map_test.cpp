@@ -8,30 +8,13 @@
 #include <set>
 
 #include "engine/base/random.h"
-#include "tests/engine/rendered_world.h"
+#include "tests/engine/mapping/panorama_scene.h"
 
 namespace docent::engine {
 namespace {
 
+using testing_world::BlankKeyFrame;
 using testing_world::CameraAt;
-using testing_world::PinholeCamera;
-
-// A blank picture will do for what this file asks.
-KeyFrame BlankKeyFrame(const Rigid3& camera_from_map = {}) {
-  static const auto camera = PinholeCamera(64, 64);
-  static const auto features = [] {
-    auto made = std::make_shared<ImageFeatures>();
-    for (int level = 0; level < kPyramidLevels; ++level)
-      made->levels[static_cast<std::size_t>(level)] =
-          cv::Mat(64 >> level, 64 >> level, CV_8UC1, cv::Scalar(0));
-    return std::shared_ptr<const ImageFeatures>(made);
-  }();
-  KeyFrame keyframe;
-  keyframe.camera = camera;
-  keyframe.features = features;
-  keyframe.camera_from_map = camera_from_map;
-  return keyframe;
-}
 
 MapPoint PointFrom(KeyFrameId source) {
   MapPoint point;

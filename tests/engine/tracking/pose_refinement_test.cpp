@@ -286,5 +286,60 @@ TEST(PoseRefinement, LetsNoPresumedDistanceMoveTheCamera) {
             3e-4);
 }
 
+// The normal equations' matrix that a refinement without any error ends with: there every robust weight is
+// one.
+Matrix6 Information(std::vector<PoseMeasurement> measurements) {
+  const PoseRefinement refined = Refine(Truth(), &measurements);
+  EXPECT_TRUE(refined.converged);
+  EXPECT_LT(Error(refined).norm(), 1e-9);
+  const double sigma = PoseRefinementOptions().min_sigma;
+  return sigma * sigma * refined.covariance.inverse();
+}
+
+// What each measurement adds is J^T J, and J is what the projection's numeric derivative says, of a finite
+// point and of an infinite one.
+TEST(PoseRefinement, HasTheJacobiansThatNumericDifferencesHave) {
+  Random random(17);
+  for (int round = 0; round < 10; ++round) {
+    std::vector<PoseMeasurement> measurements;
+    AddMeasurements(30, 0, false, &random, &measurements);
+    AddMeasurements(40, 0, true, &random, &measurements);
+    Matrix6 numeric = Matrix6::Zero();
+    for (const PoseMeasurement& measurement : measurements) {
+      Eigen::Matrix<double, 2, 6> jacobian;
+      for (int i = 0; i < 6; ++i) {
+        constexpr double kStep = 1e-6;
+        const auto moved = [&](double step) -> Eigen::Vector2d {
+          const Rigid3 pose = Rigid3::Exp(Vector6(step * Vector6::Unit(i))) * Truth();
+          const Eigen::Vector4d& x = measurement.point_in_map;
+          return *kLens.Project(pose.rotation * Eigen::Vector3d(x.head<3>()) + x[3] * pose.translation);
+        };
+        jacobian.col(i) = (moved(kStep) - moved(-kStep)) / (2 * kStep) * measurement.inverse_sigma;
+      }
+      const bool infinite = measurement.point_in_map[3] == 0;
+      numeric += (infinite ? 0.01 : 1.0) * jacobian.transpose() * jacobian;
+    }
+    const Matrix6 information = Information(measurements);
+    EXPECT_LT((information - numeric).norm(), 1e-5 * numeric.norm());
+  }
+}
+
+// They say nothing of the translation, nor of how it goes with the rotation (hybrid-slam eq. 1-2).
+TEST(PoseRefinement, TakesNothingOfTheTranslationFromInfinitePoints) {
+  Random random(19);
+  for (int round = 0; round < 10; ++round) {
+    std::vector<PoseMeasurement> finite, mixed;
+    AddMeasurements(30, 0, false, &random, &finite);
+    mixed = finite;
+    AddMeasurements(400, 0, true, &random, &mixed);
+    const Matrix6 alone = Information(finite), both = Information(mixed);
+    const double size = alone.norm();
+    EXPECT_LT(((both - alone).topRows<3>().norm()), 1e-6 * size);
+    EXPECT_LT(((both - alone).leftCols<3>().norm()), 1e-6 * size);
+    const Matrix6 more = both - alone;
+    EXPECT_GT((more.bottomRightCorner<3, 3>().trace()), 1e-3 * size);
+  }
+}
+
 }  // namespace
 }  // namespace docent::engine

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "app/files/text_file.h"
+#include "tests/app/support/temporary_folder.h"
+
+extern char** environ;
+
+// The real program, run as a person runs it, and what it leaves.
+namespace docent::app {
+
+// Its standard output and errors go to these files; nothing comes in.
+inline pid_t StartDocent(std::vector<std::string> arguments, const std::string& output,
+                         const std::string& errors) {
+  arguments.insert(arguments.begin(), DOCENT_BINARY_DIR "/docent");
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT, 0600);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT, 0600);
+  pid_t child = 0;
+  const int spawned = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  EXPECT_EQ(spawned, 0) << "cannot start " << argv[0];
+  return child;
+}
+
+struct Outcome {
+  int exit_status = -1;
+  std::string output, errors;
+};
+
+inline Outcome RunDocent(const std::vector<std::string>& arguments) {
+  const TemporaryFolder folder;
+  const std::string output = (folder / "out").string(), errors = (folder / "err").string();
+  const pid_t child = StartDocent(arguments, output, errors);
+  if (child == 0) return {};
+  int status = 0;
+  waitpid(child, &status, 0);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), ReadAll(output), ReadAll(errors)};
+}
+
+// Of frames.csv, by column.
+using Row = std::map<std::string, std::string>;
+
+inline std::vector<Row> ReadFrames(const std::filesystem::path& path) {
+  std::istringstream text(ReadAll(path));
+  std::string line;
+  std::getline(text, line);
+  const auto split = [](const std::string& whole) {
+    std::vector<std::string> fields(1);
+    for (const char c : whole) c == ',' ? fields.emplace_back() : fields.back() += c;
+    return fields;
+  };
+  const std::vector<std::string> header = split(line);
+  std::vector<Row> rows;
+  while (std::getline(text, line)) {
+    const std::vector<std::string> fields = split(line);
+    EXPECT_EQ(fields.size(), header.size()) << line;
+    Row row;
+    for (std::size_t i = 0; i < std::min(fields.size(), header.size()); ++i) row[header[i]] = fields[i];
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+}  // namespace docent::app

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "engine/geometry/sim3.h"
+#include "engine/mapping/mapper.h"
+#include "engine/tracking/tracker.h"
+#include "tests/engine/mapping/panorama_scene.h"
+
+// A tracker that knows panorama maps, and its mapper, on pictures of a painted room: an instant start, a
+// walk, a turn on the spot far beyond what the walk has seen, and the way back.
+namespace docent::engine {
+namespace {
+
+using testing_world::CameraAt;
+using testing_world::RenderedWorld;
+
+constexpr double kFramesASecond = 30;
+constexpr int kStill = 6, kWalk = 90, kTurn = 80, kHold = 10, kWalkAgain = 20;
+constexpr int kTurnBegins = kStill + kWalk, kTurnEnds = kTurnBegins + 2 * kTurn + kHold;
+constexpr int kFrames = kTurnEnds + kWalkAgain;
+constexpr double kDepth = 3;  // metres to the walls
+
+const std::shared_ptr<const CameraModel>& Camera() {
+  static const auto camera = testing_world::PinholeCamera(320, 240);
+  return camera;
+}
+
+// Ahead, out to the side and back to the centre; then 110 degrees to the right on the spot, and back.
+Rigid3 Pose(int frame) {
+  const auto walk = [](double part) {
+    const double angle = 2 * std::numbers::pi * part;
+    return Eigen::Vector3d(0.4 * std::sin(angle), 0.05 * std::sin(2 * angle), 0.1 * (1 - std::cos(angle)));
+  };
+  if (frame < kStill) return CameraAt({0, 0, 0});
+  if (frame < kTurnBegins) {
+    const Eigen::Vector3d place = walk(static_cast<double>(frame - kStill) / kWalk);
+    return CameraAt(place, {4 * place.y(), -8 * place.x(), 0});
+  }
+  if (frame < kTurnEnds) {
+    const int from_begin = frame - kTurnBegins, from_end = kTurnEnds - frame;
+    const double part = std::min({from_begin, from_end, kTurn}) / static_cast<double>(kTurn);
+    return CameraAt({0, 0, 0}, {0, 55 * (1 - std::cos(std::numbers::pi * part)), 0});
+  }
+  return CameraAt(walk(static_cast<double>(frame - kTurnEnds) / kWalk), {0, 0, 0});
+}
+
+const std::vector<cv::Mat>& Pictures() {
+  static const std::vector<cv::Mat> pictures = [] {
+    const RenderedWorld world = testing_world::Chamber(101);
+    std::vector<cv::Mat> rendered;
+    for (int i = 0; i < kFrames; ++i)
+      rendered.push_back(world.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i) + 1));
+    return rendered;
+  }();
+  return pictures;
+}
+
+Frame FrameOf(int index) {
+  Frame frame;
+  frame.time = FromSeconds(index / kFramesASecond);
+  frame.index = static_cast<std::uint64_t>(index);
+  frame.picture = Pictures()[static_cast<std::size_t>(index)];
+  return frame;
+}
+
+struct Tour {
+  std::vector<TrackedFrame> frames;
+  std::vector<MapperEvent> events;
+  std::shared_ptr<const MapSnapshot> map;
+
+  const TrackedFrame& At(int index) const { return frames[static_cast<std::size_t>(index)]; }
+};
+
+// Tracker and mapper in turn on one thread, as lockstep runs them.
+Tour TakeTour(bool hybrid) {
+  TrackerOptions options;
+  options.hybrid = hybrid;
+  Tracker tracker(options, Camera(), 1);
+  Mapper mapper({});
+  Tour tour;
+  tracker.StartNewMap();
+  for (int i = 0; i < kFrames; ++i) {
+    tour.frames.push_back(tracker.Track(FrameOf(i), nullptr));
+    if (auto pair = tracker.TakeInitialPair()) mapper.Start(std::move(*pair));
+    if (auto candidate = tracker.TakeKeyFrameCandidate()) {
+      mapper.Report(tracker.TakeReports());
+      mapper.Offer(std::move(*candidate));
+    }
+    for (int step = 0; step < 20 && !mapper.Settled(); ++step) mapper.Step();
+    mapper.Step();
+    for (MapperEvent& event : mapper.TakeEvents()) {
+      if (event.kind == MapperEvent::Kind::kStartFailed) tracker.StartFailed();
+      tour.events.push_back(std::move(event));
+    }
+    if (mapper.Snapshot() != tour.map) {
+      tour.map = mapper.Snapshot();
+      tracker.SetMap(tour.map, 1);
+    }
+  }
+  return tour;
+}
+
+const Tour& HybridTour() {
+  static const Tour tour = TakeTour(true);
+  return tour;
+}
+
+int FirstWithDepth(const Tour& tour) {
+  int first = 0;
+  while (first < kFrames && !(tour.At(first).map && tour.At(first).map->HasFinitePoints())) ++first;
+  return first;
+}
+
+TEST(HybridTracker, StartsWithTheFirstPicture) {
+  const Tour& tour = HybridTour();
+  EXPECT_EQ(tour.At(0).state, TrackingState::kInitializing);
+  for (int i = 1; i < kStill; ++i) {
+    ASSERT_EQ(tour.At(i).state, TrackingState::kPanorama) << i;
+    EXPECT_EQ(tour.At(i).finite_points, 0);
+    EXPECT_GT(tour.At(i).infinite_points, 50);
+    // It stands where it began, and looks the way it did.
+    EXPECT_LT(tour.At(i).camera_from_map.OriginInSource().norm(), 1e-9) << i;
+    EXPECT_LT(tour.At(i).camera_from_map.rotation.Angle(), 0.05 * std::numbers::pi / 180) << i;
+  }
+  EXPECT_EQ(tour.events.front().kind, MapperEvent::Kind::kPanoramaOpened);
+}
+
+TEST(HybridTracker, GainsDepthWithoutLosingAFrameOrAKeyframe) {
+  const Tour& tour = HybridTour();
+  const int first = FirstWithDepth(tour);
+  ASSERT_LT(first, kStill + kWalk / 2);
+  ASSERT_GT(first, kStill) << "no depth without parallax";
+  for (int i = 1; i < kTurnBegins; ++i) {
+    EXPECT_TRUE(HasPose(tour.At(i).state)) << i;
+    EXPECT_EQ(tour.At(i).map_key, 1u) << i;
+  }
+  const auto before = tour.At(first - 1).map;
+  ASSERT_FALSE(before->keyframes.empty());
+  for (const KeyFrame& keyframe : before->keyframes) {
+    const KeyFrame* still = tour.At(first).map->FindKeyFrame(keyframe.id);
+    ASSERT_NE(still, nullptr) << keyframe.id;
+    EXPECT_EQ(still->time, keyframe.time);
+  }
+}
+
+TEST(HybridTracker, FollowsATurnOnTheSpotAndReturns) {
+  const Tour& tour = HybridTour();
+  const int first = FirstWithDepth(tour);
+  ASSERT_LT(first, kTurnBegins);
+  int lost = 0, by_directions = 0;
+  for (int i = kTurnBegins; i < kFrames; ++i) {
+    lost += !HasPose(tour.At(i).state);
+    by_directions +=
+        tour.At(i).state == TrackingState::kPanorama || tour.At(i).state == TrackingState::kHybrid;
+  }
+  EXPECT_EQ(lost, 0);
+  EXPECT_GT(by_directions, kTurn);
+  // Angles need no alignment: the turn since the walk's end, far out and after the return.
+  const auto turn_error_deg = [&](int from, int to) {
+    const Rotation3 tracked =
+        tour.At(to).camera_from_map.rotation * tour.At(from).camera_from_map.rotation.inverse();
+    const Rotation3 truth = Pose(to).rotation * Pose(from).rotation.inverse();
+    return (tracked * truth.inverse()).Angle() * 180 / std::numbers::pi;
+  };
+  EXPECT_LT(turn_error_deg(kTurnBegins, kTurnBegins + kTurn + kHold / 2), 1.0);
+  EXPECT_LT(turn_error_deg(kTurnBegins, kTurnEnds), 0.5);
+}
+
+TEST(HybridTracker, IsBackWhereItWasAfterTheTurn) {
+  const Tour& tour = HybridTour();
+  const int first = FirstWithDepth(tour);
+  ASSERT_LT(first, kTurnBegins);
+  std::vector<Eigen::Vector3d> in_map, in_truth;
+  for (int i = first + 1; i < kTurnBegins; ++i) {
+    if (tour.At(i).finite_points == 0) continue;
+    in_map.push_back(tour.At(i).camera_from_map.OriginInSource());
+    in_truth.push_back(Pose(i).OriginInSource());
+  }
+  const auto truth_from_map = AlignSim3(in_truth, in_map);
+  ASSERT_TRUE(truth_from_map);
+  for (int i = kTurnEnds; i < kFrames; ++i) {
+    EXPECT_GT(tour.At(i).finite_points, 0) << i;
+    const Eigen::Vector3d center = *truth_from_map * tour.At(i).camera_from_map.OriginInSource();
+    EXPECT_LT((center - Pose(i).OriginInSource()).norm(), 0.02 * kDepth) << i;
+  }
+}
+
+TEST(HybridTracker, MakesAMapOfBothKinds) {
+  const Tour& tour = HybridTour();
+  ASSERT_NE(tour.map, nullptr);
+  EXPECT_EQ(Validate(*tour.map), "");
+  EXPECT_TRUE(tour.map->HasFinitePoints());
+  EXPECT_GE(tour.map->panoramas.size(), 2u) << "the start's, and the turn's";
+  int dependent = 0, infinite = 0;
+  for (const KeyFrame& keyframe : tour.map->keyframes) dependent += keyframe.kind == KeyFrameKind::kPanorama;
+  for (const MapPoint& point : tour.map->points) infinite += point.infinite();
+  EXPECT_GT(dependent, 2);
+  EXPECT_GT(infinite, 200);
+  // This camera turns about itself: dependent keyframes stand where their reference does, but for noise.
+  for (const KeyFrame& keyframe : tour.map->keyframes) {
+    if (keyframe.kind != KeyFrameKind::kPanorama) continue;
+    const KeyFrame* reference = tour.map->FindKeyFrame(tour.map->FindPanorama(keyframe.panorama)->reference);
+    EXPECT_LT(
+        (keyframe.camera_from_map.OriginInSource() - reference->camera_from_map.OriginInSource()).norm(),
+        0.01);
+  }
+}
+
+TEST(PlainTracker, KnowsNoPanoramas) {
+  const Tour tour = TakeTour(false);
+  ASSERT_NE(tour.map, nullptr);
+  EXPECT_TRUE(tour.map->panoramas.empty());
+  for (int i = 0; i < kFrames; ++i) {
+    EXPECT_NE(tour.At(i).state, TrackingState::kPanorama) << i;
+    EXPECT_NE(tour.At(i).state, TrackingState::kHybrid) << i;
+    EXPECT_EQ(tour.At(i).infinite_points, 0) << i;
+  }
+}
+
+}  // namespace
+}  // namespace docent::engine
