@@ -67,7 +67,7 @@ struct EvaluateOptions {
   std::vector<std::filesystem::path> calibrations;  // for the first sequences; the others' are found
   Pace pace = Pace::kEager;
   EngineKind engine = EngineKind::kHybrid;
-  bool turn_about_camera = false;  // see TurnCenterOptions::enabled
+  bool turn_about_camera = false;  // as in hybrid-slam: no TurnCenter, and no question whether it is a turn
   bool compare = false;            // run the other engine too
   std::uint64_t seed = 1;
 };

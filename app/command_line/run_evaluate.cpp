@@ -58,6 +58,7 @@ SessionOptions OptionsFor(const EvaluateOptions& options) {
   session.threaded = options.pace != Pace::kLockstep;
   session.tracker.hybrid = options.engine == EngineKind::kHybrid;
   session.tracker.turn_center.enabled = !options.turn_about_camera;
+  if (options.turn_about_camera) session.tracker.max_turn_sigma = session.tracker.max_sigma;
   session.first_map = "map";
   session.seed = options.seed;
   return session;

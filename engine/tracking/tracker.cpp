@@ -164,10 +164,16 @@ bool Tracker::Believable(const MapTrackResult& result) const {
 }
 
 bool Tracker::Recovered(const MapTrackResult& result) const {
-  return result.converged && result.sigma <= options_.max_sigma &&
+  return result.converged && result.sigma <= options_.max_sigma && IsTurn(result) &&
          result.inliers >= options_.min_recovery_inliers &&
          result.occupied_cells >= options_.min_recovery_cells &&
          result.Quality() >= options_.min_recovery_quality;
+}
+
+// Whether a turn, if it is one that the result tells of, explains what was seen.
+bool Tracker::IsTurn(const MapTrackResult& result) const {
+  return result.observed != ObservedMotion::kPanorama || !map_ || !map_->HasFinitePoints() ||
+         result.sigma <= options_.max_turn_sigma;
 }
 
 TrackedFrame Tracker::Track(const Frame& frame, const PlaceFinder* places) {
@@ -227,6 +233,16 @@ PanoramaId Tracker::PanoramaFor(const Rigid3& predicted) const {
   return needed ? selector_.PanoramaNear(predicted, median_depth_, *map_) : kNoId;
 }
 
+void Tracker::Lose(const Frame& frame, TrackedFrame* out) {
+  map_tracker_.Forget();
+  tracking_ = false;
+  misfit_frames_ = 0;
+  lost_since_ = frame.time;
+  motion_.Miss(frame.time);
+  out->state = TrackingState::kLost;
+  out->hint = "look back at what was mapped";
+}
+
 void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
   Rigid3 predicted = motion_.Predict(frame.time);
   if (observed_ == ObservedMotion::kPanorama)
@@ -244,11 +260,13 @@ void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
   if (!Believable(result)) {
     map_tracker_.Forget();
     if (options_.hybrid && FollowPicture(frame, result, out)) return;
-    tracking_ = false;
-    lost_since_ = frame.time;
-    motion_.Miss(frame.time);
-    out->state = TrackingState::kLost;
-    out->hint = "look back at what was mapped";
+    Lose(frame, out);
+    return;
+  }
+  misfit_frames_ = IsTurn(result) ? 0 : misfit_frames_ + 1;
+  if (misfit_frames_ >= options_.frames_of_misfit) {
+    Lose(frame, out);
+    out->hint = "you have walked where nothing is mapped: look back";
     return;
   }
   out->state = TrackingState::kSixDof;

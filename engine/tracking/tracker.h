@@ -50,6 +50,11 @@ struct TrackerOptions {
   // Robust, of the normalised residuals: where nothing fits, the robust threshold grows until chance matches
   // pass it. A true pose leaves less than one.
   double max_sigma = 4.0;
+  // The same where a turn is to explain a picture, in a map that knows depth: true turns leave less than half
+  // of it. More, for so many frames, and the camera has gone from where it turned: then it is lost, rather
+  // than its way taken for a turn.
+  double max_turn_sigma = 1.0;
+  int frames_of_misfit = 5;
   int frames_between_keyframes = 4;  // so that the mapper's answer to the last one is in the map
   // Recovery: what a pose found after a loss must show before it counts (ptamm §6.3).
   int min_recovery_inliers = 40;
@@ -109,6 +114,7 @@ class Tracker {
   void ResetStart();
   Timestamp FirstViewTime() const;
   void TrackMap(const Frame& frame, TrackedFrame* out);
+  void Lose(const Frame& frame, TrackedFrame* out);
   bool FollowPicture(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out);
   PanoramaId PanoramaFor(const Rigid3& predicted) const;
   void ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, const TrackedFrame& out);
@@ -127,6 +133,7 @@ class Tracker {
   // The best of those that resemble the frame; but_map: none of that map.
   std::vector<TurnedPlace> BestPlaces(const PlaceFinder& places, std::uint64_t but_map = 0) const;
   bool Believable(const MapTrackResult& result) const;
+  bool IsTurn(const MapTrackResult& result) const;
   bool Recovered(const MapTrackResult& result) const;
   void Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out);
   void CollectReports();
@@ -154,6 +161,7 @@ class Tracker {
   double finite_coverage_ = 1, median_depth_ = 1;  // of the last frame that told them
   Rigid3 first_view_from_map_;                     // the pose of the initializer's first view
   Timestamp lost_since_{};
+  int misfit_frames_ = 0;  // in a row, that no turn explains
   // The newest picture whose pose points told, or of a long turn a later one: FollowPicture's measure.
   std::shared_ptr<const ImageFeatures> anchor_;
   Rigid3 anchor_pose_;

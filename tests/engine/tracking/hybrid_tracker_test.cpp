@@ -77,15 +77,16 @@ struct Tour {
 };
 
 // Tracker and mapper in turn on one thread, as lockstep runs them.
-Tour TakeTour(bool hybrid) {
+template <typename FrameAt>
+Tour Take(bool hybrid, int frames, const FrameAt& frame_at) {
   TrackerOptions options;
   options.hybrid = hybrid;
   Tracker tracker(options, Camera(), 1);
   Mapper mapper({});
   Tour tour;
   tracker.StartNewMap();
-  for (int i = 0; i < kFrames; ++i) {
-    tour.frames.push_back(tracker.Track(FrameOf(i), nullptr));
+  for (int i = 0; i < frames; ++i) {
+    tour.frames.push_back(tracker.Track(frame_at(i), nullptr));
     if (auto pair = tracker.TakeInitialPair()) mapper.Start(std::move(*pair));
     if (auto candidate = tracker.TakeKeyFrameCandidate()) {
       mapper.Report(tracker.TakeReports());
@@ -103,6 +104,10 @@ Tour TakeTour(bool hybrid) {
     }
   }
   return tour;
+}
+
+Tour TakeTour(bool hybrid) {
+  return Take(hybrid, kFrames, FrameOf);
 }
 
 const Tour& HybridTour() {
@@ -209,6 +214,39 @@ TEST(HybridTracker, MakesAMapOfBothKinds) {
         (keyframe.camera_from_map.OriginInSource() - reference->camera_from_map.OriginInSource()).norm(),
         0.01);
   }
+}
+
+// Far out on the turn the camera walks ahead, where the map knows directions alone.
+TEST(HybridTracker, IsLostRatherThanTakeAWalkForATurn) {
+  constexpr int kWalkBegins = kTurnBegins + kTurn + kHold, kWalkAhead = 40;
+  const auto world = testing_world::Chamber(101);
+  const Rigid3 turned = Pose(kWalkBegins);
+  const Eigen::Vector3d ahead = turned.rotation.inverse() * Eigen::Vector3d(0, 0, 1);
+  const Tour tour = Take(true, kWalkBegins + kWalkAhead, [&](int index) {
+    if (index < kWalkBegins) return FrameOf(index);
+    Frame frame = FrameOf(kWalkBegins);
+    frame.time = FromSeconds(index / kFramesASecond);
+    frame.index = static_cast<std::uint64_t>(index);
+    const Eigen::Vector3d center = 0.03 * (index - kWalkBegins + 1) * ahead;
+    const Rigid3 pose(turned.rotation, -(turned.rotation * center));
+    frame.picture = world.Render(*Camera(), pose, 1.5, frame.index + 1);
+    return frame;
+  });
+  EXPECT_EQ(tour.At(kWalkBegins - 1).state, TrackingState::kPanorama);
+  int lost = 0, told = 0;
+  for (int i = kWalkBegins; i < kWalkBegins + kWalkAhead; ++i) {
+    lost += tour.At(i).state == TrackingState::kLost;
+    told += tour.At(i).hint == "you have walked where nothing is mapped: look back";
+    if (!HasPose(tour.At(i).state)) continue;
+    // Until then, nothing of the walk went into the direction.
+    EXPECT_LT(
+        (tour.At(i).camera_from_map.rotation * tour.At(kWalkBegins - 1).camera_from_map.rotation.inverse())
+            .Angle(),
+        0.02)
+        << i;
+  }
+  EXPECT_GT(lost, kWalkAhead / 2);
+  EXPECT_GE(told, 1);
 }
 
 TEST(PlainTracker, KnowsNoPanoramas) {
