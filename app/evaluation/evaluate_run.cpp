@@ -159,6 +159,7 @@ void CountFrames(const RunRecord& run, SequenceReport* report) {
     if (InMapOfDirections(frame)) ++report->directions_only_frames;
     if (frame.state == engine::TrackingState::kRelocalized) ++report->relocalizations;
     if (!report->first_tracked_frame) report->first_tracked_frame = static_cast<int>(i);
+    report->last_tracked_frame = static_cast<int>(i);
   }
   if (report->first_tracked_frame) {
     report->tracked_ratio =

@@ -42,7 +42,7 @@ struct MapResult {
   std::optional<double> ate_rmse_m;  // empty without truth, or when the centres do not fix a similarity
   std::optional<double> scale;       // truth metres a map metre
   std::optional<double> rotation_rmse_deg;   // after the rotation that aligns the orientations best
-  std::optional<double> rotation_drift_deg;  // of the turn from the first to the last frame
+  std::optional<double> rotation_drift_deg;  // of the turn from the first to the last frame with a pose
   // The same about the true turn's own axis, as hybrid-slam §7.3 tells it: positive when the engine turned
   // too far. Empty where the camera ended looking as it began, as there is no axis then.
   std::optional<double> turn_error_deg;
@@ -63,7 +63,7 @@ struct SequenceReport {
   int discarded_frames = 0;        // with a pose in a map that was discarded; counted as untracked
   int directions_only_frames = 0;  // of the tracked ones: in a map without depth, so without a position
   double tracked_ratio = 0;        // tracked over all frames from the first tracked one on, that one included
-  std::optional<int> first_tracked_frame;
+  std::optional<int> first_tracked_frame, last_tracked_frame;
   int relocalizations = 0;
   // Of the largest map.
   std::optional<double> ate_rmse_m, rotation_rmse_deg, rotation_drift_deg, turn_error_deg, scale;

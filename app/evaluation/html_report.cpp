@@ -34,10 +34,11 @@ std::string FigureTable(const SequenceReport& r) {
   html += Row("frames", std::to_string(r.frames));
   html += Row("tracked after the first tracked frame", Fixed(r.tracked_ratio * 100, 1) + " %");
   html += Row("first tracked frame", first);
+  html += Row("last tracked frame", r.last_tracked_frame ? std::to_string(*r.last_tracked_frame) : "never");
   html += Row("relocalizations", std::to_string(r.relocalizations));
   html += Row("ATE RMSE", Fixed(r.ate_rmse_m ? std::optional(*r.ate_rmse_m * 100) : std::nullopt, 2, " cm"));
   html += Row("rotation RMSE", Fixed(r.rotation_rmse_deg, 3, "°"));
-  html += Row("rotation drift, last frame against first", Fixed(r.rotation_drift_deg, 3, "°"));
+  html += Row("rotation drift, last tracked frame against first", Fixed(r.rotation_drift_deg, 3, "°"));
   html += Row("of it about the axis of the true turn", Fixed(r.turn_error_deg, 3, "°"));
   html += Row("scale", Fixed(r.scale, 4, ""));
   html += Row("keyframes", std::to_string(r.keyframes.sixdof) + " sixdof, " +
@@ -170,10 +171,18 @@ std::string Section(const EvaluatedRun& run) {
   return html + "</section>\n";
 }
 
+// A turn is told as far as it was tracked; one that was not tracked to its end is no figure of the whole.
+std::string TurnError(const SequenceReport& r) {
+  if (!r.turn_error_deg) return "unknown";
+  const bool to_the_end = r.last_tracked_frame == r.frames - 1;
+  return Fixed(*r.turn_error_deg, 3) + "°" +
+         (to_the_end ? "" : " at frame " + std::to_string(*r.last_tracked_frame));
+}
+
 std::string SummaryRow(const SequenceReport& r, const std::string& name) {
   return "<tr><td>" + EscapeHtml(name) + "</td><td>" + EscapeHtml(r.engine) + "</td><td>" +
          Fixed(r.tracked_ratio * 100, 1) + " %</td><td>" + Centimetres(r.ate_rmse_m) + "</td><td>" +
-         Fixed(r.rotation_rmse_deg, 3, "°") + "</td><td>" + Fixed(r.turn_error_deg, 3, "°") + "</td><td>" +
+         Fixed(r.rotation_rmse_deg, 3, "°") + "</td><td>" + TurnError(r) + "</td><td>" +
          Fixed(r.tracking_median_ms, 2) + "</td></tr>\n";
 }
 
@@ -196,7 +205,7 @@ std::string FormatHtmlReport(const std::vector<EvaluatedRun>& runs) {
   html += std::string(wide ? "<body class=\"wide\">" : "<body>") + "\n<h1>Docent: evaluation</h1>\n";
   html +=
       "<table><tr><th>sequence</th><th>engine</th><th>tracked</th><th>ATE RMSE</th><th>rotation</th>"
-      "<th>turn, last against first</th><th>ms a frame</th></tr>\n";
+      "<th>turn, last tracked frame against first</th><th>ms a frame</th></tr>\n";
   for (const EvaluatedRun& run : runs) {
     html += SummaryRow(run.report, run.report.name);
     if (run.compared) html += SummaryRow(run.compared->report, run.report.name);

@@ -45,6 +45,7 @@ Json ToJson(const SequenceReport& report) {
       {"tracked", report.tracked},
       {"tracked_ratio", report.tracked_ratio},
       {"first_tracked_frame", OrNull(report.first_tracked_frame)},
+      {"last_tracked_frame", OrNull(report.last_tracked_frame)},
       {"relocalizations", report.relocalizations},
       {"ate_rmse_m", OrNull(report.ate_rmse_m)},
       {"rotation_rmse_deg", OrNull(report.rotation_rmse_deg)},

@@ -10,9 +10,9 @@
 namespace docent::app {
 
 // report.json: one object a sequence under `sequences`, with the fields of command-line.md and, beyond them,
-// `engine`, `discarded_frames`, `directions_only_frames`, `turn_error_deg`, `maps` and `segments`. What is
-// not known is null. `compared`: the same sequences by the other engine, under a field of that name; left out
-// when empty.
+// `engine`, `last_tracked_frame`, `discarded_frames`, `directions_only_frames`, `turn_error_deg`, `maps` and
+// `segments`. What is not known is null. `compared`: the same sequences by the other engine, under a field of
+// that name; left out when empty.
 std::string FormatJsonReport(const std::vector<SequenceReport>& reports,
                              const std::vector<SequenceReport>& compared = {});
 void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports,

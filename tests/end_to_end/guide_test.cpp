@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -105,6 +107,41 @@ TEST(Guide, EvaluatesTwiceInLockstepWithTheSameBytes) {
   EXPECT_FALSE(trajectories[0].empty());
   EXPECT_EQ(trajectories[0], trajectories[1]);
   EXPECT_EQ(events[0], events[1]);
+}
+
+TEST(Guide, ComparesBothEnginesAndStitchesWhatOneKnowsByTurning) {
+  const TemporaryFolder folder;
+  const auto output = folder / "report";
+  const Outcome outcome = RunDocent(
+      {"evaluate", "sim:cylinder:0", "--output", output.string(), "--pace", "lockstep", "--compare"});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.errors;
+  const auto report = nlohmann::json::parse(ReadAll(output / "report.json"));
+  ASSERT_EQ(report.at("sequences").size(), 1u);
+  ASSERT_EQ(report.at("compared").size(), 1u);
+  const auto& hybrid = report.at("sequences").at(0);
+  EXPECT_EQ(hybrid.at("engine"), "hybrid");
+  EXPECT_EQ(report.at("compared").at(0).at("engine"), "sixdof");
+  EXPECT_EQ(report.at("compared").at(0).at("keyframes").at("panorama"), 0);
+  EXPECT_GT(hybrid.at("keyframes").at("panorama"), 2);
+  // Turned by 90 degrees about a place that it cannot know.
+  EXPECT_GT(hybrid.at("tracked"), 95);
+  EXPECT_EQ(hybrid.at("directions_only_frames"), hybrid.at("tracked"));
+  EXPECT_TRUE(hybrid.at("ate_rmse_m").is_null());
+  EXPECT_LT(std::abs(hybrid.at("turn_error_deg").get<double>()), 0.3);
+  for (const char* name : {"cylinder-0", "cylinder-0-sixdof"})
+    EXPECT_EQ(ReadFrames(output / name / "frames.csv").size(), 100u) << name;
+  const auto is_png = [](const std::filesystem::path& path) {
+    return path.extension() == ".png" && ReadAll(path).starts_with("\x89PNG\r\n");
+  };
+  const auto pictures = [&](const char* name) {
+    const std::filesystem::directory_iterator files(output / name);
+    return std::count_if(begin(files), end(files), [&](const auto& entry) { return is_png(entry.path()); });
+  };
+  EXPECT_EQ(pictures("cylinder-0"), 1);
+  EXPECT_EQ(pictures("cylinder-0-sixdof"), 0);
+  EXPECT_THAT(
+      ReadAll(output / "report.html"),
+      AllOf(HasSubstr("<h4>hybrid</h4>"), HasSubstr("<h4>sixdof</h4>"), HasSubstr("data:image/png;base64,")));
 }
 
 TEST(Guide, AuthorsMapsThatATourNamesRightlyAndLeavesUntouched) {

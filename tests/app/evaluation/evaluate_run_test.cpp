@@ -132,6 +132,17 @@ TEST(Evaluation, MeasuresHowMuchTooFarTheEngineTurned) {
   // A roll about another axis is drift, and no error of this turn.
   EXPECT_THAT(run_with(90, 3).turn_error_deg, Optional(DoubleNear(0, 0.01)));
   EXPECT_THAT(run_with(90, 3).rotation_drift_deg, Optional(DoubleNear(3, 1e-5)));
+  // Lost at frame 60 of 90, it is no figure of the whole turn, and says so.
+  RunRecord lost;
+  std::vector<TimedPose> truth;
+  for (int i = 0; i <= 90; ++i) {
+    truth.push_back({TimeOf(i), {engine::Rotation3::Exp({0, i * kDegree, 0}), Eigen::Vector3d::Zero()}});
+    lost.frames.push_back(PerfectFrame(truth.back()));
+    if (i > 60) lost.frames.back().state = TrackingState::kLost;
+  }
+  EvaluatedRun evaluated{lost, truth, {}, EvaluateRun(lost, truth, {})};
+  EXPECT_EQ(evaluated.report.last_tracked_frame, 60);
+  EXPECT_THAT(FormatHtmlReport({evaluated}), HasSubstr("° at frame 60<"));
   auto back = Helix(30);
   for (TimedPose& pose : back) pose.truth_from_camera.rotation = engine::Rotation3();
   EXPECT_FALSE(EvaluateRun(PerfectRun(back), back, {}).turn_error_deg);
@@ -149,6 +160,7 @@ TEST(Evaluation, CountsFramesWithAPoseFromTheFirstTrackedOneOn) {
   EXPECT_EQ(report.frames, 10);
   EXPECT_EQ(report.tracked, 6);
   EXPECT_EQ(report.first_tracked_frame, 2);
+  EXPECT_EQ(report.last_tracked_frame, 9);
   EXPECT_DOUBLE_EQ(report.tracked_ratio, 6.0 / 8);
   EXPECT_EQ(report.relocalizations, 1);
 }
@@ -264,9 +276,9 @@ TEST(JsonReport, HasEveryFieldAndNullWhereNothingIsKnown) {
   report.name = "a \"b\" \xff";
   const auto json = nlohmann::json::parse(FormatJsonReport({report}));
   const auto& sequence = json.at("sequences").at(0);
-  for (const char* field :
-       {"name", "frames", "tracked", "tracked_ratio", "first_tracked_frame", "relocalizations", "ate_rmse_m",
-        "rotation_rmse_deg", "rotation_drift_deg", "turn_error_deg", "scale", "wall_s", "peak_memory_mb"}) {
+  for (const char* field : {"name", "frames", "tracked", "tracked_ratio", "first_tracked_frame",
+                            "last_tracked_frame", "relocalizations", "ate_rmse_m", "rotation_rmse_deg",
+                            "rotation_drift_deg", "turn_error_deg", "scale", "wall_s", "peak_memory_mb"}) {
     EXPECT_TRUE(sequence.contains(field)) << field;
   }
   EXPECT_TRUE(sequence.at("ate_rmse_m").is_null());
