@@ -60,7 +60,7 @@ struct MapperEvent {
   std::string detail;
 };
 
-// Seconds of work by task.
+// Seconds of processor time by task.
 struct MapperTimes {
   double bundle_adjustment = 0, panorama_localization = 0, infinite_triangulation = 0, other = 0;
   double longest_hold = 0;  // for which a piece of work made an offered keyframe wait

@@ -6,9 +6,9 @@
 namespace docent::engine {
 
 struct RedundancyOptions {
-  double min_known = 0.9;  // share of a keyframe's points ...
-  int min_observers = 3;   // ... that so many others see as well or from nearer
-  int min_keyframes = 8;   // of a map of which none is missed
+  double min_known = 0.95;  // share of a keyframe's points ...
+  int min_observers = 4;    // ... that so many others see as well or from nearer
+  int min_keyframes = 8;    // of a map of which none is missed
   // Another keyframe must stand as near and look the same way: places are recognised by keyframes too.
   double max_distance = 0.15;  // of the depth
   double max_turn_deg = 15;

@@ -88,6 +88,9 @@ void KeyFrameSelector::Reopen(const PanoramaMap& panorama, const MapSnapshot& ma
 KeyFrameChoice KeyFrameSelector::Select(const SelectorFrame& frame, const MapSnapshot& map) {
   const Pose now{frame.time, frame.camera_from_map.OriginInSource(), AxisOf(frame.camera_from_map)};
   const bool localized = frame.observed != ObservedMotion::kPanorama;
+  if (mode_ == Mode::kPanorama && frame.time - reference_time_ > options_.patience &&
+      OpenPanorama(map) == kNoId)
+    mode_ = Mode::kSixDof;
   if (mode_ == Mode::kPanorama && localized) {
     // hybrid-slam §4.5. A few finite points are seen all through a turn; that alone is no return.
     const PanoramaMap* panorama = map.FindPanorama(OpenPanorama(map));

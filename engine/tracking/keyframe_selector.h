@@ -20,7 +20,9 @@ struct KeyFrameSelectorOptions {
   // With fewer points than this a panorama map is about to run out: a keyframe is due after less of a turn.
   int few_points = 60;
   double min_view_ratio_when_few = 0.03;
-  Timestamp history = std::chrono::seconds(10);                // poses that tell a turn from a walk
+  Timestamp history = std::chrono::seconds(10);  // poses that tell a turn from a walk
+  // A mapper that has not opened the panorama map by then has not taken its reference.
+  Timestamp patience = std::chrono::seconds(1);
   Timestamp history_interval = std::chrono::milliseconds(60);  // between them
 };
 

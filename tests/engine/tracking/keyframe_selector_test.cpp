@@ -403,5 +403,28 @@ TEST_F(KeyFrameSelecting, HoldsToTheThresholdsItWasGiven) {
   EXPECT_EQ(choose(35.1, 0.29, 1.01 * ten), KeyFrameChoice::kNone);
 }
 
+// The mapper's queue was full, or the map may not grow here: the reference that was offered never comes.
+TEST(KeyFrameSelector, ReturnsToGeneralMotionWhenItsReferenceWasDropped) {
+  KeyFrameSelector selector({}, 70 * std::numbers::pi / 180);
+  MapSnapshot map;
+  KeyFrame first;
+  first.id = 0;
+  map.keyframes = {first};
+  selector.Offered(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1));
+  KeyFrameChoice last = KeyFrameChoice::kNone;
+  for (int i = 0; i < 300; ++i) {
+    SelectorFrame frame;
+    frame.time = FromSeconds(1 + i / 30.0);
+    frame.camera_from_map = CameraAt({0.01 * i, 0, 0});
+    frame.finite_coverage = frame.coverage = 0.6;
+    frame.points = 200;
+    frame.median_depth = 2;
+    frame.wants_six_dof = i > 100;
+    last = selector.Select(frame, map);
+  }
+  EXPECT_EQ(selector.mode(), KeyFrameSelector::Mode::kSixDof);
+  EXPECT_EQ(last, KeyFrameChoice::kSixDof);
+}
+
 }  // namespace
 }  // namespace docent::engine
