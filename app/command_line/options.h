@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/cameras/frame_source.h"
+#include "app/session/head_control.h"
 #include "engine/base/time.h"
 #include "engine/geometry/camera_model.h"
 
@@ -46,6 +47,7 @@ struct RunArguments {
   std::optional<std::filesystem::path> record;  // video of the augmented view
   std::uint64_t seed = 1;
   std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory
+  std::optional<HeadPolicy> head;                          // of cameras that can turn their heads
   double baseline_m = 0;                                   // measured between the two cameras; 0: not
 };
 

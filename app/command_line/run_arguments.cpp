@@ -136,6 +136,10 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
           },
           "Distance of two cameras that are fixed to one another; tells the scale of their maps")
       ->type_name("METRES");
+  AddChoice<std::optional<HeadPolicy>>(
+      command, "--head", &run->head,
+      "What a camera that can turn its head looks at; when it is lost it looks for the map",
+      {{"gaze", HeadPolicy::kFollowGaze}, {"map", HeadPolicy::kKeepMapInView}});
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");
   command->add_option("--record", run->record, "Write the augmented view as a video")->type_name("FILE.mp4");

@@ -201,7 +201,8 @@ PanoramaId Tracker::PanoramaFor(const Rigid3& predicted) const {
 }
 
 void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
-  Rigid3 predicted = motion_.Predict(frame.time);
+  // What was commanded is known better than what was observed before.
+  Rigid3 predicted = frame.turned ? motion_.PredictWithRotation(*frame.turned) : motion_.Predict(frame.time);
   if (observed_ == ObservedMotion::kPanorama)
     predicted = WithCenter(predicted.rotation, motion_.last().OriginInSource());
   map_tracker_.EnablePanorama(PanoramaFor(predicted));
