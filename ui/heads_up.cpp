@@ -259,7 +259,7 @@ void DrawHeadsUp(const View& view, Canvas* canvas) {
   } else if (starting) {
     DrawMoveFigure(middle, 0.7 * radius, view.animation_seconds, canvas);
   }
-  DrawStatus(view, canvas);
+  if (view.overlay.status) DrawStatus(view, canvas);
   const double bottom =
       DrawSentence(view.overlay.message, 15 * unit, canvas->height_px() - 12 * unit, canvas) - 6 * unit;
   const std::string& own_hint = tracked.hint;

@@ -17,6 +17,7 @@ struct Overlay {
   bool points = false;     // map points as found in the picture, coloured by level
   bool keyframes = false;  // keyframes of the map as small frusta
   bool hud = true;         // state, map name, hint; the lost indicator while there is no pose
+  bool status = true;      // of the hud: the state; false where nothing is tracked
   std::string map_name;    // empty when there is none
   std::string message;     // one sentence at the bottom, empty for none
   // The newest frame of another camera, shown small in a corner (see inset.h) in a frame whose colour is its

@@ -2,6 +2,7 @@
 #include "app/calibration/calibration_file.h"
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "app/calibration/yaml_reader.h"
@@ -200,10 +201,19 @@ std::optional<std::filesystem::path> FindCalibration(const std::filesystem::path
 void CheckPictureSize(const CameraModel& camera, int width_px, int height_px, const std::string& source,
                       const std::string& calibration) {
   if (camera.width_px() == width_px && camera.height_px() == height_px) return;
-  throw Error("The pictures of " + source + " are " + std::to_string(width_px) + "x" +
-              std::to_string(height_px) + " pixels, but " + calibration + " is for " +
-              std::to_string(camera.width_px()) + "x" + std::to_string(camera.height_px()) +
-              "; use the calibration of this camera at this size.");
+  const auto size = [](int width, int height) {
+    return std::to_string(width) + "x" + std::to_string(height);
+  };
+  const std::string own = size(camera.width_px(), camera.height_px());
+  // A few pixels in a thousand are a codec's rounding.
+  const double shape = static_cast<double>(camera.width_px()) * height_px / camera.height_px() / width_px;
+  const std::string advice = std::abs(shape - 1) < 0.005
+                                 ? "take pictures of that size (--camera-format " + own +
+                                       ") or calibrate at this one (docent calibrate)"
+                                 : "their shape differs too, so another part of the lens is seen: calibrate "
+                                   "at this size (docent calibrate)";
+  throw Error("The pictures of " + source + " are " + size(width_px, height_px) + " pixels, but " +
+              calibration + " is for " + own + "; " + advice + ".");
 }
 
 }  // namespace docent::app

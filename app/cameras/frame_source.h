@@ -7,7 +7,9 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "app/cameras/head.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/tracking/tracked_frame.h"
 
@@ -56,8 +58,15 @@ class FrameSource {
 
   const SourceInfo& info() const { return info_; }
 
+  // Of a camera that can turn its head; null for others.
+  Head* head() const { return head_.get(); }
+  void SetHead(std::unique_ptr<Head> head) { head_ = std::move(head); }
+
  protected:
   SourceInfo info_;
+
+ private:
+  std::unique_ptr<Head> head_;
 };
 
 // A picture format asked of a device; zero means "whatever it likes".

@@ -14,7 +14,11 @@ namespace docent::app {
 std::unique_ptr<FrameSource> OpenCamera(const std::string& source, const CameraOptions& options) {
   namespace fs = std::filesystem;
   if (source.empty()) throw Error("The camera has no name; give a device, a video, a folder or sim:SCENE.");
-  if (source.starts_with("/dev/")) return OpenDevice(source, options);
+  if (source.starts_with("/dev/")) {
+    auto device = OpenDevice(source, options);
+    device->SetHead(OpenDeviceHead(MakeDeviceSystem(), source));
+    return device;
+  }
   if (source.starts_with("sim:")) return OpenSimulation(source.substr(4), options);
   std::error_code error;
   const fs::file_status status = fs::status(source, error);

@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "app/simulator/simulated_head.h"
+
 namespace docent::app {
 
 namespace {
@@ -15,13 +17,19 @@ class SimulatedSource : public FrameSource {
     info_.frame_count = static_cast<std::uint64_t>(simulation_->frame_count());
     info_.nominal_fps = simulation_->options().frame_rate_hz;
     info_.known_camera = simulation_->camera();
+    if (simulation_->name() == "head") SetHead(std::make_unique<SimulatedHead>());
   }
 
   bool Next(engine::Frame* frame) override {
     if (index_ == simulation_->frame_count()) return false;
     cv::Mat picture;
-    simulation_->Render(index_, &picture);
     frame->time = simulation_->time(index_);
+    if (head() != nullptr) {
+      const engine::Rigid3 turn(CarrierFromCamera(head()->At(frame->time)), Eigen::Vector3d::Zero());
+      simulation_->RenderFrom(simulation_->world_from_camera(index_) * turn, index_, &picture);
+    } else {
+      simulation_->Render(index_, &picture);
+    }
     frame->index = static_cast<std::uint64_t>(index_++);
     frame->picture = std::move(picture);
     return true;

@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "app/cameras/frame_source.h"
+#include "app/session/head_control.h"
 #include "engine/base/time.h"
+#include "engine/geometry/camera_model.h"
 
 // What the person asked for, as plain structs: the command line is parsed into these early, and nothing
 // behind them knows of words and dashes.
@@ -45,6 +47,7 @@ struct RunArguments {
   std::optional<std::filesystem::path> record;  // video of the augmented view
   std::uint64_t seed = 1;
   std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory
+  std::optional<HeadPolicy> head;                          // of cameras that can turn their heads
   double baseline_m = 0;                                   // measured between the two cameras; 0: not
 };
 
@@ -76,6 +79,16 @@ struct DemoOptions {
   bool headless = false;
   std::optional<std::filesystem::path> output, record;
   std::uint64_t seed = 1;
+};
+
+struct CalibrateOptions {
+  std::string source;  // empty: only print the board
+  std::filesystem::path output;
+  std::string board = "charuco:8x6:30";
+  std::optional<engine::LensModel> lens;  // empty: whichever predicts best
+  CameraOptions camera;
+  std::optional<std::filesystem::path> print;
+  bool headless = false;
 };
 
 // The pace that was asked for, or else realtime for devices and windows and eager for headless files.

@@ -111,6 +111,7 @@ int RunProgram(int argc, const char* const* argv) {
   program.add_flag("--verbose", verbose, "Say more about what is done")->excludes(quiet_option);
 
   AddCamerasCommand(&program, &invocation);
+  AddCalibrateCommand(&program, &invocation, RunCalibrate);
   AddSimulateCommand(&program, &invocation);
   AddTrainVocabularyCommand(&program, &invocation);
   AddMapsCommand(&program, &invocation);

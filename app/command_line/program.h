@@ -41,6 +41,8 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
                     std::function<void(const TourOptions&, Verbosity)> run);
 void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
                         std::function<void(const EvaluateOptions&, Verbosity)> run);
+void AddCalibrateCommand(CLI::App* program, Invocation* invocation,
+                         std::function<void(const CalibrateOptions&, Verbosity)> run);
 void AddDemoCommand(CLI::App* program, Invocation* invocation,
                     std::function<void(const DemoOptions&, Verbosity)> run);
 

@@ -81,6 +81,31 @@ void AddSeedOption(CLI::App* command, std::uint64_t* seed) {
       ->type_name("N");
 }
 
+void AddCameraFormatOption(CLI::App* command, CameraOptions* options) {
+  command
+      ->add_option_function<std::string>(
+          "--camera-format",
+          [options](const std::string& text) {
+            try {
+              options->device_format = ParseDeviceFormat(text);
+            } catch (const Error& error) {
+              throw CLI::ValidationError("--camera-format", error.what());
+            }
+          },
+          "Size and rate that a device should deliver")
+      ->type_name("640x480@30");
+}
+
+void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens) {
+  using engine::LensModel;
+  AddChoice<std::optional<LensModel>>(command, "--lens", lens,
+                                      "Model of the lens; auto takes the one that predicts unseen views best",
+                                      {{"auto", std::nullopt},
+                                       {"radial_tangential", LensModel::kRadialTangential},
+                                       {"fov", LensModel::kFov},
+                                       {"kannala_brandt", LensModel::kKannalaBrandt}});
+}
+
 void AddRunArguments(CLI::App* command, RunArguments* run) {
   command
       ->add_option(
@@ -93,18 +118,7 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
       ->add_option("--calibration", run->cameras.calibrations, "Calibration of each camera, in their order")
       ->type_name("FILE")
       ->allow_extra_args(false);
-  command
-      ->add_option_function<std::string>(
-          "--camera-format",
-          [run](const std::string& text) {
-            try {
-              run->cameras.options.device_format = ParseDeviceFormat(text);
-            } catch (const Error& error) {
-              throw CLI::ValidationError("--camera-format", error.what());
-            }
-          },
-          "Size and rate that a device should deliver")
-      ->type_name("640x480@30");
+  AddCameraFormatOption(command, &run->cameras.options);
   AddSeconds(command, "--from", &run->cameras.from, "Begin so long after the first picture");
   AddSeconds(command, "--until", &run->cameras.until, "End so long after the first picture");
   AddPaceOption(command, &run->pace);
@@ -122,6 +136,10 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
           },
           "Distance of two cameras that are fixed to one another; tells the scale of their maps")
       ->type_name("METRES");
+  AddChoice<std::optional<HeadPolicy>>(
+      command, "--head", &run->head,
+      "What a camera that can turn its head looks at; when it is lost it looks for the map",
+      {{"gaze", HeadPolicy::kFollowGaze}, {"map", HeadPolicy::kKeepMapInView}});
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");
   command->add_option("--record", run->record, "Write the augmented view as a video")->type_name("FILE.mp4");

@@ -14,6 +14,9 @@ void AddPaceOption(CLI::App* command, std::optional<Pace>* pace);
 void AddEngineOption(CLI::App* command, EngineKind* engine);
 void AddSeedOption(CLI::App* command, std::uint64_t* seed);
 void AddMemoryOption(CLI::App* command, std::size_t* bytes);
+void AddCameraFormatOption(CLI::App* command, CameraOptions* options);
+// auto, or the name of a lens model.
+void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens);
 // --camera, --calibration, --camera-format, --from, --until and all of the above, --headless, --output,
 // --record.
 void AddRunArguments(CLI::App* command, RunArguments* run);

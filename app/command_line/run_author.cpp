@@ -49,6 +49,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   request.pace = ResolvePace(options.run, AnyLive(cameras));
   request.engine = options.run.engine;
   request.baseline_m = options.run.baseline_m;
+  request.head = options.run.head;
   request.headless = options.run.headless;
   request.seed = options.run.seed;
   request.memory_budget_bytes = options.run.memory_budget_bytes;
@@ -73,6 +74,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   request.pace = ResolvePace(options.run, AnyLive(cameras));
   request.engine = options.run.engine;
   request.baseline_m = options.run.baseline_m;
+  request.head = options.run.head;
   request.headless = options.run.headless;
   request.seed = options.run.seed;
   request.memory_budget_bytes = options.run.memory_budget_bytes;

@@ -73,7 +73,15 @@ class GuideRun {
         cameras_(cameras),
         session_(OptionsOf(request), ModelsOf(cameras), request.library),
         inboxes_(cameras.size()),
-        watched_(cameras.size()) {}
+        watched_(cameras.size()) {
+    if (!request.head) return;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      if (Head* const head = cameras[i].source->head())
+        heads_.push_back(
+            std::make_unique<HeadControl>(head, static_cast<int>(i), cameras[i].model, *request.head));
+    }
+    if (heads_.empty()) throw Error("No camera can turn its head; leave --head away.");
+  }
 
   // On the thread of the frame's camera.
   using Show = std::function<void(std::shared_ptr<const ShownFrame>)>;
@@ -172,6 +180,7 @@ class GuideRun {
         files_->Add(session_.TakeEvents());
         if (request_.on_frame) request_.on_frame(*frame);
       }
+      for (const auto& head : heads_) head->Saw(tracked);
       if (tracked.frame.camera == 0) Direct(frame);
       if (tracked.state != engine::TrackingState::kDropped) watched.last = frame;
       show(std::move(frame));
@@ -200,6 +209,7 @@ class GuideRun {
   Session session_;
   std::vector<CommandInbox> inboxes_;  // by camera, like watched_
   std::vector<Watched> watched_;
+  std::vector<std::unique_ptr<HeadControl>> heads_;  // of the cameras that can turn theirs
   std::stop_source stop_;
   std::mutex files_mutex_;
   std::optional<GuideFiles> files_;

@@ -43,6 +43,7 @@ struct GuideRequest {
   std::function<std::vector<Command>(const ShownFrame&)> director;
   double baseline_m = 0;                               // see SessionOptions
   std::shared_ptr<const engine::PlanarTarget> target;  // see engine::TrackerOptions; may be null
+  std::optional<HeadPolicy> head;
   // Told of every frame on its camera's thread, one at a time; may be empty.
   std::function<void(const ShownFrame&)> on_frame;
   // Told of every drawn frame with its picture, on the thread that draws; may be empty. Without a window

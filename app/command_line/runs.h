@@ -11,6 +11,7 @@ namespace docent::app {
 void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity);
 void RunAuthor(const AuthorOptions& options, Verbosity verbosity);
 void RunTour(const TourOptions& options, Verbosity verbosity);
+void RunCalibrate(const CalibrateOptions& options, Verbosity verbosity);
 void RunDemo(const DemoOptions& options, Verbosity verbosity);
 
 }  // namespace docent::app

@@ -18,8 +18,8 @@ struct RigOptions {
   std::size_t min_samples = 45;    // fewer say nothing
   std::size_t min_viewpoints = 4;  // apart by rigid_turn_deg or more, so that standing still proves nothing
   double viewpoint_turn_deg = 3;
-  double max_rigid_spread = 0.05;   // of the baseline: robust sigma of the relative position
-  double max_rigid_turn_deg = 1.0;  // robust sigma of the relative rotation
+  double max_rigid_spread = 0.02;   // of the baseline: robust sigma of the relative position
+  double max_rigid_turn_deg = 0.5;  // robust sigma of the relative rotation
   Timestamp max_gap = std::chrono::milliseconds(120);  // between poses that are interpolated
 };
 

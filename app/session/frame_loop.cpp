@@ -209,6 +209,7 @@ class CameraFeed {
     // A file delivers faster than a camera and would run away from the mapper, which in the world has the
     // whole time between pictures; so whoever feeds waits, never the tracker.
     if (pace == Pace::kEager) session_->WaitUntilCalm(stop);
+    FollowHead();
     tracked = session_->Process(frame_);
     commander_.CarryOutDue(frame_.time - *first_time_, tracked);
     run_.shown(tracked);
@@ -217,9 +218,23 @@ class CameraFeed {
   void CheckAllDone() const { commander_.CheckAllDone(); }
 
  private:
+  // Tells the tracker how far the camera was told to turn since the last picture that was tracked.
+  void FollowHead() {
+    Head* const head = run_.camera->source->head();
+    if (head == nullptr) return;
+    const engine::Rotation3 now = CarrierFromCamera(head->At(frame_.time));
+    constexpr double kStill_rad = 1e-4;
+    if (before_) {
+      const engine::Rotation3 turn = now.inverse() * *before_;
+      if (turn.Angle() > kStill_rad) frame_.turned = turn;
+    }
+    before_ = now;
+  }
+
   const CameraRun& run_;
   Session* const session_;
   RealtimeClock* const clock_;
+  std::optional<engine::Rotation3> before_;  // carrier_from_camera of the head at the last tracked picture
   const bool live_;
   const Timestamp period_;
   Commander commander_;

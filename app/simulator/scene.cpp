@@ -14,6 +14,7 @@ std::span<const SceneRecipe> SceneRecipes() {
       {"hand", "0 for a hand-held camera, 1 for one that is fixed to the shoulder's", 0, 0, 1, BuildHand},
       {"shoulder", "the same person's camera on the shoulder: 0 free, 1 fixed to the hand's", 0, 0, 1,
        BuildShoulder},
+      {"head", "the same person's camera on the shoulder, which can turn its head", 0, 0, 0, BuildHead},
       {"grass", "over a lawn of one repeated texture", 0, 0, 0, BuildGrass},
   };
   return kRecipes;

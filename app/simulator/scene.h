@@ -65,6 +65,8 @@ Scene BuildGrass(const SceneRequest& request);
 // own, 1 they are fixed to one another as WearableRig says. `general`.
 Scene BuildHand(const SceneRequest& request);
 Scene BuildShoulder(const SceneRequest& request);
+// The same person's camera on the shoulder when it can turn its head: the way and the lens of BuildShoulder.
+Scene BuildHead(const SceneRequest& request);
 // hand_from_shoulder of the rigid pair.
 engine::Rigid3 WearableRig();
 // Once around a block of cabinets in a hall (`loop`) and a little further (`revisit`).

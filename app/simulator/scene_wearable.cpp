@@ -95,5 +95,8 @@ Scene BuildHand(const SceneRequest& request) {
 Scene BuildShoulder(const SceneRequest& request) {
   return BuildWearable(request, Place::kShoulder);
 }
+Scene BuildHead(const SceneRequest& request) {
+  return BuildWearable({0, request.seed, request.identical_places}, Place::kShoulder);
+}
 
 }  // namespace docent::app

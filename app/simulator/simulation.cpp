@@ -138,6 +138,11 @@ void Simulation::Render(int frame, cv::Mat* bgr) const {
   sensor_.Apply(frame, time_s, bgr);
 }
 
+void Simulation::RenderFrom(const engine::Rigid3& world_from_camera, int frame, cv::Mat* bgr) const {
+  renderer_.Render(world_from_camera.inverse(), bgr);
+  sensor_.Apply(frame, ToSeconds(time(frame)), bgr);
+}
+
 std::optional<Eigen::Vector3d> Simulation::SurfaceAt(int frame, const Eigen::Vector2d& pixel) const {
   return SurfaceAlong(world_from_camera(frame), pixel);
 }

@@ -65,6 +65,9 @@ class Simulation {
   // The picture, CV_8UC3 in BGR: the same bytes for the same scene, options, and number.
   void Render(int frame, cv::Mat* bgr) const;
 
+  // What the camera would have taken from somewhere else, without motion blur.
+  void RenderFrom(const engine::Rigid3& world_from_camera, int frame, cv::Mat* bgr) const;
+
   // The point of the world that a frame shows at a pixel. Empty where the lens has no ray, or the ray meets
   // nothing.
   std::optional<Eigen::Vector3d> SurfaceAt(int frame, const Eigen::Vector2d& pixel) const;

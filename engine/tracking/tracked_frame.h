@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ struct Frame {
   int camera = 0;           // index in the session
   std::uint64_t index = 0;  // counts the pictures of this camera, dropped ones too
   cv::Mat picture;          // CV_8UC3 (BGR) or CV_8UC1
+  // now_from_previous of a camera that was told to turn its head since its previous picture; empty otherwise.
+  std::optional<Rotation3> turned;
 };
 
 // What the wearer is told of each picture; the names of command-line.md are in ToString.

@@ -244,7 +244,8 @@ void Tracker::Lose(const Frame& frame, TrackedFrame* out) {
 }
 
 void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
-  Rigid3 predicted = motion_.Predict(frame.time);
+  // What was commanded is known better than what was observed before.
+  Rigid3 predicted = frame.turned ? motion_.PredictWithRotation(*frame.turned) : motion_.Predict(frame.time);
   if (observed_ == ObservedMotion::kPanorama)
     predicted = TurnedAbout(pivot_, motion_.last(), predicted.rotation);
   map_tracker_.EnablePanorama(PanoramaFor(predicted));

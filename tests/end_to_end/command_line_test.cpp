@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,8 @@
 #include "app/cameras/frame_source.h"
 #include "app/evaluation/ground_truth.h"
 #include "maps/library.h"
+#include "tests/app/support/board_camera.h"
+#include "tests/app/support/temporary_folder.h"
 #include "tests/end_to_end/run_docent.h"
 
 namespace docent::app {
@@ -43,6 +46,7 @@ TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
       {"author"},
       {"tour"},
       {"evaluate"},
+      {"calibrate"},
       {"cameras"},
       {"simulate"},
       {"train-vocabulary"},
@@ -137,6 +141,39 @@ TEST(CommandLine, SimulatesASequenceThatTheCamerasRead) {
   const std::size_t begin = list.find("rgb/");
   const std::string first = list.substr(begin, list.find('\n', begin) - begin);
   EXPECT_EQ(ReadAll(folder / first), ReadAll(again / first));
+}
+
+TEST(CommandLine, CalibratesALensFromAFolderOfPictures) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "pictures");
+  const engine::CameraModel truth(engine::LensModel::kFov, {640, 480, 360, 361, 316.4, 244.9}, {0.92});
+  const BoardSpec board = ParseBoard("charuco:8x6:30");
+  const BoardCamera camera(board, truth);
+  Random random(5);
+  int count = 0;
+  for (const engine::Rigid3& pose : BoardPoses(board, truth, 14)) {
+    const std::string name = "pictures/view" + std::to_string(++count) + ".png";
+    cv::imwrite((folder / name).string(), camera.Picture(pose, &random));
+  }
+  const std::string pictures = (folder / "pictures").string(), output = (folder / "camera.yaml").string();
+  const Outcome outcome =
+      RunDocent({"calibrate", "--camera", pictures, "--board", "charuco:8x6:30", "--lens", "fov",
+                 "--headless", "--output", output, "--print", (folder / "board.pdf").string()});
+  ASSERT_EQ(outcome.exit_status, 0) << outcome.errors;
+  EXPECT_THAT(outcome.output, AllOf(HasSubstr("board.pdf"), HasSubstr("14 pictures"), HasSubstr("Good")));
+  const engine::CameraModel found = ReadCalibration(output);
+  EXPECT_NEAR(found.intrinsics().fx / 360, 1, 0.002);
+  EXPECT_NEAR(found.intrinsics().cx, 316.4, 0.5);
+  EXPECT_THAT(ReadAll(output), HasSubstr("verdict: \"Good"));
+  // Two pictures are too few, and what was written stays.
+  for (int i = 3; i <= count; ++i)
+    std::filesystem::remove(folder / ("pictures/view" + std::to_string(i) + ".png"));
+  const std::string before = ReadAll(output);
+  ExpectComplaint({"calibrate", "--camera", pictures, "--headless", "--output", output}, 1,
+                  "only 2 pictures");
+  EXPECT_EQ(ReadAll(output), before);
+  ExpectComplaint({"calibrate"}, 2, "--print");
+  ExpectComplaint({"calibrate", "--print", "x.pdf", "--board", "charuco:8"}, 2, "calibration board");
 }
 
 TEST(CommandLine, CaresForAnEmptyLibrary) {

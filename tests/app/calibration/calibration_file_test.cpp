@@ -126,8 +126,11 @@ TEST(Calibration, WithCoefficientsThatTheLensDoesNotKnowIsRefused) {
 
 TEST(Calibration, OfAnotherSizeThanThePicturesIsRefused) {
   EXPECT_NO_THROW(CheckPictureSize(kEuroc, 752, 480, "desk", "camera.yaml"));
-  EXPECT_THAT(ErrorOf([] { CheckPictureSize(kEuroc, 640, 480, "desk", "camera.yaml"); }),
-              AllOf(HasSubstr("640x480"), HasSubstr("752x480"), HasSubstr("camera.yaml")));
+  EXPECT_THAT(
+      ErrorOf([] { CheckPictureSize(kEuroc, 640, 480, "desk", "camera.yaml"); }),
+      AllOf(HasSubstr("640x480"), HasSubstr("752x480"), HasSubstr("camera.yaml"), HasSubstr("shape")));
+  EXPECT_THAT(ErrorOf([] { CheckPictureSize(kEuroc, 1504, 960, "desk", "camera.yaml"); }),
+              AllOf(HasSubstr("--camera-format 752x480"), HasSubstr("docent calibrate")));
 }
 
 TEST(Calibration, IsFoundInSequenceFolders) {

@@ -82,6 +82,8 @@ double TrackedAfterJoining(const std::vector<engine::TrackedFrame>& frames) {
 
 TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
   const Walk walk = Take("hand", "shoulder", 24, Pace::kLockstep);
+  RecordProperty("tracked_0", std::to_string(TrackedAfterJoining(walk.frames[0])));
+  RecordProperty("tracked_1", std::to_string(TrackedAfterJoining(walk.frames[1])));
   EXPECT_GE(TrackedAfterJoining(walk.frames[0]), 0.98);
   EXPECT_GE(TrackedAfterJoining(walk.frames[1]), 0.98);
   ASSERT_FALSE(walk.maps.empty());
@@ -129,6 +131,7 @@ TEST(Wearable, RecognisesThatItsCamerasAreFixedToOneAnother) {
   const engine::Rigid3 truth = WearableRig().inverse();  // shoulder_from_hand
   const double turn_deg =
       (walk.rig->second_from_first.rotation.inverse() * truth.rotation).Angle() * 57.29578;
+  RecordProperty("turn_off_deg", std::to_string(turn_deg));
   EXPECT_LT(turn_deg, 0.3);
   // The map has a scale of its own: the truth in its units follows from how far the hand moved.
   const auto hand = View("hand:1", 16);
@@ -148,6 +151,7 @@ TEST(Wearable, RecognisesThatItsCamerasAreFixedToOneAnother) {
   }
   ASSERT_GT(in_world, 0.5);
   const double baseline_m = walk.rig->Baseline() * in_world / in_map;
+  RecordProperty("baseline_off_percent", std::to_string(100 * (baseline_m / truth.translation.norm() - 1)));
   EXPECT_NEAR(baseline_m, truth.translation.norm(), 0.01 * truth.translation.norm());
   EXPECT_TRUE(std::any_of(walk.events.begin(), walk.events.end(),
                           [](const Event& event) { return event.event == "rig"; }));

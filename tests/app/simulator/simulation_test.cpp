@@ -337,7 +337,7 @@ TEST(Simulation, CountsFramesFromTheRateAndTheDuration) {
 TEST(Simulation, NamesTheScenesWhenAskedForAnUnknownOne) {
   const std::string message = ErrorOf("attic");
   EXPECT_THAT(message, HasSubstr("attic"));
-  for (const char* scene : {"room", "museum", "desks", "cylinder", "loop", "grass"})
+  for (const char* scene : {"room", "museum", "desks", "cylinder", "loop", "grass", "head"})
     EXPECT_THAT(message, HasSubstr(scene));
   EXPECT_THAT(ErrorOf(""), HasSubstr("museum"));
 }

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <utility>
+
+#include "app/calibration/board.h"
+#include "app/command_line/program.h"
+#include "app/command_line/run_arguments.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+void AddCalibrateCommand(CLI::App* program, Invocation* invocation,
+                         std::function<void(const CalibrateOptions&, Verbosity)> run) {
+  CLI::App* command = AddSubcommand(
+      program, "calibrate", "Measure a camera's lens with a printed board",
+      "docent calibrate --print board.pdf\n"
+      "  docent calibrate --camera /dev/video0 --output camera.yaml\n"
+      "  docent calibrate --camera pictures --board checkerboard:9x6:25 --output camera.yaml --headless");
+  const auto options = std::make_shared<CalibrateOptions>();
+  command->add_option("--camera", options->source, "A device, a video, or a folder of pictures of the board")
+      ->type_name("SOURCE");
+  command->add_option("--output", options->output, "The calibration file to write")->type_name("FILE");
+  command
+      ->add_option_function<std::string>(
+          "--board",
+          [options](const std::string& text) {
+            try {
+              ParseBoard(text);
+            } catch (const Error& error) {
+              throw CLI::ValidationError("--board", error.what());
+            }
+            options->board = text;
+          },
+          "checkerboard:COLUMNSxROWS:MM (inner corners) or charuco:COLUMNSxROWS:MM (squares); " +
+              options->board + " if not given")
+      ->type_name("BOARD");
+  AddLensOption(command, &options->lens);
+  AddCameraFormatOption(command, &options->camera);
+  command->add_option("--print", options->print, "Write the board as a PDF to print, at its true size")
+      ->type_name("FILE.pdf");
+  command->add_flag("--headless", options->headless, "Open no window");
+  command->callback([=, run = std::move(run)] {
+    if (!options->print && (options->source.empty() || options->output.empty())) {
+      throw CLI::ValidationError("calibrate", "give --camera and --output, or --print");
+    }
+    if (options->source.empty() != options->output.empty()) {
+      throw CLI::ValidationError("calibrate", "--camera and --output belong together");
+    }
+    invocation->run = [=] { run(*options, invocation->verbosity); };
+  });
+}
+
+}  // namespace docent::app

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/calibration_window.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+namespace docent::app {
+
+namespace {
+
+// Sixteenths of a pixel, so that lines do not jump from pixel to pixel.
+constexpr int kShift = 4;
+
+cv::Point Place(const Eigen::Vector2d& pixel) {
+  return {cvRound(pixel.x() * (1 << kShift)), cvRound(pixel.y() * (1 << kShift))};
+}
+
+void ShadeCells(const Coverage& coverage, cv::Mat* picture) {
+  cv::Mat shade = picture->clone();
+  for (int row = 0; row < Coverage::kRows; ++row) {
+    for (int column = 0; column < Coverage::kColumns; ++column) {
+      if (!coverage.IsSeen(column, row)) continue;
+      const cv::Point low(column * picture->cols / Coverage::kColumns, row * picture->rows / Coverage::kRows);
+      const cv::Point high((column + 1) * picture->cols / Coverage::kColumns,
+                           (row + 1) * picture->rows / Coverage::kRows);
+      cv::rectangle(shade, low, high, {80, 160, 80}, cv::FILLED);
+    }
+  }
+  constexpr double kShade = 0.25;
+  cv::addWeighted(shade, kShade, *picture, 1 - kShade, 0, *picture);
+}
+
+// Green to red with the length of a residual, against the picture's size.
+cv::Scalar ColorOf(double residual_px, int width_px) {
+  const double poor = std::clamp(residual_px * 640 / width_px / 0.6, 0.0, 1.0);
+  return {60, 60 + 160 * (1 - poor), 60 + 195 * poor};
+}
+
+}  // namespace
+
+cv::Mat PaintCalibration(const CalibrationWindow::Shown& shown, const Coverage& coverage) {
+  cv::Mat drawn;
+  shown.picture.channels() == 1 ? cv::cvtColor(shown.picture, drawn, cv::COLOR_GRAY2BGR)
+                                : shown.picture.copyTo(drawn);
+  ShadeCells(coverage, &drawn);
+  constexpr double kTimes = 30;
+  for (std::size_t i = 0; i < shown.kept.size(); ++i) {
+    for (std::size_t k = 0; k < shown.kept[i].pixels.size(); ++k) {
+      const Eigen::Vector2d& pixel = shown.kept[i].pixels[k];
+      if (i >= shown.residuals.size()) {
+        cv::circle(drawn, Place(pixel), 1 << kShift, {200, 200, 200}, cv::FILLED, cv::LINE_AA, kShift);
+        continue;
+      }
+      const Eigen::Vector2d& residual = shown.residuals[i][k];
+      const cv::Scalar color = ColorOf(residual.norm(), drawn.cols);
+      cv::circle(drawn, Place(pixel), 1 << kShift, color, cv::FILLED, cv::LINE_AA, kShift);
+      cv::line(drawn, Place(pixel), Place(pixel + kTimes * residual), color, 1, cv::LINE_AA, kShift);
+    }
+  }
+  for (const Eigen::Vector2d& pixel : shown.now.pixels)
+    cv::circle(drawn, Place(pixel), 4 << kShift, {60, 190, 255}, 2, cv::LINE_AA, kShift);
+  return drawn;
+}
+
+bool CalibrationWindow::Show(const Shown& shown, const Coverage& coverage) {
+  for (const ui::InputEvent& event : window_.PollEvents()) {
+    const bool key = event.kind == ui::InputEvent::Kind::kKey;
+    if (key && (event.key == "escape" || event.key == "enter" || event.key == "q")) return false;
+  }
+  if (window_.IsClosing()) return false;
+  engine::TrackedFrame frame;
+  frame.frame.picture = PaintCalibration(shown, coverage);
+  frame.state = engine::TrackingState::kDropped;  // no figure invites to search or to move
+  ui::View view;
+  view.overlay.status = false;
+  view.tracked = &frame;
+  view.overlay.message = shown.message;
+  renderer_.Draw(view);
+  const Eigen::Vector2i size = window_.FramebufferSize();
+  renderer_.Present(std::max(1, size.x()), std::max(1, size.y()));
+  window_.Show();
+  return true;
+}
+
+}  // namespace docent::app

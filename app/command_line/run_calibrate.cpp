@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <optional>
+#include <utility>
+
+#include "app/calibration/calibrate.h"
+#include "app/command_line/calibration_window.h"
+#include "app/command_line/interruption.h"
+#include "app/command_line/progress.h"
+#include "app/command_line/runs.h"
+#include "app/files/checked_file.h"
+#include "app/files/text_file.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+constexpr std::size_t kEnoughViews = 40;  // of a live camera without a window
+
+// Looks for the board in one picture after the other and keeps the views that are new.
+class ViewCollector {
+ public:
+  ViewCollector(const CalibrateOptions& options, const BoardSpec& board, FrameSource* source)
+      : options_(options), detector_(board), source_(source) {}
+
+  void Run(Progress* progress) {
+    engine::Frame frame;
+    while (!Interruption::requested() && source_->Next(&frame)) {
+      if (frame.picture.empty()) {
+        shown_.message = source_->trouble();
+        if (!Present()) return;
+        continue;
+      }
+      shown_.picture = frame.picture;
+      CheckSize();
+      progress->Update(++pictures_);
+      const BoardView before = std::exchange(
+          shown_.now, detector_.Detect(shown_.picture, options_.headless || !source_->info().live));
+      if (!shown_.now.pixels.empty() && IsStill(before) && IsNewView(shown_.now, shown_.kept, size_.width))
+        Keep();
+      shown_.message = Message();
+      if (!Present()) return;
+      if (source_->info().live && options_.headless && shown_.kept.size() >= kEnoughViews) return;
+    }
+  }
+
+  const std::vector<BoardView>& views() const { return shown_.kept; }
+  cv::Size size() const { return size_; }
+  std::uint64_t pictures() const { return pictures_; }
+
+ private:
+  void CheckSize() {
+    if (!coverage_) {
+      size_ = shown_.picture.size();
+      coverage_.emplace(size_.width, size_.height);
+    }
+    if (shown_.picture.size() == size_) return;
+    throw Error("The pictures of '" + source_->info().name +
+                "' are not all of one size; a calibration is for one.");
+  }
+  // A live board must be held still for a moment: motion blurs its corners, and a rolling shutter bends them.
+  // Recorded pictures are taken as they are.
+  bool IsStill(const BoardView& before) const {
+    constexpr double kOfWidth = 0.003;
+    return !source_->info().live || Movement(before, shown_.now) < kOfWidth * size_.width;
+  }
+  void Keep() {
+    shown_.kept.push_back(shown_.now);
+    coverage_->Add(shown_.now);
+    constexpr std::size_t kEvery = 4, kFewest = 8;
+    if (options_.headless || shown_.kept.size() < kFewest || shown_.kept.size() % kEvery != 0) return;
+    solution_ = SolveLens(options_.lens.value_or(engine::LensModel::kKannalaBrandt), size_.width,
+                          size_.height, shown_.kept);
+    shown_.residuals.clear();
+    if (solution_) shown_.residuals = Residuals(*solution_, shown_.kept);
+  }
+  std::string Message() const {
+    std::string text = std::to_string(shown_.kept.size()) + " views";
+    if (solution_) text += ", " + FormatNumber(solution_->rms_px, 2) + " px off so far";
+    if (shown_.now.pixels.empty()) return text + "; show the board";
+    const std::string advice = coverage_->Advice();
+    if (!advice.empty()) return text + "; " + advice;
+    constexpr double kWellKnown = 0.001;
+    if (!solution_ || solution_->FocalSigma() > kWellKnown) return text + "; tilt the board to every side";
+    return text + "; that is enough, press enter";
+  }
+  bool Present() {
+    if (options_.headless || shown_.picture.empty()) return true;
+    if (!window_) window_.emplace(size_.width, size_.height);
+    return window_->Show(shown_, *coverage_);
+  }
+
+  const CalibrateOptions& options_;
+  const BoardDetector detector_;
+  FrameSource* const source_;
+  std::optional<CalibrationWindow> window_;
+  std::optional<Coverage> coverage_;
+  CalibrationWindow::Shown shown_;
+  std::optional<LensSolution> solution_;
+  cv::Size size_;
+  std::uint64_t pictures_ = 0;
+};
+
+}  // namespace
+
+void RunCalibrate(const CalibrateOptions& options, Verbosity verbosity) {
+  const BoardSpec board = ParseBoard(options.board);
+  if (options.print) {
+    PrintBoard(board, *options.print);
+    if (verbosity != Verbosity::kQuiet) {
+      std::printf("%s is in %s; print it at its true size.\n", FormatBoard(board).c_str(),
+                  options.print->c_str());
+    }
+  }
+  if (options.source.empty()) return;
+  const Interruption interruption;
+  CameraOptions camera = options.camera;
+  camera.reconnect = !options.headless;
+  const auto source = OpenCamera(options.source, camera);
+  ViewCollector collector(options, board, source.get());
+  {
+    Progress progress(source->info().name, source->info().frame_count, verbosity);
+    collector.Run(&progress);
+  }
+  CalibrationOptions calibration_options;
+  calibration_options.lens = options.lens;
+  const Calibration calibration =
+      Calibrate(collector.views(), collector.size().width, collector.size().height, calibration_options);
+  CheckedFile file(options.output);
+  file.Write(FormatCalibration(calibration, board));
+  file.Close();
+  if (verbosity == Verbosity::kQuiet) return;
+  std::printf("%zu of %zu views from %llu pictures, %.3f px\n%s\n", calibration.views_used,
+              calibration.views_found, static_cast<unsigned long long>(collector.pictures()),
+              calibration.rms_px, calibration.verdict.c_str());
+}
+
+}  // namespace docent::app

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two cameras, a mapper, and people who pull plugs: sessions begin and end, cameras leave and come back, in
+// an order that a seed decides. Meant for ThreadSanitizer, which needs many orders: DOCENT_STRESS_MINUTES
+// says how long; without it a few sessions are enough.
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <thread>
+
+#include "app/session/frame_loop.h"
+#include "app/session/session.h"
+#include "app/simulator/simulation.h"
+#include "engine/base/random.h"
+
+namespace docent::app {
+namespace {
+
+using engine::CameraModel;
+using engine::LensModel;
+
+// Pictures of a walk, painted once and used by every session.
+struct Film {
+  CameraModel camera;
+  std::vector<cv::Mat> pictures;
+};
+
+Film Shoot(const std::string& scene, const CameraModel& camera) {
+  SimulationOptions options;
+  options.camera = camera;
+  options.frame_rate_hz = 15;
+  options.duration_s = 4;
+  const auto simulation = MakeSimulation(scene, options);
+  Film film{camera, {}};
+  for (int i = 0; i < simulation->frame_count(); ++i) simulation->Render(i, &film.pictures.emplace_back());
+  return film;
+}
+
+// A device that somebody unplugs now and then: for a while it has no pictures and says why, then it is back.
+class ShakySource : public FrameSource {
+ public:
+  ShakySource(const Film* film, std::uint64_t seed, int pictures)
+      : film_(film), random_(seed), pictures_(pictures) {
+    info_.name = "shaky";
+    info_.live = true;
+    info_.nominal_fps = 15;
+    info_.known_camera = film->camera;
+  }
+
+  bool Next(engine::Frame* frame) override {
+    if (index_ >= static_cast<std::uint64_t>(pictures_)) return false;
+    ++tick_;
+    frame->time = FromSeconds(tick_ / 15.0);
+    if (away_ == 0 && random_.Uniform(0, 1) < 0.03) away_ = 1 + static_cast<int>(random_.Uniform(0, 12));
+    if (away_ > 0) {
+      --away_;
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+      return true;
+    }
+    if (random_.Uniform(0, 1) < 0.05) index_ += 2;  // the driver had no buffer
+    // Forth and back through the film.
+    const std::uint64_t length = film_->pictures.size(), turn = index_ % (2 * length);
+    frame->picture = film_->pictures[turn < length ? turn : 2 * length - 1 - turn];
+    frame->index = index_++;
+    return true;
+  }
+  std::string trouble() const override { return away_ > 0 ? "The camera is unplugged." : ""; }
+
+ private:
+  const Film* const film_;
+  Random random_;
+  const int pictures_;
+  std::uint64_t index_ = 0;
+  int tick_ = 0, away_ = 0;
+};
+
+struct Tally {
+  std::atomic<int> frames = 0, posed = 0, troubles = 0;
+};
+
+void RunOneSession(const Film films[2], Random* random, Tally* tally) {
+  CalibratedCamera cameras[2];
+  const int pictures = 20 + static_cast<int>(random->Uniform(0, 100));
+  for (int i = 0; i < 2; ++i) {
+    cameras[i] =
+        Calibrate(std::make_unique<ShakySource>(&films[i], random->Next(), pictures + 10 * i), std::nullopt);
+  }
+  SessionOptions options;
+  options.tracker.hybrid = random->Uniform(0, 1) < 0.5;
+  options.first_map = "table";
+  options.seed = random->Next();
+  Session session(options, {cameras[0].model, cameras[1].model}, nullptr);
+  std::stop_source stop;
+  const int stop_after = random->Uniform(0, 1) < 0.4 ? static_cast<int>(random->Uniform(1, pictures)) : -1;
+  CommandInbox inbox;
+  std::vector<CameraRun> runs(2);
+  std::atomic<int> shown = 0;
+  for (int i = 0; i < 2; ++i) {
+    runs[i].camera = &cameras[i];
+    runs[i].options.camera = i;
+    runs[i].options.pace = Pace::kRealtime;
+    if (i == 0) runs[i].options.inbox = &inbox;
+    runs[i].options.trouble = [tally](const std::string&, Timestamp) { ++tally->troubles; };
+    runs[i].options.refused = [](const std::string&) {};
+    runs[i].shown = [&, tally](const engine::TrackedFrame& frame) {
+      ++tally->frames;
+      tally->posed += engine::HasPose(frame.state);
+      if (++shown == stop_after) stop.request_stop();
+    };
+  }
+  // Somebody looks on, as a window's thread does, and starts a new map in between.
+  const int new_map_at = static_cast<int>(random->Uniform(5, 150));
+  std::jthread watcher([&](const std::stop_token& done) {
+    bool asked = false;
+    while (!done.stop_requested()) {
+      session.Maps();
+      session.MapNames();
+      session.Rig();
+      session.MappingTimes();
+      session.TakeEvents();
+      if (!asked && shown > new_map_at) {
+        inbox.Push({NewMap{"other"}, nullptr});
+        asked = true;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  });
+  RunCameras(runs, &session, stop.get_token());
+  watcher.request_stop();
+  watcher.join();
+  if (random->Uniform(0, 1) < 0.7) session.Finish();  // otherwise its end does
+}
+
+TEST(WearableStress, EndsWheneverCamerasLeaveOrComeBack) {
+  const Film films[2] = {
+      Shoot("hand",
+            {LensModel::kRadialTangential, {320, 240, 179, 179.2, 159.1, 120.05}, {-0.18, 0.03, 0, 0, 0}}),
+      Shoot("shoulder", {LensModel::kFov, {320, 240, 182.15, 182.15, 160.35, 118.9}, {0.95, 0, 0, 0, 0}})};
+  const char* const minutes = std::getenv("DOCENT_STRESS_MINUTES");
+  const auto until = std::chrono::steady_clock::now() +
+                     std::chrono::seconds(minutes ? static_cast<long>(60 * std::atof(minutes)) : 0);
+  constexpr int kFewSessions = 6;
+  Random random(2026);
+  Tally tally;
+  int sessions = 0;
+  while (sessions < kFewSessions || std::chrono::steady_clock::now() < until) {
+    RunOneSession(films, &random, &tally);
+    ++sessions;
+  }
+  RecordProperty("sessions", sessions);
+  RecordProperty("frames", tally.frames.load());
+  RecordProperty("posed", tally.posed.load());
+  RecordProperty("troubles", tally.troubles.load());
+  EXPECT_GT(tally.frames, 10 * sessions);
+  EXPECT_GT(tally.posed, 0);
+  EXPECT_GT(tally.troubles, 0);
+}
+
+}  // namespace
+}  // namespace docent::app

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "app/calibration/board.h"
+#include "engine/base/random.h"
+#include "engine/geometry/camera_model.h"
+#include "engine/geometry/rigid3.h"
+
+// Pictures of calibration boards whose every corner is known from mathematics.
+namespace docent::app {
+
+// Ways of holding a board before the camera: all over the picture, near and far, tilted every way.
+inline std::vector<engine::Rigid3> BoardPoses(const BoardSpec& board, const engine::CameraModel& camera,
+                                              int count) {
+  Random random(11);
+  std::vector<engine::Rigid3> poses;
+  const Eigen::Vector2d size = board.square_m * Eigen::Vector2d(board.columns - 1, board.rows - 1);
+  const Eigen::Vector3d middle(size.x() / 2, size.y() / 2, 0);
+  while (static_cast<int>(poses.size()) < count) {
+    const double turn = random.Uniform(0, 2 * std::numbers::pi), tilt = random.Uniform(0.2, 0.75);
+    const engine::Rotation3 rotation =
+        engine::Rotation3::Exp({tilt * std::cos(turn), tilt * std::sin(turn), 0}) *
+        engine::Rotation3::Exp({0, 0, random.Uniform(-0.5, 0.5)});
+    const Eigen::Vector2d pixel(random.Uniform(0.2, 0.8) * 639, random.Uniform(0.2, 0.8) * 479);
+    const Eigen::Vector3d place = random.Uniform(0.28, 0.5) * *camera.Unproject(pixel);
+    const engine::Rigid3 pose(rotation, place - rotation * middle);
+    bool inside = true;
+    for (const double x : {-board.square_m, size.x() + board.square_m}) {
+      for (const double y : {-board.square_m, size.y() + board.square_m}) {
+        const auto corner = camera.Project(pose * Eigen::Vector3d(x, y, 0));
+        inside = inside && corner && camera.IsInside(*corner, 6);
+      }
+    }
+    if (inside) poses.push_back(pose);
+  }
+  return poses;
+}
+
+// A camera before a board, as exactly as rays can say: every pixel is the mean of sixteen rays through the
+// lens to the sheet, then softened as by a lens, with a little noise.
+class BoardCamera {
+ public:
+  BoardCamera(const BoardSpec& board, const engine::CameraModel& camera)
+      : board_(board), size_(camera.width_px(), camera.height_px()), sheet_(PaintBoard(board, kTexels)) {
+    // One ray a pixel's corner; within a pixel they are linear to a thousandth of it.
+    for (int y = 0; y <= size_.height; ++y) {
+      for (int x = 0; x <= size_.width; ++x) {
+        const auto ray = camera.Unproject({x - 0.5, y - 0.5});
+        rays_.push_back(ray.value_or(Eigen::Vector3d::Zero()).cast<float>());
+      }
+    }
+  }
+
+  cv::Mat Picture(const engine::Rigid3& camera_from_board, Random* random) const {
+    // The inverse of the plane's homography takes a ray to where it meets the sheet.
+    Eigen::Matrix3d plane = camera_from_board.rotation.matrix();
+    plane.col(2) = camera_from_board.translation;
+    const Eigen::Matrix3f meets = plane.inverse().cast<float>();
+    // The sheet's border is one square; a checkerboard's frame begins one square inside of the sheet.
+    const float before = board_.kind == BoardSpec::Kind::kCharuco ? 1 : 2;
+    const auto scale = static_cast<float>(1 / board_.square_m);
+    cv::Mat fine(size_ * kFiner, CV_8UC1);
+    for (int y = 0; y < fine.rows; ++y) {
+      for (int x = 0; x < fine.cols; ++x) {
+        const Eigen::Vector3f hit = meets * Ray(x, y);
+        uchar brightness = 120;
+        if (hit.z() > 0) {
+          const float u = (hit.x() / hit.z() * scale + before) * kTexels;
+          const float v = (hit.y() / hit.z() * scale + before) * kTexels;
+          if (u >= 0 && v >= 0 && u < sheet_.cols && v < sheet_.rows)
+            brightness = sheet_.at<uchar>(static_cast<int>(v), static_cast<int>(u)) > 127 ? 210 : 30;
+        }
+        fine.at<uchar>(y, x) = brightness;
+      }
+    }
+    cv::Mat exact, picture;
+    cv::resize(fine, exact, size_, 0, 0, cv::INTER_AREA);
+    exact.convertTo(exact, CV_32F);
+    cv::GaussianBlur(exact, exact, {}, 0.6);
+    for (int i = 0; i < size_.area(); ++i) exact.at<float>(i) += static_cast<float>(random->Uniform(-3, 3));
+    exact.convertTo(picture, CV_8U);
+    return picture;
+  }
+
+ private:
+  static constexpr int kFiner = 4, kTexels = 200;
+
+  Eigen::Vector3f Ray(int x, int y) const {
+    const float u = (static_cast<float>(x % kFiner) + 0.5f) / kFiner;
+    const float v = (static_cast<float>(y % kFiner) + 0.5f) / kFiner;
+    const Eigen::Vector3f* upper =
+        &rays_[static_cast<std::size_t>(y / kFiner) * (size_.width + 1) + x / kFiner];
+    const Eigen::Vector3f* lower = upper + size_.width + 1;
+    return (1 - v) * ((1 - u) * upper[0] + u * upper[1]) + v * ((1 - u) * lower[0] + u * lower[1]);
+  }
+
+  BoardSpec board_;
+  cv::Size size_;
+  cv::Mat sheet_;
+  std::vector<Eigen::Vector3f> rays_;
+};
+
+}  // namespace docent::app
