@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "app/command_line/maps_exchange_command.h"
 #include "app/command_line/program.h"
 #include "engine/base/error.h"
 #include "maps/library.h"
@@ -167,6 +168,7 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
       ->add_option("POLICY", options->policy, "open, bounded, augment-only or read-only")
       ->required()
       ->check(CLI::IsMember({"open", "bounded", "augment-only", "read-only"}));
+  AddMapsExchangeCommands(group, invocation);
 }
 
 }  // namespace docent::app

@@ -91,6 +91,8 @@ TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
       {"maps", "rename"},
       {"maps", "remove"},
       {"maps", "policy"},
+      {"maps", "export"},
+      {"maps", "import"},
       {"content"},
       {"content", "list"},
       {"content", "remove"},
@@ -191,6 +193,27 @@ TEST(CommandLine, CaresForAnEmptyLibrary) {
   ExpectComplaint({"maps", "remove", "Desk", "--library", path}, 1, "Desk");
   ExpectComplaint({"maps", "policy", "Desk", "read-only", "--library", path}, 1, "Desk");
   ExpectComplaint({"content", "remove", "sign-1", "--map", "Desk", "--library", path}, 1, "Desk");
+}
+
+TEST(CommandLine, SendsAMapToAnotherLibraryAndToOtherPrograms) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "museum.docent").string(), other = (folder / "desk.docent").string();
+  {
+    maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    library.Save({library.NewKey(), "Desk", maps::Policy::kOpen, nullptr, nullptr});
+  }
+  EXPECT_EQ(RunDocent({"maps", "export", "Desk", "--library", path, "--output", other}).exit_status, 0);
+  EXPECT_THAT(RunDocent({"maps", "import", other, "--library", path}).output, HasSubstr("Desk (2)"));
+  EXPECT_EQ(maps::Library::Open(path, maps::Access::kReadOnly).List().size(), 2u);
+  for (const char* name : {"desk.ply", "desk.png", "colmap"}) {
+    const std::string output = (folder / name).string();
+    EXPECT_EQ(RunDocent({"maps", "export", "Desk", "--library", path, "--output", output}).exit_status, 0);
+    EXPECT_TRUE(std::filesystem::exists(output));
+    ExpectComplaint({"maps", "export", "Desk", "--library", path, "--output", output}, 1, "exists already");
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder / "colmap/points3D.txt"));
+  ExpectComplaint({"maps", "export", "Desk", "--library", path, "--output", (folder / "a.obj").string()}, 1,
+                  "no kind of export");
 }
 
 }  // namespace
