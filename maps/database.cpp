@@ -24,7 +24,8 @@ std::string Reason(sqlite3* connection, int result) {
     case SQLITE_NOTADB:
       return "is not a library of maps (it is no SQLite file)";
     case SQLITE_CORRUPT:
-      return "is damaged (" + std::string(sqlite3_errmsg(connection)) + "); use a copy of it that is whole";
+      return "is damaged (" + std::string(sqlite3_errmsg(connection)) +
+             "); docent maps recover saves what it still holds";
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return "is being written by another program; try again when that has ended";
@@ -241,6 +242,15 @@ void Database::ConnectReadOnly() {
 Database Database::OpenReadOnly(const fs::path& path) {
   Database database(path.string(), true);
   database.ConnectReadOnly();
+  return database;
+}
+
+Database Database::OpenDamaged(const fs::path& path) {
+  Database database = OpenReadOnly(path);
+  // With its schema open to change, SQLite bears a file that is shorter than it says (the connection cannot
+  // write all the same).
+  sqlite3_db_config(database.connection_.get(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
+  sqlite3_db_config(database.connection_.get(), SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
   return database;
 }
 

@@ -108,14 +108,6 @@ MapInfo CheckedMapFromRow(const Database& database, const Statement& row) {
   }
 }
 
-Bytes ReadPart(const Database& database, std::uint64_t key, std::string_view part) {
-  Statement query = database.Prepare("SELECT data FROM parts WHERE map_key = ? AND part = ?");
-  query.Bind(1, Signed(key)).Bind(2, part);
-  if (!query.Step()) throw Error("its part '" + std::string(part) + "' is missing");
-  const std::span<const std::uint8_t> bytes = query.Blob(0);
-  return {bytes.begin(), bytes.end()};
-}
-
 void WritePart(const Database& database, std::uint64_t key, std::string_view part, const Bytes& bytes) {
   database.Prepare("INSERT OR REPLACE INTO parts (map_key, part, data) VALUES (?, ?, ?)")
       .Bind(1, Signed(key))
@@ -125,6 +117,14 @@ void WritePart(const Database& database, std::uint64_t key, std::string_view par
 }
 
 }  // namespace
+
+Bytes ReadPart(const Database& database, std::uint64_t key, std::string_view part) {
+  Statement query = database.Prepare("SELECT data FROM parts WHERE map_key = ? AND part = ?");
+  query.Bind(1, Signed(key)).Bind(2, part);
+  if (!query.Step()) throw Error("its part '" + std::string(part) + "' is missing");
+  const std::span<const std::uint8_t> bytes = query.Blob(0);
+  return {bytes.begin(), bytes.end()};
+}
 
 LibraryRow ReadLibraryRow(const Database& database) {
   Statement query = database.Prepare("SELECT next_key, map_count, checksum FROM library WHERE id = 1");

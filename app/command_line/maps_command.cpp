@@ -113,7 +113,8 @@ void Verify(const MapsOptions& options) {
   }
   for (const std::string& problem : problems) std::printf("%s\n", problem.c_str());
   throw Error("'" + library.file() + "' is damaged: " + std::to_string(problems.size()) +
-              (problems.size() == 1 ? " problem." : " problems."));
+              (problems.size() == 1 ? " problem" : " problems") +
+              "; docent maps recover saves what it still holds.");
 }
 
 void Rename(const MapsOptions& options) {

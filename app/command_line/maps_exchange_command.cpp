@@ -12,6 +12,7 @@
 #include "engine/base/error.h"
 #include "maps/colmap_model.h"
 #include "maps/exchange.h"
+#include "maps/recovery.h"
 #include "maps/view_from_above.h"
 
 namespace docent::app {
@@ -104,6 +105,14 @@ void Import(const ExchangeOptions& options, Verbosity verbosity) {
   }
 }
 
+void Recover(const ExchangeOptions& options, Verbosity verbosity) {
+  const maps::Recovery recovery = maps::Recover(options.library, options.output);
+  if (verbosity == Verbosity::kQuiet) return;
+  for (const std::string& problem : recovery.problems) std::printf("lost: %s\n", problem.c_str());
+  std::printf("%zu maps whole and %zu in part, written to %s\n", recovery.maps_whole, recovery.maps_in_part,
+              options.output.c_str());
+}
+
 }  // namespace
 
 void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
@@ -127,6 +136,10 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
   add("import", "Add the maps of another library; names that are taken get a number",
       "docent maps import desk.docent --library museum.docent", Import)
       ->add_option("FILE", options->from, "The other library")
+      ->required();
+  add("recover", "Save what a damaged library still holds into a new one",
+      "docent maps recover --library damaged.docent --output saved.docent", Recover)
+      ->add_option("--output", options->output, "The new library")
       ->required();
 }
 

@@ -93,6 +93,7 @@ TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
       {"maps", "policy"},
       {"maps", "export"},
       {"maps", "import"},
+      {"maps", "recover"},
       {"content"},
       {"content", "list"},
       {"content", "remove"},
@@ -195,7 +196,7 @@ TEST(CommandLine, CaresForAnEmptyLibrary) {
   ExpectComplaint({"content", "remove", "sign-1", "--map", "Desk", "--library", path}, 1, "Desk");
 }
 
-TEST(CommandLine, SendsAMapToAnotherLibraryAndToOtherPrograms) {
+TEST(CommandLine, SendsAMapToAnotherLibraryAndSavesWhatADamagedOneHolds) {
   const TemporaryFolder folder;
   const std::string path = (folder / "museum.docent").string(), other = (folder / "desk.docent").string();
   {
@@ -214,6 +215,10 @@ TEST(CommandLine, SendsAMapToAnotherLibraryAndToOtherPrograms) {
   EXPECT_TRUE(std::filesystem::exists(folder / "colmap/points3D.txt"));
   ExpectComplaint({"maps", "export", "Desk", "--library", path, "--output", (folder / "a.obj").string()}, 1,
                   "no kind of export");
+  const std::string saved = (folder / "saved.docent").string();
+  EXPECT_THAT(RunDocent({"maps", "recover", "--library", path, "--output", saved}).output,
+              HasSubstr("2 maps whole and 0 in part"));
+  ExpectComplaint({"maps", "recover", "--library", path, "--output", saved}, 1, "exists already");
 }
 
 }  // namespace
