@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 
 #include <array>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -18,6 +19,21 @@ namespace fs = std::filesystem;
 constexpr int kBusyTimeoutMs = 5000;       // another process's transaction takes milliseconds
 constexpr int kCloseTimeoutMs = 200;       // tidying up is not worth a wait
 constexpr int kMaxValueBytes = 512 << 20;  // of one blob or text
+
+// What the system said to the last call that failed, where SQLite still knows; " (File too large)".
+std::string SystemReason(sqlite3* connection) {
+  if (!connection) return "";
+  int number = sqlite3_system_errno(connection);
+  // A commit leaves it with the file alone.
+  for (const int which : {SQLITE_FCNTL_JOURNAL_POINTER, SQLITE_FCNTL_FILE_POINTER}) {
+    sqlite3_file* file = nullptr;
+    if (number == 0 && sqlite3_file_control(connection, "main", which, &file) == SQLITE_OK && file &&
+        file->pMethods) {
+      file->pMethods->xFileControl(file, SQLITE_FCNTL_LAST_ERRNO, &number);
+    }
+  }
+  return number == 0 ? "" : " (" + std::string(std::strerror(number)) + ")";
+}
 
 std::string Reason(sqlite3* connection, int result) {
   switch (result & 0xFF) {
@@ -39,6 +55,8 @@ std::string Reason(sqlite3* connection, int result) {
       return "cannot be saved because the disk is full";
     case SQLITE_CANTOPEN:
       return "cannot be opened";
+    case SQLITE_IOERR:
+      return "cannot be read or written" + SystemReason(connection);
     case SQLITE_TOOBIG:
       return "cannot hold a picture, model or table above " + std::to_string(kMaxValueBytes >> 20) + " MiB";
     default:

@@ -20,6 +20,8 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
   command->add_option("--script", options->script, "Carry out the commands of this file")->type_name("FILE");
   command->add_option("--record-script", options->record_script, "Write what is done as a script")
       ->type_name("FILE");
+  AddSecondsOption(command, "--autosave", &options->autosave_interval,
+                   "Save so often; 0: only when a map is left and at the end (default 10)");
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
     invocation->run = [=] { run(*options, invocation->verbosity); };

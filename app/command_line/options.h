@@ -51,6 +51,7 @@ struct AuthorOptions {
   RunArguments run;
   std::filesystem::path library;
   std::optional<std::filesystem::path> script, record_script;
+  Timestamp autosave_interval = std::chrono::seconds(10);  // 0: at each change of map alone
 };
 
 struct TourOptions {

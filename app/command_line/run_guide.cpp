@@ -105,6 +105,7 @@ class GuideRun {
     options.threaded = request.pace != Pace::kLockstep;
     options.may_write = request.may_write;
     options.seed = request.seed;
+    options.autosave_interval = request.autosave_interval;
     options.memory.budget_bytes = request.memory_budget_bytes;
     options.memory.wait_for_maps = request.pace != Pace::kRealtime;
     return options;
