@@ -85,7 +85,7 @@ class Salvage {
 
   std::shared_ptr<const engine::MapSnapshot> ReadMap(std::uint64_t key, const std::string& where) {
     MapParts parts;
-    const CameraTable cameras = DecodeCameras(key, ReadPart(database_, key, "cameras"));
+    const CameraTable cameras = ReadCameras(database_, key);
     parts.keyframes = DecodeKeyFrames(key, ReadPart(database_, key, "keyframes"), cameras);
     parts.points = DecodePoints(key, ReadPart(database_, key, "points"));
     parts.observations = DecodeObservations(key, ReadPart(database_, key, "observations"));
