@@ -3,16 +3,23 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
+#include <stop_token>
+#include <thread>
 
+#include "app/command_line/interruption.h"
+#include "app/command_line/progress.h"
 #include "app/files/checked_file.h"
 #include "app/session/surface_at_pixel.h"
 #include "engine/base/error.h"
+#include "engine/base/worker.h"
 #include "maps/colmap_model.h"
 #include "maps/exchange.h"
 #include "maps/recovery.h"
+#include "maps/upkeep.h"
 #include "maps/view_from_above.h"
 
 namespace docent::app {
@@ -105,6 +112,63 @@ void Import(const ExchangeOptions& options, Verbosity verbosity) {
   }
 }
 
+const char* Say(maps::Optimization::Outcome outcome) {
+  using Outcome = maps::Optimization::Outcome;
+  switch (outcome) {
+    case Outcome::kImproved:
+      return "improved";
+    case Outcome::kAlreadyBest:
+      return "was at its best";
+    case Outcome::kNotAllowed:
+      return "left alone, as its policy says";
+    case Outcome::kTooSmall:
+      return "too small to adjust";
+    case Outcome::kInterrupted:
+      return "interrupted, left as it was";
+    case Outcome::kChangedMeanwhile:
+      return "was changed by another program meanwhile, left as it is";
+    case Outcome::kFailed:
+      return "cannot be adjusted, left as it was";
+  }
+  return "";
+}
+
+void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
+  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
+  std::vector<maps::MapInfo> infos = library.List();
+  if (!options.name.empty()) infos = {library.FindByName(options.name)};
+  const Interruption interruption;
+  std::atomic<bool> interrupt = false;
+  // A signal cannot reach into an adjustment by itself.
+  Worker watch("interruption", [&](const std::stop_token& stop) {
+    while (!stop.stop_requested() && !interrupt) {
+      interrupt = Interruption::requested();
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  });
+  std::optional<Progress> progress;
+  progress.emplace("maps", infos.size(), verbosity);
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < infos.size() && !Interruption::requested(); ++i) {
+    const maps::Optimization result = maps::OptimizeMap(&library, infos[i].key, &interrupt);
+    char numbers[200] = "";
+    if (result.outcome == maps::Optimization::Outcome::kImproved) {
+      std::snprintf(
+          numbers, sizeof numbers,
+          ": %.3f px before, %.3f px after; %zu observations found and %zu thrown out, %zu points removed",
+          result.rms_before_px, result.rms_after_px, result.observations_added, result.observations_removed,
+          result.points_removed);
+    }
+    lines.push_back(infos[i].name + " " + Say(result.outcome) + numbers);
+    progress->Update(i + 1);
+  }
+  progress.reset();  // wipes its line away
+  if (verbosity != Verbosity::kQuiet) {
+    for (const std::string& line : lines) std::printf("%s\n", line.c_str());
+  }
+  if (Interruption::requested()) throw Error("interrupted; what was adjusted before is saved");
+}
+
 void Recover(const ExchangeOptions& options, Verbosity verbosity) {
   const maps::Recovery recovery = maps::Recover(options.library, options.output);
   if (verbosity == Verbosity::kQuiet) return;
@@ -137,6 +201,9 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
       "docent maps import desk.docent --library museum.docent", Import)
       ->add_option("FILE", options->from, "The other library")
       ->required();
+  add("optimize", "Adjust whole maps and save what became better",
+      "docent maps optimize --library museum.docent", Optimize)
+      ->add_option("NAME", options->name, "Name of the map; all when it is left out");
   add("recover", "Save what a damaged library still holds into a new one",
       "docent maps recover --library damaged.docent --output saved.docent", Recover)
       ->add_option("--output", options->output, "The new library")

@@ -93,6 +93,7 @@ TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
       {"maps", "policy"},
       {"maps", "export"},
       {"maps", "import"},
+      {"maps", "optimize"},
       {"maps", "recover"},
       {"content"},
       {"content", "list"},
@@ -206,6 +207,8 @@ TEST(CommandLine, SendsAMapToAnotherLibraryAndSavesWhatADamagedOneHolds) {
   EXPECT_EQ(RunDocent({"maps", "export", "Desk", "--library", path, "--output", other}).exit_status, 0);
   EXPECT_THAT(RunDocent({"maps", "import", other, "--library", path}).output, HasSubstr("Desk (2)"));
   EXPECT_EQ(maps::Library::Open(path, maps::Access::kReadOnly).List().size(), 2u);
+  EXPECT_THAT(RunDocent({"maps", "optimize", "--library", path}).output,
+              HasSubstr("Desk too small to adjust"));
   for (const char* name : {"desk.ply", "desk.png", "colmap"}) {
     const std::string output = (folder / name).string();
     EXPECT_EQ(RunDocent({"maps", "export", "Desk", "--library", path, "--output", output}).exit_status, 0);
