@@ -15,18 +15,6 @@ namespace {
 const cv::Scalar kPaper(250, 250, 250), kInk(60, 60, 60), kCameraColor(200, 90, 30), kFirstColor(40, 40, 210),
     kTurnedColor(90, 160, 40);
 
-// Two directions across `up`, so that the first keyframe looks up the sheet.
-Eigen::Matrix<double, 2, 3> SheetFromMap(const engine::MapSnapshot& map, const Eigen::Vector3d& up) {
-  Eigen::Vector3d ahead = map.keyframes.front().camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
-  ahead -= ahead.dot(up) * up;
-  if (ahead.norm() < 1e-3) ahead = up.unitOrthogonal();
-  ahead.normalize();
-  Eigen::Matrix<double, 2, 3> sheet_from_map;
-  sheet_from_map.row(0) = ahead.cross(up);  // to the right of who looks ahead
-  sheet_from_map.row(1) = -ahead;           // down the sheet
-  return sheet_from_map;
-}
-
 // The part of the sheet that holds all keyframes and all but the outermost points.
 Eigen::AlignedBox2d Extent(const std::vector<Eigen::Vector2d>& cameras,
                            const std::vector<Eigen::Vector2d>& points, double ignored_part) {
@@ -62,6 +50,17 @@ void DrawScaleBar(double pixels_a_metre, int margin_px, cv::Mat* sheet) {
 }
 
 }  // namespace
+
+Eigen::Matrix<double, 2, 3> SheetFromMap(const engine::MapSnapshot& map, const Eigen::Vector3d& up) {
+  Eigen::Vector3d ahead = map.keyframes.front().camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
+  ahead -= ahead.dot(up) * up;
+  if (ahead.norm() < 1e-3) ahead = up.unitOrthogonal();
+  ahead.normalize();
+  Eigen::Matrix<double, 2, 3> sheet_from_map;
+  sheet_from_map.row(0) = ahead.cross(up);  // to the right of who looks ahead
+  sheet_from_map.row(1) = -ahead;           // down the sheet
+  return sheet_from_map;
+}
 
 cv::Mat DrawFromAbove(const engine::MapSnapshot& map, const Eigen::Vector3d& up,
                       const ViewFromAboveOptions& options) {

@@ -18,6 +18,7 @@ struct Overlay {
   bool keyframes = false;  // keyframes of the map as small frusta
   bool hud = true;         // state, map name, hint; the lost indicator while there is no pose
   std::string map_name;    // empty when there is none
+  std::string mapping;     // how far the map here has come, in a word; empty when nobody builds it
   std::string message;     // one sentence at the bottom, empty for none
 };
 

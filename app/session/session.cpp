@@ -219,9 +219,16 @@ void Session::Discard(std::uint64_t key, Timestamp time, const std::string& reas
 
 Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   const std::scoped_lock lock(mutex_);
+  Shown shown;
+  if (options_.may_write) {
+    const bool grows = growing_key_ != 0 && growing_key_ == frame.map_key;
+    shown.mapping = MappingStatusOf(frame, grows);
+  }
   const auto found = maps_.find(frame.map_key);
-  if (found == maps_.end()) return {};
-  return {found->second.name, found->second.scene};
+  if (found == maps_.end()) return shown;
+  shown.map_name = found->second.name;
+  shown.scene = found->second.scene;
+  return shown;
 }
 
 std::vector<std::string> Session::MapNames() const {

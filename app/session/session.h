@@ -15,6 +15,7 @@
 #include "app/output/run_output.h"
 #include "app/script/commands.h"
 #include "app/session/library_scene.h"
+#include "app/session/mapping_status.h"
 #include "app/session/mapping_thread.h"
 #include "app/session/session_map.h"
 #include "engine/tracking/tracker.h"
@@ -81,10 +82,12 @@ class Session {
   // frame waits for it. Throws Error.
   void Preload(const Command& command, const std::filesystem::path& model_folder);
 
-  // What is shown with a frame: the name of its map, and what stands in it. Scene null when there is none.
+  // What is shown with a frame: the name of its map, how far that has come, and what stands in it. Scene null
+  // when there is none.
   struct Shown {
     std::string map_name;
     std::shared_ptr<const content::Scene> scene;
+    std::optional<MappingStatus> mapping;  // where the session may write
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
   std::vector<std::string> MapNames() const;
