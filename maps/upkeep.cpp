@@ -80,7 +80,7 @@ Change Adjust(const std::atomic<bool>* interrupt, engine::Map* map) {
   const bool same_observations =
       static_cast<std::size_t>(outliers) == change.found && points == map->AlivePoints();
   change.outcome =
-      same_observations && gained <= kWorthwhile * cost ? Outcome::kAlreadyBest : Outcome::kImproved;
+      same_observations && gained <= kWorthwhile * cost ? Outcome::kAlreadyBest : Outcome::kAdjusted;
   return change;
 }
 
@@ -100,7 +100,7 @@ Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<
   }
   engine::Map map(*stored.snapshot);
   const Change change = Adjust(interrupt, &map);
-  if (change.outcome != Outcome::kImproved) {
+  if (change.outcome != Outcome::kAdjusted) {
     result.outcome = change.outcome;
     return result;
   }
@@ -110,7 +110,7 @@ Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<
   }
   const auto adjusted = map.Snapshot();
   const std::size_t before = stored.snapshot->observations.size(), after = adjusted->observations.size();
-  result.outcome = Outcome::kImproved;
+  result.outcome = Outcome::kAdjusted;
   result.rms_before_px = ReprojectionRms(*stored.snapshot, *adjusted);
   result.rms_after_px = ReprojectionRms(*adjusted, *stored.snapshot);
   result.points_removed = stored.snapshot->points.size() - adjusted->points.size();

@@ -12,7 +12,7 @@ namespace docent::maps {
 // What became of a map that rests (ptamm §3.1: the map maker visits maps that nobody is in).
 struct Optimization {
   enum class Outcome {
-    kImproved,
+    kAdjusted,
     kAlreadyBest,
     kNotAllowed,
     kTooSmall,
@@ -28,7 +28,7 @@ struct Optimization {
 };
 
 // Adjusts all keyframes and points of a map together, looks for its points in the keyframes that should see
-// them and do not, adjusts again, and saves it where that made it better; what does not fit the whole is
+// them and do not, adjusts again, and saves it where that changed anything; what does not fit the whole is
 // removed. The policy must allow that its structure changes. `interrupt` may be null; a map whose adjustment
 // was interrupted stays as it was. The library makes full features. Throws docent::Error for what the file
 // has wrong.

@@ -115,8 +115,8 @@ void Import(const ExchangeOptions& options, Verbosity verbosity) {
 const char* Say(maps::Optimization::Outcome outcome) {
   using Outcome = maps::Optimization::Outcome;
   switch (outcome) {
-    case Outcome::kImproved:
-      return "improved";
+    case Outcome::kAdjusted:
+      return "adjusted";
     case Outcome::kAlreadyBest:
       return "was at its best";
     case Outcome::kNotAllowed:
@@ -152,7 +152,7 @@ void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
   for (std::size_t i = 0; i < infos.size() && !Interruption::requested(); ++i) {
     const maps::Optimization result = maps::OptimizeMap(&library, infos[i].key, &interrupt);
     char numbers[200] = "";
-    if (result.outcome == maps::Optimization::Outcome::kImproved) {
+    if (result.outcome == maps::Optimization::Outcome::kAdjusted) {
       std::snprintf(
           numbers, sizeof numbers,
           ": %.3f px before, %.3f px after; %zu observations found and %zu thrown out, %zu points removed",
@@ -201,7 +201,7 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
       "docent maps import desk.docent --library museum.docent", Import)
       ->add_option("FILE", options->from, "The other library")
       ->required();
-  add("optimize", "Adjust whole maps and save what became better",
+  add("optimize", "Adjust whole maps, and find their points in keyframes that missed them",
       "docent maps optimize --library museum.docent", Optimize)
       ->add_option("NAME", options->name, "Name of the map; all when it is left out");
   add("recover", "Save what a damaged library still holds into a new one",

@@ -66,7 +66,7 @@ TEST(Upkeep, BringsAMapThatWasLeftCrookedBackToTheTruth) {
       EXPECT_EQ(FirstDifference(*stored, *crooked), "");
       continue;
     }
-    EXPECT_EQ(result.outcome, Optimization::Outcome::kImproved);
+    EXPECT_EQ(result.outcome, Optimization::Outcome::kAdjusted);
     EXPECT_GT(result.rms_before_px, 0.3);
     EXPECT_LT(result.rms_after_px, 0.01);
     for (std::size_t i = 0; i < stored->keyframes.size(); ++i) {
@@ -76,7 +76,7 @@ TEST(Upkeep, BringsAMapThatWasLeftCrookedBackToTheTruth) {
           1e-3);
     }
     const std::atomic<bool> interrupt = true;
-    EXPECT_NE(OptimizeMap(&library, key, &interrupt).outcome, Optimization::Outcome::kImproved);
+    EXPECT_NE(OptimizeMap(&library, key, &interrupt).outcome, Optimization::Outcome::kAdjusted);
   }
   EXPECT_THAT(library.Verify(), IsEmpty());
 }
