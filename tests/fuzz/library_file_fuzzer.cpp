@@ -29,7 +29,8 @@ namespace fs = std::filesystem;
 using docent::maps::Bytes;
 
 fs::path Folder() {
-  static const fs::path folder = [] {
+  // Never destroyed: it is needed at the very end.
+  static const fs::path& folder = *new fs::path([] {
     const char* const memory = "/dev/shm";
     std::error_code error;
     const fs::path base = fs::is_directory(memory, error) ? fs::path(memory) : fs::temp_directory_path();
@@ -37,7 +38,7 @@ fs::path Folder() {
     fs::create_directories(made);
     std::atexit([] { fs::remove_all(Folder()); });
     return made;
-  }();
+  }());
   return folder;
 }
 
