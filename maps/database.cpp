@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 
 #include <array>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -19,12 +20,28 @@ constexpr int kBusyTimeoutMs = 5000;       // another process's transaction take
 constexpr int kCloseTimeoutMs = 200;       // tidying up is not worth a wait
 constexpr int kMaxValueBytes = 512 << 20;  // of one blob or text
 
+// What the system said to the last call that failed, where SQLite still knows; " (File too large)".
+std::string SystemReason(sqlite3* connection) {
+  if (!connection) return "";
+  int number = sqlite3_system_errno(connection);
+  // A commit leaves it with the file alone.
+  for (const int which : {SQLITE_FCNTL_JOURNAL_POINTER, SQLITE_FCNTL_FILE_POINTER}) {
+    sqlite3_file* file = nullptr;
+    if (number == 0 && sqlite3_file_control(connection, "main", which, &file) == SQLITE_OK && file &&
+        file->pMethods) {
+      file->pMethods->xFileControl(file, SQLITE_FCNTL_LAST_ERRNO, &number);
+    }
+  }
+  return number == 0 ? "" : " (" + std::string(std::strerror(number)) + ")";
+}
+
 std::string Reason(sqlite3* connection, int result) {
   switch (result & 0xFF) {
     case SQLITE_NOTADB:
       return "is not a library of maps (it is no SQLite file)";
     case SQLITE_CORRUPT:
-      return "is damaged (" + std::string(sqlite3_errmsg(connection)) + "); use a copy of it that is whole";
+      return "is damaged (" + std::string(sqlite3_errmsg(connection)) +
+             "); docent maps recover saves what it still holds";
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return "is being written by another program; try again when that has ended";
@@ -38,6 +55,8 @@ std::string Reason(sqlite3* connection, int result) {
       return "cannot be saved because the disk is full";
     case SQLITE_CANTOPEN:
       return "cannot be opened";
+    case SQLITE_IOERR:
+      return "cannot be read or written" + SystemReason(connection);
     case SQLITE_TOOBIG:
       return "cannot hold a picture, model or table above " + std::to_string(kMaxValueBytes >> 20) + " MiB";
     default:
@@ -241,6 +260,15 @@ void Database::ConnectReadOnly() {
 Database Database::OpenReadOnly(const fs::path& path) {
   Database database(path.string(), true);
   database.ConnectReadOnly();
+  return database;
+}
+
+Database Database::OpenDamaged(const fs::path& path) {
+  Database database = OpenReadOnly(path);
+  // With its schema open to change, SQLite bears a file that is shorter than it says (the connection cannot
+  // write all the same).
+  sqlite3_db_config(database.connection_.get(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
+  sqlite3_db_config(database.connection_.get(), SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
   return database;
 }
 

@@ -59,6 +59,9 @@ class Database {
   // For reading while another process may write. The file is opened read only; where its log is at rest no
   // file appears beside it.
   static Database OpenReadOnly(const std::filesystem::path& path);
+  // For reading what a damaged file still holds: pages that it should have and has not are no reason to give
+  // up before the others were read.
+  static Database OpenDamaged(const std::filesystem::path& path);
   // For writing; the file is created (empty) when `create` is set and it is missing. Nothing in it is changed
   // before StartWriting, not even on close.
   static Database OpenReadWrite(const std::filesystem::path& path, bool create);

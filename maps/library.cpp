@@ -22,15 +22,14 @@ namespace docent::maps {
 
 namespace {
 
-constexpr std::size_t kMaxNameBytes = 200;
 // A keyframe that was taken inside the bounds may be moved a little by an adjustment before it is saved.
 constexpr double kBoundsSlack = 0.05;  // of the bounds' diagonal
 
 void CheckName(const std::string& name) {
   const bool printable = std::none_of(
       name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
-  if (name.empty() || name.size() > kMaxNameBytes || !printable) {
-    throw Error("a map's name has 1 to " + std::to_string(kMaxNameBytes) +
+  if (name.empty() || name.size() > kMaxMapNameBytes || !printable) {
+    throw Error("a map's name has 1 to " + std::to_string(kMaxMapNameBytes) +
                 " bytes and no control characters");
   }
 }
@@ -162,7 +161,8 @@ class Library::Impl {
     const engine::MapSnapshot nothing;
     const engine::MapSnapshot& snapshot = record.snapshot ? *record.snapshot : nothing;
     const MapParts parts = PartsOf(snapshot);
-    if (info.policy == Policy::kBounded) info.bounds = BoundsOf(parts);
+    info.bounds = record.bounds;
+    if (info.policy == Policy::kBounded && !info.bounds) info.bounds = BoundsOf(parts);
     WriteStructure(snapshot, parts, {}, &info);
     WriteScene(record.key, record.scene ? *record.scene : SceneRecord{});
     WriteMapRow(database_, info);

@@ -24,6 +24,8 @@
 // threads with a frame to draw leave saving to maps::Saver.
 namespace docent::maps {
 
+inline constexpr std::size_t kMaxMapNameBytes = 200;
+
 enum class Access { kReadOnly, kReadWrite };
 enum class CreateIfMissing { kNo, kYes };
 

@@ -17,9 +17,8 @@ namespace {
 using engine::CameraModel;
 using engine::LensModel;
 
-constexpr double kUnitTolerance = 1e-6;        // of a stored quaternion's length
-constexpr double kSameRotation = 1e-12;        // of a quaternion's entries
-constexpr std::size_t kMaxIdCharacters = 128;  // of an asset
+constexpr double kUnitTolerance = 1e-6;  // of a stored quaternion's length
+constexpr double kSameRotation = 1e-12;  // of a quaternion's entries
 
 bool SameKeyFrame(const StoredKeyFrame& stored_a, const StoredKeyFrame& stored_b) {
   const engine::KeyFrame& a = stored_a.keyframe;
@@ -243,10 +242,13 @@ ScenePart DecodeScene(std::uint64_t map_key, std::span<const std::uint8_t> bytes
   ScenePart scene;
   scene.text = reader.GetText();
   std::unordered_set<std::string> seen;
-  // Each id takes at least its length field, so that the loop ends with the bytes whatever the count says.
-  for (std::uint64_t i = 0; i < count && !reader.failed(); ++i) {
+  constexpr std::size_t kSmallestId = sizeof(std::uint32_t) + kMinAssetIdBytes;
+  if (reader.failed() || count > reader.remaining() / kSmallestId)
+    throw Error("the scene is damaged: its length does not match");
+  scene.asset_ids.reserve(count);
+  for (std::uint64_t i = 0; i < count; ++i) {
     std::string id = reader.GetText();
-    if (id.empty() || id.size() > kMaxIdCharacters || !seen.insert(id).second) {
+    if (id.size() < kMinAssetIdBytes || id.size() > kMaxAssetIdBytes || !seen.insert(id).second) {
       throw Error("the scene is damaged: it names an asset without a valid id");
     }
     scene.asset_ids.push_back(std::move(id));

@@ -17,6 +17,11 @@
 // sentence that names it ("the table of points is cut off"). No thread or state is involved.
 namespace docent::maps {
 
+// What is read takes at most four times the room of what it is read from, so that a small file cannot ask for
+// a large memory: the least sizes of things that vary in length see to that.
+// Pictures above a million pixels that compress further are stored as they are.
+inline constexpr std::int64_t kMaxPixelsAByte = 4, kPixelsAlwaysAllowed = std::int64_t{1} << 20;
+inline constexpr std::size_t kMinAssetIdBytes = 4, kMaxAssetIdBytes = 128;
 inline constexpr int kMinPictureSidePx = 64;  // what engine::MakeFeatures needs
 inline constexpr int kMaxPictureSidePx = 16384;
 inline constexpr std::int64_t kMaxPicturePixels = std::int64_t{1} << 26;

@@ -41,6 +41,8 @@ struct MapRecord {
   Policy policy = Policy::kOpen;
   std::shared_ptr<const engine::MapSnapshot> snapshot;  // null: the stored one stays
   std::shared_ptr<const SceneRecord> scene;             // null: the stored one stays
+  // Of a new map that was bounded elsewhere; a new bounded map without them gets them from what it holds.
+  std::optional<Bounds> bounds = std::nullopt;
 };
 
 // What a list shows; read without touching points or pictures.

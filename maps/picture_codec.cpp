@@ -48,9 +48,15 @@ std::uint64_t PictureHash(const cv::Mat& gray) {
 
 Bytes EncodePicture(std::uint64_t map_key, engine::KeyFrameId keyframe, const cv::Mat& gray) {
   Bytes png;
+  const auto pixels = static_cast<std::int64_t>(gray.total());
   try {
-    if (!cv::imencode(".png", gray, png, {cv::IMWRITE_PNG_COMPRESSION, kPngLevel}))
-      throw Error("the picture of keyframe " + std::to_string(keyframe) + " cannot be compressed");
+    for (const int level : {kPngLevel, 0}) {
+      if (!cv::imencode(".png", gray, png, {cv::IMWRITE_PNG_COMPRESSION, level}))
+        throw Error("the picture of keyframe " + std::to_string(keyframe) + " cannot be compressed");
+      // A flat one that large would look, to ReadCameras, as if a small file asked for a large memory.
+      if (pixels <= kPixelsAlwaysAllowed || pixels <= kMaxPixelsAByte * static_cast<std::int64_t>(png.size()))
+        break;
+    }
   } catch (const cv::Exception& error) {
     throw Error("the picture of keyframe " + std::to_string(keyframe) +
                 " cannot be compressed: " + error.err);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "maps/rows.h"
 
+#include <algorithm>
 #include <limits>
 #include <unordered_map>
 #include <utility>
@@ -108,14 +109,6 @@ MapInfo CheckedMapFromRow(const Database& database, const Statement& row) {
   }
 }
 
-Bytes ReadPart(const Database& database, std::uint64_t key, std::string_view part) {
-  Statement query = database.Prepare("SELECT data FROM parts WHERE map_key = ? AND part = ?");
-  query.Bind(1, Signed(key)).Bind(2, part);
-  if (!query.Step()) throw Error("its part '" + std::string(part) + "' is missing");
-  const std::span<const std::uint8_t> bytes = query.Blob(0);
-  return {bytes.begin(), bytes.end()};
-}
-
 void WritePart(const Database& database, std::uint64_t key, std::string_view part, const Bytes& bytes) {
   database.Prepare("INSERT OR REPLACE INTO parts (map_key, part, data) VALUES (?, ?, ?)")
       .Bind(1, Signed(key))
@@ -125,6 +118,14 @@ void WritePart(const Database& database, std::uint64_t key, std::string_view par
 }
 
 }  // namespace
+
+Bytes ReadPart(const Database& database, std::uint64_t key, std::string_view part) {
+  Statement query = database.Prepare("SELECT data FROM parts WHERE map_key = ? AND part = ?");
+  query.Bind(1, Signed(key)).Bind(2, part);
+  if (!query.Step()) throw Error("its part '" + std::string(part) + "' is missing");
+  const std::span<const std::uint8_t> bytes = query.Blob(0);
+  return {bytes.begin(), bytes.end()};
+}
 
 LibraryRow ReadLibraryRow(const Database& database) {
   Statement query = database.Prepare("SELECT next_key, map_count, checksum FROM library WHERE id = 1");
@@ -191,8 +192,22 @@ std::optional<std::uint64_t> FindMapByName(const Database& database, const std::
   return static_cast<std::uint64_t>(query.Integer(0));
 }
 
+CameraTable ReadCameras(const Database& database, std::uint64_t key) {
+  CameraTable cameras = DecodeCameras(key, ReadPart(database, key, "cameras"));
+  // Pictures are compressed, and a flat one by a thousand times: without this a file of a few kilobytes could
+  // ask for gigabytes. A library of pictures with something in them is far above the limit.
+  const std::int64_t most =
+      std::max(kPixelsAlwaysAllowed,
+               kMaxPixelsAByte * database.Number("PRAGMA page_count") * database.Number("PRAGMA page_size"));
+  for (const auto& camera : cameras) {
+    if (std::int64_t{camera->width_px()} * camera->height_px() > most)
+      throw Error("its camera has a picture size that a file so small does not hold");
+  }
+  return cameras;
+}
+
 MapParts ReadParts(const Database& database, const MapInfo& info) {
-  const CameraTable cameras = DecodeCameras(info.key, ReadPart(database, info.key, "cameras"));
+  const CameraTable cameras = ReadCameras(database, info.key);
   MapParts parts;
   parts.keyframes = DecodeKeyFrames(info.key, ReadPart(database, info.key, "keyframes"), cameras);
   parts.points = DecodePoints(info.key, ReadPart(database, info.key, "points"));
@@ -279,7 +294,10 @@ AssetRecord ReadAsset(const Database& database, const std::string& id) {
 }
 
 void WriteAsset(const Database& database, const AssetRecord& asset) {
-  if (asset.id.empty() || asset.id.size() > 128) throw Error("an asset needs an id of 1 to 128 characters");
+  if (asset.id.size() < kMinAssetIdBytes || asset.id.size() > kMaxAssetIdBytes) {
+    throw Error("an asset needs an id of " + std::to_string(kMinAssetIdBytes) + " to " +
+                std::to_string(kMaxAssetIdBytes) + " bytes");
+  }
   Statement query = database.Prepare("SELECT name, checksum FROM assets WHERE id = ?");
   query.Bind(1, asset.id);
   if (query.Step()) {

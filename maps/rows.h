@@ -32,6 +32,10 @@ std::optional<MapInfo> ReadMapRow(const Database& database, std::uint64_t key);
 void WriteMapRow(const Database& database, const MapInfo& info);
 std::optional<std::uint64_t> FindMapByName(const Database& database, const std::string& name);
 
+// The bytes of one binary column of a map; throws when it is not there.
+Bytes ReadPart(const Database& database, std::uint64_t key, std::string_view part);
+// The cameras of a map; throws when one's pictures could not be in this file.
+CameraTable ReadCameras(const Database& database, std::uint64_t key);
 // Keyframes, points and observations without pictures; the counts agree with `info`.
 MapParts ReadParts(const Database& database, const MapInfo& info);
 void WriteParts(const Database& database, std::uint64_t key, const MapParts& parts);

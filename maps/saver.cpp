@@ -6,9 +6,10 @@
 
 namespace docent::maps {
 
-Saver::Saver(Library* library, std::size_t capacity)
+Saver::Saver(Library* library, std::size_t capacity, Saved saved)
     : library_(library),
       capacity_(std::max<std::size_t>(1, capacity)),
+      saved_(std::move(saved)),
       worker_("map-saver", [this](const std::stop_token& stop) { Run(stop); }) {}
 
 Saver::~Saver() {
@@ -68,6 +69,7 @@ void Saver::Run(const std::stop_token& stop) {
     std::exception_ptr error;
     try {
       library_->Save(record);
+      if (saved_) saved_(record);
     } catch (...) {
       error = std::current_exception();
     }

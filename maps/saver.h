@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <stop_token>
@@ -22,9 +23,10 @@ namespace docent::maps {
 // does not stop the others; its exception waits for TakeError, and nothing that was saved before is lost.
 class Saver {
  public:
+  using Saved = std::function<void(const MapRecord& record)>;
   // library: opened for writing; must outlive the saver. capacity: maps that may wait at once; one more makes
-  // Submit wait.
-  explicit Saver(Library* library, std::size_t capacity = 16);
+  // Submit wait. saved: told on the saver's thread of each record that is on disk; may be empty.
+  explicit Saver(Library* library, std::size_t capacity = 16, Saved saved = {});
   // Writes what still waits, then ends. Whoever wants to know about failures calls Flush and TakeError first.
   ~Saver();
 
@@ -44,6 +46,7 @@ class Saver {
 
   Library* const library_;
   const std::size_t capacity_;
+  const Saved saved_;
   mutable std::mutex mutex_;  // guards all below; not held during a save
   std::condition_variable_any changed_;
   std::deque<MapRecord> waiting_;

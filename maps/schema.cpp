@@ -94,7 +94,7 @@ void CheckIsLibrary(const Database& database) {
   }
   if (version < 1) throw Error(file + " is damaged: it has no valid format version");
   if (!database.EndsWithWholePage())
-    throw Error(file + " is damaged: it is cut off; use a copy of it that is whole");
+    throw Error(file + " is damaged: it is cut off; docent maps recover saves what it still holds");
   Statement entries = database.Prepare("SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL");
   std::size_t found = 0, expected = 0;
   for (const Table& table : kTables) expected += table.since <= version ? 1 : 0;

@@ -25,7 +25,8 @@ Bytes EncodeThumbnails(std::uint64_t map_key, std::span<const KeyFrameThumbnail>
 
 std::vector<KeyFrameThumbnail> DecodeThumbnails(std::uint64_t map_key, std::span<const std::uint8_t> bytes) {
   auto [reader, count] = OpenEnvelope(kThumbnailTableKind, map_key, bytes);
-  constexpr std::size_t kSmallestRecord = 9;
+  // The smallest pictures have more pixels than this; see the limits in map_codec.h.
+  constexpr std::size_t kLeastPixels = 16, kSmallestRecord = 8 + kLeastPixels;
   if (count > reader.remaining() / kSmallestRecord)
     throw Error("the table of thumbnails is damaged: its length does not match");
   std::vector<KeyFrameThumbnail> thumbnails(count);
@@ -35,7 +36,7 @@ std::vector<KeyFrameThumbnail> DecodeThumbnails(std::uint64_t map_key, std::span
     thumbnail.width = reader.Get<std::uint16_t>();
     thumbnail.height = reader.Get<std::uint16_t>();
     const auto pixels = reader.GetBytes(std::size_t{thumbnail.width} * thumbnail.height);
-    if (reader.failed() || pixels.empty() || (i > 0 && thumbnails[i - 1].keyframe >= keyframe))
+    if (reader.failed() || pixels.size() < kLeastPixels || (i > 0 && thumbnails[i - 1].keyframe >= keyframe))
       throw Error("the table of thumbnails is damaged: a thumbnail is not valid");
     thumbnail.pixels.assign(pixels.begin(), pixels.end());
   }

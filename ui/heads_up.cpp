@@ -79,7 +79,10 @@ void DrawStatus(const View& view, Canvas* canvas) {
   state_style.bold = !named;
   state_style.size_px = (named ? 13 : 17) * unit;
 
-  const std::string state = StateInWords(tracked.state);
+  std::string state = StateInWords(tracked.state);
+  // Where the state says it already the word is not said twice.
+  if (!view.overlay.mapping.empty() && tracked.state != TrackingState::kInitializing)
+    state += ", " + view.overlay.mapping;
   const Eigen::Vector2d name_size = canvas->Measure(view.overlay.map_name, name_style);
   const Eigen::Vector2d state_size = canvas->Measure(state, state_style);
   const double padding = 8 * unit, dot = 5 * unit;

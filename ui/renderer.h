@@ -19,6 +19,7 @@ struct Overlay {
   bool hud = true;         // state, map name, hint; the lost indicator while there is no pose
   bool status = true;      // of the hud: the state; false where nothing is tracked
   std::string map_name;    // empty when there is none
+  std::string mapping;     // how far the map here has come, in a word; empty when nobody builds it
   std::string message;     // one sentence at the bottom, empty for none
   // The newest frame of another camera, shown small in a corner (see inset.h) in a frame whose colour is its
   // state; null for none. May be of any size.

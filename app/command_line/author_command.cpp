@@ -37,6 +37,8 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
           },
           "How wide the target is as it hangs there")
       ->type_name("METRES");
+  AddSecondsOption(command, "--autosave", &options->autosave_interval,
+                   "Save so often; 0: only when a map is left and at the end (default 10)");
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
     if (options->target.has_value() != (options->target_width_m > 0))

@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "app/command_line/interruption.h"
+#include "app/command_line/maps_exchange_command.h"
 #include "app/command_line/program.h"
+#include "app/command_line/progress.h"
+#include "app/session/surface_at_pixel.h"
 #include "engine/base/error.h"
 #include "maps/library.h"
+#include "maps/relocalization_check.h"
 
 namespace docent::app {
 
@@ -20,6 +26,7 @@ struct MapsOptions {
   std::filesystem::path library;
   std::string name, new_name, policy;
   bool as_json = false;
+  Verbosity verbosity = Verbosity::kNormal;
 };
 using MapsAction = void (*)(const MapsOptions& options);
 
@@ -70,8 +77,58 @@ void List(const MapsOptions& options) {
   }
 }
 
+// What a visitor who is lost may expect, by leaving each keyframe out in turn.
+Json DescribeRelocalization(const engine::MapSnapshot& map, Verbosity verbosity) {
+  using Result = maps::RelocalizationTrial::Result;
+  const Interruption interruption;
+  Progress progress("keyframes left out in turn", map.keyframes.size(), verbosity);
+  const auto trials = maps::LeaveEachKeyFrameOut(map, {}, [&](std::size_t done) {
+    progress.Update(done);
+    return !Interruption::requested();
+  });
+  if (Interruption::requested()) throw Error("interrupted");
+  const auto count = [&](Result result) {
+    return std::count_if(trials.begin(), trials.end(),
+                         [&](const maps::RelocalizationTrial& trial) { return trial.result == result; });
+  };
+  Json json = {
+      {"trials", trials.size()}, {"found", count(Result::kFound)}, {"wrong", count(Result::kWrongPose)}};
+  json["missed_keyframes"] = Json::array();
+  for (const maps::RelocalizationTrial& trial : trials) {
+    if (trial.result != Result::kFound) json["missed_keyframes"].push_back(trial.keyframe);
+  }
+  if (trials.empty()) return json;
+  const auto grid = maps::MakeRelocalizationGrid(map, trials, UpInMap(map));
+  json["square_m"] = grid.side;
+  json["grid"] = Json::array();
+  for (const maps::RelocalizationCell& cell : grid.cells) {
+    json["grid"].push_back({{"right", cell.square.x()},
+                            {"ahead", cell.square.y()},
+                            {"direction_deg", 45 * cell.direction},
+                            {"trials", cell.trials},
+                            {"found", cell.found}});
+  }
+  return json;
+}
+
+// The same in lines.
+void PrintRelocalization(const Json& json) {
+  std::printf("%-20s %s of %s keyframes are found when they are left out, %s in a wrong place\n",
+              "relocalization", json["found"].dump().c_str(), json["trials"].dump().c_str(),
+              json["wrong"].dump().c_str());
+  if (!json.contains("grid")) return;
+  std::printf("%-20s %s\n", "missed_keyframes", json["missed_keyframes"].dump().c_str());
+  std::printf("%-20s squares of %.3g m; right, ahead and direction seen from the first keyframe\n", "",
+              json["square_m"].get<double>());
+  for (const Json& cell : json["grid"]) {
+    std::printf("%-20s right %3d  ahead %3d  %4d deg  %d of %d\n", "", cell["right"].get<int>(),
+                cell["ahead"].get<int>(), cell["direction_deg"].get<int>(), cell["found"].get<int>(),
+                cell["trials"].get<int>());
+  }
+}
+
 // Extent of the camera's way and of the finite points, metres of the map.
-Json Describe(const maps::StoredMap& map) {
+Json Describe(const maps::StoredMap& map, Verbosity verbosity) {
   Json json = ToJson(map.info);
   int panorama = 0, infinite = 0;
   Eigen::AlignedBox3d cameras;
@@ -84,6 +141,7 @@ Json Describe(const maps::StoredMap& map) {
   json["infinite_points"] = infinite;
   const Eigen::Vector3d size = cameras.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(cameras.sizes());
   json["camera_extent_m"] = {size.x(), size.y(), size.z()};
+  json["relocalization"] = DescribeRelocalization(*map.snapshot, verbosity);
   json["assets"] = Json::array();
   for (const maps::AssetRecord& asset : map.scene.assets) json["assets"].push_back(asset.name);
   return json;
@@ -91,12 +149,16 @@ Json Describe(const maps::StoredMap& map) {
 
 void Show(const MapsOptions& options) {
   const maps::Library library = OpenToRead(options);
-  const Json json = Describe(library.Load(library.FindByName(options.name).key));
+  const Json json = Describe(library.Load(library.FindByName(options.name).key), options.verbosity);
   if (options.as_json) {
     Print(json);
     return;
   }
   for (const auto& [field, value] : json.items()) {
+    if (field == "relocalization") {
+      PrintRelocalization(value);
+      continue;
+    }
     const std::string text = value.is_string() ? value.get<std::string>()
                                                : value.dump(-1, ' ', false, Json::error_handler_t::replace);
     std::printf("%-20s %s\n", field.c_str(), text.c_str());
@@ -112,7 +174,8 @@ void Verify(const MapsOptions& options) {
   }
   for (const std::string& problem : problems) std::printf("%s\n", problem.c_str());
   throw Error("'" + library.file() + "' is damaged: " + std::to_string(problems.size()) +
-              (problems.size() == 1 ? " problem." : " problems."));
+              (problems.size() == 1 ? " problem" : " problems") +
+              "; docent maps recover saves what it still holds.");
 }
 
 void Rename(const MapsOptions& options) {
@@ -140,7 +203,12 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
   const auto add = [&](const char* name, const char* description, const char* example, MapsAction action) {
     CLI::App* command = AddSubcommand(group, name, description, example);
     command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
-    command->callback([=] { invocation->run = [=] { action(*options); }; });
+    command->callback([=] {
+      invocation->run = [=] {
+        options->verbosity = invocation->verbosity;
+        action(*options);
+      };
+    });
     return command;
   };
   const auto add_name = [&](CLI::App* command) {
@@ -167,6 +235,7 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
       ->add_option("POLICY", options->policy, "open, bounded, augment-only or read-only")
       ->required()
       ->check(CLI::IsMember({"open", "bounded", "augment-only", "read-only"}));
+  AddMapsExchangeCommands(group, invocation);
 }
 
 }  // namespace docent::app

@@ -57,6 +57,7 @@ struct AuthorOptions {
   std::optional<std::filesystem::path> target;  // a printed picture that new maps start from
   double target_width_m = 0;
   std::optional<std::filesystem::path> script, record_script;
+  Timestamp autosave_interval = std::chrono::seconds(10);  // 0: at each change of map alone
 };
 
 struct TourOptions {

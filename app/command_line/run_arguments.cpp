@@ -36,8 +36,10 @@ void AddChoice(CLI::App* command, const std::string& option, Target* target, con
       ->type_name(JoinedNames(names));
 }
 
-void AddSeconds(CLI::App* command, const std::string& option, Timestamp* target,
-                const std::string& description) {
+}  // namespace
+
+void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* target,
+                      const std::string& description) {
   command
       ->add_option_function<std::string>(
           option,
@@ -51,8 +53,6 @@ void AddSeconds(CLI::App* command, const std::string& option, Timestamp* target,
           description)
       ->type_name("SECONDS");
 }
-
-}  // namespace
 
 void AddPaceOption(CLI::App* command, std::optional<Pace>* pace) {
   AddChoice<Pace>(command, "--pace", pace, "How pictures are fed",
@@ -119,8 +119,8 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
       ->type_name("FILE")
       ->allow_extra_args(false);
   AddCameraFormatOption(command, &run->cameras.options);
-  AddSeconds(command, "--from", &run->cameras.from, "Begin so long after the first picture");
-  AddSeconds(command, "--until", &run->cameras.until, "End so long after the first picture");
+  AddSecondsOption(command, "--from", &run->cameras.from, "Begin so long after the first picture");
+  AddSecondsOption(command, "--until", &run->cameras.until, "End so long after the first picture");
   AddPaceOption(command, &run->pace);
   AddEngineOption(command, &run->engine);
   AddSeedOption(command, &run->seed);

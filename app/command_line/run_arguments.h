@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 #include "app/command_line/options.h"
 
 namespace CLI {
@@ -13,6 +15,9 @@ namespace docent::app {
 void AddPaceOption(CLI::App* command, std::optional<Pace>* pace);
 void AddEngineOption(CLI::App* command, EngineKind* engine);
 void AddSeedOption(CLI::App* command, std::uint64_t* seed);
+// A number of seconds, 0 or more.
+void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* target,
+                      const std::string& description);
 void AddMemoryOption(CLI::App* command, std::size_t* bytes);
 void AddCameraFormatOption(CLI::App* command, CameraOptions* options);
 // auto, or the name of a lens model.

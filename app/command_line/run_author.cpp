@@ -53,6 +53,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   request.headless = options.run.headless;
   request.seed = options.run.seed;
   request.memory_budget_bytes = options.run.memory_budget_bytes;
+  request.autosave_interval = options.autosave_interval;
   request.output = options.run.output;
   request.record = options.run.record;
   request.record_script = options.record_script;

@@ -134,6 +134,7 @@ class GuideRun {
     options.may_write = request.may_write;
     options.seed = request.seed;
     options.tracker.hybrid = request.engine == EngineKind::kHybrid;
+    options.autosave_interval = request.autosave_interval;
     options.memory.budget_bytes = request.memory_budget_bytes;
     options.memory.wait_for_maps = request.pace != Pace::kRealtime;
     options.baseline_m = request.baseline_m;

@@ -28,7 +28,7 @@ Session::Session(const SessionOptions& options,
   }
   if (library_ != nullptr) {
     LoadMaps();
-    if (options.may_write) saver_.emplace(library_, 64);
+    if (options.may_write) saver_.emplace(library_, 64, TellSaved);
   }
   if (!options.first_map.empty()) {
     const std::scoped_lock lock(mutex_);
@@ -313,9 +313,16 @@ void Session::Discard(std::uint64_t key, Timestamp time, const std::string& reas
 
 Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   const std::scoped_lock lock(mutex_);
+  Shown shown;
+  if (options_.may_write) {
+    const bool grows = growing_key_ != 0 && growing_key_ == frame.map_key;
+    shown.mapping = MappingStatusOf(frame, grows);
+  }
   const auto found = maps_.find(frame.map_key);
-  if (found == maps_.end()) return {};
-  return {found->second.name, found->second.scene};
+  if (found == maps_.end()) return shown;
+  shown.map_name = found->second.name;
+  shown.scene = found->second.scene;
+  return shown;
 }
 
 std::vector<std::string> Session::MapNames() const {
@@ -343,17 +350,25 @@ std::vector<Event> Session::TakeEvents() {
 
 void Session::Finish() {
   if (std::exchange(finished_, true)) return;
-  mapping_.Finish();
-  if (!saver_) return;
-  {
-    const std::scoped_lock lock(mutex_);
-    Timestamp time{};
-    for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
-    for (auto& [key, map] : maps_) SaveMap(&map, time);
+  std::exception_ptr failure;
+  try {
+    mapping_.Finish();
+  } catch (...) {
+    failure = std::current_exception();  // what it made before is saved all the same
   }
-  saver_->Flush();
-  if (!save_failure_) save_failure_ = saver_->TakeError();
-  if (save_failure_) std::rethrow_exception(save_failure_);
+  if (saver_) {
+    saver_->Flush();  // so that what fails now is tried again with the rest
+    {
+      const std::scoped_lock lock(mutex_);
+      Timestamp time{};
+      for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
+      ReportSaveFailure(time);
+      for (auto& [key, map] : maps_) SaveMap(&map, time);
+    }
+    saver_->Flush();
+    if (!failure) failure = saver_->TakeError();
+  }
+  if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace docent::app

@@ -17,6 +17,7 @@
 #include "app/session/camera_association.h"
 #include "app/session/camera_rig.h"
 #include "app/session/library_scene.h"
+#include "app/session/mapping_status.h"
 #include "app/session/mapping_thread.h"
 #include "app/session/search_places.h"
 #include "app/session/session_map.h"
@@ -35,7 +36,9 @@ struct SessionOptions {
   bool may_write = true;  // false: maps are used as they are, nothing grows and nothing is placed
   std::string first_map;  // begin a map of this name by itself; empty: wait for `map new`
   std::uint64_t seed = 1;
-  Timestamp autosave_interval = std::chrono::seconds(10);  // of the pictures' time
+  // Of the pictures' time; a map that is left, and the end, are saved in any case, and 0 saves at these
+  // alone.
+  Timestamp autosave_interval = std::chrono::seconds(10);
   // A new map whose track is lost this early, for this long, with so few keyframes, was a false start.
   Timestamp probation = std::chrono::seconds(2);
   Timestamp probation_loss = std::chrono::seconds(1);
@@ -86,10 +89,12 @@ class Session {
   // frame waits for it. Throws Error.
   void Preload(const Command& command, const std::filesystem::path& model_folder);
 
-  // What is shown with a frame: the name of its map, and what stands in it. Scene null when there is none.
+  // What is shown with a frame: the name of its map, how far that has come, and what stands in it. Scene null
+  // when there is none.
   struct Shown {
     std::string map_name;
     std::shared_ptr<const content::Scene> scene;
+    std::optional<MappingStatus> mapping;  // where the session may write
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
   std::vector<std::string> MapNames() const;
@@ -108,7 +113,8 @@ class Session {
   engine::MapperTimes MappingTimes() const { return mapping_.Times(); }
   std::vector<Event> TakeEvents();
 
-  // Ends the mapper, saves what is unsaved and waits for the disk. Throws the first failure of either.
+  // Ends the mapper, saves what is unsaved or could not be saved before, and waits for the disk. Throws the
+  // first failure of either, after everything else was done.
   void Finish();
 
  private:
@@ -169,6 +175,7 @@ class Session {
   void GrowOn(const SessionMap& map);
 
   // session_saving.cpp
+  static void TellSaved(const maps::MapRecord& record);
   void SaveMap(SessionMap* map, Timestamp time);
   void Autosave(Timestamp time);
   void ReportSaveFailure(Timestamp time);
@@ -191,7 +198,6 @@ class Session {
   std::filesystem::path model_folder_;
   std::optional<Timestamp> last_save_;
   std::optional<maps::Saver> saver_;  // with a library opened for writing
-  std::exception_ptr save_failure_;
   bool finished_ = false;
   // Last, because their threads call back into the rest.
   std::optional<maps::MapPager> pager_;  // with a library

@@ -112,8 +112,9 @@ void Session::GrowOn(const SessionMap& map) {
 void Session::Carry(const NewMap& command, const engine::TrackedFrame& frame) {
   CheckName(command.name);
   if (FindByName(command.name) != nullptr) throw Error("there is already a map '" + command.name + "'");
-  if (growing_key_ != 0) LeaveMap(growing_key_);
-  const SessionMap& map = AddMap(command.name);
+  const std::uint64_t before = growing_key_;
+  const SessionMap& map = AddMap(command.name);  // first, because it may fail
+  if (before != 0) LeaveMap(before);
   GrowOn(map);
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     const bool begins = static_cast<int>(i) == frame.frame.camera;
@@ -160,6 +161,9 @@ void Session::Carry(const SetPolicy& command, const engine::TrackedFrame& frame)
     // command that waits for the disk.
     SaveMap(map, frame.frame.time);
     saver_->Flush();
+    ReportSaveFailure(frame.frame.time);
+    if (map->NeedsSave())
+      throw Error("the map '" + map->name + "' could not be saved, so its policy stays as it is");
     library_->SetPolicy(map->key, command.policy);
     bounds = library_->Find(map->key).bounds;
   } else if (command.policy == maps::Policy::kBounded) {

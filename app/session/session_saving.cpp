@@ -8,6 +8,13 @@
 
 namespace docent::app {
 
+// On the saver's thread. From here on the save may not be lost.
+void Session::TellSaved(const maps::MapRecord& record) {
+  const std::string revision =
+      record.snapshot ? "revision " + std::to_string(record.snapshot->revision) : "content";
+  spdlog::debug("saved {}: {}", record.name, revision);
+}
+
 // Hands what has changed of a map to the saver, which writes it in the background.
 void Session::SaveMap(SessionMap* map, Timestamp time) {
   if (!saver_ || map->discarded || !map->NeedsSave() || !map->snapshot->HasFinitePoints()) return;
@@ -33,7 +40,7 @@ void Session::Autosave(Timestamp time) {
   const std::scoped_lock lock(mutex_);
   if (!saver_) return;
   if (!last_save_) last_save_ = time;
-  if (time - *last_save_ < options_.autosave_interval) return;
+  if (options_.autosave_interval <= Timestamp{} || time - *last_save_ < options_.autosave_interval) return;
   last_save_ = time;
   ReportSaveFailure(time);
   for (auto& [key, map] : maps_) {
@@ -41,8 +48,9 @@ void Session::Autosave(Timestamp time) {
   }
 }
 
-// A save that failed does not end the session: what it did not write is written by the next one, and the
-// person hears of it at once. Finish throws it in the end.
+// A save that failed does not end the session: the person hears of it at once, and what any save since the
+// last report may not have written is tried again by the next one. What could be written no more once the
+// map's policy had changed was on disk before it changed (see SetPolicy).
 void Session::ReportSaveFailure(Timestamp time) {
   const std::exception_ptr failure = saver_->TakeError();
   if (!failure) return;
@@ -53,10 +61,10 @@ void Session::ReportSaveFailure(Timestamp time) {
     AddEvent(time, "warning", error.what());
   }
   for (auto& [key, map] : maps_) {
-    if (key == growing_key_) map.saved_snapshot.reset();
-    map.saved_scene.reset();
+    if (!map.changed) continue;
+    if (maps::MayChangeStructure(map.policy)) map.saved_snapshot.reset();
+    if (maps::MayChangeContent(map.policy)) map.saved_scene.reset();
   }
-  save_failure_ = failure;
 }
 
 }  // namespace docent::app

@@ -7,6 +7,7 @@
 #include <ceres/problem.h>
 #include <ceres/sized_cost_function.h>
 #include <ceres/solver.h>
+#include <glog/logging.h>
 
 #include <algorithm>
 #include <chrono>
@@ -392,6 +393,13 @@ std::string BundleSummary::Brief() const {
 }
 
 BundleSummary AdjustBundle(const BundleOptions& options, BundleProblem* problem) {
+  // A step that cannot be solved is tried again with more damping. Ceres says so on standard error, where it
+  // means nothing to the person.
+  static const bool silenced = [] {
+    FLAGS_minloglevel = google::GLOG_FATAL;
+    return true;
+  }();
+  static_cast<void>(silenced);
   const auto begin = std::chrono::steady_clock::now();
   BundleSummary summary;
   BundleEvaluation evaluation(*problem, options.loss, options.interrupt);

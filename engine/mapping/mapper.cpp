@@ -294,7 +294,7 @@ void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecor
     if (point && !point->point.infinite()) map_.AddObservation({id, match.point, match.pixel, match.level});
   }
   map_.UpdateDepth(record);
-  Refind(id, nullptr);
+  RefindPoints(options_.refind, id, &searcher_, &map_);
   map_.UpdateDepth(record);
   std::vector<MapPointId> created;
   for (const KeyFrameId partner : Partners(id)) {
@@ -347,40 +347,14 @@ std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
   return partners;
 }
 
-void Mapper::Refind(KeyFrameId id, const std::vector<MapPointId>* ids) {
-  Map::KeyFrameRecord& record = *map_.FindKeyFrame(id);
-  const auto find = [&](Map::PointRecord& point) {
-    if (!point.alive || point.point.infinite() || point.point.source_keyframe == id) return;
-    if (std::binary_search(point.observers.begin(), point.observers.end(), id)) return;
-    const Map::KeyFrameRecord* source = map_.FindKeyFrame(point.point.source_keyframe);
-    if (!source) return;
-    const auto predicted = searcher_.Predict(point.point, source->keyframe, *record.keyframe.camera,
-                                             record.keyframe.camera_from_map);
-    if (!predicted) return;
-    const auto found = searcher_.Find(point.point, source->keyframe, *predicted, *record.keyframe.features,
-                                      options_.refind_radius_px, false);
-    if (!found) return;
-    // Twice the level's sigma, as for a new point: what lies further off would only be thrown out again.
-    const double error = (found->pixel.cast<double>() - predicted->pixel).norm();
-    if (error > 3.0 * (1 << predicted->level)) return;
-    map_.AddObservation({id, point.point.id, found->pixel, static_cast<std::uint8_t>(predicted->level)});
-  };
-  if (ids) {
-    for (const MapPointId point : *ids) {
-      if (Map::PointRecord* found = map_.FindPoint(point)) find(*found);
-    }
-  } else {
-    for (Map::PointRecord& point : map_.points()) find(point);
-  }
-}
-
 void Mapper::RefindNewPoints() {
   // New points are looked for in the keyframes that share most with the newest one.
   constexpr std::size_t kNeighbours = 8;
   if (newest_ != kNoId) {
     auto neighbours = map_.Covisible(newest_);
     if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
-    for (const auto& [id, shared] : neighbours) Refind(id, &to_refind_);
+    for (const auto& [id, shared] : neighbours)
+      RefindPoints(options_.refind, id, &searcher_, &map_, &to_refind_);
   }
   to_refind_.clear();
 }

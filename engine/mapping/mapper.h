@@ -18,6 +18,7 @@
 #include "engine/mapping/panorama_mapping.h"
 #include "engine/mapping/point_creation.h"
 #include "engine/mapping/redundancy.h"
+#include "engine/mapping/refinding.h"
 
 namespace docent::engine {
 
@@ -28,7 +29,7 @@ struct MapperOptions {
   double min_partner_baseline = 0.03;  // of the mean depth
   double max_partner_baseline = 0.6;
   int min_initial_points = 60;  // after the first adjustment, else the start is given up
-  float refind_radius_px = 6;   // level 0
+  RefindOptions refind;
   PointCreationOptions creation;
   InfinitePointOptions infinite;
   LocalizationOptions localization;
@@ -118,8 +119,6 @@ class Mapper {
   void PlanConversions(KeyFrameId keyframe);
   bool IsFinite() const;  // the map knows depth
   void ApplyReports();
-  // Looks for the map's points (or only for those in `ids`) in a keyframe that does not see them yet.
-  void Refind(KeyFrameId keyframe, const std::vector<MapPointId>* ids);
   std::vector<KeyFrameId> Partners(KeyFrameId keyframe);
   void RefindNewPoints();
   void LocalAdjustment();

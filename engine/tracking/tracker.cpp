@@ -17,6 +17,8 @@ double FieldOfView(const CameraModel& camera) {
   return left && right ? std::acos(std::clamp(left->dot(*right), -1.0, 1.0)) : 1.0;
 }
 
+constexpr Timestamp kLongAgo = -std::chrono::hours(24 * 365 * 50);  // from which any time may be subtracted
+
 }  // namespace
 
 Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera, std::uint64_t seed)
@@ -99,7 +101,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     selector_.Offered(KeyFrameChoice::kFirst, first.time);
     observed_ = ObservedMotion::kPanorama;
     tracking_ = true;
-    lost_since_ = Timestamp::min();
+    lost_since_ = kLongAgo;
   } else if (pair_given_) {
     // Our own pair became a map: its newest keyframe is where the camera was a moment ago.
     starting_ = pair_given_ = false;
@@ -118,7 +120,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     reports_.clear();
     anchor_.reset();
     tracking_ = false;
-    lost_since_ = Timestamp::min();
+    lost_since_ = kLongAgo;
   }
 }
 

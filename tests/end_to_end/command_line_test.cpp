@@ -57,6 +57,10 @@ TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
       {"maps", "rename"},
       {"maps", "remove"},
       {"maps", "policy"},
+      {"maps", "export"},
+      {"maps", "import"},
+      {"maps", "optimize"},
+      {"maps", "recover"},
       {"content"},
       {"content", "list"},
       {"content", "remove"},
@@ -190,6 +194,33 @@ TEST(CommandLine, CaresForAnEmptyLibrary) {
   ExpectComplaint({"maps", "remove", "Desk", "--library", path}, 1, "Desk");
   ExpectComplaint({"maps", "policy", "Desk", "read-only", "--library", path}, 1, "Desk");
   ExpectComplaint({"content", "remove", "sign-1", "--map", "Desk", "--library", path}, 1, "Desk");
+}
+
+TEST(CommandLine, SendsAMapToAnotherLibraryAndSavesWhatADamagedOneHolds) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "museum.docent").string(), other = (folder / "desk.docent").string();
+  {
+    maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    library.Save({library.NewKey(), "Desk", maps::Policy::kOpen, nullptr, nullptr});
+  }
+  EXPECT_EQ(RunDocent({"maps", "export", "Desk", "--library", path, "--output", other}).exit_status, 0);
+  EXPECT_THAT(RunDocent({"maps", "import", other, "--library", path}).output, HasSubstr("Desk (2)"));
+  EXPECT_EQ(maps::Library::Open(path, maps::Access::kReadOnly).List().size(), 2u);
+  EXPECT_THAT(RunDocent({"maps", "optimize", "--library", path}).output,
+              HasSubstr("Desk too small to adjust"));
+  for (const char* name : {"desk.ply", "desk.png", "colmap"}) {
+    const std::string output = (folder / name).string();
+    EXPECT_EQ(RunDocent({"maps", "export", "Desk", "--library", path, "--output", output}).exit_status, 0);
+    EXPECT_TRUE(std::filesystem::exists(output));
+    ExpectComplaint({"maps", "export", "Desk", "--library", path, "--output", output}, 1, "exists already");
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder / "colmap/points3D.txt"));
+  ExpectComplaint({"maps", "export", "Desk", "--library", path, "--output", (folder / "a.obj").string()}, 1,
+                  "no kind of export");
+  const std::string saved = (folder / "saved.docent").string();
+  EXPECT_THAT(RunDocent({"maps", "recover", "--library", path, "--output", saved}).output,
+              HasSubstr("2 maps whole and 0 in part"));
+  ExpectComplaint({"maps", "recover", "--library", path, "--output", saved}, 1, "exists already");
 }
 
 }  // namespace

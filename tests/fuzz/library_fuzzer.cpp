@@ -9,11 +9,14 @@
 #include "maps/checksum.h"
 #include "maps/envelope.h"
 #include "maps/map_codec.h"
+#include "maps/panorama_codec.h"
+#include "maps/thumbnail_rows.h"
+#include "tests/fuzz/allocation_limit.h"
 
 // Feeds the decoders of a library's binary columns. The first byte chooses the decoder; the rest is the
 // records, put into an envelope whose magic and checksum are right, because what is behind them is to be
 // reached. What is decoded must encode to the same bytes again: a decoder that ignores something would break
-// that.
+// that. No allocation may be larger than four times the bytes.
 namespace {
 
 using docent::maps::Bytes;
@@ -33,6 +36,16 @@ Bytes Enveloped(const docent::maps::EnvelopeKind& kind, std::uint64_t count,
   return docent::maps::FinishEnvelope(std::move(writer));
 }
 
+// Sentences, maps of a few things; and what OpenCV, libpng and zlib work with.
+constexpr std::size_t kSmallThings = 1024, kPictureWorkspace = 1 << 17;
+
+// Runs a decoder with its allocations limited by the size of what it reads.
+template <typename Decode>
+auto Limited(std::size_t bytes, std::size_t besides, const Decode& decode) {
+  const AllocationLimit limit(4 * bytes + besides);
+  return decode();
+}
+
 void Expect(bool condition) {
   if (!condition) std::abort();
 }
@@ -44,13 +57,17 @@ void DecodeTable(int which, std::span<const std::uint8_t> records) {
   const EnvelopeKind& kind = kKinds[static_cast<std::size_t>(which)];
   const Bytes bytes = Enveloped(kind, records.size() / kind.record_bytes, records);
   if (which == 0) {
-    DecodeCameras(kMapKey, bytes);
+    Limited(bytes.size(), kSmallThings, [&] { return DecodeCameras(kMapKey, bytes); });
   } else if (which == 1) {
-    DecodeKeyFrames(kMapKey, bytes, OneCamera());
+    const CameraTable cameras = OneCamera();
+    Limited(bytes.size(), kSmallThings, [&] { return DecodeKeyFrames(kMapKey, bytes, cameras); });
   } else if (which == 2) {
-    Expect(EncodePoints(kMapKey, DecodePoints(kMapKey, bytes)) == bytes);
+    const auto decoded = Limited(bytes.size(), kSmallThings, [&] { return DecodePoints(kMapKey, bytes); });
+    Expect(EncodePoints(kMapKey, decoded) == bytes);
   } else {
-    Expect(EncodeObservations(kMapKey, DecodeObservations(kMapKey, bytes)) == bytes);
+    const auto decoded =
+        Limited(bytes.size(), kSmallThings, [&] { return DecodeObservations(kMapKey, bytes); });
+    Expect(EncodeObservations(kMapKey, decoded) == bytes);
   }
 }
 
@@ -60,12 +77,33 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
     std::uint64_t count = 0;
     std::memcpy(&count, data.data(), sizeof(count));
     const Bytes bytes = Enveloped(kSceneKind, count, data.subspan(8));
-    Expect(EncodeScene(kMapKey, DecodeScene(kMapKey, bytes)) == bytes);
+    const auto decoded = Limited(bytes.size(), kSmallThings, [&] { return DecodeScene(kMapKey, bytes); });
+    Expect(EncodeScene(kMapKey, decoded) == bytes);
+  } else if (which == 7 && data.size() >= 8) {
+    std::uint64_t count = 0;
+    std::memcpy(&count, data.data(), sizeof(count));
+    const Bytes bytes = Enveloped(kThumbnailTableKind, count, data.subspan(8));
+    const auto decoded =
+        Limited(bytes.size(), kSmallThings, [&] { return DecodeThumbnails(kMapKey, bytes); });
+    Expect(EncodeThumbnails(kMapKey, decoded) == bytes);
+  } else if (which == 8 && data.size() >= 8) {
+    std::uint64_t count = 0;
+    std::memcpy(&count, data.data(), sizeof(count));
+    MapParts parts;
+    for (std::uint32_t id = 0; id < 8; ++id) {
+      parts.keyframes.push_back({});
+      parts.keyframes.back().keyframe.id = id;
+      parts.points.push_back({});
+      parts.points.back().id = id;
+    }
+    const Bytes bytes = Enveloped(kPanoramaTableKind, count, data.subspan(8));
+    Limited(bytes.size(), kSmallThings, [&] { DecodePanoramas(kMapKey, bytes, &parts); });
   } else if (which == 5) {
     StoredKeyFrame keyframe;
     keyframe.keyframe.id = 0;
     keyframe.keyframe.camera = OneCamera()[0];
-    DecodePicture(kMapKey, keyframe, Enveloped(kPictureKind, 1, data));
+    const Bytes bytes = Enveloped(kPictureKind, 1, data);
+    Limited(bytes.size(), kPictureWorkspace, [&] { return DecodePicture(kMapKey, keyframe, bytes); });
   } else {
     DecodePoints(kMapKey, data);  // nothing made right: the envelope itself
     DecodeScene(kMapKey, data);
@@ -76,7 +114,7 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
-  const int which = data[0] % 7;
+  const int which = data[0] % 9;
   const std::span<const std::uint8_t> rest(data + 1, size - 1);
   try {
     if (which < 4) {

@@ -6,6 +6,7 @@
 #include "engine/base/error.h"
 #include "engine/base/random.h"
 #include "maps/library.h"
+#include "maps/map_codec.h"
 #include "maps/schema.h"
 #include "tests/maps/map_samples.h"
 
@@ -156,6 +157,32 @@ TEST_F(Damage, FlippedBytesNeverGiveWrongData) {
     ASSERT_FALSE(HasFailure()) << "byte " << at;
   }
   EXPECT_GT(errors_, 100) << "the flips hit nothing";
+}
+
+TEST_F(Damage, ASmallFileMayNotAskForLargePictures) {
+  const engine::CameraModel::Intrinsics vast{8000, 8000, 500, 500, 4000, 4000};
+  const CameraTable cameras(2, std::make_shared<const engine::CameraModel>(
+                                   engine::LensModel::kRadialTangential, vast, std::array<double, 5>{}));
+  std::string hex;
+  for (const std::uint8_t byte : EncodeCameras(1, cameras)) {
+    for (const int half : {byte >> 4, byte & 15}) hex += "0123456789ABCDEF"[half];
+  }
+  RunSql("UPDATE parts SET data = x'" + hex + "' WHERE map_key = 1 AND part = 'cameras'");
+  const Library library = Open(Access::kReadOnly);
+  EXPECT_THAT(ErrorOf([&] { library.Load(1); }),
+              HasSubstr("a picture size that a file so small does not hold"));
+  EXPECT_EQ(FirstDifference(*library.Load(2).snapshot, *door_), "");
+}
+
+TEST_F(Damage, ALargePictureWithNothingInItIsNoDamage) {
+  auto map = MakeSampleMap(3, {.keyframes = 1, .points = 0, .width_px = 2048, .height_px = 1536});
+  auto features = std::make_shared<engine::ImageFeatures>(*map->keyframes[0].features);
+  features->levels[0] = cv::Mat(1536, 2048, CV_8UC1, cv::Scalar(90));
+  map->keyframes[0].features = features;
+  Library library = Open(Access::kReadWrite);
+  library.Save({library.NewKey(), "Night", Policy::kOpen, map, nullptr});
+  EXPECT_EQ(FirstDifference(*library.Load(3).snapshot, *map), "");
+  EXPECT_TRUE(library.Verify().empty());
 }
 
 TEST_F(Damage, VerifyNamesWhatIsDamaged) {

@@ -75,11 +75,11 @@ KeyFrame MakeKeyFrame(engine::KeyFrameId id, const Eigen::Vector3d& center, std:
 bool Same(const KeyFrame& a, const KeyFrame& b) {
   const cv::Mat& picture_a = a.features->levels[0];
   const cv::Mat& picture_b = b.features->levels[0];
-  // A rotation is normalized when it is read, which may move the last bit.
+  // A rotation is normalized when it is read, which may move the last bits.
   return a.id == b.id && a.kind == b.kind && a.panorama == b.panorama && a.fixed == b.fixed &&
          a.time == b.time &&
          a.camera_from_map.rotation.quaternion().coeffs().isApprox(
-             b.camera_from_map.rotation.quaternion().coeffs(), 1e-15) &&
+             b.camera_from_map.rotation.quaternion().coeffs(), 1e-14) &&
          a.camera_from_map.translation == b.camera_from_map.translation && a.mean_depth == b.mean_depth &&
          a.depth_sigma == b.depth_sigma && *a.camera == *b.camera && picture_a.size() == picture_b.size() &&
          picture_a.type() == picture_b.type() &&

@@ -8,6 +8,7 @@
 #include "maps/library.h"
 #include "maps/schema.h"
 #include "maps/thumbnail_rows.h"
+#include "tests/maps/failing_disk.h"
 #include "tests/maps/map_samples.h"
 
 namespace docent::maps {
@@ -134,6 +135,30 @@ TEST_F(Migration, WithoutRoomForACopyNothingIsUpgraded) {
   EXPECT_THAT(ErrorOf([&] { Open(file_, Access::kReadWrite); }),
               HasSubstr("no copy of it can be made beside it"));
   ExpectAllThere(Open(file_, Access::kReadOnly));
+}
+
+TEST_F(Migration, ADiskThatFillsUpAtAnyWriteLosesNothing) {
+  const Bytes before = ReadWholeFile(file_);
+  int failures = 0;
+  for (int writes = 0; writes < 90; writes += 6) {
+    std::filesystem::remove(folder_ / "a.docent.format-1");
+    WriteWholeFile(file_, before);
+    {
+      FailingDisk disk;
+      disk.FailAfter(writes);
+      const std::string error = ErrorOf([&] { Open(file_, Access::kReadWrite); });
+      if (error != "no error") {
+        ++failures;
+        EXPECT_THAT(error, HasSubstr("the disk is full"));
+        EXPECT_EQ(error.find('\n'), std::string::npos);
+      }
+    }
+    ExpectAllThere(Open(file_, Access::kReadOnly));
+    ExpectAllThere(Open(file_, Access::kReadWrite));
+    ExpectAllThere(Open(folder_ / "a.docent.format-1", Access::kReadOnly));
+    EXPECT_EQ(FilesIn(folder_.path()), "a.docent a.docent.format-1");
+  }
+  EXPECT_GT(failures, 3) << "the disk was never full";
 }
 
 TEST(Thumbnails, AreThoseOfTheKeyframesAfterEverySave) {

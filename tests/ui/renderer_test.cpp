@@ -193,6 +193,23 @@ TEST_F(RendererTest, DrawsTheWearerIntoTheSearchWithAFigureThatMoves) {
   EXPECT_GT(CountDifferent(early(middle), late(middle)), 1000);
 }
 
+TEST_F(RendererTest, SaysHowFarTheMapHasCome) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(90, 90, 90)));
+  View view;
+  view.tracked = &tracked;
+  view.camera = &camera;
+  std::vector<cv::Mat> pictures;
+  for (const char* word : {"", "limited", "extending", "mapped"}) {
+    view.overlay.mapping = word;
+    renderer.Draw(view);
+    renderer.ReadBack(&pictures.emplace_back());
+    for (std::size_t i = 0; i + 1 < pictures.size(); ++i)
+      EXPECT_GT(CountDifferent(pictures[i], pictures.back()), 20) << word;
+  }
+}
+
 TEST_F(RendererTest, SurvivesAnyTextInItsLabels) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();

@@ -2,7 +2,10 @@
 #include "app/session/session.h"
 
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
+#include <algorithm>
+#include <csignal>
 #include <fstream>
 
 #include "app/cameras/simulated_source.h"
@@ -196,6 +199,83 @@ TEST(Session, RefusesACommandThatCannotBeCarriedOutAndNamesItsLine) {
   EXPECT_THAT(refusal(Undo{}), HasSubstr("no current map"));
   EXPECT_THAT(refusal(Save{}), HasSubstr("no library"));
   EXPECT_THAT(refusal(PlaceModel{"missing.glb", {1, 1}, 1, 0}), HasSubstr("line 7"));
+}
+
+// While one exists no file grows: a disk that is full for a while.
+class NoRoom {
+ public:
+  NoRoom() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &limit_);
+    const rlimit none{4096, limit_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &none);
+  }
+  ~NoRoom() {
+    setrlimit(RLIMIT_FSIZE, &limit_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  NoRoom(const NoRoom&) = delete;
+  NoRoom& operator=(const NoRoom&) = delete;
+
+ private:
+  void (*handler_)(int);
+  rlimit limit_{};
+};
+
+TEST(Session, TellsOfADiskThatIsFullForAWhileAndSavesAllOfItLater) {
+  const auto simulation = Room(3);
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  SessionOptions options = Options(Pace::kLockstep, "Desk");
+  options.autosave_interval = options.probation = std::chrono::milliseconds(200);
+  Session session(options, LensOf(*simulation), &library);
+  CalibratedCamera camera = CameraOf(simulation);
+  FrameLoopOptions loop;
+  loop.pace = Pace::kLockstep;
+  std::optional<NoRoom> full;
+  std::vector<Event> events;
+  RunFrames(&camera, &session, loop,
+            [&](const engine::TrackedFrame& frame) {
+              const double seconds = ToSeconds(frame.frame.time);
+              if (seconds > 1.4 && seconds < 2.4 && !full) full.emplace();
+              if (seconds >= 2.4) full.reset();
+              for (Event& event : session.TakeEvents()) events.push_back(std::move(event));
+            },
+            {});
+  full.reset();
+  session.Finish();
+  const auto warned = std::count_if(events.begin(), events.end(), [](const Event& event) {
+    return event.event == "warning" && event.detail.find("cannot be read or written") != std::string::npos;
+  });
+  EXPECT_GT(warned, 0);
+  const maps::StoredMap stored = library.Load(library.FindByName("Desk").key);
+  EXPECT_EQ(stored.snapshot->keyframes.size(), session.Maps().at(0).snapshot->keyframes.size());
+  EXPECT_EQ(stored.info.revision, session.Maps().at(0).snapshot->revision);
+  EXPECT_THAT(library.Verify(), IsEmpty());
+}
+
+TEST(Session, SaysInTheEndWhatCouldNotBeSavedAndKeepsWhatWas) {
+  const auto simulation = Room(2.5);
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  SessionOptions options = Options(Pace::kLockstep, "Desk");
+  options.autosave_interval = options.probation = std::chrono::milliseconds(200);
+  Session session(options, LensOf(*simulation), &library);
+  std::optional<NoRoom> full;
+  CalibratedCamera camera = CameraOf(simulation);
+  FrameLoopOptions loop;
+  loop.pace = Pace::kLockstep;
+  RunFrames(&camera, &session, loop,
+            [&](const engine::TrackedFrame& frame) {
+              if (ToSeconds(frame.frame.time) > 1.8 && !full && !library.List().empty()) full.emplace();
+            },
+            {});
+  ASSERT_TRUE(full);
+  EXPECT_THAT(ErrorOf([&] { session.Finish(); }), HasSubstr("l.docent"));
+  full.reset();
+  EXPECT_THAT(library.Verify(), IsEmpty());
+  EXPECT_GE(library.Load(library.FindByName("Desk").key).snapshot->keyframes.size(), 2u);
 }
 
 TEST(SurfaceAtPixel, FindsUpwardsAgainstTheLowerEdgeOfThePictures) {

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/maps_exchange_command.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <stop_token>
+#include <thread>
+
+#include "app/command_line/interruption.h"
+#include "app/command_line/progress.h"
+#include "app/files/checked_file.h"
+#include "app/session/surface_at_pixel.h"
+#include "engine/base/error.h"
+#include "engine/base/worker.h"
+#include "maps/colmap_model.h"
+#include "maps/exchange.h"
+#include "maps/recovery.h"
+#include "maps/upkeep.h"
+#include "maps/view_from_above.h"
+
+namespace docent::app {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExchangeOptions {
+  fs::path library, output, from;
+  std::string name;
+};
+using ExchangeAction = void (*)(const ExchangeOptions& options, Verbosity verbosity);
+
+void WriteText(const fs::path& path, std::string_view text) {
+  CheckedFile file(path);
+  file.Write(text);
+  file.Close();
+}
+
+void WritePng(const fs::path& path, const cv::Mat& picture) {
+  std::vector<std::uint8_t> bytes;
+  if (!cv::imencode(".png", picture, bytes)) throw Error(path.string() + " cannot be written as PNG");
+  WriteText(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+// The folder appears when everything in it is written.
+void WriteColmap(const fs::path& folder, const engine::MapSnapshot& map) {
+  const maps::ColmapModel model = maps::MakeColmapModel(map);
+  fs::path unfinished = folder.has_filename() ? folder : folder.parent_path();
+  unfinished += ".part";
+  MakeFolder(unfinished / "images");
+  WriteText(unfinished / "cameras.txt", model.cameras);
+  WriteText(unfinished / "images.txt", model.images);
+  WriteText(unfinished / "points3D.txt", model.points3d);
+  for (const auto& [name, keyframe] : model.picture_of)
+    WritePng(unfinished / "images" / name, map.FindKeyFrame(keyframe)->features->levels[0]);
+  std::error_code error;
+  fs::rename(unfinished, folder, error);
+  if (error) throw Error("Cannot write '" + folder.string() + "': " + error.message() + ".");
+}
+
+// What of a map does not go into a file made of places.
+std::string SayLeftOut(const engine::MapSnapshot& map) {
+  const auto infinite = std::count_if(map.points.begin(), map.points.end(),
+                                      [](const engine::MapPoint& point) { return point.infinite(); });
+  if (infinite == 0) return "";
+  return "; " + std::to_string(infinite) +
+         (infinite == 1 ? " point at infinity was left out, because it has no place"
+                        : " points at infinity were left out, because they have no place");
+}
+
+void Export(const ExchangeOptions& options, Verbosity verbosity) {
+  const maps::Library library = maps::Library::Open(options.library, maps::Access::kReadOnly);
+  const std::uint64_t key = library.FindByName(options.name).key;
+  const std::string kind = options.output.extension().string();
+  if (kind != "" && kind != ".docent" && kind != ".ply" && kind != ".png") {
+    throw Error("'" + options.output.string() +
+                "' is no kind of export: name a .docent, .ply or .png file, or a folder for COLMAP's files");
+  }
+  std::error_code error;
+  if (fs::exists(options.output, error) && !(kind.empty() && fs::is_empty(options.output, error)))
+    throw Error(options.output.string() + " exists already; name something new");
+  std::string left_out;
+  if (kind == ".docent") {
+    maps::ExportMap(library, key, options.output);
+  } else {
+    const auto map = library.Load(key).snapshot;
+    left_out = SayLeftOut(*map);
+    if (kind == ".ply") WriteText(options.output, maps::MakePly(*map));
+    if (kind == ".png") {
+      const Eigen::Vector3d up = map->keyframes.empty() ? -Eigen::Vector3d::UnitY().eval() : UpInMap(*map);
+      WritePng(options.output, maps::DrawFromAbove(*map, up));
+    }
+    if (kind.empty()) WriteColmap(options.output, *map);
+  }
+  if (verbosity != Verbosity::kQuiet)
+    std::printf("%s: written to %s%s\n", options.name.c_str(), options.output.c_str(), left_out.c_str());
+}
+
+void Import(const ExchangeOptions& options, Verbosity verbosity) {
+  const maps::Library from = maps::Library::Open(options.from, maps::Access::kReadOnly);
+  for (const maps::ImportedMap& map : maps::ImportMaps(from, options.library)) {
+    if (verbosity == Verbosity::kQuiet) continue;
+    if (map.name == map.name_before) {
+      std::printf("%s\n", map.name.c_str());
+    } else {
+      std::printf("%s, because there was a map of the name %s\n", map.name.c_str(), map.name_before.c_str());
+    }
+  }
+}
+
+const char* Say(maps::Optimization::Outcome outcome) {
+  using Outcome = maps::Optimization::Outcome;
+  switch (outcome) {
+    case Outcome::kAdjusted:
+      return "adjusted";
+    case Outcome::kAlreadyBest:
+      return "was at its best";
+    case Outcome::kNotAllowed:
+      return "left alone, as its policy says";
+    case Outcome::kTooSmall:
+      return "too small to adjust";
+    case Outcome::kInterrupted:
+      return "interrupted, left as it was";
+    case Outcome::kChangedMeanwhile:
+      return "was changed by another program meanwhile, left as it is";
+    case Outcome::kFailed:
+      return "cannot be adjusted, left as it was";
+  }
+  return "";
+}
+
+void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
+  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
+  std::vector<maps::MapInfo> infos = library.List();
+  if (!options.name.empty()) infos = {library.FindByName(options.name)};
+  const Interruption interruption;
+  std::atomic<bool> interrupt = false;
+  // A signal cannot reach into an adjustment by itself.
+  Worker watch("interruption", [&](const std::stop_token& stop) {
+    while (!stop.stop_requested() && !interrupt) {
+      interrupt = Interruption::requested();
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  });
+  std::optional<Progress> progress;
+  progress.emplace("maps", infos.size(), verbosity);
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < infos.size() && !Interruption::requested(); ++i) {
+    const maps::Optimization result = maps::OptimizeMap(&library, infos[i].key, &interrupt);
+    char numbers[200] = "";
+    if (result.outcome == maps::Optimization::Outcome::kAdjusted) {
+      std::snprintf(
+          numbers, sizeof numbers,
+          ": %.3f px before, %.3f px after; %zu observations found and %zu thrown out, %zu points removed",
+          result.rms_before_px, result.rms_after_px, result.observations_added, result.observations_removed,
+          result.points_removed);
+    }
+    lines.push_back(infos[i].name + " " + Say(result.outcome) + numbers);
+    progress->Update(i + 1);
+  }
+  progress.reset();  // wipes its line away
+  if (verbosity != Verbosity::kQuiet) {
+    for (const std::string& line : lines) std::printf("%s\n", line.c_str());
+  }
+  if (Interruption::requested()) throw Error("interrupted; what was adjusted before is saved");
+}
+
+void Recover(const ExchangeOptions& options, Verbosity verbosity) {
+  const maps::Recovery recovery = maps::Recover(options.library, options.output);
+  if (verbosity == Verbosity::kQuiet) return;
+  for (const std::string& problem : recovery.problems) std::printf("lost: %s\n", problem.c_str());
+  std::printf("%zu maps whole and %zu in part, written to %s\n", recovery.maps_whole, recovery.maps_in_part,
+              options.output.c_str());
+}
+
+}  // namespace
+
+void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
+  const auto options = std::make_shared<ExchangeOptions>();
+  const auto add = [&](const char* name, const char* description, const char* example,
+                       ExchangeAction action) {
+    CLI::App* command = AddSubcommand(group, name, description, example);
+    command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+    command->callback([=] { invocation->run = [=] { action(*options, invocation->verbosity); }; });
+    return command;
+  };
+  CLI::App* command =
+      add("export", "Write one map as a library of its own, for COLMAP, as PLY, or as a plan",
+          "docent maps export \"Desk 3\" --library museum.docent --output desk.docent", Export);
+  command->add_option("NAME", options->name, "Name of the map")->required();
+  command
+      ->add_option(
+          "--output", options->output,
+          "A .docent library, a .ply cloud, a .png picture from above, or a folder for COLMAP's text model")
+      ->required();
+  add("import", "Add the maps of another library; names that are taken get a number",
+      "docent maps import desk.docent --library museum.docent", Import)
+      ->add_option("FILE", options->from, "The other library")
+      ->required();
+  add("optimize", "Adjust whole maps, and find their points in keyframes that missed them",
+      "docent maps optimize --library museum.docent", Optimize)
+      ->add_option("NAME", options->name, "Name of the map; all when it is left out");
+  add("recover", "Save what a damaged library still holds into a new one",
+      "docent maps recover --library damaged.docent --output saved.docent", Recover)
+      ->add_option("--output", options->output, "The new library")
+      ->required();
+}
+
+}  // namespace docent::app

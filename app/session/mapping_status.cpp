@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/mapping_status.h"
+
+#include "engine/base/time.h"
+
+namespace docent::app {
+
+const char* ToString(MappingStatus status) {
+  switch (status) {
+    case MappingStatus::kStarting:
+      return "starting";
+    case MappingStatus::kLimited:
+      return "limited";
+    case MappingStatus::kExtending:
+      return "extending";
+    case MappingStatus::kMapped:
+      return "mapped";
+  }
+  return "";
+}
+
+MappingStatus MappingStatusOf(const engine::TrackedFrame& frame, bool grows) {
+  using engine::TrackingState;
+  constexpr Timestamp kExtendingFor = std::chrono::seconds(2);
+  if (frame.state == TrackingState::kInitializing) return MappingStatus::kStarting;
+  const bool well = engine::HasPose(frame.state) && frame.state != TrackingState::kPanorama &&
+                    frame.quality_class == engine::TrackingQuality::kGood;
+  if (!well || !frame.map || frame.map->keyframes.empty()) return MappingStatus::kLimited;
+  const Timestamp since = frame.frame.time - frame.map->keyframes.back().time;
+  const bool extends = grows && since >= Timestamp{} && since < kExtendingFor;
+  return extends ? MappingStatus::kExtending : MappingStatus::kMapped;
+}
+
+}  // namespace docent::app

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/relocalization_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <tuple>
+
+#include "engine/map/map.h"
+#include "engine/tracking/tracker.h"
+#include "maps/place_index.h"
+#include "maps/view_from_above.h"
+
+namespace docent::maps {
+
+namespace {
+
+constexpr std::uint64_t kKey = 1;
+
+// The places of a map without one keyframe: those of an index of the whole, less what is not there.
+class PlacesWithout : public engine::PlaceFinder {
+ public:
+  PlacesWithout(const PlaceIndex& index, std::shared_ptr<const engine::MapSnapshot> rest)
+      : index_(index), rest_(std::move(rest)) {}
+
+  std::vector<engine::PlaceCandidate> FindPlaces(const engine::SmallBlurryImage& image, int count,
+                                                 int per_map, std::uint64_t only_map) const override {
+    const int gone = static_cast<int>(index_.keyframes() - rest_->keyframes.size());
+    auto places = index_.FindPlaces(image, count + gone, per_map + gone, only_map);
+    std::erase_if(places, [&](const engine::PlaceCandidate& place) {
+      return rest_->FindKeyFrame(place.keyframe) == nullptr;
+    });
+    places.resize(std::min(places.size(), static_cast<std::size_t>(std::max(0, std::min(count, per_map)))));
+    for (engine::PlaceCandidate& place : places) place.map = rest_;
+    return places;
+  }
+
+ private:
+  const PlaceIndex& index_;
+  const std::shared_ptr<const engine::MapSnapshot> rest_;
+};
+
+RelocalizationTrial::Result Try(const engine::MapSnapshot& map, const PlaceIndex& index,
+                                const engine::KeyFrame& keyframe, const RelocalizationOptions& options) {
+  using Result = RelocalizationTrial::Result;
+  engine::Map without(map);
+  without.RemoveKeyFrame(keyframe.id);
+  const auto rest = without.Snapshot();
+  if (!rest->HasFinitePoints()) return Result::kNotFound;
+  const PlacesWithout places(index, rest);
+  engine::TrackerOptions tracker_options;
+  tracker_options.build_maps = false;
+  engine::Tracker tracker(tracker_options, keyframe.camera, options.seed);
+  tracker.SetMap(rest, kKey);
+  engine::Frame frame;
+  frame.time = keyframe.time;
+  frame.picture = keyframe.features->levels[0];
+  const engine::TrackedFrame tracked = tracker.Track(frame, &places);
+  if (!engine::HasPose(tracked.state)) return Result::kNotFound;
+  const engine::Rigid3 error = tracked.camera_from_map * keyframe.camera_from_map.inverse();
+  const double angle_deg = error.rotation.Log().norm() * 180 / std::numbers::pi;
+  const double distance =
+      (tracked.camera_from_map.OriginInSource() - keyframe.camera_from_map.OriginInSource()).norm();
+  const bool right =
+      angle_deg <= options.max_rotation_deg && distance <= options.max_distance * keyframe.mean_depth;
+  return right ? Result::kFound : Result::kWrongPose;
+}
+
+}  // namespace
+
+std::vector<RelocalizationTrial> LeaveEachKeyFrameOut(const engine::MapSnapshot& map,
+                                                      const RelocalizationOptions& options,
+                                                      const std::function<bool(std::size_t)>& progress) {
+  PlaceIndex index;
+  index.SetMap(kKey, std::make_shared<const engine::MapSnapshot>(map));
+  std::vector<RelocalizationTrial> trials;
+  for (const engine::KeyFrame& keyframe : map.keyframes) {
+    if (keyframe.kind != engine::KeyFrameKind::kSixDof) continue;
+    RelocalizationTrial trial;
+    trial.keyframe = keyframe.id;
+    trial.place = keyframe.camera_from_map.OriginInSource();
+    trial.direction = keyframe.camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
+    trial.result = Try(map, index, keyframe, options);
+    trials.push_back(trial);
+    if (progress && !progress(trials.size())) break;
+  }
+  return trials;
+}
+
+RelocalizationGrid MakeRelocalizationGrid(const engine::MapSnapshot& map,
+                                          const std::vector<RelocalizationTrial>& trials,
+                                          const Eigen::Vector3d& up) {
+  RelocalizationGrid grid;
+  if (trials.empty() || map.keyframes.empty()) return grid;
+  std::vector<double> depths;
+  for (const engine::KeyFrame& keyframe : map.keyframes) depths.push_back(keyframe.mean_depth);
+  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2),
+                   depths.end());
+  grid.side = std::max(1e-6, 0.5 * depths[depths.size() / 2]);
+  const Eigen::Matrix<double, 2, 3> sheet_from_map = SheetFromMap(map, up);
+  const Eigen::Vector2d origin = sheet_from_map * map.keyframes.front().camera_from_map.OriginInSource();
+  std::map<std::tuple<int, int, int>, RelocalizationCell> cells;
+  for (const RelocalizationTrial& trial : trials) {
+    const Eigen::Vector2d place = (sheet_from_map * trial.place - origin) / grid.side;
+    const Eigen::Vector2d view = sheet_from_map * trial.direction;
+    RelocalizationCell cell;
+    // The sheet's second axis points down, which is back.
+    cell.square = {static_cast<int>(std::floor(place.x() + 0.5)),
+                   static_cast<int>(std::floor(-place.y() + 0.5))};
+    const double eighths = std::atan2(view.x(), -view.y()) * 4 / std::numbers::pi;
+    cell.direction = (static_cast<int>(std::lround(eighths)) + 8) % 8;
+    auto& kept = cells[{cell.square.x(), cell.square.y(), cell.direction}];
+    cell.trials = kept.trials + 1;
+    cell.found = kept.found + (trial.result == RelocalizationTrial::Result::kFound ? 1 : 0);
+    kept = cell;
+  }
+  for (const auto& [place, cell] : cells) grid.cells.push_back(cell);
+  return grid;
+}
+
+}  // namespace docent::maps

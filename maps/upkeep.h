@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+#include "maps/library.h"
+
+namespace docent::maps {
+
+// What became of a map that rests (ptamm §3.1: the map maker visits maps that nobody is in).
+struct Optimization {
+  enum class Outcome {
+    kAdjusted,
+    kAlreadyBest,
+    kNotAllowed,
+    kTooSmall,
+    kInterrupted,
+    kChangedMeanwhile,  // by another program: its work stays
+    kFailed
+  };
+  Outcome outcome = Outcome::kFailed;
+  // Of the observations that were there before and stayed: what was found must not make the comparison
+  // unfair.
+  double rms_before_px = 0, rms_after_px = 0;
+  std::size_t points_removed = 0, observations_removed = 0, observations_added = 0;
+};
+
+// Adjusts all keyframes and points of a map together, looks for its points in the keyframes that should see
+// them and do not, adjusts again, and saves it where that changed anything; what does not fit the whole is
+// removed. The policy must allow that its structure changes. `interrupt` may be null; a map whose adjustment
+// was interrupted stays as it was. The library makes full features. Throws docent::Error for what the file
+// has wrong.
+Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<bool>* interrupt);
+
+// Root mean square distance between where points were seen and where they should be, pixels of level 0:
+// of the observations of finite points that project and that `counted` has too. 0 when there is none.
+double ReprojectionRms(const engine::MapSnapshot& map, const engine::MapSnapshot& counted);
+
+}  // namespace docent::maps

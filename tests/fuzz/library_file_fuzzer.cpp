@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <opencv2/core/mat.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "maps/library.h"
+#include "maps/recovery.h"
+#include "maps/snapshot_reader.h"
+#include "tests/fuzz/allocation_limit.h"
+
+// Feeds a whole library file to everything that reads one: opening, listing, thumbnails, maps, scenes,
+// verifying, recovering. The input changes a small library that is right: it is a row of patches, each an
+// offset of 3 bytes, a length of 1 byte and that many bytes; a last patch that is cut off cuts the file
+// there. An input that begins as SQLite files do is the file itself. What the recovery writes must verify. No
+// allocation may be larger than four times the file, and what SQLite and the decoders need for any file.
+namespace {
+
+namespace fs = std::filesystem;
+using docent::maps::Bytes;
+
+fs::path Folder() {
+  // Never destroyed: it is needed at the very end.
+  static const fs::path& folder = *new fs::path([] {
+    const char* const memory = "/dev/shm";
+    std::error_code error;
+    const fs::path base = fs::is_directory(memory, error) ? fs::path(memory) : fs::temp_directory_path();
+    fs::path made = base / ("docent-fuzz-" + std::to_string(getpid()));
+    fs::create_directories(made);
+    std::atexit([] { fs::remove_all(Folder()); });
+    return made;
+  }());
+  return folder;
+}
+
+docent::maps::LibraryOptions Quick() {
+  docent::maps::LibraryOptions options;
+  options.make_features = docent::maps::MakeSizesOnly;
+  options.load_threads = 1;
+  return options;
+}
+
+Bytes MakeSeed() {
+  using namespace docent;
+  const fs::path path = Folder() / "seed.docent";
+  {
+    maps::Library library =
+        maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes, Quick());
+    const engine::CameraModel::Intrinsics intrinsics{64, 64, 60, 60, 32, 32};
+    const auto camera = std::make_shared<const engine::CameraModel>(engine::LensModel::kRadialTangential,
+                                                                    intrinsics, std::array<double, 5>{});
+    for (int m = 0; m < 2; ++m) {
+      auto map = std::make_shared<engine::MapSnapshot>();
+      for (std::uint32_t i = 0; i < 2; ++i) {
+        engine::KeyFrame keyframe;
+        keyframe.id = i;
+        keyframe.camera = camera;
+        keyframe.features = maps::MakeSizesOnly(cv::Mat(64, 64, CV_8UC1, cv::Scalar(50.0 + i)));
+        map->keyframes.push_back(keyframe);
+        engine::MapPoint point;
+        point.id = i;
+        point.point_in_map = {0.1 * i, 0, 1, 1};
+        point.source_keyframe = 0;
+        map->points.push_back(point);
+        map->observations.push_back({0, i, {5, 5}, 0});
+      }
+      map->next_keyframe = map->next_point = 2;
+      auto scene = std::make_shared<maps::SceneRecord>();
+      scene->text = "{}";
+      scene->assets.push_back({"asset", "model.glb", std::make_shared<const Bytes>(Bytes(20, 7))});
+      library.Save({library.NewKey(), "map " + std::to_string(m), maps::Policy::kOpen, map, scene});
+    }
+  }
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+Bytes Patched(Bytes file, std::span<const std::uint8_t> patches) {
+  constexpr std::size_t kHead = 4;
+  while (patches.size() > kHead) {
+    const std::size_t offset =
+        (patches[0] | std::size_t{patches[1]} << 8 | std::size_t{patches[2]} << 16) % file.size();
+    const std::size_t length = patches[3];
+    patches = patches.subspan(kHead);
+    if (length > patches.size()) {
+      file.resize(offset);
+      break;
+    }
+    for (std::size_t i = 0; i < length && offset + i < file.size(); ++i) file[offset + i] = patches[i];
+    patches = patches.subspan(length);
+  }
+  return file;
+}
+
+void ReadAll(const fs::path& path) {
+  using namespace docent::maps;
+  const Library library = Library::Open(path, Access::kReadOnly, CreateIfMissing::kNo, Quick());
+  library.Verify();
+  library.LoadThumbnails([](const MapInfo&, const std::vector<KeyFrameThumbnail>&, const std::string&) {});
+  for (const MapInfo& info : library.List()) {
+    try {
+      library.Load(info.key);
+    } catch (const docent::Error&) {
+      // The next one may be whole.
+    }
+  }
+}
+
+void Recover(const fs::path& path) {
+  using namespace docent::maps;
+  const fs::path target = Folder() / "recovered.docent";
+  std::error_code error;
+  fs::remove(target, error);
+  docent::maps::Recover(path, target);
+  const Library library = Library::Open(target, Access::kReadOnly, CreateIfMissing::kNo, Quick());
+  if (!library.Verify().empty()) std::abort();
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const Bytes seed = MakeSeed();
+  constexpr char kMagic[] = "SQLite format 3";
+  const bool whole = size >= sizeof(kMagic) && std::memcmp(data, kMagic, sizeof(kMagic)) == 0;
+  const Bytes file = whole ? Bytes(data, data + size) : Patched(seed, {data, size});
+  const fs::path path = Folder() / "input.docent";
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
+  constexpr std::size_t kForAnyFile = 1 << 21;  // twenty of SQLite's largest pages among them
+  for (const auto& step : {ReadAll, Recover}) {
+    const AllocationLimit limit(4 * file.size() + kForAnyFile);
+    try {
+      step(path);
+    } catch (const docent::Error&) {
+      // The right answer to most inputs.
+    }
+  }
+  return 0;
+}

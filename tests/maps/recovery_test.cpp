@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/recovery.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include "engine/base/error.h"
+#include "engine/base/random.h"
+#include "maps/library.h"
+#include "tests/maps/map_samples.h"
+
+namespace docent::maps {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class Recovering : public ::testing::Test {
+ protected:
+  Recovering() {
+    Library library = Library::Open(file_, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+    for (std::uint64_t i = 0; i < maps_.size(); ++i)
+      library.Save({library.NewKey(), NameOf(i), Policy::kOpen, maps_[i], MakeSampleScene(i, 1)});
+  }
+  static std::string NameOf(std::size_t i) { return "map number " + std::to_string(i); }
+  void RunSql(const std::string& sql) const {
+    sqlite3* connection = nullptr;
+    ASSERT_EQ(sqlite3_open(file_.c_str(), &connection), SQLITE_OK);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_free(message);
+    sqlite3_close(connection);
+  }
+  Library OpenRecovered() const {
+    return Library::Open(target_, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  }
+
+  TemporaryFolder folder_;
+  const std::filesystem::path file_ = folder_ / "a.docent", target_ = folder_ / "b.docent";
+  std::vector<std::shared_ptr<engine::MapSnapshot>> maps_ = {
+      MakeSampleMap(1), MakeSampleMap(2, {.keyframes = 6}), MakeSampleMap(3), MakeSampleMap(4)};
+};
+
+TEST_F(Recovering, AWholeLibraryComesBackWhole) {
+  const Bytes before = ReadWholeFile(file_);
+  const Recovery recovery = Recover(file_, target_);
+  EXPECT_EQ(recovery.maps_whole, 4u);
+  EXPECT_EQ(recovery.maps_in_part, 0u);
+  EXPECT_THAT(recovery.problems, IsEmpty());
+  EXPECT_EQ(ReadWholeFile(file_), before);
+  const Library library = OpenRecovered();
+  EXPECT_THAT(library.Verify(), IsEmpty());
+  for (std::size_t i = 0; i < maps_.size(); ++i) {
+    const StoredMap stored = library.Load(library.FindByName(NameOf(i)).key);
+    EXPECT_EQ(FirstDifference(*stored.snapshot, *maps_[i]), "");
+    EXPECT_EQ(FirstDifference(stored.scene, *MakeSampleScene(i, 1)), "");
+  }
+  EXPECT_THAT(ErrorOf([&] { Recover(file_, target_); }), HasSubstr("exists already"));
+}
+
+TEST_F(Recovering, WhatIsLostIsNamedAndTheRestIsSaved) {
+  RunSql("DELETE FROM pictures WHERE map_key = 2 AND keyframe = 3");  // one keyframe of six
+  RunSql("UPDATE parts SET data = x'00' WHERE map_key = 3 AND part = 'points'");
+  RunSql("UPDATE maps SET name = 'forged' WHERE key = 4");  // its entry is not to be believed
+  RunSql("DELETE FROM assets WHERE id = 'asset-0'");        // the scene of the first map
+  const Recovery recovery = Recover(file_, target_);
+  EXPECT_EQ(recovery.maps_whole, 0u);
+  EXPECT_EQ(recovery.maps_in_part, 3u);
+  EXPECT_THAT(recovery.problems, Contains(HasSubstr("the picture of keyframe 3 is missing")));
+  EXPECT_THAT(recovery.problems, Contains(HasSubstr("the table of points is cut off")));
+  EXPECT_THAT(recovery.problems, Contains(HasSubstr("the entry of map 4: its checksum does not match")));
+  EXPECT_THAT(recovery.problems, Contains(HasSubstr("the asset asset-0 is missing")));
+  const Library library = OpenRecovered();
+  EXPECT_THAT(library.Verify(), IsEmpty());
+  EXPECT_EQ(library.List().size(), 3u);
+  EXPECT_EQ(FirstDifference(*library.Load(library.FindByName(NameOf(0)).key).snapshot, *maps_[0]), "");
+  const auto second = library.Load(library.FindByName(NameOf(1)).key).snapshot;
+  EXPECT_EQ(second->keyframes.size(), 5u);
+  EXPECT_EQ(second->FindKeyFrame(3), nullptr);
+  EXPECT_GT(second->points.size(), maps_[1]->points.size() / 2);
+  EXPECT_EQ(FirstDifference(library.Load(library.FindByName("map 4").key).scene, *MakeSampleScene(3, 1)), "");
+}
+
+TEST_F(Recovering, FromBytesFlippedAndFilesCutOffNothingFalseComesBack) {
+  const Bytes whole = ReadWholeFile(file_);
+  Random random(9);
+  int recovered = 0, nothing = 0;
+  for (int i = 0; i < 120; ++i) {
+    Bytes damaged = whole;
+    if (i % 3 == 0) {
+      damaged.resize(whole.size() / 3 + random.Below(static_cast<std::uint32_t>(2 * whole.size() / 3)));
+    } else {
+      for (int flips = 0; flips < 5; ++flips)
+        damaged[random.Below(static_cast<std::uint32_t>(whole.size()))] ^=
+            static_cast<std::uint8_t>(1 + random.Below(255));
+    }
+    WriteWholeFile(file_, damaged);
+    std::filesystem::remove(target_);
+    Recovery recovery;
+    try {
+      recovery = Recover(file_, target_);
+    } catch (const Error&) {
+      ++nothing;
+      EXPECT_FALSE(std::filesystem::exists(target_));
+      continue;
+    }
+    ++recovered;
+    EXPECT_EQ(ReadWholeFile(file_), damaged);
+    const Library library = OpenRecovered();
+    EXPECT_THAT(library.Verify(), IsEmpty());
+    const auto infos = library.List();
+    EXPECT_EQ(infos.size(), recovery.maps_whole + recovery.maps_in_part);
+    std::size_t equal = 0;
+    for (const MapInfo& info : infos) {
+      const auto map = library.Load(info.key).snapshot;
+      for (const auto& original : maps_) equal += FirstDifference(*map, *original).empty();
+    }
+    EXPECT_GE(equal, recovery.maps_whole);
+  }
+  EXPECT_GT(recovered, 60);
+  RecordProperty("nothing_recovered", nothing);
+}
+
+TEST_F(Recovering, NothingIsLeftWhereNothingCanBeSaved) {
+  RunSql("DELETE FROM parts");
+  EXPECT_THAT(ErrorOf([&] { Recover(file_, target_); }), HasSubstr("nothing could be recovered"));
+  WriteWholeFile(file_, Bytes(5000, 'x'));
+  EXPECT_THAT(ErrorOf([&] { Recover(file_, target_); }), HasSubstr("not a library of maps"));
+  EXPECT_EQ(FilesIn(folder_.path()), "a.docent");
+}
+
+}  // namespace
+}  // namespace docent::maps
