@@ -29,6 +29,7 @@ class ClippedSource : public FrameSource {
   }
   std::string trouble() const override { return source_->trouble(); }
   Delivery delivery() const override { return source_->delivery(); }
+  Head* head() const override { return source_->head(); }
 
  private:
   std::unique_ptr<FrameSource> source_;

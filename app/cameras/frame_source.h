@@ -59,7 +59,7 @@ class FrameSource {
   const SourceInfo& info() const { return info_; }
 
   // Of a camera that can turn its head; null for others.
-  Head* head() const { return head_.get(); }
+  virtual Head* head() const { return head_.get(); }
   void SetHead(std::unique_ptr<Head> head) { head_ = std::move(head); }
 
  protected:

@@ -207,6 +207,15 @@ TEST_F(Cameras, CanBeClippedToAPart) {
   EXPECT_EQ(frames[2].time, std::chrono::milliseconds(400));
 }
 
+TEST_F(Cameras, KeepTheirHeadWhenTheyAreClipped) {
+  const auto source = OpenCamera("sim:head", {});
+  Head* const head = source->head();
+  ASSERT_NE(head, nullptr);
+  EXPECT_EQ(OpenCamera("sim:hand", {})->head(), nullptr);
+  const auto clipped = ClipSource(OpenCamera("sim:head", {}), std::chrono::seconds(1), Timestamp{});
+  EXPECT_NE(clipped->head(), nullptr);
+}
+
 TEST(DeviceFormats, AreParsedOrRefused) {
   const DeviceFormat format = ParseDeviceFormat("640x480@29.97");
   EXPECT_EQ(format.width_px, 640);
