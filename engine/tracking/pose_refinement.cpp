@@ -96,7 +96,8 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
   result.camera_from_map = start;
   result.covariance.setZero();
   Matrix6 normal;
-  Kind kinds[2];  // finite, infinite
+  Kind kinds[2];     // finite, infinite
+  double depth = 0;  // summed over finite inliers
   for (int iteration = 0; iteration <= options.iterations; ++iteration) {
     // The last pass only weighs and counts at the final pose.
     const bool last = iteration == options.iterations;
@@ -108,6 +109,7 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
     normal.setZero();
     Vector6 gradient = Vector6::Zero();
     result.inliers = result.finite_inliers = 0;
+    depth = 0;
     for (PoseMeasurement& measurement : *measurements) {
       const Residual residual = Evaluate(camera, result.camera_from_map, pivot, measurement);
       const bool infinite = measurement.infinite();
@@ -117,6 +119,7 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
       if (measurement.weight > options.min_weight) {
         ++result.inliers;
         result.finite_inliers += !infinite;
+        if (!infinite) depth += (result.camera_from_map * measurement.point_in_map).z();
       }
       const double weight = measurement.weight * (infinite && !turn_only ? options.infinite_weight : 1.0);
       normal.noalias() += weight * residual.jacobian.transpose() * residual.jacobian;
@@ -159,11 +162,18 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
   }
   const double sigma = std::max(result.sigma, options.min_sigma);
   result.covariance = sigma * sigma * normal.ldlt().solve(Matrix6::Identity());
+  result.mean_depth = result.finite_inliers > 0 ? depth / result.finite_inliers : 0;
   if (turn_only) {
     result.covariance.leftCols<3>().setZero();
     result.covariance.topRows<3>().setZero();
   }
   return result;
+}
+
+// Whether the finite points hold the camera in its place.
+bool IsPlaced(const PoseRefinementOptions& options, const PoseRefinement& result) {
+  const double largest = options.max_position_sigma * result.mean_depth;
+  return result.covariance.topLeftCorner<3, 3>().trace() <= largest * largest;
 }
 
 }  // namespace
@@ -177,7 +187,7 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
   const bool may_turn = infinite >= kFewestInfinite;
   if (finite >= options.min_finite || !may_turn) {
     PoseRefinement result = Refine(camera, start, options, nullptr, measurements, scratch);
-    if (result.finite_inliers >= options.min_finite || !may_turn) {
+    if (!may_turn || (result.finite_inliers >= options.min_finite && IsPlaced(options, result))) {
       result.observed =
           result.inliers > result.finite_inliers ? ObservedMotion::kHybrid : ObservedMotion::kSixDof;
       return result;

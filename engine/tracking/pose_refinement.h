@@ -31,6 +31,9 @@ struct PoseRefinementOptions {
   // With fewer finite points there is no telling where the camera moved: beside infinite ones it is taken to
   // have turned only (hybrid-slam §4.3).
   int min_finite = 15;
+  // Nor is there where they say it less surely than this, of the depth of what they show: a few points at the
+  // rim of the picture err together, by ten times what each by itself would let one think.
+  double max_position_sigma = 0.003;
 };
 
 // What the measurements could tell of the pose.
@@ -48,6 +51,7 @@ struct PoseRefinement {
   double sigma = 0;  // robust, of the normalised residuals
   int inliers = 0;
   int finite_inliers = 0;  // of these
+  double mean_depth = 0;   // of the finite inliers; 0 for none
   bool converged = false;  // also false where the measurements do not hold the degrees of freedom asked for
 };
 

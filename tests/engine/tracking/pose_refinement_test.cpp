@@ -177,9 +177,9 @@ TEST(PoseRefinement, DoesNotBelieveWhatLiesBehindTheCamera) {
 TEST(PoseRefinement, IsHelpedInTheRotationByInfinitePoints) {
   Random random(7);
   std::vector<PoseMeasurement> finite, mixed;
-  AddMeasurements(20, 1, false, &random, &finite);
+  AddMeasurements(60, 0.5, false, &random, &finite);
   mixed = finite;
-  AddMeasurements(400, 1, true, &random, &mixed);
+  AddMeasurements(400, 0.5, true, &random, &mixed);
   const PoseRefinement alone = Refine(Perturbed(&random, 0.02, 1), &finite);
   const PoseRefinement both = Refine(Perturbed(&random, 0.02, 1), &mixed);
   ASSERT_TRUE(alone.converged && both.converged);
@@ -339,6 +339,29 @@ TEST(PoseRefinement, TakesNothingOfTheTranslationFromInfinitePoints) {
     const Matrix6 more = both - alone;
     EXPECT_GT((more.bottomRightCorner<3, 3>().trace()), 1e-3 * size);
   }
+}
+
+// Twenty points place a camera when they are all over the picture, not when they are about to leave it.
+TEST(PoseRefinement, HoldsTheCameraWhereItWasWhenFinitePointsPlaceItBadly) {
+  Random random(23);
+  std::vector<PoseMeasurement> rim, spread;
+  AddMeasurements(100, 0.5, true, &random, &rim);
+  spread = rim;
+  AddMeasurements(60, 0.2, false, &random, &spread);
+  while (rim.size() < 120) {
+    const Eigen::Vector2d pixel(random.Uniform(4, 30), random.Uniform(100, 300));
+    PoseMeasurement measurement;
+    measurement.point_in_map << Truth().inverse() *
+                                    Eigen::Vector3d(random.Uniform(2.5, 3) * *kLens.Unproject(pixel)),
+        1;
+    measurement.pixel = pixel + Eigen::Vector2d(Gaussian(&random), Gaussian(&random));
+    rim.push_back(measurement);
+  }
+  const Rigid3 start = Perturbed(&random, 0, 0.5);
+  const PoseRefinement held = Refine(start, &rim), placed = Refine(start, &spread);
+  EXPECT_EQ(held.observed, ObservedMotion::kPanorama);
+  EXPECT_LT((held.camera_from_map.OriginInSource() - start.OriginInSource()).norm(), 1e-9);
+  EXPECT_EQ(placed.observed, ObservedMotion::kHybrid);
 }
 
 }  // namespace
