@@ -16,6 +16,8 @@ constexpr int kCellsAcross = 4;                         // of the grid that inli
 constexpr int kCoverageColumns = 4, kCoverageRows = 3;  // hybrid-slam §4.1
 // An infinite point is left out where a finite one, or another, falls into the same cell (hybrid-slam §3.1).
 constexpr int kTakenCellPx = 16;
+constexpr std::size_t kMissesSlots = 16384;
+constexpr std::uint8_t kMostMisses = 4;  // in a row, that are told from more
 
 std::size_t CellOf(const Eigen::Vector2d& pixel, const CameraModel& camera, int columns, int rows) {
   const int column = std::clamp(static_cast<int>(pixel.x() * columns / camera.width_px()), 0, columns - 1);
@@ -30,6 +32,7 @@ MapTracker::MapTracker(const MapTrackerOptions& options, std::shared_ptr<const C
 
 void MapTracker::Clear() {
   searcher_.Clear();
+  misses_.clear();
   Forget();
 }
 
@@ -147,6 +150,24 @@ void MapTracker::Project(const std::vector<LocalPoint>& points, const Rigid3& ca
   }
 }
 
+void MapTracker::Remember() {
+  misses_.resize(kMissesSlots);
+  for (const Attempt& attempt : attempts_) {
+    Misses& misses = misses_[attempt.point % kMissesSlots];
+    if (misses.point != attempt.point) misses = {attempt.point, 0};
+    misses.in_a_row =
+        attempt.inlier ? std::uint8_t{0} : std::min<std::uint8_t>(misses.in_a_row + 1, kMostMisses);
+  }
+}
+
+// Ever fewer tries for what was missed again and again, but never none: what hid it may be gone.
+bool MapTracker::IsWorthATry(MapPointId point, Random* random) const {
+  if (misses_.empty()) return true;
+  const Misses& misses = misses_[point % kMissesSlots];
+  if (misses.point != point || misses.in_a_row == 0) return true;
+  return random->Below(1 + misses.in_a_row) == 0;
+}
+
 // Points are drawn at random so that a choice among many is spread over the picture and over the map.
 void MapTracker::AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random) {
   const std::size_t before = candidates_.size();
@@ -154,6 +175,7 @@ void MapTracker::AddCandidates(const Rigid3& camera_from_map, std::size_t wanted
     const std::size_t j = i + random->Below(static_cast<std::uint32_t>(visible_.size() - i));
     std::swap(visible_[i], visible_[j]);
     const auto& [point, source, place] = visible_[i];
+    if (!IsWorthATry(point->id, random)) continue;
     const auto predicted = searcher_.Predict(*point, *source, *camera_, camera_from_map, place);
     if (!predicted) continue;
     const auto index = static_cast<std::uint32_t>(candidates_.size());

@@ -87,6 +87,9 @@ class MapTracker {
     last_inliers_.clear();
     local_map_ = nullptr;
   }
+  // The frame just tracked was believed: points that were not found where they should be, as something hides
+  // them from here, are looked for less often from now on, until they are found again.
+  void Remember();
 
  private:
   // A point that may be looked for, with its source; both live in the snapshot that they were taken from.
@@ -110,6 +113,7 @@ class MapTracker {
   void CollectVisible(const MapSnapshot& map, const Rigid3& camera_from_map, Random* random);
   void Project(const std::vector<LocalPoint>& points, const Rigid3& camera_from_map);
   void AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random);
+  bool IsWorthATry(MapPointId point, Random* random) const;
   void CountInliers(MapTrackResult* result);
   void Search(const std::vector<std::uint32_t>& which, const ImageFeatures& features, float radius,
               bool direct);
@@ -124,6 +128,11 @@ class MapTracker {
   std::vector<PointMatch> matches_;
   std::vector<Attempt> attempts_;
   std::vector<MapPointId> last_inliers_;  // of the last frame, by ascending id
+  struct Misses {
+    MapPointId point = kNoId;
+    std::uint8_t in_a_row = 0;
+  };
+  std::vector<Misses> misses_;  // direct mapped: slot id % size
   // Scratch, kept to save allocations.
   std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
   std::vector<MapPointId> ids_;

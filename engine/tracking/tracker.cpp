@@ -343,6 +343,7 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
     anchor_pose_ = result.camera_from_map;
     last_points_ = frame.time;
     out->matches = map_tracker_.matches();
+    map_tracker_.Remember();
     CollectReports();
   }
   if (!good) out->hint = "few points are found: slow down";

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <numbers>
+#include <opencv2/core.hpp>
 
 #include "engine/tracking/tracker.h"
 #include "engine/vision/features.h"
@@ -115,6 +116,35 @@ TEST_F(TrackingInAMap, TellsWhatItLookedForAndFound) {
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(result.covariance);
   EXPECT_EQ(factor.info(), Eigen::Success) << "the covariance is not positive definite";
   EXPECT_LT(std::sqrt(result.covariance.topLeftCorner<3, 3>().trace()), 0.01);
+}
+
+// Somebody stands before the left half of the picture, and goes away again.
+TEST_F(TrackingInAMap, LooksLessOftenForWhatIsHidden) {
+  MapTracker tracker({}, camera_);
+  Random random(9);
+  const Rigid3 view = Views()[0];
+  cv::Mat picture = world_->Render(*camera_, view, 1.5, 3);
+  const auto free = MakeFeatures(picture.clone());
+  picture(cv::Rect(0, 0, picture.cols / 2, picture.rows)).setTo(90);
+  const auto hidden = MakeFeatures(picture);
+  const auto track = [&](const ImageFeatures& features, int frames) {
+    MapTrackResult result;
+    for (int i = 0; i < frames; ++i) {
+      result = tracker.Track(*map_, features, view, Effort::kUsual, &random);
+      tracker.Remember();
+    }
+    ExpectAt(result, view);
+    return result;
+  };
+  const MapTrackResult before = track(*free, 1);
+  const MapTrackResult first = track(*hidden, 1);
+  const MapTrackResult later = track(*hidden, 20);
+  EXPECT_LT(first.Quality(), 0.7 * before.Quality());
+  EXPECT_GT(later.Quality(), 1.2 * first.Quality());
+  EXPECT_LT(later.attempted, first.attempted);
+  EXPECT_GT(later.inliers, 0.9 * first.inliers) << "what is seen must not be given up";
+  const MapTrackResult again = track(*free, 20);
+  EXPECT_GT(again.inliers, 0.95 * before.inliers) << "it is looked for again when it may be seen";
 }
 
 TEST_F(TrackingInAMap, ComesBackFromABadGuess) {
