@@ -139,7 +139,8 @@ bool LocalizePanoramaKeyFrame(const LocalizationOptions& options, KeyFrameId id,
   const auto start = PoseFrom(options, record->keyframe, map, seed, &found, &measurements);
   if (!start) return false;
   std::vector<double> scratch;
-  const PoseRefinement refined = RefinePose(*record->keyframe.camera, *start, {}, &measurements, &scratch);
+  const PoseRefinement refined = RefinePose(*record->keyframe.camera, *start, {}, &measurements, &scratch,
+                                            {Eigen::Vector3d::Zero(), *start});
   scratch.clear();
   std::vector<Eigen::Vector2f> pixels;
   for (std::size_t i = 0; i < found.size(); ++i) {

@@ -36,9 +36,9 @@ void MapTracker::Clear() {
   Forget();
 }
 
-void MapTracker::SetPivot(const Eigen::Vector3d& pivot) {
-  if (pivot.isZero(0) != pivot_.isZero(0)) local_panorama_ = kNoId;  // its points are elsewhere now
-  pivot_ = pivot;
+void MapTracker::ExpectTurn(const Turn& turn) {
+  if (turn.pivot.isZero(0) != turn_.pivot.isZero(0)) local_panorama_ = kNoId;  // its points are elsewhere now
+  turn_ = turn;
 }
 
 // The points of the keyframes that see most of what the last frame saw; without a last frame, of those
@@ -105,7 +105,7 @@ void MapTracker::TakePoints(const MapSnapshot& map, bool infinite) {
   std::vector<LocalPoint>& points = infinite ? local_infinite_ : local_;
   points.clear();
   double nearness = 0;  // of infinite points; 1 / metres
-  if (infinite && !pivot_.isZero(0)) {
+  if (infinite && !turn_.pivot.isZero(0)) {
     const PanoramaMap* panorama = map.FindPanorama(panorama_);
     const KeyFrame* reference = panorama ? map.FindKeyFrame(panorama->reference) : nullptr;
     if (reference && reference->mean_depth > 0) nearness = 1 / reference->mean_depth;
@@ -175,7 +175,10 @@ void MapTracker::AddCandidates(const Rigid3& camera_from_map, std::size_t wanted
     const std::size_t j = i + random->Below(static_cast<std::uint32_t>(visible_.size() - i));
     std::swap(visible_[i], visible_[j]);
     const auto& [point, source, place] = visible_[i];
-    if (!IsWorthATry(point->id, random)) continue;
+    if (!IsWorthATry(point->id, random)) {
+      ++spared_;
+      continue;
+    }
     const auto predicted = searcher_.Predict(*point, *source, *camera_, camera_from_map, place);
     if (!predicted) continue;
     const auto index = static_cast<std::uint32_t>(candidates_.size());
@@ -189,6 +192,7 @@ void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_fro
   candidates_.clear();
   coarse_.clear();
   fine_.clear();
+  spared_ = 0;
   taken_.assign(static_cast<std::size_t>((camera_->width_px() / kTakenCellPx + 1) *
                                          (camera_->height_px() / kTakenCellPx + 1)),
                 0);
@@ -296,8 +300,8 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   result.coarse_found = static_cast<int>(measurements_.size());
   float radius = wide ? options_.coarse_radius_px : options_.fine_radius_alone_px;
   if (result.coarse_found >= options_.min_coarse) {
-    const PoseRefinement coarse =
-        RefinePose(*camera_, predicted, options_.refinement, &measurements_, &scratch_, pivot_);
+    const PoseRefinement coarse = RefinePose(*camera_, predicted, options_.refinement, &measurements_,
+                                             &scratch_, {turn_.pivot, predicted, turn_.sure});
     if (coarse.converged && coarse.inliers >= options_.min_coarse / 2) {
       result.camera_from_map = coarse.camera_from_map;
       radius = options_.fine_radius_px;
@@ -306,10 +310,12 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   }
   Search(fine_, features, radius, true);
   result.attempted = static_cast<int>(attempts_.size());
+  result.spared = spared_;
   result.found = static_cast<int>(measurements_.size());
-  const PoseRefinement fine =
-      RefinePose(*camera_, result.camera_from_map, options_.refinement, &measurements_, &scratch_, pivot_);
+  const PoseRefinement fine = RefinePose(*camera_, result.camera_from_map, options_.refinement,
+                                         &measurements_, &scratch_, {turn_.pivot, predicted, turn_.sure});
   result.camera_from_map = fine.camera_from_map;
+  result.by_points_alone = fine.by_points_alone;
   result.covariance = fine.covariance;
   result.observed = fine.observed;
   result.converged = fine.converged;

@@ -10,6 +10,7 @@
 #include "engine/tracking/point_search.h"
 #include "engine/tracking/pose_refinement.h"
 #include "engine/tracking/tracked_frame.h"
+#include "engine/tracking/turn_center.h"
 
 // Finds the pose of one frame in one map from a guess: coarse stage, fine stage, robust pose (ptamm §2.1).
 // Knows nothing of time: prediction, loss and recovery are the Tracker's.
@@ -38,9 +39,11 @@ struct MapTrackerOptions {
 
 struct MapTrackResult {
   Rigid3 camera_from_map;
+  Rigid3 by_points_alone;  // without the turn that was expected, see PoseRefinement
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   ObservedMotion observed = ObservedMotion::kSixDof;
   int attempted = 0, found = 0, inliers = 0;
+  int spared = 0;          // points in view that were not looked for, as they have long been hidden
   int finite_inliers = 0;  // of the inliers
   // Shares of a 4x3 grid over the picture in which enough inliers lie, finite ones and all (hybrid-slam
   // §4.1).
@@ -52,6 +55,8 @@ struct MapTrackResult {
   double median_depth = 0;  // metres, of the inliers
   // found / attempted (ptamm §2.1).
   double Quality() const { return attempted > 0 ? static_cast<double>(inliers) / attempted : 0; }
+  // How much of the map in view is seen, hidden points among it: tells maps from each other.
+  double Explained() const { return inliers > 0 ? static_cast<double>(inliers) / (attempted + spared) : 0; }
 };
 
 class MapTracker {
@@ -67,8 +72,8 @@ class MapTracker {
   // Estimates the pose. The matches of the last call stay in matches().
   MapTrackResult Track(const MapSnapshot& map, const ImageFeatures& features, const Rigid3& predicted,
                        Effort effort, Random* random);
-  // What the camera turns about where only its rotation can be told (camera frame); zero: its own centre.
-  void SetPivot(const Eigen::Vector3d& pivot);
+  // What the camera turns about where its place cannot be told.
+  void ExpectTurn(const Turn& turn);
 
   const std::vector<PointMatch>& matches() const { return matches_; }
   // Every point looked for in the last call: whether it was found, and whether it agreed with the pose.
@@ -124,7 +129,7 @@ class MapTracker {
   std::shared_ptr<const CameraModel> camera_;
   PointSearcher searcher_;
   PanoramaId panorama_ = kNoId;
-  Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();
+  Turn turn_;
   std::vector<PointMatch> matches_;
   std::vector<Attempt> attempts_;
   std::vector<MapPointId> last_inliers_;  // of the last frame, by ascending id
@@ -144,7 +149,7 @@ class MapTracker {
   PanoramaId local_panorama_ = kNoId;
   int local_age_frames_ = 0;
   std::vector<LocalPoint> visible_;
-  int visible_finite_ = 0;
+  int visible_finite_ = 0, spared_ = 0;
   std::vector<std::uint8_t> taken_;  // cells of the picture where finite points are expected
   std::vector<Candidate> candidates_;
   std::vector<std::uint32_t> coarse_, fine_;

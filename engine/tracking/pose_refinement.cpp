@@ -44,7 +44,11 @@ Residual Evaluate(const CameraModel& camera, const Rigid3& camera_from_map, cons
 }
 
 // Fewer rays than this hold no rotation that is worth the name.
-constexpr std::ptrdiff_t kFewestInfinite = 8;
+constexpr std::ptrdiff_t kFewestRays = 8;
+
+double Square(double x) {
+  return x * x;
+}
 
 double RobustSigma(std::vector<double>* squared_errors) {
   if (squared_errors->empty()) return 0;
@@ -86,16 +90,23 @@ double LossWeight(double error, double threshold, bool tukey) {
   return ratio < 1 ? (1 - ratio * ratio) * (1 - ratio * ratio) : 0;
 }
 
-// turn_about: only the rotation about this point of the camera frame is estimated; null for the whole pose.
+// What is taken for known of the motion beside what the measurements say.
+struct Held {
+  bool turn_only = false;  // the pivot stays exactly where `turn` has it, and only the rotation is estimated
+  double sigma = 0;        // else: to within this, in units of the map; 0 for not at all
+  double infinite_weight = 1;
+};
+
 PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const PoseRefinementOptions& options,
-                      const Eigen::Vector3d* turn_about, std::vector<PoseMeasurement>* measurements,
+                      const ExpectedTurn& turn, const Held& held, std::vector<PoseMeasurement>* measurements,
                       std::vector<double>* scratch) {
-  const bool turn_only = turn_about != nullptr;
-  const Eigen::Vector3d pivot = turn_only ? *turn_about : Eigen::Vector3d::Zero();
+  const bool turn_only = held.turn_only;
+  const Eigen::Vector3d pivot = turn_only ? turn.pivot : Eigen::Vector3d::Zero();
+  const Eigen::Vector3d fixed_in_map = turn.camera_from_map.inverse() * turn.pivot;
   PoseRefinement result;
   result.camera_from_map = start;
   result.covariance.setZero();
-  Matrix6 normal;
+  Matrix6 normal, measured;
   Kind kinds[2];     // finite, infinite
   double depth = 0;  // summed over finite inliers
   for (int iteration = 0; iteration <= options.iterations; ++iteration) {
@@ -121,18 +132,27 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
         result.finite_inliers += !infinite;
         if (!infinite) depth += (result.camera_from_map * measurement.point_in_map).z();
       }
-      const double weight = measurement.weight * (infinite && !turn_only ? options.infinite_weight : 1.0);
+      const double weight = measurement.weight * (infinite ? held.infinite_weight : 1.0);
       normal.noalias() += weight * residual.jacobian.transpose() * residual.jacobian;
       gradient.noalias() += weight * residual.jacobian.transpose() * residual.error;
     }
-    if (turn_only) {
+    measured = normal;
+    if (held.sigma > 0) {
+      const double information = Square(std::max(kinds[0].sigma, options.min_sigma) / held.sigma);
+      const Eigen::Vector3d now = result.camera_from_map * fixed_in_map;
+      Eigen::Matrix<double, 3, 6> jacobian;
+      jacobian << Eigen::Matrix3d::Identity(), -Hat(now);
+      normal.noalias() += information * jacobian.transpose() * jacobian;
+      gradient.noalias() += information * jacobian.transpose() * (turn.pivot - now);
+    } else if (turn_only) {
       // What little finite points are left must not drag the centre away.
       normal.leftCols<3>().setZero();
       normal.topRows<3>().setZero();
       normal.topLeftCorner<3, 3>().diagonal().setConstant(normal.diagonal().maxCoeff());
       gradient.head<3>().setZero();
     }
-    result.sigma = result.finite_inliers > 0 && !turn_only ? kinds[0].sigma : kinds[1].sigma;
+    const int enough = held.infinite_weight < 1 ? 1 : options.min_finite;
+    result.sigma = kinds[result.finite_inliers >= enough ? 0 : 1].sigma;
     if (last) break;
     const Eigen::LDLT<Matrix6> factor(normal);
     const Vector6 pivots = factor.vectorD();
@@ -151,8 +171,7 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
     }
     // Root mean square shift of the projections that this update made, in sigmas of their levels.
     const int infinite_inliers = result.inliers - result.finite_inliers;
-    const double counted =
-        result.finite_inliers + (turn_only ? 1.0 : options.infinite_weight) * infinite_inliers;
+    const double counted = result.finite_inliers + held.infinite_weight * infinite_inliers;
     const double shift = std::sqrt(std::max(0.0, update.dot(normal * update)) / (counted + 1.0));
     // Tukey's weights may swing forever by a little; what no eye can see counts as standing still.
     result.converged = shift < 0.1;
@@ -161,39 +180,54 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
       iteration = std::max(iteration, tukey ? options.iterations - 1 : options.iterations / 2 - 1);
   }
   const double sigma = std::max(result.sigma, options.min_sigma);
-  result.covariance = sigma * sigma * normal.ldlt().solve(Matrix6::Identity());
+  result.covariance = sigma * sigma * measured.ldlt().solve(Matrix6::Identity());
   result.mean_depth = result.finite_inliers > 0 ? depth / result.finite_inliers : 0;
   if (turn_only) {
+    result.covariance = sigma * sigma * normal.ldlt().solve(Matrix6::Identity());
     result.covariance.leftCols<3>().setZero();
     result.covariance.topRows<3>().setZero();
   }
   return result;
 }
 
-// Whether the finite points hold the camera in its place.
-bool IsPlaced(const PoseRefinementOptions& options, const PoseRefinement& result) {
-  const double largest = options.max_position_sigma * result.mean_depth;
-  return result.covariance.topLeftCorner<3, 3>().trace() <= largest * largest;
+// Whether the finite points hold the camera in its place: to within largest, of the depth.
+bool IsPlaced(const PoseRefinement& result, double largest) {
+  const double variance = result.covariance.topLeftCorner<3, 3>().trace();
+  return variance >= 0 && variance <= Square(largest * result.mean_depth);
 }
 
 }  // namespace
 
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          std::vector<double>* scratch, const Eigen::Vector3d& pivot) {
+                          std::vector<double>* scratch, const ExpectedTurn& turn) {
   const auto finite = std::count_if(measurements->begin(), measurements->end(),
                                     [](const PoseMeasurement& m) { return !m.infinite(); });
   const auto infinite = static_cast<std::ptrdiff_t>(measurements->size()) - finite;
-  const bool may_turn = infinite >= kFewestInfinite;
+  const bool may_turn = infinite >= kFewestRays || (turn.sure && infinite + finite >= kFewestRays);
+  Held held;
   if (finite >= options.min_finite || !may_turn) {
-    PoseRefinement result = Refine(camera, start, options, nullptr, measurements, scratch);
-    if (!may_turn || (result.finite_inliers >= options.min_finite && IsPlaced(options, result))) {
-      result.observed =
-          result.inliers > result.finite_inliers ? ObservedMotion::kHybrid : ObservedMotion::kSixDof;
+    held.infinite_weight = options.infinite_weight;
+    PoseRefinement result = Refine(camera, start, options, turn, held, measurements, scratch);
+    const Rigid3 by_points_alone = result.camera_from_map;
+    const bool enough = result.finite_inliers >= options.min_finite;
+    const bool placed = enough && IsPlaced(result, options.max_position_sigma);
+    if (turn.sure && enough && !IsPlaced(result, options.max_position_sigma / 2)) {
+      held.sigma = options.sure_turn_sigma * result.mean_depth;
+      result = Refine(camera, start, options, turn, held, measurements, scratch);
+    }
+    if (!may_turn || placed || held.sigma > 0) {
+      result.by_points_alone = by_points_alone;
+      const bool infinite_too = result.inliers > result.finite_inliers;
+      result.observed = infinite_too ? ObservedMotion::kHybrid : ObservedMotion::kSixDof;
+      if (may_turn && !placed) result.observed = ObservedMotion::kPanorama;
       return result;
     }
+    if (enough) held.sigma = options.max_position_sigma * result.mean_depth;
+    held.infinite_weight = 1;
   }
-  PoseRefinement result = Refine(camera, start, options, &pivot, measurements, scratch);
+  held.turn_only = held.sigma == 0;
+  PoseRefinement result = Refine(camera, start, options, turn, held, measurements, scratch);
   result.observed = ObservedMotion::kPanorama;
   return result;
 }

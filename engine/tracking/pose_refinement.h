@@ -32,21 +32,29 @@ struct PoseRefinementOptions {
   // have turned only (hybrid-slam §4.3).
   int min_finite = 15;
   // Nor is there where they say it less surely than this, of the depth of what they show: a few points at the
-  // rim of the picture err together, by ten times what each by itself would let one think.
+  // rim of the picture err together, by ten times what each by itself would let one think. Then the camera is
+  // taken to have turned, and to have moved beside that by no more than about as much: where the points do
+  // tell something of the way, it is not thrown away.
   double max_position_sigma = 0.003;
+  // As far goes a camera beside a turn that is sure, in a frame; of the depth too, and taken as much less as
+  // points seem surer than they are. It counts from half of max_position_sigma on: what places the camera
+  // well must be free to say that it turns no more.
+  double sure_turn_sigma = 0.0003;
 };
 
 // What the measurements could tell of the pose.
 enum class ObservedMotion : std::uint8_t {
   kSixDof,    // rotation and translation, from finite points
   kHybrid,    // the same, with infinite points beside
-  kPanorama,  // the rotation alone; the pivot (or the camera's own centre) is where it was at the start
+  kPanorama,  // the rotation alone; the pivot (or the camera's own centre) is about where it was at the start
 };
 
 struct PoseRefinement {
   Rigid3 camera_from_map;
   // Of the left twist in the camera frame; zero for a translation that was not estimated.
   Eigen::Matrix<double, 6, 6> covariance;
+  // The same without the turn that was expected; where `observed` is not kPanorama.
+  Rigid3 by_points_alone;
   ObservedMotion observed = ObservedMotion::kSixDof;
   double sigma = 0;  // robust, of the normalised residuals
   int inliers = 0;
@@ -55,14 +63,21 @@ struct PoseRefinement {
   bool converged = false;  // also false where the measurements do not hold the degrees of freedom asked for
 };
 
+// The turn that the motion so far lets expect.
+struct ExpectedTurn {
+  // A point that stays where `camera_from_map` has it; camera frame, zero for the camera's own centre.
+  Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
+  Rigid3 camera_from_map;
+  // Else it is resorted to only where the place cannot be told and infinite points are seen.
+  bool sure = false;
+};
+
 // Robust Gauss-Newton on reprojection errors of finite and infinite points from `start` (ptamm eq. 1-3,
 // hybrid-slam eq. 1-2): Huber while far away, Tukey for the last iterations. The scale of the errors is
 // estimated for each kind by itself: what little translation does to infinite points is no noise of finite
-// ones. Where only the rotation is told, the camera turns about `pivot` (camera frame; zero: its own centre).
-// Does not allocate beyond *scratch.
+// ones. Does not allocate beyond *scratch.
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          std::vector<double>* scratch,
-                          const Eigen::Vector3d& pivot = Eigen::Vector3d::Zero());
+                          std::vector<double>* scratch, const ExpectedTurn& turn);
 
 }  // namespace docent::engine

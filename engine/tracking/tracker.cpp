@@ -60,7 +60,7 @@ void Tracker::Reset() {
   starting_ = pair_given_ = tracking_ = false;
   anchor_.reset();
   turn_center_.Reset();
-  pivot_.setZero();
+  turn_ = {};
   entering_key_ = 0;
   entering_frames_ = 0;
   ResetStart();
@@ -115,7 +115,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     map_tracker_.EnablePanorama(kNoId);
     selector_.Reset();
     turn_center_.Reset();
-    pivot_.setZero();
+    turn_ = {};
     map_tracker_.Clear();
     reports_.clear();
     anchor_.reset();
@@ -249,9 +249,9 @@ void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
   // What was commanded is known better than what was observed before.
   Rigid3 predicted = frame.turned ? motion_.PredictWithRotation(*frame.turned) : motion_.Predict(frame.time);
   if (observed_ == ObservedMotion::kPanorama)
-    predicted = TurnedAbout(pivot_, motion_.last(), predicted.rotation);
+    predicted = TurnedAbout(turn_.pivot, motion_.last(), predicted.rotation);
   map_tracker_.EnablePanorama(PanoramaFor(predicted));
-  map_tracker_.SetPivot(pivot_);
+  map_tracker_.ExpectTurn(turn_);
   MapTrackResult result =
       map_tracker_.Track(*map_, *features_, predicted, MapTracker::Effort::kUsual, &random_);
   if (!Believable(result)) {
@@ -289,7 +289,7 @@ bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, Tra
   std::optional<RotationAlignment> turn;
   const auto align = [&] {
     turn = AlignRotation(anchor_->small_blurry, *camera_, picture, *camera_,
-                         predicted * anchor_pose_.rotation.inverse(), 10, pivot_ / median_depth_);
+                         predicted * anchor_pose_.rotation.inverse(), 10, turn_.pivot / median_depth_);
     return turn && turn->converged && turn->overlap >= options_.min_picture_overlap &&
            turn->rms * turn->rms <= (1 - options_.min_picture_agreement) * spread;
   };
@@ -302,7 +302,7 @@ bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, Tra
     if (!align()) return false;
   }
   MapTrackResult result;
-  result.camera_from_map = TurnedAbout(pivot_, anchor_pose_, turn->b_from_a * anchor_pose_.rotation);
+  result.camera_from_map = TurnedAbout(turn_.pivot, anchor_pose_, turn->b_from_a * anchor_pose_.rotation);
   result.observed = ObservedMotion::kPanorama;
   result.attempted = tried.attempted;
   Accept(frame, result, out);
@@ -323,11 +323,12 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   }
   tracking_ = true;
   observed_ = result.observed;
+  explained_ = result.Explained();
   finite_coverage_ = result.finite_coverage;
   if (result.finite_inliers > 0 && result.median_depth > 0) median_depth_ = result.median_depth;
-  if (result.observed != ObservedMotion::kPanorama) {
-    turn_center_.Add(frame.time, result.camera_from_map, result.covariance, median_depth_);
-    pivot_ = turn_center_.InCamera(median_depth_);
+  if (options_.hybrid && result.observed != ObservedMotion::kPanorama) {
+    turn_center_.Add(frame.time, result.by_points_alone, result.covariance, median_depth_);
+    turn_ = turn_center_.Estimate(median_depth_);
   }
   out->map = map_;
   out->map_key = map_key_;

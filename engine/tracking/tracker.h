@@ -66,8 +66,8 @@ struct TrackerOptions {
   std::size_t candidates = 3;     // the best of these are verified, each frame
   int agreeing_frames = 3;        // before another map is entered (ptamm §6.3)
   // Overlapping maps (ptamm §5.3): while a map that does not grow is poorly seen, another one may fit better.
-  double poor_quality = 0.5;
-  double better_quality = 1.3;   // times the present quality, to be entered
+  double poor_quality = 0.5;     // share of what is in view, hidden points among it
+  double better_quality = 1.3;   // times the present one, to be entered
   int frames_between_looks = 3;  // for such a map
   bool build_maps = true;        // else a frame without a map is lost, not initializing
 };
@@ -149,7 +149,7 @@ class Tracker {
   MotionModel motion_;
   KeyFrameSelector selector_;
   TurnCenter turn_center_;
-  Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();  // of the turn that goes on, camera frame
+  Turn turn_;  // that goes on
 
   std::shared_ptr<const MapSnapshot> map_;
   std::uint64_t map_key_ = 0;
@@ -159,6 +159,7 @@ class Tracker {
   // The last pose told the rotation alone; then the centre stays where it was.
   ObservedMotion observed_ = ObservedMotion::kSixDof;
   double finite_coverage_ = 1, median_depth_ = 1;  // of the last frame that told them
+  double explained_ = 0;                           // of the last frame
   Rigid3 first_view_from_map_;                     // the pose of the initializer's first view
   Timestamp lost_since_{};
   int misfit_frames_ = 0;  // in a row, that no turn explains

@@ -93,12 +93,12 @@ void Tracker::Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, 
 // Where maps overlap the camera is carried from one into another by what both show; what was left in the
 // other is only seen once it is entered. It is, when it explains the picture clearly better (ptamm §5.3).
 void Tracker::LookForBetterMap(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
-  if (out->quality >= options_.poor_quality) {
+  if (explained_ >= options_.poor_quality) {
     entering_frames_ = 0;
     return;
   }
   const auto better = [&](const MapTrackResult& result) {
-    return Recovered(result) && result.Quality() > options_.better_quality * out->quality;
+    return Recovered(result) && result.Explained() > options_.better_quality * explained_;
   };
   MapTrackResult result;
   if (entering_frames_ > 0) {

@@ -22,11 +22,11 @@ void TurnCenter::Add(Timestamp time, const Rigid3& camera_from_map,
 
 // The point that stays: center_i + map_from_camera_i * pivot is the same for all i. Linear in the pivot once
 // the means are taken out; a ridge keeps what the turn does not tell (along its axis) at the camera.
-Eigen::Vector3d TurnCenter::InCamera(double depth) const {
-  const Eigen::Vector3d own_center = Eigen::Vector3d::Zero();
+Turn TurnCenter::Estimate(double depth) const {
+  const Turn unknown;
   const auto count = static_cast<double>(poses_.size());
   if (!options_.enabled || static_cast<int>(poses_.size()) < options_.min_poses || !(depth > 0))
-    return own_center;
+    return unknown;
   Eigen::Matrix3d mean_rotation = Eigen::Matrix3d::Zero();
   Eigen::Vector3d mean_center = Eigen::Vector3d::Zero();
   double turn = 0;
@@ -36,7 +36,7 @@ Eigen::Vector3d TurnCenter::InCamera(double depth) const {
     const double cosine = pose.map_from_camera.col(2).dot(poses_.back().map_from_camera.col(2));
     turn = std::max(turn, std::acos(std::clamp(cosine, -1.0, 1.0)));
   }
-  if (turn < options_.min_turn_deg * std::numbers::pi / 180) return own_center;
+  if (turn < options_.min_turn_deg * std::numbers::pi / 180) return unknown;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   double spread = 0;
@@ -48,15 +48,20 @@ Eigen::Vector3d TurnCenter::InCamera(double depth) const {
     spread += b.squaredNorm();
   }
   const double noise = options_.position_noise * depth;
-  if (spread < count * noise * noise) return own_center;  // it turned about itself
+  if (spread < count * noise * noise) return {.sure = true};  // about itself
   normal.diagonal().array() += count * options_.rotation_noise * options_.rotation_noise;
   const Eigen::Vector3d pivot = normal.ldlt().solve(right);
   double misfit = 0;
   for (const Pose& pose : poses_) {
     misfit += (pose.center - mean_center + (pose.map_from_camera - mean_rotation) * pivot).squaredNorm();
   }
-  const bool turned = misfit <= options_.max_misfit * options_.max_misfit * spread;
-  return turned && pivot.norm() <= options_.max_distance * depth ? pivot : own_center;
+  if (misfit > options_.max_misfit * options_.max_misfit * spread ||
+      pivot.norm() > options_.max_distance * depth)
+    return unknown;
+  const double offset = options_.max_sure_offset * depth;
+  const bool sure = misfit <= options_.max_sure_misfit * options_.max_sure_misfit * spread &&
+                    misfit <= count * offset * offset;
+  return {pivot, sure};
 }
 
 Rigid3 TurnedAbout(const Eigen::Vector3d& pivot, const Rigid3& camera_from_map, const Rotation3& rotation) {

@@ -20,6 +20,16 @@ struct TurnCenterOptions {
   double max_position_sigma = 0.01;  // of the depth, of poses that are taken
   double max_distance = 2.0;         // of the depth: further off, the camera walks and does not turn
   double max_misfit = 0.25;          // share of the centres' spread that turning leaves unexplained
+  // Less than this, and of the depth, and it surely turns: a hand that walks while it turns leaves more.
+  double max_sure_misfit = 0.08;
+  double max_sure_offset = 0.006;
+};
+
+// What the camera turns about.
+struct Turn {
+  // Camera frame, units of the map; zero, the camera's own centre, also where the poses do not tell one.
+  Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
+  bool sure = false;  // the poses of the last moments leave next to no doubt that the camera turns about it
 };
 
 // A camera in the hand or on the head turns about the person, not about its own centre. From the poses of the
@@ -35,9 +45,8 @@ class TurnCenter {
   // A pose that finite points told. covariance: of the left twist, camera frame; depth: of what it looks at.
   void Add(Timestamp time, const Rigid3& camera_from_map, const Eigen::Matrix<double, 6, 6>& covariance,
            double depth);
-  // The point about which the camera turned in the last moments, camera frame, in units of the map; zero
-  // (the camera's own centre) when the poses do not tell one. depth: of what the camera looks at.
-  Eigen::Vector3d InCamera(double depth) const;
+  // What the camera turned about in the last moments. depth: of what it looks at.
+  Turn Estimate(double depth) const;
 
  private:
   struct Pose {

@@ -59,7 +59,7 @@ void AddMeasurements(int count, double noise_sigmas, bool infinite, Random* rand
 
 PoseRefinement Refine(const Rigid3& start, std::vector<PoseMeasurement>* measurements) {
   std::vector<double> scratch;
-  return RefinePose(kLens, start, {}, measurements, &scratch);
+  return RefinePose(kLens, start, {}, measurements, &scratch, {Eigen::Vector3d::Zero(), start});
 }
 
 Vector6 Error(const PoseRefinement& refined) {
@@ -258,7 +258,7 @@ TEST(PoseRefinement, TurnsAboutThePivotWhereOnlyTheRotationIsTold) {
   const Rotation3 guess = Rotation3::Exp({-0.02, 0.04, 0.03}) * turned.rotation;
   const Rigid3 start(guess, pivot - guess * fixed_in_map);
   std::vector<double> scratch;
-  const PoseRefinement refined = RefinePose(kLens, start, {}, &measurements, &scratch, pivot);
+  const PoseRefinement refined = RefinePose(kLens, start, {}, &measurements, &scratch, {pivot, start});
   EXPECT_TRUE(refined.converged);
   EXPECT_EQ(refined.observed, ObservedMotion::kPanorama);
   EXPECT_EQ(refined.inliers, 60);
@@ -342,26 +342,84 @@ TEST(PoseRefinement, TakesNothingOfTheTranslationFromInfinitePoints) {
 }
 
 // Twenty points place a camera when they are all over the picture, not when they are about to leave it.
+// Points in a strip at the picture's rim, which moving and turning shift alike.
+void AddPointsAtTheRim(int count, const Rigid3& seen_from, Random* random,
+                       std::vector<PoseMeasurement>* measurements) {
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector2d pixel(random->Uniform(4, 30), random->Uniform(100, 300));
+    PoseMeasurement measurement;
+    measurement.point_in_map << seen_from.inverse() *
+                                    Eigen::Vector3d(random->Uniform(2.5, 3) * *kLens.Unproject(pixel)),
+        1;
+    measurement.pixel = pixel + Eigen::Vector2d(Gaussian(random), Gaussian(random));
+    measurements->push_back(measurement);
+  }
+}
+
+double Moved(const PoseRefinement& refined, const Rigid3& from) {
+  return (refined.camera_from_map.OriginInSource() - from.OriginInSource()).norm();
+}
+
 TEST(PoseRefinement, HoldsTheCameraWhereItWasWhenFinitePointsPlaceItBadly) {
   Random random(23);
   std::vector<PoseMeasurement> rim, spread;
   AddMeasurements(100, 0.5, true, &random, &rim);
   spread = rim;
   AddMeasurements(60, 0.2, false, &random, &spread);
-  while (rim.size() < 120) {
-    const Eigen::Vector2d pixel(random.Uniform(4, 30), random.Uniform(100, 300));
-    PoseMeasurement measurement;
-    measurement.point_in_map << Truth().inverse() *
-                                    Eigen::Vector3d(random.Uniform(2.5, 3) * *kLens.Unproject(pixel)),
-        1;
-    measurement.pixel = pixel + Eigen::Vector2d(Gaussian(&random), Gaussian(&random));
-    rim.push_back(measurement);
-  }
+  AddPointsAtTheRim(20, Truth(), &random, &rim);
   const Rigid3 start = Perturbed(&random, 0, 0.5);
   const PoseRefinement held = Refine(start, &rim), placed = Refine(start, &spread);
   EXPECT_EQ(held.observed, ObservedMotion::kPanorama);
-  EXPECT_LT((held.camera_from_map.OriginInSource() - start.OriginInSource()).norm(), 1e-9);
+  EXPECT_LT(Moved(held, start), 2 * PoseRefinementOptions().max_position_sigma * held.mean_depth);
   EXPECT_EQ(placed.observed, ObservedMotion::kHybrid);
+}
+
+TEST(PoseRefinement, KeepsToASureTurnWherePointsTellLittleAndLeavesItWhereTheyTellMuch) {
+  Random random(29);
+  const Eigen::Vector3d pivot(0, 0, -0.5);
+  const Rotation3 turn = Rotation3::Exp({0, 0.02, 0});
+  const Rigid3 before = Truth();
+  const Eigen::Vector3d fixed_in_map = before.inverse() * pivot;
+  const Rigid3 turned(turn * before.rotation, pivot - turn * before.rotation * fixed_in_map);
+  std::vector<double> scratch;
+  double freely = 0, held = 0;
+  constexpr int kTrials = 20;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<PoseMeasurement> rim;
+    AddPointsAtTheRim(30, turned, &random, &rim);
+    const auto off = [&](bool sure) {
+      const PoseRefinement refined = RefinePose(kLens, before, {}, &rim, &scratch, {pivot, before, sure});
+      EXPECT_EQ(refined.observed, sure ? ObservedMotion::kPanorama : ObservedMotion::kSixDof);
+      return (refined.camera_from_map.rotation * turned.rotation.inverse()).Angle() / kTrials;
+    };
+    freely += off(false);
+    held += off(true);
+  }
+  EXPECT_LT(held, 0.4 * freely);
+
+  // It has stepped aside by two hundredths of the depth, and points all over the picture say so.
+  std::vector<PoseMeasurement> spread;
+  AddMeasurements(400, 0.3, false, &random, &spread);
+  const Rigid3 aside = testing_world::CameraAt({0.05, 0, 0}) * Truth();
+  const PoseRefinement placed = RefinePose(kLens, aside, {}, &spread, &scratch, {pivot, aside, true});
+  EXPECT_EQ(placed.observed, ObservedMotion::kSixDof);
+  EXPECT_LT(Moved(placed, Truth()), 0.3 * 0.05);
+}
+
+TEST(PoseRefinement, FollowsWhatFinitePointsTellOfTheWayThoughTheyPlaceTheCameraBadly) {
+  Random random(31);
+  // Up and down is told by the height of the strip, which is long.
+  const Rigid3 start = Rigid3::Exp((Vector6() << 0, 0.01, 0, 0, 0, 0).finished()) * Truth();
+  std::vector<PoseMeasurement> rim;
+  AddMeasurements(100, 0.1, true, &random, &rim);
+  AddPointsAtTheRim(200, Truth(), &random, &rim);
+  PoseRefinementOptions strict;
+  strict.max_position_sigma = 0.0025;
+  std::vector<double> scratch;
+  const PoseRefinement refined =
+      RefinePose(kLens, start, strict, &rim, &scratch, {Eigen::Vector3d::Zero(), start});
+  EXPECT_EQ(refined.observed, ObservedMotion::kPanorama);
+  EXPECT_LT(std::abs(Error(refined)[1]), 0.005);
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ TurnCenter After(const Eigen::Vector3d& pivot, double noise_m, double noise_deg)
 
 TEST(TurnCenter, IsTheShoulderOfTheArmThatHoldsTheCamera) {
   const Eigen::Vector3d shoulder(0.15, 0, -0.6);
-  const Eigen::Vector3d found = After(shoulder, 0.002, 0.05).InCamera(kDepth);
+  const Eigen::Vector3d found = After(shoulder, 0.002, 0.05).Estimate(kDepth).pivot;
   // Along the axis of the turn nothing is told; there it stays by the camera.
   EXPECT_NEAR(found.x(), shoulder.x(), 0.03);
   EXPECT_NEAR(found.y(), 0, 0.03);
@@ -51,8 +51,16 @@ TEST(TurnCenter, IsTheShoulderOfTheArmThatHoldsTheCamera) {
 }
 
 TEST(TurnCenter, IsTheCameraWhereTheCameraStays) {
-  EXPECT_EQ(After(Eigen::Vector3d::Zero(), 0, 0).InCamera(kDepth), Eigen::Vector3d::Zero());
-  EXPECT_LT(After(Eigen::Vector3d::Zero(), 0.002, 0.05).InCamera(kDepth).norm(), 0.02);
+  EXPECT_EQ(After(Eigen::Vector3d::Zero(), 0, 0).Estimate(kDepth).pivot, Eigen::Vector3d::Zero());
+  EXPECT_LT(After(Eigen::Vector3d::Zero(), 0.002, 0.05).Estimate(kDepth).pivot.norm(), 0.02);
+}
+
+TEST(TurnCenter, IsSureOfATurnThatHardlyErrsAndOfNothingElse) {
+  const Eigen::Vector3d shoulder(0.15, 0, -0.6);
+  EXPECT_TRUE(After(shoulder, 0.002, 0.05).Estimate(kDepth).sure);
+  EXPECT_TRUE(After(Eigen::Vector3d::Zero(), 0.002, 0.05).Estimate(kDepth).sure) << "about itself";
+  EXPECT_FALSE(After(shoulder, 0.05, 0.05).Estimate(kDepth).sure) << "the shoulder sways";
+  EXPECT_FALSE(TurnCenter({}).Estimate(kDepth).sure);
 }
 
 TEST(TurnCenter, IsTheCameraWhereItWalksOrHardlyTurns) {
@@ -66,9 +74,9 @@ TEST(TurnCenter, IsTheCameraWhereItWalksOrHardlyTurns) {
     glance.Add(time, Turned({0, 0, -0.6}, 0.1 * i), kSure, kDepth);
     straight.Add(time, Rigid3({}, {-0.05 * i, 0, 0}), kSure, kDepth);
   }
-  EXPECT_EQ(walk.InCamera(kDepth), Eigen::Vector3d::Zero());
-  EXPECT_EQ(glance.InCamera(kDepth), Eigen::Vector3d::Zero());
-  EXPECT_EQ(straight.InCamera(kDepth), Eigen::Vector3d::Zero());
+  EXPECT_EQ(walk.Estimate(kDepth).pivot, Eigen::Vector3d::Zero());
+  EXPECT_EQ(glance.Estimate(kDepth).pivot, Eigen::Vector3d::Zero());
+  EXPECT_EQ(straight.Estimate(kDepth).pivot, Eigen::Vector3d::Zero());
 }
 
 TEST(TurnCenter, LooksAtTheLastMomentsAndAtSurePosesOnly) {
@@ -80,9 +88,9 @@ TEST(TurnCenter, LooksAtTheLastMomentsAndAtSurePosesOnly) {
     turn_center.Add(FromSeconds(10 + i / 30.0), Turned(shoulder, i), kSure, kDepth);
     turn_center.Add(FromSeconds(10.001 + i / 30.0), Turned({3, 3, 3}, 3 * i), Matrix6::Identity(), kDepth);
   }
-  EXPECT_LT((turn_center.InCamera(kDepth) - shoulder).norm(), 0.02);
+  EXPECT_LT((turn_center.Estimate(kDepth).pivot - shoulder).norm(), 0.02);
   turn_center.Reset();
-  EXPECT_EQ(turn_center.InCamera(kDepth), Eigen::Vector3d::Zero());
+  EXPECT_EQ(turn_center.Estimate(kDepth).pivot, Eigen::Vector3d::Zero());
 }
 
 TEST(TurnCenter, StaysWhereItIsWhenTheCameraTurnsAboutIt) {
