@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/session/mapping_thread.h"
 
+#include <chrono>
 #include <utility>
 
 namespace docent::app {
@@ -132,9 +133,18 @@ void MappingThread::WaitUntilCalm(const std::stop_token& stop) {
 }
 
 void MappingThread::Finish() {
-  if (!worker_) return;
-  worker_->RequestStop();
-  worker_->Join();
+  // In turn the number of steps ends it and not the clock, so that two runs make the same map.
+  constexpr int kMaxLastSteps = 500;
+  constexpr auto kLongest = std::chrono::seconds(2);
+  const bool threaded = worker_.has_value();
+  if (threaded) {
+    worker_->RequestStop();
+    worker_->Join();
+  }
+  const auto start = std::chrono::steady_clock::now();
+  for (int step = 0; step < kMaxLastSteps && StepOnce(); ++step) {
+    if (threaded && std::chrono::steady_clock::now() - start > kLongest) return;
+  }
 }
 
 }  // namespace docent::app

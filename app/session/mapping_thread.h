@@ -47,7 +47,8 @@ class MappingThread {
   void WaitUntilCalm(const std::stop_token& stop);
 
   engine::MapperTimes Times() const { return mapper_.Times(); }
-  // Ends the thread and rethrows what it threw. Nothing may be asked for afterwards.
+  // Ends the thread and rethrows what it threw; then does what the last keyframes left to be done, for two
+  // seconds at most. Nothing may be asked for afterwards.
   void Finish();
 
  private:

@@ -150,8 +150,10 @@ double MapperTimes::*Mapper::DoNextTask() {
     LocalAdjustment();
     return &MapperTimes::bundle_adjustment;
   }
-  if (LocalizeOne()) return &MapperTimes::panorama_localization;
+  // New points carry the camera on; what could not be localized so far can wait for them.
+  if (LocalizeNew()) return &MapperTimes::panorama_localization;
   if (ConvertOne()) return &MapperTimes::infinite_triangulation;
+  if (LocalizeAgain()) return &MapperTimes::panorama_localization;
   if (global_interrupted_ || keyframes_since_global_ > 4 + map_.keyframes().size() / 6) {
     GlobalAdjustment();
     return &MapperTimes::bundle_adjustment;

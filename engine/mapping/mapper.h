@@ -110,8 +110,12 @@ class Mapper {
   void InsertKeyFrame(const KeyFrameCandidate& candidate);
   void InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecord* record);
   void InsertPanorama(const KeyFrameCandidate& candidate);
-  // Tries one waiting panorama keyframe; false when none is worth trying.
-  bool LocalizeOne();
+  // Tries one waiting panorama keyframe, of those that were never tried or of the others; false when none is
+  // worth trying.
+  bool LocalizeNew();
+  bool LocalizeAgain();
+  void TryToLocalize(Unlocalized* waiting, std::size_t finite);
+  std::size_t CountFinite() const;
   // guess: see LocalizePanoramaKeyFrame.
   bool Localize(KeyFrameId keyframe, const Rigid3* guess);
   // Looks for the infinite points of one pair of keyframes; false when no pair waits.

@@ -61,20 +61,40 @@ void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
   Tell(MapperEvent::Kind::kPanoramaKeyFrame, candidate.time, std::to_string(rays) + " new directions");
 }
 
-bool Mapper::LocalizeOne() {
+std::size_t Mapper::CountFinite() const {
+  std::size_t finite = 0;
+  for (const Map::PointRecord& record : map_.points()) finite += record.alive && !record.point.infinite();
+  return finite;
+}
+
+void Mapper::TryToLocalize(Unlocalized* waiting, std::size_t finite) {
+  waiting->tried_with_points = finite;
+  waiting->looks_due = !Localize(waiting->keyframe, nullptr);
+}
+
+bool Mapper::LocalizeNew() {
   if (to_localize_.empty()) return false;
   std::erase_if(to_localize_, [&](const Unlocalized& waiting) {
     const Map::KeyFrameRecord* record = map_.FindKeyFrame(waiting.keyframe);
     return !record || record->keyframe.kind != KeyFrameKind::kPanorama;
   });
-  std::size_t finite = 0;
-  for (const Map::PointRecord& record : map_.points()) finite += record.alive && !record.point.infinite();
+  const auto fresh = std::find_if(to_localize_.begin(), to_localize_.end(),
+                                  [](const Unlocalized& waiting) { return waiting.tried_with_points == 0; });
+  if (fresh == to_localize_.end()) return false;
+  const std::size_t finite = CountFinite();
+  if (finite == 0) return false;
+  TryToLocalize(&*fresh, finite);
+  return true;
+}
+
+bool Mapper::LocalizeAgain() {
+  if (to_localize_.empty()) return false;
+  // Worth another try when the map has grown.
+  constexpr double kGrowth = 1.1;
+  const std::size_t finite = CountFinite();
   for (Unlocalized& waiting : to_localize_) {
-    // Worth another try when the map has grown.
-    constexpr double kGrowth = 1.1;
     if (static_cast<double>(finite) < kGrowth * static_cast<double>(waiting.tried_with_points) + 1) continue;
-    waiting.tried_with_points = finite;
-    waiting.looks_due = !Localize(waiting.keyframe, nullptr);
+    TryToLocalize(&waiting, finite);
     return true;
   }
   // Where active search saw nothing, its pose may be too far off: what looks like its corners says another.
