@@ -34,6 +34,9 @@ class AddEdit : public Edit {
                           static_cast<std::ptrdiff_t>(IndexOf(*scene, entity_.name)));
   }
   std::string Text() const override { return text_; }
+  void MoveAlong(const std::string& name, const engine::Sim3& motion) override {
+    if (name == entity_.name) content::MoveAlong(motion, &entity_);
+  }
 
  private:
   Entity entity_;
@@ -52,8 +55,15 @@ class ChangeEdit : public Edit {
     before_ = std::exchange(entity, std::move(changed));
   }
   void Undo(Scene* scene) final { scene->entities[IndexOf(*scene, name_)] = before_; }
+  void MoveAlong(const std::string& name, const engine::Sim3& motion) final {
+    if (name != name_) return;
+    content::MoveAlong(motion, &before_);
+    MoveAim(motion);
+  }
 
  protected:
+  // The place in the map that the edit takes the entity to, if it names one.
+  virtual void MoveAim(const engine::Sim3& /*motion*/) {}
   // May throw; works on a copy.
   virtual void Change(Entity* entity) = 0;
   const std::string& name() const { return name_; }
@@ -82,6 +92,7 @@ class Move : public ChangeEdit {
       entity->signpost.anchor = position_;
     }
   }
+  void MoveAim(const engine::Sim3& motion) override { position_ = motion * position_; }
 
  private:
   Eigen::Vector3d position_;
@@ -141,6 +152,9 @@ class Remove : public Edit {
     scene->entities.insert(scene->entities.begin() + static_cast<std::ptrdiff_t>(index_), entity_);
   }
   std::string Text() const override { return "remove " + QuoteWord(name_); }
+  void MoveAlong(const std::string& name, const engine::Sim3& motion) override {
+    if (name == name_) content::MoveAlong(motion, &entity_);
+  }
 
  private:
   std::string name_;
@@ -201,6 +215,12 @@ bool EditHistory::Redo(Scene* scene) {
   done_.push_back(std::move(undone_.back()));
   undone_.pop_back();
   return true;
+}
+
+void EditHistory::MoveAlong(const std::string& name, const engine::Sim3& motion) {
+  for (auto* edits : {&done_, &undone_}) {
+    for (const std::unique_ptr<Edit>& edit : *edits) edit->MoveAlong(name, motion);
+  }
 }
 
 std::vector<std::string> EditHistory::Lines() const {

@@ -36,6 +36,8 @@ class Edit {
   virtual void Undo(Scene* scene) = 0;
   // One line of a script, without its time.
   virtual std::string Text() const = 0;
+  // The ground of the entity of this name has moved in the map: what is remembered of it moves along.
+  virtual void MoveAlong(const std::string& name, const engine::Sim3& motion) = 0;
 };
 
 // The entity's name must be free (Scene::FreeName). `file` is the model's file as the script names it.
@@ -57,6 +59,10 @@ class EditHistory {
   // False when there is nothing to undo or redo.
   bool Undo(Scene* scene);
   bool Redo(Scene* scene);
+
+  // The ground of the entity of this name has moved in the map: all that was done and may be done again moves
+  // along.
+  void MoveAlong(const std::string& name, const engine::Sim3& motion);
 
   bool can_undo() const { return !done_.empty(); }
   bool can_redo() const { return !undone_.empty(); }

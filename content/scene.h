@@ -45,6 +45,11 @@ struct Entity {
   Signpost signpost;
 };
 
+// The foot that an entity stands on, in the map.
+Eigen::Vector3d PlaceOf(const Entity& entity);
+// Takes an entity along with its ground, which has moved in the map by `motion`.
+void MoveAlong(const engine::Sim3& motion, Entity* entity);
+
 // Value type: copies are cheap (assets are shared), so that edits are made on a copy and swapped in whole.
 struct Scene {
   std::vector<Entity> entities;  // in the order they were placed

@@ -214,7 +214,7 @@ void Session::Hear(const MappingThread::News& news) {
   if (found == maps_.end() || news.key != growing_key_ || found->second.discarded) return;
   SessionMap& map = found->second;
   if (news.snapshot) {
-    map.snapshot = news.snapshot;
+    map.Grow(news.snapshot);
     index_.SetMap(map.key, news.snapshot);
   }
   for (const engine::MapperEvent& event : news.events) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "app/session/content_follower.h"
 #include "content/edits.h"
 #include "content/scene.h"
 #include "engine/base/time.h"
@@ -26,6 +27,7 @@ struct SessionMap {
       snapshot;  // null while its start is looked for, or not in memory
   std::shared_ptr<const content::Scene> scene = std::make_shared<content::Scene>();  // never null
   content::EditHistory history;
+  ContentFollower follower;
 
   // What the library holds of it, or will hold when the saver has caught up; null when never saved.
   std::shared_ptr<const engine::MapSnapshot> saved_snapshot;
@@ -41,6 +43,9 @@ struct SessionMap {
   bool on_probation = false;
   bool discarded = false;
   Timestamp started{};  // of the frame that completed its first pair
+
+  // The mapper has made this of it; what stands in it moves along with its ground.
+  void Grow(std::shared_ptr<const engine::MapSnapshot> grown);
 
   bool NeedsSave() const { return snapshot && (snapshot != saved_snapshot || scene != saved_scene); }
 };

@@ -69,6 +69,51 @@ TEST(Edits, EachOneIsTakenBackExactly) {
   }
 }
 
+TEST(Edits, AreTakenBackAndDoneAgainOnGroundThatHasMoved) {
+  const engine::Sim3 motion{engine::Rotation3::Exp({0, 0.1, 0}), {0.5, 0, -0.5}, 1.25};
+  const auto move_all = [&](EditHistory* history, Scene* scene) {
+    for (Entity& entity : scene->entities) MoveAlong(motion, &entity);
+    for (const char* name : {"helmet", "sign-1", "old fox", "fox"}) history->MoveAlong(name, motion);
+  };
+  const auto same = [](const Scene& a, const Scene& b) {
+    ASSERT_EQ(a.entities.size(), b.entities.size());
+    for (std::size_t i = 0; i < a.entities.size(); ++i) {
+      EXPECT_EQ(a.entities[i].name, b.entities[i].name);
+      EXPECT_LT((PlaceOf(a.entities[i]) - PlaceOf(b.entities[i])).norm(), 1e-12) << a.entities[i].name;
+      EXPECT_NEAR(a.entities[i].model.map_from_model.scale, b.entities[i].model.map_from_model.scale, 1e-12);
+    }
+  };
+  EditHistory history;
+  Scene scene = TwoThings();
+  std::vector<Scene> moved;  // after each edit, as it would stand on the ground that has moved
+  const auto keep = [&] {
+    moved.push_back(scene);
+    for (Entity& entity : moved.back().entities) MoveAlong(motion, &entity);
+  };
+  keep();
+  for (const auto make : {+[] {
+                            return PlaceModelEdit(ModelEntity("fox"), "fox.glb", {10, 20});
+                          },
+                          +[] {
+                            return MoveEdit("helmet", {7, 8, 9});
+                          },
+                          +[] { return ScaleEdit("old fox", 3); }, +[] { return RemoveEdit("sign-1"); }}) {
+    history.Do(make(), &scene);
+    keep();
+  }
+  ASSERT_TRUE(history.Undo(&scene));  // so that something waits to be done again
+  move_all(&history, &scene);
+  same(scene, moved[3]);
+  for (int i = 2; i >= 0; --i) {
+    ASSERT_TRUE(history.Undo(&scene));
+    same(scene, moved[static_cast<std::size_t>(i)]);
+  }
+  for (std::size_t i = 1; i < moved.size(); ++i) {
+    ASSERT_TRUE(history.Redo(&scene));
+    same(scene, moved[i]);
+  }
+}
+
 TEST(Edits, MoveRotateAndScaleDoWhatTheySay) {
   Scene scene = TwoThings();
   const engine::Sim3& pose = scene.entities[0].model.map_from_model;

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/content_follower.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace docent::app {
+
+namespace {
+
+// Enough that the noise of single points, which the next picture makes smaller, neither shifts nor tilts
+// what stands among them.
+constexpr std::size_t kPointsAbout = 150;
+// Of the distance to the points: below it nothing is seen to move.
+constexpr double kLeast = 1e-5;
+
+// By how much the motion moves things near `place`, as a share of `reach`.
+double Extent(const engine::Sim3& motion, const Eigen::Vector3d& place, double reach) {
+  return std::max(
+      {(motion * place - place).norm() / reach, motion.rotation.Angle(), std::abs(motion.scale - 1)});
+}
+
+}  // namespace
+
+ContentFollower::Motions ContentFollower::Follow(const content::Scene& scene,
+                                                 const engine::MapSnapshot& before,
+                                                 const engine::MapSnapshot& now) {
+  std::erase_if(anchors_, [&](const auto& entry) { return scene.Find(entry.first) == nullptr; });
+  Motions motions;
+  for (const content::Entity& entity : scene.entities) {
+    const Eigen::Vector3d place = content::PlaceOf(entity);
+    Anchor& anchor = anchors_[entity.name];
+    if (anchor.points.ids.empty() || !anchor.place.isApprox(place, 1e-9))
+      anchor = {engine::PointsAbout(before, place, kPointsAbout), place, {}};
+    const auto motion = engine::MotionOf(anchor.points, now);
+    if (!motion) {
+      anchors_.erase(entity.name);  // the points that are there now are its ground from here on
+      continue;
+    }
+    const engine::Sim3 step = *motion * anchor.motion.inverse();
+    double reach = 0;
+    for (const Eigen::Vector3d& position : anchor.points.positions)
+      reach = std::max(reach, (anchor.motion * position - place).norm());
+    if (Extent(step, place, reach) < kLeast) continue;
+    anchor.motion = *motion;
+    anchor.place = step * place;
+    motions.emplace_back(entity.name, step);
+  }
+  return motions;
+}
+
+}  // namespace docent::app

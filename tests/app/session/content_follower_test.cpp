@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/content_follower.h"
+
+#include <gtest/gtest.h>
+
+#include "app/session/session_map.h"
+#include "engine/base/random.h"
+
+namespace docent::app {
+namespace {
+
+using engine::MapSnapshot;
+using engine::Sim3;
+
+std::shared_ptr<MapSnapshot> Cloud() {
+  Random random(1);
+  auto map = std::make_shared<MapSnapshot>();
+  for (int i = 0; i < 400; ++i) {
+    engine::MapPoint point;
+    point.id = static_cast<engine::MapPointId>(i + 1);
+    point.point_in_map << random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(2, 4), 1;
+    map->points.push_back(point);
+  }
+  return map;
+}
+
+std::shared_ptr<MapSnapshot> Moved(const MapSnapshot& map, const Sim3& motion, double noise = 0,
+                                   std::uint64_t seed = 1) {
+  Random random(seed);
+  auto moved = std::make_shared<MapSnapshot>(map);
+  for (engine::MapPoint& point : moved->points) {
+    point.point_in_map.head<3>() = motion * point.position() + Eigen::Vector3d(random.Uniform(-noise, noise),
+                                                                               random.Uniform(-noise, noise),
+                                                                               random.Uniform(-noise, noise));
+  }
+  return moved;
+}
+
+Sim3 Bend() {
+  return {engine::Rotation3::Exp({0.01, -0.04, 0.02}), Eigen::Vector3d(0.05, -0.1, 0.2), 0.95};
+}
+
+content::Scene TwoThings() {
+  content::Scene scene;
+  content::Entity model, sign;
+  model.name = "fox";
+  model.kind = content::Entity::Kind::kModel;
+  model.model.map_from_model = {engine::Rotation3(), {0.2, 0.1, 2.8}, 0.3};
+  sign.name = "sign-1";
+  sign.signpost.anchor = {-0.3, 0.2, 3.1};
+  sign.signpost.height_m = 0.2;
+  scene.entities = {model, sign};
+  return scene;
+}
+
+SessionMap MapWithContent() {
+  SessionMap map;
+  map.snapshot = Cloud();
+  map.scene = std::make_shared<content::Scene>(TwoThings());
+  return map;
+}
+
+TEST(ContentFollower, TakesContentWhereItsGroundGoes) {
+  SessionMap map = MapWithContent();
+  const content::Scene before = *map.scene;
+  map.Grow(Moved(*map.snapshot, Bend()));
+  const Sim3 model = map.scene->Find("fox")->model.map_from_model;
+  const Sim3 wanted = Bend() * before.Find("fox")->model.map_from_model;
+  EXPECT_LT((model.translation - wanted.translation).norm(), 1e-9);
+  EXPECT_NEAR(model.scale, wanted.scale, 1e-9);
+  EXPECT_LT((model.rotation * wanted.rotation.inverse()).Angle(), 1e-9);
+  const content::Signpost& sign = map.scene->Find("sign-1")->signpost;
+  EXPECT_LT((sign.anchor - Bend() * before.Find("sign-1")->signpost.anchor).norm(), 1e-9);
+  EXPECT_NEAR(sign.height_m, 0.95 * 0.2, 1e-9);
+}
+
+TEST(ContentFollower, LeavesTheSceneAloneWhileNothingMoves) {
+  SessionMap map = MapWithContent();
+  const auto scene = map.scene;
+  map.Grow(std::make_shared<MapSnapshot>(*map.snapshot));
+  EXPECT_EQ(map.scene, scene) << "or it would be saved anew with every keyframe";
+}
+
+// A thousand adjustments that each shake every point, about where it belongs.
+TEST(ContentFollower, AddsUpNoErrorsOfManyAdjustments) {
+  SessionMap map = MapWithContent();
+  const auto truth = map.snapshot;
+  const Eigen::Vector3d placed = content::PlaceOf(*map.scene->Find("fox"));
+  double farthest = 0;
+  for (std::uint64_t i = 1; i <= 1000; ++i) {
+    map.Grow(Moved(*truth, Sim3(), 0.01, i));
+    farthest = std::max(farthest, (content::PlaceOf(*map.scene->Find("fox")) - placed).norm());
+  }
+  EXPECT_LT(farthest, 0.004) << "150 points with an error of a centimetre";
+  map.Grow(truth);
+  EXPECT_LT((content::PlaceOf(*map.scene->Find("fox")) - placed).norm(), 1e-9);
+}
+
+TEST(ContentFollower, LetsAnEditPutContentElsewhereAndTakesItAlongFromThere) {
+  SessionMap map = MapWithContent();
+  map.Grow(Moved(*map.snapshot, Bend()));
+  auto scene = std::make_shared<content::Scene>(*map.scene);
+  map.history.Do(content::MoveEdit("fox", {-0.5, 0.4, 2.6}), scene.get());
+  map.scene = scene;
+  map.Grow(Moved(*map.snapshot, Bend()));
+  EXPECT_LT((content::PlaceOf(*map.scene->Find("fox")) - Bend() * Eigen::Vector3d(-0.5, 0.4, 2.6)).norm(),
+            1e-9);
+  scene = std::make_shared<content::Scene>(*map.scene);
+  ASSERT_TRUE(map.history.Undo(scene.get()));
+  const Eigen::Vector3d wanted = Bend() * (Bend() * Eigen::Vector3d(0.2, 0.1, 2.8));
+  EXPECT_LT((content::PlaceOf(*scene->Find("fox")) - wanted).norm(), 1e-9)
+      << "taken back to where it would be by now";
+}
+
+TEST(ContentFollower, KeepsContentWhenThePointsAboutItAreGone) {
+  SessionMap map = MapWithContent();
+  const content::Scene before = *map.scene;
+  auto other = Moved(*map.snapshot, Bend());
+  for (engine::MapPoint& point : other->points) point.id += 1000;
+  map.Grow(other);
+  EXPECT_EQ(content::PlaceOf(*map.scene->Find("fox")), content::PlaceOf(*before.Find("fox")));
+  // From now on these are its ground.
+  map.Grow(Moved(*other, Bend()));
+  EXPECT_LT(
+      (content::PlaceOf(*map.scene->Find("fox")) - Bend() * content::PlaceOf(*before.Find("fox"))).norm(),
+      1e-9);
+}
+
+}  // namespace
+}  // namespace docent::app
