@@ -38,7 +38,7 @@ struct MapperOptions {
   int min_initial_directions = 40;  // in the first picture, for a map to begin as a panorama
   // Of the infinite points: what is seen from two panorama maps is mostly further away (hybrid-slam §5.2).
   double min_infinite_parallax_deg = 1.5;
-  int conversion_partners = 4;  // keyframes in which a localized keyframe's infinite points are looked for
+  int conversion_partners = 30;  // keyframes in which a localized keyframe's infinite points are looked for
   MapAdjustmentOptions adjustment;
   SearchOptions search;
 };
