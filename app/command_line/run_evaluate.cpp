@@ -82,7 +82,7 @@ void StitchMap(const std::filesystem::path& folder, const Session::MapState& map
 
 // Tracks the whole sequence in a fresh session and leaves its files in the folder of that name.
 RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const std::string& name,
-                Verbosity verbosity, std::vector<ShownPanorama>* panoramas) {
+                Verbosity verbosity, bool has_truth, std::vector<ShownPanorama>* panoramas) {
   RunRecord record;
   record.name = name;
   record.engine = ToString(options.engine);
@@ -122,7 +122,9 @@ RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const 
     if (!map.snapshot) continue;
     record.maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
     record.maps.back().discarded = map.discarded;
-    if (!map.discarded) StitchMap(options.output / name, map, panoramas);
+    if (map.discarded) continue;
+    if (has_truth) record.maps.back().adjusted_centers = AdjustedCenters(*map.snapshot);
+    StitchMap(options.output / name, map, panoramas);
   }
   return record;
 }
@@ -141,7 +143,7 @@ std::string FreeFolderName(std::string name, std::set<std::string>* taken) {
 EvaluatedRun Evaluate(const EvaluateOptions& options, Sequence sequence, const std::string& name,
                       Verbosity verbosity) {
   EvaluatedRun run;
-  run.run = Track(options, &sequence.camera, name, verbosity, &run.panoramas);
+  run.run = Track(options, &sequence.camera, name, verbosity, !sequence.truth.empty(), &run.panoramas);
   run.truth = std::move(sequence.truth);
   run.segments = std::move(sequence.segments);
   run.report = EvaluateRun(run.run, run.truth, run.segments);

@@ -109,6 +109,23 @@ void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<Fram
   map->scale = truth_from_map->scale;
 }
 
+void CompareKeyFrames(const MapRecord& record, const std::vector<TimedPose>& truth,
+                      const EvaluationOptions& options, MapResult* map) {
+  std::vector<Eigen::Vector3d> in_truth, in_map;
+  for (const auto& [time, center] : record.adjusted_centers) {
+    const TimedPose* pose = FindPose(truth, time, options.max_time_difference);
+    if (!pose) continue;
+    in_truth.push_back(pose->truth_from_camera.translation);
+    in_map.push_back(center);
+  }
+  const std::optional<engine::Sim3> truth_from_map = engine::AlignSim3(in_truth, in_map);
+  if (!truth_from_map) return;
+  RootMeanSquare error;
+  for (std::size_t i = 0; i < in_map.size(); ++i)
+    error.Add((*truth_from_map * in_map[i] - in_truth[i]).norm());
+  map->keyframe_ate_rmse_m = error.Get();
+}
+
 // One result a map, in the order in which the frames entered them.
 std::vector<MapResult> ListMaps(const RunRecord& run) {
   std::vector<MapResult> maps;
@@ -196,6 +213,9 @@ void CompareWithTruth(const RunRecord& run, const std::vector<TimedPose>& truth,
     MapResult& map = report->maps[i];
     if (map.discarded) continue;
     CompareMap(pairs_of_map[map.key], &map, &report->frame_results);
+    for (const MapRecord& record : run.maps) {
+      if (record.key == map.key) CompareKeyFrames(record, truth, options, &map);
+    }
     const bool larger = !report->largest_map || map.frames > report->maps[*report->largest_map].frames;
     if (map.frames > 0 && larger) report->largest_map = i;
   }

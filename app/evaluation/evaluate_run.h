@@ -40,7 +40,10 @@ struct MapResult {
   bool discarded = false;
   int frames = 0;                    // with a pose in this map
   std::optional<double> ate_rmse_m;  // empty without truth, or when the centres do not fix a similarity
-  std::optional<double> scale;       // truth metres a map metre
+  // Of its keyframes after one more adjustment of the whole map: what the map knows, where ate_rmse_m is what
+  // the wearer saw.
+  std::optional<double> keyframe_ate_rmse_m;
+  std::optional<double> scale;               // truth metres a map metre
   std::optional<double> rotation_rmse_deg;   // after the rotation that aligns the orientations best
   std::optional<double> rotation_drift_deg;  // of the turn from the first to the last frame with a pose
   // The same about the true turn's own axis, as hybrid-slam §7.3 tells it: positive when the engine turned

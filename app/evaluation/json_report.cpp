@@ -23,6 +23,7 @@ Json ToJson(const MapResult& map) {
           {"discarded", map.discarded},
           {"frames", map.frames},
           {"ate_rmse_m", OrNull(map.ate_rmse_m)},
+          {"keyframe_ate_rmse_m", OrNull(map.keyframe_ate_rmse_m)},
           {"rotation_rmse_deg", OrNull(map.rotation_rmse_deg)},
           {"rotation_drift_deg", OrNull(map.rotation_drift_deg)},
           {"turn_error_deg", OrNull(map.turn_error_deg)},

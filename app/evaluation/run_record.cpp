@@ -5,6 +5,8 @@
 
 #include "app/files/text_file.h"
 #include "app/session/surface_at_pixel.h"
+#include "engine/map/map.h"
+#include "engine/mapping/map_adjustment.h"
 
 namespace docent::app {
 
@@ -86,6 +88,17 @@ MapRecord MakeMapRecord(std::uint64_t key, const std::string& name, const engine
   // A camera that begins looking straight down has no way ahead; any level one will do.
   record.forward = level.norm() > 1e-3 ? level.normalized() : record.up.unitOrthogonal();
   return record;
+}
+
+std::vector<std::pair<Timestamp, Eigen::Vector3d>> AdjustedCenters(const engine::MapSnapshot& snapshot) {
+  engine::Map map(snapshot);
+  engine::AdjustGlobally({}, nullptr, &map);
+  std::vector<std::pair<Timestamp, Eigen::Vector3d>> centers;
+  for (const auto& [id, record] : map.keyframes()) {
+    if (record.keyframe.kind == engine::KeyFrameKind::kPanorama) continue;
+    centers.emplace_back(record.keyframe.time, record.keyframe.camera_from_map.OriginInSource());
+  }
+  return centers;
 }
 
 MappingTimes MakeMappingTimes(const engine::MapperTimes& times) {

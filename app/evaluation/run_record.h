@@ -61,6 +61,9 @@ struct MapRecord {
   std::vector<bool> converted = {};        // whether each of them was a direction before
   // Of keyframes whose place is known, and of the places where panorama maps stand.
   std::vector<Eigen::Vector3d> sixdof_centers = {}, localized_centers = {}, panorama_centers = {};
+  // Of the keyframes whose place is known, after one more adjustment of the whole map; empty when nobody
+  // asked.
+  std::vector<std::pair<Timestamp, Eigen::Vector3d>> adjusted_centers = {};
   // How it is looked at: upwards, and the way the first keyframe looks, level; unit vectors of the map.
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY(), forward = Eigen::Vector3d::UnitZ();
 };
@@ -91,6 +94,9 @@ class RunRecorder {
 
 // Counts and positions of a map as it is now; `converted` and `localized` are the mapper's to add.
 MapRecord MakeMapRecord(std::uint64_t key, const std::string& name, const engine::MapSnapshot& map);
+
+// For MapRecord::adjusted_centers; the map itself stays as it is.
+std::vector<std::pair<Timestamp, Eigen::Vector3d>> AdjustedCenters(const engine::MapSnapshot& map);
 
 MappingTimes MakeMappingTimes(const engine::MapperTimes& times);
 

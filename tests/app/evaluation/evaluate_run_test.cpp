@@ -92,6 +92,25 @@ TEST(Evaluation, MeasuresTheAteThatWasPutIn) {
   EXPECT_THAT(EvaluateRun(run, truth, {}).ate_rmse_m, Optional(DoubleNear(0.05, 5e-4)));
 }
 
+TEST(Evaluation, MeasuresWhatTheMapKnowsBesideWhatWasSeenLive) {
+  const auto truth = Helix(400);
+  RunRecord run = PerfectRun(truth);
+  for (std::size_t i = 0; i < run.frames.size(); ++i)
+    MoveInTruth(&run.frames[i], {0, i % 2 == 0 ? 0.05 : -0.05, 0});
+  EXPECT_FALSE(EvaluateRun(run, truth, {}).maps.at(0).keyframe_ate_rmse_m) << "nobody asked for it";
+  MapRecord map;
+  map.key = 1;
+  for (std::size_t i = 0; i < truth.size(); i += 20) {
+    FrameRecord keyframe = PerfectFrame(truth[i]);
+    MoveInTruth(&keyframe, {0, i % 40 == 0 ? 0.01 : -0.01, 0});
+    map.adjusted_centers.emplace_back(keyframe.time, keyframe.camera_from_map.OriginInSource());
+  }
+  run.maps.push_back(map);
+  const MapResult result = EvaluateRun(run, truth, {}).maps.at(0);
+  EXPECT_THAT(result.ate_rmse_m, Optional(DoubleNear(0.05, 5e-4)));
+  EXPECT_THAT(result.keyframe_ate_rmse_m, Optional(DoubleNear(0.01, 1e-3)));
+}
+
 TEST(Evaluation, MeasuresRotationErrorAndDriftSeparately) {
   const auto truth = Helix(201);
   RunRecord run = PerfectRun(truth);
