@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "engine/vision/fast_corners.h"
 
 namespace docent::engine {
 
@@ -13,24 +14,6 @@ namespace {
 constexpr double kReferenceArea = 640.0 * 480.0;
 // The patch border: a corner nearer to the edge could not be matched.
 constexpr int kBorder = 6;
-
-void DetectCorners(const cv::Mat& image, int threshold, std::vector<cv::KeyPoint>* scratch,
-                   std::vector<Corner>* corners, std::vector<int>* row_begin) {
-  cv::FAST(image, *scratch, threshold, true, cv::FastFeatureDetector::TYPE_9_16);
-  corners->clear();
-  row_begin->assign(static_cast<std::size_t>(image.rows) + 1, 0);
-  // OpenCV reports corners row by row, which the row index relies on.
-  for (const cv::KeyPoint& keypoint : *scratch) {
-    const Corner corner{static_cast<std::int16_t>(keypoint.pt.x), static_cast<std::int16_t>(keypoint.pt.y)};
-    if (corner.x < kBorder || corner.y < kBorder || corner.x >= image.cols - kBorder ||
-        corner.y >= image.rows - kBorder) {
-      continue;
-    }
-    corners->push_back(corner);
-    ++(*row_begin)[static_cast<std::size_t>(corner.y) + 1];
-  }
-  for (std::size_t row = 1; row < row_begin->size(); ++row) (*row_begin)[row] += (*row_begin)[row - 1];
-}
 
 // A step towards the threshold that gives the wanted count; counts fall roughly as exp(-threshold / 8).
 int NextThreshold(int threshold, std::size_t found, double wanted, const FeatureOptions& options) {
@@ -48,7 +31,6 @@ double WantedCorners(const FeatureOptions& options, const cv::Mat& gray, int lev
 
 void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
                      const std::array<int, kPyramidLevels>& threshold_hint, ImageFeatures* features) {
-  static thread_local std::vector<cv::KeyPoint> scratch;
   features->levels[0] = gray;
   for (std::size_t level = 0; level < kPyramidLevels; ++level) {
     if (level > 0) {
@@ -59,14 +41,14 @@ void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
     }
     const double wanted = WantedCorners(options, gray, static_cast<int>(level));
     int threshold = threshold_hint[level] > 0 ? threshold_hint[level] : 15;
-    DetectCorners(features->levels[level], threshold, &scratch, &features->corners[level],
-                  &features->row_begin[level]);
+    DetectFastCorners(features->levels[level], threshold, kBorder, &features->corners[level],
+                      &features->row_begin[level]);
     const std::size_t found = features->corners[level].size();
     const int next = NextThreshold(threshold, found, wanted, options);
     // A picture that suddenly blurs or clears is detected again at once; otherwise the next one profits.
     if (static_cast<double>(found) < 0.4 * wanted && next < threshold) {
-      DetectCorners(features->levels[level], next, &scratch, &features->corners[level],
-                    &features->row_begin[level]);
+      DetectFastCorners(features->levels[level], next, kBorder, &features->corners[level],
+                        &features->row_begin[level]);
     }
     features->fast_threshold[level] = next;
   }
