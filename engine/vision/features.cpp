@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 #include "engine/vision/fast_corners.h"
 
@@ -33,12 +32,7 @@ void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
                      const std::array<int, kPyramidLevels>& threshold_hint, ImageFeatures* features) {
   features->levels[0] = gray;
   for (std::size_t level = 0; level < kPyramidLevels; ++level) {
-    if (level > 0) {
-      const cv::Mat& finer = features->levels[level - 1];
-      const cv::Size half(finer.cols / 2, finer.rows / 2);
-      // Whole blocks only: an odd last row or column would stretch every pixel a little beyond 2x2.
-      cv::resize(finer(cv::Rect(cv::Point(), half * 2)), features->levels[level], half, 0, 0, cv::INTER_AREA);
-    }
+    if (level > 0) HalvePicture(features->levels[level - 1], &features->levels[level]);
     const double wanted = WantedCorners(options, gray, static_cast<int>(level));
     int threshold = threshold_hint[level] > 0 ? threshold_hint[level] : 15;
     DetectFastCorners(features->levels[level], threshold, kBorder, &features->corners[level],
@@ -52,7 +46,7 @@ void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
     }
     features->fast_threshold[level] = next;
   }
-  features->small_blurry = MakeSmallBlurryImage(gray);
+  MakeSmallBlurryImage(gray, kThumbnailBlurPx, &features->small_blurry);
 }
 
 std::shared_ptr<const ImageFeatures> MakeFeatures(const cv::Mat& gray, const FeatureOptions& options) {
