@@ -7,6 +7,7 @@
 
 #include "engine/base/random.h"
 #include "engine/map/map_snapshot.h"
+#include "engine/tracking/point_id_set.h"
 #include "engine/tracking/point_search.h"
 #include "engine/tracking/pose_refinement.h"
 #include "engine/tracking/tracked_frame.h"
@@ -23,10 +24,12 @@ struct MapTrackerOptions {
   int max_fine = 600;                // ptamm §2.1 allows 1000; beyond 600 the pose gains nothing that shows
   int local_frames = 6;              // for which the choice of points near the camera is good
   std::size_t local_keyframes = 20;  // whose points are looked for: those that share most with the last frame
-  float coarse_radius_px = 30;       // level 0, about the prediction
-  float wide_radius_px = 70;         // the second try before a frame is called lost
-  float fine_radius_px = 7;          // after a coarse pose
-  float fine_radius_alone_px = 14;   // when the coarse stage had nothing to say
+  // The nearest ones, among which these are chosen: in a large map the others are not even looked at.
+  std::size_t examined_keyframes = 100;
+  float coarse_radius_px = 30;      // level 0, about the prediction
+  float wide_radius_px = 70;        // the second try before a frame is called lost
+  float fine_radius_px = 7;         // after a coarse pose
+  float fine_radius_alone_px = 14;  // when the coarse stage had nothing to say
   // Infinite points are off their prediction by what the camera has moved since its panorama map was opened;
   // all by about the same, so that they still tell the rotation when the finite points are gone.
   float infinite_radius_px = 20;
@@ -126,7 +129,7 @@ class MapTracker {
   std::vector<MapPointId> last_inliers_;  // of the last frame, by ascending id
   // Scratch, kept to save allocations.
   std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
-  std::vector<MapPointId> ids_;
+  PointIdSet wanted_;
   // What may be seen from about here, finite and infinite; taken anew when the map has changed and every few
   // frames, as the camera goes on.
   std::vector<LocalPoint> local_, local_infinite_;
@@ -141,7 +144,8 @@ class MapTracker {
   std::vector<std::uint32_t> coarse_, fine_;
   std::vector<std::uint32_t> measured_;  // candidate of each measurement
   std::vector<PoseMeasurement> measurements_;
-  std::vector<double> scratch_;
+  PoseRefinementMemory memory_;
+  std::vector<double> depths_;
 };
 
 }  // namespace docent::engine

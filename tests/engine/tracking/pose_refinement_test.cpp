@@ -58,8 +58,8 @@ void AddMeasurements(int count, double noise_sigmas, bool infinite, Random* rand
 }
 
 PoseRefinement Refine(const Rigid3& start, std::vector<PoseMeasurement>* measurements) {
-  std::vector<double> scratch;
-  return RefinePose(kLens, start, {}, measurements, &scratch);
+  PoseRefinementMemory memory;
+  return RefinePose(kLens, start, {}, measurements, &memory);
 }
 
 Vector6 Error(const PoseRefinement& refined) {
@@ -257,8 +257,8 @@ TEST(PoseRefinement, TurnsAboutThePivotWhereOnlyTheRotationIsTold) {
   }
   const Rotation3 guess = Rotation3::Exp({-0.02, 0.04, 0.03}) * turned.rotation;
   const Rigid3 start(guess, pivot - guess * fixed_in_map);
-  std::vector<double> scratch;
-  const PoseRefinement refined = RefinePose(kLens, start, {}, &measurements, &scratch, pivot);
+  PoseRefinementMemory memory;
+  const PoseRefinement refined = RefinePose(kLens, start, {}, &measurements, &memory, pivot);
   EXPECT_TRUE(refined.converged);
   EXPECT_EQ(refined.observed, ObservedMotion::kPanorama);
   EXPECT_EQ(refined.inliers, 60);
