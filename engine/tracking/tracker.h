@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -91,6 +90,9 @@ class Tracker {
 
   // The whole way of one frame. `places` may be null: then a lost track is sought in its own map only.
   TrackedFrame Track(const Frame& frame, const PlaceFinder* places);
+  // The same into *out, whose memory is used again: once its containers have grown to the map, a frame that
+  // is tracked without trouble allocates nothing.
+  void Track(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
 
   // What the last frame offers to the mapper; each is given out once.
   std::optional<KeyFrameCandidate> TakeKeyFrameCandidate();
@@ -177,7 +179,7 @@ class Tracker {
   std::shared_ptr<const ImageFeatures> features_, previous_;
   std::vector<std::shared_ptr<ImageFeatures>> pool_;
   std::array<int, kPyramidLevels> fast_threshold_{};
-  std::map<MapPointId, PointReport> reports_;
+  std::vector<PointReport> reports_;  // by ascending point
   std::optional<KeyFrameCandidate> candidate_;
   std::optional<InitialPair> pair_;
 };
