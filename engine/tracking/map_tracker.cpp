@@ -258,7 +258,7 @@ std::optional<Rigid3> MapTracker::PoseFromPatches(const ImageFeatures& features,
 MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& features,
                                  const Rigid3& predicted, Effort effort, Random* random) {
   MapTrackResult result;
-  result.camera_from_map = predicted;
+  result.camera_from_map = predicted_ = predicted;
   matches_.clear();
   attempts_.clear();
   measured_.clear();
@@ -339,6 +339,35 @@ void MapTracker::CountInliers(MapTrackResult* result) {
     std::nth_element(depths_.begin(), middle, depths_.end());
     result->median_depth = *middle;
   }
+}
+
+FrameInspection MapTracker::Inspect(const Rigid3& camera_from_map) const {
+  FrameInspection inspection;
+  inspection.predicted = predicted_;
+  inspection.visible_points = visible_finite_;
+  inspection.panorama = panorama_;
+  // A search after a loss has no attempts for all candidates when its patches did not agree.
+  std::vector<std::uint32_t> order = coarse_;
+  order.insert(order.end(), fine_.begin(), fine_.end());
+  if (order.size() != attempts_.size()) return inspection;
+  std::size_t match = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Candidate& candidate = candidates_[order[i]];
+    InspectedPoint& point = inspection.points.emplace_back();
+    point.point = candidate.point->id;
+    point.infinite = candidate.point->infinite();
+    point.level = candidate.predicted.level;
+    point.predicted = candidate.predicted.pixel;
+    if (!attempts_[i].found) continue;
+    const PoseMeasurement& measurement = measurements_[match++];
+    point.found = measurement.pixel;
+    point.weight = measurement.weight;
+    point.inlier = attempts_[i].inlier;
+    const Eigen::Vector4d in_camera = camera_from_map * measurement.point_in_map;
+    if (const auto pixel = camera_->Project(in_camera.head<3>()))
+      point.residual_px = measurement.pixel - *pixel;
+  }
+  return inspection;
 }
 
 }  // namespace docent::engine

@@ -7,6 +7,7 @@
 
 #include "engine/base/random.h"
 #include "engine/map/map_snapshot.h"
+#include "engine/tracking/frame_inspection.h"
 #include "engine/tracking/point_id_set.h"
 #include "engine/tracking/point_search.h"
 #include "engine/tracking/pose_refinement.h"
@@ -80,6 +81,9 @@ class MapTracker {
     bool found, inlier;
   };
   const std::vector<Attempt>& attempts() const { return attempts_; }
+  // All about the last call of Track, and of the pose that came of it. The snapshot that it was given must
+  // live still. Leaves the picture's features to the caller.
+  FrameInspection Inspect(const Rigid3& camera_from_map) const;
   // To be called when another map is tracked from now on.
   void Clear();
   // Infinite points of this panorama map are looked for from now on beside the finite points; kNoId for none.
@@ -122,6 +126,7 @@ class MapTracker {
   MapTrackerOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   PointSearcher searcher_;
+  Rigid3 predicted_;  // that the last search began with
   PanoramaId panorama_ = kNoId;
   Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();
   std::vector<PointMatch> matches_;

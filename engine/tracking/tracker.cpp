@@ -196,6 +196,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   previous_ = std::exchange(features_, nullptr);
   features_ = NextFeatures(frame);
   ++frames_since_keyframe_;
+  searched_ = map_ && tracking_;
 
   if (starting_ && !map_) {
     LookForStart(frame, out);
@@ -425,6 +426,18 @@ std::optional<KeyFrameCandidate> Tracker::TakeKeyFrameCandidate() {
 
 std::optional<InitialPair> Tracker::TakeInitialPair() {
   return std::exchange(pair_, std::nullopt);
+}
+
+FrameInspection Tracker::Inspect(const TrackedFrame& tracked) const {
+  FrameInspection inspection;
+  // What was searched in vain after a loss may belong to maps that are gone.
+  if (HasPose(tracked.state)) {
+    inspection = map_tracker_.Inspect(tracked.camera_from_map);
+  } else if (searched_) {
+    inspection = map_tracker_.Inspect(motion_.last());
+  }
+  inspection.features = features_;
+  return inspection;
 }
 
 std::vector<PointReport> Tracker::TakeReports() {

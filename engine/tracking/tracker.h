@@ -10,6 +10,7 @@
 #include "engine/mapping/keyframe_candidate.h"
 #include "engine/mapping/target_initializer.h"
 #include "engine/recognition/place.h"
+#include "engine/tracking/frame_inspection.h"
 #include "engine/tracking/keyframe_selection.h"
 #include "engine/tracking/keyframe_selector.h"
 #include "engine/tracking/map_tracker.h"
@@ -94,6 +95,9 @@ class Tracker {
   // is tracked without trouble allocates nothing.
   void Track(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
 
+  // All about the last frame, for whoever looks for a fault; `tracked`: what Track answered.
+  FrameInspection Inspect(const TrackedFrame& tracked) const;
+
   // What the last frame offers to the mapper; each is given out once.
   std::optional<KeyFrameCandidate> TakeKeyFrameCandidate();
   std::optional<InitialPair> TakeInitialPair();
@@ -163,6 +167,7 @@ class Tracker {
   double finite_coverage_ = 1, median_depth_ = 1;  // of the last frame that told them
   Rigid3 first_view_from_map_;                     // the pose of the initializer's first view
   Timestamp lost_since_{};
+  bool searched_ = false;  // a map, for the last frame
   int misfit_frames_ = 0;  // in a row, that no turn explains
   // The newest picture whose pose points told, or of a long turn a later one: FollowPicture's measure.
   std::shared_ptr<const ImageFeatures> anchor_;
