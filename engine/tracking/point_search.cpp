@@ -22,6 +22,10 @@ void PointSearcher::Clear() {
   cache_.clear();
 }
 
+void PointSearcher::Release() {
+  std::vector<Cached>().swap(cache_);
+}
+
 PointSearcher::Cached& PointSearcher::Entry(const MapPoint& point) {
   if (cache_.empty()) cache_.resize(kCacheSlots);
   Cached& entry = cache_[point.id % kCacheSlots];

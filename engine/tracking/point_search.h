@@ -46,6 +46,8 @@ class PointSearcher {
 
   // Forgets all patches; to be called when another map is searched.
   void Clear();
+  // The same, and gives their memory back.
+  void Release();
 
   // Empty when the point cannot be seen from there: behind, outside, edge-on, or at a scale that no level
   // fits. source is the keyframe that point.source_keyframe names.
