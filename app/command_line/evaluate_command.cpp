@@ -29,6 +29,12 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
                     "Take every turn to be about the camera's own centre, not the wearer's; for comparison");
   command->add_flag("--compare", options->compare,
                     "Run each sequence with the other engine too, and show both side by side");
+  command
+      ->add_option(
+          "--dump-frame", options->dump_frames,
+          "Write everything about frame N (from 0) of each sequence, as pictures and JSON; may be repeated")
+      ->type_name("N")
+      ->allow_extra_args(false);
   AddSeedOption(command, &options->seed);
   command->callback([=, run = std::move(run)] {
     if (options->calibrations.size() > options->sequences.size()) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <exception>
@@ -9,6 +10,7 @@
 #include "app/cameras/simulated_source.h"
 #include "app/command_line/progress.h"
 #include "app/command_line/runs.h"
+#include "app/evaluation/frame_dump.h"
 #include "app/evaluation/html_report.h"
 #include "app/evaluation/json_report.h"
 #include "app/evaluation/panorama_picture.h"
@@ -80,6 +82,23 @@ void StitchMap(const std::filesystem::path& folder, const Session::MapState& map
   }
 }
 
+void DumpFrame(const std::filesystem::path& folder, std::size_t number, const engine::TrackedFrame& frame,
+               const Session& session) {
+  // The tracker has not seen a frame that was dropped.
+  const bool dropped = frame.state == engine::TrackingState::kDropped;
+  WriteFrameDump(folder, number, frame, dropped ? engine::FrameInspection() : session.Inspect(frame));
+}
+
+// So that a wrong number is told before the sequence is run.
+void CheckDumpFrames(const EvaluateOptions& options, const SourceInfo& info) {
+  if (!info.frame_count) return;
+  for (const std::size_t number : options.dump_frames) {
+    if (number < *info.frame_count) continue;
+    throw Error("--dump-frame " + std::to_string(number) + ": '" + info.name + "' has " +
+                std::to_string(*info.frame_count) + " frames, and the first one is 0.");
+  }
+}
+
 // Tracks the whole sequence in a fresh session and leaves its files in the folder of that name.
 RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const std::string& name,
                 Verbosity verbosity, bool has_truth, std::vector<ShownPanorama>* panoramas) {
@@ -100,6 +119,9 @@ RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const 
   try {
     RunFrames(camera, &session, loop,
               [&](const engine::TrackedFrame& frame) {
+                const std::size_t number = recorder.frames().size();
+                if (std::count(options.dump_frames.begin(), options.dump_frames.end(), number) > 0)
+                  DumpFrame(options.output / name, number, frame, session);
                 recorder.Add(frame, MakeMappingTimes(session.MappingTimes()));
                 output.Add(frame, session.ShownWith(frame).map_name);
                 write_events();
@@ -173,6 +195,7 @@ void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity) {
   for (std::size_t i = 0; i < options.sequences.size() && !failure; ++i) {
     try {
       Sequence sequence = OpenSequence(options, i);
+      CheckDumpFrames(options, sequence.camera.source->info());
       MakeFolder(options.output);  // not before there is something to put into it
       const std::string name = FreeFolderName(sequence.camera.source->info().name, &taken);
       runs.push_back(Evaluate(options, std::move(sequence), name, verbosity));

@@ -76,6 +76,10 @@ class Session {
 
   // The whole way of one picture.
   engine::TrackedFrame Process(const engine::Frame& frame);
+  // All about the frame that Process answered last with `frame`; on the thread of its camera.
+  engine::FrameInspection Inspect(const engine::TrackedFrame& frame) const {
+    return cameras_.at(static_cast<std::size_t>(frame.frame.camera)).tracker->Inspect(frame);
+  }
   // Holds a feeder back that is faster than a camera; see MappingThread::WaitUntilCalm.
   void WaitUntilCalm(const std::stop_token& stop) { mapping_.WaitUntilCalm(stop); }
 

@@ -252,6 +252,9 @@ std::shared_ptr<const MapSnapshot> Map::Snapshot() {
   snapshot->next_panorama = next_panorama_;
   snapshot->panoramas = panoramas_;
   snapshot->keyframes.reserve(keyframes_.size());
+  std::size_t observations = 0;
+  for (const auto& [id, record] : keyframes_) observations += record.observations.size();
+  snapshot->observations.reserve(observations);
   for (const auto& [id, record] : keyframes_) {
     snapshot->keyframes.push_back(record.keyframe);
     snapshot->observations.insert(snapshot->observations.end(), record.observations.begin(),

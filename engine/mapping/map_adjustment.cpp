@@ -40,6 +40,10 @@ Assembly Assemble(Map* map, const std::set<KeyFrameId>& free, const std::set<Key
                                                static_cast<double>(1 << observation.level), false});
     }
   };
+  std::size_t most = 0;
+  for (const auto* keyframes : {&free, &fixed})
+    for (const KeyFrameId id : *keyframes) most += map->FindKeyFrame(id)->observations.size();
+  assembly.problem.measurements.reserve(most);
   for (const KeyFrameId id : free) add(id, map->FindKeyFrame(id)->keyframe.fixed);
   for (const KeyFrameId id : fixed) add(id, true);
   return assembly;

@@ -368,6 +368,7 @@ void Mapper::LocalAdjustment() {
 }
 
 void Mapper::GlobalAdjustment() {
+  searcher_.Release();  // no time needs more memory than this one
   const BundleSummary summary = AdjustGlobally(options_.adjustment, &interrupt_, &map_);
   global_interrupted_ = summary.outcome == BundleSummary::Outcome::kInterrupted;
   if (global_interrupted_) return;

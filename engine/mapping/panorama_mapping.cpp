@@ -138,19 +138,19 @@ bool LocalizePanoramaKeyFrame(const LocalizationOptions& options, KeyFrameId id,
   std::vector<PoseMeasurement> measurements;
   const auto start = PoseFrom(options, record->keyframe, map, seed, &found, &measurements);
   if (!start) return false;
-  std::vector<double> scratch;
-  const PoseRefinement refined = RefinePose(*record->keyframe.camera, *start, {}, &measurements, &scratch,
+  PoseRefinementMemory memory;
+  const PoseRefinement refined = RefinePose(*record->keyframe.camera, *start, {}, &measurements, &memory,
                                             {Eigen::Vector3d::Zero(), *start});
-  scratch.clear();
+  std::vector<double> depths;
   std::vector<Eigen::Vector2f> pixels;
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (!(measurements[i].weight > 0.1)) continue;
     pixels.push_back(found[i].pixel);
-    scratch.push_back((refined.camera_from_map * measurements[i].point_in_map).z());
+    depths.push_back((refined.camera_from_map * measurements[i].point_in_map).z());
   }
-  if (scratch.empty()) return false;
-  const auto middle = scratch.begin() + static_cast<std::ptrdiff_t>(scratch.size() / 2);
-  std::nth_element(scratch.begin(), middle, scratch.end());
+  if (depths.empty()) return false;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
   if (!IsSure(options, refined, *middle) ||
       OccupiedCells(pixels, *record->keyframe.camera) < options.min_cells)
     return false;

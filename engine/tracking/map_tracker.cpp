@@ -5,6 +5,7 @@
 #include <array>
 #include <bitset>
 #include <cmath>
+#include <span>
 
 #include "engine/recognition/absolute_pose.h"
 
@@ -23,6 +24,23 @@ std::size_t CellOf(const Eigen::Vector2d& pixel, const CameraModel& camera, int 
   const int column = std::clamp(static_cast<int>(pixel.x() * columns / camera.width_px()), 0, columns - 1);
   const int row = std::clamp(static_cast<int>(pixel.y() * rows / camera.height_px()), 0, rows - 1);
   return static_cast<std::size_t>(row * columns + column);
+}
+
+// By ascending point.
+std::span<const Observation> ObservationsOf(const MapSnapshot& map, KeyFrameId keyframe) {
+  const auto begin = std::lower_bound(map.observations.begin(), map.observations.end(), keyframe,
+                                      [](const Observation& o, KeyFrameId id) { return o.keyframe < id; });
+  const auto end = std::upper_bound(begin, map.observations.end(), keyframe,
+                                    [](KeyFrameId id, const Observation& o) { return id < o.keyframe; });
+  return {begin, end};
+}
+
+// Of points by ascending id, the first one with this id or a later one; it is taken to be near the begin.
+const MapPoint* FirstNotBefore(const MapPoint* begin, const MapPoint* end, MapPointId id) {
+  std::ptrdiff_t step = 1;
+  while (step < end - begin && begin[step].id < id) step *= 2;
+  return std::lower_bound(begin, begin + std::min(step + 1, end - begin), id,
+                          [](const MapPoint& candidate, MapPointId wanted) { return candidate.id < wanted; });
 }
 
 }  // namespace
@@ -47,61 +65,53 @@ void MapTracker::ExpectTurn(const Turn& turn) {
 void MapTracker::CollectLocal(const MapSnapshot& map, const Rigid3& camera_from_map) {
   ranked_.clear();
   const Eigen::Vector3d center = camera_from_map.OriginInSource();
-  auto observation = map.observations.begin();
   for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
     const KeyFrame& keyframe = map.keyframes[i];
-    if (keyframe.kind == KeyFrameKind::kPanorama) {
-      // What it knows is looked for by its panorama map.
-      while (observation != map.observations.end() && observation->keyframe == keyframe.id) ++observation;
-      continue;
-    }
-    int shared = 0;
-    // Both lists ascend by point.
-    auto inlier = last_inliers_.begin();
-    for (; observation != map.observations.end() && observation->keyframe == keyframe.id; ++observation) {
-      while (inlier != last_inliers_.end() && *inlier < observation->point) ++inlier;
-      if (inlier != last_inliers_.end() && *inlier == observation->point) ++shared;
-    }
+    // What it knows is looked for by its panorama map.
+    if (keyframe.kind == KeyFrameKind::kPanorama) continue;
     const double distance = (keyframe.camera_from_map.OriginInSource() - center).norm() / keyframe.mean_depth;
     const double turn =
         1.0 - std::abs((camera_from_map.rotation.inverse() * keyframe.camera_from_map.rotation)
                            .quaternion()
                            .w());  // grows with the angle between the views, 0 for none
-    // Shared points come first; the nearness decides among keyframes that share none.
-    ranked_.emplace_back(-shared + 1.0 - 1.0 / (1.0 + distance + 10 * turn), i);
+    ranked_.emplace_back(1.0 - 1.0 / (1.0 + distance + 10 * turn), i);
   }
-  const std::size_t count = std::min(ranked_.size(), options_.local_keyframes);
-  std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(count), ranked_.end());
-  ids_.clear();
-  for (std::size_t rank = 0; rank < count; ++rank) {
-    const KeyFrameId id = map.keyframes[ranked_[rank].second].id;
-    auto it = std::lower_bound(map.observations.begin(), map.observations.end(), id,
-                               [](const Observation& o, KeyFrameId wanted) { return o.keyframe < wanted; });
-    for (; it != map.observations.end() && it->keyframe == id; ++it) ids_.push_back(it->point);
+  const auto keep_best = [this](std::size_t most) {
+    const std::size_t count = std::min(ranked_.size(), most);
+    std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(count), ranked_.end());
+    ranked_.resize(count);
+  };
+  if (ranked_.size() > options_.examined_keyframes) keep_best(options_.examined_keyframes);
+  // Shared points come first; the nearness decides among keyframes that share none.
+  wanted_.Clear(map.next_point);
+  for (const MapPointId id : last_inliers_) wanted_.Insert(id);
+  for (auto& [rank, index] : ranked_) {
+    int shared = 0;
+    for (const Observation& observation : ObservationsOf(map, map.keyframes[index].id))
+      shared += wanted_.Contains(observation.point);
+    rank -= shared;
+  }
+  keep_best(options_.local_keyframes);
+  wanted_.Clear(map.next_point);
+  for (const auto& [rank, index] : ranked_) {
+    for (const Observation& observation : ObservationsOf(map, map.keyframes[index].id))
+      wanted_.Insert(observation.point);
   }
   TakePoints(map, false);
 }
 
 // The infinite points that keyframes of the enabled panorama map see.
 void MapTracker::CollectPanorama(const MapSnapshot& map) {
-  ids_.clear();
-  auto observation = map.observations.begin();
+  wanted_.Clear(map.next_point);
   for (const KeyFrame& keyframe : map.keyframes) {
     if (keyframe.panorama != panorama_) continue;
-    observation =
-        std::lower_bound(observation, map.observations.end(), keyframe.id,
-                         [](const Observation& o, KeyFrameId wanted) { return o.keyframe < wanted; });
-    for (; observation != map.observations.end() && observation->keyframe == keyframe.id; ++observation) {
-      ids_.push_back(observation->point);
-    }
+    for (const Observation& observation : ObservationsOf(map, keyframe.id)) wanted_.Insert(observation.point);
   }
   TakePoints(map, true);
 }
 
-// The points of ids_, each once.
+// The points of wanted_.
 void MapTracker::TakePoints(const MapSnapshot& map, bool infinite) {
-  std::sort(ids_.begin(), ids_.end());
-  ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
   std::vector<LocalPoint>& points = infinite ? local_infinite_ : local_;
   points.clear();
   double nearness = 0;  // of infinite points; 1 / metres
@@ -110,20 +120,19 @@ void MapTracker::TakePoints(const MapSnapshot& map, bool infinite) {
     const KeyFrame* reference = panorama ? map.FindKeyFrame(panorama->reference) : nullptr;
     if (reference && reference->mean_depth > 0) nearness = 1 / reference->mean_depth;
   }
-  auto next = map.points.begin();
-  for (const MapPointId id : ids_) {
-    next = std::lower_bound(next, map.points.end(), id, [](const MapPoint& candidate, MapPointId wanted) {
-      return candidate.id < wanted;
-    });
-    if (next == map.points.end()) break;
-    if (next->id != id || next->infinite() != infinite) continue;
-    if (infinite && next->panorama != panorama_) continue;
-    const KeyFrame* source = map.FindKeyFrame(next->source_keyframe);
-    if (!source) continue;
+  const MapPoint* next = map.points.data();
+  const MapPoint* const end = next + map.points.size();
+  const KeyFrame* source = nullptr;  // of the point before: points come in the order in which they were made
+  wanted_.ForEach([&](MapPointId id) {
+    next = FirstNotBefore(next, end, id);
+    if (next == end || next->id != id || next->infinite() != infinite) return;
+    if (infinite && next->panorama != panorama_) return;
+    if (!source || source->id != next->source_keyframe) source = map.FindKeyFrame(next->source_keyframe);
+    if (!source) return;
     Eigen::Vector4d place = next->point_in_map;
     if (infinite) place += nearness * source->camera_from_map.OriginInSource().homogeneous();
-    points.push_back({&*next, source, place});
-  }
+    points.push_back({next, source, place});
+  });
 }
 
 // Those of the points that fall into the picture, into visible_.
@@ -239,11 +248,9 @@ void MapTracker::Repredict(const Rigid3& camera_from_map) {
   std::size_t kept = 0;
   for (const std::uint32_t index : fine_) {
     Candidate& candidate = candidates_[index];
-    const auto predicted =
-        searcher_.Predict(*candidate.point, *candidate.source, *camera_, camera_from_map, candidate.place);
-    if (!predicted) continue;
-    candidate.predicted = *predicted;
-    fine_[kept++] = index;
+    if (searcher_.Repredict(*candidate.point, *camera_, camera_from_map, candidate.place,
+                            &candidate.predicted))
+      fine_[kept++] = index;
   }
   fine_.resize(kept);
 }
@@ -277,7 +284,7 @@ std::optional<Rigid3> MapTracker::PoseFromPatches(const ImageFeatures& features,
 MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& features,
                                  const Rigid3& predicted, Effort effort, Random* random) {
   MapTrackResult result;
-  result.camera_from_map = predicted;
+  result.camera_from_map = predicted_ = predicted;
   matches_.clear();
   attempts_.clear();
   measured_.clear();
@@ -301,7 +308,7 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   float radius = wide ? options_.coarse_radius_px : options_.fine_radius_alone_px;
   if (result.coarse_found >= options_.min_coarse) {
     const PoseRefinement coarse = RefinePose(*camera_, predicted, options_.refinement, &measurements_,
-                                             &scratch_, {turn_.pivot, predicted, turn_.sure});
+                                             &memory_, {turn_.pivot, predicted, turn_.sure});
     if (coarse.converged && coarse.inliers >= options_.min_coarse / 2) {
       result.camera_from_map = coarse.camera_from_map;
       radius = options_.fine_radius_px;
@@ -313,7 +320,7 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   result.spared = spared_;
   result.found = static_cast<int>(measurements_.size());
   const PoseRefinement fine = RefinePose(*camera_, result.camera_from_map, options_.refinement,
-                                         &measurements_, &scratch_, {turn_.pivot, predicted, turn_.sure});
+                                         &measurements_, &memory_, {turn_.pivot, predicted, turn_.sure});
   result.camera_from_map = fine.camera_from_map;
   result.by_points_alone = fine.by_points_alone;
   result.covariance = fine.covariance;
@@ -327,7 +334,7 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
 void MapTracker::CountInliers(MapTrackResult* result) {
   std::bitset<kCellsAcross * kCellsAcross> cells;
   std::array<int, kCoverageColumns * kCoverageRows> finite{}, all{};
-  scratch_.clear();
+  depths_.clear();
   last_inliers_.clear();
   std::size_t match = 0;
   for (Attempt& attempt : attempts_) {
@@ -344,7 +351,7 @@ void MapTracker::CountInliers(MapTrackResult* result) {
     if (measurement.infinite()) continue;
     ++result->finite_inliers;
     ++finite[cell];
-    scratch_.push_back((result->camera_from_map * measurement.point_in_map).z());
+    depths_.push_back((result->camera_from_map * measurement.point_in_map).z());
   }
   std::sort(last_inliers_.begin(), last_inliers_.end());
   result->occupied_cells = static_cast<int>(cells.count());
@@ -355,11 +362,40 @@ void MapTracker::CountInliers(MapTrackResult* result) {
   };
   result->finite_coverage = share(finite);
   result->coverage = share(all);
-  if (!scratch_.empty()) {
-    const auto middle = scratch_.begin() + static_cast<std::ptrdiff_t>(scratch_.size() / 2);
-    std::nth_element(scratch_.begin(), middle, scratch_.end());
+  if (!depths_.empty()) {
+    const auto middle = depths_.begin() + static_cast<std::ptrdiff_t>(depths_.size() / 2);
+    std::nth_element(depths_.begin(), middle, depths_.end());
     result->median_depth = *middle;
   }
+}
+
+FrameInspection MapTracker::Inspect(const Rigid3& camera_from_map) const {
+  FrameInspection inspection;
+  inspection.predicted = predicted_;
+  inspection.visible_points = visible_finite_;
+  inspection.panorama = panorama_;
+  // A search after a loss has no attempts for all candidates when its patches did not agree.
+  std::vector<std::uint32_t> order = coarse_;
+  order.insert(order.end(), fine_.begin(), fine_.end());
+  if (order.size() != attempts_.size()) return inspection;
+  std::size_t match = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Candidate& candidate = candidates_[order[i]];
+    InspectedPoint& point = inspection.points.emplace_back();
+    point.point = candidate.point->id;
+    point.infinite = candidate.point->infinite();
+    point.level = candidate.predicted.level;
+    point.predicted = candidate.predicted.pixel;
+    if (!attempts_[i].found) continue;
+    const PoseMeasurement& measurement = measurements_[match++];
+    point.found = measurement.pixel;
+    point.weight = measurement.weight;
+    point.inlier = attempts_[i].inlier;
+    const Eigen::Vector4d in_camera = camera_from_map * measurement.point_in_map;
+    if (const auto pixel = camera_->Project(in_camera.head<3>()))
+      point.residual_px = measurement.pixel - *pixel;
+  }
+  return inspection;
 }
 
 }  // namespace docent::engine

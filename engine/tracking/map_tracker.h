@@ -7,6 +7,8 @@
 
 #include "engine/base/random.h"
 #include "engine/map/map_snapshot.h"
+#include "engine/tracking/frame_inspection.h"
+#include "engine/tracking/point_id_set.h"
 #include "engine/tracking/point_search.h"
 #include "engine/tracking/pose_refinement.h"
 #include "engine/tracking/tracked_frame.h"
@@ -24,10 +26,12 @@ struct MapTrackerOptions {
   int max_fine = 600;                // ptamm §2.1 allows 1000; beyond 600 the pose gains nothing that shows
   int local_frames = 6;              // for which the choice of points near the camera is good
   std::size_t local_keyframes = 20;  // whose points are looked for: those that share most with the last frame
-  float coarse_radius_px = 30;       // level 0, about the prediction
-  float wide_radius_px = 70;         // the second try before a frame is called lost
-  float fine_radius_px = 7;          // after a coarse pose
-  float fine_radius_alone_px = 14;   // when the coarse stage had nothing to say
+  // The nearest ones, among which these are chosen: in a large map the others are not even looked at.
+  std::size_t examined_keyframes = 100;
+  float coarse_radius_px = 30;      // level 0, about the prediction
+  float wide_radius_px = 70;        // the second try before a frame is called lost
+  float fine_radius_px = 7;         // after a coarse pose
+  float fine_radius_alone_px = 14;  // when the coarse stage had nothing to say
   // Infinite points are off their prediction by what the camera has moved since its panorama map was opened;
   // all by about the same, so that they still tell the rotation when the finite points are gone.
   float infinite_radius_px = 20;
@@ -82,6 +86,9 @@ class MapTracker {
     bool found, inlier;
   };
   const std::vector<Attempt>& attempts() const { return attempts_; }
+  // All about the last call of Track, and of the pose that came of it. The snapshot that it was given must
+  // live still. Leaves the picture's features to the caller.
+  FrameInspection Inspect(const Rigid3& camera_from_map) const;
   // To be called when another map is tracked from now on.
   void Clear();
   // Infinite points of this panorama map are looked for from now on beside the finite points; kNoId for none.
@@ -128,6 +135,7 @@ class MapTracker {
   MapTrackerOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   PointSearcher searcher_;
+  Rigid3 predicted_;  // that the last search began with
   PanoramaId panorama_ = kNoId;
   Turn turn_;
   std::vector<PointMatch> matches_;
@@ -140,7 +148,7 @@ class MapTracker {
   std::vector<Misses> misses_;  // direct mapped: slot id % size
   // Scratch, kept to save allocations.
   std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
-  std::vector<MapPointId> ids_;
+  PointIdSet wanted_;
   // What may be seen from about here, finite and infinite; taken anew when the map has changed and every few
   // frames, as the camera goes on.
   std::vector<LocalPoint> local_, local_infinite_;
@@ -155,7 +163,8 @@ class MapTracker {
   std::vector<std::uint32_t> coarse_, fine_;
   std::vector<std::uint32_t> measured_;  // candidate of each measurement
   std::vector<PoseMeasurement> measurements_;
-  std::vector<double> scratch_;
+  PoseRefinementMemory memory_;
+  std::vector<double> depths_;
 };
 
 }  // namespace docent::engine

@@ -22,6 +22,10 @@ void PointSearcher::Clear() {
   cache_.clear();
 }
 
+void PointSearcher::Release() {
+  std::vector<Cached>().swap(cache_);
+}
+
 PointSearcher::Cached& PointSearcher::Entry(const MapPoint& point) {
   if (cache_.empty()) cache_.resize(kCacheSlots);
   Cached& entry = cache_[point.id % kCacheSlots];
@@ -36,22 +40,20 @@ PointSearcher::Cached& PointSearcher::Entry(const MapPoint& point) {
   return entry;
 }
 
-std::optional<PredictedPoint> PointSearcher::Predict(const MapPoint& point, const KeyFrame& source,
-                                                     const CameraModel& camera, const Rigid3& camera_from_map,
-                                                     const Eigen::Vector4d& place) {
-  PredictedPoint predicted;
-  const Eigen::Vector3d position = place.head<3>();
-  predicted.point_in_camera = camera_from_map.rotation * position + place[3] * camera_from_map.translation;
-  if (!camera.Project(predicted.point_in_camera, &predicted.pixel, &predicted.jacobian)) return std::nullopt;
-  if (!camera.IsInside(predicted.pixel, kPatchSize / 2)) return std::nullopt;
+bool PointSearcher::FindPlace(const MapPoint& point, const CameraModel& camera,
+                              const Eigen::Matrix3d& rotation, const Rigid3& camera_from_map,
+                              const Eigen::Vector4d& place, PredictedPoint* predicted) const {
+  Eigen::Vector3d& x = predicted->point_in_camera;
+  x = camera_from_map.rotation * Eigen::Vector3d(place.head<3>()) + place[3] * camera_from_map.translation;
+  if (!camera.Project(x, &predicted->pixel, &predicted->jacobian)) return false;
+  if (!camera.IsInside(predicted->pixel, kPatchSize / 2)) return false;
+  const Eigen::Vector3d normal = rotation * point.normal.cast<double>();
+  return -normal.dot(x) >= options_.min_view_cosine * x.norm();
+}
 
-  const Eigen::Matrix3d camera_from_map_rotation = camera_from_map.rotation.matrix();
-  const Eigen::Vector3d normal_in_camera = camera_from_map_rotation * point.normal.cast<double>();
-  if (-normal_in_camera.dot(predicted.point_in_camera) <
-      options_.min_view_cosine * predicted.point_in_camera.norm()) {
-    return std::nullopt;
-  }
-
+// The steps of one source pixel on the surface, through its tangent plane.
+bool PointSearcher::FindSteps(const MapPoint& point, const KeyFrame& source, const Eigen::Vector4d& place,
+                              PredictedPoint* predicted) {
   Cached& entry = Entry(point);
   if (!entry.has_rays) {
     const Eigen::Vector2d pixel = point.source_pixel.cast<double>();
@@ -60,40 +62,59 @@ std::optional<PredictedPoint> PointSearcher::Predict(const MapPoint& point, cons
         source.camera->Unproject(LevelZeroFromLevel(pixel + Eigen::Vector2d::UnitX(), point.source_level));
     const auto down =
         source.camera->Unproject(LevelZeroFromLevel(pixel + Eigen::Vector2d::UnitY(), point.source_level));
-    if (!ray || !right || !down) return std::nullopt;
+    if (!ray || !right || !down) return false;
     entry.ray = ray->cast<float>();
     entry.ray_right = right->cast<float>();
     entry.ray_down = down->cast<float>();
     entry.has_rays = true;
   }
-
-  // The steps of one source pixel on the surface, through its tangent plane.
   const Eigen::Matrix3d source_from_map = source.camera_from_map.rotation.matrix();
   const Eigen::Vector3d normal_in_source = source_from_map * point.normal.cast<double>();
   const Eigen::Vector3d point_in_source =
-      source_from_map * position + place[3] * source.camera_from_map.translation;
+      source_from_map * place.head<3>() + place[3] * source.camera_from_map.translation;
   const double distance = normal_in_source.dot(point_in_source);
   const Eigen::Vector3d ray = entry.ray.cast<double>();
   const Eigen::Vector3d ray_right = entry.ray_right.cast<double>(), ray_down = entry.ray_down.cast<double>();
   const double along = normal_in_source.dot(ray);
   const double along_right = normal_in_source.dot(ray_right), along_down = normal_in_source.dot(ray_down);
-  if (!(along < -0.05 && along_right < -0.05 && along_down < -0.05)) return std::nullopt;
+  if (!(along < -0.05 && along_right < -0.05 && along_down < -0.05)) return false;
   const Eigen::Vector3d center = ray * (distance / along);
   Eigen::Matrix<double, 3, 2> steps_in_source;
   steps_in_source.col(0) = ray_right * (distance / along_right) - center;
   steps_in_source.col(1) = ray_down * (distance / along_down) - center;
-  const Eigen::Matrix<double, 3, 2> steps_in_camera =
-      camera_from_map_rotation * (source_from_map.transpose() * steps_in_source);
-  predicted.pixel_from_source = (predicted.jacobian * steps_in_camera).cast<float>();
+  predicted->steps_in_map = source_from_map.transpose() * steps_in_source;
+  return true;
+}
 
-  float area = std::abs(predicted.pixel_from_source.determinant());
-  predicted.level = 0;
-  while (area > kMaxAreaRatio && predicted.level < kPyramidLevels - 1) {
-    ++predicted.level;
+// How the patch is stretched in the present picture, and the level that shows it about as large.
+bool PointSearcher::FindWarp(const Eigen::Matrix3d& rotation, PredictedPoint* predicted) {
+  const Eigen::Matrix<double, 3, 2> steps_in_camera = rotation * predicted->steps_in_map;
+  predicted->pixel_from_source = (predicted->jacobian * steps_in_camera).cast<float>();
+  float area = std::abs(predicted->pixel_from_source.determinant());
+  predicted->level = 0;
+  while (area > kMaxAreaRatio && predicted->level < kPyramidLevels - 1) {
+    ++predicted->level;
     area *= 0.25f;
   }
-  if (!(area >= kMinAreaRatio && area <= kMaxAreaRatio)) return std::nullopt;
+  return area >= kMinAreaRatio && area <= kMaxAreaRatio;
+}
+
+std::optional<PredictedPoint> PointSearcher::Predict(const MapPoint& point, const KeyFrame& source,
+                                                     const CameraModel& camera, const Rigid3& camera_from_map,
+                                                     const Eigen::Vector4d& place) {
+  PredictedPoint predicted;
+  const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
+  if (!FindPlace(point, camera, rotation, camera_from_map, place, &predicted) ||
+      !FindSteps(point, source, place, &predicted) || !FindWarp(rotation, &predicted))
+    return std::nullopt;
   return predicted;
+}
+
+bool PointSearcher::Repredict(const MapPoint& point, const CameraModel& camera, const Rigid3& camera_from_map,
+                              const Eigen::Vector4d& place, PredictedPoint* predicted) const {
+  const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
+  return FindPlace(point, camera, rotation, camera_from_map, place, predicted) &&
+         FindWarp(rotation, predicted);
 }
 
 bool PointSearcher::PreparePatch(const MapPoint& point, const KeyFrame& source,

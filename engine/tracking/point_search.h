@@ -30,7 +30,9 @@ struct PredictedPoint {
   Eigen::Vector2d pixel;                 // level 0
   Eigen::Matrix<double, 2, 3> jacobian;  // d pixel / d point_in_camera
   Eigen::Matrix2f pixel_from_source;     // level-0 pixels a pixel of the source level
-  int level = 0;                         // the level whose pixels match the patch's best
+  // What a step of one pixel of the source level, right and down, is on the surface; in the map.
+  Eigen::Matrix<double, 3, 2> steps_in_map;
+  int level = 0;  // the level whose pixels match the patch's best
 };
 
 struct FoundPoint {
@@ -44,6 +46,8 @@ class PointSearcher {
 
   // Forgets all patches; to be called when another map is searched.
   void Clear();
+  // The same, and gives their memory back.
+  void Release();
 
   // Empty when the point cannot be seen from there: behind, outside, edge-on, or at a scale that no level
   // fits. source is the keyframe that point.source_keyframe names.
@@ -55,6 +59,11 @@ class PointSearcher {
                                         const CameraModel& camera, const Rigid3& camera_from_map) {
     return Predict(point, source, camera, camera_from_map, point.point_in_map);
   }
+
+  // The same for another pose of the camera: what does not depend on it is kept. False where Predict is
+  // empty.
+  bool Repredict(const MapPoint& point, const CameraModel& camera, const Rigid3& camera_from_map,
+                 const Eigen::Vector4d& place, PredictedPoint* predicted) const;
 
   // Looks for the point within radius_px (level 0) of its prediction: at the corners there, and, where
   // allowed, by alignment from the predicted place itself.
@@ -77,6 +86,13 @@ class PointSearcher {
     PatchTemplate patch;
   };
   Cached& Entry(const MapPoint& point);
+  // Pixel, Jacobian and place before the camera; rotation: of camera_from_map.
+  bool FindPlace(const MapPoint& point, const CameraModel& camera, const Eigen::Matrix3d& rotation,
+                 const Rigid3& camera_from_map, const Eigen::Vector4d& place,
+                 PredictedPoint* predicted) const;
+  bool FindSteps(const MapPoint& point, const KeyFrame& source, const Eigen::Vector4d& place,
+                 PredictedPoint* predicted);
+  static bool FindWarp(const Eigen::Matrix3d& rotation, PredictedPoint* predicted);
   bool PreparePatch(const MapPoint& point, const KeyFrame& source, const PredictedPoint& predicted,
                     Cached* entry);
 

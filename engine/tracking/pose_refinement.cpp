@@ -14,33 +14,32 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix26 = Eigen::Matrix<double, 2, 6>;
 
-struct Residual {
-  Eigen::Vector2d error;  // normalised by sigma
-  Matrix26 jacobian;
-  bool valid = false;
-};
+using Seen = PoseRefinementMemory::Seen;
 
-// pivot: what the three rotational degrees of freedom turn about, camera frame.
-Residual Evaluate(const CameraModel& camera, const Rigid3& camera_from_map, const Eigen::Vector3d& pivot,
-                  const PoseMeasurement& measurement) {
-  Residual residual;
-  const double w = measurement.point_in_map[3];
-  const Eigen::Vector3d x = camera_from_map.rotation * Eigen::Vector3d(measurement.point_in_map.head<3>()) +
-                            w * camera_from_map.translation;
+Seen See(const CameraModel& camera, const Rigid3& camera_from_map, const PoseMeasurement& measurement) {
+  Seen seen;
+  seen.point_in_camera = camera_from_map.rotation * Eigen::Vector3d(measurement.point_in_map.head<3>()) +
+                         measurement.point_in_map[3] * camera_from_map.translation;
   Eigen::Vector2d pixel;
-  Eigen::Matrix<double, 2, 3> projection;
-  if (!camera.Project(x, &pixel, &projection)) return residual;
-  residual.error = (measurement.pixel - pixel) * measurement.inverse_sigma;
-  projection *= measurement.inverse_sigma;
+  seen.valid = camera.Project(seen.point_in_camera, &pixel, &seen.jacobian);
+  if (!seen.valid) return seen;
+  seen.error = (measurement.pixel - pixel) * measurement.inverse_sigma;
+  seen.jacobian *= measurement.inverse_sigma;
+  return seen;
+}
+
+// d normalised pixel / d twist; pivot: what the three rotational degrees of freedom turn about, camera frame.
+Matrix26 PoseJacobian(const Seen& seen, const PoseMeasurement& measurement, const Eigen::Vector3d& pivot) {
+  const double w = measurement.point_in_map[3];
+  Matrix26 jacobian;
   // A presumed distance must not move the camera.
   if (measurement.infinite()) {
-    residual.jacobian.leftCols<3>().setZero();
+    jacobian.leftCols<3>().setZero();
   } else {
-    residual.jacobian.leftCols<3>() = w * projection;
+    jacobian.leftCols<3>() = w * seen.jacobian;
   }
-  residual.jacobian.rightCols<3>() = -projection * Hat(x - w * pivot);
-  residual.valid = true;
-  return residual;
+  jacobian.rightCols<3>() = -seen.jacobian * Hat(seen.point_in_camera - w * pivot);
+  return jacobian;
 }
 
 // Fewer rays than this hold no rotation that is worth the name.
@@ -64,22 +63,16 @@ struct Kind {
   double threshold = 0;  // of the loss
 };
 
-Kind JudgeKind(const CameraModel& camera, const Rigid3& camera_from_map,
-               const std::vector<PoseMeasurement>& measurements, bool infinite,
-               const PoseRefinementOptions& options, bool tukey, std::vector<double>* scratch) {
-  scratch->clear();
-  for (const PoseMeasurement& measurement : measurements) {
-    const double w = measurement.point_in_map[3];
-    if (measurement.infinite() != infinite) continue;
-    const Eigen::Vector3d x = camera_from_map.rotation * Eigen::Vector3d(measurement.point_in_map.head<3>()) +
-                              w * camera_from_map.translation;
-    const auto pixel = camera.Project(x);
-    if (!pixel) continue;
-    scratch->push_back((measurement.pixel - *pixel).squaredNorm() * measurement.inverse_sigma *
-                       measurement.inverse_sigma);
+Kind JudgeKind(const std::vector<PoseMeasurement>& measurements, bool infinite,
+               const PoseRefinementOptions& options, bool tukey, PoseRefinementMemory* memory) {
+  memory->squared_errors.clear();
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    const Seen& seen = memory->seen[i];
+    if (seen.valid && measurements[i].infinite() == infinite)
+      memory->squared_errors.push_back(seen.error.squaredNorm());
   }
   Kind kind;
-  kind.sigma = RobustSigma(scratch);
+  kind.sigma = RobustSigma(&memory->squared_errors);
   kind.threshold = std::max(kind.sigma, options.min_sigma) * (tukey ? options.tukey_factor : 1.345);
   return kind;
 }
@@ -99,7 +92,7 @@ struct Held {
 
 PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const PoseRefinementOptions& options,
                       const ExpectedTurn& turn, const Held& held, std::vector<PoseMeasurement>* measurements,
-                      std::vector<double>* scratch) {
+                      PoseRefinementMemory* memory) {
   const bool turn_only = held.turn_only;
   const Eigen::Vector3d pivot = turn_only ? turn.pivot : Eigen::Vector3d::Zero();
   const Eigen::Vector3d fixed_in_map = turn.camera_from_map.inverse() * turn.pivot;
@@ -113,28 +106,31 @@ PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const Pose
     // The last pass only weighs and counts at the final pose.
     const bool last = iteration == options.iterations;
     const bool tukey = iteration >= options.iterations / 2;
-    for (const bool infinite : {false, true}) {
-      kinds[infinite] =
-          JudgeKind(camera, result.camera_from_map, *measurements, infinite, options, tukey, scratch);
-    }
+    memory->seen.clear();
+    for (const PoseMeasurement& measurement : *measurements)
+      memory->seen.push_back(See(camera, result.camera_from_map, measurement));
+    for (const bool infinite : {false, true})
+      kinds[infinite] = JudgeKind(*measurements, infinite, options, tukey, memory);
     normal.setZero();
     Vector6 gradient = Vector6::Zero();
     result.inliers = result.finite_inliers = 0;
     depth = 0;
-    for (PoseMeasurement& measurement : *measurements) {
-      const Residual residual = Evaluate(camera, result.camera_from_map, pivot, measurement);
+    for (std::size_t i = 0; i < measurements->size(); ++i) {
+      PoseMeasurement& measurement = (*measurements)[i];
+      const Seen& seen = memory->seen[i];
       const bool infinite = measurement.infinite();
       measurement.weight = 0;
-      if (!residual.valid) continue;
-      measurement.weight = LossWeight(residual.error.norm(), kinds[infinite].threshold, tukey);
+      if (!seen.valid) continue;
+      measurement.weight = LossWeight(seen.error.norm(), kinds[infinite].threshold, tukey);
       if (measurement.weight > options.min_weight) {
         ++result.inliers;
         result.finite_inliers += !infinite;
-        if (!infinite) depth += (result.camera_from_map * measurement.point_in_map).z();
+        if (!infinite) depth += seen.point_in_camera.z();
       }
       const double weight = measurement.weight * (infinite ? held.infinite_weight : 1.0);
-      normal.noalias() += weight * residual.jacobian.transpose() * residual.jacobian;
-      gradient.noalias() += weight * residual.jacobian.transpose() * residual.error;
+      const Matrix26 jacobian = PoseJacobian(seen, measurement, pivot);
+      normal.noalias() += weight * jacobian.transpose() * jacobian;
+      gradient.noalias() += weight * jacobian.transpose() * seen.error;
     }
     measured = normal;
     if (held.sigma > 0) {
@@ -200,7 +196,7 @@ bool IsPlaced(const PoseRefinement& result, double largest) {
 
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          std::vector<double>* scratch, const ExpectedTurn& turn) {
+                          PoseRefinementMemory* memory, const ExpectedTurn& turn) {
   const auto finite = std::count_if(measurements->begin(), measurements->end(),
                                     [](const PoseMeasurement& m) { return !m.infinite(); });
   const auto infinite = static_cast<std::ptrdiff_t>(measurements->size()) - finite;
@@ -208,13 +204,13 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
   Held held;
   if (finite >= options.min_finite || !may_turn) {
     held.infinite_weight = options.infinite_weight;
-    PoseRefinement result = Refine(camera, start, options, turn, held, measurements, scratch);
+    PoseRefinement result = Refine(camera, start, options, turn, held, measurements, memory);
     const Rigid3 by_points_alone = result.camera_from_map;
     const bool enough = result.finite_inliers >= options.min_finite;
     const bool placed = enough && IsPlaced(result, options.max_position_sigma);
     if (turn.sure && enough && !IsPlaced(result, options.max_position_sigma / 2)) {
       held.sigma = options.sure_turn_sigma * result.mean_depth;
-      result = Refine(camera, start, options, turn, held, measurements, scratch);
+      result = Refine(camera, start, options, turn, held, measurements, memory);
     }
     if (!may_turn || placed || held.sigma > 0) {
       result.by_points_alone = by_points_alone;
@@ -227,7 +223,7 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
     held.infinite_weight = 1;
   }
   held.turn_only = held.sigma == 0;
-  PoseRefinement result = Refine(camera, start, options, turn, held, measurements, scratch);
+  PoseRefinement result = Refine(camera, start, options, turn, held, measurements, memory);
   result.observed = ObservedMotion::kPanorama;
   return result;
 }

@@ -72,12 +72,24 @@ struct ExpectedTurn {
   bool sure = false;
 };
 
+// What a refinement writes while it works; kept by its caller, so that the next one need not allocate.
+struct PoseRefinementMemory {
+  struct Seen {
+    Eigen::Vector3d point_in_camera;       // homogeneous as the measurement's
+    Eigen::Vector2d error;                 // normalised by sigma
+    Eigen::Matrix<double, 2, 3> jacobian;  // d normalised pixel / d point_in_camera
+    bool valid = false;
+  };
+  std::vector<Seen> seen;  // one a measurement
+  std::vector<double> squared_errors;
+};
+
 // Robust Gauss-Newton on reprojection errors of finite and infinite points from `start` (ptamm eq. 1-3,
 // hybrid-slam eq. 1-2): Huber while far away, Tukey for the last iterations. The scale of the errors is
 // estimated for each kind by itself: what little translation does to infinite points is no noise of finite
-// ones. Does not allocate beyond *scratch.
+// ones. Does not allocate beyond *memory.
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          std::vector<double>* scratch, const ExpectedTurn& turn);
+                          PoseRefinementMemory* memory, const ExpectedTurn& turn);
 
 }  // namespace docent::engine

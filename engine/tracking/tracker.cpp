@@ -179,26 +179,35 @@ bool Tracker::IsTurn(const MapTrackResult& result) const {
 }
 
 TrackedFrame Tracker::Track(const Frame& frame, const PlaceFinder* places) {
-  const auto start = std::chrono::steady_clock::now();
   TrackedFrame out;
-  out.frame = frame;
+  Track(frame, places, &out);
+  return out;
+}
+
+void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<PointMatch> matches = std::move(out->matches);
+  matches.clear();
+  *out = TrackedFrame();
+  out->matches = std::move(matches);
+  out->frame = frame;
   candidate_.reset();
   pair_.reset();
   previous_ = std::exchange(features_, nullptr);
   features_ = NextFeatures(frame);
   ++frames_since_keyframe_;
+  searched_ = map_ && tracking_;
 
   if (starting_ && !map_) {
-    LookForStart(frame, &out);
+    LookForStart(frame, out);
   } else if (tracking_) {
-    TrackMap(frame, &out);
-    if (HasPose(out.state) && places && !options_.build_maps) LookForBetterMap(frame, *places, &out);
+    TrackMap(frame, out);
+    if (HasPose(out->state) && places && !options_.build_maps) LookForBetterMap(frame, *places, out);
   } else {
-    Recover(frame, places, &out);
+    Recover(frame, places, out);
   }
-  if (starting_ && map_) LookForStart(frame, &out);
-  out.tracking_time = std::chrono::steady_clock::now() - start;
-  return out;
+  if (starting_ && map_) LookForStart(frame, out);
+  out->tracking_time = std::chrono::steady_clock::now() - start;
 }
 
 // Follows corners for two views that start a map; beside it a map of directions may already be tracked.
@@ -393,17 +402,23 @@ void Tracker::OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rig
 
 void Tracker::CollectReports() {
   if (!options_.build_maps) return;
+  const auto earlier = [](const PointReport& a, const PointReport& b) { return a.point < b.point; };
+  const std::size_t known = reports_.size();
   for (const MapTracker::Attempt& attempt : map_tracker_.attempts()) {
-    PointReport& report = reports_[attempt.point];
-    report.point = attempt.point;
+    const PointReport wanted{.point = attempt.point};
+    const auto end = reports_.begin() + static_cast<std::ptrdiff_t>(known);
+    auto report = std::lower_bound(reports_.begin(), end, wanted, earlier);
+    // Each point is attempted once, so that new ones need not be looked for among the new.
+    if (report == end || report->point != attempt.point) report = reports_.insert(reports_.end(), wanted);
     if (attempt.inlier) {
-      ++report.inlier;
+      ++report->inlier;
     } else if (attempt.found) {
-      ++report.outlier;
+      ++report->outlier;
     } else {
-      ++report.not_found;
+      ++report->not_found;
     }
   }
+  if (reports_.size() > known) std::sort(reports_.begin(), reports_.end(), earlier);
 }
 
 std::optional<KeyFrameCandidate> Tracker::TakeKeyFrameCandidate() {
@@ -415,12 +430,20 @@ std::optional<InitialPair> Tracker::TakeInitialPair() {
   return std::exchange(pair_, std::nullopt);
 }
 
+FrameInspection Tracker::Inspect(const TrackedFrame& tracked) const {
+  FrameInspection inspection;
+  // What was searched in vain after a loss may belong to maps that are gone.
+  if (HasPose(tracked.state)) {
+    inspection = map_tracker_.Inspect(tracked.camera_from_map);
+  } else if (searched_) {
+    inspection = map_tracker_.Inspect(motion_.last());
+  }
+  inspection.features = features_;
+  return inspection;
+}
+
 std::vector<PointReport> Tracker::TakeReports() {
-  std::vector<PointReport> reports;
-  reports.reserve(reports_.size());
-  for (const auto& [id, report] : reports_) reports.push_back(report);
-  reports_.clear();
-  return reports;
+  return std::exchange(reports_, {});
 }
 
 }  // namespace docent::engine

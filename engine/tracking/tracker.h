@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "engine/mapping/keyframe_candidate.h"
 #include "engine/mapping/target_initializer.h"
 #include "engine/recognition/place.h"
+#include "engine/tracking/frame_inspection.h"
 #include "engine/tracking/keyframe_selection.h"
 #include "engine/tracking/keyframe_selector.h"
 #include "engine/tracking/map_tracker.h"
@@ -91,6 +91,12 @@ class Tracker {
 
   // The whole way of one frame. `places` may be null: then a lost track is sought in its own map only.
   TrackedFrame Track(const Frame& frame, const PlaceFinder* places);
+  // The same into *out, whose memory is used again: once its containers have grown to the map, a frame that
+  // is tracked without trouble allocates nothing.
+  void Track(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
+
+  // All about the last frame, for whoever looks for a fault; `tracked`: what Track answered.
+  FrameInspection Inspect(const TrackedFrame& tracked) const;
 
   // What the last frame offers to the mapper; each is given out once.
   std::optional<KeyFrameCandidate> TakeKeyFrameCandidate();
@@ -162,6 +168,7 @@ class Tracker {
   double explained_ = 0;                           // of the last frame
   Rigid3 first_view_from_map_;                     // the pose of the initializer's first view
   Timestamp lost_since_{};
+  bool searched_ = false;  // a map, for the last frame
   int misfit_frames_ = 0;  // in a row, that no turn explains
   // The newest picture whose pose points told, or of a long turn a later one: FollowPicture's measure.
   std::shared_ptr<const ImageFeatures> anchor_;
@@ -178,7 +185,7 @@ class Tracker {
   std::shared_ptr<const ImageFeatures> features_, previous_;
   std::vector<std::shared_ptr<ImageFeatures>> pool_;
   std::array<int, kPyramidLevels> fast_threshold_{};
-  std::map<MapPointId, PointReport> reports_;
+  std::vector<PointReport> reports_;  // by ascending point
   std::optional<KeyFrameCandidate> candidate_;
   std::optional<InitialPair> pair_;
 };

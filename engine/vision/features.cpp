@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/features2d.hpp>
-#include <opencv2/imgproc.hpp>
+
+#include "engine/vision/fast_corners.h"
 
 namespace docent::engine {
 
@@ -13,24 +13,6 @@ namespace {
 constexpr double kReferenceArea = 640.0 * 480.0;
 // The patch border: a corner nearer to the edge could not be matched.
 constexpr int kBorder = 6;
-
-void DetectCorners(const cv::Mat& image, int threshold, std::vector<cv::KeyPoint>* scratch,
-                   std::vector<Corner>* corners, std::vector<int>* row_begin) {
-  cv::FAST(image, *scratch, threshold, true, cv::FastFeatureDetector::TYPE_9_16);
-  corners->clear();
-  row_begin->assign(static_cast<std::size_t>(image.rows) + 1, 0);
-  // OpenCV reports corners row by row, which the row index relies on.
-  for (const cv::KeyPoint& keypoint : *scratch) {
-    const Corner corner{static_cast<std::int16_t>(keypoint.pt.x), static_cast<std::int16_t>(keypoint.pt.y)};
-    if (corner.x < kBorder || corner.y < kBorder || corner.x >= image.cols - kBorder ||
-        corner.y >= image.rows - kBorder) {
-      continue;
-    }
-    corners->push_back(corner);
-    ++(*row_begin)[static_cast<std::size_t>(corner.y) + 1];
-  }
-  for (std::size_t row = 1; row < row_begin->size(); ++row) (*row_begin)[row] += (*row_begin)[row - 1];
-}
 
 // A step towards the threshold that gives the wanted count; counts fall roughly as exp(-threshold / 8).
 int NextThreshold(int threshold, std::size_t found, double wanted, const FeatureOptions& options) {
@@ -48,29 +30,23 @@ double WantedCorners(const FeatureOptions& options, const cv::Mat& gray, int lev
 
 void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
                      const std::array<int, kPyramidLevels>& threshold_hint, ImageFeatures* features) {
-  static thread_local std::vector<cv::KeyPoint> scratch;
   features->levels[0] = gray;
   for (std::size_t level = 0; level < kPyramidLevels; ++level) {
-    if (level > 0) {
-      const cv::Mat& finer = features->levels[level - 1];
-      const cv::Size half(finer.cols / 2, finer.rows / 2);
-      // Whole blocks only: an odd last row or column would stretch every pixel a little beyond 2x2.
-      cv::resize(finer(cv::Rect(cv::Point(), half * 2)), features->levels[level], half, 0, 0, cv::INTER_AREA);
-    }
+    if (level > 0) HalvePicture(features->levels[level - 1], &features->levels[level]);
     const double wanted = WantedCorners(options, gray, static_cast<int>(level));
     int threshold = threshold_hint[level] > 0 ? threshold_hint[level] : 15;
-    DetectCorners(features->levels[level], threshold, &scratch, &features->corners[level],
-                  &features->row_begin[level]);
+    DetectFastCorners(features->levels[level], threshold, kBorder, &features->corners[level],
+                      &features->row_begin[level]);
     const std::size_t found = features->corners[level].size();
     const int next = NextThreshold(threshold, found, wanted, options);
     // A picture that suddenly blurs or clears is detected again at once; otherwise the next one profits.
     if (static_cast<double>(found) < 0.4 * wanted && next < threshold) {
-      DetectCorners(features->levels[level], next, &scratch, &features->corners[level],
-                    &features->row_begin[level]);
+      DetectFastCorners(features->levels[level], next, kBorder, &features->corners[level],
+                        &features->row_begin[level]);
     }
     features->fast_threshold[level] = next;
   }
-  features->small_blurry = MakeSmallBlurryImage(gray);
+  MakeSmallBlurryImage(gray, kThumbnailBlurPx, &features->small_blurry);
 }
 
 std::shared_ptr<const ImageFeatures> MakeFeatures(const cv::Mat& gray, const FeatureOptions& options) {

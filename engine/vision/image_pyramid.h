@@ -25,6 +25,10 @@ inline Eigen::Vector2d LevelFromLevelZero(const Eigen::Vector2d& pixel, int leve
   return (pixel.array() + 0.5) * scale - 0.5;
 }
 
+// 2x2 means, rounded. An odd last row or column is left out: it would stretch every pixel a little beyond
+// 2x2. *half keeps its memory when its size is the same.
+void HalvePicture(const cv::Mat& picture, cv::Mat* half);
+
 // A FAST corner of one level, at whole pixels of that level.
 struct Corner {
   std::int16_t x = 0, y = 0;

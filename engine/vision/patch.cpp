@@ -3,7 +3,8 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <cstring>
+#include <opencv2/core.hpp>
+#include <opencv2/core/hal/intrin.hpp>
 
 namespace docent::engine {
 
@@ -47,6 +48,56 @@ bool CutBordered(const cv::Mat& source, const Eigen::Vector2f& center, const Eig
   return true;
 }
 
+// Four pixels as floats.
+cv::v_float32x4 LoadPixels(const std::uint8_t* pixels) {
+  return cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::v_load_expand_q(pixels)));
+}
+cv::v_float32x4 LoadGradients(const std::int16_t* gradients) {
+  return cv::v_cvt_f32(cv::v_load_expand(gradients));
+}
+
+// Over the picture's values under the patch, less the patch's mean, which keeps the sums small.
+struct ShiftedSums {
+  float value, value_squared, value_times_pixel;
+  Eigen::Vector2f value_times_gradient;
+};
+
+// left, top: of the patch in the picture, interpolated between pixels.
+ShiftedSums SumShifted(const PatchTemplate& patch, const cv::Mat& image, float left, float top) {
+  constexpr std::size_t kHalves = 2, kLanes = kPatchSize / kHalves;
+  const int x0 = static_cast<int>(left), y0 = static_cast<int>(top);
+  const float fx = left - static_cast<float>(x0), fy = top - static_cast<float>(y0);
+  const cv::v_float32x4 to_right = cv::v_setall_f32(fx), to_below = cv::v_setall_f32(fy);
+  const cv::v_float32x4 mean = cv::v_setall_f32(patch.Mean());
+  const std::uint8_t* row = image.ptr<std::uint8_t>(y0) + x0;
+  const auto along_row = [&](std::size_t half) {
+    const cv::v_float32x4 here = LoadPixels(row + half * kLanes);
+    return here + to_right * (LoadPixels(row + half * kLanes + 1) - here) - mean;
+  };
+  cv::v_float32x4 above[kHalves] = {along_row(0), along_row(1)};
+  const cv::v_float32x4 zero = cv::v_setzero_f32();
+  cv::v_float32x4 sum[kHalves] = {zero, zero}, squares[kHalves] = {zero, zero}, cross[kHalves] = {zero, zero},
+                  along_x[kHalves] = {zero, zero}, along_y[kHalves] = {zero, zero};
+  for (std::size_t i = 0; i < kPatchSize; ++i) {
+    row += image.step[0];
+    for (std::size_t half = 0; half < kHalves; ++half) {
+      const std::size_t at = i * kPatchSize + half * kLanes;
+      const cv::v_float32x4 below = along_row(half);
+      const cv::v_float32x4 value = above[half] + to_below * (below - above[half]);
+      above[half] = below;
+      sum[half] += value;
+      squares[half] += value * value;
+      cross[half] += value * LoadPixels(&patch.pixels[at]);
+      along_x[half] += value * LoadGradients(&patch.gradient_x[at]);
+      along_y[half] += value * LoadGradients(&patch.gradient_y[at]);
+    }
+  }
+  const auto total = [](const cv::v_float32x4(&halves)[kHalves]) {
+    return cv::v_reduce_sum(halves[0] + halves[1]);
+  };
+  return {total(sum), total(squares), total(cross), {total(along_x), total(along_y)}};
+}
+
 }  // namespace
 
 bool CutPatch(const cv::Mat& source, const Eigen::Vector2f& center, const Eigen::Matrix2f& source_from_patch,
@@ -55,47 +106,62 @@ bool CutPatch(const cv::Mat& source, const Eigen::Vector2f& center, const Eigen:
   if (!CutBordered(source, center, source_from_patch, &bordered)) return false;
   patch->sum = 0;
   patch->sum_of_squares = 0;
-  Eigen::Matrix3f hessian = Eigen::Matrix3f::Zero();
+  int sum_x = 0, sum_y = 0, dot_x = 0, dot_y = 0;
+  Eigen::Array<float, kPatchArea, 1> gradient_x, gradient_y;
   for (std::size_t row = 0; row < kPatchSize; ++row) {
     for (std::size_t column = 0; column < kPatchSize; ++column) {
       const std::size_t at = row * kPatchSize + column;
       const float* p = &bordered[(row + 1) * kBordered + column + 1];
       const int value = static_cast<int>(p[0] + 0.5f);
+      const float gx = p[1] - p[-1], gy = p[kBordered] - p[-kBordered];
+      const int rounded_x = cvRound(gx), rounded_y = cvRound(gy);
       patch->pixels[at] = static_cast<std::uint8_t>(value);
+      patch->gradient_x[at] = static_cast<std::int16_t>(rounded_x);
+      patch->gradient_y[at] = static_cast<std::int16_t>(rounded_y);
       patch->sum += value;
       patch->sum_of_squares += value * value;
-      const float gx = p[1] - p[-1], gy = p[kBordered] - p[-kBordered];
-      patch->gradient_x[at] = static_cast<std::int16_t>(std::lround(gx));
-      patch->gradient_y[at] = static_cast<std::int16_t>(std::lround(gy));
-      const Eigen::Vector3f jacobian(0.5f * gx, 0.5f * gy, 1.0f);
-      hessian.noalias() += jacobian * jacobian.transpose();
+      sum_x += rounded_x;
+      sum_y += rounded_y;
+      dot_x += rounded_x * value;
+      dot_y += rounded_y * value;
+      gradient_x[static_cast<Eigen::Index>(at)] = gx;
+      gradient_y[static_cast<Eigen::Index>(at)] = gy;
     }
   }
   if (patch->Variance() < kMinVariance) return false;
+  // Of half the gradients and a constant brightness.
+  const float xx = 0.25f * gradient_x.square().sum(), xy = 0.25f * (gradient_x * gradient_y).sum(),
+              yy = 0.25f * gradient_y.square().sum();
+  const float x1 = 0.5f * gradient_x.sum(), y1 = 0.5f * gradient_y.sum();
+  Eigen::Matrix3f hessian;
+  hessian << xx, xy, x1, xy, yy, y1, x1, y1, kPatchArea;
   const float determinant = hessian.determinant();
   if (!(determinant > 1e3f)) return false;
   patch->inverse_hessian = hessian.inverse();
+  patch->gradient_sum = Eigen::Vector2i(sum_x, sum_y).cast<float>();
+  patch->gradient_dot_pixel =
+      Eigen::Vector2i(dot_x, dot_y).cast<float>() - patch->Mean() * patch->gradient_sum;
   return true;
 }
 
 float PatchCorrelation(const PatchTemplate& patch, const cv::Mat& image, int x, int y) {
-  alignas(32) std::array<std::uint8_t, kPatchArea> window;
+  cv::v_int32x4 cross = cv::v_setzero_s32(), squares = cross;
+  cv::v_uint16x8 values = cv::v_setzero_u16();
   const std::uint8_t* row = image.ptr<std::uint8_t>(y - kPatchSize / 2) + x - kPatchSize / 2;
   for (std::size_t i = 0; i < kPatchSize; ++i, row += image.step[0]) {
-    std::memcpy(window.data() + i * kPatchSize, row, kPatchSize);
+    const cv::v_uint16x8 value = cv::v_load_expand(row);
+    const cv::v_int16x8 seen = cv::v_reinterpret_as_s16(value);
+    const cv::v_int16x8 wanted = cv::v_reinterpret_as_s16(cv::v_load_expand(&patch.pixels[i * kPatchSize]));
+    values += value;
+    squares += cv::v_dotprod(seen, seen);
+    cross += cv::v_dotprod(seen, wanted);
   }
-  int sum = 0, squares = 0, cross = 0;
-  for (std::size_t i = 0; i < kPatchArea; ++i) {
-    const int value = window[i];
-    sum += value;
-    squares += value * value;
-    cross += value * patch.pixels[i];
-  }
+  const int sum = static_cast<int>(cv::v_reduce_sum(values));
   const float n = kPatchArea;
-  const float covariance =
-      n * static_cast<float>(cross) - static_cast<float>(sum) * static_cast<float>(patch.sum);
+  const float covariance = n * static_cast<float>(cv::v_reduce_sum(cross)) -
+                           static_cast<float>(sum) * static_cast<float>(patch.sum);
   const float variance_a =
-      n * static_cast<float>(squares) - static_cast<float>(sum) * static_cast<float>(sum);
+      n * static_cast<float>(cv::v_reduce_sum(squares)) - static_cast<float>(sum) * static_cast<float>(sum);
   const float variance_b = n * static_cast<float>(patch.sum_of_squares) -
                            static_cast<float>(patch.sum) * static_cast<float>(patch.sum);
   const float product = variance_a * variance_b;
@@ -106,44 +172,25 @@ std::optional<PatchAlignment> AlignPatch(const PatchTemplate& patch, const cv::M
                                          const Eigen::Vector2f& start, float max_shift_px,
                                          int max_iterations) {
   constexpr float kConverged = 0.02f;  // pixels
+  constexpr float kWeight = 1.0f / kPatchArea;
   float x = start.x(), y = start.y();
   float brightness = 0;
   bool converged = false;
   float correlation = 0;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!PatchFits(image, x, y, 1.0f)) return std::nullopt;
-    const float left = x - kHalf, top = y - kHalf;
-    const int x0 = static_cast<int>(left), y0 = static_cast<int>(top);
-    const float fx = left - static_cast<float>(x0), fy = top - static_cast<float>(y0);
-    const float w00 = (1 - fx) * (1 - fy), w01 = fx * (1 - fy), w10 = (1 - fx) * fy, w11 = fx * fy;
-    float sum_x = 0, sum_y = 0, sum_e = 0, sum_ee = 0, sum_i = 0, sum_ii = 0;
-    const std::uint8_t* row = image.ptr<std::uint8_t>(y0) + x0;
-    for (std::size_t i = 0; i < kPatchSize; ++i, row += image.step[0]) {
-      const std::uint8_t* next = row + image.step[0];
-      const std::size_t at = i * kPatchSize;
-      for (std::size_t j = 0; j < kPatchSize; ++j) {
-        const float value = w00 * static_cast<float>(row[j]) + w01 * static_cast<float>(row[j + 1]) +
-                            w10 * static_cast<float>(next[j]) + w11 * static_cast<float>(next[j + 1]);
-        const float error = value - static_cast<float>(patch.pixels[at + j]) - brightness;
-        sum_x += error * static_cast<float>(patch.gradient_x[at + j]);
-        sum_y += error * static_cast<float>(patch.gradient_y[at + j]);
-        sum_e += error;
-        sum_ee += error * error;
-        sum_i += value;
-        sum_ii += value * value;
-      }
-    }
-    const float n = kPatchArea;
-    const float residual_variance = sum_ee / n - (sum_e / n) * (sum_e / n);
-    const float image_variance = sum_ii / n - (sum_i / n) * (sum_i / n);
-    const float patch_variance = patch.Variance();
-    // Var(I - T) = Var(I) + Var(T) - 2 Cov(I, T).
-    const float product = image_variance * patch_variance;
-    correlation = product > 1e-3f
-                      ? 0.5f * (image_variance + patch_variance - residual_variance) / std::sqrt(product)
-                      : 0;
+    const ShiftedSums sums = SumShifted(patch, image, x - kHalf, y - kHalf);
+    const float mean = sums.value * kWeight;
+    const float covariance = sums.value_times_pixel * kWeight - mean * patch.Mean();
+    const float product = (sums.value_squared * kWeight - mean * mean) * patch.Variance();
+    correlation = product > 1e-3f ? covariance / std::sqrt(product) : 0;
     if (converged) break;
-    const Eigen::Vector3f update = patch.inverse_hessian * Eigen::Vector3f(0.5f * sum_x, 0.5f * sum_y, sum_e);
+    // Of the error: value - pixel - brightness.
+    const Eigen::Vector2f steepest =
+        sums.value_times_gradient - patch.gradient_dot_pixel - brightness * patch.gradient_sum;
+    const Eigen::Vector3f update =
+        patch.inverse_hessian *
+        Eigen::Vector3f(0.5f * steepest[0], 0.5f * steepest[1], sums.value - kPatchArea * brightness);
     x -= update[0];
     y -= update[1];
     brightness += update[2];

@@ -21,6 +21,10 @@ struct PatchTemplate {
   alignas(32) std::array<std::int16_t, kPatchArea> gradient_y{};
   Eigen::Matrix3f inverse_hessian;  // of (dx, dy, brightness)
   int sum = 0, sum_of_squares = 0;
+  // Sums over the patch: of the gradients, and of each times the pixel less the mean.
+  Eigen::Vector2f gradient_sum, gradient_dot_pixel;
+
+  float Mean() const { return static_cast<float>(sum) / kPatchArea; }
 
   float Variance() const {
     return static_cast<float>(sum_of_squares) / kPatchArea -

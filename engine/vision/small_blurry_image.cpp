@@ -29,14 +29,25 @@ void AddRow(const std::uint8_t* row, int width, std::uint16_t* sums) {
   for (; x < width; ++x) sums[x] = static_cast<std::uint16_t>(sums[x] + row[x]);
 }
 
+// What a thumbnail is made in; every thread keeps its own, so that the next one need not allocate.
+struct Workspace {
+  std::vector<std::uint16_t> sums;  // of the columns of a row of blocks
+  std::vector<float> totals;        // of these blocks
+  std::vector<float> kernel;        // the blur's, from its middle outwards
+  double kernel_sigma_px = 0;
+  std::vector<float> padded;  // a row, or rows of a column, with what the border reflects
+};
+
 // Mean of scale x scale blocks; rows and columns beyond the last whole block are left out. Grey values keep
 // their fraction, which an 8-bit resize would round away.
-cv::Mat MeanOfBlocks(const cv::Mat& gray, int scale) {
+void MeanOfBlocks(const cv::Mat& gray, int scale, Workspace* workspace, cv::Mat* result) {
   const int width = gray.cols / scale, height = gray.rows / scale;
-  cv::Mat result(height, width, CV_32FC1);
+  result->create(height, width, CV_32FC1);
   const float weight = 1.0f / (static_cast<float>(scale) * static_cast<float>(scale));
-  std::vector<std::uint16_t> sums(static_cast<std::size_t>(width * scale));
-  std::vector<float> totals(static_cast<std::size_t>(width));
+  std::vector<std::uint16_t>& sums = workspace->sums;
+  std::vector<float>& totals = workspace->totals;
+  sums.resize(static_cast<std::size_t>(width * scale));
+  totals.resize(static_cast<std::size_t>(width));
   constexpr int kRowsBeforeOverflow = 257;  // 257 * 255 = 65535
   for (int y = 0; y < height; ++y) {
     std::fill(totals.begin(), totals.end(), 0.0f);
@@ -52,10 +63,61 @@ cv::Mat MeanOfBlocks(const cv::Mat& gray, int scale) {
         totals[static_cast<std::size_t>(x)] += static_cast<float>(sum);
       }
     }
-    float* out = result.ptr<float>(y);
+    float* out = result->ptr<float>(y);
     for (int x = 0; x < width; ++x) out[x] = totals[static_cast<std::size_t>(x)] * weight;
   }
-  return result;
+}
+
+// A Gaussian's weights out to four sigma, summing to one over both sides.
+void MakeKernel(double sigma_px, Workspace* workspace) {
+  if (workspace->kernel_sigma_px == sigma_px) return;
+  workspace->kernel_sigma_px = sigma_px;
+  const auto radius = static_cast<std::size_t>(std::ceil(4 * sigma_px));
+  std::vector<double> weights(radius + 1);
+  double sum = 0;
+  for (std::size_t i = 0; i <= radius; ++i) {
+    weights[i] = std::exp(-0.5 * static_cast<double>(i * i) / (sigma_px * sigma_px));
+    sum += i == 0 ? weights[i] : 2 * weights[i];
+  }
+  workspace->kernel.assign(weights.begin(), weights.end());
+  for (float& weight : workspace->kernel) weight = static_cast<float>(weight / sum);
+}
+
+// The index that a picture mirrored about its outermost pixels has there.
+int Reflect(int index, int size) {
+  if (size == 1) return 0;
+  const int period = 2 * (size - 1);
+  index = std::abs(index) % period;
+  return index < size ? index : period - index;
+}
+
+// Blurs in place, first along the rows, then along the columns, all columns side by side.
+void Blur(Workspace* workspace, cv::Mat* pixels) {
+  using Row = Eigen::Map<Eigen::ArrayXf>;
+  const std::vector<float>& kernel = workspace->kernel;
+  const int radius = static_cast<int>(kernel.size()) - 1;
+  const Eigen::Index width = pixels->cols;
+  std::vector<float>& padded = workspace->padded;
+  padded.resize(static_cast<std::size_t>((pixels->rows + 2 * radius) * (pixels->cols + 2 * radius)));
+  for (int y = 0; y < pixels->rows; ++y) {
+    float* row = pixels->ptr<float>(y);
+    for (int x = -radius; x < pixels->cols + radius; ++x)
+      padded[static_cast<std::size_t>(x + radius)] = row[Reflect(x, pixels->cols)];
+    const auto shifted = [&](int by) { return Row(padded.data() + radius + by, width); };
+    Row out(row, width);
+    out = kernel[0] * shifted(0);
+    for (int i = 1; i <= radius; ++i) out += kernel[static_cast<std::size_t>(i)] * (shifted(-i) + shifted(i));
+  }
+  for (int y = -radius; y < pixels->rows + radius; ++y) {
+    const float* row = pixels->ptr<float>(Reflect(y, pixels->rows));
+    std::copy(row, row + width, padded.begin() + (y + radius) * width);
+  }
+  for (int y = 0; y < pixels->rows; ++y) {
+    const auto shifted = [&](int by) { return Row(padded.data() + (y + radius + by) * width, width); };
+    Row out(pixels->ptr<float>(y), width);
+    out = kernel[0] * shifted(0);
+    for (int i = 1; i <= radius; ++i) out += kernel[static_cast<std::size_t>(i)] * (shifted(-i) + shifted(i));
+  }
 }
 
 // Every kStride-th thumbnail pixel in both directions is compared: thumbnails are blurred, so that those
@@ -356,13 +418,29 @@ bool IsObservable(const Comparison& comparison) {
 
 }  // namespace
 
-SmallBlurryImage MakeSmallBlurryImage(const cv::Mat& gray, double blur_sigma_px) {
+void MakeSmallBlurryImage(const cv::Mat& gray, double blur_sigma_px, SmallBlurryImage* result) {
   CV_Assert(gray.type() == CV_8UC1 && !gray.empty());
+  thread_local Workspace workspace;
+  result->scale = std::min((gray.cols + kMaxWidth - 1) / kMaxWidth, gray.rows);
+  // Whoever took the thumbnail that was here before keeps it.
+  if (result->pixels.u && result->pixels.u->refcount > 1) result->pixels.release();
+  MeanOfBlocks(gray, result->scale, &workspace, &result->pixels);
+  if (blur_sigma_px > 0) {
+    MakeKernel(blur_sigma_px, &workspace);
+    Blur(&workspace, &result->pixels);
+  }
+  double sum = 0;
+  for (int y = 0; y < result->pixels.rows; ++y)
+    sum += static_cast<double>(
+        Eigen::Map<Eigen::ArrayXf>(result->pixels.ptr<float>(y), result->pixels.cols).sum());
+  const auto mean = static_cast<float>(sum / static_cast<double>(result->pixels.total()));
+  for (int y = 0; y < result->pixels.rows; ++y)
+    Eigen::Map<Eigen::ArrayXf>(result->pixels.ptr<float>(y), result->pixels.cols) -= mean;
+}
+
+SmallBlurryImage MakeSmallBlurryImage(const cv::Mat& gray, double blur_sigma_px) {
   SmallBlurryImage result;
-  result.scale = std::min((gray.cols + kMaxWidth - 1) / kMaxWidth, gray.rows);
-  result.pixels = MeanOfBlocks(gray, result.scale);
-  if (blur_sigma_px > 0) cv::GaussianBlur(result.pixels, result.pixels, {}, blur_sigma_px);
-  result.pixels -= cv::mean(result.pixels);
+  MakeSmallBlurryImage(gray, blur_sigma_px, &result);
   return result;
 }
 

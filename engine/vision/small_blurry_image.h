@@ -19,7 +19,10 @@ struct SmallBlurryImage {
 };
 
 // gray: CV_8UC1. blur_sigma_px is in thumbnail pixels.
-SmallBlurryImage MakeSmallBlurryImage(const cv::Mat& gray, double blur_sigma_px = 2.5);
+inline constexpr double kThumbnailBlurPx = 2.5;
+SmallBlurryImage MakeSmallBlurryImage(const cv::Mat& gray, double blur_sigma_px = kThumbnailBlurPx);
+// The same into *result, whose memory is used again when nobody else holds it.
+void MakeSmallBlurryImage(const cv::Mat& gray, double blur_sigma_px, SmallBlurryImage* result);
 
 // Mean squared difference of two thumbnails of equal size, zero-mean (grey values squared); infinite when
 // the sizes differ.

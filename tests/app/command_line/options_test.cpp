@@ -89,8 +89,19 @@ TEST(EvaluateOptions, TakeSeveralSequencesInAnyOrderOfWords) {
   EXPECT_EQ(options->calibrations, (std::vector<std::filesystem::path>{"a.yaml"}));
   EXPECT_EQ(options->pace, Pace::kLockstep);
   EXPECT_EQ(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate a --output b")->pace, Pace::kEager);
+  EXPECT_TRUE(options->dump_frames.empty());
   EXPECT_FALSE(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate --output out"));
   EXPECT_FALSE(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen"));
+}
+
+TEST(EvaluateOptions, TakeSeveralFramesToDump) {
+  const auto options = Parse<EvaluateOptions>(
+      AddEvaluateCommand, "evaluate --dump-frame 0 kitchen --output out --dump-frame 412");
+  ASSERT_TRUE(options);
+  EXPECT_EQ(options->sequences, (std::vector<std::string>{"kitchen"}));
+  EXPECT_EQ(options->dump_frames, (std::vector<std::size_t>{0, 412}));
+  EXPECT_FALSE(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen --output out --dump-frame -1"));
+  EXPECT_FALSE(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen --output out --dump-frame last"));
 }
 
 TEST(DemoOptions, NeedAFolderWithoutAWindow) {

@@ -58,8 +58,8 @@ void AddMeasurements(int count, double noise_sigmas, bool infinite, Random* rand
 }
 
 PoseRefinement Refine(const Rigid3& start, std::vector<PoseMeasurement>* measurements) {
-  std::vector<double> scratch;
-  return RefinePose(kLens, start, {}, measurements, &scratch, {Eigen::Vector3d::Zero(), start});
+  PoseRefinementMemory memory;
+  return RefinePose(kLens, start, {}, measurements, &memory, {Eigen::Vector3d::Zero(), start});
 }
 
 Vector6 Error(const PoseRefinement& refined) {
@@ -257,8 +257,8 @@ TEST(PoseRefinement, TurnsAboutThePivotWhereOnlyTheRotationIsTold) {
   }
   const Rotation3 guess = Rotation3::Exp({-0.02, 0.04, 0.03}) * turned.rotation;
   const Rigid3 start(guess, pivot - guess * fixed_in_map);
-  std::vector<double> scratch;
-  const PoseRefinement refined = RefinePose(kLens, start, {}, &measurements, &scratch, {pivot, start});
+  PoseRefinementMemory memory;
+  const PoseRefinement refined = RefinePose(kLens, start, {}, &measurements, &memory, {pivot, start});
   EXPECT_TRUE(refined.converged);
   EXPECT_EQ(refined.observed, ObservedMotion::kPanorama);
   EXPECT_EQ(refined.inliers, 60);
@@ -381,14 +381,14 @@ TEST(PoseRefinement, KeepsToASureTurnWherePointsTellLittleAndLeavesItWhereTheyTe
   const Rigid3 before = Truth();
   const Eigen::Vector3d fixed_in_map = before.inverse() * pivot;
   const Rigid3 turned(turn * before.rotation, pivot - turn * before.rotation * fixed_in_map);
-  std::vector<double> scratch;
+  PoseRefinementMemory memory;
   double freely = 0, held = 0;
   constexpr int kTrials = 20;
   for (int trial = 0; trial < kTrials; ++trial) {
     std::vector<PoseMeasurement> rim;
     AddPointsAtTheRim(30, turned, &random, &rim);
     const auto off = [&](bool sure) {
-      const PoseRefinement refined = RefinePose(kLens, before, {}, &rim, &scratch, {pivot, before, sure});
+      const PoseRefinement refined = RefinePose(kLens, before, {}, &rim, &memory, {pivot, before, sure});
       EXPECT_EQ(refined.observed, sure ? ObservedMotion::kPanorama : ObservedMotion::kSixDof);
       return (refined.camera_from_map.rotation * turned.rotation.inverse()).Angle() / kTrials;
     };
@@ -401,7 +401,7 @@ TEST(PoseRefinement, KeepsToASureTurnWherePointsTellLittleAndLeavesItWhereTheyTe
   std::vector<PoseMeasurement> spread;
   AddMeasurements(400, 0.3, false, &random, &spread);
   const Rigid3 aside = testing_world::CameraAt({0.05, 0, 0}) * Truth();
-  const PoseRefinement placed = RefinePose(kLens, aside, {}, &spread, &scratch, {pivot, aside, true});
+  const PoseRefinement placed = RefinePose(kLens, aside, {}, &spread, &memory, {pivot, aside, true});
   EXPECT_EQ(placed.observed, ObservedMotion::kSixDof);
   EXPECT_LT(Moved(placed, Truth()), 0.3 * 0.05);
 }
@@ -415,9 +415,9 @@ TEST(PoseRefinement, FollowsWhatFinitePointsTellOfTheWayThoughTheyPlaceTheCamera
   AddPointsAtTheRim(200, Truth(), &random, &rim);
   PoseRefinementOptions strict;
   strict.max_position_sigma = 0.0025;
-  std::vector<double> scratch;
+  PoseRefinementMemory memory;
   const PoseRefinement refined =
-      RefinePose(kLens, start, strict, &rim, &scratch, {Eigen::Vector3d::Zero(), start});
+      RefinePose(kLens, start, strict, &rim, &memory, {Eigen::Vector3d::Zero(), start});
   EXPECT_EQ(refined.observed, ObservedMotion::kPanorama);
   EXPECT_LT(std::abs(Error(refined)[1]), 0.005);
 }

@@ -82,6 +82,26 @@ TEST(PyramidCoordinates, AgreeWithTheLevelsOfAnySize) {
   }
 }
 
+TEST(HalvedPicture, IsTheRoundedMeanOfTwoByTwo) {
+  Random random(12);
+  for (const cv::Size size : {cv::Size(64, 48), cv::Size(37, 21), cv::Size(2, 2), cv::Size(33, 3)}) {
+    cv::Mat picture(size, CV_8UC1), half;
+    for (int y = 0; y < size.height; ++y)
+      for (int x = 0; x < size.width; ++x)
+        picture.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
+    HalvePicture(picture, &half);
+    ASSERT_EQ(half.size(), size / 2);
+    for (int y = 0; y < half.rows; ++y) {
+      for (int x = 0; x < half.cols; ++x) {
+        int sum = 0;
+        for (const int dy : {0, 1})
+          for (const int dx : {0, 1}) sum += picture.at<std::uint8_t>(2 * y + dy, 2 * x + dx);
+        EXPECT_EQ(half.at<std::uint8_t>(y, x), (sum + 2) / 4) << size << ' ' << x << ' ' << y;
+      }
+    }
+  }
+}
+
 TEST(Features, HaveCornersInOrderWithAnIndexByRow) {
   const auto features = MakeFeatures(Rectangles(333, 251, 5));
   for (std::size_t level = 0; level < kPyramidLevels; ++level) {

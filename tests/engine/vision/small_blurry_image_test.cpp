@@ -99,6 +99,44 @@ double AngleBetween(const Rotation3& a, const Rotation3& b) {
   return (a.inverse() * b).Angle();
 }
 
+cv::Mat NoisePicture(int width, int height, std::uint64_t seed) {
+  Random random(seed);
+  cv::Mat picture(height, width, CV_8UC1);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      picture.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
+  return picture;
+}
+
+TEST(MakingAThumbnail, BlursAsOpenCvDoes) {
+  for (const double sigma_px : {0.8, 2.5}) {
+    for (const cv::Size size : {cv::Size(640, 480), cv::Size(333, 251), cv::Size(64, 64), cv::Size(90, 3)}) {
+      const cv::Mat picture = NoisePicture(size.width, size.height, 4);
+      const SmallBlurryImage made = MakeSmallBlurryImage(picture, sigma_px);
+      cv::Mat expected;
+      picture(cv::Rect({0, 0}, made.pixels.size() * made.scale)).convertTo(expected, CV_32F);
+      cv::resize(expected, expected, made.pixels.size(), 0, 0, cv::INTER_AREA);
+      cv::GaussianBlur(expected, expected, {}, sigma_px);
+      expected -= cv::mean(expected);
+      EXPECT_LT(cv::norm(expected, made.pixels, cv::NORM_INF), 0.02) << size << ' ' << sigma_px;
+    }
+  }
+}
+
+TEST(MakingAThumbnail, UsesMemoryAgainUnlessSomebodyHoldsIt) {
+  const cv::Mat one = NoisePicture(320, 240, 1), other = NoisePicture(320, 240, 2);
+  SmallBlurryImage thumbnail;
+  MakeSmallBlurryImage(one, kThumbnailBlurPx, &thumbnail);
+  const void* memory = thumbnail.pixels.data;
+  MakeSmallBlurryImage(other, kThumbnailBlurPx, &thumbnail);
+  EXPECT_EQ(thumbnail.pixels.data, memory);
+  EXPECT_EQ(Difference(thumbnail, MakeSmallBlurryImage(other)), 0);
+  const SmallBlurryImage held = thumbnail;
+  MakeSmallBlurryImage(one, kThumbnailBlurPx, &thumbnail);
+  EXPECT_EQ(Difference(held, MakeSmallBlurryImage(other)), 0);
+  EXPECT_EQ(Difference(thumbnail, MakeSmallBlurryImage(one)), 0);
+}
+
 TEST(SmallBlurryImage, IsAtMostEightyWideWithTheScaleThatMakesItSo) {
   const struct {
     int width, height, scale, small_width, small_height;

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "engine/tracking/tracker.h"
+#include "tests/allocations/allocation_counter.h"
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_allocations::AllocationsOfThisThread;
+using testing_world::CameraAt;
+using testing_world::RenderedWorld;
+
+constexpr int kFrames = 24;  // of one sway to the side and back
+constexpr double kFramesASecond = 30;
+constexpr std::uint64_t kKey = 1;
+
+const std::shared_ptr<const CameraModel>& Camera() {
+  static const auto camera = testing_world::PinholeCamera(320, 240);
+  return camera;
+}
+
+Rigid3 Pose(int frame) {
+  const double phase = 2 * M_PI * frame / kFrames;
+  return CameraAt({0.06 * std::sin(phase), 0.02 * std::sin(2 * phase), 0}, {0, -1.5 * std::sin(phase), 0});
+}
+
+struct Scene {
+  std::shared_ptr<const MapSnapshot> map;
+  std::vector<cv::Mat> pictures;
+};
+
+const Scene& TheScene() {
+  static const Scene scene = [] {
+    const RenderedWorld world = RenderedWorld::Room(71);
+    Scene made;
+    made.map = testing_world::TrueMap(world, Camera(),
+                                      {CameraAt({-0.1, 0, 0}), CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0})})
+                   .Snapshot();
+    for (int i = 0; i < kFrames; ++i)
+      made.pictures.push_back(world.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i) + 1));
+    return made;
+  }();
+  return scene;
+}
+
+class OneMap : public PlaceFinder {
+ public:
+  std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage&, int, int, std::uint64_t) const override {
+    return {{kKey, TheScene().map, TheScene().map->keyframes[1].id, 0.0}};
+  }
+};
+
+// A keyframe, which the mapper keeps, is no part of a steady frame; the first one would be due here.
+TrackerOptions WithoutKeyFrames() {
+  TrackerOptions options;
+  options.frames_between_keyframes = std::numeric_limits<int>::max();
+  return options;
+}
+
+// What each frame of a sway allocates, once the same sway has been gone through a few times.
+void ExpectNoAllocations(const TrackerOptions& options) {
+  cv::setNumThreads(1);
+  const OneMap places;
+  Tracker tracker(options, Camera(), 1);
+  tracker.SetMap(TheScene().map, kKey);
+  TrackedFrame tracked;
+  constexpr int kWarmUp = 6 * kFrames;
+  for (int i = 0; i < kWarmUp + kFrames; ++i) {
+    Frame frame;
+    frame.time = FromSeconds(i / kFramesASecond);
+    frame.index = static_cast<std::uint64_t>(i);
+    frame.picture = TheScene().pictures[static_cast<std::size_t>(i % kFrames)];
+    const std::size_t before = AllocationsOfThisThread();
+    tracker.Track(frame, &places, &tracked);
+    const std::size_t taken = AllocationsOfThisThread() - before;
+    if (i < kWarmUp) continue;
+    ASSERT_TRUE(HasPose(tracked.state)) << i;
+    ASSERT_GT(tracked.quality, 0.5) << i;
+    EXPECT_EQ(taken, 0u) << "in frame " << i;
+  }
+}
+
+TEST(AllocationCounter, CountsWhatIsAllocated) {
+  const std::size_t before = AllocationsOfThisThread();
+  auto* number = new int(3);
+  const std::size_t after = AllocationsOfThisThread();
+  delete number;
+  EXPECT_EQ(after - before, 1u);
+  const cv::Mat picture(10, 10, CV_8UC1);
+  EXPECT_GT(AllocationsOfThisThread(), after);
+}
+
+TEST(SteadyFrames, AllocateNothingOnATour) {
+  TrackerOptions options;
+  options.build_maps = false;
+  ExpectNoAllocations(options);
+}
+
+TEST(SteadyFrames, AllocateNothingWhileAMapIsBuilt) {
+  ExpectNoAllocations(WithoutKeyFrames());
+}
+
+TEST(SteadyFrames, AllocateNothingInTheHybridEngine) {
+  TrackerOptions options = WithoutKeyFrames();
+  options.hybrid = true;
+  ExpectNoAllocations(options);
+}
+
+}  // namespace
+}  // namespace docent::engine
