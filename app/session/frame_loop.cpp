@@ -17,29 +17,32 @@ namespace docent::app {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // Plays pictures by their own times. Shared by the cameras of a session; any thread.
 class RealtimeClock {
  public:
+  explicit RealtimeClock(PlayClock* clock) : clock_(clock) {}
   // The present is the time of this picture, if nobody said so before.
   void Start(Timestamp time) {
     const std::scoped_lock lock(mutex_);
-    if (!start_) start_ = Clock::now() - time;
+    if (!start_) start_ = clock_->Now() - time;
   }
   // Waits until the picture is due. False when its successor is due already.
   bool WaitFor(Timestamp time, Timestamp period, const std::stop_token& stop) {
-    std::unique_lock lock(mutex_);
-    const Clock::time_point due = *start_ + time;
-    if (Clock::now() > due + period) return false;
-    woken_.wait_until(lock, stop, due, [] { return false; });
+    const Timestamp due = Due(time);
+    if (clock_->Now() > due + period) return false;
+    clock_->WaitUntil(due, stop);
     return true;
   }
+  Timestamp Due(Timestamp time) {
+    const std::scoped_lock lock(mutex_);
+    return *start_ + time;
+  }
+  Timestamp Now() { return clock_->Now(); }
 
  private:
-  std::optional<Clock::time_point> start_;  // when a picture of time 0 would have been due
+  PlayClock* const clock_;
   std::mutex mutex_;
-  std::condition_variable_any woken_;
+  std::optional<Timestamp> start_;  // when a picture of time 0 would have been due
 };
 
 // Holds cameras together that are fed as fast as they are tracked: none goes on to a picture that lies more
@@ -211,6 +214,7 @@ class CameraFeed {
     if (pace == Pace::kEager) session_->WaitUntilCalm(stop);
     FollowHead();
     tracked = session_->Process(frame_);
+    TellLatency();
     commander_.CarryOutDue(frame_.time - *first_time_, tracked);
     run_.shown(tracked);
   }
@@ -229,6 +233,15 @@ class CameraFeed {
       if (turn.Angle() > kStill_rad) frame_.turned = turn;
     }
     before_ = now;
+  }
+
+  void TellLatency() {
+    if (!run_.options.latency) return;
+    if (live_) {
+      run_.options.latency(clock_->Now() - (frame_.time + clock_offset_));
+    } else if (run_.options.pace == Pace::kRealtime) {
+      run_.options.latency(clock_->Now() - clock_->Due(frame_.time));
+    }
   }
 
   const CameraRun& run_;
@@ -303,12 +316,24 @@ void RunSideBySide(std::vector<CameraFeed>* feeds, Pace pace, std::stop_source* 
 
 }  // namespace
 
+Timestamp PlayClock::Now() {
+  return std::chrono::steady_clock::now().time_since_epoch();
+}
+
+void PlayClock::WaitUntil(Timestamp time, const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any woken;
+  std::unique_lock lock(mutex);
+  woken.wait_until(lock, stop, std::chrono::steady_clock::time_point(time), [] { return false; });
+}
+
 void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const std::stop_token& stop) {
   constexpr Timestamp kSameClock = std::chrono::seconds(10);
   for (const CameraRun& run : cameras) PreloadModels(run.options, session);
   std::stop_source stopping;
   const std::stop_callback forward(stop, [&stopping] { stopping.request_stop(); });
-  RealtimeClock clock;
+  PlayClock machine;
+  RealtimeClock clock(cameras.front().options.clock ? cameras.front().options.clock : &machine);
   std::vector<CameraFeed> feeds;
   feeds.reserve(cameras.size());
   for (const CameraRun& run : cameras) {
