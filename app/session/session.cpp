@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <opencv2/core/utility.hpp>
 #include <utility>
 
 #include "app/files/text_file.h"
@@ -18,6 +19,8 @@ Session::Session(const SessionOptions& options,
       association_(cameras.size()),
       mapping_(options.mapper, options.threaded && options.may_write,
                [this](const MappingThread::News& news) { Hear(news); }) {
+  // Trackers and mapper have the processors; OpenCV's own threads would only get into their way.
+  cv::setNumThreads(1);
   engine::TrackerOptions tracker_options = options.tracker;
   tracker_options.build_maps = options.may_write;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
