@@ -225,7 +225,7 @@ class GuideRun {
     frame->shown = session_.ShownWith(tracked);
     if (!watched->first_time) watched->first_time = tracked.frame.time;
     frame->seconds = ToSeconds(tracked.frame.time - *watched->first_time);
-    frame->message = watched->message;
+    frame->message = watched->message.empty() ? frame->shown.advice : watched->message;
     return frame;
   }
 
