@@ -21,28 +21,18 @@ namespace {
 class RealtimeClock {
  public:
   explicit RealtimeClock(PlayClock* clock) : clock_(clock) {}
-  // The present is the time of this picture, if nobody said so before.
-  void Start(Timestamp time) {
-    const std::scoped_lock lock(mutex_);
-    if (!start_) start_ = clock_->Now() - time;
-  }
-  // Waits until the picture is due. False when its successor is due already.
-  bool WaitFor(Timestamp time, Timestamp period, const std::stop_token& stop) {
-    const Timestamp due = Due(time);
-    if (clock_->Now() > due + period) return false;
-    clock_->WaitUntil(due, stop);
-    return true;
-  }
-  Timestamp Due(Timestamp time) {
-    const std::scoped_lock lock(mutex_);
-    return *start_ + time;
-  }
+  // The present is the time of this picture. Before any other call.
+  void Start(Timestamp time) { start_ = clock_->Now() - time; }
+  // Waits until the picture is due.
+  void WaitFor(Timestamp time, const std::stop_token& stop) { clock_->WaitUntil(Due(time), stop); }
+  // Whether the picture's successor is due already.
+  bool IsLate(Timestamp time, Timestamp period) { return clock_->Now() > Due(time) + period; }
+  Timestamp Due(Timestamp time) const { return start_ + time; }
   Timestamp Now() { return clock_->Now(); }
 
  private:
   PlayClock* const clock_;
-  std::mutex mutex_;
-  std::optional<Timestamp> start_;  // when a picture of time 0 would have been due
+  Timestamp start_{};  // when a picture of time 0 would have been due
 };
 
 // Holds cameras together that are fed as fast as they are tracked: none goes on to a picture that lies more
@@ -169,10 +159,16 @@ class CameraFeed {
   bool Fetch(const std::stop_token& stop) {
     FrameSource& source = *run_.camera->source;
     while (!stop.stop_requested()) {
+      late_ = MustBeLate();
       frame_ = engine::Frame();
-      if (!source.Next(&frame_)) return false;
+      if (!(late_ ? source.NextLate(&frame_) : source.Next(&frame_))) return false;
       frame_.camera = run_.options.camera;
       frame_.time -= clock_offset_;
+      if (late_) {
+        // Recordings with gaps: what comes after one may be early.
+        late_ = frame_.picture.empty() || clock_->IsLate(frame_.time, period_);
+        return true;
+      }
       if (std::string now = source.trouble(); now != trouble_) {
         trouble_ = std::move(now);
         if (run_.options.trouble) run_.options.trouble(trouble_, frame_.time);
@@ -203,12 +199,13 @@ class CameraFeed {
     const Pace pace = run_.options.pace;
     engine::TrackedFrame tracked;
     // A device keeps time itself, and drops what nobody fetches.
-    if (pace == Pace::kRealtime && !live_ && !clock_->WaitFor(frame_.time, period_, stop)) {
+    if (late_) {
       tracked.frame = frame_;
       tracked.state = engine::TrackingState::kDropped;
       run_.shown(tracked);
       return;
     }
+    if (pace == Pace::kRealtime && !live_) clock_->WaitFor(frame_.time, stop);
     // A file delivers faster than a camera and would run away from the mapper, which in the world has the
     // whole time between pictures; so whoever feeds waits, never the tracker.
     if (pace == Pace::kEager) session_->WaitUntilCalm(stop);
@@ -235,6 +232,13 @@ class CameraFeed {
     before_ = now;
   }
 
+  // Judged before a picture is fetched: one that is slow to make (a simulation on a busy machine) is as old
+  // as it is, but those that would be late were it there at once are passed over.
+  bool MustBeLate() {
+    return run_.options.pace == Pace::kRealtime && !live_ && first_time_ &&
+           clock_->IsLate(frame_.time + period_, period_);
+  }
+
   void TellLatency() {
     if (!run_.options.latency) return;
     if (live_) {
@@ -253,6 +257,7 @@ class CameraFeed {
   Commander commander_;
   GapReporter gaps_;
   engine::Frame frame_;
+  bool late_ = false;  // the picture is to be dropped
   std::optional<Timestamp> first_time_;
   Timestamp clock_offset_{};
   std::string trouble_;
@@ -344,8 +349,9 @@ void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const s
     }
     const Timestamp ahead = feed.time() - feeds.front().time();
     if (ahead > kSameClock || ahead < -kSameClock) feed.SetClockOffset(ahead);
-    clock.Start(feeds.front().time());
   }
+  // Not before all first pictures are there, or those who had to wait for the others would begin too late.
+  clock.Start(feeds.front().time());
   const Pace pace = cameras.front().options.pace;
   if (pace == Pace::kLockstep) {
     TakeTurns(&feeds, stopping.get_token());

@@ -79,7 +79,9 @@ using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
 //
 //   lockstep   one picture after the other; the session runs its mapper in between
 //   eager      as fast as the tracker is, but never further ahead of the mapper than a camera would be
-//   realtime   by the pictures' times; what is overtaken by its successor is dropped, as a camera drops it
+//   realtime   by the pictures' times; what is overtaken by its successor before it is asked for is dropped,
+//   as
+//              a camera drops it
 //
 // A live source drops by itself: what is missing between two of its pictures is handed on as dropped, each
 // frame with its time and no picture.

@@ -152,6 +152,48 @@ TEST(FrameLoop, DropsAndCountsWhatIsOvertakenInRealtimeAndNeverQueuesIt) {
   EXPECT_EQ(latencies.back(), Timestamp{});
 }
 
+// Every picture takes its time to make; what comes too late need not be made.
+class SlowRecording : public Recording {
+ public:
+  SlowRecording(std::uint64_t pictures, SteppedClock* clock) : Recording(pictures), clock_(clock) {}
+  bool Next(engine::Frame* frame) override {
+    clock_->Pass(std::chrono::milliseconds(250));
+    return Recording::Next(frame);
+  }
+  bool NextLate(engine::Frame* frame) override {
+    if (!Recording::Next(frame)) return false;
+    frame->picture.release();
+    return true;
+  }
+
+ private:
+  SteppedClock* const clock_;
+};
+
+TEST(FrameLoop, TracksWhatItCanInRealtimeOfPicturesThatAreSlowToMake) {
+  SteppedClock clock;
+  CalibratedCamera camera = Calibrate(std::make_unique<SlowRecording>(30, &clock), std::nullopt);
+  SessionOptions options;
+  options.may_write = false;
+  Session session(options, {camera.model}, nullptr);
+  FrameLoopOptions loop;
+  loop.pace = Pace::kRealtime;
+  loop.clock = &clock;
+  Timestamp oldest{};
+  loop.latency = [&](Timestamp latency) { oldest = std::max(oldest, latency); };
+  std::vector<std::uint64_t> tracked, all;
+  RunFrames(&camera, &session, loop,
+            [&](const engine::TrackedFrame& frame) {
+              all.push_back(frame.frame.index);
+              if (frame.state != kDropped) tracked.push_back(frame.frame.index);
+            },
+            {});
+  ASSERT_EQ(all.size(), 30u);
+  for (std::uint64_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i], i);
+  EXPECT_GE(tracked.size(), 11u) << "one picture can be made in the time of two and a half";
+  EXPECT_LE(oldest, std::chrono::milliseconds(350)) << "by making it, and by less than one picture";
+}
+
 TEST(FrameLoop, TellsTheAgeOfALivePictureByItsOwnStamp) {
   SteppedClock clock;
   const Timestamp taken = clock.Now() - std::chrono::milliseconds(30);
