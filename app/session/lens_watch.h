@@ -15,11 +15,11 @@
 namespace docent::app {
 
 struct LensWatchOptions {
-  int frames_between_samples = 5;
+  int frames_between_samples = 3;
   double turn_between_samples_deg = 2;  // a camera that stands still sees the same errors again
   std::size_t min_matches = 60;         // of a frame, found points of the two finest levels
   std::size_t min_ring_matches = 6;     // of a ring in a frame
-  std::size_t min_samples = 40;         // of a ring, for it to count
+  std::size_t min_samples = 25;         // of a ring, for it to count
   std::size_t min_rings = 4;            // that count, for anything to be said
   double told_px = 0.5;                 // between the ring found farthest out and the one farthest in
   double told_sigmas = 5;               // of that difference, so that chance does not tell it
