@@ -17,8 +17,20 @@ class ClippedSource : public FrameSource {
   }
 
   bool Next(engine::Frame* frame) override {
-    while (!ended_ && source_->Next(frame)) {
-      if (frame->picture.empty()) return true;  // a device that is away
+    return NextInside(frame, [&] { return source_->Next(frame); });
+  }
+  bool NextLate(engine::Frame* frame) override {
+    return NextInside(frame, [&] { return source_->NextLate(frame); });
+  }
+  std::string trouble() const override { return source_->trouble(); }
+  Delivery delivery() const override { return source_->delivery(); }
+  Head* head() const override { return source_->head(); }
+
+ private:
+  template <typename Fetch>
+  bool NextInside(engine::Frame* frame, const Fetch& fetch) {
+    while (!ended_ && fetch()) {
+      if (frame->picture.empty() && info_.live) return true;  // a device that is away
       if (!first_) first_ = frame->time;
       const Timestamp since_first = frame->time - *first_;
       if (until_ > Timestamp{} && since_first >= until_) break;
@@ -27,11 +39,7 @@ class ClippedSource : public FrameSource {
     ended_ = true;
     return false;
   }
-  std::string trouble() const override { return source_->trouble(); }
-  Delivery delivery() const override { return source_->delivery(); }
-  Head* head() const override { return source_->head(); }
 
- private:
   std::unique_ptr<FrameSource> source_;
   Timestamp from_, until_;
   std::optional<Timestamp> first_;

@@ -52,6 +52,10 @@ class FrameSource {
   // while its device is away, and trouble() says why; time is then the present on the source's clock.
   virtual bool Next(engine::Frame* frame) = 0;
 
+  // The same where it is known that the picture comes too late to be used: time and index are set, and
+  // sources to whom a picture is much work leave it empty.
+  virtual bool NextLate(engine::Frame* frame) { return Next(frame); }
+
   // One sentence for the wearer while there is no picture to be had; empty when all is well.
   virtual std::string trouble() const { return {}; }
   virtual Delivery delivery() const { return {}; }

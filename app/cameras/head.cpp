@@ -4,6 +4,7 @@
 #include <linux/videodev2.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <mutex>
 #include <numbers>
@@ -24,11 +25,23 @@ double Approach(double from, double to, double most) {
   return from + std::clamp(to - from, -most, most);
 }
 
-// One axis of a device.
+// One axis of a device, in the numbers of its control.
 struct Axis {
   std::uint32_t id = 0;
   bool absolute = false;
-  double unit_rad = 0, lowest_rad = 0, highest_rad = 0;
+  double unit_rad = 0;
+  std::int64_t lowest = 0, highest = 0, step = 1;
+
+  // The nearest value that the control takes: within its range, and a whole number of steps from its lowest.
+  std::int64_t Nearest(double angle_rad) const {
+    const double wanted =
+        std::clamp(angle_rad / unit_rad, static_cast<double>(lowest), static_cast<double>(highest));
+    const std::int64_t origin = absolute ? lowest : 0;
+    const auto steps = static_cast<std::int64_t>(
+        std::round((wanted - static_cast<double>(origin)) / static_cast<double>(step)));
+    const std::int64_t value = origin + steps * step;
+    return value > highest ? value - step : value < lowest ? value + step : value;
+  }
 };
 
 std::optional<Axis> FindAxis(DeviceSystem* system, int file, std::uint32_t absolute, std::uint32_t relative) {
@@ -41,57 +54,125 @@ std::optional<Axis> FindAxis(DeviceSystem* system, int file, std::uint32_t absol
     if (system->Control(file, VIDIOC_QUERYCTRL, &query) < 0 || (query.flags & V4L2_CTRL_FLAG_DISABLED) != 0)
       continue;
     if (query.maximum <= query.minimum) continue;
-    const double unit = id == absolute ? kArcSecond : kStep;
-    Axis axis{id, id == absolute, unit, query.minimum * unit, query.maximum * unit};
-    // Nobody turns farther than once around, whatever the driver says.
-    axis.lowest_rad = std::max(axis.lowest_rad, -std::numbers::pi);
-    axis.highest_rad = std::min(axis.highest_rad, std::numbers::pi);
-    return axis;
+    return Axis{id,
+                id == absolute,
+                id == absolute ? kArcSecond : kStep,
+                query.minimum,
+                query.maximum,
+                std::max(1, query.step)};
   }
   return std::nullopt;
 }
 
+// A device's two axes; tilt may be missing.
+struct Axes {
+  Axis pan;
+  std::optional<Axis> tilt;
+};
+
+std::optional<Axes> FindAxes(DeviceSystem* system, int file) {
+  const auto pan = FindAxis(system, file, V4L2_CID_PAN_ABSOLUTE, V4L2_CID_PAN_RELATIVE);
+  if (!pan) return std::nullopt;
+  return Axes{*pan, FindAxis(system, file, V4L2_CID_TILT_ABSOLUTE, V4L2_CID_TILT_RELATIVE)};
+}
+
+PanTiltRange RangeOf(const Axes& axes) {
+  // Nobody turns farther than once around, whatever the driver says. Of those that turn by steps the known
+  // ones go as far to each side as their greatest step.
+  const auto ends = [](const Axis& axis) {
+    return std::pair(std::max(static_cast<double>(axis.lowest) * axis.unit_rad, -std::numbers::pi),
+                     std::min(static_cast<double>(axis.highest) * axis.unit_rad, std::numbers::pi));
+  };
+  const auto [left, right] = ends(axes.pan);
+  const auto [down, up] = axes.tilt ? ends(*axes.tilt) : std::pair(0.0, 0.0);
+  return {{left, down}, {right, up}, kDeviceSpeed};
+}
+
 class DeviceHead : public Head {
  public:
-  DeviceHead(std::unique_ptr<DeviceSystem> system, int file, const Axis& pan, const std::optional<Axis>& tilt)
-      : system_(std::move(system)),
-        file_(file),
-        pan_(pan),
-        tilt_(tilt),
-        range_{{pan.lowest_rad, tilt ? tilt->lowest_rad : 0},
-               {pan.highest_rad, tilt ? tilt->highest_rad : 0},
-               kDeviceSpeed},
-        motion_(range_) {}
-  ~DeviceHead() override { system_->Close(file_); }
+  DeviceHead(std::unique_ptr<DeviceSystem> system, std::string path, int file, const Axes& axes)
+      : system_(std::move(system)), path_(std::move(path)), file_(file), axes_(axes), range_(RangeOf(axes)) {
+    Begin();
+  }
+  ~DeviceHead() override {
+    if (file_ >= 0) system_->Close(file_);
+  }
 
   const PanTiltRange& range() const override { return range_; }
   PanTilt At(Timestamp time) const override {
     const std::scoped_lock lock(mutex_);
-    return motion_.At(time);
+    return motion_->At(time);
   }
   void LookAt(const PanTilt& wanted, Timestamp now) override {
     const std::scoped_lock lock(mutex_);
-    const PanTilt to = range_.Clamped(wanted), from = motion_.target();
-    const bool panned = Turn(pan_, from.pan_rad, to.pan_rad);
-    const bool tilted = tilt_ && Turn(*tilt_, from.tilt_rad, to.tilt_rad);
-    // An axis that refused stays where it is.
-    motion_.LookAt({panned ? to.pan_rad : from.pan_rad, tilted ? to.tilt_rad : from.tilt_rad}, now);
+    if (file_ < 0) Reopen();
+    const PanTilt to = range_.Clamped(wanted), from = motion_->target();
+    PanTilt reached = from;
+    reached.pan_rad = Turn(axes_.pan, from.pan_rad, to.pan_rad);
+    if (axes_.tilt) reached.tilt_rad = Turn(*axes_.tilt, from.tilt_rad, to.tilt_rad);
+    motion_->LookAt(reached, now);
   }
 
  private:
-  bool Turn(const Axis& axis, double from_rad, double to_rad) {
-    const double value = (axis.absolute ? to_rad : to_rad - from_rad) / axis.unit_rad;
-    if (!axis.absolute && std::abs(value) < 0.5) return false;
-    return WriteControl(system_.get(), file_, axis.id, std::llround(value));
+  // Where the device says it is, or straight ahead where it does not say.
+  void Begin() {
+    const auto where = [&](const Axis& axis, std::uint32_t reset) {
+      if (!axis.absolute) {
+        WriteControl(system_.get(), file_, reset, 1);
+        return 0.0;
+      }
+      const auto value = ReadControl(system_.get(), file_, axis.id);
+      return value ? static_cast<double>(*value) * axis.unit_rad : 0.0;
+    };
+    PanTilt at;
+    at.pan_rad = where(axes_.pan, V4L2_CID_PAN_RESET);
+    if (axes_.tilt) at.tilt_rad = where(*axes_.tilt, V4L2_CID_TILT_RESET);
+    motion_.emplace(range_, range_.Clamped(at));
+  }
+
+  // A device that was unplugged and is back has gone to where it begins.
+  void Reopen() {
+    file_ = system_->Open(path_);
+    if (file_ < 0) return;
+    const auto axes = FindAxes(system_.get(), file_);
+    if (axes && axes->pan.absolute == axes_.pan.absolute &&
+        axes->tilt.has_value() == axes_.tilt.has_value()) {
+      axes_ = *axes;
+      Begin();
+      return;
+    }
+    Close();  // another camera has its place
+  }
+  void Close() {
+    system_->Close(file_);
+    file_ = -1;
+  }
+
+  // Where the axis goes: an axis that refuses (held by another program, not ready, gone) stays where it is,
+  // and whoever asked will ask again.
+  double Turn(const Axis& axis, double from_rad, double to_rad) {
+    if (file_ < 0) return from_rad;
+    v4l2_control control{};
+    control.id = axis.id;
+    const std::int64_t value = axis.Nearest(axis.absolute ? to_rad : to_rad - from_rad);
+    if (!axis.absolute && value == 0) return from_rad;
+    control.value = static_cast<std::int32_t>(value);
+    if (system_->Control(file_, VIDIOC_S_CTRL, &control) < 0) {
+      if (errno == ENODEV || errno == ENXIO) Close();
+      return from_rad;
+    }
+    // The driver may have taken another value than the one it was given, and says which.
+    const double taken_rad = static_cast<double>(control.value) * axis.unit_rad;
+    return axis.absolute ? taken_rad : from_rad + taken_rad;
   }
 
   const std::unique_ptr<DeviceSystem> system_;
-  const int file_;
-  const Axis pan_;
-  const std::optional<Axis> tilt_;
+  const std::string path_;
+  mutable std::mutex mutex_;  // guards what follows
+  int file_;                  // -1 while the device is away
+  Axes axes_;
   const PanTiltRange range_;
-  mutable std::mutex mutex_;
-  HeadMotion motion_;
+  std::optional<HeadMotion> motion_;
 };
 
 }  // namespace
@@ -129,15 +210,12 @@ PanTilt HeadMotion::At(Timestamp time) const {
 std::unique_ptr<Head> OpenDeviceHead(std::unique_ptr<DeviceSystem> system, const std::string& path) {
   const int file = system->Open(path);
   if (file < 0) return nullptr;
-  const auto pan = FindAxis(system.get(), file, V4L2_CID_PAN_ABSOLUTE, V4L2_CID_PAN_RELATIVE);
-  const auto tilt = FindAxis(system.get(), file, V4L2_CID_TILT_ABSOLUTE, V4L2_CID_TILT_RELATIVE);
-  if (!pan) {
+  const auto axes = FindAxes(system.get(), file);
+  if (!axes) {
     system->Close(file);
     return nullptr;
   }
-  if (!pan->absolute) WriteControl(system.get(), file, V4L2_CID_PAN_RESET, 1);
-  if (tilt && !tilt->absolute) WriteControl(system.get(), file, V4L2_CID_TILT_RESET, 1);
-  auto head = std::make_unique<DeviceHead>(std::move(system), file, *pan, tilt);
+  auto head = std::make_unique<DeviceHead>(std::move(system), path, file, *axes);
   head->LookAt({}, {});
   return head;
 }

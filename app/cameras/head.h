@@ -36,7 +36,8 @@ PanTilt Toward(const Eigen::Vector3d& direction_in_carrier);
 // devices say where they are, so this is also how theirs is reckoned.
 class HeadMotion {
  public:
-  explicit HeadMotion(const PanTiltRange& range) : range_(range) {}
+  explicit HeadMotion(const PanTiltRange& range, const PanTilt& at = {})
+      : range_(range), start_(at), target_(at) {}
   void LookAt(const PanTilt& wanted, Timestamp now);
   PanTilt At(Timestamp time) const;
   const PanTilt& target() const { return target_; }
@@ -58,7 +59,9 @@ class Head {
 };
 
 // A V4L2 device's pan and tilt, absolute (arc seconds) or, on devices that have no other, relative. Null when
-// the device has neither or cannot be opened. It looks straight ahead at first.
+// the device has neither or cannot be opened. It looks straight ahead at first. Values are those that the
+// control's range and step allow; an axis that the driver refuses to turn stays where it is until it is asked
+// again, and a device that was unplugged is opened again when it is back.
 std::unique_ptr<Head> OpenDeviceHead(std::unique_ptr<DeviceSystem> system, const std::string& path);
 
 }  // namespace docent::app

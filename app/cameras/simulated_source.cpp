@@ -20,6 +20,13 @@ class SimulatedSource : public FrameSource {
     if (simulation_->name() == "head") SetHead(std::make_unique<SimulatedHead>());
   }
 
+  bool NextLate(engine::Frame* frame) override {
+    if (index_ == simulation_->frame_count()) return false;
+    frame->time = simulation_->time(index_);
+    frame->index = static_cast<std::uint64_t>(index_++);
+    return true;
+  }
+
   bool Next(engine::Frame* frame) override {
     if (index_ == simulation_->frame_count()) return false;
     cv::Mat picture;

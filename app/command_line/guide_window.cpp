@@ -52,8 +52,9 @@ namespace {
 class GuideWindow {
  public:
   GuideWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras,
-              std::span<CommandInbox> inboxes)
+              std::span<CommandInbox> inboxes, const std::function<void(const ShownFrame&)>& drawn)
       : request_(request),
+        drawn_(drawn),
         cameras_(cameras),
         inboxes_(inboxes),
         window_(request.title, cameras.front().model->width_px(), cameras.front().model->height_px()),
@@ -68,17 +69,18 @@ class GuideWindow {
   bool Turn(std::vector<std::shared_ptr<const ShownFrame>> frames) {
     HandleEvents();
     if (window_.IsClosing() || closing_) return false;
-    bool fresh = false;
+    std::vector<std::shared_ptr<const ShownFrame>> fresh;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       if (!frames[i] || frames[i]->tracked.state == engine::TrackingState::kDropped) continue;
       shown_[i] = std::move(frames[i]);
-      fresh = true;
+      fresh.push_back(shown_[i]);
     }
-    if (fresh) DrawPicture();
+    if (!fresh.empty()) DrawPicture();
     const Eigen::Vector2i size = window_.FramebufferSize();
     renderer_.Present(std::max(1, size.x()), std::max(1, size.y()));
     if (panel_) panel_->Draw();
     window_.Show();
+    for (const auto& frame : fresh) drawn_(*frame);
     return true;
   }
 
@@ -195,6 +197,7 @@ class GuideWindow {
   }
 
   const GuideRequest& request_;
+  const std::function<void(const ShownFrame&)>& drawn_;
   const std::span<const CalibratedCamera> cameras_;
   const std::span<CommandInbox> inboxes_;
   ui::Window window_;
@@ -213,8 +216,8 @@ class GuideWindow {
 }  // namespace
 
 void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,
-                  std::span<CommandInbox> inboxes) {
-  GuideWindow window(request, cameras, inboxes);
+                  std::span<CommandInbox> inboxes, const std::function<void(const ShownFrame&)>& drawn) {
+  GuideWindow window(request, cameras, inboxes, drawn);
   while (!slot->closed() && !Interruption::requested()) {
     if (!window.Turn(slot->Take())) break;
   }

@@ -40,7 +40,9 @@ class FrameSlot {
 //
 //   escape or q  close            p  points      k  keyframes      h  status      tab  swap cameras
 //   control-z    undo             control-y  redo                  control-s  save
+//
+// drawn is told of every frame once it is on the screen.
 void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,
-                  std::span<CommandInbox> inboxes);
+                  std::span<CommandInbox> inboxes, const std::function<void(const ShownFrame&)>& drawn);
 
 }  // namespace docent::app

@@ -140,6 +140,8 @@ RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const 
   record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   record.peak_memory_mb = PeakMemoryMegabytes();
   record.mapping = MakeMappingTimes(session.MappingTimes());
+  for (const LensWatch::Ring& ring : session.LensErrors(0))
+    record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
   for (const Session::MapState& map : session.Maps()) {
     if (!map.snapshot) continue;
     record.maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));

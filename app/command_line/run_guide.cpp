@@ -9,6 +9,7 @@
 #include "app/command_line/guide_window.h"
 #include "app/command_line/interruption.h"
 #include "app/command_line/progress.h"
+#include "app/evaluation/camera_report.h"
 #include "app/files/text_file.h"
 #include "engine/base/error.h"
 #include "engine/base/worker.h"
@@ -26,9 +27,10 @@ class OffscreenView {
   }
 
   // other: the newest frame of the second camera; may be null.
-  void Add(const ShownFrame& frame, const engine::CameraModel& camera, const ShownFrame* other) {
+  // False when there was nothing to draw.
+  bool Add(const ShownFrame& frame, const engine::CameraModel& camera, const ShownFrame* other) {
     const std::uint64_t index = frame.tracked.frame.index;
-    if (frame.tracked.state == engine::TrackingState::kDropped || last_index_ == index) return;
+    if (frame.tracked.state == engine::TrackingState::kDropped || last_index_ == index) return false;
     last_index_ = index;
     ui::View view = ViewOf(frame, camera);
     if (other != nullptr) view.overlay.inset = &other->tracked;
@@ -36,6 +38,7 @@ class OffscreenView {
     renderer_.ReadBack(&picture_);
     if (recorder_) recorder_->Write(picture_, frame.tracked.frame.index);
     if (request_.on_picture) request_.on_picture(frame, picture_);
+    return true;
   }
   void Close() {
     if (recorder_) recorder_->Close();
@@ -74,6 +77,7 @@ class GuideRun {
         session_(OptionsOf(request), ModelsOf(cameras), request.library),
         inboxes_(cameras.size()),
         watched_(cameras.size()) {
+    for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
     if (!request.head) return;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
       if (Head* const head = cameras[i].source->head())
@@ -108,13 +112,26 @@ class GuideRun {
       files_->Add(session_.TakeEvents());
       for (std::size_t i = 0; i < cameras_.size(); ++i) {
         const FrameSource& source = *cameras_[i].source;
+        if (source.info().live) tallies_[i].SetDelivery(source.delivery());
         if (source.info().live && watched_[i].last)
           files_->Add({Event{watched_[i].last->tracked.frame.time, "camera",
                              InWords(source.info(), source.delivery())}});
       }
       files_->Close();
     });
+    guarded([&] {
+      const std::scoped_lock lock(files_mutex_);
+      if (request_.output) WriteCameraReport(*request_.output / "report.json", tallies_);
+    });
     if (fault) std::rethrow_exception(fault);
+  }
+
+  // Any thread: the frame is on the screen now, or in the video.
+  void Drawn(const ShownFrame& frame) {
+    if (!frame.taken) return;
+    const Timestamp age = PlayClock().Now() - *frame.taken;
+    const std::scoped_lock lock(files_mutex_);
+    tallies_[static_cast<std::size_t>(frame.tracked.frame.camera)].AddDrawnAge(age);
   }
 
   std::span<CommandInbox> inboxes() { return inboxes_; }
@@ -124,6 +141,7 @@ class GuideRun {
   // What is known of one camera, on its own thread.
   struct Watched {
     std::optional<Timestamp> first_time;
+    std::optional<Timestamp> age;  // of the picture that was tracked last, by then
     std::string message;
     std::shared_ptr<const ShownFrame> last;
   };
@@ -172,11 +190,17 @@ class GuideRun {
       frame->message = sentence;
       show(std::move(frame));
     };
+    run.options.latency = [&watched](Timestamp age) { watched.age = age; };
     run.shown = [this, &watched, &show](const engine::TrackedFrame& tracked) {
       if (Interruption::requested()) stop_.request_stop();
+      const std::optional<Timestamp> age = std::exchange(watched.age, std::nullopt);
       auto frame = MakeShown(tracked, &watched);
+      if (age) frame->taken = PlayClock().Now() - *age;
       {
         const std::scoped_lock lock(files_mutex_);
+        CameraTally& tally = tallies_[static_cast<std::size_t>(tracked.frame.camera)];
+        tally.Add(tracked);
+        if (age) tally.AddTrackedAge(*age);
         files_->Add(*frame);
         files_->Add(session_.TakeEvents());
         if (request_.on_frame) request_.on_frame(*frame);
@@ -201,7 +225,7 @@ class GuideRun {
     frame->shown = session_.ShownWith(tracked);
     if (!watched->first_time) watched->first_time = tracked.frame.time;
     frame->seconds = ToSeconds(tracked.frame.time - *watched->first_time);
-    frame->message = watched->message;
+    frame->message = watched->message.empty() ? frame->shown.advice : watched->message;
     return frame;
   }
 
@@ -212,7 +236,8 @@ class GuideRun {
   std::vector<Watched> watched_;
   std::vector<std::unique_ptr<HeadControl>> heads_;  // of the cameras that can turn theirs
   std::stop_source stop_;
-  std::mutex files_mutex_;
+  std::mutex files_mutex_;            // guards files and tallies
+  std::vector<CameraTally> tallies_;  // by camera
   std::optional<GuideFiles> files_;
 };
 
@@ -239,7 +264,7 @@ void RunHeadless(const GuideRequest& request, std::span<CalibratedCamera> camera
           const std::scoped_lock lock(other_mutex);
           inset = other;
         }
-        if (view) view->Add(*frame, *cameras.front().model, inset.get());
+        if (view && view->Add(*frame, *cameras.front().model, inset.get())) run->Drawn(*frame);
         progress.Update(++count);
       },
       {});
@@ -259,7 +284,8 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
   });
   std::exception_ptr fault;
   try {
-    ShowInWindow(request, cameras, &slot, run->inboxes());
+    ShowInWindow(request, cameras, &slot, run->inboxes(),
+                 [run](const ShownFrame& frame) { run->Drawn(frame); });
   } catch (...) {
     fault = std::current_exception();
   }

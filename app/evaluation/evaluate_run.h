@@ -75,6 +75,7 @@ struct SequenceReport {
   double tracking_median_ms = 0, tracking_p95_ms = 0, tracking_max_ms = 0;  // of frames that were not dropped
   MappingTimes mapping;
   double wall_s = 0, peak_memory_mb = 0;
+  std::vector<LensRing> lens_rings;        // as in RunRecord
   std::vector<MapResult> maps;             // in the order of their first frame, then those without frames
   std::optional<std::size_t> largest_map;  // index in maps
   std::vector<SegmentResult> segments;     // in the order of their first frame

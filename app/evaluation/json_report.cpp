@@ -77,9 +77,14 @@ Json ToJson(const SequenceReport& report) {
       {"directions_only_frames", report.directions_only_frames},
       {"maps", Json::array()},
       {"segments", Json::array()},
+      {"lens_residuals", Json::array()},
   };
   for (const MapResult& map : report.maps) json["maps"].push_back(ToJson(map));
   for (const SegmentResult& segment : report.segments) json["segments"].push_back(ToJson(segment));
+  for (const LensRing& ring : report.lens_rings) {
+    json["lens_residuals"].push_back(
+        {{"samples", ring.samples}, {"mean_px", ring.mean_px}, {"sigma_px", ring.sigma_px}});
+  }
   return json;
 }
 

@@ -51,6 +51,12 @@ inline bool InMapOfDirections(const FrameRecord& frame) {
   return frame.map_points.infinite > 0 && frame.map_points.finite == 0;
 }
 
+// How far points were found outside of where they were expected, in a ring of the picture; see LensWatch.
+struct LensRing {
+  std::size_t samples = 0;
+  double mean_px = 0, sigma_px = 0;
+};
+
 struct MapRecord {
   std::uint64_t key = 0;
   std::string name;
@@ -76,6 +82,7 @@ struct RunRecord {
   MappingTimes mapping;
   double wall_s = 0;
   double peak_memory_mb = 0;
+  std::vector<LensRing> lens_rings = {};  // what tracking left over, from the middle of the picture outwards
 };
 
 // Fills frames and maps from what the session delivers. One thread.

@@ -17,29 +17,22 @@ namespace docent::app {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // Plays pictures by their own times. Shared by the cameras of a session; any thread.
 class RealtimeClock {
  public:
-  // The present is the time of this picture, if nobody said so before.
-  void Start(Timestamp time) {
-    const std::scoped_lock lock(mutex_);
-    if (!start_) start_ = Clock::now() - time;
-  }
-  // Waits until the picture is due. False when its successor is due already.
-  bool WaitFor(Timestamp time, Timestamp period, const std::stop_token& stop) {
-    std::unique_lock lock(mutex_);
-    const Clock::time_point due = *start_ + time;
-    if (Clock::now() > due + period) return false;
-    woken_.wait_until(lock, stop, due, [] { return false; });
-    return true;
-  }
+  explicit RealtimeClock(PlayClock* clock) : clock_(clock) {}
+  // The present is the time of this picture. Before any other call.
+  void Start(Timestamp time) { start_ = clock_->Now() - time; }
+  // Waits until the picture is due.
+  void WaitFor(Timestamp time, const std::stop_token& stop) { clock_->WaitUntil(Due(time), stop); }
+  // Whether the picture's successor is due already.
+  bool IsLate(Timestamp time, Timestamp period) { return clock_->Now() > Due(time) + period; }
+  Timestamp Due(Timestamp time) const { return start_ + time; }
+  Timestamp Now() { return clock_->Now(); }
 
  private:
-  std::optional<Clock::time_point> start_;  // when a picture of time 0 would have been due
-  std::mutex mutex_;
-  std::condition_variable_any woken_;
+  PlayClock* const clock_;
+  Timestamp start_{};  // when a picture of time 0 would have been due
 };
 
 // Holds cameras together that are fed as fast as they are tracked: none goes on to a picture that lies more
@@ -166,10 +159,16 @@ class CameraFeed {
   bool Fetch(const std::stop_token& stop) {
     FrameSource& source = *run_.camera->source;
     while (!stop.stop_requested()) {
+      late_ = MustBeLate();
       frame_ = engine::Frame();
-      if (!source.Next(&frame_)) return false;
+      if (!(late_ ? source.NextLate(&frame_) : source.Next(&frame_))) return false;
       frame_.camera = run_.options.camera;
       frame_.time -= clock_offset_;
+      if (late_) {
+        // Recordings with gaps: what comes after one may be early.
+        late_ = frame_.picture.empty() || clock_->IsLate(frame_.time, period_);
+        return true;
+      }
       if (std::string now = source.trouble(); now != trouble_) {
         trouble_ = std::move(now);
         if (run_.options.trouble) run_.options.trouble(trouble_, frame_.time);
@@ -200,17 +199,19 @@ class CameraFeed {
     const Pace pace = run_.options.pace;
     engine::TrackedFrame tracked;
     // A device keeps time itself, and drops what nobody fetches.
-    if (pace == Pace::kRealtime && !live_ && !clock_->WaitFor(frame_.time, period_, stop)) {
+    if (late_) {
       tracked.frame = frame_;
       tracked.state = engine::TrackingState::kDropped;
       run_.shown(tracked);
       return;
     }
+    if (pace == Pace::kRealtime && !live_) clock_->WaitFor(frame_.time, stop);
     // A file delivers faster than a camera and would run away from the mapper, which in the world has the
     // whole time between pictures; so whoever feeds waits, never the tracker.
     if (pace == Pace::kEager) session_->WaitUntilCalm(stop);
     FollowHead();
     tracked = session_->Process(frame_);
+    TellLatency();
     commander_.CarryOutDue(frame_.time - *first_time_, tracked);
     run_.shown(tracked);
   }
@@ -231,6 +232,22 @@ class CameraFeed {
     before_ = now;
   }
 
+  // Judged before a picture is fetched: one that is slow to make (a simulation on a busy machine) is as old
+  // as it is, but those that would be late were it there at once are passed over.
+  bool MustBeLate() {
+    return run_.options.pace == Pace::kRealtime && !live_ && first_time_ &&
+           clock_->IsLate(frame_.time + period_, period_);
+  }
+
+  void TellLatency() {
+    if (!run_.options.latency) return;
+    if (live_) {
+      run_.options.latency(clock_->Now() - (frame_.time + clock_offset_));
+    } else if (run_.options.pace == Pace::kRealtime) {
+      run_.options.latency(clock_->Now() - clock_->Due(frame_.time));
+    }
+  }
+
   const CameraRun& run_;
   Session* const session_;
   RealtimeClock* const clock_;
@@ -240,6 +257,7 @@ class CameraFeed {
   Commander commander_;
   GapReporter gaps_;
   engine::Frame frame_;
+  bool late_ = false;  // the picture is to be dropped
   std::optional<Timestamp> first_time_;
   Timestamp clock_offset_{};
   std::string trouble_;
@@ -303,12 +321,24 @@ void RunSideBySide(std::vector<CameraFeed>* feeds, Pace pace, std::stop_source* 
 
 }  // namespace
 
+Timestamp PlayClock::Now() {
+  return std::chrono::steady_clock::now().time_since_epoch();
+}
+
+void PlayClock::WaitUntil(Timestamp time, const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any woken;
+  std::unique_lock lock(mutex);
+  woken.wait_until(lock, stop, std::chrono::steady_clock::time_point(time), [] { return false; });
+}
+
 void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const std::stop_token& stop) {
   constexpr Timestamp kSameClock = std::chrono::seconds(10);
   for (const CameraRun& run : cameras) PreloadModels(run.options, session);
   std::stop_source stopping;
   const std::stop_callback forward(stop, [&stopping] { stopping.request_stop(); });
-  RealtimeClock clock;
+  PlayClock machine;
+  RealtimeClock clock(cameras.front().options.clock ? cameras.front().options.clock : &machine);
   std::vector<CameraFeed> feeds;
   feeds.reserve(cameras.size());
   for (const CameraRun& run : cameras) {
@@ -319,8 +349,9 @@ void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const s
     }
     const Timestamp ahead = feed.time() - feeds.front().time();
     if (ahead > kSameClock || ahead < -kSameClock) feed.SetClockOffset(ahead);
-    clock.Start(feeds.front().time());
   }
+  // Not before all first pictures are there, or those who had to wait for the others would begin too late.
+  clock.Start(feeds.front().time());
   const Pace pace = cameras.front().options.pace;
   if (pace == Pace::kLockstep) {
     TakeTurns(&feeds, stopping.get_token());

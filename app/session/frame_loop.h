@@ -39,6 +39,16 @@ class CommandInbox {
   std::vector<Entry> entries_;
 };
 
+// The clock by which recordings are played in realtime and the age of pictures is told: CLOCK_MONOTONIC,
+// which devices stamp their pictures with, too. Tests bring one of their own. Any thread.
+class PlayClock {
+ public:
+  virtual ~PlayClock() = default;
+  virtual Timestamp Now();
+  // Returns at `time`, or when stop is requested.
+  virtual void WaitUntil(Timestamp time, const std::stop_token& stop);
+};
+
 // One camera's way through a session.
 struct FrameLoopOptions {
   Pace pace = Pace::kEager;
@@ -54,6 +64,11 @@ struct FrameLoopOptions {
   // Told when the source has no pictures to give, with a sentence for the wearer and the time on its clock,
   // and with an empty sentence when it is back. On the camera's thread; may be empty.
   std::function<void(const std::string&, Timestamp)> trouble;
+  // Told of every picture that was tracked, before it is handed on, how long ago it was taken: for a device
+  // by its own stamp, for a recording in realtime by the time at which it was due. On the camera's thread;
+  // may be empty.
+  std::function<void(Timestamp)> latency;
+  PlayClock* clock = nullptr;  // of the first camera, for all; null: the machine's
 };
 
 using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
@@ -64,7 +79,9 @@ using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
 //
 //   lockstep   one picture after the other; the session runs its mapper in between
 //   eager      as fast as the tracker is, but never further ahead of the mapper than a camera would be
-//   realtime   by the pictures' times; what is overtaken by its successor is dropped, as a camera drops it
+//   realtime   by the pictures' times; what is overtaken by its successor before it is asked for is dropped,
+//   as
+//              a camera drops it
 //
 // A live source drops by itself: what is missing between two of its pictures is handed on as dropped, each
 // frame with its time and no picture.

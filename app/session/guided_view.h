@@ -17,7 +17,9 @@ namespace docent::app {
 struct ShownFrame {
   engine::TrackedFrame tracked;
   Session::Shown shown;
-  double seconds = 0;   // since the first picture
+  double seconds = 0;  // since the first picture
+  // When it was taken, on CLOCK_MONOTONIC; empty where nobody knows (see FrameLoopOptions::latency).
+  std::optional<Timestamp> taken = {};
   std::string message;  // one sentence, often empty
 };
 

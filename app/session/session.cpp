@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <opencv2/core/utility.hpp>
 #include <utility>
 
 #include "app/files/text_file.h"
@@ -18,11 +19,14 @@ Session::Session(const SessionOptions& options,
       association_(cameras.size()),
       mapping_(options.mapper, options.threaded && options.may_write,
                [this](const MappingThread::News& news) { Hear(news); }) {
+  // Trackers and mapper have the processors; OpenCV's own threads would only get into their way.
+  cv::setNumThreads(1);
   engine::TrackerOptions tracker_options = options.tracker;
   tracker_options.build_maps = options.may_write;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     Camera camera;
     camera.tracker = std::make_unique<engine::Tracker>(tracker_options, cameras[i], options.seed + i);
+    camera.lens = std::make_unique<LensWatch>(cameras[i]);
     camera.model = std::move(cameras[i]);
     cameras_.push_back(std::move(camera));
   }
@@ -120,6 +124,7 @@ void Session::React(std::size_t index, engine::TrackedFrame* frame) {
   }
   if (has_pose) {
     camera->lost_since.reset();
+    WatchLens(index, *frame);
     WatchRig(index, *frame);
   } else if (frame->state == engine::TrackingState::kLost && !camera->lost_since) {
     camera->lost_since = frame->frame.time;
@@ -154,6 +159,23 @@ void Session::WatchRig(std::size_t index, const engine::TrackedFrame& frame) {
     words += ", one unit of the map is " + FormatNumber(options_.baseline_m / estimate->Baseline(), 4) + " m";
   }
   AddEvent(frame.frame.time, "rig", words);
+}
+
+void Session::WatchLens(std::size_t index, const engine::TrackedFrame& frame) {
+  constexpr Timestamp kShown = std::chrono::seconds(15);
+  Camera& camera = cameras_[index];
+  camera.lens->Add(frame);
+  const auto warning = camera.lens->TakeWarning();
+  if (!warning) return;
+  const std::string which = cameras_.size() > 1 ? "camera " + std::to_string(index) + ": " : std::string();
+  AddEvent(frame.frame.time, "warning", which + *warning);
+  camera.advice = *warning;
+  camera.advice_end = frame.frame.time + kShown;
+}
+
+LensWatch::Profile Session::LensErrors(std::size_t camera) const {
+  const std::scoped_lock lock(mutex_);
+  return cameras_.at(camera).lens->profile();
 }
 
 std::optional<RigEstimate> Session::Rig() const {
@@ -314,6 +336,8 @@ void Session::Discard(std::uint64_t key, Timestamp time, const std::string& reas
 Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   const std::scoped_lock lock(mutex_);
   Shown shown;
+  const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
+  if (frame.frame.time < camera.advice_end) shown.advice = camera.advice;
   if (options_.may_write) {
     const bool grows = growing_key_ != 0 && growing_key_ == frame.map_key;
     shown.mapping = MappingStatusOf(frame, grows);

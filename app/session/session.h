@@ -16,6 +16,7 @@
 #include "app/script/commands.h"
 #include "app/session/camera_association.h"
 #include "app/session/camera_rig.h"
+#include "app/session/lens_watch.h"
 #include "app/session/library_scene.h"
 #include "app/session/mapping_status.h"
 #include "app/session/mapping_thread.h"
@@ -99,6 +100,7 @@ class Session {
     std::string map_name;
     std::shared_ptr<const content::Scene> scene;
     std::optional<MappingStatus> mapping;  // where the session may write
+    std::string advice;                    // a sentence about the frame's camera; often empty
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
   std::vector<std::string> MapNames() const;
@@ -114,6 +116,8 @@ class Session {
   std::vector<MapState> Maps() const;  // by key, discarded ones too
   // How the first two cameras stand to each other in the present map; empty while that is not known.
   std::optional<RigEstimate> Rig() const;
+  // What tracking leaves over, by rings of the picture; see LensWatch.
+  LensWatch::Profile LensErrors(std::size_t camera) const;
   engine::MapperTimes MappingTimes() const { return mapping_.Times(); }
   std::vector<Event> TakeEvents();
 
@@ -128,12 +132,15 @@ class Session {
     enum class Order { kNone, kStart, kStartAgain, kLeave, kGo };
     std::unique_ptr<engine::Tracker> tracker;
     std::shared_ptr<const engine::CameraModel> model;
+    std::unique_ptr<LensWatch> lens;
     std::uint64_t map_key = 0;  // of the map it is tracked in; 0 while it looks in all maps
     Order order = Order::kNone;
     bool starting = false;                // it looks for the first views of map_key
     bool began = false;                   // the present map is, or was, started by this camera
     std::optional<Timestamp> lost_since;  // while it is lost in map_key
     Timestamp last_time{};
+    std::string advice;  // shown until advice_end
+    Timestamp advice_end{};
   };
 
   // session.cpp
@@ -148,6 +155,7 @@ class Session {
   void React(std::size_t index, engine::TrackedFrame* frame);
   void Refuse(Camera* camera, engine::TrackedFrame* frame);
   void WatchRig(std::size_t index, const engine::TrackedFrame& frame);
+  void WatchLens(std::size_t index, const engine::TrackedFrame& frame);
   void OfferToMapper(Camera* camera, const engine::TrackedFrame& frame);
   bool MayGrow(const SessionMap& map, const engine::Rigid3& camera_from_map) const;
   void WatchProbation(Camera* camera, const engine::TrackedFrame& frame);

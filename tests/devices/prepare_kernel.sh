@@ -3,9 +3,13 @@
 # Fetches Debian's kernel, busybox and the source of v4l2loopback, unpacks them without installing them, and builds
 # the v4l2loopback module: prepare_kernel.sh FOLDER
 # Leaves FOLDER/{vmlinuz,busybox,modules/,version}. A second run does nothing. Needs the network only the first time.
+# With --ready after the folder it only says, by its status, whether all is there.
 set -euo pipefail
 readonly folder=$1
-[[ -e "$folder/version" ]] && exit 0
+# vivid's cameras, and what a USB camera made of software is plugged into with the driver that it then gets.
+readonly drivers="vivid vhci-hcd uvcvideo"
+[[ -e "$folder/version" && "$(sed -n 2p "$folder/version")" == "$drivers" ]] && exit 0
+[[ "${2:-}" == --ready ]] && exit 1
 
 say() { printf 'prepare_kernel: %s\n' "$*"; }
 readonly image=$(apt-cache depends linux-image-amd64 | awk '/Depends: linux-image-[0-9].*-amd64$/ {print $2; exit}')
@@ -24,11 +28,14 @@ source_folder=$(echo "$work"/root/usr/src/v4l2loopback-*)
 make -s -C "$headers" M="$(realpath "$source_folder")" modules >"$work/make.log" 2>&1 ||
   { cat "$work/make.log" >&2; say "the v4l2loopback module does not build" >&2; exit 1; }
 
-# vivid and what it needs, flat and in the order in which they are loaded.
+# The drivers and what they need, flat and in the order in which they are loaded.
 depmod -b "$work/root" "$release"
+rm -rf "$folder/modules"
 mkdir -p "$folder/modules"
 number=10
-modprobe --dirname "$work/root" --set-version "$release" --show-depends vivid | awk '$1 == "insmod" {print $2}' |
+# shellcheck disable=SC2086  # the drivers are several words
+modprobe --dirname "$work/root" --set-version "$release" --show-depends --all $drivers |
+  awk '$1 == "insmod" && !seen[$2]++ {print $2}' |
   while read -r module; do
     cp "$module" "$folder/modules/$number-$(basename "$module")"
     number=$((number + 1))
@@ -38,5 +45,5 @@ cp "$work/root/boot/vmlinuz-$release" "$folder/vmlinuz"
 busybox=$work/root/bin/busybox
 [[ -e "$busybox" ]] || busybox=$work/root/usr/bin/busybox
 cp "$busybox" "$folder/busybox"
-echo "$release" >"$folder/version"
+printf '%s\n%s\n' "$release" "$drivers" >"$folder/version"
 say "ready: $release in $folder"

@@ -5,26 +5,42 @@
 #include <linux/videodev2.h>
 
 #include <cerrno>
+#include <limits>
 #include <map>
 #include <numbers>
+#include <vector>
 
 namespace docent::app {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// A device with these controls and nothing else; what is written stays written here.
+// A device with these controls and nothing else, which answers as V4L2's specification (VIDIOC_G_CTRL,
+// VIDIOC_S_CTRL) says drivers do: values are rounded to the control's steps and told back, one out of range
+// is ERANGE, a missing control EINVAL, one that another program holds EBUSY, and all are ENODEV while the
+// device is away.
 struct FakeDevice {
   std::map<std::uint32_t, v4l2_queryctrl> controls;
-  std::map<std::uint32_t, std::int32_t> written;
+  std::map<std::uint32_t, std::int32_t> values;
+  std::vector<std::pair<std::uint32_t, std::int32_t>> written;  // as asked for
   int open = 0;
+  bool away = false;
+  int refusal = 0;  // what every S_CTRL fails with; 0: it does not
 
-  void Add(std::uint32_t id, std::int32_t lowest, std::int32_t highest) {
+  void Add(std::uint32_t id, std::int32_t lowest, std::int32_t highest, std::int32_t step = 1) {
     v4l2_queryctrl query{};
     query.id = id;
     query.minimum = lowest;
     query.maximum = highest;
+    query.step = step;
     controls[id] = query;
+  }
+  std::int32_t Last(std::uint32_t id) const {
+    std::int32_t last = std::numeric_limits<std::int32_t>::min();
+    for (const auto& [written_id, value] : written) {
+      if (written_id == id) last = value;
+    }
+    return last;
   }
 };
 
@@ -32,22 +48,34 @@ class FakeSystem : public DeviceSystem {
  public:
   explicit FakeSystem(FakeDevice* device) : device_(device) {}
   int Open(const std::string&) override {
+    if (device_->away) return Fail(ENOENT);
     ++device_->open;
     return 3;
   }
   void Close(int) override { --device_->open; }
   int Control(int, unsigned long request, void* argument) override {
+    if (device_->away) return Fail(ENODEV);
     if (request == VIDIOC_QUERYCTRL) {
       auto* query = static_cast<v4l2_queryctrl*>(argument);
       const auto found = device_->controls.find(query->id);
-      if (found == device_->controls.end()) return Fail();
+      if (found == device_->controls.end()) return Fail(EINVAL);
       *query = found->second;
       return 0;
     }
-    if (request != VIDIOC_S_CTRL) return Fail();
-    const auto* control = static_cast<v4l2_control*>(argument);
-    if (!device_->controls.contains(control->id)) return Fail();
-    device_->written[control->id] = control->value;
+    auto* control = static_cast<v4l2_control*>(argument);
+    const auto found = device_->controls.find(control->id);
+    if (found == device_->controls.end()) return Fail(EINVAL);
+    if (request == VIDIOC_G_CTRL) {
+      control->value = device_->values[control->id];
+      return 0;
+    }
+    if (request != VIDIOC_S_CTRL) return Fail(ENOTTY);
+    if (device_->refusal != 0) return Fail(device_->refusal);
+    const v4l2_queryctrl& query = found->second;
+    if (control->value < query.minimum || control->value > query.maximum) return Fail(ERANGE);
+    device_->written.emplace_back(control->id, control->value);
+    control->value = query.minimum + (control->value - query.minimum) / query.step * query.step;
+    device_->values[control->id] = control->value;
     return 0;
   }
   void* Map(int, std::size_t, long) override { return nullptr; }
@@ -57,8 +85,8 @@ class FakeSystem : public DeviceSystem {
   void Sleep(std::chrono::milliseconds) override {}
 
  private:
-  static int Fail() {
-    errno = EINVAL;
+  static int Fail(int error) {
+    errno = error;
     return -1;
   }
   FakeDevice* const device_;
@@ -96,8 +124,8 @@ TEST(Head, OfADeviceTurnsInSecondsOfArc) {
     ASSERT_TRUE(head);
     EXPECT_NEAR(head->range().highest.pan_rad, 100 * kDegree, 1e-9);
     head->LookAt({30 * kDegree, -90 * kDegree}, FromSeconds(1));
-    EXPECT_EQ(device.written[V4L2_CID_PAN_ABSOLUTE], 30 * 3600);
-    EXPECT_EQ(device.written[V4L2_CID_TILT_ABSOLUTE], -20 * 3600);
+    EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), 30 * 3600);
+    EXPECT_EQ(device.Last(V4L2_CID_TILT_ABSOLUTE), -20 * 3600);
     EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 30 * kDegree, 1e-9);
   }
   EXPECT_EQ(device.open, 0);
@@ -109,10 +137,83 @@ TEST(Head, OfADeviceThatOnlyTurnsByStepsIsToldTheDifference) {
   const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
   ASSERT_TRUE(head);
   head->LookAt({10 * kDegree, 0}, FromSeconds(1));
-  EXPECT_EQ(device.written[V4L2_CID_PAN_RELATIVE], 640);
+  EXPECT_EQ(device.Last(V4L2_CID_PAN_RELATIVE), 640);
   head->LookAt({4 * kDegree, 0}, FromSeconds(2));
-  EXPECT_EQ(device.written[V4L2_CID_PAN_RELATIVE], -384);
+  EXPECT_EQ(device.Last(V4L2_CID_PAN_RELATIVE), -384);
   EXPECT_DOUBLE_EQ(head->range().highest.tilt_rad, 0);
+}
+
+TEST(Head, OfADeviceGoesByWholeStepsAndBeginsWhereItIs) {
+  FakeDevice device;
+  // A quarter of a degree from -50 degrees on: whole degrees are reached, others nearly.
+  device.Add(V4L2_CID_PAN_ABSOLUTE, -50 * 3600, 50 * 3600, 900);
+  device.values[V4L2_CID_PAN_ABSOLUTE] = 45 * 3600;
+  const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
+  ASSERT_TRUE(head);
+  EXPECT_NEAR(head->At({}).pan_rad, 45 * kDegree, 1e-9) << "it has yet to turn ahead";
+  EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9);
+  head->LookAt({20.2 * kDegree, 0}, FromSeconds(40));
+  EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), 20 * 3600 + 900);
+  EXPECT_NEAR(head->At(FromSeconds(60)).pan_rad, 20.25 * kDegree, 1e-9);
+  head->LookAt({-80 * kDegree, 0}, FromSeconds(60));
+  EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), -50 * 3600) << "never out of range";
+}
+
+TEST(Head, OfADeviceBelievesWhatTheDriverSaysItTook) {
+  FakeDevice device;
+  device.Add(V4L2_CID_PAN_ABSOLUTE, -360000, 360000, 1);
+  auto system = std::make_unique<FakeSystem>(&device);
+  const auto head = OpenDeviceHead(std::move(system), "/dev/video0");
+  ASSERT_TRUE(head);
+  // The firmware is coarser than its description.
+  device.controls[V4L2_CID_PAN_ABSOLUTE].step = 10 * 3600;
+  head->LookAt({37 * kDegree, 0}, FromSeconds(1));
+  EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 30 * kDegree, 1e-9);
+}
+
+TEST(Head, OfADeviceThatIsHeldByAnotherProgramStaysAndGoesOnceItMay) {
+  for (const int refusal : {EBUSY, EACCES, ERANGE, EINVAL}) {
+    FakeDevice device;
+    device.Add(V4L2_CID_PAN_ABSOLUTE, -100 * 3600, 100 * 3600);
+    const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
+    ASSERT_TRUE(head);
+    device.refusal = refusal;
+    head->LookAt({30 * kDegree, 0}, FromSeconds(1));
+    EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9) << refusal;
+    device.refusal = 0;
+    head->LookAt({30 * kDegree, 0}, FromSeconds(30));
+    EXPECT_NEAR(head->At(FromSeconds(60)).pan_rad, 30 * kDegree, 1e-9) << refusal;
+    EXPECT_EQ(device.open, 1);
+  }
+}
+
+TEST(Head, OfADeviceThatWasUnpluggedIsFoundAgain) {
+  FakeDevice device;
+  device.Add(V4L2_CID_PAN_ABSOLUTE, -100 * 3600, 100 * 3600);
+  {
+    const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
+    ASSERT_TRUE(head);
+    head->LookAt({30 * kDegree, 0}, FromSeconds(1));
+    device.away = true;
+    head->LookAt({-30 * kDegree, 0}, FromSeconds(10));
+    EXPECT_EQ(device.open, 0) << "a dead device is let go of, so that its name is free when it comes back";
+    EXPECT_NEAR(head->At(FromSeconds(20)).pan_rad, 30 * kDegree, 1e-9);
+    head->LookAt({-30 * kDegree, 0}, FromSeconds(20));
+    device.away = false;
+    device.values[V4L2_CID_PAN_ABSOLUTE] = 0;  // it starts anew
+    head->LookAt({-30 * kDegree, 0}, FromSeconds(30));
+    EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), -30 * 3600);
+    EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9);
+    EXPECT_NEAR(head->At(FromSeconds(40)).pan_rad, -30 * kDegree, 1e-9);
+    // Another camera without a head in its place is left alone.
+    device.away = true;
+    head->LookAt({}, FromSeconds(50));
+    device.away = false;
+    device.controls.clear();
+    head->LookAt({}, FromSeconds(60));
+    EXPECT_EQ(device.open, 0);
+  }
+  EXPECT_EQ(device.open, 0);
 }
 
 TEST(Head, IsNotThereOnADeviceWithoutPan) {

@@ -84,5 +84,132 @@ TEST(FrameLoop, TellsOfTroubleOnceAndOfItsEndAndGoesOn) {
   EXPECT_THAT(played.frames, ElementsAre(std::pair(0ul, kLost), std::pair(1ul, kLost)));
 }
 
+// Time that passes only when somebody says so.
+class SteppedClock : public PlayClock {
+ public:
+  Timestamp Now() override { return now_; }
+  void WaitUntil(Timestamp time, const std::stop_token&) override { now_ = std::max(now_, time); }
+  void Pass(Timestamp time) { now_ += time; }
+
+ private:
+  Timestamp now_ = std::chrono::hours(5);
+};
+
+// A recording of black pictures, ten a second.
+class Recording : public FrameSource {
+ public:
+  explicit Recording(std::uint64_t pictures) : pictures_(pictures) {
+    info_.name = "recording";
+    info_.nominal_fps = 10;
+    info_.known_camera = SimulatedCamera(160);
+  }
+  bool Next(engine::Frame* frame) override {
+    if (next_ == pictures_) return false;
+    frame->index = next_;
+    frame->time = std::chrono::milliseconds(100) * next_++;
+    frame->picture = cv::Mat::zeros(120, 160, CV_8UC1);
+    return true;
+  }
+
+ private:
+  const std::uint64_t pictures_;
+  std::uint64_t next_ = 0;
+};
+
+TEST(FrameLoop, DropsAndCountsWhatIsOvertakenInRealtimeAndNeverQueuesIt) {
+  constexpr std::uint64_t kPictures = 40;
+  CalibratedCamera camera = Calibrate(std::make_unique<Recording>(kPictures), std::nullopt);
+  SessionOptions options;
+  options.may_write = false;
+  Session session(options, {camera.model}, nullptr);
+  SteppedClock clock;
+  FrameLoopOptions loop;
+  loop.pace = Pace::kRealtime;
+  loop.clock = &clock;
+  std::vector<Timestamp> latencies;
+  loop.latency = [&](Timestamp latency) { latencies.push_back(latency); };
+  std::vector<std::uint64_t> tracked, dropped, all;
+  RunFrames(&camera, &session, loop,
+            [&](const engine::TrackedFrame& frame) {
+              all.push_back(frame.frame.index);
+              if (frame.state == kDropped) return dropped.push_back(frame.frame.index);
+              tracked.push_back(frame.frame.index);
+              // Whoever looks on takes two and a half pictures' time for the first twenty, then next to none.
+              clock.Pass(std::chrono::milliseconds(frame.frame.index < 20 ? 250 : 1));
+            },
+            {});
+  ASSERT_EQ(all.size(), kPictures) << "each is told of, once";
+  for (std::uint64_t i = 0; i < kPictures; ++i) EXPECT_EQ(all[i], i) << "and in its order";
+  // By hand: 0 ends at 250 ms, when the successor of 1 is due and that of 2 is not.
+  EXPECT_THAT(std::vector(tracked.begin(), tracked.begin() + 4), ElementsAre(0u, 2u, 4u, 7u));
+  EXPECT_EQ(dropped.size(), 13u);
+  for (const std::uint64_t index : dropped) EXPECT_LT(index, 23u) << "nothing is left over from the bad time";
+  ASSERT_EQ(latencies.size(), tracked.size());
+  for (const Timestamp latency : latencies) {
+    EXPECT_GE(latency, Timestamp{});
+    EXPECT_LE(latency, std::chrono::milliseconds(100)) << "what is tracked is the newest picture there is";
+  }
+  EXPECT_EQ(latencies.back(), Timestamp{});
+}
+
+// Every picture takes its time to make; what comes too late need not be made.
+class SlowRecording : public Recording {
+ public:
+  SlowRecording(std::uint64_t pictures, SteppedClock* clock) : Recording(pictures), clock_(clock) {}
+  bool Next(engine::Frame* frame) override {
+    clock_->Pass(std::chrono::milliseconds(250));
+    return Recording::Next(frame);
+  }
+  bool NextLate(engine::Frame* frame) override {
+    if (!Recording::Next(frame)) return false;
+    frame->picture.release();
+    return true;
+  }
+
+ private:
+  SteppedClock* const clock_;
+};
+
+TEST(FrameLoop, TracksWhatItCanInRealtimeOfPicturesThatAreSlowToMake) {
+  SteppedClock clock;
+  CalibratedCamera camera = Calibrate(std::make_unique<SlowRecording>(30, &clock), std::nullopt);
+  SessionOptions options;
+  options.may_write = false;
+  Session session(options, {camera.model}, nullptr);
+  FrameLoopOptions loop;
+  loop.pace = Pace::kRealtime;
+  loop.clock = &clock;
+  Timestamp oldest{};
+  loop.latency = [&](Timestamp latency) { oldest = std::max(oldest, latency); };
+  std::vector<std::uint64_t> tracked, all;
+  RunFrames(&camera, &session, loop,
+            [&](const engine::TrackedFrame& frame) {
+              all.push_back(frame.frame.index);
+              if (frame.state != kDropped) tracked.push_back(frame.frame.index);
+            },
+            {});
+  ASSERT_EQ(all.size(), 30u);
+  for (std::uint64_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i], i);
+  EXPECT_GE(tracked.size(), 11u) << "one picture can be made in the time of two and a half";
+  EXPECT_LE(oldest, std::chrono::milliseconds(350)) << "by making it, and by less than one picture";
+}
+
+TEST(FrameLoop, TellsTheAgeOfALivePictureByItsOwnStamp) {
+  SteppedClock clock;
+  const Timestamp taken = clock.Now() - std::chrono::milliseconds(30);
+  CalibratedCamera camera = Calibrate(
+      std::make_unique<ScriptedSource>(std::vector<ScriptedSource::Entry>{{0, taken, ""}}), std::nullopt);
+  SessionOptions options;
+  options.may_write = false;
+  Session session(options, {camera.model}, nullptr);
+  FrameLoopOptions loop;
+  loop.pace = Pace::kRealtime;
+  loop.clock = &clock;
+  std::vector<Timestamp> latencies;
+  loop.latency = [&](Timestamp latency) { latencies.push_back(latency); };
+  RunFrames(&camera, &session, loop, [](const engine::TrackedFrame&) {}, {});
+  EXPECT_THAT(latencies, ElementsAre(std::chrono::milliseconds(30)));
+}
+
 }  // namespace
 }  // namespace docent::app

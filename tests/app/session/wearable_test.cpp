@@ -11,6 +11,7 @@
 #include "app/session/session.h"
 #include "app/simulator/scene.h"
 #include "app/simulator/simulation.h"
+#include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
 namespace {
@@ -50,6 +51,7 @@ Walk Take(const std::string& hand, const std::string& shoulder, double seconds, 
                                  Calibrate(OpenSimulation(View(shoulder, seconds)), std::nullopt)};
   SessionOptions options;
   options.threaded = pace != Pace::kLockstep;
+  options.tracker.hybrid = true;
   options.first_map = "table";
   Session session(options, {cameras[0].model, cameras[1].model}, nullptr);
   Walk walk;
@@ -155,6 +157,118 @@ TEST(Wearable, RecognisesThatItsCamerasAreFixedToOneAnother) {
   EXPECT_NEAR(baseline_m, truth.translation.norm(), 0.01 * truth.translation.norm());
   EXPECT_TRUE(std::any_of(walk.events.begin(), walk.events.end(),
                           [](const Event& event) { return event.event == "rig"; }));
+}
+
+// Makes a map of the beginning of a scene in a library.
+void MapScene(const std::string& name, const Simulation& simulation, maps::Library* library) {
+  SessionOptions options;
+  options.threaded = false;
+  options.tracker.hybrid = true;
+  options.first_map = name;
+  Session session(options, {std::make_shared<engine::CameraModel>(simulation.camera())}, library);
+  for (int i = 0; i < simulation.frame_count(); ++i) {
+    engine::Frame frame;
+    frame.time = simulation.time(i);
+    frame.index = static_cast<std::uint64_t>(i);
+    simulation.Render(i, &frame.picture);
+    session.Process(frame);
+  }
+  session.Finish();
+}
+
+// Two cameras on a tour, each shown what a test likes.
+class Tourists {
+ public:
+  Tourists(std::shared_ptr<const engine::CameraModel> lens, maps::Library* library)
+      : session_(Options(), {lens, lens}, library) {}
+
+  // Each camera is shown its picture, the same again and again; -> the map in which each is then tracked.
+  using MapNamesOfBoth = std::pair<std::string, std::string>;
+  MapNamesOfBoth Look(const cv::Mat& first, const cv::Mat& second, int times = 25) {
+    std::string names[2];
+    for (int i = 0; i < times; ++i) {
+      time_ += std::chrono::milliseconds(33);
+      for (int camera = 0; camera < 2; ++camera) {
+        engine::Frame frame;
+        frame.time = time_;
+        frame.index = index_;
+        frame.camera = camera;
+        frame.picture = camera == 0 ? first : second;
+        const engine::TrackedFrame tracked = session_.Process(frame);
+        names[camera] = session_.ShownWith(tracked).map_name;
+        if (!engine::HasPose(tracked.state)) names[camera] = "lost";
+        seen_.insert({camera, names[camera]});
+      }
+      ++index_;
+    }
+    return {names[0], names[1]};
+  }
+  // Whether a camera was tracked in this map, or was "lost", at any time since this was forgotten.
+  bool Seen(int camera, const std::string& map) const { return seen_.contains({camera, map}); }
+  void Forget() { seen_.clear(); }
+
+ private:
+  static SessionOptions Options() {
+    SessionOptions options;
+    options.threaded = false;
+    options.may_write = false;
+    options.tracker.hybrid = true;
+    options.memory.wait_for_maps = true;
+    return options;
+  }
+  Session session_;
+  Timestamp time_ = std::chrono::seconds(1);
+  std::uint64_t index_ = 0;
+  std::set<std::pair<int, std::string>> seen_;
+};
+
+// ptamm Fig. 7 and §3.3, step by step, with pictures.
+TEST(Wearable, SearchesAndIsCalledTogetherByTheRulesOfAssociatedCameras) {
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  SimulationOptions options;
+  options.camera = SimulatedCamera(320);
+  options.frame_rate_hz = 20;
+  options.duration_s = 5;
+  const auto room = MakeSimulation("room", options), desk = MakeSimulation("desks", options);
+  MapScene("room", *room, &library);
+  MapScene("desk", *desk, &library);
+  const auto picture = [](const Simulation& simulation) {
+    cv::Mat bgr;
+    simulation.Render(simulation.frame_count() - 10, &bgr);
+    return bgr;
+  };
+  const cv::Mat of_room = picture(*room), of_desk = picture(*desk);
+  const cv::Mat dark = cv::Mat::zeros(of_room.size(), of_room.type());
+  Tourists cameras(std::make_shared<engine::CameraModel>(room->camera()), &library);
+  using Both = Tourists::MapNamesOfBoth;
+
+  // Nobody is tracked yet: whatever is looked at is found, and both are tracked in one map.
+  EXPECT_EQ(cameras.Look(of_room, of_room), Both("room", "room"));
+  // (b) One becomes lost and sees another map: it is not looked for there, and stays lost.
+  cameras.Look(of_room, dark);
+  cameras.Forget();
+  EXPECT_EQ(cameras.Look(of_room, of_desk, 60), Both("room", "lost"));
+  EXPECT_FALSE(cameras.Seen(1, "desk"));
+  EXPECT_FALSE(cameras.Seen(0, "lost"));
+  // It recovers into the current map alone.
+  EXPECT_EQ(cameras.Look(of_room, of_room), Both("room", "room"));
+  // (c) Both are lost: each searches all maps. (d) The first to be found, in another map, calls the other
+  // one, which gives up its search: even what it sees of the map before does not make it be found there.
+  EXPECT_EQ(cameras.Look(dark, dark), Both("lost", "lost"));
+  EXPECT_EQ(cameras.Look(dark, of_desk), Both("lost", "desk"));
+  cameras.Forget();
+  EXPECT_EQ(cameras.Look(of_room, of_desk, 60), Both("lost", "desk"));
+  EXPECT_FALSE(cameras.Seen(0, "room"));
+  EXPECT_FALSE(cameras.Seen(1, "lost"));
+  // (e) It is found in the recovered map, and they go on together.
+  EXPECT_EQ(cameras.Look(of_desk, of_desk), Both("desk", "desk"));
+  // The rules know no first camera: the same the other way round.
+  EXPECT_EQ(cameras.Look(dark, dark), Both("lost", "lost"));
+  EXPECT_EQ(cameras.Look(of_room, dark), Both("room", "lost"));
+  EXPECT_EQ(cameras.Look(of_room, of_desk), Both("room", "lost"));
+  EXPECT_EQ(cameras.Look(of_room, of_room), Both("room", "room"));
 }
 
 TEST(Wearable, WorksOnThreadsOfItsOwn) {
