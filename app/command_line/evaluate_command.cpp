@@ -33,6 +33,7 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
       ->add_option(
           "--dump-frame", options->dump_frames,
           "Write everything about frame N (from 0) of each sequence, as pictures and JSON; may be repeated")
+      ->check(CLI::NonNegativeNumber)
       ->type_name("N")
       ->allow_extra_args(false);
   AddSeedOption(command, &options->seed);

@@ -44,7 +44,8 @@ bool KeyFrameSelector::TurnedOnTheSpot(const Pose& now, double depth) const {
 }
 
 void KeyFrameSelector::Remember(const Pose& pose) {
-  while (!history_.empty() && pose.time - history_.front().time > options_.history) history_.pop_front();
+  while (!history_.empty() && pose.time - history_.front().time > options_.history)
+    history_.erase(history_.begin());
   if (history_.empty() || pose.time - history_.back().time >= options_.history_interval)
     history_.push_back(pose);
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <deque>
 #include <vector>
 
 #include "engine/base/time.h"
@@ -79,7 +78,7 @@ class KeyFrameSelector {
   const double field_of_view_;
   Mode mode_ = Mode::kSixDof;
   Timestamp reference_time_{};  // of the open panorama map's reference keyframe
-  std::deque<Pose> history_;
+  std::vector<Pose> history_;   // allocates nothing once it is full
 };
 
 }  // namespace docent::engine
