@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/maps/map_samples.h"
 
+#include <sqlite3.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -226,6 +227,17 @@ void WriteWholeFile(const fs::path& path, std::span<const std::uint8_t> bytes) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (!file) throw std::runtime_error("cannot write " + path.string());
+}
+
+void RunSql(const std::filesystem::path& file, const std::string& sql) {
+  sqlite3* connection = nullptr;
+  char* message = nullptr;
+  int result = sqlite3_open(file.c_str(), &connection);
+  if (result == SQLITE_OK) result = sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, &message);
+  const std::string problem = message ? message : sqlite3_errstr(result);
+  sqlite3_free(message);
+  sqlite3_close(connection);
+  if (result != SQLITE_OK) throw Error(file.string() + ": " + sql + ": " + problem);
 }
 
 std::string FilesIn(const fs::path& folder) {

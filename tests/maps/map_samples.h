@@ -52,6 +52,8 @@ LibraryOptions QuickOptions();
 
 Bytes ReadWholeFile(const std::filesystem::path& path);
 void WriteWholeFile(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+// Changes a library behind its back. Throws docent::Error with what SQLite has against it.
+void RunSql(const std::filesystem::path& file, const std::string& sql);
 // The names in a folder, sorted, separated by spaces.
 std::string FilesIn(const std::filesystem::path& folder);
 // The sentence of the docent::Error that `body` throws; "no error" when it throws none.
