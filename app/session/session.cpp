@@ -112,6 +112,7 @@ void Session::React(std::size_t index, engine::TrackedFrame* frame) {
     Refuse(camera, frame);
   }
   const bool has_pose = engine::HasPose(frame->state);
+  TellDoubt(camera, frame);
   if (has_pose && frame->map_key != camera->map_key) {
     EnterMap(camera, frame->map_key, frame->frame.time);
   } else if (frame->state == engine::TrackingState::kRelocalized) {
@@ -138,7 +139,24 @@ void Session::Refuse(Camera* camera, engine::TrackedFrame* frame) {
   frame->matches.clear();
   frame->finite_points = frame->infinite_points = 0;
   frame->hint = "look where the other camera looks";
+  camera->doubts = {};
   if (camera->order == Camera::Order::kNone) camera->order = Camera::Order::kGo;
+}
+
+void Session::TellDoubt(Camera* camera, engine::TrackedFrame* frame) {
+  const auto name = [&](std::uint64_t key) {
+    const auto found = maps_.find(key);
+    return found != maps_.end() ? found->second.name : std::string();
+  };
+  const bool news =
+      camera->doubts.See(frame->frame.time, engine::HasPose(frame->state), frame->verdict, name);
+  const std::string& words = camera->doubts.words();
+  if (words.empty()) return;
+  frame->hint = "not sure: " + words;
+  if (!news) return;
+  const std::string by =
+      cameras_.size() > 1 ? "camera " + std::to_string(frame->frame.camera) + ": " : std::string();
+  AddEvent(frame->frame.time, "not sure", by + words);
 }
 
 void Session::WatchRig(std::size_t index, const engine::TrackedFrame& frame) {

@@ -16,6 +16,7 @@
 #include "app/script/commands.h"
 #include "app/session/camera_association.h"
 #include "app/session/camera_rig.h"
+#include "app/session/doubts.h"
 #include "app/session/library_scene.h"
 #include "app/session/mapping_status.h"
 #include "app/session/mapping_thread.h"
@@ -130,6 +131,7 @@ class Session {
     bool began = false;                   // the present map is, or was, started by this camera
     std::optional<Timestamp> lost_since;  // while it is lost in map_key
     Timestamp last_time{};
+    Doubts doubts;
   };
 
   // session.cpp
@@ -143,6 +145,7 @@ class Session {
   SearchPlaces FollowOrders(std::size_t index, Timestamp time);
   void React(std::size_t index, engine::TrackedFrame* frame);
   void Refuse(Camera* camera, engine::TrackedFrame* frame);
+  void TellDoubt(Camera* camera, engine::TrackedFrame* frame);
   void WatchRig(std::size_t index, const engine::TrackedFrame& frame);
   void OfferToMapper(Camera* camera, const engine::TrackedFrame& frame);
   bool MayGrow(const SessionMap& map, const engine::Rigid3& camera_from_map) const;
