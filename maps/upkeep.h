@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "maps/library.h"
@@ -24,14 +25,20 @@ struct Optimization {
   // Of the observations that were there before and stayed: what was found must not make the comparison
   // unfair.
   double rms_before_px = 0, rms_after_px = 0;
-  std::size_t points_removed = 0, observations_removed = 0, observations_added = 0;
+  std::size_t points_removed = 0, observations_removed = 0, observations_added = 0, keyframes_removed = 0;
 };
 
-// Adjusts all keyframes and points of a map together, looks for its points in the keyframes that should see
-// them and do not, adjusts again, and saves it where that changed anything; what does not fit the whole is
-// removed. The policy must allow that its structure changes. `interrupt` may be null; a map whose adjustment
-// was interrupted stays as it was. The library makes full features. Throws docent::Error for what the file
-// has wrong.
+// The work on one map, without a library: global adjustment, points found again in the keyframes that should
+// see them, adjustment again, redundant keyframes taken out. Pure; `interrupt` may be null.
+struct AdjustedMap {
+  Optimization optimization;
+  std::shared_ptr<const engine::MapSnapshot> snapshot;  // of kAdjusted alone
+};
+AdjustedMap AdjustRestingMap(const engine::MapSnapshot& map, const std::atomic<bool>* interrupt);
+
+// Does that to a map of a library, and saves it where that changed anything. The policy must allow that its
+// structure changes. `interrupt` may be null; a map whose adjustment was interrupted stays as it was. The
+// library makes full features. Throws docent::Error for what the file has wrong.
 Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<bool>* interrupt);
 
 // Root mean square distance between where points were seen and where they should be, pixels of level 0:

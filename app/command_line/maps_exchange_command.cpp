@@ -151,13 +151,14 @@ void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < infos.size() && !Interruption::requested(); ++i) {
     const maps::Optimization result = maps::OptimizeMap(&library, infos[i].key, &interrupt);
-    char numbers[200] = "";
+    char numbers[240] = "";
     if (result.outcome == maps::Optimization::Outcome::kAdjusted) {
       std::snprintf(
           numbers, sizeof numbers,
-          ": %.3f px before, %.3f px after; %zu observations found and %zu thrown out, %zu points removed",
+          ": %.3f px before, %.3f px after; %zu observations found and %zu thrown out, %zu points and %zu "
+          "redundant keyframes removed",
           result.rms_before_px, result.rms_after_px, result.observations_added, result.observations_removed,
-          result.points_removed);
+          result.points_removed, result.keyframes_removed);
     }
     lines.push_back(infos[i].name + " " + Say(result.outcome) + numbers);
     progress->Update(i + 1);
@@ -201,7 +202,8 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
       "docent maps import desk.docent --library museum.docent", Import)
       ->add_option("FILE", options->from, "The other library")
       ->required();
-  add("optimize", "Adjust whole maps, and find their points in keyframes that missed them",
+  add("optimize",
+      "Adjust whole maps, find their points in keyframes that missed them, and drop redundant keyframes",
       "docent maps optimize --library museum.docent", Optimize)
       ->add_option("NAME", options->name, "Name of the map; all when it is left out");
   add("recover", "Save what a damaged library still holds into a new one",

@@ -28,7 +28,7 @@ Session::Session(const SessionOptions& options,
   }
   if (library_ != nullptr) {
     LoadMaps();
-    if (options.may_write) saver_.emplace(library_, 64, TellSaved);
+    if (options.may_write) StartSaver();
   }
   if (!options.first_map.empty()) {
     const std::scoped_lock lock(mutex_);
@@ -185,6 +185,7 @@ void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
   AddEvent(time, "map", "entered " + map.name);
   HoldMapsInUse();
   ExpectNeighbours(map);
+  if (saver_) saver_->InterruptUpkeep();  // it may be this map's
   // The others give up where they are looking and come (ptamm §3.3).
   for (Camera& other : cameras_) {
     if (other.map_key == key) continue;
@@ -220,6 +221,7 @@ void Session::OfferToMapper(Camera* camera, const engine::TrackedFrame& frame) {
     if (pair && found->second.snapshot && found->second.snapshot->HasFinitePoints()) return;
     if (candidate && !MayGrow(found->second, frame.camera_from_map)) candidate.reset();
   }
+  if (saver_) saver_->InterruptUpkeep();  // the present map comes first
   if (pair) mapping_.Start(key, std::move(*pair));
   if (candidate) mapping_.Offer(key, std::move(*candidate), tracker.TakeReports());
 }
@@ -375,11 +377,11 @@ void Session::Finish() {
     failure = std::current_exception();  // what it made before is saved all the same
   }
   if (saver_) {
+    saver_->EndUpkeep();
     saver_->Flush();  // so that what fails now is tried again with the rest
     {
       const std::scoped_lock lock(mutex_);
-      Timestamp time{};
-      for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
+      const Timestamp time = LastTime();
       ReportSaveFailure(time);
       for (auto& [key, map] : maps_) SaveMap(&map, time);
     }
