@@ -40,6 +40,8 @@ class FrameSlot {
 //
 //   escape or q  close            p  points      k  keyframes      h  status      tab  swap cameras
 //   control-z    undo             control-y  redo                  control-s  save
+//   m            the map about the camera from above, with colours that say where lost visitors will be found
+//                (authors)
 void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,
                   std::span<CommandInbox> inboxes);
 
