@@ -3,6 +3,7 @@
 
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <limits>
@@ -120,6 +121,19 @@ bool GoesWithLog(sqlite3* connection) {
   return header[19] == 2;
 }
 
+// Whether the file is smaller than one page of the size that it names (file format, offset 16), which SQLite
+// would set memory apart for. A file that is new is empty.
+bool AsksForMoreThanItHas(sqlite3* connection) {
+  sqlite3_file* const file = OpenFile(connection);
+  sqlite3_int64 size = 0;
+  std::array<unsigned char, 18> header{};
+  if (!file || file->pMethods->xFileSize(file, &size) != SQLITE_OK || size == 0) return false;
+  if (file->pMethods->xRead(file, header.data(), static_cast<int>(header.size()), 0) != SQLITE_OK)
+    return false;
+  const int page = header[16] << 8 | header[17];
+  return std::memcmp(header.data(), "SQLite format 3", 16) == 0 && size < (page == 1 ? 65536 : page);
+}
+
 // Whether there is no live log beside the file: a process that writes keeps both -wal and -shm there.
 bool LogAtRest(const fs::path& path) {
   std::error_code error;
@@ -227,6 +241,9 @@ void Database::Closer::operator()(sqlite3* connection) const {
 }
 
 void Database::OpenConnection(const std::string& name, int flags) {
+  // SQLite would otherwise begin with memory for twenty pages, of the size that a file asks for.
+  static const int configured = sqlite3_config(SQLITE_CONFIG_PAGECACHE, nullptr, 0, 0);
+  static_cast<void>(configured);
   sqlite3* connection = nullptr;
   const int result = sqlite3_open_v2(name.c_str(), &connection,
                                      flags | SQLITE_OPEN_FULLMUTEX | SQLITE_OPEN_EXRESCODE, nullptr);
@@ -240,6 +257,7 @@ void Database::OpenConnection(const std::string& name, int flags) {
   sqlite3_db_config(connection, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   sqlite3_db_config(connection, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
   sqlite3_db_config(connection, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  if (AsksForMoreThanItHas(connection)) throw Error(file_ + " is damaged: it is cut off in its first page");
 }
 
 void Database::ConnectReadOnly() {
@@ -337,6 +355,18 @@ void Database::CopyTo(const fs::path& path) const {
   if (!backup) Fail(copy.file_, copy.connection_.get(), sqlite3_extended_errcode(copy.connection_.get()));
   const int result = sqlite3_backup_step(backup.get(), -1);
   if (result != SQLITE_DONE) Fail(copy.file_, copy.connection_.get(), result);
+}
+
+std::int64_t Database::Bytes() const {
+  sqlite3_file* const file = OpenFile(connection_.get());
+  sqlite3_int64 size = 0;
+  if (!file || file->pMethods->xFileSize(file, &size) != SQLITE_OK) return 0;
+  const fs::path log = Beside(fs::absolute(file_), "-wal");
+  std::error_code error;
+  const std::uintmax_t log_size = fs::file_size(log, error);
+  // What the file says of itself is no proof, nor is a log that grew long ago.
+  return std::min<std::int64_t>(size + (error ? 0 : static_cast<std::int64_t>(log_size)),
+                                Number("PRAGMA page_count") * Number("PRAGMA page_size"));
 }
 
 bool Database::EndsWithWholePage() const {

@@ -88,6 +88,8 @@ class Database {
   // False when the file ends within a page, as one that was cut off does. (With a log beside it the last page
   // may be on its way.) SQLite itself would take the missing bytes for zeros.
   bool EndsWithWholePage() const;
+  // How much the file holds, its log included.
+  std::int64_t Bytes() const;
 
   // Copies the whole file as it is now, log included, into a new one, which is on disk when this returns.
   // Not inside a transaction.

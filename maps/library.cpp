@@ -309,15 +309,18 @@ std::uint64_t Library::NewKey() {
   return key;
 }
 
-void Library::Save(const MapRecord& record) {
+bool Library::Save(const MapRecord& record) {
   if (record.snapshot) {
     if (const std::string problem = engine::Validate(*record.snapshot); !problem.empty()) {
       throw Error(file() + ": map '" + record.name + "' cannot be saved: " + problem);
     }
   }
+  bool wanted = true;
   impl_->Write([&] {
     const std::optional<MapInfo> info =
         record.key == 0 ? std::nullopt : ReadMapRow(impl_->database(), record.key);
+    wanted = !record.over_revision || (info && info->revision == *record.over_revision);
+    if (!wanted) return false;
     MapInfo place;
     place.key = record.key;
     place.name = record.name;
@@ -332,6 +335,7 @@ void Library::Save(const MapRecord& record) {
     });
     return changed;
   });
+  return wanted;
 }
 
 void Library::Rename(std::uint64_t key, const std::string& name) {

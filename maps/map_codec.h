@@ -19,8 +19,8 @@ namespace docent::maps {
 
 // What is read takes at most four times the room of what it is read from, so that a small file cannot ask for
 // a large memory: the least sizes of things that vary in length see to that.
-// Pictures above a million pixels that compress further are stored as they are.
-inline constexpr std::int64_t kMaxPixelsAByte = 4, kPixelsAlwaysAllowed = std::int64_t{1} << 20;
+// Pictures that compress further are stored as they are.
+inline constexpr std::int64_t kMaxPixelsAByte = 4;
 inline constexpr std::size_t kMinAssetIdBytes = 4, kMaxAssetIdBytes = 128;
 inline constexpr int kMinPictureSidePx = 64;  // what engine::MakeFeatures needs
 inline constexpr int kMaxPictureSidePx = 16384;

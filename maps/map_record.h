@@ -43,6 +43,8 @@ struct MapRecord {
   std::shared_ptr<const SceneRecord> scene;             // null: the stored one stays
   // Of a new map that was bounded elsewhere; a new bounded map without them gets them from what it holds.
   std::optional<Bounds> bounds = std::nullopt;
+  // When given, the map is only written over this revision: another program's work stays.
+  std::optional<std::uint64_t> over_revision = std::nullopt;
 };
 
 // What a list shows; read without touching points or pictures.

@@ -53,9 +53,8 @@ Bytes EncodePicture(std::uint64_t map_key, engine::KeyFrameId keyframe, const cv
     for (const int level : {kPngLevel, 0}) {
       if (!cv::imencode(".png", gray, png, {cv::IMWRITE_PNG_COMPRESSION, level}))
         throw Error("the picture of keyframe " + std::to_string(keyframe) + " cannot be compressed");
-      // A flat one that large would look, to ReadCameras, as if a small file asked for a large memory.
-      if (pixels <= kPixelsAlwaysAllowed || pixels <= kMaxPixelsAByte * static_cast<std::int64_t>(png.size()))
-        break;
+      // A flat one would look, to ReadCameras, as if a small file asked for a large memory.
+      if (pixels <= kMaxPixelsAByte * static_cast<std::int64_t>(png.size())) break;
     }
   } catch (const cv::Exception& error) {
     throw Error("the picture of keyframe " + std::to_string(keyframe) +

@@ -113,9 +113,19 @@ RelocalizationGrid MakeRelocalizationGrid(const engine::MapSnapshot& map,
     auto& kept = cells[{cell.square.x(), cell.square.y(), cell.direction}];
     cell.trials = kept.trials + 1;
     cell.found = kept.found + (trial.result == RelocalizationTrial::Result::kFound ? 1 : 0);
+    // The sum of the heights, for now.
+    cell.place = kept.place + up.dot(trial.place) * up;
+    const double turn = cell.direction * std::numbers::pi / 4;
+    cell.view = sheet_from_map.transpose() * Eigen::Vector2d(std::sin(turn), -std::cos(turn));
     kept = cell;
   }
-  for (const auto& [place, cell] : cells) grid.cells.push_back(cell);
+  for (const auto& [key, summed] : cells) {
+    RelocalizationCell cell = summed;
+    const Eigen::Vector2d middle(origin.x() + cell.square.x() * grid.side,
+                                 origin.y() - cell.square.y() * grid.side);
+    cell.place = sheet_from_map.transpose() * middle + cell.place / cell.trials;
+    grid.cells.push_back(cell);
+  }
   return grid;
 }
 

@@ -42,6 +42,9 @@ struct RelocalizationCell {
       Eigen::Vector2i::Zero();  // steps of the side, right and ahead of the first keyframe
   int direction = 0;            // eighths of a turn to the right of the first keyframe's view, 0 to 7
   int trials = 0, found = 0;
+  // The same in the map: the middle of the square at the mean height of the cameras, and the middle of the
+  // directions, unit length.
+  Eigen::Vector3d place = Eigen::Vector3d::Zero(), view = Eigen::Vector3d::UnitZ();
 };
 struct RelocalizationGrid {
   double side = 0;  // of a square, metres of the map: half the median of the mean depths

@@ -196,9 +196,7 @@ CameraTable ReadCameras(const Database& database, std::uint64_t key) {
   CameraTable cameras = DecodeCameras(key, ReadPart(database, key, "cameras"));
   // Pictures are compressed, and a flat one by a thousand times: without this a file of a few kilobytes could
   // ask for gigabytes. A library of pictures with something in them is far above the limit.
-  const std::int64_t most =
-      std::max(kPixelsAlwaysAllowed,
-               kMaxPixelsAByte * database.Number("PRAGMA page_count") * database.Number("PRAGMA page_size"));
+  const std::int64_t most = kMaxPixelsAByte * database.Bytes();
   for (const auto& camera : cameras) {
     if (std::int64_t{camera->width_px()} * camera->height_px() > most)
       throw Error("its camera has a picture size that a file so small does not hold");

@@ -2,17 +2,26 @@
 #include "maps/saver.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 namespace docent::maps {
 
-Saver::Saver(Library* library, std::size_t capacity, Saved saved)
+namespace {
+
+constexpr std::chrono::milliseconds kUntilUpkeepIsAskedAgain{250};
+
+}  // namespace
+
+Saver::Saver(Library* library, std::size_t capacity, Saved saved, Upkeep upkeep)
     : library_(library),
       capacity_(std::max<std::size_t>(1, capacity)),
       saved_(std::move(saved)),
+      upkeep_(std::move(upkeep)),
       worker_("map-saver", [this](const std::stop_token& stop) { Run(stop); }) {}
 
 Saver::~Saver() {
+  EndUpkeep();
   worker_.RequestStop();  // Run ends only when nothing waits
   worker_.Join();
 }
@@ -31,6 +40,7 @@ void Saver::Submit(MapRecord record) {
     } else {
       waiting_.push_back(std::move(record));
     }
+    interrupt_ = true;
   }
   changed_.notify_all();
 }
@@ -58,9 +68,44 @@ std::size_t Saver::pending() const {
   return waiting_.size() + (running_ ? 1 : 0);
 }
 
+void Saver::EndUpkeep() {
+  std::unique_lock lock(mutex_);
+  upkeep_ended_ = interrupt_ = true;
+  changed_.wait(lock, [this] { return !keeping_up_; });
+}
+
+// With the lock held, which is let go meanwhile.
+bool Saver::KeepUp(std::unique_lock<std::mutex>* lock) {
+  keeping_up_ = true;
+  interrupt_ = false;
+  lock->unlock();
+  bool more = false;
+  std::exception_ptr error;
+  try {
+    more = upkeep_(interrupt_);
+  } catch (...) {
+    error = std::current_exception();
+  }
+  lock->lock();
+  if (!error_) error_ = error;
+  keeping_up_ = false;
+  changed_.notify_all();
+  return more;
+}
+
 void Saver::Run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  while (changed_.wait(lock, stop, [this] { return !waiting_.empty(); })) {
+  const auto waits = [this] { return !waiting_.empty(); };
+  while (true) {
+    bool more = false;
+    while (upkeep_ && !upkeep_ended_ && !waits()) {
+      if (!more &&
+          changed_.wait_for(lock, stop, kUntilUpkeepIsAskedAgain, [&] { return waits() || upkeep_ended_; }))
+        break;
+      if (stop.stop_requested()) break;
+      more = KeepUp(&lock);
+    }
+    if (!changed_.wait(lock, stop, waits)) return;
     MapRecord record = std::move(waiting_.front());
     waiting_.pop_front();
     running_ = record.key;

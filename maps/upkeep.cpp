@@ -7,6 +7,7 @@
 
 #include "engine/map/map.h"
 #include "engine/mapping/map_adjustment.h"
+#include "engine/mapping/redundancy.h"
 #include "engine/mapping/refinding.h"
 
 namespace docent::maps {
@@ -36,7 +37,19 @@ namespace {
 struct Change {
   Optimization::Outcome outcome = Optimization::Outcome::kFailed;
   std::size_t found = 0;
+  std::size_t keyframes_removed = 0, observations_of_keyframes = 0;
 };
+
+// Of a map that nobody is in: its newest keyframes are no more its frontier than the others.
+void ThinOut(const std::atomic<bool>* interrupt, engine::Map* map, Change* change) {
+  while (!interrupt || !*interrupt) {
+    const engine::KeyFrameId id = engine::FindRedundantKeyFrame({}, engine::kNoId, map);
+    if (id == engine::kNoId) return;
+    change->observations_of_keyframes += map->FindKeyFrame(id)->observations.size();
+    engine::RemoveRedundantKeyFrame(id, map);
+    ++change->keyframes_removed;
+  }
+}
 
 // Both adjustments and the refinding between them.
 Change Adjust(const std::atomic<bool>* interrupt, engine::Map* map) {
@@ -74,11 +87,17 @@ Change Adjust(const std::atomic<bool>* interrupt, engine::Map* map) {
     }
     outliers += summary.outliers;
   }
+  const bool same_points = points == map->AlivePoints();
+  ThinOut(interrupt, map, &change);
+  if (interrupt && *interrupt) {
+    change.outcome = Outcome::kInterrupted;
+    return change;
+  }
   // Saving what moved by nothing that counts would only wear the disk. What was found and did not hold is
   // nothing either.
   constexpr double kWorthwhile = 1e-6;
   const bool same_observations =
-      static_cast<std::size_t>(outliers) == change.found && points == map->AlivePoints();
+      static_cast<std::size_t>(outliers) == change.found && same_points && change.keyframes_removed == 0;
   change.outcome =
       same_observations && gained <= kWorthwhile * cost ? Outcome::kAlreadyBest : Outcome::kAdjusted;
   return change;
@@ -86,7 +105,31 @@ Change Adjust(const std::atomic<bool>* interrupt, engine::Map* map) {
 
 }  // namespace
 
-Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<bool>* interrupt) {
+AdjustedMap AdjustRestingMap(const engine::MapSnapshot& snapshot, const std::atomic<bool>* interrupt) {
+  using Outcome = Optimization::Outcome;
+  AdjustedMap adjusted;
+  Optimization& result = adjusted.optimization;
+  if (snapshot.keyframes.size() < 2 || !snapshot.HasFinitePoints()) {
+    result.outcome = Outcome::kTooSmall;
+    return adjusted;
+  }
+  engine::Map map(snapshot);
+  const Change change = Adjust(interrupt, &map);
+  result.outcome = change.outcome;
+  if (change.outcome != Outcome::kAdjusted) return adjusted;
+  adjusted.snapshot = map.Snapshot();
+  const std::size_t before = snapshot.observations.size(), after = adjusted.snapshot->observations.size();
+  result.rms_before_px = ReprojectionRms(snapshot, *adjusted.snapshot);
+  result.rms_after_px = ReprojectionRms(*adjusted.snapshot, snapshot);
+  result.points_removed = snapshot.points.size() - adjusted.snapshot->points.size();
+  result.observations_added = change.found;
+  result.keyframes_removed = change.keyframes_removed;
+  result.observations_removed = before + change.found - after - change.observations_of_keyframes;
+  return adjusted;
+}
+
+Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<bool>* interrupt,
+                         const MoveScene& move_scene) {
   using Outcome = Optimization::Outcome;
   Optimization result;
   if (!MayChangeStructure(library->Find(key).policy)) {
@@ -94,34 +137,16 @@ Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<
     return result;
   }
   const StoredMap stored = library->Load(key);
-  if (stored.snapshot->keyframes.size() < 2 || !stored.snapshot->HasFinitePoints()) {
-    result.outcome = Outcome::kTooSmall;
-    return result;
-  }
-  engine::Map map(*stored.snapshot);
-  const Change change = Adjust(interrupt, &map);
-  if (change.outcome != Outcome::kAdjusted) {
-    result.outcome = change.outcome;
-    return result;
-  }
-  if (library->Find(key).modified != stored.info.modified) {
-    result.outcome = Outcome::kChangedMeanwhile;
-    return result;
-  }
-  const auto adjusted = map.Snapshot();
-  const std::size_t before = stored.snapshot->observations.size(), after = adjusted->observations.size();
-  result.outcome = Outcome::kAdjusted;
-  result.rms_before_px = ReprojectionRms(*stored.snapshot, *adjusted);
-  result.rms_after_px = ReprojectionRms(*adjusted, *stored.snapshot);
-  result.points_removed = stored.snapshot->points.size() - adjusted->points.size();
-  result.observations_added = change.found;
-  result.observations_removed = before + change.found - after;
+  AdjustedMap adjusted = AdjustRestingMap(*stored.snapshot, interrupt);
+  if (!adjusted.snapshot) return adjusted.optimization;
   MapRecord record;
   record.key = key;
   record.name = stored.info.name;
-  record.snapshot = adjusted;
-  library->Save(record);
-  return result;
+  record.snapshot = std::move(adjusted.snapshot);
+  record.over_revision = stored.info.revision;
+  if (move_scene) record.scene = move_scene(stored.scene, *stored.snapshot, *record.snapshot);
+  if (!library->Save(record)) adjusted.optimization.outcome = Outcome::kChangedMeanwhile;
+  return adjusted.optimization;
 }
 
 }  // namespace docent::maps

@@ -62,6 +62,23 @@ class Drawing {
     }
   }
 
+  void Wedge(const FoundAgain& found) {
+    // Strokes from the middle outwards, close enough to each other to fill the eighth.
+    constexpr int kStrokes = 9;
+    constexpr double kHalfEighth = std::numbers::pi / 8 * 0.9;
+    Color color = ShareColor(found.share);
+    color.alpha = 0.75f;
+    const Eigen::Vector3d side = kUp.cross(found.direction);
+    const double depth = std::max(1e-9, (camera_from_map_ * found.place).z());
+    const double width_px = 0.45 * found.side_m * kHalfEighth / kStrokes / (camera_.PixelAngle() * depth);
+    for (int i = 0; i < kStrokes; ++i) {
+      const double turn = kHalfEighth * (2.0 * i / (kStrokes - 1) - 1);
+      const Eigen::Vector3d outwards = std::cos(turn) * found.direction + std::sin(turn) * side;
+      Line(found.place + 0.06 * found.side_m * outwards, found.place + 0.45 * found.side_m * outwards, color,
+           std::max(1.0, 1.2 * width_px));
+    }
+  }
+
   // Far ones first, so that near ones lie over them.
   void Points(const engine::MapSnapshot& map) {
     struct Dot {
@@ -83,7 +100,8 @@ class Drawing {
 
  private:
   // Cut into pieces, so that a line that passes behind the eye still shows its visible part.
-  void Line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Color& color) {
+  void Line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Color& color,
+            double width_px = 1.0) {
     constexpr int kPieces = 20;
     std::optional<Eigen::Vector2d> previous;
     for (int i = 0; i <= kPieces; ++i) {
@@ -91,7 +109,7 @@ class Drawing {
       const std::optional<Eigen::Vector2d> pixel =
           camera_.Project(camera_from_map_ * Eigen::Vector3d((1 - t) * from + t * to));
       if (pixel && previous && (camera_.IsInside(*pixel, -200) || camera_.IsInside(*previous, -200)))
-        canvas_->Line(*previous, *pixel, 1.0, color);
+        canvas_->Line(*previous, *pixel, width_px, color);
       previous = pixel;
     }
   }
@@ -134,6 +152,12 @@ engine::Rigid3 CameraFromMap(const Orbit& orbit) {
   rotation.row(2) = forward;
   const Eigen::Vector3d eye = orbit.target - orbit.distance_m * forward;
   return {engine::Rotation3(rotation), -(rotation * eye)};
+}
+
+Color ShareColor(double share) {
+  // Over yellow, so that the middle is neither.
+  const auto t = static_cast<float>(std::clamp(share, 0.0, 1.0));
+  return {std::min(1.0f, 2 - 2 * t) * 0.9f, std::min(1.0f, 2 * t) * 0.8f, 0.15f, 1.0f};
 }
 
 Orbit OrbitAbove(const engine::MapSnapshot& map, double width_over_height) {
@@ -179,7 +203,7 @@ MapView::MapView(const MapViewOptions& options) : impl_(std::make_unique<Impl>(o
 MapView::~MapView() = default;
 
 void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, const Orbit& orbit,
-                   const std::string& title) {
+                   const std::string& title, const std::vector<FoundAgain>& found_again) {
   const int width_px = impl_->options.width_px, height_px = impl_->options.height_px;
   const RenderTarget& target = impl_->picture.Bind(width_px, height_px);
   impl_->picture.DrawVideo(cv::Mat());
@@ -189,6 +213,7 @@ void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, 
   impl_->below.Begin(width_px, height_px);
   Drawing drawing(impl_->camera, camera_from_map, &impl_->below);
   drawing.Grid(orbit, grid_m);
+  for (const FoundAgain& found : found_again) drawing.Wedge(found);
   drawing.Points(map);
   DrawKeyFrames(map, impl_->camera, camera_from_map, &impl_->below);
   impl_->below.End();

@@ -5,10 +5,12 @@
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <vector>
 
 #include "content/scene.h"
 #include "engine/geometry/rigid3.h"
 #include "engine/map/map_snapshot.h"
+#include "ui/canvas.h"
 
 namespace docent::ui {
 
@@ -34,6 +36,16 @@ struct MapViewOptions {
   int max_texture_px = 1024;
 };
 
+// How well a camera that is lost will be found at a place when it looks in a direction: an eighth of a
+// circle, red where it never is, green where it always is.
+struct FoundAgain {
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();       // map
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // map, level, unit length: the middle of the eighth
+  double side_m = 1;                                     // of the square whose middle is the place
+  double share = 0;                                      // of the attempts that succeed
+};
+Color ShareColor(double share);
+
 // Draws a map from outside: points by level, keyframes as frusta, the content where it stands, a grid and its
 // scale. Needs a current context from construction to destruction, on one thread.
 class MapView {
@@ -43,9 +55,10 @@ class MapView {
   MapView(const MapView&) = delete;
   MapView& operator=(const MapView&) = delete;
 
-  // scene may be null; title is shown in the corner, empty for none.
+  // scene may be null; title is shown in the corner, empty for none. found_again lies on the floor, under
+  // all.
   void Draw(const engine::MapSnapshot& map, const content::Scene* scene, const Orbit& orbit,
-            const std::string& title = {});
+            const std::string& title = {}, const std::vector<FoundAgain>& found_again = {});
   // As Renderer's.
   void Present(int width_px, int height_px);
   void ReadBack(cv::Mat* picture);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "app/command_line/interruption.h"
+#include "app/command_line/map_panel.h"
 #include "app/script/script_file.h"
 #include "engine/base/error.h"
 #include "ui/authoring_panel.h"
@@ -77,7 +78,13 @@ class GuideWindow {
     }
     if (!fresh.empty()) DrawPicture();
     const Eigen::Vector2i size = window_.FramebufferSize();
-    renderer_.Present(std::max(1, size.x()), std::max(1, size.y()));
+    const int width_px = std::max(1, size.x()), height_px = std::max(1, size.y());
+    if (shows_map_ && large()) {
+      if (!fresh.empty()) map_panel_.Draw(*large(), width_px, height_px);
+      map_panel_.Present(width_px, height_px);
+    } else {
+      renderer_.Present(width_px, height_px);
+    }
     if (panel_) panel_->Draw();
     window_.Show();
     for (const auto& frame : fresh) drawn_(*frame);
@@ -170,6 +177,7 @@ class GuideWindow {
       return;
     }
     if (event.key == "tab") Swap();
+    if (event.key == "m" && request_.may_write) shows_map_ = !shows_map_;
     if (event.key == "escape" || event.key == "q") closing_ = true;
     bool& points = panel_ ? panel_->state().show_points : points_;
     bool& keyframes = panel_ ? panel_->state().show_keyframes : keyframes_;
@@ -189,7 +197,7 @@ class GuideWindow {
       const engine::CameraModel& other = *cameras_[1 - large_].model;
       if (ui::PlaceInset(width, height, other.width_px(), other.height_px()).Contains(pixel)) return Swap();
     }
-    if (panel_ && camera().IsInside(pixel)) panel_->ClickPicture(pixel);
+    if (panel_ && !shows_map_ && camera().IsInside(pixel)) panel_->ClickPicture(pixel);
   }
   bool SizeOfFirst(const cv::Mat& picture) const {
     const engine::CameraModel& first = *cameras_.front().model;
@@ -202,6 +210,7 @@ class GuideWindow {
   const std::span<CommandInbox> inboxes_;
   ui::Window window_;
   ui::Renderer renderer_;
+  MapPanel map_panel_;
   std::optional<ui::AuthoringPanel> panel_;
   std::optional<ViewRecorder> recorder_;
   std::vector<std::shared_ptr<const ShownFrame>> shown_;  // by camera
@@ -210,7 +219,7 @@ class GuideWindow {
   std::set<std::string> map_names_;
   std::string refusal_;
   cv::Mat picture_;
-  bool points_ = false, keyframes_ = false, hud_ = true, closing_ = false;
+  bool points_ = false, keyframes_ = false, hud_ = true, shows_map_ = false, closing_ = false;
 };
 
 }  // namespace

@@ -40,6 +40,8 @@ class FrameSlot {
 //
 //   escape or q  close            p  points      k  keyframes      h  status      tab  swap cameras
 //   control-z    undo             control-y  redo                  control-s  save
+//   m            the map about the camera from above, with colours that say where lost visitors will be found
+//                (authors)
 //
 // drawn is told of every frame once it is on the screen.
 void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,

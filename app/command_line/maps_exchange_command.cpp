@@ -13,6 +13,8 @@
 #include "app/command_line/interruption.h"
 #include "app/command_line/progress.h"
 #include "app/files/checked_file.h"
+#include "app/session/content_follower.h"
+#include "app/session/library_scene.h"
 #include "app/session/surface_at_pixel.h"
 #include "engine/base/error.h"
 #include "engine/base/worker.h"
@@ -133,6 +135,18 @@ const char* Say(maps::Optimization::Outcome outcome) {
   return "";
 }
 
+// Content goes along with its ground.
+maps::MoveScene SceneMover(const std::string& library) {
+  return [library](const maps::SceneRecord& record, const engine::MapSnapshot& before,
+                   const engine::MapSnapshot& after) -> std::shared_ptr<const maps::SceneRecord> {
+    AssetCache assets;
+    const content::Scene scene = SceneFromRecord(record, library, &assets);
+    const auto motions = ContentFollower().Follow(scene, before, after);
+    if (motions.empty()) return nullptr;
+    return std::make_shared<maps::SceneRecord>(RecordFromScene(*Moved(scene, motions)));
+  };
+}
+
 void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
   maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
   std::vector<maps::MapInfo> infos = library.List();
@@ -150,14 +164,16 @@ void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
   progress.emplace("maps", infos.size(), verbosity);
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < infos.size() && !Interruption::requested(); ++i) {
-    const maps::Optimization result = maps::OptimizeMap(&library, infos[i].key, &interrupt);
-    char numbers[200] = "";
+    const maps::Optimization result =
+        maps::OptimizeMap(&library, infos[i].key, &interrupt, SceneMover(options.library));
+    char numbers[240] = "";
     if (result.outcome == maps::Optimization::Outcome::kAdjusted) {
       std::snprintf(
           numbers, sizeof numbers,
-          ": %.3f px before, %.3f px after; %zu observations found and %zu thrown out, %zu points removed",
+          ": %.3f px before, %.3f px after; %zu observations found and %zu thrown out, %zu points and %zu "
+          "redundant keyframes removed",
           result.rms_before_px, result.rms_after_px, result.observations_added, result.observations_removed,
-          result.points_removed);
+          result.points_removed, result.keyframes_removed);
     }
     lines.push_back(infos[i].name + " " + Say(result.outcome) + numbers);
     progress->Update(i + 1);
@@ -201,7 +217,8 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
       "docent maps import desk.docent --library museum.docent", Import)
       ->add_option("FILE", options->from, "The other library")
       ->required();
-  add("optimize", "Adjust whole maps, and find their points in keyframes that missed them",
+  add("optimize",
+      "Adjust whole maps, find their points in keyframes that missed them, and drop redundant keyframes",
       "docent maps optimize --library museum.docent", Optimize)
       ->add_option("NAME", options->name, "Name of the map; all when it is left out");
   add("recover", "Save what a damaged library still holds into a new one",

@@ -9,6 +9,7 @@
 
 #include "app/cameras/clipped_source.h"
 #include "app/cameras/simulated_source.h"
+#include "app/command_line/map_panel.h"
 #include "app/command_line/run_guide.h"
 #include "app/command_line/runs.h"
 #include "app/demo/exhibit_model.h"
@@ -135,7 +136,8 @@ void DrawMaps(const std::vector<Session::MapState>& maps, const fs::path& folder
   cv::Mat picture;
   for (const Session::MapState& map : maps) {
     if (map.discarded || !map.snapshot) continue;
-    view.Draw(*map.snapshot, map.scene.get(), ui::OrbitAbove(*map.snapshot), map.name);
+    view.Draw(*map.snapshot, map.scene.get(), ui::OrbitAbove(*map.snapshot), map.name,
+              PredictFoundAgain(*map.snapshot));
     view.ReadBack(&picture);
     WritePicture(folder / ("map-" + FileName(map.name) + ".png"), picture);
   }

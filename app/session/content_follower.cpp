@@ -49,4 +49,15 @@ ContentFollower::Motions ContentFollower::Follow(const content::Scene& scene,
   return motions;
 }
 
+std::shared_ptr<const content::Scene> Moved(const content::Scene& scene,
+                                            const ContentFollower::Motions& motions) {
+  auto moved = std::make_shared<content::Scene>(scene);
+  for (const auto& [name, motion] : motions) {
+    for (content::Entity& entity : moved->entities) {
+      if (entity.name == name) content::MoveAlong(motion, &entity);
+    }
+  }
+  return moved;
+}
+
 }  // namespace docent::app

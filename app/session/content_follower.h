@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,5 +33,9 @@ class ContentFollower {
   };
   std::map<std::string, Anchor> anchors_;
 };
+
+// The scene with these motions carried out.
+std::shared_ptr<const content::Scene> Moved(const content::Scene& scene,
+                                            const ContentFollower::Motions& motions);
 
 }  // namespace docent::app

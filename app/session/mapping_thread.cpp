@@ -124,8 +124,9 @@ void MappingThread::Run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     {
       std::unique_lock lock(mutex_);
+      resting_ = true;
       if (!changed_.wait(lock, stop, [this] { return work_; })) return;
-      work_ = false;
+      resting_ = work_ = false;
     }
     TakeOver();
     bool more = true;
@@ -142,6 +143,11 @@ void MappingThread::Run(const std::stop_token& stop) {
 
 bool MappingThread::Busy() const {
   return adoption_.has_value() || starting_ || mapper_.QueueLength() > 1;
+}
+
+bool MappingThread::Resting() const {
+  const std::scoped_lock lock(mutex_);
+  return resting_ && !work_;
 }
 
 void MappingThread::WaitUntilCalm(const std::stop_token& stop) {

@@ -43,6 +43,8 @@ class MappingThread {
 
   // Lockstep only: works until nothing urgent waits (at most kMaxSteps pieces), then one piece of idle work.
   void RunInTurn();
+  // Threaded only: nothing was asked for that is not done.
+  bool Resting() const;
   // Threaded only: waits while the mapper is a whole keyframe behind or makes a map's beginning.
   void WaitUntilCalm(const std::stop_token& stop);
 
@@ -76,6 +78,7 @@ class MappingThread {
   std::optional<engine::InitialPair> pair_;
   bool starting_ = false;         // from Start until its map or its failure is told
   bool work_ = false;             // something was asked for since the last idle step
+  bool resting_ = false;          // the thread waits for work
   bool failed_ = false;           // the thread has ended by an exception, which Finish hands out
   std::optional<Worker> worker_;  // last: it uses the rest
 };

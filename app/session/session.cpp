@@ -32,7 +32,7 @@ Session::Session(const SessionOptions& options,
   }
   if (library_ != nullptr) {
     LoadMaps();
-    if (options.may_write) saver_.emplace(library_, 64, TellSaved);
+    if (options.may_write) StartSaver();
   }
   if (!options.first_map.empty()) {
     const std::scoped_lock lock(mutex_);
@@ -116,6 +116,7 @@ void Session::React(std::size_t index, engine::TrackedFrame* frame) {
     Refuse(camera, frame);
   }
   const bool has_pose = engine::HasPose(frame->state);
+  TellDoubt(camera, frame);
   if (has_pose && frame->map_key != camera->map_key) {
     EnterMap(camera, frame->map_key, frame->frame.time);
   } else if (frame->state == engine::TrackingState::kRelocalized) {
@@ -143,7 +144,24 @@ void Session::Refuse(Camera* camera, engine::TrackedFrame* frame) {
   frame->matches.clear();
   frame->finite_points = frame->infinite_points = 0;
   frame->hint = "look where the other camera looks";
+  camera->doubts = {};
   if (camera->order == Camera::Order::kNone) camera->order = Camera::Order::kGo;
+}
+
+void Session::TellDoubt(Camera* camera, engine::TrackedFrame* frame) {
+  const auto name = [&](std::uint64_t key) {
+    const auto found = maps_.find(key);
+    return found != maps_.end() ? found->second.name : std::string();
+  };
+  const bool news =
+      camera->doubts.See(frame->frame.time, engine::HasPose(frame->state), frame->verdict, name);
+  const std::string& words = camera->doubts.words();
+  if (words.empty()) return;
+  frame->hint = "not sure: " + words;
+  if (!news) return;
+  const std::string by =
+      cameras_.size() > 1 ? "camera " + std::to_string(frame->frame.camera) + ": " : std::string();
+  AddEvent(frame->frame.time, "not sure", by + words);
 }
 
 void Session::WatchRig(std::size_t index, const engine::TrackedFrame& frame) {
@@ -189,6 +207,7 @@ void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
   AddEvent(time, "map", "entered " + map.name);
   HoldMapsInUse();
   ExpectNeighbours(map);
+  if (saver_) saver_->InterruptUpkeep();  // it may be this map's
   // The others give up where they are looking and come (ptamm §3.3).
   for (Camera& other : cameras_) {
     if (other.map_key == key) continue;
@@ -224,6 +243,7 @@ void Session::OfferToMapper(Camera* camera, const engine::TrackedFrame& frame) {
     if (pair && found->second.snapshot && found->second.snapshot->HasFinitePoints()) return;
     if (candidate && !MayGrow(found->second, frame.camera_from_map)) candidate.reset();
   }
+  if (saver_) saver_->InterruptUpkeep();  // the present map comes first
   if (pair) mapping_.Start(key, std::move(*pair));
   if (candidate) mapping_.Offer(key, std::move(*candidate), tracker.TakeReports());
 }
@@ -381,11 +401,11 @@ void Session::Finish() {
     failure = std::current_exception();  // what it made before is saved all the same
   }
   if (saver_) {
+    saver_->EndUpkeep();
     saver_->Flush();  // so that what fails now is tried again with the rest
     {
       const std::scoped_lock lock(mutex_);
-      Timestamp time{};
-      for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
+      const Timestamp time = LastTime();
       ReportSaveFailure(time);
       for (auto& [key, map] : maps_) SaveMap(&map, time);
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
@@ -16,12 +17,14 @@
 #include "app/script/commands.h"
 #include "app/session/camera_association.h"
 #include "app/session/camera_rig.h"
+#include "app/session/doubts.h"
 #include "app/session/lens_watch.h"
 #include "app/session/library_scene.h"
 #include "app/session/mapping_status.h"
 #include "app/session/mapping_thread.h"
 #include "app/session/search_places.h"
 #include "app/session/session_map.h"
+#include "app/session/upkeep_order.h"
 #include "engine/tracking/tracker.h"
 #include "maps/library.h"
 #include "maps/map_pager.h"
@@ -44,6 +47,8 @@ struct SessionOptions {
   Timestamp probation = std::chrono::seconds(2);
   Timestamp probation_loss = std::chrono::seconds(1);
   std::size_t probation_keyframes = 5;
+  // Maps in memory that nobody is in are adjusted while there is nothing else to do; needs `threaded`.
+  bool upkeep = true;
   double signpost_height = 0.12;  // of the distance at which it is put up
   maps::PagerOptions memory;      // how many of the library's maps are in memory at once
   // Metres between the first two cameras of a rigid rig, measured by hand; 0 when nobody did. A recognised
@@ -141,6 +146,7 @@ class Session {
     Timestamp last_time{};
     std::string advice;  // shown until advice_end
     Timestamp advice_end{};
+    Doubts doubts;
   };
 
   // session.cpp
@@ -154,6 +160,7 @@ class Session {
   SearchPlaces FollowOrders(std::size_t index, Timestamp time);
   void React(std::size_t index, engine::TrackedFrame* frame);
   void Refuse(Camera* camera, engine::TrackedFrame* frame);
+  void TellDoubt(Camera* camera, engine::TrackedFrame* frame);
   void WatchRig(std::size_t index, const engine::TrackedFrame& frame);
   void WatchLens(std::size_t index, const engine::TrackedFrame& frame);
   void OfferToMapper(Camera* camera, const engine::TrackedFrame& frame);
@@ -188,9 +195,17 @@ class Session {
 
   // session_saving.cpp
   static void TellSaved(const maps::MapRecord& record);
+  void StartSaver();
   void SaveMap(SessionMap* map, Timestamp time);
   void Autosave(Timestamp time);
   void ReportSaveFailure(Timestamp time);
+  Timestamp LastTime() const;  // of any camera
+
+  // session_upkeep.cpp; KeepUp on the saver's thread and without mutex_
+  bool KeepUp(const std::atomic<bool>& interrupt);
+  bool Rests(const SessionMap& map) const;
+  std::vector<RestingMap> MapsForUpkeep() const;
+  SessionMap* StillResting(const RestingMap& resting);
 
   const SessionOptions options_;
   maps::Library* const library_;
@@ -209,11 +224,12 @@ class Session {
   std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by the file as commands name it
   std::filesystem::path model_folder_;
   std::optional<Timestamp> last_save_;
-  std::optional<maps::Saver> saver_;  // with a library opened for writing
   bool finished_ = false;
+  UpkeepOrder upkeep_order_;  // the saver's thread alone touches it
   // Last, because their threads call back into the rest.
   std::optional<maps::MapPager> pager_;  // with a library
   MappingThread mapping_;
+  std::optional<maps::Saver> saver_;  // with a library opened for writing
 };
 
 }  // namespace docent::app

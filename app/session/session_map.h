@@ -37,6 +37,9 @@ struct SessionMap {
       false;             // it was there when the session began: without a snapshot it is merely not in memory
   bool changed = false;  // in this session: it stays in memory until the end
 
+  // The state that upkeep has left behind, or looked at without finding anything to do; 0 for none.
+  std::uint64_t upkept_revision = 0;
+
   bool rests = false;  // the person stopped it: it grows no further until it is taken up again by name
 
   // Of a map made in this session: a start that does not hold is given up (see Session).

@@ -22,9 +22,7 @@ void Session::LoadMaps() {
   callbacks.let_go = [this](std::uint64_t key) { return LetGo(key); };
   callbacks.failed = [this](std::uint64_t, const std::string& problem) {
     const std::scoped_lock lock(mutex_);
-    Timestamp time{};
-    for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
-    AddEvent(time, "warning", problem);
+    AddEvent(LastTime(), "warning", problem);
   };
   pager_.emplace(library_, &index_, options_.memory, std::move(callbacks));
   pager_->Open();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "app/session/session.h"
@@ -13,6 +15,21 @@ void Session::TellSaved(const maps::MapRecord& record) {
   const std::string revision =
       record.snapshot ? "revision " + std::to_string(record.snapshot->revision) : "content";
   spdlog::debug("saved {}: {}", record.name, revision);
+}
+
+void Session::StartSaver() {
+  // A place for every map, so that a save is never waited for; in lockstep nothing happens by itself.
+  constexpr std::size_t kAnyNumber = std::numeric_limits<std::size_t>::max();
+  maps::Saver::Upkeep upkeep;
+  if (options_.threaded && options_.upkeep)
+    upkeep = [this](const std::atomic<bool>& interrupt) { return KeepUp(interrupt); };
+  saver_.emplace(library_, kAnyNumber, TellSaved, std::move(upkeep));
+}
+
+Timestamp Session::LastTime() const {
+  Timestamp time{};
+  for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
+  return time;
 }
 
 // Hands what has changed of a map to the saver, which writes it in the background.

@@ -13,6 +13,7 @@
 #include "engine/base/time.h"
 #include "engine/geometry/rigid3.h"
 #include "engine/map/map_snapshot.h"
+#include "engine/tracking/verdict.h"
 
 namespace docent::engine {
 
@@ -66,6 +67,7 @@ struct TrackedFrame {
   std::vector<PointMatch> matches;
   std::chrono::nanoseconds tracking_time{};
   std::string hint;  // a sentence for the wearer ("move sideways"), often empty
+  Verdict verdict;   // of a lost frame that resembles some place; no doubt otherwise
 };
 
 }  // namespace docent::engine

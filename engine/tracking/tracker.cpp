@@ -61,8 +61,8 @@ void Tracker::Reset() {
   anchor_.reset();
   turn_center_.Reset();
   turn_ = {};
-  entering_key_ = 0;
-  entering_frames_ = 0;
+  entering_key_ = leader_key_ = 0;
+  entering_frames_ = leader_frames_ = doubtful_frames_ = 0;
   ResetStart();
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(kNoId);
@@ -165,16 +165,9 @@ bool Tracker::Believable(const MapTrackResult& result) const {
          result.occupied_cells >= options_.min_cells && result.Quality() >= options_.lost_quality;
 }
 
-bool Tracker::Recovered(const MapTrackResult& result) const {
-  return result.converged && result.sigma <= options_.max_sigma && IsTurn(result) &&
-         result.inliers >= options_.min_recovery_inliers &&
-         result.occupied_cells >= options_.min_recovery_cells &&
-         result.Quality() >= options_.min_recovery_quality;
-}
-
 // Whether a turn, if it is one that the result tells of, explains what was seen.
-bool Tracker::IsTurn(const MapTrackResult& result) const {
-  return result.observed != ObservedMotion::kPanorama || !map_ || !map_->HasFinitePoints() ||
+bool Tracker::IsTurn(const MapTrackResult& result, const MapSnapshot& map) const {
+  return result.observed != ObservedMotion::kPanorama || !map.HasFinitePoints() ||
          result.sigma <= options_.max_turn_sigma;
 }
 
@@ -275,7 +268,7 @@ void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
     Lose(frame, out);
     return;
   }
-  misfit_frames_ = IsTurn(result) ? 0 : misfit_frames_ + 1;
+  misfit_frames_ = IsTurn(result, *map_) ? 0 : misfit_frames_ + 1;
   if (misfit_frames_ >= options_.frames_of_misfit) {
     Lose(frame, out);
     out->hint = "you have walked where nothing is mapped: look back";
@@ -322,6 +315,8 @@ bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, Tra
 void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out) {
   const bool good = result.Quality() >= options_.good_quality;
   if (out->state == TrackingState::kRelocalized) {
+    doubtful_frames_ = options_.agreeing_frames;
+    leader_frames_ = 0;
     motion_.Reset(frame.time, result.camera_from_map);
     selector_.Reset();
     turn_center_.Reset();
@@ -330,9 +325,14 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
     if (result.observed == ObservedMotion::kHybrid) out->state = TrackingState::kHybrid;
     if (result.observed == ObservedMotion::kPanorama) out->state = TrackingState::kPanorama;
   }
+  // What was found again is not extended before it has held (ptamm §6.3).
+  const bool doubtful = doubtful_frames_ > 0;
+  if (doubtful && out->state != TrackingState::kRelocalized)
+    doubtful_frames_ = good ? doubtful_frames_ - 1 : options_.agreeing_frames;
   tracking_ = true;
   observed_ = result.observed;
   explained_ = result.Explained();
+  out->verdict = {};
   finite_coverage_ = result.finite_coverage;
   if (result.finite_inliers > 0 && result.median_depth > 0) median_depth_ = result.median_depth;
   if (options_.hybrid && result.observed != ObservedMotion::kPanorama) {
@@ -354,10 +354,10 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
     last_points_ = frame.time;
     out->matches = map_tracker_.matches();
     map_tracker_.Remember();
-    CollectReports();
+    if (!doubtful) CollectReports();
   }
   if (!good) out->hint = "few points are found: slow down";
-  if ((good || !by_points) && options_.build_maps) ChooseKeyFrame(frame, result, *out);
+  if ((good || !by_points) && !doubtful && options_.build_maps) ChooseKeyFrame(frame, result, *out);
 }
 
 void Tracker::ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, const TrackedFrame& out) {

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "engine/base/random.h"
@@ -64,12 +65,19 @@ struct TrackerOptions {
   int candidates_looked_at = 10;  // keyframes that resemble the picture, turned to fit it best
   int candidates_of_a_map = 4;    // of these, at most
   std::size_t candidates = 3;     // the best of these are verified, each frame
-  int agreeing_frames = 3;        // before another map is entered (ptamm §6.3)
+  std::size_t rivals = 2;         // other maps that are tried as well, each by its best keyframe
+  // Times the quality of the second best map, to be believed; or ahead of it by anything for so many frames
+  // in a row: maps that overlap explain the picture both, and must not keep each other out.
+  double clear_lead = 1.2;
+  int frames_ahead = 15;
+  // Before another map is entered (ptamm §6.3), and before a map that was entered or found again is extended.
+  int agreeing_frames = 3;
   // Overlapping maps (ptamm §5.3): while a map that does not grow is poorly seen, another one may fit better.
-  double poor_quality = 0.5;     // share of what is in view, hidden points among it
-  double better_quality = 1.3;   // times the present one, to be entered
-  int frames_between_looks = 3;  // for such a map
-  bool build_maps = true;        // else a frame without a map is lost, not initializing
+  double poor_quality = 0.5;    // share of what is in view, hidden points among it
+  double better_quality = 1.3;  // times that of the map that the camera is or was in, to be entered
+  // For such a map, as long as the present one is well enough seen to be extended.
+  int frames_between_looks = 3;
+  bool build_maps = true;  // else a frame without a map is lost, not initializing
 };
 
 // Tracks one camera: waits for a start, follows the map, notices loss and comes back by the place finder.
@@ -132,15 +140,35 @@ class Tracker {
   std::shared_ptr<const MapSnapshot> FollowEntering(const PlaceFinder& places, MapTracker* tracker,
                                                     MapTrackResult* result);
   MapTrackResult TryPlace(const TurnedPlace& place, MapTracker* tracker);
+  // A place whose map explains the frame.
+  struct FoundPlace {
+    TurnedPlace place;
+    MapTrackResult result;
+    PanoramaId panorama = kNoId;
+  };
+  // The first of the places at which the frame is explained, and the best rival of its map that explains it
+  // too, the better one first. Tells `out` what speaks against the others.
+  std::vector<FoundPlace> FindMaps(const std::vector<TurnedPlace>& places, TrackedFrame* out);
+  // The best of other maps than these at which the frame is explained.
+  std::optional<FoundPlace> BestRival(const std::vector<TurnedPlace>& places,
+                                      std::set<std::uint64_t> but_maps, TrackedFrame* out);
+  // Whether the best map is far enough before the second best, in this frame or in many in a row.
+  bool ClearlyAhead(std::uint64_t best_key, double best_quality, std::uint64_t second_key,
+                    double second_quality);
+  bool GoOnEntering(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
+  void Return(const Frame& frame, const FoundPlace& found, TrackedFrame* out);
+  void Unconfirmed(const MapTrackResult& result, TrackedFrame* out) const;
   void Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, const MapTrackResult& result,
              TrackedFrame* out);
-  void BeginEntering(const TurnedPlace& place, const MapTracker& tracker, const MapTrackResult& result);
-  bool RecoverNearby(const Frame& frame, TrackedFrame* out);
-  // The best of those that resemble the frame; but_map: none of that map.
+  void BeginEntering(const FoundPlace& found);
+  bool RecoverNearby(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
+  // Those that resemble the frame, the best first; but_map: none of that map, and none at all when the most
+  // alike at first sight is of it.
   std::vector<TurnedPlace> BestPlaces(const PlaceFinder& places, std::uint64_t but_map = 0) const;
   bool Believable(const MapTrackResult& result) const;
-  bool IsTurn(const MapTrackResult& result) const;
-  bool Recovered(const MapTrackResult& result) const;
+  bool IsTurn(const MapTrackResult& result, const MapSnapshot& map) const;
+  // Whether a pose that was found after a loss counts: kNone, or what speaks against it.
+  Doubt DoubtOf(const MapTrackResult& result, const MapSnapshot& map) const;
   void Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out);
   void CollectReports();
   std::optional<Rotation3> RotationFromPrevious() const;
@@ -168,14 +196,17 @@ class Tracker {
   double explained_ = 0;                           // of the last frame
   Rigid3 first_view_from_map_;                     // the pose of the initializer's first view
   Timestamp lost_since_{};
-  bool searched_ = false;  // a map, for the last frame
-  int misfit_frames_ = 0;  // in a row, that no turn explains
+  bool searched_ = false;    // a map, for the last frame
+  int misfit_frames_ = 0;    // in a row, that no turn explains
+  int doubtful_frames_ = 0;  // good ones that are wanted since the last recovery before the map is extended
   // The newest picture whose pose points told, or of a long turn a later one: FollowPicture's measure.
   std::shared_ptr<const ImageFeatures> anchor_;
   Rigid3 anchor_pose_;
   Timestamp last_points_{};  // when points told the pose
   int frames_since_keyframe_ = 0;
-  int frames_since_look_ = 0;  // for a better map
+  int frames_since_look_ = 0;     // for a better map
+  std::uint64_t leader_key_ = 0;  // of two maps that explain the pictures, for so many frames
+  int leader_frames_ = 0;
   // Poses in another map that agree with each other, before it is entered.
   std::uint64_t entering_key_ = 0;
   int entering_frames_ = 0;

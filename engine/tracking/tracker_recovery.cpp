@@ -2,24 +2,52 @@
 // How a tracker comes back after a loss, and from one map to another (ptamm §3.2, §5.3, §6.3).
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "engine/tracking/tracker.h"
 
 namespace docent::engine {
 
-bool Tracker::RecoverNearby(const Frame& frame, TrackedFrame* out) {
+namespace {
+
+// Of all that speaks against a pose in one frame that is told which came nearest.
+void Consider(const Verdict& verdict, TrackedFrame* out) {
+  if (std::tie(verdict.doubt, verdict.inliers) > std::tie(out->verdict.doubt, out->verdict.inliers))
+    out->verdict = verdict;
+}
+
+}  // namespace
+
+// Whether a pose that was found after a loss counts: kNone, or what speaks against it.
+Doubt Tracker::DoubtOf(const MapTrackResult& result, const MapSnapshot& map) const {
+  if (result.inliers < options_.min_recovery_inliers || result.Quality() < options_.min_recovery_quality)
+    return Doubt::kFewPoints;
+  if (!result.converged || result.sigma > options_.max_sigma || !IsTurn(result, map)) return Doubt::kPoorFit;
+  if (result.occupied_cells < options_.min_recovery_cells) return Doubt::kOneCorner;
+  return Doubt::kNone;
+}
+
+bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
   if (frame.time - lost_since_ > FromSeconds(options_.short_loss_s)) return false;
   const auto rotation = RotationFromPrevious();
   const Rigid3 guess = rotation ? motion_.PredictWithRotation(*rotation) : motion_.Predict(frame.time);
   map_tracker_.EnablePanorama(PanoramaFor(guess));
   const MapTrackResult result =
       map_tracker_.Track(*map_, *features_, guess, MapTracker::Effort::kRecovery, &random_);
-  if (Recovered(result)) {
-    out->state = TrackingState::kRelocalized;
-    Accept(frame, result, out);
-    return true;
+  const Doubt doubt = DoubtOf(result, *map_);
+  if (doubt == Doubt::kNone) {
+    // What is poorly seen may be something else that is only alike.
+    std::optional<FoundPlace> rival;
+    if (places && result.Explained() < options_.poor_quality)
+      rival = BestRival(BestPlaces(*places), {map_key_}, out);
+    if (!rival || rival->result.Explained() < options_.better_quality * result.Explained()) {
+      out->state = TrackingState::kRelocalized;
+      Accept(frame, result, out);
+      return true;
+    }
   }
+  Consider({.doubt = doubt, .map_key = map_key_, .inliers = result.inliers}, out);
   map_tracker_.Forget();
   motion_.Reset(frame.time, guess);
   return false;
@@ -45,7 +73,6 @@ std::vector<Tracker::TurnedPlace> Tracker::BestPlaces(const PlaceFinder& places,
   }
   std::stable_sort(turned.begin(), turned.end(),
                    [](const TurnedPlace& a, const TurnedPlace& b) { return a.misfit < b.misfit; });
-  if (turned.size() > options_.candidates) turned.resize(options_.candidates);
   return turned;
 }
 
@@ -58,11 +85,58 @@ MapTrackResult Tracker::TryPlace(const TurnedPlace& place, MapTracker* tracker) 
                         &random_);
 }
 
-void Tracker::BeginEntering(const TurnedPlace& place, const MapTracker& tracker,
-                            const MapTrackResult& result) {
-  entering_key_ = place.candidate.map_key;
-  entering_panorama_ = tracker.panorama();
-  entering_pose_ = result.camera_from_map;
+std::vector<Tracker::FoundPlace> Tracker::FindMaps(const std::vector<TurnedPlace>& places,
+                                                   TrackedFrame* out) {
+  std::vector<FoundPlace> found;
+  std::set<std::uint64_t> tried;
+  for (std::size_t i = 0; i < places.size() && i < options_.candidates && found.empty(); ++i) {
+    const PlaceCandidate& candidate = places[i].candidate;
+    tried.insert(candidate.map_key);
+    const MapTrackResult result = TryPlace(places[i], &rival_tracker_);
+    const Doubt doubt = DoubtOf(result, *candidate.map);
+    Consider({.doubt = doubt, .map_key = candidate.map_key, .inliers = result.inliers}, out);
+    if (doubt == Doubt::kNone) found.push_back({places[i], result, rival_tracker_.panorama()});
+  }
+  if (found.empty()) return found;
+  if (auto rival = BestRival(places, std::move(tried), out)) found.push_back(std::move(*rival));
+  std::stable_sort(found.begin(), found.end(), [](const FoundPlace& a, const FoundPlace& b) {
+    return a.result.Quality() > b.result.Quality();
+  });
+  return found;
+}
+
+std::optional<Tracker::FoundPlace> Tracker::BestRival(const std::vector<TurnedPlace>& places,
+                                                      std::set<std::uint64_t> but_maps, TrackedFrame* out) {
+  std::optional<FoundPlace> best;
+  std::size_t rivals = 0;
+  for (const TurnedPlace& place : places) {
+    if (rivals == options_.rivals) break;
+    if (!but_maps.insert(place.candidate.map_key).second) continue;
+    ++rivals;
+    const MapTrackResult result = TryPlace(place, &rival_tracker_);
+    const Doubt doubt = DoubtOf(result, *place.candidate.map);
+    Consider({.doubt = doubt, .map_key = place.candidate.map_key, .inliers = result.inliers}, out);
+    if (doubt == Doubt::kNone && (!best || result.Quality() > best->result.Quality()))
+      best = FoundPlace{place, result, rival_tracker_.panorama()};
+  }
+  return best;
+}
+
+bool Tracker::ClearlyAhead(std::uint64_t best_key, double best_quality, std::uint64_t second_key,
+                           double second_quality) {
+  const bool ahead = best_quality > second_quality;
+  if (best_key != leader_key_ || !ahead) leader_frames_ = 0;
+  if (ahead) ++leader_frames_;
+  leader_key_ = best_key;
+  // Whoever was in one of them stays there in case of doubt.
+  const double lead = second_key == map_key_ ? options_.better_quality : options_.clear_lead;
+  return ahead && (best_quality >= lead * second_quality || leader_frames_ >= options_.frames_ahead);
+}
+
+void Tracker::BeginEntering(const FoundPlace& found) {
+  entering_key_ = found.place.candidate.map_key;
+  entering_panorama_ = found.panorama;
+  entering_pose_ = found.result.camera_from_map;
   entering_frames_ = 1;
 }
 
@@ -98,12 +172,12 @@ void Tracker::LookForBetterMap(const Frame& frame, const PlaceFinder& places, Tr
     return;
   }
   const auto better = [&](const MapTrackResult& result) {
-    return Recovered(result) && result.Explained() > options_.better_quality * explained_;
+    return result.Explained() > options_.better_quality * explained_;
   };
   MapTrackResult result;
   if (entering_frames_ > 0) {
     const auto map = FollowEntering(places, &rival_tracker_, &result);
-    if (!map || !better(result)) {
+    if (!map || DoubtOf(result, *map) != Doubt::kNone || !better(result)) {
       entering_frames_ = 0;
     } else if (entering_pose_ = result.camera_from_map; ++entering_frames_ >= options_.agreeing_frames) {
       // Once more as its own, so that all that a frame tells is of the new map.
@@ -114,46 +188,99 @@ void Tracker::LookForBetterMap(const Frame& frame, const PlaceFinder& places, Tr
     }
     return;
   }
-  if (++frames_since_look_ < options_.frames_between_looks) return;
+  const bool well_enough = out->quality >= options_.good_quality;
+  if (++frames_since_look_ < options_.frames_between_looks && well_enough) return;
   frames_since_look_ = 0;
-  for (const TurnedPlace& place : BestPlaces(places, map_key_)) {
+  std::vector<TurnedPlace> others = BestPlaces(places, map_key_);
+  if (others.size() > options_.candidates) others.resize(options_.candidates);
+  for (const TurnedPlace& place : others) {
     result = TryPlace(place, &rival_tracker_);
-    if (!better(result)) continue;
-    BeginEntering(place, rival_tracker_, result);
+    if (DoubtOf(result, *place.candidate.map) != Doubt::kNone || !better(result)) continue;
+    BeginEntering({place, result, rival_tracker_.panorama()});
     return;
   }
+}
+
+void Tracker::Unconfirmed(const MapTrackResult& result, TrackedFrame* out) const {
+  out->verdict = {.doubt = Doubt::kUnconfirmed,
+                  .map_key = entering_key_,
+                  .inliers = result.inliers,
+                  .frames = entering_frames_};
+}
+
+// A map that is about to be entered is followed, not searched anew; false when it does not hold. Its poses
+// agree: each is looked for close about the one before.
+bool Tracker::GoOnEntering(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
+  if (entering_frames_ == 0) return false;
+  MapTrackResult result;
+  const auto map = FollowEntering(places, &map_tracker_, &result);
+  const Doubt doubt = map ? DoubtOf(result, *map) : Doubt::kFewPoints;
+  if (doubt != Doubt::kNone) {
+    Consider({.doubt = doubt, .map_key = entering_key_, .inliers = result.inliers}, out);
+    entering_frames_ = 0;
+    return false;
+  }
+  if (const auto rival = BestRival(BestPlaces(places), {entering_key_}, out)) {
+    const std::uint64_t rival_key = rival->place.candidate.map_key;
+    if (!ClearlyAhead(entering_key_, result.Quality(), rival_key, rival->result.Quality())) {
+      entering_frames_ = 0;
+      out->verdict = {.doubt = Doubt::kLookAlikes,
+                      .map_key = entering_key_,
+                      .rival_key = rival_key,
+                      .inliers = result.inliers};
+      return true;
+    }
+  }
+  entering_pose_ = result.camera_from_map;
+  if (++entering_frames_ >= options_.agreeing_frames) {
+    Enter(frame, map, result, out);
+  } else {
+    Unconfirmed(result, out);
+  }
+  return true;
+}
+
+// Into the map that the camera was in: once more as its own, so that all that the frame tells is of it.
+void Tracker::Return(const Frame& frame, const FoundPlace& found, TrackedFrame* out) {
+  entering_frames_ = 0;
+  map_tracker_.Clear();
+  map_tracker_.EnablePanorama(found.panorama);
+  const MapTrackResult result = map_tracker_.Track(*map_, *features_, found.result.camera_from_map,
+                                                   MapTracker::Effort::kUsual, &random_);
+  if (const Doubt doubt = DoubtOf(result, *map_); doubt != Doubt::kNone) {
+    Consider({.doubt = doubt, .map_key = map_key_, .inliers = result.inliers}, out);
+    return;
+  }
+  out->state = TrackingState::kRelocalized;
+  out->hint.clear();
+  Accept(frame, result, out);
 }
 
 void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
   out->state = map_ || !options_.build_maps ? TrackingState::kLost : TrackingState::kInitializing;
   out->hint = "look back at what was mapped";
-  if (map_ && RecoverNearby(frame, out)) return;
-  if (!places) return;
-  MapTrackResult result;
-  // A map that is about to be entered is followed, not searched anew.
-  if (entering_frames_ > 0) {
-    if (const auto map = FollowEntering(*places, &map_tracker_, &result); map && Recovered(result)) {
-      entering_pose_ = result.camera_from_map;
-      if (++entering_frames_ < options_.agreeing_frames) return;
-      Enter(frame, map, result, out);
-      return;
-    }
-    entering_frames_ = 0;
-  }
-  for (const TurnedPlace& place : BestPlaces(*places)) {
-    const PlaceCandidate& candidate = place.candidate;
-    result = TryPlace(place, &map_tracker_);
-    if (!Recovered(result)) continue;
-    if (candidate.map_key == map_key_) {
-      out->state = TrackingState::kRelocalized;
-      out->hint.clear();
-      Accept(frame, result, out);
-    } else {
-      BeginEntering(place, map_tracker_, result);
-    }
+  if (map_ && RecoverNearby(frame, places, out)) return;
+  if (!places || GoOnEntering(frame, *places, out)) return;
+  map_tracker_.Clear();
+  const std::vector<FoundPlace> found = FindMaps(BestPlaces(*places), out);
+  if (found.empty()) return;
+  const auto key = [&](std::size_t i) { return found[i].place.candidate.map_key; };
+  if (found.size() > 1 &&
+      !ClearlyAhead(key(0), found[0].result.Quality(), key(1), found[1].result.Quality())) {
+    // In case of doubt the camera is still where it was.
+    const auto own = std::find_if(found.begin(), found.end(), [&](const FoundPlace& place) {
+      return place.place.candidate.map_key == map_key_;
+    });
+    if (own != found.end()) return Return(frame, *own, out);
+    out->verdict = {.doubt = Doubt::kLookAlikes,
+                    .map_key = key(0),
+                    .rival_key = key(1),
+                    .inliers = found[0].result.inliers};
     return;
   }
-  map_tracker_.Clear();
+  if (key(0) == map_key_) return Return(frame, found[0], out);
+  BeginEntering(found[0]);
+  Unconfirmed(found[0].result, out);
 }
 
 }  // namespace docent::engine

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdlib>
@@ -16,7 +17,8 @@
 // Feeds the decoders of a library's binary columns. The first byte chooses the decoder; the rest is the
 // records, put into an envelope whose magic and checksum are right, because what is behind them is to be
 // reached. What is decoded must encode to the same bytes again: a decoder that ignores something would break
-// that. No allocation may be larger than four times the bytes.
+// that. No allocation may be larger than four times the column's bytes, or than a few things that do not
+// grow with them.
 namespace {
 
 using docent::maps::Bytes;
@@ -36,13 +38,13 @@ Bytes Enveloped(const docent::maps::EnvelopeKind& kind, std::uint64_t count,
   return docent::maps::FinishEnvelope(std::move(writer));
 }
 
-// Sentences, maps of a few things; and what OpenCV, libpng and zlib work with.
-constexpr std::size_t kSmallThings = 1024, kPictureWorkspace = 1 << 17;
+// Sentences; and what zlib works with, 32 KiB that were decompressed last among it.
+constexpr std::size_t kSmallThings = 512, kPictureWorkspace = 40 << 10;
 
-// Runs a decoder with its allocations limited by the size of what it reads.
+// Runs a decoder with its allocations limited by the size of what it reads, or by what any input takes.
 template <typename Decode>
-auto Limited(std::size_t bytes, std::size_t besides, const Decode& decode) {
-  const AllocationLimit limit(4 * bytes + besides);
+auto Limited(std::size_t bytes, std::size_t at_least, const Decode& decode) {
+  const AllocationLimit limit(std::max(4 * bytes, at_least));
   return decode();
 }
 

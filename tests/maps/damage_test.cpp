@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include "engine/base/error.h"
 #include "engine/base/random.h"
@@ -28,14 +27,7 @@ class Damage : public ::testing::Test {
   Library Open(Access access, CreateIfMissing create = CreateIfMissing::kNo) const {
     return Library::Open(file_, access, create, QuickOptions());
   }
-  void RunSql(const std::string& sql) const {
-    sqlite3* connection = nullptr;
-    ASSERT_EQ(sqlite3_open(file_.c_str(), &connection), SQLITE_OK);
-    char* message = nullptr;
-    EXPECT_EQ(sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
-    sqlite3_free(message);
-    sqlite3_close(connection);
-  }
+  void RunSql(const std::string& sql) const { maps::RunSql(file_, sql); }
   std::vector<std::string> Verify() const { return Open(Access::kReadOnly).Verify(); }
   // Opening fails with one sentence about the file, changes none of its bytes and leaves nothing beside it.
   void ExpectRefused(const std::string& part_of_sentence) const {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/maps/map_samples.h"
 
+#include <sqlite3.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <set>
@@ -133,6 +135,37 @@ std::shared_ptr<MapSnapshot> MakeSampleMap(std::uint64_t seed, const SampleOptio
   return map;
 }
 
+std::shared_ptr<engine::MapSnapshot> MakeTrueMap(int keyframes, double step) {
+  auto map = MakeSampleMap(1, {.keyframes = keyframes, .points = 0, .width_px = 320, .height_px = 240});
+  map->panoramas.clear();
+  for (std::size_t i = 0; i < map->keyframes.size(); ++i) {
+    engine::KeyFrame& keyframe = map->keyframes[i];
+    keyframe.kind = engine::KeyFrameKind::kSixDof;
+    keyframe.panorama = engine::kNoId;
+    keyframe.fixed = i < 2;  // two hold the scale
+    keyframe.camera = map->keyframes.front().camera;
+    const double x = step * static_cast<double>(i);
+    keyframe.camera_from_map = {engine::Rotation3::Exp({0.01 * x, -0.1 * x, 0.02}), {-x, 0.02 * x, 0.1 * x}};
+  }
+  for (std::uint32_t i = 0; i < 300; ++i) {
+    engine::MapPoint point;
+    point.id = i;
+    const double x = -1.2 + 0.15 * (i % 20), y = -0.9 + 0.12 * (i / 20);
+    point.point_in_map = {x, y, 3 + 0.4 * std::sin(3 * x) * std::cos(2 * y), 1};
+    point.source_keyframe = map->keyframes.front().id;
+    map->points.push_back(point);
+  }
+  map->next_point = 300;
+  for (const engine::KeyFrame& keyframe : map->keyframes) {
+    for (const engine::MapPoint& point : map->points) {
+      const auto pixel = keyframe.camera->Project(keyframe.camera_from_map * point.position());
+      if (pixel && keyframe.camera->IsInside(*pixel, 1))
+        map->observations.push_back({keyframe.id, point.id, pixel->cast<float>(), 0});
+    }
+  }
+  return map;
+}
+
 void AddSampleKeyFrame(std::uint64_t seed, const Eigen::Vector3d& center, MapSnapshot* map) {
   map->keyframes.push_back(MakeKeyFrame(map->next_keyframe++, center, seed, map->keyframes.front().camera));
   ++map->revision;
@@ -226,6 +259,17 @@ void WriteWholeFile(const fs::path& path, std::span<const std::uint8_t> bytes) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (!file) throw std::runtime_error("cannot write " + path.string());
+}
+
+void RunSql(const std::filesystem::path& file, const std::string& sql) {
+  sqlite3* connection = nullptr;
+  char* message = nullptr;
+  int result = sqlite3_open(file.c_str(), &connection);
+  if (result == SQLITE_OK) result = sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, &message);
+  const std::string problem = message ? message : sqlite3_errstr(result);
+  sqlite3_free(message);
+  sqlite3_close(connection);
+  if (result != SQLITE_OK) throw Error(file.string() + ": " + sql + ": " + problem);
 }
 
 std::string FilesIn(const fs::path& folder) {

@@ -23,6 +23,9 @@ struct SampleOptions {
 // Keyframes along a path with pictures of noise over a gradient, two cameras, finite and infinite points,
 // each seen from some keyframes. Valid, and different for each seed.
 std::shared_ptr<engine::MapSnapshot> MakeSampleMap(std::uint64_t seed, const SampleOptions& options = {});
+// A map as the engine makes them: points on a wavy wall, seen where they are, by keyframes in a row that are
+// `step` apart.
+std::shared_ptr<engine::MapSnapshot> MakeTrueMap(int keyframes = 6, double step = 0.2);
 // One more keyframe at `center`, with the picture of `seed`.
 void AddSampleKeyFrame(std::uint64_t seed, const Eigen::Vector3d& center, engine::MapSnapshot* map);
 
@@ -52,6 +55,8 @@ LibraryOptions QuickOptions();
 
 Bytes ReadWholeFile(const std::filesystem::path& path);
 void WriteWholeFile(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+// Changes a library behind its back. Throws docent::Error with what SQLite has against it.
+void RunSql(const std::filesystem::path& file, const std::string& sql);
 // The names in a folder, sorted, separated by spaces.
 std::string FilesIn(const std::filesystem::path& folder);
 // The sentence of the docent::Error that `body` throws; "no error" when it throws none.

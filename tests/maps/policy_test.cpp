@@ -4,7 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "maps/exchange.h"
 #include "maps/library.h"
+#include "maps/saver.h"
+#include "maps/upkeep.h"
 #include "tests/maps/map_samples.h"
 
 namespace docent::maps {
@@ -158,6 +161,67 @@ TEST_P(EveryPolicy, IsAskedForANewName) {
 
 TEST_P(EveryPolicy, IsAskedForRemoval) {
   ExpectAnswer(structure(), [&] { library_.Remove(key_); });
+}
+
+TEST_P(EveryPolicy, IsAskedByTheSaverInTheBackground) {
+  auto changed = std::make_shared<engine::MapSnapshot>(*map_);
+  changed->points[0].point_in_map.x() += 1;
+  Saver saver(&library_);
+  const auto save = [&](MapRecord record) {
+    saver.Submit(std::move(record));
+    saver.Flush();
+    if (const auto error = saver.TakeError()) std::rethrow_exception(error);
+  };
+  ExpectAnswer(structure(), [&] { save({key_, "", Policy::kOpen, changed, nullptr}); });
+  ExpectAnswer(content(), [&] { save({key_, "", Policy::kOpen, nullptr, MakeSampleScene(9, 2)}); });
+}
+
+TEST_P(EveryPolicy, IsAskedWhenAnAdjustedMapIsSavedOverTheOldOne) {
+  auto changed = std::make_shared<engine::MapSnapshot>(*map_);
+  for (engine::MapPoint& point : changed->points) {
+    if (!point.infinite()) point.point_in_map.head<3>() *= 1.001;
+  }
+  ++changed->revision;
+  MapRecord record{key_, "", Policy::kOpen, changed, nullptr};
+  record.over_revision = map_->revision;
+  ExpectAnswer(structure(), [&] { EXPECT_TRUE(library_.Save(record)); });
+  if (!structure()) return;
+  const auto saved = library_.Find(key_);
+  EXPECT_FALSE(library_.Save(record)) << "somebody has changed it since";
+  EXPECT_EQ(library_.Find(key_), saved);
+}
+
+TEST_P(EveryPolicy, IsAskedWhenTheMapIsOptimized) {
+  auto crooked = std::make_shared<engine::MapSnapshot>(*MakeTrueMap());
+  for (engine::MapPoint& point : crooked->points) point.point_in_map.z() += point.id % 2 == 0 ? 0.02 : -0.02;
+  Library library = Library::Open(folder_ / "b.docent", Access::kReadWrite, CreateIfMissing::kYes);
+  const std::uint64_t key = library.NewKey();
+  library.Save({key, "Crooked", GetParam(), crooked, nullptr});
+  const Optimization result = OptimizeMap(&library, key, nullptr);
+  const bool same = FirstDifference(*library.Load(key).snapshot, *crooked).empty();
+  EXPECT_EQ(result.outcome,
+            structure() ? Optimization::Outcome::kAdjusted : Optimization::Outcome::kNotAllowed);
+  EXPECT_EQ(same, !structure());
+}
+
+TEST_P(EveryPolicy, GoesWithTheMapThroughAnImportThatTouchesNoMapOfThatName) {
+  const auto before = library_.Load(key_);
+  {
+    Library other =
+        Library::Open(folder_ / "b.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+    other.Save({other.NewKey(), "Desk", GetParam(), MakeSampleMap(8), MakeSampleScene(8, 1)});
+    ImportMaps(other, folder_ / "a.docent");
+  }
+  const auto after = library_.Load(key_);
+  EXPECT_EQ(after.info, before.info);
+  EXPECT_EQ(FirstDifference(*after.snapshot, *before.snapshot), "");
+  EXPECT_EQ(FirstDifference(after.scene, before.scene), "");
+  key_ = library_.FindByName("Desk (2)").key;
+  EXPECT_EQ(library_.Find(key_).policy, GetParam());
+  ExpectAnswer(structure(), [&] {
+    library_.Save({key_, "", Policy::kOpen, MakeSampleMap(8, {.points = 50}), nullptr});
+  });
+  ExpectAnswer(content(), [&] { library_.Save({key_, "", Policy::kOpen, nullptr, MakeSampleScene(9, 2)}); });
 }
 
 TEST_P(EveryPolicy, IsLoosenedBySetPolicyAlone) {

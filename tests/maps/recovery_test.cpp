@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include "engine/base/error.h"
 #include "engine/base/random.h"
@@ -25,14 +24,7 @@ class Recovering : public ::testing::Test {
       library.Save({library.NewKey(), NameOf(i), Policy::kOpen, maps_[i], MakeSampleScene(i, 1)});
   }
   static std::string NameOf(std::size_t i) { return "map number " + std::to_string(i); }
-  void RunSql(const std::string& sql) const {
-    sqlite3* connection = nullptr;
-    ASSERT_EQ(sqlite3_open(file_.c_str(), &connection), SQLITE_OK);
-    char* message = nullptr;
-    EXPECT_EQ(sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
-    sqlite3_free(message);
-    sqlite3_close(connection);
-  }
+  void RunSql(const std::string& sql) const { maps::RunSql(file_, sql); }
   Library OpenRecovered() const {
     return Library::Open(target_, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
   }

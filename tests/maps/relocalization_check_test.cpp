@@ -101,6 +101,8 @@ TEST(RelocalizationCheck, FindsWhatOthersHoldUpAndMissesWhatStandsAlone) {
     found_in_cells += cell.found;
     EXPECT_EQ(cell.direction, 0) << "all look the same way";
     EXPECT_EQ(cell.square.y(), 0) << "nobody stands ahead of the others";
+    EXPECT_LT((cell.view - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+    EXPECT_LT((cell.place - Eigen::Vector3d(cell.square.x() * grid.side, 0, 0)).norm(), 1e-9);
   }
   EXPECT_EQ(in_cells, 9);
   EXPECT_EQ(found_in_cells, found);

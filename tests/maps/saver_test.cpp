@@ -133,6 +133,44 @@ TEST_F(SaverTest, AFullQueueMakesAnotherMapWaitButNotANewerStateOfTheSame) {
   EXPECT_EQ(library_->List().size(), 3u);
 }
 
+TEST_F(SaverTest, UpkeepGivesWayToASave) {
+  const std::uint64_t key = library_->NewKey();
+  std::atomic<int> begun = 0, given_way = 0;
+  Saver saver(&*library_, 16, {}, [&](const std::atomic<bool>& interrupt) {
+    ++begun;
+    // Without end, but for the interruption.
+    while (!interrupt) std::this_thread::yield();
+    ++given_way;
+    return true;
+  });
+  for (std::uint64_t round = 1; round < 5; ++round) {
+    const int before = begun;
+    while (begun == before) std::this_thread::yield();
+    saver.Submit({key, "Desk", Policy::kOpen, MakeSampleMap(round), nullptr});
+    saver.Flush();
+    EXPECT_EQ(FirstDifference(*library_->Load(key).snapshot, *MakeSampleMap(round)), "");
+  }
+  saver.EndUpkeep();
+  const int at_the_end = begun;
+  EXPECT_EQ(given_way, at_the_end);
+  saver.Submit({key, "Desk", Policy::kOpen, MakeSampleMap(9), nullptr});
+  saver.Flush();
+  EXPECT_EQ(begun, at_the_end) << "ended for good";
+  EXPECT_EQ(saver.TakeError(), nullptr);
+}
+
+TEST_F(SaverTest, UpkeepGoesOnAfterASaveAndItsFailureIsTold) {
+  std::atomic<int> begun = 0;
+  Saver saver(&*library_, 16, {}, [&](const std::atomic<bool>&) -> bool {
+    if (++begun == 3) throw Error("no upkeep");
+    return begun < 3;
+  });
+  while (begun < 4) std::this_thread::yield();
+  const std::exception_ptr error = saver.TakeError();
+  ASSERT_NE(error, nullptr);
+  EXPECT_THROW(std::rethrow_exception(error), Error);
+}
+
 TEST_F(SaverTest, ManyThreadsSubmitListAndLoadAtOnce) {
   const std::uint64_t first = library_->NewKey();
   for (int i = 1; i < 4; ++i) library_->NewKey();

@@ -4,45 +4,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <mutex>
+#include <thread>
+
 #include "engine/base/random.h"
+#include "engine/vision/features.h"
 #include "tests/maps/map_samples.h"
 
 namespace docent::maps {
 namespace {
 
 using ::testing::IsEmpty;
-
-// A map as the engine makes them: points on a wavy wall, seen where they are, by keyframes in a row.
-std::shared_ptr<engine::MapSnapshot> MakeTrueMap() {
-  auto map = MakeSampleMap(1, {.keyframes = 6, .points = 0, .width_px = 320, .height_px = 240});
-  map->panoramas.clear();
-  for (std::size_t i = 0; i < map->keyframes.size(); ++i) {
-    engine::KeyFrame& keyframe = map->keyframes[i];
-    keyframe.kind = engine::KeyFrameKind::kSixDof;
-    keyframe.panorama = engine::kNoId;
-    keyframe.fixed = i < 2;  // two hold the scale
-    keyframe.camera = map->keyframes.front().camera;
-    const double x = 0.2 * static_cast<double>(i);
-    keyframe.camera_from_map = {engine::Rotation3::Exp({0.01 * x, -0.1 * x, 0.02}), {-x, 0.02 * x, 0.1 * x}};
-  }
-  for (std::uint32_t i = 0; i < 300; ++i) {
-    engine::MapPoint point;
-    point.id = i;
-    const double x = -1.2 + 0.15 * (i % 20), y = -0.9 + 0.12 * (i / 20);
-    point.point_in_map = {x, y, 3 + 0.4 * std::sin(3 * x) * std::cos(2 * y), 1};
-    point.source_keyframe = map->keyframes.front().id;
-    map->points.push_back(point);
-  }
-  map->next_point = 300;
-  for (const engine::KeyFrame& keyframe : map->keyframes) {
-    for (const engine::MapPoint& point : map->points) {
-      const auto pixel = keyframe.camera->Project(keyframe.camera_from_map * point.position());
-      if (pixel && keyframe.camera->IsInside(*pixel, 1))
-        map->observations.push_back({keyframe.id, point.id, pixel->cast<float>(), 0});
-    }
-  }
-  return map;
-}
 
 TEST(Upkeep, BringsAMapThatWasLeftCrookedBackToTheTruth) {
   const TemporaryFolder folder;
@@ -79,6 +51,65 @@ TEST(Upkeep, BringsAMapThatWasLeftCrookedBackToTheTruth) {
     EXPECT_NE(OptimizeMap(&library, key, &interrupt).outcome, Optimization::Outcome::kAdjusted);
   }
   EXPECT_THAT(library.Verify(), IsEmpty());
+}
+
+TEST(Upkeep, TakesContentAlongWithItsGround) {
+  const TemporaryFolder folder;
+  Library library = Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes);
+  auto crooked = std::make_shared<engine::MapSnapshot>(*MakeTrueMap());
+  Random random(4);
+  for (engine::MapPoint& point : crooked->points) point.point_in_map[2] += random.Uniform(-0.02, 0.02);
+  const std::uint64_t key = library.NewKey();
+  library.Save({key, "a", Policy::kOpen, crooked, std::make_shared<SceneRecord>(SceneRecord{"here", {}})});
+  const auto move = [&](const SceneRecord& scene, const engine::MapSnapshot& before,
+                        const engine::MapSnapshot& after) {
+    EXPECT_EQ(scene.text, "here");
+    EXPECT_EQ(FirstDifference(before, *crooked), "");
+    EXPECT_NE(FirstDifference(after, *crooked), "");
+    return std::make_shared<SceneRecord>(SceneRecord{"there", {}});
+  };
+  ASSERT_EQ(OptimizeMap(&library, key, nullptr, move).outcome, Optimization::Outcome::kAdjusted);
+  EXPECT_EQ(library.Load(key).scene.text, "there");
+}
+
+TEST(Upkeep, LeavesAMapThatAnotherProgramHasChangedMeanwhile) {
+  const TemporaryFolder folder;
+  LibraryOptions options;
+  std::optional<Library> other;
+  std::uint64_t key = 0;
+  auto crooked = std::make_shared<engine::MapSnapshot>(*MakeTrueMap());
+  for (engine::MapPoint& point : crooked->points) point.point_in_map.z() += point.id % 2 == 0 ? 0.02 : -0.02;
+  const auto theirs = MakeSampleMap(5);
+  theirs->revision = crooked->revision + 7;
+  // The other one saves while this one reads the pictures: after its transaction saw the file.
+  std::once_flag once;
+  std::jthread saves;
+  options.make_features = [&](const cv::Mat& gray) {
+    std::call_once(once, [&] {
+      saves = std::jthread([&] { other->Save({key, "", Policy::kOpen, theirs, nullptr}); });
+      saves.join();
+    });
+    return engine::MakeFeatures(gray);
+  };
+  Library library = Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, options);
+  key = library.NewKey();
+  library.Save({key, "Desk", Policy::kOpen, crooked, nullptr});
+  other.emplace(Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kNo, QuickOptions()));
+  EXPECT_EQ(OptimizeMap(&library, key, nullptr).outcome, Optimization::Outcome::kChangedMeanwhile);
+  EXPECT_EQ(FirstDifference(*other->Load(key).snapshot, *theirs), "");
+}
+
+TEST(Upkeep, TakesRedundantKeyframesOutOfAMapThatRests) {
+  auto map = std::make_shared<engine::MapSnapshot>(*MakeTrueMap(12, 0.02));
+  ASSERT_EQ(engine::Validate(*map), "");
+  const AdjustedMap adjusted = AdjustRestingMap(*map, nullptr);
+  ASSERT_EQ(adjusted.optimization.outcome, Optimization::Outcome::kAdjusted);
+  EXPECT_EQ(adjusted.optimization.keyframes_removed, 4u) << "all but the eight that every map keeps";
+  EXPECT_EQ(adjusted.snapshot->keyframes.size(), 8u);
+  EXPECT_EQ(adjusted.snapshot->points.size(), map->points.size()) << "no point is lost";
+  EXPECT_EQ(adjusted.optimization.observations_removed, 0u);
+  EXPECT_EQ(engine::Validate(*adjusted.snapshot), "");
+  EXPECT_GT(adjusted.snapshot->revision, map->revision);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <numbers>
 #include <opencv2/videoio.hpp>
 
 #include "tests/ui/ui_testing.h"
@@ -70,6 +71,27 @@ TEST(MapView, LooksStraightDownFromAbove) {
 }
 
 using MapViewPicture = OffscreenTest;
+
+TEST_F(MapViewPicture, ShowsWhereAndWhitherALostCameraIsFoundAgain) {
+  const engine::MapSnapshot map;
+  Orbit orbit;
+  orbit.distance_m = 4;
+  orbit.elevation = std::numbers::pi / 2;
+  MapView view;
+  cv::Mat picture;
+  const std::vector<FoundAgain> found = {{{0, 0, 0}, {0, 0, 1}, 2.0, 1.0}, {{0, 0, 0}, {0, 0, -1}, 2.0, 0.0}};
+  view.Draw(map, nullptr, orbit, {}, found);
+  view.ReadBack(&picture);
+  // From above +z is up the picture: green there, red below, on the middle column.
+  const int x = picture.cols / 2;
+  const int step = picture.rows / 12;
+  const auto ahead = picture.at<cv::Vec3b>(picture.rows / 2 - step, x);
+  const auto behind = picture.at<cv::Vec3b>(picture.rows / 2 + step, x);
+  EXPECT_GT(ahead[1], ahead[2] + 60);
+  EXPECT_GT(behind[2], behind[1] + 60);
+  const auto aside = picture.at<cv::Vec3b>(picture.rows / 2 + 3, x + step);
+  EXPECT_LT(std::abs(aside[1] - aside[2]), 40) << "nothing was tried there";
+}
 
 TEST_F(MapViewPicture, ShowsThePointsOfAMapInColour) {
   engine::MapSnapshot map;

@@ -13,59 +13,16 @@
 #include "app/session/frame_loop.h"
 #include "app/session/surface_at_pixel.h"
 #include "app/simulator/simulation.h"
+#include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
 namespace {
 
+using namespace simulated_session;
+
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-std::shared_ptr<const Simulation> Room(double seconds) {
-  SimulationOptions options;
-  options.duration_s = seconds;
-  return MakeSimulation("museum:2", options);
-}
-
-CalibratedCamera CameraOf(const std::shared_ptr<const Simulation>& simulation) {
-  return Calibrate(OpenSimulation(simulation), std::nullopt);
-}
-
-struct Seen {
-  std::vector<engine::TrackedFrame> frames;
-  int poses = 0;
-};
-
-// Feeds a whole simulation to a session.
-Seen Feed(const std::shared_ptr<const Simulation>& simulation, Pace pace, Session* session,
-          std::vector<TimedCommand> script = {}, const std::filesystem::path& model_folder = {}) {
-  CalibratedCamera camera = CameraOf(simulation);
-  FrameLoopOptions loop;
-  loop.pace = pace;
-  loop.script = std::move(script);
-  loop.script_name = "script";
-  loop.model_folder = model_folder;
-  Seen seen;
-  RunFrames(&camera, session, loop,
-            [&](const engine::TrackedFrame& frame) {
-              seen.frames.push_back(frame);
-              seen.poses += engine::HasPose(frame.state);
-            },
-            {});
-  session->Finish();
-  return seen;
-}
-
-SessionOptions Options(Pace pace, const std::string& first_map) {
-  SessionOptions options;
-  options.threaded = pace != Pace::kLockstep;
-  options.first_map = first_map;
-  return options;
-}
-
-std::vector<std::shared_ptr<const engine::CameraModel>> LensOf(const Simulation& simulation) {
-  return {std::make_shared<engine::CameraModel>(simulation.camera())};
-}
 
 TEST(Session, MapsEagerlyOnAThreadOfItsOwnAndDropsNothing) {
   const auto simulation = Room(3);
@@ -147,6 +104,32 @@ TEST(Session, KeepsWhatIsPlacedUndoneAndRedoneInTheLibrary) {
 }
 
 // A camera that only turns gives a map of directions, which has no place for anything.
+TEST(Session, SaysWhyAVisitorElsewhereIsNotFoundWithoutFloodingTheEvents) {
+  const TemporaryFolder folder;
+  const auto file = folder / "a.docent";
+  const auto simulation = Room(3);
+  {
+    auto library = maps::Library::Open(file, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    Session session(Options(Pace::kLockstep, "map"), LensOf(*simulation), &library);
+    Feed(simulation, Pace::kLockstep, &session);
+  }
+  auto library = maps::Library::Open(file, maps::Access::kReadOnly);
+  ASSERT_EQ(library.List().size(), 1u);
+  SimulationOptions elsewhere;
+  elsewhere.duration_s = 2.5;
+  const std::shared_ptr<const Simulation> other = MakeSimulation("room", elsewhere);
+  SessionOptions options = Options(Pace::kLockstep, "");
+  options.may_write = false;
+  Session session(options, LensOf(*other), &library);
+  const Seen seen = Feed(other, Pace::kLockstep, &session);
+  EXPECT_EQ(seen.poses, 0);
+  int told = 0;
+  for (const Event& event : session.TakeEvents()) told += event.event == "not sure";
+  EXPECT_GE(told, 1);
+  EXPECT_LE(told, 3);
+  EXPECT_THAT(seen.frames.back().hint, HasSubstr("not sure: "));
+}
+
 TEST(Session, NeverSavesAMapOfDirectionsAlone) {
   const auto simulation = std::shared_ptr<const Simulation>(MakeSimulation("cylinder:0"));
   const TemporaryFolder folder;

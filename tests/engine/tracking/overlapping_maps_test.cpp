@@ -3,18 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <map>
 #include <vector>
 
 #include "engine/base/random.h"
 #include "engine/tracking/tracker.h"
 #include "tests/engine/rendered_world.h"
+#include "tests/engine/some_maps.h"
 
 namespace docent::engine {
 namespace {
 
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
+using testing_world::SomeMaps;
 
 const std::shared_ptr<const CameraModel>& Camera() {
   static const auto camera = testing_world::PinholeCamera(320, 240);
@@ -38,43 +39,22 @@ std::shared_ptr<const MapSnapshot> MapFrom(double x, std::size_t spoilt) {
   return map.Snapshot();
 }
 
-// Every keyframe of some maps, compared by thumbnail.
-class Maps : public PlaceFinder {
- public:
-  void Add(std::uint64_t key, std::shared_ptr<const MapSnapshot> map) { maps_[key] = std::move(map); }
-  const std::shared_ptr<const MapSnapshot>& At(std::uint64_t key) const { return maps_.at(key); }
-  std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage& image, int count, int,
-                                         std::uint64_t only_map) const override {
-    std::vector<PlaceCandidate> found;
-    for (const auto& [key, map] : maps_) {
-      if (only_map != 0 && only_map != key) continue;
-      for (const KeyFrame& keyframe : map->keyframes)
-        found.push_back({key, map, keyframe.id, Difference(keyframe.features->small_blurry, image)});
-    }
-    std::sort(found.begin(), found.end(),
-              [](const auto& a, const auto& b) { return a.difference < b.difference; });
-    found.resize(std::min<std::size_t>(found.size(), static_cast<std::size_t>(count)));
-    return found;
-  }
-
- private:
-  std::map<std::uint64_t, std::shared_ptr<const MapSnapshot>> maps_;
-};
-
 // Walks from where map 1 was made to where map 2 was; the map that each frame was tracked in.
-std::vector<std::uint64_t> Walk(const Maps& maps, bool build_maps) {
+std::vector<std::uint64_t> Walk(const SomeMaps& maps, bool build_maps) {
   TrackerOptions options;
   options.build_maps = build_maps;
   Tracker tracker(options, Camera(), 3);
   tracker.SetMap(maps.At(1), 1);
   std::vector<std::uint64_t> keys;
+  SomeMaps first_alone;
+  first_alone.Add(1, maps.At(1));
   for (int i = 0; i < 40; ++i) {
     Frame frame;
     frame.time = FromSeconds(i / 30.0);
     frame.index = static_cast<std::uint64_t>(i);
     const Rigid3 truth = CameraAt({0.1 + 0.012 * i, 0.02, 0.03});
     frame.picture = World().Render(*Camera(), truth, 1.5, frame.index + 1);
-    const TrackedFrame tracked = tracker.Track(frame, &maps);
+    const TrackedFrame tracked = tracker.Track(frame, i < 5 ? &first_alone : &maps);
     EXPECT_TRUE(HasPose(tracked.state) || i < 3) << i;
     if (HasPose(tracked.state)) {
       EXPECT_LT((tracked.camera_from_map.OriginInSource() - truth.OriginInSource()).norm(), 0.03) << i;
@@ -85,24 +65,24 @@ std::vector<std::uint64_t> Walk(const Maps& maps, bool build_maps) {
 }
 
 TEST(OverlappingMaps, AreLeftForTheOneThatFitsBetter) {
-  Maps maps;
+  SomeMaps maps;
   maps.Add(1, MapFrom(0, 2));
   maps.Add(2, MapFrom(0.4, 1));
   const auto keys = Walk(maps, false);
-  EXPECT_EQ(keys[4], 1u) << "there the first map's keyframes are nearest";
+  EXPECT_EQ(keys[4], 1u);
   EXPECT_EQ(keys.back(), 2u);
   EXPECT_TRUE(std::is_sorted(keys.begin() + 4, keys.end())) << "once, and not to and fro";
 }
 
 TEST(OverlappingMaps, AreKeptWhileTheyAreWellSeen) {
-  Maps maps;
+  SomeMaps maps;
   maps.Add(1, MapFrom(0, 1));
   maps.Add(2, MapFrom(0.4, 1));
   EXPECT_EQ(Walk(maps, false).back(), 1u);
 }
 
 TEST(OverlappingMaps, AreKeptWhileTheyGrow) {
-  Maps maps;
+  SomeMaps maps;
   maps.Add(1, MapFrom(0, 2));
   maps.Add(2, MapFrom(0.4, 1));
   EXPECT_EQ(Walk(maps, true).back(), 1u);

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/map_panel.h"
+
+#include <utility>
+
+#include "app/session/surface_at_pixel.h"
+#include "maps/relocalization_check.h"
+
+namespace docent::app {
+
+std::vector<ui::FoundAgain> PredictFoundAgain(const engine::MapSnapshot& map, const std::stop_token& stop) {
+  const auto trials =
+      maps::LeaveEachKeyFrameOut(map, {}, [&](std::size_t) { return !stop.stop_requested(); });
+  std::vector<ui::FoundAgain> found;
+  if (trials.empty()) return found;
+  const maps::RelocalizationGrid grid = maps::MakeRelocalizationGrid(map, trials, UpInMap(map));
+  for (const maps::RelocalizationCell& cell : grid.cells)
+    found.push_back({cell.place, cell.view, grid.side, static_cast<double>(cell.found) / cell.trials});
+  return found;
+}
+
+MapPanel::~MapPanel() {
+  worker_.reset();
+}
+
+void MapPanel::Predict(const std::shared_ptr<const engine::MapSnapshot>& map, std::uint64_t key) {
+  if (worker_ && !worker_->finished()) return;
+  if (predicted_key_ == key && predicted_keyframes_ == map->keyframes.size()) return;
+  if (predicted_key_ != key) {
+    const std::scoped_lock lock(mutex_);
+    found_again_.clear();
+  }
+  predicted_key_ = key;
+  predicted_keyframes_ = map->keyframes.size();
+  worker_.emplace("found-again", [this, map](const std::stop_token& stop) {
+    std::vector<ui::FoundAgain> found = PredictFoundAgain(*map, stop);
+    const std::scoped_lock lock(mutex_);
+    found_again_ = std::move(found);
+  });
+}
+
+void MapPanel::Draw(const ShownFrame& frame, int width_px, int height_px) {
+  if (!view_ || width_px_ != width_px || height_px_ != height_px) {
+    view_.emplace(ui::MapViewOptions{.width_px = width_px, .height_px = height_px});
+    width_px_ = width_px;
+    height_px_ = height_px;
+  }
+  const auto& map = frame.tracked.map;
+  if (!map || map->keyframes.empty()) return;
+  Predict(map, frame.tracked.map_key);
+  const ui::Orbit orbit = ui::OrbitAbove(*map, static_cast<double>(width_px) / height_px);
+  const std::scoped_lock lock(mutex_);
+  view_->Draw(*map, frame.shown.scene.get(), orbit, frame.shown.map_name, found_again_);
+}
+
+void MapPanel::Present(int width_px, int height_px) {
+  if (view_) view_->Present(width_px, height_px);
+}
+
+}  // namespace docent::app

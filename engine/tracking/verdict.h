@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+// The answer of a camera that is lost and has found places that its picture resembles: a pose, or why there
+// is none. A pose is believed by its geometry alone (ptamm §5.3, §6.3): enough points, well fitted, spread
+// over the picture, the best map clearly ahead of the others, and, in a map that it was not in before, for
+// several frames. Plain values.
+namespace docent::engine {
+
+enum class Doubt : std::uint8_t {
+  kNone,
+  kFewPoints,   // too few of the points of any place are found
+  kPoorFit,     // points are found, but no pose explains them
+  kOneCorner,   // they are gathered in a part of the picture
+  kLookAlikes,  // another map explains the picture nearly as well
+  kUnconfirmed  // it is right in this picture, but not in several in a row yet
+};
+
+// What came nearest to a pose in one frame.
+struct Verdict {
+  Doubt doubt = Doubt::kNone;
+  std::uint64_t map_key = 0, rival_key = 0;  // the rival is of kLookAlikes alone
+  int inliers = 0;                           // points that agree
+  int frames = 0;                            // that agreed so far, of kUnconfirmed
+};
+
+}  // namespace docent::engine

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "engine/recognition/place.h"
+
+namespace docent::engine::testing_world {
+
+// Every keyframe of some maps, compared by thumbnail.
+class SomeMaps : public PlaceFinder {
+ public:
+  void Add(std::uint64_t key, std::shared_ptr<const MapSnapshot> map) { maps_[key] = std::move(map); }
+  const std::shared_ptr<const MapSnapshot>& At(std::uint64_t key) const { return maps_.at(key); }
+  std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage& image, int count, int,
+                                         std::uint64_t only_map) const override {
+    std::vector<PlaceCandidate> found;
+    for (const auto& [key, map] : maps_) {
+      if (only_map != 0 && only_map != key) continue;
+      for (const KeyFrame& keyframe : map->keyframes)
+        found.push_back({key, map, keyframe.id, Difference(keyframe.features->small_blurry, image)});
+    }
+    std::sort(found.begin(), found.end(),
+              [](const auto& a, const auto& b) { return a.difference < b.difference; });
+    found.resize(std::min<std::size_t>(found.size(), static_cast<std::size_t>(count)));
+    return found;
+  }
+
+ private:
+  std::map<std::uint64_t, std::shared_ptr<const MapSnapshot>> maps_;
+};
+
+}  // namespace docent::engine::testing_world

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a lost tracker answers where places resemble its picture: a pose, or why there is none.
+#include "engine/tracking/verdict.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "engine/base/random.h"
+#include "engine/tracking/tracker.h"
+#include "tests/engine/rendered_world.h"
+#include "tests/engine/some_maps.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::CameraAt;
+using testing_world::RenderedWorld;
+using testing_world::SomeMaps;
+
+const std::shared_ptr<const CameraModel>& Camera() {
+  static const auto camera = testing_world::PinholeCamera(320, 240);
+  return camera;
+}
+const RenderedWorld& World() {
+  static const RenderedWorld world = RenderedWorld::Room(71);
+  return world;
+}
+
+// Three keyframes. Of every ten points `wrong` are not where they were.
+std::shared_ptr<const MapSnapshot> MapWith(std::size_t wrong) {
+  Map map = testing_world::TrueMap(World(), Camera(),
+                                   {CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0}), CameraAt({0.2, 0, 0})});
+  Random random(1);
+  for (std::size_t i = 0; i < map.points().size(); ++i) {
+    const Eigen::Vector3d away(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5), 0);
+    if (i % 10 < wrong) map.points()[i].point.point_in_map.head<3>() += away;
+  }
+  for (auto& [id, record] : map.keyframes()) map.UpdateDepth(&record);
+  return map.Snapshot();
+}
+
+// The same map, with those points alone that its first keyframe sees in one corner.
+std::shared_ptr<const MapSnapshot> MapOfACorner() {
+  auto map = std::make_shared<MapSnapshot>(*MapWith(0));
+  const KeyFrame first = map->keyframes.front();
+  std::erase_if(map->points, [&](const MapPoint& point) {
+    const auto pixel = Camera()->Project(first.camera_from_map * point.position());
+    return !pixel || pixel->x() > 145 || pixel->y() > 110;
+  });
+  std::erase_if(map->observations,
+                [&](const Observation& observation) { return !map->FindPoint(observation.point); });
+  return map;
+}
+
+Frame FrameOf(int index, const RenderedWorld& world = World()) {
+  Frame frame;
+  frame.time = FromSeconds(index / 30.0);
+  frame.index = static_cast<std::uint64_t>(index);
+  frame.picture = world.Render(*Camera(), CameraAt({0.06 + 0.002 * index, 0.02, 0.03}), 1.5, frame.index + 1);
+  return frame;
+}
+
+// A visitor who was in no map yet.
+std::vector<TrackedFrame> Visit(const SomeMaps& maps, int frames, const RenderedWorld& world = World()) {
+  TrackerOptions options;
+  options.build_maps = false;
+  Tracker tracker(options, Camera(), 3);
+  std::vector<TrackedFrame> seen;
+  for (int i = 0; i < frames; ++i) seen.push_back(tracker.Track(FrameOf(i, world), &maps));
+  return seen;
+}
+
+TEST(Verdict, IsUnconfirmedUntilSeveralFramesAgree) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(0));
+  const auto frames = Visit(maps, 4);
+  const auto wanted = static_cast<std::size_t>(TrackerOptions().agreeing_frames);
+  for (std::size_t i = 0; i + 1 < wanted; ++i) {
+    EXPECT_EQ(frames[i].state, TrackingState::kLost);
+    EXPECT_EQ(frames[i].verdict.doubt, Doubt::kUnconfirmed);
+    EXPECT_EQ(frames[i].verdict.map_key, 1u);
+    EXPECT_EQ(frames[i].verdict.frames, static_cast<int>(i) + 1);
+  }
+  EXPECT_EQ(frames[wanted - 1].state, TrackingState::kRelocalized);
+  EXPECT_EQ(frames[wanted - 1].verdict.doubt, Doubt::kNone);
+}
+
+TEST(Verdict, NamesTooFewPointsInAnotherPlace) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(0));
+  for (const TrackedFrame& frame : Visit(maps, 6, RenderedWorld::Room(7177))) {
+    EXPECT_EQ(frame.state, TrackingState::kLost);
+    EXPECT_EQ(frame.verdict.doubt, Doubt::kFewPoints);
+    EXPECT_LT(frame.verdict.inliers, TrackerOptions().min_recovery_inliers);
+  }
+}
+
+TEST(Verdict, NamesPointsThatAreGatheredInOneCorner) {
+  SomeMaps maps;
+  maps.Add(1, MapOfACorner());
+  ASSERT_GT(maps.At(1)->points.size(), 60u);
+  for (const TrackedFrame& frame : Visit(maps, 6)) {
+    EXPECT_EQ(frame.state, TrackingState::kLost);
+    EXPECT_EQ(frame.verdict.doubt, Doubt::kOneCorner);
+    EXPECT_GE(frame.verdict.inliers, TrackerOptions().min_recovery_inliers);
+  }
+}
+
+TEST(Verdict, NamesTwoMapsThatLookAlike) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(0));
+  maps.Add(2, MapWith(0));
+  for (const TrackedFrame& frame : Visit(maps, 30)) {
+    EXPECT_EQ(frame.state, TrackingState::kLost) << frame.frame.index;
+    EXPECT_EQ(frame.verdict.doubt, Doubt::kLookAlikes);
+    EXPECT_EQ(frame.verdict.map_key + frame.verdict.rival_key, 3u);
+  }
+}
+
+TEST(Verdict, TakesTheMapThatIsClearlyAheadWhicheverIsFoundFirst) {
+  for (const std::uint64_t right : {1u, 2u}) {
+    SomeMaps maps;
+    maps.Add(right, MapWith(0));
+    maps.Add(3 - right, MapWith(5));
+    const auto frames = Visit(maps, 5);
+    EXPECT_TRUE(HasPose(frames.back().state));
+    EXPECT_EQ(frames.back().map_key, right);
+  }
+}
+
+TEST(Verdict, TakesTheMapThatIsAlwaysAheadAfterAWhile) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(1));
+  maps.Add(2, MapWith(0));
+  const auto frames = Visit(maps, 30);
+  const auto waited = static_cast<std::size_t>(TrackerOptions().frames_ahead - 1);
+  for (std::size_t i = 0; i < waited; ++i) EXPECT_EQ(frames[i].verdict.doubt, Doubt::kLookAlikes) << i;
+  EXPECT_TRUE(HasPose(frames.back().state));
+  EXPECT_EQ(frames.back().map_key, 2u);
+}
+
+TEST(Verdict, KeepsToTheMapTheCameraWasInUnlessAnotherIsClearlyBetter) {
+  for (const std::size_t wrong : {1u, 5u}) {
+    SomeMaps maps;
+    maps.Add(1, MapWith(wrong));
+    maps.Add(2, MapWith(0));
+    TrackerOptions options;
+    options.build_maps = false;
+    Tracker tracker(options, Camera(), 3);
+    tracker.SetMap(maps.At(1), 1);
+    TrackedFrame last;
+    for (int i = 0; i < 4; ++i) last = tracker.Track(FrameOf(i), &maps);
+    EXPECT_TRUE(HasPose(last.state));
+    EXPECT_EQ(last.map_key, wrong == 1 ? 1u : 2u);
+  }
+}
+
+TEST(Verdict, LetsNoMapBeExtendedThatWasJustFoundAgain) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(0));
+  const RenderedWorld nothing{std::vector<testing_world::Wall>()};
+  TrackerOptions options;
+  options.keyframes.min_distance = 0.05;
+  Tracker tracker(options, Camera(), 3);
+  tracker.SetMap(maps.At(1), 1);
+  // Lost for longer than keyframes keep apart, then back at a place that is far enough from all keyframes.
+  for (int i = 0; i < 8; ++i) EXPECT_FALSE(HasPose(tracker.Track(FrameOf(i, nothing), &maps).state));
+  int first_pose = -1, first_keyframe = -1, first_reports = -1;
+  for (int i = 100; i < 130; ++i) {
+    Frame frame = FrameOf(i);
+    frame.picture = World().Render(*Camera(), CameraAt({0.45, 0.02, 0.03}), 1.5, frame.index + 1);
+    if (HasPose(tracker.Track(frame, &maps).state) && first_pose < 0) first_pose = i;
+    if (tracker.TakeKeyFrameCandidate() && first_keyframe < 0) first_keyframe = i;
+    if (!tracker.TakeReports().empty() && first_reports < 0) first_reports = i;
+  }
+  ASSERT_GE(first_pose, 0);
+  ASSERT_GE(first_keyframe, 0);
+  EXPECT_EQ(first_keyframe, first_pose + options.agreeing_frames + 1);
+  EXPECT_EQ(first_reports, first_keyframe);
+}
+
+}  // namespace
+}  // namespace docent::engine
