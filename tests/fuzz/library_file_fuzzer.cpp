@@ -24,7 +24,8 @@
 // offset of 3 bytes, a length of 1 byte and that many bytes; a last patch that is cut off cuts the file
 // there. An input that begins as SQLite files do is the file itself. What the recovery writes must verify. No
 // allocation may be larger than four times the file, or than what SQLite takes for any database at all: its
-// lookaside memory of 48,000 bytes, which is less than four times the smallest library.
+// lookaside memory of 48,000 bytes, which is less than four times the smallest library; the recovery, which
+// writes a library, may take four times that of an empty one.
 namespace {
 
 namespace fs = std::filesystem;
@@ -86,6 +87,13 @@ Bytes MakeSeed() {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
+std::size_t EmptyLibrarySize() {
+  const fs::path path = Folder() / "empty.docent";
+  docent::maps::Library::Open(path, docent::maps::Access::kReadWrite, docent::maps::CreateIfMissing::kYes,
+                              Quick());
+  return fs::file_size(path);
+}
+
 Bytes Patched(Bytes file, std::span<const std::uint8_t> patches) {
   constexpr std::size_t kHead = 4;
   while (patches.size() > kHead) {
@@ -138,10 +146,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::ofstream(path, std::ios::binary)
       .write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
   constexpr std::size_t kForAnyDatabase = 48'000;
-  for (const auto& step : {ReadAll, Recover}) {
-    const AllocationLimit limit(std::max(4 * file.size(), kForAnyDatabase));
+  static const std::size_t empty_size = EmptyLibrarySize();
+  for (const bool recover : {false, true}) {
+    const AllocationLimit limit(
+        std::max({4 * file.size(), kForAnyDatabase, recover ? 4 * empty_size : std::size_t{0}}));
     try {
-      step(path);
+      recover ? Recover(path) : ReadAll(path);
     } catch (const docent::Error&) {
       // The right answer to most inputs.
     }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <opencv2/imgcodecs.hpp>
 #include <span>
 
 #include "engine/base/error.h"
@@ -38,8 +39,9 @@ Bytes Enveloped(const docent::maps::EnvelopeKind& kind, std::uint64_t count,
   return docent::maps::FinishEnvelope(std::move(writer));
 }
 
-// Sentences; and what zlib works with, 32 KiB that were decompressed last among it.
-constexpr std::size_t kSmallThings = 512, kPictureWorkspace = 40 << 10;
+// A sentence, for which a stream begins with 513 bytes; and what zlib works with, 32 KiB that were
+// decompressed last among it.
+constexpr std::size_t kSmallThings = 1024, kPictureWorkspace = 40 << 10;
 
 // Runs a decoder with its allocations limited by the size of what it reads, or by what any input takes.
 template <typename Decode>
@@ -113,6 +115,14 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
 }
 
 }  // namespace
+
+// The first picture that OpenCV decodes makes it set up all that it has decoders from.
+extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", cv::Mat(8, 8, CV_8UC1, cv::Scalar(0)), png);
+  cv::imdecode(png, cv::IMREAD_GRAYSCALE);
+  return 0;
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
