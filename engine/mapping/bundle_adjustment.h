@@ -10,8 +10,7 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 
-// Robust non-linear refinement of keyframe poses and points (ptamm §2.3, eq. 4-7). The only header through
-// which Ceres is used.
+// Robust non-linear refinement of keyframe poses and points (ptamm §2.3, eq. 4-7).
 namespace docent::engine {
 
 enum class RobustLoss { kHuber, kTukey };
@@ -45,9 +44,8 @@ struct BundleOptions {
   // normalised residuals' standard deviation, never below min_sigma. 4.685 is Tukey's 95 % efficiency.
   double threshold_factor = 4.685;
   double min_sigma = 0.4;
-  // Stops as soon as this becomes true, between iterations or inside an evaluation; what was reached is kept
-  // when it is better than the start. May be null. Only the solution of one linear system is not cut short:
-  // a few milliseconds for a local problem, about 1 ms for every thousand measurements by free cameras.
+  // Stops within about a millisecond when this becomes true, wherever it is; what was reached is kept when it
+  // is better than the start. May be null.
   const std::atomic<bool>* interrupt = nullptr;
 };
 
