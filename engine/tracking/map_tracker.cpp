@@ -5,7 +5,6 @@
 #include <array>
 #include <bitset>
 #include <cmath>
-#include <span>
 
 #include "engine/recognition/absolute_pose.h"
 
@@ -26,27 +25,10 @@ std::size_t CellOf(const Eigen::Vector2d& pixel, const CameraModel& camera, int 
   return static_cast<std::size_t>(row * columns + column);
 }
 
-// By ascending point.
-std::span<const Observation> ObservationsOf(const MapSnapshot& map, KeyFrameId keyframe) {
-  const auto begin = std::lower_bound(map.observations.begin(), map.observations.end(), keyframe,
-                                      [](const Observation& o, KeyFrameId id) { return o.keyframe < id; });
-  const auto end = std::upper_bound(begin, map.observations.end(), keyframe,
-                                    [](KeyFrameId id, const Observation& o) { return id < o.keyframe; });
-  return {begin, end};
-}
-
-// Of points by ascending id, the first one with this id or a later one; it is taken to be near the begin.
-const MapPoint* FirstNotBefore(const MapPoint* begin, const MapPoint* end, MapPointId id) {
-  std::ptrdiff_t step = 1;
-  while (step < end - begin && begin[step].id < id) step *= 2;
-  return std::lower_bound(begin, begin + std::min(step + 1, end - begin), id,
-                          [](const MapPoint& candidate, MapPointId wanted) { return candidate.id < wanted; });
-}
-
 }  // namespace
 
 MapTracker::MapTracker(const MapTrackerOptions& options, std::shared_ptr<const CameraModel> camera)
-    : options_(options), camera_(std::move(camera)), searcher_(options.search) {}
+    : options_(options), camera_(std::move(camera)), searcher_(options.search), nearby_(options.nearby) {}
 
 void MapTracker::Clear() {
   searcher_.Clear();
@@ -54,95 +36,14 @@ void MapTracker::Clear() {
   Forget();
 }
 
-void MapTracker::ExpectTurn(const Turn& turn) {
-  if (turn.pivot.isZero(0) != turn_.pivot.isZero(0)) local_panorama_ = kNoId;  // its points are elsewhere now
-  turn_ = turn;
-}
-
-// The points of the keyframes that see most of what the last frame saw; without a last frame, of those
-// nearest to the guessed pose. A point that only far-off keyframes know is likely hidden here, and would
-// count as a failure of tracking that it is not (ptamm §5.2).
-void MapTracker::CollectLocal(const MapSnapshot& map, const Rigid3& camera_from_map) {
-  ranked_.clear();
-  const Eigen::Vector3d center = camera_from_map.OriginInSource();
-  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
-    const KeyFrame& keyframe = map.keyframes[i];
-    // What it knows is looked for by its panorama map.
-    if (keyframe.kind == KeyFrameKind::kPanorama) continue;
-    const double distance = (keyframe.camera_from_map.OriginInSource() - center).norm() / keyframe.mean_depth;
-    const double turn =
-        1.0 - std::abs((camera_from_map.rotation.inverse() * keyframe.camera_from_map.rotation)
-                           .quaternion()
-                           .w());  // grows with the angle between the views, 0 for none
-    ranked_.emplace_back(1.0 - 1.0 / (1.0 + distance + 10 * turn), i);
-  }
-  const auto keep_best = [this](std::size_t most) {
-    const std::size_t count = std::min(ranked_.size(), most);
-    std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(count), ranked_.end());
-    ranked_.resize(count);
-  };
-  if (ranked_.size() > options_.examined_keyframes) keep_best(options_.examined_keyframes);
-  // Shared points come first; the nearness decides among keyframes that share none.
-  wanted_.Clear(map.next_point);
-  for (const MapPointId id : last_inliers_) wanted_.Insert(id);
-  for (auto& [rank, index] : ranked_) {
-    int shared = 0;
-    for (const Observation& observation : ObservationsOf(map, map.keyframes[index].id))
-      shared += wanted_.Contains(observation.point);
-    rank -= shared;
-  }
-  keep_best(options_.local_keyframes);
-  wanted_.Clear(map.next_point);
-  for (const auto& [rank, index] : ranked_) {
-    for (const Observation& observation : ObservationsOf(map, map.keyframes[index].id))
-      wanted_.Insert(observation.point);
-  }
-  TakePoints(map, false);
-}
-
-// The infinite points that keyframes of the enabled panorama map see.
-void MapTracker::CollectPanorama(const MapSnapshot& map) {
-  wanted_.Clear(map.next_point);
-  for (const KeyFrame& keyframe : map.keyframes) {
-    if (keyframe.panorama != panorama_) continue;
-    for (const Observation& observation : ObservationsOf(map, keyframe.id)) wanted_.Insert(observation.point);
-  }
-  TakePoints(map, true);
-}
-
-// The points of wanted_.
-void MapTracker::TakePoints(const MapSnapshot& map, bool infinite) {
-  std::vector<LocalPoint>& points = infinite ? local_infinite_ : local_;
-  points.clear();
-  double nearness = 0;  // of infinite points; 1 / metres
-  if (infinite && !turn_.pivot.isZero(0)) {
-    const PanoramaMap* panorama = map.FindPanorama(panorama_);
-    const KeyFrame* reference = panorama ? map.FindKeyFrame(panorama->reference) : nullptr;
-    if (reference && reference->mean_depth > 0) nearness = 1 / reference->mean_depth;
-  }
-  const MapPoint* next = map.points.data();
-  const MapPoint* const end = next + map.points.size();
-  const KeyFrame* source = nullptr;  // of the point before: points come in the order in which they were made
-  wanted_.ForEach([&](MapPointId id) {
-    next = FirstNotBefore(next, end, id);
-    if (next == end || next->id != id || next->infinite() != infinite) return;
-    if (infinite && next->panorama != panorama_) return;
-    if (!source || source->id != next->source_keyframe) source = map.FindKeyFrame(next->source_keyframe);
-    if (!source) return;
-    Eigen::Vector4d place = next->point_in_map;
-    if (infinite) place += nearness * source->camera_from_map.OriginInSource().homogeneous();
-    points.push_back({next, source, place});
-  });
-}
-
 // Those of the points that fall into the picture, into visible_.
-void MapTracker::Project(const std::vector<LocalPoint>& points, const Rigid3& camera_from_map) {
+void MapTracker::Project(const std::vector<NearbyPoint>& points, const Rigid3& camera_from_map) {
   visible_.clear();
   const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
   const Eigen::Vector3d translation = camera_from_map.translation;
   const double min_cosine = options_.search.min_view_cosine;
   const int columns = camera_->width_px() / kTakenCellPx + 1;
-  for (const LocalPoint& local : points) {
+  for (const NearbyPoint& local : points) {
     const MapPoint& point = *local.point;
     const Eigen::Vector3d x = rotation * local.place.head<3>() + local.place[3] * translation;
     if (!(x.z() > 0)) continue;
@@ -205,24 +106,12 @@ void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_fro
   taken_.assign(static_cast<std::size_t>((camera_->width_px() / kTakenCellPx + 1) *
                                          (camera_->height_px() / kTakenCellPx + 1)),
                 0);
-  const bool same_map = local_map_ == &map && local_revision_ == map.revision;
-  if (!same_map || ++local_age_frames_ >= options_.local_frames || last_inliers_.empty()) {
-    CollectLocal(map, camera_from_map);
-    local_age_frames_ = 0;
-  }
-  if (!same_map) local_panorama_ = kNoId;  // its points went with the snapshot
-  if (panorama_ != local_panorama_) {
-    local_infinite_.clear();
-    if (panorama_ != kNoId) CollectPanorama(map);
-    local_panorama_ = panorama_;
-  }
-  local_map_ = &map;
-  local_revision_ = map.revision;
-  Project(local_, camera_from_map);
+  nearby_.Update(map, camera_from_map, last_inliers_, panorama_, turn_.pivot);
+  Project(nearby_.finite(), camera_from_map);
   visible_finite_ = static_cast<int>(visible_.size());
   AddCandidates(camera_from_map, static_cast<std::size_t>(options_.max_fine), random);
   if (panorama_ == kNoId) return;
-  Project(local_infinite_, camera_from_map);
+  Project(nearby_.infinite(), camera_from_map);
   AddCandidates(camera_from_map, static_cast<std::size_t>(options_.max_infinite), random);
 }
 
@@ -293,8 +182,7 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
 
   if (effort == Effort::kRecovery) {
     // Of directions alone there is no pose without a guess; the guess has turned as the picture has.
-    if (static_cast<int>(local_infinite_.size()) > 0 && panorama_ != kNoId &&
-        visible_finite_ < options_.min_coarse)
+    if (!nearby_.infinite().empty() && panorama_ != kNoId && visible_finite_ < options_.min_coarse)
       return Track(map, features, predicted, Effort::kWide, random);
     const auto recovered = PoseFromPatches(features, random);
     if (!recovered) return result;

@@ -8,7 +8,7 @@
 #include "engine/base/random.h"
 #include "engine/map/map_snapshot.h"
 #include "engine/tracking/frame_inspection.h"
-#include "engine/tracking/point_id_set.h"
+#include "engine/tracking/nearby_points.h"
 #include "engine/tracking/point_search.h"
 #include "engine/tracking/pose_refinement.h"
 #include "engine/tracking/tracked_frame.h"
@@ -19,15 +19,11 @@
 namespace docent::engine {
 
 struct MapTrackerOptions {
-  int max_coarse = 60;               // ptamm §2.1: up to 50 on the top levels
-  int min_coarse = 12;               // found ones, for the coarse pose to be believed
-  int max_recovery = 220;            // patches of the upper levels looked for after a loss
-  double recovery_inlier_px = 5;     // level 0: corners of upper levels are that coarse
-  int max_fine = 600;                // ptamm §2.1 allows 1000; beyond 600 the pose gains nothing that shows
-  int local_frames = 6;              // for which the choice of points near the camera is good
-  std::size_t local_keyframes = 20;  // whose points are looked for: those that share most with the last frame
-  // The nearest ones, among which these are chosen: in a large map the others are not even looked at.
-  std::size_t examined_keyframes = 100;
+  int max_coarse = 60;              // ptamm §2.1: up to 50 on the top levels
+  int min_coarse = 12;              // found ones, for the coarse pose to be believed
+  int max_recovery = 220;           // patches of the upper levels looked for after a loss
+  double recovery_inlier_px = 5;    // level 0: corners of upper levels are that coarse
+  int max_fine = 600;               // ptamm §2.1 allows 1000; beyond 600 the pose gains nothing that shows
   float coarse_radius_px = 30;      // level 0, about the prediction
   float wide_radius_px = 70;        // the second try before a frame is called lost
   float fine_radius_px = 7;         // after a coarse pose
@@ -37,6 +33,7 @@ struct MapTrackerOptions {
   float infinite_radius_px = 20;
   int max_infinite = 250;     // of the points, where a panorama map is enabled
   int min_points_a_cell = 2;  // for a cell of the coverage grid to count as covered (hybrid-slam §4.1)
+  NearbyPointOptions nearby;
   SearchOptions search;
   PoseRefinementOptions refinement;
 };
@@ -77,7 +74,7 @@ class MapTracker {
   MapTrackResult Track(const MapSnapshot& map, const ImageFeatures& features, const Rigid3& predicted,
                        Effort effort, Random* random);
   // What the camera turns about where its place cannot be told.
-  void ExpectTurn(const Turn& turn);
+  void ExpectTurn(const Turn& turn) { turn_ = turn; }
 
   const std::vector<PointMatch>& matches() const { return matches_; }
   // Every point looked for in the last call: whether it was found, and whether it agreed with the pose.
@@ -97,33 +94,21 @@ class MapTracker {
   // The frame just tracked was not believed: the next one chooses its points by the guessed pose alone.
   void Forget() {
     last_inliers_.clear();
-    local_map_ = nullptr;
+    nearby_.Forget();
   }
   // The frame just tracked was believed: points that were not found where they should be, as something hides
   // them from here, are looked for less often from now on, until they are found again.
   void Remember();
 
  private:
-  // A point that may be looked for, with its source; both live in the snapshot that they were taken from.
-  struct LocalPoint {
-    const MapPoint* point;
-    const KeyFrame* source;
-    // Homogeneous, in the map. While the camera turns about a point that is not its own centre, a direction
-    // is taken to be as far from its source as the panorama map's reference sees the scene: nearer to the
-    // truth than infinity.
-    Eigen::Vector4d place;
-  };
   struct Candidate {
     const MapPoint* point;
     const KeyFrame* source;
     Eigen::Vector4d place;
     PredictedPoint predicted;
   };
-  void CollectLocal(const MapSnapshot& map, const Rigid3& camera_from_map);
-  void CollectPanorama(const MapSnapshot& map);
-  void TakePoints(const MapSnapshot& map, bool infinite);
   void CollectVisible(const MapSnapshot& map, const Rigid3& camera_from_map, Random* random);
-  void Project(const std::vector<LocalPoint>& points, const Rigid3& camera_from_map);
+  void Project(const std::vector<NearbyPoint>& points, const Rigid3& camera_from_map);
   void AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random);
   bool IsWorthATry(MapPointId point, Random* random) const;
   void CountInliers(MapTrackResult* result);
@@ -146,17 +131,9 @@ class MapTracker {
     std::uint8_t in_a_row = 0;
   };
   std::vector<Misses> misses_;  // direct mapped: slot id % size
+  NearbyPoints nearby_;
   // Scratch, kept to save allocations.
-  std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
-  PointIdSet wanted_;
-  // What may be seen from about here, finite and infinite; taken anew when the map has changed and every few
-  // frames, as the camera goes on.
-  std::vector<LocalPoint> local_, local_infinite_;
-  const MapSnapshot* local_map_ = nullptr;
-  std::uint64_t local_revision_ = 0;
-  PanoramaId local_panorama_ = kNoId;
-  int local_age_frames_ = 0;
-  std::vector<LocalPoint> visible_;
+  std::vector<NearbyPoint> visible_;
   int visible_finite_ = 0, spared_ = 0;
   std::vector<std::uint8_t> taken_;  // cells of the picture where finite points are expected
   std::vector<Candidate> candidates_;

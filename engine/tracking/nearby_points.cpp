@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/nearby_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+namespace docent::engine {
+
+namespace {
+
+// By ascending point.
+std::span<const Observation> ObservationsOf(const MapSnapshot& map, KeyFrameId keyframe) {
+  const auto begin = std::lower_bound(map.observations.begin(), map.observations.end(), keyframe,
+                                      [](const Observation& o, KeyFrameId id) { return o.keyframe < id; });
+  const auto end = std::upper_bound(begin, map.observations.end(), keyframe,
+                                    [](KeyFrameId id, const Observation& o) { return id < o.keyframe; });
+  return {begin, end};
+}
+
+// Of points by ascending id, the first one with this id or a later one; it is taken to be near the begin.
+const MapPoint* FirstNotBefore(const MapPoint* begin, const MapPoint* end, MapPointId id) {
+  std::ptrdiff_t step = 1;
+  while (step < end - begin && begin[step].id < id) step *= 2;
+  return std::lower_bound(begin, begin + std::min(step + 1, end - begin), id,
+                          [](const MapPoint& candidate, MapPointId wanted) { return candidate.id < wanted; });
+}
+
+// How unlike two views of a point are, squared: the angle between the lines of sight, by its chord, and the
+// ratio r of the distances, by (r - 1/r) / 3, about its logarithm times 2/3.
+double SquaredMisfit(const Eigen::Vector3d& view, const Eigen::Vector3d& other) {
+  const double a = view.squaredNorm(), b = other.squaredNorm();
+  if (!(a > 0 && b > 0)) return std::numeric_limits<double>::infinity();
+  const double squared_chord = 2 - 2 * view.dot(other) / std::sqrt(a * b);
+  return squared_chord + (a / b + b / a - 2) / 9;
+}
+
+}  // namespace
+
+void NearbyPoints::Update(const MapSnapshot& map, const Rigid3& camera_from_map,
+                          const std::vector<MapPointId>& seen, PanoramaId panorama,
+                          const Eigen::Vector3d& pivot) {
+  const bool same_map = map_ == &map && revision_ == map.revision;
+  if (!same_map || ++age_frames_ >= options_.frames || seen.empty()) {
+    ChooseFinite(map, camera_from_map, seen);
+    age_frames_ = 0;
+  }
+  const bool has_pivot = !pivot.isZero(0);
+  if (!same_map || panorama != panorama_ || has_pivot != has_pivot_) {
+    panorama_ = panorama;
+    has_pivot_ = has_pivot;
+    infinite_.clear();
+    if (panorama != kNoId) ChooseInfinite(map);
+  }
+  map_ = &map;
+  revision_ = map.revision;
+}
+
+// The points of the keyframes that see most of what the last frame saw; without a last frame, of those
+// nearest to the guessed pose. A point that only far-off keyframes know is likely hidden here, and would
+// count as a failure of tracking that it is not (ptamm §5.2).
+void NearbyPoints::ChooseFinite(const MapSnapshot& map, const Rigid3& camera_from_map,
+                                const std::vector<MapPointId>& seen) {
+  ranked_.clear();
+  const Eigen::Vector3d center = camera_from_map.OriginInSource();
+  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
+    const KeyFrame& keyframe = map.keyframes[i];
+    // What it knows is looked for by its panorama map.
+    if (keyframe.kind == KeyFrameKind::kPanorama) continue;
+    const double distance = (keyframe.camera_from_map.OriginInSource() - center).norm() / keyframe.mean_depth;
+    const double turn =
+        1.0 - std::abs((camera_from_map.rotation.inverse() * keyframe.camera_from_map.rotation)
+                           .quaternion()
+                           .w());  // grows with the angle between the views, 0 for none
+    ranked_.emplace_back(1.0 - 1.0 / (1.0 + distance + 10 * turn), i);
+  }
+  const auto keep_best = [this](std::size_t most) {
+    const std::size_t count = std::min(ranked_.size(), most);
+    std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(count), ranked_.end());
+    ranked_.resize(count);
+  };
+  if (ranked_.size() > options_.examined_keyframes) keep_best(options_.examined_keyframes);
+  // Shared points come first; the nearness decides among keyframes that share none.
+  wanted_.Clear(map.next_point);
+  for (const MapPointId id : seen) wanted_.Insert(id);
+  for (auto& [rank, index] : ranked_) {
+    int shared = 0;
+    for (const Observation& observation : ObservationsOf(map, map.keyframes[index].id))
+      shared += wanted_.Contains(observation.point);
+    rank -= shared;
+  }
+  keep_best(options_.keyframes);
+  wanted_.Clear(map.next_point);
+  for (const auto& [rank, index] : ranked_) {
+    for (const Observation& observation : ObservationsOf(map, map.keyframes[index].id))
+      wanted_.Insert(observation.point);
+  }
+  Take(map, false, &finite_);
+  ChooseSources(map, camera_from_map);
+}
+
+// The infinite points that keyframes of the panorama map see.
+void NearbyPoints::ChooseInfinite(const MapSnapshot& map) {
+  wanted_.Clear(map.next_point);
+  for (const KeyFrame& keyframe : map.keyframes) {
+    if (keyframe.panorama != panorama_) continue;
+    for (const Observation& observation : ObservationsOf(map, keyframe.id)) wanted_.Insert(observation.point);
+  }
+  Take(map, true, &infinite_);
+}
+
+void NearbyPoints::Take(const MapSnapshot& map, bool infinite, std::vector<NearbyPoint>* points) {
+  points->clear();
+  double nearness = 0;  // of infinite points; 1 / metres
+  if (infinite && has_pivot_) {
+    const PanoramaMap* panorama = map.FindPanorama(panorama_);
+    const KeyFrame* reference = panorama ? map.FindKeyFrame(panorama->reference) : nullptr;
+    if (reference && reference->mean_depth > 0) nearness = 1 / reference->mean_depth;
+  }
+  const MapPoint* next = map.points.data();
+  const MapPoint* const end = next + map.points.size();
+  const KeyFrame* source = nullptr;  // of the point before: points come in the order in which they were made
+  wanted_.ForEach([&](MapPointId id) {
+    next = FirstNotBefore(next, end, id);
+    if (next == end || next->id != id || next->infinite() != infinite) return;
+    if (infinite && next->panorama != panorama_) return;
+    if (!source || source->id != next->source_keyframe) source = map.FindKeyFrame(next->source_keyframe);
+    if (!source) return;
+    Eigen::Vector4d place = next->point_in_map;
+    if (infinite) place += nearness * source->camera_from_map.OriginInSource().homogeneous();
+    points->push_back({next, source, place});
+  });
+}
+
+// The first view of a point is the one that all others were measured against, and stays the source wherever
+// it will do. From the side, or from much nearer or further, a warped patch is a poor picture of it: then it
+// is cut where the chosen keyframe that sees it most alike shows it (ptamm §2.1 has the first view alone).
+void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_from_map) {
+  const Eigen::Vector3d center = camera_from_map.OriginInSource();
+  const double most = options_.max_source_misfit * options_.max_source_misfit;
+  const double better = options_.better_source * options_.better_source;
+  fits_.assign(finite_.size(), {});
+  const KeyFrame* source = nullptr;
+  Eigen::Vector3d source_center = Eigen::Vector3d::Zero();
+  std::size_t poor = 0;
+  for (std::size_t i = 0; i < finite_.size(); ++i) {
+    if (finite_[i].source != source) {
+      source = finite_[i].source;
+      source_center = source->camera_from_map.OriginInSource();
+    }
+    const Eigen::Vector3d position = finite_[i].point->position();
+    const double misfit = SquaredMisfit(source_center - position, center - position);
+    if (!(misfit > most)) continue;
+    fits_[i].wanted = better * misfit;
+    ++poor;
+  }
+  resourced_.clear();
+  resourced_.reserve(poor);
+  for (const auto& [rank, index] : ranked_) {
+    const KeyFrame& keyframe = map.keyframes[index];
+    const Eigen::Vector3d keyframe_center = keyframe.camera_from_map.OriginInSource();
+    std::size_t i = 0;
+    for (const Observation& observation : ObservationsOf(map, keyframe.id)) {
+      while (i < finite_.size() && finite_[i].point->id < observation.point) ++i;
+      if (i == finite_.size()) break;
+      if (finite_[i].point->id != observation.point || fits_[i].wanted == 0) continue;
+      const Eigen::Vector3d position = finite_[i].place.head<3>();
+      const double misfit = SquaredMisfit(keyframe_center - position, center - position);
+      if (misfit < fits_[i].wanted) TakeSource(keyframe, observation, misfit, i);
+    }
+  }
+}
+
+void NearbyPoints::TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit,
+                              std::size_t index) {
+  NearbyPoint& nearby = finite_[index];
+  // Where the whole map puts the point, which is surer than the one measurement; but that must agree.
+  const auto pixel = keyframe.camera->Project(keyframe.camera_from_map * nearby.point->position());
+  if (!pixel) return;
+  const float sigma = static_cast<float>(1 << observation.level);
+  if ((pixel->cast<float>() - observation.pixel).squaredNorm() > sigma * sigma) return;
+  Fit& fit = fits_[index];
+  fit.wanted = misfit;
+  if (fit.resourced < 0) {
+    fit.resourced = static_cast<std::int32_t>(resourced_.size());
+    resourced_.push_back(*nearby.point);
+    nearby.point = &resourced_.back();
+  }
+  MapPoint& point = resourced_[static_cast<std::size_t>(fit.resourced)];
+  point.source_keyframe = keyframe.id;
+  point.source_level = observation.level;
+  point.source_pixel = LevelFromLevelZero(*pixel, observation.level).cast<float>();
+  nearby.source = &keyframe;
+}
+
+}  // namespace docent::engine
