@@ -154,6 +154,17 @@ class PairSearch {
         line_.push_back(LevelFromLevelZero(*pixel, level).cast<float>());
       }
     }
+    if (line_.empty()) return;
+    const Eigen::Vector2f chord = line_.back() - line_.front();
+    across_ = chord.norm() > 1e-3f ? chord.unitOrthogonal() : Eigen::Vector2f::Zero();
+    band_ = options_.epipolar_tolerance_px;
+    for (const Eigen::Vector2f& p : line_)
+      band_ = std::max(band_, options_.epipolar_tolerance_px + std::abs(across_.dot(p - line_.front())));
+  }
+
+  // A lens bends the line by little: most corners are out of reach of its chord already.
+  bool NearChord(float x, float y) const {
+    return std::abs(across_.dot(Eigen::Vector2f(x, y) - line_.front())) <= band_;
   }
 
   bool NearLine(float x, float y) const {
@@ -187,7 +198,8 @@ class PairSearch {
     for (int i = features.row_begin[level][static_cast<std::size_t>(first)];
          i < features.row_begin[level][static_cast<std::size_t>(last)]; ++i) {
       const Corner& corner = features.corners[level][static_cast<std::size_t>(i)];
-      if (corner.x < low.x() - tolerance || corner.x > high.x() + tolerance || !NearLine(corner.x, corner.y))
+      if (corner.x < low.x() - tolerance || corner.x > high.x() + tolerance ||
+          !NearChord(corner.x, corner.y) || !NearLine(corner.x, corner.y))
         continue;
       const float correlation = PatchCorrelation(patch, features.levels[level], corner.x, corner.y);
       if (correlation > best) {
@@ -212,6 +224,8 @@ class PairSearch {
   PointSearcher* searcher_;
   Rigid3 map_from_target_, partner_from_target_;
   std::vector<Eigen::Vector2f> line_;
+  Eigen::Vector2f across_ = Eigen::Vector2f::Zero();  // unit, across the line's chord; zero for no chord
+  float band_ = 0;                                    // half the width about the chord that holds the line
   std::uint32_t scratch_id_ = 0;
 };
 
