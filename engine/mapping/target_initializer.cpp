@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/geometry/triangulation.h"
+#include "engine/vision/rotation_alignment.h"
 
 namespace docent::engine {
 

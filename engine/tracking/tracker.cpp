@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/tracking/tracker.h"
+#include "engine/vision/rotation_alignment.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/tracking/tracker.h"
+#include "engine/vision/rotation_alignment.h"
 
 namespace docent::engine {
 

@@ -8,6 +8,7 @@
 #include "engine/tracking/point_search.h"
 #include "engine/vision/features.h"
 #include "tests/bench/bench_sequence.h"
+#include "engine/vision/rotation_alignment.h"
 
 // The parts that a frame and a keyframe are made of, each alone.
 namespace docent::bench {
