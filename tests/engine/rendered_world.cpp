@@ -293,4 +293,18 @@ Map TrueMap(const RenderedWorld& world, const std::shared_ptr<const CameraModel>
   return map;
 }
 
+std::shared_ptr<const MapSnapshot> MapGoneAstray(const RenderedWorld& world,
+                                                 const std::shared_ptr<const CameraModel>& camera,
+                                                 const std::vector<Rigid3>& views,
+                                                 const std::function<bool(std::size_t)>& astray) {
+  Map map = TrueMap(world, camera, views);
+  Random random(1);
+  for (std::size_t i = 0; i < map.points().size(); ++i) {
+    const Eigen::Vector3d away(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5), 0);
+    if (astray(i)) map.points()[i].point.point_in_map.head<3>() += away;
+  }
+  for (auto& [id, record] : map.keyframes()) map.UpdateDepth(&record);
+  return map.Snapshot();
+}
+
 }  // namespace docent::engine::testing_world

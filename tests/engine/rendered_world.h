@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <opencv2/core/mat.hpp>
@@ -81,5 +82,11 @@ KeyFrame MakeKeyFrame(const RenderedWorld& world, const std::shared_ptr<const Ca
 Map TrueMap(const RenderedWorld& world, const std::shared_ptr<const CameraModel>& camera,
             const std::vector<Rigid3>& poses,
             std::size_t max_points_a_keyframe = std::numeric_limits<std::size_t>::max());
+
+// The same, published, with those points up to half a metre from where they were whose index is astray.
+std::shared_ptr<const MapSnapshot> MapGoneAstray(const RenderedWorld& world,
+                                                 const std::shared_ptr<const CameraModel>& camera,
+                                                 const std::vector<Rigid3>& views,
+                                                 const std::function<bool(std::size_t)>& astray);
 
 }  // namespace docent::engine::testing_world

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "engine/base/random.h"
 #include "engine/tracking/tracker.h"
 #include "tests/engine/rendered_world.h"
 #include "tests/engine/some_maps.h"
@@ -28,15 +27,9 @@ const RenderedWorld& World() {
 
 // Keyframes a hand's breadth apart from x on. spoilt: of every `spoilt` points one alone is where it was.
 std::shared_ptr<const MapSnapshot> MapFrom(double x, std::size_t spoilt) {
-  Map map = testing_world::TrueMap(
-      World(), Camera(), {CameraAt({x, 0, 0}), CameraAt({x + 0.1, 0, 0}), CameraAt({x + 0.2, 0, 0})});
-  Random random(1);
-  for (std::size_t i = 0; i < map.points().size(); ++i) {
-    const Eigen::Vector3d away(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5), 0);
-    if (i % spoilt != 0) map.points()[i].point.point_in_map.head<3>() += away;
-  }
-  for (auto& [id, record] : map.keyframes()) map.UpdateDepth(&record);
-  return map.Snapshot();
+  return testing_world::MapGoneAstray(
+      World(), Camera(), {CameraAt({x, 0, 0}), CameraAt({x + 0.1, 0, 0}), CameraAt({x + 0.2, 0, 0})},
+      [=](std::size_t i) { return i % spoilt != 0; });
 }
 
 // Walks from where map 1 was made to where map 2 was; the map that each frame was tracked in.

@@ -6,7 +6,6 @@
 
 #include <vector>
 
-#include "engine/base/random.h"
 #include "engine/tracking/tracker.h"
 #include "tests/engine/rendered_world.h"
 #include "tests/engine/some_maps.h"
@@ -29,15 +28,9 @@ const RenderedWorld& World() {
 
 // Three keyframes. Of every ten points `wrong` are not where they were.
 std::shared_ptr<const MapSnapshot> MapWith(std::size_t wrong) {
-  Map map = testing_world::TrueMap(World(), Camera(),
-                                   {CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0}), CameraAt({0.2, 0, 0})});
-  Random random(1);
-  for (std::size_t i = 0; i < map.points().size(); ++i) {
-    const Eigen::Vector3d away(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5), 0);
-    if (i % 10 < wrong) map.points()[i].point.point_in_map.head<3>() += away;
-  }
-  for (auto& [id, record] : map.keyframes()) map.UpdateDepth(&record);
-  return map.Snapshot();
+  return testing_world::MapGoneAstray(World(), Camera(),
+                                      {CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0}), CameraAt({0.2, 0, 0})},
+                                      [=](std::size_t i) { return i % 10 < wrong; });
 }
 
 // The same map, with those points alone that its first keyframe sees in one corner.
