@@ -151,7 +151,7 @@ MapperOptions WithLoops(bool enabled) {
   MapperOptions options;
   options.loops.enabled = enabled;
   options.loops.correction.max_strain = 0.1;  // the steps here are far longer than those of a walk
-  options.redundancy.min_keyframes = 1000;  // all stay, for comparison
+  options.redundancy.min_keyframes = 1000;    // all stay, for comparison
   return options;
 }
 
