@@ -27,6 +27,8 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
   AddEngineOption(command, &options->engine);
   command->add_flag("--turn-about-camera", options->turn_about_camera,
                     "Take every turn to be about the camera's own centre, not the wearer's; for comparison");
+  command->add_flag("--leave-loops-open", options->leave_loops_open,
+                    "Do not put maps right when the camera is back where they began; for comparison");
   command->add_flag("--compare", options->compare,
                     "Run each sequence with the other engine too, and show both side by side");
   command

@@ -72,7 +72,8 @@ struct EvaluateOptions {
   Pace pace = Pace::kEager;
   EngineKind engine = EngineKind::kHybrid;
   bool turn_about_camera = false;  // as in hybrid-slam: no TurnCenter, and no question whether it is a turn
-  bool compare = false;            // run the other engine too
+  bool leave_loops_open = false;
+  bool compare = false;                  // run the other engine too
   std::vector<std::size_t> dump_frames;  // lines of frames.csv, from 0, about which everything is written
   std::uint64_t seed = 1;
 };

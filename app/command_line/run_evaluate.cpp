@@ -61,6 +61,7 @@ SessionOptions OptionsFor(const EvaluateOptions& options) {
   session.tracker.hybrid = options.engine == EngineKind::kHybrid;
   session.tracker.turn_center.enabled = !options.turn_about_camera;
   if (options.turn_about_camera) session.tracker.max_turn_sigma = session.tracker.max_sigma;
+  session.mapper.loops.enabled = !options.leave_loops_open;
   session.first_map = "map";
   session.seed = options.seed;
   return session;

@@ -51,7 +51,9 @@ std::string FigureTable(const SequenceReport& r) {
   html += Row("mapping", Fixed(r.mapping.bundle_adjustment_s, 2) + " s bundle adjustment, " +
                              Fixed(r.mapping.panorama_localization_s, 2) + " s panorama localization, " +
                              Fixed(r.mapping.infinite_triangulation_s, 2) + " s infinite triangulation, " +
-                             Fixed(r.mapping.other_s, 2) + " s other");
+                             Fixed(r.mapping.loop_closing_s, 2) + " s loops, " + Fixed(r.mapping.other_s, 2) +
+                             " s other");
+  html += Row("loops closed", std::to_string(r.mapping.loops_closed));
   html += Row("wall time", Fixed(r.wall_s, 1) + " s");
   html += Row("peak memory", Fixed(r.peak_memory_mb, 0) + " MB");
   return html + "</table>\n";

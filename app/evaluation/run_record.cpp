@@ -102,8 +102,13 @@ std::vector<std::pair<Timestamp, Eigen::Vector3d>> AdjustedCenters(const engine:
 }
 
 MappingTimes MakeMappingTimes(const engine::MapperTimes& times) {
-  return {times.bundle_adjustment, times.panorama_localization, times.infinite_triangulation, times.other,
-          times.longest_hold};
+  return {times.bundle_adjustment,
+          times.panorama_localization,
+          times.infinite_triangulation,
+          times.loop_closing,
+          times.other,
+          times.longest_hold,
+          times.loops_closed};
 }
 
 double PeakMemoryMegabytes() {

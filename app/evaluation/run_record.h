@@ -28,8 +28,10 @@ struct PointCounts {
 
 // Seconds that the mapper spent, by task.
 struct MappingTimes {
-  double bundle_adjustment_s = 0, panorama_localization_s = 0, infinite_triangulation_s = 0, other_s = 0;
+  double bundle_adjustment_s = 0, panorama_localization_s = 0, infinite_triangulation_s = 0,
+         loop_closing_s = 0, other_s = 0;
   double longest_hold_s = 0;  // see engine::MapperTimes
+  int loops_closed = 0;
 };
 
 // One picture of one camera.

@@ -296,6 +296,9 @@ void Session::Hear(const MappingThread::News& news) {
         AddEvent(event.time, "keyframe",
                  "removed from " + map.name + ", as others know what it shows: " + event.detail);
         break;
+      case Kind::kLoopClosed:
+        AddEvent(event.time, "loop", "closed in " + map.name + ": " + event.detail);
+        break;
       case Kind::kGlobalAdjustment:
         // Its last words are how long it took, which differs from run to run; events of one input do not.
         AddEvent(event.time, "adjustment",

@@ -69,7 +69,9 @@ Scene BuildShoulder(const SceneRequest& request);
 Scene BuildHead(const SceneRequest& request);
 // hand_from_shoulder of the rigid pair.
 engine::Rigid3 WearableRig();
-// Once around a block of cabinets in a hall (`loop`) and a little further (`revisit`).
+// Once around something in a hall (`loop`) and a little further (`revisit`). parameter: 0 a block of cabinets
+// that one looks over, 1 a round tower up to the ceiling, of which each place is seen on arriving there
+// alone.
 Scene BuildLoop(const SceneRequest& request);
 
 }  // namespace docent::app

@@ -29,6 +29,61 @@ cv::Mat Frieze(cv::Size size, int side, Random* random) {
   return canvas;
 }
 
+// Two by three cabinets back to back, fronts outwards, and once around them.
+void BuildCabinets(Random* random, Scene* scene) {
+  Surfaces& surfaces = scene->surfaces;
+  for (int side = 0; side < 4; ++side) {
+    Stand stand;
+    stand.yaw_rad = side * kTau / 4;
+    const bool is_long = side % 2 == 0;
+    for (int i = 0; i < (is_long ? 2 : 1); ++i) {
+      const double x = is_long ? -0.7 + 1.4 * i : 0, distance = is_long ? -0.4 : -1.5;
+      const int front =
+          surfaces.AddTexture(i == 0 ? PaintCabinet({512, 512}, RandomColor(random, 0.4, 0.8), random->Next())
+                                     : PaintBooks({512, 512}, 3, random->Next()));
+      const int body = surfaces.AddTexture(PaintWood({256, 256}, {70, 100, 135}, 4, random->Next()));
+      surfaces.AddBox(stand.Point({x, 0, distance}), 1.38, 1.05, is_long ? 0.78 : 0.2, stand.yaw_rad, body,
+                      front);
+      if (is_long) AddClutter(stand, {x, -1.05, distance}, 1.3, 0.7, 6, 0.4, random, scene);
+    }
+  }
+  scene->places.push_back({"block", {0, -1.05, 0}});
+  Trajectory& trajectory = scene->trajectory;
+  trajectory.BeginSegment("loop");
+  constexpr int kSteps = 60, kBeyond = 10;
+  for (int i = 0; i <= kSteps + kBeyond; ++i) {
+    const double angle = -kTau / 4 + kTau * i / kSteps;
+    if (i == kSteps) trajectory.BeginSegment("revisit");
+    trajectory.LookFrom({3.1 * std::cos(angle), -1.55, 2.7 * std::sin(angle)},
+                        {0.5 * std::cos(angle), -1.1, 0.1 * std::sin(angle)}, 0.5);
+  }
+}
+
+// A round tower up to the ceiling, painted all over, and once around it, close by: nothing that is seen in
+// one place is seen again before the camera is back there.
+void BuildTower(Random* random, Scene* scene) {
+  constexpr double kRadius = 2.2, kHeight = 3.2, kWay = 3.4;
+  constexpr int kPanels = 72;
+  const int texture = scene->surfaces.AddTexture(Frieze({4096, 1024}, 512, random));
+  for (int i = 0; i < kPanels; ++i) {
+    const double from = kTau * i / kPanels, to = kTau * (i + 1) / kPanels;
+    const Eigen::Vector3d a(kRadius * std::cos(from), -kHeight, kRadius * std::sin(from));
+    const Eigen::Vector3d b(kRadius * std::cos(to), -kHeight, kRadius * std::sin(to));
+    scene->surfaces.AddRectangle(
+        a, b - a, {0, kHeight, 0}, texture,
+        {static_cast<double>(i) / kPanels, 0, static_cast<double>(i + 1) / kPanels, 1});
+  }
+  scene->places.push_back({"tower", {0, -1.5, -kRadius}});
+  Trajectory& trajectory = scene->trajectory;
+  trajectory.BeginSegment("loop");
+  constexpr int kSteps = 88, kBeyond = 14;
+  for (int i = 0; i <= kSteps + kBeyond; ++i) {
+    const double angle = -kTau / 4 + kTau * i / kSteps;
+    if (i == kSteps) trajectory.BeginSegment("revisit");
+    trajectory.LookFrom({kWay * std::cos(angle), -1.55, kWay * std::sin(angle)}, {0, -1.5, 0}, 0.3);
+  }
+}
+
 }  // namespace
 
 Scene BuildCylinder(const SceneRequest& request) {
@@ -106,31 +161,10 @@ Scene BuildLoop(const SceneRequest& request) {
                   random.Uniform(0.8, 1.2), picture, &scene);
     }
   }
-  // Two by three cabinets back to back, fronts outwards.
-  for (int side = 0; side < 4; ++side) {
-    Stand stand;
-    stand.yaw_rad = side * kTau / 4;
-    const bool is_long = side % 2 == 0;
-    for (int i = 0; i < (is_long ? 2 : 1); ++i) {
-      const double x = is_long ? -0.7 + 1.4 * i : 0, distance = is_long ? -0.4 : -1.5;
-      const int front =
-          surfaces.AddTexture(i == 0 ? PaintCabinet({512, 512}, RandomColor(&random, 0.4, 0.8), random.Next())
-                                     : PaintBooks({512, 512}, 3, random.Next()));
-      const int body = surfaces.AddTexture(PaintWood({256, 256}, {70, 100, 135}, 4, random.Next()));
-      surfaces.AddBox(stand.Point({x, 0, distance}), 1.38, 1.05, is_long ? 0.78 : 0.2, stand.yaw_rad, body,
-                      front);
-      if (is_long) AddClutter(stand, {x, -1.05, distance}, 1.3, 0.7, 6, 0.4, &random, &scene);
-    }
-  }
-  scene.places.push_back({"block", {0, -1.05, 0}});
-  Trajectory& trajectory = scene.trajectory;
-  trajectory.BeginSegment("loop");
-  constexpr int kSteps = 60, kBeyond = 10;
-  for (int i = 0; i <= kSteps + kBeyond; ++i) {
-    const double angle = -kTau / 4 + kTau * i / kSteps;
-    if (i == kSteps) trajectory.BeginSegment("revisit");
-    trajectory.LookFrom({3.1 * std::cos(angle), -1.55, 2.7 * std::sin(angle)},
-                        {0.5 * std::cos(angle), -1.1, 0.1 * std::sin(angle)}, 0.5);
+  if (request.parameter == 0) {
+    BuildCabinets(&random, &scene);
+  } else {
+    BuildTower(&random, &scene);
   }
   return scene;
 }

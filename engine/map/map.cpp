@@ -18,6 +18,7 @@ auto FindObservation(std::vector<Observation>& observations, MapPointId point) {
 
 Map::Map(const MapSnapshot& snapshot)
     : panoramas_(snapshot.panoramas),
+      corrections_(snapshot.corrections),
       next_keyframe_(snapshot.next_keyframe),
       next_point_(snapshot.next_point),
       next_panorama_(snapshot.next_panorama),
@@ -109,6 +110,59 @@ void Map::RemoveKeyFrame(KeyFrameId id) {
   const bool reference = record->keyframe.kind == KeyFrameKind::kSixDof && panorama != kNoId;
   keyframes_.erase(id);
   if (reference) ClosePanorama(panorama);
+}
+
+void Map::MergePoints(MapPointId into, MapPointId twin) {
+  PointRecord* kept = FindPoint(into);
+  const PointRecord* gone = FindPoint(twin);
+  if (!kept || !gone || kept == gone) return;
+  const std::vector<KeyFrameId> observers = gone->observers;
+  for (const KeyFrameId observer : observers) {
+    std::vector<Observation>& observations = keyframes_.at(observer).observations;
+    const auto it = FindObservation(observations, twin);
+    if (it == observations.end() || it->point != twin) continue;
+    Observation observation = *it;
+    observation.point = into;
+    AddObservation(observation);
+  }
+  kept->seen_inlier += gone->seen_inlier;
+  kept->seen_outlier += gone->seen_outlier;
+  kept->not_found += gone->not_found;
+  RemovePoint(twin);
+}
+
+void Map::Correct(const std::map<KeyFrameId, Sim3>& after_from_before) {
+  constexpr std::size_t kRemembered = 8;
+  auto correction = std::make_shared<MapCorrection>();
+  correction->revision = revision_ + 1;
+  for (auto& [id, record] : keyframes_) {
+    KeyFrame& keyframe = record.keyframe;
+    KeyFrameId leader = id;
+    if (keyframe.kind == KeyFrameKind::kPanorama) {
+      for (const PanoramaMap& panorama : panoramas_) {
+        if (panorama.id == keyframe.panorama) leader = panorama.reference;
+      }
+    }
+    const auto found = after_from_before.find(leader);
+    const Sim3 moved = found != after_from_before.end() ? found->second : Sim3();
+    correction->after_from_before[id] = moved;
+    keyframe.camera_from_map = CarriedAlong(keyframe.camera_from_map, moved);
+    keyframe.mean_depth *= moved.scale;
+    keyframe.depth_sigma *= moved.scale;
+  }
+  for (PointRecord& record : points_) {
+    if (!record.alive) continue;
+    const auto moved = correction->after_from_before.find(record.point.source_keyframe);
+    if (moved == correction->after_from_before.end()) continue;
+    if (record.point.infinite()) {
+      UpdateDirection(&record);
+      continue;
+    }
+    record.point.point_in_map.head<3>() = moved->second * record.point.position();
+    record.point.normal = (moved->second.rotation * record.point.normal.cast<double>()).cast<float>();
+  }
+  corrections_.push_back(std::move(correction));
+  if (corrections_.size() > kRemembered) corrections_.erase(corrections_.begin());
 }
 
 // Without its reference nothing says where a panorama map stands.
@@ -251,6 +305,7 @@ std::shared_ptr<const MapSnapshot> Map::Snapshot() {
   snapshot->next_point = next_point_;
   snapshot->next_panorama = next_panorama_;
   snapshot->panoramas = panoramas_;
+  snapshot->corrections = corrections_;
   snapshot->keyframes.reserve(keyframes_.size());
   std::size_t observations = 0;
   for (const auto& [id, record] : keyframes_) observations += record.observations.size();

@@ -53,6 +53,9 @@ class Map {
   void RemoveObservation(KeyFrameId keyframe, MapPointId point);
   void RemovePoint(MapPointId id);
   void RemoveKeyFrame(KeyFrameId id);
+  // Two finite points were one: `into` takes over what saw `twin`, as far as its keyframes do not see both,
+  // and the trackers' verdicts; `twin` is removed.
+  void MergePoints(MapPointId into, MapPointId twin);
 
   // Makes a localized keyframe the reference of a new panorama map. One that was a dependent keyframe leaves
   // its panorama map, and the infinite points that it is the source of come with it (hybrid-slam §5.1).
@@ -64,6 +67,13 @@ class Map {
   void MakeFinite(PointRecord* record, const Eigen::Vector3d& position);
   // The direction of an infinite point: the mean of the rays under which its keyframes see it.
   void UpdateDirection(PointRecord* record);
+
+  // Moves the surroundings of keyframes by similarities, a finite point with its source keyframe, a dependent
+  // panorama keyframe and its directions with the reference. after_from_before: of localized keyframes; those
+  // that are missing stay. The next Snapshot() tells of it.
+  void Correct(const std::map<KeyFrameId, Sim3>& after_from_before);
+  // By ascending revision.
+  const std::vector<std::shared_ptr<const MapCorrection>>& corrections() const { return corrections_; }
 
   // Median depth and spread of the points that a keyframe sees.
   void UpdateDepth(KeyFrameRecord* record);
@@ -83,6 +93,7 @@ class Map {
   std::map<KeyFrameId, KeyFrameRecord> keyframes_;
   std::vector<PointRecord> points_;
   std::vector<PanoramaMap> panoramas_;
+  std::vector<std::shared_ptr<const MapCorrection>> corrections_;
   std::size_t alive_points_ = 0;
   KeyFrameId next_keyframe_ = 0;
   MapPointId next_point_ = 0;

@@ -10,6 +10,7 @@
 #include "engine/base/time.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
+#include "engine/map/map_correction.h"
 #include "engine/vision/image_pyramid.h"
 
 // The data of one map. Plain structs that know nothing of how they are stored, drawn or computed. The mapper
@@ -79,6 +80,8 @@ struct MapSnapshot {
   std::vector<MapPoint> points;           // by ascending id
   std::vector<Observation> observations;  // by ascending keyframe, then point
   std::vector<PanoramaMap> panoramas;     // by ascending id
+  // The last times that it was moved as a whole, by ascending revision; not stored with the map.
+  std::vector<std::shared_ptr<const MapCorrection>> corrections;
   // Next ids to give out, so that a map that is stored and grown again never reuses one.
   KeyFrameId next_keyframe = 0;
   MapPointId next_point = 0;

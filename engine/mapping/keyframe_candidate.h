@@ -30,6 +30,10 @@ struct KeyFrameCandidate {
   std::shared_ptr<const ImageFeatures> features;
   Rigid3 camera_from_map;
   std::vector<PointMatch> matches;  // inliers only
+  // The snapshot that the pose is in, and the keyframe that most of what it shows was first seen in: should
+  // the map be moved before the keyframe joins it, it goes along with that one. 0: the newest.
+  std::uint64_t map_revision = 0;
+  KeyFrameId surroundings = kNoId;
 };
 
 // How often each point was looked for, found and believed since the last report: the trackers' verdict on it.

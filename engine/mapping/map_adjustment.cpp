@@ -131,6 +131,7 @@ BundleSummary AdjustGlobally(const MapAdjustmentOptions& options, const std::ato
   Assembly assembly = Assemble(map, all, {}, FinitePointsSeenBy(map, all));
   BundleOptions bundle;
   bundle.max_iterations = options.global_iterations;
+  bundle.loss = options.global_loss;
   bundle.interrupt = interrupt;
   return Solve(bundle, &assembly, map);
 }

@@ -14,6 +14,8 @@ struct MapAdjustmentOptions {
   int max_fixed = 20;  // further observers held fixed
   int local_iterations = 5;
   int global_iterations = 12;
+  // Huber's still pulls where much is wrong at once, as after a loop was closed.
+  RobustLoss global_loss = RobustLoss::kTukey;
 };
 
 // Adjusts `keyframe`, the keyframes that share most points with it and all their points, the rest fixed

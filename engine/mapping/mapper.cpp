@@ -27,7 +27,10 @@ double ProcessorSeconds() {
 }  // namespace
 
 Mapper::Mapper(const MapperOptions& options)
-    : options_(options), searcher_(options.search), descriptors_(DefaultVocabulary()) {}
+    : options_(options),
+      searcher_(options.search),
+      descriptors_(DefaultVocabulary()),
+      loops_(options.loops, options.search) {}
 
 void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
   map_ = snapshot ? Map(*snapshot) : Map();
@@ -37,6 +40,7 @@ void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
   to_refind_.clear();
   to_localize_.clear();
   to_convert_.clear();
+  loops_.Begin();
   for (const auto& [id, record] : map_.keyframes()) {
     if (record.keyframe.kind == KeyFrameKind::kPanorama) to_localize_.push_back({id});
   }
@@ -122,7 +126,7 @@ bool Mapper::Step() {
   double MapperTimes::*account = &MapperTimes::other;
   if (task) {
     if (const auto* candidate = std::get_if<KeyFrameCandidate>(&*task)) {
-      InsertKeyFrame(*candidate);
+      InsertKeyFrame(UpToDate(*candidate));
     } else {
       StartMap(std::get<InitialPair>(*task));
     }
@@ -150,6 +154,7 @@ double MapperTimes::*Mapper::DoNextTask() {
     LocalAdjustment();
     return &MapperTimes::bundle_adjustment;
   }
+  if (loops_.HasFound() && WorkOnLoops()) return &MapperTimes::loop_closing;
   // New points carry the camera on; what could not be localized so far can wait for them.
   if (LocalizeNew()) return &MapperTimes::panorama_localization;
   if (ConvertOne()) return &MapperTimes::infinite_triangulation;
@@ -162,7 +167,7 @@ double MapperTimes::*Mapper::DoNextTask() {
     ThinOut();
     return &MapperTimes::other;
   }
-  return nullptr;
+  return WorkOnLoops() ? &MapperTimes::loop_closing : nullptr;
 }
 
 bool Mapper::IsFinite() const {
@@ -179,6 +184,7 @@ void Mapper::StartMap(const InitialPair& pair) {
   descriptors_.Clear();
   to_refind_.clear();
   to_convert_.clear();
+  loops_.Begin();
   keyframes_since_global_ = 0;
   const double scale = pair.baseline_m > 0 ? pair.baseline_m : options_.initial_baseline_m;
   Rigid3 b_from_a = pair.geometry.b_from_a;
@@ -311,6 +317,7 @@ void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecor
   }
   PlanConversions(id);
   newest_ = id;
+  loops_.Look(id);
   ++keyframes_since_global_;
   locally_adjusted_ = false;
   Publish();
@@ -369,9 +376,16 @@ void Mapper::LocalAdjustment() {
 
 void Mapper::GlobalAdjustment() {
   searcher_.Release();  // no time needs more memory than this one
-  const BundleSummary summary = AdjustGlobally(options_.adjustment, &interrupt_, &map_);
+  MapAdjustmentOptions adjustment = options_.adjustment;
+  if (loop_to_adjust_) adjustment.global_loss = RobustLoss::kHuber;
+  const BundleSummary summary = AdjustGlobally(adjustment, &interrupt_, &map_);
   global_interrupted_ = summary.outcome == BundleSummary::Outcome::kInterrupted;
   if (global_interrupted_) return;
+  // The error of a loop sinks into the map slowly: on as long as it becomes clearly less, and then once more
+  // as ever. To give up early would be to take the seam for outliers, and tear it open again.
+  constexpr double kClearlyLess = 0.9;
+  global_interrupted_ = std::exchange(
+      loop_to_adjust_, loop_to_adjust_ && summary.final_cost < kClearlyLess * summary.initial_cost);
   keyframes_since_global_ = 0;
   thin_out_ = true;
   Publish();

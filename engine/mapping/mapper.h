@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "engine/mapping/keyframe_candidate.h"
+#include "engine/mapping/loop_closing.h"
 #include "engine/mapping/map_adjustment.h"
 #include "engine/mapping/map_descriptors.h"
 #include "engine/mapping/panorama_mapping.h"
@@ -40,6 +41,7 @@ struct MapperOptions {
   double min_infinite_parallax_deg = 1.5;
   int conversion_partners = 30;  // keyframes in which a localized keyframe's infinite points are looked for
   MapAdjustmentOptions adjustment;
+  LoopOptions loops;
   SearchOptions search;
 };
 
@@ -54,7 +56,8 @@ struct MapperEvent {
     kLocalized,
     kConverted,
     kKeyFrameRemoved,
-    kGlobalAdjustment
+    kGlobalAdjustment,
+    kLoopClosed
   };
   Kind kind = Kind::kKeyFrame;
   Timestamp time{};
@@ -63,7 +66,9 @@ struct MapperEvent {
 
 // Seconds of processor time by task.
 struct MapperTimes {
-  double bundle_adjustment = 0, panorama_localization = 0, infinite_triangulation = 0, other = 0;
+  double bundle_adjustment = 0, panorama_localization = 0, infinite_triangulation = 0, loop_closing = 0,
+         other = 0;
+  int loops_closed = 0;
   double longest_hold = 0;  // for which a piece of work made an offered keyframe wait
 };
 
@@ -127,6 +132,10 @@ class Mapper {
   void RefindNewPoints();
   void LocalAdjustment();
   void GlobalAdjustment();
+  // The most urgent step towards closing a loop; false when there is none.
+  bool WorkOnLoops();
+  // A candidate as it would have been offered had it been tracked in the map as it is now.
+  KeyFrameCandidate UpToDate(KeyFrameCandidate candidate) const;
   void ThinOut();  // removes one redundant keyframe
   void Publish();
   void Tell(MapperEvent::Kind kind, Timestamp time, std::string detail);
@@ -140,9 +149,11 @@ class Mapper {
   std::vector<MapPointId> to_refind_;
   std::vector<Unlocalized> to_localize_;
   std::deque<std::pair<KeyFrameId, KeyFrameId>> to_convert_;  // (reference, partner)
+  LoopCloser loops_;
+  bool loop_to_adjust_ = false;  // by the next global adjustment
   std::size_t keyframes_since_global_ = 0;
-  bool global_interrupted_ = false;
-  bool thin_out_ = false;  // the map has settled since keyframes were last looked through
+  bool global_interrupted_ = false;  // or due for another reason
+  bool thin_out_ = false;            // the map has settled since keyframes were last looked through
 
   std::atomic<bool> interrupt_{false};
   std::atomic<bool> locally_adjusted_{true};

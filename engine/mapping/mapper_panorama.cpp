@@ -113,6 +113,7 @@ bool Mapper::Localize(KeyFrameId id, const Rigid3* guess) {
   if (!LocalizePanoramaKeyFrame(options_.localization, id, id + 1, &map_, &searcher_, guess)) return false;
   PlanConversions(id);
   newest_ = id;
+  loops_.Look(id);
   ++keyframes_since_global_;
   locally_adjusted_ = false;
   Publish();

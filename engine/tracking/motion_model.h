@@ -5,6 +5,7 @@
 
 #include "engine/base/time.h"
 #include "engine/geometry/rigid3.h"
+#include "engine/map/map_correction.h"
 
 namespace docent::engine {
 
@@ -42,6 +43,11 @@ class MotionModel {
   // Only the sideways and the rotating part replaced by what the pictures say; see Tracker.
   Rigid3 PredictWithRotation(const Rotation3& now_from_previous) const {
     return Rigid3(now_from_previous, Eigen::Vector3d::Zero()) * camera_from_map_;
+  }
+  // The map has moved under the camera.
+  void Follow(const Sim3& after_from_before) {
+    camera_from_map_ = CarriedAlong(camera_from_map_, after_from_before);
+    twist_per_second_.head<3>() *= after_from_before.scale;
   }
   const Rigid3& last() const { return camera_from_map_; }
 

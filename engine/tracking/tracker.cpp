@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "engine/tracking/surroundings.h"
+
 namespace docent::engine {
 
 namespace {
@@ -84,6 +86,7 @@ void Tracker::StartNewMap() {
 
 void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_key) {
   const bool same = map_key == map_key_;
+  if (same && map_ && map) FollowCorrections(*map);
   map_ = map && !map->keyframes.empty() ? std::move(map) : nullptr;
   map_key_ = map_ ? map_key : 0;
   if (!map_) {
@@ -391,6 +394,10 @@ void Tracker::OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rig
   candidate.choice = choice;
   candidate.panorama = map_tracker_.panorama();
   candidate.time = frame.time;
+  if (map_) {
+    candidate.map_revision = map_->revision;
+    candidate.surroundings = Surroundings(*map_, matches);
+  }
   candidate.camera = camera_;
   candidate.features = features_;
   candidate.camera_from_map = camera_from_map;

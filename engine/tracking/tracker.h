@@ -171,6 +171,8 @@ class Tracker {
   Doubt DoubtOf(const MapTrackResult& result, const MapSnapshot& map) const;
   void Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out);
   void CollectReports();
+  // Carries what the tracker knows in coordinates of its map over to a newer snapshot of it.
+  void FollowCorrections(const MapSnapshot& newer);
   std::optional<Rotation3> RotationFromPrevious() const;
 
   const TrackerOptions options_;

@@ -5,6 +5,7 @@
 
 #include "app/session/session_map.h"
 #include "engine/base/random.h"
+#include "engine/map/map.h"
 
 namespace docent::app {
 namespace {
@@ -110,6 +111,40 @@ TEST(ContentFollower, LetsAnEditPutContentElsewhereAndTakesItAlongFromThere) {
   const Eigen::Vector3d wanted = Bend() * (Bend() * Eigen::Vector3d(0.2, 0.1, 2.8));
   EXPECT_LT((content::PlaceOf(*scene->Find("fox")) - wanted).norm(), 1e-9)
       << "taken back to where it would be by now";
+}
+
+// Where a loop is closed one part of the map moves by several percent while another stays, and a good part of
+// the points is found to have been known before and goes.
+TEST(ContentFollower, GoesAlongWhenALoopIsClosed) {
+  auto snapshot = Cloud();
+  for (const engine::MapPoint& point : std::vector(snapshot->points)) {
+    engine::MapPoint& other = snapshot->points.emplace_back(point);
+    other.id += 400;
+    other.source_keyframe = 1;
+    other.point_in_map.x() += 2.2;
+  }
+  for (engine::KeyFrameId id : {0u, 1u}) {
+    engine::KeyFrame& keyframe = snapshot->keyframes.emplace_back();
+    keyframe.id = id;
+    keyframe.mean_depth = 3;
+  }
+  snapshot->next_keyframe = 2;
+  snapshot->next_point = 801;
+  SessionMap map;
+  map.snapshot = snapshot;
+  content::Scene scene = TwoThings();
+  scene.entities[0].model.map_from_model.translation = {2.0, 0.1, 2.8};
+  map.scene = std::make_shared<content::Scene>(scene);
+  engine::Map closed(*snapshot);
+  closed.Correct({{1, Bend()}});
+  for (engine::MapPointId id = 401; id <= 800; id += 2) closed.RemovePoint(id);
+  map.Grow(closed.Snapshot());
+  const Eigen::Vector3d wanted = Bend() * scene.entities[0].model.map_from_model.translation;
+  EXPECT_GT((wanted - content::PlaceOf(scene.entities[0])).norm(), 0.2);
+  EXPECT_LT((content::PlaceOf(*map.scene->Find("fox")) - wanted).norm(), 1e-3);
+  EXPECT_NEAR(map.scene->Find("fox")->model.map_from_model.scale, 0.95 * 0.3, 1e-3);
+  EXPECT_LT((content::PlaceOf(*map.scene->Find("sign-1")) - content::PlaceOf(scene.entities[1])).norm(), 1e-3)
+      << "it stands in the part that stays";
 }
 
 TEST(ContentFollower, KeepsContentWhenThePointsAboutItAreGone) {

@@ -279,5 +279,59 @@ TEST(Map, TurnsNormalsTowardsTheObservers) {
   EXPECT_LT((map.FindPoint(id)->point.normal - Eigen::Vector3f(-1, 0, 0)).norm(), 1e-6f);
 }
 
+TEST(Map, MakesOneOfTwoPointsThatAreOne) {
+  Map map;
+  for (int i = 0; i < 4; ++i) map.AddKeyFrame(BlankKeyFrame());
+  const MapPointId known = AddSeenPoint(&map, 0, 1), twin = AddSeenPoint(&map, 2, 1);
+  map.AddObservation(Seen(3, twin));
+  map.FindPoint(known)->seen_inlier = 3;
+  map.FindPoint(twin)->seen_inlier = 4;
+  map.MergePoints(known, twin);
+  ExpectConsistent(map);
+  EXPECT_EQ(map.FindPoint(twin), nullptr);
+  EXPECT_EQ(map.FindPoint(known)->observers, (std::vector<KeyFrameId>{0, 1, 2, 3}));
+  EXPECT_EQ(map.FindPoint(known)->seen_inlier, 7);
+  map.MergePoints(known, known);
+  map.MergePoints(known, twin);
+  EXPECT_EQ(map.AlivePoints(), 1u) << "neither with itself nor with what is gone";
+}
+
+TEST(Map, MovesWhatIsAboutAKeyFrameWithIt) {
+  Map map;
+  for (int i = 0; i < 4; ++i) {
+    KeyFrame keyframe = BlankKeyFrame();
+    keyframe.camera_from_map = CameraAt({0.3 * i, 0, 0}, {0, 5.0 * i, 0});
+    keyframe.mean_depth = 2;
+    map.AddKeyFrame(keyframe);
+  }
+  const MapPointId stays = AddSeenPoint(&map, 0, 1), goes = AddSeenPoint(&map, 2, 1);
+  const PanoramaId panorama = map.OpenPanorama(2);
+  KeyFrame& dependent = map.FindKeyFrame(3)->keyframe;
+  dependent.kind = KeyFrameKind::kPanorama;
+  dependent.panorama = panorama;
+  const Map before = map;
+  const auto in_camera = [](Map of, KeyFrameId keyframe, MapPointId point) {
+    return Eigen::Vector3d(of.FindKeyFrame(keyframe)->keyframe.camera_from_map *
+                           of.FindPoint(point)->point.position());
+  };
+  Sim3 moved;
+  moved.rotation = Rotation3::Exp({0.1, 0.2, -0.3});
+  moved.translation = {1, 2, 3};
+  moved.scale = 1.25;
+  map.Correct({{2, moved}});
+  ExpectConsistent(map);
+  // Everything in the camera's frame has grown, and is seen where it was.
+  EXPECT_LT((in_camera(map, 2, goes) - 1.25 * in_camera(before, 2, goes)).norm(), 1e-12);
+  EXPECT_LT((in_camera(map, 3, goes) - 1.25 * in_camera(before, 3, goes)).norm(), 1e-12)
+      << "a dependent keyframe goes with its reference";
+  EXPECT_DOUBLE_EQ(map.FindKeyFrame(2)->keyframe.mean_depth, 2.5);
+  EXPECT_LT((in_camera(map, 0, stays) - in_camera(before, 0, stays)).norm(), 1e-15);
+  const auto snapshot = map.Snapshot();
+  ASSERT_EQ(snapshot->corrections.size(), 1u);
+  EXPECT_EQ(snapshot->corrections[0]->revision, snapshot->revision);
+  EXPECT_EQ(snapshot->corrections[0]->after_from_before.size(), 4u);
+  EXPECT_EQ(Map(*snapshot).Snapshot()->corrections.size(), 1u) << "whoever goes on with it remembers";
+}
+
 }  // namespace
 }  // namespace docent::engine

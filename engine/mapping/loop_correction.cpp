@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/loop_correction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "engine/mapping/covisibility.h"
+
+namespace docent::engine {
+
+LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopSighting>& sightings,
+                        Map* map) {
+  const Covisibility sharing(*map);
+  const std::size_t count = sharing.keyframes().size();
+  LoopGraph result;
+  result.keyframes = sharing.keyframes();
+  result.sightings = sightings.size();
+  bool any_fixed = false;
+  for (const KeyFrameId id : sharing.keyframes()) {
+    const KeyFrame& keyframe = map->FindKeyFrame(id)->keyframe;
+    result.graph.nodes.push_back({AsSim3(keyframe.camera_from_map), keyframe.fixed, keyframe.mean_depth});
+    any_fixed = any_fixed || keyframe.fixed;
+  }
+  if (!any_fixed && count > 0) result.graph.nodes.front().fixed = true;
+  std::set<std::pair<std::size_t, std::size_t>> joined;
+  const auto join = [&](std::size_t a, std::size_t b) {
+    if (a > b) std::swap(a, b);
+    if (a == b || !joined.emplace(a, b).second) return;
+    const Sim3 a_from_b = result.graph.nodes[a].node_from_map * result.graph.nodes[b].node_from_map.inverse();
+    const double weight = std::clamp(sharing.Shared(a, b) / 100.0, 0.05, 1.0);
+    result.graph.edges.push_back({static_cast<int>(a), static_cast<int>(b), a_from_b, weight});
+  };
+  std::vector<std::size_t> order(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto most = std::min(count, static_cast<std::size_t>(options.edges));
+    std::iota(order.begin(), order.end(), 0);
+    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(most), order.end(),
+                      [&](std::size_t a, std::size_t b) {
+                        return std::pair(-sharing.Shared(i, a), a) < std::pair(-sharing.Shared(i, b), b);
+                      });
+    for (std::size_t k = 0; k < most; ++k) {
+      if (sharing.AreNeighbours(i, order[k])) join(i, order[k]);
+    }
+  }
+  // Whatever would fall apart is held by the strongest links there are, and at last by the order of coming.
+  std::vector<std::size_t> part(count);
+  std::iota(part.begin(), part.end(), 0);
+  const auto root = [&](std::size_t i) {
+    while (part[i] != i) i = part[i] = part[part[i]];
+    return i;
+  };
+  for (const auto& [a, b] : joined) part[root(a)] = root(b);
+  std::vector<std::tuple<int, std::size_t, std::size_t>> links;
+  for (std::size_t a = 0; a < count; ++a) {
+    for (std::size_t b = a + 1; b < count; ++b) {
+      if (sharing.Shared(a, b) > 0) links.emplace_back(-sharing.Shared(a, b), a, b);
+    }
+    if (a + 1 < count) links.emplace_back(0, a, a + 1);
+  }
+  std::sort(links.begin(), links.end());
+  for (const auto& [shared, a, b] : links) {
+    if (root(a) == root(b)) continue;
+    part[root(a)] = root(b);
+    join(a, b);
+  }
+  // Hundreds of points tell it to a pixel.
+  constexpr double kSightingWeight = 10;
+  for (const LoopSighting& sighting : sightings) {
+    result.graph.edges.push_back({static_cast<int>(sharing.IndexOf(sighting.keyframe)),
+                                  static_cast<int>(sharing.IndexOf(sighting.place)),
+                                  sighting.keyframe_from_place, kSightingWeight});
+  }
+  return result;
+}
+
+bool IsSettled(const LoopCorrectionOptions& options, const LoopGraph& relaxed) {
+  const std::size_t first_sighting = relaxed.graph.edges.size() - relaxed.sightings;
+  for (std::size_t i = 0; i < relaxed.graph.edges.size(); ++i) {
+    const PoseGraph::Edge& edge = relaxed.graph.edges[i];
+    const double left = LargestError(relaxed.graph, edge);
+    if (i < first_sighting ? edge.weight * left > options.max_strain : left > options.max_misfit)
+      return false;
+  }
+  return true;
+}
+
+void ApplyLoopGraph(const LoopGraph& relaxed, Map* map) {
+  std::map<KeyFrameId, Sim3> after_from_before;
+  for (std::size_t i = 0; i < relaxed.keyframes.size(); ++i) {
+    const Map::KeyFrameRecord* record = map->FindKeyFrame(relaxed.keyframes[i]);
+    if (!record || relaxed.graph.nodes[i].fixed) continue;
+    after_from_before[relaxed.keyframes[i]] =
+        relaxed.graph.nodes[i].node_from_map.inverse() * AsSim3(record->keyframe.camera_from_map);
+  }
+  for (const auto& [id, record] : map->keyframes()) {
+    if (record.keyframe.kind != KeyFrameKind::kSixDof ||
+        std::binary_search(relaxed.keyframes.begin(), relaxed.keyframes.end(), id))
+      continue;
+    for (const auto& [other, shared] : map->Covisible(id)) {
+      const auto moved = after_from_before.find(other);
+      if (moved == after_from_before.end()) continue;
+      after_from_before[id] = moved->second;
+      break;
+    }
+  }
+  map->Correct(after_from_before);
+}
+
+int FuseTwins(const LoopSighting& sighting, Map* map) {
+  for (const Observation& observation : sighting.seen) map->AddObservation(observation);
+  int fused = 0;
+  for (const Twins& twins : sighting.twins) {
+    if (!map->FindPoint(twins.known) || !map->FindPoint(twins.recent)) continue;
+    map->MergePoints(twins.known, twins.recent);
+    ++fused;
+  }
+  return fused;
+}
+
+int FuseSeenTwice(KeyFrameId id, const std::vector<MapPointId>& points, Map* map, PointSearcher* searcher) {
+  constexpr float kRadiusPx = 10;      // level 0: what the spreading of the error has left
+  constexpr double kMaxErrorPx = 5;    // of the level
+  constexpr double kSamePx = 1.5;      // of the coarser level
+  constexpr double kSameDepth = 0.08;  // relative
+  const Map::KeyFrameRecord* const record = map->FindKeyFrame(id);
+  if (!record || record->keyframe.kind != KeyFrameKind::kSixDof) return 0;
+  const KeyFrame& keyframe = record->keyframe;
+  std::vector<Observation> found;
+  for (const MapPointId point_id : points) {
+    const Map::PointRecord* const point = map->FindPoint(point_id);
+    if (!point || point->point.infinite() ||
+        std::binary_search(point->observers.begin(), point->observers.end(), id))
+      continue;
+    const Map::KeyFrameRecord* const source = map->FindKeyFrame(point->point.source_keyframe);
+    if (!source) continue;
+    const auto predicted =
+        searcher->Predict(point->point, source->keyframe, *keyframe.camera, keyframe.camera_from_map);
+    if (!predicted) continue;
+    const auto seen =
+        searcher->Find(point->point, source->keyframe, *predicted, *keyframe.features, kRadiusPx, false);
+    if (!seen ||
+        (seen->pixel.cast<double>() - predicted->pixel).norm() > kMaxErrorPx * (1 << predicted->level))
+      continue;
+    found.push_back({id, point_id, seen->pixel, static_cast<std::uint8_t>(predicted->level)});
+  }
+  const std::vector<Observation> own = record->observations;
+  int fused = 0;
+  for (const Observation& seen : found) {
+    const Map::PointRecord* point = map->FindPoint(seen.point);
+    if (!point) continue;
+    const double depth = (keyframe.camera_from_map * point->point.position()).z();
+    MapPointId twin = kNoId;
+    for (const Observation& observation : own) {
+      const double limit = kSamePx * (1 << std::max(seen.level, observation.level));
+      if ((observation.pixel - seen.pixel).norm() > limit) continue;
+      const Map::PointRecord* other = map->FindPoint(observation.point);
+      if (!other || other->point.infinite()) continue;
+      const double other_depth = (keyframe.camera_from_map * other->point.position()).z();
+      if (std::abs(other_depth - depth) <= kSameDepth * depth) {
+        twin = observation.point;
+        break;
+      }
+    }
+    if (twin == kNoId) {
+      map->AddObservation(seen);
+      continue;
+    }
+    map->MergePoints(std::min(twin, seen.point), std::max(twin, seen.point));
+    ++fused;
+  }
+  return fused;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/loop_verification.h"
+
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <set>
+
+#include "engine/tracking/pose_refinement.h"
+
+namespace docent::engine {
+namespace {
+
+constexpr int kCellsAcross = 4;
+constexpr double kInlierWeight = 0.1;
+
+struct Found {
+  MapPointId point = kNoId;
+  Eigen::Vector2f pixel;
+  int level = 0;
+  double error = 0;  // against the prediction, in pixels of the level
+};
+
+double Median(std::vector<double>* values) {
+  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
+  std::nth_element(values->begin(), middle, values->end());
+  return *middle;
+}
+
+std::vector<MapPointId> FinitePointsOf(std::span<const KeyFrameId> keyframes, Map* map) {
+  std::set<MapPointId> points;
+  for (const KeyFrameId id : keyframes) {
+    for (const Observation& observation : map->FindKeyFrame(id)->observations) {
+      const Map::PointRecord* point = map->FindPoint(observation.point);
+      if (point && !point->point.infinite()) points.insert(observation.point);
+    }
+  }
+  return {points.begin(), points.end()};
+}
+
+// No more than so many, evenly.
+std::vector<MapPointId> Some(const std::vector<MapPointId>& points, std::size_t count) {
+  std::vector<MapPointId> some;
+  const std::size_t stride = 1 + (points.size() - (points.empty() ? 0 : 1)) / count;
+  for (std::size_t i = 0; i < points.size(); i += stride) some.push_back(points[i]);
+  return some;
+}
+
+// *expected: how many should be in the picture.
+std::vector<Found> Search(std::span<const MapPointId> points, const KeyFrame& keyframe,
+                          const Rigid3& camera_from_map, float radius_px, Map* map, PointSearcher* searcher,
+                          int* expected) {
+  std::vector<Found> found;
+  *expected = 0;
+  for (const MapPointId id : points) {
+    const Map::PointRecord* record = map->FindPoint(id);
+    const Map::KeyFrameRecord* source = map->FindKeyFrame(record->point.source_keyframe);
+    if (!source) continue;
+    const auto predicted =
+        searcher->Predict(record->point, source->keyframe, *keyframe.camera, camera_from_map);
+    if (!predicted) continue;
+    ++*expected;
+    const auto match =
+        searcher->Find(record->point, source->keyframe, *predicted, *keyframe.features, radius_px, false);
+    if (!match) continue;
+    const double error = (match->pixel.cast<double>() - predicted->pixel).norm() / (1 << predicted->level);
+    found.push_back({id, match->pixel, predicted->level, error});
+  }
+  return found;
+}
+
+PoseRefinement Refine(const std::vector<Found>& found, const CameraModel& camera, const Rigid3& start,
+                      Map* map, std::vector<PoseMeasurement>* measurements) {
+  measurements->clear();
+  for (const Found& f : found) {
+    measurements->push_back({map->FindPoint(f.point)->point.point_in_map, f.pixel.cast<double>(),
+                             1.0 / static_cast<double>(1 << f.level), 1.0});
+  }
+  PoseRefinementMemory memory;
+  return RefinePose(camera, start, {}, measurements, &memory, {Eigen::Vector3d::Zero(), start});
+}
+
+int OccupiedCells(const std::vector<Found>& found, const CameraModel& camera) {
+  std::bitset<kCellsAcross * kCellsAcross> cells;
+  for (const Found& f : found) {
+    const int column = static_cast<int>(f.pixel.x()) * kCellsAcross / camera.width_px();
+    const int row = static_cast<int>(f.pixel.y()) * kCellsAcross / camera.height_px();
+    cells.set(static_cast<std::size_t>(std::clamp(row, 0, kCellsAcross - 1) * kCellsAcross +
+                                       std::clamp(column, 0, kCellsAcross - 1)));
+  }
+  return static_cast<int>(cells.count());
+}
+
+// Pairs what was found of the place with what the keyframe knows there by recent points. The scale is the
+// median of the depths' ratios, recent to known; empty where too few agree on it.
+std::optional<double> PairTwins(const LoopVerificationOptions& options, const Map::KeyFrameRecord& keyframe,
+                                const Rigid3& camera_from_place, const std::vector<Found>& found, Map* map,
+                                std::vector<Twins>* twins) {
+  std::vector<double> ratios;
+  std::set<MapPointId> known;
+  for (const Found& f : found) known.insert(f.point);
+  for (const Found& f : found) {
+    MapPointId nearest = kNoId;
+    double least = 0, ratio = 0;
+    for (const Observation& observation : keyframe.observations) {
+      const double limit = options.twin_px * (1 << std::max<int>(f.level, observation.level));
+      const double distance = (observation.pixel - f.pixel).norm();
+      if (distance > limit || (nearest != kNoId && distance >= least)) continue;
+      const Map::PointRecord* recent = map->FindPoint(observation.point);
+      if (!recent || recent->point.infinite() || known.contains(observation.point)) continue;
+      const double depth = (keyframe.keyframe.camera_from_map * recent->point.position()).z();
+      const double known_depth = (camera_from_place * map->FindPoint(f.point)->point.position()).z();
+      if (!(depth > 0) || !(known_depth > 0)) continue;
+      nearest = observation.point;
+      least = distance;
+      ratio = depth / known_depth;
+    }
+    if (nearest == kNoId) continue;
+    twins->push_back({f.point, nearest});
+    ratios.push_back(std::log(ratio));
+  }
+  if (static_cast<int>(ratios.size()) < options.min_twins) return std::nullopt;
+  std::vector<double> sorted = ratios;
+  const double middle = Median(&sorted);
+  for (double& value : sorted) value = std::abs(value - middle);
+  const double spread = 1.4826 * Median(&sorted);
+  if (spread > options.max_scale_spread) return std::nullopt;
+  std::vector<Twins> agreeing;
+  for (std::size_t i = 0; i < ratios.size(); ++i) {
+    if (std::abs(ratios[i] - middle) <= 3 * std::max(spread, 0.01)) agreeing.push_back((*twins)[i]);
+  }
+  *twins = std::move(agreeing);
+  if (static_cast<int>(twins->size()) < options.min_twins) return std::nullopt;
+  return std::exp(middle);
+}
+
+}  // namespace
+
+std::string LoopSighting::Brief() const {
+  char text[160];
+  std::snprintf(text, sizeof(text), "keyframe %u shows the place of %u: %zu of %d points, %zu twins, %d back",
+                keyframe, place, seen.size(), expected, twins.size(), back_inliers);
+  return text;
+}
+
+std::optional<LoopSighting> VerifySighting(const LoopVerificationOptions& options, KeyFrameId id,
+                                           std::span<const KeyFrameId> place, const Rigid3& camera_from_map,
+                                           Map* map, PointSearcher* searcher) {
+  const Map::KeyFrameRecord* record = map->FindKeyFrame(id);
+  if (!record || place.empty()) return std::nullopt;
+  const KeyFrame& keyframe = record->keyframe;
+  std::vector<MapPointId> points = FinitePointsOf(place, map);
+  std::erase_if(points, [&](MapPointId point) {
+    const auto& observers = map->FindPoint(point)->observers;
+    return std::binary_search(observers.begin(), observers.end(), id);
+  });
+  LoopSighting sighting;
+  sighting.keyframe = id;
+  sighting.place = place.front();
+  std::vector<PoseMeasurement> measurements;
+  // Some of them, from far off, and then all.
+  points = Some(points, options.max_points);
+  const std::vector<MapPointId> some = Some(points, options.first_points);
+  std::vector<Found> found =
+      Search(some, keyframe, camera_from_map, options.first_radius_px, map, searcher, &sighting.expected);
+  if (found.size() < options.min_first_found) return std::nullopt;
+  PoseRefinement pose = Refine(found, *keyframe.camera, camera_from_map, map, &measurements);
+  if (!pose.converged) return std::nullopt;
+  found =
+      Search(points, keyframe, pose.camera_from_map, options.radius_px, map, searcher, &sighting.expected);
+  if (static_cast<int>(found.size()) < options.min_inliers) return std::nullopt;
+  pose = Refine(found, *keyframe.camera, pose.camera_from_map, map, &measurements);
+  std::vector<Found> inliers;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (measurements[i].weight > kInlierWeight) inliers.push_back(found[i]);
+  }
+  const double variance = pose.covariance.topLeftCorner<3, 3>().trace();
+  if (!pose.converged || pose.sigma > options.max_sigma || pose.observed != ObservedMotion::kSixDof ||
+      static_cast<int>(inliers.size()) < options.min_inliers ||
+      static_cast<double>(inliers.size()) < options.min_inlier_ratio * sighting.expected ||
+      OccupiedCells(inliers, *keyframe.camera) < options.min_cells ||
+      !(std::sqrt(variance) <= options.max_position_sigma * pose.mean_depth))
+    return std::nullopt;
+  const auto scale = PairTwins(options, *record, pose.camera_from_map, inliers, map, &sighting.twins);
+  if (!scale) return std::nullopt;
+
+  const KeyFrame& known = map->FindKeyFrame(sighting.place)->keyframe;
+  sighting.keyframe_from_place = AsSim3(pose.camera_from_map * known.camera_from_map.inverse());
+  sighting.keyframe_from_place.translation *= *scale;
+  sighting.keyframe_from_place.scale = *scale;
+  for (const Found& f : inliers)
+    sighting.seen.push_back({id, f.point, f.pixel, static_cast<std::uint8_t>(f.level)});
+
+  // The other way about, in the recent points' coordinates.
+  Rigid3 place_from_keyframe;
+  place_from_keyframe.rotation = sighting.keyframe_from_place.rotation.inverse();
+  place_from_keyframe.translation =
+      -(place_from_keyframe.rotation * sighting.keyframe_from_place.translation);
+  const std::array<KeyFrameId, 1> own = {id};
+  std::vector<MapPointId> recent = FinitePointsOf(own, map);
+  std::erase_if(recent, [&](MapPointId point) {
+    const auto& observers = map->FindPoint(point)->observers;
+    return std::binary_search(observers.begin(), observers.end(), known.id);
+  });
+  recent = Some(recent, options.max_points);
+  constexpr double kMaxBackError = 3;  // pixels of the level
+  int expected = 0;
+  const std::vector<Found> back = Search(recent, known, place_from_keyframe * keyframe.camera_from_map,
+                                         options.radius_px, map, searcher, &expected);
+  sighting.back_inliers = static_cast<int>(
+      std::count_if(back.begin(), back.end(), [](const Found& f) { return f.error <= kMaxBackError; }));
+  if (sighting.back_inliers < options.min_back_inliers ||
+      sighting.back_inliers < options.min_back_ratio * expected)
+    return std::nullopt;
+  return sighting;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/loop_closing.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "engine/mapping/mapper.h"
+#include "engine/vision/features.h"
+#include "tests/engine/rendered_world.h"
+
+// A camera goes around a room, looking out, with a calibration that is two per cent off: by the time it is
+// back, the map is some degrees off, and knows the beginning twice (ptamm §6.2, Fig. 15).
+namespace docent::engine {
+namespace {
+
+using testing_world::CameraAt;
+using testing_world::PaintedWall;
+using testing_world::RenderedWorld;
+using testing_world::Wall;
+
+constexpr double kStep_deg = 10;
+constexpr int kRound = 36;
+constexpr double kRadius = 0.8;
+
+const std::shared_ptr<const CameraModel>& TrueCamera() {
+  static const auto camera = testing_world::PinholeCamera(400, 300);
+  return camera;
+}
+const std::shared_ptr<const CameraModel>& BelievedCamera() {
+  static const auto camera = [] {
+    CameraModel::Intrinsics intrinsics{400, 300, 252 * 1.02, 252 * 1.02, 199.5, 149.5};
+    return std::make_shared<const CameraModel>(LensModel::kRadialTangential, intrinsics,
+                                               std::array<double, 5>{});
+  }();
+  return camera;
+}
+
+// Four walls, and before each of them a smaller one.
+const RenderedWorld& Hall() {
+  static const RenderedWorld hall = [] {
+    std::vector<Wall> walls;
+    for (int side = 0; side < 4; ++side) {
+      const double turn = side * std::numbers::pi / 2;
+      const Eigen::Vector3d out(std::sin(turn), 0, std::cos(turn)), right(std::cos(turn), 0, -std::sin(turn)),
+          down(0, 1, 0);
+      const auto seed = static_cast<std::uint64_t>(side);
+      walls.push_back(PaintedWall(2.6 * out, right, down, 2.6, 1.8, 100 + seed));
+      walls.push_back(
+          PaintedWall(2.0 * out + (side % 2 == 0 ? 0.9 : -0.7) * right + Eigen::Vector3d(0, 0.3, 0), right,
+                      down, 0.45, 0.5, 200 + seed));
+    }
+    return RenderedWorld(std::move(walls));
+  }();
+  return hall;
+}
+
+Rigid3 OnTheRound(int step) {
+  const double angle = step * kStep_deg * std::numbers::pi / 180;
+  return CameraAt({kRadius * std::sin(angle), 0, kRadius * std::cos(angle)}, {0, step * kStep_deg, 0});
+}
+
+// Where a true pose sees what, as the believed lens has it.
+InitialPair FirstPair(const RenderedWorld& world, const Rigid3& a, const Rigid3& b,
+                      const std::shared_ptr<const CameraModel>& believed) {
+  InitialPair pair;
+  pair.camera = believed;
+  pair.a = {FromSeconds(0), MakeFeatures(world.Render(*TrueCamera(), a, 1.5, 1))};
+  pair.b = {FromSeconds(1), MakeFeatures(world.Render(*TrueCamera(), b, 1.5, 2))};
+  pair.geometry.verdict = TwoViewVerdict::kGeneral;
+  pair.geometry.b_from_a = b * a.inverse();
+  pair.baseline_m = pair.geometry.b_from_a.translation.norm();
+  pair.geometry.b_from_a.translation /= pair.baseline_m;
+  for (int level = 2; level >= 0; --level) {
+    for (const Corner& corner : pair.a.features->corners[static_cast<std::size_t>(level)]) {
+      const Eigen::Vector2d pixel = LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), level);
+      const auto hit = world.AtPixel(*TrueCamera(), a, pixel);
+      if (pair.matches.size() >= 250 || !hit || !world.Sees(*TrueCamera(), b, hit->point)) continue;
+      pair.matches.push_back({pixel.cast<float>(), TrueCamera()->Project(b * hit->point)->cast<float>(),
+                              static_cast<std::uint8_t>(level)});
+      pair.geometry.points_in_a.push_back(a * hit->point / pair.baseline_m);
+      pair.geometry.inlier.push_back(true);
+    }
+  }
+  pair.geometry.inlier_count = static_cast<int>(pair.matches.size());
+  return pair;
+}
+
+// What became of a walk: the map after each step, and what was closed.
+struct Walk {
+  std::vector<std::shared_ptr<const MapSnapshot>> maps;
+  std::vector<MapperEvent> loops;
+};
+
+// Each keyframe is offered where the last one is in the map and the true step from there leads.
+Walk GoAlong(const RenderedWorld& world, const std::vector<Rigid3>& poses, const MapperOptions& options,
+             const std::shared_ptr<const CameraModel>& believed) {
+  Walk walk;
+  Mapper mapper(options);
+  mapper.Start(FirstPair(world, poses[0], poses[1], believed));
+  mapper.Step();
+  for (std::size_t i = 2; i < poses.size(); ++i) {
+    const auto map = mapper.Snapshot();
+    if (!map) break;
+    KeyFrameCandidate candidate;
+    candidate.time = FromSeconds(static_cast<double>(i));
+    candidate.camera = believed;
+    candidate.features = MakeFeatures(world.Render(*TrueCamera(), poses[i], 1.5, i));
+    candidate.camera_from_map = poses[i] * poses[i - 1].inverse() * map->keyframes.back().camera_from_map;
+    candidate.map_revision = map->revision;
+    candidate.surroundings = map->keyframes.back().id;
+    mapper.Offer(std::move(candidate));
+    for (int step = 0; step < 200 && mapper.Step(); ++step) {
+    }
+    walk.maps.push_back(mapper.Snapshot());
+    for (MapperEvent& event : mapper.TakeEvents()) {
+      if (event.kind == MapperEvent::Kind::kLoopClosed) walk.loops.push_back(std::move(event));
+    }
+  }
+  return walk;
+}
+
+std::vector<Rigid3> Round(int steps) {
+  std::vector<Rigid3> poses;
+  for (int step = 0; step < steps; ++step) poses.push_back(OnTheRound(step));
+  return poses;
+}
+
+const KeyFrame& At(const MapSnapshot& map, double seconds) {
+  return *std::find_if(map.keyframes.begin(), map.keyframes.end(),
+                       [&](const KeyFrame& keyframe) { return keyframe.time == FromSeconds(seconds); });
+}
+
+// By how much the map is wrong about where the camera stands that has gone all the way round: its keyframe
+// and that of the same place a round before. Degrees, and metres in the map's own unit.
+struct Gap {
+  double turn_deg, distance;
+};
+Gap GapAfterTheRound(const MapSnapshot& map, int step) {
+  const Rigid3 now = At(map, kRound + step).camera_from_map, then = At(map, step).camera_from_map;
+  const Rigid3 left = now * then.inverse();
+  return {left.rotation.Angle() * 180 / std::numbers::pi,
+          (now.OriginInSource() - then.OriginInSource()).norm()};
+}
+
+MapperOptions WithLoops(bool enabled) {
+  MapperOptions options;
+  options.loops.enabled = enabled;
+  options.loops.correction.max_strain = 0.1;  // the steps here are far longer than those of a walk
+  options.redundancy.min_keyframes = 1000;    // all stay, for comparison
+  return options;
+}
+
+const Walk& ClosedWalk() {
+  static const Walk walk = GoAlong(Hall(), Round(kRound + 6), WithLoops(true), BelievedCamera());
+  return walk;
+}
+
+TEST(LoopClosing, WithoutItTheMapKnowsTheBeginningTwice) {
+  const Walk walk = GoAlong(Hall(), Round(kRound + 6), WithLoops(false), BelievedCamera());
+  const Gap gap = GapAfterTheRound(*walk.maps.back(), 4);
+  EXPECT_GT(gap.turn_deg, 2.0);
+  EXPECT_TRUE(walk.loops.empty());
+}
+
+TEST(LoopClosing, PutsTheMapRightWhenTheCameraIsBack) {
+  const Walk& walk = ClosedWalk();
+  ASSERT_EQ(walk.loops.size(), 1u);
+  const MapSnapshot& map = *walk.maps.back();
+  EXPECT_EQ(Validate(map), "");
+  const Gap gap = GapAfterTheRound(map, 4);
+  EXPECT_LT(gap.turn_deg, 0.25);
+  EXPECT_LT(gap.distance, 0.03);
+  // And all the way: against the true poses, in the first keyframe's frame.
+  for (int step = 0; step < kRound; step += 6) {
+    const Rigid3 estimated = At(map, step).camera_from_map,
+                 truth = OnTheRound(step) * OnTheRound(0).inverse();
+    EXPECT_LT((estimated.rotation * truth.rotation.inverse()).Angle() * 180 / std::numbers::pi, 1.5)
+        << "step " << step;
+  }
+  // What was twice is once: keyframes of both rounds see the same points.
+  Map linked(map);
+  int shared = 0;
+  for (const auto& [id, count] : linked.Covisible(At(map, kRound + 4).id)) {
+    if (id == At(map, 4).id) shared = count;
+  }
+  EXPECT_GE(shared, 60);
+}
+
+TEST(LoopClosing, TellsWhoeverHoldsAPoseHowTheMapWasMoved) {
+  const Walk& walk = ClosedWalk();
+  const auto moved = std::find_if(walk.maps.begin(), walk.maps.end(),
+                                  [](const auto& map) { return !map->corrections.empty(); });
+  ASSERT_NE(moved, walk.maps.end());
+  ASSERT_NE(moved, walk.maps.begin());
+  const MapSnapshot &before = **(moved - 1), &after = **moved;
+  const MapCorrection& correction = *after.corrections.back();
+  EXPECT_GT(correction.revision, before.revision);
+  EXPECT_LE(correction.revision, after.revision);
+  // A camera that stood where the newest keyframe of the map before is, is carried to where that one is now.
+  const KeyFrame& newest = before.keyframes.back();
+  const Rigid3 carried = CarriedAlong(newest.camera_from_map, correction.after_from_before.at(newest.id));
+  const Rigid3 now = after.FindKeyFrame(newest.id)->camera_from_map;
+  // The adjustments about it move it a little, too.
+  EXPECT_LT((carried.rotation * now.rotation.inverse()).Angle() * 180 / std::numbers::pi, 1.0);
+  EXPECT_GT((newest.camera_from_map.rotation * now.rotation.inverse()).Angle() * 180 / std::numbers::pi, 2.0);
+}
+
+TEST(LoopClosing, NeverTakesALookAlikeForTheSamePlace) {
+  // One pattern again and again along a wall: every two metres all looks the same.
+  const Wall panel = PaintedWall({0, 0, 1.3}, {1, 0, 0}, {0, 1, 0}, 1.0, 1.2, 7);
+  const Wall stand = PaintedWall({0.3, 0.2, 1.0}, {1, 0, 0}, {0, 1, 0}, 0.2, 0.25, 8);
+  std::vector<Wall> walls;
+  for (int i = -1; i < 6; ++i) {
+    for (Wall wall : {panel, stand}) {
+      wall.center.x() += 2.0 * i;
+      walls.push_back(std::move(wall));
+    }
+  }
+  std::vector<Rigid3> poses;
+  for (int i = 0; i < 42; ++i) poses.push_back(CameraAt({0.18 * i, 0.02 * std::sin(i), 0}));
+  MapperOptions options = WithLoops(true);
+  const Walk walk = GoAlong(RenderedWorld(walls), poses, options, TrueCamera());
+  ASSERT_EQ(walk.maps.size(), 40u);
+  EXPECT_TRUE(walk.loops.empty()) << walk.loops.front().detail;
+  // It is the implausible error that gives them away, or else the map, which would have to be bent: whoever
+  // believes in any error is taken in.
+  options.loops.finder.max_shift = 10;
+  EXPECT_TRUE(GoAlong(RenderedWorld(walls), poses, options, TrueCamera()).loops.empty());
+  options.loops.correction.max_misfit = options.loops.correction.max_strain = 10;
+  EXPECT_FALSE(GoAlong(RenderedWorld(walls), poses, options, TrueCamera()).loops.empty());
+}
+
+}  // namespace
+}  // namespace docent::engine

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/pose_graph.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "engine/base/random.h"
+
+namespace docent::engine {
+namespace {
+
+constexpr double kTurn = 2 * std::numbers::pi;
+
+Sim3 MakeSim3(const Eigen::Vector3d& rotation, const Eigen::Vector3d& translation, double scale) {
+  Sim3 result;
+  result.rotation = Rotation3::Exp(rotation);
+  result.translation = translation;
+  result.scale = scale;
+  return result;
+}
+
+// What the error of an edge would be, without its weight: zero for equal ones.
+double Difference(const Sim3& a, const Sim3& b) {
+  const Sim3 left = a * b.inverse();
+  return std::max({left.translation.norm(), left.rotation.Angle(), std::abs(std::log(left.scale))});
+}
+
+// Cameras on a circle, each looking along it; of different units of length.
+std::vector<Sim3> Circle(int count) {
+  std::vector<Sim3> nodes;
+  for (int i = 0; i < count; ++i) {
+    const double angle = kTurn * i / count;
+    const Rotation3 rotation = Rotation3::Exp({0, angle, 0});
+    const Eigen::Vector3d center(5 * std::sin(angle), 0.1 * std::sin(3 * angle), 5 * std::cos(angle));
+    const double scale = 1 + 0.2 * std::sin(angle);
+    nodes.push_back(MakeSim3(rotation.Log(), -scale * (rotation * center), scale));
+  }
+  return nodes;
+}
+
+Eigen::Vector3d Draw(Random* random, double size) {
+  return {random->Uniform(-size, size), random->Uniform(-size, size), random->Uniform(-size, size)};
+}
+
+// Neighbours and next neighbours, all round.
+PoseGraph ExactGraph(const std::vector<Sim3>& truth) {
+  PoseGraph graph;
+  const int count = static_cast<int>(truth.size());
+  for (const Sim3& node : truth) graph.nodes.push_back({node, false, 2.0});
+  graph.nodes.front().fixed = true;
+  for (int i = 0; i < count; ++i) {
+    for (const int step : {1, 2}) {
+      const int j = (i + step) % count;
+      graph.edges.push_back(
+          {i, j, truth[static_cast<std::size_t>(i)] * truth[static_cast<std::size_t>(j)].inverse(),
+           0.3 + 0.1 * step});
+    }
+  }
+  return graph;
+}
+
+TEST(PoseGraph, ComesBackToTheTruthFromADisturbedStart) {
+  const std::vector<Sim3> truth = Circle(30);
+  PoseGraph graph = ExactGraph(truth);
+  Random random(3);
+  for (PoseGraph::Node& node : graph.nodes) {
+    if (!node.fixed)
+      node.node_from_map =
+          MakeSim3(Draw(&random, 0.2), Draw(&random, 0.5), random.Uniform(0.8, 1.2)) * node.node_from_map;
+  }
+  const PoseGraphSummary summary = RelaxPoseGraph({}, &graph);
+  EXPECT_TRUE(summary.solved);
+  EXPECT_GT(summary.initial_cost, 0.1);
+  EXPECT_LT(summary.final_cost, 1e-12);
+  // Wrong derivatives would take many more.
+  EXPECT_LE(summary.iterations, 10);
+  for (std::size_t i = 0; i < truth.size(); ++i)
+    EXPECT_LT(Difference(graph.nodes[i].node_from_map, truth[i]), 1e-5) << "node " << i;
+}
+
+TEST(PoseGraph, SpreadsTheErrorOfALoopEvenlyOverIt) {
+  // Every step is measured 1 % too short, turned too little, and 0.5 % off in scale.
+  constexpr int kCount = 40;
+  const std::vector<Sim3> truth = Circle(kCount);
+  PoseGraph graph;
+  graph.nodes.push_back({truth[0], true, 2.0});
+  const Sim3 slip = MakeSim3({0, 0.004, 0.001}, {0.005, 0, -0.01}, 1.005);
+  for (int i = 1; i < kCount; ++i) {
+    const Sim3 measured =
+        slip * (truth[static_cast<std::size_t>(i)] * truth[static_cast<std::size_t>(i - 1)].inverse());
+    graph.nodes.push_back({measured * graph.nodes.back().node_from_map, false, 2.0});
+    graph.edges.push_back({i, i - 1, measured, 1.0});
+  }
+  const double drifted = Difference(graph.nodes.back().node_from_map, truth.back());
+  EXPECT_GT(drifted, 0.15);
+  graph.edges.push_back({kCount - 1, 0, truth.back() * truth.front().inverse(), 1.0});
+  const PoseGraphSummary summary = RelaxPoseGraph({}, &graph);
+  ASSERT_TRUE(summary.solved);
+  EXPECT_LT(summary.final_cost, 0.1 * summary.initial_cost);
+  EXPECT_LT(Difference(graph.nodes.back().node_from_map, truth.back()), 0.1 * drifted);
+  // What is left is what each step slipped, and nowhere more.
+  const double slipped = Difference(slip, Sim3());
+  for (const PoseGraph::Edge& edge : graph.edges) {
+    const Sim3 a_from_b = graph.nodes[static_cast<std::size_t>(edge.a)].node_from_map *
+                          graph.nodes[static_cast<std::size_t>(edge.b)].node_from_map.inverse();
+    EXPECT_LT(Difference(edge.a_from_b, a_from_b), 3 * slipped) << edge.a << " from " << edge.b;
+  }
+}
+
+TEST(PoseGraph, RefusesAPartThatNothingHolds) {
+  const std::vector<Sim3> truth = Circle(6);
+  PoseGraph graph = ExactGraph(truth);
+  graph.nodes.push_back({Sim3(), false, 1.0});
+  const PoseGraph before = graph;
+  EXPECT_FALSE(RelaxPoseGraph({}, &graph).solved);
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i)
+    EXPECT_EQ(graph.nodes[i].node_from_map.translation, before.nodes[i].node_from_map.translation) << i;
+}
+
+TEST(PoseGraph, LeavesFixedNodesAlone) {
+  const std::vector<Sim3> truth = Circle(8);
+  PoseGraph graph = ExactGraph(truth);
+  graph.nodes[3].fixed = true;
+  graph.nodes[3].node_from_map.translation.x() += 0.3;
+  const Sim3 held = graph.nodes[3].node_from_map;
+  EXPECT_TRUE(RelaxPoseGraph({}, &graph).solved);
+  EXPECT_EQ(graph.nodes[3].node_from_map.translation, held.translation);
+  EXPECT_EQ(graph.nodes[0].node_from_map.translation, truth[0].translation);
+  EXPECT_GT(Difference(graph.nodes[4].node_from_map, truth[4]), 0.01) << "its neighbours follow it";
+}
+
+}  // namespace
+}  // namespace docent::engine

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/surroundings.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "engine/recognition/place.h"
+#include "engine/tracking/tracker.h"
+#include "tests/engine/rendered_world.h"
+
+// What a tracker makes of a map that is moved under it.
+namespace docent::engine {
+namespace {
+
+using testing_world::CameraAt;
+using testing_world::RenderedWorld;
+
+const std::shared_ptr<const CameraModel>& Camera() {
+  static const auto camera = testing_world::PinholeCamera(320, 240);
+  return camera;
+}
+const RenderedWorld& World() {
+  static const RenderedWorld world = RenderedWorld::Room(71);
+  return world;
+}
+
+Rigid3 Pose(int frame) {
+  return CameraAt({0.01 * frame, 0.02 * std::sin(0.1 * frame), 0}, {0, -0.1 * frame, 0});
+}
+
+Frame FrameAt(int index) {
+  Frame frame;
+  frame.time = FromSeconds(index / 30.0);
+  frame.picture = World().Render(*Camera(), Pose(index), 1.5, static_cast<std::uint64_t>(index) + 1);
+  return frame;
+}
+
+class OneMap : public PlaceFinder {
+ public:
+  explicit OneMap(std::shared_ptr<const MapSnapshot> map) : map_(std::move(map)) {}
+  std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage& image, int, int,
+                                         std::uint64_t) const override {
+    std::vector<PlaceCandidate> found;
+    for (const KeyFrame& keyframe : map_->keyframes)
+      found.push_back({1, map_, keyframe.id, Difference(keyframe.features->small_blurry, image)});
+    std::sort(found.begin(), found.end(),
+              [](const auto& a, const auto& b) { return a.difference < b.difference; });
+    return found;
+  }
+
+ private:
+  std::shared_ptr<const MapSnapshot> map_;
+};
+
+// A tracker that follows the first frames in an exact map.
+class MovedMap : public ::testing::Test {
+ protected:
+  static constexpr int kBefore = 12;
+  static void SetUpTestSuite() {
+    map_ = new Map(testing_world::TrueMap(World(), Camera(), {Pose(-20), Pose(0), Pose(20), Pose(40)}, 250));
+  }
+  static void TearDownTestSuite() {
+    delete map_;
+    map_ = nullptr;
+  }
+  void SetUp() override {
+    tracker_.SetMap(before_, 1);
+    const OneMap places(before_);
+    for (int i = 0; i < kBefore; ++i) last_ = tracker_.Track(FrameAt(i), &places);
+    ASSERT_TRUE(HasPose(last_.state)) << "the test needs a tracked camera";
+  }
+  // Half as large again, turned and shifted.
+  static Sim3 Moved() {
+    Sim3 moved;
+    moved.rotation = Rotation3::Exp({0.1, -0.4, 0.2});
+    moved.translation = {0.5, 1.0, -2.0};
+    moved.scale = 1.5;
+    return moved;
+  }
+  std::shared_ptr<const MapSnapshot> After() const {
+    Map moved(*before_);
+    std::map<KeyFrameId, Sim3> by;
+    for (const KeyFrame& keyframe : before_->keyframes) by[keyframe.id] = Moved();
+    moved.Correct(by);
+    return moved.Snapshot();
+  }
+
+  static Map* map_;
+  std::shared_ptr<const MapSnapshot> before_ = map_->Snapshot();
+  static TrackerOptions OnTour() {
+    TrackerOptions options;
+    options.build_maps = false;
+    return options;
+  }
+  Tracker tracker_{OnTour(), Camera(), 5};
+  TrackedFrame last_;
+};
+Map* MovedMap::map_ = nullptr;
+
+TEST_F(MovedMap, CarriesTheTrackAlong) {
+  tracker_.SetMap(After(), 1);
+  const TrackedFrame next = tracker_.Track(FrameAt(kBefore), nullptr);
+  ASSERT_EQ(next.state, TrackingState::kSixDof) << next.hint;
+  // The map's unit is two thirds of a metre now: 3 mm of the truth.
+  EXPECT_TRUE(IsNear(next.camera_from_map, CarriedAlong(Pose(kBefore), Moved()), 0.0045, 0.003))
+      << next.camera_from_map;
+}
+
+TEST_F(MovedMap, IsLostToATrackerThatIsNotTold) {
+  MapSnapshot silent = *After();
+  silent.corrections.clear();
+  tracker_.SetMap(std::make_shared<MapSnapshot>(silent), 1);
+  EXPECT_FALSE(HasPose(tracker_.Track(FrameAt(kBefore), nullptr).state));
+}
+
+TEST_F(MovedMap, IsNotFollowedTwice) {
+  tracker_.SetMap(After(), 1);
+  tracker_.SetMap(After(), 1);
+  EXPECT_EQ(tracker_.Track(FrameAt(kBefore), nullptr).state, TrackingState::kSixDof);
+}
+
+TEST_F(MovedMap, IsTheMapAboutTheKeyFrameThatMostOfThePictureWasFirstSeenIn) {
+  std::map<KeyFrameId, int> sources;
+  for (const PointMatch& match : last_.matches) {
+    if (match.inlier) ++sources[before_->FindPoint(match.point)->source_keyframe];
+  }
+  const KeyFrameId surroundings = Surroundings(*before_, last_.matches);
+  for (const auto& [keyframe, count] : sources) EXPECT_LE(count, sources[surroundings]) << keyframe;
+  EXPECT_EQ(Surroundings(*before_, {}), before_->keyframes.back().id) << "nothing seen: the newest";
+  EXPECT_EQ(Surroundings({}, {}), kNoId);
+}
+
+}  // namespace
+}  // namespace docent::engine
