@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/map/map_snapshot.h"
+
+// Of keyframes that were compared with a picture in two ways, which are to be looked at first.
+namespace docent::maps {
+
+struct PlaceScore {
+  std::uint64_t map_key = 0;
+  engine::KeyFrameId place = engine::kNoId;  // of its map; keyframes of one place see nearly the same
+  double difference = 0;                     // of the thumbnails, see ThumbnailArray::Hit
+  double words = 0;                          // that are shared, see InvertedFile::Hit
+};
+
+// How much alike two pictures are by both ways, larger is more alike: the correlation of the thumbnails, 0
+// for none, and by how much the words that are shared are more than `chance`, which keyframes of other places
+// share, in parts of it. Each counts about 1 where it is sure, and about 0 where it knows nothing.
+double Likeness(const PlaceScore& score, double chance);
+
+// Indices of the best `count`, at most `per_map` of one map: first the best of each of the kDifferentPlaces
+// best places, the most alike first; then the rest, the most alike first, whatever place it is of: a place is
+// verified by whichever of its keyframes fits. Ties go to the earlier.
+inline constexpr std::size_t kDifferentPlaces = 5;
+std::vector<std::size_t> RankPlaces(std::span<const PlaceScore> scores, double chance, std::size_t count,
+                                    std::size_t per_map);
+
+}  // namespace docent::maps
