@@ -53,10 +53,10 @@ bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, Track
   return false;
 }
 
-std::vector<Tracker::TurnedPlace> Tracker::BestPlaces(const PlaceFinder& places,
-                                                      std::uint64_t but_map) const {
+std::vector<Tracker::TurnedPlace> Tracker::BestPlaces(const PlaceFinder& places, std::uint64_t but_map) {
+  if (!words_) words_ = MakeWordBag(*features_);
   std::vector<TurnedPlace> turned;
-  const auto found = places.FindPlaces(features_->small_blurry, options_.candidates_looked_at,
+  const auto found = places.FindPlaces({features_->small_blurry, *words_}, options_.candidates_looked_at,
                                        options_.candidates_of_a_map, 0);
   if (but_map != 0 && (found.empty() || found.front().map_key == but_map)) return turned;
   for (const PlaceCandidate& candidate : found) {
