@@ -17,8 +17,7 @@ namespace {
 constexpr std::size_t kComparedFinely = 256;
 // As many as words bring into the comparison.
 constexpr std::size_t kByWords = 64;
-// Of words: what pictures of different places share mostly.
-constexpr double kLeastChance = 0.1;
+constexpr double kMostByChance = 0.9;  // of the correlation
 // The difference of thumbnails that have nothing in common.
 constexpr double kUnlike = 2.0 * kThumbnailContrast * kThumbnailContrast;
 
@@ -31,7 +30,7 @@ class PlaceIndex::Merge {
 
   void AddByThumbnail(const PackedThumbnail& wanted, std::size_t count, const Map* only_map);
   void AddByWords(const engine::WordBag& wanted, const Map* only_map);
-  std::vector<engine::PlaceCandidate> Best(std::size_t count, std::size_t per_map) const;
+  std::vector<engine::PlaceCandidate> Best(std::size_t count, std::size_t per_map, std::size_t places) const;
 
  private:
   struct Candidate {
@@ -53,7 +52,7 @@ class PlaceIndex::Merge {
   const PackedThumbnail* thumbnail_ = nullptr;
   const State::Array* array_ = nullptr;  // of thumbnails as large as the wanted one
   std::vector<Candidate> candidates_;
-  double chance_ = kLeastChance;  // see Likeness
+  ByChance chance_;  // what the last of so many shares that they cannot all be the place
   std::unordered_set<const Entry*> known_;
 };
 
@@ -85,6 +84,8 @@ void PlaceIndex::Merge::AddByThumbnail(const PackedThumbnail& wanted, std::size_
     // A slot whose keyframe went, or has another picture now.
     if (!entry || entry->array != index || entry->slot != hit.slot) continue;
     Add(map, entry, hit.difference);
+    if (!only_map && candidates_.size() == kByWords)
+      chance_.correlation = std::clamp(1 - hit.difference / kUnlike, 0.0, kMostByChance);
   }
 }
 
@@ -94,8 +95,7 @@ void PlaceIndex::Merge::AddByWords(const engine::WordBag& wanted, const Map* onl
     for (const Entry& entry : only_map->entries) Add(only_map, &entry, kUnlike);
   } else {
     const std::vector<InvertedFile::Hit> hits = words_.Search(wanted, kByWords);
-    // So many places are not where the picture was taken: what the last one shares, it shares by chance.
-    if (hits.size() == kByWords) chance_ = std::max(kLeastChance, hits.back().score);
+    if (hits.size() == kByWords) chance_.words = std::max(chance_.words, hits.back().score);
     for (const InvertedFile::Hit& hit : hits) {
       const Map* const map = state_.Find(hit.owner.map_key);
       const Entry* const entry = Find(map, hit.owner.keyframe);
@@ -124,12 +124,13 @@ void PlaceIndex::Merge::Compare(std::size_t first) {
     candidates_[candidate_at.at(hit.slot)].difference = hit.difference;
 }
 
-std::vector<engine::PlaceCandidate> PlaceIndex::Merge::Best(std::size_t count, std::size_t per_map) const {
+std::vector<engine::PlaceCandidate> PlaceIndex::Merge::Best(std::size_t count, std::size_t per_map,
+                                                            std::size_t places) const {
   std::vector<PlaceScore> scores;
   for (const Candidate& candidate : candidates_)
     scores.push_back({candidate.map->key, candidate.entry->place, candidate.difference, candidate.words});
   std::vector<engine::PlaceCandidate> best;
-  for (const std::size_t i : RankPlaces(scores, chance_, count, per_map)) {
+  for (const std::size_t i : RankPlaces(scores, chance_, count, per_map, places)) {
     const Candidate& candidate = candidates_[i];
     best.push_back(
         {candidate.map->key, candidate.map->snapshot, candidate.entry->keyframe, candidate.difference});
@@ -147,7 +148,8 @@ std::vector<engine::PlaceCandidate> PlaceIndex::FindPlaces(const engine::PlaceQu
   Merge merge(*state, words_);
   if (wanted.width != 0) merge.AddByThumbnail(wanted, static_cast<std::size_t>(count), only);
   if (query.words && !query.words->empty()) merge.AddByWords(*query.words, only);
-  return merge.Best(static_cast<std::size_t>(count), static_cast<std::size_t>(per_map));
+  return merge.Best(static_cast<std::size_t>(count), static_cast<std::size_t>(per_map),
+                    query.places_first ? kDifferentPlaces : 0);
 }
 
 }  // namespace docent::maps

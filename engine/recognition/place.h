@@ -30,6 +30,8 @@ struct PlaceQuery {
 
   const SmallBlurryImage* image;
   const WordBag* words = nullptr;
+  // Different places first; else the most alike keyframes, whatever place they are of.
+  bool places_first = true;
 };
 
 // Whoever knows all maps (the library's place index) answers this; the engine asks it when it is lost.

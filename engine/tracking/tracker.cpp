@@ -188,7 +188,6 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   pair_.reset();
   previous_ = std::exchange(features_, nullptr);
   features_ = NextFeatures(frame);
-  words_.reset();
   ++frames_since_keyframe_;
   searched_ = map_ && tracking_;
 
