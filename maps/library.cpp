@@ -17,6 +17,7 @@
 #include "maps/snapshot_reader.h"
 #include "maps/thumbnail_rows.h"
 #include "maps/verify.h"
+#include "maps/word_rows.h"
 
 namespace docent::maps {
 
@@ -198,6 +199,8 @@ class Library::Impl {
     WritePictures(database_, info->key, snapshot, parts.keyframes, stored_before);
     WriteParts(database_, info->key, parts);
     WriteThumbnails(database_, info->key, MakeThumbnails(snapshot));
+    WriteWords(database_, info->key,
+               MakeWords(snapshot, UnchangedWords(database_, *info, stored_before, parts.keyframes)));
     info->revision = snapshot.revision;
     info->next_keyframe = snapshot.next_keyframe;
     info->next_point = snapshot.next_point;
@@ -280,17 +283,20 @@ SceneRecord Library::LoadScene(std::uint64_t key) const {
   });
 }
 
-void Library::LoadThumbnails(const TakeThumbnails& take) const {
+void Library::LoadLooks(const TakeLooks& take) const {
   impl_->Read([&] {
     for (const MapInfo& info : ReadMapRows(impl_->database())) {
-      std::vector<KeyFrameThumbnail> thumbnails;
-      std::string problem;
-      try {
-        WithPlace(impl_->database(), info, [&] { thumbnails = ReadThumbnails(impl_->database(), info); });
-      } catch (const Error& error) {
-        problem = error.what();
-      }
-      take(info, std::move(thumbnails), problem);
+      Looks looks;
+      const auto attempt = [&](const std::function<void()>& read) {
+        try {
+          WithPlace(impl_->database(), info, read);
+        } catch (const Error& error) {
+          looks.problem = error.what();
+        }
+      };
+      attempt([&] { looks.words = ReadWords(impl_->database(), info); });
+      attempt([&] { looks.thumbnails = ReadThumbnails(impl_->database(), info); });
+      take(info, std::move(looks));
     }
   });
 }

@@ -12,6 +12,7 @@
 #include "maps/map_record.h"
 #include "maps/policy.h"
 #include "maps/thumbnail_array.h"
+#include "maps/word_rows.h"
 
 // A library of maps: one SQLite file, NAME.docent (maps/README.md describes it).
 //
@@ -57,10 +58,14 @@ class Library {
   StoredMap Load(std::uint64_t key) const;
   SceneRecord LoadScene(std::uint64_t key) const;
   // Hands out what a place index needs of every map, by ascending key: a few kilobytes a keyframe, without
-  // touching points or pictures. A map whose thumbnails are damaged is told as an empty list and a sentence.
-  using TakeThumbnails = std::function<void(const MapInfo& info, std::vector<KeyFrameThumbnail> thumbnails,
-                                            const std::string& problem)>;
-  void LoadThumbnails(const TakeThumbnails& take) const;
+  // touching points or pictures. What is damaged is told as an empty list and a sentence.
+  struct Looks {
+    std::vector<KeyFrameThumbnail> thumbnails;
+    std::vector<KeyFrameWords> words;  // empty also where none are known, see ReadWords
+    std::string problem;
+  };
+  using TakeLooks = std::function<void(const MapInfo& info, Looks looks)>;
+  void LoadLooks(const TakeLooks& take) const;
 
   // A key that no map of this library has or ever had; reserved on disk, so that two processes never share
   // one.

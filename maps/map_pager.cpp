@@ -50,8 +50,8 @@ class MapPager::Impl {
   void Load(std::uint64_t key);
   void Expect(const std::vector<std::uint64_t>& keys);
   void Hold(const std::vector<std::uint64_t>& keys);
-  std::vector<engine::PlaceCandidate> FindPlaces(const engine::SmallBlurryImage& image, int count,
-                                                 int per_map, std::uint64_t only_map);
+  std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
+                                                 std::uint64_t only_map);
   std::size_t bytes_in_memory() const {
     const std::scoped_lock lock(mutex_);
     return bytes_;
@@ -96,12 +96,11 @@ std::vector<MapInfo> MapPager::Impl::Open() {
   std::size_t keyframes = 0;
   for (const MapInfo& info : infos) keyframes += info.keyframes;
   index_->Reserve(keyframes);
-  library_->LoadThumbnails(
-      [&](const MapInfo& info, const std::vector<KeyFrameThumbnail>& thumbnails, const std::string& problem) {
-        index_->SetThumbnails(info.key, thumbnails);
-        // It cannot be found by what it looks like; by its name it can.
-        if (!problem.empty() && callbacks_.failed) callbacks_.failed(info.key, problem);
-      });
+  library_->LoadLooks([&](const MapInfo& info, const Library::Looks& looks) {
+    index_->SetLooks(info.key, looks.thumbnails, looks.words);
+    // It is hard to find by what it looks like; by its name it can be found.
+    if (!looks.problem.empty() && callbacks_.failed) callbacks_.failed(info.key, looks.problem);
+  });
   if (keyframes * kUsualKeyFrameBytes <= std::min(options_.read_at_start_bytes, options_.budget_bytes)) {
     for (const MapInfo& info : infos) Load(info.key);
   }
@@ -229,10 +228,9 @@ void MapPager::Impl::Hold(const std::vector<std::uint64_t>& keys) {
   for (const std::uint64_t key : keys) Touch(key);
 }
 
-std::vector<engine::PlaceCandidate> MapPager::Impl::FindPlaces(const engine::SmallBlurryImage& image,
-                                                               int count, int per_map,
-                                                               std::uint64_t only_map) {
-  std::vector<engine::PlaceCandidate> candidates = index_->FindPlaces(image, count, per_map, only_map);
+std::vector<engine::PlaceCandidate> MapPager::Impl::FindPlaces(const engine::PlaceQuery& query, int count,
+                                                               int per_map, std::uint64_t only_map) {
+  std::vector<engine::PlaceCandidate> candidates = index_->FindPlaces(query, count, per_map, only_map);
   std::vector<std::uint64_t> missing;  // the most alike first
   {
     const std::scoped_lock lock(mutex_);
@@ -250,7 +248,7 @@ std::vector<engine::PlaceCandidate> MapPager::Impl::FindPlaces(const engine::Sma
   if (!missing.empty()) {
     if (options_.wait_for_maps) {
       for (const std::uint64_t key : missing) TryLoad(key);
-      candidates = index_->FindPlaces(image, count, per_map, only_map);
+      candidates = index_->FindPlaces(query, count, per_map, only_map);
     } else {
       changed_.notify_all();
     }
@@ -276,9 +274,9 @@ void MapPager::Expect(const std::vector<std::uint64_t>& keys) {
 void MapPager::Hold(const std::vector<std::uint64_t>& keys) {
   impl_->Hold(keys);
 }
-std::vector<engine::PlaceCandidate> MapPager::FindPlaces(const engine::SmallBlurryImage& image, int count,
+std::vector<engine::PlaceCandidate> MapPager::FindPlaces(const engine::PlaceQuery& query, int count,
                                                          int per_map, std::uint64_t only_map) const {
-  return impl_->FindPlaces(image, count, per_map, only_map);
+  return impl_->FindPlaces(query, count, per_map, only_map);
 }
 std::size_t MapPager::bytes_in_memory() const {
   return impl_->bytes_in_memory();

@@ -62,8 +62,8 @@ class MapPager : public engine::PlaceFinder {
   // These stay in memory until the next call.
   void Hold(const std::vector<std::uint64_t>& keys);
 
-  std::vector<engine::PlaceCandidate> FindPlaces(const engine::SmallBlurryImage& image, int count,
-                                                 int per_map, std::uint64_t only_map) const override;
+  std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
+                                                 std::uint64_t only_map) const override;
 
   std::size_t bytes_in_memory() const;
   std::vector<std::uint64_t> maps_in_memory() const;  // the most recently used first

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "maps/migration.h"
 
+#include <algorithm>
 #include <string>
 #include <system_error>
 
@@ -8,6 +9,7 @@
 #include "maps/rows.h"
 #include "maps/schema.h"
 #include "maps/thumbnail_rows.h"
+#include "maps/word_rows.h"
 
 namespace docent::maps {
 
@@ -46,6 +48,14 @@ void UpgradeToFormat2(const Database& database) {
   }
 }
 
+// Format 3 keeps the words of each map's keyframes.
+void UpgradeToFormat3(const Database& database) {
+  CreateTable(database, "words");
+  for (const MapInfo& info : ReadMapRows(database)) {
+    WithPlace(database, info, [&] { WriteWords(database, info.key, WordsFromPictures(database, info)); });
+  }
+}
+
 }  // namespace
 
 fs::path BackupPath(const fs::path& library, std::int64_t format) {
@@ -61,6 +71,8 @@ void UpgradeFormat(const Database& database) {
   Transaction transaction(database, Transaction::Kind::kWrite);
   // Another process may have been faster.
   if (SchemaVersion(database) < 2) UpgradeToFormat2(database);
+  SetSchemaVersion(database, std::max<std::int64_t>(2, SchemaVersion(database)));
+  if (SchemaVersion(database) < 3) UpgradeToFormat3(database);
   SetSchemaVersion(database, kSchemaVersion);
   transaction.Commit();
 }

@@ -4,58 +4,15 @@
 #include <algorithm>
 #include <utility>
 
+#include "maps/place_index_state.h"
+
 namespace docent::maps {
 
 namespace {
 
-// What the exhaustive search hands on to the fine comparison: what looks alike in cells of six picture pixels
-// of eighty is looked at again in pixels of two.
-constexpr std::size_t kComparedFinely = 256;
 constexpr std::size_t kFirstCapacity = 256;
-constexpr std::size_t kDeadAllowed = 128;  // slots of thumbnails that went, beside a sixteenth of all
 
 }  // namespace
-
-// One keyframe of a map, and where its thumbnail lies.
-struct PlaceIndex::Entry {
-  engine::KeyFrameId keyframe = engine::kNoId;
-  std::uint32_t array = 0;       // index in State::arrays
-  std::uint32_t slot = 0;        // in that array
-  const void* source = nullptr;  // the features it was made from, while the map holds them
-};
-
-struct PlaceIndex::Map {
-  std::uint64_t key = 0;
-  std::shared_ptr<const engine::MapSnapshot> snapshot;  // null while it is not in memory
-  std::vector<Entry> entries;                           // by ascending keyframe
-
-  const Entry* Find(engine::KeyFrameId keyframe) const {
-    const auto entry =
-        std::lower_bound(entries.begin(), entries.end(), keyframe,
-                         [](const Entry& e, engine::KeyFrameId id) { return e.keyframe < id; });
-    return entry != entries.end() && entry->keyframe == keyframe ? &*entry : nullptr;
-  }
-};
-
-struct PlaceIndex::State {
-  struct Array {
-    std::shared_ptr<ThumbnailArray> thumbnails;  // changed by the writer alone, behind `size`
-    std::size_t size = 0;                        // thumbnails that this state knows of
-    std::size_t alive = 0;                       // of these, owned by a map still
-  };
-  std::vector<Array> arrays;                     // one a size of thumbnail
-  std::vector<std::shared_ptr<const Map>> maps;  // by ascending key
-
-  std::size_t LowerBound(std::uint64_t key) const {
-    const auto place = std::lower_bound(maps.begin(), maps.end(), key,
-                                        [](const auto& map, std::uint64_t k) { return map->key < k; });
-    return static_cast<std::size_t>(place - maps.begin());
-  }
-  const Map* Find(std::uint64_t key) const {
-    const std::size_t place = LowerBound(key);
-    return place < maps.size() && maps[place]->key == key ? maps[place].get() : nullptr;
-  }
-};
 
 // The next state in the making. What is shared with earlier states stays as it is: arrays only grow behind
 // the sizes that those know, or are made anew.
@@ -75,9 +32,7 @@ class PlaceIndex::Update {
     state_->maps.insert(state_->maps.begin() + static_cast<std::ptrdiff_t>(place), std::move(map));
   }
   bool Holds(const Entry& entry, const PackedThumbnail& thumbnail) const {
-    const ThumbnailArray& array = *state_->arrays[entry.array].thumbnails;
-    return array.shape().width == thumbnail.width && array.shape().height == thumbnail.height &&
-           array.Holds(entry.slot, thumbnail);
+    return state_->Holds(entry, thumbnail);
   }
   // The array of a size, with room for `more`.
   std::uint32_t ArrayFor(int width, int height, std::size_t more) {
@@ -109,7 +64,7 @@ class PlaceIndex::Update {
   std::shared_ptr<const State> Finish() {
     for (std::uint32_t i = 0; i < state_->arrays.size(); ++i) {
       const State::Array& array = state_->arrays[i];
-      if (array.size - array.alive > kDeadAllowed + array.size / 16) Compact(i);
+      if (array.size - array.alive > kDeadThumbnailsAllowed + array.size / 16) Compact(i);
     }
     return state_;
   }
@@ -148,39 +103,80 @@ void PlaceIndex::Publish(std::shared_ptr<const State> state) {
   state_.swap(state);
 }
 
-void PlaceIndex::SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot) {
+std::vector<KeyFrameWords> PlaceIndex::DescribeNew(std::uint64_t key, const engine::MapSnapshot& map) const {
+  const auto state = Current();
+  const Map* const before = state->Find(key);
+  std::vector<KeyFrameWords> described;
+  for (const engine::KeyFrame& keyframe : map.keyframes) {
+    const Entry* const entry = before ? before->Find(keyframe.id) : nullptr;
+    if (entry && entry->described &&
+        (entry->source == keyframe.features.get() ||
+         state->Holds(*entry, Pack(keyframe.features->small_blurry)))) {
+      continue;
+    }
+    described.push_back({keyframe.id, engine::kNoId, WordsOf(*keyframe.features)});
+  }
+  return described;
+}
+
+void PlaceIndex::SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot,
+                        const std::vector<KeyFrameWords>& described) {
   if (!snapshot) return RemoveMap(key);
+  if (described.empty()) {
+    // Mostly there is nothing new, and this tells so at once.
+    const std::vector<KeyFrameWords> own = DescribeNew(key, *snapshot);
+    if (!own.empty()) return SetMap(key, std::move(snapshot), own);
+  }
+  const std::vector<engine::KeyFrameId> places = PlacesOf(*snapshot);
   std::scoped_lock writing(write_mutex_);
   const auto state = Current();
   const Map* const before = state->Find(key);
-  std::vector<KeyFrameThumbnail> thumbnails;
-  std::vector<const void*> sources;
-  for (const engine::KeyFrame& keyframe : snapshot->keyframes) {
-    KeyFrameThumbnail next{keyframe.id, {}};
-    const void* const source = keyframe.features.get();
-    // A keyframe whose features the index has seen needs no packing: an empty thumbnail stands for the known
-    // one.
+  std::vector<News> news;
+  std::vector<PackedThumbnail> packed;
+  packed.reserve(snapshot->keyframes.size());
+  auto words = described.begin();
+  for (std::size_t i = 0; i < snapshot->keyframes.size(); ++i) {
+    const engine::KeyFrame& keyframe = snapshot->keyframes[i];
+    News next;
+    next.keyframe = keyframe.id;
+    next.place = places[i];
+    next.source = keyframe.features.get();
+    while (words != described.end() && words->keyframe < keyframe.id) ++words;
+    if (words != described.end() && words->keyframe == keyframe.id) next.words = &words->words;
+    // A keyframe whose features the index has seen needs no packing.
     const Entry* const entry = before && before->snapshot ? before->Find(keyframe.id) : nullptr;
-    const bool known = entry && entry->source == source;
-    if (!known) {
-      next.thumbnail = Pack(keyframe.features->small_blurry);
-      if (next.thumbnail.width == 0) continue;
+    if (!entry || entry->source != next.source) {
+      packed.push_back(Pack(keyframe.features->small_blurry));
+      if (packed.back().width == 0) continue;
+      next.thumbnail = &packed.back();
     }
-    thumbnails.push_back(std::move(next));
-    sources.push_back(source);
+    news.push_back(next);
   }
-  Replace(key, std::move(snapshot), thumbnails, sources);
+  Replace(key, std::move(snapshot), news);
 }
 
-void PlaceIndex::SetThumbnails(std::uint64_t key, std::span<const KeyFrameThumbnail> thumbnails) {
+void PlaceIndex::SetLooks(std::uint64_t key, std::span<const KeyFrameThumbnail> thumbnails,
+                          std::span<const KeyFrameWords> words) {
+  std::vector<News> news;
+  news.reserve(thumbnails.size());
+  auto described = words.begin();
+  for (const auto& [keyframe, thumbnail] : thumbnails) {
+    News next;
+    next.keyframe = next.place = keyframe;
+    next.thumbnail = &thumbnail;
+    while (described != words.end() && described->keyframe < keyframe) ++described;
+    if (described != words.end() && described->keyframe == keyframe) {
+      next.place = described->place;
+      next.words = &described->words;
+    }
+    news.push_back(next);
+  }
   std::scoped_lock writing(write_mutex_);
-  const std::vector<const void*> sources(thumbnails.size(), nullptr);
-  Replace(key, nullptr, thumbnails, sources);
+  Replace(key, nullptr, news);
 }
 
 void PlaceIndex::Replace(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot,
-                         std::span<const KeyFrameThumbnail> thumbnails,
-                         std::span<const void* const> sources) {
+                         std::span<const News> news) {
   const auto state = Current();
   const Map* const before = state->Find(key);
   Update update(*state);
@@ -188,22 +184,43 @@ void PlaceIndex::Replace(std::uint64_t key, std::shared_ptr<const engine::MapSna
   auto map = std::make_shared<Map>();
   map->key = key;
   map->snapshot = std::move(snapshot);
-  map->entries.reserve(thumbnails.size());
-  for (std::size_t i = 0; i < thumbnails.size(); ++i) {
-    const auto& [keyframe, thumbnail] = thumbnails[i];
-    const Entry* const known = before ? before->Find(keyframe) : nullptr;
-    Entry entry{keyframe, 0, 0, sources[i]};
-    if (known && (thumbnail.width == 0 || update.Holds(*known, thumbnail))) {
-      entry.array = known->array;
-      entry.slot = known->slot;
-    } else {
-      entry.array = update.ArrayFor(thumbnail.width, thumbnail.height, thumbnails.size() - i);
-      entry.slot = update.Append(entry.array, thumbnail, {key, keyframe});
+  map->entries.reserve(news.size());
+  std::vector<InvertedFile::Slot> kept;
+  for (std::size_t i = 0; i < news.size(); ++i) {
+    const News& next = news[i];
+    const Entry* const known = before ? before->Find(next.keyframe) : nullptr;
+    const bool same_picture = known && (!next.thumbnail || update.Holds(*known, *next.thumbnail));
+    if (!same_picture && !next.thumbnail) continue;
+    Entry entry = same_picture ? *known : Entry();
+    entry.keyframe = next.keyframe;
+    entry.place = next.place;
+    entry.source = next.source;
+    if (!same_picture) {
+      entry.array = update.ArrayFor(next.thumbnail->width, next.thumbnail->height, news.size() - i);
+      entry.slot = update.Append(entry.array, *next.thumbnail, {key, next.keyframe});
     }
+    if (!entry.described && next.words) {
+      entry.described = true;
+      if (!next.words->empty()) entry.word_slot = words_.Add(*next.words, {key, next.keyframe});
+    }
+    if (entry.word_slot != InvertedFile::kNoSlot) kept.push_back(entry.word_slot);
     map->entries.push_back(entry);
   }
   update.Insert(std::move(map));
   Publish(update.Finish());
+  RemoveWords(before, std::move(kept));
+}
+
+// Those of a map as it was, but these. A search that still reads the state before passes over what is gone.
+void PlaceIndex::RemoveWords(const Map* before, std::vector<InvertedFile::Slot> kept) {
+  if (!before) return;
+  std::sort(kept.begin(), kept.end());
+  for (const Entry& entry : before->entries) {
+    if (entry.word_slot != InvertedFile::kNoSlot &&
+        !std::binary_search(kept.begin(), kept.end(), entry.word_slot)) {
+      words_.Remove(entry.word_slot);
+    }
+  }
 }
 
 void PlaceIndex::ReleaseMap(std::uint64_t key) {
@@ -222,9 +239,11 @@ void PlaceIndex::ReleaseMap(std::uint64_t key) {
 
 void PlaceIndex::RemoveMap(std::uint64_t key) {
   std::scoped_lock writing(write_mutex_);
-  Update update(*Current());
+  const auto state = Current();
+  Update update(*state);
   update.Remove(key);
   Publish(update.Finish());
+  RemoveWords(state->Find(key), {});
 }
 
 void PlaceIndex::Reserve(std::size_t keyframes) {
@@ -243,51 +262,6 @@ std::size_t PlaceIndex::keyframes() const {
   std::size_t count = 0;
   for (const auto& map : Current()->maps) count += map->entries.size();
   return count;
-}
-
-// Stage (a), by thumbnails. Candidates of further stages, which look at other things, join the list here
-// before it is sorted.
-std::vector<engine::PlaceCandidate> PlaceIndex::FindPlaces(const engine::SmallBlurryImage& image, int count,
-                                                           int per_map, std::uint64_t only_map) const {
-  if (count <= 0 || per_map <= 0) return {};
-  const PackedThumbnail wanted = Pack(image);
-  if (wanted.width == 0) return {};
-  const auto state = Current();
-  const auto array = std::find_if(state->arrays.begin(), state->arrays.end(), [&](const State::Array& a) {
-    return a.thumbnails->shape().width == wanted.width && a.thumbnails->shape().height == wanted.height;
-  });
-  if (array == state->arrays.end()) return {};
-  const auto index = static_cast<std::uint32_t>(array - state->arrays.begin());
-  std::vector<ThumbnailArray::Hit> hits;
-  if (only_map == 0) {
-    const std::size_t dead = array->size - array->alive;
-    hits = array->thumbnails->Search(
-        wanted, array->size,
-        std::max(kComparedFinely, static_cast<std::size_t>(count)) + std::min(dead, kDeadAllowed));
-  } else if (const Map* const map = state->Find(only_map)) {
-    std::vector<std::size_t> slots;
-    for (const Entry& entry : map->entries) {
-      if (entry.array == index) slots.push_back(entry.slot);
-    }
-    hits = array->thumbnails->Search(wanted, slots);
-  }
-  std::vector<engine::PlaceCandidate> candidates;
-  std::vector<std::pair<std::uint64_t, int>> given;  // by map
-  for (const ThumbnailArray::Hit& hit : hits) {
-    const ThumbnailArray::Owner owner = array->thumbnails->owner(hit.slot);
-    const Map* const map = state->Find(owner.map_key);
-    if (!map) continue;
-    const Entry* const entry = map->Find(owner.keyframe);
-    // A slot whose keyframe went, or has another picture now.
-    if (!entry || entry->array != index || entry->slot != hit.slot) continue;
-    auto place = std::find_if(given.begin(), given.end(), [&](const auto& g) { return g.first == map->key; });
-    if (place == given.end()) place = given.insert(given.end(), {map->key, 0});
-    if (place->second == per_map) continue;
-    ++place->second;
-    candidates.push_back({map->key, map->snapshot, owner.keyframe, hit.difference});
-    if (candidates.size() == static_cast<std::size_t>(count)) break;
-  }
-  return candidates;
 }
 
 }  // namespace docent::maps

@@ -24,10 +24,10 @@ class PlacesWithout : public engine::PlaceFinder {
   PlacesWithout(const PlaceIndex& index, std::shared_ptr<const engine::MapSnapshot> rest)
       : index_(index), rest_(std::move(rest)) {}
 
-  std::vector<engine::PlaceCandidate> FindPlaces(const engine::SmallBlurryImage& image, int count,
-                                                 int per_map, std::uint64_t only_map) const override {
+  std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
+                                                 std::uint64_t only_map) const override {
     const int gone = static_cast<int>(index_.keyframes() - rest_->keyframes.size());
-    auto places = index_.FindPlaces(image, count + gone, per_map + gone, only_map);
+    auto places = index_.FindPlaces(query, count + gone, per_map + gone, only_map);
     std::erase_if(places, [&](const engine::PlaceCandidate& place) {
       return rest_->FindKeyFrame(place.keyframe) == nullptr;
     });

@@ -336,7 +336,8 @@ void RemoveUnusedAssets(const Database& database) {
 void RemoveMapRows(const Database& database, std::uint64_t key) {
   for (const char* sql :
        {"DELETE FROM maps WHERE key = ?", "DELETE FROM parts WHERE map_key = ?",
-        "DELETE FROM pictures WHERE map_key = ?", "DELETE FROM thumbnails WHERE map_key = ?"}) {
+        "DELETE FROM pictures WHERE map_key = ?", "DELETE FROM thumbnails WHERE map_key = ?",
+        "DELETE FROM words WHERE map_key = ?"}) {
     database.Prepare(sql).Bind(1, Signed(key)).Run();
   }
 }

@@ -19,7 +19,7 @@ struct Table {
 };
 
 // Never edited: a change of the tables is a new schema version and a step that upgrades to it.
-constexpr std::array<Table, 6> kTables = {{
+constexpr std::array<Table, 7> kTables = {{
     {1, "library",
      "CREATE TABLE library (id INTEGER PRIMARY KEY CHECK (id = 1), next_key INTEGER NOT NULL, map_count "
      "INTEGER NOT "
@@ -46,6 +46,7 @@ constexpr std::array<Table, 6> kTables = {{
      "STRICT"},
     {kThumbnailsSince, "thumbnails",
      "CREATE TABLE thumbnails (map_key INTEGER PRIMARY KEY, data BLOB NOT NULL) STRICT"},
+    {kWordsSince, "words", "CREATE TABLE words (map_key INTEGER PRIMARY KEY, data BLOB NOT NULL) STRICT"},
 }};
 
 }  // namespace

@@ -10,8 +10,9 @@
 namespace docent::maps {
 
 inline constexpr std::int64_t kApplicationId = 0x446F6374;  // "Doct", PRAGMA application_id
-inline constexpr std::int64_t kSchemaVersion = 2;           // PRAGMA user_version
+inline constexpr std::int64_t kSchemaVersion = 3;           // PRAGMA user_version
 inline constexpr std::int64_t kThumbnailsSince = 2;         // the first format with the table of thumbnails
+inline constexpr std::int64_t kWordsSince = 3;              // the first format with the table of words
 inline constexpr std::int64_t kPanoramasSince = 2;          // the first format with the part `panoramas`
 
 // Whether the file holds nothing at all yet, as after it was created.

@@ -14,7 +14,6 @@ namespace docent::maps {
 
 namespace {
 
-constexpr float kContrast = 32;          // standard deviation of packed values; leaves room for four of them
 constexpr double kLightSigma = 1.0 / 8;  // of the width: shading coarser than this is left out
 constexpr float kMinDeviation = 2;       // grey values: below it noise would be blown up
 constexpr std::size_t kBlock = 16;       // coarse vectors are padded to whole registers of 16-bit numbers
@@ -184,7 +183,7 @@ double DifferenceAt(const ThumbnailShape& shape, const std::int8_t* a, const std
   const double covariance = sums.product / count - mean_a * mean_b;
   const double correlation = covariance / std::sqrt(variance_a * variance_b);
   const double part = count / (shape.width * shape.height);
-  return 2 * kContrast * kContrast * std::max(0.0, 1 - correlation) / part;
+  return 2 * kThumbnailContrast * kThumbnailContrast * std::max(0.0, 1 - correlation) / part;
 }
 
 // About a shift that the coarse search found, pixel by pixel.
@@ -220,7 +219,7 @@ PackedThumbnail Pack(const engine::SmallBlurryImage& image) {
   half -= light;
   cv::Scalar mean, deviation;
   cv::meanStdDev(half, mean, deviation);
-  const float scale = kContrast / std::max(kMinDeviation, static_cast<float>(deviation[0]));
+  const float scale = kThumbnailContrast / std::max(kMinDeviation, static_cast<float>(deviation[0]));
   packed.width = static_cast<std::uint16_t>(size.width);
   packed.height = static_cast<std::uint16_t>(size.height);
   packed.pixels.reserve(half.total());

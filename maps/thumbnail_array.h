@@ -16,6 +16,9 @@
 // shifted: the search tries all shifts up to a sixth of the picture. Brightness and contrast play no part.
 namespace docent::maps {
 
+// Standard deviation of a packed thumbnail's values; leaves room for four of them.
+inline constexpr float kThumbnailContrast = 32;
+
 // A thumbnail as the index and the library keep it: half as large as engine::SmallBlurryImage in either
 // direction (its blur leaves nothing in between), without the coarsest shading, mean 0, standard
 // deviation 32.

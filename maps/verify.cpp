@@ -10,6 +10,7 @@
 #include "maps/schema.h"
 #include "maps/snapshot_reader.h"
 #include "maps/thumbnail_rows.h"
+#include "maps/word_rows.h"
 
 namespace docent::maps {
 
@@ -81,6 +82,14 @@ void CheckThumbnails(const Database& database, const MapInfo& info) {
   }
 }
 
+void CheckWords(const Database& database, const MapInfo& info) {
+  const std::vector<KeyFrameWords> words = ReadWords(database, info);
+  const std::vector<StoredKeyFrame> keyframes = ReadParts(database, info).keyframes;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i].keyframe != keyframes[i].keyframe.id) throw Error("its words are those of other keyframes");
+  }
+}
+
 void CheckMap(const Database& database, const MapInfo& info, int threads,
               std::set<std::string>* wanted_assets, Report* report) {
   report->Try(
@@ -93,6 +102,9 @@ void CheckMap(const Database& database, const MapInfo& info, int threads,
   });
   if (SchemaVersion(database) >= kThumbnailsSince) {
     report->Try([&] { WithPlace(database, info, [&] { CheckThumbnails(database, info); }); });
+  }
+  if (SchemaVersion(database) >= kWordsSince) {
+    report->Try([&] { WithPlace(database, info, [&] { CheckWords(database, info); }); });
   }
   report->Try([&] {
     Statement count = database.Prepare("SELECT count(*) FROM pictures WHERE map_key = ?");
@@ -125,6 +137,7 @@ void CheckAssets(const Database& database, const std::set<std::string>& wanted, 
 void CheckStrays(const Database& database, Report* report) {
   std::vector<const char*> tables = {"parts", "pictures"};
   if (SchemaVersion(database) >= kThumbnailsSince) tables.push_back("thumbnails");
+  if (SchemaVersion(database) >= kWordsSince) tables.push_back("words");
   for (const char* table : tables) {
     report->Try([&] {
       const std::int64_t strays = database.Number(std::string("SELECT count(*) FROM ") + table +

@@ -26,8 +26,8 @@ class SearchPlaces : public engine::PlaceFinder {
       : index_(index), only_map_(only_map), prediction_(std::move(prediction)) {}
 
   // The keyframes that look most like what the prediction says lead; the rest follows by appearance.
-  std::vector<engine::PlaceCandidate> FindPlaces(const engine::SmallBlurryImage& image, int count,
-                                                 int per_map, std::uint64_t only_map) const override;
+  std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
+                                                 std::uint64_t only_map) const override;
 
  private:
   const engine::PlaceFinder* const index_;

@@ -250,6 +250,9 @@ void Session::OfferToMapper(Camera* camera, const engine::TrackedFrame& frame) {
 
 void Session::Hear(const MappingThread::News& news) {
   using Kind = engine::MapperEvent::Kind;
+  // New keyframes are described before the lock: frames go on meanwhile.
+  std::vector<maps::KeyFrameWords> described;
+  if (news.snapshot) described = index_.DescribeNew(news.key, *news.snapshot);
   const std::scoped_lock lock(mutex_);
   const auto found = maps_.find(news.key);
   // News that comes late, of a map that was closed or given up meanwhile, is let go.
@@ -257,7 +260,7 @@ void Session::Hear(const MappingThread::News& news) {
   SessionMap& map = found->second;
   if (news.snapshot) {
     map.Grow(news.snapshot);
-    index_.SetMap(map.key, news.snapshot);
+    index_.SetMap(map.key, news.snapshot, described);
   }
   for (const engine::MapperEvent& event : news.events) {
     switch (event.kind) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/map/map_snapshot.h"
+#include "engine/recognition/word_bag.h"
 #include "engine/vision/small_blurry_image.h"
 
 namespace docent::engine {
@@ -18,6 +19,21 @@ struct PlaceCandidate {
   double difference = 0;  // mean squared difference of the thumbnails
 };
 
+// What is known of the picture whose place is sought. A view: whoever asks keeps both until the answer.
+struct PlaceQuery {
+  // By its thumbnail alone.
+  PlaceQuery(const SmallBlurryImage& picture)  // NOLINT(google-explicit-constructor)
+      : image(&picture) {}
+  // By its words as well; empty ones are none.
+  PlaceQuery(const SmallBlurryImage& picture, const WordBag& picture_words)
+      : image(&picture), words(&picture_words) {}
+
+  const SmallBlurryImage* image;
+  const WordBag* words = nullptr;
+  // Different places first; else the most alike keyframes, whatever place they are of.
+  bool places_first = true;
+};
+
 // Whoever knows all maps (the library's place index) answers this; the engine asks it when it is lost.
 // May be called from several threads at once.
 class PlaceFinder {
@@ -25,7 +41,7 @@ class PlaceFinder {
   virtual ~PlaceFinder() = default;
   // The best `count` candidates, most alike first, at most `per_map` of one map. With only_map != 0 the
   // search stays in that map (ptamm §3.3). Never throws for lack of maps: the answer is empty.
-  virtual std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage& image, int count, int per_map,
+  virtual std::vector<PlaceCandidate> FindPlaces(const PlaceQuery& query, int count, int per_map,
                                                  std::uint64_t only_map) const = 0;
 };
 

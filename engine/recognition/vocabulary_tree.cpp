@@ -168,6 +168,11 @@ VocabularyTree VocabularyTree::FromBytes(std::span<const std::uint8_t> bytes) {
   return tree;
 }
 
+std::uint64_t VocabularyTree::Fingerprint() const {
+  const std::vector<std::uint8_t> bytes = ToBytes();
+  return Fnv1a(std::span(bytes).first(kBytes - 8));
+}
+
 std::uint32_t VocabularyTree::Leaf(const Descriptor& descriptor) const {
   std::size_t node = 0;
   for (std::size_t level = 0; level < kLevels; ++level)

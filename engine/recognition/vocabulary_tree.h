@@ -35,6 +35,8 @@ class VocabularyTree {
   std::vector<std::uint8_t> ToBytes() const;
   // Throws docent::Error with one sentence when the bytes are anything else.
   static VocabularyTree FromBytes(std::span<const std::uint8_t> bytes);
+  // Names the tree: the FNV-1a of its bytes. What is kept of one tree's leaves means nothing under another.
+  std::uint64_t Fingerprint() const;
 
   // The leaf that a descriptor falls into, going to the nearest child each time; the first of equally near.
   std::uint32_t Leaf(const Descriptor& descriptor) const;

@@ -162,9 +162,13 @@ class Tracker {
              TrackedFrame* out);
   void BeginEntering(const FoundPlace& found);
   bool RecoverNearby(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
-  // Those that resemble the frame, the best first; but_map: none of that map, and none at all when the most
-  // alike at first sight is of it.
+  // Those that resemble the frame by their thumbnails, the best first; but_map: none of that map, and none at
+  // all when the most alike at first sight is of it.
   std::vector<TurnedPlace> BestPlaces(const PlaceFinder& places, std::uint64_t but_map = 0) const;
+  // The first different places that resemble it by thumbnail and words, other keyframes than `tried`.
+  std::vector<TurnedPlace> PlacesByWords(const PlaceFinder& places,
+                                         const std::vector<TurnedPlace>& tried) const;
+  std::optional<TurnedPlace> TurnToFit(const PlaceCandidate& candidate) const;
   bool Believable(const MapTrackResult& result) const;
   bool IsTurn(const MapTrackResult& result, const MapSnapshot& map) const;
   // Whether a pose that was found after a loss counts: kNone, or what speaks against it.

@@ -54,26 +54,49 @@ bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, Track
   return false;
 }
 
+std::optional<Tracker::TurnedPlace> Tracker::TurnToFit(const PlaceCandidate& candidate) const {
+  const KeyFrame* keyframe = candidate.map ? candidate.map->FindKeyFrame(candidate.keyframe) : nullptr;
+  if (!keyframe) return std::nullopt;
+  const auto rotation =
+      AlignRotation(keyframe->features->small_blurry, *keyframe->camera, features_->small_blurry, *camera_);
+  if (!rotation) return std::nullopt;
+  // What overlaps little agrees easily.
+  return TurnedPlace{candidate,
+                     Rigid3(rotation->b_from_a, Eigen::Vector3d::Zero()) * keyframe->camera_from_map,
+                     rotation->rms / std::sqrt(rotation->overlap)};
+}
+
 std::vector<Tracker::TurnedPlace> Tracker::BestPlaces(const PlaceFinder& places,
                                                       std::uint64_t but_map) const {
   std::vector<TurnedPlace> turned;
-  const auto found = places.FindPlaces(features_->small_blurry, options_.candidates_looked_at,
-                                       options_.candidates_of_a_map, 0);
+  PlaceQuery query(features_->small_blurry);
+  query.places_first = false;  // the one that fits best of some that are near each other is a better guess
+  const auto found = places.FindPlaces(query, options_.candidates_looked_at, options_.candidates_of_a_map, 0);
   if (but_map != 0 && (found.empty() || found.front().map_key == but_map)) return turned;
   for (const PlaceCandidate& candidate : found) {
     if (candidate.map_key == but_map) continue;
-    const KeyFrame* keyframe = candidate.map ? candidate.map->FindKeyFrame(candidate.keyframe) : nullptr;
-    if (!keyframe) continue;
-    const auto rotation =
-        AlignRotation(keyframe->features->small_blurry, *keyframe->camera, features_->small_blurry, *camera_);
-    if (!rotation) continue;
-    // What overlaps little agrees easily.
-    turned.push_back({candidate,
-                      Rigid3(rotation->b_from_a, Eigen::Vector3d::Zero()) * keyframe->camera_from_map,
-                      rotation->rms / std::sqrt(rotation->overlap)});
+    if (const auto place = TurnToFit(candidate)) turned.push_back(*place);
   }
   std::stable_sort(turned.begin(), turned.end(),
                    [](const TurnedPlace& a, const TurnedPlace& b) { return a.misfit < b.misfit; });
+  return turned;
+}
+
+std::vector<Tracker::TurnedPlace> Tracker::PlacesByWords(const PlaceFinder& places,
+                                                         const std::vector<TurnedPlace>& tried) const {
+  std::vector<TurnedPlace> turned;
+  const WordBag words = MakeWordBag(*features_);
+  if (words.empty()) return turned;
+  const auto found = places.FindPlaces({features_->small_blurry, words}, options_.candidates_looked_at,
+                                       options_.candidates_of_a_map, 0);
+  for (const PlaceCandidate& candidate : found) {
+    if (turned.size() == options_.candidates) break;
+    const auto known = std::find_if(tried.begin(), tried.end(), [&](const TurnedPlace& place) {
+      return place.candidate.map_key == candidate.map_key && place.candidate.keyframe == candidate.keyframe;
+    });
+    if (known != tried.end()) continue;
+    if (const auto place = TurnToFit(candidate)) turned.push_back(*place);
+  }
   return turned;
 }
 
@@ -263,7 +286,16 @@ void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFram
   if (map_ && RecoverNearby(frame, places, out)) return;
   if (!places || GoOnEntering(frame, *places, out)) return;
   map_tracker_.Clear();
-  const std::vector<FoundPlace> found = FindMaps(BestPlaces(*places), out);
+  const std::vector<TurnedPlace> alike = BestPlaces(*places);
+  std::vector<FoundPlace> found = FindMaps(alike, out);
+  if (found.empty()) {
+    // What does not look alike at once may still show the same things; what does is a rival at least.
+    std::vector<TurnedPlace> others = PlacesByWords(*places, alike);
+    if (!others.empty()) {
+      others.insert(others.end(), alike.begin(), alike.end());
+      found = FindMaps(others, out);
+    }
+  }
   if (found.empty()) return;
   const auto key = [&](std::size_t i) { return found[i].place.candidate.map_key; };
   if (found.size() > 1 &&

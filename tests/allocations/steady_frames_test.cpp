@@ -53,7 +53,7 @@ const Scene& TheScene() {
 
 class OneMap : public PlaceFinder {
  public:
-  std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage&, int, int, std::uint64_t) const override {
+  std::vector<PlaceCandidate> FindPlaces(const PlaceQuery&, int, int, std::uint64_t) const override {
     return {{kKey, TheScene().map, TheScene().map->keyframes[1].id, 0.0}};
   }
 };

@@ -79,12 +79,12 @@ const BenchSequence& Sequence() {
   return sequence;
 }
 
-std::vector<engine::PlaceCandidate> MapPlaces::FindPlaces(const engine::SmallBlurryImage& image, int count,
+std::vector<engine::PlaceCandidate> MapPlaces::FindPlaces(const engine::PlaceQuery& query, int count,
                                                           int per_map, std::uint64_t only_map) const {
   std::vector<engine::PlaceCandidate> found;
   if (only_map != 0 && only_map != kKey) return found;
   for (const engine::KeyFrame& keyframe : map_->keyframes) {
-    const double difference = engine::Difference(keyframe.features->small_blurry, image);
+    const double difference = engine::Difference(keyframe.features->small_blurry, *query.image);
     if (std::isfinite(difference)) found.push_back({kKey, map_, keyframe.id, difference});
   }
   const auto wanted = static_cast<std::size_t>(std::max(0, std::min(count, per_map)));

@@ -33,8 +33,8 @@ class MapPlaces : public engine::PlaceFinder {
  public:
   static constexpr std::uint64_t kKey = 1;
   explicit MapPlaces(std::shared_ptr<const engine::MapSnapshot> map) : map_(std::move(map)) {}
-  std::vector<engine::PlaceCandidate> FindPlaces(const engine::SmallBlurryImage& image, int count,
-                                                 int per_map, std::uint64_t only_map) const override;
+  std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
+                                                 std::uint64_t only_map) const override;
 
  private:
   std::shared_ptr<const engine::MapSnapshot> map_;

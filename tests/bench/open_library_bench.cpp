@@ -6,13 +6,16 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
+#include "engine/base/random.h"
 #include "engine/vision/features.h"
+#include "maps/database.h"
 #include "maps/library.h"
 #include "maps/place_index.h"
 
-// Opening a library of many maps for a tour: its entries and thumbnails are read and the place index is made;
-// maps stay on disk. 150 keyframes a map, of small pictures, whose thumbnails are as large as usual ones. The
-// library is written to the folder for temporary files first, 0.8 GB of it for 1000 maps.
+// Opening a library of many maps for a tour: its entries, thumbnails and words are read and the place index
+// is made; maps stay on disk. 150 keyframes a map, of small pictures, whose thumbnails are as large as usual
+// ones, with 190 words each, as a picture of 640 x 480 has. The library is written to the folder for
+// temporary files first, 0.8 GB of it for 1000 maps.
 namespace docent::bench {
 namespace {
 
@@ -44,6 +47,17 @@ std::shared_ptr<const engine::MapSnapshot> MakeMap(int number) {
   return map;
 }
 
+std::vector<maps::KeyFrameWords> MakeWords(int number) {
+  Random random(static_cast<std::uint64_t>(number));
+  std::vector<maps::KeyFrameWords> words;
+  for (engine::KeyFrameId i = 0; i < kKeyFramesOfAMap; ++i) {
+    std::vector<std::uint32_t> leaves(200);
+    for (std::uint32_t& leaf : leaves) leaf = random.Below(engine::VocabularyTree::kLeaves);
+    words.push_back({i, i / 5 * 5, engine::MakeWordBag(std::move(leaves))});
+  }
+  return words;
+}
+
 void OpenLibrary(benchmark::State& state) {
   const std::filesystem::path path =
       std::filesystem::temp_directory_path() / ("docent-bench-" + std::to_string(getpid()) + ".docent");
@@ -51,19 +65,27 @@ void OpenLibrary(benchmark::State& state) {
     maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
     for (int i = 0; i < state.range(0); ++i)
       library.Save({library.NewKey(), "map " + std::to_string(i), maps::Policy::kOpen, MakeMap(i), nullptr});
+    const maps::Database database = maps::Database::OpenReadWrite(path, false);
+    maps::Transaction transaction(database, maps::Transaction::Kind::kWrite);
+    for (int i = 0; i < state.range(0); ++i)
+      maps::WriteWords(database, static_cast<std::uint64_t>(i) + 1, MakeWords(i));
+    transaction.Commit();
   }
-  std::size_t keyframes = 0;
+  std::size_t keyframes = 0, words = 0;
   for (auto _ : state) {
     const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
     maps::PlaceIndex index;
     std::size_t wanted = 0;
     for (const maps::MapInfo& info : library.List()) wanted += info.keyframes;
     index.Reserve(wanted);
-    library.LoadThumbnails([&](const maps::MapInfo& info, std::vector<maps::KeyFrameThumbnail> thumbnails,
-                               const std::string&) { index.SetThumbnails(info.key, thumbnails); });
+    library.LoadLooks([&](const maps::MapInfo& info, const maps::Library::Looks& looks) {
+      index.SetLooks(info.key, looks.thumbnails, looks.words);
+    });
+    words = index.words();
     keyframes = index.keyframes();
   }
   state.counters["keyframes"] = static_cast<double>(keyframes);
+  state.counters["words_a_keyframe"] = static_cast<double>(words) / static_cast<double>(keyframes);
   state.counters["file_mb"] = static_cast<double>(std::filesystem::file_size(path)) * 1e-6;
   std::filesystem::remove(path);
 }

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <map>
 #include <opencv2/imgproc.hpp>
@@ -12,16 +13,21 @@
 
 #include "app/simulator/simulation.h"
 #include "engine/base/random.h"
+#include "engine/vision/features.h"
+#include "maps/inverted_file.h"
 #include "maps/place_index.h"
 #include "tests/bench/bench_sequence.h"
 
 // The search for a place among all keyframes of all maps. The maps are those of the simulator's museum and
 // desks: keyframes from where each place is built, questions from where it is visited later, by another way.
-// Larger libraries hold the same maps again, mirrored and under noise as coarse as what a thumbnail shows,
-// 150 keyframes a map. The counters:
-//   median_ms, p95_ms       a question, in milliseconds of computing
-//   recall_at_5             part of the questions whose place is among the first five candidates
+// Larger libraries hold the same maps again, with thumbnails mirrored and under noise as coarse as what they
+// show, and half of each keyframe's words those of others; 150 keyframes a map. The counters:
+//   median_ms, p95_ms       a question, in milliseconds of computing, its words being known
+//   recall_at_1, _5         part of the questions whose map is first, or among the first five candidates
 //   bytes_a_keyframe        resident memory that the index takes
+// FindChangedPlaces asks the same questions under changes that a visitor brings about, of thumbnails and
+// words each alone and of both; SearchWords is the search of the inverted file alone and DescribeAQuestion
+// what a question costs that has words.
 namespace docent::bench {
 namespace {
 
@@ -29,13 +35,23 @@ constexpr std::size_t kKeyFramesOfAMap = 150;
 constexpr std::size_t kQuestions = 1000;
 
 struct View {
-  std::uint64_t map_key = 0;
   engine::SmallBlurryImage thumbnail;
+  engine::WordBag words;
+};
+struct Visit {
+  std::uint64_t map_key = 0;
+  cv::Mat gray;
+  View view;
 };
 struct Places {
-  std::map<std::uint64_t, std::vector<engine::SmallBlurryImage>> maps;  // by key
-  std::vector<View> visits;
+  std::map<std::uint64_t, std::vector<View>> maps;  // by key
+  std::vector<Visit> visits;
 };
+
+View ViewOf(const cv::Mat& gray) {
+  const auto features = engine::MakeFeatures(gray);
+  return {features->small_blurry, engine::MakeWordBag(*features)};
+}
 
 // Every fourth frame of building is a keyframe and every eighth of visiting a question.
 void AddScene(const std::string& name, std::uint64_t first_key, Places* places) {
@@ -49,9 +65,9 @@ void AddScene(const std::string& name, std::uint64_t first_key, Places* places) 
     cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
     const std::uint64_t key = first_key + std::stoul(label.substr(5));
     if (build) {
-      places->maps[key].push_back(engine::MakeSmallBlurryImage(gray));
+      places->maps[key].push_back(ViewOf(gray));
     } else {
-      places->visits.push_back({key, engine::MakeSmallBlurryImage(gray)});
+      places->visits.push_back({key, gray, ViewOf(gray)});
     }
   }
 }
@@ -89,6 +105,28 @@ engine::SmallBlurryImage Replica(const engine::SmallBlurryImage& image, bool mir
   return replica;
 }
 
+// Half of the words, and as many that any keyframe has, the commoner ones oftener.
+engine::WordBag Replica(const engine::WordBag& words, Random* random) {
+  static const std::vector<std::uint32_t> all = [] {
+    std::vector<std::uint32_t> leaves;
+    for (const auto& [key, views] : SimulatedPlaces().maps) {
+      for (const View& view : views) {
+        for (const engine::VisualWord& word : view.words)
+          leaves.insert(leaves.end(), static_cast<std::size_t>(word.count()), word.leaf());
+      }
+    }
+    return leaves;
+  }();
+  std::vector<std::uint32_t> leaves;
+  for (const engine::VisualWord& word : words) {
+    for (int i = 0; i < word.count(); ++i) {
+      const std::uint32_t other = all[random->Below(static_cast<std::uint32_t>(all.size()))];
+      leaves.push_back(random->Below(2) == 0 ? word.leaf() : other);
+    }
+  }
+  return engine::MakeWordBag(std::move(leaves));
+}
+
 // Keys of the simulated places as they are, and replicas of them from 1000 on, each filled up to a map's
 // size.
 void FillIndex(std::size_t maps, maps::PlaceIndex* index) {
@@ -98,16 +136,20 @@ void FillIndex(std::size_t maps, maps::PlaceIndex* index) {
   std::size_t made = 0;
   while (made < maps) {
     const std::size_t round = made / places.maps.size();
-    for (const auto& [key, thumbnails] : places.maps) {
+    for (const auto& [key, views] : places.maps) {
       if (made == maps) break;
-      std::vector<maps::KeyFrameThumbnail> map;
+      std::vector<maps::KeyFrameThumbnail> thumbnails;
+      std::vector<maps::KeyFrameWords> words;
       for (std::size_t i = 0; i < kKeyFramesOfAMap; ++i) {
-        const engine::SmallBlurryImage& original = thumbnails[i % thumbnails.size()];
-        const bool original_itself = round == 0 && i < thumbnails.size();
-        map.push_back({static_cast<engine::KeyFrameId>(i),
-                       maps::Pack(original_itself ? original : Replica(original, round % 2 == 1, &random))});
+        const auto id = static_cast<engine::KeyFrameId>(i);
+        const View& original = views[i % views.size()];
+        const bool itself = round == 0 && i < views.size();
+        thumbnails.push_back({id, maps::Pack(itself ? original.thumbnail
+                                                    : Replica(original.thumbnail, round % 2 == 1, &random))});
+        // Five keyframes are a place.
+        words.push_back({id, id / 5 * 5, itself ? original.words : Replica(original.words, &random)});
       }
-      index->SetThumbnails(round == 0 ? key : 1000 * round + key, map);
+      index->SetLooks(round == 0 ? key : 1000 * round + key, thumbnails, words);
       ++made;
     }
   }
@@ -121,9 +163,12 @@ double ResidentBytes() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-bool HasPlace(const std::vector<engine::PlaceCandidate>& candidates, std::uint64_t key) {
-  return std::any_of(candidates.begin(), candidates.end(),
-                     [&](const auto& candidate) { return candidate.map_key == key; });
+// Where a map comes among the candidates; 1000 where it does not.
+std::size_t RankOf(const std::vector<engine::PlaceCandidate>& candidates, std::uint64_t key) {
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (candidates[i].map_key == key) return i;
+  }
+  return 1000;
 }
 
 void FindPlaces(benchmark::State& state) {
@@ -133,21 +178,25 @@ void FindPlaces(benchmark::State& state) {
   FillIndex(static_cast<std::size_t>(state.range(0)), &index);
   const double bytes = ResidentBytes() - before;
   std::vector<double> milliseconds;
-  double total = 0, found = 0;
+  double total = 0, first = 0, found = 0;
   for (auto _ : state) {
     for (std::size_t i = 0; i < kQuestions; ++i) {
-      const View& view = places.visits[i % places.visits.size()];
+      const Visit& visit = places.visits[i % places.visits.size()];
       const double start = ThreadMilliseconds();
-      const auto candidates = index.FindPlaces(view.thumbnail, 5, 5, 0);
+      const auto candidates = index.FindPlaces({visit.view.thumbnail, visit.view.words}, 5, 5, 0);
       milliseconds.push_back(ThreadMilliseconds() - start);
       total += milliseconds.back();
-      found += HasPlace(candidates, view.map_key);
+      first += RankOf(candidates, visit.map_key) < 1;
+      found += RankOf(candidates, visit.map_key) < 5;
     }
     state.SetIterationTime(1e-3 * total);
   }
   const auto asked = static_cast<double>(milliseconds.size());
   state.counters["keyframes"] = static_cast<double>(index.keyframes());
+  state.counters["words_a_keyframe"] =
+      static_cast<double>(index.words()) / static_cast<double>(index.keyframes());
   state.counters["bytes_a_keyframe"] = bytes / static_cast<double>(index.keyframes());
+  state.counters["recall_at_1"] = first / asked;
   state.counters["recall_at_5"] = found / asked;
   state.counters["median_ms"] = Quantile(&milliseconds, 0.5);
   state.counters["p95_ms"] = Quantile(&milliseconds, 0.95);
@@ -161,6 +210,119 @@ BENCHMARK(FindPlaces)
     ->Arg(1000)
     ->Iterations(1)
     ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
+
+// What a visitor's camera does: it is rolled, further away or nearer, looks aside (the rest of the picture is
+// black), or the light is another.
+cv::Mat Changed(const cv::Mat& gray, int change) {
+  const auto warped = [&](double angle_deg, double scale, double aside) {
+    cv::Mat warp = cv::getRotationMatrix2D({gray.cols / 2.0f, gray.rows / 2.0f}, angle_deg, scale), out;
+    warp.at<double>(0, 2) += aside * gray.cols;
+    cv::warpAffine(gray, out, warp, gray.size());
+    return out;
+  };
+  cv::Mat out;
+  switch (change) {
+    case 1:
+      return warped(30, 1, 0);
+    case 2:
+      return warped(90, 1, 0);
+    case 3:
+      return warped(0, 1.4, 0);
+    case 4:
+      return warped(0, 0.7, 0);
+    case 5:
+      return warped(0, 1, 0.4);
+    case 6:
+      gray.convertTo(out, CV_8U, 0.35);
+      return out;
+    case 7:
+      gray.convertTo(out, CV_8U, 1.8, 30);
+      return out;
+    case 8:
+      cv::blur(gray, out, {21, 1});
+      return out;
+    default:
+      return gray;
+  }
+}
+
+void FindChangedPlaces(benchmark::State& state) {
+  constexpr std::array kNames = {"as it is",
+                                 "rolled by 30 degrees",
+                                 "rolled by 90 degrees",
+                                 "1.4 times nearer",
+                                 "1.4 times further",
+                                 "shifted by 0.4 of the width",
+                                 "dark",
+                                 "bright, partly white",
+                                 "blurred by 21 pixels of motion"};
+  const Places& places = SimulatedPlaces();
+  const auto change = static_cast<int>(state.range(0));
+  maps::PlaceIndex index;
+  FillIndex(static_cast<std::size_t>(state.range(1)), &index);
+  const engine::SmallBlurryImage nothing;
+  std::array<double, 3> first{}, found{};
+  for (auto _ : state) {
+    for (const Visit& visit : places.visits) {
+      const View view = ViewOf(Changed(visit.gray, change));
+      const std::array<engine::PlaceQuery, 3> queries = {
+          engine::PlaceQuery(view.thumbnail), {nothing, view.words}, {view.thumbnail, view.words}};
+      for (std::size_t i = 0; i < queries.size(); ++i) {
+        const std::size_t rank = RankOf(index.FindPlaces(queries[i], 5, 5, 0), visit.map_key);
+        first[i] += rank < 1;
+        found[i] += rank < 5;
+      }
+    }
+  }
+  const auto asked = static_cast<double>(state.iterations() * places.visits.size());
+  constexpr std::array kWays = {"thumbnails", "words", "both"};
+  for (std::size_t i = 0; i < kWays.size(); ++i) {
+    state.counters[std::string(kWays[i]) + "_at_1"] = first[i] / asked;
+    state.counters[std::string(kWays[i]) + "_at_5"] = found[i] / asked;
+  }
+  state.SetLabel(kNames[static_cast<std::size_t>(change)]);
+}
+BENCHMARK(FindChangedPlaces)
+    ->ArgNames({"change", "maps"})
+    ->ArgsProduct({benchmark::CreateDenseRange(0, 8, 1), {30, 300}})
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
+
+void DescribeAQuestion(benchmark::State& state) {
+  const auto features = engine::MakeFeatures(SimulatedPlaces().visits.front().gray);
+  std::size_t words = 0;
+  for (auto _ : state) words = engine::MakeWordBag(*features).size();
+  state.counters["words"] = static_cast<double>(words);
+}
+BENCHMARK(DescribeAQuestion)->Unit(benchmark::kMillisecond);
+
+// What a question reads of the inverted file: the search by words alone.
+void SearchWords(benchmark::State& state) {
+  const Places& places = SimulatedPlaces();
+  Random random(7);
+  maps::InvertedFile file;
+  for (engine::KeyFrameId i = 0; static_cast<std::int64_t>(file.size()) < state.range(0) * 150; ++i) {
+    for (const auto& [key, views] : places.maps)
+      file.Add(Replica(views[i % views.size()].words, &random), {key, i});
+  }
+  std::vector<double> postings;
+  std::size_t next = 0;
+  for (auto _ : state) {
+    maps::InvertedFile::Cost cost;
+    benchmark::DoNotOptimize(file.Search(places.visits[next].view.words, 64, &cost));
+    postings.push_back(static_cast<double>(cost.postings));
+    next = next + 1 < places.visits.size() ? next + 1 : 0;
+  }
+  state.counters["postings"] = Quantile(&postings, 0.5);
+  state.counters["keyframes"] = static_cast<double>(file.size());
+}
+BENCHMARK(SearchWords)
+    ->ArgName("maps")
+    ->Arg(30)
+    ->Arg(100)
+    ->Arg(300)
+    ->Arg(1000)
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace

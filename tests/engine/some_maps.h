@@ -17,13 +17,13 @@ class SomeMaps : public PlaceFinder {
  public:
   void Add(std::uint64_t key, std::shared_ptr<const MapSnapshot> map) { maps_[key] = std::move(map); }
   const std::shared_ptr<const MapSnapshot>& At(std::uint64_t key) const { return maps_.at(key); }
-  std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage& image, int count, int,
+  std::vector<PlaceCandidate> FindPlaces(const PlaceQuery& query, int count, int,
                                          std::uint64_t only_map) const override {
     std::vector<PlaceCandidate> found;
     for (const auto& [key, map] : maps_) {
       if (only_map != 0 && only_map != key) continue;
       for (const KeyFrame& keyframe : map->keyframes)
-        found.push_back({key, map, keyframe.id, Difference(keyframe.features->small_blurry, image)});
+        found.push_back({key, map, keyframe.id, Difference(keyframe.features->small_blurry, *query.image)});
     }
     std::sort(found.begin(), found.end(),
               [](const auto& a, const auto& b) { return a.difference < b.difference; });

@@ -67,7 +67,12 @@ Bytes MakeSeed() {
         engine::KeyFrame keyframe;
         keyframe.id = i;
         keyframe.camera = camera;
-        keyframe.features = maps::MakeSizesOnly(cv::Mat(64, 64, CV_8UC1, cv::Scalar(50.0 + i)));
+        // Squares, so that there are corners and the table of words has some.
+        cv::Mat picture(64, 64, CV_8UC1, cv::Scalar(50.0 + i));
+        for (int square = 0; square < 9; ++square)
+          picture(cv::Rect(14 + square % 3 * 14, 14 + square / 3 * 14, 7, 7)) =
+              cv::Scalar(120.0 + 15 * square);
+        keyframe.features = maps::MakeSizesOnly(picture);
         map->keyframes.push_back(keyframe);
         engine::MapPoint point;
         point.id = i;
@@ -115,7 +120,7 @@ void ReadAll(const fs::path& path) {
   using namespace docent::maps;
   const Library library = Library::Open(path, Access::kReadOnly, CreateIfMissing::kNo, Quick());
   library.Verify();
-  library.LoadThumbnails([](const MapInfo&, const std::vector<KeyFrameThumbnail>&, const std::string&) {});
+  library.LoadLooks([](const MapInfo&, const Library::Looks&) {});
   for (const MapInfo& info : library.List()) {
     try {
       library.Load(info.key);

@@ -13,6 +13,7 @@
 #include "maps/map_codec.h"
 #include "maps/panorama_codec.h"
 #include "maps/thumbnail_rows.h"
+#include "maps/word_rows.h"
 #include "tests/fuzz/allocation_limit.h"
 
 // Feeds the decoders of a library's binary columns. The first byte chooses the decoder; the rest is the
@@ -102,6 +103,12 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
     }
     const Bytes bytes = Enveloped(kPanoramaTableKind, count, data.subspan(8));
     Limited(bytes.size(), kSmallThings, [&] { DecodePanoramas(kMapKey, bytes, &parts); });
+  } else if (which == 9 && data.size() >= 8) {
+    std::uint64_t count = 0;
+    std::memcpy(&count, data.data(), sizeof(count));
+    const Bytes bytes = Enveloped(kWordTableKind, count, data.subspan(8));
+    const auto decoded = Limited(bytes.size(), kSmallThings, [&] { return DecodeWords(kMapKey, bytes); });
+    Expect(EncodeWords(kMapKey, decoded) == bytes);
   } else if (which == 5) {
     StoredKeyFrame keyframe;
     keyframe.keyframe.id = 0;
@@ -126,7 +133,7 @@ extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
-  const int which = data[0] % 9;
+  const int which = data[0] % 10;
   const std::span<const std::uint8_t> rest(data + 1, size - 1);
   try {
     if (which < 4) {

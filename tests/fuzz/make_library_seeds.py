@@ -39,9 +39,12 @@ SEEDS = {
     "envelope": b"\6DPNT" + struct.pack("<IQQ", 1, 7, 0) + bytes(8),
     "thumbnails": b"\7" + struct.pack("<Q", 2) + b"".join(struct.pack("<IHH", i, 4, 4) + bytes(16) for i in (1, 2)),
     "panoramas": b"\x08" + struct.pack("<QIII", 1, 4, 3, 0) + b"".join(struct.pack("<BII", i, i, 3) for i in range(3)),
+    "words": b"\x09" + struct.pack("<QQ", 2, 77) + struct.pack("<IIHHH", 1, 1, 2, 5 << 4, 4095 << 4 | 15) +
+             struct.pack("<IIH", 4, 1, 0),
     "many-assets": b"\4" + struct.pack("<Q", 9000) + text(b"") + b"".join(text(b"%04x" % i) for i in range(9000)),
     "many-thumbnails": b"\7" + struct.pack("<Q", 3000) +
                        b"".join(struct.pack("<IHH", i, 4, 4) + bytes(16) for i in range(3000)),
+    "many-words": b"\x09" + struct.pack("<QQ", 3000, 77) + b"".join(struct.pack("<IIH", i, 0, 0) for i in range(3000)),
 }
 
 

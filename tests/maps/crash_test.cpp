@@ -161,10 +161,10 @@ TEST(TwoProcesses, TwoToursSeeWholeSavesWhileAnAuthorWrites) {
           EXPECT_GE(stored.info.revision, last);
           last = stored.info.revision;
           ExpectWhole(stored);
-          library.LoadThumbnails([&](const MapInfo& info, const std::vector<KeyFrameThumbnail>& thumbnails,
-                                     const std::string& problem) {
-            EXPECT_EQ(problem, "");
-            EXPECT_EQ(thumbnails.size(), info.keyframes);
+          library.LoadLooks([&](const MapInfo& info, const Library::Looks& looks) {
+            EXPECT_EQ(looks.problem, "");
+            EXPECT_EQ(looks.thumbnails.size(), info.keyframes);
+            EXPECT_EQ(looks.words.size(), info.keyframes);
           });
         }
       }

@@ -102,8 +102,8 @@ TEST_F(Damage, AnSqliteFileOfAnotherProgramIsRefused) {
 }
 
 TEST_F(Damage, ALibraryOfANewerProgramIsRefused) {
-  RunSql("PRAGMA user_version = 3");
-  ExpectRefused("written by a newer Docent (format 3;");
+  RunSql("PRAGMA user_version = 4");
+  ExpectRefused("written by a newer Docent (format 4;");
 }
 
 TEST_F(Damage, ALibraryWithOtherTablesIsRefused) {
@@ -191,6 +191,7 @@ TEST_F(Damage, VerifyNamesWhatIsDamaged) {
                 "the entry of map 2: its checksum does not match"},
       std::pair{"DELETE FROM parts WHERE part = 'scene' AND map_key = 1",
                 "map 'Desk' (1): its part 'scene' is missing"},
+      std::pair{"DELETE FROM words WHERE map_key = 2", "map 'Door' (2): its words are missing"},
       std::pair{"DELETE FROM thumbnails WHERE map_key = 2", "map 'Door' (2): its thumbnails are missing"},
       std::pair{"UPDATE thumbnails SET data = (SELECT data FROM thumbnails WHERE map_key = 1)",
                 "map 'Door' (2): the table of thumbnails belongs to another map"},

@@ -27,9 +27,18 @@ namespace {
 
 constexpr engine::PanoramaId kSamplePanorama = 3;  // the one of each map, about its first keyframe
 
-cv::Mat MakePicture(std::uint64_t seed, int width_px, int height_px) {
+cv::Mat MakePicture(std::uint64_t seed, int width_px, int height_px, bool corners) {
   Random random(seed);
   cv::Mat gray(height_px, width_px, CV_8UC1);
+  if (corners) {
+    constexpr int kBlock = 8;
+    for (int y = 0; y < height_px; y += kBlock) {
+      for (int x = 0; x < width_px; x += kBlock)
+        gray(cv::Rect(x, y, std::min(kBlock, width_px - x), std::min(kBlock, height_px - y))) =
+            cv::Scalar(random.Below(256));
+    }
+    return gray;
+  }
   for (int y = 0; y < height_px; ++y) {
     for (int x = 0; x < width_px; ++x) {
       gray.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(x + y + static_cast<int>(random.Below(24)));
@@ -57,7 +66,7 @@ Eigen::Vector3d RandomVector(Random& random, double size) {
 }
 
 KeyFrame MakeKeyFrame(engine::KeyFrameId id, const Eigen::Vector3d& center, std::uint64_t seed,
-                      std::shared_ptr<const engine::CameraModel> camera) {
+                      std::shared_ptr<const engine::CameraModel> camera, bool corners = false) {
   Random random(seed);
   KeyFrame keyframe;
   keyframe.id = id;
@@ -69,7 +78,8 @@ KeyFrame MakeKeyFrame(engine::KeyFrameId id, const Eigen::Vector3d& center, std:
   keyframe.camera_from_map.translation = -(keyframe.camera_from_map.rotation * center);
   keyframe.mean_depth = random.Uniform(0.5, 3);
   keyframe.depth_sigma = random.Uniform(0.1, 0.5);
-  keyframe.features = MakeSizesOnly(MakePicture(random.Next(), camera->width_px(), camera->height_px()));
+  keyframe.features =
+      MakeSizesOnly(MakePicture(random.Next(), camera->width_px(), camera->height_px(), corners));
   keyframe.camera = std::move(camera);
   return keyframe;
 }
@@ -99,7 +109,8 @@ std::shared_ptr<MapSnapshot> MakeSampleMap(std::uint64_t seed, const SampleOptio
   for (int i = 0; i < options.keyframes; ++i) {
     const auto id = static_cast<engine::KeyFrameId>(i + i / 2);  // ids with gaps, as after culling
     const Eigen::Vector3d center(0.1 * i, random.Uniform(-0.05, 0.05), random.Uniform(-0.05, 0.05));
-    map->keyframes.push_back(MakeKeyFrame(id, center, random.Next(), cameras[i % 3 == 2 ? 1 : 0]));
+    map->keyframes.push_back(
+        MakeKeyFrame(id, center, random.Next(), cameras[i % 3 == 2 ? 1 : 0], options.corners));
   }
   map->next_keyframe = map->keyframes.empty() ? 0 : map->keyframes.back().id + 1;
   if (!map->keyframes.empty()) {

@@ -18,6 +18,7 @@ struct SampleOptions {
   int keyframes = 3;
   int points = 40;
   int width_px = 96, height_px = 80;
+  bool corners = false;  // pictures of blocks, which have words, instead of noise, which has none
 };
 
 // Keyframes along a path with pictures of noise over a gradient, two cameras, finite and infinite points,

@@ -3,11 +3,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include "maps/library.h"
 #include "maps/schema.h"
 #include "maps/thumbnail_rows.h"
+#include "maps/word_rows.h"
 #include "tests/maps/failing_disk.h"
 #include "tests/maps/map_samples.h"
 
@@ -16,31 +16,30 @@ namespace {
 
 using ::testing::HasSubstr;
 
-void RunSql(const std::filesystem::path& file, const std::string& sql) {
-  sqlite3* connection = nullptr;
-  ASSERT_EQ(sqlite3_open(file.c_str(), &connection), SQLITE_OK);
-  char* message = nullptr;
-  EXPECT_EQ(sqlite3_exec(connection, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
-  sqlite3_free(message);
-  sqlite3_close(connection);
-}
-
 Library Open(const std::filesystem::path& file, Access access) {
   return Library::Open(file, access, CreateIfMissing::kNo, QuickOptions());
 }
 
 std::vector<std::vector<KeyFrameThumbnail>> ThumbnailsIn(const Library& library) {
   std::vector<std::vector<KeyFrameThumbnail>> all;
-  library.LoadThumbnails(
-      [&](const MapInfo&, std::vector<KeyFrameThumbnail> thumbnails, const std::string& problem) {
-        EXPECT_EQ(problem, "");
-        all.push_back(std::move(thumbnails));
-      });
+  library.LoadLooks([&](const MapInfo&, Library::Looks looks) {
+    EXPECT_EQ(looks.problem, "");
+    all.push_back(std::move(looks.thumbnails));
+  });
   return all;
 }
 
-// A library as the first released version wrote it: its tables, by its own words, and two maps in them.
-class Migration : public ::testing::Test {
+std::vector<std::vector<KeyFrameWords>> WordsIn(const Library& library) {
+  std::vector<std::vector<KeyFrameWords>> all;
+  library.LoadLooks([&](const MapInfo&, Library::Looks looks) {
+    EXPECT_EQ(looks.problem, "");
+    all.push_back(std::move(looks.words));
+  });
+  return all;
+}
+
+// A library as an earlier version wrote it: its tables, by its own words, and two maps in them.
+class Migration : public ::testing::TestWithParam<int> {
  protected:
   Migration() {
     const auto newer = folder_ / "newer.docent";
@@ -49,6 +48,7 @@ class Migration : public ::testing::Test {
       library.Save({library.NewKey(), "Desk", Policy::kOpen, desk_, scene_});
       library.Save({library.NewKey(), "Door", Policy::kReadOnly, door_, nullptr});
       thumbnails_ = ThumbnailsIn(library);
+      words_ = WordsIn(library);
     }
     RunSql(file_, R"sql(
       CREATE TABLE library (id INTEGER PRIMARY KEY CHECK (id = 1), next_key INTEGER NOT NULL, map_count INTEGER NOT NULL, checksum INTEGER NOT NULL) STRICT;
@@ -65,6 +65,15 @@ class Migration : public ::testing::Test {
       INSERT INTO parts SELECT * FROM newer.parts WHERE part != 'panoramas';
       INSERT INTO pictures SELECT * FROM newer.pictures;
       INSERT INTO assets SELECT * FROM newer.assets;)sql");
+    if (GetParam() >= 2) {
+      RunSql(file_, R"sql(
+      CREATE TABLE thumbnails (map_key INTEGER PRIMARY KEY, data BLOB NOT NULL) STRICT;
+      PRAGMA user_version = 2;
+      ATTACH ')sql" + newer.string() +
+                        R"sql(' AS newer;
+      INSERT INTO parts SELECT * FROM newer.parts WHERE part = 'panoramas';
+      INSERT INTO thumbnails SELECT * FROM newer.thumbnails;)sql");
+    }
     std::filesystem::remove(newer);
   }
   void ExpectAllThere(const Library& library) const {
@@ -75,6 +84,11 @@ class Migration : public ::testing::Test {
     EXPECT_EQ(library.Find(2).policy, Policy::kReadOnly);
     EXPECT_EQ(ThumbnailsIn(library), thumbnails_);
   }
+  void ExpectUpgraded(const Library& library) const {
+    ExpectAllThere(library);
+    EXPECT_EQ(WordsIn(library), words_);
+  }
+  std::string CopyName() const { return "a.docent.format-" + std::to_string(GetParam()); }
 
   TemporaryFolder folder_;
   const std::filesystem::path file_ = folder_ / "a.docent";
@@ -90,37 +104,41 @@ class Migration : public ::testing::Test {
     }
     return map;
   }
-  std::shared_ptr<engine::MapSnapshot> desk_ =
-      WithoutPanoramas(MakeSampleMap(1, {.keyframes = 2, .points = 30}));
-  std::shared_ptr<engine::MapSnapshot> door_ =
-      WithoutPanoramas(MakeSampleMap(2, {.keyframes = 3, .points = 60}));
+  std::shared_ptr<engine::MapSnapshot> desk_ = WithoutPanoramas(
+      MakeSampleMap(1, {.keyframes = 2, .points = 30, .width_px = 160, .height_px = 128, .corners = true}));
+  std::shared_ptr<engine::MapSnapshot> door_ = WithoutPanoramas(
+      MakeSampleMap(2, {.keyframes = 3, .points = 60, .width_px = 160, .height_px = 128, .corners = true}));
   std::shared_ptr<SceneRecord> scene_ = MakeSampleScene(3, 1);
   std::vector<std::vector<KeyFrameThumbnail>> thumbnails_;
+  std::vector<std::vector<KeyFrameWords>> words_;
 };
+INSTANTIATE_TEST_SUITE_P(EachFormat, Migration, ::testing::Values(1, 2));
 
-TEST_F(Migration, AVisitorReadsTheFirstFormatAndLeavesItAsItIs) {
+TEST_P(Migration, AVisitorReadsAnEarlierFormatAndLeavesItAsItIs) {
   const Bytes before = ReadWholeFile(file_);
-  ExpectAllThere(Open(file_, Access::kReadOnly));
+  const Library library = Open(file_, Access::kReadOnly);
+  ExpectAllThere(library);
+  EXPECT_THAT(WordsIn(library), ::testing::Each(::testing::IsEmpty()));
   EXPECT_EQ(ReadWholeFile(file_), before);
   EXPECT_EQ(FilesIn(folder_.path()), "a.docent");
 }
 
-TEST_F(Migration, AnAuthorUpgradesTheFirstFormatAndKeepsACopyOfIt) {
-  const Bytes before = ReadWholeFile(file_);
-  { ExpectAllThere(Open(file_, Access::kReadWrite)); }
-  EXPECT_EQ(FilesIn(folder_.path()), "a.docent a.docent.format-1");
-  ExpectAllThere(Open(file_, Access::kReadOnly));
-  // The copy is a library in itself, of the first format.
-  ExpectAllThere(Open(folder_ / "a.docent.format-1", Access::kReadOnly));
-  const Bytes copy = ReadWholeFile(folder_ / "a.docent.format-1");
+TEST_P(Migration, AnAuthorUpgradesAnEarlierFormatAndKeepsACopyOfIt) {
+  ASSERT_FALSE(words_.at(0).at(0).words.empty()) << "else nothing is tested";
+  { ExpectUpgraded(Open(file_, Access::kReadWrite)); }
+  EXPECT_EQ(FilesIn(folder_.path()), "a.docent " + CopyName());
+  ExpectUpgraded(Open(file_, Access::kReadOnly));
+  // The copy is a library in itself, of that format.
+  ExpectAllThere(Open(folder_ / CopyName(), Access::kReadOnly));
+  const Bytes copy = ReadWholeFile(folder_ / CopyName());
   // The second time there is nothing to do.
   Open(file_, Access::kReadWrite).Rename(1, "Table");
-  EXPECT_EQ(ReadWholeFile(folder_ / "a.docent.format-1"), copy);
+  EXPECT_EQ(ReadWholeFile(folder_ / CopyName()), copy);
   EXPECT_EQ(Open(file_, Access::kReadOnly).Find(1).name, "Table");
-  EXPECT_EQ(Open(folder_ / "a.docent.format-1", Access::kReadOnly).Find(1).name, "Desk");
+  EXPECT_EQ(Open(folder_ / CopyName(), Access::kReadOnly).Find(1).name, "Desk");
 }
 
-TEST_F(Migration, ADamagedMapStopsTheUpgradeAndTheLibraryStaysAsItWas) {
+TEST_P(Migration, ADamagedMapStopsTheUpgradeAndTheLibraryStaysAsItWas) {
   RunSql(file_, "DELETE FROM pictures WHERE map_key = 2 AND keyframe = 1");
   EXPECT_THAT(ErrorOf([&] { Open(file_, Access::kReadWrite); }),
               HasSubstr("map 'Door' (2): the picture of keyframe 1"));
@@ -128,20 +146,21 @@ TEST_F(Migration, ADamagedMapStopsTheUpgradeAndTheLibraryStaysAsItWas) {
   EXPECT_EQ(FirstDifference(*library.Load(1).snapshot, *desk_), "");
 }
 
-TEST_F(Migration, WithoutRoomForACopyNothingIsUpgraded) {
+TEST_P(Migration, WithoutRoomForACopyNothingIsUpgraded) {
   const Bytes before = ReadWholeFile(file_);
-  std::filesystem::create_directory(folder_ / "a.docent.format-1.part");  // something in the copy's way
-  WriteWholeFile(folder_ / "a.docent.format-1.part/x", before);
+  const auto unfinished = folder_ / (CopyName() + ".part");
+  std::filesystem::create_directory(unfinished);  // something in the copy's way
+  WriteWholeFile(unfinished / "x", before);
   EXPECT_THAT(ErrorOf([&] { Open(file_, Access::kReadWrite); }),
               HasSubstr("no copy of it can be made beside it"));
   ExpectAllThere(Open(file_, Access::kReadOnly));
 }
 
-TEST_F(Migration, ADiskThatFillsUpAtAnyWriteLosesNothing) {
+TEST_P(Migration, ADiskThatFillsUpAtAnyWriteLosesNothing) {
   const Bytes before = ReadWholeFile(file_);
   int failures = 0;
   for (int writes = 0; writes < 90; writes += 6) {
-    std::filesystem::remove(folder_ / "a.docent.format-1");
+    std::filesystem::remove(folder_ / CopyName());
     WriteWholeFile(file_, before);
     {
       FailingDisk disk;
@@ -154,9 +173,9 @@ TEST_F(Migration, ADiskThatFillsUpAtAnyWriteLosesNothing) {
       }
     }
     ExpectAllThere(Open(file_, Access::kReadOnly));
-    ExpectAllThere(Open(file_, Access::kReadWrite));
-    ExpectAllThere(Open(folder_ / "a.docent.format-1", Access::kReadOnly));
-    EXPECT_EQ(FilesIn(folder_.path()), "a.docent a.docent.format-1");
+    ExpectUpgraded(Open(file_, Access::kReadWrite));
+    ExpectAllThere(Open(folder_ / CopyName(), Access::kReadOnly));
+    EXPECT_EQ(FilesIn(folder_.path()), "a.docent " + CopyName());
   }
   EXPECT_GT(failures, 3) << "the disk was never full";
 }
@@ -186,16 +205,17 @@ TEST(Thumbnails, ThatAreDamagedAreToldAndTheOthersHandedOut) {
   }
   RunSql(folder / "a.docent", "UPDATE thumbnails SET data = x'00' WHERE map_key = 1");
   std::string problems;
-  std::size_t keyframes = 0;
+  std::size_t keyframes = 0, words = 0;
   Open(folder / "a.docent", Access::kReadOnly)
-      .LoadThumbnails(
-          [&](const MapInfo& info, std::vector<KeyFrameThumbnail> thumbnails, const std::string& problem) {
-            problems += problem;
-            keyframes += thumbnails.size();
-            EXPECT_EQ(thumbnails.empty(), info.name == "Desk");
-          });
+      .LoadLooks([&](const MapInfo& info, const Library::Looks& looks) {
+        problems += looks.problem;
+        keyframes += looks.thumbnails.size();
+        words += looks.words.size();
+        EXPECT_EQ(looks.thumbnails.empty(), info.name == "Desk");
+      });
   EXPECT_THAT(problems, HasSubstr("map 'Desk' (1): the table of thumbnails is cut off"));
   EXPECT_EQ(keyframes, 3u);
+  EXPECT_EQ(words, 6u);
 }
 
 }  // namespace

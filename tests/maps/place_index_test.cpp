@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "engine/base/random.h"
+#include "engine/vision/features.h"
 
 namespace docent::maps {
 namespace {
@@ -70,7 +71,7 @@ std::vector<KeyFrameThumbnail> ThumbnailsOf(const MapSnapshot& map) {
 TEST(PlaceIndex, AnswersNothingWhenItKnowsNothing) {
   const PlaceIndex index;
   EXPECT_TRUE(index.FindPlaces(MakeThumbnail(1), 5, 5, 0).empty());
-  EXPECT_TRUE(index.FindPlaces({}, 5, 5, 0).empty());
+  EXPECT_TRUE(index.FindPlaces(SmallBlurryImage(), 5, 5, 0).empty());
 }
 
 TEST(PlaceIndex, FindsEachKeyframeAmongManyUnderNoise) {
@@ -129,7 +130,7 @@ TEST(PlaceIndex, FindsAKeyframeByAPictureThatIsTurnedAside) {
 TEST(PlaceIndex, KnowsMapsThatAreNotInMemory) {
   PlaceIndex index;
   const auto map = MakeMap(1, 30);
-  index.SetThumbnails(4, ThumbnailsOf(*map));
+  index.SetLooks(4, ThumbnailsOf(*map));
   EXPECT_EQ(index.keyframes(), 30u);
   auto found = index.FindPlaces(MakeThumbnail(8), 1, 1, 0);
   ASSERT_EQ(found.size(), 1u);
@@ -217,16 +218,184 @@ TEST(PlaceIndex, PassesOverThumbnailsOfAnotherSize) {
   EXPECT_EQ(index.FindPlaces(MakeThumbnail(9, 80, 60), 10, 10, 0).size(), 1u);
 }
 
+// The words of keyframe i of a map: twenty of its own and ten that all have.
+engine::WordBag WordsOfKeyFrame(std::uint64_t map, std::uint64_t i) {
+  Random random(1000 * map + i);
+  std::vector<std::uint32_t> leaves;
+  for (std::uint32_t k = 0; k < 20; ++k) leaves.push_back(100 + random.Below(3900));
+  for (std::uint32_t k = 0; k < 10; ++k) leaves.push_back(k);
+  return engine::MakeWordBag(leaves);
+}
+std::vector<KeyFrameWords> WordsOfMap(std::uint64_t key, const MapSnapshot& map) {
+  std::vector<KeyFrameWords> words;
+  for (const auto& keyframe : map.keyframes)
+    words.push_back({keyframe.id, keyframe.id, WordsOfKeyFrame(key, keyframe.id)});
+  return words;
+}
+
+TEST(PlaceIndex, FindsAPlaceByItsWordsWhereItsThumbnailHelpsNobody) {
+  PlaceIndex index;
+  for (std::uint64_t key = 1; key <= 8; ++key) {
+    const auto map = MakeMap(100 * key, 50);
+    index.SetLooks(key, ThumbnailsOf(*map), WordsOfMap(key, *map));
+  }
+  const SmallBlurryImage unlike = MakeThumbnail(77'777), empty;
+  int alone = 0;
+  for (std::uint64_t key = 1; key <= 8; ++key) {
+    for (std::uint64_t i = 0; i < 50; i += 7) {
+      const engine::WordBag words = WordsOfKeyFrame(key, i);
+      for (const SmallBlurryImage* image : {&unlike, &empty}) {
+        const auto found = index.FindPlaces({*image, words}, 3, 3, 0);
+        ASSERT_FALSE(found.empty());
+        EXPECT_EQ(found[0].map_key, key);
+        EXPECT_EQ(found[0].keyframe, i);
+        EXPECT_EQ(index.FindPlaces({*image, words}, 1, 1, key).at(0).keyframe, i);
+      }
+      const auto found = index.FindPlaces(unlike, 1, 1, 0);
+      alone += found.at(0).map_key == key && found[0].keyframe == i;
+    }
+  }
+  EXPECT_LE(alone, 1);
+}
+
+TEST(PlaceIndex, FindsKeyframesWithThumbnailsOfAnotherSizeByTheirWords) {
+  PlaceIndex index;
+  auto map = std::make_shared<MapSnapshot>();
+  AddKeyFrame(1, map.get(), 80, 45);
+  AddKeyFrame(2, map.get(), 80, 60);
+  index.SetLooks(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
+  const engine::WordBag words = WordsOfKeyFrame(1, 0);
+  for (const std::uint64_t only : {0, 1}) {
+    const auto found = index.FindPlaces({MakeThumbnail(9, 80, 60), words}, 2, 2, only);
+    ASSERT_EQ(found.size(), 2u);
+    EXPECT_EQ(found[0].keyframe, 0u);
+  }
+}
+
+TEST(PlaceIndex, AnswersWithDifferentPlacesFirst) {
+  PlaceIndex index;
+  const auto map = MakeMap(1, 30);
+  std::vector<KeyFrameWords> words = WordsOfMap(1, *map);
+  for (auto& of : words) of.place = of.keyframe / 10 * 10;
+  index.SetLooks(1, ThumbnailsOf(*map), words);
+  // Like the keyframes 11, 12 and 13, in this order.
+  SmallBlurryImage seen = MakeThumbnail(12);
+  seen.pixels = seen.pixels + 0.8 * MakeThumbnail(13).pixels + 0.6 * MakeThumbnail(14).pixels;
+  const auto found = index.FindPlaces(seen, 5, 5, 0);
+  ASSERT_EQ(found.size(), 5u);
+  EXPECT_EQ(found[0].keyframe, 11u);
+  EXPECT_NE(found[1].keyframe / 10, found[2].keyframe / 10);
+  EXPECT_NE(found[1].keyframe / 10, 1u);
+  EXPECT_NE(found[2].keyframe / 10, 1u);
+  EXPECT_EQ(found[3].keyframe, 12u);
+  EXPECT_EQ(found[4].keyframe, 13u);
+}
+
+TEST(PlaceIndex, HasNoWordsLeftOfMapsThatGo) {
+  PlaceIndex index;
+  const auto map = MakeMap(1, 20);
+  index.SetLooks(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
+  const std::size_t before = index.words();
+  EXPECT_GT(before, 20u * 25);
+  index.SetLooks(2, ThumbnailsOf(*map), WordsOfMap(2, *map));
+  EXPECT_GT(index.words(), before);
+  // In memory, let go, smaller, gone.
+  index.SetMap(2, map);
+  index.ReleaseMap(2);
+  EXPECT_GT(index.words(), before);
+  index.SetMap(2, std::make_shared<const MapSnapshot>());
+  EXPECT_EQ(index.words(), before);
+  index.RemoveMap(2);
+  index.RemoveMap(2);
+  EXPECT_EQ(index.words(), before);
+  index.RemoveMap(1);
+  EXPECT_EQ(index.words(), 0u);
+}
+
+// A map with pictures that have corners.
+std::shared_ptr<MapSnapshot> MakeMapOfPictures(std::uint64_t seed, std::uint64_t keyframes) {
+  auto map = std::make_shared<MapSnapshot>();
+  for (std::uint64_t i = 0; i < keyframes; ++i) {
+    Random random(seed + i);
+    cv::Mat coarse(24, 32, CV_8UC1), picture;
+    for (int y = 0; y < coarse.rows; ++y) {
+      for (int x = 0; x < coarse.cols; ++x)
+        coarse.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
+    }
+    cv::resize(coarse, picture, {320, 240}, 0, 0, cv::INTER_CUBIC);
+    engine::KeyFrame keyframe;
+    keyframe.id = map->next_keyframe++;
+    keyframe.features = engine::MakeFeatures(picture);
+    map->keyframes.push_back(keyframe);
+  }
+  return map;
+}
+
+TEST(PlaceIndex, DescribesKeyframesOnce) {
+  PlaceIndex index;
+  const auto map = MakeMapOfPictures(1, 3);
+  const auto described = index.DescribeNew(1, *map);
+  ASSERT_EQ(described.size(), 3u);
+  EXPECT_GT(described[0].words.size(), 20u);
+  index.SetMap(1, map, described);
+  const std::size_t words = index.words();
+  EXPECT_TRUE(index.DescribeNew(1, *map).empty());
+  EXPECT_EQ(index.FindPlaces({SmallBlurryImage(), described[1].words}, 1, 1, 0).at(0).keyframe, 1u);
+  // One more keyframe, and the same ones read from a file again.
+  const auto longer = MakeMapOfPictures(1, 4);
+  const auto news = index.DescribeNew(1, *longer);
+  ASSERT_EQ(news.size(), 1u);
+  EXPECT_EQ(news[0].keyframe, 3u);
+  index.SetMap(1, longer);  // describes what is new itself
+  EXPECT_EQ(index.words(), words + news[0].words.size());
+  // Words of a library are taken as they are; where it has none they are made when the map is in memory.
+  for (const bool stored : {true, false}) {
+    PlaceIndex other;
+    std::vector<KeyFrameWords> kept;
+    if (stored) kept = described;
+    for (auto& of : kept) of.place = of.keyframe;
+    other.SetLooks(1, ThumbnailsOf(*map), kept);
+    EXPECT_EQ(other.words(), stored ? words : 0u);
+    EXPECT_EQ(other.DescribeNew(1, *MakeMapOfPictures(1, 3)).size(), stored ? 0u : 3u);
+    other.SetMap(1, MakeMapOfPictures(1, 3));
+    EXPECT_EQ(other.words(), words);
+    EXPECT_EQ(other.FindPlaces({SmallBlurryImage(), described[2].words}, 1, 1, 0).at(0).keyframe, 2u);
+  }
+}
+
+TEST(PlaceIndex, FindsPicturesByWordsAfterARollThatThumbnailsDoNotKnow) {
+  PlaceIndex index;
+  const auto map = MakeMapOfPictures(1, 60);
+  index.SetMap(1, map);
+  int by_thumbnails = 0, merged = 0;
+  for (std::uint64_t i = 0; i < 60; i += 3) {
+    cv::Mat rolled;
+    const cv::Mat turn = cv::getRotationMatrix2D({160, 120}, 50, 1);
+    cv::warpAffine(map->keyframes[i].features->levels[0], rolled, turn, {320, 240});
+    const auto features = engine::MakeFeatures(rolled);
+    const engine::WordBag words = engine::MakeWordBag(*features);
+    by_thumbnails += index.FindPlaces(features->small_blurry, 1, 1, 0).at(0).keyframe == i;
+    merged += index.FindPlaces({features->small_blurry, words}, 1, 1, 0).at(0).keyframe == i;
+  }
+  EXPECT_GE(merged, 19);
+  EXPECT_LE(by_thumbnails, 6);
+}
+
 TEST(PlaceIndex, IsSearchedWhileMapsComeGrowAndGo) {
   PlaceIndex index;
-  index.SetMap(1, MakeMap(0, 30));
+  const auto map = MakeMap(0, 30);
+  index.SetLooks(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
+  const SmallBlurryImage seen = MakeThumbnail(11);
+  const engine::WordBag words = WordsOfKeyFrame(1, 11);
   std::atomic<bool> done = false;
   std::atomic<int> wrong = 0;
   std::vector<std::jthread> readers;
   for (int r = 0; r < 2; ++r) {
-    readers.emplace_back([&] {
+    readers.emplace_back([&, r] {
       while (!done) {
-        const auto found = index.FindPlaces(MakeThumbnail(11), 3, 3, 0);
+        // With words and without.
+        const engine::PlaceQuery query = r == 0 ? engine::PlaceQuery(seen) : engine::PlaceQuery(seen, words);
+        const auto found = index.FindPlaces(query, 3, 3, 0);
         if (found.empty() || found[0].map_key != 1 || found[0].keyframe != 11 || found[0].difference > 1e-6)
           ++wrong;
       }
@@ -236,7 +405,8 @@ TEST(PlaceIndex, IsSearchedWhileMapsComeGrowAndGo) {
   for (int i = 0; i < 150; ++i) {
     AddKeyFrame(10'000 + static_cast<std::uint64_t>(i), growing.get());
     index.SetMap(2, std::make_shared<const MapSnapshot>(*growing));
-    if (i % 10 == 0) index.SetMap(3, MakeMap(20'000, 3));
+    const auto other = MakeMap(20'000, 3);
+    if (i % 10 == 0) index.SetLooks(3, ThumbnailsOf(*other), WordsOfMap(3, *other));
     if (i % 10 == 5) index.RemoveMap(3);
   }
   done = true;

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <vector>
 
-#include "engine/recognition/place.h"
 #include "engine/tracking/tracker.h"
 #include "tests/engine/rendered_world.h"
+#include "tests/engine/some_maps.h"
 
 // What a tracker makes of a map that is moved under it.
 namespace docent::engine {
@@ -38,23 +38,6 @@ Frame FrameAt(int index) {
   return frame;
 }
 
-class OneMap : public PlaceFinder {
- public:
-  explicit OneMap(std::shared_ptr<const MapSnapshot> map) : map_(std::move(map)) {}
-  std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage& image, int, int,
-                                         std::uint64_t) const override {
-    std::vector<PlaceCandidate> found;
-    for (const KeyFrame& keyframe : map_->keyframes)
-      found.push_back({1, map_, keyframe.id, Difference(keyframe.features->small_blurry, image)});
-    std::sort(found.begin(), found.end(),
-              [](const auto& a, const auto& b) { return a.difference < b.difference; });
-    return found;
-  }
-
- private:
-  std::shared_ptr<const MapSnapshot> map_;
-};
-
 // A tracker that follows the first frames in an exact map.
 class MovedMap : public ::testing::Test {
  protected:
@@ -68,7 +51,8 @@ class MovedMap : public ::testing::Test {
   }
   void SetUp() override {
     tracker_.SetMap(before_, 1);
-    const OneMap places(before_);
+    testing_world::SomeMaps places;
+    places.Add(1, before_);
     for (int i = 0; i < kBefore; ++i) last_ = tracker_.Track(FrameAt(i), &places);
     ASSERT_TRUE(HasPose(last_.state)) << "the test needs a tracked camera";
   }

@@ -72,12 +72,12 @@ Frame FrameOf(int index) {
 class OneMap : public PlaceFinder {
  public:
   OneMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t key) : map_(std::move(map)), key_(key) {}
-  std::vector<PlaceCandidate> FindPlaces(const SmallBlurryImage& image, int count, int per_map,
+  std::vector<PlaceCandidate> FindPlaces(const PlaceQuery& query, int count, int per_map,
                                          std::uint64_t only_map) const override {
     std::vector<PlaceCandidate> found;
     if (only_map != 0 && only_map != key_) return found;
     for (const KeyFrame& keyframe : map_->keyframes)
-      found.push_back({key_, map_, keyframe.id, Difference(keyframe.features->small_blurry, image)});
+      found.push_back({key_, map_, keyframe.id, Difference(keyframe.features->small_blurry, *query.image)});
     std::sort(found.begin(), found.end(),
               [](const auto& a, const auto& b) { return a.difference < b.difference; });
     found.resize(std::min<std::size_t>(found.size(), static_cast<std::size_t>(std::min(count, per_map))));

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/recognition/word_bag.h"
+
+#include <array>
+
+namespace docent::engine {
+
+WordBag MakeWordBag(std::vector<std::uint32_t> leaves) {
+  std::sort(leaves.begin(), leaves.end());
+  WordBag bag;
+  for (std::size_t begin = 0, end = 0; begin < leaves.size(); begin = end) {
+    while (end < leaves.size() && leaves[end] == leaves[begin]) ++end;
+    bag.emplace_back(leaves[begin],
+                     static_cast<int>(std::min<std::size_t>(end - begin, VisualWord::kMaxCount)));
+  }
+  return bag;
+}
+
+WordBag MakeWordBag(const ImageFeatures& features, const VocabularyTree& tree,
+                    const WordBagOptions& options) {
+  std::vector<std::uint32_t> leaves;
+  for (const DescribedPlace& place : DescribeCorners(features, options.corners)) {
+    // The nearest of those that a descent with some alternatives reaches: a single descent often misses it by
+    // an early turn.
+    std::array<std::uint32_t, 4> nearest;
+    tree.NearestLeaves(place.oriented.descriptor, nearest);
+    leaves.push_back(nearest[0]);
+  }
+  return MakeWordBag(std::move(leaves));
+}
+
+}  // namespace docent::engine

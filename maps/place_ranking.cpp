@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/place_ranking.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <set>
+#include <utility>
+
+#include "maps/thumbnail_array.h"
+
+namespace docent::maps {
+
+double Likeness(const PlaceScore& score, const ByChance& chance) {
+  const double correlation = 1 - score.difference / (2 * kThumbnailContrast * kThumbnailContrast);
+  return std::max(0.0, (correlation - chance.correlation) / (1 - chance.correlation)) +
+         std::max(0.0, score.words / chance.words - 1);
+}
+
+std::vector<std::size_t> RankPlaces(std::span<const PlaceScore> scores, const ByChance& chance,
+                                    std::size_t count, std::size_t per_map, std::size_t places) {
+  std::vector<double> likeness;
+  for (const PlaceScore& score : scores) likeness.push_back(Likeness(score, chance));
+  std::vector<std::size_t> order(scores.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return likeness[a] > likeness[b]; });
+  std::map<std::uint64_t, std::size_t> given;  // by map
+  std::set<std::pair<std::uint64_t, engine::KeyFrameId>> seen;
+  std::vector<std::size_t> ranked, later;
+  const auto take = [&](std::size_t index) {
+    if (ranked.size() == count || given[scores[index].map_key] == per_map) return;
+    ++given[scores[index].map_key];
+    ranked.push_back(index);
+  };
+  for (const std::size_t index : order) {
+    const std::pair place(scores[index].map_key, scores[index].place);
+    if (ranked.size() >= places || seen.contains(place)) {
+      later.push_back(index);
+    } else {
+      seen.insert(place);
+      take(index);
+    }
+  }
+  for (const std::size_t index : later) take(index);
+  return ranked;
+}
+
+}  // namespace docent::maps

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/word_rows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "engine/base/error.h"
+#include "engine/vision/features.h"
+#include "maps/envelope.h"
+#include "maps/rows.h"
+#include "maps/schema.h"
+
+namespace docent::maps {
+
+namespace {
+
+// Of the distance of what a keyframe sees, and the largest turn: what lies within shares most of the picture.
+constexpr double kPlaceSize = 0.5;
+constexpr double kPlaceTurn_rad = 35 * std::numbers::pi / 180;
+
+[[noreturn]] void Damaged(const char* what) {
+  throw Error(std::string("the table of words is damaged: ") + what);
+}
+
+}  // namespace
+
+std::uint64_t VocabularyFingerprint() {
+  static const std::uint64_t fingerprint = engine::DefaultVocabulary().Fingerprint();
+  return fingerprint;
+}
+
+std::vector<engine::KeyFrameId> PlacesOf(const engine::MapSnapshot& map) {
+  struct Place {
+    engine::KeyFrameId keyframe;
+    Eigen::Vector3d center, view;
+    double depth;
+  };
+  std::vector<Place> places;
+  std::vector<engine::KeyFrameId> place_of;
+  place_of.reserve(map.keyframes.size());
+  for (const engine::KeyFrame& keyframe : map.keyframes) {
+    const Place own{keyframe.id, keyframe.camera_from_map.OriginInSource(),
+                    keyframe.camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ(),
+                    keyframe.mean_depth};
+    const auto near = std::find_if(places.begin(), places.end(), [&](const Place& place) {
+      return (place.center - own.center).norm() <= kPlaceSize * std::min(place.depth, own.depth) &&
+             place.view.dot(own.view) >= std::cos(kPlaceTurn_rad);
+    });
+    place_of.push_back(near == places.end() ? own.keyframe : near->keyframe);
+    if (near == places.end()) places.push_back(own);
+  }
+  return place_of;
+}
+
+engine::WordBag WordsOf(const engine::ImageFeatures& features) {
+  const bool has_corners = !features.row_begin[0].empty();
+  if (has_corners) return engine::MakeWordBag(features);
+  // Whoever made the features may have had no use for corners.
+  const cv::Mat& picture = features.levels[0];
+  if (picture.cols < kMinPictureSidePx || picture.rows < kMinPictureSidePx) return {};
+  return engine::MakeWordBag(*engine::MakeFeatures(picture));
+}
+
+std::vector<KeyFrameWords> MakeWords(const engine::MapSnapshot& map, std::span<const KeyFrameWords> known) {
+  const std::vector<engine::KeyFrameId> places = PlacesOf(map);
+  std::vector<KeyFrameWords> words;
+  words.reserve(map.keyframes.size());
+  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
+    const engine::KeyFrame& keyframe = map.keyframes[i];
+    const auto found =
+        std::lower_bound(known.begin(), known.end(), keyframe.id,
+                         [](const KeyFrameWords& k, engine::KeyFrameId id) { return k.keyframe < id; });
+    const bool is_known = found != known.end() && found->keyframe == keyframe.id;
+    words.push_back({keyframe.id, places[i], is_known ? found->words : WordsOf(*keyframe.features)});
+  }
+  return words;
+}
+
+Bytes EncodeWords(std::uint64_t map_key, const WordTable& table) {
+  ByteWriter writer = BeginEnvelope(kWordTableKind, map_key, table.keyframes.size());
+  writer.Put(table.vocabulary);
+  for (const KeyFrameWords& keyframe : table.keyframes) {
+    writer.Put(std::uint32_t{keyframe.keyframe});
+    writer.Put(std::uint32_t{keyframe.place});
+    writer.Put(static_cast<std::uint16_t>(keyframe.words.size()));
+    for (const engine::VisualWord& word : keyframe.words) writer.Put(word.bits());
+  }
+  return FinishEnvelope(std::move(writer));
+}
+
+WordTable DecodeWords(std::uint64_t map_key, std::span<const std::uint8_t> bytes) {
+  auto [reader, count] = OpenEnvelope(kWordTableKind, map_key, bytes);
+  constexpr std::size_t kSmallestRecord = 10;
+  WordTable table;
+  table.vocabulary = reader.Get<std::uint64_t>();
+  if (reader.failed() || count > reader.remaining() / kSmallestRecord) Damaged("its length does not match");
+  table.keyframes.resize(count);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    KeyFrameWords& next = table.keyframes[i];
+    next.keyframe = reader.Get<std::uint32_t>();
+    next.place = reader.Get<std::uint32_t>();
+    const std::size_t words = reader.Get<std::uint16_t>();
+    ByteReader packed(reader.GetBytes(words * sizeof(std::uint16_t)));
+    if (reader.failed()) Damaged("it is cut off");
+    if (i > 0 && table.keyframes[i - 1].keyframe >= next.keyframe) Damaged("its keyframes are out of order");
+    // Whoever stands for a place came first and stands for itself.
+    const auto leader = std::lower_bound(
+        table.keyframes.begin(), table.keyframes.begin() + static_cast<std::ptrdiff_t>(i) + 1, next.place,
+        [](const KeyFrameWords& k, engine::KeyFrameId id) { return k.keyframe < id; });
+    if (leader - table.keyframes.begin() > static_cast<std::ptrdiff_t>(i) || leader->keyframe != next.place ||
+        leader->place != next.place) {
+      Damaged("a place is none");
+    }
+    next.words.reserve(words);
+    for (std::size_t w = 0; w < words; ++w) {
+      const auto word = engine::VisualWord::FromBits(packed.Get<std::uint16_t>());
+      if (w > 0 && next.words.back().leaf() >= word.leaf()) Damaged("its words are out of order");
+      next.words.push_back(word);
+    }
+  }
+  if (reader.remaining() != 0) Damaged("its length does not match");
+  return table;
+}
+
+void WriteWords(const Database& database, std::uint64_t key, std::vector<KeyFrameWords> keyframes) {
+  const Bytes bytes = EncodeWords(key, {VocabularyFingerprint(), std::move(keyframes)});
+  database.Prepare("INSERT OR REPLACE INTO words (map_key, data) VALUES (?, ?)")
+      .Bind(1, static_cast<std::int64_t>(key))
+      .Bind(2, std::span<const std::uint8_t>(bytes))
+      .Run();
+}
+
+std::vector<KeyFrameWords> ReadWords(const Database& database, const MapInfo& info) {
+  if (SchemaVersion(database) < kWordsSince) return {};
+  Statement query = database.Prepare("SELECT data FROM words WHERE map_key = ?");
+  query.Bind(1, static_cast<std::int64_t>(info.key));
+  if (!query.Step()) throw Error("its words are missing");
+  WordTable table = DecodeWords(info.key, query.Blob(0));
+  if (table.keyframes.size() != info.keyframes)
+    throw Error("its words are of fewer or more keyframes than it has");
+  if (table.vocabulary != VocabularyFingerprint()) return {};
+  return std::move(table.keyframes);
+}
+
+std::vector<KeyFrameWords> UnchangedWords(const Database& database, const MapInfo& info,
+                                          const std::vector<StoredKeyFrame>& stored,
+                                          const std::vector<StoredKeyFrame>& wanted) {
+  std::vector<KeyFrameWords> words;
+  if (stored.empty()) return words;
+  try {
+    words = ReadWords(database, info);
+  } catch (const Error&) {
+    return {};
+  }
+  const auto same_picture = [&](engine::KeyFrameId keyframe) {
+    const auto find = [&](const std::vector<StoredKeyFrame>& all) {
+      const auto found =
+          std::lower_bound(all.begin(), all.end(), keyframe,
+                           [](const StoredKeyFrame& k, engine::KeyFrameId id) { return k.keyframe.id < id; });
+      return found != all.end() && found->keyframe.id == keyframe ? &*found : nullptr;
+    };
+    const StoredKeyFrame *before = find(stored), *after = find(wanted);
+    return before && after && before->picture_hash == after->picture_hash;
+  };
+  std::erase_if(words, [&](const KeyFrameWords& of) { return !same_picture(of.keyframe); });
+  return words;
+}
+
+std::vector<KeyFrameWords> WordsFromPictures(const Database& database, const MapInfo& info) {
+  const MapParts parts = ReadParts(database, info);
+  engine::MapSnapshot map;
+  for (const StoredKeyFrame& stored : parts.keyframes) map.keyframes.push_back(stored.keyframe);
+  const std::vector<engine::KeyFrameId> places = PlacesOf(map);
+  std::vector<KeyFrameWords> words(parts.keyframes.size());
+  ReadPictures(
+      database, info.key, parts.keyframes, [&](std::size_t index, std::span<const std::uint8_t> bytes) {
+        const auto features = engine::MakeFeatures(DecodePicture(info.key, parts.keyframes[index], bytes));
+        words[index] = {parts.keyframes[index].keyframe.id, places[index], engine::MakeWordBag(*features)};
+      });
+  return words;
+}
+
+}  // namespace docent::maps

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/recognition/word_bag.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "engine/base/random.h"
+#include "engine/vision/features.h"
+
+namespace docent::engine {
+namespace {
+
+TEST(WordBag, CountsEachLeafOnceInOrder) {
+  const WordBag bag = MakeWordBag({9, 4095, 9, 0, 9});
+  ASSERT_EQ(bag.size(), 3u);
+  EXPECT_EQ(bag[0], VisualWord(0, 1));
+  EXPECT_EQ(bag[1], VisualWord(9, 3));
+  EXPECT_EQ(bag[2], VisualWord(4095, 1));
+  EXPECT_EQ(bag[1].leaf(), 9u);
+  EXPECT_EQ(bag[1].count(), 3);
+  EXPECT_TRUE(MakeWordBag(std::vector<std::uint32_t>()).empty());
+  EXPECT_EQ(MakeWordBag(std::vector<std::uint32_t>(100, 7)).at(0).count(), VisualWord::kMaxCount);
+}
+
+TEST(WordBag, AWordIsItsTwoBytes) {
+  for (const std::uint32_t leaf : {0u, 1u, 2048u, 4095u}) {
+    for (int count = 1; count <= VisualWord::kMaxCount; ++count) {
+      const VisualWord word(leaf, count);
+      EXPECT_EQ(VisualWord::FromBits(word.bits()), word);
+      EXPECT_EQ(word.leaf(), leaf);
+      EXPECT_EQ(word.count(), count);
+    }
+  }
+}
+
+// Blobs on a grey ground, in the middle of the picture, so that nothing leaves it when it is turned.
+cv::Mat Blobs(std::uint64_t seed) {
+  Random random(seed);
+  cv::Mat picture(480, 640, CV_8UC1, cv::Scalar(128));
+  for (int i = 0; i < 150; ++i) {
+    const double angle = random.Uniform(0, 6.28), radius = 170 * std::sqrt(random.Uniform(0, 1));
+    const cv::Point middle(static_cast<int>(320 + radius * std::cos(angle)),
+                           static_cast<int>(240 + radius * std::sin(angle)));
+    cv::rectangle(picture, middle, middle + cv::Point(8 + static_cast<int>(random.Below(25)), 12),
+                  cv::Scalar(random.Below(256)), -1);
+  }
+  return picture;
+}
+
+// What part of the words two bags share.
+double Shared(const WordBag& a, const WordBag& b) {
+  double shared = 0, all = 0;
+  for (const VisualWord& word : a) {
+    all += word.count();
+    for (const VisualWord& other : b)
+      if (other.leaf() == word.leaf()) shared += std::min(word.count(), other.count());
+  }
+  return shared / all;
+}
+
+TEST(WordBag, MostWordsStayWhenThePictureTurnsOrDarkensAndFewAreThoseOfAnother) {
+  const cv::Mat picture = Blobs(1);
+  const WordBag bag = MakeWordBag(*MakeFeatures(picture));
+  EXPECT_GT(bag.size(), 80u);
+  EXPECT_EQ(MakeWordBag(*MakeFeatures(picture)), bag);
+  const double other = Shared(bag, MakeWordBag(*MakeFeatures(Blobs(2))));
+  cv::Mat turned, dark;
+  cv::rotate(picture, turned, cv::ROTATE_180);
+  picture.convertTo(dark, CV_8U, 0.5, 5);
+  EXPECT_GT(Shared(bag, MakeWordBag(*MakeFeatures(turned))), 1.5 * other);
+  EXPECT_GT(Shared(bag, MakeWordBag(*MakeFeatures(dark))), 2 * other);
+}
+
+TEST(WordBag, APictureWithoutTextureHasNone) {
+  EXPECT_TRUE(MakeWordBag(*MakeFeatures(cv::Mat(480, 640, CV_8UC1, cv::Scalar(90)))).empty());
+}
+
+}  // namespace
+}  // namespace docent::engine

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/place_ranking.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace docent::maps {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr ByChance kChance{};
+
+// Thumbnails alike by that correlation.
+PlaceScore Alike(std::uint64_t map, engine::KeyFrameId place, double correlation, double words = 0) {
+  return {map, place, 2 * 32.0 * 32.0 * (1 - correlation), words};
+}
+
+TEST(PlaceRanking, TheBestOfEveryPlaceComeFirst) {
+  const std::vector<PlaceScore> scores = {Alike(1, 0, 0.9), Alike(1, 0, 0.95), Alike(1, 7, 0.5),
+                                          Alike(2, 0, 0.6), Alike(1, 7, 0.4)};
+  EXPECT_THAT(RankPlaces(scores, kChance, 10, 10), ElementsAre(1, 3, 2, 0, 4));
+  EXPECT_THAT(RankPlaces(scores, kChance, 3, 10), ElementsAre(1, 3, 2));
+}
+
+TEST(PlaceRanking, AfterFiveDifferentPlacesTheMostAlikeFollow) {
+  std::vector<PlaceScore> scores;
+  for (engine::KeyFrameId place = 0; place < 7; ++place) {
+    scores.push_back(Alike(1, place, 0.9 - 0.1 * place));
+    scores.push_back(Alike(1, place, 0.85 - 0.1 * place));
+  }
+  EXPECT_THAT(RankPlaces(scores, kChance, 9, 9), ElementsAre(0, 2, 4, 6, 8, 1, 3, 5, 7));
+  EXPECT_THAT(RankPlaces(scores, kChance, 12, 12), ElementsAre(0, 2, 4, 6, 8, 1, 3, 5, 7, 9, 10, 11));
+}
+
+TEST(PlaceRanking, PassesOverPlacesWhenAsked) {
+  const std::vector<PlaceScore> scores = {Alike(1, 0, 0.9), Alike(1, 0, 0.95), Alike(1, 7, 0.5),
+                                          Alike(2, 0, 0.6), Alike(1, 7, 0.4)};
+  EXPECT_THAT(RankPlaces(scores, kChance, 10, 10, 0), ElementsAre(1, 0, 3, 2, 4));
+}
+
+TEST(PlaceRanking, KeepsTheLimitsOfAMapAndOfTheWhole) {
+  const std::vector<PlaceScore> scores = {Alike(1, 0, 0.9), Alike(1, 1, 0.8), Alike(1, 2, 0.7),
+                                          Alike(2, 0, 0.6), Alike(2, 0, 0.5)};
+  EXPECT_THAT(RankPlaces(scores, kChance, 10, 2), ElementsAre(0, 1, 3, 4));
+  EXPECT_THAT(RankPlaces(scores, kChance, 3, 1), ElementsAre(0, 3));
+  EXPECT_THAT(RankPlaces(scores, kChance, 0, 1), IsEmpty());
+  EXPECT_THAT(RankPlaces({}, kChance, 5, 5), IsEmpty());
+}
+
+TEST(PlaceRanking, EitherWayCanDecide) {
+  EXPECT_NEAR(Likeness(Alike(1, 0, 0.5, 0.3), kChance), 0.5 + 2, 1e-12);
+  EXPECT_GT(Likeness(Alike(1, 0, 0.5, 0.2), kChance), Likeness(Alike(1, 0, 0.5, 0.15), kChance));
+  EXPECT_GT(Likeness(Alike(1, 0, 0.6, 0.2), kChance), Likeness(Alike(1, 0, 0.5, 0.2), kChance));
+  // A roll takes the thumbnail's likeness away; that it is then unlike says no more than nothing.
+  EXPECT_EQ(Likeness(Alike(1, 0, -0.8, 0.3), kChance), Likeness(Alike(1, 0, 0, 0.3), kChance));
+  // What many have is nothing.
+  const ByChance many = {.correlation = 0.6, .words = 0.2};
+  EXPECT_NEAR(Likeness(Alike(1, 0, 0.8, 0.3), many), 0.5 + 0.5, 1e-12);
+  EXPECT_NEAR(Likeness(Alike(1, 0, 0.6, 0.2), many), 0, 1e-12);
+  // Where nothing is shared but what everything shares, thumbnails alone decide.
+  EXPECT_EQ(Likeness(Alike(1, 0, 0.5, 0.05), kChance), Likeness(Alike(1, 0, 0.5, 0.09), kChance));
+}
+
+}  // namespace
+}  // namespace docent::maps
