@@ -19,10 +19,10 @@ struct LensWatchOptions {
   double turn_between_samples_deg = 2;  // a camera that stands still sees the same errors again
   std::size_t min_matches = 60;         // of a frame, found points of the two finest levels
   std::size_t min_ring_matches = 6;     // of a ring in a frame
-  std::size_t min_samples = 25;         // of a ring, for it to count
-  std::size_t min_rings = 4;            // that count, for anything to be said
-  double told_px = 0.5;                 // between the ring found farthest out and the one farthest in
-  double told_sigmas = 5;               // of that difference, so that chance does not tell it
+  std::size_t min_samples = 15;  // of a ring, for its spread to be known; told_sigmas weighs how few they are
+  std::size_t min_rings = 4;     // that count, for anything to be said
+  double told_px = 0.5;          // between the ring found farthest out and the one farthest in
+  double told_sigmas = 5;        // of that difference, so that chance does not tell it
 };
 
 // Watches one camera. With the right lens, points are found about where they are expected, evenly to all

@@ -175,7 +175,8 @@ void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_fr
 void NearbyPoints::TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit,
                               std::size_t index) {
   NearbyPoint& nearby = finite_[index];
-  // Where the whole map puts the point, which is surer than the one measurement; but that must agree.
+  // The patch is cut where the point was seen, not where the map puts it: what a wrong lens does to the map
+  // must show in the residuals. But the two must agree.
   const auto pixel = keyframe.camera->Project(keyframe.camera_from_map * nearby.point->position());
   if (!pixel) return;
   const float sigma = static_cast<float>(1 << observation.level);
@@ -190,7 +191,7 @@ void NearbyPoints::TakeSource(const KeyFrame& keyframe, const Observation& obser
   MapPoint& point = resourced_[static_cast<std::size_t>(fit.resourced)];
   point.source_keyframe = keyframe.id;
   point.source_level = observation.level;
-  point.source_pixel = LevelFromLevelZero(*pixel, observation.level).cast<float>();
+  point.source_pixel = LevelFromLevelZero(observation.pixel.cast<double>(), observation.level).cast<float>();
   nearby.source = &keyframe;
 }
 
