@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mapping/initializer.h"
-#include "engine/vision/rotation_alignment.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "engine/vision/rotation_alignment.h"
 
 namespace docent::engine {
 

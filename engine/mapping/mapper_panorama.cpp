@@ -7,25 +7,6 @@
 
 namespace docent::engine {
 
-// A map without depth yet: its first keyframe is the reference of a panorama map, and stands at the origin.
-void Mapper::StartFromPanorama(const KeyFrameCandidate& candidate) {
-  KeyFrame keyframe;
-  keyframe.fixed = true;
-  keyframe.time = candidate.time;
-  keyframe.camera = candidate.camera;
-  keyframe.features = candidate.features;
-  const KeyFrameId id = map_.AddKeyFrame(keyframe).keyframe.id;
-  map_.OpenPanorama(id);
-  const int rays = AddInfinitePoints(options_.infinite, id, {}, &map_);
-  if (rays < options_.min_initial_directions) {
-    map_ = Map();  // a dark or empty picture; the next one may be better
-    return;
-  }
-  newest_ = id;
-  Publish();
-  Tell(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " directions");
-}
-
 void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
   const auto panorama =
       std::find_if(map_.panoramas().begin(), map_.panoramas().end(),

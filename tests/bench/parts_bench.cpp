@@ -7,8 +7,8 @@
 #include "engine/mapping/map_adjustment.h"
 #include "engine/tracking/point_search.h"
 #include "engine/vision/features.h"
-#include "tests/bench/bench_sequence.h"
 #include "engine/vision/rotation_alignment.h"
+#include "tests/bench/bench_sequence.h"
 
 // The parts that a frame and a keyframe are made of, each alone.
 namespace docent::bench {

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the tracker has for the mapper: keyframes, pairs to start a map from, and how its points fare.
+#include <algorithm>
+#include <utility>
+
+#include "engine/tracking/surroundings.h"
+#include "engine/tracking/tracker.h"
+
+namespace docent::engine {
+
+void Tracker::ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, const TrackedFrame& out) {
+  const bool wants_six_dof = result.observed != ObservedMotion::kPanorama &&
+                             WantsKeyFrame(options_.keyframes, *map_, result.camera_from_map, result);
+  KeyFrameChoice choice = wants_six_dof ? KeyFrameChoice::kSixDof : KeyFrameChoice::kNone;
+  if (options_.hybrid) {
+    // What carries the camera is what grows.
+    if (selector_.mode() == KeyFrameSelector::Mode::kSixDof && result.observed == ObservedMotion::kPanorama) {
+      if (const PanoramaMap* panorama = map_->FindPanorama(map_tracker_.panorama()))
+        selector_.Reopen(*panorama, *map_);
+    }
+    choice = selector_.Select({.time = frame.time,
+                               .camera_from_map = result.camera_from_map,
+                               .observed = result.observed,
+                               .finite_coverage = result.finite_coverage,
+                               .coverage = result.coverage,
+                               .points = result.inliers,
+                               .median_depth = median_depth_,
+                               .wants_six_dof = wants_six_dof},
+                              *map_);
+  }
+  if (choice == KeyFrameChoice::kNone || frames_since_keyframe_ < options_.frames_between_keyframes) return;
+  OfferKeyFrame(choice, frame, result.camera_from_map, out.matches);
+}
+
+void Tracker::OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rigid3& camera_from_map,
+                            const std::vector<PointMatch>& matches) {
+  KeyFrameCandidate candidate;
+  candidate.choice = choice;
+  candidate.panorama = map_tracker_.panorama();
+  candidate.time = frame.time;
+  if (map_) {
+    candidate.map_revision = map_->revision;
+    candidate.surroundings = Surroundings(*map_, matches);
+  }
+  candidate.camera = camera_;
+  candidate.features = features_;
+  candidate.camera_from_map = camera_from_map;
+  for (const PointMatch& match : matches) {
+    if (match.inlier) candidate.matches.push_back(match);
+  }
+  candidate_ = std::move(candidate);
+  selector_.Offered(choice, frame.time);
+}
+
+void Tracker::CollectReports() {
+  if (!options_.build_maps) return;
+  const auto earlier = [](const PointReport& a, const PointReport& b) { return a.point < b.point; };
+  const std::size_t known = reports_.size();
+  for (const MapTracker::Attempt& attempt : map_tracker_.attempts()) {
+    const PointReport wanted{.point = attempt.point};
+    const auto end = reports_.begin() + static_cast<std::ptrdiff_t>(known);
+    auto report = std::lower_bound(reports_.begin(), end, wanted, earlier);
+    // Each point is attempted once, so that new ones need not be looked for among the new.
+    if (report == end || report->point != attempt.point) report = reports_.insert(reports_.end(), wanted);
+    if (attempt.inlier) {
+      ++report->inlier;
+    } else if (attempt.found) {
+      ++report->outlier;
+    } else {
+      ++report->not_found;
+    }
+  }
+  if (reports_.size() > known) std::sort(reports_.begin(), reports_.end(), earlier);
+}
+
+std::optional<KeyFrameCandidate> Tracker::TakeKeyFrameCandidate() {
+  if (candidate_) frames_since_keyframe_ = 0;
+  return std::exchange(candidate_, std::nullopt);
+}
+
+std::optional<InitialPair> Tracker::TakeInitialPair() {
+  return std::exchange(pair_, std::nullopt);
+}
+
+std::vector<PointReport> Tracker::TakeReports() {
+  return std::exchange(reports_, {});
+}
+
+}  // namespace docent::engine
