@@ -68,9 +68,10 @@ LoopCloser::Progress LoopCloser::DoStep(Map* map) {
   std::vector<LoopSighting> sightings = finder_.Look(to_look_.front(), map, &searcher_);
   to_look_.pop_front();
   if (sightings.empty()) return Progress::kWorked;
-  loop_.emplace();
-  loop_->graph = MakeLoopGraph(options_.correction, sightings, map);
-  loop_->sightings = std::move(sightings);
+  Loop found;
+  found.graph = MakeLoopGraph(options_.correction, sightings, map);
+  found.sightings = std::move(sightings);
+  loop_ = std::move(found);
   return Progress::kWorked;
 }
 
