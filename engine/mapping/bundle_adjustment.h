@@ -44,8 +44,8 @@ struct BundleOptions {
   // normalised residuals' standard deviation, never below min_sigma. 4.685 is Tukey's 95 % efficiency.
   double threshold_factor = 4.685;
   double min_sigma = 0.4;
-  // Stops within about a millisecond when this becomes true, wherever it is; what was reached is kept when it
-  // is better than the start. May be null.
+  // Stops when this becomes true, which is looked at every few points and before each product of panels; what
+  // was reached is kept when it is better than the start. May be null.
   const std::atomic<bool>* interrupt = nullptr;
 };
 
