@@ -35,17 +35,17 @@ Eigen::AlignedBox2d Extent(const std::vector<Eigen::Vector2d>& cameras,
   return box;
 }
 
-void DrawScaleBar(double pixels_a_metre, int margin_px, cv::Mat* sheet) {
+void DrawScaleBar(double pixels_a_unit, int margin_px, cv::Mat* sheet) {
   // The longest of 1, 2, 5 times a power of ten that takes at most a third of the width.
-  const double most = sheet->cols / 3.0 / pixels_a_metre;
+  const double most = sheet->cols / 3.0 / pixels_a_unit;
   const double power = std::pow(10.0, std::floor(std::log10(most)));
-  const double metres = most >= 5 * power ? 5 * power : most >= 2 * power ? 2 * power : power;
+  const double length = most >= 5 * power ? 5 * power : most >= 2 * power ? 2 * power : power;
   const int y = sheet->rows - margin_px / 2;
-  const int length = static_cast<int>(std::lround(metres * pixels_a_metre));
-  cv::line(*sheet, {margin_px, y}, {margin_px + length, y}, kInk, 2, cv::LINE_AA);
+  const int length_px = static_cast<int>(std::lround(length * pixels_a_unit));
+  cv::line(*sheet, {margin_px, y}, {margin_px + length_px, y}, kInk, 2, cv::LINE_AA);
   char text[32];
-  std::snprintf(text, sizeof text, "%g m", metres);
-  cv::putText(*sheet, text, {margin_px + length + 8, y + 5}, cv::FONT_HERSHEY_SIMPLEX, 0.45, kInk, 1,
+  std::snprintf(text, sizeof text, "%g units", length);
+  cv::putText(*sheet, text, {margin_px + length_px + 8, y + 5}, cv::FONT_HERSHEY_SIMPLEX, 0.45, kInk, 1,
               cv::LINE_AA);
 }
 

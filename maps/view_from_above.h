@@ -21,8 +21,8 @@ Eigen::Matrix<double, 2, 3> SheetFromMap(const engine::MapSnapshot& map, const E
 
 // The plan of a map: its finite points seen along `up` (unit length, in the map), its keyframes as small
 // triangles that point where they look (the first red, panorama keyframes green, the others blue), and a bar
-// of a round length of the map's metres. CV_8UC3 in BGR. A pure function; a map without keyframes gives an
-// empty sheet.
+// of a round length in units of the map, which are metres only where it was started from something of known
+// width. CV_8UC3 in BGR. A pure function; a map without keyframes gives an empty sheet.
 cv::Mat DrawFromAbove(const engine::MapSnapshot& map, const Eigen::Vector3d& up,
                       const ViewFromAboveOptions& options = {});
 

@@ -119,10 +119,7 @@ class Drawing {
   Canvas* canvas_;
 };
 
-void DrawCaption(const engine::MapSnapshot& map, const std::string& title, double grid_m, Canvas* canvas) {
-  char counts[160];
-  std::snprintf(counts, sizeof counts, "%zu points, %zu keyframes, grid %g m", map.points.size(),
-                map.keyframes.size(), grid_m);
+void DrawCaption(const std::string& title, const std::string& counts, Canvas* canvas) {
   TextStyle title_style;
   title_style.size_px = 20;
   title_style.bold = true;
@@ -152,6 +149,13 @@ engine::Rigid3 CameraFromMap(const Orbit& orbit) {
   rotation.row(2) = forward;
   const Eigen::Vector3d eye = orbit.target - orbit.distance_m * forward;
   return {engine::Rotation3(rotation), -(rotation * eye)};
+}
+
+std::string MapViewCounts(const engine::MapSnapshot& map, double grid) {
+  char counts[160];
+  std::snprintf(counts, sizeof counts, "%zu points, %zu keyframes, grid of %g units", map.points.size(),
+                map.keyframes.size(), grid);
+  return counts;
 }
 
 Color ShareColor(double share) {
@@ -208,18 +212,18 @@ void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, 
   const RenderTarget& target = impl_->picture.Bind(width_px, height_px);
   impl_->picture.DrawVideo(cv::Mat());
   const engine::Rigid3 camera_from_map = CameraFromMap(orbit);
-  const double grid_m = RoundLength(std::max(1e-6, 0.25 * orbit.distance_m * kHalfViewHeight));
+  const double grid = RoundLength(std::max(1e-6, 0.25 * orbit.distance_m * kHalfViewHeight));
 
   impl_->below.Begin(width_px, height_px);
   Drawing drawing(impl_->camera, camera_from_map, &impl_->below);
-  drawing.Grid(orbit, grid_m);
+  drawing.Grid(orbit, grid);
   for (const FoundAgain& found : found_again) drawing.Wedge(found);
   drawing.Points(map);
   DrawKeyFrames(map, impl_->camera, camera_from_map, &impl_->below);
   impl_->below.End();
   if (scene != nullptr) impl_->content.Draw(impl_->camera, camera_from_map, *scene, 0.0, target);
   impl_->above.Begin(width_px, height_px);
-  DrawCaption(map, title, grid_m, &impl_->above);
+  DrawCaption(title, MapViewCounts(map, grid), &impl_->above);
   target.BindForDrawing();
   impl_->above.End();
 }

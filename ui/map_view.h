@@ -30,6 +30,10 @@ engine::Rigid3 CameraFromMap(const Orbit& orbit);
 // these proportions, from above.
 Orbit OrbitAbove(const engine::MapSnapshot& map, double width_over_height = 4.0 / 3.0);
 
+// What stands below the title: how much the map has, and how wide the grid is. In units of the map, which are
+// metres only where it was started from something of known width; a map does not know of that.
+std::string MapViewCounts(const engine::MapSnapshot& map, double grid);
+
 struct MapViewOptions {
   int width_px = 960, height_px = 720;
   int samples = 4;

@@ -118,7 +118,7 @@ void PrintRelocalization(const Json& json) {
               json["wrong"].dump().c_str());
   if (!json.contains("grid")) return;
   std::printf("%-20s %s\n", "missed_keyframes", json["missed_keyframes"].dump().c_str());
-  std::printf("%-20s squares of %.3g m; right, ahead and direction seen from the first keyframe\n", "",
+  std::printf("%-20s squares of %.3g units; right, ahead and direction seen from the first keyframe\n", "",
               json["square_m"].get<double>());
   for (const Json& cell : json["grid"]) {
     std::printf("%-20s right %3d  ahead %3d  %4d deg  %d of %d\n", "", cell["right"].get<int>(),

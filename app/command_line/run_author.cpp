@@ -19,6 +19,19 @@ bool AnyLive(const std::vector<CalibratedCamera>& cameras) {
                      [](const CalibratedCamera& camera) { return camera.source->info().live; });
 }
 
+// What both ways of guiding are told alike.
+void TakeOver(const RunArguments& run, bool any_live, GuideRequest* request) {
+  request->pace = ResolvePace(run, any_live);
+  request->engine = run.engine;
+  request->baseline_m = run.baseline_m;
+  request->head = run.head;
+  request->headless = run.headless;
+  request->seed = run.seed;
+  request->memory_budget_bytes = run.memory_budget_bytes;
+  request->output = run.output;
+  request->record = run.record;
+}
+
 std::shared_ptr<const engine::PlanarTarget> ReadTarget(const std::filesystem::path& path, double width_m) {
   std::vector<std::uint8_t> bytes;
   cv::Mat picture = ReadPicture(path, &bytes);
@@ -46,16 +59,8 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   maps::Library library =
       maps::Library::Open(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   request.library = &library;
-  request.pace = ResolvePace(options.run, AnyLive(cameras));
-  request.engine = options.run.engine;
-  request.baseline_m = options.run.baseline_m;
-  request.head = options.run.head;
-  request.headless = options.run.headless;
-  request.seed = options.run.seed;
-  request.memory_budget_bytes = options.run.memory_budget_bytes;
+  TakeOver(options.run, AnyLive(cameras), &request);
   request.autosave_interval = options.autosave_interval;
-  request.output = options.run.output;
-  request.record = options.run.record;
   request.record_script = options.record_script;
   const auto maps = RunGuide(request, cameras, verbosity);
   if (verbosity == Verbosity::kQuiet) return;
@@ -72,15 +77,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   GuideRequest request;
   request.library = &library;
   request.title = "Docent - tour";
-  request.pace = ResolvePace(options.run, AnyLive(cameras));
-  request.engine = options.run.engine;
-  request.baseline_m = options.run.baseline_m;
-  request.head = options.run.head;
-  request.headless = options.run.headless;
-  request.seed = options.run.seed;
-  request.memory_budget_bytes = options.run.memory_budget_bytes;
-  request.output = options.run.output;
-  request.record = options.run.record;
+  TakeOver(options.run, AnyLive(cameras), &request);
   std::uint64_t frames = 0, named = 0;
   request.on_frame = [&](const ShownFrame& frame) {
     ++frames;

@@ -29,6 +29,35 @@ cv::Mat Frieze(cv::Size size, int side, Random* random) {
   return canvas;
 }
 
+// A walk about the middle: where the eye is and where it looks go around on ellipses with these half axes
+// along x and z.
+struct Round {
+  int steps = 1, beyond = 0;  // of a whole round, and of the part of it that is walked a second time
+  double step_s = 1;
+  Eigen::Vector2d eye, gaze;
+  double gaze_height = 0;
+};
+void Walk(const Round& round, Trajectory* trajectory) {
+  trajectory->BeginSegment("loop");
+  for (int i = 0; i <= round.steps + round.beyond; ++i) {
+    const double angle = -kTau / 4 + kTau * i / round.steps;
+    const double right = std::cos(angle), ahead = std::sin(angle);
+    if (i == round.steps) trajectory->BeginSegment("revisit");
+    trajectory->LookFrom({round.eye.x() * right, -1.55, round.eye.y() * ahead},
+                         {round.gaze.x() * right, -round.gaze_height, round.gaze.y() * ahead}, round.step_s);
+  }
+}
+
+// A round wall of flat panels, painted once around. rim(angle): its upper edge.
+template <typename Rim>
+void AddRoundWall(int panels, const Rim& rim, double height, int texture, Surfaces* surfaces) {
+  for (int i = 0; i < panels; ++i) {
+    const Eigen::Vector3d a = rim(kTau * i / panels), b = rim(kTau * (i + 1) / panels);
+    surfaces->AddRectangle(a, b - a, {0, height, 0}, texture,
+                           {static_cast<double>(i) / panels, 0, static_cast<double>(i + 1) / panels, 1});
+  }
+}
+
 // Two by three cabinets back to back, fronts outwards, and once around them.
 void BuildCabinets(Random* random, Scene* scene) {
   Surfaces& surfaces = scene->surfaces;
@@ -48,40 +77,22 @@ void BuildCabinets(Random* random, Scene* scene) {
     }
   }
   scene->places.push_back({"block", {0, -1.05, 0}});
-  Trajectory& trajectory = scene->trajectory;
-  trajectory.BeginSegment("loop");
-  constexpr int kSteps = 60, kBeyond = 10;
-  for (int i = 0; i <= kSteps + kBeyond; ++i) {
-    const double angle = -kTau / 4 + kTau * i / kSteps;
-    if (i == kSteps) trajectory.BeginSegment("revisit");
-    trajectory.LookFrom({3.1 * std::cos(angle), -1.55, 2.7 * std::sin(angle)},
-                        {0.5 * std::cos(angle), -1.1, 0.1 * std::sin(angle)}, 0.5);
-  }
+  Walk({.steps = 60, .beyond = 10, .step_s = 0.5, .eye = {3.1, 2.7}, .gaze = {0.5, 0.1}, .gaze_height = 1.1},
+       &scene->trajectory);
 }
 
 // A round tower up to the ceiling, painted all over, and once around it, close by: nothing that is seen in
 // one place is seen again before the camera is back there.
 void BuildTower(Random* random, Scene* scene) {
   constexpr double kRadius = 2.2, kHeight = 3.2, kWay = 3.4;
-  constexpr int kPanels = 72;
   const int texture = scene->surfaces.AddTexture(Frieze({4096, 1024}, 512, random));
-  for (int i = 0; i < kPanels; ++i) {
-    const double from = kTau * i / kPanels, to = kTau * (i + 1) / kPanels;
-    const Eigen::Vector3d a(kRadius * std::cos(from), -kHeight, kRadius * std::sin(from));
-    const Eigen::Vector3d b(kRadius * std::cos(to), -kHeight, kRadius * std::sin(to));
-    scene->surfaces.AddRectangle(
-        a, b - a, {0, kHeight, 0}, texture,
-        {static_cast<double>(i) / kPanels, 0, static_cast<double>(i + 1) / kPanels, 1});
-  }
+  const auto rim = [](double angle) {
+    return Eigen::Vector3d(kRadius * std::cos(angle), -kHeight, kRadius * std::sin(angle));
+  };
+  AddRoundWall(72, rim, kHeight, texture, &scene->surfaces);
   scene->places.push_back({"tower", {0, -1.5, -kRadius}});
-  Trajectory& trajectory = scene->trajectory;
-  trajectory.BeginSegment("loop");
-  constexpr int kSteps = 88, kBeyond = 14;
-  for (int i = 0; i <= kSteps + kBeyond; ++i) {
-    const double angle = -kTau / 4 + kTau * i / kSteps;
-    if (i == kSteps) trajectory.BeginSegment("revisit");
-    trajectory.LookFrom({kWay * std::cos(angle), -1.55, kWay * std::sin(angle)}, {0, -1.5, 0}, 0.3);
-  }
+  Walk({.steps = 88, .beyond = 14, .step_s = 0.3, .eye = {kWay, kWay}, .gaze = {0, 0}, .gaze_height = 1.5},
+       &scene->trajectory);
 }
 
 }  // namespace
@@ -92,16 +103,11 @@ Scene BuildCylinder(const SceneRequest& request) {
   scene.trajectory = Trajectory(random.Next());
   // Ninety panels: nowhere more than 0.3 mm inside the round wall, and the truth is that of the panels.
   constexpr double kRadius = 0.5, kHeight = 0.8;
-  constexpr int kPanels = 90;
   const int texture = scene.surfaces.AddTexture(Frieze({4096, 1024}, 512, &random));
-  for (int i = 0; i < kPanels; ++i) {
-    const double from = kTau * i / kPanels, to = kTau * (i + 1) / kPanels;
-    const Eigen::Vector3d a(kRadius * std::sin(from), -kHeight / 2, kRadius * std::cos(from));
-    const Eigen::Vector3d b(kRadius * std::sin(to), -kHeight / 2, kRadius * std::cos(to));
-    scene.surfaces.AddRectangle(
-        a, b - a, {0, kHeight, 0}, texture,
-        {static_cast<double>(i) / kPanels, 0, static_cast<double>(i + 1) / kPanels, 1});
-  }
+  const auto rim = [](double angle) {
+    return Eigen::Vector3d(kRadius * std::sin(angle), -kHeight / 2, kRadius * std::cos(angle));
+  };
+  AddRoundWall(90, rim, kHeight, texture, &scene.surfaces);
   scene.places.push_back({"cylinder", {0, 0, kRadius}});
   // 64 degrees across, without distortion, as in the paper.
   engine::CameraModel::Intrinsics intrinsics{640, 480, 0, 0, 319.5, 239.5};

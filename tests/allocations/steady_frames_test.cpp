@@ -15,17 +15,12 @@ namespace docent::engine {
 namespace {
 
 using testing_allocations::AllocationsOfThisThread;
+using testing_world::Camera;
 using testing_world::CameraAt;
-using testing_world::RenderedWorld;
+using testing_world::World;
 
 constexpr int kFrames = 24;  // of one sway to the side and back
-constexpr double kFramesASecond = 30;
 constexpr std::uint64_t kKey = 1;
-
-const std::shared_ptr<const CameraModel>& Camera() {
-  static const auto camera = testing_world::PinholeCamera(320, 240);
-  return camera;
-}
 
 Rigid3 Pose(int frame) {
   const double phase = 2 * M_PI * frame / kFrames;
@@ -39,13 +34,12 @@ struct Scene {
 
 const Scene& TheScene() {
   static const Scene scene = [] {
-    const RenderedWorld world = RenderedWorld::Room(71);
     Scene made;
-    made.map = testing_world::TrueMap(world, Camera(),
+    made.map = testing_world::TrueMap(World(), Camera(),
                                       {CameraAt({-0.1, 0, 0}), CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0})})
                    .Snapshot();
     for (int i = 0; i < kFrames; ++i)
-      made.pictures.push_back(world.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i) + 1));
+      made.pictures.push_back(World().Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i) + 1));
     return made;
   }();
   return scene;
@@ -74,10 +68,8 @@ void ExpectNoAllocations(const TrackerOptions& options) {
   TrackedFrame tracked;
   constexpr int kWarmUp = 6 * kFrames;
   for (int i = 0; i < kWarmUp + kFrames; ++i) {
-    Frame frame;
-    frame.time = FromSeconds(i / kFramesASecond);
-    frame.index = static_cast<std::uint64_t>(i);
-    frame.picture = TheScene().pictures[static_cast<std::size_t>(i % kFrames)];
+    const Frame frame =
+        testing_world::MakeFrame(i, TheScene().pictures[static_cast<std::size_t>(i % kFrames)]);
     const std::size_t before = AllocationsOfThisThread();
     tracker.Track(frame, &places, &tracked);
     const std::size_t taken = AllocationsOfThisThread() - before;

@@ -12,7 +12,6 @@
 
 #include "app/cameras/frame_source.h"
 #include "app/session/calibrated_camera.h"
-#include "engine/mapping/mapper.h"
 
 namespace docent::bench {
 
@@ -41,26 +40,12 @@ void ReadPictures(BenchSequence* sequence) {
 
 // As a session in lockstep does.
 void MakeMap(BenchSequence* sequence) {
-  engine::Tracker tracker({}, sequence->camera, 1);
-  engine::Mapper mapper({});
-  tracker.StartNewMap();
+  engine::Lockstep lockstep({}, sequence->camera, 1);
   for (const engine::Frame& frame : sequence->frames) {
     std::optional<MapPlaces> places;
     if (sequence->map) places.emplace(sequence->map);
-    sequence->tracked.push_back(tracker.Track(frame, places ? &*places : nullptr));
-    if (auto pair = tracker.TakeInitialPair()) mapper.Start(std::move(*pair));
-    if (auto candidate = tracker.TakeKeyFrameCandidate()) {
-      mapper.Report(tracker.TakeReports());
-      mapper.Offer(std::move(*candidate));
-    }
-    for (int step = 0; step < 20 && !mapper.Settled(); ++step) mapper.Step();
-    mapper.Step();
-    for (const engine::MapperEvent& event : mapper.TakeEvents()) {
-      if (event.kind == engine::MapperEvent::Kind::kStartFailed) tracker.StartNewMap();
-    }
-    if (mapper.Snapshot() == sequence->map) continue;
-    sequence->map = mapper.Snapshot();
-    tracker.SetMap(sequence->map, MapPlaces::kKey);
+    sequence->tracked.push_back(lockstep.Feed(frame, places ? &*places : nullptr));
+    sequence->map = lockstep.map();
   }
 }
 

@@ -9,7 +9,7 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/map/map_snapshot.h"
 #include "engine/recognition/place.h"
-#include "engine/tracking/tracker.h"
+#include "tests/engine/lockstep.h"
 
 // What every benchmark measures on: grey pictures of one sequence in memory, and the map that tracker and
 // mapper, run in turn, made of them. The sequence is the folder or file that the environment variable
@@ -31,7 +31,7 @@ const BenchSequence& Sequence();
 // The keyframes of one map by their thumbnails, so that a second pass may enter it from anywhere.
 class MapPlaces : public engine::PlaceFinder {
  public:
-  static constexpr std::uint64_t kKey = 1;
+  static constexpr std::uint64_t kKey = engine::Lockstep::kMapKey;
   explicit MapPlaces(std::shared_ptr<const engine::MapSnapshot> map) : map_(std::move(map)) {}
   std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
                                                  std::uint64_t only_map) const override;

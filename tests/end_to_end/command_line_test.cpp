@@ -20,21 +20,9 @@ namespace docent::app {
 namespace {
 
 using ::testing::AllOf;
-using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::Not;
 using ::testing::StartsWith;
-
-// One clear line on standard error, nothing else, and that exit status.
-void ExpectComplaint(const std::vector<std::string>& arguments, int exit_status, const std::string& part) {
-  const Outcome outcome = RunDocent(arguments);
-  SCOPED_TRACE(testing::PrintToString(arguments));
-  EXPECT_EQ(outcome.exit_status, exit_status);
-  EXPECT_THAT(outcome.output, IsEmpty());
-  EXPECT_THAT(outcome.errors, AllOf(StartsWith("docent: "), HasSubstr(part), EndsWith("\n")));
-  EXPECT_EQ(std::count(outcome.errors.begin(), outcome.errors.end(), '\n'), 1) << outcome.errors;
-}
 
 TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
   const Outcome top = RunDocent({"--help"});

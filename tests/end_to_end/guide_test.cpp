@@ -27,15 +27,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::StartsWith;
-
-void ExpectOneLineAndStatus1(const std::vector<std::string>& arguments, const std::string& part) {
-  const Outcome outcome = RunDocent(arguments);
-  SCOPED_TRACE(testing::PrintToString(arguments));
-  EXPECT_EQ(outcome.exit_status, 1);
-  EXPECT_THAT(outcome.errors, AllOf(StartsWith("docent: "), HasSubstr(part)));
-  EXPECT_EQ(std::count(outcome.errors.begin(), outcome.errors.end(), '\n'), 1) << outcome.errors;
-}
 
 // A museum of two bays: where it is built and visited, and the script that authors it.
 struct Museum {
@@ -243,39 +234,41 @@ TEST(Guide, LeavesALibraryThatVerifiesWhenItIsKilledWhileAuthoring) {
 TEST(Guide, EndsWithOneLineWhenItsInputIsBad) {
   const TemporaryFolder folder;
   const std::string library = (folder / "l.docent").string(), output = (folder / "out").string();
-  ExpectOneLineAndStatus1({"evaluate", (folder / "nowhere").string(), "--output", output}, "nowhere");
+  const auto fails = [](const std::vector<std::string>& arguments, const std::string& part) {
+    ExpectComplaint(arguments, 1, part);
+  };
+  fails({"evaluate", (folder / "nowhere").string(), "--output", output}, "nowhere");
   const auto video = folder.Write("cut.mp4", std::string("\0\0\0\x20"
                                                          "ftypisom\0\0\2\0isomiso2",
                                                          24));
   const auto calibration = folder.Write("c.yaml", "width: 640\nheight: 480\nfy: 500\ncx: 320\ncy: 240\n");
-  ExpectOneLineAndStatus1({"evaluate", video.string(), "--output", output}, "cut.mp4");
-  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
-                           "--calibration", calibration.string()},
-                          "fx");
+  fails({"evaluate", video.string(), "--output", output}, "cut.mp4");
+  fails({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless", "--calibration",
+         calibration.string()},
+        "fx");
   const auto damaged = folder.Write("damaged.docent", std::string(5000, 'x'));
-  ExpectOneLineAndStatus1(
-      {"tour", "--library", damaged.string(), "--camera", "sim:cylinder:20", "--headless"}, "damaged.docent");
-  ExpectOneLineAndStatus1(
-      {"tour", "--library", (folder / "none.docent").string(), "--camera", "sim:cylinder:20", "--headless"},
-      "none.docent");
+  fails({"tour", "--library", damaged.string(), "--camera", "sim:cylinder:20", "--headless"},
+        "damaged.docent");
+  fails({"tour", "--library", (folder / "none.docent").string(), "--camera", "sim:cylinder:20", "--headless"},
+        "none.docent");
   folder.Write("hostile.gltf", R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":4000000000,
       "uri":"../../../etc/passwd"}],"bufferViews":[{"buffer":0,"byteLength":4000000000}]})");
   const auto script = folder.Write("hostile.txt", "0 map new A\n1 place hostile.gltf at pixel 320 240\n");
-  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
-                           "--script", script.string()},
-                          "line 2");
+  fails({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless", "--script",
+         script.string()},
+        "line 2");
   const std::string target = (folder / "poster.png").string();
-  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
-                           "--target", target, "--target-width", "0.4"},
-                          "poster.png");
+  fails({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless", "--target", target,
+         "--target-width", "0.4"},
+        "poster.png");
   cv::imwrite(target, cv::Mat(300, 400, CV_8UC1, cv::Scalar(200)));
-  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
-                           "--target", target, "--target-width", "0.4"},
-                          "too little detail");
+  fails({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless", "--target", target,
+         "--target-width", "0.4"},
+        "too little detail");
   const auto early = folder.Write("early.txt", "0 map new A\n0.1 signpost \"x\" at pixel 320 240\n");
-  ExpectOneLineAndStatus1({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless",
-                           "--script", early.string()},
-                          "early.txt, line 2");
+  fails({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless", "--script",
+         early.string()},
+        "early.txt, line 2");
 }
 
 }  // namespace

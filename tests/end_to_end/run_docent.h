@@ -2,7 +2,7 @@
 #pragma once
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -57,6 +57,18 @@ inline Outcome RunDocent(const std::vector<std::string>& arguments) {
 }
 
 // Of frames.csv, by column.
+// One clear line on standard error, nothing else, and that exit status.
+inline void ExpectComplaint(const std::vector<std::string>& arguments, int exit_status,
+                            const std::string& part) {
+  const Outcome outcome = RunDocent(arguments);
+  SCOPED_TRACE(testing::PrintToString(arguments));
+  EXPECT_EQ(outcome.exit_status, exit_status);
+  EXPECT_THAT(outcome.output, ::testing::IsEmpty());
+  EXPECT_THAT(outcome.errors, ::testing::AllOf(::testing::StartsWith("docent: "), ::testing::HasSubstr(part),
+                                               ::testing::EndsWith("\n")));
+  EXPECT_EQ(std::count(outcome.errors.begin(), outcome.errors.end(), '\n'), 1) << outcome.errors;
+}
+
 using Row = std::map<std::string, std::string>;
 
 inline std::vector<Row> ReadFrames(const std::filesystem::path& path) {

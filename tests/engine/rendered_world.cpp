@@ -237,8 +237,31 @@ std::shared_ptr<const CameraModel> PinholeCamera(int width_px, int height_px) {
       std::array<double, 5>{});
 }
 
+const std::shared_ptr<const CameraModel>& Camera() {
+  static const auto camera = PinholeCamera(320, 240);
+  return camera;
+}
+
+const RenderedWorld& World() {
+  static const RenderedWorld world = RenderedWorld::Room(71);
+  return world;
+}
+
 Rigid3 CameraAt(const Eigen::Vector3d& center, const Eigen::Vector3d& turn_deg) {
   return Rigid3(Rotation3::Exp(turn_deg * std::numbers::pi / 180), center).inverse();
+}
+
+Frame MakeFrame(int index, const cv::Mat& picture) {
+  Frame frame;
+  frame.time = FromSeconds(index / 30.0);
+  frame.index = static_cast<std::uint64_t>(index);
+  frame.picture = picture;
+  return frame;
+}
+
+Frame MakeFrame(int index, const RenderedWorld& world, const Rigid3& camera_from_world) {
+  const std::uint64_t noise_seed = static_cast<std::uint64_t>(index) + 1;
+  return MakeFrame(index, world.Render(*Camera(), camera_from_world, 1.5, noise_seed));
 }
 
 KeyFrame MakeKeyFrame(const RenderedWorld& world, const std::shared_ptr<const CameraModel>& camera,

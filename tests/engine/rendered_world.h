@@ -13,6 +13,7 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 #include "engine/map/map.h"
+#include "engine/tracking/tracked_frame.h"
 
 // A small painted world for the engine's tests: a few flat walls, seen through a CameraModel by casting rays,
 // so that every pixel's true place is known. World frame x right, y down, z forward, metres.
@@ -70,8 +71,17 @@ Wall PaintedWall(const Eigen::Vector3d& center, const Eigen::Vector3d& right, co
 // A pinhole camera with a picture 77 degrees across.
 std::shared_ptr<const CameraModel> PinholeCamera(int width_px, int height_px);
 
+// What most tests look through and at, made once: a camera of 320x240 pixels, and a room.
+const std::shared_ptr<const CameraModel>& Camera();
+const RenderedWorld& World();
+
 // The pose of a camera at a place, turned by a rotation vector in degrees (world_from_camera).
 Rigid3 CameraAt(const Eigen::Vector3d& center, const Eigen::Vector3d& turn_deg = Eigen::Vector3d::Zero());
+
+// The picture of that number, of a camera that takes thirty a second.
+Frame MakeFrame(int index, const cv::Mat& picture);
+// The same, of what Camera() shows from a pose, with the noise that a sensor has.
+Frame MakeFrame(int index, const RenderedWorld& world, const Rigid3& camera_from_world);
 
 KeyFrame MakeKeyFrame(const RenderedWorld& world, const std::shared_ptr<const CameraModel>& camera,
                       const Rigid3& camera_from_world);

@@ -17,21 +17,28 @@ class SomeMaps : public PlaceFinder {
  public:
   void Add(std::uint64_t key, std::shared_ptr<const MapSnapshot> map) { maps_[key] = std::move(map); }
   const std::shared_ptr<const MapSnapshot>& At(std::uint64_t key) const { return maps_.at(key); }
-  std::vector<PlaceCandidate> FindPlaces(const PlaceQuery& query, int count, int,
+  std::vector<PlaceCandidate> FindPlaces(const PlaceQuery& query, int count, int per_map,
                                          std::uint64_t only_map) const override {
     std::vector<PlaceCandidate> found;
     for (const auto& [key, map] : maps_) {
       if (only_map != 0 && only_map != key) continue;
+      std::vector<PlaceCandidate> of_map;
       for (const KeyFrame& keyframe : map->keyframes)
-        found.push_back({key, map, keyframe.id, Difference(keyframe.features->small_blurry, *query.image)});
+        of_map.push_back({key, map, keyframe.id, Difference(keyframe.features->small_blurry, *query.image)});
+      KeepMostAlike(per_map, &of_map);
+      found.insert(found.end(), of_map.begin(), of_map.end());
     }
-    std::sort(found.begin(), found.end(),
-              [](const auto& a, const auto& b) { return a.difference < b.difference; });
-    found.resize(std::min<std::size_t>(found.size(), static_cast<std::size_t>(count)));
+    KeepMostAlike(count, &found);
     return found;
   }
 
  private:
+  static void KeepMostAlike(int count, std::vector<PlaceCandidate>* found) {
+    std::sort(found->begin(), found->end(),
+              [](const auto& a, const auto& b) { return a.difference < b.difference; });
+    found->resize(std::min(found->size(), static_cast<std::size_t>(count)));
+  }
+
   std::map<std::uint64_t, std::shared_ptr<const MapSnapshot>> maps_;
 };
 

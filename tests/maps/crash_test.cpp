@@ -32,7 +32,7 @@ TEST(AuthorProcess, SavesRoundAfterRoundUntilItIsKilled) {
   const char* file = std::getenv(kFileVariable);
   if (!file) GTEST_SKIP() << "runs only as the second process of other tests";
   const int pipe = std::atoi(std::getenv(kPipeVariable));
-  Library library = Library::Open(file, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+  Library library = OpenToWrite(file);
   const auto maps = library.List();
   const std::uint64_t key = maps.empty() ? library.NewKey() : maps.front().key;
   for (std::uint64_t round = maps.empty() ? 1 : maps.front().revision + 1;; ++round) {
@@ -129,7 +129,7 @@ TEST(TwoProcesses, AVisitorSeesWholeSavesWhileAnAuthorWrites) {
   const auto file = folder / "a.docent";
   Author author(file);
   ASSERT_EQ(author.WaitForSave(), 1u);
-  const Library visitor = Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  const Library visitor = OpenToRead(file);
   std::uint64_t last = 0;
   for (int visits = 0; visits < 25; ++visits) {
     const std::uint64_t told = author.WaitForSave();
@@ -155,7 +155,7 @@ TEST(TwoProcesses, TwoToursSeeWholeSavesWhileAnAuthorWrites) {
       std::uint64_t last = 0;
       for (int visit = 0; visit < visits; ++visit) {
         // One stays, the other comes and goes.
-        const Library library = Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+        const Library library = OpenToRead(file);
         for (int look = 0; look < (tour == 0 ? 5 : 1); ++look) {
           const StoredMap stored = library.Load(library.List().front().key);
           EXPECT_GE(stored.info.revision, last);
@@ -175,7 +175,7 @@ TEST(TwoProcesses, TwoToursSeeWholeSavesWhileAnAuthorWrites) {
   while (!done && author.WaitForSave() != 0) continue;
   tours.clear();
   const std::uint64_t told = author.Kill();
-  const Library library = Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  const Library library = OpenToRead(file);
   EXPECT_GE(library.List().front().revision, told);
   EXPECT_TRUE(library.Verify().empty());
 }
@@ -185,14 +185,14 @@ TEST(TwoProcesses, AFileThatWasClosedStandsAlone) {
   const auto file = folder / "a.docent";
   std::uint64_t key = 0;
   {
-    Library library = Library::Open(file, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+    Library library = OpenToWrite(file);
     key = library.NewKey();
     library.Save({key, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
   }
   EXPECT_EQ(FilesIn(folder.path()), "a.docent");
   const Bytes before = ReadWholeFile(file);
   {
-    const Library visitor = Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+    const Library visitor = OpenToRead(file);
     EXPECT_EQ(FirstDifference(*visitor.Load(key).snapshot, *MakeSampleMap(1)), "");
     EXPECT_EQ(FilesIn(folder.path()), "a.docent") << "while it is open";
   }
@@ -204,10 +204,10 @@ TEST(TwoProcesses, AFileThatWasLeftInLogModeIsReadWithoutANewFileBesideIt) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   Author(file).WaitForSave();  // killed: header says log
-  Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  OpenToRead(file);
   {
     // A visitor keeps the log from being tidied away; what it holds moves into the file all the same.
-    const Library visitor = Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+    const Library visitor = OpenToRead(file);
     EXPECT_EQ(visitor.List().size(), 1u);
     Library author = Library::Open(file, Access::kReadWrite, CreateIfMissing::kNo, QuickOptions());
     author.Rename(author.List().front().key, "Table");
@@ -216,8 +216,7 @@ TEST(TwoProcesses, AFileThatWasLeftInLogModeIsReadWithoutANewFileBesideIt) {
   std::filesystem::copy_file(file, folder / "copy/a.docent");
   std::filesystem::permissions(folder / "copy",
                                std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
-  const Library copy =
-      Library::Open(folder / "copy/a.docent", Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  const Library copy = OpenToRead(folder / "copy/a.docent");
   const auto maps = copy.List();
   ASSERT_EQ(maps.size(), 1u);
   EXPECT_EQ(maps[0].name, "Table");

@@ -19,16 +19,9 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-Library Create(const std::filesystem::path& path) {
-  return Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
-}
-Library OpenToRead(const std::filesystem::path& path) {
-  return Library::Open(path, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
-}
-
 TEST(Exchange, AMapGoesToAnotherLibraryWithAllThatBelongsToIt) {
   const TemporaryFolder folder;
-  Library museum = Create(folder / "museum.docent");
+  Library museum = OpenToWrite(folder / "museum.docent");
   const auto desk = MakeSampleMap(1, {.keyframes = 6});
   const auto scene = MakeSampleScene(3, 2);
   museum.Save({museum.NewKey(), "Door", Policy::kOpen, MakeSampleMap(2), nullptr});
@@ -37,7 +30,7 @@ TEST(Exchange, AMapGoesToAnotherLibraryWithAllThatBelongsToIt) {
   ExportMap(museum, key, folder / "desk.docent");
   EXPECT_THAT(ErrorOf([&] { ExportMap(museum, key, folder / "desk.docent"); }), HasSubstr("exists already"));
 
-  Library other = Create(folder / "other.docent");
+  Library other = OpenToWrite(folder / "other.docent");
   const Library exported = OpenToRead(folder / "desk.docent");
   ASSERT_EQ(exported.List().size(), 1u);
   EXPECT_EQ(ImportMaps(exported, folder / "other.docent").at(0).name, "Desk");
@@ -55,7 +48,7 @@ TEST(Exchange, AMapGoesToAnotherLibraryWithAllThatBelongsToIt) {
 
 TEST(Exchange, ALongNameStaysWithinItsLimitAndWhole) {
   const TemporaryFolder folder;
-  Library museum = Create(folder / "museum.docent");
+  Library museum = OpenToWrite(folder / "museum.docent");
   std::string name;
   while (name.size() + 2 <= kMaxMapNameBytes) name += "\xC3\xBC";
   museum.Save({museum.NewKey(), name, Policy::kOpen, nullptr, nullptr});
@@ -68,7 +61,7 @@ TEST(Exchange, ALongNameStaysWithinItsLimitAndWhole) {
 TEST(Exchange, NothingIsWrittenOfALibraryThatIsDamaged) {
   const TemporaryFolder folder;
   {
-    Library museum = Create(folder / "museum.docent");
+    Library museum = OpenToWrite(folder / "museum.docent");
     for (const char* name : {"Desk", "Door"})
       museum.Save({museum.NewKey(), name, Policy::kOpen, MakeSampleMap(1), nullptr});
   }
@@ -81,7 +74,7 @@ TEST(Exchange, NothingIsWrittenOfALibraryThatIsDamaged) {
 
 TEST(Exchange, NothingIsLeftOfAnExportThatFails) {
   const TemporaryFolder folder;
-  Library museum = Create(folder / "museum.docent");
+  Library museum = OpenToWrite(folder / "museum.docent");
   EXPECT_THROW(ExportMap(museum, 77, folder / "desk.docent"), Error);
   EXPECT_THROW(ExportMap(museum, 77, folder / "nowhere/desk.docent"), Error);
   EXPECT_EQ(FilesIn(folder.path()).find("desk"), std::string::npos);

@@ -147,7 +147,7 @@ TEST(SmallDisk, ThatFillsUpIsToldAndNothingIsLost) {
 TEST(FileSizeLimit, IsToldAndNothingIsLost) {
   const TemporaryFolder folder;
   const std::filesystem::path file = folder / "a.docent";
-  Library library = Library::Open(file, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+  Library library = OpenToWrite(file);
   library.Save({library.NewKey(), "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);
   rlimit limit{};

@@ -16,13 +16,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-Library Create(const std::filesystem::path& path) {
-  return Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
-}
-Library OpenToRead(const std::filesystem::path& path) {
-  return Library::Open(path, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
-}
-
 TEST(Library, GivesBackWhatWasSavedFieldByField) {
   const TemporaryFolder folder;
   const auto desk = MakeSampleMap(1);
@@ -30,7 +23,7 @@ TEST(Library, GivesBackWhatWasSavedFieldByField) {
   const auto scene = MakeSampleScene(7, 3);
   std::uint64_t desk_key = 0, door_key = 0;
   {
-    Library library = Create(folder / "a.docent");
+    Library library = OpenToWrite(folder / "a.docent");
     desk_key = library.NewKey();
     door_key = library.NewKey();
     library.Save({desk_key, "Desk", Policy::kOpen, desk, scene});
@@ -61,7 +54,7 @@ TEST(Library, GivesBackWhatWasSavedFieldByField) {
 
 TEST(Library, SharesOneCameraAmongTheKeyframesThatHaveIt) {
   const TemporaryFolder folder;
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
   library.Save({key, "Desk", Policy::kOpen, MakeSampleMap(1, {.keyframes = 6}), nullptr});
   const auto loaded = library.Load(key).snapshot;
@@ -91,7 +84,7 @@ TEST(Library, RebuildsTheFeaturesOfTheEngineFromTheStoredPictures) {
 
 TEST(Library, HoldsAMapWithoutKeyframes) {
   const TemporaryFolder folder;
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
   library.Save({key, "Nothing yet", Policy::kOpen, nullptr, nullptr});
   EXPECT_TRUE(library.Load(key).snapshot->keyframes.empty());
@@ -100,7 +93,7 @@ TEST(Library, HoldsAMapWithoutKeyframes) {
 
 TEST(Library, KeepsUpWithAMapThatGrowsShrinksAndMoves) {
   const TemporaryFolder folder;
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
   auto map = MakeSampleMap(1);
   library.Save({key, "Desk", Policy::kOpen, map, nullptr});
@@ -127,7 +120,7 @@ TEST(Library, KeepsUpWithAMapThatGrowsShrinksAndMoves) {
 
 TEST(Library, WritesLittleWhenOnlyPointsMoved) {
   const TemporaryFolder folder;
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
   const auto map = MakeSampleMap(1, {.keyframes = 4, .points = 20, .width_px = 640, .height_px = 480});
   library.Save({key, "Desk", Policy::kOpen, map, nullptr});
@@ -160,7 +153,7 @@ TEST(Library, NeverGivesAKeyTwiceEvenAfterAMapIsRemovedAndTheFileReopened) {
   const TemporaryFolder folder;
   std::uint64_t first = 0;
   {
-    Library library = Create(folder / "a.docent");
+    Library library = OpenToWrite(folder / "a.docent");
     first = library.NewKey();
     EXPECT_GE(first, 1u);
     library.Save({first, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
@@ -168,7 +161,7 @@ TEST(Library, NeverGivesAKeyTwiceEvenAfterAMapIsRemovedAndTheFileReopened) {
     EXPECT_TRUE(library.List().empty());
     EXPECT_TRUE(library.Verify().empty());
   }
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   EXPECT_GT(library.NewKey(), first);
   EXPECT_THAT(ErrorOf([&] {
                 library.Save({1000, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
@@ -182,7 +175,7 @@ TEST(Library, NeverGivesAKeyTwiceEvenAfterAMapIsRemovedAndTheFileReopened) {
 
 TEST(Library, RefusesTwoMapsOfOneNameAndNamesThatCannotBeShown) {
   const TemporaryFolder folder;
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t a = library.NewKey(), b = library.NewKey();
   library.Save({a, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
   const MapRecord twin{b, "Desk", Policy::kOpen, MakeSampleMap(2), nullptr};
@@ -199,7 +192,7 @@ TEST(Library, RefusesTwoMapsOfOneNameAndNamesThatCannotBeShown) {
 
 TEST(Library, ASaveOnItsWayDoesNotUndoANewNameOrPolicy) {
   const TemporaryFolder folder;
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
   library.Save({key, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
   library.Rename(key, "Table");
@@ -211,7 +204,7 @@ TEST(Library, ASaveOnItsWayDoesNotUndoANewNameOrPolicy) {
 
 TEST(Library, KeepsAnAssetOnceHoweverManyScenesShowItAndDropsItWithTheLast) {
   const TemporaryFolder folder;
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t a = library.NewKey(), b = library.NewKey();
   auto scene = std::make_shared<SceneRecord>();
   scene->text = "shared";
@@ -236,7 +229,7 @@ TEST(Library, KeepsAnAssetOnceHoweverManyScenesShowItAndDropsItWithTheLast) {
 
 TEST(Library, RefusesOtherBytesUnderTheIdOfAnAsset) {
   const TemporaryFolder folder;
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
   auto scene = std::make_shared<SceneRecord>();
   scene->assets = {MakeSampleAsset(1, 100)};
@@ -253,7 +246,7 @@ TEST(Library, RefusesOtherBytesUnderTheIdOfAnAsset) {
 
 TEST(Library, RefusesAMapThatIsNotConsistentAndKeepsTheOldOne) {
   const TemporaryFolder folder;
-  Library library = Create(folder / "a.docent");
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
   const auto good = MakeSampleMap(1);
   library.Save({key, "Desk", Policy::kOpen, good, nullptr});

@@ -22,8 +22,7 @@ class Pager : public ::testing::Test {
  protected:
   void MakeLibrary(int maps) {
     {
-      Library library =
-          Library::Open(folder_ / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+      Library library = OpenToWrite(folder_ / "a.docent");
       for (int i = 0; i < maps; ++i) {
         const std::uint64_t key = library.NewKey();
         library.Save({key, "map " + std::to_string(key), Policy::kOpen, MapOf(key), nullptr});

@@ -260,6 +260,14 @@ LibraryOptions QuickOptions() {
   return options;
 }
 
+Library OpenToWrite(const fs::path& file) {
+  return Library::Open(file, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+}
+
+Library OpenToRead(const fs::path& file) {
+  return Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+}
+
 Bytes ReadWholeFile(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw std::runtime_error("cannot read " + path.string());

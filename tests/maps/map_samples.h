@@ -53,6 +53,9 @@ class TemporaryFolder {
 
 // Features of the right sizes without corners: quick, for tests that look at what is stored.
 LibraryOptions QuickOptions();
+// With these options. To be written, a library is made where there is none.
+Library OpenToWrite(const std::filesystem::path& file);
+Library OpenToRead(const std::filesystem::path& file);
 
 Bytes ReadWholeFile(const std::filesystem::path& path);
 void WriteWholeFile(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);

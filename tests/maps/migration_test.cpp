@@ -44,7 +44,7 @@ class Migration : public ::testing::TestWithParam<int> {
   Migration() {
     const auto newer = folder_ / "newer.docent";
     {
-      Library library = Library::Open(newer, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+      Library library = OpenToWrite(newer);
       library.Save({library.NewKey(), "Desk", Policy::kOpen, desk_, scene_});
       library.Save({library.NewKey(), "Door", Policy::kReadOnly, door_, nullptr});
       thumbnails_ = ThumbnailsIn(library);
@@ -182,8 +182,7 @@ TEST_P(Migration, ADiskThatFillsUpAtAnyWriteLosesNothing) {
 
 TEST(Thumbnails, AreThoseOfTheKeyframesAfterEverySave) {
   const TemporaryFolder folder;
-  Library library =
-      Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
   auto map = MakeSampleMap(1, {.keyframes = 3});
   library.Save({key, "Desk", Policy::kOpen, map, nullptr});
@@ -198,8 +197,7 @@ TEST(Thumbnails, AreThoseOfTheKeyframesAfterEverySave) {
 TEST(Thumbnails, ThatAreDamagedAreToldAndTheOthersHandedOut) {
   const TemporaryFolder folder;
   {
-    Library library =
-        Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+    Library library = OpenToWrite(folder / "a.docent");
     library.Save({library.NewKey(), "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
     library.Save({library.NewKey(), "Door", Policy::kOpen, MakeSampleMap(2), nullptr});
   }

@@ -62,9 +62,7 @@ TEST(Policy, BoundsHoldAllKeyframesAndAreNotOpenedByAFewWildPoints) {
 // One library with a map of the policy, and what each way of writing answers.
 class EveryPolicy : public ::testing::TestWithParam<Policy> {
  protected:
-  EveryPolicy()
-      : library_(
-            Library::Open(folder_ / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions())) {
+  EveryPolicy() : library_(OpenToWrite(folder_ / "a.docent")) {
     key_ = library_.NewKey();
     library_.Save({key_, "Desk", GetParam(), map_, scene_});
   }
@@ -207,8 +205,7 @@ TEST_P(EveryPolicy, IsAskedWhenTheMapIsOptimized) {
 TEST_P(EveryPolicy, GoesWithTheMapThroughAnImportThatTouchesNoMapOfThatName) {
   const auto before = library_.Load(key_);
   {
-    Library other =
-        Library::Open(folder_ / "b.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+    Library other = OpenToWrite(folder_ / "b.docent");
     other.Save({other.NewKey(), "Desk", GetParam(), MakeSampleMap(8), MakeSampleScene(8, 1)});
     ImportMaps(other, folder_ / "a.docent");
   }
@@ -235,8 +232,7 @@ TEST_P(EveryPolicy, IsLoosenedBySetPolicyAlone) {
 }
 
 TEST_P(EveryPolicy, CannotBeChangedInALibraryThatWasOpenedReadOnly) {
-  Library visitor =
-      Library::Open(folder_ / "a.docent", Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+  Library visitor = OpenToRead(folder_ / "a.docent");
   const std::function<void()> writes[] = {
       [&] { visitor.NewKey(); },
       [&] {
@@ -256,8 +252,7 @@ INSTANTIATE_TEST_SUITE_P(Policies, EveryPolicy, ::testing::ValuesIn(kAll));
 
 TEST(BoundedMap, KeepsItsOriginalBoundsHoweverItGrowsUntilItIsOpened) {
   const TemporaryFolder folder;
-  Library library =
-      Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+  Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
   auto map = MakeSampleMap(1);
   library.Save({key, "Desk", Policy::kOpen, map, nullptr});

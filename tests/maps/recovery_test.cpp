@@ -19,15 +19,13 @@ using ::testing::IsEmpty;
 class Recovering : public ::testing::Test {
  protected:
   Recovering() {
-    Library library = Library::Open(file_, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
+    Library library = OpenToWrite(file_);
     for (std::uint64_t i = 0; i < maps_.size(); ++i)
       library.Save({library.NewKey(), NameOf(i), Policy::kOpen, maps_[i], MakeSampleScene(i, 1)});
   }
   static std::string NameOf(std::size_t i) { return "map number " + std::to_string(i); }
   void RunSql(const std::string& sql) const { maps::RunSql(file_, sql); }
-  Library OpenRecovered() const {
-    return Library::Open(target_, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
-  }
+  Library OpenRecovered() const { return OpenToRead(target_); }
 
   TemporaryFolder folder_;
   const std::filesystem::path file_ = folder_ / "a.docent", target_ = folder_ / "b.docent";

@@ -29,6 +29,13 @@ std::vector<KeyFrameWords> WordsIn(const Library& library) {
 
 constexpr SampleOptions kWithWords = {.keyframes = 3, .width_px = 160, .height_px = 128, .corners = true};
 
+// A new library whose map 1, "Desk", is this one.
+Library LibraryOf(const std::filesystem::path& file, const std::shared_ptr<const engine::MapSnapshot>& map) {
+  Library library = OpenToWrite(file);
+  library.Save({library.NewKey(), "Desk", Policy::kOpen, map, nullptr});
+  return library;
+}
+
 WordTable SampleTable() {
   return {77,
           {{2, 2, MakeWordBag({1, 1, 5, 4095})},
@@ -100,11 +107,9 @@ TEST(WordRows, KeyframesNearEachOtherAreOnePlace) {
 
 TEST(WordRows, AreThoseOfTheKeyframesAfterEverySave) {
   const TemporaryFolder folder;
-  Library library =
-      Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
-  const std::uint64_t key = library.NewKey();
   auto map = MakeSampleMap(1, kWithWords);
-  library.Save({key, "Desk", Policy::kOpen, map, nullptr});
+  Library library = LibraryOf(folder / "a.docent", map);
+  const std::uint64_t key = library.FindByName("Desk").key;
   const std::vector<KeyFrameWords> first = MakeWords(*map, {});
   EXPECT_EQ(WordsIn(library), first);
   EXPECT_FALSE(first[0].words.empty());
@@ -124,17 +129,14 @@ TEST(WordRows, OfAPictureThatStaysAreKeptAndOfAnotherMadeAnew) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   auto map = MakeSampleMap(1, kWithWords);
-  {
-    Library library = Library::Open(file, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
-    library.Save({library.NewKey(), "Desk", Policy::kOpen, map, nullptr});
-  }
+  LibraryOf(file, map);
   // Words that nobody would make of these pictures.
   std::vector<KeyFrameWords> marked = MakeWords(*map, {});
   for (KeyFrameWords& words : marked) words.words = MakeWordBag({words.keyframe});
   WriteWords(Database::OpenReadWrite(file, false), 1, marked);
   const engine::KeyFrameId changed = map->keyframes[1].id;
   map->keyframes[1].features = MakeSampleMap(5, kWithWords)->keyframes[1].features;
-  Library library = Library::Open(file, Access::kReadWrite, CreateIfMissing::kNo, QuickOptions());
+  Library library = OpenToWrite(file);
   library.Save({1, "Desk", Policy::kOpen, map, nullptr});
   const auto words = WordsIn(library);
   ASSERT_EQ(words.size(), 3u);
@@ -148,8 +150,7 @@ TEST(WordRows, OfAnotherVocabularyAreNone) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   auto map = MakeSampleMap(1, kWithWords);
-  Library library = Library::Open(file, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
-  library.Save({library.NewKey(), "Desk", Policy::kOpen, map, nullptr});
+  Library library = LibraryOf(file, map);
   {
     const Database database = Database::OpenReadWrite(file, false);
     const Bytes bytes = EncodeWords(1, {VocabularyFingerprint() + 1, MakeWords(*map, {})});
@@ -169,12 +170,9 @@ TEST(WordRows, ThatAreWrongAreFoundByVerifying) {
   const auto map = MakeSampleMap(1, kWithWords);
   const auto verified_after = [&](const std::function<void(const Database&)>& change) {
     std::filesystem::remove(file);
-    {
-      Library library = Library::Open(file, Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
-      library.Save({library.NewKey(), "Desk", Policy::kOpen, map, nullptr});
-    }
+    LibraryOf(file, map);
     change(Database::OpenReadWrite(file, false));
-    const Library library = Library::Open(file, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
+    const Library library = OpenToRead(file);
     const auto sentences = library.Verify();
     return sentences.empty() ? std::string("all is well") : sentences.front();
   };
@@ -202,15 +200,8 @@ TEST(WordRows, ThatAreWrongAreFoundByVerifying) {
 
 TEST(WordRows, GoWithAMapThatIsExportedImportedOrRecovered) {
   const TemporaryFolder folder;
-  {
-    Library library =
-        Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, QuickOptions());
-    library.Save({library.NewKey(), "Desk", Policy::kOpen, MakeSampleMap(1, kWithWords), nullptr});
-    ExportMap(library, 1, folder / "exported.docent");
-  }
-  const auto open = [&](const char* name) {
-    return Library::Open(folder / name, Access::kReadOnly, CreateIfMissing::kNo, QuickOptions());
-  };
+  ExportMap(LibraryOf(folder / "a.docent", MakeSampleMap(1, kWithWords)), 1, folder / "exported.docent");
+  const auto open = [&](const char* name) { return OpenToRead(folder / name); };
   ImportMaps(open("a.docent"), folder / "imported.docent");
   RunSql(folder / "a.docent", "UPDATE words SET data = x'00'");
   Recover(folder / "a.docent", folder / "recovered.docent");

@@ -70,6 +70,13 @@ TEST(MapView, LooksStraightDownFromAbove) {
   EXPECT_LT((camera_from_map * orbit.target - Eigen::Vector3d(0, 0, 4)).norm(), 1e-9);
 }
 
+TEST(MapView, TellsLengthsInUnitsOfTheMapWhichNeedNotBeMetres) {
+  engine::MapSnapshot map;
+  map.points.resize(3);
+  map.keyframes.resize(2);
+  EXPECT_EQ(MapViewCounts(map, 0.2), "3 points, 2 keyframes, grid of 0.2 units");
+}
+
 using MapViewPicture = OffscreenTest;
 
 TEST_F(MapViewPicture, ShowsWhereAndWhitherALostCameraIsFoundAgain) {

@@ -36,25 +36,6 @@ TEST(Session, MapsEagerlyOnAThreadOfItsOwnAndDropsNothing) {
   EXPECT_EQ(engine::Validate(*maps[0].snapshot), "");
 }
 
-TEST(Session, GivesEqualPosesOnEveryRunInLockstep) {
-  const auto simulation = Room(2.5);
-  std::vector<Seen> runs;
-  for (int run = 0; run < 2; ++run) {
-    Session session(Options(Pace::kLockstep, "map"), LensOf(*simulation), nullptr);
-    runs.push_back(Feed(simulation, Pace::kLockstep, &session));
-  }
-  ASSERT_GT(runs[0].poses, 10);
-  ASSERT_EQ(runs[0].frames.size(), runs[1].frames.size());
-  for (std::size_t i = 0; i < runs[0].frames.size(); ++i) {
-    const engine::TrackedFrame &a = runs[0].frames[i], &b = runs[1].frames[i];
-    ASSERT_EQ(a.state, b.state) << i;
-    EXPECT_EQ(a.camera_from_map.translation, b.camera_from_map.translation) << i;
-    EXPECT_EQ(a.camera_from_map.rotation.quaternion().coeffs(),
-              b.camera_from_map.rotation.quaternion().coeffs())
-        << i;
-  }
-}
-
 TEST(Session, KeepsWhatIsPlacedUndoneAndRedoneInTheLibrary) {
   const auto simulation = Room(4);
   const TemporaryFolder folder;
@@ -89,14 +70,15 @@ TEST(Session, KeepsWhatIsPlacedUndoneAndRedoneInTheLibrary) {
   EXPECT_EQ(maps[0].scene->Find("sign-2")->signpost.to_map, "Desk");
   EXPECT_THAT(ErrorOf([&] { session.Execute(NewMap{"More"}, {}); }), HasSubstr("tour"));
   const std::uint64_t keyframes = info.keyframes;
-  const Seen seen = Feed(simulation, Pace::kEager, &session);
-  EXPECT_GT(seen.poses, simulation->frame_count() / 3);
+  const auto visit = Room(1.5);
+  const Seen seen = Feed(visit, Pace::kEager, &session);
+  EXPECT_GT(seen.poses, visit->frame_count() / 3);
 
   // The same where maps are read when they are wanted: by what the camera sees, or by their name.
   tour.memory.read_at_start_bytes = 0;
   Session seeing(tour, LensOf(*simulation), &library), naming(tour, LensOf(*simulation), &library);
   EXPECT_EQ(seeing.Maps().at(0).snapshot, nullptr);
-  EXPECT_EQ(Feed(simulation, Pace::kEager, &seeing).poses, seen.poses);
+  EXPECT_EQ(Feed(visit, Pace::kEager, &seeing).poses, seen.poses);
   EXPECT_EQ(seeing.Maps().at(0).scene->entities.size(), 3u);
   naming.Execute(UseMap{"Desk"}, {});
   EXPECT_NE(naming.Maps().at(0).snapshot, nullptr);
@@ -104,32 +86,6 @@ TEST(Session, KeepsWhatIsPlacedUndoneAndRedoneInTheLibrary) {
 }
 
 // A camera that only turns gives a map of directions, which has no place for anything.
-TEST(Session, SaysWhyAVisitorElsewhereIsNotFoundWithoutFloodingTheEvents) {
-  const TemporaryFolder folder;
-  const auto file = folder / "a.docent";
-  const auto simulation = Room(3);
-  {
-    auto library = maps::Library::Open(file, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
-    Session session(Options(Pace::kLockstep, "map"), LensOf(*simulation), &library);
-    Feed(simulation, Pace::kLockstep, &session);
-  }
-  auto library = maps::Library::Open(file, maps::Access::kReadOnly);
-  ASSERT_EQ(library.List().size(), 1u);
-  SimulationOptions elsewhere;
-  elsewhere.duration_s = 2.5;
-  const std::shared_ptr<const Simulation> other = MakeSimulation("room", elsewhere);
-  SessionOptions options = Options(Pace::kLockstep, "");
-  options.may_write = false;
-  Session session(options, LensOf(*other), &library);
-  const Seen seen = Feed(other, Pace::kLockstep, &session);
-  EXPECT_EQ(seen.poses, 0);
-  int told = 0;
-  for (const Event& event : session.TakeEvents()) told += event.event == "not sure";
-  EXPECT_GE(told, 1);
-  EXPECT_LE(told, 3);
-  EXPECT_THAT(seen.frames.back().hint, HasSubstr("not sure: "));
-}
-
 TEST(Session, NeverSavesAMapOfDirectionsAlone) {
   const auto simulation = std::shared_ptr<const Simulation>(MakeSimulation("cylinder:0"));
   const TemporaryFolder folder;
@@ -150,23 +106,82 @@ TEST(Session, NeverSavesAMapOfDirectionsAlone) {
   for (const Event& event : session.TakeEvents()) EXPECT_NE(event.event, "save") << event.detail;
 }
 
-TEST(Session, SavesAMapThatBeganWithDirectionsOnceItKnowsDepth) {
-  const auto simulation = Room(4);
-  const TemporaryFolder folder;
-  maps::Library library =
-      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
-  SessionOptions options = Options(Pace::kLockstep, "Bay");
-  options.tracker.hybrid = true;
-  Session session(options, LensOf(*simulation), &library);
-  const Seen seen = Feed(simulation, Pace::kLockstep, &session);
+// One author's session in lockstep, and the library that it left: its tests only look at them.
+class AuthoredBay : public ::testing::Test {
+ protected:
+  struct Run {
+    TemporaryFolder folder;
+    Seen seen;
+  };
+  static void SetUpTestSuite() {
+    run_ = new Run;
+    const auto simulation = Room(4);
+    maps::Library library =
+        maps::Library::Open(run_->folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    SessionOptions options = Options(Pace::kLockstep, "Bay");
+    options.tracker.hybrid = true;
+    Session session(options, LensOf(*simulation), &library);
+    run_->seen = Feed(simulation, Pace::kLockstep, &session);
+  }
+  static void TearDownTestSuite() {
+    delete run_;
+    run_ = nullptr;
+  }
+  static maps::Library Library() {
+    return maps::Library::Open(run_->folder / "l.docent", maps::Access::kReadOnly);
+  }
+
+  static Run* run_;
+};
+AuthoredBay::Run* AuthoredBay::run_ = nullptr;
+
+TEST_F(AuthoredBay, IsSavedAlthoughItBeganWithDirectionsOnceItKnowsDepth) {
+  const Seen& seen = run_->seen;
   ASSERT_GT(seen.frames.size(), 2u);
   EXPECT_EQ(seen.frames[1].state, engine::TrackingState::kPanorama);
   EXPECT_EQ(seen.frames[1].map_key, seen.frames.back().map_key);
+  const maps::Library library = Library();
   ASSERT_EQ(library.List().size(), 1u);
   const auto saved = library.Load(library.FindByName("Bay").key).snapshot;
   EXPECT_TRUE(saved->HasFinitePoints());
   EXPECT_FALSE(saved->panoramas.empty());
   EXPECT_EQ(engine::Validate(*saved), "");
+}
+
+TEST_F(AuthoredBay, IsTrackedWithEqualPosesOnEveryRunInLockstep) {
+  const auto simulation = Room(2.5);
+  SessionOptions options = Options(Pace::kLockstep, "Bay");
+  options.tracker.hybrid = true;
+  Session session(options, LensOf(*simulation), nullptr);
+  const Seen again = Feed(simulation, Pace::kLockstep, &session);
+  ASSERT_GT(again.poses, 10);
+  ASSERT_LT(again.frames.size(), run_->seen.frames.size());
+  for (std::size_t i = 0; i < again.frames.size(); ++i) {
+    const engine::TrackedFrame &a = run_->seen.frames[i], &b = again.frames[i];
+    ASSERT_EQ(a.state, b.state) << i;
+    EXPECT_EQ(a.camera_from_map.translation, b.camera_from_map.translation) << i;
+    EXPECT_EQ(a.camera_from_map.rotation.quaternion().coeffs(),
+              b.camera_from_map.rotation.quaternion().coeffs())
+        << i;
+  }
+}
+
+TEST_F(AuthoredBay, TellsAVisitorElsewhereWhyItIsNotEnteredWithoutFloodingTheEvents) {
+  maps::Library library = Library();
+  ASSERT_EQ(library.List().size(), 1u);
+  SimulationOptions elsewhere;
+  elsewhere.duration_s = 2.5;
+  const std::shared_ptr<const Simulation> other = MakeSimulation("room", elsewhere);
+  SessionOptions options = Options(Pace::kLockstep, "");
+  options.may_write = false;
+  Session session(options, LensOf(*other), &library);
+  const Seen seen = Feed(other, Pace::kLockstep, &session);
+  EXPECT_EQ(seen.poses, 0);
+  int told = 0;
+  for (const Event& event : session.TakeEvents()) told += event.event == "not sure";
+  EXPECT_GE(told, 1);
+  EXPECT_LE(told, 3);
+  EXPECT_THAT(seen.frames.back().hint, HasSubstr("not sure: "));
 }
 
 TEST(Session, RefusesACommandThatCannotBeCarriedOutAndNamesItsLine) {

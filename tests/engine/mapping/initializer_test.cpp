@@ -17,13 +17,9 @@
 namespace docent::engine {
 namespace {
 
+using testing_world::Camera;
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
-
-const std::shared_ptr<const CameraModel>& Camera() {
-  static const auto camera = testing_world::PinholeCamera(320, 240);
-  return camera;
-}
 
 struct Outcome {
   std::optional<InitialPair> pair;

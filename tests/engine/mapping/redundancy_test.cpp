@@ -10,15 +10,15 @@
 namespace docent::engine {
 namespace {
 
+using testing_world::Camera;
 using testing_world::CameraAt;
 
 // Before one wall: keyframes at these places, sideways, all of which see the same points.
 Map MapFrom(const std::vector<double>& places) {
-  static const auto camera = testing_world::PinholeCamera(320, 240);
   static const auto world = testing_world::RenderedWorld::SingleWall(3, 5);
   std::vector<Rigid3> poses;
   for (const double x : places) poses.push_back(CameraAt({x, 0, 0}));
-  Map map = testing_world::TrueMap(world, camera, poses, 60);
+  Map map = testing_world::TrueMap(world, Camera(), poses, 60);
   for (auto& [id, record] : map.keyframes()) map.UpdateDepth(&record);
   return map;
 }

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "engine/geometry/sim3.h"
-#include "engine/mapping/mapper.h"
-#include "engine/tracking/tracker.h"
+#include "tests/engine/lockstep.h"
 #include "tests/engine/mapping/panorama_scene.h"
 
 // A tracker that knows panorama maps, and its mapper, on pictures of a painted room: an instant start, a
@@ -16,19 +15,14 @@
 namespace docent::engine {
 namespace {
 
+using testing_world::Camera;
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
 
-constexpr double kFramesASecond = 30;
 constexpr int kStill = 6, kWalk = 90, kTurn = 80, kHold = 10, kWalkAgain = 20;
 constexpr int kTurnBegins = kStill + kWalk, kTurnEnds = kTurnBegins + 2 * kTurn + kHold;
 constexpr int kFrames = kTurnEnds + kWalkAgain;
 constexpr double kDepth = 3;  // metres to the walls
-
-const std::shared_ptr<const CameraModel>& Camera() {
-  static const auto camera = testing_world::PinholeCamera(320, 240);
-  return camera;
-}
 
 // Ahead, out to the side and back to the centre; then 110 degrees to the right on the spot, and back.
 Rigid3 Pose(int frame) {
@@ -61,11 +55,7 @@ const std::vector<cv::Mat>& Pictures() {
 }
 
 Frame FrameOf(int index) {
-  Frame frame;
-  frame.time = FromSeconds(index / kFramesASecond);
-  frame.index = static_cast<std::uint64_t>(index);
-  frame.picture = Pictures()[static_cast<std::size_t>(index)];
-  return frame;
+  return testing_world::MakeFrame(index, Pictures()[static_cast<std::size_t>(index)]);
 }
 
 struct Tour {
@@ -76,33 +66,15 @@ struct Tour {
   const TrackedFrame& At(int index) const { return frames[static_cast<std::size_t>(index)]; }
 };
 
-// Tracker and mapper in turn on one thread, as lockstep runs them.
 template <typename FrameAt>
 Tour Take(bool hybrid, int frames, const FrameAt& frame_at) {
   TrackerOptions options;
   options.hybrid = hybrid;
-  Tracker tracker(options, Camera(), 1);
-  Mapper mapper({});
+  Lockstep lockstep(options, Camera(), 1);
   Tour tour;
-  tracker.StartNewMap();
-  for (int i = 0; i < frames; ++i) {
-    tour.frames.push_back(tracker.Track(frame_at(i), nullptr));
-    if (auto pair = tracker.TakeInitialPair()) mapper.Start(std::move(*pair));
-    if (auto candidate = tracker.TakeKeyFrameCandidate()) {
-      mapper.Report(tracker.TakeReports());
-      mapper.Offer(std::move(*candidate));
-    }
-    for (int step = 0; step < 20 && !mapper.Settled(); ++step) mapper.Step();
-    mapper.Step();
-    for (MapperEvent& event : mapper.TakeEvents()) {
-      if (event.kind == MapperEvent::Kind::kStartFailed) tracker.StartFailed();
-      tour.events.push_back(std::move(event));
-    }
-    if (mapper.Snapshot() != tour.map) {
-      tour.map = mapper.Snapshot();
-      tracker.SetMap(tour.map, 1);
-    }
-  }
+  for (int i = 0; i < frames; ++i) tour.frames.push_back(lockstep.Feed(frame_at(i)));
+  tour.map = lockstep.map();
+  tour.events = lockstep.events();
   return tour;
 }
 
@@ -224,13 +196,9 @@ TEST(HybridTracker, IsLostRatherThanTakeAWalkForATurn) {
   const Eigen::Vector3d ahead = turned.rotation.inverse() * Eigen::Vector3d(0, 0, 1);
   const Tour tour = Take(true, kWalkBegins + kWalkAhead, [&](int index) {
     if (index < kWalkBegins) return FrameOf(index);
-    Frame frame = FrameOf(kWalkBegins);
-    frame.time = FromSeconds(index / kFramesASecond);
-    frame.index = static_cast<std::uint64_t>(index);
     const Eigen::Vector3d center = 0.03 * (index - kWalkBegins + 1) * ahead;
     const Rigid3 pose(turned.rotation, -(turned.rotation * center));
-    frame.picture = world.Render(*Camera(), pose, 1.5, frame.index + 1);
-    return frame;
+    return testing_world::MakeFrame(index, world, pose);
   });
   EXPECT_EQ(tour.At(kWalkBegins - 1).state, TrackingState::kPanorama);
   int lost = 0, told = 0;

@@ -12,18 +12,10 @@
 namespace docent::engine {
 namespace {
 
+using testing_world::Camera;
 using testing_world::CameraAt;
-using testing_world::RenderedWorld;
 using testing_world::SomeMaps;
-
-const std::shared_ptr<const CameraModel>& Camera() {
-  static const auto camera = testing_world::PinholeCamera(320, 240);
-  return camera;
-}
-const RenderedWorld& World() {
-  static const RenderedWorld world = RenderedWorld::Room(71);
-  return world;
-}
+using testing_world::World;
 
 // Keyframes a hand's breadth apart from x on. spoilt: of every `spoilt` points one alone is where it was.
 std::shared_ptr<const MapSnapshot> MapFrom(double x, std::size_t spoilt) {
@@ -42,11 +34,8 @@ std::vector<std::uint64_t> Walk(const SomeMaps& maps, bool build_maps) {
   SomeMaps first_alone;
   first_alone.Add(1, maps.At(1));
   for (int i = 0; i < 40; ++i) {
-    Frame frame;
-    frame.time = FromSeconds(i / 30.0);
-    frame.index = static_cast<std::uint64_t>(i);
     const Rigid3 truth = CameraAt({0.1 + 0.012 * i, 0.02, 0.03});
-    frame.picture = World().Render(*Camera(), truth, 1.5, frame.index + 1);
+    const Frame frame = testing_world::MakeFrame(i, World(), truth);
     const TrackedFrame tracked = tracker.Track(frame, i < 5 ? &first_alone : &maps);
     EXPECT_TRUE(HasPose(tracked.state) || i < 3) << i;
     if (HasPose(tracked.state)) {

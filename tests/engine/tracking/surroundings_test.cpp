@@ -15,27 +15,16 @@
 namespace docent::engine {
 namespace {
 
+using testing_world::Camera;
 using testing_world::CameraAt;
-using testing_world::RenderedWorld;
-
-const std::shared_ptr<const CameraModel>& Camera() {
-  static const auto camera = testing_world::PinholeCamera(320, 240);
-  return camera;
-}
-const RenderedWorld& World() {
-  static const RenderedWorld world = RenderedWorld::Room(71);
-  return world;
-}
+using testing_world::World;
 
 Rigid3 Pose(int frame) {
   return CameraAt({0.01 * frame, 0.02 * std::sin(0.1 * frame), 0}, {0, -0.1 * frame, 0});
 }
 
 Frame FrameAt(int index) {
-  Frame frame;
-  frame.time = FromSeconds(index / 30.0);
-  frame.picture = World().Render(*Camera(), Pose(index), 1.5, static_cast<std::uint64_t>(index) + 1);
-  return frame;
+  return testing_world::MakeFrame(index, World(), Pose(index));
 }
 
 // A tracker that follows the first frames in an exact map.

@@ -4,8 +4,7 @@
 
 #include <vector>
 
-#include "engine/mapping/mapper.h"
-#include "engine/tracking/tracker.h"
+#include "tests/engine/lockstep.h"
 #include "tests/engine/mapping/target_scene.h"
 
 namespace docent::engine {
@@ -22,31 +21,19 @@ TEST_P(TargetTracking, MakesAMapInMetres) {
   TrackerOptions options;
   options.hybrid = GetParam();
   options.target = std::make_shared<const PlanarTarget>(scene.picture, scene.width_m);
-  Tracker tracker(options, camera, 1);
-  Mapper mapper({});
-  tracker.StartNewMap();
-  std::shared_ptr<const MapSnapshot> map;
+  Lockstep lockstep(options, camera, 1);
   std::vector<Rigid3> truth, tracked;
   std::string first_hint;
   for (int i = 0; i < 36; ++i) {
     const Rigid3 pose = CameraAt({-0.15 + 0.02 * i, 0.05, 0.1}, {0, -0.4 * i, 0});
-    Frame frame;
-    frame.time = FromSeconds(i / 30.0);
-    frame.index = static_cast<std::uint64_t>(i);
-    frame.picture = scene.world.Render(*camera, pose, 1.5, frame.index + 1);
-    const TrackedFrame out = tracker.Track(frame, nullptr);
+    const std::uint64_t noise_seed = static_cast<std::uint64_t>(i) + 1;
+    const auto map = lockstep.map();
+    const TrackedFrame out =
+        lockstep.Feed(testing_world::MakeFrame(i, scene.world.Render(*camera, pose, 1.5, noise_seed)));
     if (i == 0) first_hint = out.hint;
     if (map && map->HasFinitePoints() && HasPose(out.state)) {
       truth.push_back(pose);
       tracked.push_back(out.camera_from_map);
-    }
-    if (auto pair = tracker.TakeInitialPair()) mapper.Start(std::move(*pair));
-    if (auto candidate = tracker.TakeKeyFrameCandidate()) mapper.Offer(std::move(*candidate));
-    for (int step = 0; step < 20 && !mapper.Settled(); ++step) mapper.Step();
-    mapper.Step();
-    if (mapper.Snapshot() != map) {
-      map = mapper.Snapshot();
-      tracker.SetMap(map, 1);
     }
   }
   EXPECT_EQ(first_hint, "move sideways");

@@ -10,25 +10,24 @@
 #include <numbers>
 #include <vector>
 
-#include "engine/mapping/mapper.h"
+#include "tests/engine/lockstep.h"
 #include "tests/engine/rendered_world.h"
+#include "tests/engine/some_maps.h"
 
 namespace docent::engine {
 namespace {
 
+using testing_world::Camera;
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
+using testing_world::SomeMaps;
+using testing_world::World;
 
 constexpr double kFramesASecond = 30;
 constexpr int kWalk = 110;         // frames of the first walk
 constexpr int kShortlyHidden = 8;  // frames with a hand before the lens
 constexpr int kLookAgain = 20;
 constexpr int kFrames = kWalk + kShortlyHidden + kLookAgain;
-
-const std::shared_ptr<const CameraModel>& Camera() {
-  static const auto camera = testing_world::PinholeCamera(320, 240);
-  return camera;
-}
 
 bool Hidden(int frame) {
   return frame >= kWalk && frame < kWalk + kShortlyHidden;
@@ -44,7 +43,6 @@ Rigid3 Pose(int frame) {
 // The pictures of one walk, rendered once.
 const std::vector<cv::Mat>& Pictures() {
   static const std::vector<cv::Mat> pictures = [] {
-    const RenderedWorld world = RenderedWorld::Room(71);
     std::vector<cv::Mat> rendered;
     for (int i = 0; i < kFrames; ++i) {
       const auto seed = static_cast<std::uint64_t>(i) + 1;
@@ -52,7 +50,7 @@ const std::vector<cv::Mat>& Pictures() {
         const RenderedWorld nothing{std::vector<testing_world::Wall>()};
         rendered.push_back(nothing.Render(*Camera(), Pose(i), 1.5, seed));
       } else {
-        rendered.push_back(world.Render(*Camera(), Pose(i), 1.5, seed));
+        rendered.push_back(World().Render(*Camera(), Pose(i), 1.5, seed));
       }
     }
     return rendered;
@@ -61,63 +59,8 @@ const std::vector<cv::Mat>& Pictures() {
 }
 
 Frame FrameOf(int index) {
-  Frame frame;
-  frame.time = FromSeconds(index / kFramesASecond);
-  frame.index = static_cast<std::uint64_t>(index);
-  frame.picture = Pictures()[static_cast<std::size_t>(index)];
-  return frame;
+  return testing_world::MakeFrame(index, Pictures()[static_cast<std::size_t>(index)]);
 }
-
-// Every keyframe of one map, compared by thumbnail.
-class OneMap : public PlaceFinder {
- public:
-  OneMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t key) : map_(std::move(map)), key_(key) {}
-  std::vector<PlaceCandidate> FindPlaces(const PlaceQuery& query, int count, int per_map,
-                                         std::uint64_t only_map) const override {
-    std::vector<PlaceCandidate> found;
-    if (only_map != 0 && only_map != key_) return found;
-    for (const KeyFrame& keyframe : map_->keyframes)
-      found.push_back({key_, map_, keyframe.id, Difference(keyframe.features->small_blurry, *query.image)});
-    std::sort(found.begin(), found.end(),
-              [](const auto& a, const auto& b) { return a.difference < b.difference; });
-    found.resize(std::min<std::size_t>(found.size(), static_cast<std::size_t>(std::min(count, per_map))));
-    return found;
-  }
-
- private:
-  std::shared_ptr<const MapSnapshot> map_;
-  std::uint64_t key_;
-};
-
-// Tracker and mapper in turn on one thread, as lockstep runs them.
-class Lockstep {
- public:
-  explicit Lockstep(std::uint64_t seed) : tracker_({}, Camera(), seed), mapper_({}) {
-    tracker_.StartNewMap();
-  }
-
-  TrackedFrame Feed(const Frame& frame) {
-    TrackedFrame tracked = tracker_.Track(frame, nullptr);
-    if (auto pair = tracker_.TakeInitialPair()) mapper_.Start(std::move(*pair));
-    if (auto candidate = tracker_.TakeKeyFrameCandidate()) {
-      mapper_.Report(tracker_.TakeReports());
-      mapper_.Offer(std::move(*candidate));
-    }
-    for (int step = 0; step < 20 && !mapper_.Settled(); ++step) mapper_.Step();
-    mapper_.Step();
-    if (mapper_.Snapshot() != told_) {
-      told_ = mapper_.Snapshot();
-      tracker_.SetMap(told_, 1);
-    }
-    return tracked;
-  }
-  std::shared_ptr<const MapSnapshot> map() const { return told_; }
-
- private:
-  Tracker tracker_;
-  Mapper mapper_;
-  std::shared_ptr<const MapSnapshot> told_;
-};
 
 struct Walk {
   std::vector<TrackedFrame> frames;
@@ -126,7 +69,7 @@ struct Walk {
 
 Walk TakeWalk(std::uint64_t seed) {
   Walk walk;
-  Lockstep lockstep(seed);
+  Lockstep lockstep({}, Camera(), seed);
   for (int i = 0; i < kFrames; ++i) walk.frames.push_back(lockstep.Feed(FrameOf(i)));
   walk.map = lockstep.map();
   return walk;
@@ -189,11 +132,10 @@ TEST(Tracker, StartsAMapAndFollowsItClosely) {
 TEST(Tracker, PutsTheMapOnTheWalls) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
-  const RenderedWorld world = RenderedWorld::Room(71);
   const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
   std::vector<double> distances;
   for (const MapPoint& point : walk.map->points)
-    distances.push_back(world.DistanceToSurface((world_from_map * point.point_in_map).head<3>()));
+    distances.push_back(World().DistanceToSurface((world_from_map * point.point_in_map).head<3>()));
   std::sort(distances.begin(), distances.end());
   ASSERT_GT(distances.size(), 200u);
   EXPECT_LT(distances[distances.size() / 2], 0.02);
@@ -247,7 +189,8 @@ TEST(Tracker, AnswersToTheByteTheSameOnEveryRun) {
 TEST(Tracker, FindsItsPlaceInAMapThatItIsGivenWithTheHelpOfAPlaceFinder) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
-  const OneMap places(walk.map, 9);
+  SomeMaps places;
+  places.Add(9, walk.map);
   TrackerOptions options;
   options.build_maps = false;
   Tracker tracker(options, Camera(), 3);
@@ -272,7 +215,8 @@ TEST(Tracker, FindsItsPlaceInAMapThatItIsGivenWithTheHelpOfAPlaceFinder) {
 TEST(Tracker, EntersAnotherMapOnlyAfterSeveralFramesAgree) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
-  const OneMap places(walk.map, 9);
+  SomeMaps places;
+  places.Add(9, walk.map);
   TrackerOptions options;
   options.build_maps = false;
   Tracker tracker(options, Camera(), 3);
@@ -291,7 +235,8 @@ TEST(Tracker, EntersAnotherMapOnlyAfterSeveralFramesAgree) {
 TEST(Tracker, IsLostAsSoonAsThePictureIsOfAnotherPlace) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
-  const OneMap places(walk.map, 9);
+  SomeMaps places;
+  places.Add(9, walk.map);
   const RenderedWorld other = RenderedWorld::Room(7177);
   TrackerOptions options;
   options.build_maps = false;
@@ -310,7 +255,8 @@ TEST(Tracker, IsLostAsSoonAsThePictureIsOfAnotherPlace) {
 TEST(Tracker, EntersNoMapOfAnotherPlace) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
-  const OneMap places(walk.map, 9);
+  SomeMaps places;
+  places.Add(9, walk.map);
   const RenderedWorld other = RenderedWorld::Room(7177);
   TrackerOptions options;
   options.build_maps = false;

@@ -13,18 +13,11 @@
 namespace docent::engine {
 namespace {
 
+using testing_world::Camera;
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
 using testing_world::SomeMaps;
-
-const std::shared_ptr<const CameraModel>& Camera() {
-  static const auto camera = testing_world::PinholeCamera(320, 240);
-  return camera;
-}
-const RenderedWorld& World() {
-  static const RenderedWorld world = RenderedWorld::Room(71);
-  return world;
-}
+using testing_world::World;
 
 // Three keyframes. Of every ten points `wrong` are not where they were.
 std::shared_ptr<const MapSnapshot> MapWith(std::size_t wrong) {
@@ -47,11 +40,7 @@ std::shared_ptr<const MapSnapshot> MapOfACorner() {
 }
 
 Frame FrameOf(int index, const RenderedWorld& world = World()) {
-  Frame frame;
-  frame.time = FromSeconds(index / 30.0);
-  frame.index = static_cast<std::uint64_t>(index);
-  frame.picture = world.Render(*Camera(), CameraAt({0.06 + 0.002 * index, 0.02, 0.03}), 1.5, frame.index + 1);
-  return frame;
+  return testing_world::MakeFrame(index, world, CameraAt({0.06 + 0.002 * index, 0.02, 0.03}));
 }
 
 // A visitor who was in no map yet.
