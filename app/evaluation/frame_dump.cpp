@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/evaluation/frame_dump.h"
 
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -8,6 +10,7 @@
 
 #include "app/evaluation/panorama_picture.h"
 #include "app/files/checked_file.h"
+#include "engine/map/point_uncertainty.h"
 
 namespace docent::app {
 
@@ -33,11 +36,14 @@ Json ToJson(const engine::Rigid3& camera_from_map) {
           {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
 }
 
-Json ToJson(const engine::InspectedPoint& point) {
-  Json json = {{"id", point.point},      {"infinite", point.infinite},
-               {"level", point.level},   {"predicted_px", ToJson(point.predicted)},
-               {"found_px", nullptr},    {"residual_px", nullptr},
-               {"weight", point.weight}, {"inlier", point.inlier}};
+// deviation: of the depth, relative; infinite for what has none.
+Json ToJson(const engine::InspectedPoint& point, float deviation) {
+  Json json = {{"id", point.point},         {"infinite", point.infinite},
+               {"level", point.level},      {"predicted_px", ToJson(point.predicted)},
+               {"found_px", nullptr},       {"residual_px", nullptr},
+               {"weight", point.weight},    {"inlier", point.inlier},
+               {"depth_deviation", nullptr}};
+  if (std::isfinite(deviation)) json["depth_deviation"] = deviation;
   if (point.found) json["found_px"] = ToJson(*point.found);
   if (point.residual_px) json["residual_px"] = ToJson(*point.residual_px);
   return json;
@@ -95,7 +101,14 @@ Json Describe(std::size_t number, const engine::TrackedFrame& frame,
   }
   json["levels"] = levels;
   Json points = Json::array();
-  for (const engine::InspectedPoint& point : inspection.points) points.push_back(ToJson(point));
+  std::vector<float> deviations;
+  if (frame.map) deviations = engine::RelativeDepthDeviations(*frame.map);
+  for (const engine::InspectedPoint& point : inspection.points) {
+    const engine::MapPoint* const known = frame.map ? frame.map->FindPoint(point.point) : nullptr;
+    points.push_back(
+        ToJson(point, known ? deviations[static_cast<std::size_t>(known - frame.map->points.data())]
+                            : std::numeric_limits<float>::infinity()));
+  }
   json["points"] = points;
   return json;
 }

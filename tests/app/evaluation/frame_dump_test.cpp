@@ -70,6 +70,11 @@ TEST_F(FrameDump, TellsOfEveryPointWhereItWasLookedForAndFound) {
     EXPECT_NEAR(point["residual_px"][0], point["found_px"][0].get<double>() - pixel->x(), 1e-6);
     EXPECT_NEAR(point["residual_px"][1], point["found_px"][1].get<double>() - pixel->y(), 1e-6);
     EXPECT_GT(point["weight"], 0);
+    if (in_map->infinite()) {
+      EXPECT_TRUE(point["depth_deviation"].is_null());
+    } else {
+      EXPECT_GT(point["depth_deviation"], 0);
+    }
   }
   EXPECT_EQ(found, tracked_.matches.size());
   EXPECT_EQ(inliers, static_cast<std::size_t>(tracked_.finite_points + tracked_.infinite_points));
