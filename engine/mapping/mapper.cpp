@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "engine/geometry/triangulation.h"
 
@@ -33,6 +35,7 @@ Mapper::Mapper(const MapperOptions& options)
       loops_(options.loops, options.search) {}
 
 void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
+  RestPictures(Resting::kAll);
   map_ = snapshot ? Map(*snapshot) : Map();
   searcher_.Clear();
   descriptors_.Clear();
@@ -125,6 +128,7 @@ bool Mapper::Step() {
   }
   double MapperTimes::*account = &MapperTimes::other;
   if (task) {
+    KeepPictures(&*task);
     if (const auto* candidate = std::get_if<KeyFrameCandidate>(&*task)) {
       InsertKeyFrame(UpToDate(*candidate));
     } else {
@@ -240,6 +244,7 @@ void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecor
   PlanConversions(id);
   newest_ = id;
   loops_.Look(id);
+  RestPictures(Resting::kElsewhere);
   ++keyframes_since_global_;
   locally_adjusted_ = false;
   Publish();
@@ -278,6 +283,35 @@ std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
   return partners;
 }
 
+void Mapper::KeepPictures(Task* task) const {
+  if (!options_.pictures) return;
+  const auto keep = [this](std::shared_ptr<const ImageFeatures>* features) {
+    *features = options_.pictures->Keep(std::move(*features));
+  };
+  if (auto* candidate = std::get_if<KeyFrameCandidate>(task)) {
+    keep(&candidate->features);
+    return;
+  }
+  auto& pair = std::get<InitialPair>(*task);
+  keep(&pair.a.features);
+  keep(&pair.b.features);
+}
+
+void Mapper::RestPictures(Resting which) {
+  constexpr std::size_t kLookedAt = 16;
+  if (!options_.pictures) return;
+  std::set<KeyFrameId> here;
+  if (which == Resting::kElsewhere && newest_ != kNoId) {
+    here.insert(newest_);
+    for (const auto& [id, shared] : map_.Covisible(newest_)) {
+      if (here.size() > kLookedAt) break;
+      here.insert(id);
+    }
+  }
+  for (const auto& [id, record] : map_.keyframes())
+    if (!here.contains(id)) options_.pictures->Rest(*record.keyframe.features);
+}
+
 void Mapper::RefindNewPoints() {
   // New points are looked for in the keyframes that share most with the newest one.
   constexpr std::size_t kNeighbours = 8;
@@ -297,7 +331,9 @@ void Mapper::LocalAdjustment() {
 }
 
 void Mapper::GlobalAdjustment() {
-  searcher_.Release();  // no time needs more memory than this one
+  // No time needs more memory than this one.
+  searcher_.Release();
+  RestPictures(Resting::kAll);
   MapAdjustmentOptions adjustment = options_.adjustment;
   if (loop_to_adjust_) adjustment.global_loss = RobustLoss::kHuber;
   const BundleSummary summary = AdjustGlobally(adjustment, &interrupt_, &map_);

@@ -20,6 +20,7 @@
 #include "engine/mapping/point_creation.h"
 #include "engine/mapping/redundancy.h"
 #include "engine/mapping/refinding.h"
+#include "engine/vision/picture_store.h"
 
 namespace docent::engine {
 
@@ -43,6 +44,7 @@ struct MapperOptions {
   MapAdjustmentOptions adjustment;
   LoopOptions loops;
   SearchOptions search;
+  std::shared_ptr<PictureStore> pictures;  // where keyframes' pictures lie; null: in memory
 };
 
 // What the mapper did, for events and reports.
@@ -134,6 +136,10 @@ class Mapper {
   void GlobalAdjustment();
   // The most urgent step towards closing a loop; false when there is none.
   bool WorkOnLoops();
+  void KeepPictures(Task* task) const;
+  // Of all keyframes but the newest and those that share most with it; or of all.
+  enum class Resting { kElsewhere, kAll };
+  void RestPictures(Resting which);
   // A candidate as it would have been offered had it been tracked in the map as it is now.
   KeyFrameCandidate UpToDate(KeyFrameCandidate candidate) const;
   void ThinOut();  // removes one redundant keyframe
