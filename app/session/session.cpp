@@ -7,17 +7,27 @@
 #include <opencv2/core/utility.hpp>
 #include <utility>
 
+#include "app/files/picture_files.h"
 #include "app/files/text_file.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
+
+namespace {
+
+engine::MapperOptions WithPictureFiles(engine::MapperOptions options) {
+  if (!options.pictures) options.pictures = std::make_shared<PictureFiles>();
+  return options;
+}
+
+}  // namespace
 
 Session::Session(const SessionOptions& options,
                  std::vector<std::shared_ptr<const engine::CameraModel>> cameras, maps::Library* library)
     : options_(options),
       library_(library),
       association_(cameras.size()),
-      mapping_(options.mapper, options.threaded && options.may_write,
+      mapping_(WithPictureFiles(options.mapper), options.threaded && options.may_write,
                [this](const MappingThread::News& news) { Hear(news); }) {
   // Trackers and mapper have the processors; OpenCV's own threads would only get into their way.
   cv::setNumThreads(1);

@@ -84,7 +84,7 @@ class Descent {
   }
 
  private:
-  double Wanted() const { return RobustThreshold(options_, EstimateSigma(system_.squared_norms())); }
+  double Wanted() const { return RobustThreshold(options_, system_.Sigma()); }
   void SetThreshold(double threshold) {
     threshold_ = threshold;
     cost_ = RobustCost(options_.loss, threshold_, system_.squared_norms());
@@ -158,9 +158,9 @@ BundleSummary AdjustBundle(const BundleOptions& options, BundleProblem* problem)
   const auto begin = std::chrono::steady_clock::now();
   BundleSummary summary;
   BundleSystem system(*problem, options.loss, options.interrupt);
-  const std::vector<double> start_norms = system.squared_norms();
   summary.outcome = Descent(options, &system, &summary).Run();
-  summary.sigma = EstimateSigma(system.squared_norms());
+  summary.sigma = system.Sigma();
+  const std::vector<double>& start_norms = system.MeasureAgain(*problem);
   double threshold = RobustThreshold(options, summary.sigma);
   // Both under the same threshold: otherwise a tighter one alone would look like progress.
   summary.initial_cost = RobustCost(options.loss, threshold, start_norms);

@@ -28,12 +28,13 @@ struct BundleProblem {
   };
   struct Measurement {
     int camera = 0, point = 0;
-    Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // level 0
-    double sigma_px = 1.0;                            // 2^level
+    Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // level 0
+    float sigma_px = 1;                               // 2^level
     bool outlier = false;                             // out: residual beyond the robust threshold
   };
   std::vector<Camera> cameras;
   std::vector<Point> points;
+  // In any order; by ascending point they are gone through as they lie in memory.
   std::vector<Measurement> measurements;
 };
 

@@ -30,26 +30,40 @@ Eigen::Matrix<double, 2, 6> ByPose(const Eigen::Matrix<double, 2, 3>& jacobian, 
   return by_pose;
 }
 
+double InverseSigma(const BundleProblem::Measurement& measurement) {
+  return 1 / static_cast<double>(measurement.sigma_px);
+}
+
 }  // namespace
 
 BundleSystem::BundleSystem(const BundleProblem& problem, RobustLoss loss, const std::atomic<bool>* interrupt)
-    : loss_(loss), interrupt_(interrupt), reduced_(std::vector<int>()) {
+    : loss_(loss), interrupt_(interrupt), measurements_(problem.measurements), reduced_(std::vector<int>()) {
   Pack(problem);
   reduced_ = MakeReduced();
-  squared_norms_.assign(measurements_.size(), std::numeric_limits<double>::infinity());
-  for (const Point& point : points_) {
-    for (std::size_t i = point.begin; i < point.end; ++i) {
-      const auto camera = static_cast<std::size_t>(measurements_[i].camera);
-      squared_norms_[i] =
-          SquaredNorm(measurements_[i], cameras_[camera], positions_[static_cast<std::size_t>(point.index)]);
-    }
-  }
-  next_squared_norms_ = squared_norms_;
   next_cameras_ = cameras_;
   next_positions_ = positions_;
+  squared_norms_.resize(order_.size());
+  next_squared_norms_.resize(order_.size());
+  squared_norms_ = MeasureAgain(problem);
   const auto size = static_cast<Eigen::Index>(6 * free_cameras_.size());
   camera_step_ = right_side_ = camera_gradient_ = camera_damping_ = Eigen::VectorXd::Zero(size);
   eliminated_.resize(free_points_.size());
+}
+
+const std::vector<double>& BundleSystem::MeasureAgain(const BundleProblem& problem) {
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    next_cameras_[i].camera_from_map = problem.cameras[i].camera_from_map;
+    next_cameras_[i].rotation = problem.cameras[i].camera_from_map.rotation.matrix();
+  }
+  for (const Point& point : points_) {
+    const Eigen::Vector3d& position = problem.points[static_cast<std::size_t>(point.index)].position;
+    for (std::size_t i = point.begin; i < point.end; ++i) {
+      const Measurement& measurement = MeasurementAt(i);
+      next_squared_norms_[i] =
+          SquaredNorm(measurement, next_cameras_[static_cast<std::size_t>(measurement.camera)], position);
+    }
+  }
+  return next_squared_norms_;
 }
 
 // A counting sort by point. What is fixed, not finite or never measured is no unknown.
@@ -89,12 +103,9 @@ void BundleSystem::Pack(const BundleProblem& problem) {
     }
     points_.push_back(point);
   }
-  measurements_.resize(problem.measurements.size());
-  for (std::size_t i = 0; i < problem.measurements.size(); ++i) {
-    const BundleProblem::Measurement& measurement = problem.measurements[i];
-    measurements_[next[static_cast<std::size_t>(measurement.point)]++] = {
-        measurement.pixel, 1 / measurement.sigma_px, measurement.camera, static_cast<int>(i)};
-  }
+  order_.resize(measurements_.size());
+  for (std::size_t i = 0; i < measurements_.size(); ++i)
+    order_[next[static_cast<std::size_t>(measurements_[i].point)]++] = static_cast<int>(i);
 }
 
 // Two cameras are coupled where they measured the same free point.
@@ -105,11 +116,11 @@ SkylineCholesky BundleSystem::MakeReduced() const {
     if (point.unknown < 0) continue;
     int least = std::numeric_limits<int>::max();
     for (std::size_t i = point.begin; i < point.end; ++i) {
-      const int unknown = cameras_[static_cast<std::size_t>(measurements_[i].camera)].unknown;
+      const int unknown = cameras_[static_cast<std::size_t>(MeasurementAt(i).camera)].unknown;
       if (unknown >= 0) least = std::min(least, unknown);
     }
     for (std::size_t i = point.begin; i < point.end; ++i) {
-      const int unknown = cameras_[static_cast<std::size_t>(measurements_[i].camera)].unknown;
+      const int unknown = cameras_[static_cast<std::size_t>(MeasurementAt(i).camera)].unknown;
       if (unknown < 0) continue;
       int& begin = first[static_cast<std::size_t>(unknown)];
       begin = std::min(begin, least);
@@ -123,7 +134,9 @@ double BundleSystem::SquaredNorm(const Measurement& measurement, const Camera& c
   Eigen::Vector2d pixel;
   const Eigen::Vector3d in_camera = camera.rotation * point + camera.camera_from_map.translation;
   if (!camera.model->Project(in_camera, &pixel, nullptr)) return std::numeric_limits<double>::infinity();
-  const double squared_norm = (measurement.inverse_sigma * (pixel - measurement.pixel)).squaredNorm();
+  const Eigen::Vector2d measured = measurement.pixel.cast<double>();
+  const double inverse_sigma = InverseSigma(measurement);
+  const double squared_norm = (inverse_sigma * (pixel - measured)).squaredNorm();
   return std::isfinite(squared_norm) ? squared_norm : std::numeric_limits<double>::infinity();
 }
 
@@ -136,8 +149,9 @@ bool BundleSystem::Linearize(const Measurement& measurement, double squared_norm
   result->in_camera.noalias() = camera.rotation * point + camera.camera_from_map.translation;
   Eigen::Vector2d pixel;
   if (!camera.model->Project(result->in_camera, &pixel, &result->jacobian)) return false;
-  const double scale = std::sqrt(slope) * measurement.inverse_sigma;
-  result->residual = scale * (pixel - measurement.pixel);
+  const Eigen::Vector2d measured = measurement.pixel.cast<double>();
+  const double scale = std::sqrt(slope) * InverseSigma(measurement);
+  result->residual = scale * (pixel - measured);
   result->jacobian *= scale;
   return true;
 }
@@ -171,7 +185,7 @@ void BundleSystem::ReducePoint(const Point& point, double threshold, double damp
   couplings_.clear();
   Linearized linearized;
   for (std::size_t i = point.begin; i < point.end; ++i) {
-    const Measurement& measurement = measurements_[i];
+    const Measurement& measurement = MeasurementAt(i);
     const Camera& camera = cameras_[static_cast<std::size_t>(measurement.camera)];
     if (camera.unknown < 0 && point.unknown < 0) continue;
     if (!Linearize(measurement, squared_norms_[i], position, threshold, &linearized)) continue;
@@ -266,9 +280,9 @@ void BundleSystem::FollowPoint(const Point& point, double threshold) {
     Eigen::Vector3d pull = eliminated.gradient;
     Linearized linearized;
     for (std::size_t i = point.begin; i < point.end; ++i) {
-      const Camera& camera = cameras_[static_cast<std::size_t>(measurements_[i].camera)];
+      const Camera& camera = cameras_[static_cast<std::size_t>(MeasurementAt(i).camera)];
       if (camera.unknown < 0) continue;
-      if (!Linearize(measurements_[i], squared_norms_[i], positions_[index], threshold, &linearized))
+      if (!Linearize(MeasurementAt(i), squared_norms_[i], positions_[index], threshold, &linearized))
         continue;
       const Twist twist = camera_step_.segment<6>(6 * camera.unknown);
       const Eigen::Vector3d moved = twist.head<3>() + twist.tail<3>().cross(linearized.in_camera);
@@ -280,9 +294,12 @@ void BundleSystem::FollowPoint(const Point& point, double threshold) {
     predicted_decrease_ += 0.5 * step.dot(eliminated.damping.cwiseProduct(step) - eliminated.gradient);
   }
   for (std::size_t i = point.begin; i < point.end; ++i) {
-    const auto camera = static_cast<std::size_t>(measurements_[i].camera);
-    if (point.unknown < 0 && cameras_[camera].unknown < 0) continue;
-    next_squared_norms_[i] = SquaredNorm(measurements_[i], next_cameras_[camera], next_positions_[index]);
+    const auto camera = static_cast<std::size_t>(MeasurementAt(i).camera);
+    if (point.unknown < 0 && cameras_[camera].unknown < 0) {
+      next_squared_norms_[i] = squared_norms_[i];
+      continue;
+    }
+    next_squared_norms_[i] = SquaredNorm(MeasurementAt(i), next_cameras_[camera], next_positions_[index]);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/mapping/bundle_adjustment.h"
+#include "engine/mapping/robust_loss.h"
 #include "engine/mapping/skyline_cholesky.h"
 
 namespace docent::engine {
@@ -14,15 +15,15 @@ namespace docent::engine {
 // The normal equations of a bundle problem and one damped step of them (Levenberg-Marquardt with the points
 // eliminated: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 2000, §6). Jacobians are never kept:
 // a point's measurements are linearised, summed up and eliminated while they are in the cache, and linearised
-// once more when the point follows the cameras' step. Memory is that of the measurements themselves and of
-// the reduced system of the cameras, and the work can stop after any point.
+// once more when the point follows the cameras' step. The measurements stay in the problem; memory is that
+// of their residuals and of the reduced system of the cameras, and the work can stop after any point.
 //
 // The robust loss makes weights: a measurement with residual r (in sigmas) and slope rho'(|r|^2) counts as
 // sqrt(rho') r, so the gradient is exactly the robust cost's, and the Hessian that of iteratively reweighted
 // least squares.
 //
-// Owned by one AdjustBundle call and used on its thread only. Reads the problem at construction only; the
-// camera models must outlive it.
+// Owned by one AdjustBundle call and used on its thread only. The problem must outlive it, and keep its
+// measurements; what else it holds is read at construction only.
 class BundleSystem {
  public:
   BundleSystem(const BundleProblem& problem, RobustLoss loss, const std::atomic<bool>* interrupt);
@@ -34,7 +35,11 @@ class BundleSystem {
   // Squared norms of residual / sigma_px at the state, infinite where a measurement does not project; entry i
   // belongs to the problem's measurement measurement_index(i). Right from construction on.
   const std::vector<double>& squared_norms() const { return squared_norms_; }
-  int measurement_index(std::size_t i) const { return measurements_[i].index; }
+  // EstimateSigma of them, in the memory of next_squared_norms(), which are lost.
+  double Sigma() { return EstimateSigma(squared_norms_, &next_squared_norms_); }
+  // Those at the state that the problem has, in the memory of what the last step led to, which is lost.
+  const std::vector<double>& MeasureAgain(const BundleProblem& problem);
+  int measurement_index(std::size_t i) const { return order_[i]; }
 
   enum class Outcome { kDone, kSingular, kInterrupted };
   // Works out the step that minimises the weighted squares at this robust threshold plus damping times each
@@ -60,12 +65,7 @@ class BundleSystem {
   void WriteBack(BundleProblem* problem) const;
 
  private:
-  // In the order of the passes: first those of nothing free, whose norms never change, then by point.
-  struct Measurement {
-    Eigen::Vector2d pixel;
-    double inverse_sigma = 1;
-    int camera = 0, index = 0;
-  };
+  using Measurement = BundleProblem::Measurement;
   struct Camera {
     const CameraModel* model = nullptr;
     Rigid3 camera_from_map;
@@ -73,7 +73,7 @@ class BundleSystem {
     int unknown = -1;  // place among the free cameras
   };
   struct Point {
-    std::size_t begin = 0, end = 0;  // measurements
+    std::size_t begin = 0, end = 0;  // of its measurements, in order_
     int index = 0;                   // into the problem
     int unknown = -1;                // place among the free points
   };
@@ -95,6 +95,9 @@ class BundleSystem {
   };
 
   void Pack(const BundleProblem& problem);
+  const Measurement& MeasurementAt(std::size_t i) const {
+    return measurements_[static_cast<std::size_t>(order_[i])];
+  }
   SkylineCholesky MakeReduced() const;
   // False where the measurement has no weight.
   bool Linearize(const Measurement& measurement, double squared_norm, const Eigen::Vector3d& point,
@@ -114,7 +117,8 @@ class BundleSystem {
   std::vector<Camera> cameras_, next_cameras_;
   std::vector<Eigen::Vector3d> positions_, next_positions_;  // of the problem's points
   std::vector<Point> points_;
-  std::vector<Measurement> measurements_;
+  const std::vector<Measurement>& measurements_;  // the problem's
+  std::vector<int> order_;                        // of the passes: indices of measurements, by point
   std::vector<double> squared_norms_, next_squared_norms_;
   std::vector<int> free_cameras_, free_points_;
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "engine/mapping/panorama_registration.h"
 
@@ -19,33 +21,39 @@ struct Assembly {
 };
 
 Assembly Assemble(Map* map, const std::set<KeyFrameId>& free, const std::set<KeyFrameId>& fixed,
-                  const std::set<MapPointId>& points) {
+                  std::vector<MapPointId> points) {
   Assembly assembly;
-  std::map<MapPointId, int> point_index;
-  for (const MapPointId id : points) {
-    const Map::PointRecord* record = map->FindPoint(id);
-    point_index[id] = static_cast<int>(assembly.points.size());
-    assembly.points.push_back(id);
-    assembly.problem.points.push_back({record->point.position(), false});
-  }
+  assembly.points = std::move(points);
+  std::map<KeyFrameId, std::pair<int, const Map::KeyFrameRecord*>> cameras;
   const auto add = [&](KeyFrameId id, bool hold) {
     const Map::KeyFrameRecord* record = map->FindKeyFrame(id);
-    const int camera = static_cast<int>(assembly.cameras.size());
+    cameras[id] = {static_cast<int>(assembly.cameras.size()), record};
     assembly.cameras.push_back(id);
     assembly.problem.cameras.push_back({record->keyframe.camera, record->keyframe.camera_from_map, hold});
-    for (const Observation& observation : record->observations) {
-      const auto point = point_index.find(observation.point);
-      if (point == point_index.end()) continue;
-      assembly.problem.measurements.push_back({camera, point->second, observation.pixel.cast<double>(),
-                                               static_cast<double>(1 << observation.level), false});
-    }
   };
-  std::size_t most = 0;
-  for (const auto* keyframes : {&free, &fixed})
-    for (const KeyFrameId id : *keyframes) most += map->FindKeyFrame(id)->observations.size();
-  assembly.problem.measurements.reserve(most);
   for (const KeyFrameId id : free) add(id, map->FindKeyFrame(id)->keyframe.fixed);
   for (const KeyFrameId id : fixed) add(id, true);
+  std::size_t most = 0;
+  for (const MapPointId id : assembly.points) most += map->FindPoint(id)->observers.size();
+  assembly.problem.points.reserve(assembly.points.size());
+  assembly.problem.measurements.reserve(most);
+  std::vector<std::pair<int, const Map::KeyFrameRecord*>> observers;
+  for (std::size_t i = 0; i < assembly.points.size(); ++i) {
+    const Map::PointRecord* record = map->FindPoint(assembly.points[i]);
+    assembly.problem.points.push_back({record->point.position(), false});
+    observers.clear();
+    for (const KeyFrameId id : record->observers)
+      if (const auto camera = cameras.find(id); camera != cameras.end()) observers.push_back(camera->second);
+    std::sort(observers.begin(), observers.end());
+    for (const auto& [camera, keyframe] : observers) {
+      const auto observation =
+          std::lower_bound(keyframe->observations.begin(), keyframe->observations.end(), assembly.points[i],
+                           [](const Observation& before, MapPointId id) { return before.point < id; });
+      if (observation == keyframe->observations.end() || observation->point != assembly.points[i]) continue;
+      assembly.problem.measurements.push_back({camera, static_cast<int>(i), observation->pixel,
+                                               static_cast<float>(1 << observation->level), false});
+    }
+  }
   return assembly;
 }
 
@@ -79,14 +87,19 @@ BundleSummary Solve(const BundleOptions& options, Assembly* assembly, Map* map) 
   return summary;
 }
 
-std::set<MapPointId> FinitePointsSeenBy(Map* map, const std::set<KeyFrameId>& keyframes) {
-  std::set<MapPointId> points;
-  for (const KeyFrameId id : keyframes) {
-    for (const Observation& observation : map->FindKeyFrame(id)->observations) {
-      const Map::PointRecord* record = map->FindPoint(observation.point);
-      if (record && !record->point.infinite()) points.insert(observation.point);
-    }
-  }
+// By ascending id.
+std::vector<MapPointId> FinitePointsSeenBy(Map* map, const std::set<KeyFrameId>& keyframes) {
+  std::vector<MapPointId> points;
+  for (const KeyFrameId id : keyframes)
+    for (const Observation& observation : map->FindKeyFrame(id)->observations)
+      points.push_back(observation.point);
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  std::erase_if(points, [&](MapPointId id) {
+    const Map::PointRecord* record = map->FindPoint(id);
+    return !record || record->point.infinite();
+  });
+  points.shrink_to_fit();
   return points;
 }
 
@@ -100,7 +113,7 @@ BundleSummary AdjustLocally(const MapAdjustmentOptions& options, KeyFrameId keyf
     if (static_cast<int>(free.size()) > options.window) break;
     free.insert(id);
   }
-  const std::set<MapPointId> points = FinitePointsSeenBy(map, free);
+  std::vector<MapPointId> points = FinitePointsSeenBy(map, free);
   std::map<KeyFrameId, int> others;
   for (const MapPointId id : points) {
     for (const KeyFrameId observer : map->FindPoint(id)->observers) {
@@ -115,7 +128,7 @@ BundleSummary AdjustLocally(const MapAdjustmentOptions& options, KeyFrameId keyf
     if (static_cast<int>(fixed.size()) >= options.max_fixed) break;
     fixed.insert(id);
   }
-  Assembly assembly = Assemble(map, free, fixed, points);
+  Assembly assembly = Assemble(map, free, fixed, std::move(points));
   BundleOptions bundle;
   bundle.max_iterations = options.local_iterations;
   bundle.interrupt = interrupt;

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "engine/geometry/triangulation.h"
 
@@ -33,6 +35,7 @@ Mapper::Mapper(const MapperOptions& options)
       loops_(options.loops, options.search) {}
 
 void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
+  RestPictures(kNoId);
   map_ = snapshot ? Map(*snapshot) : Map();
   searcher_.Clear();
   descriptors_.Clear();
@@ -125,6 +128,7 @@ bool Mapper::Step() {
   }
   double MapperTimes::*account = &MapperTimes::other;
   if (task) {
+    KeepPictures(&*task);
     if (const auto* candidate = std::get_if<KeyFrameCandidate>(&*task)) {
       InsertKeyFrame(UpToDate(*candidate));
     } else {
@@ -133,6 +137,7 @@ bool Mapper::Step() {
   } else {
     account = DoNextTask();
   }
+  if (account != nullptr) RestPictures(newest_);
   const double seconds = ProcessorSeconds() - start;
   const std::lock_guard lock(mutex_);
   stepping_ = false;
@@ -224,7 +229,7 @@ void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecor
     if (point && !point->point.infinite()) map_.AddObservation({id, match.point, match.pixel, match.level});
   }
   map_.UpdateDepth(record);
-  RefindPoints(options_.refind, id, &searcher_, &map_);
+  RefindAllPoints(id);
   map_.UpdateDepth(record);
   std::vector<MapPointId> created;
   for (const KeyFrameId partner : Partners(id)) {
@@ -278,6 +283,46 @@ std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
   return partners;
 }
 
+void Mapper::KeepPictures(Task* task) const {
+  if (!options_.pictures) return;
+  const auto keep = [this](std::shared_ptr<const ImageFeatures>* features) {
+    *features = options_.pictures->Keep(std::move(*features));
+  };
+  if (auto* candidate = std::get_if<KeyFrameCandidate>(task)) {
+    keep(&candidate->features);
+    return;
+  }
+  auto& pair = std::get<InitialPair>(*task);
+  keep(&pair.a.features);
+  keep(&pair.b.features);
+}
+
+void Mapper::RestPictures(KeyFrameId looked_at) {
+  constexpr std::size_t kNeighbours = 16;
+  if (!options_.pictures) return;
+  std::set<KeyFrameId> here = {looked_at};
+  for (const auto& [id, shared] : map_.Covisible(looked_at)) {
+    if (here.size() > kNeighbours) break;
+    here.insert(id);
+  }
+  for (const auto& [id, record] : map_.keyframes())
+    if (!here.contains(id)) options_.pictures->Rest(*record.keyframe.features);
+}
+
+// Patches of points far and wide are cut for it, and bring a good part of all pictures back.
+void Mapper::RefindAllPoints(KeyFrameId keyframe) {
+  constexpr std::size_t kPointsBetweenRests = 4096;
+  std::vector<MapPointId> all, some;
+  for (const Map::PointRecord& record : map_.points())
+    if (record.alive) all.push_back(record.point.id);
+  for (auto begin = all.begin(); begin != all.end(); begin += static_cast<std::ptrdiff_t>(some.size())) {
+    const auto left = static_cast<std::size_t>(all.end() - begin);
+    some.assign(begin, begin + static_cast<std::ptrdiff_t>(std::min(left, kPointsBetweenRests)));
+    RefindPoints(options_.refind, keyframe, &searcher_, &map_, &some);
+    RestPictures(keyframe);
+  }
+}
+
 void Mapper::RefindNewPoints() {
   // New points are looked for in the keyframes that share most with the newest one.
   constexpr std::size_t kNeighbours = 8;
@@ -297,7 +342,9 @@ void Mapper::LocalAdjustment() {
 }
 
 void Mapper::GlobalAdjustment() {
-  searcher_.Release();  // no time needs more memory than this one
+  // No time needs more memory than this one.
+  searcher_.Release();
+  RestPictures(kNoId);
   MapAdjustmentOptions adjustment = options_.adjustment;
   if (loop_to_adjust_) adjustment.global_loss = RobustLoss::kHuber;
   const BundleSummary summary = AdjustGlobally(adjustment, &interrupt_, &map_);

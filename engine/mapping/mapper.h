@@ -20,6 +20,7 @@
 #include "engine/mapping/point_creation.h"
 #include "engine/mapping/redundancy.h"
 #include "engine/mapping/refinding.h"
+#include "engine/vision/picture_store.h"
 
 namespace docent::engine {
 
@@ -43,6 +44,7 @@ struct MapperOptions {
   MapAdjustmentOptions adjustment;
   LoopOptions loops;
   SearchOptions search;
+  std::shared_ptr<PictureStore> pictures;  // where keyframes' pictures lie; null: in memory
 };
 
 // What the mapper did, for events and reports.
@@ -129,11 +131,15 @@ class Mapper {
   bool IsFinite() const;  // the map knows depth
   void ApplyReports();
   std::vector<KeyFrameId> Partners(KeyFrameId keyframe);
+  void RefindAllPoints(KeyFrameId keyframe);
   void RefindNewPoints();
   void LocalAdjustment();
   void GlobalAdjustment();
   // The most urgent step towards closing a loop; false when there is none.
   bool WorkOnLoops();
+  void KeepPictures(Task* task) const;
+  // Of all keyframes but this one and those that share most with it; kNoId: of all.
+  void RestPictures(KeyFrameId looked_at);
   // A candidate as it would have been offered had it been tracked in the map as it is now.
   KeyFrameCandidate UpToDate(KeyFrameCandidate candidate) const;
   void ThinOut();  // removes one redundant keyframe

@@ -46,15 +46,18 @@ double RobustCost(RobustLoss loss, double threshold, const std::vector<double>& 
 }
 
 double EstimateSigma(const std::vector<double>& squared_norms) {
-  std::vector<double> finite;
-  finite.reserve(squared_norms.size());
-  std::copy_if(squared_norms.begin(), squared_norms.end(), std::back_inserter(finite),
-               [](double norm) { return std::isfinite(norm); });
-  if (finite.empty()) {
-    return 0;
-  }
-  const auto middle = finite.begin() + static_cast<std::ptrdiff_t>(finite.size() / 2);
-  std::nth_element(finite.begin(), middle, finite.end());
+  std::vector<double> scratch;
+  return EstimateSigma(squared_norms, &scratch);
+}
+
+double EstimateSigma(const std::vector<double>& squared_norms, std::vector<double>* scratch) {
+  if (scratch->size() < squared_norms.size()) scratch->resize(squared_norms.size());
+  const auto begin = scratch->begin();
+  const auto end = std::copy_if(squared_norms.begin(), squared_norms.end(), begin,
+                                [](double norm) { return std::isfinite(norm); });
+  if (begin == end) return 0;
+  const auto middle = begin + (end - begin) / 2;
+  std::nth_element(begin, middle, end);
   return std::sqrt(*middle) / kRayleighMedian;
 }
 

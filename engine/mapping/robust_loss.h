@@ -26,5 +26,7 @@ double RobustCost(RobustLoss loss, double threshold, const std::vector<double>& 
 // Standard deviation per axis of two-dimensional residuals from the median of their squared norms;
 // measurements that do not project (infinite) are left out. Zero without any.
 double EstimateSigma(const std::vector<double>& squared_norms);
+// The same in memory that is there already: *scratch, whose numbers are lost and whose size stays.
+double EstimateSigma(const std::vector<double>& squared_norms, std::vector<double>* scratch);
 
 }  // namespace docent::engine

@@ -72,12 +72,15 @@ struct Reprojection {
                                       Eigen::Map<const Eigen::Vector3d>(translation));
     if (!pixel) return false;
     Eigen::Map<Eigen::Vector2d> result(residual);
-    result = (*pixel - measurement->pixel) / measurement->sigma_px;
+    result = (*pixel - measurement->pixel.cast<double>()) / static_cast<double>(measurement->sigma_px);
     return true;
   }
   const CameraModel* model;
   const BundleProblem::Measurement* measurement;
 };
+
+// Of two thousand measurements whose pixels, below 1024, were rounded to floats: by up to 3e-5 in x and in y.
+constexpr double kRoundingCost = 0.5 * 2000 * 2 * 3e-5 * 3e-5;
 
 BundleOptions WithIterations(int iterations) {
   BundleOptions options;
@@ -103,7 +106,7 @@ TEST(AdjustBundleTest, ExactMeasurementsLeadBackToTheTruthThroughEveryLens) {
       EXPECT_LT(WorstCenterError(scene), 1e-6) << summary.Brief();
       EXPECT_LT(WorstPointError(scene), 1e-4) << summary.Brief();
       EXPECT_EQ(summary.outliers, 0) << summary.Brief();
-      EXPECT_LT(summary.final_cost, 1e-9) << summary.Brief();
+      EXPECT_LT(summary.final_cost, kRoundingCost) << summary.Brief();
     }
   }
 }
@@ -222,7 +225,7 @@ TEST(AdjustBundleTest, FindsAPoseAmongFixedPoints) {
   BundleScene scene = MakeBundleScene(scene_options);
   const BundleSummary summary = AdjustBundle(WithIterations(30), &scene.problem);
   EXPECT_EQ(summary.outcome, Outcome::kConverged) << summary.Brief();
-  EXPECT_LT(WorstCenterError(scene), 1e-9) << summary.Brief();
+  EXPECT_LT(WorstCenterError(scene), 1e-6) << summary.Brief();
 }
 
 TEST(AdjustBundleTest, FindsPointsAmongFixedCameras) {
@@ -239,7 +242,7 @@ TEST(AdjustBundleTest, WithNothingFixedTheResidualsStillVanish) {
   scene_options.fixed_cameras = 0;
   BundleScene scene = MakeBundleScene(scene_options);
   const BundleSummary summary = AdjustBundle(WithIterations(50), &scene.problem);
-  EXPECT_LT(summary.final_cost, 1e-9) << summary.Brief();
+  EXPECT_LT(summary.final_cost, kRoundingCost) << summary.Brief();
 }
 
 TEST(AdjustBundleTest, NothingFreeIsNothingToDo) {
@@ -309,7 +312,7 @@ TEST(AdjustBundleTest, APointWithOneMeasurementDoesNotRunAway) {
     lone.problem.points.push_back({truth.inverse() * start, false});
     lone.points.push_back(truth.inverse() * in_camera);
     const auto pixel = lone.problem.cameras[0].model->Project(in_camera);
-    lone.problem.measurements.push_back({camera, scene_options.points, *pixel, 1, false});
+    lone.problem.measurements.push_back({camera, scene_options.points, pixel->cast<float>(), 1, false});
     AdjustBundle(WithIterations(50), &lone.problem);
     const Eigen::Vector3d found = truth * lone.problem.points.back().position;
     EXPECT_LT((found.head<2>() / found.z() - in_camera.head<2>() / in_camera.z()).norm(), 1e-6);

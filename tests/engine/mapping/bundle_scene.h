@@ -63,7 +63,7 @@ inline BundleScene MakeBundleScene(const BundleSceneOptions& options) {
       if (!pixel || !model->IsInside(*pixel)) {
         continue;
       }
-      const double sigma_px = 1 << random.Below(3);
+      const auto sigma_px = static_cast<float>(1 << random.Below(3));
       const bool outlier = random.Uniform() < options.outlier_ratio;
       Eigen::Vector2d error(RandomNormal(&random), RandomNormal(&random));
       error *= options.noise_px * sigma_px;
@@ -71,7 +71,7 @@ inline BundleScene MakeBundleScene(const BundleSceneOptions& options) {
         error += sigma_px * random.Uniform(30, 60) *
                  Eigen::Vector2d(RandomDirection(&random).head<2>().normalized());
       }
-      scene.problem.measurements.push_back({camera, point, *pixel + error, sigma_px, false});
+      scene.problem.measurements.push_back({camera, point, (*pixel + error).cast<float>(), sigma_px, false});
       scene.is_outlier.push_back(outlier);
     }
   }

@@ -38,7 +38,7 @@ Eigen::VectorXd Residuals(const BundleProblem& problem) {
     const auto pixel = camera.model->Project(
         camera.camera_from_map * problem.points[static_cast<std::size_t>(measurement.point)].position);
     result.segment<2>(static_cast<Eigen::Index>(2 * i)) =
-        (pixel.value() - measurement.pixel) / measurement.sigma_px;
+        (pixel.value() - measurement.pixel.cast<double>()) / static_cast<double>(measurement.sigma_px);
   }
   return result;
 }
@@ -135,7 +135,7 @@ TEST_P(BundleSystemTest, TheStepIsThatOfTheFullDampedNormalEquations) {
 
 TEST_P(BundleSystemTest, APointThatOnePictureShowsTwiceCountsTwice) {
   BundleProblem::Measurement again = problem_.measurements.back();  // by a free camera
-  again.pixel.x() += 0.7;
+  again.pixel.x() += 0.7f;
   problem_.measurements.insert(problem_.measurements.begin(), again);
   ExpectTheDenseStep();
 }

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/files/picture_files.h"
+
+#include <fcntl.h>
+#include <spdlog/spdlog.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <opencv2/core.hpp>
+#include <string>
+#include <utility>
+
+namespace docent::app {
+
+namespace {
+
+constexpr std::size_t kAlignment = 64;  // of each picture, in bytes
+
+// An open file without a name; -1 with errno when there can be none.
+class NamelessFile {
+ public:
+  explicit NamelessFile(const std::filesystem::path& folder)
+      : descriptor_(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600)) {
+    // Not every file system has files that never had a name.
+    if (descriptor_ >= 0 || (errno != EOPNOTSUPP && errno != EISDIR)) return;
+    std::string name = (folder / "docent-XXXXXX").string();
+    descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
+    if (descriptor_ >= 0) ::unlink(name.c_str());
+  }
+  ~NamelessFile() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  NamelessFile(const NamelessFile&) = delete;
+  NamelessFile& operator=(const NamelessFile&) = delete;
+
+  int descriptor() const { return descriptor_; }
+  // False with errno when the disk does not take it all.
+  bool Write(const std::uint8_t* bytes, std::size_t count, std::size_t offset) const {
+    while (count > 0) {
+      const ssize_t written = ::pwrite(descriptor_, bytes, count, static_cast<off_t>(offset));
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) return false;
+      bytes += written;
+      offset += static_cast<std::size_t>(written);
+      count -= static_cast<std::size_t>(written);
+    }
+    return true;
+  }
+
+ private:
+  int descriptor_ = -1;
+};
+
+// A file's bytes in memory, and the owner of every picture that lies in them: OpenCV's count of who holds a
+// picture ends here. Each picture holds the mapping; the last one takes it along.
+class PictureMapping final : public cv::MatAllocator, public std::enable_shared_from_this<PictureMapping> {
+ public:
+  // Null with errno when it cannot be mapped.
+  static std::shared_ptr<const PictureMapping> Make(const NamelessFile& file, std::size_t bytes) {
+    void* const data = ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file.descriptor(), 0);
+    if (data == MAP_FAILED) return nullptr;
+    return std::make_shared<PictureMapping>(data, bytes);
+  }
+
+  PictureMapping(void* data, std::size_t bytes) : data_(data), bytes_(bytes) {}
+  ~PictureMapping() override { ::munmap(data_, bytes_); }
+  PictureMapping(const PictureMapping&) = delete;
+  PictureMapping& operator=(const PictureMapping&) = delete;
+
+  cv::Mat Picture(std::size_t offset, cv::Size size) const {
+    cv::Mat picture(size, CV_8UC1, static_cast<std::uint8_t*>(data_) + offset);
+    auto holder = std::make_unique<std::shared_ptr<const PictureMapping>>(shared_from_this());
+    picture.u = new cv::UMatData(this);  // deleted by deallocate
+    picture.u->data = picture.u->origdata = picture.data;
+    picture.u->size = picture.total();
+    picture.u->refcount = 1;
+    picture.u->userdata = holder.release();
+    return picture;
+  }
+
+  // The pages are shared with the file: to let them go loses nothing.
+  void Rest() const { ::madvise(data_, bytes_, MADV_DONTNEED); }
+
+  void deallocate(cv::UMatData* data) const override {
+    if (data == nullptr) return;
+    const std::unique_ptr<std::shared_ptr<const PictureMapping>> holder(
+        static_cast<std::shared_ptr<const PictureMapping>*>(data->userdata));
+    delete data;
+  }
+  // Nothing else is ever made in here: cv::Mat asks its `allocator`, which Picture leaves empty.
+  cv::UMatData* allocate(int /*dims*/, const int* /*sizes*/, int /*type*/, void* /*data*/,
+                         std::size_t* /*step*/, cv::AccessFlag /*flags*/,
+                         cv::UMatUsageFlags /*usage*/) const override {
+    return nullptr;
+  }
+  bool allocate(cv::UMatData* /*data*/, cv::AccessFlag /*flags*/,
+                cv::UMatUsageFlags /*usage*/) const override {
+    return false;
+  }
+
+ private:
+  void* const data_;
+  const std::size_t bytes_;
+};
+
+// The features with their pyramid in a file of the folder; null with errno.
+std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatures& features,
+                                                        const std::filesystem::path& folder) {
+  const NamelessFile file(folder);
+  if (file.descriptor() < 0) return nullptr;
+  std::array<std::size_t, engine::kPyramidLevels> offsets{};
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; i < features.levels.size(); ++i) {
+    const cv::Mat& level = features.levels[i];
+    const cv::Mat whole = level.isContinuous() ? level : level.clone();
+    offsets[i] = bytes;
+    if (!file.Write(whole.ptr(), whole.total(), bytes)) return nullptr;
+    bytes = (bytes + whole.total() + kAlignment - 1) / kAlignment * kAlignment;
+  }
+  const auto mapping = PictureMapping::Make(file, bytes);
+  if (!mapping) return nullptr;
+  auto kept = std::make_shared<engine::ImageFeatures>();
+  for (std::size_t i = 0; i < features.levels.size(); ++i)
+    kept->levels[i] = mapping->Picture(offsets[i], features.levels[i].size());
+  kept->corners = features.corners;
+  kept->row_begin = features.row_begin;
+  kept->fast_threshold = features.fast_threshold;
+  kept->small_blurry = {features.small_blurry.pixels.clone(), features.small_blurry.scale};
+  return kept;
+}
+
+const PictureMapping* MappingOf(const engine::ImageFeatures& features) {
+  const cv::UMatData* const data = features.levels[0].u;
+  return data != nullptr ? dynamic_cast<const PictureMapping*>(data->currAllocator) : nullptr;
+}
+
+}  // namespace
+
+PictureFiles::PictureFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+std::filesystem::path PictureFiles::DefaultFolder() {
+  const char* const folder = std::getenv("TMPDIR");
+  return folder != nullptr && *folder != '\0' ? folder : "/var/tmp";
+}
+
+std::shared_ptr<const engine::ImageFeatures> PictureFiles::Keep(
+    std::shared_ptr<const engine::ImageFeatures> features) {
+  if (MappingOf(*features) != nullptr) return features;
+  if (auto kept = MoveToFile(*features, folder_)) return kept;
+  const int error = errno;
+  if (!told_.exchange(true)) {
+    spdlog::warn("The pictures of maps stay in memory: '{}' takes no file ({}).", folder_.string(),
+                 std::strerror(error));
+  }
+  return features;
+}
+
+void PictureFiles::Rest(const engine::ImageFeatures& features) {
+  if (const PictureMapping* const mapping = MappingOf(features)) mapping->Rest();
+}
+
+}  // namespace docent::app

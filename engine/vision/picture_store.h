@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "engine/vision/image_pyramid.h"
+
+namespace docent::engine {
+
+// Where the pictures of keyframes lie. They are most of a map's bytes, and of most of them nothing is looked
+// at for minutes: a store keeps them where they need no memory in the meantime. The engine knows no files;
+// whoever owns a mapper may give it a store, which must outlive none of the pictures that it kept.
+//
+// What holds: a kept picture has the same pixels at the same address for as long as anyone holds it, resting
+// or not, so who reads it needs to know nothing of all this. Any thread may call anything.
+class PictureStore {
+ public:
+  virtual ~PictureStore() = default;
+
+  // The same features with their pyramid in the store; never to be written again. The argument itself when
+  // the store has no room.
+  virtual std::shared_ptr<const ImageFeatures> Keep(std::shared_ptr<const ImageFeatures> features) = 0;
+  // Nobody is expected to look at these for a while: their memory may go. Looking brings it back. Nothing
+  // happens to features that no store keeps.
+  virtual void Rest(const ImageFeatures& features) = 0;
+};
+
+}  // namespace docent::engine

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/files/picture_files.h"
+
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdint>
+#include <fstream>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "engine/vision/features.h"
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using engine::ImageFeatures;
+
+std::shared_ptr<const ImageFeatures> NoisyFeatures(std::uint64_t seed = 1) {
+  cv::Mat gray(241, 323, CV_8UC1);  // odd at every level
+  cv::RNG random(seed);
+  random.fill(gray, cv::RNG::UNIFORM, 0, 256);
+  return engine::MakeFeatures(gray);
+}
+
+bool Same(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
+}
+
+void ExpectSame(const ImageFeatures& a, const ImageFeatures& b) {
+  for (std::size_t i = 0; i < engine::kPyramidLevels; ++i) {
+    EXPECT_TRUE(Same(a.levels[i], b.levels[i])) << "level " << i;
+    EXPECT_EQ(a.row_begin[i], b.row_begin[i]);
+    ASSERT_EQ(a.corners[i].size(), b.corners[i].size());
+    for (std::size_t k = 0; k < a.corners[i].size(); ++k) {
+      EXPECT_EQ(a.corners[i][k].x, b.corners[i][k].x);
+      EXPECT_EQ(a.corners[i][k].y, b.corners[i][k].y);
+    }
+  }
+  EXPECT_EQ(a.fast_threshold, b.fast_threshold);
+  EXPECT_TRUE(Same(a.small_blurry.pixels, b.small_blurry.pixels));
+  EXPECT_EQ(a.small_blurry.scale, b.small_blurry.scale);
+}
+
+// Of the mapping that holds the address; -1 where nothing is mapped.
+long ResidentKilobytes(const void* address) {
+  const auto wanted = reinterpret_cast<std::uintptr_t>(address);
+  std::ifstream maps("/proc/self/smaps");
+  bool inside = false;
+  for (std::string line; std::getline(maps, line);) {
+    unsigned long begin = 0, end = 0;
+    char after = 0;
+    if (std::sscanf(line.c_str(), "%lx-%lx%c", &begin, &end, &after) == 3 && after == ' ')
+      inside = begin <= wanted && wanted < end;
+    long kilobytes = 0;
+    if (inside && std::sscanf(line.c_str(), "Rss: %ld kB", &kilobytes) == 1) return kilobytes;
+  }
+  return -1;
+}
+
+TEST(PictureFiles, KeepAnEqualCopyThatSharesNothing) {
+  const TemporaryFolder folder;
+  PictureFiles files(folder.path());
+  const auto features = NoisyFeatures();
+  const auto kept = files.Keep(features);
+  ASSERT_NE(kept, features);
+  ExpectSame(*kept, *features);
+  EXPECT_NE(kept->levels[0].data, features->levels[0].data);
+  EXPECT_NE(kept->small_blurry.pixels.data, features->small_blurry.pixels.data);
+  EXPECT_EQ(files.Keep(kept), kept);
+}
+
+TEST(PictureFiles, RestingPicturesNeedNoMemoryAndAreTheSameAfterwards) {
+  const TemporaryFolder folder;
+  PictureFiles files(folder.path());
+  const auto features = NoisyFeatures();
+  const auto kept = files.Keep(features);
+  ExpectSame(*kept, *features);
+  const std::uint8_t* const address = kept->levels[0].data;
+  EXPECT_GE(ResidentKilobytes(address), 323 * 241 / 1024);
+  files.Rest(*kept);
+  EXPECT_EQ(ResidentKilobytes(address), 0);
+  EXPECT_EQ(kept->levels[0].data, address);
+  ExpectSame(*kept, *features);
+}
+
+TEST(PictureFiles, RestingHarmsNoPictureInOrdinaryMemory) {
+  const TemporaryFolder folder;
+  PictureFiles files(folder.path());
+  const auto features = NoisyFeatures();
+  files.Rest(*features);
+  files.Rest(ImageFeatures());
+  ExpectSame(*features, *NoisyFeatures());
+}
+
+TEST(PictureFiles, LeaveNothingInTheFolder) {
+  const TemporaryFolder folder;
+  PictureFiles files(folder.path());
+  const auto kept = files.Keep(NoisyFeatures());
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(PictureFiles, PicturesOutliveTheirFeaturesAndTheStoreAndThenGiveTheirMemoryBack) {
+  const TemporaryFolder folder;
+  auto files = std::make_unique<PictureFiles>(folder.path());
+  const auto features = NoisyFeatures();
+  auto kept = files->Keep(features);
+  cv::Mat picture = kept->levels[1];
+  const std::uint8_t* const address = picture.data;
+  kept.reset();
+  files.reset();
+  EXPECT_TRUE(Same(picture, features->levels[1]));
+  picture.release();
+  EXPECT_EQ(ResidentKilobytes(address), -1);
+}
+
+// A picture that is made like a kept one is nobody's business but its maker's.
+TEST(PictureFiles, AnotherPictureInTheSameVariableLiesInOrdinaryMemory) {
+  const TemporaryFolder folder;
+  PictureFiles files(folder.path());
+  const auto kept = files.Keep(NoisyFeatures());
+  cv::Mat picture = kept->levels[0];
+  picture.create(100, 100, CV_8UC1);
+  picture.setTo(7);
+  EXPECT_EQ(cv::countNonZero(picture == 7), 100 * 100);
+  ExpectSame(*kept, *NoisyFeatures());
+}
+
+TEST(PictureFiles, WhereThereIsNoFolderPicturesStayWhereTheyAre) {
+  const TemporaryFolder folder;
+  PictureFiles files(folder / "missing");
+  const auto features = NoisyFeatures();
+  EXPECT_EQ(files.Keep(features), features);
+}
+
+TEST(PictureFiles, WhereTheDiskTakesNoMorePicturesStayWhereTheyAre) {
+  const TemporaryFolder folder;
+  PictureFiles files(folder.path());
+  const auto features = NoisyFeatures();
+  const auto before = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &limit), 0);
+  rlimit little = limit;
+  little.rlim_cur = features->levels[0].total() + 100;  // full within the second level
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &little), 0);
+  const auto kept = files.Keep(features);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  std::signal(SIGXFSZ, before);
+  EXPECT_EQ(kept, features);
+  EXPECT_NE(files.Keep(features), features);  // there is room again
+}
+
+}  // namespace
+}  // namespace docent::app
