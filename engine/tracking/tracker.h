@@ -42,8 +42,8 @@ struct TrackerOptions {
   double max_picture_s = 5.0;          // without points in between: small errors add up
   double good_quality = 0.30;          // ptamm §2.1
   double lost_quality = 0.13;          // ptamm §2.1
-  // Fewer do not make a pose, whatever their share: patches that fit by chance agree with some pose, too. Where
-  // a map was being left, poses told by 20 to 30 points jumped by two degrees and more.
+  // Fewer do not make a pose, whatever their share: patches that fit by chance agree with some pose, too.
+  // Where a map was being left, poses told by 20 to 30 points jumped by two degrees and more.
   int min_inliers = 30;
   // Enough where only the rotation is asked for, or where nearly all that was looked for is there: a bare
   // wall.
