@@ -299,7 +299,10 @@ void Mapper::KeepPictures(Task* task) const {
 
 void Mapper::RestPictures(KeyFrameId looked_at) {
   constexpr std::size_t kNeighbours = 16;
-  if (!options_.pictures) return;
+  // 40 MB at 640x480. What rests is slow to be looked at for the first time; a map of one exhibit need not
+  // pay.
+  constexpr std::size_t kSmallMap = 100;
+  if (!options_.pictures || map_.keyframes().size() <= kSmallMap) return;
   std::set<KeyFrameId> here = {looked_at};
   for (const auto& [id, shared] : map_.Covisible(looked_at)) {
     if (here.size() > kNeighbours) break;
