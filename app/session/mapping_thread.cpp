@@ -5,7 +5,10 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <memory>
 #include <utility>
+
+#include "app/files/picture_files.h"
 
 namespace docent::app {
 
@@ -21,10 +24,15 @@ void LetOthersGoFirst() {
   setpriority(PRIO_PROCESS, thread, now + kSteps);  // where it is refused all go alike
 }
 
+engine::MapperOptions WithPictureFiles(engine::MapperOptions options) {
+  if (!options.pictures) options.pictures = std::make_shared<PictureFiles>();
+  return options;
+}
+
 }  // namespace
 
 MappingThread::MappingThread(const engine::MapperOptions& options, bool threaded, Tell tell)
-    : mapper_(options), tell_(std::move(tell)) {
+    : mapper_(WithPictureFiles(options)), tell_(std::move(tell)) {
   if (!threaded) return;
   worker_.emplace("mapper", [this](const std::stop_token& stop) {
     LetOthersGoFirst();

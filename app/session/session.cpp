@@ -7,27 +7,17 @@
 #include <opencv2/core/utility.hpp>
 #include <utility>
 
-#include "app/files/picture_files.h"
 #include "app/files/text_file.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
-
-namespace {
-
-engine::MapperOptions WithPictureFiles(engine::MapperOptions options) {
-  if (!options.pictures) options.pictures = std::make_shared<PictureFiles>();
-  return options;
-}
-
-}  // namespace
 
 Session::Session(const SessionOptions& options,
                  std::vector<std::shared_ptr<const engine::CameraModel>> cameras, maps::Library* library)
     : options_(options),
       library_(library),
       association_(cameras.size()),
-      mapping_(WithPictureFiles(options.mapper), options.threaded && options.may_write,
+      mapping_(options.mapper, options.threaded && options.may_write,
                [this](const MappingThread::News& news) { Hear(news); }) {
   // Trackers and mapper have the processors; OpenCV's own threads would only get into their way.
   cv::setNumThreads(1);
@@ -211,34 +201,6 @@ std::optional<RigEstimate> Session::Rig() const {
   return rig_.estimate();
 }
 
-void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
-  const std::uint64_t before = std::exchange(camera->map_key, key);
-  const SessionMap& map = maps_.at(key);
-  AddEvent(time, "map", "entered " + map.name);
-  HoldMapsInUse();
-  ExpectNeighbours(map);
-  if (saver_) saver_->InterruptUpkeep();  // it may be this map's
-  // The others give up where they are looking and come (ptamm §3.3).
-  for (Camera& other : cameras_) {
-    if (other.map_key == key) continue;
-    other.map_key = key;
-    other.lost_since.reset();
-    other.order = Camera::Order::kGo;
-  }
-  if (!options_.may_write || growing_key_ == key) return;
-  // The map before rests now: it is saved as it stands, and grows again when somebody comes back to it.
-  if (const auto found = maps_.find(before); found != maps_.end() && !found->second.discarded) {
-    found->second.on_probation = false;
-    SaveMap(&found->second, time);
-  }
-  GrowOn(map);
-}
-
-bool Session::MayGrow(const SessionMap& map, const engine::Rigid3& camera_from_map) const {
-  return options_.may_write && !map.discarded &&
-         maps::KeyFrameAllowed(map.policy, map.bounds, camera_from_map.OriginInSource());
-}
-
 void Session::OfferToMapper(Camera* camera, const engine::TrackedFrame& frame) {
   engine::Tracker& tracker = *camera->tracker;
   std::optional<engine::InitialPair> pair = tracker.TakeInitialPair();
@@ -318,54 +280,6 @@ void Session::Hear(const MappingThread::News& news) {
                  map.name + ": " + event.detail.substr(0, event.detail.rfind(", ")));
         break;
     }
-  }
-}
-
-void Session::WatchProbation(Camera* camera, const engine::TrackedFrame& frame) {
-  const auto found = maps_.find(camera->map_key);
-  if (found == maps_.end()) return;
-  SessionMap& map = found->second;
-  const Timestamp now = frame.frame.time;
-  if (options_.may_write && map.snapshot && !map.snapshot->HasFinitePoints()) {
-    // Directions alone are soon had again.
-    if (camera->lost_since && now - *camera->lost_since > options_.probation_loss)
-      Discard(map.key, now, "its track was lost before it knew depth");
-    return;
-  }
-  if (!map.on_probation) return;
-  if (map.snapshot->keyframes.size() >= options_.probation_keyframes ||
-      (!camera->lost_since && now - map.started > options_.probation)) {
-    map.on_probation = false;
-    return;
-  }
-  if (!camera->lost_since || now - *camera->lost_since <= options_.probation_loss) return;
-  if (*camera->lost_since - map.started > options_.probation) {
-    map.on_probation = false;
-    return;
-  }
-  Discard(map.key, now,
-          "its track was lost " + FormatNumber(ToSeconds(*camera->lost_since - map.started), 3) +
-              " s after the start, with " + std::to_string(map.snapshot->keyframes.size()) + " keyframes");
-}
-
-void Session::Discard(std::uint64_t key, Timestamp time, const std::string& reason) {
-  SessionMap& map = maps_.at(key);
-  map.discarded = true;
-  index_.RemoveMap(key);
-  AddEvent(time, "map", "discarded " + map.name + ": " + reason);
-  SessionMap& next = AddMap(map.name);
-  // What was placed in the false start has lost its ground with it.
-  for (const content::Entity& entity : map.scene->entities) {
-    AddEvent(time, "warning", "'" + entity.name + "' went with the discarded map");
-  }
-  growing_key_ = next.key;
-  mapping_.Adopt(next.key, nullptr);
-  association_.Begin(next.key);
-  for (Camera& camera : cameras_) {
-    if (camera.map_key != key) continue;
-    camera.map_key = next.key;
-    camera.order = camera.began ? Camera::Order::kStart : Camera::Order::kGo;
-    camera.lost_since.reset();
   }
 }
 
