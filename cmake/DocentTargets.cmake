@@ -30,6 +30,9 @@ target_compile_options(docent_compile_options INTERFACE -Wall -Wextra -Wpedantic
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<STREQUAL:${CMAKE_CXX_FLAGS_RELEASE},-O3>>:-Wno-restrict>
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${DOCENT_PRECOMPILE}>>:-fpch-preprocess>
   $<$<BOOL:${DOCENT_WERROR}>:-Werror>
+  # Else it is the optimiser's choice which products are rounded before they are added, and a change of one line
+  # changes the figures of another. It costs nothing that can be measured.
+  -ffp-contract=off
   # A vector of the machine's width changes Eigen's layout: every target must agree on it.
   $<$<AND:$<BOOL:${DOCENT_MARCH}>,$<STREQUAL:${CMAKE_SYSTEM_PROCESSOR},x86_64>>:-march=${DOCENT_MARCH}>)
 if(DOCENT_SANITIZE)  # a plain if: the comma of "address,undefined" would end a generator expression
