@@ -206,9 +206,7 @@ class CameraFeed {
       return;
     }
     if (pace == Pace::kRealtime && !live_) clock_->WaitFor(frame_.time, stop);
-    // A file delivers faster than a camera and would run away from the mapper, which in the world has the
-    // whole time between pictures; so whoever feeds waits, never the tracker.
-    if (pace == Pace::kEager) session_->WaitUntilCalm(stop);
+    if (pace == Pace::kEager) WaitForMapper(stop);
     FollowHead();
     tracked = session_->Process(frame_);
     TellLatency();
@@ -219,6 +217,15 @@ class CameraFeed {
   void CheckAllDone() const { commander_.CheckAllDone(); }
 
  private:
+  // A file delivers faster than a camera and would run away from the mapper, which in the world has the whole
+  // time between pictures; so whoever feeds waits, never the tracker.
+  void WaitForMapper(const std::stop_token& stop) {
+    auto due = std::chrono::steady_clock::now();
+    if (handed_on_) due = handed_on_->first + (frame_.time - handed_on_->second);
+    session_->WaitUntilCalm(due, stop);
+    handed_on_ = {std::chrono::steady_clock::now(), frame_.time};
+  }
+
   // Tells the tracker how far the camera was told to turn since the last picture that was tracked.
   void FollowHead() {
     Head* const head = run_.camera->source->head();
@@ -260,6 +267,8 @@ class CameraFeed {
   bool late_ = false;  // the picture is to be dropped
   std::optional<Timestamp> first_time_;
   Timestamp clock_offset_{};
+  // Eager: when the picture before was handed on, and its own time.
+  std::optional<std::pair<std::chrono::steady_clock::time_point, Timestamp>> handed_on_;
   std::string trouble_;
 };
 

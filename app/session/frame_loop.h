@@ -78,7 +78,8 @@ using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
 // the camera's. Throws Error for what the source or a command's line has wrong; what was done before stands.
 //
 //   lockstep   one picture after the other; the session runs its mapper in between
-//   eager      as fast as the tracker is, but never further ahead of the mapper than a camera would be
+//   eager      as fast as the tracker is while the mapper rests, and no faster than the pictures' times while it
+//              works: never further ahead of the mapper than a camera would be
 //   realtime   by the pictures' times; what is overtaken by its successor before it is asked for is dropped,
 //   as
 //              a camera drops it

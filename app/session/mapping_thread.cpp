@@ -133,6 +133,7 @@ void MappingThread::Run(const std::stop_token& stop) {
     {
       std::unique_lock lock(mutex_);
       resting_ = true;
+      changed_.notify_all();
       if (!changed_.wait(lock, stop, [this] { return work_; })) return;
       resting_ = work_ = false;
     }
@@ -158,9 +159,10 @@ bool MappingThread::Resting() const {
   return resting_ && !work_;
 }
 
-void MappingThread::WaitUntilCalm(const std::stop_token& stop) {
+void MappingThread::WaitUntilCalm(std::chrono::steady_clock::time_point latest, const std::stop_token& stop) {
   if (!worker_) return;
   std::unique_lock lock(mutex_);
+  changed_.wait_until(lock, stop, latest, [this] { return failed_ || (resting_ && !work_); });
   changed_.wait(lock, stop, [this] { return failed_ || !Busy(); });
 }
 

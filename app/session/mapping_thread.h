@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -45,8 +46,9 @@ class MappingThread {
   void RunInTurn();
   // Threaded only: nothing was asked for that is not done.
   bool Resting() const;
-  // Threaded only: waits while the mapper is a whole keyframe behind or makes a map's beginning.
-  void WaitUntilCalm(const std::stop_token& stop);
+  // Threaded only: waits while the mapper works, but until `latest` at most, and beyond it while the mapper
+  // is a whole keyframe behind or makes a map's beginning.
+  void WaitUntilCalm(std::chrono::steady_clock::time_point latest, const std::stop_token& stop);
 
   engine::MapperTimes Times() const { return mapper_.Times(); }
   // Ends the thread and rethrows what it threw; then does what the last keyframes left to be done, for two

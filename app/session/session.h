@@ -87,7 +87,9 @@ class Session {
     return cameras_.at(static_cast<std::size_t>(frame.frame.camera)).tracker->Inspect(frame);
   }
   // Holds a feeder back that is faster than a camera; see MappingThread::WaitUntilCalm.
-  void WaitUntilCalm(const std::stop_token& stop) { mapping_.WaitUntilCalm(stop); }
+  void WaitUntilCalm(std::chrono::steady_clock::time_point latest, const std::stop_token& stop) {
+    mapping_.WaitUntilCalm(latest, stop);
+  }
 
   // Carries out a command at a frame that was processed before; a pixel means what that frame shows. Throws
   // Error with one sentence, without its full stop, when it cannot be carried out; then nothing has changed.
