@@ -78,11 +78,10 @@ using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
 // the camera's. Throws Error for what the source or a command's line has wrong; what was done before stands.
 //
 //   lockstep   one picture after the other; the session runs its mapper in between
-//   eager      as fast as the tracker is while the mapper rests, and no faster than the pictures' times while it
-//              works: never further ahead of the mapper than a camera would be
+//   eager      as fast as the tracker is while the mapper rests, and no faster than the pictures' times while
+//              it works: never further ahead of the mapper than a camera would be
 //   realtime   by the pictures' times; what is overtaken by its successor before it is asked for is dropped,
-//   as
-//              a camera drops it
+//              as a camera drops it
 //
 // A live source drops by itself: what is missing between two of its pictures is handed on as dropped, each
 // frame with its time and no picture.
