@@ -224,7 +224,8 @@ class Tracker {
   std::shared_ptr<const ImageFeatures> features_, previous_;
   std::vector<std::shared_ptr<ImageFeatures>> pool_;
   std::array<int, kPyramidLevels> fast_threshold_{};
-  std::vector<PointReport> reports_;  // by ascending point
+  std::vector<PointReport> reports_;      // by ascending point
+  std::vector<PointReport> new_reports_;  // of the present frame, of points that reports_ did not hold
   std::optional<KeyFrameCandidate> candidate_;
   std::optional<InitialPair> pair_;
 };

@@ -55,22 +55,29 @@ void Tracker::OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rig
 void Tracker::CollectReports() {
   if (!options_.build_maps) return;
   const auto earlier = [](const PointReport& a, const PointReport& b) { return a.point < b.point; };
-  const std::size_t known = reports_.size();
+  new_reports_.clear();
   for (const MapTracker::Attempt& attempt : map_tracker_.attempts()) {
     const PointReport wanted{.point = attempt.point};
-    const auto end = reports_.begin() + static_cast<std::ptrdiff_t>(known);
-    auto report = std::lower_bound(reports_.begin(), end, wanted, earlier);
+    const auto known = std::lower_bound(reports_.begin(), reports_.end(), wanted, earlier);
     // Each point is attempted once, so that new ones need not be looked for among the new.
-    if (report == end || report->point != attempt.point) report = reports_.insert(reports_.end(), wanted);
+    PointReport& report =
+        known != reports_.end() && known->point == attempt.point ? *known : new_reports_.emplace_back(wanted);
     if (attempt.inlier) {
-      ++report->inlier;
+      ++report.inlier;
     } else if (attempt.found) {
-      ++report->outlier;
+      ++report.outlier;
     } else {
-      ++report->not_found;
+      ++report.not_found;
     }
   }
-  if (reports_.size() > known) std::sort(reports_.begin(), reports_.end(), earlier);
+  std::sort(new_reports_.begin(), new_reports_.end(), earlier);
+  // Merged from the back, in place: std::inplace_merge would ask for memory.
+  auto old = reports_.size(), fresh = new_reports_.size();
+  reports_.resize(old + fresh);
+  for (auto to = reports_.size(); fresh > 0;) {
+    const bool old_is_later = old > 0 && earlier(new_reports_[fresh - 1], reports_[old - 1]);
+    reports_[--to] = old_is_later ? reports_[--old] : new_reports_[--fresh];
+  }
 }
 
 std::optional<KeyFrameCandidate> Tracker::TakeKeyFrameCandidate() {

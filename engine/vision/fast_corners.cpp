@@ -6,17 +6,18 @@
 #include <bit>
 #include <cstdint>
 #include <opencv2/core.hpp>
-#include <opencv2/core/hal/intrin.hpp>
+
+#include "engine/vision/lanes.h"
 
 namespace docent::engine {
 
 namespace {
 
-constexpr int kLanes = cv::v_uint8x16::nlanes;
+constexpr int kLanes = kByteLanes;
 constexpr std::size_t kRing = 16;
 constexpr int kRadius = 3;
 
-using Lanes = cv::v_uint8x16;
+using Lanes = ByteLanes;
 using RingOffsets = std::array<std::ptrdiff_t, kRing>;
 
 // The circle of radius three about a pixel, once around.
@@ -71,17 +72,17 @@ Lanes StrongestArc(const Lanes (&ring)[kRing]) {
 
 // One less than the largest difference that makes the pixel a corner; 0 where it is none at this threshold.
 Lanes Scores(const std::uint8_t* pixel, const RingOffsets& offsets, const Lanes& threshold) {
-  const Lanes center = cv::v_load(pixel);
+  const Lanes center = LoadBytes(pixel);
   Lanes ring[kRing];
-  for (const std::size_t i : {0, 4, 8, 12}) ring[i] = cv::v_load(pixel + offsets[i]);
+  for (const std::size_t i : {0, 4, 8, 12}) ring[i] = LoadBytes(pixel + offsets[i]);
   // Every arc of nine holds one of each two opposite pixels. Differences saturate at 0.
   const Lanes bright = cv::v_min(cv::v_max(ring[0], ring[8]), cv::v_max(ring[4], ring[12])) - center;
   const Lanes dark = center - cv::v_max(cv::v_min(ring[0], ring[8]), cv::v_min(ring[4], ring[12]));
-  if (!cv::v_check_any(cv::v_max(bright, dark) > threshold)) return cv::v_setzero_u8();
+  if (!cv::v_check_any(cv::v_max(bright, dark) > threshold)) return AllBytes(0);
   for (const std::size_t i : {1, 2, 3, 5, 6, 7, 9, 10, 11, 13, 14, 15})
-    ring[i] = cv::v_load(pixel + offsets[i]);
+    ring[i] = LoadBytes(pixel + offsets[i]);
   const Lanes best = cv::v_max(StrongestArc<Brighter>(ring) - center, center - StrongestArc<Darker>(ring));
-  return (best - cv::v_setall_u8(1)) & (best > threshold);
+  return (best - AllBytes(1)) & (best > threshold);
 }
 
 // Scores of the columns first to end - 1; up to a block more is written behind them.
@@ -97,15 +98,15 @@ void ScoreRow(const std::uint8_t* row, int columns, int first, int end, const Ri
 void TakePeaks(const std::uint8_t* above, const std::uint8_t* scores, const std::uint8_t* below, int first,
                int end, int y, std::vector<Corner>* corners) {
   for (int x = first; x < end; x += kLanes) {
-    const Lanes score = cv::v_load(scores + x);
-    if (!cv::v_check_any(score > cv::v_setzero_u8())) continue;
-    Lanes rival = cv::v_max(cv::v_load(scores + x - 1), cv::v_load(scores + x + 1));
+    const Lanes score = LoadBytes(scores + x);
+    if (!cv::v_check_any(score > AllBytes(0))) continue;
+    Lanes rival = cv::v_max(LoadBytes(scores + x - 1), LoadBytes(scores + x + 1));
     for (const std::uint8_t* other : {above, below}) {
-      rival = cv::v_max(rival, cv::v_load(other + x));
-      rival = cv::v_max(rival, cv::v_max(cv::v_load(other + x - 1), cv::v_load(other + x + 1)));
+      rival = cv::v_max(rival, LoadBytes(other + x));
+      rival = cv::v_max(rival, cv::v_max(LoadBytes(other + x - 1), LoadBytes(other + x + 1)));
     }
     auto peaks = static_cast<std::uint32_t>(cv::v_signmask(score > rival));
-    if (end - x < kLanes) peaks &= (1u << (end - x)) - 1;
+    if (end - x < kLanes) peaks &= (std::uint32_t{1} << (end - x)) - 1;
     for (; peaks != 0; peaks &= peaks - 1)
       corners->push_back(
           {static_cast<std::int16_t>(x + std::countr_zero(peaks)), static_cast<std::int16_t>(y)});
@@ -123,7 +124,12 @@ void DetectFastCorners(const cv::Mat& image, int threshold, int border, std::vec
   cv::Mat pixels = image;
   // A whole block must fit between the margins; what is added is never a corner's neighbour.
   const int least = border + kLanes + kRadius;
-  if (image.cols < least) cv::copyMakeBorder(image, pixels, 0, 0, 0, least - image.cols, cv::BORDER_CONSTANT);
+  thread_local std::vector<std::uint8_t> widened;
+  if (image.cols < least) {
+    widened.assign(static_cast<std::size_t>(image.rows) * static_cast<std::size_t>(least), 0);
+    pixels = cv::Mat(image.rows, least, CV_8UC1, widened.data());
+    image.copyTo(pixels.colRange(0, image.cols));
+  }
 
   const auto width = static_cast<std::size_t>(pixels.cols + 2 * kLanes);
   thread_local std::vector<std::uint8_t> memory;
@@ -132,7 +138,7 @@ void DetectFastCorners(const cv::Mat& image, int threshold, int border, std::vec
   std::uint8_t* scores = above + width;
   std::uint8_t* below = scores + width;
   const RingOffsets offsets = MakeRing(static_cast<std::ptrdiff_t>(pixels.step[0]));
-  const Lanes lanes = cv::v_setall_u8(static_cast<std::uint8_t>(std::clamp(threshold, 0, 255)));
+  const Lanes lanes = AllBytes(static_cast<std::uint8_t>(std::clamp(threshold, 0, 255)));
   const int first = border, end = image.cols - border;
   for (int y = border - 1; y <= image.rows - border; ++y) {
     ScoreRow(pixels.ptr<std::uint8_t>(y), pixels.cols, first - 1, end + 1, offsets, lanes, below);

@@ -3,8 +3,8 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <opencv2/core.hpp>
-#include <opencv2/core/hal/intrin.hpp>
+
+#include "engine/vision/lanes.h"
 
 namespace docent::engine {
 
@@ -48,14 +48,6 @@ bool CutBordered(const cv::Mat& source, const Eigen::Vector2f& center, const Eig
   return true;
 }
 
-// Four pixels as floats.
-cv::v_float32x4 LoadPixels(const std::uint8_t* pixels) {
-  return cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::v_load_expand_q(pixels)));
-}
-cv::v_float32x4 LoadGradients(const std::int16_t* gradients) {
-  return cv::v_cvt_f32(cv::v_load_expand(gradients));
-}
-
 // Over the picture's values under the patch, less the patch's mean, which keeps the sums small.
 struct ShiftedSums {
   float value, value_squared, value_times_pixel;
@@ -64,38 +56,30 @@ struct ShiftedSums {
 
 // left, top: of the patch in the picture, interpolated between pixels.
 ShiftedSums SumShifted(const PatchTemplate& patch, const cv::Mat& image, float left, float top) {
-  constexpr std::size_t kHalves = 2, kLanes = kPatchSize / kHalves;
+  static_assert(kPatchSize == 8);  // a row is eight floats
   const int x0 = static_cast<int>(left), y0 = static_cast<int>(top);
-  const float fx = left - static_cast<float>(x0), fy = top - static_cast<float>(y0);
-  const cv::v_float32x4 to_right = cv::v_setall_f32(fx), to_below = cv::v_setall_f32(fy);
-  const cv::v_float32x4 mean = cv::v_setall_f32(patch.Mean());
+  const EightFloats to_right = AllFloats(left - static_cast<float>(x0));
+  const EightFloats to_below = AllFloats(top - static_cast<float>(y0));
+  const EightFloats mean = AllFloats(patch.Mean());
   const std::uint8_t* row = image.ptr<std::uint8_t>(y0) + x0;
-  const auto along_row = [&](std::size_t half) {
-    const cv::v_float32x4 here = LoadPixels(row + half * kLanes);
-    return here + to_right * (LoadPixels(row + half * kLanes + 1) - here) - mean;
+  const auto along_row = [&] {
+    const EightFloats here = LoadAsFloats(row);
+    return here + to_right * (LoadAsFloats(row + 1) - here) - mean;
   };
-  cv::v_float32x4 above[kHalves] = {along_row(0), along_row(1)};
-  const cv::v_float32x4 zero = cv::v_setzero_f32();
-  cv::v_float32x4 sum[kHalves] = {zero, zero}, squares[kHalves] = {zero, zero}, cross[kHalves] = {zero, zero},
-                  along_x[kHalves] = {zero, zero}, along_y[kHalves] = {zero, zero};
-  for (std::size_t i = 0; i < kPatchSize; ++i) {
+  EightFloats above = along_row();
+  EightFloats sum = AllFloats(0), squares = sum, cross = sum, along_x = sum, along_y = sum;
+  for (std::size_t at = 0; at < kPatchArea; at += kPatchSize) {
     row += image.step[0];
-    for (std::size_t half = 0; half < kHalves; ++half) {
-      const std::size_t at = i * kPatchSize + half * kLanes;
-      const cv::v_float32x4 below = along_row(half);
-      const cv::v_float32x4 value = above[half] + to_below * (below - above[half]);
-      above[half] = below;
-      sum[half] += value;
-      squares[half] += value * value;
-      cross[half] += value * LoadPixels(&patch.pixels[at]);
-      along_x[half] += value * LoadGradients(&patch.gradient_x[at]);
-      along_y[half] += value * LoadGradients(&patch.gradient_y[at]);
-    }
+    const EightFloats below = along_row();
+    const EightFloats value = above + to_below * (below - above);
+    above = below;
+    sum += value;
+    squares += value * value;
+    cross += value * LoadAsFloats(&patch.pixels[at]);
+    along_x += value * LoadAsFloats(&patch.gradient_x[at]);
+    along_y += value * LoadAsFloats(&patch.gradient_y[at]);
   }
-  const auto total = [](const cv::v_float32x4(&halves)[kHalves]) {
-    return cv::v_reduce_sum(halves[0] + halves[1]);
-  };
-  return {total(sum), total(squares), total(cross), {total(along_x), total(along_y)}};
+  return {Sum(sum), Sum(squares), Sum(cross), {Sum(along_x), Sum(along_y)}};
 }
 
 }  // namespace
@@ -104,30 +88,34 @@ bool CutPatch(const cv::Mat& source, const Eigen::Vector2f& center, const Eigen:
               PatchTemplate* patch) {
   std::array<float, kBordered * kBordered> bordered;
   if (!CutBordered(source, center, source_from_patch, &bordered)) return false;
-  patch->sum = 0;
-  patch->sum_of_squares = 0;
-  int sum_x = 0, sum_y = 0, dot_x = 0, dot_y = 0;
+  std::array<int, kPatchArea> values, rounded_x, rounded_y;
   Eigen::Array<float, kPatchArea, 1> gradient_x, gradient_y;
   for (std::size_t row = 0; row < kPatchSize; ++row) {
-    for (std::size_t column = 0; column < kPatchSize; ++column) {
-      const std::size_t at = row * kPatchSize + column;
-      const float* p = &bordered[(row + 1) * kBordered + column + 1];
-      const int value = static_cast<int>(p[0] + 0.5f);
-      const float gx = p[1] - p[-1], gy = p[kBordered] - p[-kBordered];
-      const int rounded_x = cvRound(gx), rounded_y = cvRound(gy);
-      patch->pixels[at] = static_cast<std::uint8_t>(value);
-      patch->gradient_x[at] = static_cast<std::int16_t>(rounded_x);
-      patch->gradient_y[at] = static_cast<std::int16_t>(rounded_y);
-      patch->sum += value;
-      patch->sum_of_squares += value * value;
-      sum_x += rounded_x;
-      sum_y += rounded_y;
-      dot_x += rounded_x * value;
-      dot_y += rounded_y * value;
-      gradient_x[static_cast<Eigen::Index>(at)] = gx;
-      gradient_y[static_cast<Eigen::Index>(at)] = gy;
-    }
+    const std::size_t at = row * kPatchSize;
+    const float* p = &bordered[(row + 1) * kBordered + 1];
+    const EightFloats gx = LoadFloats(p + 1) - LoadFloats(p - 1);
+    const EightFloats gy = LoadFloats(p + kBordered) - LoadFloats(p - kBordered);
+    StoreTruncated(LoadFloats(p) + AllFloats(0.5f), &values[at]);
+    StoreRounded(gx, &rounded_x[at]);
+    StoreRounded(gy, &rounded_y[at]);
+    Store(gx, gradient_x.data() + at);
+    Store(gy, gradient_y.data() + at);
   }
+  int sum = 0, sum_of_squares = 0, sum_x = 0, sum_y = 0, dot_x = 0, dot_y = 0;
+  for (std::size_t at = 0; at < kPatchArea; ++at) {
+    const int value = values[at], x = rounded_x[at], y = rounded_y[at];
+    patch->pixels[at] = static_cast<std::uint8_t>(value);
+    patch->gradient_x[at] = static_cast<std::int16_t>(x);
+    patch->gradient_y[at] = static_cast<std::int16_t>(y);
+    sum += value;
+    sum_of_squares += value * value;
+    sum_x += x;
+    sum_y += y;
+    dot_x += x * value;
+    dot_y += y * value;
+  }
+  patch->sum = sum;
+  patch->sum_of_squares = sum_of_squares;
   if (patch->Variance() < kMinVariance) return false;
   // Of half the gradients and a constant brightness.
   const float xx = 0.25f * gradient_x.square().sum(), xy = 0.25f * (gradient_x * gradient_y).sum(),

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <opencv2/core/simd_intrinsics.hpp>
+
+// OpenCV's universal intrinsics at the widths that this folder works in: bytes as wide as the target has them
+// up to 32, floats eight at a time, which is a patch's row. Results are the same to the bit at every width.
+// opencv2/core/hal/intrin.hpp alone knows only four floats, whatever the compiler's target.
+namespace docent::engine {
+
+#if CV_SIMD256
+
+using ByteLanes = cv::v_uint8x32;
+inline ByteLanes LoadBytes(const std::uint8_t* from) {
+  return cv::v256_load(from);
+}
+inline ByteLanes AllBytes(std::uint8_t value) {
+  return cv::v256_setall_u8(value);
+}
+
+using EightFloats = cv::v_float32x8;
+inline EightFloats AllFloats(float value) {
+  return cv::v256_setall_f32(value);
+}
+inline EightFloats LoadAsFloats(const std::uint8_t* from) {
+  return cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::v256_load_expand_q(from)));
+}
+inline EightFloats LoadAsFloats(const std::int16_t* from) {
+  return cv::v_cvt_f32(cv::v256_load_expand(from));
+}
+inline EightFloats LoadFloats(const float* from) {
+  return cv::v256_load(from);
+}
+inline void Store(const EightFloats& lanes, float* to) {
+  cv::v_store(to, lanes);
+}
+inline void StoreRounded(const EightFloats& lanes, int* to) {
+  cv::v_store(to, cv::v_round(lanes));
+}
+inline void StoreTruncated(const EightFloats& lanes, int* to) {
+  cv::v_store(to, cv::v_trunc(lanes));
+}
+
+#else
+
+using ByteLanes = cv::v_uint8x16;
+inline ByteLanes LoadBytes(const std::uint8_t* from) {
+  return cv::v_load(from);
+}
+inline ByteLanes AllBytes(std::uint8_t value) {
+  return cv::v_setall_u8(value);
+}
+
+struct EightFloats {
+  cv::v_float32x4 low, high;
+  EightFloats& operator+=(const EightFloats& other) { return *this = *this + other; }
+  friend EightFloats operator+(const EightFloats& a, const EightFloats& b) {
+    return {a.low + b.low, a.high + b.high};
+  }
+  friend EightFloats operator-(const EightFloats& a, const EightFloats& b) {
+    return {a.low - b.low, a.high - b.high};
+  }
+  friend EightFloats operator*(const EightFloats& a, const EightFloats& b) {
+    return {a.low * b.low, a.high * b.high};
+  }
+};
+inline EightFloats AllFloats(float value) {
+  return {cv::v_setall_f32(value), cv::v_setall_f32(value)};
+}
+inline EightFloats LoadAsFloats(const std::uint8_t* from) {
+  const auto four = [](const std::uint8_t* bytes) {
+    return cv::v_cvt_f32(cv::v_reinterpret_as_s32(cv::v_load_expand_q(bytes)));
+  };
+  return {four(from), four(from + 4)};
+}
+inline EightFloats LoadAsFloats(const std::int16_t* from) {
+  return {cv::v_cvt_f32(cv::v_load_expand(from)), cv::v_cvt_f32(cv::v_load_expand(from + 4))};
+}
+inline EightFloats LoadFloats(const float* from) {
+  return {cv::v_load(from), cv::v_load(from + 4)};
+}
+inline void Store(const EightFloats& lanes, float* to) {
+  cv::v_store(to, lanes.low);
+  cv::v_store(to + 4, lanes.high);
+}
+inline void StoreRounded(const EightFloats& lanes, int* to) {
+  cv::v_store(to, cv::v_round(lanes.low));
+  cv::v_store(to + 4, cv::v_round(lanes.high));
+}
+inline void StoreTruncated(const EightFloats& lanes, int* to) {
+  cv::v_store(to, cv::v_trunc(lanes.low));
+  cv::v_store(to + 4, cv::v_trunc(lanes.high));
+}
+
+#endif
+
+inline constexpr int kByteLanes = ByteLanes::nlanes;
+
+// Always in the same order, whatever the width.
+inline float Sum(const EightFloats& lanes) {
+  std::array<float, 8> all;
+  Store(lanes, all.data());
+  return cv::v_reduce_sum(cv::v_load(all.data()) + cv::v_load(all.data() + 4));
+}
+
+}  // namespace docent::engine
