@@ -26,6 +26,7 @@ std::string InWords(const engine::Verdict& verdict, const Doubts::NameOf& name) 
     case engine::Doubt::kOneCorner:
       return points + " of " + map + " are seen, but all in one corner of the picture";
     case engine::Doubt::kLookAlikes:
+      if (verdict.rival_key == verdict.map_key) return "it may be one place in " + map + " or another";
       return "it may be " + map + " or " + name(verdict.rival_key);
     case engine::Doubt::kUnconfirmed:
       return "it looks like " + map + ", to be confirmed";

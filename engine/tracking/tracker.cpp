@@ -198,7 +198,10 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
     LookForStart(frame, out);
   } else if (tracking_) {
     TrackMap(frame, out);
-    if (HasPose(out->state) && places && !options_.build_maps) LookForBetterMap(frame, *places, out);
+    if (HasPose(out->state) && places) {
+      LookForBetterPlace(frame, *places, out);
+      if (!options_.build_maps) LookForBetterMap(frame, *places, out);
+    }
   } else {
     Recover(frame, places, out);
   }
@@ -319,6 +322,7 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   const bool good = result.Quality() >= options_.good_quality;
   if (out->state == TrackingState::kRelocalized) {
     doubtful_frames_ = options_.agreeing_frames;
+    frames_since_recovery_ = 0;
     leader_frames_ = 0;
     motion_.Reset(frame.time, result.camera_from_map);
     selector_.Reset();
@@ -328,10 +332,13 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
     if (result.observed == ObservedMotion::kHybrid) out->state = TrackingState::kHybrid;
     if (result.observed == ObservedMotion::kPanorama) out->state = TrackingState::kPanorama;
   }
-  // What was found again is not extended before it has held (ptamm §6.3).
+  // What was found again is not extended before it has held (ptamm §6.3) and explains most of what is in
+  // view: the furniture of a room fits another one, too.
   const bool doubtful = doubtful_frames_ > 0;
-  if (doubtful && out->state != TrackingState::kRelocalized)
-    doubtful_frames_ = good ? doubtful_frames_ - 1 : options_.agreeing_frames;
+  if (doubtful && out->state != TrackingState::kRelocalized) {
+    if (!good) doubtful_frames_ = options_.agreeing_frames;
+    if (result.Explained() >= options_.poor_quality) --doubtful_frames_;
+  }
   tracking_ = true;
   observed_ = result.observed;
   explained_ = result.Explained();

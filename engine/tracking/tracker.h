@@ -138,6 +138,7 @@ class Tracker {
                      const std::vector<PointMatch>& matches);
   void Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
   void LookForBetterMap(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
+  void LookForBetterPlace(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
   // Tracks the map that is about to be entered, in `tracker`; its snapshot, or null when it is not there.
   std::shared_ptr<const MapSnapshot> FollowEntering(const PlaceFinder& places, MapTracker* tracker,
                                                     MapTrackResult* result);
@@ -148,9 +149,16 @@ class Tracker {
     MapTrackResult result;
     PanoramaId panorama = kNoId;
   };
-  // The first of the places at which the frame is explained, and the best rival of its map that explains it
-  // too, the better one first. Tells `out` what speaks against the others.
-  std::vector<FoundPlace> FindMaps(const std::vector<TurnedPlace>& places, TrackedFrame* out);
+  // The first of the places at which the frame is explained, or a better one in the same map, and the best
+  // rival of its map that explains it too, the better one first. Tells `out` what speaks against the others.
+  std::vector<FoundPlace> FindMaps(const PlaceFinder& finder, const std::vector<TurnedPlace>& places,
+                                   TrackedFrame* out);
+  // By the best of its map; false when that is not clearly ahead of the second best there.
+  bool ReplaceByBetterPlace(const PlaceFinder& finder, FoundPlace* found, TrackedFrame* out);
+  // The best of other places in a map at which the frame is explained, by another pose than this one.
+  std::optional<FoundPlace> BestElsewhere(const PlaceFinder& finder, std::uint64_t map_key,
+                                          const Rigid3& camera_from_map, KeyFrameId but_keyframe,
+                                          TrackedFrame* out);
   // The best of other maps than these at which the frame is explained.
   std::optional<FoundPlace> BestRival(const std::vector<TurnedPlace>& places,
                                       std::set<std::uint64_t> but_maps, TrackedFrame* out);
@@ -204,16 +212,18 @@ class Tracker {
   double explained_ = 0;                           // of the last frame
   Rigid3 first_view_from_map_;                     // the pose of the initializer's first view
   Timestamp lost_since_{};
-  bool searched_ = false;    // a map, for the last frame
-  int misfit_frames_ = 0;    // in a row, that no turn explains
-  int doubtful_frames_ = 0;  // good ones that are wanted since the last recovery before the map is extended
+  bool searched_ = false;  // a map, for the last frame
+  int misfit_frames_ = 0;  // in a row, that no turn explains
+  // That explain the picture well, wanted since the last recovery before the map is extended.
+  int doubtful_frames_ = 0;
   // The newest picture whose pose points told, or of a long turn a later one: FollowPicture's measure.
   std::shared_ptr<const ImageFeatures> anchor_;
   Rigid3 anchor_pose_;
   Timestamp last_points_{};  // when points told the pose
   int frames_since_keyframe_ = 0;
-  int frames_since_look_ = 0;     // for a better map
-  std::uint64_t leader_key_ = 0;  // of two maps that explain the pictures, for so many frames
+  int frames_since_look_ = 0;           // for a better map
+  unsigned frames_since_recovery_ = 0;  // while it is doubted
+  std::uint64_t leader_key_ = 0;        // of two maps that explain the pictures, for so many frames
   int leader_frames_ = 0;
   // Poses in another map that agree with each other, before it is entered.
   std::uint64_t entering_key_ = 0;

@@ -1,24 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // How a tracker comes back after a loss, and from one map to another (ptamm §3.2, §5.3, §6.3).
 #include <algorithm>
-#include <cmath>
-#include <tuple>
+#include <bit>
 #include <utility>
 
 #include "engine/tracking/tracker.h"
-#include "engine/vision/rotation_alignment.h"
 
 namespace docent::engine {
-
-namespace {
-
-// Of all that speaks against a pose in one frame that is told which came nearest.
-void Consider(const Verdict& verdict, TrackedFrame* out) {
-  if (std::tie(verdict.doubt, verdict.inliers) > std::tie(out->verdict.doubt, out->verdict.inliers))
-    out->verdict = verdict;
-}
-
-}  // namespace
 
 // Whether a pose that was found after a loss counts: kNone, or what speaks against it.
 Doubt Tracker::DoubtOf(const MapTrackResult& result, const MapSnapshot& map) const {
@@ -39,111 +27,27 @@ bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, Track
   const Doubt doubt = DoubtOf(result, *map_);
   if (doubt == Doubt::kNone) {
     // What is poorly seen may be something else that is only alike.
-    std::optional<FoundPlace> rival;
-    if (places && result.Explained() < options_.poor_quality)
-      rival = BestRival(BestPlaces(*places), {map_key_}, out);
-    if (!rival || rival->result.Explained() < options_.better_quality * result.Explained()) {
+    const auto is_better = [&](const std::optional<FoundPlace>& rival) {
+      return rival && rival->result.Explained() >= options_.better_quality * result.Explained();
+    };
+    const bool poor = places && result.Explained() < options_.poor_quality;
+    if (!poor || !(is_better(BestElsewhere(*places, map_key_, result.camera_from_map, kNoId, out)) ||
+                   is_better(BestRival(BestPlaces(*places), {map_key_}, out)))) {
+      if (poor) {
+        if (entering_frames_ > 0) return false;
+        BeginEntering({{{map_key_, map_}, guess}, result, map_tracker_.panorama()});
+        Unconfirmed(result, out);
+        return true;
+      }
       out->state = TrackingState::kRelocalized;
       Accept(frame, result, out);
       return true;
     }
   }
-  Consider({.doubt = doubt, .map_key = map_key_, .inliers = result.inliers}, out);
+  out->verdict.Consider({.doubt = doubt, .map_key = map_key_, .inliers = result.inliers});
   map_tracker_.Forget();
   motion_.Reset(frame.time, guess);
   return false;
-}
-
-std::optional<Tracker::TurnedPlace> Tracker::TurnToFit(const PlaceCandidate& candidate) const {
-  const KeyFrame* keyframe = candidate.map ? candidate.map->FindKeyFrame(candidate.keyframe) : nullptr;
-  if (!keyframe) return std::nullopt;
-  const auto rotation =
-      AlignRotation(keyframe->features->small_blurry, *keyframe->camera, features_->small_blurry, *camera_);
-  if (!rotation) return std::nullopt;
-  // What overlaps little agrees easily.
-  return TurnedPlace{candidate,
-                     Rigid3(rotation->b_from_a, Eigen::Vector3d::Zero()) * keyframe->camera_from_map,
-                     rotation->rms / std::sqrt(rotation->overlap)};
-}
-
-std::vector<Tracker::TurnedPlace> Tracker::BestPlaces(const PlaceFinder& places,
-                                                      std::uint64_t but_map) const {
-  std::vector<TurnedPlace> turned;
-  PlaceQuery query(features_->small_blurry);
-  query.places_first = false;  // the one that fits best of some that are near each other is a better guess
-  const auto found = places.FindPlaces(query, options_.candidates_looked_at, options_.candidates_of_a_map, 0);
-  if (but_map != 0 && (found.empty() || found.front().map_key == but_map)) return turned;
-  for (const PlaceCandidate& candidate : found) {
-    if (candidate.map_key == but_map) continue;
-    if (const auto place = TurnToFit(candidate)) turned.push_back(*place);
-  }
-  std::stable_sort(turned.begin(), turned.end(),
-                   [](const TurnedPlace& a, const TurnedPlace& b) { return a.misfit < b.misfit; });
-  return turned;
-}
-
-std::vector<Tracker::TurnedPlace> Tracker::PlacesByWords(const PlaceFinder& places,
-                                                         const std::vector<TurnedPlace>& tried) const {
-  std::vector<TurnedPlace> turned;
-  const WordBag words = MakeWordBag(*features_);
-  if (words.empty()) return turned;
-  const auto found = places.FindPlaces({features_->small_blurry, words}, options_.candidates_looked_at,
-                                       options_.candidates_of_a_map, 0);
-  for (const PlaceCandidate& candidate : found) {
-    if (turned.size() == options_.candidates) break;
-    const auto known = std::find_if(tried.begin(), tried.end(), [&](const TurnedPlace& place) {
-      return place.candidate.map_key == candidate.map_key && place.candidate.keyframe == candidate.keyframe;
-    });
-    if (known != tried.end()) continue;
-    if (const auto place = TurnToFit(candidate)) turned.push_back(*place);
-  }
-  return turned;
-}
-
-MapTrackResult Tracker::TryPlace(const TurnedPlace& place, MapTracker* tracker) {
-  const PlaceCandidate& candidate = place.candidate;
-  const KeyFrame* keyframe = candidate.map->FindKeyFrame(candidate.keyframe);
-  tracker->Clear();
-  tracker->EnablePanorama(keyframe ? keyframe->panorama : kNoId);
-  return tracker->Track(*candidate.map, *features_, place.camera_from_map, MapTracker::Effort::kRecovery,
-                        &random_);
-}
-
-std::vector<Tracker::FoundPlace> Tracker::FindMaps(const std::vector<TurnedPlace>& places,
-                                                   TrackedFrame* out) {
-  std::vector<FoundPlace> found;
-  std::set<std::uint64_t> tried;
-  for (std::size_t i = 0; i < places.size() && i < options_.candidates && found.empty(); ++i) {
-    const PlaceCandidate& candidate = places[i].candidate;
-    tried.insert(candidate.map_key);
-    const MapTrackResult result = TryPlace(places[i], &rival_tracker_);
-    const Doubt doubt = DoubtOf(result, *candidate.map);
-    Consider({.doubt = doubt, .map_key = candidate.map_key, .inliers = result.inliers}, out);
-    if (doubt == Doubt::kNone) found.push_back({places[i], result, rival_tracker_.panorama()});
-  }
-  if (found.empty()) return found;
-  if (auto rival = BestRival(places, std::move(tried), out)) found.push_back(std::move(*rival));
-  std::stable_sort(found.begin(), found.end(), [](const FoundPlace& a, const FoundPlace& b) {
-    return a.result.Quality() > b.result.Quality();
-  });
-  return found;
-}
-
-std::optional<Tracker::FoundPlace> Tracker::BestRival(const std::vector<TurnedPlace>& places,
-                                                      std::set<std::uint64_t> but_maps, TrackedFrame* out) {
-  std::optional<FoundPlace> best;
-  std::size_t rivals = 0;
-  for (const TurnedPlace& place : places) {
-    if (rivals == options_.rivals) break;
-    if (!but_maps.insert(place.candidate.map_key).second) continue;
-    ++rivals;
-    const MapTrackResult result = TryPlace(place, &rival_tracker_);
-    const Doubt doubt = DoubtOf(result, *place.candidate.map);
-    Consider({.doubt = doubt, .map_key = place.candidate.map_key, .inliers = result.inliers}, out);
-    if (doubt == Doubt::kNone && (!best || result.Quality() > best->result.Quality()))
-      best = FoundPlace{place, result, rival_tracker_.panorama()};
-  }
-  return best;
 }
 
 bool Tracker::ClearlyAhead(std::uint64_t best_key, double best_quality, std::uint64_t second_key,
@@ -166,15 +70,18 @@ void Tracker::BeginEntering(const FoundPlace& found) {
 
 std::shared_ptr<const MapSnapshot> Tracker::FollowEntering(const PlaceFinder& places, MapTracker* tracker,
                                                            MapTrackResult* result) {
-  const auto found = places.FindPlaces(features_->small_blurry, 1, 1, entering_key_);
-  if (found.empty()) return nullptr;
+  std::shared_ptr<const MapSnapshot> map = map_;
+  if (entering_key_ != map_key_) {
+    const auto found = places.FindPlaces(features_->small_blurry, 1, 1, entering_key_);
+    if (found.empty()) return nullptr;
+    map = found.front().map;
+  }
   const auto rotation = RotationFromPrevious();
   const Rigid3 turn(rotation ? *rotation : Rotation3(), Eigen::Vector3d::Zero());
   tracker->Clear();
   tracker->EnablePanorama(entering_panorama_);
-  *result = tracker->Track(*found.front().map, *features_, turn * entering_pose_, MapTracker::Effort::kWide,
-                           &random_);
-  return found.front().map;
+  *result = tracker->Track(*map, *features_, turn * entering_pose_, MapTracker::Effort::kWide, &random_);
+  return map;
 }
 
 void Tracker::Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, const MapTrackResult& result,
@@ -225,6 +132,22 @@ void Tracker::LookForBetterMap(const Frame& frame, const PlaceFinder& places, Tr
   }
 }
 
+// What was found again by a part of what is in view may be another place that looks alike: as long as it is
+// seen no better, the others are asked.
+void Tracker::LookForBetterPlace(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
+  if (doubtful_frames_ == 0) return;
+  ++frames_since_recovery_;
+  if (explained_ >= options_.poor_quality) return;
+  // A look costs as much as ten frames: ever more seldom, for a place may have changed for good.
+  constexpr unsigned kSeldom = 32;
+  const unsigned frames = frames_since_recovery_;
+  if (frames < 2 || !(std::has_single_bit(frames) || frames % kSeldom == 0)) return;
+  const auto other = BestElsewhere(places, map_key_, out->camera_from_map, kNoId, out);
+  const double needed = std::max(options_.poor_quality, options_.better_quality * explained_);
+  if (other && other->result.Explained() >= needed) Return(frame, *other, out);
+  out->verdict = {};
+}
+
 void Tracker::Unconfirmed(const MapTrackResult& result, TrackedFrame* out) const {
   out->verdict = {.doubt = Doubt::kUnconfirmed,
                   .map_key = entering_key_,
@@ -240,7 +163,7 @@ bool Tracker::GoOnEntering(const Frame& frame, const PlaceFinder& places, Tracke
   const auto map = FollowEntering(places, &map_tracker_, &result);
   const Doubt doubt = map ? DoubtOf(result, *map) : Doubt::kFewPoints;
   if (doubt != Doubt::kNone) {
-    Consider({.doubt = doubt, .map_key = entering_key_, .inliers = result.inliers}, out);
+    out->verdict.Consider({.doubt = doubt, .map_key = entering_key_, .inliers = result.inliers});
     entering_frames_ = 0;
     return false;
   }
@@ -266,13 +189,19 @@ bool Tracker::GoOnEntering(const Frame& frame, const PlaceFinder& places, Tracke
 
 // Into the map that the camera was in: once more as its own, so that all that the frame tells is of it.
 void Tracker::Return(const Frame& frame, const FoundPlace& found, TrackedFrame* out) {
+  if (found.result.Explained() < options_.poor_quality) {
+    // What fits a part of what is in view may be alike only.
+    BeginEntering(found);
+    Unconfirmed(found.result, out);
+    return;
+  }
   entering_frames_ = 0;
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(found.panorama);
   const MapTrackResult result = map_tracker_.Track(*map_, *features_, found.result.camera_from_map,
                                                    MapTracker::Effort::kUsual, &random_);
   if (const Doubt doubt = DoubtOf(result, *map_); doubt != Doubt::kNone) {
-    Consider({.doubt = doubt, .map_key = map_key_, .inliers = result.inliers}, out);
+    out->verdict.Consider({.doubt = doubt, .map_key = map_key_, .inliers = result.inliers});
     return;
   }
   out->state = TrackingState::kRelocalized;
@@ -287,13 +216,13 @@ void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFram
   if (!places || GoOnEntering(frame, *places, out)) return;
   map_tracker_.Clear();
   const std::vector<TurnedPlace> alike = BestPlaces(*places);
-  std::vector<FoundPlace> found = FindMaps(alike, out);
-  if (found.empty()) {
+  std::vector<FoundPlace> found = FindMaps(*places, alike, out);
+  if (found.empty() && out->verdict.doubt != Doubt::kLookAlikes) {
     // What does not look alike at once may still show the same things; what does is a rival at least.
     std::vector<TurnedPlace> others = PlacesByWords(*places, alike);
     if (!others.empty()) {
       others.insert(others.end(), alike.begin(), alike.end());
-      found = FindMaps(others, out);
+      found = FindMaps(*places, others, out);
     }
   }
   if (found.empty()) return;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <tuple>
 
 // The answer of a camera that is lost and has found places that its picture resembles: a pose, or why there
 // is none. A pose is believed by its geometry alone (ptamm §5.3, §6.3): enough points, well fitted, spread
@@ -14,16 +15,21 @@ enum class Doubt : std::uint8_t {
   kFewPoints,   // too few of the points of any place are found
   kPoorFit,     // points are found, but no pose explains them
   kOneCorner,   // they are gathered in a part of the picture
-  kLookAlikes,  // another map explains the picture nearly as well
+  kLookAlikes,  // another map, or another place in the same one, explains the picture nearly as well
   kUnconfirmed  // it is right in this picture, but not in several in a row yet
 };
 
 // What came nearest to a pose in one frame.
 struct Verdict {
   Doubt doubt = Doubt::kNone;
-  std::uint64_t map_key = 0, rival_key = 0;  // the rival is of kLookAlikes alone
+  std::uint64_t map_key = 0, rival_key = 0;  // the rival is of kLookAlikes alone, and may be the same map
   int inliers = 0;                           // points that agree
   int frames = 0;                            // that agreed so far, of kUnconfirmed
+
+  // Of all that speaks against a pose in one frame that is kept which came nearest.
+  void Consider(const Verdict& other) {
+    if (std::tie(other.doubt, other.inliers) > std::tie(doubt, inliers)) *this = other;
+  }
 };
 
 }  // namespace docent::engine

@@ -65,5 +65,12 @@ TEST(Doubts, AreOverOnceThereIsAPoseAndOnceNothingResemblesThePicture) {
   EXPECT_EQ(doubts.words(), "");
 }
 
+TEST(Doubts, NameTheMapOnceOfWhichTwoPlacesLookAlike) {
+  Doubts doubts;
+  EXPECT_TRUE(
+      doubts.See(FromSeconds(0), false, {.doubt = Doubt::kLookAlikes, .map_key = 1, .rival_key = 1}, NameOf));
+  EXPECT_EQ(doubts.words(), "it may be one place in Elephants or another");
+}
+
 }  // namespace
 }  // namespace docent::app

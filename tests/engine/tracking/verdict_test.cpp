@@ -39,6 +39,34 @@ std::shared_ptr<const MapSnapshot> MapOfACorner() {
   return map;
 }
 
+constexpr double kBetweenPlaces = 10;
+
+// One map of two places, the second so many metres to the right of the first.
+std::shared_ptr<const MapSnapshot> TwoPlaces(const MapSnapshot& first, const MapSnapshot& second) {
+  auto both = std::make_shared<MapSnapshot>(first);
+  const Eigen::Vector3d shift(kBetweenPlaces, 0, 0);
+  for (KeyFrame keyframe : second.keyframes) {
+    keyframe.id += first.next_keyframe;
+    keyframe.fixed = false;
+    keyframe.camera_from_map = keyframe.camera_from_map * Rigid3(Rotation3(), -shift);
+    both->keyframes.push_back(keyframe);
+  }
+  for (MapPoint point : second.points) {
+    point.id += first.next_point;
+    point.source_keyframe += first.next_keyframe;
+    point.point_in_map.head<3>() += shift;
+    both->points.push_back(point);
+  }
+  for (Observation observation : second.observations) {
+    observation.keyframe += first.next_keyframe;
+    observation.point += first.next_point;
+    both->observations.push_back(observation);
+  }
+  both->next_keyframe += second.next_keyframe;
+  both->next_point += second.next_point;
+  return both;
+}
+
 Frame FrameOf(int index, const RenderedWorld& world = World()) {
   return testing_world::MakeFrame(index, world, CameraAt({0.06 + 0.002 * index, 0.02, 0.03}));
 }
@@ -160,6 +188,50 @@ TEST(Verdict, LetsNoMapBeExtendedThatWasJustFoundAgain) {
   ASSERT_GE(first_keyframe, 0);
   EXPECT_EQ(first_keyframe, first_pose + options.agreeing_frames + 1);
   EXPECT_EQ(first_reports, first_keyframe);
+}
+
+TEST(Verdict, TakesTheBetterOfTwoPlacesInOneMapThatLookAlike) {
+  for (const bool second : {false, true}) {
+    SomeMaps maps;
+    maps.Add(1, second ? TwoPlaces(*MapWith(5), *MapWith(0)) : TwoPlaces(*MapWith(0), *MapWith(5)));
+    ASSERT_EQ(Validate(*maps.At(1)), "");
+    const TrackedFrame last = Visit(maps, 5).back();
+    ASSERT_TRUE(HasPose(last.state));
+    EXPECT_NEAR(last.camera_from_map.OriginInSource().x(), second ? kBetweenPlaces : 0, 0.3);
+  }
+}
+
+TEST(Verdict, NamesTwoPlacesInOneMapThatLookAlike) {
+  SomeMaps maps;
+  maps.Add(1, TwoPlaces(*MapWith(0), *MapWith(0)));
+  for (const TrackedFrame& frame : Visit(maps, 10)) {
+    EXPECT_EQ(frame.state, TrackingState::kLost) << frame.frame.index;
+    EXPECT_EQ(frame.verdict.doubt, Doubt::kLookAlikes);
+    EXPECT_EQ(frame.verdict.map_key, 1u);
+    EXPECT_EQ(frame.verdict.rival_key, 1u);
+  }
+}
+
+// The camera was found where a part of the map looks alike, and then sees what only the right place shows.
+TEST(Verdict, GoesOverToThePlaceThatExplainsMoreOfThePicture) {
+  SomeMaps maps;
+  maps.Add(1, TwoPlaces(*MapWith(5), *MapWith(10)));
+  TrackerOptions options;
+  options.build_maps = false;
+  Tracker tracker(options, Camera(), 3);
+  TrackedFrame frame;
+  int index = 0;
+  while (index < 10 && !HasPose(frame.state)) frame = tracker.Track(FrameOf(index++), &maps);
+  ASSERT_TRUE(HasPose(frame.state));
+  EXPECT_LT(frame.quality, options.poor_quality);
+  EXPECT_NEAR(frame.camera_from_map.OriginInSource().x(), 0, 0.3);
+  auto both = TwoPlaces(*MapWith(5), *MapWith(0));
+  maps.Add(1, both);
+  tracker.SetMap(both, 1);
+  for (int i = 0; i < 5; ++i) frame = tracker.Track(FrameOf(index++), &maps);
+  ASSERT_TRUE(HasPose(frame.state));
+  EXPECT_NEAR(frame.camera_from_map.OriginInSource().x(), kBetweenPlaces, 0.3);
+  EXPECT_GT(frame.quality, options.poor_quality);
 }
 
 }  // namespace
