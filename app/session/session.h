@@ -46,6 +46,8 @@ struct SessionOptions {
   // A new map whose track is lost this early, for this long, with so few keyframes, was a false start.
   Timestamp probation = std::chrono::seconds(2);
   Timestamp probation_loss = std::chrono::seconds(1);
+  // The same of a map that is its first picture alone: the next picture is as good.
+  Timestamp first_picture_loss = std::chrono::milliseconds(150);
   std::size_t probation_keyframes = 5;
   // Maps in memory that nobody is in are adjusted while there is nothing else to do; needs `threaded`.
   bool upkeep = true;

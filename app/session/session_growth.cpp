@@ -43,7 +43,9 @@ void Session::WatchProbation(Camera* camera, const engine::TrackedFrame& frame) 
   const Timestamp now = frame.frame.time;
   if (options_.may_write && map.snapshot && !map.snapshot->HasFinitePoints()) {
     // Directions alone are soon had again.
-    if (camera->lost_since && now - *camera->lost_since > options_.probation_loss)
+    const bool one_picture = map.snapshot->keyframes.size() == 1;
+    if (camera->lost_since &&
+        now - *camera->lost_since > (one_picture ? options_.first_picture_loss : options_.probation_loss))
       Discard(map.key, now, "its track was lost before it knew depth");
     return;
   }

@@ -106,6 +106,36 @@ TEST(Session, NeverSavesAMapOfDirectionsAlone) {
   for (const Event& event : session.TakeEvents()) EXPECT_NE(event.event, "save") << event.detail;
 }
 
+// The next picture is as good as the one that was lost: nobody waits a second for it.
+TEST(Session, BeginsAnewWithTheNextPictureWhenTheFirstIsLost) {
+  const auto simulation = Room(1);
+  const auto source = OpenSimulation(simulation);
+  engine::Frame first;
+  ASSERT_TRUE(source->Next(&first));
+  SessionOptions options = Options(Pace::kLockstep, "Bay");
+  options.tracker.hybrid = true;
+  Session session(options, LensOf(*simulation), nullptr);
+  const auto frame_of = [&](std::uint64_t index) {
+    engine::Frame frame = first;
+    frame.index = index;
+    frame.time = FromSeconds(static_cast<double>(index) / 30);
+    const bool dark = index >= 3 && index < 10;
+    if (dark) frame.picture = cv::Mat(first.picture.size(), first.picture.type(), cv::Scalar::all(0));
+    return frame;
+  };
+  std::vector<engine::TrackingState> states;
+  for (std::uint64_t i = 0; i < 14; ++i) states.push_back(session.Process(frame_of(i)).state);
+  EXPECT_EQ(states[2], engine::TrackingState::kPanorama);
+  EXPECT_EQ(states[5], engine::TrackingState::kLost);
+  EXPECT_EQ(states[9], engine::TrackingState::kInitializing);
+  EXPECT_EQ(states[13], engine::TrackingState::kPanorama);
+  std::vector<std::string> discarded;
+  for (const Event& event : session.TakeEvents())
+    if (event.detail.find("discarded") != std::string::npos) discarded.push_back(event.detail);
+  ASSERT_EQ(discarded.size(), 1u);
+  EXPECT_THAT(discarded[0], HasSubstr("before it knew depth"));
+}
+
 // One author's session in lockstep, and the library that it left: its tests only look at them.
 class AuthoredBay : public ::testing::Test {
  protected:
