@@ -33,6 +33,9 @@ target_compile_options(docent_compile_options INTERFACE -Wall -Wextra -Wpedantic
   # Else it is the optimiser's choice which products are rounded before they are added, and a change of one line
   # changes the figures of another. It costs nothing that can be measured.
   -ffp-contract=off
+  # GCC 12 does not keep to it where it gathers single statements into vectors: a difference beside a sum becomes
+  # vfmaddsub. tests/tools/check_rounding.py looks for what else might.
+  $<$<CXX_COMPILER_ID:GNU>:-fno-tree-slp-vectorize>
   # A vector of the machine's width changes Eigen's layout: every target must agree on it.
   $<$<AND:$<BOOL:${DOCENT_MARCH}>,$<STREQUAL:${CMAKE_SYSTEM_PROCESSOR},x86_64>>:-march=${DOCENT_MARCH}>)
 if(DOCENT_SANITIZE)  # a plain if: the comma of "address,undefined" would end a generator expression

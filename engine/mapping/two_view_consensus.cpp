@@ -115,7 +115,9 @@ void OptimiseLocally(const RayPairs& pairs, double inlier_px, Consensus* best) {
 
 // Samples that must be drawn until one without outliers is among them with this confidence.
 int IterationsNeeded(int inliers, Eigen::Index total, int sample_size, double confidence) {
-  const double clean = std::pow(static_cast<double>(inliers) / static_cast<double>(total), sample_size);
+  // Not std::pow, which an optimiser replaces for some exponents and the library rounds otherwise.
+  double clean = 1;
+  for (int i = 0; i < sample_size; ++i) clean *= static_cast<double>(inliers) / static_cast<double>(total);
   if (clean >= 1) return 1;
   if (clean < 1e-9) return std::numeric_limits<int>::max();
   const double needed = std::log(1 - confidence) / std::log1p(-clean);

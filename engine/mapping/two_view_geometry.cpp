@@ -195,7 +195,7 @@ class TwoViewEstimator {
   bool HasSecondMotion(const Eigen::ArrayXd& squared) const {
     constexpr double kClearlyOut = 2.0, kMinShare = 0.06;
     constexpr int kMinPairs = 10;
-    const double limit = std::pow(kClearlyOut * options_.inlier_px, 2);
+    const double limit_px = kClearlyOut * options_.inlier_px, limit = limit_px * limit_px;
     std::vector<Eigen::Vector3d> rays_in_a, rays_in_b;
     for (Eigen::Index i = 0; i < pairs_.size(); ++i) {
       const double plane = model_ == ModelKind::kHomography
@@ -219,13 +219,14 @@ class TwoViewEstimator {
     constexpr double kStillNoises = 3.0;  // holds nine in ten of what does not move
     const double still_px = std::max(kTwoDimensional * options_.inlier_px, kStillNoises * noise_px_);
     constexpr double kFarRatio = 1.5;  // the rotation is only known within the noise
+    const double far_px = kFarRatio * still_px;
     const Eigen::ArrayXd squared = SquaredDisplacementPx();
     const Eigen::ArrayXd squared_parallax = 2 * RotationResiduals(pairs_, b_from_a_.rotation.matrix());
     int still = 0, still_and_far = 0;
     for (Eigen::Index i = 0; i < pairs_.size(); ++i) {
       if (squared[i] > still_px * still_px) continue;
       ++still;
-      still_and_far += squared_parallax[i] < std::pow(kFarRatio * still_px, 2);
+      still_and_far += squared_parallax[i] < far_px * far_px;
     }
     return still > kMinStillShare * consistent_ && still_and_far > kMinFarShare * still;
   }
