@@ -58,17 +58,25 @@ class NamelessFile {
 
 // A file's bytes in memory, and the owner of every picture that lies in them: OpenCV's count of who holds a
 // picture ends here. Each picture holds the mapping; the last one takes it along.
-class PictureMapping final : public cv::MatAllocator, public std::enable_shared_from_this<PictureMapping> {
+class PictureMapping final : public cv::MatAllocator,
+                             public engine::KeptPictures,
+                             public WorkingSet::Member,
+                             public std::enable_shared_from_this<PictureMapping> {
  public:
   // Null with errno when it cannot be mapped.
-  static std::shared_ptr<const PictureMapping> Make(const NamelessFile& file, std::size_t bytes) {
+  static std::shared_ptr<const PictureMapping> Make(const NamelessFile& file, std::size_t bytes,
+                                                    std::shared_ptr<WorkingSet> awake) {
     void* const data = ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file.descriptor(), 0);
     if (data == MAP_FAILED) return nullptr;
-    return std::make_shared<PictureMapping>(data, bytes);
+    return std::make_shared<PictureMapping>(data, bytes, std::move(awake));
   }
 
-  PictureMapping(void* data, std::size_t bytes) : data_(data), bytes_(bytes) {}
-  ~PictureMapping() override { ::munmap(data_, bytes_); }
+  PictureMapping(void* data, std::size_t bytes, std::shared_ptr<WorkingSet> awake)
+      : Member(bytes), data_(data), bytes_(bytes), awake_(std::move(awake)) {}
+  ~PictureMapping() override {
+    awake_->Remove(*this);
+    ::munmap(data_, bytes_);
+  }
   PictureMapping(const PictureMapping&) = delete;
   PictureMapping& operator=(const PictureMapping&) = delete;
 
@@ -83,8 +91,9 @@ class PictureMapping final : public cv::MatAllocator, public std::enable_shared_
     return picture;
   }
 
-  // The pages are shared with the file: to let them go loses nothing.
-  void Rest() const { ::madvise(data_, bytes_, MADV_DONTNEED); }
+  void Look() const override { awake_->Look(*this); }
+  // The pages are shared with the file: to let them go loses nothing, even while somebody reads them.
+  void Rest() const override { ::madvise(data_, bytes_, MADV_DONTNEED); }
 
   void deallocate(cv::UMatData* data) const override {
     if (data == nullptr) return;
@@ -106,11 +115,13 @@ class PictureMapping final : public cv::MatAllocator, public std::enable_shared_
  private:
   void* const data_;
   const std::size_t bytes_;
+  const std::shared_ptr<WorkingSet> awake_;
 };
 
 // The features with their pyramid in a file of the folder; null with errno.
 std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatures& features,
-                                                        const std::filesystem::path& folder) {
+                                                        const std::filesystem::path& folder,
+                                                        const std::shared_ptr<WorkingSet>& awake) {
   const NamelessFile file(folder);
   if (file.descriptor() < 0) return nullptr;
   std::array<std::size_t, engine::kPyramidLevels> offsets{};
@@ -122,7 +133,7 @@ std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatu
     if (!file.Write(whole.ptr(), whole.total(), bytes)) return nullptr;
     bytes = (bytes + whole.total() + kAlignment - 1) / kAlignment * kAlignment;
   }
-  const auto mapping = PictureMapping::Make(file, bytes);
+  const auto mapping = PictureMapping::Make(file, bytes, awake);
   if (!mapping) return nullptr;
   auto kept = std::make_shared<engine::ImageFeatures>();
   for (std::size_t i = 0; i < features.levels.size(); ++i)
@@ -131,17 +142,14 @@ std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatu
   kept->row_begin = features.row_begin;
   kept->fast_threshold = features.fast_threshold;
   kept->small_blurry = {features.small_blurry.pixels.clone(), features.small_blurry.scale};
+  kept->kept = mapping;
   return kept;
-}
-
-const PictureMapping* MappingOf(const engine::ImageFeatures& features) {
-  const cv::UMatData* const data = features.levels[0].u;
-  return data != nullptr ? dynamic_cast<const PictureMapping*>(data->currAllocator) : nullptr;
 }
 
 }  // namespace
 
-PictureFiles::PictureFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
+PictureFiles::PictureFiles(std::filesystem::path folder, std::size_t awake_bytes)
+    : folder_(std::move(folder)), awake_(std::make_shared<WorkingSet>(awake_bytes)) {}
 
 std::filesystem::path PictureFiles::DefaultFolder() {
   const char* const folder = std::getenv("TMPDIR");
@@ -150,8 +158,8 @@ std::filesystem::path PictureFiles::DefaultFolder() {
 
 std::shared_ptr<const engine::ImageFeatures> PictureFiles::Keep(
     std::shared_ptr<const engine::ImageFeatures> features) {
-  if (MappingOf(*features) != nullptr) return features;
-  if (auto kept = MoveToFile(*features, folder_)) return kept;
+  if (features->kept) return features;
+  if (auto kept = MoveToFile(*features, folder_, awake_)) return kept;
   const int error = errno;
   if (!told_.exchange(true)) {
     spdlog::warn("The pictures of maps stay in memory: '{}' takes no file ({}).", folder_.string(),
@@ -160,8 +168,8 @@ std::shared_ptr<const engine::ImageFeatures> PictureFiles::Keep(
   return features;
 }
 
-void PictureFiles::Rest(const engine::ImageFeatures& features) {
-  if (const PictureMapping* const mapping = MappingOf(features)) mapping->Rest();
+void PictureFiles::RestAll() {
+  awake_->RestAll();
 }
 
 }  // namespace docent::app

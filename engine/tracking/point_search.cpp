@@ -128,6 +128,7 @@ bool PointSearcher::PreparePatch(const MapPoint& point, const KeyFrame& source,
   entry->level = predicted.level;
   entry->pixel_from_source = predicted.pixel_from_source;
   const Eigen::Matrix2f source_from_patch = (predicted.pixel_from_source * scale).inverse();
+  source.features->Look();
   entry->has_patch = CutPatch(source.features->levels[point.source_level], point.source_pixel,
                               source_from_patch, &entry->patch);
   return entry->has_patch;
@@ -138,6 +139,7 @@ std::optional<FoundPoint> PointSearcher::Find(const MapPoint& point, const KeyFr
                                               float radius_px, bool direct) {
   Cached& entry = Entry(point);
   if (!PreparePatch(point, source, predicted, &entry)) return std::nullopt;
+  features.Look();
   const auto level = static_cast<std::size_t>(predicted.level);
   const cv::Mat& image = features.levels[level];
   const Eigen::Vector2f center = LevelFromLevelZero(predicted.pixel, predicted.level).cast<float>();

@@ -81,21 +81,37 @@ TEST(PictureFiles, RestingPicturesNeedNoMemoryAndAreTheSameAfterwards) {
   PictureFiles files(folder.path());
   const auto features = NoisyFeatures();
   const auto kept = files.Keep(features);
+  kept->Look();
   ExpectSame(*kept, *features);
   const std::uint8_t* const address = kept->levels[0].data;
   EXPECT_GE(ResidentKilobytes(address), 323 * 241 / 1024);
-  files.Rest(*kept);
+  files.RestAll();
   EXPECT_EQ(ResidentKilobytes(address), 0);
   EXPECT_EQ(kept->levels[0].data, address);
   ExpectSame(*kept, *features);
 }
 
-TEST(PictureFiles, RestingHarmsNoPictureInOrdinaryMemory) {
+TEST(PictureFiles, WhoeverLooksIntoManyPicturesWakesFewAtATime) {
   const TemporaryFolder folder;
-  PictureFiles files(folder.path());
+  constexpr long kBytes = 323 * 241 * 4 / 3;  // of a pyramid
+  PictureFiles files(folder.path(), 3 * kBytes);
+  std::vector<std::shared_ptr<const ImageFeatures>> kept;
+  for (std::uint64_t i = 0; i < 8; ++i) kept.push_back(files.Keep(NoisyFeatures(i)));
+  for (int round = 0; round < 2; ++round) {
+    for (std::uint64_t i = 0; i < kept.size(); ++i) {
+      kept[i]->Look();
+      ExpectSame(*kept[i], *NoisyFeatures(i));
+      long resident = 0;
+      for (const auto& features : kept) resident += ResidentKilobytes(features->levels[0].data);
+      EXPECT_LE(resident, 4 * kBytes / 1024);
+      EXPECT_GE(resident, round * 2 * kBytes / 1024);
+    }
+  }
+}
+
+TEST(PictureFiles, NothingHappensToPicturesInOrdinaryMemoryThatAreLookedAt) {
   const auto features = NoisyFeatures();
-  files.Rest(*features);
-  files.Rest(ImageFeatures());
+  features->Look();
   ExpectSame(*features, *NoisyFeatures());
 }
 
