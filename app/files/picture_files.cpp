@@ -39,6 +39,13 @@ class NamelessFile {
   NamelessFile& operator=(const NamelessFile&) = delete;
 
   int descriptor() const { return descriptor_; }
+  // False with errno when the disk has no room for it. What was written fits for sure then, now and when the
+  // system brings it to the disk, and to look at it later cannot fail for want of room.
+  bool Reserve(std::size_t bytes) const {
+    if (::fallocate(descriptor_, 0, 0, static_cast<off_t>(bytes)) == 0) return true;
+    // Where the file system cannot tell, writing does.
+    return errno == EOPNOTSUPP || errno == ENOSYS;
+  }
   // False with errno when the disk does not take it all.
   bool Write(const std::uint8_t* bytes, std::size_t count, std::size_t offset) const {
     while (count > 0) {
@@ -127,11 +134,14 @@ std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatu
   std::array<std::size_t, engine::kPyramidLevels> offsets{};
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < features.levels.size(); ++i) {
+    offsets[i] = bytes;
+    bytes = (bytes + features.levels[i].total() + kAlignment - 1) / kAlignment * kAlignment;
+  }
+  if (!file.Reserve(bytes)) return nullptr;
+  for (std::size_t i = 0; i < features.levels.size(); ++i) {
     const cv::Mat& level = features.levels[i];
     const cv::Mat whole = level.isContinuous() ? level : level.clone();
-    offsets[i] = bytes;
-    if (!file.Write(whole.ptr(), whole.total(), bytes)) return nullptr;
-    bytes = (bytes + whole.total() + kAlignment - 1) / kAlignment * kAlignment;
+    if (!file.Write(whole.ptr(), whole.total(), offsets[i])) return nullptr;
   }
   const auto mapping = PictureMapping::Make(file, bytes, awake);
   if (!mapping) return nullptr;
