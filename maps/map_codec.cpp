@@ -98,6 +98,7 @@ std::vector<StoredKeyFrame> MakeStoredKeyFrames(const engine::MapSnapshot& snaps
   std::vector<StoredKeyFrame> keyframes;
   keyframes.reserve(snapshot.keyframes.size());
   for (const engine::KeyFrame& keyframe : snapshot.keyframes) {
+    keyframe.features->Look();
     StoredKeyFrame stored{keyframe, PictureHash(keyframe.features->levels[0])};
     stored.keyframe.features = nullptr;
     keyframes.push_back(std::move(stored));

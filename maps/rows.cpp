@@ -253,6 +253,7 @@ void WritePictures(const Database& database, std::uint64_t key, const engine::Ma
     const bool same = stored != left.end() && stored->second == keyframes[i].picture_hash;
     if (stored != left.end()) left.erase(stored);
     if (same) continue;
+    snapshot.keyframes[i].features->Look();
     const Bytes bytes = EncodePicture(key, id, snapshot.keyframes[i].features->levels[0]);
     insert.Reset();
     insert.Bind(1, Signed(key)).Bind(2, std::int64_t{id}).Bind(3, std::span<const std::uint8_t>(bytes)).Run();

@@ -59,6 +59,7 @@ engine::WordBag WordsOf(const engine::ImageFeatures& features) {
   const bool has_corners = !features.row_begin[0].empty();
   if (has_corners) return engine::MakeWordBag(features);
   // Whoever made the features may have had no use for corners.
+  features.Look();
   const cv::Mat& picture = features.levels[0];
   if (picture.cols < kMinPictureSidePx || picture.rows < kMinPictureSidePx) return {};
   return engine::MakeWordBag(*engine::MakeFeatures(picture));

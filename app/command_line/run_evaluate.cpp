@@ -4,8 +4,10 @@
 #include <cstdio>
 #include <exception>
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "app/cameras/simulated_source.h"
 #include "app/command_line/progress.h"
@@ -110,7 +112,8 @@ RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const 
   const auto start = std::chrono::steady_clock::now();
   RunOutput output(options.output / name);
   RunRecorder recorder;
-  Session session(OptionsFor(options), {camera->model}, nullptr);
+  std::optional<Session> in_use(std::in_place, OptionsFor(options), std::vector{camera->model}, nullptr);
+  Session& session = *in_use;
   Progress progress(name, camera->source->info().frame_count, verbosity);
   FrameLoopOptions loop;
   loop.pace = options.pace;
@@ -143,7 +146,10 @@ RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const 
   record.mapping = MakeMappingTimes(session.MappingTimes());
   for (const LensWatch::Ring& ring : session.LensErrors(0))
     record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
-  for (const Session::MapState& map : session.Maps()) {
+  // What follows needs the maps, and memory for one of them over again, but not all that tracked and mapped.
+  std::vector<Session::MapState> maps = session.Maps();
+  in_use.reset();
+  for (const Session::MapState& map : maps) {
     if (!map.snapshot) continue;
     record.maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
     record.maps.back().discarded = map.discarded;

@@ -39,6 +39,13 @@ class NamelessFile {
   NamelessFile& operator=(const NamelessFile&) = delete;
 
   int descriptor() const { return descriptor_; }
+  // False with errno when the disk has no room for it. What was written fits for sure then, now and when the
+  // system brings it to the disk, and to look at it later cannot fail for want of room.
+  bool Reserve(std::size_t bytes) const {
+    if (::fallocate(descriptor_, 0, 0, static_cast<off_t>(bytes)) == 0) return true;
+    // Where the file system cannot tell, writing does.
+    return errno == EOPNOTSUPP || errno == ENOSYS;
+  }
   // False with errno when the disk does not take it all.
   bool Write(const std::uint8_t* bytes, std::size_t count, std::size_t offset) const {
     while (count > 0) {
@@ -58,17 +65,25 @@ class NamelessFile {
 
 // A file's bytes in memory, and the owner of every picture that lies in them: OpenCV's count of who holds a
 // picture ends here. Each picture holds the mapping; the last one takes it along.
-class PictureMapping final : public cv::MatAllocator, public std::enable_shared_from_this<PictureMapping> {
+class PictureMapping final : public cv::MatAllocator,
+                             public engine::KeptPictures,
+                             public WorkingSet::Member,
+                             public std::enable_shared_from_this<PictureMapping> {
  public:
   // Null with errno when it cannot be mapped.
-  static std::shared_ptr<const PictureMapping> Make(const NamelessFile& file, std::size_t bytes) {
+  static std::shared_ptr<const PictureMapping> Make(const NamelessFile& file, std::size_t bytes,
+                                                    std::shared_ptr<WorkingSet> awake) {
     void* const data = ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file.descriptor(), 0);
     if (data == MAP_FAILED) return nullptr;
-    return std::make_shared<PictureMapping>(data, bytes);
+    return std::make_shared<PictureMapping>(data, bytes, std::move(awake));
   }
 
-  PictureMapping(void* data, std::size_t bytes) : data_(data), bytes_(bytes) {}
-  ~PictureMapping() override { ::munmap(data_, bytes_); }
+  PictureMapping(void* data, std::size_t bytes, std::shared_ptr<WorkingSet> awake)
+      : Member(bytes), data_(data), bytes_(bytes), awake_(std::move(awake)) {}
+  ~PictureMapping() override {
+    awake_->Remove(*this);
+    ::munmap(data_, bytes_);
+  }
   PictureMapping(const PictureMapping&) = delete;
   PictureMapping& operator=(const PictureMapping&) = delete;
 
@@ -83,8 +98,9 @@ class PictureMapping final : public cv::MatAllocator, public std::enable_shared_
     return picture;
   }
 
-  // The pages are shared with the file: to let them go loses nothing.
-  void Rest() const { ::madvise(data_, bytes_, MADV_DONTNEED); }
+  void Look() const override { awake_->Look(*this); }
+  // The pages are shared with the file: to let them go loses nothing, even while somebody reads them.
+  void Rest() const override { ::madvise(data_, bytes_, MADV_DONTNEED); }
 
   void deallocate(cv::UMatData* data) const override {
     if (data == nullptr) return;
@@ -106,23 +122,28 @@ class PictureMapping final : public cv::MatAllocator, public std::enable_shared_
  private:
   void* const data_;
   const std::size_t bytes_;
+  const std::shared_ptr<WorkingSet> awake_;
 };
 
 // The features with their pyramid in a file of the folder; null with errno.
 std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatures& features,
-                                                        const std::filesystem::path& folder) {
+                                                        const std::filesystem::path& folder,
+                                                        const std::shared_ptr<WorkingSet>& awake) {
   const NamelessFile file(folder);
   if (file.descriptor() < 0) return nullptr;
   std::array<std::size_t, engine::kPyramidLevels> offsets{};
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < features.levels.size(); ++i) {
+    offsets[i] = bytes;
+    bytes = (bytes + features.levels[i].total() + kAlignment - 1) / kAlignment * kAlignment;
+  }
+  if (!file.Reserve(bytes)) return nullptr;
+  for (std::size_t i = 0; i < features.levels.size(); ++i) {
     const cv::Mat& level = features.levels[i];
     const cv::Mat whole = level.isContinuous() ? level : level.clone();
-    offsets[i] = bytes;
-    if (!file.Write(whole.ptr(), whole.total(), bytes)) return nullptr;
-    bytes = (bytes + whole.total() + kAlignment - 1) / kAlignment * kAlignment;
+    if (!file.Write(whole.ptr(), whole.total(), offsets[i])) return nullptr;
   }
-  const auto mapping = PictureMapping::Make(file, bytes);
+  const auto mapping = PictureMapping::Make(file, bytes, awake);
   if (!mapping) return nullptr;
   auto kept = std::make_shared<engine::ImageFeatures>();
   for (std::size_t i = 0; i < features.levels.size(); ++i)
@@ -131,17 +152,14 @@ std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatu
   kept->row_begin = features.row_begin;
   kept->fast_threshold = features.fast_threshold;
   kept->small_blurry = {features.small_blurry.pixels.clone(), features.small_blurry.scale};
+  kept->kept = mapping;
   return kept;
-}
-
-const PictureMapping* MappingOf(const engine::ImageFeatures& features) {
-  const cv::UMatData* const data = features.levels[0].u;
-  return data != nullptr ? dynamic_cast<const PictureMapping*>(data->currAllocator) : nullptr;
 }
 
 }  // namespace
 
-PictureFiles::PictureFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
+PictureFiles::PictureFiles(std::filesystem::path folder, std::size_t awake_bytes)
+    : folder_(std::move(folder)), awake_(std::make_shared<WorkingSet>(awake_bytes)) {}
 
 std::filesystem::path PictureFiles::DefaultFolder() {
   const char* const folder = std::getenv("TMPDIR");
@@ -150,8 +168,8 @@ std::filesystem::path PictureFiles::DefaultFolder() {
 
 std::shared_ptr<const engine::ImageFeatures> PictureFiles::Keep(
     std::shared_ptr<const engine::ImageFeatures> features) {
-  if (MappingOf(*features) != nullptr) return features;
-  if (auto kept = MoveToFile(*features, folder_)) return kept;
+  if (features->kept) return features;
+  if (auto kept = MoveToFile(*features, folder_, awake_)) return kept;
   const int error = errno;
   if (!told_.exchange(true)) {
     spdlog::warn("The pictures of maps stay in memory: '{}' takes no file ({}).", folder_.string(),
@@ -160,8 +178,8 @@ std::shared_ptr<const engine::ImageFeatures> PictureFiles::Keep(
   return features;
 }
 
-void PictureFiles::Rest(const engine::ImageFeatures& features) {
-  if (const PictureMapping* const mapping = MappingOf(features)) mapping->Rest();
+void PictureFiles::RestAll() {
+  awake_->RestAll();
 }
 
 }  // namespace docent::app

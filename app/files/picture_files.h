@@ -2,9 +2,11 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 
+#include "app/files/working_set.h"
 #include "engine/vision/picture_store.h"
 
 namespace docent::app {
@@ -13,24 +15,31 @@ namespace docent::app {
 // is mapped for reading and closed, and the system takes its blocks back when the last picture in it is let
 // go, however the program ends. A page of a picture that rests is read from the file again when it is
 // touched, mostly from what the system has cached and may reclaim at any time; so what rests counts for
-// nothing, and nobody who reads can tell. Where no file can be written (no folder, no room) the pictures stay
-// in ordinary memory, and the log says so once.
+// nothing, and nobody who reads can tell. Of those that are looked at so many bytes are awake at a time.
+// Where no file can be written (no folder, no room) the pictures stay in ordinary memory, and the log says so
+// once.
 //
-// There is no state that calls share: any thread may call anything. Blocks on the disk in Keep alone.
+// Any thread may call anything. Blocks on the disk in Keep alone.
 class PictureFiles : public engine::PictureStore {
  public:
-  explicit PictureFiles(std::filesystem::path folder = DefaultFolder());
+  // 80 keyframes of 640x480: the map of one exhibit is awake as a whole, and a camera in a larger one sees
+  // what fewer of them show.
+  static constexpr std::size_t kAwakeBytes = 32 * 1024 * 1024;
+
+  explicit PictureFiles(std::filesystem::path folder = DefaultFolder(),
+                        std::size_t awake_bytes = kAwakeBytes);
 
   // For files that are large, and may be on disk rather than in memory: $TMPDIR, else /var/tmp.
   static std::filesystem::path DefaultFolder();
 
   std::shared_ptr<const engine::ImageFeatures> Keep(
       std::shared_ptr<const engine::ImageFeatures> features) override;
-  void Rest(const engine::ImageFeatures& features) override;
+  void RestAll() override;
 
  private:
   const std::filesystem::path folder_;
-  std::atomic<bool> told_{false};  // that pictures stay in memory
+  const std::shared_ptr<WorkingSet> awake_;  // the pictures have it too, for they may outlive this
+  std::atomic<bool> told_{false};            // that pictures stay in memory
 };
 
 }  // namespace docent::app

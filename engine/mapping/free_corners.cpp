@@ -32,6 +32,7 @@ std::size_t Occupancy::Index(const Eigen::Vector2f& pixel) const {
 std::vector<ScoredCorner> FreeCorners(const Map::KeyFrameRecord& keyframe, std::size_t level, float min_score,
                                       Occupancy* occupancy) {
   const ImageFeatures& features = *keyframe.keyframe.features;
+  features.Look();
   const cv::Mat& image = features.levels[level];
   for (const Observation& observation : keyframe.observations) {
     // A point of a neighbouring level stands for the same structure.

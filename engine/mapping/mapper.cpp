@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include "engine/geometry/triangulation.h"
@@ -35,7 +34,6 @@ Mapper::Mapper(const MapperOptions& options)
       loops_(options.loops, options.search) {}
 
 void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
-  RestPictures(kNoId);
   map_ = snapshot ? Map(*snapshot) : Map();
   searcher_.Clear();
   descriptors_.Clear();
@@ -137,7 +135,6 @@ bool Mapper::Step() {
   } else {
     account = DoNextTask();
   }
-  if (account != nullptr) RestPictures(newest_);
   const double seconds = ProcessorSeconds() - start;
   const std::lock_guard lock(mutex_);
   stepping_ = false;
@@ -229,7 +226,7 @@ void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecor
     if (point && !point->point.infinite()) map_.AddObservation({id, match.point, match.pixel, match.level});
   }
   map_.UpdateDepth(record);
-  RefindAllPoints(id);
+  RefindPoints(options_.refind, id, &searcher_, &map_);
   map_.UpdateDepth(record);
   std::vector<MapPointId> created;
   for (const KeyFrameId partner : Partners(id)) {
@@ -297,35 +294,6 @@ void Mapper::KeepPictures(Task* task) const {
   keep(&pair.b.features);
 }
 
-void Mapper::RestPictures(KeyFrameId looked_at) {
-  constexpr std::size_t kNeighbours = 16;
-  // 40 MB at 640x480. What rests is slow to be looked at for the first time; a map of one exhibit need not
-  // pay.
-  constexpr std::size_t kSmallMap = 100;
-  if (!options_.pictures || map_.keyframes().size() <= kSmallMap) return;
-  std::set<KeyFrameId> here = {looked_at};
-  for (const auto& [id, shared] : map_.Covisible(looked_at)) {
-    if (here.size() > kNeighbours) break;
-    here.insert(id);
-  }
-  for (const auto& [id, record] : map_.keyframes())
-    if (!here.contains(id)) options_.pictures->Rest(*record.keyframe.features);
-}
-
-// Patches of points far and wide are cut for it, and bring a good part of all pictures back.
-void Mapper::RefindAllPoints(KeyFrameId keyframe) {
-  constexpr std::size_t kPointsBetweenRests = 4096;
-  std::vector<MapPointId> all, some;
-  for (const Map::PointRecord& record : map_.points())
-    if (record.alive) all.push_back(record.point.id);
-  for (auto begin = all.begin(); begin != all.end(); begin += static_cast<std::ptrdiff_t>(some.size())) {
-    const auto left = static_cast<std::size_t>(all.end() - begin);
-    some.assign(begin, begin + static_cast<std::ptrdiff_t>(std::min(left, kPointsBetweenRests)));
-    RefindPoints(options_.refind, keyframe, &searcher_, &map_, &some);
-    RestPictures(keyframe);
-  }
-}
-
 void Mapper::RefindNewPoints() {
   // New points are looked for in the keyframes that share most with the newest one.
   constexpr std::size_t kNeighbours = 8;
@@ -347,7 +315,7 @@ void Mapper::LocalAdjustment() {
 void Mapper::GlobalAdjustment() {
   // No time needs more memory than this one.
   searcher_.Release();
-  RestPictures(kNoId);
+  if (options_.pictures) options_.pictures->RestAll();
   MapAdjustmentOptions adjustment = options_.adjustment;
   if (loop_to_adjust_) adjustment.global_loss = RobustLoss::kHuber;
   const BundleSummary summary = AdjustGlobally(adjustment, &interrupt_, &map_);

@@ -131,15 +131,12 @@ class Mapper {
   bool IsFinite() const;  // the map knows depth
   void ApplyReports();
   std::vector<KeyFrameId> Partners(KeyFrameId keyframe);
-  void RefindAllPoints(KeyFrameId keyframe);
   void RefindNewPoints();
   void LocalAdjustment();
   void GlobalAdjustment();
   // The most urgent step towards closing a loop; false when there is none.
   bool WorkOnLoops();
   void KeepPictures(Task* task) const;
-  // Of all keyframes but this one and those that share most with it; kNoId: of all.
-  void RestPictures(KeyFrameId looked_at);
   // A candidate as it would have been offered had it been tracked in the map as it is now.
   KeyFrameCandidate UpToDate(KeyFrameCandidate candidate) const;
   void ThinOut();  // removes one redundant keyframe

@@ -87,6 +87,8 @@ class PairSearch {
                                       const Eigen::Vector3d& ray, const DepthRange& range) {
     const auto predicted = PredictPatch(source_pixel, level, ray, range);
     if (!predicted) return std::nullopt;
+    target_.features->Look();
+    partner_.features->Look();
     const auto search_level = static_cast<std::size_t>(predicted->level);
     const cv::Mat& image = partner_.features->levels[search_level];
     PatchTemplate patch;

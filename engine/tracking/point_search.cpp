@@ -20,10 +20,21 @@ constexpr float kMaxAreaRatio = 3.0f;
 
 void PointSearcher::Clear() {
   cache_.clear();
+  patches_.clear();
 }
 
 void PointSearcher::Release() {
   std::vector<Cached>().swap(cache_);
+  std::vector<PatchTemplate>().swap(patches_);
+}
+
+PatchTemplate& PointSearcher::PatchOf(Cached* entry) {
+  if (entry->patch < 0) {
+    if (patches_.empty()) patches_.reserve(kCacheSlots);
+    entry->patch = static_cast<int>(patches_.size());
+    patches_.emplace_back();
+  }
+  return patches_[static_cast<std::size_t>(entry->patch)];
 }
 
 PointSearcher::Cached& PointSearcher::Entry(const MapPoint& point) {
@@ -128,8 +139,9 @@ bool PointSearcher::PreparePatch(const MapPoint& point, const KeyFrame& source,
   entry->level = predicted.level;
   entry->pixel_from_source = predicted.pixel_from_source;
   const Eigen::Matrix2f source_from_patch = (predicted.pixel_from_source * scale).inverse();
+  source.features->Look();
   entry->has_patch = CutPatch(source.features->levels[point.source_level], point.source_pixel,
-                              source_from_patch, &entry->patch);
+                              source_from_patch, &PatchOf(entry));
   return entry->has_patch;
 }
 
@@ -138,6 +150,8 @@ std::optional<FoundPoint> PointSearcher::Find(const MapPoint& point, const KeyFr
                                               float radius_px, bool direct) {
   Cached& entry = Entry(point);
   if (!PreparePatch(point, source, predicted, &entry)) return std::nullopt;
+  features.Look();
+  const PatchTemplate& patch = PatchOf(&entry);
   const auto level = static_cast<std::size_t>(predicted.level);
   const cv::Mat& image = features.levels[level];
   const Eigen::Vector2f center = LevelFromLevelZero(predicted.pixel, predicted.level).cast<float>();
@@ -155,21 +169,21 @@ std::optional<FoundPoint> PointSearcher::Find(const MapPoint& point, const KeyFr
     const float dx = static_cast<float>(corner.x) - center.x(),
                 dy = static_cast<float>(corner.y) - center.y();
     if (dx * dx + dy * dy > radius * radius) continue;
-    const float correlation = PatchCorrelation(entry.patch, image, corner.x, corner.y);
+    const float correlation = PatchCorrelation(patch, image, corner.x, corner.y);
     if (correlation > best) {
       best = correlation;
       best_corner = &corner;
     }
   }
   if (best_corner) {
-    const auto aligned = AlignPatch(entry.patch, image, {best_corner->x, best_corner->y});
+    const auto aligned = AlignPatch(patch, image, {best_corner->x, best_corner->y});
     if (aligned && aligned->correlation >= options_.min_correlation) {
       return FoundPoint{LevelZeroFromLevel(aligned->pixel.cast<double>(), predicted.level).cast<float>(),
                         aligned->correlation};
     }
   }
   if (direct && PatchFits(image, center.x(), center.y(), 2.0f)) {
-    const auto aligned = AlignPatch(entry.patch, image, center, options_.max_direct_shift_px);
+    const auto aligned = AlignPatch(patch, image, center, options_.max_direct_shift_px);
     if (aligned && aligned->correlation >= options_.min_direct_correlation) {
       return FoundPoint{LevelZeroFromLevel(aligned->pixel.cast<double>(), predicted.level).cast<float>(),
                         aligned->correlation};

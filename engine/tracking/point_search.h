@@ -81,9 +81,9 @@ class PointSearcher {
     Eigen::Vector2f source_pixel = Eigen::Vector2f::Zero();
     bool has_rays = false, has_patch = false;
     int level = -1;
+    int patch = -1;                            // its place in patches_, once it had one
     Eigen::Vector3f ray, ray_right, ray_down;  // in the source camera, of the source pixel and its neighbours
     Eigen::Matrix2f pixel_from_source;         // that the patch was cut for
-    PatchTemplate patch;
   };
   Cached& Entry(const MapPoint& point);
   // Pixel, Jacobian and place before the camera; rotation: of camera_from_map.
@@ -95,9 +95,13 @@ class PointSearcher {
   static bool FindWarp(const Eigen::Matrix3d& rotation, PredictedPoint* predicted);
   bool PreparePatch(const MapPoint& point, const KeyFrame& source, const PredictedPoint& predicted,
                     Cached* entry);
+  PatchTemplate& PatchOf(Cached* entry);
 
   SearchOptions options_;
   std::vector<Cached> cache_;  // direct mapped: slot id % size
+  // Most points that are predicted are never looked for, and a patch is large: room for all is reserved, but
+  // touched only as patches come.
+  std::vector<PatchTemplate> patches_;
 };
 
 }  // namespace docent::engine

@@ -246,6 +246,7 @@ bool DescriptorFits(const cv::Mat& image, const Eigen::Vector2f& pixel) {
 
 void Append(const ImageFeatures& features, const Eigen::Vector2f& pixel, int level,
             std::vector<DescribedPlace>* places) {
+  features.Look();
   const auto description = Describe(features.levels[static_cast<std::size_t>(level)],
                                     LevelFromLevelZero(pixel.cast<double>(), level).cast<float>());
   if (!description) return;
@@ -256,6 +257,7 @@ void Append(const ImageFeatures& features, const Eigen::Vector2f& pixel, int lev
 // The best corners of a level, at most `count`, no two in one cell of a grid of about as many cells.
 std::vector<Corner> BestCorners(const ImageFeatures& features, std::size_t level, int count,
                                 float min_score) {
+  features.Look();
   const cv::Mat& image = features.levels[level];
   if (image.cols <= 2 * kDescriptorBorder || image.rows <= 2 * kDescriptorBorder || count <= 0) return {};
   const double cell = std::max(4.0, std::sqrt(static_cast<double>(image.total()) / (2.0 * count)));

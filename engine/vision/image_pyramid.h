@@ -34,6 +34,14 @@ struct Corner {
   std::int16_t x = 0, y = 0;
 };
 
+// Pictures that a PictureStore keeps.
+class KeptPictures {
+ public:
+  virtual ~KeptPictures() = default;
+  // See ImageFeatures::Look. Any thread.
+  virtual void Look() const = 0;
+};
+
 // Everything of one picture that tracking and mapping look at. Level 0 is the full grey picture (CV_8UC1),
 // each further level half the size (2x2 mean). Corners are sorted by row, then column.
 struct ImageFeatures {
@@ -43,6 +51,13 @@ struct ImageFeatures {
   std::array<std::vector<int>, kPyramidLevels> row_begin;
   std::array<int, kPyramidLevels> fast_threshold{};
   SmallBlurryImage small_blurry;
+  std::shared_ptr<const KeptPictures> kept;  // null where the levels lie in ordinary memory
+
+  // Says that the levels are about to be read, so that a store lets others rest. Whoever goes from keyframe
+  // to keyframe says so for each; it costs next to nothing, and who forgets it reads the same pixels.
+  void Look() const {
+    if (kept) kept->Look();
+  }
 };
 
 }  // namespace docent::engine

@@ -2,8 +2,11 @@
 #include "app/files/picture_files.h"
 
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <sys/mman.h>
+#include <sys/mount.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
@@ -21,6 +24,8 @@ namespace docent::app {
 namespace {
 
 using engine::ImageFeatures;
+
+constexpr int kNoDisk = 77;
 
 std::shared_ptr<const ImageFeatures> NoisyFeatures(std::uint64_t seed = 1) {
   cv::Mat gray(241, 323, CV_8UC1);  // odd at every level
@@ -81,21 +86,37 @@ TEST(PictureFiles, RestingPicturesNeedNoMemoryAndAreTheSameAfterwards) {
   PictureFiles files(folder.path());
   const auto features = NoisyFeatures();
   const auto kept = files.Keep(features);
+  kept->Look();
   ExpectSame(*kept, *features);
   const std::uint8_t* const address = kept->levels[0].data;
   EXPECT_GE(ResidentKilobytes(address), 323 * 241 / 1024);
-  files.Rest(*kept);
+  files.RestAll();
   EXPECT_EQ(ResidentKilobytes(address), 0);
   EXPECT_EQ(kept->levels[0].data, address);
   ExpectSame(*kept, *features);
 }
 
-TEST(PictureFiles, RestingHarmsNoPictureInOrdinaryMemory) {
+TEST(PictureFiles, WhoeverLooksIntoManyPicturesWakesFewAtATime) {
   const TemporaryFolder folder;
-  PictureFiles files(folder.path());
+  constexpr long kBytes = 323 * 241 * 4 / 3;  // of a pyramid
+  PictureFiles files(folder.path(), 3 * kBytes);
+  std::vector<std::shared_ptr<const ImageFeatures>> kept;
+  for (std::uint64_t i = 0; i < 8; ++i) kept.push_back(files.Keep(NoisyFeatures(i)));
+  for (int round = 0; round < 2; ++round) {
+    for (std::uint64_t i = 0; i < kept.size(); ++i) {
+      kept[i]->Look();
+      ExpectSame(*kept[i], *NoisyFeatures(i));
+      long resident = 0;
+      for (const auto& features : kept) resident += ResidentKilobytes(features->levels[0].data);
+      EXPECT_LE(resident, 4 * kBytes / 1024);
+      EXPECT_GE(resident, round * 2 * kBytes / 1024);
+    }
+  }
+}
+
+TEST(PictureFiles, NothingHappensToPicturesInOrdinaryMemoryThatAreLookedAt) {
   const auto features = NoisyFeatures();
-  files.Rest(*features);
-  files.Rest(ImageFeatures());
+  features->Look();
   ExpectSame(*features, *NoisyFeatures());
 }
 
@@ -154,6 +175,39 @@ TEST(PictureFiles, WhereTheDiskTakesNoMorePicturesStayWhereTheyAre) {
   std::signal(SIGXFSZ, before);
   EXPECT_EQ(kept, features);
   EXPECT_NE(files.Keep(features), features);  // there is room again
+}
+
+// In a process of its own, on a disk of a quarter of a megabyte. Whoever maps a file without having room for
+// it is killed where it is touched.
+int FillADisk(const std::string& folder) {
+  const std::string same_user = "0 " + std::to_string(geteuid()) + " 1";
+  const std::string same_group = "0 " + std::to_string(getegid()) + " 1";
+  if (unshare(CLONE_NEWUSER | CLONE_NEWNS) != 0) return kNoDisk;
+  if (!(std::ofstream("/proc/self/uid_map") << same_user << std::flush)) return kNoDisk;
+  if (!(std::ofstream("/proc/self/setgroups") << "deny" << std::flush)) return kNoDisk;
+  if (!(std::ofstream("/proc/self/gid_map") << same_group << std::flush)) return kNoDisk;
+  if (mount("none", folder.c_str(), "tmpfs", 0, "size=256k") != 0) return kNoDisk;
+  PictureFiles files(folder);
+  std::vector<std::shared_ptr<const ImageFeatures>> all;
+  int in_files = 0;
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    all.push_back(files.Keep(NoisyFeatures(i)));
+    in_files += all.back()->kept ? 1 : 0;
+  }
+  for (std::uint64_t i = 0; i < 5; ++i)
+    if (!Same(all[i]->levels[0], NoisyFeatures(i)->levels[0])) return 1;
+  return in_files == 2 ? 0 : 2;
+}
+
+TEST(PictureFiles, AFullDiskIsNoTrouble) {
+  const TemporaryFolder folder;
+  const pid_t child = fork();
+  if (child == 0) _exit(FillADisk(folder.path().string()));
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status);
+  if (WEXITSTATUS(status) == kNoDisk) GTEST_SKIP() << "no disk of its own can be had here";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace
