@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "engine/mapping/map_adjustment.h"
 #include "engine/tracking/point_search.h"
+#include "engine/vision/fast_corners.h"
 #include "engine/vision/features.h"
+#include "engine/vision/lanes.h"
+#include "engine/vision/patch.h"
 #include "engine/vision/rotation_alignment.h"
 #include "tests/bench/bench_sequence.h"
 
@@ -78,6 +83,114 @@ void PredictAndFindAPoint(benchmark::State& state) {
   state.counters["found"] = looked_for > 0 ? found / looked_for : 0;
 }
 BENCHMARK(PredictAndFindAPoint)->Unit(benchmark::kMicrosecond);
+
+// Whether any of these pixels passes the corner detector's first test.
+bool PassesFirstTest(const cv::Mat& picture, int y, int begin, int end, int threshold) {
+  for (int x = begin; x < end; ++x) {
+    const auto at = [&](int dx, int dy) {
+      return static_cast<int>(picture.at<std::uint8_t>(y + dy, x + dx));
+    };
+    const int center = at(0, 0), top = at(0, -3), bottom = at(0, 3), left = at(-3, 0), right = at(3, 0);
+    const int bright = std::min(std::max(top, bottom), std::max(left, right)) - center;
+    const int dark = center - std::max(std::min(top, bottom), std::min(left, right));
+    if (std::max(bright, dark) > threshold) return true;
+  }
+  return false;
+}
+
+// Per picture. "operations" counts those on a vector of bytes that the test cannot do without: five loads,
+// nine comparisons and differences, a branch and a store for each block; and for a block that passes the
+// first test twelve loads, 46 minima and maxima for the strongest bright arc, as many for the dark one, and
+// seven more.
+void DetectCorners(benchmark::State& state) {
+  const BenchSequence& sequence = Sequence();
+  const auto features = engine::MakeFeatures(sequence.frames[sequence.frames.size() / 2].picture);
+  constexpr int kMargin = 6;
+  double operations = 0;
+  for (std::size_t level = 0; level < engine::kPyramidLevels; ++level) {
+    const cv::Mat& picture = features->levels[level];
+    for (int y = kMargin; y < picture.rows - kMargin; ++y) {
+      for (int x = kMargin; x < picture.cols - kMargin; x += engine::kByteLanes) {
+        const int end = std::min(x + engine::kByteLanes, picture.cols - kMargin);
+        operations += PassesFirstTest(picture, y, x, end, features->fast_threshold[level]) ? 16 + 111 : 16;
+      }
+    }
+  }
+  std::vector<engine::Corner> corners;
+  std::vector<int> row_begin;
+  for (auto _ : state) {
+    for (std::size_t level = 0; level < engine::kPyramidLevels; ++level)
+      engine::DetectFastCorners(features->levels[level], features->fast_threshold[level], kMargin, &corners,
+                                &row_begin);
+  }
+  state.counters["operations"] =
+      benchmark::Counter(operations, benchmark::Counter::kIsIterationInvariantRate);
+}
+BENCHMARK(DetectCorners)->Unit(benchmark::kMicrosecond);
+
+struct CornersOfAPicture {
+  cv::Mat picture;
+  std::vector<Eigen::Vector2f> corners;  // that patches fit about
+};
+CornersOfAPicture SomeCorners() {
+  const BenchSequence& sequence = Sequence();
+  const auto features = engine::MakeFeatures(sequence.frames[sequence.frames.size() / 2].picture);
+  CornersOfAPicture some{features->levels[0], {}};
+  for (const engine::Corner& corner : features->corners[0]) {
+    const Eigen::Vector2f pixel(corner.x, corner.y);
+    if (engine::PatchFits(some.picture, pixel.x(), pixel.y(), 12)) some.corners.push_back(pixel);
+  }
+  return some;
+}
+
+Eigen::Matrix2f SomeWarp() {
+  Eigen::Matrix2f warp;
+  warp << 1.1f, 0.15f, -0.1f, 0.9f;
+  return warp;
+}
+
+// "operations": 100 bilinear samples of 22 on single numbers; eight rows of 16 on vectors and eight of 14 for
+// the integer sums; 100 for the sums of gradients and the matrix.
+void CutAPatch(benchmark::State& state) {
+  const CornersOfAPicture some = SomeCorners();
+  const Eigen::Matrix2f warp = SomeWarp();
+  engine::PatchTemplate patch;
+  std::size_t next = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(engine::CutPatch(some.picture, some.corners[next], warp, &patch));
+    next = (next + 1) % some.corners.size();
+  }
+  state.counters["operations"] =
+      benchmark::Counter(100 * 22 + 8 * 16 + 8 * 14 + 100, benchmark::Counter::kIsIterationInvariantRate);
+}
+BENCHMARK(CutAPatch)->Unit(benchmark::kNanosecond);
+
+// From where the patch lies already: one pass that finds no step to take, and the one that measures.
+// "operations" on vectors of eight: 8 for the first row and 26 for each of eight, 40 for the five totals, 40
+// for the step.
+void AlignAPatch(benchmark::State& state) {
+  const CornersOfAPicture some = SomeCorners();
+  const Eigen::Matrix2f warp = SomeWarp();
+  std::vector<std::pair<engine::PatchTemplate, Eigen::Vector2f>> patches;
+  for (const Eigen::Vector2f& corner : some.corners) {
+    engine::PatchTemplate patch;
+    if (!engine::CutPatch(some.picture, corner, warp, &patch)) continue;
+    if (const auto aligned = engine::AlignPatch(patch, some.picture, corner))
+      patches.emplace_back(patch, aligned->pixel);
+  }
+  if (patches.empty()) {
+    state.SkipWithError("no patch could be aligned");
+    return;
+  }
+  std::size_t next = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(engine::AlignPatch(patches[next].first, some.picture, patches[next].second));
+    next = (next + 1) % patches.size();
+  }
+  state.counters["operations"] =
+      benchmark::Counter(2 * (8 + 8 * 26 + 40 + 40), benchmark::Counter::kIsIterationInvariantRate);
+}
+BENCHMARK(AlignAPatch)->Unit(benchmark::kNanosecond);
 
 void AdjustLocally(benchmark::State& state) {
   if (!HasMap(&state)) return;
