@@ -74,7 +74,8 @@ struct TrackerOptions {
   int frames_ahead = 15;
   // Before another map is entered (ptamm §6.3), and before a map that was entered or found again is extended.
   int agreeing_frames = 3;
-  // Overlapping maps (ptamm §5.3): while a map that does not grow is poorly seen, another one may fit better.
+  // A map or a place seen worse than this may be another that is alike: what is found again so is confirmed
+  // and not extended, and, of overlapping maps that do not grow, another one may fit better (ptamm §5.3).
   double poor_quality = 0.5;    // share of what is in view, hidden points among it
   double better_quality = 1.3;  // times that of the map that the camera is or was in, to be entered
   // For such a map, as long as the present one is well enough seen to be extended.
