@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
+#include <span>
 #include <string>
 
 #include "app/cameras/frame_source.h"
@@ -68,7 +69,7 @@ std::vector<engine::PlaceCandidate> MapPlaces::FindPlaces(const engine::PlaceQue
                                                           int per_map, std::uint64_t only_map) const {
   std::vector<engine::PlaceCandidate> found;
   if (only_map != 0 && only_map != kKey) return found;
-  for (const engine::KeyFrame& keyframe : map_->keyframes) {
+  for (const engine::KeyFrame& keyframe : std::span(map_->keyframes).first(keyframes_)) {
     const double difference = engine::Difference(keyframe.features->small_blurry, *query.image);
     if (std::isfinite(difference)) found.push_back({kKey, map_, keyframe.id, difference});
   }

@@ -28,16 +28,20 @@ struct BenchSequence {
 // Throws docent::Error when the sequence cannot be read.
 const BenchSequence& Sequence();
 
-// The keyframes of one map by their thumbnails, so that a second pass may enter it from anywhere.
+// The first `keyframes` keyframes of one map by their thumbnails, so that a second pass may enter it from
+// anywhere.
 class MapPlaces : public engine::PlaceFinder {
  public:
   static constexpr std::uint64_t kKey = engine::Lockstep::kMapKey;
-  explicit MapPlaces(std::shared_ptr<const engine::MapSnapshot> map) : map_(std::move(map)) {}
+  explicit MapPlaces(std::shared_ptr<const engine::MapSnapshot> map,
+                     std::size_t keyframes = std::numeric_limits<std::size_t>::max())
+      : map_(std::move(map)), keyframes_(std::min(keyframes, map_->keyframes.size())) {}
   std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
                                                  std::uint64_t only_map) const override;
 
  private:
   std::shared_ptr<const engine::MapSnapshot> map_;
+  std::size_t keyframes_;
 };
 
 // Milliseconds that this thread has computed: on a machine that others use as well, the time on the wall
