@@ -55,7 +55,7 @@ bool PointSearcher::FindPlace(const MapPoint& point, const CameraModel& camera,
                               const Eigen::Matrix3d& rotation, const Rigid3& camera_from_map,
                               const Eigen::Vector4d& place, PredictedPoint* predicted) const {
   Eigen::Vector3d& x = predicted->point_in_camera;
-  x = camera_from_map.rotation * Eigen::Vector3d(place.head<3>()) + place[3] * camera_from_map.translation;
+  x = rotation * place.head<3>() + place[3] * camera_from_map.translation;
   if (!camera.Project(x, &predicted->pixel, &predicted->jacobian)) return false;
   if (!camera.IsInside(predicted->pixel, kPatchSize / 2)) return false;
   const Eigen::Vector3d normal = rotation * point.normal.cast<double>();
