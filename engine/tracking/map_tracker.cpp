@@ -37,24 +37,24 @@ void MapTracker::Clear() {
 }
 
 // Those of the points that fall into the picture, into visible_.
-void MapTracker::Project(const std::vector<NearbyPoint>& points, const Rigid3& camera_from_map) {
+void MapTracker::Project(const std::vector<NearbyPoint>& points, bool infinite,
+                         const Rigid3& camera_from_map) {
   visible_.clear();
   const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
   const Eigen::Vector3d translation = camera_from_map.translation;
   const double min_cosine = options_.search.min_view_cosine;
   const int columns = camera_->width_px() / kTakenCellPx + 1;
   for (const NearbyPoint& local : points) {
-    const MapPoint& point = *local.point;
     const Eigen::Vector3d x = rotation * local.place.head<3>() + local.place[3] * translation;
     if (!(x.z() > 0)) continue;
-    const Eigen::Vector3d normal = rotation * point.normal.cast<double>();
+    const Eigen::Vector3d normal = rotation * local.normal.cast<double>();
     const double facing = -normal.dot(x);
     if (facing <= 0 || facing * facing < min_cosine * min_cosine * x.squaredNorm()) continue;
     const auto pixel = camera_->Project(x);
     if (!pixel || !camera_->IsInside(*pixel, kPatchSize / 2)) continue;
     std::uint8_t& cell = taken_[static_cast<std::size_t>(
         static_cast<int>(pixel->y()) / kTakenCellPx * columns + static_cast<int>(pixel->x()) / kTakenCellPx)];
-    if (point.infinite() && cell != 0) continue;
+    if (infinite && cell != 0) continue;
     cell = 1;
     visible_.push_back(local);
   }
@@ -78,23 +78,48 @@ bool MapTracker::IsWorthATry(MapPointId point, Random* random) const {
   return random->Below(1 + misses.in_a_row) == 0;
 }
 
-// Points are drawn at random so that a choice among many is spread over the picture and over the map.
+// The order in which visible_ is tried. A choice among many is spread over the picture and over the map as if
+// it were drawn at random, but for the most part it is the choice of the frame before: patches that were cut
+// still fit, and the pose does not tremble with the choice. Every point draws anew once in kDrawFrames
+// frames.
+void MapTracker::Draw() {
+  constexpr std::size_t kBins = 256;
+  std::array<std::uint32_t, kBins + 1> begin{};
+  bins_.clear();
+  for (const NearbyPoint& local : visible_) {
+    const std::uint64_t draw = (draw_frame_ + local.id) / kDrawFrames;
+    const auto bin = static_cast<std::uint8_t>(Random(std::uint64_t{local.id} << 32 ^ draw).Next() >> 56);
+    bins_.push_back(bin);
+    ++begin[bin + std::size_t{1}];
+  }
+  for (std::size_t bin = 0; bin < kBins; ++bin) begin[bin + 1] += begin[bin];
+  order_.resize(visible_.size());
+  for (std::size_t i = 0; i < visible_.size(); ++i) order_[begin[bins_[i]]++] = static_cast<std::uint32_t>(i);
+}
+
 void MapTracker::AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random) {
+  Draw();
   const std::size_t before = candidates_.size();
-  for (std::size_t i = 0; i < visible_.size() && candidates_.size() - before < wanted; ++i) {
-    const std::size_t j = i + random->Below(static_cast<std::uint32_t>(visible_.size() - i));
-    std::swap(visible_[i], visible_[j]);
-    const auto& [point, source, place] = visible_[i];
-    if (!IsWorthATry(point->id, random)) {
+  for (const std::uint32_t which : order_) {
+    if (candidates_.size() - before >= wanted) break;
+    const NearbyPoint& local = visible_[which];
+    if (!IsWorthATry(local.id, random)) {
       ++spared_;
       continue;
     }
-    const auto predicted = searcher_.Predict(*point, *source, *camera_, camera_from_map, place);
-    if (!predicted) continue;
-    const auto index = static_cast<std::uint32_t>(candidates_.size());
-    candidates_.push_back({point, source, place, *predicted});
-    const bool top = predicted->level >= 2 && static_cast<int>(coarse_.size()) < options_.max_coarse;
-    (top ? coarse_ : fine_).push_back(index);
+    const auto predicted =
+        searcher_.Predict(*local.point, *local.source, *camera_, camera_from_map, local.place);
+    if (predicted) candidates_.push_back({local.point, local.source, local.place, *predicted});
+  }
+  const std::size_t count = candidates_.size() - before;
+  if (count == 0) return;
+  // Large patches that fail must not be the ones that the next frame begins with.
+  const std::size_t first = random->Below(static_cast<std::uint32_t>(count));
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t index = before + (first + i) % count;
+    const bool top =
+        candidates_[index].predicted.level >= 2 && static_cast<int>(coarse_.size()) < options_.max_coarse;
+    (top ? coarse_ : fine_).push_back(static_cast<std::uint32_t>(index));
   }
 }
 
@@ -103,15 +128,16 @@ void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_fro
   coarse_.clear();
   fine_.clear();
   spared_ = 0;
+  ++draw_frame_;
   taken_.assign(static_cast<std::size_t>((camera_->width_px() / kTakenCellPx + 1) *
                                          (camera_->height_px() / kTakenCellPx + 1)),
                 0);
   nearby_.Update(map, camera_from_map, last_inliers_, panorama_, turn_.pivot);
-  Project(nearby_.finite(), camera_from_map);
+  Project(nearby_.finite(), false, camera_from_map);
   visible_finite_ = static_cast<int>(visible_.size());
   AddCandidates(camera_from_map, static_cast<std::size_t>(options_.max_fine), random);
   if (panorama_ == kNoId) return;
-  Project(nearby_.infinite(), camera_from_map);
+  Project(nearby_.infinite(), true, camera_from_map);
   AddCandidates(camera_from_map, static_cast<std::size_t>(options_.max_infinite), random);
 }
 

@@ -95,12 +95,14 @@ class MapTracker {
   void Forget() {
     last_inliers_.clear();
     nearby_.Forget();
+    draw_frame_ += kDrawFrames;
   }
   // The frame just tracked was believed: points that were not found where they should be, as something hides
   // them from here, are looked for less often from now on, until they are found again.
   void Remember();
 
  private:
+  static constexpr std::uint64_t kDrawFrames = 32;  // about a second
   struct Candidate {
     const MapPoint* point;
     const KeyFrame* source;
@@ -108,7 +110,8 @@ class MapTracker {
     PredictedPoint predicted;
   };
   void CollectVisible(const MapSnapshot& map, const Rigid3& camera_from_map, Random* random);
-  void Project(const std::vector<NearbyPoint>& points, const Rigid3& camera_from_map);
+  void Project(const std::vector<NearbyPoint>& points, bool infinite, const Rigid3& camera_from_map);
+  void Draw();
   void AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random);
   bool IsWorthATry(MapPointId point, Random* random) const;
   void CountInliers(MapTrackResult* result);
@@ -130,10 +133,13 @@ class MapTracker {
     MapPointId point = kNoId;
     std::uint8_t in_a_row = 0;
   };
-  std::vector<Misses> misses_;  // direct mapped: slot id % size
+  std::vector<Misses> misses_;    // direct mapped: slot id % size
+  std::uint64_t draw_frame_ = 0;  // counts searches; on by kDrawFrames, and all points draw anew
   NearbyPoints nearby_;
   // Scratch, kept to save allocations.
   std::vector<NearbyPoint> visible_;
+  std::vector<std::uint8_t> bins_;    // of visible_
+  std::vector<std::uint32_t> order_;  // in which visible_ is tried
   int visible_finite_ = 0, spared_ = 0;
   std::vector<std::uint8_t> taken_;  // cells of the picture where finite points are expected
   std::vector<Candidate> candidates_;

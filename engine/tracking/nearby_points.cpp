@@ -129,7 +129,7 @@ void NearbyPoints::Take(const MapSnapshot& map, bool infinite, std::vector<Nearb
     if (!source) return;
     Eigen::Vector4d place = next->point_in_map;
     if (infinite) place += nearness * source->camera_from_map.OriginInSource().homogeneous();
-    points->push_back({next, source, place});
+    points->push_back({next, source, id, next->normal, place});
   });
 }
 
@@ -149,7 +149,7 @@ void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_fr
       source = finite_[i].source;
       source_center = source->camera_from_map.OriginInSource();
     }
-    const Eigen::Vector3d position = finite_[i].point->position();
+    const Eigen::Vector3d position = finite_[i].place.head<3>();
     const double misfit = SquaredMisfit(source_center - position, center - position);
     if (!(misfit > most)) continue;
     fits_[i].wanted = better * misfit;
@@ -162,9 +162,9 @@ void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_fr
     const Eigen::Vector3d keyframe_center = keyframe.camera_from_map.OriginInSource();
     std::size_t i = 0;
     for (const Observation& observation : ObservationsOf(map, keyframe.id)) {
-      while (i < finite_.size() && finite_[i].point->id < observation.point) ++i;
+      while (i < finite_.size() && finite_[i].id < observation.point) ++i;
       if (i == finite_.size()) break;
-      if (finite_[i].point->id != observation.point || fits_[i].wanted == 0) continue;
+      if (finite_[i].id != observation.point || fits_[i].wanted == 0) continue;
       const Eigen::Vector3d position = finite_[i].place.head<3>();
       const double misfit = SquaredMisfit(keyframe_center - position, center - position);
       if (misfit < fits_[i].wanted) TakeSource(keyframe, observation, misfit, i);
@@ -177,7 +177,8 @@ void NearbyPoints::TakeSource(const KeyFrame& keyframe, const Observation& obser
   NearbyPoint& nearby = finite_[index];
   // The patch is cut where the point was seen, not where the map puts it: what a wrong lens does to the map
   // must show in the residuals. But the two must agree.
-  const auto pixel = keyframe.camera->Project(keyframe.camera_from_map * nearby.point->position());
+  const auto pixel =
+      keyframe.camera->Project(keyframe.camera_from_map * Eigen::Vector3d(nearby.place.head<3>()));
   if (!pixel) return;
   const float sigma = static_cast<float>(1 << observation.level);
   if ((pixel->cast<float>() - observation.pixel).squaredNorm() > sigma * sigma) return;

@@ -28,6 +28,9 @@ struct NearbyPointOptions {
 struct NearbyPoint {
   const MapPoint* point;   // its source is the keyframe whose view of it resembles the present one
   const KeyFrame* source;  // that keyframe
+  // As in *point, beside what else it takes to tell whether it is in the picture.
+  MapPointId id;
+  Eigen::Vector3f normal;
   // Homogeneous, in the map. While the camera turns about a point that is not its own centre, a direction
   // is taken to be as far from its source as the panorama map's reference sees the scene: nearer to the
   // truth than infinity.

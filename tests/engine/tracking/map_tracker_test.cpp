@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <numbers>
 #include <opencv2/core.hpp>
+#include <set>
 
 #include "engine/tracking/tracker.h"
 #include "engine/vision/features.h"
@@ -145,6 +146,42 @@ TEST_F(TrackingInAMap, LooksLessOftenForWhatIsHidden) {
   EXPECT_GT(later.inliers, 0.9 * first.inliers) << "what is seen must not be given up";
   const MapTrackResult again = track(*free, 20);
   EXPECT_GT(again.inliers, 0.95 * before.inliers) << "it is looked for again when it may be seen";
+}
+
+// Of what is in view a quarter may be looked for in a frame.
+TEST_F(TrackingInAMap, ChangesItsChoiceLittleByLittle) {
+  Random random(4);
+  const Rigid3 view = Views()[0];
+  const auto features = Show(*world_, view);
+  MapTracker all({}, camera_);
+  const int in_view = all.Track(*map_, *features, view, Effort::kUsual, &random).attempted;
+  MapTrackerOptions options;
+  options.max_fine = in_view / 4;
+  MapTracker tracker(options, camera_);
+  const auto choose = [&] {
+    tracker.Track(*map_, *features, view, Effort::kUsual, &random);
+    std::set<MapPointId> chosen;
+    for (const MapTracker::Attempt& attempt : tracker.attempts()) chosen.insert(attempt.point);
+    return chosen;
+  };
+  const auto shared = [](const std::set<MapPointId>& a, const std::set<MapPointId>& b) {
+    return static_cast<double>(
+               std::count_if(a.begin(), a.end(), [&](MapPointId id) { return b.contains(id); })) /
+           static_cast<double>(a.size());
+  };
+  const std::set<MapPointId> first = choose();
+  ASSERT_GT(first.size(), 50u);
+  std::set<MapPointId> before = first, ever = first;
+  for (int frame = 0; frame < 200; ++frame) {
+    const std::set<MapPointId> now = choose();
+    EXPECT_GT(shared(now, before), 0.8);
+    ever.insert(now.begin(), now.end());
+    before = now;
+  }
+  EXPECT_LT(shared(before, first), 0.5) << "no choice is for ever";
+  EXPECT_GT(static_cast<double>(ever.size()), 0.7 * in_view) << "every point has its turn";
+  tracker.Forget();
+  EXPECT_LT(shared(choose(), before), 0.5) << "what was not believed is not tried again";
 }
 
 TEST_F(TrackingInAMap, ComesBackFromABadGuess) {
