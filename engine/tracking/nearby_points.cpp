@@ -10,21 +10,21 @@ namespace docent::engine {
 
 namespace {
 
-// By ascending point.
-std::span<const Observation> ObservationsOf(const MapSnapshot& map, KeyFrameId keyframe) {
-  const auto begin = std::lower_bound(map.observations.begin(), map.observations.end(), keyframe,
-                                      [](const Observation& o, KeyFrameId id) { return o.keyframe < id; });
-  const auto end = std::upper_bound(begin, map.observations.end(), keyframe,
-                                    [](KeyFrameId id, const Observation& o) { return id < o.keyframe; });
-  return {begin, end};
+// The first item that is not before what is looked for; it is taken to be near the begin.
+template <typename Item, typename IsBefore>
+const Item* FirstNot(const Item* begin, const Item* end, const IsBefore& is_before) {
+  std::ptrdiff_t step = 1;
+  while (step < end - begin && is_before(begin[step])) step *= 2;
+  return std::partition_point(begin, begin + std::min(step + 1, end - begin), is_before);
 }
 
-// Of points by ascending id, the first one with this id or a later one; it is taken to be near the begin.
-const MapPoint* FirstNotBefore(const MapPoint* begin, const MapPoint* end, MapPointId id) {
-  std::ptrdiff_t step = 1;
-  while (step < end - begin && begin[step].id < id) step *= 2;
-  return std::lower_bound(begin, begin + std::min(step + 1, end - begin), id,
-                          [](const MapPoint& candidate, MapPointId wanted) { return candidate.id < wanted; });
+// By ascending point.
+std::span<const Observation> ObservationsOf(const MapSnapshot& map, KeyFrameId keyframe) {
+  const Observation* const all_end = map.observations.data() + map.observations.size();
+  const Observation* const begin = std::partition_point(
+      map.observations.data(), all_end, [keyframe](const Observation& o) { return o.keyframe < keyframe; });
+  return {begin,
+          FirstNot(begin, all_end, [keyframe](const Observation& o) { return o.keyframe <= keyframe; })};
 }
 
 // How unlike two views of a point are, squared: the angle between the lines of sight, by its chord, and the
@@ -76,11 +76,11 @@ void NearbyPoints::ChooseFinite(const MapSnapshot& map, const Rigid3& camera_fro
     ranked_.emplace_back(1.0 - 1.0 / (1.0 + distance + 10 * turn), i);
   }
   const auto keep_best = [this](std::size_t most) {
-    const std::size_t count = std::min(ranked_.size(), most);
-    std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(count), ranked_.end());
-    ranked_.resize(count);
+    if (ranked_.size() <= most) return;
+    std::nth_element(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(most), ranked_.end());
+    ranked_.resize(most);
   };
-  if (ranked_.size() > options_.examined_keyframes) keep_best(options_.examined_keyframes);
+  keep_best(options_.examined_keyframes);
   // Shared points come first; the nearness decides among keyframes that share none.
   wanted_.Clear(map.next_point);
   for (const MapPointId id : seen) wanted_.Insert(id);
@@ -91,6 +91,7 @@ void NearbyPoints::ChooseFinite(const MapSnapshot& map, const Rigid3& camera_fro
     rank -= shared;
   }
   keep_best(options_.keyframes);
+  std::sort(ranked_.begin(), ranked_.end());
   wanted_.Clear(map.next_point);
   for (const auto& [rank, index] : ranked_) {
     for (const Observation& observation : ObservationsOf(map, map.keyframes[index].id))
@@ -122,7 +123,7 @@ void NearbyPoints::Take(const MapSnapshot& map, bool infinite, std::vector<Nearb
   const MapPoint* const end = next + map.points.size();
   const KeyFrame* source = nullptr;  // of the point before: points come in the order in which they were made
   wanted_.ForEach([&](MapPointId id) {
-    next = FirstNotBefore(next, end, id);
+    next = FirstNot(next, end, [id](const MapPoint& point) { return point.id < id; });
     if (next == end || next->id != id || next->infinite() != infinite) return;
     if (infinite && next->panorama != panorama_) return;
     if (!source || source->id != next->source_keyframe) source = map.FindKeyFrame(next->source_keyframe);
@@ -140,10 +141,9 @@ void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_fr
   const Eigen::Vector3d center = camera_from_map.OriginInSource();
   const double most = options_.max_source_misfit * options_.max_source_misfit;
   const double better = options_.better_source * options_.better_source;
-  fits_.assign(finite_.size(), {});
+  misfits_.clear();
   const KeyFrame* source = nullptr;
   Eigen::Vector3d source_center = Eigen::Vector3d::Zero();
-  std::size_t poor = 0;
   for (std::size_t i = 0; i < finite_.size(); ++i) {
     if (finite_[i].source != source) {
       source = finite_[i].source;
@@ -151,30 +151,30 @@ void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_fr
     }
     const Eigen::Vector3d position = finite_[i].place.head<3>();
     const double misfit = SquaredMisfit(source_center - position, center - position);
-    if (!(misfit > most)) continue;
-    fits_[i].wanted = better * misfit;
-    ++poor;
+    if (misfit > most) misfits_.push_back({finite_[i].id, static_cast<std::uint32_t>(i), better * misfit});
   }
   resourced_.clear();
-  resourced_.reserve(poor);
+  resourced_.reserve(misfits_.size());
+  if (misfits_.empty()) return;
   for (const auto& [rank, index] : ranked_) {
     const KeyFrame& keyframe = map.keyframes[index];
     const Eigen::Vector3d keyframe_center = keyframe.camera_from_map.OriginInSource();
-    std::size_t i = 0;
+    Misfit* next = misfits_.data();
+    Misfit* const end = next + misfits_.size();
     for (const Observation& observation : ObservationsOf(map, keyframe.id)) {
-      while (i < finite_.size() && finite_[i].id < observation.point) ++i;
-      if (i == finite_.size()) break;
-      if (finite_[i].id != observation.point || fits_[i].wanted == 0) continue;
-      const Eigen::Vector3d position = finite_[i].place.head<3>();
+      while (next != end && next->point < observation.point) ++next;
+      if (next == end) break;
+      if (next->point != observation.point) continue;
+      const Eigen::Vector3d position = finite_[next->index].place.head<3>();
       const double misfit = SquaredMisfit(keyframe_center - position, center - position);
-      if (misfit < fits_[i].wanted) TakeSource(keyframe, observation, misfit, i);
+      if (misfit < next->wanted) TakeSource(keyframe, observation, misfit, next);
     }
   }
 }
 
 void NearbyPoints::TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit,
-                              std::size_t index) {
-  NearbyPoint& nearby = finite_[index];
+                              Misfit* poor) {
+  NearbyPoint& nearby = finite_[poor->index];
   // The patch is cut where the point was seen, not where the map puts it: what a wrong lens does to the map
   // must show in the residuals. But the two must agree.
   const auto pixel =
@@ -182,14 +182,13 @@ void NearbyPoints::TakeSource(const KeyFrame& keyframe, const Observation& obser
   if (!pixel) return;
   const float sigma = static_cast<float>(1 << observation.level);
   if ((pixel->cast<float>() - observation.pixel).squaredNorm() > sigma * sigma) return;
-  Fit& fit = fits_[index];
-  fit.wanted = misfit;
-  if (fit.resourced < 0) {
-    fit.resourced = static_cast<std::int32_t>(resourced_.size());
+  poor->wanted = misfit;
+  if (poor->resourced < 0) {
+    poor->resourced = static_cast<std::int32_t>(resourced_.size());
     resourced_.push_back(*nearby.point);
     nearby.point = &resourced_.back();
   }
-  MapPoint& point = resourced_[static_cast<std::size_t>(fit.resourced)];
+  MapPoint& point = resourced_[static_cast<std::size_t>(poor->resourced)];
   point.source_keyframe = keyframe.id;
   point.source_level = observation.level;
   point.source_pixel = LevelFromLevelZero(observation.pixel.cast<double>(), observation.level).cast<float>();

@@ -61,7 +61,14 @@ class NearbyPoints {
   // The points of wanted_.
   void Take(const MapSnapshot& map, bool infinite, std::vector<NearbyPoint>* points);
   void ChooseSources(const MapSnapshot& map, const Rigid3& camera_from_map);
-  void TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit, std::size_t index);
+  // A point of finite_ that its source shows poorly.
+  struct Misfit {
+    MapPointId point;
+    std::uint32_t index;          // in finite_
+    double wanted;                // squared misfit that a view must stay below
+    std::int32_t resourced = -1;  // place in resourced_
+  };
+  void TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit, Misfit* poor);
 
   NearbyPointOptions options_;
   std::vector<NearbyPoint> finite_, infinite_;
@@ -75,11 +82,7 @@ class NearbyPoints {
   // Scratch, kept to save allocations.
   std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
   PointIdSet wanted_;
-  struct Fit {
-    double wanted = 0;            // squared misfit that a view must stay below; 0 where none is looked for
-    std::int32_t resourced = -1;  // place in resourced_
-  };
-  std::vector<Fit> fits_;  // of finite_
+  std::vector<Misfit> misfits_;  // by ascending point
 };
 
 }  // namespace docent::engine
