@@ -11,9 +11,10 @@
 
 // What a frame costs in maps of 1 000 to 50 000 points. The sequence's own map is thinned where it has more,
 // and where it has fewer is put beside itself again and again, as the rooms of a larger house would lie; the
-// camera walks through the first of them, and is told so where it asks: exact copies cannot be told apart, and
-// what finding a place costs has a benchmark of its own. Counters: the map's points and keyframes, the points looked for in
-// a tracked frame, and the frames' median and 95th percentile in milliseconds of computing.
+// camera walks through the first of them, and is told so where it asks: exact copies cannot be told apart,
+// and what finding a place costs has a benchmark of its own. Counters: the map's points and keyframes, the
+// points looked for in a tracked frame, and the frames' median and 95th percentile in milliseconds of
+// computing.
 namespace docent::bench {
 namespace {
 
@@ -57,9 +58,9 @@ void AddCopy(const MapSnapshot& source, std::size_t every, double apart, MapSnap
 }
 
 std::size_t RoomKeyframes(const MapSnapshot& source) {
-  return static_cast<std::size_t>(std::count_if(
-      source.keyframes.begin(), source.keyframes.end(),
-      [](const engine::KeyFrame& k) { return k.kind == engine::KeyFrameKind::kSixDof; }));
+  return static_cast<std::size_t>(
+      std::count_if(source.keyframes.begin(), source.keyframes.end(),
+                    [](const engine::KeyFrame& k) { return k.kind == engine::KeyFrameKind::kSixDof; }));
 }
 
 std::shared_ptr<const MapSnapshot> MapOf(std::size_t points, const MapSnapshot& source) {
