@@ -62,13 +62,13 @@ class NearbyPoints {
   void Take(const MapSnapshot& map, bool infinite, std::vector<NearbyPoint>* points);
   void ChooseSources(const MapSnapshot& map, const Rigid3& camera_from_map);
   // A point of finite_ that its source shows poorly.
-  struct Misfit {
+  struct PoorlyShown {
     MapPointId point;
     std::uint32_t index;          // in finite_
     double wanted;                // squared misfit that a view must stay below
     std::int32_t resourced = -1;  // place in resourced_
   };
-  void TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit, Misfit* poor);
+  void TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit, PoorlyShown* poor);
 
   NearbyPointOptions options_;
   std::vector<NearbyPoint> finite_, infinite_;
@@ -82,7 +82,7 @@ class NearbyPoints {
   // Scratch, kept to save allocations.
   std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
   PointIdSet wanted_;
-  std::vector<Misfit> misfits_;  // by ascending point
+  std::vector<PoorlyShown> poorly_shown_;  // by ascending point
 };
 
 }  // namespace docent::engine
