@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/cameras/clipped_source.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -46,7 +47,57 @@ class ClippedSource : public FrameSource {
   bool ended_ = false;
 };
 
+class WindowSource : public FrameSource {
+ public:
+  WindowSource(std::unique_ptr<FrameSource> source, std::uint64_t first_frame, Timestamp duration)
+      : source_(std::move(source)), first_frame_(first_frame), duration_(duration) {
+    info_ = source_->info();
+    if (duration_ > Timestamp{}) {
+      info_.frame_count.reset();
+    } else if (info_.frame_count) {
+      *info_.frame_count -= std::min(*info_.frame_count, first_frame_);
+    }
+  }
+
+  bool Next(engine::Frame* frame) override {
+    return NextInside(frame, [&] { return source_->Next(frame); });
+  }
+  bool NextLate(engine::Frame* frame) override {
+    return NextInside(frame, [&] { return source_->NextLate(frame); });
+  }
+  std::string trouble() const override { return source_->trouble(); }
+  Delivery delivery() const override { return source_->delivery(); }
+  Head* head() const override { return source_->head(); }
+
+ private:
+  template <typename Fetch>
+  bool NextInside(engine::Frame* frame, const Fetch& fetch) {
+    for (; skipped_ < first_frame_ && !ended_; ++skipped_) ended_ = !source_->NextLate(frame);
+    if (ended_) return false;
+    *frame = engine::Frame();  // what was skipped leaves nothing behind
+    ended_ = !fetch();
+    if (ended_) return false;
+    if (!begin_) begin_ = {frame->time, frame->index};
+    ended_ = duration_ > Timestamp{} && frame->time - begin_->first >= duration_;
+    frame->index -= begin_->second;
+    return !ended_;
+  }
+
+  std::unique_ptr<FrameSource> source_;
+  const std::uint64_t first_frame_;
+  const Timestamp duration_;
+  std::uint64_t skipped_ = 0;
+  std::optional<std::pair<Timestamp, std::uint64_t>> begin_;  // time and index of the first picture
+  bool ended_ = false;
+};
+
 }  // namespace
+
+std::unique_ptr<FrameSource> WindowOf(std::unique_ptr<FrameSource> source, std::uint64_t first_frame,
+                                      Timestamp duration) {
+  if (first_frame == 0 && duration <= Timestamp{}) return source;
+  return std::make_unique<WindowSource>(std::move(source), first_frame, duration);
+}
 
 std::unique_ptr<FrameSource> ClipSource(std::unique_ptr<FrameSource> source, Timestamp from,
                                         Timestamp until) {

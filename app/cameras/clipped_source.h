@@ -11,4 +11,10 @@ namespace docent::app {
 // indices stay as they are. An `until` of zero means to the end.
 std::unique_ptr<FrameSource> ClipSource(std::unique_ptr<FrameSource> source, Timestamp from, Timestamp until);
 
+// The pictures of a recorded source from the one of number `first_frame` (from 0) on, for less than
+// `duration` or, where that is zero, to the end, as if the recording began there: times stay as they are,
+// indices begin at 0.
+std::unique_ptr<FrameSource> WindowOf(std::unique_ptr<FrameSource> source, std::uint64_t first_frame,
+                                      Timestamp duration);
+
 }  // namespace docent::app

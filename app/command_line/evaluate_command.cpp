@@ -5,8 +5,45 @@
 
 #include "app/command_line/program.h"
 #include "app/command_line/run_arguments.h"
+#include "app/files/text_file.h"
 
 namespace docent::app {
+
+namespace {
+
+// A whole number from 1 to most.
+void AddCountOption(CLI::App* command, const std::string& option, std::size_t* target, std::size_t most,
+                    const std::string& description) {
+  command
+      ->add_option_function<std::string>(
+          option,
+          [=](const std::string& text) {
+            const auto number = ParseInteger(text);
+            if (!number || *number < 1 || static_cast<std::size_t>(*number) > most) {
+              throw CLI::ValidationError(option,
+                                         "'" + text + "' is no number from 1 to " + std::to_string(most));
+            }
+            *target = static_cast<std::size_t>(*number);
+          },
+          description)
+      ->type_name("N");
+}
+
+void AddDistributionOptions(CLI::App* command, EvaluateOptions* options) {
+  constexpr std::size_t kMostSeeds = 1000, kMostStarts = 1'000'000, kMostJobs = 256;
+  AddCountOption(command, "--seeds", &options->seeds, kMostSeeds,
+                 "Run each sequence with N seeds of the engine, from --seed on, and report the spread; "
+                 "a simulated world stays that of --seed");
+  AddCountOption(command, "--starts", &options->starts, kMostStarts,
+                 "Run N windows over each sequence, each as if the sequence began there, and report the "
+                 "spread; with --seeds every window has all seeds");
+  AddSecondsOption(command, "--window", &options->window,
+                   "End each run so long after its first picture (0: at the end of the sequence)");
+  AddCountOption(command, "--jobs", &options->jobs, kMostJobs,
+                 "Run so many of the seeds and starts at a time; with --pace lockstep only");
+}
+
+}  // namespace
 
 void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
                         std::function<void(const EvaluateOptions&, Verbosity)> run) {
@@ -39,11 +76,16 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
       ->type_name("N")
       ->allow_extra_args(false);
   AddSeedOption(command, &options->seed);
+  AddDistributionOptions(command, options.get());
   command->callback([=, run = std::move(run)] {
     if (options->calibrations.size() > options->sequences.size()) {
       throw CLI::ValidationError("--calibration", "more calibrations than sequences");
     }
     options->pace = pace->value_or(Pace::kEager);
+    if (options->many_runs() && !options->dump_frames.empty())
+      throw CLI::ValidationError("--dump-frame", "works with one run, without --seeds and --starts");
+    if (options->jobs > 1 && options->pace != Pace::kLockstep)
+      throw CLI::ValidationError("--jobs", "needs --pace lockstep, as other paces depend on a free machine");
     invocation->run = [=] { run(*options, invocation->verbosity); };
   });
 }

@@ -75,7 +75,13 @@ struct EvaluateOptions {
   bool leave_loops_open = false;
   bool compare = false;                  // run the other engine too
   std::vector<std::size_t> dump_frames;  // lines of frames.csv, from 0, about which everything is written
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;                // of the first run's engine, and of every run's simulated world
+  std::size_t seeds = 1;                 // runs with seed, seed + 1, ... of the engine, at least 1
+  std::size_t starts = 1;                // windows over each sequence, at least 1, see RunsOf
+  Timestamp window{};                    // the most that each run may last; 0: to the end of the sequence
+  std::size_t jobs = 1;                  // runs side by side, each on a thread of its own; lockstep alone
+
+  bool many_runs() const { return seeds > 1 || starts > 1; }
 };
 
 struct DemoOptions {

@@ -1,163 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <memory>
-#include <optional>
+#include <mutex>
 #include <set>
+#include <thread>
 #include <utility>
 #include <vector>
 
-#include "app/cameras/simulated_source.h"
+#include "app/command_line/evaluate_sequence.h"
 #include "app/command_line/progress.h"
 #include "app/command_line/runs.h"
-#include "app/evaluation/frame_dump.h"
 #include "app/evaluation/html_report.h"
 #include "app/evaluation/json_report.h"
-#include "app/evaluation/panorama_picture.h"
-#include "app/evaluation/simulated_truth.h"
 #include "app/files/checked_file.h"
-#include "app/output/run_output.h"
-#include "app/session/frame_loop.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
 
 namespace {
 
-// A sequence with what is known to be true of it.
-struct Sequence {
-  CalibratedCamera camera;
-  std::vector<TimedPose> truth;
-  std::vector<TimedLabel> segments;
-};
-
-Sequence OpenSequence(const EvaluateOptions& options, std::size_t index) {
-  const std::string& word = options.sequences[index];
-  std::optional<std::filesystem::path> calibration;
-  if (index < options.calibrations.size()) calibration = options.calibrations[index];
-  Sequence sequence;
-  if (word.starts_with("sim:")) {
-    SimulationOptions simulation_options;
-    simulation_options.seed = options.seed;
-    const std::shared_ptr<const Simulation> simulation = MakeSimulation(word.substr(4), simulation_options);
-    sequence.truth = GroundTruthOf(*simulation);
-    sequence.segments = SegmentsOf(*simulation);
-    sequence.camera = Calibrate(OpenSimulation(simulation), calibration);
-    return sequence;
-  }
-  CameraOptions camera_options;
-  camera_options.seed = options.seed;
-  sequence.camera = Calibrate(OpenCamera(word, camera_options), calibration);
-  const SourceInfo& info = sequence.camera.source->info();
-  if (info.live) throw Error("'" + word + "' is a live camera; evaluate takes recorded sequences.");
-  if (info.ground_truth_path) sequence.truth = ReadGroundTruth(*info.ground_truth_path);
-  if (info.segments_path) sequence.segments = ReadSegments(*info.segments_path);
-  return sequence;
-}
-
-SessionOptions OptionsFor(const EvaluateOptions& options) {
-  SessionOptions session;
-  session.threaded = options.pace != Pace::kLockstep;
-  session.tracker.hybrid = options.engine == EngineKind::kHybrid;
-  session.tracker.turn_center.enabled = !options.turn_about_camera;
-  if (options.turn_about_camera) session.tracker.max_turn_sigma = session.tracker.max_sigma;
-  session.mapper.loops.enabled = !options.leave_loops_open;
-  session.first_map = "map";
-  session.seed = options.seed;
-  return session;
-}
-
-// Stitches what a map knows by turning, into the output folder and for the report.
-void StitchMap(const std::filesystem::path& folder, const Session::MapState& map,
-               std::vector<ShownPanorama>* shown) {
-  for (const PanoramaPicture& panorama : StitchPanoramas(*map.snapshot)) {
-    const std::string number = std::to_string(map.key) + "-" + std::to_string(panorama.panorama);
-    ShownPanorama picture;
-    picture.caption = "panorama-" + number + ".png: " + std::to_string(panorama.keyframes) +
-                      " keyframes of the map '" + map.name + "'";
-    picture.png = EncodePng(panorama.picture);
-    CheckedFile file(folder / ("panorama-" + number + ".png"));
-    file.Write({reinterpret_cast<const char*>(picture.png.data()), picture.png.size()});
-    file.Close();
-    shown->push_back(std::move(picture));
-  }
-}
-
-void DumpFrame(const std::filesystem::path& folder, std::size_t number, const engine::TrackedFrame& frame,
-               const Session& session) {
-  // The tracker has not seen a frame that was dropped.
-  const bool dropped = frame.state == engine::TrackingState::kDropped;
-  WriteFrameDump(folder, number, frame, dropped ? engine::FrameInspection() : session.Inspect(frame));
-}
-
 // So that a wrong number is told before the sequence is run.
-void CheckDumpFrames(const EvaluateOptions& options, const SourceInfo& info) {
-  if (!info.frame_count) return;
+void CheckDumpFrames(const EvaluateOptions& options, const EvaluatedSequence& sequence) {
+  if (!sequence.frame_count) return;
   for (const std::size_t number : options.dump_frames) {
-    if (number < *info.frame_count) continue;
-    throw Error("--dump-frame " + std::to_string(number) + ": '" + info.name + "' has " +
-                std::to_string(*info.frame_count) + " frames, and the first one is 0.");
+    if (number < *sequence.frame_count) continue;
+    throw Error("--dump-frame " + std::to_string(number) + ": '" + sequence.name + "' has " +
+                std::to_string(*sequence.frame_count) + " frames, and the first one is 0.");
   }
-}
-
-// Tracks the whole sequence in a fresh session and leaves its files in the folder of that name.
-RunRecord Track(const EvaluateOptions& options, CalibratedCamera* camera, const std::string& name,
-                Verbosity verbosity, bool has_truth, std::vector<ShownPanorama>* panoramas) {
-  RunRecord record;
-  record.name = name;
-  record.engine = ToString(options.engine);
-  ResetPeakMemory();
-  const auto start = std::chrono::steady_clock::now();
-  RunOutput output(options.output / name);
-  RunRecorder recorder;
-  std::optional<Session> in_use(std::in_place, OptionsFor(options), std::vector{camera->model}, nullptr);
-  Session& session = *in_use;
-  Progress progress(name, camera->source->info().frame_count, verbosity);
-  FrameLoopOptions loop;
-  loop.pace = options.pace;
-  const auto write_events = [&] {
-    for (const Event& event : session.TakeEvents()) output.Add(event);
-  };
-  try {
-    RunFrames(camera, &session, loop,
-              [&](const engine::TrackedFrame& frame) {
-                const std::size_t number = recorder.frames().size();
-                if (std::count(options.dump_frames.begin(), options.dump_frames.end(), number) > 0)
-                  DumpFrame(options.output / name, number, frame, session);
-                recorder.Add(frame, MakeMappingTimes(session.MappingTimes()));
-                output.Add(frame, session.ShownWith(frame).map_name);
-                write_events();
-                progress.Update(recorder.frames().size());
-              },
-              {});
-    session.Finish();
-  } catch (...) {
-    write_events();
-    output.Close();
-    throw;
-  }
-  write_events();
-  output.Close();
-  record.frames = recorder.frames();
-  record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  record.peak_memory_mb = PeakMemoryMegabytes();
-  record.mapping = MakeMappingTimes(session.MappingTimes());
-  for (const LensWatch::Ring& ring : session.LensErrors(0))
-    record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
-  // What follows needs the maps, and memory for one of them over again, but not all that tracked and mapped.
-  std::vector<Session::MapState> maps = session.Maps();
-  in_use.reset();
-  for (const Session::MapState& map : maps) {
-    if (!map.snapshot) continue;
-    record.maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
-    record.maps.back().discarded = map.discarded;
-    if (map.discarded) continue;
-    if (has_truth) record.maps.back().adjusted_centers = AdjustedCenters(*map.snapshot);
-    StitchMap(options.output / name, map, panoramas);
-  }
-  return record;
 }
 
 // Names the sequence's folder below the output: no separators, and no two alike.
@@ -171,18 +42,84 @@ std::string FreeFolderName(std::string name, std::set<std::string>* taken) {
   return free;
 }
 
-EvaluatedRun Evaluate(const EvaluateOptions& options, Sequence sequence, const std::string& name,
-                      Verbosity verbosity) {
+EvaluateOptions WithOtherEngine(EvaluateOptions options) {
+  options.engine = options.engine == EngineKind::kHybrid ? EngineKind::kSixDof : EngineKind::kHybrid;
+  return options;
+}
+
+void Print(const std::string& text, Verbosity verbosity) {
+  if (verbosity == Verbosity::kQuiet) return;
+  std::printf("%s\n", text.c_str());
+  std::fflush(stdout);
+}
+
+EvaluatedRun Evaluate(const EvaluateOptions& options, const EvaluatedSequence& sequence,
+                      const std::string& name, Verbosity verbosity) {
   EvaluatedRun run;
-  run.run = Track(options, &sequence.camera, name, verbosity, !sequence.truth.empty(), &run.panoramas);
-  run.truth = std::move(sequence.truth);
-  run.segments = std::move(sequence.segments);
+  const TrackRequest request{name, options.output / name, {.seed = options.seed}};
+  run.run = Track(options, sequence, request, verbosity, &run.panoramas);
+  run.truth = sequence.truth;
+  run.segments = sequence.segments;
   run.report = EvaluateRun(run.run, run.truth, run.segments);
-  if (verbosity != Verbosity::kQuiet) {
-    std::printf("%s\n", FormatSummary(run.report).c_str());
-    std::fflush(stdout);
-  }
+  Print(FormatSummary(run.report), verbosity);
   return run;
+}
+
+// One of many runs, of which only the figures are kept.
+RunRow EvaluateOneOfMany(const EvaluateOptions& options, const EvaluatedSequence& sequence,
+                         const std::string& name, const RunKey& key) {
+  const std::string folder = "seed-" + std::to_string(key.seed) + "-start-" + std::to_string(key.start);
+  const TrackRequest request{name, options.output / name / folder, key, true};
+  const RunRecord run = Track(options, sequence, request, Verbosity::kQuiet, nullptr);
+  std::optional<std::vector<StartResult>> starts;
+  if (!sequence.truth.empty()) starts = JudgeStarts(run, sequence.truth);
+  return MakeRunRow(key, run, EvaluateRun(run, sequence.truth, sequence.segments), std::move(starts));
+}
+
+// All runs, as many at a time as there are jobs. The rows have their own order, whichever run ends first; the
+// first fault ends all and is thrown.
+RunDistribution EvaluateMany(const EvaluateOptions& options, const EvaluatedSequence& sequence,
+                             const std::string& name, Verbosity verbosity) {
+  const std::vector<RunKey> keys = RunsOf(options, sequence);
+  RunDistribution distribution{name,
+                               ToString(options.engine),
+                               options.seeds,
+                               options.starts,
+                               ToSeconds(options.window),
+                               !sequence.truth.empty(),
+                               std::vector<RunRow>(keys.size())};
+  Progress progress(name + ", runs", keys.size(), verbosity);
+  std::mutex mutex;  // guards the three below, and the terminal
+  std::size_t next = 0, done = 0;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    std::unique_lock lock(mutex);
+    while (next < keys.size() && !failure) {
+      const std::size_t i = next++;
+      lock.unlock();
+      std::exception_ptr fault;
+      try {
+        distribution.rows[i] = EvaluateOneOfMany(options, sequence, name, keys[i]);
+      } catch (...) {
+        fault = std::current_exception();
+      }
+      lock.lock();
+      if (fault) {
+        if (!failure) failure = fault;
+        continue;
+      }
+      progress.Update(++done);
+      Print(FormatRunLine(distribution.rows[i], distribution), verbosity);
+    }
+  };
+  {
+    std::vector<std::jthread> others;
+    for (std::size_t i = 1; i < std::min(options.jobs, keys.size()); ++i) others.emplace_back(work);
+    work();
+  }
+  if (failure) std::rethrow_exception(failure);
+  Print("\n" + FormatTable(distribution), verbosity);
+  return distribution;
 }
 
 void WriteReports(const std::filesystem::path& folder, const std::vector<EvaluatedRun>& runs) {
@@ -195,31 +132,51 @@ void WriteReports(const std::filesystem::path& folder, const std::vector<Evaluat
   WriteHtmlReport(folder / "report.html", runs);
 }
 
+void WriteReports(const std::filesystem::path& folder, const std::vector<RunDistribution>& distributions,
+                  const std::vector<RunDistribution>& compared) {
+  WriteJsonReport(folder / "report.json", distributions, compared);
+  std::vector<RunDistribution> shown;
+  for (std::size_t i = 0; i < distributions.size(); ++i) {
+    shown.push_back(distributions[i]);
+    if (i < compared.size()) shown.push_back(compared[i]);
+  }
+  WriteHtmlReport(folder / "report.html", shown);
+}
+
 }  // namespace
 
 void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity) {
   std::vector<EvaluatedRun> runs;
+  std::vector<RunDistribution> distributions, compared;
   std::set<std::string> taken;
   std::exception_ptr failure;
+  const EvaluateOptions other = WithOtherEngine(options);
   for (std::size_t i = 0; i < options.sequences.size() && !failure; ++i) {
     try {
-      Sequence sequence = OpenSequence(options, i);
-      CheckDumpFrames(options, sequence.camera.source->info());
+      const EvaluatedSequence sequence = KnowSequence(options, i);
+      CheckDumpFrames(options, sequence);
       MakeFolder(options.output);  // not before there is something to put into it
-      const std::string name = FreeFolderName(sequence.camera.source->info().name, &taken);
-      runs.push_back(Evaluate(options, std::move(sequence), name, verbosity));
+      const std::string name = FreeFolderName(sequence.name, &taken);
+      if (options.many_runs()) {
+        distributions.push_back(EvaluateMany(options, sequence, name, verbosity));
+      } else {
+        runs.push_back(Evaluate(options, sequence, name, verbosity));
+      }
       if (!options.compare) continue;
-      EvaluateOptions other = options;
-      other.engine = options.engine == EngineKind::kHybrid ? EngineKind::kSixDof : EngineKind::kHybrid;
       const std::string other_name = FreeFolderName(name + "-" + ToString(other.engine), &taken);
-      runs.back().compared =
-          std::make_shared<EvaluatedRun>(Evaluate(other, OpenSequence(options, i), other_name, verbosity));
+      if (options.many_runs()) {
+        compared.push_back(EvaluateMany(other, sequence, other_name, verbosity));
+      } else {
+        runs.back().compared =
+            std::make_shared<EvaluatedRun>(Evaluate(other, sequence, other_name, verbosity));
+      }
     } catch (const Error&) {
       // What was evaluated before is reported all the same.
       failure = std::current_exception();
     }
   }
   if (!runs.empty()) WriteReports(options.output, runs);
+  if (!distributions.empty()) WriteReports(options.output, distributions, compared);
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -80,6 +80,23 @@ const TimedPose* FindPose(const std::vector<TimedPose>& poses, Timestamp time, T
   return best;
 }
 
+std::optional<engine::Rigid3> InterpolatePose(const std::vector<TimedPose>& poses, Timestamp time,
+                                              Timestamp max_difference) {
+  const auto after = std::lower_bound(poses.begin(), poses.end(), time,
+                                      [](const TimedPose& pose, Timestamp at) { return pose.time < at; });
+  if (after != poses.end() && after != poses.begin() && after->time > time) {
+    const auto before = std::prev(after);
+    if (after->time - time <= max_difference && time - before->time <= max_difference) {
+      const double part = ToSeconds(time - before->time) / ToSeconds(after->time - before->time);
+      const engine::Rigid3 &a = before->truth_from_camera, &b = after->truth_from_camera;
+      return engine::Rigid3(engine::Rotation3(a.rotation.quaternion().slerp(part, b.rotation.quaternion())),
+                            (1 - part) * a.translation + part * b.translation);
+    }
+  }
+  const TimedPose* nearest = FindPose(poses, time, max_difference);
+  return nearest ? std::optional(nearest->truth_from_camera) : std::nullopt;
+}
+
 const TimedLabel* FindLabel(const std::vector<TimedLabel>& labels, Timestamp time) {
   const auto after =
       std::upper_bound(labels.begin(), labels.end(), time,

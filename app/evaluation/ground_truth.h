@@ -34,6 +34,10 @@ std::vector<TimedLabel> ParseSegments(std::string_view text, const std::string& 
 
 // The pose nearest in time, if it is at most max_difference away. O(log n).
 const TimedPose* FindPose(const std::vector<TimedPose>& poses, Timestamp time, Timestamp max_difference);
+// The pose at this time, between its neighbours (centres linearly, orientations by the shortest way), where
+// both are at most max_difference away; else as FindPose.
+std::optional<engine::Rigid3> InterpolatePose(const std::vector<TimedPose>& poses, Timestamp time,
+                                              Timestamp max_difference);
 // The label that holds at this time; null before the first one.
 const TimedLabel* FindLabel(const std::vector<TimedLabel>& labels, Timestamp time);
 

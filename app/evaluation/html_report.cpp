@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "app/evaluation/distribution_section.h"
 #include "app/evaluation/run_plots.h"
 #include "app/evaluation/svg_plot.h"
 #include "app/files/checked_file.h"
@@ -190,20 +191,30 @@ std::string SummaryRow(const SequenceReport& r, const std::string& name) {
          Fixed(r.tracking_median_ms, 2) + "</td></tr>\n";
 }
 
+std::string PageHead() {
+  return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Docent: "
+         "evaluation</title>\n<style>\n"
+         "body{font:15px/1.45 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 "
+         "1em;color:#222}\n"
+         "table{border-collapse:collapse;margin:1em 0}th,td{padding:.15em .8em;text-align:left;"
+         "border-bottom:1px solid #ddd;font-variant-numeric:tabular-nums}th{font-weight:600}\n"
+         "svg{width:100%;height:auto;margin:.6em 0;font:12px system-ui,sans-serif}svg .title{font-weight:600;"
+         "font-size:13px}svg .grid{stroke:#e3e3e3;fill:none}\n"
+         "body.wide{max-width:1800px}.pair{display:grid;grid-template-columns:1fr 1fr;gap:0 "
+         "2em}.pair>div{min-width:0}"
+         "h4{margin:.4em 0 0}figure{margin:1em 0}img{max-width:100%}\n</style></head>";
+}
+
+void WriteAll(const std::filesystem::path& path, const std::string& html) {
+  CheckedFile file(path);
+  file.Write(html);
+  file.Close();
+}
+
 }  // namespace
 
 std::string FormatHtmlReport(const std::vector<EvaluatedRun>& runs) {
-  std::string html =
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Docent: "
-      "evaluation</title>\n<style>\n"
-      "body{font:15px/1.45 system-ui,sans-serif;max-width:960px;margin:2em auto;padding:0 1em;color:#222}\n"
-      "table{border-collapse:collapse;margin:1em 0}th,td{padding:.15em .8em;text-align:left;"
-      "border-bottom:1px solid #ddd;font-variant-numeric:tabular-nums}th{font-weight:600}\n"
-      "svg{width:100%;height:auto;margin:.6em 0;font:12px system-ui,sans-serif}svg .title{font-weight:600;"
-      "font-size:13px}svg .grid{stroke:#e3e3e3;fill:none}\n"
-      "body.wide{max-width:1800px}.pair{display:grid;grid-template-columns:1fr 1fr;gap:0 "
-      "2em}.pair>div{min-width:0}"
-      "h4{margin:.4em 0 0}figure{margin:1em 0}img{max-width:100%}\n</style></head>";
+  std::string html = PageHead();
   const bool wide =
       std::any_of(runs.begin(), runs.end(), [](const EvaluatedRun& run) { return run.compared != nullptr; });
   html += std::string(wide ? "<body class=\"wide\">" : "<body>") + "\n<h1>Docent: evaluation</h1>\n";
@@ -220,9 +231,17 @@ std::string FormatHtmlReport(const std::vector<EvaluatedRun>& runs) {
 }
 
 void WriteHtmlReport(const std::filesystem::path& path, const std::vector<EvaluatedRun>& runs) {
-  CheckedFile file(path);
-  file.Write(FormatHtmlReport(runs));
-  file.Close();
+  WriteAll(path, FormatHtmlReport(runs));
+}
+
+std::string FormatHtmlReport(const std::vector<RunDistribution>& distributions) {
+  std::string html = PageHead() + "<body>\n<h1>Docent: evaluation of many runs</h1>\n";
+  for (const RunDistribution& distribution : distributions) html += DistributionSection(distribution);
+  return html + "</body></html>\n";
+}
+
+void WriteHtmlReport(const std::filesystem::path& path, const std::vector<RunDistribution>& distributions) {
+  WriteAll(path, FormatHtmlReport(distributions));
 }
 
 }  // namespace docent::app

@@ -90,6 +90,77 @@ Json ToJson(const SequenceReport& report) {
   return json;
 }
 
+Json ToJson(const StartResult& start) {
+  return {{"frame", start.frame},         {"verdict", ToString(start.verdict)},
+          {"discarded", start.discarded}, {"window_s", start.window_s},
+          {"centers", start.centers},     {"error_m", start.error_m},
+          {"path_m", start.path_m},       {"true_path_m", start.true_path_m},
+          {"depth_m", start.depth_m},     {"claimed_ratio", start.claimed_ratio}};
+}
+
+Json ToJson(const RunRow& row) {
+  Json json = {{"seed", row.key.seed},
+               {"start", row.key.start},
+               {"first_frame", row.key.first_frame},
+               {"frames", row.frames},
+               {"tracked", row.tracked},
+               {"tracked_share", row.tracked_share},
+               {"ate_rmse_m", OrNull(row.ate_m)},
+               {"rotation_rmse_deg", OrNull(row.rotation_deg)},
+               {"first_3d_pose_s", OrNull(row.first_3d_pose_s)},
+               {"false_starts", OrNull(row.false_starts)},
+               {"noticed_false_starts", OrNull(row.noticed)},
+               {"maps", row.maps},
+               {"discarded_maps", row.discarded_maps},
+               {"tracking_median_ms", row.tracking_median_ms},
+               {"starts", Json::array()}};
+  for (const StartResult& start : row.starts) json["starts"].push_back(ToJson(start));
+  return json;
+}
+
+Json KeyOf(const RunRow& row) {
+  return {{"seed", row.key.seed}, {"start", row.key.start}};
+}
+
+Json ToJson(const RunDistribution& distribution) {
+  Json figures = Json::object();
+  for (const Figure& figure : Figures()) {
+    const std::optional<Spread> spread = SpreadOf(figure, distribution.rows);
+    figures[figure.name] = nullptr;
+    if (!spread) continue;
+    figures[figure.name] = {{"runs", spread->runs},
+                            {"min", spread->min},
+                            {"median", spread->median},
+                            {"max", spread->max},
+                            {"worst", KeyOf(distribution.rows[spread->worst])}};
+  }
+  Json inner = {{"seeds", distribution.seeds}, {"starts", distribution.starts}};
+  inner["window_s"] = distribution.window_s > 0 ? Json(distribution.window_s) : Json(nullptr);
+  inner["figures"] = std::move(figures);
+  inner["worst"] =
+      distribution.rows.empty() ? Json(nullptr) : KeyOf(distribution.rows[WorstRun(distribution.rows)]);
+  inner["runs"] = Json::array();
+  for (const RunRow& row : distribution.rows) inner["runs"].push_back(ToJson(row));
+  return {{"name", distribution.name},
+          {"engine", distribution.engine.empty() ? Json(nullptr) : Json(distribution.engine)},
+          {"distribution", std::move(inner)}};
+}
+
+// A folder's name need not be UTF-8; a report that cannot be written for its name would be worse than a '?'.
+template <typename Report>
+std::string FormatAll(const std::vector<Report>& reports, const std::vector<Report>& compared) {
+  Json json = {{"sequences", Json::array()}};
+  for (const Report& report : reports) json["sequences"].push_back(ToJson(report));
+  for (const Report& report : compared) json["compared"].push_back(ToJson(report));
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void WriteAll(const std::filesystem::path& path, const std::string& text) {
+  CheckedFile file(path);
+  file.Write(text);
+  file.Close();
+}
+
 std::string Format(const char* format, double value) {
   char text[64];
   std::snprintf(text, sizeof text, format, value);
@@ -100,19 +171,22 @@ std::string Format(const char* format, double value) {
 
 std::string FormatJsonReport(const std::vector<SequenceReport>& reports,
                              const std::vector<SequenceReport>& compared) {
-  Json json = {{"sequences", Json::array()}};
-  for (const SequenceReport& report : reports) json["sequences"].push_back(ToJson(report));
-  for (const SequenceReport& report : compared) json["compared"].push_back(ToJson(report));
-  // A folder's name need not be UTF-8; a report that cannot be written for its name would be worse than a
-  // '?'.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return FormatAll(reports, compared);
+}
+
+std::string FormatJsonReport(const std::vector<RunDistribution>& distributions,
+                             const std::vector<RunDistribution>& compared) {
+  return FormatAll(distributions, compared);
 }
 
 void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports,
                      const std::vector<SequenceReport>& compared) {
-  CheckedFile file(path);
-  file.Write(FormatJsonReport(reports, compared));
-  file.Close();
+  WriteAll(path, FormatJsonReport(reports, compared));
+}
+
+void WriteJsonReport(const std::filesystem::path& path, const std::vector<RunDistribution>& distributions,
+                     const std::vector<RunDistribution>& compared) {
+  WriteAll(path, FormatJsonReport(distributions, compared));
 }
 
 std::string FormatSummary(const SequenceReport& report) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/evaluation/run_record.h"
 
+#include <algorithm>
 #include <fstream>
 
 #include "app/files/text_file.h"
@@ -33,7 +34,37 @@ PointCounts CountPoints(const engine::MapSnapshot& map) {
   return counts;
 }
 
+// The nearest rank; 0 where no finite point was found.
+double MedianDepth(const engine::TrackedFrame& frame) {
+  std::vector<double> depths;
+  for (const engine::PointMatch& match : frame.matches) {
+    if (!match.inlier) continue;
+    const engine::MapPoint* point = frame.map->FindPoint(match.point);
+    if (point == nullptr || point->infinite()) continue;
+    depths.push_back((frame.camera_from_map * point->position()).z());
+  }
+  if (depths.empty()) return 0;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
 }  // namespace
+
+void RunRecorder::AddStart(const engine::TrackedFrame& frame) {
+  const bool known = std::any_of(starts_.begin(), starts_.end(), [&frame](const StartRecord& start) {
+    return start.map_key == frame.map_key;
+  });
+  if (known) return;
+  StartRecord start;
+  start.map_key = frame.map_key;
+  start.frame = frames_.size();
+  for (const engine::KeyFrame& keyframe : frame.map->keyframes) {
+    if (keyframe.kind == engine::KeyFrameKind::kSixDof)
+      start.keyframes.push_back({keyframe.time, keyframe.camera_from_map});
+  }
+  starts_.push_back(std::move(start));
+}
 
 void RunRecorder::Add(const engine::TrackedFrame& frame, const MappingTimes& mapping) {
   FrameRecord record;
@@ -56,6 +87,10 @@ void RunRecorder::Add(const engine::TrackedFrame& frame, const MappingTimes& map
     }
     record.map_keyframes = keyframes_;
     record.map_points = points_;
+    if (engine::HasPose(frame.state)) {
+      record.median_depth = MedianDepth(frame);
+      if (points_.finite > 0) AddStart(frame);
+    }
   }
   frames_.push_back(record);
 }

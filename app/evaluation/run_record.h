@@ -46,6 +46,19 @@ struct FrameRecord {
   KeyFrameCounts map_keyframes;  // size of the map at that time
   PointCounts map_points;
   MappingTimes mapping = {};  // since the run began
+  // Of the finite inliers, along the optical axis, in the map's unit; 0 when there are none.
+  double median_depth = 0;
+};
+
+// The first frame with a pose in a map that had depth, and the keyframes that gave the map its depth.
+struct StartRecord {
+  struct KeyFrame {
+    Timestamp time{};
+    engine::Rigid3 camera_from_map;
+  };
+  std::uint64_t map_key = 0;
+  std::size_t frame = 0;            // index in RunRecord::frames
+  std::vector<KeyFrame> keyframes;  // of the map at that frame, those with a position of their own
 };
 
 // The frame was tracked in a map that knew no depth yet: its position is not one.
@@ -84,6 +97,7 @@ struct RunRecord {
   MappingTimes mapping;
   double wall_s = 0;
   double peak_memory_mb = 0;
+  std::vector<StartRecord> starts = {};   // one for each map that had depth, by frame
   std::vector<LensRing> lens_rings = {};  // what tracking left over, from the middle of the picture outwards
 };
 
@@ -93,9 +107,13 @@ class RunRecorder {
   // mapping: the seconds spent until now.
   void Add(const engine::TrackedFrame& frame, const MappingTimes& mapping = {});
   const std::vector<FrameRecord>& frames() const { return frames_; }
+  const std::vector<StartRecord>& starts() const { return starts_; }
 
  private:
+  void AddStart(const engine::TrackedFrame& frame);
+
   std::vector<FrameRecord> frames_;
+  std::vector<StartRecord> starts_;
   std::uint64_t counted_map_ = 0, counted_revision_ = 0;  // what `keyframes_` and `points_` were counted in
   KeyFrameCounts keyframes_;
   PointCounts points_;

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/evaluate_sequence.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "app/cameras/clipped_source.h"
+#include "app/cameras/simulated_source.h"
+#include "app/command_line/progress.h"
+#include "app/evaluation/frame_dump.h"
+#include "app/evaluation/panorama_picture.h"
+#include "app/evaluation/simulated_truth.h"
+#include "app/files/checked_file.h"
+#include "app/output/run_output.h"
+#include "app/session/frame_loop.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+SessionOptions OptionsFor(const EvaluateOptions& options, std::uint64_t seed) {
+  SessionOptions session;
+  session.threaded = options.pace != Pace::kLockstep;
+  session.tracker.hybrid = options.engine == EngineKind::kHybrid;
+  session.tracker.turn_center.enabled = !options.turn_about_camera;
+  if (options.turn_about_camera) session.tracker.max_turn_sigma = session.tracker.max_sigma;
+  session.mapper.loops.enabled = !options.leave_loops_open;
+  session.first_map = "map";
+  session.seed = seed;
+  return session;
+}
+
+// Stitches what a map knows by turning, into the output folder and for the report.
+void StitchMap(const std::filesystem::path& folder, const Session::MapState& map,
+               std::vector<ShownPanorama>* shown) {
+  for (const PanoramaPicture& panorama : StitchPanoramas(*map.snapshot)) {
+    const std::string number = std::to_string(map.key) + "-" + std::to_string(panorama.panorama);
+    ShownPanorama picture;
+    picture.caption = "panorama-" + number + ".png: " + std::to_string(panorama.keyframes) +
+                      " keyframes of the map '" + map.name + "'";
+    picture.png = EncodePng(panorama.picture);
+    CheckedFile file(folder / ("panorama-" + number + ".png"));
+    file.Write({reinterpret_cast<const char*>(picture.png.data()), picture.png.size()});
+    file.Close();
+    shown->push_back(std::move(picture));
+  }
+}
+
+void DumpFrame(const std::filesystem::path& folder, std::size_t number, const engine::TrackedFrame& frame,
+               const Session& session) {
+  // The tracker has not seen a frame that was dropped.
+  const bool dropped = frame.state == engine::TrackingState::kDropped;
+  WriteFrameDump(folder, number, frame, dropped ? engine::FrameInspection() : session.Inspect(frame));
+}
+
+// Of a run of its own, whose maps are shown in the report.
+void AddMaps(std::vector<Session::MapState> maps, const std::filesystem::path& folder, bool has_truth,
+             bool one_of_many, RunRecord* record, std::vector<ShownPanorama>* panoramas) {
+  for (const Session::MapState& map : maps) {
+    if (!map.snapshot) continue;
+    record->maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
+    record->maps.back().discarded = map.discarded;
+    if (map.discarded || one_of_many) continue;
+    if (has_truth) record->maps.back().adjusted_centers = AdjustedCenters(*map.snapshot);
+    StitchMap(folder, map, panoramas);
+  }
+}
+
+// As many as fit between the first picture and the last one, evenly.
+void CheckStarts(const EvaluateOptions& options, const EvaluatedSequence& sequence) {
+  if (options.starts == 1) return;
+  const std::string asked = "--starts " + std::to_string(options.starts) + ": '" + sequence.name + "' ";
+  if (!sequence.frame_count)
+    throw Error(asked + "does not say how many frames it has, so windows over it have no beginning.");
+  if (*sequence.frame_count < options.starts) {
+    throw Error(asked + "has only " + std::to_string(*sequence.frame_count) +
+                " frames, and every window begins at one of its own.");
+  }
+}
+
+}  // namespace
+
+EvaluatedSequence KnowSequence(const EvaluateOptions& options, std::size_t index) {
+  EvaluatedSequence sequence;
+  sequence.word = options.sequences[index];
+  if (index < options.calibrations.size()) sequence.calibration = options.calibrations[index];
+  if (sequence.word.starts_with("sim:")) {
+    SimulationOptions simulation_options;
+    simulation_options.seed = options.seed;
+    sequence.simulation = MakeSimulation(sequence.word.substr(4), simulation_options);
+    sequence.truth = GroundTruthOf(*sequence.simulation);
+    sequence.segments = SegmentsOf(*sequence.simulation);
+  }
+  // Opened once here, so that what is wrong with it is told before anything is run or written.
+  const CalibratedCamera camera = OpenWindow(sequence, 0, {});
+  const SourceInfo& info = camera.source->info();
+  if (info.live) throw Error("'" + sequence.word + "' is a live camera; evaluate takes recorded sequences.");
+  sequence.name = info.name;
+  sequence.frame_count = info.frame_count;
+  if (info.ground_truth_path) sequence.truth = ReadGroundTruth(*info.ground_truth_path);
+  if (info.segments_path) sequence.segments = ReadSegments(*info.segments_path);
+  CheckStarts(options, sequence);
+  return sequence;
+}
+
+CalibratedCamera OpenWindow(const EvaluatedSequence& sequence, std::uint64_t first_frame, Timestamp window) {
+  std::unique_ptr<FrameSource> source =
+      sequence.simulation ? OpenSimulation(sequence.simulation) : OpenCamera(sequence.word);
+  if (!source->info().live) source = WindowOf(std::move(source), first_frame, window);
+  return Calibrate(std::move(source), sequence.calibration);
+}
+
+std::vector<RunKey> RunsOf(const EvaluateOptions& options, const EvaluatedSequence& sequence) {
+  std::vector<RunKey> keys;
+  for (std::size_t start = 0; start < options.starts; ++start) {
+    const std::uint64_t first = start * sequence.frame_count.value_or(0) / options.starts;
+    for (std::size_t seed = 0; seed < options.seeds; ++seed)
+      keys.push_back({options.seed + seed, start, static_cast<std::size_t>(first)});
+  }
+  return keys;
+}
+
+RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequence,
+                const TrackRequest& request, Verbosity verbosity, std::vector<ShownPanorama>* panoramas) {
+  CalibratedCamera camera = OpenWindow(sequence, request.key.first_frame, options.window);
+  RunRecord record;
+  record.name = request.name;
+  record.engine = ToString(options.engine);
+  ResetPeakMemory();
+  const auto start = std::chrono::steady_clock::now();
+  RunOutput output(request.folder);
+  RunRecorder recorder;
+  std::optional<Session> in_use(std::in_place, OptionsFor(options, request.key.seed),
+                                std::vector{camera.model}, nullptr);
+  Session& session = *in_use;
+  Progress progress(request.name, camera.source->info().frame_count,
+                    request.one_of_many ? Verbosity::kQuiet : verbosity);
+  FrameLoopOptions loop;
+  loop.pace = options.pace;
+  const auto write_events = [&] {
+    for (const Event& event : session.TakeEvents()) output.Add(event);
+  };
+  try {
+    RunFrames(&camera, &session, loop,
+              [&](const engine::TrackedFrame& frame) {
+                const std::size_t number = recorder.frames().size();
+                if (std::count(options.dump_frames.begin(), options.dump_frames.end(), number) > 0)
+                  DumpFrame(request.folder, number, frame, session);
+                recorder.Add(frame, MakeMappingTimes(session.MappingTimes()));
+                output.Add(frame, session.ShownWith(frame).map_name);
+                write_events();
+                progress.Update(recorder.frames().size());
+              },
+              {});
+    session.Finish();
+  } catch (...) {
+    write_events();
+    output.Close();
+    throw;
+  }
+  write_events();
+  output.Close();
+  record.frames = recorder.frames();
+  record.starts = recorder.starts();
+  record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  record.peak_memory_mb = PeakMemoryMegabytes();
+  record.mapping = MakeMappingTimes(session.MappingTimes());
+  for (const LensWatch::Ring& ring : session.LensErrors(0))
+    record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
+  // What follows needs the maps, and memory for one of them over again, but not all that tracked and mapped.
+  std::vector<Session::MapState> maps = session.Maps();
+  in_use.reset();
+  AddMaps(std::move(maps), request.folder, !sequence.truth.empty(), request.one_of_many, &record, panoramas);
+  return record;
+}
+
+}  // namespace docent::app
