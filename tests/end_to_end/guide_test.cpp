@@ -100,6 +100,36 @@ TEST(Guide, EvaluatesTwiceInLockstepWithTheSameBytes) {
   EXPECT_EQ(events[0], events[1]);
 }
 
+TEST(Guide, TellsTheSpreadOverSeedsAndStartsWhateverTheNumberOfJobs) {
+  const TemporaryFolder folder;
+  std::vector<std::string> trajectories;
+  std::vector<nlohmann::json> rows;
+  for (const char* jobs : {"1", "2"}) {
+    const auto output = folder / jobs;
+    const Outcome outcome =
+        RunDocent({"evaluate", "sim:cylinder:20", "--output", output.string(), "--pace", "lockstep",
+                   "--seeds", "2", "--starts", "2", "--window", "1", "--jobs", jobs});
+    ASSERT_EQ(outcome.exit_status, 0) << outcome.errors;
+    EXPECT_THAT(outcome.output, HasSubstr("cylinder-20, hybrid: 4 runs (2 seeds, 2 starts, 1 s each)"));
+    const auto distribution =
+        nlohmann::json::parse(ReadAll(output / "report.json")).at("sequences").at(0).at("distribution");
+    ASSERT_EQ(distribution.at("runs").size(), 4u);
+    EXPECT_EQ(distribution.at("runs").at(3).at("seed"), 2);
+    EXPECT_EQ(distribution.at("runs").at(3).at("first_frame"), 50);
+    rows.push_back(distribution.at("runs"));
+    for (auto& row : rows.back()) row.erase("tracking_median_ms");
+    const auto run = output / "cylinder-20" / "seed-2-start-1";
+    const std::vector<Row> frames = ReadFrames(run / "frames.csv");
+    EXPECT_EQ(frames.size(), 30u) << "one second";
+    trajectories.push_back(ReadAll(run / "trajectory.txt"));
+    for (const auto& file : std::filesystem::directory_iterator(run))
+      EXPECT_NE(file.path().extension(), ".png") << "only one run is worth pictures";
+    EXPECT_THAT(ReadAll(output / "report.html"), HasSubstr("of each run, sorted"));
+  }
+  EXPECT_EQ(rows[0], rows[1]);
+  EXPECT_EQ(trajectories[0], trajectories[1]);
+}
+
 TEST(Guide, ComparesBothEnginesAndStitchesWhatOneKnowsByTurning) {
   const TemporaryFolder folder;
   const auto output = folder / "report";
@@ -243,6 +273,7 @@ TEST(Guide, EndsWithOneLineWhenItsInputIsBad) {
                                                          24));
   const auto calibration = folder.Write("c.yaml", "width: 640\nheight: 480\nfy: 500\ncx: 320\ncy: 240\n");
   fails({"evaluate", video.string(), "--output", output}, "cut.mp4");
+  fails({"evaluate", "sim:cylinder:20", "--starts", "101", "--output", output}, "has only 100 frames");
   fails({"author", "--library", library, "--camera", "sim:cylinder:20", "--headless", "--calibration",
          calibration.string()},
         "fx");

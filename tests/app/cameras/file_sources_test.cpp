@@ -207,6 +207,28 @@ TEST_F(Cameras, CanBeClippedToAPart) {
   EXPECT_EQ(frames[2].time, std::chrono::milliseconds(400));
 }
 
+TEST_F(Cameras, CanBeginAtAnyPictureAsIfItWasTheFirst) {
+  for (int i = 0; i < 10; ++i) WritePng(folder_ / (std::to_string(i) + ".png"), Numbered(i));
+  CameraOptions options;
+  options.image_fps = 10;
+  const auto window = [&](std::uint64_t first, int milliseconds) {
+    return WindowOf(OpenCamera(folder_.path().string(), options), first,
+                    std::chrono::milliseconds(milliseconds));
+  };
+  const auto source = window(6, 0);
+  EXPECT_EQ(source->info().frame_count, 4u);
+  const auto frames = ReadFrames(source.get());
+  ASSERT_EQ(frames.size(), 4u);
+  EXPECT_EQ(frames[0].index, 0u);
+  EXPECT_EQ(frames[3].index, 3u);
+  EXPECT_EQ(frames[0].time, std::chrono::milliseconds(600)) << "the truth goes by the recording's times";
+  EXPECT_FALSE(frames[0].picture.empty());
+  EXPECT_EQ(ReadFrames(window(6, 200).get()).size(), 2u) << "the end is left out";
+  EXPECT_EQ(ReadFrames(window(0, 250).get()).size(), 3u);
+  EXPECT_EQ(ReadFrames(window(8, 5000).get()).size(), 2u);
+  EXPECT_TRUE(ReadFrames(window(10, 0).get()).empty());
+}
+
 TEST_F(Cameras, KeepTheirHeadWhenTheyAreClipped) {
   const auto source = OpenCamera("sim:head", {});
   Head* const head = source->head();

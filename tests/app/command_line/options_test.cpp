@@ -104,6 +104,36 @@ TEST(EvaluateOptions, TakeSeveralFramesToDump) {
   EXPECT_FALSE(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen --output out --dump-frame last"));
 }
 
+TEST(EvaluateOptions, TakeSeedsStartsAWindowAndJobs) {
+  const auto options = Parse<EvaluateOptions>(
+      AddEvaluateCommand,
+      "evaluate kitchen --output out --pace lockstep --seed 7 --seeds 20 --starts 10 --window 2.5 --jobs 2");
+  ASSERT_TRUE(options);
+  EXPECT_EQ(options->seed, 7u);
+  EXPECT_EQ(options->seeds, 20u);
+  EXPECT_EQ(options->starts, 10u);
+  EXPECT_EQ(options->window, std::chrono::milliseconds(2500));
+  EXPECT_EQ(options->jobs, 2u);
+  EXPECT_TRUE(options->many_runs());
+  const auto one = Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen --output out --window 3");
+  ASSERT_TRUE(one);
+  EXPECT_FALSE(one->many_runs());
+}
+
+TEST(EvaluateOptions, RefuseCountsThatMakeNoSense) {
+  const auto refused = [](const std::string& words) {
+    return !Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen --output out" + words);
+  };
+  EXPECT_FALSE(refused(" --seeds 1000"));
+  for (const char* words :
+       {" --seeds 0", " --seeds -1", " --seeds 1001", " --seeds two", " --seeds 1.5", " --starts 0",
+        " --starts -3", " --window -1", " --window nan", " --pace lockstep --jobs 0"}) {
+    EXPECT_TRUE(refused(words)) << words;
+  }
+  EXPECT_TRUE(refused(" --jobs 2")) << "the pace is not lockstep";
+  EXPECT_TRUE(refused(" --seeds 2 --dump-frame 3"));
+}
+
 TEST(DemoOptions, NeedAFolderWithoutAWindow) {
   EXPECT_TRUE(Parse<DemoOptions>(AddDemoCommand, "demo"));
   EXPECT_FALSE(Parse<DemoOptions>(AddDemoCommand, "demo --headless"));

@@ -354,5 +354,22 @@ TEST(GroundTruth, IsFoundByTheNearestTime) {
   EXPECT_EQ(FindPose(truth, TimeOf(9), std::chrono::milliseconds(10)), nullptr);
 }
 
+TEST(GroundTruth, IsInterpolatedBetweenItsPoses) {
+  std::vector<TimedPose> truth = {{TimeOf(0), {engine::Rotation3(), {1, 2, 3}}},
+                                  {TimeOf(1), {engine::Rotation3::Exp({0, 0.4, 0}), {2, 2, 5}}}};
+  const Timestamp quarter = TimeOf(1) / 4, far = std::chrono::seconds(1);
+  const auto pose = InterpolatePose(truth, quarter, far);
+  ASSERT_TRUE(pose);
+  EXPECT_TRUE(engine::IsNear(*pose, {engine::Rotation3::Exp({0, 0.1, 0}), {1.25, 2, 3.5}}, 1e-9, 1e-9));
+  EXPECT_TRUE(
+      engine::IsNear(*InterpolatePose(truth, TimeOf(1), far), truth[1].truth_from_camera, 1e-9, 1e-9));
+  EXPECT_TRUE(
+      engine::IsNear(*InterpolatePose(truth, TimeOf(2), far), truth[1].truth_from_camera, 1e-9, 1e-9));
+  // One neighbour is too far away: the other stands for it; both: there is no pose.
+  EXPECT_TRUE(
+      engine::IsNear(*InterpolatePose(truth, quarter, quarter), truth[0].truth_from_camera, 1e-9, 1e-9));
+  EXPECT_FALSE(InterpolatePose(truth, quarter, quarter / 2));
+}
+
 }  // namespace
 }  // namespace docent::app
