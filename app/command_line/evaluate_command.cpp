@@ -39,6 +39,18 @@ void AddDistributionOptions(CLI::App* command, EvaluateOptions* options) {
                  "spread; with --seeds every window has all seeds");
   AddSecondsOption(command, "--window", &options->window,
                    "End each run so long after its first picture (0: at the end of the sequence)");
+  command
+      ->add_option_function<std::string>(
+          "--truth-noise",
+          [options](const std::string& text) {
+            const auto metres = ParseNumber(text);
+            if (!metres || *metres < 0)
+              throw CLI::ValidationError("--truth-noise", "'" + text + "' is no length in metres");
+            options->truth_noise_m = *metres;
+          },
+          "Standard deviation of the true positions of recorded sequences, for telling false starts (default "
+          "0.01)")
+      ->type_name("METRES");
   AddCountOption(command, "--jobs", &options->jobs, kMostJobs,
                  "Run so many of the seeds and starts at a time; with --pace lockstep only");
 }

@@ -11,6 +11,7 @@
 #include "app/evaluation/frame_dump.h"
 #include "app/evaluation/panorama_picture.h"
 #include "app/evaluation/simulated_truth.h"
+#include "app/evaluation/true_depth.h"
 #include "app/files/checked_file.h"
 #include "app/output/run_output.h"
 #include "app/session/frame_loop.h"
@@ -110,6 +111,26 @@ CalibratedCamera OpenWindow(const EvaluatedSequence& sequence, std::uint64_t fir
       sequence.simulation ? OpenSimulation(sequence.simulation) : OpenCamera(sequence.word);
   if (!source->info().live) source = WindowOf(std::move(source), first_frame, window);
   return Calibrate(std::move(source), sequence.calibration);
+}
+
+std::optional<std::vector<StartResult>> JudgeStartsOf(const EvaluateOptions& options,
+                                                      const EvaluatedSequence& sequence, const RunKey& key,
+                                                      const RunRecord& run) {
+  if (sequence.truth.empty()) return std::nullopt;
+  FalseStartOptions judging;
+  judging.truth_noise_m = sequence.simulation ? 0 : options.truth_noise_m;
+  const auto true_depths = [&](const StartRecord& start) {
+    std::vector<Eigen::Vector2f> pixels;
+    for (const StartRecord::Point& point : start.points) pixels.push_back(point.pixel);
+    const std::size_t frame = key.first_frame + start.frame;
+    if (sequence.simulation)
+      return SimulatedTrueDepths(*sequence.simulation, static_cast<int>(frame), pixels);
+    TrueDepthOptions following;
+    following.truth_noise_m = judging.truth_noise_m;
+    CalibratedCamera camera = OpenWindow(sequence, frame, {});
+    return FollowTrueDepths(&camera, sequence.truth, pixels, following);
+  };
+  return JudgeStarts(run, sequence.truth, true_depths, judging);
 }
 
 std::vector<RunKey> RunsOf(const EvaluateOptions& options, const EvaluatedSequence& sequence) {

@@ -37,6 +37,11 @@ EvaluatedSequence KnowSequence(const EvaluateOptions& options, std::size_t index
 // Its pictures from the frame of that number on; see WindowOf. Throws Error.
 CalibratedCamera OpenWindow(const EvaluatedSequence& sequence, std::uint64_t first_frame, Timestamp window);
 
+// Judges the starts of a run of this sequence that began at that frame; empty without a truth. Throws Error.
+std::optional<std::vector<StartResult>> JudgeStartsOf(const EvaluateOptions& options,
+                                                      const EvaluatedSequence& sequence, const RunKey& key,
+                                                      const RunRecord& run);
+
 // The runs that are asked for, by start, then seed.
 std::vector<RunKey> RunsOf(const EvaluateOptions& options, const EvaluatedSequence& sequence);
 

@@ -79,6 +79,7 @@ struct EvaluateOptions {
   std::size_t seeds = 1;                 // runs with seed, seed + 1, ... of the engine, at least 1
   std::size_t starts = 1;                // windows over each sequence, at least 1, see RunsOf
   Timestamp window{};                    // the most that each run may last; 0: to the end of the sequence
+  double truth_noise_m = 0.01;           // of recorded sequences, see FalseStartOptions
   std::size_t jobs = 1;                  // runs side by side, each on a thread of its own; lockstep alone
 
   bool many_runs() const { return seeds > 1 || starts > 1; }

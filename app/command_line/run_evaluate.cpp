@@ -71,8 +71,7 @@ RunRow EvaluateOneOfMany(const EvaluateOptions& options, const EvaluatedSequence
   const std::string folder = "seed-" + std::to_string(key.seed) + "-start-" + std::to_string(key.start);
   const TrackRequest request{name, options.output / name / folder, key, true};
   const RunRecord run = Track(options, sequence, request, Verbosity::kQuiet, nullptr);
-  std::optional<std::vector<StartResult>> starts;
-  if (!sequence.truth.empty()) starts = JudgeStarts(run, sequence.truth);
+  std::optional<std::vector<StartResult>> starts = JudgeStartsOf(options, sequence, key, run);
   return MakeRunRow(key, run, EvaluateRun(run, sequence.truth, sequence.segments), std::move(starts));
 }
 

@@ -27,48 +27,6 @@ engine::Rotation3 AlignRotations(const std::vector<Pair>& pairs) {
   return engine::Rotation3(Eigen::Matrix3d(u * svd.matrixV().transpose()));
 }
 
-double LargestDistance(const std::vector<Eigen::Vector3d>& points) {
-  double largest = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) largest = std::max(largest, (points[i] - points[j]).norm());
-  }
-  return largest;
-}
-
-// The scale and translation of least squares after the rotation of the orientations.
-struct Fit {
-  double scale = 0, error_m = 0, path_m = 0, true_path_m = 0, map_path = 0;
-};
-
-Fit FitCenters(const std::vector<Pair>& pairs) {
-  const engine::Rotation3 truth_from_map = AlignRotations(pairs);
-  std::vector<Eigen::Vector3d> truth, turned;
-  Eigen::Vector3d truth_mean = Eigen::Vector3d::Zero(), turned_mean = Eigen::Vector3d::Zero();
-  for (const Pair& pair : pairs) {
-    truth.push_back(pair.truth_from_camera.translation);
-    turned.push_back(truth_from_map * pair.map_from_camera.translation);
-    truth_mean += truth.back();
-    turned_mean += turned.back();
-  }
-  truth_mean /= static_cast<double>(pairs.size());
-  turned_mean /= static_cast<double>(pairs.size());
-  double product = 0, square = 0;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    product += (truth[i] - truth_mean).dot(turned[i] - turned_mean);
-    square += (turned[i] - turned_mean).squaredNorm();
-  }
-  Fit fit;
-  fit.scale = square > 0 ? std::max(0.0, product / square) : 0;
-  double error = 0;
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    error += ((truth[i] - truth_mean) - fit.scale * (turned[i] - turned_mean)).squaredNorm();
-  fit.error_m = std::sqrt(error / static_cast<double>(pairs.size()));
-  fit.map_path = LargestDistance(turned);
-  fit.path_m = fit.scale * fit.map_path;
-  fit.true_path_m = LargestDistance(truth);
-  return fit;
-}
-
 double Median(std::vector<double> values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -76,15 +34,82 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
+// Centres about their means, those of the map turned into the truth's axes.
+struct Paths {
+  std::vector<Eigen::Vector3d> truth, map;
+
+  explicit Paths(const std::vector<Pair>& pairs) {
+    const engine::Rotation3 truth_from_map = AlignRotations(pairs);
+    for (const Pair& pair : pairs) {
+      truth.push_back(pair.truth_from_camera.translation);
+      map.push_back(truth_from_map * pair.map_from_camera.translation);
+    }
+    Center(&truth);
+    Center(&map);
+  }
+
+  static void Center(std::vector<Eigen::Vector3d>* points) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& point : *points) mean += point;
+    mean /= static_cast<double>(points->size());
+    for (Eigen::Vector3d& point : *points) point -= mean;
+  }
+
+  static double RootMeanSquare(const std::vector<Eigen::Vector3d>& points) {
+    double sum = 0;
+    for (const Eigen::Vector3d& point : points) sum += point.squaredNorm();
+    return std::sqrt(sum / static_cast<double>(points.size()));
+  }
+
+  // Of least squares, not negative.
+  double Scale() const {
+    double product = 0, square = 0;
+    for (std::size_t i = 0; i < map.size(); ++i) {
+      product += truth[i].dot(map[i]);
+      square += map[i].squaredNorm();
+    }
+    return square > 0 ? std::max(0.0, product / square) : 0;
+  }
+
+  double Error(double scale) const {
+    std::vector<Eigen::Vector3d> errors;
+    for (std::size_t i = 0; i < map.size(); ++i) errors.push_back(truth[i] - scale * map[i]);
+    return RootMeanSquare(errors);
+  }
+};
+
+// What the true depths say of the told ones.
+struct DepthComparison {
+  int points = 0;
+  double scale = 0;  // metres a unit
+  double error = 0;  // relative
+};
+
+DepthComparison CompareDepths(const StartRecord& start, const TrueDepthSource& true_depths) {
+  DepthComparison comparison;
+  if (!true_depths) return comparison;
+  const std::vector<std::optional<double>> depths = true_depths(start);
+  std::vector<double> scales, errors;
+  for (std::size_t i = 0; i < start.points.size() && i < depths.size(); ++i) {
+    if (depths[i] && *depths[i] > 0 && start.points[i].depth > 0)
+      scales.push_back(*depths[i] / start.points[i].depth);
+  }
+  comparison.points = static_cast<int>(scales.size());
+  comparison.scale = Median(scales);
+  for (const double scale : scales) errors.push_back(std::abs(comparison.scale / scale - 1));
+  comparison.error = Median(std::move(errors));
+  return comparison;
+}
+
 class StartJudge {
  public:
-  StartJudge(const RunRecord& run, const std::vector<TimedPose>& truth, const FalseStartOptions& options)
+  StartJudge(const RunRecord& run, const std::vector<TimedPose>& truth, const TrueDepthSource& true_depths,
+             const FalseStartOptions& options)
       : run_(run),
         truth_(truth),
+        true_depths_(true_depths),
         options_(options),
-        noise_m_(options.truth_noise_m ? *options.truth_noise_m
-                                       : EstimateTruthNoise(truth, run.frames, options.max_time_difference)) {
-  }
+        noise_m_(options.noise_factor * options.truth_noise_m) {}
 
   StartResult Judge(const StartRecord& start) const {
     StartResult result;
@@ -93,69 +118,73 @@ class StartJudge {
     for (const MapRecord& map : run_.maps) {
       if (map.key == start.map_key) result.discarded = map.discarded;
     }
-    std::vector<Pair> pairs;
-    for (const StartRecord::KeyFrame& keyframe : start.keyframes)
-      AddPair(keyframe.time, keyframe.camera_from_map, &pairs);
-    std::vector<double> depths;
-    const Timestamp begin = run_.frames[start.frame].time;
-    // What a tenth of the path must be for noise alone not to exceed it.
-    const double needed_m = options_.noise_factor * noise_m_ / options_.tolerance;
-    std::vector<Eigen::Vector3d> centers;
-    double reached_m = 0;
-    for (const Pair& pair : pairs) AddCenter(pair, &centers, &reached_m);
-    for (std::size_t i = start.frame; i < run_.frames.size(); ++i) {
-      const FrameRecord& frame = run_.frames[i];
-      const Timestamp since = frame.time - begin;
-      if (since > options_.window && (since > options_.longest || reached_m >= needed_m)) break;
-      if (!engine::HasPose(frame.state) || frame.map_key != start.map_key) continue;
-      if (!AddPair(frame.time, frame.camera_from_map, &pairs)) continue;
-      AddCenter(pairs.back(), &centers, &reached_m);
-      result.window_s = ToSeconds(since);
-      if (frame.median_depth > 0) depths.push_back(frame.median_depth);
-    }
+    const DepthComparison depth = CompareDepths(start, true_depths_);
+    result.depth_points = depth.points;
+    result.scale_of_depth = static_cast<std::size_t>(depth.points) >= options_.least_points;
+    double median_depth = 0;
+    const std::vector<Pair> pairs = FirstSecond(start, &median_depth, &result);
     result.centers = static_cast<int>(pairs.size());
-    if (pairs.size() >= 3) Decide(FitCenters(pairs), Median(std::move(depths)), needed_m, &result);
+    if (pairs.size() < 3) return result;
+    const Paths paths(pairs);
+    const double scale = result.scale_of_depth ? depth.scale : paths.Scale();
+    result.error_m = paths.Error(scale);
+    result.path_m = scale * Paths::RootMeanSquare(paths.map);
+    result.true_path_m = Paths::RootMeanSquare(paths.truth);
+    result.depth_m = scale * median_depth;
+    if (result.scale_of_depth) result.depth_error = depth.error;
+    const double claimed = median_depth > 0 ? Paths::RootMeanSquare(paths.map) / median_depth : 0;
+    result.verdict = Decide(result, claimed);
     return result;
   }
 
  private:
-  bool AddPair(Timestamp time, const engine::Rigid3& camera_from_map, std::vector<Pair>* pairs) const {
+  // Of the map's first second with depth, extended where the scale has to come from the path.
+  std::vector<Pair> FirstSecond(const StartRecord& start, double* median_depth, StartResult* result) const {
+    std::vector<Pair> pairs;
+    double reached_m = 0;
+    for (const StartRecord::KeyFrame& keyframe : start.keyframes)
+      AddPair(keyframe.time, keyframe.camera_from_map, &pairs, &reached_m);
+    std::vector<double> depths;
+    const Timestamp begin = run_.frames[start.frame].time;
+    const double enough_m = result->scale_of_depth ? 0 : noise_m_ / options_.tolerance;
+    for (std::size_t i = start.frame; i < run_.frames.size(); ++i) {
+      const FrameRecord& frame = run_.frames[i];
+      const Timestamp since = frame.time - begin;
+      if (since > options_.window && (since > options_.longest || reached_m >= enough_m)) break;
+      if (!engine::HasPose(frame.state) || frame.map_key != start.map_key) continue;
+      if (!AddPair(frame.time, frame.camera_from_map, &pairs, &reached_m)) continue;
+      result->window_s = ToSeconds(since);
+      if (frame.median_depth > 0) depths.push_back(frame.median_depth);
+    }
+    *median_depth = Median(std::move(depths));
+    return pairs;
+  }
+
+  // False where there is no truth. reached_m: how far the true centres are from the first one.
+  bool AddPair(Timestamp time, const engine::Rigid3& camera_from_map, std::vector<Pair>* pairs,
+               double* reached_m) const {
     const auto pose = InterpolatePose(truth_, time, options_.max_time_difference);
-    if (pose) pairs->push_back({camera_from_map.inverse(), *pose});
-    return pose.has_value();
+    if (!pose) return false;
+    pairs->push_back({camera_from_map.inverse(), *pose});
+    const Eigen::Vector3d& first = pairs->front().truth_from_camera.translation;
+    *reached_m = std::max(*reached_m, (pose->translation - first).norm());
+    return true;
   }
 
-  static void AddCenter(const Pair& pair, std::vector<Eigen::Vector3d>* centers, double* reached_m) {
-    for (const Eigen::Vector3d& other : *centers)
-      *reached_m = std::max(*reached_m, (pair.truth_from_camera.translation - other).norm());
-    centers->push_back(pair.truth_from_camera.translation);
-  }
-
-  void Decide(const Fit& fit, double median_depth, double needed_m, StartResult* result) const {
-    result->error_m = fit.error_m;
-    result->path_m = fit.path_m;
-    result->true_path_m = fit.true_path_m;
-    if (median_depth > 0) {
-      result->claimed_ratio = fit.map_path / median_depth;
-      result->depth_m = fit.scale * median_depth;
-    }
-    const double noise_m = options_.noise_factor * noise_m_;
-    if (fit.error_m > std::max(options_.tolerance * fit.path_m, noise_m)) {
-      result->verdict = StartVerdict::kFalsePath;
-      return;
-    }
-    // What the depth is at most: each end of the true path may be off by the noise.
-    if (result->claimed_ratio > 0 &&
-        (fit.true_path_m + 2 * noise_m) / result->claimed_ratio < options_.least_depth_m) {
-      result->verdict = StartVerdict::kFalseDepth;
-      return;
-    }
-    const bool above_noise = fit.true_path_m > 0 && fit.true_path_m >= needed_m;
-    result->verdict = above_noise ? StartVerdict::kRight : StartVerdict::kUndecided;
+  // claimed: the map's own path over its depth.
+  StartVerdict Decide(const StartResult& result, double claimed) const {
+    if (result.error_m > std::max(options_.tolerance * result.path_m, noise_m_))
+      return StartVerdict::kFalsePath;
+    if (result.depth_error && *result.depth_error > options_.tolerance) return StartVerdict::kFalseDepth;
+    const bool too_near = claimed > 0 && (result.true_path_m + noise_m_) / claimed < options_.least_depth_m;
+    if (!result.scale_of_depth && too_near) return StartVerdict::kFalseDepth;
+    const double path_m = std::max(result.path_m, result.true_path_m);
+    return path_m > 0 && path_m >= noise_m_ ? StartVerdict::kRight : StartVerdict::kUndecided;
   }
 
   const RunRecord& run_;
   const std::vector<TimedPose>& truth_;
+  const TrueDepthSource& true_depths_;
   const FalseStartOptions& options_;
   const double noise_m_;
 };
@@ -168,7 +197,7 @@ std::optional<std::string> FalseStartOptions::Validate() const {
   if (!(tolerance > 0 && tolerance < 1)) return "the tolerance of a start must lie between 0 and 1";
   if (!(least_depth_m >= 0)) return "the least depth of a start must not be negative";
   if (!(noise_factor >= 0)) return "the noise factor of a start must not be negative";
-  if (truth_noise_m && !(*truth_noise_m >= 0 && std::isfinite(*truth_noise_m)))
+  if (!(truth_noise_m >= 0 && std::isfinite(truth_noise_m)))
     return "the noise of the truth must not be negative";
   if (max_time_difference < Timestamp{}) return "the time difference to the truth must not be negative";
   return std::nullopt;
@@ -188,32 +217,12 @@ const char* ToString(StartVerdict verdict) {
   return "undecided";
 }
 
-double EstimateTruthNoise(const std::vector<TimedPose>& truth, const std::vector<FrameRecord>& frames,
-                          Timestamp max_time_difference) {
-  std::vector<double> differences;
-  std::vector<Eigen::Vector3d> run;  // of frames in a row that have a truth
-  for (const FrameRecord& frame : frames) {
-    const auto pose = InterpolatePose(truth, frame.time, max_time_difference);
-    if (!pose) {
-      run.clear();
-      continue;
-    }
-    run.push_back(pose->translation);
-    if (run.size() < 5) continue;
-    const Eigen::Vector3d* const c = &run[run.size() - 5];
-    const Eigen::Vector3d fourth = c[0] - 4 * c[1] + 6 * c[2] - 4 * c[3] + c[4];
-    for (const double value : fourth) differences.push_back(std::abs(value));
-  }
-  constexpr double kSigmaOfMedian = 1.4826;  // of a normal distribution's absolute values
-  return kSigmaOfMedian * Median(std::move(differences)) / std::sqrt(70.0);
-}
-
 std::vector<StartResult> JudgeStarts(const RunRecord& run, const std::vector<TimedPose>& truth,
-                                     const FalseStartOptions& options) {
+                                     const TrueDepthSource& true_depths, const FalseStartOptions& options) {
   if (const auto fault = options.Validate()) throw Error("A start cannot be judged: " + *fault + ".");
   std::vector<StartResult> results;
   if (truth.empty()) return results;
-  const StartJudge judge(run, truth, options);
+  const StartJudge judge(run, truth, true_depths, options);
   for (const StartRecord& start : run.starts) results.push_back(judge.Judge(start));
   return results;
 }

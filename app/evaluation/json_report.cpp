@@ -91,11 +91,18 @@ Json ToJson(const SequenceReport& report) {
 }
 
 Json ToJson(const StartResult& start) {
-  return {{"frame", start.frame},         {"verdict", ToString(start.verdict)},
-          {"discarded", start.discarded}, {"window_s", start.window_s},
-          {"centers", start.centers},     {"error_m", start.error_m},
-          {"path_m", start.path_m},       {"true_path_m", start.true_path_m},
-          {"depth_m", start.depth_m},     {"claimed_ratio", start.claimed_ratio}};
+  return {{"frame", start.frame},
+          {"verdict", ToString(start.verdict)},
+          {"discarded", start.discarded},
+          {"window_s", start.window_s},
+          {"centers", start.centers},
+          {"depth_points", start.depth_points},
+          {"scale_of", start.scale_of_depth ? "depth" : "path"},
+          {"depth_error", OrNull(start.depth_error)},
+          {"error_m", start.error_m},
+          {"path_m", start.path_m},
+          {"true_path_m", start.true_path_m},
+          {"depth_m", start.depth_m}};
 }
 
 Json ToJson(const RunRow& row) {

@@ -34,15 +34,22 @@ PointCounts CountPoints(const engine::MapSnapshot& map) {
   return counts;
 }
 
-// The nearest rank; 0 where no finite point was found.
-double MedianDepth(const engine::TrackedFrame& frame) {
-  std::vector<double> depths;
+// The finite inliers.
+std::vector<StartRecord::Point> FinitePoints(const engine::TrackedFrame& frame) {
+  std::vector<StartRecord::Point> points;
   for (const engine::PointMatch& match : frame.matches) {
     if (!match.inlier) continue;
     const engine::MapPoint* point = frame.map->FindPoint(match.point);
     if (point == nullptr || point->infinite()) continue;
-    depths.push_back((frame.camera_from_map * point->position()).z());
+    points.push_back({match.pixel, (frame.camera_from_map * point->position()).z()});
   }
+  return points;
+}
+
+// The nearest rank; 0 where no finite point was found.
+double MedianDepth(const std::vector<StartRecord::Point>& points) {
+  std::vector<double> depths;
+  for (const StartRecord::Point& point : points) depths.push_back(point.depth);
   if (depths.empty()) return 0;
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
@@ -51,7 +58,7 @@ double MedianDepth(const engine::TrackedFrame& frame) {
 
 }  // namespace
 
-void RunRecorder::AddStart(const engine::TrackedFrame& frame) {
+void RunRecorder::AddStart(const engine::TrackedFrame& frame, const std::vector<StartRecord::Point>& points) {
   const bool known = std::any_of(starts_.begin(), starts_.end(), [&frame](const StartRecord& start) {
     return start.map_key == frame.map_key;
   });
@@ -63,6 +70,8 @@ void RunRecorder::AddStart(const engine::TrackedFrame& frame) {
     if (keyframe.kind == engine::KeyFrameKind::kSixDof)
       start.keyframes.push_back({keyframe.time, keyframe.camera_from_map});
   }
+  const std::size_t count = std::min(points.size(), StartRecord::kMostPoints);
+  for (std::size_t i = 0; i < count; ++i) start.points.push_back(points[i * points.size() / count]);
   starts_.push_back(std::move(start));
 }
 
@@ -88,8 +97,9 @@ void RunRecorder::Add(const engine::TrackedFrame& frame, const MappingTimes& map
     record.map_keyframes = keyframes_;
     record.map_points = points_;
     if (engine::HasPose(frame.state)) {
-      record.median_depth = MedianDepth(frame);
-      if (points_.finite > 0) AddStart(frame);
+      const std::vector<StartRecord::Point> points = FinitePoints(frame);
+      record.median_depth = MedianDepth(points);
+      if (points_.finite > 0) AddStart(frame, points);
     }
   }
   frames_.push_back(record);

@@ -46,8 +46,7 @@ struct FrameRecord {
   KeyFrameCounts map_keyframes;  // size of the map at that time
   PointCounts map_points;
   MappingTimes mapping = {};  // since the run began
-  // Of the finite inliers, along the optical axis, in the map's unit; 0 when there are none.
-  double median_depth = 0;
+  double median_depth = 0;    // of the finite inliers, as StartRecord::Point::depth; 0 when there are none
 };
 
 // The first frame with a pose in a map that had depth, and the keyframes that gave the map its depth.
@@ -56,9 +55,16 @@ struct StartRecord {
     Timestamp time{};
     engine::Rigid3 camera_from_map;
   };
+  // A finite inlier of the frame.
+  struct Point {
+    Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+    double depth = 0;  // along the optical axis, in the map's unit
+  };
   std::uint64_t map_key = 0;
   std::size_t frame = 0;            // index in RunRecord::frames
   std::vector<KeyFrame> keyframes;  // of the map at that frame, those with a position of their own
+  std::vector<Point> points;        // at most kMostPoints of them, evenly over the list
+  static constexpr std::size_t kMostPoints = 200;
 };
 
 // The frame was tracked in a map that knew no depth yet: its position is not one.
@@ -110,7 +116,7 @@ class RunRecorder {
   const std::vector<StartRecord>& starts() const { return starts_; }
 
  private:
-  void AddStart(const engine::TrackedFrame& frame);
+  void AddStart(const engine::TrackedFrame& frame, const std::vector<StartRecord::Point>& points);
 
   std::vector<FrameRecord> frames_;
   std::vector<StartRecord> starts_;

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/evaluation/true_depth.h"
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+// Where the followed pixels were in an image after the first one.
+struct FollowedImage {
+  engine::Rigid3 now_from_first;
+  std::vector<std::optional<Eigen::Vector2d>> rays;  // x / z and y / z of the camera frame
+};
+
+std::optional<Eigen::Vector2d> RayOf(const engine::CameraModel& model, const cv::Point2f& pixel) {
+  const std::optional<Eigen::Vector3d> ray = model.Unproject({pixel.x, pixel.y});
+  constexpr double kLeastForward = 0.2;  // an angle of 78 degrees from the axis: x / z grows without bound
+  if (!ray || ray->z() < kLeastForward) return std::nullopt;
+  return ray->hnormalized();
+}
+
+cv::Mat Grey(const cv::Mat& picture) {
+  if (picture.channels() == 1) return picture;
+  cv::Mat grey;
+  cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+  return grey;
+}
+
+// Follows pixels from image to image.
+class Flow {
+ public:
+  Flow(const cv::Mat& picture, const std::vector<Eigen::Vector2f>& pixels)
+      : before_(Grey(picture)), alive_(pixels.size(), true) {
+    for (const Eigen::Vector2f& pixel : pixels) at_.emplace_back(pixel.x(), pixel.y());
+  }
+
+  void Follow(const cv::Mat& picture) {
+    cv::Mat now = Grey(picture);
+    std::vector<cv::Point2f> found;
+    std::vector<unsigned char> status;
+    std::vector<float> error;
+    constexpr int kWindow_px = 15, kLevels = 4;
+    cv::calcOpticalFlowPyrLK(before_, now, at_, found, status, error, {kWindow_px, kWindow_px}, kLevels);
+    const cv::Rect2f inside(0, 0, static_cast<float>(now.cols - 1), static_cast<float>(now.rows - 1));
+    for (std::size_t i = 0; i < at_.size(); ++i) {
+      alive_[i] = alive_[i] && status[i] != 0 && inside.contains(found[i]);
+      if (alive_[i]) at_[i] = found[i];
+    }
+    before_ = now;
+  }
+
+  double Kept() const {
+    return static_cast<double>(std::count(alive_.begin(), alive_.end(), true)) /
+           static_cast<double>(alive_.size());
+  }
+  bool alive(std::size_t i) const { return alive_[i]; }
+  const cv::Point2f& at(std::size_t i) const { return at_[i]; }
+
+ private:
+  cv::Mat before_;
+  std::vector<cv::Point2f> at_;
+  std::vector<bool> alive_;
+};
+
+// The residual of one pixel in one image, in standard deviations of a pixel.
+struct PixelResidual {
+  Eigen::Vector2d first_ray, ray;
+  engine::Rigid3 now_from_first;
+  double weight;
+
+  template <typename T>
+  bool operator()(const T* turn, const T* inverse_depth, T* residual) const {
+    const Eigen::Vector3d turned = now_from_first.rotation * Eigen::Vector3d(first_ray.x(), first_ray.y(), 1);
+    const Eigen::Vector3d& t = now_from_first.translation;
+    const T point[3] = {turned.x() + inverse_depth[0] * t.x(), turned.y() + inverse_depth[0] * t.y(),
+                        turned.z() + inverse_depth[0] * t.z()};
+    T seen[3];
+    ceres::AngleAxisRotatePoint(turn, point, seen);
+    if (seen[2] < T(1e-3)) return false;
+    residual[0] = weight * (seen[0] / seen[2] - ray.x());
+    residual[1] = weight * (seen[1] / seen[2] - ray.y());
+    return true;
+  }
+};
+
+struct TurnPrior {
+  double weight;
+  template <typename T>
+  bool operator()(const T* turn, T* residual) const {
+    for (int i = 0; i < 3; ++i) residual[i] = weight * turn[i];
+    return true;
+  }
+};
+
+// Least squares with the true orientations as they are; empty where no image tells or the point would be
+// behind.
+std::optional<double> LinearInverseDepth(const Eigen::Vector2d& first_ray, std::size_t i,
+                                         const std::vector<FollowedImage>& images) {
+  double product = 0, square = 0;
+  for (const FollowedImage& image : images) {
+    if (!image.rays[i]) continue;
+    const Eigen::Vector3d turned =
+        image.now_from_first.rotation * Eigen::Vector3d(first_ray.x(), first_ray.y(), 1);
+    const Eigen::Vector3d& t = image.now_from_first.translation;
+    for (int axis = 0; axis < 2; ++axis) {
+      const double u = (*image.rays[i])[axis];
+      const double slope = t[axis] - u * t.z(), value = u * turned.z() - turned[axis];
+      product += slope * value;
+      square += slope * slope;
+    }
+  }
+  if (!(square > 0)) return std::nullopt;
+  return product / square;
+}
+
+class Triangulation {
+ public:
+  Triangulation(const engine::CameraModel& model, const TrueDepthOptions& options,
+                const std::vector<FollowedImage>& images, std::vector<std::optional<Eigen::Vector2d>> first)
+      : options_(options),
+        images_(images),
+        first_(std::move(first)),
+        weight_(1 / (options.pixel_sigma * model.PixelAngle())) {}
+
+  TrueDepths Solve() {
+    inverse_depths_.assign(first_.size(), 0);
+    turns_.assign(images_.size(), {0, 0, 0});
+    ceres::Problem problem;
+    for (std::size_t i = 0; i < first_.size(); ++i) AddPoint(i, &problem);
+    if (problem.NumResidualBlocks() == 0) return TrueDepths(first_.size());
+    const double prior = 1 / (options_.orientation_sigma_deg * kDegree);
+    for (std::array<double, 3>& turn : turns_) {
+      if (!problem.HasParameterBlock(turn.data())) continue;
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<TurnPrior, 3, 3>(new TurnPrior{prior}),
+                               nullptr, turn.data());
+    }
+    ceres::Solver::Options solver;
+    solver.linear_solver_type = ceres::DENSE_SCHUR;
+    solver.logging_type = ceres::SILENT;
+    solver.num_threads = 1;
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver, &problem, &summary);
+    TrueDepths depths(first_.size());
+    for (std::size_t i = 0; i < first_.size(); ++i) {
+      if (summary.IsSolutionUsable() && IsSure(i)) depths[i] = 1 / inverse_depths_[i];
+    }
+    return depths;
+  }
+
+ private:
+  void AddPoint(std::size_t i, ceres::Problem* problem) {
+    if (!first_[i]) return;
+    const std::optional<double> start = LinearInverseDepth(*first_[i], i, images_);
+    if (!start) return;
+    constexpr double kFar = 1e-3;  // a kilometre: so that what is behind by its noise begins in front
+    inverse_depths_[i] = std::max(kFar, *start);
+    for (std::size_t j = 0; j < images_.size(); ++j) {
+      if (!images_[j].rays[i]) continue;
+      problem->AddResidualBlock(new ceres::AutoDiffCostFunction<PixelResidual, 2, 3, 1>(new PixelResidual{
+                                    *first_[i], *images_[j].rays[i], images_[j].now_from_first, weight_}),
+                                new ceres::CauchyLoss(2), turns_[j].data(), &inverse_depths_[i]);
+    }
+  }
+
+  // Whether the pixel was followed well, and from far enough apart.
+  bool IsSure(std::size_t i) const {
+    if (!first_[i] || !(inverse_depths_[i] > 0)) return false;
+    const Eigen::Vector3d point = Eigen::Vector3d(first_[i]->x(), first_[i]->y(), 1) / inverse_depths_[i];
+    double error = 0, baseline_m = 0, parallax = 0;
+    int seen = 0;
+    for (std::size_t j = 0; j < images_.size(); ++j) {
+      if (!images_[j].rays[i]) continue;
+      double residual[2];
+      const PixelResidual pixel{*first_[i], *images_[j].rays[i], images_[j].now_from_first, weight_};
+      if (!pixel(turns_[j].data(), &inverse_depths_[i], residual)) return false;
+      error += residual[0] * residual[0] + residual[1] * residual[1];
+      ++seen;
+      const Eigen::Vector3d center = images_[j].now_from_first.OriginInSource();
+      baseline_m = std::max(baseline_m, center.norm());
+      const Eigen::Vector3d a = point.normalized(), b = (point - center).normalized();
+      parallax = std::max(parallax, std::atan2(a.cross(b).norm(), a.dot(b)));
+    }
+    if (seen < 2) return false;
+    const double rms_px = std::sqrt(error / seen) * options_.pixel_sigma;
+    return rms_px <= options_.largest_error_px &&
+           baseline_m >= options_.least_noises * options_.truth_noise_m &&
+           parallax >= options_.least_parallax_deg * kDegree;
+  }
+
+  const TrueDepthOptions& options_;
+  const std::vector<FollowedImage>& images_;
+  const std::vector<std::optional<Eigen::Vector2d>> first_;
+  const double weight_;
+  std::vector<double> inverse_depths_;
+  std::vector<std::array<double, 3>> turns_;
+};
+
+// `count` of them, evenly, the last one among them.
+std::vector<FollowedImage> Thin(std::vector<FollowedImage> images, std::size_t count) {
+  if (images.size() <= count) return images;
+  std::vector<FollowedImage> thinned;
+  for (std::size_t i = 1; i <= count; ++i)
+    thinned.push_back(std::move(images[i * images.size() / count - 1]));
+  return thinned;
+}
+
+}  // namespace
+
+std::optional<std::string> TrueDepthOptions::Validate() const {
+  if (longest <= Timestamp{}) return "pixels must be followed for a positive time";
+  if (!(least_kept >= 0 && least_kept < 1)) return "the part of the pixels that is kept must lie in [0, 1)";
+  if (images < 1) return "at least one image must be used";
+  if (!(pixel_sigma > 0) || !(orientation_sigma_deg > 0)) return "standard deviations must be positive";
+  if (!(truth_noise_m >= 0) || !(least_noises >= 0) || !(least_parallax_deg >= 0))
+    return "the noise of the truth and what is asked of the baseline must not be negative";
+  if (!(largest_error_px > 0)) return "the largest error must be positive";
+  return std::nullopt;
+}
+
+TrueDepths FollowTrueDepths(CalibratedCamera* camera, const std::vector<TimedPose>& truth,
+                            const std::vector<Eigen::Vector2f>& pixels, const TrueDepthOptions& options) {
+  if (const auto fault = options.Validate()) throw Error("True depths cannot be measured: " + *fault + ".");
+  engine::Frame frame;
+  if (pixels.empty() || !camera->source->Next(&frame)) return TrueDepths(pixels.size());
+  const auto first_pose = InterpolatePose(truth, frame.time, options.max_time_difference);
+  if (!first_pose) return TrueDepths(pixels.size());
+  const Timestamp begin = frame.time;
+  Flow flow(frame.picture, pixels);
+  std::vector<std::optional<Eigen::Vector2d>> first;
+  for (std::size_t i = 0; i < pixels.size(); ++i) first.push_back(RayOf(*camera->model, flow.at(i)));
+  std::vector<FollowedImage> images;
+  while (camera->source->Next(&frame) && frame.time - begin <= options.longest) {
+    flow.Follow(frame.picture);
+    if (flow.Kept() < options.least_kept) break;
+    const auto pose = InterpolatePose(truth, frame.time, options.max_time_difference);
+    if (!pose) continue;
+    FollowedImage image{pose->inverse() * *first_pose, {}};
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      image.rays.push_back(flow.alive(i) ? RayOf(*camera->model, flow.at(i)) : std::nullopt);
+    images.push_back(std::move(image));
+  }
+  images = Thin(std::move(images), static_cast<std::size_t>(options.images));
+  return Triangulation(*camera->model, options, images, std::move(first)).Solve();
+}
+
+TrueDepths SimulatedTrueDepths(const Simulation& simulation, int frame,
+                               const std::vector<Eigen::Vector2f>& pixels) {
+  TrueDepths depths;
+  const engine::Rigid3 camera_from_world = simulation.world_from_camera(frame).inverse();
+  for (const Eigen::Vector2f& pixel : pixels) {
+    const auto point = simulation.SurfaceAt(frame, pixel.cast<double>());
+    depths.push_back(point ? std::optional((camera_from_world * *point).z()) : std::nullopt);
+  }
+  return depths;
+}
+
+}  // namespace docent::app
