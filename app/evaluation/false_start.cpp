@@ -78,25 +78,39 @@ struct Paths {
   }
 };
 
-// What the true depths say of the told ones.
+// What the true depths say of the map's scale, metres a unit.
 struct DepthComparison {
-  int points = 0;
-  double scale = 0;  // metres a unit
-  double error = 0;  // relative
+  int points = 0;               // that could be followed
+  double inverse = 0;           // 1 / scale
+  double sigma = 0;             // of `inverse`
+  std::optional<double> error;  // relative, of the depths among each other
 };
 
-DepthComparison CompareDepths(const StartRecord& start, const TrueDepthSource& true_depths) {
+// The median over the better known half of the points: those that were followed for long, and so seen from
+// far apart. The error of what is common to all of them is not smaller than each one's.
+DepthComparison CompareDepths(const StartRecord& start, const TrueDepthSource& true_depths,
+                              const FalseStartOptions& options) {
   DepthComparison comparison;
   if (!true_depths) return comparison;
-  const std::vector<std::optional<double>> depths = true_depths(start);
-  std::vector<double> scales, errors;
+  const TrueDepths depths = true_depths(start);
+  std::vector<std::pair<double, double>> known;  // standard deviation and value of the inverse scale
   for (std::size_t i = 0; i < start.points.size() && i < depths.size(); ++i) {
-    if (depths[i] && *depths[i] > 0 && start.points[i].depth > 0)
-      scales.push_back(*depths[i] / start.points[i].depth);
+    const double told = start.points[i].depth;
+    if (depths[i] && told > 0) known.emplace_back(depths[i]->sigma * told, depths[i]->inverse * told);
   }
-  comparison.points = static_cast<int>(scales.size());
-  comparison.scale = Median(scales);
-  for (const double scale : scales) errors.push_back(std::abs(comparison.scale / scale - 1));
+  comparison.points = static_cast<int>(known.size());
+  if (known.size() < options.least_points) return comparison;
+  std::sort(known.begin(), known.end());
+  known.resize(std::max(options.least_points, known.size() / 2));
+  std::vector<double> sigmas, values, errors;
+  for (const auto& [sigma, value] : known) {
+    sigmas.push_back(sigma);
+    values.push_back(value);
+  }
+  comparison.inverse = Median(values);
+  comparison.sigma = Median(std::move(sigmas));
+  if (!(options.sigmas * comparison.sigma < options.tolerance * comparison.inverse)) return comparison;
+  for (const double value : values) errors.push_back(std::abs(value / comparison.inverse - 1));
   comparison.error = Median(std::move(errors));
   return comparison;
 }
@@ -109,7 +123,7 @@ class StartJudge {
         truth_(truth),
         true_depths_(true_depths),
         options_(options),
-        noise_m_(options.noise_factor * options.truth_noise_m) {}
+        noise_m_(options.sigmas * options.truth_noise_m) {}
 
   StartResult Judge(const StartRecord& start) const {
     StartResult result;
@@ -118,35 +132,45 @@ class StartJudge {
     for (const MapRecord& map : run_.maps) {
       if (map.key == start.map_key) result.discarded = map.discarded;
     }
-    const DepthComparison depth = CompareDepths(start, true_depths_);
+    const DepthComparison depth = CompareDepths(start, true_depths_, options_);
     result.depth_points = depth.points;
-    result.scale_of_depth = static_cast<std::size_t>(depth.points) >= options_.least_points;
-    double median_depth = 0;
-    const std::vector<Pair> pairs = FirstSecond(start, &median_depth, &result);
+    result.depth_error = depth.error;
+    const bool bounded = static_cast<std::size_t>(depth.points) >= options_.least_points;
+    const std::vector<Pair> pairs = FirstSecond(start, !bounded, &result);
     result.centers = static_cast<int>(pairs.size());
     if (pairs.size() < 3) return result;
     const Paths paths(pairs);
-    const double scale = result.scale_of_depth ? depth.scale : paths.Scale();
+    const double told = run_.frames[start.frame].median_depth;
+    double scale = paths.Scale();
+    if (bounded) {
+      const double margin = options_.sigmas * depth.sigma;
+      const double most_inverse = depth.inverse + margin, least_inverse = depth.inverse - margin;
+      if (most_inverse > 0) {
+        scale = std::max(scale, 1 / most_inverse);
+        result.least_depth_m = told / most_inverse;
+      }
+      if (least_inverse > 0) {
+        scale = std::min(scale, 1 / least_inverse);
+        result.most_depth_m = told / least_inverse;
+      }
+    }
+    if (told > 0) result.depth_m = scale * told;
     result.error_m = paths.Error(scale);
     result.path_m = scale * Paths::RootMeanSquare(paths.map);
     result.true_path_m = Paths::RootMeanSquare(paths.truth);
-    result.depth_m = scale * median_depth;
-    if (result.scale_of_depth) result.depth_error = depth.error;
-    const double claimed = median_depth > 0 ? Paths::RootMeanSquare(paths.map) / median_depth : 0;
-    result.verdict = Decide(result, claimed);
+    result.verdict = Decide(result);
     return result;
   }
 
  private:
-  // Of the map's first second with depth, extended where the scale has to come from the path.
-  std::vector<Pair> FirstSecond(const StartRecord& start, double* median_depth, StartResult* result) const {
+  // Of the map's first second with depth.
+  std::vector<Pair> FirstSecond(const StartRecord& start, bool extended, StartResult* result) const {
     std::vector<Pair> pairs;
     double reached_m = 0;
     for (const StartRecord::KeyFrame& keyframe : start.keyframes)
       AddPair(keyframe.time, keyframe.camera_from_map, &pairs, &reached_m);
-    std::vector<double> depths;
     const Timestamp begin = run_.frames[start.frame].time;
-    const double enough_m = result->scale_of_depth ? 0 : noise_m_ / options_.tolerance;
+    const double enough_m = extended ? noise_m_ / options_.tolerance : 0;
     for (std::size_t i = start.frame; i < run_.frames.size(); ++i) {
       const FrameRecord& frame = run_.frames[i];
       const Timestamp since = frame.time - begin;
@@ -154,9 +178,7 @@ class StartJudge {
       if (!engine::HasPose(frame.state) || frame.map_key != start.map_key) continue;
       if (!AddPair(frame.time, frame.camera_from_map, &pairs, &reached_m)) continue;
       result->window_s = ToSeconds(since);
-      if (frame.median_depth > 0) depths.push_back(frame.median_depth);
     }
-    *median_depth = Median(std::move(depths));
     return pairs;
   }
 
@@ -171,13 +193,10 @@ class StartJudge {
     return true;
   }
 
-  // claimed: the map's own path over its depth.
-  StartVerdict Decide(const StartResult& result, double claimed) const {
+  StartVerdict Decide(const StartResult& result) const {
     if (result.error_m > std::max(options_.tolerance * result.path_m, noise_m_))
       return StartVerdict::kFalsePath;
     if (result.depth_error && *result.depth_error > options_.tolerance) return StartVerdict::kFalseDepth;
-    const bool too_near = claimed > 0 && (result.true_path_m + noise_m_) / claimed < options_.least_depth_m;
-    if (!result.scale_of_depth && too_near) return StartVerdict::kFalseDepth;
     const double path_m = std::max(result.path_m, result.true_path_m);
     return path_m > 0 && path_m >= noise_m_ ? StartVerdict::kRight : StartVerdict::kUndecided;
   }
@@ -195,8 +214,8 @@ std::optional<std::string> FalseStartOptions::Validate() const {
   if (window <= Timestamp{}) return "the window of a start must be positive";
   if (longest < window) return "the longest window of a start must not be below the usual one";
   if (!(tolerance > 0 && tolerance < 1)) return "the tolerance of a start must lie between 0 and 1";
-  if (!(least_depth_m >= 0)) return "the least depth of a start must not be negative";
-  if (!(noise_factor >= 0)) return "the noise factor of a start must not be negative";
+  if (!(sigmas >= 0)) return "the standard deviations that are allowed must not be negative";
+  if (least_points < 1) return "at least one point with a true depth must be asked for";
   if (!(truth_noise_m >= 0 && std::isfinite(truth_noise_m)))
     return "the noise of the truth must not be negative";
   if (max_time_difference < Timestamp{}) return "the time difference to the truth must not be negative";

@@ -97,12 +97,13 @@ Json ToJson(const StartResult& start) {
           {"window_s", start.window_s},
           {"centers", start.centers},
           {"depth_points", start.depth_points},
-          {"scale_of", start.scale_of_depth ? "depth" : "path"},
           {"depth_error", OrNull(start.depth_error)},
           {"error_m", start.error_m},
           {"path_m", start.path_m},
           {"true_path_m", start.true_path_m},
-          {"depth_m", start.depth_m}};
+          {"depth_m", OrNull(start.depth_m)},
+          {"least_depth_m", OrNull(start.least_depth_m)},
+          {"most_depth_m", OrNull(start.most_depth_m)}};
 }
 
 Json ToJson(const RunRow& row) {

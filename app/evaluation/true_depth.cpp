@@ -155,7 +155,7 @@ class Triangulation {
     ceres::Solve(solver, &problem, &summary);
     TrueDepths depths(first_.size());
     for (std::size_t i = 0; i < first_.size(); ++i) {
-      if (summary.IsSolutionUsable() && IsSure(i)) depths[i] = 1 / inverse_depths_[i];
+      if (summary.IsSolutionUsable()) depths[i] = Depth(i);
     }
     return depths;
   }
@@ -175,29 +175,27 @@ class Triangulation {
     }
   }
 
-  // Whether the pixel was followed well, and from far enough apart.
-  bool IsSure(std::size_t i) const {
-    if (!first_[i] || !(inverse_depths_[i] > 0)) return false;
-    const Eigen::Vector3d point = Eigen::Vector3d(first_[i]->x(), first_[i]->y(), 1) / inverse_depths_[i];
-    double error = 0, baseline_m = 0, parallax = 0;
+  // Empty where the pixel was not followed well, or the camera has not moved at all.
+  std::optional<TrueDepth> Depth(std::size_t i) const {
+    if (!first_[i]) return std::nullopt;
+    double error = 0, baseline_m = 0;
     int seen = 0;
     for (std::size_t j = 0; j < images_.size(); ++j) {
       if (!images_[j].rays[i]) continue;
       double residual[2];
       const PixelResidual pixel{*first_[i], *images_[j].rays[i], images_[j].now_from_first, weight_};
-      if (!pixel(turns_[j].data(), &inverse_depths_[i], residual)) return false;
+      if (!pixel(turns_[j].data(), &inverse_depths_[i], residual)) return std::nullopt;
       error += residual[0] * residual[0] + residual[1] * residual[1];
       ++seen;
-      const Eigen::Vector3d center = images_[j].now_from_first.OriginInSource();
-      baseline_m = std::max(baseline_m, center.norm());
-      const Eigen::Vector3d a = point.normalized(), b = (point - center).normalized();
-      parallax = std::max(parallax, std::atan2(a.cross(b).norm(), a.dot(b)));
+      baseline_m = std::max(baseline_m, images_[j].now_from_first.translation.norm());
     }
-    if (seen < 2) return false;
-    const double rms_px = std::sqrt(error / seen) * options_.pixel_sigma;
-    return rms_px <= options_.largest_error_px &&
-           baseline_m >= options_.least_noises * options_.truth_noise_m &&
-           parallax >= options_.least_parallax_deg * kDegree;
+    const bool followed =
+        seen > 0 && std::sqrt(error / seen) * options_.pixel_sigma <= options_.largest_error_px;
+    if (!followed || !(baseline_m > 0)) return std::nullopt;
+    const double inverse = inverse_depths_[i];
+    const double by_turn = options_.orientation_sigma_deg * kDegree / baseline_m;
+    const double by_centers = inverse * std::numbers::sqrt2 * options_.truth_noise_m / baseline_m;
+    return TrueDepth{inverse, std::hypot(by_turn, by_centers)};
   }
 
   const TrueDepthOptions& options_;
@@ -224,8 +222,7 @@ std::optional<std::string> TrueDepthOptions::Validate() const {
   if (!(least_kept >= 0 && least_kept < 1)) return "the part of the pixels that is kept must lie in [0, 1)";
   if (images < 1) return "at least one image must be used";
   if (!(pixel_sigma > 0) || !(orientation_sigma_deg > 0)) return "standard deviations must be positive";
-  if (!(truth_noise_m >= 0) || !(least_noises >= 0) || !(least_parallax_deg >= 0))
-    return "the noise of the truth and what is asked of the baseline must not be negative";
+  if (!(truth_noise_m >= 0)) return "the noise of the truth must not be negative";
   if (!(largest_error_px > 0)) return "the largest error must be positive";
   return std::nullopt;
 }
@@ -262,7 +259,8 @@ TrueDepths SimulatedTrueDepths(const Simulation& simulation, int frame,
   const engine::Rigid3 camera_from_world = simulation.world_from_camera(frame).inverse();
   for (const Eigen::Vector2f& pixel : pixels) {
     const auto point = simulation.SurfaceAt(frame, pixel.cast<double>());
-    depths.push_back(point ? std::optional((camera_from_world * *point).z()) : std::nullopt);
+    depths.emplace_back();
+    if (point) depths.back() = {1 / (camera_from_world * *point).z(), 0};
   }
   return depths;
 }

@@ -15,8 +15,6 @@ namespace {
 
 using engine::Rotation3;
 using engine::TrackingState;
-using ::testing::Each;
-using ::testing::Field;
 
 constexpr int kFrames = 90;      // three seconds
 constexpr int kFirstDepth = 15;  // the frame at which the map gets depth
@@ -67,6 +65,7 @@ RunRecord RunOf(const std::vector<TimedPose>& told, double depth_m = kSceneDepth
   }
   StartRecord start;
   start.map_key = 1;
+  for (int i = 0; i < 20; ++i) start.points.push_back({{}, run.frames[0].median_depth * (0.5 + 0.05 * i)});
   for (const int i : {0, kFirstDepth})
     start.keyframes.push_back({TimeOf(i), InMap(told[static_cast<std::size_t>(i)].truth_from_camera)});
   run.starts.push_back(start);
@@ -76,11 +75,28 @@ RunRecord RunOf(const std::vector<TimedPose>& told, double depth_m = kSceneDepth
   return run;
 }
 
+// The options for a truth without noise.
+FalseStartOptions Exact() {
+  FalseStartOptions options;
+  options.truth_noise_m = 0;
+  return options;
+}
+
 StartResult Judge(const RunRecord& run, const std::vector<TimedPose>& truth,
-                  const FalseStartOptions& options = {}) {
-  const std::vector<StartResult> results = JudgeStarts(run, truth, options);
+                  const TrueDepthSource& true_depths = {}, const FalseStartOptions& options = Exact()) {
+  const std::vector<StartResult> results = JudgeStarts(run, truth, true_depths, options);
   EXPECT_EQ(results.size(), 1u);
   return results.at(0);
+}
+
+// The told depths of a map of the right scale are the true ones divided by `factor`.
+TrueDepthSource Depths(double factor, double sigma = 0) {
+  return [=](const StartRecord& start) {
+    TrueDepths depths;
+    for (const StartRecord::Point& point : start.points)
+      depths.push_back(TrueDepth{1 / (factor * kTruthFromMap.scale * point.depth), sigma});
+    return depths;
+  };
 }
 
 TEST(FalseStart, IsNotFoundInARightStartOfAnyFrameAndScale) {
@@ -126,22 +142,74 @@ TEST(FalseStart, IsAScaleThatChangesWithinTheFirstSecond) {
 TEST(FalseStart, IsAMapOfACameraThatOnlyTurned) {
   const auto truth = Sideways(0);
   const auto told = Sideways(0.1);
-  const StartResult result = Judge(RunOf(told), truth);
-  EXPECT_TRUE(IsFalse(result.verdict));
+  const StartResult result = Judge(RunOf(told), truth, Depths(1));
+  EXPECT_EQ(result.verdict, StartVerdict::kFalsePath);
   EXPECT_EQ(result.true_path_m, 0);
+  EXPECT_EQ(Judge(RunOf(told), truth).verdict, StartVerdict::kUndecided) << "no depth and no path to go by";
 }
 
-TEST(FalseStart, IsADepthOfCentimetresThatALineOfMillimetresWouldNeed) {
-  const auto truth = Sideways(0.004);
-  const auto told = Sideways(0.1);  // the right shape, but 25 times as long before the same depth
-  const StartResult result = Judge(RunOf(told), truth);
+TEST(FalseStart, IsARightPathBeforeASceneThatIsFartherAway) {
+  const auto truth = Sideways(0.3);
+  const StartResult result = Judge(RunOf(truth), truth, Depths(5));
+  EXPECT_EQ(result.verdict, StartVerdict::kFalsePath);
+  EXPECT_NEAR(result.path_m, 5 * result.true_path_m, 1e-9) << "what the map claims, in metres";
+  EXPECT_EQ(result.depth_m, result.least_depth_m);
+  EXPECT_EQ(Judge(RunOf(truth), truth, Depths(0.2)).verdict, StartVerdict::kFalsePath) << "or nearer";
+  EXPECT_EQ(Judge(RunOf(truth), truth, Depths(1)).verdict, StartVerdict::kRight);
+  EXPECT_EQ(Judge(RunOf(truth), truth, Depths(1.05)).verdict, StartVerdict::kRight) << "within a tenth";
+  EXPECT_EQ(Judge(RunOf(truth), truth, Depths(1.2)).verdict, StartVerdict::kFalsePath);
+}
+
+TEST(FalseStart, IsFoundWhereTheTruthOnlySaysThatTheSceneIsFar) {
+  const auto truth = Sideways(0.3);
+  const RunRecord run = RunOf(truth);
+  // The scene is 6 m away, give or take so much that it might be at infinity, where the map has 2 m.
+  const double inverse = 1 / (3 * kSceneDepth_m);
+  const StartResult result = Judge(run, truth, Depths(3, 0.5 * inverse));
+  EXPECT_EQ(result.verdict, StartVerdict::kFalsePath);
+  EXPECT_FALSE(result.most_depth_m);
+  EXPECT_THAT(result.least_depth_m, ::testing::Optional(::testing::DoubleNear(3.0, 0.2)));
+  // And here the same depths say next to nothing.
+  EXPECT_EQ(Judge(run, truth, Depths(3, 3 * inverse)).verdict, StartVerdict::kRight);
+}
+
+TEST(FalseStart, IsAMapOfRandomDepths) {
+  const auto truth = Sideways(0.3);
+  const RunRecord run = RunOf(truth);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> factor(0.5, 2);
+  const auto depths = [&](double sigma) {
+    return [&, sigma](const StartRecord& start) {
+      TrueDepths result = Depths(1, sigma)(start);
+      for (auto& depth : result) depth->inverse *= factor(random);
+      return result;
+    };
+  };
+  FalseStartOptions lenient = Exact();
+  lenient.truth_noise_m = 1;  // the path may be anything
+  const StartResult result = Judge(run, truth, depths(0), lenient);
   EXPECT_EQ(result.verdict, StartVerdict::kFalseDepth);
-  EXPECT_NEAR(result.depth_m, kSceneDepth_m * 0.04, 1e-6);
+  EXPECT_GT(result.depth_error, 0.1);
+  EXPECT_FALSE(Judge(run, truth, depths(0.1), lenient).depth_error) << "known too badly to tell";
+}
+
+TEST(FalseStart, AsksForEnoughDepths) {
+  const auto truth = Sideways(0.3);
+  const auto few = [](const StartRecord& start) {
+    TrueDepths depths = Depths(5)(start);
+    for (std::size_t i = 14; i < depths.size(); ++i) depths[i].reset();
+    return depths;
+  };
+  const StartResult result = Judge(RunOf(truth), truth, few);
+  EXPECT_EQ(result.depth_points, 14);
+  EXPECT_EQ(result.verdict, StartVerdict::kRight) << "by its path";
+  EXPECT_FALSE(result.least_depth_m);
 }
 
 TEST(FalseStart, IsNotMadeByTheNoiseOfTheTruth) {
   std::mt19937 random(3);
-  int right = 0;
+  FalseStartOptions options;
+  options.truth_noise_m = 0.01;
   for (int trial = 0; trial < 50; ++trial) {
     auto truth = Sideways(0.1);
     const RunRecord run = RunOf(truth);
@@ -150,13 +218,10 @@ TEST(FalseStart, IsNotMadeByTheNoiseOfTheTruth) {
       Eigen::Vector3d& t = pose.truth_from_camera.translation;
       t += Eigen::Vector3d(noise(random), noise(random), noise(random));
     }
-    EXPECT_NEAR(EstimateTruthNoise(truth, run.frames, {}), 0.01, 0.003);
-    const StartResult result = Judge(run, truth);
-    EXPECT_FALSE(IsFalse(result.verdict)) << ToString(result.verdict);
-    EXPECT_GT(result.window_s, 1.5) << "a tenth of the path of one second is no more than the noise";
-    right += result.verdict == StartVerdict::kRight;
+    const StartResult result = Judge(run, truth, {}, options);
+    EXPECT_FALSE(IsFalse(result.verdict)) << ToString(result.verdict) << " " << result.error_m;
+    EXPECT_GT(result.window_s, 1.3) << "a tenth of the path of one second is no more than the noise";
   }
-  EXPECT_GT(right, 40);
 }
 
 TEST(FalseStart, IsFoundThroughTheNoiseOfTheTruth) {
@@ -171,12 +236,12 @@ TEST(FalseStart, IsFoundThroughTheNoiseOfTheTruth) {
     Eigen::Vector3d& t = pose.truth_from_camera.translation;
     t += Eigen::Vector3d(noise(random), noise(random), noise(random));
   }
-  EXPECT_EQ(Judge(run, truth).verdict, StartVerdict::kFalsePath);
+  EXPECT_EQ(Judge(run, truth, {}, {}).verdict, StartVerdict::kFalsePath);
 }
 
 TEST(FalseStart, IsUndecidedWithTooLittleData) {
   const auto truth = Sideways(0.3);
-  EXPECT_TRUE(JudgeStarts(RunOf(truth), {}).empty()) << "without a truth";
+  EXPECT_TRUE(JudgeStarts(RunOf(truth), {}, {}).empty()) << "without a truth";
   RunRecord run = RunOf(truth);
   run.starts[0].keyframes.clear();
   run.frames.resize(2);
@@ -203,6 +268,7 @@ TEST(FalseStart, LooksAtTheMapsOwnFramesAlone) {
 TEST(FalseStart, IsToldApartWhenTheEngineNoticedIt) {
   const auto truth = Sideways(0);
   RunRecord run = RunOf(Sideways(0.1));
+  EXPECT_FALSE(Judge(run, truth).discarded);
   run.maps[0].discarded = true;
   EXPECT_TRUE(Judge(run, truth).discarded);
 }
@@ -213,7 +279,7 @@ TEST(FalseStart, RefusesOptionsThatMakeNoSense) {
   options.truth_noise_m = -1;
   EXPECT_TRUE(options.Validate());
   const auto truth = Sideways(0.3);
-  EXPECT_THROW(JudgeStarts(RunOf(truth), truth, options), Error);
+  EXPECT_THROW(JudgeStarts(RunOf(truth), truth, {}, options), Error);
   options = {};
   options.tolerance = 0;
   EXPECT_TRUE(options.Validate());

@@ -125,7 +125,7 @@ TEST(RunDistribution, TakesTheErrorOfEachFrameByItsOwnMap) {
     const double scale = i < 12 ? 1 : 10;
     run.frames.back().camera_from_map = engine::Rigid3(engine::Rotation3(), center * scale).inverse();
   }
-  const RunRow row = MakeRunRow({}, run, EvaluateRun(run, truth, {}), JudgeStarts(run, truth));
+  const RunRow row = MakeRunRow({}, run, EvaluateRun(run, truth, {}), JudgeStarts(run, truth, {}));
   EXPECT_THAT(row.ate_m, Optional(DoubleNear(0, 1e-9)));
   EXPECT_THAT(row.rotation_deg, Optional(DoubleNear(0, 1e-6)));
   EXPECT_EQ(row.maps, 2);
