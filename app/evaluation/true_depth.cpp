@@ -89,7 +89,7 @@ struct PixelResidual {
                         turned.z() + inverse_depth[0] * t.z()};
     T seen[3];
     ceres::AngleAxisRotatePoint(turn, point, seen);
-    if (seen[2] < T(1e-3)) return false;
+    if (seen[2] < T(1e-2)) seen[2] = T(1e-2);  // beside or behind the camera: a large residual
     residual[0] = weight * (seen[0] / seen[2] - ray.x());
     residual[1] = weight * (seen[1] / seen[2] - ray.y());
     return true;
@@ -165,8 +165,9 @@ class Triangulation {
     if (!first_[i]) return;
     const std::optional<double> start = LinearInverseDepth(*first_[i], i, images_);
     if (!start) return;
-    constexpr double kFar = 1e-3;  // a kilometre: so that what is behind by its noise begins in front
-    inverse_depths_[i] = std::max(kFar, *start);
+    // From a kilometre to half a metre: one image with next to no baseline may say anything, and from too
+    // near there is no way back.
+    inverse_depths_[i] = std::clamp(*start, 1e-3, 2.0);
     for (std::size_t j = 0; j < images_.size(); ++j) {
       if (!images_[j].rays[i]) continue;
       problem->AddResidualBlock(new ceres::AutoDiffCostFunction<PixelResidual, 2, 3, 1>(new PixelResidual{
