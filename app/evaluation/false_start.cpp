@@ -93,19 +93,20 @@ DepthComparison CompareDepths(const StartRecord& start, const TrueDepthSource& t
   DepthComparison comparison;
   if (!true_depths) return comparison;
   const TrueDepths depths = true_depths(start);
-  std::vector<std::pair<double, double>> known;  // standard deviation and value of the inverse scale
+  std::vector<std::size_t> known;
   for (std::size_t i = 0; i < start.points.size() && i < depths.size(); ++i) {
-    const double told = start.points[i].depth;
-    if (depths[i] && told > 0) known.emplace_back(depths[i]->sigma * told, depths[i]->inverse * told);
+    if (depths[i] && start.points[i].depth > 0) known.push_back(i);
   }
   comparison.points = static_cast<int>(known.size());
   if (known.size() < options.least_points) return comparison;
-  std::sort(known.begin(), known.end());
+  // Not by what the map told of them, which may be false.
+  std::stable_sort(known.begin(), known.end(),
+                   [&depths](std::size_t a, std::size_t b) { return depths[a]->sigma < depths[b]->sigma; });
   known.resize(std::max(options.least_points, known.size() / 2));
   std::vector<double> sigmas, values, errors;
-  for (const auto& [sigma, value] : known) {
-    sigmas.push_back(sigma);
-    values.push_back(value);
+  for (const std::size_t i : known) {
+    sigmas.push_back(depths[i]->sigma * start.points[i].depth);
+    values.push_back(depths[i]->inverse * start.points[i].depth);
   }
   comparison.inverse = Median(values);
   comparison.sigma = Median(std::move(sigmas));
