@@ -27,8 +27,8 @@ struct CameraFaults {
   double exposure_jump_stops = 0;  // largest jump of the exposure (ExposureJumps); one stop doubles it
   double gain_noise_sigma = 0;  // standard deviation of the noise of a signal of 128 grey levels at gain 1;
                                 // its variance grows with the signal and the gain (photon noise, EMVA 1288)
-  double dropped_share = 0;  // of the frames that are lost on the way (KeptFrames), [0, 0.9]
-  double tremor_deg = 0;     // root mean square rotation of the hand's tremor about each axis (Tremor)
+  double dropped_share = 0;     // of the frames that are lost on the way (KeptFrames), [0, 0.9]
+  double tremor_deg = 0;        // root mean square rotation of the hand's tremor about each axis (Tremor)
 
   // A sentence that says what is wrong with these faults, or empty.
   std::optional<std::string> Validate(double frame_rate_hz) const;
