@@ -16,8 +16,8 @@ class SimulatedSource : public FrameSource {
     info_.name = simulation_->name();
     info_.frame_count = static_cast<std::uint64_t>(simulation_->frame_count());
     info_.nominal_fps = simulation_->options().frame_rate_hz;
-    info_.known_camera = simulation_->camera();
-    if (simulation_->name() == "head") SetHead(std::make_unique<SimulatedHead>());
+    info_.known_camera = simulation_->calibration();
+    if (simulation_->scene_name() == "head") SetHead(std::make_unique<SimulatedHead>());
   }
 
   bool NextLate(engine::Frame* frame) override {
@@ -33,7 +33,7 @@ class SimulatedSource : public FrameSource {
     frame->time = simulation_->time(index_);
     if (head() != nullptr) {
       const engine::Rigid3 turn(CarrierFromCamera(head()->At(frame->time)), Eigen::Vector3d::Zero());
-      simulation_->RenderFrom(simulation_->world_from_camera(index_) * turn, index_, &picture);
+      simulation_->RenderTurned(index_, turn, &picture);
     } else {
       simulation_->Render(index_, &picture);
     }

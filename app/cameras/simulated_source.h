@@ -9,8 +9,8 @@
 
 namespace docent::app {
 
-// The simulator as a camera: `scene` is what follows "sim:". The source knows its lens. Throws Error for an
-// unknown scene.
+// The simulator as a camera: `scene` is what follows "sim:", as MakeSimulation takes it. The source comes
+// with the simulation's calibration. Throws Error for an unknown scene or option.
 std::unique_ptr<FrameSource> OpenSimulation(const std::string& scene, const CameraOptions& options = {});
 
 // The same over a simulation that somebody else asks for the truth.

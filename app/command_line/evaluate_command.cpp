@@ -64,7 +64,10 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
       "docent evaluate kitchen room --output report --pace lockstep");
   const auto options = std::make_shared<EvaluateOptions>();
   const auto pace = std::make_shared<std::optional<Pace>>();
-  command->add_option("SEQUENCE", options->sequences, "Folders with image sequences, or sim:SCENE")
+  command
+      ->add_option(
+          "SEQUENCE", options->sequences,
+          "Folders with image sequences, or sim:SCENE[,OPTION=NUMBER...] (see docent simulate --help)")
       ->required();
   command->add_option("--output", options->output, "Folder for report.json, report.html and each run's files")
       ->required()

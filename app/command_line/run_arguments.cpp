@@ -108,9 +108,9 @@ void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens) {
 
 void AddRunArguments(CLI::App* command, RunArguments* run) {
   command
-      ->add_option(
-          "--camera", run->cameras.sources,
-          "A device, a video file, a folder with an image sequence, or sim:SCENE; twice for the wearable")
+      ->add_option("--camera", run->cameras.sources,
+                   "A device, a video file, a folder with an image sequence, or sim:SCENE[,OPTION=NUMBER...] "
+                   "(see docent simulate --help); twice for the wearable")
       ->required()
       ->type_name("SOURCE")
       ->allow_extra_args(false);

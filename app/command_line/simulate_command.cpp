@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <cctype>
 #include <cstdio>
 #include <memory>
+#include <string>
 
 #include "app/command_line/program.h"
 #include "app/command_line/progress.h"
 #include "app/command_line/run_arguments.h"
+#include "app/simulator/named_options.h"
 #include "app/simulator/simulation.h"
 #include "app/simulator/write_sequence.h"
+#include "engine/base/error.h"
 
 namespace docent::app {
 
@@ -31,29 +35,40 @@ void Simulate(const SimulateOptions& options, Verbosity verbosity) {
   }
 }
 
+void AddNamedOption(CLI::App* command, const NamedOption& option, SimulationOptions* options) {
+  const std::string dashed = "--" + std::string(option.name);
+  std::string meaning = option.meaning;
+  meaning[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(meaning[0])));
+  const auto set = [dashed, &option, options](std::string_view text) {
+    try {
+      SetNamedOption(option, text, options);
+    } catch (const Error& error) {
+      throw CLI::ValidationError(dashed, error.what());
+    }
+  };
+  if (option.unit == nullptr) {
+    command->add_flag_callback(
+        dashed, [set] { set(""); }, meaning);
+    return;
+  }
+  command->add_option_function<std::string>(dashed, set, meaning)->type_name(option.unit);
+}
+
 }  // namespace
 
 void AddSimulateCommand(CLI::App* program, Invocation* invocation) {
-  CLI::App* command =
-      AddSubcommand(program, "simulate",
-                    "Write a simulated sequence with its truth, in TUM layout. Scenes:\n" + ListOfScenes(),
-                    "docent simulate museum --output museum --duration 20");
+  CLI::App* command = AddSubcommand(
+      program, "simulate",
+      "Write a simulated sequence with its truth, in TUM layout. The options may also follow the "
+      "scene after commas, as in sim:room,rolling-shutter=20,interlaced. Scenes:\n" +
+          ListOfScenes(),
+      "docent simulate museum --output museum --duration 20\n"
+      "  docent simulate room --output room --rolling-shutter 25 --focal-error 1 --tremor 0.1");
   const auto options = std::make_shared<SimulateOptions>();
   command->add_option("SCENE", options->scene, "Name of the scene, such as room or cylinder:10")->required();
   command->add_option("--output", options->output, "Folder to write to; new or empty")->required();
-  SimulationOptions& simulation = options->simulation;
-  command->add_option("--duration", simulation.duration_s, "Seconds at most; 0 for the whole way")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--fps", simulation.frame_rate_hz, "Pictures a second")->check(CLI::PositiveNumber);
-  command->add_option("--noise", simulation.noise_sigma, "Noise, grey levels of 255")
-      ->check(CLI::NonNegativeNumber);
-  command
-      ->add_option("--blur", simulation.blur_samples,
-                   "Pictures averaged over an exposure; 1 for no motion blur")
-      ->check(CLI::Range(1, 64));
-  command->add_flag("--identical-places", simulation.identical_places,
-                    "Make all bays and desks look the same");
-  AddSeedOption(command, &simulation.seed);
+  for (const NamedOption& option : NamedOptions()) AddNamedOption(command, option, &options->simulation);
+  AddSeedOption(command, &options->simulation.seed);
   command->callback(
       [=] { invocation->run = [options, invocation] { Simulate(*options, invocation->verbosity); }; });
 }

@@ -11,6 +11,8 @@ namespace docent::app {
 namespace {
 
 constexpr std::size_t kNoiseCount = std::size_t{1} << 17;
+// Signals that are clipped anyway share the noise of this one, in grey levels.
+constexpr int kBrightestSignal = 1023;
 
 }  // namespace
 
@@ -30,13 +32,14 @@ Sensor::Sensor(const Options& options) : options_(options) {
       }
     }
   }
-  if (options.noise_sigma > 0) {
+  if (options.noise_sigma > 0 || options.gain_noise_sigma > 0) {
+    const double sigma = options.gain_noise_sigma > 0 ? 1 : options.noise_sigma;
     noise_q12_.resize(kNoiseCount);
     for (std::int32_t& noise : noise_q12_) {
       // A sum of twelve uniform numbers is normal enough, and the same with every mathematics library.
       double sum = -6;
       for (int i = 0; i < 12; ++i) sum += random.Uniform();
-      noise = static_cast<std::int32_t>(std::lround(sum * options.noise_sigma * 4096));
+      noise = static_cast<std::int32_t>(std::lround(sum * sigma * 4096));
     }
   }
 }
@@ -45,12 +48,28 @@ double Sensor::Gain(double time_s) const {
   const double turn = 2 * std::numbers::pi;
   const double wandering =
       std::sin(turn * 0.07 * time_s + phases_rad_[0]) + 0.5 * std::sin(turn * 0.23 * time_s + phases_rad_[1]);
-  return options_.gain * std::exp(options_.exposure_drift * wandering);
+  return options_.gain * std::exp(options_.exposure_drift * wandering) * options_.exposure_jumps.Gain(time_s);
+}
+
+std::vector<std::int32_t> Sensor::NoiseOfSignals_q12(double gain) const {
+  std::vector<std::int32_t> deviations;
+  if (options_.gain_noise_sigma == 0) return deviations;
+  const double constant = options_.noise_sigma * options_.noise_sigma;
+  const double growth = options_.gain_noise_sigma * options_.gain_noise_sigma * gain / kReferenceSignal;
+  for (int signal = 0; signal <= kBrightestSignal; ++signal)
+    deviations.push_back(
+        static_cast<std::int32_t>(std::lround(4096 * std::sqrt(constant + growth * signal))));
+  return deviations;
 }
 
 void Sensor::Apply(int frame, double time_s, cv::Mat* bgr) const {
-  if (options_.exposure_drift == 0 && options_.gain == 1 && shade_q12_.empty() && noise_q12_.empty()) return;
-  const int gain_q12 = static_cast<int>(std::lround(4096 * Gain(time_s)));
+  if (options_.exposure_drift == 0 && options_.gain == 1 && options_.exposure_jumps.jumps().empty() &&
+      shade_q12_.empty() && noise_q12_.empty()) {
+    return;
+  }
+  const double exposure = Gain(time_s);
+  const int gain_q12 = static_cast<int>(std::lround(4096 * exposure));
+  const std::vector<std::int32_t> deviations_q12 = NoiseOfSignals_q12(exposure);
   Random random(options_.seed ^ (0xD1B54A32D192ED03ull * (static_cast<std::uint64_t>(frame) + 1)));
   const int channels = 3 * bgr->cols;
   const std::vector<std::int32_t> silence(noise_q12_.empty() ? static_cast<std::size_t>(channels) : 0, 0);
@@ -68,6 +87,15 @@ void Sensor::Apply(int frame, double time_s, cv::Mat* bgr) const {
       noise = noise_q12_.data() + random.Below(static_cast<std::uint32_t>(kNoiseCount - channels));
     }
     uchar* row = bgr->ptr<uchar>(y);
+    if (!deviations_q12.empty()) {
+      for (int i = 0; i < channels; ++i) {
+        const int signal_q12 = row[i] * gains[i];
+        const std::int64_t deviation_q12 = deviations_q12[std::min(signal_q12 >> 12, kBrightestSignal)];
+        const int noise_of_signal_q12 = static_cast<int>((noise[i] * deviation_q12) >> 12);
+        row[i] = static_cast<uchar>(std::clamp((signal_q12 + noise_of_signal_q12 + 2048) >> 12, 0, 255));
+      }
+      continue;
+    }
     for (int i = 0; i < channels; ++i) {
       row[i] = static_cast<uchar>(std::clamp((row[i] * gains[i] + noise[i] + 2048) >> 12, 0, 255));
     }

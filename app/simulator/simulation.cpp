@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/simulator/simulation.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <sstream>
 #include <utility>
 
+#include "app/simulator/calibration_error.h"
+#include "app/simulator/frame_drops.h"
+#include "app/simulator/named_options.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -13,6 +17,33 @@ namespace {
 
 constexpr int kLargestSide_px = 8192;
 constexpr double kLongestDuration_s = 86400;
+
+// Parts of a camera that draw from the seed each for themselves.
+enum class SeedOf : std::uint64_t { kSensor, kExposureJumps, kFrameDrops, kTremor };
+
+std::uint64_t MixedSeed(const SimulationOptions& options, const Scene& scene, SeedOf part) {
+  return options.seed + 0x9E3779B97F4A7C15ull * scene.sensor_number +
+         0xBF58476D1CE4E5B9ull * static_cast<std::uint64_t>(part);
+}
+
+double DurationOf(const Scene& scene, const SimulationOptions& options) {
+  const double whole_s = scene.trajectory.duration_s();
+  return options.duration_s > 0 ? std::min(whole_s, options.duration_s) : whole_s;
+}
+
+Sensor::Options SensorOf(const Scene& scene, const SimulationOptions& options, cv::Size size) {
+  Sensor::Options sensor;
+  sensor.size = size;
+  sensor.vignetting = options.vignetting;
+  sensor.exposure_drift = options.exposure_drift;
+  sensor.noise_sigma = options.noise_sigma;
+  sensor.seed = MixedSeed(options, scene, SeedOf::kSensor);
+  sensor.gain = scene.sensor_gain * options.faults.gain;
+  sensor.gain_noise_sigma = options.faults.gain_noise_sigma;
+  sensor.exposure_jumps = ExposureJumps(options.faults.exposure_jump_stops, DurationOf(scene, options),
+                                        MixedSeed(options, scene, SeedOf::kExposureJumps));
+  return sensor;
+}
 
 engine::CameraModel CameraOf(const Scene& scene, const SimulationOptions& options) {
   if (options.camera) return *options.camera;
@@ -60,7 +91,7 @@ std::optional<std::string> SimulationOptions::Validate() const {
   if (camera && (camera->width_px() > kLargestSide_px || camera->height_px() > kLargestSide_px)) {
     return "The picture of a simulation has at most 8192 pixels along a side.";
   }
-  return std::nullopt;
+  return faults.Validate(frame_rate_hz);
 }
 
 SimulationOptions SimulationOptions::Clean() {
@@ -87,25 +118,49 @@ Simulation::Simulation(const std::string& name, Scene scene, const SimulationOpt
       options_(options),
       scene_(std::move(scene)),
       camera_(CameraOf(scene_, options)),
+      calibration_(WrongCalibration(camera_, options.faults.focal_error, options.faults.distortion_error_px)),
       renderer_(&scene_.surfaces, camera_),
-      sensor_({{camera_.width_px(), camera_.height_px()},
-               options.vignetting,
-               options.exposure_drift,
-               options.noise_sigma,
-               options.seed + 0x9E3779B97F4A7C15ull * scene_.sensor_number,
-               scene_.sensor_gain}) {
-  double duration_s = scene_.trajectory.duration_s();
-  if (options.duration_s > 0) duration_s = std::min(duration_s, options.duration_s);
+      duration_s_(DurationOf(scene_, options)),
+      sensor_(SensorOf(scene_, options, {camera_.width_px(), camera_.height_px()})),
+      tremor_(options.faults.tremor_deg, MixedSeed(options, scene_, SeedOf::kTremor)) {
   // The last frame is not lost to the rounding of the product.
-  frame_count_ = static_cast<int>(std::floor(duration_s * options.frame_rate_hz + 1e-6)) + 1;
+  const int count = static_cast<int>(std::floor(duration_s_ * options.frame_rate_hz + 1e-6)) + 1;
+  exposures_ =
+      KeptFrames(count, options.faults.dropped_share, MixedSeed(options, scene_, SeedOf::kFrameDrops));
 }
 
 Timestamp Simulation::time(int frame) const {
-  return FromSeconds(frame / options_.frame_rate_hz);
+  return FromSeconds(exposures_[static_cast<std::size_t>(frame)] / options_.frame_rate_hz);
 }
 
 engine::Rigid3 Simulation::PoseAt(double time_s) const {
-  return scene_.trajectory.WorldFromCamera(time_s) * scene_.carrier_from_camera;
+  const engine::Rigid3 steady = scene_.trajectory.WorldFromCamera(time_s) * scene_.carrier_from_camera;
+  return tremor_.is_still() ? steady : steady * tremor_.SteadyFromTrembling(time_s);
+}
+
+double Simulation::RowOffset_s(double row) const {
+  const CameraFaults& faults = options_.faults;
+  const double height = camera_.height_px();
+  const bool is_odd = std::lround(row) % 2 != 0;
+  const double field_s = faults.interlaced && is_odd ? 0.5 / options_.frame_rate_hz : 0;
+  return faults.readout_s * ((row + 0.5) / height - 0.5) + field_s;
+}
+
+void Simulation::RenderLight(double time_s, const std::optional<engine::Rigid3>& camera_from_turned,
+                             cv::Mat* bgr) const {
+  const auto pose_at = [&](double row_time_s) {
+    const engine::Rigid3 pose = PoseAt(row_time_s);
+    return (camera_from_turned ? pose * *camera_from_turned : pose).inverse();
+  };
+  if (!rows_differ()) {
+    renderer_.Render(pose_at(time_s), bgr);
+    return;
+  }
+  std::vector<engine::Rigid3> camera_from_world;
+  for (int row = 0; row < camera_.height_px(); ++row) {
+    camera_from_world.push_back(pose_at(time_s + RowOffset_s(row)));
+  }
+  renderer_.RenderRows(camera_from_world, bgr);
 }
 
 engine::Rigid3 Simulation::world_from_camera(int frame) const {
@@ -116,16 +171,17 @@ const std::string& Simulation::label(int frame) const {
   return scene_.trajectory.LabelAt(ToSeconds(time(frame)));
 }
 
-void Simulation::Render(int frame, cv::Mat* bgr) const {
+void Simulation::RenderTurned(int frame, const std::optional<engine::Rigid3>& camera_from_turned,
+                              cv::Mat* bgr) const {
   const double time_s = ToSeconds(time(frame));
   if (options_.blur_samples == 1) {
-    renderer_.Render(PoseAt(time_s).inverse(), bgr);
+    RenderLight(time_s, camera_from_turned, bgr);
   } else {
     const int samples = options_.blur_samples;
     cv::Mat sum, sample, wide;
     for (int i = 0; i < samples; ++i) {
       const double offset_s = options_.exposure_s * ((i + 0.5) / samples - 0.5);
-      renderer_.Render(PoseAt(time_s + offset_s).inverse(), &sample);
+      RenderLight(time_s + offset_s, camera_from_turned, &sample);
       sample.convertTo(wide, CV_16UC3);
       if (i == 0) {
         sum = wide.clone();
@@ -135,16 +191,17 @@ void Simulation::Render(int frame, cv::Mat* bgr) const {
     }
     sum.convertTo(*bgr, CV_8UC3, 1.0 / samples);
   }
-  sensor_.Apply(frame, time_s, bgr);
+  sensor_.Apply(exposures_[static_cast<std::size_t>(frame)], time_s, bgr);
 }
 
 void Simulation::RenderFrom(const engine::Rigid3& world_from_camera, int frame, cv::Mat* bgr) const {
   renderer_.Render(world_from_camera.inverse(), bgr);
-  sensor_.Apply(frame, ToSeconds(time(frame)), bgr);
+  sensor_.Apply(exposures_[static_cast<std::size_t>(frame)], ToSeconds(time(frame)), bgr);
 }
 
 std::optional<Eigen::Vector3d> Simulation::SurfaceAt(int frame, const Eigen::Vector2d& pixel) const {
-  return SurfaceAlong(world_from_camera(frame), pixel);
+  if (!rows_differ()) return SurfaceAlong(world_from_camera(frame), pixel);
+  return SurfaceAlong(PoseAt(ToSeconds(time(frame)) + RowOffset_s(pixel.y())), pixel);
 }
 
 std::optional<Eigen::Vector3d> Simulation::SurfaceAlong(const engine::Rigid3& world_from_camera,
@@ -166,14 +223,17 @@ bool Simulation::IsVisible(int frame, const Eigen::Vector3d& point_in_world) con
   return !hit || hit->distance > way.norm() - 0.01;
 }
 
-std::unique_ptr<Simulation> MakeSimulation(const std::string& scene_spec, const SimulationOptions& options) {
-  if (const auto fault = options.Validate()) throw Error(*fault);
-  const std::size_t colon = scene_spec.find(':');
-  const SceneRecipe& recipe = RecipeOf(scene_spec.substr(0, colon));
+std::unique_ptr<Simulation> MakeSimulation(const std::string& scene_spec, const SimulationOptions& defaults) {
+  SimulationOptions options = defaults;
+  const std::size_t comma = std::min(scene_spec.find(','), scene_spec.size());
+  const std::string scene = scene_spec.substr(0, comma);
+  const std::size_t colon = scene.find(':');
+  const SceneRecipe& recipe = RecipeOf(scene.substr(0, colon));
   SceneRequest request;
-  request.parameter = colon == std::string::npos
-                          ? recipe.default_parameter
-                          : ParameterOf(recipe, scene_spec, scene_spec.substr(colon + 1));
+  request.parameter = colon == std::string::npos ? recipe.default_parameter
+                                                 : ParameterOf(recipe, scene, scene.substr(colon + 1));
+  if (comma < scene_spec.size()) SetNamedOptions(std::string_view(scene_spec).substr(comma + 1), &options);
+  if (const auto fault = options.Validate()) throw Error(*fault);
   request.seed = options.seed;
   request.identical_places = options.identical_places;
   return std::make_unique<Simulation>(scene_spec, recipe.build(request), options);

@@ -85,7 +85,11 @@ std::vector<SurfaceRenderer::Facet> SurfaceRenderer::FacetsFrom(
     const Eigen::Vector3d half_u = rotation * rectangle.half_u, half_v = rotation * rectangle.half_v;
     const Eigen::Vector3d normal = half_u.cross(half_v).normalized();
     const double plane_distance = normal.dot(center);
-    if (std::abs(plane_distance) < 1e-6) continue;  // seen exactly from the side: a line without area
+    if (std::abs(plane_distance) < 1e-6) {  // seen exactly from the side: a line without area
+      facets.push_back({Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()});
+      facets.back().rectangle = static_cast<int>(i);
+      continue;
+    }
     const Eigen::Vector3d u_axis = half_u / half_u.squaredNorm(), v_axis = half_v / half_v.squaredNorm();
     const Eigen::Vector3d w = normal / plane_distance;
     const Texture& texture = surfaces_->textures()[rectangle.texture];
@@ -140,25 +144,26 @@ void SurfaceRenderer::CandidatesOf(const std::vector<Facet>& facets, const std::
   std::erase_if(*candidates, [&](const Candidate& candidate) { return candidate.nearest < covered_from; });
 }
 
+template <int kCount>
 void SurfaceRenderer::Trace(const std::vector<Facet>& facets, const std::vector<Candidate>& candidates,
-                            const Rays& rays, std::array<int, kTilePixels>* nearest) const {
+                            const Rays& rays, int first_pixel, int* nearest) {
   // Local arrays of fixed size and no branches: the compiler turns the loop into vector code.
-  float best[kTilePixels];
-  int best_index[kTilePixels];
-  for (int i = 0; i < kTilePixels; ++i) {
+  float best[kCount];
+  int best_index[kCount];
+  for (int i = 0; i < kCount; ++i) {
     best[i] = 0;
     best_index[i] = kNothing;
   }
-  const float* x = rays.x.data();
-  const float* y = rays.y.data();
-  const float* z = rays.z.data();
+  const float* x = rays.x.data() + first_pixel;
+  const float* y = rays.y.data() + first_pixel;
+  const float* z = rays.z.data() + first_pixel;
   for (const Candidate& candidate : candidates) {
     const Facet& facet = facets[candidate.facet];
     const float ux = facet.u.x(), uy = facet.u.y(), uz = facet.u.z();
     const float vx = facet.v.x(), vy = facet.v.y(), vz = facet.v.z();
     const float wx = facet.w.x(), wy = facet.w.y(), wz = facet.w.z();
     const int index = candidate.facet;
-    for (int i = 0; i < kTilePixels; ++i) {
+    for (int i = 0; i < kCount; ++i) {
       const float u = ux * x[i] + uy * y[i] + uz * z[i];
       const float v = vx * x[i] + vy * y[i] + vz * z[i];
       const float w = wx * x[i] + wy * y[i] + wz * z[i];
@@ -168,7 +173,7 @@ void SurfaceRenderer::Trace(const std::vector<Facet>& facets, const std::vector<
       best_index[i] = hit ? index : best_index[i];
     }
   }
-  std::copy(best_index, best_index + kTilePixels, nearest->begin());
+  std::copy(best_index, best_index + kCount, nearest);
 }
 
 int SurfaceRenderer::TraceOne(const std::vector<Facet>& facets, const std::vector<Candidate>& candidates,
@@ -213,7 +218,7 @@ bool SurfaceRenderer::IsEdge(const cv::Mat& nearest, int x, int y) const {
          above[x] != index || below[x] != index;
 }
 
-void SurfaceRenderer::ShadeTile(const std::vector<Facet>& facets, const std::vector<Candidate>& candidates,
+void SurfaceRenderer::ShadeTile(const FacetsOfRow& facets_of_row, const std::vector<Candidate>& candidates,
                                 const cv::Mat& nearest, int tile_x, int tile_y, cv::Mat* bgr) const {
   static constexpr float kOffsets[4][2] = {
       {-0.125f, -0.375f}, {0.375f, -0.125f}, {0.125f, 0.375f}, {-0.375f, 0.125f}};
@@ -225,6 +230,7 @@ void SurfaceRenderer::ShadeTile(const std::vector<Facet>& facets, const std::vec
             columns = std::min(kTile, width_px_ - tile_x * kTile);
   for (int row = 0; row < rows; ++row) {
     const int y = tile_y * kTile + row;
+    const std::vector<Facet>& facets = *facets_of_row[row];
     cv::Vec3b* out = bgr->ptr<cv::Vec3b>(y) + tile_x * kTile;
     for (int column = 0; column < columns; ++column) {
       const int i = row * kTile + column, x = tile_x * kTile + column;
@@ -251,6 +257,16 @@ void SurfaceRenderer::ShadeTile(const std::vector<Facet>& facets, const std::vec
   }
 }
 
+void SurfaceRenderer::StoreTile(const std::array<int, kTilePixels>& tile_nearest, int tile_x, int tile_y,
+                                cv::Mat* nearest) const {
+  const int rows = std::min(kTile, height_px_ - tile_y * kTile);
+  const int columns = std::min(kTile, width_px_ - tile_x * kTile);
+  for (int row = 0; row < rows; ++row) {
+    std::copy_n(tile_nearest.begin() + row * kTile, columns,
+                nearest->ptr<int>(tile_y * kTile + row) + tile_x * kTile);
+  }
+}
+
 void SurfaceRenderer::Render(const engine::Rigid3& camera_from_world, cv::Mat* bgr) const {
   const std::vector<Facet> facets = FacetsFrom(camera_from_world);
   std::vector<std::vector<int>> groups(group_cones_.size());
@@ -267,19 +283,72 @@ void SurfaceRenderer::Render(const engine::Rigid3& camera_from_world, cv::Mat* b
       const int tile = tile_y * tiles_x_ + tile_x;
       const std::vector<int>& group = groups[(tile_y / kGroup) * groups_x_ + tile_x / kGroup];
       CandidatesOf(facets, group, tile_cones_[tile], &candidates[tile]);
-      Trace(facets, candidates[tile], rays_[tile], &tile_nearest);
-      const int rows = std::min(kTile, height_px_ - tile_y * kTile);
-      const int columns = std::min(kTile, width_px_ - tile_x * kTile);
+      Trace<kTilePixels>(facets, candidates[tile], rays_[tile], 0, tile_nearest.data());
+      StoreTile(tile_nearest, tile_x, tile_y, &nearest);
+    }
+  }
+  bgr->create(height_px_, width_px_, CV_8UC3);
+  FacetsOfRow facets_of_row;
+  facets_of_row.fill(&facets);
+  for (int tile_y = 0; tile_y < tiles_y_; ++tile_y) {
+    for (int tile_x = 0; tile_x < tiles_x_; ++tile_x) {
+      ShadeTile(facets_of_row, candidates[tile_y * tiles_x_ + tile_x], nearest, tile_x, tile_y, bgr);
+    }
+  }
+}
+
+void SurfaceRenderer::CandidatesOfRows(std::span<const std::vector<Facet>> row_facets, int tile_x, int tile_y,
+                                       std::vector<Candidate>* candidates) const {
+  const int last = std::min(kTile, height_px_ - tile_y * kTile) - 1;
+  const int tile = tile_y * tiles_x_ + tile_x;
+  const Cone& group_cone = group_cones_[(tile_y / kGroup) * groups_x_ + tile_x / kGroup];
+  std::vector<int> group;
+  std::vector<Candidate> of_row;
+  candidates->clear();
+  // Between these rows a facet moves evenly, and interlaced rows of either parity are a case of their own.
+  for (const int row : {0, std::min(1, last), std::max(0, last - 1), last}) {
+    const std::vector<Facet>& facets = row_facets[row];
+    group.clear();
+    for (int i = 0; i < static_cast<int>(facets.size()); ++i) {
+      if (MayShow(facets[i], group_cone)) group.push_back(i);
+    }
+    CandidatesOf(facets, group, tile_cones_[tile], &of_row);
+    candidates->insert(candidates->end(), of_row.begin(), of_row.end());
+  }
+  // The order decides between surfaces that coincide: it is that of Render.
+  std::sort(candidates->begin(), candidates->end(),
+            [](const Candidate& a, const Candidate& b) { return a.facet < b.facet; });
+  candidates->erase(std::unique(candidates->begin(), candidates->end(),
+                                [](const Candidate& a, const Candidate& b) { return a.facet == b.facet; }),
+                    candidates->end());
+}
+
+void SurfaceRenderer::RenderRows(std::span<const engine::Rigid3> camera_from_world, cv::Mat* bgr) const {
+  std::vector<std::vector<Facet>> facets;
+  for (const engine::Rigid3& pose : camera_from_world) facets.push_back(FacetsFrom(pose));
+  cv::Mat nearest(height_px_, width_px_, CV_32SC1);
+  std::vector<std::vector<Candidate>> candidates(rays_.size());
+  std::array<int, kTilePixels> tile_nearest;
+  for (int tile_y = 0; tile_y < tiles_y_; ++tile_y) {
+    const int rows = std::min(kTile, height_px_ - tile_y * kTile);
+    const std::span row_facets(facets.data() + tile_y * kTile, static_cast<std::size_t>(rows));
+    for (int tile_x = 0; tile_x < tiles_x_; ++tile_x) {
+      const int tile = tile_y * tiles_x_ + tile_x;
+      CandidatesOfRows(row_facets, tile_x, tile_y, &candidates[tile]);
       for (int row = 0; row < rows; ++row) {
-        std::copy_n(tile_nearest.begin() + row * kTile, columns,
-                    nearest.ptr<int>(tile_y * kTile + row) + tile_x * kTile);
+        Trace<kTile>(row_facets[row], candidates[tile], rays_[tile], row * kTile,
+                     tile_nearest.data() + row * kTile);
       }
+      StoreTile(tile_nearest, tile_x, tile_y, &nearest);
     }
   }
   bgr->create(height_px_, width_px_, CV_8UC3);
   for (int tile_y = 0; tile_y < tiles_y_; ++tile_y) {
+    FacetsOfRow facets_of_row{};
+    for (int row = 0; row < std::min(kTile, height_px_ - tile_y * kTile); ++row)
+      facets_of_row[row] = &facets[tile_y * kTile + row];
     for (int tile_x = 0; tile_x < tiles_x_; ++tile_x) {
-      ShadeTile(facets, candidates[tile_y * tiles_x_ + tile_x], nearest, tile_x, tile_y, bgr);
+      ShadeTile(facets_of_row, candidates[tile_y * tiles_x_ + tile_x], nearest, tile_x, tile_y, bgr);
     }
   }
 }

@@ -3,6 +3,7 @@
 
 #include <system_error>
 
+#include "app/calibration/calibration_file.h"
 #include "app/output/sequence_writer.h"
 #include "engine/base/error.h"
 
@@ -46,7 +47,9 @@ void WriteSequence(const Simulation& simulation, const std::filesystem::path& fo
                    const std::function<void(int written, int total)>& progress) {
   const bool existed = ExistsEmpty(folder);
   try {
-    SequenceWriter writer(folder, simulation.camera(), PictureFormat::kPng);
+    SequenceWriter writer(folder, simulation.calibration(), PictureFormat::kPng);
+    if (!(simulation.calibration() == simulation.camera()))
+      WriteCalibration(folder / "true_calibration.yaml", simulation.camera());
     for (int frame = 0; frame < simulation.frame_count(); ++frame) {
       SequencePicture picture;
       picture.time = simulation.time(frame);

@@ -81,6 +81,16 @@ TEST_F(WriteSequenceTest, WritesPicturesTruthLensAndLabels) {
   }
 }
 
+TEST_F(WriteSequenceTest, WritesAWrongCalibrationAndBesideItTheTrueLens) {
+  WriteSequence(*simulation_, folder_ / "right");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "right" / "true_calibration.yaml"));
+  const auto wrong = MakeSimulation("museum:1,focal-error=2,distortion-error=1,duration=0.1");
+  WriteSequence(*wrong, folder_ / "wrong");
+  EXPECT_EQ(ReadCalibration(folder_ / "wrong" / "calibration.yaml"), wrong->calibration());
+  EXPECT_EQ(ReadCalibration(folder_ / "wrong" / "true_calibration.yaml"), wrong->camera());
+  EXPECT_EQ(FindCalibration(folder_ / "wrong"), folder_ / "wrong" / "calibration.yaml");
+}
+
 TEST_F(WriteSequenceTest, UsesAnEmptyFolderButNeverOneWithSomethingInIt) {
   std::filesystem::create_directories(folder_);
   std::ofstream(folder_ / "mine.txt") << "keep";

@@ -55,8 +55,9 @@ inline SessionOptions Options(Pace pace, const std::string& first_map) {
   return options;
 }
 
+// The lens as the simulation's calibration describes it.
 inline std::vector<std::shared_ptr<const engine::CameraModel>> LensOf(const Simulation& simulation) {
-  return {std::make_shared<engine::CameraModel>(simulation.camera())};
+  return {std::make_shared<engine::CameraModel>(simulation.calibration())};
 }
 
 }  // namespace docent::app::simulated_session

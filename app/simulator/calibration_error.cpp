@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/simulator/calibration_error.h"
+
+#include <array>
+#include <cmath>
+
+#include "engine/base/error.h"
+
+namespace docent::app {
+namespace {
+
+using engine::CameraModel;
+
+constexpr int kGrid = 24;  // rays along a side of the image
+
+CameraModel WithFirstCoefficient(const CameraModel& lens, double value) {
+  std::array<double, 5> distortion = lens.distortion();
+  distortion[0] = value;
+  return {lens.lens(), lens.intrinsics(), distortion};
+}
+
+// The change of the first coefficient that misplaces rays by so many pixels.
+double CoefficientChange(const CameraModel& lens, double distortion_error_px) {
+  const double sign = distortion_error_px < 0 ? -1 : 1, wanted = std::abs(distortion_error_px);
+  const auto misplaced = [&](double change) {
+    const double value = lens.distortion()[0] + sign * change;
+    if (CameraModel::Validate(lens.lens(), lens.intrinsics(), WithFirstCoefficient(lens, value).distortion()))
+      return std::optional<double>();
+    return MisplacementRms(WithFirstCoefficient(lens, value), lens);
+  };
+  // The misplacement grows with the change: bracketed by doubling, then halved.
+  double low = 0, high = 1e-6;
+  for (;; high *= 2) {
+    const auto error = misplaced(high);
+    if (!error || high > 10) {
+      throw Error("No calibration of this lens is wrong by so many pixels of distortion; ask for fewer.");
+    }
+    if (*error >= wanted) break;
+    low = high;
+  }
+  for (int step = 0; step < 60; ++step) {
+    const double middle = 0.5 * (low + high);
+    (misplaced(middle).value_or(wanted) < wanted ? low : high) = middle;
+  }
+  return sign * 0.5 * (low + high);
+}
+
+}  // namespace
+
+std::optional<double> MisplacementRms(const CameraModel& calibration, const CameraModel& lens) {
+  double sum = 0;
+  int count = 0;
+  for (int row = 0; row < kGrid; ++row) {
+    for (int column = 0; column < kGrid; ++column) {
+      const Eigen::Vector2d pixel((column + 0.5) / kGrid * lens.width_px() - 0.5,
+                                  (row + 0.5) / kGrid * lens.height_px() - 0.5);
+      const auto ray = lens.Unproject(pixel);
+      if (!ray) continue;  // outside the circle of a wide lens
+      const auto projected = calibration.Project(*ray);
+      if (!projected) return std::nullopt;
+      sum += (*projected - pixel).squaredNorm();
+      ++count;
+    }
+  }
+  return count > 0 ? std::optional(std::sqrt(sum / count)) : std::nullopt;
+}
+
+CameraModel WrongCalibration(const CameraModel& lens, double focal_error, double distortion_error_px) {
+  CameraModel::Intrinsics intrinsics = lens.intrinsics();
+  std::array<double, 5> distortion = lens.distortion();
+  if (distortion_error_px != 0) distortion[0] += CoefficientChange(lens, distortion_error_px);
+  intrinsics.fx *= 1 + focal_error;
+  intrinsics.fy *= 1 + focal_error;
+  return {lens.lens(), intrinsics, distortion};
+}
+
+}  // namespace docent::app

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/simulator/named_options.h"
+
+#include <cmath>
+#include <set>
+
+#include "app/files/text_file.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+namespace {
+
+using Options = SimulationOptions;
+
+constexpr NamedOption kOptions[] = {
+    {"duration", "SECONDS", "seconds at most; 0 for the whole way", 0, 86400,
+     [](double value, Options* options) { options->duration_s = value; }},
+    {"fps", "HZ", "images a second", 0.01, 1000,
+     [](double value, Options* options) { options->frame_rate_hz = value; }},
+    {"noise", "LEVELS", "noise that is the same everywhere, grey levels of 255", 0, 100,
+     [](double value, Options* options) { options->noise_sigma = value; }},
+    {"gain-noise", "LEVELS", "noise that grows with signal and gain: grey levels at a signal of 128", 0, 50,
+     [](double value, Options* options) { options->faults.gain_noise_sigma = value; }},
+    {"blur", "N", "renderings averaged over an exposure; 1 for no motion blur", 1, 64,
+     [](double value, Options* options) { options->blur_samples = static_cast<int>(value); }, true},
+    {"exposure", "MS", "time of an exposure, milliseconds; matters with blur", 0, 1000,
+     [](double value, Options* options) { options->exposure_s = value / 1000; }},
+    {"rolling-shutter", "MS", "time from the exposure of the first row to that of the last, milliseconds", 0,
+     1000, [](double value, Options* options) { options->faults.readout_s = value / 1000; }},
+    {"interlaced", nullptr, "expose the odd rows half a frame after the even ones", 0, 1,
+     [](double value, Options* options) { options->faults.interlaced = value != 0; }},
+    {"focal-error", "PERCENT", "the calibration's focal length is too long by so much", -50, 100,
+     [](double value, Options* options) { options->faults.focal_error = value / 100; }},
+    {"distortion-error", "PIXELS",
+     "the calibration's distortion misplaces rays by so much, as root mean square over the image", -20, 20,
+     [](double value, Options* options) { options->faults.distortion_error_px = value; }},
+    {"gain", "FACTOR", "of the exposure; above 1 highlights are clipped", 0.05, 20,
+     [](double value, Options* options) { options->faults.gain = value; }},
+    {"exposure-jumps", "STOPS", "largest jump of the exposure, at random times, with recovery", 0, 4,
+     [](double value, Options* options) { options->faults.exposure_jump_stops = value; }},
+    {"drops", "PERCENT", "share of the frames that are lost, alone and in bursts", 0, 90,
+     [](double value, Options* options) { options->faults.dropped_share = value / 100; }},
+    {"tremor", "DEGREES", "root mean square rotation of a hand's tremor of 4 to 12 Hz about each axis", 0, 5,
+     [](double value, Options* options) { options->faults.tremor_deg = value; }},
+    {"identical-places", nullptr, "make all bays and desks look the same", 0, 1,
+     [](double value, Options* options) { options->identical_places = value != 0; }},
+};
+
+std::string Names() {
+  std::string names;
+  for (const NamedOption& option : kOptions) names += (names.empty() ? "" : ", ") + std::string(option.name);
+  return names;
+}
+
+const NamedOption& OptionOf(std::string_view name) {
+  for (const NamedOption& option : kOptions) {
+    if (name == option.name) return option;
+  }
+  throw Error("The simulator has no option '" + std::string(name) + "'; its options are " + Names() + ".");
+}
+
+}  // namespace
+
+std::span<const NamedOption> NamedOptions() {
+  return kOptions;
+}
+
+void SetNamedOption(const NamedOption& option, std::string_view text, SimulationOptions* options) {
+  const std::string name = "The simulator's option '" + std::string(option.name) + "'";
+  if (option.unit == nullptr) {
+    if (!text.empty()) throw Error(name + " takes no number.");
+    option.set(1, options);
+    return;
+  }
+  const auto value = ParseNumber(text);
+  if (!value || !(*value >= option.lowest && *value <= option.highest) ||
+      (option.whole && *value != std::round(*value))) {
+    throw Error(name + " takes a " + (option.whole ? "whole " : "") + "number from " +
+                FormatNumber(option.lowest) + " to " + FormatNumber(option.highest) + ", not '" +
+                std::string(text) + "': " + option.meaning + ".");
+  }
+  option.set(*value, options);
+}
+
+void SetNamedOptions(std::string_view text, SimulationOptions* options) {
+  std::set<std::string_view> taken;
+  for (bool more = true; more;) {
+    const std::size_t comma = text.find(',');
+    const std::string_view word = text.substr(0, comma);
+    more = comma != std::string_view::npos;
+    if (more) text.remove_prefix(comma + 1);
+    const std::size_t equals = word.find('=');
+    const std::string_view name = word.substr(0, equals);
+    const NamedOption& option = OptionOf(name);
+    if (!taken.insert(name).second)
+      throw Error("The simulator's option '" + std::string(name) + "' is given twice.");
+    const bool has_number = equals != std::string_view::npos;
+    if (option.unit != nullptr && !has_number) {
+      throw Error("The simulator's option '" + std::string(name) + "' needs a number: " + std::string(name) +
+                  "=" + option.unit + ".");
+    }
+    if (option.unit == nullptr && has_number)
+      throw Error("The simulator's option '" + std::string(name) + "' takes no number.");
+    SetNamedOption(option, has_number ? word.substr(equals + 1) : std::string_view(), options);
+  }
+}
+
+}  // namespace docent::app
