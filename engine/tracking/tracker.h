@@ -11,6 +11,7 @@
 #include "engine/mapping/keyframe_candidate.h"
 #include "engine/mapping/target_initializer.h"
 #include "engine/recognition/place.h"
+#include "engine/tracking/descriptor_relocalizer.h"
 #include "engine/tracking/frame_inspection.h"
 #include "engine/tracking/keyframe_selection.h"
 #include "engine/tracking/keyframe_selector.h"
@@ -179,6 +180,8 @@ class Tracker {
   // The first different places that resemble it by thumbnail and words, other keyframes than `tried`.
   std::vector<TurnedPlace> PlacesByWords(const PlaceFinder& places,
                                          const std::vector<TurnedPlace>& tried) const;
+  // Where descriptors place the camera, in maps that the words of the image suggest.
+  std::vector<TurnedPlace> PlacesByDescriptors(const PlaceFinder& places);
   std::optional<TurnedPlace> TurnToFit(const PlaceCandidate& candidate) const;
   bool Believable(const MapTrackResult& result) const;
   bool IsTurn(const MapTrackResult& result, const MapSnapshot& map) const;
@@ -239,6 +242,7 @@ class Tracker {
   std::vector<PointReport> new_reports_;  // of the present frame, of points that reports_ did not hold
   std::optional<KeyFrameCandidate> candidate_;
   std::optional<InitialPair> pair_;
+  DescriptorRelocalizer descriptor_relocalizer_;
 };
 
 }  // namespace docent::engine

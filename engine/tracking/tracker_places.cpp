@@ -68,6 +68,25 @@ std::vector<Tracker::TurnedPlace> Tracker::PlacesByWords(const PlaceFinder& plac
   return turned;
 }
 
+std::vector<Tracker::TurnedPlace> Tracker::PlacesByDescriptors(const PlaceFinder& places) {
+  std::vector<TurnedPlace> suggested;
+  // Most keyframes are of one camera: any of them tells the resolution that they were described at.
+  const auto any = places.FindPlaces(features_->small_blurry, 1, 1, map_key_);
+  const KeyFrame* keyframe =
+      !any.empty() && any.front().map ? any.front().map->FindKeyFrame(any.front().keyframe) : nullptr;
+  const DescribedImage image = DescribeAtResolution(
+      *features_, *camera_, keyframe ? keyframe->camera->PixelAngle() : camera_->PixelAngle());
+  if (image.words.empty()) return suggested;
+  PlaceQuery query(features_->small_blurry, image.words);
+  query.places_first = false;
+  const auto found =
+      places.FindPlaces(query, options_.candidates_looked_at, options_.candidates_looked_at, 0);
+  for (const auto& suggestion :
+       descriptor_relocalizer_.Suggest(image.corners, *camera_, found, random_.Next()))
+    suggested.push_back({suggestion.candidate, suggestion.camera_from_map, 0});
+  return suggested;
+}
+
 MapTrackResult Tracker::TryPlace(const TurnedPlace& place, MapTracker* tracker) {
   const PlaceCandidate& candidate = place.candidate;
   const KeyFrame* keyframe = candidate.map->FindKeyFrame(candidate.keyframe);

@@ -225,6 +225,14 @@ void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFram
       found = FindMaps(*places, others, out);
     }
   }
+  if (found.empty() && out->verdict.doubt != Doubt::kLookAlikes) {
+    // No keyframe is near enough to be turned until it fits; descriptors tell the pose from further away.
+    std::vector<TurnedPlace> others = PlacesByDescriptors(*places);
+    if (!others.empty()) {
+      others.insert(others.end(), alike.begin(), alike.end());
+      found = FindMaps(*places, others, out);
+    }
+  }
   if (found.empty()) return;
   const auto key = [&](std::size_t i) { return found[i].place.candidate.map_key; };
   if (found.size() > 1 &&
