@@ -10,8 +10,11 @@
 #include "engine/map/map_snapshot.h"
 
 // How well a visitor who is lost will be found in a map, by place and direction, foretold from the map alone:
-// each keyframe is left out in turn, with all that it alone holds up, and its picture is given to a tracker
-// that is lost in what remains. Pure functions; any thread.
+// each keyframe is left out in turn, with all that it alone holds up, and its image is given to a tracker
+// that is lost in what remains, as often as images have to agree before a pose counts, as a visitor's camera
+// would deliver them. Keyframes are spaced, so that the one that is left out is about as far from the others
+// as a visitor on the author's way can be: the share that is found is a lower bound for such visits. Pure
+// functions; any thread.
 namespace docent::maps {
 
 struct RelocalizationOptions {

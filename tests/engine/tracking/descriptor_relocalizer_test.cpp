@@ -54,7 +54,8 @@ std::shared_ptr<const CameraModel> TeleCamera() {
   const CameraModel::Intrinsics usual = UsualCamera()->intrinsics();
   return std::make_shared<const CameraModel>(
       LensModel::kRadialTangential,
-      CameraModel::Intrinsics{usual.width, usual.height, 2 * usual.fx, 2 * usual.fy, usual.cx, usual.cy},
+      CameraModel::Intrinsics{usual.width_px, usual.height_px, 2 * usual.fx, 2 * usual.fy, usual.cx,
+                              usual.cy},
       std::array<double, 5>{});
 }
 
