@@ -70,10 +70,15 @@ std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t lev
 
 Initializer::Initializer(const InitializerOptions& options, std::shared_ptr<const CameraModel> camera,
                          std::uint64_t seed)
-    : options_(options), camera_(std::move(camera)), random_(seed) {}
+    : options_(options),
+      camera_(std::move(camera)),
+      random_(seed),
+      confirmation_(options.confirmation),
+      views_confirmation_(options.confirmation) {}
 
 void Initializer::Reset() {
   trails_.clear();
+  confirmation_.Reset();
   first_.reset();
   previous_.reset();
   hint_.clear();
@@ -81,11 +86,12 @@ void Initializer::Reset() {
 
 void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
   trails_.clear();
+  confirmation_.Reset();
   for (std::size_t level = 0; level < options_.corners.size(); ++level) {
     for (const Corner& corner : SpreadCorners(*features, level, options_.corners[level])) {
       const Eigen::Vector2f pixel =
           LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), static_cast<int>(level)).cast<float>();
-      trails_.push_back({pixel, pixel, static_cast<int>(level)});
+      trails_.push_back({pixel, pixel, static_cast<int>(level), static_cast<std::uint32_t>(trails_.size())});
     }
   }
   trails_at_start_ = trails_.size();
@@ -110,6 +116,8 @@ void Initializer::Follow(const ImageFeatures& features) {
     const auto back = FollowPatch(features, *now, *previous_, trail.now, trail.level);
     if (!back || (*back - trail.now).norm() > kMaxRoundTripPx * static_cast<float>(1 << trail.level))
       return true;
+    trail.step = *now - trail.now;
+    if (age_frames_ == 1) trail.first_step = trail.step;
     trail.now = *now;
     return false;
   });
@@ -144,30 +152,69 @@ std::optional<InitialPair> Initializer::Track(Timestamp time,
   return Attempt(time, features);
 }
 
+// By how much faster the image moves now than it did in the first view: the median over the keypoints.
+double Initializer::SpeedChange() const {
+  std::vector<float> changes;
+  changes.reserve(trails_.size());
+  for (const Trail& trail : trails_) changes.push_back((trail.step - trail.first_step).norm());
+  if (changes.empty()) return 0;
+  const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
+  std::nth_element(changes.begin(), middle, changes.end());
+  return *middle;
+}
+
 std::optional<InitialPair> Initializer::Attempt(Timestamp time,
                                                 const std::shared_ptr<const ImageFeatures>& features) {
-  std::vector<Eigen::Vector3d> rays_a, rays_b;
-  InitialPair pair;
+  std::vector<InitialPair::Match> matches;
+  std::vector<std::uint32_t> ids;
   for (const Trail& trail : trails_) {
-    const auto a = camera_->Unproject(trail.first.cast<double>()),
-               b = camera_->Unproject(trail.now.cast<double>());
-    if (!a || !b) continue;
-    rays_a.push_back(*a);
-    rays_b.push_back(*b);
-    pair.matches.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
+    matches.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
+    ids.push_back(trail.id);
+  }
+  auto pair =
+      Solve({first_time_, first_}, {time, features}, std::move(matches), ids, SpeedChange(), &confirmation_);
+  if (pair) Reset();
+  return pair;
+}
+
+std::optional<InitialPair> Initializer::TryViews(const InitialPair::View& a, const InitialPair::View& b,
+                                                 std::vector<InitialPair::Match> matches,
+                                                 std::span<const std::uint32_t> ids, double speed_change_px) {
+  return Solve(a, b, std::move(matches), ids, speed_change_px, &views_confirmation_);
+}
+
+std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const InitialPair::View& b,
+                                              std::vector<InitialPair::Match> matches,
+                                              std::span<const std::uint32_t> ids, double speed_change_px,
+                                              StartConfirmation* confirmation) {
+  std::vector<Eigen::Vector3d> rays_a, rays_b;
+  std::vector<std::uint32_t> kept;
+  InitialPair pair;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const auto ray_a = camera_->Unproject(matches[i].pixel_a.cast<double>()),
+               ray_b = camera_->Unproject(matches[i].pixel_b.cast<double>());
+    if (!ray_a || !ray_b) continue;
+    rays_a.push_back(*ray_a);
+    rays_b.push_back(*ray_b);
+    kept.push_back(ids[i]);
+    pair.matches.push_back(matches[i]);
   }
   TwoViewOptions options = options_.two_view;
   options.pixel_angle = camera_->PixelAngle();
+  options.depth_noise.speed_change_px = speed_change_px;
   options.seed = random_.Next();
   pair.geometry = EstimateTwoViews(rays_a, rays_b, options);
   hint_ = Advice(pair.geometry.verdict);
   if (pair.geometry.verdict != TwoViewVerdict::kGeneral && pair.geometry.verdict != TwoViewVerdict::kPlanar) {
     return std::nullopt;
   }
+  if (!confirmation->Confirm(a.time, kept, pair.geometry)) {
+    hint_ = Advice(TwoViewVerdict::kTooLittleParallax);
+    return std::nullopt;
+  }
   pair.camera = camera_;
-  pair.a = {first_time_, first_};
-  pair.b = {time, features};
-  Reset();
+  pair.a = a;
+  pair.b = b;
   return pair;
 }
 

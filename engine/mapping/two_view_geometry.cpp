@@ -21,6 +21,8 @@ constexpr double kDegreesPerRadian = 57.295779513082321;
 constexpr double kTwoDimensional = 1.25;
 // A point whose rays differ by less than this many inlier thresholds has no depth worth the name.
 constexpr double kMinParallaxThresholds = 2.0;
+// Keypoints are never better placed than this.
+constexpr double kMinScatterPx = 0.1;
 
 bool IsUnitRay(const Eigen::Vector3d& ray) {
   return std::abs(ray.squaredNorm() - 1) < 1e-6;
@@ -70,6 +72,7 @@ class TwoViewEstimator {
 
   const Rigid3& b_from_a() const { return b_from_a_; }
   double median_parallax_deg() const { return median_parallax_deg_; }
+  const DepthSignificance& significance() const { return significance_; }
   // Pairs that the pose explains, at a depth that can be told.
   const std::vector<bool>& inlier() const { return inlier_; }
 
@@ -133,7 +136,7 @@ class TwoViewEstimator {
     if (deviation > std::max(kMinNoises * noise_px_, kMinPx)) return true;
     // Corners followed so well that they show less than that: clearly more than they scatter, and more of
     // them than chance or one ill-followed thing could sway.
-    constexpr double kClearNoises = 2.8, kMinClear = 100, kMinScatterPx = 0.1;
+    constexpr double kClearNoises = 2.8, kMinClear = 100;
     return counted.sum() >= kMinClear && deviation > kClearNoises * std::max(scatter_px_, kMinScatterPx);
   }
 
@@ -152,10 +155,22 @@ class TwoViewEstimator {
     constexpr double kMaxFarShare = 0.3;
     if (median_parallax_deg_ < options_.min_parallax_deg || far_ > kMaxFarShare * consistent_)
       return TwoViewVerdict::kTooLittleParallax;
+    significance_ = MeasureDepthSignificance(
+        pairs_, explained_, b_from_a_,
+        model_ == ModelKind::kHomography ? StructureModel::kPlane : StructureModel::kGeneral,
+        std::max(scatter_px_, kMinScatterPx), options_.depth_noise);
+    if (!DepthIsSignificant()) return TwoViewVerdict::kTooLittleParallax;
     if (IsAmbiguous(ranked)) return TwoViewVerdict::kAmbiguousPlane;
     if (std::count(inlier_.begin(), inlier_.end(), true) < options_.min_inliers)
       return TwoViewVerdict::kTooFewMatches;
     return model_ == ModelKind::kHomography ? TwoViewVerdict::kPlanar : TwoViewVerdict::kGeneral;
+  }
+
+  bool DepthIsSignificant() const {
+    const double ratio = significance_.Ratio(), sigma = significance_.relative_depth_sigma;
+    if (ratio >= options_.min_parallax_ratio && sigma <= options_.max_relative_depth_sigma) return true;
+    return model_ == ModelKind::kHomography && ratio >= options_.min_plane_parallax_ratio &&
+           sigma <= options_.max_plane_depth_sigma;
   }
 
   // consistent_: explained by the pose and not behind; far_: of these, too far for a depth.
@@ -241,6 +256,7 @@ class TwoViewEstimator {
   std::vector<bool> inlier_, explained_;
   int consistent_ = 0, far_ = 0;
   double median_parallax_deg_ = 0;
+  DepthSignificance significance_;
 };
 
 }  // namespace
@@ -288,6 +304,7 @@ TwoViewResult EstimateTwoViews(std::span<const Eigen::Vector3d> rays_in_a,
   TwoViewEstimator estimator(pairs, options);
   result.verdict = estimator.Decide();
   result.median_parallax_deg = estimator.median_parallax_deg();
+  result.significance = estimator.significance();
   if (result.verdict != TwoViewVerdict::kGeneral && result.verdict != TwoViewVerdict::kPlanar) return result;
   result.b_from_a = estimator.b_from_a();
   for (std::size_t i = 0; i < index.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/geometry/rigid3.h"
+#include "engine/mapping/depth_significance.h"
 
 // The relative pose of two calibrated views and the structure between them, without any prior: ptamm §2.3's
 // five-point start, made safe against planes, pure rotation and still cameras.
@@ -20,6 +21,15 @@ struct TwoViewOptions {
   int min_inliers = 50;
   double min_inlier_ratio = 0.6;
   double min_parallax_deg = 1.0;  // median over the inliers, below it depth is a guess
+  // Depth is accepted only where it is significant; see DepthSignificance.
+  DepthNoiseOptions depth_noise;
+  double min_parallax_ratio = 4.0;
+  double max_relative_depth_sigma = 0.2;
+  // A plane square on leaves a ratio of about three however far the camera moves: the perspective that tells
+  // it from a turn grows with the motion as the errors of the calibration do. Its depths are known the
+  // better.
+  double min_plane_parallax_ratio = 2.5;
+  double max_plane_depth_sigma = 0.1;
   std::uint64_t seed = 1;
 };
 
@@ -43,6 +53,7 @@ struct TwoViewResult {
   std::vector<bool> inlier;                  // in front of both views, small residual, finite depth
   int inlier_count = 0;
   double median_parallax_deg = 0;
+  DepthSignificance significance;  // valid for kGeneral, kPlanar and some of kTooLittleParallax
 };
 
 // rays_in_a[i] and rays_in_b[i] are unit rays of the same scene point. Scores an essential matrix

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/start_confirmation.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace docent::engine {
+
+namespace {
+
+double Median(std::vector<double>* values) {
+  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
+  std::nth_element(values->begin(), middle, values->end());
+  return *middle;
+}
+
+}  // namespace
+
+void StartConfirmation::Keep(Timestamp first_view, std::span<const std::uint32_t> ids,
+                             const TwoViewResult& geometry) {
+  first_view_ = first_view;
+  parallax_deg_ = geometry.median_parallax_deg;
+  ids_.clear();
+  depths_.clear();
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (!geometry.inlier[i]) continue;
+    ids_.push_back(ids[i]);
+    depths_.push_back(geometry.points_in_a[i].norm());
+  }
+}
+
+bool StartConfirmation::Confirm(Timestamp first_view, std::span<const std::uint32_t> ids,
+                                const TwoViewResult& geometry) {
+  if (ids_.empty() || first_view != first_view_) {
+    Keep(first_view, ids, geometry);
+    return false;
+  }
+  if (geometry.median_parallax_deg < options_.min_growth * parallax_deg_) return false;
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (!geometry.inlier[i]) continue;
+    const auto known = std::lower_bound(ids_.begin(), ids_.end(), ids[i]);
+    if (known == ids_.end() || *known != ids[i]) continue;
+    ratios.push_back(
+        std::log(geometry.points_in_a[i].norm() / depths_[static_cast<std::size_t>(known - ids_.begin())]));
+  }
+  bool agree = static_cast<int>(ratios.size()) >= options_.min_shared;
+  if (agree) {
+    const double middle = Median(&ratios);
+    for (double& ratio : ratios) ratio = std::abs(ratio - middle);
+    constexpr double kSigmaFromMedian = 1.4826;  // of a normal distribution's absolute deviations
+    agree = kSigmaFromMedian * Median(&ratios) <= options_.max_depth_spread;
+  }
+  if (!agree) Keep(first_view, ids, geometry);
+  return agree;
+}
+
+}  // namespace docent::engine
