@@ -46,6 +46,7 @@ DescriptorRelocalizer::DescriptorRelocalizer(const DescriptorRelocalizerOptions&
                                              const VocabularyTree& tree)
     : options_(options), tree_(&tree) {}
 DescriptorRelocalizer::~DescriptorRelocalizer() = default;
+DescriptorRelocalizer::DescriptorRelocalizer(DescriptorRelocalizer&&) noexcept = default;
 
 void DescriptorRelocalizer::Clear() {
   maps_.clear();

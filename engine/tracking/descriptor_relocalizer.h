@@ -53,6 +53,7 @@ class DescriptorRelocalizer {
   explicit DescriptorRelocalizer(const DescriptorRelocalizerOptions& options = {},
                                  const VocabularyTree& tree = DefaultVocabulary());
   ~DescriptorRelocalizer();
+  DescriptorRelocalizer(DescriptorRelocalizer&&) noexcept;
 
   struct Suggestion {
     PlaceCandidate candidate;  // the one that most of the matches are of

@@ -120,6 +120,10 @@ KeyFrameChoice KeyFrameSelector::Select(const SelectorFrame& frame, const MapSna
   }
   const PanoramaId open = OpenPanorama(map);
   if (open == kNoId || frame.coverage >= options_.min_panorama_coverage) return KeyFrameChoice::kNone;
+  // In a map of directions alone, hardly one of which is where it was, the camera has moved among near
+  // things: what it sees now is taken in, wherever it looks. A map that knows depth does not pay the drift
+  // for that.
+  if (frame.points < options_.fewest_points && !map.HasFinitePoints()) return KeyFrameChoice::kPanorama;
   const double ratio =
       frame.points < options_.few_points ? options_.min_view_ratio_when_few : options_.min_view_ratio;
   const bool elsewhere = std::all_of(map.keyframes.begin(), map.keyframes.end(), [&](const KeyFrame& k) {

@@ -19,6 +19,8 @@ struct KeyFrameSelectorOptions {
   // With fewer points than this a panorama map is about to run out: a keyframe is due after less of a turn.
   int few_points = 60;
   double min_view_ratio_when_few = 0.03;
+  // With fewer than these, half of `few_points`, a map of directions alone gets a keyframe without any turn.
+  int fewest_points = 30;
   Timestamp history = std::chrono::seconds(10);  // poses that tell a turn from a walk
   // A mapper that has not opened the panorama map by then has not taken its reference.
   Timestamp patience = std::chrono::seconds(1);

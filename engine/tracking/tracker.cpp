@@ -59,7 +59,7 @@ std::optional<InitialPair> Tracker::TrackStart(const Frame& frame, std::string* 
 void Tracker::Reset() {
   map_.reset();
   map_key_ = 0;
-  starting_ = pair_given_ = tracking_ = false;
+  starting_ = pair_given_ = tracking_ = search_known_maps_ = false;
   anchor_.reset();
   turn_center_.Reset();
   turn_ = {};
@@ -72,15 +72,17 @@ void Tracker::Reset() {
   reports_.clear();
   candidate_.reset();
   pair_.reset();
+  keyframe_turn_rates_.clear();
 }
 
 void Tracker::StartFailed() {
   pair_given_ = false;
 }
 
-void Tracker::StartNewMap() {
+void Tracker::StartNewMap(bool search_known_maps) {
   Reset();
   starting_ = true;
+  search_known_maps_ = search_known_maps;
 }
 
 void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_key) {
@@ -201,6 +203,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
     if (HasPose(out->state) && places) {
       LookForBetterPlace(frame, *places, out);
       if (!options_.build_maps) LookForBetterMap(frame, *places, out);
+      if (search_known_maps_) SearchKnownMaps(frame, *places, out);
     }
   } else {
     Recover(frame, places, out);
@@ -225,10 +228,9 @@ void Tracker::LookForStart(const Frame& frame, TrackedFrame* out) {
   const bool directions = options_.hybrid && options_.build_maps;
   if (!map_ && directions) ResetStart();  // its first view is to be the map's, too
   pair_ = TrackStart(frame, &out->hint);
-  if (pair_) {
-    pair_->a_from_map = first_view_from_map_;
-    pair_given_ = true;
-  }
+  if (pair_) pair_->a_from_map = first_view_from_map_;
+  if (!pair_ && posed && directions && !target_initializer_) pair_ = TryPanoramaViews(frame, *out);
+  if (pair_) pair_given_ = true;
   if (FirstViewTime() == frame.time) first_view_from_map_ = posed ? out->camera_from_map : Rigid3();
   if (!map_ && directions) OfferKeyFrame(KeyFrameChoice::kFirst, frame, Rigid3(), {});
 }
@@ -288,7 +290,9 @@ void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
 // camera has turned (ptamm §3.2). Only where few points are to be expected, or are there; where many are and
 // fail, the pose is wrong.
 bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out) {
-  const bool bare = tried.attempted <= options_.bare_points || tried.Quality() >= options_.sure_quality;
+  // A map of directions alone claims nothing but turns.
+  const bool bare = tried.attempted <= options_.bare_points || tried.Quality() >= options_.sure_quality ||
+                    !map_->HasFinitePoints();
   if (!anchor_ || !bare || frame.time - last_points_ > FromSeconds(options_.max_picture_s)) return false;
   const SmallBlurryImage& picture = features_->small_blurry;
   const double spread =
@@ -320,6 +324,7 @@ bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, Tra
 
 void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out) {
   const bool good = result.Quality() >= options_.good_quality;
+  const Rotation3 previous_rotation = motion_.last().rotation;
   if (out->state == TrackingState::kRelocalized) {
     doubtful_frames_ = options_.agreeing_frames;
     frames_since_recovery_ = 0;
@@ -339,6 +344,7 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
     if (!good) doubtful_frames_ = options_.agreeing_frames;
     if (result.Explained() >= options_.poor_quality) --doubtful_frames_;
   }
+  turn_rate_ = (result.camera_from_map.rotation * previous_rotation.inverse()).Log();
   tracking_ = true;
   observed_ = result.observed;
   explained_ = result.Explained();

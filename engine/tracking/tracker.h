@@ -96,7 +96,9 @@ class Tracker {
   // Forgets the start that is being waited for and the track.
   void Reset();
   // Begins to look for a new map's first views; until SetMap gives one, frames are `initializing`.
-  void StartNewMap();
+  // search_known_maps: the camera was lost in another map. While it is tracked in the new one, the others are
+  // searched as well, and one that explains the image is entered as after a loss.
+  void StartNewMap(bool search_known_maps = false);
   bool starting() const { return starting_; }
   // The first view and pose from which the mapper could not make a map were nothing: look on.
   void StartFailed();
@@ -127,6 +129,10 @@ class Tracker {
   };
   std::shared_ptr<ImageFeatures> NextFeatures(const Frame& frame);
   void LookForStart(const Frame& frame, TrackedFrame* out);
+  // A start from a keyframe of the panorama map and the present frame, matched by the map's directions: these
+  // outlive the keypoint tracks of the initializer when the camera turns away and back.
+  std::optional<InitialPair> TryPanoramaViews(const Frame& frame, const TrackedFrame& out);
+  const KeyFrame* WidestPanoramaView(const TrackedFrame& out);
   // Whichever of the two ways to start a map is used.
   std::optional<InitialPair> TrackStart(const Frame& frame, std::string* hint);
   void ResetStart();
@@ -141,6 +147,7 @@ class Tracker {
   void Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
   void LookForBetterMap(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
   void LookForBetterPlace(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
+  void SearchKnownMaps(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
   // Tracks the map that is about to be entered, in `tracker`; its snapshot, or null when it is not there.
   std::shared_ptr<const MapSnapshot> FollowEntering(const PlaceFinder& places, MapTracker* tracker,
                                                     MapTrackResult* result);
@@ -207,14 +214,20 @@ class Tracker {
 
   std::shared_ptr<const MapSnapshot> map_;
   std::uint64_t map_key_ = 0;
-  bool starting_ = false;    // a start is being looked for, or the mapper is making a map of it
+  bool starting_ = false;  // a start is being looked for, or the mapper is making a map of it
+  bool search_known_maps_ = false;
   bool pair_given_ = false;  // the mapper is making a map of our pair
   bool tracking_ = false;
   // The last pose told the rotation alone; then the centre stays where it was.
   ObservedMotion observed_ = ObservedMotion::kSixDof;
-  double finite_coverage_ = 1, median_depth_ = 1;  // of the last frame that told them
-  double explained_ = 0;                           // of the last frame
-  Rigid3 first_view_from_map_;                     // the pose of the initializer's first view
+  double finite_coverage_ = 1, median_depth_ = 1;        // of the last frame that told them
+  double explained_ = 0;                                 // of the last frame
+  Rigid3 first_view_from_map_;                           // the pose of the initializer's first view
+  Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  // rotation vector a frame, of the last tracked frame
+  std::vector<std::pair<Timestamp, Eigen::Vector3d>>
+      keyframe_turn_rates_;                 // of offered keyframes, while starting
+  std::vector<PointMatch> sorted_matches_;  // scratch of WidestPanoramaView
+  int frames_since_views_ = 0;              // that TryPanoramaViews was asked
   Timestamp lost_since_{};
   bool searched_ = false;  // a map, for the last frame
   int misfit_frames_ = 0;  // in a row, that no turn explains

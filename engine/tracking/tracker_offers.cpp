@@ -50,6 +50,7 @@ void Tracker::OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rig
   }
   candidate_ = std::move(candidate);
   selector_.Offered(choice, frame.time);
+  if (starting_) keyframe_turn_rates_.emplace_back(frame.time, turn_rate_);
 }
 
 void Tracker::CollectReports() {

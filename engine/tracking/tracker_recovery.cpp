@@ -132,6 +132,39 @@ void Tracker::LookForBetterMap(const Frame& frame, const PlaceFinder& places, Tr
   }
 }
 
+// A map that was begun because the camera was lost: where another map explains the image, the camera goes
+// back there, as if it were still lost, so that the same place is not mapped twice.
+void Tracker::SearchKnownMaps(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
+  constexpr int kFramesBetweenSearches = 8;  // a search costs as much as ten tracked frames
+  if (entering_frames_ > 0 && entering_key_ != map_key_) {
+    MapTrackResult result;
+    const auto map = FollowEntering(places, &rival_tracker_, &result);
+    if (!map || DoubtOf(result, *map) != Doubt::kNone || result.Explained() < options_.poor_quality) {
+      entering_frames_ = 0;
+      return;
+    }
+    entering_pose_ = result.camera_from_map;
+    if (++entering_frames_ < options_.agreeing_frames) return;
+    map_tracker_.Clear();
+    map_tracker_.EnablePanorama(entering_panorama_);
+    result = map_tracker_.Track(*map, *features_, entering_pose_, MapTracker::Effort::kUsual, &random_);
+    starting_ = pair_given_ = search_known_maps_ = false;
+    candidate_.reset();
+    ResetStart();
+    Enter(frame, map, result, out);
+    return;
+  }
+  if (++frames_since_look_ < kFramesBetweenSearches) return;
+  frames_since_look_ = 0;
+  const Verdict before = out->verdict;
+  const std::vector<FoundPlace> found = FindMaps(places, BestPlaces(places, map_key_), out);
+  out->verdict = before;
+  if (found.empty() || found.front().result.Explained() < options_.poor_quality) return;
+  const bool rival =
+      found.size() > 1 && found.front().result.Quality() < options_.clear_lead * found[1].result.Quality();
+  if (!rival) BeginEntering(found.front());
+}
+
 // What was found again by a part of what is in view may be another place that looks alike: as long as it is
 // seen no better, the others are asked.
 void Tracker::LookForBetterPlace(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
