@@ -39,6 +39,7 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
       ->type_name("METRES");
   AddSecondsOption(command, "--autosave", &options->autosave_interval,
                    "Save so often; 0: only when a map is left and at the end (default 10)");
+  AddWhenLostOption(command, &options->when_lost, "new without a window, else wait");
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
     if (options->target.has_value() != (options->target_width_m > 0))

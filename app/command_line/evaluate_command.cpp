@@ -77,6 +77,8 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
       ->allow_extra_args(false);
   AddPaceOption(command, pace.get());
   AddEngineOption(command, &options->engine);
+  const auto when_lost = std::make_shared<std::optional<WhenLost>>();
+  AddWhenLostOption(command, when_lost.get(), "new");
   command->add_flag("--turn-about-camera", options->turn_about_camera,
                     "Take every turn to be about the camera's own centre, not the wearer's; for comparison");
   command->add_flag("--leave-loops-open", options->leave_loops_open,
@@ -97,6 +99,7 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
       throw CLI::ValidationError("--calibration", "more calibrations than sequences");
     }
     options->pace = pace->value_or(Pace::kEager);
+    options->when_lost = when_lost->value_or(WhenLost::kNew);
     if (options->many_runs() && !options->dump_frames.empty())
       throw CLI::ValidationError("--dump-frame", "works with one run, without --seeds and --starts");
     if (options->jobs > 1 && options->pace != Pace::kLockstep)

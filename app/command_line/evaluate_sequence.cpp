@@ -28,6 +28,7 @@ SessionOptions OptionsFor(const EvaluateOptions& options, std::uint64_t seed) {
   session.tracker.turn_center.enabled = !options.turn_about_camera;
   if (options.turn_about_camera) session.tracker.max_turn_sigma = session.tracker.max_sigma;
   session.mapper.loops.enabled = !options.leave_loops_open;
+  session.new_map_when_lost = options.when_lost == WhenLost::kNew;
   session.first_map = "map";
   session.seed = seed;
   return session;

@@ -27,6 +27,11 @@ enum class EngineKind {
   kHybrid,  // with panorama maps
   kSixDof,  // plain PTAM
 };
+// What a camera does that is lost where no map explains what it sees.
+enum class WhenLost {
+  kNew,   // it begins a new map after a moment, and goes on
+  kWait,  // it waits until it sees a map again
+};
 const char* ToString(Pace pace);
 const char* ToString(EngineKind engine);
 
@@ -58,6 +63,7 @@ struct AuthorOptions {
   double target_width_m = 0;
   std::optional<std::filesystem::path> script, record_script;
   Timestamp autosave_interval = std::chrono::seconds(10);  // 0: at each change of map alone
+  std::optional<WhenLost> when_lost;                       // empty: kWait where a window can ask, else kNew
 };
 
 struct TourOptions {
@@ -73,6 +79,7 @@ struct EvaluateOptions {
   EngineKind engine = EngineKind::kHybrid;
   bool turn_about_camera = false;  // as in hybrid-slam: no TurnCenter, and no question whether it is a turn
   bool leave_loops_open = false;
+  WhenLost when_lost = WhenLost::kNew;
   bool compare = false;                  // run the other engine too
   std::vector<std::size_t> dump_frames;  // lines of frames.csv, from 0, about which everything is written
   std::uint64_t seed = 1;                // of the first run's engine, and of every run's simulated world

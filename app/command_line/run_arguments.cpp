@@ -66,6 +66,14 @@ void AddEngineOption(CLI::App* command, EngineKind* engine) {
       {{"hybrid", EngineKind::kHybrid}, {"sixdof", EngineKind::kSixDof}});
 }
 
+void AddWhenLostOption(CLI::App* command, std::optional<WhenLost>* when_lost, const std::string& otherwise) {
+  AddChoice<WhenLost>(command, "--when-lost", when_lost,
+                      "What a camera does that is lost where no map is recognised: begin a new map, or wait "
+                      "until it sees a map again (default: " +
+                          otherwise + ")",
+                      {{"new", WhenLost::kNew}, {"wait", WhenLost::kWait}});
+}
+
 void AddSeedOption(CLI::App* command, std::uint64_t* seed) {
   // Read as text: the parser's own numbers would let -1 wrap round to the largest seed.
   command

@@ -14,6 +14,8 @@ namespace docent::app {
 
 void AddPaceOption(CLI::App* command, std::optional<Pace>* pace);
 void AddEngineOption(CLI::App* command, EngineKind* engine);
+// --when-lost; `otherwise` names the default in the help.
+void AddWhenLostOption(CLI::App* command, std::optional<WhenLost>* when_lost, const std::string& otherwise);
 void AddSeedOption(CLI::App* command, std::uint64_t* seed);
 // A number of seconds, 0 or more.
 void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* target,

@@ -54,6 +54,8 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
     request.script_name = options.script->string();
     request.model_folder = options.script->parent_path();
   }
+  const WhenLost otherwise = options.run.headless ? WhenLost::kNew : WhenLost::kWait;
+  request.new_map_when_lost = options.when_lost.value_or(otherwise) == WhenLost::kNew;
   if (options.target) request.target = ReadTarget(*options.target, options.target_width_m);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
   maps::Library library =

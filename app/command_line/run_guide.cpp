@@ -150,6 +150,7 @@ class GuideRun {
     SessionOptions options;
     options.threaded = request.pace != Pace::kLockstep;
     options.may_write = request.may_write;
+    options.new_map_when_lost = request.new_map_when_lost;
     options.seed = request.seed;
     options.tracker.hybrid = request.engine == EngineKind::kHybrid;
     options.autosave_interval = request.autosave_interval;

@@ -33,6 +33,7 @@ struct GuideRequest {
   bool headless = false;
   std::uint64_t seed = 1;
   std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory
+  bool new_map_when_lost = false;                          // see SessionOptions
   Timestamp autosave_interval = SessionOptions().autosave_interval;
   std::optional<std::filesystem::path> output, record, record_script;
   std::vector<TimedCommand> script;

@@ -19,6 +19,12 @@ struct Pair {
   engine::Rigid3 map_from_camera, truth_from_camera;
 };
 
+// A map of directions alone claims no place: giving it up takes nothing back.
+bool TookBack(const MapRecord& map) {
+  const bool directions_alone = map.points.infinite > 0 && map.points.finite == 0;
+  return map.discarded && !directions_alone;
+}
+
 class RootMeanSquare {
  public:
   void Add(double value) {
@@ -151,14 +157,14 @@ std::vector<MapResult> ListMaps(const RunRecord& run) {
       found = std::prev(maps.end());
     }
     found->name = record.name;
-    found->discarded = record.discarded;
+    found->discarded = TookBack(record);
   }
   return maps;
 }
 
 void CountFrames(const RunRecord& run, SequenceReport* report) {
   std::map<std::uint64_t, bool> discarded;
-  for (const MapRecord& map : run.maps) discarded[map.key] = map.discarded;
+  for (const MapRecord& map : run.maps) discarded[map.key] = TookBack(map);
   std::vector<double> tracking_ms;
   report->frames = static_cast<int>(run.frames.size());
   report->frame_results.resize(run.frames.size());

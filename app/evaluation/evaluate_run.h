@@ -11,7 +11,8 @@
 #include "engine/geometry/sim3.h"
 
 // How good a run was, against the truth. Poses are the live ones. A frame in a map that was later discarded
-// counts as untracked: whoever wore the camera was shown something that the engine itself took back.
+// counts as untracked: whoever wore the camera was shown something that the engine itself took back. (Not so
+// where that map held directions alone: a turn that was shown stays true when the map is given up.)
 //
 // Each map has a frame and a scale of its own, so poses are compared map by map: the similarity
 // truth_from_map of least squares over its camera centres (Umeyama 1991), then the root mean square of what

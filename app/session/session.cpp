@@ -64,7 +64,7 @@ SearchPlaces Session::FollowOrders(std::size_t index, Timestamp time) {
   {
     const std::scoped_lock lock(mutex_);
     order = std::exchange(camera->order, Camera::Order::kNone);
-    if (order == Camera::Order::kStart) camera->starting = true;
+    if (order == Camera::Order::kStart || order == Camera::Order::kStartAfterLoss) camera->starting = true;
     if (order == Camera::Order::kLeave || order == Camera::Order::kGo) camera->starting = false;
     if (const auto found = maps_.find(camera->map_key); found != maps_.end()) {
       snapshot = found->second.snapshot;
@@ -79,7 +79,9 @@ SearchPlaces Session::FollowOrders(std::size_t index, Timestamp time) {
     }
   }
   if (order == Camera::Order::kStart) {
-    tracker.StartNewMap();
+    tracker.StartNewMap(/*search_known_maps=*/false);
+  } else if (order == Camera::Order::kStartAfterLoss) {
+    tracker.StartNewMap(/*search_known_maps=*/true);
   } else if (order == Camera::Order::kStartAgain) {
     tracker.StartFailed();
   } else if (order != Camera::Order::kNone) {
@@ -132,6 +134,7 @@ void Session::React(std::size_t index, engine::TrackedFrame* frame) {
   }
   // Of several cameras, one that is tracked shows that a start holds.
   if (has_pose || !association_.AnyTracked()) WatchProbation(camera, *frame);
+  if (!has_pose) WatchLoss(camera, *frame);
 }
 
 // The frame's pose is in a map that is not the cameras' any more: while it was worked out, another camera was
@@ -239,6 +242,7 @@ void Session::Hear(const MappingThread::News& news) {
       case Kind::kMapStarted:
         map.started = event.time;
         map.on_probation = true;
+        map.start_watch = StartWatch();
         for (std::size_t i = 0; i < cameras_.size(); ++i) {
           if (cameras_[i].map_key == map.key && cameras_[i].starting) association_.Tracked(i, map.key);
         }
@@ -248,7 +252,9 @@ void Session::Hear(const MappingThread::News& news) {
         AddEvent(event.time, "warning", "no start for " + map.name + ": " + event.detail);
         for (Camera& camera : cameras_) {
           if (camera.map_key == map.key && camera.starting) {
-            camera.order = map.snapshot ? Camera::Order::kStartAgain : Camera::Order::kStart;
+            camera.order = map.snapshot     ? Camera::Order::kStartAgain
+                           : map.after_loss ? Camera::Order::kStartAfterLoss
+                                            : Camera::Order::kStart;
           }
         }
         break;

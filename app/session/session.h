@@ -24,6 +24,7 @@
 #include "app/session/mapping_thread.h"
 #include "app/session/search_places.h"
 #include "app/session/session_map.h"
+#include "app/session/start_watch.h"
 #include "app/session/upkeep_order.h"
 #include "engine/tracking/tracker.h"
 #include "maps/library.h"
@@ -43,12 +44,17 @@ struct SessionOptions {
   // Of the pictures' time; a map that is left, and the end, are saved in any case, and 0 saves at these
   // alone.
   Timestamp autosave_interval = std::chrono::seconds(10);
-  // A new map whose track is lost this early, for this long, with so few keyframes, was a false start.
+  // A new map with depth is confirmed after this time, or once it has so many keyframes, unless StartWatch
+  // finds fault with it. One that is lost for `probation_loss` before, or found false, is discarded and begun
+  // again.
   Timestamp probation = std::chrono::seconds(2);
-  Timestamp probation_loss = std::chrono::seconds(1);
-  // The same of a map that is its first picture alone: the next picture is as good.
-  Timestamp first_picture_loss = std::chrono::milliseconds(150);
+  Timestamp probation_loss = std::chrono::milliseconds(400);
   std::size_t probation_keyframes = 5;
+  // A map of directions alone that is lost for so long begins again with the next image.
+  Timestamp first_picture_loss = std::chrono::milliseconds(150);
+  // A camera that is lost for `lost_patience` where no map explains what it sees begins a new map.
+  bool new_map_when_lost = false;
+  Timestamp lost_patience = std::chrono::milliseconds(400);
   // Maps in memory that nobody is in are adjusted while there is nothing else to do; needs `threaded`.
   bool upkeep = true;
   double signpost_height = 0.12;  // of the distance at which it is put up
@@ -70,7 +76,8 @@ struct SessionOptions {
 // are tracked in it. Whoever recovers into another map takes the session there: that map then grows, and its
 // content is what is shown. Several cameras are those of one wearer and work in one map together: see
 // CameraAssociation. A start that does not hold (see SessionOptions::probation) is given up and looked
-// for again under the same name, with an event that says why.
+// for again under the same name, with an event that says why. A camera that is lost begins another map where
+// SessionOptions::new_map_when_lost says so.
 class Session {
  public:
   // library may be null (nothing is kept) and must outlive the session. Its maps are known from the start and
@@ -138,7 +145,7 @@ class Session {
   // Where a camera is and where it was told to go. Guarded by mutex_ except for tracker, which is its
   // thread's.
   struct Camera {
-    enum class Order { kNone, kStart, kStartAgain, kLeave, kGo };
+    enum class Order { kNone, kStart, kStartAfterLoss, kStartAgain, kLeave, kGo };
     std::unique_ptr<engine::Tracker> tracker;
     std::shared_ptr<const engine::CameraModel> model;
     std::unique_ptr<LensWatch> lens;
@@ -170,7 +177,9 @@ class Session {
   void OfferToMapper(Camera* camera, const engine::TrackedFrame& frame);
   bool MayGrow(const SessionMap& map, const engine::Rigid3& camera_from_map) const;
   void WatchProbation(Camera* camera, const engine::TrackedFrame& frame);
+  void WatchLoss(Camera* camera, const engine::TrackedFrame& frame);
   void Discard(std::uint64_t key, Timestamp time, const std::string& reason);
+  std::string FreeMapName(const std::string& name) const;
   void Hear(const MappingThread::News& news);
   void EnterMap(Camera* camera, std::uint64_t key, Timestamp time);
   void AddEvent(Timestamp time, std::string event, std::string detail);

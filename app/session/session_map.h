@@ -7,6 +7,7 @@
 #include <string>
 
 #include "app/session/content_follower.h"
+#include "app/session/start_watch.h"
 #include "content/edits.h"
 #include "content/scene.h"
 #include "engine/base/time.h"
@@ -44,8 +45,10 @@ struct SessionMap {
 
   // Of a map made in this session: a start that does not hold is given up (see Session).
   bool on_probation = false;
+  StartWatch start_watch;  // while on_probation
   bool discarded = false;
-  Timestamp started{};  // of the frame that completed its first pair
+  bool after_loss = false;  // begun because the camera was lost in another map
+  Timestamp started{};      // of the frame that completed its first pair
 
   // The mapper has made this of it; what stands in it moves along with its ground.
   void Grow(std::shared_ptr<const engine::MapSnapshot> grown);

@@ -65,7 +65,8 @@ RunRecord RunOf(const std::vector<TimedPose>& told, double depth_m = kSceneDepth
   }
   StartRecord start;
   start.map_key = 1;
-  for (int i = 0; i < 20; ++i) start.points.push_back({{}, run.frames[0].median_depth * (0.5 + 0.05 * i)});
+  for (int i = 0; i < 20; ++i)
+    start.points.push_back({Eigen::Vector2f::Zero(), run.frames[0].median_depth * (0.5 + 0.05 * i)});
   for (const int i : {0, kFirstDepth})
     start.keyframes.push_back({TimeOf(i), InMap(told[static_cast<std::size_t>(i)].truth_from_camera)});
   run.starts.push_back(start);
