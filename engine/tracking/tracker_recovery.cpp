@@ -135,7 +135,7 @@ void Tracker::LookForBetterMap(const Frame& frame, const PlaceFinder& places, Tr
 // A map that was begun because the camera was lost: where another map explains the image, the camera goes
 // back there, as if it were still lost, so that the same place is not mapped twice.
 void Tracker::SearchKnownMaps(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
-  constexpr int kFramesBetweenSearches = 8;  // a search costs as much as ten tracked frames
+  constexpr int kFramesBetweenSearches = 8;  // about four searches a second
   if (entering_frames_ > 0 && entering_key_ != map_key_) {
     MapTrackResult result;
     const auto map = FollowEntering(places, &rival_tracker_, &result);

@@ -64,7 +64,7 @@ const KeyFrame* Tracker::WidestPanoramaView(const TrackedFrame& out) {
 }
 
 std::optional<InitialPair> Tracker::TryPanoramaViews(const Frame& frame, const TrackedFrame& out) {
-  constexpr int kInterval = 3;  // frames; the geometry of two views costs as much as five tracked frames
+  constexpr int kInterval = 3;  // frames; the initializer asks every second one for the same
   if (++frames_since_views_ < kInterval || !map_ || out.matches.empty()) return std::nullopt;
   frames_since_views_ = 0;
   const KeyFrame* const keyframe = WidestPanoramaView(out);
