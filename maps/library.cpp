@@ -75,7 +75,7 @@ void CheckNewKeyFramesInside(const MapInfo& info, const MapParts& stored, const 
   }
 }
 
-[[noreturn]] void Refuse(Policy policy, const char* what) {
+[[noreturn]] void Refuse(Policy policy, const std::string& what) {
   throw Error(std::string("its policy is ") + ToString(policy) + ", so " + what +
               "; set another policy first to change that");
 }
@@ -215,6 +215,47 @@ class Library::Impl {
     WriteScene(info.key, scene);
     RemoveUnusedAssets(database_);
     return true;
+  }
+
+  // Of two maps and all that point to them.
+  void Join(const JoinRecord& record) {
+    for (const MapInfo& info : {record.into, record.from}) {
+      WithPlace(database_, info, [&] {
+        if (!MayChangeStructure(info.policy)) Refuse(info.policy, "it may not be joined with another map");
+      });
+    }
+    for (MapInfo info : ReadMapRows(database_)) {
+      if (info.key == record.into.key || info.key == record.from.key || !record.redirect) continue;
+      WithPlace(database_, info, [&] {
+        ScenePart scene = ReadScenePart(database_, info.key);
+        const std::optional<std::string> text = record.redirect(scene.text);
+        if (!text) return;
+        if (!MayChangeContent(info.policy)) {
+          Refuse(info.policy, "its signposts to '" + record.from.name + "' cannot point to '" +
+                                  record.into.name + "' instead");
+        }
+        scene.text = *text;
+        WriteScenePart(database_, info.key, scene);
+        info.modified = options_.clock();
+        WriteMapRow(database_, info);
+      });
+    }
+    MapInfo info = record.into;
+    WriteStructure(*record.snapshot, PartsOf(*record.snapshot), ReadParts(database_, info).keyframes, &info);
+    WriteScene(info.key, *record.scene);
+    info.policy = Stricter(record.into.policy, record.from.policy);
+    info.bounds = record.bounds;
+    info.modified = options_.clock();
+    WriteMapRow(database_, info);
+    RemoveMap(record.from.key);
+  }
+
+  void RemoveMap(std::uint64_t key) {
+    RemoveMapRows(database_, key);
+    LibraryRow library = ReadLibraryRow(database_);
+    --library.map_count;
+    WriteLibraryRow(database_, library);
+    RemoveUnusedAssets(database_);
   }
 
   void WriteScene(std::uint64_t key, const SceneRecord& scene) {
@@ -366,11 +407,7 @@ void Library::Remove(std::uint64_t key) {
     WithPlace(impl_->database(), info, [&] {
       if (!MayRemove(info.policy)) Refuse(info.policy, "it may not be removed");
     });
-    RemoveMapRows(impl_->database(), key);
-    LibraryRow library = ReadLibraryRow(impl_->database());
-    --library.map_count;
-    WriteLibraryRow(impl_->database(), library);
-    RemoveUnusedAssets(impl_->database());
+    impl_->RemoveMap(key);
     return true;
   });
 }
@@ -388,6 +425,21 @@ void Library::SetPolicy(std::uint64_t key, Policy policy) {
     WriteMapRow(impl_->database(), info);
     return true;
   });
+}
+
+bool Library::Join(const JoinRecord& record) {
+  if (const std::string problem = engine::Validate(*record.snapshot); !problem.empty()) {
+    throw Error(file() + ": maps '" + record.into.name + "' and '" + record.from.name +
+                "' cannot be joined: " + problem);
+  }
+  bool unchanged = true;
+  impl_->Write([&] {
+    for (const MapInfo& info : {record.into, record.from})
+      unchanged = unchanged && ReadMapRow(impl_->database(), info.key) == info;
+    if (unchanged) impl_->Join(record);
+    return unchanged;
+  });
+  return unchanged;
 }
 
 std::vector<std::string> Library::Verify() const {

@@ -80,6 +80,12 @@ class Library {
   // bounded before and not opened since.
   void SetPolicy(std::uint64_t key, Policy policy);
 
+  // Carries out in one transaction what joins two maps: `into` gets snapshot, scene and the stricter policy,
+  // the scenes of the other maps are redirected, and `from` is removed. Both policies must allow that
+  // keyframes and points change, and those of maps whose scenes are redirected that their content does.
+  // False, and nothing was written, when one of the two is no more as it was loaded.
+  bool Join(const JoinRecord& record);
+
   // Reads everything and says what is wrong, a sentence each; empty when all is well.
   std::vector<std::string> Verify() const;
 

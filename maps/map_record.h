@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,6 +61,16 @@ struct MapInfo {
   std::optional<Bounds> bounds;                               // of a map that is or was bounded; see policy.h
 
   bool operator==(const MapInfo& other) const = default;
+};
+
+// Two maps that have become one (see joining.h).
+struct JoinRecord {
+  MapInfo into, from;  // as they were loaded: `into` takes over everything, `from` goes
+  std::shared_ptr<const engine::MapSnapshot> snapshot;  // of both
+  std::shared_ptr<const SceneRecord> scene;             // of both
+  std::optional<Bounds> bounds;                         // where the stricter of the policies is bounded
+  // The text of another map's scene once `from` is gone, given the text that it has; empty where it stays.
+  std::function<std::optional<std::string>(const std::string& text)> redirect;
 };
 
 struct StoredMap {

@@ -50,6 +50,10 @@ bool MayRemove(Policy policy) {
   return MayChangeStructure(policy);
 }
 
+Policy Stricter(Policy a, Policy b) {
+  return std::max(a, b);  // they are declared by strictness
+}
+
 std::optional<Bounds> ComputeBounds(const engine::MapSnapshot& map) {
   if (map.keyframes.empty()) return std::nullopt;
   Bounds bounds;

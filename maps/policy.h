@@ -28,6 +28,8 @@ std::optional<Policy> ParsePolicy(std::string_view text);
 bool MayChangeStructure(Policy policy);  // keyframes, points, observations
 bool MayChangeContent(Policy policy);    // scene and assets
 bool MayRemove(Policy policy);
+// Of a map that two maps become (see joining.h).
+Policy Stricter(Policy a, Policy b);
 
 // The room that a map filled when it was bounded: a box along the map's axes, metres.
 struct Bounds {

@@ -14,12 +14,14 @@
 #include "app/command_line/progress.h"
 #include "app/files/checked_file.h"
 #include "app/session/content_follower.h"
+#include "app/session/joined_scenes.h"
 #include "app/session/library_scene.h"
 #include "app/session/surface_at_pixel.h"
 #include "engine/base/error.h"
 #include "engine/base/worker.h"
 #include "maps/colmap_model.h"
 #include "maps/exchange.h"
+#include "maps/joining.h"
 #include "maps/recovery.h"
 #include "maps/upkeep.h"
 #include "maps/view_from_above.h"
@@ -32,7 +34,7 @@ namespace fs = std::filesystem;
 
 struct ExchangeOptions {
   fs::path library, output, from;
-  std::string name;
+  std::string name, other_name;
 };
 using ExchangeAction = void (*)(const ExchangeOptions& options, Verbosity verbosity);
 
@@ -147,25 +149,35 @@ maps::MoveScene SceneMover(const std::string& library) {
   };
 }
 
+// A flag that a request to end the program sets: a signal cannot reach into long work by itself.
+class InterruptFlag {
+ public:
+  InterruptFlag()
+      : watch_("interruption", [this](const std::stop_token& stop) {
+          while (!stop.stop_requested() && !flag_) {
+            flag_ = Interruption::requested();
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+          }
+        }) {}
+  const std::atomic<bool>* get() const { return &flag_; }
+
+ private:
+  const Interruption interruption_;
+  std::atomic<bool> flag_ = false;
+  Worker watch_;  // last: it uses the rest
+};
+
 void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
   maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
   std::vector<maps::MapInfo> infos = library.List();
   if (!options.name.empty()) infos = {library.FindByName(options.name)};
-  const Interruption interruption;
-  std::atomic<bool> interrupt = false;
-  // A signal cannot reach into an adjustment by itself.
-  Worker watch("interruption", [&](const std::stop_token& stop) {
-    while (!stop.stop_requested() && !interrupt) {
-      interrupt = Interruption::requested();
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-  });
+  const InterruptFlag interrupt;
   std::optional<Progress> progress;
   progress.emplace("maps", infos.size(), verbosity);
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < infos.size() && !Interruption::requested(); ++i) {
     const maps::Optimization result =
-        maps::OptimizeMap(&library, infos[i].key, &interrupt, SceneMover(options.library));
+        maps::OptimizeMap(&library, infos[i].key, interrupt.get(), SceneMover(options.library));
     char numbers[240] = "";
     if (result.outcome == maps::Optimization::Outcome::kAdjusted) {
       std::snprintf(
@@ -183,6 +195,28 @@ void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
     for (const std::string& line : lines) std::printf("%s\n", line.c_str());
   }
   if (Interruption::requested()) throw Error("interrupted; what was adjusted before is saved");
+}
+
+void Join(const ExchangeOptions& options, Verbosity verbosity) {
+  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
+  const std::uint64_t into = library.FindByName(options.name).key,
+                      from = library.FindByName(options.other_name).key;
+  const InterruptFlag interrupt;
+  const maps::JoinResult result =
+      maps::JoinMaps(&library, into, from, LibrarySceneJoiner(options.library), interrupt.get());
+  if (Interruption::requested() && !result.refusal.empty()) throw Error("interrupted; nothing was changed");
+  if (verbosity == Verbosity::kVerbose) std::printf("%s\n", result.overlap.Brief().c_str());
+  if (!result.refusal.empty()) {
+    throw Error("'" + options.name + "' and '" + options.other_name + "' stay two maps, because " +
+                result.refusal);
+  }
+  if (verbosity != Verbosity::kQuiet) {
+    const maps::MapInfo joined = library.Find(into);
+    std::printf(
+        "%s holds %s now: %llu keyframes and %llu points, of which %d pairs became one; policy %s\n",
+        options.name.c_str(), options.other_name.c_str(), static_cast<unsigned long long>(joined.keyframes),
+        static_cast<unsigned long long>(joined.points), result.points_merged, maps::ToString(joined.policy));
+  }
 }
 
 void Recover(const ExchangeOptions& options, Verbosity verbosity) {
@@ -221,6 +255,13 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
       "Adjust whole maps, find their points in keyframes that missed them, and drop redundant keyframes",
       "docent maps optimize --library museum.docent", Optimize)
       ->add_option("NAME", options->name, "Name of the map; all when it is left out");
+  CLI::App* join = add(
+      "join",
+      "Make one map of two that overlap; the first keeps its name and coordinates, the second is gone, and "
+      "the stricter of their policies holds",
+      "docent maps join \"East wing\" \"West wing\" --library museum.docent", Join);
+  join->add_option("NAME", options->name, "Name of the map that takes the other in")->required();
+  join->add_option("OTHER", options->other_name, "Name of the map that becomes a part of it")->required();
   add("recover", "Save what a damaged library still holds into a new one",
       "docent maps recover --library damaged.docent --output saved.docent", Recover)
       ->add_option("--output", options->output, "The new library")

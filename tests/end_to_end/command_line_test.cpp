@@ -48,6 +48,7 @@ TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
       {"maps", "export"},
       {"maps", "import"},
       {"maps", "optimize"},
+      {"maps", "join"},
       {"maps", "recover"},
       {"content"},
       {"content", "list"},
@@ -196,6 +197,9 @@ TEST(CommandLine, SendsAMapToAnotherLibraryAndSavesWhatADamagedOneHolds) {
   EXPECT_EQ(maps::Library::Open(path, maps::Access::kReadOnly).List().size(), 2u);
   EXPECT_THAT(RunDocent({"maps", "optimize", "--library", path}).output,
               HasSubstr("Desk too small to adjust"));
+  ExpectComplaint({"maps", "join", "Desk", "Desk (2)", "--library", path}, 1, "stay two maps, because");
+  ExpectComplaint({"maps", "join", "Desk", "Desk", "--library", path}, 1, "itself");
+  ExpectComplaint({"maps", "join", "Desk", "Kiosk", "--library", path}, 1, "Kiosk");
   for (const char* name : {"desk.ply", "desk.png", "colmap"}) {
     const std::string output = (folder / name).string();
     EXPECT_EQ(RunDocent({"maps", "export", "Desk", "--library", path, "--output", output}).exit_status, 0);

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "engine/base/random.h"
+#include "engine/mapping/map_joining.h"
 #include "maps/library.h"
 #include "tests/maps/map_samples.h"
 
@@ -122,6 +123,72 @@ TEST(Crash, AnAuthorKilledAtAnyMomentLosesAtMostTheSaveItWasIn) {
     }
   }
   EXPECT_GT(told, 5u) << "the authors never came to save";
+}
+
+// Two maps of the samples, and what joins them.
+JoinRecord JoinOf(const Library& library) {
+  const StoredMap into = library.Load(library.FindByName("East").key),
+                  from = library.Load(library.FindByName("West").key);
+  JoinRecord record;
+  record.into = into.info;
+  record.from = from.info;
+  engine::JoinedIds ids;
+  record.snapshot =
+      std::make_shared<engine::MapSnapshot>(engine::SideBySide(*into.snapshot, *from.snapshot, &ids));
+  record.scene = std::make_shared<SceneRecord>(SceneRecord{"joined", into.scene.assets});
+  record.redirect = [](const std::string&) { return std::optional<std::string>("to East"); };
+  return record;
+}
+
+TEST(JoinerProcess, JoinsTwoMapsUntilItIsKilled) {
+  const char* file = std::getenv("DOCENT_JOINER_FILE");
+  if (!file) GTEST_SKIP() << "runs only as the second process of other tests";
+  Library library = OpenToWrite(file);
+  const JoinRecord record = JoinOf(library);
+  const char begun = 1;
+  if (write(std::atoi(std::getenv(kPipeVariable)), &begun, 1) == 1) library.Join(record);
+}
+
+TEST(Crash, MapsAreJoinedWholeOrNotAtAllWhenTheProgramIsKilledMeanwhile) {
+  const TemporaryFolder folder;
+  Random random(3);
+  for (int round = 0; round < Repetitions("DOCENT_KILLS", 12); ++round) {
+    const auto file = folder / (std::to_string(round) + ".docent");
+    {
+      Library library = OpenToWrite(file);
+      for (const char* name : {"East", "West", "Hall"}) {
+        library.Save({library.NewKey(), name, Policy::kOpen,
+                      MakeSampleMap(1, {.keyframes = 6, .points = 200}),
+                      std::make_shared<SceneRecord>(SceneRecord{"to West", {}})});
+      }
+    }
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    const pid_t process = fork();
+    if (process == 0) {
+      setenv("DOCENT_JOINER_FILE", file.c_str(), 1);
+      setenv(kPipeVariable, std::to_string(ends[1]).c_str(), 1);
+      const int silence = open("/dev/null", O_WRONLY);
+      dup2(silence, STDOUT_FILENO);
+      execl("/proc/self/exe", "docent_maps_tests", "--gtest_filter=JoinerProcess.*", nullptr);
+      _exit(127);
+    }
+    close(ends[1]);
+    char begun = 0;
+    ASSERT_EQ(read(ends[0], &begun, 1), 1);
+    close(ends[0]);
+    std::this_thread::sleep_for(std::chrono::microseconds(random.Below(40'000)));
+    kill(process, SIGKILL);
+    waitpid(process, nullptr, 0);
+    Library library = OpenToWrite(file);
+    EXPECT_EQ(library.Verify(), std::vector<std::string>{});
+    const bool done = library.List().size() == 2;
+    EXPECT_EQ(library.List().size(), done ? 2u : 3u);
+    EXPECT_EQ(library.LoadScene(library.FindByName("Hall").key).text, done ? "to East" : "to West");
+    const StoredMap east = library.Load(library.FindByName("East").key);
+    EXPECT_EQ(east.snapshot->keyframes.size(), done ? 12u : 6u);
+    EXPECT_EQ(east.scene.text, done ? "joined" : "to West");
+  }
 }
 
 TEST(TwoProcesses, AVisitorSeesWholeSavesWhileAnAuthorWrites) {

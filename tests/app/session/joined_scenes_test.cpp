@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/joined_scenes.h"
+
+#include <gtest/gtest.h>
+
+#include "content/scene_codec.h"
+#include "engine/base/random.h"
+
+namespace docent::app {
+namespace {
+
+using engine::Sim3;
+
+content::Entity Sign(const std::string& name, const std::string& to_map, const Eigen::Vector3d& anchor) {
+  content::Entity sign;
+  sign.name = name;
+  sign.signpost.text = "this way";
+  sign.signpost.anchor = anchor;
+  sign.signpost.height_m = 0.2;
+  sign.signpost.to_map = to_map;
+  return sign;
+}
+
+// A joined map whose points the adjustment has left where they were.
+engine::JoinedMap Joined(const Sim3& a_from_b) {
+  Random random(1);
+  auto map = std::make_shared<engine::MapSnapshot>();
+  for (std::uint32_t i = 0; i < 400; ++i) {
+    engine::MapPoint point;
+    point.id = i;
+    point.point_in_map << random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(2, 4), 1;
+    map->points.push_back(point);
+  }
+  engine::JoinedMap joined;
+  joined.map = joined.aligned = map;
+  joined.a_from_b = a_from_b;
+  return joined;
+}
+
+TEST(JoinedScenes, HoldWhatStoodInBothMapsInTheCoordinatesOfTheFirst) {
+  content::Scene a, b;
+  a.entities = {Sign("sign-1", "", {0.5, 0.2, 3})};
+  b.entities = {Sign("sign-1", "Garden", {1, 2, 3})};
+  content::Entity model;
+  model.name = "fox";
+  model.kind = content::Entity::Kind::kModel;
+  model.model.map_from_model = {engine::Rotation3::Exp({0, 0.3, 0}), {0.2, 0.1, 2.8}, 0.3};
+  b.entities.push_back(model);
+  const Sim3 a_from_b{engine::Rotation3::Exp({0.2, -0.5, 0.1}), {1, -2, 0.5}, 2.5};
+  const content::Scene both = JoinScenes(a, b, "East", "West", Joined(a_from_b));
+  ASSERT_EQ(both.entities.size(), 3u);
+  EXPECT_EQ(both.Find("sign-1")->signpost.anchor, a.entities[0].signpost.anchor);
+  const content::Signpost& moved = both.Find("sign-1-2")->signpost;
+  EXPECT_LT((moved.anchor - a_from_b * Eigen::Vector3d(1, 2, 3)).norm(), 1e-9);
+  EXPECT_NEAR(moved.height_m, 0.5, 1e-9);
+  EXPECT_LT((moved.up - a_from_b.rotation * b.entities[0].signpost.up).norm(), 1e-9);
+  EXPECT_EQ(moved.to_map, "Garden");
+  const Sim3 fox = both.Find("fox")->model.map_from_model, wanted = a_from_b * model.model.map_from_model;
+  EXPECT_LT((fox.translation - wanted.translation).norm(), 1e-9);
+  EXPECT_LT((fox.rotation * wanted.rotation.inverse()).Angle(), 1e-9);
+  EXPECT_NEAR(fox.scale, 0.75, 1e-9);
+}
+
+TEST(JoinedScenes, HaveNoSignpostThatPointsToTheirOwnMap) {
+  content::Scene a, b;
+  a.entities = {Sign("sign-1", "West", {0.5, 0.2, 3})};
+  b.entities = {Sign("sign-2", "East", {1, 2, 3})};
+  const content::Scene both = JoinScenes(a, b, "East", "West", Joined({}));
+  EXPECT_EQ(both.Find("sign-1")->signpost.to_map, "");
+  EXPECT_EQ(both.Find("sign-2")->signpost.to_map, "");
+}
+
+TEST(JoinedScenes, LetSignpostsOfOtherMapsPointToTheJoinedOne) {
+  content::Scene hall;
+  hall.entities = {Sign("sign-1", "West", {0, 0, 1}), Sign("sign-2", "Garden", {0, 0, 2})};
+  content::Entity model;
+  model.name = "fox";
+  model.kind = content::Entity::Kind::kModel;
+  auto asset = std::make_shared<content::Asset>();
+  asset->id = "0123456789abcdef0123456789abcdef";
+  model.model.asset = asset;
+  hall.entities.push_back(model);
+  const auto text = RedirectSignposts(content::EncodeScene(hall), "West", "East");
+  ASSERT_TRUE(text.has_value());
+  const content::Scene after = content::DecodeScene(*text, "test", [&](const std::string&) { return asset; });
+  EXPECT_EQ(after.Find("sign-1")->signpost.to_map, "East");
+  EXPECT_EQ(after.Find("sign-2")->signpost.to_map, "Garden");
+  EXPECT_EQ(after.Find("fox")->model.asset->id, asset->id);
+  EXPECT_EQ(RedirectSignposts(content::EncodeScene(hall), "Attic", "East"), std::nullopt);
+  EXPECT_EQ(RedirectSignposts("", "West", "East"), std::nullopt);
+}
+
+}  // namespace
+}  // namespace docent::app
