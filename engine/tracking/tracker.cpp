@@ -124,6 +124,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     map_tracker_.Clear();
     reports_.clear();
     anchor_.reset();
+    usually_explained_ = 1;
     tracking_ = false;
     lost_since_ = kLongAgo;
   }
@@ -199,7 +200,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   if (starting_ && !map_) {
     LookForStart(frame, out);
   } else if (tracking_) {
-    TrackMap(frame, out);
+    TrackMap(frame, places, out);
     if (HasPose(out->state) && places) {
       LookForBetterPlace(frame, *places, out);
       if (!options_.build_maps) LookForBetterMap(frame, *places, out);
@@ -255,7 +256,7 @@ void Tracker::Lose(const Frame& frame, TrackedFrame* out) {
   out->hint = "look back at what was mapped";
 }
 
-void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
+void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
   // What was commanded is known better than what was observed before.
   Rigid3 predicted = frame.turned ? motion_.PredictWithRotation(*frame.turned) : motion_.Predict(frame.time);
   if (observed_ == ObservedMotion::kPanorama)
@@ -274,6 +275,8 @@ void Tracker::TrackMap(const Frame& frame, TrackedFrame* out) {
     map_tracker_.Forget();
     if (options_.hybrid && FollowPicture(frame, result, out)) return;
     Lose(frame, out);
+    // The same image may show a place that is recognised: a surprising motion need not cost a frame.
+    Recover(frame, places, out);
     return;
   }
   misfit_frames_ = IsTurn(result, *map_) ? 0 : misfit_frames_ + 1;
@@ -327,6 +330,7 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   const Rotation3 previous_rotation = motion_.last().rotation;
   if (out->state == TrackingState::kRelocalized) {
     doubtful_frames_ = options_.agreeing_frames;
+    enough_explained_ = EnoughExplained(frame, result.camera_from_map);
     frames_since_recovery_ = 0;
     leader_frames_ = 0;
     motion_.Reset(frame.time, result.camera_from_map);
@@ -342,12 +346,15 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   const bool doubtful = doubtful_frames_ > 0;
   if (doubtful && out->state != TrackingState::kRelocalized) {
     if (!good) doubtful_frames_ = options_.agreeing_frames;
-    if (result.Explained() >= options_.poor_quality) --doubtful_frames_;
+    if (result.Explained() >= enough_explained_) --doubtful_frames_;
   }
   turn_rate_ = (result.camera_from_map.rotation * previous_rotation.inverse()).Log();
   tracking_ = true;
   observed_ = result.observed;
   explained_ = result.Explained();
+  constexpr double kKept = 0.9;  // of the average in each frame
+  if (!doubtful && result.inliers > 0)
+    usually_explained_ = kKept * usually_explained_ + (1 - kKept) * explained_;
   out->verdict = {};
   finite_coverage_ = result.finite_coverage;
   if (result.finite_inliers > 0 && result.median_depth > 0) median_depth_ = result.median_depth;

@@ -137,7 +137,7 @@ class Tracker {
   std::optional<InitialPair> TrackStart(const Frame& frame, std::string* hint);
   void ResetStart();
   Timestamp FirstViewTime() const;
-  void TrackMap(const Frame& frame, TrackedFrame* out);
+  void TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
   void Lose(const Frame& frame, TrackedFrame* out);
   bool FollowPicture(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out);
   PanoramaId PanoramaFor(const Rigid3& predicted) const;
@@ -194,6 +194,7 @@ class Tracker {
   bool IsTurn(const MapTrackResult& result, const MapSnapshot& map) const;
   // Whether a pose that was found after a loss counts: kNone, or what speaks against it.
   Doubt DoubtOf(const MapTrackResult& result, const MapSnapshot& map) const;
+  double EnoughExplained(const Frame& frame, const Rigid3& found_camera_from_map) const;
   void Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out);
   void CollectReports();
   // Carries what the tracker knows in coordinates of its map over to a newer snapshot of it.
@@ -222,6 +223,7 @@ class Tracker {
   ObservedMotion observed_ = ObservedMotion::kSixDof;
   double finite_coverage_ = 1, median_depth_ = 1;        // of the last frame that told them
   double explained_ = 0;                                 // of the last frame
+  double usually_explained_ = 1;                         // averaged over about the last ten frames
   Rigid3 first_view_from_map_;                           // the pose of the initializer's first view
   Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  // rotation vector a frame, of the last tracked frame
   std::vector<std::pair<Timestamp, Eigen::Vector3d>>
@@ -233,6 +235,7 @@ class Tracker {
   int misfit_frames_ = 0;  // in a row, that no turn explains
   // That explain the picture well, wanted since the last recovery before the map is extended.
   int doubtful_frames_ = 0;
+  double enough_explained_ = 0;  // by a frame that counts for this
   // The newest picture whose pose points told, or of a long turn a later one: FollowPicture's measure.
   std::shared_ptr<const ImageFeatures> anchor_;
   Rigid3 anchor_pose_;

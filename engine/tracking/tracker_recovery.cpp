@@ -17,6 +17,21 @@ Doubt Tracker::DoubtOf(const MapTrackResult& result, const MapSnapshot& map) con
   return Doubt::kNone;
 }
 
+// What a frame must explain after a recovery to count for the map's extension. A camera that was lost a
+// moment ago and is found about where it was lost has hardly come to a place that looks alike. Where things
+// hide each other a map never explained much of what is in view; it explains enough when it explains about as
+// much as before.
+double Tracker::EnoughExplained(const Frame& frame, const Rigid3& found_camera_from_map) const {
+  constexpr double kNear = 0.5;  // of the depth, and radians: both images show mostly the same
+  const Rigid3& lost = motion_.last();
+  const double shift = (lost.OriginInSource() - found_camera_from_map.OriginInSource()).norm();
+  const double turn = (lost.rotation * found_camera_from_map.rotation.inverse()).Angle();
+  if (frame.time - lost_since_ > FromSeconds(options_.short_loss_s) || shift > kNear * median_depth_ ||
+      turn > kNear)
+    return options_.poor_quality;
+  return std::min(options_.poor_quality, usually_explained_ / options_.better_quality);
+}
+
 bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
   if (frame.time - lost_since_ > FromSeconds(options_.short_loss_s)) return false;
   const auto rotation = RotationFromPrevious();
@@ -86,6 +101,7 @@ std::shared_ptr<const MapSnapshot> Tracker::FollowEntering(const PlaceFinder& pl
 
 void Tracker::Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, const MapTrackResult& result,
                     TrackedFrame* out) {
+  if (entering_key_ != map_key_) usually_explained_ = 1;  // unknown, in another map
   map_ = std::move(map);
   map_key_ = entering_key_;
   entering_frames_ = 0;
@@ -93,6 +109,8 @@ void Tracker::Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, 
   out->state = TrackingState::kRelocalized;
   out->hint.clear();
   Accept(frame, result, out);
+  // The frames that agreed have counted already where the camera is about where it was lost.
+  if (enough_explained_ < options_.poor_quality) doubtful_frames_ = 1;
 }
 
 // Where maps overlap the camera is carried from one into another by what both show; what was left in the
