@@ -168,7 +168,14 @@ bool Tracker::Believable(const MapTrackResult& result) const {
   const bool sure = result.observed == ObservedMotion::kPanorama || result.Quality() >= options_.sure_quality;
   const int min_inliers = sure ? options_.min_sure_inliers : options_.min_inliers;
   return result.converged && result.sigma <= options_.max_sigma && result.inliers >= min_inliers &&
-         result.occupied_cells >= options_.min_cells && result.Quality() >= options_.lost_quality;
+         result.occupied_cells >= options_.min_cells &&
+         (result.Quality() >= options_.lost_quality || AgreesWidely(result));
+}
+
+// Whether so many points agree on the pose that it is right whatever else was looked for in vain.
+bool Tracker::AgreesWidely(const MapTrackResult& result) const {
+  return result.inliers >= options_.many_inliers && result.sigma <= options_.max_agreeing_sigma &&
+         result.inliers >= options_.min_agreement * result.found;
 }
 
 // Whether a turn, if it is one that the result tells of, explains what was seen.
@@ -326,7 +333,7 @@ bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, Tra
 }
 
 void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out) {
-  const bool good = result.Quality() >= options_.good_quality;
+  const bool good = result.Quality() >= options_.good_quality || AgreesWidely(result);
   const Rotation3 previous_rotation = motion_.last().rotation;
   if (out->state == TrackingState::kRelocalized) {
     doubtful_frames_ = options_.agreeing_frames;
