@@ -34,9 +34,11 @@ void AddDistributionOptions(CLI::App* command, EvaluateOptions* options) {
   AddCountOption(command, "--seeds", &options->seeds, kMostSeeds,
                  "Run each sequence with N seeds of the engine, from --seed on, and report the spread; "
                  "a simulated world stays that of --seed");
-  AddCountOption(command, "--starts", &options->starts, kMostStarts,
-                 "Run N windows over each sequence, each as if the sequence began there, and report the "
-                 "spread; with --seeds every window has all seeds");
+  AddCountOption(
+      command, "--starts", &options->starts, kMostStarts,
+      "Run N windows over each sequence, each as if the sequence began there, and report the "
+      "spread; with --seeds every window has all seeds. Windows of a length (--window) that fit lie "
+      "within the sequence, so that all are equally long");
   AddSecondsOption(command, "--window", &options->window,
                    "End each run so long after its first picture (0: at the end of the sequence)");
   command

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "app/cameras/clipped_source.h"
@@ -101,6 +102,7 @@ EvaluatedSequence KnowSequence(const EvaluateOptions& options, std::size_t index
   if (info.live) throw Error("'" + sequence.word + "' is a live camera; evaluate takes recorded sequences.");
   sequence.name = info.name;
   sequence.frame_count = info.frame_count;
+  sequence.frames_per_second = info.nominal_fps;
   if (info.ground_truth_path) sequence.truth = ReadGroundTruth(*info.ground_truth_path);
   if (info.segments_path) sequence.segments = ReadSegments(*info.segments_path);
   CheckStarts(options, sequence);
@@ -134,10 +136,25 @@ std::optional<std::vector<StartResult>> JudgeStartsOf(const EvaluateOptions& opt
   return JudgeStarts(run, sequence.truth, true_depths, judging);
 }
 
+std::vector<std::uint64_t> FirstFrames(std::size_t starts, std::uint64_t frames,
+                                       std::uint64_t window_frames) {
+  std::vector<std::uint64_t> first_frames;
+  const bool fit = window_frames > 0 && window_frames + starts <= frames + 1;
+  for (std::size_t start = 0; start < starts; ++start) {
+    first_frames.push_back(fit && starts > 1 ? start * (frames - window_frames) / (starts - 1)
+                                             : start * frames / starts);
+  }
+  return first_frames;
+}
+
 std::vector<RunKey> RunsOf(const EvaluateOptions& options, const EvaluatedSequence& sequence) {
   std::vector<RunKey> keys;
+  const auto window_frames =
+      static_cast<std::uint64_t>(std::ceil(ToSeconds(options.window) * sequence.frames_per_second));
+  const std::vector<std::uint64_t> first_frames =
+      FirstFrames(options.starts, sequence.frame_count.value_or(0), window_frames);
   for (std::size_t start = 0; start < options.starts; ++start) {
-    const std::uint64_t first = start * sequence.frame_count.value_or(0) / options.starts;
+    const std::uint64_t first = first_frames[start];
     for (std::size_t seed = 0; seed < options.seeds; ++seed)
       keys.push_back({options.seed + seed, start, static_cast<std::size_t>(first)});
   }

@@ -26,6 +26,7 @@ struct EvaluatedSequence {
   std::shared_ptr<const Simulation> simulation;  // of sim:SCENE; null otherwise
   std::string name;                              // as the source calls itself
   std::optional<std::uint64_t> frame_count;
+  double frames_per_second = 30;
   std::vector<TimedPose> truth;      // may be empty
   std::vector<TimedLabel> segments;  // may be empty
 };
@@ -41,6 +42,11 @@ CalibratedCamera OpenWindow(const EvaluatedSequence& sequence, std::uint64_t fir
 std::optional<std::vector<StartResult>> JudgeStartsOf(const EvaluateOptions& options,
                                                       const EvaluatedSequence& sequence, const RunKey& key,
                                                       const RunRecord& run);
+
+// The first frames of so many windows, evenly over a sequence of so many frames. Where a window of that
+// length (0: to the end of the sequence) fits into the sequence so often, at a frame of its own each time,
+// every window lies within it, so that all runs are equally long; otherwise later ones are shorter.
+std::vector<std::uint64_t> FirstFrames(std::size_t starts, std::uint64_t frames, std::uint64_t window_frames);
 
 // The runs that are asked for, by start, then seed.
 std::vector<RunKey> RunsOf(const EvaluateOptions& options, const EvaluatedSequence& sequence);
