@@ -54,7 +54,7 @@ struct SessionOptions {
   Timestamp first_picture_loss = std::chrono::milliseconds(150);
   // A camera that is lost for `lost_patience` where no map explains what it sees begins a new map.
   bool new_map_when_lost = false;
-  Timestamp lost_patience = std::chrono::milliseconds(400);
+  Timestamp lost_patience = std::chrono::milliseconds(200);
   // Maps in memory that nobody is in are adjusted while there is nothing else to do; needs `threaded`.
   bool upkeep = true;
   double signpost_height = 0.12;  // of the distance at which it is put up

@@ -153,7 +153,9 @@ void Tracker::LookForBetterMap(const Frame& frame, const PlaceFinder& places, Tr
 // A map that was begun because the camera was lost: where another map explains the image, the camera goes
 // back there, as if it were still lost, so that the same place is not mapped twice.
 void Tracker::SearchKnownMaps(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
-  constexpr int kFramesBetweenSearches = 8;  // about four searches a second
+  // A search costs as much as ten frames: about four a second, and more as long as hardly anything would be
+  // lost by going back.
+  const int frames_between = map_->HasFinitePoints() ? 8 : 2;
   if (entering_frames_ > 0 && entering_key_ != map_key_) {
     MapTrackResult result;
     const auto map = FollowEntering(places, &rival_tracker_, &result);
@@ -172,7 +174,7 @@ void Tracker::SearchKnownMaps(const Frame& frame, const PlaceFinder& places, Tra
     Enter(frame, map, result, out);
     return;
   }
-  if (++frames_since_look_ < kFramesBetweenSearches) return;
+  if (++frames_since_look_ < frames_between) return;
   frames_since_look_ = 0;
   const Verdict before = out->verdict;
   const std::vector<FoundPlace> found = FindMaps(places, BestPlaces(places, map_key_), out);
