@@ -269,6 +269,62 @@ TEST(Tracker, EntersNoMapOfAnotherPlace) {
   }
 }
 
+// A grid of tiles before the lens, of which one in `every` is open.
+void CoverTiles(int every, cv::Mat* picture) {
+  constexpr int kTile = 40;  // pixels
+  int tile = 0;
+  for (int y = 0; y < picture->rows; y += kTile) {
+    for (int x = 0; x < picture->cols; x += kTile, ++tile) {
+      const cv::Rect rectangle = cv::Rect(x, y, kTile, kTile) & cv::Rect(0, 0, picture->cols, picture->rows);
+      if (tile % every != 0) (*picture)(rectangle).setTo(128);
+    }
+  }
+}
+
+TEST(Tracker, HoldsAPoseThatManyPointsAgreeOnThoughMostAreHidden) {
+  const Walk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  TrackerOptions options;
+  options.build_maps = false;
+  const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
+  for (const bool agreement_counts : {true, false}) {
+    if (!agreement_counts) options.many_inliers = 100000;
+    SomeMaps places;
+    places.Add(9, walk.map);
+    Tracker tracker(options, Camera(), 3);
+    tracker.SetMap(walk.map, 9);
+    for (int i = 40; i < 55; ++i) tracker.Track(FrameOf(i), &places);
+    constexpr int kCovered = 55;
+    Frame frame = FrameOf(kCovered);
+    frame.picture = frame.picture.clone();
+    CoverTiles(8, &frame.picture);
+    const TrackedFrame tracked = tracker.Track(frame, nullptr);
+    if (agreement_counts) {
+      ASSERT_EQ(tracked.state, TrackingState::kSixDof);
+      EXPECT_LT(tracked.quality, options.lost_quality);
+      EXPECT_GE(tracked.finite_points, options.many_inliers);
+      EXPECT_LT(DistanceFromTruth(world_from_map, tracked.camera_from_map, Pose(kCovered)), 0.02);
+    } else {
+      EXPECT_EQ(tracked.state, TrackingState::kLost);
+    }
+  }
+}
+
+TEST(Tracker, ExtendsItsMapAgainAfterAShortLossThoughHalfOfItIsHidden) {
+  constexpr int kCovered = 45, kLost = 78, kBack = 80;
+  Lockstep lockstep({}, Camera(), 1);
+  std::size_t keyframes = 0;
+  for (int i = 0; i < kWalk; ++i) {
+    Frame frame = FrameOf(i);
+    frame.picture = frame.picture.clone();
+    if (i >= kCovered) CoverTiles(3, &frame.picture);
+    if (i >= kLost && i < kBack) frame.picture.setTo(128);
+    const TrackedFrame tracked = lockstep.Feed(frame);
+    if (i == kBack - 1) keyframes = lockstep.map()->keyframes.size();
+  }
+  EXPECT_GT(lockstep.map()->keyframes.size(), keyframes + 1);
+}
+
 TEST(Tracker, OffersEachKeyframeOnceAndNoneBeforeThereIsAMap) {
   Tracker tracker({}, Camera(), 1);
   tracker.StartNewMap();
