@@ -91,6 +91,8 @@ class MapTracker {
   // Infinite points of this panorama map are looked for from now on beside the finite points; kNoId for none.
   void EnablePanorama(PanoramaId panorama) { panorama_ = panorama; }
   PanoramaId panorama() const { return panorama_; }
+  // How patches are compared from now on; kUsual at first.
+  void Compare(PatchComparison comparison) { searcher_.Compare(comparison); }
   // The frame just tracked was not believed: the next one chooses its points by the guessed pose alone.
   void Forget() {
     last_inliers_.clear();

@@ -161,6 +161,7 @@ std::optional<FoundPoint> PointSearcher::Find(const MapPoint& point, const KeyFr
   const std::vector<Corner>& corners = features.corners[level];
   const int first_row = std::clamp(static_cast<int>(center.y() - radius), 0, image.rows - 1);
   const int last_row = std::clamp(static_cast<int>(center.y() + radius) + 1, 0, image.rows);
+  const bool tolerant = comparison_ == PatchComparison::kTolerant;
   float best = options_.min_corner_correlation;
   const Corner* best_corner = nullptr;
   for (int i = row_begin[static_cast<std::size_t>(first_row)];
@@ -169,21 +170,26 @@ std::optional<FoundPoint> PointSearcher::Find(const MapPoint& point, const KeyFr
     const float dx = static_cast<float>(corner.x) - center.x(),
                 dy = static_cast<float>(corner.y) - center.y();
     if (dx * dx + dy * dy > radius * radius) continue;
-    const float correlation = PatchCorrelation(patch, image, corner.x, corner.y);
+    const float correlation = tolerant ? TolerantPatchCorrelation(patch, image, corner.x, corner.y)
+                                       : PatchCorrelation(patch, image, corner.x, corner.y);
     if (correlation > best) {
       best = correlation;
       best_corner = &corner;
     }
   }
   if (best_corner) {
-    const auto aligned = AlignPatch(patch, image, {best_corner->x, best_corner->y});
+    const Eigen::Vector2f start{best_corner->x, best_corner->y};
+    const auto aligned =
+        tolerant ? AlignPatchTolerantly(patch, image, start) : AlignPatch(patch, image, start);
     if (aligned && aligned->correlation >= options_.min_correlation) {
       return FoundPoint{LevelZeroFromLevel(aligned->pixel.cast<double>(), predicted.level).cast<float>(),
                         aligned->correlation};
     }
   }
   if (direct && PatchFits(image, center.x(), center.y(), 2.0f)) {
-    const auto aligned = AlignPatch(patch, image, center, options_.max_direct_shift_px);
+    const float shift_px = options_.max_direct_shift_px;
+    const auto aligned = tolerant ? AlignPatchTolerantly(patch, image, center, shift_px)
+                                  : AlignPatch(patch, image, center, shift_px);
     if (aligned && aligned->correlation >= options_.min_direct_correlation) {
       return FoundPoint{LevelZeroFromLevel(aligned->pixel.cast<double>(), predicted.level).cast<float>(),
                         aligned->correlation};

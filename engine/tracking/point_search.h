@@ -40,9 +40,18 @@ struct FoundPoint {
   float correlation = 0;
 };
 
+enum class PatchComparison : std::uint8_t {
+  kUsual,
+  kTolerant  // of images whose exposure or sharpness may be another; see AlignPatchTolerantly
+};
+
 class PointSearcher {
  public:
   explicit PointSearcher(const SearchOptions& options = {}) : options_(options) {}
+
+  // How patches are compared from now on; kUsual at first.
+  void Compare(PatchComparison comparison) { comparison_ = comparison; }
+  PatchComparison comparison() const { return comparison_; }
 
   // Forgets all patches; to be called when another map is searched.
   void Clear();
@@ -98,6 +107,7 @@ class PointSearcher {
   PatchTemplate& PatchOf(Cached* entry);
 
   SearchOptions options_;
+  PatchComparison comparison_ = PatchComparison::kUsual;
   std::vector<Cached> cache_;  // direct mapped: slot id % size
   // Most points that are predicted are never looked for, and a patch is large: room for all is reserved, but
   // touched only as patches come.

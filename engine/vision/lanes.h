@@ -37,6 +37,9 @@ inline EightFloats LoadFloats(const float* from) {
 inline void Store(const EightFloats& lanes, float* to) {
   cv::v_store(to, lanes);
 }
+inline EightFloats Smaller(const EightFloats& a, const EightFloats& b) {
+  return cv::v_min(a, b);
+}
 inline void StoreRounded(const EightFloats& lanes, int* to) {
   cv::v_store(to, cv::v_round(lanes));
 }
@@ -85,6 +88,9 @@ inline EightFloats LoadFloats(const float* from) {
 inline void Store(const EightFloats& lanes, float* to) {
   cv::v_store(to, lanes.low);
   cv::v_store(to + 4, lanes.high);
+}
+inline EightFloats Smaller(const EightFloats& a, const EightFloats& b) {
+  return {cv::v_min(a.low, b.low), cv::v_min(a.high, b.high)};
 }
 inline void StoreRounded(const EightFloats& lanes, int* to) {
   cv::v_store(to, cv::v_round(lanes.low));

@@ -2,7 +2,9 @@
 #include "engine/vision/patch.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "engine/vision/lanes.h"
 
@@ -14,6 +16,10 @@ constexpr int kBordered = kPatchSize + 2;
 constexpr float kHalf = kPatchSize / 2;
 // Grey values squared; below it a patch is sensor noise.
 constexpr float kMinVariance = 9.0f;
+constexpr float kMinDeterminant = 1e3f;  // of the Hessian
+// Within which the contrast of an image may differ from the patch's: two f-stops either way. Blur lowers it,
+// exposure raises or lowers it.
+constexpr float kMinContrast = 0.25f, kMaxContrast = 4.0f;
 
 float SampleBilinear(const cv::Mat& image, float x, float y) {
   const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
@@ -54,13 +60,17 @@ struct ShiftedSums {
   Eigen::Vector2f value_times_gradient;
 };
 
-// left, top: of the patch in the picture, interpolated between pixels.
-ShiftedSums SumShifted(const PatchTemplate& patch, const cv::Mat& image, float left, float top) {
+// left, top: of the patch in the picture, interpolated between pixels. With kLimited brighter values count as
+// `limit`.
+template <bool kLimited>
+ShiftedSums SumShifted(const PatchTemplate& patch, const cv::Mat& image, float left, float top,
+                       float limit = 0) {
   static_assert(kPatchSize == 8);  // a row is eight floats
   const int x0 = static_cast<int>(left), y0 = static_cast<int>(top);
   const EightFloats to_right = AllFloats(left - static_cast<float>(x0));
   const EightFloats to_below = AllFloats(top - static_cast<float>(y0));
   const EightFloats mean = AllFloats(patch.Mean());
+  [[maybe_unused]] const EightFloats limit_less_mean = AllFloats(limit - patch.Mean());
   const std::uint8_t* row = image.ptr<std::uint8_t>(y0) + x0;
   const auto along_row = [&] {
     const EightFloats here = LoadAsFloats(row);
@@ -71,7 +81,8 @@ ShiftedSums SumShifted(const PatchTemplate& patch, const cv::Mat& image, float l
   for (std::size_t at = 0; at < kPatchArea; at += kPatchSize) {
     row += image.step[0];
     const EightFloats below = along_row();
-    const EightFloats value = above + to_below * (below - above);
+    EightFloats value = above + to_below * (below - above);
+    if constexpr (kLimited) value = Smaller(value, limit_less_mean);
     above = below;
     sum += value;
     squares += value * value;
@@ -80,6 +91,145 @@ ShiftedSums SumShifted(const PatchTemplate& patch, const cv::Mat& image, float l
     along_y += value * LoadAsFloats(&patch.gradient_y[at]);
   }
   return {Sum(sum), Sum(squares), Sum(cross), {Sum(along_x), Sum(along_y)}};
+}
+
+using PatchPixels = std::array<std::uint8_t, kPatchArea>;
+
+// Those of the patch about a whole pixel, which lies inside.
+PatchPixels PixelsAbout(const cv::Mat& image, int x, int y) {
+  PatchPixels pixels;
+  const std::uint8_t* row = image.ptr<std::uint8_t>(y - kPatchSize / 2) + x - kPatchSize / 2;
+  for (std::size_t i = 0; i < kPatchSize; ++i, row += image.step[0])
+    std::copy(row, row + kPatchSize, pixels.begin() + static_cast<std::ptrdiff_t>(i * kPatchSize));
+  return pixels;
+}
+
+int CountSaturated(const PatchPixels& pixels) {
+  return static_cast<int>(std::count_if(pixels.begin(), pixels.end(),
+                                        [](std::uint8_t value) { return value >= kSaturatedGrey; }));
+}
+
+// The grey value of the count-th brightest pixel; count > 0.
+std::uint8_t NthBrightest(PatchPixels pixels, int count) {
+  const auto at = pixels.begin() + (count - 1);
+  std::nth_element(pixels.begin(), at, pixels.end(), std::greater<>());
+  return *at;
+}
+
+float CorrelationOf(const PatchPixels& a, const PatchPixels& b) {
+  int sum_a = 0, sum_b = 0, aa = 0, bb = 0, ab = 0;
+  for (std::size_t i = 0; i < kPatchArea; ++i) {
+    const int va = a[i], vb = b[i];
+    sum_a += va;
+    sum_b += vb;
+    aa += va * va;
+    bb += vb * vb;
+    ab += va * vb;
+  }
+  const float covariance = static_cast<float>(kPatchArea * ab - sum_a * sum_b);
+  const float product = static_cast<float>(kPatchArea * aa - sum_a * sum_a) *
+                        static_cast<float>(kPatchArea * bb - sum_b * sum_b);
+  return product > 1.0f ? covariance / std::sqrt(product) : 0.0f;
+}
+
+// All sums and the Hessian, out of pixels and gradients. False where too little texture is left.
+bool Summarise(PatchTemplate* patch) {
+  int sum = 0, sum_of_squares = 0, sum_x = 0, sum_y = 0, dot_x = 0, dot_y = 0, xx = 0, xy = 0, yy = 0;
+  for (std::size_t at = 0; at < kPatchArea; ++at) {
+    const int value = patch->pixels[at], x = patch->gradient_x[at], y = patch->gradient_y[at];
+    sum += value;
+    sum_of_squares += value * value;
+    sum_x += x;
+    sum_y += y;
+    dot_x += x * value;
+    dot_y += y * value;
+    xx += x * x;
+    xy += x * y;
+    yy += y * y;
+  }
+  patch->sum = sum;
+  patch->sum_of_squares = sum_of_squares;
+  if (patch->Variance() < kMinVariance) return false;
+  // Of half the gradients and a constant brightness.
+  const float xx_4 = 0.25f * static_cast<float>(xx), xy_4 = 0.25f * static_cast<float>(xy),
+              yy_4 = 0.25f * static_cast<float>(yy);
+  const float x_2 = 0.5f * static_cast<float>(sum_x), y_2 = 0.5f * static_cast<float>(sum_y);
+  Eigen::Matrix3f hessian;
+  hessian << xx_4, xy_4, x_2, xy_4, yy_4, y_2, x_2, y_2, kPatchArea;
+  if (!(hessian.determinant() > kMinDeterminant)) return false;
+  patch->inverse_hessian = hessian.inverse();
+  patch->gradient_sum = Eigen::Vector2i(sum_x, sum_y).cast<float>();
+  patch->gradient_dot_pixel =
+      Eigen::Vector2i(dot_x, dot_y).cast<float>() - patch->Mean() * patch->gradient_sum;
+  return true;
+}
+
+// The patch with its `count` brightest pixels equally bright; false where too little texture is left.
+bool LimitBrightness(const PatchTemplate& patch, int count, PatchTemplate* limited) {
+  const std::uint8_t limit = NthBrightest(patch.pixels, count);
+  for (std::size_t at = 0; at < kPatchArea; ++at) {
+    const bool flat = patch.pixels[at] >= limit;
+    limited->pixels[at] = std::min(patch.pixels[at], limit);
+    limited->gradient_x[at] = flat ? std::int16_t{0} : patch.gradient_x[at];
+    limited->gradient_y[at] = flat ? std::int16_t{0} : patch.gradient_y[at];
+  }
+  return Summarise(limited);
+}
+
+// The contrast of the image against the patch's.
+enum class Contrast { kEqual, kEstimated };
+
+// kLimited: see SumShifted.
+template <Contrast kContrast, bool kLimited>
+std::optional<PatchAlignment> Align(const PatchTemplate& patch, const cv::Mat& image,
+                                    const Eigen::Vector2f& start, float max_shift_px, int max_iterations,
+                                    float limit = 0) {
+  constexpr float kConverged = 0.02f;  // pixels
+  constexpr float kWeight = 1.0f / kPatchArea;
+  float x = start.x(), y = start.y();
+  float brightness = 0;
+  bool converged = false;
+  float correlation = 0;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    if (!PatchFits(image, x, y, 1.0f)) return std::nullopt;
+    const ShiftedSums sums = SumShifted<kLimited>(patch, image, x - kHalf, y - kHalf, limit);
+    const float mean = sums.value * kWeight;
+    const float covariance = sums.value_times_pixel * kWeight - mean * patch.Mean();
+    const float product = (sums.value_squared * kWeight - mean * mean) * patch.Variance();
+    correlation = product > 1e-3f ? covariance / std::sqrt(product) : 0;
+    if (converged) break;
+    Eigen::Vector2f step;
+    if constexpr (kContrast == Contrast::kEqual) {
+      // Of the error: value - pixel - brightness.
+      const Eigen::Vector2f steepest =
+          sums.value_times_gradient - patch.gradient_dot_pixel - brightness * patch.gradient_sum;
+      const Eigen::Vector3f update =
+          patch.inverse_hessian *
+          Eigen::Vector3f(0.5f * steepest[0], 0.5f * steepest[1], sums.value - kPatchArea * brightness);
+      step = update.head<2>();
+      brightness += update[2];
+    } else {
+      // The image's contrast in units of the patch's, as the regression of the one on the other. A step that
+      // took the two for equal would be too long or too short by that: at twice the contrast it never ends.
+      const float contrast = std::clamp(covariance / patch.Variance(), kMinContrast, kMaxContrast);
+      // Of the error: value - contrast * pixel - brightness.
+      const Eigen::Vector2f steepest =
+          sums.value_times_gradient - contrast * patch.gradient_dot_pixel - brightness * patch.gradient_sum;
+      const Eigen::Vector3f update =
+          patch.inverse_hessian *
+          Eigen::Vector3f(0.5f * steepest[0], 0.5f * steepest[1], sums.value - kPatchArea * brightness);
+      step = update.head<2>() / contrast;
+      brightness += update[2];
+    }
+    x -= step[0];
+    y -= step[1];
+    const float shift_x = x - start.x(), shift_y = y - start.y();
+    if (!(shift_x * shift_x + shift_y * shift_y <= max_shift_px * max_shift_px)) return std::nullopt;
+    // One more pass after convergence measures the correlation where the patch came to rest.
+    converged = step[0] * step[0] + step[1] * step[1] < kConverged * kConverged;
+  }
+  if (!converged) return std::nullopt;
+  return PatchAlignment{{x, y}, correlation};
 }
 
 }  // namespace
@@ -124,7 +274,7 @@ bool CutPatch(const cv::Mat& source, const Eigen::Vector2f& center, const Eigen:
   Eigen::Matrix3f hessian;
   hessian << xx, xy, x1, xy, yy, y1, x1, y1, kPatchArea;
   const float determinant = hessian.determinant();
-  if (!(determinant > 1e3f)) return false;
+  if (!(determinant > kMinDeterminant)) return false;
   patch->inverse_hessian = hessian.inverse();
   patch->gradient_sum = Eigen::Vector2i(sum_x, sum_y).cast<float>();
   patch->gradient_dot_pixel =
@@ -159,36 +309,34 @@ float PatchCorrelation(const PatchTemplate& patch, const cv::Mat& image, int x, 
 std::optional<PatchAlignment> AlignPatch(const PatchTemplate& patch, const cv::Mat& image,
                                          const Eigen::Vector2f& start, float max_shift_px,
                                          int max_iterations) {
-  constexpr float kConverged = 0.02f;  // pixels
-  constexpr float kWeight = 1.0f / kPatchArea;
-  float x = start.x(), y = start.y();
-  float brightness = 0;
-  bool converged = false;
-  float correlation = 0;
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (!PatchFits(image, x, y, 1.0f)) return std::nullopt;
-    const ShiftedSums sums = SumShifted(patch, image, x - kHalf, y - kHalf);
-    const float mean = sums.value * kWeight;
-    const float covariance = sums.value_times_pixel * kWeight - mean * patch.Mean();
-    const float product = (sums.value_squared * kWeight - mean * mean) * patch.Variance();
-    correlation = product > 1e-3f ? covariance / std::sqrt(product) : 0;
-    if (converged) break;
-    // Of the error: value - pixel - brightness.
-    const Eigen::Vector2f steepest =
-        sums.value_times_gradient - patch.gradient_dot_pixel - brightness * patch.gradient_sum;
-    const Eigen::Vector3f update =
-        patch.inverse_hessian *
-        Eigen::Vector3f(0.5f * steepest[0], 0.5f * steepest[1], sums.value - kPatchArea * brightness);
-    x -= update[0];
-    y -= update[1];
-    brightness += update[2];
-    const float shift_x = x - start.x(), shift_y = y - start.y();
-    if (!(shift_x * shift_x + shift_y * shift_y <= max_shift_px * max_shift_px)) return std::nullopt;
-    // One more pass after convergence measures the correlation where the patch came to rest.
-    converged = update[0] * update[0] + update[1] * update[1] < kConverged * kConverged;
-  }
-  if (!converged) return std::nullopt;
-  return PatchAlignment{{x, y}, correlation};
+  return Align<Contrast::kEqual, false>(patch, image, start, max_shift_px, max_iterations);
+}
+
+float TolerantPatchCorrelation(const PatchTemplate& patch, const cv::Mat& image, int x, int y) {
+  PatchPixels seen = PixelsAbout(image, x, y);
+  const int count = std::max(CountSaturated(patch.pixels), CountSaturated(seen));
+  if (count == 0) return PatchCorrelation(patch, image, x, y);
+  if (count > kMaxSaturatedPixels) return 0;
+  PatchPixels wanted = patch.pixels;
+  const std::uint8_t seen_limit = NthBrightest(seen, count), wanted_limit = NthBrightest(wanted, count);
+  for (std::uint8_t& value : seen) value = std::min(value, seen_limit);
+  for (std::uint8_t& value : wanted) value = std::min(value, wanted_limit);
+  return CorrelationOf(wanted, seen);
+}
+
+std::optional<PatchAlignment> AlignPatchTolerantly(const PatchTemplate& patch, const cv::Mat& image,
+                                                   const Eigen::Vector2f& start, float max_shift_px,
+                                                   int max_iterations) {
+  // What saturates is told where the search begins, and is taken to be the same a pixel or two from there.
+  if (!PatchFits(image, start.x(), start.y(), 1.0f)) return std::nullopt;
+  const PatchPixels seen = PixelsAbout(image, static_cast<int>(start.x()), static_cast<int>(start.y()));
+  const int count = std::max(CountSaturated(patch.pixels), CountSaturated(seen));
+  if (count == 0)
+    return Align<Contrast::kEstimated, false>(patch, image, start, max_shift_px, max_iterations);
+  PatchTemplate limited;
+  if (count > kMaxSaturatedPixels || !LimitBrightness(patch, count, &limited)) return std::nullopt;
+  return Align<Contrast::kEstimated, true>(limited, image, start, max_shift_px, max_iterations,
+                                           NthBrightest(seen, count));
 }
 
 float ShiTomasiScore(const cv::Mat& image, int x, int y) {

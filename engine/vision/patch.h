@@ -14,6 +14,11 @@ namespace docent::engine {
 
 inline constexpr int kPatchSize = 8;
 inline constexpr int kPatchArea = kPatchSize * kPatchSize;
+// Grey values from here on are saturated: a grey value is a mean over colour channels and over the pixels of
+// a finer level, and video compression moves it by a few steps.
+inline constexpr std::uint8_t kSaturatedGrey = 250;
+// Of a patch; with more saturated pixels hardly anything is left that could be told apart.
+inline constexpr int kMaxSaturatedPixels = 3 * kPatchArea / 4;
 
 struct PatchTemplate {
   alignas(32) std::array<std::uint8_t, kPatchArea> pixels{};
@@ -57,6 +62,16 @@ struct PatchAlignment {
 std::optional<PatchAlignment> AlignPatch(const PatchTemplate& patch, const cv::Mat& image,
                                          const Eigen::Vector2f& start, float max_shift_px = 3.0f,
                                          int max_iterations = 10);
+
+// The same for images whose exposure or sharpness is another than the patch's. The alignment estimates the
+// contrast as well. A pixel that saturates tells only that the surface is at least so bright: where one image
+// saturates in n pixels of a patch, the n brightest pixels of both are compared as if they were equally
+// bright, as an exposure that maps one patch to the other maps its n brightest pixels to the saturated ones.
+// Costs more, and what is alike passes for the same more easily.
+float TolerantPatchCorrelation(const PatchTemplate& patch, const cv::Mat& image, int x, int y);
+std::optional<PatchAlignment> AlignPatchTolerantly(const PatchTemplate& patch, const cv::Mat& image,
+                                                   const Eigen::Vector2f& start, float max_shift_px = 3.0f,
+                                                   int max_iterations = 10);
 
 // Smaller eigenvalue of the gradient matrix over a 7x7 window about a whole pixel (Shi and Tomasi 1994),
 // grey values squared.

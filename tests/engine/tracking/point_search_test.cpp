@@ -103,6 +103,33 @@ TEST_F(PointSearch, FindsPointsWhereTheHomographyPutsThem) {
   }
 }
 
+// As a camera takes the image with two and a half times the light.
+TEST_F(PointSearch, FindsMorePointsOfAnOverExposedImageWhenItComparesTolerantly) {
+  PointSearcher usual, tolerant;
+  tolerant.Compare(PatchComparison::kTolerant);
+  int found_usually = 0, found_tolerantly = 0;
+  std::vector<double> errors;  // of the tolerant search, in pixels of the level
+  for (const Rigid3& view : Views()) {
+    const cv::Mat image = world_->Render(*camera_, view, 1.5, 5);
+    const auto features = MakeFeatures(image * 2.5);
+    for (const MapPoint& point : map_->points) {
+      auto predicted = usual.Predict(point, Source(), *camera_, view);
+      if (!predicted) continue;
+      const Eigen::Vector2d truth = predicted->pixel;
+      predicted->pixel += Eigen::Vector2d(3, -2);
+      if (usual.Find(point, Source(), *predicted, *features, 8, true)) ++found_usually;
+      const auto found = tolerant.Find(point, Source(), *predicted, *features, 8, true);
+      if (!found) continue;
+      ++found_tolerantly;
+      errors.push_back((found->pixel.cast<double>() - truth).norm() / (1 << predicted->level));
+    }
+  }
+  EXPECT_GT(found_tolerantly, 1.3 * found_usually);
+  ASSERT_FALSE(errors.empty());
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.2);
+}
+
 TEST_F(PointSearch, ChoosesTheLevelThatShowsThePatchAtItsOwnSize) {
   PointSearcher searcher;
   for (const double distance : {0.15, 0.3, 0.5, 1.0, 1.5, 2.0, 3.5, 5.0, 9.0, 20.0}) {

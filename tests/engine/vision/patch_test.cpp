@@ -93,6 +93,64 @@ TEST(PatchAlignment, IgnoresAChangeOfBrightness) {
   }
 }
 
+TEST(TolerantPatchAlignment, ConvergesAtAnyContrast) {
+  Random random(11);
+  for (const double contrast : {0.3, 0.5, 1.9, 2.5, 3.5}) {
+    const double of_patch = std::min(1.0, 1 / contrast), of_image = of_patch * contrast;
+    int converged = 0;
+    for (int trial = 0; trial < 100; ++trial) {
+      const Eigen::Vector2f center(static_cast<float>(20 + random.Below(80)),
+                                   static_cast<float>(20 + random.Below(60)));
+      const Eigen::Vector2d shift(random.Uniform(-1, 1), random.Uniform(-1, 1));
+      const cv::Mat source =
+          Picture(120, 100, [&](double x, double y) { return of_patch * (Texture(x, y) - 128) + 128; });
+      const cv::Mat image = Picture(120, 100, [&](double x, double y) {
+        return of_image * (Texture(x - shift.x(), y - shift.y()) - 128) + 128;
+      });
+      PatchTemplate patch;
+      ASSERT_TRUE(CutPatch(source, center, kUnwarped, &patch));
+      const auto aligned = AlignPatchTolerantly(patch, image, center);
+      if (!aligned) continue;
+      ++converged;
+      EXPECT_LT((aligned->pixel.cast<double>() - center.cast<double>() - shift).norm(), 0.3) << contrast;
+    }
+    EXPECT_GE(converged, 95) << contrast;
+  }
+}
+
+// As a camera takes the texture with so much more light.
+cv::Mat OverExposed(double gain, const Eigen::Vector2d& shift) {
+  return Picture(120, 100, [=](double x, double y) { return gain * Texture(x - shift.x(), y - shift.y()); });
+}
+int SaturatedIn(const cv::Mat& image, int x, int y) {
+  return cv::countNonZero(image(cv::Rect(x - 4, y - 4, kPatchSize, kPatchSize)) >= kSaturatedGrey);
+}
+
+TEST(TolerantPatchAlignment, FindsWhatSaturatesInOneImage) {
+  Random random(12);
+  int partly = 0, found = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const Eigen::Vector2i center(20 + static_cast<int>(random.Below(80)),
+                                 20 + static_cast<int>(random.Below(60)));
+    const Eigen::Vector2d shift(random.Uniform(-1, 1), random.Uniform(-1, 1));
+    // Either the patch or the image may be the one that saturates.
+    const bool swapped = trial % 2 == 0;
+    const cv::Mat bright = OverExposed(1.9, swapped ? Eigen::Vector2d::Zero() : shift);
+    const cv::Mat fair = OverExposed(1, swapped ? shift : Eigen::Vector2d::Zero());
+    const int saturated = SaturatedIn(bright, center.x(), center.y());
+    if (saturated == 0 || saturated > kPatchArea / 2) continue;
+    PatchTemplate patch;
+    if (!CutPatch(swapped ? bright : fair, center.cast<float>(), kUnwarped, &patch)) continue;
+    ++partly;
+    const auto aligned = AlignPatchTolerantly(patch, swapped ? fair : bright, center.cast<float>());
+    if (!aligned || aligned->correlation < 0.9f) continue;
+    if ((aligned->pixel.cast<double>() - center.cast<double>() - shift).norm() < 0.3) ++found;
+  }
+  ASSERT_GT(partly, 100);
+  // Alignment that takes saturated pixels at their word finds a third.
+  EXPECT_GT(found, 0.7 * partly);
+}
+
 TEST(PatchAlignment, FollowsAnAffineWarp) {
   Random random(5);
   for (int trial = 0; trial < 100; ++trial) {
@@ -229,6 +287,41 @@ TEST(PatchCorrelation, IsOneAtHomeMinusOneInTheNegativeAndNothingOnBlank) {
   EXPECT_EQ(PatchCorrelation(patch, blank, 60, 50), 0);
   const cv::Mat dim = Picture(120, 100, [](double x, double y) { return 0.5 * Texture(x, y) + 20; });
   EXPECT_GT(PatchCorrelation(patch, dim, 60, 50), 0.999f);
+}
+
+TEST(TolerantPatchCorrelation, IsTheUsualOneWhereNothingSaturates) {
+  Random random(14);
+  const cv::Mat fair =
+      Picture(120, 100, [](double x, double y) { return 0.8 * (Texture(x, y) - 128) + 120; });
+  for (int trial = 0; trial < 100; ++trial) {
+    const int x = 10 + static_cast<int>(random.Below(100)), y = 10 + static_cast<int>(random.Below(80));
+    PatchTemplate patch;
+    ASSERT_TRUE(CutPatch(fair, {60, 50}, kUnwarped, &patch));
+    EXPECT_EQ(TolerantPatchCorrelation(patch, fair, x, y), PatchCorrelation(patch, fair, x, y));
+  }
+}
+
+TEST(TolerantPatchCorrelation, IsHighWhereTheImageSaturatesInPartAndNothingWhereItDoesNearlyEverywhere) {
+  const cv::Mat bright = OverExposed(1.9, Eigen::Vector2d::Zero());
+  Random random(13);
+  int partly = 0, nearly_all = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    const int x = 10 + static_cast<int>(random.Below(100)), y = 10 + static_cast<int>(random.Below(80));
+    PatchTemplate patch;
+    const Eigen::Vector2f center(static_cast<float>(x), static_cast<float>(y));
+    ASSERT_TRUE(CutPatch(TexturePicture(), center, kUnwarped, &patch));
+    const int saturated = SaturatedIn(bright, x, y);
+    if (saturated > kMaxSaturatedPixels) {
+      ++nearly_all;
+      EXPECT_EQ(TolerantPatchCorrelation(patch, bright, x, y), 0);
+    } else if (saturated > 0) {
+      ++partly;
+      // Pixels between kSaturatedGrey and white are not all the same.
+      EXPECT_GT(TolerantPatchCorrelation(patch, bright, x, y), 0.98f) << saturated;
+    }
+  }
+  EXPECT_GT(partly, 100);
+  EXPECT_GT(nearly_all, 100);
 }
 
 TEST(ShiTomasi, IsTheSmallerEigenvalueOfTheMeanGradientMatrix) {
