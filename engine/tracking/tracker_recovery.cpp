@@ -10,7 +10,12 @@ namespace docent::engine {
 
 // Whether a pose that was found after a loss counts: kNone, or what speaks against it.
 Doubt Tracker::DoubtOf(const MapTrackResult& result, const MapSnapshot& map) const {
-  if (result.inliers < options_.min_recovery_inliers || result.Quality() < options_.min_recovery_quality)
+  // Images that differ from the map's show fewer of its points, but still many of them, which fit well.
+  const bool fits = comparison_ == PatchComparison::kTolerant &&
+                    result.inliers >= options_.min_fitting_inliers &&
+                    result.sigma <= options_.max_fitting_sigma;
+  const double min_quality = fits ? options_.lost_quality : options_.min_recovery_quality;
+  if (result.inliers < options_.min_recovery_inliers || result.Quality() < min_quality)
     return Doubt::kFewPoints;
   if (!result.converged || result.sigma > options_.max_sigma || !IsTurn(result, map)) return Doubt::kPoorFit;
   if (result.occupied_cells < options_.min_recovery_cells) return Doubt::kOneCorner;
@@ -37,9 +42,21 @@ bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, Track
   const auto rotation = RotationFromPrevious();
   const Rigid3 guess = rotation ? motion_.PredictWithRotation(*rotation) : motion_.Predict(frame.time);
   map_tracker_.EnablePanorama(PanoramaFor(guess));
-  const MapTrackResult result =
+  MapTrackResult result =
       map_tracker_.Track(*map_, *features_, guess, MapTracker::Effort::kRecovery, &random_);
   const Doubt doubt = DoubtOf(result, *map_);
+  if (doubt != Doubt::kNone && !options_.build_maps) {
+    // Where the patches of the upper levels are too few to tell a pose, the guess may still be good.
+    for (const auto effort : {MapTracker::Effort::kUsual, MapTracker::Effort::kWide}) {
+      if (HoldsOn(result)) break;
+      result = map_tracker_.Track(*map_, *features_, guess, effort, &random_);
+    }
+    if (HoldsOn(result)) {
+      out->state = TrackingState::kRelocalized;
+      Accept(frame, result, out);
+      return true;
+    }
+  }
   if (doubt == Doubt::kNone) {
     // What is poorly seen may be something else that is only alike.
     const auto is_better = [&](const std::optional<FoundPlace>& rival) {
@@ -265,9 +282,16 @@ void Tracker::Return(const Frame& frame, const FoundPlace& found, TrackedFrame* 
 void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
   out->state = map_ || !options_.build_maps ? TrackingState::kLost : TrackingState::kInitializing;
   out->hint = "look back at what was mapped";
+  // Every other frame: the exposure or sharpness may have changed. A map that is about to be entered is
+  // followed as it was found.
+  if (entering_frames_ == 0 && frames_lost_++ > 0) {
+    Compare(comparison_ == PatchComparison::kUsual ? PatchComparison::kTolerant : PatchComparison::kUsual);
+  }
   if (map_ && RecoverNearby(frame, places, out)) return;
   if (!places || GoOnEntering(frame, *places, out)) return;
-  map_tracker_.Clear();
+  // What was hidden from where a visitor was lost is so for a while.
+  if (options_.build_maps || !map_ || frame.time - lost_since_ > FromSeconds(options_.short_loss_s))
+    map_tracker_.Clear();
   const std::vector<TurnedPlace> alike = BestPlaces(*places);
   std::vector<FoundPlace> found = FindMaps(*places, alike, out);
   if (found.empty() && out->verdict.doubt != Doubt::kLookAlikes) {

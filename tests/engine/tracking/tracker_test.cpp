@@ -212,6 +212,31 @@ TEST(Tracker, FindsItsPlaceInAMapThatItIsGivenWithTheHelpOfAPlaceFinder) {
   EXPECT_LT(first, 46);
 }
 
+TEST(Tracker, FindsItsPlaceInOverExposedImagesAndStaysThereWhenTheExposureIsRightAgain) {
+  constexpr double kGain = 2.5;
+  const Walk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  SomeMaps places;
+  places.Add(9, walk.map);
+  TrackerOptions options;
+  options.build_maps = false;
+  Tracker tracker(options, Camera(), 3);
+  tracker.SetMap(walk.map, 9);
+  const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
+  int first = -1;
+  for (int i = 40; i < 80; ++i) {
+    Frame frame = FrameOf(i);
+    if (i < 60) frame.picture = frame.picture * kGain;
+    const TrackedFrame tracked = tracker.Track(frame, &places);
+    if (first < 0 && HasPose(tracked.state)) first = i;
+    if (first < 0) continue;
+    EXPECT_TRUE(HasPose(tracked.state)) << i;
+    EXPECT_LT(DistanceFromTruth(world_from_map, tracked.camera_from_map, Pose(i)), 0.05) << i;
+  }
+  EXPECT_GE(first, 40);
+  EXPECT_LT(first, 48);
+}
+
 TEST(Tracker, EntersAnotherMapOnlyAfterSeveralFramesAgree) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
