@@ -163,10 +163,14 @@ TEST(MapJoining, RefusesALookAlikeThatOtherThingsStandAbout) {
   const MapJoinAttempt attempt = JoinMaps({}, *a, *b, nullptr);
   EXPECT_EQ(attempt.joined, nullptr) << attempt.overlap.Brief();
   EXPECT_NE(attempt.refusal, "");
-  // It is what is not found again that gives them away: whoever does not ask for it is taken in.
+  // What stands where the other map has another surface gives them away: every keyframe sees the common
+  // panel.
+  EXPECT_EQ(attempt.overlap.verdict, Verdict::kContradicted) << attempt.overlap.Brief();
+  EXPECT_GT(attempt.overlap.contradicted * 5, attempt.overlap.regions) << attempt.overlap.Brief();
   MapJoiningOptions careless;
-  careless.overlap.min_confirmed = careless.overlap.min_found = 0;
-  EXPECT_EQ(JoinMaps(careless, *a, *b, nullptr).overlap.verdict, Verdict::kOverlap);
+  careless.overlap.max_contradicted = 1;
+  const MapJoinAttempt taken_in = JoinMaps(careless, *a, *b, nullptr);
+  EXPECT_EQ(taken_in.overlap.verdict, Verdict::kOverlap) << taken_in.overlap.Brief();
 }
 
 TEST(MapJoining, RefusesToChooseBetweenTwoPlacesThatLookTheSame) {
