@@ -101,99 +101,7 @@ int MergeTwins(const JoinedIds& ids, const std::vector<LoopSighting>& sightings,
   return merged;
 }
 
-// The similarities that take the surroundings of B's keyframes into the joined map: of those of b_then by
-// where they are, and of later ones by their neighbours.
-std::map<KeyFrameId, Sim3> JoinedFromAllOfB(const JoinedMap& joined, const MapSnapshot& b_then,
-                                            const MapSnapshot& b_now) {
-  std::map<KeyFrameId, Sim3> joined_from_b;
-  for (const KeyFrame& keyframe : b_then.keyframes)
-    joined_from_b[keyframe.id] =
-        joined.JoinedFromB(keyframe.id, b_now.FindKeyFrame(keyframe.id) ? b_now : b_then);
-  Map now(b_now);
-  for (const KeyFrame& keyframe : b_now.keyframes) {  // by ascending id: the earlier first
-    if (joined_from_b.contains(keyframe.id)) continue;
-    KeyFrameId leader = keyframe.id;
-    if (keyframe.kind == KeyFrameKind::kPanorama) leader = b_now.FindPanorama(keyframe.panorama)->reference;
-    Sim3 motion = joined_from_b.empty() ? joined.a_from_b : joined_from_b.rbegin()->second;
-    if (const auto known = joined_from_b.find(leader); known != joined_from_b.end()) {
-      motion = known->second;
-    } else {
-      for (const auto& [neighbour, shared] : now.Covisible(leader)) {
-        const auto found = joined_from_b.find(neighbour);
-        if (found == joined_from_b.end()) continue;
-        motion = found->second;
-        break;
-      }
-    }
-    joined_from_b[keyframe.id] = motion;
-  }
-  return joined_from_b;
-}
-
 }  // namespace
-
-std::shared_ptr<const MapSnapshot> WithGrowthOfB(const JoinedMap& joined, const MapSnapshot& b_then,
-                                                 const MapSnapshot& b_now) {
-  auto grown = std::make_shared<MapSnapshot>(*joined.map);
-  const JoinedIds& ids = joined.ids;
-  grown->revision = std::max(grown->revision, b_now.revision) + 1;
-  grown->next_keyframe = ids.first_keyframe + b_now.next_keyframe;
-  grown->next_point = ids.first_point + b_now.next_point;
-  grown->next_panorama = ids.first_panorama + b_now.next_panorama;
-  for (const PanoramaMap& panorama : b_now.panoramas) {
-    if (panorama.id < b_then.next_panorama || panorama.reference < b_then.next_keyframe) continue;
-    grown->panoramas.push_back({panorama.id + ids.first_panorama, panorama.reference + ids.first_keyframe});
-  }
-  const auto has_panorama = [&](PanoramaId id) {
-    return grown->FindPanorama(id + ids.first_panorama) != nullptr;
-  };
-  const std::map<KeyFrameId, Sim3> joined_from_b = JoinedFromAllOfB(joined, b_then, b_now);
-  for (KeyFrame keyframe : b_now.keyframes) {
-    if (keyframe.id < b_then.next_keyframe) continue;
-    if (keyframe.panorama != kNoId && !has_panorama(keyframe.panorama)) {
-      if (keyframe.kind == KeyFrameKind::kPanorama) continue;
-      keyframe.panorama = kNoId;
-    }
-    const Sim3& motion = joined_from_b.at(keyframe.id);
-    keyframe.camera_from_map = CarriedAlong(keyframe.camera_from_map, motion);
-    keyframe.mean_depth *= motion.scale;
-    keyframe.depth_sigma *= motion.scale;
-    keyframe.fixed = false;
-    keyframe.id += ids.first_keyframe;
-    if (keyframe.panorama != kNoId) keyframe.panorama += ids.first_panorama;
-    grown->keyframes.push_back(std::move(keyframe));
-  }
-  for (MapPoint point : b_now.points) {
-    if (point.id < b_then.next_point || (point.infinite() && !has_panorama(point.panorama)) ||
-        !grown->FindKeyFrame(point.source_keyframe + ids.first_keyframe))
-      continue;
-    const Sim3& motion = joined_from_b.at(point.source_keyframe);
-    if (point.infinite()) {
-      point.point_in_map.head<3>() = motion.rotation * point.position();
-      point.panorama += ids.first_panorama;
-    } else {
-      point.point_in_map.head<3>() = motion * point.position();
-    }
-    point.normal = (motion.rotation * point.normal.cast<double>()).cast<float>();
-    point.id += ids.first_point;
-    point.source_keyframe += ids.first_keyframe;
-    grown->points.push_back(point);
-  }
-  Map map(*grown);
-  for (Observation observation : b_now.observations) {
-    if (observation.keyframe < b_then.next_keyframe && observation.point < b_then.next_point) continue;
-    observation.keyframe += ids.first_keyframe;
-    observation.point += ids.first_point;
-    map.AddObservation(observation);  // where both are there
-  }
-  // A point is seen from somewhere.
-  for (const Map::PointRecord& point : map.points()) {
-    if (point.alive && point.observers.empty()) map.RemovePoint(point.point.id);
-  }
-  auto snapshot = std::make_shared<MapSnapshot>(*map.Snapshot());
-  snapshot->revision = grown->revision;
-  return snapshot;
-}
 
 MapSnapshot SideBySide(const MapSnapshot& a, const MapSnapshot& b, JoinedIds* ids) {
   *ids = {a.next_keyframe, a.next_point, a.next_panorama};
@@ -223,14 +131,6 @@ MapSnapshot SideBySide(const MapSnapshot& a, const MapSnapshot& b, JoinedIds* id
   for (const PanoramaMap& of_b : b.panoramas)
     both.panoramas.push_back({panorama(of_b.id), of_b.reference + ids->first_keyframe});
   return both;
-}
-
-Sim3 JoinedMap::JoinedFromB(KeyFrameId keyframe_of_b, const MapSnapshot& b) const {
-  const KeyFrame* const before = b.FindKeyFrame(keyframe_of_b);
-  const KeyFrame* const after = map->FindKeyFrame(keyframe_of_b + ids.first_keyframe);
-  if (!before || !after) return a_from_b;
-  const Sim3 scaled{Rotation3(), Eigen::Vector3d::Zero(), a_from_b.scale};
-  return AsSim3(after->camera_from_map).inverse() * scaled * AsSim3(before->camera_from_map);
 }
 
 MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, const MapSnapshot& b,

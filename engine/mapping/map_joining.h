@@ -37,9 +37,6 @@ struct JoinedMap {
   Sim3 a_from_b;
   JoinedIds ids;
   int points_merged = 0;
-  // From the coordinates of B to those of the joined map, about a keyframe of B (its id there). Takes a
-  // camera along with its surroundings (CarriedAlong).
-  Sim3 JoinedFromB(KeyFrameId keyframe_of_b, const MapSnapshot& b) const;
 };
 
 struct MapJoinAttempt {
@@ -52,13 +49,6 @@ struct MapJoinAttempt {
 // Both must be valid (Validate), with full features (MakeFeatures). interrupt may be null.
 MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, const MapSnapshot& b,
                         const std::atomic<bool>* interrupt);
-
-// The joined map with what B has come to while the maps were being joined: new keyframes go along with the
-// keyframe of b_then that they share most points with, new points with their source keyframe. What new
-// keyframes saw of points that were merged away is left out, as are new panorama maps about keyframes of
-// b_then. b_then is the B that was joined, b_now a later snapshot of the same map. The result is valid.
-std::shared_ptr<const MapSnapshot> WithGrowthOfB(const JoinedMap& joined, const MapSnapshot& b_then,
-                                                 const MapSnapshot& b_now);
 
 // Both maps side by side in one, unmoved: the ids of B are raised, and its fixed keyframes let go, so that
 // A's alone hold the frame. The revision is the higher of the two.

@@ -33,7 +33,8 @@ Mapper::Mapper(const MapperOptions& options)
       descriptors_(DefaultVocabulary()),
       loops_(options.loops, options.search) {}
 
-void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
+// What the stepping thread knows of its map begins anew; what waits is not touched.
+void Mapper::GoOnWith(const MapSnapshot* snapshot) {
   map_ = snapshot ? Map(*snapshot) : Map();
   searcher_.Clear();
   descriptors_.Clear();
@@ -47,11 +48,35 @@ void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
   }
   keyframes_since_global_ = 0;
   global_interrupted_ = thin_out_ = false;
+  loop_to_adjust_ = false;
   locally_adjusted_ = true;
+}
+
+void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
+  GoOnWith(snapshot.get());
   const std::lock_guard lock(mutex_);
   queue_.clear();
   reports_.clear();
   snapshot_ = std::move(snapshot);
+}
+
+MapJoinAttempt Mapper::Join(const MapSnapshot& other, const std::atomic<bool>* interrupt) {
+  const double start = ProcessorSeconds();
+  {
+    const std::lock_guard lock(mutex_);
+    stepping_ = true;
+  }
+  // As for a global adjustment, but of two maps.
+  searcher_.Release();
+  if (options_.pictures) options_.pictures->RestAll();
+  MapJoinAttempt attempt = JoinMaps(options_.joining, *map_.Snapshot(), other, interrupt);
+  if (attempt.joined) GoOnWith(attempt.joined->map.get());
+  EndWork(ProcessorSeconds() - start, &MapperTimes::other);
+  if (attempt.joined) {
+    const std::lock_guard lock(mutex_);
+    snapshot_ = attempt.joined->map;
+  }
+  return attempt;
 }
 
 bool Mapper::Offer(KeyFrameCandidate candidate) {
@@ -135,15 +160,18 @@ bool Mapper::Step() {
   } else {
     account = DoNextTask();
   }
-  const double seconds = ProcessorSeconds() - start;
+  EndWork(ProcessorSeconds() - start, account);
+  return account != nullptr;
+}
+
+// account: null when there was nothing to do.
+void Mapper::EndWork(double seconds, double MapperTimes::*account) {
   const std::lock_guard lock(mutex_);
   stepping_ = false;
   if (offered_during_step_)
     times_.longest_hold = std::max(times_.longest_hold, SecondsSince(*offered_during_step_));
   offered_during_step_.reset();
-  if (account == nullptr) return false;
-  times_.*account += seconds;
-  return true;
+  if (account != nullptr) times_.*account += seconds;
 }
 
 // The most urgent piece of work that no keyframe asks for; the account that its time goes to, null for none.

@@ -16,6 +16,7 @@
 #include "engine/mapping/loop_closing.h"
 #include "engine/mapping/map_adjustment.h"
 #include "engine/mapping/map_descriptors.h"
+#include "engine/mapping/map_joining.h"
 #include "engine/mapping/panorama_mapping.h"
 #include "engine/mapping/point_creation.h"
 #include "engine/mapping/redundancy.h"
@@ -43,6 +44,7 @@ struct MapperOptions {
   int conversion_partners = 30;  // keyframes in which a localized keyframe's infinite points are looked for
   MapAdjustmentOptions adjustment;
   LoopOptions loops;
+  MapJoiningOptions joining;
   SearchOptions search;
   std::shared_ptr<PictureStore> pictures;  // where keyframes' pictures lie; null: in memory
 };
@@ -84,6 +86,10 @@ class Mapper {
 
   // Goes on with a map from the library, or with nothing (null). Drops whatever waits. Not during a Step().
   void Adopt(std::shared_ptr<const MapSnapshot> snapshot);
+  // Takes another map into the present one where both show one place (map_joining.h): this one keeps its ids
+  // and coordinates, and what was offered waits on. Without `joined` in the answer nothing has changed. Takes
+  // seconds; not during a Step(). interrupt may be null.
+  MapJoinAttempt Join(const MapSnapshot& other, const std::atomic<bool>* interrupt);
 
   // False when the queue is full. Times of one map ascend.
   bool Offer(KeyFrameCandidate candidate);
@@ -111,6 +117,8 @@ class Mapper {
     bool looks_due = false;  // active search failed; its looks have not been asked yet
   };
 
+  void GoOnWith(const MapSnapshot* snapshot);
+  void EndWork(double seconds, double MapperTimes::*account);
   double MapperTimes::*DoNextTask();
   void StartMap(const InitialPair& pair);
   void StartFromPanorama(const KeyFrameCandidate& candidate);

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include "engine/mapping/mapper.h"
 #include "tests/engine/rendered_world.h"
 
 // Two cameras go along a gallery of painted panels, each with a smaller one standing before it, and each
@@ -115,10 +116,6 @@ TEST(MapJoining, MakesOneTrueMapOfBoth) {
         (joined.camera_from_map.OriginInSource() - world_from_b * keyframe.camera_from_map.OriginInSource())
             .norm(),
         0.02);
-    const Sim3 carried = attempt.joined->JoinedFromB(keyframe.id, *b);
-    EXPECT_LT((carried * keyframe.camera_from_map.OriginInSource() - joined.camera_from_map.OriginInSource())
-                  .norm(),
-              1e-9);
   }
   int astray = 0;
   for (const MapPoint& point : map.points)
@@ -194,30 +191,35 @@ TEST(MapJoining, CanBeInterrupted) {
   EXPECT_EQ(attempt.overlap.verdict, Verdict::kInterrupted);
 }
 
-TEST(MapJoining, AddsWhatOneMapHasGrownByMeanwhile) {
-  // B before its last three keyframes came.
+TEST(MapJoining, IsDoneByAMapperWhichKeepsWhatWasOffered) {
   const auto& [a, b] = OverlappingPair();
-  Map earlier(*b);
-  const KeyFrameId first_new = b->keyframes[b->keyframes.size() - 3].id;
-  for (const KeyFrame& keyframe : b->keyframes) {
-    if (keyframe.id >= first_new) earlier.RemoveKeyFrame(keyframe.id);
-  }
-  auto then = std::make_shared<MapSnapshot>(*earlier.Snapshot());
-  then->next_keyframe = first_new;
-  then->next_point = then->points.back().id + 1;
-  const MapJoinAttempt attempt = JoinMaps({}, *a, *then, nullptr);
+  Mapper mapper({});
+  mapper.Adopt(a);
+  const KeyFrame& last = a->keyframes.back();
+  KeyFrameCandidate candidate;
+  candidate.time = last.time;
+  candidate.camera = last.camera;
+  candidate.features = last.features;
+  candidate.camera_from_map = last.camera_from_map;
+  ASSERT_TRUE(mapper.Offer(candidate));
+  const MapJoinAttempt attempt = mapper.Join(*b, nullptr);
   ASSERT_NE(attempt.joined, nullptr) << attempt.refusal;
-  const auto grown = WithGrowthOfB(*attempt.joined, *then, *b);
+  EXPECT_EQ(mapper.Snapshot(), attempt.joined->map);
+  EXPECT_EQ(mapper.QueueLength(), 1u);
+  ASSERT_TRUE(mapper.Step());
+  const auto grown = mapper.Snapshot();
   EXPECT_EQ(Validate(*grown), "");
-  EXPECT_GT(grown->revision, attempt.joined->map->revision);
-  EXPECT_EQ(grown->keyframes.size(), a->keyframes.size() + b->keyframes.size());
-  EXPECT_GT(grown->points.size(), attempt.joined->map->points.size());
-  const KeyFrame& newest = grown->keyframes.back();
-  EXPECT_LT((newest.camera_from_map.OriginInSource() -
-             kOther.inverse() * b->keyframes.back().camera_from_map.OriginInSource())
-                .norm(),
-            0.03);
-  EXPECT_GT(Map(*grown).Covisible(newest.id).size(), 3u) << "it is tied to the keyframes before it";
+  EXPECT_EQ(grown->keyframes.size(), a->keyframes.size() + b->keyframes.size() + 1);
+  EXPECT_EQ(grown->keyframes.back().id, a->next_keyframe + b->next_keyframe) << "no id is given out twice";
+}
+
+TEST(MapJoining, LeavesTheMapOfAMapperAsItIsWhereItIsRefused) {
+  Mapper mapper({});
+  mapper.Adopt(OverlappingPair().a);
+  const std::atomic<bool> interrupt = true;
+  EXPECT_EQ(mapper.Join(*OverlappingPair().b, &interrupt).joined, nullptr);
+  EXPECT_EQ(mapper.Join(MapSnapshot(), nullptr).joined, nullptr);
+  EXPECT_EQ(mapper.Snapshot(), OverlappingPair().a);
 }
 
 TEST(MapJoining, TakesPanoramaMapsAlong) {
