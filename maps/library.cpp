@@ -250,6 +250,17 @@ class Library::Impl {
     RemoveMap(record.from.key);
   }
 
+  // False where it is gone already.
+  bool RemoveJoined(std::uint64_t key) {
+    const std::optional<MapInfo> info = ReadMapRow(database_, key);
+    if (!info) return false;
+    WithPlace(database_, *info, [&] {
+      if (!MayRemove(info->policy)) Refuse(info->policy, "it may not become a part of another map");
+    });
+    RemoveMap(key);
+    return true;
+  }
+
   void RemoveMap(std::uint64_t key) {
     RemoveMapRows(database_, key);
     LibraryRow library = ReadLibraryRow(database_);
@@ -380,6 +391,7 @@ bool Library::Save(const MapRecord& record) {
         impl_->Create(record);
       }
     });
+    for (const std::uint64_t key : record.holds) changed |= impl_->RemoveJoined(key);
     return changed;
   });
   return wanted;

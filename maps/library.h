@@ -71,8 +71,9 @@ class Library {
   // one.
   std::uint64_t NewKey();
   // Adds a map or brings it up to date; see MapRecord and the table in policy.h. What is unchanged costs
-  // nothing on disk: pictures of keyframes that are stored already are kept as they are. False, and nothing
-  // was written, when the stored revision is not the one that the record wants.
+  // nothing on disk: pictures of keyframes that are stored already are kept as they are. Maps that it holds
+  // now (MapRecord::holds) are removed in the same transaction. False, and nothing was written, when the
+  // stored revision is not the one that the record wants.
   bool Save(const MapRecord& record);
   void Rename(std::uint64_t key, const std::string& name);
   void Remove(std::uint64_t key);

@@ -46,6 +46,8 @@ struct MapRecord {
   std::optional<Bounds> bounds = std::nullopt;
   // When given, the map is only written over this revision: another program's work stays.
   std::optional<std::uint64_t> over_revision = std::nullopt;
+  // Maps that were joined into this one: those of them that are in the library are removed by this save.
+  std::vector<std::uint64_t> holds = {};
 };
 
 // What a list shows; read without touching points or pictures.

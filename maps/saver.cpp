@@ -29,6 +29,9 @@ Saver::~Saver() {
 void Saver::Submit(MapRecord record) {
   {
     std::unique_lock lock(mutex_);
+    // What waits of a map that is a part of this one now would bring it back.
+    for (const std::uint64_t gone : record.holds)
+      std::erase_if(waiting_, [&](const MapRecord& waiting) { return waiting.key == gone; });
     const auto same_map = [&] {
       return std::find_if(waiting_.begin(), waiting_.end(),
                           [&](const MapRecord& waiting) { return waiting.key == record.key; });
@@ -37,6 +40,7 @@ void Saver::Submit(MapRecord record) {
     if (const auto place = same_map(); place != waiting_.end()) {
       if (record.snapshot) place->snapshot = std::move(record.snapshot);
       if (record.scene) place->scene = std::move(record.scene);
+      place->holds.insert(place->holds.end(), record.holds.begin(), record.holds.end());
     } else {
       waiting_.push_back(std::move(record));
     }

@@ -20,7 +20,8 @@ namespace docent::maps {
 
 // Saves maps on a thread of its own, so that nobody who tracks or draws waits for a disk. Requests wait in a
 // short queue with one place a map: a newer snapshot or scene of a map takes the place of the older one that
-// was not written yet. When and how often to save is up to the caller, and so is the upkeep that fills the
+// was not written yet, and what waits of maps that were joined into another one (MapRecord::holds) is
+// forgotten. When and how often to save is up to the caller, and so is the upkeep that fills the
 // time between: a save interrupts it. Any thread may call. A save that fails does not stop the others; its
 // exception waits for TakeError, and nothing that was saved before is lost.
 class Saver {

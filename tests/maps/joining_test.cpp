@@ -142,6 +142,23 @@ TEST_F(JoinedLibrary, LeavesWhatAnotherProgramHasChangedMeanwhile) {
   EXPECT_EQ(Names(), (std::vector<std::string>{"East", "West"}));
 }
 
+TEST_F(JoinedLibrary, LosesAMapWithTheSaveOfTheOneThatHoldsIt) {
+  Add("East", 1);
+  Add("West", 5);
+  const MapInfo east = library_.FindByName("East"), west = library_.FindByName("West");
+  MapRecord record{east.key, "", Policy::kOpen, MakeSampleMap(3), MakeSampleScene(5, 1)};
+  record.holds = {west.key, west.key + 50};
+  library_.SetPolicy(west.key, Policy::kReadOnly);
+  EXPECT_THAT(ErrorOf([&] { library_.Save(record); }), AllOf(HasSubstr("West"), HasSubstr("read-only")));
+  EXPECT_EQ(library_.Find(east.key), east) << "nothing was written";
+  library_.SetPolicy(west.key, Policy::kOpen);
+  EXPECT_TRUE(library_.Save(record));
+  EXPECT_EQ(Names(), std::vector<std::string>{"East"});
+  EXPECT_EQ(FirstDifference(library_.Load(east.key).scene, *record.scene), "") << "with an asset of West";
+  EXPECT_TRUE(library_.Save(record)) << "what is gone already is no fault";
+  EXPECT_THAT(library_.Verify(), IsEmpty());
+}
+
 TEST_F(JoinedLibrary, KeepsTwoMapsThatDoNotOverlap) {
   library_.Save({library_.NewKey(), "East", Policy::kOpen, MakeTrueMap(), nullptr});
   library_.Save({library_.NewKey(), "West", Policy::kOpen, MakeTrueMap(), nullptr});

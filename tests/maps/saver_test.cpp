@@ -71,6 +71,26 @@ TEST_F(SaverTest, TheLatestOfAMapWinsAndASceneIsNotLostToALaterSnapshot) {
   EXPECT_EQ(FirstDifference(library_->LoadScene(b), *scene), "");
 }
 
+TEST_F(SaverTest, DoesNotBringBackAMapThatAnotherOneHolds) {
+  const std::uint64_t a = library_->NewKey(), b = library_->NewKey();
+  Saver saver(&*library_);
+  hold_ = true;
+  saver.Submit({b, "Door", Policy::kOpen, MakeSampleMap(2), nullptr});
+  WaitUntilASaveRuns();
+  // The save of `a` that waits before that of `b` takes up that it holds `b`.
+  saver.Submit({a, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
+  saver.Submit({b, "", Policy::kOpen, MakeSampleMap(3), nullptr});
+  MapRecord both{a, "", Policy::kOpen, MakeSampleMap(4), nullptr};
+  both.holds = {b};
+  saver.Submit(both);
+  EXPECT_EQ(saver.pending(), 2u);
+  hold_ = false;
+  saver.Flush();
+  EXPECT_EQ(saver.TakeError(), nullptr);
+  ASSERT_EQ(library_->List().size(), 1u);
+  EXPECT_EQ(FirstDifference(*library_->Load(a).snapshot, *both.snapshot), "");
+}
+
 TEST_F(SaverTest, HandsAFailureToWhoeverAsksAndGoesOn) {
   const std::uint64_t key = library_->NewKey();
   Saver saver(&*library_);
