@@ -65,7 +65,10 @@ void AddMaps(std::vector<Session::MapState> maps, const std::filesystem::path& f
     if (!map.snapshot) continue;
     record->maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
     record->maps.back().discarded = map.discarded;
-    if (map.discarded || one_of_many) continue;
+    for (const Session::MapState& other : maps) {
+      if (other.key == map.joined_into) record->maps.back().joined_into = other.name;
+    }
+    if (map.discarded || map.joined_into != 0 || one_of_many) continue;
     if (has_truth) record->maps.back().adjusted_centers = AdjustedCenters(*map.snapshot);
     StitchMap(folder, map, panoramas);
   }

@@ -67,11 +67,12 @@ void AddEngineOption(CLI::App* command, EngineKind* engine) {
 }
 
 void AddWhenLostOption(CLI::App* command, std::optional<WhenLost>* when_lost, const std::string& otherwise) {
-  AddChoice<WhenLost>(command, "--when-lost", when_lost,
-                      "What a camera does that is lost where no map is recognised: begin a new map, or wait "
-                      "until it sees a map again (default: " +
-                          otherwise + ")",
-                      {{"new", WhenLost::kNew}, {"wait", WhenLost::kWait}});
+  AddChoice<WhenLost>(
+      command, "--when-lost", when_lost,
+      "What a camera does that is lost where no map is recognised: begin a new map, which is "
+      "joined with a known one where they overlap, or wait until it sees a map again (default: " +
+          otherwise + ")",
+      {{"new", WhenLost::kNew}, {"wait", WhenLost::kWait}});
 }
 
 void AddSeedOption(CLI::App* command, std::uint64_t* seed) {

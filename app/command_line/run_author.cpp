@@ -67,7 +67,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   const auto maps = RunGuide(request, cameras, verbosity);
   if (verbosity == Verbosity::kQuiet) return;
   for (const Session::MapState& map : maps) {
-    if (map.discarded || !map.snapshot) continue;
+    if (map.discarded || map.joined_into != 0 || !map.snapshot) continue;
     std::printf("%s: %zu keyframes, %zu points, %zu things\n", map.name.c_str(),
                 map.snapshot->keyframes.size(), map.snapshot->points.size(), map.scene->entities.size());
   }

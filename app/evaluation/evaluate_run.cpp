@@ -158,6 +158,7 @@ std::vector<MapResult> ListMaps(const RunRecord& run) {
     }
     found->name = record.name;
     found->discarded = TookBack(record);
+    found->joined_into = record.joined_into;
   }
   return maps;
 }
@@ -195,7 +196,7 @@ void CountFrames(const RunRecord& run, SequenceReport* report) {
 
 void SumMaps(const RunRecord& run, SequenceReport* report) {
   for (const MapRecord& map : run.maps) {
-    if (map.discarded) continue;
+    if (map.discarded || !map.joined_into.empty()) continue;
     report->keyframes.sixdof += map.keyframes.sixdof;
     report->keyframes.panorama += map.keyframes.panorama;
     report->keyframes.localized += map.keyframes.localized;

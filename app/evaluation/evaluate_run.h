@@ -39,6 +39,7 @@ struct MapResult {
   std::uint64_t key = 0;
   std::string name;
   bool discarded = false;
+  std::string joined_into = {};      // see MapRecord
   int frames = 0;                    // with a pose in this map
   std::optional<double> ate_rmse_m;  // empty without truth, or when the centres do not fix a similarity
   // Of its keyframes after one more adjustment of the whole map: what the map knows, where ate_rmse_m is what

@@ -69,10 +69,12 @@ std::string MapTable(const SequenceReport& r) {
       "<h3>Maps</h3><table><tr><th>map</th><th>frames</th><th>ATE RMSE</th><th>of its "
       "keyframes</th><th>rotation</th></tr>\n";
   for (const MapResult& map : r.maps) {
-    html += "<tr><td>" + EscapeHtml(map.name) + (map.discarded ? " (given up)" : "") + "</td><td>" +
-            std::to_string(map.frames) + "</td><td>" + Centimetres(map.ate_rmse_m) + "</td><td>" +
-            Centimetres(map.keyframe_ate_rmse_m) + "</td><td>" + Fixed(map.rotation_rmse_deg, 3, "°") +
-            "</td></tr>\n";
+    std::string name = map.name;
+    if (map.discarded) name += " (given up)";
+    if (!map.joined_into.empty()) name += " (a part of " + map.joined_into + " at the end)";
+    html += "<tr><td>" + EscapeHtml(name) + "</td><td>" + std::to_string(map.frames) + "</td><td>" +
+            Centimetres(map.ate_rmse_m) + "</td><td>" + Centimetres(map.keyframe_ate_rmse_m) + "</td><td>" +
+            Fixed(map.rotation_rmse_deg, 3, "°") + "</td></tr>\n";
   }
   html += "</table>\n<p>The figures above are those of the largest map.";
   if (r.discarded_frames > 0) {

@@ -21,6 +21,7 @@ Json OrNull(const std::optional<Value>& value) {
 Json ToJson(const MapResult& map) {
   return {{"name", map.name},
           {"discarded", map.discarded},
+          {"joined_into", map.joined_into},
           {"frames", map.frames},
           {"ate_rmse_m", OrNull(map.ate_rmse_m)},
           {"keyframe_ate_rmse_m", OrNull(map.keyframe_ate_rmse_m)},

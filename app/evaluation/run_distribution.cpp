@@ -87,7 +87,7 @@ RunRow MakeRunRow(const RunKey& key, const RunRecord& run, const SequenceReport&
       row.first_3d_pose_s = ToSeconds(run.frames[i].time - run.frames.front().time);
   }
   for (const MapResult& map : report.maps) {
-    row.maps += !map.discarded && map.frames > 0;
+    row.maps += !map.discarded && map.joined_into.empty() && map.frames > 0;
     row.discarded_maps += map.discarded;
   }
   row.tracking_median_ms = report.tracking_median_ms;

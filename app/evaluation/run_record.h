@@ -82,6 +82,9 @@ struct MapRecord {
   std::uint64_t key = 0;
   std::string name;
   bool discarded = false;  // given up during the run (a false start): its frames count as untracked
+  // The name of the map that it became a part of during the run. Its frames are compared as they were told,
+  // by an alignment of their own; its keyframes and points are counted there.
+  std::string joined_into = {};
   KeyFrameCounts keyframes;
   PointCounts points;
   std::vector<Eigen::Vector3d> positions;  // of finite points, map frame, for the view from above

@@ -9,19 +9,36 @@
 
 namespace docent::app {
 
-content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const std::string& name_of_a,
-                          const std::string& name_of_b, const engine::JoinedMap& joined) {
-  content::Scene both = a;
-  for (content::Entity entity : b.entities) {
-    content::MoveAlong(joined.a_from_b, &entity);
-    entity.name = both.FreeName(entity.name);
-    both.entities.push_back(std::move(entity));
+void TakeInScene(const content::Scene& b, const std::string& name_of_a, const std::string& name_of_b,
+                 const engine::JoinedMap& joined, content::Scene* scene) {
+  content::Scene aligned = b;
+  for (content::Entity& entity : aligned.entities) content::MoveAlong(joined.a_from_b, &entity);
+  const auto moved = Moved(aligned, ContentFollower().Follow(aligned, *joined.aligned, *joined.map));
+  for (content::Entity entity : moved->entities) {
+    entity.name = scene->FreeName(entity.name);
+    scene->entities.push_back(std::move(entity));
   }
-  for (content::Entity& entity : both.entities) {
+  for (content::Entity& entity : scene->entities) {
     if (entity.signpost.to_map == name_of_a || entity.signpost.to_map == name_of_b)
       entity.signpost.to_map.clear();
   }
-  return *Moved(both, ContentFollower().Follow(both, *joined.aligned, *joined.map));
+}
+
+content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const std::string& name_of_a,
+                          const std::string& name_of_b, const engine::JoinedMap& joined) {
+  content::Scene both = *Moved(a, ContentFollower().Follow(a, *joined.aligned, *joined.map));
+  TakeInScene(b, name_of_a, name_of_b, joined, &both);
+  return both;
+}
+
+bool RedirectSignpostsIn(const std::string& from, const std::string& into, content::Scene* scene) {
+  bool changed = false;
+  for (content::Entity& entity : scene->entities) {
+    if (entity.signpost.to_map != from) continue;
+    entity.signpost.to_map = into;
+    changed = true;
+  }
+  return changed;
 }
 
 std::optional<std::string> RedirectSignposts(const std::string& text, const std::string& from,
@@ -33,13 +50,7 @@ std::optional<std::string> RedirectSignposts(const std::string& text, const std:
     asset->id = id;
     return asset;
   });
-  bool changed = false;
-  for (content::Entity& entity : scene.entities) {
-    if (entity.signpost.to_map != from) continue;
-    entity.signpost.to_map = into;
-    changed = true;
-  }
-  if (!changed) return std::nullopt;
+  if (!RedirectSignpostsIn(from, into, &scene)) return std::nullopt;
   return content::EncodeScene(scene);
 }
 

@@ -12,11 +12,18 @@
 // thread.
 namespace docent::app {
 
-// What stands in both maps, in the coordinates of the joined one: each thing among the points that it was
-// placed among. Names of B's things that are taken get a number. A signpost that pointed from one of the two
-// to the other points nowhere.
+// Adds what stands in B to `scene`, which is that of A in the joined map: each thing among the points that it
+// was placed among. Names that are taken get a number. A signpost that pointed from one of the two to the
+// other points nowhere.
+void TakeInScene(const content::Scene& b, const std::string& name_of_a, const std::string& name_of_b,
+                 const engine::JoinedMap& joined, content::Scene* scene);
+
+// What stands in both maps, in the coordinates of the joined one.
 content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const std::string& name_of_a,
                           const std::string& name_of_b, const engine::JoinedMap& joined);
+
+// Lets signposts to the map `from` point to `into` instead; false when there is none.
+bool RedirectSignpostsIn(const std::string& from, const std::string& into, content::Scene* scene);
 
 // The text of a scene whose signposts to the map `from` point to `into` instead; empty when it has none.
 // Throws docent::Error when the text does not hold.

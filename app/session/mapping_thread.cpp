@@ -55,6 +55,8 @@ void MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const engine::MapSn
     wanted_key_ = key;
     adoption_ = Adoption{key, std::move(snapshot)};
     pair_.reset();
+    join_.reset();
+    interrupt_join_ = true;
     starting_ = false;
     work_ = true;
   }
@@ -68,6 +70,17 @@ void MappingThread::Start(std::uint64_t key, engine::InitialPair pair) {
     if (key != wanted_key_) return;
     pair_ = std::move(pair);
     starting_ = work_ = true;
+  }
+  changed_.notify_all();
+}
+
+void MappingThread::Join(std::uint64_t key, std::uint64_t number,
+                         std::shared_ptr<const engine::MapSnapshot> other) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (key != wanted_key_) return;
+    join_ = JoinRequest{number, std::move(other)};
+    work_ = true;
   }
   changed_.notify_all();
 }
@@ -104,6 +117,22 @@ void MappingThread::TakeOver() {
   pair_.reset();
 }
 
+void MappingThread::JoinIfAsked() {
+  std::optional<JoinRequest> request;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (adoption_ || !join_) return;
+    request = std::exchange(join_, std::nullopt);
+    interrupt_join_ = false;
+  }
+  News news;
+  news.key = key_;
+  news.join = News::Join{request->number, mapper_.Join(*request->other, &interrupt_join_)};
+  request.reset();
+  if (news.join->attempt.joined) news.snapshot = told_ = mapper_.Snapshot();
+  tell_(news);
+}
+
 bool MappingThread::StepOnce() {
   const bool worked = mapper_.Step();
   News news;
@@ -124,6 +153,7 @@ bool MappingThread::StepOnce() {
 
 void MappingThread::RunInTurn() {
   TakeOver();
+  JoinIfAsked();
   for (int step = 0; step < kMaxSteps && !mapper_.Settled(); ++step) StepOnce();
   StepOnce();
 }
@@ -138,12 +168,14 @@ void MappingThread::Run(const std::stop_token& stop) {
       resting_ = work_ = false;
     }
     TakeOver();
+    JoinIfAsked();
     bool more = true;
     while (more && !stop.stop_requested()) {
       more = StepOnce();
       {
         const std::scoped_lock lock(mutex_);
-        if (adoption_ || pair_) more = false;  // work_ is set as well: the outer loop goes on with them
+        // work_ is set as well: the outer loop goes on with them.
+        if (adoption_ || pair_ || join_) more = false;
       }
       changed_.notify_all();
     }
@@ -171,6 +203,11 @@ void MappingThread::Finish() {
   constexpr int kMaxLastSteps = 500;
   constexpr auto kLongest = std::chrono::seconds(2);
   const bool threaded = worker_.has_value();
+  {
+    const std::scoped_lock lock(mutex_);
+    join_.reset();
+    interrupt_join_ = true;
+  }
   if (threaded) {
     worker_->RequestStop();
     worker_->Join();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -21,14 +22,20 @@ namespace docent::app {
 // through the callback, on the thread that steps, together with the key it belongs to; the callback is called
 // without any lock held here.
 //
-// Adopt, Start, Offer and the questions may be called from any thread and never wait for a step: what cannot
-// be done while the mapper works is done before its next step.
+// Adopt, Start, Join, Offer and the questions may be called from any thread and never wait for a step: what
+// cannot be done while the mapper works is done before its next step.
 class MappingThread {
  public:
   struct News {
     std::uint64_t key = 0;
     std::shared_ptr<const engine::MapSnapshot> snapshot;  // null when nothing new was published
     std::vector<engine::MapperEvent> events;
+    // What came of a Join: where the maps are one now, `snapshot` is it.
+    struct Join {
+      std::uint64_t number = 0;  // that it was asked under
+      engine::MapJoinAttempt attempt;
+    };
+    std::optional<Join> join = std::nullopt;
   };
   using Tell = std::function<void(const News&)>;
 
@@ -38,6 +45,9 @@ class MappingThread {
   void Adopt(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot);
   // Makes the map of `key` from its first two views; without effect when another map has been adopted since.
   void Start(std::uint64_t key, engine::InitialPair pair);
+  // Takes another map into the map of `key` (see Mapper::Join). Without effect when another map, or the same
+  // one anew, is adopted before it is done; then no news of it counts. The last one asked for counts.
+  void Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const engine::MapSnapshot> other);
   // False when the mapper is busy or works on another map.
   bool Offer(std::uint64_t key, engine::KeyFrameCandidate candidate,
              std::vector<engine::PointReport> reports);
@@ -62,8 +72,14 @@ class MappingThread {
     std::shared_ptr<const engine::MapSnapshot> snapshot;
   };
 
+  struct JoinRequest {
+    std::uint64_t number = 0;
+    std::shared_ptr<const engine::MapSnapshot> other;
+  };
+
   void Run(const std::stop_token& stop);
-  void TakeOver();  // carries out a waiting adoption and start
+  void TakeOver();     // carries out a waiting adoption and start
+  void JoinIfAsked();  // after TakeOver
   bool StepOnce();
   bool Busy() const;  // with mutex_ held
 
@@ -78,11 +94,13 @@ class MappingThread {
   std::uint64_t wanted_key_ = 0;
   std::optional<Adoption> adoption_;
   std::optional<engine::InitialPair> pair_;
-  bool starting_ = false;         // from Start until its map or its failure is told
-  bool work_ = false;             // something was asked for since the last idle step
-  bool resting_ = false;          // the thread waits for work
-  bool failed_ = false;           // the thread has ended by an exception, which Finish hands out
-  std::optional<Worker> worker_;  // last: it uses the rest
+  std::optional<JoinRequest> join_;
+  std::atomic<bool> interrupt_join_{false};  // read without the lock by the join that it ends
+  bool starting_ = false;                    // from Start until its map or its failure is told
+  bool work_ = false;                        // something was asked for since the last idle step
+  bool resting_ = false;                     // the thread waits for work
+  bool failed_ = false;                      // the thread has ended by an exception, which Finish hands out
+  std::optional<Worker> worker_;             // last: it uses the rest
 };
 
 }  // namespace docent::app

@@ -112,8 +112,9 @@ void Session::React(std::size_t index, engine::TrackedFrame* frame) {
   camera->last_time = frame->frame.time;
   if (!engine::HasPose(frame->state)) {
     association_.Lost(index);
-  } else if (camera->order != Camera::Order::kNone || !maps_.contains(frame->map_key) ||
-             !association_.Tracked(index, frame->map_key)) {
+  } else if (const auto map = maps_.find(frame->map_key); camera->order != Camera::Order::kNone ||
+                                                          map == maps_.end() || !map->second.Lives() ||
+                                                          !association_.Tracked(index, frame->map_key)) {
     association_.Lost(index);
     Refuse(camera, frame);
   }
@@ -183,15 +184,19 @@ void Session::WatchRig(std::size_t index, const engine::TrackedFrame& frame) {
 }
 
 void Session::WatchLens(std::size_t index, const engine::TrackedFrame& frame) {
-  constexpr Timestamp kShown = std::chrono::seconds(15);
   Camera& camera = cameras_[index];
   camera.lens->Add(frame);
   const auto warning = camera.lens->TakeWarning();
   if (!warning) return;
   const std::string which = cameras_.size() > 1 ? "camera " + std::to_string(index) + ": " : std::string();
   AddEvent(frame.frame.time, "warning", which + *warning);
-  camera.advice = *warning;
-  camera.advice_end = frame.frame.time + kShown;
+  Advise(&camera, *warning);
+}
+
+void Session::Advise(Camera* camera, const std::string& sentence) {
+  constexpr Timestamp kShown = std::chrono::seconds(15);
+  camera->advice = sentence;
+  camera->advice_end = camera->last_time + kShown;
 }
 
 LensWatch::Profile Session::LensErrors(std::size_t camera) const {
@@ -231,11 +236,17 @@ void Session::Hear(const MappingThread::News& news) {
   const std::scoped_lock lock(mutex_);
   const auto found = maps_.find(news.key);
   // News that comes late, of a map that was closed or given up meanwhile, is let go.
-  if (found == maps_.end() || news.key != growing_key_ || found->second.discarded) return;
+  if (found == maps_.end() || news.key != growing_key_ || !found->second.Lives()) return;
   SessionMap& map = found->second;
+  if (news.join && !Expects(*news.join, map)) return;
   if (news.snapshot) {
     map.Grow(news.snapshot);
     index_.SetMap(map.key, news.snapshot, described);
+  }
+  if (news.join) {
+    EndJoining(news.join->attempt, &map);
+  } else if (news.snapshot) {
+    AskToJoin(map);
   }
   for (const engine::MapperEvent& event : news.events) {
     switch (event.kind) {
@@ -309,7 +320,7 @@ std::vector<std::string> Session::MapNames() const {
   const std::scoped_lock lock(mutex_);
   std::vector<std::string> names;
   for (const auto& [key, map] : maps_) {
-    if (!map.discarded) names.push_back(map.name);
+    if (map.Lives()) names.push_back(map.name);
   }
   return names;
 }
@@ -318,7 +329,7 @@ std::vector<Session::MapState> Session::Maps() const {
   const std::scoped_lock lock(mutex_);
   std::vector<MapState> states;
   for (const auto& [key, map] : maps_) {
-    states.push_back({key, map.name, map.policy, map.snapshot, map.scene, map.discarded});
+    states.push_back({key, map.name, map.policy, map.snapshot, map.scene, map.discarded, map.joined_into});
   }
   return states;
 }

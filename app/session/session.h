@@ -77,7 +77,8 @@ struct SessionOptions {
 // content is what is shown. Several cameras are those of one wearer and work in one map together: see
 // CameraAssociation. A start that does not hold (see SessionOptions::probation) is given up and looked
 // for again under the same name, with an event that says why. A camera that is lost begins another map where
-// SessionOptions::new_map_when_lost says so.
+// SessionOptions::new_map_when_lost says so; once it is back in the first one, the two become one where they
+// overlap.
 class Session {
  public:
   // library may be null (nothing is kept) and must outlive the session. Its maps are known from the start and
@@ -120,16 +121,17 @@ class Session {
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
   std::vector<std::string> MapNames() const;
-  // What the session knows of a map; discarded ones are in DiscardedMaps.
+  // What the session knows of a map.
   struct MapState {
     std::uint64_t key = 0;
     std::string name;
     maps::Policy policy = maps::Policy::kOpen;
     std::shared_ptr<const engine::MapSnapshot> snapshot;  // null: not begun yet, or not in memory
     std::shared_ptr<const content::Scene> scene;
-    bool discarded = false;
+    bool discarded = false;         // given up
+    std::uint64_t joined_into = 0;  // the key of the map that it is a part of now; 0 for none
   };
-  std::vector<MapState> Maps() const;  // by key, discarded ones too
+  std::vector<MapState> Maps() const;  // by key, those that are no more too
   // How the first two cameras stand to each other in the present map; empty while that is not known.
   std::optional<RigEstimate> Rig() const;
   // What tracking leaves over, by rings of the picture; see LensWatch.
@@ -180,6 +182,7 @@ class Session {
   void WatchLoss(Camera* camera, const engine::TrackedFrame& frame);
   void Discard(std::uint64_t key, Timestamp time, const std::string& reason);
   std::string FreeMapName(const std::string& name) const;
+  static void Advise(Camera* camera, const std::string& sentence);
   void Hear(const MappingThread::News& news);
   void EnterMap(Camera* camera, std::uint64_t key, Timestamp time);
   void AddEvent(Timestamp time, std::string event, std::string detail);
@@ -205,6 +208,13 @@ class Session {
   std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
   void LeaveMap(std::uint64_t key);
   void GrowOn(const SessionMap& map);
+  void LetMapperWorkOn(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot);
+
+  // session_joining.cpp; all with mutex_ held
+  void AskToJoin(const SessionMap& into);
+  bool Expects(const MappingThread::News::Join& news, const SessionMap& into);
+  void EndJoining(const engine::MapJoinAttempt& attempt, SessionMap* into);
+  void TakeIn(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into);
 
   // session_saving.cpp
   static void TellSaved(const maps::MapRecord& record);
@@ -231,7 +241,14 @@ class Session {
   CameraRig rig_;
   bool rig_told_ = false;          // that it is rigid
   std::uint64_t growing_key_ = 0;  // the map that the mapper works on; 0 for none
-  std::uint64_t next_key_ = 1;     // without a library
+  // The map that the mapper is to take into the one that it works on; see session_joining.cpp.
+  struct Joining {
+    std::uint64_t number = 0, from = 0;
+    std::shared_ptr<const engine::MapSnapshot> snapshot;
+  };
+  std::optional<Joining> joining_;
+  std::uint64_t joins_asked_ = 0;
+  std::uint64_t next_key_ = 1;  // without a library
   std::vector<Event> events_;
   AssetCache assets_;                                                    // by id
   std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by the file as commands name it

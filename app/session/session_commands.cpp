@@ -61,7 +61,7 @@ std::shared_ptr<const content::Asset> Session::LoadAsset(const std::string& file
 
 SessionMap* Session::FindByName(const std::string& name) {
   for (auto& [key, map] : maps_) {
-    if (!map.discarded && map.name == name) return &map;
+    if (map.Lives() && map.name == name) return &map;
   }
   return nullptr;
 }
@@ -78,11 +78,10 @@ SessionMap& Session::AddMap(const std::string& name) {
 // The map of `key` rests from now on: it is saved as it stands, or forgotten if it never began.
 void Session::LeaveMap(std::uint64_t key) {
   if (growing_key_ == key) {
-    growing_key_ = 0;
-    mapping_.Adopt(0, nullptr);
+    LetMapperWorkOn(0, nullptr);
   }
   const auto found = maps_.find(key);
-  if (found == maps_.end() || found->second.discarded) return;
+  if (found == maps_.end() || !found->second.Lives()) return;
   SessionMap& map = found->second;
   Timestamp time{};
   for (Camera& camera : cameras_) {
@@ -105,8 +104,13 @@ void Session::LeaveMap(std::uint64_t key) {
 
 void Session::GrowOn(const SessionMap& map) {
   const bool grows = options_.may_write && !map.rests && maps::MayChangeStructure(map.policy);
-  growing_key_ = grows ? map.key : 0;
-  mapping_.Adopt(growing_key_, grows ? map.snapshot : nullptr);
+  LetMapperWorkOn(grows ? map.key : 0, grows ? map.snapshot : nullptr);
+}
+
+void Session::LetMapperWorkOn(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot) {
+  growing_key_ = key;
+  joining_.reset();  // whatever the mapper had joined, it begins from the snapshot
+  mapping_.Adopt(key, std::move(snapshot));
 }
 
 void Session::Carry(const NewMap& command, const engine::TrackedFrame& frame) {
@@ -180,6 +184,7 @@ SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
   const auto found = maps_.find(key);
   if (found == maps_.end() || !found->second.snapshot) throw Error("there is no current map");
   if (found->second.discarded) throw Error("the map of this frame has been given up");
+  if (!found->second.Lives()) throw Error("the map of this frame is a part of another one now");
   if (!maps::MayChangeContent(found->second.policy)) {
     throw Error("the map '" + found->second.name + "' is " + maps::ToString(found->second.policy) +
                 ": its content stays as it is");

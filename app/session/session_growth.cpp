@@ -25,7 +25,7 @@ void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
   }
   if (!options_.may_write || growing_key_ == key) return;
   // The map before rests now: it is saved as it stands, and grows again when somebody comes back to it.
-  if (const auto found = maps_.find(before); found != maps_.end() && !found->second.discarded) {
+  if (const auto found = maps_.find(before); found != maps_.end() && found->second.Lives()) {
     SessionMap& left = found->second;
     left.on_probation = false;
     SaveMap(&left, time);
@@ -33,13 +33,16 @@ void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
       left.discarded = true;
       index_.RemoveMap(before);
       AddEvent(time, "map", "discarded " + left.name + ": the camera was found in " + map.name);
+    } else if (left.after_loss) {
+      left.join_with = key;
     }
   }
   GrowOn(map);
+  AskToJoin(map);
 }
 
 bool Session::MayGrow(const SessionMap& map, const engine::Rigid3& camera_from_map) const {
-  return options_.may_write && !map.discarded &&
+  return options_.may_write && map.Lives() &&
          maps::KeyFrameAllowed(map.policy, map.bounds, camera_from_map.OriginInSource());
 }
 
@@ -108,7 +111,7 @@ std::string Session::FreeMapName(const std::string& name) const {
   for (int number = 2;; ++number) {
     const std::string candidate = stem + " " + std::to_string(number);
     const bool taken = std::any_of(maps_.begin(), maps_.end(), [&](const auto& entry) {
-      return !entry.second.discarded && entry.second.name == candidate;
+      return entry.second.Lives() && entry.second.name == candidate;
     });
     if (!taken) return candidate;
   }
@@ -125,8 +128,7 @@ void Session::Discard(std::uint64_t key, Timestamp time, const std::string& reas
   for (const content::Entity& entity : map.scene->entities) {
     AddEvent(time, "warning", "'" + entity.name + "' went with the discarded map");
   }
-  growing_key_ = next.key;
-  mapping_.Adopt(next.key, nullptr);
+  LetMapperWorkOn(next.key, nullptr);
   association_.Begin(next.key);
   for (Camera& camera : cameras_) {
     if (camera.map_key != key) continue;

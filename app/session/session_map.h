@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "app/session/content_follower.h"
 #include "app/session/start_watch.h"
@@ -50,9 +51,17 @@ struct SessionMap {
   bool after_loss = false;  // begun because the camera was lost in another map
   Timestamp started{};      // of the frame that completed its first pair
 
+  // See session_joining.cpp.
+  std::uint64_t join_with = 0;       // the map that the camera went back to from it; 0 for none
+  std::size_t join_at = 0;           // keyframes of both, from which on it is tried
+  std::uint64_t joined_into = 0;     // the map that it is a part of now; 0 for none
+  std::vector<std::uint64_t> holds;  // that were joined into it
+
   // The mapper has made this of it; what stands in it moves along with its ground.
   void Grow(std::shared_ptr<const engine::MapSnapshot> grown);
 
+  // It is a map of its own still: neither given up nor a part of another one.
+  bool Lives() const { return !discarded && joined_into == 0; }
   bool NeedsSave() const { return snapshot && (snapshot != saved_snapshot || scene != saved_scene); }
 };
 

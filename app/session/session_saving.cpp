@@ -34,11 +34,12 @@ Timestamp Session::LastTime() const {
 
 // Hands what has changed of a map to the saver, which writes it in the background.
 void Session::SaveMap(SessionMap* map, Timestamp time) {
-  if (!saver_ || map->discarded || !map->NeedsSave() || !map->snapshot->HasFinitePoints()) return;
+  if (!saver_ || !map->Lives() || !map->NeedsSave() || !map->snapshot->HasFinitePoints()) return;
   maps::MapRecord record;
   record.key = map->key;
   record.name = map->name;
   record.policy = map->policy;
+  record.holds = map->holds;
   const bool structure = map->snapshot != map->saved_snapshot;
   const bool content = map->scene != map->saved_scene;
   if (structure) record.snapshot = map->snapshot;

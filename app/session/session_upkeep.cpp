@@ -26,7 +26,8 @@ std::unique_lock<std::mutex> LockUnless(const std::atomic<bool>& interrupt, std:
 bool Session::Rests(const SessionMap& map) const {
   const bool used = std::any_of(cameras_.begin(), cameras_.end(),
                                 [&](const Camera& camera) { return camera.map_key == map.key; });
-  return !used && map.key != growing_key_ && !map.discarded && map.snapshot && !map.NeedsSave() &&
+  const bool joined = joining_ && joining_->from == map.key;
+  return !used && !joined && map.key != growing_key_ && map.Lives() && map.snapshot && !map.NeedsSave() &&
          maps::MayChangeStructure(map.policy);
 }
 

@@ -9,6 +9,7 @@
 
 #include "app/evaluation/html_report.h"
 #include "app/evaluation/json_report.h"
+#include "app/evaluation/run_distribution.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
@@ -188,8 +189,8 @@ TEST(Evaluation, CountsFramesOfDiscardedMapsAsUntracked) {
   const auto truth = Helix(50);
   RunRecord run = PerfectRun(truth);
   for (int i = 0; i < 30; ++i) run.frames[static_cast<std::size_t>(i)].map_key = 9;
-  run.maps = {{1, "kept", false, {3, 0, 0}, {100, 0, 0}, {}},
-              {9, "false start", true, {2, 0, 0}, {50, 0, 0}, {}}};
+  run.maps = {{1, "kept", false, {}, {3, 0, 0}, {100, 0, 0}, {}},
+              {9, "false start", true, {}, {2, 0, 0}, {50, 0, 0}, {}}};
   const SequenceReport report = EvaluateRun(run, truth, {});
   EXPECT_EQ(report.tracked, 20);
   EXPECT_EQ(report.discarded_frames, 30);
@@ -198,6 +199,27 @@ TEST(Evaluation, CountsFramesOfDiscardedMapsAsUntracked) {
   ASSERT_TRUE(report.largest_map);
   EXPECT_EQ(report.maps[*report.largest_map].name, "kept");
   EXPECT_THAT(FormatSummary(report), HasSubstr("30 frames in maps given up"));
+}
+
+TEST(Evaluation, ComparesFramesOfAMapThatWasJoinedWithAnotherByThemselves) {
+  const auto truth = Helix(50);
+  RunRecord run = PerfectRun(truth);
+  const engine::Rigid3 moved(engine::Rotation3::Exp({0, 0.5, 0}), {1, 2, 3});
+  for (int i = 0; i < 20; ++i) {
+    FrameRecord& frame = run.frames[static_cast<std::size_t>(i)];
+    frame.map_key = 9;
+    frame.camera_from_map = frame.camera_from_map * moved;
+  }
+  run.maps = {{1, "kept", false, {}, {5, 0, 0}, {100, 0, 0}, {}},
+              {9, "taken in", false, "kept", {2, 0, 0}, {50, 0, 0}, {}}};
+  const SequenceReport report = EvaluateRun(run, truth, {});
+  EXPECT_EQ(report.tracked, 50);
+  EXPECT_EQ(report.keyframes.sixdof, 5) << "those of the other are among them";
+  ASSERT_EQ(report.maps.size(), 2u);
+  EXPECT_EQ(report.maps[0].joined_into, "kept");
+  EXPECT_LT(report.maps[0].ate_rmse_m.value(), 1e-6);
+  EXPECT_LT(report.maps[1].ate_rmse_m.value(), 1e-6);
+  EXPECT_EQ(MakeRunRow({}, run, report, std::nullopt).maps, 1);
 }
 
 TEST(Evaluation, AlignsEveryMapByItselfAndReportsTheLargest) {
@@ -316,7 +338,7 @@ TEST(HtmlReport, IsOnePageThatLoadsNothingAndEscapesNames) {
   evaluated.truth = Helix(300);
   evaluated.run = PerfectRun(evaluated.truth);
   evaluated.run.name = "<script>alert(1)</script>";
-  evaluated.run.maps = {{1, "Desk & \"3\"", false, {}, {}, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 2}}}};
+  evaluated.run.maps = {{1, "Desk & \"3\"", false, {}, {}, {}, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 2}}}};
   evaluated.report = EvaluateRun(evaluated.run, evaluated.truth, {});
   const std::string html = FormatHtmlReport({evaluated});
   EXPECT_THAT(html, Not(HasSubstr("<script")));

@@ -68,7 +68,7 @@ Outcome Feed(bool new_map, bool back) {
             [&](const engine::TrackedFrame& frame) { outcome.frames.push_back(frame); }, {});
   session.Finish();
   for (const auto& map : session.Maps()) {
-    if (!map.discarded) outcome.maps.push_back(map);
+    if (!map.discarded && map.joined_into == 0) outcome.maps.push_back(map);
   }
   return outcome;
 }
