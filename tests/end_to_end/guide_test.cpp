@@ -115,7 +115,7 @@ TEST(Guide, TellsTheSpreadOverSeedsAndStartsWhateverTheNumberOfJobs) {
         nlohmann::json::parse(ReadAll(output / "report.json")).at("sequences").at(0).at("distribution");
     ASSERT_EQ(distribution.at("runs").size(), 4u);
     EXPECT_EQ(distribution.at("runs").at(3).at("seed"), 2);
-    EXPECT_EQ(distribution.at("runs").at(3).at("first_frame"), 50);
+    EXPECT_EQ(distribution.at("runs").at(3).at("first_frame"), 70);
     rows.push_back(distribution.at("runs"));
     for (auto& row : rows.back()) row.erase("tracking_median_ms");
     const auto run = output / "cylinder-20" / "seed-2-start-1";
