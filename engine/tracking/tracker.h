@@ -54,7 +54,7 @@ struct TrackerOptions {
   // crowded part of a map most points may be hidden or look different by now. Measured where the share was
   // below `good_quality`: true poses (an office, a flying drone) left a sigma of 0.7-2.3, and 61-99 % of the
   // points found were inliers; chance matches left a sigma of 3.8-15.
-  int many_inliers = 60;
+  int many_inliers = 60;       // twice `min_inliers`
   double min_agreement = 0.6;  // inliers of the points found
   double max_agreeing_sigma = 2.0;
   int min_cells = 3;  // of the 4x4 grid that inliers must occupy

@@ -27,7 +27,7 @@ Doubt Tracker::DoubtOf(const MapTrackResult& result, const MapSnapshot& map) con
 // hide each other a map never explained much of what is in view; it explains enough when it explains about as
 // much as before.
 double Tracker::EnoughExplained(const Frame& frame, const Rigid3& found_camera_from_map) const {
-  constexpr double kNear = 0.5;  // of the depth, and radians: both images show mostly the same
+  constexpr double kNear = 0.5;  // of the depth, and radians: half the field of view of a 60 degree lens
   const Rigid3& lost = motion_.last();
   const double shift = (lost.OriginInSource() - found_camera_from_map.OriginInSource()).norm();
   const double turn = (lost.rotation * found_camera_from_map.rotation.inverse()).Angle();
