@@ -101,13 +101,13 @@ Json AssimpMaterialWriter::WriteTexture(const aiMaterial& source, aiTextureType 
   unsigned int uv_set = 0;
   if (source.GetTexture(type, 0, &path, nullptr, &uv_set) != AI_SUCCESS) return nullptr;
   const auto known = textures_.find(path.C_Str());
-  const int texture = known != textures_.end() ? known->second : WritePicture(path.C_Str());
+  const int texture = known != textures_.end() ? known->second : WriteImage(path.C_Str());
   textures_[path.C_Str()] = texture;
   if (texture < 0) return nullptr;
   return {{"index", texture}, {"texCoord", std::min(uv_set, 1u)}};
 }
 
-int AssimpMaterialWriter::WritePicture(const std::string& path) {
+int AssimpMaterialWriter::WriteImage(const std::string& path) {
   const aiTexture* embedded = scene_.GetEmbeddedTexture(path.c_str());
   const Json image = embedded != nullptr ? EmbeddedImage(*embedded) : ExternalImage(path);
   if (image.is_null()) {
@@ -129,7 +129,7 @@ Json AssimpMaterialWriter::EmbeddedImage(const aiTexture& texture) {
 Json AssimpMaterialWriter::ExternalImage(const std::string& path) {
   std::string forward = path;
   std::replace(forward.begin(), forward.end(), '\\', '/');
-  // Many files name the path on their maker's machine; the picture then usually lies beside the model.
+  // Many files name the path on their maker's machine; the image then usually lies beside the model.
   for (const std::string& candidate : {forward, std::filesystem::path(forward).filename().string()}) {
     try {
       const std::string uri = PercentEncoded(candidate);

@@ -41,8 +41,8 @@ class AssimpMaterialWriter {
  private:
   // A glTF texture info, or null when the material has no such texture that can be shown.
   Json WriteTexture(const aiMaterial& source, aiTextureType type);
-  // Index of the glTF texture that shows this picture, -1 with a warning when it cannot be shown.
-  int WritePicture(const std::string& path);
+  // Index of the glTF texture that shows this image, -1 with a warning when it cannot be shown.
+  int WriteImage(const std::string& path);
   Json EmbeddedImage(const aiTexture& texture);
   Json ExternalImage(const std::string& path);
 
@@ -51,7 +51,7 @@ class AssimpMaterialWriter {
   const LoadLimits& limits_;
   GltfBuilder& builder_;
   std::vector<std::string>& warnings_;
-  std::map<std::string, int> textures_;  // by the picture's path as the file names it
+  std::map<std::string, int> textures_;  // by the image's path as the file names it
 };
 
 }  // namespace docent::content

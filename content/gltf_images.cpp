@@ -82,20 +82,20 @@ std::optional<ImageSize> ReadImageSize(std::span<const std::uint8_t> bytes) {
 
 Image DecodeImage(const std::string& file, const std::string& place, std::span<const std::uint8_t> bytes,
                   const LoadLimits& limits, std::uint64_t* pixels_left) {
-  if (!IsPng(bytes) && !IsJpeg(bytes)) Refuse(file, place, "is neither a PNG nor a JPEG picture.");
+  if (!IsPng(bytes) && !IsJpeg(bytes)) Refuse(file, place, "is neither a PNG nor a JPEG image.");
   const std::optional<ImageSize> size = ReadImageSize(bytes);
-  if (!size || size->width_px <= 0 || size->height_px <= 0) Refuse(file, place, "is a damaged picture.");
+  if (!size || size->width_px <= 0 || size->height_px <= 0) Refuse(file, place, "is a damaged image.");
   const std::string words = std::to_string(size->width_px) + " x " + std::to_string(size->height_px);
   if (std::max(size->width_px, size->height_px) > limits.max_image_side_px) {
     Refuse(file, place,
-           "is a picture of " + words + " pixels; at most " + std::to_string(limits.max_image_side_px) +
+           "is an image of " + words + " pixels; at most " + std::to_string(limits.max_image_side_px) +
                " a side can be read.");
   }
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(size->width_px) * static_cast<std::uint64_t>(size->height_px);
   if (pixels > *pixels_left) {
     Refuse(file, place,
-           "of " + words + " pixels brings the model's pictures above " +
+           "of " + words + " pixels brings the model's images above " +
                std::to_string(limits.max_image_pixels) + " pixels.");
   }
   *pixels_left -= pixels;
@@ -107,7 +107,7 @@ Image DecodeImage(const std::string& file, const std::string& place, std::span<c
   const std::size_t expected = pixels * 4 * (decoded.bits == 16 ? 2 : 1);
   if (!done || decoded.width != size->width_px || decoded.height != size->height_px ||
       decoded.component != 4 || decoded.image.size() != expected) {
-    Refuse(file, place, "is a damaged picture.");
+    Refuse(file, place, "is a damaged image.");
   }
   return ToImage(decoded);
 }

@@ -59,7 +59,7 @@ Json Reduced(const Json& value) {
 
 bool KeepEncoded(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int,
                  void*) {
-  return true;  // pictures are decoded later, and only those that a texture shows
+  return true;  // images are decoded later, and only those that a texture shows
 }
 
 tinygltf::Model Parse(const std::string& name, const PackedGltf& packed) {
@@ -118,7 +118,7 @@ void CheckNothingLost(const std::string& name, const Json& json, const tinygltf:
   if (!same) Refuse(name, "", "the glTF cannot be read: a part of it has no meaning.");
 }
 
-// Decodes the pictures that textures show; the answer is the place of each of the file's images in
+// Decodes the images that textures show; the answer is the place of each of the file's images in
 // Model::images.
 std::vector<int> ReadImages(const std::string& name, const tinygltf::Model& source, const LoadLimits& limits,
                             Model* model) {

@@ -25,7 +25,7 @@ namespace docent::content {
 
 struct LoadedGltf {
   std::shared_ptr<Model> model;
-  // The same file as one GLB that needs no other file: the input itself if it was one. Pictures keep their
+  // The same file as one GLB that needs no other file: the input itself if it was one. Images keep their
   // encoding.
   std::vector<std::uint8_t> glb;
 };

@@ -15,7 +15,7 @@
 // Turns the primitives of a checked glTF into triangles with whole vertices.
 namespace docent::content {
 
-// Lives while one model is read. Every index that comes out is in range of its primitive's vertices, every
+// IsActive while one model is read. Every index that comes out is in range of its primitive's vertices, every
 // coordinate finite.
 class MeshReader {
  public:

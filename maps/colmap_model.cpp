@@ -62,7 +62,7 @@ std::string CameraLine(std::size_t id, const engine::CameraModel& camera) {
   return line.Take();
 }
 
-std::string PictureName(engine::KeyFrameId id) {
+std::string ImageName(engine::KeyFrameId id) {
   std::string digits = std::to_string(id);
   return "keyframe" + std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits + ".png";
 }
@@ -130,9 +130,9 @@ ColmapModel MakeColmapModel(const engine::MapSnapshot& map) {
     Line line;
     line.Add(std::uint64_t{keyframe.id} + 1).Add(q.w()).Add(q.x()).Add(q.y()).Add(q.z());
     line.Add(t.x()).Add(t.y()).Add(t.z()).Add(camera - cameras.begin() + 1);
-    line.Add(std::string_view(PictureName(keyframe.id)));
+    line.Add(std::string_view(ImageName(keyframe.id)));
     model.images += line.Take() + ObservationsLine(map, keyframe, {begin, observation}, &tracks);
-    model.picture_of.emplace_back(PictureName(keyframe.id), keyframe.id);
+    model.image_of.emplace_back(ImageName(keyframe.id), keyframe.id);
   }
   model.points3d = "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n";
   for (const engine::MapPoint& point : map.points) {

@@ -59,7 +59,7 @@ std::string Reason(sqlite3* connection, int result) {
     case SQLITE_IOERR:
       return "cannot be read or written" + SystemReason(connection);
     case SQLITE_TOOBIG:
-      return "cannot hold a picture, model or table above " + std::to_string(kMaxValueBytes >> 20) + " MiB";
+      return "cannot hold an image, model or table above " + std::to_string(kMaxValueBytes >> 20) + " MiB";
     default:
       return "cannot be used (" +
              std::string(connection ? sqlite3_errmsg(connection) : sqlite3_errstr(result)) + ")";

@@ -35,7 +35,7 @@ inline constexpr EnvelopeKind kSceneKind = {{'D', 'S', 'C', 'N'}, "the scene", 0
 inline constexpr EnvelopeKind kPanoramaTableKind = {{'D', 'P', 'A', 'N'}, "the table of panorama maps", 0};
 inline constexpr EnvelopeKind kThumbnailTableKind = {{'D', 'T', 'H', 'M'}, "the table of thumbnails", 0};
 inline constexpr EnvelopeKind kWordTableKind = {{'D', 'W', 'R', 'D'}, "the table of words", 0};
-inline constexpr EnvelopeKind kPictureKind = {{'D', 'P', 'I', 'C'}, "the picture", 0};
+inline constexpr EnvelopeKind kImageKind = {{'D', 'P', 'I', 'C'}, "the image", 0};
 
 // Writes the head; the caller appends `count` records.
 ByteWriter BeginEnvelope(const EnvelopeKind& kind, std::uint64_t map_key, std::uint64_t count);

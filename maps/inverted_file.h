@@ -16,7 +16,7 @@ namespace docent::maps {
 
 // Bags of words of many keyframes, and for each word the keyframes that have it (Sivic and Zisserman 2003):
 // a search reads the lists of the words that it asks for and nothing else, the rarest first, and stops where
-// more would say little. Scores weigh terms by their frequency in the picture and by their rarity among all
+// more would say little. Scores weigh terms by their frequency in the image and by their rarity among all
 // keyframes (Nister and Stewenius 2006), always as of now: adding and removing leaves everything as if only
 // what is there had ever been added.
 //
@@ -34,7 +34,7 @@ class InvertedFile {
     Slot slot = kNoSlot;
     Owner owner;
     // Of tf-idf vectors brought to a sum of 1, how much the two share: 1 for the same words in the same
-    // proportions, 0 for none in common. tf: how often the picture has the word; idf: ln(1 + N / n) for a
+    // proportions, 0 for none in common. tf: how often the image has the word; idf: ln(1 + N / n) for a
     // word that n of N keyframes have.
     double score = 0;
   };

@@ -196,7 +196,7 @@ class Library::Impl {
 
   void WriteStructure(const engine::MapSnapshot& snapshot, const MapParts& parts,
                       const std::vector<StoredKeyFrame>& stored_before, MapInfo* info) {
-    WritePictures(database_, info->key, snapshot, parts.keyframes, stored_before);
+    WriteImages(database_, info->key, snapshot, parts.keyframes, stored_before);
     WriteParts(database_, info->key, parts);
     WriteThumbnails(database_, info->key, MakeThumbnails(snapshot));
     WriteWords(database_, info->key,
@@ -335,20 +335,20 @@ SceneRecord Library::LoadScene(std::uint64_t key) const {
   });
 }
 
-void Library::LoadLooks(const TakeLooks& take) const {
+void Library::LoadAppearance(const TakeLooks& take) const {
   impl_->Read([&] {
     for (const MapInfo& info : ReadMapRows(impl_->database())) {
-      Looks looks;
+      Appearance appearance;
       const auto attempt = [&](const std::function<void()>& read) {
         try {
           WithPlace(impl_->database(), info, read);
         } catch (const Error& error) {
-          looks.problem = error.what();
+          appearance.problem = error.what();
         }
       };
-      attempt([&] { looks.words = ReadWords(impl_->database(), info); });
-      attempt([&] { looks.thumbnails = ReadThumbnails(impl_->database(), info); });
-      take(info, std::move(looks));
+      attempt([&] { appearance.words = ReadWords(impl_->database(), info); });
+      attempt([&] { appearance.thumbnails = ReadThumbnails(impl_->database(), info); });
+      take(info, std::move(appearance));
     }
   });
 }

@@ -30,14 +30,14 @@ inline constexpr std::size_t kMaxMapNameBytes = 200;
 enum class Access { kReadOnly, kReadWrite };
 enum class CreateIfMissing { kNo, kYes };
 
-// Makes of a stored picture (CV_8UC1) what an engine needs of a keyframe. Called from several threads at
+// Makes of a stored image (CV_8UC1) what an engine needs of a keyframe. Called from several threads at
 // once.
 using FeatureMaker = std::function<std::shared_ptr<const engine::ImageFeatures>(const cv::Mat& gray)>;
 
 struct LibraryOptions {
   std::function<WallTime()> clock;  // for created and modified; the system's when empty
   FeatureMaker make_features;       // engine::MakeFeatures when empty
-  int load_threads = 0;             // that decode pictures; 0: one a processor, at most 8
+  int load_threads = 0;             // that decode images; 0: one a processor, at most 8
 };
 
 class Library {
@@ -51,27 +51,27 @@ class Library {
   Access access() const;
   const std::string& file() const;  // as it was named to Open
 
-  // All maps by ascending key. Reads no points and no pictures.
+  // All maps by ascending key. Reads no points and no images.
   std::vector<MapInfo> List() const;
   MapInfo Find(std::uint64_t key) const;              // throws when there is none
   MapInfo FindByName(const std::string& name) const;  // throws when there is none
   StoredMap Load(std::uint64_t key) const;
   SceneRecord LoadScene(std::uint64_t key) const;
   // Hands out what a place index needs of every map, by ascending key: a few kilobytes a keyframe, without
-  // touching points or pictures. What is damaged is told as an empty list and a sentence.
-  struct Looks {
+  // touching points or images. What is damaged is told as an empty list and a sentence.
+  struct Appearance {
     std::vector<KeyFrameThumbnail> thumbnails;
     std::vector<KeyFrameWords> words;  // empty also where none are known, see ReadWords
     std::string problem;
   };
-  using TakeLooks = std::function<void(const MapInfo& info, Looks looks)>;
-  void LoadLooks(const TakeLooks& take) const;
+  using TakeLooks = std::function<void(const MapInfo& info, Appearance appearance)>;
+  void LoadAppearance(const TakeLooks& take) const;
 
   // A key that no map of this library has or ever had; reserved on disk, so that two processes never share
   // one.
   std::uint64_t NewKey();
   // Adds a map or brings it up to date; see MapRecord and the table in policy.h. What is unchanged costs
-  // nothing on disk: pictures of keyframes that are stored already are kept as they are. Maps that it holds
+  // nothing on disk: images of keyframes that are stored already are kept as they are. Maps that it holds
   // now (MapRecord::holds) are removed in the same transaction. False, and nothing was written, when the
   // stored revision is not the one that the record wants.
   bool Save(const MapRecord& record);

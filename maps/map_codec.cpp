@@ -23,7 +23,7 @@ constexpr double kSameRotation = 1e-12;  // of a quaternion's entries
 bool SameKeyFrame(const StoredKeyFrame& stored_a, const StoredKeyFrame& stored_b) {
   const engine::KeyFrame& a = stored_a.keyframe;
   const engine::KeyFrame& b = stored_b.keyframe;
-  return stored_a.picture_hash == stored_b.picture_hash && a.id == b.id && a.kind == b.kind &&
+  return stored_a.image_hash == stored_b.image_hash && a.id == b.id && a.kind == b.kind &&
          a.panorama == b.panorama && a.fixed == b.fixed && a.time == b.time &&
          a.camera_from_map.translation == b.camera_from_map.translation &&
          (a.camera_from_map.rotation.quaternion().coeffs() - b.camera_from_map.rotation.quaternion().coeffs())
@@ -48,10 +48,10 @@ std::uint16_t CameraIndex(const CameraTable& cameras, const std::shared_ptr<cons
   return static_cast<std::uint16_t>(it - cameras.begin());
 }
 
-void CheckPictureSize(const std::string& camera, std::int64_t width, std::int64_t height) {
-  if (std::min(width, height) < kMinPictureSidePx || std::max(width, height) > kMaxPictureSidePx ||
-      width * height > kMaxPicturePixels) {
-    throw Error(camera + " has an impossible picture size of " + std::to_string(width) + "x" +
+void CheckImageSize(const std::string& camera, std::int64_t width, std::int64_t height) {
+  if (std::min(width, height) < kMinImageSidePx || std::max(width, height) > kMaxImageSidePx ||
+      width * height > kMaxImagePixels) {
+    throw Error(camera + " has an impossible image size of " + std::to_string(width) + "x" +
                 std::to_string(height));
   }
 }
@@ -79,7 +79,7 @@ StoredKeyFrame DecodeKeyFrame(ByteReader& reader, const CameraTable& cameras) {
   keyframe.camera_from_map = {engine::Rotation3(rotation), reader.GetAll<Eigen::Vector3d>()};
   keyframe.mean_depth = reader.Get<double>();
   keyframe.depth_sigma = reader.Get<double>();
-  stored.picture_hash = reader.Get<std::uint64_t>();
+  stored.image_hash = reader.Get<std::uint64_t>();
   return stored;
 }
 
@@ -99,7 +99,7 @@ std::vector<StoredKeyFrame> MakeStoredKeyFrames(const engine::MapSnapshot& snaps
   keyframes.reserve(snapshot.keyframes.size());
   for (const engine::KeyFrame& keyframe : snapshot.keyframes) {
     keyframe.features->Look();
-    StoredKeyFrame stored{keyframe, PictureHash(keyframe.features->levels[0])};
+    StoredKeyFrame stored{keyframe, ImageHash(keyframe.features->levels[0])};
     stored.keyframe.features = nullptr;
     keyframes.push_back(std::move(stored));
   }
@@ -111,7 +111,7 @@ Bytes EncodeCameras(std::uint64_t map_key, const CameraTable& cameras) {
   for (const auto& camera : cameras) {
     const CameraModel::Intrinsics& intrinsics = camera->intrinsics();
     // What could not be read back must not be written.
-    CheckPictureSize("its camera", intrinsics.width_px, intrinsics.height_px);
+    CheckImageSize("its camera", intrinsics.width_px, intrinsics.height_px);
     if (const auto problem = CameraModel::Validate(camera->lens(), intrinsics, camera->distortion())) {
       throw Error("its camera is not valid: " + *problem);
     }
@@ -134,7 +134,7 @@ CameraTable DecodeCameras(std::uint64_t map_key, std::span<const std::uint8_t> b
     const auto lens = reader.Get<std::uint8_t>();
     if (lens > static_cast<std::uint8_t>(LensModel::kKannalaBrandt)) throw Error(name + " has no known lens");
     const auto width = reader.Get<std::uint32_t>(), height = reader.Get<std::uint32_t>();
-    CheckPictureSize(name, width, height);
+    CheckImageSize(name, width, height);
     CameraModel::Intrinsics intrinsics;
     intrinsics.width_px = static_cast<int>(width);
     intrinsics.height_px = static_cast<int>(height);
@@ -166,7 +166,7 @@ Bytes EncodeKeyFrames(std::uint64_t map_key, const std::vector<StoredKeyFrame>& 
     writer.PutAll(keyframe.camera_from_map.translation);
     writer.Put(keyframe.mean_depth);
     writer.Put(keyframe.depth_sigma);
-    writer.Put(stored.picture_hash);
+    writer.Put(stored.image_hash);
   }
   return FinishEnvelope(std::move(writer));
 }

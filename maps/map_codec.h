@@ -19,20 +19,20 @@ namespace docent::maps {
 
 // What is read takes at most four times the room of what it is read from, so that a small file cannot ask for
 // a large memory: the least sizes of things that vary in length see to that.
-// Pictures that compress further are stored as they are.
+// Images that compress further are stored as they are.
 inline constexpr std::int64_t kMaxPixelsAByte = 4;
 inline constexpr std::size_t kMinAssetIdBytes = 4, kMaxAssetIdBytes = 128;
-inline constexpr int kMinPictureSidePx = 64;  // what engine::MakeFeatures needs
-inline constexpr int kMaxPictureSidePx = 16384;
-inline constexpr std::int64_t kMaxPicturePixels = std::int64_t{1} << 26;
+inline constexpr int kMinImageSidePx = 64;  // what engine::MakeFeatures needs
+inline constexpr int kMaxImageSidePx = 16384;
+inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
 
-// A keyframe without its picture, which lies in a row of its own and is recognised by its hash.
+// A keyframe without its image, which lies in a row of its own and is recognised by its hash.
 struct StoredKeyFrame {
   engine::KeyFrame keyframe;  // features null
-  std::uint64_t picture_hash = 0;
+  std::uint64_t image_hash = 0;
 };
 
-// What a map is made of, without pictures.
+// What a map is made of, without images.
 struct MapParts {
   std::vector<StoredKeyFrame> keyframes;
   std::vector<engine::MapPoint> points;
@@ -51,12 +51,12 @@ struct ScenePart {
 
 using CameraTable = std::vector<std::shared_ptr<const engine::CameraModel>>;
 
-// Hash of size and grey values of a CV_8UC1 picture.
-std::uint64_t PictureHash(const cv::Mat& gray);
+// Hash of size and grey values of a CV_8UC1 image.
+std::uint64_t ImageHash(const cv::Mat& gray);
 
 // The distinct cameras of the keyframes, in order of first use. Equal cameras become one.
 CameraTable MakeCameraTable(const std::vector<StoredKeyFrame>& keyframes);
-// Keyframes without their pictures, but with the hashes of them.
+// Keyframes without their images, but with the hashes of them.
 std::vector<StoredKeyFrame> MakeStoredKeyFrames(const engine::MapSnapshot& snapshot);
 
 Bytes EncodeCameras(std::uint64_t map_key, const CameraTable& cameras);
@@ -66,7 +66,7 @@ Bytes EncodePoints(std::uint64_t map_key, const std::vector<engine::MapPoint>& p
 Bytes EncodeObservations(std::uint64_t map_key, const std::vector<engine::Observation>& observations);
 Bytes EncodeScene(std::uint64_t map_key, const ScenePart& scene);
 // gray: CV_8UC1. Lossless (PNG, quickest level).
-Bytes EncodePicture(std::uint64_t map_key, engine::KeyFrameId keyframe, const cv::Mat& gray);
+Bytes EncodeImage(std::uint64_t map_key, engine::KeyFrameId keyframe, const cv::Mat& gray);
 
 CameraTable DecodeCameras(std::uint64_t map_key, std::span<const std::uint8_t> bytes);
 std::vector<StoredKeyFrame> DecodeKeyFrames(std::uint64_t map_key, std::span<const std::uint8_t> bytes,
@@ -75,9 +75,9 @@ std::vector<engine::MapPoint> DecodePoints(std::uint64_t map_key, std::span<cons
 std::vector<engine::Observation> DecodeObservations(std::uint64_t map_key,
                                                     std::span<const std::uint8_t> bytes);
 ScenePart DecodeScene(std::uint64_t map_key, std::span<const std::uint8_t> bytes);
-// The picture must be of the keyframe's camera's size and have the keyframe's hash.
-cv::Mat DecodePicture(std::uint64_t map_key, const StoredKeyFrame& keyframe,
-                      std::span<const std::uint8_t> bytes);
+// The image must be of the keyframe's camera's size and have the keyframe's hash.
+cv::Mat DecodeImage(std::uint64_t map_key, const StoredKeyFrame& keyframe,
+                    std::span<const std::uint8_t> bytes);
 
 // Whether two maps are the same field by field. Rotations to 1e-12: reading one normalizes it, which may move
 // its last bit, and a map that is read and saved again has not changed.

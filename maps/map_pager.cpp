@@ -19,9 +19,9 @@ namespace docent::maps {
 
 namespace {
 
-// Of a picture of 640 x 480 with its pyramid and corners: for maps that were not read yet.
+// Of an image of 640 x 480 with its pyramid and corners: for maps that were not read yet.
 constexpr std::size_t kUsualKeyFrameBytes = 450'000;
-// What a camera that is lost asks for changes with every picture: older wishes are not worth the reading.
+// What a camera that is lost asks for changes with every image: older wishes are not worth the reading.
 constexpr std::size_t kMaxWanted = 8;
 
 }  // namespace
@@ -96,10 +96,10 @@ std::vector<MapInfo> MapPager::Impl::Open() {
   std::size_t keyframes = 0;
   for (const MapInfo& info : infos) keyframes += info.keyframes;
   index_->Reserve(keyframes);
-  library_->LoadLooks([&](const MapInfo& info, const Library::Looks& looks) {
-    index_->SetLooks(info.key, looks.thumbnails, looks.words);
-    // It is hard to find by what it looks like; by its name it can be found.
-    if (!looks.problem.empty() && callbacks_.failed) callbacks_.failed(info.key, looks.problem);
+  library_->LoadAppearance([&](const MapInfo& info, const Library::Appearance& appearance) {
+    index_->SetAppearance(info.key, appearance.thumbnails, appearance.words);
+    // It is hard to find by what it appearance like; by its name it can be found.
+    if (!appearance.problem.empty() && callbacks_.failed) callbacks_.failed(info.key, appearance.problem);
   });
   if (keyframes * kUsualKeyFrameBytes <= std::min(options_.read_at_start_bytes, options_.budget_bytes)) {
     for (const MapInfo& info : infos) Load(info.key);

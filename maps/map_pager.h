@@ -18,12 +18,12 @@ struct PagerOptions {
   std::size_t budget_bytes = std::size_t{1} << 30;  // of maps in memory
   // A library that is as small as this is read whole at the start: it is there before it is looked for.
   std::size_t read_at_start_bytes = std::size_t{256} << 20;
-  // Who asks for a place waits for its map, so that equal pictures give equal answers on every run; else maps
+  // Who asks for a place waits for its map, so that equal images give equal answers on every run; else maps
   // are read on a thread of their own, and the answer has those that are there already.
   bool wait_for_maps = true;
 };
 
-// What a snapshot takes in memory, nearly: pictures, corners, points and observations.
+// What a snapshot takes in memory, nearly: images, corners, points and observations.
 std::size_t BytesOf(const engine::MapSnapshot& map);
 
 // Keeps those maps of a library in memory that are used or likely to be, and lets the least recently used go

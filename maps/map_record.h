@@ -50,7 +50,7 @@ struct MapRecord {
   std::vector<std::uint64_t> holds = {};
 };
 
-// What a list shows; read without touching points or pictures.
+// What a list shows; read without touching points or images.
 struct MapInfo {
   std::uint64_t key = 0;
   std::string name;

@@ -42,7 +42,7 @@ void UpgradeToFormat2(const Database& database) {
   CreateTable(database, "thumbnails");
   for (const MapInfo& info : ReadMapRows(database)) {
     WithPlace(database, info, [&] {
-      WriteThumbnails(database, info.key, ThumbnailsFromPictures(database, info));
+      WriteThumbnails(database, info.key, ThumbnailsFromImages(database, info));
       WritePanoramas(database, info.key, {});
     });
   }
@@ -52,7 +52,7 @@ void UpgradeToFormat2(const Database& database) {
 void UpgradeToFormat3(const Database& database) {
   CreateTable(database, "words");
   for (const MapInfo& info : ReadMapRows(database)) {
-    WithPlace(database, info, [&] { WriteWords(database, info.key, WordsFromPictures(database, info)); });
+    WithPlace(database, info, [&] { WriteWords(database, info.key, WordsFromImages(database, info)); });
   }
 }
 

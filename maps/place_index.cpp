@@ -155,8 +155,8 @@ void PlaceIndex::SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnap
   Replace(key, std::move(snapshot), news);
 }
 
-void PlaceIndex::SetLooks(std::uint64_t key, std::span<const KeyFrameThumbnail> thumbnails,
-                          std::span<const KeyFrameWords> words) {
+void PlaceIndex::SetAppearance(std::uint64_t key, std::span<const KeyFrameThumbnail> thumbnails,
+                               std::span<const KeyFrameWords> words) {
   std::vector<News> news;
   news.reserve(thumbnails.size());
   auto described = words.begin();
@@ -189,13 +189,13 @@ void PlaceIndex::Replace(std::uint64_t key, std::shared_ptr<const engine::MapSna
   for (std::size_t i = 0; i < news.size(); ++i) {
     const News& next = news[i];
     const Entry* const known = before ? before->Find(next.keyframe) : nullptr;
-    const bool same_picture = known && (!next.thumbnail || update.Holds(*known, *next.thumbnail));
-    if (!same_picture && !next.thumbnail) continue;
-    Entry entry = same_picture ? *known : Entry();
+    const bool same_image = known && (!next.thumbnail || update.Holds(*known, *next.thumbnail));
+    if (!same_image && !next.thumbnail) continue;
+    Entry entry = same_image ? *known : Entry();
     entry.keyframe = next.keyframe;
     entry.place = next.place;
     entry.source = next.source;
-    if (!same_picture) {
+    if (!same_image) {
       entry.array = update.ArrayFor(next.thumbnail->width, next.thumbnail->height, news.size() - i);
       entry.slot = update.Append(entry.array, *next.thumbnail, {key, next.keyframe});
     }

@@ -14,7 +14,7 @@
 
 namespace docent::maps {
 
-// Which keyframes, of all maps, look like a picture (ptamm §3.2, §3.3), in two ways: by small blurry images,
+// Which keyframes, of all maps, look like an image (ptamm §3.2, §3.3), in two ways: by small blurry images,
 // all of which are compared (thumbnail_array.h), and by the words of their descriptors, of which only those
 // are touched that share some (inverted_file.h). A map is known by these alone, so that all maps of a large
 // library can be searched while only few of them are in memory; whoever loads or extends a map hands its
@@ -39,12 +39,12 @@ class PlaceIndex : public engine::PlaceFinder {
   // Adds a map that is not in memory: candidates in it have no snapshot. Both by ascending keyframe; words of
   // keyframes without a thumbnail are passed over, and those of which no words are told are described once
   // their map is in memory.
-  void SetLooks(std::uint64_t key, std::span<const KeyFrameThumbnail> thumbnails,
-                std::span<const KeyFrameWords> words = {});
+  void SetAppearance(std::uint64_t key, std::span<const KeyFrameThumbnail> thumbnails,
+                     std::span<const KeyFrameWords> words = {});
   // Keeps a map's looks and lets its snapshot go.
   void ReleaseMap(std::uint64_t key);
   void RemoveMap(std::uint64_t key);
-  // Makes room for this many thumbnails of pictures with sides as 4 to 3, so that a library is read in one
+  // Makes room for this many thumbnails of images with sides as 4 to 3, so that a library is read in one
   // go.
   void Reserve(std::size_t keyframes);
 

@@ -12,7 +12,7 @@ namespace docent::maps {
 
 namespace {
 
-// What the exhaustive search hands on to the fine comparison: what looks alike in cells of six picture pixels
+// What the exhaustive search hands on to the fine comparison: what looks alike in cells of six image pixels
 // of eighty is looked at again in pixels of two.
 constexpr std::size_t kComparedFinely = 256;
 // As many as words bring into the comparison.
@@ -52,7 +52,7 @@ class PlaceIndex::Merge {
   const PackedThumbnail* thumbnail_ = nullptr;
   const State::Array* array_ = nullptr;  // of thumbnails as large as the wanted one
   std::vector<Candidate> candidates_;
-  ByChance chance_;  // what the last of so many shares that they cannot all be the place
+  ChanceLevel chance_;  // what the last of so many shares that they cannot all be the place
   std::unordered_set<const Entry*> known_;
 };
 
@@ -81,7 +81,7 @@ void PlaceIndex::Merge::AddByThumbnail(const PackedThumbnail& wanted, std::size_
     const ThumbnailArray::Owner owner = array->thumbnails->owner(hit.slot);
     const Map* const map = state_.Find(owner.map_key);
     const Entry* const entry = Find(map, owner.keyframe);
-    // A slot whose keyframe went, or has another picture now.
+    // A slot whose keyframe went, or has another image now.
     if (!entry || entry->array != index || entry->slot != hit.slot) continue;
     Add(map, entry, hit.difference);
     if (!only_map && candidates_.size() == kByWords)

@@ -11,13 +11,13 @@
 
 namespace docent::maps {
 
-double Likeness(const PlaceScore& score, const ByChance& chance) {
+double Likeness(const PlaceScore& score, const ChanceLevel& chance) {
   const double correlation = 1 - score.difference / (2 * kThumbnailContrast * kThumbnailContrast);
   return std::max(0.0, (correlation - chance.correlation) / (1 - chance.correlation)) +
          std::max(0.0, score.words / chance.words - 1);
 }
 
-std::vector<std::size_t> RankPlaces(std::span<const PlaceScore> scores, const ByChance& chance,
+std::vector<std::size_t> RankPlaces(std::span<const PlaceScore> scores, const ChanceLevel& chance,
                                     std::size_t count, std::size_t per_map, std::size_t places) {
   std::vector<double> likeness;
   for (const PlaceScore& score : scores) likeness.push_back(Likeness(score, chance));

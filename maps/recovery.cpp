@@ -98,7 +98,7 @@ class Salvage {
       whole_ = false;
     }
     auto map = std::make_shared<engine::MapSnapshot>();
-    ReadPictures(key, where, &parts, map.get());
+    ReadImages(key, where, &parts, map.get());
     Prune(parts, map.get());
     if (info_ && info_->key == key) {
       map->revision = info_->revision;
@@ -109,17 +109,17 @@ class Salvage {
       map->next_point = parts.points.empty() ? 0 : parts.points.back().id + 1;
     }
     if (const std::string problem = engine::Validate(*map); !problem.empty()) throw Error(problem);
-    if (map->keyframes.empty() && !parts.keyframes.empty()) throw Error("none of its pictures is left");
+    if (map->keyframes.empty() && !parts.keyframes.empty()) throw Error("none of its images is left");
     return map;
   }
 
-  // The keyframes whose pictures are there.
-  void ReadPictures(std::uint64_t key, const std::string& where, MapParts* parts, engine::MapSnapshot* map) {
+  // The keyframes whose images are there.
+  void ReadImages(std::uint64_t key, const std::string& where, MapParts* parts, engine::MapSnapshot* map) {
     for (const StoredKeyFrame& stored : parts->keyframes) {
       const bool there = Try(where + ", keyframe " + std::to_string(stored.keyframe.id), [&] {
-        maps::ReadPictures(database_, key, {stored}, [&](std::size_t, std::span<const std::uint8_t> bytes) {
+        maps::ReadImages(database_, key, {stored}, [&](std::size_t, std::span<const std::uint8_t> bytes) {
           map->keyframes.push_back(stored.keyframe);
-          map->keyframes.back().features = MakeSizesOnly(DecodePicture(key, stored, bytes));
+          map->keyframes.back().features = MakeSizesOnly(DecodeImage(key, stored, bytes));
         });
       });
       if (there) continue;

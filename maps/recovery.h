@@ -15,7 +15,7 @@ struct Recovery {
 };
 
 // Reads what a damaged file still holds and writes it into a new library, which verifies. The damaged file is
-// not changed. A keyframe whose picture is lost goes with its points; a map whose tables are lost is lost; a
+// not changed. A keyframe whose image is lost goes with its points; a map whose tables are lost is lost; a
 // scene one of whose assets is lost goes whole, because it would not open. Throws docent::Error when the
 // file is no library at all, the new one exists already or cannot be written, or nothing could be saved: then
 // no new file is left.

@@ -55,7 +55,7 @@ RelocalizationTrial::Result Try(const engine::MapSnapshot& map, const PlaceIndex
   tracker.SetMap(rest, kKey);
   engine::Frame frame;
   frame.time = keyframe.time;
-  frame.picture = keyframe.features->levels[0];
+  frame.image = keyframe.features->levels[0];
   // What shows less than half of what should be in view counts only once several images in a row agree: a
   // visitor's camera delivers them within a tenth of a second, and so does this.
   engine::TrackedFrame tracked;

@@ -194,12 +194,12 @@ std::optional<std::uint64_t> FindMapByName(const Database& database, const std::
 
 CameraTable ReadCameras(const Database& database, std::uint64_t key) {
   CameraTable cameras = DecodeCameras(key, ReadPart(database, key, "cameras"));
-  // Pictures are compressed, and a flat one by a thousand times: without this a file of a few kilobytes could
-  // ask for gigabytes. A library of pictures with something in them is far above the limit.
+  // Images are compressed, and a flat one by a thousand times: without this a file of a few kilobytes could
+  // ask for gigabytes. A library of images with something in them is far above the limit.
   const std::int64_t most = kMaxPixelsAByte * database.Bytes();
   for (const auto& camera : cameras) {
     if (std::int64_t{camera->width_px()} * camera->height_px() > most)
-      throw Error("its camera has a picture size that a file so small does not hold");
+      throw Error("its camera has an image size that a file so small does not hold");
   }
   return cameras;
 }
@@ -228,33 +228,33 @@ void WriteParts(const Database& database, std::uint64_t key, const MapParts& par
   WritePanoramas(database, key, parts);
 }
 
-void ReadPictures(const Database& database, std::uint64_t key, const std::vector<StoredKeyFrame>& keyframes,
-                  const TakePicture& take) {
+void ReadImages(const Database& database, std::uint64_t key, const std::vector<StoredKeyFrame>& keyframes,
+                const TakeImage& take) {
   Statement query = database.Prepare("SELECT data FROM pictures WHERE map_key = ? AND keyframe = ?");
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     query.Reset();
     query.Bind(1, Signed(key)).Bind(2, std::int64_t{keyframes[i].keyframe.id});
     if (!query.Step())
-      throw Error("the picture of keyframe " + std::to_string(keyframes[i].keyframe.id) + " is missing");
+      throw Error("the image of keyframe " + std::to_string(keyframes[i].keyframe.id) + " is missing");
     take(i, query.Blob(0));
   }
 }
 
-void WritePictures(const Database& database, std::uint64_t key, const engine::MapSnapshot& snapshot,
-                   const std::vector<StoredKeyFrame>& keyframes,
-                   const std::vector<StoredKeyFrame>& stored_before) {
+void WriteImages(const Database& database, std::uint64_t key, const engine::MapSnapshot& snapshot,
+                 const std::vector<StoredKeyFrame>& keyframes,
+                 const std::vector<StoredKeyFrame>& stored_before) {
   std::unordered_map<engine::KeyFrameId, std::uint64_t> left;  // stored, and not yet found in the new map
-  for (const StoredKeyFrame& stored : stored_before) left.emplace(stored.keyframe.id, stored.picture_hash);
+  for (const StoredKeyFrame& stored : stored_before) left.emplace(stored.keyframe.id, stored.image_hash);
   Statement insert =
       database.Prepare("INSERT OR REPLACE INTO pictures (map_key, keyframe, data) VALUES (?, ?, ?)");
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     const engine::KeyFrameId id = keyframes[i].keyframe.id;
     const auto stored = left.find(id);
-    const bool same = stored != left.end() && stored->second == keyframes[i].picture_hash;
+    const bool same = stored != left.end() && stored->second == keyframes[i].image_hash;
     if (stored != left.end()) left.erase(stored);
     if (same) continue;
     snapshot.keyframes[i].features->Look();
-    const Bytes bytes = EncodePicture(key, id, snapshot.keyframes[i].features->levels[0]);
+    const Bytes bytes = EncodeImage(key, id, snapshot.keyframes[i].features->levels[0]);
     insert.Reset();
     insert.Bind(1, Signed(key)).Bind(2, std::int64_t{id}).Bind(3, std::span<const std::uint8_t>(bytes)).Run();
   }

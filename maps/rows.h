@@ -34,21 +34,21 @@ std::optional<std::uint64_t> FindMapByName(const Database& database, const std::
 
 // The bytes of one binary column of a map; throws when it is not there.
 Bytes ReadPart(const Database& database, std::uint64_t key, std::string_view part);
-// The cameras of a map; throws when one's pictures could not be in this file.
+// The cameras of a map; throws when one's images could not be in this file.
 CameraTable ReadCameras(const Database& database, std::uint64_t key);
-// Keyframes, points and observations without pictures; the counts agree with `info`.
+// Keyframes, points and observations without images; the counts agree with `info`.
 MapParts ReadParts(const Database& database, const MapInfo& info);
 void WriteParts(const Database& database, std::uint64_t key, const MapParts& parts);
 // The part that WriteParts writes as well: for upgrading a map that has none.
 void WritePanoramas(const Database& database, std::uint64_t key, const MapParts& parts);
-// Hands the bytes of each keyframe's picture to `take`, in the keyframes' order; every keyframe has one.
-using TakePicture = std::function<void(std::size_t keyframe_index, std::span<const std::uint8_t> bytes)>;
-void ReadPictures(const Database& database, std::uint64_t key, const std::vector<StoredKeyFrame>& keyframes,
-                  const TakePicture& take);
-// Brings the stored pictures to those of `snapshot`: rows whose picture is the same stay untouched.
-void WritePictures(const Database& database, std::uint64_t key, const engine::MapSnapshot& snapshot,
-                   const std::vector<StoredKeyFrame>& keyframes,
-                   const std::vector<StoredKeyFrame>& stored_before);
+// Hands the bytes of each keyframe's image to `take`, in the keyframes' order; every keyframe has one.
+using TakeImage = std::function<void(std::size_t keyframe_index, std::span<const std::uint8_t> bytes)>;
+void ReadImages(const Database& database, std::uint64_t key, const std::vector<StoredKeyFrame>& keyframes,
+                const TakeImage& take);
+// Brings the stored images to those of `snapshot`: rows whose image is the same stay untouched.
+void WriteImages(const Database& database, std::uint64_t key, const engine::MapSnapshot& snapshot,
+                 const std::vector<StoredKeyFrame>& keyframes,
+                 const std::vector<StoredKeyFrame>& stored_before);
 
 ScenePart ReadScenePart(const Database& database, std::uint64_t key);
 void WriteScenePart(const Database& database, std::uint64_t key, const ScenePart& scene);

@@ -13,15 +13,15 @@ constexpr std::chrono::milliseconds kUntilUpkeepIsAskedAgain{250};
 
 }  // namespace
 
-Saver::Saver(Library* library, std::size_t capacity, Saved saved, Upkeep upkeep)
+Saver::Saver(Library* library, std::size_t capacity, Saved saved, Upkeep maintenance)
     : library_(library),
       capacity_(std::max<std::size_t>(1, capacity)),
       saved_(std::move(saved)),
-      upkeep_(std::move(upkeep)),
+      upkeep_(std::move(maintenance)),
       worker_("map-saver", [this](const std::stop_token& stop) { Run(stop); }) {}
 
 Saver::~Saver() {
-  EndUpkeep();
+  EndMaintenance();
   worker_.RequestStop();  // Run ends only when nothing waits
   worker_.Join();
 }
@@ -72,14 +72,14 @@ std::size_t Saver::pending() const {
   return waiting_.size() + (running_ ? 1 : 0);
 }
 
-void Saver::EndUpkeep() {
+void Saver::EndMaintenance() {
   std::unique_lock lock(mutex_);
   upkeep_ended_ = interrupt_ = true;
   changed_.wait(lock, [this] { return !keeping_up_; });
 }
 
 // With the lock held, which is let go meanwhile.
-bool Saver::KeepUp(std::unique_lock<std::mutex>* lock) {
+bool Saver::RunMaintenance(std::unique_lock<std::mutex>* lock) {
   keeping_up_ = true;
   interrupt_ = false;
   lock->unlock();
@@ -107,7 +107,7 @@ void Saver::Run(const std::stop_token& stop) {
           changed_.wait_for(lock, stop, kUntilUpkeepIsAskedAgain, [&] { return waits() || upkeep_ended_; }))
         break;
       if (stop.stop_requested()) break;
-      more = KeepUp(&lock);
+      more = RunMaintenance(&lock);
     }
     if (!changed_.wait(lock, stop, waits)) return;
     MapRecord record = std::move(waiting_.front());

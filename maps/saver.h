@@ -32,7 +32,7 @@ class Saver {
   using Upkeep = std::function<bool(const std::atomic<bool>& interrupt)>;
   // library: opened for writing; must outlive the saver. capacity: maps that may wait at once; one more makes
   // Submit wait. saved: told on the saver's thread of each record that is on disk; may be empty.
-  explicit Saver(Library* library, std::size_t capacity = 16, Saved saved = {}, Upkeep upkeep = {});
+  explicit Saver(Library* library, std::size_t capacity = 16, Saved saved = {}, Upkeep maintenance = {});
   // Writes what still waits, then ends. Whoever wants to know about failures calls Flush and TakeError first.
   ~Saver();
 
@@ -46,14 +46,14 @@ class Saver {
   // Maps that wait or are being written.
   std::size_t pending() const;
   // Ends the upkeep that runs now, if any; it goes on later.
-  void InterruptUpkeep() { interrupt_ = true; }
+  void InterruptMaintenance() { interrupt_ = true; }
   // The same, for good, and waits for it: what it uses may go.
-  void EndUpkeep();
+  void EndMaintenance();
 
  private:
   void Run(const std::stop_token& stop);
   bool Idle() const { return waiting_.empty() && !running_; }
-  bool KeepUp(std::unique_lock<std::mutex>* lock);
+  bool RunMaintenance(std::unique_lock<std::mutex>* lock);
 
   Library* const library_;
   const std::size_t capacity_;

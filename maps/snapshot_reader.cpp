@@ -15,23 +15,23 @@ namespace docent::maps {
 
 namespace {
 
-struct PictureJob {
+struct ImageJob {
   std::size_t keyframe = 0;  // index
   Bytes bytes;
 };
 
-// Compressed pictures wait in a short queue, so that only a few are in memory beside the decoded ones.
+// Compressed images wait in a short queue, so that only a few are in memory beside the decoded ones.
 void ReadFeatures(
     const Database& database, std::uint64_t key, const std::vector<StoredKeyFrame>& stored,
     const std::function<std::shared_ptr<const engine::ImageFeatures>(const cv::Mat&)>& make_features,
     int threads, engine::MapSnapshot* snapshot) {
-  BoundedQueue<PictureJob> jobs(static_cast<std::size_t>(threads) * 2);
+  BoundedQueue<ImageJob> jobs(static_cast<std::size_t>(threads) * 2);
   std::vector<std::unique_ptr<Worker>> workers;
   for (int i = 0; i < threads; ++i) {
     workers.push_back(std::make_unique<Worker>("map-loader", [&](std::stop_token) {
       try {
         while (const auto job = jobs.Pop()) {
-          const cv::Mat gray = DecodePicture(key, stored[job->keyframe], job->bytes);
+          const cv::Mat gray = DecodeImage(key, stored[job->keyframe], job->bytes);
           snapshot->keyframes[job->keyframe].features = make_features(gray);
         }
       } catch (...) {
@@ -41,7 +41,7 @@ void ReadFeatures(
     }));
   }
   try {
-    ReadPictures(database, key, stored, [&](std::size_t index, std::span<const std::uint8_t> bytes) {
+    ReadImages(database, key, stored, [&](std::size_t index, std::span<const std::uint8_t> bytes) {
       jobs.Push({index, Bytes(bytes.begin(), bytes.end())});
     });
   } catch (...) {

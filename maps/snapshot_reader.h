@@ -15,7 +15,7 @@ namespace docent::maps {
 // Features that have the sizes of all pyramid levels and nothing more: enough to check a map's numbers.
 std::shared_ptr<const engine::ImageFeatures> MakeSizesOnly(const cv::Mat& gray);
 
-// Reads a map and its pictures inside the caller's transaction, builds the features of its keyframes on up to
+// Reads a map and its images inside the caller's transaction, builds the features of its keyframes on up to
 // `threads` threads and checks the whole (engine::Validate). Throws docent::Error; see WithPlace.
 std::shared_ptr<const engine::MapSnapshot> ReadSnapshot(
     const Database& database, const MapInfo& info,

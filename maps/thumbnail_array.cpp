@@ -19,10 +19,10 @@ constexpr float kMinDeviation = 2;       // grey values: below it noise would be
 constexpr std::size_t kBlock = 16;       // coarse vectors are padded to whole registers of 16-bit numbers
 constexpr int kShiftsAtOnce = 4;    // of the coarse search, so that each number loaded is used four times
 constexpr float kCoarseScale = 32;  // root mean square of a coarse vector's values
-constexpr int kReachFraction = 6;   // of the picture
+constexpr int kReachFraction = 6;   // of the image
 
 int ReachOf(int size_px) {
-  // An even number, so that the steps reach it; none in pictures too small to shift.
+  // An even number, so that the steps reach it; none in images too small to shift.
   return size_px < 4 * kReachFraction ? 0 : (size_px / kReachFraction) & ~1;
 }
 
@@ -284,7 +284,7 @@ std::vector<ThumbnailArray::Hit> ThumbnailArray::Search(const PackedThumbnail& w
   } else {
     const CoarseQuery query(shape_, wanted);
     std::vector<std::int32_t> scores(size + 1);
-    constexpr std::size_t kUsualLength = 64;  // of thumbnails of pictures with sides as 4 to 3
+    constexpr std::size_t kUsualLength = 64;  // of thumbnails of images with sides as 4 to 3
     const auto score = shape_.coarse_bytes == kUsualLength ? ScoreAll<kUsualLength> : ScoreAll<0>;
     score(query, coarse_.get(), shape_.coarse_bytes, size, scores.data());
     scores.resize(size);

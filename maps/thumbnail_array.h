@@ -12,8 +12,8 @@
 
 // Small blurry images side by side in memory, and the exhaustive search among them (ptamm §3.2): a byte a
 // pixel, so that those of a museum fit a wearable, and in two sizes, so that all of them are read in
-// milliseconds. A camera that stands where a keyframe was taken but looks a little elsewhere sees the picture
-// shifted: the search tries all shifts up to a sixth of the picture. Brightness and contrast play no part.
+// milliseconds. A camera that stands where a keyframe was taken but looks a little elsewhere sees the image
+// shifted: the search tries all shifts up to a sixth of the image. Brightness and contrast play no part.
 namespace docent::maps {
 
 // Standard deviation of a packed thumbnail's values; leaves room for four of them.
@@ -60,7 +60,7 @@ class ThumbnailArray {
     engine::KeyFrameId keyframe = engine::kNoId;
   };
   // A thumbnail like the wanted one. difference: mean squared difference at the best shift, both thumbnails
-  // at a standard deviation of 32, divided by the part of the picture that overlaps: what overlaps little
+  // at a standard deviation of 32, divided by the part of the image that overlaps: what overlaps little
   // agrees easily.
   struct Hit {
     std::size_t slot = 0;

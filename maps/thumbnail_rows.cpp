@@ -25,7 +25,7 @@ Bytes EncodeThumbnails(std::uint64_t map_key, std::span<const KeyFrameThumbnail>
 
 std::vector<KeyFrameThumbnail> DecodeThumbnails(std::uint64_t map_key, std::span<const std::uint8_t> bytes) {
   auto [reader, count] = OpenEnvelope(kThumbnailTableKind, map_key, bytes);
-  // The smallest pictures have more pixels than this; see the limits in map_codec.h.
+  // The smallest images have more pixels than this; see the limits in map_codec.h.
   constexpr std::size_t kLeastPixels = 16, kSmallestRecord = 8 + kLeastPixels;
   if (count > reader.remaining() / kSmallestRecord)
     throw Error("the table of thumbnails is damaged: its length does not match");
@@ -66,7 +66,7 @@ void WriteThumbnails(const Database& database, std::uint64_t key,
 }
 
 std::vector<KeyFrameThumbnail> ReadThumbnails(const Database& database, const MapInfo& info) {
-  if (SchemaVersion(database) < kThumbnailsSince) return ThumbnailsFromPictures(database, info);
+  if (SchemaVersion(database) < kThumbnailsSince) return ThumbnailsFromImages(database, info);
   Statement query = database.Prepare("SELECT data FROM thumbnails WHERE map_key = ?");
   query.Bind(1, static_cast<std::int64_t>(info.key));
   if (!query.Step()) throw Error("its thumbnails are missing");
@@ -75,12 +75,12 @@ std::vector<KeyFrameThumbnail> ReadThumbnails(const Database& database, const Ma
   return thumbnails;
 }
 
-std::vector<KeyFrameThumbnail> ThumbnailsFromPictures(const Database& database, const MapInfo& info) {
+std::vector<KeyFrameThumbnail> ThumbnailsFromImages(const Database& database, const MapInfo& info) {
   const MapParts parts = ReadParts(database, info);
   std::vector<KeyFrameThumbnail> thumbnails(parts.keyframes.size());
-  ReadPictures(
+  ReadImages(
       database, info.key, parts.keyframes, [&](std::size_t index, std::span<const std::uint8_t> bytes) {
-        const cv::Mat gray = DecodePicture(info.key, parts.keyframes[index], bytes);
+        const cv::Mat gray = DecodeImage(info.key, parts.keyframes[index], bytes);
         thumbnails[index] = {parts.keyframes[index].keyframe.id, Pack(engine::MakeSmallBlurryImage(gray))};
       });
   return thumbnails;

@@ -12,7 +12,7 @@
 #include "maps/thumbnail_array.h"
 
 // The table `thumbnails`: what a place index needs of a map, in one row, so that opening a large library
-// reads this and leaves pictures and points where they are. Inside a transaction that the caller holds; what
+// reads this and leaves images and points where they are. Inside a transaction that the caller holds; what
 // is read is checked; throws docent::Error.
 namespace docent::maps {
 
@@ -25,9 +25,9 @@ std::vector<KeyFrameThumbnail> MakeThumbnails(const engine::MapSnapshot& snapsho
 void WriteThumbnails(const Database& database, std::uint64_t key,
                      std::span<const KeyFrameThumbnail> thumbnails);
 // One for each keyframe that `info` counts. From a library of format 1, which has no such table, they are
-// made from the pictures.
+// made from the images.
 std::vector<KeyFrameThumbnail> ReadThumbnails(const Database& database, const MapInfo& info);
-// From the pictures of a map, whatever the table says.
-std::vector<KeyFrameThumbnail> ThumbnailsFromPictures(const Database& database, const MapInfo& info);
+// From the images of a map, whatever the table says.
+std::vector<KeyFrameThumbnail> ThumbnailsFromImages(const Database& database, const MapInfo& info);
 
 }  // namespace docent::maps

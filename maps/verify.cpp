@@ -111,7 +111,7 @@ void CheckMap(const Database& database, const MapInfo& info, int threads,
     count.Bind(1, static_cast<std::int64_t>(info.key));
     if (count.Step() && static_cast<std::uint64_t>(count.Integer(0)) != info.keyframes) {
       report->Add(database.file() + ": map '" + info.name + "' (" + std::to_string(info.key) + "): it has " +
-                  std::to_string(count.Integer(0)) + " pictures for " + std::to_string(info.keyframes) +
+                  std::to_string(count.Integer(0)) + " images for " + std::to_string(info.keyframes) +
                   " keyframes");
     }
   });

@@ -9,7 +9,7 @@
 namespace docent::maps {
 
 struct ViewFromAboveOptions {
-  int size_px = 1024;  // of the picture's longer side
+  int size_px = 1024;  // of the image's longer side
   int margin_px = 48;
   double ignored_part =
       0.01;  // of the points at either end of each axis, so that strays do not shrink the rest

@@ -17,7 +17,7 @@ namespace docent::maps {
 
 namespace {
 
-// Of the distance of what a keyframe sees, and the largest turn: what lies within shares most of the picture.
+// Of the distance of what a keyframe sees, and the largest turn: what lies within shares most of the image.
 constexpr double kPlaceSize = 0.5;
 constexpr double kPlaceTurn_rad = 35 * std::numbers::pi / 180;
 
@@ -60,9 +60,9 @@ engine::WordBag WordsOf(const engine::ImageFeatures& features) {
   if (has_corners) return engine::MakeWordBag(features);
   // Whoever made the features may have had no use for corners.
   features.Look();
-  const cv::Mat& picture = features.levels[0];
-  if (picture.cols < kMinPictureSidePx || picture.rows < kMinPictureSidePx) return {};
-  return engine::MakeWordBag(*engine::MakeFeatures(picture));
+  const cv::Mat& image = features.levels[0];
+  if (image.cols < kMinImageSidePx || image.rows < kMinImageSidePx) return {};
+  return engine::MakeWordBag(*engine::MakeFeatures(image));
 }
 
 std::vector<KeyFrameWords> MakeWords(const engine::MapSnapshot& map, std::span<const KeyFrameWords> known) {
@@ -156,7 +156,7 @@ std::vector<KeyFrameWords> UnchangedWords(const Database& database, const MapInf
   } catch (const Error&) {
     return {};
   }
-  const auto same_picture = [&](engine::KeyFrameId keyframe) {
+  const auto same_image = [&](engine::KeyFrameId keyframe) {
     const auto find = [&](const std::vector<StoredKeyFrame>& all) {
       const auto found =
           std::lower_bound(all.begin(), all.end(), keyframe,
@@ -164,21 +164,21 @@ std::vector<KeyFrameWords> UnchangedWords(const Database& database, const MapInf
       return found != all.end() && found->keyframe.id == keyframe ? &*found : nullptr;
     };
     const StoredKeyFrame *before = find(stored), *after = find(wanted);
-    return before && after && before->picture_hash == after->picture_hash;
+    return before && after && before->image_hash == after->image_hash;
   };
-  std::erase_if(words, [&](const KeyFrameWords& of) { return !same_picture(of.keyframe); });
+  std::erase_if(words, [&](const KeyFrameWords& of) { return !same_image(of.keyframe); });
   return words;
 }
 
-std::vector<KeyFrameWords> WordsFromPictures(const Database& database, const MapInfo& info) {
+std::vector<KeyFrameWords> WordsFromImages(const Database& database, const MapInfo& info) {
   const MapParts parts = ReadParts(database, info);
   engine::MapSnapshot map;
   for (const StoredKeyFrame& stored : parts.keyframes) map.keyframes.push_back(stored.keyframe);
   const std::vector<engine::KeyFrameId> places = PlacesOf(map);
   std::vector<KeyFrameWords> words(parts.keyframes.size());
-  ReadPictures(
+  ReadImages(
       database, info.key, parts.keyframes, [&](std::size_t index, std::span<const std::uint8_t> bytes) {
-        const auto features = engine::MakeFeatures(DecodePicture(info.key, parts.keyframes[index], bytes));
+        const auto features = engine::MakeFeatures(DecodeImage(info.key, parts.keyframes[index], bytes));
         words[index] = {parts.keyframes[index].keyframe.id, places[index], engine::MakeWordBag(*features)};
       });
   return words;

@@ -12,7 +12,7 @@
 #include "maps/map_record.h"
 
 // The table `words`: what each keyframe of a map shows as words of the vocabulary tree, and which keyframes
-// are one place, in one row a map, so that a large library is opened without its pictures. Words mean
+// are one place, in one row a map, so that a large library is opened without its images. Words mean
 // something under the vocabulary that made them alone, so a row names it. Inside a transaction that the
 // caller holds; what is read is checked; throws docent::Error.
 namespace docent::maps {
@@ -45,7 +45,7 @@ std::vector<engine::KeyFrameId> PlacesOf(const engine::MapSnapshot& map);
 // there, the others are made, some milliseconds each.
 std::vector<KeyFrameWords> MakeWords(const engine::MapSnapshot& map, std::span<const KeyFrameWords> known);
 
-// The words of a picture; empty where it is too small for any.
+// The words of an image; empty where it is too small for any.
 engine::WordBag WordsOf(const engine::ImageFeatures& features);
 
 Bytes EncodeWords(std::uint64_t map_key, const WordTable& table);
@@ -55,12 +55,12 @@ void WriteWords(const Database& database, std::uint64_t key, std::vector<KeyFram
 // One for each keyframe that `info` counts; none where nothing is known: from a library of a format that had
 // no such table, or one that another vocabulary was used for.
 std::vector<KeyFrameWords> ReadWords(const Database& database, const MapInfo& info);
-// Of those keyframes whose picture is still the one that is stored, what is stored; what cannot be read is
+// Of those keyframes whose image is still the one that is stored, what is stored; what cannot be read is
 // left out.
 std::vector<KeyFrameWords> UnchangedWords(const Database& database, const MapInfo& info,
                                           const std::vector<StoredKeyFrame>& stored,
                                           const std::vector<StoredKeyFrame>& wanted);
-// From the pictures of a map, whatever the table says.
-std::vector<KeyFrameWords> WordsFromPictures(const Database& database, const MapInfo& info);
+// From the images of a map, whatever the table says.
+std::vector<KeyFrameWords> WordsFromImages(const Database& database, const MapInfo& info);
 
 }  // namespace docent::maps

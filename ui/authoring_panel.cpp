@@ -148,7 +148,7 @@ void AuthoringPanel::Impl::DrawPlaceSection() {
     ImGui::InputDouble("scale", &state.scale, kScaleStep, 10 * kScaleStep, "%.3g");
     ImGui::InputDouble("turned by", &state.yaw_deg, kYawStep, 6 * kYawStep, "%.0f deg");
     if (!(state.scale > 0)) state.scale = kScaleStep;
-    ImGui::TextUnformatted("Click in the picture to place it.");
+    ImGui::TextUnformatted("Click in the image to place it.");
   } else if (state.tool == Tool::kSignpost) {
     ImGui::InputTextMultiline("text", &state.sign_text, ImVec2(150.0f, 60.0f));
     if (ImGui::BeginCombo("points to", state.sign_to_map.empty() ? "nowhere" : state.sign_to_map.c_str())) {
@@ -158,7 +158,7 @@ void AuthoringPanel::Impl::DrawPlaceSection() {
       }
       ImGui::EndCombo();
     }
-    ImGui::TextUnformatted("Click in the picture to put it up.");
+    ImGui::TextUnformatted("Click in the image to put it up.");
   }
 }
 
@@ -180,7 +180,7 @@ bool AuthoringPanel::WantsKeyboard() const {
   return ImGui::GetIO().WantCaptureKeyboard;
 }
 
-bool AuthoringPanel::ClickPicture(const Eigen::Vector2d& pixel) {
+bool AuthoringPanel::ClickImage(const Eigen::Vector2d& pixel) {
   const State& state = impl_->state;
   if (state.tool == Tool::kModel && !state.model_file.empty()) {
     impl_->emit(PlaceCommand(state.model_file, pixel, state.scale, state.yaw_deg));

@@ -12,7 +12,7 @@
 
 namespace docent::ui {
 
-// The small panel over the picture with which a person authors (Dear ImGui): new map, stop map, place model,
+// The small panel over the image with which a person authors (Dear ImGui): new map, stop map, place model,
 // signpost, undo, redo, save, and what to show. It changes nothing itself: every action leaves as a line of
 // the script language. One in a window, on the window's thread; destroyed before the window.
 class AuthoringPanel {
@@ -22,7 +22,7 @@ class AuthoringPanel {
 
   // The person's choices, shown and changed by the panel, and by whoever owns it (a key, a test).
   struct State {
-    Tool tool = Tool::kNone;  // what a click in the picture places
+    Tool tool = Tool::kNone;  // what a click in the image places
     std::string map_name;
     std::string model_file;
     double scale = 1.0, yaw_deg = 0.0;
@@ -41,15 +41,15 @@ class AuthoringPanel {
   // Copies the toggles; the overlay's texts stay.
   void ApplyTo(Overlay* overlay) const;
 
-  // Draws into the default framebuffer, after the picture was presented and before Window::Show.
+  // Draws into the default framebuffer, after the image was presented and before Window::Show.
   void Draw();
   // Whether the pointer is over the panel or a text field has the keyboard: such events are not the
-  // picture's.
+  // image's.
   bool WantsMouse() const;
   bool WantsKeyboard() const;
-  // A click in the picture, at one of its pixels: places what the tool says. Without a tool, or with nothing
+  // A click in the image, at one of its pixels: places what the tool says. Without a tool, or with nothing
   // chosen to place, nothing happens. Answers whether a command was emitted.
-  bool ClickPicture(const Eigen::Vector2d& pixel);
+  bool ClickImage(const Eigen::Vector2d& pixel);
 
  private:
   struct Impl;

@@ -12,13 +12,12 @@ namespace {
 constexpr std::uint64_t kLabelLifeFrames = 120;  // a text not shown for so long is forgotten
 
 // Shown at its own size, so it needs no mipmaps.
-GlTexture MakeLabelTexture(const cv::Mat& picture) {
+GlTexture MakeLabelTexture(const cv::Mat& image) {
   GlTexture texture;
   glBindTexture(GL_TEXTURE_2D, texture.name());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, static_cast<GLint>(picture.step / 4));
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, picture.cols, picture.rows, 0, GL_BGRA, GL_UNSIGNED_BYTE,
-               picture.data);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, static_cast<GLint>(image.step / 4));
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, image.cols, image.rows, 0, GL_BGRA, GL_UNSIGNED_BYTE, image.data);
   glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
   for (const GLenum direction : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
     glTexParameteri(GL_TEXTURE_2D, direction, GL_CLAMP_TO_EDGE);
@@ -163,12 +162,12 @@ Canvas::Label& Canvas::FindLabel(const std::string& text, const TextStyle& style
       return at->second;
     }
   }
-  const cv::Mat picture = DrawText(text, style);
+  const cv::Mat image = DrawText(text, style);
   glActiveTexture(GL_TEXTURE0);
   Label label;
   label.style = style;
-  label.texture = MakeLabelTexture(picture);
-  label.size = Eigen::Vector2d(picture.cols, picture.rows);
+  label.texture = MakeLabelTexture(image);
+  label.size = Eigen::Vector2d(image.cols, image.rows);
   label.last_frame = frame_;
   return labels_.emplace(text, std::move(label))->second;
 }

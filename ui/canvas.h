@@ -12,9 +12,9 @@
 
 namespace docent::ui {
 
-// Flat drawing over a picture: boxes, disks, lines and text with smooth edges, in the order of the calls.
-// Coordinates are the picture's pixels (the centre of the top-left pixel is (0, 0), y down). Calls only
-// collect; End draws into the bound framebuffer, a picture target (row 0 is the top). One thread, one
+// Flat drawing over an image: boxes, disks, lines and text with smooth edges, in the order of the calls.
+// Coordinates are the image's pixels (the centre of the top-left pixel is (0, 0), y down). Calls only
+// collect; End draws into the bound framebuffer, an image target (row 0 is the top). One thread, one
 // context.
 class Canvas {
  public:

@@ -44,7 +44,7 @@ ContentLayer::ContentLayer(int samples, int max_texture_px)
 ContentLayer::~ContentLayer() = default;
 
 void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-                        const content::Scene& scene, double animation_seconds, const RenderTarget& picture) {
+                        const content::Scene& scene, double animation_seconds, const RenderTarget& image) {
   ++frame_;
   const std::vector<ModelInstance> instances =
       Instances(scene, camera_from_map.OriginInSource(), animation_seconds);
@@ -54,7 +54,7 @@ void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3&
   const PixelRectangle region = DrawAtlas(camera_from_map, &lens);
   if (region.empty()) return;
 
-  picture.BindForDrawing();
+  image.BindForDrawing();
   warp_program_.Use();
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, lens.lookup.name());
@@ -106,7 +106,7 @@ PixelRectangle ContentLayer::DrawAtlas(const engine::Rigid3& camera_from_map, Le
   for (const PixelRectangle& rectangle : changed)
     lens->atlas->Resolve(rectangle.x, rectangle.y, rectangle.width, rectangle.height);
   lens->drawn = drawn;
-  return PictureFromAtlas(lens->warp, lens->camera, drawn);
+  return ImageFromAtlas(lens->warp, lens->camera, drawn);
 }
 
 ContentLayer::Lens& ContentLayer::FindLens(const engine::CameraModel& camera) {

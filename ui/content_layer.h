@@ -17,7 +17,7 @@
 
 namespace docent::ui {
 
-// Draws a scene through a camera's own lens over a picture: undistorted with depth and multisampling into the
+// Draws a scene through a camera's own lens over an image: undistorted with depth and multisampling into the
 // faces of a LensWarp, then pixel by pixel through its lookup. Keeps what is dear to make (lens tables,
 // models on the graphics card, lettered signposts) from one call to the next. One thread, one context.
 class ContentLayer {
@@ -25,10 +25,10 @@ class ContentLayer {
   ContentLayer(int samples, int max_texture_px);
   ~ContentLayer();
 
-  // Composites over what `picture` (a picture target of the camera's size: row 0 is the top) holds. Pixels
+  // Composites over what `image` (an image target of the camera's size: row 0 is the top) holds. Pixels
   // that no content covers keep their exact values.
   void Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-            const content::Scene& scene, double animation_seconds, const RenderTarget& picture);
+            const content::Scene& scene, double animation_seconds, const RenderTarget& image);
   std::size_t cached_models() const { return mesh_drawer_.cached_models(); }
 
  private:
@@ -43,7 +43,7 @@ class ContentLayer {
     std::shared_ptr<const content::Model> model;
     std::uint64_t last_frame = 0;
   };
-  // Draws the prepared content into the lens's atlas; what of the picture it may cover.
+  // Draws the prepared content into the lens's atlas; what of the image it may cover.
   PixelRectangle DrawAtlas(const engine::Rigid3& camera_from_map, Lens* lens);
   Lens& FindLens(const engine::CameraModel& camera);
   std::vector<ModelInstance> Instances(const content::Scene& scene, const Eigen::Vector3d& eye_in_map,

@@ -25,7 +25,7 @@ GLuint CompileShader(const char* name, GLenum kind, const std::string& source) {
 
 void CheckFramebuffer(int width_px, int height_px) {
   if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-    throw Error("The OpenGL driver cannot draw into a picture of " + std::to_string(width_px) + " x " +
+    throw Error("The OpenGL driver cannot draw into an image of " + std::to_string(width_px) + " x " +
                 std::to_string(height_px) + " pixels.");
   }
 }

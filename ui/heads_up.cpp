@@ -60,7 +60,7 @@ Color QualityColor(engine::TrackingQuality quality) {
   return kPoor;
 }
 
-// Letters grow with the picture, so that they stay readable on a large window.
+// Letters grow with the image, so that they stay readable on a large window.
 double UnitPx(const Canvas& canvas) {
   return std::clamp(canvas.height_px() / 480.0, 0.5, 4.0);
 }

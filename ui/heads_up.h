@@ -5,8 +5,8 @@
 #include "ui/inset.h"
 #include "ui/renderer.h"
 
-// The flat layers over the picture. Each adds to a canvas between its Begin and End; nothing here keeps
-// state, so that the same View always gives the same picture.
+// The flat layers over the image. Each adds to a canvas between its Begin and End; nothing here keeps
+// state, so that the same View always gives the same image.
 namespace docent::ui {
 
 // Colour of a pyramid level, in overlays and in the map view.
@@ -23,7 +23,7 @@ void DrawKeyFrames(const engine::MapSnapshot& map, const engine::CameraModel& ca
 // to search (a lens wandering over a compass) or to move (a camera gliding sideways).
 void DrawHeadsUp(const View& view, Canvas* canvas);
 
-// The frame around another camera's small picture: its colour says how that camera is tracked.
+// The frame around another camera's small image: its colour says how that camera is tracked.
 void DrawInsetFrame(const engine::TrackedFrame& tracked, const Inset& inset, Canvas* canvas);
 
 }  // namespace docent::ui

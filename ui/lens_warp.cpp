@@ -13,7 +13,7 @@ namespace {
 constexpr int kBorderPx = 2;  // beyond the outermost ray, for bilinear fetches
 constexpr int kFacesPerRow = 3;
 
-// The rays of a picture, row by row; zero where there is none.
+// The rays of an image, row by row; zero where there is none.
 std::vector<Eigen::Vector3d> RaysOf(const engine::CameraModel& camera) {
   std::vector<Eigen::Vector3d> rays;
   rays.reserve(static_cast<std::size_t>(camera.width_px()) * camera.height_px());
@@ -51,7 +51,7 @@ bool FitsOneFace(const std::vector<Eigen::Vector3d>& rays) {
   });
 }
 
-// Pixels that a unit tangent covers in the middle of the picture.
+// Pixels that a unit tangent covers in the middle of the image.
 double MiddleFocalLength(const engine::CameraModel& camera) {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> jacobian;
@@ -141,8 +141,8 @@ void PixelRectangle::Include(const PixelRectangle& other) {
   height = bottom - y;
 }
 
-PixelRectangle PictureFromAtlas(const LensWarp& warp, const engine::CameraModel& camera,
-                                const std::vector<PixelRectangle>& atlas_rectangles) {
+PixelRectangle ImageFromAtlas(const LensWarp& warp, const engine::CameraModel& camera,
+                              const std::vector<PixelRectangle>& atlas_rectangles) {
   PixelRectangle result;
   for (int i = 0; i < static_cast<int>(warp.tiles.size()); ++i) {
     const PixelRectangle& tile = warp.tiles[i];

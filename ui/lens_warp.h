@@ -31,7 +31,7 @@ struct LensFace {
 };
 
 // How to draw through a lens: content is rendered undistorted into the faces of an atlas, then every pixel of
-// the picture fetches its colour from where its own ray falls in the atlas. The ray of each pixel comes from
+// the image fetches its colour from where its own ray falls in the atlas. The ray of each pixel comes from
 // CameraModel::Unproject, so the warp is as exact as the lens model. An ordinary lens needs one face, a
 // little larger than its field of view; beyond kMaxTangent the directions go to the faces of a cube that the
 // lens really sees, so that lenses beyond 180 degrees work too.
@@ -40,7 +40,7 @@ struct LensWarp {
 
   std::vector<LensFace> faces;  // never empty
   int atlas_width_px = 0, atlas_height_px = 0;
-  // Rectangles of the atlas that the picture's tiles look at, row by row of tiles; empty (width 0) for none.
+  // Rectangles of the atlas that the image's tiles look at, row by row of tiles; empty (width 0) for none.
   static constexpr int kTilePx = 32;
   int tiles_per_row = 0;
   std::vector<PixelRectangle> tiles;
@@ -50,13 +50,13 @@ struct LensWarp {
   std::vector<glm::vec2> lookup;
 };
 
-// The middle of the picture keeps its resolution in the atlas, unless a side of the atlas would then exceed
+// The middle of the image keeps its resolution in the atlas, unless a side of the atlas would then exceed
 // max_side_px. A hundred nanoseconds or so a pixel: to be made once a camera.
 LensWarp MakeLensWarp(const engine::CameraModel& camera, int max_side_px);
 
-// The part of the picture that looks at any of these rectangles of the atlas (whole tiles; picture pixels,
+// The part of the image that looks at any of these rectangles of the atlas (whole tiles; image pixels,
 // row 0 is the top).
-PixelRectangle PictureFromAtlas(const LensWarp& warp, const engine::CameraModel& camera,
-                                const std::vector<PixelRectangle>& atlas_rectangles);
+PixelRectangle ImageFromAtlas(const LensWarp& warp, const engine::CameraModel& camera,
+                              const std::vector<PixelRectangle>& atlas_rectangles);
 
 }  // namespace docent::ui

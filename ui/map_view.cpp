@@ -11,7 +11,7 @@
 #include "ui/canvas.h"
 #include "ui/content_layer.h"
 #include "ui/heads_up.h"
-#include "ui/picture_target.h"
+#include "ui/image_target.h"
 
 namespace docent::ui {
 namespace {
@@ -62,7 +62,7 @@ class Drawing {
     }
   }
 
-  void Wedge(const FoundAgain& found) {
+  void Wedge(const PredictedRecall& found) {
     // Strokes from the middle outwards, close enough to each other to fill the eighth.
     constexpr int kStrokes = 9;
     constexpr double kHalfEighth = std::numbers::pi / 8 * 0.9;
@@ -197,7 +197,7 @@ struct MapView::Impl {
 
   MapViewOptions options;
   engine::CameraModel camera;
-  PictureTarget picture;
+  ImageTarget image;
   ContentLayer content;
   Canvas below, above;
 };
@@ -207,17 +207,17 @@ MapView::MapView(const MapViewOptions& options) : impl_(std::make_unique<Impl>(o
 MapView::~MapView() = default;
 
 void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, const Orbit& orbit,
-                   const std::string& title, const std::vector<FoundAgain>& found_again) {
+                   const std::string& title, const std::vector<PredictedRecall>& predicted_recall) {
   const int width_px = impl_->options.width_px, height_px = impl_->options.height_px;
-  const RenderTarget& target = impl_->picture.Bind(width_px, height_px);
-  impl_->picture.DrawVideo(cv::Mat());
+  const RenderTarget& target = impl_->image.Bind(width_px, height_px);
+  impl_->image.DrawVideo(cv::Mat());
   const engine::Rigid3 camera_from_map = CameraFromMap(orbit);
   const double grid = RoundLength(std::max(1e-6, 0.25 * orbit.distance_m * kHalfViewHeight));
 
   impl_->below.Begin(width_px, height_px);
   Drawing drawing(impl_->camera, camera_from_map, &impl_->below);
   drawing.Grid(orbit, grid);
-  for (const FoundAgain& found : found_again) drawing.Wedge(found);
+  for (const PredictedRecall& found : predicted_recall) drawing.Wedge(found);
   drawing.Points(map);
   DrawKeyFrames(map, impl_->camera, camera_from_map, &impl_->below);
   impl_->below.End();
@@ -229,11 +229,11 @@ void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, 
 }
 
 void MapView::Present(int width_px, int height_px) {
-  impl_->picture.Present(width_px, height_px);
+  impl_->image.Present(width_px, height_px);
 }
 
-void MapView::ReadBack(cv::Mat* picture) {
-  impl_->picture.ReadBack(picture);
+void MapView::ReadBack(cv::Mat* image) {
+  impl_->image.ReadBack(image);
 }
 
 }  // namespace docent::ui

@@ -26,7 +26,7 @@ struct Orbit {
 // The eye's pose for an orbit. The map's up axis is -y, as everywhere in Docent.
 engine::Rigid3 CameraFromMap(const Orbit& orbit);
 
-// An orbit from which the whole map (nine tenths of its points, all its keyframes) is seen in a picture of
+// An orbit from which the whole map (nine tenths of its points, all its keyframes) is seen in an image of
 // these proportions, from above.
 Orbit OrbitAbove(const engine::MapSnapshot& map, double width_over_height = 4.0 / 3.0);
 
@@ -42,7 +42,7 @@ struct MapViewOptions {
 
 // How well a camera that is lost will be found at a place when it looks in a direction: an eighth of a
 // circle, red where it never is, green where it always is.
-struct FoundAgain {
+struct PredictedRecall {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();       // map
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // map, level, unit length: the middle of the eighth
   double side_m = 1;                                     // of the square whose middle is the place
@@ -59,13 +59,13 @@ class MapView {
   MapView(const MapView&) = delete;
   MapView& operator=(const MapView&) = delete;
 
-  // scene may be null; title is shown in the corner, empty for none. found_again lies on the floor, under
-  // all.
+  // scene may be null; title is shown in the corner, empty for none. predicted_recall lies on the floor,
+  // under all.
   void Draw(const engine::MapSnapshot& map, const content::Scene* scene, const Orbit& orbit,
-            const std::string& title = {}, const std::vector<FoundAgain>& found_again = {});
+            const std::string& title = {}, const std::vector<PredictedRecall>& predicted_recall = {});
   // As Renderer's.
   void Present(int width_px, int height_px);
-  void ReadBack(cv::Mat* picture);
+  void ReadBack(cv::Mat* image);
 
  private:
   struct Impl;

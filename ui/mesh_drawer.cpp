@@ -132,7 +132,7 @@ void MeshDrawer::AddNode(const ModelInstance& instance, const std::vector<glm::m
     item.box = box;
     item.center = 0.5f * (box.low + box.high);
     item.radius = 0.5f * glm::length(box.high - box.low);
-    // A pose that is not a number has no place in the picture, and would poison the depth range.
+    // A pose that is not a number has no place in the image, and would poison the depth range.
     if (std::isfinite(item.radius) && std::isfinite(glm::dot(item.center, item.center)))
       items_.push_back(std::move(item));
   }

@@ -95,18 +95,18 @@ GLuint ModelResources::Texture(const content::Model& model, int texture, bool is
   const std::size_t bytes = std::size_t{4} * image.width_px * image.height_px;
   if (image.width_px < 1 || image.height_px < 1 || image.rgba.size() != bytes) return 0;
 
-  cv::Mat picture(image.height_px, image.width_px, CV_8UC4, const_cast<std::uint8_t*>(image.rgba.data()));
+  cv::Mat image(image.height_px, image.width_px, CV_8UC4, const_cast<std::uint8_t*>(image.rgba.data()));
   const int longest = std::max(image.width_px, image.height_px);
   if (longest > max_texture_px_) {
     const double factor = static_cast<double>(max_texture_px_) / longest;
-    cv::Mat smaller;  // resize would write through `picture` into the model otherwise
-    cv::resize(picture, smaller,
+    cv::Mat smaller;  // resize would write through `image` into the model otherwise
+    cv::resize(image, smaller,
                cv::Size(std::max(1, static_cast<int>(image.width_px * factor)),
                         std::max(1, static_cast<int>(image.height_px * factor))),
                0, 0, cv::INTER_AREA);
-    picture = smaller;
+    image = smaller;
   }
-  GlTexture uploaded = MakeTexture(picture.cols, picture.rows, GL_RGBA, picture.data, is_color);
+  GlTexture uploaded = MakeTexture(image.cols, image.rows, GL_RGBA, image.data, is_color);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, WrapMode(description.repeat_u, description.mirror_u));
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, WrapMode(description.repeat_v, description.mirror_v));
   if (description.nearest) {

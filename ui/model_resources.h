@@ -43,7 +43,7 @@ struct GpuPrimitive {
 // The graphics memory of one content::Model; textures are uploaded when they are first asked for.
 class ModelResources {
  public:
-  // Pictures wider or higher than max_texture_px are stored smaller.
+  // Images wider or higher than max_texture_px are stored smaller.
   ModelResources(const content::Model& model, int max_texture_px);
 
   const std::vector<GpuPrimitive>& primitives(int mesh) const { return meshes_[mesh]; }
@@ -73,7 +73,7 @@ class ModelCache {
   std::unordered_map<const content::Model*, Entry> entries_;
 };
 
-// A texture of a picture in memory, with mipmaps. format: GL_RGBA or GL_BGRA; bytes are packed rows.
+// A texture of an image in memory, with mipmaps. format: GL_RGBA or GL_BGRA; bytes are packed rows.
 GlTexture MakeTexture(int width_px, int height_px, GLenum format, const void* bytes, bool is_srgb);
 
 }  // namespace docent::ui

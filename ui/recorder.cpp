@@ -45,11 +45,11 @@ struct Recorder::Impl {
   std::int64_t frames = 0;
   bool closed = false;
 
-  void Open(const cv::Mat& picture) {
-    size = cv::Size(picture.cols / 2 * 2, picture.rows / 2 * 2);
+  void Open(const cv::Mat& image) {
+    size = cv::Size(image.cols / 2 * 2, image.rows / 2 * 2);
     if (size.width < 2 || size.height < 2)
-      throw Error("Cannot record to '" + path + "': a picture of " + std::to_string(picture.cols) + " x " +
-                  std::to_string(picture.rows) + " pixels is too small for a video.");
+      throw Error("Cannot record to '" + path + "': an image of " + std::to_string(image.cols) + " x " +
+                  std::to_string(image.rows) + " pixels is too small for a video.");
     const QuietOpenCv quiet;
     const std::array<int, 2> codecs = {cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
                                        cv::VideoWriter::fourcc('m', 'p', '4', 'v')};
@@ -82,13 +82,13 @@ Recorder::~Recorder() {
   }
 }
 
-void Recorder::Write(const cv::Mat& picture) {
+void Recorder::Write(const cv::Mat& image) {
   Impl& recorder = *impl_;
-  const cv::Mat& source = picture.empty() ? recorder.last : picture;
+  const cv::Mat& source = image.empty() ? recorder.last : image;
   if (recorder.closed || source.empty()) return;
   if (source.type() != CV_8UC3 && source.type() != CV_8UC1)
     throw Error("Cannot record to '" + recorder.path +
-                "': a picture has neither one nor three channels of bytes.");
+                "': an image has neither one nor three channels of bytes.");
   if (!recorder.writer.isOpened()) recorder.Open(source);
   cv::Mat frame = source;
   if (frame.channels() == 1) {
@@ -103,7 +103,7 @@ void Recorder::Write(const cv::Mat& picture) {
   }
   recorder.writer.write(frame);
   ++recorder.frames;
-  if (!picture.empty()) picture.copyTo(recorder.last);
+  if (!image.empty()) image.copyTo(recorder.last);
 }
 
 void Recorder::Close() {

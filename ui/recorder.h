@@ -7,7 +7,7 @@
 
 namespace docent::ui {
 
-// Writes pictures as a video file: H.264 where FFmpeg can encode it, otherwise MPEG-4. One owner, one thread.
+// Writes images as a video file: H.264 where FFmpeg can encode it, otherwise MPEG-4. One owner, one thread.
 class Recorder {
  public:
   // path: its ending chooses the container (.mp4, .mkv, .avi, .mov). Throws docent::Error with one sentence
@@ -18,12 +18,12 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // CV_8UC3 (BGR) or CV_8UC1. The first picture fixes the size; later ones of another size are scaled to it.
+  // CV_8UC3 (BGR) or CV_8UC1. The first image fixes the size; later ones of another size are scaled to it.
   // An odd last row or column is left out, because the encoders take colour by two by two pixels. An empty
-  // picture repeats the last one. Throws docent::Error when no encoder takes it.
-  void Write(const cv::Mat& picture);
+  // image repeats the last one. Throws docent::Error when no encoder takes it.
+  void Write(const cv::Mat& image);
   // Finishes the file. Throws docent::Error when what is on disk is not what was written (a full disk).
-  // Without a single picture no file remains. Later calls do nothing.
+  // Without a single image no file remains. Later calls do nothing.
   void Close();
 
  private:

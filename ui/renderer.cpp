@@ -4,14 +4,14 @@
 #include "ui/canvas.h"
 #include "ui/content_layer.h"
 #include "ui/heads_up.h"
-#include "ui/picture_target.h"
+#include "ui/image_target.h"
 
 namespace docent::ui {
 
 struct Renderer::Impl {
   explicit Impl(const RendererOptions& options) : content(options.samples, options.max_texture_px) {}
 
-  PictureTarget picture;
+  ImageTarget image;
   ContentLayer content;
   Canvas canvas;
 };
@@ -22,13 +22,13 @@ Renderer::~Renderer() = default;
 
 void Renderer::Draw(const View& view) {
   const engine::TrackedFrame* tracked = view.tracked;
-  const cv::Mat picture = tracked != nullptr ? tracked->frame.picture : cv::Mat();
-  const int width_px = view.camera != nullptr ? view.camera->width_px() : picture.cols;
-  const int height_px = view.camera != nullptr ? view.camera->height_px() : picture.rows;
+  const cv::Mat image = tracked != nullptr ? tracked->frame.image : cv::Mat();
+  const int width_px = view.camera != nullptr ? view.camera->width_px() : image.cols;
+  const int height_px = view.camera != nullptr ? view.camera->height_px() : image.rows;
   if (width_px < 1 || height_px < 1) return;
 
-  const RenderTarget& target = impl_->picture.Bind(width_px, height_px);
-  impl_->picture.DrawVideo(picture);
+  const RenderTarget& target = impl_->image.Bind(width_px, height_px);
+  impl_->image.DrawVideo(image);
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
   if (has_pose && view.scene != nullptr)
     impl_->content.Draw(*view.camera, tracked->camera_from_map, *view.scene, view.animation_seconds, target);
@@ -40,10 +40,10 @@ void Renderer::Draw(const View& view) {
   if (view.overlay.hud) DrawHeadsUp(view, &impl_->canvas);
   target.BindForDrawing();
   impl_->canvas.End();
-  if (view.overlay.inset == nullptr || view.overlay.inset->frame.picture.empty()) return;
-  const cv::Mat& other = view.overlay.inset->frame.picture;
+  if (view.overlay.inset == nullptr || view.overlay.inset->frame.image.empty()) return;
+  const cv::Mat& other = view.overlay.inset->frame.image;
   const Inset inset = PlaceInset(width_px, height_px, other.cols, other.rows);
-  impl_->picture.DrawInset(other, inset);
+  impl_->image.DrawInset(other, inset);
   impl_->canvas.Begin(width_px, height_px);
   DrawInsetFrame(*view.overlay.inset, inset, &impl_->canvas);
   target.BindForDrawing();
@@ -51,11 +51,11 @@ void Renderer::Draw(const View& view) {
 }
 
 void Renderer::Present(int width_px, int height_px) {
-  impl_->picture.Present(width_px, height_px);
+  impl_->image.Present(width_px, height_px);
 }
 
-void Renderer::ReadBack(cv::Mat* picture) {
-  impl_->picture.ReadBack(picture);
+void Renderer::ReadBack(cv::Mat* image) {
+  impl_->image.ReadBack(image);
 }
 
 }  // namespace docent::ui

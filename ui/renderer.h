@@ -14,7 +14,7 @@ namespace docent::ui {
 
 // What to show besides the video and the content.
 struct Overlay {
-  bool points = false;     // map points as found in the picture, coloured by level
+  bool points = false;     // map points as found in the image, coloured by level
   bool keyframes = false;  // keyframes of the map as small frusta
   bool hud = true;         // state, map name, hint; the lost indicator while there is no pose
   bool status = true;      // of the hud: the state; false where nothing is tracked
@@ -26,7 +26,7 @@ struct Overlay {
   const engine::TrackedFrame* inset = nullptr;
 };
 
-// Everything of one picture: video, pose and content always belong to the same frame.
+// Everything of one image: video, pose and content always belong to the same frame.
 struct View {
   const engine::TrackedFrame* tracked = nullptr;
   const engine::CameraModel* camera = nullptr;
@@ -37,7 +37,7 @@ struct View {
 
 struct RendererOptions {
   int samples = 4;            // of each pixel of the content (multisampling); 1 is fastest and jagged
-  int max_texture_px = 2048;  // longest side of a model's pictures on the graphics card
+  int max_texture_px = 2048;  // longest side of a model's images on the graphics card
 };
 
 // Draws a View with OpenGL 3.3 core into the current context's framebuffer, and reads it back on demand.
@@ -50,12 +50,12 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  // Draws into an internal framebuffer of the size of the camera's picture.
+  // Draws into an internal framebuffer of the size of the camera's image.
   void Draw(const View& view);
-  // Shows the last drawn picture in the default framebuffer, letterboxed into width_px x height_px.
+  // Shows the last drawn image in the default framebuffer, letterboxed into width_px x height_px.
   void Present(int width_px, int height_px);
-  // The last drawn picture, CV_8UC3 (BGR). The memory is reused by the next call when *picture fits.
-  void ReadBack(cv::Mat* picture);
+  // The last drawn image, CV_8UC3 (BGR). The memory is reused by the next call when *image fits.
+  void ReadBack(cv::Mat* image);
 
  private:
   struct Impl;

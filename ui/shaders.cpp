@@ -10,7 +10,7 @@ void main() {
 }
 )glsl";
 
-// The video's bytes arrive as they lie in memory (blue first); a picture of the target's own size is copied
+// The video's bytes arrive as they lie in memory (blue first); an image of the target's own size is copied
 // texel by texel, so that it keeps its exact values.
 const char* const kVideoFragmentShader = R"glsl(#version 330 core
 uniform sampler2D video;
@@ -157,7 +157,7 @@ vec3 Normal() {
 }
 
 // Light that arrives from a direction, blurred with the roughness of what mirrors it.
-vec3 Surroundings(vec3 direction, float blur) {
+vec3 FindReferenceKeyFrame(vec3 direction, float blur) {
   float height = dot(direction, up_in_map);
   float width = mix(0.08, 1.0, blur);
   vec3 sky = sky_radiance * mix(1.25, 0.85, smoothstep(0.0, 0.9, height));
@@ -184,8 +184,8 @@ vec3 Shade(vec3 albedo, vec3 normal, float metal, float rough, float occlusion) 
   vec3 direct = ((1.0 - fresnel) * diffuse / kPi + fresnel * min(distribution * visibility, 40.0)) *
                 light_radiance * nl;
   vec3 mirror = f0 + (max(vec3(1.0 - rough), f0) - f0) * pow(1.0 - nv, 5.0);
-  vec3 ambient = diffuse * Surroundings(normal, 1.0) * (1.0 - mirror) +
-                 mirror * Surroundings(reflect(-view, normal), rough);
+  vec3 ambient = diffuse * FindReferenceKeyFrame(normal, 1.0) * (1.0 - mirror) +
+                 mirror * FindReferenceKeyFrame(reflect(-view, normal), rough);
   return direct + ambient * occlusion;
 }
 

@@ -2,7 +2,7 @@
 #pragma once
 
 // The shader texts, GLSL 3.30 core. Colours leave every shader sRGB-encoded with premultiplied alpha.
-// A "picture" target keeps the picture's top row at the framebuffer's row 0, so that reading it back needs no
+// A "image" target keeps the image's top row at the framebuffer's row 0, so that reading it back needs no
 // flip; the content atlas has OpenGL's usual orientation.
 namespace docent::ui {
 

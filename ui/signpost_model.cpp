@@ -33,13 +33,12 @@ cv::Mat LayOutText(const std::string& text) {
       style.max_height_px = kMaxTextHeightPx;
       style.color = kTextColor;
       bool is_cut = false;
-      const cv::Mat picture = DrawText(text, style, &is_cut);
-      const double misfit =
-          std::abs(std::log(static_cast<double>(picture.cols) / picture.rows / kWantedAspect)) +
-          (is_cut ? 100.0 : 0.0);
+      const cv::Mat image = DrawText(text, style, &is_cut);
+      const double misfit = std::abs(std::log(static_cast<double>(image.cols) / image.rows / kWantedAspect)) +
+                            (is_cut ? 100.0 : 0.0);
       if (misfit < best_misfit) {
         best_misfit = misfit;
-        best = picture;
+        best = image;
       }
     }
     if (best_misfit < 100.0) break;
@@ -47,13 +46,13 @@ cv::Mat LayOutText(const std::string& text) {
   return best;
 }
 
-// Lays premultiplied BGRA over an opaque picture, with its top left corner at (x, y); cut at the border.
-void Lay(const cv::Mat& over, int x, int y, cv::Mat* picture) {
-  const cv::Rect inside = cv::Rect(x, y, over.cols, over.rows) & cv::Rect(0, 0, picture->cols, picture->rows);
+// Lays premultiplied BGRA over an opaque image, with its top left corner at (x, y); cut at the border.
+void Lay(const cv::Mat& over, int x, int y, cv::Mat* image) {
+  const cv::Rect inside = cv::Rect(x, y, over.cols, over.rows) & cv::Rect(0, 0, image->cols, image->rows);
   for (int row = inside.y; row < inside.y + inside.height; ++row) {
     for (int column = inside.x; column < inside.x + inside.width; ++column) {
       const cv::Vec4b& source = over.at<cv::Vec4b>(row - y, column - x);
-      cv::Vec4b& target = picture->at<cv::Vec4b>(row, column);
+      cv::Vec4b& target = image->at<cv::Vec4b>(row, column);
       for (int i = 0; i < 3; ++i)
         target[i] =
             static_cast<std::uint8_t>(std::min(255, source[i] + (target[i] * (255 - source[3]) + 127) / 255));
@@ -61,13 +60,13 @@ void Lay(const cv::Mat& over, int x, int y, cv::Mat* picture) {
   }
 }
 
-void DrawArrow(const cv::Point& tail, int length, cv::Mat* picture) {
+void DrawArrow(const cv::Point& tail, int length, cv::Mat* image) {
   const int half = length / 3;
   const cv::Point tip(tail.x + length, tail.y);
   const std::vector<cv::Point> head = {
       tip, {tip.x - half - 4, tip.y - half}, {tip.x - half - 4, tip.y + half}};
-  cv::line(*picture, tail, {tip.x - half, tip.y}, kLineColor, 9, cv::LINE_AA);
-  cv::fillConvexPoly(*picture, head, kLineColor, cv::LINE_AA);
+  cv::line(*image, tail, {tip.x - half, tip.y}, kLineColor, 9, cv::LINE_AA);
+  cv::fillConvexPoly(*image, head, kLineColor, cv::LINE_AA);
 }
 
 // The whole front of the board, BGRA, opaque.

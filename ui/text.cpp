@@ -81,16 +81,16 @@ cv::Mat DrawText(std::string_view text, const TextStyle& style, bool* is_cut) {
   const int left = std::min(ink.x, logical.x), top = std::min(ink.y, logical.y);
   const int right = std::max(ink.x + ink.width, logical.x + logical.width);
   const int bottom = std::max(ink.y + ink.height, logical.y + logical.height);
-  cv::Mat picture = cv::Mat::zeros(std::clamp(bottom - top, 1, std::max(1, style.max_height_px)),
-                                   std::clamp(right - left, 1, std::max(1, style.max_width_px)), CV_8UC4);
-  const Surface surface(cairo_image_surface_create_for_data(picture.data, CAIRO_FORMAT_ARGB32, picture.cols,
-                                                            picture.rows, static_cast<int>(picture.step)));
+  cv::Mat image = cv::Mat::zeros(std::clamp(bottom - top, 1, std::max(1, style.max_height_px)),
+                                 std::clamp(right - left, 1, std::max(1, style.max_width_px)), CV_8UC4);
+  const Surface surface(cairo_image_surface_create_for_data(image.data, CAIRO_FORMAT_ARGB32, image.cols,
+                                                            image.rows, static_cast<int>(image.step)));
   const Cairo cairo(cairo_create(surface.get()));
   cairo_translate(cairo.get(), -left, -top);
   cairo_set_source_rgba(cairo.get(), style.color.red, style.color.green, style.color.blue, style.color.alpha);
   pango_cairo_show_layout(cairo.get(), layout.get());
   cairo_surface_flush(surface.get());
-  return picture;
+  return image;
 }
 
 }  // namespace docent::ui

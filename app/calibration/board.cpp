@@ -145,9 +145,9 @@ cv::Mat PaintBoard(const BoardSpec& board, int pixels_per_square) {
     const auto at = [&](double length) { return border + static_cast<int>(std::lround(length * scale)); };
     fine(cv::Range(at(ink.y), at(ink.y + ink.height)), cv::Range(at(ink.x), at(ink.x + ink.width))).setTo(0);
   }
-  cv::Mat picture;
-  cv::resize(fine, picture, {fine.cols / kFiner, fine.rows / kFiner}, 0, 0, cv::INTER_AREA);
-  return picture;
+  cv::Mat image;
+  cv::resize(fine, image, {fine.cols / kFiner, fine.rows / kFiner}, 0, 0, cv::INTER_AREA);
+  return image;
 }
 
 void PrintBoard(const BoardSpec& board, const std::filesystem::path& path) {
@@ -182,9 +182,9 @@ void PrintBoard(const BoardSpec& board, const std::filesystem::path& path) {
 
 BoardDetector::BoardDetector(const BoardSpec& board) : board_(board) {}
 
-BoardView BoardDetector::Detect(const cv::Mat& picture, bool thorough) const {
-  cv::Mat grey = picture;
-  if (picture.channels() == 3) cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+BoardView BoardDetector::Detect(const cv::Mat& image, bool thorough) const {
+  cv::Mat grey = image;
+  if (image.channels() == 3) cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
   return board_.kind == BoardSpec::Kind::kCharuco ? DetectCharuco(grey) : DetectCheckerboard(grey, thorough);
 }
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 // The flat boards that a camera is calibrated with: what they look like on paper, and where their corners are
-// in a picture. Board frame: metres, x right and y down on the printed sheet, z into it, origin at the first
+// in an image. Board frame: metres, x right and y down on the printed sheet, z into it, origin at the first
 // inner corner of a checkerboard and at the outer upper left corner of a ChArUco board.
 namespace docent::app {
 
@@ -37,26 +37,26 @@ struct InkRectangle {
 std::vector<InkRectangle> InkOf(const BoardSpec& board);
 // The sheet's size without margins, metres.
 Eigen::Vector2d SheetSize(const BoardSpec& board);
-// A picture of the sheet with a white border of one square, CV_8UC1.
+// An image of the sheet with a white border of one square, CV_8UC1.
 cv::Mat PaintBoard(const BoardSpec& board, int pixels_per_square);
 // Writes a PDF of the board at its true size, on a page with the board in its middle and a scale to check the
 // printer with. Throws Error where the file cannot be written.
 void PrintBoard(const BoardSpec& board, const std::filesystem::path& path);
 
-// Corners of a board in one picture.
+// Corners of a board in one image.
 struct BoardView {
   std::vector<Eigen::Vector2d> points_on_board;  // metres
   std::vector<Eigen::Vector2d> pixels;
 };
 
-// Finds the board's corners to a fraction of a pixel: of a checkerboard when all of it is in the picture, of
+// Finds the board's corners to a fraction of a pixel: of a checkerboard when all of it is in the image, of
 // a ChArUco board those that can be seen. Empty views have no points. Any thread.
 class BoardDetector {
  public:
   explicit BoardDetector(const BoardSpec& board);
-  // picture: CV_8UC1 or CV_8UC3. thorough: where a quick search finds no checkerboard, a slow one is made
-  // too; a person before a live picture would rather have the next one.
-  BoardView Detect(const cv::Mat& picture, bool thorough = true) const;
+  // image: CV_8UC1 or CV_8UC3. thorough: where a quick search finds no checkerboard, a slow one is made
+  // too; a person before a live image would rather have the next one.
+  BoardView Detect(const cv::Mat& image, bool thorough = true) const;
 
  private:
   BoardView DetectCheckerboard(const cv::Mat& grey, bool thorough) const;

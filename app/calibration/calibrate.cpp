@@ -25,7 +25,7 @@ std::vector<BoardView> Take(const std::vector<BoardView>& views, const std::vect
   return taken;
 }
 
-// Leaves out views that no lens could fit: a corner taken for another, a picture blurred by motion.
+// Leaves out views that no lens could fit: a corner taken for another, an image blurred by motion.
 std::vector<BoardView> WithoutOutliers(const std::vector<BoardView>& views, const LensSolution& solution,
                                        double sigmas) {
   std::vector<double> sorted = solution.view_rms_px;
@@ -81,7 +81,7 @@ const char* InWords(LensModel lens) {
 }
 
 std::string VerdictOf(const Calibration& calibration, int width_px) {
-  // What counts is the error against the picture's size: half a pixel of 640 is good for a tracker.
+  // What counts is the error against the image's size: half a pixel of 640 is good for a tracker.
   const double error = calibration.cross_validated_px * 640 / width_px;
   std::string verdict = error < 0.35 && calibration.focal_sigma < 0.002  ? "Good"
                         : error < 0.8 && calibration.focal_sigma < 0.006 ? "Usable"
@@ -91,11 +91,11 @@ std::string VerdictOf(const Calibration& calibration, int width_px) {
              " px, and its focal length is known to " + FormatNumber(100 * calibration.focal_sigma, 2) + " %";
   if (calibration.coverage < 0.6) {
     verdict += "; the board was seen in only " + FormatNumber(std::round(100 * calibration.coverage), 3) +
-               " % of the picture, so do not trust its corners";
+               " % of the image, so do not trust its corners";
   } else if (calibration.focal_sigma >= 0.002) {
     verdict += "; tilt the board more";
   } else if (error >= 0.8) {
-    verdict += "; check that the board is flat and the pictures sharp";
+    verdict += "; check that the board is flat and the images sharp";
   }
   return verdict + ".";
 }
@@ -160,7 +160,7 @@ Calibration Calibrate(const std::vector<BoardView>& views, int width_px, int hei
                       const CalibrationOptions& options) {
   if (views.size() < options.min_views) {
     throw Error("The board was found in only " + std::to_string(views.size()) +
-                " pictures; a calibration needs " + std::to_string(options.min_views) +
+                " images; a calibration needs " + std::to_string(options.min_views) +
                 " different views of it, and twenty make a good one.");
   }
   std::vector<LensModel> models = {LensModel::kRadialTangential, LensModel::kFov, LensModel::kKannalaBrandt};
@@ -226,7 +226,7 @@ double Coverage::Share() const {
 }
 
 std::string Coverage::Advice() const {
-  // The ninth of the picture with the most unseen cells.
+  // The ninth of the image with the most unseen cells.
   static constexpr const char* kRowNames[] = {"upper", "middle", "lower"};
   static constexpr const char* kColumnNames[] = {"left", "middle", "right"};
   std::array<std::array<int, 3>, 3> missing{};

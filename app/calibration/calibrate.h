@@ -11,7 +11,7 @@
 #include "app/calibration/lens_solver.h"
 #include "engine/geometry/camera_model.h"
 
-// From many pictures of a board to a calibration that says how good it is.
+// From many images of a board to a calibration that says how good it is.
 namespace docent::app {
 
 struct CalibrationOptions {
@@ -29,7 +29,7 @@ struct Calibration {
   double cross_validated_px = 0;  // on views it was not made from
   double focal_sigma = 0;         // part of the focal length
   double principal_sigma_px = 0;
-  double coverage = 0;           // part of the picture's cells in which corners were seen
+  double coverage = 0;           // part of the image's cells in which corners were seen
   std::string verdict;           // one sentence
   std::vector<BoardView> views;  // used
 };
@@ -52,7 +52,7 @@ std::optional<double> CrossValidate(engine::LensModel lens, int width_px, int he
 // `cross_validated_px`, `verdict` …), which readers of cameras pass over.
 std::string FormatCalibration(const Calibration& calibration, const BoardSpec& board);
 
-// Which parts of a picture the corners of views have been seen in, for whoever holds the board.
+// Which parts of an image the corners of views have been seen in, for whoever holds the board.
 class Coverage {
  public:
   static constexpr int kColumns = 8, kRows = 6;
@@ -71,7 +71,7 @@ class Coverage {
 // How far the corners that both views show have moved on average, pixels; infinite when they share hardly
 // any.
 double Movement(const BoardView& from, const BoardView& to);
-// Whether a view shows the board elsewhere than all before: corners moved by a thirtieth of the picture's
+// Whether a view shows the board elsewhere than all before: corners moved by a thirtieth of the image's
 // width on average.
 bool IsNewView(const BoardView& view, const std::vector<BoardView>& before, int width_px);
 

@@ -198,8 +198,8 @@ std::optional<std::filesystem::path> FindCalibration(const std::filesystem::path
   return std::nullopt;
 }
 
-void CheckPictureSize(const CameraModel& camera, int width_px, int height_px, const std::string& source,
-                      const std::string& calibration) {
+void CheckImageSize(const CameraModel& camera, int width_px, int height_px, const std::string& source,
+                    const std::string& calibration) {
   if (camera.width_px() == width_px && camera.height_px() == height_px) return;
   const auto size = [](int width, int height) {
     return std::to_string(width) + "x" + std::to_string(height);
@@ -208,11 +208,11 @@ void CheckPictureSize(const CameraModel& camera, int width_px, int height_px, co
   // A few pixels in a thousand are a codec's rounding.
   const double shape = static_cast<double>(camera.width_px()) * height_px / camera.height_px() / width_px;
   const std::string advice = std::abs(shape - 1) < 0.005
-                                 ? "take pictures of that size (--camera-format " + own +
+                                 ? "take images of that size (--camera-format " + own +
                                        ") or calibrate at this one (docent calibrate)"
                                  : "their shape differs too, so another part of the lens is seen: calibrate "
                                    "at this size (docent calibrate)";
-  throw Error("The pictures of " + source + " are " + size(width_px, height_px) + " pixels, but " +
+  throw Error("The images of " + source + " are " + size(width_px, height_px) + " pixels, but " +
               calibration + " is for " + own + "; " + advice + ".");
 }
 

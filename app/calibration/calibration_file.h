@@ -26,9 +26,9 @@ std::string FormatCalibration(const engine::CameraModel& camera);
 // sensor.yaml of an EuRoC camera. Empty when there is none.
 std::optional<std::filesystem::path> FindCalibration(const std::filesystem::path& folder);
 
-// Throws Error when pictures of this size do not belong to the calibration; `source` and `calibration` are
+// Throws Error when images of this size do not belong to the calibration; `source` and `calibration` are
 // names for the sentence.
-void CheckPictureSize(const engine::CameraModel& camera, int width_px, int height_px,
-                      const std::string& source, const std::string& calibration);
+void CheckImageSize(const engine::CameraModel& camera, int width_px, int height_px, const std::string& source,
+                    const std::string& calibration);
 
 }  // namespace docent::app

@@ -72,7 +72,7 @@ std::vector<Sample> SamplesOf(const cv::Mat& grey, const CornerGuess& guess, dou
       const Eigen::Vector2d squares = (squares_from_pixel * offset).cwiseAbs();
       if (offset.norm() > kFarthest_px || squares.maxCoeff() > kOfSquare || squares.minCoeff() > clear_share)
         continue;
-      // A corner whose surroundings are cut off would be pulled to the side that is left.
+      // A corner whose reference_keyframe are cut off would be pulled to the side that is left.
       if (x < 0 || y < 0 || x >= grey.cols || y >= grey.rows) return {};
       samples.push_back({{x, y}, static_cast<double>(grey.at<uchar>(y, x))});
     }

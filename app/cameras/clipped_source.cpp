@@ -31,7 +31,7 @@ class ClippedSource : public FrameSource {
   template <typename Fetch>
   bool NextInside(engine::Frame* frame, const Fetch& fetch) {
     while (!ended_ && fetch()) {
-      if (frame->picture.empty() && info_.live) return true;  // a device that is away
+      if (frame->image.empty() && info_.live) return true;  // a device that is away
       if (!first_) first_ = frame->time;
       const Timestamp since_first = frame->time - *first_;
       if (until_ > Timestamp{} && since_first >= until_) break;
@@ -87,7 +87,7 @@ class WindowSource : public FrameSource {
   const std::uint64_t first_frame_;
   const Timestamp duration_;
   std::uint64_t skipped_ = 0;
-  std::optional<std::pair<Timestamp, std::uint64_t>> begin_;  // time and index of the first picture
+  std::optional<std::pair<Timestamp, std::uint64_t>> begin_;  // time and index of the first image
   bool ended_ = false;
 };
 

@@ -22,7 +22,7 @@ struct Automatism {
   std::array<std::uint32_t, 2> governed;  // 0 for none
 };
 constexpr std::array<Automatism, 5> kAutomatisms = {{
-    // First of all the freedom to lower the picture rate for a longer exposure.
+    // First of all the freedom to lower the image rate for a longer exposure.
     {"frame rate", V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0, {0, 0}},
     {"exposure",
      V4L2_CID_EXPOSURE_AUTO,

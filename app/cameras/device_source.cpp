@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "app/cameras/device_picture.h"
+#include "app/cameras/device_image.h"
 #include "app/cameras/device_stream.h"
 #include "engine/base/error.h"
 
@@ -14,7 +14,7 @@ namespace docent::app {
 
 namespace {
 
-// Latencies of the newest pictures.
+// Latencies of the newest images.
 class LatencyWindow {
  public:
   void Add(Timestamp latency) { latencies_[count_++ % latencies_.size()] = latency; }
@@ -69,11 +69,11 @@ class DeviceSource : public FrameSource {
   std::optional<DeviceStream> stream_;  // empty while the device is away
   cv::Size size_;                       // agreed at the first opening
   std::optional<LockedControls> locked_;
-  std::uint64_t since_opened_ = 0;  // pictures delivered
+  std::uint64_t since_opened_ = 0;  // images delivered
   std::string trouble_;
   Delivery delivery_;
   LatencyWindow latency_;
-  std::uint64_t index_ = 0;                     // of the next picture that the device takes
+  std::uint64_t index_ = 0;                     // of the next image that the device takes
   std::optional<std::uint32_t> last_sequence_;  // of this opening
   std::optional<Timestamp> last_time_;
 };
@@ -86,7 +86,7 @@ void DeviceSource::Close() {
   since_opened_ = 0;
 }
 
-// The device's own number tells how many pictures it took that nobody had a buffer for.
+// The device's own number tells how many images it took that nobody had a buffer for.
 void DeviceSource::CountGap(const DeviceStream::Loan& loan) {
   const std::uint32_t sequence = loan.sequence();
   if (last_sequence_ && sequence > *last_sequence_ + 1) {
@@ -97,11 +97,11 @@ void DeviceSource::CountGap(const DeviceStream::Loan& loan) {
   last_sequence_ = sequence;
 }
 
-// Waits for a picture and passes over all but the newest that are there.
+// Waits for an image and passes over all but the newest that are there.
 DeviceStream::Loan DeviceSource::TakeNewest() {
   for (;;) {
     if (!stream_->Wait(options_.device_timeout)) {
-      throw DeviceGone("The camera " + path_ + " sent no picture for " +
+      throw DeviceGone("The camera " + path_ + " sent no image for " +
                        std::to_string(options_.device_timeout.count()) +
                        " ms; is it covered by another program or asleep?");
     }
@@ -122,21 +122,21 @@ DeviceStream::Loan DeviceSource::TakeNewest() {
   }
 }
 
-// False when the picture is broken. Gives the buffer back in any case.
+// False when the image is broken. Gives the buffer back in any case.
 bool DeviceSource::Deliver(DeviceStream::Loan loan, engine::Frame* frame) {
-  cv::Mat picture;
+  cv::Mat image;
   if (!loan.broken()) {
     try {
-      picture = ConvertDevicePicture(stream_->pixel_format(), loan.bytes, size_, stream_->stride_bytes(),
-                                     "A picture of " + path_);
+      image = ConvertDeviceImage(stream_->pixel_format(), loan.bytes, size_, stream_->stride_bytes(),
+                                 "An image of " + path_);
     } catch (const Error&) {
-      picture.release();
+      image.release();
     }
   }
   const Timestamp told = stream_->TimeOf(loan);
   stream_->Return(&loan);
   const std::uint64_t index = index_++;
-  if (picture.empty()) {
+  if (image.empty()) {
     ++delivery_.broken;
     return false;
   }
@@ -148,19 +148,19 @@ bool DeviceSource::Deliver(DeviceStream::Loan loan, engine::Frame* frame) {
   latency_.Add(std::max(Timestamp{}, system_->Now() - told));
   frame->time = time;
   frame->index = index;
-  frame->picture = std::move(picture);
+  frame->image = std::move(image);
   ++delivery_.delivered;
   ++since_opened_;
   return true;
 }
 
 void DeviceSource::NextFromDevice(engine::Frame* frame) {
-  // Cameras send a broken picture now and then, most of all while they start; many in a row are a fault.
+  // Cameras send a broken image now and then, most of all while they start; many in a row are a fault.
   constexpr int kMaxBroken = 30;
   for (int broken = 0; !Deliver(TakeNewest(), frame);) {
     if (++broken < kMaxBroken) continue;
     throw Error("The camera " + path_ +
-                " sends nothing but broken pictures; try another cable, port or format.");
+                " sends nothing but broken images; try another cable, port or format.");
   }
   if (options_.lock_controls_after > 0 && !locked_ &&
       since_opened_ >= static_cast<std::uint64_t>(options_.lock_controls_after)) {
@@ -201,7 +201,7 @@ bool DeviceSource::Next(engine::Frame* frame) {
   }
   frame->time = system_->Now();
   frame->index = index_;
-  frame->picture.release();
+  frame->image.release();
   return true;
 }
 

@@ -10,17 +10,17 @@
 #include "app/cameras/frame_source.h"
 
 // V4L2 cameras by the kernel's own interface (linux/videodev2.h): streaming with mapped buffers, a time-out
-// on every picture, and pictures in YUYV, NV12, Motion-JPEG or grey, the first of them that the device
+// on every image, and images in YUYV, NV12, Motion-JPEG or grey, the first of them that the device
 // delivers fast enough at the size that is asked.
 namespace docent::app {
 
 // Opens and starts the device. Throws Error with one sentence: no such device, busy, not permitted, no
 // camera, no known pixel format.
 //
-// Next gives the newest picture there is: older ones that nobody fetched in time go back to the device unread
-// and are counted as late. When no picture comes in time or the device is unplugged, it throws Error, or,
-// with CameraOptions::reconnect, answers with empty pictures while it tries to open the same path again; a
-// device that comes back with another picture size is refused until it goes away again.
+// Next gives the newest image there is: older ones that nobody fetched in time go back to the device unread
+// and are counted as late. When no image comes in time or the device is unplugged, it throws Error, or,
+// with CameraOptions::reconnect, answers with empty images while it tries to open the same path again; a
+// device that comes back with another image size is refused until it goes away again.
 std::unique_ptr<FrameSource> OpenDevice(const std::string& path, const CameraOptions& options,
                                         std::unique_ptr<DeviceSystem> system = MakeDeviceSystem());
 

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "app/cameras/device_picture.h"
+#include "app/cameras/device_image.h"
 #include "app/cameras/device_source.h"
 
 namespace docent::app {
@@ -19,7 +19,7 @@ namespace {
 // them.
 constexpr std::array<std::uint32_t, 5> kPixelFormats = {
     V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_NV12, V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_JPEG, V4L2_PIX_FMT_GREY};
-constexpr std::uint64_t kMaxPicturePixels = 1 << 28;
+constexpr std::uint64_t kMaxImagePixels = 1 << 28;
 constexpr double kUsualFps = 30;
 
 }  // namespace
@@ -61,7 +61,7 @@ void DeviceStream::Open() {
   const std::uint32_t can = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? capability.device_caps
                                                                                   : capability.capabilities;
   if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0) {
-    throw Error(path_ + " is a video device, but not one that streams pictures.");
+    throw Error(path_ + " is a video device, but not one that streams images.");
   }
 }
 
@@ -80,7 +80,7 @@ std::optional<v4l2_pix_format> DeviceStream::Ask(unsigned long request, std::uin
   }
   const v4l2_pix_format& got = format.fmt.pix;
   if (got.pixelformat != pixel_format || got.width == 0 || got.height == 0) return std::nullopt;
-  if (static_cast<std::uint64_t>(got.width) * got.height > kMaxPicturePixels) return std::nullopt;
+  if (static_cast<std::uint64_t>(got.width) * got.height > kMaxImagePixels) return std::nullopt;
   const bool as_wanted =
       static_cast<int>(got.width) == wanted.width_px && static_cast<int>(got.height) == wanted.height_px;
   if (wanted.width_px > 0 && !as_wanted) return std::nullopt;
@@ -108,7 +108,7 @@ void DeviceStream::NegotiateFormat(const DeviceFormat& wanted) {
   const auto got = chosen != 0 ? Ask(VIDIOC_S_FMT, chosen, wanted) : std::nullopt;
   if (!got) {
     throw Error("The camera " + path_ +
-                " offers no picture format that Docent reads (YUYV, NV12, Motion-JPEG or grey)" +
+                " offers no image format that Docent reads (YUYV, NV12, Motion-JPEG or grey)" +
                 (wanted.width_px > 0
                      ? " at " + std::to_string(wanted.width_px) + "x" + std::to_string(wanted.height_px)
                      : std::string()) +
@@ -129,7 +129,7 @@ void DeviceStream::NegotiateRate(double fps) {
     interval = {1000, static_cast<std::uint32_t>(std::lround(wanted * 1000))};
     // What nobody asked for need not be had.
     if (system_->Control(file_, VIDIOC_S_PARM, &parameters) < 0 && fps > 0)
-      Fail("refuses this picture rate", errno);
+      Fail("refuses this image rate", errno);
   }
   if (interval.numerator > 0 && interval.denominator > 0) {
     fps_ = static_cast<double>(interval.denominator) / interval.numerator;
@@ -142,7 +142,7 @@ void DeviceStream::StartStreaming() {
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = V4L2_MEMORY_MMAP;
   if (system_->Control(file_, VIDIOC_REQBUFS, &request) < 0) Fail("gives no buffers", errno);
-  if (request.count < 2) throw Error("The camera " + path_ + " has no memory for its pictures.");
+  if (request.count < 2) throw Error("The camera " + path_ + " has no memory for its images.");
   for (std::uint32_t i = 0; i < request.count; ++i) {
     Loan loan;
     v4l2_buffer& buffer = loan.buffer;
@@ -184,7 +184,7 @@ std::optional<DeviceStream::Loan> DeviceStream::Take() {
   loan.buffer.memory = V4L2_MEMORY_MMAP;
   if (system_->Control(file_, VIDIOC_DQBUF, &loan.buffer) < 0) {
     if (errno == EAGAIN) return std::nullopt;
-    Fail("stopped sending pictures", errno);
+    Fail("stopped sending images", errno);
   }
   if (loan.buffer.index >= buffers_.size())
     throw Error("The camera " + path_ + " answers with a buffer it never gave.");

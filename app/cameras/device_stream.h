@@ -43,12 +43,12 @@ class DeviceStream {
     std::uint32_t sequence() const { return buffer.sequence; }
   };
 
-  // False when no picture came within the time.
+  // False when no image came within the time.
   bool Wait(std::chrono::milliseconds timeout);
   // Empty when there was nothing after all.
   std::optional<Loan> Take();
   void Return(Loan* loan);
-  // When the picture was taken, on CLOCK_MONOTONIC: the kernel's own stamp, or the present for the few
+  // When the image was taken, on CLOCK_MONOTONIC: the kernel's own stamp, or the present for the few
   // drivers that stamp with another clock.
   Timestamp TimeOf(const Loan& loan) const;
 

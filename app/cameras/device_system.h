@@ -19,9 +19,9 @@ class DeviceSystem {
   virtual int Control(int file, unsigned long request, void* argument) = 0;
   virtual void* Map(int file, std::size_t length_bytes, long offset_bytes) = 0;  // null when it fails
   virtual void Unmap(void* memory, std::size_t length_bytes) = 0;
-  // 1 when a picture waits, 0 after the time-out, -1 with errno; ENODEV when the device is gone.
+  // 1 when an image waits, 0 after the time-out, -1 with errno; ENODEV when the device is gone.
   virtual int Wait(int file, int timeout_ms) = 0;
-  // The clock that the kernel stamps pictures with, CLOCK_MONOTONIC.
+  // The clock that the kernel stamps images with, CLOCK_MONOTONIC.
   virtual std::chrono::nanoseconds Now() = 0;
   virtual void Sleep(std::chrono::milliseconds duration) = 0;
 };

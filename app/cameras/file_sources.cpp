@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "app/calibration/calibration_file.h"
-#include "app/cameras/decode_picture.h"
+#include "app/cameras/decode_image.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -64,21 +64,21 @@ class VideoSource : public FrameSource {
     if (timestamps_path_ && index_ == times_.size()) {
       ended_ = true;
       throw Error(Quoted(*timestamps_path_) + " has " + std::to_string(times_.size()) + " times, but " +
-                  Quoted(path_) + " goes on after that many pictures.");
+                  Quoted(path_) + " goes on after that many images.");
     }
-    cv::Mat picture;
-    if (!capture_.retrieve(picture) || picture.empty()) {
+    cv::Mat image;
+    if (!capture_.retrieve(image) || image.empty()) {
       ended_ = true;
-      throw Error("Picture " + std::to_string(index_) + " of " + Quoted(path_) + " cannot be decoded.");
+      throw Error("Image " + std::to_string(index_) + " of " + Quoted(path_) + " cannot be decoded.");
     }
     frame->time = timestamps_path_ ? times_[index_] : ContainerTime();
     frame->index = index_++;
-    frame->picture = std::move(picture);
+    frame->image = std::move(image);
     return true;
   }
 
  private:
-  // The container's time where it grows. The decoder tells none for pictures that it still holds when the
+  // The container's time where it grows. The decoder tells none for images that it still holds when the
   // file ends, and raw streams have none at all: those go on with the step before.
   Timestamp ContainerTime() {
     const double milliseconds = capture_.get(cv::CAP_PROP_POS_MSEC);
@@ -99,12 +99,12 @@ class VideoSource : public FrameSource {
   void CheckEnd() const {
     if (timestamps_path_) {
       if (index_ < times_.size()) {
-        throw Error(Quoted(path_) + " breaks off at picture " + std::to_string(index_) + " of the " +
+        throw Error(Quoted(path_) + " breaks off at image " + std::to_string(index_) + " of the " +
                     std::to_string(times_.size()) + " that " + Quoted(*timestamps_path_) + " lists.");
       }
       return;
     }
-    if (index_ == 0) throw Error(Quoted(path_) + " holds no picture that can be decoded.");
+    if (index_ == 0) throw Error(Quoted(path_) + " holds no image that can be decoded.");
     if (!announced_count_) return;
     // Some containers announce a length in seconds only, so both measures must agree that something is
     // missing.
@@ -113,7 +113,7 @@ class VideoSource : public FrameSource {
     const double missing_s = *announced_count_ / fps - ToSeconds(last_time_ + step_);
     const double allowed = std::max(2.0, 0.01 * *announced_count_);
     if (missing > allowed && missing_s > allowed / fps) {
-      throw Error(Quoted(path_) + " breaks off at picture " + std::to_string(index_) + " of the " +
+      throw Error(Quoted(path_) + " breaks off at image " + std::to_string(index_) + " of the " +
                   std::to_string(static_cast<std::uint64_t>(*announced_count_)) + " that it announces.");
     }
   }
@@ -130,39 +130,39 @@ class VideoSource : public FrameSource {
 
 class ImageListSource : public FrameSource {
  public:
-  explicit ImageListSource(std::vector<TimedPath> pictures) : pictures_(std::move(pictures)) {
+  explicit ImageListSource(std::vector<TimedPath> images) : images_(std::move(images)) {
     std::vector<Timestamp> times;
-    for (const TimedPath& picture : pictures_) times.push_back(picture.time);
-    info_.frame_count = pictures_.size();
+    for (const TimedPath& image : images_) times.push_back(image.time);
+    info_.frame_count = images_.size();
     info_.nominal_fps = MedianFps(times);
   }
 
   void SetInfo(SourceInfo info) { info_ = std::move(info); }
 
   bool Next(engine::Frame* frame) override {
-    if (index_ == pictures_.size()) return false;
-    const TimedPath& next = pictures_[index_];
-    cv::Mat picture;
+    if (index_ == images_.size()) return false;
+    const TimedPath& next = images_[index_];
+    cv::Mat image;
     try {
-      picture = ReadPicture(next.path, &buffer_);
-      if (size_.area() == 0) size_ = picture.size();
-      if (picture.size() != size_) {
-        throw Error(Quoted(next.path) + " is " + std::to_string(picture.cols) + "x" +
-                    std::to_string(picture.rows) + " pixels, but the pictures before it are " +
+      image = ReadImage(next.path, &buffer_);
+      if (size_.area() == 0) size_ = image.size();
+      if (image.size() != size_) {
+        throw Error(Quoted(next.path) + " is " + std::to_string(image.cols) + "x" +
+                    std::to_string(image.rows) + " pixels, but the images before it are " +
                     std::to_string(size_.width) + "x" + std::to_string(size_.height) + ".");
       }
     } catch (const Error&) {
-      index_ = pictures_.size();  // a source that broke off has ended
+      index_ = images_.size();  // a source that broke off has ended
       throw;
     }
     frame->time = next.time;
     frame->index = index_++;
-    frame->picture = std::move(picture);
+    frame->image = std::move(image);
     return true;
   }
 
  private:
-  std::vector<TimedPath> pictures_;
+  std::vector<TimedPath> images_;
   std::vector<std::uint8_t> buffer_;
   cv::Size size_;
   std::size_t index_ = 0;
@@ -191,7 +191,7 @@ std::unique_ptr<FrameSource> OpenFolder(const fs::path& folder, const CameraOpti
   if (!layout) {
     throw Error(
         "The folder " + Quoted(folder) +
-        " holds no image sequence: neither rgb.txt, mav0/cam0/data.csv, video.mp4 nor numbered pictures.");
+        " holds no image sequence: neither rgb.txt, mav0/cam0/data.csv, video.mp4 nor numbered images.");
   }
   const fs::path video = folder / "video.mp4";
   switch (*layout) {

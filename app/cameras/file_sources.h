@@ -12,8 +12,8 @@
 // Sources that read files. All throw Error with one sentence; see FrameSource.
 namespace docent::app {
 
-// A video. With `timestamps_path` the times are that file's, one a picture, and a video that holds fewer or
-// more pictures than the file has times is an Error at the picture where it shows. Without it the times are
+// A video. With `timestamps_path` the times are that file's, one an image, and a video that holds fewer or
+// more images than the file has times is an Error at the image where it shows. Without it the times are
 // the container's own, and a video that ends clearly before its announced length is said to break off.
 std::unique_ptr<FrameSource> OpenVideo(const std::filesystem::path& video,
                                        const std::optional<std::filesystem::path>& timestamps_path = {});

@@ -11,7 +11,7 @@
 
 // A camera that can turn its head: on a carrier (a shoulder, a shelf) it pans and tilts about its centre. The
 // carrier's frame is that of the camera when it looks straight ahead (x right, y down, z forward). A head
-// belongs to the source of its pictures; any thread may use it.
+// belongs to the source of its images; any thread may use it.
 namespace docent::app {
 
 struct PanTilt {
@@ -29,7 +29,7 @@ struct PanTiltRange {
 };
 
 engine::Rotation3 CarrierFromCamera(const PanTilt& at);
-// Where to look for a direction of the carrier's frame to be in the middle of the picture.
+// Where to look for a direction of the carrier's frame to be in the middle of the image.
 PanTilt Toward(const Eigen::Vector3d& direction_in_carrier);
 
 // Where a head is that was told where to go: it turns about both axes at its speed until it is there. Few
@@ -52,7 +52,7 @@ class Head {
  public:
   virtual ~Head() = default;
   virtual const PanTiltRange& range() const = 0;
-  // Where it looks at a time on the clock of its pictures, as far as is known.
+  // Where it looks at a time on the clock of its images, as far as is known.
   virtual PanTilt At(Timestamp time) const = 0;
   // Goes there; what is out of range, as near as it can.
   virtual void LookAt(const PanTilt& wanted, Timestamp now) = 0;

@@ -77,7 +77,7 @@ std::optional<SequenceLayout> FindLayout(const fs::path& folder) {
 std::vector<TimedPath> ReadTumList(const fs::path& folder) {
   const fs::path list = folder / "rgb.txt";
   const std::string text = ReadTextFile(list);
-  std::vector<TimedPath> pictures;
+  std::vector<TimedPath> images;
   for (const TextLine& line : ContentLines(text)) {
     const std::size_t blank = line.text.find_first_of(" \t");
     const std::optional<Timestamp> time = ParseSeconds(line.text.substr(0, blank));
@@ -85,12 +85,11 @@ std::vector<TimedPath> ReadTumList(const fs::path& folder) {
       throw Error(At(list, line.number) +
                   ": expected a time in seconds and a file, as in '1.25 rgb/1.25.png'.");
     }
-    CheckOrder(pictures.empty() ? std::nullopt : std::optional(pictures.back().time), *time, list,
-               line.number);
-    pictures.push_back({*time, folder / Trim(line.text.substr(blank))});
+    CheckOrder(images.empty() ? std::nullopt : std::optional(images.back().time), *time, list, line.number);
+    images.push_back({*time, folder / Trim(line.text.substr(blank))});
   }
-  if (pictures.empty()) throw Error("'" + list.string() + "' names no pictures.");
-  return pictures;
+  if (images.empty()) throw Error("'" + list.string() + "' names no images.");
+  return images;
 }
 
 std::vector<TimedPath> ReadEurocList(const fs::path& folder) {
@@ -98,7 +97,7 @@ std::vector<TimedPath> ReadEurocList(const fs::path& folder) {
   if (!camera) throw Error("There is no data.csv in '" + folder.string() + "'.");
   const fs::path list = *camera / "data.csv";
   const std::string text = ReadTextFile(list);
-  std::vector<TimedPath> pictures;
+  std::vector<TimedPath> images;
   for (const TextLine& line : ContentLines(text)) {
     const std::size_t comma = line.text.find(',');
     const std::optional<std::int64_t> nanoseconds = ParseInteger(Trim(line.text.substr(0, comma)));
@@ -106,22 +105,21 @@ std::vector<TimedPath> ReadEurocList(const fs::path& folder) {
       throw Error(At(list, line.number) + ": expected a time in nanoseconds, a comma and a file.");
     }
     const Timestamp time(*nanoseconds);
-    CheckOrder(pictures.empty() ? std::nullopt : std::optional(pictures.back().time), time, list,
-               line.number);
-    pictures.push_back({time, *camera / "data" / Trim(line.text.substr(comma + 1))});
+    CheckOrder(images.empty() ? std::nullopt : std::optional(images.back().time), time, list, line.number);
+    images.push_back({time, *camera / "data" / Trim(line.text.substr(comma + 1))});
   }
-  if (pictures.empty()) throw Error("'" + list.string() + "' names no pictures.");
-  return pictures;
+  if (images.empty()) throw Error("'" + list.string() + "' names no images.");
+  return images;
 }
 
 std::vector<TimedPath> ListNumberedImages(const fs::path& folder, double fps) {
-  std::vector<TimedPath> pictures;
+  std::vector<TimedPath> images;
   for (fs::path& path : NumberedImages(folder)) {
-    const auto time = FromSeconds(static_cast<double>(pictures.size()) / fps);
-    pictures.push_back({time, std::move(path)});
+    const auto time = FromSeconds(static_cast<double>(images.size()) / fps);
+    images.push_back({time, std::move(path)});
   }
-  if (pictures.empty()) throw Error("There are no numbered pictures in '" + folder.string() + "'.");
-  return pictures;
+  if (images.empty()) throw Error("There are no numbered images in '" + folder.string() + "'.");
+  return images;
 }
 
 std::vector<Timestamp> ReadTimestamps(const fs::path& path) {

@@ -19,10 +19,10 @@ struct TimedPath {
 
 enum class SequenceLayout {
   kTum,             // rgb.txt: `seconds path`
-  kEuroc,           // mav0/cam0, cam0 or the folder itself: data.csv `nanoseconds,file`, pictures in data/
+  kEuroc,           // mav0/cam0, cam0 or the folder itself: data.csv `nanoseconds,file`, images in data/
   kTimedVideo,      // video.mp4 with timestamps.txt
   kVideo,           // video.mp4 alone: the container's own times
-  kNumberedImages,  // pictures in the order of the numbers in their names
+  kNumberedImages,  // images in the order of the numbers in their names
 };
 
 // Which layout the folder has, or empty when it holds no sequence.
@@ -37,7 +37,7 @@ std::vector<Timestamp> ReadTimestamps(const std::filesystem::path& path);
 // The folder of an EuRoC camera (the one with data.csv), or empty.
 std::optional<std::filesystem::path> FindEurocCamera(const std::filesystem::path& folder);
 
-// Median of the steps between times, as pictures a second; 30 with fewer than two times.
+// Median of the steps between times, as images a second; 30 with fewer than two times.
 double MedianFps(const std::vector<Timestamp>& times);
 
 }  // namespace docent::app

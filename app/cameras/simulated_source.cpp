@@ -29,16 +29,16 @@ class SimulatedSource : public FrameSource {
 
   bool Next(engine::Frame* frame) override {
     if (index_ == simulation_->frame_count()) return false;
-    cv::Mat picture;
+    cv::Mat image;
     frame->time = simulation_->time(index_);
     if (head() != nullptr) {
       const engine::Rigid3 turn(CarrierFromCamera(head()->At(frame->time)), Eigen::Vector3d::Zero());
-      simulation_->RenderTurned(index_, turn, &picture);
+      simulation_->RenderTurned(index_, turn, &image);
     } else {
-      simulation_->Render(index_, &picture);
+      simulation_->Render(index_, &image);
     }
     frame->index = static_cast<std::uint64_t>(index_++);
-    frame->picture = std::move(picture);
+    frame->image = std::move(image);
     return true;
   }
 

@@ -24,8 +24,8 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
       ->type_name("FILE");
   command
       ->add_option("--target", options->target,
-                   "Start new maps from this printed picture, in metres; see --target-width")
-      ->type_name("PICTURE");
+                   "Start new maps from this printed image, in metres; see --target-width")
+      ->type_name("IMAGE");
   command
       ->add_option_function<std::string>(
           "--target-width",

@@ -16,9 +16,9 @@ void AddCalibrateCommand(CLI::App* program, Invocation* invocation,
       program, "calibrate", "Measure a camera's lens with a printed board",
       "docent calibrate --print board.pdf\n"
       "  docent calibrate --camera /dev/video0 --output camera.yaml\n"
-      "  docent calibrate --camera pictures --board checkerboard:9x6:25 --output camera.yaml --headless");
+      "  docent calibrate --camera images --board checkerboard:9x6:25 --output camera.yaml --headless");
   const auto options = std::make_shared<CalibrateOptions>();
-  command->add_option("--camera", options->source, "A device, a video, or a folder of pictures of the board")
+  command->add_option("--camera", options->source, "A device, a video, or a folder of images of the board")
       ->type_name("SOURCE");
   command->add_option("--output", options->output, "The calibration file to write")->type_name("FILE");
   command

@@ -15,22 +15,22 @@ cv::Point Place(const Eigen::Vector2d& pixel) {
   return {cvRound(pixel.x() * (1 << kShift)), cvRound(pixel.y() * (1 << kShift))};
 }
 
-void ShadeCells(const Coverage& coverage, cv::Mat* picture) {
-  cv::Mat shade = picture->clone();
+void ShadeCells(const Coverage& coverage, cv::Mat* image) {
+  cv::Mat shade = image->clone();
   for (int row = 0; row < Coverage::kRows; ++row) {
     for (int column = 0; column < Coverage::kColumns; ++column) {
       if (!coverage.IsSeen(column, row)) continue;
-      const cv::Point low(column * picture->cols / Coverage::kColumns, row * picture->rows / Coverage::kRows);
-      const cv::Point high((column + 1) * picture->cols / Coverage::kColumns,
-                           (row + 1) * picture->rows / Coverage::kRows);
+      const cv::Point low(column * image->cols / Coverage::kColumns, row * image->rows / Coverage::kRows);
+      const cv::Point high((column + 1) * image->cols / Coverage::kColumns,
+                           (row + 1) * image->rows / Coverage::kRows);
       cv::rectangle(shade, low, high, {80, 160, 80}, cv::FILLED);
     }
   }
   constexpr double kShade = 0.25;
-  cv::addWeighted(shade, kShade, *picture, 1 - kShade, 0, *picture);
+  cv::addWeighted(shade, kShade, *image, 1 - kShade, 0, *image);
 }
 
-// Green to red with the length of a residual, against the picture's size.
+// Green to red with the length of a residual, against the image's size.
 cv::Scalar ColorOf(double residual_px, int width_px) {
   const double poor = std::clamp(residual_px * 640 / width_px / 0.6, 0.0, 1.0);
   return {60, 60 + 160 * (1 - poor), 60 + 195 * poor};
@@ -40,8 +40,8 @@ cv::Scalar ColorOf(double residual_px, int width_px) {
 
 cv::Mat PaintCalibration(const CalibrationWindow::Shown& shown, const Coverage& coverage) {
   cv::Mat drawn;
-  shown.picture.channels() == 1 ? cv::cvtColor(shown.picture, drawn, cv::COLOR_GRAY2BGR)
-                                : shown.picture.copyTo(drawn);
+  shown.image.channels() == 1 ? cv::cvtColor(shown.image, drawn, cv::COLOR_GRAY2BGR)
+                              : shown.image.copyTo(drawn);
   ShadeCells(coverage, &drawn);
   constexpr double kTimes = 30;
   for (std::size_t i = 0; i < shown.kept.size(); ++i) {
@@ -69,7 +69,7 @@ bool CalibrationWindow::Show(const Shown& shown, const Coverage& coverage) {
   }
   if (window_.IsClosing()) return false;
   engine::TrackedFrame frame;
-  frame.frame.picture = PaintCalibration(shown, coverage);
+  frame.frame.image = PaintCalibration(shown, coverage);
   frame.state = engine::TrackingState::kDropped;  // no figure invites to search or to move
   ui::View view;
   view.overlay.status = false;

@@ -11,13 +11,13 @@
 
 namespace docent::app {
 
-// What the person who holds the board sees: the picture with the board's corners in it, where in the picture
+// What the person who holds the board sees: the image with the board's corners in it, where in the image
 // corners have been (shaded cells), how far each of them is from where the lens so far puts it (lines, thirty
 // times as long), and one sentence on what is missing. On the main thread (GLFW's rule).
 class CalibrationWindow {
  public:
   struct Shown {
-    cv::Mat picture;              // CV_8UC1 or CV_8UC3
+    cv::Mat image;                // CV_8UC1 or CV_8UC3
     BoardView now;                // the board in it; without points where there is none
     std::vector<BoardView> kept;  // the views so far
     // By view as many as were kept when the lens was last worked out, and corner: where the lens puts it,

@@ -40,7 +40,7 @@ void AddDistributionOptions(CLI::App* command, EvaluateOptions* options) {
       "spread; with --seeds every window has all seeds. Windows of a length (--window) that fit lie "
       "within the sequence, so that all are equally long");
   AddSecondsOption(command, "--window", &options->window,
-                   "End each run so long after its first picture (0: at the end of the sequence)");
+                   "End each run so long after its first image (0: at the end of the sequence)");
   command
       ->add_option_function<std::string>(
           "--truth-noise",
@@ -90,7 +90,7 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
   command
       ->add_option(
           "--dump-frame", options->dump_frames,
-          "Write everything about frame N (from 0) of each sequence, as pictures and JSON; may be repeated")
+          "Write everything about frame N (from 0) of each sequence, as images and JSON; may be repeated")
       ->check(CLI::NonNegativeNumber)
       ->type_name("N")
       ->allow_extra_args(false);

@@ -10,7 +10,7 @@
 #include "app/cameras/simulated_source.h"
 #include "app/command_line/progress.h"
 #include "app/evaluation/frame_dump.h"
-#include "app/evaluation/panorama_picture.h"
+#include "app/evaluation/panorama_image.h"
 #include "app/evaluation/simulated_truth.h"
 #include "app/evaluation/true_depth.h"
 #include "app/files/checked_file.h"
@@ -26,7 +26,7 @@ SessionOptions OptionsFor(const EvaluateOptions& options, std::uint64_t seed) {
   SessionOptions session;
   session.threaded = options.pace != Pace::kLockstep;
   session.tracker.hybrid = options.engine == EngineKind::kHybrid;
-  session.tracker.turn_center.enabled = !options.turn_about_camera;
+  session.tracker.rotation_center.enabled = !options.turn_about_camera;
   if (options.turn_about_camera) session.tracker.max_turn_sigma = session.tracker.max_sigma;
   session.mapper.loops.enabled = !options.leave_loops_open;
   session.new_map_when_lost = options.when_lost == WhenLost::kNew;
@@ -38,16 +38,16 @@ SessionOptions OptionsFor(const EvaluateOptions& options, std::uint64_t seed) {
 // Stitches what a map knows by turning, into the output folder and for the report.
 void StitchMap(const std::filesystem::path& folder, const Session::MapState& map,
                std::vector<ShownPanorama>* shown) {
-  for (const PanoramaPicture& panorama : StitchPanoramas(*map.snapshot)) {
+  for (const PanoramaImage& panorama : StitchPanoramas(*map.snapshot)) {
     const std::string number = std::to_string(map.key) + "-" + std::to_string(panorama.panorama);
-    ShownPanorama picture;
-    picture.caption = "panorama-" + number + ".png: " + std::to_string(panorama.keyframes) +
-                      " keyframes of the map '" + map.name + "'";
-    picture.png = EncodePng(panorama.picture);
+    ShownPanorama image;
+    image.caption = "panorama-" + number + ".png: " + std::to_string(panorama.keyframes) +
+                    " keyframes of the map '" + map.name + "'";
+    image.png = EncodePng(panorama.image);
     CheckedFile file(folder / ("panorama-" + number + ".png"));
-    file.Write({reinterpret_cast<const char*>(picture.png.data()), picture.png.size()});
+    file.Write({reinterpret_cast<const char*>(image.png.data()), image.png.size()});
     file.Close();
-    shown->push_back(std::move(picture));
+    shown->push_back(std::move(image));
   }
 }
 
@@ -74,7 +74,7 @@ void AddMaps(std::vector<Session::MapState> maps, const std::filesystem::path& f
   }
 }
 
-// As many as fit between the first picture and the last one, evenly.
+// As many as fit between the first image and the last one, evenly.
 void CheckStarts(const EvaluateOptions& options, const EvaluatedSequence& sequence) {
   if (options.starts == 1) return;
   const std::string asked = "--starts " + std::to_string(options.starts) + ": '" + sequence.name + "' ";
@@ -209,7 +209,7 @@ RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequenc
   record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   record.peak_memory_mb = PeakMemoryMegabytes();
   record.mapping = MakeMappingTimes(session.MappingTimes());
-  for (const LensWatch::Ring& ring : session.LensErrors(0))
+  for (const CalibrationMonitor::Ring& ring : session.LensErrors(0))
     record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
   // What follows needs the maps, and memory for one of them over again, but not all that tracked and mapped.
   std::vector<Session::MapState> maps = session.Maps();

@@ -35,7 +35,7 @@ struct EvaluatedSequence {
 // live camera, or has not enough frames for the windows that are asked for.
 EvaluatedSequence KnowSequence(const EvaluateOptions& options, std::size_t index);
 
-// Its pictures from the frame of that number on; see WindowOf. Throws Error.
+// Its images from the frame of that number on; see WindowOf. Throws Error.
 CalibratedCamera OpenWindow(const EvaluatedSequence& sequence, std::uint64_t first_frame, Timestamp window);
 
 // Judges the starts of a run of this sequence that began at that frame; empty without a truth. Throws Error.
@@ -56,7 +56,7 @@ struct TrackRequest {
   std::string name;              // of the sequence, for the record
   std::filesystem::path folder;  // of the run's files
   RunKey key;
-  // Leaves out what only one run is worth: whole adjustments, panorama pictures, and their progress.
+  // Leaves out what only one run is worth: whole adjustments, panorama images, and their progress.
   bool one_of_many = false;
 };
 

@@ -13,7 +13,7 @@ namespace docent::app {
 // The text files that a guided run leaves, where they were asked for. One thread at a time.
 class GuideFiles {
  public:
-  // What was drawn over the first camera's pictures is noted through its lens.
+  // What was drawn over the first camera's images is noted through its lens.
   GuideFiles(const GuideRequest& request, const engine::CameraModel& first_camera);
 
   void Add(const ShownFrame& frame);

@@ -76,7 +76,7 @@ class GuideWindow {
       shown_[i] = std::move(frames[i]);
       fresh.push_back(shown_[i]);
     }
-    if (!fresh.empty()) DrawPicture();
+    if (!fresh.empty()) DrawImage();
     const Eigen::Vector2i size = window_.FramebufferSize();
     const int width_px = std::max(1, size.x()), height_px = std::max(1, size.y());
     if (shows_map_ && large()) {
@@ -116,10 +116,10 @@ class GuideWindow {
   void Swap() {
     if (shown_.size() < 2 || !shown_[1 - large_]) return;
     large_ = 1 - large_;
-    DrawPicture();
+    DrawImage();
   }
 
-  void DrawPicture() {
+  void DrawImage() {
     if (!large()) return;
     ui::View view = ViewOf(*large(), camera());
     if (shown_.size() > 1 && shown_[1 - large_]) view.overlay.inset = &shown_[1 - large_]->tracked;
@@ -134,14 +134,13 @@ class GuideWindow {
     }
     if (!refusal_.empty()) view.overlay.message = refusal_;
     renderer_.Draw(view);
-    if (!recorder_ && !request_.on_picture) return;
-    renderer_.ReadBack(&picture_);
-    // The video has the first camera's rate and size: it is written at that camera's pictures.
+    if (!recorder_ && !request_.on_image) return;
+    renderer_.ReadBack(&image_);
+    // The video has the first camera's rate and size: it is written at that camera's images.
     const std::uint64_t index = shown_[0] ? shown_[0]->tracked.frame.index : 0;
-    if (recorder_ && shown_[0] && index != recorded_ && SizeOfFirst(picture_))
-      recorder_->Write(picture_, index);
+    if (recorder_ && shown_[0] && index != recorded_ && SizeOfFirst(image_)) recorder_->Write(image_, index);
     recorded_ = index;
-    if (request_.on_picture) request_.on_picture(*large(), picture_);
+    if (request_.on_image) request_.on_image(*large(), image_);
   }
 
   // A line of the script language becomes a command at the frame that is on the screen.
@@ -191,17 +190,17 @@ class GuideWindow {
     const Eigen::Vector2i size = window_.WindowSize();
     if (!large() || size.x() < 1 || size.y() < 1) return;
     const int width = camera().width_px(), height = camera().height_px();
-    const ui::Letterbox box = ui::FitPicture(width, height, size.x(), size.y());
-    const Eigen::Vector2d pixel = box.PictureFromWindow(event.position);
+    const ui::Letterbox box = ui::FitImage(width, height, size.x(), size.y());
+    const Eigen::Vector2d pixel = box.ImageFromWindow(event.position);
     if (shown_.size() > 1 && shown_[1 - large_]) {
       const engine::CameraModel& other = *cameras_[1 - large_].model;
       if (ui::PlaceInset(width, height, other.width_px(), other.height_px()).Contains(pixel)) return Swap();
     }
-    if (panel_ && !shows_map_ && camera().IsInside(pixel)) panel_->ClickPicture(pixel);
+    if (panel_ && !shows_map_ && camera().IsInside(pixel)) panel_->ClickImage(pixel);
   }
-  bool SizeOfFirst(const cv::Mat& picture) const {
+  bool SizeOfFirst(const cv::Mat& image) const {
     const engine::CameraModel& first = *cameras_.front().model;
-    return picture.cols == first.width_px() && picture.rows == first.height_px();
+    return image.cols == first.width_px() && image.rows == first.height_px();
   }
 
   const GuideRequest& request_;
@@ -218,7 +217,7 @@ class GuideWindow {
   std::optional<std::uint64_t> recorded_;
   std::set<std::string> map_names_;
   std::string refusal_;
-  cv::Mat picture_;
+  cv::Mat image_;
   bool points_ = false, keyframes_ = false, hud_ = true, shows_map_ = false, closing_ = false;
 };
 

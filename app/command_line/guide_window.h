@@ -36,7 +36,7 @@ class FrameSlot {
 
 // Shows frames in a window until they end or the person closes it; authors put commands into the inbox of the
 // frame's camera with its panel. With two cameras the first is shown large and the other small; a click on
-// the small picture swaps them. On the main thread (GLFW's rule). Throws Error when there is no display.
+// the small image swaps them. On the main thread (GLFW's rule). Throws Error when there is no display.
 //
 //   escape or q  close            p  points      k  keyframes      h  status      tab  swap cameras
 //   control-z    undo             control-y  redo                  control-s  save

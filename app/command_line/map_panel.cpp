@@ -8,10 +8,10 @@
 
 namespace docent::app {
 
-std::vector<ui::FoundAgain> PredictFoundAgain(const engine::MapSnapshot& map, const std::stop_token& stop) {
+std::vector<ui::PredictedRecall> PredictRecall(const engine::MapSnapshot& map, const std::stop_token& stop) {
   const auto trials =
       maps::LeaveEachKeyFrameOut(map, {}, [&](std::size_t) { return !stop.stop_requested(); });
-  std::vector<ui::FoundAgain> found;
+  std::vector<ui::PredictedRecall> found;
   if (trials.empty()) return found;
   const maps::RelocalizationGrid grid = maps::MakeRelocalizationGrid(map, trials, UpInMap(map));
   for (const maps::RelocalizationCell& cell : grid.cells)
@@ -28,14 +28,14 @@ void MapPanel::Predict(const std::shared_ptr<const engine::MapSnapshot>& map, st
   if (predicted_key_ == key && predicted_keyframes_ == map->keyframes.size()) return;
   if (predicted_key_ != key) {
     const std::scoped_lock lock(mutex_);
-    found_again_.clear();
+    predicted_recall_.clear();
   }
   predicted_key_ = key;
   predicted_keyframes_ = map->keyframes.size();
   worker_.emplace("found-again", [this, map](const std::stop_token& stop) {
-    std::vector<ui::FoundAgain> found = PredictFoundAgain(*map, stop);
+    std::vector<ui::PredictedRecall> found = PredictRecall(*map, stop);
     const std::scoped_lock lock(mutex_);
-    found_again_ = std::move(found);
+    predicted_recall_ = std::move(found);
   });
 }
 
@@ -50,7 +50,7 @@ void MapPanel::Draw(const ShownFrame& frame, int width_px, int height_px) {
   Predict(map, frame.tracked.map_key);
   const ui::Orbit orbit = ui::OrbitAbove(*map, static_cast<double>(width_px) / height_px);
   const std::scoped_lock lock(mutex_);
-  view_->Draw(*map, frame.shown.scene.get(), orbit, frame.shown.map_name, found_again_);
+  view_->Draw(*map, frame.shown.scene.get(), orbit, frame.shown.map_name, predicted_recall_);
 }
 
 void MapPanel::Present(int width_px, int height_px) {

@@ -16,8 +16,8 @@ namespace docent::app {
 // The cells of a map's grid of predicted relocalization, ready to be drawn: see maps/relocalization_check.h.
 // Every keyframe costs a search, a map a second or more. `stop` may be asked for meanwhile: the answer is
 // then of the keyframes that were tried. The map has full features.
-std::vector<ui::FoundAgain> PredictFoundAgain(const engine::MapSnapshot& map,
-                                              const std::stop_token& stop = {});
+std::vector<ui::PredictedRecall> PredictRecall(const engine::MapSnapshot& map,
+                                               const std::stop_token& stop = {});
 
 // The author's other view: the map about the camera from above, with its content and colours that say where a
 // visitor who is lost will be found again. The colours come a moment later than the map, from a thread of
@@ -37,7 +37,7 @@ class MapPanel {
   std::uint64_t predicted_key_ = 0;
   std::size_t predicted_keyframes_ = 0;
   std::mutex mutex_;  // guards the colours
-  std::vector<ui::FoundAgain> found_again_;
+  std::vector<ui::PredictedRecall> predicted_recall_;
   std::optional<Worker> worker_;  // last: it uses the rest
 };
 

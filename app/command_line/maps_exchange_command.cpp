@@ -22,8 +22,8 @@
 #include "maps/colmap_model.h"
 #include "maps/exchange.h"
 #include "maps/joining.h"
+#include "maps/maintenance.h"
 #include "maps/recovery.h"
-#include "maps/upkeep.h"
 #include "maps/view_from_above.h"
 
 namespace docent::app {
@@ -44,9 +44,9 @@ void WriteText(const fs::path& path, std::string_view text) {
   file.Close();
 }
 
-void WritePng(const fs::path& path, const cv::Mat& picture) {
+void WritePng(const fs::path& path, const cv::Mat& image) {
   std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", picture, bytes)) throw Error(path.string() + " cannot be written as PNG");
+  if (!cv::imencode(".png", image, bytes)) throw Error(path.string() + " cannot be written as PNG");
   WriteText(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -59,7 +59,7 @@ void WriteColmap(const fs::path& folder, const engine::MapSnapshot& map) {
   WriteText(unfinished / "cameras.txt", model.cameras);
   WriteText(unfinished / "images.txt", model.images);
   WriteText(unfinished / "points3D.txt", model.points3d);
-  for (const auto& [name, keyframe] : model.picture_of)
+  for (const auto& [name, keyframe] : model.image_of)
     WritePng(unfinished / "images" / name, map.FindKeyFrame(keyframe)->features->levels[0]);
   std::error_code error;
   fs::rename(unfinished, folder, error);
@@ -245,7 +245,7 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
   command
       ->add_option(
           "--output", options->output,
-          "A .docent library, a .ply cloud, a .png picture from above, or a folder for COLMAP's text model")
+          "A .docent library, a .ply cloud, a .png image from above, or a folder for COLMAP's text model")
       ->required();
   add("import", "Add the maps of another library; names that are taken get a number",
       "docent maps import desk.docent --library museum.docent", Import)

@@ -21,7 +21,7 @@ enum class Verbosity { kQuiet, kNormal, kVerbose };
 enum class Pace {
   kLockstep,  // tracker and mapper in turn on one thread: equal to the byte between runs
   kEager,     // threaded, drops nothing
-  kRealtime,  // by the pictures' own times; drops those that come too late
+  kRealtime,  // by the images' own times; drops those that come too late
 };
 enum class EngineKind {
   kHybrid,  // with panorama maps
@@ -39,7 +39,7 @@ struct CameraArguments {
   std::vector<std::string> sources;                 // one or two
   std::vector<std::filesystem::path> calibrations;  // for the first sources; the others' are found
   CameraOptions options;                            // device format; `seed` is RunArguments::seed
-  Timestamp from{}, until{};                        // part of the source, from its first picture; 0: no bound
+  Timestamp from{}, until{};                        // part of the source, from its first image; 0: no bound
 };
 
 // What every subcommand that tracks takes.
@@ -59,7 +59,7 @@ struct RunArguments {
 struct AuthorOptions {
   RunArguments run;
   std::filesystem::path library;
-  std::optional<std::filesystem::path> target;  // a printed picture that new maps start from
+  std::optional<std::filesystem::path> target;  // a printed image that new maps start from
   double target_width_m = 0;
   std::optional<std::filesystem::path> script, record_script;
   Timestamp autosave_interval = std::chrono::seconds(10);  // 0: at each change of map alone
@@ -77,7 +77,8 @@ struct EvaluateOptions {
   std::vector<std::filesystem::path> calibrations;  // for the first sequences; the others' are found
   Pace pace = Pace::kEager;
   EngineKind engine = EngineKind::kHybrid;
-  bool turn_about_camera = false;  // as in hybrid-slam: no TurnCenter, and no question whether it is a turn
+  bool turn_about_camera =
+      false;  // as in hybrid-slam: no RotationCenter, and no question whether it is a turn
   bool leave_loops_open = false;
   WhenLost when_lost = WhenLost::kNew;
   bool compare = false;                  // run the other engine too

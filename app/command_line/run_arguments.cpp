@@ -55,7 +55,7 @@ void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* t
 }
 
 void AddPaceOption(CLI::App* command, std::optional<Pace>* pace) {
-  AddChoice<Pace>(command, "--pace", pace, "How pictures are fed",
+  AddChoice<Pace>(command, "--pace", pace, "How images are fed",
                   {{"lockstep", Pace::kLockstep}, {"eager", Pace::kEager}, {"realtime", Pace::kRealtime}});
 }
 
@@ -128,8 +128,8 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
       ->type_name("FILE")
       ->allow_extra_args(false);
   AddCameraFormatOption(command, &run->cameras.options);
-  AddSecondsOption(command, "--from", &run->cameras.from, "Begin so long after the first picture");
-  AddSecondsOption(command, "--until", &run->cameras.until, "End so long after the first picture");
+  AddSecondsOption(command, "--from", &run->cameras.from, "Begin so long after the first image");
+  AddSecondsOption(command, "--until", &run->cameras.until, "End so long after the first image");
   AddPaceOption(command, &run->pace);
   AddEngineOption(command, &run->engine);
   AddSeedOption(command, &run->seed);

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
-#include "app/cameras/decode_picture.h"
+#include "app/cameras/decode_image.h"
 #include "app/command_line/run_guide.h"
 #include "app/command_line/runs.h"
 #include "app/script/script_file.h"
@@ -34,10 +34,10 @@ void TakeOver(const RunArguments& run, bool any_live, GuideRequest* request) {
 
 std::shared_ptr<const engine::PlanarTarget> ReadTarget(const std::filesystem::path& path, double width_m) {
   std::vector<std::uint8_t> bytes;
-  cv::Mat picture = ReadPicture(path, &bytes);
-  if (picture.channels() == 3) cv::cvtColor(picture, picture, cv::COLOR_BGR2GRAY);
+  cv::Mat image = ReadImage(path, &bytes);
+  if (image.channels() == 3) cv::cvtColor(image, image, cv::COLOR_BGR2GRAY);
   try {
-    return std::make_shared<engine::PlanarTarget>(picture, width_m);
+    return std::make_shared<engine::PlanarTarget>(image, width_m);
   } catch (const Error& error) {
     throw Error("'" + path.string() + "': " + error.what());
   }

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kEnoughViews = 40;  // of a live camera without a window
 
-// Looks for the board in one picture after the other and keeps the views that are new.
+// Appearance for the board in one image after the other and keeps the views that are new.
 class ViewCollector {
  public:
   ViewCollector(const CalibrateOptions& options, const BoardSpec& board, FrameSource* source)
@@ -27,16 +27,16 @@ class ViewCollector {
   void Run(Progress* progress) {
     engine::Frame frame;
     while (!Interruption::requested() && source_->Next(&frame)) {
-      if (frame.picture.empty()) {
+      if (frame.image.empty()) {
         shown_.message = source_->trouble();
         if (!Present()) return;
         continue;
       }
-      shown_.picture = frame.picture;
+      shown_.image = frame.image;
       CheckSize();
-      progress->Update(++pictures_);
+      progress->Update(++images_);
       const BoardView before = std::exchange(
-          shown_.now, detector_.Detect(shown_.picture, options_.headless || !source_->info().live));
+          shown_.now, detector_.Detect(shown_.image, options_.headless || !source_->info().live));
       if (!shown_.now.pixels.empty() && IsStill(before) && IsNewView(shown_.now, shown_.kept, size_.width))
         Keep();
       shown_.message = Message();
@@ -47,20 +47,20 @@ class ViewCollector {
 
   const std::vector<BoardView>& views() const { return shown_.kept; }
   cv::Size size() const { return size_; }
-  std::uint64_t pictures() const { return pictures_; }
+  std::uint64_t images() const { return images_; }
 
  private:
   void CheckSize() {
     if (!coverage_) {
-      size_ = shown_.picture.size();
+      size_ = shown_.image.size();
       coverage_.emplace(size_.width, size_.height);
     }
-    if (shown_.picture.size() == size_) return;
-    throw Error("The pictures of '" + source_->info().name +
+    if (shown_.image.size() == size_) return;
+    throw Error("The images of '" + source_->info().name +
                 "' are not all of one size; a calibration is for one.");
   }
   // A live board must be held still for a moment: motion blurs its corners, and a rolling shutter bends them.
-  // Recorded pictures are taken as they are.
+  // Recorded images are taken as they are.
   bool IsStill(const BoardView& before) const {
     constexpr double kOfWidth = 0.003;
     return !source_->info().live || Movement(before, shown_.now) < kOfWidth * size_.width;
@@ -86,7 +86,7 @@ class ViewCollector {
     return text + "; that is enough, press enter";
   }
   bool Present() {
-    if (options_.headless || shown_.picture.empty()) return true;
+    if (options_.headless || shown_.image.empty()) return true;
     if (!window_) window_.emplace(size_.width, size_.height);
     return window_->Show(shown_, *coverage_);
   }
@@ -99,7 +99,7 @@ class ViewCollector {
   CalibrationWindow::Shown shown_;
   std::optional<LensSolution> solution_;
   cv::Size size_;
-  std::uint64_t pictures_ = 0;
+  std::uint64_t images_ = 0;
 };
 
 }  // namespace
@@ -131,8 +131,8 @@ void RunCalibrate(const CalibrateOptions& options, Verbosity verbosity) {
   file.Write(FormatCalibration(calibration, board));
   file.Close();
   if (verbosity == Verbosity::kQuiet) return;
-  std::printf("%zu of %zu views from %llu pictures, %.3f px\n%s\n", calibration.views_used,
-              calibration.views_found, static_cast<unsigned long long>(collector.pictures()),
+  std::printf("%zu of %zu views from %llu images, %.3f px\n%s\n", calibration.views_used,
+              calibration.views_found, static_cast<unsigned long long>(collector.images()),
               calibration.rms_px, calibration.verdict.c_str());
 }
 

@@ -47,8 +47,8 @@ void WriteModel(const fs::path& path) {
   file.Close();
 }
 
-void WritePicture(const fs::path& path, const cv::Mat& picture) {
-  if (!cv::imwrite(path.string(), picture)) throw Error("Cannot write '" + path.string() + "'.");
+void WriteImage(const fs::path& path, const cv::Mat& image) {
+  if (!cv::imwrite(path.string(), image)) throw Error("Cannot write '" + path.string() + "'.");
 }
 
 // "Bay 3" in a file's name.
@@ -107,22 +107,22 @@ GuideRequest CommonRequest(const DemoOptions& options, maps::Library* library, c
   GuideRequest request;
   request.library = library;
   request.headless = options.headless;
-  // Without a window nobody waits for the pictures' own time, and lockstep shows the same on every machine.
+  // Without a window nobody waits for the images' own time, and lockstep shows the same on every machine.
   request.pace = options.headless ? Pace::kLockstep : Pace::kRealtime;
   request.seed = options.seed;
   request.output = output;
   return request;
 }
 
-// One picture of the tour for each map: the frame in which it has been seen for a second.
-class TourPictures {
+// One image of the tour for each map: the frame in which it has been seen for a second.
+class TourImages {
  public:
-  explicit TourPictures(fs::path folder) : folder_(std::move(folder)) {}
-  void Add(const ShownFrame& frame, const cv::Mat& picture) {
+  explicit TourImages(fs::path folder) : folder_(std::move(folder)) {}
+  void Add(const ShownFrame& frame, const cv::Mat& image) {
     if (!engine::HasPose(frame.tracked.state)) return;
     constexpr int kFrames = 30;
     if (++seen_[frame.shown.map_name] != kFrames) return;
-    WritePicture(folder_ / ("tour-" + FileName(frame.shown.map_name) + ".png"), picture);
+    WriteImage(folder_ / ("tour-" + FileName(frame.shown.map_name) + ".png"), image);
   }
 
  private:
@@ -133,13 +133,13 @@ class TourPictures {
 void DrawMaps(const std::vector<Session::MapState>& maps, const fs::path& folder) {
   ui::OffscreenContext context;
   ui::MapView view;
-  cv::Mat picture;
+  cv::Mat image;
   for (const Session::MapState& map : maps) {
     if (map.discarded || !map.snapshot) continue;
     view.Draw(*map.snapshot, map.scene.get(), ui::OrbitAbove(*map.snapshot), map.name,
-              PredictFoundAgain(*map.snapshot));
-    view.ReadBack(&picture);
-    WritePicture(folder / ("map-" + FileName(map.name) + ".png"), picture);
+              PredictRecall(*map.snapshot));
+    view.ReadBack(&image);
+    WriteImage(folder / ("map-" + FileName(map.name) + ".png"), image);
   }
 }
 
@@ -188,11 +188,9 @@ void RunDemo(const DemoOptions& options, Verbosity verbosity) {
     GuideRequest request = CommonRequest(options, &library, folder / "tour");
     request.title = "Docent demonstration - the tour";
     request.record = options.record ? *options.record : folder / "tour.mp4";
-    TourPictures pictures(folder);
+    TourImages images(folder);
     request.on_frame = [&](const ShownFrame& frame) { check.Add(frame); };
-    request.on_picture = [&](const ShownFrame& frame, const cv::Mat& picture) {
-      pictures.Add(frame, picture);
-    };
+    request.on_image = [&](const ShownFrame& frame, const cv::Mat& image) { images.Add(frame, image); };
     tour.Run(std::move(request), verbosity);
   }
   DrawMaps(tour.maps(), folder);

@@ -19,7 +19,7 @@ namespace docent::app {
 
 namespace {
 
-// Draws without a window, for a video or for whoever wants pictures.
+// Draws without a window, for a video or for whoever wants images.
 class OffscreenView {
  public:
   OffscreenView(const GuideRequest& request, double frames_per_second) : request_(request) {
@@ -35,9 +35,9 @@ class OffscreenView {
     ui::View view = ViewOf(frame, camera);
     if (other != nullptr) view.overlay.inset = &other->tracked;
     renderer_.Draw(view);
-    renderer_.ReadBack(&picture_);
-    if (recorder_) recorder_->Write(picture_, frame.tracked.frame.index);
-    if (request_.on_picture) request_.on_picture(frame, picture_);
+    renderer_.ReadBack(&image_);
+    if (recorder_) recorder_->Write(image_, frame.tracked.frame.index);
+    if (request_.on_image) request_.on_image(frame, image_);
     return true;
   }
   void Close() {
@@ -50,12 +50,12 @@ class OffscreenView {
   ui::Renderer renderer_;
   std::optional<ViewRecorder> recorder_;
   std::optional<std::uint64_t> last_index_;
-  cv::Mat picture_;
+  cv::Mat image_;
 };
 
 // What a live camera lost on the way, for events.csv.
 std::string InWords(const SourceInfo& info, const Delivery& delivery) {
-  return info.name + ": " + std::to_string(delivery.delivered) + " pictures, " +
+  return info.name + ": " + std::to_string(delivery.delivered) + " images, " +
          std::to_string(delivery.missed) + " missed by the device, " + std::to_string(delivery.late) +
          " overtaken, " + std::to_string(delivery.broken) + " broken, " +
          std::to_string(delivery.reconnections) + " reconnections, latency " +
@@ -141,7 +141,7 @@ class GuideRun {
   // What is known of one camera, on its own thread.
   struct Watched {
     std::optional<Timestamp> first_time;
-    std::optional<Timestamp> age;  // of the picture that was tracked last, by then
+    std::optional<Timestamp> age;  // of the image that was tracked last, by then
     std::string message;
     std::shared_ptr<const ShownFrame> last;
   };
@@ -186,7 +186,7 @@ class GuideRun {
         files_->Add({Event{time, "camera", sentence.empty() ? "back again" : sentence}});
       }
       if (!watched.last) return;
-      // There is no new picture to say it in: the last one comes again.
+      // There is no new image to say it in: the last one comes again.
       auto frame = std::make_shared<ShownFrame>(*watched.last);
       frame->message = sentence;
       show(std::move(frame));
@@ -246,7 +246,7 @@ void RunHeadless(const GuideRequest& request, std::span<CalibratedCamera> camera
                  Verbosity verbosity) {
   const SourceInfo& info = cameras.front().source->info();
   std::optional<OffscreenView> view;
-  if (request.record || request.on_picture) view.emplace(request, info.nominal_fps);
+  if (request.record || request.on_image) view.emplace(request, info.nominal_fps);
   Progress progress(info.name, info.frame_count, verbosity);
   std::uint64_t count = 0;
   std::mutex other_mutex;

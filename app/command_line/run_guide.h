@@ -48,9 +48,9 @@ struct GuideRequest {
   std::optional<HeadPolicy> head;
   // Told of every frame on its camera's thread, one at a time; may be empty.
   std::function<void(const ShownFrame&)> on_frame;
-  // Told of every drawn frame with its picture, on the thread that draws; may be empty. Without a window
+  // Told of every drawn frame with its image, on the thread that draws; may be empty. Without a window
   // frames are drawn only for this and for `record`.
-  std::function<void(const ShownFrame&, const cv::Mat&)> on_picture;
+  std::function<void(const ShownFrame&, const cv::Mat&)> on_image;
 };
 
 // Runs until the first camera ends, the window is closed, or the person interrupts; saves and closes

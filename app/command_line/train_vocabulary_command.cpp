@@ -23,13 +23,13 @@ using Descriptors = std::vector<engine::Descriptor>;
 
 struct TrainingOptions {
   std::filesystem::path folder, output;
-  int pictures = 60;  // of each sequence and each simulated scene
+  int images = 60;  // of each sequence and each simulated scene
   std::uint64_t seed = 1;
 };
 
-void AddPicture(const cv::Mat& picture, Descriptors* descriptors) {
-  cv::Mat gray = picture;
-  if (picture.channels() == 3) cv::cvtColor(picture, gray, cv::COLOR_BGR2GRAY);
+void AddImage(const cv::Mat& image, Descriptors* descriptors) {
+  cv::Mat gray = image;
+  if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
   if (gray.cols < 64 || gray.rows < 64) return;  // nothing that features can be extracted from
   for (const engine::DescribedPlace& place : engine::DescribeCorners(*engine::MakeFeatures(gray)))
     descriptors->push_back(place.oriented.descriptor);
@@ -47,22 +47,22 @@ std::vector<std::filesystem::path> FindSequences(const std::filesystem::path& fo
   if (error) throw Error("Cannot look into the folder '" + folder.string() + "': " + error.message() + ".");
   if (sequences.empty())
     throw Error("There is no sequence in '" + folder.string() +
-                "'; one is a folder with rgb.txt, mav0/cam0, video.mp4 or numbered pictures.");
+                "'; one is a folder with rgb.txt, mav0/cam0, video.mp4 or numbered images.");
   std::sort(sequences.begin(), sequences.end());
   return sequences;
 }
 
-// Every so many pictures of a sequence, from the first one on.
-void AddSequence(const std::filesystem::path& folder, int pictures, Descriptors* descriptors) {
+// Every so many images of a sequence, from the first one on.
+void AddSequence(const std::filesystem::path& folder, int images, Descriptors* descriptors) {
   const auto source = OpenFolder(folder);
   constexpr std::uint64_t kUnknownLength = 1000;
   const std::uint64_t step = std::max<std::uint64_t>(
-      1, source->info().frame_count.value_or(kUnknownLength) / static_cast<std::uint64_t>(pictures));
+      1, source->info().frame_count.value_or(kUnknownLength) / static_cast<std::uint64_t>(images));
   engine::Frame frame;
   int taken = 0;
-  for (std::uint64_t index = 0; taken < pictures && source->Next(&frame); ++index) {
+  for (std::uint64_t index = 0; taken < images && source->Next(&frame); ++index) {
     if (index % step != 0) continue;
-    AddPicture(frame.picture, descriptors);
+    AddImage(frame.image, descriptors);
     ++taken;
   }
 }
@@ -71,11 +71,11 @@ void AddScene(const char* scene, const TrainingOptions& options, Descriptors* de
   SimulationOptions simulated;
   simulated.seed = options.seed;
   const auto simulation = MakeSimulation(scene, simulated);
-  const int step = std::max(1, simulation->frame_count() / options.pictures);
-  for (int taken = 0; taken < options.pictures && taken * step < simulation->frame_count(); ++taken) {
-    cv::Mat picture;
-    simulation->Render(taken * step, &picture);
-    AddPicture(picture, descriptors);
+  const int step = std::max(1, simulation->frame_count() / options.images);
+  for (int taken = 0; taken < options.images && taken * step < simulation->frame_count(); ++taken) {
+    cv::Mat image;
+    simulation->Render(taken * step, &image);
+    AddImage(image, descriptors);
   }
 }
 
@@ -88,7 +88,7 @@ void Train(const TrainingOptions& options, Verbosity verbosity) {
     std::uint64_t done = 0;
     progress.Update(done);
     for (const std::filesystem::path& sequence : sequences) {
-      AddSequence(sequence, options.pictures, &descriptors);
+      AddSequence(sequence, options.images, &descriptors);
       progress.Update(++done);
     }
     for (const SceneRecipe& scene : scenes) {
@@ -116,14 +116,14 @@ void Train(const TrainingOptions& options, Verbosity verbosity) {
 void AddTrainVocabularyCommand(CLI::App* program, Invocation* invocation) {
   CLI::App* command = AddSubcommand(
       program, "train-vocabulary",
-      "Train the tree of descriptors by which places are recognised, from pictures of the sequences in a\n"
+      "Train the tree of descriptors by which places are recognised, from images of the sequences in a\n"
       "folder and of all simulated scenes. The program carries one; a new one takes effect when it is built\n"
       "in as engine/recognition/vocabulary.bin.",
       "docent train-vocabulary sequences --output vocabulary.bin");
   const auto options = std::make_shared<TrainingOptions>();
   command->add_option("DIR", options->folder, "A sequence, or a folder of sequences")->required();
   command->add_option("--output", options->output, "File to write")->required();
-  command->add_option("--pictures", options->pictures, "Pictures taken of each sequence and scene")
+  command->add_option("--images", options->images, "Images taken of each sequence and scene")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   AddSeedOption(command, &options->seed);

@@ -69,21 +69,21 @@ Mesh MakeObelisk() {
 
 // From top to bottom: gold for the tip, red and white bands, dark stone for the pedestal.
 std::vector<std::uint8_t> PaintTexture() {
-  cv::Mat picture(256, 64, CV_8UC3);
-  for (int y = 0; y < picture.rows; ++y) {
+  cv::Mat image(256, 64, CV_8UC3);
+  for (int y = 0; y < image.rows; ++y) {
     cv::Scalar color(60, 190, 235);
     if (y >= 205) {
       color = cv::Scalar(95, 85, 80);
     } else if (y >= 48) {
       color = (y - 48) / 20 % 2 == 0 ? cv::Scalar(55, 60, 200) : cv::Scalar(235, 240, 240);
     }
-    picture.row(y).setTo(color);
+    image.row(y).setTo(color);
   }
   for (int y = 16; y < 256; y += 32) {
-    cv::line(picture, {0, y}, {63, y}, cv::Scalar(70, 70, 70), 1);
+    cv::line(image, {0, y}, {63, y}, cv::Scalar(70, 70, 70), 1);
   }
   std::vector<std::uint8_t> png;
-  cv::imencode(".png", picture, png);
+  cv::imencode(".png", image, png);
   return png;
 }
 
@@ -143,7 +143,7 @@ std::vector<std::uint8_t> MakeExhibitGlb() {
   const int normals = builder.AddView(mesh.normals, kArrayBuffer);
   const int texture = builder.AddView(mesh.texture, kArrayBuffer);
   const int indices = builder.AddView(mesh.indices, kElementArrayBuffer);
-  const int picture = builder.AddView(PaintTexture(), 0);
+  const int image = builder.AddView(PaintTexture(), 0);
   const std::size_t count = mesh.positions.size();
   nlohmann::json json;
   json["asset"] = {{"version", "2.0"}, {"generator", "Docent"}};
@@ -158,7 +158,7 @@ std::vector<std::uint8_t> MakeExhibitGlb() {
       {{"pbrMetallicRoughness",
         {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0.0}, {"roughnessFactor", 0.7}}}}};
   json["textures"] = {{{"source", 0}}};
-  json["images"] = {{{"bufferView", picture}, {"mimeType", "image/png"}}};
+  json["images"] = {{{"bufferView", image}, {"mimeType", "image/png"}}};
   json["accessors"] = nlohmann::json::array();
   json["accessors"].push_back({{"bufferView", positions},
                                {"componentType", kFloat},

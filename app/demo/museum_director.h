@@ -51,7 +51,7 @@ class DrawingCheck {
 
   void Add(const ShownFrame& frame);
 
-  // Pixels from the truth, one a thing and frame in which both are in the picture.
+  // Pixels from the truth, one a thing and frame in which both are in the image.
   const std::vector<double>& errors_px() const { return errors_px_; }
   // Frames of `visitK` parts; those that named a map; and those that named K's.
   int visit_frames() const { return visit_frames_; }

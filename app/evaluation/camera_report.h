@@ -11,7 +11,7 @@
 #include "engine/base/time.h"
 #include "engine/tracking/tracked_frame.h"
 
-// What authoring and touring tell of each camera in report.json: frames, and how long its pictures took.
+// What authoring and touring tell of each camera in report.json: frames, and how long its images took.
 namespace docent::app {
 
 // Counts one camera's frames. One thread at a time.
@@ -21,11 +21,11 @@ class CameraTally {
 
   // Every frame that is handed on, dropped ones too.
   void Add(const engine::TrackedFrame& frame);
-  // How old a picture was when it was tracked, and when it was drawn. Not known of recordings that are played
+  // How old an image was when it was tracked, and when it was drawn. Not known of recordings that are played
   // faster or slower than they were taken.
   void AddTrackedAge(Timestamp age) { tracked_ages_ms_.push_back(Milliseconds(age)); }
   void AddDrawnAge(Timestamp age) { drawn_ages_ms_.push_back(Milliseconds(age)); }
-  // What a device says of its pictures' way, at the end.
+  // What a device says of its images' way, at the end.
   void SetDelivery(const Delivery& delivery) { delivery_ = delivery; }
 
  private:

@@ -17,7 +17,7 @@
 // Each map has a frame and a scale of its own, so poses are compared map by map: the similarity
 // truth_from_map of least squares over its camera centres (Umeyama 1991), then the root mean square of what
 // remains. The figures of the whole sequence are those of the largest map, the one with most tracked frames.
-// A map that holds directions alone, as one does from its first picture until its camera has moved, says
+// A map that holds directions alone, as one does from its first image until its camera has moved, says
 // which way the camera looks and nothing of where it is: its frames are tracked and have a rotation, but they
 // have no part in the alignment and the error of positions.
 namespace docent::app {

@@ -10,7 +10,7 @@
 
 namespace docent::app {
 
-// A stitched panorama (see PanoramaPicture) as the report shows it.
+// A stitched panorama (see PanoramaImage) as the report shows it.
 struct ShownPanorama {
   std::string caption;
   std::vector<std::uint8_t> png;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "app/evaluation/panorama_picture.h"
+#include "app/evaluation/panorama_image.h"
 #include "app/files/checked_file.h"
 #include "engine/map/point_uncertainty.h"
 
@@ -113,12 +113,12 @@ Json Describe(std::size_t number, const engine::TrackedFrame& frame,
   return json;
 }
 
-cv::Mat InColor(const cv::Mat& picture) {
+cv::Mat InColor(const cv::Mat& image) {
   cv::Mat color;
-  if (picture.channels() == 1) {
-    cv::cvtColor(picture, color, cv::COLOR_GRAY2BGR);
+  if (image.channels() == 1) {
+    cv::cvtColor(image, color, cv::COLOR_GRAY2BGR);
   } else {
-    color = picture.clone();
+    color = image.clone();
   }
   return color;
 }
@@ -129,12 +129,12 @@ cv::Point Place(const Eigen::Vector2d& pixel) {
 }
 
 void DrawLine(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const cv::Scalar& color,
-              cv::Mat* picture) {
-  cv::line(*picture, Place(from), Place(to), color, 1, cv::LINE_AA, kSubpixelBits);
+              cv::Mat* image) {
+  cv::line(*image, Place(from), Place(to), color, 1, cv::LINE_AA, kSubpixelBits);
 }
 
-void DrawCircle(const Eigen::Vector2d& pixel, double radius_px, const cv::Scalar& color, cv::Mat* picture) {
-  cv::circle(*picture, Place(pixel), cvRound(radius_px * (1 << kSubpixelBits)), color, 1, cv::LINE_AA,
+void DrawCircle(const Eigen::Vector2d& pixel, double radius_px, const cv::Scalar& color, cv::Mat* image) {
+  cv::circle(*image, Place(pixel), cvRound(radius_px * (1 << kSubpixelBits)), color, 1, cv::LINE_AA,
              kSubpixelBits);
 }
 
@@ -144,8 +144,8 @@ cv::Scalar ColorOf(const engine::InspectedPoint& point) {
   return point.infinite ? kBlue : kGreen;
 }
 
-cv::Mat DrawPoints(const cv::Mat& picture, const engine::FrameInspection& inspection) {
-  cv::Mat drawn = InColor(picture);
+cv::Mat DrawPoints(const cv::Mat& image, const engine::FrameInspection& inspection) {
+  cv::Mat drawn = InColor(image);
   for (const engine::InspectedPoint& point : inspection.points) {
     const Eigen::Vector2d& at = point.found ? *point.found : point.predicted;
     DrawCircle(at, 2.0 * (1 << point.level), ColorOf(point), &drawn);
@@ -154,8 +154,8 @@ cv::Mat DrawPoints(const cv::Mat& picture, const engine::FrameInspection& inspec
   return drawn;
 }
 
-cv::Mat DrawResiduals(const cv::Mat& picture, const engine::FrameInspection& inspection) {
-  cv::Mat drawn = InColor(picture);
+cv::Mat DrawResiduals(const cv::Mat& image, const engine::FrameInspection& inspection) {
+  cv::Mat drawn = InColor(image);
   for (const engine::InspectedPoint& point : inspection.points) {
     if (!point.found || !point.residual_px) continue;
     DrawCircle(*point.found, 1.5, ColorOf(point), &drawn);
@@ -169,14 +169,14 @@ cv::Mat DrawCorners(const engine::ImageFeatures& features) {
   cv::Mat drawn(whole.rows, whole.cols + features.levels[1].cols, CV_8UC3, cv::Scalar::all(0));
   cv::Point origin;
   for (std::size_t level = 0; level < engine::kPyramidLevels; ++level) {
-    const cv::Mat& picture = features.levels[level];
-    cv::Mat part = drawn(cv::Rect(origin, picture.size()));
-    cv::cvtColor(picture, part, cv::COLOR_GRAY2BGR);
+    const cv::Mat& image = features.levels[level];
+    cv::Mat part = drawn(cv::Rect(origin, image.size()));
+    cv::cvtColor(image, part, cv::COLOR_GRAY2BGR);
     for (const engine::Corner& corner : features.corners[level])
       part.at<cv::Vec3b>(corner.y, corner.x) =
           cv::Vec3b(static_cast<std::uint8_t>(kYellow[0]), static_cast<std::uint8_t>(kYellow[1]),
                     static_cast<std::uint8_t>(kYellow[2]));
-    origin = level == 0 ? cv::Point(whole.cols, 0) : origin + cv::Point(0, picture.rows);
+    origin = level == 0 ? cv::Point(whole.cols, 0) : origin + cv::Point(0, image.rows);
   }
   return drawn;
 }
@@ -187,8 +187,8 @@ void Write(const std::filesystem::path& path, const std::string& bytes) {
   file.Close();
 }
 
-void WritePicture(const std::filesystem::path& path, const cv::Mat& picture) {
-  const std::vector<std::uint8_t> png = EncodePng(picture);
+void WriteImage(const std::filesystem::path& path, const cv::Mat& image) {
+  const std::vector<std::uint8_t> png = EncodePng(image);
   Write(path, std::string(png.begin(), png.end()));
 }
 
@@ -198,10 +198,10 @@ void WriteFrameDump(const std::filesystem::path& folder, std::size_t number,
                     const engine::TrackedFrame& frame, const engine::FrameInspection& inspection) {
   const std::string name = "frame-" + std::to_string(number);
   Write(folder / (name + ".json"), Describe(number, frame, inspection).dump(2) + "\n");
-  if (frame.state == engine::TrackingState::kDropped || frame.frame.picture.empty()) return;
-  WritePicture(folder / (name + "-points.png"), DrawPoints(frame.frame.picture, inspection));
-  WritePicture(folder / (name + "-residuals.png"), DrawResiduals(frame.frame.picture, inspection));
-  if (inspection.features) WritePicture(folder / (name + "-corners.png"), DrawCorners(*inspection.features));
+  if (frame.state == engine::TrackingState::kDropped || frame.frame.image.empty()) return;
+  WriteImage(folder / (name + "-points.png"), DrawPoints(frame.frame.image, inspection));
+  WriteImage(folder / (name + "-residuals.png"), DrawResiduals(frame.frame.image, inspection));
+  if (inspection.features) WriteImage(folder / (name + "-corners.png"), DrawCorners(*inspection.features));
 }
 
 }  // namespace docent::app

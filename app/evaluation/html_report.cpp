@@ -115,7 +115,7 @@ std::string Base64(const std::vector<std::uint8_t>& bytes) {
   return text;
 }
 
-std::string PanoramaPictures(const EvaluatedRun& run) {
+std::string PanoramaImages(const EvaluatedRun& run) {
   if (run.panoramas.empty()) return {};
   std::string html = "<h3>Panorama maps</h3>\n";
   for (const ShownPanorama& panorama : run.panoramas) {
@@ -164,7 +164,7 @@ std::string Figures(const EvaluatedRun& run) {
                      SideBySide(run, with_ranges(TrackingTimePlot));
   if (!run.truth.empty()) html += SideBySide(run, AlignedTrajectoryPlot) + SideBySide(run, ErrorPlots);
   return html + SideBySide(run, of_map(PointViewPlot)) + SideBySide(run, of_map(PlaceViewPlot)) +
-         SideBySide(run, PanoramaPictures);
+         SideBySide(run, PanoramaImages);
 }
 
 std::string Tables(const EvaluatedRun& run) {

@@ -152,7 +152,7 @@ MappingTimes MakeMappingTimes(const engine::MapperTimes& times) {
           times.infinite_triangulation,
           times.loop_closing,
           times.other,
-          times.longest_hold,
+          times.max_queue_latency,
           times.loops_closed};
 }
 

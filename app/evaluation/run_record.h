@@ -10,7 +10,7 @@
 #include "engine/mapping/mapper.h"
 #include "engine/tracking/tracked_frame.h"
 
-// What a run leaves for its evaluation: plain numbers, no pictures and no maps, so that it can be kept whole
+// What a run leaves for its evaluation: plain numbers, no images and no maps, so that it can be kept whole
 // and made up by tests.
 namespace docent::app {
 
@@ -34,7 +34,7 @@ struct MappingTimes {
   int loops_closed = 0;
 };
 
-// One picture of one camera.
+// One image of one camera.
 struct FrameRecord {
   Timestamp time{};
   engine::TrackingState state = engine::TrackingState::kInitializing;
@@ -72,7 +72,8 @@ inline bool InMapOfDirections(const FrameRecord& frame) {
   return frame.map_points.infinite > 0 && frame.map_points.finite == 0;
 }
 
-// How far points were found outside of where they were expected, in a ring of the picture; see LensWatch.
+// How far points were found outside of where they were expected, in a ring of the image; see
+// CalibrationMonitor.
 struct LensRing {
   std::size_t samples = 0;
   double mean_px = 0, sigma_px = 0;
@@ -107,7 +108,7 @@ struct RunRecord {
   double wall_s = 0;
   double peak_memory_mb = 0;
   std::vector<StartRecord> starts = {};   // one for each map that had depth, by frame
-  std::vector<LensRing> lens_rings = {};  // what tracking left over, from the middle of the picture outwards
+  std::vector<LensRing> lens_rings = {};  // what tracking left over, from the middle of the image outwards
 };
 
 // Fills frames and maps from what the session delivers. One thread.

@@ -47,7 +47,7 @@ std::vector<SvgPlot::Point> Thin(const std::vector<SvgPlot::Point>& points, std:
 
 }  // namespace
 
-// The data's range and where it lies in the picture.
+// The data's range and where it lies in the image.
 struct SvgPlot::Frame {
   double x_low = 0, x_high = 1, y_low = 0, y_high = 1;
   double bottom_px = 0;

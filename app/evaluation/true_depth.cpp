@@ -32,23 +32,23 @@ std::optional<Eigen::Vector2d> RayOf(const engine::CameraModel& model, const cv:
   return ray->hnormalized();
 }
 
-cv::Mat Grey(const cv::Mat& picture) {
-  if (picture.channels() == 1) return picture;
+cv::Mat Grey(const cv::Mat& image) {
+  if (image.channels() == 1) return image;
   cv::Mat grey;
-  cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
   return grey;
 }
 
 // Follows pixels from image to image.
 class Flow {
  public:
-  Flow(const cv::Mat& picture, const std::vector<Eigen::Vector2f>& pixels)
-      : before_(Grey(picture)), alive_(pixels.size(), true) {
+  Flow(const cv::Mat& image, const std::vector<Eigen::Vector2f>& pixels)
+      : before_(Grey(image)), alive_(pixels.size(), true) {
     for (const Eigen::Vector2f& pixel : pixels) at_.emplace_back(pixel.x(), pixel.y());
   }
 
-  void Follow(const cv::Mat& picture) {
-    cv::Mat now = Grey(picture);
+  void Follow(const cv::Mat& image) {
+    cv::Mat now = Grey(image);
     std::vector<cv::Point2f> found;
     std::vector<unsigned char> status;
     std::vector<float> error;
@@ -236,12 +236,12 @@ TrueDepths FollowTrueDepths(CalibratedCamera* camera, const std::vector<TimedPos
   const auto first_pose = InterpolatePose(truth, frame.time, options.max_time_difference);
   if (!first_pose) return TrueDepths(pixels.size());
   const Timestamp begin = frame.time;
-  Flow flow(frame.picture, pixels);
+  Flow flow(frame.image, pixels);
   std::vector<std::optional<Eigen::Vector2d>> first;
   for (std::size_t i = 0; i < pixels.size(); ++i) first.push_back(RayOf(*camera->model, flow.at(i)));
   std::vector<FollowedImage> images;
   while (camera->source->Next(&frame) && frame.time - begin <= options.longest) {
-    flow.Follow(frame.picture);
+    flow.Follow(frame.image);
     if (flow.Kept() < options.least_kept) break;
     const auto pose = InterpolatePose(truth, frame.time, options.max_time_difference);
     if (!pose) continue;

@@ -17,7 +17,7 @@ namespace docent::app {
 
 // The whole file. Throws Error when it is missing, a folder, unreadable, or larger than max_bytes.
 std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{64} << 20);
-// The same into a buffer that is used again, for pictures.
+// The same into a buffer that is used again, for images.
 void ReadBytes(const std::filesystem::path& path, std::size_t max_bytes, std::vector<std::uint8_t>* bytes);
 
 // A line that says something: comments (from '#' on) and blanks around it are gone, empty lines left out.

@@ -7,12 +7,12 @@ namespace docent::app {
 
 void WorkingSet::Wake(const Member& member) {
   const std::scoped_lock lock(mutex_);
-  if (member.state_ != State::kResting) {
-    member.state_ = State::kLookedAt;
+  if (member.state_ != State::kEvicted) {
+    member.state_ = State::kInUse;
     return;
   }
   MakeRoomFor(member.bytes_);
-  member.state_ = State::kAwake;
+  member.state_ = State::kResident;
   awake_.push_back(&member);
   awake_bytes_ += member.bytes_;
 }
@@ -23,22 +23,22 @@ void WorkingSet::MakeRoomFor(std::size_t bytes) {
   while (!awake_.empty() && awake_bytes_ + bytes > limit_bytes_) {
     const Member& eldest = *awake_.front();
     awake_.pop_front();
-    State state = State::kLookedAt;
-    if (chances > 0 && eldest.state_.compare_exchange_strong(state, State::kAwake)) {
+    State state = State::kInUse;
+    if (chances > 0 && eldest.state_.compare_exchange_strong(state, State::kResident)) {
       --chances;
       awake_.push_back(&eldest);
       continue;
     }
-    eldest.state_ = State::kResting;
+    eldest.state_ = State::kEvicted;
     awake_bytes_ -= eldest.bytes_;
     eldest.Rest();
   }
 }
 
-void WorkingSet::RestAll() {
+void WorkingSet::EvictAll() {
   const std::scoped_lock lock(mutex_);
   for (const Member* member : awake_) {
-    member->state_ = State::kResting;
+    member->state_ = State::kEvicted;
     member->Rest();
   }
   awake_.clear();
@@ -47,7 +47,7 @@ void WorkingSet::RestAll() {
 
 void WorkingSet::Remove(const Member& member) {
   const std::scoped_lock lock(mutex_);
-  if (member.state_.exchange(State::kResting) == State::kResting) return;
+  if (member.state_.exchange(State::kEvicted) == State::kEvicted) return;
   awake_.erase(std::find(awake_.begin(), awake_.end(), &member));
   awake_bytes_ -= member.bytes_;
 }

@@ -30,16 +30,16 @@ class WorkingSet {
 
    private:
     friend class WorkingSet;
-    enum class State : std::uint8_t { kResting, kAwake, kLookedAt };
+    enum class State : std::uint8_t { kEvicted, kResident, kInUse };
     const std::size_t bytes_;
-    mutable std::atomic<State> state_{State::kResting};
+    mutable std::atomic<State> state_{State::kEvicted};
   };
 
   explicit WorkingSet(std::size_t limit_bytes) : limit_bytes_(limit_bytes) {}
 
   // One that is larger than the limit is awake alone.
   void Look(const Member& member);
-  void RestAll();
+  void EvictAll();
   void Remove(const Member& member);
   std::size_t awake_bytes() const;
 
@@ -56,8 +56,8 @@ class WorkingSet {
 
 inline void WorkingSet::Look(const Member& member) {
   State state = member.state_.load(std::memory_order_relaxed);
-  if (state == State::kLookedAt) return;
-  if (state == State::kAwake && member.state_.compare_exchange_strong(state, State::kLookedAt)) return;
+  if (state == State::kInUse) return;
+  if (state == State::kResident && member.state_.compare_exchange_strong(state, State::kInUse)) return;
   Wake(member);
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 std::filesystem::path MadeSequenceFolder(const std::filesystem::path& folder) {
   MakeFolder(folder / "rgb");
-  // What an earlier run left must not stand beside the new pictures.
+  // What an earlier run left must not stand beside the new images.
   for (const char* name : {"rgb.txt", "groundtruth.txt", "segments.txt"})
     std::filesystem::remove(folder / name);
   return folder;
@@ -23,7 +23,7 @@ std::filesystem::path MadeSequenceFolder(const std::filesystem::path& folder) {
 }  // namespace
 
 SequenceWriter::SequenceWriter(const std::filesystem::path& folder, const engine::CameraModel& camera,
-                               PictureFormat format)
+                               ImageFormat format)
     : folder_(MadeSequenceFolder(folder)),
       format_(format),
       list_(folder / "rgb.txt"),
@@ -35,30 +35,30 @@ SequenceWriter::SequenceWriter(const std::filesystem::path& folder, const engine
   segments_.Write("# timestamp label\n");
 }
 
-void SequenceWriter::Add(const SequencePicture& picture) {
-  const std::string time = FormatSeconds(picture.time);
-  const bool png = format_ == PictureFormat::kPng;
+void SequenceWriter::Add(const SequenceImage& image) {
+  const std::string time = FormatSeconds(image.time);
+  const bool png = format_ == ImageFormat::kPng;
   const std::string name = "rgb/" + time + (png ? ".png" : ".jpg");
   std::vector<std::uint8_t> bytes;
   // The lowest compression of PNG that still filters: noise does not compress, and higher levels cost
   // seconds.
   const std::vector<int> parameters =
       png ? std::vector<int>{cv::IMWRITE_PNG_COMPRESSION, 1} : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, 95};
-  if (!cv::imencode(png ? ".png" : ".jpg", picture.picture, bytes, parameters)) {
-    throw Error("Cannot encode the picture '" + name + "'.");
+  if (!cv::imencode(png ? ".png" : ".jpg", image.image, bytes, parameters)) {
+    throw Error("Cannot encode the image '" + name + "'.");
   }
   CheckedFile file(folder_ / name);
   file.Write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   file.Close();
   list_.Write(time + ' ' + name + '\n');
 
-  const Eigen::Vector3d& t = picture.truth_from_camera.translation;
-  const Eigen::Vector4d& q = picture.truth_from_camera.rotation.quaternion().coeffs();  // x y z w
+  const Eigen::Vector3d& t = image.truth_from_camera.translation;
+  const Eigen::Vector4d& q = image.truth_from_camera.rotation.quaternion().coeffs();  // x y z w
   std::string line = time;
   for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()})
     line += ' ' + FormatNumber(value, 12);
   truth_.Write(line + '\n');
-  if (!picture.label.empty()) segments_.Write(time + ' ' + picture.label + '\n');
+  if (!image.label.empty()) segments_.Write(time + ' ' + image.label + '\n');
 }
 
 void SequenceWriter::Close() {

@@ -13,12 +13,12 @@
 
 namespace docent::app {
 
-enum class PictureFormat { kPng, kJpeg };
+enum class ImageFormat { kPng, kJpeg };
 
-// One picture of a sequence with its truth.
-struct SequencePicture {
+// One image of a sequence with its truth.
+struct SequenceImage {
   Timestamp time{};
-  cv::Mat picture;  // CV_8UC3 (BGR) or CV_8UC1
+  cv::Mat image;  // CV_8UC3 (BGR) or CV_8UC1
   engine::Rigid3 truth_from_camera;
   std::string label;  // what the camera is doing; one word, or empty for none
 };
@@ -28,14 +28,13 @@ struct SequencePicture {
 // was never finished. One thread. Throws Error where a file cannot be written.
 class SequenceWriter {
  public:
-  SequenceWriter(const std::filesystem::path& folder, const engine::CameraModel& camera,
-                 PictureFormat format);
-  void Add(const SequencePicture& picture);
+  SequenceWriter(const std::filesystem::path& folder, const engine::CameraModel& camera, ImageFormat format);
+  void Add(const SequenceImage& image);
   void Close();
 
  private:
   std::filesystem::path folder_;
-  PictureFormat format_;
+  ImageFormat format_;
   CheckedFile list_, truth_, segments_;
 };
 

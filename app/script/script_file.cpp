@@ -54,7 +54,7 @@ class LineReader {
     Need("pixel");
     const double u = TakeNumber("a pixel's column");
     const double v = TakeNumber("a pixel's row");
-    if (std::abs(u) > kMaxPixel || std::abs(v) > kMaxPixel) Fail("the pixel lies far outside any picture");
+    if (std::abs(u) > kMaxPixel || std::abs(v) > kMaxPixel) Fail("the pixel lies far outside any image");
     return {u, v};
   }
   void NeedEnd() {

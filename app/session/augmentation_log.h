@@ -11,7 +11,7 @@
 namespace docent::app {
 
 // Writes where content was drawn: augmentations.csv, one line a frame and thing whose foot lies in the
-// picture, `timestamp,map,name,u,v` with the pixel of the foot. Against a truth it tells how well things stay
+// image, `timestamp,map,name,u,v` with the pixel of the foot. Against a truth it tells how well things stay
 // where they were put. One thread.
 class AugmentationLog {
  public:

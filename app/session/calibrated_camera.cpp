@@ -8,8 +8,8 @@
 
 namespace docent::app {
 
-void CalibratedCamera::CheckPicture(const cv::Mat& picture) const {
-  CheckPictureSize(*model, picture.cols, picture.rows, source->info().name, calibration_name);
+void CalibratedCamera::CheckImage(const cv::Mat& image) const {
+  CheckImageSize(*model, image.cols, image.rows, source->info().name, calibration_name);
 }
 
 CalibratedCamera Calibrate(std::unique_ptr<FrameSource> source,

@@ -17,7 +17,7 @@ namespace docent::app {
 //   - The first to be found again calls the others into its map; whoever is found elsewhere at the same
 //     moment is not believed.
 //
-// Knows nothing of pictures and keeps no lock: its owner guards it. Maps are named by their keys; 0 is none.
+// Knows nothing of images and keeps no lock: its owner guards it. Maps are named by their keys; 0 is none.
 class CameraAssociation {
  public:
   explicit CameraAssociation(std::size_t cameras) : tracked_(cameras, false) {}

@@ -8,7 +8,7 @@ namespace docent::app {
 
 namespace {
 
-// Enough that the noise of single points, which the next picture makes smaller, neither shifts nor tilts
+// Enough that the noise of single points, which the next image makes smaller, neither shifts nor tilts
 // what stands among them.
 constexpr std::size_t kPointsAbout = 150;
 // Of the distance to the points: below it nothing is seen to move.

@@ -17,29 +17,29 @@ namespace docent::app {
 
 namespace {
 
-// Plays pictures by their own times. Shared by the cameras of a session; any thread.
+// Plays images by their own times. Shared by the cameras of a session; any thread.
 class RealtimeClock {
  public:
   explicit RealtimeClock(PlayClock* clock) : clock_(clock) {}
-  // The present is the time of this picture. Before any other call.
+  // The present is the time of this image. Before any other call.
   void Start(Timestamp time) { start_ = clock_->Now() - time; }
-  // Waits until the picture is due.
+  // Waits until the image is due.
   void WaitFor(Timestamp time, const std::stop_token& stop) { clock_->WaitUntil(Due(time), stop); }
-  // Whether the picture's successor is due already.
+  // Whether the image's successor is due already.
   bool IsLate(Timestamp time, Timestamp period) { return clock_->Now() > Due(time) + period; }
   Timestamp Due(Timestamp time) const { return start_ + time; }
   Timestamp Now() { return clock_->Now(); }
 
  private:
   PlayClock* const clock_;
-  Timestamp start_{};  // when a picture of time 0 would have been due
+  Timestamp start_{};  // when an image of time 0 would have been due
 };
 
-// Holds cameras together that are fed as fast as they are tracked: none goes on to a picture that lies more
+// Holds cameras together that are fed as fast as they are tracked: none goes on to an image that lies more
 // than the slack after one that another camera has not finished. Any thread.
-class PictureGate {
+class ImageGate {
  public:
-  PictureGate(std::size_t cameras, Timestamp slack) : times_(cameras, Timestamp::min()), slack_(slack) {}
+  ImageGate(std::size_t cameras, Timestamp slack) : times_(cameras, Timestamp::min()), slack_(slack) {}
 
   void Wait(std::size_t camera, Timestamp time, const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
@@ -48,7 +48,7 @@ class PictureGate {
     changed_.wait(lock, stop,
                   [&] { return time <= *std::min_element(times_.begin(), times_.end()) + slack_; });
   }
-  // This camera has no more pictures, or none for now.
+  // This camera has no more images, or none for now.
   void Leave(std::size_t camera) {
     const std::scoped_lock lock(mutex_);
     times_[camera] = Timestamp::max() - slack_;
@@ -56,7 +56,7 @@ class PictureGate {
   }
 
  private:
-  std::vector<Timestamp> times_;  // of the picture that each is at
+  std::vector<Timestamp> times_;  // of the image that each is at
   const Timestamp slack_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
@@ -68,7 +68,7 @@ class Commander {
   Commander(const FrameLoopOptions& options, Session* session)
       : options_(options), session_(session), next_(options.script.begin()) {}
 
-  // now: from the first picture.
+  // now: from the first image.
   void CarryOutDue(Timestamp now, const engine::TrackedFrame& frame) {
     for (; next_ != options_.script.end() && next_->time <= now; ++next_) {
       try {
@@ -89,10 +89,10 @@ class Commander {
     }
   }
 
-  // Nothing of the script may be left when the pictures have ended.
+  // Nothing of the script may be left when the images have ended.
   void CheckAllDone() const {
     if (next_ == options_.script.end()) return;
-    throw Error(Line(*next_) + "the pictures ended before the time of this command.");
+    throw Error(Line(*next_) + "the images ended before the time of this command.");
   }
 
  private:
@@ -111,7 +111,7 @@ class Commander {
   Timestamp last_time_{};  // scripts never go back in time
 };
 
-// Hands on what a source lost before this picture, as its index tells. After an absence the index goes on
+// Hands on what a source lost before this image, as its index tells. After an absence the index goes on
 // where it was, so that nothing is made up for the time in between.
 class GapReporter {
  public:
@@ -144,7 +144,7 @@ void PreloadModels(const FrameLoopOptions& options, Session* session) {
   }
 }
 
-// One camera's way through a session, a picture at a time.
+// One camera's way through a session, an image at a time.
 class CameraFeed {
  public:
   CameraFeed(const CameraRun& run, Session* session, RealtimeClock* clock)
@@ -155,7 +155,7 @@ class CameraFeed {
         period_(FromSeconds(1 / run.camera->source->info().nominal_fps)),
         commander_(run.options, session) {}
 
-  // Goes on to the next picture; false at the end of the source or when stop is requested.
+  // Goes on to the next image; false at the end of the source or when stop is requested.
   bool Fetch(const std::stop_token& stop) {
     FrameSource& source = *run_.camera->source;
     while (!stop.stop_requested()) {
@@ -166,18 +166,18 @@ class CameraFeed {
       frame_.time -= clock_offset_;
       if (late_) {
         // Recordings with gaps: what comes after one may be early.
-        late_ = frame_.picture.empty() || clock_->IsLate(frame_.time, period_);
+        late_ = frame_.image.empty() || clock_->IsLate(frame_.time, period_);
         return true;
       }
       if (std::string now = source.trouble(); now != trouble_) {
         trouble_ = std::move(now);
         if (run_.options.trouble) run_.options.trouble(trouble_, frame_.time);
       }
-      if (frame_.picture.empty()) continue;
+      if (frame_.image.empty()) continue;
       if (live_) gaps_.Report(frame_, run_.shown);
       if (!first_time_) {
         first_time_ = frame_.time;
-        run_.camera->CheckPicture(frame_.picture);
+        run_.camera->CheckImage(frame_.image);
       }
       return true;
     }
@@ -194,7 +194,7 @@ class CameraFeed {
     *first_time_ -= offset;
   }
 
-  // The picture that was fetched.
+  // The image that was fetched.
   void Handle(const std::stop_token& stop) {
     const Pace pace = run_.options.pace;
     engine::TrackedFrame tracked;
@@ -218,15 +218,15 @@ class CameraFeed {
 
  private:
   // A file delivers faster than a camera and would run away from the mapper, which in the world has the whole
-  // time between pictures; so whoever feeds waits, never the tracker.
+  // time between images; so whoever feeds waits, never the tracker.
   void WaitForMapper(const std::stop_token& stop) {
     auto due = std::chrono::steady_clock::now();
     if (handed_on_) due = handed_on_->first + (frame_.time - handed_on_->second);
-    session_->WaitUntilCalm(due, stop);
+    session_->WaitUntilIdle(due, stop);
     handed_on_ = {std::chrono::steady_clock::now(), frame_.time};
   }
 
-  // Tells the tracker how far the camera was told to turn since the last picture that was tracked.
+  // Tells the tracker how far the camera was told to turn since the last image that was tracked.
   void FollowHead() {
     Head* const head = run_.camera->source->head();
     if (head == nullptr) return;
@@ -239,7 +239,7 @@ class CameraFeed {
     before_ = now;
   }
 
-  // Judged before a picture is fetched: one that is slow to make (a simulation on a busy machine) is as old
+  // Judged before an image is fetched: one that is slow to make (a simulation on a busy machine) is as old
   // as it is, but those that would be late were it there at once are passed over.
   bool MustBeLate() {
     return run_.options.pace == Pace::kRealtime && !live_ && first_time_ &&
@@ -258,21 +258,21 @@ class CameraFeed {
   const CameraRun& run_;
   Session* const session_;
   RealtimeClock* const clock_;
-  std::optional<engine::Rotation3> before_;  // carrier_from_camera of the head at the last tracked picture
+  std::optional<engine::Rotation3> before_;  // carrier_from_camera of the head at the last tracked image
   const bool live_;
   const Timestamp period_;
   Commander commander_;
   GapReporter gaps_;
   engine::Frame frame_;
-  bool late_ = false;  // the picture is to be dropped
+  bool late_ = false;  // the image is to be dropped
   std::optional<Timestamp> first_time_;
   Timestamp clock_offset_{};
-  // Eager: when the picture before was handed on, and its own time.
+  // Eager: when the image before was handed on, and its own time.
   std::optional<std::pair<std::chrono::steady_clock::time_point, Timestamp>> handed_on_;
   std::string trouble_;
 };
 
-// All cameras on this thread, always the one whose picture is the oldest; the first of two that are as old.
+// All cameras on this thread, always the one whose image is the oldest; the first of two that are as old.
 void TakeTurns(std::vector<CameraFeed>* feeds, const std::stop_token& stop) {
   std::vector<CameraFeed*> going;
   for (CameraFeed& feed : *feeds) going.push_back(&feed);
@@ -288,7 +288,7 @@ void TakeTurns(std::vector<CameraFeed>* feeds, const std::stop_token& stop) {
 
 void RunSideBySide(std::vector<CameraFeed>* feeds, Pace pace, std::stop_source* stopping) {
   const std::stop_token stop = stopping->get_token();
-  PictureGate gate(feeds->size(), feeds->front().period());
+  ImageGate gate(feeds->size(), feeds->front().period());
   for (std::size_t i = 0; i < feeds->size(); ++i) {
     if ((*feeds)[i].live()) gate.Leave(i);  // devices keep time together by themselves
   }
@@ -359,7 +359,7 @@ void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const s
     const Timestamp ahead = feed.time() - feeds.front().time();
     if (ahead > kSameClock || ahead < -kSameClock) feed.SetClockOffset(ahead);
   }
-  // Not before all first pictures are there, or those who had to wait for the others would begin too late.
+  // Not before all first images are there, or those who had to wait for the others would begin too late.
   clock.Start(feeds.front().time());
   const Pace pace = cameras.front().options.pace;
   if (pace == Pace::kLockstep) {

@@ -17,7 +17,7 @@
 
 namespace docent::app {
 
-// Commands that come while the pictures run, from a window. Any thread.
+// Commands that come while the images run, from a window. Any thread.
 class CommandInbox {
  public:
   // A command and the frame that the person saw when giving it: a pixel of it means what was seen there.
@@ -39,8 +39,8 @@ class CommandInbox {
   std::vector<Entry> entries_;
 };
 
-// The clock by which recordings are played in realtime and the age of pictures is told: CLOCK_MONOTONIC,
-// which devices stamp their pictures with, too. Tests bring one of their own. Any thread.
+// The clock by which recordings are played in realtime and the age of images is told: CLOCK_MONOTONIC,
+// which devices stamp their images with, too. Tests bring one of their own. Any thread.
 class PlayClock {
  public:
   virtual ~PlayClock() = default;
@@ -57,14 +57,14 @@ struct FrameLoopOptions {
   std::string script_name;             // for sentences
   std::filesystem::path model_folder;  // where the script's models are
   CommandInbox* inbox = nullptr;       // may be null
-  // Told of every command that was carried out, with its time from the first picture, and of what was wrong
+  // Told of every command that was carried out, with its time from the first image, and of what was wrong
   // with one from the inbox (a script's fault ends the run instead). On the camera's thread; may be empty.
   std::function<void(const TimedCommand&)> carried_out;
   std::function<void(const std::string&)> refused;
-  // Told when the source has no pictures to give, with a sentence for the wearer and the time on its clock,
+  // Told when the source has no images to give, with a sentence for the wearer and the time on its clock,
   // and with an empty sentence when it is back. On the camera's thread; may be empty.
   std::function<void(const std::string&, Timestamp)> trouble;
-  // Told of every picture that was tracked, before it is handed on, how long ago it was taken: for a device
+  // Told of every image that was tracked, before it is handed on, how long ago it was taken: for a device
   // by its own stamp, for a recording in realtime by the time at which it was due. On the camera's thread;
   // may be empty.
   std::function<void(Timestamp)> latency;
@@ -73,18 +73,18 @@ struct FrameLoopOptions {
 
 using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
 
-// Feeds the pictures of a source to a session until the source ends or stop is requested, carries out the
+// Feeds the images of a source to a session until the source ends or stop is requested, carries out the
 // script's commands, and hands every frame on, dropped ones too. `shown` runs on the calling thread, which is
 // the camera's. Throws Error for what the source or a command's line has wrong; what was done before stands.
 //
-//   lockstep   one picture after the other; the session runs its mapper in between
-//   eager      as fast as the tracker is while the mapper rests, and no faster than the pictures' times while
+//   lockstep   one image after the other; the session runs its mapper in between
+//   eager      as fast as the tracker is while the mapper rests, and no faster than the images' times while
 //              it works: never further ahead of the mapper than a camera would be
-//   realtime   by the pictures' times; what is overtaken by its successor before it is asked for is dropped,
+//   realtime   by the images' times; what is overtaken by its successor before it is asked for is dropped,
 //              as a camera drops it
 //
-// A live source drops by itself: what is missing between two of its pictures is handed on as dropped, each
-// frame with its time and no picture.
+// A live source drops by itself: what is missing between two of its images is handed on as dropped, each
+// frame with its time and no image.
 void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,
                const FrameCallback& shown, const std::stop_token& stop);
 
@@ -95,10 +95,10 @@ struct CameraRun {
   FrameCallback shown;       // on this camera's thread
 };
 
-// The same for several cameras side by side, until the first one's pictures end: the first on the calling
+// The same for several cameras side by side, until the first one's images end: the first on the calling
 // thread, each other on a thread of its own. In lockstep all take turns on the calling thread, by the times
-// of their pictures, which also hold them together in the other paces: none runs further ahead of the others
-// than one picture. Cameras whose first pictures lie more than ten seconds apart have clocks of their own:
+// of their images, which also hold them together in the other paces: none runs further ahead of the others
+// than one image. Cameras whose first images lie more than ten seconds apart have clocks of their own:
 // they are taken to begin together, and times are the first camera's. The first fault stops all and is
 // thrown.
 void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const std::stop_token& stop);

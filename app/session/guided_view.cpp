@@ -17,14 +17,14 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   return view;
 }
 
-void ViewRecorder::Write(const cv::Mat& picture, std::uint64_t index) {
+void ViewRecorder::Write(const cv::Mat& image, std::uint64_t index) {
   // A source that leaves a long gap (a device that was unplugged) is not filled up.
   constexpr std::uint64_t kLongestGap = 300;
   if (last_index_ && index > *last_index_ + 1) {
     const std::uint64_t missing = std::min(index - *last_index_ - 1, kLongestGap);
     for (std::uint64_t i = 0; i < missing; ++i) recorder_.Write(cv::Mat());
   }
-  recorder_.Write(picture);
+  recorder_.Write(image);
   last_index_ = index;
 }
 

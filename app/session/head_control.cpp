@@ -21,7 +21,7 @@ std::vector<engine::MapPointId> Inliers(const engine::TrackedFrame& frame) {
 
 }  // namespace
 
-void HeadControl::Saw(const engine::TrackedFrame& frame) {
+void HeadControl::AddView(const engine::TrackedFrame& frame) {
   if (frame.state == engine::TrackingState::kDropped) return;
   const std::scoped_lock lock(mutex_);
   if (frame.frame.camera != camera_) {
@@ -61,7 +61,7 @@ void HeadControl::Tracked(const engine::TrackedFrame& frame, const PanTilt& at) 
 void HeadControl::Lost(const engine::TrackedFrame& frame, const PanTilt& at) {
   if (!map_ || !map_->HasFinitePoints() || frame.frame.time - tracked_at_ < kPatience) return;
   if (!search_) search_.emplace(head_->range(), *model_, *map_, carrier_from_map_);
-  search_->SawNothing(at);
+  search_->AddEmptyView(at);
   head_->LookAt(search_->Next(at), frame.frame.time);
 }
 

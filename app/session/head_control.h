@@ -26,7 +26,7 @@ class HeadControl {
   HeadControl(Head* head, int camera, std::shared_ptr<const engine::CameraModel> model, HeadPolicy policy)
       : head_(head), camera_(camera), model_(std::move(model)), policy_(policy) {}
 
-  void Saw(const engine::TrackedFrame& frame);
+  void AddView(const engine::TrackedFrame& frame);
   bool searching() const;
 
  private:

@@ -142,7 +142,7 @@ PanTilt HeadSearch::Best() const {
   return best;
 }
 
-void HeadSearch::SawNothing(const PanTilt& at) {
+void HeadSearch::AddEmptyView(const PanTilt& at) {
   double all = 0;
   for (int i = 0; i < kYaws; ++i) {
     double& belief = belief_[static_cast<std::size_t>(i)];

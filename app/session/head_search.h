@@ -12,7 +12,7 @@
 namespace docent::app {
 
 // From where the carrier is, the direction in which a point of the map (or what the hand-held camera looks
-// at) is in the middle of the picture.
+// at) is in the middle of the image.
 PanTilt TowardPoint(const engine::Rigid3& carrier_from_map, const Eigen::Vector3d& point_in_map);
 
 // What a camera looks at: the median of the points that it is tracked by and that have a place. Empty
@@ -25,13 +25,13 @@ struct HeadSearchOptions {
   double anywhere = 0.15;       // odds that it turned by anything at all
   double likeness_rad = 0.4;  // views turned this far apart still look alike enough to be found in most cases
   double likeness_shift = 0.4;  // the same for their distance, in depths of what they see
-  int enough_points = 60;       // in the picture; fewer lower the odds
-  double best_odds = 0.5;       // of one picture in the best direction
+  int enough_points = 60;       // in the image; fewer lower the odds
+  double best_odds = 0.5;       // of one image in the best direction
   double dwell_s = 0.3;         // what looking costs besides the way there
 };
 
-// How likely a picture in a direction is to be recognised, and the search that follows from it: a belief over
-// how far the carrier has turned since it was known, lowered wherever a picture found nothing (Stone, Theory
+// How likely an image in a direction is to be recognised, and the search that follows from it: a belief over
+// how far the carrier has turned since it was known, lowered wherever an image found nothing (Stone, Theory
 // of Optimal Search, 1975), and as the next direction always the one that finds the map soonest in
 // expectation.
 class HeadSearch {
@@ -40,12 +40,12 @@ class HeadSearch {
   HeadSearch(const PanTiltRange& range, const engine::CameraModel& camera, const engine::MapSnapshot& map,
              const engine::Rigid3& carrier_from_map, const HeadSearchOptions& options = {});
 
-  // The odds of one picture, the carrier not having turned; [0, 1].
+  // The odds of one image, the carrier not having turned; [0, 1].
   double Odds(const PanTilt& at) const;
   // Where the map is seen best if the carrier has not turned: also what keeps the map in view.
   PanTilt Best() const;
-  // A picture taken there was not recognised.
-  void SawNothing(const PanTilt& at);
+  // An image taken there was not recognised.
+  void AddEmptyView(const PanTilt& at);
   // Where to look next.
   PanTilt Next(const PanTilt& at) const;
 
@@ -54,7 +54,7 @@ class HeadSearch {
   std::size_t Row(double tilt_rad) const;
   static std::size_t Column(double yaw_rad);
   double OddsIn(double yaw_rad, double tilt_rad) const;
-  // Of one picture in every direction, as odds_.
+  // Of one image in every direction, as odds_.
   std::vector<double> Expected() const;
 
   const PanTiltRange range_;

@@ -8,13 +8,13 @@
 #include <memory>
 #include <utility>
 
-#include "app/files/picture_files.h"
+#include "app/files/image_files.h"
 
 namespace docent::app {
 
 namespace {
 
-// A picture that waits for the mapper is late; a keyframe that waits for pictures is none the worse. Where
+// An image that waits for the mapper is late; a keyframe that waits for images is none the worse. Where
 // there are fewer processors than threads, the trackers go first: five steps of niceness are a third of
 // their share.
 void LetOthersGoFirst() {
@@ -24,15 +24,15 @@ void LetOthersGoFirst() {
   setpriority(PRIO_PROCESS, thread, now + kSteps);  // where it is refused all go alike
 }
 
-engine::MapperOptions WithPictureFiles(engine::MapperOptions options) {
-  if (!options.pictures) options.pictures = std::make_shared<PictureFiles>();
+engine::MapperOptions WithImageFiles(engine::MapperOptions options) {
+  if (!options.images) options.images = std::make_shared<ImageFiles>();
   return options;
 }
 
 }  // namespace
 
 MappingThread::MappingThread(const engine::MapperOptions& options, bool threaded, Tell tell)
-    : mapper_(WithPictureFiles(options)), tell_(std::move(tell)) {
+    : mapper_(WithImageFiles(options)), tell_(std::move(tell)) {
   if (!threaded) return;
   worker_.emplace("mapper", [this](const std::stop_token& stop) {
     LetOthersGoFirst();
@@ -125,9 +125,9 @@ void MappingThread::JoinIfAsked() {
     request = std::exchange(join_, std::nullopt);
     interrupt_join_ = false;
   }
-  News news;
+  MapperUpdate news;
   news.key = key_;
-  news.join = News::Join{request->number, mapper_.Join(*request->other, &interrupt_join_)};
+  news.join = MapperUpdate::Join{request->number, mapper_.Join(*request->other, &interrupt_join_)};
   request.reset();
   if (news.join->attempt.joined) news.snapshot = told_ = mapper_.Snapshot();
   tell_(news);
@@ -135,7 +135,7 @@ void MappingThread::JoinIfAsked() {
 
 bool MappingThread::StepOnce() {
   const bool worked = mapper_.Step();
-  News news;
+  MapperUpdate news;
   news.key = key_;
   news.events = mapper_.TakeEvents();
   if (auto snapshot = mapper_.Snapshot(); snapshot != told_) news.snapshot = told_ = std::move(snapshot);
@@ -154,7 +154,7 @@ bool MappingThread::StepOnce() {
 void MappingThread::RunInTurn() {
   TakeOver();
   JoinIfAsked();
-  for (int step = 0; step < kMaxSteps && !mapper_.Settled(); ++step) StepOnce();
+  for (int step = 0; step < kMaxSteps && !mapper_.IsIdle(); ++step) StepOnce();
   StepOnce();
 }
 
@@ -191,7 +191,7 @@ bool MappingThread::Resting() const {
   return resting_ && !work_;
 }
 
-void MappingThread::WaitUntilCalm(std::chrono::steady_clock::time_point latest, const std::stop_token& stop) {
+void MappingThread::WaitUntilIdle(std::chrono::steady_clock::time_point latest, const std::stop_token& stop) {
   if (!worker_) return;
   std::unique_lock lock(mutex_);
   changed_.wait_until(lock, stop, latest, [this] { return failed_ || (resting_ && !work_); });

@@ -26,7 +26,7 @@ namespace docent::app {
 // cannot be done while the mapper works is done before its next step.
 class MappingThread {
  public:
-  struct News {
+  struct MapperUpdate {
     std::uint64_t key = 0;
     std::shared_ptr<const engine::MapSnapshot> snapshot;  // null when nothing new was published
     std::vector<engine::MapperEvent> events;
@@ -37,7 +37,7 @@ class MappingThread {
     };
     std::optional<Join> join = std::nullopt;
   };
-  using Tell = std::function<void(const News&)>;
+  using Tell = std::function<void(const MapperUpdate&)>;
 
   MappingThread(const engine::MapperOptions& options, bool threaded, Tell tell);
 
@@ -58,7 +58,7 @@ class MappingThread {
   bool Resting() const;
   // Threaded only: waits while the mapper works, but until `latest` at most, and beyond it while the mapper
   // is a whole keyframe behind or makes a map's beginning.
-  void WaitUntilCalm(std::chrono::steady_clock::time_point latest, const std::stop_token& stop);
+  void WaitUntilIdle(std::chrono::steady_clock::time_point latest, const std::stop_token& stop);
 
   engine::MapperTimes Times() const { return mapper_.Times(); }
   // Ends the thread and rethrows what it threw; then does what the last keyframes left to be done, for two

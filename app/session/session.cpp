@@ -18,7 +18,7 @@ Session::Session(const SessionOptions& options,
       library_(library),
       association_(cameras.size()),
       mapping_(options.mapper, options.threaded && options.may_write,
-               [this](const MappingThread::News& news) { Hear(news); }) {
+               [this](const MappingThread::MapperUpdate& news) { OnMapperUpdate(news); }) {
   // Trackers and mapper have the processors; OpenCV's own threads would only get into their way.
   cv::setNumThreads(1);
   engine::TrackerOptions tracker_options = options.tracker;
@@ -26,7 +26,7 @@ Session::Session(const SessionOptions& options,
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     Camera camera;
     camera.tracker = std::make_unique<engine::Tracker>(tracker_options, cameras[i], options.seed + i);
-    camera.lens = std::make_unique<LensWatch>(cameras[i]);
+    camera.lens = std::make_unique<CalibrationMonitor>(cameras[i]);
     camera.model = std::move(cameras[i]);
     cameras_.push_back(std::move(camera));
   }
@@ -36,7 +36,7 @@ Session::Session(const SessionOptions& options,
   }
   if (!options.first_map.empty()) {
     const std::scoped_lock lock(mutex_);
-    Carry(NewMap{options.first_map}, engine::TrackedFrame());
+    Apply(NewMap{options.first_map}, engine::TrackedFrame());
   }
 }
 
@@ -53,11 +53,11 @@ void Session::AddEvent(Timestamp time, std::string event, std::string detail) {
   events_.push_back({time, std::move(event), std::move(detail)});
 }
 
-SearchPlaces Session::FollowOrders(std::size_t index, Timestamp time) {
+CameraPlaceFinder Session::FollowOrders(std::size_t index, Timestamp time) {
   Camera* const camera = &cameras_[index];
   engine::Tracker& tracker = *camera->tracker;
   std::uint64_t searched = 0;
-  std::optional<SearchPlaces::Prediction> prediction;
+  std::optional<CameraPlaceFinder::Prediction> prediction;
   std::shared_ptr<const engine::MapSnapshot> snapshot;
   std::uint64_t key = 0;
   Camera::Order order = Camera::Order::kNone;
@@ -75,7 +75,7 @@ SearchPlaces Session::FollowOrders(std::size_t index, Timestamp time) {
     searched = association_.SearchedMap(index);
     if (snapshot && index < 2 && !association_.IsTracked(index)) {
       if (const auto pose = rig_.Predict(static_cast<int>(index), time, key))
-        prediction = SearchPlaces::Prediction{key, snapshot, *pose};
+        prediction = CameraPlaceFinder::Prediction{key, snapshot, *pose};
     }
   }
   if (order == Camera::Order::kStart) {
@@ -89,15 +89,15 @@ SearchPlaces Session::FollowOrders(std::size_t index, Timestamp time) {
   }
   tracker.SetMap(std::move(snapshot), key);
   const engine::PlaceFinder* const all = pager_ ? static_cast<const engine::PlaceFinder*>(&*pager_) : &index_;
-  return SearchPlaces(all, searched, std::move(prediction));
+  return CameraPlaceFinder(all, searched, std::move(prediction));
 }
 
 engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   const auto index = static_cast<std::size_t>(frame.camera);
   Camera& camera = cameras_.at(index);
-  const SearchPlaces places = FollowOrders(index, frame.time);
+  const CameraPlaceFinder places = FollowOrders(index, frame.time);
   engine::TrackedFrame tracked = camera.tracker->Track(frame, &places);
-  React(index, &tracked);
+  HandleResult(index, &tracked);
   if (options_.may_write) {
     OfferToMapper(&camera, tracked);
     if (!options_.threaded) mapping_.RunInTurn();
@@ -106,20 +106,20 @@ engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   return tracked;
 }
 
-void Session::React(std::size_t index, engine::TrackedFrame* frame) {
+void Session::HandleResult(std::size_t index, engine::TrackedFrame* frame) {
   const std::scoped_lock lock(mutex_);
   Camera* const camera = &cameras_[index];
   camera->last_time = frame->frame.time;
   if (!engine::HasPose(frame->state)) {
     association_.Lost(index);
   } else if (const auto map = maps_.find(frame->map_key); camera->order != Camera::Order::kNone ||
-                                                          map == maps_.end() || !map->second.Lives() ||
+                                                          map == maps_.end() || !map->second.IsActive() ||
                                                           !association_.Tracked(index, frame->map_key)) {
     association_.Lost(index);
-    Refuse(camera, frame);
+    RejectPose(camera, frame);
   }
   const bool has_pose = engine::HasPose(frame->state);
-  TellDoubt(camera, frame);
+  ReportRejection(camera, frame);
   if (has_pose && frame->map_key != camera->map_key) {
     EnterMap(camera, frame->map_key, frame->frame.time);
   } else if (frame->state == engine::TrackingState::kRelocalized) {
@@ -140,7 +140,7 @@ void Session::React(std::size_t index, engine::TrackedFrame* frame) {
 
 // The frame's pose is in a map that is not the cameras' any more: while it was worked out, another camera was
 // found elsewhere, or somebody chose another map.
-void Session::Refuse(Camera* camera, engine::TrackedFrame* frame) {
+void Session::RejectPose(Camera* camera, engine::TrackedFrame* frame) {
   frame->state = engine::TrackingState::kLost;
   frame->quality_class = engine::TrackingQuality::kLost;
   frame->map.reset();
@@ -152,7 +152,7 @@ void Session::Refuse(Camera* camera, engine::TrackedFrame* frame) {
   if (camera->order == Camera::Order::kNone) camera->order = Camera::Order::kGo;
 }
 
-void Session::TellDoubt(Camera* camera, engine::TrackedFrame* frame) {
+void Session::ReportRejection(Camera* camera, engine::TrackedFrame* frame) {
   const auto name = [&](std::uint64_t key) {
     const auto found = maps_.find(key);
     return found != maps_.end() ? found->second.name : std::string();
@@ -199,7 +199,7 @@ void Session::Advise(Camera* camera, const std::string& sentence) {
   camera->advice_end = camera->last_time + kShown;
 }
 
-LensWatch::Profile Session::LensErrors(std::size_t camera) const {
+CalibrationMonitor::Profile Session::LensErrors(std::size_t camera) const {
   const std::scoped_lock lock(mutex_);
   return cameras_.at(camera).lens->profile();
 }
@@ -219,24 +219,24 @@ void Session::OfferToMapper(Camera* camera, const engine::TrackedFrame& frame) {
     const std::scoped_lock lock(mutex_);
     key = camera->map_key;
     const auto found = maps_.find(key);
-    if (found == maps_.end() || key != growing_key_) return;
+    if (found == maps_.end() || key != extended_key_) return;
     if (pair && found->second.snapshot && found->second.snapshot->HasFinitePoints()) return;
-    if (candidate && !MayGrow(found->second, frame.camera_from_map)) candidate.reset();
+    if (candidate && !MayExtend(found->second, frame.camera_from_map)) candidate.reset();
   }
-  if (saver_) saver_->InterruptUpkeep();  // the present map comes first
+  if (saver_) saver_->InterruptMaintenance();  // the present map comes first
   if (pair) mapping_.Start(key, std::move(*pair));
   if (candidate) mapping_.Offer(key, std::move(*candidate), tracker.TakeReports());
 }
 
-void Session::Hear(const MappingThread::News& news) {
+void Session::OnMapperUpdate(const MappingThread::MapperUpdate& news) {
   using Kind = engine::MapperEvent::Kind;
   // New keyframes are described before the lock: frames go on meanwhile.
   std::vector<maps::KeyFrameWords> described;
   if (news.snapshot) described = index_.DescribeNew(news.key, *news.snapshot);
   const std::scoped_lock lock(mutex_);
   const auto found = maps_.find(news.key);
-  // News that comes late, of a map that was closed or given up meanwhile, is let go.
-  if (found == maps_.end() || news.key != growing_key_ || !found->second.Lives()) return;
+  // MapperUpdate that comes late, of a map that was closed or given up meanwhile, is let go.
+  if (found == maps_.end() || news.key != extended_key_ || !found->second.IsActive()) return;
   SessionMap& map = found->second;
   if (news.join && !Expects(*news.join, map)) return;
   if (news.snapshot) {
@@ -253,7 +253,7 @@ void Session::Hear(const MappingThread::News& news) {
       case Kind::kMapStarted:
         map.started = event.time;
         map.on_probation = true;
-        map.start_watch = StartWatch();
+        map.start_watch = InitializationMonitor();
         for (std::size_t i = 0; i < cameras_.size(); ++i) {
           if (cameras_[i].map_key == map.key && cameras_[i].starting) association_.Tracked(i, map.key);
         }
@@ -306,7 +306,7 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
   if (frame.frame.time < camera.advice_end) shown.advice = camera.advice;
   if (options_.may_write) {
-    const bool grows = growing_key_ != 0 && growing_key_ == frame.map_key;
+    const bool grows = extended_key_ != 0 && extended_key_ == frame.map_key;
     shown.mapping = MappingStatusOf(frame, grows);
   }
   const auto found = maps_.find(frame.map_key);
@@ -320,7 +320,7 @@ std::vector<std::string> Session::MapNames() const {
   const std::scoped_lock lock(mutex_);
   std::vector<std::string> names;
   for (const auto& [key, map] : maps_) {
-    if (map.Lives()) names.push_back(map.name);
+    if (map.IsActive()) names.push_back(map.name);
   }
   return names;
 }
@@ -348,7 +348,7 @@ void Session::Finish() {
     failure = std::current_exception();  // what it made before is saved all the same
   }
   if (saver_) {
-    saver_->EndUpkeep();
+    saver_->EndMaintenance();
     saver_->Flush();  // so that what fails now is tried again with the rest
     {
       const std::scoped_lock lock(mutex_);

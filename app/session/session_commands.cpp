@@ -31,10 +31,10 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
   if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
     throw Error("nothing can be changed on a tour; use docent author");
   }
-  BringToMemory(command);
+  LoadIntoMemory(command);
   const std::scoped_lock lock(mutex_);
   model_folder_ = model_folder;
-  std::visit([&](const auto& chosen) { Carry(chosen, frame); }, command);
+  std::visit([&](const auto& chosen) { Apply(chosen, frame); }, command);
   AddEvent(frame.frame.time, "command", FormatCommand(command));
 }
 
@@ -61,7 +61,7 @@ std::shared_ptr<const content::Asset> Session::LoadAsset(const std::string& file
 
 SessionMap* Session::FindByName(const std::string& name) {
   for (auto& [key, map] : maps_) {
-    if (map.Lives() && map.name == name) return &map;
+    if (map.IsActive() && map.name == name) return &map;
   }
   return nullptr;
 }
@@ -77,11 +77,11 @@ SessionMap& Session::AddMap(const std::string& name) {
 
 // The map of `key` rests from now on: it is saved as it stands, or forgotten if it never began.
 void Session::LeaveMap(std::uint64_t key) {
-  if (growing_key_ == key) {
-    LetMapperWorkOn(0, nullptr);
+  if (extended_key_ == key) {
+    AssignMapper(0, nullptr);
   }
   const auto found = maps_.find(key);
-  if (found == maps_.end() || !found->second.Lives()) return;
+  if (found == maps_.end() || !found->second.IsActive()) return;
   SessionMap& map = found->second;
   Timestamp time{};
   for (Camera& camera : cameras_) {
@@ -102,24 +102,24 @@ void Session::LeaveMap(std::uint64_t key) {
   maps_.erase(found);
 }
 
-void Session::GrowOn(const SessionMap& map) {
+void Session::ExtendMap(const SessionMap& map) {
   const bool grows = options_.may_write && !map.rests && maps::MayChangeStructure(map.policy);
-  LetMapperWorkOn(grows ? map.key : 0, grows ? map.snapshot : nullptr);
+  AssignMapper(grows ? map.key : 0, grows ? map.snapshot : nullptr);
 }
 
-void Session::LetMapperWorkOn(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot) {
-  growing_key_ = key;
+void Session::AssignMapper(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot) {
+  extended_key_ = key;
   joining_.reset();  // whatever the mapper had joined, it begins from the snapshot
   mapping_.Adopt(key, std::move(snapshot));
 }
 
-void Session::Carry(const NewMap& command, const engine::TrackedFrame& frame) {
+void Session::Apply(const NewMap& command, const engine::TrackedFrame& frame) {
   CheckName(command.name);
   if (FindByName(command.name) != nullptr) throw Error("there is already a map '" + command.name + "'");
-  const std::uint64_t before = growing_key_;
+  const std::uint64_t before = extended_key_;
   const SessionMap& map = AddMap(command.name);  // first, because it may fail
   if (before != 0) LeaveMap(before);
-  GrowOn(map);
+  ExtendMap(map);
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     const bool begins = static_cast<int>(i) == frame.frame.camera;
     cameras_[i].map_key = map.key;
@@ -130,20 +130,20 @@ void Session::Carry(const NewMap& command, const engine::TrackedFrame& frame) {
   association_.Begin(map.key);
 }
 
-void Session::Carry(const StopMap&, const engine::TrackedFrame& frame) {
+void Session::Apply(const StopMap&, const engine::TrackedFrame& frame) {
   const std::uint64_t key = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
   if (key == 0) throw Error("there is no current map to stop");
   maps_.at(key).rests = true;
   LeaveMap(key);
 }
 
-void Session::Carry(const UseMap& command, const engine::TrackedFrame& frame) {
+void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
   SessionMap* map = FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (!map->snapshot) throw Error("the map '" + command.name + "' has not begun yet");
   map->rests = false;
   const std::uint64_t before = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
-  if (before == map->key) return GrowOn(*map);
+  if (before == map->key) return ExtendMap(*map);
   if (before != 0) LeaveMap(before);
   association_.Release();
   for (Camera& camera : cameras_) {
@@ -151,11 +151,11 @@ void Session::Carry(const UseMap& command, const engine::TrackedFrame& frame) {
     camera.lost_since.reset();
     camera.order = Camera::Order::kGo;
   }
-  HoldMapsInUse();
-  GrowOn(*map);
+  PinMapsInUse();
+  ExtendMap(*map);
 }
 
-void Session::Carry(const SetPolicy& command, const engine::TrackedFrame& frame) {
+void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame) {
   SessionMap* map = FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (!map->snapshot) throw Error("the map '" + command.name + "' has not begun yet");
@@ -175,7 +175,7 @@ void Session::Carry(const SetPolicy& command, const engine::TrackedFrame& frame)
   }
   map->policy = command.policy;
   map->bounds = bounds;
-  if (cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key == map->key) GrowOn(*map);
+  if (cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key == map->key) ExtendMap(*map);
 }
 
 SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
@@ -184,7 +184,7 @@ SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
   const auto found = maps_.find(key);
   if (found == maps_.end() || !found->second.snapshot) throw Error("there is no current map");
   if (found->second.discarded) throw Error("the map of this frame has been given up");
-  if (!found->second.Lives()) throw Error("the map of this frame is a part of another one now");
+  if (!found->second.IsActive()) throw Error("the map of this frame is a part of another one now");
   if (!maps::MayChangeContent(found->second.policy)) {
     throw Error("the map '" + found->second.name + "' is " + maps::ToString(found->second.policy) +
                 ": its content stays as it is");
@@ -198,7 +198,7 @@ void Session::Edit(SessionMap* map, std::unique_ptr<content::Edit> edit) {
   map->scene = std::move(scene);
 }
 
-void Session::Carry(const PlaceModel& command, const engine::TrackedFrame& frame) {
+void Session::Apply(const PlaceModel& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
   const content::SurfaceHit hit = SurfaceAtPixel(frame, *camera.model, command.pixel);
@@ -212,7 +212,7 @@ void Session::Carry(const PlaceModel& command, const engine::TrackedFrame& frame
                                      command.scale, command.yaw_deg));
 }
 
-void Session::Carry(const PlaceSignpost& command, const engine::TrackedFrame& frame) {
+void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
   const content::SurfaceHit hit = SurfaceAtPixel(frame, *camera.model, command.pixel);
@@ -231,7 +231,7 @@ void Session::Carry(const PlaceSignpost& command, const engine::TrackedFrame& fr
   Edit(&map, content::AddSignpostEdit(std::move(entity), {command.pixel.x(), command.pixel.y()}));
 }
 
-void Session::Carry(const MoveEntity& command, const engine::TrackedFrame& frame) {
+void Session::Apply(const MoveEntity& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   const content::Entity& entity = FindEntity(*map.scene, command.name);
   Eigen::Vector3d place = entity.kind == content::Entity::Kind::kModel
@@ -246,33 +246,33 @@ void Session::Carry(const MoveEntity& command, const engine::TrackedFrame& frame
   Edit(&map, content::MoveEdit(command.name, place));
 }
 
-void Session::Carry(const RotateEntity& command, const engine::TrackedFrame& frame) {
+void Session::Apply(const RotateEntity& command, const engine::TrackedFrame& frame) {
   Edit(&MapToEdit(frame), content::RotateEdit(command.name, command.angle_deg));
 }
 
-void Session::Carry(const ScaleEntity& command, const engine::TrackedFrame& frame) {
+void Session::Apply(const ScaleEntity& command, const engine::TrackedFrame& frame) {
   Edit(&MapToEdit(frame), content::ScaleEdit(command.name, command.factor));
 }
 
-void Session::Carry(const RemoveEntity& command, const engine::TrackedFrame& frame) {
+void Session::Apply(const RemoveEntity& command, const engine::TrackedFrame& frame) {
   Edit(&MapToEdit(frame), content::RemoveEdit(command.name));
 }
 
-void Session::Carry(const Undo&, const engine::TrackedFrame& frame) {
+void Session::Apply(const Undo&, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   auto scene = std::make_shared<content::Scene>(*map.scene);
   if (!map.history.Undo(scene.get())) throw Error("there is nothing to undo in '" + map.name + "'");
   map.scene = std::move(scene);
 }
 
-void Session::Carry(const Redo&, const engine::TrackedFrame& frame) {
+void Session::Apply(const Redo&, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   auto scene = std::make_shared<content::Scene>(*map.scene);
   if (!map.history.Redo(scene.get())) throw Error("there is nothing to redo in '" + map.name + "'");
   map.scene = std::move(scene);
 }
 
-void Session::Carry(const Save&, const engine::TrackedFrame& frame) {
+void Session::Apply(const Save&, const engine::TrackedFrame& frame) {
   if (!saver_) throw Error("there is no library to save to");
   for (auto& [key, map] : maps_) SaveMap(&map, frame.frame.time);
 }

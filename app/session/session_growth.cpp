@@ -13,9 +13,9 @@ void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
   const std::uint64_t before = std::exchange(camera->map_key, key);
   const SessionMap& map = maps_.at(key);
   AddEvent(time, "map", "entered " + map.name);
-  HoldMapsInUse();
+  PinMapsInUse();
   ExpectNeighbours(map);
-  if (saver_) saver_->InterruptUpkeep();  // it may be this map's
+  if (saver_) saver_->InterruptMaintenance();  // it may be this map's
   // The others give up where they are looking and come (ptamm §3.3).
   for (Camera& other : cameras_) {
     if (other.map_key == key) continue;
@@ -23,9 +23,9 @@ void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
     other.lost_since.reset();
     other.order = Camera::Order::kGo;
   }
-  if (!options_.may_write || growing_key_ == key) return;
+  if (!options_.may_write || extended_key_ == key) return;
   // The map before rests now: it is saved as it stands, and grows again when somebody comes back to it.
-  if (const auto found = maps_.find(before); found != maps_.end() && found->second.Lives()) {
+  if (const auto found = maps_.find(before); found != maps_.end() && found->second.IsActive()) {
     SessionMap& left = found->second;
     left.on_probation = false;
     SaveMap(&left, time);
@@ -37,12 +37,12 @@ void Session::EnterMap(Camera* camera, std::uint64_t key, Timestamp time) {
       left.join_with = key;
     }
   }
-  GrowOn(map);
+  ExtendMap(map);
   AskToJoin(map);
 }
 
-bool Session::MayGrow(const SessionMap& map, const engine::Rigid3& camera_from_map) const {
-  return options_.may_write && map.Lives() &&
+bool Session::MayExtend(const SessionMap& map, const engine::Rigid3& camera_from_map) const {
+  return options_.may_write && map.IsActive() &&
          maps::KeyFrameAllowed(map.policy, map.bounds, camera_from_map.OriginInSource());
 }
 
@@ -53,7 +53,7 @@ void Session::WatchProbation(Camera* camera, const engine::TrackedFrame& frame) 
   const Timestamp now = frame.frame.time;
   if (options_.may_write && map.snapshot && !map.snapshot->HasFinitePoints()) {
     // Directions alone are soon had again.
-    if (camera->lost_since && now - *camera->lost_since > options_.first_picture_loss)
+    if (camera->lost_since && now - *camera->lost_since > options_.first_image_loss)
       Discard(map.key, now, "its track was lost before it knew depth");
     return;
   }
@@ -88,13 +88,13 @@ void Session::WatchLoss(Camera* camera, const engine::TrackedFrame& frame) {
     return;
   const auto found = maps_.find(camera->map_key);
   // A map that somebody stopped, or that may not grow, is not left by itself.
-  if (found == maps_.end() || found->second.on_probation || growing_key_ != found->first) return;
+  if (found == maps_.end() || found->second.on_probation || extended_key_ != found->first) return;
   const Timestamp now = frame.frame.time;
   if (now - *camera->lost_since <= options_.lost_patience) return;
-  if (frame.verdict.doubt == engine::Doubt::kUnconfirmed) return;  // it is about to be found
+  if (frame.verdict.doubt == engine::RejectionReason::kUnconfirmed) return;  // it is about to be found
   const std::string before = found->second.name;
   const std::string name = FreeMapName(before);
-  Carry(NewMap{name}, frame);
+  Apply(NewMap{name}, frame);
   SessionMap& map = *FindByName(name);
   map.after_loss = true;
   camera->order = Camera::Order::kStartAfterLoss;
@@ -111,7 +111,7 @@ std::string Session::FreeMapName(const std::string& name) const {
   for (int number = 2;; ++number) {
     const std::string candidate = stem + " " + std::to_string(number);
     const bool taken = std::any_of(maps_.begin(), maps_.end(), [&](const auto& entry) {
-      return entry.second.Lives() && entry.second.name == candidate;
+      return entry.second.IsActive() && entry.second.name == candidate;
     });
     if (!taken) return candidate;
   }
@@ -128,7 +128,7 @@ void Session::Discard(std::uint64_t key, Timestamp time, const std::string& reas
   for (const content::Entity& entity : map.scene->entities) {
     AddEvent(time, "warning", "'" + entity.name + "' went with the discarded map");
   }
-  LetMapperWorkOn(next.key, nullptr);
+  AssignMapper(next.key, nullptr);
   association_.Begin(next.key);
   for (Camera& camera : cameras_) {
     if (camera.map_key != key) continue;

@@ -15,7 +15,8 @@ namespace docent::app {
 namespace {
 
 bool MayBeJoined(const SessionMap& map) {
-  return map.Lives() && map.snapshot && map.snapshot->HasFinitePoints() && map.policy == maps::Policy::kOpen;
+  return map.IsActive() && map.snapshot && map.snapshot->HasFinitePoints() &&
+         map.policy == maps::Policy::kOpen;
 }
 
 std::size_t KeyFramesOf(const SessionMap& a, const SessionMap& b) {
@@ -33,24 +34,24 @@ std::size_t CompareAgainAt(std::size_t keyframes, std::size_t fewest) {
 
 // Whenever a map is entered or has grown.
 void Session::AskToJoin(const SessionMap& into) {
-  if (joining_ || growing_key_ != into.key || !MayBeJoined(into)) return;
+  if (joining_ || extended_key_ != into.key || !MayBeJoined(into)) return;
   for (const auto& [key, map] : maps_) {
     if (map.join_with != into.key || !MayBeJoined(map) || KeyFramesOf(into, map) < map.join_at) continue;
     joining_ = Joining{++joins_asked_, key, map.snapshot};
     mapping_.Join(into.key, joining_->number, map.snapshot);
-    if (saver_) saver_->InterruptUpkeep();  // it may be this map's
+    if (saver_) saver_->InterruptMaintenance();  // it may be this map's
     return;
   }
 }
 
 // Whether the answer is to what was asked last, of maps that are still as they were. If they are not, the
 // mapper goes on with the map as it was.
-bool Session::Expects(const MappingThread::News::Join& news, const SessionMap& into) {
+bool Session::Expects(const MappingThread::MapperUpdate::Join& news, const SessionMap& into) {
   if (!joining_ || joining_->number != news.number) return false;
   const SessionMap& from = maps_.at(joining_->from);
   if (!news.attempt.joined || (MayBeJoined(into) && MayBeJoined(from) && from.snapshot == joining_->snapshot))
     return true;
-  GrowOn(into);
+  ExtendMap(into);
   return false;
 }
 
@@ -60,19 +61,19 @@ void Session::EndJoining(const engine::MapJoinAttempt& attempt, SessionMap* into
   const Timestamp now = LastTime();
   const std::string both = "maps " + into->name + " and " + from.name;
   if (attempt.joined) {
-    TakeIn(&from, *attempt.joined, into);
+    AbsorbMap(&from, *attempt.joined, into);
     const std::string sentence = both + " were joined";
     AddEvent(now, "map",
              sentence + ": " + std::to_string(attempt.joined->points_merged) + " points became one each");
     for (Camera& camera : cameras_) Advise(&camera, sentence);
-  } else if (attempt.overlap.verdict != engine::MapOverlap::Verdict::kInterrupted) {
+  } else if (attempt.overlap.verdict != engine::MapOverlap::RelocalizationResult::kInterrupted) {
     from.join_at = CompareAgainAt(KeyFramesOf(*into, from), options_.probation_keyframes);
     AddEvent(now, "map", both + " stay two, because " + attempt.refusal);
   }
 }
 
 // `into` has the joined map already. What stands in `from` can be undone no more, as it stands elsewhere now.
-void Session::TakeIn(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
+void Session::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
   auto scene = std::make_shared<content::Scene>(*into->scene);
   TakeInScene(*from->scene, into->name, from->name, joined, scene.get());
   into->scene = std::move(scene);
@@ -81,7 +82,7 @@ void Session::TakeIn(SessionMap* from, const engine::JoinedMap& joined, SessionM
   from->joined_into = into->key;
   index_.RemoveMap(from->key);
   for (auto& [key, map] : maps_) {
-    if (!map.Lives() || key == into->key) continue;
+    if (!map.IsActive() || key == into->key) continue;
     if (map.join_with == from->key) map.join_with = into->key;
     auto other = std::make_shared<content::Scene>(*map.scene);
     if (maps::MayChangeContent(map.policy) && RedirectSignpostsIn(from->name, into->name, other.get()))

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/session/content_follower.h"
-#include "app/session/start_watch.h"
+#include "app/session/initialization_monitor.h"
 #include "content/edits.h"
 #include "content/scene.h"
 #include "engine/base/time.h"
@@ -46,7 +46,7 @@ struct SessionMap {
 
   // Of a map made in this session: a start that does not hold is given up (see Session).
   bool on_probation = false;
-  StartWatch start_watch;  // while on_probation
+  InitializationMonitor start_watch;  // while on_probation
   bool discarded = false;
   bool after_loss = false;  // begun because the camera was lost in another map
   Timestamp started{};      // of the frame that completed its first pair
@@ -61,7 +61,7 @@ struct SessionMap {
   void Grow(std::shared_ptr<const engine::MapSnapshot> grown);
 
   // It is a map of its own still: neither given up nor a part of another one.
-  bool Lives() const { return !discarded && joined_into == 0; }
+  bool IsActive() const { return !discarded && joined_into == 0; }
   bool NeedsSave() const { return snapshot && (snapshot != saved_snapshot || scene != saved_scene); }
 };
 

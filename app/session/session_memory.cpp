@@ -18,8 +18,8 @@ void Session::LoadMaps() {
     map.in_library = true;
   }
   maps::MapPager::Callbacks callbacks;
-  callbacks.loaded = [this](const maps::StoredMap& stored) { KeepLoaded(stored); };
-  callbacks.let_go = [this](std::uint64_t key) { return LetGo(key); };
+  callbacks.loaded = [this](const maps::StoredMap& stored) { AddLoadedMap(stored); };
+  callbacks.let_go = [this](std::uint64_t key) { return Evict(key); };
   callbacks.failed = [this](std::uint64_t, const std::string& problem) {
     const std::scoped_lock lock(mutex_);
     AddEvent(LastTime(), "warning", problem);
@@ -28,7 +28,7 @@ void Session::LoadMaps() {
   pager_->Open();
 }
 
-void Session::KeepLoaded(const maps::StoredMap& stored) {
+void Session::AddLoadedMap(const maps::StoredMap& stored) {
   AssetCache assets;
   {
     const std::scoped_lock lock(mutex_);
@@ -47,14 +47,14 @@ void Session::KeepLoaded(const maps::StoredMap& stored) {
   map.scene = map.saved_scene = std::move(scene);
 }
 
-bool Session::LetGo(std::uint64_t key) {
+bool Session::Evict(std::uint64_t key) {
   const std::scoped_lock lock(mutex_);
   const auto found = maps_.find(key);
   if (found == maps_.end()) return true;
   SessionMap& map = found->second;
   const bool used = std::any_of(cameras_.begin(), cameras_.end(),
                                 [&](const Camera& camera) { return camera.map_key == key; });
-  if (used || map.changed || map.NeedsSave() || key == growing_key_) return false;
+  if (used || map.changed || map.NeedsSave() || key == extended_key_) return false;
   map.snapshot.reset();
   map.saved_snapshot.reset();
   map.scene = map.saved_scene = std::make_shared<content::Scene>();
@@ -63,7 +63,7 @@ bool Session::LetGo(std::uint64_t key) {
 }
 
 // The map that a command names, where it works on the map itself.
-void Session::BringToMemory(const Command& command) {
+void Session::LoadIntoMemory(const Command& command) {
   const auto* use = std::get_if<UseMap>(&command);
   const auto* policy = std::get_if<SetPolicy>(&command);
   if (!pager_ || (!use && !policy)) return;
@@ -76,7 +76,7 @@ void Session::BringToMemory(const Command& command) {
   if (key != 0) pager_->Load(key);
 }
 
-void Session::HoldMapsInUse() {
+void Session::PinMapsInUse() {
   if (!pager_) return;
   std::vector<std::uint64_t> keys;
   for (const Camera& camera : cameras_) keys.push_back(camera.map_key);

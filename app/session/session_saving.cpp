@@ -11,7 +11,7 @@
 namespace docent::app {
 
 // On the saver's thread. From here on the save may not be lost.
-void Session::TellSaved(const maps::MapRecord& record) {
+void Session::ReportSaved(const maps::MapRecord& record) {
   const std::string revision =
       record.snapshot ? "revision " + std::to_string(record.snapshot->revision) : "content";
   spdlog::debug("saved {}: {}", record.name, revision);
@@ -20,10 +20,10 @@ void Session::TellSaved(const maps::MapRecord& record) {
 void Session::StartSaver() {
   // A place for every map, so that a save is never waited for; in lockstep nothing happens by itself.
   constexpr std::size_t kAnyNumber = std::numeric_limits<std::size_t>::max();
-  maps::Saver::Upkeep upkeep;
-  if (options_.threaded && options_.upkeep)
-    upkeep = [this](const std::atomic<bool>& interrupt) { return KeepUp(interrupt); };
-  saver_.emplace(library_, kAnyNumber, TellSaved, std::move(upkeep));
+  maps::Saver::Upkeep maintenance;
+  if (options_.threaded && options_.maintenance)
+    maintenance = [this](const std::atomic<bool>& interrupt) { return RunMaintenance(interrupt); };
+  saver_.emplace(library_, kAnyNumber, ReportSaved, std::move(maintenance));
 }
 
 Timestamp Session::LastTime() const {
@@ -34,7 +34,7 @@ Timestamp Session::LastTime() const {
 
 // Hands what has changed of a map to the saver, which writes it in the background.
 void Session::SaveMap(SessionMap* map, Timestamp time) {
-  if (!saver_ || !map->Lives() || !map->NeedsSave() || !map->snapshot->HasFinitePoints()) return;
+  if (!saver_ || !map->IsActive() || !map->NeedsSave() || !map->snapshot->HasFinitePoints()) return;
   maps::MapRecord record;
   record.key = map->key;
   record.name = map->name;

@@ -16,7 +16,7 @@ content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engi
   }
   const std::string at =
       "pixel " + std::to_string(std::lround(pixel.x())) + " " + std::to_string(std::lround(pixel.y()));
-  if (!camera.IsInside(pixel, -0.5)) throw Error(at + " lies outside the picture");
+  if (!camera.IsInside(pixel, -0.5)) throw Error(at + " lies outside the image");
   const auto ray = camera.Unproject(pixel);
   if (!ray) throw Error("the lens has no ray for " + at);
   std::vector<Eigen::Vector3d> points;

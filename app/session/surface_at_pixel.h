@@ -15,7 +15,7 @@ namespace docent::app {
 content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engine::CameraModel& camera,
                                    const Eigen::Vector2d& pixel);
 
-// Upwards in a map, unit length: against the mean of where its keyframes' pictures have their lower edge. A
+// Upwards in a map, unit length: against the mean of where its keyframes' images have their lower edge. A
 // map knows no gravity; people hold cameras level on the whole, and the mean of many keyframes is steadier
 // than the first one alone.
 Eigen::Vector3d UpInMap(const engine::MapSnapshot& map);

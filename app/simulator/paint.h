@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 // Textures as rich as photographs, painted from a seed: corners at many scales, sharp edges, natural
-// contrast. Each answers a CV_8UC3 picture in BGR; the same size, arguments and seed give the same picture to
+// contrast. Each answers a CV_8UC3 image in BGR; the same size, arguments and seed give the same image to
 // the byte.
 namespace docent::app {
 
@@ -19,7 +19,7 @@ cv::Mat PaintCarpet(cv::Size size, std::uint64_t seed);
 // Fits to its own opposite border, so that it can be repeated.
 cv::Mat PaintGrass(cv::Size size, std::uint64_t seed);
 
-// Pictures and things.
+// Images and things.
 cv::Mat PaintPoster(cv::Size size, std::uint64_t seed);
 // Brush strokes that follow a landscape of colours, in a wooden frame.
 cv::Mat PaintPainting(cv::Size size, std::uint64_t seed);

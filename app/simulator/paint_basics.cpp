@@ -20,13 +20,13 @@ cv::Point Fixed(cv::Point2d p) {
 }
 
 void DrawLetter(cv::Point2d corner, double width, double height, int thickness, const cv::Scalar& color,
-                Random* random, cv::Mat* picture) {
+                Random* random, cv::Mat* image) {
   const int strokes = 2 + random->Below(2);
   cv::Point2d from = corner + cv::Point2d(width * random->Below(3) / 2.0, height * random->Below(3) / 2.0);
   for (int i = 0; i < strokes; ++i) {
     const cv::Point2d to =
         corner + cv::Point2d(width * random->Below(3) / 2.0, height * random->Below(3) / 2.0);
-    cv::line(*picture, Fixed(from), Fixed(to), color, thickness, cv::LINE_AA, kShift);
+    cv::line(*image, Fixed(from), Fixed(to), color, thickness, cv::LINE_AA, kShift);
     from = to;
   }
 }
@@ -66,11 +66,11 @@ cv::Mat NoiseField(cv::Size size, int cells_x, int cells_y, int octaves, double 
   return sum / std::max(1.0, std::sqrt(total));
 }
 
-void AddField(const cv::Mat& field, double strength, cv::Mat* picture, const cv::Scalar& tint) {
-  for (int y = 0; y < picture->rows; ++y) {
-    cv::Vec3b* out = picture->ptr<cv::Vec3b>(y);
+void AddField(const cv::Mat& field, double strength, cv::Mat* image, const cv::Scalar& tint) {
+  for (int y = 0; y < image->rows; ++y) {
+    cv::Vec3b* out = image->ptr<cv::Vec3b>(y);
     const float* in = field.ptr<float>(y);
-    for (int x = 0; x < picture->cols; ++x) {
+    for (int x = 0; x < image->cols; ++x) {
       for (int c = 0; c < 3; ++c) {
         out[x][c] = cv::saturate_cast<uchar>(out[x][c] + static_cast<float>(strength * tint[c]) * in[x]);
       }
@@ -79,22 +79,22 @@ void AddField(const cv::Mat& field, double strength, cv::Mat* picture, const cv:
 }
 
 cv::Mat ColorsAlong(const cv::Mat& field, const cv::Scalar& a, const cv::Scalar& b) {
-  cv::Mat picture(field.size(), CV_8UC3);
+  cv::Mat image(field.size(), CV_8UC3);
   const cv::Vec3f low(static_cast<float>(a[0]), static_cast<float>(a[1]), static_cast<float>(a[2]));
   const cv::Vec3f high(static_cast<float>(b[0]), static_cast<float>(b[1]), static_cast<float>(b[2]));
   for (int y = 0; y < field.rows; ++y) {
-    cv::Vec3b* out = picture.ptr<cv::Vec3b>(y);
+    cv::Vec3b* out = image.ptr<cv::Vec3b>(y);
     const float* in = field.ptr<float>(y);
     for (int x = 0; x < field.cols; ++x) {
       const float t = std::clamp(0.5f + 0.5f * in[x], 0.0f, 1.0f);
       for (int c = 0; c < 3; ++c) out[x][c] = cv::saturate_cast<uchar>(low[c] + t * (high[c] - low[c]));
     }
   }
-  return picture;
+  return image;
 }
 
 void DrawWriting(const cv::Rect& area, int letter_px, const cv::Scalar& color, Random* random,
-                 cv::Mat* picture) {
+                 cv::Mat* image) {
   const double width = 0.6 * letter_px, advance = 0.95 * letter_px;
   const int thickness = std::max(1, letter_px / 7);
   for (double y = area.y; y + letter_px <= area.y + area.height; y += 1.7 * letter_px) {
@@ -105,22 +105,22 @@ void DrawWriting(const cv::Rect& area, int letter_px, const cv::Scalar& color, R
         letters_left = 2 + random->Below(7);
         continue;
       }
-      DrawLetter({x, y}, width, letter_px, thickness, color, random, picture);
+      DrawLetter({x, y}, width, letter_px, thickness, color, random, image);
     }
   }
 }
 
-void DrawShape(cv::Point2d center, double radius, const cv::Scalar& color, Random* random, cv::Mat* picture) {
+void DrawShape(cv::Point2d center, double radius, const cv::Scalar& color, Random* random, cv::Mat* image) {
   const double turn = random->Uniform(0, kFullTurn);
   const int kind = random->Below(6);
   const int thickness = std::max(1, static_cast<int>(radius * 0.15));
   if (kind == 0) {
-    cv::circle(*picture, Fixed(center), static_cast<int>(radius * (1 << kShift)), color, cv::FILLED,
+    cv::circle(*image, Fixed(center), static_cast<int>(radius * (1 << kShift)), color, cv::FILLED,
                cv::LINE_AA, kShift);
     return;
   }
   if (kind == 1) {
-    cv::ellipse(*picture, Fixed(center),
+    cv::ellipse(*image, Fixed(center),
                 {static_cast<int>(radius * (1 << kShift)), static_cast<int>(radius * 0.6 * (1 << kShift))},
                 turn * 57, 0, 360, color, thickness, cv::LINE_AA, kShift);
     return;
@@ -138,34 +138,34 @@ void DrawShape(cv::Point2d center, double radius, const cv::Scalar& color, Rando
     corners.push_back(Fixed(center + reach * cv::Point2d(std::cos(angle), std::sin(angle))));
   }
   if (kind == 5) {
-    cv::polylines(*picture, corners, true, color, thickness, cv::LINE_AA, kShift);
+    cv::polylines(*image, corners, true, color, thickness, cv::LINE_AA, kShift);
   } else {
-    cv::fillPoly(*picture, std::vector<std::vector<cv::Point>>{corners}, color, cv::LINE_AA, kShift);
+    cv::fillPoly(*image, std::vector<std::vector<cv::Point>>{corners}, color, cv::LINE_AA, kShift);
   }
 }
 
-void Weather(double amount, Random* random, cv::Mat* picture) {
-  const double side = std::sqrt(static_cast<double>(picture->cols) * picture->rows);
-  AddField(NoiseField(picture->size(), 3, 3, 4, 0.6, random), 9 * amount, picture);
+void Weather(double amount, Random* random, cv::Mat* image) {
+  const double side = std::sqrt(static_cast<double>(image->cols) * image->rows);
+  AddField(NoiseField(image->size(), 3, 3, 4, 0.6, random), 9 * amount, image);
   const int specks = static_cast<int>(amount * side * 0.25),
             scratches = static_cast<int>(amount * side * 0.02);
   for (int i = 0; i < specks; ++i) {
-    const cv::Point2d center(random->Uniform(0, picture->cols), random->Uniform(0, picture->rows));
+    const cv::Point2d center(random->Uniform(0, image->cols), random->Uniform(0, image->rows));
     const double radius = 0.6 + 2.2 * std::pow(random->Uniform(), 4);
     const cv::Scalar color =
         cv::Scalar::all(random->Below(3) == 0 ? random->Uniform(170, 235) : random->Uniform(20, 90));
-    cv::circle(*picture, Fixed(center), static_cast<int>(radius * (1 << kShift)), color, cv::FILLED,
+    cv::circle(*image, Fixed(center), static_cast<int>(radius * (1 << kShift)), color, cv::FILLED,
                cv::LINE_AA, kShift);
   }
   for (int i = 0; i < scratches; ++i) {
-    cv::Point2d from(random->Uniform(0, picture->cols), random->Uniform(0, picture->rows));
+    cv::Point2d from(random->Uniform(0, image->cols), random->Uniform(0, image->rows));
     double angle = random->Uniform(0, kFullTurn);
     const cv::Scalar color = cv::Scalar::all(random->Uniform(40, 200));
     for (int piece = 2 + random->Below(5); piece > 0; --piece) {
       angle += random->Uniform(-0.7, 0.7);
       const cv::Point2d to =
           from + random->Uniform(0.005, 0.03) * side * cv::Point2d(std::cos(angle), std::sin(angle));
-      cv::line(*picture, Fixed(from), Fixed(to), color, 1, cv::LINE_AA, kShift);
+      cv::line(*image, Fixed(from), Fixed(to), color, 1, cv::LINE_AA, kShift);
       from = to;
     }
   }

@@ -90,12 +90,12 @@ Scene BuildDesks(const SceneRequest& request) {
     const std::uint64_t own_seed = desk == 0 ? first_seed : random.Next();
     FurnishDesk(stand, shared, request.identical_places ? first_seed : own_seed, &scene);
     scene.places.push_back({std::to_string(desk), stand.Point({0, -kDeskHeight, kDeskMiddle})});
-    // Pictures on the wall behind the partitions.
+    // Images on the wall behind the partitions.
     const double width = random.Uniform(0.8, 1.3);
     Stand wall;
     wall.origin = {kDeskPitch * desk, 0, hall.high.z()};
-    const int picture = surfaces.AddTexture(PaintPainting({512, 512}, random.Next()));
-    HangPicture(wall, {random.Uniform(-0.4, 0.4), -1.85, -0.02}, width, random.Uniform(0.6, 0.9), picture,
+    const int image = surfaces.AddTexture(PaintPainting({512, 512}, random.Next()));
+    HangPicture(wall, {random.Uniform(-0.4, 0.4), -1.85, -0.02}, width, random.Uniform(0.6, 0.9), image,
                 &scene);
   }
   Viewing viewing;

@@ -39,7 +39,7 @@ void FurnishBay(const Stand& stand, const SharedTextures& shared, std::uint64_t 
                   shared.cabinet_body, shared.cabinet_front);
   AddClutter(stand, {0, -kCabinetHeight, cabinet_z}, kCabinetWidth - 0.1, kCabinetDepth - 0.06, 6, 0.45,
              &random, scene);
-  // Pictures in two rows, none in the same place as in another bay.
+  // Images in two rows, none in the same place as in another bay.
   double left = -1.5 + random.Uniform(0, 0.15);
   while (left < 0.95) {
     const double width = random.Uniform(0.5, 0.95), height = random.Uniform(0.55, 0.95);
@@ -103,7 +103,7 @@ Scene BuildMuseum(const SceneRequest& request) {
       surfaces.AddColumn({side * (kHalfNave - 0.3), 0, kBayPitch * (row - 0.5)}, 0.2, 3.6, 14, shared.column);
     }
   }
-  // The ends of the nave: a large picture each.
+  // The ends of the nave: a large image each.
   for (const double yaw : {0.0, std::numbers::pi}) {
     Stand end;
     end.yaw_rad = yaw;

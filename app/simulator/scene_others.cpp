@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kTau = 2 * std::numbers::pi;
 
-// Square pictures of this side, beside and below each other, on one canvas.
+// Square images of this side, beside and below each other, on one canvas.
 cv::Mat Frieze(cv::Size size, int side, Random* random) {
   cv::Mat canvas(size, CV_8UC3);
   const int columns = size.width / side;
@@ -20,11 +20,11 @@ cv::Mat Frieze(cv::Size size, int side, Random* random) {
     const std::uint64_t seed = random->Next();
     const cv::Size square(side, side);
     const int kind = (i + i / columns) % 4;  // a different one below
-    const cv::Mat picture = kind == 0   ? PaintCollage(square, seed)
-                            : kind == 1 ? PaintPoster(square, seed)
-                            : kind == 2 ? PaintPainting(square, seed)
-                                        : PaintBooks(square, 3, seed);
-    picture.copyTo(canvas(cv::Rect(i % columns * side, i / columns * side, side, side)));
+    const cv::Mat image = kind == 0   ? PaintCollage(square, seed)
+                          : kind == 1 ? PaintPoster(square, seed)
+                          : kind == 2 ? PaintPainting(square, seed)
+                                      : PaintBooks(square, 3, seed);
+    image.copyTo(canvas(cv::Rect(i % columns * side, i / columns * side, side, side)));
   }
   return canvas;
 }
@@ -161,10 +161,10 @@ Scene BuildLoop(const SceneRequest& request) {
     stand.yaw_rad = wall * kTau / 4;
     stand.origin = stand.Direction({0, 0, wall % 2 == 0 ? hall.high.z() : hall.high.x()});
     for (int i = 0; i < 4; ++i) {
-      const int picture = surfaces.AddTexture(i % 2 == 0 ? PaintPainting({512, 512}, random.Next())
-                                                         : PaintPoster({512, 512}, random.Next()));
+      const int image = surfaces.AddTexture(i % 2 == 0 ? PaintPainting({512, 512}, random.Next())
+                                                       : PaintPoster({512, 512}, random.Next()));
       HangPicture(stand, {-3.0 + 2 * i + random.Uniform(-0.2, 0.2), -1.7, -0.02}, random.Uniform(0.9, 1.4),
-                  random.Uniform(0.8, 1.2), picture, &scene);
+                  random.Uniform(0.8, 1.2), image, &scene);
     }
   }
   if (request.parameter == 0) {

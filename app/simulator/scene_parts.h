@@ -21,7 +21,7 @@ struct Stand {
   Eigen::Vector3d Point(const Eigen::Vector3d& point) const { return origin + Direction(point); }
 };
 
-// A picture that hangs upright, facing the viewer of the stand; center in the stand's frame.
+// An image that hangs upright, facing the viewer of the stand; center in the stand's frame.
 void HangPicture(const Stand& stand, const Eigen::Vector3d& center, double width, double height, int texture,
                  Scene* scene);
 // Boxes, vases, and books at random places of a rectangle width by depth around `center` (in the stand's

@@ -10,7 +10,7 @@
 namespace docent::app {
 
 // What happens to the light behind the lens: vignetting, an exposure that wanders slowly and may jump,
-// clipping at 255, and noise, part of which may grow with the signal. A picture's result depends on its
+// clipping at 255, and noise, part of which may grow with the signal. An image's result depends on its
 // number and the seed alone, not on what was made before. Immutable; any thread.
 class Sensor {
  public:
@@ -31,7 +31,7 @@ class Sensor {
 
   explicit Sensor(const Options& options);
 
-  // Turns light (CV_8UC3) into the sensor's picture in place.
+  // Turns light (CV_8UC3) into the sensor's image in place.
   void Apply(int frame, double time_s, cv::Mat* bgr) const;
   // Gain of the exposure at a time, about 1.
   double Gain(double time_s) const;

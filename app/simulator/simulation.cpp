@@ -89,7 +89,7 @@ std::optional<std::string> SimulationOptions::Validate() const {
     return "The exposure drift of a simulation lies from 0 to 1.";
   if (!(vignetting >= 0 && vignetting < 1)) return "The vignetting of a simulation lies from 0 to below 1.";
   if (camera && (camera->width_px() > kLargestSide_px || camera->height_px() > kLargestSide_px)) {
-    return "The picture of a simulation has at most 8192 pixels along a side.";
+    return "The image of a simulation has at most 8192 pixels along a side.";
   }
   return faults.Validate(frame_rate_hz);
 }

@@ -29,9 +29,9 @@ struct SimulationOptions {
   std::optional<engine::CameraModel> camera;  // empty: the scene's own, or SimulatedCamera()
   double frame_rate_hz = 30;
   double duration_s = 0;         // the most that is simulated; 0: the whole way of the scene
-  double exposure_s = 1.0 / 60;  // the picture's time is the middle of the exposure
-  int blur_samples = 1;  // pictures averaged over the exposure; 1: no motion blur. Costs as many renderings
-  double noise_sigma = 1.5;      // of each channel, grey levels of 255; what a webcam shows indoors
+  double exposure_s = 1.0 / 60;  // the image's time is the middle of the exposure
+  int blur_samples = 1;      // images averaged over the exposure; 1: no motion blur. Costs as many renderings
+  double noise_sigma = 1.5;  // of each channel, grey levels of 255; what a webcam shows indoors
   double exposure_drift = 0.04;  // wandering of the logarithm of the gain
   double vignetting = 0.1;       // part of the light lost in the corners, [0, 1)
   bool identical_places =
@@ -73,7 +73,7 @@ class Simulation {
   Timestamp time(int frame) const;
   engine::Rigid3 world_from_camera(int frame) const;
   const std::string& label(int frame) const;
-  // The picture, CV_8UC3 in BGR: the same bytes for the same scene, options, and number.
+  // The image, CV_8UC3 in BGR: the same bytes for the same scene, options, and number.
   void Render(int frame, cv::Mat* bgr) const { RenderTurned(frame, std::nullopt, bgr); }
   // The same when the camera is turned on its mount, if it is.
   void RenderTurned(int frame, const std::optional<engine::Rigid3>& camera_from_turned, cv::Mat* bgr) const;

@@ -15,7 +15,7 @@
 namespace docent::app {
 
 // Ray casting of Surfaces through the camera's own lens, on one core. Every pixel has its exact ray,
-// unprojected once at construction, so the picture needs no resampling for the distortion. In the frame of a
+// unprojected once at construction, so the image needs no resampling for the distortion. In the frame of a
 // rectangle both its inside test and its inverse distance are linear in the ray; so a tile of pixels keeps
 // the rectangles whose linear functions are not negative at all four (slightly widened) corner rays, and only
 // these are tried. Pixels at an edge are averaged over four sub-rays. Immutable after construction; Render
@@ -25,7 +25,7 @@ class SurfaceRenderer {
   // surfaces must outlive the renderer.
   SurfaceRenderer(const Surfaces* surfaces, const engine::CameraModel& camera);
 
-  // The picture at a pose, CV_8UC3 in BGR. Pixels that no ray reaches, or whose ray meets nothing, are black.
+  // The image at a pose, CV_8UC3 in BGR. Pixels that no ray reaches, or whose ray meets nothing, are black.
   void Render(const engine::Rigid3& camera_from_world, cv::Mat* bgr) const;
   // The same when each row is seen from a pose of its own, as through a rolling shutter; one pose a row. The
   // poses of the sixteen rows of a tile lie within a few pixels of one another. Costs about twice as much.

@@ -48,11 +48,11 @@ void Surfaces::AddBox(const Eigen::Vector3d& base_center, double width, double h
                          {top + half_x + half_z, -2 * half_x, z},
                          {top - half_x + half_z, -2 * half_z, -x}};
   for (int i = 0; i < 4; ++i) {
-    const bool own_picture = i == 0 && front >= 0;
+    const bool own_image = i == 0 && front >= 0;
     const double left = (i % 3) / 3.0;
-    const TextureWindow window = own_picture ? TextureWindow{} : TextureWindow{left, 0, left + 1.0 / 3, 1};
+    const TextureWindow window = own_image ? TextureWindow{} : TextureWindow{left, 0, left + 1.0 / 3, 1};
     Rectangle& side =
-        AddRectangle(sides[i].corner, sides[i].right, down, own_picture ? front : texture, window);
+        AddRectangle(sides[i].corner, sides[i].right, down, own_image ? front : texture, window);
     side.light = LightOn(sides[i].normal);
     side.light_v = -0.06f;  // darker towards the ground
   }

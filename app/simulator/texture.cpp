@@ -25,27 +25,26 @@ std::uint64_t Blend(std::uint64_t a, std::uint64_t b, unsigned weight) {
 Texture::Texture(const cv::Mat& bgr, bool repeat) : repeat_(repeat) {
   if (bgr.type() != CV_8UC3 || !std::has_single_bit(static_cast<unsigned>(bgr.cols)) ||
       !std::has_single_bit(static_cast<unsigned>(bgr.rows))) {
-    throw std::invalid_argument("a texture is a CV_8UC3 picture whose sides are powers of two");
+    throw std::invalid_argument("a texture is a CV_8UC3 image whose sides are powers of two");
   }
-  cv::Mat picture = bgr;
+  cv::Mat image = bgr;
   while (true) {
     Level level;
-    level.width = picture.cols;
-    level.height = picture.rows;
-    level.texels.reserve(static_cast<std::size_t>(picture.cols) * picture.rows);
-    for (int y = 0; y < picture.rows; ++y) {
-      const cv::Vec3b* row = picture.ptr<cv::Vec3b>(y);
-      for (int x = 0; x < picture.cols; ++x) {
+    level.width = image.cols;
+    level.height = image.rows;
+    level.texels.reserve(static_cast<std::size_t>(image.cols) * image.rows);
+    for (int y = 0; y < image.rows; ++y) {
+      const cv::Vec3b* row = image.ptr<cv::Vec3b>(y);
+      for (int x = 0; x < image.cols; ++x) {
         level.texels.push_back(row[x][0] | static_cast<std::uint32_t>(row[x][1]) << 8 |
                                static_cast<std::uint32_t>(row[x][2]) << 16);
       }
     }
     levels_.push_back(std::move(level));
-    if (picture.cols == 1 && picture.rows == 1) break;
+    if (image.cols == 1 && image.rows == 1) break;
     cv::Mat half;
-    cv::resize(picture, half, {std::max(1, picture.cols / 2), std::max(1, picture.rows / 2)}, 0, 0,
-               cv::INTER_AREA);
-    picture = half;
+    cv::resize(image, half, {std::max(1, image.cols / 2), std::max(1, image.rows / 2)}, 0, 0, cv::INTER_AREA);
+    image = half;
   }
 }
 

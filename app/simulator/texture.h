@@ -7,7 +7,7 @@
 
 namespace docent::app {
 
-// A colour picture with its whole mip pyramid (Williams 1983), made once and then only read, from any thread.
+// A colour image with its whole mip pyramid (Williams 1983), made once and then only read, from any thread.
 // Sides are powers of two, so that wrapping is a mask. Channels are interpolated four at a time as 16-bit
 // lanes of one 64-bit word: a sample costs about as much as three table look-ups.
 class Texture {

@@ -24,7 +24,7 @@ bool ExistsEmpty(const std::filesystem::path& folder) {
   if (error) throw Error("Cannot look into the folder '" + folder.string() + "': " + error.message() + ".");
   if (!is_empty) {
     throw Error("The folder '" + folder.string() +
-                "' is not empty; choose another, so that no pictures are overwritten or mixed.");
+                "' is not empty; choose another, so that no images are overwritten or mixed.");
   }
   return true;
 }
@@ -47,16 +47,16 @@ void WriteSequence(const Simulation& simulation, const std::filesystem::path& fo
                    const std::function<void(int written, int total)>& progress) {
   const bool existed = ExistsEmpty(folder);
   try {
-    SequenceWriter writer(folder, simulation.calibration(), PictureFormat::kPng);
+    SequenceWriter writer(folder, simulation.calibration(), ImageFormat::kPng);
     if (!(simulation.calibration() == simulation.camera()))
       WriteCalibration(folder / "true_calibration.yaml", simulation.camera());
     for (int frame = 0; frame < simulation.frame_count(); ++frame) {
-      SequencePicture picture;
-      picture.time = simulation.time(frame);
-      simulation.Render(frame, &picture.picture);
-      picture.truth_from_camera = simulation.world_from_camera(frame);
-      picture.label = simulation.label(frame);
-      writer.Add(picture);
+      SequenceImage image;
+      image.time = simulation.time(frame);
+      simulation.Render(frame, &image.image);
+      image.truth_from_camera = simulation.world_from_camera(frame);
+      image.label = simulation.label(frame);
+      writer.Add(image);
       if (progress) progress(frame + 1, simulation.frame_count());
     }
     writer.Close();

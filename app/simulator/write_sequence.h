@@ -12,7 +12,7 @@ namespace docent::app {
 // world, calibration.yaml, segments.txt). Where the calibration has an error, true_calibration.yaml has the
 // lens as it is. The folder must not exist or be empty; otherwise, and when anything cannot be written,
 // throws docent::Error, and a folder that could not be finished is taken away again. progress (may be empty):
-// called after each picture with how many are written, of how many.
+// called after each image with how many are written, of how many.
 void WriteSequence(const Simulation& simulation, const std::filesystem::path& folder,
                    const std::function<void(int written, int total)>& progress = {});
 

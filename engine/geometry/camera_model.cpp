@@ -17,7 +17,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 // Tangent of the largest angle for lenses that see less than 90 degrees to the side (89.94 degrees).
 constexpr double kMaxRadius = 1000.0;
-// The one-to-one range ends a little before the radius where the picture's growth is exactly zero.
+// The one-to-one range ends a little before the radius where the image's growth is exactly zero.
 constexpr double kRangeMargin = 1 - 1e-6;
 constexpr int kMaxNewtonSteps = 100;
 
@@ -85,7 +85,7 @@ double InvertRadius(double (*radius)(const std::array<double, 5>&, double, doubl
 }
 
 // The Brown model on the plane z = 1 with its (symmetric) Jacobian. `Out` takes x, y, xx, xy, yy as
-// CameraModel::PicturePoint does. Inlined, what its caller does not use is not worked out.
+// CameraModel::ImagePoint does. Inlined, what its caller does not use is not worked out.
 template <typename Out>
 inline void BrownDistort(const std::array<double, 5>& k, double x, double y, Out* out) {
   const double s = x * x + y * y;
@@ -117,7 +117,7 @@ struct BrownError {
 };
 
 // Inverse of BrownDistort within the radius, or empty. Starts at the solution without tangential part and
-// goes on with Newton steps that are halved until they bring the picture nearer.
+// goes on with Newton steps that are halved until they bring the image nearer.
 std::optional<Eigen::Vector2d> BrownUndistort(const std::array<double, 5>& k,
                                               const Eigen::Vector2d& distorted, double max_radius,
                                               double max_image_radius) {
@@ -232,16 +232,16 @@ std::optional<std::string> CameraModel::Validate(LensModel lens, const Intrinsic
                                                  const std::array<double, 5>& distortion) {
   const Intrinsics& in = intrinsics;
   for (const auto& [what, size] :
-       {std::pair{"The picture's width", in.width_px}, {"The picture's height", in.height_px}}) {
+       {std::pair{"The image's width", in.width_px}, {"The image's height", in.height_px}}) {
     if (size < 1 || size > 65535) {
       return Sentence(what, size, "between 1 and 65535 pixels");
     }
   }
   for (const auto& [what, focal] :
        {std::pair{"The focal length fx", in.fx}, {"The focal length fy", in.fy}}) {
-    // 360 degrees across the picture make 0.16 widths; no lens is a thousand times longer than its sensor.
+    // 360 degrees across the image make 0.16 widths; no lens is a thousand times longer than its sensor.
     if (!(focal >= 0.01 * in.width_px && focal <= 1000.0 * in.width_px)) {
-      return Sentence(what, focal, "between 0.01 and 1000 times the picture's width in pixels");
+      return Sentence(what, focal, "between 0.01 and 1000 times the image's width in pixels");
     }
   }
   for (const auto& [what, center] :
@@ -253,7 +253,7 @@ std::optional<std::string> CameraModel::Validate(LensModel lens, const Intrinsic
   if (auto complaint = ComplainAboutDistortion(lens, distortion)) {
     return complaint;
   }
-  // A lens that folds back within the picture was calibrated wrongly. A few pixels in the corners may be.
+  // A lens that folds back within the image was calibrated wrongly. A few pixels in the corners may be.
   constexpr int kGrid = 9;
   const CameraModel camera(lens, intrinsics, distortion);
   int without_ray = 0;
@@ -264,15 +264,15 @@ std::optional<std::string> CameraModel::Validate(LensModel lens, const Intrinsic
   }
   if (without_ray > kGrid * kGrid / 2) {
     return "The distortion of the " + std::string(Name(lens)) +
-           " lens leaves more than half of the picture without a ray: check the coefficients and their "
+           " lens leaves more than half of the image without a ray: check the coefficients and their "
            "order.";
   }
   return std::nullopt;
 }
 
-// Through the plane z = 1, which Brown's and the FOV lens map to the picture with a symmetric Jacobian.
+// Through the plane z = 1, which Brown's and the FOV lens map to the image with a symmetric Jacobian.
 bool CameraModel::ProjectThroughPlane(const Eigen::Vector3d& point, bool with_jacobian,
-                                      PicturePoint* result) const {
+                                      ImagePoint* result) const {
   const double z = point.z();
   const double radius_squared = point.x() * point.x() + point.y() * point.y();
   if (!(z > 0) || !(radius_squared <= max_radius_squared_ * z * z)) {
@@ -303,7 +303,7 @@ bool CameraModel::ProjectThroughPlane(const Eigen::Vector3d& point, bool with_ja
 }
 
 // Through the angle from the axis: Kannala and Brandt's lens, also beyond 90 degrees.
-bool CameraModel::ProjectByAngle(const Eigen::Vector3d& point, PicturePoint* result) const {
+bool CameraModel::ProjectByAngle(const Eigen::Vector3d& point, ImagePoint* result) const {
   const double x = point.x(), y = point.y(), z = point.z();
   const double radius_squared = x * x + y * y, radius = std::sqrt(radius_squared);
   const double angle = std::atan2(radius, z);
@@ -325,7 +325,7 @@ bool CameraModel::ProjectByAngle(const Eigen::Vector3d& point, PicturePoint* res
 
 bool CameraModel::Project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
                           Eigen::Matrix<double, 2, 3>* jacobian) const {
-  PicturePoint point;
+  ImagePoint point;
   if (!(lens_ == LensModel::kKannalaBrandt
             ? ProjectByAngle(point_in_camera, &point)
             : ProjectThroughPlane(point_in_camera, jacobian != nullptr, &point))) {

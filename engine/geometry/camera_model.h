@@ -18,7 +18,7 @@ enum class LensModel {
 // A calibrated camera: what pixel a ray falls on, and back. An immutable value; safe to share across threads.
 // Camera frame x right, y down, z forward; the centre of the top-left pixel is (0, 0). A point projects only
 // where the lens is one-to-one: outside the largest angle at which the distortion still grows with the angle
-// (worked out once at construction) Project answers empty, so that no point folds back into the picture.
+// (worked out once at construction) Project answers empty, so that no point folds back into the image.
 class CameraModel {
  public:
   struct Intrinsics {
@@ -37,7 +37,7 @@ class CameraModel {
                                              const std::array<double, 5>& distortion);
 
   // Pixel of a point in the camera frame (any scale; for w = 0 pass the direction). Empty behind the camera
-  // (for the first two lenses) or where the lens is not one-to-one. The pixel may lie outside the picture.
+  // (for the first two lenses) or where the lens is not one-to-one. The pixel may lie outside the image.
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& point_in_camera) const;
   // The same with the Jacobian d pixel / d point, 2x3, pixels a metre.
   bool Project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
@@ -46,7 +46,7 @@ class CameraModel {
   // no ray of the one-to-one range falls on the pixel.
   std::optional<Eigen::Vector3d> Unproject(const Eigen::Vector2d& pixel) const;
 
-  // Whether a pixel lies in the picture, at least margin_px inside its border.
+  // Whether a pixel lies in the image, at least margin_px inside its border.
   bool IsInside(const Eigen::Vector2d& pixel, double margin_px = 0) const {
     return pixel.x() >= margin_px && pixel.y() >= margin_px &&
            pixel.x() <= intrinsics_.width_px - 1 - margin_px &&
@@ -60,19 +60,19 @@ class CameraModel {
   int height_px() const { return intrinsics_.height_px; }
   // Angle between the optical axis and the most oblique ray that projects, radians.
   double max_angle() const { return max_angle_; }
-  // Angle that one pixel covers at the middle of the picture, radians: 1 / mean focal length.
+  // Angle that one pixel covers at the middle of the image, radians: 1 / mean focal length.
   double PixelAngle() const { return 2.0 / (intrinsics_.fx + intrinsics_.fy); }
 
   bool operator==(const CameraModel& other) const;
 
  private:
-  // A point of the picture in focal lengths from the principal point, and its derivatives by the point in the
+  // A point of the image in focal lengths from the principal point, and its derivatives by the point in the
   // camera frame: xz is d x / d z. That of y by x is xy too.
-  struct PicturePoint {
+  struct ImagePoint {
     double x, y, xx, xy, yy, xz, yz;
   };
-  bool ProjectThroughPlane(const Eigen::Vector3d& point, bool with_jacobian, PicturePoint* result) const;
-  bool ProjectByAngle(const Eigen::Vector3d& point, PicturePoint* result) const;
+  bool ProjectThroughPlane(const Eigen::Vector3d& point, bool with_jacobian, ImagePoint* result) const;
+  bool ProjectByAngle(const Eigen::Vector3d& point, ImagePoint* result) const;
 
   LensModel lens_ = LensModel::kRadialTangential;
   Intrinsics intrinsics_;

@@ -112,15 +112,15 @@ void Map::RemoveKeyFrame(KeyFrameId id) {
   if (reference) ClosePanorama(panorama);
 }
 
-void Map::MergePoints(MapPointId into, MapPointId twin) {
+void Map::FusePoints(MapPointId into, MapPointId duplicate) {
   PointRecord* kept = FindPoint(into);
-  const PointRecord* gone = FindPoint(twin);
+  const PointRecord* gone = FindPoint(duplicate);
   if (!kept || !gone || kept == gone) return;
   const std::vector<KeyFrameId> observers = gone->observers;
   for (const KeyFrameId observer : observers) {
     std::vector<Observation>& observations = keyframes_.at(observer).observations;
-    const auto it = FindObservation(observations, twin);
-    if (it == observations.end() || it->point != twin) continue;
+    const auto it = FindObservation(observations, duplicate);
+    if (it == observations.end() || it->point != duplicate) continue;
     Observation observation = *it;
     observation.point = into;
     AddObservation(observation);
@@ -128,7 +128,7 @@ void Map::MergePoints(MapPointId into, MapPointId twin) {
   kept->seen_inlier += gone->seen_inlier;
   kept->seen_outlier += gone->seen_outlier;
   kept->not_found += gone->not_found;
-  RemovePoint(twin);
+  RemovePoint(duplicate);
 }
 
 void Map::Correct(const std::map<KeyFrameId, Sim3>& after_from_before) {

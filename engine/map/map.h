@@ -53,9 +53,9 @@ class Map {
   void RemoveObservation(KeyFrameId keyframe, MapPointId point);
   void RemovePoint(MapPointId id);
   void RemoveKeyFrame(KeyFrameId id);
-  // Two finite points were one: `into` takes over what saw `twin`, as far as its keyframes do not see both,
-  // and the trackers' verdicts; `twin` is removed.
-  void MergePoints(MapPointId into, MapPointId twin);
+  // Two finite points were one: `into` takes over what saw `duplicate`, as far as its keyframes do not see
+  // both, and the trackers' verdicts; `duplicate` is removed.
+  void FusePoints(MapPointId into, MapPointId duplicate);
 
   // Makes a localized keyframe the reference of a new panorama map. One that was a dependent keyframe leaves
   // its panorama map, and the infinite points that it is the source of come with it (hybrid-slam §5.1).
@@ -68,9 +68,9 @@ class Map {
   // The direction of an infinite point: the mean of the rays under which its keyframes see it.
   void UpdateDirection(PointRecord* record);
 
-  // Moves the surroundings of keyframes by similarities, a finite point with its source keyframe, a dependent
-  // panorama keyframe and its directions with the reference. after_from_before: of localized keyframes; those
-  // that are missing stay. The next Snapshot() tells of it.
+  // Moves the reference_keyframe of keyframes by similarities, a finite point with its source keyframe, a
+  // dependent panorama keyframe and its directions with the reference. after_from_before: of localized
+  // keyframes; those that are missing stay. The next Snapshot() tells of it.
   void Correct(const std::map<KeyFrameId, Sim3>& after_from_before);
   // By ascending revision.
   const std::vector<std::shared_ptr<const MapCorrection>>& corrections() const { return corrections_; }

@@ -10,8 +10,8 @@
 namespace docent::engine {
 
 // How a map was moved as a whole, part by part, when a loop was closed: by so much that whoever holds a pose
-// or a place in the coordinates before must carry it along. The parts are the surroundings of keyframes. Made
-// by the mapper; immutable in snapshots.
+// or a place in the coordinates before must carry it along. The parts are the reference_keyframe of
+// keyframes. Made by the mapper; immutable in snapshots.
 struct MapCorrection {
   std::uint64_t revision = 0;                            // of the first snapshot that is corrected
   std::map<std::uint32_t, Sim3> after_from_before = {};  // by keyframe, of all there were

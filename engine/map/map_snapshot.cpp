@@ -22,10 +22,10 @@ std::string CheckKeyFrames(const MapSnapshot& map) {
     if (keyframe.id < next || keyframe.id >= map.next_keyframe) return name + " is out of order";
     next = keyframe.id + 1;
     if (!keyframe.camera) return name + " has no camera";
-    if (!keyframe.features || keyframe.features->levels[0].empty()) return name + " has no picture";
+    if (!keyframe.features || keyframe.features->levels[0].empty()) return name + " has no image";
     if (keyframe.features->levels[0].cols != keyframe.camera->width_px() ||
         keyframe.features->levels[0].rows != keyframe.camera->height_px()) {
-      return name + " has a picture of another size than its camera";
+      return name + " has an image of another size than its camera";
     }
     const auto& pose = keyframe.camera_from_map;
     if (!pose.translation.allFinite() || !pose.rotation.quaternion().coeffs().allFinite() ||
@@ -79,7 +79,7 @@ std::string CheckPoints(const MapSnapshot& map) {
     if (!point.source_pixel.allFinite() || point.source_pixel.minCoeff() < 0 ||
         point.source_pixel.x() > static_cast<float>(level.cols - 1) ||
         point.source_pixel.y() > static_cast<float>(level.rows - 1)) {
-      return name + " has its source outside the picture";
+      return name + " has its source outside the image";
     }
   }
   return {};
@@ -100,7 +100,7 @@ std::string CheckObservations(const MapSnapshot& map) {
     if (!map.FindPoint(observation.point)) return name + " names a point that is not there";
     if (observation.level >= kPyramidLevels) return name + " names a pyramid level that is not there";
     if (!observation.pixel.allFinite() || !keyframe->camera->IsInside(observation.pixel.cast<double>())) {
-      return name + " lies outside the picture";
+      return name + " lies outside the image";
     }
   }
   return {};

@@ -95,7 +95,7 @@ struct MapSnapshot {
   bool HasFinitePoints() const;
 };
 
-// A sentence that says what is inconsistent (order, missing keyframe, pixel outside the picture, number not
+// A sentence that says what is inconsistent (order, missing keyframe, pixel outside the image, number not
 // finite, rotation not unit), or empty when the snapshot may be used. For data from files.
 std::string Validate(const MapSnapshot& map);
 

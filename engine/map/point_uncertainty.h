@@ -12,7 +12,7 @@ namespace docent::engine {
 // Of each point of the map, in its order: the standard deviation of its place along the line of sight from
 // its source keyframe, over its distance from there (0.01: one per cent of the depth). By the Gaussian
 // covariance of the place alone, the keyframes taken to stand where the map says, with pixel_sigma (pixels of
-// the level that a measurement was made on) in either direction of the picture. Infinite for what has no
+// the level that a measurement was made on) in either direction of the image. Infinite for what has no
 // depth: infinite points, and points whose rays are as good as parallel.
 std::vector<float> RelativeDepthDeviations(const MapSnapshot& map, double pixel_sigma = 0.5);
 

@@ -233,7 +233,7 @@ void BundleSystem::Eliminate(const Point& point, double damping, const Eigen::Ma
       const Coupling& column = ordered ? other : coupling;
       auto target = reduced_.At(row.camera, column.camera);
       target.noalias() -= row.solved * column.block.transpose();
-      // A point that one picture shows twice, which no map holds but the problem allows.
+      // A point that one image shows twice, which no map holds but the problem allows.
       if (a != b && row.camera == column.camera) target.noalias() -= column.solved * row.block.transpose();
     }
   }

@@ -36,7 +36,7 @@ bool Covisibility::AreNeighbours(std::size_t a, std::size_t b) const {
   return Shared(a, b) >= std::max(kMinShared, static_cast<int>(kMinShare * seen));
 }
 
-double Covisibility::WayBetween(KeyFrameId from, KeyFrameId to, const Map& map) const {
+double Covisibility::PathLengthBetween(KeyFrameId from, KeyFrameId to, const Map& map) const {
   constexpr double kFar = std::numeric_limits<double>::infinity();
   const std::size_t count = keyframes_.size(), start = IndexOf(from), end = IndexOf(to);
   if (start == count || end == count) return kFar;

@@ -24,7 +24,7 @@ class Covisibility {
   // place, and tell nothing of where the two are.
   bool AreNeighbours(std::size_t a, std::size_t b) const;
   // Metres from one keyframe to another by way of neighbours; infinite when there is no such way.
-  double WayBetween(KeyFrameId from, KeyFrameId to, const Map& map) const;
+  double PathLengthBetween(KeyFrameId from, KeyFrameId to, const Map& map) const;
 
  private:
   std::vector<KeyFrameId> keyframes_;

@@ -39,7 +39,7 @@ std::optional<Eigen::Vector2f> FollowPatch(const ImageFeatures& from, const Eige
   return guess.cast<float>();
 }
 
-// The best corners of a level, at most `count`, thinned so that they cover the picture.
+// The best corners of a level, at most `count`, thinned so that they cover the image.
 std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t level, int count) {
   const cv::Mat& image = features.levels[level];
   const double cell = std::max(8.0, std::sqrt(static_cast<double>(image.total()) / (1.3 * count)));

@@ -16,7 +16,7 @@ namespace docent::engine {
 
 struct InitializerOptions {
   std::array<int, 3> corners = {350, 200, 100};  // to follow, by level
-  double min_motion_px = 8;      // median motion, for a 640 pixel wide picture, before geometry is asked
+  double min_motion_px = 8;      // median motion, for a 640 pixel wide image, before geometry is asked
   double min_alive_ratio = 0.3;  // of the corners at the start, else the first view is taken anew
   int min_alive = 80;
   int max_age_frames = 240;  // a first view older than this is taken anew

@@ -33,7 +33,7 @@ struct KeyFrameCandidate {
   // The snapshot that the pose is in, and the keyframe that most of what it shows was first seen in: should
   // the map be moved before the keyframe joins it, it goes along with that one. 0: the newest.
   std::uint64_t map_revision = 0;
-  KeyFrameId surroundings = kNoId;
+  KeyFrameId reference_keyframe = kNoId;
 };
 
 // How often each point was looked for, found and believed since the last report: the trackers' verdict on it.

@@ -19,12 +19,12 @@ constexpr std::size_t kNeighbours = 16;  // of each sighting's keyframe, that ar
 constexpr double kDegrees = 57.29577951308232;
 
 // What the loop was wrong by.
-std::string SizeOfError(const LoopSighting& sighting, Map* map) {
+std::string SizeOfError(const LoopCandidate& sighting, Map* map) {
   const Sim3 error = KnownFromRecent(sighting, map);
   const KeyFrame& keyframe = map->FindKeyFrame(sighting.keyframe)->keyframe;
   const Eigen::Vector3d center = keyframe.camera_from_map.OriginInSource();
   const double shift = (error * center - center).norm();
-  const double way = Covisibility(*map).WayBetween(sighting.keyframe, sighting.place, *map);
+  const double way = Covisibility(*map).PathLengthBetween(sighting.keyframe, sighting.place, *map);
   char text[160];
   std::snprintf(text, sizeof(text), "off by %.1f %% of the way, %.2f degrees, %+.1f %% of scale",
                 100 * shift / way, kDegrees * error.rotation.Angle(), 100 * (error.scale - 1));
@@ -61,11 +61,11 @@ LoopCloser::Progress LoopCloser::DoStep(Map* map) {
   }
   if (loop_) {
     Progress progress = Progress::kWorked;
-    Relax(map, &progress);
+    OptimizePoseGraph(map, &progress);
     return progress;
   }
   if (to_look_.empty()) return Progress::kNothing;
-  std::vector<LoopSighting> sightings = finder_.Look(to_look_.front(), map, &searcher_);
+  std::vector<LoopCandidate> sightings = finder_.Look(to_look_.front(), map, &searcher_);
   to_look_.pop_front();
   if (sightings.empty()) return Progress::kWorked;
   Loop found;
@@ -76,7 +76,7 @@ LoopCloser::Progress LoopCloser::DoStep(Map* map) {
 }
 
 // Spreads the error a little more; at last moves the map.
-void LoopCloser::Relax(Map* map, Progress* progress) {
+void LoopCloser::OptimizePoseGraph(Map* map, Progress* progress) {
   PoseGraphOptions one_round = options_.correction.graph;
   one_round.max_iterations = kIterationsAStep;
   const PoseGraphSummary summary = RelaxPoseGraph(one_round, &loop_->graph.graph);
@@ -86,21 +86,21 @@ void LoopCloser::Relax(Map* map, Progress* progress) {
   }
   const double decrease = summary.initial_cost - summary.final_cost;
   if (decrease > kSettled * summary.initial_cost && ++loop_->rounds < kMaxRounds) return;
-  if (IsSettled(options_.correction, loop_->graph) && Close(map)) *progress = Progress::kMoved;
+  if (IsConsistent(options_.correction, loop_->graph) && Close(map)) *progress = Progress::kMoved;
   loop_.reset();
 }
 
 bool LoopCloser::Close(Map* map) {
   // Whatever happened since the keyframes were seen may have taken some away.
-  for (const LoopSighting& sighting : loop_->sightings)
+  for (const LoopCandidate& sighting : loop_->sightings)
     if (!map->FindKeyFrame(sighting.keyframe) || !map->FindKeyFrame(sighting.place)) return false;
-  const LoopSighting& last = loop_->sightings.back();
+  const LoopCandidate& last = loop_->sightings.back();
   report_ = SizeOfError(last, map);
   closed_by_ = last.keyframe;
   ApplyLoopGraph(loop_->graph, map);
   std::set<KeyFrameId> about;
   int fused = 0;
-  for (const LoopSighting& sighting : loop_->sightings) {
+  for (const LoopCandidate& sighting : loop_->sightings) {
     fused += FuseTwins(sighting, map);
     about.insert({sighting.keyframe, sighting.place});
     auto neighbours = map->Covisible(sighting.keyframe);

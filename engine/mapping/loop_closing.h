@@ -13,7 +13,7 @@ namespace docent::engine {
 
 struct LoopOptions {
   bool enabled = true;
-  LoopFinderOptions finder;
+  LoopDetectorOptions finder;
   LoopCorrectionOptions correction;
 };
 
@@ -48,17 +48,17 @@ class LoopCloser {
  private:
   // One that was found, while its error is being spread.
   struct Loop {
-    std::vector<LoopSighting> sightings;
+    std::vector<LoopCandidate> sightings;
     LoopGraph graph;
     int rounds = 0;
   };
   Progress DoStep(Map* map);
-  void Relax(Map* map, Progress* progress);
+  void OptimizePoseGraph(Map* map, Progress* progress);
   bool Close(Map* map);
   void Fuse(Map* map);
 
   const LoopOptions options_;
-  LoopFinder finder_;
+  LoopDetector finder_;
   PointSearcher searcher_;  // its own, so that a search for loops that finds none leaves no trace
   std::deque<KeyFrameId> to_look_;
   std::optional<Loop> loop_;

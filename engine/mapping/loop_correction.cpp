@@ -13,7 +13,7 @@
 
 namespace docent::engine {
 
-LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopSighting>& sightings,
+LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& sightings,
                         Map* map) {
   const Covisibility sharing(*map);
   const std::size_t count = sharing.keyframes().size();
@@ -70,7 +70,7 @@ LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<
   }
   // Hundreds of points tell it to a pixel.
   constexpr double kSightingWeight = 10;
-  for (const LoopSighting& sighting : sightings) {
+  for (const LoopCandidate& sighting : sightings) {
     result.graph.edges.push_back({static_cast<int>(sharing.IndexOf(sighting.keyframe)),
                                   static_cast<int>(sharing.IndexOf(sighting.place)),
                                   sighting.keyframe_from_place, kSightingWeight});
@@ -78,12 +78,12 @@ LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<
   return result;
 }
 
-bool IsSettled(const LoopCorrectionOptions& options, const LoopGraph& relaxed) {
+bool IsConsistent(const LoopCorrectionOptions& options, const LoopGraph& relaxed) {
   const std::size_t first_sighting = relaxed.graph.edges.size() - relaxed.sightings;
   for (std::size_t i = 0; i < relaxed.graph.edges.size(); ++i) {
     const PoseGraph::Edge& edge = relaxed.graph.edges[i];
     const double left = LargestError(relaxed.graph, edge);
-    if (i < first_sighting ? edge.weight * left > options.max_strain : left > options.max_misfit)
+    if (i < first_sighting ? edge.weight * left > options.max_edge_residual : left > options.max_misfit)
       return false;
   }
   return true;
@@ -111,12 +111,12 @@ void ApplyLoopGraph(const LoopGraph& relaxed, Map* map) {
   map->Correct(after_from_before);
 }
 
-int FuseTwins(const LoopSighting& sighting, Map* map) {
+int FuseTwins(const LoopCandidate& sighting, Map* map) {
   for (const Observation& observation : sighting.seen) map->AddObservation(observation);
   int fused = 0;
-  for (const Twins& twins : sighting.twins) {
-    if (!map->FindPoint(twins.known) || !map->FindPoint(twins.recent)) continue;
-    map->MergePoints(twins.known, twins.recent);
+  for (const DuplicatePoints& duplicates : sighting.duplicates) {
+    if (!map->FindPoint(duplicates.known) || !map->FindPoint(duplicates.recent)) continue;
+    map->FusePoints(duplicates.known, duplicates.recent);
     ++fused;
   }
   return fused;
@@ -154,7 +154,7 @@ int FuseSeenTwice(KeyFrameId id, const std::vector<MapPointId>& points, Map* map
     const Map::PointRecord* point = map->FindPoint(seen.point);
     if (!point) continue;
     const double depth = (keyframe.camera_from_map * point->point.position()).z();
-    MapPointId twin = kNoId;
+    MapPointId duplicate = kNoId;
     for (const Observation& observation : own) {
       const double limit = kSamePx * (1 << std::max(seen.level, observation.level));
       if ((observation.pixel - seen.pixel).norm() > limit) continue;
@@ -162,15 +162,15 @@ int FuseSeenTwice(KeyFrameId id, const std::vector<MapPointId>& points, Map* map
       if (!other || other->point.infinite()) continue;
       const double other_depth = (keyframe.camera_from_map * other->point.position()).z();
       if (std::abs(other_depth - depth) <= kSameDepth * depth) {
-        twin = observation.point;
+        duplicate = observation.point;
         break;
       }
     }
-    if (twin == kNoId) {
+    if (duplicate == kNoId) {
       map->AddObservation(seen);
       continue;
     }
-    map->MergePoints(std::min(twin, seen.point), std::max(twin, seen.point));
+    map->FusePoints(std::min(duplicate, seen.point), std::max(duplicate, seen.point));
     ++fused;
   }
   return fused;

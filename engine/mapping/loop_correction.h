@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "engine/mapping/loop_finder.h"
+#include "engine/mapping/loop_detector.h"
 #include "engine/mapping/pose_graph.h"
 
 // How a map is put right once a loop is known: the error is spread over the whole way, and what was mapped
@@ -17,8 +17,8 @@ struct LoopCorrectionOptions {
   // radians, logarithm of the scale.
   double max_misfit = 0.05;
   // By how much keyframes that share a hundred points may have been wrong to each other, in the same units. A
-  // look-alike that is joined to its twin asks more of those in between.
-  double max_strain = 0.02;
+  // look-alike that is joined to its duplicate asks more of those in between.
+  double max_edge_residual = 0.02;
 };
 
 // The keyframes and what they know of each other, and after these edges one for each of the sightings.
@@ -27,18 +27,18 @@ struct LoopGraph {
   std::vector<KeyFrameId> keyframes;  // of each node
   std::size_t sightings = 0;
 };
-LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopSighting>& sightings,
+LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& sightings,
                         Map* map);
 // Whether the relaxed graph has room for the sightings: what is left of them, and what they have asked of the
 // other edges, is small.
-bool IsSettled(const LoopCorrectionOptions& options, const LoopGraph& relaxed);
+bool IsConsistent(const LoopCorrectionOptions& options, const LoopGraph& relaxed);
 // Moves the map as the relaxed graph says; keyframes that came since go with the one they share most with.
 void ApplyLoopGraph(const LoopGraph& relaxed, Map* map);
 // Makes one of each two points that the sighting has shown to be one; returns how many there were.
-int FuseTwins(const LoopSighting& sighting, Map* map);
+int FuseTwins(const LoopCandidate& sighting, Map* map);
 
-// Looks in a keyframe for points of other keyframes that it should see, further off than RefindPoints, and
-// makes one of those that are then seen twice at the same place. Returns how many became one.
+// Appearance in a keyframe for points of other keyframes that it should see, further off than MatchMapPoints,
+// and makes one of those that are then seen twice at the same place. Returns how many became one.
 int FuseSeenTwice(KeyFrameId keyframe, const std::vector<MapPointId>& points, Map* map,
                   PointSearcher* searcher);
 

@@ -48,7 +48,7 @@ std::vector<MapPointId> Some(const std::vector<MapPointId>& points, std::size_t 
   return some;
 }
 
-// *expected: how many should be in the picture.
+// *expected: how many should be in the image.
 std::vector<Found> Search(std::span<const MapPointId> points, const KeyFrame& keyframe,
                           const Rigid3& camera_from_map, float radius_px, Map* map, PointSearcher* searcher,
                           int* expected) {
@@ -97,7 +97,7 @@ int OccupiedCells(const std::vector<Found>& found, const CameraModel& camera) {
 // median of the depths' ratios, recent to known; empty where too few agree on it.
 std::optional<double> PairTwins(const LoopVerificationOptions& options, const Map::KeyFrameRecord& keyframe,
                                 const Rigid3& camera_from_place, const std::vector<Found>& found, Map* map,
-                                std::vector<Twins>* twins) {
+                                std::vector<DuplicatePoints>* duplicates) {
   std::vector<double> ratios;
   std::set<MapPointId> known;
   for (const Found& f : found) known.insert(f.point);
@@ -118,7 +118,7 @@ std::optional<double> PairTwins(const LoopVerificationOptions& options, const Ma
       ratio = depth / known_depth;
     }
     if (nearest == kNoId) continue;
-    twins->push_back({f.point, nearest});
+    duplicates->push_back({f.point, nearest});
     ratios.push_back(std::log(ratio));
   }
   if (static_cast<int>(ratios.size()) < options.min_twins) return std::nullopt;
@@ -127,27 +127,29 @@ std::optional<double> PairTwins(const LoopVerificationOptions& options, const Ma
   for (double& value : sorted) value = std::abs(value - middle);
   const double spread = 1.4826 * Median(&sorted);
   if (spread > options.max_scale_spread) return std::nullopt;
-  std::vector<Twins> agreeing;
+  std::vector<DuplicatePoints> agreeing;
   for (std::size_t i = 0; i < ratios.size(); ++i) {
-    if (std::abs(ratios[i] - middle) <= 3 * std::max(spread, 0.01)) agreeing.push_back((*twins)[i]);
+    if (std::abs(ratios[i] - middle) <= 3 * std::max(spread, 0.01)) agreeing.push_back((*duplicates)[i]);
   }
-  *twins = std::move(agreeing);
-  if (static_cast<int>(twins->size()) < options.min_twins) return std::nullopt;
+  *duplicates = std::move(agreeing);
+  if (static_cast<int>(duplicates->size()) < options.min_twins) return std::nullopt;
   return std::exp(middle);
 }
 
 }  // namespace
 
-std::string LoopSighting::Brief() const {
+std::string LoopCandidate::Brief() const {
   char text[160];
-  std::snprintf(text, sizeof(text), "keyframe %u shows the place of %u: %zu of %d points, %zu twins, %d back",
-                keyframe, place, seen.size(), expected, twins.size(), back_inliers);
+  std::snprintf(text, sizeof(text),
+                "keyframe %u shows the place of %u: %zu of %d points, %zu duplicates, %d back", keyframe,
+                place, seen.size(), expected, duplicates.size(), back_inliers);
   return text;
 }
 
-std::optional<LoopSighting> VerifySighting(const LoopVerificationOptions& options, KeyFrameId id,
-                                           std::span<const KeyFrameId> place, const Rigid3& camera_from_map,
-                                           Map* map, PointSearcher* searcher) {
+std::optional<LoopCandidate> VerifyLoopCandidate(const LoopVerificationOptions& options, KeyFrameId id,
+                                                 std::span<const KeyFrameId> place,
+                                                 const Rigid3& camera_from_map, Map* map,
+                                                 PointSearcher* searcher) {
   const Map::KeyFrameRecord* record = map->FindKeyFrame(id);
   if (!record || place.empty()) return std::nullopt;
   const KeyFrame& keyframe = record->keyframe;
@@ -156,7 +158,7 @@ std::optional<LoopSighting> VerifySighting(const LoopVerificationOptions& option
     const auto& observers = map->FindPoint(point)->observers;
     return std::binary_search(observers.begin(), observers.end(), id);
   });
-  LoopSighting sighting;
+  LoopCandidate sighting;
   sighting.keyframe = id;
   sighting.place = place.front();
   std::vector<PoseMeasurement> measurements;
@@ -183,7 +185,7 @@ std::optional<LoopSighting> VerifySighting(const LoopVerificationOptions& option
       OccupiedCells(inliers, *keyframe.camera) < options.min_cells ||
       !(std::sqrt(variance) <= options.max_position_sigma * pose.mean_depth))
     return std::nullopt;
-  const auto scale = PairTwins(options, *record, pose.camera_from_map, inliers, map, &sighting.twins);
+  const auto scale = PairTwins(options, *record, pose.camera_from_map, inliers, map, &sighting.duplicates);
   if (!scale) return std::nullopt;
 
   const KeyFrame& known = map->FindKeyFrame(sighting.place)->keyframe;

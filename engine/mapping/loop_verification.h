@@ -20,11 +20,11 @@ struct LoopVerificationOptions {
   std::size_t first_points = 300, min_first_found = 20;
   std::size_t max_points = 1000;
   int min_inliers = 50;
-  double min_inlier_ratio = 0.15;    // of the points that should be in the picture; many are hidden
-  int min_cells = 7;                 // of a 4x4 grid over the picture
+  double min_inlier_ratio = 0.15;    // of the points that should be in the image; many are hidden
+  int min_cells = 7;                 // of a 4x4 grid over the image
   double max_sigma = 2.0;            // robust, of the normalised residuals
   double max_position_sigma = 0.02;  // of the depth
-  // A point of the place and a recent one that are seen within this are taken to be one ("twins").
+  // A point of the place and a recent one that are seen within this are taken to be one ("duplicates").
   double twin_px = 2.0;  // of the coarser of their levels
   int min_twins = 25;
   double max_scale_spread = 0.1;  // robust, of their depths' ratios: they are the same surfaces
@@ -34,18 +34,18 @@ struct LoopVerificationOptions {
 };
 
 // One physical point that the map has twice.
-struct Twins {
+struct DuplicatePoints {
   MapPointId known = kNoId, recent = kNoId;
 };
 
 // A keyframe that shows a known place.
-struct LoopSighting {
+struct LoopCandidate {
   KeyFrameId keyframe = kNoId, place = kNoId;
   // Camera frames, of which each has the unit of length that the map has about it: the scale says how far
   // these have drifted apart.
   Sim3 keyframe_from_place;
   std::vector<Observation> seen;  // points of the place, found in the keyframe
-  std::vector<Twins> twins;
+  std::vector<DuplicatePoints> duplicates;
   int expected = 0, back_inliers = 0;
   std::string Brief() const;
 };
@@ -53,8 +53,9 @@ struct LoopSighting {
 // place: the keyframes that know it, the one most like `keyframe` first; none shares its points.
 // camera_from_map: where the keyframe stands if it shows the place, in the coordinates of the place. Empty
 // where the proof fails; changes nothing.
-std::optional<LoopSighting> VerifySighting(const LoopVerificationOptions& options, KeyFrameId keyframe,
-                                           std::span<const KeyFrameId> place, const Rigid3& camera_from_map,
-                                           Map* map, PointSearcher* searcher);
+std::optional<LoopCandidate> VerifyLoopCandidate(const LoopVerificationOptions& options, KeyFrameId keyframe,
+                                                 std::span<const KeyFrameId> place,
+                                                 const Rigid3& camera_from_map, Map* map,
+                                                 PointSearcher* searcher);
 
 }  // namespace docent::engine

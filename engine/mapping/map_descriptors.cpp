@@ -14,7 +14,7 @@ void MapDescriptors::Clear() {
   described_.clear();
 }
 
-bool MapDescriptors::UpdateOne(const LooksOptions& options, Map* map) {
+bool MapDescriptors::UpdateOne(const AppearanceOptions& options, Map* map) {
   for (auto it = described_.begin(); it != described_.end(); ++it) {
     if (map->FindKeyFrame(it->first)) continue;
     database_.RemoveKeyFrame(it->first);
@@ -45,7 +45,7 @@ bool MapDescriptors::UpdateOne(const LooksOptions& options, Map* map) {
   return false;
 }
 
-std::optional<Rigid3> MapDescriptors::SuggestPose(const LooksOptions& options, const KeyFrame& keyframe,
+std::optional<Rigid3> MapDescriptors::SuggestPose(const AppearanceOptions& options, const KeyFrame& keyframe,
                                                   std::uint64_t seed, Map* map) const {
   const std::vector<DescribedPlace> places = DescribeCorners(*keyframe.features);
   std::vector<Descriptor> queries;

@@ -11,7 +11,7 @@
 
 namespace docent::engine {
 
-struct LooksOptions {
+struct AppearanceOptions {
   int levels_around = 1;  // on which an observation is described beside its own
   double inlier_px = 4;   // RANSAC, level 0
   int min_inliers = 15;   // of matches by looks alone; what they suggest is searched for thoroughly then
@@ -28,11 +28,11 @@ class MapDescriptors {
   void Clear();
   // Describes what one keyframe saw and is not known here yet, and forgets what it no longer sees; false when
   // every keyframe is in step.
-  bool UpdateOne(const LooksOptions& options, Map* map);
+  bool UpdateOne(const AppearanceOptions& options, Map* map);
   // The pose of a keyframe by three-point RANSAC over points that look like its corners; empty where too few
   // agree. Nothing but a suggestion: many of them may look alike.
-  std::optional<Rigid3> SuggestPose(const LooksOptions& options, const KeyFrame& keyframe, std::uint64_t seed,
-                                    Map* map) const;
+  std::optional<Rigid3> SuggestPose(const AppearanceOptions& options, const KeyFrame& keyframe,
+                                    std::uint64_t seed, Map* map) const;
 
   const DescriptorDatabase& database() const { return database_; }
 

@@ -25,8 +25,8 @@ void MoveB(const Sim3& a_from_b, KeyFrameId first_of_b, Map* map) {
 }
 
 // The sightings were made before B was moved: their places and keyframes have one unit now.
-void Rescale(const Sim3& a_from_b, KeyFrameId first_of_b, std::vector<LoopSighting>* sightings) {
-  for (LoopSighting& sighting : *sightings) {
+void Rescale(const Sim3& a_from_b, KeyFrameId first_of_b, std::vector<LoopCandidate>* sightings) {
+  for (LoopCandidate& sighting : *sightings) {
     // Lengths in the keyframe's frame over lengths in the place's frame.
     const bool of_b = sighting.keyframe >= first_of_b;
     const double unit = of_b ? a_from_b.scale : 1 / a_from_b.scale;
@@ -37,18 +37,19 @@ void Rescale(const Sim3& a_from_b, KeyFrameId first_of_b, std::vector<LoopSighti
 }
 
 // Spreads what the maps have drifted over both. False where they would have to be bent too far.
-bool SpreadDrift(const LoopCorrectionOptions& options, const std::vector<LoopSighting>& sightings, Map* map) {
+bool SpreadDrift(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& sightings,
+                 Map* map) {
   LoopGraph graph = MakeLoopGraph(options, sightings, map);
-  if (!RelaxPoseGraph(options.graph, &graph.graph).solved || !IsSettled(options, graph)) return false;
+  if (!RelaxPoseGraph(options.graph, &graph.graph).solved || !IsConsistent(options, graph)) return false;
   ApplyLoopGraph(graph, map);
   return true;
 }
 
 // What both maps have keeps the id of A: content of A stands among these points.
-void KeepIdsOfA(MapPointId first_of_b, std::vector<LoopSighting>* sightings) {
-  for (LoopSighting& sighting : *sightings) {
-    for (Twins& twins : sighting.twins) {
-      if (twins.known >= first_of_b) std::swap(twins.known, twins.recent);
+void KeepIdsOfA(MapPointId first_of_b, std::vector<LoopCandidate>* sightings) {
+  for (LoopCandidate& sighting : *sightings) {
+    for (DuplicatePoints& duplicates : sighting.duplicates) {
+      if (duplicates.known >= first_of_b) std::swap(duplicates.known, duplicates.recent);
     }
   }
 }
@@ -70,15 +71,15 @@ bool Adjust(const MapJoiningOptions& options, const std::atomic<bool>* interrupt
 
 // Makes one of each two points that the maps have of one physical point; returns how many there were. What
 // one map has twice by itself stays: each keyframe is searched for points of the other map alone.
-int MergeTwins(const JoinedIds& ids, const std::vector<LoopSighting>& sightings,
-               const std::atomic<bool>* interrupt, Map* map) {
+int FuseDuplicatePoints(const JoinedIds& ids, const std::vector<LoopCandidate>& sightings,
+                        const std::atomic<bool>* interrupt, Map* map) {
   std::set<KeyFrameId> about;
   int merged = 0;
-  for (const LoopSighting& sighting : sightings) {
+  for (const LoopCandidate& sighting : sightings) {
     merged += FuseTwins(sighting, map);
     about.insert({sighting.keyframe, sighting.place});
   }
-  for (const LoopSighting& sighting : sightings) {
+  for (const LoopCandidate& sighting : sightings) {
     auto neighbours = map->Covisible(sighting.keyframe);
     if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
     for (const auto& [id, shared] : neighbours) about.insert(id);
@@ -150,7 +151,7 @@ MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, 
   if (!attempt.refusal.empty()) return attempt;
 
   joined->a_from_b = attempt.overlap.a_from_b;
-  std::vector<LoopSighting> sightings = attempt.overlap.sightings;
+  std::vector<LoopCandidate> sightings = attempt.overlap.sightings;
   MoveB(joined->a_from_b, first_of_b, &map);
   Rescale(joined->a_from_b, first_of_b, &sightings);
   joined->aligned = map.Snapshot();
@@ -159,7 +160,7 @@ MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, 
     return attempt;
   }
   KeepIdsOfA(joined->ids.first_point, &sightings);
-  joined->points_merged = MergeTwins(joined->ids, sightings, interrupt, &map);
+  joined->points_merged = FuseDuplicatePoints(joined->ids, sightings, interrupt, &map);
   if (!Adjust(options, interrupt, &map)) {
     attempt.refusal = "the joined map cannot be adjusted";
     return attempt;

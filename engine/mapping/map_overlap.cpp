@@ -22,7 +22,7 @@ std::pair<int, int> CellOf(const Eigen::Vector2d& pixel, const KeyFrame& keyfram
 // A keyframe of B that was recognised, and where it puts B.
 struct Recognition {
   std::size_t order = 0;  // of the keyframe in B
-  LoopSighting sighting;
+  LoopCandidate sighting;
   Sim3 a_from_b;
 };
 
@@ -30,13 +30,13 @@ struct Recognition {
 struct Evidence {
   Sim3 a_from_b;
   std::size_t in_a_row = 0, looking = 0;
-  std::vector<LoopSighting> sightings;
+  std::vector<LoopCandidate> sightings;
   double found = 0;
   std::size_t regions = 0, contradicted = 0;
 
   std::size_t Points() const {
     std::size_t points = 0;
-    for (const LoopSighting& sighting : sightings) points += sighting.seen.size();
+    for (const LoopCandidate& sighting : sightings) points += sighting.seen.size();
     return points;
   }
 };
@@ -77,7 +77,7 @@ class OverlapFinder {
     if (!examined.empty()) best = std::move(examined.front());
     for (std::size_t i = 1; i < examined.size(); ++i) {
       std::size_t elsewhere = 0;
-      for (const LoopSighting& sighting : examined[i].sightings)
+      for (const LoopCandidate& sighting : examined[i].sightings)
         elsewhere += Says(best, sighting) ? 0 : sighting.seen.size();
       overlap.second_points = std::max(overlap.second_points, elsewhere);
     }
@@ -105,7 +105,7 @@ class OverlapFinder {
   MapOverlap::Verdict Judge(const MapOverlap& overlap) const;
   void Recognise(MapOverlap* overlap);
   std::vector<std::size_t> BySupport() const;
-  bool Says(const Evidence& evidence, const LoopSighting& sighting) const;
+  bool Says(const Evidence& evidence, const LoopCandidate& sighting) const;
   std::size_t LongestRow(const Sim3& a_from_b) const;
   bool IsFromElsewhere(const KeyFrame& a, const KeyFrame& b) const;
   // Of the two at a keyframe, in the coordinates of B.
@@ -119,7 +119,7 @@ class OverlapFinder {
                                        const Rigid3& camera_from_other);
   std::optional<PredictedPoint> Predict(MapPointId id, const KeyFrame& keyframe,
                                         const Rigid3& camera_from_other);
-  void CompareSurfaces(const LoopSighting& sighting, const std::vector<MapPointId>& points,
+  void CompareSurfaces(const LoopCandidate& sighting, const std::vector<MapPointId>& points,
                        Evidence* evidence);
   bool HasSurface(const Map::KeyFrameRecord& keyframe, const Eigen::Vector2d& pixel, double depth) const;
 
@@ -127,7 +127,7 @@ class OverlapFinder {
   const KeyFrameId first_of_b_;
   const std::atomic<bool>* const interrupt_;
   Map* const map_;
-  SightingSearch search_;
+  LoopCandidateSearch search_;
   PointSearcher searcher_;
   std::vector<KeyFrameId> in_a_, in_b_;  // localized, in the order in which they were made
   std::vector<Recognition> recognitions_;
@@ -155,7 +155,7 @@ void OverlapFinder::Recognise(MapOverlap* overlap) {
   }
   for (std::size_t order = 0; order < in_b_.size() && !Interrupted(); ++order) {
     const std::size_t before = recognitions_.size();
-    search_.Find(in_b_[order], all_of_b, map_, &searcher_, [&](LoopSighting sighting) {
+    search_.Find(in_b_[order], all_of_b, map_, &searcher_, [&](LoopCandidate sighting) {
       const Sim3 a_from_b = KnownFromRecent(sighting, map_);
       recognitions_.push_back({order, std::move(sighting), a_from_b});
       return false;
@@ -186,9 +186,9 @@ std::vector<std::size_t> OverlapFinder::BySupport() const {
 
 // Whether the evidence has the keyframe of the sighting at the same place: one similarity that drift bends is
 // no second hypothesis.
-bool OverlapFinder::Says(const Evidence& evidence, const LoopSighting& sighting) const {
+bool OverlapFinder::Says(const Evidence& evidence, const LoopCandidate& sighting) const {
   const Sim3 said = KnownFromRecent(sighting, map_);
-  return std::any_of(evidence.sightings.begin(), evidence.sightings.end(), [&](const LoopSighting& other) {
+  return std::any_of(evidence.sightings.begin(), evidence.sightings.end(), [&](const LoopCandidate& other) {
     return other.keyframe == sighting.keyframe &&
            SizeAt(said.inverse() * KnownFromRecent(other, map_), At(other.keyframe)).largest() <=
                options_.distinct;
@@ -265,7 +265,7 @@ Evidence OverlapFinder::Examine(std::size_t seed) {
     ++evidence.looking;
     shares.push_back(0);
     auto sighting =
-        VerifySighting(options_.search.verification, id, others, camera_from_other, map_, &searcher_);
+        VerifyLoopCandidate(options_.search.verification, id, others, camera_from_other, map_, &searcher_);
     if (!sighting) continue;
     const Sim3 says = KnownFromRecent(*sighting, map_);
     if (SizeAt(other_from_own.inverse() * says, At(id)).largest() > options_.max_disagreement) continue;
@@ -361,7 +361,7 @@ bool OverlapFinder::HasSurface(const Map::KeyFrameRecord& keyframe, const Eigen:
 
 // Where both maps have a surface at one depth, the points of one are found in a keyframe of the other, unless
 // something else is to be seen there.
-void OverlapFinder::CompareSurfaces(const LoopSighting& sighting, const std::vector<MapPointId>& points,
+void OverlapFinder::CompareSurfaces(const LoopCandidate& sighting, const std::vector<MapPointId>& points,
                                     Evidence* evidence) {
   const Map::KeyFrameRecord& record = *map_->FindKeyFrame(sighting.keyframe);
   const KeyFrame& keyframe = record.keyframe;
@@ -395,8 +395,8 @@ void OverlapFinder::CompareSurfaces(const LoopSighting& sighting, const std::vec
 
 }  // namespace
 
-SightingSearchOptions MapOverlapOptions::ThoroughSearch() {
-  SightingSearchOptions search;
+LoopCandidateSearchOptions MapOverlapOptions::ThoroughSearch() {
+  LoopCandidateSearchOptions search;
   search.new_descriptions = std::numeric_limits<std::size_t>::max();
   search.proved = 4;
   return search;

@@ -7,17 +7,17 @@
 #include <string>
 #include <vector>
 
-#include "engine/mapping/sighting_search.h"
+#include "engine/mapping/loop_candidate_search.h"
 
 // Whether two maps show one place, and how they lie to each other. Keyframes of one map are recognised in the
-// other as for a loop (sighting_search.h). Between two maps no drift bound tells a place from a look-alike,
-// so a similarity must also explain whatever it puts into view: of the keyframes that look at points of the
-// other map under it most must find most of these points again, and no other similarity may do nearly as
-// well. For one thread at a time; the same input gives the same result.
+// other as for a loop (loop_candidate_search.h). Between two maps no drift bound tells a place from a
+// look-alike, so a similarity must also explain whatever it puts into view: of the keyframes that look at
+// points of the other map under it most must find most of these points again, and no other similarity may do
+// nearly as well. For one thread at a time; the same input gives the same result.
 namespace docent::engine {
 
 struct MapOverlapOptions {
-  SightingSearchOptions search = ThoroughSearch();
+  LoopCandidateSearchOptions search = ThoroughSearch();
   // So many keyframes in a row (as they were made, each from elsewhere than the one before) must be
   // recognised and agree: as for a loop.
   std::size_t in_a_row = 3;
@@ -43,7 +43,7 @@ struct MapOverlapOptions {
   // about these. A keyframe is divided into regions; a point counts in its region when it is found, or when
   // the keyframe's own map has a surface there at its depth, so that nothing hides it. A region of so many
   // points contradicts when so few of them are found. Measured: 0.1-5.2 % of the regions of desks seen again,
-  // 18-21 % where every desk holds the same things and other pictures hang on the wall behind.
+  // 18-21 % where every desk holds the same things and other images hang on the wall behind.
   int regions_across = 8;
   int min_region_points = 8;
   double min_region_found = 0.1;
@@ -55,7 +55,7 @@ struct MapOverlapOptions {
   double max_second = 0.5;
 
   // Every candidate is described and proved: two maps are compared once, not with every new keyframe.
-  static SightingSearchOptions ThoroughSearch();
+  static LoopCandidateSearchOptions ThoroughSearch();
 };
 
 // What became of the comparison.
@@ -71,7 +71,7 @@ struct MapOverlap {
   };
   Verdict verdict = Verdict::kNothingToCompare;
   Sim3 a_from_b;                           // of the best hypothesis
-  std::vector<LoopSighting> sightings;     // that confirm it, of keyframes of both maps
+  std::vector<LoopCandidate> sightings;    // that confirm it, of keyframes of both maps
   std::size_t recognised = 0;              // keyframes of B that were recognised, whatever they say
   std::size_t in_a_row = 0;                // that agree
   std::size_t looking = 0, confirmed = 0;  // keyframes of both maps, under the best hypothesis

@@ -34,12 +34,12 @@ Mapper::Mapper(const MapperOptions& options)
       loops_(options.loops, options.search) {}
 
 // What the stepping thread knows of its map begins anew; what waits is not touched.
-void Mapper::GoOnWith(const MapSnapshot* snapshot) {
+void Mapper::ResumeFrom(const MapSnapshot* snapshot) {
   map_ = snapshot ? Map(*snapshot) : Map();
   searcher_.Clear();
   descriptors_.Clear();
   newest_ = kNoId;
-  to_refind_.clear();
+  to_match_.clear();
   to_localize_.clear();
   to_convert_.clear();
   loops_.Begin();
@@ -47,13 +47,13 @@ void Mapper::GoOnWith(const MapSnapshot* snapshot) {
     if (record.keyframe.kind == KeyFrameKind::kPanorama) to_localize_.push_back({id});
   }
   keyframes_since_global_ = 0;
-  global_interrupted_ = thin_out_ = false;
+  global_interrupted_ = culling_due_ = false;
   loop_to_adjust_ = false;
   locally_adjusted_ = true;
 }
 
 void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
-  GoOnWith(snapshot.get());
+  ResumeFrom(snapshot.get());
   const std::lock_guard lock(mutex_);
   queue_.clear();
   reports_.clear();
@@ -68,9 +68,9 @@ MapJoinAttempt Mapper::Join(const MapSnapshot& other, const std::atomic<bool>* i
   }
   // As for a global adjustment, but of two maps.
   searcher_.Release();
-  if (options_.pictures) options_.pictures->RestAll();
+  if (options_.images) options_.images->EvictAll();
   MapJoinAttempt attempt = JoinMaps(options_.joining, *map_.Snapshot(), other, interrupt);
-  if (attempt.joined) GoOnWith(attempt.joined->map.get());
+  if (attempt.joined) ResumeFrom(attempt.joined->map.get());
   EndWork(ProcessorSeconds() - start, &MapperTimes::other);
   if (attempt.joined) {
     const std::lock_guard lock(mutex_);
@@ -122,7 +122,7 @@ MapperTimes Mapper::Times() const {
   return times_;
 }
 
-bool Mapper::Settled() const {
+bool Mapper::IsIdle() const {
   return QueueLength() == 0 && locally_adjusted_;
 }
 
@@ -151,7 +151,7 @@ bool Mapper::Step() {
   }
   double MapperTimes::*account = &MapperTimes::other;
   if (task) {
-    KeepPictures(&*task);
+    KeepImages(&*task);
     if (const auto* candidate = std::get_if<KeyFrameCandidate>(&*task)) {
       InsertKeyFrame(UpToDate(*candidate));
     } else {
@@ -169,15 +169,15 @@ void Mapper::EndWork(double seconds, double MapperTimes::*account) {
   const std::lock_guard lock(mutex_);
   stepping_ = false;
   if (offered_during_step_)
-    times_.longest_hold = std::max(times_.longest_hold, SecondsSince(*offered_during_step_));
+    times_.max_queue_latency = std::max(times_.max_queue_latency, SecondsSince(*offered_during_step_));
   offered_during_step_.reset();
   if (account != nullptr) times_.*account += seconds;
 }
 
 // The most urgent piece of work that no keyframe asks for; the account that its time goes to, null for none.
 double MapperTimes::*Mapper::DoNextTask() {
-  if (!to_refind_.empty()) {
-    RefindNewPoints();
+  if (!to_match_.empty()) {
+    MatchNewPoints();
     return &MapperTimes::other;
   }
   if (!locally_adjusted_) {
@@ -193,8 +193,8 @@ double MapperTimes::*Mapper::DoNextTask() {
     GlobalAdjustment();
     return &MapperTimes::bundle_adjustment;
   }
-  if (thin_out_) {
-    ThinOut();
+  if (culling_due_) {
+    CullRedundantKeyFrame();
     return &MapperTimes::other;
   }
   return WorkOnLoops() ? &MapperTimes::loop_closing : nullptr;
@@ -254,14 +254,14 @@ void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecor
     if (point && !point->point.infinite()) map_.AddObservation({id, match.point, match.pixel, match.level});
   }
   map_.UpdateDepth(record);
-  RefindPoints(options_.refind, id, &searcher_, &map_);
+  MatchMapPoints(options_.guided_matching, id, &searcher_, &map_);
   map_.UpdateDepth(record);
   std::vector<MapPointId> created;
   for (const KeyFrameId partner : Partners(id)) {
     const auto points = CreatePoints(options_.creation, id, partner, &map_, &searcher_);
     created.insert(created.end(), points.begin(), points.end());
   }
-  to_refind_.insert(to_refind_.end(), created.begin(), created.end());
+  to_match_.insert(to_match_.end(), created.begin(), created.end());
   int rays = 0;
   if (candidate.choice == KeyFrameChoice::kLocalizedPanorama) {
     map_.OpenPanorama(id);
@@ -308,10 +308,10 @@ std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
   return partners;
 }
 
-void Mapper::KeepPictures(Task* task) const {
-  if (!options_.pictures) return;
+void Mapper::KeepImages(Task* task) const {
+  if (!options_.images) return;
   const auto keep = [this](std::shared_ptr<const ImageFeatures>* features) {
-    *features = options_.pictures->Keep(std::move(*features));
+    *features = options_.images->Keep(std::move(*features));
   };
   if (auto* candidate = std::get_if<KeyFrameCandidate>(task)) {
     keep(&candidate->features);
@@ -322,16 +322,16 @@ void Mapper::KeepPictures(Task* task) const {
   keep(&pair.b.features);
 }
 
-void Mapper::RefindNewPoints() {
+void Mapper::MatchNewPoints() {
   // New points are looked for in the keyframes that share most with the newest one.
   constexpr std::size_t kNeighbours = 8;
   if (newest_ != kNoId) {
     auto neighbours = map_.Covisible(newest_);
     if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
     for (const auto& [id, shared] : neighbours)
-      RefindPoints(options_.refind, id, &searcher_, &map_, &to_refind_);
+      MatchMapPoints(options_.guided_matching, id, &searcher_, &map_, &to_match_);
   }
-  to_refind_.clear();
+  to_match_.clear();
 }
 
 void Mapper::LocalAdjustment() {
@@ -343,7 +343,7 @@ void Mapper::LocalAdjustment() {
 void Mapper::GlobalAdjustment() {
   // No time needs more memory than this one.
   searcher_.Release();
-  if (options_.pictures) options_.pictures->RestAll();
+  if (options_.images) options_.images->EvictAll();
   MapAdjustmentOptions adjustment = options_.adjustment;
   if (loop_to_adjust_) adjustment.global_loss = RobustLoss::kHuber;
   const BundleSummary summary = AdjustGlobally(adjustment, &interrupt_, &map_);
@@ -355,19 +355,19 @@ void Mapper::GlobalAdjustment() {
   global_interrupted_ = std::exchange(
       loop_to_adjust_, loop_to_adjust_ && summary.final_cost < kClearlyLess * summary.initial_cost);
   keyframes_since_global_ = 0;
-  thin_out_ = true;
+  culling_due_ = true;
   Publish();
   if (map_.empty()) return;
   Tell(MapperEvent::Kind::kGlobalAdjustment, map_.keyframes().rbegin()->second.keyframe.time,
        summary.Brief());
 }
 
-void Mapper::ThinOut() {
-  const KeyFrameId redundant = FindRedundantKeyFrame(options_.redundancy, newest_, &map_);
-  thin_out_ = redundant != kNoId;
-  if (!thin_out_) return;
+void Mapper::CullRedundantKeyFrame() {
+  const KeyFrameId redundant = FindRedundantKeyFrame(options_.culling, newest_, &map_);
+  culling_due_ = redundant != kNoId;
+  if (!culling_due_) return;
   const Timestamp time = map_.FindKeyFrame(redundant)->keyframe.time;
-  RemoveRedundantKeyFrame(redundant, &map_);
+  CullKeyFrame(redundant, &map_);
   searcher_.Clear();
   Publish();
   Tell(MapperEvent::Kind::kKeyFrameRemoved, time, "keyframe " + std::to_string(redundant));

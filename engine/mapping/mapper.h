@@ -12,16 +12,16 @@
 #include <variant>
 #include <vector>
 
+#include "engine/mapping/guided_matching.h"
 #include "engine/mapping/keyframe_candidate.h"
+#include "engine/mapping/keyframe_culling.h"
 #include "engine/mapping/loop_closing.h"
 #include "engine/mapping/map_adjustment.h"
 #include "engine/mapping/map_descriptors.h"
 #include "engine/mapping/map_joining.h"
 #include "engine/mapping/panorama_mapping.h"
 #include "engine/mapping/point_creation.h"
-#include "engine/mapping/redundancy.h"
-#include "engine/mapping/refinding.h"
-#include "engine/vision/picture_store.h"
+#include "engine/vision/image_store.h"
 
 namespace docent::engine {
 
@@ -32,13 +32,13 @@ struct MapperOptions {
   double min_partner_baseline = 0.03;  // of the mean depth
   double max_partner_baseline = 0.6;
   int min_initial_points = 60;  // after the first adjustment, else the start is given up
-  RefindOptions refind;
+  GuidedMatchingOptions guided_matching;
   PointCreationOptions creation;
   InfinitePointOptions infinite;
   LocalizationOptions localization;
-  LooksOptions looks;
-  RedundancyOptions redundancy;
-  int min_initial_directions = 40;  // in the first picture, for a map to begin as a panorama
+  AppearanceOptions appearance;
+  KeyFrameCullingOptions culling;
+  int min_initial_directions = 40;  // in the first image, for a map to begin as a panorama
   // Of the infinite points: what is seen from two panorama maps is mostly further away (hybrid-slam §5.2).
   double min_infinite_parallax_deg = 1.5;
   int conversion_partners = 30;  // keyframes in which a localized keyframe's infinite points are looked for
@@ -46,7 +46,7 @@ struct MapperOptions {
   LoopOptions loops;
   MapJoiningOptions joining;
   SearchOptions search;
-  std::shared_ptr<PictureStore> pictures;  // where keyframes' pictures lie; null: in memory
+  std::shared_ptr<ImageStore> images;  // where keyframes' images lie; null: in memory
 };
 
 // What the mapper did, for events and reports.
@@ -73,7 +73,7 @@ struct MapperTimes {
   double bundle_adjustment = 0, panorama_localization = 0, infinite_triangulation = 0, loop_closing = 0,
          other = 0;
   int loops_closed = 0;
-  double longest_hold = 0;  // for which a piece of work made an offered keyframe wait
+  double max_queue_latency = 0;  // for which a piece of work made an offered keyframe wait
 };
 
 // Grows and refines one map (ptamm §2.3, Fig. 2b): starts it from two views, takes keyframes in, makes
@@ -100,7 +100,7 @@ class Mapper {
   // Does the most urgent piece of work; false when there was none.
   bool Step();
   // True while nothing urgent waits: no keyframe, and the newest one is adjusted.
-  bool Settled() const;
+  bool IsIdle() const;
 
   // The newest published state; null while there is no map.
   std::shared_ptr<const MapSnapshot> Snapshot() const;
@@ -114,10 +114,10 @@ class Mapper {
   struct Unlocalized {
     KeyFrameId keyframe = kNoId;
     std::size_t tried_with_points = 0;
-    bool looks_due = false;  // active search failed; its looks have not been asked yet
+    bool appearance_due = false;  // active search failed; its looks have not been asked yet
   };
 
-  void GoOnWith(const MapSnapshot* snapshot);
+  void ResumeFrom(const MapSnapshot* snapshot);
   void EndWork(double seconds, double MapperTimes::*account);
   double MapperTimes::*DoNextTask();
   void StartMap(const InitialPair& pair);
@@ -133,21 +133,21 @@ class Mapper {
   std::size_t CountFinite() const;
   // guess: see LocalizePanoramaKeyFrame.
   bool Localize(KeyFrameId keyframe, const Rigid3* guess);
-  // Looks for the infinite points of one pair of keyframes; false when no pair waits.
+  // Appearance for the infinite points of one pair of keyframes; false when no pair waits.
   bool ConvertOne();
   void PlanConversions(KeyFrameId keyframe);
   bool IsFinite() const;  // the map knows depth
   void ApplyReports();
   std::vector<KeyFrameId> Partners(KeyFrameId keyframe);
-  void RefindNewPoints();
+  void MatchNewPoints();
   void LocalAdjustment();
   void GlobalAdjustment();
   // The most urgent step towards closing a loop; false when there is none.
   bool WorkOnLoops();
-  void KeepPictures(Task* task) const;
+  void KeepImages(Task* task) const;
   // A candidate as it would have been offered had it been tracked in the map as it is now.
   KeyFrameCandidate UpToDate(KeyFrameCandidate candidate) const;
-  void ThinOut();  // removes one redundant keyframe
+  void CullRedundantKeyFrame();  // removes one redundant keyframe
   void Publish();
   void Tell(MapperEvent::Kind kind, Timestamp time, std::string detail);
 
@@ -157,14 +157,14 @@ class Mapper {
   PointSearcher searcher_;
   MapDescriptors descriptors_;
   KeyFrameId newest_ = kNoId;
-  std::vector<MapPointId> to_refind_;
+  std::vector<MapPointId> to_match_;
   std::vector<Unlocalized> to_localize_;
   std::deque<std::pair<KeyFrameId, KeyFrameId>> to_convert_;  // (reference, partner)
   LoopCloser loops_;
   bool loop_to_adjust_ = false;  // by the next global adjustment
   std::size_t keyframes_since_global_ = 0;
   bool global_interrupted_ = false;  // or due for another reason
-  bool thin_out_ = false;            // the map has settled since keyframes were last looked through
+  bool culling_due_ = false;         // the map has settled since keyframes were last looked through
 
   std::atomic<bool> interrupt_{false};
   std::atomic<bool> locally_adjusted_{true};

@@ -30,7 +30,7 @@ KeyFrameCandidate Mapper::UpToDate(KeyFrameCandidate candidate) const {
   if (candidate.map_revision == 0) return candidate;
   for (const auto& correction : map_.corrections()) {
     if (correction->revision <= candidate.map_revision) continue;
-    const auto moved = correction->after_from_before.find(candidate.surroundings);
+    const auto moved = correction->after_from_before.find(candidate.reference_keyframe);
     if (moved != correction->after_from_before.end())
       candidate.camera_from_map = CarriedAlong(candidate.camera_from_map, moved->second);
   }

@@ -50,7 +50,7 @@ std::size_t Mapper::CountFinite() const {
 
 void Mapper::TryToLocalize(Unlocalized* waiting, std::size_t finite) {
   waiting->tried_with_points = finite;
-  waiting->looks_due = !Localize(waiting->keyframe, nullptr);
+  waiting->appearance_due = !Localize(waiting->keyframe, nullptr);
 }
 
 bool Mapper::LocalizeNew() {
@@ -80,12 +80,13 @@ bool Mapper::LocalizeAgain() {
   }
   // Where active search saw nothing, its pose may be too far off: what looks like its corners says another.
   const auto due = std::find_if(to_localize_.begin(), to_localize_.end(),
-                                [](const Unlocalized& waiting) { return waiting.looks_due; });
+                                [](const Unlocalized& waiting) { return waiting.appearance_due; });
   if (due == to_localize_.end()) return false;
-  if (descriptors_.UpdateOne(options_.looks, &map_)) return true;
-  due->looks_due = false;
+  if (descriptors_.UpdateOne(options_.appearance, &map_)) return true;
+  due->appearance_due = false;
   const KeyFrameId id = due->keyframe;
-  const auto guess = descriptors_.SuggestPose(options_.looks, map_.FindKeyFrame(id)->keyframe, id + 1, &map_);
+  const auto guess =
+      descriptors_.SuggestPose(options_.appearance, map_.FindKeyFrame(id)->keyframe, id + 1, &map_);
   if (guess) Localize(id, &*guess);
   return true;
 }
@@ -135,7 +136,7 @@ bool Mapper::ConvertOne() {
   const InfiniteConversion conversion =
       ConvertInfinitePoints(creation, reference, partner, &map_, &searcher_);
   if (conversion.converted.empty() && conversion.merged == 0) return true;
-  to_refind_.insert(to_refind_.end(), conversion.converted.begin(), conversion.converted.end());
+  to_match_.insert(to_match_.end(), conversion.converted.begin(), conversion.converted.end());
   Publish();
   Tell(MapperEvent::Kind::kConverted, map_.FindKeyFrame(partner)->keyframe.time,
        std::to_string(conversion.converted.size()) + " directions became points, " +

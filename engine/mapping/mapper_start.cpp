@@ -15,7 +15,7 @@ void Mapper::StartMap(const InitialPair& pair) {
   if (!panorama) map_ = Map();
   searcher_.Clear();
   descriptors_.Clear();
-  to_refind_.clear();
+  to_match_.clear();
   to_convert_.clear();
   loops_.Begin();
   keyframes_since_global_ = 0;
@@ -62,7 +62,7 @@ void Mapper::StartMap(const InitialPair& pair) {
   newest_ = b;
   AdjustGlobally(options_.adjustment, nullptr, &map_);
   for (auto& [id, record] : map_.keyframes()) map_.UpdateDepth(&record);
-  // The first corners are few; the rest of the picture joins at once, from both sides.
+  // The first corners are few; the rest of the image joins at once, from both sides.
   CreatePoints(options_.creation, b, a, &map_, &searcher_);
   CreatePoints(options_.creation, a, b, &map_, &searcher_);
   AdjustGlobally(options_.adjustment, nullptr, &map_);
@@ -97,7 +97,7 @@ void Mapper::StartFromPanorama(const KeyFrameCandidate& candidate) {
   map_.OpenPanorama(id);
   const int rays = AddInfinitePoints(options_.infinite, id, {}, &map_);
   if (rays < options_.min_initial_directions) {
-    map_ = Map();  // a dark or empty picture; the next one may be better
+    map_ = Map();  // a dark or empty image; the next one may be better
     return;
   }
   newest_ = id;

@@ -5,7 +5,7 @@
 #include <bitset>
 #include <cmath>
 
-#include "engine/mapping/free_corners.h"
+#include "engine/mapping/unmatched_corners.h"
 #include "engine/recognition/absolute_pose.h"
 
 namespace docent::engine {
@@ -103,7 +103,8 @@ int AddInfinitePoints(const InfinitePointOptions& options, KeyFrameId id,
     for (const Eigen::Vector2f& pixel : taken)
       occupancy.Take(LevelFromLevelZero(pixel.cast<double>(), level).cast<float>());
     int accepted = 0;
-    for (const ScoredCorner& scored : FreeCorners(*record, index, options.min_corner_score, &occupancy)) {
+    for (const ScoredCorner& scored :
+         UnmatchedCorners(*record, index, options.min_corner_score, &occupancy)) {
       if (accepted >= options.max_points[index]) break;
       const Eigen::Vector2f pixel(scored.corner.x, scored.corner.y);
       if (occupancy.Taken(pixel)) continue;
@@ -184,10 +185,10 @@ int DropInfiniteTwins(KeyFrameId id, Map* map) {
   int dropped = 0;
   for (const Observation& observation : infinite) {
     const float limit = kSamePx * static_cast<float>(1 << observation.level);
-    const bool twin = std::any_of(finite.begin(), finite.end(), [&](const Eigen::Vector2f& pixel) {
+    const bool duplicate = std::any_of(finite.begin(), finite.end(), [&](const Eigen::Vector2f& pixel) {
       return (pixel - observation.pixel).squaredNorm() < limit * limit;
     });
-    if (!twin) continue;
+    if (!duplicate) continue;
     map->RemovePoint(observation.point);
     ++dropped;
   }
@@ -195,7 +196,7 @@ int DropInfiniteTwins(KeyFrameId id, Map* map) {
 }
 
 int DropInfiniteOutliers(PanoramaId panorama, Map* map) {
-  // Of the level; what a camera that is taken to turn about a point moves beside it shifts all of a picture
+  // Of the level; what a camera that is taken to turn about a point moves beside it shifts all of an image
   // alike, and less than this between keyframes that see the same point.
   constexpr double kMaxErrorPx = 6;
   std::vector<Observation> outliers;

@@ -30,14 +30,14 @@ struct LocalizationOptions {
   double inlier_px = 4;         // RANSAC, level 0
   int min_inliers = 40;         // strict, since a wrong pose would harm the 3D map (hybrid-slam §4)
   double min_inlier_ratio = 0.4;
-  int min_cells = 6;                 // of a 4x4 grid over the picture
+  int min_cells = 6;                 // of a 4x4 grid over the image
   double max_sigma = 2.0;            // robust, of the normalised residuals
   double max_position_sigma = 0.01;  // of the mean depth, from the covariance
 };
 
-// Looks for the map's finite points in a dependent panorama keyframe by active search, and estimates its pose
-// from them: three-point RANSAC, then robust refinement over its inliers. If that holds by all counts, the
-// keyframe is localized: it becomes the reference of a panorama map of its own, with the inliers as
+// Appearance for the map's finite points in a dependent panorama keyframe by active search, and estimates its
+// pose from them: three-point RANSAC, then robust refinement over its inliers. If that holds by all counts,
+// the keyframe is localized: it becomes the reference of a panorama map of its own, with the inliers as
 // observations (hybrid-slam §5.1). False when it does not; then nothing has changed. guess: where to look
 // from instead of the keyframe's own pose; null for none.
 bool LocalizePanoramaKeyFrame(const LocalizationOptions& options, KeyFrameId keyframe, std::uint64_t seed,

@@ -18,7 +18,7 @@ namespace docent::engine {
 
 namespace {
 
-constexpr int kMinSide = 64;  // of a picture that features are extracted from
+constexpr int kMinSide = 64;  // of an image that features are extracted from
 constexpr std::size_t kMinDescriptors = 100;
 constexpr double kElsewhere_px = 8;  // of the model: further apart are two places
 // A descriptor is kept in several leaves and looked for in more: finds nearly what comparing with all does.
@@ -92,7 +92,7 @@ PlanarTarget::PlanarTarget(const cv::Mat& gray, double width_m, const PlanarTarg
   if (!(width_m > 0) || !std::isfinite(width_m))
     throw Error("The width of a target is a positive number of metres.");
   if (gray.cols < kMinSide || gray.rows < kMinSide) {
-    throw Error("A target's picture has at least " + std::to_string(kMinSide) +
+    throw Error("A target's image has at least " + std::to_string(kMinSide) +
                 " pixels on each side, and this one " + std::to_string(gray.cols) + " by " +
                 std::to_string(gray.rows) + ".");
   }
@@ -118,8 +118,7 @@ PlanarTarget::PlanarTarget(const cv::Mat& gray, double width_m, const PlanarTarg
     for (int side = 0; side < 4; ++side) DescribeView(scale, 0.6, side * std::numbers::pi / 4);
   }
   if (descriptors_.size() < kMinDescriptors)
-    throw Error(
-        "This picture shows too little detail to be found by; choose one with many corners all over.");
+    throw Error("This image shows too little detail to be found by; choose one with many corners all over.");
   leaves_.resize(VocabularyTree::kLeaves);
   std::array<std::uint32_t, kKeptLeaves> leaves;
   for (std::uint32_t i = 0; i < descriptors_.size(); ++i) {
@@ -164,7 +163,7 @@ void PlanarTarget::DescribeView(double scale, double squeeze, double squeeze_rad
   for (const DescribedPlace& place : DescribeCorners(*MakeFeatures(view), corners)) {
     const Eigen::Vector2d in_scaled = middle + back * (place.pixel.cast<double>() - middle);
     const Eigen::Vector2d pixel = (in_scaled.array() + 0.5) / scales - 0.5;
-    // Beyond the picture's edge there is but its smear.
+    // Beyond the image's edge there is but its smear.
     if (pixel.x() < 4 || pixel.y() < 4 || pixel.x() > model.cols - 5 || pixel.y() > model.rows - 5) continue;
     const double turn = place.oriented.direction_rad;
     const Eigen::Vector2d direction = back * Eigen::Vector2d(std::cos(turn), std::sin(turn));
@@ -210,8 +209,8 @@ std::vector<PlanarTarget::DescriptorMatch> PlanarTarget::MatchDescriptors(
   return matches;
 }
 
-std::optional<TargetSighting> PlanarTarget::Detect(const ImageFeatures& features, const CameraModel& camera,
-                                                   std::uint64_t seed) const {
+std::optional<TargetDetection> PlanarTarget::Detect(const ImageFeatures& features, const CameraModel& camera,
+                                                    std::uint64_t seed) const {
   std::vector<Eigen::Vector3d> rays, points;
   for (const DescriptorMatch& match : MatchDescriptors(features)) {
     const auto ray = camera.Unproject(match.pixel);
@@ -231,7 +230,7 @@ std::optional<TargetSighting> PlanarTarget::Detect(const ImageFeatures& features
   // A plane far away has two poses that look nearly alike: alignment from either tells which fits.
   const auto other = Align(
       features, camera, TiltedOtherWay(sighting ? sighting->camera_from_target : consensus->camera_from_map));
-  const auto evidence = [](const std::optional<TargetSighting>& s) {
+  const auto evidence = [](const std::optional<TargetDetection>& s) {
     return s ? static_cast<double>(s->points.size()) / (0.1 + s->rms_px) : 0.0;
   };
   return evidence(other) > evidence(sighting) ? other : sighting;

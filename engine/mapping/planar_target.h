@@ -16,7 +16,7 @@
 namespace docent::engine {
 
 struct PlanarTargetOptions {
-  int model_size_px = 480;          // longer side that the picture is reduced to
+  int model_size_px = 480;          // longer side that the image is reduced to
   CornerDescriptionOptions corners  // of the frame, for detection
       = {.corners = {300, 200, 120, 60}, .min_score = 20};
   int max_distance = 60000;  // squared, of matched descriptors
@@ -31,7 +31,7 @@ struct PlanarTargetOptions {
 };
 
 // Where the target was found in one frame.
-struct TargetSighting {
+struct TargetDetection {
   struct Point {
     std::uint32_t id = 0;  // of the target's point: the same in every frame
     Eigen::Vector3d point_in_target = Eigen::Vector3d::Zero();
@@ -43,13 +43,13 @@ struct TargetSighting {
   double rms_px = 0;          // of `points`
 };
 
-// A printed picture of known width that tells a camera where it is, in metres (hybrid-slam §5.5): found by
-// descriptors without any prior, then aligned patch by patch. Target frame: origin in the picture's middle, x
+// A printed image of known width that tells a camera where it is, in metres (hybrid-slam §5.5): found by
+// descriptors without any prior, then aligned patch by patch. Target frame: origin in the image's middle, x
 // right, y down in the plane, z away from the viewer. The patches follow the pose, so that scale and slant
 // cost no accuracy. Immutable; safe to share across threads.
 class PlanarTarget {
  public:
-  // gray: CV_8UC1. Throws docent::Error with one sentence where the picture is too small (64 pixels on a
+  // gray: CV_8UC1. Throws docent::Error with one sentence where the image is too small (64 pixels on a
   // side) or shows too little to be found by, or the width is no positive length.
   PlanarTarget(const cv::Mat& gray, double width_m, const PlanarTargetOptions& options = {});
 
@@ -58,12 +58,12 @@ class PlanarTarget {
 
   // Finds the target anywhere in a frame, most often where it is seen up to about 50 degrees aslant and is at
   // least 150 pixels wide. Some milliseconds; deterministic under the seed. Empty where it is not seen.
-  std::optional<TargetSighting> Detect(const ImageFeatures& features, const CameraModel& camera,
-                                       std::uint64_t seed) const;
+  std::optional<TargetDetection> Detect(const ImageFeatures& features, const CameraModel& camera,
+                                        std::uint64_t seed) const;
   // The target near a pose that is right to within about ten pixels of the frame. Empty where it is not
   // there.
-  std::optional<TargetSighting> Align(const ImageFeatures& features, const CameraModel& camera,
-                                      const Rigid3& camera_from_target) const;
+  std::optional<TargetDetection> Align(const ImageFeatures& features, const CameraModel& camera,
+                                       const Rigid3& camera_from_target) const;
 
  private:
   static constexpr std::size_t kModelLevels = 5;

@@ -44,7 +44,7 @@ std::vector<PlanarTarget::PatchMatch> PlanarTarget::AlignPoints(const ImageFeatu
       if (*looked_for >= options_.points_a_stage) return matches;
       const Eigen::Vector3d in_target = InTarget(point.pixel);
       const Eigen::Vector3d in_camera = rotation * in_target + camera_from_target.translation;
-      // Seen from behind, the picture is not there.
+      // Seen from behind, the image is not there.
       if (!(in_camera.dot(rotation.col(2)) > 0)) continue;
       Eigen::Vector2d pixel;
       Eigen::Matrix<double, 2, 3> jacobian;
@@ -77,9 +77,9 @@ std::vector<PlanarTarget::PatchMatch> PlanarTarget::AlignPoints(const ImageFeatu
   return matches;
 }
 
-std::optional<TargetSighting> PlanarTarget::Align(const ImageFeatures& features, const CameraModel& camera,
-                                                  const Rigid3& camera_from_target) const {
-  std::optional<TargetSighting> sighting;
+std::optional<TargetDetection> PlanarTarget::Align(const ImageFeatures& features, const CameraModel& camera,
+                                                   const Rigid3& camera_from_target) const {
+  std::optional<TargetDetection> sighting;
   Rigid3 pose = camera_from_target;
   for (const Stage& stage : kStages) {
     int looked_for = 0;

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "engine/geometry/triangulation.h"
-#include "engine/mapping/free_corners.h"
+#include "engine/mapping/unmatched_corners.h"
 
 namespace docent::engine {
 
@@ -34,7 +34,7 @@ std::vector<KnownDepth> KnownDepths(Map& map, const Map::KeyFrameRecord& target)
   return known;
 }
 
-// Depths near a pixel say how far to look; where the picture knows nothing, the keyframe's own spread does.
+// Depths near a pixel say how far to look; where the image knows nothing, the keyframe's own spread does.
 DepthRange GuessRange(const std::vector<KnownDepth>& known, const KeyFrame& target,
                       const Eigen::Vector2f& pixel) {
   constexpr std::size_t kNeighbours = 6;
@@ -205,10 +205,10 @@ class PairSearch {
         continue;
       const float correlation = PatchCorrelation(patch, features.levels[level], corner.x, corner.y);
       if (correlation > best) {
-        // A neighbour on the same structure is no rival.
-        const bool rival =
+        // A neighbour on the same structure is no competitor.
+        const bool competitor =
             best_corner && std::abs(best_corner->x - corner.x) + std::abs(best_corner->y - corner.y) > 4;
-        if (rival) second = best;
+        if (competitor) second = best;
         best = correlation;
         best_corner = &corner;
       } else if (best_corner &&
@@ -231,7 +231,7 @@ class PairSearch {
   std::uint32_t scratch_id_ = 0;
 };
 
-// How many points each part of the picture has.
+// How many points each part of the image has.
 class CellCounts {
  public:
   explicit CellCounts(const CameraModel& camera)
@@ -265,7 +265,7 @@ std::vector<MapPointId> CreatePoints(const PointCreationOptions& options, KeyFra
     Occupancy occupancy(target->keyframe.features->levels[index], options.min_distance_px);
     int accepted = 0;
     for (const ScoredCorner& scored :
-         FreeCorners(*target, index, options.min_faint_corner_score, &occupancy)) {
+         UnmatchedCorners(*target, index, options.min_faint_corner_score, &occupancy)) {
       if (accepted >= options.max_points[index]) break;
       const Eigen::Vector2f pixel(scored.corner.x, scored.corner.y);
       if (occupancy.Taken(pixel)) continue;

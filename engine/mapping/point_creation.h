@@ -9,9 +9,9 @@ namespace docent::engine {
 struct PointCreationOptions {
   std::array<int, kPyramidLevels> max_points = {180, 120, 80, 50};  // a keyframe pair, by level
   float min_corner_score = 40.0f;  // Shi-Tomasi, grey values squared: "particularly salient" (ptamm §2.3)
-  // Where the picture has nothing better, faint corners must do: better a few than none.
+  // Where the image has nothing better, faint corners must do: better a few than none.
   float min_faint_corner_score = 15.0f;
-  int few_points = 3;            // in a cell of an 8x6 grid over the picture: there faint corners count
+  int few_points = 3;            // in a cell of an 8x6 grid over the image: there faint corners count
   float min_distance_px = 7.0f;  // to any matched feature of that level, pixels of the level (ptamm §2.3)
   float epipolar_tolerance_px = 2.0f;   // of the level
   float min_correlation = 0.80f;        // of the best corner along the epipolar line

@@ -46,7 +46,7 @@ std::vector<double> AppendTargetPoints(const TargetView& a, const TargetView& b,
   std::vector<double> parallax_deg;
   const double baseline_m = b_from_a.translation.norm();
   auto other = b.sighting.points.begin();
-  for (const TargetSighting::Point& point : a.sighting.points) {
+  for (const TargetDetection::Point& point : a.sighting.points) {
     while (other != b.sighting.points.end() && other->id < point.id) ++other;
     if (other == b.sighting.points.end()) break;
     if (other->id != point.id) continue;
@@ -148,7 +148,7 @@ void TargetInitializer::Reset() {
   hint_ = kFindTarget;
 }
 
-std::optional<TargetSighting> TargetInitializer::Sight(const ImageFeatures& features) {
+std::optional<TargetDetection> TargetInitializer::Sight(const ImageFeatures& features) {
   if (sighting_ && previous_) {
     // What a hand does between two frames is mostly a rotation.
     const auto rotation = AlignRotation(previous_->small_blurry, *camera_, features.small_blurry, *camera_);

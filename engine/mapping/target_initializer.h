@@ -28,7 +28,7 @@ struct TargetStart {
 // A view, where the target was in it, and its corners that were followed to the other view.
 struct TargetView {
   InitialPair::View view;
-  TargetSighting sighting;
+  TargetDetection sighting;
 };
 // The start that two views give: points of the target that both saw, where the plane says they are, and
 // followed corners beside it, triangulated. Empty where parallax or points are too few; *hint then says what
@@ -38,7 +38,7 @@ std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraMod
                                            const std::vector<InitialPair::Match>& followed,
                                            const TargetStartOptions& options, std::string* hint);
 
-// Waits for the target, tracks the camera from it, and follows corners all over the picture beside it, until
+// Waits for the target, tracks the camera from it, and follows corners all over the image beside it, until
 // two views start a map (hybrid-slam §5.5). Used like an Initializer, in its place: one a camera, on the
 // tracker's thread.
 class TargetInitializer {
@@ -56,12 +56,12 @@ class TargetInitializer {
   // Why there is no map so far.
   const std::string& hint() const { return hint_; }
   // Where the target was in the last frame; empty when it was not seen there.
-  const std::optional<TargetSighting>& sighting() const { return sighting_; }
+  const std::optional<TargetDetection>& sighting() const { return sighting_; }
   // Corners being followed since the first view.
   const std::vector<Initializer::Trail>& trails() const { return follower_.trails(); }
 
  private:
-  std::optional<TargetSighting> Sight(const ImageFeatures& features);
+  std::optional<TargetDetection> Sight(const ImageFeatures& features);
 
   std::shared_ptr<const PlanarTarget> target_;
   TargetStartOptions options_;
@@ -69,7 +69,7 @@ class TargetInitializer {
   Random random_;
   Initializer follower_;  // of corners; never asked for a pose
   std::optional<TargetView> first_;
-  std::optional<TargetSighting> sighting_;
+  std::optional<TargetDetection> sighting_;
   std::shared_ptr<const ImageFeatures> previous_;
   std::string hint_;
 };

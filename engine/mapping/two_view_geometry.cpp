@@ -81,7 +81,7 @@ class TwoViewEstimator {
     return static_cast<int>(std::ceil(options_.min_inlier_ratio * static_cast<double>(pairs_.size())));
   }
 
-  // Over both pictures' noise, how far rays moved with the camera taken as still.
+  // Over both images' noise, how far rays moved with the camera taken as still.
   Eigen::ArrayXd SquaredDisplacementPx() const {
     return 2 * RotationResiduals(pairs_, Eigen::Matrix3d::Identity());
   }
@@ -156,7 +156,7 @@ class TwoViewEstimator {
     if (median_parallax_deg_ < options_.min_parallax_deg || far_ > kMaxFarShare * consistent_)
       return TwoViewVerdict::kTooLittleParallax;
     significance_ = MeasureDepthSignificance(
-        pairs_, explained_, b_from_a_,
+        pairs_, visible_inlier_ratio_, b_from_a_,
         model_ == ModelKind::kHomography ? StructureModel::kPlane : StructureModel::kGeneral,
         std::max(scatter_px_, kMinScatterPx), options_.depth_noise);
     if (!DepthIsSignificant()) return TwoViewVerdict::kTooLittleParallax;
@@ -177,11 +177,11 @@ class TwoViewEstimator {
   void Classify(const Eigen::ArrayXd& squared, const std::vector<Depth>& depths) {
     const double limit = options_.inlier_px * options_.inlier_px;
     inlier_.assign(depths.size(), false);
-    explained_.assign(depths.size(), false);
+    visible_inlier_ratio_.assign(depths.size(), false);
     for (std::size_t i = 0; i < depths.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
       if (!(squared[row] < limit) || depths[i] == Depth::kBehind) continue;
-      explained_[i] = true;
+      visible_inlier_ratio_[i] = true;
       ++consistent_;
       far_ += depths[i] == Depth::kTooFar;
       // On a plane the homography says more than the epipolar line: a match that slid along the line is
@@ -195,8 +195,8 @@ class TwoViewEstimator {
   void MeasureParallax() {
     const Eigen::Matrix3d rotation = b_from_a_.rotation.matrix();
     std::vector<double> angles;
-    for (std::size_t i = 0; i < explained_.size(); ++i) {
-      if (!explained_[i]) continue;
+    for (std::size_t i = 0; i < visible_inlier_ratio_.size(); ++i) {
+      if (!visible_inlier_ratio_[i]) continue;
       const auto row = static_cast<Eigen::Index>(i);
       const double chord = (rotation * pairs_.RayA(row) - pairs_.RayB(row)).norm();
       angles.push_back(2 * std::asin(std::min(chord / 2, 1.0)));
@@ -227,7 +227,7 @@ class TwoViewEstimator {
            options.min_inliers;
   }
 
-  // A share of the picture did not move at all and has no parallax either, while the rest has: more likely a
+  // A share of the image did not move at all and has no parallax either, while the rest has: more likely a
   // still camera and a moving thing than a camera that moved without turning before a far background.
   bool LooksStillButForOneThing() const {
     constexpr double kMinStillShare = 0.08, kMinFarShare = 0.5;
@@ -253,7 +253,7 @@ class TwoViewEstimator {
   double scatter_px_ = 0, noise_px_ = 0;  // as seen; and as it is at least
   ModelKind model_ = ModelKind::kRotation;
   Rigid3 b_from_a_;
-  std::vector<bool> inlier_, explained_;
+  std::vector<bool> inlier_, visible_inlier_ratio_;
   int consistent_ = 0, far_ = 0;
   double median_parallax_deg_ = 0;
   DepthSignificance significance_;
@@ -277,7 +277,7 @@ const char* Advice(TwoViewVerdict verdict) {
     case TwoViewVerdict::kTooFewMatches:
       return "look at something with more texture, and move slowly";
     case TwoViewVerdict::kInconsistent:
-      return "wait until nothing moves in the picture, then move sideways";
+      return "wait until nothing moves in the image, then move sideways";
   }
   return "";
 }

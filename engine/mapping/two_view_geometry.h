@@ -36,7 +36,7 @@ struct TwoViewOptions {
 enum class TwoViewVerdict {
   kGeneral,            // essential matrix, scene with depth
   kPlanar,             // homography, the right one of its decompositions is clear
-  kStill,              // the picture did not move
+  kStill,              // the image did not move
   kPureRotation,       // explained by a rotation: nothing to triangulate
   kTooLittleParallax,  // translation is there but depth would be a guess
   kAmbiguousPlane,     // two poses explain the plane equally well

@@ -8,8 +8,8 @@
 
 // How well a rotation, a homography or an essential matrix explains ray pairs, and the least-squares
 // refinement of each. All residuals are first-order distances from the model's manifold in the joint space of
-// both pictures (Sampson), in pixels of TwoViewOptions::pixel_angle: with noise of sigma pixels on every
-// coordinate of both pictures, an essential matrix leaves sigma^2 and the other two 2 sigma^2 on average, so
+// both images (Sampson), in pixels of TwoViewOptions::pixel_angle: with noise of sigma pixels on every
+// coordinate of both images, an essential matrix leaves sigma^2 and the other two 2 sigma^2 on average, so
 // that the three can be compared. Pure functions; any thread.
 namespace docent::engine {
 

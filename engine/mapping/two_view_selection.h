@@ -10,7 +10,7 @@ namespace docent::engine {
 
 enum class ModelKind { kRotation, kHomography, kEssential };
 
-// Standard deviation of a picture coordinate, pixels, from the residuals that the best-fitting essential
+// Standard deviation of an image coordinate, pixels, from the residuals that the best-fitting essential
 // matrix leaves on its inliers: the loosest of the three models shows the noise alone.
 double EstimateScatter(const RayPairs& pairs, const Consensus& essential, double inlier_px);
 

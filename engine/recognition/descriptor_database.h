@@ -14,7 +14,7 @@
 
 namespace docent::engine {
 
-// Finds which observations of a map look like those of a picture, without knowing where the picture was
+// Finds which observations of a map look like those of an image, without knowing where the image was
 // taken: the descriptors of observations in the leaves of a vocabulary tree (hybrid-slam §5.4). The mapper
 // owns one for observations of finite points and one for those of infinite points, and keeps them in step
 // with the map; adding and removing cost the same however large the map is. Const members may be called from
@@ -72,7 +72,7 @@ class DescriptorDatabase {
     // inverse document frequency, Sivic and Zisserman 2003); 1 for the keyframe itself, 0 for nothing shared.
     double score = 0;
   };
-  // The `count` keyframes most like a picture with these descriptors, best first.
+  // The `count` keyframes most like an image with these descriptors, best first.
   std::vector<Vote> FindKeyFrames(std::span<const Descriptor> descriptors, std::size_t count,
                                   KeyFrameId except_keyframe = kNoId) const;
 
@@ -107,7 +107,7 @@ class DescriptorDatabase {
   std::size_t size_ = 0;
 };
 
-// Adds the descriptors of an observation in its keyframe's picture: on its level and `levels_around` coarser
+// Adds the descriptors of an observation in its keyframe's image: on its level and `levels_around` coarser
 // and finer ones, as far as the patch fits into them, so that it is recognised from nearer and further too.
 void AddObservation(const ImageFeatures& features, const Observation& observation, int levels_around,
                     DescriptorDatabase* database);

@@ -11,7 +11,7 @@
 
 namespace docent::engine {
 
-// A keyframe that looks like the present picture, in one of the maps. Appearance only: nothing is verified.
+// A keyframe that looks like the present image, in one of the maps. Appearance only: nothing is verified.
 struct PlaceCandidate {
   std::uint64_t map_key = 0;
   std::shared_ptr<const MapSnapshot> map;
@@ -19,14 +19,14 @@ struct PlaceCandidate {
   double difference = 0;  // mean squared difference of the thumbnails
 };
 
-// What is known of the picture whose place is sought. A view: whoever asks keeps both until the answer.
+// What is known of the image whose place is sought. A view: whoever asks keeps both until the answer.
 struct PlaceQuery {
   // By its thumbnail alone.
-  PlaceQuery(const SmallBlurryImage& picture)  // NOLINT(google-explicit-constructor)
-      : image(&picture) {}
+  PlaceQuery(const SmallBlurryImage& thumbnail)  // NOLINT(google-explicit-constructor)
+      : image(&thumbnail) {}
   // By its words as well; empty ones are none.
-  PlaceQuery(const SmallBlurryImage& picture, const WordBag& picture_words)
-      : image(&picture), words(&picture_words) {}
+  PlaceQuery(const SmallBlurryImage& thumbnail, const WordBag& visual_words)
+      : image(&thumbnail), words(&visual_words) {}
 
   const SmallBlurryImage* image;
   const WordBag* words = nullptr;

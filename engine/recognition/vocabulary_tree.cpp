@@ -129,7 +129,7 @@ VocabularyTree VocabularyTree::Train(std::vector<Descriptor> descriptors, std::u
   if (descriptors.size() < kMinTraining) {
     throw Error("A vocabulary needs at least " + std::to_string(kMinTraining) +
                 " descriptors, and there are " + std::to_string(descriptors.size()) +
-                "; give more pictures, or pictures with more texture.");
+                "; give more images, or images with more texture.");
   }
   VocabularyTree tree;
   std::size_t settled = 0;

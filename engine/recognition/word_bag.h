@@ -10,7 +10,7 @@
 
 namespace docent::engine {
 
-// A leaf of the vocabulary tree and how often a picture has it, in two bytes: what looks alike has one word
+// A leaf of the vocabulary tree and how often an image has it, in two bytes: what looks alike has one word
 // (Sivic and Zisserman 2003). A word that is there more often than kMaxCount counts as kMaxCount.
 class VisualWord {
  public:
@@ -32,17 +32,17 @@ class VisualWord {
   std::uint16_t bits_;
 };
 
-// What a picture shows, without where: by ascending leaf, each leaf once. Where a camera rolls, comes nearer
+// What an image shows, without where: by ascending leaf, each leaf once. Where a camera rolls, comes nearer
 // or looks aside, the words that stay in sight stay the same.
 using WordBag = std::vector<VisualWord>;
 
 struct WordBagOptions {
   // None of the finest level: its corners are noise and motion blur first of all, and every word has its
-  // price. A picture of 640 x 480 gets about 190 words.
+  // price. An image of 640 x 480 gets about 190 words.
   CornerDescriptionOptions corners{.corners = {0, 60, 60, 40}, .min_score = 20};
 };
 
-// The words of the best corners of a picture. The same features and tree give the same words.
+// The words of the best corners of an image. The same features and tree give the same words.
 WordBag MakeWordBag(const ImageFeatures& features, const VocabularyTree& tree = DefaultVocabulary(),
                     const WordBagOptions& options = {});
 // Of leaves in any order.

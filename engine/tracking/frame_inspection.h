@@ -29,9 +29,9 @@ struct FrameInspection {
   // The guess that the last search began with; empty when no map was searched in this frame.
   std::optional<Rigid3> predicted;
   std::vector<InspectedPoint> points;             // that were looked for in the last search, in its order
-  int visible_points = 0;                         // finite ones that the guess puts into the picture
+  int visible_points = 0;                         // finite ones that the guess puts into the image
   PanoramaId panorama = kNoId;                    // whose infinite points were looked for
-  std::shared_ptr<const ImageFeatures> features;  // of the picture; null before the first one
+  std::shared_ptr<const ImageFeatures> features;  // of the image; null before the first one
 };
 
 }  // namespace docent::engine

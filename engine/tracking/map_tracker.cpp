@@ -36,7 +36,7 @@ void MapTracker::Clear() {
   Forget();
 }
 
-// Those of the points that fall into the picture, into visible_.
+// Those of the points that fall into the image, into visible_.
 void MapTracker::Project(const std::vector<NearbyPoint>& points, bool infinite,
                          const Rigid3& camera_from_map) {
   visible_.clear();
@@ -78,7 +78,7 @@ bool MapTracker::IsWorthATry(MapPointId point, Random* random) const {
   return random->Below(1 + misses.in_a_row) == 0;
 }
 
-// The order in which visible_ is tried. A choice among many is spread over the picture and over the map as if
+// The order in which visible_ is tried. A choice among many is spread over the image and over the map as if
 // it were drawn at random, but for the most part it is the choice of the frame before: patches that were cut
 // still fit, and the pose does not tremble with the choice. Every point draws anew once in kDrawFrames
 // frames.
@@ -104,7 +104,7 @@ void MapTracker::AddCandidates(const Rigid3& camera_from_map, std::size_t wanted
     if (candidates_.size() - before >= wanted) break;
     const NearbyPoint& local = visible_[which];
     if (!IsWorthATry(local.id, random)) {
-      ++spared_;
+      ++skipped_as_occluded_;
       continue;
     }
     const auto predicted =
@@ -127,7 +127,7 @@ void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_fro
   candidates_.clear();
   coarse_.clear();
   fine_.clear();
-  spared_ = 0;
+  skipped_as_occluded_ = 0;
   ++draw_frame_;
   taken_.assign(static_cast<std::size_t>((camera_->width_px() / kTakenCellPx + 1) *
                                          (camera_->height_px() / kTakenCellPx + 1)),
@@ -207,13 +207,13 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   CollectVisible(map, predicted, random);
 
   if (effort == Effort::kRecovery) {
-    // Of directions alone there is no pose without a guess; the guess has turned as the picture has.
+    // Of directions alone there is no pose without a guess; the guess has turned as the image has.
     if (!nearby_.infinite().empty() && panorama_ != kNoId && visible_finite_ < options_.min_coarse)
       return Track(map, features, predicted, Effort::kWide, random);
     const auto recovered = PoseFromPatches(features, random);
     if (!recovered) return result;
     Forget();
-    return Track(map, features, *recovered, Effort::kUsual, random);
+    return Track(map, features, *recovered, Effort::kStandard, random);
   }
   const bool wide = effort == Effort::kWide;
   Search(coarse_, features, wide ? options_.wide_radius_px : options_.coarse_radius_px, false);
@@ -231,12 +231,12 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   }
   Search(fine_, features, radius, true);
   result.attempted = static_cast<int>(attempts_.size());
-  result.spared = spared_;
+  result.skipped_as_occluded = skipped_as_occluded_;
   result.found = static_cast<int>(measurements_.size());
   const PoseRefinement fine = RefinePose(*camera_, result.camera_from_map, options_.refinement,
                                          &measurements_, &memory_, {turn_.pivot, predicted, turn_.sure});
   result.camera_from_map = fine.camera_from_map;
-  result.by_points_alone = fine.by_points_alone;
+  result.camera_from_map_without_prior = fine.camera_from_map_without_prior;
   result.covariance = fine.covariance;
   result.observed = fine.observed;
   result.converged = fine.converged;

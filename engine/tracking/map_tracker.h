@@ -11,8 +11,8 @@
 #include "engine/tracking/nearby_points.h"
 #include "engine/tracking/point_search.h"
 #include "engine/tracking/pose_refinement.h"
+#include "engine/tracking/rotation_center.h"
 #include "engine/tracking/tracked_frame.h"
-#include "engine/tracking/turn_center.h"
 
 // Finds the pose of one frame in one map from a guess: coarse stage, fine stage, robust pose (ptamm §2.1).
 // Knows nothing of time: prediction, loss and recovery are the Tracker's.
@@ -40,24 +40,26 @@ struct MapTrackerOptions {
 
 struct MapTrackResult {
   Rigid3 camera_from_map;
-  Rigid3 by_points_alone;  // without the turn that was expected, see PoseRefinement
+  Rigid3 camera_from_map_without_prior;  // without the turn that was expected, see PoseRefinement
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   ObservedMotion observed = ObservedMotion::kSixDof;
   int attempted = 0, found = 0, inliers = 0;
-  int spared = 0;          // points in view that were not looked for, as they have long been hidden
-  int finite_inliers = 0;  // of the inliers
-  // Shares of a 4x3 grid over the picture in which enough inliers lie, finite ones and all (hybrid-slam
+  int skipped_as_occluded = 0;  // points in view that were not looked for, as they have long been hidden
+  int finite_inliers = 0;       // of the inliers
+  // Shares of a 4x3 grid over the image in which enough inliers lie, finite ones and all (hybrid-slam
   // §4.1).
   double finite_coverage = 0, coverage = 0;
   int coarse_attempted = 0, coarse_found = 0;
   double sigma = 0;        // robust, of the normalised residuals
-  int occupied_cells = 0;  // of a 4x4 grid over the picture: how well the inliers are spread
+  int occupied_cells = 0;  // of a 4x4 grid over the image: how well the inliers are spread
   bool converged = false;
   double median_depth = 0;  // metres, of the inliers
   // found / attempted (ptamm §2.1).
   double Quality() const { return attempted > 0 ? static_cast<double>(inliers) / attempted : 0; }
   // How much of the map in view is seen, hidden points among it: tells maps from each other.
-  double Explained() const { return inliers > 0 ? static_cast<double>(inliers) / (attempted + spared) : 0; }
+  double VisibleInlierRatio() const {
+    return inliers > 0 ? static_cast<double>(inliers) / (attempted + skipped_as_occluded) : 0;
+  }
 };
 
 class MapTracker {
@@ -65,7 +67,7 @@ class MapTracker {
   MapTracker(const MapTrackerOptions& options, std::shared_ptr<const CameraModel> camera);
 
   enum class Effort {
-    kUsual,     // the prediction is a good one
+    kStandard,  // the prediction is a good one
     kWide,      // the motion was a surprise: look further
     kRecovery,  // the guess may be altogether wrong: look far, and stop early where the large patches
                 // disagree
@@ -74,7 +76,7 @@ class MapTracker {
   MapTrackResult Track(const MapSnapshot& map, const ImageFeatures& features, const Rigid3& predicted,
                        Effort effort, Random* random);
   // What the camera turns about where its place cannot be told.
-  void ExpectTurn(const Turn& turn) { turn_ = turn; }
+  void SetRotationPrior(const Turn& turn) { turn_ = turn; }
 
   const std::vector<PointMatch>& matches() const { return matches_; }
   // Every point looked for in the last call: whether it was found, and whether it agreed with the pose.
@@ -84,14 +86,14 @@ class MapTracker {
   };
   const std::vector<Attempt>& attempts() const { return attempts_; }
   // All about the last call of Track, and of the pose that came of it. The snapshot that it was given must
-  // live still. Leaves the picture's features to the caller.
+  // live still. Leaves the image's features to the caller.
   FrameInspection Inspect(const Rigid3& camera_from_map) const;
   // To be called when another map is tracked from now on.
   void Clear();
   // Infinite points of this panorama map are looked for from now on beside the finite points; kNoId for none.
   void EnablePanorama(PanoramaId panorama) { panorama_ = panorama; }
   PanoramaId panorama() const { return panorama_; }
-  // How patches are compared from now on; kUsual at first.
+  // How patches are compared from now on; kStandard at first.
   void Compare(PatchComparison comparison) { searcher_.Compare(comparison); }
   // The frame just tracked was not believed: the next one chooses its points by the guessed pose alone.
   void Forget() {
@@ -142,8 +144,8 @@ class MapTracker {
   std::vector<NearbyPoint> visible_;
   std::vector<std::uint8_t> bins_;    // of visible_
   std::vector<std::uint32_t> order_;  // in which visible_ is tried
-  int visible_finite_ = 0, spared_ = 0;
-  std::vector<std::uint8_t> taken_;  // cells of the picture where finite points are expected
+  int visible_finite_ = 0, skipped_as_occluded_ = 0;
+  std::vector<std::uint8_t> taken_;  // cells of the image where finite points are expected
   std::vector<Candidate> candidates_;
   std::vector<std::uint32_t> coarse_, fine_;
   std::vector<std::uint32_t> measured_;  // candidate of each measurement

@@ -40,7 +40,7 @@ class MotionModel {
     const double seconds = std::clamp(ToSeconds(time - time_), 0.0, 0.2);
     return Rigid3::Exp(twist_per_second_ * seconds) * camera_from_map_;
   }
-  // Only the sideways and the rotating part replaced by what the pictures say; see Tracker.
+  // Only the sideways and the rotating part replaced by what the images say; see Tracker.
   Rigid3 PredictWithRotation(const Rotation3& now_from_previous) const {
     return Rigid3(now_from_previous, Eigen::Vector3d::Zero()) * camera_from_map_;
   }

@@ -135,13 +135,13 @@ void NearbyPoints::Take(const MapSnapshot& map, bool infinite, std::vector<Nearb
 }
 
 // The first view of a point is the one that all others were measured against, and stays the source wherever
-// it will do. From the side, or from much nearer or further, a warped patch is a poor picture of it: then it
+// it will do. From the side, or from much nearer or further, a warped patch is a poor image of it: then it
 // is cut where the chosen keyframe that sees it most alike shows it (ptamm §2.1 has the first view alone).
 void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_from_map) {
   const Eigen::Vector3d center = camera_from_map.OriginInSource();
   const double most = options_.max_source_misfit * options_.max_source_misfit;
   const double better = options_.better_source * options_.better_source;
-  poorly_shown_.clear();
+  poorly_viewed_.clear();
   const KeyFrame* source = nullptr;
   Eigen::Vector3d source_center = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < finite_.size(); ++i) {
@@ -152,16 +152,16 @@ void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_fr
     const Eigen::Vector3d position = finite_[i].place.head<3>();
     const double misfit = SquaredMisfit(source_center - position, center - position);
     if (misfit > most)
-      poorly_shown_.push_back({finite_[i].id, static_cast<std::uint32_t>(i), better * misfit});
+      poorly_viewed_.push_back({finite_[i].id, static_cast<std::uint32_t>(i), better * misfit});
   }
   resourced_.clear();
-  resourced_.reserve(poorly_shown_.size());
-  if (poorly_shown_.empty()) return;
+  resourced_.reserve(poorly_viewed_.size());
+  if (poorly_viewed_.empty()) return;
   for (const auto& [rank, index] : ranked_) {
     const KeyFrame& keyframe = map.keyframes[index];
     const Eigen::Vector3d keyframe_center = keyframe.camera_from_map.OriginInSource();
-    PoorlyShown* next = poorly_shown_.data();
-    PoorlyShown* const end = next + poorly_shown_.size();
+    PoorlyViewed* next = poorly_viewed_.data();
+    PoorlyViewed* const end = next + poorly_viewed_.size();
     for (const Observation& observation : ObservationsOf(map, keyframe.id)) {
       while (next != end && next->point < observation.point) ++next;
       if (next == end) break;
@@ -174,7 +174,7 @@ void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_fr
 }
 
 void NearbyPoints::TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit,
-                              PoorlyShown* poor) {
+                              PoorlyViewed* poor) {
   NearbyPoint& nearby = finite_[poor->index];
   // The patch is cut where the point was seen, not where the map puts it: what a wrong lens does to the map
   // must show in the residuals. But the two must agree.

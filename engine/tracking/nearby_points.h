@@ -28,7 +28,7 @@ struct NearbyPointOptions {
 struct NearbyPoint {
   const MapPoint* point;   // its source is the keyframe whose view of it resembles the present one
   const KeyFrame* source;  // that keyframe
-  // As in *point, beside what else it takes to tell whether it is in the picture.
+  // As in *point, beside what else it takes to tell whether it is in the image.
   MapPointId id;
   Eigen::Vector3f normal;
   // Homogeneous, in the map. While the camera turns about a point that is not its own centre, a direction
@@ -62,13 +62,14 @@ class NearbyPoints {
   void Take(const MapSnapshot& map, bool infinite, std::vector<NearbyPoint>* points);
   void ChooseSources(const MapSnapshot& map, const Rigid3& camera_from_map);
   // A point of finite_ that its source shows poorly.
-  struct PoorlyShown {
+  struct PoorlyViewed {
     MapPointId point;
     std::uint32_t index;          // in finite_
     double wanted;                // squared misfit that a view must stay below
     std::int32_t resourced = -1;  // place in resourced_
   };
-  void TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit, PoorlyShown* poor);
+  void TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit,
+                  PoorlyViewed* poor);
 
   NearbyPointOptions options_;
   std::vector<NearbyPoint> finite_, infinite_;
@@ -82,7 +83,7 @@ class NearbyPoints {
   // Scratch, kept to save allocations.
   std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
   PointIdSet wanted_;
-  std::vector<PoorlyShown> poorly_shown_;  // by ascending point
+  std::vector<PoorlyViewed> poorly_viewed_;  // by ascending point
 };
 
 }  // namespace docent::engine

@@ -97,7 +97,7 @@ bool PointSearcher::FindSteps(const MapPoint& point, const KeyFrame& source, con
   return true;
 }
 
-// How the patch is stretched in the present picture, and the level that shows it about as large.
+// How the patch is stretched in the present image, and the level that shows it about as large.
 bool PointSearcher::FindWarp(const Eigen::Matrix3d& rotation, PredictedPoint* predicted) {
   const Eigen::Matrix<double, 3, 2> steps_in_camera = rotation * predicted->steps_in_map;
   predicted->pixel_from_source = (predicted->jacobian * steps_in_camera).cast<float>();

@@ -41,7 +41,7 @@ struct FoundPoint {
 };
 
 enum class PatchComparison : std::uint8_t {
-  kUsual,
+  kStandard,
   kTolerant  // of images whose exposure or sharpness may be another; see AlignPatchTolerantly
 };
 
@@ -49,7 +49,7 @@ class PointSearcher {
  public:
   explicit PointSearcher(const SearchOptions& options = {}) : options_(options) {}
 
-  // How patches are compared from now on; kUsual at first.
+  // How patches are compared from now on; kStandard at first.
   void Compare(PatchComparison comparison) { comparison_ = comparison; }
   PatchComparison comparison() const { return comparison_; }
 
@@ -74,7 +74,7 @@ class PointSearcher {
   bool Repredict(const MapPoint& point, const CameraModel& camera, const Rigid3& camera_from_map,
                  const Eigen::Vector4d& place, PredictedPoint* predicted) const;
 
-  // Looks for the point within radius_px (level 0) of its prediction: at the corners there, and, where
+  // Appearance for the point within radius_px (level 0) of its prediction: at the corners there, and, where
   // allowed, by alignment from the predicted place itself.
   std::optional<FoundPoint> Find(const MapPoint& point, const KeyFrame& source,
                                  const PredictedPoint& predicted, const ImageFeatures& features,
@@ -107,7 +107,7 @@ class PointSearcher {
   PatchTemplate& PatchOf(Cached* entry);
 
   SearchOptions options_;
-  PatchComparison comparison_ = PatchComparison::kUsual;
+  PatchComparison comparison_ = PatchComparison::kStandard;
   std::vector<Cached> cache_;  // direct mapped: slot id % size
   // Most points that are predicted are never looked for, and a patch is large: room for all is reserved, but
   // touched only as patches come.

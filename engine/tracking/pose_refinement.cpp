@@ -93,7 +93,7 @@ struct Held {
 };
 
 PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const PoseRefinementOptions& options,
-                      const ExpectedTurn& turn, const Held& held, std::vector<PoseMeasurement>* measurements,
+                      const RotationPrior& turn, const Held& held, std::vector<PoseMeasurement>* measurements,
                       PoseRefinementMemory* memory) {
   const bool turn_only = held.turn_only;
   const Eigen::Vector3d pivot = turn_only ? turn.pivot : Eigen::Vector3d::Zero();
@@ -199,7 +199,7 @@ bool IsPlaced(const PoseRefinement& result, double largest) {
 
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          PoseRefinementMemory* memory, const ExpectedTurn& turn) {
+                          PoseRefinementMemory* memory, const RotationPrior& turn) {
   const auto finite = std::count_if(measurements->begin(), measurements->end(),
                                     [](const PoseMeasurement& m) { return !m.infinite(); });
   const auto infinite = static_cast<std::ptrdiff_t>(measurements->size()) - finite;
@@ -208,15 +208,15 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
   if (finite >= options.min_finite || !may_turn) {
     held.infinite_weight = options.infinite_weight;
     PoseRefinement result = Refine(camera, start, options, turn, held, measurements, memory);
-    const Rigid3 by_points_alone = result.camera_from_map;
+    const Rigid3 camera_from_map_without_prior = result.camera_from_map;
     const bool enough = result.finite_inliers >= options.min_finite;
     const bool placed = enough && IsPlaced(result, options.max_position_sigma);
     if (turn.sure && enough && !IsPlaced(result, options.max_position_sigma / 2)) {
-      held.sigma = options.sure_turn_sigma * result.mean_depth;
+      held.sigma = options.prior_translation_sigma * result.mean_depth;
       result = Refine(camera, start, options, turn, held, measurements, memory);
     }
     if (!may_turn || placed || held.sigma > 0) {
-      result.by_points_alone = by_points_alone;
+      result.camera_from_map_without_prior = camera_from_map_without_prior;
       const bool infinite_too = result.inliers > result.finite_inliers;
       result.observed = infinite_too ? ObservedMotion::kHybrid : ObservedMotion::kSixDof;
       if (may_turn && !placed) result.observed = ObservedMotion::kPanorama;

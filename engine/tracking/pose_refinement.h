@@ -32,14 +32,14 @@ struct PoseRefinementOptions {
   // have turned only (hybrid-slam §4.3).
   int min_finite = 15;
   // Nor is there where they say it less surely than this, of the depth of what they show: a few points at the
-  // rim of the picture err together, by ten times what each by itself would let one think. Then the camera is
+  // rim of the image err together, by ten times what each by itself would let one think. Then the camera is
   // taken to have turned, and to have moved beside that by no more than about as much: where the points do
   // tell something of the way, it is not thrown away.
   double max_position_sigma = 0.003;
   // As far goes a camera beside a turn that is sure, in a frame; of the depth too, and taken as much less as
   // points seem surer than they are. It counts from half of max_position_sigma on: what places the camera
   // well must be free to say that it turns no more.
-  double sure_turn_sigma = 0.0003;
+  double prior_translation_sigma = 0.0003;
 };
 
 // What the measurements could tell of the pose.
@@ -54,7 +54,7 @@ struct PoseRefinement {
   // Of the left twist in the camera frame; zero for a translation that was not estimated.
   Eigen::Matrix<double, 6, 6> covariance;
   // The same without the turn that was expected; where `observed` is not kPanorama.
-  Rigid3 by_points_alone;
+  Rigid3 camera_from_map_without_prior;
   ObservedMotion observed = ObservedMotion::kSixDof;
   double sigma = 0;  // robust, of the normalised residuals
   int inliers = 0;
@@ -64,7 +64,7 @@ struct PoseRefinement {
 };
 
 // The turn that the motion so far lets expect.
-struct ExpectedTurn {
+struct RotationPrior {
   // A point that stays where `camera_from_map` has it; camera frame, zero for the camera's own centre.
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
   Rigid3 camera_from_map;
@@ -90,6 +90,6 @@ struct PoseRefinementMemory {
 // ones. Does not allocate beyond *memory.
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          PoseRefinementMemory* memory, const ExpectedTurn& turn);
+                          PoseRefinementMemory* memory, const RotationPrior& turn);
 
 }  // namespace docent::engine

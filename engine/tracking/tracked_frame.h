@@ -13,21 +13,21 @@
 #include "engine/base/time.h"
 #include "engine/geometry/rigid3.h"
 #include "engine/map/map_snapshot.h"
-#include "engine/tracking/verdict.h"
+#include "engine/tracking/relocalization_result.h"
 
 namespace docent::engine {
 
-// One picture as a camera delivered it. Pictures are not written to once they are in a Frame.
+// One image as a camera delivered it. Images are not written to once they are in a Frame.
 struct Frame {
   Timestamp time{};
   int camera = 0;           // index in the session
-  std::uint64_t index = 0;  // counts the pictures of this camera, dropped ones too
-  cv::Mat picture;          // CV_8UC3 (BGR) or CV_8UC1
-  // now_from_previous of a camera that was told to turn its head since its previous picture; empty otherwise.
+  std::uint64_t index = 0;  // counts the images of this camera, dropped ones too
+  cv::Mat image;            // CV_8UC3 (BGR) or CV_8UC1
+  // now_from_previous of a camera that was told to turn its head since its previous image; empty otherwise.
   std::optional<Rotation3> turned;
 };
 
-// What the wearer is told of each picture; the names of command-line.md are in ToString.
+// What the wearer is told of each image; the names of command-line.md are in ToString.
 enum class TrackingState : std::uint8_t {
   kInitializing,
   kSixDof,
@@ -51,7 +51,7 @@ struct PointMatch {
   bool inlier = false;
 };
 
-// The tracker's answer for one frame; complete in itself, so that picture, pose and map always belong
+// The tracker's answer for one frame; complete in itself, so that image, pose and map always belong
 // together.
 struct TrackedFrame {
   Frame frame;
@@ -66,8 +66,8 @@ struct TrackedFrame {
   int finite_points = 0, infinite_points = 0;  // inliers
   std::vector<PointMatch> matches;
   std::chrono::nanoseconds tracking_time{};
-  std::string hint;  // a sentence for the wearer ("move sideways"), often empty
-  Verdict verdict;   // of a lost frame that resembles some place; no doubt otherwise
+  std::string hint;              // a sentence for the wearer ("move sideways"), often empty
+  RelocalizationResult verdict;  // of a lost frame that resembles some place; no doubt otherwise
 };
 
 }  // namespace docent::engine

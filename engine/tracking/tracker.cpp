@@ -38,10 +38,10 @@ Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraMode
       camera_(std::move(camera)),
       random_(seed),
       map_tracker_(options.map_tracker, camera_),
-      rival_tracker_(options.map_tracker, camera_),
+      competing_tracker_(options.map_tracker, camera_),
       initializer_(options.initializer, camera_, random_.Next()),
       selector_(options.selector, FieldOfView(*camera_)),
-      turn_center_(options.turn_center) {
+      rotation_center_(options.rotation_center) {
   if (options.target) target_initializer_.emplace(options.target, options.target_start, camera_, seed);
 }
 
@@ -71,10 +71,10 @@ void Tracker::Reset() {
   map_key_ = 0;
   starting_ = pair_given_ = tracking_ = search_known_maps_ = false;
   anchor_.reset();
-  turn_center_.Reset();
+  rotation_center_.Reset();
   turn_ = {};
-  entering_key_ = leader_key_ = 0;
-  entering_frames_ = leader_frames_ = doubtful_frames_ = 0;
+  hypothesis_key_ = leader_key_ = 0;
+  hypothesis_frames_ = leader_frames_ = doubtful_frames_ = 0;
   ResetStart();
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(kNoId);
@@ -105,7 +105,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     return;
   }
   if (starting_ && !map_->HasFinitePoints()) {
-    // Our own first picture became a map of directions.
+    // Our own first image became a map of directions.
     if (same && tracking_) return;
     const KeyFrame& first = map_->keyframes.front();
     map_tracker_.Clear();
@@ -129,12 +129,12 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
   } else if (!same) {
     map_tracker_.EnablePanorama(kNoId);
     selector_.Reset();
-    turn_center_.Reset();
+    rotation_center_.Reset();
     turn_ = {};
     map_tracker_.Clear();
     reports_.clear();
     anchor_.reset();
-    usually_explained_ = 1;
+    mean_visible_inlier_ratio_ = 1;
     tracking_ = false;
     lost_since_ = kLongAgo;
   }
@@ -156,11 +156,11 @@ std::shared_ptr<ImageFeatures> Tracker::NextFeatures(const Frame& frame) {
     pool_.push_back(features);
   }
   cv::Mat gray;
-  if (frame.picture.channels() == 1) {
-    gray = frame.picture;
+  if (frame.image.channels() == 1) {
+    gray = frame.image;
   } else {
     gray = features->levels[0];
-    cv::cvtColor(frame.picture, gray, cv::COLOR_BGR2GRAY);
+    cv::cvtColor(frame.image, gray, cv::COLOR_BGR2GRAY);
   }
   ExtractFeatures(gray, options_.features, fast_threshold_, features.get());
   fast_threshold_ = features->fast_threshold;
@@ -174,7 +174,7 @@ std::optional<Rotation3> Tracker::RotationFromPrevious() const {
   return aligned->b_from_a;
 }
 
-bool Tracker::Believable(const MapTrackResult& result) const {
+bool Tracker::IsAccepted(const MapTrackResult& result) const {
   const bool sure = result.observed == ObservedMotion::kPanorama || result.Quality() >= options_.sure_quality;
   const int min_inliers = sure ? options_.min_sure_inliers : options_.min_inliers;
   // What is compared tolerantly is found by chance more often, and visitors must not see exhibits jump.
@@ -182,19 +182,19 @@ bool Tracker::Believable(const MapTrackResult& result) const {
   const bool fits = !strict || result.Quality() >= options_.good_quality || FitsWell(result);
   return fits && result.converged && result.sigma <= options_.max_sigma && result.inliers >= min_inliers &&
          result.occupied_cells >= options_.min_cells &&
-         (result.Quality() >= options_.lost_quality || AgreesWidely(result));
+         (result.Quality() >= options_.lost_quality || HasWideConsensus(result));
 }
 
 // Whether so many points agree on the pose that it is right whatever else was looked for in vain.
-bool Tracker::AgreesWidely(const MapTrackResult& result) const {
-  return result.inliers >= options_.many_inliers && result.sigma <= options_.max_agreeing_sigma &&
-         result.inliers >= options_.min_agreement * result.found;
+bool Tracker::HasWideConsensus(const MapTrackResult& result) const {
+  return result.inliers >= options_.min_consensus_inliers && result.sigma <= options_.max_consensus_sigma &&
+         result.inliers >= options_.min_consensus_ratio * result.found;
 }
 
 // Where a visitor's camera sees few points of the map, as its lens shows a small part of it or its images
 // differ, few tell the pose nevertheless when they fit. Only where the camera was a moment ago: by such a
 // pose no place is recognised, and no map grows.
-bool Tracker::HoldsOn(const MapTrackResult& result) const {
+bool Tracker::HoldsTrack(const MapTrackResult& result) const {
   if (options_.build_maps || !result.converged || result.observed != ObservedMotion::kSixDof) return false;
   if (result.occupied_cells < options_.min_recovery_cells || result.Quality() < options_.lost_quality)
     return false;
@@ -229,23 +229,23 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   searched_ = map_ && tracking_;
 
   if (starting_ && !map_) {
-    LookForStart(frame, out);
+    SearchInitialPair(frame, out);
   } else if (tracking_) {
     TrackMap(frame, places, out);
     if (HasPose(out->state) && places) {
-      LookForBetterPlace(frame, *places, out);
-      if (!options_.build_maps) LookForBetterMap(frame, *places, out);
+      SearchBetterPlace(frame, *places, out);
+      if (!options_.build_maps) SearchBetterMap(frame, *places, out);
       if (search_known_maps_) SearchKnownMaps(frame, *places, out);
     }
   } else {
     Recover(frame, places, out);
   }
-  if (starting_ && map_) LookForStart(frame, out);
+  if (starting_ && map_) SearchInitialPair(frame, out);
   out->tracking_time = std::chrono::steady_clock::now() - start;
 }
 
 // Follows corners for two views that start a map; beside it a map of directions may already be tracked.
-void Tracker::LookForStart(const Frame& frame, TrackedFrame* out) {
+void Tracker::SearchInitialPair(const Frame& frame, TrackedFrame* out) {
   if (!map_) out->state = TrackingState::kInitializing;
   if (pair_given_) {
     if (!map_) out->hint = "hold on, making a map";
@@ -268,10 +268,10 @@ void Tracker::LookForStart(const Frame& frame, TrackedFrame* out) {
 }
 
 // The panorama map whose points are looked for: the one that is open, or one whose centre the camera is back
-// in when the map of finite points does not fill the picture.
+// in when the map of finite points does not fill the image.
 PanoramaId Tracker::PanoramaFor(const Rigid3& predicted) const {
   if (map_->panoramas.empty()) return kNoId;
-  if (selector_.mode() == KeyFrameSelector::Mode::kPanorama) return selector_.OpenPanorama(*map_);
+  if (selector_.mode() == KeyFramePolicy::Mode::kPanorama) return selector_.OpenPanorama(*map_);
   const bool needed =
       observed_ == ObservedMotion::kPanorama || finite_coverage_ < options_.selector.min_coverage;
   return needed ? selector_.PanoramaNear(predicted, median_depth_, *map_) : kNoId;
@@ -280,14 +280,14 @@ PanoramaId Tracker::PanoramaFor(const Rigid3& predicted) const {
 void Tracker::Compare(PatchComparison comparison) {
   comparison_ = comparison;
   map_tracker_.Compare(comparison);
-  rival_tracker_.Compare(comparison);
+  competing_tracker_.Compare(comparison);
 }
 
 MapTrackResult Tracker::TrackFrom(const Rigid3& predicted) {
   const auto track = [&] {
-    return map_tracker_.Track(*map_, *features_, predicted, MapTracker::Effort::kUsual, &random_);
+    return map_tracker_.Track(*map_, *features_, predicted, MapTracker::Effort::kStandard, &random_);
   };
-  if (comparison_ == PatchComparison::kUsual) {
+  if (comparison_ == PatchComparison::kStandard) {
     const MapTrackResult result = track();
     // What differed may do so again.
     if (frames_tolerant_ == 0 || result.Quality() >= options_.good_quality) return result;
@@ -298,15 +298,15 @@ MapTrackResult Tracker::TrackFrom(const Rigid3& predicted) {
   constexpr unsigned kSeldom = 32;
   ++frames_tolerant_;
   if (std::has_single_bit(frames_tolerant_) || frames_tolerant_ % kSeldom == 0) {
-    Compare(PatchComparison::kUsual);
+    Compare(PatchComparison::kStandard);
     const MapTrackResult result = track();
-    if (Believable(result) && result.inliers >= options_.usual_share * inliers_) return result;
+    if (IsAccepted(result) && result.inliers >= options_.standard_share * inliers_) return result;
     Compare(PatchComparison::kTolerant);
   }
   return track();
 }
 
-void Tracker::Lose(const Frame& frame, TrackedFrame* out) {
+void Tracker::EnterLostState(const Frame& frame, TrackedFrame* out) {
   map_tracker_.Forget();
   tracking_ = false;
   misfit_frames_ = 0;
@@ -321,27 +321,27 @@ void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFra
   // What was commanded is known better than what was observed before.
   Rigid3 predicted = frame.turned ? motion_.PredictWithRotation(*frame.turned) : motion_.Predict(frame.time);
   if (observed_ == ObservedMotion::kPanorama)
-    predicted = TurnedAbout(turn_.pivot, motion_.last(), predicted.rotation);
+    predicted = RotatedAbout(turn_.pivot, motion_.last(), predicted.rotation);
   map_tracker_.EnablePanorama(PanoramaFor(predicted));
-  map_tracker_.ExpectTurn(turn_);
+  map_tracker_.SetRotationPrior(turn_);
   MapTrackResult result = TrackFrom(predicted);
-  if (!Believable(result)) {
-    // A second try, wider and turned as the whole picture turned.
+  if (!IsAccepted(result)) {
+    // A second try, wider and turned as the whole image turned.
     const auto rotation = RotationFromPrevious();
     const Rigid3 turned = rotation ? motion_.PredictWithRotation(*rotation) : predicted;
     result = map_tracker_.Track(*map_, *features_, turned, MapTracker::Effort::kWide, &random_);
   }
-  if (!Believable(result) && !HoldsOn(result)) {
+  if (!IsAccepted(result) && !HoldsTrack(result)) {
     map_tracker_.Forget();
-    if (options_.hybrid && FollowPicture(frame, result, out)) return;
-    Lose(frame, out);
+    if (options_.hybrid && TrackRotationDirectly(frame, result, out)) return;
+    EnterLostState(frame, out);
     // The same image may show a place that is recognised: a surprising motion need not cost a frame.
     Recover(frame, places, out);
     return;
   }
   misfit_frames_ = IsTurn(result, *map_) ? 0 : misfit_frames_ + 1;
   if (misfit_frames_ >= options_.frames_of_misfit) {
-    Lose(frame, out);
+    EnterLostState(frame, out);
     out->hint = "you have walked where nothing is mapped: look back";
     return;
   }
@@ -349,26 +349,25 @@ void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFra
   Accept(frame, result, out);
 }
 
-// On a bare wall there are edges and shades, but hardly a corner: the whole picture still tells how the
+// On a bare wall there are edges and shades, but hardly a corner: the whole image still tells how the
 // camera has turned (ptamm §3.2). Only where few points are to be expected, or are there; where many are and
 // fail, the pose is wrong.
-bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out) {
+bool Tracker::TrackRotationDirectly(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out) {
   // A map of directions alone claims nothing but turns.
-  const bool bare = tried.attempted <= options_.bare_points || tried.Quality() >= options_.sure_quality ||
-                    !map_->HasFinitePoints();
-  if (!anchor_ || !bare || frame.time - last_points_ > FromSeconds(options_.max_picture_s)) return false;
-  const SmallBlurryImage& picture = features_->small_blurry;
-  const double spread =
-      cv::norm(picture.pixels, cv::NORM_L2SQR) / static_cast<double>(picture.pixels.total());
+  const bool bare = tried.attempted <= options_.low_texture_points ||
+                    tried.Quality() >= options_.sure_quality || !map_->HasFinitePoints();
+  if (!anchor_ || !bare || frame.time - last_points_ > FromSeconds(options_.max_image_s)) return false;
+  const SmallBlurryImage& image = features_->small_blurry;
+  const double spread = cv::norm(image.pixels, cv::NORM_L2SQR) / static_cast<double>(image.pixels.total());
   const Rotation3 predicted = motion_.Predict(frame.time).rotation;
   std::optional<RotationAlignment> turn;
   const auto align = [&] {
-    turn = AlignRotation(anchor_->small_blurry, *camera_, picture, *camera_,
+    turn = AlignRotation(anchor_->small_blurry, *camera_, image, *camera_,
                          predicted * anchor_pose_.rotation.inverse(), 10, turn_.pivot / median_depth_);
-    return turn && turn->converged && turn->overlap >= options_.min_picture_overlap &&
-           turn->rms * turn->rms <= (1 - options_.min_picture_agreement) * spread;
+    return turn && turn->converged && turn->overlap >= options_.min_image_overlap &&
+           turn->rms * turn->rms <= (1 - options_.min_image_agreement) * spread;
   };
-  // The older the picture that the turn is measured from, the less errors add up; the newer, the more it has
+  // The older the image that the turn is measured from, the less errors add up; the newer, the more it has
   // in common with this one.
   if (!align()) {
     if (!previous_ || anchor_ == previous_) return false;
@@ -377,7 +376,7 @@ bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, Tra
     if (!align()) return false;
   }
   MapTrackResult result;
-  result.camera_from_map = TurnedAbout(turn_.pivot, anchor_pose_, turn->b_from_a * anchor_pose_.rotation);
+  result.camera_from_map = RotatedAbout(turn_.pivot, anchor_pose_, turn->b_from_a * anchor_pose_.rotation);
   result.observed = ObservedMotion::kPanorama;
   result.attempted = tried.attempted;
   Accept(frame, result, out);
@@ -386,16 +385,16 @@ bool Tracker::FollowPicture(const Frame& frame, const MapTrackResult& tried, Tra
 }
 
 void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out) {
-  const bool good = result.Quality() >= options_.good_quality || AgreesWidely(result);
+  const bool good = result.Quality() >= options_.good_quality || HasWideConsensus(result);
   const Rotation3 previous_rotation = motion_.last().rotation;
   if (out->state == TrackingState::kRelocalized) {
     doubtful_frames_ = options_.agreeing_frames;
-    enough_explained_ = EnoughExplained(frame, result.camera_from_map);
+    required_inlier_ratio_ = RequiredInlierRatio(frame, result.camera_from_map);
     frames_since_recovery_ = frames_tolerant_ = 0;
     leader_frames_ = 0;
     motion_.Reset(frame.time, result.camera_from_map);
     selector_.Reset();
-    turn_center_.Reset();
+    rotation_center_.Reset();
   } else {
     motion_.Update(frame.time, result.camera_from_map);
     if (result.observed == ObservedMotion::kHybrid) out->state = TrackingState::kHybrid;
@@ -406,22 +405,22 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   const bool doubtful = doubtful_frames_ > 0;
   if (doubtful && out->state != TrackingState::kRelocalized) {
     if (!good) doubtful_frames_ = options_.agreeing_frames;
-    if (result.Explained() >= enough_explained_) --doubtful_frames_;
+    if (result.VisibleInlierRatio() >= required_inlier_ratio_) --doubtful_frames_;
   }
   turn_rate_ = (result.camera_from_map.rotation * previous_rotation.inverse()).Log();
   tracking_ = true;
   observed_ = result.observed;
   inliers_ = result.inliers;
-  explained_ = result.Explained();
+  visible_inlier_ratio_ = result.VisibleInlierRatio();
   constexpr double kKept = 0.9;  // of the average in each frame
   if (!doubtful && result.inliers > 0)
-    usually_explained_ = kKept * usually_explained_ + (1 - kKept) * explained_;
+    mean_visible_inlier_ratio_ = kKept * mean_visible_inlier_ratio_ + (1 - kKept) * visible_inlier_ratio_;
   out->verdict = {};
   finite_coverage_ = result.finite_coverage;
   if (result.finite_inliers > 0 && result.median_depth > 0) median_depth_ = result.median_depth;
   if (options_.hybrid && result.observed != ObservedMotion::kPanorama) {
-    turn_center_.Add(frame.time, result.by_points_alone, result.covariance, median_depth_);
-    turn_ = turn_center_.Estimate(median_depth_);
+    rotation_center_.Add(frame.time, result.camera_from_map_without_prior, result.covariance, median_depth_);
+    turn_ = rotation_center_.Estimate(median_depth_);
   }
   out->map = map_;
   out->map_key = map_key_;

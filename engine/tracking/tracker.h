@@ -13,12 +13,12 @@
 #include "engine/recognition/place.h"
 #include "engine/tracking/descriptor_relocalizer.h"
 #include "engine/tracking/frame_inspection.h"
-#include "engine/tracking/keyframe_selection.h"
-#include "engine/tracking/keyframe_selector.h"
+#include "engine/tracking/keyframe_novelty.h"
+#include "engine/tracking/keyframe_policy.h"
 #include "engine/tracking/map_tracker.h"
 #include "engine/tracking/motion_model.h"
+#include "engine/tracking/rotation_center.h"
 #include "engine/tracking/tracked_frame.h"
-#include "engine/tracking/turn_center.h"
 #include "engine/vision/features.h"
 
 namespace docent::engine {
@@ -27,22 +27,22 @@ struct TrackerOptions {
   FeatureOptions features;
   MapTrackerOptions map_tracker;
   InitializerOptions initializer;
-  // When given, maps start from this picture, in metres (hybrid-slam §5.5), and not from any two views.
+  // When given, maps start from this image, in metres (hybrid-slam §5.5), and not from any two views.
   std::shared_ptr<const PlanarTarget> target;
   TargetStartOptions target_start;
-  KeyFrameSelectionOptions keyframes;
-  KeyFrameSelectorOptions selector;
-  TurnCenterOptions turn_center;
+  KeyFrameNoveltyOptions keyframes;
+  KeyFramePolicyOptions selector;
+  RotationCenterOptions rotation_center;
   // Panorama maps (hybrid-slam): a turn on the spot is tracked by directions, and a new map begins as one
-  // with its first picture. Off: general motion alone, as in ptamm.
+  // with its first image. Off: general motion alone, as in ptamm.
   bool hybrid = false;
-  // A bare wall: where no more points than this can be looked for, a turn is followed by the whole picture.
-  int bare_points = 60;
-  double min_picture_agreement = 0.8;  // share of the picture's variance that the turn must explain
-  double min_picture_overlap = 0.5;    // with the picture that the turn is measured from
-  double max_picture_s = 5.0;          // without points in between: small errors add up
-  double good_quality = 0.30;          // ptamm §2.1
-  double lost_quality = 0.13;          // ptamm §2.1
+  // A bare wall: where no more points than this can be looked for, a turn is followed by the whole image.
+  int low_texture_points = 60;
+  double min_image_agreement = 0.8;  // share of the image's variance that the turn must explain
+  double min_image_overlap = 0.5;    // with the image that the turn is measured from
+  double max_image_s = 5.0;          // without points in between: small errors add up
+  double good_quality = 0.30;        // ptamm §2.1
+  double lost_quality = 0.13;        // ptamm §2.1
   // Fewer do not make a pose, whatever their share: patches that fit by chance agree with some pose, too.
   // Where a map was being left, poses told by 20 to 30 points jumped by two degrees and more.
   int min_inliers = 30;
@@ -54,14 +54,14 @@ struct TrackerOptions {
   // crowded part of a map most points may be hidden or look different by now. Measured where the share was
   // below `good_quality`: true poses (an office, a flying drone) left a sigma of 0.7-2.3, and 61-99 % of the
   // points found were inliers; chance matches left a sigma of 3.8-15.
-  int many_inliers = 60;       // twice `min_inliers`
-  double min_agreement = 0.6;  // inliers of the points found
-  double max_agreeing_sigma = 2.0;
+  int min_consensus_inliers = 60;    // twice `min_inliers`
+  double min_consensus_ratio = 0.6;  // inliers of the points found
+  double max_consensus_sigma = 2.0;
   int min_cells = 3;  // of the 4x4 grid that inliers must occupy
   // Robust, of the normalised residuals: where nothing fits, the robust threshold grows until chance matches
   // pass it. A true pose leaves less than one.
   double max_sigma = 4.0;
-  // The same where a turn is to explain a picture, in a map that knows depth: true turns leave less than half
+  // The same where a turn is to explain an image, in a map that knows depth: true turns leave less than half
   // of it. More, for so many frames, and the camera has gone from where it turned: then it is lost, rather
   // than its way taken for a turn.
   double max_turn_sigma = 1.0;
@@ -71,15 +71,15 @@ struct TrackerOptions {
   int min_recovery_inliers = 40;
   double min_recovery_quality = 0.25;
   int min_recovery_cells = 5;
-  double short_loss_s = 2.0;      // within it the track is first sought where it was lost
-  int candidates_looked_at = 10;  // keyframes that resemble the picture, turned to fit it best
-  int candidates_of_a_map = 4;    // of these, at most
-  std::size_t candidates = 3;     // the best of these are verified, each frame
-  std::size_t rivals = 2;         // other maps that are tried as well, each by its best keyframe
+  double short_loss_s = 2.0;       // within it the track is first sought where it was lost
+  int max_retrieved = 10;          // keyframes that resemble the image, turned to fit it best
+  int max_retrieved_per_map = 4;   // of these, at most
+  std::size_t candidates = 3;      // the best of these are verified, each frame
+  std::size_t competing_maps = 2;  // other maps that are tried as well, each by its best keyframe
   // Times the quality of the second best map, to be believed; or ahead of it by anything for so many frames
-  // in a row: maps that overlap explain the picture both, and must not keep each other out.
-  double clear_lead = 1.2;
-  int frames_ahead = 15;
+  // in a row: maps that overlap explain the image both, and must not keep each other out.
+  double min_quality_ratio = 1.2;
+  int min_leading_frames = 15;
   // Before another map is entered (ptamm §6.3), and before a map that was entered or found again is extended.
   int agreeing_frames = 3;
   // A map or a place seen worse than this may be another that is alike: what is found again so is confirmed
@@ -87,10 +87,10 @@ struct TrackerOptions {
   double poor_quality = 0.5;    // share of what is in view, hidden points among it
   double better_quality = 1.3;  // times that of the map that the camera is or was in, to be entered
   // For such a map, as long as the present one is well enough seen to be extended.
-  int frames_between_looks = 2;
+  int frames_between_better_map_searches = 2;
   // Tolerant comparison of patches is given up when the usual one finds this share of the points: that may be
   // less by what two choices of points differ, but no more.
-  double usual_share = 0.9;
+  double standard_share = 0.9;
   // Under tolerant comparison so many points that fit so well are enough after a loss, if they are no small
   // share. Right poses had 69 to 193 of 600 and left 0.8 to 1.3 in most cases; a wrong one had 81. Of a
   // thousand tries with images of other places none found a dozen that agreed.
@@ -104,7 +104,7 @@ struct TrackerOptions {
 };
 
 // Tracks one camera: waits for a start, follows the map, notices loss and comes back by the place finder.
-// Lives on its camera's thread; never waits for the mapper. Not thread safe.
+// IsActive on its camera's thread; never waits for the mapper. Not thread safe.
 class Tracker {
  public:
   Tracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera, std::uint64_t seed);
@@ -141,13 +141,13 @@ class Tracker {
 
  private:
   // A keyframe that resembles the frame, and the pose that the resemblance suggests.
-  struct TurnedPlace {
+  struct AlignedPlace {
     PlaceCandidate candidate;
     Rigid3 camera_from_map;
     double misfit = 0;  // of the thumbnails, after turning
   };
   std::shared_ptr<ImageFeatures> NextFeatures(const Frame& frame);
-  void LookForStart(const Frame& frame, TrackedFrame* out);
+  void SearchInitialPair(const Frame& frame, TrackedFrame* out);
   // A start from a keyframe of the panorama map and the present frame, matched by the map's directions: these
   // outlive the keypoint tracks of the initializer when the camera turns away and back.
   std::optional<InitialPair> TryPanoramaViews(const Frame& frame, const TrackedFrame& out);
@@ -162,29 +162,30 @@ class Tracker {
   // The search from where the camera is expected; while patches are compared tolerantly, now and then by the
   // usual comparison, which stays where it does as well.
   MapTrackResult TrackFrom(const Rigid3& predicted);
-  void Lose(const Frame& frame, TrackedFrame* out);
-  bool FollowPicture(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out);
+  void EnterLostState(const Frame& frame, TrackedFrame* out);
+  bool TrackRotationDirectly(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out);
   PanoramaId PanoramaFor(const Rigid3& predicted) const;
   void ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, const TrackedFrame& out);
   void OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rigid3& camera_from_map,
                      const std::vector<PointMatch>& matches);
   void Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
-  void LookForBetterMap(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
-  void LookForBetterPlace(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
+  void SearchBetterMap(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
+  void SearchBetterPlace(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
   void SearchKnownMaps(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
   // Tracks the map that is about to be entered, in `tracker`; its snapshot, or null when it is not there.
-  std::shared_ptr<const MapSnapshot> FollowEntering(const PlaceFinder& places, MapTracker* tracker,
-                                                    MapTrackResult* result);
-  MapTrackResult TryPlace(const TurnedPlace& place, MapTracker* tracker);
+  std::shared_ptr<const MapSnapshot> TrackHypothesis(const PlaceFinder& places, MapTracker* tracker,
+                                                     MapTrackResult* result);
+  MapTrackResult TryPlace(const AlignedPlace& place, MapTracker* tracker);
   // A place whose map explains the frame.
   struct FoundPlace {
-    TurnedPlace place;
+    AlignedPlace place;
     MapTrackResult result;
     PanoramaId panorama = kNoId;
   };
   // The first of the places at which the frame is explained, or a better one in the same map, and the best
-  // rival of its map that explains it too, the better one first. Tells `out` what speaks against the others.
-  std::vector<FoundPlace> FindMaps(const PlaceFinder& finder, const std::vector<TurnedPlace>& places,
+  // competitor of its map that explains it too, the better one first. Tells `out` what speaks against the
+  // others.
+  std::vector<FoundPlace> FindMaps(const PlaceFinder& finder, const std::vector<AlignedPlace>& places,
                                    TrackedFrame* out);
   // By the best of its map; false when that is not clearly ahead of the second best there.
   bool ReplaceByBetterPlace(const PlaceFinder& finder, FoundPlace* found, TrackedFrame* out);
@@ -193,34 +194,34 @@ class Tracker {
                                           const Rigid3& camera_from_map, KeyFrameId but_keyframe,
                                           TrackedFrame* out);
   // The best of other maps than these at which the frame is explained.
-  std::optional<FoundPlace> BestRival(const std::vector<TurnedPlace>& places,
-                                      std::set<std::uint64_t> but_maps, TrackedFrame* out);
+  std::optional<FoundPlace> BestCompetingMap(const std::vector<AlignedPlace>& places,
+                                             std::set<std::uint64_t> but_maps, TrackedFrame* out);
   // Whether the best map is far enough before the second best, in this frame or in many in a row.
-  bool ClearlyAhead(std::uint64_t best_key, double best_quality, std::uint64_t second_key,
-                    double second_quality);
-  bool GoOnEntering(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
+  bool IsUnambiguous(std::uint64_t best_key, double best_quality, std::uint64_t second_key,
+                     double second_quality);
+  bool ContinueRelocalization(const Frame& frame, const PlaceFinder& places, TrackedFrame* out);
   void Return(const Frame& frame, const FoundPlace& found, TrackedFrame* out);
-  void Unconfirmed(const MapTrackResult& result, TrackedFrame* out) const;
+  void SetUnconfirmed(const MapTrackResult& result, TrackedFrame* out) const;
   void Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, const MapTrackResult& result,
              TrackedFrame* out);
-  void BeginEntering(const FoundPlace& found);
+  void BeginRelocalization(const FoundPlace& found);
   bool RecoverNearby(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
   // Those that resemble the frame by their thumbnails, the best first; but_map: none of that map, and none at
   // all when the most alike at first sight is of it.
-  std::vector<TurnedPlace> BestPlaces(const PlaceFinder& places, std::uint64_t but_map = 0) const;
+  std::vector<AlignedPlace> BestPlaces(const PlaceFinder& places, std::uint64_t but_map = 0) const;
   // The first different places that resemble it by thumbnail and words, other keyframes than `tried`.
-  std::vector<TurnedPlace> PlacesByWords(const PlaceFinder& places,
-                                         const std::vector<TurnedPlace>& tried) const;
+  std::vector<AlignedPlace> PlacesByWords(const PlaceFinder& places,
+                                          const std::vector<AlignedPlace>& tried) const;
   // Where descriptors place the camera, in maps that the words of the image suggest.
-  std::vector<TurnedPlace> PlacesByDescriptors(const PlaceFinder& places);
-  std::optional<TurnedPlace> TurnToFit(const PlaceCandidate& candidate) const;
-  bool Believable(const MapTrackResult& result) const;
-  bool AgreesWidely(const MapTrackResult& result) const;
+  std::vector<AlignedPlace> PlacesByDescriptors(const PlaceFinder& places);
+  std::optional<AlignedPlace> AlignPlace(const PlaceCandidate& candidate) const;
+  bool IsAccepted(const MapTrackResult& result) const;
+  bool HasWideConsensus(const MapTrackResult& result) const;
   bool IsTurn(const MapTrackResult& result, const MapSnapshot& map) const;
-  bool HoldsOn(const MapTrackResult& result) const;
+  bool HoldsTrack(const MapTrackResult& result) const;
   // Whether a pose that was found after a loss counts: kNone, or what speaks against it.
-  Doubt DoubtOf(const MapTrackResult& result, const MapSnapshot& map) const;
-  double EnoughExplained(const Frame& frame, const Rigid3& found_camera_from_map) const;
+  RejectionReason RejectionReasonOf(const MapTrackResult& result, const MapSnapshot& map) const;
+  double RequiredInlierRatio(const Frame& frame, const Rigid3& found_camera_from_map) const;
   void Accept(const Frame& frame, const MapTrackResult& result, TrackedFrame* out);
   void CollectReports();
   // Carries what the tracker knows in coordinates of its map over to a newer snapshot of it.
@@ -231,12 +232,12 @@ class Tracker {
   std::shared_ptr<const CameraModel> camera_;
   Random random_;
   MapTracker map_tracker_;
-  MapTracker rival_tracker_;  // of another map, while one is tracked
+  MapTracker competing_tracker_;  // of another map, while one is tracked
   Initializer initializer_;
   std::optional<TargetInitializer> target_initializer_;
   MotionModel motion_;
-  KeyFrameSelector selector_;
-  TurnCenter turn_center_;
+  KeyFramePolicy selector_;
+  RotationCenter rotation_center_;
   Turn turn_;  // that goes on
 
   std::shared_ptr<const MapSnapshot> map_;
@@ -247,13 +248,13 @@ class Tracker {
   bool tracking_ = false;
   // The last pose told the rotation alone; then the centre stays where it was.
   ObservedMotion observed_ = ObservedMotion::kSixDof;
-  PatchComparison comparison_ = PatchComparison::kUsual;
+  PatchComparison comparison_ = PatchComparison::kStandard;
   int frames_lost_ = 0;                                  // that were searched since the loss
   unsigned frames_tolerant_ = 0;                         // in a row, that were tracked
   int inliers_ = 0;                                      // of the last frame
   double finite_coverage_ = 1, median_depth_ = 1;        // of the last frame that told them
-  double explained_ = 0;                                 // of the last frame
-  double usually_explained_ = 1;                         // averaged over about the last ten frames
+  double visible_inlier_ratio_ = 0;                      // of the last frame
+  double mean_visible_inlier_ratio_ = 1;                 // averaged over about the last ten frames
   Rigid3 first_view_from_map_;                           // the pose of the initializer's first view
   Eigen::Vector3d turn_rate_ = Eigen::Vector3d::Zero();  // rotation vector a frame, of the last tracked frame
   std::vector<std::pair<Timestamp, Eigen::Vector3d>>
@@ -263,23 +264,23 @@ class Tracker {
   Timestamp lost_since_{};
   bool searched_ = false;  // a map, for the last frame
   int misfit_frames_ = 0;  // in a row, that no turn explains
-  // That explain the picture well, wanted since the last recovery before the map is extended.
+  // That explain the image well, wanted since the last recovery before the map is extended.
   int doubtful_frames_ = 0;
-  double enough_explained_ = 0;  // by a frame that counts for this
-  // The newest picture whose pose points told, or of a long turn a later one: FollowPicture's measure.
+  double required_inlier_ratio_ = 0;  // by a frame that counts for this
+  // The newest image whose pose points told, or of a long turn a later one: TrackRotationDirectly's measure.
   std::shared_ptr<const ImageFeatures> anchor_;
   Rigid3 anchor_pose_;
   Timestamp last_points_{};  // when points told the pose
   int frames_since_keyframe_ = 0;
-  int frames_since_look_ = 0;           // for a better map
-  unsigned frames_since_recovery_ = 0;  // while it is doubted
-  std::uint64_t leader_key_ = 0;        // of two maps that explain the pictures, for so many frames
+  int frames_since_better_map_search_ = 0;  // for a better map
+  unsigned frames_since_recovery_ = 0;      // while it is doubted
+  std::uint64_t leader_key_ = 0;            // of two maps that explain the images, for so many frames
   int leader_frames_ = 0;
   // Poses in another map that agree with each other, before it is entered.
-  std::uint64_t entering_key_ = 0;
-  int entering_frames_ = 0;
-  Rigid3 entering_pose_;
-  PanoramaId entering_panorama_ = kNoId;
+  std::uint64_t hypothesis_key_ = 0;
+  int hypothesis_frames_ = 0;
+  Rigid3 hypothesis_pose_;
+  PanoramaId hypothesis_panorama_ = kNoId;
 
   std::shared_ptr<const ImageFeatures> features_, previous_;
   std::vector<std::shared_ptr<ImageFeatures>> pool_;

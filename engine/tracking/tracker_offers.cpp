@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "engine/tracking/surroundings.h"
+#include "engine/tracking/reference_keyframe.h"
 #include "engine/tracking/tracker.h"
 
 namespace docent::engine {
@@ -14,7 +14,7 @@ void Tracker::ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, c
   KeyFrameChoice choice = wants_six_dof ? KeyFrameChoice::kSixDof : KeyFrameChoice::kNone;
   if (options_.hybrid) {
     // What carries the camera is what grows.
-    if (selector_.mode() == KeyFrameSelector::Mode::kSixDof && result.observed == ObservedMotion::kPanorama) {
+    if (selector_.mode() == KeyFramePolicy::Mode::kSixDof && result.observed == ObservedMotion::kPanorama) {
       if (const PanoramaMap* panorama = map_->FindPanorama(map_tracker_.panorama()))
         selector_.Reopen(*panorama, *map_);
     }
@@ -40,7 +40,7 @@ void Tracker::OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rig
   candidate.time = frame.time;
   if (map_) {
     candidate.map_revision = map_->revision;
-    candidate.surroundings = Surroundings(*map_, matches);
+    candidate.reference_keyframe = FindReferenceKeyFrame(*map_, matches);
   }
   candidate.camera = camera_;
   candidate.features = features_;

@@ -9,24 +9,25 @@
 namespace docent::engine {
 
 // Whether a pose that was found after a loss counts: kNone, or what speaks against it.
-Doubt Tracker::DoubtOf(const MapTrackResult& result, const MapSnapshot& map) const {
+RejectionReason Tracker::RejectionReasonOf(const MapTrackResult& result, const MapSnapshot& map) const {
   // Images that differ from the map's show fewer of its points, but still many of them, which fit well.
   const bool fits = comparison_ == PatchComparison::kTolerant &&
                     result.inliers >= options_.min_fitting_inliers &&
                     result.sigma <= options_.max_fitting_sigma;
   const double min_quality = fits ? options_.lost_quality : options_.min_recovery_quality;
   if (result.inliers < options_.min_recovery_inliers || result.Quality() < min_quality)
-    return Doubt::kFewPoints;
-  if (!result.converged || result.sigma > options_.max_sigma || !IsTurn(result, map)) return Doubt::kPoorFit;
-  if (result.occupied_cells < options_.min_recovery_cells) return Doubt::kOneCorner;
-  return Doubt::kNone;
+    return RejectionReason::kFewPoints;
+  if (!result.converged || result.sigma > options_.max_sigma || !IsTurn(result, map))
+    return RejectionReason::kPoorFit;
+  if (result.occupied_cells < options_.min_recovery_cells) return RejectionReason::kOneCorner;
+  return RejectionReason::kNone;
 }
 
 // What a frame must explain after a recovery to count for the map's extension. A camera that was lost a
 // moment ago and is found about where it was lost has hardly come to a place that looks alike. Where things
 // hide each other a map never explained much of what is in view; it explains enough when it explains about as
 // much as before.
-double Tracker::EnoughExplained(const Frame& frame, const Rigid3& found_camera_from_map) const {
+double Tracker::RequiredInlierRatio(const Frame& frame, const Rigid3& found_camera_from_map) const {
   constexpr double kNear = 0.5;  // of the depth, and radians: half the field of view of a 60 degree lens
   const Rigid3& lost = motion_.last();
   const double shift = (lost.OriginInSource() - found_camera_from_map.OriginInSource()).norm();
@@ -34,7 +35,7 @@ double Tracker::EnoughExplained(const Frame& frame, const Rigid3& found_camera_f
   if (frame.time - lost_since_ > FromSeconds(options_.short_loss_s) || shift > kNear * median_depth_ ||
       turn > kNear)
     return options_.poor_quality;
-  return std::min(options_.poor_quality, usually_explained_ / options_.better_quality);
+  return std::min(options_.poor_quality, mean_visible_inlier_ratio_ / options_.better_quality);
 }
 
 bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
@@ -44,31 +45,32 @@ bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, Track
   map_tracker_.EnablePanorama(PanoramaFor(guess));
   MapTrackResult result =
       map_tracker_.Track(*map_, *features_, guess, MapTracker::Effort::kRecovery, &random_);
-  const Doubt doubt = DoubtOf(result, *map_);
-  if (doubt != Doubt::kNone && !options_.build_maps) {
+  const RejectionReason doubt = RejectionReasonOf(result, *map_);
+  if (doubt != RejectionReason::kNone && !options_.build_maps) {
     // Where the patches of the upper levels are too few to tell a pose, the guess may still be good.
-    for (const auto effort : {MapTracker::Effort::kUsual, MapTracker::Effort::kWide}) {
-      if (HoldsOn(result)) break;
+    for (const auto effort : {MapTracker::Effort::kStandard, MapTracker::Effort::kWide}) {
+      if (HoldsTrack(result)) break;
       result = map_tracker_.Track(*map_, *features_, guess, effort, &random_);
     }
-    if (HoldsOn(result)) {
+    if (HoldsTrack(result)) {
       out->state = TrackingState::kRelocalized;
       Accept(frame, result, out);
       return true;
     }
   }
-  if (doubt == Doubt::kNone) {
+  if (doubt == RejectionReason::kNone) {
     // What is poorly seen may be something else that is only alike.
-    const auto is_better = [&](const std::optional<FoundPlace>& rival) {
-      return rival && rival->result.Explained() >= options_.better_quality * result.Explained();
+    const auto is_better = [&](const std::optional<FoundPlace>& competitor) {
+      return competitor &&
+             competitor->result.VisibleInlierRatio() >= options_.better_quality * result.VisibleInlierRatio();
     };
-    const bool poor = places && result.Explained() < options_.poor_quality;
+    const bool poor = places && result.VisibleInlierRatio() < options_.poor_quality;
     if (!poor || !(is_better(BestElsewhere(*places, map_key_, result.camera_from_map, kNoId, out)) ||
-                   is_better(BestRival(BestPlaces(*places), {map_key_}, out)))) {
+                   is_better(BestCompetingMap(BestPlaces(*places), {map_key_}, out)))) {
       if (poor) {
-        if (entering_frames_ > 0) return false;
-        BeginEntering({{{map_key_, map_}, guess}, result, map_tracker_.panorama()});
-        Unconfirmed(result, out);
+        if (hypothesis_frames_ > 0) return false;
+        BeginRelocalization({{{map_key_, map_}, guess}, result, map_tracker_.panorama()});
+        SetUnconfirmed(result, out);
         return true;
       }
       out->state = TrackingState::kRelocalized;
@@ -82,87 +84,89 @@ bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, Track
   return false;
 }
 
-bool Tracker::ClearlyAhead(std::uint64_t best_key, double best_quality, std::uint64_t second_key,
-                           double second_quality) {
+bool Tracker::IsUnambiguous(std::uint64_t best_key, double best_quality, std::uint64_t second_key,
+                            double second_quality) {
   const bool ahead = best_quality > second_quality;
   if (best_key != leader_key_ || !ahead) leader_frames_ = 0;
   if (ahead) ++leader_frames_;
   leader_key_ = best_key;
   // Whoever was in one of them stays there in case of doubt.
-  const double lead = second_key == map_key_ ? options_.better_quality : options_.clear_lead;
-  return ahead && (best_quality >= lead * second_quality || leader_frames_ >= options_.frames_ahead);
+  const double lead = second_key == map_key_ ? options_.better_quality : options_.min_quality_ratio;
+  return ahead && (best_quality >= lead * second_quality || leader_frames_ >= options_.min_leading_frames);
 }
 
-void Tracker::BeginEntering(const FoundPlace& found) {
-  entering_key_ = found.place.candidate.map_key;
-  entering_panorama_ = found.panorama;
-  entering_pose_ = found.result.camera_from_map;
-  entering_frames_ = 1;
+void Tracker::BeginRelocalization(const FoundPlace& found) {
+  hypothesis_key_ = found.place.candidate.map_key;
+  hypothesis_panorama_ = found.panorama;
+  hypothesis_pose_ = found.result.camera_from_map;
+  hypothesis_frames_ = 1;
 }
 
-std::shared_ptr<const MapSnapshot> Tracker::FollowEntering(const PlaceFinder& places, MapTracker* tracker,
-                                                           MapTrackResult* result) {
+std::shared_ptr<const MapSnapshot> Tracker::TrackHypothesis(const PlaceFinder& places, MapTracker* tracker,
+                                                            MapTrackResult* result) {
   std::shared_ptr<const MapSnapshot> map = map_;
-  if (entering_key_ != map_key_) {
-    const auto found = places.FindPlaces(features_->small_blurry, 1, 1, entering_key_);
+  if (hypothesis_key_ != map_key_) {
+    const auto found = places.FindPlaces(features_->small_blurry, 1, 1, hypothesis_key_);
     if (found.empty()) return nullptr;
     map = found.front().map;
   }
   const auto rotation = RotationFromPrevious();
   const Rigid3 turn(rotation ? *rotation : Rotation3(), Eigen::Vector3d::Zero());
   tracker->Clear();
-  tracker->EnablePanorama(entering_panorama_);
-  *result = tracker->Track(*map, *features_, turn * entering_pose_, MapTracker::Effort::kWide, &random_);
+  tracker->EnablePanorama(hypothesis_panorama_);
+  *result = tracker->Track(*map, *features_, turn * hypothesis_pose_, MapTracker::Effort::kWide, &random_);
   return map;
 }
 
 void Tracker::Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, const MapTrackResult& result,
                     TrackedFrame* out) {
-  if (entering_key_ != map_key_) usually_explained_ = 1;  // unknown, in another map
+  if (hypothesis_key_ != map_key_) mean_visible_inlier_ratio_ = 1;  // unknown, in another map
   map_ = std::move(map);
-  map_key_ = entering_key_;
-  entering_frames_ = 0;
+  map_key_ = hypothesis_key_;
+  hypothesis_frames_ = 0;
   reports_.clear();
   out->state = TrackingState::kRelocalized;
   out->hint.clear();
   Accept(frame, result, out);
   // The frames that agreed have counted already where the camera is about where it was lost.
-  if (enough_explained_ < options_.poor_quality) doubtful_frames_ = 1;
+  if (required_inlier_ratio_ < options_.poor_quality) doubtful_frames_ = 1;
 }
 
 // Where maps overlap the camera is carried from one into another by what both show; what was left in the
-// other is only seen once it is entered. It is, when it explains the picture clearly better (ptamm §5.3).
-void Tracker::LookForBetterMap(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
-  if (explained_ >= options_.poor_quality) {
-    entering_frames_ = 0;
+// other is only seen once it is entered. It is, when it explains the image clearly better (ptamm §5.3).
+void Tracker::SearchBetterMap(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
+  if (visible_inlier_ratio_ >= options_.poor_quality) {
+    hypothesis_frames_ = 0;
     return;
   }
   const auto better = [&](const MapTrackResult& result) {
-    return result.Explained() > options_.better_quality * explained_;
+    return result.VisibleInlierRatio() > options_.better_quality * visible_inlier_ratio_;
   };
   MapTrackResult result;
-  if (entering_frames_ > 0) {
-    const auto map = FollowEntering(places, &rival_tracker_, &result);
-    if (!map || DoubtOf(result, *map) != Doubt::kNone || !better(result)) {
-      entering_frames_ = 0;
-    } else if (entering_pose_ = result.camera_from_map; ++entering_frames_ >= options_.agreeing_frames) {
+  if (hypothesis_frames_ > 0) {
+    const auto map = TrackHypothesis(places, &competing_tracker_, &result);
+    if (!map || RejectionReasonOf(result, *map) != RejectionReason::kNone || !better(result)) {
+      hypothesis_frames_ = 0;
+    } else if (hypothesis_pose_ = result.camera_from_map; ++hypothesis_frames_ >= options_.agreeing_frames) {
       // Once more as its own, so that all that a frame tells is of the new map.
       map_tracker_.Clear();
-      map_tracker_.EnablePanorama(entering_panorama_);
-      result = map_tracker_.Track(*map, *features_, entering_pose_, MapTracker::Effort::kUsual, &random_);
+      map_tracker_.EnablePanorama(hypothesis_panorama_);
+      result =
+          map_tracker_.Track(*map, *features_, hypothesis_pose_, MapTracker::Effort::kStandard, &random_);
       Enter(frame, map, result, out);
     }
     return;
   }
   const bool well_enough = out->quality >= options_.good_quality;
-  if (++frames_since_look_ < options_.frames_between_looks && well_enough) return;
-  frames_since_look_ = 0;
-  std::vector<TurnedPlace> others = BestPlaces(places, map_key_);
+  if (++frames_since_better_map_search_ < options_.frames_between_better_map_searches && well_enough) return;
+  frames_since_better_map_search_ = 0;
+  std::vector<AlignedPlace> others = BestPlaces(places, map_key_);
   if (others.size() > options_.candidates) others.resize(options_.candidates);
-  for (const TurnedPlace& place : others) {
-    result = TryPlace(place, &rival_tracker_);
-    if (DoubtOf(result, *place.candidate.map) != Doubt::kNone || !better(result)) continue;
-    BeginEntering({place, result, rival_tracker_.panorama()});
+  for (const AlignedPlace& place : others) {
+    result = TryPlace(place, &competing_tracker_);
+    if (RejectionReasonOf(result, *place.candidate.map) != RejectionReason::kNone || !better(result))
+      continue;
+    BeginRelocalization({place, result, competing_tracker_.panorama()});
     return;
   }
 }
@@ -173,104 +177,105 @@ void Tracker::SearchKnownMaps(const Frame& frame, const PlaceFinder& places, Tra
   // A search costs as much as ten frames: about four a second, and more as long as hardly anything would be
   // lost by going back.
   const int frames_between = map_->HasFinitePoints() ? 8 : 2;
-  if (entering_frames_ > 0 && entering_key_ != map_key_) {
+  if (hypothesis_frames_ > 0 && hypothesis_key_ != map_key_) {
     MapTrackResult result;
-    const auto map = FollowEntering(places, &rival_tracker_, &result);
-    if (!map || DoubtOf(result, *map) != Doubt::kNone || result.Explained() < options_.poor_quality) {
-      entering_frames_ = 0;
+    const auto map = TrackHypothesis(places, &competing_tracker_, &result);
+    if (!map || RejectionReasonOf(result, *map) != RejectionReason::kNone ||
+        result.VisibleInlierRatio() < options_.poor_quality) {
+      hypothesis_frames_ = 0;
       return;
     }
-    entering_pose_ = result.camera_from_map;
-    if (++entering_frames_ < options_.agreeing_frames) return;
+    hypothesis_pose_ = result.camera_from_map;
+    if (++hypothesis_frames_ < options_.agreeing_frames) return;
     map_tracker_.Clear();
-    map_tracker_.EnablePanorama(entering_panorama_);
-    result = map_tracker_.Track(*map, *features_, entering_pose_, MapTracker::Effort::kUsual, &random_);
+    map_tracker_.EnablePanorama(hypothesis_panorama_);
+    result = map_tracker_.Track(*map, *features_, hypothesis_pose_, MapTracker::Effort::kStandard, &random_);
     starting_ = pair_given_ = search_known_maps_ = false;
     candidate_.reset();
     ResetStart();
     Enter(frame, map, result, out);
     return;
   }
-  if (++frames_since_look_ < frames_between) return;
-  frames_since_look_ = 0;
-  const Verdict before = out->verdict;
+  if (++frames_since_better_map_search_ < frames_between) return;
+  frames_since_better_map_search_ = 0;
+  const RelocalizationResult before = out->verdict;
   const std::vector<FoundPlace> found = FindMaps(places, BestPlaces(places, map_key_), out);
   out->verdict = before;
-  if (found.empty() || found.front().result.Explained() < options_.poor_quality) return;
-  const bool rival =
-      found.size() > 1 && found.front().result.Quality() < options_.clear_lead * found[1].result.Quality();
-  if (!rival) BeginEntering(found.front());
+  if (found.empty() || found.front().result.VisibleInlierRatio() < options_.poor_quality) return;
+  const bool competitor = found.size() > 1 && found.front().result.Quality() <
+                                                  options_.min_quality_ratio * found[1].result.Quality();
+  if (!competitor) BeginRelocalization(found.front());
 }
 
 // What was found again by a part of what is in view may be another place that looks alike: as long as it is
 // seen no better, the others are asked.
-void Tracker::LookForBetterPlace(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
+void Tracker::SearchBetterPlace(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
   if (doubtful_frames_ == 0) return;
   ++frames_since_recovery_;
-  if (explained_ >= options_.poor_quality) return;
+  if (visible_inlier_ratio_ >= options_.poor_quality) return;
   // A look costs as much as ten frames: ever more seldom, for a place may have changed for good.
   constexpr unsigned kSeldom = 32;
   const unsigned frames = frames_since_recovery_;
   if (frames < 2 || !(std::has_single_bit(frames) || frames % kSeldom == 0)) return;
   const auto other = BestElsewhere(places, map_key_, out->camera_from_map, kNoId, out);
-  const double needed = std::max(options_.poor_quality, options_.better_quality * explained_);
-  if (other && other->result.Explained() >= needed) Return(frame, *other, out);
+  const double needed = std::max(options_.poor_quality, options_.better_quality * visible_inlier_ratio_);
+  if (other && other->result.VisibleInlierRatio() >= needed) Return(frame, *other, out);
   out->verdict = {};
 }
 
-void Tracker::Unconfirmed(const MapTrackResult& result, TrackedFrame* out) const {
-  out->verdict = {.doubt = Doubt::kUnconfirmed,
-                  .map_key = entering_key_,
+void Tracker::SetUnconfirmed(const MapTrackResult& result, TrackedFrame* out) const {
+  out->verdict = {.doubt = RejectionReason::kUnconfirmed,
+                  .map_key = hypothesis_key_,
                   .inliers = result.inliers,
-                  .frames = entering_frames_};
+                  .frames = hypothesis_frames_};
 }
 
 // A map that is about to be entered is followed, not searched anew; false when it does not hold. Its poses
 // agree: each is looked for close about the one before.
-bool Tracker::GoOnEntering(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
-  if (entering_frames_ == 0) return false;
+bool Tracker::ContinueRelocalization(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
+  if (hypothesis_frames_ == 0) return false;
   MapTrackResult result;
-  const auto map = FollowEntering(places, &map_tracker_, &result);
-  const Doubt doubt = map ? DoubtOf(result, *map) : Doubt::kFewPoints;
-  if (doubt != Doubt::kNone) {
-    out->verdict.Consider({.doubt = doubt, .map_key = entering_key_, .inliers = result.inliers});
-    entering_frames_ = 0;
+  const auto map = TrackHypothesis(places, &map_tracker_, &result);
+  const RejectionReason doubt = map ? RejectionReasonOf(result, *map) : RejectionReason::kFewPoints;
+  if (doubt != RejectionReason::kNone) {
+    out->verdict.Consider({.doubt = doubt, .map_key = hypothesis_key_, .inliers = result.inliers});
+    hypothesis_frames_ = 0;
     return false;
   }
-  if (const auto rival = BestRival(BestPlaces(places), {entering_key_}, out)) {
-    const std::uint64_t rival_key = rival->place.candidate.map_key;
-    if (!ClearlyAhead(entering_key_, result.Quality(), rival_key, rival->result.Quality())) {
-      entering_frames_ = 0;
-      out->verdict = {.doubt = Doubt::kLookAlikes,
-                      .map_key = entering_key_,
-                      .rival_key = rival_key,
+  if (const auto competitor = BestCompetingMap(BestPlaces(places), {hypothesis_key_}, out)) {
+    const std::uint64_t competitor_key = competitor->place.candidate.map_key;
+    if (!IsUnambiguous(hypothesis_key_, result.Quality(), competitor_key, competitor->result.Quality())) {
+      hypothesis_frames_ = 0;
+      out->verdict = {.doubt = RejectionReason::kLookAlikes,
+                      .map_key = hypothesis_key_,
+                      .competitor_key = competitor_key,
                       .inliers = result.inliers};
       return true;
     }
   }
-  entering_pose_ = result.camera_from_map;
-  if (++entering_frames_ >= options_.agreeing_frames) {
+  hypothesis_pose_ = result.camera_from_map;
+  if (++hypothesis_frames_ >= options_.agreeing_frames) {
     Enter(frame, map, result, out);
   } else {
-    Unconfirmed(result, out);
+    SetUnconfirmed(result, out);
   }
   return true;
 }
 
 // Into the map that the camera was in: once more as its own, so that all that the frame tells is of it.
 void Tracker::Return(const Frame& frame, const FoundPlace& found, TrackedFrame* out) {
-  if (found.result.Explained() < options_.poor_quality) {
+  if (found.result.VisibleInlierRatio() < options_.poor_quality) {
     // What fits a part of what is in view may be alike only.
-    BeginEntering(found);
-    Unconfirmed(found.result, out);
+    BeginRelocalization(found);
+    SetUnconfirmed(found.result, out);
     return;
   }
-  entering_frames_ = 0;
+  hypothesis_frames_ = 0;
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(found.panorama);
   const MapTrackResult result = map_tracker_.Track(*map_, *features_, found.result.camera_from_map,
-                                                   MapTracker::Effort::kUsual, &random_);
-  if (const Doubt doubt = DoubtOf(result, *map_); doubt != Doubt::kNone) {
+                                                   MapTracker::Effort::kStandard, &random_);
+  if (const RejectionReason doubt = RejectionReasonOf(result, *map_); doubt != RejectionReason::kNone) {
     out->verdict.Consider({.doubt = doubt, .map_key = map_key_, .inliers = result.inliers});
     return;
   }
@@ -284,27 +289,28 @@ void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFram
   out->hint = "look back at what was mapped";
   // Every other frame: the exposure or sharpness may have changed. A map that is about to be entered is
   // followed as it was found.
-  if (entering_frames_ == 0 && frames_lost_++ > 0) {
-    Compare(comparison_ == PatchComparison::kUsual ? PatchComparison::kTolerant : PatchComparison::kUsual);
+  if (hypothesis_frames_ == 0 && frames_lost_++ > 0) {
+    Compare(comparison_ == PatchComparison::kStandard ? PatchComparison::kTolerant
+                                                      : PatchComparison::kStandard);
   }
   if (map_ && RecoverNearby(frame, places, out)) return;
-  if (!places || GoOnEntering(frame, *places, out)) return;
+  if (!places || ContinueRelocalization(frame, *places, out)) return;
   // What was hidden from where a visitor was lost is so for a while.
   if (options_.build_maps || !map_ || frame.time - lost_since_ > FromSeconds(options_.short_loss_s))
     map_tracker_.Clear();
-  const std::vector<TurnedPlace> alike = BestPlaces(*places);
+  const std::vector<AlignedPlace> alike = BestPlaces(*places);
   std::vector<FoundPlace> found = FindMaps(*places, alike, out);
-  if (found.empty() && out->verdict.doubt != Doubt::kLookAlikes) {
-    // What does not look alike at once may still show the same things; what does is a rival at least.
-    std::vector<TurnedPlace> others = PlacesByWords(*places, alike);
+  if (found.empty() && out->verdict.doubt != RejectionReason::kLookAlikes) {
+    // What does not look alike at once may still show the same things; what does is a competitor at least.
+    std::vector<AlignedPlace> others = PlacesByWords(*places, alike);
     if (!others.empty()) {
       others.insert(others.end(), alike.begin(), alike.end());
       found = FindMaps(*places, others, out);
     }
   }
-  if (found.empty() && out->verdict.doubt != Doubt::kLookAlikes) {
+  if (found.empty() && out->verdict.doubt != RejectionReason::kLookAlikes) {
     // No keyframe is near enough to be turned until it fits; descriptors tell the pose from further away.
-    std::vector<TurnedPlace> others = PlacesByDescriptors(*places);
+    std::vector<AlignedPlace> others = PlacesByDescriptors(*places);
     if (!others.empty()) {
       others.insert(others.end(), alike.begin(), alike.end());
       found = FindMaps(*places, others, out);
@@ -313,21 +319,21 @@ void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFram
   if (found.empty()) return;
   const auto key = [&](std::size_t i) { return found[i].place.candidate.map_key; };
   if (found.size() > 1 &&
-      !ClearlyAhead(key(0), found[0].result.Quality(), key(1), found[1].result.Quality())) {
+      !IsUnambiguous(key(0), found[0].result.Quality(), key(1), found[1].result.Quality())) {
     // In case of doubt the camera is still where it was.
     const auto own = std::find_if(found.begin(), found.end(), [&](const FoundPlace& place) {
       return place.place.candidate.map_key == map_key_;
     });
     if (own != found.end()) return Return(frame, *own, out);
-    out->verdict = {.doubt = Doubt::kLookAlikes,
+    out->verdict = {.doubt = RejectionReason::kLookAlikes,
                     .map_key = key(0),
-                    .rival_key = key(1),
+                    .competitor_key = key(1),
                     .inliers = found[0].result.inliers};
     return;
   }
   if (key(0) == map_key_) return Return(frame, found[0], out);
-  BeginEntering(found[0]);
-  Unconfirmed(found[0].result, out);
+  BeginRelocalization(found[0]);
+  SetUnconfirmed(found[0].result, out);
 }
 
 }  // namespace docent::engine

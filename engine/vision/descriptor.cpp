@@ -52,10 +52,10 @@ struct Tables {
 };
 const Tables kTables;
 
-// The surroundings of the pixel, blurred with a 3x3 binomial; the pixel itself is in the middle.
-class Surroundings {
+// The reference_keyframe of the pixel, blurred with a 3x3 binomial; the pixel itself is in the middle.
+class FindReferenceKeyFrame {
  public:
-  Surroundings(const cv::Mat& image, const Eigen::Vector2f& pixel) {
+  FindReferenceKeyFrame(const cv::Mat& image, const Eigen::Vector2f& pixel) {
     const int x0 = static_cast<int>(pixel.x()) - kRadius, y0 = static_cast<int>(pixel.y()) - kRadius;
     const float fx = pixel.x() - std::floor(pixel.x()), fy = pixel.y() - std::floor(pixel.y());
     // Bilinear interpolation and the binomial 1 2 1 in one pass over four neighbours.
@@ -117,7 +117,7 @@ float TurnsOf(float x, float y) {
 
 using DirectionHistogram = std::array<float, kDirectionBins>;
 
-DirectionHistogram HistogramOf(const Surroundings& surroundings) {
+DirectionHistogram HistogramOf(const FindReferenceKeyFrame& reference_keyframe) {
   // One bin more, so that the last one can share with its neighbour without asking.
   std::array<float, kDirectionBins + 2> bins{};
   for (int y = -kHalfPatch; y <= kHalfPatch; ++y) {
@@ -125,8 +125,8 @@ DirectionHistogram HistogramOf(const Surroundings& surroundings) {
       const float weight = kTables.direction_weight[static_cast<std::size_t>(y + kHalfPatch)]
                                                    [static_cast<std::size_t>(x + kHalfPatch)];
       if (weight == 0) continue;
-      const float gx = surroundings.At(x + 1, y) - surroundings.At(x - 1, y);
-      const float gy = surroundings.At(x, y + 1) - surroundings.At(x, y - 1);
+      const float gx = reference_keyframe.At(x + 1, y) - reference_keyframe.At(x - 1, y);
+      const float gy = reference_keyframe.At(x, y + 1) - reference_keyframe.At(x, y - 1);
       const float place = TurnsOf(gx, gy) * kDirectionBins;
       const auto bin = static_cast<std::size_t>(place);
       const float share = place - static_cast<float>(bin);
@@ -192,7 +192,8 @@ bool Normalise(std::array<float, kDescriptorSize>* values, Descriptor* descripto
   return true;
 }
 
-bool DescribeTurned(const Surroundings& surroundings, float direction_rad, Descriptor* descriptor) {
+bool DescribeTurned(const FindReferenceKeyFrame& reference_keyframe, float direction_rad,
+                    Descriptor* descriptor) {
   const float cosine = std::cos(direction_rad), sine = std::sin(direction_rad);
   std::array<std::array<float, kTurned>, kTurned> turned;
   for (int row = 0; row < kTurned; ++row) {
@@ -200,7 +201,7 @@ bool DescribeTurned(const Surroundings& surroundings, float direction_rad, Descr
     for (int column = 0; column < kTurned; ++column) {
       const float u = static_cast<float>(column - kTurned / 2);
       turned[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)] =
-          surroundings.Between(cosine * u - sine * v, sine * u + cosine * v);
+          reference_keyframe.Between(cosine * u - sine * v, sine * u + cosine * v);
     }
   }
   // Each gradient counts for the half axes that it leans to, in the measure that it does: no angle is needed,
@@ -299,13 +300,13 @@ int SquaredDistance(const Descriptor& a, const Descriptor& b) {
 
 std::optional<Description> Describe(const cv::Mat& level_image, const Eigen::Vector2f& pixel_of_level) {
   if (!DescriptorFits(level_image, pixel_of_level)) return std::nullopt;
-  const Surroundings surroundings(level_image, pixel_of_level);
+  const FindReferenceKeyFrame reference_keyframe(level_image, pixel_of_level);
   std::array<float, kMaxDirections> directions;
-  const int found = DominantDirections(HistogramOf(surroundings), &directions);
+  const int found = DominantDirections(HistogramOf(reference_keyframe), &directions);
   Description description;
   for (std::size_t i = 0; i < static_cast<std::size_t>(found); ++i) {
     OrientedDescriptor& oriented = description.of_direction[i];
-    if (!DescribeTurned(surroundings, directions[i], &oriented.descriptor)) break;
+    if (!DescribeTurned(reference_keyframe, directions[i], &oriented.descriptor)) break;
     oriented.direction_rad = directions[i];
     ++description.count;
   }

@@ -10,7 +10,7 @@
 
 #include "engine/vision/image_pyramid.h"
 
-// What a corner looks like, in 36 bytes that stay nearly the same when the picture turns, brightens or gains
+// What a corner looks like, in 36 bytes that stay nearly the same when the image turns, brightens or gains
 // contrast: histograms of gradient directions over 3x3 cells, four directions each, of a 15x15 patch of one
 // pyramid level turned so that its dominant gradient points to the right (the PhonySIFT of Wagner, Reitmayr,
 // Mulloni, Drummond and Schmalstieg 2010; hybrid-slam §5.4), as square roots of shares. Scale is left to the
@@ -38,7 +38,7 @@ struct OrientedDescriptor {
 };
 
 // A patch with two strong directions has two descriptors, as nobody can tell which will be the stronger one
-// in another picture.
+// in another image.
 inline constexpr int kMaxDirections = 2;
 struct Description {
   std::array<OrientedDescriptor, kMaxDirections> of_direction;  // strongest first
@@ -50,7 +50,7 @@ struct Description {
 // sensor noise makes.
 std::optional<Description> Describe(const cv::Mat& level_image, const Eigen::Vector2f& pixel_of_level);
 
-// A described place of a picture.
+// A described place of an image.
 struct DescribedPlace {
   OrientedDescriptor oriented;
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // level 0
@@ -63,11 +63,11 @@ void DescribePlace(const ImageFeatures& features, const Eigen::Vector2f& pixel, 
                    int last_level, std::vector<DescribedPlace>* places);
 
 struct CornerDescriptionOptions {
-  // The corners with the highest Shi-Tomasi score, thinned so that they cover the picture, by level.
+  // The corners with the highest Shi-Tomasi score, thinned so that they cover the image, by level.
   std::array<int, kPyramidLevels> corners = {300, 200, 120, 60};
   float min_score = 20;  // Shi-Tomasi, grey values squared
 };
-// Describes the best corners of a picture, level by level.
+// Describes the best corners of an image, level by level.
 std::vector<DescribedPlace> DescribeCorners(const ImageFeatures& features,
                                             const CornerDescriptionOptions& options = {});
 

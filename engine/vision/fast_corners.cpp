@@ -100,12 +100,12 @@ void TakePeaks(const std::uint8_t* above, const std::uint8_t* scores, const std:
   for (int x = first; x < end; x += kLanes) {
     const Lanes score = LoadBytes(scores + x);
     if (!cv::v_check_any(score > AllBytes(0))) continue;
-    Lanes rival = cv::v_max(LoadBytes(scores + x - 1), LoadBytes(scores + x + 1));
+    Lanes competitor = cv::v_max(LoadBytes(scores + x - 1), LoadBytes(scores + x + 1));
     for (const std::uint8_t* other : {above, below}) {
-      rival = cv::v_max(rival, LoadBytes(other + x));
-      rival = cv::v_max(rival, cv::v_max(LoadBytes(other + x - 1), LoadBytes(other + x + 1)));
+      competitor = cv::v_max(competitor, LoadBytes(other + x));
+      competitor = cv::v_max(competitor, cv::v_max(LoadBytes(other + x - 1), LoadBytes(other + x + 1)));
     }
-    auto peaks = static_cast<std::uint32_t>(cv::v_signmask(score > rival));
+    auto peaks = static_cast<std::uint32_t>(cv::v_signmask(score > competitor));
     if (end - x < kLanes) peaks &= (std::uint32_t{1} << (end - x)) - 1;
     for (; peaks != 0; peaks &= peaks - 1)
       corners->push_back(

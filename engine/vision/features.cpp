@@ -32,14 +32,14 @@ void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
                      const std::array<int, kPyramidLevels>& threshold_hint, ImageFeatures* features) {
   features->levels[0] = gray;
   for (std::size_t level = 0; level < kPyramidLevels; ++level) {
-    if (level > 0) HalvePicture(features->levels[level - 1], &features->levels[level]);
+    if (level > 0) HalveImage(features->levels[level - 1], &features->levels[level]);
     const double wanted = WantedCorners(options, gray, static_cast<int>(level));
     int threshold = threshold_hint[level] > 0 ? threshold_hint[level] : 15;
     DetectFastCorners(features->levels[level], threshold, kBorder, &features->corners[level],
                       &features->row_begin[level]);
     const std::size_t found = features->corners[level].size();
     const int next = NextThreshold(threshold, found, wanted, options);
-    // A picture that suddenly blurs or clears is detected again at once; otherwise the next one profits.
+    // An image that suddenly blurs or clears is detected again at once; otherwise the next one profits.
     if (static_cast<double>(found) < 0.4 * wanted && next < threshold) {
       DetectFastCorners(features->levels[level], next, kBorder, &features->corners[level],
                         &features->row_begin[level]);

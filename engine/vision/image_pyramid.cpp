@@ -17,13 +17,13 @@ cv::v_uint16x8 PairSums(const std::uint8_t* pixels) {
 
 }  // namespace
 
-void HalvePicture(const cv::Mat& picture, cv::Mat* half) {
-  CV_Assert(picture.type() == CV_8UC1);
-  half->create(picture.rows / 2, picture.cols / 2, CV_8UC1);
+void HalveImage(const cv::Mat& image, cv::Mat* half) {
+  CV_Assert(image.type() == CV_8UC1);
+  half->create(image.rows / 2, image.cols / 2, CV_8UC1);
   const cv::v_uint16x8 rounding = cv::v_setall_u16(2);
   for (int y = 0; y < half->rows; ++y) {
-    const std::uint8_t* upper = picture.ptr<std::uint8_t>(2 * y);
-    const std::uint8_t* lower = picture.ptr<std::uint8_t>(2 * y + 1);
+    const std::uint8_t* upper = image.ptr<std::uint8_t>(2 * y);
+    const std::uint8_t* lower = image.ptr<std::uint8_t>(2 * y + 1);
     std::uint8_t* out = half->ptr<std::uint8_t>(y);
     int x = 0;
     for (; x + 8 <= half->cols; x += 8) {

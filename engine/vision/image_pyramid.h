@@ -15,7 +15,7 @@ namespace docent::engine {
 inline constexpr int kPyramidLevels = 4;  // ptamm §2.1
 
 // Pixel of level 0 that a pixel of a level stands for, with pixel centres at integers: level l halves the
-// picture l times, and each of its pixels covers 2^l by 2^l pixels of level 0.
+// image l times, and each of its pixels covers 2^l by 2^l pixels of level 0.
 inline Eigen::Vector2d LevelZeroFromLevel(const Eigen::Vector2d& pixel, int level) {
   const double scale = 1 << level;
   return (pixel.array() + 0.5) * scale - 0.5;
@@ -27,22 +27,22 @@ inline Eigen::Vector2d LevelFromLevelZero(const Eigen::Vector2d& pixel, int leve
 
 // 2x2 means, rounded. An odd last row or column is left out: it would stretch every pixel a little beyond
 // 2x2. *half keeps its memory when its size is the same.
-void HalvePicture(const cv::Mat& picture, cv::Mat* half);
+void HalveImage(const cv::Mat& image, cv::Mat* half);
 
 // A FAST corner of one level, at whole pixels of that level.
 struct Corner {
   std::int16_t x = 0, y = 0;
 };
 
-// Pictures that a PictureStore keeps.
-class KeptPictures {
+// Images that a ImageStore keeps.
+class KeptImages {
  public:
-  virtual ~KeptPictures() = default;
+  virtual ~KeptImages() = default;
   // See ImageFeatures::Look. Any thread.
   virtual void Look() const = 0;
 };
 
-// Everything of one picture that tracking and mapping look at. Level 0 is the full grey picture (CV_8UC1),
+// Everything of one image that tracking and mapping look at. Level 0 is the full grey image (CV_8UC1),
 // each further level half the size (2x2 mean). Corners are sorted by row, then column.
 struct ImageFeatures {
   std::array<cv::Mat, kPyramidLevels> levels;
@@ -51,7 +51,7 @@ struct ImageFeatures {
   std::array<std::vector<int>, kPyramidLevels> row_begin;
   std::array<int, kPyramidLevels> fast_threshold{};
   SmallBlurryImage small_blurry;
-  std::shared_ptr<const KeptPictures> kept;  // null where the levels lie in ordinary memory
+  std::shared_ptr<const KeptImages> kept;  // null where the levels lie in ordinary memory
 
   // Says that the levels are about to be read, so that a store lets others rest. Whoever goes from keyframe
   // to keyframe says so for each; it costs next to nothing, and who forgets it reads the same pixels.

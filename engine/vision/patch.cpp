@@ -54,13 +54,13 @@ bool CutBordered(const cv::Mat& source, const Eigen::Vector2f& center, const Eig
   return true;
 }
 
-// Over the picture's values under the patch, less the patch's mean, which keeps the sums small.
+// Over the image's values under the patch, less the patch's mean, which keeps the sums small.
 struct ShiftedSums {
   float value, value_squared, value_times_pixel;
   Eigen::Vector2f value_times_gradient;
 };
 
-// left, top: of the patch in the picture, interpolated between pixels. With kLimited brighter values count as
+// left, top: of the patch in the image, interpolated between pixels. With kLimited brighter values count as
 // `limit`.
 template <bool kLimited>
 ShiftedSums SumShifted(const PatchTemplate& patch, const cv::Mat& image, float left, float top,

@@ -7,7 +7,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
-// 8x8 grey patches: cut from one picture through an affine warp, compared with another, aligned to a fraction
+// 8x8 grey patches: cut from one image through an affine warp, compared with another, aligned to a fraction
 // of a pixel. Nothing here allocates. A patch about a pixel p covers p + (-4 .. 3) in both directions; the
 // same rule holds on both sides of a match, so the half pixel cancels.
 namespace docent::engine {
@@ -38,11 +38,11 @@ struct PatchTemplate {
 };
 
 // Cuts a template: template pixel (i, j) shows source at `center` + source_from_patch * (offset of (i, j)).
-// False when the warped patch leaves the picture or has too little texture to be found again.
+// False when the warped patch leaves the image or has too little texture to be found again.
 bool CutPatch(const cv::Mat& source, const Eigen::Vector2f& center, const Eigen::Matrix2f& source_from_patch,
               PatchTemplate* patch);
 
-// Zero-mean normalised cross-correlation of the template with the picture about whole pixel (x, y), in [-1,
+// Zero-mean normalised cross-correlation of the template with the image about whole pixel (x, y), in [-1,
 // 1]. The caller has made sure that the patch lies inside.
 float PatchCorrelation(const PatchTemplate& patch, const cv::Mat& image, int x, int y);
 

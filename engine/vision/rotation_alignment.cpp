@@ -41,11 +41,11 @@ struct SampleTable {
   }
 };
 
-// Thumbnail pixel u covers picture pixels scale * u to scale * (u + 1) - 1.
-double PictureFromThumbnail(double x, int scale) {
+// Thumbnail pixel u covers image pixels scale * u to scale * (u + 1) - 1.
+double ImageFromThumbnail(double x, int scale) {
   return scale * (x + 0.5) - 0.5;
 }
-double ThumbnailFromPicture(double x, int scale) {
+double ThumbnailFromImage(double x, int scale) {
   return (x + 0.5) / scale - 0.5;
 }
 
@@ -59,7 +59,7 @@ SampleTable MakeSampleTable(const CameraModel& camera, cv::Size size, int scale)
       Sample sample;
       sample.x = x;
       sample.y = y;
-      const auto ray = camera.Unproject({PictureFromThumbnail(x, scale), PictureFromThumbnail(y, scale)});
+      const auto ray = camera.Unproject({ImageFromThumbnail(x, scale), ImageFromThumbnail(y, scale)});
       Eigen::Vector2d pixel;
       Eigen::Matrix<double, 2, 3> jacobian;
       if (ray && camera.Project(*ray, &pixel, &jacobian)) {
@@ -156,7 +156,7 @@ Comparison Summarise(const Sums& sums) {
   const double variance_a = m(3, 3) - count * mean_a * mean_a;
   const double variance_b = m(5, 5) - count * mean_b * mean_b;
   const double covariance = m(3, 5) - count * mean_a * mean_b;
-  // A free gain would let two unlike pictures "agree" by fading one of them to flat grey.
+  // A free gain would let two unlike images "agree" by fading one of them to flat grey.
   result.gain = variance_a > 1e-6 * count ? std::clamp(covariance / variance_a, 0.5, 2.0) : 1.0;
   const double squared = variance_b - 2 * result.gain * covariance + result.gain * result.gain * variance_a;
   result.mean_squared = std::max(squared, 0.0) / count;
@@ -193,15 +193,15 @@ class RotationAligner {
     const float max_y = static_cast<float>(image_b_.size.height - 1);
     Eigen::Matrix<float, 6, 6> row_sum;
     for (int row = 0; row < table_a_->rows; ++row) {
-      row_sum.setZero();  // floats hold one row's sum exactly enough, doubles the picture's
+      row_sum.setZero();  // floats hold one row's sum exactly enough, doubles the image's
       for (int column = 0; column < table_a_->columns; ++column) {
         const Sample& sample = table_a_->samples[static_cast<std::size_t>(row * table_a_->columns + column)];
         if (!sample.valid) continue;
         ++sums.valid;
         const auto pixel = table_b_->camera.Project(rotation * (sample.ray - pivot_) + pivot_);
         if (!pixel) continue;
-        const float x = static_cast<float>(ThumbnailFromPicture(pixel->x(), table_b_->scale));
-        const float y = static_cast<float>(ThumbnailFromPicture(pixel->y(), table_b_->scale));
+        const float x = static_cast<float>(ThumbnailFromImage(pixel->x(), table_b_->scale));
+        const float y = static_cast<float>(ThumbnailFromImage(pixel->y(), table_b_->scale));
         if (!(x >= 0 && y >= 0 && x <= max_x && y <= max_y)) continue;
         ++sums.inside;
         const Sample& there = table_b_->Nearest(x, y);
@@ -297,8 +297,8 @@ cv::Mat Coarser(const cv::Mat& pixels) {
   return blurred;
 }
 
-// Whether the picture holds the rotation in place: the standard deviation that its texture leaves, from the
-// residuals (never below what quantised pictures show) and the number of independent samples.
+// Whether the image holds the rotation in place: the standard deviation that its texture leaves, from the
+// residuals (never below what quantised images show) and the number of independent samples.
 bool IsObservable(const Comparison& comparison) {
   constexpr double kMinNoise = 0.1;              // grey values
   constexpr double kSamplesOneIndependent = 20;  // the blur's area, 4 pi sigma^2, in units of kStride^2
@@ -324,7 +324,7 @@ std::optional<RotationAlignment> AlignRotation(const SmallBlurryImage& a, const 
     const RotationAligner coarse(Coarser(a.pixels), camera_a, Coarser(b.pixels), camera_b, 2 * a.scale,
                                  2 * b.scale, pivot);
     const Descent guess = Descend(coarse, {initial, coarse.Compare(initial, 1.0)}, max_iterations);
-    // The coarse pictures suggest; the thumbnails themselves decide.
+    // The coarse images suggest; the thumbnails themselves decide.
     const Comparison comparison = fine.Compare(guess.b_from_a, 1.0);
     if (comparison.mean_squared < descent.comparison.mean_squared) descent = {guess.b_from_a, comparison};
   }

@@ -10,7 +10,7 @@
 
 namespace docent::engine {
 
-// The camera rotation b_from_a between two pictures of one camera that lie near each other, by efficient
+// The camera rotation b_from_a between two images of one camera that lie near each other, by efficient
 // second-order minimisation over SO(3) through the lens model (ESM, Benhimane and Malis 2007; ptamm §3.2).
 struct RotationAlignment {
   Rotation3 b_from_a;
@@ -18,7 +18,7 @@ struct RotationAlignment {
   double overlap = 0;  // fraction of thumbnail pixels that fall inside the other
   bool converged = false;
 };
-// camera_a, camera_b: models of the full pictures. initial: b_from_a to start from. pivot: what the camera
+// camera_a, camera_b: models of the full images. initial: b_from_a to start from. pivot: what the camera
 // turned about, camera frame, in units of the distance of what it sees; zero: its own centre. Empty when the
 // overlap falls below a quarter.
 std::optional<RotationAlignment> AlignRotation(const SmallBlurryImage& a, const CameraModel& camera_a,

@@ -82,7 +82,7 @@ void MakeKernel(double sigma_px, Workspace* workspace) {
   for (float& weight : workspace->kernel) weight = static_cast<float>(weight / sum);
 }
 
-// The index that a picture mirrored about its outermost pixels has there.
+// The index that an image mirrored about its outermost pixels has there.
 int Reflect(int index, int size) {
   if (size == 1) return 0;
   const int period = 2 * (size - 1);

@@ -5,8 +5,8 @@
 
 namespace docent::engine {
 
-// A picture's thumbnail for recognising places and for estimating rotation between neighbours: subsampled
-// and blurred, mean removed (ptamm §3.2). `pixels` is CV_32FC1, at most 80 wide; `scale` is picture pixels a
+// An image's thumbnail for recognising places and for estimating rotation between neighbours: subsampled
+// and blurred, mean removed (ptamm §3.2). `pixels` is CV_32FC1, at most 80 wide; `scale` is image pixels a
 // thumbnail pixel.
 struct SmallBlurryImage {
   cv::Mat pixels;

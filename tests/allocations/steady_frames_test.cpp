@@ -29,7 +29,7 @@ Rigid3 Pose(int frame) {
 
 struct Scene {
   std::shared_ptr<const MapSnapshot> map;
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
 };
 
 const Scene& TheScene() {
@@ -39,7 +39,7 @@ const Scene& TheScene() {
                                       {CameraAt({-0.1, 0, 0}), CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0})})
                    .Snapshot();
     for (int i = 0; i < kFrames; ++i)
-      made.pictures.push_back(World().Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i) + 1));
+      made.images.push_back(World().Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i) + 1));
     return made;
   }();
   return scene;
@@ -68,8 +68,7 @@ void ExpectNoAllocations(const TrackerOptions& options) {
   TrackedFrame tracked;
   constexpr int kWarmUp = 6 * kFrames;
   for (int i = 0; i < kWarmUp + kFrames; ++i) {
-    const Frame frame =
-        testing_world::MakeFrame(i, TheScene().pictures[static_cast<std::size_t>(i % kFrames)]);
+    const Frame frame = testing_world::MakeFrame(i, TheScene().images[static_cast<std::size_t>(i % kFrames)]);
     const std::size_t before = AllocationsOfThisThread();
     tracker.Track(frame, &places, &tracked);
     const std::size_t taken = AllocationsOfThisThread() - before;
@@ -87,7 +86,7 @@ TEST(AllocationCounter, CountsWhatIsAllocated) {
   const std::size_t after = AllocationsOfThisThread();
   delete number;
   EXPECT_EQ(after - before, 1u);
-  const cv::Mat picture(10, 10, CV_8UC1);
+  const cv::Mat image(10, 10, CV_8UC1);
   EXPECT_GT(AllocationsOfThisThread(), after);
 }
 

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kSimulatedFrames = 300;
 
-void ReadPictures(BenchSequence* sequence) {
+void ReadImages(BenchSequence* sequence) {
   const char* named = std::getenv("DOCENT_BENCH_SEQUENCE");
   app::QuietDecoders();
   app::CalibratedCamera camera = app::Calibrate(app::OpenCamera(named ? named : "sim:room"), std::nullopt);
@@ -28,11 +28,11 @@ void ReadPictures(BenchSequence* sequence) {
   sequence->camera = camera.model;
   engine::Frame frame;
   while (camera.source->Next(&frame)) {
-    camera.CheckPicture(frame.picture);
-    if (frame.picture.channels() == 3) {
+    camera.CheckImage(frame.image);
+    if (frame.image.channels() == 3) {
       cv::Mat gray;
-      cv::cvtColor(frame.picture, gray, cv::COLOR_BGR2GRAY);
-      frame.picture = gray;
+      cv::cvtColor(frame.image, gray, cv::COLOR_BGR2GRAY);
+      frame.image = gray;
     }
     sequence->frames.push_back(frame);
     if (!named && sequence->frames.size() == kSimulatedFrames) break;
@@ -53,7 +53,7 @@ void MakeMap(BenchSequence* sequence) {
 BenchSequence MakeSequence() {
   cv::setNumThreads(1);
   BenchSequence sequence;
-  ReadPictures(&sequence);
+  ReadImages(&sequence);
   MakeMap(&sequence);
   return sequence;
 }

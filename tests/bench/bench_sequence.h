@@ -11,7 +11,7 @@
 #include "engine/recognition/place.h"
 #include "tests/engine/lockstep.h"
 
-// What every benchmark measures on: grey pictures of one sequence in memory, and the map that tracker and
+// What every benchmark measures on: grey images of one sequence in memory, and the map that tracker and
 // mapper, run in turn, made of them. The sequence is the folder or file that the environment variable
 // DOCENT_BENCH_SEQUENCE names (anything that --camera takes; its calibration beside it), else ten seconds of
 // the simulator's room. Made once a process, by the first benchmark that asks; all on the calling thread.

@@ -31,7 +31,7 @@ void ExtractFeatures(benchmark::State& state) {
   std::size_t next = 0;
   for (auto _ : state) {
     const auto hint = features.fast_threshold;
-    engine::ExtractFeatures(sequence.frames[next].picture, {}, hint, &features);
+    engine::ExtractFeatures(sequence.frames[next].image, {}, hint, &features);
     next = (next + 1) % sequence.frames.size();
   }
 }
@@ -41,7 +41,7 @@ void AlignRotation(benchmark::State& state) {
   const BenchSequence& sequence = Sequence();
   std::vector<engine::SmallBlurryImage> thumbnails;
   for (const engine::Frame& frame : sequence.frames) {
-    thumbnails.push_back(engine::MakeSmallBlurryImage(frame.picture));
+    thumbnails.push_back(engine::MakeSmallBlurryImage(frame.image));
     if (thumbnails.size() == 100) break;
   }
   std::size_t next = 1;
@@ -63,7 +63,7 @@ void PredictAndFindAPoint(benchmark::State& state) {
     state.SkipWithError("no frame was tracked in the second half of this sequence");
     return;
   }
-  const auto features = engine::MakeFeatures(sequence.frames[index].picture);
+  const auto features = engine::MakeFeatures(sequence.frames[index].image);
   const engine::Rigid3& pose = sequence.tracked[index].camera_from_map;
   engine::PointSearcher searcher;
   std::size_t next = 0;
@@ -85,11 +85,9 @@ void PredictAndFindAPoint(benchmark::State& state) {
 BENCHMARK(PredictAndFindAPoint)->Unit(benchmark::kMicrosecond);
 
 // Whether any of these pixels passes the corner detector's first test.
-bool PassesFirstTest(const cv::Mat& picture, int y, int begin, int end, int threshold) {
+bool PassesFirstTest(const cv::Mat& image, int y, int begin, int end, int threshold) {
   for (int x = begin; x < end; ++x) {
-    const auto at = [&](int dx, int dy) {
-      return static_cast<int>(picture.at<std::uint8_t>(y + dy, x + dx));
-    };
+    const auto at = [&](int dx, int dy) { return static_cast<int>(image.at<std::uint8_t>(y + dy, x + dx)); };
     const int center = at(0, 0), top = at(0, -3), bottom = at(0, 3), left = at(-3, 0), right = at(3, 0);
     const int bright = std::min(std::max(top, bottom), std::max(left, right)) - center;
     const int dark = center - std::max(std::min(top, bottom), std::min(left, right));
@@ -98,21 +96,21 @@ bool PassesFirstTest(const cv::Mat& picture, int y, int begin, int end, int thre
   return false;
 }
 
-// Per picture. "operations" counts those on a vector of bytes that the test cannot do without: five loads,
+// Per image. "operations" counts those on a vector of bytes that the test cannot do without: five loads,
 // nine comparisons and differences, a branch and a store for each block; and for a block that passes the
 // first test twelve loads, 46 minima and maxima for the strongest bright arc, as many for the dark one, and
 // seven more.
 void DetectCorners(benchmark::State& state) {
   const BenchSequence& sequence = Sequence();
-  const auto features = engine::MakeFeatures(sequence.frames[sequence.frames.size() / 2].picture);
+  const auto features = engine::MakeFeatures(sequence.frames[sequence.frames.size() / 2].image);
   constexpr int kMargin = 6;
   double operations = 0;
   for (std::size_t level = 0; level < engine::kPyramidLevels; ++level) {
-    const cv::Mat& picture = features->levels[level];
-    for (int y = kMargin; y < picture.rows - kMargin; ++y) {
-      for (int x = kMargin; x < picture.cols - kMargin; x += engine::kByteLanes) {
-        const int end = std::min(x + engine::kByteLanes, picture.cols - kMargin);
-        operations += PassesFirstTest(picture, y, x, end, features->fast_threshold[level]) ? 16 + 111 : 16;
+    const cv::Mat& image = features->levels[level];
+    for (int y = kMargin; y < image.rows - kMargin; ++y) {
+      for (int x = kMargin; x < image.cols - kMargin; x += engine::kByteLanes) {
+        const int end = std::min(x + engine::kByteLanes, image.cols - kMargin);
+        operations += PassesFirstTest(image, y, x, end, features->fast_threshold[level]) ? 16 + 111 : 16;
       }
     }
   }
@@ -128,17 +126,17 @@ void DetectCorners(benchmark::State& state) {
 }
 BENCHMARK(DetectCorners)->Unit(benchmark::kMicrosecond);
 
-struct CornersOfAPicture {
-  cv::Mat picture;
+struct CornersOfAnImage {
+  cv::Mat image;
   std::vector<Eigen::Vector2f> corners;  // that patches fit about
 };
-CornersOfAPicture SomeCorners() {
+CornersOfAnImage SomeCorners() {
   const BenchSequence& sequence = Sequence();
-  const auto features = engine::MakeFeatures(sequence.frames[sequence.frames.size() / 2].picture);
-  CornersOfAPicture some{features->levels[0], {}};
+  const auto features = engine::MakeFeatures(sequence.frames[sequence.frames.size() / 2].image);
+  CornersOfAnImage some{features->levels[0], {}};
   for (const engine::Corner& corner : features->corners[0]) {
     const Eigen::Vector2f pixel(corner.x, corner.y);
-    if (engine::PatchFits(some.picture, pixel.x(), pixel.y(), 12)) some.corners.push_back(pixel);
+    if (engine::PatchFits(some.image, pixel.x(), pixel.y(), 12)) some.corners.push_back(pixel);
   }
   return some;
 }
@@ -152,12 +150,12 @@ Eigen::Matrix2f SomeWarp() {
 // "operations": 100 bilinear samples of 22 on single numbers; eight rows of 16 on vectors and eight of 14 for
 // the integer sums; 100 for the sums of gradients and the matrix.
 void CutAPatch(benchmark::State& state) {
-  const CornersOfAPicture some = SomeCorners();
+  const CornersOfAnImage some = SomeCorners();
   const Eigen::Matrix2f warp = SomeWarp();
   engine::PatchTemplate patch;
   std::size_t next = 0;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(engine::CutPatch(some.picture, some.corners[next], warp, &patch));
+    benchmark::DoNotOptimize(engine::CutPatch(some.image, some.corners[next], warp, &patch));
     next = (next + 1) % some.corners.size();
   }
   state.counters["operations"] =
@@ -169,13 +167,13 @@ BENCHMARK(CutAPatch)->Unit(benchmark::kNanosecond);
 // "operations" on vectors of eight: 8 for the first row and 26 for each of eight, 40 for the five totals, 40
 // for the step.
 void AlignAPatch(benchmark::State& state) {
-  const CornersOfAPicture some = SomeCorners();
+  const CornersOfAnImage some = SomeCorners();
   const Eigen::Matrix2f warp = SomeWarp();
   std::vector<std::pair<engine::PatchTemplate, Eigen::Vector2f>> patches;
   for (const Eigen::Vector2f& corner : some.corners) {
     engine::PatchTemplate patch;
-    if (!engine::CutPatch(some.picture, corner, warp, &patch)) continue;
-    if (const auto aligned = engine::AlignPatch(patch, some.picture, corner))
+    if (!engine::CutPatch(some.image, corner, warp, &patch)) continue;
+    if (const auto aligned = engine::AlignPatch(patch, some.image, corner))
       patches.emplace_back(patch, aligned->pixel);
   }
   if (patches.empty()) {
@@ -184,7 +182,7 @@ void AlignAPatch(benchmark::State& state) {
   }
   std::size_t next = 0;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(engine::AlignPatch(patches[next].first, some.picture, patches[next].second));
+    benchmark::DoNotOptimize(engine::AlignPatch(patches[next].first, some.image, patches[next].second));
     next = (next + 1) % patches.size();
   }
   state.counters["operations"] =

@@ -149,7 +149,7 @@ void FillIndex(std::size_t maps, maps::PlaceIndex* index) {
         // Five keyframes are a place.
         words.push_back({id, id / 5 * 5, itself ? original.words : Replica(original.words, &random)});
       }
-      index->SetLooks(round == 0 ? key : 1000 * round + key, thumbnails, words);
+      index->SetAppearance(round == 0 ? key : 1000 * round + key, thumbnails, words);
       ++made;
     }
   }
@@ -212,7 +212,7 @@ BENCHMARK(FindPlaces)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
 
-// What a visitor's camera does: it is rolled, further away or nearer, looks aside (the rest of the picture is
+// What a visitor's camera does: it is rolled, further away or nearer, looks aside (the rest of the image is
 // black), or the light is another.
 cv::Mat Changed(const cv::Mat& gray, int change) {
   const auto warped = [&](double angle_deg, double scale, double aside) {

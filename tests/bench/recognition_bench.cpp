@@ -16,14 +16,14 @@ namespace {
 using engine::DescribedPlace;
 using engine::DescriptorDatabase;
 
-// The described corners of pictures all over the sequence.
-const std::vector<std::vector<DescribedPlace>>& DescribedPictures() {
+// The described corners of images all over the sequence.
+const std::vector<std::vector<DescribedPlace>>& DescribedImages() {
   static const std::vector<std::vector<DescribedPlace>> described = [] {
-    std::vector<std::vector<DescribedPlace>> pictures;
+    std::vector<std::vector<DescribedPlace>> images;
     const std::size_t step = std::max<std::size_t>(1, Sequence().frames.size() / 50);
     for (std::size_t i = 0; i < Sequence().frames.size(); i += step)
-      pictures.push_back(DescribeCorners(*engine::MakeFeatures(Sequence().frames[i].picture)));
-    return pictures;
+      images.push_back(DescribeCorners(*engine::MakeFeatures(Sequence().frames[i].image)));
+    return images;
   }();
   return described;
 }
@@ -36,8 +36,8 @@ std::vector<engine::Descriptor> DescriptorsOf(const std::vector<DescribedPlace>&
 
 // A database of this many keyframes: the sequence's, again and again.
 void AddKeyFrame(engine::KeyFrameId id, DescriptorDatabase* database) {
-  const auto& pictures = DescribedPictures();
-  const std::vector<DescribedPlace>& places = pictures[id % pictures.size()];
+  const auto& images = DescribedImages();
+  const std::vector<DescribedPlace>& places = images[id % images.size()];
   for (std::size_t i = 0; i < places.size(); ++i) {
     database->Add({places[i].oriented.descriptor, id, static_cast<engine::MapPointId>(i), places[i].pixel,
                    places[i].level});
@@ -50,7 +50,7 @@ DescriptorDatabase MakeDatabase(std::int64_t keyframes) {
 }
 
 void DescribeACorner(benchmark::State& state) {
-  const auto features = engine::MakeFeatures(Sequence().frames.front().picture);
+  const auto features = engine::MakeFeatures(Sequence().frames.front().image);
   std::size_t next = 0;
   for (auto _ : state) {
     const engine::Corner corner = features->corners[0][next];
@@ -60,16 +60,16 @@ void DescribeACorner(benchmark::State& state) {
 }
 BENCHMARK(DescribeACorner)->Unit(benchmark::kMicrosecond);
 
-void DescribeAPicture(benchmark::State& state) {
-  const auto features = engine::MakeFeatures(Sequence().frames.front().picture);
+void DescribeAnImage(benchmark::State& state) {
+  const auto features = engine::MakeFeatures(Sequence().frames.front().image);
   std::size_t described = 0;
   for (auto _ : state) described = DescribeCorners(*features).size();
   state.counters["descriptors"] = static_cast<double>(described);
 }
-BENCHMARK(DescribeAPicture)->Unit(benchmark::kMicrosecond);
+BENCHMARK(DescribeAnImage)->Unit(benchmark::kMicrosecond);
 
 void CompareDescriptors(benchmark::State& state) {
-  const auto descriptors = DescriptorsOf(DescribedPictures().front());
+  const auto descriptors = DescriptorsOf(DescribedImages().front());
   std::size_t next = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(SquaredDistance(descriptors[0], descriptors[next]));
@@ -80,7 +80,7 @@ BENCHMARK(CompareDescriptors);
 
 // Argument: how many leaves are looked for.
 void DescendTheTree(benchmark::State& state) {
-  const auto descriptors = DescriptorsOf(DescribedPictures().front());
+  const auto descriptors = DescriptorsOf(DescribedImages().front());
   std::array<std::uint32_t, engine::VocabularyTree::kMaxNearestLeaves> leaves;
   const auto wanted = std::span(leaves).first(static_cast<std::size_t>(state.range(0)));
   std::size_t next = 0;
@@ -102,27 +102,27 @@ void AddAndRemoveAKeyFrame(benchmark::State& state) {
 }
 BENCHMARK(AddAndRemoveAKeyFrame)->Arg(10)->Arg(100)->Arg(1000)->Unit(benchmark::kMicrosecond);
 
-void MatchAPicture(benchmark::State& state) {
+void MatchAnImage(benchmark::State& state) {
   const DescriptorDatabase database = MakeDatabase(state.range(0));
-  const auto queries = DescriptorsOf(DescribedPictures()[DescribedPictures().size() / 2]);
+  const auto queries = DescriptorsOf(DescribedImages()[DescribedImages().size() / 2]);
   for (auto _ : state) benchmark::DoNotOptimize(database.FindMatches(queries, {}));
   state.counters["queries"] = static_cast<double>(queries.size());
   state.counters["entries"] = static_cast<double>(database.size());
 }
-BENCHMARK(MatchAPicture)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
+BENCHMARK(MatchAnImage)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 
 void VoteForKeyFrames(benchmark::State& state) {
   const DescriptorDatabase database = MakeDatabase(state.range(0));
-  const auto queries = DescriptorsOf(DescribedPictures()[DescribedPictures().size() / 2]);
+  const auto queries = DescriptorsOf(DescribedImages()[DescribedImages().size() / 2]);
   for (auto _ : state) benchmark::DoNotOptimize(database.FindKeyFrames(queries, 5));
 }
 BENCHMARK(VoteForKeyFrames)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 
-// The sequence's first picture as a target, seen as it is.
+// The sequence's first image as a target, seen as it is.
 void DetectATarget(benchmark::State& state) {
-  const cv::Mat& picture = Sequence().frames.front().picture;
-  const engine::PlanarTarget target(picture, 1.0);
-  const auto features = engine::MakeFeatures(picture);
+  const cv::Mat& image = Sequence().frames.front().image;
+  const engine::PlanarTarget target(image, 1.0);
+  const auto features = engine::MakeFeatures(image);
   double found = 0;
   for (auto _ : state) found = target.Detect(*features, *Sequence().camera, 1).has_value();
   state.counters["found"] = found;
@@ -131,12 +131,12 @@ BENCHMARK(DetectATarget)->Unit(benchmark::kMillisecond);
 
 // From a pose that is a little off, as from frame to frame.
 void AlignATarget(benchmark::State& state) {
-  const cv::Mat& picture = Sequence().frames.front().picture;
-  const engine::PlanarTarget target(picture, 1.0);
-  const auto features = engine::MakeFeatures(picture);
+  const cv::Mat& image = Sequence().frames.front().image;
+  const engine::PlanarTarget target(image, 1.0);
+  const auto features = engine::MakeFeatures(image);
   const auto sighting = target.Detect(*features, *Sequence().camera, 1);
   if (!sighting) {
-    state.SkipWithError("the picture is not found in itself");
+    state.SkipWithError("the image is not found in itself");
     return;
   }
   const engine::Rigid3 off(engine::Rotation3::Exp({0.005, -0.005, 0.005}), {0.005, 0.005, 0.005});

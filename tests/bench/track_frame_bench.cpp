@@ -8,7 +8,7 @@
 #include "tests/bench/bench_sequence.h"
 
 // What a frame costs: tracking it in a finished map, beside the extraction of a thousand ORB features from
-// the same picture, which trackers of another kind begin with. All on one thread, in milliseconds of
+// the same image, which trackers of another kind begin with. All on one thread, in milliseconds of
 // computing. The counters:
 //   *_median_ms, *_p95_ms   over the frames; lost ones count, with what their recovery costs
 //   tracked                 part of the frames that had a pose
@@ -60,7 +60,7 @@ Timings GoThrough(const BenchSequence& sequence, bool track, bool extract) {
       timings.total_ms += timings.track_ms.back();
     }
     if (extract) {
-      timings.orb_ms.push_back(orb.Milliseconds(frame.picture));
+      timings.orb_ms.push_back(orb.Milliseconds(frame.image));
       timings.total_ms += timings.orb_ms.back();
     }
   }

@@ -14,7 +14,7 @@
 #include "tests/bench/bench_sequence.h"
 
 // What a second camera costs the first: two trackers and the mapper together, beside each camera alone with
-// the mapper, all at the pace of real cameras with pictures that lie in memory, one run after the other so
+// the mapper, all at the pace of real cameras with images that lie in memory, one run after the other so
 // that whatever slows the machine slows all three. The counters, for the camera in the hand (hand) and the
 // one on the shoulder (shoulder):
 //   *_alone_p95_ms, *_pair_p95_ms  tracking of a frame on the wall, as report.json has it
@@ -22,7 +22,7 @@
 //   *_cpu_ratio                    the same for the computing of the camera's thread alone, which does not
 //                                  grow by waiting for a processor
 //   *_pair_tracked                 part of the pair's frames, from the first with a pose on, that had one
-//   dropped                        part of the pair's pictures that came too late
+//   dropped                        part of the pair's images that came too late
 // DOCENT_BENCH_SECONDS shortens the walk of 24 s. Repetitions (--benchmark_repetitions) give medians. To be
 // run on two processors (taskset) of a machine that does nothing else:
 //
@@ -48,7 +48,7 @@ Film Shoot(const std::string& scene) {
     engine::Frame& frame = film.frames.emplace_back();
     frame.index = static_cast<std::uint64_t>(i);
     frame.time = simulation->time(i);
-    simulation->Render(i, &frame.picture);
+    simulation->Render(i, &frame.image);
   }
   return film;
 }
@@ -126,7 +126,7 @@ void WearablePair(benchmark::State& state) {
     alone.push_back(Run({&films[0]}));
     std::vector<Measured> pair = Run({&films[0], &films[1]});
     alone.push_back(Run({&films[1]}));
-    double dropped = 0, pictures = 0;
+    double dropped = 0, images = 0;
     for (std::size_t i = 0; i < 2; ++i) {
       Measured& one = alone[i].front();
       const double alone_ms = Quantile(&one.wall_ms, 0.95), pair_ms = Quantile(&pair[i].wall_ms, 0.95);
@@ -139,9 +139,9 @@ void WearablePair(benchmark::State& state) {
       counters[name + "_cpu_ratio"] = Quantile(&pair[i].cpu_ms, 0.95) / Quantile(&one.cpu_ms, 0.95);
       counters[name + "_pair_tracked"] = static_cast<double>(pair[i].tracked) / pair[i].since_first;
       dropped += pair[i].dropped;
-      pictures += static_cast<double>(pair[i].wall_ms.size()) + pair[i].dropped;
+      images += static_cast<double>(pair[i].wall_ms.size()) + pair[i].dropped;
     }
-    counters["dropped"] = dropped / pictures;
+    counters["dropped"] = dropped / images;
   }
 }
 

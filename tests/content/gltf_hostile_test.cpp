@@ -225,7 +225,7 @@ TEST(HostileGltf, RequiredExtensionsThatAreNotReadAreNamed) {
   EXPECT_THAT(old.Refusal(), HasSubstr("glTF 1.0"));
 }
 
-TEST(HostileGltf, APictureTooLargeIsRefusedFromItsHeaderAlone) {
+TEST(HostileGltf, AImageTooLargeIsRefusedFromItsHeaderAlone) {
   // A PNG header of 20000 x 4 pixels and nothing behind it.
   std::vector<std::uint8_t> png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n', 0,    0, 0,
                                    13,   'I', 'H', 'D', 'R',  0,    0,    0x4E, 0x20, 0, 0,
@@ -247,7 +247,7 @@ TEST(HostileGltf, APictureTooLargeIsRefusedFromItsHeaderAlone) {
   EXPECT_THAT(refusal(), HasSubstr("20000 x 4"));
   limits.max_image_side_px = 30000;
   pixels_left = 79'999;
-  EXPECT_THAT(refusal(), HasSubstr("brings the model's pictures above"));
+  EXPECT_THAT(refusal(), HasSubstr("brings the model's images above"));
   pixels_left = 80'000;
   EXPECT_THAT(refusal(), HasSubstr("damaged"));
 }

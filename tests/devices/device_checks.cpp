@@ -71,14 +71,14 @@ CameraOptions Options(std::uint32_t pixel_format) {
   return options;
 }
 
-// Fetches pictures and checks what holds for all of them. Answers with the last one.
+// Fetches images and checks what holds for all of them. Answers with the last one.
 engine::Frame Fetch(FrameSource* source, int count) {
   engine::Frame frame;
   std::optional<Timestamp> time;
   std::optional<std::uint64_t> index;
   for (int i = 0; i < count; ++i) {
     EXPECT_TRUE(source->Next(&frame));
-    EXPECT_EQ(frame.picture.size(), cv::Size(640, 480));
+    EXPECT_EQ(frame.image.size(), cv::Size(640, 480));
     if (time) {
       EXPECT_GT(frame.time, *time);
     }
@@ -110,7 +110,7 @@ TEST(Vivid, IsListedWithFormatsAndControls) {
   EXPECT_THAT(HeldDevices(), IsEmpty());
 }
 
-TEST(Vivid, DeliversSixtyYuyvPicturesInOrderAndIsLetGoOf) {
+TEST(Vivid, DeliversSixtyYuyvImagesInOrderAndIsLetGoOf) {
   {
     const auto source = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
     Fetch(source.get(), 60);
@@ -123,14 +123,14 @@ TEST(Vivid, DeliversSixtyYuyvPicturesInOrderAndIsLetGoOf) {
   EXPECT_THAT(HeldDevices(), IsEmpty());
 }
 
-// The same test picture must come out of every pixel format. Its lower part has no text in it.
+// The same test image must come out of every pixel format. Its lower part has no text in it.
 TEST(Vivid, LooksTheSameInEveryPixelFormat) {
   const cv::Rect bars(0, 300, 640, 100);
   const auto column_means = [&](std::uint32_t pixel_format) {
     const auto source = OpenDevice(kVivid, Options(pixel_format));
-    const cv::Mat picture = Fetch(source.get(), 2).picture;
+    const cv::Mat image = Fetch(source.get(), 2).image;
     cv::Mat means;
-    cv::reduce(picture(bars), means, 0, cv::REDUCE_AVG, CV_32F);
+    cv::reduce(image(bars), means, 0, cv::REDUCE_AVG, CV_32F);
     return means;
   };
   const cv::Mat yuyv = column_means(V4L2_PIX_FMT_YUYV), nv12 = column_means(V4L2_PIX_FMT_NV12);
@@ -152,7 +152,7 @@ TEST(Vivid, LooksTheSameInEveryPixelFormat) {
   EXPECT_GT(correlation, 0.95);  // colours outside the screen's range are clipped
 }
 
-TEST(Vivid, ThatDropsThreePicturesInTenIsCountedRightly) {
+TEST(Vivid, ThatDropsThreeImagesInTenIsCountedRightly) {
   SetByName("Percentage of Dropped Buffers", 30);
   {
     const auto source = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
@@ -165,7 +165,7 @@ TEST(Vivid, ThatDropsThreePicturesInTenIsCountedRightly) {
   SetByName("Percentage of Dropped Buffers", 0);
 }
 
-TEST(Vivid, ThatMarksAPictureAsBrokenIsPassedOver) {
+TEST(Vivid, ThatMarksAnImageAsBrokenIsPassedOver) {
   const auto source = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
   Fetch(source.get(), 2);
   SetByName("Inject V4L2_BUF_FLAG_ERROR", 1);
@@ -173,7 +173,7 @@ TEST(Vivid, ThatMarksAPictureAsBrokenIsPassedOver) {
   EXPECT_EQ(source->delivery().broken, 1u);
 }
 
-TEST(Vivid, GivesTheNewestPictureToASlowReader) {
+TEST(Vivid, GivesTheNewestImageToASlowReader) {
   const auto source = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
   Fetch(source.get(), 2);
   std::this_thread::sleep_for(std::chrono::seconds(1));
@@ -210,7 +210,7 @@ TEST(Vivid, ThatIsUnpluggedAndPluggedInAgainGoesOn) {
   EXPECT_THAT(source->trouble(), HasSubstr("unplugged"));
   for (int i = 0; i < 3; ++i) {
     ASSERT_TRUE(source->Next(&frame));
-    EXPECT_TRUE(frame.picture.empty());
+    EXPECT_TRUE(frame.image.empty());
   }
   close(holder);
   for (int i = 0; i < 50 && !source->trouble().empty(); ++i) ASSERT_TRUE(source->Next(&frame));
@@ -243,19 +243,19 @@ TEST(Vivid, HasItsAutomaticGainHeldAndGivenBack) {
 
 constexpr int kNumbers = 64;
 
-// A picture whose grey levels tell its number.
+// An image whose grey levels tell its number.
 cv::Mat Numbered(int number) {
-  cv::Mat picture(480, 640, CV_8UC3, cv::Scalar::all(30));
+  cv::Mat image(480, 640, CV_8UC3, cv::Scalar::all(30));
   for (int bit = 0; bit < 6; ++bit) {
-    if ((number >> bit & 1) != 0) picture(cv::Rect(80 * bit, 0, 80, 480)).setTo(cv::Scalar::all(220));
+    if ((number >> bit & 1) != 0) image(cv::Rect(80 * bit, 0, 80, 480)).setTo(cv::Scalar::all(220));
   }
-  return picture;
+  return image;
 }
 
-int NumberOf(const cv::Mat& picture) {
+int NumberOf(const cv::Mat& image) {
   int number = 0;
   for (int bit = 0; bit < 6; ++bit) {
-    if (cv::mean(picture(cv::Rect(80 * bit + 20, 100, 40, 200)))[0] > 128) number |= 1 << bit;
+    if (cv::mean(image(cv::Rect(80 * bit + 20, 100, 40, 200)))[0] > 128) number |= 1 << bit;
   }
   return number;
 }
@@ -274,19 +274,18 @@ class JpegFeeder {
     EXPECT_EQ(ioctl(file_, VIDIOC_S_FMT, &format), 0);
     const tjhandle encoder = tjInitCompress();
     for (int number = 0; number < kNumbers; ++number) {
-      const cv::Mat picture = Numbered(number);
+      const cv::Mat image = Numbered(number);
       unsigned char* bytes = nullptr;
       unsigned long size = 0;
-      EXPECT_EQ(tjCompress2(encoder, picture.data, 640, 0, 480, TJPF_BGR, &bytes, &size, TJSAMP_422, 80, 0),
-                0);
-      pictures_.emplace_back(bytes, bytes + size);
+      EXPECT_EQ(tjCompress2(encoder, image.data, 640, 0, 480, TJPF_BGR, &bytes, &size, TJSAMP_422, 80, 0), 0);
+      images_.emplace_back(bytes, bytes + size);
       tjFree(bytes);
     }
     tjDestroy(encoder);
-    EXPECT_GT(write(file_, pictures_[0].data(), pictures_[0].size()), 0);
+    EXPECT_GT(write(file_, images_[0].data(), images_[0].size()), 0);
     worker_.emplace("feeder", [this](const std::stop_token& stop) {
       for (std::size_t number = 1; !stop.stop_requested(); ++number) {
-        const auto& bytes = pictures_[number % pictures_.size()];
+        const auto& bytes = images_[number % images_.size()];
         if (write(file_, bytes.data(), bytes.size()) < 0) return;
         std::this_thread::sleep_for(std::chrono::milliseconds(40));
       }
@@ -299,11 +298,11 @@ class JpegFeeder {
 
  private:
   int file_;
-  std::vector<std::vector<unsigned char>> pictures_;
+  std::vector<std::vector<unsigned char>> images_;
   std::optional<Worker> worker_;
 };
 
-TEST(Loopback, DeliversSixtyMotionJpegPicturesInOrder) {
+TEST(Loopback, DeliversSixtyMotionJpegImagesInOrder) {
   const JpegFeeder feeder;
   const auto source = OpenDevice(kLoopback, Options(V4L2_PIX_FMT_MJPEG));
   engine::Frame frame;
@@ -311,8 +310,8 @@ TEST(Loopback, DeliversSixtyMotionJpegPicturesInOrder) {
   int last = -1;
   for (int i = 0; i < 60; ++i) {
     frame = Fetch(source.get(), 1);
-    ASSERT_EQ(frame.picture.type(), CV_8UC3);
-    const int number = NumberOf(frame.picture);
+    ASSERT_EQ(frame.image.type(), CV_8UC3);
+    const int number = NumberOf(frame.image);
     if (last >= 0) steps.push_back((number - last + kNumbers) % kNumbers);
     last = number;
   }

@@ -23,8 +23,8 @@ constexpr char kController[] = "/sys/devices/platform/vhci_hcd.0/";
 constexpr int kPort = 0;
 constexpr std::uint32_t kDevice = 0x00010002, kSubmit = 1, kUnlink = 2, kReturnSubmit = 3, kReturnUnlink = 4;
 constexpr std::size_t kPayloadBytes = 16384, kPayloadHeaderBytes = 2;
-constexpr std::size_t kPictureBytes = UsbCamera::kWidth_px * UsbCamera::kHeight_px * 2;
-constexpr std::uint32_t kInterval = 400000;  // of 100 ns: 25 pictures a second
+constexpr std::size_t kImageBytes = UsbCamera::kWidth_px * UsbCamera::kHeight_px * 2;
+constexpr std::uint32_t kInterval = 400000;  // of 100 ns: 25 images a second
 
 // Little endian, as USB has it.
 void Put(Bytes* bytes, std::uint32_t value, int size) {
@@ -62,9 +62,9 @@ Bytes ConfigurationDescriptor() {
                      0};
   Put(&streaming, UsbCamera::kWidth_px, 2);
   Put(&streaming, UsbCamera::kHeight_px, 2);
-  Put(&streaming, kPictureBytes * 8 * 25, 4);
-  Put(&streaming, kPictureBytes * 8 * 25, 4);
-  Put(&streaming, kPictureBytes, 4);
+  Put(&streaming, kImageBytes * 8 * 25, 4);
+  Put(&streaming, kImageBytes * 8 * 25, 4);
+  Put(&streaming, kImageBytes, 4);
   Put(&streaming, kInterval, 4);
   Put(&streaming, 1, 1);
   Put(&streaming, kInterval, 4);
@@ -97,7 +97,7 @@ Bytes Probe() {
   Put(&bytes, 1, 1);
   Put(&bytes, kInterval, 4);
   for (int i = 0; i < 5; ++i) Put(&bytes, 0, 2);
-  Put(&bytes, kPictureBytes, 4);
+  Put(&bytes, kImageBytes, 4);
   Put(&bytes, kPayloadBytes, 4);
   return bytes;
 }
@@ -128,7 +128,7 @@ std::string VideoDevice() {
   };
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator("/sys/class/video4linux", error)) {
-    // Its second device, for data about the pictures, has the index 1.
+    // Its second device, for data about the images, has the index 1.
     if (first_line(entry.path() / "name").starts_with(UsbCamera::kName) &&
         first_line(entry.path() / "index") == "0")
       return "/dev/" + entry.path().filename().string();
@@ -294,19 +294,19 @@ UsbCamera::Answer UsbCamera::OnPanTilt(std::uint8_t what, const Request& request
   }
 }
 
-// A picture goes over in payloads, each with a header that says by a bit which picture it is of and whether
-// it ends it. Every picture has one grey level, and the next picture the next level.
+// An image goes over in payloads, each with a header that says by a bit which image it is of and whether
+// it ends it. Every image has one grey level, and the next image the next level.
 UsbCamera::Answer UsbCamera::NextPayload(std::size_t room) {
   if (sent_bytes_ == 0) std::this_thread::sleep_for(std::chrono::milliseconds(40));
-  const std::size_t left = kPictureBytes - sent_bytes_;
+  const std::size_t left = kImageBytes - sent_bytes_;
   const std::size_t bytes = std::min(left, std::min(room, kPayloadBytes) - kPayloadHeaderBytes);
   const bool last = bytes == left;
   Answer answer;
-  answer.data = {kPayloadHeaderBytes, static_cast<std::uint8_t>(0x80 | (last ? 0x02 : 0) | (picture_ & 1))};
+  answer.data = {kPayloadHeaderBytes, static_cast<std::uint8_t>(0x80 | (last ? 0x02 : 0) | (image_ & 1))};
   for (std::size_t i = 0; i < bytes; ++i)
-    answer.data.push_back((sent_bytes_ + i) % 2 == 0 ? static_cast<std::uint8_t>(16 + picture_ % 200) : 128);
+    answer.data.push_back((sent_bytes_ + i) % 2 == 0 ? static_cast<std::uint8_t>(16 + image_ % 200) : 128);
   sent_bytes_ = last ? 0 : sent_bytes_ + bytes;
-  if (last) ++picture_;
+  if (last) ++image_;
   return answer;
 }
 

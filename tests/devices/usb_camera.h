@@ -14,7 +14,7 @@ namespace docent::app {
 // A USB camera that turns its head, made of software: it speaks USB/IP (the kernel's
 // Documentation/usb/usbip_protocol.rst) to vhci_hcd, so that the kernel sees a real USB device and binds its
 // own driver for webcams, uvcvideo, to it. Its descriptors are those of USB Video Class 1.0: a camera
-// terminal with absolute pan and tilt, and grey 160x120 pictures as YUYV over a bulk endpoint. Plugged in by
+// terminal with absolute pan and tilt, and grey 160x120 images as YUYV over a bulk endpoint. Plugged in by
 // construction and pulled out by destruction; needs the rights of root.
 class UsbCamera {
  public:
@@ -60,8 +60,8 @@ class UsbCamera {
   std::atomic<std::int32_t> pan_ = 0, tilt_ = 0;
   std::atomic<std::uint8_t> refusal_ = 0;
   std::uint8_t last_error_ = 0;
-  std::size_t sent_bytes_ = 0;  // of the picture that is under way
-  std::uint8_t picture_ = 0;
+  std::size_t sent_bytes_ = 0;  // of the image that is under way
+  std::uint8_t image_ = 0;
   std::vector<std::uint8_t> probe_;
   Worker worker_;  // last: it uses the rest
 };

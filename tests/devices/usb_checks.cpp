@@ -80,7 +80,7 @@ TEST(Webcam, ThatIsPulledOutAndPutBackGoesOnAndTurnsAgain) {
   std::optional<Timestamp> before;
   for (int i = 0; i < 5; ++i) {
     ASSERT_TRUE(source->Next(&frame));
-    ASSERT_EQ(frame.picture.size(), cv::Size(UsbCamera::kWidth_px, UsbCamera::kHeight_px));
+    ASSERT_EQ(frame.image.size(), cv::Size(UsbCamera::kWidth_px, UsbCamera::kHeight_px));
     if (before) {
       EXPECT_GT(frame.time, *before);
     }
@@ -96,7 +96,7 @@ TEST(Webcam, ThatIsPulledOutAndPutBackGoesOnAndTurnsAgain) {
   for (int i = 0; i < 50 && !source->trouble().empty(); ++i) ASSERT_TRUE(source->Next(&frame));
   EXPECT_EQ(source->trouble(), "");
   ASSERT_TRUE(source->Next(&frame));
-  EXPECT_FALSE(frame.picture.empty());
+  EXPECT_FALSE(frame.image.empty());
   EXPECT_EQ(source->delivery().reconnections, 1);
   head->LookAt({20 * kDegree, 0}, FromSeconds(200));
   EXPECT_EQ(camera->pan(), 20 * 3600);

@@ -119,8 +119,7 @@ TEST(CommandLine, SimulatesASequenceThatTheCamerasRead) {
   const engine::CameraModel camera = ReadCalibration(*source->info().calibration_path);
   engine::Frame frame;
   std::uint64_t count = 0;
-  for (; source->Next(&frame); ++count)
-    CheckPictureSize(camera, frame.picture.cols, frame.picture.rows, "a", "b");
+  for (; source->Next(&frame); ++count) CheckImageSize(camera, frame.image.cols, frame.image.rows, "a", "b");
   EXPECT_GE(count, 5u);
   EXPECT_EQ(ReadGroundTruth(*source->info().ground_truth_path).size(), count);
 
@@ -136,7 +135,7 @@ TEST(CommandLine, SimulatesASequenceThatTheCamerasRead) {
   EXPECT_EQ(ReadAll(folder / first), ReadAll(again / first));
 }
 
-TEST(CommandLine, CalibratesALensFromAFolderOfPictures) {
+TEST(CommandLine, CalibratesALensFromAFolderOfImages) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "pictures");
   const engine::CameraModel truth(engine::LensModel::kFov, {640, 480, 360, 361, 316.4, 244.9}, {0.92});
@@ -145,25 +144,24 @@ TEST(CommandLine, CalibratesALensFromAFolderOfPictures) {
   Random random(5);
   int count = 0;
   for (const engine::Rigid3& pose : BoardPoses(board, truth, 14)) {
-    const std::string name = "pictures/view" + std::to_string(++count) + ".png";
-    cv::imwrite((folder / name).string(), camera.Picture(pose, &random));
+    const std::string name = "images/view" + std::to_string(++count) + ".png";
+    cv::imwrite((folder / name).string(), camera.Image(pose, &random));
   }
-  const std::string pictures = (folder / "pictures").string(), output = (folder / "camera.yaml").string();
+  const std::string images = (folder / "pictures").string(), output = (folder / "camera.yaml").string();
   const Outcome outcome =
-      RunDocent({"calibrate", "--camera", pictures, "--board", "charuco:8x6:30", "--lens", "fov",
-                 "--headless", "--output", output, "--print", (folder / "board.pdf").string()});
+      RunDocent({"calibrate", "--camera", images, "--board", "charuco:8x6:30", "--lens", "fov", "--headless",
+                 "--output", output, "--print", (folder / "board.pdf").string()});
   ASSERT_EQ(outcome.exit_status, 0) << outcome.errors;
-  EXPECT_THAT(outcome.output, AllOf(HasSubstr("board.pdf"), HasSubstr("14 pictures"), HasSubstr("Good")));
+  EXPECT_THAT(outcome.output, AllOf(HasSubstr("board.pdf"), HasSubstr("14 images"), HasSubstr("Good")));
   const engine::CameraModel found = ReadCalibration(output);
   EXPECT_NEAR(found.intrinsics().fx / 360, 1, 0.002);
   EXPECT_NEAR(found.intrinsics().cx, 316.4, 0.5);
   EXPECT_THAT(ReadAll(output), HasSubstr("verdict: \"Good"));
-  // Two pictures are too few, and what was written stays.
+  // Two images are too few, and what was written stays.
   for (int i = 3; i <= count; ++i)
-    std::filesystem::remove(folder / ("pictures/view" + std::to_string(i) + ".png"));
+    std::filesystem::remove(folder / ("images/view" + std::to_string(i) + ".png"));
   const std::string before = ReadAll(output);
-  ExpectComplaint({"calibrate", "--camera", pictures, "--headless", "--output", output}, 1,
-                  "only 2 pictures");
+  ExpectComplaint({"calibrate", "--camera", images, "--headless", "--output", output}, 1, "only 2 images");
   EXPECT_EQ(ReadAll(output), before);
   ExpectComplaint({"calibrate"}, 2, "--print");
   ExpectComplaint({"calibrate", "--print", "x.pdf", "--board", "charuco:8"}, 2, "calibration board");

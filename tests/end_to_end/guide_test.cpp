@@ -123,7 +123,7 @@ TEST(Guide, TellsTheSpreadOverSeedsAndStartsWhateverTheNumberOfJobs) {
     EXPECT_EQ(frames.size(), 30u) << "one second";
     trajectories.push_back(ReadAll(run / "trajectory.txt"));
     for (const auto& file : std::filesystem::directory_iterator(run))
-      EXPECT_NE(file.path().extension(), ".png") << "only one run is worth pictures";
+      EXPECT_NE(file.path().extension(), ".png") << "only one run is worth images";
     EXPECT_THAT(ReadAll(output / "report.html"), HasSubstr("of each run, sorted"));
   }
   EXPECT_EQ(rows[0], rows[1]);
@@ -154,12 +154,12 @@ TEST(Guide, ComparesBothEnginesAndStitchesWhatOneKnowsByTurning) {
   const auto is_png = [](const std::filesystem::path& path) {
     return path.extension() == ".png" && ReadAll(path).starts_with("\x89PNG\r\n");
   };
-  const auto pictures = [&](const char* name) {
+  const auto images = [&](const char* name) {
     const std::filesystem::directory_iterator files(output / name);
     return std::count_if(begin(files), end(files), [&](const auto& entry) { return is_png(entry.path()); });
   };
-  EXPECT_EQ(pictures("cylinder-0"), 1);
-  EXPECT_EQ(pictures("cylinder-0-sixdof"), 0);
+  EXPECT_EQ(images("cylinder-0"), 1);
+  EXPECT_EQ(images("cylinder-0-sixdof"), 0);
   EXPECT_THAT(
       ReadAll(output / "report.html"),
       AllOf(HasSubstr("<h4>hybrid</h4>"), HasSubstr("<h4>sixdof</h4>"), HasSubstr("data:image/png;base64,")));

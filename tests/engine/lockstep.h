@@ -29,7 +29,7 @@ class Lockstep {
       mapper_.Report(tracker_.TakeReports());
       mapper_.Offer(std::move(*candidate));
     }
-    for (int step = 0; step < 20 && !mapper_.Settled(); ++step) mapper_.Step();
+    for (int step = 0; step < 20 && !mapper_.IsIdle(); ++step) mapper_.Step();
     mapper_.Step();
     for (MapperEvent& event : mapper_.TakeEvents()) {
       if (event.kind == MapperEvent::Kind::kStartFailed) tracker_.StartFailed();

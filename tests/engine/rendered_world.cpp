@@ -22,7 +22,7 @@ float Sample(const cv::Mat& paint, float x, float y) {
   return (1 - fy) * (top[0] + fx * (top[1] - top[0])) + fy * (bottom[0] + fx * (bottom[1] - bottom[0]));
 }
 
-// A wall as one picture sees it: from a ray d in the camera, coordinates on the wall by three dot products.
+// A wall as one image sees it: from a ray d in the camera, coordinates on the wall by three dot products.
 struct SeenWall {
   Eigen::Vector3f normal, right, down;
   float distance;  // along the normal
@@ -73,7 +73,7 @@ double Gaussian(Random* random) {
 
 constexpr int kRaysAPixel = 4;
 
-// The rays of every pixel, row by row; kept for the last camera, as a test renders many pictures of one.
+// The rays of every pixel, row by row; kept for the last camera, as a test renders many images of one.
 const std::vector<Eigen::Vector3f>& RaysOf(const CameraModel& camera) {
   static thread_local CameraModel last;
   static thread_local std::vector<Eigen::Vector3f> rays;
@@ -214,19 +214,19 @@ cv::Mat RenderedWorld::Render(const CameraModel& camera, const Rigid3& camera_fr
                               std::uint64_t noise_seed) const {
   const std::vector<SeenWall> walls = SeeWalls(walls_, camera_from_world);
   const std::vector<Eigen::Vector3f>& rays = RaysOf(camera);
-  cv::Mat picture(camera.height_px(), camera.width_px(), CV_8UC1);
+  cv::Mat image(camera.height_px(), camera.width_px(), CV_8UC1);
   Random random(noise_seed);
   std::size_t next = 0;
-  for (int y = 0; y < picture.rows; ++y) {
-    for (int x = 0; x < picture.cols; ++x) {
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
       float sum = 0;
       for (int part = 0; part < kRaysAPixel; ++part) sum += Grey(walls, rays[next++]);
       const double noise = noise_sigma > 0 ? noise_sigma * Gaussian(&random) : 0;
-      picture.at<std::uint8_t>(y, x) =
+      image.at<std::uint8_t>(y, x) =
           cv::saturate_cast<std::uint8_t>(static_cast<double>(sum) / kRaysAPixel + noise);
     }
   }
-  return picture;
+  return image;
 }
 
 std::shared_ptr<const CameraModel> PinholeCamera(int width_px, int height_px) {
@@ -251,11 +251,11 @@ Rigid3 CameraAt(const Eigen::Vector3d& center, const Eigen::Vector3d& turn_deg) 
   return Rigid3(Rotation3::Exp(turn_deg * std::numbers::pi / 180), center).inverse();
 }
 
-Frame MakeFrame(int index, const cv::Mat& picture) {
+Frame MakeFrame(int index, const cv::Mat& image) {
   Frame frame;
   frame.time = FromSeconds(index / 30.0);
   frame.index = static_cast<std::uint64_t>(index);
-  frame.picture = picture;
+  frame.image = image;
   return frame;
 }
 

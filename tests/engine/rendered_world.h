@@ -36,7 +36,7 @@ class RenderedWorld {
 
   // A back wall three metres away, and before it three smaller ones at other depths and slants.
   static RenderedWorld Room(std::uint64_t seed);
-  // One wall straight ahead, large enough to fill any picture.
+  // One wall straight ahead, large enough to fill any image.
   static RenderedWorld SingleWall(double distance, std::uint64_t seed);
 
   struct Hit {
@@ -48,7 +48,7 @@ class RenderedWorld {
   // What the camera shows at a pixel.
   std::optional<Hit> AtPixel(const CameraModel& camera, const Rigid3& camera_from_world,
                              const Eigen::Vector2d& pixel) const;
-  // Whether a point of a wall is in the picture with nothing before it.
+  // Whether a point of a wall is in the image with nothing before it.
   bool Sees(const CameraModel& camera, const Rigid3& camera_from_world, const Eigen::Vector3d& point,
             double margin_px = 8) const;
   // From a point to the nearest wall, metres.
@@ -68,7 +68,7 @@ class RenderedWorld {
 Wall PaintedWall(const Eigen::Vector3d& center, const Eigen::Vector3d& right, const Eigen::Vector3d& down,
                  double half_width, double half_height, std::uint64_t seed);
 
-// A pinhole camera with a picture 77 degrees across.
+// A pinhole camera with an image 77 degrees across.
 std::shared_ptr<const CameraModel> PinholeCamera(int width_px, int height_px);
 
 // What most tests look through and at, made once: a camera of 320x240 pixels, and a room.
@@ -78,8 +78,8 @@ const RenderedWorld& World();
 // The pose of a camera at a place, turned by a rotation vector in degrees (world_from_camera).
 Rigid3 CameraAt(const Eigen::Vector3d& center, const Eigen::Vector3d& turn_deg = Eigen::Vector3d::Zero());
 
-// The picture of that number, of a camera that takes thirty a second.
-Frame MakeFrame(int index, const cv::Mat& picture);
+// The image of that number, of a camera that takes thirty a second.
+Frame MakeFrame(int index, const cv::Mat& image);
 // The same, of what Camera() shows from a pose, with the noise that a sensor has.
 Frame MakeFrame(int index, const RenderedWorld& world, const Rigid3& camera_from_world);
 

@@ -68,11 +68,10 @@ Bytes MakeSeed() {
         keyframe.id = i;
         keyframe.camera = camera;
         // Squares, so that there are corners and the table of words has some.
-        cv::Mat picture(64, 64, CV_8UC1, cv::Scalar(50.0 + i));
+        cv::Mat image(64, 64, CV_8UC1, cv::Scalar(50.0 + i));
         for (int square = 0; square < 9; ++square)
-          picture(cv::Rect(14 + square % 3 * 14, 14 + square / 3 * 14, 7, 7)) =
-              cv::Scalar(120.0 + 15 * square);
-        keyframe.features = maps::MakeSizesOnly(picture);
+          image(cv::Rect(14 + square % 3 * 14, 14 + square / 3 * 14, 7, 7)) = cv::Scalar(120.0 + 15 * square);
+        keyframe.features = maps::MakeSizesOnly(image);
         map->keyframes.push_back(keyframe);
         engine::MapPoint point;
         point.id = i;
@@ -120,7 +119,7 @@ void ReadAll(const fs::path& path) {
   using namespace docent::maps;
   const Library library = Library::Open(path, Access::kReadOnly, CreateIfMissing::kNo, Quick());
   library.Verify();
-  library.LoadLooks([](const MapInfo&, const Library::Looks&) {});
+  library.LoadAppearance([](const MapInfo&, const Library::Appearance&) {});
   for (const MapInfo& info : library.List()) {
     try {
       library.Load(info.key);

@@ -42,7 +42,7 @@ Bytes Enveloped(const docent::maps::EnvelopeKind& kind, std::uint64_t count,
 
 // A sentence, for which a stream begins with 513 bytes; and what zlib works with, 32 KiB that were
 // decompressed last among it.
-constexpr std::size_t kSmallThings = 1024, kPictureWorkspace = 40 << 10;
+constexpr std::size_t kSmallThings = 1024, kImageWorkspace = 40 << 10;
 
 // Runs a decoder with its allocations limited by the size of what it reads, or by what any input takes.
 template <typename Decode>
@@ -113,8 +113,8 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
     StoredKeyFrame keyframe;
     keyframe.keyframe.id = 0;
     keyframe.keyframe.camera = OneCamera()[0];
-    const Bytes bytes = Enveloped(kPictureKind, 1, data);
-    Limited(bytes.size(), kPictureWorkspace, [&] { return DecodePicture(kMapKey, keyframe, bytes); });
+    const Bytes bytes = Enveloped(kImageKind, 1, data);
+    Limited(bytes.size(), kImageWorkspace, [&] { return DecodeImage(kMapKey, keyframe, bytes); });
   } else {
     DecodePoints(kMapKey, data);  // nothing made right: the envelope itself
     DecodeScene(kMapKey, data);
@@ -123,7 +123,7 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
 
 }  // namespace
 
-// The first picture that OpenCV decodes makes it set up all that it has decoders from.
+// The first image that OpenCV decodes makes it set up all that it has decoders from.
 extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
   std::vector<std::uint8_t> png;
   cv::imencode(".png", cv::Mat(8, 8, CV_8UC1, cv::Scalar(0)), png);

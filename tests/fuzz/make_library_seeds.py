@@ -35,7 +35,7 @@ SEEDS = {
     "points": b"\2" + b"".join(POINT),
     "observations": b"\3" + b"".join(OBSERVATION),
     "scene": b"\4" + struct.pack("<Q", 2) + text(b"{}") + text(b"asset-1") + text(b"asset-2"),
-    "picture": b"\5" + struct.pack("<I", 0) + png(64, 64),
+    "image": b"\5" + struct.pack("<I", 0) + png(64, 64),
     "envelope": b"\6DPNT" + struct.pack("<IQQ", 1, 7, 0) + bytes(8),
     "thumbnails": b"\7" + struct.pack("<Q", 2) + b"".join(struct.pack("<IHH", i, 4, 4) + bytes(16) for i in (1, 2)),
     "panoramas": b"\x08" + struct.pack("<QIII", 1, 4, 3, 0) + b"".join(struct.pack("<BII", i, i, 3) for i in range(3)),

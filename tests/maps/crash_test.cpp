@@ -228,7 +228,7 @@ TEST(TwoProcesses, TwoToursSeeWholeSavesWhileAnAuthorWrites) {
           EXPECT_GE(stored.info.revision, last);
           last = stored.info.revision;
           ExpectWhole(stored);
-          library.LoadLooks([&](const MapInfo& info, const Library::Looks& looks) {
+          library.LoadAppearance([&](const MapInfo& info, const Library::Appearance& looks) {
             EXPECT_EQ(looks.problem, "");
             EXPECT_EQ(looks.thumbnails.size(), info.keyframes);
             EXPECT_EQ(looks.words.size(), info.keyframes);

@@ -151,7 +151,7 @@ TEST_F(Damage, FlippedBytesNeverGiveWrongData) {
   EXPECT_GT(errors_, 100) << "the flips hit nothing";
 }
 
-TEST_F(Damage, ASmallFileMayNotAskForLargePictures) {
+TEST_F(Damage, ASmallFileMayNotAskForLargeImages) {
   const engine::CameraModel::Intrinsics vast{8000, 8000, 500, 500, 4000, 4000};
   const CameraTable cameras(2, std::make_shared<const engine::CameraModel>(
                                    engine::LensModel::kRadialTangential, vast, std::array<double, 5>{}));
@@ -162,11 +162,11 @@ TEST_F(Damage, ASmallFileMayNotAskForLargePictures) {
   RunSql("UPDATE parts SET data = x'" + hex + "' WHERE map_key = 1 AND part = 'cameras'");
   const Library library = Open(Access::kReadOnly);
   EXPECT_THAT(ErrorOf([&] { library.Load(1); }),
-              HasSubstr("a picture size that a file so small does not hold"));
+              HasSubstr("an image size that a file so small does not hold"));
   EXPECT_EQ(FirstDifference(*library.Load(2).snapshot, *door_), "");
 }
 
-TEST_F(Damage, ALargePictureWithNothingInItIsNoDamage) {
+TEST_F(Damage, ALargeImageWithNothingInItIsNoDamage) {
   auto map = MakeSampleMap(3, {.keyframes = 1, .points = 0, .width_px = 2048, .height_px = 1536});
   auto features = std::make_shared<engine::ImageFeatures>(*map->keyframes[0].features);
   features->levels[0] = cv::Mat(1536, 2048, CV_8UC1, cv::Scalar(90));
@@ -183,10 +183,10 @@ TEST_F(Damage, VerifyNamesWhatIsDamaged) {
           "UPDATE parts SET data = substr(data, 1, length(data) - 9) WHERE map_key = 1 AND part = 'points'",
           "map 'Desk' (1): the table of points is damaged: its checksum does not match"},
       std::pair{"DELETE FROM pictures WHERE map_key = 2 AND keyframe = 1",
-                "map 'Door' (2): the picture of keyframe 1 is missing"},
+                "map 'Door' (2): the image of keyframe 1 is missing"},
       std::pair{"UPDATE pictures SET data = (SELECT data FROM pictures WHERE map_key = 2 AND keyframe = 0) "
                 "WHERE map_key = 1 AND keyframe = 0",
-                "map 'Desk' (1): the picture belongs to another map"},
+                "map 'Desk' (1): the image belongs to another map"},
       std::pair{"UPDATE maps SET policy = 'open' WHERE key = 2",
                 "the entry of map 2: its checksum does not match"},
       std::pair{"DELETE FROM parts WHERE part = 'scene' AND map_key = 1",

@@ -150,9 +150,9 @@ TEST(ColmapModel, SaysTheSameAsTheMapInColmapsConventions) {
     std::string name;
     lines[2 * i] >> id >> q.w() >> q.x() >> q.y() >> q.z() >> t.x() >> t.y() >> t.z() >> camera_id >> name;
     EXPECT_EQ(id, static_cast<int>(keyframe.id) + 1);
-    EXPECT_EQ(name, model.picture_of[i].first);
-    EXPECT_EQ(keyframe.id, model.picture_of[i].second);
-    // A point goes through COLMAP's pose and lens to the same place in the picture as through ours.
+    EXPECT_EQ(name, model.image_of[i].first);
+    EXPECT_EQ(keyframe.id, model.image_of[i].second);
+    // A point goes through COLMAP's pose and lens to the same place in the image as through ours.
     for (const engine::MapPoint& point : map->points) {
       if (point.infinite()) continue;
       const Eigen::Vector3d in_camera = q * point.position() + t;

@@ -74,7 +74,7 @@ TEST_F(JoinedLibrary, HoldsOneMapWithEverythingOfBoth) {
   EXPECT_EQ(FirstDifference(joined.scene, *record.scene), "");
   EXPECT_EQ(joined.info.policy, Policy::kOpen);
   EXPECT_EQ(library_.LoadScene(library_.FindByName("Hall").key).text, "to East");
-  library_.LoadLooks([](const MapInfo& info, const Library::Looks& looks) {
+  library_.LoadAppearance([](const MapInfo& info, const Library::Appearance& looks) {
     EXPECT_EQ(looks.problem, "");
     EXPECT_EQ(looks.thumbnails.size(), info.keyframes);
   });

@@ -63,7 +63,7 @@ TEST(Library, SharesOneCameraAmongTheKeyframesThatHaveIt) {
   EXPECT_EQ(loaded->keyframes[2].camera, loaded->keyframes[5].camera);
 }
 
-TEST(Library, RebuildsTheFeaturesOfTheEngineFromTheStoredPictures) {
+TEST(Library, RebuildsTheFeaturesOfTheEngineFromTheStoredImages) {
   const TemporaryFolder folder;
   const auto map = MakeSampleMap(3, {.keyframes = 5});
   Library library = Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes);
@@ -112,7 +112,7 @@ TEST(Library, KeepsUpWithAMapThatGrowsShrinksAndMoves) {
   EXPECT_EQ(FirstDifference(*library.Load(key).snapshot, *map), "");
   EXPECT_TRUE(library.Verify().empty());
 
-  const auto other = MakeSampleMap(55);  // the same ids with other pictures
+  const auto other = MakeSampleMap(55);  // the same ids with other images
   library.Save({key, "", Policy::kOpen, other, nullptr});
   EXPECT_EQ(FirstDifference(*library.Load(key).snapshot, *other), "");
   EXPECT_TRUE(library.Verify().empty());
@@ -130,7 +130,7 @@ TEST(Library, WritesLittleWhenOnlyPointsMoved) {
   library.Save({key, "", Policy::kOpen, map, nullptr});
   const auto written = std::filesystem::file_size(log) - before;
   EXPECT_GT(written, 0u);
-  EXPECT_LT(written, 64u << 10);  // four pictures of noise are some 500 KiB
+  EXPECT_LT(written, 64u << 10);  // four images of noise are some 500 KiB
   library.Save({key, "", Policy::kOpen, map, nullptr});
   EXPECT_EQ(std::filesystem::file_size(log), before + written) << "nothing changed, so nothing is written";
 }
@@ -178,8 +178,8 @@ TEST(Library, RefusesTwoMapsOfOneNameAndNamesThatCannotBeShown) {
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t a = library.NewKey(), b = library.NewKey();
   library.Save({a, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
-  const MapRecord twin{b, "Desk", Policy::kOpen, MakeSampleMap(2), nullptr};
-  EXPECT_THAT(ErrorOf([&] { library.Save(twin); }), HasSubstr("another map of the name 'Desk'"));
+  const MapRecord duplicate{b, "Desk", Policy::kOpen, MakeSampleMap(2), nullptr};
+  EXPECT_THAT(ErrorOf([&] { library.Save(duplicate); }), HasSubstr("another map of the name 'Desk'"));
   library.Save({b, "Door", Policy::kOpen, MakeSampleMap(2), nullptr});
   EXPECT_THAT(ErrorOf([&] { library.Rename(b, "Desk"); }), HasSubstr("another map of the name 'Desk'"));
   EXPECT_THAT(ErrorOf([&] { library.Rename(b, ""); }), HasSubstr("name has 1 to 200 bytes"));

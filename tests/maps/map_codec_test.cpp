@@ -71,7 +71,7 @@ TEST(MapCodec, ForgedNumbersOfCamerasAndKeyframesAreRefused) {
   EXPECT_THAT(ErrorOf([&] { DecodeCameras(7, Forged(camera_bytes, 24, std::uint8_t{3})); }),
               HasSubstr("lens"));
   EXPECT_THAT(ErrorOf([&] { DecodeCameras(7, Forged(camera_bytes, 25, std::uint32_t{1} << 31)); }),
-              HasSubstr("impossible picture size"));
+              HasSubstr("impossible image size"));
   EXPECT_THROW(DecodeCameras(7, Forged(camera_bytes, 33, std::nan(""))), Error);
   EXPECT_THROW(DecodeCameras(7, Forged(camera_bytes, 33, -1.0)), Error);
   const Bytes bytes = EncodeKeyFrames(7, keyframes, cameras);
@@ -87,20 +87,20 @@ TEST(MapCodec, ForgedNumbersOfCamerasAndKeyframesAreRefused) {
               HasSubstr("rotation"));
 }
 
-TEST(MapCodec, APictureOfAnotherSizeOrContentIsRefusedBeforeItIsUnpacked) {
+TEST(MapCodec, AImageOfAnotherSizeOrContentIsRefusedBeforeItIsUnpacked) {
   const auto map = MakeSampleMap(1);
   const auto keyframes = MakeStoredKeyFrames(*map);
-  const Bytes bytes = EncodePicture(7, 0, map->keyframes[0].features->levels[0]);
-  EXPECT_EQ(PictureHash(DecodePicture(7, keyframes[0], bytes)), keyframes[0].picture_hash);
-  EXPECT_THAT(ErrorOf([&] { DecodePicture(7, keyframes[1], bytes); }),
+  const Bytes bytes = EncodeImage(7, 0, map->keyframes[0].features->levels[0]);
+  EXPECT_EQ(ImageHash(DecodeImage(7, keyframes[0], bytes)), keyframes[0].image_hash);
+  EXPECT_THAT(ErrorOf([&] { DecodeImage(7, keyframes[1], bytes); }),
               HasSubstr("belongs to another keyframe"));
   const std::size_t width_at = kEnvelopeBytes - 8 + 4 + 16;
   EXPECT_THAT(
-      ErrorOf([&] { DecodePicture(7, keyframes[0], Forged(bytes, width_at, std::uint32_t{0xFFFFFF7F})); }),
+      ErrorOf([&] { DecodeImage(7, keyframes[0], Forged(bytes, width_at, std::uint32_t{0xFFFFFF7F})); }),
       HasSubstr("camera's size"));
   StoredKeyFrame other = keyframes[0];
-  other.picture_hash ^= 1;
-  EXPECT_THAT(ErrorOf([&] { DecodePicture(7, other, bytes); }), HasSubstr("not the one that was saved"));
+  other.image_hash ^= 1;
+  EXPECT_THAT(ErrorOf([&] { DecodeImage(7, other, bytes); }), HasSubstr("not the one that was saved"));
 }
 
 TEST(MapCodec, PanoramaMapsAreBelievedOnlyWhereTheirMembersAre) {
@@ -140,7 +140,7 @@ TEST(MapCodec, ThumbnailsAreBelievedOnlyWhenTheirBytesAreThere) {
   EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 24, std::uint32_t{5})), Error) << "twice the same keyframe";
   EXPECT_THROW(DecodeThumbnails(7, EncodeThumbnails(7, std::vector<KeyFrameThumbnail>{{2, {1, 1, {127}}}})),
                Error)
-      << "smaller than any picture's";
+      << "smaller than any image's";
   EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 28, std::uint16_t{0})), Error);
   EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 28, std::uint16_t{0xFFFF})), Error);
 }

@@ -27,7 +27,7 @@ namespace {
 
 constexpr engine::PanoramaId kSamplePanorama = 3;  // the one of each map, about its first keyframe
 
-cv::Mat MakePicture(std::uint64_t seed, int width_px, int height_px, bool corners) {
+cv::Mat MakeImage(std::uint64_t seed, int width_px, int height_px, bool corners) {
   Random random(seed);
   cv::Mat gray(height_px, width_px, CV_8UC1);
   if (corners) {
@@ -79,24 +79,24 @@ KeyFrame MakeKeyFrame(engine::KeyFrameId id, const Eigen::Vector3d& center, std:
   keyframe.mean_depth = random.Uniform(0.5, 3);
   keyframe.depth_sigma = random.Uniform(0.1, 0.5);
   keyframe.features =
-      MakeSizesOnly(MakePicture(random.Next(), camera->width_px(), camera->height_px(), corners));
+      MakeSizesOnly(MakeImage(random.Next(), camera->width_px(), camera->height_px(), corners));
   keyframe.camera = std::move(camera);
   return keyframe;
 }
 
 bool Same(const KeyFrame& a, const KeyFrame& b) {
-  const cv::Mat& picture_a = a.features->levels[0];
-  const cv::Mat& picture_b = b.features->levels[0];
+  const cv::Mat& image_a = a.features->levels[0];
+  const cv::Mat& image_b = b.features->levels[0];
   // A rotation is normalized when it is read, which may move the last bits.
   return a.id == b.id && a.kind == b.kind && a.panorama == b.panorama && a.fixed == b.fixed &&
          a.time == b.time &&
          a.camera_from_map.rotation.quaternion().coeffs().isApprox(
              b.camera_from_map.rotation.quaternion().coeffs(), 1e-14) &&
          a.camera_from_map.translation == b.camera_from_map.translation && a.mean_depth == b.mean_depth &&
-         a.depth_sigma == b.depth_sigma && *a.camera == *b.camera && picture_a.size() == picture_b.size() &&
-         picture_a.type() == picture_b.type() &&
-         std::equal(picture_a.begin<std::uint8_t>(), picture_a.end<std::uint8_t>(),
-                    picture_b.begin<std::uint8_t>());
+         a.depth_sigma == b.depth_sigma && *a.camera == *b.camera && image_a.size() == image_b.size() &&
+         image_a.type() == image_b.type() &&
+         std::equal(image_a.begin<std::uint8_t>(), image_a.end<std::uint8_t>(),
+                    image_b.begin<std::uint8_t>());
 }
 
 }  // namespace

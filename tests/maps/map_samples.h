@@ -18,16 +18,16 @@ struct SampleOptions {
   int keyframes = 3;
   int points = 40;
   int width_px = 96, height_px = 80;
-  bool corners = false;  // pictures of blocks, which have words, instead of noise, which has none
+  bool corners = false;  // images of blocks, which have words, instead of noise, which has none
 };
 
-// Keyframes along a path with pictures of noise over a gradient, two cameras, finite and infinite points,
+// Keyframes along a path with images of noise over a gradient, two cameras, finite and infinite points,
 // each seen from some keyframes. Valid, and different for each seed.
 std::shared_ptr<engine::MapSnapshot> MakeSampleMap(std::uint64_t seed, const SampleOptions& options = {});
 // A map as the engine makes them: points on a wavy wall, seen where they are, by keyframes in a row that are
 // `step` apart.
 std::shared_ptr<engine::MapSnapshot> MakeTrueMap(int keyframes = 6, double step = 0.2);
-// One more keyframe at `center`, with the picture of `seed`.
+// One more keyframe at `center`, with the image of `seed`.
 void AddSampleKeyFrame(std::uint64_t seed, const Eigen::Vector3d& center, engine::MapSnapshot* map);
 
 AssetRecord MakeSampleAsset(std::uint64_t seed, std::size_t bytes);

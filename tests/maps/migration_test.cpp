@@ -22,7 +22,7 @@ Library Open(const std::filesystem::path& file, Access access) {
 
 std::vector<std::vector<KeyFrameThumbnail>> ThumbnailsIn(const Library& library) {
   std::vector<std::vector<KeyFrameThumbnail>> all;
-  library.LoadLooks([&](const MapInfo&, Library::Looks looks) {
+  library.LoadAppearance([&](const MapInfo&, Library::Appearance looks) {
     EXPECT_EQ(looks.problem, "");
     all.push_back(std::move(looks.thumbnails));
   });
@@ -31,7 +31,7 @@ std::vector<std::vector<KeyFrameThumbnail>> ThumbnailsIn(const Library& library)
 
 std::vector<std::vector<KeyFrameWords>> WordsIn(const Library& library) {
   std::vector<std::vector<KeyFrameWords>> all;
-  library.LoadLooks([&](const MapInfo&, Library::Looks looks) {
+  library.LoadAppearance([&](const MapInfo&, Library::Appearance looks) {
     EXPECT_EQ(looks.problem, "");
     all.push_back(std::move(looks.words));
   });
@@ -141,7 +141,7 @@ TEST_P(Migration, AnAuthorUpgradesAnEarlierFormatAndKeepsACopyOfIt) {
 TEST_P(Migration, ADamagedMapStopsTheUpgradeAndTheLibraryStaysAsItWas) {
   RunSql(file_, "DELETE FROM pictures WHERE map_key = 2 AND keyframe = 1");
   EXPECT_THAT(ErrorOf([&] { Open(file_, Access::kReadWrite); }),
-              HasSubstr("map 'Door' (2): the picture of keyframe 1"));
+              HasSubstr("map 'Door' (2): the image of keyframe 1"));
   const Library library = Open(file_, Access::kReadOnly);
   EXPECT_EQ(FirstDifference(*library.Load(1).snapshot, *desk_), "");
 }
@@ -205,7 +205,7 @@ TEST(Thumbnails, ThatAreDamagedAreToldAndTheOthersHandedOut) {
   std::string problems;
   std::size_t keyframes = 0, words = 0;
   Open(folder / "a.docent", Access::kReadOnly)
-      .LoadLooks([&](const MapInfo& info, const Library::Looks& looks) {
+      .LoadAppearance([&](const MapInfo& info, const Library::Appearance& looks) {
         problems += looks.problem;
         keyframes += looks.thumbnails.size();
         words += looks.words.size();

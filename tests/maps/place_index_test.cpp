@@ -45,7 +45,7 @@ std::shared_ptr<const MapSnapshot> MakeMap(std::uint64_t first_seed, int keyfram
   return map;
 }
 
-// A thumbnail as a picture of a scene gives one: what it shows is as coarse as the usual blur.
+// A thumbnail as an image of a scene gives one: what it shows is as coarse as the usual blur.
 SmallBlurryImage MakeScene(std::uint64_t seed, int width = 80, int height = 60) {
   SmallBlurryImage image = MakeThumbnail(seed, width, height);
   cv::GaussianBlur(image.pixels, image.pixels, {}, 2.5);
@@ -105,7 +105,7 @@ TEST(PlaceIndex, FindsEachKeyframeAmongManyUnderNoise) {
   }
 }
 
-TEST(PlaceIndex, FindsAKeyframeByAPictureThatIsTurnedAside) {
+TEST(PlaceIndex, FindsAKeyframeByAnImageThatIsTurnedAside) {
   PlaceIndex index;
   auto map = std::make_shared<MapSnapshot>();
   for (std::uint64_t i = 0; i < 600; ++i) {
@@ -130,7 +130,7 @@ TEST(PlaceIndex, FindsAKeyframeByAPictureThatIsTurnedAside) {
 TEST(PlaceIndex, KnowsMapsThatAreNotInMemory) {
   PlaceIndex index;
   const auto map = MakeMap(1, 30);
-  index.SetLooks(4, ThumbnailsOf(*map));
+  index.SetAppearance(4, ThumbnailsOf(*map));
   EXPECT_EQ(index.keyframes(), 30u);
   auto found = index.FindPlaces(MakeThumbnail(8), 1, 1, 0);
   ASSERT_EQ(found.size(), 1u);
@@ -178,7 +178,7 @@ TEST(PlaceIndex, KeepsTheLimitsOfAMapAndOfTheWholeAndStaysInOneMapWhenAsked) {
   EXPECT_TRUE(index.FindPlaces(MakeThumbnail(7), 5, 5, 9).empty());
 }
 
-TEST(PlaceIndex, FollowsAMapThatGrowsLosesKeyframesAndChangesAPicture) {
+TEST(PlaceIndex, FollowsAMapThatGrowsLosesKeyframesAndChangesAnImage) {
   PlaceIndex index;
   auto map = std::make_shared<MapSnapshot>();
   for (int i = 0; i < 200; ++i) {
@@ -198,7 +198,7 @@ TEST(PlaceIndex, FollowsAMapThatGrowsLosesKeyframesAndChangesAPicture) {
   index.SetMap(1, std::make_shared<const MapSnapshot>(*map));
   EXPECT_EQ(index.keyframes(), 100u);
   EXPECT_GT(index.FindPlaces(MakeThumbnail(60), 1, 1, 0)[0].difference, 100) << "keyframe 60 is gone";
-  EXPECT_GT(index.FindPlaces(MakeThumbnail(10), 1, 1, 0)[0].difference, 100) << "its picture is another";
+  EXPECT_GT(index.FindPlaces(MakeThumbnail(10), 1, 1, 0)[0].difference, 100) << "its image is another";
   EXPECT_EQ(index.FindPlaces(MakeThumbnail(5000), 1, 1, 0)[0].keyframe, 10u);
   index.RemoveMap(1);
   EXPECT_EQ(index.maps(), 0u);
@@ -237,7 +237,7 @@ TEST(PlaceIndex, FindsAPlaceByItsWordsWhereItsThumbnailHelpsNobody) {
   PlaceIndex index;
   for (std::uint64_t key = 1; key <= 8; ++key) {
     const auto map = MakeMap(100 * key, 50);
-    index.SetLooks(key, ThumbnailsOf(*map), WordsOfMap(key, *map));
+    index.SetAppearance(key, ThumbnailsOf(*map), WordsOfMap(key, *map));
   }
   const SmallBlurryImage unlike = MakeThumbnail(77'777), empty;
   int alone = 0;
@@ -263,7 +263,7 @@ TEST(PlaceIndex, FindsKeyframesWithThumbnailsOfAnotherSizeByTheirWords) {
   auto map = std::make_shared<MapSnapshot>();
   AddKeyFrame(1, map.get(), 80, 45);
   AddKeyFrame(2, map.get(), 80, 60);
-  index.SetLooks(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
+  index.SetAppearance(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
   const engine::WordBag words = WordsOfKeyFrame(1, 0);
   for (const std::uint64_t only : {0, 1}) {
     const auto found = index.FindPlaces({MakeThumbnail(9, 80, 60), words}, 2, 2, only);
@@ -277,7 +277,7 @@ TEST(PlaceIndex, AnswersWithDifferentPlacesFirst) {
   const auto map = MakeMap(1, 30);
   std::vector<KeyFrameWords> words = WordsOfMap(1, *map);
   for (auto& of : words) of.place = of.keyframe / 10 * 10;
-  index.SetLooks(1, ThumbnailsOf(*map), words);
+  index.SetAppearance(1, ThumbnailsOf(*map), words);
   // Like the keyframes 11, 12 and 13, in this order.
   SmallBlurryImage seen = MakeThumbnail(12);
   seen.pixels = seen.pixels + 0.8 * MakeThumbnail(13).pixels + 0.6 * MakeThumbnail(14).pixels;
@@ -294,10 +294,10 @@ TEST(PlaceIndex, AnswersWithDifferentPlacesFirst) {
 TEST(PlaceIndex, HasNoWordsLeftOfMapsThatGo) {
   PlaceIndex index;
   const auto map = MakeMap(1, 20);
-  index.SetLooks(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
+  index.SetAppearance(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
   const std::size_t before = index.words();
   EXPECT_GT(before, 20u * 25);
-  index.SetLooks(2, ThumbnailsOf(*map), WordsOfMap(2, *map));
+  index.SetAppearance(2, ThumbnailsOf(*map), WordsOfMap(2, *map));
   EXPECT_GT(index.words(), before);
   // In memory, let go, smaller, gone.
   index.SetMap(2, map);
@@ -312,20 +312,20 @@ TEST(PlaceIndex, HasNoWordsLeftOfMapsThatGo) {
   EXPECT_EQ(index.words(), 0u);
 }
 
-// A map with pictures that have corners.
-std::shared_ptr<MapSnapshot> MakeMapOfPictures(std::uint64_t seed, std::uint64_t keyframes) {
+// A map with images that have corners.
+std::shared_ptr<MapSnapshot> MakeMapOfImages(std::uint64_t seed, std::uint64_t keyframes) {
   auto map = std::make_shared<MapSnapshot>();
   for (std::uint64_t i = 0; i < keyframes; ++i) {
     Random random(seed + i);
-    cv::Mat coarse(24, 32, CV_8UC1), picture;
+    cv::Mat coarse(24, 32, CV_8UC1), image;
     for (int y = 0; y < coarse.rows; ++y) {
       for (int x = 0; x < coarse.cols; ++x)
         coarse.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
     }
-    cv::resize(coarse, picture, {320, 240}, 0, 0, cv::INTER_CUBIC);
+    cv::resize(coarse, image, {320, 240}, 0, 0, cv::INTER_CUBIC);
     engine::KeyFrame keyframe;
     keyframe.id = map->next_keyframe++;
-    keyframe.features = engine::MakeFeatures(picture);
+    keyframe.features = engine::MakeFeatures(image);
     map->keyframes.push_back(keyframe);
   }
   return map;
@@ -333,7 +333,7 @@ std::shared_ptr<MapSnapshot> MakeMapOfPictures(std::uint64_t seed, std::uint64_t
 
 TEST(PlaceIndex, DescribesKeyframesOnce) {
   PlaceIndex index;
-  const auto map = MakeMapOfPictures(1, 3);
+  const auto map = MakeMapOfImages(1, 3);
   const auto described = index.DescribeNew(1, *map);
   ASSERT_EQ(described.size(), 3u);
   EXPECT_GT(described[0].words.size(), 20u);
@@ -342,7 +342,7 @@ TEST(PlaceIndex, DescribesKeyframesOnce) {
   EXPECT_TRUE(index.DescribeNew(1, *map).empty());
   EXPECT_EQ(index.FindPlaces({SmallBlurryImage(), described[1].words}, 1, 1, 0).at(0).keyframe, 1u);
   // One more keyframe, and the same ones read from a file again.
-  const auto longer = MakeMapOfPictures(1, 4);
+  const auto longer = MakeMapOfImages(1, 4);
   const auto news = index.DescribeNew(1, *longer);
   ASSERT_EQ(news.size(), 1u);
   EXPECT_EQ(news[0].keyframe, 3u);
@@ -354,18 +354,18 @@ TEST(PlaceIndex, DescribesKeyframesOnce) {
     std::vector<KeyFrameWords> kept;
     if (stored) kept = described;
     for (auto& of : kept) of.place = of.keyframe;
-    other.SetLooks(1, ThumbnailsOf(*map), kept);
+    other.SetAppearance(1, ThumbnailsOf(*map), kept);
     EXPECT_EQ(other.words(), stored ? words : 0u);
-    EXPECT_EQ(other.DescribeNew(1, *MakeMapOfPictures(1, 3)).size(), stored ? 0u : 3u);
-    other.SetMap(1, MakeMapOfPictures(1, 3));
+    EXPECT_EQ(other.DescribeNew(1, *MakeMapOfImages(1, 3)).size(), stored ? 0u : 3u);
+    other.SetMap(1, MakeMapOfImages(1, 3));
     EXPECT_EQ(other.words(), words);
     EXPECT_EQ(other.FindPlaces({SmallBlurryImage(), described[2].words}, 1, 1, 0).at(0).keyframe, 2u);
   }
 }
 
-TEST(PlaceIndex, FindsPicturesByWordsAfterARollThatThumbnailsDoNotKnow) {
+TEST(PlaceIndex, FindsImagesByWordsAfterARollThatThumbnailsDoNotKnow) {
   PlaceIndex index;
-  const auto map = MakeMapOfPictures(1, 60);
+  const auto map = MakeMapOfImages(1, 60);
   index.SetMap(1, map);
   int by_thumbnails = 0, merged = 0;
   for (std::uint64_t i = 0; i < 60; i += 3) {
@@ -384,7 +384,7 @@ TEST(PlaceIndex, FindsPicturesByWordsAfterARollThatThumbnailsDoNotKnow) {
 TEST(PlaceIndex, IsSearchedWhileMapsComeGrowAndGo) {
   PlaceIndex index;
   const auto map = MakeMap(0, 30);
-  index.SetLooks(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
+  index.SetAppearance(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
   const SmallBlurryImage seen = MakeThumbnail(11);
   const engine::WordBag words = WordsOfKeyFrame(1, 11);
   std::atomic<bool> done = false;
@@ -406,7 +406,7 @@ TEST(PlaceIndex, IsSearchedWhileMapsComeGrowAndGo) {
     AddKeyFrame(10'000 + static_cast<std::uint64_t>(i), growing.get());
     index.SetMap(2, std::make_shared<const MapSnapshot>(*growing));
     const auto other = MakeMap(20'000, 3);
-    if (i % 10 == 0) index.SetLooks(3, ThumbnailsOf(*other), WordsOfMap(3, *other));
+    if (i % 10 == 0) index.SetAppearance(3, ThumbnailsOf(*other), WordsOfMap(3, *other));
     if (i % 10 == 5) index.RemoveMap(3);
   }
   done = true;

@@ -10,7 +10,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr ByChance kChance{};
+constexpr ChanceLevel kChance{};
 
 // Thumbnails alike by that correlation.
 PlaceScore Alike(std::uint64_t map, engine::KeyFrameId place, double correlation, double words = 0) {
@@ -56,7 +56,7 @@ TEST(PlaceRanking, EitherWayCanDecide) {
   // A roll takes the thumbnail's likeness away; that it is then unlike says no more than nothing.
   EXPECT_EQ(Likeness(Alike(1, 0, -0.8, 0.3), kChance), Likeness(Alike(1, 0, 0, 0.3), kChance));
   // What many have is nothing.
-  const ByChance many = {.correlation = 0.6, .words = 0.2};
+  const ChanceLevel many = {.correlation = 0.6, .words = 0.2};
   EXPECT_NEAR(Likeness(Alike(1, 0, 0.8, 0.3), many), 0.5 + 0.5, 1e-12);
   EXPECT_NEAR(Likeness(Alike(1, 0, 0.6, 0.2), many), 0, 1e-12);
   // Where nothing is shared but what everything shares, thumbnails alone decide.

@@ -6,8 +6,8 @@
 
 #include "maps/exchange.h"
 #include "maps/library.h"
+#include "maps/maintenance.h"
 #include "maps/saver.h"
-#include "maps/upkeep.h"
 #include "tests/maps/map_samples.h"
 
 namespace docent::maps {
@@ -123,7 +123,7 @@ TEST_P(EveryPolicy, IsAskedWhenAPanoramaMapOpens) {
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
 }
 
-TEST_P(EveryPolicy, IsAskedWhenAPictureIsExchanged) {
+TEST_P(EveryPolicy, IsAskedWhenAnImageIsExchanged) {
   auto changed = std::make_shared<engine::MapSnapshot>(*map_);
   changed->keyframes[0].features = MakeSampleMap(77)->keyframes[0].features;
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });

@@ -58,7 +58,7 @@ TEST_F(Recovering, WhatIsLostIsNamedAndTheRestIsSaved) {
   const Recovery recovery = Recover(file_, target_);
   EXPECT_EQ(recovery.maps_whole, 0u);
   EXPECT_EQ(recovery.maps_in_part, 3u);
-  EXPECT_THAT(recovery.problems, Contains(HasSubstr("the picture of keyframe 3 is missing")));
+  EXPECT_THAT(recovery.problems, Contains(HasSubstr("the image of keyframe 3 is missing")));
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the table of points is cut off")));
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the entry of map 4: its checksum does not match")));
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the asset asset-0 is missing")));

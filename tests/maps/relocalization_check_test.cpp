@@ -29,7 +29,7 @@ cv::Mat PaintWall() {
 }
 
 // Keyframes that look straight at a wall, each at an offset along it in pixels; the corners of each are
-// points, seen by all that have them in their picture.
+// points, seen by all that have them in their image.
 engine::MapSnapshot MakeRow(const std::vector<int>& offsets) {
   const cv::Mat wall = PaintWall();
   const auto camera = std::make_shared<const engine::CameraModel>(
@@ -52,7 +52,7 @@ engine::MapSnapshot MakeRow(const std::vector<int>& offsets) {
       for (std::size_t i = 0; i < keyframe.features->corners[level].size(); i += 3) {
         const engine::Corner corner = keyframe.features->corners[level][i];
         const Eigen::Vector2d pixel = engine::LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), level);
-        // Each makes points in the middle of its picture alone, so that none is made twice.
+        // Each makes points in the middle of its image alone, so that none is made twice.
         if (std::abs(pixel.x() - 160) > kPartOfTheWall / 2.0) continue;
         engine::MapPoint point;
         point.id = map.next_point++;

@@ -170,7 +170,7 @@ TEST_F(SaverTest, UpkeepGivesWayToASave) {
     saver.Flush();
     EXPECT_EQ(FirstDifference(*library_->Load(key).snapshot, *MakeSampleMap(round)), "");
   }
-  saver.EndUpkeep();
+  saver.EndMaintenance();
   const int at_the_end = begun;
   EXPECT_EQ(given_way, at_the_end);
   saver.Submit({key, "Desk", Policy::kOpen, MakeSampleMap(9), nullptr});

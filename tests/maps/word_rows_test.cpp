@@ -20,7 +20,7 @@ using ::testing::IsEmpty;
 
 std::vector<KeyFrameWords> WordsIn(const Library& library) {
   std::vector<KeyFrameWords> all;
-  library.LoadLooks([&](const MapInfo&, const Library::Looks& looks) {
+  library.LoadAppearance([&](const MapInfo&, const Library::Appearance& looks) {
     EXPECT_EQ(looks.problem, "");
     all.insert(all.end(), looks.words.begin(), looks.words.end());
   });
@@ -125,12 +125,12 @@ TEST(WordRows, AreThoseOfTheKeyframesAfterEverySave) {
   EXPECT_EQ(library.Verify(), std::vector<std::string>{});
 }
 
-TEST(WordRows, OfAPictureThatStaysAreKeptAndOfAnotherMadeAnew) {
+TEST(WordRows, OfAnImageThatStaysAreKeptAndOfAnotherMadeAnew) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   auto map = MakeSampleMap(1, kWithWords);
   LibraryOf(file, map);
-  // Words that nobody would make of these pictures.
+  // Words that nobody would make of these images.
   std::vector<KeyFrameWords> marked = MakeWords(*map, {});
   for (KeyFrameWords& words : marked) words.words = MakeWordBag({words.keyframe});
   WriteWords(Database::OpenReadWrite(file, false), 1, marked);

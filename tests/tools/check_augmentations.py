@@ -197,7 +197,7 @@ def main():
                 continue
             offset = [anchor[i] - pose[0][i] for i in range(3)]
             seen = project(camera, apply(transposed(pose[1]), offset))
-            # A thing that truly is behind the camera or far outside counts as missed by a picture's width.
+            # A thing that truly is behind the camera or far outside counts as missed by an image's width.
             error = camera["width"] if seen is None else math.dist(seen, (float(row["u"]), float(row["v"])))
             errors[row["map"], row["name"]].append(min(error, camera["width"]))
     everything = sorted(e for group in errors.values() for e in group)

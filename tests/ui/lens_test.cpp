@@ -27,7 +27,7 @@ void ExpectContentLandsWhereTheLensProjects(const CameraModel& camera) {
       content::Scene scene;
       const auto side = static_cast<float>(5 * 2.5 * camera.PixelAngle());
       scene.entities.push_back(Facing(SquareModel(side, glm::vec4(1)), point));
-      const Eigen::Vector2d seen = Centroid(DrawPicture(&renderer, tracked, camera, scene));
+      const Eigen::Vector2d seen = Centroid(DrawImage(&renderer, tracked, camera, scene));
       const std::optional<Eigen::Vector2d> expected = camera.Project(point);
       ASSERT_TRUE(expected.has_value());
       EXPECT_LT((seen - *expected).norm(), 0.25)
@@ -52,7 +52,7 @@ TEST_F(Lens, DrawsContentWhereAFieldOfViewLensProjectsIt) {
 }
 
 TEST_F(Lens, DrawsContentBesideAndBehindTheCameraOfAFisheyeLens) {
-  // The corners of the picture look 115 degrees off the axis.
+  // The corners of the image look 115 degrees off the axis.
   ExpectContentLandsWhereTheLensProjects(
       {LensModel::kKannalaBrandt, {640, 480, 200.0, 200.0, 319.0, 240.0}, {0.01, -0.002, 0, 0, 0}});
 }

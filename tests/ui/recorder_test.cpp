@@ -18,7 +18,7 @@ std::filesystem::path Scratch(const std::string& name) {
   return std::filesystem::temp_directory_path() / ("docent-ui-" + std::to_string(getpid()) + "-" + name);
 }
 
-TEST(Recorder, WritesAVideoThatReadsBackWithTheSamePictures) {
+TEST(Recorder, WritesAVideoThatReadsBackWithTheSameImages) {
   const std::filesystem::path path = Scratch("video.mp4");
   {
     Recorder recorder(path.string(), 25);
@@ -30,9 +30,9 @@ TEST(Recorder, WritesAVideoThatReadsBackWithTheSamePictures) {
   ASSERT_TRUE(video.isOpened());
   EXPECT_NEAR(video.get(cv::CAP_PROP_FPS), 25, 0.01);
   int count = 0;
-  for (cv::Mat picture; video.read(picture); ++count) {
-    EXPECT_EQ(picture.size(), cv::Size(160, 120));
-    const cv::Scalar mean = cv::mean(picture);
+  for (cv::Mat image; video.read(image); ++count) {
+    EXPECT_EQ(image.size(), cv::Size(160, 120));
+    const cv::Scalar mean = cv::mean(image);
     EXPECT_NEAR(mean[0], 10 + 10 * count, 8);
     EXPECT_NEAR(mean[2], 240 - 10 * count, 8);
   }
@@ -54,7 +54,7 @@ TEST(Recorder, RefusesWhatItCannotWriteWithASentence) {
   EXPECT_NE(message(Scratch("video.mp4").string(), 0).find("rate"), std::string::npos);
 }
 
-TEST(Recorder, LeavesNoFileWithoutPictures) {
+TEST(Recorder, LeavesNoFileWithoutImages) {
   const std::filesystem::path path = Scratch("empty.mp4");
   Recorder(path.string(), 30).Close();
   EXPECT_FALSE(std::filesystem::exists(path));
@@ -77,30 +77,31 @@ TEST(MapView, TellsLengthsInUnitsOfTheMapWhichNeedNotBeMetres) {
   EXPECT_EQ(MapViewCounts(map, 0.2), "3 points, 2 keyframes, grid of 0.2 units");
 }
 
-using MapViewPicture = OffscreenTest;
+using MapViewImage = OffscreenTest;
 
-TEST_F(MapViewPicture, ShowsWhereAndWhitherALostCameraIsFoundAgain) {
+TEST_F(MapViewImage, ShowsWhereAndWhitherALostCameraIsFoundAgain) {
   const engine::MapSnapshot map;
   Orbit orbit;
   orbit.distance_m = 4;
   orbit.elevation = std::numbers::pi / 2;
   MapView view;
-  cv::Mat picture;
-  const std::vector<FoundAgain> found = {{{0, 0, 0}, {0, 0, 1}, 2.0, 1.0}, {{0, 0, 0}, {0, 0, -1}, 2.0, 0.0}};
+  cv::Mat image;
+  const std::vector<PredictedRecall> found = {{{0, 0, 0}, {0, 0, 1}, 2.0, 1.0},
+                                              {{0, 0, 0}, {0, 0, -1}, 2.0, 0.0}};
   view.Draw(map, nullptr, orbit, {}, found);
-  view.ReadBack(&picture);
-  // From above +z is up the picture: green there, red below, on the middle column.
-  const int x = picture.cols / 2;
-  const int step = picture.rows / 12;
-  const auto ahead = picture.at<cv::Vec3b>(picture.rows / 2 - step, x);
-  const auto behind = picture.at<cv::Vec3b>(picture.rows / 2 + step, x);
+  view.ReadBack(&image);
+  // From above +z is up the image: green there, red below, on the middle column.
+  const int x = image.cols / 2;
+  const int step = image.rows / 12;
+  const auto ahead = image.at<cv::Vec3b>(image.rows / 2 - step, x);
+  const auto behind = image.at<cv::Vec3b>(image.rows / 2 + step, x);
   EXPECT_GT(ahead[1], ahead[2] + 60);
   EXPECT_GT(behind[2], behind[1] + 60);
-  const auto aside = picture.at<cv::Vec3b>(picture.rows / 2 + 3, x + step);
+  const auto aside = image.at<cv::Vec3b>(image.rows / 2 + 3, x + step);
   EXPECT_LT(std::abs(aside[1] - aside[2]), 40) << "nothing was tried there";
 }
 
-TEST_F(MapViewPicture, ShowsThePointsOfAMapInColour) {
+TEST_F(MapViewImage, ShowsThePointsOfAMapInColour) {
   engine::MapSnapshot map;
   Random random(5);
   for (engine::MapPointId i = 0; i < 300; ++i) {

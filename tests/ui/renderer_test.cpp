@@ -24,13 +24,13 @@ int CountDifferent(const cv::Mat& a, const cv::Mat& b) {
 TEST_F(RendererTest, KeepsEveryByteOfTheVideoWhereNothingStands) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
-  const cv::Mat video = NoisePicture(640, 480, CV_8UC3);
+  const cv::Mat video = NoiseImage(640, 480, CV_8UC3);
   const engine::TrackedFrame tracked = Tracked(video);
-  EXPECT_EQ(CountDifferent(DrawPicture(&renderer, tracked, camera, {}), video), 0);
+  EXPECT_EQ(CountDifferent(DrawImage(&renderer, tracked, camera, {}), video), 0);
 
   content::Scene scene;
   scene.entities.push_back(Facing(SquareModel(0.4f, glm::vec4(1, 0, 0, 1)), {0, 0, 2}));
-  const cv::Mat drawn = DrawPicture(&renderer, tracked, camera, scene);
+  const cv::Mat drawn = DrawImage(&renderer, tracked, camera, scene);
   EXPECT_EQ(drawn.at<cv::Vec3b>(242, 319), cv::Vec3b(0, 0, 255));
   // The square spans 81 pixels around the middle; beside it the video is untouched.
   const cv::Rect around(319 - 50, 242 - 50, 100, 100);
@@ -41,16 +41,16 @@ TEST_F(RendererTest, KeepsEveryByteOfTheVideoWhereNothingStands) {
   EXPECT_GT(CountDifferent(drawn, video), 3 * 70 * 70);
 }
 
-TEST_F(RendererTest, ShowsGreyVideoAndPicturesWithinLargerOnes) {
+TEST_F(RendererTest, ShowsGreyVideoAndImagesWithinLargerOnes) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
-  const cv::Mat gray = NoisePicture(640, 480, CV_8UC1);
+  const cv::Mat gray = NoiseImage(640, 480, CV_8UC1);
   cv::Mat colored;
   cv::cvtColor(gray, colored, cv::COLOR_GRAY2BGR);
-  EXPECT_EQ(CountDifferent(DrawPicture(&renderer, Tracked(gray), camera, {}), colored), 0);
-  const cv::Mat large = NoisePicture(701, 500, CV_8UC3);
+  EXPECT_EQ(CountDifferent(DrawImage(&renderer, Tracked(gray), camera, {}), colored), 0);
+  const cv::Mat large = NoiseImage(701, 500, CV_8UC3);
   const cv::Mat part = large(cv::Rect(13, 7, 640, 480));
-  EXPECT_EQ(CountDifferent(DrawPicture(&renderer, Tracked(part), camera, {}), part), 0);
+  EXPECT_EQ(CountDifferent(DrawImage(&renderer, Tracked(part), camera, {}), part), 0);
 }
 
 TEST_F(RendererTest, ShowsAnotherCameraSmallInACornerAndNothingElsewhere) {
@@ -87,7 +87,7 @@ TEST_F(RendererTest, HidesWhatStandsBehindWhateverTheOrderOfPlacing) {
   for (const bool near_first : {true, false}) {
     content::Scene scene;
     scene.entities = near_first ? std::vector{near, far} : std::vector{far, near};
-    const cv::Mat drawn = DrawPicture(&renderer, tracked, camera, scene);
+    const cv::Mat drawn = DrawImage(&renderer, tracked, camera, scene);
     EXPECT_EQ(drawn.at<cv::Vec3b>(242, 319), cv::Vec3b(0, 0, 255));
     EXPECT_EQ(drawn.at<cv::Vec3b>(242, 419), cv::Vec3b(0, 255, 0));
   }
@@ -100,7 +100,7 @@ TEST_F(RendererTest, BlendsTransparentContentOverTheVideoAndOverEachOther) {
   content::Scene scene;
   scene.entities.push_back(Facing(SquareModel(0.2f, glm::vec4(1, 0, 0, 0.25f)), {0, 0, 1.0}));
   scene.entities.push_back(Facing(SquareModel(1.0f, glm::vec4(0, 1, 0, 0.5f)), {0, 0, 1.5}));
-  const cv::Mat drawn = DrawPicture(&renderer, tracked, camera, scene);
+  const cv::Mat drawn = DrawImage(&renderer, tracked, camera, scene);
   const cv::Vec3b once = drawn.at<cv::Vec3b>(242, 419), twice = drawn.at<cv::Vec3b>(242, 319);
   EXPECT_NEAR(once[0], 0.5 * 200, 2);
   EXPECT_NEAR(once[1], 0.5 * 255 + 0.5 * 100, 2);
@@ -108,7 +108,7 @@ TEST_F(RendererTest, BlendsTransparentContentOverTheVideoAndOverEachOther) {
   EXPECT_NEAR(twice[2], 0.25 * 255 + 0.75 * 0.5 * 40, 2);
 }
 
-TEST_F(RendererTest, DrawsEachPictureWithItsOwnPoseAndForgetsTheOneBefore) {
+TEST_F(RendererTest, DrawsEachImageWithItsOwnPoseAndForgetsTheOneBefore) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   content::Scene scene;
@@ -120,7 +120,7 @@ TEST_F(RendererTest, DrawsEachPictureWithItsOwnPoseAndForgetsTheOneBefore) {
     tracked.camera_from_map = {
         engine::Rotation3::Exp({random.Uniform(-0.2, 0.2), random.Uniform(-0.2, 0.2), random.Uniform(-1, 1)}),
         {random.Uniform(-0.3, 0.3), random.Uniform(-0.3, 0.3), random.Uniform(-0.3, 0.3)}};
-    const Eigen::Vector2d seen = Centroid(DrawPicture(&renderer, tracked, camera, scene));
+    const Eigen::Vector2d seen = Centroid(DrawImage(&renderer, tracked, camera, scene));
     const std::optional<Eigen::Vector2d> expected =
         camera.Project(Eigen::Vector3d(tracked.camera_from_map * place));
     ASSERT_TRUE(expected.has_value());
@@ -133,9 +133,9 @@ TEST_F(RendererTest, DrawsNoContentWithoutAPose) {
   const engine::CameraModel camera = StronglyDistorted();
   content::Scene scene;
   scene.entities.push_back(Facing(SquareModel(1, glm::vec4(1)), {0, 0, 1}));
-  engine::TrackedFrame tracked = Tracked(NoisePicture(640, 480, CV_8UC3));
+  engine::TrackedFrame tracked = Tracked(NoiseImage(640, 480, CV_8UC3));
   tracked.state = engine::TrackingState::kLost;
-  EXPECT_EQ(CountDifferent(DrawPicture(&renderer, tracked, camera, scene), tracked.frame.picture), 0);
+  EXPECT_EQ(CountDifferent(DrawImage(&renderer, tracked, camera, scene), tracked.frame.image), 0);
 }
 
 TEST_F(RendererTest, MovesASkinnedMeshWithItsJoint) {
@@ -154,7 +154,7 @@ TEST_F(RendererTest, MovesASkinnedMeshWithItsJoint) {
   entity.model.map_from_model.rotation = {};
   content::Scene scene;
   scene.entities.push_back(entity);
-  const cv::Mat drawn = DrawPicture(&renderer, Tracked(cv::Mat::zeros(480, 640, CV_8UC3)), camera, scene);
+  const cv::Mat drawn = DrawImage(&renderer, Tracked(cv::Mat::zeros(480, 640, CV_8UC3)), camera, scene);
   const Eigen::Vector2d expected = *camera.Project(Eigen::Vector3d(0.3, 0, 2));
   EXPECT_LT((Centroid(drawn) - expected).norm(), 0.5);
 }
@@ -200,13 +200,13 @@ TEST_F(RendererTest, SaysHowFarTheMapHasCome) {
   View view;
   view.tracked = &tracked;
   view.camera = &camera;
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
   for (const char* word : {"", "limited", "extending", "mapped"}) {
     view.overlay.mapping = word;
     renderer.Draw(view);
-    renderer.ReadBack(&pictures.emplace_back());
-    for (std::size_t i = 0; i + 1 < pictures.size(); ++i)
-      EXPECT_GT(CountDifferent(pictures[i], pictures.back()), 20) << word;
+    renderer.ReadBack(&images.emplace_back());
+    for (std::size_t i = 0; i + 1 < images.size(); ++i)
+      EXPECT_GT(CountDifferent(images[i], images.back()), 20) << word;
   }
 }
 
@@ -221,9 +221,9 @@ TEST_F(RendererTest, SurvivesAnyTextInItsLabels) {
   view.overlay.map_name = "\xff\xfe\x80 broken \xc3";
   view.overlay.message = std::string("nul\0inside", 10) + "\x01\x02";
   renderer.Draw(view);
-  cv::Mat picture;
-  renderer.ReadBack(&picture);
-  EXPECT_EQ(picture.size(), cv::Size(640, 480));
+  cv::Mat image;
+  renderer.ReadBack(&image);
+  EXPECT_EQ(image.size(), cv::Size(640, 480));
 }
 
 }  // namespace

@@ -68,17 +68,17 @@ TEST(Text, IsAlwaysValidAndBounded) {
   style.max_width_px = 120;
   style.max_height_px = 60;
   bool is_cut = false;
-  const cv::Mat picture = DrawText(std::string(5000, 'x'), style, &is_cut);
-  EXPECT_LE(picture.cols, 120);
-  EXPECT_LE(picture.rows, 60);
+  const cv::Mat image = DrawText(std::string(5000, 'x'), style, &is_cut);
+  EXPECT_LE(image.cols, 120);
+  EXPECT_LE(image.rows, 60);
   EXPECT_TRUE(is_cut);
   DrawText("short", style, &is_cut);
   EXPECT_FALSE(is_cut);
 }
 
-using SignpostPicture = OffscreenTest;
+using SignpostImage = OffscreenTest;
 
-TEST_F(SignpostPicture, ShowsItsBoardToReadersOnBothSides) {
+TEST_F(SignpostImage, ShowsItsBoardToReadersOnBothSides) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   content::Scene scene;
@@ -88,10 +88,10 @@ TEST_F(SignpostPicture, ShowsItsBoardToReadersOnBothSides) {
   entity.signpost.height_m = 0.4;
   scene.entities.push_back(entity);
   engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
-  const cv::Mat front = DrawPicture(&renderer, tracked, camera, scene);
+  const cv::Mat front = DrawImage(&renderer, tracked, camera, scene);
   // The same distance on the far side, looking back.
   tracked.camera_from_map = {engine::Rotation3::Exp({0, 3.14159265358979, 0}), {0, 0, 4}};
-  const cv::Mat back = DrawPicture(&renderer, tracked, camera, scene);
+  const cv::Mat back = DrawImage(&renderer, tracked, camera, scene);
   // Both see letters: the same front, not its mirror image nor the plain back.
   cv::Mat difference;
   cv::absdiff(front, back, difference);

@@ -34,14 +34,14 @@ inline engine::CameraModel StronglyDistorted() {
           {-0.31, 0.09, 0.0016, -0.0011, 0}};
 }
 
-inline cv::Mat NoisePicture(int width_px, int height_px, int type) {
-  cv::Mat picture(height_px, width_px, type);
+inline cv::Mat NoiseImage(int width_px, int height_px, int type) {
+  cv::Mat image(height_px, width_px, type);
   Random random(7);
-  for (int y = 0; y < picture.rows; ++y) {
-    for (std::size_t x = 0; x < picture.cols * picture.elemSize(); ++x)
-      picture.ptr(y)[x] = static_cast<std::uint8_t>(random.Below(256));
+  for (int y = 0; y < image.rows; ++y) {
+    for (std::size_t x = 0; x < image.cols * image.elemSize(); ++x)
+      image.ptr(y)[x] = static_cast<std::uint8_t>(random.Below(256));
   }
-  return picture;
+  return image;
 }
 
 // A square in the model's xy plane, `side` long, seen from both sides, in one unlit colour (linear).
@@ -85,34 +85,34 @@ inline content::Entity Facing(std::shared_ptr<const content::Model> model, const
   return entity;
 }
 
-// A tracked frame with a pose at the map's origin over this picture.
-inline engine::TrackedFrame Tracked(const cv::Mat& picture) {
+// A tracked frame with a pose at the map's origin over this image.
+inline engine::TrackedFrame Tracked(const cv::Mat& image) {
   engine::TrackedFrame tracked;
-  tracked.frame.picture = picture;
+  tracked.frame.image = image;
   tracked.state = engine::TrackingState::kSixDof;
   return tracked;
 }
 
-inline cv::Mat DrawPicture(Renderer* renderer, const engine::TrackedFrame& tracked,
-                           const engine::CameraModel& camera, const content::Scene& scene) {
+inline cv::Mat DrawImage(Renderer* renderer, const engine::TrackedFrame& tracked,
+                         const engine::CameraModel& camera, const content::Scene& scene) {
   View view;
   view.tracked = &tracked;
   view.camera = &camera;
   view.scene = &scene;
   view.overlay.hud = false;
   renderer->Draw(view);
-  cv::Mat picture;
-  renderer->ReadBack(&picture);
-  return picture;
+  cv::Mat image;
+  renderer->ReadBack(&image);
+  return image;
 }
 
-// Centre of what is brighter than black in a picture, weighted by its green, pixels; (-1, -1) for nothing.
-inline Eigen::Vector2d Centroid(const cv::Mat& picture) {
+// Centre of what is brighter than black in an image, weighted by its green, pixels; (-1, -1) for nothing.
+inline Eigen::Vector2d Centroid(const cv::Mat& image) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double weight = 0;
-  for (int y = 0; y < picture.rows; ++y) {
-    for (int x = 0; x < picture.cols; ++x) {
-      const double green = picture.at<cv::Vec3b>(y, x)[1];
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      const double green = image.at<cv::Vec3b>(y, x)[1];
       sum += green * Eigen::Vector2d(x, y);
       weight += green;
     }

@@ -80,7 +80,7 @@ TEST(Window, SaysInASentenceThatThereIsNoDisplay) {
   }
 }
 
-TEST(Window, ShowsThePictureAndPlacesWhatIsClicked) {
+TEST(Window, ShowsTheImageAndPlacesWhatIsClicked) {
   VirtualScreen screen;
   if (!screen.works()) GTEST_SKIP() << "Xvfb is not installed";
   if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
@@ -115,21 +115,21 @@ TEST(Window, ShowsThePictureAndPlacesWhatIsClicked) {
   EXPECT_EQ(click->button, 0);
   EXPECT_FALSE(panel.WantsMouse());
   const Eigen::Vector2i size = window.WindowSize();
-  const Letterbox box = FitPicture(640, 480, size.x(), size.y());
-  const Eigen::Vector2d pixel = box.PictureFromWindow(click->position);
+  const Letterbox box = FitImage(640, 480, size.x(), size.y());
+  const Eigen::Vector2d pixel = box.ImageFromWindow(click->position);
   EXPECT_TRUE(camera.IsInside(pixel));
-  EXPECT_TRUE(panel.ClickPicture(pixel));
+  EXPECT_TRUE(panel.ClickImage(pixel));
   ASSERT_EQ(commands.size(), 1u);
   EXPECT_EQ(commands[0], PlaceCommand("cake.glb", pixel, 1, 0));
 }
 
-TEST(Letterbox, MapsWindowPointsToPicturePixels) {
-  const Letterbox box = FitPicture(640, 480, 1280, 1000);
+TEST(Letterbox, MapsWindowPointsToImagePixels) {
+  const Letterbox box = FitImage(640, 480, 1280, 1000);
   EXPECT_EQ(box.width, 1280);
   EXPECT_EQ(box.height, 960);
   EXPECT_EQ(box.y, 20);
-  EXPECT_LT((box.PictureFromWindow({1, 21}) - Eigen::Vector2d(0, 0)).norm(), 1e-12);
-  EXPECT_LT((box.PictureFromWindow({1279, 979}) - Eigen::Vector2d(639, 479)).norm(), 1e-12);
+  EXPECT_LT((box.ImageFromWindow({1, 21}) - Eigen::Vector2d(0, 0)).norm(), 1e-12);
+  EXPECT_LT((box.ImageFromWindow({1279, 979}) - Eigen::Vector2d(639, 479)).norm(), 1e-12);
 }
 
 TEST(CommandText, QuotesWhatAPersonTyped) {

@@ -51,7 +51,7 @@ std::vector<BoardView> RenderAndDetect(const BoardSpec& board, const CameraModel
   Random random(29);
   std::vector<BoardView> views;
   for (const Rigid3& pose : BoardPoses(board, camera, count)) {
-    BoardView view = detector.Detect(renderer.Picture(pose, &random));
+    BoardView view = detector.Detect(renderer.Image(pose, &random));
     if (!view.pixels.empty()) views.push_back(std::move(view));
   }
   return views;
@@ -163,7 +163,7 @@ TEST(Calibrate, ChoosesViewsThatSayMostAndNotTheSameTwice) {
 }
 
 TEST(Calibrate, SaysWhatIsMissing) {
-  EXPECT_THAT(ErrorOf([] { Calibrate(std::vector<BoardView>(2), 640, 480); }), HasSubstr("only 2 pictures"));
+  EXPECT_THAT(ErrorOf([] { Calibrate(std::vector<BoardView>(2), 640, 480); }), HasSubstr("only 2 images"));
   const BoardSpec board;
   const CameraModel truth = LensOf(LensModel::kFov);
   Coverage coverage(640, 480);
@@ -203,18 +203,18 @@ TEST(Boards, ArePrintedAsPdf) {
   EXPECT_THAT(ErrorOf([&] { PrintBoard(BoardSpec(), folder / "no/board.pdf"); }), HasSubstr("Cannot write"));
 }
 
-// OpenCV's own way with the pictures: its search, its refinement with the window of its sample program, its
+// OpenCV's own way with the images: its search, its refinement with the window of its sample program, its
 // calibration.
-double OpenCvRms(const std::vector<cv::Mat>& pictures, const BoardSpec& board) {
+double OpenCvRms(const std::vector<cv::Mat>& images, const BoardSpec& board) {
   std::vector<std::vector<cv::Point3f>> points;
   std::vector<std::vector<cv::Point2f>> pixels;
   const cv::Size size(board.columns, board.rows);
-  for (const cv::Mat& picture : pictures) {
+  for (const cv::Mat& image : images) {
     std::vector<cv::Point2f> corners;
-    if (!cv::findChessboardCorners(picture, size, corners,
+    if (!cv::findChessboardCorners(image, size, corners,
                                    cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE))
       continue;
-    cv::cornerSubPix(picture, corners, {11, 11}, {-1, -1},
+    cv::cornerSubPix(image, corners, {11, 11}, {-1, -1},
                      {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 1e-4});
     pixels.push_back(corners);
     points.emplace_back();
@@ -224,7 +224,7 @@ double OpenCvRms(const std::vector<cv::Mat>& pictures, const BoardSpec& board) {
   }
   cv::Mat camera, distortion;
   std::vector<cv::Mat> turns, shifts;
-  return cv::calibrateCamera(points, pixels, pictures.front().size(), camera, distortion, turns, shifts);
+  return cv::calibrateCamera(points, pixels, images.front().size(), camera, distortion, turns, shifts);
 }
 
 // The same corners through OpenCV's calibration.
@@ -244,28 +244,28 @@ double OpenCvRms(const std::vector<BoardView>& views, const cv::Size& size) {
   return cv::calibrateCamera(points, pixels, size, camera, distortion, turns, shifts);
 }
 
-// OpenCV's own sample pictures, where Debian's opencv-doc is installed.
-TEST(Calibrate, IsNoWorseThanOpenCvOnItsOwnPictures) {
+// OpenCV's own sample images, where Debian's opencv-doc is installed.
+TEST(Calibrate, IsNoWorseThanOpenCvOnItsOwnImages) {
   const std::filesystem::path folder = "/usr/share/doc/opencv-doc/examples/data";
   const BoardSpec board = ParseBoard("checkerboard:9x6:25");
   const BoardDetector detector(board);
   for (const char* side : {"left", "right"}) {
-    std::vector<cv::Mat> pictures;
+    std::vector<cv::Mat> images;
     std::vector<BoardView> views;
     for (int i = 1; i <= 14; ++i) {
       const std::string name = side + std::string(i < 10 ? "0" : "") + std::to_string(i) + ".jpg";
-      const cv::Mat picture = cv::imread((folder / name).string(), cv::IMREAD_GRAYSCALE);
-      if (picture.empty()) continue;
-      pictures.push_back(picture);
-      BoardView view = detector.Detect(picture);
+      const cv::Mat image = cv::imread((folder / name).string(), cv::IMREAD_GRAYSCALE);
+      if (image.empty()) continue;
+      images.push_back(image);
+      BoardView view = detector.Detect(image);
       if (!view.pixels.empty()) views.push_back(std::move(view));
     }
-    if (pictures.empty()) GTEST_SKIP() << "Debian's opencv-doc, which has the pictures, is not installed";
+    if (images.empty()) GTEST_SKIP() << "Debian's opencv-doc, which has the images, is not installed";
     ASSERT_GE(views.size(), 12u) << side;
-    const cv::Size size = pictures.front().size();
+    const cv::Size size = images.front().size();
     const auto solution = SolveLens(LensModel::kRadialTangential, size.width, size.height, views);
     ASSERT_TRUE(solution);
-    const double opencv_px = OpenCvRms(pictures, board), same_corners_px = OpenCvRms(views, size);
+    const double opencv_px = OpenCvRms(images, board), same_corners_px = OpenCvRms(views, size);
     RecordProperty(std::string(side) + "_views", std::to_string(views.size()));
     RecordProperty(std::string(side) + "_docent_rms_px", std::to_string(solution->rms_px));
     RecordProperty(std::string(side) + "_opencv_rms_px", std::to_string(opencv_px));

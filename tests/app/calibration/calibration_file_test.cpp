@@ -124,12 +124,12 @@ TEST(Calibration, WithCoefficientsThatTheLensDoesNotKnowIsRefused) {
   EXPECT_THAT(ErrorOf([&] { ParseCalibration(head + "0, 0.5, 0]\n", "file"); }), HasSubstr("8 coefficients"));
 }
 
-TEST(Calibration, OfAnotherSizeThanThePicturesIsRefused) {
-  EXPECT_NO_THROW(CheckPictureSize(kEuroc, 752, 480, "desk", "camera.yaml"));
+TEST(Calibration, OfAnotherSizeThanTheImagesIsRefused) {
+  EXPECT_NO_THROW(CheckImageSize(kEuroc, 752, 480, "desk", "camera.yaml"));
   EXPECT_THAT(
-      ErrorOf([] { CheckPictureSize(kEuroc, 640, 480, "desk", "camera.yaml"); }),
+      ErrorOf([] { CheckImageSize(kEuroc, 640, 480, "desk", "camera.yaml"); }),
       AllOf(HasSubstr("640x480"), HasSubstr("752x480"), HasSubstr("camera.yaml"), HasSubstr("shape")));
-  EXPECT_THAT(ErrorOf([] { CheckPictureSize(kEuroc, 1504, 960, "desk", "camera.yaml"); }),
+  EXPECT_THAT(ErrorOf([] { CheckImageSize(kEuroc, 1504, 960, "desk", "camera.yaml"); }),
               AllOf(HasSubstr("--camera-format 752x480"), HasSubstr("docent calibrate")));
 }
 

@@ -9,7 +9,7 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 
-#include "app/cameras/device_picture.h"
+#include "app/cameras/device_image.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
@@ -19,19 +19,19 @@ using ::testing::HasSubstr;
 
 constexpr std::uint32_t kWidth = 8, kHeight = 4;
 
-// A camera that answers as a driver does: one pixel format, three buffers, grey pictures numbered by
+// A camera that answers as a driver does: one pixel format, three buffers, grey images numbered by
 // brightness.
 struct FakeCamera {
   bool plugged_in = true;
-  int backlog = 0;                  // pictures that wait already, besides the one that is waited for
-  std::uint32_t missed_before = 0;  // of the device's numbers, before every picture but the first
+  int backlog = 0;                  // images that wait already, besides the one that is waited for
+  std::uint32_t missed_before = 0;  // of the device's numbers, before every image but the first
   std::map<std::uint32_t, std::int32_t> controls;
   std::chrono::milliseconds now{100500};
   int width = kWidth;
   std::uint32_t pixel_format = V4L2_PIX_FMT_GREY;
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   int open_error = 0;
-  int pictures_until_unplugged = 1000, pictures_until_silent = 1000, broken_pictures = 0;
+  int images_until_unplugged = 1000, images_until_silent = 1000, broken_images = 0;
   std::vector<std::vector<std::uint8_t>> buffers;
   std::vector<std::uint32_t> queue;
   std::uint32_t sequence = 0;
@@ -62,8 +62,8 @@ class FakeSystem : public DeviceSystem {
   int Wait(int, int timeout_ms) override {
     if (!camera_->plugged_in) return Fail(ENODEV);
     if (timeout_ms == 0) return camera_->backlog > 0 ? 1 : 0;
-    if (camera_->delivered >= camera_->pictures_until_unplugged) return Fail(ENODEV);
-    return camera_->delivered >= camera_->pictures_until_silent ? 0 : 1;
+    if (camera_->delivered >= camera_->images_until_unplugged) return Fail(ENODEV);
+    return camera_->delivered >= camera_->images_until_silent ? 0 : 1;
   }
 
   int Control(int, unsigned long request, void* argument) override {
@@ -145,7 +145,7 @@ class FakeSystem : public DeviceSystem {
     if (camera_->sequence > 0) camera_->sequence += camera_->missed_before;
     buffer->sequence = camera_->sequence++;
     std::memset(camera_->buffers[buffer->index].data(), number, kWidth * kHeight);
-    buffer->bytesused = number < camera_->broken_pictures ? 3 : kWidth * kHeight;
+    buffer->bytesused = number < camera_->broken_images ? 3 : kWidth * kHeight;
     buffer->timestamp = {100, number * 1000};
     return 0;
   }
@@ -157,7 +157,7 @@ std::unique_ptr<FrameSource> Open(FakeCamera* camera, CameraOptions options = {}
   return OpenDevice("/dev/video9", options, std::make_unique<FakeSystem>(camera));
 }
 
-TEST(Device, StreamsPicturesAndLetsGoOfEverything) {
+TEST(Device, StreamsImagesAndLetsGoOfEverything) {
   FakeCamera camera;
   {
     const auto source = Open(&camera);
@@ -165,9 +165,9 @@ TEST(Device, StreamsPicturesAndLetsGoOfEverything) {
     EXPECT_DOUBLE_EQ(source->info().nominal_fps, 15);
     std::vector<engine::Frame> frames(10);
     for (engine::Frame& frame : frames) ASSERT_TRUE(source->Next(&frame));
-    for (int i = 0; i < 10; ++i) {  // a picture stays as it was when its buffer is used again
+    for (int i = 0; i < 10; ++i) {  // an image stays as it was when its buffer is used again
       const engine::Frame& frame = frames[static_cast<std::size_t>(i)];
-      EXPECT_EQ(frame.picture.at<std::uint8_t>(3, 7), i);
+      EXPECT_EQ(frame.image.at<std::uint8_t>(3, 7), i);
       EXPECT_EQ(frame.time, std::chrono::seconds(100) + std::chrono::milliseconds(i));
       EXPECT_EQ(frame.index, static_cast<std::uint64_t>(i));
     }
@@ -180,7 +180,7 @@ TEST(Device, StreamsPicturesAndLetsGoOfEverything) {
 
 TEST(Device, ThatIsUnpluggedSaysSo) {
   FakeCamera camera;
-  camera.pictures_until_unplugged = 2;
+  camera.images_until_unplugged = 2;
   const auto source = Open(&camera);
   engine::Frame frame;
   ASSERT_TRUE(source->Next(&frame));
@@ -195,12 +195,12 @@ TEST(Device, ThatIsWaitedForGoesOnWhenItIsBack) {
   const auto source = Open(&camera, options);
   engine::Frame frame;
   ASSERT_TRUE(source->Next(&frame));
-  EXPECT_FALSE(frame.picture.empty());
+  EXPECT_FALSE(frame.image.empty());
   const Timestamp before = frame.time;
   camera.plugged_in = false;
   for (int i = 0; i < 3; ++i) {
     ASSERT_TRUE(source->Next(&frame));
-    EXPECT_TRUE(frame.picture.empty());
+    EXPECT_TRUE(frame.image.empty());
     EXPECT_THAT(source->trouble(), HasSubstr("unplugged"));
     EXPECT_EQ(camera.opened, 0);  // its number is free for when it comes back
     EXPECT_EQ(camera.mapped, 0);
@@ -208,18 +208,18 @@ TEST(Device, ThatIsWaitedForGoesOnWhenItIsBack) {
   camera.width = kWidth * 2;
   camera.plugged_in = true;
   ASSERT_TRUE(source->Next(&frame));
-  EXPECT_TRUE(frame.picture.empty());
+  EXPECT_TRUE(frame.image.empty());
   EXPECT_THAT(source->trouble(), HasSubstr("at 8x4"));
   camera.width = kWidth;
   ASSERT_TRUE(source->Next(&frame));
-  EXPECT_FALSE(frame.picture.empty());
+  EXPECT_FALSE(frame.image.empty());
   EXPECT_EQ(source->trouble(), "");
   EXPECT_GT(frame.time, before);
   EXPECT_EQ(frame.index, 1u);
   EXPECT_EQ(source->delivery().reconnections, 1);
 }
 
-TEST(Device, CountsThePicturesThatTheDriverMissed) {
+TEST(Device, CountsTheImagesThatTheDriverMissed) {
   FakeCamera camera;
   camera.missed_before = 2;
   const auto source = Open(&camera);
@@ -232,14 +232,14 @@ TEST(Device, CountsThePicturesThatTheDriverMissed) {
   EXPECT_EQ(source->delivery().delivered, 5u);
 }
 
-TEST(Device, GivesTheNewestPictureAndCountsTheOvertaken) {
+TEST(Device, GivesTheNewestImageAndCountsTheOvertaken) {
   FakeCamera camera;
   const auto source = Open(&camera);
   engine::Frame frame;
   ASSERT_TRUE(source->Next(&frame));
   camera.backlog = 2;
   ASSERT_TRUE(source->Next(&frame));
-  EXPECT_EQ(frame.picture.at<std::uint8_t>(0, 0), 2);  // the backlog holds 1 and 2
+  EXPECT_EQ(frame.image.at<std::uint8_t>(0, 0), 2);  // the backlog holds 1 and 2
   EXPECT_EQ(frame.index, 2u);
   EXPECT_EQ(source->delivery().late, 1u);
 }
@@ -266,7 +266,7 @@ TEST(Device, HoldsItsAutomaticControlsOnceTheyHaveSettledAndPutsThemBack) {
   EXPECT_EQ(camera.controls, before);
 }
 
-TEST(Device, TellsTheLatencyOfItsPictures) {
+TEST(Device, TellsTheLatencyOfItsImages) {
   FakeCamera camera;
   const auto source = Open(&camera);
   engine::Frame frame;
@@ -287,23 +287,23 @@ TEST(Device, ThatMayNotBeOpenedIsListedWithWhatToDo) {
 
 TEST(Device, ThatFallsSilentSaysSo) {
   FakeCamera camera;
-  camera.pictures_until_silent = 1;
+  camera.images_until_silent = 1;
   const auto source = Open(&camera);
   engine::Frame frame;
   ASSERT_TRUE(source->Next(&frame));
-  EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("no picture for 2000 ms"));
+  EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("no image for 2000 ms"));
 }
 
-TEST(Device, SkipsAFewBrokenPicturesButNotEndlessly) {
+TEST(Device, SkipsAFewBrokenImagesButNotEndlessly) {
   FakeCamera camera;
-  camera.broken_pictures = 5;
+  camera.broken_images = 5;
   engine::Frame frame;
   ASSERT_TRUE(Open(&camera)->Next(&frame));
-  EXPECT_EQ(frame.picture.at<std::uint8_t>(0, 0), 5);
+  EXPECT_EQ(frame.image.at<std::uint8_t>(0, 0), 5);
   FakeCamera broken;
-  broken.broken_pictures = 1000;
+  broken.broken_images = 1000;
   const auto source = Open(&broken);
-  EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("broken pictures"));
+  EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("broken images"));
 }
 
 TEST(Device, ThatCannotBeUsedSaysWhy) {
@@ -325,7 +325,7 @@ TEST(Device, ThatCannotBeUsedSaysWhy) {
   EXPECT_THAT(sentence(camera), HasSubstr("not one that streams"));
   camera = {};
   camera.pixel_format = V4L2_PIX_FMT_RGB565;
-  EXPECT_THAT(sentence(camera), HasSubstr("no picture format"));
+  EXPECT_THAT(sentence(camera), HasSubstr("no image format"));
   camera = {};
   CameraOptions options;
   options.device_format = {1920, 1080, 0};
@@ -343,7 +343,7 @@ TEST(Device, IsDescribedWithItsFormats) {
   EXPECT_EQ(camera.opened, 0);
 }
 
-TEST(DevicePictures, AreConvertedWithTheirStride) {
+TEST(DeviceImages, AreConvertedWithTheirStride) {
   // Grey in YUYV is Y with U = V = 128; rows are two bytes longer than their pixels.
   std::vector<std::uint8_t> bytes;
   for (int row = 0; row < 2; ++row) {
@@ -351,39 +351,39 @@ TEST(DevicePictures, AreConvertedWithTheirStride) {
       bytes.insert(bytes.end(), {static_cast<std::uint8_t>(100 + row), 128});
     bytes.insert(bytes.end(), {0, 0});
   }
-  const cv::Mat picture = ConvertDevicePicture(V4L2_PIX_FMT_YUYV, bytes, {4, 2}, 10, "picture");
-  ASSERT_EQ(picture.size(), cv::Size(4, 2));
-  EXPECT_LT(picture.at<cv::Vec3b>(0, 0)[1], picture.at<cv::Vec3b>(1, 3)[1]);
-  EXPECT_EQ(picture.at<cv::Vec3b>(1, 0)[0], picture.at<cv::Vec3b>(1, 3)[2]);
+  const cv::Mat image = ConvertDeviceImage(V4L2_PIX_FMT_YUYV, bytes, {4, 2}, 10, "image");
+  ASSERT_EQ(image.size(), cv::Size(4, 2));
+  EXPECT_LT(image.at<cv::Vec3b>(0, 0)[1], image.at<cv::Vec3b>(1, 3)[1]);
+  EXPECT_EQ(image.at<cv::Vec3b>(1, 0)[0], image.at<cv::Vec3b>(1, 3)[2]);
   bytes.resize(bytes.size() - 3);
   EXPECT_THAT(ErrorOf([&] {
-                ConvertDevicePicture(V4L2_PIX_FMT_YUYV, bytes, {4, 2}, 10, "picture");
+                ConvertDeviceImage(V4L2_PIX_FMT_YUYV, bytes, {4, 2}, 10, "image");
               }),
               HasSubstr("bytes"));
 }
 
-TEST(DevicePictures, InMotionJpegAreDecodedAndTheirSizeIsChecked) {
+TEST(DeviceImages, InMotionJpegAreDecodedAndTheirSizeIsChecked) {
   std::vector<std::uint8_t> bytes;
   ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(8, 16, CV_8UC3, cv::Scalar(10, 200, 30)), bytes));
-  EXPECT_EQ(ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bytes, {16, 8}, 16, "picture").type(), CV_8UC3);
+  EXPECT_EQ(ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bytes, {16, 8}, 16, "image").type(), CV_8UC3);
   EXPECT_THAT(ErrorOf([&] {
-                ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bytes, {8, 8}, 8, "picture");
+                ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bytes, {8, 8}, 8, "image");
               }),
               HasSubstr("another size"));
 }
 
-TEST(DevicePictures, InMotionJpegMayLeaveOutTheUsualTablesButNotTheirEnd) {
-  cv::Mat picture(48, 64, CV_8UC3);
-  for (int row = 0; row < picture.rows; ++row) {
-    for (int column = 0; column < picture.cols; ++column) {
-      picture.at<cv::Vec3b>(row, column) =
+TEST(DeviceImages, InMotionJpegMayLeaveOutTheUsualTablesButNotTheirEnd) {
+  cv::Mat image(48, 64, CV_8UC3);
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
+      image.at<cv::Vec3b>(row, column) =
           cv::Vec3b(static_cast<std::uint8_t>(4 * row), static_cast<std::uint8_t>(3 * column), 100);
     }
   }
   std::vector<std::uint8_t> bytes;
-  ASSERT_TRUE(cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 95}));
-  const cv::Mat whole = ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bytes, {64, 48}, 0, "picture");
-  EXPECT_LT(cv::norm(whole, picture, cv::NORM_L1) / static_cast<double>(picture.total()), 12);
+  ASSERT_TRUE(cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 95}));
+  const cv::Mat whole = ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bytes, {64, 48}, 0, "image");
+  EXPECT_LT(cv::norm(whole, image, cv::NORM_L1) / static_cast<double>(image.total()), 12);
   // Cameras leave out the DHT segments (FF C4, length) that the encoder above writes as in the standard.
   std::vector<std::uint8_t> bare;
   for (std::size_t i = 0; i < bytes.size();) {
@@ -394,26 +394,26 @@ TEST(DevicePictures, InMotionJpegMayLeaveOutTheUsualTablesButNotTheirEnd) {
     }
   }
   ASSERT_LT(bare.size(), bytes.size());
-  EXPECT_EQ(cv::norm(ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bare, {64, 48}, 0, "picture"), whole), 0);
+  EXPECT_EQ(cv::norm(ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bare, {64, 48}, 0, "image"), whole), 0);
   bytes.resize(bytes.size() - 100);
   EXPECT_THAT(ErrorOf([&] {
-                ConvertDevicePicture(V4L2_PIX_FMT_MJPEG, bytes, {64, 48}, 0, "picture");
+                ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bytes, {64, 48}, 0, "image");
               }),
               HasSubstr("cannot be decoded"));
 }
 
-TEST(DevicePictures, InNv12TakeTheirColourFromTheSecondPlane) {
+TEST(DeviceImages, InNv12TakeTheirColourFromTheSecondPlane) {
   // Two rows of luma and one of interleaved chroma, two bytes of padding after each.
   std::vector<std::uint8_t> bytes = {100, 100, 100, 100, 0,   0,   100, 100, 100,
                                      100, 0,   0,   128, 128, 128, 240, 0,   0};
-  const cv::Mat picture = ConvertDevicePicture(V4L2_PIX_FMT_NV12, bytes, {4, 2}, 6, "picture");
-  ASSERT_EQ(picture.type(), CV_8UC3);
-  const auto grey = picture.at<cv::Vec3b>(1, 0), red = picture.at<cv::Vec3b>(1, 3);
+  const cv::Mat image = ConvertDeviceImage(V4L2_PIX_FMT_NV12, bytes, {4, 2}, 6, "image");
+  ASSERT_EQ(image.type(), CV_8UC3);
+  const auto grey = image.at<cv::Vec3b>(1, 0), red = image.at<cv::Vec3b>(1, 3);
   EXPECT_EQ(grey[0], grey[2]);
   EXPECT_GT(red[2], red[0] + 100);  // Cr above its middle is red
   bytes.resize(15);
   EXPECT_THAT(ErrorOf([&] {
-                ConvertDevicePicture(V4L2_PIX_FMT_NV12, bytes, {4, 2}, 6, "picture");
+                ConvertDeviceImage(V4L2_PIX_FMT_NV12, bytes, {4, 2}, 6, "image");
               }),
               HasSubstr("bytes"));
 }

@@ -18,24 +18,24 @@ using ::testing::HasSubstr;
 
 constexpr int kWidth = 64, kHeight = 48;
 
-// A picture that tells its number: as bright as it.
+// An image that tells its number: as bright as it.
 cv::Mat Numbered(int number) {
   return cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(10 * number + 5));
 }
 
-void WritePng(const std::filesystem::path& path, const cv::Mat& picture) {
+void WritePng(const std::filesystem::path& path, const cv::Mat& image) {
   std::filesystem::create_directories(path.parent_path());
-  ASSERT_TRUE(cv::imwrite(path.string(), picture));
+  ASSERT_TRUE(cv::imwrite(path.string(), image));
 }
 
 void WriteVideo(const std::filesystem::path& path, int count) {
   cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25,
                          cv::Size(kWidth, kHeight));
   ASSERT_TRUE(writer.isOpened());
-  cv::Mat picture;
+  cv::Mat image;
   for (int i = 0; i < count; ++i) {
-    cv::cvtColor(Numbered(i), picture, cv::COLOR_GRAY2BGR);
-    writer.write(picture);
+    cv::cvtColor(Numbered(i), image, cv::COLOR_GRAY2BGR);
+    writer.write(image);
   }
 }
 
@@ -49,7 +49,7 @@ class Cameras : public testing::Test {
  protected:
   static void SetUpTestSuite() { QuietDecoders(); }
 
-  // A TUM folder of three pictures.
+  // A TUM folder of three images.
   void MakeTum() {
     for (int i = 0; i < 3; ++i) WritePng(folder_ / ("rgb/" + std::to_string(i) + ".png"), Numbered(i));
     folder_.Write("rgb.txt",
@@ -74,8 +74,8 @@ TEST_F(Cameras, ReadTumFoldersWithExactTimes) {
   EXPECT_EQ(frames[0].time, Timestamp(1305031102175304001));
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(frames[static_cast<std::size_t>(i)].index, static_cast<std::uint64_t>(i));
-    EXPECT_EQ(frames[static_cast<std::size_t>(i)].picture.type(), CV_8UC1);
-    EXPECT_EQ(frames[static_cast<std::size_t>(i)].picture.at<std::uint8_t>(7, 7), 10 * i + 5);
+    EXPECT_EQ(frames[static_cast<std::size_t>(i)].image.type(), CV_8UC1);
+    EXPECT_EQ(frames[static_cast<std::size_t>(i)].image.at<std::uint8_t>(7, 7), 10 * i + 5);
   }
   engine::Frame more;
   EXPECT_FALSE(source->Next(&more));
@@ -93,14 +93,14 @@ TEST_F(Cameras, ReadEurocFoldersInNanoseconds) {
   }
 }
 
-TEST_F(Cameras, ReadNumberedPicturesInTheOrderOfTheirNumbers) {
+TEST_F(Cameras, ReadNumberedImagesInTheOrderOfTheirNumbers) {
   for (int i = 8; i <= 11; ++i) WritePng(folder_ / ("frame" + std::to_string(i) + ".png"), Numbered(i));
   CameraOptions options;
   options.image_fps = 10;
   const auto frames = ReadFrames(OpenCamera(folder_.path().string(), options).get());
   ASSERT_EQ(frames.size(), 4u);
   for (int i = 0; i < 4; ++i) {
-    EXPECT_EQ(frames[static_cast<std::size_t>(i)].picture.at<std::uint8_t>(0, 0), 10 * (i + 8) + 5);
+    EXPECT_EQ(frames[static_cast<std::size_t>(i)].image.at<std::uint8_t>(0, 0), 10 * (i + 8) + 5);
     EXPECT_EQ(frames[static_cast<std::size_t>(i)].time, std::chrono::milliseconds(100 * i));
   }
 }
@@ -113,7 +113,7 @@ TEST_F(Cameras, GiveVideosTheTimesOfTheirList) {
   EXPECT_EQ(frames[1].time, Timestamp(10'033'333'000));
   EXPECT_EQ(frames[3].time, std::chrono::seconds(11));
   for (int i = 0; i < 4; ++i) {
-    EXPECT_NEAR(frames[static_cast<std::size_t>(i)].picture.at<cv::Vec3b>(20, 20)[1], 10 * i + 5, 4);
+    EXPECT_NEAR(frames[static_cast<std::size_t>(i)].image.at<cv::Vec3b>(20, 20)[1], 10 * i + 5, 4);
   }
 }
 
@@ -132,7 +132,7 @@ TEST_F(Cameras, DeliverWhatCameBeforeAVideoBreaksOffAndThenSayWhere) {
   engine::Frame frame;
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(source->Next(&frame));
   EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }),
-              AllOf(HasSubstr("breaks off at picture 3"), HasSubstr("of the 5")));
+              AllOf(HasSubstr("breaks off at image 3"), HasSubstr("of the 5")));
   EXPECT_FALSE(source->Next(&frame));
 }
 
@@ -149,7 +149,7 @@ TEST_F(Cameras, SayThatACutOffVideoCannotBeOpened) {
   EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("video.mp4"), HasSubstr("cannot be opened")));
 }
 
-TEST_F(Cameras, SayWhenAPictureBreaksOff) {
+TEST_F(Cameras, SayWhenAnImageBreaksOff) {
   cv::Mat noise(kHeight, kWidth, CV_8UC3);
   cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 255);
   for (const char* name : {"rgb/0.jpg", "rgb/0.png"}) {
@@ -159,13 +159,13 @@ TEST_F(Cameras, SayWhenAPictureBreaksOff) {
     folder_.Write("rgb.txt", std::string("0 ") + name + "\n");
     EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr(name), HasSubstr("breaks off")));
   }
-  folder_.Write("rgb/0.png", "no picture at all");
+  folder_.Write("rgb/0.png", "no image at all");
   EXPECT_THAT(SentenceOfReading(), HasSubstr("cannot be decoded"));
   folder_.Write("rgb/0.png", "");
   EXPECT_THAT(SentenceOfReading(), HasSubstr("empty"));
 }
 
-TEST_F(Cameras, SayWhichPictureIsMissingOrOfAnotherSize) {
+TEST_F(Cameras, SayWhichImageIsMissingOrOfAnotherSize) {
   MakeTum();
   WritePng(folder_ / "rgb/1.png", cv::Mat(20, 20, CV_8UC1, cv::Scalar(0)));
   EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("rgb/1.png"), HasSubstr("20x20"), HasSubstr("64x48")));
@@ -182,7 +182,7 @@ TEST_F(Cameras, NameTheLineOfABadList) {
   folder_.Write("rgb.txt", "1\n");
   EXPECT_THAT(SentenceOfReading(), HasSubstr("line 1"));
   folder_.Write("rgb.txt", "# nothing\n");
-  EXPECT_THAT(SentenceOfReading(), HasSubstr("no pictures"));
+  EXPECT_THAT(SentenceOfReading(), HasSubstr("no images"));
 }
 
 TEST_F(Cameras, SayWhatIsNoSource) {
@@ -207,7 +207,7 @@ TEST_F(Cameras, CanBeClippedToAPart) {
   EXPECT_EQ(frames[2].time, std::chrono::milliseconds(400));
 }
 
-TEST_F(Cameras, CanBeginAtAnyPictureAsIfItWasTheFirst) {
+TEST_F(Cameras, CanBeginAtAnyImageAsIfItWasTheFirst) {
   for (int i = 0; i < 10; ++i) WritePng(folder_ / (std::to_string(i) + ".png"), Numbered(i));
   CameraOptions options;
   options.image_fps = 10;
@@ -222,7 +222,7 @@ TEST_F(Cameras, CanBeginAtAnyPictureAsIfItWasTheFirst) {
   EXPECT_EQ(frames[0].index, 0u);
   EXPECT_EQ(frames[3].index, 3u);
   EXPECT_EQ(frames[0].time, std::chrono::milliseconds(600)) << "the truth goes by the recording's times";
-  EXPECT_FALSE(frames[0].picture.empty());
+  EXPECT_FALSE(frames[0].image.empty());
   EXPECT_EQ(ReadFrames(window(6, 200).get()).size(), 2u) << "the end is left out";
   EXPECT_EQ(ReadFrames(window(0, 250).get()).size(), 3u);
   EXPECT_EQ(ReadFrames(window(8, 5000).get()).size(), 2u);

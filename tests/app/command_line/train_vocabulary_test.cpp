@@ -37,7 +37,7 @@ TEST(TrainingAVocabulary, WritesTheSameTreeEveryTime) {
   WriteSequence(*MakeSimulation("desks", options), (folder / "sequences") / "desks");
   for (const char* output : {"first", "again"}) {
     EXPECT_EQ(RunWords({"train-vocabulary", (folder / "sequences").string(), "--output",
-                        (folder / output).string(), "--pictures", "3"}),
+                        (folder / output).string(), "--images", "3"}),
               0);
   }
   EXPECT_EQ(Read(folder / "first"), Read(folder / "again"));

@@ -15,7 +15,7 @@ engine::TrackedFrame FrameOf(engine::TrackingState state, int milliseconds) {
   return frame;
 }
 
-TEST(CameraReport, TellsOfEachCameraHowLongItsPicturesTook) {
+TEST(CameraReport, TellsOfEachCameraHowLongItsImagesTook) {
   using engine::TrackingState;
   CameraTally hand("hand"), shoulder("/dev/video1");
   for (int i = 1; i <= 100; ++i) hand.Add(FrameOf(TrackingState::kSixDof, i));

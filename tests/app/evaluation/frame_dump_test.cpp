@@ -35,7 +35,7 @@ class FrameDump : public ::testing::Test {
       engine::Frame frame;
       frame.time = FromSeconds(i / 30.0);
       frame.index = static_cast<std::uint64_t>(i);
-      simulation_->Render(i, &frame.picture);
+      simulation_->Render(i, &frame.image);
       tracked_ = session_->Process(frame);
       if (tracked_.state == engine::TrackingState::kSixDof && tracked_.finite_points >= 50) return;
     }
@@ -87,9 +87,9 @@ TEST_F(FrameDump, DrawsThePointsWhereTheyAre) {
   WriteFrameDump(folder_.path(), 0, tracked_, inspection);
   for (const char* const name : {"frame-0-points.png", "frame-0-residuals.png"}) {
     const cv::Mat drawn = cv::imread((folder_.path() / name).string());
-    ASSERT_EQ(drawn.size(), tracked_.frame.picture.size()) << name;
+    ASSERT_EQ(drawn.size(), tracked_.frame.image.size()) << name;
     cv::Mat difference;
-    cv::absdiff(drawn, tracked_.frame.picture, difference);
+    cv::absdiff(drawn, tracked_.frame.image, difference);
     cv::Mat changed = cv::Mat::zeros(drawn.size(), CV_8UC1);
     for (int y = 0; y < drawn.rows; ++y)
       for (int x = 0; x < drawn.cols; ++x)
@@ -105,7 +105,7 @@ TEST_F(FrameDump, DrawsThePointsWhereTheyAre) {
     }
   }
   const cv::Mat corners = cv::imread((folder_.path() / "frame-0-corners.png").string());
-  EXPECT_EQ(corners.cols, tracked_.frame.picture.cols * 3 / 2);
+  EXPECT_EQ(corners.cols, tracked_.frame.image.cols * 3 / 2);
 }
 
 TEST_F(FrameDump, OfADroppedFrameSaysNoMore) {

@@ -57,11 +57,11 @@ std::unique_ptr<const Museum> MakeMuseum() {
   return museum;
 }
 
-// What a visitor's camera does to the picture that the author's took.
+// What a visitor's camera does to the image that the author's took.
 struct Change {
   const char* name;
   double angle_deg, scale;
-  double aside;  // of the picture's width
+  double aside;  // of the image's width
   bool thumbnails_fail;
   bool needs_both;  // neither thumbnails nor words alone are as often right with their first candidate
 };

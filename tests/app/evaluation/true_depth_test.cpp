@@ -14,7 +14,7 @@
 namespace docent::app {
 namespace {
 
-// A grid over the picture of a simulated camera.
+// A grid over the image of a simulated camera.
 std::vector<Eigen::Vector2f> Grid(const engine::CameraModel& camera) {
   std::vector<Eigen::Vector2f> pixels;
   for (int x = 1; x < 14; ++x) {

@@ -75,7 +75,7 @@ TEST(WorkingSet, AllRestWhenTheyAreToldTo) {
   const std::array<Thing, 3> things;
   set.Look(things[0]);
   set.Look(things[1]);
-  set.RestAll();
+  set.EvictAll();
   EXPECT_EQ(set.awake_bytes(), 0u);
   EXPECT_EQ(things[0].rests(), 1);
   EXPECT_EQ(things[1].rests(), 1);
@@ -109,11 +109,11 @@ TEST(WorkingSet, ThreadsMayLookAtTheSameThings) {
       });
     }
     threads.emplace_back([&] {
-      for (int i = 0; i < 200; ++i) set.RestAll();
+      for (int i = 0; i < 200; ++i) set.EvictAll();
     });
   }
   EXPECT_LE(set.awake_bytes(), 40u);
-  set.RestAll();
+  set.EvictAll();
   for (const Thing& thing : things) set.Look(thing);
   EXPECT_EQ(set.awake_bytes(), 40u);
 }

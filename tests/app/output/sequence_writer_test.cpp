@@ -18,7 +18,7 @@ TEST(SequenceWriter, WritesWhatTheCamerasRead) {
   const engine::CameraModel camera(engine::LensModel::kRadialTangential, {32, 24, 30, 30, 16, 12},
                                    {0.1, 0, 0, 0, 0});
   const engine::Rigid3 pose(engine::Rotation3::Exp({0.1, -0.2, 0.3}), {1, -2, 3});
-  SequenceWriter writer(folder.path(), camera, PictureFormat::kPng);
+  SequenceWriter writer(folder.path(), camera, ImageFormat::kPng);
   for (int i = 0; i < 3; ++i) {
     writer.Add(
         {Timestamp(i * 33'333'333LL), cv::Mat(24, 32, CV_8UC3, cv::Scalar(i, 50, 200)), pose, "general"});
@@ -32,7 +32,7 @@ TEST(SequenceWriter, WritesWhatTheCamerasRead) {
   for (int i = 0; i < 3; ++i) {
     ASSERT_TRUE(source->Next(&frame));
     EXPECT_EQ(frame.time, Timestamp(i * 33'333'333LL));
-    EXPECT_EQ(frame.picture.at<cv::Vec3b>(5, 5), cv::Vec3b(static_cast<std::uint8_t>(i), 50, 200));
+    EXPECT_EQ(frame.image.at<cv::Vec3b>(5, 5), cv::Vec3b(static_cast<std::uint8_t>(i), 50, 200));
   }
   EXPECT_FALSE(source->Next(&frame));
   const auto truth = ReadGroundTruth(*source->info().ground_truth_path);
@@ -43,7 +43,7 @@ TEST(SequenceWriter, WritesWhatTheCamerasRead) {
 
 TEST(SequenceWriter, ThatIsNotClosedLeavesNoSequence) {
   const TemporaryFolder folder;
-  { SequenceWriter(folder.path(), engine::CameraModel(), PictureFormat::kPng); }
+  { SequenceWriter(folder.path(), engine::CameraModel(), ImageFormat::kPng); }
   EXPECT_NE(ErrorOf([&] { OpenCamera(folder.path().string()); }), "");
 }
 

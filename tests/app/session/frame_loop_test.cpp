@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::ElementsAre;
 
-// A live source of black pictures; an entry without a picture is a moment of trouble.
+// A live source of black images; an entry without an image is a moment of trouble.
 class ScriptedSource : public FrameSource {
  public:
   struct Entry {
@@ -29,7 +29,7 @@ class ScriptedSource : public FrameSource {
     trouble_ = entry.trouble;
     frame->index = entry.index;
     frame->time = entry.time;
-    frame->picture = trouble_.empty() ? cv::Mat(cv::Mat::zeros(120, 160, CV_8UC1)) : cv::Mat();
+    frame->image = trouble_.empty() ? cv::Mat(cv::Mat::zeros(120, 160, CV_8UC1)) : cv::Mat();
     return true;
   }
   std::string trouble() const override { return trouble_; }
@@ -95,30 +95,30 @@ class SteppedClock : public PlayClock {
   Timestamp now_ = std::chrono::hours(5);
 };
 
-// A recording of black pictures, ten a second.
+// A recording of black images, ten a second.
 class Recording : public FrameSource {
  public:
-  explicit Recording(std::uint64_t pictures) : pictures_(pictures) {
+  explicit Recording(std::uint64_t images) : images_(images) {
     info_.name = "recording";
     info_.nominal_fps = 10;
     info_.known_camera = SimulatedCamera(160);
   }
   bool Next(engine::Frame* frame) override {
-    if (next_ == pictures_) return false;
+    if (next_ == images_) return false;
     frame->index = next_;
     frame->time = std::chrono::milliseconds(100) * next_++;
-    frame->picture = cv::Mat::zeros(120, 160, CV_8UC1);
+    frame->image = cv::Mat::zeros(120, 160, CV_8UC1);
     return true;
   }
 
  private:
-  const std::uint64_t pictures_;
+  const std::uint64_t images_;
   std::uint64_t next_ = 0;
 };
 
 TEST(FrameLoop, DropsAndCountsWhatIsOvertakenInRealtimeAndNeverQueuesIt) {
-  constexpr std::uint64_t kPictures = 40;
-  CalibratedCamera camera = Calibrate(std::make_unique<Recording>(kPictures), std::nullopt);
+  constexpr std::uint64_t kImages = 40;
+  CalibratedCamera camera = Calibrate(std::make_unique<Recording>(kImages), std::nullopt);
   SessionOptions options;
   options.may_write = false;
   Session session(options, {camera.model}, nullptr);
@@ -134,12 +134,12 @@ TEST(FrameLoop, DropsAndCountsWhatIsOvertakenInRealtimeAndNeverQueuesIt) {
               all.push_back(frame.frame.index);
               if (frame.state == kDropped) return dropped.push_back(frame.frame.index);
               tracked.push_back(frame.frame.index);
-              // Whoever looks on takes two and a half pictures' time for the first twenty, then next to none.
+              // Whoever looks on takes two and a half images' time for the first twenty, then next to none.
               clock.Pass(std::chrono::milliseconds(frame.frame.index < 20 ? 250 : 1));
             },
             {});
-  ASSERT_EQ(all.size(), kPictures) << "each is told of, once";
-  for (std::uint64_t i = 0; i < kPictures; ++i) EXPECT_EQ(all[i], i) << "and in its order";
+  ASSERT_EQ(all.size(), kImages) << "each is told of, once";
+  for (std::uint64_t i = 0; i < kImages; ++i) EXPECT_EQ(all[i], i) << "and in its order";
   // By hand: 0 ends at 250 ms, when the successor of 1 is due and that of 2 is not.
   EXPECT_THAT(std::vector(tracked.begin(), tracked.begin() + 4), ElementsAre(0u, 2u, 4u, 7u));
   EXPECT_EQ(dropped.size(), 13u);
@@ -147,22 +147,22 @@ TEST(FrameLoop, DropsAndCountsWhatIsOvertakenInRealtimeAndNeverQueuesIt) {
   ASSERT_EQ(latencies.size(), tracked.size());
   for (const Timestamp latency : latencies) {
     EXPECT_GE(latency, Timestamp{});
-    EXPECT_LE(latency, std::chrono::milliseconds(100)) << "what is tracked is the newest picture there is";
+    EXPECT_LE(latency, std::chrono::milliseconds(100)) << "what is tracked is the newest image there is";
   }
   EXPECT_EQ(latencies.back(), Timestamp{});
 }
 
-// Every picture takes its time to make; what comes too late need not be made.
+// Every image takes its time to make; what comes too late need not be made.
 class SlowRecording : public Recording {
  public:
-  SlowRecording(std::uint64_t pictures, SteppedClock* clock) : Recording(pictures), clock_(clock) {}
+  SlowRecording(std::uint64_t images, SteppedClock* clock) : Recording(images), clock_(clock) {}
   bool Next(engine::Frame* frame) override {
     clock_->Pass(std::chrono::milliseconds(250));
     return Recording::Next(frame);
   }
   bool NextLate(engine::Frame* frame) override {
     if (!Recording::Next(frame)) return false;
-    frame->picture.release();
+    frame->image.release();
     return true;
   }
 
@@ -170,7 +170,7 @@ class SlowRecording : public Recording {
   SteppedClock* const clock_;
 };
 
-TEST(FrameLoop, TracksWhatItCanInRealtimeOfPicturesThatAreSlowToMake) {
+TEST(FrameLoop, TracksWhatItCanInRealtimeOfImagesThatAreSlowToMake) {
   SteppedClock clock;
   CalibratedCamera camera = Calibrate(std::make_unique<SlowRecording>(30, &clock), std::nullopt);
   SessionOptions options;
@@ -190,11 +190,11 @@ TEST(FrameLoop, TracksWhatItCanInRealtimeOfPicturesThatAreSlowToMake) {
             {});
   ASSERT_EQ(all.size(), 30u);
   for (std::uint64_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i], i);
-  EXPECT_GE(tracked.size(), 11u) << "one picture can be made in the time of two and a half";
-  EXPECT_LE(oldest, std::chrono::milliseconds(350)) << "by making it, and by less than one picture";
+  EXPECT_GE(tracked.size(), 11u) << "one image can be made in the time of two and a half";
+  EXPECT_LE(oldest, std::chrono::milliseconds(350)) << "by making it, and by less than one image";
 }
 
-TEST(FrameLoop, TellsTheAgeOfALivePictureByItsOwnStamp) {
+TEST(FrameLoop, TellsTheAgeOfALiveImageByItsOwnStamp) {
   SteppedClock clock;
   const Timestamp taken = clock.Now() - std::chrono::milliseconds(30);
   CalibratedCamera camera = Calibrate(

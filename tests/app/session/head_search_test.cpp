@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera on a shoulder that can turn its head, in the simulated room: real pictures, the real tracker.
+// A camera on a shoulder that can turn its head, in the simulated room: real images, the real tracker.
 #include "app/session/head_search.h"
 
 #include <gmock/gmock.h>
@@ -40,7 +40,7 @@ class Room {
     session_options.threaded = false;
     session_options.first_map = "table";
     Session session(session_options, {camera_}, nullptr);
-    for (int i = 0; i < world_->frame_count(); ++i) session.Process(Picture(world_->world_from_camera(i), i));
+    for (int i = 0; i < world_->frame_count(); ++i) session.Process(Image(world_->world_from_camera(i), i));
     session.Finish();
     map_ = session.Maps().back().snapshot;
     index_.SetMap(kKey, map_);
@@ -54,11 +54,11 @@ class Room {
     const Eigen::Vector3d ahead = pose.rotation * Eigen::Vector3d::UnitZ();
     return {CarrierFromCamera({std::atan2(ahead.x(), ahead.z()), 0}), pose.translation};
   }
-  engine::Frame Picture(const Rigid3& world_from_camera, int number) const {
+  engine::Frame Image(const Rigid3& world_from_camera, int number) const {
     engine::Frame frame;
     frame.index = static_cast<std::uint64_t>(number);
     frame.time = FromSeconds(number / kFramesPerSecond);
-    world_->RenderFrom(world_from_camera, number, &frame.picture);
+    world_->RenderFrom(world_from_camera, number, &frame.image);
     return frame;
   }
   engine::Tracker NewTracker(std::uint64_t seed) const {
@@ -68,12 +68,12 @@ class Room {
     tracker.SetMap(map_, kKey);
     return tracker;
   }
-  // As the tracker says it, from pictures of the table.
+  // As the tracker says it, from images of the table.
   std::optional<Rigid3> CarrierFromMap() const {
     engine::Tracker tracker = NewTracker(1);
     const Rigid3 camera_from_carrier = world_->world_from_camera(0).inverse() * world_from_carrier();
     for (int i = 0; i < 5; ++i) {
-      const engine::TrackedFrame frame = tracker.Track(Picture(world_->world_from_camera(0), i), &index_);
+      const engine::TrackedFrame frame = tracker.Track(Image(world_->world_from_camera(0), i), &index_);
       if (engine::HasPose(frame.state)) return camera_from_carrier.inverse() * frame.camera_from_map;
     }
     return std::nullopt;
@@ -125,9 +125,9 @@ struct Loss {
 };
 
 // Seconds until the tracker knows where it is; a minute when it never does.
-template <typename Next, typename SawNothing>
+template <typename Next, typename AddEmptyView>
 double Find(const Room& room, const Loss& loss, std::uint64_t seed, const Next& next,
-            const SawNothing& saw_nothing) {
+            const AddEmptyView& saw_nothing) {
   engine::Tracker tracker = room.NewTracker(seed);
   HeadMotion motion(SimulatedHead::Range());
   motion.LookAt(loss.at, {});
@@ -137,7 +137,7 @@ double Find(const Room& room, const Loss& loss, std::uint64_t seed, const Next& 
     const Timestamp now = kStart + FromSeconds(i / kFramesPerSecond);
     const PanTilt at = motion.At(now);
     const Rigid3 turn(CarrierFromCamera(at), Eigen::Vector3d::Zero());
-    engine::Frame frame = room.Picture(loss.world_from_carrier * turn, i);
+    engine::Frame frame = room.Image(loss.world_from_carrier * turn, i);
     frame.time = now;
     if (engine::HasPose(tracker.Track(frame, &room.index()).state)) return i / kFramesPerSecond;
     saw_nothing(at);
@@ -168,7 +168,7 @@ TEST(HeadSearch, LooksFirstWhereTheMapWasAndThenElsewhere) {
   PanTilt at = first;
   double farthest = 0;
   for (int i = 0; i < 60; ++i) {
-    search.SawNothing(at);
+    search.AddEmptyView(at);
     at = search.Next(at);
     farthest = std::max(farthest, std::abs(at.pan_rad - first.pan_rad));
   }
@@ -194,7 +194,7 @@ TEST(HeadSearch, FindsTheMapInHalfTheTimeOfABlindSweep) {
     HeadSearch search(SimulatedHead::Range(), *room.camera(), *room.map(), *carrier_from_map);
     searched.push_back(Find(
         room, loss, 100 + static_cast<std::uint64_t>(i), [&](const PanTilt& at) { return search.Next(at); },
-        [&](const PanTilt& at) { search.SawNothing(at); }));
+        [&](const PanTilt& at) { search.AddEmptyView(at); }));
     BlindSweep sweep(SimulatedHead::Range(), loss.at);
     swept.push_back(Find(
         room, loss, 100 + static_cast<std::uint64_t>(i), [&](const PanTilt& at) { return sweep.Next(at); },
@@ -233,8 +233,8 @@ TEST(HeadControl, FollowsWhatTheOtherCameraLooksAt) {
   engine::TrackedFrame hand = Seen(room, 0, 1, Rigid3());
   const engine::MapPoint& looked_at = room.map()->points.front();
   hand.matches = {{looked_at.id, Eigen::Vector2f::Zero(), 0, true}};
-  control.Saw(hand);
-  control.Saw(Seen(room, 1, 1, *carrier_from_map));
+  control.AddView(hand);
+  control.AddView(Seen(room, 1, 1, *carrier_from_map));
   const PanTilt there = TowardPoint(*carrier_from_map, looked_at.position()), at = head.At(FromSeconds(10));
   EXPECT_NEAR(at.pan_rad, there.pan_rad, 1e-9);
   EXPECT_NEAR(at.tilt_rad, there.tilt_rad, 1e-9);
@@ -249,7 +249,7 @@ TEST(HeadControl, TurnsBackToTheMapAndLooksForItWhenLost) {
   head.LookAt({90 * kDegree, 0}, {});
   const PanTilt aside = head.At(FromSeconds(5));
   const Rigid3 camera_from_carrier(CarrierFromCamera(aside).inverse(), Eigen::Vector3d::Zero());
-  control.Saw(Seen(room, 0, 5, camera_from_carrier * *carrier_from_map));
+  control.AddView(Seen(room, 0, 5, camera_from_carrier * *carrier_from_map));
   EXPECT_LT(std::abs(head.At(FromSeconds(20)).pan_rad), 40 * kDegree);
   EXPECT_FALSE(control.searching());
   // Lost for a moment it waits, then it searches, also where it has not looked.
@@ -258,7 +258,7 @@ TEST(HeadControl, TurnsBackToTheMapAndLooksForItWhenLost) {
   double least = 10, most = -10;
   for (int i = 0; i < 150; ++i) {
     lost.frame.time = FromSeconds(5.15 + 0.1 * i);
-    control.Saw(lost);
+    control.AddView(lost);
     EXPECT_EQ(control.searching(), i >= 3) << i;
     least = std::min(least, head.At(lost.frame.time).pan_rad);
     most = std::max(most, head.At(lost.frame.time).pan_rad);

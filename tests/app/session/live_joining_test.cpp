@@ -29,8 +29,8 @@ class Detour : public FrameSource {
   }
   bool Next(engine::Frame* frame) override {
     if (next_ == order_.size()) return false;
-    simulation_->Render(order_[next_], &frame->picture);
-    frame->picture = frame->picture.clone();
+    simulation_->Render(order_[next_], &frame->image);
+    frame->image = frame->image.clone();
     frame->index = next_;
     frame->time = FromSeconds(static_cast<double>(next_) / 30);
     ++next_;
@@ -107,7 +107,7 @@ engine::Sim3 WorldFromMap(const Outcome& outcome, const Simulation& simulation, 
   return engine::AlignSim3(in_world, in_map).value();
 }
 
-// The walk with a signpost in either map, each in the middle of the picture of its frame.
+// The walk with a signpost in either map, each in the middle of the image of its frame.
 constexpr int kSignInFirst = 80, kSignInSecond = kSeen + 100;
 const Eigen::Vector2d kMiddle(160, 120);
 std::vector<TimedCommand> Signs() {

@@ -32,8 +32,8 @@ class TwoPlaces : public FrameSource {
       frame_ = 0;
     }
     if (part_ == order_.size()) return false;
-    order_[part_]->Render(frame_++, &frame->picture);
-    frame->picture = frame->picture.clone();
+    order_[part_]->Render(frame_++, &frame->image);
+    frame->image = frame->image.clone();
     frame->index = index_++;
     frame->time = FromSeconds(static_cast<double>(frame->index) / 30);
     return true;

@@ -19,19 +19,19 @@ using std::chrono::hours;
 using std::chrono::steady_clock;
 
 // Enough corners for a map to begin with.
-cv::Mat PictureOfBlocks() {
-  cv::Mat blocks(30, 40, CV_8UC1), picture;
+cv::Mat ImageOfBlocks() {
+  cv::Mat blocks(30, 40, CV_8UC1), image;
   cv::theRNG().state = 7;
   cv::randu(blocks, 0, 256);
-  cv::resize(blocks, picture, {}, 8, 8, cv::INTER_NEAREST);
-  return picture;
+  cv::resize(blocks, image, {}, 8, 8, cv::INTER_NEAREST);
+  return image;
 }
 
 engine::KeyFrameCandidate FirstKeyFrame() {
   engine::KeyFrameCandidate first;
   first.choice = engine::KeyFrameChoice::kFirst;
   first.camera = std::make_shared<engine::CameraModel>(SimulatedCamera(320));
-  first.features = engine::MakeFeatures(PictureOfBlocks());
+  first.features = engine::MakeFeatures(ImageOfBlocks());
   return first;
 }
 
@@ -40,22 +40,22 @@ class HeldMapper : public ::testing::Test {
  protected:
   HeldMapper() {
     mapping_.Adopt(1, nullptr);
-    mapping_.WaitUntilCalm(steady_clock::now() + hours(1), {});
+    mapping_.WaitUntilIdle(steady_clock::now() + hours(1), {});
     EXPECT_TRUE(mapping_.Resting());
     EXPECT_TRUE(mapping_.Offer(1, FirstKeyFrame(), {}));
     EXPECT_EQ(told_.get_future().wait_for(std::chrono::minutes(1)), std::future_status::ready);
   }
   ~HeldMapper() override {
-    if (!let_go_) LetGo();
+    if (!let_go_) Evict();
   }
-  void LetGo() {
+  void Evict() {
     let_go_ = true;
     go_.set_value();
   }
 
   std::promise<void> told_, go_;
   std::atomic<bool> let_go_ = false;
-  MappingThread mapping_{{}, true, [this](const MappingThread::News&) {
+  MappingThread mapping_{{}, true, [this](const MappingThread::MapperUpdate&) {
                            if (let_go_) return;
                            told_.set_value();
                            go_.get_future().wait();
@@ -63,13 +63,13 @@ class HeldMapper : public ::testing::Test {
 };
 
 TEST_F(HeldMapper, HoldsAFeederNoLongerThanTheCameraWouldWait) {
-  mapping_.WaitUntilCalm(steady_clock::now(), {});
+  mapping_.WaitUntilIdle(steady_clock::now(), {});
   EXPECT_FALSE(mapping_.Resting());
 }
 
 TEST_F(HeldMapper, HoldsAFeederThatIsFasterThanACameraUntilItRests) {
-  std::thread later([this] { LetGo(); });
-  mapping_.WaitUntilCalm(steady_clock::now() + hours(1), {});
+  std::thread later([this] { Evict(); });
+  mapping_.WaitUntilIdle(steady_clock::now() + hours(1), {});
   EXPECT_TRUE(let_go_);
   EXPECT_TRUE(mapping_.Resting());
   later.join();
@@ -81,8 +81,8 @@ TEST_F(HeldMapper, HoldsAFeederThatIsAWholeKeyFrameAheadHoweverLong) {
   third.time = FromSeconds(2);
   ASSERT_TRUE(mapping_.Offer(1, second, {}));
   ASSERT_TRUE(mapping_.Offer(1, third, {}));
-  std::thread later([this] { LetGo(); });
-  mapping_.WaitUntilCalm(steady_clock::now(), {});
+  std::thread later([this] { Evict(); });
+  mapping_.WaitUntilIdle(steady_clock::now(), {});
   EXPECT_TRUE(let_go_);
   later.join();
 }
@@ -90,7 +90,7 @@ TEST_F(HeldMapper, HoldsAFeederThatIsAWholeKeyFrameAheadHoweverLong) {
 TEST_F(HeldMapper, LetsAFeederGoThatIsToldToStop) {
   std::stop_source stop;
   stop.request_stop();
-  mapping_.WaitUntilCalm(steady_clock::now() + hours(1), stop.get_token());
+  mapping_.WaitUntilIdle(steady_clock::now() + hours(1), stop.get_token());
   EXPECT_FALSE(mapping_.Resting());
 }
 

@@ -26,22 +26,22 @@ class Film {
     options.frame_rate_hz = kFramesASecond;
     options.duration_s = 4;
     const auto simulation = MakeSimulation("hand", options);
-    for (int i = 0; i < simulation->frame_count(); ++i) simulation->Render(i, &pictures_.emplace_back());
+    for (int i = 0; i < simulation->frame_count(); ++i) simulation->Render(i, &images_.emplace_back());
     camera_ = std::make_shared<CameraModel>(simulation->camera());
   }
   engine::Frame At(std::uint64_t index) const {
-    const std::uint64_t length = pictures_.size(), turn = index % (2 * length);
+    const std::uint64_t length = images_.size(), turn = index % (2 * length);
     engine::Frame frame;
     frame.index = index;
     frame.time = FromSeconds(static_cast<double>(index) / kFramesASecond);
-    frame.picture = pictures_[turn < length ? turn : 2 * length - 1 - turn];
+    frame.image = images_[turn < length ? turn : 2 * length - 1 - turn];
     return frame;
   }
-  std::uint64_t length() const { return pictures_.size(); }
+  std::uint64_t length() const { return images_.size(); }
   const std::shared_ptr<const CameraModel>& camera() const { return camera_; }
 
  private:
-  std::vector<cv::Mat> pictures_;
+  std::vector<cv::Mat> images_;
   std::shared_ptr<const CameraModel> camera_;
 };
 

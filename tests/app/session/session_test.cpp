@@ -106,8 +106,8 @@ TEST(Session, NeverSavesAMapOfDirectionsAlone) {
   for (const Event& event : session.TakeEvents()) EXPECT_NE(event.event, "save") << event.detail;
 }
 
-// The next picture is as good as the one that was lost: nobody waits a second for it.
-TEST(Session, BeginsAnewWithTheNextPictureWhenTheFirstIsLost) {
+// The next image is as good as the one that was lost: nobody waits a second for it.
+TEST(Session, BeginsAnewWithTheNextImageWhenTheFirstIsLost) {
   const auto simulation = Room(1);
   const auto source = OpenSimulation(simulation);
   engine::Frame first;
@@ -120,7 +120,7 @@ TEST(Session, BeginsAnewWithTheNextPictureWhenTheFirstIsLost) {
     frame.index = index;
     frame.time = FromSeconds(static_cast<double>(index) / 30);
     const bool dark = index >= 3 && index < 10;
-    if (dark) frame.picture = cv::Mat(first.picture.size(), first.picture.type(), cv::Scalar::all(0));
+    if (dark) frame.image = cv::Mat(first.image.size(), first.image.type(), cv::Scalar::all(0));
     return frame;
   };
   std::vector<engine::TrackingState> states;
@@ -306,7 +306,7 @@ TEST(Session, SaysInTheEndWhatCouldNotBeSavedAndKeepsWhatWas) {
   EXPECT_GE(library.Load(library.FindByName("Desk").key).snapshot->keyframes.size(), 2u);
 }
 
-TEST(SurfaceAtPixel, FindsUpwardsAgainstTheLowerEdgeOfThePictures) {
+TEST(SurfaceAtPixel, FindsUpwardsAgainstTheLowerEdgeOfTheImages) {
   engine::MapSnapshot map;
   const engine::Rotation3 tilt = engine::Rotation3::Exp({0.3, 0, 0});
   for (const double sign : {-1.0, 1.0}) {

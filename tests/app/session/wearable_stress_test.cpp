@@ -20,10 +20,10 @@ namespace {
 using engine::CameraModel;
 using engine::LensModel;
 
-// Pictures of a walk, painted once and used by every session.
+// Images of a walk, painted once and used by every session.
 struct Film {
   CameraModel camera;
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
 };
 
 Film Shoot(const std::string& scene, const CameraModel& camera) {
@@ -33,15 +33,15 @@ Film Shoot(const std::string& scene, const CameraModel& camera) {
   options.duration_s = 4;
   const auto simulation = MakeSimulation(scene, options);
   Film film{camera, {}};
-  for (int i = 0; i < simulation->frame_count(); ++i) simulation->Render(i, &film.pictures.emplace_back());
+  for (int i = 0; i < simulation->frame_count(); ++i) simulation->Render(i, &film.images.emplace_back());
   return film;
 }
 
-// A device that somebody unplugs now and then: for a while it has no pictures and says why, then it is back.
+// A device that somebody unplugs now and then: for a while it has no images and says why, then it is back.
 class ShakySource : public FrameSource {
  public:
-  ShakySource(const Film* film, std::uint64_t seed, int pictures)
-      : film_(film), random_(seed), pictures_(pictures) {
+  ShakySource(const Film* film, std::uint64_t seed, int images)
+      : film_(film), random_(seed), images_(images) {
     info_.name = "shaky";
     info_.live = true;
     info_.nominal_fps = 15;
@@ -49,7 +49,7 @@ class ShakySource : public FrameSource {
   }
 
   bool Next(engine::Frame* frame) override {
-    if (index_ >= static_cast<std::uint64_t>(pictures_)) return false;
+    if (index_ >= static_cast<std::uint64_t>(images_)) return false;
     ++tick_;
     frame->time = FromSeconds(tick_ / 15.0);
     if (away_ == 0 && random_.Uniform(0, 1) < 0.03) away_ = 1 + static_cast<int>(random_.Uniform(0, 12));
@@ -60,8 +60,8 @@ class ShakySource : public FrameSource {
     }
     if (random_.Uniform(0, 1) < 0.05) index_ += 2;  // the driver had no buffer
     // Forth and back through the film.
-    const std::uint64_t length = film_->pictures.size(), turn = index_ % (2 * length);
-    frame->picture = film_->pictures[turn < length ? turn : 2 * length - 1 - turn];
+    const std::uint64_t length = film_->images.size(), turn = index_ % (2 * length);
+    frame->image = film_->images[turn < length ? turn : 2 * length - 1 - turn];
     frame->index = index_++;
     return true;
   }
@@ -70,7 +70,7 @@ class ShakySource : public FrameSource {
  private:
   const Film* const film_;
   Random random_;
-  const int pictures_;
+  const int images_;
   std::uint64_t index_ = 0;
   int tick_ = 0, away_ = 0;
 };
@@ -81,10 +81,10 @@ struct Tally {
 
 void RunOneSession(const Film films[2], Random* random, Tally* tally) {
   CalibratedCamera cameras[2];
-  const int pictures = 20 + static_cast<int>(random->Uniform(0, 100));
+  const int images = 20 + static_cast<int>(random->Uniform(0, 100));
   for (int i = 0; i < 2; ++i) {
     cameras[i] =
-        Calibrate(std::make_unique<ShakySource>(&films[i], random->Next(), pictures + 10 * i), std::nullopt);
+        Calibrate(std::make_unique<ShakySource>(&films[i], random->Next(), images + 10 * i), std::nullopt);
   }
   SessionOptions options;
   options.tracker.hybrid = random->Uniform(0, 1) < 0.5;
@@ -92,7 +92,7 @@ void RunOneSession(const Film films[2], Random* random, Tally* tally) {
   options.seed = random->Next();
   Session session(options, {cameras[0].model, cameras[1].model}, nullptr);
   std::stop_source stop;
-  const int stop_after = random->Uniform(0, 1) < 0.4 ? static_cast<int>(random->Uniform(1, pictures)) : -1;
+  const int stop_after = random->Uniform(0, 1) < 0.4 ? static_cast<int>(random->Uniform(1, images)) : -1;
   CommandInbox inbox;
   std::vector<CameraRun> runs(2);
   std::atomic<int> shown = 0;

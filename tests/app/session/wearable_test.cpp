@@ -62,7 +62,7 @@ Walk Take(const std::string& hand, const std::string& shoulder, double seconds, 
     runs[i].options.pace = pace;
     runs[i].shown = [&walk, i](const engine::TrackedFrame& frame) {
       walk.frames[i].push_back(frame);
-      walk.frames[i].back().frame.picture.release();
+      walk.frames[i].back().frame.image.release();
     };
   }
   RunCameras(runs, &session, {});
@@ -170,7 +170,7 @@ void MapScene(const std::string& name, const Simulation& simulation, maps::Libra
     engine::Frame frame;
     frame.time = simulation.time(i);
     frame.index = static_cast<std::uint64_t>(i);
-    simulation.Render(i, &frame.picture);
+    simulation.Render(i, &frame.image);
     session.Process(frame);
   }
   session.Finish();
@@ -182,7 +182,7 @@ class Tourists {
   Tourists(std::shared_ptr<const engine::CameraModel> lens, maps::Library* library)
       : session_(Options(), {lens, lens}, library) {}
 
-  // Each camera is shown its picture, the same again and again; -> the map in which each is then tracked.
+  // Each camera is shown its image, the same again and again; -> the map in which each is then tracked.
   using MapNamesOfBoth = std::pair<std::string, std::string>;
   MapNamesOfBoth Look(const cv::Mat& first, const cv::Mat& second, int times = 25) {
     std::string names[2];
@@ -193,7 +193,7 @@ class Tourists {
         frame.time = time_;
         frame.index = index_;
         frame.camera = camera;
-        frame.picture = camera == 0 ? first : second;
+        frame.image = camera == 0 ? first : second;
         const engine::TrackedFrame tracked = session_.Process(frame);
         names[camera] = session_.ShownWith(tracked).map_name;
         if (!engine::HasPose(tracked.state)) names[camera] = "lost";
@@ -222,7 +222,7 @@ class Tourists {
   std::set<std::pair<int, std::string>> seen_;
 };
 
-// ptamm Fig. 7 and §3.3, step by step, with pictures.
+// ptamm Fig. 7 and §3.3, step by step, with images.
 TEST(Wearable, SearchesAndIsCalledTogetherByTheRulesOfAssociatedCameras) {
   const TemporaryFolder folder;
   maps::Library library =
@@ -234,12 +234,12 @@ TEST(Wearable, SearchesAndIsCalledTogetherByTheRulesOfAssociatedCameras) {
   const auto room = MakeSimulation("room", options), desk = MakeSimulation("desks", options);
   MapScene("room", *room, &library);
   MapScene("desk", *desk, &library);
-  const auto picture = [](const Simulation& simulation) {
+  const auto image = [](const Simulation& simulation) {
     cv::Mat bgr;
     simulation.Render(simulation.frame_count() - 10, &bgr);
     return bgr;
   };
-  const cv::Mat of_room = picture(*room), of_desk = picture(*desk);
+  const cv::Mat of_room = image(*room), of_desk = image(*desk);
   const cv::Mat dark = cv::Mat::zeros(of_room.size(), of_room.type());
   Tourists cameras(std::make_shared<engine::CameraModel>(room->camera()), &library);
   using Both = Tourists::MapNamesOfBoth;

@@ -74,23 +74,23 @@ double TrueEdge(double time_s) {
 TEST(RollingShutter, SlantsAnEdgeByThePanRateTimesTheReadout) {
   constexpr double kReadout_s = 0.03;
   const Simulation simulation = Panned({.readout_s = kReadout_s});
-  cv::Mat picture;
-  simulation.Render(15, &picture);  // at half a second
+  cv::Mat image;
+  simulation.Render(15, &image);  // at half a second
   for (int row = 0; row < 240; ++row)
-    EXPECT_NEAR(EdgeIn(picture, row), TrueEdge(0.5 + kReadout_s * ((row + 0.5) / 240 - 0.5)), 0.3) << row;
-  const double slant = EdgeIn(picture, 0) - EdgeIn(picture, 239);
+    EXPECT_NEAR(EdgeIn(image, row), TrueEdge(0.5 + kReadout_s * ((row + 0.5) / 240 - 0.5)), 0.3) << row;
+  const double slant = EdgeIn(image, 0) - EdgeIn(image, 239);
   EXPECT_NEAR(slant, 200 * kPanRate * kReadout_s * 239 / 240, 0.3);
-  EXPECT_NEAR(EdgeIn(picture, 120), TrueEdge(0.5), 0.3) << "the time of the image is that of its middle row";
+  EXPECT_NEAR(EdgeIn(image, 120), TrueEdge(0.5), 0.3) << "the time of the image is that of its middle row";
 }
 
 TEST(RollingShutter, KeepsTheTruthOfTheMiddleRow) {
   const Simulation rolling = Panned({.readout_s = 0.03}), global = Panned({});
   EXPECT_TRUE(engine::IsNear(rolling.world_from_camera(15), global.world_from_camera(15), 1e-12, 1e-12));
   // A pixel shows what its own row saw: the wall straight ahead of the edge's pixel is the edge.
-  cv::Mat picture;
-  rolling.Render(15, &picture);
+  cv::Mat image;
+  rolling.Render(15, &image);
   for (const int row : {5, 120, 235}) {
-    const auto point = rolling.SurfaceAt(15, {EdgeIn(picture, row), static_cast<double>(row)});
+    const auto point = rolling.SurfaceAt(15, {EdgeIn(image, row), static_cast<double>(row)});
     ASSERT_TRUE(point);
     EXPECT_NEAR(point->x(), 0, 0.006) << "metres; a third of a pixel is 5 mm there";
   }
@@ -116,8 +116,8 @@ TEST(RollingShutter, ShowsEachRowAsAnImageFromItsOwnPoseDoes) {
   const auto simulation = MakeSimulation("room", options);
   const Scene scene = BuildRoom({.seed = options.seed});
   const SurfaceRenderer renderer(&scene.surfaces, simulation->camera());
-  cv::Mat picture, whole;
-  simulation->Render(45, &picture);
+  cv::Mat image, whole;
+  simulation->Render(45, &image);
   for (const int row : {3, 150, 301, 476}) {
     const double offset_s = 0.03 * ((row + 0.5) / 480 - 0.5) + (row % 2) / 60.0;
     const engine::Rigid3 pose = scene.trajectory.WorldFromCamera(45 / 30.0 + offset_s);
@@ -125,17 +125,17 @@ TEST(RollingShutter, ShowsEachRowAsAnImageFromItsOwnPoseDoes) {
     // The rims of things are averaged over a pixel and see the rows beside them.
     int differing = 0;
     for (int x = 0; x < 640; ++x)
-      differing += picture.at<cv::Vec3b>(row, x) != whole.at<cv::Vec3b>(row, x) ? 1 : 0;
+      differing += image.at<cv::Vec3b>(row, x) != whole.at<cv::Vec3b>(row, x) ? 1 : 0;
     EXPECT_LT(differing, 32) << "row " << row;
   }
 }
 
 TEST(Interlacing, ShowsOddRowsHalfAFrameLater) {
   const Simulation simulation = Panned({.interlaced = true});
-  cv::Mat picture;
-  simulation.Render(15, &picture);
+  cv::Mat image;
+  simulation.Render(15, &image);
   for (int row = 0; row < 240; ++row)
-    EXPECT_NEAR(EdgeIn(picture, row), TrueEdge(0.5 + (row % 2) / 60.0), 0.3) << row;
+    EXPECT_NEAR(EdgeIn(image, row), TrueEdge(0.5 + (row % 2) / 60.0), 0.3) << row;
 }
 
 TEST(CalibrationError, ChangesTheCalibrationAndNotTheLens) {
@@ -194,7 +194,7 @@ TEST(FrameDrops, LeaveTimesAndPosesTrue) {
   options.camera = SimulatedCamera(160);
   const auto whole = MakeSimulation("room", options), lossy = MakeSimulation("room,drops=30", options);
   ASSERT_LT(lossy->frame_count(), whole->frame_count());
-  cv::Mat picture, expected;
+  cv::Mat image, expected;
   for (int frame = 0; frame < lossy->frame_count(); ++frame) {
     const auto original = static_cast<int>(std::lround(ToSeconds(lossy->time(frame)) * 30));
     EXPECT_EQ(lossy->time(frame), whole->time(original));
@@ -202,9 +202,9 @@ TEST(FrameDrops, LeaveTimesAndPosesTrue) {
     EXPECT_TRUE(
         engine::IsNear(lossy->world_from_camera(frame), whole->world_from_camera(original), 1e-12, 1e-12));
     if (frame % 100 != 50) continue;
-    lossy->Render(frame, &picture);
+    lossy->Render(frame, &image);
     whole->Render(original, &expected);
-    EXPECT_EQ(cv::norm(picture, expected, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(image, expected, cv::NORM_INF), 0);
   }
 }
 
@@ -243,10 +243,10 @@ TEST(Sensor, HasNoiseWhoseVarianceGrowsWithSignalAndGain) {
   const auto variance = [](double light, double gain, double constant_sigma) {
     const Sensor sensor(
         {.size = {640, 480}, .noise_sigma = constant_sigma, .gain = gain, .gain_noise_sigma = 4});
-    cv::Mat picture(480, 640, CV_8UC3, cv::Scalar::all(light));
-    sensor.Apply(0, 0, &picture);
+    cv::Mat image(480, 640, CV_8UC3, cv::Scalar::all(light));
+    sensor.Apply(0, 0, &image);
     cv::Scalar mean, deviation;
-    cv::meanStdDev(picture, mean, deviation);
+    cv::meanStdDev(image, mean, deviation);
     EXPECT_NEAR(mean[1], light * gain, 0.1);
     return deviation[1] * deviation[1] - 1.0 / 12;
   };
@@ -318,10 +318,10 @@ TEST(HandTremor, IsPartOfTheTruth) {
   EXPECT_GT(largest, 0.5 * kDegree);
   EXPECT_LT(largest, 4 * kDegree);
   // The image is the one from the true pose.
-  cv::Mat picture, from_truth;
-  trembling->Render(7, &picture);
+  cv::Mat image, from_truth;
+  trembling->Render(7, &image);
   steady->RenderFrom(trembling->world_from_camera(7), 7, &from_truth);
-  EXPECT_EQ(cv::norm(picture, from_truth, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(image, from_truth, cv::NORM_INF), 0);
 }
 
 TEST(HandTremor, DiffersBetweenTheCamerasOfOnePerson) {

@@ -16,9 +16,9 @@ cv::Mat Grey(cv::Size size) {
 
 TEST(Sensor, LeavesTheLightAloneWithoutFaults) {
   const Sensor sensor({.size = {64, 48}});
-  cv::Mat picture = Grey({64, 48});
-  sensor.Apply(3, 1.5, &picture);
-  EXPECT_EQ(cv::norm(picture, Grey({64, 48}), cv::NORM_INF), 0);
+  cv::Mat image = Grey({64, 48});
+  sensor.Apply(3, 1.5, &image);
+  EXPECT_EQ(cv::norm(image, Grey({64, 48}), cv::NORM_INF), 0);
 }
 
 TEST(Sensor, AddsNoiseOfTheGivenStrengthThatDiffersFromFrameToFrame) {
@@ -41,11 +41,11 @@ TEST(Sensor, AddsNoiseOfTheGivenStrengthThatDiffersFromFrameToFrame) {
 
 TEST(Sensor, DarkensTheCornersAndNotTheMiddle) {
   const Sensor sensor({.size = {65, 49}, .vignetting = 0.4});
-  cv::Mat picture = Grey({65, 49});
-  sensor.Apply(0, 0, &picture);
-  EXPECT_EQ(picture.at<cv::Vec3b>(24, 32)[0], 120);
-  EXPECT_NEAR(picture.at<cv::Vec3b>(0, 0)[0], 72, 1);
-  EXPECT_NEAR(picture.at<cv::Vec3b>(48, 64)[2], 72, 1);
+  cv::Mat image = Grey({65, 49});
+  sensor.Apply(0, 0, &image);
+  EXPECT_EQ(image.at<cv::Vec3b>(24, 32)[0], 120);
+  EXPECT_NEAR(image.at<cv::Vec3b>(0, 0)[0], 72, 1);
+  EXPECT_NEAR(image.at<cv::Vec3b>(48, 64)[2], 72, 1);
 }
 
 TEST(Sensor, LetsTheExposureWanderSlowly) {
@@ -57,9 +57,9 @@ TEST(Sensor, LetsTheExposureWanderSlowly) {
     highest = std::max(highest, gain);
     largest_step = std::max(largest_step, std::abs(gain - sensor.Gain((i + 1) / 30.0)));
     if (i % 100 != 0) continue;
-    cv::Mat picture = Grey({32, 32});
-    sensor.Apply(i, i / 30.0, &picture);
-    EXPECT_NEAR(picture.at<cv::Vec3b>(5, 5)[1], 120 * gain, 0.6);
+    cv::Mat image = Grey({32, 32});
+    sensor.Apply(i, i / 30.0, &image);
+    EXPECT_NEAR(image.at<cv::Vec3b>(5, 5)[1], 120 * gain, 0.6);
   }
   EXPECT_LT(lowest, 0.95);
   EXPECT_GT(highest, 1.05);

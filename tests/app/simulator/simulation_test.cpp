@@ -29,7 +29,7 @@ SimulationOptions SmallAndClean() {
   return options;
 }
 
-bool SamePicture(const cv::Mat& a, const cv::Mat& b) {
+bool SameImage(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
 }
 
@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(Simulation, EveryScene,
                            return name.substr(0, name.find(':'));
                          });
 
-// The truth and the pictures belong together: what frame i shows at a pixel, frame j shows where the truth
+// The truth and the images belong together: what frame i shows at a pixel, frame j shows where the truth
 // says. A truth that is two pixels off must fit worse.
 TEST_P(EveryScene, ShowsTheSamePointInTwoFramesWhereTheTruthSays) {
   const auto simulation = MakeSimulation(GetParam(), SmallAndClean());
@@ -77,11 +77,11 @@ TEST_P(EveryScene, ShowsTheSamePointInTwoFramesWhereTheTruthSays) {
   int compared = 0;
   for (int i = 5; i + step < simulation->frame_count(); i += simulation->frame_count() / 4) {
     const int j = i + step;
-    cv::Mat picture_i, picture_j, grey_i, grey_j;
-    simulation->Render(i, &picture_i);
-    simulation->Render(j, &picture_j);
-    cv::cvtColor(picture_i, grey_i, cv::COLOR_BGR2GRAY);
-    cv::cvtColor(picture_j, grey_j, cv::COLOR_BGR2GRAY);
+    cv::Mat image_i, image_j, grey_i, grey_j;
+    simulation->Render(i, &image_i);
+    simulation->Render(j, &image_j);
+    cv::cvtColor(image_i, grey_i, cv::COLOR_BGR2GRAY);
+    cv::cvtColor(image_j, grey_j, cv::COLOR_BGR2GRAY);
     for (int y = 12; y < camera.height_px() - 12; y += 9) {
       for (int x = 12; x < camera.width_px() - 12; x += 9) {
         const auto point = simulation->SurfaceAt(i, {x, y});
@@ -108,22 +108,23 @@ TEST_P(EveryScene, IsTheSameToTheByteForTheSameSeedAndAnotherForAnother) {
   const auto simulation = MakeSimulation(GetParam(), options);
   simulation->Render(0, &again);
   simulation->Render(7, &first);
-  const auto twin = MakeSimulation(GetParam(), options);
-  twin->Render(7, &again);
-  EXPECT_TRUE(SamePicture(first, again)) << "a picture must not depend on what was rendered before";
-  EXPECT_TRUE(engine::IsNear(simulation->world_from_camera(7), twin->world_from_camera(7), 1e-12, 1e-12));
+  const auto duplicate = MakeSimulation(GetParam(), options);
+  duplicate->Render(7, &again);
+  EXPECT_TRUE(SameImage(first, again)) << "an image must not depend on what was rendered before";
+  EXPECT_TRUE(
+      engine::IsNear(simulation->world_from_camera(7), duplicate->world_from_camera(7), 1e-12, 1e-12));
   options.seed = 2;
   MakeSimulation(GetParam(), options)->Render(7, &other);
-  EXPECT_FALSE(SamePicture(first, other));
+  EXPECT_FALSE(SameImage(first, other));
 }
 
-TEST_P(EveryScene, IsRichInCornersAtEveryScaleAndEverywhereInThePicture) {
+TEST_P(EveryScene, IsRichInCornersAtEveryScaleAndEverywhereInTheImage) {
   const auto simulation = MakeSimulation(GetParam(), SimulationOptions{});
   for (int part = 0; part < 5; ++part) {
     const int frame = (simulation->frame_count() - 1) * part / 4;
-    cv::Mat picture, grey;
-    simulation->Render(frame, &picture);
-    cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+    cv::Mat image, grey;
+    simulation->Render(frame, &image);
+    cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
     constexpr int kFewest[] = {700, 400, 150, 50};
     for (int level = 0; level < 4; ++level) {
       std::vector<cv::KeyPoint> corners;
@@ -157,16 +158,16 @@ TEST_P(EveryScene, MovesNoFasterThanAPersonAndHasALabelAndAPlace) {
   EXPECT_LT(quickest_turn, 2.6) << "radians a second";
 }
 
-TEST_P(EveryScene, IsPictureFilling) {
+TEST_P(EveryScene, IsImageFilling) {
   const auto simulation = MakeSimulation(GetParam(), SmallAndClean());
-  cv::Mat picture;
+  cv::Mat image;
   for (int part = 0; part < 4; ++part) {
     const int frame = (simulation->frame_count() - 1) * part / 3;
-    simulation->Render(frame, &picture);
-    ASSERT_EQ(picture.type(), CV_8UC3);
-    ASSERT_EQ(picture.size(), cv::Size(320, 240));
+    simulation->Render(frame, &image);
+    ASSERT_EQ(image.type(), CV_8UC3);
+    ASSERT_EQ(image.size(), cv::Size(320, 240));
     int black = 0;
-    for (auto pixel = picture.begin<cv::Vec3b>(); pixel != picture.end<cv::Vec3b>(); ++pixel) {
+    for (auto pixel = image.begin<cv::Vec3b>(); pixel != image.end<cv::Vec3b>(); ++pixel) {
       black += *pixel == cv::Vec3b() ? 1 : 0;
     }
     EXPECT_LT(black, 320 * 240 / 100) << "black pixels of frame " << frame;
@@ -308,20 +309,19 @@ TEST(Simulation, BlursAlongTheMotionAndKeepsTheMiddleOfTheExposure) {
   options.blur_samples = 12;
   options.exposure_s = 0.1;
   const auto blurred = MakeSimulation("room", options);
-  cv::Mat sharp_picture, blurred_picture, edges;
-  sharp->Render(8, &sharp_picture);
-  blurred->Render(8, &blurred_picture);
-  const auto detail = [&](const cv::Mat& picture) {
-    cv::Laplacian(picture, edges, CV_32F);
+  cv::Mat sharp_image, blurred_image, edges;
+  sharp->Render(8, &sharp_image);
+  blurred->Render(8, &blurred_image);
+  const auto detail = [&](const cv::Mat& image) {
+    cv::Laplacian(image, edges, CV_32F);
     return cv::norm(edges, cv::NORM_L1);
   };
-  EXPECT_LT(detail(blurred_picture), 0.8 * detail(sharp_picture));
+  EXPECT_LT(detail(blurred_image), 0.8 * detail(sharp_image));
   // Smoothed alike, the two agree: nothing has been shifted.
-  cv::GaussianBlur(sharp_picture, sharp_picture, {0, 0}, 4);
-  cv::GaussianBlur(blurred_picture, blurred_picture, {0, 0}, 4);
-  EXPECT_LT(
-      cv::norm(sharp_picture, blurred_picture, cv::NORM_L1) / static_cast<double>(3 * sharp_picture.total()),
-      1.5);
+  cv::GaussianBlur(sharp_image, sharp_image, {0, 0}, 4);
+  cv::GaussianBlur(blurred_image, blurred_image, {0, 0}, 4);
+  EXPECT_LT(cv::norm(sharp_image, blurred_image, cv::NORM_L1) / static_cast<double>(3 * sharp_image.total()),
+            1.5);
 }
 
 TEST(Simulation, CountsFramesFromTheRateAndTheDuration) {
@@ -367,16 +367,16 @@ TEST(Simulation, SaysWhatIsWrongWithOptions) {
   EXPECT_THAT(fault([](auto& options) { options.camera = SimulatedCamera(9000); }), HasSubstr("8192"));
 }
 
-TEST(Simulation, ReportsHowLongAPictureTakes) {
+TEST(Simulation, ReportsHowLongAnImageTakes) {
   const auto simulation = MakeSimulation("museum:2");
-  cv::Mat picture;
-  simulation->Render(0, &picture);
+  cv::Mat image;
+  simulation->Render(0, &image);
   const auto start = std::chrono::steady_clock::now();
-  constexpr int kPictures = 10;
-  for (int i = 0; i < kPictures; ++i) simulation->Render(i * 20, &picture);
+  constexpr int kImages = 10;
+  for (int i = 0; i < kImages; ++i) simulation->Render(i * 20, &image);
   const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - start;
-  RecordProperty("milliseconds_per_picture", std::to_string(taken.count() / kPictures));
-  EXPECT_EQ(picture.size(), cv::Size(640, 480));
+  RecordProperty("milliseconds_per_image", std::to_string(taken.count() / kImages));
+  EXPECT_EQ(image.size(), cv::Size(640, 480));
 }
 
 }  // namespace

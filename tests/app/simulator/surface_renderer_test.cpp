@@ -42,29 +42,29 @@ MarkedWall MakeMarkedWall() {
   constexpr double kWidth = 4, kHeight = 3;
   constexpr int kTexels = 1024, kHalfMarker = 8;
   MarkedWall wall;
-  cv::Mat picture(kTexels, kTexels, CV_8UC3, cv::Scalar::all(10));
+  cv::Mat image(kTexels, kTexels, CV_8UC3, cv::Scalar::all(10));
   for (int row = 0; row < 12; ++row) {
     for (int column = 0; column < 12; ++column) {
       const int x = 40 + 80 * column, y = 40 + 80 * row;
-      picture(cv::Rect(x - kHalfMarker, y - kHalfMarker, 2 * kHalfMarker, 2 * kHalfMarker))
+      image(cv::Rect(x - kHalfMarker, y - kHalfMarker, 2 * kHalfMarker, 2 * kHalfMarker))
           .setTo(cv::Scalar::all(240));
       wall.markers.push_back(
           {kWidth * (x / double{kTexels} - 0.5), kHeight * (y / double{kTexels} - 0.5), 0});
     }
   }
   wall.surfaces.AddRectangle({-kWidth / 2, -kHeight / 2, 0}, {kWidth, 0, 0}, {0, kHeight, 0},
-                             wall.surfaces.AddTexture(picture));
+                             wall.surfaces.AddTexture(image));
   return wall;
 }
 
 // Centre of brightness about a pixel.
-Eigen::Vector2d Centroid(const cv::Mat& picture, const Eigen::Vector2d& about, int reach) {
+Eigen::Vector2d Centroid(const cv::Mat& image, const Eigen::Vector2d& about, int reach) {
   double sum = 0;
   Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
   const int x0 = static_cast<int>(std::lround(about.x())), y0 = static_cast<int>(std::lround(about.y()));
   for (int y = y0 - reach; y <= y0 + reach; ++y) {
     for (int x = x0 - reach; x <= x0 + reach; ++x) {
-      const double brightness = picture.at<cv::Vec3b>(y, x)[1] - 10;
+      const double brightness = image.at<cv::Vec3b>(y, x)[1] - 10;
       sum += brightness;
       weighted += brightness * Eigen::Vector2d(x, y);
     }
@@ -77,15 +77,15 @@ TEST(SurfaceRenderer, DrawsMarkersWhereEachLensSaysToATenthOfAPixel) {
   for (const engine::CameraModel& camera : Lenses()) {
     const SurfaceRenderer renderer(&wall.surfaces, camera);
     const engine::Rigid3 camera_from_world = ObliquePose();
-    cv::Mat picture;
-    renderer.Render(camera_from_world, &picture);
+    cv::Mat image;
+    renderer.Render(camera_from_world, &image);
     int checked = 0;
     double worst = 0;
     for (const Eigen::Vector3d& marker : wall.markers) {
       const auto pixel = camera.Project(camera_from_world * marker);
       if (!pixel || !camera.IsInside(*pixel, 16)) continue;
       // The centroid of a square seen obliquely through a lens is not the image of its centre: compare with
-      // the mean of the projections of many of its points, which weights them as the picture does to first
+      // the mean of the projections of many of its points, which weights them as the image does to first
       // order.
       double area = 0, reach = 0;
       Eigen::Vector2d expected = Eigen::Vector2d::Zero();
@@ -104,7 +104,7 @@ TEST(SurfaceRenderer, DrawsMarkersWhereEachLensSaysToATenthOfAPixel) {
         expected += density * projected;
       }
       expected /= area;
-      worst = std::max(worst, (Centroid(picture, *pixel, static_cast<int>(reach) + 3) - expected).norm());
+      worst = std::max(worst, (Centroid(image, *pixel, static_cast<int>(reach) + 3) - expected).norm());
       ++checked;
     }
     EXPECT_GT(checked, 40) << camera;
@@ -112,7 +112,7 @@ TEST(SurfaceRenderer, DrawsMarkersWhereEachLensSaysToATenthOfAPixel) {
   }
 }
 
-// The tiles' short lists of rectangles must leave nothing out: the picture equals that of rays tried against
+// The tiles' short lists of rectangles must leave nothing out: the image equals that of rays tried against
 // all.
 TEST(SurfaceRenderer, FindsTheNearestOfManyRectanglesLikeTheSearchThroughAll) {
   Random random(5);
@@ -133,12 +133,12 @@ TEST(SurfaceRenderer, FindsTheNearestOfManyRectanglesLikeTheSearchThroughAll) {
   }
   for (const engine::CameraModel& camera : Lenses()) {
     const engine::Rigid3 world_from_camera = ObliquePose().inverse();
-    cv::Mat picture;
-    SurfaceRenderer(&surfaces, camera).Render(world_from_camera.inverse(), &picture);
+    cv::Mat image;
+    SurfaceRenderer(&surfaces, camera).Render(world_from_camera.inverse(), &image);
     int compared = 0, wrong = 0, empty = 0;
     for (int y = 2; y < 478; y += 3) {
       for (int x = 2; x < 638; x += 3) {
-        // Only where the neighbourhood shows one rectangle: elsewhere the picture blends.
+        // Only where the neighbourhood shows one rectangle: elsewhere the image blends.
         std::array<int, 5> seen{};
         const std::array<Eigen::Vector2d, 5> offsets = {Eigen::Vector2d(0, 0), Eigen::Vector2d(-1, 0),
                                                         Eigen::Vector2d(1, 0), Eigen::Vector2d(0, -1),
@@ -156,7 +156,7 @@ TEST(SurfaceRenderer, FindsTheNearestOfManyRectanglesLikeTheSearchThroughAll) {
         const cv::Vec3b expected = seen[0] < 0 ? cv::Vec3b() : colors[static_cast<std::size_t>(seen[0])];
         ++compared;
         empty += seen[0] < 0 ? 1 : 0;
-        wrong += cv::norm(picture.at<cv::Vec3b>(y, x), expected, cv::NORM_INF) > 1 ? 1 : 0;
+        wrong += cv::norm(image.at<cv::Vec3b>(y, x), expected, cv::NORM_INF) > 1 ? 1 : 0;
       }
     }
     EXPECT_GT(compared, 20000) << camera;
@@ -167,10 +167,10 @@ TEST(SurfaceRenderer, FindsTheNearestOfManyRectanglesLikeTheSearchThroughAll) {
 
 TEST(SurfaceRenderer, IsBlackWhereNothingStands) {
   const Surfaces nothing;
-  cv::Mat picture;
-  SurfaceRenderer(&nothing, SimulatedCamera(160)).Render({}, &picture);
-  EXPECT_EQ(picture.size(), cv::Size(160, 120));
-  EXPECT_EQ(cv::norm(picture, cv::NORM_INF), 0);
+  cv::Mat image;
+  SurfaceRenderer(&nothing, SimulatedCamera(160)).Render({}, &image);
+  EXPECT_EQ(image.size(), cv::Size(160, 120));
+  EXPECT_EQ(cv::norm(image, cv::NORM_INF), 0);
 }
 
 TEST(SurfaceRenderer, SoftensWhatIsFarAwayInsteadOfFlickering) {
@@ -183,10 +183,10 @@ TEST(SurfaceRenderer, SoftensWhatIsFarAwayInsteadOfFlickering) {
   Surfaces surfaces;
   surfaces.AddRectangle({-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, surfaces.AddTexture(squares));
   const engine::CameraModel camera(engine::LensModel::kRadialTangential, Intrinsics(300), {});
-  cv::Mat picture;
-  SurfaceRenderer(&surfaces, camera).Render({engine::Rotation3(), Eigen::Vector3d(0, 0, 12)}, &picture);
+  cv::Mat image;
+  SurfaceRenderer(&surfaces, camera).Render({engine::Rotation3(), Eigen::Vector3d(0, 0, 12)}, &image);
   cv::Scalar mean, deviation;
-  cv::meanStdDev(picture(cv::Rect(300, 220, 40, 40)), mean, deviation);
+  cv::meanStdDev(image(cv::Rect(300, 220, 40, 40)), mean, deviation);
   EXPECT_NEAR(mean[0], 127.5, 2);
   EXPECT_LT(deviation[0], 4);
 }

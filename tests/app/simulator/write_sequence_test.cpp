@@ -45,7 +45,7 @@ class WriteSequenceTest : public ::testing::Test {
   std::unique_ptr<Simulation> simulation_;
 };
 
-TEST_F(WriteSequenceTest, WritesPicturesTruthLensAndLabels) {
+TEST_F(WriteSequenceTest, WritesImagesTruthLensAndLabels) {
   int calls = 0;
   WriteSequence(*simulation_, folder_, [&](int written, int total) {
     EXPECT_EQ(written, ++calls);
@@ -53,17 +53,17 @@ TEST_F(WriteSequenceTest, WritesPicturesTruthLensAndLabels) {
   });
   EXPECT_EQ(calls, 10);
   EXPECT_EQ(ReadCalibration(folder_ / "calibration.yaml"), simulation_->camera());
-  const auto pictures = LinesOf("rgb.txt"), truth = LinesOf("groundtruth.txt"),
+  const auto images = LinesOf("rgb.txt"), truth = LinesOf("groundtruth.txt"),
              labels = LinesOf("segments.txt");
-  ASSERT_EQ(pictures.size(), 10u);
+  ASSERT_EQ(images.size(), 10u);
   ASSERT_EQ(truth.size(), 10u);
   ASSERT_EQ(labels.size(), 10u);
   for (int i = 0; i < 10; ++i) {
     const auto line = static_cast<std::size_t>(i);
-    std::istringstream picture_line(pictures[line]), truth_line(truth[line]);
+    std::istringstream image_line(images[line]), truth_line(truth[line]);
     double time, truth_time;
     std::string name;
-    ASSERT_TRUE(picture_line >> time >> name);
+    ASSERT_TRUE(image_line >> time >> name);
     EXPECT_NEAR(time, ToSeconds(simulation_->time(i)), 1e-6);
     cv::Mat expected;
     simulation_->Render(i, &expected);

@@ -13,10 +13,10 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 
-// Pictures of calibration boards whose every corner is known from mathematics.
+// Images of calibration boards whose every corner is known from mathematics.
 namespace docent::app {
 
-// Ways of holding a board before the camera: all over the picture, near and far, tilted every way.
+// Ways of holding a board before the camera: all over the image, near and far, tilted every way.
 inline std::vector<engine::Rigid3> BoardPoses(const BoardSpec& board, const engine::CameraModel& camera,
                                               int count) {
   Random random(11);
@@ -58,7 +58,7 @@ class BoardCamera {
     }
   }
 
-  cv::Mat Picture(const engine::Rigid3& camera_from_board, Random* random) const {
+  cv::Mat Image(const engine::Rigid3& camera_from_board, Random* random) const {
     // The inverse of the plane's homography takes a ray to where it meets the sheet.
     Eigen::Matrix3d plane = camera_from_board.rotation.matrix();
     plane.col(2) = camera_from_board.translation;
@@ -80,13 +80,13 @@ class BoardCamera {
         fine.at<uchar>(y, x) = brightness;
       }
     }
-    cv::Mat exact, picture;
+    cv::Mat exact, image;
     cv::resize(fine, exact, size_, 0, 0, cv::INTER_AREA);
     exact.convertTo(exact, CV_32F);
     cv::GaussianBlur(exact, exact, {}, 0.6);
     for (int i = 0; i < size_.area(); ++i) exact.at<float>(i) += static_cast<float>(random->Uniform(-3, 3));
-    exact.convertTo(picture, CV_8U);
-    return picture;
+    exact.convertTo(image, CV_8U);
+    return image;
   }
 
  private:

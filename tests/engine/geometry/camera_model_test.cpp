@@ -31,7 +31,7 @@ struct Lens {
   Distortion distortion;
 };
 
-// Lenses that are one-to-one over the whole of kIntrinsics' picture, from none to strong.
+// Lenses that are one-to-one over the whole of kIntrinsics' image, from none to strong.
 const std::vector<Lens>& Lenses() {
   static const std::vector<Lens> lenses = {
       {"pinhole", LensModel::kRadialTangential, {}},
@@ -53,7 +53,7 @@ CameraModel MakeCamera(const Lens& lens) {
   return {lens.model, kIntrinsics, lens.distortion};
 }
 
-std::vector<Eigen::Vector2d> WholePicture(const CameraModel& camera) {
+std::vector<Eigen::Vector2d> WholeImage(const CameraModel& camera) {
   std::vector<Eigen::Vector2d> pixels = {{camera.intrinsics().cx, camera.intrinsics().cy}};
   for (int y = 0; y < camera.height_px(); y += 9) {
     for (int x = 0; x < camera.width_px(); x += 9) {
@@ -64,10 +64,10 @@ std::vector<Eigen::Vector2d> WholePicture(const CameraModel& camera) {
   return pixels;
 }
 
-TEST(CameraModelTest, EveryPixelOfThePictureComesBackFromItsRay) {
+TEST(CameraModelTest, EveryPixelOfTheImageComesBackFromItsRay) {
   for (const Lens& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
-    for (const Eigen::Vector2d& pixel : WholePicture(camera)) {
+    for (const Eigen::Vector2d& pixel : WholeImage(camera)) {
       const auto ray = camera.Unproject(pixel);
       ASSERT_TRUE(ray) << lens.name << " at " << pixel.transpose();
       EXPECT_NEAR(ray->norm(), 1, 1e-14);
@@ -104,7 +104,7 @@ TEST(CameraModelTest, TheJacobianIsTheDerivative) {
     const CameraModel camera = MakeCamera(lens);
     std::vector<Eigen::Vector3d> points = {
         {0, 0, 2}, {1e-12, 0, 2}, {1e-9, -1e-9, 1}, {1e-6, 1e-6, 1}, {1e-4, 0, 3}};
-    for (const Eigen::Vector2d& pixel : WholePicture(camera)) {
+    for (const Eigen::Vector2d& pixel : WholeImage(camera)) {
       points.push_back(random.Uniform(0.5, 5) * *camera.Unproject(pixel));
     }
     for (const Eigen::Vector3d& point : points) {
@@ -136,7 +136,7 @@ TEST(CameraModelTest, AgreesWithOpenCvsPinhole) {
     }
     const CameraModel camera = MakeCamera(lens);
     std::vector<cv::Point3d> points;
-    for (const Eigen::Vector2d& pixel : WholePicture(camera)) {
+    for (const Eigen::Vector2d& pixel : WholeImage(camera)) {
       const Eigen::Vector3d point = random.Uniform(0.5, 5) * *camera.Unproject(pixel);
       points.emplace_back(point.x(), point.y(), point.z());
     }
@@ -186,7 +186,7 @@ TEST(CameraModelTest, FovProjectsAsDevernayAndFaugerasWrite) {
   EXPECT_LT((*camera.Project(point) - expected).norm(), 1e-10);
 }
 
-TEST(CameraModelTest, NoPointBehindTheCameraFallsIntoThePicture) {
+TEST(CameraModelTest, NoPointBehindTheCameraFallsIntoTheImage) {
   Random random(5);
   for (const Lens& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
@@ -221,7 +221,7 @@ TEST(CameraModelTest, PointsWhereTheLensFoldsBackDoNotProject) {
   EXPECT_NEAR(camera.max_angle(), std::atan(radius), 2e-6);
   EXPECT_TRUE(camera.Project(Eigen::Vector3d(0.999 * radius, 0, 1)));
   EXPECT_FALSE(camera.Project(Eigen::Vector3d(1.001 * radius, 0, 1)));
-  // On the far side of the fold r (1 - 0.3 r^2) is zero again: it would land in the middle of the picture.
+  // On the far side of the fold r (1 - 0.3 r^2) is zero again: it would land in the middle of the image.
   EXPECT_FALSE(camera.Project(Eigen::Vector3d(1 / std::sqrt(0.3), 0, 1)));
   const double edge = radius * (1 - 0.3 * radius * radius);
   EXPECT_TRUE(camera.Unproject({kIntrinsics.cx + 0.999 * edge * kIntrinsics.fx, kIntrinsics.cy}));
@@ -306,7 +306,7 @@ TEST(CameraModelTest, BadNumbersGetASentenceThatNamesThem) {
   EXPECT_NE(complaint(fisheye, [&](auto&, auto& d) { d[2] = nan; }).find("coefficient 3"), std::string::npos);
   EXPECT_NE(complaint(fisheye, [](auto&, auto& d) { d[4] = 0.1; }).find("does not use"), std::string::npos);
   EXPECT_NE(complaint(fov, [](auto&, auto& d) { d[0] = 3.2; }).find("omega"), std::string::npos);
-  EXPECT_NE(complaint(brown, [](auto&, auto& d) { d[0] = -30; }).find("half of the picture"),
+  EXPECT_NE(complaint(brown, [](auto&, auto& d) { d[0] = -30; }).find("half of the image"),
             std::string::npos);
 }
 
@@ -321,7 +321,7 @@ TEST(CameraModelTest, EqualsOnlyTheSameNumbers) {
 }
 
 // The recorded sequences' own lenses, where they are at hand: every pixel of them needs its ray.
-TEST(CameraModelTest, TheSequencesCalibrationsCoverTheirPictures) {
+TEST(CameraModelTest, TheSequencesCalibrationsCoverTheirImages) {
   const std::filesystem::path folder = std::filesystem::path(DOCENT_SOURCE_DIR) / "../shared/sequences";
   if (!std::filesystem::is_directory(folder)) {
     GTEST_SKIP() << "no sequences at " << folder;
@@ -351,7 +351,7 @@ TEST(CameraModelTest, TheSequencesCalibrationsCoverTheirPictures) {
     const Distortion distortion{values["k1"], values["k2"], values["p1"], values["p2"], values["k3"]};
     ASSERT_EQ(CameraModel::Validate(LensModel::kRadialTangential, intrinsics, distortion).value_or(""), "");
     const CameraModel camera(LensModel::kRadialTangential, intrinsics, distortion);
-    for (const Eigen::Vector2d& pixel : WholePicture(camera)) {
+    for (const Eigen::Vector2d& pixel : WholeImage(camera)) {
       const auto ray = camera.Unproject(pixel);
       ASSERT_TRUE(ray) << entry.path() << " at " << pixel.transpose();
       EXPECT_LT((*camera.Project(*ray) - pixel).norm(), 1e-9) << entry.path() << " at " << pixel.transpose();

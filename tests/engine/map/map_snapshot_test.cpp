@@ -100,11 +100,11 @@ TEST(MapSnapshot, NamesTheKeyframeThatIsWrong) {
   ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].id = 2; }, "keyframe 2 is out of order");
   ExpectComplaint([](MapSnapshot* m) { m->next_keyframe = 5; }, "keyframe 5 is out of order");
   ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].camera.reset(); }, "keyframe 5 has no camera");
-  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].features.reset(); }, "keyframe 5 has no picture");
+  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].features.reset(); }, "keyframe 5 has no image");
   ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].features = std::make_shared<ImageFeatures>(); },
-                  "keyframe 5 has no picture");
+                  "keyframe 5 has no image");
   ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].camera = testing_world::PinholeCamera(48, 64); },
-                  "keyframe 5 has a picture of another size");
+                  "keyframe 5 has an image of another size");
   ExpectComplaint([](MapSnapshot* m) { m->keyframes[0].camera_from_map.translation.y() = kNan; },
                   "keyframe 2 has no valid pose");
   ExpectComplaint(
@@ -137,7 +137,7 @@ TEST(MapSnapshot, NamesThePointThatIsWrong) {
   for (const Eigen::Vector2f& pixel : {Eigen::Vector2f(31.5f, 5), Eigen::Vector2f(5, 23.5f),
                                        Eigen::Vector2f(-1, 5), Eigen::Vector2f(std::nanf(""), 5)}) {
     ExpectComplaint([&](MapSnapshot* m) { m->points[1].source_pixel = pixel; },
-                    "point 7 has its source outside the picture");
+                    "point 7 has its source outside the image");
   }
 }
 

@@ -282,17 +282,17 @@ TEST(Map, TurnsNormalsTowardsTheObservers) {
 TEST(Map, MakesOneOfTwoPointsThatAreOne) {
   Map map;
   for (int i = 0; i < 4; ++i) map.AddKeyFrame(BlankKeyFrame());
-  const MapPointId known = AddSeenPoint(&map, 0, 1), twin = AddSeenPoint(&map, 2, 1);
-  map.AddObservation(Seen(3, twin));
+  const MapPointId known = AddSeenPoint(&map, 0, 1), duplicate = AddSeenPoint(&map, 2, 1);
+  map.AddObservation(Seen(3, duplicate));
   map.FindPoint(known)->seen_inlier = 3;
-  map.FindPoint(twin)->seen_inlier = 4;
-  map.MergePoints(known, twin);
+  map.FindPoint(duplicate)->seen_inlier = 4;
+  map.FusePoints(known, duplicate);
   ExpectConsistent(map);
-  EXPECT_EQ(map.FindPoint(twin), nullptr);
+  EXPECT_EQ(map.FindPoint(duplicate), nullptr);
   EXPECT_EQ(map.FindPoint(known)->observers, (std::vector<KeyFrameId>{0, 1, 2, 3}));
   EXPECT_EQ(map.FindPoint(known)->seen_inlier, 7);
-  map.MergePoints(known, known);
-  map.MergePoints(known, twin);
+  map.FusePoints(known, known);
+  map.FusePoints(known, duplicate);
   EXPECT_EQ(map.AlivePoints(), 1u) << "neither with itself nor with what is gone";
 }
 

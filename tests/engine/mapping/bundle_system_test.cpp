@@ -133,7 +133,7 @@ TEST_P(BundleSystemTest, TheStepIsThatOfTheFullDampedNormalEquations) {
   ExpectTheDenseStep();
 }
 
-TEST_P(BundleSystemTest, APointThatOnePictureShowsTwiceCountsTwice) {
+TEST_P(BundleSystemTest, APointThatOneImageShowsTwiceCountsTwice) {
   BundleProblem::Measurement again = problem_.measurements.back();  // by a free camera
   again.pixel.x() += 0.7f;
   problem_.measurements.insert(problem_.measurements.begin(), again);

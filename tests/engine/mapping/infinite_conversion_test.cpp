@@ -27,7 +27,7 @@ class Converting : public ::testing::Test {
     world_ = nullptr;
     camera_.reset();
   }
-  static KeyFrame Picture(const Rigid3& pose) {
+  static KeyFrame Image(const Rigid3& pose) {
     KeyFrame keyframe = testing_world::MakeKeyFrame(*world_, camera_, pose);
     keyframe.mean_depth = 2.5;
     keyframe.depth_sigma = 0.5;
@@ -37,10 +37,10 @@ class Converting : public ::testing::Test {
   // keyframe elsewhere.
   static Map Pair(const Rigid3& partner) {
     Map map;
-    map.AddKeyFrame(Picture(CameraAt({0, 0, 0})));
+    map.AddKeyFrame(Image(CameraAt({0, 0, 0})));
     map.OpenPanorama(0);
     EXPECT_GT(AddInfinitePoints({}, 0, {}, &map), 150);
-    map.AddKeyFrame(Picture(partner));
+    map.AddKeyFrame(Image(partner));
     return map;
   }
   // As the mapper asks: with more parallax than of an ordinary pair.
@@ -95,7 +95,7 @@ TEST_F(Converting, RefusesParallaxThatTellsNoDepth) {
   }
 }
 
-// The partner's picture was taken on the other side of where its pose says: what truly matches would lie
+// The partner's image was taken on the other side of where its pose says: what truly matches would lie
 // behind both cameras.
 TEST_F(Converting, RefusesWhatWouldLieBehindTheCameras) {
   Map right = Pair(CameraAt({0.3, 0, 0})), wrong = Pair(CameraAt({0.3, 0, 0}));
@@ -155,7 +155,7 @@ TEST_F(Converting, ConvertsWhatTheReferenceIsTheSourceOfAlone) {
 // The partner knows the same corners as finite points already: no second point may be made of any.
 TEST_F(Converting, MakesNoTwinOfAPointThatTheMapKnows) {
   Map map = Pair(CameraAt({0.3, 0, 0}));
-  map.AddKeyFrame(Picture(CameraAt({0.55, 0, 0})));
+  map.AddKeyFrame(Image(CameraAt({0.55, 0, 0})));
   PointSearcher searcher;
   const std::size_t known = CreatePoints({}, 1, 2, &map, &searcher).size();
   ASSERT_GT(known, 100u);
@@ -178,7 +178,7 @@ TEST_F(Converting, MakesNoTwinOfAPointThatTheMapKnows) {
   // A few met a point that was a direction itself, or one that the reference had met already.
   EXPECT_LE(joined, conversion.merged);
   EXPECT_GT(joined, 3 * conversion.merged / 4);
-  // No two finite points at one place of the partner's picture.
+  // No two finite points at one place of the partner's image.
   const auto& observations = map.FindKeyFrame(1)->observations;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {

@@ -32,9 +32,9 @@ Outcome Show(const RenderedWorld& world, int frames, const std::function<Rigid3(
   Outcome outcome;
   Initializer initializer({}, Camera(), 5);
   for (; outcome.frames < frames && !outcome.pair; ++outcome.frames) {
-    const cv::Mat picture =
+    const cv::Mat image =
         world.Render(*Camera(), pose(outcome.frames), 1.5, static_cast<std::uint64_t>(outcome.frames) + 1);
-    outcome.pair = initializer.Track(FromSeconds(outcome.frames / 30.0), MakeFeatures(picture));
+    outcome.pair = initializer.Track(FromSeconds(outcome.frames / 30.0), MakeFeatures(image));
     if (!outcome.pair) outcome.hints.insert(initializer.hint());
   }
   return outcome;

@@ -112,7 +112,7 @@ Walk GoAlong(const RenderedWorld& world, const std::vector<Rigid3>& poses, const
     candidate.features = MakeFeatures(world.Render(*TrueCamera(), poses[i], 1.5, i));
     candidate.camera_from_map = poses[i] * poses[i - 1].inverse() * map->keyframes.back().camera_from_map;
     candidate.map_revision = map->revision;
-    candidate.surroundings = map->keyframes.back().id;
+    candidate.reference_keyframe = map->keyframes.back().id;
     mapper.Offer(std::move(candidate));
     for (int step = 0; step < 200 && mapper.Step(); ++step) {
     }
@@ -150,8 +150,8 @@ Gap GapAfterTheRound(const MapSnapshot& map, int step) {
 MapperOptions WithLoops(bool enabled) {
   MapperOptions options;
   options.loops.enabled = enabled;
-  options.loops.correction.max_strain = 0.1;  // the steps here are far longer than those of a walk
-  options.redundancy.min_keyframes = 1000;    // all stay, for comparison
+  options.loops.correction.max_edge_residual = 0.1;  // the steps here are far longer than those of a walk
+  options.culling.min_keyframes = 1000;              // all stay, for comparison
   return options;
 }
 
@@ -231,7 +231,7 @@ TEST(LoopClosing, NeverTakesALookAlikeForTheSamePlace) {
   // believes in any error is taken in.
   options.loops.finder.max_shift = 10;
   EXPECT_TRUE(GoAlong(RenderedWorld(walls), poses, options, TrueCamera()).loops.empty());
-  options.loops.correction.max_misfit = options.loops.correction.max_strain = 10;
+  options.loops.correction.max_misfit = options.loops.correction.max_edge_residual = 10;
   EXPECT_FALSE(GoAlong(RenderedWorld(walls), poses, options, TrueCamera()).loops.empty());
 }
 

@@ -32,7 +32,7 @@ class MapDescriptorsTest : public testing::Test {
 std::shared_ptr<const CameraModel> MapDescriptorsTest::camera_;
 std::unique_ptr<RenderedWorld> MapDescriptorsTest::world_;
 
-TEST_F(MapDescriptorsTest, SuggestThePoseOfAPictureThatIsFarFromWhereItWasThought) {
+TEST_F(MapDescriptorsTest, SuggestThePoseOfAnImageThatIsFarFromWhereItWasThought) {
   Map map = TrueMap();
   MapDescriptors descriptors(DefaultVocabulary());
   Update(&descriptors, &map);

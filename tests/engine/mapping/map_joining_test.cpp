@@ -24,7 +24,7 @@ using testing_world::RenderedWorld;
 using testing_world::TrueMap;
 using testing_world::Wall;
 
-using Verdict = MapOverlap::Verdict;
+using RelocalizationResult = MapOverlap::RelocalizationResult;
 
 constexpr double kPitch = 2.0;  // metres, of the panels
 constexpr std::size_t kPoints = 150;
@@ -84,7 +84,7 @@ const MapJoinAttempt& OverlappingAttempt() {
 
 TEST(MapJoining, FindsHowTwoMapsOfOnePlaceLieToEachOther) {
   const MapJoinAttempt& attempt = OverlappingAttempt();
-  ASSERT_EQ(attempt.overlap.verdict, Verdict::kOverlap) << attempt.overlap.Brief();
+  ASSERT_EQ(attempt.overlap.verdict, RelocalizationResult::kOverlap) << attempt.overlap.Brief();
   ASSERT_NE(attempt.joined, nullptr) << attempt.refusal;
   EXPECT_EQ(attempt.refusal, "");
   const Sim3 left = attempt.joined->a_from_b * kOther;
@@ -149,7 +149,7 @@ TEST(MapJoining, LeavesMapsOfDifferentPlacesAlone) {
   const auto elsewhere = MapOfWalk(Gallery({21, 22}, {31, 32}), Walk(0, 2, 0.2, 0), kOther);
   const MapJoinAttempt attempt = JoinMaps({}, *OverlappingPair().a, *elsewhere, nullptr);
   EXPECT_EQ(attempt.joined, nullptr);
-  EXPECT_NE(attempt.overlap.verdict, Verdict::kOverlap);
+  EXPECT_NE(attempt.overlap.verdict, RelocalizationResult::kOverlap);
   EXPECT_NE(attempt.refusal, "");
 }
 
@@ -162,12 +162,12 @@ TEST(MapJoining, RefusesALookAlikeThatOtherThingsStandAbout) {
   EXPECT_NE(attempt.refusal, "");
   // What stands where the other map has another surface gives them away: every keyframe sees the common
   // panel.
-  EXPECT_EQ(attempt.overlap.verdict, Verdict::kContradicted) << attempt.overlap.Brief();
+  EXPECT_EQ(attempt.overlap.verdict, RelocalizationResult::kContradicted) << attempt.overlap.Brief();
   EXPECT_GT(attempt.overlap.contradicted * 5, attempt.overlap.regions) << attempt.overlap.Brief();
   MapJoiningOptions careless;
   careless.overlap.max_contradicted = 1;
   const MapJoinAttempt taken_in = JoinMaps(careless, *a, *b, nullptr);
-  EXPECT_EQ(taken_in.overlap.verdict, Verdict::kOverlap) << taken_in.overlap.Brief();
+  EXPECT_EQ(taken_in.overlap.verdict, RelocalizationResult::kOverlap) << taken_in.overlap.Brief();
 }
 
 TEST(MapJoining, RefusesToChooseBetweenTwoPlacesThatLookTheSame) {
@@ -175,20 +175,22 @@ TEST(MapJoining, RefusesToChooseBetweenTwoPlacesThatLookTheSame) {
   const auto b = MapOfWalk(Gallery({2, 2, 2}, {12, 12, 12}), Walk(1.7, 2.5, 0.2, 0.1), kOther);
   const MapJoinAttempt attempt = JoinMaps({}, *a, *b, nullptr);
   EXPECT_EQ(attempt.joined, nullptr);
-  EXPECT_EQ(attempt.overlap.verdict, Verdict::kAmbiguous) << attempt.overlap.Brief();
+  EXPECT_EQ(attempt.overlap.verdict, RelocalizationResult::kAmbiguous) << attempt.overlap.Brief();
 }
 
 TEST(MapJoining, SaysWhenAMapHasTooLittleToBeCompared) {
   MapSnapshot empty;
-  EXPECT_EQ(JoinMaps({}, *OverlappingPair().a, empty, nullptr).overlap.verdict, Verdict::kNothingToCompare);
-  EXPECT_EQ(JoinMaps({}, empty, *OverlappingPair().b, nullptr).overlap.verdict, Verdict::kNothingToCompare);
+  EXPECT_EQ(JoinMaps({}, *OverlappingPair().a, empty, nullptr).overlap.verdict,
+            RelocalizationResult::kNothingToCompare);
+  EXPECT_EQ(JoinMaps({}, empty, *OverlappingPair().b, nullptr).overlap.verdict,
+            RelocalizationResult::kNothingToCompare);
 }
 
 TEST(MapJoining, CanBeInterrupted) {
   const std::atomic<bool> interrupt = true;
   const MapJoinAttempt attempt = JoinMaps({}, *OverlappingPair().a, *OverlappingPair().b, &interrupt);
   EXPECT_EQ(attempt.joined, nullptr);
-  EXPECT_EQ(attempt.overlap.verdict, Verdict::kInterrupted);
+  EXPECT_EQ(attempt.overlap.verdict, RelocalizationResult::kInterrupted);
 }
 
 TEST(MapJoining, IsDoneByAMapperWhichKeepsWhatWasOffered) {

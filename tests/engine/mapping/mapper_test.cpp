@@ -114,10 +114,10 @@ std::shared_ptr<const MapSnapshot> Mapping::started_;
 TEST_F(Mapping, StartsAMapFromTwoViews) {
   Mapper mapper({});
   EXPECT_EQ(mapper.Snapshot(), nullptr);
-  EXPECT_TRUE(mapper.Settled());
+  EXPECT_TRUE(mapper.IsIdle());
   EXPECT_FALSE(mapper.Step());
   ASSERT_TRUE(mapper.Start(*pair_));
-  EXPECT_FALSE(mapper.Settled());
+  EXPECT_FALSE(mapper.IsIdle());
   EXPECT_TRUE(mapper.Step());
   EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 1);
   EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 0) << "events are given out once";
@@ -131,12 +131,12 @@ TEST_F(Mapping, StartsAMapFromTwoViews) {
             0.012);
   EXPECT_GT(map->points.size(), pair_->matches.size() * 3 / 4);
   EXPECT_LT(MedianDistanceToSurface(*map), 0.05);
-  EXPECT_TRUE(mapper.Settled());
+  EXPECT_TRUE(mapper.IsIdle());
 }
 
 TEST_F(Mapping, TellsWhenAStartFails) {
   InitialPair poor = TruePair(*world_, CameraAt({0, 0, 0}), CameraAt({kBaseline, 0, 0}), 30);
-  // A blank second picture: nothing can join the thirty.
+  // A blank second image: nothing can join the thirty.
   poor.b.features = MakeFeatures(cv::Mat(300, 400, CV_8UC1, cv::Scalar(120)));
   Mapper mapper({});
   mapper.Start(poor);
@@ -146,7 +146,7 @@ TEST_F(Mapping, TellsWhenAStartFails) {
   EXPECT_EQ(events[0].kind, Kind::kStartFailed);
   EXPECT_FALSE(events[0].detail.empty());
   EXPECT_EQ(mapper.Snapshot(), nullptr);
-  EXPECT_TRUE(mapper.Settled());
+  EXPECT_TRUE(mapper.IsIdle());
   // A keyframe that comes too late is dropped without harm, and the next start succeeds.
   mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.2, 0, 0}), 1));
   WorkUntilIdle(&mapper);
@@ -166,9 +166,9 @@ TEST_F(Mapping, GrowsByKeyframesUntilSettled) {
   for (const Rigid3& pose : poses) {
     const auto before = mapper.Snapshot();
     ASSERT_TRUE(mapper.Offer(TrueCandidate(*world_, *before, pose, seconds++)));
-    EXPECT_FALSE(mapper.Settled());
+    EXPECT_FALSE(mapper.IsIdle());
     WorkUntilIdle(&mapper);
-    EXPECT_TRUE(mapper.Settled());
+    EXPECT_TRUE(mapper.IsIdle());
     const auto after = mapper.Snapshot();
     EXPECT_EQ(after->keyframes.size(), before->keyframes.size() + 1);
     EXPECT_GT(after->revision, before->revision);
@@ -203,12 +203,12 @@ TEST_F(Mapping, TakesInAWaitingKeyframeBeforeItAdjusts) {
   mapper.Adopt(started_);
   mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.25, 0, 0}), 1));
   ASSERT_TRUE(mapper.Step());
-  EXPECT_FALSE(mapper.Settled()) << "the newest keyframe has yet to be adjusted";
+  EXPECT_FALSE(mapper.IsIdle()) << "the newest keyframe has yet to be adjusted";
   mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.45, 0, 0}), 2));
   ASSERT_TRUE(mapper.Step());
   EXPECT_EQ(mapper.Snapshot()->keyframes.size(), 4u);
   WorkUntilIdle(&mapper);
-  EXPECT_TRUE(mapper.Settled());
+  EXPECT_TRUE(mapper.IsIdle());
 }
 
 TEST_F(Mapping, StaysWholeWhileKeyframesInterruptIt) {
@@ -228,7 +228,7 @@ TEST_F(Mapping, StaysWholeWhileKeyframesInterruptIt) {
   }
   tracker.join();
   WorkUntilIdle(&mapper);
-  EXPECT_TRUE(mapper.Settled());
+  EXPECT_TRUE(mapper.IsIdle());
   EXPECT_EQ(mapper.Snapshot()->keyframes.size(), 7u);
   EXPECT_EQ(Validate(*mapper.Snapshot()), "");
 }

@@ -252,7 +252,7 @@ TEST_F(PanoramaMapping, LocalizesNothingByPointsOfOneCornerAlone) {
   ExpectSameMap(*before, *map.Snapshot());
 }
 
-TEST_F(PanoramaMapping, LocalizesNoPictureOfAnotherPlace) {
+TEST_F(PanoramaMapping, LocalizesNoImageOfAnotherPlace) {
   const RenderedWorld other = testing_world::Chamber(8181);
   Map map = MapWithPanorama();
   PointSearcher searcher;
@@ -289,10 +289,10 @@ TEST(InfiniteTwins, AreDroppedWhereAFinitePointIsSeenAtTheSamePlace) {
     return added;
   };
   const MapPointId finite = add(false, {30, 30}, 0);
-  const MapPointId twin = add(true, {31.9f, 30}, 0), apart = add(true, {32.1f, 30}, 0);
+  const MapPointId duplicate = add(true, {31.9f, 30}, 0), apart = add(true, {32.1f, 30}, 0);
   const MapPointId coarse_twin = add(true, {30, 37.9f}, 2), coarse_apart = add(true, {30, 38.1f}, 2);
   EXPECT_EQ(DropInfiniteTwins(id, &map), 2);
-  for (const MapPointId gone : {twin, coarse_twin}) EXPECT_EQ(map.FindPoint(gone), nullptr) << gone;
+  for (const MapPointId gone : {duplicate, coarse_twin}) EXPECT_EQ(map.FindPoint(gone), nullptr) << gone;
   for (const MapPointId kept : {finite, apart, coarse_apart}) EXPECT_NE(map.FindPoint(kept), nullptr) << kept;
   EXPECT_EQ(DropInfiniteTwins(id, &map), 0);
   EXPECT_EQ(DropInfiniteTwins(77, &map), 0);

@@ -9,7 +9,7 @@
 // Panorama maps for tests: blank ones, and a room that surrounds the camera.
 namespace docent::engine::testing_world {
 
-// A keyframe of 64x64 pixels that shows nothing, for what asks no picture.
+// A keyframe of 64x64 pixels that shows nothing, for what asks no image.
 inline KeyFrame BlankKeyFrame(const Rigid3& camera_from_map = {}) {
   static const auto camera = PinholeCamera(64, 64);
   static const auto features = [] {

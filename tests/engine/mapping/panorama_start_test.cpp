@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A map that begins with one picture's directions and gains depth.
+// A map that begins with one image's directions and gains depth.
 #include <gtest/gtest.h>
 
 #include "engine/mapping/mapper.h"
@@ -11,12 +11,12 @@ namespace {
 
 using testing_world::CameraAt;
 
-// The first picture hands the reference on to the pair's first view; it is to be localized as any other
+// The first image hands the reference on to the pair's first view; it is to be localized as any other
 // dependent keyframe is.
-TEST(PanoramaStart, TheFirstPictureIsLocalizedOnceTheMapKnowsDepth) {
+TEST(PanoramaStart, TheFirstImageIsLocalizedOnceTheMapKnowsDepth) {
   const auto world = testing_world::Chamber(61);
   const auto camera = testing_world::PinholeCamera(400, 300);
-  const auto picture = [&](const Rigid3& pose, std::uint64_t seed) {
+  const auto image = [&](const Rigid3& pose, std::uint64_t seed) {
     return MakeFeatures(world.Render(*camera, pose, 1.5, seed));
   };
   Mapper mapper({});
@@ -24,15 +24,15 @@ TEST(PanoramaStart, TheFirstPictureIsLocalizedOnceTheMapKnowsDepth) {
   first.choice = KeyFrameChoice::kFirst;
   first.time = FromSeconds(0);
   first.camera = camera;
-  first.features = picture(CameraAt({0, 0, 0}), 1);
+  first.features = image(CameraAt({0, 0, 0}), 1);
   ASSERT_TRUE(mapper.Offer(first));
   mapper.Step();
   ASSERT_NE(mapper.Snapshot(), nullptr);
   const Rigid3 a = CameraAt({0, 0, 0}, {0, 6, 0}), b = CameraAt({0.1, 0, 0}, {0, 6, 0});
   InitialPair pair;
   pair.camera = camera;
-  pair.a = {FromSeconds(1), picture(a, 2)};
-  pair.b = {FromSeconds(1.5), picture(b, 3)};
+  pair.a = {FromSeconds(1), image(a, 2)};
+  pair.b = {FromSeconds(1.5), image(b, 3)};
   pair.a_from_map = a;
   pair.geometry.verdict = TwoViewVerdict::kGeneral;
   pair.geometry.b_from_a = b * a.inverse();

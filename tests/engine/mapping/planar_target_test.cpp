@@ -22,7 +22,7 @@ const TargetScene& Scene() {
   return scene;
 }
 const PlanarTarget& Target() {
-  static const PlanarTarget target(Scene().picture, Scene().width_m);
+  static const PlanarTarget target(Scene().image, Scene().width_m);
   return target;
 }
 const std::shared_ptr<const CameraModel>& Camera() {
@@ -71,7 +71,7 @@ TEST(PlanarTarget, NamesPointsWhereTheyAre) {
   ASSERT_TRUE(sighting);
   ASSERT_GE(sighting->points.size(), 50u);
   for (std::size_t i = 0; i < sighting->points.size(); ++i) {
-    const TargetSighting::Point& point = sighting->points[i];
+    const TargetDetection::Point& point = sighting->points[i];
     if (i > 0) {
       EXPECT_GT(point.id, sighting->points[i - 1].id);
     }
@@ -86,7 +86,7 @@ TEST(PlanarTarget, NamesPointsWhereTheyAre) {
 
 TEST(PlanarTarget, IsMeasuredInItsOwnWidth) {
   const View view{2, 20, 0, 0};
-  const PlanarTarget half(Scene().picture, Scene().width_m / 2);
+  const PlanarTarget half(Scene().image, Scene().width_m / 2);
   const auto sighting = half.Detect(*Look(view), *Camera(), 1);
   ASSERT_TRUE(sighting);
   EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation / 2).norm(), 0.005);
@@ -94,11 +94,11 @@ TEST(PlanarTarget, IsMeasuredInItsOwnWidth) {
 
 TEST(PlanarTarget, IsFoundInOtherLightAndBlurred) {
   const View view{2, 25, 10, 30};
-  const cv::Mat picture = Scene().world.Render(
+  const cv::Mat image = Scene().world.Render(
       *Camera(), LookAtBoard(view.distance, view.slant_deg, view.rise_deg, view.roll_deg), 1.5);
   cv::Mat dim, blurred;
-  picture.convertTo(dim, -1, 0.45, 10);
-  cv::GaussianBlur(picture, blurred, {}, 1.8);
+  image.convertTo(dim, -1, 0.45, 10);
+  cv::GaussianBlur(image, blurred, {}, 1.8);
   for (const cv::Mat& changed : {dim, blurred}) {
     const auto sighting = Target().Detect(*MakeFeatures(changed), *Camera(), 1);
     ASSERT_TRUE(sighting);
@@ -109,9 +109,9 @@ TEST(PlanarTarget, IsFoundInOtherLightAndBlurred) {
 
 TEST(PlanarTarget, IsFoundWhenAThirdIsHidden) {
   const View view{2, 10, 0, 0};
-  cv::Mat picture = Scene().world.Render(*Camera(), LookAtBoard(2, 10, 0, 0), 1.5);
-  picture(cv::Rect(0, 0, 250, 480)) = cv::Scalar(60);
-  const auto sighting = Target().Detect(*MakeFeatures(picture), *Camera(), 1);
+  cv::Mat image = Scene().world.Render(*Camera(), LookAtBoard(2, 10, 0, 0), 1.5);
+  image(cv::Rect(0, 0, 250, 480)) = cv::Scalar(60);
+  const auto sighting = Target().Detect(*MakeFeatures(image), *Camera(), 1);
   ASSERT_TRUE(sighting);
   EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation).norm(), 0.02);
 }
@@ -126,7 +126,7 @@ TEST(PlanarTarget, IsFoundThroughAWideLens) {
   EXPECT_LT(AngleBetween(sighting->camera_from_target, truth), 0.5);
 }
 
-TEST(PlanarTarget, IsNeverFoundInOtherPictures) {
+TEST(PlanarTarget, IsNeverFoundInOtherImages) {
   for (std::uint64_t seed = 500; seed < 512; ++seed) {
     const TargetScene other(seed);
     const auto features = MakeFeatures(other.world.Render(*Camera(), LookAtBoard(2, 15, 5, 10), 1.5));
@@ -176,9 +176,9 @@ TEST(PlanarTargetAlignment, RefusesAPoseFromWhichItIsNotSeen) {
 }
 
 TEST(MakingAPlanarTarget, RefusesWhatCannotBeFoundOrMeasured) {
-  EXPECT_THROW(PlanarTarget(Scene().picture, 0), Error);
-  EXPECT_THROW(PlanarTarget(Scene().picture, -1), Error);
-  EXPECT_THROW(PlanarTarget(Scene().picture, std::nan("")), Error);
+  EXPECT_THROW(PlanarTarget(Scene().image, 0), Error);
+  EXPECT_THROW(PlanarTarget(Scene().image, -1), Error);
+  EXPECT_THROW(PlanarTarget(Scene().image, std::nan("")), Error);
   EXPECT_THROW(PlanarTarget(cv::Mat(50, 300, CV_8UC1, cv::Scalar(0)), 1), Error);
   EXPECT_THROW(PlanarTarget(cv::Mat(300, 300, CV_8UC1, cv::Scalar(90)), 1), Error);
 }

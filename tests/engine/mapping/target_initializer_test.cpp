@@ -27,7 +27,7 @@ std::shared_ptr<const ImageFeatures> Look(const Rigid3& camera_from_world) {
   return MakeFeatures(Scene().world.Render(*Camera(), camera_from_world, 1.5));
 }
 TargetInitializer MakeInitializer() {
-  static const auto target = std::make_shared<const PlanarTarget>(Scene().picture, Scene().width_m);
+  static const auto target = std::make_shared<const PlanarTarget>(Scene().image, Scene().width_m);
   return TargetInitializer(target, {}, Camera(), 1);
 }
 
@@ -114,7 +114,7 @@ TEST(TargetInitializer, FindsTheTargetAgainAfterItWasGone) {
 }
 
 TEST(TargetStart, NeedsParallaxAndPoints) {
-  const PlanarTarget target(Scene().picture, Scene().width_m);
+  const PlanarTarget target(Scene().image, Scene().width_m);
   const auto view = [&](double right) {
     const auto features = Look(CameraAt({right, 0, 0}));
     return TargetView{{Timestamp(0), features}, *target.Detect(*features, *Camera(), 1)};

@@ -7,13 +7,13 @@
 #include "engine/mapping/planar_target.h"
 #include "tests/engine/rendered_world.h"
 
-// A painted board before a painted wall, and the picture of it that a person would hand in: what the tests of
+// A painted board before a painted wall, and the image of it that a person would hand in: what the tests of
 // planar targets look at. World frame x right, y down, z forward, metres.
 namespace docent::engine::testing_world {
 
 struct TargetScene {
   RenderedWorld world{{}};
-  cv::Mat picture;  // of the board, CV_8UC1
+  cv::Mat image;  // of the board, CV_8UC1
   double width_m = 0;
   Rigid3 world_from_target;
 
@@ -27,11 +27,11 @@ struct TargetScene {
       walls.push_back(PaintedWall({1.3, -0.1, 1.8}, x, y, 0.35, 0.6, seed + 300));
     }
     world = RenderedWorld(walls);
-    board.paint.convertTo(picture, CV_8UC1);
-    width_m = picture.cols * kTexelSize;
-    // The paint's first texel lies on the board's edge, a picture's first pixel half a pixel inside.
-    const Eigen::Vector3d off((picture.cols - 1) * kTexelSize / 2 - 0.8,
-                              (picture.rows - 1) * kTexelSize / 2 - 0.6, 0);
+    board.paint.convertTo(image, CV_8UC1);
+    width_m = image.cols * kTexelSize;
+    // The paint's first texel lies on the board's edge, an image's first pixel half a pixel inside.
+    const Eigen::Vector3d off((image.cols - 1) * kTexelSize / 2 - 0.8,
+                              (image.rows - 1) * kTexelSize / 2 - 0.6, 0);
     world_from_target = Rigid3(Rotation3(), middle + off);
   }
 };

@@ -65,7 +65,7 @@ struct SceneOptions {
   int count = 400;
   double noise_px = 0.5;
   double outlier_ratio = 0;
-  // The focal length with which the pictures are read, relative to the one with which they were taken.
+  // The focal length with which the images are read, relative to the one with which they were taken.
   double focal_error = 1;
 };
 

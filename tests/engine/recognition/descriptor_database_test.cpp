@@ -23,9 +23,9 @@ using Match = DescriptorDatabase::Match;
 using Vote = DescriptorDatabase::Vote;
 
 // A map's worth of points with a look of their own.
-class Looks {
+class Appearance {
  public:
-  explicit Looks(std::size_t points) {
+  explicit Appearance(std::size_t points) {
     Random random(21);
     for (std::size_t i = 0; i < points; ++i) looks_.push_back(MadeDescriptor(&random));
   }
@@ -47,8 +47,8 @@ class Looks {
  private:
   std::vector<Descriptor> looks_;
 };
-const Looks& Points() {
-  static const Looks looks(2000);
+const Appearance& Points() {
+  static const Appearance looks(2000);
   return looks;
 }
 
@@ -263,7 +263,7 @@ TEST(DescriptorMatches, AreNotMadeForWhatLooksLikeNothingThere) {
 TEST(KeyFrameVotes, RankKeyFramesByWhatTheyShare) {
   DescriptorDatabase database(MadeTree());
   for (KeyFrameId id = 0; id < 10; ++id) AddAll(Points().KeyFrame(id, 100 * id, 200), &database);
-  // Looks like a place between keyframes 4 (three quarters) and 5 (three quarters less a little).
+  // Appearance like a place between keyframes 4 (three quarters) and 5 (three quarters less a little).
   const auto votes = database.FindKeyFrames(DescriptorsOf(Points().KeyFrame(50, 440, 200)), 3);
   ASSERT_EQ(votes.size(), 3u);
   EXPECT_EQ(votes[0].keyframe, 4u);

@@ -131,15 +131,15 @@ std::vector<Descriptor> DescriptorsOfARoom() {
   const auto camera = testing_world::PinholeCamera(640, 480);
   std::vector<Descriptor> descriptors;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    const cv::Mat picture =
+    const cv::Mat image =
         testing_world::RenderedWorld::Room(seed).Render(*camera, testing_world::CameraAt({0, 0, 0}), 1.5);
-    for (const DescribedPlace& place : DescribeCorners(*MakeFeatures(picture)))
+    for (const DescribedPlace& place : DescribeCorners(*MakeFeatures(image)))
       descriptors.push_back(place.oriented.descriptor);
   }
   return descriptors;
 }
 
-TEST(DefaultVocabulary, TellsAPicturesCornersApart) {
+TEST(DefaultVocabulary, TellsAnImagesCornersApart) {
   std::set<std::uint32_t> leaves;
   double centre_distance = 0;
   const std::vector<Descriptor> descriptors = DescriptorsOfARoom();

@@ -34,18 +34,18 @@ TEST(WordBag, AWordIsItsTwoBytes) {
   }
 }
 
-// Blobs on a grey ground, in the middle of the picture, so that nothing leaves it when it is turned.
+// Blobs on a grey ground, in the middle of the image, so that nothing leaves it when it is turned.
 cv::Mat Blobs(std::uint64_t seed) {
   Random random(seed);
-  cv::Mat picture(480, 640, CV_8UC1, cv::Scalar(128));
+  cv::Mat image(480, 640, CV_8UC1, cv::Scalar(128));
   for (int i = 0; i < 150; ++i) {
     const double angle = random.Uniform(0, 6.28), radius = 170 * std::sqrt(random.Uniform(0, 1));
     const cv::Point middle(static_cast<int>(320 + radius * std::cos(angle)),
                            static_cast<int>(240 + radius * std::sin(angle)));
-    cv::rectangle(picture, middle, middle + cv::Point(8 + static_cast<int>(random.Below(25)), 12),
+    cv::rectangle(image, middle, middle + cv::Point(8 + static_cast<int>(random.Below(25)), 12),
                   cv::Scalar(random.Below(256)), -1);
   }
-  return picture;
+  return image;
 }
 
 // What part of the words two bags share.
@@ -59,20 +59,20 @@ double Shared(const WordBag& a, const WordBag& b) {
   return shared / all;
 }
 
-TEST(WordBag, MostWordsStayWhenThePictureTurnsOrDarkensAndFewAreThoseOfAnother) {
-  const cv::Mat picture = Blobs(1);
-  const WordBag bag = MakeWordBag(*MakeFeatures(picture));
+TEST(WordBag, MostWordsStayWhenTheImageTurnsOrDarkensAndFewAreThoseOfAnother) {
+  const cv::Mat image = Blobs(1);
+  const WordBag bag = MakeWordBag(*MakeFeatures(image));
   EXPECT_GT(bag.size(), 80u);
-  EXPECT_EQ(MakeWordBag(*MakeFeatures(picture)), bag);
+  EXPECT_EQ(MakeWordBag(*MakeFeatures(image)), bag);
   const double other = Shared(bag, MakeWordBag(*MakeFeatures(Blobs(2))));
   cv::Mat turned, dark;
-  cv::rotate(picture, turned, cv::ROTATE_180);
-  picture.convertTo(dark, CV_8U, 0.5, 5);
+  cv::rotate(image, turned, cv::ROTATE_180);
+  image.convertTo(dark, CV_8U, 0.5, 5);
   EXPECT_GT(Shared(bag, MakeWordBag(*MakeFeatures(turned))), 1.5 * other);
   EXPECT_GT(Shared(bag, MakeWordBag(*MakeFeatures(dark))), 2 * other);
 }
 
-TEST(WordBag, APictureWithoutTextureHasNone) {
+TEST(WordBag, AImageWithoutTextureHasNone) {
   EXPECT_TRUE(MakeWordBag(*MakeFeatures(cv::Mat(480, 640, CV_8UC1, cv::Scalar(90)))).empty());
 }
 

@@ -10,7 +10,7 @@
 #include "tests/engine/lockstep.h"
 #include "tests/engine/mapping/panorama_scene.h"
 
-// A tracker that knows panorama maps, and its mapper, on pictures of a painted room: an instant start, a
+// A tracker that knows panorama maps, and its mapper, on images of a painted room: an instant start, a
 // walk, a turn on the spot far beyond what the walk has seen, and the way back.
 namespace docent::engine {
 namespace {
@@ -43,19 +43,19 @@ Rigid3 Pose(int frame) {
   return CameraAt(walk(static_cast<double>(frame - kTurnEnds) / kWalk), {0, 0, 0});
 }
 
-const std::vector<cv::Mat>& Pictures() {
-  static const std::vector<cv::Mat> pictures = [] {
+const std::vector<cv::Mat>& Images() {
+  static const std::vector<cv::Mat> images = [] {
     const RenderedWorld world = testing_world::Chamber(101);
     std::vector<cv::Mat> rendered;
     for (int i = 0; i < kFrames; ++i)
       rendered.push_back(world.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i) + 1));
     return rendered;
   }();
-  return pictures;
+  return images;
 }
 
 Frame FrameOf(int index) {
-  return testing_world::MakeFrame(index, Pictures()[static_cast<std::size_t>(index)]);
+  return testing_world::MakeFrame(index, Images()[static_cast<std::size_t>(index)]);
 }
 
 struct Tour {
@@ -93,7 +93,7 @@ int FirstWithDepth(const Tour& tour) {
   return first;
 }
 
-TEST(HybridTracker, StartsWithTheFirstPicture) {
+TEST(HybridTracker, StartsWithTheFirstImage) {
   const Tour& tour = HybridTour();
   EXPECT_EQ(tour.At(0).state, TrackingState::kInitializing);
   for (int i = 1; i < kStill; ++i) {

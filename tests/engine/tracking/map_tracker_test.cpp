@@ -81,7 +81,7 @@ TEST_F(TrackingInAMap, FindsThePoseFromAPerturbedPrediction) {
           CameraAt({random.Uniform(-0.03, 0.03), random.Uniform(-0.03, 0.03), random.Uniform(-0.03, 0.03)},
                    {random.Uniform(-2, 2), random.Uniform(-2, 2), random.Uniform(-2, 2)}) *
           view;
-      const MapTrackResult result = tracker.Track(*map_, *features, predicted, Effort::kUsual, &random);
+      const MapTrackResult result = tracker.Track(*map_, *features, predicted, Effort::kStandard, &random);
       ExpectAt(result, view);
       EXPECT_GT(result.Quality(), 0.5);
       EXPECT_GT(result.inliers, 100);
@@ -95,7 +95,7 @@ TEST_F(TrackingInAMap, TellsWhatItLookedForAndFound) {
   MapTracker tracker({}, camera_);
   Random random(2);
   const auto features = Show(*world_, Views()[0]);
-  const MapTrackResult result = tracker.Track(*map_, *features, Views()[0], Effort::kUsual, &random);
+  const MapTrackResult result = tracker.Track(*map_, *features, Views()[0], Effort::kStandard, &random);
   EXPECT_EQ(static_cast<int>(tracker.attempts().size()), result.attempted);
   EXPECT_EQ(static_cast<int>(tracker.matches().size()), result.found);
   const auto inlying = [](const auto& item) { return item.inlier; };
@@ -119,19 +119,19 @@ TEST_F(TrackingInAMap, TellsWhatItLookedForAndFound) {
   EXPECT_LT(std::sqrt(result.covariance.topLeftCorner<3, 3>().trace()), 0.01);
 }
 
-// Somebody stands before the left half of the picture, and goes away again.
+// Somebody stands before the left half of the image, and goes away again.
 TEST_F(TrackingInAMap, LooksLessOftenForWhatIsHidden) {
   MapTracker tracker({}, camera_);
   Random random(9);
   const Rigid3 view = Views()[0];
-  cv::Mat picture = world_->Render(*camera_, view, 1.5, 3);
-  const auto free = MakeFeatures(picture.clone());
-  picture(cv::Rect(0, 0, picture.cols / 2, picture.rows)).setTo(90);
-  const auto hidden = MakeFeatures(picture);
+  cv::Mat image = world_->Render(*camera_, view, 1.5, 3);
+  const auto free = MakeFeatures(image.clone());
+  image(cv::Rect(0, 0, image.cols / 2, image.rows)).setTo(90);
+  const auto hidden = MakeFeatures(image);
   const auto track = [&](const ImageFeatures& features, int frames) {
     MapTrackResult result;
     for (int i = 0; i < frames; ++i) {
-      result = tracker.Track(*map_, features, view, Effort::kUsual, &random);
+      result = tracker.Track(*map_, features, view, Effort::kStandard, &random);
       tracker.Remember();
     }
     ExpectAt(result, view);
@@ -154,12 +154,12 @@ TEST_F(TrackingInAMap, ChangesItsChoiceLittleByLittle) {
   const Rigid3 view = Views()[0];
   const auto features = Show(*world_, view);
   MapTracker all({}, camera_);
-  const int in_view = all.Track(*map_, *features, view, Effort::kUsual, &random).attempted;
+  const int in_view = all.Track(*map_, *features, view, Effort::kStandard, &random).attempted;
   MapTrackerOptions options;
   options.max_fine = in_view / 4;
   MapTracker tracker(options, camera_);
   const auto choose = [&] {
-    tracker.Track(*map_, *features, view, Effort::kUsual, &random);
+    tracker.Track(*map_, *features, view, Effort::kStandard, &random);
     std::set<MapPointId> chosen;
     for (const MapTracker::Attempt& attempt : tracker.attempts()) chosen.insert(attempt.point);
     return chosen;
@@ -206,7 +206,7 @@ TEST_F(TrackingInAMap, BelievesNothingOfAnotherWorld) {
   Random random(4);
   for (const Rigid3& view : Views()) {
     const auto features = Show(other, view);
-    for (const Effort effort : {Effort::kUsual, Effort::kWide, Effort::kRecovery}) {
+    for (const Effort effort : {Effort::kStandard, Effort::kWide, Effort::kRecovery}) {
       MapTracker tracker({}, camera_);
       const MapTrackResult result = tracker.Track(*map_, *features, view, effort, &random);
       EXPECT_FALSE(Believed(result)) << "effort " << static_cast<int>(effort) << ": " << result.inliers
@@ -215,11 +215,11 @@ TEST_F(TrackingInAMap, BelievesNothingOfAnotherWorld) {
   }
 }
 
-TEST_F(TrackingInAMap, BelievesNothingOfABlankPictureOrAnEmptyMap) {
+TEST_F(TrackingInAMap, BelievesNothingOfABlankImageOrAnEmptyMap) {
   Random random(5);
   const auto blank = MakeFeatures(cv::Mat(300, 400, CV_8UC1, cv::Scalar(90)));
   const auto features = Show(*world_, Views()[0]);
-  for (const Effort effort : {Effort::kUsual, Effort::kWide, Effort::kRecovery}) {
+  for (const Effort effort : {Effort::kStandard, Effort::kWide, Effort::kRecovery}) {
     MapTracker tracker({}, camera_);
     EXPECT_FALSE(tracker.Track(*map_, *blank, Views()[0], effort, &random).converged);
     EXPECT_FALSE(tracker.Track(MapSnapshot(), *features, Views()[0], effort, &random).converged);
@@ -231,7 +231,7 @@ TEST_F(TrackingInAMap, SeesNothingFromBehindTheWalls) {
   Random random(6);
   const auto features = Show(*world_, Views()[0]);
   const MapTrackResult result =
-      tracker.Track(*map_, *features, CameraAt({0, 0, 6}, {0, 180, 0}), Effort::kUsual, &random);
+      tracker.Track(*map_, *features, CameraAt({0, 0, 6}, {0, 180, 0}), Effort::kStandard, &random);
   EXPECT_EQ(result.attempted, 0);
   EXPECT_FALSE(result.converged);
 }
@@ -242,7 +242,7 @@ TEST_F(TrackingInAMap, AnswersTheSameToTheSameSeed) {
     MapTracker tracker({}, camera_);
     Random random(7);
     for (const Rigid3& view : Views())
-      result = tracker.Track(*map_, *Show(*world_, view), view, Effort::kUsual, &random);
+      result = tracker.Track(*map_, *Show(*world_, view), view, Effort::kStandard, &random);
   }
   EXPECT_EQ(results[0].camera_from_map.translation, results[1].camera_from_map.translation);
   EXPECT_EQ(results[0].camera_from_map.rotation.quaternion().coeffs(),

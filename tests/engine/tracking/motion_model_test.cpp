@@ -58,7 +58,7 @@ TEST(MotionModel, SlowsDownWhileNothingIsFound) {
   EXPECT_LT(step, 1e-5);
 }
 
-TEST(MotionModel, TwoPicturesOfOneTimeDoNotBreakIt) {
+TEST(MotionModel, TwoImagesOfOneTimeDoNotBreakIt) {
   MotionModel model;
   model.Reset(FromSeconds(1), Screw(0));
   model.Update(FromSeconds(1), Screw(0.1));

@@ -32,7 +32,7 @@ class PointSearch : public ::testing::Test {
   }
   const KeyFrame& Source() const { return map_->keyframes[0]; }
 
-  // Where the wall's homography takes a pixel of a level of the source picture.
+  // Where the wall's homography takes a pixel of a level of the source image.
   std::optional<Eigen::Vector2d> ThroughTheWall(const Eigen::Vector2d& source_pixel, int level,
                                                 const Rigid3& camera_from_world) const {
     const auto hit =
@@ -166,7 +166,7 @@ TEST_F(PointSearch, PredictsNothingBehindOutsideOrEdgeOn) {
   }
 }
 
-TEST_F(PointSearch, FindsNothingInAPictureOfSomethingElse) {
+TEST_F(PointSearch, FindsNothingInAnImageOfSomethingElse) {
   const RenderedWorld other = RenderedWorld::SingleWall(2, 999);
   PointSearcher searcher;
   const auto features = MakeFeatures(other.Render(*camera_, Views()[0]));

@@ -37,7 +37,7 @@ Rigid3 Perturbed(Random* random, double distance_m, double angle_deg) {
   return Rigid3::Exp(twist) * Truth();
 }
 
-// Points spread over the picture, one to four metres away, on four pyramid levels; the noise is that of the
+// Points spread over the image, one to four metres away, on four pyramid levels; the noise is that of the
 // level. infinite: directions instead.
 void AddMeasurements(int count, double noise_sigmas, bool infinite, Random* random,
                      std::vector<PoseMeasurement>* measurements) {
@@ -341,8 +341,8 @@ TEST(PoseRefinement, TakesNothingOfTheTranslationFromInfinitePoints) {
   }
 }
 
-// Twenty points place a camera when they are all over the picture, not when they are about to leave it.
-// Points in a strip at the picture's rim, which moving and turning shift alike.
+// Twenty points place a camera when they are all over the image, not when they are about to leave it.
+// Points in a strip at the image's rim, which moving and turning shift alike.
 void AddPointsAtTheRim(int count, const Rigid3& seen_from, Random* random,
                        std::vector<PoseMeasurement>* measurements) {
   for (int i = 0; i < count; ++i) {
@@ -397,7 +397,7 @@ TEST(PoseRefinement, KeepsToASureTurnWherePointsTellLittleAndLeavesItWhereTheyTe
   }
   EXPECT_LT(held, 0.4 * freely);
 
-  // It has stepped aside by two hundredths of the depth, and points all over the picture say so.
+  // It has stepped aside by two hundredths of the depth, and points all over the image say so.
   std::vector<PoseMeasurement> spread;
   AddMeasurements(400, 0.3, false, &random, &spread);
   const Rigid3 aside = testing_world::CameraAt({0.05, 0, 0}) * Truth();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tracker and a mapper that start from a printed picture of known width.
+// A tracker and a mapper that start from a printed image of known width.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -20,7 +20,7 @@ TEST_P(TargetTracking, MakesAMapInMetres) {
   static const auto camera = testing_world::PinholeCamera(640, 480);
   TrackerOptions options;
   options.hybrid = GetParam();
-  options.target = std::make_shared<const PlanarTarget>(scene.picture, scene.width_m);
+  options.target = std::make_shared<const PlanarTarget>(scene.image, scene.width_m);
   Lockstep lockstep(options, camera, 1);
   std::vector<Rigid3> truth, tracked;
   std::string first_hint;
@@ -38,7 +38,7 @@ TEST_P(TargetTracking, MakesAMapInMetres) {
   }
   EXPECT_EQ(first_hint, "move sideways");
   ASSERT_GT(tracked.size(), 15u);
-  // No alignment: the map's unit is the metre, from the picture's width alone.
+  // No alignment: the map's unit is the metre, from the image's width alone.
   const double went = (tracked.back().OriginInSource() - tracked.front().OriginInSource()).norm();
   const double truly = (truth.back().OriginInSource() - truth.front().OriginInSource()).norm();
   EXPECT_NEAR(went, truly, 0.03 * truly);

@@ -40,9 +40,9 @@ Rigid3 Pose(int frame) {
                   {1.5 * std::sin(1.7 * t), -4 * std::sin(0.9 * t), 2 * std::sin(1.1 * t)});
 }
 
-// The pictures of one walk, rendered once.
-const std::vector<cv::Mat>& Pictures() {
-  static const std::vector<cv::Mat> pictures = [] {
+// The images of one walk, rendered once.
+const std::vector<cv::Mat>& Images() {
+  static const std::vector<cv::Mat> images = [] {
     std::vector<cv::Mat> rendered;
     for (int i = 0; i < kFrames; ++i) {
       const auto seed = static_cast<std::uint64_t>(i) + 1;
@@ -55,11 +55,11 @@ const std::vector<cv::Mat>& Pictures() {
     }
     return rendered;
   }();
-  return pictures;
+  return images;
 }
 
 Frame FrameOf(int index) {
-  return testing_world::MakeFrame(index, Pictures()[static_cast<std::size_t>(index)]);
+  return testing_world::MakeFrame(index, Images()[static_cast<std::size_t>(index)]);
 }
 
 struct Walk {
@@ -227,8 +227,8 @@ TEST(Tracker, FindsItsPlaceInOverExposedImagesAndStaysThereWhenTheExposureIsRigh
   for (int i = 40; i < 80; ++i) {
     Frame frame = FrameOf(i);
     cv::Mat bright;  // the images are shared by all tests
-    frame.picture.convertTo(bright, -1, kGain);
-    if (i < 60) frame.picture = bright;
+    frame.image.convertTo(bright, -1, kGain);
+    if (i < 60) frame.image = bright;
     const TrackedFrame tracked = tracker.Track(frame, &places);
     if (first < 0 && HasPose(tracked.state)) first = i;
     if (first < 0) continue;
@@ -259,7 +259,7 @@ TEST(Tracker, EntersAnotherMapOnlyAfterSeveralFramesAgree) {
   EXPECT_LT(first, 50);
 }
 
-TEST(Tracker, IsLostAsSoonAsThePictureIsOfAnotherPlace) {
+TEST(Tracker, IsLostAsSoonAsTheImageIsOfAnotherPlace) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
   SomeMaps places;
@@ -274,7 +274,7 @@ TEST(Tracker, IsLostAsSoonAsThePictureIsOfAnotherPlace) {
   ASSERT_EQ(last.state, TrackingState::kSixDof);
   for (int i = 55; i < 60; ++i) {
     Frame frame = FrameOf(i);
-    frame.picture = other.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i));
+    frame.image = other.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i));
     EXPECT_EQ(tracker.Track(frame, &places).state, TrackingState::kLost) << i;
   }
 }
@@ -291,19 +291,19 @@ TEST(Tracker, EntersNoMapOfAnotherPlace) {
   tracker.SetMap(walk.map, 9);
   for (int i = 40; i < 55; ++i) {
     Frame frame = FrameOf(i);
-    frame.picture = other.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i));
+    frame.image = other.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i));
     EXPECT_EQ(tracker.Track(frame, &places).state, TrackingState::kLost);
   }
 }
 
 // A grid of tiles before the lens, of which one in `every` is open.
-void CoverTiles(int every, cv::Mat* picture) {
+void CoverTiles(int every, cv::Mat* image) {
   constexpr int kTile = 40;  // pixels
   int tile = 0;
-  for (int y = 0; y < picture->rows; y += kTile) {
-    for (int x = 0; x < picture->cols; x += kTile, ++tile) {
-      const cv::Rect rectangle = cv::Rect(x, y, kTile, kTile) & cv::Rect(0, 0, picture->cols, picture->rows);
-      if (tile % every != 0) (*picture)(rectangle).setTo(128);
+  for (int y = 0; y < image->rows; y += kTile) {
+    for (int x = 0; x < image->cols; x += kTile, ++tile) {
+      const cv::Rect rectangle = cv::Rect(x, y, kTile, kTile) & cv::Rect(0, 0, image->cols, image->rows);
+      if (tile % every != 0) (*image)(rectangle).setTo(128);
     }
   }
 }
@@ -314,7 +314,7 @@ TEST(Tracker, HoldsAPoseThatManyPointsAgreeOnThoughMostAreHidden) {
   TrackerOptions options;
   const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
   for (const bool agreement_counts : {true, false}) {
-    if (!agreement_counts) options.many_inliers = 100000;
+    if (!agreement_counts) options.min_consensus_inliers = 100000;
     SomeMaps places;
     places.Add(9, walk.map);
     Tracker tracker(options, Camera(), 3);
@@ -322,13 +322,13 @@ TEST(Tracker, HoldsAPoseThatManyPointsAgreeOnThoughMostAreHidden) {
     for (int i = 40; i < 55; ++i) tracker.Track(FrameOf(i), &places);
     constexpr int kCovered = 55;
     Frame frame = FrameOf(kCovered);
-    frame.picture = frame.picture.clone();
-    CoverTiles(8, &frame.picture);
+    frame.image = frame.image.clone();
+    CoverTiles(8, &frame.image);
     const TrackedFrame tracked = tracker.Track(frame, nullptr);
     if (agreement_counts) {
       ASSERT_EQ(tracked.state, TrackingState::kSixDof);
       EXPECT_LT(tracked.quality, options.lost_quality);
-      EXPECT_GE(tracked.finite_points, options.many_inliers);
+      EXPECT_GE(tracked.finite_points, options.min_consensus_inliers);
       EXPECT_LT(DistanceFromTruth(world_from_map, tracked.camera_from_map, Pose(kCovered)), 0.02);
     } else {
       EXPECT_EQ(tracked.state, TrackingState::kLost);
@@ -342,9 +342,9 @@ TEST(Tracker, ExtendsItsMapAgainAfterAShortLossThoughHalfOfItIsHidden) {
   std::size_t keyframes = 0;
   for (int i = 0; i < kWalk; ++i) {
     Frame frame = FrameOf(i);
-    frame.picture = frame.picture.clone();
-    if (i >= kCovered) CoverTiles(3, &frame.picture);
-    if (i >= kLost && i < kBack) frame.picture.setTo(128);
+    frame.image = frame.image.clone();
+    if (i >= kCovered) CoverTiles(3, &frame.image);
+    if (i >= kLost && i < kBack) frame.image.setTo(128);
     const TrackedFrame tracked = lockstep.Feed(frame);
     if (i == kBack - 1) keyframes = lockstep.map()->keyframes.size();
   }

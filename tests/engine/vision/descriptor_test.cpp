@@ -17,7 +17,7 @@
 namespace docent::engine {
 namespace {
 
-// Smooth random blobs, known at every real place, so that a turned or scaled picture follows from
+// Smooth random blobs, known at every real place, so that a turned or scaled image follows from
 // mathematics.
 class Blobs {
  public:
@@ -61,16 +61,16 @@ class Blobs {
   double origin_ = 0;
 };
 
-// A picture of 41x41 pixels about a place: its middle is pixel (20, 20).
+// An image of 41x41 pixels about a place: its middle is pixel (20, 20).
 cv::Mat Around(const std::function<double(double, double)>& grey, const Eigen::Vector2d& place,
                double turn_rad = 0, double scale = 1) {
-  cv::Mat picture(41, 41, CV_8UC1);
+  cv::Mat image(41, 41, CV_8UC1);
   const double c = scale * std::cos(turn_rad), s = scale * std::sin(turn_rad);
   for (int y = 0; y < 41; ++y)
     for (int x = 0; x < 41; ++x)
-      picture.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(
+      image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(
           grey(place.x() + c * (x - 20) - s * (y - 20), place.y() + s * (x - 20) + c * (y - 20)));
-  return picture;
+  return image;
 }
 
 const Eigen::Vector2f kMiddle(20, 20);
@@ -82,7 +82,7 @@ std::vector<Eigen::Vector2d> Places(int count) {
   return places;
 }
 
-// Of the descriptors of two pictures of the same place: the nearest pair counts, as it does in matching.
+// Of the descriptors of two images of the same place: the nearest pair counts, as it does in matching.
 int Difference(const Description& a, const Description& b) {
   int least = 4 * kDescriptorLength * kDescriptorLength;
   for (int i = 0; i < a.count; ++i)
@@ -92,7 +92,7 @@ int Difference(const Description& a, const Description& b) {
   return least;
 }
 
-// Counts how often the changed picture of a place is nearest, among all places, to the place itself.
+// Counts how often the changed image of a place is nearest, among all places, to the place itself.
 double PartRecognised(const std::function<cv::Mat(const Eigen::Vector2d&)>& changed) {
   const Blobs blobs(5);
   std::vector<Description> known, seen;
@@ -114,7 +114,7 @@ double PartRecognised(const std::function<cv::Mat(const Eigen::Vector2d&)>& chan
   return static_cast<double>(right) / static_cast<double>(seen.size());
 }
 
-TEST(Descriptor, RecognisesPlacesWhateverThePictureIsTurnedBy) {
+TEST(Descriptor, RecognisesPlacesWhateverTheImageIsTurnedBy) {
   const Blobs blobs(5);
   for (const double turn_deg : {10.0, 45.0, 90.0, 133.0, 180.0, -77.0}) {
     EXPECT_GT(PartRecognised([&](const Eigen::Vector2d& place) {
@@ -159,16 +159,16 @@ TEST(Descriptor, RecognisesPlacesThroughNoiseAndAPixelOff) {
 TEST(Descriptor, KeepsTheSameBytesUnderAnOffsetOfBrightness) {
   const Blobs blobs(6);
   for (const Eigen::Vector2d& place : Places(30)) {
-    const cv::Mat picture = Around([&](double x, double y) { return 0.3 * blobs(x, y) + 40; }, place);
-    const cv::Mat brighter = picture + cv::Scalar(60);
-    const auto a = Describe(picture, kMiddle), b = Describe(brighter, kMiddle);
+    const cv::Mat image = Around([&](double x, double y) { return 0.3 * blobs(x, y) + 40; }, place);
+    const cv::Mat brighter = image + cv::Scalar(60);
+    const auto a = Describe(image, kMiddle), b = Describe(brighter, kMiddle);
     ASSERT_TRUE(a && b);
     ASSERT_EQ(a->count, b->count);
     EXPECT_LT(Difference(*a, *b), 20);
   }
 }
 
-TEST(Descriptor, TurnsItsDirectionWithThePicture) {
+TEST(Descriptor, TurnsItsDirectionWithTheImage) {
   const Blobs blobs(7);
   int agree = 0, all = 0;
   for (const Eigen::Vector2d& place : Places(60)) {
@@ -212,14 +212,14 @@ TEST(Descriptor, HasTheSameLengthEverywhere) {
 }
 
 TEST(Descriptor, RefusesPlacesNearTheBorder) {
-  const cv::Mat picture = Around(Blobs(9), {0, 0});
-  EXPECT_TRUE(Describe(picture, {14, 14}));
-  EXPECT_TRUE(Describe(picture, {26, 26}));
+  const cv::Mat image = Around(Blobs(9), {0, 0});
+  EXPECT_TRUE(Describe(image, {14, 14}));
+  EXPECT_TRUE(Describe(image, {26, 26}));
   for (const Eigen::Vector2f& pixel :
        {Eigen::Vector2f(13.9f, 20), Eigen::Vector2f(20, 13.9f), Eigen::Vector2f(26.1f, 20),
         Eigen::Vector2f(20, 26.1f), Eigen::Vector2f(-5, 20), Eigen::Vector2f(1e9f, 20),
         Eigen::Vector2f(std::nanf(""), 20)}) {
-    EXPECT_FALSE(Describe(picture, pixel)) << pixel.transpose();
+    EXPECT_FALSE(Describe(image, pixel)) << pixel.transpose();
   }
 }
 

@@ -14,37 +14,37 @@ namespace {
 
 cv::Mat Noise(int width, int height, std::uint64_t seed) {
   Random random(seed);
-  cv::Mat picture(height, width, CV_8UC1);
+  cv::Mat image(height, width, CV_8UC1);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
-      picture.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
-  return picture;
+      image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
+  return image;
 }
 
 cv::Mat Blurred(int width, int height, std::uint64_t seed) {
-  cv::Mat picture;
-  cv::GaussianBlur(Noise(width, height, seed), picture, {}, 1.2);
-  return picture;
+  cv::Mat image;
+  cv::GaussianBlur(Noise(width, height, seed), image, {}, 1.2);
+  return image;
 }
 
-void ExpectAsOpenCv(const cv::Mat& picture, int threshold, int border) {
+void ExpectAsOpenCv(const cv::Mat& image, int threshold, int border) {
   std::vector<cv::KeyPoint> keypoints;
-  cv::FAST(picture, keypoints, threshold, true, cv::FastFeatureDetector::TYPE_9_16);
+  cv::FAST(image, keypoints, threshold, true, cv::FastFeatureDetector::TYPE_9_16);
   std::vector<cv::Point> expected;
   for (const cv::KeyPoint& keypoint : keypoints) {
     const cv::Point place(keypoint.pt);
-    if (place.x >= border && place.y >= border && place.x < picture.cols - border &&
-        place.y < picture.rows - border)
+    if (place.x >= border && place.y >= border && place.x < image.cols - border &&
+        place.y < image.rows - border)
       expected.push_back(place);
   }
   std::vector<Corner> corners;
   std::vector<int> row_begin;
-  DetectFastCorners(picture, threshold, border, &corners, &row_begin);
+  DetectFastCorners(image, threshold, border, &corners, &row_begin);
   std::vector<cv::Point> found;
   for (const Corner& corner : corners) found.emplace_back(corner.x, corner.y);
-  EXPECT_EQ(found, expected) << picture.size() << " at " << threshold << " within " << border;
-  ASSERT_EQ(row_begin.size(), static_cast<std::size_t>(picture.rows) + 1);
-  for (int row = 0; row <= picture.rows; ++row) {
+  EXPECT_EQ(found, expected) << image.size() << " at " << threshold << " within " << border;
+  ASSERT_EQ(row_begin.size(), static_cast<std::size_t>(image.rows) + 1);
+  for (int row = 0; row <= image.rows; ++row) {
     EXPECT_EQ(row_begin[static_cast<std::size_t>(row)],
               std::count_if(expected.begin(), expected.end(), [&](const cv::Point& p) { return p.y < row; }));
   }
@@ -57,34 +57,34 @@ TEST(FastCorners, AreThoseOfOpenCv) {
   }
 }
 
-TEST(FastCorners, AreThoseOfOpenCvInPicturesOfAnyWidth) {
+TEST(FastCorners, AreThoseOfOpenCvInImagesOfAnyWidth) {
   for (int width = 9; width < 60; ++width) {
     ExpectAsOpenCv(Blurred(width, 31, static_cast<std::uint64_t>(width)), 8, 4);
     ExpectAsOpenCv(Blurred(width, 13, static_cast<std::uint64_t>(width)), 8, 6);
   }
 }
 
-TEST(FastCorners, AreFoundInAPartOfAPicture) {
-  const cv::Mat picture = Blurred(200, 150, 3);
-  ExpectAsOpenCv(picture(cv::Rect(13, 7, 101, 90)), 10, 6);
+TEST(FastCorners, AreFoundInAPartOfAnImage) {
+  const cv::Mat image = Blurred(200, 150, 3);
+  ExpectAsOpenCv(image(cv::Rect(13, 7, 101, 90)), 10, 6);
 }
 
 TEST(FastCorners, NeedAllNineBeyondTheThreshold) {
   // A corner of nine pixels, brighter by exactly 20.
-  cv::Mat picture(40, 40, CV_8UC1, cv::Scalar(100));
+  cv::Mat image(40, 40, CV_8UC1, cv::Scalar(100));
   for (const cv::Point& offset :
        {cv::Point(0, -3), {1, -3}, {2, -2}, {3, -1}, {3, 0}, {3, 1}, {2, 2}, {1, 3}, {0, 3}})
-    picture.at<std::uint8_t>(cv::Point(20, 20) + offset) = 120;
+    image.at<std::uint8_t>(cv::Point(20, 20) + offset) = 120;
   std::vector<Corner> corners;
   std::vector<int> row_begin;
   const auto finds = [&](int threshold) {
-    DetectFastCorners(picture, threshold, 6, &corners, &row_begin);
+    DetectFastCorners(image, threshold, 6, &corners, &row_begin);
     return std::any_of(corners.begin(), corners.end(),
                        [](const Corner& c) { return c.x == 20 && c.y == 20; });
   };
   EXPECT_TRUE(finds(19));
   EXPECT_FALSE(finds(20));
-  picture.at<std::uint8_t>(23, 20) = 100;  // eight are none
+  image.at<std::uint8_t>(23, 20) = 100;  // eight are none
   EXPECT_FALSE(finds(5));
 }
 

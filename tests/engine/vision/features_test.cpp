@@ -16,16 +16,16 @@ namespace {
 // Random rectangles: corners in every size and contrast.
 cv::Mat Rectangles(int width, int height, std::uint64_t seed, double contrast = 1) {
   Random random(seed);
-  cv::Mat picture(height, width, CV_8UC1, cv::Scalar(128));
+  cv::Mat image(height, width, CV_8UC1, cv::Scalar(128));
   const int count = width * height / 150;
   for (int i = 0; i < count; ++i) {
     const cv::Point corner(static_cast<int>(random.Below(static_cast<std::uint32_t>(width))),
                            static_cast<int>(random.Below(static_cast<std::uint32_t>(height))));
     const cv::Size size(3 + static_cast<int>(random.Below(30)), 3 + static_cast<int>(random.Below(30)));
-    cv::rectangle(picture, cv::Rect(corner, size), cv::Scalar(128 + contrast * random.Uniform(-110, 110)),
+    cv::rectangle(image, cv::Rect(corner, size), cv::Scalar(128 + contrast * random.Uniform(-110, 110)),
                   cv::FILLED);
   }
-  return picture;
+  return image;
 }
 
 bool SameFeatures(const ImageFeatures& a, const ImageFeatures& b) {
@@ -52,7 +52,7 @@ TEST(PyramidCoordinates, GoThereAndBackAgain) {
   EXPECT_EQ(LevelZeroFromLevel({7, 9}, 0), Eigen::Vector2d(7, 9));
 }
 
-// On a picture whose grey value is its own coordinate, a level's pixel must show the coordinate that the
+// On an image whose grey value is its own coordinate, a level's pixel must show the coordinate that the
 // pixel stands for, up to rounding in each level.
 TEST(PyramidCoordinates, AgreeWithTheLevelsOfAnySize) {
   for (const cv::Size size :
@@ -66,15 +66,15 @@ TEST(PyramidCoordinates, AgreeWithTheLevelsOfAnySize) {
     }
     const auto by_column = MakeFeatures(columns), by_row = MakeFeatures(rows);
     for (int level = 1; level < kPyramidLevels; ++level) {
-      const cv::Mat& x_picture = by_column->levels[static_cast<std::size_t>(level)];
-      const cv::Mat& y_picture = by_row->levels[static_cast<std::size_t>(level)];
-      ASSERT_EQ(x_picture.size(), cv::Size(size.width >> level, size.height >> level));
+      const cv::Mat& x_image = by_column->levels[static_cast<std::size_t>(level)];
+      const cv::Mat& y_image = by_row->levels[static_cast<std::size_t>(level)];
+      ASSERT_EQ(x_image.size(), cv::Size(size.width >> level, size.height >> level));
       double worst = 0;
-      for (int y = 0; y < x_picture.rows; ++y) {
-        for (int x = 0; x < x_picture.cols; ++x) {
+      for (int y = 0; y < x_image.rows; ++y) {
+        for (int x = 0; x < x_image.cols; ++x) {
           const Eigen::Vector2d place = LevelZeroFromLevel({x, y}, level);
-          worst = std::max({worst, std::abs(place.x() - x_picture.at<std::uint8_t>(y, x)),
-                            std::abs(place.y() - y_picture.at<std::uint8_t>(y, x))});
+          worst = std::max({worst, std::abs(place.x() - x_image.at<std::uint8_t>(y, x)),
+                            std::abs(place.y() - y_image.at<std::uint8_t>(y, x))});
         }
       }
       EXPECT_LE(worst, 0.5 * level + 1e-9) << size << " level " << level;
@@ -82,20 +82,20 @@ TEST(PyramidCoordinates, AgreeWithTheLevelsOfAnySize) {
   }
 }
 
-TEST(HalvedPicture, IsTheRoundedMeanOfTwoByTwo) {
+TEST(HalvedImage, IsTheRoundedMeanOfTwoByTwo) {
   Random random(12);
   for (const cv::Size size : {cv::Size(64, 48), cv::Size(37, 21), cv::Size(2, 2), cv::Size(33, 3)}) {
-    cv::Mat picture(size, CV_8UC1), half;
+    cv::Mat image(size, CV_8UC1), half;
     for (int y = 0; y < size.height; ++y)
       for (int x = 0; x < size.width; ++x)
-        picture.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
-    HalvePicture(picture, &half);
+        image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
+    HalveImage(image, &half);
     ASSERT_EQ(half.size(), size / 2);
     for (int y = 0; y < half.rows; ++y) {
       for (int x = 0; x < half.cols; ++x) {
         int sum = 0;
         for (const int dy : {0, 1})
-          for (const int dx : {0, 1}) sum += picture.at<std::uint8_t>(2 * y + dy, 2 * x + dx);
+          for (const int dx : {0, 1}) sum += image.at<std::uint8_t>(2 * y + dy, 2 * x + dx);
         EXPECT_EQ(half.at<std::uint8_t>(y, x), (sum + 2) / 4) << size << ' ' << x << ' ' << y;
       }
     }
@@ -105,43 +105,42 @@ TEST(HalvedPicture, IsTheRoundedMeanOfTwoByTwo) {
 TEST(Features, HaveCornersInOrderWithAnIndexByRow) {
   const auto features = MakeFeatures(Rectangles(333, 251, 5));
   for (std::size_t level = 0; level < kPyramidLevels; ++level) {
-    const cv::Mat& picture = features->levels[level];
+    const cv::Mat& image = features->levels[level];
     const auto& corners = features->corners[level];
     const auto& row_begin = features->row_begin[level];
     EXPECT_GT(corners.size(), 5u) << level;
     EXPECT_TRUE(std::is_sorted(corners.begin(), corners.end(), [](const Corner& a, const Corner& b) {
       return a.y != b.y ? a.y < b.y : a.x < b.x;
     }));
-    ASSERT_EQ(row_begin.size(), static_cast<std::size_t>(picture.rows) + 1);
-    for (int row = 0; row <= picture.rows; ++row) {
+    ASSERT_EQ(row_begin.size(), static_cast<std::size_t>(image.rows) + 1);
+    for (int row = 0; row <= image.rows; ++row) {
       const auto before = std::count_if(corners.begin(), corners.end(),
                                         [row](const Corner& corner) { return corner.y < row; });
       EXPECT_EQ(row_begin[static_cast<std::size_t>(row)], before) << level << ' ' << row;
     }
     for (const Corner& corner : corners) {
-      EXPECT_TRUE(corner.x >= 4 && corner.y >= 4 && corner.x < picture.cols - 4 &&
-                  corner.y < picture.rows - 4);
+      EXPECT_TRUE(corner.x >= 4 && corner.y >= 4 && corner.x < image.cols - 4 && corner.y < image.rows - 4);
     }
   }
 }
 
-TEST(Features, DependOnThePictureAlone) {
-  const cv::Mat picture = Rectangles(320, 240, 1), other = Rectangles(320, 240, 2, 0.2);
-  const auto alone = MakeFeatures(picture);
+TEST(Features, DependOnTheImageAlone) {
+  const cv::Mat image = Rectangles(320, 240, 1), other = Rectangles(320, 240, 2, 0.2);
+  const auto alone = MakeFeatures(image);
   MakeFeatures(other);
   ImageFeatures reused;
   ExtractFeatures(other, {}, {40, 40, 40, 40}, &reused);
-  EXPECT_TRUE(SameFeatures(*alone, *MakeFeatures(picture)));
+  EXPECT_TRUE(SameFeatures(*alone, *MakeFeatures(image)));
   EXPECT_FALSE(SameFeatures(*alone, *MakeFeatures(other)));
 }
 
 TEST(Features, ComeOutTheSameInMemoryThatWasUsedBefore) {
-  const cv::Mat picture = Rectangles(320, 240, 1), other = Rectangles(400, 300, 2, 0.5);
+  const cv::Mat image = Rectangles(320, 240, 1), other = Rectangles(400, 300, 2, 0.5);
   const std::array<int, kPyramidLevels> hint = {12, 14, 16, 18};
   ImageFeatures fresh, used;
-  ExtractFeatures(picture, {}, hint, &fresh);
+  ExtractFeatures(image, {}, hint, &fresh);
   ExtractFeatures(other, {}, hint, &used);
-  ExtractFeatures(picture, {}, hint, &used);
+  ExtractFeatures(image, {}, hint, &used);
   EXPECT_TRUE(SameFeatures(fresh, used));
 }
 
@@ -149,13 +148,13 @@ TEST(Features, ApproachTheWantedCountsFromFrameToFrame) {
   FeatureOptions options;
   options.wanted_corners = {800, 400, 150, 60};
   for (const double contrast : {1.0, 0.4}) {
-    const cv::Mat picture = Rectangles(640, 480, 7, contrast);
+    const cv::Mat image = Rectangles(640, 480, 7, contrast);
     for (const int start : {options.min_threshold, options.max_threshold}) {
       std::array<int, kPyramidLevels> hint;
       hint.fill(start);
       ImageFeatures features;
       for (int frame = 0; frame < 20; ++frame) {
-        ExtractFeatures(picture, options, hint, &features);
+        ExtractFeatures(image, options, hint, &features);
         hint = features.fast_threshold;
         for (const int threshold : hint) {
           EXPECT_GE(threshold, options.min_threshold);
@@ -176,9 +175,9 @@ TEST(Features, ApproachTheWantedCountsFromFrameToFrame) {
   }
 }
 
-TEST(Features, OfASmallOrEmptyPictureAreFewButInOrder) {
-  for (const cv::Mat& picture : {Rectangles(64, 64, 3), cv::Mat(64, 80, CV_8UC1, cv::Scalar(100))}) {
-    const auto features = MakeFeatures(picture);
+TEST(Features, OfASmallOrEmptyImageAreFewButInOrder) {
+  for (const cv::Mat& image : {Rectangles(64, 64, 3), cv::Mat(64, 80, CV_8UC1, cv::Scalar(100))}) {
+    const auto features = MakeFeatures(image);
     for (std::size_t level = 0; level < kPyramidLevels; ++level) {
       EXPECT_EQ(features->row_begin[level].size(),
                 static_cast<std::size_t>(features->levels[level].rows) + 1);

@@ -10,7 +10,7 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 
-// Pictures of which the truth follows from mathematics, for tests of thumbnails and of the rotation between
+// Images of which the truth follows from mathematics, for tests of thumbnails and of the rotation between
 // them.
 namespace docent::engine {
 
@@ -23,7 +23,7 @@ inline double Radians(double degrees) {
 }
 
 // A painted sphere around the camera: grey values that depend on the direction alone, in patches of
-// 30 degrees down to 2 degrees, so that a rotation's picture follows from mathematics.
+// 30 degrees down to 2 degrees, so that a rotation's image follows from mathematics.
 class PaintedSphere {
  public:
   explicit PaintedSphere(std::uint64_t seed) : seed_(seed) {}
@@ -40,16 +40,16 @@ class PaintedSphere {
   cv::Mat Render(const CameraModel& camera, const Rotation3& camera_from_sphere, double gain = 1,
                  double offset = 0, double noise = 0) const {
     const Rotation3 sphere_from_camera = camera_from_sphere.inverse();
-    cv::Mat picture(camera.height_px(), camera.width_px(), CV_8UC1, cv::Scalar(0));
-    // Other noise in every picture: its seed comes from where the camera looks.
+    cv::Mat image(camera.height_px(), camera.width_px(), CV_8UC1, cv::Scalar(0));
+    // Other noise in every image: its seed comes from where the camera looks.
     const double bits = 1e9 * camera_from_sphere.Log().sum();
     Random random(seed_ + static_cast<std::uint64_t>(std::abs(bits)));
-    for (int y = 0; y < picture.rows; ++y)
-      for (int x = 0; x < picture.cols; ++x)
+    for (int y = 0; y < image.rows; ++y)
+      for (int x = 0; x < image.cols; ++x)
         if (const auto ray = camera.Unproject({x, y}))
-          picture.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(
+          image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(
               gain * Grey(sphere_from_camera * *ray) + offset + noise * random.Uniform(-1.7, 1.7));
-    return picture;
+    return image;
   }
 
  private:

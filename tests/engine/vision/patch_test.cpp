@@ -16,24 +16,24 @@
 namespace docent::engine {
 namespace {
 
-// A smooth grey value for every place of a picture: waves of 14 to 30 pixels in several directions. Shorter
+// A smooth grey value for every place of an image: waves of 14 to 30 pixels in several directions. Shorter
 // ones would lose height between the pixels, where bilinear interpolation flattens them.
 double Texture(double x, double y) {
   return 128 + 30 * std::sin(0.30 * x + 0.20 * y) + 28 * std::cos(0.19 * x - 0.38 * y + 1) +
          20 * std::sin(0.44 * x - 0.11 * y + 2) + 18 * std::cos(0.08 * x + 0.33 * y + 0.5);
 }
 
-cv::Mat Picture(int width, int height, const std::function<double(double, double)>& grey) {
-  cv::Mat picture(height, width, CV_8UC1);
+cv::Mat Image(int width, int height, const std::function<double(double, double)>& grey) {
+  cv::Mat image(height, width, CV_8UC1);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
-      picture.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(grey(x, y));
-  return picture;
+      image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(grey(x, y));
+  return image;
 }
 
-const cv::Mat& TexturePicture() {
-  static const cv::Mat picture = Picture(120, 100, Texture);
-  return picture;
+const cv::Mat& TextureImage() {
+  static const cv::Mat image = Image(120, 100, Texture);
+  return image;
 }
 
 const Eigen::Matrix2f kUnwarped = Eigen::Matrix2f::Identity();
@@ -47,9 +47,9 @@ TEST(PatchAlignment, RecoversShiftsToATwentiethOfAPixel) {
     const Eigen::Vector2f shift(static_cast<float>(random.Uniform(-1.5, 1.5)),
                                 static_cast<float>(random.Uniform(-1.5, 1.5)));
     const cv::Mat shifted =
-        Picture(120, 100, [&](double x, double y) { return Texture(x - shift.x(), y - shift.y()); });
+        Image(120, 100, [&](double x, double y) { return Texture(x - shift.x(), y - shift.y()); });
     PatchTemplate patch;
-    ASSERT_TRUE(CutPatch(TexturePicture(), center, kUnwarped, &patch));
+    ASSERT_TRUE(CutPatch(TextureImage(), center, kUnwarped, &patch));
     const auto aligned = AlignPatch(patch, shifted, center, 3, 20);
     ASSERT_TRUE(aligned) << center.transpose() << " by " << shift.transpose();
     errors.push_back((aligned->pixel - center - shift).norm());
@@ -67,9 +67,9 @@ TEST(PatchAlignment, TakesAFractionalPlaceOnBothSides) {
     const Eigen::Vector2f center(static_cast<float>(random.Uniform(20, 100)),
                                  static_cast<float>(random.Uniform(20, 80)));
     PatchTemplate patch;
-    ASSERT_TRUE(CutPatch(TexturePicture(), center, kUnwarped, &patch));
+    ASSERT_TRUE(CutPatch(TextureImage(), center, kUnwarped, &patch));
     const Eigen::Vector2f start = center + Eigen::Vector2f(0.8f, -0.6f);
-    const auto aligned = AlignPatch(patch, TexturePicture(), start, 3, 20);
+    const auto aligned = AlignPatch(patch, TextureImage(), start, 3, 20);
     ASSERT_TRUE(aligned);
     EXPECT_LT((aligned->pixel - center).norm(), 0.07f);
   }
@@ -78,10 +78,10 @@ TEST(PatchAlignment, TakesAFractionalPlaceOnBothSides) {
 TEST(PatchAlignment, IgnoresAChangeOfBrightness) {
   for (const double change : {-35.0, -10.0, 15.0, 30.0}) {
     const cv::Mat changed =
-        Picture(120, 100, [&](double x, double y) { return 0.7 * (Texture(x - 0.7, y + 0.4) - 128) + 128; });
+        Image(120, 100, [&](double x, double y) { return 0.7 * (Texture(x - 0.7, y + 0.4) - 128) + 128; });
     const cv::Mat brighter = changed + cv::Scalar(change);
     PatchTemplate patch, same_light;
-    ASSERT_TRUE(CutPatch(TexturePicture(), {60, 50}, kUnwarped, &patch));
+    ASSERT_TRUE(CutPatch(TextureImage(), {60, 50}, kUnwarped, &patch));
     ASSERT_TRUE(CutPatch(changed, {60, 50}, kUnwarped, &same_light));
     // A gain shows in the correlation not at all, an offset shows not even in the place.
     const auto aligned = AlignPatch(same_light, brighter, {61, 49}, 3, 20);
@@ -103,8 +103,8 @@ TEST(TolerantPatchAlignment, ConvergesAtAnyContrast) {
                                    static_cast<float>(20 + random.Below(60)));
       const Eigen::Vector2d shift(random.Uniform(-1, 1), random.Uniform(-1, 1));
       const cv::Mat source =
-          Picture(120, 100, [&](double x, double y) { return of_patch * (Texture(x, y) - 128) + 128; });
-      const cv::Mat image = Picture(120, 100, [&](double x, double y) {
+          Image(120, 100, [&](double x, double y) { return of_patch * (Texture(x, y) - 128) + 128; });
+      const cv::Mat image = Image(120, 100, [&](double x, double y) {
         return of_image * (Texture(x - shift.x(), y - shift.y()) - 128) + 128;
       });
       PatchTemplate patch;
@@ -120,7 +120,7 @@ TEST(TolerantPatchAlignment, ConvergesAtAnyContrast) {
 
 // As a camera takes the texture with so much more light.
 cv::Mat OverExposed(double gain, const Eigen::Vector2d& shift) {
-  return Picture(120, 100, [=](double x, double y) { return gain * Texture(x - shift.x(), y - shift.y()); });
+  return Image(120, 100, [=](double x, double y) { return gain * Texture(x - shift.x(), y - shift.y()); });
 }
 int SaturatedIn(const cv::Mat& image, int x, int y) {
   return cv::countNonZero(image(cv::Rect(x - 4, y - 4, kPatchSize, kPatchSize)) >= kSaturatedGrey);
@@ -162,12 +162,12 @@ TEST(PatchAlignment, FollowsAnAffineWarp) {
     if (std::abs(source_from_patch.determinant()) < 0.3) continue;
     const Eigen::Vector2d source(random.Uniform(40, 80), random.Uniform(35, 65));
     const Eigen::Vector2d target(random.Uniform(15, 25), random.Uniform(15, 25));
-    const cv::Mat warped = Picture(40, 40, [&](double x, double y) {
+    const cv::Mat warped = Image(40, 40, [&](double x, double y) {
       const Eigen::Vector2d place = source + source_from_patch * (Eigen::Vector2d(x, y) - target);
       return Texture(place.x(), place.y());
     });
     PatchTemplate patch;
-    ASSERT_TRUE(CutPatch(TexturePicture(), source.cast<float>(), source_from_patch.cast<float>(), &patch));
+    ASSERT_TRUE(CutPatch(TextureImage(), source.cast<float>(), source_from_patch.cast<float>(), &patch));
     const auto aligned = AlignPatch(patch, warped, target.cast<float>() + Eigen::Vector2f(0.5f, 0.4f), 3, 20);
     ASSERT_TRUE(aligned) << source_from_patch;
     EXPECT_LT((aligned->pixel.cast<double>() - target).norm(), 0.12) << source_from_patch;
@@ -181,10 +181,10 @@ TEST(PatchAlignment, NeverEndsFurtherAwayThanAllowed) {
     PatchTemplate patch;
     const Eigen::Vector2f center(static_cast<float>(random.Uniform(15, 105)),
                                  static_cast<float>(random.Uniform(15, 85)));
-    ASSERT_TRUE(CutPatch(TexturePicture(), center, kUnwarped, &patch));
+    ASSERT_TRUE(CutPatch(TextureImage(), center, kUnwarped, &patch));
     const Eigen::Vector2f start(static_cast<float>(random.Uniform(0, 119)),
                                 static_cast<float>(random.Uniform(0, 99)));
-    const auto aligned = AlignPatch(patch, TexturePicture(), start, 2);
+    const auto aligned = AlignPatch(patch, TextureImage(), start, 2);
     aligned ? ++accepted : ++refused;
     if (aligned) {
       EXPECT_LE((aligned->pixel - start).norm(), 2.0f);
@@ -196,59 +196,59 @@ TEST(PatchAlignment, NeverEndsFurtherAwayThanAllowed) {
 
 TEST(PatchAlignment, RefusesToWanderToAPlaceThatItWouldReach) {
   // Long waves only, so that alignment finds its way from six pixels off, when it is let.
-  const cv::Mat picture = Picture(120, 100, [](double x, double y) {
+  const cv::Mat image = Image(120, 100, [](double x, double y) {
     return 128 + 60 * std::sin(0.11 * x + 0.02 * y) + 55 * std::cos(0.1 * y - 0.03 * x);
   });
   PatchTemplate patch;
-  ASSERT_TRUE(CutPatch(picture, {60, 50}, kUnwarped, &patch));
-  const auto free = AlignPatch(patch, picture, {65, 53}, 20, 50);
+  ASSERT_TRUE(CutPatch(image, {60, 50}, kUnwarped, &patch));
+  const auto free = AlignPatch(patch, image, {65, 53}, 20, 50);
   ASSERT_TRUE(free);
   EXPECT_LT((free->pixel - Eigen::Vector2f(60, 50)).norm(), 0.1f);
-  EXPECT_FALSE(AlignPatch(patch, picture, {65, 53}, 3, 50));
+  EXPECT_FALSE(AlignPatch(patch, image, {65, 53}, 3, 50));
 }
 
-TEST(PatchAlignment, StopsAtThePictureBorder) {
+TEST(PatchAlignment, StopsAtTheImageBorder) {
   PatchTemplate patch;
-  ASSERT_TRUE(CutPatch(TexturePicture(), {60, 50}, kUnwarped, &patch));
+  ASSERT_TRUE(CutPatch(TextureImage(), {60, 50}, kUnwarped, &patch));
   for (const Eigen::Vector2f& start :
        {Eigen::Vector2f(2, 50), Eigen::Vector2f(118, 50), Eigen::Vector2f(60, 1), Eigen::Vector2f(60, 99),
         Eigen::Vector2f(-50, 50), Eigen::Vector2f(1e6f, 50)}) {
-    EXPECT_FALSE(AlignPatch(patch, TexturePicture(), start)) << start.transpose();
+    EXPECT_FALSE(AlignPatch(patch, TextureImage(), start)) << start.transpose();
   }
   const float nan = std::nanf("");
-  EXPECT_FALSE(AlignPatch(patch, TexturePicture(), {nan, 50}));
+  EXPECT_FALSE(AlignPatch(patch, TextureImage(), {nan, 50}));
 }
 
 TEST(CuttingAPatch, ShowsTheSourcePixelsItself) {
   PatchTemplate patch;
-  ASSERT_TRUE(CutPatch(TexturePicture(), {60, 50}, kUnwarped, &patch));
+  ASSERT_TRUE(CutPatch(TextureImage(), {60, 50}, kUnwarped, &patch));
   for (int row = 0; row < kPatchSize; ++row)
     for (int column = 0; column < kPatchSize; ++column)
       EXPECT_EQ(patch.pixels[static_cast<std::size_t>(row * kPatchSize + column)],
-                TexturePicture().at<std::uint8_t>(50 - 4 + row, 60 - 4 + column));
+                TextureImage().at<std::uint8_t>(50 - 4 + row, 60 - 4 + column));
 }
 
 TEST(CuttingAPatch, NeedsAllOfTheWarpedSquareInside) {
   PatchTemplate patch;
   // Patch pixels -4 .. 3 and a border of one for the gradients.
-  EXPECT_TRUE(CutPatch(TexturePicture(), {5, 50}, kUnwarped, &patch));
-  EXPECT_FALSE(CutPatch(TexturePicture(), {4.9f, 50}, kUnwarped, &patch));
-  EXPECT_TRUE(CutPatch(TexturePicture(), {114.9f, 50}, kUnwarped, &patch));
-  EXPECT_FALSE(CutPatch(TexturePicture(), {115.5f, 50}, kUnwarped, &patch));
-  EXPECT_FALSE(CutPatch(TexturePicture(), {60, 4.9f}, kUnwarped, &patch));
-  EXPECT_FALSE(CutPatch(TexturePicture(), {60, 95.5f}, kUnwarped, &patch));
-  EXPECT_FALSE(CutPatch(TexturePicture(), {8, 50}, 2.0f * kUnwarped, &patch));
-  EXPECT_FALSE(CutPatch(TexturePicture(), {std::nanf(""), 50}, kUnwarped, &patch));
+  EXPECT_TRUE(CutPatch(TextureImage(), {5, 50}, kUnwarped, &patch));
+  EXPECT_FALSE(CutPatch(TextureImage(), {4.9f, 50}, kUnwarped, &patch));
+  EXPECT_TRUE(CutPatch(TextureImage(), {114.9f, 50}, kUnwarped, &patch));
+  EXPECT_FALSE(CutPatch(TextureImage(), {115.5f, 50}, kUnwarped, &patch));
+  EXPECT_FALSE(CutPatch(TextureImage(), {60, 4.9f}, kUnwarped, &patch));
+  EXPECT_FALSE(CutPatch(TextureImage(), {60, 95.5f}, kUnwarped, &patch));
+  EXPECT_FALSE(CutPatch(TextureImage(), {8, 50}, 2.0f * kUnwarped, &patch));
+  EXPECT_FALSE(CutPatch(TextureImage(), {std::nanf(""), 50}, kUnwarped, &patch));
 }
 
 TEST(CuttingAPatch, RefusesWhatCannotBeFoundAgain) {
   PatchTemplate patch;
-  EXPECT_FALSE(CutPatch(Picture(40, 40, [](double, double) { return 90; }), {20, 20}, kUnwarped, &patch));
+  EXPECT_FALSE(CutPatch(Image(40, 40, [](double, double) { return 90; }), {20, 20}, kUnwarped, &patch));
   // An edge holds the patch in one direction only.
-  EXPECT_FALSE(CutPatch(Picture(40, 40, [](double x, double) { return x < 20 ? 30 : 200; }), {20, 20},
+  EXPECT_FALSE(CutPatch(Image(40, 40, [](double x, double) { return x < 20 ? 30 : 200; }), {20, 20},
                         kUnwarped, &patch));
   Random random(1);
-  const cv::Mat noise = Picture(40, 40, [&](double, double) { return 90 + random.Uniform(-2, 2); });
+  const cv::Mat noise = Image(40, 40, [&](double, double) { return 90 + random.Uniform(-2, 2); });
   EXPECT_FALSE(CutPatch(noise, {20, 20}, kUnwarped, &patch));
 }
 
@@ -270,29 +270,28 @@ TEST(PatchCorrelation, EqualsItsDefinition) {
     PatchTemplate patch;
     const Eigen::Vector2f center(static_cast<float>(random.Uniform(10, 110)),
                                  static_cast<float>(random.Uniform(10, 90)));
-    ASSERT_TRUE(CutPatch(TexturePicture(), center, kUnwarped, &patch));
+    ASSERT_TRUE(CutPatch(TextureImage(), center, kUnwarped, &patch));
     const int x = 4 + static_cast<int>(random.Below(112)), y = 4 + static_cast<int>(random.Below(92));
-    EXPECT_NEAR(PatchCorrelation(patch, TexturePicture(), x, y),
-                BruteForceCorrelation(patch, TexturePicture(), x, y), 2e-4);
+    EXPECT_NEAR(PatchCorrelation(patch, TextureImage(), x, y),
+                BruteForceCorrelation(patch, TextureImage(), x, y), 2e-4);
   }
 }
 
 TEST(PatchCorrelation, IsOneAtHomeMinusOneInTheNegativeAndNothingOnBlank) {
   PatchTemplate patch;
-  ASSERT_TRUE(CutPatch(TexturePicture(), {60, 50}, kUnwarped, &patch));
-  EXPECT_NEAR(PatchCorrelation(patch, TexturePicture(), 60, 50), 1, 1e-5);
-  const cv::Mat negative = 255 - TexturePicture();
+  ASSERT_TRUE(CutPatch(TextureImage(), {60, 50}, kUnwarped, &patch));
+  EXPECT_NEAR(PatchCorrelation(patch, TextureImage(), 60, 50), 1, 1e-5);
+  const cv::Mat negative = 255 - TextureImage();
   EXPECT_NEAR(PatchCorrelation(patch, negative, 60, 50), -1, 1e-5);
   const cv::Mat blank(100, 120, CV_8UC1, cv::Scalar(70));
   EXPECT_EQ(PatchCorrelation(patch, blank, 60, 50), 0);
-  const cv::Mat dim = Picture(120, 100, [](double x, double y) { return 0.5 * Texture(x, y) + 20; });
+  const cv::Mat dim = Image(120, 100, [](double x, double y) { return 0.5 * Texture(x, y) + 20; });
   EXPECT_GT(PatchCorrelation(patch, dim, 60, 50), 0.999f);
 }
 
 TEST(TolerantPatchCorrelation, IsTheUsualOneWhereNothingSaturates) {
   Random random(14);
-  const cv::Mat fair =
-      Picture(120, 100, [](double x, double y) { return 0.8 * (Texture(x, y) - 128) + 120; });
+  const cv::Mat fair = Image(120, 100, [](double x, double y) { return 0.8 * (Texture(x, y) - 128) + 120; });
   for (int trial = 0; trial < 100; ++trial) {
     const int x = 10 + static_cast<int>(random.Below(100)), y = 10 + static_cast<int>(random.Below(80));
     PatchTemplate patch;
@@ -309,7 +308,7 @@ TEST(TolerantPatchCorrelation, IsHighWhereTheImageSaturatesInPartAndNothingWhere
     const int x = 10 + static_cast<int>(random.Below(100)), y = 10 + static_cast<int>(random.Below(80));
     PatchTemplate patch;
     const Eigen::Vector2f center(static_cast<float>(x), static_cast<float>(y));
-    ASSERT_TRUE(CutPatch(TexturePicture(), center, kUnwarped, &patch));
+    ASSERT_TRUE(CutPatch(TextureImage(), center, kUnwarped, &patch));
     const int saturated = SaturatedIn(bright, x, y);
     if (saturated > kMaxSaturatedPixels) {
       ++nearly_all;
@@ -332,7 +331,7 @@ TEST(ShiTomasi, IsTheSmallerEigenvalueOfTheMeanGradientMatrix) {
     for (int row = y - 3; row <= y + 3; ++row) {
       for (int column = x - 3; column <= x + 3; ++column) {
         const auto at = [](int r, int c) {
-          return static_cast<double>(TexturePicture().at<std::uint8_t>(r, c));
+          return static_cast<double>(TextureImage().at<std::uint8_t>(r, c));
         };
         const Eigen::Vector2d gradient(0.5 * (at(row, column + 1) - at(row, column - 1)),
                                        0.5 * (at(row + 1, column) - at(row - 1, column)));
@@ -340,15 +339,15 @@ TEST(ShiTomasi, IsTheSmallerEigenvalueOfTheMeanGradientMatrix) {
       }
     }
     const double expected = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(sum / 49).eigenvalues()[0];
-    EXPECT_NEAR(ShiTomasiScore(TexturePicture(), x, y), expected, 1e-3 * (1 + expected));
+    EXPECT_NEAR(ShiTomasiScore(TextureImage(), x, y), expected, 1e-3 * (1 + expected));
   }
 }
 
 TEST(ShiTomasi, IsZeroOnAnEdgeAndAtTheBorder) {
-  const cv::Mat edge = Picture(40, 40, [](double x, double) { return x < 20 ? 30 : 200; });
+  const cv::Mat edge = Image(40, 40, [](double x, double) { return x < 20 ? 30 : 200; });
   EXPECT_NEAR(ShiTomasiScore(edge, 20, 20), 0, 1e-3);
   for (const auto& [x, y] : {std::pair{3, 50}, {116, 50}, {60, 3}, {60, 96}, {-5, 50}, {60, 200}})
-    EXPECT_EQ(ShiTomasiScore(TexturePicture(), x, y), 0) << x << ' ' << y;
+    EXPECT_EQ(ShiTomasiScore(TextureImage(), x, y), 0) << x << ' ' << y;
 }
 
 }  // namespace

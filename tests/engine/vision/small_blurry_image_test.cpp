@@ -18,22 +18,22 @@
 namespace docent::engine {
 namespace {
 
-cv::Mat NoisePicture(int width, int height, std::uint64_t seed) {
+cv::Mat NoiseImage(int width, int height, std::uint64_t seed) {
   Random random(seed);
-  cv::Mat picture(height, width, CV_8UC1);
+  cv::Mat image(height, width, CV_8UC1);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
-      picture.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
-  return picture;
+      image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
+  return image;
 }
 
 TEST(MakingAThumbnail, BlursAsOpenCvDoes) {
   for (const double sigma_px : {0.8, 2.5}) {
     for (const cv::Size size : {cv::Size(640, 480), cv::Size(333, 251), cv::Size(64, 64), cv::Size(90, 3)}) {
-      const cv::Mat picture = NoisePicture(size.width, size.height, 4);
-      const SmallBlurryImage made = MakeSmallBlurryImage(picture, sigma_px);
+      const cv::Mat image = NoiseImage(size.width, size.height, 4);
+      const SmallBlurryImage made = MakeSmallBlurryImage(image, sigma_px);
       cv::Mat expected;
-      picture(cv::Rect({0, 0}, made.pixels.size() * made.scale)).convertTo(expected, CV_32F);
+      image(cv::Rect({0, 0}, made.pixels.size() * made.scale)).convertTo(expected, CV_32F);
       cv::resize(expected, expected, made.pixels.size(), 0, 0, cv::INTER_AREA);
       cv::GaussianBlur(expected, expected, {}, sigma_px);
       expected -= cv::mean(expected);
@@ -43,7 +43,7 @@ TEST(MakingAThumbnail, BlursAsOpenCvDoes) {
 }
 
 TEST(MakingAThumbnail, UsesMemoryAgainUnlessSomebodyHoldsIt) {
-  const cv::Mat one = NoisePicture(320, 240, 1), other = NoisePicture(320, 240, 2);
+  const cv::Mat one = NoiseImage(320, 240, 1), other = NoiseImage(320, 240, 2);
   SmallBlurryImage thumbnail;
   MakeSmallBlurryImage(one, kThumbnailBlurPx, &thumbnail);
   const void* memory = thumbnail.pixels.data;
@@ -70,16 +70,15 @@ TEST(SmallBlurryImage, IsAtMostEightyWideWithTheScaleThatMakesItSo) {
 }
 
 TEST(SmallBlurryImage, KeepsBlockMeansWithTheirFractionAndNoMean) {
-  cv::Mat picture(16, 160, CV_8UC1);
-  for (int y = 0; y < picture.rows; ++y)
-    for (int x = 0; x < picture.cols; ++x)
-      picture.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>((x * 37 + y * 101) % 256);
-  const SmallBlurryImage small = MakeSmallBlurryImage(picture, 0);
+  cv::Mat image(16, 160, CV_8UC1);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x)
+      image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>((x * 37 + y * 101) % 256);
+  const SmallBlurryImage small = MakeSmallBlurryImage(image, 0);
   ASSERT_EQ(small.scale, 2);
   cv::Mat expected(8, 80, CV_64FC1);
   for (int y = 0; y < 8; ++y)
-    for (int x = 0; x < 80; ++x)
-      expected.at<double>(y, x) = cv::mean(picture(cv::Rect(2 * x, 2 * y, 2, 2)))[0];
+    for (int x = 0; x < 80; ++x) expected.at<double>(y, x) = cv::mean(image(cv::Rect(2 * x, 2 * y, 2, 2)))[0];
   const double mean = cv::mean(expected)[0];
   for (int y = 0; y < 8; ++y)
     for (int x = 0; x < 80; ++x)
@@ -88,9 +87,9 @@ TEST(SmallBlurryImage, KeepsBlockMeansWithTheirFractionAndNoMean) {
 }
 
 TEST(SmallBlurryImage, SumsOfLargeBrightBlocksDoNotOverflow) {
-  cv::Mat picture(600, 24000, CV_8UC1, cv::Scalar(255));
-  picture.colRange(0, 12000).setTo(253);
-  const SmallBlurryImage small = MakeSmallBlurryImage(picture, 0);
+  cv::Mat image(600, 24000, CV_8UC1, cv::Scalar(255));
+  image.colRange(0, 12000).setTo(253);
+  const SmallBlurryImage small = MakeSmallBlurryImage(image, 0);
   ASSERT_EQ(small.scale, 300);
   EXPECT_NEAR(small.pixels.at<float>(0, 0), -1, 1e-3);
   EXPECT_NEAR(small.pixels.at<float>(1, 79), 1, 1e-3);

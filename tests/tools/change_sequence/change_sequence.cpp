@@ -117,9 +117,8 @@ void Run(const Options& options) {
   engine::Frame frame;
   for (std::uint64_t i = 0; i < range.until && source->Next(&frame); ++i) {
     if (i < range.from) continue;
-    app::CheckPictureSize(lens, frame.picture.cols, frame.picture.rows, options.input.string(),
-                          "its calibration");
-    cv::Mat image = frame.picture;
+    app::CheckImageSize(lens, frame.image.cols, frame.image.rows, options.input.string(), "its calibration");
+    cv::Mat image = frame.image;
     for (const auto& change : changes) image = change->Apply(frame.time, image);
     writer.Add(frame.time, image);
   }

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/keyframe_novelty.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace docent::engine {
+
+namespace {
+
+// Of finite points.
+std::ptrdiff_t CountObservations(const MapSnapshot& map, KeyFrameId id, bool with_infinite) {
+  const auto before = [](const Observation& observation, KeyFrameId wanted) {
+    return observation.keyframe < wanted;
+  };
+  const auto first = std::lower_bound(map.observations.begin(), map.observations.end(), id, before);
+  const auto last = std::lower_bound(first, map.observations.end(), id + 1, before);
+  if (!with_infinite) return last - first;
+  return std::count_if(first, last, [&](const Observation& observation) {
+    const MapPoint* point = map.FindPoint(observation.point);
+    return point && !point->infinite();
+  });
+}
+
+}  // namespace
+
+bool WantsKeyFrame(const KeyFrameNoveltyOptions& options, const MapSnapshot& map,
+                   const Rigid3& camera_from_map, const MapTrackResult& tracked) {
+  const Eigen::Vector3d center = camera_from_map.OriginInSource();
+  const double depth = tracked.median_depth > 0 ? tracked.median_depth : 1.0;
+  double nearest = std::numeric_limits<double>::max();
+  double nearest_distance = 0, nearest_turn_deg = 0;
+  const KeyFrame* nearest_keyframe = nullptr;
+  for (const KeyFrame& keyframe : map.keyframes) {
+    if (keyframe.kind == KeyFrameKind::kPanorama) continue;  // its place is not known
+    const double distance = (keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
+    const double turn_deg = (camera_from_map.rotation * keyframe.camera_from_map.rotation.inverse()).Angle() *
+                            180 / std::numbers::pi;
+    const double novelty = std::hypot(distance / options.min_distance, turn_deg / options.min_turn_deg);
+    if (novelty < nearest) {
+      nearest = novelty;
+      nearest_distance = distance;
+      nearest_turn_deg = turn_deg;
+      nearest_keyframe = &keyframe;
+    }
+  }
+  if (nearest > 1.0) return true;
+  const bool moved =
+      nearest_distance > options.min_distance_when_few || nearest_turn_deg > options.min_turn_when_few_deg;
+  if (!moved || !nearest_keyframe) return false;
+  const auto known =
+      static_cast<double>(CountObservations(map, nearest_keyframe->id, nearest_keyframe->panorama != kNoId));
+  return tracked.finite_inliers < options.min_found_ratio * std::min(known, options.max_known);
+}
+
+}  // namespace docent::engine

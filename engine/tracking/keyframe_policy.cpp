@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/keyframe_policy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace docent::engine {
+
+namespace {
+
+double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+Eigen::Vector3d AxisOf(const Rigid3& camera_from_map) {
+  return camera_from_map.rotation.inverse() * Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+}
+
+}  // namespace
+
+KeyFramePolicy::KeyFramePolicy(const KeyFramePolicyOptions& options, double field_of_view)
+    : options_(options), field_of_view_(field_of_view) {}
+
+void KeyFramePolicy::Reset() {
+  mode_ = Mode::kSixDof;
+  reference_time_ = {};
+  history_.clear();
+}
+
+// hybrid-slam §4.1: the angle under which two centres are seen from the scene between them.
+bool KeyFramePolicy::Parallax(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double depth) const {
+  const double angle = 2 * std::atan2((a - b).norm(), 2 * depth);
+  return angle > options_.min_parallax_deg * std::numbers::pi / 180;
+}
+
+// hybrid-slam §4.2: some pose of a while ago stood here and looked elsewhere.
+bool KeyFramePolicy::IsPureRotation(const Pose& now, double depth) const {
+  return std::any_of(history_.begin(), history_.end(), [&](const Pose& before) {
+    return !Parallax(before.center, now.center, depth) &&
+           AngleBetween(before.axis, now.axis) > options_.min_view_ratio * field_of_view_;
+  });
+}
+
+void KeyFramePolicy::Remember(const Pose& pose) {
+  while (!history_.empty() && pose.time - history_.front().time > options_.history)
+    history_.erase(history_.begin());
+  if (history_.empty() || pose.time - history_.back().time >= options_.history_interval)
+    history_.push_back(pose);
+}
+
+PanoramaId KeyFramePolicy::OpenPanorama(const MapSnapshot& map) const {
+  if (mode_ != Mode::kPanorama) return kNoId;
+  for (auto it = map.panoramas.rbegin(); it != map.panoramas.rend(); ++it) {
+    const KeyFrame* reference = map.FindKeyFrame(it->reference);
+    if (reference && reference->time == reference_time_) return it->id;
+  }
+  return kNoId;
+}
+
+PanoramaId KeyFramePolicy::PanoramaNear(const Rigid3& camera_from_map, double depth,
+                                        const MapSnapshot& map) const {
+  constexpr double kNear = 0.5;  // of the parallax at which a panorama is left
+  const Eigen::Vector3d center = camera_from_map.OriginInSource(), axis = AxisOf(camera_from_map);
+  PanoramaId best = kNoId;
+  double smallest = std::numeric_limits<double>::max();
+  for (const PanoramaMap& panorama : map.panoramas) {
+    const KeyFrame* reference = map.FindKeyFrame(panorama.reference);
+    if (!reference || Parallax(reference->camera_from_map.OriginInSource(), center, kNear * depth)) continue;
+    for (const KeyFrame& keyframe : map.keyframes) {
+      if (keyframe.panorama != panorama.id) continue;
+      const double angle = AngleBetween(AxisOf(keyframe.camera_from_map), axis);
+      if (angle > 0.5 * field_of_view_ || angle >= smallest) continue;
+      smallest = angle;
+      best = panorama.id;
+    }
+  }
+  return best;
+}
+
+void KeyFramePolicy::Reopen(const PanoramaMap& panorama, const MapSnapshot& map) {
+  const KeyFrame* reference = map.FindKeyFrame(panorama.reference);
+  if (!reference) return;
+  mode_ = Mode::kPanorama;
+  reference_time_ = reference->time;
+}
+
+KeyFrameChoice KeyFramePolicy::Select(const PolicyFrame& frame, const MapSnapshot& map) {
+  const Pose now{frame.time, frame.camera_from_map.OriginInSource(), AxisOf(frame.camera_from_map)};
+  const bool localized = frame.observed != ObservedMotion::kPanorama;
+  if (mode_ == Mode::kPanorama && frame.time - reference_time_ > options_.patience &&
+      OpenPanorama(map) == kNoId)
+    mode_ = Mode::kSixDof;
+  if (mode_ == Mode::kPanorama && localized) {
+    // hybrid-slam §4.5. A few finite points are seen all through a turn; that alone is no return.
+    const PanoramaMap* panorama = map.FindPanorama(OpenPanorama(map));
+    const KeyFrame* reference = panorama ? map.FindKeyFrame(panorama->reference) : nullptr;
+    const bool away =
+        reference && Parallax(reference->camera_from_map.OriginInSource(), now.center, frame.median_depth);
+    if (away || frame.finite_coverage >= options_.min_coverage) mode_ = Mode::kSixDof;
+  }
+  if (mode_ == Mode::kSixDof) {
+    if (!localized) return KeyFrameChoice::kNone;  // infinite points of a closed panorama carry the camera
+    const bool unknown = frame.finite_coverage < options_.min_coverage;
+    const bool runs_out = unknown && frame.points < options_.few_points;
+    const bool turned = unknown && IsPureRotation(now, frame.median_depth);
+    Remember(now);
+    // However the camera came here: directions are better than nothing.
+    if (runs_out && PanoramaNear(frame.camera_from_map, frame.median_depth, map) == kNoId)
+      return KeyFrameChoice::kLocalizedPanorama;
+    if (turned && frame.coverage < options_.min_panorama_coverage) {
+      const bool parallax = std::all_of(map.keyframes.begin(), map.keyframes.end(), [&](const KeyFrame& k) {
+        return k.kind == KeyFrameKind::kPanorama ||
+               Parallax(k.camera_from_map.OriginInSource(), now.center, frame.median_depth);
+      });
+      if (!parallax) return KeyFrameChoice::kLocalizedPanorama;
+    }
+    return frame.wants_six_dof ? KeyFrameChoice::kSixDof : KeyFrameChoice::kNone;
+  }
+  const PanoramaId open = OpenPanorama(map);
+  if (open == kNoId || frame.coverage >= options_.min_panorama_coverage) return KeyFrameChoice::kNone;
+  // In a map of directions alone, hardly one of which is where it was, the camera has moved among near
+  // things: what it sees now is taken in, wherever it looks. A map that knows depth does not pay the drift
+  // for that.
+  if (frame.points < options_.fewest_points && !map.HasFinitePoints()) return KeyFrameChoice::kPanorama;
+  const double ratio =
+      frame.points < options_.few_points ? options_.min_view_ratio_when_few : options_.min_view_ratio;
+  const bool elsewhere = std::all_of(map.keyframes.begin(), map.keyframes.end(), [&](const KeyFrame& k) {
+    return k.panorama != open || AngleBetween(AxisOf(k.camera_from_map), now.axis) > ratio * field_of_view_;
+  });
+  return elsewhere ? KeyFrameChoice::kPanorama : KeyFrameChoice::kNone;
+}
+
+void KeyFramePolicy::Offered(KeyFrameChoice choice, Timestamp time) {
+  if (choice != KeyFrameChoice::kLocalizedPanorama && choice != KeyFrameChoice::kFirst) return;
+  mode_ = Mode::kPanorama;
+  reference_time_ = time;
+}
+
+}  // namespace docent::engine

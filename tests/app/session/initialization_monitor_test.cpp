@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/initialization_monitor.h"
+
+#include <gtest/gtest.h>
+
+namespace docent::app {
+namespace {
+
+std::shared_ptr<const engine::MapSnapshot> MapWithDepth() {
+  auto map = std::make_shared<engine::MapSnapshot>();
+  map->keyframes.emplace_back().mean_depth = 2;
+  map->points.emplace_back();
+  return map;
+}
+
+// A second and a half at 30 Hz; the share of points that are found falls from 0.9 to `last`, and the camera
+// moves by so many units and radians.
+std::optional<std::string> FaultAfter(double last, double distance, double turn) {
+  InitializationMonitor watch;
+  const auto map = MapWithDepth();
+  for (int i = 0; i <= 45; ++i) {
+    const double part = i / 45.0;
+    engine::TrackedFrame frame;
+    frame.frame.time = FromSeconds(i / 30.0);
+    frame.state = engine::TrackingState::kSixDof;
+    frame.map = map;
+    frame.finite_points = 100;
+    frame.quality = 0.9 + part * (last - 0.9);
+    frame.camera_from_map =
+        engine::Rigid3(engine::Rotation3::Exp({0, part * turn, 0}), Eigen::Vector3d(part * distance, 0, 0));
+    watch.Add(frame);
+  }
+  return watch.Fault();
+}
+
+TEST(InitializationMonitor, TellsAMapWhosePointsAreLostWhileTheCameraHardlyMoves) {
+  const auto fault = FaultAfter(0.1, 0.05, 0.05);
+  ASSERT_TRUE(fault);
+  EXPECT_NE(fault->find("fell from 8"), std::string::npos) << *fault;
+}
+
+TEST(InitializationMonitor, TrustsAMapWhosePointsAreStillFound) {
+  EXPECT_FALSE(FaultAfter(0.7, 0.05, 0.05));
+}
+
+TEST(InitializationMonitor, DoesNotExpectPointsWhereTheCameraHasLeftThem) {
+  EXPECT_FALSE(FaultAfter(0.1, 2.0, 0.0)) << "walked away";
+  EXPECT_FALSE(FaultAfter(0.1, 0.05, 1.0)) << "turned away";
+}
+
+TEST(InitializationMonitor, SaysNothingBeforeThereAreFrames) {
+  InitializationMonitor watch;
+  EXPECT_FALSE(watch.Fault());
+  watch.Add(engine::TrackedFrame());
+  EXPECT_FALSE(watch.Fault());
+}
+
+}  // namespace
+}  // namespace docent::app

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/keyframe_culling.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::Camera;
+using testing_world::CameraAt;
+
+// Before one wall: keyframes at these places, sideways, all of which see the same points.
+Map MapFrom(const std::vector<double>& places) {
+  static const auto world = testing_world::RenderedWorld::SingleWall(3, 5);
+  std::vector<Rigid3> poses;
+  for (const double x : places) poses.push_back(CameraAt({x, 0, 0}));
+  Map map = testing_world::TrueMap(world, Camera(), poses, 60);
+  for (auto& [id, record] : map.keyframes()) map.UpdateDepth(&record);
+  return map;
+}
+
+KeyFrameId Newest(const Map& map) {
+  return map.keyframes().rbegin()->first;
+}
+
+TEST(Redundancy, IsAKeyFrameAmongManyThatSeeTheSame) {
+  Map map = MapFrom({0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9});
+  const KeyFrameId redundant = FindRedundantKeyFrame({}, Newest(map), &map);
+  ASSERT_NE(redundant, kNoId);
+  EXPECT_FALSE(map.FindKeyFrame(redundant)->keyframe.fixed);
+  EXPECT_LT(redundant, Newest(map));
+}
+
+TEST(Redundancy, LeavesKeyFramesThatStandAlone) {
+  // A metre apart before a wall three metres away: others know the points, but not the view.
+  Map map = MapFrom({0, 0.6, 1.2, 1.8, 2.4, 3.0, 3.6, 4.2, 4.8, 5.4});
+  EXPECT_EQ(FindRedundantKeyFrame({}, Newest(map), &map), kNoId);
+}
+
+TEST(Redundancy, LeavesSmallMapsFixedOnesAndReferences) {
+  Map small = MapFrom({0, 0.1, 0.2, 0.3, 0.4});
+  EXPECT_EQ(FindRedundantKeyFrame({}, Newest(small), &small), kNoId);
+  Map map = MapFrom({0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9});
+  bool fixed = false;
+  for (auto& [id, record] : map.keyframes()) {
+    if (fixed) map.OpenPanorama(id);
+    record.keyframe.fixed = !fixed;
+    fixed = true;
+  }
+  EXPECT_EQ(FindRedundantKeyFrame({}, Newest(map), &map), kNoId);
+}
+
+TEST(Redundancy, EndsWhenEveryPointIsLeftWithEnoughObservers) {
+  Map map = MapFrom({0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1});
+  const std::size_t points = map.AlivePoints();
+  int removed = 0;
+  for (KeyFrameId id = 0; (id = FindRedundantKeyFrame({}, Newest(map), &map)) != kNoId; ++removed)
+    CullKeyFrame(id, &map);
+  EXPECT_EQ(removed, 4) << "down to the eight that any map may keep";
+  EXPECT_GT(map.AlivePoints(), points * 98 / 100) << "only what a single keyframe saw goes with it";
+  const auto snapshot = map.Snapshot();
+  EXPECT_NO_THROW(Validate(*snapshot));
+  for (const MapPoint& point : snapshot->points) {
+    const KeyFrame* source = snapshot->FindKeyFrame(point.source_keyframe);
+    ASSERT_NE(source, nullptr);
+    // The new source sees the point where the point is.
+    const auto pixel = source->camera->Project(source->camera_from_map * point.position());
+    ASSERT_TRUE(pixel);
+    const Eigen::Vector2d seen = LevelZeroFromLevel(point.source_pixel.cast<double>(), point.source_level);
+    EXPECT_LT((*pixel - seen).norm(), 1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace docent::engine

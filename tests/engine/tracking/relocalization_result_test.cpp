@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a lost tracker answers where places resemble its image: a pose, or why there is none.
+#include "engine/tracking/relocalization_result.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "engine/tracking/tracker.h"
+#include "tests/engine/rendered_world.h"
+#include "tests/engine/some_maps.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::Camera;
+using testing_world::CameraAt;
+using testing_world::RenderedWorld;
+using testing_world::SomeMaps;
+using testing_world::World;
+
+// Three keyframes. Of every ten points `wrong` are not where they were.
+std::shared_ptr<const MapSnapshot> MapWith(std::size_t wrong) {
+  return testing_world::MapGoneAstray(World(), Camera(),
+                                      {CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0}), CameraAt({0.2, 0, 0})},
+                                      [=](std::size_t i) { return i % 10 < wrong; });
+}
+
+// The same map, with those points alone that its first keyframe sees in one corner.
+std::shared_ptr<const MapSnapshot> MapOfACorner() {
+  auto map = std::make_shared<MapSnapshot>(*MapWith(0));
+  const KeyFrame first = map->keyframes.front();
+  std::erase_if(map->points, [&](const MapPoint& point) {
+    const auto pixel = Camera()->Project(first.camera_from_map * point.position());
+    return !pixel || pixel->x() > 145 || pixel->y() > 110;
+  });
+  std::erase_if(map->observations,
+                [&](const Observation& observation) { return !map->FindPoint(observation.point); });
+  return map;
+}
+
+constexpr double kBetweenPlaces = 10;
+
+// One map of two places, the second so many metres to the right of the first.
+std::shared_ptr<const MapSnapshot> TwoPlaces(const MapSnapshot& first, const MapSnapshot& second) {
+  auto both = std::make_shared<MapSnapshot>(first);
+  const Eigen::Vector3d shift(kBetweenPlaces, 0, 0);
+  for (KeyFrame keyframe : second.keyframes) {
+    keyframe.id += first.next_keyframe;
+    keyframe.fixed = false;
+    keyframe.camera_from_map = keyframe.camera_from_map * Rigid3(Rotation3(), -shift);
+    both->keyframes.push_back(keyframe);
+  }
+  for (MapPoint point : second.points) {
+    point.id += first.next_point;
+    point.source_keyframe += first.next_keyframe;
+    point.point_in_map.head<3>() += shift;
+    both->points.push_back(point);
+  }
+  for (Observation observation : second.observations) {
+    observation.keyframe += first.next_keyframe;
+    observation.point += first.next_point;
+    both->observations.push_back(observation);
+  }
+  both->next_keyframe += second.next_keyframe;
+  both->next_point += second.next_point;
+  return both;
+}
+
+Frame FrameOf(int index, const RenderedWorld& world = World()) {
+  return testing_world::MakeFrame(index, world, CameraAt({0.06 + 0.002 * index, 0.02, 0.03}));
+}
+
+// A visitor who was in no map yet.
+std::vector<TrackedFrame> Visit(const SomeMaps& maps, int frames, const RenderedWorld& world = World()) {
+  TrackerOptions options;
+  options.build_maps = false;
+  Tracker tracker(options, Camera(), 3);
+  std::vector<TrackedFrame> seen;
+  for (int i = 0; i < frames; ++i) seen.push_back(tracker.Track(FrameOf(i, world), &maps));
+  return seen;
+}
+
+TEST(RelocalizationResult, IsUnconfirmedUntilSeveralFramesAgree) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(0));
+  const auto frames = Visit(maps, 4);
+  const auto wanted = static_cast<std::size_t>(TrackerOptions().agreeing_frames);
+  for (std::size_t i = 0; i + 1 < wanted; ++i) {
+    EXPECT_EQ(frames[i].state, TrackingState::kLost);
+    EXPECT_EQ(frames[i].verdict.doubt, RejectionReason::kUnconfirmed);
+    EXPECT_EQ(frames[i].verdict.map_key, 1u);
+    EXPECT_EQ(frames[i].verdict.frames, static_cast<int>(i) + 1);
+  }
+  EXPECT_EQ(frames[wanted - 1].state, TrackingState::kRelocalized);
+  EXPECT_EQ(frames[wanted - 1].verdict.doubt, RejectionReason::kNone);
+}
+
+TEST(RelocalizationResult, NamesTooFewPointsInAnotherPlace) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(0));
+  for (const TrackedFrame& frame : Visit(maps, 6, RenderedWorld::Room(7177))) {
+    EXPECT_EQ(frame.state, TrackingState::kLost);
+    EXPECT_EQ(frame.verdict.doubt, RejectionReason::kFewPoints);
+    EXPECT_LT(frame.verdict.inliers, TrackerOptions().min_recovery_inliers);
+  }
+}
+
+TEST(RelocalizationResult, NamesPointsThatAreGatheredInOneCorner) {
+  SomeMaps maps;
+  maps.Add(1, MapOfACorner());
+  ASSERT_GT(maps.At(1)->points.size(), 60u);
+  for (const TrackedFrame& frame : Visit(maps, 6)) {
+    EXPECT_EQ(frame.state, TrackingState::kLost);
+    EXPECT_EQ(frame.verdict.doubt, RejectionReason::kOneCorner);
+    EXPECT_GE(frame.verdict.inliers, TrackerOptions().min_recovery_inliers);
+  }
+}
+
+TEST(RelocalizationResult, NamesTwoMapsThatLookAlike) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(0));
+  maps.Add(2, MapWith(0));
+  for (const TrackedFrame& frame : Visit(maps, 30)) {
+    EXPECT_EQ(frame.state, TrackingState::kLost) << frame.frame.index;
+    EXPECT_EQ(frame.verdict.doubt, RejectionReason::kLookAlikes);
+    EXPECT_EQ(frame.verdict.map_key + frame.verdict.competitor_key, 3u);
+  }
+}
+
+TEST(RelocalizationResult, TakesTheMapThatIsClearlyAheadWhicheverIsFoundFirst) {
+  for (const std::uint64_t right : {1u, 2u}) {
+    SomeMaps maps;
+    maps.Add(right, MapWith(0));
+    maps.Add(3 - right, MapWith(5));
+    const auto frames = Visit(maps, 5);
+    EXPECT_TRUE(HasPose(frames.back().state));
+    EXPECT_EQ(frames.back().map_key, right);
+  }
+}
+
+TEST(RelocalizationResult, TakesTheMapThatIsAlwaysAheadAfterAWhile) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(1));
+  maps.Add(2, MapWith(0));
+  const auto frames = Visit(maps, 30);
+  const auto waited = static_cast<std::size_t>(TrackerOptions().min_leading_frames - 1);
+  for (std::size_t i = 0; i < waited; ++i)
+    EXPECT_EQ(frames[i].verdict.doubt, RejectionReason::kLookAlikes) << i;
+  EXPECT_TRUE(HasPose(frames.back().state));
+  EXPECT_EQ(frames.back().map_key, 2u);
+}
+
+TEST(RelocalizationResult, KeepsToTheMapTheCameraWasInUnlessAnotherIsClearlyBetter) {
+  for (const std::size_t wrong : {1u, 5u}) {
+    SomeMaps maps;
+    maps.Add(1, MapWith(wrong));
+    maps.Add(2, MapWith(0));
+    TrackerOptions options;
+    options.build_maps = false;
+    Tracker tracker(options, Camera(), 3);
+    tracker.SetMap(maps.At(1), 1);
+    TrackedFrame last;
+    for (int i = 0; i < 4; ++i) last = tracker.Track(FrameOf(i), &maps);
+    EXPECT_TRUE(HasPose(last.state));
+    EXPECT_EQ(last.map_key, wrong == 1 ? 1u : 2u);
+  }
+}
+
+TEST(RelocalizationResult, LetsNoMapBeExtendedThatWasJustFoundAgain) {
+  SomeMaps maps;
+  maps.Add(1, MapWith(0));
+  const RenderedWorld nothing{std::vector<testing_world::Wall>()};
+  TrackerOptions options;
+  options.keyframes.min_distance = 0.05;
+  Tracker tracker(options, Camera(), 3);
+  tracker.SetMap(maps.At(1), 1);
+  // Lost for longer than keyframes keep apart, then back at a place that is far enough from all keyframes.
+  for (int i = 0; i < 8; ++i) EXPECT_FALSE(HasPose(tracker.Track(FrameOf(i, nothing), &maps).state));
+  int first_pose = -1, first_keyframe = -1, first_reports = -1;
+  for (int i = 100; i < 130; ++i) {
+    Frame frame = FrameOf(i);
+    frame.image = World().Render(*Camera(), CameraAt({0.45, 0.02, 0.03}), 1.5, frame.index + 1);
+    if (HasPose(tracker.Track(frame, &maps).state) && first_pose < 0) first_pose = i;
+    if (tracker.TakeKeyFrameCandidate() && first_keyframe < 0) first_keyframe = i;
+    if (!tracker.TakeReports().empty() && first_reports < 0) first_reports = i;
+  }
+  ASSERT_GE(first_pose, 0);
+  ASSERT_GE(first_keyframe, 0);
+  EXPECT_EQ(first_keyframe, first_pose + options.agreeing_frames + 1);
+  EXPECT_EQ(first_reports, first_keyframe);
+}
+
+TEST(RelocalizationResult, TakesTheBetterOfTwoPlacesInOneMapThatLookAlike) {
+  for (const bool second : {false, true}) {
+    SomeMaps maps;
+    maps.Add(1, second ? TwoPlaces(*MapWith(5), *MapWith(0)) : TwoPlaces(*MapWith(0), *MapWith(5)));
+    ASSERT_EQ(Validate(*maps.At(1)), "");
+    const TrackedFrame last = Visit(maps, 5).back();
+    ASSERT_TRUE(HasPose(last.state));
+    EXPECT_NEAR(last.camera_from_map.OriginInSource().x(), second ? kBetweenPlaces : 0, 0.3);
+  }
+}
+
+TEST(RelocalizationResult, NamesTwoPlacesInOneMapThatLookAlike) {
+  SomeMaps maps;
+  maps.Add(1, TwoPlaces(*MapWith(0), *MapWith(0)));
+  for (const TrackedFrame& frame : Visit(maps, 10)) {
+    EXPECT_EQ(frame.state, TrackingState::kLost) << frame.frame.index;
+    EXPECT_EQ(frame.verdict.doubt, RejectionReason::kLookAlikes);
+    EXPECT_EQ(frame.verdict.map_key, 1u);
+    EXPECT_EQ(frame.verdict.competitor_key, 1u);
+  }
+}
+
+// The camera was found where a part of the map looks alike, and then sees what only the right place shows.
+TEST(RelocalizationResult, GoesOverToThePlaceThatExplainsMoreOfTheImage) {
+  SomeMaps maps;
+  maps.Add(1, TwoPlaces(*MapWith(5), *MapWith(10)));
+  TrackerOptions options;
+  options.build_maps = false;
+  Tracker tracker(options, Camera(), 3);
+  TrackedFrame frame;
+  int index = 0;
+  while (index < 10 && !HasPose(frame.state)) frame = tracker.Track(FrameOf(index++), &maps);
+  ASSERT_TRUE(HasPose(frame.state));
+  EXPECT_LT(frame.quality, options.poor_quality);
+  EXPECT_NEAR(frame.camera_from_map.OriginInSource().x(), 0, 0.3);
+  auto both = TwoPlaces(*MapWith(5), *MapWith(0));
+  maps.Add(1, both);
+  tracker.SetMap(both, 1);
+  for (int i = 0; i < 5; ++i) frame = tracker.Track(FrameOf(index++), &maps);
+  ASSERT_TRUE(HasPose(frame.state));
+  EXPECT_NEAR(frame.camera_from_map.OriginInSource().x(), kBetweenPlaces, 0.3);
+  EXPECT_GT(frame.quality, options.poor_quality);
+}
+
+}  // namespace
+}  // namespace docent::engine
