@@ -27,7 +27,7 @@ Asset ImportAsset(const std::filesystem::path& path, const LoadLimits& limits) {
   const std::string name = path.filename().string();
   const std::optional<std::filesystem::path> folder = path.parent_path();
   if (IsAssimpFormat(path)) {
-    // What assimp read comes out as glTF text and passes through the same checks as any other.
+    // The converted file passes through the same checks as any other glTF file.
     ConvertedGltf converted = GltfFromAssimp(path, limits);
     LoadedGltf loaded = LoadGltf(name, std::move(converted.glb), folder, limits);
     loaded.model->warnings.insert(loaded.model->warnings.end(), converted.warnings.begin(),

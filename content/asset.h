@@ -9,16 +9,17 @@
 #include "content/load_limits.h"
 #include "content/scene.h"
 
-// From a model file on disk, or bytes kept in a library, to an Asset that can be placed. Free of state: any
-// thread may call these. Every fault of the file throws Error with one sentence that names it.
+// Makes an Asset, which can be placed in a map, from a model file or from bytes that a library stores. The
+// functions are stateless and thread-safe. Every error in the file throws Error with a one-sentence message
+// that names the file.
 namespace docent::content {
 
-// Reads a model file: .gltf and .glb by the glTF loader, other formats (.obj, .ply, .stl, .fbx, .dae, .3ds,
-// .off) by assimp. The asset needs no other file afterwards; its id is the SHA-256 of its GLB bytes.
+// Reads a model file: .gltf and .glb with the glTF loader, other formats (.obj, .ply, .stl, .fbx, .dae, .3ds,
+// .off) with assimp. The asset is self-contained; its id is the SHA-256 of its GLB bytes.
 Asset ImportAsset(const std::filesystem::path& path, const LoadLimits& limits = {});
 
-// An asset as it was kept: `glb` is checked as thoroughly as a file from anywhere, and may point to no other
-// file.
+// Makes an asset from stored bytes. `glb` is checked as thoroughly as any other file and must not refer to
+// other files.
 Asset AssetFromGlb(const std::string& name, std::vector<std::uint8_t> glb, const LoadLimits& limits = {});
 
 }  // namespace docent::content

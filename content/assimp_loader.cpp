@@ -20,7 +20,7 @@ namespace {
 
 constexpr const char* kFormats[] = {".obj", ".ply", ".stl", ".fbx", ".dae", ".3ds", ".off"};
 
-// Shows assimp nothing but regular files of a bounded size inside one folder, links followed.
+// Restricts assimp to regular files of limited size inside one folder; symbolic links are resolved.
 class FolderOnly : public Assimp::DefaultIOSystem {
  public:
   FolderOnly(const std::filesystem::path& folder, std::uint64_t max_bytes)
@@ -46,7 +46,7 @@ class FolderOnly : public Assimp::DefaultIOSystem {
   std::uint64_t max_bytes_;
 };
 
-// Builds JSON and binary chunk of a glTF from what assimp read.
+// Builds the JSON and the binary chunk of a glTF from an assimp scene.
 class Writer {
  public:
   Writer(const std::string& file, const std::filesystem::path& folder, const aiScene& scene,
@@ -151,7 +151,7 @@ class Writer {
   Json WriteNode(const aiNode& node) {
     Json json{{"name", node.mName.C_Str()}};
     if (!node.mTransformation.IsIdentity()) {
-      // glTF writes columns, assimp keeps rows.
+      // glTF is column-major, assimp row-major.
       Json matrix = Json::array();
       for (unsigned int column = 0; column < 4; ++column) {
         for (unsigned int row = 0; row < 4; ++row) matrix.push_back(node.mTransformation[row][column]);
@@ -179,7 +179,7 @@ class Writer {
   GltfBuilder buffer_;
   std::vector<std::string> warnings_;
   AssimpMaterialWriter materials_;
-  std::vector<Json> primitives_;  // of each of assimp's meshes, null for one without triangles
+  std::vector<Json> primitives_;  // One for each assimp mesh; null for a mesh without triangles.
 };
 
 }  // namespace
@@ -193,9 +193,10 @@ bool IsAssimpFormat(const std::filesystem::path& path) {
 
 ConvertedGltf GltfFromAssimp(const std::filesystem::path& path, const LoadLimits& limits) {
   const std::string file = path.filename().string();
-  ReadFileBytes(path, limits.max_file_bytes);  // says in one sentence when it is missing or too large
+  ReadFileBytes(path, limits.max_file_bytes);  // Throws Error when the file is missing or too large.
   Assimp::Importer importer;
-  importer.SetIOHandler(new FolderOnly(path.parent_path(), limits.max_file_bytes));  // the importer owns it
+  // The importer owns the handler.
+  importer.SetIOHandler(new FolderOnly(path.parent_path(), limits.max_file_bytes));
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const aiScene* scene = importer.ReadFile(
       path.string(), aiProcess_Triangulate | aiProcess_JoinIdenticalVertices | aiProcess_SortByPType |

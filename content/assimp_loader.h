@@ -8,22 +8,22 @@
 
 #include "content/load_limits.h"
 
-// Reads model files that are not glTF, through assimp, by turning them into glTF: what assimp understood then
-// passes through the glTF loader's checks like any other file. Triangles, normals, two sets of texture
-// coordinates, vertex colours, the node tree, colours and PNG or JPEG textures come over; skins and
-// animations do not.
+// Reads model files that are not glTF with assimp and converts them to glTF, so that the result passes
+// through the glTF loader's checks like any other file. Triangles, normals, two sets of texture coordinates,
+// vertex colours, the node tree, material colours and PNG or JPEG textures are converted; skins and
+// animations are not.
 namespace docent::content {
 
 // Whether the file's extension is one of .obj, .ply, .stl, .fbx, .dae, .3ds, .off.
 bool IsAssimpFormat(const std::filesystem::path& path);
 
 struct ConvertedGltf {
-  std::vector<std::uint8_t> glb;      // textures by relative URI, beside the source file
-  std::vector<std::string> warnings;  // what did not come over, a sentence each
+  std::vector<std::uint8_t> glb;      // Refers to textures by URIs relative to the source file.
+  std::vector<std::string> warnings;  // One sentence for each feature that was not converted.
 };
 
-// assimp itself opens only files inside the model's own folder. Throws Error when it cannot read the file or
-// the result is beyond the limits.
+// assimp opens only files inside the model's own folder. Throws Error when the file cannot be read or the
+// result exceeds the limits.
 ConvertedGltf GltfFromAssimp(const std::filesystem::path& path, const LoadLimits& limits);
 
 }  // namespace docent::content

@@ -42,8 +42,9 @@ std::optional<aiColor4D> ColorOf(const aiMaterial& source) {
   return std::nullopt;
 }
 
-// Blinn-Phong's exponent as a roughness: both lobes have the same width where n = 2 / roughness^2 - 2, with
-// the square root once more because glTF squares its parameter (Karis 2013, "Specular BRDF Reference").
+// Converts a Blinn-Phong exponent n to roughness. Both lobes have the same width for n = 2 / roughness^2 - 2;
+// the square root is taken once more because glTF squares its roughness parameter (Karis 2013, "Specular BRDF
+// Reference").
 float RoughnessOf(const aiMaterial& source) {
   float roughness = 0;
   if (source.Get(AI_MATKEY_ROUGHNESS_FACTOR, roughness) == AI_SUCCESS) return UnitClamped(roughness);
@@ -119,7 +120,8 @@ int AssimpMaterialWriter::WriteImage(const std::string& path) {
 }
 
 Json AssimpMaterialWriter::EmbeddedImage(const aiTexture& texture) {
-  if (texture.mHeight != 0) return nullptr;  // raw texels; a height of 0 marks a whole file of mWidth bytes
+  // These are raw texels; a height of 0 marks a complete image file of mWidth bytes.
+  if (texture.mHeight != 0) return nullptr;
   const std::span bytes(reinterpret_cast<const std::uint8_t*>(texture.pcData), texture.mWidth);
   if (!ReadImageSize(bytes)) return nullptr;
   return {{"bufferView", builder_.AppendView(bytes)},
@@ -129,14 +131,14 @@ Json AssimpMaterialWriter::EmbeddedImage(const aiTexture& texture) {
 Json AssimpMaterialWriter::ExternalImage(const std::string& path) {
   std::string forward = path;
   std::replace(forward.begin(), forward.end(), '\\', '/');
-  // Many files name the path on their maker's machine; the image then usually lies beside the model.
+  // Many files contain the path on their author's machine. The image then usually is in the model's folder.
   for (const std::string& candidate : {forward, std::filesystem::path(forward).filename().string()}) {
     try {
       const std::string uri = PercentEncoded(candidate);
       const std::filesystem::path found = ResolveUri("", "", uri, folder_);
       if (ReadImageSize(ReadFileBytes(found, limits_.max_file_bytes))) return {{"uri", uri}};
     } catch (const Error&) {
-      continue;  // not there, or not allowed: the next candidate, and a warning in the end
+      continue;  // Missing or not allowed: try the next candidate; a warning follows if none is usable.
     }
   }
   return nullptr;

@@ -14,10 +14,10 @@
 #include "content/gltf_json.h"
 #include "content/load_limits.h"
 
-// The parts of assimp_loader that write materials; nobody else includes this.
+// Converts assimp's materials. Private to assimp_loader.
 namespace docent::content {
 
-// A glTF while it is built.
+// A glTF under construction.
 struct GltfBuilder {
   Json json;
   std::vector<std::uint8_t> bin;
@@ -30,7 +30,7 @@ struct GltfBuilder {
 
 class AssimpMaterialWriter {
  public:
-  // All must outlive the writer. `folder` is where texture files may lie.
+  // All references must outlive the writer. `folder` is the folder that may contain texture files.
   AssimpMaterialWriter(const std::filesystem::path& folder, const aiScene& scene, const LoadLimits& limits,
                        GltfBuilder* builder, std::vector<std::string>* warnings)
       : folder_(folder), scene_(scene), limits_(limits), builder_(*builder), warnings_(*warnings) {}
@@ -39,9 +39,9 @@ class AssimpMaterialWriter {
   void Write(const aiMaterial& source);
 
  private:
-  // A glTF texture info, or null when the material has no such texture that can be shown.
+  // Returns a glTF texture info, or null when the material has no usable texture of this type.
   Json WriteTexture(const aiMaterial& source, aiTextureType type);
-  // Index of the glTF texture that shows this image, -1 with a warning when it cannot be shown.
+  // Returns the index of the glTF texture with this image, or -1 with a warning when it is unusable.
   int WriteImage(const std::string& path);
   Json EmbeddedImage(const aiTexture& texture);
   Json ExternalImage(const std::string& path);
@@ -51,7 +51,7 @@ class AssimpMaterialWriter {
   const LoadLimits& limits_;
   GltfBuilder& builder_;
   std::vector<std::string>& warnings_;
-  std::map<std::string, int> textures_;  // by the image's path as the file names it
+  std::map<std::string, int> textures_;  // By the image's path in the file.
 };
 
 }  // namespace docent::content

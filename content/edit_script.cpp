@@ -14,8 +14,8 @@ bool IsBlank(char letter) {
   return letter == ' ' || letter == '\t' || letter == '\r' || letter == '\n';
 }
 
-// Reads a quoted word whose opening quote stands at *at; *at is moved past the closing one.
-std::string TakeQuoted(std::string_view line, std::size_t* at) {
+// Reads a quoted word whose opening quote is at *at, and moves *at past the closing quote.
+std::string ReadQuoted(std::string_view line, std::size_t* at) {
   std::string word;
   for (std::size_t i = *at + 1; i < line.size(); ++i) {
     if (line[i] == '"') {
@@ -33,7 +33,7 @@ std::string TakeQuoted(std::string_view line, std::size_t* at) {
 }
 
 void CheckCount(std::span<const std::string> words, std::size_t count, const char* form) {
-  if (words.size() != count) throw Error("'" + words[0] + "' is written: " + form + ".");
+  if (words.size() != count) throw Error("'" + words[0] + "' must be written as: " + form + ".");
 }
 
 }  // namespace
@@ -47,7 +47,7 @@ std::vector<std::string> SplitWords(std::string_view line) {
     } else if (line[at] == '#') {
       break;
     } else if (line[at] == '"') {
-      words.push_back(TakeQuoted(line, &at));
+      words.push_back(ReadQuoted(line, &at));
     } else {
       std::size_t end = at;
       while (end < line.size() && !IsBlank(line[end]) && line[end] != '#' && line[end] != '"') ++end;

@@ -9,25 +9,25 @@
 
 #include "content/edits.h"
 
-// The words of a script line, and the edits that need nothing but their words.
+// The words of a script line, and the edits that can be parsed from words alone.
 namespace docent::content {
 
-// Splits a line at blanks. Words with blanks, '#' or quotes stand in double quotes, in which \" is a quote,
-// \\ a backslash and \n a line break; '#' outside quotes begins a comment. Throws Error for a quote that is
-// not closed.
+// Splits a line at blanks. Words that contain blanks, '#' or quotes are enclosed in double quotes, in which
+// \" is a quote, \\ a backslash and \n a line break. '#' outside quotes begins a comment. Throws Error if a
+// quote is not closed.
 std::vector<std::string> SplitWords(std::string_view line);
 
-// A word as SplitWords reads it back: bare where possible, else in quotes. QuoteText always quotes.
+// Formats a word so that SplitWords reads it back: without quotes if possible. QuoteText always adds quotes.
 std::string QuoteWord(std::string_view word);
 std::string QuoteText(std::string_view text);
 
-// Shortest decimal that reads back to the same number.
+// Returns the shortest decimal text that reads back as the same number.
 std::string NumberText(double number);
-// The number that the whole word says; throws Error naming `what` otherwise.
+// Parses the whole word as a number; otherwise throws Error with `what` in the message.
 double ParseNumber(std::string_view word, std::string_view what);
 
-// The edit that `words` say (move, rotate, scale, remove; arguments in edits.h), or nullptr when the first
-// word is none of these. Throws Error for wrong arguments.
+// Parses an edit (move, rotate, scale or remove; see edits.h for the arguments). Returns nullptr when the
+// first word is none of these. Throws Error for invalid arguments.
 std::unique_ptr<Edit> ParseEdit(std::span<const std::string> words);
 
 }  // namespace docent::content

@@ -12,7 +12,7 @@
 namespace docent::content {
 namespace {
 
-// Index of the entity of this name; throws Error when there is none.
+// Returns the index of the entity with this name; throws Error when there is none.
 std::size_t IndexOf(const Scene& scene, const std::string& name) {
   const Entity* found = scene.Find(name);
   if (found == nullptr) throw Error("There is no '" + name + "' in this map.");
@@ -24,7 +24,7 @@ class AddEdit : public Edit {
   AddEdit(Entity entity, std::string text) : entity_(std::move(entity)), text_(std::move(text)) {}
 
   void Apply(Scene* scene) override {
-    if (entity_.name.empty()) throw Error("A thing without a name cannot be placed.");
+    if (entity_.name.empty()) throw Error("An object without a name cannot be placed.");
     if (scene->Find(entity_.name) != nullptr)
       throw Error("There is already a '" + entity_.name + "' in this map.");
     scene->entities.push_back(entity_);
@@ -34,8 +34,8 @@ class AddEdit : public Edit {
                           static_cast<std::ptrdiff_t>(IndexOf(*scene, entity_.name)));
   }
   std::string Text() const override { return text_; }
-  void MoveAlong(const std::string& name, const engine::Sim3& motion) override {
-    if (name == entity_.name) content::MoveAlong(motion, &entity_);
+  void MoveWithAnchor(const std::string& name, const engine::Sim3& motion) override {
+    if (name == entity_.name) content::MoveWithAnchor(motion, &entity_);
   }
 
  private:
@@ -43,7 +43,7 @@ class AddEdit : public Edit {
   std::string text_;
 };
 
-// An edit that changes one entity where it stands and takes it back by restoring what it was.
+// An edit that changes one entity in place. Undo restores the previous entity.
 class ChangeEdit : public Edit {
  public:
   explicit ChangeEdit(std::string name) : name_(std::move(name)) {}
@@ -55,16 +55,16 @@ class ChangeEdit : public Edit {
     before_ = std::exchange(entity, std::move(changed));
   }
   void Undo(Scene* scene) final { scene->entities[IndexOf(*scene, name_)] = before_; }
-  void MoveAlong(const std::string& name, const engine::Sim3& motion) final {
+  void MoveWithAnchor(const std::string& name, const engine::Sim3& motion) final {
     if (name != name_) return;
-    content::MoveAlong(motion, &before_);
-    MoveAim(motion);
+    content::MoveWithAnchor(motion, &before_);
+    MoveTarget(motion);
   }
 
  protected:
-  // The place in the map that the edit takes the entity to, if it names one.
-  virtual void MoveAim(const engine::Sim3& /*motion*/) {}
-  // May throw; works on a copy.
+  // Transforms the edit's target position in the map, if it has one.
+  virtual void MoveTarget(const engine::Sim3& /*motion*/) {}
+  // May throw, because it works on a copy.
   virtual void Change(Entity* entity) = 0;
   const std::string& name() const { return name_; }
 
@@ -85,14 +85,14 @@ class Move : public ChangeEdit {
  protected:
   void Change(Entity* entity) override {
     if (!position_.allFinite())
-      throw Error("'" + name() + "' cannot be moved to a place that is not a number.");
+      throw Error("'" + name() + "' cannot be moved: the coordinates must be finite numbers.");
     if (entity->kind == Entity::Kind::kModel) {
       entity->model.map_from_model.translation = position_;
     } else {
       entity->signpost.anchor = position_;
     }
   }
-  void MoveAim(const engine::Sim3& motion) override { position_ = motion * position_; }
+  void MoveTarget(const engine::Sim3& motion) override { position_ = motion * position_; }
 
  private:
   Eigen::Vector3d position_;
@@ -105,9 +105,10 @@ class Rotate : public ChangeEdit {
 
  protected:
   void Change(Entity* entity) override {
-    if (!std::isfinite(angle_deg_)) throw Error("'" + name() + "' cannot be turned by what is not a number.");
+    if (!std::isfinite(angle_deg_))
+      throw Error("'" + name() + "' cannot be rotated: the angle must be a finite number.");
     if (entity->kind != Entity::Kind::kModel) {
-      throw Error("'" + name() + "' is a signpost, which turns to its reader by itself.");
+      throw Error("'" + name() + "' is a signpost, which always faces the reader and cannot be rotated.");
     }
     const Eigen::Vector3d turn = Eigen::Vector3d::UnitY() * (angle_deg_ * std::numbers::pi / 180);
     engine::Rotation3& rotation = entity->model.map_from_model.rotation;
@@ -128,7 +129,7 @@ class Scale : public ChangeEdit {
     double& size =
         entity->kind == Entity::Kind::kModel ? entity->model.map_from_model.scale : entity->signpost.height_m;
     const double scaled = size * factor_;
-    // The bounds keep the size within what a saved scene may hold.
+    // The limits keep the size within the range that a saved scene allows.
     if (!(factor_ > 0) || !(scaled >= 1e-6) || !(scaled <= 1e6)) {
       throw Error("'" + name() + "' cannot be scaled by " + NumberText(factor_) + ".");
     }
@@ -152,8 +153,8 @@ class Remove : public Edit {
     scene->entities.insert(scene->entities.begin() + static_cast<std::ptrdiff_t>(index_), entity_);
   }
   std::string Text() const override { return "remove " + QuoteWord(name_); }
-  void MoveAlong(const std::string& name, const engine::Sim3& motion) override {
-    if (name == name_) content::MoveAlong(motion, &entity_);
+  void MoveWithAnchor(const std::string& name, const engine::Sim3& motion) override {
+    if (name == name_) content::MoveWithAnchor(motion, &entity_);
   }
 
  private:
@@ -217,9 +218,9 @@ bool EditHistory::Redo(Scene* scene) {
   return true;
 }
 
-void EditHistory::MoveAlong(const std::string& name, const engine::Sim3& motion) {
+void EditHistory::MoveWithAnchor(const std::string& name, const engine::Sim3& motion) {
   for (auto* edits : {&done_, &undone_}) {
-    for (const std::unique_ptr<Edit>& edit : *edits) edit->MoveAlong(name, motion);
+    for (const std::unique_ptr<Edit>& edit : *edits) edit->MoveWithAnchor(name, motion);
   }
 }
 

@@ -29,7 +29,7 @@ const char* TypeName(int type) {
   }
 }
 
-// Reads through memcpy: the buffer's own address need not be aligned for the type.
+// Uses memcpy, because the buffer need not be aligned for the type.
 template <typename T>
 T Load(const std::uint8_t* from) {
   T value;

@@ -9,24 +9,24 @@
 #include <string>
 #include <vector>
 
-// Reads the elements of one accessor of a checked model (gltf_check.h): strides, normalised integers
-// (§3.6.2.2) and sparse replacements (§3.6.2.3) are seen to here. Refers to the model, which must outlive it.
+// Reads the elements of one accessor of a checked model (gltf_check.h). Handles strides, normalized integers
+// (§3.6.2.2) and sparse replacements (§3.6.2.3). It refers to the model, which must outlive it.
 namespace docent::content {
 
 class AccessorReader {
  public:
-  // `file` is named in sentences. Materialises a sparse accessor, otherwise copies nothing.
+  // `file` is used in messages. A sparse accessor is unpacked into a copy; others are read in place.
   AccessorReader(const std::string& file, const tinygltf::Model& model, int accessor);
 
   std::size_t count() const { return count_; }
   int components() const { return components_; }
 
-  // Component of an element as a real number, normalised where the accessor says so. Throws Error when it is
-  // not finite, naming the accessor.
+  // Returns a component as a float, normalized if the accessor says so. Throws Error, which names the
+  // accessor, when it is not finite.
   float Float(std::size_t element, int component) const;
-  // The same as a whole number, for indices and joints (unsigned component types).
+  // Returns a component of an unsigned type as an integer, for indices and joints.
   std::uint32_t Unsigned(std::size_t element, int component = 0) const;
-  // The largest number of the component type.
+  // The largest value of the component type.
   std::uint32_t MaxUnsigned() const { return 0xFFFFFFFFu >> (32 - 8 * component_bytes_); }
 
  private:
@@ -42,11 +42,11 @@ class AccessorReader {
   int components_ = 0, component_type_ = 0;
   bool normalized_ = false;
   const std::uint8_t* data_ = nullptr;
-  std::vector<std::uint8_t> own_;  // of sparse accessors and those without a view
+  std::vector<std::uint8_t> own_;  // The data of sparse accessors and those without a view.
 };
 
-// One reader for each accessor, made when it is first asked for: a sparse accessor that many primitives share
-// is unpacked once. `file` and `model` must outlive it.
+// Caches one reader per accessor, so that a sparse accessor shared by many primitives is unpacked once.
+// `file` and `model` must outlive it.
 class AccessorCache {
  public:
   AccessorCache(const std::string& file, const tinygltf::Model& model) : file_(file), model_(model) {}

@@ -28,7 +28,7 @@ std::vector<float> ReadTimes(const std::string& file, const AccessorReader& read
   std::vector<float> times(reader.count());
   for (std::size_t i = 0; i < times.size(); ++i) {
     times[i] = reader.Float(i, 0);
-    // Equal times occur in real files and do no harm: the step between them is never shown.
+    // Equal times occur in real files and are harmless: the step between them is never shown.
     if (i > 0 && times[i] < times[i - 1]) Refuse(file, place, "has times that do not ascend.");
   }
   return times;
@@ -36,7 +36,7 @@ std::vector<float> ReadTimes(const std::string& file, const AccessorReader& read
 
 void MakeUnit(const std::string& file, const std::string& place, AnimationChannel* channel) {
   const bool cubic = channel->interpolation == AnimationChannel::Interpolation::kCubicSpline;
-  // Of a spline's triples only the middle one is a rotation, the others are tangents.
+  // In a spline's triples only the middle value is a rotation; the others are tangents.
   for (std::size_t i = cubic ? 1 : 0; i < channel->values.size(); i += cubic ? 3 : 1) {
     const float length = glm::length(channel->values[i]);
     if (!(length > 1e-3f) || !std::isfinite(length)) Refuse(file, place, "has a rotation of length zero.");
@@ -67,7 +67,8 @@ std::vector<Animation> ReadAnimations(const std::string& file, const tinygltf::M
       total += values.count();
       if (total > limits.max_key_frame_values) {
         Refuse(file, place,
-               "brings the model above " + std::to_string(limits.max_key_frame_values) + " key frames.");
+               "takes the model over the limit of " + std::to_string(limits.max_key_frame_values) +
+                   " keyframe values.");
       }
       AnimationChannel channel;
       channel.target = *target;
@@ -85,7 +86,7 @@ std::vector<Animation> ReadAnimations(const std::string& file, const tinygltf::M
     }
     animations.push_back(std::move(animation));
   }
-  if (begins_early) warnings->emplace_back("What an animation shows before its time zero is left out.");
+  if (begins_early) warnings->emplace_back("The part of an animation before time zero is left out.");
   if (morphs) warnings->emplace_back("Animations of morph targets are left out.");
   return animations;
 }

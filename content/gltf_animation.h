@@ -10,12 +10,12 @@
 #include "content/load_limits.h"
 #include "content/model.h"
 
-// Key-frame animations of a checked glTF (§3.11).
+// Keyframe animations of a checked glTF (§3.11).
 namespace docent::content {
 
-// Model::animations: times finite and ascending, one value a time (three for splines),
-// rotations of unit length. place_of: new place of each of the file's nodes. Channels without a node and
-// those of morph weights are left out, the latter with a warning.
+// Returns Model::animations: finite ascending times, one value per time (three for splines), rotations of
+// unit length. place_of is the new index of each of the file's nodes. Channels without a node and those of
+// morph weights are left out, the latter with a warning.
 std::vector<Animation> ReadAnimations(const std::string& file, const tinygltf::Model& source,
                                       const std::vector<int>& place_of, const LoadLimits& limits,
                                       AccessorCache* accessors, std::vector<std::string>* warnings);

@@ -7,36 +7,38 @@
 
 #include "content/gltf_json.h"
 
-// What the JSON says, held against itself and against the true sizes of the buffers, before anything is
-// decoded: tinygltf and the decoders after it then work on numbers that are known to be in range. Everything
-// throws Error with one sentence. The steps go in this order, each relying on those before it.
+// Checks the JSON for consistency with itself and with the actual sizes of the buffers before anything is
+// decoded, so that tinygltf and the later decoders only see numbers in range. All functions throw Error with
+// a one-sentence message. The checks must run in this order, because each relies on the previous ones.
 namespace docent::content {
 
-// glTF 2.x, and no required extension that Docent cannot read.
+// Checks for glTF 2.x without required extensions that Docent cannot read.
 void CheckVersion(std::string_view file, const Json& root);
 
-// Whether the extension's name stands in extensionsUsed.
+// Whether extensionsUsed contains the extension.
 bool UsesExtension(const Json& root, std::string_view name);
 
-// Bytes of one component and of one element of an accessor (columns of small matrices padded, §3.6.2.4).
+// The bytes of one component and of one element of an accessor (columns of small matrices are padded,
+// §3.6.2.4).
 std::uint64_t ComponentBytes(int component_type);
 std::uint64_t ElementBytes(std::string_view type, int component_type);
-// Without the padding after the last column, which the last element of a view may lack.
+// The same without the padding after the last column, which may be missing for the last element of a view.
 std::uint64_t UnpaddedBytes(std::string_view type, int component_type);
 int ComponentCount(std::string_view type);
 
-// Every buffer view inside its buffer, every accessor inside its view and aligned, every sparse part
-// likewise. An accessor without a view costs no bytes in the file: its count is bounded by `file_bytes`.
-// buffer_bytes: the true number of bytes of each buffer.
+// Checks that every buffer view is inside its buffer, and every accessor and sparse part is aligned and
+// inside its view. An accessor without a view takes no bytes in the file, so its count is limited by
+// `file_bytes`. buffer_bytes are the actual sizes of the buffers.
 void CheckBufferViews(std::string_view file, const Json& root, std::span<const std::uint64_t> buffer_bytes);
 void CheckAccessors(std::string_view file, const Json& root, std::uint64_t file_bytes,
                     const LoadLimits& limits);
 
-// Attributes and indices of the kinds that §3.7.2.1 allows, all of one count within a primitive.
+// Checks that attributes and indices have types that §3.7.2.1 allows, and that the attributes of a primitive
+// have equal counts.
 void CheckMeshes(std::string_view file, const Json& root);
 
-// Nodes form a forest, skins and animation samplers have the kinds and counts that
-// they need (§3.5, §3.7.3, §3.11).
+// Checks that the nodes form a forest and that skins and animation samplers have the required types and
+// counts (§3.5, §3.7.3, §3.11).
 void CheckNodes(std::string_view file, const Json& root, const LoadLimits& limits);
 void CheckSkins(std::string_view file, const Json& root);
 void CheckAnimations(std::string_view file, const Json& root);

@@ -16,7 +16,7 @@ constexpr std::string_view kReadableExtensions[] = {
 };
 
 bool IsGltf1(const Json& root) {
-  // In glTF 1.0 the collections are objects with names, not arrays.
+  // In glTF 1.0 the collections are named objects, not arrays.
   for (const char* name : {"meshes", "nodes", "accessors", "bufferViews", "buffers", "scenes"}) {
     const auto found = root.find(name);
     if (found != root.end() && found->is_object()) return true;
@@ -33,11 +33,12 @@ int MajorVersion(const std::string& version) {
   return std::stoi(version.substr(0, dot));
 }
 
-// One accessor's elements in a view: begin, step, size and number, all in bytes and checked by Fits.
+// The location of an accessor's elements in a view; all values in bytes except the count. Fits checks them.
 struct Layout {
-  std::uint64_t offset, stride, last_bytes, count;  // last_bytes: of the last element, which needs no padding
+  // last_bytes is the size of the last element, which needs no padding.
+  std::uint64_t offset, stride, last_bytes, count;
   bool Fits(std::uint64_t view_bytes) const {
-    // No sum or product here can wrap: each factor was bounded first.
+    // No sum or product can overflow here, because each operand was bounded first.
     if (offset > view_bytes || last_bytes > view_bytes - offset) return false;
     return (count - 1) <= (view_bytes - offset - last_bytes) / stride;
   }
@@ -139,20 +140,20 @@ void CheckVersion(std::string_view file, const Json& root) {
   const bool has_version = version != asset.end() && version->is_string();
   const int major = has_version ? MajorVersion(version->get<std::string>()) : -1;
   if (major == 1 || IsGltf1(root)) Refuse(file, "", "this is a glTF 1.0 file; convert it to glTF 2.0 first.");
-  if (major != 2) Refuse(file, "asset.version", "does not say 2.0.");
+  if (major != 2) Refuse(file, "asset.version", "is not 2.0.");
   const auto least = asset.find("minVersion");
   if (least != asset.end() && (!least->is_string() || *least != "2.0")) {
     Refuse(file, "asset.minVersion", "asks for a newer reader than glTF 2.0.");
   }
   const Json& required = ArrayOf(root, "extensionsRequired");
   for (const Json& name : required) {
-    if (!name.is_string()) Refuse(file, "extensionsRequired", "is not a list of texts.");
+    if (!name.is_string()) Refuse(file, "extensionsRequired", "is not a list of strings.");
     const std::string text = name.get<std::string>();
     if (std::find(std::begin(kReadableExtensions), std::end(kReadableExtensions), text) ==
         std::end(kReadableExtensions)) {
       Refuse(file, "",
              "the file cannot be shown without the extension " + text.substr(0, 60) +
-                 ", which Docent does not read; export it without.");
+                 ", which Docent does not read; export the model without it.");
     }
   }
 }
@@ -195,7 +196,7 @@ void CheckBufferViews(std::string_view file, const Json& root, std::span<const s
   const Json& views = ArrayOf(root, "bufferViews");
   for (std::size_t i = 0; i < views.size(); ++i) {
     const std::size_t buffer = views[i]["buffer"].get<std::size_t>();
-    if (buffer_bytes[buffer] == 0) Refuse(file, Place("buffers", buffer), "is needed and has no bytes.");
+    if (buffer_bytes[buffer] == 0) Refuse(file, Place("buffers", buffer), "is used but has no data.");
     const std::uint64_t whole = buffers[buffer]["byteLength"].get<std::uint64_t>();
     const std::uint64_t offset = UnsignedOr(views[i], "byteOffset", 0);
     const std::uint64_t length = views[i]["byteLength"].get<std::uint64_t>();
@@ -219,14 +220,14 @@ void CheckAccessors(std::string_view file, const Json& root, std::uint64_t file_
     const Json& accessor = accessors[i];
     checker.Check(accessor, Place("accessors", i));
     if (accessor.contains("bufferView") && !accessor.contains("sparse")) continue;
-    // Such an accessor is unpacked into memory of its own; its count was bounded just now.
+    // Such an accessor is unpacked into separate memory; its count was bounded above.
     const std::uint64_t element_bytes =
         ElementBytes(accessor["type"].get_ref<const std::string&>(), accessor["componentType"].get<int>());
     unpacked_bytes += accessor["count"].get<std::uint64_t>() * element_bytes;
     if (unpacked_bytes > limits.max_file_bytes) {
       Refuse(file, Place("accessors", i),
-             "brings what the sparse accessors unpack to above " + std::to_string(limits.max_file_bytes) +
-                 " bytes.");
+             "takes the unpacked sparse accessors over the limit of " +
+                 std::to_string(limits.max_file_bytes) + " bytes.");
     }
   }
 }

@@ -33,7 +33,7 @@ bool IsFloatOrNormalized(const Json& accessor, bool signed_too) {
   return accessor.value("normalized", false) && (is_unsigned || (signed_too && is_signed));
 }
 
-// Whether an attribute has a type that §3.7.2.1 lists, or KHR_mesh_quantization with `quantized`.
+// Whether an attribute has a type that §3.7.2.1 allows, or KHR_mesh_quantization if `quantized`.
 bool HasAttributeFormat(const std::string& name, const Json& accessor, bool quantized) {
   const int component = accessor["componentType"].get<int>();
   const bool small = component != kUnsignedInt;
@@ -56,7 +56,7 @@ bool HasAttributeFormat(const std::string& name, const Json& accessor, bool quan
     return IsType(accessor, "VEC4") && (component == kUnsignedByte || component == kUnsignedShort);
   }
   if (name.starts_with("WEIGHTS_")) return IsType(accessor, "VEC4") && IsFloatOrNormalized(accessor, false);
-  return true;  // an application's own attribute, not read
+  return true;  // An application-specific attribute, which is not read.
 }
 
 void CheckPrimitive(std::string_view file, const Json& root, const Json& primitive,
@@ -68,16 +68,16 @@ void CheckPrimitive(std::string_view file, const Json& root, const Json& primiti
     const Json& accessor = AccessorAt(root, index);
     const std::string attribute_place = place + ".attributes." + name.substr(0, 40);
     if (!HasAttributeFormat(name, accessor, quantized)) {
-      Refuse(file, attribute_place, "has a type that this attribute cannot have.");
+      Refuse(file, attribute_place, "has a type that is not allowed for this attribute.");
     }
     if (accessor["count"].get<std::uint64_t>() != count) {
-      Refuse(file, attribute_place, "has another number of elements than the other attributes.");
+      Refuse(file, attribute_place, "has a different number of elements than the other attributes.");
     }
   }
   for (const auto& target : ArrayOf(primitive, "targets")) {
     for (const auto& [name, index] : target.items()) {
       if (AccessorAt(root, index)["count"].get<std::uint64_t>() != count) {
-        Refuse(file, place + ".targets", "has another number of elements than the attributes.");
+        Refuse(file, place + ".targets", "has a different number of elements than the attributes.");
       }
     }
   }
@@ -90,12 +90,12 @@ void CheckPrimitive(std::string_view file, const Json& root, const Json& primiti
   const bool is_index =
       component == kUnsignedByte || component == kUnsignedShort || component == kUnsignedInt;
   if (!IsType(indices, "SCALAR") || !is_index || indices.value("normalized", false)) {
-    Refuse(file, place + ".indices", "is not an accessor of unsigned whole numbers.");
+    Refuse(file, place + ".indices", "is not an accessor of unsigned integers.");
   }
   if (HasStride(root, indices)) Refuse(file, place + ".indices", "lies in a view with a byteStride.");
 }
 
-// Every node's parent, -1 for none; refuses a node with two.
+// Returns each node's parent, or -1; refuses a node with two parents.
 std::vector<int> Parents(std::string_view file, const Json& nodes) {
   std::vector<int> parents(nodes.size(), -1);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -108,8 +108,8 @@ std::vector<int> Parents(std::string_view file, const Json& nodes) {
   return parents;
 }
 
-// With one parent each, nodes that cannot be reached from a root stand in a circle.
-void CheckNoCircle(std::string_view file, const Json& nodes, const std::vector<int>& parents) {
+// Every node has at most one parent, so nodes that no root reaches form a cycle.
+void CheckAcyclic(std::string_view file, const Json& nodes, const std::vector<int>& parents) {
   std::vector<std::size_t> open;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (parents[i] < 0) open.push_back(i);
@@ -121,7 +121,7 @@ void CheckNoCircle(std::string_view file, const Json& nodes, const std::vector<i
     ++reached;
     for (const Json& child : ArrayOf(nodes[node], "children")) open.push_back(child.get<std::size_t>());
   }
-  if (reached != nodes.size()) Refuse(file, "nodes", "contains a circle: a node is its own ancestor.");
+  if (reached != nodes.size()) Refuse(file, "nodes", "contain a cycle: a node is its own ancestor.");
 }
 
 int KeyFrameComponents(const std::string& path) {
@@ -132,7 +132,7 @@ void CheckChannel(std::string_view file, const Json& root, const Json& animation
                   const std::string& place) {
   const Json& samplers = animation["samplers"];
   const std::uint64_t number = channel["sampler"].get<std::uint64_t>();
-  if (number >= samplers.size()) Refuse(file, place + ".sampler", "is no sampler of this animation.");
+  if (number >= samplers.size()) Refuse(file, place + ".sampler", "is not a sampler of this animation.");
   const Json& sampler = samplers[number];
   const Json& input = AccessorAt(root, sampler["input"]);
   const Json& output = AccessorAt(root, sampler["output"]);
@@ -146,14 +146,14 @@ void CheckChannel(std::string_view file, const Json& root, const Json& animation
       is_rotation ? IsFloatOrNormalized(output, true) : output["componentType"] == kFloat;
   if (ComponentCount(output["type"].get<std::string>()) != KeyFrameComponents(path) ||
       IsType(output, "MAT2") || !right_component) {
-    Refuse(file, place, "has values of a type that a " + path + " cannot have.");
+    Refuse(file, place, "has values of a type that is not allowed for a " + path + ".");
   }
   const bool cubic = sampler.value("interpolation", "LINEAR") == "CUBICSPLINE";
   const std::uint64_t times = input["count"].get<std::uint64_t>();
   if (output["count"].get<std::uint64_t>() != times * (cubic ? 3u : 1u)) {
-    Refuse(file, place, "has another number of values than its times ask for.");
+    Refuse(file, place, "has a number of values that does not match its times.");
   }
-  if (cubic && times < 2) Refuse(file, place, "is a cubic spline with a single key frame.");
+  if (cubic && times < 2) Refuse(file, place, "is a cubic spline with a single keyframe.");
 }
 
 }  // namespace
@@ -174,7 +174,7 @@ void CheckNodes(std::string_view file, const Json& root, const LoadLimits& limit
     Refuse(file, "", "the file has more than " + std::to_string(limits.max_nodes) + " nodes.");
   }
   const std::vector<int> parents = Parents(file, nodes);
-  CheckNoCircle(file, nodes, parents);
+  CheckAcyclic(file, nodes, parents);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const bool has_parts =
         nodes[i].contains("translation") || nodes[i].contains("rotation") || nodes[i].contains("scale");
@@ -213,7 +213,7 @@ void CheckAnimations(std::string_view file, const Json& root) {
       const Json& target = channels[k]["target"];
       if (!target.contains("node")) continue;
       if (!targets.emplace(target["node"].get<int>(), target["path"].get<std::string>()).second) {
-        Refuse(file, place, "moves what another channel of this animation moves already.");
+        Refuse(file, place, "animates a property that another channel of this animation already animates.");
       }
     }
   }

@@ -14,7 +14,7 @@ constexpr std::uint32_t kJsonChunk = 0x4E4F534A;  // "JSON"
 constexpr std::uint32_t kBinChunk = 0x004E4942;   // "BIN\0"
 constexpr std::size_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
 
-// GLB numbers are little-endian whatever the machine is.
+// GLB numbers are little-endian on every machine.
 std::uint32_t ReadU32(std::span<const std::uint8_t> bytes, std::size_t offset) {
   return std::uint32_t{bytes[offset]} | std::uint32_t{bytes[offset + 1]} << 8 |
          std::uint32_t{bytes[offset + 2]} << 16 | std::uint32_t{bytes[offset + 3]} << 24;
@@ -33,7 +33,7 @@ void AppendChunk(std::uint32_t type, std::span<const std::uint8_t> data, std::ui
   glb->insert(glb->end(), padded - data.size(), padding);
 }
 
-// The bytes that the header speaks of; what stands behind them belongs to nobody.
+// The bytes that the header covers; further bytes are ignored.
 std::span<const std::uint8_t> WithoutTail(std::string_view file, std::span<const std::uint8_t> bytes) {
   if (bytes.size() < kHeaderBytes) Refuse(file, "", "the GLB file is cut off inside its header.");
   const std::uint32_t version = ReadU32(bytes, 4), length = ReadU32(bytes, 8);
@@ -41,13 +41,13 @@ std::span<const std::uint8_t> WithoutTail(std::string_view file, std::span<const
   if (version != 2) Refuse(file, "", "the GLB header says version " + std::to_string(version) + ", not 2.");
   if (length > bytes.size()) {
     Refuse(file, "",
-           "the GLB file is cut off: its header says " + std::to_string(length) + " bytes and there are " +
+           "the GLB file is cut off: its header gives " + std::to_string(length) + " bytes and there are " +
                std::to_string(bytes.size()) + ".");
   }
   return bytes.first(length);
 }
 
-// One chunk's data at `offset`, which is moved past it.
+// Returns the data of the chunk at `offset` and moves `offset` past it.
 std::span<const std::uint8_t> TakeChunk(std::string_view file, std::span<const std::uint8_t> bytes,
                                         std::size_t* offset, std::uint32_t* type) {
   if (bytes.size() - *offset < kChunkHeaderBytes)
@@ -78,7 +78,7 @@ GltfContainer SplitGlb(std::string_view file, std::span<const std::uint8_t> byte
       if (data.empty()) Refuse(file, "", "the JSON chunk of the GLB file is empty.");
       container.json = {reinterpret_cast<const char*>(data.data()), data.size()};
     } else if (type == kBinChunk) {
-      if (number != 1) Refuse(file, "", "a BIN chunk stands at another place than second in the GLB file.");
+      if (number != 1) Refuse(file, "", "the BIN chunk is not the second chunk of the GLB file.");
       container.bin = data;
     }
   }
@@ -93,7 +93,7 @@ GltfContainer SplitGltf(std::string_view file, std::span<const std::uint8_t> byt
   if (bytes.size() >= 4 && ReadU32(bytes, 0) == kMagic) return SplitGlb(file, bytes);
   GltfContainer container;
   container.json = {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-  // A first byte that no JSON object can begin with: say that instead of quoting a JSON parser.
+  // No JSON object can begin with this byte. This message is clearer than the JSON parser's.
   const std::size_t first = container.json.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
   if (first == std::string_view::npos || container.json[first] != '{') {
     Refuse(file, "", "this is neither a GLB file nor glTF text.");

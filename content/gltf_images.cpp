@@ -28,7 +28,7 @@ bool IsJpeg(std::span<const std::uint8_t> bytes) {
   return bytes.size() >= 3 && bytes[0] == 0xFF && bytes[1] == 0xD8;
 }
 
-// Walks the segments before the first frame header (ITU-T T.81, B.1.1 and B.2.2).
+// Skips the segments before the first frame header (ITU-T T.81, B.1.1 and B.2.2).
 std::optional<ImageSize> ReadJpegSize(std::span<const std::uint8_t> bytes) {
   std::size_t offset = 2;
   while (offset + 4 <= bytes.size()) {
@@ -42,7 +42,7 @@ std::optional<ImageSize> ReadJpegSize(std::span<const std::uint8_t> bytes) {
       continue;
     }
     if (marker == 0xD9 || marker == 0xDA) return std::nullopt;
-    // C0..CF are frame headers, but for the tables DHT (C4), JPG (C8) and DAC (CC).
+    // C0 to CF are frame headers, except for the tables DHT (C4), JPG (C8) and DAC (CC).
     const bool is_frame =
         marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
     if (is_frame) {
@@ -54,7 +54,7 @@ std::optional<ImageSize> ReadJpegSize(std::span<const std::uint8_t> bytes) {
   return std::nullopt;
 }
 
-// stb gives 8 or, for some PNGs, 16 bits a channel; a screen shows the upper 8.
+// stb returns 8 or, for some PNGs, 16 bits per channel; only the upper 8 are used.
 Image ToImage(const tinygltf::Image& decoded) {
   Image image;
   image.width_px = decoded.width;
@@ -95,13 +95,13 @@ Image DecodeImage(const std::string& file, const std::string& place, std::span<c
       static_cast<std::uint64_t>(size->width_px) * static_cast<std::uint64_t>(size->height_px);
   if (pixels > *pixels_left) {
     Refuse(file, place,
-           "of " + words + " pixels brings the model's images above " +
+           "of " + words + " pixels takes the model's images over the limit of " +
                std::to_string(limits.max_image_pixels) + " pixels.");
   }
   *pixels_left -= pixels;
   tinygltf::Image decoded;
   std::string fault, warning;
-  // Without options it asks stb for four channels.
+  // Without options, stb is asked for four channels.
   const bool done = tinygltf::LoadImageData(&decoded, 0, &fault, &warning, size->width_px, size->height_px,
                                             bytes.data(), static_cast<int>(bytes.size()), nullptr);
   const std::size_t expected = pixels * 4 * (decoded.bits == 16 ? 2 : 1);

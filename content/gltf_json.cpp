@@ -18,8 +18,8 @@ void Refuse(std::string_view file, std::string_view place, std::string_view what
 
 namespace {
 
-// Walks through the text once, keeping nothing, to see that it is JSON within the limits. (The library can
-// call back while it builds the tree too, but then searches every array anew at each of its entries.)
+// Parses the text once without building a tree, to check that it is JSON within the limits. (The library also
+// offers callbacks while it builds the tree, but then it searches each array again for each of its entries.)
 class LimitCheck : public nlohmann::json_sax<Json> {
  public:
   LimitCheck(std::string_view file, const LoadLimits& limits) : file_(file), limits_(limits) {}
@@ -37,7 +37,7 @@ class LimitCheck : public nlohmann::json_sax<Json> {
   bool end_object() override { return Close(); }
   bool end_array() override { return Close(); }
   bool parse_error(std::size_t, const std::string&, const Json::exception& fault) override {
-    // The library's words carry the byte offset; its prefix "[json.exception…]" is of no use to a person.
+    // The library's message contains the byte offset; its prefix "[json.exception…]" is useless to users.
     std::string words = fault.what();
     const std::size_t bracket = words.find("] ");
     if (bracket != std::string::npos) words.erase(0, bracket + 2);

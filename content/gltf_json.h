@@ -7,30 +7,30 @@
 
 #include "content/load_limits.h"
 
-// JSON text of a glTF file, parsed under limits. The nested containers of hostile text ("[[[[…") and their
-// number are counted while they are read, so that a bomb stops at its limit and not at the end of memory.
+// Parses the JSON text of a glTF file under limits. Nesting depth and number of values are counted while the
+// text is read, so that hostile text ("[[[[…") stops at the limit instead of exhausting memory.
 namespace docent::content {
 
 using Json = nlohmann::json;
 
-// Throws Error "FILE: PLACE WHAT", the one form of every sentence about a model file. `place` may be empty.
+// Throws Error "FILE: PLACE WHAT", the form of all messages about model files. `place` may be empty.
 [[noreturn]] void Refuse(std::string_view file, std::string_view place, std::string_view what);
 
-// The parsed text; throws Error when it is not JSON, not an object, or beyond the limits.
+// Returns the parsed text; throws Error when it is not JSON, not an object, or exceeds the limits.
 Json ParseGltfJson(std::string_view file, std::string_view text, const LoadLimits& limits);
 
-// Member `name` of an object as an unsigned number, or `fallback` when it is absent. The caller has checked
-// that it is a whole number of that range.
+// Returns member `name` of an object as an unsigned number, or `fallback` when it is missing. The caller has
+// checked that it is an integer in range.
 std::uint64_t UnsignedOr(const Json& object, const char* name, std::uint64_t fallback);
-// Member `name` as an index, -1 when it is absent. The caller has checked that it is in range.
+// Returns member `name` as an index, or -1 when it is missing. The caller has checked that it is in range.
 int IndexOr(const Json& object, const char* name);
-// Length of the array member `name` of an object, 0 when it is absent.
+// Returns the length of the array member `name` of an object, or 0 when it is missing.
 std::size_t CountOf(const Json& object, const char* name);
-// The array or object member `name`, or an empty one of that kind.
+// Returns the array or object member `name`, or an empty one when it is missing.
 const Json& ArrayOf(const Json& object, const char* name);
 const Json& ObjectOf(const Json& object, const char* name);
 
-// "nodes[3]"
+// For example "nodes[3]".
 std::string Place(std::string_view array, std::size_t index);
 
 }  // namespace docent::content

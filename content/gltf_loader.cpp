@@ -23,20 +23,20 @@
 namespace docent::content {
 namespace {
 
-constexpr const char* kBufferUri = "buffer";  // of the one buffer, in what tinygltf reads
+constexpr const char* kBufferUri = "buffer";  // URI of the single buffer in tinygltf's input.
 
-// What tinygltf gets to see: without members that nothing reads afterwards. It copies extras and extensions
-// into trees of its own, some of them once for each sibling, which hostile text could use to grow without
-// measure.
-Json Reduced(const Json& value) {
+// Removes the members that are not read afterwards from tinygltf's input. tinygltf copies extras and
+// extensions into its own trees, some of them once per sibling, which hostile text could use to exhaust
+// memory.
+Json WithoutUnreadMembers(const Json& value) {
   if (value.is_array()) {
     Json result = Json::array();
-    for (const Json& entry : value) result.push_back(Reduced(entry));
+    for (const Json& entry : value) result.push_back(WithoutUnreadMembers(entry));
     return result;
   }
   if (!value.is_object()) {
-    // tinygltf reads 3.0 as no whole number. A number that is too large for one stands where none is asked
-    // for.
+    // tinygltf does not accept 3.0 as an integer. Numbers that are too large for one occur only where no
+    // integer is expected.
     if (!value.is_number_float()) return value;
     const double number = value.get<double>();
     return number == std::floor(number) && std::abs(number) < 1e9 ? Json(static_cast<std::int64_t>(number))
@@ -46,12 +46,12 @@ Json Reduced(const Json& value) {
   for (const auto& [name, member] : value.items()) {
     if (name == "extras" || name == "cameras" || name == "camera") continue;
     if (name != "extensions") {
-      result[name] = Reduced(member);
+      result[name] = WithoutUnreadMembers(member);
       continue;
     }
     for (const char* kept : {"KHR_texture_transform", "KHR_materials_unlit",
                              "KHR_materials_emissive_strength", "KHR_materials_pbrSpecularGlossiness"}) {
-      if (member.contains(kept)) result["extensions"][kept] = Reduced(member[kept]);
+      if (member.contains(kept)) result["extensions"][kept] = WithoutUnreadMembers(member[kept]);
     }
   }
   return result;
@@ -59,11 +59,11 @@ Json Reduced(const Json& value) {
 
 bool KeepEncoded(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int,
                  void*) {
-  return true;  // images are decoded later, and only those that a texture shows
+  return true;  // Images are decoded later, and only those that a texture uses.
 }
 
 tinygltf::Model Parse(const std::string& name, const PackedGltf& packed) {
-  Json json = Reduced(packed.json);
+  Json json = WithoutUnreadMembers(packed.json);
   if (!packed.bin.empty())
     json["buffers"] = Json::array({{{"byteLength", packed.bin.size()}, {"uri", kBufferUri}}});
   tinygltf::TinyGLTF parser;
@@ -93,8 +93,9 @@ tinygltf::Model Parse(const std::string& name, const PackedGltf& packed) {
   return source;
 }
 
-// tinygltf drops what it cannot read from some lists; the numbers in the file would then mean other entries.
-// And since all decoders trust the buffer views, those are held against the bytes that tinygltf really has.
+// tinygltf drops entries that it cannot read from some lists, and the indices in the file would then refer to
+// other entries. All decoders trust the buffer views, so those are also checked against the data that
+// tinygltf has.
 void CheckNothingLost(const std::string& name, const Json& json, const tinygltf::Model& source) {
   bool same =
       CountOf(json, "accessors") == source.accessors.size() &&
@@ -115,11 +116,10 @@ void CheckNothingLost(const std::string& name, const Json& json, const tinygltf:
     same = same && buffer < source.buffers.size() && view.byteOffset <= source.buffers[buffer].data.size() &&
            view.byteLength <= source.buffers[buffer].data.size() - view.byteOffset;
   }
-  if (!same) Refuse(name, "", "the glTF cannot be read: a part of it has no meaning.");
+  if (!same) Refuse(name, "", "the glTF cannot be read: a part of it is not valid.");
 }
 
-// Decodes the images that textures show; the answer is the place of each of the file's images in
-// Model::images.
+// Decodes the images that textures use. Returns the index in Model::images of each of the file's images.
 std::vector<int> ReadImages(const std::string& name, const tinygltf::Model& source, const LoadLimits& limits,
                             Model* model) {
   const std::vector<bool> used = UsedImages(source);
@@ -167,7 +167,7 @@ std::shared_ptr<Model> Convert(const std::string& name, const tinygltf::Model& s
   model->animations = ReadAnimations(name, source, place_of, limits, &accessors, &model->warnings);
   CheckDrawn(name, *model, limits);
   const auto bounds = RestBounds(*model);
-  if (!bounds) Refuse(name, "nodes", "move vertices beyond the largest number.");
+  if (!bounds) Refuse(name, "nodes", "move vertices beyond the range of floating-point numbers.");
   std::tie(model->bounds_min, model->bounds_max) = *bounds;
   return model;
 }

@@ -7,7 +7,7 @@
 namespace docent::content {
 namespace {
 
-constexpr float kDielectricSpecular = 0.04f;  // of glass and plastic, glTF 2.0 appendix B
+constexpr float kDielectricSpecular = 0.04f;  // Of glass and plastic (glTF 2.0 appendix B).
 
 float NumberOr(const tinygltf::Value& object, const char* name, float fallback) {
   return object.Has(name) ? static_cast<float>(object.Get(name).GetNumberAsDouble()) : fallback;
@@ -22,13 +22,13 @@ glm::vec<N, float> VectorOr(const tinygltf::Value& object, const char* name,
   return value;
 }
 
-// The matrix of KHR_texture_transform: scale, then rotate counter-clockwise, then move.
+// The matrix of KHR_texture_transform: scale, then counter-clockwise rotation, then translation.
 glm::mat3 UvTransform(const tinygltf::Value& transform) {
   const glm::vec2 offset = VectorOr<2>(transform, "offset", glm::vec2(0));
   const glm::vec2 scale = VectorOr<2>(transform, "scale", glm::vec2(1));
   const float angle = NumberOr(transform, "rotation", 0);
   const float c = std::cos(angle), s = std::sin(angle);
-  // GLM's matrices are written column by column.
+  // GLM's matrices are column-major.
   return glm::mat3(c * scale.x, -s * scale.x, 0, s * scale.y, c * scale.y, 0, offset.x, offset.y, 1);
 }
 
@@ -81,7 +81,7 @@ class MaterialReader {
       use.uv_set = static_cast<int>(NumberOr(*transform, "texCoord", static_cast<float>(uv_set)));
     }
     if (use.uv_set > 1) {
-      Warn("Textures of a third set of texture coordinates are left out.");
+      Warn("Textures that use a third set of texture coordinates are left out.");
       return TextureUse{};
     }
     use.texture = texture;
@@ -122,7 +122,7 @@ class MaterialReader {
     material->roughness =
         glm::clamp(1.0f - NumberOr(source, "glossinessFactor", 1) * mean_specular.a, 0.0f, 1.0f);
     material->metallic_roughness_texture = {};
-    // A metal's colour stands in its specular texture, any other's in the diffuse one.
+    // The colour of a metal is in its specular texture, that of other materials in the diffuse texture.
     const bool metal = converted.metallic > 0.5f;
     const TextureUse& color_texture =
         metal && specular_texture.texture >= 0 ? specular_texture : diffuse_texture;
@@ -138,8 +138,8 @@ class MaterialReader {
     }
   }
 
-  // Mean of the texture's texels in linear light (alpha as it is), white without a texture. Each image is
-  // averaged once; a regular sample of at most 64x64 texels is plenty for a mean.
+  // The mean of the texture's texels in linear light (alpha unchanged); white without a texture. Each image
+  // is averaged once; a regular sample of at most 64x64 texels is sufficient for a mean.
   glm::vec4 MeanColor(const TextureUse& use) const {
     if (use.texture < 0) return glm::vec4(1);
     const Image& image =

@@ -16,7 +16,7 @@ glm::vec<N, float> ReadVector(const AccessorReader& reader, std::uint32_t elemen
   return value;
 }
 
-// Corners of the triangles that a run of `count` vertices makes (§3.7.2.1); incomplete ones are left out.
+// Calls `emit` for the triangles formed by `count` vertices (§3.7.2.1); incomplete ones are left out.
 template <typename Emit>
 void ForEachTriangle(int mode, std::size_t count, const Emit& emit) {
   if (count < 3) return;
@@ -43,18 +43,19 @@ std::vector<std::uint32_t> MeshReader::ReadTriangles(const tinygltf::Primitive& 
   const std::uint64_t corners = primitive.mode == TINYGLTF_MODE_TRIANGLES ? count : 3 * std::uint64_t{count};
   indices_ += corners;
   if (indices_ > limits_.max_indices) {
-    Refuse(file_, place, "brings the model above " + std::to_string(limits_.max_indices / 3) + " triangles.");
+    Refuse(file_, place,
+           "takes the model over the limit of " + std::to_string(limits_.max_indices / 3) + " triangles.");
   }
   const auto vertex_at = [&](std::size_t i) {
     const std::uint32_t vertex = indices == nullptr ? static_cast<std::uint32_t>(i) : indices->Unsigned(i);
-    // The largest number of the type would begin a new strip on some machines, which is why glTF forbids it.
+    // glTF forbids the largest value of the type, because it restarts a strip on some graphics hardware.
     if (vertex >= vertex_count || (indices != nullptr && vertex == indices->MaxUnsigned())) {
       Refuse(file_, place + ".indices",
-             "names vertex " + std::to_string(vertex) + " of " + std::to_string(vertex_count) + ".");
+             "refers to vertex " + std::to_string(vertex) + " of " + std::to_string(vertex_count) + ".");
     }
     return vertex;
   };
-  // Also those that make no whole triangle must be in range.
+  // Vertices of incomplete triangles must be in range too.
   std::vector<std::uint32_t> vertices(count);
   for (std::size_t i = 0; i < count; ++i) vertices[i] = vertex_at(i);
   std::vector<std::uint32_t> triangles;
@@ -102,7 +103,7 @@ void MeshReader::ReadVertices(const Attributes& attributes, std::span<const std:
 void MeshReader::ReadSkinning(const Attributes& attributes, std::span<const std::uint32_t> chosen,
                               Primitive* result) {
   if (!attributes.contains("JOINTS_0") || !attributes.contains("WEIGHTS_0")) return;
-  if (attributes.contains("JOINTS_1")) Warn("Of the joints of a vertex more than four are left out.");
+  if (attributes.contains("JOINTS_1")) Warn("Only four joints per vertex are used; the others are left out.");
   const AccessorReader& joints = accessors_.Get(attributes.at("JOINTS_0"));
   const AccessorReader& weights = accessors_.Get(attributes.at("WEIGHTS_0"));
   for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -112,7 +113,7 @@ void MeshReader::ReadSkinning(const Attributes& attributes, std::span<const std:
     Vertex& vertex = result->vertices[i];
     for (int k = 0; k < 4; ++k) {
       vertex.weights[k] = static_cast<float>(raw[k] / sum);
-      // A joint without weight may name anything; 0 is always a joint.
+      // A joint without weight may have any index; 0 is always valid.
       const std::uint32_t joint = vertex.weights[k] > 0 ? joints.Unsigned(chosen[i], k) : 0;
       vertex.joints[k] = static_cast<std::uint16_t>(joint);
     }
@@ -124,14 +125,15 @@ Primitive MeshReader::ReadPrimitive(const tinygltf::Primitive& primitive, const 
   result.material = primitive.material;
   const std::size_t vertex_count = accessors_.Get(primitive.attributes.at("POSITION")).count();
   const std::vector<std::uint32_t> triangles = ReadTriangles(primitive, vertex_count, place);
-  // Only the vertices that the triangles use: primitives often share one long accessor.
+  // Keeps only the vertices that the triangles use, because primitives often share one long accessor.
   std::vector<std::uint32_t> chosen = triangles;
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   const bool has_normals = primitive.attributes.contains("NORMAL");
   vertices_ += has_normals ? chosen.size() : triangles.size();
   if (vertices_ > limits_.max_vertices) {
-    Refuse(file_, place, "brings the model above " + std::to_string(limits_.max_vertices) + " vertices.");
+    Refuse(file_, place,
+           "takes the model over the limit of " + std::to_string(limits_.max_vertices) + " vertices.");
   }
   result.indices.resize(triangles.size());
   std::transform(triangles.begin(), triangles.end(), result.indices.begin(), [&](std::uint32_t vertex) {

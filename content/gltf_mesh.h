@@ -12,14 +12,14 @@
 #include "content/load_limits.h"
 #include "content/model.h"
 
-// Turns the primitives of a checked glTF into triangles with whole vertices.
+// Converts the primitives of a checked glTF to triangles with complete vertices.
 namespace docent::content {
 
-// IsActive while one model is read. Every index that comes out is in range of its primitive's vertices, every
-// coordinate finite.
+// Reads the meshes of one model. All indices of its results are in range of the primitive's vertices, and all
+// coordinates are finite.
 class MeshReader {
  public:
-  // All must outlive the reader. `materials` decide which primitives need tangents.
+  // All references must outlive the reader. `materials` determine which primitives need tangents.
   MeshReader(const std::string& file, const tinygltf::Model& source, std::span<const Material> materials,
              const LoadLimits& limits, AccessorCache* accessors, std::vector<std::string>* warnings)
       : file_(file),
@@ -31,13 +31,13 @@ class MeshReader {
 
   Mesh Read(std::size_t mesh);
 
-  // One more than the largest joint that a vertex of the mesh hangs on, 0 when none does.
+  // The largest joint index of the mesh's vertices plus one, or 0 without joints.
   static int JointsNeeded(const Mesh& mesh);
 
  private:
   using Attributes = std::map<std::string, int>;
 
-  // Triangles as numbers of the file's vertices, three each.
+  // Triangles as indices of the file's vertices, three each.
   std::vector<std::uint32_t> ReadTriangles(const tinygltf::Primitive& primitive, std::size_t vertex_count,
                                            const std::string& place);
   void ReadVertices(const Attributes& attributes, std::span<const std::uint32_t> chosen, Primitive* result);
@@ -51,7 +51,7 @@ class MeshReader {
   const LoadLimits& limits_;
   AccessorCache& accessors_;
   std::vector<std::string>& warnings_;
-  std::uint64_t vertices_ = 0, indices_ = 0;  // so far, of all primitives
+  std::uint64_t vertices_ = 0, indices_ = 0;  // Totals of all primitives so far.
 };
 
 }  // namespace docent::content

@@ -20,7 +20,7 @@ std::vector<int> Parents(const tinygltf::Model& source) {
   return parents;
 }
 
-// The file's nodes in an order in which parents come first.
+// The file's nodes ordered so that parents precede children.
 std::vector<int> TopDown(const tinygltf::Model& source, const std::vector<int>& parents) {
   std::vector<int> order;
   order.reserve(source.nodes.size());
@@ -47,7 +47,7 @@ Node ReadNode(const tinygltf::Node& source, std::vector<std::string>* warnings) 
   if (source.matrix.size() == 16) {
     glm::dmat4 matrix;
     for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = source.matrix[static_cast<std::size_t>(i)];
-    const std::string warning = "A node's matrix shears, which is shown without the shear.";
+    const std::string warning = "A node's matrix contains a shear, which is left out.";
     if (!Decompose(matrix, &node) &&
         std::find(warnings->begin(), warnings->end(), warning) == warnings->end()) {
       warnings->push_back(warning);
@@ -71,8 +71,9 @@ std::vector<int> SceneRoots(const tinygltf::Model& source, const std::vector<int
         source.scenes[static_cast<std::size_t>(std::max(source.defaultScene, 0))].nodes;
     std::vector<bool> is_listed(parents.size(), false);
     for (const int node : listed) is_listed[static_cast<std::size_t>(node)] = true;
-    // Some exporters list every node. One below another listed one is shown with it and is no root. The walk
-    // up stops at the first listed ancestor, so that a long chain of listed nodes costs one step each.
+    // Some exporters list every node. A node below another listed one is shown with it and is no root. The
+    // search for an ancestor stops at the first listed one, so that a long chain of listed nodes costs one
+    // step per node.
     for (const int node : listed) {
       int above = parents[static_cast<std::size_t>(node)];
       while (above >= 0 && !is_listed[static_cast<std::size_t>(above)])
@@ -87,7 +88,7 @@ std::vector<int> SceneRoots(const tinygltf::Model& source, const std::vector<int
   return roots;
 }
 
-// Takes the meshes off all nodes that no root of the scene leads to.
+// Removes the meshes of all nodes that no root of the scene reaches.
 void HideUnreachable(Model* model) {
   std::vector<bool> shown(model->nodes.size(), false);
   for (const int root : model->roots) shown[static_cast<std::size_t>(root)] = true;
@@ -115,7 +116,7 @@ void ReadSkins(const tinygltf::Model& source, const std::vector<int>& place_of, 
 }
 
 void CheckJoints(const std::string& file, const Model& model) {
-  std::vector<int> needed(model.meshes.size(), -1);  // worked out once a mesh
+  std::vector<int> needed(model.meshes.size(), -1);  // Computed once per mesh.
   for (const Node& node : model.nodes) {
     if (node.skin < 0 || node.mesh < 0) continue;
     const auto mesh = static_cast<std::size_t>(node.mesh);
@@ -123,8 +124,8 @@ void CheckJoints(const std::string& file, const Model& model) {
     const std::size_t joints = model.skins[static_cast<std::size_t>(node.skin)].joints.size();
     if (static_cast<std::size_t>(needed[mesh]) > joints) {
       Refuse(file, Place("meshes", mesh),
-             "hangs on joint " + std::to_string(needed[mesh] - 1) + " of a skin with " +
-                 std::to_string(joints) + ".");
+             "uses joint " + std::to_string(needed[mesh] - 1) + " of a skin with " + std::to_string(joints) +
+                 ".");
     }
   }
 }
@@ -145,7 +146,7 @@ bool Decompose(const glm::dmat4& matrix, Node* node) {
   const double shear = std::max({std::abs(glm::dot(axes[0], axes[1])), std::abs(glm::dot(axes[1], axes[2])),
                                  std::abs(glm::dot(axes[0], axes[2]))});
   if (shear > 1e-3) {
-    // The nearest frame that keeps the third axis (Gram-Schmidt).
+    // The nearest orthonormal frame with the same third axis (Gram-Schmidt).
     axes[1] = glm::dvec3(UnitOr(axes[1] - axes[2] * glm::dot(axes[1], axes[2]), glm::vec3(0, 1, 0)));
     axes[0] = glm::cross(axes[1], axes[2]);
   }

@@ -9,16 +9,17 @@
 #include "content/gltf_accessor.h"
 #include "content/model.h"
 
-// The node tree, the scene that is shown, and the skins of a checked glTF (§3.5, §3.7.3).
+// The node tree, the visible scene and the skins of a checked glTF (§3.5, §3.7.3).
 namespace docent::content {
 
-// Fills nodes, roots and skins of `model`, whose meshes are there already; nodes come out parents before
-// children. Meshes of nodes that the scene does not show are taken off; the nodes stay, because they may be
-// joints. Returns the new place of each of the file's nodes.
+// Fills nodes, roots and skins of `model`, whose meshes must exist already; parents precede children. Nodes
+// outside the visible scene lose their meshes but are kept, because they may be joints. Returns the new index
+// of each of the file's nodes.
 std::vector<int> ReadNodes(const std::string& file, const tinygltf::Model& source, AccessorCache* accessors,
                            Model* model);
 
-// Fills translation, rotation and scale from a matrix; false when it shears, which those three cannot say.
+// Decomposes a matrix into translation, rotation and scale; returns false when it contains a shear, which
+// these cannot represent.
 bool Decompose(const glm::dmat4& matrix, Node* node);
 
 }  // namespace docent::content

@@ -18,7 +18,7 @@ int HexDigit(char c) {
   return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
 }
 
-// RFC 3986 §2.1; empty when an escape is broken.
+// RFC 3986 §2.1; empty when an escape is invalid.
 std::optional<std::string> PercentDecode(std::string_view text) {
   std::string decoded;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -44,7 +44,7 @@ std::string Shortened(const std::string& text) {
   return text.size() <= 80 ? text : text.substr(0, 77) + "...";
 }
 
-// Collects the parts of PackGltf's result.
+// Builds the result of PackGltf.
 class Packer {
  public:
   Packer(std::string_view file, std::optional<std::span<const std::uint8_t>> bin,
@@ -64,7 +64,7 @@ class Packer {
         sizes[i] = bytes.size();
         Append(std::span(bytes).first(std::min<std::uint64_t>(claimed, bytes.size())));
       } else {
-        // Without either it has no bytes, which is no fault while no view needs them.
+        // A buffer with neither is empty, which is no error unless a view uses it.
         const std::span<const std::uint8_t> bytes =
             i == 0 && glb_bin_ ? *glb_bin_ : std::span<const std::uint8_t>();
         sizes[i] = bytes.size();
@@ -76,7 +76,7 @@ class Packer {
     for (Json& view : (*root)["bufferViews"]) {
       view["byteOffset"] = UnsignedOr(view, "byteOffset", 0) + begins[view["buffer"].get<std::size_t>()];
       view["buffer"] = 0;
-      // Its own buffer number would be wrong now, and nothing reads the extension.
+      // The extension's buffer index would be wrong now, and nothing reads the extension.
       if (view.contains("extensions")) view["extensions"].erase("EXT_meshopt_compression");
     }
   }
@@ -112,7 +112,7 @@ class Packer {
   }
 
  private:
-  // Pads to the largest alignment that glTF asks for, and answers where the next part begins.
+  // Pads to the largest alignment that glTF requires, and returns the offset of the next part.
   std::uint64_t Align() {
     bin_.resize((bin_.size() + 3) / 4 * 4);
     return bin_.size();
@@ -136,7 +136,7 @@ class Packer {
     self_contained_ = false;
     if (!folder_) {
       Refuse(file_, place,
-             "points to the file '" + Shortened(uri) + "', and a model in the library may not.");
+             "refers to the file '" + Shortened(uri) + "', but a model in a library must be self-contained.");
     }
     std::vector<std::uint8_t> bytes =
         ReadFileBytes(ResolveUri(file_, place + ".uri", uri, *folder_), limits_.max_file_bytes);
@@ -144,7 +144,7 @@ class Packer {
     return bytes;
   }
 
-  // Also what is read and not kept counts: many small buffers may all name one large file.
+  // Files that are read but not kept count too, because many small buffers may refer to one large file.
   void CountFetched(std::uint64_t bytes) {
     fetched_bytes_ += bytes;
     if (fetched_bytes_ > limits_.max_file_bytes) RefuseSize();
@@ -169,7 +169,7 @@ class Packer {
 
 std::vector<std::uint8_t> ReadFileBytes(const std::filesystem::path& path, std::uint64_t max_bytes) {
   std::error_code code;
-  // Anything but a regular file (a pipe, a device) might never end or never answer.
+  // Reading another kind of file (a pipe, a device) might never end or might block.
   if (!std::filesystem::is_regular_file(path, code)) {
     throw Error(path.string() + ": " +
                 (std::filesystem::exists(path, code) ? "is not a file." : "no such file."));
@@ -192,7 +192,7 @@ std::filesystem::path ResolveUri(std::string_view file, std::string_view place, 
   const std::string quoted = "'" + Shortened(uri) + "'";
   const std::optional<std::string> decoded = PercentDecode(uri);
   if (!decoded || decoded->empty() || decoded->find('\0') != std::string::npos)
-    Refuse(file, place, "is no file name: " + quoted + ".");
+    Refuse(file, place, "is not a file name: " + quoted + ".");
   const bool has_scheme = decoded->substr(0, decoded->find('/')).find(':') != std::string::npos;
   const std::filesystem::path relative(*decoded);
   const bool climbs = std::find(relative.begin(), relative.end(), "..") != relative.end();
@@ -201,9 +201,9 @@ std::filesystem::path ResolveUri(std::string_view file, std::string_view place, 
   }
   std::error_code code;
   const std::filesystem::path base = std::filesystem::canonical(folder.empty() ? "." : folder, code);
-  if (code) Refuse(file, place, "cannot be looked up: the model's folder cannot be read.");
+  if (code) Refuse(file, place, "cannot be found: the model's folder cannot be read.");
   const std::filesystem::path target = std::filesystem::canonical(base / relative, code);
-  if (code) Refuse(file, place, "names " + quoted + ", which is not there.");
+  if (code) Refuse(file, place, "refers to " + quoted + ", which does not exist.");
   if (!IsInside(target, base))
     Refuse(file, place, "leads outside the model's folder by a link: " + quoted + ".");
   return target;

@@ -11,30 +11,31 @@
 
 #include "content/gltf_json.h"
 
-// The bytes that a glTF file points to: its binary chunk, data URIs, and files beside it.
+// Collects the data that a glTF file refers to: its binary chunk, data URIs, and external files.
 namespace docent::content {
 
-// All bytes of a regular file; throws Error when it cannot be read or is larger than `max_bytes`.
+// Returns all bytes of a regular file; throws Error when it cannot be read or is larger than `max_bytes`.
 std::vector<std::uint8_t> ReadFileBytes(const std::filesystem::path& path, std::uint64_t max_bytes);
 
-// The file that a relative URI of a model names, inside `folder` also after every symbolic link is followed.
-// Throws Error for anything else: other schemes, absolute paths, "..", a broken escape, a missing file.
+// Returns the file that a relative URI refers to, which must be inside `folder` after all symbolic links are
+// resolved. Throws Error otherwise: for other schemes, absolute paths, "..", invalid escapes and missing
+// files.
 std::filesystem::path ResolveUri(std::string_view file, std::string_view place, const std::string& uri,
                                  const std::filesystem::path& folder);
 
-// The bytes of a "data:" URI (RFC 2397, base64 of RFC 4648 or percent-encoded); empty when it is damaged.
+// Decodes a "data:" URI (RFC 2397, base64 of RFC 4648 or percent-encoded); empty when it is invalid.
 std::optional<std::vector<std::uint8_t>> DecodeDataUri(std::string_view uri);
 bool IsDataUri(std::string_view uri);
 
-// A glTF whose buffers are one run of bytes and whose images all lie in it.
+// A glTF with a single buffer that contains all its data and images.
 struct PackedGltf {
-  Json json;  // one buffer without URI (none when `bin` is empty); images by buffer view
+  Json json;  // One buffer without URI (none when `bin` is empty); images by buffer view.
   std::vector<std::uint8_t> bin;
-  bool was_self_contained = true;  // false when something came from another file
+  bool was_self_contained = true;  // False when other files were read.
 };
 
-// Gathers everything. `root` has passed CheckSchema; buffer views are checked against their buffers' true
-// sizes on the way. With `folder` empty nothing but the binary chunk and data URIs can be pointed to.
+// Collects all data. `root` must have passed CheckSchema; buffer views are checked against the actual sizes
+// of their buffers. If `folder` is empty, only the binary chunk and data URIs are allowed.
 PackedGltf PackGltf(std::string_view file, Json root, std::optional<std::span<const std::uint8_t>> bin,
                     const std::optional<std::filesystem::path>& folder, const LoadLimits& limits);
 

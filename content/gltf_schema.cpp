@@ -70,11 +70,11 @@ class Checker {
   }
 
   void CheckString(const Json& value, const Field& field, const std::string& place) const {
-    if (!value.is_string()) Refuse(file_, place, "is not a text.");
+    if (!value.is_string()) Refuse(file_, place, "is not a string.");
     const std::string& text = value.get_ref<const std::string&>();
     if (!field.words.empty() &&
         std::find(field.words.begin(), field.words.end(), text) == field.words.end()) {
-      Refuse(file_, place, "is \"" + text.substr(0, 40) + "\", which glTF 2.0 does not know.");
+      Refuse(file_, place, "is \"" + text.substr(0, 40) + "\", which is not valid in glTF 2.0.");
     }
   }
 
@@ -83,8 +83,8 @@ class Checker {
     const double number = value.get<double>();
     if (!(std::abs(number) <= std::numeric_limits<float>::max())) Refuse(file_, place, "is too large.");
     if (field.kind == Field::Kind::kInteger) {
-      if (number != std::floor(number)) Refuse(file_, place, "is not a whole number.");
-      // Beyond 2^53 the comparison below would work on a rounded number.
+      if (number != std::floor(number)) Refuse(file_, place, "is not an integer.");
+      // Beyond 2^53 the comparison below would use a rounded number.
       if (std::abs(number) > 9e15) Refuse(file_, place, "is too large.");
     }
     const bool known = field.codes.empty() || std::any_of(field.codes.begin(), field.codes.end(),
@@ -114,7 +114,7 @@ class Checker {
     std::vector<Json> sorted(value.begin(), value.end());
     std::sort(sorted.begin(), sorted.end());
     if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) {
-      Refuse(file_, place, "names the same thing twice.");
+      Refuse(file_, place, "contains an entry twice.");
     }
   }
 

@@ -5,14 +5,14 @@
 
 #include "content/gltf_json.h"
 
-// The shape of glTF 2.0's JSON: which member has which type, range and set of values, and which array each
-// index points into. Written as tables after the JSON schemas of the standard (glTF 2.0, appendix B); members
-// that no part of Docent reads are left alone.
+// Checks the structure of glTF 2.0's JSON: the type, range and allowed values of each member, and the array
+// that each index refers to. The tables follow the JSON schemas of the standard (glTF 2.0, appendix B).
+// Members that Docent does not read are ignored.
 namespace docent::content {
 
-// Throws Error at the first member of the wrong type or range, the first required member that is missing and
-// the first index beyond its array. What holds afterwards: every member named in the tables can be read with
-// its type without a further check, every number fits a float, every index lies in its array.
+// Throws Error for the first member of a wrong type or range, missing required member or index beyond its
+// array. Afterwards every member in the tables can be read with its type without further checks, every number
+// fits a float, and every index is in range.
 void CheckSchema(std::string_view file, const Json& root);
 
 }  // namespace docent::content

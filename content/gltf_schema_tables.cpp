@@ -156,7 +156,7 @@ const Schema kMaterial{{Object("pbrMetallicRoughness", kMetallicRoughness),
                         Text("alphaMode", {"OPAQUE", "MASK", "BLEND"}), Number("alphaCutoff", 0),
                         Boolean("doubleSided"), Text("name"), Object("extensions", kMaterialExtensions)}};
 
-// §5.25 nodes, §5.26 scenes, §5.28 skins, §5.12 cameras (checked because nodes point at them; not shown)
+// §5.25 nodes, §5.26 scenes, §5.28 skins, §5.12 cameras (checked because nodes refer to them; not shown)
 const Schema kNode{{Index("camera", "cameras"), Index("children", "nodes").List(1).Distinct(),
                     Index("skin", "skins"), Number("matrix").List(16, 16), Index("mesh", "meshes"),
                     Number("rotation", -1.0001, 1.0001).List(4, 4), Number("scale").List(3, 3),

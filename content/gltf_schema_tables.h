@@ -6,26 +6,26 @@
 #include <string_view>
 #include <vector>
 
-// The tables that CheckSchema (gltf_schema.h) walks; nobody else includes this.
+// The tables of CheckSchema (gltf_schema.h). Private to gltf_schema.
 namespace docent::content {
 
 struct Schema;
 
-// One member of a JSON object: its type, and what else the standard asks of it.
+// One member of a JSON object: its type and its other constraints.
 struct Field {
   enum class Kind { kBoolean, kString, kInteger, kNumber, kIndex, kIndexMap, kObject };
   const char* name = "";
   Kind kind = Kind::kObject;
-  double min = -std::numeric_limits<double>::infinity();  // kInteger, kNumber
+  double min = -std::numeric_limits<double>::infinity();  // For kInteger and kNumber.
   double max = std::numeric_limits<double>::infinity();
-  const char* target = "";              // kIndex, kIndexMap: name of the root's array
-  const Schema* schema = nullptr;       // kObject
-  std::vector<int> codes;               // kInteger: the only values, empty for any
-  std::vector<std::string_view> words;  // kString: the only values, empty for any
+  const char* target = "";              // For kIndex and kIndexMap: name of the root's array.
+  const Schema* schema = nullptr;       // For kObject.
+  std::vector<int> codes;               // For kInteger: the allowed values; empty for any.
+  std::vector<std::string_view> words;  // For kString: the allowed values; empty for any.
   bool required = false;
-  bool list = false;  // an array of what `kind` says
+  bool list = false;  // An array of `kind`.
   bool distinct = false;
-  std::size_t min_count = 0, max_count = std::numeric_limits<std::size_t>::max();  // kIndexMap and lists
+  std::size_t min_count = 0, max_count = std::numeric_limits<std::size_t>::max();  // For kIndexMap and lists.
 
   Field Required() const {
     Field result = *this;

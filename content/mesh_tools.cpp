@@ -13,7 +13,7 @@ glm::dvec3 AreaNormal(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c
   return glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a));
 }
 
-// Some direction at right angles to a unit vector.
+// An arbitrary unit vector orthogonal to a unit vector.
 glm::vec3 AnyOrthogonal(const glm::vec3& n) {
   const glm::vec3 other = std::abs(n.x) < 0.9f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
   return UnitOr(glm::cross(glm::dvec3(other), glm::dvec3(n)), glm::vec3(1, 0, 0));
@@ -74,8 +74,8 @@ void ComputeTangents(int uv_set, Primitive* primitive) {
     const glm::dvec2 step1 = uv(corner[1]) - uv(corner[0]), step2 = uv(corner[2]) - uv(corner[0]);
     const double determinant = step1.x * step2.y - step1.y * step2.x;
     if (!std::isfinite(determinant) || determinant == 0) continue;
-    // Only the sign of the determinant matters: the directions are normalised, and large triangles weigh
-    // more.
+    // Only the sign of the determinant is needed: the directions are normalized at the end, and large
+    // triangles get more weight.
     const double sign = determinant > 0 ? 1 : -1;
     const glm::dvec3 along_u = sign * (edge1 * step2.y - edge2 * step1.y);
     const glm::dvec3 along_v = sign * (edge2 * step1.x - edge1 * step2.x);

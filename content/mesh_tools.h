@@ -7,23 +7,23 @@
 
 #include "content/model.h"
 
-// Fills in what a file left out of its triangles. Pure functions on plain data; indices are in range.
+// Computes vertex data that is missing in a file. Pure functions; indices must be in range.
 namespace docent::content {
 
-// `v` with length 1, or `fallback` where it has no direction. Works in double, so that no finite float
+// Returns `v` normalized, or `fallback` if it is zero or not finite. Uses double, so that no finite float
 // overflows.
 glm::vec3 UnitOr(const glm::dvec3& v, const glm::vec3& fallback);
 
-// A vertex of its own for each corner, with the normal of its triangle (what glTF 2.0 §3.7.2.1 asks for when
+// Gives each corner its own vertex with the normal of its triangle (required by glTF 2.0 §3.7.2.1 when
 // normals are missing).
 void MakeFlat(Primitive* primitive);
 
-// Normals of length zero are replaced by the mean of the triangles around the vertex, weighted by area; the
-// others are brought to unit length.
+// Replaces zero normals with the area-weighted mean normal of the adjacent triangles, and normalizes the
+// others.
 void RepairNormals(Primitive* primitive);
 
-// Tangents from positions, normals and one set of texture coordinates: the direction in which u grows, made
-// orthogonal to the normal, with the handedness in w (Lengyel, "Foundations of Game Engine Development 2",
+// Computes tangents from positions, normals and one set of texture coordinates: the direction of increasing
+// u, orthogonal to the normal, with the handedness in w (Lengyel, "Foundations of Game Engine Development 2",
 // §7.5).
 void ComputeTangents(int uv_set, Primitive* primitive);
 

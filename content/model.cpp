@@ -10,8 +10,8 @@ namespace {
 
 using Channel = AnimationChannel;
 
-// Position of a time among a channel's key frames: between key and key + 1, at fraction t of the span of
-// seconds. At the ends t is 0 and the span empty.
+// The position of a time among a channel's keyframes: between key and key + 1, at fraction t of their
+// distance in seconds. Before the first and after the last keyframe t and the distance are 0.
 struct Span {
   std::size_t key = 0;
   float t = 0, seconds = 0;
@@ -55,7 +55,7 @@ glm::vec4 Sample(const Channel& channel, float time) {
   return ToVector(glm::slerp(ToQuaternion(from), ToQuaternion(to), span.t));
 }
 
-// A node's place relative to its parent at one moment.
+// A node's pose relative to its parent at one time.
 struct Pose {
   glm::vec3 translation;
   glm::quat rotation;
@@ -74,7 +74,7 @@ void Apply(const Channel& channel, float time, Pose* node) {
       break;
     case Channel::Target::kRotation: {
       const float length = glm::length(value);
-      // A spline may pass through zero; the rotation then stays what the file's node says.
+      // A spline may pass through zero; then the node keeps its static rotation.
       if (length > 0 && std::isfinite(length)) node->rotation = ToQuaternion(value / length);
       break;
     }
@@ -106,7 +106,7 @@ std::vector<glm::mat4> NodeMatrices(const Model& model, int animation, double se
     }
   }
   std::vector<glm::mat4> matrices(poses.size());
-  // Parents come before children, so that each parent's matrix is ready.
+  // Parents precede children, so each parent's matrix is ready.
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const int parent = model.nodes[i].parent;
     const glm::mat4 local = LocalMatrix(poses[i]);

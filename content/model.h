@@ -9,25 +9,25 @@
 #include <string>
 #include <vector>
 
-// A loaded 3D model as plain data, ready for a renderer: what glTF 2.0 says, checked, with all indices in
-// range. glTF axes (y up, metres). Immutable once loaded, shared by every instance.
+// A loaded 3D model as plain data for a renderer: the validated contents of a glTF 2.0 file with all indices
+// in range. glTF axes (y up, metres). Immutable once loaded and shared by all instances.
 namespace docent::content {
 
 struct Image {
   int width_px = 0, height_px = 0;
-  std::vector<std::uint8_t> rgba;  // width * height * 4
+  std::vector<std::uint8_t> rgba;  // width * height * 4 bytes.
 };
 
 struct Texture {
-  int image = -1;  // index into Model::images, -1 for none
+  int image = -1;  // Index into Model::images, -1 for none.
   bool repeat_u = true, repeat_v = true, mirror_u = false, mirror_v = false;
   bool nearest = false;
 };
 
 struct TextureUse {
-  int texture = -1;              // index into Model::textures, -1 for none
-  int uv_set = 0;                // 0 or 1
-  glm::mat3 uv_transform{1.0f};  // KHR_texture_transform
+  int texture = -1;              // Index into Model::textures, -1 for none.
+  int uv_set = 0;                // 0 or 1.
+  glm::mat3 uv_transform{1.0f};  // KHR_texture_transform.
 };
 
 // Metallic-roughness material (glTF 2.0 §3.9).
@@ -52,14 +52,14 @@ struct Vertex {
   glm::vec2 uv0{0.0f}, uv1{0.0f};
   glm::vec4 color{1.0f};
   glm::u16vec4 joints{0};
-  glm::vec4 weights{0.0f};  // all zero: not skinned
+  glm::vec4 weights{0.0f};  // All zero if not skinned.
 };
 
-// Triangles (points and lines of the file are left out, strips and fans are unrolled).
+// Triangles. Points and lines of the file are left out; strips and fans are unrolled.
 struct Primitive {
   std::vector<Vertex> vertices;
-  std::vector<std::uint32_t> indices;  // three a triangle
-  int material = -1;                   // -1: the default material
+  std::vector<std::uint32_t> indices;  // Three per triangle.
+  int material = -1;                   // -1 for the default material.
 };
 
 struct Mesh {
@@ -72,14 +72,14 @@ struct Node {
   int parent = -1;
   std::vector<int> children;
   glm::vec3 translation{0.0f};
-  glm::quat rotation{1.0f, 0.0f, 0.0f, 0.0f};  // w x y z
+  glm::quat rotation{1.0f, 0.0f, 0.0f, 0.0f};  // Order w x y z.
   glm::vec3 scale{1.0f};
   int mesh = -1, skin = -1;
 };
 
 struct Skin {
-  std::vector<int> joints;              // nodes
-  std::vector<glm::mat4> inverse_bind;  // one a joint
+  std::vector<int> joints;              // Node indices.
+  std::vector<glm::mat4> inverse_bind;  // One per joint.
 };
 
 // One property of one node over time.
@@ -87,13 +87,13 @@ struct AnimationChannel {
   enum class Target { kTranslation, kRotation, kScale } target = Target::kTranslation;
   enum class Interpolation { kStep, kLinear, kCubicSpline } interpolation = Interpolation::kLinear;
   int node = -1;
-  std::vector<float> times;       // seconds, ascending
-  std::vector<glm::vec4> values;  // one a time (three for cubic splines: in-tangent, value, out-tangent)
+  std::vector<float> times;       // Seconds, ascending.
+  std::vector<glm::vec4> values;  // One per time (three for cubic splines: in-tangent, value, out-tangent).
 };
 
 struct Animation {
   std::string name;
-  float duration = 0;  // seconds
+  float duration = 0;  // Seconds.
   std::vector<AnimationChannel> channels;
 };
 
@@ -103,15 +103,16 @@ struct Model {
   std::vector<Texture> textures;
   std::vector<Material> materials;
   std::vector<Mesh> meshes;
-  std::vector<Node> nodes;  // parents before children
-  std::vector<int> roots;   // of the scene to show
+  std::vector<Node> nodes;  // Parents precede children.
+  std::vector<int> roots;   // Roots of the visible scene.
   std::vector<Skin> skins;
   std::vector<Animation> animations;
-  glm::vec3 bounds_min{0.0f}, bounds_max{0.0f};  // of the rest pose, model axes, metres
-  std::vector<std::string> warnings;             // what was left out, a sentence each
+  glm::vec3 bounds_min{0.0f}, bounds_max{0.0f};  // Bounding box of the rest pose in model axes, metres.
+  std::vector<std::string> warnings;             // One sentence for each feature that was left out.
 };
 
-// World matrix of every node at a time of an animation (seconds, repeated; animation -1 for the rest pose).
+// Returns the model_from_node matrices of all nodes at a time of an animation (seconds; the animation
+// repeats). Animation -1 is the rest pose.
 std::vector<glm::mat4> NodeMatrices(const Model& model, int animation, double seconds);
 
 }  // namespace docent::content

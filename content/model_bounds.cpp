@@ -7,8 +7,7 @@
 namespace docent::content {
 namespace {
 
-// model_from_vertex of each joint of a skin (§3.7.3.3: the node that carries the skinned mesh does not move
-// it).
+// model_from_vertex of each joint of a skin. The node of a skinned mesh does not move it (§3.7.3.3).
 std::vector<glm::mat4> JointMatrices(const Skin& skin, const std::vector<glm::mat4>& nodes) {
   std::vector<glm::mat4> matrices(skin.joints.size());
   for (std::size_t i = 0; i < matrices.size(); ++i) {

@@ -8,8 +8,8 @@
 
 namespace docent::content {
 
-// Smallest box around everything that the model shows in its rest pose, skins included, in model axes; both
-// corners zero when it shows nothing. Empty when a vertex lies beyond what a float holds.
+// The bounding box of everything that the model shows in its rest pose, including skins, in model axes. Both
+// corners are zero when it shows nothing. Empty when a vertex is outside the range of float.
 std::optional<std::pair<glm::vec3, glm::vec3>> RestBounds(const Model& model);
 
 }  // namespace docent::content

@@ -14,28 +14,29 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// A map point as the ray sees it.
+// A map point in coordinates of the ray.
 struct Neighbour {
   Eigen::Vector3d point;
-  double depth;            // along the ray, metres
-  Eigen::Vector2d offset;  // across the ray over depth: its length is the tangent of the angle to the ray
+  double depth;            // Along the ray, in map units.
+  Eigen::Vector2d offset;  // OrthogonalAxes the ray, divided by the depth: its length is the tangent of the
+                           // angle to the ray.
 };
 
-// Two unit vectors that make a right-handed frame with a unit vector.
-void Across(const Eigen::Vector3d& axis, Eigen::Vector3d* first, Eigen::Vector3d* second) {
+// Two unit vectors that form a right-handed frame with a unit vector.
+void OrthogonalAxes(const Eigen::Vector3d& axis, Eigen::Vector3d* first, Eigen::Vector3d* second) {
   Eigen::Index smallest;
   axis.cwiseAbs().minCoeff(&smallest);
   *first = axis.cross(Eigen::Vector3d::Unit(smallest)).normalized();
   *second = axis.cross(*first);
 }
 
-// The points inside the narrowest cone that holds enough of them, nearest first.
+// The points inside the narrowest cone that contains enough of them, ordered by depth.
 std::vector<Neighbour> PointsNearRay(std::span<const Eigen::Vector3d> points, const Eigen::Vector3d& origin,
                                      const Eigen::Vector3d& ray, const PlacementOptions& options) {
   Eigen::Vector3d right, down;
-  Across(ray, &right, &down);
+  OrthogonalAxes(ray, &right, &down);
   std::vector<Neighbour> found;
-  const double widest = std::tan(options.widest_angle_deg * kDegree);
+  const double widest = std::tan(options.max_cone_deg * kDegree);
   for (const Eigen::Vector3d& point : points) {
     const Eigen::Vector3d from_origin = point - origin;
     const double depth = ray.dot(from_origin);
@@ -46,10 +47,10 @@ std::vector<Neighbour> PointsNearRay(std::span<const Eigen::Vector3d> points, co
   std::sort(found.begin(), found.end(), [](const Neighbour& a, const Neighbour& b) {
     return a.offset.squaredNorm() < b.offset.squaredNorm();
   });
-  const double start = std::tan(options.start_angle_deg * kDegree);
+  const double start = std::tan(options.initial_cone_deg * kDegree);
   std::size_t kept = 0;
   while (kept < found.size() &&
-         (found[kept].offset.norm() <= start || kept < static_cast<std::size_t>(options.enough_points))) {
+         (found[kept].offset.norm() <= start || kept < static_cast<std::size_t>(options.sufficient_points))) {
     ++kept;
   }
   found.resize(kept);
@@ -58,8 +59,8 @@ std::vector<Neighbour> PointsNearRay(std::span<const Eigen::Vector3d> points, co
   return found;
 }
 
-// Whether the ray passes between the points, seen from the viewer: no half-plane through the ray is free of
-// them.
+// Whether the points surround the ray as seen from the viewer: every half-plane through the ray contains a
+// point.
 bool Surrounds(std::span<const Neighbour> points) {
   std::vector<double> angles;
   for (const Neighbour& point : points) angles.push_back(std::atan2(point.offset.y(), point.offset.x()));
@@ -70,15 +71,15 @@ bool Surrounds(std::span<const Neighbour> points) {
   return widest_gap < std::numbers::pi;
 }
 
-double LeastOffset(std::span<const Neighbour> points) {
+double SmallestOffset(std::span<const Neighbour> points) {
   double least = std::numeric_limits<double>::infinity();
   for (const Neighbour& point : points) least = std::min(least, point.offset.norm());
   return least;
 }
 
-// The surface that the ray meets. Points sorted by depth fall into surfaces at the gaps; the nearest that
-// surrounds the ray is in front. If none does, the ray passes beside them all, and the one closest to it is
-// taken.
+// The surface that the ray hits. Points sorted by depth are divided into surfaces at the gaps. The nearest
+// surface that surrounds the ray is used; if there is none, the ray passes beside all of them, and the
+// surface closest to it is used.
 std::span<const Neighbour> FrontSurface(std::span<const Neighbour> points, const PlacementOptions& options) {
   std::span<const Neighbour> closest;
   std::size_t begin = 0;
@@ -87,30 +88,29 @@ std::span<const Neighbour> FrontSurface(std::span<const Neighbour> points, const
     if (!ends) continue;
     const std::span<const Neighbour> surface = points.subspan(begin, i - begin);
     begin = i;
-    if (surface.size() < static_cast<std::size_t>(options.least_points)) continue;
+    if (surface.size() < static_cast<std::size_t>(options.min_points)) continue;
     if (Surrounds(surface)) return surface;
-    if (closest.empty() || LeastOffset(surface) < LeastOffset(closest)) closest = surface;
+    if (closest.empty() || SmallestOffset(surface) < SmallestOffset(closest)) closest = surface;
   }
   return closest;
 }
 
-// The ray's point on the plane of these points; empty where no plane fits or it is met too obliquely or far
-// off.
+// The intersection of the ray with a plane fitted to these points. Empty when no plane fits, the incidence is
+// too oblique, or the intersection is far from the points.
 std::optional<SurfaceHit> HitPlane(std::span<const Neighbour> surface, const Eigen::Vector3d& origin,
                                    const Eigen::Vector3d& ray, const PlacementOptions& options) {
-  if (surface.size() < static_cast<std::size_t>(options.least_plane_points)) return std::nullopt;
+  if (surface.size() < static_cast<std::size_t>(options.min_plane_points)) return std::nullopt;
   std::vector<Eigen::Vector3d> points;
   for (const Neighbour& neighbour : surface) points.push_back(neighbour.point);
   const double median_depth = surface[surface.size() / 2].depth;
   const auto fit = engine::FitPlane(points, options.inlier_distance * median_depth, options.seed);
-  if (!fit || fit->inliers < options.least_plane_points ||
-      2 * fit->inliers < static_cast<int>(points.size())) {
+  if (!fit || fit->inliers < options.min_plane_points || 2 * fit->inliers < static_cast<int>(points.size())) {
     return std::nullopt;
   }
   const double along = fit->plane.normal.dot(ray);
-  if (std::abs(along) < std::cos(options.steepest_deg * kDegree)) return std::nullopt;
+  if (std::abs(along) < std::cos(options.max_incidence_deg * kDegree)) return std::nullopt;
   const double depth = -fit->plane.SignedDistance(origin) / along;
-  // A plane through one-sided points may be met far from all of them.
+  // If all points lie on one side of the ray, the plane's intersection may be far from all of them.
   const double slack = options.depth_gap * median_depth;
   if (depth < surface.front().depth - slack || depth > surface.back().depth + slack) return std::nullopt;
   SurfaceHit hit;
@@ -126,16 +126,18 @@ std::optional<SurfaceHit> HitPlane(std::span<const Neighbour> surface, const Eig
 SurfaceResult FindSurface(std::span<const Eigen::Vector3d> points_in_map, const Eigen::Vector3d& ray_origin,
                           const Eigen::Vector3d& ray_direction, const PlacementOptions& options) {
   if (!ray_origin.allFinite() || !ray_direction.allFinite() || !(ray_direction.norm() > 0)) {
-    return {std::nullopt, "The pixel has no ray."};
+    return {std::nullopt, "The lens has no ray for this pixel."};
   }
   const Eigen::Vector3d ray = ray_direction.normalized();
   const std::vector<Neighbour> near = PointsNearRay(points_in_map, ray_origin, ray, options);
-  if (near.empty()) return {std::nullopt, "The map has no point near this pixel."};
-  if (near.size() < static_cast<std::size_t>(options.least_points)) {
-    return {std::nullopt, "The map has too few points near this pixel."};
+  if (near.empty())
+    return {std::nullopt, "The map has no points near this pixel; choose a place with more detail."};
+  if (near.size() < static_cast<std::size_t>(options.min_points)) {
+    return {std::nullopt, "The map has too few points near this pixel; choose a place with more detail."};
   }
   std::span<const Neighbour> surface = FrontSurface(near, options);
-  if (surface.empty()) surface = near;  // too scattered in depth for a surface: the median of all
+  if (surface.empty())
+    surface = near;  // The points are too scattered for surfaces; the median depth of all is used.
   if (const std::optional<SurfaceHit> hit = HitPlane(surface, ray_origin, ray, options)) return {hit, ""};
   SurfaceHit hit;
   hit.point = ray_origin + surface[surface.size() / 2].depth * ray;
@@ -152,7 +154,7 @@ engine::Sim3 UprightPose(const Eigen::Vector3d& point, const Eigen::Vector3d& no
   // Within 30 degrees of level ground the direction of the slope is mostly noise.
   if (front.norm() < 0.5) {
     Eigen::Vector3d unused;
-    Across(up, &front, &unused);
+    OrthogonalAxes(up, &front, &unused);
   }
   front.normalize();
   Eigen::Matrix3d axes;

@@ -9,45 +9,46 @@
 
 #include "engine/geometry/sim3.h"
 
-// Where a thing stands that a person puts at a pixel: the map knows points, not surfaces, so the surface seen
-// at the pixel is worked out from the points around its ray. Pure mathematics; any thread may call it.
+// Computes the pose of an entity that a person places at a pixel. A map has points and no surfaces, so the
+// surface at the pixel is estimated from the map points around its ray. Pure functions; thread-safe.
 namespace docent::content {
 
 struct PlacementOptions {
-  double start_angle_deg = 2.0;    // half-angle of the first cone around the ray
-  double widest_angle_deg = 12.0;  // the cone grows to this while it holds too few points
-  int enough_points = 24;          // with so many it grows no further
-  int least_points = 3;            // fewer give no answer
-  int least_plane_points = 5;      // fewer on one surface give its median depth instead of a plane
-  double depth_gap = 0.15;         // of the depth: a larger step in depth divides two surfaces
-  double inlier_distance = 0.02;   // of the depth: how far a point may lie from its plane
-  double steepest_deg = 80.0;      // planes that the ray meets more obliquely are not believed
+  double initial_cone_deg = 2.0;  // Half-angle of the initial cone around the ray.
+  double max_cone_deg = 12.0;     // The cone is widened up to this until it contains enough points.
+  int sufficient_points = 24;     // The cone is not widened if it contains this many points.
+  int min_points = 3;             // With fewer points there is no result.
+  int min_plane_points = 5;       // With fewer points the surface's median depth is used instead of a plane.
+  double depth_gap = 0.15;        // Ratio of the depth: a larger step in depth separates two surfaces.
+  double inlier_distance = 0.02;  // Ratio of the depth: largest distance of an inlier from the plane.
+  double max_incidence_deg = 80.0;  // Planes with a larger angle between normal and ray are rejected.
   std::uint64_t seed = 1;
 };
 
-// The surface seen along a ray, in the map.
+// The surface that a ray hits, in the map.
 struct SurfaceHit {
   Eigen::Vector3d point;
-  Eigen::Vector3d normal;  // unit, towards the viewer
-  bool on_plane = false;   // false: no plane was found, point at the median depth, normal along the ray
+  Eigen::Vector3d normal;  // Unit vector towards the viewer.
+  // False without a plane: the point is at the median depth and the normal opposes the ray.
+  bool on_plane = false;
   int supporting_points = 0;
 };
 
 struct SurfaceResult {
   std::optional<SurfaceHit> hit;
-  std::string reason;  // a sentence when there is no hit
+  std::string reason;  // Why there is no hit, as a sentence.
 };
 
-// points_in_map: finite points in view of the camera, metres. ray_origin and ray_direction (any length but
-// zero) in the map. Of several surfaces at different depths the nearest one that the ray goes through is
-// taken.
+// points_in_map are finite points in the camera's view. ray_origin and ray_direction (any nonzero length) are
+// in the map. Among several surfaces at different depths, the nearest one that the ray passes through is
+// used.
 SurfaceResult FindSurface(std::span<const Eigen::Vector3d> points_in_map, const Eigen::Vector3d& ray_origin,
                           const Eigen::Vector3d& ray_direction, const PlacementOptions& options = {});
 
-// map_from_model of a model (y up, foot at its origin, front along z) that stands at `point` with its y axis
-// along map_up. Its front looks where the surface faces, or, on level ground, in a direction fixed by map_up
-// alone; then it is turned by yaw (radians, counter-clockwise seen from above). With map_up zero the normal
-// is up.
+// Returns the map_from_model of a model (y up, foot at its origin, front along z) that stands at `point` with
+// its y axis along map_up. Its front faces along the horizontal part of the surface normal or, on nearly
+// level ground, in a fixed direction that depends only on map_up. It is then rotated by yaw (radians,
+// counter-clockwise seen from above). If map_up is zero, the normal is up.
 engine::Sim3 UprightPose(const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
                          const Eigen::Vector3d& map_up, double yaw, double scale);
 

@@ -10,7 +10,7 @@ Eigen::Vector3d PlaceOf(const Entity& entity) {
                                              : entity.signpost.anchor;
 }
 
-void MoveAlong(const engine::Sim3& motion, Entity* entity) {
+void MoveWithAnchor(const engine::Sim3& motion, Entity* entity) {
   if (entity->kind == Entity::Kind::kModel) {
     entity->model.map_from_model = motion * entity->model.map_from_model;
   } else {

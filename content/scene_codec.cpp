@@ -44,7 +44,7 @@ Json ToJson(const Entity& entity) {
   return json;
 }
 
-// Reads the members of one JSON object and refuses those that nobody asked for.
+// Reads the members of one JSON object and rejects unknown members.
 class ObjectReader {
  public:
   ObjectReader(std::string_view where, std::string place, const Json& object,
@@ -69,7 +69,7 @@ class ObjectReader {
     const Json& value = Member(name);
     if (!value.is_string() || value.get_ref<const std::string&>().size() > kMaxTextBytes) {
       Refuse(where_, place_ + "." + name,
-             "is not a text of at most " + std::to_string(kMaxTextBytes) + " bytes.");
+             "is not a string of at most " + std::to_string(kMaxTextBytes) + " bytes.");
     }
     return value.get<std::string>();
   }
@@ -89,7 +89,7 @@ class ObjectReader {
     return vector;
   }
 
-  // A vector whose length is 1, up to rounding.
+  // Reads a vector that must have length 1, up to rounding.
   template <int N>
   Eigen::Matrix<double, N, 1> UnitVector(const char* name) const {
     const Eigen::Matrix<double, N, 1> vector = Vector<N>(name, 2);
@@ -118,9 +118,9 @@ Entity ReadModel(std::string_view where, const std::string& place, const Json& j
   const std::string id = reader.Text("asset");
   entity.model.asset = find_asset(id);
   if (!entity.model.asset)
-    Refuse(where, place, "shows the asset " + id.substr(0, 64) + ", which is not there.");
+    Refuse(where, place, "uses the asset " + id.substr(0, 64) + ", which does not exist.");
   const double animation = reader.Number("animation", -1, 1e6);
-  if (animation != std::floor(animation)) Refuse(where, place + ".animation", "is not a whole number.");
+  if (animation != std::floor(animation)) Refuse(where, place + ".animation", "is not an integer.");
   entity.model.animation = static_cast<int>(animation);
   const ObjectReader pose(where, place + ".map_from_model", reader.Member("map_from_model"),
                           {"rotation_xyzw", "translation_m", "scale"});
@@ -145,7 +145,7 @@ Entity ReadSignpost(std::string_view where, const std::string& place, const Json
   return entity;
 }
 
-// The parsed text, its version and the types of its two lists checked.
+// Returns the parsed text after checking its version and the types of its two lists.
 Json ParseScene(std::string_view text, std::string_view where) {
   Json json = ParseGltfJson(where, text, LoadLimits{});
   const ObjectReader reader(where, "the scene", json, {"docent_scene", "assets", "entities"});
@@ -169,7 +169,7 @@ std::string EncodeScene(const Scene& scene) {
     entities.push_back(ToJson(entity));
   }
   const Json json{{"docent_scene", kVersion}, {"assets", assets}, {"entities", entities}};
-  // Text that is no valid UTF-8 is mended rather than lost with everything else.
+  // Invalid UTF-8 is replaced, so that the rest of the scene is not lost.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -177,7 +177,7 @@ std::vector<std::string> SceneAssetIds(std::string_view text) {
   const Json json = ParseScene(text, "scene");
   std::vector<std::string> ids;
   for (const Json& id : json["assets"]) {
-    if (!id.is_string()) Refuse("scene", "assets", "is not a list of texts.");
+    if (!id.is_string()) Refuse("scene", "assets", "is not a list of strings.");
     ids.push_back(id.get<std::string>());
   }
   return ids;

@@ -9,8 +9,8 @@
 
 #include "content/scene.h"
 
-// A scene as JSON text, the form in which a library keeps it (the assets are kept beside it, once each, by
-// id):
+// Encodes a scene as JSON text, the form in which a library stores it (assets are stored separately, once
+// each, by id):
 //
 //   {"docent_scene": 1, "assets": [ID…], "entities": [
 //     {"kind": "model", "name": NAME, "asset": ID, "animation": N,
@@ -18,19 +18,19 @@
 //     {"kind": "signpost", "name": NAME, "text": TEXT, "anchor_m": [x, y, z], "up": [x, y, z],
 //      "height_m": H, "to_map": NAME}]}
 //
-// Numbers are written so that they read back to the same bits (rotations are brought to length 1 again).
+// Numbers are written so that they read back to the same bits (rotations are normalized again).
 namespace docent::content {
 
 std::string EncodeScene(const Scene& scene);
 
-// The ids in "assets", so that a library can fetch them first. Throws Error like DecodeScene.
+// Returns the ids in "assets", so that a library can fetch them first. Throws Error like DecodeScene.
 std::vector<std::string> SceneAssetIds(std::string_view text);
 
-// Answers with the asset of an id, or nullptr when there is none.
+// Returns the asset with an id, or nullptr when there is none.
 using AssetLookup = std::function<std::shared_ptr<const Asset>(const std::string& id)>;
 
-// Parses strictly: unknown versions, kinds and members, missing members, numbers out of range, doubled names
-// and unknown assets throw Error. `where` names the text in sentences ("library.docent, map Desk").
+// Parses strictly: unknown versions, kinds and members, missing members, numbers out of range, duplicate
+// names and unknown assets throw Error. `where` names the text in messages ("library.docent, map Desk").
 Scene DecodeScene(std::string_view text, std::string_view where, const AssetLookup& find_asset);
 
 }  // namespace docent::content

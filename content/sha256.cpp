@@ -7,7 +7,7 @@
 namespace docent::content {
 namespace {
 
-// First 32 bits of the fractional parts of the cube roots of the first 64 primes (FIPS 180-4, §4.2.2).
+// The first 32 bits of the fractional parts of the cube roots of the first 64 primes (FIPS 180-4, §4.2.2).
 constexpr std::array<std::uint32_t, 64> kRound = {
     0x428a2f98, 0x71374491, 0xb5c0fbcf, 0xe9b5dba5, 0x3956c25b, 0x59f111f1, 0x923f82a4, 0xab1c5ed5,
     0xd807aa98, 0x12835b01, 0x243185be, 0x550c7dc3, 0x72be5d74, 0x80deb1fe, 0x9bdc06a7, 0xc19bf174,
@@ -59,7 +59,7 @@ std::array<std::uint8_t, 32> Sha256(std::span<const std::uint8_t> bytes) {
   for (; bytes.size() - offset >= 64; offset += 64) {
     Compress(std::span<const std::uint8_t, 64>(bytes.data() + offset, 64), &state);
   }
-  // The rest, a one bit, zeros, and the message's length in bits fill one or two more blocks.
+  // The remaining bytes, a one bit, zeros, and the message's length in bits fill one or two more blocks.
   std::array<std::uint8_t, 128> tail{};
   const std::size_t rest = bytes.size() - offset;
   std::copy(bytes.begin() + static_cast<std::ptrdiff_t>(offset), bytes.end(), tail.begin());

@@ -8,10 +8,10 @@
 
 namespace docent::content {
 
-// SHA-256 (FIPS 180-4, §6.2): names an asset by its bytes.
+// SHA-256 (FIPS 180-4, §6.2), which identifies an asset by its bytes.
 std::array<std::uint8_t, 32> Sha256(std::span<const std::uint8_t> bytes);
 
-// The same as 64 lower-case hexadecimal digits.
+// The hash as 64 lower-case hexadecimal digits.
 std::string Sha256Hex(std::span<const std::uint8_t> bytes);
 
 }  // namespace docent::content

@@ -13,14 +13,14 @@
 #include <utility>
 #include <vector>
 
-// Little-endian numbers to and from bytes, for the binary columns of a library.
+// Little-endian serialization of numbers for the binary columns of a library.
 namespace docent::maps {
 
 static_assert(std::endian::native == std::endian::little, "the file format is little-endian");
 
 using Bytes = std::vector<std::uint8_t>;
 
-// Appends to a growing array of bytes.
+// Appends numbers and bytes to an array that grows.
 class ByteWriter {
  public:
   template <typename Number>
@@ -29,7 +29,7 @@ class ByteWriter {
     const auto* bytes = reinterpret_cast<const std::uint8_t*>(&number);
     bytes_.insert(bytes_.end(), bytes, bytes + sizeof(number));
   }
-  // All numbers of an Eigen vector, first to last.
+  // Writes all coefficients of an Eigen vector, first to last.
   template <typename Vector>
   void PutAll(const Vector& vector) {
     for (Eigen::Index i = 0; i < vector.size(); ++i) Put(vector[i]);
@@ -37,7 +37,7 @@ class ByteWriter {
   void PutBytes(std::span<const std::uint8_t> bytes) {
     bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
   }
-  // Length in bytes as 32 bits, then the text.
+  // Writes the length in bytes as 32 bits, then the text.
   void PutText(std::string_view text) {
     Put(static_cast<std::uint32_t>(text.size()));
     bytes_.insert(bytes_.end(), text.begin(), text.end());
@@ -50,8 +50,8 @@ class ByteWriter {
   Bytes bytes_;
 };
 
-// Reads from a span that the caller keeps alive. Reading past the end gives zeros and sets failed(), so that
-// a decoder may read a whole record and look once.
+// Reads from a span that must outlive the reader. Reading past the end returns zeros and sets failed(), so
+// that a decoder can read a whole record and check once.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}

@@ -11,7 +11,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the file format is little-endian");
 
-// The five primes of the specification.
+// The five primes of the XXH64 specification.
 constexpr std::uint64_t kPrime1 = 0x9E3779B185EBCA87ull;
 constexpr std::uint64_t kPrime2 = 0xC2B2AE3D27D4EB4Full;
 constexpr std::uint64_t kPrime3 = 0x165667B19E3779F9ull;
@@ -29,7 +29,7 @@ std::uint64_t Round(std::uint64_t lane, std::uint64_t input) {
   return std::rotl(lane + input * kPrime2, 31) * kPrime1;
 }
 
-// The whole stripes of 32 bytes; advances *at past them.
+// Hashes the whole stripes of 32 bytes and advances *at past them.
 std::uint64_t HashStripes(const std::uint8_t** at, const std::uint8_t* end, std::uint64_t seed) {
   std::array<std::uint64_t, 4> lanes = {seed + kPrime1 + kPrime2, seed + kPrime2, seed, seed - kPrime1};
   const std::uint8_t* bytes = *at;

@@ -7,9 +7,9 @@
 
 namespace docent::maps {
 
-// XXH64 of the bytes, after Yann Collet's public specification ("xxHash fast digest algorithm", 64-bit
-// variant): four lanes of 8 bytes each, multiplied by fixed primes, rotated and folded together. It guards
-// against damage, not against a forger. Never throws; about 10 bytes a nanosecond.
+// The XXH64 hash of the bytes, after Yann Collet's public specification ("xxHash fast digest algorithm",
+// 64-bit variant): four lanes of 8 bytes each are multiplied by fixed primes, rotated and combined. It
+// detects damage, not forgery. Never throws; speed is about 10 bytes per nanosecond.
 std::uint64_t Checksum(std::span<const std::uint8_t> bytes, std::uint64_t seed = 0);
 
 }  // namespace docent::maps

@@ -16,9 +16,9 @@ namespace {
 
 using engine::LensModel;
 
-constexpr double kPixelOffset = 0.5;  // from our pixels to COLMAP's
+constexpr double kPixelOffset = 0.5;  // From Docent's pixel coordinates to COLMAP's.
 
-// Numbers in the shortest form that reads back as the same number, whatever the locale.
+// Formats numbers in the shortest form that reads back as the same number, independently of the locale.
 class Line {
  public:
   template <typename Number>
@@ -67,7 +67,7 @@ std::string ImageName(engine::KeyFrameId id) {
   return "keyframe" + std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits + ".png";
 }
 
-// What a point gathers over the keyframes that see it.
+// What is accumulated for a point over the keyframes that observe it.
 struct Track {
   std::string text;
   double error_px = 0;
@@ -84,7 +84,7 @@ int GrayAt(const engine::MapSnapshot& map, const engine::MapPoint& point) {
   return level.at<std::uint8_t>(y, x);
 }
 
-// The second line of a keyframe in images.txt.
+// The second line of a keyframe in images.txt, which lists its observations.
 std::string ObservationsLine(const engine::MapSnapshot& map, const engine::KeyFrame& keyframe,
                              std::span<const engine::Observation> observations,
                              std::map<engine::MapPointId, Track>* tracks) {

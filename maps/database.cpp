@@ -17,15 +17,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kBusyTimeoutMs = 5000;       // another process's transaction takes milliseconds
-constexpr int kCloseTimeoutMs = 200;       // tidying up is not worth a wait
-constexpr int kMaxValueBytes = 512 << 20;  // of one blob or text
+constexpr int kBusyTimeoutMs = 5000;  // Another process's transaction takes milliseconds.
+// Moving the log into the file on close is optional, so it is not worth a long wait.
+constexpr int kCloseTimeoutMs = 200;
+constexpr int kMaxValueBytes = 512 << 20;  // Limit for one blob or text.
 
-// What the system said to the last call that failed, where SQLite still knows; " (File too large)".
+// The system's error for the last failed call, if SQLite still has it, as " (File too large)".
 std::string SystemReason(sqlite3* connection) {
   if (!connection) return "";
   int number = sqlite3_system_errno(connection);
-  // A commit leaves it with the file alone.
+  // A failed commit leaves the error only with the file or journal.
   for (const int which : {SQLITE_FCNTL_JOURNAL_POINTER, SQLITE_FCNTL_FILE_POINTER}) {
     sqlite3_file* file = nullptr;
     if (number == 0 && sqlite3_file_control(connection, "main", which, &file) == SQLITE_OK && file &&
@@ -39,19 +40,19 @@ std::string SystemReason(sqlite3* connection) {
 std::string Reason(sqlite3* connection, int result) {
   switch (result & 0xFF) {
     case SQLITE_NOTADB:
-      return "is not a library of maps (it is no SQLite file)";
+      return "is not a library of maps (it is not an SQLite file)";
     case SQLITE_CORRUPT:
       return "is damaged (" + std::string(sqlite3_errmsg(connection)) +
-             "); docent maps recover saves what it still holds";
+             "); use docent maps recover to save what is still readable";
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-      return "is being written by another program; try again when that has ended";
+      return "is being written by another program; try again when that program has ended";
     case SQLITE_READONLY:
       if (result == SQLITE_READONLY_ROLLBACK || result == SQLITE_READONLY_RECOVERY) {
-        return "was left in the middle of a change by a program that was killed; open it once for writing to "
+        return "was left incomplete by a program that was killed; open it once for writing to "
                "repair it";
       }
-      return "may not be written";
+      return "is not writable";
     case SQLITE_FULL:
       return "cannot be saved because the disk is full";
     case SQLITE_CANTOPEN:
@@ -85,7 +86,8 @@ void CheckIsFile(const fs::path& path, const std::string& file) {
     throw Error(file + " cannot be opened: it is not a plain file");
 }
 
-// "file:" URI of an absolute path (RFC 3986: all but unreserved characters and slashes are escaped).
+// A "file:" URI of an absolute path (RFC 3986: everything except unreserved characters and slashes is
+// escaped).
 std::string Uri(const fs::path& path, const char* query) {
   constexpr std::string_view kHex = "0123456789ABCDEF";
   constexpr std::string_view kPlain = "-._~/";
@@ -103,16 +105,16 @@ std::string Uri(const fs::path& path, const char* query) {
   return uri + query;
 }
 
-// SQLite's own descriptor. The file is looked into through this one only: a second descriptor would, when it
-// is closed, drop the locks that this process holds on the file.
+// SQLite's own file descriptor. All checks use this one, because closing a second descriptor would release
+// this process's locks on the file.
 sqlite3_file* OpenFile(sqlite3* connection) {
   sqlite3_file* file = nullptr;
   if (sqlite3_file_control(connection, "main", SQLITE_FCNTL_FILE_POINTER, &file) != SQLITE_OK) return nullptr;
   return file && file->pMethods ? file : nullptr;
 }
 
-// Whether the file says that it goes with a write-ahead log (file format, offset 19).
-bool GoesWithLog(sqlite3* connection) {
+// Whether the file's header says that it uses a write-ahead log (file format, offset 19).
+bool UsesWriteAheadLog(sqlite3* connection) {
   sqlite3_file* const file = OpenFile(connection);
   if (!file) return false;
   std::array<unsigned char, 20> header{};
@@ -121,9 +123,9 @@ bool GoesWithLog(sqlite3* connection) {
   return header[19] == 2;
 }
 
-// Whether the file is smaller than one page of the size that it names (file format, offset 16), which SQLite
-// would set memory apart for. A file that is new is empty.
-bool AsksForMoreThanItHas(sqlite3* connection) {
+// Whether the file is smaller than the page size in its header (file format, offset 16), for which SQLite
+// would allocate memory. A new file is empty and therefore valid.
+bool IsSmallerThanOnePage(sqlite3* connection) {
   sqlite3_file* const file = OpenFile(connection);
   sqlite3_int64 size = 0;
   std::array<unsigned char, 18> header{};
@@ -134,8 +136,8 @@ bool AsksForMoreThanItHas(sqlite3* connection) {
   return std::memcmp(header.data(), "SQLite format 3", 16) == 0 && size < (page == 1 ? 65536 : page);
 }
 
-// Whether there is no live log beside the file: a process that writes keeps both -wal and -shm there.
-bool LogAtRest(const fs::path& path) {
+// Whether there is no active log beside the file: a process that writes keeps both -wal and -shm there.
+bool HasNoActiveLog(const fs::path& path) {
   std::error_code error;
   if (fs::exists(Beside(path, "-shm"), error)) return false;
   const fs::path log = Beside(path, "-wal");
@@ -173,7 +175,7 @@ Statement& Statement::Bind(int parameter, std::string_view text) {
 }
 
 Statement& Statement::Bind(int parameter, std::span<const std::uint8_t> bytes) {
-  static constexpr std::uint8_t kNothing = 0;  // a null pointer would bind NULL
+  static constexpr std::uint8_t kNothing = 0;  // Binding a null pointer would store NULL.
   Check(sqlite3_bind_blob64(statement_.get(), parameter, bytes.empty() ? &kNothing : bytes.data(),
                             bytes.size(), SQLITE_STATIC));
   return *this;
@@ -224,7 +226,7 @@ std::span<const std::uint8_t> Statement::Blob(int column) const {
   const void* bytes = sqlite3_column_blob(statement_.get(), column);
   const int size = sqlite3_column_bytes(statement_.get(), column);
   if (!bytes) {
-    // An overflow page that cannot be read shows up here and not as a failed step.
+    // An overflow page that cannot be read is reported here and not by a failed step.
     const int code = sqlite3_extended_errcode(connection_);
     if (size > 0 || (code != SQLITE_OK && code != SQLITE_ROW)) Fail(file_, connection_, code);
     return {};
@@ -241,7 +243,7 @@ void Database::Closer::operator()(sqlite3* connection) const {
 }
 
 void Database::OpenConnection(const std::string& name, int flags) {
-  // SQLite would otherwise begin with memory for twenty pages, of the size that a file asks for.
+  // Otherwise SQLite would first allocate memory for twenty pages of the size that the file's header gives.
   static const int configured = sqlite3_config(SQLITE_CONFIG_PAGECACHE, nullptr, 0, 0);
   static_cast<void>(configured);
   sqlite3* connection = nullptr;
@@ -251,24 +253,25 @@ void Database::OpenConnection(const std::string& name, int flags) {
   if (result != SQLITE_OK) Fail(file_, connection, result);
   sqlite3_busy_timeout(connection, kBusyTimeoutMs);
   sqlite3_limit(connection, SQLITE_LIMIT_LENGTH, kMaxValueBytes);
-  // The file is input: its schema may run nothing, and its pages are checked as they are read.
+  // The file is untrusted input: its schema must not run code, and its pages are checked as they are read.
   sqlite3_db_config(connection, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   sqlite3_db_config(connection, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_db_config(connection, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   sqlite3_db_config(connection, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
   sqlite3_db_config(connection, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-  if (AsksForMoreThanItHas(connection)) throw Error(file_ + " is damaged: it is cut off in its first page");
+  if (IsSmallerThanOnePage(connection))
+    throw Error(file_ + " is damaged: it is truncated within its first page");
 }
 
 void Database::ConnectReadOnly() {
   const fs::path path = fs::absolute(file_);
   CheckIsFile(path, file_);
   immutable_ = false;
-  const bool at_rest = LogAtRest(path);
+  const bool no_active_log = HasNoActiveLog(path);
   OpenConnection(path.string(), SQLITE_OPEN_READONLY);
-  if (at_rest && GoesWithLog(connection_.get())) {
-    // Written by a process that could not tidy up, or copied without its log. SQLite would now make a log
-    // beside the file; promising that it does not change keeps the folder as it is.
+  if (no_active_log && UsesWriteAheadLog(connection_.get())) {
+    // The file was left by a process that could not close it properly, or it was copied without its log.
+    // SQLite would now create a log beside it. Opening it as immutable leaves the folder unchanged.
     OpenConnection(Uri(path, "?immutable=1"), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
     immutable_ = true;
   }
@@ -283,8 +286,8 @@ Database Database::OpenReadOnly(const fs::path& path) {
 
 Database Database::OpenDamaged(const fs::path& path) {
   Database database = OpenReadOnly(path);
-  // With its schema open to change, SQLite bears a file that is shorter than it says (the connection cannot
-  // write all the same).
+  // With a writable schema SQLite accepts a file that is shorter than its header says. The connection is
+  // still read-only.
   sqlite3_db_config(database.connection_.get(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
   sqlite3_db_config(database.connection_.get(), SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
   return database;
@@ -301,7 +304,7 @@ Database Database::OpenReadWrite(const fs::path& path, bool create) {
   }
   database.OpenConnection(absolute.string(), SQLITE_OPEN_READWRITE | (create ? SQLITE_OPEN_CREATE : 0));
   if (sqlite3_db_readonly(database.connection_.get(), "main") == 1) {
-    throw Error(database.file_ + " may not be written; open it read only or change its permissions");
+    throw Error(database.file_ + " is not writable; open it read-only or change its permissions");
   }
   database.Execute("PRAGMA cell_size_check = ON");
   return database;
@@ -320,7 +323,7 @@ void Database::StartWriting() {
 
 Database::~Database() {
   if (!connection_ || !writing_) return;
-  // Failing here loses nothing: the log is simply left for the next process that writes.
+  // A failure here loses nothing: the log is left for the next process that writes.
   sqlite3_busy_timeout(connection_.get(), kCloseTimeoutMs);
   sqlite3_exec(connection_.get(), "PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode = DELETE", nullptr,
                nullptr, nullptr);
@@ -364,7 +367,8 @@ std::int64_t Database::Bytes() const {
   const fs::path log = Beside(fs::absolute(file_), "-wal");
   std::error_code error;
   const std::uintmax_t log_size = fs::file_size(log, error);
-  // What the file says of itself is no proof, nor is a log that grew long ago.
+  // Neither the size in the file's header nor the size of an old log proves how much data there is, so the
+  // smaller estimate counts.
   return std::min<std::int64_t>(size + (error ? 0 : static_cast<std::int64_t>(log_size)),
                                 Number("PRAGMA page_count") * Number("PRAGMA page_size"));
 }
@@ -388,7 +392,7 @@ Transaction::~Transaction() {
   try {
     database_.Execute("ROLLBACK");
   } catch (const Error&) {
-    // SQLite has already rolled back by itself after some failures, which is what was wanted.
+    // After some failures SQLite has already rolled back, which is the intended result.
   }
 }
 

@@ -12,30 +12,30 @@
 struct sqlite3;
 struct sqlite3_stmt;
 
-// A thin owner of one SQLite connection: opening in a way that changes nothing by accident, statements and
-// transactions that clean up after themselves, and every failure as a docent::Error whose sentence begins
-// with the file's name. Not thread-safe: whoever owns a Database lets one thread at a time use it.
+// A RAII wrapper for one SQLite connection. Opening a file never modifies it, statements and transactions are
+// released automatically, and every failure throws docent::Error with a message that begins with the file's
+// name. Not thread-safe: the owner must serialize access.
 namespace docent::maps {
 
-// A prepared statement. Parameters count from 1, columns from 0, as in SQLite.
+// A prepared statement. Parameters are numbered from 1 and columns from 0, as in SQLite.
 class Statement {
  public:
   Statement(sqlite3* connection, const std::string& file, std::string_view sql);
 
   Statement& Bind(int parameter, std::int64_t value);
   Statement& Bind(int parameter, std::string_view text);
-  // The bytes must live until the statement was run.
+  // The bytes must stay valid until the statement has run.
   Statement& Bind(int parameter, std::span<const std::uint8_t> bytes);
   Statement& BindNull(int parameter);
 
-  // True when there is a row to read; false at the end.
+  // Returns true when there is a row to read, and false at the end.
   bool Step();
-  // For a statement without rows.
+  // Runs a statement that returns no rows.
   void Run();
-  // Ready to be bound and run again.
+  // Resets the statement, so that it can be bound and run again.
   void Reset();
 
-  // Each throws when the column holds another type, which only a damaged file does.
+  // These throw when the column has another type, which happens only in damaged files.
   std::int64_t Integer(int column) const;
   std::string Text(int column) const;
   // Valid until the next Step or Reset.
@@ -56,43 +56,43 @@ class Statement {
 
 class Database {
  public:
-  // For reading while another process may write. The file is opened read only; where its log is at rest no
-  // file appears beside it.
+  // Opens the file for reading while another process may write. If the file has no write-ahead log, no file
+  // is created beside it.
   static Database OpenReadOnly(const std::filesystem::path& path);
-  // For reading what a damaged file still holds: pages that it should have and has not are no reason to give
-  // up before the others were read.
+  // Opens a damaged file to read what is still readable. Missing pages do not prevent reading the others.
   static Database OpenDamaged(const std::filesystem::path& path);
-  // For writing; the file is created (empty) when `create` is set and it is missing. Nothing in it is changed
-  // before StartWriting, not even on close.
+  // Opens the file for writing. If it is missing and `create` is set, an empty file is created. The contents
+  // are not modified before StartWriting, not even on close.
   static Database OpenReadWrite(const std::filesystem::path& path, bool create);
   Database(Database&&) = default;
   Database& operator=(Database&&) = delete;
-  // A connection that was writing moves its log into the file, if nobody else is reading, so that the file
-  // alone holds everything and can be read from a folder that may not be written to.
+  // A writing connection moves its log into the file unless another process is reading. The file then is
+  // complete without the log and can be read from a read-only folder.
   ~Database();
 
-  // Switches to the write-ahead log: readers go on while a transaction is written, and what was committed
-  // survives a crash at any moment. To be called once the file is known to be ours.
+  // Switches to the write-ahead log: readers can continue while a transaction is written, and committed data
+  // survives a crash at any moment. Call it once the file is known to be a library.
   void StartWriting();
-  // Called before each use of a read-only connection. A file whose log was not there when it was opened is
-  // opened again, because the connection could not see that another process writes now.
+  // Call this before each use of a read-only connection. A file that had no log when it was opened is
+  // reopened, because the connection could not notice that another process has started to write.
   void Refresh();
 
   Statement Prepare(std::string_view sql) const { return {connection_.get(), file_, sql}; }
   void Execute(const char* sql) const;
-  // The single number that a query gives.
+  // Returns the single number that a query yields.
   std::int64_t Number(std::string_view sql) const;
-  // Rows that the last statement changed.
+  // The number of rows that the last statement changed.
   std::int64_t Changes() const;
 
-  // False when the file ends within a page, as one that was cut off does. (With a log beside it the last page
-  // may be on its way.) SQLite itself would take the missing bytes for zeros.
+  // Returns false when the file ends within a page, which means that it is truncated. SQLite itself would
+  // read the missing bytes as zeros. When there is a log, the last page may not have been written yet, so the
+  // answer is true.
   bool EndsWithWholePage() const;
-  // How much the file holds, its log included.
+  // The size of the library in bytes, including its log.
   std::int64_t Bytes() const;
 
-  // Copies the whole file as it is now, log included, into a new one, which is on disk when this returns.
-  // Not inside a transaction.
+  // Copies the current state of the file, including the log, to a new file, which is on disk when this
+  // returns. Must not be called inside a transaction.
   void CopyTo(const std::filesystem::path& path) const;
 
   const std::string& file() const { return file_; }
@@ -106,14 +106,14 @@ class Database {
   void OpenConnection(const std::string& name, int flags);
   void ConnectReadOnly();
 
-  std::string file_;  // as the user named it
+  std::string file_;  // The path as the user gave it.
   bool read_only_;
   bool writing_ = false;
   bool immutable_ = false;
   std::unique_ptr<sqlite3, Closer> connection_;
 };
 
-// One transaction: everything or nothing. Rolls back unless it was committed.
+// A transaction, which is rolled back unless it was committed.
 class Transaction {
  public:
   enum class Kind { kRead, kWrite };

@@ -28,7 +28,7 @@ Envelope OpenEnvelope(const EnvelopeKind& kind, std::uint64_t map_key, std::span
   const std::string name = kind.name;
   if (bytes.size() < kEnvelopeBytes) throw Error(name + " is cut off");
   if (!std::equal(kind.magic.begin(), kind.magic.end(), bytes.begin())) {
-    throw Error(name + " is damaged: it does not begin as it should");
+    throw Error(name + " is damaged: its header is not valid");
   }
   const auto body = bytes.first(bytes.size() - sizeof(std::uint64_t));
   if (ByteReader(bytes.last(sizeof(std::uint64_t))).Get<std::uint64_t>() != Checksum(body)) {
@@ -36,14 +36,15 @@ Envelope OpenEnvelope(const EnvelopeKind& kind, std::uint64_t map_key, std::span
   }
   ByteReader reader(body.subspan(kind.magic.size()));
   if (const auto version = reader.Get<std::uint32_t>(); version != kLayoutVersion) {
-    throw Error(name + " has layout " + std::to_string(version) + ", which this program does not know");
+    throw Error(name + " has layout version " + std::to_string(version) +
+                ", which this program does not know");
   }
   if (reader.Get<std::uint64_t>() != map_key) throw Error(name + " belongs to another map");
   const auto count = reader.Get<std::uint64_t>();
   if (kind.record_bytes > 0 &&
       (reader.remaining() % kind.record_bytes != 0 || count != reader.remaining() / kind.record_bytes)) {
-    throw Error(name + " is damaged: it says it has " + std::to_string(count) + " records but has " +
-                std::to_string(reader.remaining()) + " bytes of them");
+    throw Error(name + " is damaged: its header gives " + std::to_string(count) + " records for " +
+                std::to_string(reader.remaining()) + " bytes");
   }
   return {reader, count};
 }

@@ -7,7 +7,7 @@
 
 #include "maps/byte_stream.h"
 
-// The frame round every binary column: who it is, whose it is, how much there is, and whether it is whole.
+// The envelope around every binary column: its type, its map, its number of records and its checksum.
 //
 //   offset  size  field
 //        0     4  magic, ASCII
@@ -23,8 +23,8 @@ inline constexpr std::size_t kEnvelopeBytes = 32;
 
 struct EnvelopeKind {
   std::array<char, 4> magic;
-  const char* name;          // for sentences: "the table of points"
-  std::size_t record_bytes;  // 0 when records vary in length
+  const char* name;          // For messages, for instance "the table of points".
+  std::size_t record_bytes;  // 0 when records vary in length.
 };
 
 inline constexpr EnvelopeKind kCameraTableKind = {{'D', 'C', 'A', 'M'}, "the table of cameras", 81};
@@ -37,15 +37,15 @@ inline constexpr EnvelopeKind kThumbnailTableKind = {{'D', 'T', 'H', 'M'}, "the 
 inline constexpr EnvelopeKind kWordTableKind = {{'D', 'W', 'R', 'D'}, "the table of words", 0};
 inline constexpr EnvelopeKind kImageKind = {{'D', 'P', 'I', 'C'}, "the image", 0};
 
-// Writes the head; the caller appends `count` records.
+// Writes the header; the caller appends `count` records.
 ByteWriter BeginEnvelope(const EnvelopeKind& kind, std::uint64_t map_key, std::uint64_t count);
 Bytes FinishEnvelope(ByteWriter writer);
 
 struct Envelope {
   ByteReader records;
-  std::uint64_t count = 0;  // for records of fixed length: exactly as many as there are bytes for
+  std::uint64_t count = 0;  // For records of fixed length, checked against the number of bytes.
 };
-// Throws docent::Error with a sentence about `kind` when the bytes are not such an envelope of that map.
+// Throws docent::Error with a message about `kind` when the bytes are not a valid envelope of that map.
 Envelope OpenEnvelope(const EnvelopeKind& kind, std::uint64_t map_key, std::span<const std::uint8_t> bytes);
 
 }  // namespace docent::maps

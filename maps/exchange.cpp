@@ -27,7 +27,7 @@ std::string FreeName(const std::string& name, const std::set<std::string>& taken
   if (!taken.contains(name)) return name;
   for (int number = 2;; ++number) {
     const std::string suffix = " (" + std::to_string(number) + ")";
-    // Whole characters of UTF-8: bytes 10xxxxxx go on with the one before.
+    // Cuts only between whole UTF-8 characters: bytes 10xxxxxx continue the one before.
     std::size_t length = std::min(name.size(), kMaxMapNameBytes - suffix.size());
     while (length < name.size() && length > 0 && (static_cast<unsigned char>(name[length]) & 0xC0) == 0x80)
       --length;
@@ -40,7 +40,7 @@ std::string FreeName(const std::string& name, const std::set<std::string>& taken
 void ExportMap(const Library& library, std::uint64_t key, const std::filesystem::path& path) {
   std::error_code error;
   if (std::filesystem::exists(path, error))
-    throw Error(path.string() + " exists already; name a new file for the map");
+    throw Error(path.string() + " exists already; choose a new file name for the map");
   StoredMap map = library.Load(key);
   try {
     Library target = Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes);
@@ -55,7 +55,7 @@ void ExportMap(const Library& library, std::uint64_t key, const std::filesystem:
 
 std::vector<ImportedMap> ImportMaps(const Library& from, const std::filesystem::path& path) {
   const std::vector<MapInfo> infos = from.List();
-  if (infos.empty()) throw Error(from.file() + " holds no map to import");
+  if (infos.empty()) throw Error(from.file() + " contains no map to import");
   for (const MapInfo& info : infos) from.Load(info.key);
   Library to = Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes);
   std::set<std::string> taken;

@@ -16,15 +16,15 @@ namespace docent::maps {
 
 namespace {
 
-constexpr int kPngLevel = 1;  // higher ones take several times as long and save a few percent
+constexpr int kPngLevel = 1;  // Higher levels take several times as long and save only a few percent.
 
 std::uint32_t BigEndian32(std::span<const std::uint8_t> bytes) {
   return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 | std::uint32_t{bytes[2]} << 8 |
          bytes[3];
 }
 
-// Appearance at the PNG's head before a decoder allocates what it asks for (PNG specification, §5.2 and
-// §11.2.2): it must be a grey image of 8 bits and of the size that the camera says.
+// Checks the PNG header before a decoder allocates the memory that it asks for (PNG specification, sections
+// 5.2 and 11.2.2): the image must be 8-bit grey and have the size of its camera.
 bool IsGrayPngOfSize(std::span<const std::uint8_t> png, int width_px, int height_px) {
   constexpr std::array<std::uint8_t, 16> kHead = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n',
                                                   0,    0,   0,   13,  'I',  'H',  'D',  'R'};
@@ -40,7 +40,7 @@ bool IsGrayPngOfSize(std::span<const std::uint8_t> png, int width_px, int height
 std::uint64_t ImageHash(const cv::Mat& gray) {
   std::uint64_t hash = static_cast<std::uint64_t>(gray.cols) << 32 |
                        static_cast<std::uint64_t>(static_cast<std::uint32_t>(gray.rows));
-  // By row, because an image that is cut out of another is not one piece of memory.
+  // Row by row, because the rows of a sub-image are not contiguous in memory.
   for (int row = 0; row < gray.rows; ++row)
     hash = Checksum({gray.ptr(row), static_cast<std::size_t>(gray.cols)}, hash);
   return hash;
@@ -53,8 +53,8 @@ Bytes EncodeImage(std::uint64_t map_key, engine::KeyFrameId keyframe, const cv::
     for (const int level : {kPngLevel, 0}) {
       if (!cv::imencode(".png", gray, png, {cv::IMWRITE_PNG_COMPRESSION, level}))
         throw Error("the image of keyframe " + std::to_string(keyframe) + " cannot be compressed");
-      // A flat one would look, to ReadCameras, as if a small file asked for a large memory.
-      if (pixels <= kMaxPixelsAByte * static_cast<std::int64_t>(png.size())) break;
+      // ReadCameras limits the ratio of pixels to bytes, and a uniform image would exceed it.
+      if (pixels <= kMaxPixelsPerByte * static_cast<std::int64_t>(png.size())) break;
     }
   } catch (const cv::Exception& error) {
     throw Error("the image of keyframe " + std::to_string(keyframe) + " cannot be compressed: " + error.err);
@@ -78,7 +78,7 @@ cv::Mat DecodeImage(std::uint64_t map_key, const StoredKeyFrame& stored,
   }
   cv::Mat gray;
   try {
-    // The header only reads: OpenCV has no const view.
+    // The cv::Mat is only read; OpenCV has no const view.
     const cv::Mat source(1, static_cast<int>(png.size()), CV_8UC1, const_cast<std::uint8_t*>(png.data()));
     gray = cv::imdecode(source, cv::IMREAD_UNCHANGED);
   } catch (const cv::Exception& error) {

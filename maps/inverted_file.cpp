@@ -15,11 +15,11 @@ using engine::WordBag;
 
 constexpr std::uint32_t kCountBits = 4;
 constexpr std::uint32_t kCountMask = (1u << kCountBits) - 1;
-// Longest reading of a search. Words that would go beyond are left out: they are the commonest, and say
-// least.
+// Limit for the postings that one search reads. Words beyond it are skipped; they are the most frequent and
+// carry the least information.
 constexpr std::size_t kMaxPostings = 300'000;
-// What is compared by all words.
-constexpr std::size_t kComparedFinely = 256;
+// The number of candidates that are compared with all words.
+constexpr std::size_t kFineCandidates = 256;
 
 int LengthOf(const WordBag& bag) {
   int length = 0;
@@ -29,19 +29,19 @@ int LengthOf(const WordBag& bag) {
 
 }  // namespace
 
-// Shares of the words found so far, by slot, for one search.
+// Sums of the shared words by slot during one search.
 struct InvertedFile::Scratch {
   std::vector<float> shared;
   std::vector<Slot> touched;
 };
 
-// Rarity of each word.
+// The inverse document frequency of each word.
 class InvertedFile::Weights {
  public:
   explicit Weights(const InvertedFile& file) : rarity_(file.lists_.size()) {
     const double keyframes = static_cast<double>(file.bags_.size() - file.free_.size());
     for (std::size_t word = 0; word < rarity_.size(); ++word) {
-      // A word that no keyframe has is as rare as one that a single one has.
+      // A word that no keyframe contains is weighted like a word of a single keyframe.
       rarity_[word] =
           static_cast<float>(std::log1p(std::max(1.0, keyframes) / static_cast<double>(std::max<std::size_t>(
                                                                        1, file.lists_[word].size()))));
@@ -75,10 +75,10 @@ class InvertedFile::Weights {
   std::vector<float> rarity_;
 };
 
-class InvertedFile::Reading {
+class InvertedFile::ReadLock {
  public:
-  explicit Reading(const InvertedFile& file) {
-    const std::scoped_lock passing(file.door_);
+  explicit ReadLock(const InvertedFile& file) {
+    const std::scoped_lock passing(file.writer_priority_mutex_);
     lock_ = std::shared_lock(file.mutex_);
   }
 
@@ -90,7 +90,7 @@ InvertedFile::InvertedFile() : lists_(engine::VocabularyTree::kLeaves) {}
 InvertedFile::~InvertedFile() = default;
 
 InvertedFile::Slot InvertedFile::Add(const WordBag& bag, Owner owner) {
-  const std::scoped_lock closing(door_);
+  const std::scoped_lock closing(writer_priority_mutex_);
   const std::scoped_lock lock(mutex_);
   if (free_.empty()) {
     free_.push_back(static_cast<Slot>(bags_.size()));
@@ -110,7 +110,7 @@ InvertedFile::Slot InvertedFile::Add(const WordBag& bag, Owner owner) {
 }
 
 void InvertedFile::Remove(Slot slot) {
-  const std::scoped_lock closing(door_);
+  const std::scoped_lock closing(writer_priority_mutex_);
   const std::scoped_lock lock(mutex_);
   for (const VisualWord& word : bags_[slot]) {
     std::vector<std::uint32_t>& list = lists_[word.leaf()];
@@ -126,12 +126,12 @@ void InvertedFile::Remove(Slot slot) {
 }
 
 std::size_t InvertedFile::size() const {
-  const Reading reading(*this);
+  const ReadLock lock(*this);
   return bags_.size() - free_.size();
 }
 
 std::size_t InvertedFile::postings() const {
-  const Reading reading(*this);
+  const ReadLock lock(*this);
   return postings_;
 }
 
@@ -143,7 +143,7 @@ std::unique_ptr<InvertedFile::Scratch> InvertedFile::TakeScratch() const {
   return scratch;
 }
 
-void InvertedFile::GiveBack(std::unique_ptr<Scratch> scratch) const {
+void InvertedFile::ReturnScratch(std::unique_ptr<Scratch> scratch) const {
   const std::scoped_lock lock(scratch_mutex_);
   scratch_.push_back(std::move(scratch));
 }
@@ -162,7 +162,7 @@ std::vector<InvertedFile::Slot> InvertedFile::Shortlist(const WordBag& wanted, c
     if (cost->postings + list.size() > kMaxPostings) break;
     ++cost->words;
     cost->postings += list.size();
-    // What a posting adds, by its count.
+    // What a posting adds to the sum, by its count.
     std::array<float, VisualWord::kMaxCount> adds;
     for (int i = 0; i < VisualWord::kMaxCount; ++i)
       adds[static_cast<std::size_t>(i)] =
@@ -173,7 +173,7 @@ std::vector<InvertedFile::Slot> InvertedFile::Shortlist(const WordBag& wanted, c
       shared[slot] += adds[posting & kCountMask];
     }
   }
-  // Long bags share more by chance.
+  // The sum is normalized, because long bags share more words by chance.
   const auto length = static_cast<float>(LengthOf(wanted));
   std::vector<std::pair<float, Slot>> ranked;
   ranked.reserve(scratch->touched.size());
@@ -182,7 +182,7 @@ std::vector<InvertedFile::Slot> InvertedFile::Shortlist(const WordBag& wanted, c
     shared[slot] = 0;
   }
   scratch->touched.clear();
-  GiveBack(std::move(scratch));
+  ReturnScratch(std::move(scratch));
   if (ranked.size() > count) {
     std::nth_element(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(count), ranked.end());
     ranked.resize(count);
@@ -199,10 +199,10 @@ std::vector<InvertedFile::Hit> InvertedFile::Search(const WordBag& wanted, std::
   *cost = {};
   std::vector<Hit> hits;
   if (wanted.empty() || count == 0) return hits;
-  const Reading reading(*this);
+  const ReadLock lock(*this);
   const Weights weights(*this);
   const double sum = weights.SumOf(wanted);
-  for (const Slot slot : Shortlist(wanted, weights, std::max(count, kComparedFinely), cost))
+  for (const Slot slot : Shortlist(wanted, weights, std::max(count, kFineCandidates), cost))
     hits.push_back({slot, owners_[slot], weights.Compare(wanted, sum, bags_[slot])});
   std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
     return a.score != b.score ? a.score > b.score : a.slot < b.slot;
@@ -214,7 +214,7 @@ std::vector<InvertedFile::Hit> InvertedFile::Search(const WordBag& wanted, std::
 std::vector<double> InvertedFile::Scores(const WordBag& wanted, std::span<const Slot> slots) const {
   std::vector<double> scores(slots.size(), 0.0);
   if (wanted.empty()) return scores;
-  const Reading reading(*this);
+  const ReadLock lock(*this);
   const Weights weights(*this);
   const double sum = weights.SumOf(wanted);
   for (std::size_t i = 0; i < slots.size(); ++i) {

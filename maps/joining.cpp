@@ -9,14 +9,14 @@ namespace docent::maps {
 
 namespace {
 
-// Before minutes are spent on what cannot be saved; the library checks it again.
+// Checked before minutes of computation whose result could not be saved. The library checks it again.
 void CheckMayBeJoined(const Library& library, const MapInfo& info) {
   if (MayChangeStructure(info.policy)) return;
   throw Error(library.file() + ": map '" + info.name + "' has the policy " + ToString(info.policy) +
-              ", so it may not be joined with another map; set another policy first to change that");
+              ", so it cannot be joined with another map; change its policy first");
 }
 
-// The box round a box that was moved.
+// The axis-aligned bounding box of a transformed box.
 Bounds Moved(const engine::Sim3& motion, const Bounds& bounds) {
   Bounds moved;
   for (int corner = 0; corner < 8; ++corner) {
@@ -46,7 +46,7 @@ std::optional<Bounds> JoinedBounds(const StoredMap& into, const StoredMap& from,
 JoinResult JoinMaps(Library* library, std::uint64_t into_key, std::uint64_t from_key,
                     const SceneJoiner& scenes, const std::atomic<bool>* interrupt,
                     const engine::MapJoiningOptions& options) {
-  if (into_key == from_key) throw Error("a map cannot be joined with itself; name two maps");
+  if (into_key == from_key) throw Error("a map cannot be joined with itself; choose two different maps");
   for (const std::uint64_t key : {into_key, from_key}) CheckMayBeJoined(*library, library->Find(key));
   const StoredMap into = library->Load(into_key), from = library->Load(from_key);
   engine::MapJoinAttempt attempt = engine::JoinMaps(options, *into.snapshot, *from.snapshot, interrupt);
@@ -65,7 +65,7 @@ JoinResult JoinMaps(Library* library, std::uint64_t into_key, std::uint64_t from
   record.redirect = [&](const std::string& text) {
     return scenes.redirect(text, from.info.name, into.info.name);
   };
-  if (!library->Join(record)) result.refusal = "one of them was changed by another program meanwhile";
+  if (!library->Join(record)) result.refusal = "one of them was changed by another program in the meantime";
   return result;
 }
 

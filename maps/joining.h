@@ -10,16 +10,17 @@
 #include "engine/mapping/map_joining.h"
 #include "maps/library.h"
 
-// Two maps of a library become one (engine/mapping/map_joining.h says when and how): keyframes, points and
-// panorama maps, content, signposts and policies, in one transaction. The first keeps its name, key,
-// coordinates and unit; the second is gone afterwards. The joined map has the stricter policy of the two;
-// where that is bounded, its bounds are the box round the bounds of both (of an open one: round what it
-// holds). Both policies must allow that keyframes and points change.
+// Joins two maps of a library (engine/mapping/map_joining.h describes when this is possible and how):
+// keyframes, points, panorama maps, content, signposts and policies, in one transaction. The first map keeps
+// its name, key, coordinates and unit; the second is removed. The joined map gets the stricter of the two
+// policies. If that is bounded, its bounds are the bounding box of the bounds of both maps; the bounds of an
+// open map are computed from its keyframes and points. Both policies must allow changes to keyframes and
+// points.
 namespace docent::maps {
 
-// What only the content floor can do.
+// Operations on scenes, which only the content library can interpret.
 struct SceneJoiner {
-  // What stands in both maps, in the coordinates of the joined one.
+  // Returns the scenes of both maps in the coordinates of the joined map.
   std::function<std::shared_ptr<const SceneRecord>(const StoredMap& into, const StoredMap& from,
                                                    const engine::JoinedMap& joined)>
       join;
@@ -32,17 +33,17 @@ struct SceneJoiner {
 struct JoinResult {
   engine::MapOverlap overlap;
   int points_merged = 0;
-  // One sentence without a full stop that says why the maps stay two, and nothing was written; empty when
-  // they were joined.
+  // Why the maps were not joined, as a sentence without a full stop; then nothing was written. Empty if they
+  // were joined.
   std::string refusal;
 };
 
-// `into` and `from` are keys of two maps. The library makes full features. interrupt may be null. Throws
-// docent::Error where a policy does not allow it, and for what the file has wrong.
+// `into` and `from` are the keys of two maps. The library must be opened with full feature computation.
+// `interrupt` may be null. Throws docent::Error when a policy forbids the change or the file has an error.
 JoinResult JoinMaps(Library* library, std::uint64_t into, std::uint64_t from, const SceneJoiner& scenes,
                     const std::atomic<bool>* interrupt, const engine::MapJoiningOptions& options = {});
 
-// The bounds of the joined map: of both, where the stricter policy is bounded, else none.
+// The bounds of the joined map: those of both maps if the stricter policy is bounded, else none.
 std::optional<Bounds> JoinedBounds(const StoredMap& into, const StoredMap& from,
                                    const engine::Sim3& into_from_from);
 

@@ -23,14 +23,15 @@ namespace docent::maps {
 
 namespace {
 
-// A keyframe that was taken inside the bounds may be moved a little by an adjustment before it is saved.
-constexpr double kBoundsSlack = 0.05;  // of the bounds' diagonal
+// Bundle adjustment may move a keyframe slightly after it was accepted inside the bounds and before it is
+// saved.
+constexpr double kBoundsSlack = 0.05;  // Ratio of the bounds' diagonal.
 
 void CheckName(const std::string& name) {
   const bool printable = std::none_of(
       name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
   if (name.empty() || name.size() > kMaxMapNameBytes || !printable) {
-    throw Error("a map's name has 1 to " + std::to_string(kMaxMapNameBytes) +
+    throw Error("a map's name must have 1 to " + std::to_string(kMaxMapNameBytes) +
                 " bytes and no control characters");
   }
 }
@@ -43,7 +44,7 @@ MapParts PartsOf(const engine::MapSnapshot& snapshot) {
 ScenePart PartOf(const SceneRecord& scene) {
   ScenePart part{scene.text, {}};
   for (const AssetRecord& asset : scene.assets) {
-    // Two things in a scene may show one asset.
+    // Several entities of a scene may use the same asset.
     if (std::find(part.asset_ids.begin(), part.asset_ids.end(), asset.id) == part.asset_ids.end()) {
       part.asset_ids.push_back(asset.id);
     }
@@ -56,15 +57,15 @@ std::optional<Bounds> BoundsOf(const MapParts& parts) {
   for (const StoredKeyFrame& stored : parts.keyframes) map.keyframes.push_back(stored.keyframe);
   map.points = parts.points;
   const std::optional<Bounds> bounds = ComputeBounds(map);
-  if (!bounds) throw Error("a map without keyframes cannot be bounded; build it first");
+  if (!bounds) throw Error("a map without keyframes cannot be bounded; build the map first");
   return bounds;
 }
 
 void CheckNewKeyFramesInside(const MapInfo& info, const MapParts& stored, const MapParts& wanted) {
-  if (!info.bounds) throw Error("it is bounded but has no bounds; set its policy again");
+  if (!info.bounds) throw Error("its policy is bounded but it has no bounds; set the policy again");
   std::unordered_set<engine::KeyFrameId> known;
   for (const StoredKeyFrame& keyframe : stored.keyframes) known.insert(keyframe.keyframe.id);
-  const Bounds allowed = Grown(*info.bounds, kBoundsSlack);
+  const Bounds allowed = Expanded(*info.bounds, kBoundsSlack);
   for (const StoredKeyFrame& keyframe : wanted.keyframes) {
     if (known.contains(keyframe.keyframe.id) ||
         KeyFrameAllowed(Policy::kBounded, allowed, keyframe.keyframe.camera_from_map.OriginInSource())) {
@@ -77,7 +78,7 @@ void CheckNewKeyFramesInside(const MapInfo& info, const MapParts& stored, const 
 
 [[noreturn]] void Refuse(Policy policy, const std::string& what) {
   throw Error(std::string("its policy is ") + ToString(policy) + ", so " + what +
-              "; set another policy first to change that");
+              "; change its policy first");
 }
 
 WallTime SystemTime() {
@@ -113,7 +114,7 @@ class Library::Impl {
     }
   }
 
-  // Runs `body` in a transaction that sees one state of the file.
+  // Runs `body` in a read transaction, which sees one consistent state of the file.
   template <typename Body>
   auto Read(const Body& body) {
     std::scoped_lock lock(mutex_);
@@ -122,10 +123,10 @@ class Library::Impl {
     return body();
   }
 
-  // Runs `body` in a transaction that is committed when it answers that it changed something.
+  // Runs `body` in a transaction and commits it if `body` returns that something changed.
   void Write(const std::function<bool()>& body) {
     std::scoped_lock lock(mutex_);
-    if (database_.read_only()) throw Error(database_.file() + " was opened read only and cannot be changed");
+    if (database_.read_only()) throw Error(database_.file() + " was opened read-only and cannot be changed");
     Transaction transaction(database_, Transaction::Kind::kWrite);
     if (body()) transaction.Commit();
   }
@@ -144,14 +145,14 @@ class Library::Impl {
 
   void CheckNameIsFree(const std::string& name, std::uint64_t key) const {
     const auto other = FindMapByName(database_, name);
-    if (other && *other != key) throw Error("there is another map of the name '" + name + "'");
+    if (other && *other != key) throw Error("there is already a map named '" + name + "'");
   }
 
   void Create(const MapRecord& record) {
     CheckName(record.name);
     CheckNameIsFree(record.name, record.key);
     LibraryRow library = ReadLibraryRow(database_);
-    if (record.key >= library.next_key) throw Error("its key was not given out by this library");
+    if (record.key >= library.next_key) throw Error("its key was not issued by this library");
     ++library.map_count;
     WriteLibraryRow(database_, library);
     MapInfo info;
@@ -169,7 +170,7 @@ class Library::Impl {
     WriteMapRow(database_, info);
   }
 
-  // True when something was changed.
+  // Returns whether something changed.
   bool Update(const MapRecord& record, MapInfo info) {
     bool changed = false;
     if (record.snapshot) changed |= UpdateStructure(*record.snapshot, &info);
@@ -188,7 +189,7 @@ class Library::Impl {
           info->next_keyframe == snapshot.next_keyframe && info->next_point == snapshot.next_point;
       if (same_ids || !MayChangeStructure(info->policy)) return false;
     }
-    if (!MayChangeStructure(info->policy)) Refuse(info->policy, "its keyframes and points stay as they are");
+    if (!MayChangeStructure(info->policy)) Refuse(info->policy, "its keyframes and points cannot be changed");
     if (info->policy == Policy::kBounded) CheckNewKeyFramesInside(*info, stored, wanted);
     WriteStructure(snapshot, wanted, stored.keyframes, info);
     return true;
@@ -211,22 +212,22 @@ class Library::Impl {
 
   bool UpdateScene(const SceneRecord& scene, const MapInfo& info) {
     if (ReadScenePart(database_, info.key) == PartOf(scene)) return false;
-    if (!MayChangeContent(info.policy)) Refuse(info.policy, "its content stays as it is");
+    if (!MayChangeContent(info.policy)) Refuse(info.policy, "its content cannot be changed");
     WriteScene(info.key, scene);
     RemoveUnusedAssets(database_);
     return true;
   }
 
-  // Of two maps and all that point to them.
+  // Joins two maps and redirects everything that refers to the removed one.
   void Join(const JoinRecord& record) {
     for (const MapInfo& info : {record.into, record.from}) {
-      WithPlace(database_, info, [&] {
-        if (!MayChangeStructure(info.policy)) Refuse(info.policy, "it may not be joined with another map");
+      WithMapContext(database_, info, [&] {
+        if (!MayChangeStructure(info.policy)) Refuse(info.policy, "it cannot be joined with another map");
       });
     }
     for (MapInfo info : ReadMapRows(database_)) {
       if (info.key == record.into.key || info.key == record.from.key || !record.redirect) continue;
-      WithPlace(database_, info, [&] {
+      WithMapContext(database_, info, [&] {
         ScenePart scene = ReadScenePart(database_, info.key);
         const std::optional<std::string> text = record.redirect(scene.text);
         if (!text) return;
@@ -250,12 +251,12 @@ class Library::Impl {
     RemoveMap(record.from.key);
   }
 
-  // False where it is gone already.
+  // Returns false if the map no longer exists.
   bool RemoveJoined(std::uint64_t key) {
     const std::optional<MapInfo> info = ReadMapRow(database_, key);
     if (!info) return false;
-    WithPlace(database_, *info, [&] {
-      if (!MayRemove(info->policy)) Refuse(info->policy, "it may not become a part of another map");
+    WithMapContext(database_, *info, [&] {
+      if (!MayRemove(info->policy)) Refuse(info->policy, "it cannot be joined into another map");
     });
     RemoveMap(key);
     return true;
@@ -278,7 +279,7 @@ class Library::Impl {
   const LibraryOptions& options() const { return options_; }
 
  private:
-  std::mutex mutex_;  // held during each call: one connection, one transaction at a time
+  std::mutex mutex_;  // Held during each call: one connection, one transaction at a time.
   Database database_;
   LibraryOptions options_;
 };
@@ -310,7 +311,7 @@ MapInfo Library::Find(std::uint64_t key) const {
 MapInfo Library::FindByName(const std::string& name) const {
   return impl_->Read([&] {
     if (const auto key = FindMapByName(impl_->database(), name)) return impl_->Get(*key);
-    throw Error(file() + " has no map of the name '" + name + "'");
+    throw Error(file() + " has no map named '" + name + "'");
   });
 }
 
@@ -318,7 +319,7 @@ StoredMap Library::Load(std::uint64_t key) const {
   return impl_->Read([&] {
     StoredMap map;
     map.info = impl_->Get(key);
-    WithPlace(impl_->database(), map.info, [&] {
+    WithMapContext(impl_->database(), map.info, [&] {
       map.snapshot = ReadSnapshot(impl_->database(), map.info, impl_->options().make_features,
                                   impl_->options().load_threads);
       map.scene = impl_->ReadScene(key);
@@ -330,18 +331,18 @@ StoredMap Library::Load(std::uint64_t key) const {
 SceneRecord Library::LoadScene(std::uint64_t key) const {
   return impl_->Read([&] {
     SceneRecord scene;
-    WithPlace(impl_->database(), impl_->Get(key), [&] { scene = impl_->ReadScene(key); });
+    WithMapContext(impl_->database(), impl_->Get(key), [&] { scene = impl_->ReadScene(key); });
     return scene;
   });
 }
 
-void Library::LoadAppearance(const TakeLooks& take) const {
+void Library::LoadAppearance(const TakeAppearance& take) const {
   impl_->Read([&] {
     for (const MapInfo& info : ReadMapRows(impl_->database())) {
       Appearance appearance;
       const auto attempt = [&](const std::function<void()>& read) {
         try {
-          WithPlace(impl_->database(), info, read);
+          WithMapContext(impl_->database(), info, read);
         } catch (const Error& error) {
           appearance.problem = error.what();
         }
@@ -377,13 +378,13 @@ bool Library::Save(const MapRecord& record) {
   impl_->Write([&] {
     const std::optional<MapInfo> info =
         record.key == 0 ? std::nullopt : ReadMapRow(impl_->database(), record.key);
-    wanted = !record.over_revision || (info && info->revision == *record.over_revision);
+    wanted = !record.expected_revision || (info && info->revision == *record.expected_revision);
     if (!wanted) return false;
     MapInfo place;
     place.key = record.key;
     place.name = record.name;
     bool changed = true;
-    WithPlace(impl_->database(), info ? *info : place, [&] {
+    WithMapContext(impl_->database(), info ? *info : place, [&] {
       if (record.key == 0) throw Error("it has no key; ask the library for one");
       if (info) {
         changed = impl_->Update(record, *info);
@@ -391,7 +392,7 @@ bool Library::Save(const MapRecord& record) {
         impl_->Create(record);
       }
     });
-    for (const std::uint64_t key : record.holds) changed |= impl_->RemoveJoined(key);
+    for (const std::uint64_t key : record.joined_keys) changed |= impl_->RemoveJoined(key);
     return changed;
   });
   return wanted;
@@ -401,8 +402,8 @@ void Library::Rename(std::uint64_t key, const std::string& name) {
   impl_->Write([&] {
     MapInfo info = impl_->Get(key);
     if (info.name == name) return false;
-    WithPlace(impl_->database(), info, [&] {
-      if (!MayChangeContent(info.policy)) Refuse(info.policy, "its name stays as it is");
+    WithMapContext(impl_->database(), info, [&] {
+      if (!MayChangeContent(info.policy)) Refuse(info.policy, "it cannot be renamed");
       CheckName(name);
       impl_->CheckNameIsFree(name, key);
     });
@@ -416,8 +417,8 @@ void Library::Rename(std::uint64_t key, const std::string& name) {
 void Library::Remove(std::uint64_t key) {
   impl_->Write([&] {
     const MapInfo info = impl_->Get(key);
-    WithPlace(impl_->database(), info, [&] {
-      if (!MayRemove(info.policy)) Refuse(info.policy, "it may not be removed");
+    WithMapContext(impl_->database(), info, [&] {
+      if (!MayRemove(info.policy)) Refuse(info.policy, "it cannot be removed");
     });
     impl_->RemoveMap(key);
     return true;
@@ -428,7 +429,7 @@ void Library::SetPolicy(std::uint64_t key, Policy policy) {
   impl_->Write([&] {
     MapInfo info = impl_->Get(key);
     if (info.policy == policy) return false;
-    WithPlace(impl_->database(), info, [&] {
+    WithMapContext(impl_->database(), info, [&] {
       if (policy == Policy::kOpen) info.bounds.reset();
       if (policy == Policy::kBounded && !info.bounds)
         info.bounds = BoundsOf(ReadParts(impl_->database(), info));

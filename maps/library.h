@@ -14,15 +14,16 @@
 #include "maps/thumbnail_array.h"
 #include "maps/word_rows.h"
 
-// A library of maps: one SQLite file, NAME.docent (maps/README.md describes it).
+// A library of maps: one SQLite file, NAME.docent, which maps/README.md describes.
 //
-// What holds: each save is one transaction, on disk when the call returns; a process that is killed at any
-// moment loses at most the save that it was in. What is read was checked, value by value. Policies are
-// enforced here, whoever calls. A library opened read only changes nothing, and sees what an author in
-// another process saves meanwhile. Faults throw docent::Error: one sentence that begins with the file's name.
+// Guarantees: each save is one transaction that is on disk when the call returns, so a process that is killed
+// loses at most the current save. Every value that is read is validated. The library enforces the policies
+// for all callers. A library that was opened read-only is never modified, and it shows what another process
+// saves in the meantime. Errors throw docent::Error with a one-sentence message that begins with the file's
+// name.
 //
-// Any thread may call any function; calls wait for each other, and a large save takes a while, so that
-// threads with a frame to draw leave saving to maps::Saver.
+// All functions are thread-safe and are executed one at a time. A large save takes long, so real-time threads
+// use maps::Saver instead.
 namespace docent::maps {
 
 inline constexpr std::size_t kMaxMapNameBytes = 200;
@@ -30,14 +31,14 @@ inline constexpr std::size_t kMaxMapNameBytes = 200;
 enum class Access { kReadOnly, kReadWrite };
 enum class CreateIfMissing { kNo, kYes };
 
-// Makes of a stored image (CV_8UC1) what an engine needs of a keyframe. Called from several threads at
-// once.
+// Computes the features that the engine needs from a keyframe's stored image (CV_8UC1). Called concurrently
+// from several threads.
 using FeatureMaker = std::function<std::shared_ptr<const engine::ImageFeatures>(const cv::Mat& gray)>;
 
 struct LibraryOptions {
-  std::function<WallTime()> clock;  // for created and modified; the system's when empty
-  FeatureMaker make_features;       // engine::MakeFeatures when empty
-  int load_threads = 0;             // that decode images; 0: one a processor, at most 8
+  std::function<WallTime()> clock;  // For the creation and modification times; the system clock if empty.
+  FeatureMaker make_features;       // engine::MakeFeatures if empty.
+  int load_threads = 0;             // Threads that decode images; 0 means one per processor, at most 8.
 };
 
 class Library {
@@ -49,45 +50,46 @@ class Library {
   ~Library();
 
   Access access() const;
-  const std::string& file() const;  // as it was named to Open
+  const std::string& file() const;  // The path that was passed to Open.
 
-  // All maps by ascending key. Reads no points and no images.
+  // Returns all maps by ascending key, without reading points or images.
   std::vector<MapInfo> List() const;
-  MapInfo Find(std::uint64_t key) const;              // throws when there is none
-  MapInfo FindByName(const std::string& name) const;  // throws when there is none
+  MapInfo Find(std::uint64_t key) const;              // Throws if there is no such map.
+  MapInfo FindByName(const std::string& name) const;  // Throws if there is no such map.
   StoredMap Load(std::uint64_t key) const;
   SceneRecord LoadScene(std::uint64_t key) const;
-  // Hands out what a place index needs of every map, by ascending key: a few kilobytes a keyframe, without
-  // touching points or images. What is damaged is told as an empty list and a sentence.
+  // Passes the appearance of every map, which a place index needs, to `take` by ascending key. It has a few
+  // kilobytes per keyframe and is read without points or images. For a damaged table the list is empty and
+  // `problem` describes the error.
   struct Appearance {
     std::vector<KeyFrameThumbnail> thumbnails;
-    std::vector<KeyFrameWords> words;  // empty also where none are known, see ReadWords
+    std::vector<KeyFrameWords> words;  // Also empty when no words are stored; see ReadWords.
     std::string problem;
   };
-  using TakeLooks = std::function<void(const MapInfo& info, Appearance appearance)>;
-  void LoadAppearance(const TakeLooks& take) const;
+  using TakeAppearance = std::function<void(const MapInfo& info, Appearance appearance)>;
+  void LoadAppearance(const TakeAppearance& take) const;
 
-  // A key that no map of this library has or ever had; reserved on disk, so that two processes never share
-  // one.
+  // Returns a key that no map of this library has or ever had. It is reserved on disk, so that two processes
+  // never get the same one.
   std::uint64_t NewKey();
-  // Adds a map or brings it up to date; see MapRecord and the table in policy.h. What is unchanged costs
-  // nothing on disk: images of keyframes that are stored already are kept as they are. Maps that it holds
-  // now (MapRecord::holds) are removed in the same transaction. False, and nothing was written, when the
-  // stored revision is not the one that the record wants.
+  // Adds or updates a map; see MapRecord and the table in policy.h. Unchanged parts, such as the images of
+  // stored keyframes, are not rewritten. Maps that were joined into this one (MapRecord::joined_keys) are
+  // removed in the same transaction. Returns false, and writes nothing, when the stored revision is not
+  // MapRecord::expected_revision.
   bool Save(const MapRecord& record);
   void Rename(std::uint64_t key, const std::string& name);
   void Remove(std::uint64_t key);
-  // The only way to loosen a policy. `bounded` fixes the bounds from what the map holds, unless it was
-  // bounded before and not opened since.
+  // The only way to relax a policy. Setting `bounded` computes the bounds from the map's contents, unless it
+  // was bounded before and has not been open since.
   void SetPolicy(std::uint64_t key, Policy policy);
 
-  // Carries out in one transaction what joins two maps: `into` gets snapshot, scene and the stricter policy,
-  // the scenes of the other maps are redirected, and `from` is removed. Both policies must allow that
-  // keyframes and points change, and those of maps whose scenes are redirected that their content does.
-  // False, and nothing was written, when one of the two is no more as it was loaded.
+  // Executes a join in one transaction: `into` gets the snapshot, the scene and the stricter policy,
+  // signposts in other maps are redirected, and `from` is removed. The policies of both maps must allow
+  // changes to keyframes and points, and those of the maps whose scenes are redirected must allow changes to
+  // content. Returns false, and writes nothing, when one of the two maps has changed since it was loaded.
   bool Join(const JoinRecord& record);
 
-  // Reads everything and says what is wrong, a sentence each; empty when all is well.
+  // Reads and validates everything. Returns one sentence for each error; empty if there is none.
   std::vector<std::string> Verify() const;
 
  private:

@@ -40,7 +40,7 @@ struct Change {
   std::size_t keyframes_removed = 0, observations_of_keyframes = 0;
 };
 
-// Of a map that nobody is in: its newest keyframes are no more its frontier than the others.
+// No camera is in an idle map, so its newest keyframes are treated like the others.
 void CullRedundantKeyFrame(const std::atomic<bool>* interrupt, engine::Map* map, Change* change) {
   while (!interrupt || !*interrupt) {
     const engine::KeyFrameId id = engine::FindRedundantKeyFrame({}, engine::kNoId, map);
@@ -51,18 +51,18 @@ void CullRedundantKeyFrame(const std::atomic<bool>* interrupt, engine::Map* map,
   }
 }
 
-// Both adjustments and the refinding between them.
+// Two bundle adjustments, with guided matching between them.
 Change Adjust(const std::atomic<bool>* interrupt, engine::Map* map) {
   using Outcome = Optimization::Outcome;
-  // Nobody waits for it: it goes on until it has converged, or nearly.
+  // There is no time limit, so the adjustment runs until it has nearly converged.
   engine::MapAdjustmentOptions options;
   options.global_iterations = 40;
   const std::size_t points = map->AlivePoints();
   Change change;
   engine::PointSearcher searcher;
-  double gained = 0, cost = 0;
+  double cost_reduction = 0, cost = 0;
   int outliers = 0;
-  for (const bool refind : {false, true}) {
+  for (const bool guided_matching : {false, true}) {
     if (guided_matching) {
       std::vector<engine::KeyFrameId> ids;
       for (const auto& [id, record] : map->keyframes()) ids.push_back(id);
@@ -83,7 +83,7 @@ Change Adjust(const std::atomic<bool>* interrupt, engine::Map* map) {
     if (summary.outcome == engine::BundleSummary::Outcome::kFailed) return change;
     if (!guided_matching) {
       cost = summary.initial_cost;
-      gained = summary.initial_cost - summary.final_cost;
+      cost_reduction = summary.initial_cost - summary.final_cost;
     }
     outliers += summary.outliers;
   }
@@ -93,13 +93,13 @@ Change Adjust(const std::atomic<bool>* interrupt, engine::Map* map) {
     change.outcome = Outcome::kInterrupted;
     return change;
   }
-  // Saving what moved by nothing that counts would only wear the disk. What was found and did not hold is
-  // nothing either.
-  constexpr double kWorthwhile = 1e-6;
+  // Saving a negligible improvement would only wear the disk. Observations that were added and then rejected
+  // as outliers do not count as a change.
+  constexpr double kMinCostReduction = 1e-6;  // Ratio of the initial cost.
   const bool same_observations =
       static_cast<std::size_t>(outliers) == change.found && same_points && change.keyframes_removed == 0;
-  change.outcome =
-      same_observations && gained <= kWorthwhile * cost ? Outcome::kAlreadyBest : Outcome::kAdjusted;
+  change.outcome = same_observations && cost_reduction <= kMinCostReduction * cost ? Outcome::kAlreadyOptimal
+                                                                                   : Outcome::kAdjusted;
   return change;
 }
 
@@ -143,7 +143,7 @@ Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<
   record.key = key;
   record.name = stored.info.name;
   record.snapshot = std::move(adjusted.snapshot);
-  record.over_revision = stored.info.revision;
+  record.expected_revision = stored.info.revision;
   if (move_scene) record.scene = move_scene(stored.scene, *stored.snapshot, *record.snapshot);
   if (!library->Save(record)) adjusted.optimization.outcome = Outcome::kChangedMeanwhile;
   return adjusted.optimization;

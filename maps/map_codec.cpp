@@ -17,8 +17,8 @@ namespace {
 using engine::CameraModel;
 using engine::LensModel;
 
-constexpr double kUnitTolerance = 1e-6;  // of a stored quaternion's length
-constexpr double kSameRotation = 1e-12;  // of a quaternion's entries
+constexpr double kUnitTolerance = 1e-6;  // Tolerance of a stored quaternion's length.
+constexpr double kSameRotation = 1e-12;  // Tolerance of a quaternion's coefficients.
 
 bool SameKeyFrame(const StoredKeyFrame& stored_a, const StoredKeyFrame& stored_b) {
   const engine::KeyFrame& a = stored_a.keyframe;
@@ -63,16 +63,16 @@ StoredKeyFrame DecodeKeyFrame(ByteReader& reader, const CameraTable& cameras) {
   const std::string name = "keyframe " + std::to_string(keyframe.id);
   const auto kind = reader.Get<std::uint8_t>();
   if (kind > static_cast<std::uint8_t>(engine::KeyFrameKind::kPanorama))
-    throw Error(name + " is of no known kind");
+    throw Error(name + " is of an unknown kind");
   keyframe.kind = static_cast<engine::KeyFrameKind>(kind);
   const auto fixed = reader.Get<std::uint8_t>();
-  if (fixed > 1) throw Error(name + " has flags that this program does not know");
+  if (fixed > 1) throw Error(name + " has unknown flags");
   keyframe.fixed = fixed == 1;
   const auto camera = reader.Get<std::uint32_t>();
-  if (camera >= cameras.size()) throw Error(name + " names a camera that is not there");
+  if (camera >= cameras.size()) throw Error(name + " refers to a camera that does not exist");
   keyframe.camera = cameras[camera];
   keyframe.time = Timestamp(reader.Get<std::int64_t>());
-  const Eigen::Quaterniond rotation(reader.GetAll<Eigen::Vector4d>());  // x y z w
+  const Eigen::Quaterniond rotation(reader.GetAll<Eigen::Vector4d>());  // Order x y z w.
   if (!rotation.coeffs().allFinite() || std::abs(rotation.norm() - 1) > kUnitTolerance) {
     throw Error(name + " has no valid rotation");
   }
@@ -98,7 +98,7 @@ std::vector<StoredKeyFrame> MakeStoredKeyFrames(const engine::MapSnapshot& snaps
   std::vector<StoredKeyFrame> keyframes;
   keyframes.reserve(snapshot.keyframes.size());
   for (const engine::KeyFrame& keyframe : snapshot.keyframes) {
-    keyframe.features->Look();
+    keyframe.features->MarkInUse();
     StoredKeyFrame stored{keyframe, ImageHash(keyframe.features->levels[0])};
     stored.keyframe.features = nullptr;
     keyframes.push_back(std::move(stored));
@@ -110,7 +110,7 @@ Bytes EncodeCameras(std::uint64_t map_key, const CameraTable& cameras) {
   ByteWriter writer = BeginEnvelope(kCameraTableKind, map_key, cameras.size());
   for (const auto& camera : cameras) {
     const CameraModel::Intrinsics& intrinsics = camera->intrinsics();
-    // What could not be read back must not be written.
+    // Data that could not be read back must not be written.
     CheckImageSize("its camera", intrinsics.width_px, intrinsics.height_px);
     if (const auto problem = CameraModel::Validate(camera->lens(), intrinsics, camera->distortion())) {
       throw Error("its camera is not valid: " + *problem);
@@ -132,7 +132,8 @@ CameraTable DecodeCameras(std::uint64_t map_key, std::span<const std::uint8_t> b
   for (std::uint64_t i = 0; i < count; ++i) {
     const std::string name = "camera " + std::to_string(i);
     const auto lens = reader.Get<std::uint8_t>();
-    if (lens > static_cast<std::uint8_t>(LensModel::kKannalaBrandt)) throw Error(name + " has no known lens");
+    if (lens > static_cast<std::uint8_t>(LensModel::kKannalaBrandt))
+      throw Error(name + " has an unknown lens model");
     const auto width = reader.Get<std::uint32_t>(), height = reader.Get<std::uint32_t>();
     CheckImageSize(name, width, height);
     CameraModel::Intrinsics intrinsics;
@@ -250,7 +251,7 @@ ScenePart DecodeScene(std::uint64_t map_key, std::span<const std::uint8_t> bytes
   for (std::uint64_t i = 0; i < count; ++i) {
     std::string id = reader.GetText();
     if (id.size() < kMinAssetIdBytes || id.size() > kMaxAssetIdBytes || !seen.insert(id).second) {
-      throw Error("the scene is damaged: it names an asset without a valid id");
+      throw Error("the scene is damaged: it refers to an asset without a valid id");
     }
     scene.asset_ids.push_back(std::move(id));
   }

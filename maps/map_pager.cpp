@@ -19,10 +19,11 @@ namespace docent::maps {
 
 namespace {
 
-// Of an image of 640 x 480 with its pyramid and corners: for maps that were not read yet.
-constexpr std::size_t kUsualKeyFrameBytes = 450'000;
-// What a camera that is lost asks for changes with every image: older wishes are not worth the reading.
-constexpr std::size_t kMaxWanted = 8;
+// Estimated memory for an image of 640 x 480 with its pyramid and corners, for maps that have not been read
+// yet.
+constexpr std::size_t kTypicalKeyFrameBytes = 450'000;
+// The requests of a lost camera change with every image, so older requests are not worth reading.
+constexpr std::size_t kMaxQueuedLoads = 8;
 
 }  // namespace
 
@@ -48,8 +49,8 @@ class MapPager::Impl {
 
   std::vector<MapInfo> Open();
   void Load(std::uint64_t key);
-  void Expect(const std::vector<std::uint64_t>& keys);
-  void Hold(const std::vector<std::uint64_t>& keys);
+  void Prefetch(const std::vector<std::uint64_t>& keys);
+  void Pin(const std::vector<std::uint64_t>& keys);
   std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
                                                  std::uint64_t only_map);
   std::size_t bytes_in_memory() const {
@@ -58,21 +59,23 @@ class MapPager::Impl {
   }
   std::vector<std::uint64_t> maps_in_memory() const {
     const std::scoped_lock lock(mutex_);
-    return {uses_.begin(), uses_.end()};
+    return {recently_used_.begin(), recently_used_.end()};
   }
 
  private:
   struct Resident {
     std::size_t bytes = 0;
-    std::list<std::uint64_t>::iterator use;  // in uses_
+    std::list<std::uint64_t>::iterator use;  // Position in recently_used_.
   };
   void Run(const std::stop_token& stop);
-  void Read(std::uint64_t key);  // the whole way of one map into memory
+  void Read(std::uint64_t key);  // Reads one map and adds it to the index.
   void TryLoad(std::uint64_t key);
   void MakeRoom();
-  // With mutex_ held.
-  bool Known(std::uint64_t key) const { return resident_.contains(key) || unreadable_.contains(key); }
-  void Want(std::uint64_t key, bool urgent);
+  // Requires mutex_.
+  bool IsResidentOrUnreadable(std::uint64_t key) const {
+    return resident_.contains(key) || unreadable_.contains(key);
+  }
+  void Enqueue(std::uint64_t key, bool urgent);
   void Touch(std::uint64_t key);
 
   const Library* const library_;
@@ -80,15 +83,15 @@ class MapPager::Impl {
   const PagerOptions options_;
   const Callbacks callbacks_;
 
-  std::mutex reading_;        // held by whoever reads a map; taken before mutex_
-  mutable std::mutex mutex_;  // guards what follows; not held while reading or calling back
+  std::mutex reading_mutex_;  // Held by the thread that reads a map; taken before mutex_.
+  mutable std::mutex mutex_;  // Guards the fields below; not held while reading or in a callback.
   std::condition_variable_any changed_;
-  std::list<std::uint64_t> uses_;  // keys in memory, the most recently used first
+  std::list<std::uint64_t> recently_used_;  // Keys of the maps in memory, the most recently used first.
   std::map<std::uint64_t, Resident> resident_;
-  std::deque<std::uint64_t> wanted_;  // to be read, the most wanted first
-  std::set<std::uint64_t> held_, unreadable_;
+  std::deque<std::uint64_t> load_queue_;  // Keys of the maps to read, the most urgent first.
+  std::set<std::uint64_t> pinned_, unreadable_;
   std::size_t bytes_ = 0;
-  std::optional<Worker> worker_;  // last: it uses the rest
+  std::optional<Worker> worker_;  // Declared last, because it uses the other fields.
 };
 
 std::vector<MapInfo> MapPager::Impl::Open() {
@@ -98,10 +101,10 @@ std::vector<MapInfo> MapPager::Impl::Open() {
   index_->Reserve(keyframes);
   library_->LoadAppearance([&](const MapInfo& info, const Library::Appearance& appearance) {
     index_->SetAppearance(info.key, appearance.thumbnails, appearance.words);
-    // It is hard to find by what it appearance like; by its name it can be found.
+    // Such a map cannot be found by its appearance, but it can still be loaded by name.
     if (!appearance.problem.empty() && callbacks_.failed) callbacks_.failed(info.key, appearance.problem);
   });
-  if (keyframes * kUsualKeyFrameBytes <= std::min(options_.read_at_start_bytes, options_.budget_bytes)) {
+  if (keyframes * kTypicalKeyFrameBytes <= std::min(options_.read_at_start_bytes, options_.budget_bytes)) {
     for (const MapInfo& info : infos) Load(info.key);
   }
   if (!options_.wait_for_maps) {
@@ -112,29 +115,29 @@ std::vector<MapInfo> MapPager::Impl::Open() {
 
 void MapPager::Impl::Touch(std::uint64_t key) {
   if (const auto found = resident_.find(key); found != resident_.end())
-    uses_.splice(uses_.begin(), uses_, found->second.use);
+    recently_used_.splice(recently_used_.begin(), recently_used_, found->second.use);
 }
 
-void MapPager::Impl::Want(std::uint64_t key, bool urgent) {
-  if (Known(key)) return;
-  const auto waiting = std::find(wanted_.begin(), wanted_.end(), key);
-  if (waiting != wanted_.end()) {
+void MapPager::Impl::Enqueue(std::uint64_t key, bool urgent) {
+  if (IsResidentOrUnreadable(key)) return;
+  const auto waiting = std::find(load_queue_.begin(), load_queue_.end(), key);
+  if (waiting != load_queue_.end()) {
     if (!urgent) return;
-    wanted_.erase(waiting);
+    load_queue_.erase(waiting);
   }
   if (urgent) {
-    wanted_.push_front(key);
+    load_queue_.push_front(key);
   } else {
-    wanted_.push_back(key);
+    load_queue_.push_back(key);
   }
-  if (wanted_.size() > kMaxWanted) wanted_.pop_back();
+  if (load_queue_.size() > kMaxQueuedLoads) load_queue_.pop_back();
 }
 
 void MapPager::Impl::Run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  while (changed_.wait(lock, stop, [this] { return !wanted_.empty(); }) && !stop.stop_requested()) {
-    const std::uint64_t key = wanted_.front();
-    wanted_.pop_front();
+  while (changed_.wait(lock, stop, [this] { return !load_queue_.empty(); }) && !stop.stop_requested()) {
+    const std::uint64_t key = load_queue_.front();
+    load_queue_.pop_front();
     lock.unlock();
     TryLoad(key);
     lock.lock();
@@ -142,7 +145,7 @@ void MapPager::Impl::Run(const std::stop_token& stop) {
 }
 
 void MapPager::Impl::Read(std::uint64_t key) {
-  const std::scoped_lock reading(reading_);
+  const std::scoped_lock reading(reading_mutex_);
   {
     const std::scoped_lock lock(mutex_);
     if (resident_.contains(key)) return Touch(key);
@@ -160,8 +163,8 @@ void MapPager::Impl::Read(std::uint64_t key) {
   }
   {
     const std::scoped_lock lock(mutex_);
-    uses_.push_front(key);
-    resident_[key] = {bytes, uses_.begin()};
+    recently_used_.push_front(key);
+    resident_[key] = {bytes, recently_used_.begin()};
     bytes_ += bytes;
   }
   MakeRoom();
@@ -183,66 +186,67 @@ void MapPager::Impl::TryLoad(std::uint64_t key) {
   }
 }
 
-// With reading_ held, so that nobody reads a map that is just let go.
+// Requires reading_mutex_, so that no thread reads a map while it is evicted.
 void MapPager::Impl::MakeRoom() {
   std::vector<std::uint64_t> oldest_first;
   {
     const std::scoped_lock lock(mutex_);
     if (bytes_ <= options_.budget_bytes) return;
-    // The one that was just read stays, or it would be read again at once.
-    for (auto use = uses_.rbegin(); use != uses_.rend() && *use != uses_.front(); ++use) {
-      if (!held_.contains(*use)) oldest_first.push_back(*use);
+    // The map that was just read stays; otherwise it would be read again at once.
+    for (auto use = recently_used_.rbegin(); use != recently_used_.rend() && *use != recently_used_.front();
+         ++use) {
+      if (!pinned_.contains(*use)) oldest_first.push_back(*use);
     }
   }
   for (const std::uint64_t key : oldest_first) {
     {
       const std::scoped_lock lock(mutex_);
       if (bytes_ <= options_.budget_bytes) return;
-      if (held_.contains(key)) continue;
+      if (pinned_.contains(key)) continue;
     }
-    if (callbacks_.let_go && !callbacks_.let_go(key)) continue;
+    if (callbacks_.evict && !callbacks_.evict(key)) continue;
     index_->ReleaseMap(key);
     const std::scoped_lock lock(mutex_);
     const auto found = resident_.find(key);
     bytes_ -= found->second.bytes;
-    uses_.erase(found->second.use);
+    recently_used_.erase(found->second.use);
     resident_.erase(found);
   }
 }
 
-void MapPager::Impl::Expect(const std::vector<std::uint64_t>& keys) {
+void MapPager::Impl::Prefetch(const std::vector<std::uint64_t>& keys) {
   if (options_.wait_for_maps) return;
   {
     const std::scoped_lock lock(mutex_);
     for (const std::uint64_t key : keys) {
       Touch(key);
-      Want(key, false);
+      Enqueue(key, false);
     }
   }
   changed_.notify_all();
 }
 
-void MapPager::Impl::Hold(const std::vector<std::uint64_t>& keys) {
+void MapPager::Impl::Pin(const std::vector<std::uint64_t>& keys) {
   const std::scoped_lock lock(mutex_);
-  held_ = {keys.begin(), keys.end()};
+  pinned_ = {keys.begin(), keys.end()};
   for (const std::uint64_t key : keys) Touch(key);
 }
 
 std::vector<engine::PlaceCandidate> MapPager::Impl::FindPlaces(const engine::PlaceQuery& query, int count,
                                                                int per_map, std::uint64_t only_map) {
   std::vector<engine::PlaceCandidate> candidates = index_->FindPlaces(query, count, per_map, only_map);
-  std::vector<std::uint64_t> missing;  // the most alike first
+  std::vector<std::uint64_t> missing;  // The most similar first.
   {
     const std::scoped_lock lock(mutex_);
     for (auto candidate = candidates.rbegin(); candidate != candidates.rend(); ++candidate)
       Touch(candidate->map_key);
     for (const engine::PlaceCandidate& candidate : candidates) {
-      if (candidate.map || Known(candidate.map_key)) continue;
+      if (candidate.map || IsResidentOrUnreadable(candidate.map_key)) continue;
       if (std::find(missing.begin(), missing.end(), candidate.map_key) == missing.end())
         missing.push_back(candidate.map_key);
     }
     if (!options_.wait_for_maps) {
-      for (auto key = missing.rbegin(); key != missing.rend(); ++key) Want(*key, true);
+      for (auto key = missing.rbegin(); key != missing.rend(); ++key) Enqueue(*key, true);
     }
   }
   if (!missing.empty()) {
@@ -268,11 +272,11 @@ std::vector<MapInfo> MapPager::Open() {
 void MapPager::Load(std::uint64_t key) {
   impl_->Load(key);
 }
-void MapPager::Expect(const std::vector<std::uint64_t>& keys) {
-  impl_->Expect(keys);
+void MapPager::Prefetch(const std::vector<std::uint64_t>& keys) {
+  impl_->Prefetch(keys);
 }
-void MapPager::Hold(const std::vector<std::uint64_t>& keys) {
-  impl_->Hold(keys);
+void MapPager::Pin(const std::vector<std::uint64_t>& keys) {
+  impl_->Pin(keys);
 }
 std::vector<engine::PlaceCandidate> MapPager::FindPlaces(const engine::PlaceQuery& query, int count,
                                                          int per_map, std::uint64_t only_map) const {

@@ -15,34 +15,36 @@
 namespace docent::maps {
 
 struct PagerOptions {
-  std::size_t budget_bytes = std::size_t{1} << 30;  // of maps in memory
-  // A library that is as small as this is read whole at the start: it is there before it is looked for.
+  std::size_t budget_bytes = std::size_t{1} << 30;  // Limit for the maps in memory.
+  // A library up to this size is loaded completely on opening, so that no map has to be read during
+  // relocalization.
   std::size_t read_at_start_bytes = std::size_t{256} << 20;
-  // Who asks for a place waits for its map, so that equal images give equal answers on every run; else maps
-  // are read on a thread of their own, and the answer has those that are there already.
+  // If true, a place query waits until its maps are loaded, so that equal images give equal results in every
+  // run. Otherwise a separate thread loads maps, and the result contains only those that are in memory.
   bool wait_for_maps = true;
 };
 
-// What a snapshot takes in memory, nearly: images, corners, points and observations.
+// The approximate memory of a snapshot: images, corners, points and observations.
 std::size_t BytesOf(const engine::MapSnapshot& map);
 
-// Keeps those maps of a library in memory that are used or likely to be, and lets the least recently used go
-// when there are too many. All maps are in the place index from the start, by their thumbnails. It stands
-// between a tracker and the index as the place finder: a map that a lost camera may be in is read, and is
-// among the candidates once it is there; no candidate is without its map.
+// Keeps the maps of a library that are in use or likely to be used in memory, and evicts the least recently
+// used ones when the budget is exceeded. All maps are in the place index from the start, by their appearance.
+// As a PlaceFinder it sits between the tracker and the index: it loads the maps in which a lost camera may
+// be, and returns a candidate only when its map is in memory.
 //
-// What holds: maps that are held are never let go; beside them there are at most as many as the budget
-// allows, and one more while it is read. Any thread may call anything. The callbacks come on the thread that
-// reads; they may call Hold and Expect, and may wait for whoever calls these, but not for a Load.
+// Guarantees: pinned maps are never evicted; the other maps fit the budget, except for one more while it is
+// loaded. All functions are thread-safe. The callbacks run on the loading thread; they may call Pin and
+// Prefetch and may wait for threads that call these, but must not wait for a Load.
 class MapPager : public engine::PlaceFinder {
  public:
   struct Callbacks {
-    // A map was read; it is in the index when this returns. May throw docent::Error: then it was not
-    // readable.
+    // Called when a map was read, before it is added to the index. May throw docent::Error to mark the map as
+    // unreadable.
     std::function<void(const StoredMap& map)> loaded;
-    // Whether a map may go now (false: it has changes that are not on disk). After true it is forgotten here.
-    std::function<bool(std::uint64_t key)> let_go;
-    // A map could not be read, a sentence; it is not asked for again.
+    // Asks whether a map may be evicted now; return false if it has unsaved changes. After true the pager no
+    // longer refers to it.
+    std::function<bool(std::uint64_t key)> evict;
+    // Called with a sentence when a map cannot be read; it is not requested again.
     std::function<void(std::uint64_t key, const std::string& problem)> failed;
   };
 
@@ -50,27 +52,27 @@ class MapPager : public engine::PlaceFinder {
   MapPager(const Library* library, PlaceIndex* index, const PagerOptions& options, Callbacks callbacks);
   ~MapPager() override;
 
-  // Fills the index, and reads maps as the options say. To be called once. Answers with what the library
-  // lists.
+  // Fills the index and loads maps according to the options. Call it once. Returns the library's list of
+  // maps.
   std::vector<MapInfo> Open();
 
-  // Reads a map unless it is in memory, and waits for it. Throws docent::Error when it cannot be read.
+  // Loads a map unless it is in memory, and waits for it. Throws docent::Error when it cannot be read.
   void Load(std::uint64_t key);
-  // Maps that may be wanted soon, the likeliest first; they take the place of others that were not used for
-  // longer. Does nothing when maps are waited for.
-  void Expect(const std::vector<std::uint64_t>& keys);
-  // These stay in memory until the next call.
-  void Hold(const std::vector<std::uint64_t>& keys);
+  // Loads these maps in the background because they may be needed soon, the likeliest first; the least
+  // recently used maps are evicted for them. Does nothing if PagerOptions::wait_for_maps is set.
+  void Prefetch(const std::vector<std::uint64_t>& keys);
+  // Keeps these maps in memory until the next call.
+  void Pin(const std::vector<std::uint64_t>& keys);
 
   std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
                                                  std::uint64_t only_map) const override;
 
   std::size_t bytes_in_memory() const;
-  std::vector<std::uint64_t> maps_in_memory() const;  // the most recently used first
+  std::vector<std::uint64_t> maps_in_memory() const;  // The most recently used first.
 
  private:
   class Impl;
-  const std::unique_ptr<Impl> impl_;  // changes while places are looked for
+  const std::unique_ptr<Impl> impl_;  // FindPlaces is const but changes it.
 };
 
 }  // namespace docent::maps

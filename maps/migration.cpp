@@ -17,8 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A copy that is there already is an earlier one of the same format: it is kept, because it may be the only
-// one from before something went wrong.
+// An existing copy is of the same format and is kept, because it may be the only one from before an error.
 void MakeBackup(const Database& database, std::int64_t format) {
   const fs::path path = BackupPath(fs::absolute(database.file()), format);
   std::error_code error;
@@ -33,26 +32,26 @@ void MakeBackup(const Database& database, std::int64_t format) {
     fs::remove(unfinished, error);
     throw Error(database.file() +
                 " is of an older format and cannot be upgraded, because no copy of it can be " +
-                "made beside it (" + problem.what() + "); make room there, or open it read only");
+                "made beside it (" + problem.what() + "); make room there, or open it read-only");
   }
 }
 
-// Format 2 keeps the thumbnails of each map in a row of their own, and knows panorama maps.
+// Format 2 added a table with one row of thumbnails per map, and panorama maps.
 void UpgradeToFormat2(const Database& database) {
   CreateTable(database, "thumbnails");
   for (const MapInfo& info : ReadMapRows(database)) {
-    WithPlace(database, info, [&] {
+    WithMapContext(database, info, [&] {
       WriteThumbnails(database, info.key, ThumbnailsFromImages(database, info));
       WritePanoramas(database, info.key, {});
     });
   }
 }
 
-// Format 3 keeps the words of each map's keyframes.
+// Format 3 added the words of each map's keyframes.
 void UpgradeToFormat3(const Database& database) {
   CreateTable(database, "words");
   for (const MapInfo& info : ReadMapRows(database)) {
-    WithPlace(database, info, [&] { WriteWords(database, info.key, WordsFromImages(database, info)); });
+    WithMapContext(database, info, [&] { WriteWords(database, info.key, WordsFromImages(database, info)); });
   }
 }
 
@@ -69,7 +68,7 @@ void UpgradeFormat(const Database& database) {
   if (format == kSchemaVersion) return;
   MakeBackup(database, format);
   Transaction transaction(database, Transaction::Kind::kWrite);
-  // Another process may have been faster.
+  // Another process may have upgraded the file already.
   if (SchemaVersion(database) < 2) UpgradeToFormat2(database);
   SetSchemaVersion(database, std::max<std::int64_t>(2, SchemaVersion(database)));
   if (SchemaVersion(database) < 3) UpgradeToFormat3(database);

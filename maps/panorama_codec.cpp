@@ -11,7 +11,7 @@ namespace docent::maps {
 
 namespace {
 
-// What a record says of a keyframe or point.
+// The kind of a record's keyframe or point.
 enum class Member : std::uint8_t { kKeyFrame, kInfinitePoint, kPointThatWasInfinite };
 
 void PutMember(Member kind, std::uint32_t id, std::uint32_t panorama, ByteWriter* writer) {
@@ -47,7 +47,7 @@ void ApplyMember(std::uint8_t kind, std::uint32_t id, std::uint32_t panorama, Ma
       return;
     }
   }
-  throw Error("the table of panorama maps is damaged: it names what is not there");
+  throw Error("the table of panorama maps is damaged: it refers to something that does not exist");
 }
 
 }  // namespace

@@ -14,8 +14,8 @@ constexpr std::size_t kFirstCapacity = 256;
 
 }  // namespace
 
-// The next state in the making. What is shared with earlier states stays as it is: arrays only grow behind
-// the sizes that those know, or are made anew.
+// Builds the next state. Data that is shared with earlier states is never modified: arrays grow only beyond
+// the sizes that those states use, or are reallocated.
 class PlaceIndex::Update {
  public:
   explicit Update(const State& before) : state_(std::make_shared<State>(before)) {}
@@ -34,7 +34,7 @@ class PlaceIndex::Update {
   bool Holds(const Entry& entry, const PackedThumbnail& thumbnail) const {
     return state_->Holds(entry, thumbnail);
   }
-  // The array of a size, with room for `more`.
+  // The array for this thumbnail size, with room for `more` thumbnails.
   std::uint32_t ArrayFor(int width, int height, std::size_t more) {
     std::uint32_t index = 0;
     for (; index < state_->arrays.size(); ++index) {
@@ -70,7 +70,7 @@ class PlaceIndex::Update {
   }
 
  private:
-  // Leaves out what no map owns any more.
+  // Removes the thumbnails that no map owns.
   void Compact(std::uint32_t which) {
     State::Array& array = state_->arrays[which];
     const ThumbnailArray& before = *array.thumbnails;
@@ -123,7 +123,7 @@ void PlaceIndex::SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnap
                         const std::vector<KeyFrameWords>& described) {
   if (!snapshot) return RemoveMap(key);
   if (described.empty()) {
-    // Mostly there is nothing new, and this tells so at once.
+    // Usually there is nothing new, which this finds out quickly.
     const std::vector<KeyFrameWords> own = DescribeNew(key, *snapshot);
     if (!own.empty()) return SetMap(key, std::move(snapshot), own);
   }
@@ -131,37 +131,37 @@ void PlaceIndex::SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnap
   std::scoped_lock writing(write_mutex_);
   const auto state = Current();
   const Map* const before = state->Find(key);
-  std::vector<News> news;
+  std::vector<KeyFrameUpdate> updates;
   std::vector<PackedThumbnail> packed;
   packed.reserve(snapshot->keyframes.size());
   auto words = described.begin();
   for (std::size_t i = 0; i < snapshot->keyframes.size(); ++i) {
     const engine::KeyFrame& keyframe = snapshot->keyframes[i];
-    News next;
+    KeyFrameUpdate next;
     next.keyframe = keyframe.id;
     next.place = places[i];
     next.source = keyframe.features.get();
     while (words != described.end() && words->keyframe < keyframe.id) ++words;
     if (words != described.end() && words->keyframe == keyframe.id) next.words = &words->words;
-    // A keyframe whose features the index has seen needs no packing.
+    // A keyframe whose features the index has seen already needs no new thumbnail.
     const Entry* const entry = before && before->snapshot ? before->Find(keyframe.id) : nullptr;
     if (!entry || entry->source != next.source) {
       packed.push_back(Pack(keyframe.features->small_blurry));
       if (packed.back().width == 0) continue;
       next.thumbnail = &packed.back();
     }
-    news.push_back(next);
+    updates.push_back(next);
   }
-  Replace(key, std::move(snapshot), news);
+  Replace(key, std::move(snapshot), updates);
 }
 
 void PlaceIndex::SetAppearance(std::uint64_t key, std::span<const KeyFrameThumbnail> thumbnails,
                                std::span<const KeyFrameWords> words) {
-  std::vector<News> news;
-  news.reserve(thumbnails.size());
+  std::vector<KeyFrameUpdate> updates;
+  updates.reserve(thumbnails.size());
   auto described = words.begin();
   for (const auto& [keyframe, thumbnail] : thumbnails) {
-    News next;
+    KeyFrameUpdate next;
     next.keyframe = next.place = keyframe;
     next.thumbnail = &thumbnail;
     while (described != words.end() && described->keyframe < keyframe) ++described;
@@ -169,14 +169,14 @@ void PlaceIndex::SetAppearance(std::uint64_t key, std::span<const KeyFrameThumbn
       next.place = described->place;
       next.words = &described->words;
     }
-    news.push_back(next);
+    updates.push_back(next);
   }
   std::scoped_lock writing(write_mutex_);
-  Replace(key, nullptr, news);
+  Replace(key, nullptr, updates);
 }
 
 void PlaceIndex::Replace(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot,
-                         std::span<const News> news) {
+                         std::span<const KeyFrameUpdate> updates) {
   const auto state = Current();
   const Map* const before = state->Find(key);
   Update update(*state);
@@ -184,10 +184,10 @@ void PlaceIndex::Replace(std::uint64_t key, std::shared_ptr<const engine::MapSna
   auto map = std::make_shared<Map>();
   map->key = key;
   map->snapshot = std::move(snapshot);
-  map->entries.reserve(news.size());
+  map->entries.reserve(updates.size());
   std::vector<InvertedFile::Slot> kept;
-  for (std::size_t i = 0; i < news.size(); ++i) {
-    const News& next = news[i];
+  for (std::size_t i = 0; i < updates.size(); ++i) {
+    const KeyFrameUpdate& next = updates[i];
     const Entry* const known = before ? before->Find(next.keyframe) : nullptr;
     const bool same_image = known && (!next.thumbnail || update.Holds(*known, *next.thumbnail));
     if (!same_image && !next.thumbnail) continue;
@@ -196,7 +196,7 @@ void PlaceIndex::Replace(std::uint64_t key, std::shared_ptr<const engine::MapSna
     entry.place = next.place;
     entry.source = next.source;
     if (!same_image) {
-      entry.array = update.ArrayFor(next.thumbnail->width, next.thumbnail->height, news.size() - i);
+      entry.array = update.ArrayFor(next.thumbnail->width, next.thumbnail->height, updates.size() - i);
       entry.slot = update.Append(entry.array, *next.thumbnail, {key, next.keyframe});
     }
     if (!entry.described && next.words) {
@@ -211,7 +211,8 @@ void PlaceIndex::Replace(std::uint64_t key, std::shared_ptr<const engine::MapSna
   RemoveWords(before, std::move(kept));
 }
 
-// Those of a map as it was, but these. A search that still reads the state before passes over what is gone.
+// Removes the words of a map's previous state except those in `kept`. A search that still uses that state
+// skips removed words.
 void PlaceIndex::RemoveWords(const Map* before, std::vector<InvertedFile::Slot> kept) {
   if (!before) return;
   std::sort(kept.begin(), kept.end());
@@ -230,7 +231,7 @@ void PlaceIndex::ReleaseMap(std::uint64_t key) {
   if (!before || !before->snapshot) return;
   auto map = std::make_shared<Map>(*before);
   map->snapshot.reset();
-  for (Entry& entry : map->entries) entry.source = nullptr;  // its address may be used again
+  for (Entry& entry : map->entries) entry.source = nullptr;  // The address may be reused for other features.
   Update update(*state);
   update.Remove(key);
   update.Insert(std::move(map));

@@ -14,48 +14,50 @@
 
 namespace docent::maps {
 
-// Which keyframes, of all maps, look like an image (ptamm §3.2, §3.3), in two ways: by small blurry images,
-// all of which are compared (thumbnail_array.h), and by the words of their descriptors, of which only those
-// are touched that share some (inverted_file.h). A map is known by these alone, so that all maps of a large
-// library can be searched while only few of them are in memory; whoever loads or extends a map hands its
-// newest snapshot to SetMap, whoever lets one go calls ReleaseMap.
+// Finds the keyframes of all maps whose appearance is similar to an image ([PTAMM] 3.2 and 3.3). It combines
+// two methods: small blurry images, of which all are compared (thumbnail_array.h), and visual words, of which
+// only the keyframes that share some are read (inverted_file.h). It stores only this appearance, so that all
+// maps of a large library can be searched while only few are in memory. The owner calls SetMap with the
+// newest snapshot when a map is loaded or extended, and ReleaseMap when it is evicted.
 //
-// Any thread may call anything: a search reads one immutable state of the index, which writers replace whole
-// and never wait for; the words alone are changed in place, under a lock that is held for microseconds.
+// All functions are thread-safe. A search reads one immutable state of the index; writers replace the whole
+// state and do not wait for searches. Only the words are changed in place, under a lock that is held for
+// microseconds.
 //
-// What a keyframe costs: 1.3 kB for its thumbnail in two sizes, about 1.4 kB for its words.
+// Memory per keyframe: 1.3 kB for the thumbnail in two sizes and about 1.4 kB for the words.
 class PlaceIndex : public engine::PlaceFinder {
  public:
   PlaceIndex();
   ~PlaceIndex() override;
 
-  // The words of a map's keyframes that the index does not know yet. Takes a millisecond or two a keyframe:
-  // for whoever hands a map to SetMap under a lock, to be called before.
+  // Computes the words of those keyframes of a map that the index does not have yet, in one to two
+  // milliseconds per keyframe. Call it before taking a lock under which SetMap is called.
   std::vector<KeyFrameWords> DescribeNew(std::uint64_t key, const engine::MapSnapshot& map) const;
-  // Adds a map or brings it up to date. What of its keyframes the index has already is not stored again.
-  // described: what DescribeNew said of them, or of some; the rest is described now. key > 0.
+  // Adds or updates a map. Appearance that the index already has is not stored again. `described` is the
+  // result of DescribeNew or a part of it; missing words are computed now if it is empty. key > 0.
   void SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> map,
               const std::vector<KeyFrameWords>& described = {});
-  // Adds a map that is not in memory: candidates in it have no snapshot. Both by ascending keyframe; words of
-  // keyframes without a thumbnail are passed over, and those of which no words are told are described once
-  // their map is in memory.
+  // Adds a map that is not in memory, so that its candidates have no snapshot. Both lists are ordered by
+  // ascending keyframe. Words of keyframes without a thumbnail are ignored; keyframes without words get them
+  // once their map is in memory.
   void SetAppearance(std::uint64_t key, std::span<const KeyFrameThumbnail> thumbnails,
                      std::span<const KeyFrameWords> words = {});
-  // Keeps a map's looks and lets its snapshot go.
+  // Releases a map's snapshot but keeps its appearance.
   void ReleaseMap(std::uint64_t key);
   void RemoveMap(std::uint64_t key);
-  // Makes room for this many thumbnails of images with sides as 4 to 3, so that a library is read in one
-  // go.
+  // Reserves memory for this many thumbnails of images with an aspect ratio of 4:3, so that loading a library
+  // allocates once.
   void Reserve(std::size_t keyframes);
 
   std::size_t maps() const;
   std::size_t keyframes() const;
-  std::size_t words() const { return words_.postings(); }  // of all keyframes
+  std::size_t words() const { return words_.postings(); }  // The number of words in all keyframes.
 
-  // Each way brings its best; all of these are then compared in both and ranked by the sum (see Likeness in
-  // place_ranking.h). Keyframes near each other are one place: five different places come first. Without
-  // words in the query thumbnails alone decide. PlaceCandidate::map is null where the map is not in memory.
-  // Keyframes with thumbnails of another size than the query's are found by words alone.
+  // Retrieves the best keyframes by each method, then compares all of them by both methods and ranks them by
+  // the sum (see PlaceSimilarity in place_ranking.h). Keyframes that are close together are one place; the
+  // first five results are five different places if the query asks for that. Without words in the query, only
+  // thumbnails are used. Keyframes whose thumbnails have another size than the query's are found by words
+  // alone. PlaceCandidate::map is null for maps that are not in memory.
   std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
                                                  std::uint64_t only_map) const override;
 
@@ -65,23 +67,23 @@ class PlaceIndex : public engine::PlaceFinder {
   struct State;
   class Update;
   class Merge;
-  // What is told of a keyframe when its map is set. Null: it is as the index knows it.
-  struct News {
+  // The new data of a keyframe when its map is set. Null fields keep what the index has.
+  struct KeyFrameUpdate {
     engine::KeyFrameId keyframe = engine::kNoId, place = engine::kNoId;
-    const void* source = nullptr;  // see Entry
+    const void* source = nullptr;  // See Entry.
     const PackedThumbnail* thumbnail = nullptr;
     const engine::WordBag* words = nullptr;
   };
   std::shared_ptr<const State> Current() const;
   void Publish(std::shared_ptr<const State> state);
   void Replace(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot,
-               std::span<const News> news);
+               std::span<const KeyFrameUpdate> updates);
   void RemoveWords(const Map* before, std::vector<InvertedFile::Slot> kept);
 
   InvertedFile words_;
-  std::mutex write_mutex_;              // one writer at a time
-  mutable std::mutex state_mutex_;      // held while a pointer is copied
-  std::shared_ptr<const State> state_;  // never null
+  std::mutex write_mutex_;              // Serializes writers.
+  mutable std::mutex state_mutex_;      // Held while a pointer is copied.
+  std::shared_ptr<const State> state_;  // Never null.
 };
 
 }  // namespace docent::maps

@@ -12,18 +12,18 @@ namespace docent::maps {
 
 namespace {
 
-// What the exhaustive search hands on to the fine comparison: what looks alike in cells of six image pixels
-// of eighty is looked at again in pixels of two.
-constexpr std::size_t kComparedFinely = 256;
-// As many as words bring into the comparison.
-constexpr std::size_t kByWords = 64;
-constexpr double kMostByChance = 0.9;  // of the correlation
-// The difference of thumbnails that have nothing in common.
-constexpr double kUnlike = 2.0 * kThumbnailContrast * kThumbnailContrast;
+// The number of thumbnails that the exhaustive search passes to the fine comparison. Of the 80
+// pixels of the small blurry image's width, a coarse cell covers six and a fine pixel two.
+constexpr std::size_t kFineCandidates = 256;
+// The number of candidates that the search by words contributes.
+constexpr std::size_t kWordCandidates = 64;
+constexpr double kMaxChanceCorrelation = 0.9;
+// The difference of uncorrelated thumbnails.
+constexpr double kUncorrelatedDifference = 2.0 * kThumbnailContrast * kThumbnailContrast;
 
 }  // namespace
 
-// What both ways bring, compared in both.
+// Merges the candidates of both methods and compares all of them by both.
 class PlaceIndex::Merge {
  public:
   Merge(const State& state, const InvertedFile& words) : state_(state), words_(words) {}
@@ -36,7 +36,7 @@ class PlaceIndex::Merge {
   struct Candidate {
     const Map* map = nullptr;
     const Entry* entry = nullptr;
-    double difference = kUnlike;
+    double difference = kUncorrelatedDifference;
     double words = 0;
   };
   const Entry* Find(const Map* map, engine::KeyFrameId keyframe) const {
@@ -50,9 +50,10 @@ class PlaceIndex::Merge {
   const State& state_;
   const InvertedFile& words_;
   const PackedThumbnail* thumbnail_ = nullptr;
-  const State::Array* array_ = nullptr;  // of thumbnails as large as the wanted one
+  const State::Array* array_ = nullptr;  // The thumbnails of the query's size.
   std::vector<Candidate> candidates_;
-  ChanceLevel chance_;  // what the last of so many shares that they cannot all be the place
+  // Measured at the kWordCandidates-th candidate, because so many cannot all show the place.
+  ChanceLevel chance_;
   std::unordered_set<const Entry*> known_;
 };
 
@@ -69,7 +70,7 @@ void PlaceIndex::Merge::AddByThumbnail(const PackedThumbnail& wanted, std::size_
   if (!only_map) {
     const std::size_t dead = array->size - array->alive;
     hits = array->thumbnails->Search(
-        wanted, array->size, std::max(kComparedFinely, count) + std::min(dead, kDeadThumbnailsAllowed));
+        wanted, array->size, std::max(kFineCandidates, count) + std::min(dead, kDeadThumbnailsAllowed));
   } else {
     std::vector<std::size_t> slots;
     for (const Entry& entry : only_map->entries) {
@@ -81,25 +82,26 @@ void PlaceIndex::Merge::AddByThumbnail(const PackedThumbnail& wanted, std::size_
     const ThumbnailArray::Owner owner = array->thumbnails->owner(hit.slot);
     const Map* const map = state_.Find(owner.map_key);
     const Entry* const entry = Find(map, owner.keyframe);
-    // A slot whose keyframe went, or has another image now.
+    // The keyframe in this slot was removed or has another image now.
     if (!entry || entry->array != index || entry->slot != hit.slot) continue;
     Add(map, entry, hit.difference);
-    if (!only_map && candidates_.size() == kByWords)
-      chance_.correlation = std::clamp(1 - hit.difference / kUnlike, 0.0, kMostByChance);
+    if (!only_map && candidates_.size() == kWordCandidates)
+      chance_.correlation =
+          std::clamp(1 - hit.difference / kUncorrelatedDifference, 0.0, kMaxChanceCorrelation);
   }
 }
 
 void PlaceIndex::Merge::AddByWords(const engine::WordBag& wanted, const Map* only_map) {
   const std::size_t first = candidates_.size();
   if (only_map) {
-    for (const Entry& entry : only_map->entries) Add(only_map, &entry, kUnlike);
+    for (const Entry& entry : only_map->entries) Add(only_map, &entry, kUncorrelatedDifference);
   } else {
-    const std::vector<InvertedFile::Hit> hits = words_.Search(wanted, kByWords);
-    if (hits.size() == kByWords) chance_.words = std::max(chance_.words, hits.back().score);
+    const std::vector<InvertedFile::Hit> hits = words_.Search(wanted, kWordCandidates);
+    if (hits.size() == kWordCandidates) chance_.words = std::max(chance_.words, hits.back().score);
     for (const InvertedFile::Hit& hit : hits) {
       const Map* const map = state_.Find(hit.owner.map_key);
       const Entry* const entry = Find(map, hit.owner.keyframe);
-      if (entry && entry->word_slot == hit.slot) Add(map, entry, kUnlike);
+      if (entry && entry->word_slot == hit.slot) Add(map, entry, kUncorrelatedDifference);
     }
   }
   Compare(first);
@@ -109,11 +111,11 @@ void PlaceIndex::Merge::AddByWords(const engine::WordBag& wanted, const Map* onl
   for (std::size_t i = 0; i < scores.size(); ++i) candidates_[i].words = scores[i];
 }
 
-// The thumbnails of what words alone have brought.
+// Compares the thumbnails of the candidates that were found only by words.
 void PlaceIndex::Merge::Compare(std::size_t first) {
   if (!array_) return;
   const auto index = static_cast<std::uint32_t>(array_ - state_.arrays.data());
-  std::unordered_map<std::size_t, std::size_t> candidate_at;  // by slot
+  std::unordered_map<std::size_t, std::size_t> candidate_at;  // By slot.
   std::vector<std::size_t> slots;
   for (std::size_t i = first; i < candidates_.size(); ++i) {
     if (candidates_[i].entry->array != index) continue;

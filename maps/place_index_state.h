@@ -10,29 +10,29 @@
 #include "maps/place_index.h"
 #include "maps/thumbnail_array.h"
 
-// What a place index is made of, for the two files that implement it: place_index.cpp changes it and
-// place_index_search.cpp reads it. States are shared between threads and never change once they are
-// published.
+// The data structures of the place index, shared by its two source files: place_index.cpp modifies them and
+// place_index_search.cpp reads them. States are shared between threads and are immutable once published.
 namespace docent::maps {
 
-// Slots of thumbnails that went, beside a sixteenth of all.
+// The number of unused thumbnail slots, in addition to a sixteenth of all slots, above which an array is
+// compacted.
 inline constexpr std::size_t kDeadThumbnailsAllowed = 128;
 
-// One keyframe of a map, and where its thumbnail lies.
+// A keyframe of a map and the location of its thumbnail and words.
 struct PlaceIndex::Entry {
   engine::KeyFrameId keyframe = engine::kNoId;
-  std::uint32_t array = 0;       // index in State::arrays
-  std::uint32_t slot = 0;        // in that array
-  const void* source = nullptr;  // the features it was made from, while the map holds them
+  std::uint32_t array = 0;       // Index in State::arrays.
+  std::uint32_t slot = 0;        // Slot in that array.
+  const void* source = nullptr;  // The features that it was computed from, while the map is in memory.
   engine::KeyFrameId place = engine::kNoId;
-  bool described = false;                                // its words are known
-  InvertedFile::Slot word_slot = InvertedFile::kNoSlot;  // where they are; none: it has no words
+  bool described = false;                                // Its words were computed.
+  InvertedFile::Slot word_slot = InvertedFile::kNoSlot;  // kNoSlot if it has no words.
 };
 
 struct PlaceIndex::Map {
   std::uint64_t key = 0;
-  std::shared_ptr<const engine::MapSnapshot> snapshot;  // null while it is not in memory
-  std::vector<Entry> entries;                           // by ascending keyframe
+  std::shared_ptr<const engine::MapSnapshot> snapshot;  // Null while the map is not in memory.
+  std::vector<Entry> entries;                           // By ascending keyframe.
 
   const Entry* Find(engine::KeyFrameId keyframe) const {
     const auto entry =
@@ -44,12 +44,12 @@ struct PlaceIndex::Map {
 
 struct PlaceIndex::State {
   struct Array {
-    std::shared_ptr<ThumbnailArray> thumbnails;  // changed by the writer alone, behind `size`
-    std::size_t size = 0;                        // thumbnails that this state knows of
-    std::size_t alive = 0;                       // of these, owned by a map still
+    std::shared_ptr<ThumbnailArray> thumbnails;  // Only the writer appends, beyond `size`.
+    std::size_t size = 0;                        // The number of thumbnails in this state.
+    std::size_t alive = 0;                       // The number of those that belong to a map.
   };
-  std::vector<Array> arrays;                     // one a size of thumbnail
-  std::vector<std::shared_ptr<const Map>> maps;  // by ascending key
+  std::vector<Array> arrays;                     // One for each thumbnail size.
+  std::vector<std::shared_ptr<const Map>> maps;  // By ascending key.
 
   std::size_t LowerBound(std::uint64_t key) const {
     const auto place = std::lower_bound(maps.begin(), maps.end(), key,

@@ -11,7 +11,7 @@
 
 namespace docent::maps {
 
-double Likeness(const PlaceScore& score, const ChanceLevel& chance) {
+double PlaceSimilarity(const PlaceScore& score, const ChanceLevel& chance) {
   const double correlation = 1 - score.difference / (2 * kThumbnailContrast * kThumbnailContrast);
   return std::max(0.0, (correlation - chance.correlation) / (1 - chance.correlation)) +
          std::max(0.0, score.words / chance.words - 1);
@@ -20,12 +20,12 @@ double Likeness(const PlaceScore& score, const ChanceLevel& chance) {
 std::vector<std::size_t> RankPlaces(std::span<const PlaceScore> scores, const ChanceLevel& chance,
                                     std::size_t count, std::size_t per_map, std::size_t places) {
   std::vector<double> likeness;
-  for (const PlaceScore& score : scores) likeness.push_back(Likeness(score, chance));
+  for (const PlaceScore& score : scores) likeness.push_back(PlaceSimilarity(score, chance));
   std::vector<std::size_t> order(scores.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return likeness[a] > likeness[b]; });
-  std::map<std::uint64_t, std::size_t> given;  // by map
+  std::map<std::uint64_t, std::size_t> given;  // The number of results by map.
   std::set<std::pair<std::uint64_t, engine::KeyFrameId>> seen;
   std::vector<std::size_t> ranked, later;
   const auto take = [&](std::size_t index) {

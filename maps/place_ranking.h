@@ -8,30 +8,32 @@
 
 #include "engine/map/map_snapshot.h"
 
-// Of keyframes that were compared with an image in two ways, which are to be looked at first.
+// Ranks keyframes that were compared with an image by thumbnail and by words.
 namespace docent::maps {
 
 struct PlaceScore {
   std::uint64_t map_key = 0;
-  engine::KeyFrameId place = engine::kNoId;  // of its map; keyframes of one place see nearly the same
-  double difference = 0;                     // of the thumbnails, see ThumbnailArray::Hit
-  double words = 0;                          // that are shared, see InvertedFile::Hit
+  engine::KeyFrameId place = engine::kNoId;  // Within its map; keyframes of one place see nearly the same.
+  double difference = 0;                     // Of the thumbnails; see ThumbnailArray::Hit.
+  double words = 0;                          // Score of the shared words; see InvertedFile::Hit.
 };
 
-// What keyframes of other places have in common with the image.
+// The similarity that keyframes of other places have with the image by chance.
 struct ChanceLevel {
-  double correlation = 0;  // of thumbnails; less than 1
-  double words = 0.1;      // more than 0
+  double correlation = 0;  // Of thumbnails; less than 1.
+  double words = 0.1;      // Greater than 0.
 };
 
-// How much alike two images are by both ways, larger is more alike: by how much the correlation of their
-// thumbnails is more than chance, in parts of what there is above it, and by how much the words that are
-// shared are, in parts of it. Each counts about 1 where it is sure, and about 0 where it knows nothing.
-double Likeness(const PlaceScore& score, const ChanceLevel& chance);
+// The similarity of two images by both methods; larger is more similar. It is the sum of the excess of the
+// thumbnails' correlation over chance, relative to the largest possible excess, and of the excess of the word
+// score over chance, relative to chance. Each term is about 1 for a certain match and 0 for one at chance
+// level.
+double PlaceSimilarity(const PlaceScore& score, const ChanceLevel& chance);
 
-// Indices of the best `count`, at most `per_map` of one map: first the best of each of the `places` best
-// places, the most alike first; then the rest, the most alike first, whatever place it is of: a place is
-// verified by whichever of its keyframes fits. Ties go to the earlier.
+// Returns the indices of the best `count` keyframes, at most `per_map` of one map: first the best keyframe of
+// each of the `places` best places, then the others regardless of their place, both by descending similarity.
+// Several keyframes of one place are useful, because any of them may pass geometric verification. Ties go to
+// the lower index.
 inline constexpr std::size_t kDifferentPlaces = 5;
 std::vector<std::size_t> RankPlaces(std::span<const PlaceScore> scores, const ChanceLevel& chance,
                                     std::size_t count, std::size_t per_map,

@@ -14,11 +14,11 @@ constexpr std::array<std::pair<Policy, const char*>, 4> kNames = {{{Policy::kOpe
                                                                    {Policy::kBounded, "bounded"},
                                                                    {Policy::kAugmentOnly, "augment-only"},
                                                                    {Policy::kReadOnly, "read-only"}}};
-constexpr double kIgnoredTail = 0.01;  // of the points, at either end of each axis
+constexpr double kIgnoredRatio = 0.01;  // Ratio of the points ignored at either end of each axis.
 
-// The values that a fraction kIgnoredTail lies below and above.
+// The quantiles kIgnoredRatio and 1 - kIgnoredRatio of the values.
 std::pair<double, double> MiddleRange(std::vector<double>& values) {
-  const auto skipped = static_cast<std::ptrdiff_t>(kIgnoredTail * static_cast<double>(values.size()));
+  const auto skipped = static_cast<std::ptrdiff_t>(kIgnoredRatio * static_cast<double>(values.size()));
   const auto low = values.begin() + skipped;
   std::nth_element(values.begin(), low, values.end());
   const double low_value = *low;
@@ -51,7 +51,7 @@ bool MayRemove(Policy policy) {
 }
 
 Policy Stricter(Policy a, Policy b) {
-  return std::max(a, b);  // they are declared by strictness
+  return std::max(a, b);  // The enumerators are ordered by strictness.
 }
 
 std::optional<Bounds> ComputeBounds(const engine::MapSnapshot& map) {
@@ -76,7 +76,7 @@ std::optional<Bounds> ComputeBounds(const engine::MapSnapshot& map) {
   return bounds;
 }
 
-Bounds Grown(const Bounds& bounds, double fraction) {
+Bounds Expanded(const Bounds& bounds, double fraction) {
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(fraction * (bounds.max - bounds.min).norm());
   return {bounds.min - margin, bounds.max + margin};
 }

@@ -10,8 +10,8 @@
 
 namespace docent::maps {
 
-// What may be done to a stored map. The library enforces it on every write; a mapper asks KeyFrameAllowed
-// before it offers a keyframe, so that nothing is built that cannot be kept.
+// What may be changed in a stored map. The library enforces the policy on every write. A mapper calls
+// KeyFrameAllowed before it adds a keyframe, so that it never builds what cannot be saved.
 //
 //   policy        keyframes, points    new keyframes            content   rename   remove
 //   open          yes                  anywhere                 yes       yes      yes
@@ -20,18 +20,18 @@ namespace docent::maps {
 //   read-only     no                   no                       no        no       no
 enum class Policy { kOpen, kBounded, kAugmentOnly, kReadOnly };
 
-// The word of the command line: "open", "bounded", "augment-only", "read-only".
+// The name on the command line: "open", "bounded", "augment-only", "read-only".
 const char* ToString(Policy policy);
-// Empty when it is none of the four words.
+// Empty if it is none of the four names.
 std::optional<Policy> ParsePolicy(std::string_view text);
 
-bool MayChangeStructure(Policy policy);  // keyframes, points, observations
-bool MayChangeContent(Policy policy);    // scene and assets
+bool MayChangeStructure(Policy policy);  // Keyframes, points and observations.
+bool MayChangeContent(Policy policy);    // Scene and assets.
 bool MayRemove(Policy policy);
-// Of a map that two maps become (see joining.h).
+// The policy of a map that two maps are joined into (see joining.h).
 Policy Stricter(Policy a, Policy b);
 
-// The room that a map filled when it was bounded: a box along the map's axes, metres.
+// The extent of a map when it became bounded: a box along the map's axes, in map units.
 struct Bounds {
   Eigen::Vector3d min = Eigen::Vector3d::Zero();
   Eigen::Vector3d max = Eigen::Vector3d::Zero();
@@ -39,15 +39,15 @@ struct Bounds {
   bool operator==(const Bounds& other) const { return min == other.min && max == other.max; }
 };
 
-// The box round all keyframe centres and the middle 98 % of the finite points along each axis, so that a few
-// badly triangulated points do not open it to the horizon. Empty for a map without keyframes.
+// The bounding box of all keyframe centres and of the central 98 % of the finite points along each axis, so
+// that a few badly triangulated points do not extend it far. Empty for a map without keyframes.
 std::optional<Bounds> ComputeBounds(const engine::MapSnapshot& map);
 
-// The same box, wider on every side by `fraction` of its diagonal.
-Bounds Grown(const Bounds& bounds, double fraction);
+// The box expanded on every side by `fraction` of its diagonal.
+Bounds Expanded(const Bounds& bounds, double fraction);
 
-// Whether a map with this policy takes a new keyframe whose centre is at `position` (metres, in the map).
-// A bounded map without known bounds takes none.
+// Whether a map with this policy accepts a new keyframe whose centre is at `position` (map coordinates). A
+// bounded map without bounds accepts none.
 bool KeyFrameAllowed(Policy policy, const std::optional<Bounds>& bounds, const Eigen::Vector3d& position);
 
 }  // namespace docent::maps

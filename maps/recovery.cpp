@@ -20,7 +20,8 @@ namespace docent::maps {
 
 namespace {
 
-// Reads a file of which nothing is believed. Every step may fail; what fails is noted and gone without.
+// Reads a file without trusting any of it. Every step may fail; failures are recorded and the affected data
+// is left out.
 class Salvage {
  public:
   explicit Salvage(const std::filesystem::path& path)
@@ -31,16 +32,16 @@ class Salvage {
 
   void Run(Library* target) {
     for (const std::uint64_t key : Keys()) {
-      whole_ = true;
+      complete_ = true;
       MapRecord record;
       record.name = "map " + std::to_string(key);
       const auto where = [&] { return "map '" + record.name + "'"; };
-      record.policy = Policy::kReadOnly;  // where its own is lost, nobody changes it by accident
-      if (!Try(where(), [&] { ReadEntry(key, &record); })) whole_ = false;
+      record.policy = Policy::kReadOnly;  // Prevents accidental changes if the map's own policy is lost.
+      if (!Try(where(), [&] { ReadEntry(key, &record); })) complete_ = false;
       if (!Try(where(), [&] { record.snapshot = ReadMap(key, where()); })) continue;
       auto scene = std::make_shared<SceneRecord>();
       if (!Try(where(), [&] { *scene = ReadScene(key); })) {
-        whole_ = false;
+        complete_ = false;
         *scene = {};
       }
       record.scene = std::move(scene);
@@ -56,13 +57,14 @@ class Salvage {
       return true;
     } catch (const Error& error) {
       std::string what = error.what();
-      what.erase(std::min(what.size(), what.find(';')));  // advice to do what is being done
+      // The advice after the semicolon is to recover the file, which is what happens here.
+      what.erase(std::min(what.size(), what.find(';')));
       recovery_.problems.push_back(where + ": " + what);
       return false;
     }
   }
 
-  // Of the maps that any table knows.
+  // The maps that appear in any table.
   std::set<std::uint64_t> Keys() {
     std::set<std::uint64_t> keys;
     for (const char* sql : {"SELECT key FROM maps", "SELECT map_key FROM parts"}) {
@@ -95,7 +97,7 @@ class Salvage {
         Try(where, [&] { DecodePanoramas(key, ReadPart(database_, key, "panoramas"), &with_panoramas); })) {
       parts = std::move(with_panoramas);
     } else {
-      whole_ = false;
+      complete_ = false;
     }
     auto map = std::make_shared<engine::MapSnapshot>();
     ReadImages(key, where, &parts, map.get());
@@ -109,11 +111,11 @@ class Salvage {
       map->next_point = parts.points.empty() ? 0 : parts.points.back().id + 1;
     }
     if (const std::string problem = engine::Validate(*map); !problem.empty()) throw Error(problem);
-    if (map->keyframes.empty() && !parts.keyframes.empty()) throw Error("none of its images is left");
+    if (map->keyframes.empty() && !parts.keyframes.empty()) throw Error("none of its images could be read");
     return map;
   }
 
-  // The keyframes whose images are there.
+  // Keeps the keyframes whose images can be read.
   void ReadImages(std::uint64_t key, const std::string& where, MapParts* parts, engine::MapSnapshot* map) {
     for (const StoredKeyFrame& stored : parts->keyframes) {
       const bool there = Try(where + ", keyframe " + std::to_string(stored.keyframe.id), [&] {
@@ -123,12 +125,12 @@ class Salvage {
         });
       });
       if (there) continue;
-      whole_ = false;
+      complete_ = false;
       std::erase_if(map->keyframes, [](const engine::KeyFrame& keyframe) { return !keyframe.features; });
     }
   }
 
-  // Leaves out what names something that is gone.
+  // Leaves out everything that refers to lost data.
   static void Prune(const MapParts& parts, engine::MapSnapshot* map) {
     map->next_panorama = parts.next_panorama;
     for (const engine::PanoramaMap& panorama : parts.panoramas) {
@@ -137,7 +139,7 @@ class Salvage {
     std::erase_if(map->keyframes, [&](const engine::KeyFrame& keyframe) {
       return keyframe.kind == engine::KeyFrameKind::kPanorama && !map->FindPanorama(keyframe.panorama);
     });
-    // A point whose every observation went with a keyframe cannot be kept: nothing sees it.
+    // A point all of whose observations were lost with their keyframes cannot be kept.
     std::unordered_set<engine::MapPointId> there, lost;
     for (const engine::Observation& observation : parts.observations) {
       if (!map->FindKeyFrame(observation.keyframe)) lost.insert(observation.point);
@@ -166,20 +168,20 @@ class Salvage {
 
   void Save(MapRecord record, Library* target) {
     const std::string name = record.name;
-    // An entry that is lost leaves the name to whoever has it.
+    // A map whose name was lost may have got a name that another map has.
     for (const MapInfo& info : target->List()) {
       if (info.name == record.name) record.name += " (recovered)";
     }
     if (record.policy == Policy::kBounded && !record.bounds) record.policy = Policy::kReadOnly;
     record.key = target->NewKey();
     if (!Try("map '" + name + "'", [&] { target->Save(record); })) return;
-    ++(whole_ ? recovery_.maps_whole : recovery_.maps_in_part);
+    ++(complete_ ? recovery_.maps_complete : recovery_.maps_partial);
   }
 
   Database database_;
   Transaction transaction_;
-  std::optional<MapInfo> info_;  // the entry that was read last
-  bool whole_ = true;            // the map that is being read
+  std::optional<MapInfo> info_;  // The last entry that was read.
+  bool complete_ = true;         // Whether the current map is complete so far.
   Recovery recovery_;
 };
 
@@ -188,14 +190,14 @@ class Salvage {
 Recovery Recover(const std::filesystem::path& damaged, const std::filesystem::path& target) {
   std::error_code error;
   if (std::filesystem::exists(target, error))
-    throw Error(target.string() + " exists already; name a new file for what can be recovered");
+    throw Error(target.string() + " exists already; choose a new file name for the recovered maps");
   Salvage salvage(damaged);
   Recovery recovery;
   try {
     Library library = Library::Open(target, Access::kReadWrite, CreateIfMissing::kYes);
     salvage.Run(&library);
     recovery = salvage.Take();
-    if (recovery.maps_whole + recovery.maps_in_part == 0) {
+    if (recovery.maps_complete + recovery.maps_partial == 0) {
       throw Error("nothing could be recovered from " + damaged.string() +
                   (recovery.problems.empty() ? std::string() : ": " + recovery.problems.front()));
     }

@@ -18,10 +18,11 @@ namespace {
 
 constexpr std::uint64_t kKey = 1;
 
-// The places of a map without one keyframe: those of an index of the whole, less what is not there.
-class PlacesWithout : public engine::PlaceFinder {
+// Finds places in a map without one keyframe: searches an index of the whole map and removes what is no
+// longer in it.
+class RemainingPlaces : public engine::PlaceFinder {
  public:
-  PlacesWithout(const PlaceIndex& index, std::shared_ptr<const engine::MapSnapshot> rest)
+  RemainingPlaces(const PlaceIndex& index, std::shared_ptr<const engine::MapSnapshot> rest)
       : index_(index), rest_(std::move(rest)) {}
 
   std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
@@ -48,7 +49,7 @@ RelocalizationTrial::Result Try(const engine::MapSnapshot& map, const PlaceIndex
   without.RemoveKeyFrame(keyframe.id);
   const auto rest = without.Snapshot();
   if (!rest->HasFinitePoints()) return Result::kNotFound;
-  const PlacesWithout places(index, rest);
+  const RemainingPlaces places(index, rest);
   engine::TrackerOptions tracker_options;
   tracker_options.build_maps = false;
   engine::Tracker tracker(tracker_options, keyframe.camera, options.seed);
@@ -56,10 +57,10 @@ RelocalizationTrial::Result Try(const engine::MapSnapshot& map, const PlaceIndex
   engine::Frame frame;
   frame.time = keyframe.time;
   frame.image = keyframe.features->levels[0];
-  // What shows less than half of what should be in view counts only once several images in a row agree: a
-  // visitor's camera delivers them within a tenth of a second, and so does this.
+  // A pose with a low inlier ratio is accepted only after several consecutive images agree. A visitor's
+  // camera delivers them within a tenth of a second, so the image is repeated at 30 Hz.
   engine::TrackedFrame tracked;
-  for (int image = 0; image <= tracker_options.agreeing_frames; ++image) {
+  for (int image = 0; image <= tracker_options.confirming_frames; ++image) {
     tracked = tracker.Track(frame, &places);
     if (engine::HasPose(tracked.state)) break;
     frame.time += std::chrono::milliseconds(33);
@@ -112,7 +113,7 @@ RelocalizationGrid MakeRelocalizationGrid(const engine::MapSnapshot& map,
     const Eigen::Vector2d place = (sheet_from_map * trial.place - origin) / grid.side;
     const Eigen::Vector2d view = sheet_from_map * trial.direction;
     RelocalizationCell cell;
-    // The sheet's second axis points down, which is back.
+    // The second axis of the plan points down, which is backwards.
     cell.square = {static_cast<int>(std::floor(place.x() + 0.5)),
                    static_cast<int>(std::floor(-place.y() + 0.5))};
     const double eighths = std::atan2(view.x(), -view.y()) * 4 / std::numbers::pi;
@@ -120,7 +121,7 @@ RelocalizationGrid MakeRelocalizationGrid(const engine::MapSnapshot& map,
     auto& kept = cells[{cell.square.x(), cell.square.y(), cell.direction}];
     cell.trials = kept.trials + 1;
     cell.found = kept.found + (trial.result == RelocalizationTrial::Result::kFound ? 1 : 0);
-    // The sum of the heights, for now.
+    // The sum of the heights, which is divided by the number of trials below.
     cell.place = kept.place + up.dot(trial.place) * up;
     const double turn = cell.direction * std::numbers::pi / 4;
     cell.view = sheet_from_map.transpose() * Eigen::Vector2d(std::sin(turn), -std::cos(turn));

@@ -9,51 +9,51 @@
 
 #include "engine/map/map_snapshot.h"
 
-// How well a visitor who is lost will be found in a map, by place and direction, foretold from the map alone:
-// each keyframe is left out in turn, with all that it alone holds up, and its image is given to a tracker
-// that is lost in what remains, as often as images have to agree before a pose counts, as a visitor's camera
-// would deliver them. Keyframes are spaced, so that the one that is left out is about as far from the others
-// as a visitor on the author's way can be: the share that is found is a lower bound for such visits. Pure
-// functions; any thread.
+// Predicts how well a lost camera is relocalized in a map, by place and direction, using only the map. Each
+// keyframe is removed in turn with the points that depend on it, and its image is passed to a tracker that is
+// lost in the rest of the map, as many times as images must agree before a pose is accepted. Because
+// keyframes are spaced apart, the removed keyframe is about as far from the others as a visitor on the
+// author's path can be, so the recall is a lower bound for such visitors. All functions are pure and
+// thread-safe.
 namespace docent::maps {
 
 struct RelocalizationOptions {
-  // A pose further from the keyframe's own is wrong.
+  // A pose that differs more than this from the keyframe's own pose counts as wrong.
   double max_rotation_deg = 5;
-  double max_distance = 0.1;  // of the keyframe's mean depth
+  double max_distance = 0.1;  // Ratio of the keyframe's median depth.
   std::uint64_t seed = 1;
 };
 
 struct RelocalizationTrial {
   enum class Result { kFound, kNotFound, kWrongPose };
   engine::KeyFrameId keyframe = engine::kNoId;
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();       // of the camera, in the map
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // of its view, in the map, unit length
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();       // Camera centre in the map.
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // Viewing direction in the map, unit length.
   Result result = Result::kNotFound;
 };
 
-// One trial a localized keyframe, in the order of the map, on at most that map: how this place is told from
-// those of other maps is not asked. `progress` is told the number of trials done and stops them by answering
-// false; may be empty. The snapshot has full features.
+// Runs one trial for each localized keyframe, in the order of the map. Only this map is searched, so the
+// trials do not measure confusion with other maps. `progress` gets the number of finished trials and returns
+// false to stop; it may be empty. The snapshot must have full features.
 std::vector<RelocalizationTrial> LeaveEachKeyFrameOut(const engine::MapSnapshot& map,
                                                       const RelocalizationOptions& options = {},
                                                       const std::function<bool(std::size_t)>& progress = {});
 
-// The trials of one square of the floor and one eighth of the directions.
+// The trials in one square of the floor and one octant of viewing directions.
 struct RelocalizationCell {
-  Eigen::Vector2i square =
-      Eigen::Vector2i::Zero();  // steps of the side, right and ahead of the first keyframe
-  int direction = 0;            // eighths of a turn to the right of the first keyframe's view, 0 to 7
+  // In steps of the side, to the right and ahead of the first keyframe.
+  Eigen::Vector2i square = Eigen::Vector2i::Zero();
+  int direction = 0;  // Octants clockwise from the first keyframe's view, 0 to 7.
   int trials = 0, found = 0;
-  // The same in the map: the middle of the square at the mean height of the cameras, and the middle of the
-  // directions, unit length.
+  // In map coordinates: the centre of the square at the mean height of the cameras, and the central direction
+  // of the octant (unit length).
   Eigen::Vector3d place = Eigen::Vector3d::Zero(), view = Eigen::Vector3d::UnitZ();
 };
 struct RelocalizationGrid {
-  double side = 0;  // of a square, metres of the map: half the median of the mean depths
-  std::vector<RelocalizationCell> cells;  // those that have trials, by square and direction
+  double side = 0;  // Side of a square in map units: half the median of the keyframes' median depths.
+  std::vector<RelocalizationCell> cells;  // Those with trials, ordered by square and direction.
 };
-// up: unit length, in the map.
+// `up` is a unit vector in the map.
 RelocalizationGrid MakeRelocalizationGrid(const engine::MapSnapshot& map,
                                           const std::vector<RelocalizationTrial>& trials,
                                           const Eigen::Vector3d& up);

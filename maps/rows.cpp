@@ -73,7 +73,7 @@ MapInfo MapFromRow(const Statement& row) {
   info.key = static_cast<std::uint64_t>(row.Integer(0));
   info.name = row.Text(1);
   const std::optional<Policy> policy = ParsePolicy(row.Text(2));
-  if (!policy) throw Error("its policy is none that this program knows");
+  if (!policy) throw Error("its policy is unknown to this program");
   info.policy = *policy;
   info.created = WallTime(std::chrono::nanoseconds(row.Integer(3)));
   info.modified = WallTime(std::chrono::nanoseconds(row.Integer(4)));
@@ -152,7 +152,7 @@ std::vector<MapInfo> ReadMapRows(const Database& database) {
   std::vector<MapInfo> maps;
   while (query.Step()) maps.push_back(CheckedMapFromRow(database, query));
   if (maps.size() != library.map_count) {
-    throw Error(database.file() + " is damaged: it says it has " + std::to_string(library.map_count) +
+    throw Error(database.file() + " is damaged: its first entry gives " + std::to_string(library.map_count) +
                 " maps but " + std::to_string(maps.size()) + " are there");
   }
   return maps;
@@ -166,7 +166,7 @@ std::optional<MapInfo> ReadMapRow(const Database& database, std::uint64_t key) {
 }
 
 void WriteMapRow(const Database& database, const MapInfo& info) {
-  // Not INSERT OR REPLACE, which would also remove another map of the same name.
+  // INSERT OR REPLACE would also remove another map with the same name.
   database.Prepare("DELETE FROM maps WHERE key = ?").Bind(1, Signed(info.key)).Run();
   Statement insert = database.Prepare(std::string("INSERT INTO maps (") + kMapColumns +
                                       ") VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
@@ -194,12 +194,12 @@ std::optional<std::uint64_t> FindMapByName(const Database& database, const std::
 
 CameraTable ReadCameras(const Database& database, std::uint64_t key) {
   CameraTable cameras = DecodeCameras(key, ReadPart(database, key, "cameras"));
-  // Images are compressed, and a flat one by a thousand times: without this a file of a few kilobytes could
-  // ask for gigabytes. A library of images with something in them is far above the limit.
-  const std::int64_t most = kMaxPixelsAByte * database.Bytes();
+  // Images are compressed, uniform ones by a factor of a thousand. Without this check a file of a few
+  // kilobytes could request gigabytes of memory. Libraries of real images are far from the limit.
+  const std::int64_t most = kMaxPixelsPerByte * database.Bytes();
   for (const auto& camera : cameras) {
     if (std::int64_t{camera->width_px()} * camera->height_px() > most)
-      throw Error("its camera has an image size that a file so small does not hold");
+      throw Error("its camera's image size is impossible for so small a file");
   }
   return cameras;
 }
@@ -214,7 +214,7 @@ MapParts ReadParts(const Database& database, const MapInfo& info) {
     DecodePanoramas(info.key, ReadPart(database, info.key, "panoramas"), &parts);
   if (parts.keyframes.size() != info.keyframes || parts.points.size() != info.points ||
       parts.observations.size() != info.observations) {
-    throw Error("its keyframes, points or observations are fewer or more than its entry says");
+    throw Error("the numbers of its keyframes, points or observations differ from its entry");
   }
   return parts;
 }
@@ -243,7 +243,7 @@ void ReadImages(const Database& database, std::uint64_t key, const std::vector<S
 void WriteImages(const Database& database, std::uint64_t key, const engine::MapSnapshot& snapshot,
                  const std::vector<StoredKeyFrame>& keyframes,
                  const std::vector<StoredKeyFrame>& stored_before) {
-  std::unordered_map<engine::KeyFrameId, std::uint64_t> left;  // stored, and not yet found in the new map
+  std::unordered_map<engine::KeyFrameId, std::uint64_t> left;  // Stored images that are not in the new map.
   for (const StoredKeyFrame& stored : stored_before) left.emplace(stored.keyframe.id, stored.image_hash);
   Statement insert =
       database.Prepare("INSERT OR REPLACE INTO pictures (map_key, keyframe, data) VALUES (?, ?, ?)");
@@ -253,7 +253,7 @@ void WriteImages(const Database& database, std::uint64_t key, const engine::MapS
     const bool same = stored != left.end() && stored->second == keyframes[i].image_hash;
     if (stored != left.end()) left.erase(stored);
     if (same) continue;
-    snapshot.keyframes[i].features->Look();
+    snapshot.keyframes[i].features->MarkInUse();
     const Bytes bytes = EncodeImage(key, id, snapshot.keyframes[i].features->levels[0]);
     insert.Reset();
     insert.Bind(1, Signed(key)).Bind(2, std::int64_t{id}).Bind(3, std::span<const std::uint8_t>(bytes)).Run();
@@ -323,7 +323,7 @@ void RemoveUnusedAssets(const Database& database) {
       const ScenePart scene = DecodeScene(static_cast<std::uint64_t>(scenes.Integer(0)), scenes.Blob(1));
       used.insert(scene.asset_ids.begin(), scene.asset_ids.end());
     } catch (const Error&) {
-      return;  // a damaged scene of another map may need any of them
+      return;  // A damaged scene may refer to any of the assets.
     }
   }
   std::vector<std::string> unused;
@@ -343,12 +343,12 @@ void RemoveMapRows(const Database& database, std::uint64_t key) {
   }
 }
 
-void WithPlace(const Database& database, const MapInfo& info, const std::function<void()>& body) {
+void WithMapContext(const Database& database, const MapInfo& info, const std::function<void()>& body) {
   try {
     body();
   } catch (const Error& error) {
     const std::string what = error.what();
-    if (what.starts_with(database.file() + " ")) throw;  // says where already
+    if (what.starts_with(database.file() + " ")) throw;  // The message already names the file.
     throw Error(database.file() + ": map '" + info.name + "' (" + std::to_string(info.key) + "): " + what);
   }
 }

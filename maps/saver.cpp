@@ -9,28 +9,28 @@ namespace docent::maps {
 
 namespace {
 
-constexpr std::chrono::milliseconds kUntilUpkeepIsAskedAgain{250};
+constexpr std::chrono::milliseconds kMaintenanceInterval{250};
 
 }  // namespace
 
-Saver::Saver(Library* library, std::size_t capacity, Saved saved, Upkeep maintenance)
+Saver::Saver(Library* library, std::size_t capacity, Saved saved, Maintenance maintenance)
     : library_(library),
       capacity_(std::max<std::size_t>(1, capacity)),
       saved_(std::move(saved)),
-      upkeep_(std::move(maintenance)),
+      maintenance_(std::move(maintenance)),
       worker_("map-saver", [this](const std::stop_token& stop) { Run(stop); }) {}
 
 Saver::~Saver() {
   EndMaintenance();
-  worker_.RequestStop();  // Run ends only when nothing waits
+  worker_.RequestStop();  // Run ends only when no save is waiting.
   worker_.Join();
 }
 
 void Saver::Submit(MapRecord record) {
   {
     std::unique_lock lock(mutex_);
-    // What waits of a map that is a part of this one now would bring it back.
-    for (const std::uint64_t gone : record.holds)
+    // A waiting save of a map that is now part of this one would restore it.
+    for (const std::uint64_t gone : record.joined_keys)
       std::erase_if(waiting_, [&](const MapRecord& waiting) { return waiting.key == gone; });
     const auto same_map = [&] {
       return std::find_if(waiting_.begin(), waiting_.end(),
@@ -40,7 +40,8 @@ void Saver::Submit(MapRecord record) {
     if (const auto place = same_map(); place != waiting_.end()) {
       if (record.snapshot) place->snapshot = std::move(record.snapshot);
       if (record.scene) place->scene = std::move(record.scene);
-      place->holds.insert(place->holds.end(), record.holds.begin(), record.holds.end());
+      place->joined_keys.insert(place->joined_keys.end(), record.joined_keys.begin(),
+                                record.joined_keys.end());
     } else {
       waiting_.push_back(std::move(record));
     }
@@ -74,42 +75,42 @@ std::size_t Saver::pending() const {
 
 void Saver::EndMaintenance() {
   std::unique_lock lock(mutex_);
-  upkeep_ended_ = interrupt_ = true;
-  changed_.wait(lock, [this] { return !keeping_up_; });
+  maintenance_ended_ = interrupt_ = true;
+  changed_.wait(lock, [this] { return !maintenance_running_; });
 }
 
-// With the lock held, which is let go meanwhile.
+// Requires the lock, which is released while the maintenance runs.
 bool Saver::RunMaintenance(std::unique_lock<std::mutex>* lock) {
-  keeping_up_ = true;
+  maintenance_running_ = true;
   interrupt_ = false;
   lock->unlock();
   bool more = false;
   std::exception_ptr error;
   try {
-    more = upkeep_(interrupt_);
+    more = maintenance_(interrupt_);
   } catch (...) {
     error = std::current_exception();
   }
   lock->lock();
   if (!error_) error_ = error;
-  keeping_up_ = false;
+  maintenance_running_ = false;
   changed_.notify_all();
   return more;
 }
 
 void Saver::Run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  const auto waits = [this] { return !waiting_.empty(); };
+  const auto has_waiting = [this] { return !waiting_.empty(); };
   while (true) {
     bool more = false;
-    while (upkeep_ && !upkeep_ended_ && !waits()) {
-      if (!more &&
-          changed_.wait_for(lock, stop, kUntilUpkeepIsAskedAgain, [&] { return waits() || upkeep_ended_; }))
+    while (maintenance_ && !maintenance_ended_ && !has_waiting()) {
+      if (!more && changed_.wait_for(lock, stop, kMaintenanceInterval,
+                                     [&] { return has_waiting() || maintenance_ended_; }))
         break;
       if (stop.stop_requested()) break;
       more = RunMaintenance(&lock);
     }
-    if (!changed_.wait(lock, stop, waits)) return;
+    if (!changed_.wait(lock, stop, has_waiting)) return;
     MapRecord record = std::move(waiting_.front());
     waiting_.pop_front();
     running_ = record.key;
@@ -122,7 +123,7 @@ void Saver::Run(const std::stop_token& stop) {
     } catch (...) {
       error = std::current_exception();
     }
-    record = {};  // large things are let go before anybody is told
+    record = {};  // Large data is released before waiting threads are notified.
     lock.lock();
     if (!error_) error_ = error;
     running_.reset();

@@ -18,36 +18,37 @@
 
 namespace docent::maps {
 
-// Saves maps on a thread of its own, so that nobody who tracks or draws waits for a disk. Requests wait in a
-// short queue with one place a map: a newer snapshot or scene of a map takes the place of the older one that
-// was not written yet, and what waits of maps that were joined into another one (MapRecord::holds) is
-// forgotten. When and how often to save is up to the caller, and so is the upkeep that fills the
-// time between: a save interrupts it. Any thread may call. A save that fails does not stop the others; its
-// exception waits for TakeError, and nothing that was saved before is lost.
+// Saves maps on a separate thread, so that tracking and drawing never wait for the disk. Requests wait in a
+// short queue with one entry per map: a newer snapshot or scene replaces one that is not written yet, and
+// entries of maps that were joined into another one (MapRecord::joined_keys) are dropped. The caller decides
+// when to save, and provides the maintenance that runs between saves; a save interrupts it. Thread-safe. A
+// failed save does not stop the others: its exception is kept for TakeError, and nothing that was saved
+// before is lost.
 class Saver {
  public:
   using Saved = std::function<void(const MapRecord& record)>;
-  // What is done on the saver's thread while nothing waits to be saved. It ends soon after `interrupt` is
-  // set, answers whether it did something, and is asked again: at once when it did, else after a while.
-  using Upkeep = std::function<bool(const std::atomic<bool>& interrupt)>;
-  // library: opened for writing; must outlive the saver. capacity: maps that may wait at once; one more makes
-  // Submit wait. saved: told on the saver's thread of each record that is on disk; may be empty.
-  explicit Saver(Library* library, std::size_t capacity = 16, Saved saved = {}, Upkeep maintenance = {});
-  // Writes what still waits, then ends. Whoever wants to know about failures calls Flush and TakeError first.
+  // Work for the saver's thread while no save is waiting. It must end soon after `interrupt` is set. It
+  // returns whether it did something; if so it is called again at once, else after a while.
+  using Maintenance = std::function<bool(const std::atomic<bool>& interrupt)>;
+  // `library` must be opened for writing and outlive the saver. `capacity` is the number of maps that can
+  // wait; Submit blocks when the queue is full. `saved` is called on the saver's thread for each record that
+  // is on disk; it may be empty.
+  explicit Saver(Library* library, std::size_t capacity = 16, Saved saved = {}, Maintenance maintenance = {});
+  // Writes what is still waiting, then ends. Call Flush and TakeError first to learn of failures.
   ~Saver();
 
   void Submit(MapRecord record);
-  // Forgets what waits of a map that is to be removed; a save of it that is running is waited for.
+  // Drops the waiting save of a map that will be removed, and waits for a running one.
   void Forget(std::uint64_t key);
-  // Waits until everything submitted before is on disk or has failed.
+  // Waits until every earlier request is on disk or has failed.
   void Flush();
-  // The first failure since the last call; null when there was none.
+  // Returns and clears the first failure since the last call; null if there was none.
   std::exception_ptr TakeError();
-  // Maps that wait or are being written.
+  // The number of maps that are waiting or being written.
   std::size_t pending() const;
-  // Ends the upkeep that runs now, if any; it goes on later.
+  // Interrupts the current maintenance, if any; it is resumed later.
   void InterruptMaintenance() { interrupt_ = true; }
-  // The same, for good, and waits for it: what it uses may go.
+  // Ends maintenance permanently and waits for it, so that the objects it uses can be destroyed.
   void EndMaintenance();
 
  private:
@@ -58,15 +59,15 @@ class Saver {
   Library* const library_;
   const std::size_t capacity_;
   const Saved saved_;
-  const Upkeep upkeep_;
+  const Maintenance maintenance_;
   std::atomic<bool> interrupt_ = false;
-  mutable std::mutex mutex_;  // guards all below; not held during a save
+  mutable std::mutex mutex_;  // Guards the fields below; not held during a save.
   std::condition_variable_any changed_;
   std::deque<MapRecord> waiting_;
-  std::optional<std::uint64_t> running_;  // key
+  std::optional<std::uint64_t> running_;  // Key of the map that is being saved.
   std::exception_ptr error_;
-  bool keeping_up_ = false, upkeep_ended_ = false;
-  Worker worker_;  // last: it uses the rest
+  bool maintenance_running_ = false, maintenance_ended_ = false;
+  Worker worker_;  // Declared last, because it uses the other fields.
 };
 
 }  // namespace docent::maps

@@ -13,12 +13,12 @@ namespace docent::maps {
 namespace {
 
 struct Table {
-  std::int64_t since;  // format
+  std::int64_t since;  // The first format with this table.
   const char* name;
   const char* sql;
 };
 
-// Never edited: a change of the tables is a new schema version and a step that upgrades to it.
+// Never edit these: a change of the tables needs a new schema version and an upgrade step.
 constexpr std::array<Table, 7> kTables = {{
     {1, "library",
      "CREATE TABLE library (id INTEGER PRIMARY KEY CHECK (id = 1), next_key INTEGER NOT NULL, map_count "
@@ -57,7 +57,7 @@ bool IsBlank(const Database& database) {
 
 void CreateSchema(const Database& database) {
   Transaction transaction(database, Transaction::Kind::kWrite);
-  // Beginning to write allots the first page, so that only the tables tell whether somebody was faster.
+  // Starting to write allocates the first page, so only the tables show whether another process was first.
   if (database.Number("SELECT count(*) FROM sqlite_schema") != 0) return;
   for (const Table& table : kTables) database.Execute(table.sql);
   WriteLibraryRow(database, {});
@@ -93,9 +93,9 @@ void CheckIsLibrary(const Database& database) {
                 "; this program knows formats up to " + std::to_string(kSchemaVersion) +
                 "); update Docent to open it");
   }
-  if (version < 1) throw Error(file + " is damaged: it has no valid format version");
+  if (version < 1) throw Error(file + " is damaged: its format version is not valid");
   if (!database.EndsWithWholePage())
-    throw Error(file + " is damaged: it is cut off; docent maps recover saves what it still holds");
+    throw Error(file + " is damaged: it is cut off; use docent maps recover to save what is still readable");
   Statement entries = database.Prepare("SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL");
   std::size_t found = 0, expected = 0;
   for (const Table& table : kTables) expected += table.since <= version ? 1 : 0;

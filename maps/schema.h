@@ -6,26 +6,26 @@
 
 #include "maps/database.h"
 
-// The tables of a library (maps/README.md describes them) and the marks by which a file is known to be one.
+// The tables of a library (described in maps/README.md) and the marks that identify its file format.
 namespace docent::maps {
 
 inline constexpr std::int64_t kApplicationId = 0x446F6374;  // "Doct", PRAGMA application_id
 inline constexpr std::int64_t kSchemaVersion = 3;           // PRAGMA user_version
-inline constexpr std::int64_t kThumbnailsSince = 2;         // the first format with the table of thumbnails
-inline constexpr std::int64_t kWordsSince = 3;              // the first format with the table of words
-inline constexpr std::int64_t kPanoramasSince = 2;          // the first format with the part `panoramas`
+inline constexpr std::int64_t kThumbnailsSince = 2;         // The first format with the table `thumbnails`.
+inline constexpr std::int64_t kWordsSince = 3;              // The first format with the table `words`.
+inline constexpr std::int64_t kPanoramasSince = 2;          // The first format with the part `panoramas`.
 
-// Whether the file holds nothing at all yet, as after it was created.
+// Whether the file is still empty, as after its creation.
 bool IsBlank(const Database& database);
-// Writes the tables into a blank file, in one transaction. Does nothing when another process was faster.
+// Creates the tables in an empty file, in one transaction. Does nothing if another process did so first.
 void CreateSchema(const Database& database);
-// The format that the file has; what this program does not know is refused by CheckIsLibrary.
+// Returns the file's format version; CheckIsLibrary rejects unknown versions.
 std::int64_t SchemaVersion(const Database& database);
 void SetSchemaVersion(const Database& database, std::int64_t version);
-// One table by its name, inside the caller's transaction.
+// Creates one table by its name, inside the caller's transaction.
 void CreateTable(const Database& database, std::string_view name);
-// Throws docent::Error with one sentence when the file is not a library, is of a newer version, or has other
-// tables than a library of its format has. Reads only.
+// Throws docent::Error with a one-sentence message when the file is not a library, has a newer format, or has
+// other tables than a library of its format. Only reads.
 void CheckIsLibrary(const Database& database);
 
 }  // namespace docent::maps

@@ -16,11 +16,12 @@ namespace docent::maps {
 namespace {
 
 struct ImageJob {
-  std::size_t keyframe = 0;  // index
+  std::size_t keyframe = 0;  // Index of the keyframe.
   Bytes bytes;
 };
 
-// Compressed images wait in a short queue, so that only a few are in memory beside the decoded ones.
+// Compressed images pass through a short queue, so that only a few are in memory in addition to the decoded
+// ones.
 void ReadFeatures(
     const Database& database, std::uint64_t key, const std::vector<StoredKeyFrame>& stored,
     const std::function<std::shared_ptr<const engine::ImageFeatures>(const cv::Mat&)>& make_features,
@@ -35,7 +36,7 @@ void ReadFeatures(
           snapshot->keyframes[job->keyframe].features = make_features(gray);
         }
       } catch (...) {
-        jobs.Close();  // the reader need not go on
+        jobs.Close();  // Stops the reader.
         throw;
       }
     }));

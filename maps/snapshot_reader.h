@@ -12,11 +12,11 @@
 
 namespace docent::maps {
 
-// Features that have the sizes of all pyramid levels and nothing more: enough to check a map's numbers.
+// Makes features with images of the right sizes only, which suffices to validate a map.
 std::shared_ptr<const engine::ImageFeatures> MakeSizesOnly(const cv::Mat& gray);
 
-// Reads a map and its images inside the caller's transaction, builds the features of its keyframes on up to
-// `threads` threads and checks the whole (engine::Validate). Throws docent::Error; see WithPlace.
+// Reads a map and its images inside the caller's transaction, computes the features of its keyframes on up to
+// `threads` threads and validates the map (engine::Validate). Throws docent::Error; see WithMapContext.
 std::shared_ptr<const engine::MapSnapshot> ReadSnapshot(
     const Database& database, const MapInfo& info,
     const std::function<std::shared_ptr<const engine::ImageFeatures>(const cv::Mat&)>& make_features,

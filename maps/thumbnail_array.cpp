@@ -14,15 +14,16 @@ namespace docent::maps {
 
 namespace {
 
-constexpr double kLightSigma = 1.0 / 8;  // of the width: shading coarser than this is left out
-constexpr float kMinDeviation = 2;       // grey values: below it noise would be blown up
-constexpr std::size_t kBlock = 16;       // coarse vectors are padded to whole registers of 16-bit numbers
-constexpr int kShiftsAtOnce = 4;    // of the coarse search, so that each number loaded is used four times
-constexpr float kCoarseScale = 32;  // root mean square of a coarse vector's values
-constexpr int kReachFraction = 6;   // of the image
+constexpr double kShadingSigma = 1.0 / 8;  // Ratio of the width. Coarser shading is removed.
+constexpr float kMinDeviation = 2;         // Grey values. Below it the normalization would amplify noise.
+constexpr std::size_t kBlock = 16;         // Coarse vectors are padded to whole registers of 16-bit numbers.
+// Shifts that the coarse search scores together, so that each loaded number is used four times.
+constexpr int kShiftsAtOnce = 4;
+constexpr float kCoarseScale = 32;  // Root mean square of a coarse vector's values.
+constexpr int kReachFraction = 6;   // The largest shift is the image size divided by this.
 
 int ReachOf(int size_px) {
-  // An even number, so that the steps reach it; none in images too small to shift.
+  // An even number, so that the shift steps reach it; 0 for images that are too small to shift.
   return size_px < 4 * kReachFraction ? 0 : (size_px / kReachFraction) & ~1;
 }
 
@@ -30,7 +31,8 @@ std::int8_t ToByte(float value) {
   return static_cast<std::int8_t>(std::clamp(std::lround(value), -127L, 127L));
 }
 
-// The cells' means about a shift, mean removed, brought to one length; zeros where nothing is to be seen.
+// The means of the cells at a shift, with their mean removed and normalized to one length; zeros for a
+// uniform image.
 template <typename Number>
 void MakeCoarse(const ThumbnailShape& shape, const std::int8_t* fine, int shift_x, int shift_y,
                 std::span<Number> coarse) {
@@ -61,13 +63,13 @@ void MakeCoarse(const ThumbnailShape& shape, const std::int8_t* fine, int shift_
   }
 }
 
-// The wanted thumbnail's coarse vectors under all shifts.
+// The query thumbnail's coarse vectors at all shifts.
 struct CoarseQuery {
-  std::vector<cv::Point> shifts;  // where the middle of a stored thumbnail lies in the wanted one
+  std::vector<cv::Point> shifts;  // Offset of the stored thumbnail's centre in the query.
   std::vector<std::int16_t> vectors;
   std::size_t padded_shifts = 0;
 
-  // The shift at which a stored coarse vector fits best; the middle one where nothing distinguishes them.
+  // The shift at which a stored coarse vector has the highest score; the zero shift if none is positive.
   cv::Point BestShift(const std::int8_t* coarse, std::size_t length) const {
     if (length == 0) return {};
     std::int32_t best = 0;
@@ -99,8 +101,8 @@ struct CoarseQuery {
   }
 };
 
-// Products of two stored vectors with four wanted ones. Written so that a compiler sees sums of products of
-// 16-bit numbers, for which every processor since 1999 has an instruction.
+// Scores two stored vectors with four query vectors at once. The loop is written as sums of products of
+// 16-bit numbers, for which every processor since 1999 has a SIMD instruction.
 template <std::size_t kLength>
 void ScorePair(const std::int16_t* stored, const std::int16_t* wanted, std::size_t shifts, std::size_t length,
                std::int32_t* first, std::int32_t* second) {
@@ -128,8 +130,8 @@ void ScorePair(const std::int16_t* stored, const std::int16_t* wanted, std::size
   *second = best_b;
 }
 
-// Best score over the shifts of each of `size` coarse vectors; one more place in *scores than needed, for the
-// partner of a last odd one.
+// The best score of each of `size` coarse vectors over all shifts. *scores needs room for one more if `size`
+// is odd.
 template <std::size_t kLength>
 void ScoreAll(const CoarseQuery& query, const std::int8_t* coarse, std::size_t length, std::size_t size,
               std::int32_t* scores) {
@@ -143,7 +145,7 @@ void ScoreAll(const CoarseQuery& query, const std::int8_t* coarse, std::size_t l
   }
 }
 
-// Sums over the overlap of two thumbnails.
+// Sums over the overlapping pixels of two thumbnails.
 struct Overlap {
   std::int32_t count = 0, sum_a = 0, sum_b = 0, square_a = 0, square_b = 0, product = 0;
 };
@@ -166,7 +168,7 @@ void AddRow(const std::int8_t* a, const std::int8_t* b, int count, Overlap* over
   overlap->product += product;
 }
 
-// See ThumbnailArray::Hit. a's pixel p lies at b's pixel p + shift.
+// See ThumbnailArray::Hit. Pixel p of a corresponds to pixel p + shift of b.
 double DifferenceAt(const ThumbnailShape& shape, const std::int8_t* a, const std::int8_t* b, int shift_x,
                     int shift_y) {
   const int width = shape.width - std::abs(shift_x), height = shape.height - std::abs(shift_y);
@@ -186,7 +188,7 @@ double DifferenceAt(const ThumbnailShape& shape, const std::int8_t* a, const std
   return 2 * kThumbnailContrast * kThumbnailContrast * std::max(0.0, 1 - correlation) / part;
 }
 
-// About a shift that the coarse search found, pixel by pixel.
+// Refines the shift of the coarse search, pixel by pixel.
 double BestDifference(const ThumbnailShape& shape, const std::int8_t* stored, const std::int8_t* wanted,
                       cv::Point start) {
   double best = std::numeric_limits<double>::infinity();
@@ -213,10 +215,10 @@ PackedThumbnail Pack(const engine::SmallBlurryImage& image) {
   const cv::Size size(std::max(1, pixels.cols / 2), std::max(1, pixels.rows / 2));
   cv::Mat half;
   cv::resize(pixels, half, size, 0, 0, cv::INTER_AREA);
-  // Light from a window and vignetting look the same in many places; what stands there does not.
-  cv::Mat light;
-  cv::GaussianBlur(half, light, {}, kLightSigma * size.width);
-  half -= light;
+  // Window light and vignetting are similar in many places, unlike the objects there.
+  cv::Mat shading;
+  cv::GaussianBlur(half, shading, {}, kShadingSigma * size.width);
+  half -= shading;
   cv::Scalar mean, deviation;
   cv::meanStdDev(half, mean, deviation);
   const float scale = kThumbnailContrast / std::max(kMinDeviation, static_cast<float>(deviation[0]));
@@ -284,14 +286,14 @@ std::vector<ThumbnailArray::Hit> ThumbnailArray::Search(const PackedThumbnail& w
   } else {
     const CoarseQuery query(shape_, wanted);
     std::vector<std::int32_t> scores(size + 1);
-    constexpr std::size_t kUsualLength = 64;  // of thumbnails of images with sides as 4 to 3
-    const auto score = shape_.coarse_bytes == kUsualLength ? ScoreAll<kUsualLength> : ScoreAll<0>;
+    constexpr std::size_t kTypicalLength = 64;  // For images with an aspect ratio of 4:3.
+    const auto score = shape_.coarse_bytes == kTypicalLength ? ScoreAll<kTypicalLength> : ScoreAll<0>;
     score(query, coarse_.get(), shape_.coarse_bytes, size, scores.data());
     scores.resize(size);
     std::vector<std::int32_t> ranked = scores;
     const auto last = ranked.begin() + static_cast<std::ptrdiff_t>(count - 1);
     std::nth_element(ranked.begin(), last, ranked.end(), std::greater<>());
-    // Of those that are as good as the last one, the earlier are taken.
+    // Among those that tie with the last one, the earlier slots are taken.
     auto ties = static_cast<std::size_t>(std::count(ranked.begin(), last + 1, *last));
     for (std::size_t slot = 0; slot < size; ++slot) {
       if (scores[slot] > *last) slots.push_back(slot);

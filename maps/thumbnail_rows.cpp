@@ -49,7 +49,7 @@ std::vector<KeyFrameThumbnail> MakeThumbnails(const engine::MapSnapshot& snapsho
   thumbnails.reserve(snapshot.keyframes.size());
   for (const engine::KeyFrame& keyframe : snapshot.keyframes) {
     PackedThumbnail thumbnail = Pack(keyframe.features->small_blurry);
-    // Whoever made the features may have had no use for a thumbnail.
+    // The features may have been made without a thumbnail.
     if (thumbnail.width == 0) thumbnail = Pack(engine::MakeSmallBlurryImage(keyframe.features->levels[0]));
     thumbnails.push_back({keyframe.id, std::move(thumbnail)});
   }
@@ -71,7 +71,8 @@ std::vector<KeyFrameThumbnail> ReadThumbnails(const Database& database, const Ma
   query.Bind(1, static_cast<std::int64_t>(info.key));
   if (!query.Step()) throw Error("its thumbnails are missing");
   std::vector<KeyFrameThumbnail> thumbnails = DecodeThumbnails(info.key, query.Blob(0));
-  if (thumbnails.size() != info.keyframes) throw Error("its thumbnails are fewer or more than its keyframes");
+  if (thumbnails.size() != info.keyframes)
+    throw Error("the number of its thumbnails differs from that of its keyframes");
   return thumbnails;
 }
 

@@ -16,14 +16,14 @@ namespace docent::maps {
 
 namespace {
 
-constexpr std::size_t kMaxSentences = 100;  // more tell nobody more
+constexpr std::size_t kMaxSentences = 100;  // More sentences would not help anybody.
 
 class Report {
  public:
   void Add(std::string sentence) {
     if (sentences_.size() < kMaxSentences) sentences_.push_back(std::move(sentence));
   }
-  // Runs `check` and notes what it throws.
+  // Runs `check` and records the message of what it throws.
   void Try(const std::function<void()>& check) {
     try {
       check();
@@ -46,7 +46,7 @@ void CheckPages(const Database& database, Report* report) {
   }
 }
 
-// The maps whose entries can be read; the others are reported.
+// The maps whose entries can be read; errors in the others are reported.
 std::vector<MapInfo> ReadableMaps(const Database& database, Report* report) {
   std::vector<std::uint64_t> keys;
   report->Try([&] {
@@ -64,11 +64,12 @@ std::vector<MapInfo> ReadableMaps(const Database& database, Report* report) {
   report->Try([&] {
     const LibraryRow library = ReadLibraryRow(database);
     if (library.map_count != keys.size()) {
-      report->Add(database.file() + " is damaged: it says it has " + std::to_string(library.map_count) +
-                  " maps but " + std::to_string(keys.size()) + " are there");
+      report->Add(database.file() + " is damaged: its first entry gives " +
+                  std::to_string(library.map_count) + " maps but " + std::to_string(keys.size()) +
+                  " are there");
     }
     if (library.next_key < next_key)
-      report->Add(database.file() + " is damaged: the next map would get a used key");
+      report->Add(database.file() + " is damaged: the key for the next map is already used");
   });
   return maps;
 }
@@ -78,7 +79,7 @@ void CheckThumbnails(const Database& database, const MapInfo& info) {
   const std::vector<StoredKeyFrame> keyframes = ReadParts(database, info).keyframes;
   for (std::size_t i = 0; i < thumbnails.size(); ++i) {
     if (thumbnails[i].keyframe != keyframes[i].keyframe.id)
-      throw Error("its thumbnails are those of other keyframes");
+      throw Error("its thumbnails belong to other keyframes");
   }
 }
 
@@ -86,25 +87,25 @@ void CheckWords(const Database& database, const MapInfo& info) {
   const std::vector<KeyFrameWords> words = ReadWords(database, info);
   const std::vector<StoredKeyFrame> keyframes = ReadParts(database, info).keyframes;
   for (std::size_t i = 0; i < words.size(); ++i) {
-    if (words[i].keyframe != keyframes[i].keyframe.id) throw Error("its words are those of other keyframes");
+    if (words[i].keyframe != keyframes[i].keyframe.id) throw Error("its words belong to other keyframes");
   }
 }
 
 void CheckMap(const Database& database, const MapInfo& info, int threads,
               std::set<std::string>* wanted_assets, Report* report) {
   report->Try(
-      [&] { WithPlace(database, info, [&] { ReadSnapshot(database, info, MakeSizesOnly, threads); }); });
+      [&] { WithMapContext(database, info, [&] { ReadSnapshot(database, info, MakeSizesOnly, threads); }); });
   report->Try([&] {
-    WithPlace(database, info, [&] {
+    WithMapContext(database, info, [&] {
       const ScenePart scene = ReadScenePart(database, info.key);
       wanted_assets->insert(scene.asset_ids.begin(), scene.asset_ids.end());
     });
   });
   if (SchemaVersion(database) >= kThumbnailsSince) {
-    report->Try([&] { WithPlace(database, info, [&] { CheckThumbnails(database, info); }); });
+    report->Try([&] { WithMapContext(database, info, [&] { CheckThumbnails(database, info); }); });
   }
   if (SchemaVersion(database) >= kWordsSince) {
-    report->Try([&] { WithPlace(database, info, [&] { CheckWords(database, info); }); });
+    report->Try([&] { WithMapContext(database, info, [&] { CheckWords(database, info); }); });
   }
   report->Try([&] {
     Statement count = database.Prepare("SELECT count(*) FROM pictures WHERE map_key = ?");
@@ -133,7 +134,7 @@ void CheckAssets(const Database& database, const std::set<std::string>& wanted, 
   }
 }
 
-// Rows of maps that are not there.
+// Reports rows whose map does not exist.
 void CheckStrays(const Database& database, Report* report) {
   std::vector<const char*> tables = {"parts", "pictures"};
   if (SchemaVersion(database) >= kThumbnailsSince) tables.push_back("thumbnails");

@@ -8,8 +8,8 @@
 
 namespace docent::maps {
 
-// Reads every row of a library, decodes and checks it, and says what is wrong, a sentence each; empty when
-// all is well. The caller holds a read transaction.
+// Reads, decodes and checks every row of a library. Returns one sentence for each error; empty if there is
+// none. The caller holds a read transaction.
 std::vector<std::string> VerifyAll(const Database& database, int threads);
 
 }  // namespace docent::maps

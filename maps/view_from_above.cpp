@@ -15,9 +15,9 @@ namespace {
 const cv::Scalar kPaper(250, 250, 250), kInk(60, 60, 60), kCameraColor(200, 90, 30), kFirstColor(40, 40, 210),
     kTurnedColor(90, 160, 40);
 
-// The part of the sheet that holds all keyframes and all but the outermost points.
+// The area of the plan that contains all keyframes and all points except outliers.
 Eigen::AlignedBox2d Extent(const std::vector<Eigen::Vector2d>& cameras,
-                           const std::vector<Eigen::Vector2d>& points, double ignored_part) {
+                           const std::vector<Eigen::Vector2d>& points, double ignored_ratio) {
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& camera : cameras) box.extend(camera);
   if (points.empty()) return box;
@@ -26,7 +26,7 @@ Eigen::AlignedBox2d Extent(const std::vector<Eigen::Vector2d>& cameras,
     std::vector<double> values;
     for (const Eigen::Vector2d& point : points) values.push_back(point[axis]);
     std::sort(values.begin(), values.end());
-    const auto skipped = static_cast<std::size_t>(ignored_part * static_cast<double>(values.size()));
+    const auto skipped = static_cast<std::size_t>(ignored_ratio * static_cast<double>(values.size()));
     low[axis] = values[skipped];
     high[axis] = values[values.size() - 1 - skipped];
   }
@@ -35,16 +35,16 @@ Eigen::AlignedBox2d Extent(const std::vector<Eigen::Vector2d>& cameras,
   return box;
 }
 
-void DrawScaleBar(double pixels_a_unit, int margin_px, cv::Mat* sheet) {
-  // The longest of 1, 2, 5 times a power of ten that takes at most a third of the width.
-  const double most = sheet->cols / 3.0 / pixels_a_unit;
+void DrawScaleBar(double pixels_per_unit, int margin_px, cv::Mat* sheet) {
+  // The longest of 1, 2 or 5 times a power of ten that takes at most a third of the width.
+  const double most = sheet->cols / 3.0 / pixels_per_unit;
   const double power = std::pow(10.0, std::floor(std::log10(most)));
   const double length = most >= 5 * power ? 5 * power : most >= 2 * power ? 2 * power : power;
   const int y = sheet->rows - margin_px / 2;
-  const int length_px = static_cast<int>(std::lround(length * pixels_a_unit));
+  const int length_px = static_cast<int>(std::lround(length * pixels_per_unit));
   cv::line(*sheet, {margin_px, y}, {margin_px + length_px, y}, kInk, 2, cv::LINE_AA);
   char text[32];
-  std::snprintf(text, sizeof text, "%g units", length);
+  std::snprintf(text, sizeof text, "%g map units", length);
   cv::putText(*sheet, text, {margin_px + length_px + 8, y + 5}, cv::FONT_HERSHEY_SIMPLEX, 0.45, kInk, 1,
               cv::LINE_AA);
 }
@@ -57,8 +57,8 @@ Eigen::Matrix<double, 2, 3> SheetFromMap(const engine::MapSnapshot& map, const E
   if (ahead.norm() < 1e-3) ahead = up.unitOrthogonal();
   ahead.normalize();
   Eigen::Matrix<double, 2, 3> sheet_from_map;
-  sheet_from_map.row(0) = ahead.cross(up);  // to the right of who looks ahead
-  sheet_from_map.row(1) = -ahead;           // down the sheet
+  sheet_from_map.row(0) = ahead.cross(up);  // To the right when facing ahead.
+  sheet_from_map.row(1) = -ahead;           // Down in the plan.
   return sheet_from_map;
 }
 
@@ -72,7 +72,7 @@ cv::Mat DrawFromAbove(const engine::MapSnapshot& map, const Eigen::Vector3d& up,
   for (const engine::MapPoint& point : map.points) {
     if (!point.infinite()) points.push_back(sheet_from_map * point.position());
   }
-  const Eigen::AlignedBox2d box = Extent(cameras, points, options.ignored_part);
+  const Eigen::AlignedBox2d box = Extent(cameras, points, options.ignored_ratio);
   const double room = options.size_px - 2.0 * options.margin_px;
   const double scale = room / std::max(1e-6, box.sizes().maxCoeff());
   const Eigen::Vector2d size = (box.sizes() * scale).array().max(room / 4) + 2.0 * options.margin_px;

@@ -9,20 +9,20 @@
 namespace docent::maps {
 
 struct ViewFromAboveOptions {
-  int size_px = 1024;  // of the image's longer side
+  int size_px = 1024;  // The longer side of the image.
   int margin_px = 48;
-  double ignored_part =
-      0.01;  // of the points at either end of each axis, so that strays do not shrink the rest
+  // Ratio of the points ignored at either end of each axis, so that outliers do not shrink the plan.
+  double ignored_ratio = 0.01;
 };
 
-// From the map to the plan's two axes, right and down, which lie across `up`; the first keyframe looks up the
-// sheet. The map has a keyframe.
+// The projection from the map to the axes of the plan (right, down), which are orthogonal to `up`. The first
+// keyframe's view points up in the plan. The map must have a keyframe.
 Eigen::Matrix<double, 2, 3> SheetFromMap(const engine::MapSnapshot& map, const Eigen::Vector3d& up);
 
-// The plan of a map: its finite points seen along `up` (unit length, in the map), its keyframes as small
-// triangles that point where they look (the first red, panorama keyframes green, the others blue), and a bar
-// of a round length in units of the map, which are metres only where it was started from something of known
-// width. CV_8UC3 in BGR. A pure function; a map without keyframes gives an empty sheet.
+// Draws a plan of a map: its finite points projected along `up` (unit length, in the map), its keyframes as
+// small triangles that point in the viewing direction (the first red, panorama keyframes green, the others
+// blue), and a scale bar of a round length in map units, which are metres only if a known width gave the
+// scale. Returns CV_8UC3 in BGR; an empty plan for a map without keyframes. A pure function.
 cv::Mat DrawFromAbove(const engine::MapSnapshot& map, const Eigen::Vector3d& up,
                       const ViewFromAboveOptions& options = {});
 

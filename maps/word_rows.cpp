@@ -17,9 +17,10 @@ namespace docent::maps {
 
 namespace {
 
-// Of the distance of what a keyframe sees, and the largest turn: what lies within shares most of the image.
-constexpr double kPlaceSize = 0.5;
-constexpr double kPlaceTurn_rad = 35 * std::numbers::pi / 180;
+// Limits for one place, within which most of the image is shared: the distance as a ratio of the median
+// depth, and the angle between the views.
+constexpr double kMaxPlaceDistance = 0.5;
+constexpr double kMaxPlaceAngle_rad = 35 * std::numbers::pi / 180;
 
 [[noreturn]] void Damaged(const char* what) {
   throw Error(std::string("the table of words is damaged: ") + what);
@@ -46,8 +47,8 @@ std::vector<engine::KeyFrameId> PlacesOf(const engine::MapSnapshot& map) {
                     keyframe.camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ(),
                     keyframe.mean_depth};
     const auto near = std::find_if(places.begin(), places.end(), [&](const Place& place) {
-      return (place.center - own.center).norm() <= kPlaceSize * std::min(place.depth, own.depth) &&
-             place.view.dot(own.view) >= std::cos(kPlaceTurn_rad);
+      return (place.center - own.center).norm() <= kMaxPlaceDistance * std::min(place.depth, own.depth) &&
+             place.view.dot(own.view) >= std::cos(kMaxPlaceAngle_rad);
     });
     place_of.push_back(near == places.end() ? own.keyframe : near->keyframe);
     if (near == places.end()) places.push_back(own);
@@ -58,8 +59,8 @@ std::vector<engine::KeyFrameId> PlacesOf(const engine::MapSnapshot& map) {
 engine::WordBag WordsOf(const engine::ImageFeatures& features) {
   const bool has_corners = !features.row_begin[0].empty();
   if (has_corners) return engine::MakeWordBag(features);
-  // Whoever made the features may have had no use for corners.
-  features.Look();
+  // The features may have been made without corners.
+  features.MarkInUse();
   const cv::Mat& image = features.levels[0];
   if (image.cols < kMinImageSidePx || image.rows < kMinImageSidePx) return {};
   return engine::MakeWordBag(*engine::MakeFeatures(image));
@@ -107,13 +108,13 @@ WordTable DecodeWords(std::uint64_t map_key, std::span<const std::uint8_t> bytes
     ByteReader packed(reader.GetBytes(words * sizeof(std::uint16_t)));
     if (reader.failed()) Damaged("it is cut off");
     if (i > 0 && table.keyframes[i - 1].keyframe >= next.keyframe) Damaged("its keyframes are out of order");
-    // Whoever stands for a place came first and stands for itself.
+    // The keyframe that represents a place comes first and represents itself.
     const auto leader = std::lower_bound(
         table.keyframes.begin(), table.keyframes.begin() + static_cast<std::ptrdiff_t>(i) + 1, next.place,
         [](const KeyFrameWords& k, engine::KeyFrameId id) { return k.keyframe < id; });
     if (leader - table.keyframes.begin() > static_cast<std::ptrdiff_t>(i) || leader->keyframe != next.place ||
         leader->place != next.place) {
-      Damaged("a place is none");
+      Damaged("a keyframe has no valid place");
     }
     next.words.reserve(words);
     for (std::size_t w = 0; w < words; ++w) {
@@ -141,7 +142,7 @@ std::vector<KeyFrameWords> ReadWords(const Database& database, const MapInfo& in
   if (!query.Step()) throw Error("its words are missing");
   WordTable table = DecodeWords(info.key, query.Blob(0));
   if (table.keyframes.size() != info.keyframes)
-    throw Error("its words are of fewer or more keyframes than it has");
+    throw Error("the number of its words' keyframes differs from that of its keyframes");
   if (table.vocabulary != VocabularyFingerprint()) return {};
   return std::move(table.keyframes);
 }

@@ -16,7 +16,8 @@
 namespace docent::ui {
 namespace {
 
-// Dear ImGui's own font knows Latin letters only; these cover more, where Debian has put them.
+// Dear ImGui's built-in font covers Latin letters only. These fonts cover more, at the paths that Debian
+// installs them to.
 constexpr std::array<const char*, 2> kFonts = {"/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
                                                "/usr/share/fonts/truetype/noto/NotoSans-Regular.ttf"};
 
@@ -43,7 +44,7 @@ struct AuthoringPanel::Impl {
   void DrawMapSection();
   void DrawPlaceSection();
   void DrawShowSection();
-  // A button that emits this command.
+  // Draws a button that emits this command.
   void CommandButton(const char* label, const char* command) {
     if (ImGui::Button(label)) emit(command);
   }
@@ -58,15 +59,15 @@ AuthoringPanel::AuthoringPanel(Window* window, Emit emit, std::vector<std::strin
   window->MakeCurrent();
   impl_->context = ImGui::CreateContext();
   ImGui::SetCurrentContext(impl_->context);
-  ImGui::GetIO().IniFilename = nullptr;  // it would write a file into the working folder
+  ImGui::GetIO().IniFilename = nullptr;  // Otherwise ImGui writes a file into the working directory.
   ImGui::StyleColorsDark();
   ImGui::GetStyle().WindowRounding = 8.0f;
   ImGui::GetStyle().FrameRounding = 4.0f;
   LoadFont();
-  // The window's own callbacks stay: ImGui calls them after its own.
+  // ImGui chains to the callbacks that the window installed before.
   if (!ImGui_ImplGlfw_InitForOpenGL(window->handle(), true) || !ImGui_ImplOpenGL3_Init("#version 330 core")) {
     ImGui::DestroyContext(impl_->context);
-    throw Error("Cannot show the authoring panel: Dear ImGui does not start on this OpenGL driver.");
+    throw Error("Cannot show the authoring panel: Dear ImGui does not work with this OpenGL driver.");
   }
 }
 
@@ -114,7 +115,7 @@ void AuthoringPanel::Draw() {
 }
 
 void AuthoringPanel::Impl::DrawMapSection() {
-  ImGui::InputTextWithHint("##map name", "name of the new map", &state.map_name);
+  ImGui::InputTextWithHint("##map name", "Name of the new map", &state.map_name);
   ImGui::SameLine();
   if (ImGui::Button("New map") && !state.map_name.empty()) {
     emit(NewMapCommand(state.map_name));
@@ -133,41 +134,41 @@ void AuthoringPanel::Impl::DrawPlaceSection() {
   const auto tool_button = [&](const char* label, Tool tool) {
     if (ImGui::RadioButton(label, state.tool == tool)) state.tool = tool;
   };
-  tool_button("Look", Tool::kNone);
+  tool_button("View only", Tool::kNone);
   ImGui::SameLine();
   tool_button("Place model", Tool::kModel);
   ImGui::SameLine();
   tool_button("Signpost", Tool::kSignpost);
   if (state.tool == Tool::kModel) {
-    ImGui::InputTextWithHint("file", "FILE.glb", &state.model_file);
+    ImGui::InputTextWithHint("Model file", "FILE.glb", &state.model_file);
     for (const std::string& model : models) {
       const std::string label = std::filesystem::path(model).filename().string() + "##" + model;
       if (ImGui::Selectable(label.c_str(), state.model_file == model)) state.model_file = model;
     }
     constexpr double kScaleStep = 0.1, kYawStep = 15.0;
-    ImGui::InputDouble("scale", &state.scale, kScaleStep, 10 * kScaleStep, "%.3g");
-    ImGui::InputDouble("turned by", &state.yaw_deg, kYawStep, 6 * kYawStep, "%.0f deg");
+    ImGui::InputDouble("Scale", &state.scale, kScaleStep, 10 * kScaleStep, "%.3g");
+    ImGui::InputDouble("Rotation", &state.yaw_deg, kYawStep, 6 * kYawStep, "%.0f deg");
     if (!(state.scale > 0)) state.scale = kScaleStep;
-    ImGui::TextUnformatted("Click in the image to place it.");
+    ImGui::TextUnformatted("Click in the image to place the model.");
   } else if (state.tool == Tool::kSignpost) {
-    ImGui::InputTextMultiline("text", &state.sign_text, ImVec2(150.0f, 60.0f));
-    if (ImGui::BeginCombo("points to", state.sign_to_map.empty() ? "nowhere" : state.sign_to_map.c_str())) {
-      if (ImGui::Selectable("nowhere", state.sign_to_map.empty())) state.sign_to_map.clear();
+    ImGui::InputTextMultiline("Text", &state.sign_text, ImVec2(150.0f, 60.0f));
+    if (ImGui::BeginCombo("Leads to", state.sign_to_map.empty() ? "(none)" : state.sign_to_map.c_str())) {
+      if (ImGui::Selectable("(none)", state.sign_to_map.empty())) state.sign_to_map.clear();
       for (const std::string& name : map_names) {
         if (ImGui::Selectable(name.c_str(), state.sign_to_map == name)) state.sign_to_map = name;
       }
       ImGui::EndCombo();
     }
-    ImGui::TextUnformatted("Click in the image to put it up.");
+    ImGui::TextUnformatted("Click in the image to place the signpost.");
   }
 }
 
 void AuthoringPanel::Impl::DrawShowSection() {
-  ImGui::Checkbox("points", &state.show_points);
+  ImGui::Checkbox("Map points", &state.show_points);
   ImGui::SameLine();
-  ImGui::Checkbox("keyframes", &state.show_keyframes);
+  ImGui::Checkbox("Keyframes", &state.show_keyframes);
   ImGui::SameLine();
-  ImGui::Checkbox("status", &state.show_hud);
+  ImGui::Checkbox("Status", &state.show_hud);
 }
 
 bool AuthoringPanel::WantsMouse() const {

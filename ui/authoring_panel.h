@@ -12,17 +12,17 @@
 
 namespace docent::ui {
 
-// The small panel over the image with which a person authors (Dear ImGui): new map, stop map, place model,
-// signpost, undo, redo, save, and what to show. It changes nothing itself: every action leaves as a line of
-// the script language. One in a window, on the window's thread; destroyed before the window.
+// The small authoring panel over the image (Dear ImGui): new map, stop map, place model, signpost, undo,
+// redo, save, and display options. It changes nothing itself: every action is emitted as a line of the script
+// language. One panel per window, used on the window's thread and destroyed before the window.
 class AuthoringPanel {
  public:
   using Emit = std::function<void(std::string command)>;
   enum class Tool { kNone, kModel, kSignpost };
 
-  // The person's choices, shown and changed by the panel, and by whoever owns it (a key, a test).
+  // The user's choices. The panel shows and changes them, and so can its owner (for a key press or a test).
   struct State {
-    Tool tool = Tool::kNone;  // what a click in the image places
+    Tool tool = Tool::kNone;  // What a click in the image places.
     std::string map_name;
     std::string model_file;
     double scale = 1.0, yaw_deg = 0.0;
@@ -30,25 +30,26 @@ class AuthoringPanel {
     bool show_points = false, show_keyframes = false, show_hud = true;
   };
 
-  // models: files to choose from; map_names are the maps that a signpost may point to.
+  // `models` are the files to choose from.
   AuthoringPanel(Window* window, Emit emit, std::vector<std::string> models = {});
   ~AuthoringPanel();
   AuthoringPanel(const AuthoringPanel&) = delete;
   AuthoringPanel& operator=(const AuthoringPanel&) = delete;
 
+  // The maps that a signpost may lead to.
   void SetMapNames(std::vector<std::string> map_names);
   State& state();
-  // Copies the toggles; the overlay's texts stay.
+  // Copies the display options; the overlay's texts are not changed.
   void ApplyTo(Overlay* overlay) const;
 
-  // Draws into the default framebuffer, after the image was presented and before Window::Show.
+  // Draws into the default framebuffer. Call it after the image was presented and before Window::Show.
   void Draw();
-  // Whether the pointer is over the panel or a text field has the keyboard: such events are not the
-  // image's.
+  // Whether the pointer is over the panel or a text field has the keyboard focus; such events must not be
+  // handled as events of the image.
   bool WantsMouse() const;
   bool WantsKeyboard() const;
-  // A click in the image, at one of its pixels: places what the tool says. Without a tool, or with nothing
-  // chosen to place, nothing happens. Answers whether a command was emitted.
+  // Handles a click at this pixel of the image by placing what the selected tool places. Without a tool, or
+  // without a model or text to place, nothing happens. Returns whether a command was emitted.
   bool ClickImage(const Eigen::Vector2d& pixel);
 
  private:

@@ -7,9 +7,9 @@
 #include "engine/geometry/rigid3.h"
 #include "engine/geometry/sim3.h"
 
-// The only place that knows how Docent's camera axes (x right, y down, z forward) relate to OpenGL's eye axes
-// (x right, y up, z backward), and how Eigen's types become glm's. Both frames are right-handed, so that the
-// winding of triangles survives. Metres throughout.
+// The only file that converts between Docent's camera axes (x right, y down, z forward) and OpenGL's eye axes
+// (x right, y up, z backward), and between Eigen's and glm's types. Both frames are right-handed, so the
+// winding order of triangles is preserved. Lengths are in map units.
 namespace docent::ui {
 
 inline glm::vec3 GlmFrom(const Eigen::Vector3d& v) {
@@ -29,24 +29,25 @@ inline glm::mat4 GlmFrom(const engine::Sim3& transform) {
   return GlmFrom(transform.rotation.matrix(), transform.scale, transform.translation);
 }
 
-// A half turn about the x axis; its own inverse.
+// A rotation by 180 degrees about the x axis; it is its own inverse.
 inline Eigen::Matrix3d GlEyeFromCamera() {
   return Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
 }
 
-// The view matrix: OpenGL eye coordinates of a point in the map.
+// The view matrix: it transforms a point from the map to OpenGL eye coordinates.
 inline glm::mat4 GlEyeFromMap(const engine::Rigid3& camera_from_map) {
   return GlmFrom(GlEyeFromCamera() * camera_from_map.rotation.matrix(), 1.0,
                  GlEyeFromCamera() * camera_from_map.translation);
 }
 
-// Part of the image plane z = 1 of a pinhole, in camera axes: tangents of the angles to its borders.
+// A rectangle of a pinhole camera's image plane z = 1, in camera axes. The values are the tangents of the
+// angles from the optical axis to its borders.
 struct TangentBounds {
   double left = -1.0, right = 1.0, top = -1.0, bottom = 1.0;  // x right, y down; left < right, top < bottom
 };
 
-// OpenGL clip coordinates of a point in OpenGL eye coordinates, for a pinhole with these bounds. Depths from
-// near_m to far_m (both positive) fill the depth buffer.
+// Projects from OpenGL eye coordinates to OpenGL clip coordinates for a pinhole camera with these bounds. The
+// depth buffer covers depths from near_m to far_m (both positive, in map units).
 inline glm::mat4 GlClipFromGlEye(const TangentBounds& bounds, double near_m, double far_m) {
   const double width = bounds.right - bounds.left, height = bounds.bottom - bounds.top;
   glm::mat4 clip(0.0f);
@@ -60,8 +61,8 @@ inline glm::mat4 GlClipFromGlEye(const TangentBounds& bounds, double near_m, dou
   return clip;
 }
 
-// Texture coordinates (0..1, OpenGL's origin at the bottom left) at which a texture that was rendered with
-// GlClipFromGlEye shows the direction (x, y, 1) in camera axes.
+// The texture coordinates (0..1, OpenGL's origin at the bottom left) of the direction (x, y, 1) in camera
+// axes, in a texture that was rendered with GlClipFromGlEye.
 inline glm::vec2 GlTextureFromTangent(const TangentBounds& bounds, double x, double y) {
   return glm::vec2((x - bounds.left) / (bounds.right - bounds.left),
                    (bounds.bottom - y) / (bounds.bottom - bounds.top));

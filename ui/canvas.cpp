@@ -9,9 +9,10 @@
 namespace docent::ui {
 namespace {
 
-constexpr std::uint64_t kLabelLifeFrames = 120;  // a text not shown for so long is forgotten
+// Labels that were not drawn for this many frames are deleted.
+constexpr std::uint64_t kLabelLifeFrames = 120;
 
-// Shown at its own size, so it needs no mipmaps.
+// The texture is drawn at its own size, so it needs no mipmaps.
 GlTexture MakeLabelTexture(const cv::Mat& image) {
   GlTexture texture;
   glBindTexture(GL_TEXTURE_2D, texture.name());
@@ -102,7 +103,7 @@ Eigen::Vector2d Canvas::Text(const std::string& text, const TextStyle& style, co
                              double align, double alpha) {
   if (text.empty()) return Eigen::Vector2d::Zero();
   Label& label = FindLabel(text, style);
-  // On whole pixels, so that letters stay as sharp as they were set.
+  // The position is rounded to whole pixels, so that the text stays sharp.
   const Eigen::Vector2d low(std::round(position.x() - align * label.size.x()) - 0.5,
                             std::round(position.y()) - 0.5);
   const Eigen::Vector2d high = low + label.size;
@@ -121,7 +122,7 @@ void Canvas::AddShape(const Eigen::Vector2d& center, const Eigen::Vector2d& half
                       const Eigen::Vector2d& axis, const Vertex& shape) {
   if (!center.allFinite() || !half_size.allFinite()) return;
   const Eigen::Vector2d across(-axis.y(), axis.x());
-  const Eigen::Vector2d reach = half_size.array() + 1.0;  // the smooth edge's outer half
+  const Eigen::Vector2d reach = half_size.array() + 1.0;  // Adds the outer half of the anti-aliased edge.
   Eigen::Vector2d corners[4], locals[4];
   for (int i = 0; i < 4; ++i) {
     locals[i] = {(i == 1 || i == 2 ? 1 : -1) * reach.x(), (i >= 2 ? 1 : -1) * reach.y()};
@@ -130,7 +131,7 @@ void Canvas::AddShape(const Eigen::Vector2d& center, const Eigen::Vector2d& half
   Vertex complete = shape;
   complete.half_width = static_cast<float>(half_size.x());
   complete.half_height = static_cast<float>(half_size.y());
-  // Shapes look at no texture, so they go with whatever run is open.
+  // Shapes use no texture, so they join the current run whatever its texture is.
   if (runs_.empty()) runs_.push_back({0, 0});
   AddQuad(corners, locals, complete);
 }

@@ -12,10 +12,10 @@
 
 namespace docent::ui {
 
-// Flat drawing over an image: boxes, disks, lines and text with smooth edges, in the order of the calls.
-// Coordinates are the image's pixels (the centre of the top-left pixel is (0, 0), y down). Calls only
-// collect; End draws into the bound framebuffer, an image target (row 0 is the top). One thread, one
-// context.
+// Draws anti-aliased 2D shapes (boxes, disks, lines and text) over an image, in the order of the calls.
+// Coordinates are image pixels: the centre of the top-left pixel is (0, 0) and y points down. The calls only
+// collect vertices; End draws them into the bound framebuffer, whose row 0 is the top of the image. Single
+// thread, single context.
 class Canvas {
  public:
   Canvas();
@@ -23,13 +23,13 @@ class Canvas {
   void Begin(int width_px, int height_px);
   void End();
 
-  // stroke_px 0 fills; otherwise a line of that width just inside the edge.
+  // A stroke_px of 0 fills the shape; otherwise an outline of that width is drawn just inside its edge.
   void Box(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double corner_px, const Color& color,
            double stroke_px = 0);
   void Disk(const Eigen::Vector2d& center, double radius_px, const Color& color, double stroke_px = 0);
   void Line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double width_px, const Color& color);
-  // Text with its top at y; align 0, 0.5, 1: `position.x` is its left end, middle, right end. Returns its
-  // size.
+  // Draws text whose top is at position.y. With align 0, 0.5 or 1, position.x is the left end, the middle or
+  // the right end of the text. Returns the size of the text in pixels.
   Eigen::Vector2d Text(const std::string& text, const TextStyle& style, const Eigen::Vector2d& position,
                        double align = 0, double alpha = 1);
   Eigen::Vector2d Measure(const std::string& text, const TextStyle& style);
@@ -43,7 +43,7 @@ class Canvas {
     float half_width, half_height, corner, stroke;
     Color color;
   };
-  struct Run {  // vertices drawn together
+  struct Run {  // Vertices that are drawn with one call, because they use the same texture.
     std::size_t first = 0;
     GLuint texture = 0;
   };

@@ -7,7 +7,7 @@
 namespace docent::ui {
 namespace {
 
-// Independent of the user's locale, unlike printf, and without trailing zeros.
+// Formats a number independently of the user's locale, unlike printf, and without trailing zeros.
 std::string Number(double value) {
   char text[64];
   const double rounded = std::round(value * 100.0) / 100.0;

@@ -20,7 +20,8 @@ int MaxAtlasSide() {
   return std::clamp(static_cast<int>(side), 256, kMaxAtlasSidePx);
 }
 
-// The pixels of a face, in the atlas, that a part of its view covers, with a border for smoothed edges.
+// The rectangle of the atlas that a covered part of a face's view occupies, with a border for anti-aliased
+// edges.
 PixelRectangle RectangleOf(const LensFace& face, const MeshDrawer::Cover& cover) {
   const auto pixels = [](float low, float high, int size) {
     const int first = std::max(0, static_cast<int>(std::floor(low * static_cast<float>(size))) - 1);
@@ -86,8 +87,8 @@ PixelRectangle ContentLayer::DrawAtlas(const engine::Rigid3& camera_from_map, Le
     drawn.push_back(RectangleOf(face, cover));
     passes.push_back({&face, view, drawn.back()});
   }
-  // Transparent again what was drawn last time; clearing and averaging the whole atlas would cost more than
-  // the content itself when there is little of it.
+  // Only the rectangles drawn now or in the previous frame are cleared. Clearing and resolving the whole
+  // atlas would cost more than the content itself when there is little of it.
   std::vector<PixelRectangle> changed = lens->drawn;
   changed.insert(changed.end(), drawn.begin(), drawn.end());
   lens->atlas->BindForDrawing();
@@ -121,7 +122,8 @@ ContentLayer::Lens& ContentLayer::FindLens(const engine::CameraModel& camera) {
   auto lens = std::make_unique<Lens>();
   lens->camera = camera;
   lens->atlas = std::make_unique<RenderTarget>(warp.atlas_width_px, warp.atlas_height_px, samples_, true);
-  // New graphics memory holds anything: all of it counts as drawn until it has been cleared once.
+  // The contents of new graphics memory are undefined, so the whole atlas counts as drawn until it has been
+  // cleared once.
   lens->drawn = {{0, 0, warp.atlas_width_px, warp.atlas_height_px}};
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, lens->lookup.name());

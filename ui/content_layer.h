@@ -17,16 +17,17 @@
 
 namespace docent::ui {
 
-// Draws a scene through a camera's own lens over an image: undistorted with depth and multisampling into the
-// faces of a LensWarp, then pixel by pixel through its lookup. Keeps what is dear to make (lens tables,
-// models on the graphics card, lettered signposts) from one call to the next. One thread, one context.
+// Draws a scene over an image as the camera's lens distorts it. The scene is first rendered undistorted, with
+// depth and multisampling, into the faces of a LensWarp; then each image pixel fetches its colour through the
+// warp's lookup table. Expensive resources (lens tables, models on the graphics card, signpost textures) are
+// cached between calls. Single thread, single context.
 class ContentLayer {
  public:
   ContentLayer(int samples, int max_texture_px);
   ~ContentLayer();
 
-  // Composites over what `image` (an image target of the camera's size: row 0 is the top) holds. Pixels
-  // that no content covers keep their exact values.
+  // Composites the scene over the contents of `image`, an image target of the camera's size whose row 0 is
+  // the top. Pixels that no content covers keep their exact values.
   void Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
             const content::Scene& scene, double animation_seconds, const RenderTarget& image);
   std::size_t cached_models() const { return mesh_drawer_.cached_models(); }
@@ -34,16 +35,17 @@ class ContentLayer {
  private:
   struct Lens {
     engine::CameraModel camera;
-    LensWarp warp;  // its lookup has moved to the texture
+    LensWarp warp;  // Its lookup table was moved to the texture `lookup`.
     GlTexture lookup;
     std::unique_ptr<RenderTarget> atlas;
-    std::vector<PixelRectangle> drawn;  // parts of the atlas that are not transparent
+    std::vector<PixelRectangle> drawn;  // Rectangles of the atlas that are not transparent.
   };
   struct Sign {
     std::shared_ptr<const content::Model> model;
     std::uint64_t last_frame = 0;
   };
-  // Draws the prepared content into the lens's atlas; what of the image it may cover.
+  // Draws the prepared content into the lens's atlas. Returns the part of the image that the content may
+  // cover.
   PixelRectangle DrawAtlas(const engine::Rigid3& camera_from_map, Lens* lens);
   Lens& FindLens(const engine::CameraModel& camera);
   std::vector<ModelInstance> Instances(const content::Scene& scene, const Eigen::Vector3d& eye_in_map,
@@ -53,8 +55,8 @@ class ContentLayer {
   MeshDrawer mesh_drawer_;
   GlProgram warp_program_;
   GlVertexArray empty_vertex_array_;
-  std::vector<std::unique_ptr<Lens>> lenses_;                  // the last used one comes last
-  std::map<std::pair<std::string, std::string>, Sign> signs_;  // by text and target map
+  std::vector<std::unique_ptr<Lens>> lenses_;                  // Ordered by use, the most recently used last.
+  std::map<std::pair<std::string, std::string>, Sign> signs_;  // Keyed by text and target map.
   std::uint64_t frame_ = 0;
 };
 

@@ -30,7 +30,8 @@ std::vector<EGLDisplay> CandidateDisplays() {
 
 EGLContext CreateCoreContext(EGLDisplay display) {
   if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) return EGL_NO_CONTEXT;
-  // Surfaceless displays offer no config with a window or a pbuffer; any config with OpenGL serves.
+  // Surfaceless displays offer no configuration with a window or pbuffer surface, so any configuration with
+  // OpenGL is accepted.
   const EGLint config_attributes[] = {EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
   EGLConfig config = nullptr;
   EGLint count = 0;
@@ -53,7 +54,7 @@ std::string GraphicsContext::DriverName() const {
   return name == nullptr ? std::string() : std::string(reinterpret_cast<const char*>(name));
 }
 
-// Displays are shared by all contexts of the process and so never terminated here.
+// All contexts of the process share the EGL displays, so a display is never terminated here.
 struct OffscreenContext::Impl {
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
@@ -91,7 +92,7 @@ OffscreenContext::~OffscreenContext() = default;
 
 void OffscreenContext::MakeCurrent() {
   if (eglMakeCurrent(impl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl_->context) != EGL_TRUE)
-    throw Error("The graphics driver no longer gives access to the offscreen OpenGL context.");
+    throw Error("The graphics driver can no longer use the offscreen OpenGL context.");
 }
 
 }  // namespace docent::ui

@@ -6,21 +6,21 @@
 
 namespace docent::ui {
 
-// An OpenGL 3.3 core context. It is made current on the thread that constructs it and stays with that thread;
-// whatever draws (Renderer, MapView) must be destroyed before its context.
+// An OpenGL 3.3 core context. Its constructor makes it current on the calling thread, and it belongs to that
+// thread. Objects that draw (Renderer, MapView) must be destroyed before their context.
 class GraphicsContext {
  public:
   virtual ~GraphicsContext() = default;
-  // Makes this context the thread's current one, where several exist. Throws docent::Error when the driver
-  // refuses (the display has gone).
+  // Makes this context current on its thread, which is needed when several contexts exist. Throws
+  // docent::Error when the driver fails to (for instance because the display has gone).
   virtual void MakeCurrent() = 0;
-  // The driver in words ("llvmpipe (LLVM 15.0.6, 256 bits)"). Needs to be current.
+  // The name of the driver ("llvmpipe (LLVM 15.0.6, 256 bits)"). The context must be current.
   std::string DriverName() const;
 };
 
-// A context without window or display, by EGL: Mesa's surfaceless platform first, then any EGL device, then
-// the default display. Draws into framebuffer objects only. Throws docent::Error with one sentence when the
-// machine has no OpenGL 3.3.
+// A context without a window or display, created with EGL: on Mesa's surfaceless platform if possible, else
+// on any EGL device, else on the default display. It can only draw into framebuffer objects. The constructor
+// throws docent::Error with a one-sentence message when the machine has no OpenGL 3.3.
 class OffscreenContext : public GraphicsContext {
  public:
   OffscreenContext();

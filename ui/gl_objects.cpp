@@ -20,7 +20,7 @@ GLuint CompileShader(const char* name, GLenum kind, const std::string& source) {
   std::vector<char> log(4096, '\0');
   glGetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
   glDeleteShader(shader);
-  throw Error(std::string("The OpenGL driver refuses the shader '") + name + "': " + log.data());
+  throw Error(std::string("The OpenGL driver cannot compile the shader '") + name + "': " + log.data());
 }
 
 void CheckFramebuffer(int width_px, int height_px) {

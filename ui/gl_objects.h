@@ -8,9 +8,9 @@
 #include <unordered_map>
 #include <utility>
 
-// Owners of OpenGL objects: each frees its object when it goes, moves, and never copies. They need the
-// context in which they were made to be current from construction to destruction. Private to ui/: only source
-// files and headers that sources alone include may include this one.
+// RAII owners of OpenGL objects. They delete their object on destruction, are movable and cannot be copied.
+// The context in which they were constructed must be current throughout their lives. This header is private
+// to ui/: include it only from source files and from headers that are private to ui/.
 namespace docent::ui {
 
 template <void (*Generate)(GLuint*), void (*Delete)(GLuint)>
@@ -72,7 +72,8 @@ using GlVertexArray = GlHandle<gl_detail::GenerateVertexArray, gl_detail::Delete
 using GlFramebuffer = GlHandle<gl_detail::GenerateFramebuffer, gl_detail::DeleteFramebuffer>;
 using GlRenderbuffer = GlHandle<gl_detail::GenerateRenderbuffer, gl_detail::DeleteRenderbuffer>;
 
-// A linked vertex and fragment shader. Throws docent::Error with the driver's log when they do not compile.
+// A linked vertex and fragment shader. The constructor throws docent::Error with the driver's log when they
+// do not compile.
 class GlProgram {
  public:
   GlProgram(const char* name, const std::string& vertex_source, const std::string& fragment_source);
@@ -81,9 +82,9 @@ class GlProgram {
   GlProgram& operator=(const GlProgram&) = delete;
 
   void Use() const { glUseProgram(name_); }
-  // Location of a uniform, -1 where the compiler removed it (OpenGL ignores writes to -1).
+  // Returns the location of a uniform, or -1 when the compiler removed it (OpenGL ignores writes to -1).
   GLint Uniform(const char* uniform) const;
-  // Binds samplers to texture units 0, 1, 2 … in this order, once and for all.
+  // Assigns the samplers to texture units 0, 1, 2 … in this order. Called once after construction.
   void AssignTextureUnits(std::initializer_list<const char*> samplers) const;
 
  private:
@@ -91,21 +92,21 @@ class GlProgram {
   mutable std::unordered_map<std::string, GLint> locations_;
 };
 
-// Colour (RGBA8) and depth to draw into, with a texture of the result. With samples > 1 drawing goes to
-// multisampled buffers and Resolve averages them into the texture.
+// A colour (RGBA8) and depth buffer to draw into, whose result is available as a texture. With samples > 1,
+// drawing goes to multisampled buffers and Resolve averages them into the texture.
 class RenderTarget {
  public:
-  // samples is lowered to what the driver offers; with_depth is implied by samples > 1.
+  // `samples` is reduced to the driver's maximum; samples > 1 implies with_depth.
   RenderTarget(int width_px, int height_px, int samples, bool with_depth);
 
   int width_px() const { return width_px_; }
   int height_px() const { return height_px_; }
-  // Binds the framebuffer to draw into, with the viewport over all of it.
+  // Binds the framebuffer for drawing and sets the viewport to all of it.
   void BindForDrawing() const;
-  // Makes what was drawn inside this rectangle (OpenGL's origin) readable as texture().
+  // Resolves what was drawn inside this rectangle (OpenGL's origin at the bottom left) into texture().
   void Resolve(int x, int y, int width, int height) const;
   GLuint texture() const { return texture_.name(); }
-  // The framebuffer whose colour is texture().
+  // The framebuffer whose colour attachment is texture().
   GLuint readable_framebuffer() const { return framebuffer_.name(); }
 
  private:
@@ -116,7 +117,7 @@ class RenderTarget {
   GlRenderbuffer multisampled_color_, depth_;
 };
 
-// Draws one triangle that covers the whole viewport; its vertex shader is kFullScreenVertexShader.
+// Draws one triangle that covers the whole viewport. Use it with kFullScreenVertexShader.
 void DrawFullScreenTriangle();
 
 }  // namespace docent::ui

@@ -28,24 +28,32 @@ Eigen::Vector2d OnCircle(const Eigen::Vector2d& center, double radius, double an
   return center + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle));
 }
 
-const char* StateInWords(TrackingState state) {
+const char* StateText(TrackingState state) {
   switch (state) {
     case TrackingState::kInitializing:
-      return "Starting";
+      return "Starting the map…";
     case TrackingState::kSixDof:
       return "Tracking";
     case TrackingState::kHybrid:
-      return "Tracking, with far points";
+      return "Tracking with distant points";
     case TrackingState::kPanorama:
-      return "Turning";
+      return "Tracking rotation only";
     case TrackingState::kLost:
       return "Lost";
     case TrackingState::kRelocalized:
-      return "Found again";
+      return "Position recovered";
     case TrackingState::kDropped:
-      return "Too slow";
+      return "Frame skipped";
   }
   return "";
+}
+
+// The sentence for a mapping status of the session; any other text is shown unchanged.
+std::string MappingText(const std::string& mapping) {
+  if (mapping == "limited") return "Can't extend the map here";
+  if (mapping == "extending") return "Extending the map";
+  if (mapping == "mapped") return "This view is complete";
+  return mapping;
 }
 
 Color QualityColor(engine::TrackingQuality quality) {
@@ -60,7 +68,7 @@ Color QualityColor(engine::TrackingQuality quality) {
   return kPoor;
 }
 
-// Letters grow with the image, so that they stay readable on a large window.
+// Text and lines scale with the image, so that they stay readable in a large window.
 double UnitPx(const Canvas& canvas) {
   return std::clamp(canvas.height_px() / 480.0, 0.5, 4.0);
 }
@@ -79,10 +87,10 @@ void DrawStatus(const View& view, Canvas* canvas) {
   state_style.bold = !named;
   state_style.size_px = (named ? 13 : 17) * unit;
 
-  std::string state = StateInWords(tracked.state);
-  // Where the state says it already the word is not said twice.
+  std::string state = StateText(tracked.state);
+  // During initialization the state already says this.
   if (!view.overlay.mapping.empty() && tracked.state != TrackingState::kInitializing)
-    state += ", " + view.overlay.mapping;
+    state += " · " + MappingText(view.overlay.mapping);
   const Eigen::Vector2d name_size = canvas->Measure(view.overlay.map_name, name_style);
   const Eigen::Vector2d state_size = canvas->Measure(state, state_style);
   const double padding = 8 * unit, dot = 5 * unit;
@@ -106,7 +114,7 @@ void DrawStatus(const View& view, Canvas* canvas) {
   canvas->Box({text_left, bar_top}, {text_left + fill * text_width, bar_top + 4 * unit}, 2 * unit, color);
 }
 
-// A sentence in a panel, its bottom at this height; returns the panel's top.
+// Draws a sentence in a panel whose bottom is at this height. Returns the panel's top.
 double DrawSentence(const std::string& text, double size_px, double bottom, Canvas* canvas) {
   if (text.empty()) return bottom;
   const double unit = UnitPx(*canvas);
@@ -126,14 +134,15 @@ double DrawSentence(const std::string& text, double size_px, double bottom, Canv
   return top;
 }
 
-// Where the wandering lens is: a slow figure that never quite repeats, in units of the dial's radius.
+// The position of the magnifying glass, in units of the dial's radius. The path repeats only after about a
+// minute (2 pi / 0.1 s).
 Eigen::Vector2d SearchPath(double seconds) {
   return {1.05 * std::sin(1.3 * seconds), 0.55 * std::sin(1.7 * seconds + 0.6)};
 }
 
 void DrawSearchFigure(const Eigen::Vector2d& center, double radius, double seconds, Canvas* canvas) {
   canvas->Disk(center, 1.5 * radius, Faded(kPanel, 0.8));
-  // The compass: ticks that turn slowly, and a needle that follows the lens.
+  // The compass: slowly rotating ticks, and a needle that points to the magnifying glass.
   const Eigen::Vector2d lens = center + radius * SearchPath(seconds);
   for (int i = 0; i < 24; ++i) {
     const double angle = 2 * kPi * i / 24 + 0.15 * seconds;
@@ -147,13 +156,13 @@ void DrawSearchFigure(const Eigen::Vector2d& center, double radius, double secon
   canvas->Line(center, OnCircle(center, 1.12 * radius, angle), 0.05 * radius, Faded(kPoor, 0.9));
   canvas->Line(center, OnCircle(center, 0.5 * radius, angle + kPi), 0.05 * radius, Faded(kInk, 0.6));
   canvas->Disk(center, 0.07 * radius, kInk);
-  // Footprints of where it has looked, fading.
+  // Fading marks along the glass's past path.
   for (int i = 14; i >= 1; --i) {
     const double age = 0.11 * i;
     canvas->Disk(center + radius * SearchPath(seconds - age), 0.045 * radius,
                  Faded(kBeam, 0.75 * (1.0 - i / 15.0)));
   }
-  // The lens itself, with a handle that swings a little and a glint that pulses.
+  // The magnifying glass, with a swinging handle and a pulsing glint.
   const double handle = 0.25 * kPi + 0.18 * std::sin(2.1 * seconds);
   canvas->Line(OnCircle(lens, 0.36 * radius, handle), OnCircle(lens, 0.78 * radius, handle), 0.13 * radius,
                {0.62f, 0.40f, 0.22f, 1.0f});
@@ -166,7 +175,7 @@ void DrawMoveFigure(const Eigen::Vector2d& center, double radius, double seconds
   canvas->Box(center - Eigen::Vector2d(1.9, 0.85) * radius, center + Eigen::Vector2d(1.9, 0.85) * radius,
               0.35 * radius, Faded(kPanel, 0.8));
   const double glide = std::sin(1.6 * seconds);
-  for (const double side : {-1.0, 1.0}) {  // the direction of travel shines
+  for (const double side : {-1.0, 1.0}) {  // The arrow in the direction of motion is brighter.
     const double shine = std::clamp(0.35 + 0.65 * side * std::cos(1.6 * seconds), 0.15, 1.0);
     const Eigen::Vector2d tip = center + Eigen::Vector2d(1.7 * side * radius, 0);
     for (const double leg : {-1.0, 1.0})
@@ -182,7 +191,7 @@ void DrawMoveFigure(const Eigen::Vector2d& center, double radius, double seconds
   canvas->Disk(body, 0.16 * radius, Faded(kBeam, 0.5 + 0.3 * glide));
 }
 
-// A straight line of the map, bent as the lens bends it.
+// Draws a straight line of the map, distorted by the lens.
 void DrawMapLine(const Eigen::Vector3d& from_in_camera, const Eigen::Vector3d& to_in_camera,
                  const engine::CameraModel& camera, const Color& color, Canvas* canvas) {
   constexpr int kSteps = 6;
@@ -265,8 +274,8 @@ void DrawHeadsUp(const View& view, Canvas* canvas) {
   if (view.overlay.status) DrawStatus(view, canvas);
   const double bottom =
       DrawSentence(view.overlay.message, 15 * unit, canvas->height_px() - 12 * unit, canvas) - 6 * unit;
-  const std::string& own_hint = tracked.hint;
-  DrawSentence(own_hint.empty() && lost ? "Look back at a place you have seen before." : own_hint, 18 * unit,
+  const std::string& hint = tracked.hint;
+  DrawSentence(hint.empty() && lost ? "Point the camera at a place that is already mapped." : hint, 18 * unit,
                bottom, canvas);
 }
 

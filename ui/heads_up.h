@@ -5,25 +5,26 @@
 #include "ui/inset.h"
 #include "ui/renderer.h"
 
-// The flat layers over the image. Each adds to a canvas between its Begin and End; nothing here keeps
-// state, so that the same View always gives the same image.
+// The 2D layers over the image. Each function draws into a canvas between its Begin and End. The functions
+// keep no state, so the same View always gives the same image.
 namespace docent::ui {
 
-// Colour of a pyramid level, in overlays and in the map view.
+// The colour of a pyramid level in overlays and in the map view.
 Color LevelColor(int level);
 
-// The points of a tracked frame where they were found: disks for inliers, rings for the others.
+// Draws the matched points of a tracked frame: disks for inliers, rings for the others.
 void DrawPoints(const engine::TrackedFrame& tracked, Canvas* canvas);
 
-// Keyframes as small pyramids, through the lens.
+// Draws keyframes as small frusta, distorted by the lens.
 void DrawKeyFrames(const engine::MapSnapshot& map, const engine::CameraModel& camera,
                    const engine::Rigid3& camera_from_map, Canvas* canvas);
 
-// State, map, quality bar, hint and message; while there is no pose also the figure that invites the wearer
-// to search (a lens wandering over a compass) or to move (a camera gliding sideways).
+// Draws the state, map name, quality bar, hint and message. Without a pose it also draws an animated figure
+// that asks the wearer to search (a magnifying glass over a compass) or to move (a camera that moves
+// sideways).
 void DrawHeadsUp(const View& view, Canvas* canvas);
 
-// The frame around another camera's small image: its colour says how that camera is tracked.
+// Draws the border of another camera's inset image; its colour is that camera's tracking quality.
 void DrawInsetFrame(const engine::TrackedFrame& tracked, const Inset& inset, Canvas* canvas);
 
 }  // namespace docent::ui

@@ -43,14 +43,15 @@ void ImageTarget::DrawInset(const cv::Mat& image, const Inset& inset) {
 
 void ImageTarget::DrawImage(const cv::Mat& image, const Inset& area) {
   const int channels = image.channels();
-  // OpenGL skips whole pixels at the end of a row; the rare row step that is no multiple of a pixel is
-  // packed.
+  // OpenGL's row length is a whole number of pixels, so an image whose row step is not (which is rare) is
+  // copied first.
   const cv::Mat source = image.step % image.elemSize() == 0 ? image : image.clone();
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, video_.name());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glPixelStorei(GL_UNPACK_ROW_LENGTH, static_cast<GLint>(source.step / source.elemSize()));
-  // Blue stays first: the shader turns the channels round, which costs less than the driver doing it.
+  // The bytes stay in BGR order: the shader swaps the channels, which costs less than a conversion in the
+  // driver.
   const GLenum format = channels == 3 ? GL_RGB : GL_RED;
   if (video_width_px_ == source.cols && video_height_px_ == source.rows && video_channels_ == channels) {
     glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, source.cols, source.rows, format, GL_UNSIGNED_BYTE, source.data);
@@ -98,7 +99,7 @@ void ImageTarget::Present(int width_px, int height_px) const {
   if (target_ == nullptr || width_px < 1 || height_px < 1) return;
   const Letterbox box = FitImage(target_->width_px(), target_->height_px(), width_px, height_px);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, target_->readable_framebuffer());
-  // The window's row 0 is its bottom, the image's its top.
+  // Row 0 is the bottom of the window but the top of the image.
   glBlitFramebuffer(0, 0, target_->width_px(), target_->height_px(), box.x, height_px - box.y,
                     box.x + box.width, height_px - box.y - box.height, GL_COLOR_BUFFER_BIT, GL_LINEAR);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);

@@ -10,24 +10,26 @@
 
 namespace docent::ui {
 
-// The finished image on the graphics card: row 0 is its top. One thread, one context.
+// The finished image on the graphics card. Framebuffer row 0 is the top of the image. Single thread, single
+// context.
 class ImageTarget {
  public:
   ImageTarget();
-  // Of this size and bound for drawing; what it held is lost when the size changes.
+  // Resizes the target and binds it for drawing. Its contents are lost when the size changes.
   RenderTarget& Bind(int width_px, int height_px);
-  // Fills the bound target with a video image, CV_8UC3 (BGR) or CV_8UC1, any size; an empty one gives a
-  // dark plain. An image of the target's size keeps its exact values.
+  // Fills the bound target with a video image (CV_8UC3 BGR or CV_8UC1) of any size; an empty image gives a
+  // dark background. An image of the target's size keeps its exact pixel values.
   void DrawVideo(const cv::Mat& image);
-  // A second image, drawn small into a part of the target; an empty one draws nothing.
+  // Draws a second image into the `inset` rectangle of the target; an empty image draws nothing.
   void DrawInset(const cv::Mat& image, const Inset& inset);
-  // CV_8UC3 (BGR); reuses the memory of *image when it fits. Empty before the first Bind.
+  // Copies the target to *image as CV_8UC3 (BGR) and reuses its memory if it fits. *image is empty before the
+  // first Bind.
   void ReadBack(cv::Mat* image) const;
-  // Into the default framebuffer, as large as fits and in the middle, black around it.
+  // Copies the target to the default framebuffer, centred and as large as fits, with black borders.
   void Present(int width_px, int height_px) const;
 
  private:
-  // CV_8UC3 or CV_8UC1 into the viewport that is set.
+  // Draws a CV_8UC3 or CV_8UC1 image into the current viewport, which is `area`.
   void DrawImage(const cv::Mat& image, const Inset& area);
 
   std::unique_ptr<RenderTarget> target_;

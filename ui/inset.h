@@ -6,7 +6,7 @@
 
 namespace docent::ui {
 
-// Where the small image of a second camera lies in the large one: pixels of the large image, in its upper
+// The rectangle of the main image, in its pixels, that shows the second camera's image. It lies in the upper
 // right corner.
 struct Inset {
   int x = 0, y = 0, width = 0, height = 0;
@@ -16,9 +16,9 @@ struct Inset {
   }
 };
 
-// All sizes positive. The small image keeps its shape.
+// All sizes are positive. The small image keeps its aspect ratio.
 inline Inset PlaceInset(int width_px, int height_px, int small_width_px, int small_height_px) {
-  constexpr double kShare = 0.28, kMargin = 0.015;  // of the large image's width
+  constexpr double kShare = 0.28, kMargin = 0.015;  // Ratios of the main image's width.
   Inset inset;
   inset.width = std::max(1, static_cast<int>(kShare * width_px));
   inset.height = std::clamp(inset.width * small_height_px / small_width_px, 1, height_px);

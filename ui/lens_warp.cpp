@@ -10,10 +10,10 @@
 namespace docent::ui {
 namespace {
 
-constexpr int kBorderPx = 2;  // beyond the outermost ray, for bilinear fetches
+constexpr int kBorderPx = 2;  // Added beyond the outermost ray for bilinear sampling.
 constexpr int kFacesPerRow = 3;
 
-// The rays of an image, row by row; zero where there is none.
+// The rays of all pixels of an image, row by row; zero where the lens has no ray.
 std::vector<Eigen::Vector3d> RaysOf(const engine::CameraModel& camera) {
   std::vector<Eigen::Vector3d> rays;
   rays.reserve(static_cast<std::size_t>(camera.width_px()) * camera.height_px());
@@ -35,7 +35,7 @@ std::array<engine::Rotation3, 6> CubeFaces() {
           Rotation3::Exp(Eigen::Vector3d(0, 2 * quarter, 0))};  // behind
 }
 
-// Index into CubeFaces of the face that a ray leaves the cube through.
+// The index in CubeFaces of the face that a ray intersects.
 int CubeFaceOf(const Eigen::Vector3d& ray) {
   int axis = 0;
   ray.cwiseAbs().maxCoeff(&axis);
@@ -51,7 +51,7 @@ bool FitsOneFace(const std::vector<Eigen::Vector3d>& rays) {
   });
 }
 
-// Pixels that a unit tangent covers in the middle of the image.
+// The number of pixels per unit of tangent at the centre of the image.
 double MiddleFocalLength(const engine::CameraModel& camera) {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> jacobian;
@@ -73,7 +73,7 @@ void Include(const Eigen::Vector2d& tangent, FaceRange* range) {
   range->bounds.bottom = std::max(range->bounds.bottom, tangent.y());
 }
 
-// Gives the face whole pixels at this focal length (pixels), with a border around its range.
+// Makes a face of whole pixels with this focal length (pixels) and a border around its range.
 LensFace MakeFace(const engine::Rotation3& face_from_camera, const TangentBounds& range, double focal_px) {
   LensFace face;
   face.face_from_camera = face_from_camera;
@@ -87,7 +87,7 @@ LensFace MakeFace(const engine::Rotation3& face_from_camera, const TangentBounds
   return face;
 }
 
-// Faces side by side, three a row.
+// Packs the faces into the atlas, three per row.
 void PlaceFaces(LensWarp* warp) {
   int x = 0, y = 0, row_height = 0;
   warp->atlas_width_px = warp->atlas_height_px = 0;
@@ -107,7 +107,7 @@ void PlaceFaces(LensWarp* warp) {
   }
 }
 
-// Fills warp->tiles from its lookup.
+// Computes warp->tiles from warp->lookup.
 void MeasureTiles(int width_px, int height_px, LensWarp* warp) {
   constexpr int kTile = LensWarp::kTilePx;
   warp->tiles_per_row = (width_px + kTile - 1) / kTile;
@@ -116,7 +116,7 @@ void MeasureTiles(int width_px, int height_px, LensWarp* warp) {
     for (int x = 0; x < width_px; ++x) {
       const glm::vec2& place = warp->lookup[static_cast<std::size_t>(y) * width_px + x];
       if (place.x < 0) continue;
-      // A bilinear fetch reads up to one texel to either side.
+      // Bilinear sampling reads up to one texel to either side.
       const int column = static_cast<int>(place.x * static_cast<float>(warp->atlas_width_px)) - 1;
       const int row = static_cast<int>(place.y * static_cast<float>(warp->atlas_height_px)) - 1;
       warp->tiles[static_cast<std::size_t>(y / kTile) * warp->tiles_per_row + x / kTile].Include(

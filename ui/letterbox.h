@@ -7,20 +7,20 @@
 
 namespace docent::ui {
 
-// Where an image lies in a window that shows it as large as fits, undistorted and in the middle. Window
+// The position of an image in a window that shows it centred, undistorted and as large as fits. Window
 // coordinates have their origin at the top left, y down.
 struct Letterbox {
-  int x = 0, y = 0, width = 1, height = 1;  // of the image, in the window's units
-  double scale = 1;                         // window units an image pixel
+  int x = 0, y = 0, width = 1, height = 1;  // The image's rectangle in window units.
+  double scale = 1;                         // Window units per image pixel.
 
-  // The image's pixel under a point of the window (0, 0 is the window's top-left corner, not its first
-  // pixel's centre); outside the image when it lies beside it.
+  // The image pixel at a point of the window, where (0, 0) is the window's top-left corner and not the centre
+  // of its first pixel. The result lies outside the image when the point is on the border.
   Eigen::Vector2d ImageFromWindow(const Eigen::Vector2d& point) const {
     return (point - Eigen::Vector2d(x, y)) / scale - Eigen::Vector2d(0.5, 0.5);
   }
 };
 
-// All sizes positive.
+// All sizes are positive.
 inline Letterbox FitImage(int image_width, int image_height, int window_width, int window_height) {
   Letterbox box;
   box.scale = std::min(static_cast<double>(window_width) / image_width,

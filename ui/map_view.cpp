@@ -16,7 +16,7 @@
 namespace docent::ui {
 namespace {
 
-constexpr double kHalfViewHeight = 0.42;  // tangent, of the view's half height
+constexpr double kHalfViewHeight = 0.42;  // Tangent of half the vertical field of view.
 const Eigen::Vector3d kUp = -Eigen::Vector3d::UnitY();
 
 engine::CameraModel Pinhole(int width_px, int height_px) {
@@ -26,7 +26,7 @@ engine::CameraModel Pinhole(int width_px, int height_px) {
           {}};
 }
 
-// The value below which this share of the numbers lies; empties give 0.
+// The quantile at this share of the values; 0 if there are none.
 double Quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0;
   const auto index = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -34,7 +34,7 @@ double Quantile(std::vector<double> values, double share) {
   return values[index];
 }
 
-// 1, 2 or 5 times a power of ten, not above `length`.
+// The largest of 1, 2 or 5 times a power of ten that does not exceed `length`.
 double RoundLength(double length) {
   const double power = std::pow(10.0, std::floor(std::log10(length)));
   for (const double step : {5.0, 2.0}) {
@@ -48,7 +48,7 @@ class Drawing {
   Drawing(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map, Canvas* canvas)
       : camera_(camera), camera_from_map_(camera_from_map), canvas_(canvas) {}
 
-  // A level grid through the target, `step_m` wide.
+  // Draws a horizontal grid through the target with a spacing of `step_m` map units.
   void Grid(const Orbit& orbit, double step_m) {
     constexpr int kLines = 10;
     const Eigen::Vector3d middle(std::round(orbit.target.x() / step_m) * step_m, orbit.target.y(),
@@ -63,10 +63,10 @@ class Drawing {
   }
 
   void Wedge(const PredictedRecall& found) {
-    // Strokes from the middle outwards, close enough to each other to fill the eighth.
+    // The octant is filled with lines from the centre outwards that lie close together.
     constexpr int kStrokes = 9;
     constexpr double kHalfEighth = std::numbers::pi / 8 * 0.9;
-    Color color = ShareColor(found.share);
+    Color color = RecallColor(found.share);
     color.alpha = 0.75f;
     const Eigen::Vector3d side = kUp.cross(found.direction);
     const double depth = std::max(1e-9, (camera_from_map_ * found.place).z());
@@ -79,7 +79,7 @@ class Drawing {
     }
   }
 
-  // Far ones first, so that near ones lie over them.
+  // Points are drawn from far to near, so that near ones cover far ones.
   void Points(const engine::MapSnapshot& map) {
     struct Dot {
       double depth;
@@ -99,7 +99,8 @@ class Drawing {
   }
 
  private:
-  // Cut into pieces, so that a line that passes behind the eye still shows its visible part.
+  // The line is divided into pieces, so that a line that passes behind the camera still shows its visible
+  // part.
   void Line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Color& color,
             double width_px = 1.0) {
     constexpr int kPieces = 20;
@@ -138,7 +139,7 @@ void DrawCaption(const std::string& title, const std::string& counts, Canvas* ca
 engine::Rigid3 CameraFromMap(const Orbit& orbit) {
   const double half_pi = std::numbers::pi / 2;
   const double elevation = std::clamp(orbit.elevation, -half_pi, half_pi);
-  // Level axes of the map: at azimuth 0 the eye stands at -z and looks along +z, with +x to its right.
+  // Horizontal axes of the map: at azimuth 0 the viewpoint is at -z and faces +z, with +x to its right.
   const Eigen::Vector3d ahead(std::sin(orbit.azimuth), 0, std::cos(orbit.azimuth));
   const Eigen::Vector3d right(std::cos(orbit.azimuth), 0, -std::sin(orbit.azimuth));
   const Eigen::Vector3d forward = std::cos(elevation) * ahead - std::sin(elevation) * kUp;
@@ -153,13 +154,13 @@ engine::Rigid3 CameraFromMap(const Orbit& orbit) {
 
 std::string MapViewCounts(const engine::MapSnapshot& map, double grid) {
   char counts[160];
-  std::snprintf(counts, sizeof counts, "%zu points, %zu keyframes, grid of %g units", map.points.size(),
-                map.keyframes.size(), grid);
+  std::snprintf(counts, sizeof counts, "%zu points, %zu keyframes, grid spacing %g map units",
+                map.points.size(), map.keyframes.size(), grid);
   return counts;
 }
 
-Color ShareColor(double share) {
-  // Over yellow, so that the middle is neither.
+Color RecallColor(double share) {
+  // The colour goes from red through yellow to green, so that medium values differ from both ends.
   const auto t = static_cast<float>(std::clamp(share, 0.0, 1.0));
   return {std::min(1.0f, 2 - 2 * t) * 0.9f, std::min(1.0f, 2 * t) * 0.8f, 0.15f, 1.0f};
 }

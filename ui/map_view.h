@@ -14,44 +14,46 @@
 
 namespace docent::ui {
 
-// An eye that circles around a point of the map and always looks at it.
+// A viewpoint that circles around a target point of the map and always faces it.
 struct Orbit {
-  Eigen::Vector3d target = Eigen::Vector3d::Zero();  // map, metres
-  double distance_m = 1.0;
-  double azimuth =
-      0.0;  // radians about the map's up axis; 0: the eye is where the map's first camera looks from
-  double elevation = 1.2;  // radians above the horizon, at most pi / 2 (straight above)
+  Eigen::Vector3d target = Eigen::Vector3d::Zero();  // Map coordinates.
+  double distance_m = 1.0;                           // In map units.
+  // Radians about the map's up axis. At 0 the viewpoint lies on the side from which the map's first camera
+  // looks.
+  double azimuth = 0.0;
+  double elevation = 1.2;  // Radians above the horizontal plane, at most pi / 2 (from straight above).
 };
 
-// The eye's pose for an orbit. The map's up axis is -y, as everywhere in Docent.
+// The pose of the viewing camera for an orbit. The map's up axis is -y, as everywhere in Docent.
 engine::Rigid3 CameraFromMap(const Orbit& orbit);
 
-// An orbit from which the whole map (nine tenths of its points, all its keyframes) is seen in an image of
-// these proportions, from above.
+// An orbit that shows the whole map (all keyframes and the central nine tenths of the points along each axis)
+// from above, in an image of this aspect ratio.
 Orbit OrbitAbove(const engine::MapSnapshot& map, double width_over_height = 4.0 / 3.0);
 
-// What stands below the title: how much the map has, and how wide the grid is. In units of the map, which are
-// metres only where it was started from something of known width; a map does not know of that.
+// The text below the title: the size of the map and the spacing of the grid. The spacing is in map units,
+// because a map does not know whether its unit is the metre.
 std::string MapViewCounts(const engine::MapSnapshot& map, double grid);
 
 struct MapViewOptions {
   int width_px = 960, height_px = 720;
-  int samples = 4;
-  int max_texture_px = 1024;
+  int samples = 4;            // As in RendererOptions.
+  int max_texture_px = 1024;  // As in RendererOptions.
 };
 
-// How well a camera that is lost will be found at a place when it looks in a direction: an eighth of a
-// circle, red where it never is, green where it always is.
+// The predicted recall of relocalization for a lost camera at one place and viewing direction. It is drawn as
+// an octant of a disk, from red (never recognized) to green (always recognized).
 struct PredictedRecall {
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();       // map
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // map, level, unit length: the middle of the eighth
-  double side_m = 1;                                     // of the square whose middle is the place
-  double share = 0;                                      // of the attempts that succeed
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // Map coordinates.
+  // Unit vector in the map, horizontal: the central direction of the octant.
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+  double side_m = 1;  // Side of the grid cell that is centred on the place, in map units.
+  double share = 0;   // Ratio of successful attempts.
 };
-Color ShareColor(double share);
+Color RecallColor(double share);
 
-// Draws a map from outside: points by level, keyframes as frusta, the content where it stands, a grid and its
-// scale. Needs a current context from construction to destruction, on one thread.
+// Draws a map from outside: map points coloured by pyramid level, keyframes as frusta, the content, a grid
+// and its spacing. A context must be current from construction to destruction, on one thread.
 class MapView {
  public:
   explicit MapView(const MapViewOptions& options = {});
@@ -59,11 +61,11 @@ class MapView {
   MapView(const MapView&) = delete;
   MapView& operator=(const MapView&) = delete;
 
-  // scene may be null; title is shown in the corner, empty for none. predicted_recall lies on the floor,
-  // under all.
+  // `scene` may be null. `title` is shown in the corner when it is not empty. predicted_recall is drawn on
+  // the ground plane, below everything else.
   void Draw(const engine::MapSnapshot& map, const content::Scene* scene, const Orbit& orbit,
             const std::string& title = {}, const std::vector<PredictedRecall>& predicted_recall = {});
-  // As Renderer's.
+  // See Renderer::Present and Renderer::ReadBack.
   void Present(int width_px, int height_px);
   void ReadBack(cv::Mat* image);
 

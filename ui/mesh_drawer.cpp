@@ -11,13 +11,15 @@
 namespace docent::ui {
 namespace {
 
-// Light of a bright room. Units are such that a white matt surface facing the light is just short of white.
+// The illumination of a bright room. It is scaled so that a white diffuse surface that faces the light is
+// slightly darker than white.
 constexpr glm::vec3 kLightRadiance(2.1f, 2.03f, 1.9f);
 constexpr glm::vec3 kSkyRadiance(0.46f, 0.48f, 0.52f);
 constexpr glm::vec3 kFloorRadiance(0.2f, 0.18f, 0.16f);
-// The depth buffer's far plane is at most this many times as far as its near plane.
+// The largest ratio of the far plane's depth to the near plane's depth.
 constexpr double kMaxDepthRatio = 20000.0;
-constexpr int kMaxJoints = 16384;  // of everything in view together; beyond them skins keep their rest pose
+// For all skins in view together. Skins beyond this limit keep their bind pose.
+constexpr int kMaxJoints = 16384;
 
 const content::Material& DefaultMaterial() {
   static const content::Material kMaterial;
@@ -41,8 +43,8 @@ constexpr std::array<TextureSlot, 5> kSlots = {{
 }};
 constexpr int kJointUnit = static_cast<int>(kSlots.size());
 
-// The lit side is the one that a person at the map's first camera sees: above, before it, a little to its
-// right.
+// The light comes from above, from the side of the map's first camera and slightly from its right, so that it
+// lights the side of the content that a person there sees.
 glm::vec3 DirectionToLight(const glm::vec3& up) {
   const glm::vec3 towards_viewer = glm::vec3(0.45f, 0.0f, -0.75f);
   const glm::vec3 level = towards_viewer - up * glm::dot(up, towards_viewer);
@@ -54,7 +56,8 @@ void Extend(const Box& box, const glm::mat4& transform, Box* result) {
   for (int i = 0; i < 8; ++i) result->Include(glm::vec3(transform * glm::vec4(box.Corner(i), 1.0f)));
 }
 
-// Whether a sphere of the map may show in a view: not behind it, nor outside one of the frustum's sides.
+// Whether a sphere in the map may be visible in a view: it is not behind the camera and not outside a side of
+// the frustum.
 bool IsVisible(const glm::vec3& center, float radius, const TangentBounds& bounds,
                const glm::mat4& eye_from_map) {
   const glm::vec3 eye(eye_from_map * glm::vec4(center, 1.0f));
@@ -82,7 +85,7 @@ void MeshDrawer::Prepare(std::span<const ModelInstance> instances, const glm::ve
   joints_.clear();
   cache_.Sweep();
   for (const ModelInstance& instance : instances) AddInstance(instance);
-  if (joints_.empty()) joints_.emplace_back(1.0f);  // a sampler needs something to look at
+  if (joints_.empty()) joints_.emplace_back(1.0f);  // A sampler needs a non-empty buffer.
   glBindBuffer(GL_TEXTURE_BUFFER, joint_buffer_.name());
   glBufferData(GL_TEXTURE_BUFFER, static_cast<GLsizeiptr>(joints_.size() * sizeof(glm::mat4)), joints_.data(),
                GL_STREAM_DRAW);
@@ -132,7 +135,7 @@ void MeshDrawer::AddNode(const ModelInstance& instance, const std::vector<glm::m
     item.box = box;
     item.center = 0.5f * (box.low + box.high);
     item.radius = 0.5f * glm::length(box.high - box.low);
-    // A pose that is not a number has no place in the image, and would poison the depth range.
+    // An instance whose pose is not finite is left out, because it would make the depth range invalid.
     if (std::isfinite(item.radius) && std::isfinite(glm::dot(item.center, item.center)))
       items_.push_back(std::move(item));
   }
@@ -156,7 +159,7 @@ MeshDrawer::Cover MeshDrawer::Covered(const PinholeView& view) const {
     if (!IsVisible(item.center, item.radius, view.bounds, eye_from_map)) continue;
     for (int i = 0; i < 8; ++i) {
       const glm::vec3 eye(eye_from_map * glm::vec4(item.box.Corner(i), 1.0f));
-      // A box that reaches behind the camera may cover anything.
+      // A box that reaches behind the camera may cover the whole view.
       if (-eye.z <= 0.01f * item.radius) return {glm::vec2(0.0f), glm::vec2(1.0f)};
       const glm::vec2 place = GlTextureFromTangent(view.bounds, eye.x / -eye.z, -eye.y / -eye.z);
       cover.low = glm::min(cover.low, place);
@@ -172,7 +175,7 @@ void MeshDrawer::Draw(const PinholeView& view) {
   const glm::mat4 eye_from_map = GlEyeFromMap(view.camera_from_map);
   struct Visible {
     const Item* item;
-    float depth;  // of the sphere's middle
+    float depth;  // Depth of the bounding sphere's centre.
   };
   std::vector<Visible> opaque, blended;
   double nearest = 1e30, farthest = 0;
@@ -190,7 +193,8 @@ void MeshDrawer::Draw(const PinholeView& view) {
   SetScene(view, GlClipFromGlEye(view.bounds, near_m, farthest) * eye_from_map);
 
   const auto nearer = [](const Visible& a, const Visible& b) { return a.depth < b.depth; };
-  std::stable_sort(opaque.begin(), opaque.end(), nearer);  // hidden fragments then cost nothing
+  std::stable_sort(opaque.begin(), opaque.end(),
+                   nearer);  // Front to back, so that the depth test rejects hidden fragments early.
   std::stable_sort(blended.begin(), blended.end(), nearer);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LEQUAL);
@@ -229,7 +233,7 @@ void MeshDrawer::DrawItem(const Item& item) {
   SetMaterial(item);
   glUniformMatrix4fv(program_.Uniform("map_from_mesh"), 1, GL_FALSE, &item.map_from_mesh[0][0]);
   glUniform1i(program_.Uniform("first_joint"), item.first_joint);
-  glUniform1i(program_.Uniform("turn_normals"), mirrors);
+  glUniform1i(program_.Uniform("flip_normals"), mirrors);
   glFrontFace(mirrors ? GL_CW : GL_CCW);
   glBindVertexArray(item.primitive->vertex_array.name());
   const auto draw = [&] {
@@ -240,7 +244,7 @@ void MeshDrawer::DrawItem(const Item& item) {
     glCullFace(GL_BACK);
     draw();
   } else if (item.material->alpha == content::Material::Alpha::kBlend) {
-    glEnable(GL_CULL_FACE);  // far sides first, so that the near ones blend over them
+    glEnable(GL_CULL_FACE);  // Back faces are drawn first, so that the front faces blend over them.
     glCullFace(GL_FRONT);
     draw();
     glCullFace(GL_BACK);
@@ -272,7 +276,8 @@ void MeshDrawer::SetMaterial(const Item& item) {
 
 void MeshDrawer::SetTexture(const Item& item, int unit, const content::TextureUse& use) {
   const TextureSlot& slot = kSlots[unit];
-  glActiveTexture(GL_TEXTURE0 + unit);  // first, because an upload binds its texture to the active unit
+  glActiveTexture(GL_TEXTURE0 +
+                  unit);  // Must come first, because an upload binds its texture to the active unit.
   const GLuint texture = item.resources->Texture(*item.model, use.texture, slot.is_color);
   glBindTexture(GL_TEXTURE_2D, texture != 0 ? texture : white_.name());
   glUniform1i(program_.Uniform(slot.used), texture != 0);

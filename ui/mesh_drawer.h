@@ -14,7 +14,7 @@
 
 namespace docent::ui {
 
-// A model as it stands in the map at one moment.
+// A model with its pose in the map and its animation time.
 struct ModelInstance {
   std::shared_ptr<const content::Model> model;
   glm::mat4 map_from_model{1.0f};
@@ -22,30 +22,31 @@ struct ModelInstance {
   double seconds = 0;
 };
 
-// A pinhole looking at the map.
+// A pinhole camera with its pose in the map.
 struct PinholeView {
   engine::Rigid3 camera_from_map;
   TangentBounds bounds;
 };
 
-// Draws model instances with depth into the bound framebuffer: opaque and masked primitives first, blended
-// ones after them from far to near. Output is sRGB with premultiplied alpha. One thread, one context.
+// Draws model instances with depth into the bound framebuffer: first opaque and masked primitives, then
+// blended ones from far to near. The output is sRGB with premultiplied alpha. Single thread, single context.
 class MeshDrawer {
  public:
   explicit MeshDrawer(int max_texture_px);
 
-  // Poses the instances; what Draw shows until the next call. Shares ownership of the models until then.
+  // Computes the poses of the instances that Draw shows until the next call. Shares ownership of their models
+  // until then.
   void Prepare(std::span<const ModelInstance> instances, const glm::vec3& up_in_map);
-  // The part of the view that what was prepared may cover, as texture coordinates (0..1, OpenGL's origin);
-  // empty when it covers nothing, and drawing may be left out.
+  // The part of the view that the prepared instances may cover, in texture coordinates (0..1, OpenGL's origin
+  // at the bottom left). If it is empty, nothing is visible and drawing can be skipped.
   struct Cover {
     glm::vec2 low{1.0f}, high{0.0f};
     bool empty() const { return low.x >= high.x || low.y >= high.y; }
   };
   Cover Covered(const PinholeView& view) const;
-  // Draws what was prepared into the current viewport. The depth range is fitted to what is drawn.
+  // Draws the prepared instances into the current viewport. The depth range is fitted to them.
   void Draw(const PinholeView& view);
-  // Models whose graphics memory is held.
+  // The number of models that hold graphics memory.
   std::size_t cached_models() const { return cache_.size(); }
 
  private:
@@ -56,8 +57,8 @@ class MeshDrawer {
     const content::Material* material = nullptr;
     glm::mat4 map_from_mesh{1.0f};
     int first_joint = -1;
-    Box box;                 // in the map
-    glm::vec3 center{0.0f};  // of the sphere around that box
+    Box box;                 // In the map.
+    glm::vec3 center{0.0f};  // Centre of the box's bounding sphere.
     float radius = 0;
   };
 

@@ -95,18 +95,18 @@ GLuint ModelResources::Texture(const content::Model& model, int texture, bool is
   const std::size_t bytes = std::size_t{4} * image.width_px * image.height_px;
   if (image.width_px < 1 || image.height_px < 1 || image.rgba.size() != bytes) return 0;
 
-  cv::Mat image(image.height_px, image.width_px, CV_8UC4, const_cast<std::uint8_t*>(image.rgba.data()));
+  cv::Mat pixels(image.height_px, image.width_px, CV_8UC4, const_cast<std::uint8_t*>(image.rgba.data()));
   const int longest = std::max(image.width_px, image.height_px);
   if (longest > max_texture_px_) {
     const double factor = static_cast<double>(max_texture_px_) / longest;
-    cv::Mat smaller;  // resize would write through `image` into the model otherwise
-    cv::resize(image, smaller,
+    cv::Mat smaller;  // cv::resize must not write through `pixels` into the model.
+    cv::resize(pixels, smaller,
                cv::Size(std::max(1, static_cast<int>(image.width_px * factor)),
                         std::max(1, static_cast<int>(image.height_px * factor))),
                0, 0, cv::INTER_AREA);
-    image = smaller;
+    pixels = smaller;
   }
-  GlTexture uploaded = MakeTexture(image.cols, image.rows, GL_RGBA, image.data, is_color);
+  GlTexture uploaded = MakeTexture(pixels.cols, pixels.rows, GL_RGBA, pixels.data, is_color);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, WrapMode(description.repeat_u, description.mirror_u));
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, WrapMode(description.repeat_v, description.mirror_v));
   if (description.nearest) {
@@ -118,7 +118,7 @@ GLuint ModelResources::Texture(const content::Model& model, int texture, bool is
 
 ModelResources& ModelCache::Get(const std::shared_ptr<const content::Model>& model) {
   Entry& entry = entries_[model.get()];
-  // A new model may lie where one that is gone lay before.
+  // A new model may have the address of a deleted one.
   if (entry.resources == nullptr || entry.model.lock() != model) {
     entry.resources = std::make_unique<ModelResources>(*model, max_texture_px_);
     entry.model = model;

@@ -15,7 +15,7 @@
 
 namespace docent::ui {
 
-// An axis-aligned box; empty while low > high.
+// An axis-aligned box. It is empty while low > high.
 struct Box {
   glm::vec3 low{1e30f}, high{-1e30f};
   bool empty() const { return low.x > high.x; }
@@ -28,26 +28,27 @@ struct Box {
   }
 };
 
-// A content::Primitive on the graphics card, and what is known of it without asking there.
+// A content::Primitive on the graphics card, with the properties that must be known without reading it back.
 struct GpuPrimitive {
   GlVertexArray vertex_array;
   GlBuffer vertices, indices;
   GLsizei index_count = 0;
   int material = -1;
-  Box box;  // of the vertices as stored
-  // For a skinned primitive: the box of the vertices that each joint moves. A posed vertex is a mean of where
-  // its joints put it, so the union of the moved boxes contains the posed primitive.
+  Box box;  // Bounding box of the stored vertices.
+  // For a skinned primitive, the bounding box of the vertices that each joint moves. A posed vertex is a
+  // weighted mean of its positions under its joints, so the union of the transformed boxes contains the posed
+  // primitive.
   std::vector<Box> joint_boxes;
 };
 
-// The graphics memory of one content::Model; textures are uploaded when they are first asked for.
+// The graphics memory of one content::Model. Textures are uploaded on first use.
 class ModelResources {
  public:
-  // Images wider or higher than max_texture_px are stored smaller.
+  // Images wider or higher than max_texture_px are downscaled.
   ModelResources(const content::Model& model, int max_texture_px);
 
   const std::vector<GpuPrimitive>& primitives(int mesh) const { return meshes_[mesh]; }
-  // 0 when the model has no such texture. Colour textures hold sRGB, the others plain numbers.
+  // Returns 0 when the model has no such texture. Colour textures are sRGB, the others linear.
   GLuint Texture(const content::Model& model, int texture, bool is_color);
 
  private:
@@ -56,7 +57,7 @@ class ModelResources {
   std::map<std::pair<int, bool>, GlTexture> textures_;
 };
 
-// Resources of every model in use; those of a model that nobody holds any more are freed by Sweep.
+// The resources of all models in use. Sweep frees those of models that no longer exist.
 class ModelCache {
  public:
   explicit ModelCache(int max_texture_px) : max_texture_px_(max_texture_px) {}
@@ -73,7 +74,7 @@ class ModelCache {
   std::unordered_map<const content::Model*, Entry> entries_;
 };
 
-// A texture of an image in memory, with mipmaps. format: GL_RGBA or GL_BGRA; bytes are packed rows.
+// Makes a texture with mipmaps from an image in memory. `format` is GL_RGBA or GL_BGRA; the rows are packed.
 GlTexture MakeTexture(int width_px, int height_px, GLenum format, const void* bytes, bool is_srgb);
 
 }  // namespace docent::ui

@@ -24,7 +24,8 @@ std::string EndingOf(const std::string& path) {
   return ending;
 }
 
-// OpenCV reports a codec that it cannot use on standard error; trying is part of choosing, and no news.
+// Silences OpenCV, which reports unusable codecs on standard error. Trying a codec is part of the selection,
+// so a failure is no error.
 class QuietOpenCv {
  public:
   QuietOpenCv() : level_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
@@ -57,19 +58,20 @@ struct Recorder::Impl {
       if (writer.open(path, cv::CAP_FFMPEG, codec, frames_per_second, size, true)) return;
     }
     throw Error("Cannot record to '" + path +
-                "': FFmpeg has neither an H.264 nor an MPEG-4 encoder for this kind of file.");
+                "': FFmpeg has no H.264 or MPEG-4 encoder for this file format.");
   }
 };
 
 Recorder::Recorder(const std::string& path, double frames_per_second) : impl_(std::make_unique<Impl>()) {
   constexpr std::array<const char*, 4> kEndings = {".mp4", ".mkv", ".avi", ".mov"};
   if (std::find(kEndings.begin(), kEndings.end(), EndingOf(path)) == kEndings.end())
-    throw Error("Cannot record to '" + path + "': the file's name must end in .mp4, .mkv, .avi or .mov.");
+    throw Error("Cannot record to '" + path + "': the file name must end in .mp4, .mkv, .avi or .mov.");
   if (!(frames_per_second > 0 && frames_per_second <= 1000))
-    throw Error("Cannot record to '" + path + "': the frame rate must lie between 0 and 1000 a second.");
-  // An encoder that cannot write says so only in passing, so it is tried here.
+    throw Error("Cannot record to '" + path +
+                "': the frame rate must be above 0 and at most 1000 frames per second.");
+  // OpenCV's encoder does not report that it cannot open the file, so that is checked here.
   if (!std::ofstream(path, std::ios::binary | std::ios::trunc))
-    throw Error("Cannot record to '" + path + "': the file cannot be written; does its folder exist?");
+    throw Error("Cannot record to '" + path + "': the file cannot be written. Check that its folder exists.");
   impl_->path = path;
   impl_->frames_per_second = frames_per_second;
 }
@@ -78,7 +80,7 @@ Recorder::~Recorder() {
   try {
     Close();
   } catch (const Error&) {
-    // The owner chose not to ask; the file is as complete as it can be.
+    // The owner did not call Close, so the failure is ignored. The file is as complete as possible.
   }
 }
 
@@ -87,8 +89,7 @@ void Recorder::Write(const cv::Mat& image) {
   const cv::Mat& source = image.empty() ? recorder.last : image;
   if (recorder.closed || source.empty()) return;
   if (source.type() != CV_8UC3 && source.type() != CV_8UC1)
-    throw Error("Cannot record to '" + recorder.path +
-                "': an image has neither one nor three channels of bytes.");
+    throw Error("Cannot record to '" + recorder.path + "': an image must have one or three 8-bit channels.");
   if (!recorder.writer.isOpened()) recorder.Open(source);
   cv::Mat frame = source;
   if (frame.channels() == 1) {
@@ -116,11 +117,11 @@ void Recorder::Close() {
     std::filesystem::remove(recorder.path, ignored);
     return;
   }
-  // The encoder keeps its failures to itself; reading the file back tells.
+  // The encoder does not report failures, so the file is read back to check it.
   const QuietOpenCv quiet;
   cv::VideoCapture check(recorder.path, cv::CAP_FFMPEG);
   if (!check.isOpened() || !check.grab())
-    throw Error("The recording '" + recorder.path + "' is not complete; is the disk full?");
+    throw Error("The recording '" + recorder.path + "' is incomplete. Check that the disk is not full.");
 }
 
 }  // namespace docent::ui

@@ -7,23 +7,26 @@
 
 namespace docent::ui {
 
-// Writes images as a video file: H.264 where FFmpeg can encode it, otherwise MPEG-4. One owner, one thread.
+// Writes images to a video file: H.264 if FFmpeg can encode it, otherwise MPEG-4. Single owner, single
+// thread.
 class Recorder {
  public:
-  // path: its ending chooses the container (.mp4, .mkv, .avi, .mov). Throws docent::Error with one sentence
-  // when the file cannot be written or the ending says nothing; a file that was there is replaced.
+  // The extension of `path` selects the container (.mp4, .mkv, .avi, .mov). An existing file is replaced.
+  // Throws docent::Error with a one-sentence message when the file cannot be written or the extension is
+  // unknown.
   Recorder(const std::string& path, double frames_per_second);
-  // Closes the file; whoever wants to hear of a failure calls Close before.
+  // Closes the file and ignores failures; call Close first to be told of them.
   ~Recorder();
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // CV_8UC3 (BGR) or CV_8UC1. The first image fixes the size; later ones of another size are scaled to it.
-  // An odd last row or column is left out, because the encoders take colour by two by two pixels. An empty
-  // image repeats the last one. Throws docent::Error when no encoder takes it.
+  // `image` is CV_8UC3 (BGR) or CV_8UC1. The first image sets the video's size; later images of other sizes
+  // are scaled to it. An odd last row or column is left out, because the encoders subsample colour in blocks
+  // of two by two pixels. An empty image repeats the last one. Throws docent::Error when no encoder accepts
+  // the image.
   void Write(const cv::Mat& image);
-  // Finishes the file. Throws docent::Error when what is on disk is not what was written (a full disk).
-  // Without a single image no file remains. Later calls do nothing.
+  // Finishes the file. Throws docent::Error when the file on disk is incomplete, for instance because the
+  // disk is full. If no image was written, no file remains. Further calls do nothing.
   void Close();
 
  private:

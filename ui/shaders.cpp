@@ -10,7 +10,7 @@ void main() {
 }
 )glsl";
 
-// The video's bytes arrive as they lie in memory (blue first); an image of the target's own size is copied
+// The video's bytes are uploaded in memory order (blue first). An image of the target's own size is copied
 // texel by texel, so that it keeps its exact values.
 const char* const kVideoFragmentShader = R"glsl(#version 330 core
 uniform sampler2D video;
@@ -48,10 +48,10 @@ layout(location = 5) in vec4 vertex_color;
 layout(location = 6) in uvec4 joints;
 layout(location = 7) in vec4 weights;
 uniform mat4 clip_from_map;
-uniform mat4 map_from_mesh;    // of a skinned mesh: map_from_model
-uniform samplerBuffer joint_columns;  // four texels a joint: model_from_bind of this skin
-uniform int first_joint;       // -1: not skinned
-uniform bool turn_normals;     // the transform mirrors
+uniform mat4 map_from_mesh;    // For a skinned mesh this is map_from_model.
+uniform samplerBuffer joint_columns;  // Four texels per joint: model_from_bind.
+uniform int first_joint;       // -1 if the mesh is not skinned.
+uniform bool flip_normals;     // True if map_from_mesh is a reflection.
 out vec3 position_in_map;
 out vec3 normal_in_map;
 out vec4 tangent_in_map;
@@ -75,13 +75,13 @@ void main() {
     map_from_vertex = map_from_mesh * (blended / weight);
   }
   mat3 linear = mat3(map_from_vertex);
-  // The cofactors are the inverse transpose up to a factor, and exist for flat transforms too.
+  // The cofactor matrix equals the inverse transpose up to a factor and also exists for singular transforms.
   mat3 cofactors =
       mat3(cross(linear[1], linear[2]), cross(linear[2], linear[0]), cross(linear[0], linear[1]));
   vec4 place = map_from_vertex * vec4(position, 1.0);
   position_in_map = place.xyz;
-  normal_in_map = cofactors * normal * (turn_normals ? -1.0 : 1.0);
-  tangent_in_map = vec4(linear * tangent.xyz, turn_normals ? -tangent.w : tangent.w);
+  normal_in_map = cofactors * normal * (flip_normals ? -1.0 : 1.0);
+  tangent_in_map = vec4(linear * tangent.xyz, flip_normals ? -tangent.w : tangent.w);
   texture_place[0] = uv0;
   texture_place[1] = uv1;
   tint = vertex_color;
@@ -89,8 +89,8 @@ void main() {
 }
 )glsl";
 
-// glTF 2.0 appendix B: Lambert plus GGX microfacets with Smith's joint visibility and Schlick's Fresnel term,
-// under one directional light and an analytic sky above a floor.
+// The glTF 2.0 appendix B material model: Lambert plus GGX microfacets with Smith's joint visibility term and
+// Schlick's Fresnel term, under one directional light and an analytic sky above a floor.
 const char* const kMeshFragmentShader = R"glsl(#version 330 core
 struct TextureUse {
   bool used;
@@ -112,7 +112,7 @@ uniform float alpha_cutoff;
 uniform bool unlit;
 uniform vec3 eye_in_map;
 uniform vec3 up_in_map;
-uniform vec3 direction_to_light;  // unit, in the map
+uniform vec3 direction_to_light;  // Unit vector in the map.
 uniform vec3 light_radiance, sky_radiance, floor_radiance;
 out vec4 color;
 const float kPi = 3.14159265;
@@ -126,7 +126,7 @@ vec3 Encode(vec3 linear) {  // IEC 61966-2-1
   return mix(12.92 * linear, 1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, linear));
 }
 
-// Leaves colours below the shoulder alone and bends what is brighter towards white.
+// Leaves colours below the shoulder unchanged and compresses brighter ones towards white.
 vec3 Compress(vec3 linear) {
   const float shoulder = 0.75;
   vec3 above = max(linear - shoulder, 0.0) / (1.0 - shoulder);
@@ -142,7 +142,7 @@ vec3 Normal() {
   if (dot(tangent, tangent) > 1e-8 * dot(tangent_in_map.xyz, tangent_in_map.xyz)) {
     tangent = normalize(tangent);
     bitangent = cross(normal, tangent) * tangent_in_map.w;
-  } else {  // no usable tangent in the file: take it from how the texture lies on the screen
+  } else {  // Without a usable vertex tangent, it is computed from screen-space derivatives.
     vec3 dx = dFdx(position_in_map), dy = dFdy(position_in_map);
     vec2 du = dFdx(place), dv = dFdy(place);
     tangent = dx * dv.y - dy * du.y;
@@ -156,8 +156,8 @@ vec3 Normal() {
   return normalize(tangent * local.x + bitangent * local.y + normal * local.z);
 }
 
-// Light that arrives from a direction, blurred with the roughness of what mirrors it.
-vec3 FindReferenceKeyFrame(vec3 direction, float blur) {
+// The radiance of the environment in a direction, blurred by the roughness of the reflecting surface.
+vec3 EnvironmentRadiance(vec3 direction, float blur) {
   float height = dot(direction, up_in_map);
   float width = mix(0.08, 1.0, blur);
   vec3 sky = sky_radiance * mix(1.25, 0.85, smoothstep(0.0, 0.9, height));
@@ -184,8 +184,8 @@ vec3 Shade(vec3 albedo, vec3 normal, float metal, float rough, float occlusion) 
   vec3 direct = ((1.0 - fresnel) * diffuse / kPi + fresnel * min(distribution * visibility, 40.0)) *
                 light_radiance * nl;
   vec3 mirror = f0 + (max(vec3(1.0 - rough), f0) - f0) * pow(1.0 - nv, 5.0);
-  vec3 ambient = diffuse * FindReferenceKeyFrame(normal, 1.0) * (1.0 - mirror) +
-                 mirror * FindReferenceKeyFrame(reflect(-view, normal), rough);
+  vec3 ambient = diffuse * EnvironmentRadiance(normal, 1.0) * (1.0 - mirror) +
+                 mirror * EnvironmentRadiance(reflect(-view, normal), rough);
   return direct + ambient * occlusion;
 }
 
@@ -216,7 +216,7 @@ void main() {
 const char* const kCanvasVertexShader = R"glsl(#version 330 core
 layout(location = 0) in vec2 position_px;
 layout(location = 1) in vec2 local;
-layout(location = 2) in vec4 shape;  // half width, half height, corner radius, stroke width (0: filled)
+layout(location = 2) in vec4 shape;  // Half width, half height, corner radius, stroke width (0: filled).
 layout(location = 3) in vec4 shape_color;
 uniform vec2 target_size;
 out vec2 place;
@@ -230,8 +230,8 @@ void main() {
 }
 )glsl";
 
-// Every shape is a rounded box, filled or stroked, with its edge smoothed over one pixel; a negative half
-// width says that `place` is a texture coordinate instead.
+// Every shape is a rounded box, filled or stroked, with an edge that is anti-aliased over one pixel. A
+// negative half width means that `place` is a texture coordinate instead.
 const char* const kCanvasFragmentShader = R"glsl(#version 330 core
 in vec2 place;
 flat in vec4 form;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The shader texts, GLSL 3.30 core. Colours leave every shader sRGB-encoded with premultiplied alpha.
-// A "image" target keeps the image's top row at the framebuffer's row 0, so that reading it back needs no
-// flip; the content atlas has OpenGL's usual orientation.
+// The shader sources, in GLSL 3.30 core. All output colours are sRGB-encoded with premultiplied alpha. An
+// image target stores the image's top row in framebuffer row 0, so that it can be read back without a flip;
+// the content atlas has OpenGL's usual orientation.
 namespace docent::ui {
 
 extern const char* const kFullScreenVertexShader;

@@ -11,7 +11,8 @@
 namespace docent::ui {
 namespace {
 
-constexpr int kMaxTextWidthPx = 900, kMaxTextHeightPx = 640;  // with padding and strip below 1024
+constexpr int kMaxTextWidthPx = 900,
+              kMaxTextHeightPx = 640;  // With padding and strip, the texture stays below 1024.
 constexpr int kPaddingPx = 28, kStripHeightPx = 84, kStripTextPx = 44;
 constexpr double kWantedAspect = 1.9;
 constexpr float kPoleHeight = 0.7f, kPoleRadius = 0.035f, kThickness = 0.07f, kCornerRadius = 0.09f;
@@ -19,7 +20,7 @@ constexpr float kPoleHeight = 0.7f, kPoleRadius = 0.035f, kThickness = 0.07f, kC
 const cv::Scalar kBoardColor(70, 44, 22, 255), kStripColor(38, 122, 232, 255), kLineColor(225, 236, 244, 255);
 constexpr Color kTextColor{0.97f, 0.96f, 0.92f, 1.0f};
 
-// The text at the largest size at which all of it fits, wrapped to a pleasant shape.
+// Renders the text at the largest size at which all of it fits, wrapped to a balanced aspect ratio.
 cv::Mat LayOutText(const std::string& text) {
   cv::Mat best;
   for (const double size_px : {64.0, 48.0, 34.0, 24.0}) {
@@ -46,7 +47,7 @@ cv::Mat LayOutText(const std::string& text) {
   return best;
 }
 
-// Lays premultiplied BGRA over an opaque image, with its top left corner at (x, y); cut at the border.
+// Blends premultiplied BGRA over an opaque image with its top left corner at (x, y), clipped at the border.
 void Lay(const cv::Mat& over, int x, int y, cv::Mat* image) {
   const cv::Rect inside = cv::Rect(x, y, over.cols, over.rows) & cv::Rect(0, 0, image->cols, image->rows);
   for (int row = inside.y; row < inside.y + inside.height; ++row) {
@@ -69,7 +70,7 @@ void DrawArrow(const cv::Point& tail, int length, cv::Mat* image) {
   cv::fillConvexPoly(*image, head, kLineColor, cv::LINE_AA);
 }
 
-// The whole front of the board, BGRA, opaque.
+// The complete front of the board, BGRA, opaque.
 cv::Mat DrawBoard(const content::Signpost& signpost) {
   const cv::Mat text = LayOutText(signpost.text.empty() ? " " : signpost.text);
   const bool points_on = !signpost.to_map.empty();
@@ -110,7 +111,7 @@ content::Vertex MakeVertex(const glm::vec3& position, const glm::vec3& normal, c
   return vertex;
 }
 
-// A rounded rectangle around (0, 0), counter-clockwise.
+// The outline of a rounded rectangle around (0, 0), counter-clockwise.
 std::vector<glm::vec2> RoundedOutline(const glm::vec2& half_size) {
   constexpr int kSteps = 6;
   std::vector<glm::vec2> outline;
@@ -126,7 +127,8 @@ std::vector<glm::vec2> RoundedOutline(const glm::vec2& half_size) {
   return outline;
 }
 
-// One flat side of the board: a fan over the outline at this z, seen from `facing` (+1 or -1 along z).
+// One flat side of the board at this z: a triangle fan over the outline, visible from `facing` (+1 or -1
+// along z).
 content::Primitive BoardSide(const std::vector<glm::vec2>& outline, const glm::vec2& half_size,
                              float facing) {
   content::Primitive side;
@@ -163,7 +165,7 @@ void AddRim(const std::vector<glm::vec2>& outline, const glm::vec2& half_size, c
   }
 }
 
-// A frustum of a cone about the y axis, closed at the top.
+// A truncated cone about the y axis, closed at the top.
 void AddCone(float bottom, float top, float bottom_radius, float top_radius, content::Primitive* body) {
   constexpr int kSides = 16;
   const auto first = static_cast<std::uint32_t>(body->vertices.size());
@@ -210,7 +212,7 @@ std::shared_ptr<const content::Model> MakeSignpostModel(const content::Signpost&
   model->textures.push_back(texture);
   content::Material front;
   front.base_color_texture.texture = 0;
-  front.unlit = true;  // letters must be readable whatever the light
+  front.unlit = true;  // The text must be readable in any light.
   content::Material body_material;
   body_material.base_color = glm::vec4(0.55f, 0.47f, 0.38f, 1.0f);
   body_material.metallic = 0.0f;

@@ -45,8 +45,8 @@ bool TextStyle::operator==(const TextStyle& other) const {
 }
 
 std::string ReadableText(std::string_view text, std::size_t max_bytes) {
-  // Cutting may split a character, which the repair below then turns into one replacement character; an
-  // ellipsis there is more honest.
+  // The text is cut between characters: a split character would become a replacement character in the
+  // conversion below.
   const bool cut = text.size() > max_bytes;
   if (cut) {
     std::size_t length = max_bytes;
@@ -69,7 +69,7 @@ std::string ReadableText(std::string_view text, std::size_t max_bytes) {
 }
 
 cv::Mat DrawText(std::string_view text, const TextStyle& style, bool* is_cut) {
-  // Measured on a surface of one pixel, then drawn on one of the right size.
+  // The text is measured on a surface of one pixel and then drawn on a surface of the right size.
   const Surface probe(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, 1, 1));
   const Cairo probe_cairo(cairo_create(probe.get()));
   const std::string readable = ReadableText(text);
@@ -77,7 +77,8 @@ cv::Mat DrawText(std::string_view text, const TextStyle& style, bool* is_cut) {
   if (is_cut != nullptr) *is_cut = pango_layout_is_ellipsized(layout.get()) != FALSE;
   PangoRectangle ink, logical;
   pango_layout_get_pixel_extents(layout.get(), &ink, &logical);
-  // Centred lines start right of the layout's own left edge; slanted letters reach beyond the logical box.
+  // Centred lines start to the right of the layout's left edge, and slanted letters extend beyond the logical
+  // box.
   const int left = std::min(ink.x, logical.x), top = std::min(ink.y, logical.y);
   const int right = std::max(ink.x + ink.width, logical.x + logical.width);
   const int bottom = std::max(ink.y + ink.height, logical.y + logical.height);

@@ -13,23 +13,24 @@ struct Color {
 };
 
 struct TextStyle {
-  double size_px = 16;  // height of the font's em
+  double size_px = 16;  // Height of the font's em.
   bool bold = false;
-  bool centered = false;    // each line within the block
-  int max_width_px = 600;   // lines wrap there
-  int max_height_px = 400;  // what does not fit is cut and ends with an ellipsis
+  bool centered = false;    // Centres each line within the block.
+  int max_width_px = 600;   // Longer lines are wrapped.
+  int max_height_px = 400;  // Text that does not fit is cut off with an ellipsis.
   Color color;
 
   bool operator==(const TextStyle& other) const;
 };
 
-// What may be shown of any bytes: valid UTF-8 (broken sequences become the replacement character), control
-// characters other than line ends become spaces, at most max_bytes long.
+// Converts any bytes to displayable text: valid UTF-8, in which broken sequences become the replacement
+// character and control characters other than line ends become spaces. Text longer than max_bytes is cut off
+// with an ellipsis.
 std::string ReadableText(std::string_view text, std::size_t max_bytes = 4096);
 
-// Sets text with Pango. CV_8UC4, blue first, premultiplied alpha, just as large as the text, at most
-// max_width_px by max_height_px, at least 1x1. Whatever the text is, ReadableText of it is set. is_cut, if
-// not null, says whether something had to be left out.
+// Renders text with Pango to a CV_8UC4 image (BGRA, premultiplied alpha) that is as large as the text, at
+// least 1x1 and at most max_width_px by max_height_px. The text is passed through ReadableText first.
+// *is_cut, if not null, is set to whether part of the text was left out.
 cv::Mat DrawText(std::string_view text, const TextStyle& style, bool* is_cut = nullptr);
 
 }  // namespace docent::ui

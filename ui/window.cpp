@@ -2,7 +2,7 @@
 #include "ui/window.h"
 
 #include <epoxy/gl.h>
-// GLFW brings its own OpenGL header unless told that there is one.
+// GLFW includes its own OpenGL header unless this is defined.
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
@@ -13,7 +13,8 @@
 namespace docent::ui {
 namespace {
 
-// GLFW is one library for the whole process: started with the first window, ended with the last.
+// GLFW is one library for the whole process. It is initialized with the first window and terminated with the
+// last.
 int window_count = 0;
 
 std::string LastProblem() {
@@ -22,7 +23,7 @@ std::string LastProblem() {
   return description == nullptr ? std::string("unknown reason") : std::string(description);
 }
 
-// Empty for keys that Docent has no word for.
+// Returns an empty name for keys that Docent does not use.
 std::string NameOf(int key) {
   if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z)
     return std::string(1, static_cast<char>('a' + key - GLFW_KEY_A));

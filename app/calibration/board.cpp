@@ -18,8 +18,8 @@ namespace docent::app {
 
 namespace {
 
-constexpr double kMarkerShare = 0.74;  // of a square's side
-constexpr int kMarkerCells = 5 + 2;    // with the black border
+constexpr double kMarkerRatio = 0.74;  // Marker side over square side.
+constexpr int kMarkerCells = 5 + 2;    // Five data cells and the black border.
 
 cv::Ptr<cv::aruco::Dictionary> Markers() {
   return cv::aruco::getPredefinedDictionary(cv::aruco::DICT_5X5_250);
@@ -28,10 +28,10 @@ cv::Ptr<cv::aruco::Dictionary> Markers() {
 cv::Ptr<cv::aruco::CharucoBoard> CharucoOf(const BoardSpec& board) {
   const auto side = static_cast<float>(board.square_m);
   return cv::aruco::CharucoBoard::create(board.columns, board.rows, side,
-                                         static_cast<float>(kMarkerShare) * side, Markers());
+                                         static_cast<float>(kMarkerRatio) * side, Markers());
 }
 
-// OpenCV's y axis of a ChArUco board points up the sheet.
+// The y axis of OpenCV's ChArUco boards points up, that of the board frame down.
 double Flipped(const BoardSpec& board, double y) {
   return board.rows * board.square_m - y;
 }
@@ -43,11 +43,11 @@ void AddMarker(const BoardSpec& board, const std::vector<cv::Point3f>& corners, 
     left = std::min<double>(left, corner.x);
     top = std::min(top, Flipped(board, corner.y));
   }
-  const double cell = kMarkerShare * board.square_m / kMarkerCells;
+  const double cell = kMarkerRatio * board.square_m / kMarkerCells;
   cv::Mat bits;
   Markers()->drawMarker(id, kMarkerCells, bits, 1);
   for (int row = 0; row < kMarkerCells; ++row) {
-    // Neighbours in a row become one rectangle, so that no seam shows between them on paper.
+    // Adjacent cells of a row become one rectangle, so that no seam between them is printed.
     for (int begin = 0; begin < kMarkerCells;) {
       int end = begin;
       while (end < kMarkerCells && bits.at<uchar>(row, end) == 0) ++end;
@@ -68,10 +68,10 @@ struct DestroyContext {
 
 BoardSpec ParseBoard(const std::string& text) {
   const auto fail = [&]() -> BoardSpec {
-    throw Error(
-        "'" + text +
-        "' is no calibration board; write checkerboard:9x6:25 (inner corners, millimetres a square) or "
-        "charuco:8x6:30 (squares).");
+    throw Error("'" + text +
+                "' is not a calibration board; use checkerboard:9x6:25 (inner corners, square size in "
+                "millimetres) or "
+                "charuco:8x6:30 (squares, square size in millimetres).");
   };
   const std::string_view whole = text;
   const std::size_t first = whole.find(':'), second = whole.rfind(':');
@@ -89,7 +89,7 @@ BoardSpec ParseBoard(const std::string& text) {
   const auto columns = ParseInteger(size.substr(0, cross)), rows = ParseInteger(size.substr(cross + 1));
   const auto square_mm = ParseNumber(whole.substr(second + 1));
   if (!columns || !rows || !square_mm) return fail();
-  // More squares than this have more markers than the dictionary.
+  // A larger ChArUco board needs more markers than the dictionary has (250).
   if (*columns < 3 || *rows < 3 || *columns > 22 || *rows > 22) return fail();
   if (!(*square_mm >= 1 && *square_mm <= 1000)) return fail();
   board.columns = static_cast<int>(*columns);
@@ -134,7 +134,8 @@ std::vector<InkRectangle> InkOf(const BoardSpec& board) {
 }
 
 cv::Mat PaintBoard(const BoardSpec& board, int pixels_per_square) {
-  // Every edge of a marker's cell would need a whole pixel; four times finer and averaged is near enough.
+  // The edges of marker cells do not fall on whole pixels, so the board is drawn four times finer and
+  // averaged.
   constexpr int kFiner = 4;
   const double scale = kFiner * pixels_per_square / board.square_m;
   const Eigen::Vector2d size = SheetSize(board) * scale;
@@ -153,7 +154,7 @@ cv::Mat PaintBoard(const BoardSpec& board, int pixels_per_square) {
 void PrintBoard(const BoardSpec& board, const std::filesystem::path& path) {
   constexpr double kPointsPerMetre = 72 / 0.0254, kMargin_m = 0.012;
   const Eigen::Vector2d sheet = SheetSize(board);
-  // A4, the longer side along the board's, unless the board needs more.
+  // A4 in the orientation of the board, or a larger page if the board needs it.
   const double across = std::max(sheet.x() >= sheet.y() ? 0.297 : 0.210, sheet.x() + 2 * kMargin_m);
   const double down = std::max(sheet.x() >= sheet.y() ? 0.210 : 0.297, sheet.y() + 2 * kMargin_m + 0.01);
   const std::unique_ptr<cairo_surface_t, DestroySurface> surface(
@@ -170,7 +171,7 @@ void PrintBoard(const BoardSpec& board, const std::filesystem::path& path) {
   cairo_set_font_size(page, 0.0035);
   cairo_move_to(page, kMargin_m / 2, down - 0.004);
   const std::string note = "Docent " + FormatBoard(board) + ": print at 100 %; a square is " +
-                           FormatNumber(board.square_m * 1000, 6) + " mm. Glue it to something flat.";
+                           FormatNumber(board.square_m * 1000, 6) + " mm. Glue it to a flat surface.";
   cairo_show_text(page, note.c_str());
   cairo_show_page(page);
   cairo_surface_finish(surface.get());
@@ -191,7 +192,8 @@ BoardView BoardDetector::Detect(const cv::Mat& image, bool thorough) const {
 BoardView BoardDetector::DetectCheckerboard(const cv::Mat& grey, bool thorough) const {
   const cv::Size size(board_.columns, board_.rows);
   std::vector<cv::Point2f> corners;
-  // The search by the pattern's sectors is quick and knows bad light; the classic one finds smaller squares.
+  // The sector-based search is fast and tolerates uneven lighting; the classic search detects smaller
+  // squares.
   if (!cv::findChessboardCornersSB(grey, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE) &&
       !(thorough && cv::findChessboardCorners(grey, size, corners,
                                               cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE |
@@ -217,30 +219,33 @@ BoardView BoardDetector::DetectCharuco(const cv::Mat& grey) const {
   const int columns = board_.columns - 1, rows = board_.rows - 1;
   std::vector<std::optional<Eigen::Vector2d>> guesses(static_cast<std::size_t>(columns * rows));
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    // OpenCV counts corners from the sheet's bottom row, or from its top, by version; their places say which.
+    // Depending on its version, OpenCV numbers the corners from the top or the bottom row, so rows and
+    // columns are computed from the corner positions.
     const cv::Point3f& point = charuco->chessboardCorners[static_cast<std::size_t>(corner_ids[i])];
     const auto column = std::lround(point.x / board_.square_m) - 1;
     const auto row = std::lround(Flipped(board_, point.y) / board_.square_m) - 1;
     guesses[static_cast<std::size_t>(row * columns + column)] = Eigen::Vector2d(corners[i].x, corners[i].y);
   }
-  // A marker begins so far from the square's edge; a little less, because a blurred marker reaches farther.
-  constexpr double kClear = 0.5 * (1 - kMarkerShare) - 0.03;
-  constexpr std::size_t kFewest = 8;
+  // The distance from the square's edge to the marker, less a margin for the blur of the marker, as a ratio
+  // of the square's side.
+  constexpr double kClear = 0.5 * (1 - kMarkerRatio) - 0.03;
+  constexpr std::size_t kMinCorners = 8;
   BoardView view = Refine(grey, guesses, columns, kClear);
   for (Eigen::Vector2d& point : view.points_on_board) point.array() += board_.square_m;
-  return view.pixels.size() < kFewest ? BoardView() : view;
+  return view.pixels.size() < kMinCorners ? BoardView() : view;
 }
 
 BoardView BoardDetector::Refine(const cv::Mat& grey,
                                 const std::vector<std::optional<Eigen::Vector2d>>& guesses, int columns,
-                                double clear_share) const {
+                                double clear_ratio) const {
   const int rows = static_cast<int>(guesses.size()) / columns;
   const auto at = [&](int column, int row) -> std::optional<Eigen::Vector2d> {
     if (column < 0 || row < 0 || column >= columns || row >= rows) return std::nullopt;
     return guesses[static_cast<std::size_t>(row * columns + column)];
   };
-  // How far a square reaches: half of the way between both neighbours, or all of the way to the only one.
-  const auto reach = [&](int column, int row, int right, int down) -> std::optional<Eigen::Vector2d> {
+  // Extent of a square in the image: half the distance between both neighbours, or the distance to the only
+  // one.
+  const auto extent = [&](int column, int row, int right, int down) -> std::optional<Eigen::Vector2d> {
     const auto here = at(column, row), before = at(column - right, row - down),
                after = at(column + right, row + down);
     if (before && after) return 0.5 * (*after - *before);
@@ -253,9 +258,9 @@ BoardView BoardDetector::Refine(const cv::Mat& grey,
     for (int column = 0; column < columns; ++column) {
       const auto guess = at(column, row);
       if (!guess) continue;
-      const auto along_row = reach(column, row, 1, 0), along_column = reach(column, row, 0, 1);
+      const auto along_row = extent(column, row, 1, 0), along_column = extent(column, row, 0, 1);
       if (!along_row || !along_column) continue;
-      const auto corner = RefineCorner(grey, {*guess, *along_row, *along_column}, clear_share);
+      const auto corner = RefineCorner(grey, {*guess, *along_row, *along_column}, clear_ratio);
       if (!corner) continue;
       view.points_on_board.emplace_back(board_.square_m * column, board_.square_m * row);
       view.pixels.push_back(*corner);

@@ -19,22 +19,22 @@ namespace {
 using engine::CameraModel;
 using engine::LensModel;
 
-std::vector<BoardView> Take(const std::vector<BoardView>& views, const std::vector<std::size_t>& which) {
-  std::vector<BoardView> taken;
-  for (const std::size_t i : which) taken.push_back(views[i]);
-  return taken;
+std::vector<BoardView> Select(const std::vector<BoardView>& views, const std::vector<std::size_t>& indices) {
+  std::vector<BoardView> selected;
+  for (const std::size_t i : indices) selected.push_back(views[i]);
+  return selected;
 }
 
-// Leaves out views that no lens could fit: a corner taken for another, an image blurred by motion.
+// Rejects views that no lens could fit, because corners were confused or the image is blurred by motion.
 std::vector<BoardView> WithoutOutliers(const std::vector<BoardView>& views, const LensSolution& solution,
-                                       double sigmas) {
+                                       double max_error_ratio) {
   std::vector<double> sorted = solution.view_rms_px;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
                    sorted.end());
-  const double usual = sorted[sorted.size() / 2];
+  const double median = sorted[sorted.size() / 2];
   std::vector<BoardView> kept;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    if (solution.view_rms_px[i] <= std::max(sigmas * usual, 0.05)) kept.push_back(views[i]);
+    if (solution.view_rms_px[i] <= std::max(max_error_ratio * median, 0.05)) kept.push_back(views[i]);
   }
   return kept;
 }
@@ -50,14 +50,14 @@ std::optional<Fitted> Fit(LensModel lens, int width_px, int height_px, const std
   auto solution = SolveLens(lens, width_px, height_px, views);
   if (!solution) return std::nullopt;
   Fitted fitted;
-  fitted.views = WithoutOutliers(views, *solution, options.max_outlier_sigmas);
+  fitted.views = WithoutOutliers(views, *solution, options.max_view_error_ratio);
   if (fitted.views.size() < options.min_views) return std::nullopt;
   if (fitted.views.size() < views.size()) {
     solution = RefineLens(solution->camera, fitted.views);
     if (!solution) return std::nullopt;
   }
   if (fitted.views.size() > options.max_views) {
-    fitted.views = Take(fitted.views, ChooseViews(solution->information, options.max_views));
+    fitted.views = Select(fitted.views, ChooseViews(solution->information, options.max_views));
     solution = RefineLens(solution->camera, fitted.views);
     if (!solution) return std::nullopt;
   }
@@ -68,7 +68,7 @@ std::optional<Fitted> Fit(LensModel lens, int width_px, int height_px, const std
   return fitted;
 }
 
-const char* InWords(LensModel lens) {
+const char* LensName(LensModel lens) {
   switch (lens) {
     case LensModel::kRadialTangential:
       return "radial-tangential";
@@ -80,24 +80,25 @@ const char* InWords(LensModel lens) {
   return "";
 }
 
-std::string VerdictOf(const Calibration& calibration, int width_px) {
-  // What counts is the error against the image's size: half a pixel of 640 is good for a tracker.
+std::string Assess(const Calibration& calibration, int width_px) {
+  // The error is compared relative to an image width of 640 pixels.
   const double error = calibration.cross_validated_px * 640 / width_px;
-  std::string verdict = error < 0.35 && calibration.focal_sigma < 0.002  ? "Good"
-                        : error < 0.8 && calibration.focal_sigma < 0.006 ? "Usable"
-                                                                         : "Poor";
-  verdict += ": the " + std::string(InWords(calibration.camera.lens())) +
-             " lens predicts corners it has not seen to " + FormatNumber(calibration.cross_validated_px, 3) +
-             " px, and its focal length is known to " + FormatNumber(100 * calibration.focal_sigma, 2) + " %";
+  std::string text = error < 0.35 && calibration.focal_sigma < 0.002  ? "Good"
+                     : error < 0.8 && calibration.focal_sigma < 0.006 ? "Usable"
+                                                                      : "Poor";
+  text += ": the " + std::string(LensName(calibration.camera.lens())) + " lens has an error of " +
+          FormatNumber(calibration.cross_validated_px, 3) +
+          " px on views that were not used for the fit, and the focal length is accurate to " +
+          FormatNumber(100 * calibration.focal_sigma, 2) + " %";
   if (calibration.coverage < 0.6) {
-    verdict += "; the board was seen in only " + FormatNumber(std::round(100 * calibration.coverage), 3) +
-               " % of the image, so do not trust its corners";
+    text += "; the board covered only " + FormatNumber(std::round(100 * calibration.coverage), 3) +
+            " % of the image, so the calibration is unreliable in the image corners";
   } else if (calibration.focal_sigma >= 0.002) {
-    verdict += "; tilt the board more";
+    text += "; tilt the board more";
   } else if (error >= 0.8) {
-    verdict += "; check that the board is flat and the images sharp";
+    text += "; check that the board is flat and the images are sharp";
   }
-  return verdict + ".";
+  return text + ".";
 }
 
 }  // namespace
@@ -106,8 +107,8 @@ std::vector<std::size_t> ChooseViews(const std::vector<Eigen::MatrixXd>& informa
   std::vector<std::size_t> chosen;
   if (information.empty()) return chosen;
   const Eigen::Index size = information.front().rows();
-  // Units of pixels and of distortion coefficients differ by orders of magnitude: each number is measured in
-  // what all views together know of it.
+  // Pixels and distortion coefficients differ by orders of magnitude, so each parameter is scaled by the
+  // square root of its information from all views.
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(size, size);
   for (const Eigen::MatrixXd& view : information) all += view;
   const Eigen::VectorXd scale = all.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
@@ -161,21 +162,21 @@ Calibration Calibrate(const std::vector<BoardView>& views, int width_px, int hei
   if (views.size() < options.min_views) {
     throw Error("The board was found in only " + std::to_string(views.size()) +
                 " images; a calibration needs " + std::to_string(options.min_views) +
-                " different views of it, and twenty make a good one.");
+                " different views, and twenty or more give a good result.");
   }
   std::vector<LensModel> models = {LensModel::kRadialTangential, LensModel::kFov, LensModel::kKannalaBrandt};
   if (options.lens) models = {*options.lens};
   std::optional<Fitted> best;
   for (const LensModel lens : models) {
     auto fitted = Fit(lens, width_px, height_px, views, options);
-    // Between models that predict equally well the first one is the better known.
+    // Among models with nearly equal errors the earlier one is preferred, because it is in wider use.
     if (fitted && (!best || fitted->cross_validated_px < 0.99 * best->cross_validated_px))
       best = std::move(fitted);
   }
   if (!best) {
     throw Error(
-        "No lens explains where the board was seen; tilt the board in the views, and check its number of "
-        "squares.");
+        "No lens model fits the views of the board; tilt the board in different directions, and check its "
+        "number of squares.");
   }
   Calibration calibration;
   const LensSolution& solution = best->solution;
@@ -191,16 +192,16 @@ Calibration Calibrate(const std::vector<BoardView>& views, int width_px, int hei
   calibration.cross_validated_px = best->cross_validated_px;
   calibration.focal_sigma = solution.FocalSigma();
   calibration.principal_sigma_px = std::max(solution.sigma[2], solution.sigma[3]);
-  calibration.coverage = coverage.Share();
-  calibration.verdict = VerdictOf(calibration, width_px);
+  calibration.coverage = coverage.Ratio();
+  calibration.assessment = Assess(calibration, width_px);
   calibration.views = std::move(best->views);
   return calibration;
 }
 
 std::string FormatCalibration(const Calibration& calibration, const BoardSpec& board) {
   std::string text = FormatCalibration(calibration.camera);
-  text += "# How it was made, and how good it is.\n";
-  text += "verdict: \"" + calibration.verdict + "\"\n";
+  text += "# How this calibration was made, and its quality.\n";
+  text += "assessment: \"" + calibration.assessment + "\"\n";
   text += "board: \"" + FormatBoard(board) + "\"\n";
   text += "views: " + std::to_string(calibration.views_used) + "\n";
   text += "corners: " + std::to_string(calibration.corners) + "\n";
@@ -220,13 +221,13 @@ void Coverage::Add(const BoardView& view) {
   }
 }
 
-double Coverage::Share() const {
+double Coverage::Ratio() const {
   return static_cast<double>(std::count(seen_.begin(), seen_.end(), true)) /
          static_cast<double>(seen_.size());
 }
 
 std::string Coverage::Advice() const {
-  // The ninth of the image with the most unseen cells.
+  // Finds the ninth of the image with the most missing cells.
   static constexpr const char* kRowNames[] = {"upper", "middle", "lower"};
   static constexpr const char* kColumnNames[] = {"left", "middle", "right"};
   std::array<std::array<int, 3>, 3> missing{};
@@ -245,7 +246,7 @@ std::string Coverage::Advice() const {
     }
   }
   if (at_row < 0) return {};
-  if (at_row == 1 && at_column == 1) return "show the board in the middle";
+  if (at_row == 1 && at_column == 1) return "show the board in the centre";
   return std::string("show the board at the ") + kRowNames[at_row] + " " + kColumnNames[at_column];
 }
 
@@ -265,9 +266,10 @@ double Movement(const BoardView& from, const BoardView& to) {
 }
 
 bool IsNewView(const BoardView& view, const std::vector<BoardView>& before, int width_px) {
-  constexpr double kOfWidth = 1.0 / 30;
-  return std::none_of(before.begin(), before.end(),
-                      [&](const BoardView& other) { return Movement(other, view) < kOfWidth * width_px; });
+  constexpr double kMinMovement = 1.0 / 30;  // Ratio of the image width.
+  return std::none_of(before.begin(), before.end(), [&](const BoardView& other) {
+    return Movement(other, view) < kMinMovement * width_px;
+  });
 }
 
 }  // namespace docent::app

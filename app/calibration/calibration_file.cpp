@@ -43,7 +43,7 @@ LensModel NeedLens(const YamlReader& file, const std::string& field, const std::
   const std::optional<LensModel> lens = LensFromName(name);
   if (!lens) {
     throw Error(file.name() + ": the field '" + field + "' names the lens model '" + name +
-                "', which is none of pinhole, fov and kannala_brandt.");
+                "', which is not pinhole, fov or kannala_brandt.");
   }
   return *lens;
 }
@@ -56,7 +56,7 @@ CameraModel Checked(const YamlReader& file, LensModel lens, const CameraModel::I
   return CameraModel(lens, intrinsics, distortion);
 }
 
-// A coefficient list of any length; what the lens model does not know must be zero.
+// Converts a coefficient list of any length. Coefficients beyond those of the lens model must be zero.
 Distortion NeedDistortion(const YamlReader& file, const std::string& field, LensModel lens,
                           const std::vector<double>& values) {
   const std::size_t used = lens == LensModel::kRadialTangential ? 5
@@ -68,7 +68,7 @@ Distortion NeedDistortion(const YamlReader& file, const std::string& field, Lens
       distortion[i] = values[i];
     } else if (values[i] != 0) {
       throw Error(file.name() + ": the field '" + field + "' has " + std::to_string(values.size()) +
-                  " coefficients, but the lens model knows only the first " + std::to_string(used) + ".");
+                  " coefficients, but the lens model has only " + std::to_string(used) + ".");
     }
   }
   return distortion;
@@ -94,12 +94,12 @@ CameraModel FromOwn(const YamlReader& file) {
   return Checked(file, lens, intrinsics, distortion);
 }
 
-// OpenCV's own files and ROS camera_info: a 3x3 camera matrix and a list of coefficients.
+// Reads OpenCV's own files and ROS camera_info: a 3x3 camera matrix and a list of coefficients.
 CameraModel FromMatrix(const YamlReader& file, const std::string& matrix_field) {
   const std::vector<double> k = file.Numbers(matrix_field);
   if (k.size() != 9) throw Error(file.name() + ": the field '" + matrix_field + "' is not a 3x3 matrix.");
   if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
-    throw Error(file.name() + ": the field '" + matrix_field + "' has skew or is no camera matrix.");
+    throw Error(file.name() + ": the field '" + matrix_field + "' has skew or is not a camera matrix.");
   }
   const auto need = [&](std::initializer_list<const char*> fields) {
     const std::string field = file.FirstOf(fields);
@@ -114,7 +114,7 @@ CameraModel FromMatrix(const YamlReader& file, const std::string& matrix_field) 
   LensModel lens = LensModel::kRadialTangential;
   if (const std::string field = file.FirstOf({"distortion_model", "model"}); !field.empty()) {
     lens = NeedLens(file, field, file.Text(field));
-  } else if (file.NumberOr("fisheye_model", 0) != 0) {  // as OpenCV's calibration sample writes it
+  } else if (file.NumberOr("fisheye_model", 0) != 0) {  // Written by OpenCV's calibration sample.
     lens = LensModel::kKannalaBrandt;
   }
   const std::string field = need({"distortion_coefficients", "distortion_coeffs", "dist_coeffs", "D", "d"});
@@ -132,7 +132,7 @@ CameraModel FromEuroc(const YamlReader& file) {
   const std::string camera_model = file.TextOr("camera_model", "pinhole");
   if (camera_model != "pinhole") {
     throw Error(file.name() + ": the field 'camera_model' is '" + camera_model +
-                "', only 'pinhole' is known.");
+                "', but only 'pinhole' is supported.");
   }
   const LensModel lens = NeedLens(file, "distortion_model", file.TextOr("distortion_model", "none"));
   const std::string field = file.Has("distortion_coeffs") ? "distortion_coeffs" : "distortion_coefficients";
@@ -205,13 +205,13 @@ void CheckImageSize(const CameraModel& camera, int width_px, int height_px, cons
     return std::to_string(width) + "x" + std::to_string(height);
   };
   const std::string own = size(camera.width_px(), camera.height_px());
-  // A few pixels in a thousand are a codec's rounding.
+  // Codecs round image sizes, which changes the aspect ratio by a few thousandths.
   const double shape = static_cast<double>(camera.width_px()) * height_px / camera.height_px() / width_px;
   const std::string advice = std::abs(shape - 1) < 0.005
-                                 ? "take images of that size (--camera-format " + own +
-                                       ") or calibrate at this one (docent calibrate)"
-                                 : "their shape differs too, so another part of the lens is seen: calibrate "
-                                   "at this size (docent calibrate)";
+                                 ? "use images of that size (--camera-format " + own +
+                                       ") or calibrate at the image size (docent calibrate)"
+                                 : "their aspect ratio differs too, so calibrate at the image size (docent "
+                                   "calibrate)";
   throw Error("The images of " + source + " are " + size(width_px, height_px) + " pixels, but " +
               calibration + " is for " + own + "; " + advice + ".");
 }

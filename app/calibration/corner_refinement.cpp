@@ -16,8 +16,8 @@ struct Sample {
   double brightness;
 };
 
-// brightness = middle + contrast * Edge(first) * Edge(second), where Edge is a step blurred by a Gaussian and
-// an edge is the line through the corner whose normal has the given direction.
+// Model: brightness = middle + contrast * Edge(first) * Edge(second). Edge is a step function blurred by a
+// Gaussian; each edge is a line through the corner, given by the direction of its normal.
 struct Crossing {
   enum { kX, kY, kFirst, kSecond, kMiddle, kContrast, kBlur, kCount };
   using Numbers = Eigen::Matrix<double, kCount, 1>;
@@ -54,25 +54,27 @@ struct Crossing {
   }
 };
 
-// The pixels around the guess that belong to the four squares and not to what is printed inside them.
-std::vector<Sample> SamplesOf(const cv::Mat& grey, const CornerGuess& guess, double clear_share) {
-  constexpr double kFarthest_px = 9;  // beyond it edges may be bent
-  constexpr double kOfSquare = 0.42;  // beyond it the guess's error could reach the next corner's edges
+// Samples the pixels around the guess that belong to the four squares, without the area in which a marker may
+// be printed.
+std::vector<Sample> SamplesOf(const cv::Mat& grey, const CornerGuess& guess, double clear_ratio) {
+  constexpr double kMaxDistance_px = 9;  // Farther away, lens distortion may bend the edges.
+  constexpr double kMaxSquares = 0.42;   // Farther away, an inaccurate guess could include other edges.
   std::vector<Sample> samples;
   Eigen::Matrix2d pixel_from_squares;
   pixel_from_squares << guess.along_row, guess.along_column;
   if (std::abs(pixel_from_squares.determinant()) < 4) return samples;
   const Eigen::Matrix2d squares_from_pixel = pixel_from_squares.inverse();
-  const int reach = static_cast<int>(kFarthest_px);
+  const int reach = static_cast<int>(kMaxDistance_px);
   const int x0 = static_cast<int>(std::lround(guess.pixel.x())),
             y0 = static_cast<int>(std::lround(guess.pixel.y()));
   for (int y = y0 - reach; y <= y0 + reach; ++y) {
     for (int x = x0 - reach; x <= x0 + reach; ++x) {
       const Eigen::Vector2d offset = Eigen::Vector2d(x, y) - guess.pixel;
       const Eigen::Vector2d squares = (squares_from_pixel * offset).cwiseAbs();
-      if (offset.norm() > kFarthest_px || squares.maxCoeff() > kOfSquare || squares.minCoeff() > clear_share)
+      if (offset.norm() > kMaxDistance_px || squares.maxCoeff() > kMaxSquares ||
+          squares.minCoeff() > clear_ratio)
         continue;
-      // A corner whose reference_keyframe are cut off would be pulled to the side that is left.
+      // A window that is cut off by the image border would bias the corner towards the remaining side.
       if (x < 0 || y < 0 || x >= grey.cols || y >= grey.rows) return {};
       samples.push_back({{x, y}, static_cast<double>(grey.at<uchar>(y, x))});
     }
@@ -83,13 +85,13 @@ std::vector<Sample> SamplesOf(const cv::Mat& grey, const CornerGuess& guess, dou
 double SumOfSquares(const std::vector<Sample>& samples, const Crossing& crossing) {
   double sum = 0;
   for (const Sample& sample : samples) {
-    const double miss = crossing.At(sample.pixel, nullptr) - sample.brightness;
-    sum += miss * miss;
+    const double residual = crossing.At(sample.pixel, nullptr) - sample.brightness;
+    sum += residual * residual;
   }
   return sum;
 }
 
-// Middle and contrast follow from the edges by a straight line.
+// For given edges, the model is linear in middle and contrast, which are solved here in closed form.
 void FitBrightness(const std::vector<Sample>& samples, Crossing* crossing) {
   crossing->numbers[Crossing::kMiddle] = 0;
   crossing->numbers[Crossing::kContrast] = 1;
@@ -103,7 +105,7 @@ void FitBrightness(const std::vector<Sample>& samples, Crossing* crossing) {
   crossing->numbers.segment<2>(Crossing::kMiddle) = left.ldlt().solve(right);
 }
 
-// Levenberg and Marquardt's method; answers with the sum of squares.
+// Levenberg-Marquardt optimization. Returns the sum of squared residuals.
 double Fit(const std::vector<Sample>& samples, Crossing* crossing) {
   constexpr int kIterations = 40;
   constexpr double kSharpest_px = 0.25, kSoftest_px = 5;
@@ -113,9 +115,9 @@ double Fit(const std::vector<Sample>& samples, Crossing* crossing) {
     normal.setZero();
     Crossing::Numbers right = Crossing::Numbers::Zero(), slope;
     for (const Sample& sample : samples) {
-      const double miss = crossing->At(sample.pixel, &slope) - sample.brightness;
+      const double residual = crossing->At(sample.pixel, &slope) - sample.brightness;
       normal += slope * slope.transpose();
-      right -= slope * miss;
+      right -= slope * residual;
     }
     normal.diagonal() *= 1 + damping;
     normal.diagonal().array() += 1e-9;
@@ -139,21 +141,22 @@ double Fit(const std::vector<Sample>& samples, Crossing* crossing) {
 }  // namespace
 
 std::optional<Eigen::Vector2d> RefineCorner(const cv::Mat& grey, const CornerGuess& guess,
-                                            double clear_share) {
-  const std::vector<Sample> samples = SamplesOf(grey, guess, clear_share);
+                                            double clear_ratio) {
+  const std::vector<Sample> samples = SamplesOf(grey, guess, clear_ratio);
   if (samples.size() < 2 * Crossing::kCount) return std::nullopt;
   Crossing crossing;
-  // The edges run along rows and columns, so their normals stand across.
+  // The edges run along rows and columns, so their normals are perpendicular to these.
   const auto normal_of = [](const Eigen::Vector2d& along) { return std::atan2(along.x(), -along.y()); };
   crossing.numbers << guess.pixel, normal_of(guess.along_column), normal_of(guess.along_row), 0, 1, 1.2;
   FitBrightness(samples, &crossing);
   const double sum = Fit(samples, &crossing);
-  constexpr double kLeastContrast = 6, kWorstMiss = 0.35, kFarthest = 0.34;
+  // Contrast in grey levels, RMS residual over contrast, and correction over the side of the square.
+  constexpr double kMinContrast = 6, kMaxResidualRatio = 0.35, kMaxCorrection = 0.34;
   const double contrast = std::abs(crossing.numbers[Crossing::kContrast]);
-  const double miss = std::sqrt(sum / static_cast<double>(samples.size()));
+  const double residual = std::sqrt(sum / static_cast<double>(samples.size()));
   const double side = std::min(guess.along_row.norm(), guess.along_column.norm());
-  if (!(contrast >= kLeastContrast && miss <= kWorstMiss * contrast)) return std::nullopt;
-  if (!((crossing.corner() - guess.pixel).norm() <= kFarthest * side)) return std::nullopt;
+  if (!(contrast >= kMinContrast && residual <= kMaxResidualRatio * contrast)) return std::nullopt;
+  if (!((crossing.corner() - guess.pixel).norm() <= kMaxCorrection * side)) return std::nullopt;
   return crossing.corner();
 }
 

@@ -18,7 +18,7 @@ using engine::LensModel;
 using engine::Rigid3;
 using engine::Rotation3;
 
-using Numbers = std::array<double, 9>;  // fx fy cx cy, distortion
+using Numbers = std::array<double, 9>;  // fx fy cx cy, distortion.
 
 std::optional<CameraModel> MakeCamera(LensModel lens, int width_px, int height_px, const double* numbers) {
   CameraModel::Intrinsics intrinsics{width_px, height_px, numbers[0], numbers[1], numbers[2], numbers[3]};
@@ -35,7 +35,7 @@ Numbers NumbersOf(const CameraModel& camera) {
   return numbers;
 }
 
-// Derivative of Exp(w) x by w is -[Exp(w) x] LeftJacobian(w) (Barfoot 2017, section 7.1.5).
+// The derivative of Exp(w) x by w is -[Exp(w) x] LeftJacobian(w) (Barfoot 2017, section 7.1.5).
 Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& w) {
   const double angle = w.norm();
   const Eigen::Matrix3d hat = engine::Hat(w);
@@ -44,7 +44,8 @@ Eigen::Matrix3d LeftJacobian(const Eigen::Vector3d& w) {
          (angle - std::sin(angle)) / (angle * angle * angle) * hat * hat;
 }
 
-// All corners of one view. Parameters: the intrinsics, and the pose as rotation vector and translation.
+// Reprojection residuals of all corners of one view. Parameter blocks: the intrinsics, and the pose as
+// rotation vector and translation.
 class ViewCost : public ceres::CostFunction {
  public:
   ViewCost(LensModel lens, int width_px, int height_px, const BoardView* view)
@@ -57,29 +58,30 @@ class ViewCost : public ceres::CostFunction {
   bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
     const auto camera = MakeCamera(lens_, width_px_, height_px_, parameters[0]);
     if (!camera) return false;
-    const Eigen::Map<const Eigen::Vector3d> turn(parameters[1]), shift(parameters[1] + 3);
-    const Eigen::Matrix3d rotation = Rotation3::Exp(turn).matrix(), left = LeftJacobian(turn);
+    const Eigen::Map<const Eigen::Vector3d> rotation_vector(parameters[1]), translation(parameters[1] + 3);
+    const Eigen::Matrix3d rotation = Rotation3::Exp(rotation_vector).matrix(),
+                          left = LeftJacobian(rotation_vector);
     double* const pose_jacobian = jacobians ? jacobians[1] : nullptr;
     for (std::size_t i = 0; i < view_->pixels.size(); ++i) {
       const Eigen::Vector2d& on_board = view_->points_on_board[i];
-      const Eigen::Vector3d turned = rotation.leftCols<2>() * on_board;
+      const Eigen::Vector3d rotated = rotation.leftCols<2>() * on_board;
       Eigen::Vector2d pixel;
       Eigen::Matrix<double, 2, 3> by_point;
-      if (!camera->Project(turned + shift, &pixel, &by_point)) return false;
+      if (!camera->Project(rotated + translation, &pixel, &by_point)) return false;
       Eigen::Map<Eigen::Vector2d>(residuals + 2 * i) = pixel - view_->pixels[i];
       if (pose_jacobian == nullptr) continue;
       Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> by_pose(pose_jacobian + 12 * i);
-      by_pose.leftCols<3>() = -by_point * engine::Hat(turned) * left;
+      by_pose.leftCols<3>() = -by_point * engine::Hat(rotated) * left;
       by_pose.rightCols<3>() = by_point;
     }
-    return !jacobians || !jacobians[0] || DeriveByIntrinsics(parameters, rotation, shift, jacobians[0]);
+    return !jacobians || !jacobians[0] || DeriveByIntrinsics(parameters, rotation, translation, jacobians[0]);
   }
 
  private:
-  // Central differences: the camera models have no derivatives by their own numbers, which only calibration
-  // needs, and a step of a millionth is exact to ten digits.
+  // Central differences, because the camera models have no derivatives with respect to their intrinsics,
+  // which only calibration needs. With a step of 1e-6 they are exact to ten digits.
   bool DeriveByIntrinsics(const double* const* parameters, const Eigen::Matrix3d& rotation,
-                          const Eigen::Vector3d& shift, double* jacobian) const {
+                          const Eigen::Vector3d& translation, double* jacobian) const {
     const int count = IntrinsicCount(lens_);
     for (int n = 0; n < count; ++n) {
       const double step = 1e-6 * std::max(1.0, std::abs(parameters[0][n]));
@@ -92,7 +94,7 @@ class ViewCost : public ceres::CostFunction {
       const auto above = MakeCamera(lens_, width_px_, height_px_, high.data());
       if (!below || !above) return false;
       for (std::size_t i = 0; i < view_->pixels.size(); ++i) {
-        const Eigen::Vector3d point = rotation.leftCols<2>() * view_->points_on_board[i] + shift;
+        const Eigen::Vector3d point = rotation.leftCols<2>() * view_->points_on_board[i] + translation;
         const auto a = below->Project(point), b = above->Project(point);
         if (!a || !b) return false;
         const Eigen::Vector2d slope = (*b - *a) / (2 * step);
@@ -108,7 +110,8 @@ class ViewCost : public ceres::CostFunction {
   const BoardView* const view_;
 };
 
-// The pose of a plane from the rays of its corners, by the homography between them (Zhang 2000, section 3.1).
+// Estimates the pose of a plane from the rays of its corners through the homography between plane and rays
+// (Zhang 2000, section 3.1).
 std::optional<Rigid3> PoseFromRays(const CameraModel& camera, const BoardView& view) {
   std::vector<Eigen::Vector3d> rays;
   std::vector<Eigen::Vector2d> points;
@@ -119,7 +122,7 @@ std::optional<Rigid3> PoseFromRays(const CameraModel& camera, const BoardView& v
     points.push_back(view.points_on_board[i]);
   }
   if (rays.size() < 4) return std::nullopt;
-  // Metres of the board about its middle, scaled to one, so that the equations are well conditioned.
+  // Board points are centred and scaled to at most one, so that the equations are well conditioned.
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const auto& point : points) middle += point / static_cast<double>(points.size());
   double scale = 0;
@@ -127,7 +130,7 @@ std::optional<Rigid3> PoseFromRays(const CameraModel& camera, const BoardView& v
   if (scale <= 0) return std::nullopt;
   Eigen::MatrixXd equations(3 * rays.size(), 9);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    // ray x (H p) = 0, which holds for rays of any direction.
+    // ray x (H p) = 0 holds for rays of any direction, also beyond 90 degrees.
     const Eigen::Matrix3d cross = engine::Hat(rays[i]);
     const Eigen::Vector3d p((points[i].x() - middle.x()) / scale, (points[i].y() - middle.y()) / scale, 1);
     for (int column = 0; column < 3; ++column)
@@ -163,11 +166,13 @@ struct Problem {
 };
 
 std::array<double, 6> PoseNumbers(const Rigid3& pose) {
-  const Eigen::Vector3d turn = pose.rotation.Log();
-  return {turn.x(), turn.y(), turn.z(), pose.translation.x(), pose.translation.y(), pose.translation.z()};
+  const Eigen::Vector3d rotation = pose.rotation.Log();
+  return {rotation.x(),         rotation.y(),         rotation.z(),
+          pose.translation.x(), pose.translation.y(), pose.translation.z()};
 }
 
-// Minimizes in place. Answers with half the sum of squares, or empty when the start is none.
+// Minimizes in place. Returns half the sum of squared residuals; empty when the initial values are not
+// usable.
 std::optional<double> Minimize(const std::vector<BoardView>& views, int iterations, bool fixed_lens,
                                Problem* problem) {
   ceres::Problem ceres_problem;
@@ -197,7 +202,7 @@ std::optional<double> Minimize(const std::vector<BoardView>& views, int iteratio
   return summary.final_cost;
 }
 
-// What the views say at the solution: residuals, and the intrinsics' information with the poses eliminated.
+// Evaluates the solution: residuals, and the information of the intrinsics with the poses eliminated.
 std::optional<LensSolution> Describe(const std::vector<BoardView>& views, const Problem& problem) {
   const auto camera = MakeCamera(problem.lens, problem.width_px, problem.height_px, problem.numbers.data());
   if (!camera) return std::nullopt;
@@ -218,8 +223,9 @@ std::optional<LensSolution> Describe(const std::vector<BoardView>& views, const 
     squares += residuals.squaredNorm();
     corners += static_cast<double>(views[i].pixels.size());
     solution.view_rms_px.push_back(std::sqrt(2 * residuals.squaredNorm() / static_cast<double>(size)));
-    const Eigen::Map<const Eigen::Vector3d> turn(problem.poses[i].data()), shift(problem.poses[i].data() + 3);
-    solution.camera_from_board.emplace_back(Rotation3::Exp(turn), shift);
+    const Eigen::Map<const Eigen::Vector3d> rotation_vector(problem.poses[i].data()),
+        translation(problem.poses[i].data() + 3);
+    solution.camera_from_board.emplace_back(Rotation3::Exp(rotation_vector), translation);
     const Eigen::MatrixXd cross = by_lens.transpose() * by_pose;
     const Eigen::Matrix<double, 6, 6> pose = by_pose.transpose() * by_pose;
     solution.information.push_back(by_lens.transpose() * by_lens -
@@ -227,16 +233,17 @@ std::optional<LensSolution> Describe(const std::vector<BoardView>& views, const 
     all += solution.information.back();
   }
   solution.rms_px = std::sqrt(squares / corners);
-  const double freedom = std::max(1.0, 2 * corners - count - 6 * static_cast<double>(views.size()));
+  const double degrees_of_freedom =
+      std::max(1.0, 2 * corners - count - 6 * static_cast<double>(views.size()));
   const Eigen::FullPivLU<Eigen::MatrixXd> lu(all);
   solution.sigma = Eigen::VectorXd::Constant(count, std::numeric_limits<double>::infinity());
   if (lu.isInvertible())
-    solution.sigma = (squares / freedom * lu.inverse().diagonal()).cwiseMax(0).cwiseSqrt();
+    solution.sigma = (squares / degrees_of_freedom * lu.inverse().diagonal()).cwiseMax(0).cwiseSqrt();
   return solution;
 }
 
-// The poses that a lens gives the views; empty when one of them has none.
-bool StartPoses(const std::vector<BoardView>& views, Problem* problem) {
+// Initializes the poses of all views for the current lens. Returns false when one of them has no pose.
+bool InitializePoses(const std::vector<BoardView>& views, Problem* problem) {
   const auto camera =
       MakeCamera(problem->lens, problem->width_px, problem->height_px, problem->numbers.data());
   if (!camera) return false;
@@ -251,7 +258,8 @@ bool StartPoses(const std::vector<BoardView>& views, Problem* problem) {
 
 std::optional<LensSolution> Solve(const std::vector<BoardView>& views, Problem problem) {
   constexpr int kIterations = 200;
-  if (!StartPoses(views, &problem) || !Minimize(views, kIterations, false, &problem)) return std::nullopt;
+  if (!InitializePoses(views, &problem) || !Minimize(views, kIterations, false, &problem))
+    return std::nullopt;
   return Describe(views, problem);
 }
 
@@ -272,7 +280,7 @@ int IntrinsicCount(LensModel lens) {
 std::optional<LensSolution> SolveLens(LensModel lens, int width_px, int height_px,
                                       const std::vector<BoardView>& views) {
   if (views.size() < 2) return std::nullopt;
-  // A few views, evenly taken, decide between guesses of the focal length.
+  // A few views, evenly spaced, select the best initial focal length.
   std::vector<BoardView> few;
   const std::size_t step = std::max<std::size_t>(1, views.size() / 8);
   for (std::size_t i = 0; i < views.size(); i += step) few.push_back(views[i]);
@@ -283,7 +291,7 @@ std::optional<LensSolution> SolveLens(LensModel lens, int width_px, int height_p
     problem.numbers = {focal * width_px, focal * width_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1)};
     if (lens == LensModel::kFov) problem.numbers[4] = 0.6;
     constexpr int kFewIterations = 25;
-    if (!StartPoses(few, &problem)) continue;
+    if (!InitializePoses(few, &problem)) continue;
     const auto cost = Minimize(few, kFewIterations, false, &problem);
     if (!cost || *cost >= least) continue;
     least = *cost;
@@ -320,11 +328,12 @@ std::optional<BoardPose> SolvePose(const CameraModel& camera, const BoardView& v
   Problem problem{camera.lens(), camera.width_px(), camera.height_px(), NumbersOf(camera), {}};
   const std::vector<BoardView> views = {view};
   constexpr int kIterations = 50;
-  if (!StartPoses(views, &problem)) return std::nullopt;
+  if (!InitializePoses(views, &problem)) return std::nullopt;
   const auto cost = Minimize(views, kIterations, true, &problem);
   if (!cost) return std::nullopt;
-  const Eigen::Map<const Eigen::Vector3d> turn(problem.poses[0].data()), shift(problem.poses[0].data() + 3);
-  return BoardPose{Rigid3(Rotation3::Exp(turn), shift),
+  const Eigen::Map<const Eigen::Vector3d> rotation_vector(problem.poses[0].data()),
+      translation(problem.poses[0].data() + 3);
+  return BoardPose{Rigid3(Rotation3::Exp(rotation_vector), translation),
                    std::sqrt(2 * *cost / static_cast<double>(view.pixels.size()))};
 }
 

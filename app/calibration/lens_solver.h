@@ -9,42 +9,42 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 
-// A lens from views of a flat board, by least squares on the reprojection error through the very camera
-// models that the tracker uses (Zhang 2000, with Ceres).
+// Estimates the lens from views of a planar board by minimizing the reprojection error (Zhang 2000) with
+// Ceres. It uses the same camera models as the tracker.
 namespace docent::app {
 
-// How many numbers a lens model has, focal lengths and principal point among them.
+// Number of intrinsic parameters of a lens model, including focal lengths and principal point.
 int IntrinsicCount(engine::LensModel lens);
 
 struct LensSolution {
   engine::CameraModel camera;
-  std::vector<engine::Rigid3> camera_from_board;  // by view
-  std::vector<double> view_rms_px;                // by view: root mean square of the distances
+  std::vector<engine::Rigid3> camera_from_board;  // By view.
+  std::vector<double> view_rms_px;                // By view: RMS reprojection error.
   double rms_px = 0;
-  // Of the intrinsics (fx fy cx cy and the distortion), by how far the residuals of this many corners can
-  // move them: standard deviations.
+  // Standard deviations of the intrinsics (fx fy cx cy and the distortion), from their covariance scaled by
+  // the residual variance.
   Eigen::VectorXd sigma;
-  // What each view alone says of the intrinsics, its pose being unknown; by view.
+  // By view: information matrix of the intrinsics with the view's pose eliminated (Schur complement).
   std::vector<Eigen::MatrixXd> information;
 
-  // The larger of both focal lengths' standard deviations, as a part of it.
+  // The larger of the relative standard deviations of fx and fy.
   double FocalSigma() const;
 };
 
-// From no guess at all. Empty when no lens of this model explains the views (too few, all from the same side,
-// or another kind of lens). Views need four corners each; two views at least.
+// Estimates the lens without an initial guess. Needs at least two views with four corners each. Empty when no
+// lens of this model fits: too few views, all from the same direction, or another kind of lens.
 std::optional<LensSolution> SolveLens(engine::LensModel lens, int width_px, int height_px,
                                       const std::vector<BoardView>& views);
-// From a solution of other views of the same camera.
+// Estimates the lens, starting from a solution for other views of the same camera.
 std::optional<LensSolution> RefineLens(const engine::CameraModel& start, const std::vector<BoardView>& views);
 
-// Where the lens puts each corner, minus where it was seen, pixels; by view and corner. The views are those
-// of the solution, in its order.
+// Residuals, predicted minus detected corner in pixels, by view and corner. The views are those of the
+// solution, in the same order.
 std::vector<std::vector<Eigen::Vector2d>> Residuals(const LensSolution& solution,
                                                     const std::vector<BoardView>& views);
 
-// The board's pose in one view through a known lens, and the root mean square of what remains, pixels. Empty
-// when there is none.
+// Estimates the board's pose in one view with a known lens, and the RMS reprojection error in pixels. Empty
+// on failure.
 struct BoardPose {
   engine::Rigid3 camera_from_board;
   double rms_px = 0;

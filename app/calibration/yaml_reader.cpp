@@ -10,12 +10,12 @@ namespace docent::app {
 
 namespace {
 
-// yaml-cpp follows nested lists by recursion, so that a file of brackets alone could exhaust the stack; no
-// calibration nests deeper than this.
+// yaml-cpp parses nested lists recursively, so a file of brackets could exhaust the stack. No calibration
+// nests deeper than this.
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxIndent = 256;
 
-// The `%YAML:1.0` of OpenCV is not the directive of the YAML standard: everything that begins with % goes.
+// OpenCV's `%YAML:1.0` is not a directive of the YAML standard, so all lines that begin with % are removed.
 std::string WithoutDirectives(const std::string& text) {
   std::string result;
   std::size_t begin = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;
@@ -42,7 +42,7 @@ bool IsDeep(const std::string& text) {
       at_start = true;
       leading = 0;
     } else if (at_start) {
-      // Block nesting shows as indentation, or as a chain of "- - -" or "? ? ?".
+      // Block nesting is indentation, or a chain of "- - -" or "? ? ?".
       if (c == ' ' || c == '-' || c == '?' || c == ':' || c == '\t') {
         if (++leading > kMaxIndent) return depth == 0;
       } else {
@@ -64,7 +64,7 @@ YamlReader::YamlReader(const std::string& text, std::string name) : name_(std::m
     throw Error(name_ + (error.mark.is_null() ? "" : ", line " + std::to_string(error.mark.line + 1)) +
                 " is not valid YAML: " + error.msg + ".");
   }
-  if (!root_.IsMap()) throw Error(name_ + " is no calibration: it should hold lines such as 'fx: 525'.");
+  if (!root_.IsMap()) throw Error(name_ + " is not a calibration; expected lines such as 'fx: 525'.");
 }
 
 YAML::Node YamlReader::Find(const std::string& field) const {
@@ -100,7 +100,7 @@ int YamlReader::Integer(const std::string& field) const {
 
 std::string YamlReader::Text(const std::string& field) const {
   const YAML::Node node = Need(field);
-  if (!node.IsScalar()) throw Error(name_ + ": the field '" + field + "' is not a word.");
+  if (!node.IsScalar()) throw Error(name_ + ": the field '" + field + "' is not a text.");
   return node.Scalar();
 }
 

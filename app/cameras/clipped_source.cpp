@@ -14,7 +14,7 @@ class ClippedSource : public FrameSource {
   ClippedSource(std::unique_ptr<FrameSource> source, Timestamp from, Timestamp until)
       : source_(std::move(source)), from_(from), until_(until) {
     info_ = source_->info();
-    info_.frame_count.reset();  // how many of them lie between is not known before they are read
+    info_.frame_count.reset();  // Only known after reading all timestamps.
   }
 
   bool Next(engine::Frame* frame) override {
@@ -31,7 +31,7 @@ class ClippedSource : public FrameSource {
   template <typename Fetch>
   bool NextInside(engine::Frame* frame, const Fetch& fetch) {
     while (!ended_ && fetch()) {
-      if (frame->image.empty() && info_.live) return true;  // a device that is away
+      if (frame->image.empty() && info_.live) return true;  // The device is disconnected.
       if (!first_) first_ = frame->time;
       const Timestamp since_first = frame->time - *first_;
       if (until_ > Timestamp{} && since_first >= until_) break;
@@ -74,7 +74,7 @@ class WindowSource : public FrameSource {
   bool NextInside(engine::Frame* frame, const Fetch& fetch) {
     for (; skipped_ < first_frame_ && !ended_; ++skipped_) ended_ = !source_->NextLate(frame);
     if (ended_) return false;
-    *frame = engine::Frame();  // what was skipped leaves nothing behind
+    *frame = engine::Frame();  // Discards data of the skipped images.
     ended_ = !fetch();
     if (ended_) return false;
     if (!begin_) begin_ = {frame->time, frame->index};
@@ -87,7 +87,7 @@ class WindowSource : public FrameSource {
   const std::uint64_t first_frame_;
   const Timestamp duration_;
   std::uint64_t skipped_ = 0;
-  std::optional<std::pair<Timestamp, std::uint64_t>> begin_;  // time and index of the first image
+  std::optional<std::pair<Timestamp, std::uint64_t>> begin_;  // Time and index of the first image.
   bool ended_ = false;
 };
 

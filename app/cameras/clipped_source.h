@@ -7,13 +7,12 @@
 
 namespace docent::app {
 
-// The images of `source` from `from` on and before `until`, both counted from its first image. Times and
-// indices stay as they are. An `until` of zero means to the end.
+// Delivers the images of `source` in the interval [from, until), relative to its first image. Timestamps and
+// indices are unchanged. An `until` of zero means the end of the source.
 std::unique_ptr<FrameSource> ClipSource(std::unique_ptr<FrameSource> source, Timestamp from, Timestamp until);
 
-// The images of a recorded source from the one of number `first_frame` (from 0) on, for less than
-// `duration` or, where that is zero, to the end, as if the recording began there: times stay as they are,
-// indices begin at 0.
+// Delivers the images of a recorded source as if the recording began at image `first_frame` (from 0), for
+// less than `duration`, or to the end if `duration` is zero. Timestamps are unchanged; indices begin at 0.
 std::unique_ptr<FrameSource> WindowOf(std::unique_ptr<FrameSource> source, std::uint64_t first_frame,
                                       Timestamp duration);
 

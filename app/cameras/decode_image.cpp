@@ -18,7 +18,7 @@ bool StartsWith(std::span<const std::uint8_t> bytes, std::initializer_list<std::
   return bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
 }
 
-// Whether the mark stands in the last `reach` bytes; some writers pad the end of a file.
+// Whether the last `reach` bytes contain the end marker; some writers pad the end of a file.
 bool EndsWithMark(std::span<const std::uint8_t> bytes, std::initializer_list<std::uint8_t> mark,
                   std::size_t reach) {
   const auto tail = bytes.last(std::min(bytes.size(), reach));
@@ -34,8 +34,8 @@ bool IsCutOff(std::span<const std::uint8_t> bytes) {
 }  // namespace
 
 cv::Mat DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
-  if (bytes.empty()) throw Error(name + " is empty; it holds no image.");
-  if (IsCutOff(bytes)) throw Error(name + " breaks off before the end of its image.");
+  if (bytes.empty()) throw Error(name + " is empty; it contains no image.");
+  if (IsCutOff(bytes)) throw Error(name + " is truncated before the end of its image.");
   cv::Mat image;
   try {
     const cv::Mat wrapped(1, static_cast<int>(bytes.size()), CV_8UC1,

@@ -10,12 +10,12 @@
 
 namespace docent::app {
 
-// Decodes an image file's bytes to CV_8UC3 (BGR) or CV_8UC1. `name` stands in the sentence of the Error that
-// is thrown when the bytes are no image, or a JPEG or PNG that breaks off: decoders fill the rest of such an
-// image with grey, and a tracker must not see that.
+// Decodes an image file to CV_8UC3 (BGR) or CV_8UC1. Throws Error, with `name` in its message, when the bytes
+// are not an image, or are a truncated JPEG or PNG: decoders fill the missing part with grey, which would
+// mislead the tracker.
 cv::Mat DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name);
 
-// Reads and decodes; `buffer` is used again from image to image.
+// Reads and decodes an image file; `buffer` is reused between calls. Throws Error.
 cv::Mat ReadImage(const std::filesystem::path& path, std::vector<std::uint8_t>* buffer);
 
 }  // namespace docent::app

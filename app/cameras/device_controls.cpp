@@ -11,18 +11,19 @@ namespace docent::app {
 
 namespace {
 
-// Bounds what a driver that never says "that is all" could make of a list.
+// Limits the enumeration, in case a driver never reports the end of its list.
 constexpr std::uint32_t kMaxControls = 256;
 
-// An automatic adjustment: the switch, what it must be set to, and the values that it governs.
-struct Automatism {
+// An automatic control: its identifier, its value for manual mode, and the controls that it sets
+// automatically.
+struct AutomaticControl {
   const char* name;
   std::uint32_t id;
   std::int64_t manual;
-  std::array<std::uint32_t, 2> governed;  // 0 for none
+  std::array<std::uint32_t, 2> governed;  // 0: none.
 };
-constexpr std::array<Automatism, 5> kAutomatisms = {{
-    // First of all the freedom to lower the image rate for a longer exposure.
+constexpr std::array<AutomaticControl, 5> kAutomaticControls = {{
+    // The first one allows the device to lower the frame rate for a longer exposure.
     {"frame rate", V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0, {0, 0}},
     {"exposure",
      V4L2_CID_EXPOSURE_AUTO,
@@ -78,19 +79,19 @@ std::string LockedControls::Words() const {
 
 LockedControls LockControls(DeviceSystem* system, int file) {
   LockedControls locked;
-  for (const Automatism& automatism : kAutomatisms) {
-    const auto before = ReadControl(system, file, automatism.id);
-    if (!before || *before == automatism.manual) continue;
+  for (const AutomaticControl& automatic : kAutomaticControls) {
+    const auto before = ReadControl(system, file, automatic.id);
+    if (!before || *before == automatic.manual) continue;
     std::array<std::optional<std::int64_t>, 2> found;
     for (std::size_t i = 0; i < found.size(); ++i) {
-      if (automatism.governed[i] != 0) found[i] = ReadControl(system, file, automatism.governed[i]);
+      if (automatic.governed[i] != 0) found[i] = ReadControl(system, file, automatic.governed[i]);
     }
-    if (!WriteControl(system, file, automatism.id, automatism.manual)) continue;
-    locked.changes.push_back({automatism.id, *before});
-    locked.names.emplace_back(automatism.name);
-    // Some devices fall back to what was set by hand last; what the automatism had found is better.
+    if (!WriteControl(system, file, automatic.id, automatic.manual)) continue;
+    locked.changes.push_back({automatic.id, *before});
+    locked.names.emplace_back(automatic.name);
+    // Some devices return to the last manual values, so the values found automatically are written again.
     for (std::size_t i = 0; i < found.size(); ++i) {
-      if (found[i]) WriteControl(system, file, automatism.governed[i], *found[i]);
+      if (found[i]) WriteControl(system, file, automatic.governed[i], *found[i]);
     }
   }
   std::reverse(locked.changes.begin(), locked.changes.end());

@@ -18,7 +18,7 @@ struct DestroyDecoder {
   void operator()(void* handle) const { tjDestroy(handle); }
 };
 
-// The library's decoder serves one thread at a time and is dear to make.
+// A decoder serves one thread at a time and is expensive to create, so each thread keeps one.
 tjhandle Decoder() {
   thread_local const std::unique_ptr<void, DestroyDecoder> decoder(tjInitDecompress());
   if (!decoder) throw Error("The JPEG decoder cannot be set up.");
@@ -30,12 +30,12 @@ cv::Mat DecodeJpeg(std::span<const std::uint8_t> bytes, cv::Size size, const std
   int width = 0, height = 0, subsampling = 0, colours = 0;
   const auto length = static_cast<unsigned long>(bytes.size());
   if (tjDecompressHeader3(decoder, bytes.data(), length, &width, &height, &subsampling, &colours) < 0) {
-    throw Error(name + " is no JPEG: " + tjGetErrorStr2(decoder) + ".");
+    throw Error(name + " is not a JPEG: " + tjGetErrorStr2(decoder) + ".");
   }
-  if (cv::Size(width, height) != size) throw Error(name + " is of another size than was agreed.");
+  if (cv::Size(width, height) != size) throw Error(name + " does not have the negotiated size.");
   const bool grey = subsampling == TJSAMP_GRAY;
   cv::Mat image(size, grey ? CV_8UC1 : CV_8UC3);
-  // An image that breaks off would otherwise be filled up with grey, and a tracker must not see that.
+  // Without this flag a truncated image would be filled with grey, which would mislead the tracker.
   if (tjDecompress2(decoder, bytes.data(), length, image.data, width, static_cast<int>(image.step[0]), height,
                     grey ? TJPF_GRAY : TJPF_BGR, TJFLAG_STOPONWARNING) < 0) {
     throw Error(name + " cannot be decoded: " + tjGetErrorStr2(decoder) + ".");
@@ -61,12 +61,12 @@ std::size_t RowBytes(std::uint32_t pixel_format, int width_px) {
 cv::Mat ConvertDeviceImage(std::uint32_t pixel_format, std::span<const std::uint8_t> bytes, cv::Size size,
                            std::size_t stride_bytes, const std::string& name) {
   if (!IsKnownPixelFormat(pixel_format))
-    throw Error(name + " is in a pixel format that Docent does not read.");
+    throw Error(name + " has a pixel format that Docent does not support.");
   const std::size_t row_bytes = RowBytes(pixel_format, size.width);
   if (row_bytes == 0) return DecodeJpeg(bytes, size, name);
   const bool planar = pixel_format == V4L2_PIX_FMT_NV12;
   if (pixel_format != V4L2_PIX_FMT_GREY && (size.width % 2 != 0 || (planar && size.height % 2 != 0))) {
-    throw Error(name + " has an odd size, which its pixel format cannot have.");
+    throw Error(name + " has an odd size, which its pixel format does not allow.");
   }
   const int rows = planar ? size.height + size.height / 2 : size.height;
   if (stride_bytes < row_bytes ||

@@ -13,7 +13,7 @@ namespace docent::app {
 
 namespace {
 
-// Bounds what a driver that never says "that is all" could make of a list.
+// Limits the enumeration, in case a driver never reports the end of its list.
 constexpr std::uint32_t kMaxEntries = 256;
 
 std::string FromDriver(const std::uint8_t* text, std::size_t size) {
@@ -64,7 +64,7 @@ std::vector<double> DeviceRates(DeviceSystem* system, int file, std::uint32_t pi
     const v4l2_fract& interval = discrete ? entry.discrete : entry.stepwise.min;
     if (interval.numerator > 0)
       rates.push_back(static_cast<double>(interval.denominator) / interval.numerator);
-    if (!discrete) break;  // one entry stands for a whole range; its shortest interval is the highest rate
+    if (!discrete) break;  // One entry describes a whole range; its shortest interval is the highest rate.
   }
   std::sort(rates.begin(), rates.end(), std::greater<>());
   return rates;
@@ -81,7 +81,7 @@ std::optional<DeviceDescription> DescribeDevice(const std::string& path, DeviceS
     if (errno != EACCES) return std::nullopt;
     device.emplace();
     device->path = path;
-    device->trouble = "You may not open it; " + PermissionAdvice();
+    device->trouble = "You do not have permission to open it; " + PermissionAdvice();
     return device;
   }
   v4l2_capability capability{};

@@ -14,7 +14,7 @@ namespace docent::app {
 
 namespace {
 
-// Latencies of the newest images.
+// Latencies of the last 128 images.
 class LatencyWindow {
  public:
   void Add(Timestamp latency) { latencies_[count_++ % latencies_.size()] = latency; }
@@ -53,7 +53,7 @@ class DeviceSource : public FrameSource {
   }
 
  private:
-  // How long Next waits between two tries to open a device that is away.
+  // Interval between two attempts to open a disconnected device.
   static constexpr std::chrono::milliseconds kRetry{200};
 
   void NextFromDevice(engine::Frame* frame);
@@ -66,15 +66,15 @@ class DeviceSource : public FrameSource {
   const std::string path_;
   const CameraOptions options_;
   const std::unique_ptr<DeviceSystem> system_;
-  std::optional<DeviceStream> stream_;  // empty while the device is away
-  cv::Size size_;                       // agreed at the first opening
+  std::optional<DeviceStream> stream_;  // Empty while the device is disconnected.
+  cv::Size size_;                       // Negotiated when the device was first opened.
   std::optional<LockedControls> locked_;
-  std::uint64_t since_opened_ = 0;  // images delivered
+  std::uint64_t since_opened_ = 0;  // Images delivered since the device was opened.
   std::string trouble_;
   Delivery delivery_;
   LatencyWindow latency_;
-  std::uint64_t index_ = 0;                     // of the next image that the device takes
-  std::optional<std::uint32_t> last_sequence_;  // of this opening
+  std::uint64_t index_ = 0;                     // Index of the next image that the device captures.
+  std::optional<std::uint32_t> last_sequence_;  // Since the device was opened.
   std::optional<Timestamp> last_time_;
 };
 
@@ -86,7 +86,7 @@ void DeviceSource::Close() {
   since_opened_ = 0;
 }
 
-// The device's own number tells how many images it took that nobody had a buffer for.
+// Gaps in the device's sequence numbers are images that it captured without a free buffer.
 void DeviceSource::CountGap(const DeviceStream::Loan& loan) {
   const std::uint32_t sequence = loan.sequence();
   if (last_sequence_ && sequence > *last_sequence_ + 1) {
@@ -97,18 +97,18 @@ void DeviceSource::CountGap(const DeviceStream::Loan& loan) {
   last_sequence_ = sequence;
 }
 
-// Waits for an image and passes over all but the newest that are there.
+// Waits for an image, and skips all but the newest available one.
 DeviceStream::Loan DeviceSource::TakeNewest() {
   for (;;) {
     if (!stream_->Wait(options_.device_timeout)) {
       throw DeviceGone("The camera " + path_ + " sent no image for " +
                        std::to_string(options_.device_timeout.count()) +
-                       " ms; is it covered by another program or asleep?");
+                       " ms; check the cable and that no other program uses the camera.");
     }
     std::optional<DeviceStream::Loan> newest = stream_->Take();
     if (!newest) continue;
     CountGap(*newest);
-    // A driver fills at most the buffers that it has.
+    // No more images can be available than there are buffers.
     for (std::size_t i = 1; i < stream_->buffer_count() && stream_->Wait(std::chrono::milliseconds(0)); ++i) {
       std::optional<DeviceStream::Loan> newer = stream_->Take();
       if (!newer) break;
@@ -122,7 +122,7 @@ DeviceStream::Loan DeviceSource::TakeNewest() {
   }
 }
 
-// False when the image is broken. Gives the buffer back in any case.
+// Converts the image into the frame. Returns false when the image is broken. Returns the buffer in any case.
 bool DeviceSource::Deliver(DeviceStream::Loan loan, engine::Frame* frame) {
   cv::Mat image;
   if (!loan.broken()) {
@@ -133,19 +133,19 @@ bool DeviceSource::Deliver(DeviceStream::Loan loan, engine::Frame* frame) {
       image.release();
     }
   }
-  const Timestamp told = stream_->TimeOf(loan);
+  const Timestamp stamp = stream_->TimeOf(loan);
   stream_->Return(&loan);
   const std::uint64_t index = index_++;
   if (image.empty()) {
     ++delivery_.broken;
     return false;
   }
-  // A few drivers repeat a time or step back.
-  Timestamp time = told;
+  // A few drivers repeat a timestamp or go back in time.
+  Timestamp time = stamp;
   if (last_time_ && time <= *last_time_) time = *last_time_ + FromSeconds(1 / info_.nominal_fps);
   last_time_ = time;
-  // Drivers that compute the time instead of measuring it may be ahead.
-  latency_.Add(std::max(Timestamp{}, system_->Now() - told));
+  // Timestamps that a driver computes instead of measuring may be in the future.
+  latency_.Add(std::max(Timestamp{}, system_->Now() - stamp));
   frame->time = time;
   frame->index = index;
   frame->image = std::move(image);
@@ -155,12 +155,11 @@ bool DeviceSource::Deliver(DeviceStream::Loan loan, engine::Frame* frame) {
 }
 
 void DeviceSource::NextFromDevice(engine::Frame* frame) {
-  // Cameras send a broken image now and then, most of all while they start; many in a row are a fault.
+  // Cameras occasionally deliver a broken image, especially while they start; many in a row are an error.
   constexpr int kMaxBroken = 30;
   for (int broken = 0; !Deliver(TakeNewest(), frame);) {
     if (++broken < kMaxBroken) continue;
-    throw Error("The camera " + path_ +
-                " sends nothing but broken images; try another cable, port or format.");
+    throw Error("The camera " + path_ + " delivers only broken images; try another cable, port or format.");
   }
   if (options_.lock_controls_after > 0 && !locked_ &&
       since_opened_ >= static_cast<std::uint64_t>(options_.lock_controls_after)) {
@@ -175,9 +174,10 @@ void DeviceSource::Reopen() {
     format.height_px = size_.height;
     stream_.emplace(path_, format, system_.get());
   } catch (const DeviceGone&) {
-    return;  // it is not back yet
+    return;  // The device is still disconnected.
   } catch (const Error& error) {
-    trouble_ = error.what();  // it is back, but not for us; rights are set a moment after it appears
+    trouble_ =
+        error.what();  // Permissions are set shortly after a device appears, so a later attempt may succeed.
     return;
   }
   ++delivery_.reconnections;
@@ -196,7 +196,7 @@ bool DeviceSource::Next(engine::Frame* frame) {
     } catch (const DeviceGone& error) {
       Close();
       if (!options_.reconnect) throw;
-      trouble_ = std::string(error.what()) + " Docent goes on when it is back.";
+      trouble_ = std::string(error.what()) + " Docent continues when it is connected again.";
     }
   }
   frame->time = system_->Now();

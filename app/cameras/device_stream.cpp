@@ -15,12 +15,11 @@ namespace docent::app {
 
 namespace {
 
-// In the order in which they are tried: the first two cost no decoding, but the bus may be too narrow for
-// them.
+// In order of preference: the first two need no decoding, but the bus may be too slow for them.
 constexpr std::array<std::uint32_t, 5> kPixelFormats = {
     V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_NV12, V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_JPEG, V4L2_PIX_FMT_GREY};
 constexpr std::uint64_t kMaxImagePixels = 1 << 28;
-constexpr double kUsualFps = 30;
+constexpr double kDefaultFps = 30;
 
 }  // namespace
 
@@ -32,7 +31,7 @@ DeviceStream::DeviceStream(const std::string& path, const DeviceFormat& wanted, 
     NegotiateRate(wanted.fps);
     StartStreaming();
   } catch (...) {
-    Stop();  // the destructor of an object that was never complete does not run
+    Stop();  // The destructor does not run when the constructor throws.
     throw;
   }
 }
@@ -49,8 +48,9 @@ void DeviceStream::Open() {
   file_ = system_->Open(path_);
   if (file_ < 0) {
     if (errno == ENOENT)
-      throw DeviceGone("There is no camera " + path_ + "; `docent cameras` lists those there are.");
-    if (errno == EACCES) throw Error("You may not open the camera " + path_ + "; " + PermissionAdvice());
+      throw DeviceGone("There is no camera " + path_ + "; `docent cameras` lists the available ones.");
+    if (errno == EACCES)
+      throw Error("You do not have permission to open the camera " + path_ + "; " + PermissionAdvice());
     Fail("cannot be opened", errno);
   }
   v4l2_capability capability{};
@@ -61,13 +61,14 @@ void DeviceStream::Open() {
   const std::uint32_t can = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? capability.device_caps
                                                                                   : capability.capabilities;
   if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0 || (can & V4L2_CAP_STREAMING) == 0) {
-    throw Error(path_ + " is a video device, but not one that streams images.");
+    throw Error(path_ + " is a video device, but it does not stream images.");
   }
 }
 
-// What the device makes of a pixel format at the wanted size; empty when it will not have it so.
-std::optional<v4l2_pix_format> DeviceStream::Ask(unsigned long request, std::uint32_t pixel_format,
-                                                 const DeviceFormat& wanted) {
+// Asks the device for a pixel format at the wanted size. Returns the format that the device chose; empty when
+// it does not support the request.
+std::optional<v4l2_pix_format> DeviceStream::RequestFormat(unsigned long request, std::uint32_t pixel_format,
+                                                           const DeviceFormat& wanted) {
   v4l2_format format{};
   format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   format.fmt.pix.width = static_cast<std::uint32_t>(wanted.width_px > 0 ? wanted.width_px : 640);
@@ -87,32 +88,32 @@ std::optional<v4l2_pix_format> DeviceStream::Ask(unsigned long request, std::uin
   return got;
 }
 
-// Takes the first pixel format that reaches the wanted rate at the wanted size, or else the fastest of them.
+// Selects the first pixel format that reaches the wanted rate at the wanted size, or else the fastest one.
 void DeviceStream::NegotiateFormat(const DeviceFormat& wanted) {
-  const double enough_fps = 0.99 * (wanted.fps > 0 ? wanted.fps : kUsualFps);
+  const double required_fps = 0.99 * (wanted.fps > 0 ? wanted.fps : kDefaultFps);
   std::uint32_t chosen = 0;
   double chosen_fps = 0;
   for (const std::uint32_t pixel_format : kPixelFormats) {
     if (wanted.pixel_format != 0 && wanted.pixel_format != pixel_format) continue;
-    const auto offer = Ask(VIDIOC_TRY_FMT, pixel_format, wanted);
+    const auto offer = RequestFormat(VIDIOC_TRY_FMT, pixel_format, wanted);
     if (!offer) continue;
     const std::vector<double> rates = DeviceRates(
         system_, file_, pixel_format, static_cast<int>(offer->width), static_cast<int>(offer->height));
-    // A device that names no rates leaves them to itself whatever the format.
+    // A device that lists no rates uses its own rate for every format.
     const double fps = rates.empty() ? std::numeric_limits<double>::max() : rates.front();
-    if (chosen_fps < enough_fps && fps > chosen_fps) {
+    if (chosen_fps < required_fps && fps > chosen_fps) {
       chosen = pixel_format;
       chosen_fps = fps;
     }
   }
-  const auto got = chosen != 0 ? Ask(VIDIOC_S_FMT, chosen, wanted) : std::nullopt;
+  const auto got = chosen != 0 ? RequestFormat(VIDIOC_S_FMT, chosen, wanted) : std::nullopt;
   if (!got) {
     throw Error("The camera " + path_ +
-                " offers no image format that Docent reads (YUYV, NV12, Motion-JPEG or grey)" +
+                " offers no image format that Docent supports (YUYV, NV12, Motion-JPEG or grey)" +
                 (wanted.width_px > 0
                      ? " at " + std::to_string(wanted.width_px) + "x" + std::to_string(wanted.height_px)
                      : std::string()) +
-                "; `docent cameras` lists what it offers.");
+                "; `docent cameras` lists its formats.");
   }
   pixel_format_ = chosen;
   size_ = cv::Size(static_cast<int>(got->width), static_cast<int>(got->height));
@@ -122,14 +123,14 @@ void DeviceStream::NegotiateFormat(const DeviceFormat& wanted) {
 void DeviceStream::NegotiateRate(double fps) {
   v4l2_streamparm parameters{};
   parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  if (system_->Control(file_, VIDIOC_G_PARM, &parameters) < 0) return;  // the rate is the device's own affair
+  if (system_->Control(file_, VIDIOC_G_PARM, &parameters) < 0) return;  // The device does not report a rate.
   v4l2_fract& interval = parameters.parm.capture.timeperframe;
   if ((parameters.parm.capture.capability & V4L2_CAP_TIMEPERFRAME) != 0) {
-    const double wanted = fps > 0 ? fps : kUsualFps;
+    const double wanted = fps > 0 ? fps : kDefaultFps;
     interval = {1000, static_cast<std::uint32_t>(std::lround(wanted * 1000))};
-    // What nobody asked for need not be had.
+    // A failure only matters if a rate was requested.
     if (system_->Control(file_, VIDIOC_S_PARM, &parameters) < 0 && fps > 0)
-      Fail("refuses this image rate", errno);
+      Fail("rejects this frame rate", errno);
   }
   if (interval.numerator > 0 && interval.denominator > 0) {
     fps_ = static_cast<double>(interval.denominator) / interval.numerator;
@@ -141,7 +142,7 @@ void DeviceStream::StartStreaming() {
   request.count = 4;
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = V4L2_MEMORY_MMAP;
-  if (system_->Control(file_, VIDIOC_REQBUFS, &request) < 0) Fail("gives no buffers", errno);
+  if (system_->Control(file_, VIDIOC_REQBUFS, &request) < 0) Fail("provides no buffers", errno);
   if (request.count < 2) throw Error("The camera " + path_ + " has no memory for its images.");
   for (std::uint32_t i = 0; i < request.count; ++i) {
     Loan loan;
@@ -163,7 +164,8 @@ void DeviceStream::StartStreaming() {
 void DeviceStream::Stop() noexcept {
   if (streaming_) {
     int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    system_->Control(file_, VIDIOC_STREAMOFF, &type);  // a device that is gone may refuse; nothing is lost
+    system_->Control(file_, VIDIOC_STREAMOFF,
+                     &type);  // May fail for a disconnected device, which does not matter.
     streaming_ = false;
   }
   for (const MappedBuffer& buffer : buffers_) system_->Unmap(buffer.memory, buffer.length_bytes);
@@ -187,7 +189,7 @@ std::optional<DeviceStream::Loan> DeviceStream::Take() {
     Fail("stopped sending images", errno);
   }
   if (loan.buffer.index >= buffers_.size())
-    throw Error("The camera " + path_ + " answers with a buffer it never gave.");
+    throw Error("The camera " + path_ + " returned an unknown buffer.");
   const MappedBuffer& mapped = buffers_[loan.buffer.index];
   loan.bytes = {static_cast<const std::uint8_t*>(mapped.memory),
                 std::min<std::size_t>(loan.buffer.bytesused, mapped.length_bytes)};
@@ -195,7 +197,8 @@ std::optional<DeviceStream::Loan> DeviceStream::Take() {
 }
 
 void DeviceStream::Return(Loan* loan) {
-  if (system_->Control(file_, VIDIOC_QBUF, &loan->buffer) < 0) Fail("does not take its buffer back", errno);
+  if (system_->Control(file_, VIDIOC_QBUF, &loan->buffer) < 0)
+    Fail("does not accept a returned buffer", errno);
 }
 
 Timestamp DeviceStream::TimeOf(const Loan& loan) const {

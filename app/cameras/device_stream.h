@@ -17,25 +17,26 @@
 
 namespace docent::app {
 
-// The device does not answer any more: it was unplugged, or its driver let go of it.
+// The device no longer responds, because it was unplugged or its driver released it.
 class DeviceGone : public Error {
  public:
   using Error::Error;
 };
 
-// A V4L2 device from one plugging in to the next unplugging: opened, its format and rate agreed, its buffers
-// mapped and streaming. Everything is let go of by the destructor, also when the constructor throws. One
-// thread; the system must outlive it. All functions throw DeviceGone when the device is gone and Error for
-// everything else that is wrong with it.
+// An open V4L2 device with negotiated format and frame rate and mapped buffers that is streaming. An instance
+// does not survive unplugging. All resources are released by the destructor, also when the constructor
+// throws. One thread; the system must outlive it. All functions throw DeviceGone when the device is gone, and
+// Error for every other failure.
 class DeviceStream {
  public:
-  // Throws Error with one sentence: no such device, busy, not permitted, no camera, no known pixel format.
+  // Throws Error with one sentence when the device does not exist, is busy, may not be opened, is not a
+  // camera, or offers no supported pixel format.
   DeviceStream(const std::string& path, const DeviceFormat& wanted, DeviceSystem* system);
   ~DeviceStream() { Stop(); }
   DeviceStream(const DeviceStream&) = delete;
   DeviceStream& operator=(const DeviceStream&) = delete;
 
-  // A buffer that is ours until Return. The bytes lie in memory that is shared with the driver.
+  // A filled buffer that belongs to the caller until Return. The bytes are in memory shared with the driver.
   struct Loan {
     v4l2_buffer buffer{};
     std::span<const std::uint8_t> bytes;
@@ -43,13 +44,13 @@ class DeviceStream {
     std::uint32_t sequence() const { return buffer.sequence; }
   };
 
-  // False when no image came within the time.
+  // Waits for an image. Returns false after the time-out.
   bool Wait(std::chrono::milliseconds timeout);
-  // Empty when there was nothing after all.
+  // Takes the next image. Empty when none is available.
   std::optional<Loan> Take();
   void Return(Loan* loan);
-  // When the image was taken, on CLOCK_MONOTONIC: the kernel's own stamp, or the present for the few
-  // drivers that stamp with another clock.
+  // Capture time of the image on CLOCK_MONOTONIC: the kernel's timestamp, or the current time for the few
+  // drivers that use another clock.
   Timestamp TimeOf(const Loan& loan) const;
 
   int file() const { return file_; }
@@ -57,7 +58,7 @@ class DeviceStream {
   std::uint32_t pixel_format() const { return pixel_format_; }
   cv::Size size() const { return size_; }
   std::size_t stride_bytes() const { return stride_bytes_; }
-  double fps() const { return fps_; }  // what the device says it delivers; 30 when it says nothing
+  double fps() const { return fps_; }  // Frame rate reported by the device; 30 when it reports none.
 
  private:
   struct MappedBuffer {
@@ -66,8 +67,8 @@ class DeviceStream {
   };
   void Open();
   void NegotiateFormat(const DeviceFormat& wanted);
-  std::optional<v4l2_pix_format> Ask(unsigned long request, std::uint32_t pixel_format,
-                                     const DeviceFormat& wanted);
+  std::optional<v4l2_pix_format> RequestFormat(unsigned long request, std::uint32_t pixel_format,
+                                               const DeviceFormat& wanted);
   void NegotiateRate(double fps);
   void StartStreaming();
   void Stop() noexcept;

@@ -41,7 +41,7 @@ class KernelDeviceSystem : public DeviceSystem {
       result = poll(&request, 1, timeout_ms);
     } while (result < 0 && errno == EINTR);
     if (result > 0 && (request.revents & POLLIN) == 0) {
-      errno = ENODEV;  // only POLLERR or POLLHUP: the driver has let go of the device
+      errno = ENODEV;  // Only POLLERR or POLLHUP: the driver has released the device.
       return -1;
     }
     return result;

@@ -36,12 +36,11 @@ class VideoSource : public FrameSource {
     if (!fs::exists(video)) throw Error("There is no file " + Quoted(video) + ".");
     if (timestamps_path) times_ = ReadTimestamps(*timestamps_path);
     if (!capture_.open(video.string(), cv::CAP_FFMPEG)) {
-      throw Error(Quoted(video) +
-                  " cannot be opened as a video; it is cut off, damaged, or no video at all.");
+      throw Error(Quoted(video) + " cannot be opened as a video; it is truncated, damaged, or not a video.");
     }
     const double fps = capture_.get(cv::CAP_PROP_FPS);
     if (std::isfinite(fps) && fps > 0 && fps < 10000) info_.nominal_fps = fps;
-    const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);  // an estimate in some containers
+    const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);  // Only an estimate in some containers.
     if (std::isfinite(count) && count >= 1 && count < 1e9) announced_count_ = count;
     if (timestamps_path) {
       info_.frame_count = times_.size();
@@ -64,7 +63,7 @@ class VideoSource : public FrameSource {
     if (timestamps_path_ && index_ == times_.size()) {
       ended_ = true;
       throw Error(Quoted(*timestamps_path_) + " has " + std::to_string(times_.size()) + " times, but " +
-                  Quoted(path_) + " goes on after that many images.");
+                  Quoted(path_) + " has more images.");
     }
     cv::Mat image;
     if (!capture_.retrieve(image) || image.empty()) {
@@ -78,20 +77,21 @@ class VideoSource : public FrameSource {
   }
 
  private:
-  // The container's time where it grows. The decoder tells none for images that it still holds when the
-  // file ends, and raw streams have none at all: those go on with the step before.
+  // The container's time if it is later than the previous one. The decoder reports no time for the images
+  // that it still buffers at the end of the file, and raw streams have no times; both continue with the last
+  // step.
   Timestamp ContainerTime() {
     const double milliseconds = capture_.get(cv::CAP_PROP_POS_MSEC);
-    const Timestamp told = std::isfinite(milliseconds) && milliseconds >= 0 && milliseconds < 1e12
-                               ? FromSeconds(milliseconds * 1e-3)
-                               : Timestamp{};
+    const Timestamp stamp = std::isfinite(milliseconds) && milliseconds >= 0 && milliseconds < 1e12
+                                ? FromSeconds(milliseconds * 1e-3)
+                                : Timestamp{};
     if (index_ == 0) {
       step_ = FromSeconds(1 / info_.nominal_fps);
-      return last_time_ = told;
+      return last_time_ = stamp;
     }
-    if (told > last_time_) {
-      step_ = told - last_time_;
-      return last_time_ = told;
+    if (stamp > last_time_) {
+      step_ = stamp - last_time_;
+      return last_time_ = stamp;
     }
     return last_time_ += step_;
   }
@@ -99,22 +99,21 @@ class VideoSource : public FrameSource {
   void CheckEnd() const {
     if (timestamps_path_) {
       if (index_ < times_.size()) {
-        throw Error(Quoted(path_) + " breaks off at image " + std::to_string(index_) + " of the " +
+        throw Error(Quoted(path_) + " is truncated at image " + std::to_string(index_) + " of the " +
                     std::to_string(times_.size()) + " that " + Quoted(*timestamps_path_) + " lists.");
       }
       return;
     }
-    if (index_ == 0) throw Error(Quoted(path_) + " holds no image that can be decoded.");
+    if (index_ == 0) throw Error(Quoted(path_) + " contains no image that can be decoded.");
     if (!announced_count_) return;
-    // Some containers announce a length in seconds only, so both measures must agree that something is
-    // missing.
+    // Some containers store their length only in seconds, so images must be missing by count and by duration.
     const double missing = *announced_count_ - static_cast<double>(index_);
     const double fps = capture_.get(cv::CAP_PROP_FPS);
     const double missing_s = *announced_count_ / fps - ToSeconds(last_time_ + step_);
     const double allowed = std::max(2.0, 0.01 * *announced_count_);
     if (missing > allowed && missing_s > allowed / fps) {
-      throw Error(Quoted(path_) + " breaks off at image " + std::to_string(index_) + " of the " +
-                  std::to_string(static_cast<std::uint64_t>(*announced_count_)) + " that it announces.");
+      throw Error(Quoted(path_) + " is truncated at image " + std::to_string(index_) + " of the " +
+                  std::to_string(static_cast<std::uint64_t>(*announced_count_)) + " stated in its header.");
     }
   }
 
@@ -152,7 +151,7 @@ class ImageListSource : public FrameSource {
                     std::to_string(size_.width) + "x" + std::to_string(size_.height) + ".");
       }
     } catch (const Error&) {
-      index_ = images_.size();  // a source that broke off has ended
+      index_ = images_.size();  // No images follow after an error.
       throw;
     }
     frame->time = next.time;
@@ -191,7 +190,7 @@ std::unique_ptr<FrameSource> OpenFolder(const fs::path& folder, const CameraOpti
   if (!layout) {
     throw Error(
         "The folder " + Quoted(folder) +
-        " holds no image sequence: neither rgb.txt, mav0/cam0/data.csv, video.mp4 nor numbered images.");
+        " contains no image sequence: it has no rgb.txt, mav0/cam0/data.csv, video.mp4 or numbered images.");
   }
   const fs::path video = folder / "video.mp4";
   switch (*layout) {
@@ -207,7 +206,7 @@ std::unique_ptr<FrameSource> OpenFolder(const fs::path& folder, const CameraOpti
       return WithFolderInfo(std::make_unique<ImageListSource>(ListNumberedImages(folder, options.image_fps)),
                             folder);
   }
-  throw Error("The folder " + Quoted(folder) + " holds no image sequence.");
+  throw Error("The folder " + Quoted(folder) + " contains no image sequence.");
 }
 
 }  // namespace docent::app

@@ -9,16 +9,16 @@
 #include "app/cameras/frame_source.h"
 #include "app/cameras/sequence_layout.h"
 
-// Sources that read files. All throw Error with one sentence; see FrameSource.
+// Sources that read video files and image sequences. All throw Error with one sentence; see FrameSource.
 namespace docent::app {
 
-// A video. With `timestamps_path` the times are that file's, one an image, and a video that holds fewer or
-// more images than the file has times is an Error at the image where it shows. Without it the times are
-// the container's own, and a video that ends clearly before its announced length is said to break off.
+// Opens a video. With `timestamps_path`, the timestamps come from that file, one for each image; a different
+// number of images and timestamps is an Error at the image where it is detected. Without it, the timestamps
+// come from the container, and a video that ends well before its stated length is reported as truncated.
 std::unique_ptr<FrameSource> OpenVideo(const std::filesystem::path& video,
                                        const std::optional<std::filesystem::path>& timestamps_path = {});
 
-// A folder in one of the layouts of sequence_layout.h.
+// Opens a folder in one of the layouts of sequence_layout.h.
 std::unique_ptr<FrameSource> OpenFolder(const std::filesystem::path& folder,
                                         const CameraOptions& options = {});
 

@@ -18,21 +18,22 @@ namespace docent::app {
 namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
-// Of a turning webcam; no control says it.
+// Typical speed of a pan-tilt webcam; no V4L2 control reports it.
 constexpr double kDeviceSpeed = 60 * kRadiansPerDegree;
 
 double Approach(double from, double to, double most) {
   return from + std::clamp(to - from, -most, most);
 }
 
-// One axis of a device, in the numbers of its control.
+// One axis of a device, in the units of its control.
 struct Axis {
   std::uint32_t id = 0;
   bool absolute = false;
   double unit_rad = 0;
   std::int64_t lowest = 0, highest = 0, step = 1;
 
-  // The nearest value that the control takes: within its range, and a whole number of steps from its lowest.
+  // The nearest valid value: within the range, and a whole number of steps from the lowest value (absolute)
+  // or from zero (relative).
   std::int64_t Nearest(double angle_rad) const {
     const double wanted =
         std::clamp(angle_rad / unit_rad, static_cast<double>(lowest), static_cast<double>(highest));
@@ -45,8 +46,8 @@ struct Axis {
 };
 
 std::optional<Axis> FindAxis(DeviceSystem* system, int file, std::uint32_t absolute, std::uint32_t relative) {
-  // V4L2 counts absolute angles in seconds of arc, and leaves the unit of relative ones to the device; those
-  // that turn by relative steps count 64 to a degree.
+  // V4L2 defines absolute angles in arc seconds and leaves the unit of relative ones to the device; devices
+  // with relative controls use 64 units per degree.
   constexpr double kArcSecond = kRadiansPerDegree / 3600, kStep = kRadiansPerDegree / 64;
   for (const std::uint32_t id : {absolute, relative}) {
     v4l2_queryctrl query{};
@@ -64,7 +65,7 @@ std::optional<Axis> FindAxis(DeviceSystem* system, int file, std::uint32_t absol
   return std::nullopt;
 }
 
-// A device's two axes; tilt may be missing.
+// The two axes of a device; tilt may be missing.
 struct Axes {
   Axis pan;
   std::optional<Axis> tilt;
@@ -77,8 +78,8 @@ std::optional<Axes> FindAxes(DeviceSystem* system, int file) {
 }
 
 PanTiltRange RangeOf(const Axes& axes) {
-  // Nobody turns farther than once around, whatever the driver says. Of those that turn by steps the known
-  // ones go as far to each side as their greatest step.
+  // No head turns by more than 180 degrees to a side, whatever the driver reports. Known devices with
+  // relative controls can turn as far to each side as their largest step.
   const auto ends = [](const Axis& axis) {
     return std::pair(std::max(static_cast<double>(axis.lowest) * axis.unit_rad, -std::numbers::pi),
                      std::min(static_cast<double>(axis.highest) * axis.unit_rad, std::numbers::pi));
@@ -108,15 +109,15 @@ class DeviceHead : public Head {
     if (file_ < 0) Reopen();
     const PanTilt to = range_.Clamped(wanted), from = motion_->target();
     PanTilt reached = from;
-    reached.pan_rad = Turn(axes_.pan, from.pan_rad, to.pan_rad);
-    if (axes_.tilt) reached.tilt_rad = Turn(*axes_.tilt, from.tilt_rad, to.tilt_rad);
+    reached.pan_rad = MoveAxis(axes_.pan, from.pan_rad, to.pan_rad);
+    if (axes_.tilt) reached.tilt_rad = MoveAxis(*axes_.tilt, from.tilt_rad, to.tilt_rad);
     motion_->LookAt(reached, now);
   }
 
  private:
-  // Where the device says it is, or straight ahead where it does not say.
+  // Initializes the motion model with the position that the device reports, or straight ahead without one.
   void Begin() {
-    const auto where = [&](const Axis& axis, std::uint32_t reset) {
+    const auto position = [&](const Axis& axis, std::uint32_t reset) {
       if (!axis.absolute) {
         WriteControl(system_.get(), file_, reset, 1);
         return 0.0;
@@ -125,12 +126,12 @@ class DeviceHead : public Head {
       return value ? static_cast<double>(*value) * axis.unit_rad : 0.0;
     };
     PanTilt at;
-    at.pan_rad = where(axes_.pan, V4L2_CID_PAN_RESET);
-    if (axes_.tilt) at.tilt_rad = where(*axes_.tilt, V4L2_CID_TILT_RESET);
+    at.pan_rad = position(axes_.pan, V4L2_CID_PAN_RESET);
+    if (axes_.tilt) at.tilt_rad = position(*axes_.tilt, V4L2_CID_TILT_RESET);
     motion_.emplace(range_, range_.Clamped(at));
   }
 
-  // A device that was unplugged and is back has gone to where it begins.
+  // A device that was unplugged is at its initial position again.
   void Reopen() {
     file_ = system_->Open(path_);
     if (file_ < 0) return;
@@ -141,16 +142,16 @@ class DeviceHead : public Head {
       Begin();
       return;
     }
-    Close();  // another camera has its place
+    Close();  // Another camera has this path now.
   }
   void Close() {
     system_->Close(file_);
     file_ = -1;
   }
 
-  // Where the axis goes: an axis that refuses (held by another program, not ready, gone) stays where it is,
-  // and whoever asked will ask again.
-  double Turn(const Axis& axis, double from_rad, double to_rad) {
+  // Moves an axis and returns the angle that it moves to. When the driver rejects the command (used by
+  // another program, not ready, disconnected), the axis stays, and the caller will ask again.
+  double MoveAxis(const Axis& axis, double from_rad, double to_rad) {
     if (file_ < 0) return from_rad;
     v4l2_control control{};
     control.id = axis.id;
@@ -161,15 +162,15 @@ class DeviceHead : public Head {
       if (errno == ENODEV || errno == ENXIO) Close();
       return from_rad;
     }
-    // The driver may have taken another value than the one it was given, and says which.
+    // The driver may have set another value, which it returns.
     const double taken_rad = static_cast<double>(control.value) * axis.unit_rad;
     return axis.absolute ? taken_rad : from_rad + taken_rad;
   }
 
   const std::unique_ptr<DeviceSystem> system_;
   const std::string path_;
-  mutable std::mutex mutex_;  // guards what follows
-  int file_;                  // -1 while the device is away
+  mutable std::mutex mutex_;  // Guards the members below.
+  int file_;                  // -1 while the device is disconnected.
   Axes axes_;
   const PanTiltRange range_;
   std::optional<HeadMotion> motion_;

@@ -9,31 +9,31 @@
 #include "engine/base/time.h"
 #include "engine/geometry/rigid3.h"
 
-// A camera that can turn its head: on a carrier (a shoulder, a shelf) it pans and tilts about its centre. The
-// carrier's frame is that of the camera when it looks straight ahead (x right, y down, z forward). A head
-// belongs to the source of its images; any thread may use it.
+// Pan-tilt heads: on a carrier (a shoulder, a shelf) the camera pans and tilts about its centre. The carrier
+// frame is the camera frame at zero pan and tilt (x right, y down, z forward). A head belongs to the source
+// of its images; any thread may use it.
 namespace docent::app {
 
 struct PanTilt {
-  double pan_rad = 0;   // to the right
-  double tilt_rad = 0;  // upwards
+  double pan_rad = 0;   // Positive to the right.
+  double tilt_rad = 0;  // Positive upwards.
 };
 
 struct PanTiltRange {
   PanTilt lowest, highest;
-  double speed_rad_per_s = 1;  // of each axis
+  double speed_rad_per_s = 1;  // Speed of each axis.
 
   PanTilt Clamped(const PanTilt& wanted) const;
-  // How long the way between two directions takes, seconds.
+  // Time to move between two directions, in seconds.
   double TravelSeconds(const PanTilt& from, const PanTilt& to) const;
 };
 
 engine::Rotation3 CarrierFromCamera(const PanTilt& at);
-// Where to look for a direction of the carrier's frame to be in the middle of the image.
+// Pan and tilt that bring a direction of the carrier frame to the centre of the image.
 PanTilt Toward(const Eigen::Vector3d& direction_in_carrier);
 
-// Where a head is that was told where to go: it turns about both axes at its speed until it is there. Few
-// devices say where they are, so this is also how theirs is reckoned.
+// Motion model of a head: it moves about both axes at constant speed until it reaches its target. Few devices
+// report their position, so this model also predicts theirs.
 class HeadMotion {
  public:
   explicit HeadMotion(const PanTiltRange& range, const PanTilt& at = {})
@@ -52,16 +52,16 @@ class Head {
  public:
   virtual ~Head() = default;
   virtual const PanTiltRange& range() const = 0;
-  // Where it looks at a time on the clock of its images, as far as is known.
+  // Estimated direction at a time on the clock of the images.
   virtual PanTilt At(Timestamp time) const = 0;
-  // Goes there; what is out of range, as near as it can.
+  // Moves to the direction, clamped to the range.
   virtual void LookAt(const PanTilt& wanted, Timestamp now) = 0;
 };
 
-// A V4L2 device's pan and tilt, absolute (arc seconds) or, on devices that have no other, relative. Null when
-// the device has neither or cannot be opened. It looks straight ahead at first. Values are those that the
-// control's range and step allow; an axis that the driver refuses to turn stays where it is until it is asked
-// again, and a device that was unplugged is opened again when it is back.
+// Opens the pan-tilt controls of a V4L2 device: absolute ones (arc seconds) or, on devices without these,
+// relative ones. Null when the device has neither or cannot be opened. The head first moves straight ahead.
+// Values are rounded to the control's range and step. An axis whose command the driver rejects stays at its
+// position until the next command, and a device that was unplugged is opened again by the next command.
 std::unique_ptr<Head> OpenDeviceHead(std::unique_ptr<DeviceSystem> system, const std::string& path);
 
 }  // namespace docent::app

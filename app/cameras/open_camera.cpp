@@ -13,7 +13,8 @@ namespace docent::app {
 
 std::unique_ptr<FrameSource> OpenCamera(const std::string& source, const CameraOptions& options) {
   namespace fs = std::filesystem;
-  if (source.empty()) throw Error("The camera has no name; give a device, a video, a folder or sim:SCENE.");
+  if (source.empty())
+    throw Error("The camera's name is empty; give a device, a video, a folder or sim:SCENE.");
   if (source.starts_with("/dev/")) {
     auto device = OpenDevice(source, options);
     device->SetHead(OpenDeviceHead(MakeDeviceSystem(), source));
@@ -31,7 +32,7 @@ DeviceFormat ParseDeviceFormat(const std::string& text) {
   const std::string_view whole = text;
   const std::size_t cross = whole.find('x'), at = whole.find('@');
   const auto fail = [&]() -> DeviceFormat {
-    throw Error("'" + text + "' is no camera format; write it as 640x480 or 640x480@30.");
+    throw Error("'" + text + "' is not a camera format; use 640x480 or 640x480@30.");
   };
   if (cross == std::string_view::npos || (at != std::string_view::npos && at < cross)) return fail();
   const auto width = ParseInteger(whole.substr(0, cross));

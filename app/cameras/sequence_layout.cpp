@@ -21,8 +21,8 @@ std::string At(const fs::path& path, int line) {
 
 void CheckOrder(std::optional<Timestamp> previous, Timestamp time, const fs::path& path, int line) {
   if (previous && time <= *previous) {
-    throw Error(At(path, line) + ": the time " + FormatSeconds(time) + " does not come after the " +
-                FormatSeconds(*previous) + " before it.");
+    throw Error(At(path, line) + ": the time " + FormatSeconds(time) +
+                " is not later than the previous time " + FormatSeconds(*previous) + ".");
   }
 }
 
@@ -88,7 +88,7 @@ std::vector<TimedPath> ReadTumList(const fs::path& folder) {
     CheckOrder(images.empty() ? std::nullopt : std::optional(images.back().time), *time, list, line.number);
     images.push_back({*time, folder / Trim(line.text.substr(blank))});
   }
-  if (images.empty()) throw Error("'" + list.string() + "' names no images.");
+  if (images.empty()) throw Error("'" + list.string() + "' lists no images.");
   return images;
 }
 
@@ -108,7 +108,7 @@ std::vector<TimedPath> ReadEurocList(const fs::path& folder) {
     CheckOrder(images.empty() ? std::nullopt : std::optional(images.back().time), time, list, line.number);
     images.push_back({time, *camera / "data" / Trim(line.text.substr(comma + 1))});
   }
-  if (images.empty()) throw Error("'" + list.string() + "' names no images.");
+  if (images.empty()) throw Error("'" + list.string() + "' lists no images.");
   return images;
 }
 
@@ -131,7 +131,7 @@ std::vector<Timestamp> ReadTimestamps(const fs::path& path) {
     CheckOrder(times.empty() ? std::nullopt : std::optional(times.back()), *time, path, line.number);
     times.push_back(*time);
   }
-  if (times.empty()) throw Error("'" + path.string() + "' holds no times.");
+  if (times.empty()) throw Error("'" + path.string() + "' contains no times.");
   return times;
 }
 

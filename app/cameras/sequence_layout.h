@@ -8,8 +8,8 @@
 
 #include "engine/base/time.h"
 
-// The layouts in which people keep image sequences, read into one list. Times grow strictly, or an Error
-// names the file and the line.
+// Reads the supported layouts of image sequences into a list of images. Timestamps must increase strictly;
+// otherwise an Error names the file and the line.
 namespace docent::app {
 
 struct TimedPath {
@@ -18,26 +18,26 @@ struct TimedPath {
 };
 
 enum class SequenceLayout {
-  kTum,             // rgb.txt: `seconds path`
-  kEuroc,           // mav0/cam0, cam0 or the folder itself: data.csv `nanoseconds,file`, images in data/
-  kTimedVideo,      // video.mp4 with timestamps.txt
-  kVideo,           // video.mp4 alone: the container's own times
-  kNumberedImages,  // images in the order of the numbers in their names
+  kTum,             // rgb.txt: `seconds path`.
+  kEuroc,           // mav0/cam0, cam0 or the folder itself: data.csv `nanoseconds,file`, images in data/.
+  kTimedVideo,      // video.mp4 with timestamps.txt.
+  kVideo,           // video.mp4 alone, with the timestamps of the container.
+  kNumberedImages,  // Images in the order of the numbers in their names.
 };
 
-// Which layout the folder has, or empty when it holds no sequence.
+// The layout of the folder, or empty when it contains no sequence.
 std::optional<SequenceLayout> FindLayout(const std::filesystem::path& folder);
 
 std::vector<TimedPath> ReadTumList(const std::filesystem::path& folder);
 std::vector<TimedPath> ReadEurocList(const std::filesystem::path& folder);
 std::vector<TimedPath> ListNumberedImages(const std::filesystem::path& folder, double fps);
-// timestamps.txt: one time in seconds a line, '#' comments.
+// Reads timestamps.txt: one time in seconds per line; '#' begins a comment.
 std::vector<Timestamp> ReadTimestamps(const std::filesystem::path& path);
 
 // The folder of an EuRoC camera (the one with data.csv), or empty.
 std::optional<std::filesystem::path> FindEurocCamera(const std::filesystem::path& folder);
 
-// Median of the steps between times, as images a second; 30 with fewer than two times.
+// Frame rate (images per second) from the median interval; 30 for fewer than two times.
 double MedianFps(const std::vector<Timestamp>& times);
 
 }  // namespace docent::app

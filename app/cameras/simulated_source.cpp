@@ -32,8 +32,8 @@ class SimulatedSource : public FrameSource {
     cv::Mat image;
     frame->time = simulation_->time(index_);
     if (head() != nullptr) {
-      const engine::Rigid3 turn(CarrierFromCamera(head()->At(frame->time)), Eigen::Vector3d::Zero());
-      simulation_->RenderTurned(index_, turn, &image);
+      const engine::Rigid3 rotation(CarrierFromCamera(head()->At(frame->time)), Eigen::Vector3d::Zero());
+      simulation_->RenderRotated(index_, rotation, &image);
     } else {
       simulation_->Render(index_, &image);
     }

@@ -9,11 +9,11 @@
 
 namespace docent::app {
 
-// The simulator as a camera: `scene` is what follows "sim:", as MakeSimulation takes it. The source comes
-// with the simulation's calibration. Throws Error for an unknown scene or option.
+// Opens the simulator as a camera. `scene` is the text after "sim:", see MakeSimulation. The source provides
+// the simulation's calibration. Throws Error for an unknown scene or option.
 std::unique_ptr<FrameSource> OpenSimulation(const std::string& scene, const CameraOptions& options = {});
 
-// The same over a simulation that somebody else asks for the truth.
+// Opens an existing simulation, whose ground truth the caller can use.
 std::unique_ptr<FrameSource> OpenSimulation(std::shared_ptr<const Simulation> simulation);
 
 }  // namespace docent::app

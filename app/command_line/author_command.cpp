@@ -16,15 +16,18 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
                     "docent author --library museum.docent --camera /dev/video0 --calibration camera.yaml\n"
                     "  docent author --library room.docent --camera sim:hand --camera sim:shoulder");
   const auto options = std::make_shared<AuthorOptions>();
-  command->add_option("--library", options->library, "The library's file; made when it is not there")
+  command
+      ->add_option("--library", options->library,
+                   "The library's file, NAME.docent; created if it does not exist")
       ->required();
   AddRunArguments(command, &options->run);
-  command->add_option("--script", options->script, "Carry out the commands of this file")->type_name("FILE");
-  command->add_option("--record-script", options->record_script, "Write what is done as a script")
+  command->add_option("--script", options->script, "Run the commands in this script file")->type_name("FILE");
+  command->add_option("--record-script", options->record_script, "Record all commands as a script file")
       ->type_name("FILE");
   command
       ->add_option("--target", options->target,
-                   "Start new maps from this printed image, in metres; see --target-width")
+                   "Initialize new maps from this printed image, so that they are in metres; needs "
+                   "--target-width")
       ->type_name("IMAGE");
   command
       ->add_option_function<std::string>(
@@ -32,18 +35,19 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
           [options](const std::string& text) {
             const auto metres = ParseNumber(text);
             if (!metres || *metres <= 0)
-              throw CLI::ValidationError("--target-width", "'" + text + "' is no length in metres");
+              throw CLI::ValidationError("--target-width", "'" + text + "' is not a length in metres");
             options->target_width_m = *metres;
           },
-          "How wide the target is as it hangs there")
+          "Width of the printed target")
       ->type_name("METRES");
   AddSecondsOption(command, "--autosave", &options->autosave_interval,
-                   "Save so often; 0: only when a map is left and at the end (default 10)");
-  AddWhenLostOption(command, &options->when_lost, "new without a window, else wait");
+                   "Time between automatic saves; 0: save only when a map is left and at the end "
+                   "(default 10)");
+  AddWhenLostOption(command, &options->when_lost, "new without a window, otherwise wait");
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
     if (options->target.has_value() != (options->target_width_m > 0))
-      throw CLI::ValidationError("--target", "--target and --target-width are given together");
+      throw CLI::ValidationError("--target", "--target and --target-width must be given together");
     invocation->run = [=] { run(*options, invocation->verbosity); };
   });
 }

@@ -13,7 +13,7 @@ namespace docent::app {
 void AddCalibrateCommand(CLI::App* program, Invocation* invocation,
                          std::function<void(const CalibrateOptions&, Verbosity)> run) {
   CLI::App* command = AddSubcommand(
-      program, "calibrate", "Measure a camera's lens with a printed board",
+      program, "calibrate", "Calibrate a camera with a printed board",
       "docent calibrate --print board.pdf\n"
       "  docent calibrate --camera /dev/video0 --output camera.yaml\n"
       "  docent calibrate --camera images --board checkerboard:9x6:25 --output camera.yaml --headless");
@@ -32,12 +32,12 @@ void AddCalibrateCommand(CLI::App* program, Invocation* invocation,
             }
             options->board = text;
           },
-          "checkerboard:COLUMNSxROWS:MM (inner corners) or charuco:COLUMNSxROWS:MM (squares); " +
-              options->board + " if not given")
+          "checkerboard:COLUMNSxROWS:MM (inner corners) or charuco:COLUMNSxROWS:MM (squares); default " +
+              options->board)
       ->type_name("BOARD");
   AddLensOption(command, &options->lens);
   AddCameraFormatOption(command, &options->camera);
-  command->add_option("--print", options->print, "Write the board as a PDF to print, at its true size")
+  command->add_option("--print", options->print, "Write the board as a PDF to print at 100 %")
       ->type_name("FILE.pdf");
   command->add_flag("--headless", options->headless, "Open no window");
   command->callback([=, run = std::move(run)] {
@@ -45,7 +45,7 @@ void AddCalibrateCommand(CLI::App* program, Invocation* invocation,
       throw CLI::ValidationError("calibrate", "give --camera and --output, or --print");
     }
     if (options->source.empty() != options->output.empty()) {
-      throw CLI::ValidationError("calibrate", "--camera and --output belong together");
+      throw CLI::ValidationError("calibrate", "--camera and --output must be given together");
     }
     invocation->run = [=] { run(*options, invocation->verbosity); };
   });

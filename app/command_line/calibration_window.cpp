@@ -8,7 +8,7 @@ namespace docent::app {
 
 namespace {
 
-// Sixteenths of a pixel, so that lines do not jump from pixel to pixel.
+// OpenCV draws in units of 2^-kShift pixels, so that lines move smoothly.
 constexpr int kShift = 4;
 
 cv::Point Place(const Eigen::Vector2d& pixel) {
@@ -30,7 +30,7 @@ void ShadeCells(const Coverage& coverage, cv::Mat* image) {
   cv::addWeighted(shade, kShade, *image, 1 - kShade, 0, *image);
 }
 
-// Green to red with the length of a residual, against the image's size.
+// Green to red with increasing residual, scaled to an image width of 640: red from 0.6 px.
 cv::Scalar ColorOf(double residual_px, int width_px) {
   const double poor = std::clamp(residual_px * 640 / width_px / 0.6, 0.0, 1.0);
   return {60, 60 + 160 * (1 - poor), 60 + 195 * poor};
@@ -43,7 +43,7 @@ cv::Mat PaintCalibration(const CalibrationWindow::Shown& shown, const Coverage& 
   shown.image.channels() == 1 ? cv::cvtColor(shown.image, drawn, cv::COLOR_GRAY2BGR)
                               : shown.image.copyTo(drawn);
   ShadeCells(coverage, &drawn);
-  constexpr double kTimes = 30;
+  constexpr double kResidualScale = 30;
   for (std::size_t i = 0; i < shown.kept.size(); ++i) {
     for (std::size_t k = 0; k < shown.kept[i].pixels.size(); ++k) {
       const Eigen::Vector2d& pixel = shown.kept[i].pixels[k];
@@ -54,7 +54,7 @@ cv::Mat PaintCalibration(const CalibrationWindow::Shown& shown, const Coverage& 
       const Eigen::Vector2d& residual = shown.residuals[i][k];
       const cv::Scalar color = ColorOf(residual.norm(), drawn.cols);
       cv::circle(drawn, Place(pixel), 1 << kShift, color, cv::FILLED, cv::LINE_AA, kShift);
-      cv::line(drawn, Place(pixel), Place(pixel + kTimes * residual), color, 1, cv::LINE_AA, kShift);
+      cv::line(drawn, Place(pixel), Place(pixel + kResidualScale * residual), color, 1, cv::LINE_AA, kShift);
     }
   }
   for (const Eigen::Vector2d& pixel : shown.now.pixels)
@@ -70,7 +70,7 @@ bool CalibrationWindow::Show(const Shown& shown, const Coverage& coverage) {
   if (window_.IsClosing()) return false;
   engine::TrackedFrame frame;
   frame.frame.image = PaintCalibration(shown, coverage);
-  frame.state = engine::TrackingState::kDropped;  // no figure invites to search or to move
+  frame.state = engine::TrackingState::kDropped;  // Hides the hints for initialization and for a lost camera.
   ui::View view;
   view.overlay.status = false;
   view.tracked = &frame;

@@ -11,24 +11,24 @@
 
 namespace docent::app {
 
-// What the person who holds the board sees: the image with the board's corners in it, where in the image
-// corners have been (shaded cells), how far each of them is from where the lens so far puts it (lines, thirty
-// times as long), and one sentence on what is missing. On the main thread (GLFW's rule).
+// Window for the person who holds the calibration board. It shows the image with the detected corners, the
+// image cells covered by earlier views (shaded), the residual of each corner for the current lens estimate
+// (lines, scaled by 30), and one sentence about what is missing. Main thread only, as GLFW requires.
 class CalibrationWindow {
  public:
   struct Shown {
     cv::Mat image;                // CV_8UC1 or CV_8UC3
-    BoardView now;                // the board in it; without points where there is none
-    std::vector<BoardView> kept;  // the views so far
-    // By view as many as were kept when the lens was last worked out, and corner: where the lens puts it,
-    // minus where it is, pixels.
+    BoardView now;                // Board detected in the image; without points when there is none.
+    std::vector<BoardView> kept;  // All views kept so far.
+    // Residuals, predicted minus detected corner, in pixels: one entry for each view that was kept when the
+    // lens was last estimated, with one residual for each corner.
     std::vector<std::vector<Eigen::Vector2d>> residuals;
     std::string message;
   };
 
-  // Throws Error when there is no display.
+  // Sizes in pixels. Throws Error when there is no display.
   CalibrationWindow(int width_px, int height_px) : window_("Docent - calibrate", width_px, height_px) {}
-  // False when the person is done: closed the window, or pressed enter, escape or q.
+  // Returns false when the person closed the window or pressed enter, escape or q.
   bool Show(const Shown& shown, const Coverage& coverage);
 
  private:
@@ -36,7 +36,7 @@ class CalibrationWindow {
   ui::Renderer renderer_;
 };
 
-// The drawing alone, CV_8UC3.
+// Draws the window's image (CV_8UC3) without a window.
 cv::Mat PaintCalibration(const CalibrationWindow::Shown& shown, const Coverage& coverage);
 
 }  // namespace docent::app

@@ -41,7 +41,7 @@ void PrintJson(const std::vector<DeviceDescription>& devices) {
 }
 
 void PrintText(const std::vector<DeviceDescription>& devices) {
-  if (devices.empty()) std::puts("There is no camera: no /dev/video device captures images.");
+  if (devices.empty()) std::puts("No camera found: no /dev/video device captures images.");
   for (const DeviceDescription& device : devices) {
     if (!device.trouble.empty()) {
       std::printf("%s  %s\n", device.path.c_str(), device.trouble.c_str());

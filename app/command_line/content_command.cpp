@@ -23,7 +23,7 @@ struct ContentOptions {
   bool as_json = false;
 };
 
-// The scene with its assets by name only: listing and removing need no mesh.
+// Decodes the scene with the names of its assets only, because listing and removing need no meshes.
 content::Scene DecodeNames(const maps::SceneRecord& record, const std::string& where) {
   if (record.text.empty()) return {};
   return content::DecodeScene(record.text, where, [&](const std::string& id) {
@@ -77,7 +77,7 @@ void List(const ContentOptions& options) {
                 Json{{"content", entries}}.dump(2, ' ', false, Json::error_handler_t::replace).c_str());
     return;
   }
-  if (entries.empty()) std::puts("Nothing stands in the maps.");
+  if (entries.empty()) std::puts("The maps hold no models or signposts.");
   for (const Json& entry : entries) {
     const bool model = entry["kind"] == "model";
     std::printf("%-24s %-24s %-9s %s\n", entry["map"].get<std::string>().c_str(),
@@ -93,7 +93,8 @@ void Remove(const ContentOptions& options) {
   content::Scene scene = DecodeNames(stored, Where(library, map));
   const std::size_t removed = std::erase_if(
       scene.entities, [&](const content::Entity& entity) { return entity.name == options.name; });
-  if (removed == 0) throw Error(Where(library, map) + " has nothing named '" + options.name + "'.");
+  if (removed == 0)
+    throw Error(Where(library, map) + " has no model or signpost named '" + options.name + "'.");
 
   auto changed = std::make_shared<maps::SceneRecord>();
   changed->text = content::EncodeScene(scene);
@@ -113,7 +114,7 @@ void Remove(const ContentOptions& options) {
 }  // namespace
 
 void AddContentCommand(CLI::App* program, Invocation* invocation) {
-  CLI::App* group = AddSubcommand(program, "content", "Care for what stands in the maps",
+  CLI::App* group = AddSubcommand(program, "content", "List or remove the models and signposts in the maps",
                                   "docent content list --library museum.docent");
   group->require_subcommand(1);
   const auto options = std::make_shared<ContentOptions>();
@@ -121,14 +122,14 @@ void AddContentCommand(CLI::App* program, Invocation* invocation) {
   CLI::App* list = AddSubcommand(group, "list", "List models and signposts",
                                  "docent content list --library museum.docent --map \"Desk 3\"");
   list->add_option("--library", options->library, "The library's file, NAME.docent")->required();
-  list->add_option("--map", options->map, "Only what stands in this map");
+  list->add_option("--map", options->map, "Only the content of this map");
   list->add_flag("--json", options->as_json, "Print JSON");
   list->callback([=] { invocation->run = [=] { List(*options); }; });
 
   CLI::App* remove = AddSubcommand(group, "remove", "Remove a model or a signpost",
                                    "docent content remove helmet --map \"Desk 3\" --library museum.docent");
-  remove->add_option("NAME", options->name, "What to remove")->required();
-  remove->add_option("--map", options->map, "The map that it stands in")->required();
+  remove->add_option("NAME", options->name, "Name of the model or signpost")->required();
+  remove->add_option("--map", options->map, "The map that contains it")->required();
   remove->add_option("--library", options->library, "The library's file, NAME.docent")->required();
   remove->callback([=] { invocation->run = [=] { Remove(*options); }; });
 }

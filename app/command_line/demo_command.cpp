@@ -11,7 +11,8 @@ namespace docent::app {
 void AddDemoCommand(CLI::App* program, Invocation* invocation,
                     std::function<void(const DemoOptions&, Verbosity)> run) {
   CLI::App* command = AddSubcommand(
-      program, "demo", "Build, furnish and tour the simulated museum; needs no camera and no file",
+      program, "demo",
+      "Build maps of the simulated museum, place content in them and tour them; needs no camera and no file",
       "docent demo --headless --output demo");
   const auto options = std::make_shared<DemoOptions>();
   command->add_flag("--headless", options->headless, "Open no window");
@@ -22,7 +23,7 @@ void AddDemoCommand(CLI::App* program, Invocation* invocation,
   command->callback([=, run = std::move(run)] {
     if (options->headless && !options->output) {
       throw CLI::ValidationError("--headless",
-                                 "needs --output DIR, or nothing would be left of the demonstration");
+                                 "needs --output DIR, because there is no window to show the results");
     }
     invocation->run = [=] { run(*options, invocation->verbosity); };
   });

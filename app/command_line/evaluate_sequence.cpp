@@ -27,7 +27,7 @@ SessionOptions OptionsFor(const EvaluateOptions& options, std::uint64_t seed) {
   session.threaded = options.pace != Pace::kLockstep;
   session.tracker.hybrid = options.engine == EngineKind::kHybrid;
   session.tracker.rotation_center.enabled = !options.turn_about_camera;
-  if (options.turn_about_camera) session.tracker.max_turn_sigma = session.tracker.max_sigma;
+  if (options.turn_about_camera) session.tracker.max_rotation_sigma = session.tracker.max_sigma;
   session.mapper.loops.enabled = !options.leave_loops_open;
   session.new_map_when_lost = options.when_lost == WhenLost::kNew;
   session.first_map = "map";
@@ -35,7 +35,7 @@ SessionOptions OptionsFor(const EvaluateOptions& options, std::uint64_t seed) {
   return session;
 }
 
-// Stitches what a map knows by turning, into the output folder and for the report.
+// Stitches the panorama maps of a map, writes them into the folder and adds them to the report.
 void StitchMap(const std::filesystem::path& folder, const Session::MapState& map,
                std::vector<ShownPanorama>* shown) {
   for (const PanoramaImage& panorama : StitchPanoramas(*map.snapshot)) {
@@ -53,12 +53,12 @@ void StitchMap(const std::filesystem::path& folder, const Session::MapState& map
 
 void DumpFrame(const std::filesystem::path& folder, std::size_t number, const engine::TrackedFrame& frame,
                const Session& session) {
-  // The tracker has not seen a frame that was dropped.
+  // Dropped frames were not tracked, so there is nothing to inspect.
   const bool dropped = frame.state == engine::TrackingState::kDropped;
   WriteFrameDump(folder, number, frame, dropped ? engine::FrameInspection() : session.Inspect(frame));
 }
 
-// Of a run of its own, whose maps are shown in the report.
+// Adds the session's maps to the record and, unless this is one of many runs, their panoramas to the report.
 void AddMaps(std::vector<Session::MapState> maps, const std::filesystem::path& folder, bool has_truth,
              bool one_of_many, RunRecord* record, std::vector<ShownPanorama>* panoramas) {
   for (const Session::MapState& map : maps) {
@@ -74,21 +74,21 @@ void AddMaps(std::vector<Session::MapState> maps, const std::filesystem::path& f
   }
 }
 
-// As many as fit between the first image and the last one, evenly.
+// Throws Error when the sequence is too short for the requested windows.
 void CheckStarts(const EvaluateOptions& options, const EvaluatedSequence& sequence) {
   if (options.starts == 1) return;
-  const std::string asked = "--starts " + std::to_string(options.starts) + ": '" + sequence.name + "' ";
+  const std::string prefix = "--starts " + std::to_string(options.starts) + ": '" + sequence.name + "' ";
   if (!sequence.frame_count)
-    throw Error(asked + "does not say how many frames it has, so windows over it have no beginning.");
+    throw Error(prefix + "does not say how many frames it has, so it cannot be divided into windows.");
   if (*sequence.frame_count < options.starts) {
-    throw Error(asked + "has only " + std::to_string(*sequence.frame_count) +
-                " frames, and every window begins at one of its own.");
+    throw Error(prefix + "has only " + std::to_string(*sequence.frame_count) +
+                " frames, and each window needs a different first frame.");
   }
 }
 
 }  // namespace
 
-EvaluatedSequence KnowSequence(const EvaluateOptions& options, std::size_t index) {
+EvaluatedSequence DescribeSequence(const EvaluateOptions& options, std::size_t index) {
   EvaluatedSequence sequence;
   sequence.word = options.sequences[index];
   if (index < options.calibrations.size()) sequence.calibration = options.calibrations[index];
@@ -99,10 +99,10 @@ EvaluatedSequence KnowSequence(const EvaluateOptions& options, std::size_t index
     sequence.truth = GroundTruthOf(*sequence.simulation);
     sequence.segments = SegmentsOf(*sequence.simulation);
   }
-  // Opened once here, so that what is wrong with it is told before anything is run or written.
+  // The sequence is opened once here, so that errors are reported before anything is run or written.
   const CalibratedCamera camera = OpenWindow(sequence, 0, {});
   const SourceInfo& info = camera.source->info();
-  if (info.live) throw Error("'" + sequence.word + "' is a live camera; evaluate takes recorded sequences.");
+  if (info.live) throw Error("'" + sequence.word + "' is a live camera; evaluate needs recorded sequences.");
   sequence.name = info.name;
   sequence.frame_count = info.frame_count;
   sequence.frames_per_second = info.nominal_fps;
@@ -119,24 +119,25 @@ CalibratedCamera OpenWindow(const EvaluatedSequence& sequence, std::uint64_t fir
   return Calibrate(std::move(source), sequence.calibration);
 }
 
-std::optional<std::vector<StartResult>> JudgeStartsOf(const EvaluateOptions& options,
-                                                      const EvaluatedSequence& sequence, const RunKey& key,
-                                                      const RunRecord& run) {
+std::optional<std::vector<InitializationResult>> ClassifyInitializationsOf(const EvaluateOptions& options,
+                                                                           const EvaluatedSequence& sequence,
+                                                                           const RunKey& key,
+                                                                           const RunRecord& run) {
   if (sequence.truth.empty()) return std::nullopt;
-  FalseStartOptions judging;
-  judging.truth_noise_m = sequence.simulation ? 0 : options.truth_noise_m;
-  const auto true_depths = [&](const StartRecord& start) {
+  FalseInitializationOptions start_options;
+  start_options.truth_noise_m = sequence.simulation ? 0 : options.truth_noise_m;
+  const auto true_depths = [&](const InitializationRecord& start) {
     std::vector<Eigen::Vector2f> pixels;
-    for (const StartRecord::Point& point : start.points) pixels.push_back(point.pixel);
+    for (const InitializationRecord::Point& point : start.points) pixels.push_back(point.pixel);
     const std::size_t frame = key.first_frame + start.frame;
     if (sequence.simulation)
       return SimulatedTrueDepths(*sequence.simulation, static_cast<int>(frame), pixels);
-    TrueDepthOptions following;
-    following.truth_noise_m = judging.truth_noise_m;
+    TrueDepthOptions depth_options;
+    depth_options.truth_noise_m = start_options.truth_noise_m;
     CalibratedCamera camera = OpenWindow(sequence, frame, {});
-    return FollowTrueDepths(&camera, sequence.truth, pixels, following);
+    return MeasureTrueDepths(&camera, sequence.truth, pixels, depth_options);
   };
-  return JudgeStarts(run, sequence.truth, true_depths, judging);
+  return ClassifyInitializations(run, sequence.truth, true_depths, start_options);
 }
 
 std::vector<std::uint64_t> FirstFrames(std::size_t starts, std::uint64_t frames,
@@ -174,9 +175,9 @@ RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequenc
   const auto start = std::chrono::steady_clock::now();
   RunOutput output(request.folder);
   RunRecorder recorder;
-  std::optional<Session> in_use(std::in_place, OptionsFor(options, request.key.seed),
-                                std::vector{camera.model}, nullptr);
-  Session& session = *in_use;
+  std::optional<Session> owned_session(std::in_place, OptionsFor(options, request.key.seed),
+                                       std::vector{camera.model}, nullptr);
+  Session& session = *owned_session;
   Progress progress(request.name, camera.source->info().frame_count,
                     request.one_of_many ? Verbosity::kQuiet : verbosity);
   FrameLoopOptions loop;
@@ -205,15 +206,15 @@ RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequenc
   write_events();
   output.Close();
   record.frames = recorder.frames();
-  record.starts = recorder.starts();
+  record.initializations = recorder.initializations();
   record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   record.peak_memory_mb = PeakMemoryMegabytes();
   record.mapping = MakeMappingTimes(session.MappingTimes());
   for (const CalibrationMonitor::Ring& ring : session.LensErrors(0))
     record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
-  // What follows needs the maps, and memory for one of them over again, but not all that tracked and mapped.
+  // The session is destroyed first, because the adjustments below need memory for another copy of a map.
   std::vector<Session::MapState> maps = session.Maps();
-  in_use.reset();
+  owned_session.reset();
   AddMaps(std::move(maps), request.folder, !sequence.truth.empty(), request.one_of_many, &record, panoramas);
   return record;
 }

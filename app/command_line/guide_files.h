@@ -10,10 +10,12 @@
 
 namespace docent::app {
 
-// The text files that a guided run leaves, where they were asked for. One thread at a time.
+// Text files that a guided run writes when they were requested: trajectory, frames, events, augmentations and
+// recorded script. One thread at a time.
 class GuideFiles {
  public:
-  // What was drawn over the first camera's images is noted through its lens.
+  // `first_camera` projects the content that was drawn over the first camera's images into the log of
+  // augmentations. Throws Error when a file cannot be created.
   GuideFiles(const GuideRequest& request, const engine::CameraModel& first_camera);
 
   void Add(const ShownFrame& frame);

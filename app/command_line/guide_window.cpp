@@ -49,7 +49,7 @@ bool FrameSlot::closed() const {
 
 namespace {
 
-// The window with all that is drawn in it, and what the person's hands do there.
+// The window, its renderers and the handling of keyboard and mouse input.
 class GuideWindow {
  public:
   GuideWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras,
@@ -66,8 +66,8 @@ class GuideWindow {
           &window_, [this](const std::string& line) { Emit(line); }, Models());
   }
 
-  // False when it was closed.
-  bool Turn(std::vector<std::shared_ptr<const ShownFrame>> frames) {
+  // Handles the input and draws the frames. Returns false when the window was closed.
+  bool Update(std::vector<std::shared_ptr<const ShownFrame>> frames) {
     HandleEvents();
     if (window_.IsClosing() || closing_) return false;
     std::vector<std::shared_ptr<const ShownFrame>> fresh;
@@ -96,7 +96,7 @@ class GuideWindow {
   }
 
  private:
-  // Model files that the panel offers: those of the working folder.
+  // Model files that the panel offers: those in the working directory.
   static std::vector<std::string> Models() {
     static const std::set<std::string> kEndings = {".glb", ".gltf", ".obj", ".ply", ".stl", ".fbx", ".dae"};
     std::vector<std::string> models;
@@ -132,20 +132,22 @@ class GuideWindow {
       map_names_.erase("");
       panel_->SetMapNames({map_names_.begin(), map_names_.end()});
     }
-    if (!refusal_.empty()) view.overlay.message = refusal_;
+    if (!command_error_.empty()) view.overlay.message = command_error_;
     renderer_.Draw(view);
     if (!recorder_ && !request_.on_image) return;
     renderer_.ReadBack(&image_);
-    // The video has the first camera's rate and size: it is written at that camera's images.
+    // The video has the rate and size of the first camera, so a frame is written for each of that camera's
+    // images.
     const std::uint64_t index = shown_[0] ? shown_[0]->tracked.frame.index : 0;
-    if (recorder_ && shown_[0] && index != recorded_ && SizeOfFirst(image_)) recorder_->Write(image_, index);
+    if (recorder_ && shown_[0] && index != recorded_ && HasFirstCameraSize(image_))
+      recorder_->Write(image_, index);
     recorded_ = index;
     if (request_.on_image) request_.on_image(*large(), image_);
   }
 
-  // A line of the script language becomes a command at the frame that is on the screen.
+  // Parses a line of the script language and queues it as a command for the frame on the screen.
   void Emit(const std::string& line) {
-    refusal_.clear();
+    command_error_.clear();
     try {
       for (const TimedCommand& command : ParseScript("0 " + line, "window")) {
         const auto frame = large() ? std::shared_ptr<const engine::TrackedFrame>(large(), &large()->tracked)
@@ -153,7 +155,7 @@ class GuideWindow {
         inboxes_[large_].Push({command.command, frame});
       }
     } catch (const Error& error) {
-      refusal_ = error.what();
+      command_error_ = error.what();
     }
   }
 
@@ -198,7 +200,7 @@ class GuideWindow {
     }
     if (panel_ && !shows_map_ && camera().IsInside(pixel)) panel_->ClickImage(pixel);
   }
-  bool SizeOfFirst(const cv::Mat& image) const {
+  bool HasFirstCameraSize(const cv::Mat& image) const {
     const engine::CameraModel& first = *cameras_.front().model;
     return image.cols == first.width_px() && image.rows == first.height_px();
   }
@@ -212,11 +214,11 @@ class GuideWindow {
   MapPanel map_panel_;
   std::optional<ui::AuthoringPanel> panel_;
   std::optional<ViewRecorder> recorder_;
-  std::vector<std::shared_ptr<const ShownFrame>> shown_;  // by camera
-  std::size_t large_ = 0;                                 // the camera that is shown large
+  std::vector<std::shared_ptr<const ShownFrame>> shown_;  // By camera.
+  std::size_t large_ = 0;                                 // Index of the camera that is shown large.
   std::optional<std::uint64_t> recorded_;
   std::set<std::string> map_names_;
-  std::string refusal_;
+  std::string command_error_;
   cv::Mat image_;
   bool points_ = false, keyframes_ = false, hud_ = true, shows_map_ = false, closing_ = false;
 };
@@ -227,7 +229,7 @@ void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera>
                   std::span<CommandInbox> inboxes, const std::function<void(const ShownFrame&)>& drawn) {
   GuideWindow window(request, cameras, inboxes, drawn);
   while (!slot->closed() && !Interruption::requested()) {
-    if (!window.Turn(slot->Take())) break;
+    if (!window.Update(slot->Take())) break;
   }
   window.Close();
 }

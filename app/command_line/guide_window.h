@@ -12,18 +12,17 @@
 
 namespace docent::app {
 
-// Where the cameras' threads leave frames for the window's: one place for each camera, and its newest frame
-// takes it, so that a slow screen never holds a camera back.
+// Hands frames from the camera threads to the window's thread. There is one slot for each camera, and a newer
+// frame replaces an older one, so that a slow screen never blocks a camera. Any thread.
 class FrameSlot {
  public:
   explicit FrameSlot(std::size_t cameras) : frames_(cameras) {}
   void Put(std::shared_ptr<const ShownFrame> frame);
-  // No more frames will come.
+  // Says that no more frames will come.
   void Close();
-  // The newest frames not taken yet, by camera; waits up to a sixtieth of a second for one. Null where there
-  // is none.
+  // Returns the newest frame of each camera that was not taken yet, or null. Waits up to 1/60 s for a frame.
   std::vector<std::shared_ptr<const ShownFrame>> Take();
-  bool closed() const;
+  bool closed() const;  // Closed, and all frames were taken.
 
  private:
   bool HasFrame() const;
@@ -34,16 +33,16 @@ class FrameSlot {
   bool closed_ = false;
 };
 
-// Shows frames in a window until they end or the person closes it; authors put commands into the inbox of the
-// frame's camera with its panel. With two cameras the first is shown large and the other small; a click on
-// the small image swaps them. On the main thread (GLFW's rule). Throws Error when there is no display.
+// Shows frames in a window until the frames end or the person closes it. The author's panel puts commands
+// into the inbox of the camera that is shown large. With two cameras, the first is shown large and the other
+// small; a click on the small image swaps them. Main thread only, as GLFW requires. Throws Error when there
+// is no display.
 //
 //   escape or q  close            p  points      k  keyframes      h  status      tab  swap cameras
 //   control-z    undo             control-y  redo                  control-s  save
-//   m            the map about the camera from above, with colours that say where lost visitors will be found
-//                (authors)
+//   m            the map from above, coloured by how well a lost camera will be relocalized (authors only)
 //
-// drawn is told of every frame once it is on the screen.
+// `drawn` is called with each frame once it is on the screen.
 void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,
                   std::span<CommandInbox> inboxes, const std::function<void(const ShownFrame&)>& drawn);
 

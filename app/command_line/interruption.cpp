@@ -9,9 +9,9 @@ namespace docent::app {
 namespace {
 
 std::atomic<bool> g_requested = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch such");
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only use lock-free atomics");
 
-void Note(int signal) {
+void OnSignal(int signal) {
   g_requested = true;
   std::signal(signal, SIG_DFL);
 }
@@ -20,8 +20,8 @@ void Note(int signal) {
 
 Interruption::Interruption() {
   g_requested = false;
-  std::signal(SIGINT, Note);
-  std::signal(SIGTERM, Note);
+  std::signal(SIGINT, OnSignal);
+  std::signal(SIGTERM, OnSignal);
 }
 
 Interruption::~Interruption() {

@@ -3,9 +3,9 @@
 
 namespace docent::app {
 
-// While one exists, Ctrl-C and the system's request to end (SIGINT, SIGTERM) are only noted, so that what
-// runs can save and close its files. A second Ctrl-C ends the program at once. One at a time, on the main
-// thread.
+// While an instance exists, the first SIGINT (Ctrl-C) or SIGTERM only sets a flag, so that the running
+// command can save and close its files. A second signal of the same kind ends the program at once. One
+// instance at a time, created on the main thread.
 class Interruption {
  public:
   Interruption();
@@ -13,7 +13,7 @@ class Interruption {
   Interruption(const Interruption&) = delete;
   Interruption& operator=(const Interruption&) = delete;
 
-  // Any thread.
+  // Whether a signal has arrived. Any thread.
   static bool requested();
 };
 

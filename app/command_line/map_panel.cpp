@@ -32,7 +32,7 @@ void MapPanel::Predict(const std::shared_ptr<const engine::MapSnapshot>& map, st
   }
   predicted_key_ = key;
   predicted_keyframes_ = map->keyframes.size();
-  worker_.emplace("found-again", [this, map](const std::stop_token& stop) {
+  worker_.emplace("recall", [this, map](const std::stop_token& stop) {
     std::vector<ui::PredictedRecall> found = PredictRecall(*map, stop);
     const std::scoped_lock lock(mutex_);
     predicted_recall_ = std::move(found);

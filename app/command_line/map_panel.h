@@ -13,19 +13,20 @@
 
 namespace docent::app {
 
-// The cells of a map's grid of predicted relocalization, ready to be drawn: see maps/relocalization_check.h.
-// Every keyframe costs a search, a map a second or more. `stop` may be asked for meanwhile: the answer is
-// then of the keyframes that were tried. The map has full features.
+// Predicts where a lost camera can be relocalized: leaves each keyframe out in turn, tries to relocalize it,
+// and collects the results in grid cells; see maps/relocalization_check.h. Each keyframe needs one search, so
+// a map takes a second or more. After a request through `stop`, only the keyframes tried so far are counted.
+// The keyframes must have their features in memory.
 std::vector<ui::PredictedRecall> PredictRecall(const engine::MapSnapshot& map,
                                                const std::stop_token& stop = {});
 
-// The author's other view: the map about the camera from above, with its content and colours that say where a
-// visitor who is lost will be found again. The colours come a moment later than the map, from a thread of
-// their own, and are made anew when keyframes have come or gone. Otherwise one thread, that of the window.
+// View of the active map from above for authors, with its content and with colours that show where a lost
+// camera will be relocalized. The colours are computed on a worker thread and appear later than the map; they
+// are recomputed when the number of keyframes changes. All members are called on the window's thread.
 class MapPanel {
  public:
   ~MapPanel();
-  // The frame's map; what was drawn last stays where a frame has none.
+  // Draws the frame's map. Without a map the last drawing stays. Sizes in pixels.
   void Draw(const ShownFrame& frame, int width_px, int height_px);
   void Present(int width_px, int height_px);
 
@@ -36,9 +37,9 @@ class MapPanel {
   int width_px_ = 0, height_px_ = 0;
   std::uint64_t predicted_key_ = 0;
   std::size_t predicted_keyframes_ = 0;
-  std::mutex mutex_;  // guards the colours
+  std::mutex mutex_;  // Guards predicted_recall_.
   std::vector<ui::PredictedRecall> predicted_recall_;
-  std::optional<Worker> worker_;  // last: it uses the rest
+  std::optional<Worker> worker_;  // Last member: its thread uses the others.
 };
 
 }  // namespace docent::app

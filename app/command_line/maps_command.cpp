@@ -21,7 +21,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// What any of the subcommands of `maps` takes.
+// Arguments of all subcommands of `maps`.
 struct MapsOptions {
   std::filesystem::path library;
   std::string name, new_name, policy;
@@ -77,16 +77,16 @@ void List(const MapsOptions& options) {
   }
 }
 
-// What a visitor who is lost may expect, by leaving each keyframe out in turn.
+// Estimates how often a lost camera is relocalized, by leaving each keyframe out in turn.
 Json DescribeRelocalization(const engine::MapSnapshot& map, Verbosity verbosity) {
   using Result = maps::RelocalizationTrial::Result;
   const Interruption interruption;
-  Progress progress("keyframes left out in turn", map.keyframes.size(), verbosity);
+  Progress progress("Relocalizing keyframes", map.keyframes.size(), verbosity);
   const auto trials = maps::LeaveEachKeyFrameOut(map, {}, [&](std::size_t done) {
     progress.Update(done);
     return !Interruption::requested();
   });
-  if (Interruption::requested()) throw Error("interrupted");
+  if (Interruption::requested()) throw Error("Interrupted.");
   const auto count = [&](Result result) {
     return std::count_if(trials.begin(), trials.end(),
                          [&](const maps::RelocalizationTrial& trial) { return trial.result == result; });
@@ -111,15 +111,14 @@ Json DescribeRelocalization(const engine::MapSnapshot& map, Verbosity verbosity)
   return json;
 }
 
-// The same in lines.
+// Prints the result of DescribeRelocalization as text.
 void PrintRelocalization(const Json& json) {
-  std::printf("%-20s %s of %s keyframes are found when they are left out, %s in a wrong place\n",
-              "relocalization", json["found"].dump().c_str(), json["trials"].dump().c_str(),
-              json["wrong"].dump().c_str());
+  std::printf("%-20s %s of %s left-out keyframes relocalized, %s at a wrong pose\n", "relocalization",
+              json["found"].dump().c_str(), json["trials"].dump().c_str(), json["wrong"].dump().c_str());
   if (!json.contains("grid")) return;
   std::printf("%-20s %s\n", "missed_keyframes", json["missed_keyframes"].dump().c_str());
-  std::printf("%-20s squares of %.3g units; right, ahead and direction seen from the first keyframe\n", "",
-              json["square_m"].get<double>());
+  std::printf("%-20s squares of %.3g map units; right, ahead and direction relative to the first keyframe\n",
+              "", json["square_m"].get<double>());
   for (const Json& cell : json["grid"]) {
     std::printf("%-20s right %3d  ahead %3d  %4d deg  %d of %d\n", "", cell["right"].get<int>(),
                 cell["ahead"].get<int>(), cell["direction_deg"].get<int>(), cell["found"].get<int>(),
@@ -127,7 +126,8 @@ void PrintRelocalization(const Json& json) {
   }
 }
 
-// Extent of the camera's way and of the finite points, metres of the map.
+// Summary of a map. `camera_extent_m` is the size of the bounding box of the keyframe positions, in map
+// units.
 Json Describe(const maps::StoredMap& map, Verbosity verbosity) {
   Json json = ToJson(map.info);
   int panorama = 0, infinite = 0;
@@ -169,13 +169,13 @@ void Verify(const MapsOptions& options) {
   const maps::Library library = OpenToRead(options);
   const std::vector<std::string> problems = library.Verify();
   if (problems.empty()) {
-    std::printf("%s: all is well\n", library.file().c_str());
+    std::printf("%s: no problems found\n", library.file().c_str());
     return;
   }
   for (const std::string& problem : problems) std::printf("%s\n", problem.c_str());
   throw Error("'" + library.file() + "' is damaged: " + std::to_string(problems.size()) +
               (problems.size() == 1 ? " problem" : " problems") +
-              "; docent maps recover saves what it still holds.");
+              "; run docent maps recover to save the maps that are still readable.");
 }
 
 void Rename(const MapsOptions& options) {
@@ -196,7 +196,7 @@ void SetMapPolicy(const MapsOptions& options) {
 }  // namespace
 
 void AddMapsCommand(CLI::App* program, Invocation* invocation) {
-  CLI::App* group = AddSubcommand(program, "maps", "Care for the maps of a library",
+  CLI::App* group = AddSubcommand(program, "maps", "Manage the maps of a library",
                                   "docent maps list --library museum.docent");
   group->require_subcommand(1);
   const auto options = std::make_shared<MapsOptions>();
@@ -222,15 +222,15 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
   add_json(add("list", "List the maps", "docent maps list --library museum.docent --json", List));
   add_json(
       add_name(add("show", "Show one map", "docent maps show \"Desk 3\" --library museum.docent", Show)));
-  add("verify", "Read everything and say what is damaged", "docent maps verify --library museum.docent",
+  add("verify", "Read the whole library and report damage", "docent maps verify --library museum.docent",
       Verify);
-  add_name(add("rename", "Give a map another name",
-               "docent maps rename \"Desk 3\" Kiosk --library museum.docent", Rename))
-      ->add_option("NEW_NAME", options->new_name, "Its new name")
+  add_name(
+      add("rename", "Rename a map", "docent maps rename \"Desk 3\" Kiosk --library museum.docent", Rename))
+      ->add_option("NEW_NAME", options->new_name, "New name of the map")
       ->required();
-  add_name(add("remove", "Remove a map and what stands in it",
-               "docent maps remove Kiosk --library museum.docent", Remove));
-  add_name(add("policy", "Say what may be done to a map",
+  add_name(add("remove", "Remove a map and its content", "docent maps remove Kiosk --library museum.docent",
+               Remove));
+  add_name(add("policy", "Set what may be changed in a map",
                "docent maps policy Kiosk read-only --library museum.docent", SetMapPolicy))
       ->add_option("POLICY", options->policy, "open, bounded, augment-only or read-only")
       ->required()

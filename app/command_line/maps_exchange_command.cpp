@@ -46,11 +46,12 @@ void WriteText(const fs::path& path, std::string_view text) {
 
 void WritePng(const fs::path& path, const cv::Mat& image) {
   std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", image, bytes)) throw Error(path.string() + " cannot be written as PNG");
+  if (!cv::imencode(".png", image, bytes)) throw Error("Cannot write '" + path.string() + "' as PNG.");
   WriteText(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
-// The folder appears when everything in it is written.
+// Writes into a temporary folder and renames it at the end, so that an incomplete model never has the final
+// name.
 void WriteColmap(const fs::path& folder, const engine::MapSnapshot& map) {
   const maps::ColmapModel model = maps::MakeColmapModel(map);
   fs::path unfinished = folder.has_filename() ? folder : folder.parent_path();
@@ -66,14 +67,14 @@ void WriteColmap(const fs::path& folder, const engine::MapSnapshot& map) {
   if (error) throw Error("Cannot write '" + folder.string() + "': " + error.message() + ".");
 }
 
-// What of a map does not go into a file made of places.
-std::string SayLeftOut(const engine::MapSnapshot& map) {
+// Mentions the infinite points, which formats for 3D positions cannot hold.
+std::string OmittedPointsNote(const engine::MapSnapshot& map) {
   const auto infinite = std::count_if(map.points.begin(), map.points.end(),
                                       [](const engine::MapPoint& point) { return point.infinite(); });
   if (infinite == 0) return "";
   return "; " + std::to_string(infinite) +
-         (infinite == 1 ? " point at infinity was left out, because it has no place"
-                        : " points at infinity were left out, because they have no place");
+         (infinite == 1 ? " infinite point was left out, because it has no position"
+                        : " infinite points were left out, because they have no position");
 }
 
 void Export(const ExchangeOptions& options, Verbosity verbosity) {
@@ -81,18 +82,19 @@ void Export(const ExchangeOptions& options, Verbosity verbosity) {
   const std::uint64_t key = library.FindByName(options.name).key;
   const std::string kind = options.output.extension().string();
   if (kind != "" && kind != ".docent" && kind != ".ply" && kind != ".png") {
-    throw Error("'" + options.output.string() +
-                "' is no kind of export: name a .docent, .ply or .png file, or a folder for COLMAP's files");
+    throw Error(
+        "'" + options.output.string() +
+        "' has an unknown file type; use a .docent, .ply or .png file, or a folder for COLMAP's files.");
   }
   std::error_code error;
   if (fs::exists(options.output, error) && !(kind.empty() && fs::is_empty(options.output, error)))
-    throw Error(options.output.string() + " exists already; name something new");
+    throw Error("'" + options.output.string() + "' already exists; choose a new name.");
   std::string left_out;
   if (kind == ".docent") {
     maps::ExportMap(library, key, options.output);
   } else {
     const auto map = library.Load(key).snapshot;
-    left_out = SayLeftOut(*map);
+    left_out = OmittedPointsNote(*map);
     if (kind == ".ply") WriteText(options.output, maps::MakePly(*map));
     if (kind == ".png") {
       const Eigen::Vector3d up = map->keyframes.empty() ? -Eigen::Vector3d::UnitY().eval() : UpInMap(*map);
@@ -111,33 +113,34 @@ void Import(const ExchangeOptions& options, Verbosity verbosity) {
     if (map.name == map.name_before) {
       std::printf("%s\n", map.name.c_str());
     } else {
-      std::printf("%s, because there was a map of the name %s\n", map.name.c_str(), map.name_before.c_str());
+      std::printf("%s (renamed, because there is already a map named %s)\n", map.name.c_str(),
+                  map.name_before.c_str());
     }
   }
 }
 
-const char* Say(maps::Optimization::Outcome outcome) {
+const char* ToText(maps::Optimization::Outcome outcome) {
   using Outcome = maps::Optimization::Outcome;
   switch (outcome) {
     case Outcome::kAdjusted:
       return "adjusted";
-    case Outcome::kAlreadyBest:
-      return "was at its best";
+    case Outcome::kAlreadyOptimal:
+      return "already optimal";
     case Outcome::kNotAllowed:
-      return "left alone, as its policy says";
+      return "not changed, because its policy forbids it";
     case Outcome::kTooSmall:
       return "too small to adjust";
     case Outcome::kInterrupted:
-      return "interrupted, left as it was";
+      return "interrupted; not changed";
     case Outcome::kChangedMeanwhile:
-      return "was changed by another program meanwhile, left as it is";
+      return "changed by another program in the meantime; not optimized";
     case Outcome::kFailed:
-      return "cannot be adjusted, left as it was";
+      return "could not be adjusted; not changed";
   }
   return "";
 }
 
-// Content goes along with its ground.
+// Moves content together with the map points that it is anchored to.
 maps::MoveScene SceneMover(const std::string& library) {
   return [library](const maps::SceneRecord& record, const engine::MapSnapshot& before,
                    const engine::MapSnapshot& after) -> std::shared_ptr<const maps::SceneRecord> {
@@ -149,7 +152,8 @@ maps::MoveScene SceneMover(const std::string& library) {
   };
 }
 
-// A flag that a request to end the program sets: a signal cannot reach into long work by itself.
+// An atomic flag that is set when the program is interrupted. Long operations in `maps` poll such a flag,
+// because they do not know the program's signal handling.
 class InterruptFlag {
  public:
   InterruptFlag()
@@ -164,7 +168,7 @@ class InterruptFlag {
  private:
   const Interruption interruption_;
   std::atomic<bool> flag_ = false;
-  Worker watch_;  // last: it uses the rest
+  Worker watch_;  // Last member: its thread uses the others.
 };
 
 void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
@@ -173,28 +177,28 @@ void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
   if (!options.name.empty()) infos = {library.FindByName(options.name)};
   const InterruptFlag interrupt;
   std::optional<Progress> progress;
-  progress.emplace("maps", infos.size(), verbosity);
+  progress.emplace("Maps", infos.size(), verbosity);
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < infos.size() && !Interruption::requested(); ++i) {
     const maps::Optimization result =
         maps::OptimizeMap(&library, infos[i].key, interrupt.get(), SceneMover(options.library));
     char numbers[240] = "";
     if (result.outcome == maps::Optimization::Outcome::kAdjusted) {
-      std::snprintf(
-          numbers, sizeof numbers,
-          ": %.3f px before, %.3f px after; %zu observations found and %zu thrown out, %zu points and %zu "
-          "redundant keyframes removed",
-          result.rms_before_px, result.rms_after_px, result.observations_added, result.observations_removed,
-          result.points_removed, result.keyframes_removed);
+      std::snprintf(numbers, sizeof numbers,
+                    ": RMS reprojection error %.3f px before, %.3f px after; %zu observations added and %zu "
+                    "removed, %zu "
+                    "points and %zu redundant keyframes removed",
+                    result.rms_before_px, result.rms_after_px, result.observations_added,
+                    result.observations_removed, result.points_removed, result.keyframes_removed);
     }
-    lines.push_back(infos[i].name + " " + Say(result.outcome) + numbers);
+    lines.push_back(infos[i].name + " " + ToText(result.outcome) + numbers);
     progress->Update(i + 1);
   }
-  progress.reset();  // wipes its line away
+  progress.reset();  // Erases its line.
   if (verbosity != Verbosity::kQuiet) {
     for (const std::string& line : lines) std::printf("%s\n", line.c_str());
   }
-  if (Interruption::requested()) throw Error("interrupted; what was adjusted before is saved");
+  if (Interruption::requested()) throw Error("Interrupted; the maps adjusted so far are saved.");
 }
 
 void Join(const ExchangeOptions& options, Verbosity verbosity) {
@@ -204,16 +208,16 @@ void Join(const ExchangeOptions& options, Verbosity verbosity) {
   const InterruptFlag interrupt;
   const maps::JoinResult result =
       maps::JoinMaps(&library, into, from, LibrarySceneJoiner(options.library), interrupt.get());
-  if (Interruption::requested() && !result.refusal.empty()) throw Error("interrupted; nothing was changed");
+  if (Interruption::requested() && !result.refusal.empty()) throw Error("Interrupted; nothing was changed.");
   if (verbosity == Verbosity::kVerbose) std::printf("%s\n", result.overlap.Brief().c_str());
   if (!result.refusal.empty()) {
-    throw Error("'" + options.name + "' and '" + options.other_name + "' stay two maps, because " +
+    throw Error("'" + options.name + "' and '" + options.other_name + "' cannot be joined, because " +
                 result.refusal);
   }
   if (verbosity != Verbosity::kQuiet) {
     const maps::MapInfo joined = library.Find(into);
     std::printf(
-        "%s holds %s now: %llu keyframes and %llu points, of which %d pairs became one; policy %s\n",
+        "%s now contains %s: %llu keyframes and %llu points, %d duplicate points fused; policy %s\n",
         options.name.c_str(), options.other_name.c_str(), static_cast<unsigned long long>(joined.keyframes),
         static_cast<unsigned long long>(joined.points), result.points_merged, maps::ToString(joined.policy));
   }
@@ -223,8 +227,8 @@ void Recover(const ExchangeOptions& options, Verbosity verbosity) {
   const maps::Recovery recovery = maps::Recover(options.library, options.output);
   if (verbosity == Verbosity::kQuiet) return;
   for (const std::string& problem : recovery.problems) std::printf("lost: %s\n", problem.c_str());
-  std::printf("%zu maps whole and %zu in part, written to %s\n", recovery.maps_whole, recovery.maps_in_part,
-              options.output.c_str());
+  std::printf("%zu %s recovered completely and %zu partly, written to %s\n", recovery.maps_complete,
+              recovery.maps_complete == 1 ? "map" : "maps", recovery.maps_partial, options.output.c_str());
 }
 
 }  // namespace
@@ -239,30 +243,30 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
     return command;
   };
   CLI::App* command =
-      add("export", "Write one map as a library of its own, for COLMAP, as PLY, or as a plan",
+      add("export", "Export one map as a library, a COLMAP model, a PLY point cloud or an image from above",
           "docent maps export \"Desk 3\" --library museum.docent --output desk.docent", Export);
   command->add_option("NAME", options->name, "Name of the map")->required();
   command
-      ->add_option(
-          "--output", options->output,
-          "A .docent library, a .ply cloud, a .png image from above, or a folder for COLMAP's text model")
+      ->add_option("--output", options->output,
+                   "A .docent library, a .ply point cloud, a .png image from above, or a folder for COLMAP's "
+                   "text model")
       ->required();
-  add("import", "Add the maps of another library; names that are taken get a number",
+  add("import", "Add the maps of another library; duplicate names get a number",
       "docent maps import desk.docent --library museum.docent", Import)
       ->add_option("FILE", options->from, "The other library")
       ->required();
-  add("optimize",
-      "Adjust whole maps, find their points in keyframes that missed them, and drop redundant keyframes",
-      "docent maps optimize --library museum.docent", Optimize)
-      ->add_option("NAME", options->name, "Name of the map; all when it is left out");
+  add("optimize", "Improve maps and remove redundant data", "docent maps optimize --library museum.docent",
+      Optimize)
+      ->add_option("NAME", options->name, "Name of the map; without it, all maps");
   CLI::App* join = add(
       "join",
-      "Make one map of two that overlap; the first keeps its name and coordinates, the second is gone, and "
-      "the stricter of their policies holds",
+      "Join two overlapping maps; the first keeps its name and coordinates, the second is removed, and the "
+      "stricter policy applies",
       "docent maps join \"East wing\" \"West wing\" --library museum.docent", Join);
-  join->add_option("NAME", options->name, "Name of the map that takes the other in")->required();
-  join->add_option("OTHER", options->other_name, "Name of the map that becomes a part of it")->required();
-  add("recover", "Save what a damaged library still holds into a new one",
+  join->add_option("NAME", options->name, "Name of the map that the other is joined into")->required();
+  join->add_option("OTHER", options->other_name, "Name of the map that is joined into it and removed")
+      ->required();
+  add("recover", "Save the readable parts of a damaged library to a new one",
       "docent maps recover --library damaged.docent --output saved.docent", Recover)
       ->add_option("--output", options->output, "The new library")
       ->required();

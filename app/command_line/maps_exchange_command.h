@@ -5,7 +5,7 @@
 
 namespace docent::app {
 
-// The subcommands of `maps` that work on a map as a whole: export, import, optimize, join, recover.
+// Adds the subcommands of `maps` that work on whole maps: export, import, optimize, join and recover.
 void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation);
 
 }  // namespace docent::app

@@ -12,58 +12,59 @@
 #include "engine/base/time.h"
 #include "engine/geometry/camera_model.h"
 
-// What the person asked for, as plain structs: the command line is parsed into these early, and nothing
-// behind them knows of words and dashes.
+// Options of each subcommand as plain structs. The command line is parsed into them before anything runs, so
+// the rest of the program does not depend on the argument parser.
 namespace docent::app {
 
 enum class Verbosity { kQuiet, kNormal, kVerbose };
 
 enum class Pace {
-  kLockstep,  // tracker and mapper in turn on one thread: equal to the byte between runs
-  kEager,     // threaded, drops nothing
-  kRealtime,  // by the images' own times; drops those that come too late
+  kLockstep,  // Tracker and mapper alternate on one thread; results are byte-identical between runs.
+  kEager,     // Tracker and mapper run in parallel; no frame is dropped.
+  kRealtime,  // Tracker and mapper run in parallel; frames that are late by their timestamps are dropped.
 };
 enum class EngineKind {
-  kHybrid,  // with panorama maps
-  kSixDof,  // plain PTAM
+  kHybrid,  // With panorama maps.
+  kSixDof,  // Plain PTAM, without panorama maps.
 };
-// What a camera does that is lost where no map explains what it sees.
+// What happens when a camera is lost and relocalization finds no known map.
 enum class WhenLost {
-  kNew,   // it begins a new map after a moment, and goes on
-  kWait,  // it waits until it sees a map again
+  kNew,   // A new map is started after a short delay.
+  kWait,  // The camera stays lost until it is relocalized in a known map.
 };
 const char* ToString(Pace pace);
 const char* ToString(EngineKind engine);
 
 struct CameraArguments {
-  std::vector<std::string> sources;                 // one or two
-  std::vector<std::filesystem::path> calibrations;  // for the first sources; the others' are found
-  CameraOptions options;                            // device format; `seed` is RunArguments::seed
-  Timestamp from{}, until{};                        // part of the source, from its first image; 0: no bound
+  std::vector<std::string> sources;  // One or two.
+  std::vector<std::filesystem::path>
+      calibrations;           // By source; missing ones are searched next to the source.
+  CameraOptions options;      // Device format; the seed is RunArguments::seed.
+  Timestamp from{}, until{};  // Part of the source to use, relative to its first image; 0: no limit.
 };
 
-// What every subcommand that tracks takes.
+// Options that all subcommands with tracking share.
 struct RunArguments {
   CameraArguments cameras;
-  std::optional<Pace> pace;  // empty: see ResolvePace
+  std::optional<Pace> pace;  // Empty: the default of ResolvePace.
   EngineKind engine = EngineKind::kHybrid;
   bool headless = false;
-  std::optional<std::filesystem::path> output;  // folder
-  std::optional<std::filesystem::path> record;  // video of the augmented view
+  std::optional<std::filesystem::path> output;  // Folder for the run's files.
+  std::optional<std::filesystem::path> record;  // Video of the augmented view.
   std::uint64_t seed = 1;
-  std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory
-  std::optional<HeadPolicy> head;                          // of cameras that can turn their heads
-  double baseline_m = 0;                                   // measured between the two cameras; 0: not
+  std::size_t memory_budget_bytes = std::size_t{1} << 30;  // For maps in memory.
+  std::optional<HeadPolicy> head;                          // For cameras with a pan-tilt head.
+  double baseline_m = 0;  // Measured distance between the two cameras; 0: not measured.
 };
 
 struct AuthorOptions {
   RunArguments run;
   std::filesystem::path library;
-  std::optional<std::filesystem::path> target;  // a printed image that new maps start from
+  std::optional<std::filesystem::path> target;  // Printed planar target that initializes new maps.
   double target_width_m = 0;
   std::optional<std::filesystem::path> script, record_script;
-  Timestamp autosave_interval = std::chrono::seconds(10);  // 0: at each change of map alone
-  std::optional<WhenLost> when_lost;                       // empty: kWait where a window can ask, else kNew
+  Timestamp autosave_interval = std::chrono::seconds(10);  // 0: save only when a map is left and at the end.
+  std::optional<WhenLost> when_lost;  // Empty: kWait with a window, which offers a choice, else kNew.
 };
 
 struct TourOptions {
@@ -72,23 +73,25 @@ struct TourOptions {
 };
 
 struct EvaluateOptions {
-  std::vector<std::string> sequences;  // folders or sim:SCENE
+  std::vector<std::string> sequences;  // Folders or sim:SCENE.
   std::filesystem::path output;
-  std::vector<std::filesystem::path> calibrations;  // for the first sequences; the others' are found
+  std::vector<std::filesystem::path> calibrations;  // By sequence; missing ones are searched in its folder.
   Pace pace = Pace::kEager;
   EngineKind engine = EngineKind::kHybrid;
-  bool turn_about_camera =
-      false;  // as in hybrid-slam: no RotationCenter, and no question whether it is a turn
-  bool leave_loops_open = false;
+  // Assumes that pure rotations are about the camera centre, as [HYBRID] does: RotationCenter is disabled,
+  // and the test for pure rotation has no residual limit of its own. For comparison.
+  bool turn_about_camera = false;
+  bool leave_loops_open = false;  // Disables loop closing. For comparison.
   WhenLost when_lost = WhenLost::kNew;
-  bool compare = false;                  // run the other engine too
-  std::vector<std::size_t> dump_frames;  // lines of frames.csv, from 0, about which everything is written
-  std::uint64_t seed = 1;                // of the first run's engine, and of every run's simulated world
-  std::size_t seeds = 1;                 // runs with seed, seed + 1, ... of the engine, at least 1
-  std::size_t starts = 1;                // windows over each sequence, at least 1, see RunsOf
-  Timestamp window{};                    // the most that each run may last; 0: to the end of the sequence
-  double truth_noise_m = 0.01;           // of recorded sequences, see FalseStartOptions
-  std::size_t jobs = 1;                  // runs side by side, each on a thread of its own; lockstep alone
+  bool compare = false;                  // Also runs the other engine.
+  std::vector<std::size_t> dump_frames;  // Frame indices (rows of frames.csv, from 0) to dump in full.
+  std::uint64_t seed = 1;  // Seed of the first run's engine, and of the simulated world in every run.
+  std::size_t seeds = 1;   // Number of engine seeds: seed, seed + 1, ...; at least 1.
+  std::size_t starts = 1;  // Number of windows over each sequence, at least 1; see RunsOf.
+  Timestamp window{};      // Maximum duration of a run; 0: to the end of the sequence.
+  double truth_noise_m =
+      0.01;              // Noise of the ground truth of recorded sequences; see FalseInitializationOptions.
+  std::size_t jobs = 1;  // Number of parallel runs, one thread each; above 1 only with lockstep.
 
   bool many_runs() const { return seeds > 1 || starts > 1; }
 };
@@ -100,16 +103,16 @@ struct DemoOptions {
 };
 
 struct CalibrateOptions {
-  std::string source;  // empty: only print the board
+  std::string source;  // Empty: only print the board.
   std::filesystem::path output;
   std::string board = "charuco:8x6:30";
-  std::optional<engine::LensModel> lens;  // empty: whichever predicts best
+  std::optional<engine::LensModel> lens;  // Empty: the model with the smallest cross-validated error.
   CameraOptions camera;
   std::optional<std::filesystem::path> print;
   bool headless = false;
 };
 
-// The pace that was asked for, or else realtime for devices and windows and eager for headless files.
+// Returns the requested pace, or the default: realtime for devices and windows, eager for headless files.
 Pace ResolvePace(const RunArguments& run, bool any_live);
 
 }  // namespace docent::app

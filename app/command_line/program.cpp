@@ -19,7 +19,7 @@ namespace docent::app {
 
 namespace {
 
-// One line, whatever the message was made of.
+// Collapses line breaks and repeated spaces, because every error is reported on one line.
 std::string OneLine(std::string text) {
   std::string line;
   for (const char c : text) {
@@ -31,13 +31,13 @@ std::string OneLine(std::string text) {
   return line;
 }
 
-int Complain(const std::string& message, int exit_status) {
+int ReportError(const std::string& message, int exit_status) {
   std::fprintf(stderr, "docent: %s\n", OneLine(message).c_str());
   return exit_status;
 }
 
-// The subcommand that the words have led to, with its parents: "docent maps list".
-std::string ChosenCommand(const CLI::App& program) {
+// Full name of the selected subcommand with its parents, for instance "docent maps list".
+std::string SelectedCommand(const CLI::App& program) {
   std::string name = "docent";
   for (const CLI::App* app = &program; !app->get_subcommands().empty();) {
     app = app->get_subcommands().front();
@@ -46,8 +46,8 @@ std::string ChosenCommand(const CLI::App& program) {
   return name;
 }
 
-// What is wrong with the words. A word that nobody knows is named before anything that it may have been meant
-// for is said to be missing.
+// Describes a parse error. An unknown argument is reported before a missing one, because the missing one is
+// usually a misspelled argument.
 std::string Diagnose(const CLI::App& program, const CLI::ParseError& error) {
   const bool about_words = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr ||
                            dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
@@ -58,7 +58,7 @@ std::string Diagnose(const CLI::App& program, const CLI::ParseError& error) {
   const CLI::App* chosen = &program;
   while (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
   if (chosen->get_require_subcommand_min() > 0) return "There is no subcommand '" + word + "'";
-  return "The word '" + word + "' is too much";
+  return "Unexpected argument '" + word + "'";
 }
 
 void SetUpLog(Verbosity verbosity) {
@@ -73,18 +73,18 @@ void SetUpLog(Verbosity verbosity) {
 int RunGuarded(const std::function<void()>& run) {
   try {
     run();
-    // Output that does not reach its reader (a full disk behind a redirection) is a failure too.
+    // Output that cannot be written, for instance to a full disk, is a failure too.
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
-      return Complain("Cannot write the standard output.", 1);
+      return ReportError("Cannot write the standard output.", 1);
     return 0;
   } catch (const Error& error) {
-    return Complain(error.what(), 1);
+    return ReportError(error.what(), 1);
   } catch (const std::bad_alloc&) {
-    return Complain("There is not enough memory.", 1);
+    return ReportError("There is not enough memory.", 1);
   } catch (const cv::Exception& error) {
-    return Complain("An image operation failed: " + error.err + " (" + error.func + ").", 1);
+    return ReportError("An image operation failed: " + error.err + " (" + error.func + ").", 1);
   } catch (const std::exception& error) {
-    return Complain(std::string("Something failed that should not: ") + error.what() + ".", 1);
+    return ReportError(std::string("Internal error: ") + error.what() + ".", 1);
   }
 }
 
@@ -100,15 +100,16 @@ CLI::App* AddSubcommand(CLI::App* parent, const std::string& name, const std::st
 
 int RunProgram(int argc, const char* const* argv) {
   CLI::App program(
-      "Docent, an augmented-reality guide: it builds maps, remembers them, and shows what stands in them.",
+      "Docent, an augmented-reality guide: it builds maps, recognises them later, and shows the models and "
+      "signposts placed in them.",
       "docent");
-  program.footer("Example:\n  docent simulate room --output room\nEvery subcommand has --help.");
+  program.footer("Example:\n  docent simulate room --output room\nEvery subcommand has its own --help.");
   program.require_subcommand(1);
   program.set_version_flag("--version", "docent 0.1.0", "Print the version and exit");
   Invocation invocation;
   bool quiet = false, verbose = false;
-  CLI::Option* quiet_option = program.add_flag("--quiet", quiet, "Say nothing but errors");
-  program.add_flag("--verbose", verbose, "Say more about what is done")->excludes(quiet_option);
+  CLI::Option* quiet_option = program.add_flag("--quiet", quiet, "Print only errors");
+  program.add_flag("--verbose", verbose, "Print more detail")->excludes(quiet_option);
 
   AddCamerasCommand(&program, &invocation);
   AddCalibrateCommand(&program, &invocation, RunCalibrate);
@@ -126,8 +127,8 @@ int RunProgram(int argc, const char* const* argv) {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --help and --version
-    const std::string command = ChosenCommand(program);
-    return Complain(Diagnose(program, error) + " (see " + command + " --help)", 2);
+    const std::string command = SelectedCommand(program);
+    return ReportError(Diagnose(program, error) + " (see " + command + " --help)", 2);
   }
   invocation.verbosity = quiet ? Verbosity::kQuiet : verbose ? Verbosity::kVerbose : Verbosity::kNormal;
   SetUpLog(invocation.verbosity);

@@ -10,21 +10,21 @@ namespace CLI {
 class App;
 }
 
-// The program's frame: which subcommands there are, what happens to their faults, and how they tell the
-// person. Each subcommand is one function in a file of its own that adds itself to the parser and, when its
-// words are found on the command line, says in `Invocation::run` what to do.
+// Frame of the program: registers the subcommands and reports their errors. Each subcommand is one function
+// in its own file, which adds the subcommand to the parser. When the command line selects that subcommand,
+// its callback sets `Invocation::run`.
 namespace docent::app {
 
 struct Invocation {
   Verbosity verbosity = Verbosity::kNormal;
-  std::function<void()> run;  // set by the subcommand that was chosen; throws docent::Error
+  std::function<void()> run;  // Set by the selected subcommand; throws docent::Error.
 };
 
-// Parses the command line and runs what it asks for. Answers with the exit status: 0, or 1 after a failure
-// while running, or 2 after a wrong argument; either time with one line on standard error.
+// Parses the command line and runs the selected subcommand. Returns the exit status: 0 for success, 1 for a
+// failure while running, 2 for a wrong argument. Both failures print one line on standard error.
 int RunProgram(int argc, const char* const* argv);
 
-// A new subcommand with an example below its help; global options may stand behind it.
+// Adds a subcommand whose help ends with an example. Global options may follow the subcommand.
 CLI::App* AddSubcommand(CLI::App* parent, const std::string& name, const std::string& description,
                         const std::string& example);
 
@@ -34,7 +34,7 @@ void AddTrainVocabularyCommand(CLI::App* program, Invocation* invocation);
 void AddMapsCommand(CLI::App* program, Invocation* invocation);
 void AddContentCommand(CLI::App* program, Invocation* invocation);
 
-// These take what carries them out.
+// These receive the function that executes the subcommand, so that tests can replace it.
 void AddAuthorCommand(CLI::App* program, Invocation* invocation,
                       std::function<void(const AuthorOptions&, Verbosity)> run);
 void AddTourCommand(CLI::App* program, Invocation* invocation,

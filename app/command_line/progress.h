@@ -10,11 +10,11 @@
 
 namespace docent::app {
 
-// How far long work has come, on a terminal: one line on standard error, drawn again a few times a second and
-// wiped away at the end. Silent when standard error is no terminal or the person asked for quiet. One thread.
+// Progress line of a long task on standard error. It is redrawn at most five times a second and erased at the
+// end. Nothing is printed when standard error is not a terminal or with --quiet. One thread at a time.
 class Progress {
  public:
-  // `what` is a word or two; total is empty where it is not known.
+  // `what` names the counted items in a word or two; `total` is empty when it is unknown.
   Progress(std::string what, std::optional<std::uint64_t> total, Verbosity verbosity);
   ~Progress();
   Progress(const Progress&) = delete;

@@ -18,7 +18,7 @@ std::string JoinedNames(const std::map<std::string, Choice>& names) {
   return joined;
 }
 
-// A word that stands for one of a few values; anything else is an error that names them all.
+// Adds an option with a fixed set of named values. Any other value is an error that lists the names.
 template <typename Choice, typename Target>
 void AddChoice(CLI::App* command, const std::string& option, Target* target, const std::string& description,
                const std::map<std::string, Choice>& names) {
@@ -28,7 +28,7 @@ void AddChoice(CLI::App* command, const std::string& option, Target* target, con
           [=](const std::string& word) {
             const auto found = names.find(word);
             if (found == names.end()) {
-              throw CLI::ValidationError(option, "'" + word + "' is none of " + JoinedNames(names));
+              throw CLI::ValidationError(option, "'" + word + "' is not one of " + JoinedNames(names));
             }
             *target = found->second;
           },
@@ -46,7 +46,7 @@ void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* t
           [=](const std::string& text) {
             const auto time = ParseSeconds(text);
             if (!time || *time < Timestamp{}) {
-              throw CLI::ValidationError(option, "'" + text + "' is no number of seconds");
+              throw CLI::ValidationError(option, "'" + text + "' is not a number of seconds");
             }
             *target = *time;
           },
@@ -55,38 +55,40 @@ void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* t
 }
 
 void AddPaceOption(CLI::App* command, std::optional<Pace>* pace) {
-  AddChoice<Pace>(command, "--pace", pace, "How images are fed",
+  AddChoice<Pace>(command, "--pace", pace,
+                  "How images are processed: lockstep is reproducible, eager processes every image, realtime "
+                  "skips late images",
                   {{"lockstep", Pace::kLockstep}, {"eager", Pace::kEager}, {"realtime", Pace::kRealtime}});
 }
 
 void AddEngineOption(CLI::App* command, EngineKind* engine) {
   AddChoice<EngineKind>(
       command, "--engine", engine,
-      "With panorama maps for turns on the spot (the default), or plain six degrees of freedom",
+      "hybrid maps pure rotations as panoramas (the default); sixdof is plain six-degrees-of-freedom SLAM",
       {{"hybrid", EngineKind::kHybrid}, {"sixdof", EngineKind::kSixDof}});
 }
 
 void AddWhenLostOption(CLI::App* command, std::optional<WhenLost>* when_lost, const std::string& otherwise) {
   AddChoice<WhenLost>(
       command, "--when-lost", when_lost,
-      "What a camera does that is lost where no map is recognised: begin a new map, which is "
-      "joined with a known one where they overlap, or wait until it sees a map again (default: " +
+      "What to do when tracking is lost and no map is recognised: start a new map, which is joined with a "
+      "known map where they overlap, or wait until a map is recognised (default: " +
           otherwise + ")",
       {{"new", WhenLost::kNew}, {"wait", WhenLost::kWait}});
 }
 
 void AddSeedOption(CLI::App* command, std::uint64_t* seed) {
-  // Read as text: the parser's own numbers would let -1 wrap round to the largest seed.
+  // Parsed as text, because CLI11's unsigned integers would wrap -1 around to the largest seed.
   command
       ->add_option_function<std::string>(
           "--seed",
           [=](const std::string& text) {
             const auto value = ParseInteger(text);
             if (!value || *value < 0)
-              throw CLI::ValidationError("--seed", "'" + text + "' is no whole number from 0 on");
+              throw CLI::ValidationError("--seed", "'" + text + "' is not a whole number of 0 or more");
             *seed = static_cast<std::uint64_t>(*value);
           },
-          "Fixes every random choice")
+          "Seed of all random choices")
       ->type_name("N");
 }
 
@@ -101,35 +103,40 @@ void AddCameraFormatOption(CLI::App* command, CameraOptions* options) {
               throw CLI::ValidationError("--camera-format", error.what());
             }
           },
-          "Size and rate that a device should deliver")
+          "Image size and frame rate of a device")
       ->type_name("640x480@30");
 }
 
 void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens) {
   using engine::LensModel;
-  AddChoice<std::optional<LensModel>>(command, "--lens", lens,
-                                      "Model of the lens; auto takes the one that predicts unseen views best",
-                                      {{"auto", std::nullopt},
-                                       {"radial_tangential", LensModel::kRadialTangential},
-                                       {"fov", LensModel::kFov},
-                                       {"kannala_brandt", LensModel::kKannalaBrandt}});
+  AddChoice<std::optional<LensModel>>(
+      command, "--lens", lens,
+      "Lens model; auto selects the one with the smallest error on views that "
+      "were not used for the fit",
+      {{"auto", std::nullopt},
+       {"radial_tangential", LensModel::kRadialTangential},
+       {"fov", LensModel::kFov},
+       {"kannala_brandt", LensModel::kKannalaBrandt}});
 }
 
 void AddRunArguments(CLI::App* command, RunArguments* run) {
   command
       ->add_option("--camera", run->cameras.sources,
                    "A device, a video file, a folder with an image sequence, or sim:SCENE[,OPTION=NUMBER...] "
-                   "(see docent simulate --help); twice for the wearable")
+                   "(see docent simulate --help); give it twice for two cameras")
       ->required()
       ->type_name("SOURCE")
       ->allow_extra_args(false);
   command
-      ->add_option("--calibration", run->cameras.calibrations, "Calibration of each camera, in their order")
+      ->add_option("--calibration", run->cameras.calibrations,
+                   "Calibration file of each camera, in the same order")
       ->type_name("FILE")
       ->allow_extra_args(false);
   AddCameraFormatOption(command, &run->cameras.options);
-  AddSecondsOption(command, "--from", &run->cameras.from, "Begin so long after the first image");
-  AddSecondsOption(command, "--until", &run->cameras.until, "End so long after the first image");
+  AddSecondsOption(command, "--from", &run->cameras.from,
+                   "Start at this time (seconds after the first image)");
+  AddSecondsOption(command, "--until", &run->cameras.until,
+                   "Stop at this time (seconds after the first image)");
   AddPaceOption(command, &run->pace);
   AddEngineOption(command, &run->engine);
   AddSeedOption(command, &run->seed);
@@ -140,14 +147,16 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
           [run](const std::string& text) {
             const auto metres = ParseNumber(text);
             if (!metres || *metres <= 0)
-              throw CLI::ValidationError("--baseline", "'" + text + "' is no length in metres");
+              throw CLI::ValidationError("--baseline", "'" + text + "' is not a length in metres");
             run->baseline_m = *metres;
           },
-          "Distance of two cameras that are fixed to one another; tells the scale of their maps")
+          "Distance between two cameras mounted rigidly together; sets the scale of their maps")
       ->type_name("METRES");
   AddChoice<std::optional<HeadPolicy>>(
       command, "--head", &run->head,
-      "What a camera that can turn its head looks at; when it is lost it looks for the map",
+      "Where a camera with a pan-tilt head looks: at the wearer's gaze, or so that the map stays in view; a "
+      "lost "
+      "camera searches for the map",
       {{"gaze", HeadPolicy::kFollowGaze}, {"map", HeadPolicy::kKeepMapInView}});
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");
@@ -160,8 +169,7 @@ void AddMemoryOption(CLI::App* command, std::size_t* bytes) {
           "--memory-budget",
           [=](const std::string& text) {
             constexpr std::pair<std::string_view, int> kUnits[] = {{"KiB", 10}, {"MiB", 20}, {"GiB", 30}};
-            constexpr std::int64_t kMax = 1
-                                          << 20;  // of any unit: far from where the product would wrap round
+            constexpr std::int64_t kMax = 1 << 20;  // In any unit; keeps the product far from overflow.
             for (const auto& [unit, shift] : kUnits) {
               if (!text.ends_with(unit)) continue;
               const auto number = ParseInteger(text.substr(0, text.size() - unit.size()));
@@ -169,22 +177,24 @@ void AddMemoryOption(CLI::App* command, std::size_t* bytes) {
               *bytes = static_cast<std::size_t>(*number) << shift;
               return;
             }
-            throw CLI::ValidationError("--memory-budget", "'" + text + "' is no size such as 512MiB or 1GiB");
+            throw CLI::ValidationError("--memory-budget",
+                                       "'" + text + "' is not a size such as 512MiB or 1GiB");
           },
-          "Memory for maps; those not used for longest make room (default 1GiB)")
+          "Memory for maps; the least recently used maps are evicted first (default 1GiB)")
       ->type_name("SIZE");
 }
 
 void CheckRunArguments(const RunArguments& run) {
-  if (run.cameras.sources.size() > 2) throw CLI::ValidationError("--camera", "at most two cameras");
+  if (run.cameras.sources.size() > 2)
+    throw CLI::ValidationError("--camera", "at most two cameras are supported");
   if (run.cameras.calibrations.size() > run.cameras.sources.size()) {
-    throw CLI::ValidationError("--calibration", "more calibrations than cameras");
+    throw CLI::ValidationError("--calibration", "there are more calibrations than cameras");
   }
   if (run.baseline_m > 0 && run.cameras.sources.size() < 2) {
-    throw CLI::ValidationError("--baseline", "lies between two cameras; give --camera twice");
+    throw CLI::ValidationError("--baseline", "needs two cameras; give --camera twice");
   }
   if (run.cameras.until > Timestamp{} && run.cameras.until <= run.cameras.from) {
-    throw CLI::ValidationError("--until", "does not lie after --from");
+    throw CLI::ValidationError("--until", "must be later than --from");
   }
 }
 

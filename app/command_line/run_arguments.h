@@ -9,26 +9,27 @@ namespace CLI {
 class App;
 }
 
-// The options that several subcommands share, so that a word means the same everywhere.
+// Options that several subcommands share, so that an option means the same everywhere.
 namespace docent::app {
 
 void AddPaceOption(CLI::App* command, std::optional<Pace>* pace);
 void AddEngineOption(CLI::App* command, EngineKind* engine);
-// --when-lost; `otherwise` names the default in the help.
+// Adds --when-lost. `otherwise` is the default's name in the help text.
 void AddWhenLostOption(CLI::App* command, std::optional<WhenLost>* when_lost, const std::string& otherwise);
 void AddSeedOption(CLI::App* command, std::uint64_t* seed);
-// A number of seconds, 0 or more.
+// Adds an option whose value is a number of seconds, 0 or more.
 void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* target,
                       const std::string& description);
 void AddMemoryOption(CLI::App* command, std::size_t* bytes);
 void AddCameraFormatOption(CLI::App* command, CameraOptions* options);
-// auto, or the name of a lens model.
+// Adds --lens: auto, or the name of a lens model.
 void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens);
-// --camera, --calibration, --camera-format, --from, --until and all of the above, --headless, --output,
-// --record.
+// Adds the options that all subcommands with tracking share: --camera, --calibration, --camera-format,
+// --from,
+// --until, --pace, --engine, --seed, --memory-budget, --baseline, --head, --headless, --output and --record.
 void AddRunArguments(CLI::App* command, RunArguments* run);
-// What only shows when everything is read: more calibrations than cameras, an end before the beginning, no
-// output where there is no window either. Throws CLI::ValidationError.
+// Checks combinations of options after parsing: the number of cameras and calibrations, a baseline without a
+// second camera, and --until before --from. Throws CLI::ValidationError.
 void CheckRunArguments(const RunArguments& run);
 
 }  // namespace docent::app

@@ -19,8 +19,8 @@ bool AnyLive(const std::vector<CalibratedCamera>& cameras) {
                      [](const CalibratedCamera& camera) { return camera.source->info().live; });
 }
 
-// What both ways of guiding are told alike.
-void TakeOver(const RunArguments& run, bool any_live, GuideRequest* request) {
+// Copies the options that authoring and touring share.
+void CopyRunArguments(const RunArguments& run, bool any_live, GuideRequest* request) {
   request->pace = ResolvePace(run, any_live);
   request->engine = run.engine;
   request->baseline_m = run.baseline_m;
@@ -61,15 +61,16 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   maps::Library library =
       maps::Library::Open(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   request.library = &library;
-  TakeOver(options.run, AnyLive(cameras), &request);
+  CopyRunArguments(options.run, AnyLive(cameras), &request);
   request.autosave_interval = options.autosave_interval;
   request.record_script = options.record_script;
   const auto maps = RunGuide(request, cameras, verbosity);
   if (verbosity == Verbosity::kQuiet) return;
   for (const Session::MapState& map : maps) {
     if (map.discarded || map.joined_into != 0 || !map.snapshot) continue;
-    std::printf("%s: %zu keyframes, %zu points, %zu things\n", map.name.c_str(),
-                map.snapshot->keyframes.size(), map.snapshot->points.size(), map.scene->entities.size());
+    const std::size_t objects = map.scene->entities.size();
+    std::printf("%s: %zu keyframes, %zu points, %zu %s\n", map.name.c_str(), map.snapshot->keyframes.size(),
+                map.snapshot->points.size(), objects, objects == 1 ? "object" : "objects");
   }
 }
 
@@ -79,16 +80,18 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   GuideRequest request;
   request.library = &library;
   request.title = "Docent - tour";
-  TakeOver(options.run, AnyLive(cameras), &request);
-  std::uint64_t frames = 0, named = 0;
+  CopyRunArguments(options.run, AnyLive(cameras), &request);
+  std::uint64_t frames = 0, localized = 0;
   request.on_frame = [&](const ShownFrame& frame) {
     ++frames;
-    if (engine::HasPose(frame.tracked.state)) ++named;
+    if (engine::HasPose(frame.tracked.state)) ++localized;
   };
   RunGuide(request, cameras, verbosity);
   if (verbosity == Verbosity::kQuiet) return;
-  std::printf("%llu of %llu frames with a pose in one of %zu maps\n", static_cast<unsigned long long>(named),
-              static_cast<unsigned long long>(frames), library.List().size());
+  const std::size_t maps = library.List().size();
+  std::printf("%llu of %llu frames localized; the library has %zu %s\n",
+              static_cast<unsigned long long>(localized), static_cast<unsigned long long>(frames), maps,
+              maps == 1 ? "map" : "maps");
 }
 
 }  // namespace docent::app

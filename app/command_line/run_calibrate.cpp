@@ -16,9 +16,10 @@ namespace docent::app {
 
 namespace {
 
-constexpr std::size_t kEnoughViews = 40;  // of a live camera without a window
+// Views after which a live camera without a window stops; CalibrationOptions uses at most 30 of them.
+constexpr std::size_t kMaxLiveViews = 40;
 
-// Appearance for the board in one image after the other and keeps the views that are new.
+// Detects the board in each image and keeps views that differ from those kept before.
 class ViewCollector {
  public:
   ViewCollector(const CalibrateOptions& options, const BoardSpec& board, FrameSource* source)
@@ -41,7 +42,7 @@ class ViewCollector {
         Keep();
       shown_.message = Message();
       if (!Present()) return;
-      if (source_->info().live && options_.headless && shown_.kept.size() >= kEnoughViews) return;
+      if (source_->info().live && options_.headless && shown_.kept.size() >= kMaxLiveViews) return;
     }
   }
 
@@ -57,33 +58,36 @@ class ViewCollector {
     }
     if (shown_.image.size() == size_) return;
     throw Error("The images of '" + source_->info().name +
-                "' are not all of one size; a calibration is for one.");
+                "' have different sizes; a calibration needs images of one size.");
   }
-  // A live board must be held still for a moment: motion blurs its corners, and a rolling shutter bends them.
-  // Recorded images are taken as they are.
+  // A live board must be held still for a moment, because motion blurs its corners and a rolling shutter
+  // displaces them. Recorded images are all used.
   bool IsStill(const BoardView& before) const {
-    constexpr double kOfWidth = 0.003;
-    return !source_->info().live || Movement(before, shown_.now) < kOfWidth * size_.width;
+    constexpr double kMaxMovement = 0.003;  // Ratio of the image width.
+    return !source_->info().live || Movement(before, shown_.now) < kMaxMovement * size_.width;
   }
   void Keep() {
     shown_.kept.push_back(shown_.now);
     coverage_->Add(shown_.now);
-    constexpr std::size_t kEvery = 4, kFewest = 8;
-    if (options_.headless || shown_.kept.size() < kFewest || shown_.kept.size() % kEvery != 0) return;
+    constexpr std::size_t kSolveInterval = 4, kMinViews = 8;
+    if (options_.headless || shown_.kept.size() < kMinViews || shown_.kept.size() % kSolveInterval != 0)
+      return;
     solution_ = SolveLens(options_.lens.value_or(engine::LensModel::kKannalaBrandt), size_.width,
                           size_.height, shown_.kept);
     shown_.residuals.clear();
     if (solution_) shown_.residuals = Residuals(*solution_, shown_.kept);
   }
   std::string Message() const {
-    std::string text = std::to_string(shown_.kept.size()) + " views";
-    if (solution_) text += ", " + FormatNumber(solution_->rms_px, 2) + " px off so far";
+    const std::size_t count = shown_.kept.size();
+    std::string text = std::to_string(count) + (count == 1 ? " view" : " views");
+    if (solution_) text += ", error " + FormatNumber(solution_->rms_px, 2) + " px";
     if (shown_.now.pixels.empty()) return text + "; show the board";
     const std::string advice = coverage_->Advice();
     if (!advice.empty()) return text + "; " + advice;
-    constexpr double kWellKnown = 0.001;
-    if (!solution_ || solution_->FocalSigma() > kWellKnown) return text + "; tilt the board to every side";
-    return text + "; that is enough, press enter";
+    constexpr double kMaxFocalSigma = 0.001;
+    if (!solution_ || solution_->FocalSigma() > kMaxFocalSigma)
+      return text + "; tilt the board in all directions";
+    return text + "; these views are sufficient, press enter";
   }
   bool Present() {
     if (options_.headless || shown_.image.empty()) return true;
@@ -109,8 +113,7 @@ void RunCalibrate(const CalibrateOptions& options, Verbosity verbosity) {
   if (options.print) {
     PrintBoard(board, *options.print);
     if (verbosity != Verbosity::kQuiet) {
-      std::printf("%s is in %s; print it at its true size.\n", FormatBoard(board).c_str(),
-                  options.print->c_str());
+      std::printf("%s is in %s; print it at 100 %%.\n", FormatBoard(board).c_str(), options.print->c_str());
     }
   }
   if (options.source.empty()) return;
@@ -131,9 +134,9 @@ void RunCalibrate(const CalibrateOptions& options, Verbosity verbosity) {
   file.Write(FormatCalibration(calibration, board));
   file.Close();
   if (verbosity == Verbosity::kQuiet) return;
-  std::printf("%zu of %zu views from %llu images, %.3f px\n%s\n", calibration.views_used,
+  std::printf("%zu of %zu views from %llu images used, RMS error %.3f px\n%s\n", calibration.views_used,
               calibration.views_found, static_cast<unsigned long long>(collector.images()),
-              calibration.rms_px, calibration.verdict.c_str());
+              calibration.rms_px, calibration.assessment.c_str());
 }
 
 }  // namespace docent::app

@@ -36,7 +36,7 @@ fs::path OutputFolder(const DemoOptions& options) {
     return *options.output;
   }
   std::string pattern = (fs::temp_directory_path() / "docent-demo-XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) throw Error("Cannot make a folder '" + pattern + "'.");
+  if (mkdtemp(pattern.data()) == nullptr) throw Error("Cannot create a folder '" + pattern + "'.");
   return pattern;
 }
 
@@ -51,14 +51,14 @@ void WriteImage(const fs::path& path, const cv::Mat& image) {
   if (!cv::imwrite(path.string(), image)) throw Error("Cannot write '" + path.string() + "'.");
 }
 
-// "Bay 3" in a file's name.
+// Makes a map's name usable in a file name: "Bay 3" becomes "Bay-3".
 std::string FileName(std::string name) {
   std::replace_if(
       name.begin(), name.end(), [](char c) { return c == ' ' || c == '/'; }, '-');
   return name;
 }
 
-// One half of the demonstration: a part of the simulated way, with its record for the report.
+// One half of the demonstration: a part of the simulated trajectory, with its record for the report.
 class DemoRun {
  public:
   DemoRun(std::shared_ptr<const Simulation> simulation, int first_frame, int end_frame, std::string name)
@@ -69,9 +69,9 @@ class DemoRun {
   void Run(GuideRequest request, Verbosity verbosity) {
     const auto start = std::chrono::steady_clock::now();
     RunRecorder recorder;
-    request.on_frame = [&, then = std::move(request.on_frame)](const ShownFrame& frame) {
+    request.on_frame = [&, next = std::move(request.on_frame)](const ShownFrame& frame) {
       recorder.Add(frame.tracked);
-      if (then) then(frame);
+      if (next) next(frame);
     };
     const Timestamp begin = simulation_->time(0);
     auto source = OpenSimulation(simulation_);
@@ -107,27 +107,27 @@ GuideRequest CommonRequest(const DemoOptions& options, maps::Library* library, c
   GuideRequest request;
   request.library = library;
   request.headless = options.headless;
-  // Without a window nobody waits for the images' own time, and lockstep shows the same on every machine.
+  // Without a window the timestamps do not matter, and lockstep gives the same result on every machine.
   request.pace = options.headless ? Pace::kLockstep : Pace::kRealtime;
   request.seed = options.seed;
   request.output = output;
   return request;
 }
 
-// One image of the tour for each map: the frame in which it has been seen for a second.
+// Saves one image of the tour for each map: the frame after one second of tracking in it.
 class TourImages {
  public:
   explicit TourImages(fs::path folder) : folder_(std::move(folder)) {}
   void Add(const ShownFrame& frame, const cv::Mat& image) {
     if (!engine::HasPose(frame.tracked.state)) return;
     constexpr int kFrames = 30;
-    if (++seen_[frame.shown.map_name] != kFrames) return;
+    if (++tracked_frames_[frame.shown.map_name] != kFrames) return;
     WriteImage(folder_ / ("tour-" + FileName(frame.shown.map_name) + ".png"), image);
   }
 
  private:
   const fs::path folder_;
-  std::map<std::string, int> seen_;
+  std::map<std::string, int> tracked_frames_;  // By map name.
 };
 
 void DrawMaps(const std::vector<Session::MapState>& maps, const fs::path& folder) {
@@ -144,15 +144,19 @@ void DrawMaps(const std::vector<Session::MapState>& maps, const fs::path& folder
 }
 
 void PrintSummary(const DrawingCheck& check, std::size_t maps, const fs::path& folder) {
-  std::printf(
-      "%zu maps built and furnished; on the tour %d of %d frames at a bay named a map, %d the right one\n",
-      maps, check.named(), check.visit_frames(), check.named_rightly());
+  const auto percent = [&](int frames) {
+    return check.visit_frames() > 0 ? 100.0 * frames / check.visit_frames() : 0.0;
+  };
+  std::printf("%zu maps were built and content was placed in them.\n", maps);
+  std::printf("The right bay was recognised in %.0f %% of %d images, a wrong one in %.0f %%.\n",
+              percent(check.recognized_correctly()), check.visit_frames(),
+              percent(check.recognized() - check.recognized_correctly()));
   if (!check.errors_px().empty()) {
-    std::printf("drawn %zu times, half of them within %s pixels of where they were put, 95 %% within %s\n",
-                check.errors_px().size(), FormatNumber(Quantile(check.errors_px(), 0.5), 3).c_str(),
+    std::printf("Typical placement error: %s pixels; 95 %% of %zu drawings are within %s pixels.\n",
+                FormatNumber(Quantile(check.errors_px(), 0.5), 3).c_str(), check.errors_px().size(),
                 FormatNumber(Quantile(check.errors_px(), 0.95), 3).c_str());
   }
-  std::printf("%s\n", folder.string().c_str());
+  std::printf("Results: %s\n", folder.string().c_str());
 }
 
 }  // namespace
@@ -164,7 +168,7 @@ void RunDemo(const DemoOptions& options, Verbosity verbosity) {
   const std::shared_ptr<const Simulation> simulation = MakeSimulation(kScene, simulation_options);
   const fs::path library_path = folder / "museum.docent";
   std::error_code error;
-  fs::remove(library_path, error);  // of an earlier demonstration in the same folder
+  fs::remove(library_path, error);  // An earlier demonstration may have left one in this folder.
   WriteModel(folder / "exhibit.glb");
 
   MuseumDirector director(*simulation, "exhibit.glb");

@@ -21,25 +21,25 @@ namespace docent::app {
 
 namespace {
 
-// So that a wrong number is told before the sequence is run.
+// Throws Error for a frame index beyond the sequence before it is run.
 void CheckDumpFrames(const EvaluateOptions& options, const EvaluatedSequence& sequence) {
   if (!sequence.frame_count) return;
   for (const std::size_t number : options.dump_frames) {
     if (number < *sequence.frame_count) continue;
     throw Error("--dump-frame " + std::to_string(number) + ": '" + sequence.name + "' has " +
-                std::to_string(*sequence.frame_count) + " frames, and the first one is 0.");
+                std::to_string(*sequence.frame_count) + " frames, numbered from 0.");
   }
 }
 
-// Names the sequence's folder below the output: no separators, and no two alike.
-std::string FreeFolderName(std::string name, std::set<std::string>* taken) {
+// Name of the sequence's folder below the output: without separators, and unique among `taken`.
+std::string UniqueFolderName(std::string name, std::set<std::string>* taken) {
   for (char& c : name) {
     if (c == '/' || c == ':') c = '-';
   }
   if (name.empty() || name == "." || name == "..") name = "sequence";
-  std::string free = name;
-  for (int number = 2; !taken->insert(free).second; ++number) free = name + "-" + std::to_string(number);
-  return free;
+  std::string unique = name;
+  for (int number = 2; !taken->insert(unique).second; ++number) unique = name + "-" + std::to_string(number);
+  return unique;
 }
 
 EvaluateOptions WithOtherEngine(EvaluateOptions options) {
@@ -65,18 +65,19 @@ EvaluatedRun Evaluate(const EvaluateOptions& options, const EvaluatedSequence& s
   return run;
 }
 
-// One of many runs, of which only the figures are kept.
+// Runs one of many runs and keeps only its figures.
 RunRow EvaluateOneOfMany(const EvaluateOptions& options, const EvaluatedSequence& sequence,
                          const std::string& name, const RunKey& key) {
   const std::string folder = "seed-" + std::to_string(key.seed) + "-start-" + std::to_string(key.start);
   const TrackRequest request{name, options.output / name / folder, key, true};
   const RunRecord run = Track(options, sequence, request, Verbosity::kQuiet, nullptr);
-  std::optional<std::vector<StartResult>> starts = JudgeStartsOf(options, sequence, key, run);
+  std::optional<std::vector<InitializationResult>> starts =
+      ClassifyInitializationsOf(options, sequence, key, run);
   return MakeRunRow(key, run, EvaluateRun(run, sequence.truth, sequence.segments), std::move(starts));
 }
 
-// All runs, as many at a time as there are jobs. The rows have their own order, whichever run ends first; the
-// first fault ends all and is thrown.
+// Runs all seeds and starts, options.jobs at a time. The rows keep the order of RunsOf. After the first
+// failure no further run is started, and the failure is thrown.
 RunDistribution EvaluateMany(const EvaluateOptions& options, const EvaluatedSequence& sequence,
                              const std::string& name, Verbosity verbosity) {
   const std::vector<RunKey> keys = RunsOf(options, sequence);
@@ -88,7 +89,7 @@ RunDistribution EvaluateMany(const EvaluateOptions& options, const EvaluatedSequ
                                !sequence.truth.empty(),
                                std::vector<RunRow>(keys.size())};
   Progress progress(name + ", runs", keys.size(), verbosity);
-  std::mutex mutex;  // guards the three below, and the terminal
+  std::mutex mutex;  // Guards next, done and failure, and the output to the terminal.
   std::size_t next = 0, done = 0;
   std::exception_ptr failure;
   const auto work = [&] {
@@ -152,17 +153,17 @@ void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity) {
   const EvaluateOptions other = WithOtherEngine(options);
   for (std::size_t i = 0; i < options.sequences.size() && !failure; ++i) {
     try {
-      const EvaluatedSequence sequence = KnowSequence(options, i);
+      const EvaluatedSequence sequence = DescribeSequence(options, i);
       CheckDumpFrames(options, sequence);
-      MakeFolder(options.output);  // not before there is something to put into it
-      const std::string name = FreeFolderName(sequence.name, &taken);
+      MakeFolder(options.output);  // Only created when a sequence could be opened.
+      const std::string name = UniqueFolderName(sequence.name, &taken);
       if (options.many_runs()) {
         distributions.push_back(EvaluateMany(options, sequence, name, verbosity));
       } else {
         runs.push_back(Evaluate(options, sequence, name, verbosity));
       }
       if (!options.compare) continue;
-      const std::string other_name = FreeFolderName(name + "-" + ToString(other.engine), &taken);
+      const std::string other_name = UniqueFolderName(name + "-" + ToString(other.engine), &taken);
       if (options.many_runs()) {
         compared.push_back(EvaluateMany(other, sequence, other_name, verbosity));
       } else {
@@ -170,7 +171,7 @@ void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity) {
             std::make_shared<EvaluatedRun>(Evaluate(other, sequence, other_name, verbosity));
       }
     } catch (const Error&) {
-      // What was evaluated before is reported all the same.
+      // The sequences evaluated so far are still reported.
       failure = std::current_exception();
     }
   }

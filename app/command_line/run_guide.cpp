@@ -19,15 +19,15 @@ namespace docent::app {
 
 namespace {
 
-// Draws without a window, for a video or for whoever wants images.
+// Draws frames without a window, for the video and for GuideRequest::on_image.
 class OffscreenView {
  public:
   OffscreenView(const GuideRequest& request, double frames_per_second) : request_(request) {
     if (request.record) recorder_.emplace(*request.record, frames_per_second);
   }
 
-  // other: the newest frame of the second camera; may be null.
-  // False when there was nothing to draw.
+  // Draws a frame. `other` is the newest frame of the second camera and may be null. Returns false for a
+  // frame that is not drawn, because it was dropped or drawn before.
   bool Add(const ShownFrame& frame, const engine::CameraModel& camera, const ShownFrame* other) {
     const std::uint64_t index = frame.tracked.frame.index;
     if (frame.tracked.state == engine::TrackingState::kDropped || last_index_ == index) return false;
@@ -53,11 +53,11 @@ class OffscreenView {
   cv::Mat image_;
 };
 
-// What a live camera lost on the way, for events.csv.
-std::string InWords(const SourceInfo& info, const Delivery& delivery) {
-  return info.name + ": " + std::to_string(delivery.delivered) + " images, " +
+// Delivery statistics of a live camera for events.csv.
+std::string DeliveryText(const SourceInfo& info, const Delivery& delivery) {
+  return info.name + ": " + std::to_string(delivery.delivered) + " images delivered, " +
          std::to_string(delivery.missed) + " missed by the device, " + std::to_string(delivery.late) +
-         " overtaken, " + std::to_string(delivery.broken) + " broken, " +
+         " replaced by newer ones, " + std::to_string(delivery.broken) + " broken, " +
          std::to_string(delivery.reconnections) + " reconnections, latency " +
          FormatNumber(1e3 * ToSeconds(delivery.median_latency), 3) + " ms";
 }
@@ -68,7 +68,7 @@ std::vector<std::shared_ptr<const engine::CameraModel>> ModelsOf(std::span<Calib
   return models;
 }
 
-// One run: the cameras' loops with the files they leave.
+// One run: the frame loops of the cameras and the files they write.
 class GuideRun {
  public:
   GuideRun(const GuideRequest& request, std::span<CalibratedCamera> cameras)
@@ -76,7 +76,7 @@ class GuideRun {
         cameras_(cameras),
         session_(OptionsOf(request), ModelsOf(cameras), request.library),
         inboxes_(cameras.size()),
-        watched_(cameras.size()) {
+        camera_states_(cameras.size()) {
     for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
     if (!request.head) return;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -84,13 +84,13 @@ class GuideRun {
         heads_.push_back(
             std::make_unique<HeadControl>(head, static_cast<int>(i), cameras[i].model, *request.head));
     }
-    if (heads_.empty()) throw Error("No camera can turn its head; leave --head away.");
+    if (heads_.empty()) throw Error("No camera has a pan-tilt head; remove --head.");
   }
 
-  // On the thread of the frame's camera.
+  // Called on the thread of the frame's camera.
   using Show = std::function<void(std::shared_ptr<const ShownFrame>)>;
 
-  // Whatever happens, what was built is saved and the files are closed; then the first fault is thrown.
+  // Saves the maps and closes the files in any case; then throws the first error that occurred.
   void Run(const Show& show, std::stop_token window_closed) {
     files_.emplace(request_, *cameras_.front().model);
     const std::stop_callback forward(window_closed, [this] { stop_.request_stop(); });
@@ -113,9 +113,9 @@ class GuideRun {
       for (std::size_t i = 0; i < cameras_.size(); ++i) {
         const FrameSource& source = *cameras_[i].source;
         if (source.info().live) tallies_[i].SetDelivery(source.delivery());
-        if (source.info().live && watched_[i].last)
-          files_->Add({Event{watched_[i].last->tracked.frame.time, "camera",
-                             InWords(source.info(), source.delivery())}});
+        if (source.info().live && camera_states_[i].last)
+          files_->Add({Event{camera_states_[i].last->tracked.frame.time, "camera",
+                             DeliveryText(source.info(), source.delivery())}});
       }
       files_->Close();
     });
@@ -126,7 +126,7 @@ class GuideRun {
     if (fault) std::rethrow_exception(fault);
   }
 
-  // Any thread: the frame is on the screen now, or in the video.
+  // Records the latency of a frame that is now on the screen or in the video. Any thread.
   void Drawn(const ShownFrame& frame) {
     if (!frame.taken) return;
     const Timestamp age = PlayClock().Now() - *frame.taken;
@@ -138,10 +138,10 @@ class GuideRun {
   std::vector<Session::MapState> Maps() const { return session_.Maps(); }
 
  private:
-  // What is known of one camera, on its own thread.
-  struct Watched {
+  // State of one camera; used on its thread only.
+  struct CameraState {
     std::optional<Timestamp> first_time;
-    std::optional<Timestamp> age;  // of the image that was tracked last, by then
+    std::optional<Timestamp> age;  // Age of the last tracked image when its tracking ended.
     std::string message;
     std::shared_ptr<const ShownFrame> last;
   };
@@ -162,7 +162,7 @@ class GuideRun {
   }
 
   CameraRun RunOf(std::size_t i, const Show& show) {
-    Watched& watched = watched_[i];
+    CameraState& state = camera_states_[i];
     CameraRun run;
     run.camera = &cameras_[i];
     run.options.pace = request_.pace;
@@ -173,29 +173,29 @@ class GuideRun {
     }
     run.options.model_folder = request_.model_folder;
     run.options.inbox = &inboxes_[i];
-    run.options.refused = [&watched](const std::string& reason) { watched.message = reason; };
-    run.options.carried_out = [this, &watched](const TimedCommand& command) {
-      watched.message.clear();
+    run.options.refused = [&state](const std::string& reason) { state.message = reason; };
+    run.options.carried_out = [this, &state](const TimedCommand& command) {
+      state.message.clear();
       const std::scoped_lock lock(files_mutex_);
       files_->Add(command);
     };
-    run.options.trouble = [this, &watched, &show](const std::string& sentence, Timestamp time) {
-      watched.message = sentence;
+    run.options.trouble = [this, &state, &show](const std::string& sentence, Timestamp time) {
+      state.message = sentence;
       {
         const std::scoped_lock lock(files_mutex_);
-        files_->Add({Event{time, "camera", sentence.empty() ? "back again" : sentence}});
+        files_->Add({Event{time, "camera", sentence.empty() ? "The camera is back." : sentence}});
       }
-      if (!watched.last) return;
-      // There is no new image to say it in: the last one comes again.
-      auto frame = std::make_shared<ShownFrame>(*watched.last);
+      if (!state.last) return;
+      // There is no new image, so the last one is shown again with the message.
+      auto frame = std::make_shared<ShownFrame>(*state.last);
       frame->message = sentence;
       show(std::move(frame));
     };
-    run.options.latency = [&watched](Timestamp age) { watched.age = age; };
-    run.shown = [this, &watched, &show](const engine::TrackedFrame& tracked) {
+    run.options.latency = [&state](Timestamp age) { state.age = age; };
+    run.shown = [this, &state, &show](const engine::TrackedFrame& tracked) {
       if (Interruption::requested()) stop_.request_stop();
-      const std::optional<Timestamp> age = std::exchange(watched.age, std::nullopt);
-      auto frame = MakeShown(tracked, &watched);
+      const std::optional<Timestamp> age = std::exchange(state.age, std::nullopt);
+      auto frame = MakeShown(tracked, &state);
       if (age) frame->taken = PlayClock().Now() - *age;
       {
         const std::scoped_lock lock(files_mutex_);
@@ -206,9 +206,9 @@ class GuideRun {
         files_->Add(session_.TakeEvents());
         if (request_.on_frame) request_.on_frame(*frame);
       }
-      for (const auto& head : heads_) head->Saw(tracked);
+      for (const auto& head : heads_) head->AddView(tracked);
       if (tracked.frame.camera == 0) Direct(frame);
-      if (tracked.state != engine::TrackingState::kDropped) watched.last = frame;
+      if (tracked.state != engine::TrackingState::kDropped) state.last = frame;
       show(std::move(frame));
     };
     return run;
@@ -220,25 +220,25 @@ class GuideRun {
     for (Command& command : request_.director(*frame)) inboxes_[0].Push({std::move(command), tracked});
   }
 
-  std::shared_ptr<ShownFrame> MakeShown(const engine::TrackedFrame& tracked, Watched* watched) {
+  std::shared_ptr<ShownFrame> MakeShown(const engine::TrackedFrame& tracked, CameraState* state) {
     auto frame = std::make_shared<ShownFrame>();
     frame->tracked = tracked;
     frame->shown = session_.ShownWith(tracked);
-    if (!watched->first_time) watched->first_time = tracked.frame.time;
-    frame->seconds = ToSeconds(tracked.frame.time - *watched->first_time);
-    frame->message = watched->message.empty() ? frame->shown.advice : watched->message;
+    if (!state->first_time) state->first_time = tracked.frame.time;
+    frame->seconds = ToSeconds(tracked.frame.time - *state->first_time);
+    frame->message = state->message.empty() ? frame->shown.advice : state->message;
     return frame;
   }
 
   const GuideRequest& request_;
   const std::span<CalibratedCamera> cameras_;
   Session session_;
-  std::vector<CommandInbox> inboxes_;  // by camera, like watched_
-  std::vector<Watched> watched_;
-  std::vector<std::unique_ptr<HeadControl>> heads_;  // of the cameras that can turn theirs
+  std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
+  std::vector<CameraState> camera_states_;
+  std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
-  std::mutex files_mutex_;            // guards files and tallies
-  std::vector<CameraTally> tallies_;  // by camera
+  std::mutex files_mutex_;            // Guards files_ and tallies_.
+  std::vector<CameraTally> tallies_;  // By camera.
   std::optional<GuideFiles> files_;
 };
 
@@ -253,7 +253,7 @@ void RunHeadless(const GuideRequest& request, std::span<CalibratedCamera> camera
   std::shared_ptr<const ShownFrame> other;
   run->Run(
       [&](std::shared_ptr<const ShownFrame> frame) {
-        // The first camera's thread is this one, whose context draws.
+        // The first camera runs on this thread, which owns the OpenGL context.
         if (frame->tracked.frame.camera != 0) {
           if (frame->tracked.state == engine::TrackingState::kDropped) return;
           const std::scoped_lock lock(other_mutex);
@@ -292,7 +292,7 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
   }
   worker.RequestStop();
   if (fault) {
-    // The window's fault came first; the camera's thread still saves before anybody hears of it.
+    // The window's error came first. The camera thread still saves its results before that error is thrown.
     try {
       worker.Join();
     } catch (const Error&) {
@@ -320,7 +320,7 @@ std::vector<CalibratedCamera> OpenArgumentCameras(const RunArguments& run) {
   CameraOptions options = run.cameras.options;
   options.seed = run.seed;
   options.reconnect = true;
-  options.lock_controls_after = 30;  // a second: what automatic exposure takes to settle
+  options.lock_controls_after = 30;  // One second at 30 images/s, after which automatic exposure has settled.
   std::vector<CalibratedCamera> cameras;
   for (std::size_t i = 0; i < run.cameras.sources.size(); ++i) {
     auto source = OpenCamera(run.cameras.sources[i], options);

@@ -16,9 +16,9 @@
 #include "app/session/guided_view.h"
 #include "maps/library.h"
 
-// What authoring, touring and the demonstration share: one camera, or the two of a wearable, through a
-// session over a library, seen in a window or not at all. The script and the director act for the first
-// camera.
+// Common part of authoring, touring and the demonstration: feeds one camera, or the two of a wearable,
+// through a session that uses a library, with or without a window. Commands of the script and the director
+// apply to the first camera.
 namespace docent::engine {
 class PlanarTarget;
 }
@@ -32,33 +32,33 @@ struct GuideRequest {
   EngineKind engine = EngineKind::kHybrid;
   bool headless = false;
   std::uint64_t seed = 1;
-  std::size_t memory_budget_bytes = std::size_t{1} << 30;  // of maps in memory
-  bool new_map_when_lost = false;                          // see SessionOptions
+  std::size_t memory_budget_bytes = std::size_t{1} << 30;  // For maps in memory.
+  bool new_map_when_lost = false;                          // See SessionOptions.
   Timestamp autosave_interval = SessionOptions().autosave_interval;
   std::optional<std::filesystem::path> output, record, record_script;
   std::vector<TimedCommand> script;
   std::string script_name;
   std::filesystem::path model_folder;
-  std::string title;  // of the window
-  // What is done of itself on seeing a frame, as if a person did it in the window; may be empty. On the
-  // camera's thread.
+  std::string title;  // Title of the window.
+  // Returns commands to run for a frame, as if a person had given them in the window; may be empty. Called on
+  // the camera's thread.
   std::function<std::vector<Command>(const ShownFrame&)> director;
-  double baseline_m = 0;                               // see SessionOptions
-  std::shared_ptr<const engine::PlanarTarget> target;  // see engine::TrackerOptions; may be null
+  double baseline_m = 0;                               // See SessionOptions.
+  std::shared_ptr<const engine::PlanarTarget> target;  // See engine::TrackerOptions; may be null.
   std::optional<HeadPolicy> head;
-  // Told of every frame on its camera's thread, one at a time; may be empty.
+  // Called with each frame on its camera's thread, never concurrently; may be empty.
   std::function<void(const ShownFrame&)> on_frame;
-  // Told of every drawn frame with its image, on the thread that draws; may be empty. Without a window
-  // frames are drawn only for this and for `record`.
+  // Called with each drawn frame and its image on the drawing thread; may be empty. Without a window, frames
+  // are drawn only for this and for `record`.
   std::function<void(const ShownFrame&, const cv::Mat&)> on_image;
 };
 
-// Runs until the first camera ends, the window is closed, or the person interrupts; saves and closes
-// everything then, also when it ends by an Error. Answers with the maps as they were at the end.
+// Runs until the first camera ends, the window is closed, or the program is interrupted. Saves and closes
+// everything then, also when it ends with an Error. Returns the maps at the end.
 std::vector<Session::MapState> RunGuide(const GuideRequest& request, std::span<CalibratedCamera> cameras,
                                         Verbosity verbosity);
 
-// The cameras that the arguments name, clipped to --from and --until. Throws Error.
+// Opens the cameras named by the arguments, clipped to --from and --until. Throws Error.
 std::vector<CalibratedCamera> OpenArgumentCameras(const RunArguments& run);
 
 }  // namespace docent::app

@@ -3,10 +3,9 @@
 
 #include "app/command_line/options.h"
 
-// What the subcommands that track carry out. Each throws Error with one sentence when it cannot.
+// Implementations of the subcommands that process camera images. Each throws Error with one sentence on
+// failure.
 namespace docent::app {
-
-// Throws Error when panorama maps are asked for, which this version does not make.
 
 void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity);
 void RunAuthor(const AuthorOptions& options, Verbosity verbosity);

@@ -59,14 +59,14 @@ void AddNamedOption(CLI::App* command, const NamedOption& option, SimulationOpti
 void AddSimulateCommand(CLI::App* program, Invocation* invocation) {
   CLI::App* command = AddSubcommand(
       program, "simulate",
-      "Write a simulated sequence with its truth, in TUM layout. The options may also follow the "
-      "scene after commas, as in sim:room,rolling-shutter=20,interlaced. Scenes:\n" +
+      "Write a simulated sequence with ground truth and calibration in TUM layout. The options can also be "
+      "appended to the scene name after commas, as in sim:room,rolling-shutter=20,interlaced. Scenes:\n" +
           ListOfScenes(),
       "docent simulate museum --output museum --duration 20\n"
       "  docent simulate room --output room --rolling-shutter 25 --focal-error 1 --tremor 0.1");
   const auto options = std::make_shared<SimulateOptions>();
   command->add_option("SCENE", options->scene, "Name of the scene, such as room or cylinder:10")->required();
-  command->add_option("--output", options->output, "Folder to write to; new or empty")->required();
+  command->add_option("--output", options->output, "Folder to write to; must be new or empty")->required();
   for (const NamedOption& option : NamedOptions()) AddNamedOption(command, option, &options->simulation);
   AddSeedOption(command, &options->simulation.seed);
   command->callback(

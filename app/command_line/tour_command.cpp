@@ -11,10 +11,10 @@ namespace docent::app {
 void AddTourCommand(CLI::App* program, Invocation* invocation,
                     std::function<void(const TourOptions&, Verbosity)> run) {
   CLI::App* command =
-      AddSubcommand(program, "tour", "Use the maps of a library; nothing in it changes",
+      AddSubcommand(program, "tour", "Tour saved maps (read-only)",
                     "docent tour --library museum.docent --camera /dev/video0 --calibration camera.yaml");
   const auto options = std::make_shared<TourOptions>();
-  command->add_option("--library", options->library, "The library's file")->required();
+  command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
   AddRunArguments(command, &options->run);
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);

@@ -23,36 +23,36 @@ using Descriptors = std::vector<engine::Descriptor>;
 
 struct TrainingOptions {
   std::filesystem::path folder, output;
-  int images = 60;  // of each sequence and each simulated scene
+  int images = 60;  // From each sequence and each simulated scene.
   std::uint64_t seed = 1;
 };
 
 void AddImage(const cv::Mat& image, Descriptors* descriptors) {
   cv::Mat gray = image;
   if (image.channels() == 3) cv::cvtColor(image, gray, cv::COLOR_BGR2GRAY);
-  if (gray.cols < 64 || gray.rows < 64) return;  // nothing that features can be extracted from
-  for (const engine::DescribedPlace& place : engine::DescribeCorners(*engine::MakeFeatures(gray)))
+  if (gray.cols < 64 || gray.rows < 64) return;  // Too small for feature extraction.
+  for (const engine::DescribedKeypoint& place : engine::DescribeCorners(*engine::MakeFeatures(gray)))
     descriptors->push_back(place.oriented.descriptor);
 }
 
-// The folder itself, or those of its folders that hold sequences, by name.
+// Returns the folder itself if it is a sequence, else its subfolders that are sequences, sorted by name.
 std::vector<std::filesystem::path> FindSequences(const std::filesystem::path& folder) {
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error))
-    throw Error("'" + folder.string() + "' is no folder; give one that holds sequences.");
+    throw Error("'" + folder.string() + "' is not a folder; give a folder that contains sequences.");
   if (FindLayout(folder)) return {folder};
   std::vector<std::filesystem::path> sequences;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error))
     if (entry.is_directory(error) && FindLayout(entry.path())) sequences.push_back(entry.path());
-  if (error) throw Error("Cannot look into the folder '" + folder.string() + "': " + error.message() + ".");
+  if (error) throw Error("Cannot read the folder '" + folder.string() + "': " + error.message() + ".");
   if (sequences.empty())
     throw Error("There is no sequence in '" + folder.string() +
-                "'; one is a folder with rgb.txt, mav0/cam0, video.mp4 or numbered images.");
+                "'; a sequence is a folder with rgb.txt, mav0/cam0, video.mp4 or numbered images.");
   std::sort(sequences.begin(), sequences.end());
   return sequences;
 }
 
-// Every so many images of a sequence, from the first one on.
+// Adds the descriptors of `images` images, taken at regular intervals from the sequence.
 void AddSequence(const std::filesystem::path& folder, int images, Descriptors* descriptors) {
   const auto source = OpenFolder(folder);
   constexpr std::uint64_t kUnknownLength = 1000;
@@ -84,7 +84,7 @@ void Train(const TrainingOptions& options, Verbosity verbosity) {
   const auto scenes = SceneRecipes();
   Descriptors descriptors;
   {
-    Progress progress("Sequences and scenes described", sequences.size() + scenes.size(), verbosity);
+    Progress progress("Sequences and scenes processed", sequences.size() + scenes.size(), verbosity);
     std::uint64_t done = 0;
     progress.Update(done);
     for (const std::filesystem::path& sequence : sequences) {
@@ -97,7 +97,7 @@ void Train(const TrainingOptions& options, Verbosity verbosity) {
     }
   }
   const std::size_t count = descriptors.size();
-  Progress progress("Centres settled", engine::VocabularyTree::kCenters, verbosity);
+  Progress progress("Cluster centres computed", engine::VocabularyTree::kCenters, verbosity);
   const engine::VocabularyTree tree = engine::VocabularyTree::Train(
       std::move(descriptors), options.seed, [&](std::size_t settled) { progress.Update(settled); });
   const std::vector<std::uint8_t> bytes = tree.ToBytes();
@@ -105,9 +105,10 @@ void Train(const TrainingOptions& options, Verbosity verbosity) {
   file.Write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   file.Close();
   if (verbosity != Verbosity::kQuiet) {
-    std::printf("%zu descriptors of %zu sequences and %zu simulated scenes sorted into %u leaves in %s\n",
-                count, sequences.size(), scenes.size(), engine::VocabularyTree::kLeaves,
-                options.output.string().c_str());
+    std::printf(
+        "%zu descriptors of %zu sequences and %zu simulated scenes clustered into %u visual words in %s\n",
+        count, sequences.size(), scenes.size(), engine::VocabularyTree::kLeaves,
+        options.output.string().c_str());
   }
 }
 
@@ -116,14 +117,14 @@ void Train(const TrainingOptions& options, Verbosity verbosity) {
 void AddTrainVocabularyCommand(CLI::App* program, Invocation* invocation) {
   CLI::App* command = AddSubcommand(
       program, "train-vocabulary",
-      "Train the tree of descriptors by which places are recognised, from images of the sequences in a\n"
-      "folder and of all simulated scenes. The program carries one; a new one takes effect when it is built\n"
-      "in as engine/recognition/vocabulary.bin.",
+      "Train the vocabulary tree for place recognition from the sequences in a folder and all simulated\n"
+      "scenes. The program has a built-in vocabulary; to use a new one, replace\n"
+      "engine/recognition/vocabulary.bin and rebuild.",
       "docent train-vocabulary sequences --output vocabulary.bin");
   const auto options = std::make_shared<TrainingOptions>();
   command->add_option("DIR", options->folder, "A sequence, or a folder of sequences")->required();
   command->add_option("--output", options->output, "File to write")->required();
-  command->add_option("--images", options->images, "Images taken of each sequence and scene")
+  command->add_option("--images", options->images, "Number of images used from each sequence and scene")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   AddSeedOption(command, &options->seed);

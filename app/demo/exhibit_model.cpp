@@ -22,7 +22,8 @@ struct Mesh {
   std::vector<Eigen::Vector2f> texture;
   std::vector<std::uint16_t> indices;
 
-  // Four corners counter-clockwise seen from outside; the texture's part [left, right] x [top, bottom].
+  // Adds a quad with corners counter-clockwise seen from outside, and with the texture rows from top to
+  // bottom.
   void AddQuad(const std::array<Eigen::Vector3f, 4>& corners, float top, float bottom) {
     const Eigen::Vector3f normal = (corners[2] - corners[0]).cross(corners[3] - corners[1]).normalized();
     const auto first = static_cast<std::uint16_t>(positions.size());
@@ -39,7 +40,7 @@ struct Mesh {
     }
   }
 
-  // A square frustum between two heights, with its lid.
+  // Adds a square frustum between two heights, with its top face.
   void AddFrustum(float low, float low_half, float high, float high_half, float top, float bottom) {
     const auto corner = [](float height, float half, int i) {
       constexpr std::array<std::array<float, 2>, 4> kSigns = {{{-1, 1}, {1, 1}, {1, -1}, {-1, -1}}};
@@ -51,7 +52,7 @@ struct Mesh {
                corner(high, high_half, i)},
               top, bottom);
     }
-    if (high_half < 0.002f) return;  // a point has no lid
+    if (high_half < 0.002f) return;  // A tip needs no top face.
     AddQuad({corner(high, high_half, 0), corner(high, high_half, 1), corner(high, high_half, 2),
              corner(high, high_half, 3)},
             top, top + 0.1f);
@@ -67,7 +68,7 @@ Mesh MakeObelisk() {
   return mesh;
 }
 
-// From top to bottom: gold for the tip, red and white bands, dark stone for the pedestal.
+// From top to bottom: a gold tip, red and white bands, a dark pedestal.
 std::vector<std::uint8_t> PaintTexture() {
   cv::Mat image(256, 64, CV_8UC3);
   for (int y = 0; y < image.rows; ++y) {

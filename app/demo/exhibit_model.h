@@ -6,9 +6,9 @@
 
 namespace docent::app {
 
-// A small model made on the spot: an obelisk of striped stone on a stepped pedestal, one metre high, its foot
-// at the origin, y up. The bytes are a self-contained GLB with an embedded PNG texture: what a person would
-// bring from a modelling program, so that the demonstration takes the same way.
+// Generates a small model for the demonstration: a striped obelisk on a stepped pedestal, one metre high,
+// with its foot at the origin and y up. The result is a self-contained GLB with an embedded PNG texture, so
+// that the demonstration loads it like a model exported from a modelling program.
 std::vector<std::uint8_t> MakeExhibitGlb();
 
 }  // namespace docent::app

@@ -48,18 +48,19 @@ std::vector<Command> MuseumDirector::Direct(const ShownFrame& frame) {
     if (!building_.empty()) commands.push_back(StopMap{});
     if (!place.empty()) commands.push_back(NewMap{MapName(place)});
     building_ = place;
-    furnished_ = false;
+    content_placed_ = false;
     return commands;
   }
-  if (place.empty() || furnished_) return commands;
+  if (place.empty() || content_placed_) return commands;
   const auto [first, last] = parts_.at(label);
-  // Late enough that the map has grown, early enough that it goes on to grow around what stands in it.
+  // At 3/5 of the part the map covers the place, and it is still extended after the content was placed.
   if (index < first + (last - first) * 3 / 5) return commands;
-  return Furnish(frame, index, place);
+  return PlaceContent(frame, index, place);
 }
 
-std::vector<Command> MuseumDirector::Furnish(const ShownFrame& frame, int index, const std::string& place) {
-  constexpr double kModelHeight = 0.25;  // of the map's depth
+std::vector<Command> MuseumDirector::PlaceContent(const ShownFrame& frame, int index,
+                                                  const std::string& place) {
+  constexpr double kModelHeight = 0.25;  // Ratio of the last keyframe's median depth.
   const Eigen::Vector2d kSignOffset(150, -20);
   const SimulatedPlace* spot = FindPlace(simulation_, place);
   if (spot == nullptr || !engine::HasPose(frame.tracked.state) || frame.shown.map_name != MapName(place)) {
@@ -70,7 +71,7 @@ std::vector<Command> MuseumDirector::Furnish(const ShownFrame& frame, int index,
   const Eigen::Vector2d pixel = seen->array().round(), sign_pixel = pixel + kSignOffset;
   const auto point = simulation_.SurfaceAt(index, pixel);
   if (!point) return {};
-  furnished_ = true;
+  content_placed_ = true;
   PlaceModel model;
   model.file = model_file_;
   model.pixel = pixel;
@@ -94,8 +95,8 @@ void DrawingCheck::Add(const ShownFrame& frame) {
   const bool has_pose = engine::HasPose(frame.tracked.state);
   if (label.starts_with(kVisit)) {
     ++visit_frames_;
-    named_ += has_pose;
-    named_rightly_ +=
+    recognized_ += has_pose;
+    recognized_correctly_ +=
         has_pose && frame.shown.map_name == MuseumDirector::MapName(label.substr(kVisit.size()));
   }
   if (!has_pose || !frame.shown.scene) return;

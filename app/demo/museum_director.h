@@ -12,38 +12,38 @@
 
 namespace docent::app {
 
-// Plays the author of a simulated museum: a map for each `buildK` part of the way, in it a model and a
-// signpost where the simulation says that something is worth showing, and the end of the map with the end of
-// the part. It remembers which point of the world each thing was put at. On the camera's thread.
+// Acts as the author of a simulated museum: starts a map for each `buildK` part of the trajectory, places a
+// model and a signpost at the place given by the simulation, and stops the map at the end of the part.
+// Records the world point at which each object was placed. All members are called on the camera's thread.
 class MuseumDirector {
  public:
-  // The simulation must outlive the director. model_file: as the commands are to name it.
+  // The simulation must outlive the director. model_file: the file name used in the commands.
   MuseumDirector(const Simulation& simulation, std::string model_file);
 
-  // What the author does on seeing this frame, in order; often nothing.
+  // Returns the author's commands for this frame, in order; often none.
   std::vector<Command> Direct(const ShownFrame& frame);
 
-  // The name of the map of place K.
+  // Name of the map of a place.
   static std::string MapName(const std::string& place) { return "Bay " + place; }
-  // The first frame that is not for building, or the number of frames.
+  // First frame of the visit, or the number of frames if there is none.
   int first_visit_frame() const { return first_visit_frame_; }
-  // Points of the world, by names of map and thing.
+  // World points, by name of map and name of object.
   using Truths = std::map<std::pair<std::string, std::string>, Eigen::Vector3d>;
   const Truths& truths() const { return truths_; }
 
  private:
-  std::vector<Command> Furnish(const ShownFrame& frame, int index, const std::string& place);
+  std::vector<Command> PlaceContent(const ShownFrame& frame, int index, const std::string& place);
 
   const Simulation& simulation_;
   const std::string model_file_;
   int first_visit_frame_ = 0;
-  std::map<std::string, std::pair<int, int>> parts_;  // first and last frame of each label
-  std::string building_;                              // the place whose map is open; empty for none
-  bool furnished_ = false;
+  std::map<std::string, std::pair<int, int>> parts_;  // First and last frame of each label.
+  std::string building_;                              // Place whose map is being built; empty for none.
+  bool content_placed_ = false;
   Truths truths_;
 };
 
-// Compares where things are drawn with where the simulation sees the points that they were put at.
+// Compares the pixels at which objects are drawn with the true pixels of the points they were placed at.
 class DrawingCheck {
  public:
   DrawingCheck(const Simulation& simulation, MuseumDirector::Truths truths)
@@ -51,18 +51,19 @@ class DrawingCheck {
 
   void Add(const ShownFrame& frame);
 
-  // Pixels from the truth, one a thing and frame in which both are in the image.
+  // Distances between drawn and true pixel, one for each object and frame in which both are in the image.
   const std::vector<double>& errors_px() const { return errors_px_; }
-  // Frames of `visitK` parts; those that named a map; and those that named K's.
+  // Number of frames of `visitK` parts, of those tracked in any map, and of those tracked in the map of place
+  // K.
   int visit_frames() const { return visit_frames_; }
-  int named() const { return named_; }
-  int named_rightly() const { return named_rightly_; }
+  int recognized() const { return recognized_; }
+  int recognized_correctly() const { return recognized_correctly_; }
 
  private:
   const Simulation& simulation_;
   const MuseumDirector::Truths truths_;
   std::vector<double> errors_px_;
-  int visit_frames_ = 0, named_ = 0, named_rightly_ = 0;
+  int visit_frames_ = 0, recognized_ = 0, recognized_correctly_ = 0;
 };
 
 }  // namespace docent::app

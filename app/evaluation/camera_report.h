@@ -11,21 +11,21 @@
 #include "engine/base/time.h"
 #include "engine/tracking/tracked_frame.h"
 
-// What authoring and touring tell of each camera in report.json: frames, and how long its images took.
+// Statistics of each camera that `author` and `tour` write to report.json: frame counts and latencies.
 namespace docent::app {
 
-// Counts one camera's frames. One thread at a time.
+// Collects the statistics of one camera. One thread at a time.
 class CameraTally {
  public:
   explicit CameraTally(std::string name) : name_(std::move(name)) {}
 
-  // Every frame that is handed on, dropped ones too.
+  // Adds a frame; dropped frames are counted too.
   void Add(const engine::TrackedFrame& frame);
-  // How old an image was when it was tracked, and when it was drawn. Not known of recordings that are played
-  // faster or slower than they were taken.
+  // Adds the time since capture when an image was tracked and when it was drawn. Unknown for recordings that
+  // are not played in real time.
   void AddTrackedAge(Timestamp age) { tracked_ages_ms_.push_back(Milliseconds(age)); }
   void AddDrawnAge(Timestamp age) { drawn_ages_ms_.push_back(Milliseconds(age)); }
-  // What a device says of its images' way, at the end.
+  // Sets the delivery statistics of a device, at the end of the run.
   void SetDelivery(const Delivery& delivery) { delivery_ = delivery; }
 
  private:
@@ -39,7 +39,7 @@ class CameraTally {
 };
 
 // JSON: {"cameras": [{name, frames, with_pose, dropped, tracking_ms {median, p95, max}, latency_ms {tracked,
-// drawn}, delivery}]}; what is not known is null.
+// drawn}, delivery}]}; unknown values are null.
 std::string FormatCameraReport(const std::vector<CameraTally>& cameras);
 // Throws Error.
 void WriteCameraReport(const std::filesystem::path& path, const std::vector<CameraTally>& cameras);

@@ -17,12 +17,13 @@ std::string Cell(const std::string& text) {
 }
 
 std::string Cell(const Figure& figure, const std::optional<double>& value) {
-  return Cell(Shown(figure, value));
+  return Cell(FormatValue(figure, value));
 }
 
 std::string SpreadTable(const RunDistribution& distribution) {
   std::string html =
-      "<table><tr><th>figure</th><th>minimum</th><th>median</th><th>maximum</th><th>runs with it</th>"
+      "<table><tr><th>figure</th><th>minimum</th><th>median</th><th>maximum</th><th>runs with this "
+      "figure</th>"
       "<th>worst run</th></tr>\n";
   for (const Figure& figure : Figures()) {
     html += "<tr><th>" + EscapeHtml(figure.title) + "</th>";
@@ -30,7 +31,7 @@ std::string SpreadTable(const RunDistribution& distribution) {
       const bool alike = spread->min == spread->max;
       html += Cell(figure, spread->min) + Cell(figure, spread->median) + Cell(figure, spread->max) +
               Cell(std::to_string(spread->runs)) +
-              Cell(alike ? "all alike" : NameOf(distribution.rows[spread->worst].key, distribution));
+              Cell(alike ? "all equal" : NameOf(distribution.rows[spread->worst].key, distribution));
     } else {
       html += "<td>-</td><td>-</td><td>-</td><td>0</td><td></td>";
     }
@@ -39,12 +40,12 @@ std::string SpreadTable(const RunDistribution& distribution) {
   return html + "</table>\n";
 }
 
-std::string StartsOf(const RunRow& row) {
+std::string InitializationsText(const RunRow& row) {
   std::string text;
-  for (const StartResult& start : row.starts) {
+  for (const InitializationResult& start : row.initializations) {
     char line[160];
     std::snprintf(line, sizeof line, "frame %zu: %s%s (error %.1f cm of %.1f cm)", start.frame,
-                  ToString(start.verdict), start.discarded ? ", discarded" : "", start.error_m * 100,
+                  ToString(start.outcome), start.discarded ? ", discarded" : "", start.error_m * 100,
                   start.path_m * 100);
     text += (text.empty() ? "" : "; ") + std::string(line);
   }
@@ -54,11 +55,11 @@ std::string StartsOf(const RunRow& row) {
 std::string RunTable(const RunDistribution& distribution) {
   std::string html = "<h3>Runs</h3><table><tr><th>run</th>";
   for (const Figure& figure : Figures()) html += "<th>" + EscapeHtml(figure.title) + "</th>";
-  html += "<th>starts with depth</th></tr>\n";
+  html += "<th>initializations</th></tr>\n";
   for (const RunRow& row : distribution.rows) {
     html += "<tr>" + Cell(NameOf(row.key, distribution));
     for (const Figure& figure : Figures()) html += Cell(figure, figure.value(row));
-    html += Cell(StartsOf(row)) + "</tr>\n";
+    html += Cell(InitializationsText(row)) + "</tr>\n";
   }
   return html + "</table>\n";
 }
@@ -78,11 +79,11 @@ std::string SortedPlot(const RunDistribution& distribution, const Figure& figure
   }
   std::vector<SvgPlot::Point> points;
   for (const double value : values) points.push_back({static_cast<double>(points.size() + 1), value});
-  SvgPlot plot(std::string(figure.title) + " of each run, sorted", "run, the worst first",
+  SvgPlot plot(std::string(figure.title) + " of each run, sorted", "run, worst first",
                std::string(figure.title) + figure.unit);
   plot.SetHeight(200);
   plot.Include({0, 0});
-  if (figure.factor == 100 && figure.more_is_better) plot.Include({0, 100});  // a share
+  if (figure.factor == 100 && figure.more_is_better) plot.Include({0, 100});  // A ratio in percent.
   plot.AddStems(points, "#9db8d6", "");
   plot.AddDots(points, "#2b6cb0", "", 3);
   return plot.Finish();
@@ -98,7 +99,8 @@ std::string DistributionSection(const RunDistribution& distribution) {
             EscapeHtml(NameOf(distribution.rows[WorstRun(distribution.rows)].key, distribution)) + ".";
   }
   html += "</p>\n" + SpreadTable(distribution);
-  constexpr std::size_t kPlotted = 4;  // the counts behind them say more as a table
+  constexpr std::size_t kPlotted =
+      4;  // The remaining figures are counts, which are easier to read in the table.
   for (const Figure& figure : Figures().first(kPlotted)) html += SortedPlot(distribution, figure);
   return html + RunTable(distribution) + "</section>\n";
 }

@@ -7,11 +7,11 @@
 
 namespace docent::app {
 
-// The part of report.html about one distribution: a table of its figures, plots of them over the runs, and a
-// table of the runs.
+// The section of report.html about one distribution: a table of its figures, plots over the runs, and a table
+// of the runs.
 std::string DistributionSection(const RunDistribution& distribution);
 
-// Inline SVG of one figure of every run, sorted from the worst to the best; empty where no run has it.
+// Inline SVG of one figure for all runs, sorted from worst to best; empty when no run has the figure.
 std::string SortedPlot(const RunDistribution& distribution, const Figure& figure);
 
 }  // namespace docent::app

@@ -13,16 +13,16 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-// A frame with a pose and with a true pose.
+// A frame with a tracked pose and a true pose.
 struct Pair {
   std::size_t frame = 0;
   engine::Rigid3 map_from_camera, truth_from_camera;
 };
 
-// A map of directions alone claims no place: giving it up takes nothing back.
-bool TookBack(const MapRecord& map) {
-  const bool directions_alone = map.points.infinite > 0 && map.points.finite == 0;
-  return map.discarded && !directions_alone;
+// Whether positions of the map were retracted. A map with infinite points only defines no positions.
+bool IsRetracted(const MapRecord& map) {
+  const bool without_depth = map.points.infinite > 0 && map.points.finite == 0;
+  return map.discarded && !without_depth;
 }
 
 class RootMeanSquare {
@@ -55,26 +55,26 @@ engine::Rotation3 AlignRotations(const std::vector<Pair>& pairs) {
   return engine::Rotation3(rotation);
 }
 
-// What the engine turned from the first to the last frame against what the camera did, in the first camera's
+// The true rotation from the first to the last frame and the error of the tracked one, in the first camera's
 // frame.
-struct Turn {
+struct RotationDrift {
   engine::Rotation3 truth, error;  // error = truth^-1 * tracked
 };
 
-Turn CompareTurn(const Pair& first, const Pair& last) {
-  const auto turn = [](const engine::Rigid3& a, const engine::Rigid3& b) {
+RotationDrift CompareRotation(const Pair& first, const Pair& last) {
+  const auto relative = [](const engine::Rigid3& a, const engine::Rigid3& b) {
     return a.rotation.inverse() * b.rotation;
   };
-  const engine::Rotation3 truth = turn(first.truth_from_camera, last.truth_from_camera);
-  return {truth, truth.inverse() * turn(first.map_from_camera, last.map_from_camera)};
+  const engine::Rotation3 truth = relative(first.truth_from_camera, last.truth_from_camera);
+  return {truth, truth.inverse() * relative(first.map_from_camera, last.map_from_camera)};
 }
 
-// The part of the error about the true turn's axis: the twist of the error's swing and twist.
-std::optional<double> ErrorAboutTheAxis(const Turn& turn) {
-  constexpr double kLeastTurn = 5 / kDegrees;
-  const Eigen::Vector3d axis = turn.truth.Log();
-  if (axis.norm() < kLeastTurn) return std::nullopt;
-  const Eigen::Quaterniond& q = turn.error.quaternion();
+// Component of the error about the axis of the true rotation: the twist in the swing-twist decomposition.
+std::optional<double> ErrorAboutAxis(const RotationDrift& drift) {
+  constexpr double kMinRotation = 5 / kDegrees;
+  const Eigen::Vector3d axis = drift.truth.Log();
+  if (axis.norm() < kMinRotation) return std::nullopt;
+  const Eigen::Quaterniond& q = drift.error.quaternion();
   const double half = std::atan2(q.vec().dot(axis.normalized()), q.w());
   return std::remainder(2 * half, 2 * std::numbers::pi) * kDegrees;
 }
@@ -90,11 +90,11 @@ void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<Fram
     rotation_error.Add(error_deg);
   }
   map->rotation_rmse_deg = rotation_error.Get();
-  const Turn turn = CompareTurn(pairs.front(), pairs.back());
-  map->rotation_drift_deg = turn.error.Angle() * kDegrees;
-  map->turn_error_deg = ErrorAboutTheAxis(turn);
+  const RotationDrift drift = CompareRotation(pairs.front(), pairs.back());
+  map->rotation_drift_deg = drift.error.Angle() * kDegrees;
+  map->axis_drift_deg = ErrorAboutAxis(drift);
 
-  std::vector<std::size_t> positioned;  // frames
+  std::vector<std::size_t> positioned;  // Indices of frames.
   std::vector<Eigen::Vector3d> in_truth, in_map;
   for (const Pair& pair : pairs) {
     if (!(*frames)[pair.frame].has_position) continue;
@@ -132,7 +132,7 @@ void CompareKeyFrames(const MapRecord& record, const std::vector<TimedPose>& tru
   map->keyframe_ate_rmse_m = error.Get();
 }
 
-// One result a map, in the order in which the frames entered them.
+// One result for each map, in the order of the first frames in them.
 std::vector<MapResult> ListMaps(const RunRecord& run) {
   std::vector<MapResult> maps;
   const auto find = [&maps](std::uint64_t key) {
@@ -157,7 +157,7 @@ std::vector<MapResult> ListMaps(const RunRecord& run) {
       found = std::prev(maps.end());
     }
     found->name = record.name;
-    found->discarded = TookBack(record);
+    found->discarded = IsRetracted(record);
     found->joined_into = record.joined_into;
   }
   return maps;
@@ -165,7 +165,7 @@ std::vector<MapResult> ListMaps(const RunRecord& run) {
 
 void CountFrames(const RunRecord& run, SequenceReport* report) {
   std::map<std::uint64_t, bool> discarded;
-  for (const MapRecord& map : run.maps) discarded[map.key] = TookBack(map);
+  for (const MapRecord& map : run.maps) discarded[map.key] = IsRetracted(map);
   std::vector<double> tracking_ms;
   report->frames = static_cast<int>(run.frames.size());
   report->frame_results.resize(run.frames.size());
@@ -179,8 +179,8 @@ void CountFrames(const RunRecord& run, SequenceReport* report) {
     }
     report->frame_results[i].tracked = true;
     ++report->tracked;
-    report->frame_results[i].has_position = !InMapOfDirections(frame);
-    if (InMapOfDirections(frame)) ++report->directions_only_frames;
+    report->frame_results[i].has_position = !InMapWithoutDepth(frame);
+    if (InMapWithoutDepth(frame)) ++report->directions_only_frames;
     if (frame.state == engine::TrackingState::kRelocalized) ++report->relocalizations;
     if (!report->first_tracked_frame) report->first_tracked_frame = static_cast<int>(i);
     report->last_tracked_frame = static_cast<int>(i);
@@ -232,7 +232,7 @@ void CompareWithTruth(const RunRecord& run, const std::vector<TimedPose>& truth,
   report->scale = largest.scale;
   report->rotation_rmse_deg = largest.rotation_rmse_deg;
   report->rotation_drift_deg = largest.rotation_drift_deg;
-  report->turn_error_deg = largest.turn_error_deg;
+  report->axis_drift_deg = largest.axis_drift_deg;
 }
 
 std::vector<SegmentResult> EvaluateSegments(const RunRecord& run, const std::vector<TimedLabel>& labels,

@@ -10,85 +10,87 @@
 #include "app/evaluation/run_record.h"
 #include "engine/geometry/sim3.h"
 
-// How good a run was, against the truth. Poses are the live ones. A frame in a map that was later discarded
-// counts as untracked: whoever wore the camera was shown something that the engine itself took back. (Not so
-// where that map held directions alone: a turn that was shown stays true when the map is given up.)
+// Accuracy of a run compared with ground truth. Poses are those delivered live. A frame in a map that was
+// discarded later counts as untracked, because the user saw a result that the engine retracted. This does not
+// apply to a discarded map with infinite points only, because its rotations remain correct.
 //
-// Each map has a frame and a scale of its own, so poses are compared map by map: the similarity
-// truth_from_map of least squares over its camera centres (Umeyama 1991), then the root mean square of what
-// remains. The figures of the whole sequence are those of the largest map, the one with most tracked frames.
-// A map that holds directions alone, as one does from its first image until its camera has moved, says
-// which way the camera looks and nothing of where it is: its frames are tracked and have a rotation, but they
-// have no part in the alignment and the error of positions.
+// Each map has its own coordinate frame and scale, so poses are compared for each map separately: the
+// similarity truth_from_map is estimated by least squares over the camera centres (Umeyama 1991), and the
+// error is the root mean square of the remaining distances. The figures of the whole sequence are those of
+// the largest map, the one with most tracked frames. A map has infinite points only until its camera has
+// moved. Such a map defines the rotation of the camera but not its position: its frames count as tracked and
+// have a rotation error, but they take no part in the alignment and the position error.
 namespace docent::app {
 
 struct EvaluationOptions {
-  Timestamp max_time_difference = std::chrono::milliseconds(10);  // between a frame and its true pose
+  Timestamp max_time_difference = std::chrono::milliseconds(10);  // Between a frame and its true pose.
 };
 
-// One frame against the truth; empty members where there is nothing to compare.
+// One frame compared with the truth; members are empty when there is nothing to compare.
 struct FrameResult {
-  bool tracked = false;                              // has a pose in a map that was kept
-  bool has_position = false;                         // and that map knew depth
-  std::optional<Eigen::Vector3d> position_in_truth;  // by the map's alignment
+  bool tracked = false;                              // Has a pose in a map that was kept.
+  bool has_position = false;                         // That map also had finite points.
+  std::optional<Eigen::Vector3d> position_in_truth;  // By the map's alignment.
   std::optional<double> position_error_m;
-  std::optional<double> rotation_error_deg;  // after aligning rotations
+  std::optional<double> rotation_error_deg;  // After aligning rotations.
 };
 
 struct MapResult {
   std::uint64_t key = 0;
   std::string name;
   bool discarded = false;
-  std::string joined_into = {};      // see MapRecord
-  int frames = 0;                    // with a pose in this map
-  std::optional<double> ate_rmse_m;  // empty without truth, or when the centres do not fix a similarity
-  // Of its keyframes after one more adjustment of the whole map: what the map knows, where ate_rmse_m is what
-  // the wearer saw.
+  std::string joined_into = {};  // See MapRecord.
+  int frames = 0;                // Frames with a pose in this map.
+  std::optional<double>
+      ate_rmse_m;  // Empty without truth, or when the centres do not determine a similarity.
+  // Error of the keyframes after a final global bundle adjustment: the accuracy of the map, whereas
+  // ate_rmse_m is the accuracy of the live poses.
   std::optional<double> keyframe_ate_rmse_m;
-  std::optional<double> scale;               // truth metres a map metre
-  std::optional<double> rotation_rmse_deg;   // after the rotation that aligns the orientations best
-  std::optional<double> rotation_drift_deg;  // of the turn from the first to the last frame with a pose
-  // The same about the true turn's own axis, as hybrid-slam §7.3 tells it: positive when the engine turned
-  // too far. Empty where the camera ended looking as it began, as there is no axis then.
-  std::optional<double> turn_error_deg;
+  std::optional<double> scale;              // Metres of the truth per map unit.
+  std::optional<double> rotation_rmse_deg;  // After the rotation that aligns the orientations best.
+  std::optional<double>
+      rotation_drift_deg;  // Error of the rotation from the first to the last frame with a pose.
+  // Component of that drift about the axis of the true rotation, as in [HYBRID] 7.3; positive when the
+  // tracked rotation is too large. Empty when the true rotation is too small to have an axis.
+  std::optional<double> axis_drift_deg;
 };
 
 // All frames with one label.
 struct SegmentResult {
   std::string label;
   int frames = 0, tracked = 0;
-  double tracked_ratio = 0;          // over all frames of the label
-  std::optional<double> ate_rmse_m;  // each frame by its own map's alignment
+  double tracked_ratio = 0;          // Over all frames of the label.
+  std::optional<double> ate_rmse_m;  // Each frame by the alignment of its own map.
 };
 
 struct SequenceReport {
-  std::string name, engine;  // as in RunRecord
+  std::string name, engine;  // As in RunRecord.
   int frames = 0;
-  int tracked = 0;                 // with a pose in a map that was kept
-  int discarded_frames = 0;        // with a pose in a map that was discarded; counted as untracked
-  int directions_only_frames = 0;  // of the tracked ones: in a map without depth, so without a position
-  double tracked_ratio = 0;        // tracked over all frames from the first tracked one on, that one included
+  int tracked = 0;                 // Frames with a pose in a map that was kept.
+  int discarded_frames = 0;        // Frames with a pose in a discarded map; they count as untracked.
+  int directions_only_frames = 0;  // Tracked frames in a map without finite points, so without a position.
+  double tracked_ratio = 0;        // Tracked over all frames from the first tracked one on, including it.
   std::optional<int> first_tracked_frame, last_tracked_frame;
   int relocalizations = 0;
   // Of the largest map.
-  std::optional<double> ate_rmse_m, rotation_rmse_deg, rotation_drift_deg, turn_error_deg, scale;
-  KeyFrameCounts keyframes;  // sums over the maps that were kept
+  std::optional<double> ate_rmse_m, rotation_rmse_deg, rotation_drift_deg, axis_drift_deg, scale;
+  KeyFrameCounts keyframes;  // Sums over the maps that were kept.
   PointCounts points;
-  double tracking_median_ms = 0, tracking_p95_ms = 0, tracking_max_ms = 0;  // of frames that were not dropped
+  double tracking_median_ms = 0, tracking_p95_ms = 0, tracking_max_ms = 0;  // Without dropped frames.
   MappingTimes mapping;
   double wall_s = 0, peak_memory_mb = 0;
-  std::vector<LensRing> lens_rings;        // as in RunRecord
-  std::vector<MapResult> maps;             // in the order of their first frame, then those without frames
-  std::optional<std::size_t> largest_map;  // index in maps
-  std::vector<SegmentResult> segments;     // in the order of their first frame
-  std::vector<FrameResult> frame_results;  // one a frame of the run
+  std::vector<LensRing> lens_rings;        // As in RunRecord.
+  std::vector<MapResult> maps;             // In the order of their first frame, then those without frames.
+  std::optional<std::size_t> largest_map;  // Index in maps.
+  std::vector<SegmentResult> segments;     // In the order of their first frame.
+  std::vector<FrameResult> frame_results;  // One for each frame of the run.
 };
 
 // `truth` and `segments` may be empty.
 SequenceReport EvaluateRun(const RunRecord& run, const std::vector<TimedPose>& truth,
                            const std::vector<TimedLabel>& segments, const EvaluationOptions& options = {});
 
-// The value below which the given part of the values lies (nearest rank); 0 for none. part in (0, 1].
+// Quantile of the values by the nearest-rank method; 0 without values. `part` is in (0, 1].
 double Quantile(std::vector<double> values, double part);
 
 }  // namespace docent::app

@@ -10,20 +10,20 @@
 
 namespace docent::app {
 
-// A stitched panorama (see PanoramaImage) as the report shows it.
+// A stitched panorama (see PanoramaImage) for the report.
 struct ShownPanorama {
   std::string caption;
   std::vector<std::uint8_t> png;
 };
 
-// Everything that a report shows of one sequence.
+// All data that the report shows for one sequence.
 struct EvaluatedRun {
   RunRecord run;
-  std::vector<TimedPose> truth;      // may be empty
-  std::vector<TimedLabel> segments;  // may be empty
-  SequenceReport report;             // of this run
+  std::vector<TimedPose> truth;      // May be empty.
+  std::vector<TimedLabel> segments;  // May be empty.
+  SequenceReport report;
   std::vector<ShownPanorama> panoramas = {};
-  std::shared_ptr<const EvaluatedRun> compared = nullptr;  // the same sequence by the other engine
+  std::shared_ptr<const EvaluatedRun> compared = nullptr;  // The same sequence with the other engine.
 };
 
 }  // namespace docent::app

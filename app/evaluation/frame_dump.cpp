@@ -36,7 +36,7 @@ Json ToJson(const engine::Rigid3& camera_from_map) {
           {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
 }
 
-// deviation: of the depth, relative; infinite for what has none.
+// deviation: relative standard deviation of the depth; infinite when unknown.
 Json ToJson(const engine::InspectedPoint& point, float deviation) {
   Json json = {{"id", point.point},         {"infinite", point.infinite},
                {"level", point.level},      {"predicted_px", ToJson(point.predicted)},

@@ -7,18 +7,17 @@
 #include "engine/tracking/frame_inspection.h"
 #include "engine/tracking/tracked_frame.h"
 
-// Everything about one frame of a run, for whoever looks for a fault in it:
-//   frame-N.json           state, quality, poses, and each point with its prediction, match, residual and
-//   weight frame-N-points.png     the image with each point: green found and believed, red found and not
-//   believed,
-//                          grey not found; blue instead of green for a direction; a line from where it was
-//                          looked for to where it was found; the size says the pyramid level
-//   frame-N-residuals.png  what was found, with its residual twenty times as long
-//   frame-N-corners.png    the corners of all pyramid levels, the smaller levels beside the image
+// Debugging output for one frame of a run:
+// - frame-N.json: state, quality, poses, and each map point with prediction, match, residual and weight.
+// - frame-N-points.png: the image with all searched map points: green for finite inliers, blue for infinite
+//   inliers, red for outliers, grey for points not found. A line joins predicted and found pixel, and the
+//   radius shows the pyramid level.
+// - frame-N-residuals.png: the found points with their residuals, scaled by 20.
+// - frame-N-corners.png: the corners of all pyramid levels, with the smaller levels beside the image.
 namespace docent::app {
 
-// number: the frame's line in frames.csv, counted from 0. The images are left out for a frame that was
-// dropped. Throws Error when the folder cannot be written.
+// number: the frame's row in frames.csv, from 0. For a dropped frame, no images are written. Throws Error
+// when the folder cannot be written.
 void WriteFrameDump(const std::filesystem::path& folder, std::size_t number,
                     const engine::TrackedFrame& frame, const engine::FrameInspection& inspection);
 

@@ -19,7 +19,7 @@ std::string At(const std::string& name, int line) {
 template <typename Item>
 void CheckOrder(const std::vector<Item>& items, Timestamp time, const std::string& name, int line) {
   if (!items.empty() && time <= items.back().time) {
-    throw Error(At(name, line) + ": the time does not come after the one before it.");
+    throw Error(At(name, line) + ": the time is not later than the previous one.");
   }
 }
 
@@ -32,7 +32,7 @@ std::vector<TimedPose> ParseGroundTruth(std::string_view text, const std::string
     const auto fail = [&](const char* what) { throw Error(At(name, line.number) + ": " + what); };
     if (fields.size() != 8) fail("expected 'timestamp tx ty tz qx qy qz qw'.");
     const auto time = ParseSeconds(fields[0]);
-    if (!time) fail("the time is no number of seconds.");
+    if (!time) fail("the time is not a number of seconds.");
     std::array<double, 7> v{};
     for (std::size_t i = 0; i < v.size(); ++i) {
       const auto value = ParseNumber(fields[i + 1]);
@@ -44,7 +44,7 @@ std::vector<TimedPose> ParseGroundTruth(std::string_view text, const std::string
     CheckOrder(poses, *time, name, line.number);
     poses.push_back({*time, {engine::Rotation3(rotation), Eigen::Vector3d(v[0], v[1], v[2])}});
   }
-  if (poses.empty()) throw Error(name + " holds no poses.");
+  if (poses.empty()) throw Error(name + " contains no poses.");
   return poses;
 }
 

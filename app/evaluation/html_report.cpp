@@ -33,14 +33,14 @@ std::string FigureTable(const SequenceReport& r) {
   const std::string first = r.first_tracked_frame ? std::to_string(*r.first_tracked_frame) : "never";
   std::string html = "<table>";
   html += Row("frames", std::to_string(r.frames));
-  html += Row("tracked after the first tracked frame", Fixed(r.tracked_ratio * 100, 1) + " %");
+  html += Row("tracked, from the first tracked frame on", Fixed(r.tracked_ratio * 100, 1) + " %");
   html += Row("first tracked frame", first);
   html += Row("last tracked frame", r.last_tracked_frame ? std::to_string(*r.last_tracked_frame) : "never");
   html += Row("relocalizations", std::to_string(r.relocalizations));
   html += Row("ATE RMSE", Fixed(r.ate_rmse_m ? std::optional(*r.ate_rmse_m * 100) : std::nullopt, 2, " cm"));
   html += Row("rotation RMSE", Fixed(r.rotation_rmse_deg, 3, "°"));
-  html += Row("rotation drift, last tracked frame against first", Fixed(r.rotation_drift_deg, 3, "°"));
-  html += Row("of it about the axis of the true turn", Fixed(r.turn_error_deg, 3, "°"));
+  html += Row("rotation error, first to last frame", Fixed(r.rotation_drift_deg, 3, "°"));
+  html += Row("rotation error about the true axis", Fixed(r.axis_drift_deg, 3, "°"));
   html += Row("scale", Fixed(r.scale, 4, ""));
   html += Row("keyframes", std::to_string(r.keyframes.sixdof) + " sixdof, " +
                                std::to_string(r.keyframes.panorama) + " panorama, " +
@@ -48,12 +48,12 @@ std::string FigureTable(const SequenceReport& r) {
   html += Row("points", std::to_string(r.points.finite) + " finite, " + std::to_string(r.points.infinite) +
                             " infinite, " + std::to_string(r.points.converted) + " converted");
   html += Row("tracking", Fixed(r.tracking_median_ms, 2) + " ms median, " + Fixed(r.tracking_p95_ms, 2) +
-                              " ms at 95 %, " + Fixed(r.tracking_max_ms, 2) + " ms at most");
+                              " ms at 95 %, " + Fixed(r.tracking_max_ms, 2) + " ms maximum");
   html += Row("mapping", Fixed(r.mapping.bundle_adjustment_s, 2) + " s bundle adjustment, " +
                              Fixed(r.mapping.panorama_localization_s, 2) + " s panorama localization, " +
                              Fixed(r.mapping.infinite_triangulation_s, 2) + " s infinite triangulation, " +
-                             Fixed(r.mapping.loop_closing_s, 2) + " s loops, " + Fixed(r.mapping.other_s, 2) +
-                             " s other");
+                             Fixed(r.mapping.loop_closing_s, 2) + " s loop closing, " +
+                             Fixed(r.mapping.other_s, 2) + " s other");
   html += Row("loops closed", std::to_string(r.mapping.loops_closed));
   html += Row("wall time", Fixed(r.wall_s, 1) + " s");
   html += Row("peak memory", Fixed(r.peak_memory_mb, 0) + " MB");
@@ -66,12 +66,12 @@ std::string Centimetres(const std::optional<double>& metres) {
 
 std::string MapTable(const SequenceReport& r) {
   std::string html =
-      "<h3>Maps</h3><table><tr><th>map</th><th>frames</th><th>ATE RMSE</th><th>of its "
-      "keyframes</th><th>rotation</th></tr>\n";
+      "<h3>Maps</h3><table><tr><th>map</th><th>frames</th><th>ATE RMSE</th><th>ATE RMSE of "
+      "keyframes</th><th>rotation RMSE</th></tr>\n";
   for (const MapResult& map : r.maps) {
     std::string name = map.name;
-    if (map.discarded) name += " (given up)";
-    if (!map.joined_into.empty()) name += " (a part of " + map.joined_into + " at the end)";
+    if (map.discarded) name += " (discarded)";
+    if (!map.joined_into.empty()) name += " (joined into " + map.joined_into + ")";
     html += "<tr><td>" + EscapeHtml(name) + "</td><td>" + std::to_string(map.frames) + "</td><td>" +
             Centimetres(map.ate_rmse_m) + "</td><td>" + Centimetres(map.keyframe_ate_rmse_m) + "</td><td>" +
             Fixed(map.rotation_rmse_deg, 3, "°") + "</td></tr>\n";
@@ -79,13 +79,13 @@ std::string MapTable(const SequenceReport& r) {
   html += "</table>\n<p>The figures above are those of the largest map.";
   if (r.discarded_frames > 0) {
     html += " " + std::to_string(r.discarded_frames) +
-            " frames had a pose in a map that was given up later; they count as untracked.";
+            " frames had a pose in a map that was discarded later; they count as untracked.";
   }
   if (r.directions_only_frames > 0) {
     html += " " + std::to_string(r.directions_only_frames) +
-            " frames were tracked while their map held directions alone; they have a rotation but no "
+            " frames were tracked in a map that had only infinite points; they have a rotation but no "
             "position, and "
-            "the ATE is without them.";
+            "are not included in the ATE.";
   }
   return html + "</p>\n";
 }
@@ -134,7 +134,7 @@ const MapRecord* LargestMap(const EvaluatedRun& run) {
   return nullptr;
 }
 
-// What `draw` makes of the run, and beside it of the same sequence by the other engine.
+// Draws the run and, beside it, the same sequence with the other engine.
 template <typename Draw>
 std::string SideBySide(const EvaluatedRun& run, const Draw& draw) {
   const auto drawn = [&draw](const EvaluatedRun& one) {
@@ -178,18 +178,19 @@ std::string Section(const EvaluatedRun& run) {
   return html + "</section>\n";
 }
 
-// A turn is told as far as it was tracked; one that was not tracked to its end is no figure of the whole.
-std::string TurnError(const SequenceReport& r) {
-  if (!r.turn_error_deg) return "unknown";
+// Rotation error about the true axis up to the last tracked frame. That frame is named when it is not the
+// last frame of the sequence.
+std::string AxisDrift(const SequenceReport& r) {
+  if (!r.axis_drift_deg) return "unknown";
   const bool to_the_end = r.last_tracked_frame == r.frames - 1;
-  return Fixed(*r.turn_error_deg, 3) + "°" +
+  return Fixed(*r.axis_drift_deg, 3) + "°" +
          (to_the_end ? "" : " at frame " + std::to_string(*r.last_tracked_frame));
 }
 
 std::string SummaryRow(const SequenceReport& r, const std::string& name) {
   return "<tr><td>" + EscapeHtml(name) + "</td><td>" + EscapeHtml(r.engine) + "</td><td>" +
          Fixed(r.tracked_ratio * 100, 1) + " %</td><td>" + Centimetres(r.ate_rmse_m) + "</td><td>" +
-         Fixed(r.rotation_rmse_deg, 3, "°") + "</td><td>" + TurnError(r) + "</td><td>" +
+         Fixed(r.rotation_rmse_deg, 3, "°") + "</td><td>" + AxisDrift(r) + "</td><td>" +
          Fixed(r.tracking_median_ms, 2) + "</td></tr>\n";
 }
 
@@ -221,8 +222,8 @@ std::string FormatHtmlReport(const std::vector<EvaluatedRun>& runs) {
       std::any_of(runs.begin(), runs.end(), [](const EvaluatedRun& run) { return run.compared != nullptr; });
   html += std::string(wide ? "<body class=\"wide\">" : "<body>") + "\n<h1>Docent: evaluation</h1>\n";
   html +=
-      "<table><tr><th>sequence</th><th>engine</th><th>tracked</th><th>ATE RMSE</th><th>rotation</th>"
-      "<th>turn, last tracked frame against first</th><th>ms a frame</th></tr>\n";
+      "<table><tr><th>sequence</th><th>engine</th><th>tracked</th><th>ATE RMSE</th><th>rotation RMSE</th>"
+      "<th>Rotation error, first to last frame</th><th>ms per frame</th></tr>\n";
   for (const EvaluatedRun& run : runs) {
     html += SummaryRow(run.report, run.report.name);
     if (run.compared) html += SummaryRow(run.compared->report, run.report.name);

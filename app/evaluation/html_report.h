@@ -10,13 +10,12 @@
 
 namespace docent::app {
 
-// report.html: one page for people with its plots inside; it loads nothing from anywhere. Runs
-// that are compared stand side by side.
+// Formats report.html: one self-contained page with embedded plots. Compared runs are shown side by side.
 std::string FormatHtmlReport(const std::vector<EvaluatedRun>& runs);
 void WriteHtmlReport(const std::filesystem::path& path, const std::vector<EvaluatedRun>& runs);
 
-// The same of many runs: for each distribution the table of its figures, the figures of every run from the
-// worst to the best, and a table of the runs.
+// Formats report.html for many runs: for each distribution a table of its figures, plots of the figures of
+// all runs from worst to best, and a table of the runs.
 std::string FormatHtmlReport(const std::vector<RunDistribution>& distributions);
 void WriteHtmlReport(const std::filesystem::path& path, const std::vector<RunDistribution>& distributions);
 

@@ -27,7 +27,7 @@ Json ToJson(const MapResult& map) {
           {"keyframe_ate_rmse_m", OrNull(map.keyframe_ate_rmse_m)},
           {"rotation_rmse_deg", OrNull(map.rotation_rmse_deg)},
           {"rotation_drift_deg", OrNull(map.rotation_drift_deg)},
-          {"turn_error_deg", OrNull(map.turn_error_deg)},
+          {"turn_error_deg", OrNull(map.axis_drift_deg)},
           {"scale", OrNull(map.scale)}};
 }
 
@@ -52,7 +52,7 @@ Json ToJson(const SequenceReport& report) {
       {"ate_rmse_m", OrNull(report.ate_rmse_m)},
       {"rotation_rmse_deg", OrNull(report.rotation_rmse_deg)},
       {"rotation_drift_deg", OrNull(report.rotation_drift_deg)},
-      {"turn_error_deg", OrNull(report.turn_error_deg)},
+      {"turn_error_deg", OrNull(report.axis_drift_deg)},
       {"scale", OrNull(report.scale)},
       {"keyframes",
        {{"sixdof", report.keyframes.sixdof},
@@ -73,7 +73,7 @@ Json ToJson(const SequenceReport& report) {
         {"loop_closing", report.mapping.loop_closing_s},
         {"other", report.mapping.other_s}}},
       {"loops_closed", report.mapping.loops_closed},
-      {"keyframe_held_ms", 1e3 * report.mapping.longest_hold_s},
+      {"keyframe_held_ms", 1e3 * report.mapping.max_queue_latency_s},
       {"wall_s", report.wall_s},
       {"peak_memory_mb", report.peak_memory_mb},
       {"discarded_frames", report.discarded_frames},
@@ -91,9 +91,9 @@ Json ToJson(const SequenceReport& report) {
   return json;
 }
 
-Json ToJson(const StartResult& start) {
+Json ToJson(const InitializationResult& start) {
   return {{"frame", start.frame},
-          {"verdict", ToString(start.verdict)},
+          {"outcome", ToString(start.outcome)},
           {"discarded", start.discarded},
           {"window_s", start.window_s},
           {"centers", start.centers},
@@ -103,8 +103,8 @@ Json ToJson(const StartResult& start) {
           {"path_m", start.path_m},
           {"true_path_m", start.true_path_m},
           {"depth_m", OrNull(start.depth_m)},
-          {"least_depth_m", OrNull(start.least_depth_m)},
-          {"most_depth_m", OrNull(start.most_depth_m)}};
+          {"least_depth_m", OrNull(start.min_depth_m)},
+          {"most_depth_m", OrNull(start.max_depth_m)}};
 }
 
 Json ToJson(const RunRow& row) {
@@ -123,7 +123,7 @@ Json ToJson(const RunRow& row) {
                {"discarded_maps", row.discarded_maps},
                {"tracking_median_ms", row.tracking_median_ms},
                {"starts", Json::array()}};
-  for (const StartResult& start : row.starts) json["starts"].push_back(ToJson(start));
+  for (const InitializationResult& start : row.initializations) json["starts"].push_back(ToJson(start));
   return json;
 }
 
@@ -155,7 +155,8 @@ Json ToJson(const RunDistribution& distribution) {
           {"distribution", std::move(inner)}};
 }
 
-// A folder's name need not be UTF-8; a report that cannot be written for its name would be worse than a '?'.
+// A folder's name need not be UTF-8. Invalid bytes are replaced, because otherwise no report could be
+// written.
 template <typename Report>
 std::string FormatAll(const std::vector<Report>& reports, const std::vector<Report>& compared) {
   Json json = {{"sequences", Json::array()}};
@@ -209,10 +210,10 @@ std::string FormatSummary(const SequenceReport& report) {
   if (report.ate_rmse_m) text += ", ATE " + Format("%.1f cm", *report.ate_rmse_m * 100);
   if (report.rotation_rmse_deg) text += ", rotation " + Format("%.2f deg", *report.rotation_rmse_deg);
   text += ", " + Format("%.1f ms", report.tracking_median_ms) +
-          " a frame (95 %: " + Format("%.1f ms", report.tracking_p95_ms) + ")";
+          " per frame (95 %: " + Format("%.1f ms", report.tracking_p95_ms) + ")";
   if (report.discarded_frames > 0) {
     text +=
-        "; " + std::to_string(report.discarded_frames) + " frames in maps given up later count as untracked";
+        "; " + std::to_string(report.discarded_frames) + " frames in maps discarded later count as untracked";
   }
   return text;
 }

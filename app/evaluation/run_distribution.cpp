@@ -16,16 +16,16 @@ std::optional<double> AsNumber(const std::optional<int>& value) {
 }
 
 constexpr std::array<Figure, 8> kFigures = {{
-    {"tracked_share", "tracked share", " %", 100, 1, true,
+    {"tracked_share", "tracked frames", " %", 100, 1, true,
      [](const RunRow& row) { return std::optional(row.tracked_share); }},
     {"ate_rmse_m", "ATE", " cm", 100, 2, false, [](const RunRow& row) { return row.ate_m; }},
     {"rotation_rmse_deg", "rotation error", " deg", 1, 2, false,
      [](const RunRow& row) { return row.rotation_deg; }},
     {"first_3d_pose_s", "first 3D pose after", " s", 1, 2, false,
      [](const RunRow& row) { return row.first_3d_pose_s; }},
-    {"false_starts", "false starts", "", 1, 0, false,
+    {"false_starts", "false initializations", "", 1, 0, false,
      [](const RunRow& row) { return AsNumber(row.false_starts); }},
-    {"unnoticed_false_starts", "of them not noticed", "", 1, 0, false,
+    {"unnoticed_false_starts", "unnoticed of these", "", 1, 0, false,
      [](const RunRow& row) {
        return row.false_starts ? std::optional<double>(*row.false_starts - row.noticed.value_or(0))
                                : std::nullopt;
@@ -35,7 +35,7 @@ constexpr std::array<Figure, 8> kFigures = {{
      [](const RunRow& row) { return std::optional<double>(row.discarded_maps); }},
 }};
 
-// Root mean square of those that are there.
+// Root mean square of the values that are known.
 std::optional<double> RootMeanSquare(const std::vector<FrameResult>& frames,
                                      std::optional<double> FrameResult::*value) {
   double sum = 0;
@@ -57,24 +57,25 @@ std::string Plural(std::size_t count, const std::string& word) {
   return std::to_string(count) + " " + word + (count == 1 ? "" : "s");
 }
 
-std::string FalseStartLine(const RunDistribution& distribution) {
-  if (!distribution.has_truth) return "false starts: unknown without a truth\n";
+std::string FalseInitializationLine(const RunDistribution& distribution) {
+  if (!distribution.has_truth) return "false initializations: unknown without ground truth\n";
   int runs = 0, all = 0, noticed = 0, undecided = 0;
   for (const RunRow& row : distribution.rows) {
     runs += row.false_starts.value_or(0) > 0;
     all += row.false_starts.value_or(0);
     noticed += row.noticed.value_or(0);
-    for (const StartResult& start : row.starts) undecided += start.verdict == StartVerdict::kUndecided;
+    for (const InitializationResult& start : row.initializations)
+      undecided += start.outcome == InitializationOutcome::kUndecided;
   }
-  return "false starts in " + std::to_string(runs) + " of " + Plural(distribution.rows.size(), "run") + ": " +
-         std::to_string(all) + " in all, " + std::to_string(noticed) + " of them noticed; " +
-         std::to_string(undecided) + " undecided\n";
+  return "false initializations in " + std::to_string(runs) + " of " +
+         Plural(distribution.rows.size(), "run") + ": " + std::to_string(all) + " in total, " +
+         std::to_string(noticed) + " of them noticed; " + std::to_string(undecided) + " undecided\n";
 }
 
 }  // namespace
 
 RunRow MakeRunRow(const RunKey& key, const RunRecord& run, const SequenceReport& report,
-                  std::optional<std::vector<StartResult>> starts) {
+                  std::optional<std::vector<InitializationResult>> starts) {
   RunRow row;
   row.key = key;
   row.frames = report.frames;
@@ -93,12 +94,12 @@ RunRow MakeRunRow(const RunKey& key, const RunRecord& run, const SequenceReport&
   row.tracking_median_ms = report.tracking_median_ms;
   if (!starts) return row;
   row.false_starts = row.noticed = 0;
-  for (const StartResult& start : *starts) {
-    if (!IsFalse(start.verdict)) continue;
+  for (const InitializationResult& start : *starts) {
+    if (!IsFalse(start.outcome)) continue;
     ++*row.false_starts;
     *row.noticed += start.discarded;
   }
-  row.starts = std::move(*starts);
+  row.initializations = std::move(*starts);
   return row;
 }
 
@@ -142,9 +143,9 @@ std::string NameOf(const RunKey& key, const RunDistribution& of) {
   return of.starts > 1 ? seed + ", start " + std::to_string(key.start) : seed;
 }
 
-std::string Shown(const Figure& figure, const std::optional<double>& value) {
+std::string FormatValue(const Figure& figure, const std::optional<double>& value) {
   if (!value) return "-";
-  // A median may lie between two counts.
+  // The median of counts may not be an integer.
   const double shown = *value * figure.factor;
   const int decimals = figure.decimals == 0 && shown != std::round(shown) ? 1 : figure.decimals;
   char text[64];
@@ -158,7 +159,7 @@ std::string FormatRunLine(const RunRow& row, const RunDistribution& of) {
   for (const Figure& figure : kFigures) {
     const std::optional<double> value = figure.value(row);
     if (!value && !of.has_truth) continue;
-    text += (first ? "" : ", ") + std::string(figure.title) + " " + Shown(figure, value);
+    text += (first ? "" : ", ") + std::string(figure.title) + " " + FormatValue(figure, value);
     first = false;
   }
   return text;
@@ -183,12 +184,12 @@ std::string FormatTable(const RunDistribution& distribution) {
       continue;
     }
     for (const double value : {spread->min, spread->median, spread->max})
-      text += Padded(Shown(figure, value), kValue);
+      text += Padded(FormatValue(figure, value), kValue);
     const bool alike = spread->min == spread->max;
     text += Padded(std::to_string(spread->runs), 6) + "  " +
-            (alike ? "all alike" : NameOf(distribution.rows[spread->worst].key, distribution)) + "\n";
+            (alike ? "all equal" : NameOf(distribution.rows[spread->worst].key, distribution)) + "\n";
   }
-  text += FalseStartLine(distribution);
+  text += FalseInitializationLine(distribution);
   if (!distribution.rows.empty())
     text +=
         "worst run: " + FormatRunLine(distribution.rows[WorstRun(distribution.rows)], distribution) + "\n";

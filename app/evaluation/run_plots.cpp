@@ -14,7 +14,7 @@ namespace docent::app {
 
 namespace {
 
-constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
 struct StateColor {
   engine::TrackingState state;
@@ -48,12 +48,14 @@ std::vector<SvgPlot::Point> OverTime(const EvaluatedRun& run, const Value& value
   return points;
 }
 
-// The plane that shows most of these positions: their mean and their two longest axes. For a camera that is
-// carried about, that is the view from above, whichever way the truth's axes point.
+// The plane of the two principal axes with the largest variance, through the mean of the positions. For a
+// hand-held camera this is approximately the view from above, whatever the axes of the ground truth are.
 struct View {
   Eigen::Vector3d center = Eigen::Vector3d::Zero(), right = Eigen::Vector3d::UnitX(),
                   up = Eigen::Vector3d::UnitZ();
-  SvgPlot::Point Look(const Eigen::Vector3d& x) const { return {right.dot(x - center), up.dot(x - center)}; }
+  SvgPlot::Point Project(const Eigen::Vector3d& x) const {
+    return {right.dot(x - center), up.dot(x - center)};
+  }
 };
 
 View FitView(const std::vector<Eigen::Vector3d>& positions) {
@@ -68,7 +70,8 @@ View FitView(const std::vector<Eigen::Vector3d>& positions) {
   return view;
 }
 
-// A map seen along two of its axes: in metres of the truth where a scale is known, else in the map's own.
+// Projection of a map onto two axes: in metres when the scale is known from the ground truth, else in map
+// units.
 class MapView {
  public:
   MapView(const EvaluatedRun& run, const MapRecord& map, const Eigen::Vector3d& right,
@@ -78,25 +81,25 @@ class MapView {
       if (result.key == map.key && result.scale) scale_ = result.scale;
     }
   }
-  SvgPlot::Point Look(const Eigen::Vector3d& x) const {
+  SvgPlot::Point Project(const Eigen::Vector3d& x) const {
     const double scale = scale_.value_or(1);
     return {scale * right_.dot(x), scale * up_.dot(x)};
   }
-  std::vector<SvgPlot::Point> Look(const std::vector<Eigen::Vector3d>& positions) const {
+  std::vector<SvgPlot::Point> Project(const std::vector<Eigen::Vector3d>& positions) const {
     std::vector<SvgPlot::Point> points;
-    for (const Eigen::Vector3d& x : positions) points.push_back(Look(x));
+    for (const Eigen::Vector3d& x : positions) points.push_back(Project(x));
     return points;
   }
-  const char* unit() const { return scale_ ? "metres" : "map metres"; }
+  const char* unit() const { return scale_ ? "metres" : "map units"; }
 
  private:
   Eigen::Vector3d right_, up_;
   std::optional<double> scale_;
 };
 
-// Far points are many and would make everything else small: what lies beyond one and a half times the width
-// that holds nine tenths of them is left out. Returns how many those were.
-std::size_t LeaveOutTheFar(std::vector<SvgPlot::Point>* points) {
+// Removes far points, which would make everything else small: those more than 0.75 times the range between
+// the 5 % and 95 % quantiles outside of that range. Returns the number of removed points.
+std::size_t RemoveFarPoints(std::vector<SvgPlot::Point>* points) {
   if (points->size() < 20) return 0;
   const auto range = [&](double SvgPlot::Point::*axis) {
     std::vector<double> values;
@@ -110,8 +113,8 @@ std::size_t LeaveOutTheFar(std::vector<SvgPlot::Point>* points) {
   });
 }
 
-std::string Beyond(std::size_t count) {
-  return count > 0 ? " (" + std::to_string(count) + " lie further out)" : "";
+std::string RemovedNote(std::size_t count) {
+  return count > 0 ? " (" + std::to_string(count) + " further points not shown)" : "";
 }
 
 }  // namespace
@@ -178,7 +181,7 @@ std::string KeyFramePlot(const EvaluatedRun& run, const PlotRanges& ranges) {
 
 std::string PointPlot(const EvaluatedRun& run, const PlotRanges& ranges) {
   const auto& frames = run.run.frames;
-  SvgPlot plot("Points of the current map, and those found in the frame", "seconds", "points");
+  SvgPlot plot("Points of the current map and points found in the frame", "seconds", "points");
   plot.Include({0, ranges.points});
   plot.AddLine(OverTime(run, [&](std::size_t i) { return frames[i].map_points.finite; }), kSixDofColor,
                "finite");
@@ -192,21 +195,21 @@ std::string PointPlot(const EvaluatedRun& run, const PlotRanges& ranges) {
 
 std::string FinitePointPlot(const EvaluatedRun& run, const PlotRanges& ranges) {
   const auto& frames = run.run.frames;
-  SvgPlot plot("Finite points of the current map, by their origin", "seconds", "points");
+  SvgPlot plot("Finite points of the current map by origin", "seconds", "points");
   plot.Include({0, ranges.points});
   plot.AddLine(
       OverTime(run,
                [&](std::size_t i) { return frames[i].map_points.finite - frames[i].map_points.converted; }),
-      kSixDofColor, "of general motion");
+      kSixDofColor, "triangulated directly");
   plot.AddLine(OverTime(run, [&](std::size_t i) { return frames[i].map_points.converted; }), kConvertedColor,
-               "directions before");
+               "converted from infinite points");
   return plot.Finish();
 }
 
-// What the mapper had done by each frame more than by the one before.
+// Mapping time between each frame and the previous one.
 std::string MappingPlot(const EvaluatedRun& run, const PlotRanges& ranges) {
   const auto& frames = run.run.frames;
-  SvgPlot plot("Time of mapping", "seconds", "ms of work until the frame");
+  SvgPlot plot("Mapping time", "seconds", "ms since the previous frame");
   plot.Include({0, ranges.mapping_ms});
   const auto spent_ms = [&](double MappingTimes::*task) {
     return OverTime(run, [&](std::size_t i) {
@@ -220,12 +223,12 @@ std::string MappingPlot(const EvaluatedRun& run, const PlotRanges& ranges) {
 }
 
 std::string TrackingTimePlot(const EvaluatedRun& run, const PlotRanges& ranges) {
-  SvgPlot plot("Time of tracking", "seconds", "ms a frame");
+  SvgPlot plot("Tracking time", "seconds", "ms per frame");
   plot.Include({0, ranges.tracking_ms});
   plot.AddLine(OverTime(run,
                         [&](std::size_t i) {
                           const FrameRecord& frame = run.run.frames[i];
-                          return frame.state == engine::TrackingState::kDropped ? kNothing
+                          return frame.state == engine::TrackingState::kDropped ? kNoValue
                                                                                 : frame.tracking_ms;
                         }),
                "#4a90c2", "");
@@ -236,12 +239,12 @@ std::string AlignedTrajectoryPlot(const EvaluatedRun& run) {
   std::vector<Eigen::Vector3d> truth;
   for (const TimedPose& pose : run.truth) truth.push_back(pose.truth_from_camera.translation);
   const View view = FitView(truth);
-  SvgPlot plot("Trajectory from above, each map aligned with the truth", "metres", "metres");
+  SvgPlot plot("Trajectory from above, each map aligned with the ground truth", "metres", "metres");
   plot.KeepAspect();
   plot.SetHeight(520);
   std::vector<SvgPlot::Point> line;
-  for (const Eigen::Vector3d& x : truth) line.push_back(view.Look(x));
-  plot.AddLine(std::move(line), "#9a9a9a", "truth");
+  for (const Eigen::Vector3d& x : truth) line.push_back(view.Project(x));
+  plot.AddLine(std::move(line), "#9a9a9a", "ground truth");
   for (std::size_t m = 0; m < run.report.maps.size(); ++m) {
     const MapResult& map = run.report.maps[m];
     if (!map.ate_rmse_m) continue;
@@ -249,7 +252,7 @@ std::string AlignedTrajectoryPlot(const EvaluatedRun& run) {
     for (std::size_t i = 0; i < run.run.frames.size(); ++i) {
       const auto& position = run.report.frame_results[i].position_in_truth;
       const bool here = position && run.run.frames[i].map_key == map.key;
-      points.push_back(here ? view.Look(*position) : SvgPlot::Point{kNothing, kNothing});
+      points.push_back(here ? view.Project(*position) : SvgPlot::Point{kNoValue, kNoValue});
     }
     plot.AddLine(std::move(points), kMapColors[m % kMapColors.size()], map.name);
   }
@@ -261,46 +264,46 @@ std::string PointViewPlot(const EvaluatedRun& run, const MapRecord& map) {
   std::vector<SvgPlot::Point> general, converted;
   for (std::size_t i = 0; i < map.positions.size(); ++i) {
     const bool was_direction = i < map.converted.size() && map.converted[i];
-    (was_direction ? converted : general).push_back(view.Look(map.positions[i]));
+    (was_direction ? converted : general).push_back(view.Project(map.positions[i]));
   }
-  const std::size_t beyond = LeaveOutTheFar(&general) + LeaveOutTheFar(&converted);
-  SvgPlot plot("Points of the map '" + map.name + "' from the front" + Beyond(beyond), view.unit(),
+  const std::size_t removed = RemoveFarPoints(&general) + RemoveFarPoints(&converted);
+  SvgPlot plot("Points of the map '" + map.name + "' from the front" + RemovedNote(removed), view.unit(),
                view.unit());
   plot.KeepAspect();
   plot.SetHeight(520);
-  plot.AddDots(std::move(general), "#333333", "of general motion");
-  plot.AddDots(std::move(converted), kConvertedColor, "directions before");
+  plot.AddDots(std::move(general), "#333333", "triangulated directly");
+  plot.AddDots(std::move(converted), kConvertedColor, "converted from infinite points");
   return plot.Finish();
 }
 
 std::string PlaceViewPlot(const EvaluatedRun& run, const MapRecord& map) {
   const MapView view(run, map, map.forward.cross(map.up), map.forward);
-  std::vector<SvgPlot::Point> way;
+  std::vector<SvgPlot::Point> trajectory;
   for (const FrameRecord& frame : run.run.frames) {
-    const bool here = frame.map_key == map.key && engine::HasPose(frame.state) && !InMapOfDirections(frame);
-    way.push_back(here ? view.Look(frame.camera_from_map.OriginInSource())
-                       : SvgPlot::Point{kNothing, kNothing});
+    const bool here = frame.map_key == map.key && engine::HasPose(frame.state) && !InMapWithoutDepth(frame);
+    trajectory.push_back(here ? view.Project(frame.camera_from_map.OriginInSource())
+                              : SvgPlot::Point{kNoValue, kNoValue});
   }
   SvgPlot plot("Trajectory and keyframes in the map '" + map.name + "', from above", view.unit(),
                view.unit());
   plot.KeepAspect();
   plot.SetHeight(520);
-  plot.AddDots(view.Look(map.panorama_centers), "rgba(74,144,194,0.35)", "panorama map", 9);
-  plot.AddLine(std::move(way), "#9a9a9a", "trajectory");
-  plot.AddDots(view.Look(map.sixdof_centers), kSixDofColor, "sixdof", 3);
-  plot.AddDots(view.Look(map.localized_centers), kLocalizedColor, "localized panorama", 3);
+  plot.AddDots(view.Project(map.panorama_centers), "rgba(74,144,194,0.35)", "panorama map", 9);
+  plot.AddLine(std::move(trajectory), "#9a9a9a", "trajectory");
+  plot.AddDots(view.Project(map.sixdof_centers), kSixDofColor, "sixdof", 3);
+  plot.AddDots(view.Project(map.localized_centers), kLocalizedColor, "localized panorama", 3);
   return plot.Finish();
 }
 
 std::string ErrorPlots(const EvaluatedRun& run) {
   const auto& results = run.report.frame_results;
-  SvgPlot position("Error of the position", "seconds", "centimetres");
+  SvgPlot position("Position error", "seconds", "centimetres");
   position.AddLine(
-      OverTime(run, [&](std::size_t i) { return results[i].position_error_m.value_or(kNothing) * 100; }),
+      OverTime(run, [&](std::size_t i) { return results[i].position_error_m.value_or(kNoValue) * 100; }),
       "#c8413c", "");
-  SvgPlot rotation("Error of the rotation", "seconds", "degrees");
+  SvgPlot rotation("Rotation error", "seconds", "degrees");
   rotation.AddLine(
-      OverTime(run, [&](std::size_t i) { return results[i].rotation_error_deg.value_or(kNothing); }),
+      OverTime(run, [&](std::size_t i) { return results[i].rotation_error_deg.value_or(kNoValue); }),
       "#c8413c", "");
   return position.Finish() + rotation.Finish();
 }

@@ -34,9 +34,9 @@ PointCounts CountPoints(const engine::MapSnapshot& map) {
   return counts;
 }
 
-// The finite inliers.
-std::vector<StartRecord::Point> FinitePoints(const engine::TrackedFrame& frame) {
-  std::vector<StartRecord::Point> points;
+// The inliers that are finite points.
+std::vector<InitializationRecord::Point> FinitePoints(const engine::TrackedFrame& frame) {
+  std::vector<InitializationRecord::Point> points;
   for (const engine::PointMatch& match : frame.matches) {
     if (!match.inlier) continue;
     const engine::MapPoint* point = frame.map->FindPoint(match.point);
@@ -46,10 +46,10 @@ std::vector<StartRecord::Point> FinitePoints(const engine::TrackedFrame& frame) 
   return points;
 }
 
-// The nearest rank; 0 where no finite point was found.
-double MedianDepth(const std::vector<StartRecord::Point>& points) {
+// Median by nearest rank; 0 without points.
+double MedianDepth(const std::vector<InitializationRecord::Point>& points) {
   std::vector<double> depths;
-  for (const StartRecord::Point& point : points) depths.push_back(point.depth);
+  for (const InitializationRecord::Point& point : points) depths.push_back(point.depth);
   if (depths.empty()) return 0;
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
@@ -58,21 +58,22 @@ double MedianDepth(const std::vector<StartRecord::Point>& points) {
 
 }  // namespace
 
-void RunRecorder::AddStart(const engine::TrackedFrame& frame, const std::vector<StartRecord::Point>& points) {
-  const bool known = std::any_of(starts_.begin(), starts_.end(), [&frame](const StartRecord& start) {
-    return start.map_key == frame.map_key;
-  });
+void RunRecorder::AddInitialization(const engine::TrackedFrame& frame,
+                                    const std::vector<InitializationRecord::Point>& points) {
+  const bool known =
+      std::any_of(initializations_.begin(), initializations_.end(),
+                  [&frame](const InitializationRecord& start) { return start.map_key == frame.map_key; });
   if (known) return;
-  StartRecord start;
+  InitializationRecord start;
   start.map_key = frame.map_key;
   start.frame = frames_.size();
   for (const engine::KeyFrame& keyframe : frame.map->keyframes) {
     if (keyframe.kind == engine::KeyFrameKind::kSixDof)
       start.keyframes.push_back({keyframe.time, keyframe.camera_from_map});
   }
-  const std::size_t count = std::min(points.size(), StartRecord::kMostPoints);
+  const std::size_t count = std::min(points.size(), InitializationRecord::kMaxPoints);
   for (std::size_t i = 0; i < count; ++i) start.points.push_back(points[i * points.size() / count]);
-  starts_.push_back(std::move(start));
+  initializations_.push_back(std::move(start));
 }
 
 void RunRecorder::Add(const engine::TrackedFrame& frame, const MappingTimes& mapping) {
@@ -87,7 +88,7 @@ void RunRecorder::Add(const engine::TrackedFrame& frame, const MappingTimes& map
   record.mapping = mapping;
   record.tracking_ms = ToSeconds(frame.tracking_time) * 1e3;
   if (frame.map) {
-    // Maps change far less often than frames come.
+    // Counted only for a new revision, because maps change far less often than frames arrive.
     if (frames_.empty() || counted_map_ != frame.map_key || counted_revision_ != frame.map->revision) {
       keyframes_ = CountKeyFrames(*frame.map);
       points_ = CountPoints(*frame.map);
@@ -97,9 +98,9 @@ void RunRecorder::Add(const engine::TrackedFrame& frame, const MappingTimes& map
     record.map_keyframes = keyframes_;
     record.map_points = points_;
     if (engine::HasPose(frame.state)) {
-      const std::vector<StartRecord::Point> points = FinitePoints(frame);
+      const std::vector<InitializationRecord::Point> points = FinitePoints(frame);
       record.median_depth = MedianDepth(points);
-      if (points_.finite > 0) AddStart(frame, points);
+      if (points_.finite > 0) AddInitialization(frame, points);
     }
   }
   frames_.push_back(record);
@@ -130,7 +131,8 @@ MapRecord MakeMapRecord(std::uint64_t key, const std::string& name, const engine
   const Eigen::Vector3d axis =
       map.keyframes.front().camera_from_map.rotation.inverse() * Eigen::Vector3d(Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d level = axis - axis.dot(record.up) * record.up;
-  // A camera that begins looking straight down has no way ahead; any level one will do.
+  // A camera that looks straight up or down has no horizontal viewing direction, so any horizontal one is
+  // used.
   record.forward = level.norm() > 1e-3 ? level.normalized() : record.up.unitOrthogonal();
   return record;
 }
@@ -168,7 +170,8 @@ double PeakMemoryMegabytes() {
 }
 
 void ResetPeakMemory() {
-  std::ofstream("/proc/self/clear_refs") << "5";  // see proc(5); where it is refused the peak goes on
+  std::ofstream("/proc/self/clear_refs")
+      << "5";  // See proc(5). If this is not permitted, the old peak remains.
 }
 
 }  // namespace docent::app

@@ -6,7 +6,7 @@
 #include "app/evaluation/ground_truth.h"
 #include "app/simulator/simulation.h"
 
-// What a simulation knows of itself, in the form in which recorded sequences bring it.
+// Ground truth and segments of a simulation in the same form as those of recorded sequences.
 namespace docent::app {
 
 std::vector<TimedPose> GroundTruthOf(const Simulation& simulation);

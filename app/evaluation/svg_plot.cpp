@@ -26,9 +26,9 @@ std::string Text(double x, double y, const char* anchor, const std::string& text
          EscapeHtml(text) + "</text>";
 }
 
-// Fewer points with the same outline: of every run of points the first, the lowest, the highest and the last
-// one stay, in their order.
-std::vector<SvgPlot::Point> Thin(const std::vector<SvgPlot::Point>& points, std::size_t run) {
+// Reduces the number of points and keeps the outline: of every `run` points the first, lowest, highest and
+// last one remain, in their order.
+std::vector<SvgPlot::Point> Decimate(const std::vector<SvgPlot::Point>& points, std::size_t run) {
   if (run < 5) return points;
   std::vector<SvgPlot::Point> result;
   for (std::size_t begin = 0; begin < points.size(); begin += run) {
@@ -47,7 +47,7 @@ std::vector<SvgPlot::Point> Thin(const std::vector<SvgPlot::Point>& points, std:
 
 }  // namespace
 
-// The data's range and where it lies in the image.
+// Range of the data and its position in the image.
 struct SvgPlot::Frame {
   double x_low = 0, x_high = 1, y_low = 0, y_high = 1;
   double bottom_px = 0;
@@ -130,8 +130,8 @@ std::string SvgPlot::DrawAxes(const Frame& frame) const {
              Px(kWidthPx - kRightPx) + "\"/>" + Text(kLeftPx - 6, frame.Y(y) + 4, "end", FormatNumber(y, 6));
     }
     const double middle = (kTopPx + frame.bottom_px) / 2;
-    const std::string turned = " transform=\"rotate(-90 12 " + Px(middle) + ")\"";
-    svg += Text(12, middle, "middle", y_label_, turned.c_str());
+    const std::string rotated = " transform=\"rotate(-90 12 " + Px(middle) + ")\"";
+    svg += Text(12, middle, "middle", y_label_, rotated.c_str());
   }
   return svg + Text((kLeftPx + kWidthPx - kRightPx) / 2.0, frame.bottom_px + 32, "middle", x_label_);
 }
@@ -157,10 +157,10 @@ std::string SvgPlot::DrawSeries(const Frame& frame, const Series& series) const 
     return "<path fill=\"none\" stroke=\"" + EscapeHtml(series.color) + "\" stroke-width=\"1.3\" d=\"" + svg +
            "\"/>";
   }
-  // Views from above bend every way, so thinning by columns would spoil them.
+  // Decimation assumes increasing x, which does not hold for views from above.
   const std::size_t run = keep_aspect_ ? 0 : series.points.size() / (kWidthPx / 2);
   bool pen_down = false;
-  for (const Point& point : Thin(series.points, run)) {
+  for (const Point& point : Decimate(series.points, run)) {
     if (!IsFinite(point)) {
       pen_down = false;
       continue;
@@ -177,7 +177,8 @@ std::string SvgPlot::DrawLegend() const {
   double x = kWidthPx - kRightPx;
   for (auto entry = legend_.rbegin(); entry != legend_.rend(); ++entry) {
     const double width =
-        22 + 7.1 * static_cast<double>(entry->second.size());  // about 7.1 px a letter at 12 px
+        22 +
+        7.1 * static_cast<double>(entry->second.size());  // About 7.1 px per letter at a font size of 12 px.
     x -= width;
     svg += "<rect x=\"" + Px(x) + "\" y=\"9\" width=\"10\" height=\"10\" fill=\"" + EscapeHtml(entry->first) +
            "\"/>" + Text(x + 14, 18, "start", entry->second);

@@ -7,8 +7,8 @@
 
 namespace docent::app {
 
-// A plot as inline SVG: axes with round ticks, lines, dots and bands. Collect everything, then call Finish
-// once; the ranges fit what was added. Values that are not finite are left out, and a line is parted there.
+// A plot as inline SVG: axes with round tick values, lines, dots and bands. Add all data, then call Finish
+// once; the axes are fitted to the data. Values that are not finite are omitted and interrupt a line.
 class SvgPlot {
  public:
   struct Point {
@@ -17,21 +17,21 @@ class SvgPlot {
 
   SvgPlot(std::string title, std::string x_label, std::string y_label);
 
-  // `color` is a CSS colour; a label that is not empty goes to the legend.
+  // `color` is a CSS colour; a nonempty label is added to the legend.
   void AddLine(std::vector<Point> points, const std::string& color, const std::string& label);
   void AddDots(std::vector<Point> points, const std::string& color, const std::string& label,
                double radius_px = 1.2);
-  // A line from zero to each point.
+  // Adds a vertical line from zero to each point.
   void AddStems(std::vector<Point> points, const std::string& color, const std::string& label);
-  // The ranges shall reach this far, so that two plots beside each other have the same.
+  // Extends the axes to include this point, so that two plots can have equal ranges.
   void Include(const Point& point) { included_.push_back(point); }
-  // A coloured strip over the whole height from x = begin to end.
+  // Adds a coloured strip over the whole height from x = begin to end.
   void AddBand(double begin, double end, const std::string& color);
-  // A legend entry without a line of its own, for bands.
+  // Adds a legend entry, for bands.
   void AddLegend(const std::string& color, const std::string& label);
-  // Both axes get the same scale, for views from above.
+  // Gives both axes the same scale, for views from above.
   void KeepAspect() { keep_aspect_ = true; }
-  // No y axis: only bands.
+  // Hides the y axis, for plots with bands only.
   void HideYAxis() { hide_y_axis_ = true; }
   void SetHeight(int height_px) { height_px_ = height_px; }
 
@@ -59,14 +59,14 @@ class SvgPlot {
   std::vector<Series> series_;
   std::vector<Band> bands_;
   std::vector<Point> included_;
-  std::vector<std::pair<std::string, std::string>> legend_;  // colour, label
+  std::vector<std::pair<std::string, std::string>> legend_;  // Colour and label.
   bool keep_aspect_ = false, hide_y_axis_ = false;
   int height_px_ = 260;
 };
 
-// Text for HTML and SVG: & < > " ' replaced.
+// Escapes & < > " ' for HTML and SVG.
 std::string EscapeHtml(const std::string& text);
-// About `count` round values that cover [low, high].
+// About `count` round tick values in [low, high].
 std::vector<double> RoundTicks(double low, double high, int count);
 
 }  // namespace docent::app

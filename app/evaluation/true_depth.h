@@ -10,30 +10,31 @@
 #include "app/session/calibrated_camera.h"
 #include "app/simulator/simulation.h"
 
-// How far away the scene truly is at pixels of a frame, where the true poses of the camera are known and
-// nothing else is: the pixels are followed through the images that come after by optical flow (pyramidal
-// Lucas-Kanade), and each is triangulated in all of them at once, with the true centres. The true
-// orientations are free within their error. Nothing of the engine has a part in it.
+// Measures the true depth of the scene at given pixels of a frame from the ground-truth camera poses: the
+// pixels are tracked through the following images by optical flow (pyramidal Lucas-Kanade), and each pixel is
+// triangulated from all of these images with the true camera centres. The orientations are optimized within
+// their uncertainty. No part of the engine is used.
 //
-// What is told is inverse depth, since a camera that has moved little knows that a scene is far, but not how
-// far: with centres that are b apart, an orientation that is wrong by an angle moves the inverse depth by
-// that angle over b, and centres that are wrong by n move it by n / b of itself. Both errors are much the
-// same for all pixels and do not become less with their number.
+// The result is inverse depth, because a camera that has moved little can tell that a scene is far, but not
+// how far. With a baseline b, an orientation error of an angle a changes the inverse depth by a / b, and an
+// error n of the centres changes it by n / b times its value. Both errors are nearly equal for all pixels, so
+// averaging over pixels does not reduce them.
 namespace docent::app {
 
 struct TrueDepthOptions {
-  Timestamp longest = std::chrono::seconds(5);  // that pixels are followed
-  double least_kept = 0.2;                      // of the pixels, or following ends
-  int images = 12;                              // that are used of those followed, evenly over the way
-  double pixel_sigma = 0.5;                     // of a followed pixel; Lucas-Kanade's over a second or more
-  // Of the truth: motion capture and depth cameras' trackers are good for a few tenths of a degree, and
-  // clocks that differ by 5 ms add half a degree in a turn of 100 degrees a second.
+  Timestamp max_duration = std::chrono::seconds(5);  // Maximum time that pixels are tracked.
+  double min_tracked_ratio = 0.2;  // Tracking ends when fewer of the pixels are still tracked.
+  int images = 12;                 // Images used for triangulation, evenly spaced over the tracked ones.
+  double pixel_sigma = 0.5;        // Of a tracked pixel; typical for Lucas-Kanade over a second or more.
+  // Standard deviation of the true orientations: motion capture and the trackers of depth cameras are
+  // accurate to a few tenths of a degree, and clocks that differ by 5 ms add half a degree at a rotation of
+  // 100 degrees/s.
   double orientation_sigma_deg = 0.5;
-  double truth_noise_m = 0.01;  // of a true centre, each coordinate
-  double largest_error_px = 2;  // root mean square of a pixel's residuals, or it was lost by the flow
+  double truth_noise_m = 0.01;  // Standard deviation of a true centre, for each coordinate.
+  double max_error_px = 2;      // Maximum RMS residual; a pixel above it was lost by the optical flow.
   Timestamp max_time_difference = std::chrono::milliseconds(10);
 
-  // A sentence that says what is wrong, or empty.
+  // Describes the first invalid option, or empty.
   std::optional<std::string> Validate() const;
 };
 
@@ -41,15 +42,16 @@ struct TrueDepthOptions {
 struct TrueDepth {
   double inverse = 0, sigma = 0;
 };
-// One for each pixel; empty where it could not be followed.
+// One for each pixel; empty when the pixel could not be tracked.
 using TrueDepths = std::vector<std::optional<TrueDepth>>;
 
-// The pixels are of the first image that `camera` delivers from here on. One thread; reads the source on.
-// Throws Error where the source breaks or the options are not valid.
-TrueDepths FollowTrueDepths(CalibratedCamera* camera, const std::vector<TimedPose>& truth,
-                            const std::vector<Eigen::Vector2f>& pixels, const TrueDepthOptions& options = {});
+// Measures depths at pixels of the next image that `camera` delivers, and reads further images from it. One
+// thread. Throws Error when the source fails or the options are invalid.
+TrueDepths MeasureTrueDepths(CalibratedCamera* camera, const std::vector<TimedPose>& truth,
+                             const std::vector<Eigen::Vector2f>& pixels,
+                             const TrueDepthOptions& options = {});
 
-// The same of a simulation, which knows its surfaces.
+// Returns the exact depths of a simulation.
 TrueDepths SimulatedTrueDepths(const Simulation& simulation, int frame,
                                const std::vector<Eigen::Vector2f>& pixels);
 

@@ -45,8 +45,8 @@ void MakeFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error || !std::filesystem::is_directory(folder)) {
-    throw Error("Cannot make the folder '" + folder.string() +
-                "': " + (error ? error.message() : std::string("something else has that name")) + ".");
+    throw Error("Cannot create the folder '" + folder.string() +
+                "': " + (error ? error.message() : std::string("a file with that name exists")) + ".");
   }
 }
 

@@ -7,9 +7,9 @@
 
 namespace docent::app {
 
-// Writes one file whole or not at all: the bytes go to NAME.part, which Close renames to NAME. Without Close
-// (an exception on the way) NAME.part stays behind with what was written, and a NAME of earlier stays as it
-// was. Every write is checked: a full disk is an Error that names the file. Not copyable; one thread.
+// Writes a file completely or not at all: the bytes go to NAME.part, which Close renames to NAME. Without
+// Close (for example after an exception) NAME.part remains with what was written, and an older NAME is left
+// unchanged. Every write is checked: a full disk is an Error that names the file. Not copyable; one thread.
 class CheckedFile {
  public:
   explicit CheckedFile(const std::filesystem::path& path);
@@ -18,7 +18,7 @@ class CheckedFile {
   CheckedFile& operator=(const CheckedFile&) = delete;
 
   void Write(std::string_view text);
-  // Makes what was written so far visible in NAME.part.
+  // Makes everything written so far visible in NAME.part.
   void Flush();
   // Flushes and renames. Nothing may be written afterwards.
   void Close();
@@ -30,7 +30,7 @@ class CheckedFile {
   std::FILE* file_ = nullptr;  // owned
 };
 
-// Creates the folder and its parents where missing. Throws Error when it cannot.
+// Creates the folder and any missing parents. Throws Error on failure.
 void MakeFolder(const std::filesystem::path& folder);
 
 }  // namespace docent::app

@@ -21,32 +21,32 @@ namespace {
 
 constexpr std::size_t kAlignment = 64;  // of each image, in bytes
 
-// An open file without a name; -1 with errno when there can be none.
-class NamelessFile {
+// An open file without a name. The descriptor is -1, with errno set, when none could be created.
+class AnonymousFile {
  public:
-  explicit NamelessFile(const std::filesystem::path& folder)
+  explicit AnonymousFile(const std::filesystem::path& folder)
       : descriptor_(::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600)) {
-    // Not every file system has files that never had a name.
+    // Some file systems do not support O_TMPFILE: create a named file and unlink it.
     if (descriptor_ >= 0 || (errno != EOPNOTSUPP && errno != EISDIR)) return;
     std::string name = (folder / "docent-XXXXXX").string();
     descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
     if (descriptor_ >= 0) ::unlink(name.c_str());
   }
-  ~NamelessFile() {
+  ~AnonymousFile() {
     if (descriptor_ >= 0) ::close(descriptor_);
   }
-  NamelessFile(const NamelessFile&) = delete;
-  NamelessFile& operator=(const NamelessFile&) = delete;
+  AnonymousFile(const AnonymousFile&) = delete;
+  AnonymousFile& operator=(const AnonymousFile&) = delete;
 
   int descriptor() const { return descriptor_; }
-  // False with errno when the disk has no room for it. What was written fits for sure then, now and when the
-  // system brings it to the disk, and to look at it later cannot fail for want of room.
+  // Returns false with errno set when the disk has no space for the bytes. Reserving them first guarantees
+  // that neither writing back nor reading the mapping later can fail for lack of space.
   bool Reserve(std::size_t bytes) const {
     if (::fallocate(descriptor_, 0, 0, static_cast<off_t>(bytes)) == 0) return true;
-    // Where the file system cannot tell, writing does.
+    // Where the file system does not support fallocate, Write detects a full disk.
     return errno == EOPNOTSUPP || errno == ENOSYS;
   }
-  // False with errno when the disk does not take it all.
+  // Returns false with errno set when the disk does not accept all bytes.
   bool Write(const std::uint8_t* bytes, std::size_t count, std::size_t offset) const {
     while (count > 0) {
       const ssize_t written = ::pwrite(descriptor_, bytes, count, static_cast<off_t>(offset));
@@ -63,25 +63,25 @@ class NamelessFile {
   int descriptor_ = -1;
 };
 
-// A file's bytes in memory, and the owner of every image that lies in them: OpenCV's count of who holds an
-// image ends here. Each image holds the mapping; the last one takes it along.
+// A mapped file and the allocator of every image in it: OpenCV's reference count of an image ends in
+// deallocate. Each image holds a reference to the mapping; the last one unmaps it.
 class ImageMapping final : public cv::MatAllocator,
-                           public engine::KeptImages,
+                           public engine::StoredImages,
                            public WorkingSet::Member,
                            public std::enable_shared_from_this<ImageMapping> {
  public:
-  // Null with errno when it cannot be mapped.
-  static std::shared_ptr<const ImageMapping> Make(const NamelessFile& file, std::size_t bytes,
-                                                  std::shared_ptr<WorkingSet> awake) {
+  // Null with errno set when the file cannot be mapped.
+  static std::shared_ptr<const ImageMapping> Make(const AnonymousFile& file, std::size_t bytes,
+                                                  std::shared_ptr<WorkingSet> working_set) {
     void* const data = ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file.descriptor(), 0);
     if (data == MAP_FAILED) return nullptr;
-    return std::make_shared<ImageMapping>(data, bytes, std::move(awake));
+    return std::make_shared<ImageMapping>(data, bytes, std::move(working_set));
   }
 
-  ImageMapping(void* data, std::size_t bytes, std::shared_ptr<WorkingSet> awake)
-      : Member(bytes), data_(data), bytes_(bytes), awake_(std::move(awake)) {}
+  ImageMapping(void* data, std::size_t bytes, std::shared_ptr<WorkingSet> working_set)
+      : Member(bytes), data_(data), bytes_(bytes), working_set_(std::move(working_set)) {}
   ~ImageMapping() override {
-    awake_->Remove(*this);
+    working_set_->Remove(*this);
     ::munmap(data_, bytes_);
   }
   ImageMapping(const ImageMapping&) = delete;
@@ -98,9 +98,9 @@ class ImageMapping final : public cv::MatAllocator,
     return image;
   }
 
-  void Look() const override { awake_->Look(*this); }
-  // The pages are shared with the file: to let them go loses nothing, even while somebody reads them.
-  void Rest() const override { ::madvise(data_, bytes_, MADV_DONTNEED); }
+  void MarkInUse() const override { working_set_->Touch(*this); }
+  // The pages are shared with the file, so dropping them loses nothing, even while another thread reads them.
+  void ReleaseMemory() const override { ::madvise(data_, bytes_, MADV_DONTNEED); }
 
   void deallocate(cv::UMatData* data) const override {
     if (data == nullptr) return;
@@ -108,7 +108,7 @@ class ImageMapping final : public cv::MatAllocator,
         static_cast<std::shared_ptr<const ImageMapping>*>(data->userdata));
     delete data;
   }
-  // Nothing else is ever made in here: cv::Mat asks its `allocator`, which Image leaves empty.
+  // Never used to allocate: cv::Mat calls its `allocator`, which Image leaves null.
   cv::UMatData* allocate(int /*dims*/, const int* /*sizes*/, int /*type*/, void* /*data*/,
                          std::size_t* /*step*/, cv::AccessFlag /*flags*/,
                          cv::UMatUsageFlags /*usage*/) const override {
@@ -122,14 +122,14 @@ class ImageMapping final : public cv::MatAllocator,
  private:
   void* const data_;
   const std::size_t bytes_;
-  const std::shared_ptr<WorkingSet> awake_;
+  const std::shared_ptr<WorkingSet> working_set_;
 };
 
-// The features with their pyramid in a file of the folder; null with errno.
+// Returns the features with their pyramid in a file of the folder; null with errno set on failure.
 std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatures& features,
                                                         const std::filesystem::path& folder,
-                                                        const std::shared_ptr<WorkingSet>& awake) {
-  const NamelessFile file(folder);
+                                                        const std::shared_ptr<WorkingSet>& working_set) {
+  const AnonymousFile file(folder);
   if (file.descriptor() < 0) return nullptr;
   std::array<std::size_t, engine::kPyramidLevels> offsets{};
   std::size_t bytes = 0;
@@ -143,7 +143,7 @@ std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatu
     const cv::Mat whole = level.isContinuous() ? level : level.clone();
     if (!file.Write(whole.ptr(), whole.total(), offsets[i])) return nullptr;
   }
-  const auto mapping = ImageMapping::Make(file, bytes, awake);
+  const auto mapping = ImageMapping::Make(file, bytes, working_set);
   if (!mapping) return nullptr;
   auto kept = std::make_shared<engine::ImageFeatures>();
   for (std::size_t i = 0; i < features.levels.size(); ++i)
@@ -152,34 +152,34 @@ std::shared_ptr<const engine::ImageFeatures> MoveToFile(const engine::ImageFeatu
   kept->row_begin = features.row_begin;
   kept->fast_threshold = features.fast_threshold;
   kept->small_blurry = {features.small_blurry.pixels.clone(), features.small_blurry.scale};
-  kept->kept = mapping;
+  kept->stored = mapping;
   return kept;
 }
 
 }  // namespace
 
-ImageFiles::ImageFiles(std::filesystem::path folder, std::size_t awake_bytes)
-    : folder_(std::move(folder)), awake_(std::make_shared<WorkingSet>(awake_bytes)) {}
+ImageFiles::ImageFiles(std::filesystem::path folder, std::size_t resident_bytes)
+    : folder_(std::move(folder)), working_set_(std::make_shared<WorkingSet>(resident_bytes)) {}
 
 std::filesystem::path ImageFiles::DefaultFolder() {
   const char* const folder = std::getenv("TMPDIR");
   return folder != nullptr && *folder != '\0' ? folder : "/var/tmp";
 }
 
-std::shared_ptr<const engine::ImageFeatures> ImageFiles::Keep(
+std::shared_ptr<const engine::ImageFeatures> ImageFiles::Store(
     std::shared_ptr<const engine::ImageFeatures> features) {
-  if (features->kept) return features;
-  if (auto kept = MoveToFile(*features, folder_, awake_)) return kept;
+  if (features->stored) return features;
+  if (auto kept = MoveToFile(*features, folder_, working_set_)) return kept;
   const int error = errno;
-  if (!told_.exchange(true)) {
-    spdlog::warn("The images of maps stay in memory: '{}' takes no file ({}).", folder_.string(),
-                 std::strerror(error));
+  if (!warned_.exchange(true)) {
+    spdlog::warn("Keyframe images stay in memory, because no file can be written in '{}' ({}).",
+                 folder_.string(), std::strerror(error));
   }
   return features;
 }
 
 void ImageFiles::EvictAll() {
-  awake_->EvictAll();
+  working_set_->EvictAll();
 }
 
 }  // namespace docent::app

@@ -11,34 +11,35 @@
 
 namespace docent::app {
 
-// Keyframes' images on disk, mapped into memory. Each keyframe has a file of its own that has no name: it
-// is mapped for reading and closed, and the system takes its blocks back when the last image in it is let
-// go, however the program ends. A page of an image that rests is read from the file again when it is
-// touched, mostly from what the system has cached and may reclaim at any time; so what rests counts for
-// nothing, and nobody who reads can tell. Of those that are looked at so many bytes are awake at a time.
-// Where no file can be written (no folder, no room) the images stay in ordinary memory, and the log says so
-// once.
+// Stores the images of keyframes in memory-mapped files. Each keyframe has an anonymous file of its own,
+// which is mapped for reading and closed, so the system frees its blocks when the last image in it is
+// released, however the program ends. The pages of an evicted image are read again from the file when they
+// are accessed, usually from the page cache, which the system may reclaim at any time. Evicted images
+// therefore cost no memory, and readers need not know about eviction. Of the images in use, a limited number
+// of bytes is resident at a time. Where no file can be written (no folder, no space) the images stay in
+// ordinary memory, which is logged once.
 //
-// Any thread may call anything. Blocks on the disk in Keep alone.
+// Any thread may call anything. Only Store blocks on the disk.
 class ImageFiles : public engine::ImageStore {
  public:
-  // 80 keyframes of 640x480: the map of one exhibit is awake as a whole, and a camera in a larger one sees
-  // what fewer of them show.
-  static constexpr std::size_t kAwakeBytes = 32 * 1024 * 1024;
+  // 80 keyframes of 640x480: the map of one exhibit is resident as a whole, and a camera in a larger map uses
+  // fewer keyframes than that at a time.
+  static constexpr std::size_t kResidentBytes = 32 * 1024 * 1024;
 
-  explicit ImageFiles(std::filesystem::path folder = DefaultFolder(), std::size_t awake_bytes = kAwakeBytes);
+  explicit ImageFiles(std::filesystem::path folder = DefaultFolder(),
+                      std::size_t resident_bytes = kResidentBytes);
 
-  // For files that are large, and may be on disk rather than in memory: $TMPDIR, else /var/tmp.
+  // A folder for large files that may be on disk rather than in memory: $TMPDIR, else /var/tmp.
   static std::filesystem::path DefaultFolder();
 
-  std::shared_ptr<const engine::ImageFeatures> Keep(
+  std::shared_ptr<const engine::ImageFeatures> Store(
       std::shared_ptr<const engine::ImageFeatures> features) override;
   void EvictAll() override;
 
  private:
   const std::filesystem::path folder_;
-  const std::shared_ptr<WorkingSet> awake_;  // the images have it too, for they may outlive this
-  std::atomic<bool> told_{false};            // that images stay in memory
+  const std::shared_ptr<WorkingSet> working_set_;  // shared with the images, which may outlive this object
+  std::atomic<bool> warned_{false};                // that images stay in memory; logged once
 };
 
 }  // namespace docent::app

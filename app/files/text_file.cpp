@@ -26,21 +26,21 @@ void ReadInto(const std::filesystem::path& path, std::size_t max_bytes, Buffer* 
   const auto status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) throw Error("There is no file '" + path.string() + "'.");
   if (std::filesystem::is_directory(status)) {
-    throw Error("'" + path.string() + "' is a folder where a file is needed.");
+    throw Error("'" + path.string() + "' is a folder, not a file.");
   }
   if (!std::filesystem::is_regular_file(status))
     throw Error("'" + path.string() + "' is not a regular file.");
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   if (error) throw Error("Cannot read '" + path.string() + "': " + error.message() + ".");
   if (size > max_bytes) {
-    throw Error("'" + path.string() + "' has " + std::to_string(size) + " bytes, more than the " +
-                std::to_string(max_bytes) + " that such a file may have.");
+    throw Error("'" + path.string() + "' has " + std::to_string(size) + " bytes; at most " +
+                std::to_string(max_bytes) + " are allowed.");
   }
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
   if (!file) throw Error("Cannot open '" + path.string() + "': " + std::strerror(errno) + ".");
   buffer->resize(static_cast<std::size_t>(size));
   const std::size_t read = size == 0 ? 0 : std::fread(buffer->data(), 1, buffer->size(), file.get());
-  if (read != buffer->size()) throw Error("Cannot read '" + path.string() + "' to its end.");
+  if (read != buffer->size()) throw Error("Cannot read '" + path.string() + "' completely.");
 }
 
 }  // namespace
@@ -89,7 +89,7 @@ std::vector<std::string_view> SplitFields(std::string_view line, std::string_vie
 }
 
 std::optional<double> ParseNumber(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);  // from_chars takes no plus sign
+  if (text.starts_with('+')) text.remove_prefix(1);  // from_chars does not accept a plus sign
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
@@ -114,7 +114,7 @@ std::optional<Timestamp> ParseSeconds(std::string_view text) {
   std::int64_t nanoseconds = 0;
   std::size_t i = 0;
   for (; i < text.size() && IsDigit(text[i]); ++i) nanoseconds = nanoseconds * 10 + (text[i] - '0');
-  if (i < text.size()) ++i;  // the point
+  if (i < text.size()) ++i;  // the decimal point
   for (int digit = 0; digit < 9; ++digit) {
     nanoseconds *= 10;
     if (i < text.size()) nanoseconds += text[i++] - '0';
@@ -136,7 +136,7 @@ std::string FormatSeconds(Timestamp time) {
 
 std::string FormatNumber(double value, int digits) {
   char text[64];
-  if (value == 0) value = 0;  // no "-0"
+  if (value == 0) value = 0;  // avoids "-0"
   const auto [end, error] =
       std::to_chars(text, text + sizeof text, value, std::chars_format::general, std::clamp(digits, 1, 17));
   return error == std::errc{} ? std::string(text, end) : std::string("nan");
@@ -161,7 +161,7 @@ bool NaturalLess(std::string_view a, std::string_view b) {
     if (x != y) return x < y;
   }
   if ((i < a.size()) != (j < b.size())) return i >= a.size();
-  return a < b;  // equal but for leading zeros: any fixed order will do
+  return a < b;  // equal except for leading zeros: any fixed order will do
 }
 
 }  // namespace docent::app

@@ -11,23 +11,23 @@
 
 #include "engine/base/time.h"
 
-// Reading small files of the outside world: whole files with a bounded size, lines with their numbers, and
-// numbers that are checked before they are believed. Nothing here depends on the locale.
+// Reads small external files: whole files of bounded size, lines with their numbers, and numbers that are
+// validated. Nothing here depends on the locale.
 namespace docent::app {
 
-// The whole file. Throws Error when it is missing, a folder, unreadable, or larger than max_bytes.
+// Returns the whole file. Throws Error when it is missing, a folder, unreadable, or larger than max_bytes.
 std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{64} << 20);
-// The same into a buffer that is used again, for images.
+// Reads a binary file, such as an image, into a buffer that is reused.
 void ReadBytes(const std::filesystem::path& path, std::size_t max_bytes, std::vector<std::uint8_t>* bytes);
 
-// A line that says something: comments (from '#' on) and blanks around it are gone, empty lines left out.
+// A line with content: comments (from '#' on) and surrounding blanks are removed, empty lines are skipped.
 struct TextLine {
   int number = 0;         // counts from 1
-  std::string_view text;  // into the text that was split
+  std::string_view text;  // a view into the text that was split
 };
 std::vector<TextLine> ContentLines(std::string_view text);
 
-// The fields of a line, parted by any run of the separators.
+// The fields of a line, separated by any run of the separators.
 std::vector<std::string_view> SplitFields(std::string_view line, std::string_view separators = " \t");
 
 std::string_view Trim(std::string_view text);
@@ -35,15 +35,16 @@ std::string_view Trim(std::string_view text);
 // Empty unless the whole text is one finite number.
 std::optional<double> ParseNumber(std::string_view text);
 std::optional<std::int64_t> ParseInteger(std::string_view text);
-// A time in decimal seconds, exact to the nanosecond (a double holds 1.4e9 seconds to 0.2 us only). Digits
-// beyond the ninth are rounded. Empty unless the whole text is one number of at most 250 years.
+// Parses a time in decimal seconds, exact to the nanosecond (a double holds 1.4e9 seconds to 0.2 us only).
+// Digits beyond the ninth are rounded. Empty unless the whole text is one number of at most 250 years.
 std::optional<Timestamp> ParseSeconds(std::string_view text);
-// Seconds with nine decimals; ParseSeconds gives the same time back.
+// Seconds with nine decimals; ParseSeconds returns the same time.
 std::string FormatSeconds(Timestamp time);
-// The shortest text with at most `digits` significant digits ("nan" and "inf" for what is not finite).
+// The shortest text with at most `digits` significant digits ("nan" and "inf" for values that are not
+// finite).
 std::string FormatNumber(double value, int digits = 9);
 
-// True when `a` comes before `b` in the order that people expect: runs of digits compare as numbers.
+// True when `a` sorts before `b` in natural order: runs of digits compare as numbers.
 bool NaturalLess(std::string_view a, std::string_view b);
 
 }  // namespace docent::app

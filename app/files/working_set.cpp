@@ -5,7 +5,7 @@
 
 namespace docent::app {
 
-void WorkingSet::Wake(const Member& member) {
+void WorkingSet::MakeResident(const Member& member) {
   const std::scoped_lock lock(mutex_);
   if (member.state_ != State::kEvicted) {
     member.state_ = State::kInUse;
@@ -13,48 +13,48 @@ void WorkingSet::Wake(const Member& member) {
   }
   MakeRoomFor(member.bytes_);
   member.state_ = State::kResident;
-  awake_.push_back(&member);
-  awake_bytes_ += member.bytes_;
+  resident_.push_back(&member);
+  resident_bytes_ += member.bytes_;
 }
 
 void WorkingSet::MakeRoomFor(std::size_t bytes) {
-  // Whoever looks on meanwhile must not keep all of them awake: one chance each.
-  std::size_t chances = awake_.size();
-  while (!awake_.empty() && awake_bytes_ + bytes > limit_bytes_) {
-    const Member& eldest = *awake_.front();
-    awake_.pop_front();
+  // One second chance for each member: otherwise threads that keep using members could prevent any eviction.
+  std::size_t chances = resident_.size();
+  while (!resident_.empty() && resident_bytes_ + bytes > limit_bytes_) {
+    const Member& oldest = *resident_.front();
+    resident_.pop_front();
     State state = State::kInUse;
-    if (chances > 0 && eldest.state_.compare_exchange_strong(state, State::kResident)) {
+    if (chances > 0 && oldest.state_.compare_exchange_strong(state, State::kResident)) {
       --chances;
-      awake_.push_back(&eldest);
+      resident_.push_back(&oldest);
       continue;
     }
-    eldest.state_ = State::kEvicted;
-    awake_bytes_ -= eldest.bytes_;
-    eldest.Rest();
+    oldest.state_ = State::kEvicted;
+    resident_bytes_ -= oldest.bytes_;
+    oldest.ReleaseMemory();
   }
 }
 
 void WorkingSet::EvictAll() {
   const std::scoped_lock lock(mutex_);
-  for (const Member* member : awake_) {
+  for (const Member* member : resident_) {
     member->state_ = State::kEvicted;
-    member->Rest();
+    member->ReleaseMemory();
   }
-  awake_.clear();
-  awake_bytes_ = 0;
+  resident_.clear();
+  resident_bytes_ = 0;
 }
 
 void WorkingSet::Remove(const Member& member) {
   const std::scoped_lock lock(mutex_);
   if (member.state_.exchange(State::kEvicted) == State::kEvicted) return;
-  awake_.erase(std::find(awake_.begin(), awake_.end(), &member));
-  awake_bytes_ -= member.bytes_;
+  resident_.erase(std::find(resident_.begin(), resident_.end(), &member));
+  resident_bytes_ -= member.bytes_;
 }
 
-std::size_t WorkingSet::awake_bytes() const {
+std::size_t WorkingSet::resident_bytes() const {
   const std::scoped_lock lock(mutex_);
-  return awake_bytes_;
+  return resident_bytes_;
 }
 
 }  // namespace docent::app

@@ -9,13 +9,14 @@
 
 namespace docent::app {
 
-// Things that need memory only while they are looked at, of which so many bytes are awake at a time. When one
-// more wakes, others rest, in the order in which they woke; whoever was looked at again since is passed over
-// once ("second chance": Corbato, "A Paging Experiment with the Multics System", 1968). To look at what is
-// awake costs no more than to read a flag. Its members are owned elsewhere.
+// Members that need memory only while they are in use, of which a limited number of bytes is resident at a
+// time. When another member becomes resident, older ones are evicted in the order in which they became
+// resident; a member that was used again since then is skipped once ("second chance": Corbato, "A Paging
+// Experiment with the Multics System", 1968). Touching a resident member costs no more than reading a flag.
+// The members are owned elsewhere.
 //
-// Any thread may call anything. What holds: once Remove has returned nothing is done to that member. A member
-// may be put to rest while somebody still looks, which must be harmless.
+// Any thread may call anything. Invariant: after Remove has returned, the set does not access that member. A
+// member may be evicted while another thread still reads it, which must be harmless.
 class WorkingSet {
  public:
   class Member {
@@ -26,7 +27,7 @@ class WorkingSet {
     Member& operator=(const Member&) = delete;
 
    protected:
-    virtual void Rest() const = 0;  // gives its memory back; called with the set's lock held
+    virtual void ReleaseMemory() const = 0;  // called with the set's lock held
 
    private:
     friend class WorkingSet;
@@ -37,28 +38,28 @@ class WorkingSet {
 
   explicit WorkingSet(std::size_t limit_bytes) : limit_bytes_(limit_bytes) {}
 
-  // One that is larger than the limit is awake alone.
-  void Look(const Member& member);
+  // Marks a member as used and makes it resident. A member larger than the limit is resident alone.
+  void Touch(const Member& member);
   void EvictAll();
   void Remove(const Member& member);
-  std::size_t awake_bytes() const;
+  std::size_t resident_bytes() const;
 
  private:
   using State = Member::State;
-  void Wake(const Member& member);
+  void MakeResident(const Member& member);
   void MakeRoomFor(std::size_t bytes);
 
   const std::size_t limit_bytes_;
-  mutable std::mutex mutex_;  // guards what follows, and whether a member is resting
-  std::deque<const Member*> awake_;
-  std::size_t awake_bytes_ = 0;
+  mutable std::mutex mutex_;  // guards the members below and the eviction of a member
+  std::deque<const Member*> resident_;
+  std::size_t resident_bytes_ = 0;
 };
 
-inline void WorkingSet::Look(const Member& member) {
+inline void WorkingSet::Touch(const Member& member) {
   State state = member.state_.load(std::memory_order_relaxed);
   if (state == State::kInUse) return;
   if (state == State::kResident && member.state_.compare_exchange_strong(state, State::kInUse)) return;
-  Wake(member);
+  MakeResident(member);
 }
 
 }  // namespace docent::app

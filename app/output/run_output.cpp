@@ -7,7 +7,8 @@ namespace docent::app {
 
 namespace {
 
-// tx ty tz qx qy qz qw of the camera in the map; of the two quaternions the one with qw >= 0.
+// tx ty tz qx qy qz qw of the camera in the map. Of the two equivalent quaternions, the one with qw >= 0 is
+// written.
 std::string FormatPose(const engine::Rigid3& camera_from_map, char separator) {
   const engine::Rigid3 map_from_camera = camera_from_map.inverse();
   const Eigen::Vector3d& t = map_from_camera.translation;

@@ -14,7 +14,7 @@ namespace {
 
 std::filesystem::path MadeSequenceFolder(const std::filesystem::path& folder) {
   MakeFolder(folder / "rgb");
-  // What an earlier run left must not stand beside the new images.
+  // Lists of an earlier run would not match the new images.
   for (const char* name : {"rgb.txt", "groundtruth.txt", "segments.txt"})
     std::filesystem::remove(folder / name);
   return folder;
@@ -40,7 +40,7 @@ void SequenceWriter::Add(const SequenceImage& image) {
   const bool png = format_ == ImageFormat::kPng;
   const std::string name = "rgb/" + time + (png ? ".png" : ".jpg");
   std::vector<std::uint8_t> bytes;
-  // The lowest compression of PNG that still filters: noise does not compress, and higher levels cost
+  // The lowest PNG compression level that still filters: noise does not compress, and higher levels take
   // seconds.
   const std::vector<int> parameters =
       png ? std::vector<int>{cv::IMWRITE_PNG_COMPRESSION, 1} : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, 95};
@@ -64,7 +64,7 @@ void SequenceWriter::Add(const SequenceImage& image) {
 void SequenceWriter::Close() {
   truth_.Close();
   segments_.Close();
-  list_.Close();  // last: it is what makes the folder a sequence
+  list_.Close();  // last: rgb.txt is what marks the folder as a complete sequence
 }
 
 }  // namespace docent::app

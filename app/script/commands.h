@@ -10,8 +10,8 @@
 #include "engine/base/time.h"
 #include "maps/policy.h"
 
-// Every change that a person can make, as data. The window, script files and tests all speak these structs;
-// the session carries them out. They know nothing of how that is done.
+// Every change that a user can make, as data. The window, script files and tests all use these structs; the
+// session executes them. They do not depend on how that is done.
 namespace docent::app {
 
 struct NewMap {
@@ -31,29 +31,30 @@ struct SetPolicy {
   maps::Policy policy = maps::Policy::kOpen;
   bool operator==(const SetPolicy&) const = default;
 };
-// A pixel stands for the map's surface that is seen there in the frame of the command.
+// The pixel denotes the point of the map's surface that is visible there in the command's frame.
 struct PlaceModel {
-  std::string file;  // as it was written; relative to the script's folder or the working folder
+  std::string file;  // as given; relative to the script's folder or the working folder
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  double scale = 1;    // map metres a metre of the model
+  double scale = 1;    // map units per metre of the model
   double yaw_deg = 0;  // about the surface's normal
   bool operator==(const PlaceModel&) const = default;
 };
 struct PlaceSignpost {
   std::string text;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  std::string to_map;  // empty when it points nowhere
+  std::string to_map;  // the map it leads to; empty for none
   bool operator==(const PlaceSignpost&) const = default;
 };
 struct MoveEntity {
   std::string name;
-  Eigen::Vector3d by_in_map = Eigen::Vector3d::Zero();  // metres along the map's axes, without `to_pixel`
+  // Map units along the map's axes; ignored with `to_pixel`.
+  Eigen::Vector3d by_in_map = Eigen::Vector3d::Zero();
   std::optional<Eigen::Vector2d> to_pixel;
   bool operator==(const MoveEntity&) const = default;
 };
 struct RotateEntity {
   std::string name;
-  double angle_deg = 0;  // about its own up axis
+  double angle_deg = 0;  // about the entity's own up axis
   bool operator==(const RotateEntity&) const = default;
 };
 struct ScaleEntity {
@@ -79,8 +80,8 @@ using Command = std::variant<NewMap, StopMap, UseMap, SetPolicy, PlaceModel, Pla
                              RotateEntity, ScaleEntity, RemoveEntity, Undo, Redo, Save>;
 
 struct TimedCommand {
-  Timestamp time{};  // from the first frame, not negative
-  int line = 0;      // of the script; 0 when it comes from somewhere else
+  Timestamp time{};  // from the first frame; not negative
+  int line = 0;      // in the script; 0 for a command from elsewhere
   Command command;
 };
 

@@ -18,7 +18,7 @@ struct Word {
   bool quoted = false;
 };
 
-// Reads the words of one line in order, with sentences that name the line.
+// Reads the words of one line in order; its errors name the line.
 class LineReader {
  public:
   LineReader(std::string_view line, std::string where) : where_(std::move(where)) { Split(line); }
@@ -29,13 +29,13 @@ class LineReader {
     if (AtEnd()) Fail(std::string("expected ") + what + " at the end of the line");
     return words_[next_++].text;
   }
-  // A word of the language; never one in quotes.
+  // Consumes the next word if it is this keyword. A quoted word is never a keyword.
   bool TakeIf(std::string_view keyword) {
     if (AtEnd() || words_[next_].quoted || words_[next_].text != keyword) return false;
     ++next_;
     return true;
   }
-  void Need(std::string_view keyword) {
+  void Expect(std::string_view keyword) {
     if (TakeIf(keyword)) return;
     Fail("expected '" + std::string(keyword) + "'" + (AtEnd() ? " at the end of the line" : Instead()));
   }
@@ -51,15 +51,15 @@ class LineReader {
     return *value;
   }
   Eigen::Vector2d TakePixel() {
-    Need("pixel");
+    Expect("pixel");
     const double u = TakeNumber("a pixel's column");
     const double v = TakeNumber("a pixel's row");
-    if (std::abs(u) > kMaxPixel || std::abs(v) > kMaxPixel) Fail("the pixel lies far outside any image");
+    if (std::abs(u) > kMaxPixel || std::abs(v) > kMaxPixel) Fail("the pixel is far outside any image");
     return {u, v};
   }
-  void NeedEnd() {
+  void ExpectEnd() {
     if (!AtEnd()) {
-      Fail("'" + words_[next_].text + "' is too much; a name with blanks stands in double quotes");
+      Fail("unexpected '" + words_[next_].text + "'; put a name with spaces in double quotes");
     }
   }
   [[noreturn]] void Fail(const std::string& what) const { throw Error(where_ + ": " + what + "."); }
@@ -93,11 +93,10 @@ class LineReader {
         continue;
       }
       const char escaped = ++i < line.size() ? line[i] : '\0';
-      if (escaped != '"' && escaped != '\\' && escaped != 'n')
-        Fail("after a backslash expected one of \" \\ n");
+      if (escaped != '"' && escaped != '\\' && escaped != 'n') Fail("expected \", \\ or n after a backslash");
       word.text += escaped == 'n' ? '\n' : escaped;
     }
-    if (i >= line.size()) Fail("a double quote is never closed");
+    if (i >= line.size()) Fail("a double quote is not closed");
     words_.push_back(std::move(word));
     return i + 1;
   }
@@ -116,19 +115,18 @@ Command ParseMap(LineReader* line) {
     command.name = line->TakeName("a map's name");
     const std::string& word = line->Take("a policy");
     const std::optional<maps::Policy> policy = maps::ParsePolicy(word);
-    if (!policy)
-      line->Fail("'" + word + "' is no policy; there are open, bounded, augment-only and read-only");
+    if (!policy) line->Fail("unknown policy '" + word + "'; use open, bounded, augment-only or read-only");
     command.policy = *policy;
     return command;
   }
   const std::string word = line->Take("new, stop, use or policy");
-  line->Fail("'map " + word + "' is no command; there are map new, map stop, map use and map policy");
+  line->Fail("unknown command 'map " + word + "'; use map new, map stop, map use or map policy");
 }
 
 Command ParsePlace(LineReader* line) {
   PlaceModel command;
   command.file = line->TakeName("a model's file");
-  line->Need("at");
+  line->Expect("at");
   command.pixel = line->TakePixel();
   while (!line->AtEnd()) {
     if (line->TakeIf("scale")) {
@@ -146,7 +144,7 @@ Command ParsePlace(LineReader* line) {
 Command ParseSignpost(LineReader* line) {
   PlaceSignpost command;
   command.text = line->TakeName("a signpost's text");
-  line->Need("at");
+  line->Expect("at");
   command.pixel = line->TakePixel();
   if (line->TakeIf("to")) command.to_map = line->TakeName("a map's name");
   return command;
@@ -159,7 +157,7 @@ Command ParseMove(LineReader* line) {
     command.to_pixel = line->TakePixel();
     return command;
   }
-  for (int axis = 0; axis < 3; ++axis) command.by_in_map[axis] = line->TakeNumber("X Y Z in metres");
+  for (int axis = 0; axis < 3; ++axis) command.by_in_map[axis] = line->TakeNumber("X Y Z in map units");
   return command;
 }
 
@@ -187,10 +185,10 @@ Command ParseCommand(LineReader* line) {
   if (line->TakeIf("redo")) return Redo{};
   if (line->TakeIf("save")) return Save{};
   const std::string word = line->Take("a command");
-  line->Fail("there is no command '" + word + "'");
+  line->Fail("unknown command '" + word + "'");
 }
 
-// In quotes when it would not come back as one word without them.
+// Quotes the text if it would not be read back as one word otherwise.
 std::string Quoted(const std::string& text) {
   const bool plain = !text.empty() && text.find_first_of(" \t\r\n\f\v#\"\\") == std::string::npos;
   if (plain) return text;
@@ -206,7 +204,7 @@ std::string Quoted(const std::string& text) {
   return quoted + '"';
 }
 
-// A name in the place of an optional word must never be taken for it, so names are always quoted.
+// Names are always quoted, so that a name is never mistaken for an optional keyword.
 std::string AlwaysQuoted(const std::string& text) {
   const std::string quoted = Quoted(text);
   return quoted.starts_with('"') ? quoted : '"' + quoted + '"';
@@ -266,9 +264,9 @@ std::vector<TimedCommand> ParseScript(std::string_view text, const std::string& 
     const auto time = ParseSeconds(time_text);
     if (!time || *time < Timestamp{}) line.Fail("expected a time in seconds instead of '" + time_text + "'");
     if (!commands.empty() && *time < commands.back().time)
-      line.Fail("the time lies before that of the command above");
+      line.Fail("the time is earlier than that of the previous command");
     TimedCommand command{*time, number, ParseCommand(&line)};
-    line.NeedEnd();
+    line.ExpectEnd();
     commands.push_back(std::move(command));
   }
   return commands;
@@ -284,7 +282,7 @@ std::string FormatCommand(const Command& command) {
 
 std::string FormatScriptLine(const TimedCommand& command) {
   std::string seconds = FormatSeconds(command.time);
-  seconds.erase(seconds.find_last_not_of('0') + 1);  // "12.500000000" reads better as "12.5"
+  seconds.erase(seconds.find_last_not_of('0') + 1);  // "12.5" is easier to read than "12.500000000"
   if (seconds.ends_with('.')) seconds.pop_back();
   return seconds + ' ' + FormatCommand(command.command);
 }

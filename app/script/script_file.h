@@ -8,11 +8,11 @@
 
 #include "app/script/commands.h"
 
-// Scripts of commands: one a line, at a time in seconds from the first frame, as in `12.5 map new "Desk 3"`;
-// '#' begins a comment. A word with blanks, quotes or '#' in it stands in double quotes, where \" is a quote,
-// \\ a backslash and \n a new line. Besides the commands of command-line.md:
-//   move NAME X Y Z           by so many metres along the map's axes
-//   move NAME to pixel U V    to the surface seen there
+// Command scripts: one command per line, with its time in seconds from the first frame, as in `12.5 map new
+// "Desk 3"`; '#' begins a comment. A word that contains blanks, quotes or '#' is put in double quotes, in
+// which \" is a quote, \\ a backslash and \n a line break. Besides the commands of command-line.md:
+//   move NAME X Y Z           by this offset in map units along the map's axes
+//   move NAME to pixel U V    to the surface visible at that pixel
 //   rotate NAME DEG           about its own up axis
 //   scale NAME FACTOR
 //   remove NAME
@@ -22,7 +22,7 @@ namespace docent::app {
 std::vector<TimedCommand> ReadScript(const std::filesystem::path& path);
 std::vector<TimedCommand> ParseScript(std::string_view text, const std::string& name);
 
-// One command without its time, and a line with it; ParseScript gives an equal command back.
+// Formats a command without and with its time; ParseScript returns an equal command.
 std::string FormatCommand(const Command& command);
 std::string FormatScriptLine(const TimedCommand& command);
 

@@ -10,9 +10,9 @@
 
 namespace docent::app {
 
-// Writes where content was drawn: augmentations.csv, one line a frame and thing whose foot lies in the
-// image, `timestamp,map,name,u,v` with the pixel of the foot. Against a truth it tells how well things stay
-// where they were put. One thread.
+// Logs where content is drawn, in augmentations.csv: one line for each frame and entity whose foot point
+// projects into the image, `timestamp,map,name,u,v` with the pixel of the foot point. Compared with ground
+// truth it measures how well content stays in place. One thread.
 class AugmentationLog {
  public:
   explicit AugmentationLog(const std::filesystem::path& folder);

@@ -24,8 +24,7 @@ CalibratedCamera Calibrate(std::unique_ptr<FrameSource> source,
     camera.model = std::make_shared<engine::CameraModel>(*info.known_camera);
     camera.calibration_name = info.name;
   } else {
-    throw Error("The lens of '" + info.name +
-                "' is not known; give its calibration with --calibration FILE.");
+    throw Error("There is no calibration for '" + info.name + "'; give one with --calibration FILE.");
   }
   camera.source = std::move(source);
   return camera;

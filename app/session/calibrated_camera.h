@@ -11,18 +11,18 @@
 
 namespace docent::app {
 
-// Images and the lens that they were taken through.
+// An image source and the model of the lens that its images were taken with.
 struct CalibratedCamera {
   std::unique_ptr<FrameSource> source;
   std::shared_ptr<const engine::CameraModel> model;
-  std::string calibration_name;  // for sentences
+  std::string calibration_name;  // file or source, for error messages
 
-  // Throws Error when an image's size is not the calibration's.
+  // Throws Error when the size of the image differs from that of the calibration.
   void CheckImage(const cv::Mat& image) const;
 };
 
-// Finds the lens of a source: the file that was named, else what the source knows or what lies beside its
-// images. Throws Error with one sentence when there is none.
+// Finds the camera model of a source: the given file, else the model that the source knows, else a
+// calibration file beside its images. Throws Error with one sentence when there is none.
 CalibratedCamera Calibrate(std::unique_ptr<FrameSource> source,
                            const std::optional<std::filesystem::path>& calibration);
 

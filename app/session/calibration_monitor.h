@@ -11,36 +11,36 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/tracking/tracked_frame.h"
 
-// Whether a calibration is the lens's own, by what tracking leaves over.
+// Detects a calibration that does not fit the lens, from the reprojection errors of tracking.
 namespace docent::app {
 
 struct CalibrationMonitorOptions {
   int frames_between_samples = 3;
-  double turn_between_samples_deg = 2;  // a camera that stands still sees the same errors again
-  std::size_t min_matches = 60;         // of a frame, found points of the two finest levels
-  std::size_t min_ring_matches = 6;     // of a ring in a frame
-  std::size_t min_samples = 15;  // of a ring, for its spread to be known; told_sigmas weighs how few they are
-  std::size_t min_rings = 4;     // that count, for anything to be said
-  // Between the ring found farthest out and the one farthest in. Right lenses were seen to leave 0.1
-  // (rendered) to 0.2 (recorded) of it, a focal length that is 5 % off 0.4 and more.
-  double told_px = 0.3;
-  double told_sigmas = 5;  // of that difference, so that chance does not tell it
+  double rotation_between_samples_deg = 2;  // a camera that stands still repeats the same errors
+  std::size_t min_matches = 60;             // matches of the two finest pyramid levels required in a frame
+  std::size_t min_ring_matches = 6;         // matches required in a ring for its median to be used
+  std::size_t min_samples = 15;             // frames required of a ring for an estimate of its sigma
+  std::size_t min_rings = 4;                // rings with min_samples required for a warning
+  // Pixels between the ring with the largest mean radial error and the one with the smallest. Correct
+  // calibrations were measured to leave 0.1 (rendered) to 0.2 (recorded), a focal length that is 5 % off 0.4
+  // and more.
+  double warning_px = 0.3;
+  double warning_sigmas = 5;  // the difference must also exceed this many of its standard deviations
 };
 
-// Watches one camera. With the right lens, points are found about where they are expected, evenly to all
-// sides, wherever in the image they are. With a wrong focal length or a distortion left out, no pose fits
-// the middle and the rim at once: points at one distance from the middle are found too far out and those at
-// another too far in, in every image again and whatever is seen. So the errors towards the rim are averaged
-// by rings about the principal point; what noise, bad points and other people's motion leave there goes to
-// nothing with time, as it changes its sign.
+// Monitors one camera. With the correct calibration, reprojection errors are unbiased everywhere in the
+// image. With a wrong focal length or a missing distortion, no pose fits the centre and the border at once:
+// points at one distance from the principal point are found too far out and those at another too far in, in
+// every image and whatever the scene. The radial errors are therefore averaged in rings about the principal
+// point; noise, outliers and moving people average out, as their errors change sign.
 //
-// Appearance at few frames and keeps a few numbers. One thread at a time.
+// Samples few frames and keeps a few numbers. One thread at a time.
 class CalibrationMonitor {
  public:
-  static constexpr std::size_t kRings = 6;  // of equal width, the last one ends in the farthest corner
+  static constexpr std::size_t kRings = 6;  // of equal width; the last one ends in the farthest corner
   struct Ring {
-    std::size_t samples = 0;  // frames
-    double mean_px = 0;       // outwards, of the frames' medians
+    std::size_t samples = 0;  // frames in which the ring had enough matches
+    double mean_px = 0;       // mean over the frames of the median radial error, outwards positive
     double sigma_px = 0;      // standard deviation of the frames' medians
   };
   using Profile = std::array<Ring, kRings>;
@@ -48,10 +48,10 @@ class CalibrationMonitor {
   explicit CalibrationMonitor(std::shared_ptr<const engine::CameraModel> camera,
                               const CalibrationMonitorOptions& options = {});
 
-  // Every frame of the camera, in order.
+  // To be called with every frame of the camera, in order.
   void Add(const engine::TrackedFrame& frame);
   const Profile& profile() const { return profile_; }
-  // A sentence once the lens is seen to be another one than the calibration says; given out once.
+  // One sentence when the calibration was found not to fit the lens; returned once.
   std::optional<std::string> TakeWarning();
 
  private:
@@ -59,17 +59,17 @@ class CalibrationMonitor {
     double sum = 0, sum_squares = 0;
   };
   void Sample(const engine::TrackedFrame& frame);
-  void Judge();
+  void Evaluate();
 
   const std::shared_ptr<const engine::CameraModel> camera_;
   const CalibrationMonitorOptions options_;
   double ring_width_px_ = 1;
   int frames_since_ = 0;
   std::optional<engine::Rotation3> sampled_at_;
-  std::array<std::vector<double>, kRings> residuals_;  // scratch
+  std::array<std::vector<double>, kRings> residuals_;  // radial errors by ring; kept to reuse their memory
   std::array<Sums, kRings> sums_;
   Profile profile_;
-  bool told_ = false;
+  bool warned_ = false;
   std::optional<std::string> warning_;
 };
 

@@ -18,7 +18,7 @@ std::uint64_t CameraAssociation::SearchedMap(std::size_t camera) const {
   return std::count(tracked_.begin(), tracked_.end(), true) > others || beginning_ ? map_ : 0;
 }
 
-bool CameraAssociation::Tracked(std::size_t camera, std::uint64_t map) {
+bool CameraAssociation::SetTracked(std::size_t camera, std::uint64_t map) {
   tracked_.at(camera) = false;
   const std::uint64_t searched = SearchedMap();
   if (searched != 0 && searched != map) return false;

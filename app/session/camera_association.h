@@ -7,33 +7,33 @@
 
 namespace docent::app {
 
-// Which maps the cameras of one wearer may look in (ptamm §3.3 and Fig. 7). They are associated: all work in
-// one map at a time.
+// Decides which maps the cameras of one wearer may search (ptamm §3.3 and Fig. 7). The cameras are
+// associated: all of them work in one map at a time.
 //
-//   - While one of them is tracked, those that are lost look for themselves in its map alone, even if they
-//   see
-//     another one.
-//   - When all are lost, each searches everything.
-//   - The first to be found again calls the others into its map; whoever is found elsewhere at the same
-//     moment is not believed.
+//   - While one camera is tracked, lost cameras search its map alone, even if they see another one.
+//   - When all are lost, each searches all maps.
+//   - The first camera to relocalize brings the others into its map; a pose that another camera finds in a
+//     different map at the same time is rejected.
 //
-// Knows nothing of images and keeps no lock: its owner guards it. Maps are named by their keys; 0 is none.
+// It does not use images and does not lock: its owner guards it. Maps are identified by their keys; 0 is
+// none.
 class CameraAssociation {
  public:
   explicit CameraAssociation(std::size_t cameras) : tracked_(cameras, false) {}
 
-  // The camera says that it is tracked in this map. False when it may not be, because another one holds all
-  // of them in another map; it then counts as lost.
-  bool Tracked(std::size_t camera, std::uint64_t map);
-  void Lost(std::size_t camera) { tracked_.at(camera) = false; }
-  // A map begins: nobody is tracked in it yet, and nobody may wander off to another one until somebody is.
+  // Reports that the camera is tracked in this map. Returns false, and counts the camera as lost, when other
+  // cameras hold all of them in a different map.
+  bool SetTracked(std::size_t camera, std::uint64_t map);
+  void SetLost(std::size_t camera) { tracked_.at(camera) = false; }
+  // A new map begins: no camera is tracked in it yet, and none may enter another map until one is.
   void Begin(std::uint64_t map);
-  // The map was left: nobody is tracked, and all search everything.
+  // The map was left: no camera is tracked, and all search every map.
   void Release();
 
-  // Where a camera that is lost looks for itself: this map alone, or every map when 0.
+  // The map that a lost camera searches; 0 for every map.
   std::uint64_t SearchedMap() const;
-  // The same for one of the cameras: by itself it may leave for a map that fits better, and the others come.
+  // The same for one camera, which may itself be tracked: when it is the only tracked one it may enter a
+  // better map, and the others follow.
   std::uint64_t SearchedMap(std::size_t camera) const;
   // The map that the cameras are in, or were in last.
   std::uint64_t map() const { return map_; }

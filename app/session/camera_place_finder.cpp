@@ -26,7 +26,7 @@ std::vector<engine::KeyFrameId> NearestViews(const engine::MapSnapshot& map,
 std::vector<engine::PlaceCandidate> CameraPlaceFinder::FindPlaces(const engine::PlaceQuery& query, int count,
                                                                   int per_map, std::uint64_t only_map) const {
   const std::uint64_t searched = only_map_ != 0 ? only_map_ : only_map;
-  // A map that is not to be searched must not be asked for either.
+  // The caller asks for a map that this camera may not search.
   if (only_map != 0 && searched != only_map) return {};
   std::vector<engine::PlaceCandidate> found = index_->FindPlaces(query, count, per_map, searched);
   if (!prediction_ || (searched != 0 && searched != prediction_->map_key)) return found;

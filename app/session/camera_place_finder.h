@@ -11,9 +11,9 @@
 
 namespace docent::app {
 
-// Where one camera may look for itself in one frame: all places or those of one map (see CameraAssociation),
-// and, when another camera of a known rig is tracked, first of all where this one must be. A view over the
-// session's index, made for a frame and thrown away.
+// The places that one camera may search in one frame: those of all maps or of one map (see
+// CameraAssociation). When another camera of a rigid rig is tracked, the keyframes near the predicted pose
+// come first. A view of the session's index, made for one frame.
 class CameraPlaceFinder : public engine::PlaceFinder {
  public:
   struct Prediction {
@@ -21,12 +21,12 @@ class CameraPlaceFinder : public engine::PlaceFinder {
     std::shared_ptr<const engine::MapSnapshot> map;
     engine::Rigid3 camera_from_map;
   };
-  // only_map 0: every map. The index must outlive this.
+  // only_map 0 means every map. The index must outlive this.
   CameraPlaceFinder(const engine::PlaceFinder* index, std::uint64_t only_map,
                     std::optional<Prediction> prediction)
       : index_(index), only_map_(only_map), prediction_(std::move(prediction)) {}
 
-  // The keyframes that look most like what the prediction says lead; the rest follows by appearance.
+  // Returns the keyframes nearest to the prediction first, then those found by appearance.
   std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
                                                  std::uint64_t only_map) const override;
 
@@ -36,8 +36,8 @@ class CameraPlaceFinder : public engine::PlaceFinder {
   const std::optional<Prediction> prediction_;
 };
 
-// Keyframes by how much of a view from `camera_from_map` they share, best first, at most `count`: near in
-// position (against the depth of what they see) and near in direction.
+// At most `count` keyframes ranked by the distance of their position (in units of their median depth) plus
+// the angle (radians) between the views, nearest first.
 std::vector<engine::KeyFrameId> NearestViews(const engine::MapSnapshot& map,
                                              const engine::Rigid3& camera_from_map, std::size_t count);
 

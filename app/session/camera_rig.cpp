@@ -15,7 +15,7 @@ using engine::Rigid3;
 using engine::Rotation3;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-// For distances in space: the median of |x| for a normal x in three dimensions is 1.538 sigma.
+// For distances in 3D: the median of |x| for a normal x in three dimensions is 1.538 sigma.
 constexpr double kSigmaOfMedianDistance = 1 / 1.538;
 
 double Median(std::vector<double> values) {
@@ -25,7 +25,7 @@ double Median(std::vector<double> values) {
 }
 
 Eigen::Vector3d GeometricMedian(const std::vector<Rigid3>& poses) {
-  // From the medians of the coordinates, which are near already.
+  // Start at the medians of the coordinates, which are close already.
   Eigen::Vector3d median;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
@@ -45,7 +45,7 @@ Eigen::Vector3d GeometricMedian(const std::vector<Rigid3>& poses) {
   return median;
 }
 
-// The sample with the least sum of angles to the others begins, so that outliers cannot draw the start away.
+// Starts at the sample with the least sum of angles to the others, so that outliers cannot bias the start.
 Rotation3 MedianRotation(const std::vector<Rigid3>& poses) {
   const std::size_t stride = std::max<std::size_t>(1, poses.size() / 40);
   Rotation3 median;
@@ -73,24 +73,24 @@ Rotation3 MedianRotation(const std::vector<Rigid3>& poses) {
   return median;
 }
 
-Rigid3 Interpolate(const Rigid3& a, const Rigid3& b, double part) {
+Rigid3 Interpolate(const Rigid3& a, const Rigid3& b, double fraction) {
   const Rigid3 a_inverse = a.inverse();
-  return Rigid3::Exp(part * (b * a_inverse).Log()) * a;
+  return Rigid3::Exp(fraction * (b * a_inverse).Log()) * a;
 }
 
 }  // namespace
 
-std::string RigEstimate::Words() const {
+std::string RigEstimate::ToString() const {
   char text[160];
-  std::snprintf(text, sizeof text, "%s, baseline %.4g (spread %.2g), turned by %.4g degrees (spread %.2g)",
-                rigid ? "rigid" : "articulated", Baseline(), position_spread,
-                second_from_first.rotation.Angle() * kDegrees, turn_spread_deg);
+  std::snprintf(text, sizeof text, "%s, baseline %.4g (sigma %.2g), rotation %.4g degrees (sigma %.2g)",
+                rigid ? "rigid" : "articulated", Baseline(), position_sigma,
+                second_from_first.rotation.Angle() * kDegrees, rotation_sigma_deg);
   return text;
 }
 
 RigEstimate RobustRelativePose(const std::vector<Rigid3>& second_from_first) {
-  // Positions are compared where they do not depend on the rotation's own noise: the first camera's centre
-  // in the second one's frame is the translation itself.
+  // Positions are compared as the first camera's centre in the second one's frame, which is the translation
+  // itself and therefore independent of the rotation's noise.
   const Rigid3 median(MedianRotation(second_from_first), GeometricMedian(second_from_first));
   std::vector<double> distances, angles;
   for (const Rigid3& pose : second_from_first) {
@@ -99,13 +99,13 @@ RigEstimate RobustRelativePose(const std::vector<Rigid3>& second_from_first) {
   }
   RigEstimate estimate;
   estimate.samples = second_from_first.size();
-  estimate.position_spread = kSigmaOfMedianDistance * Median(distances);
-  const double turn_sigma = kSigmaOfMedianDistance * Median(angles);
-  estimate.turn_spread_deg = turn_sigma * kDegrees;
+  estimate.position_sigma = kSigmaOfMedianDistance * Median(distances);
+  const double rotation_sigma = kSigmaOfMedianDistance * Median(angles);
+  estimate.rotation_sigma_deg = rotation_sigma * kDegrees;
   Eigen::Vector3d position = Eigen::Vector3d::Zero(), turn = Eigen::Vector3d::Zero();
   double count = 0;
   for (std::size_t i = 0; i < second_from_first.size(); ++i) {
-    if (distances[i] > 3 * estimate.position_spread || angles[i] > 3 * turn_sigma) continue;
+    if (distances[i] > 3 * estimate.position_sigma || angles[i] > 3 * rotation_sigma) continue;
     position += second_from_first[i].translation;
     turn += (median.rotation.inverse() * second_from_first[i].rotation).Log();
     ++count;
@@ -133,7 +133,7 @@ void CameraRig::Add(int camera, Timestamp time, std::uint64_t map_key, const Rig
   Match(camera);
 }
 
-// Poses of the other camera that lie between this one's last two.
+// Pairs the poses of the other camera that lie between the last two poses of this one.
 void CameraRig::Match(int camera) {
   const auto& own = poses_[camera];
   const int other = 1 - camera;
@@ -146,16 +146,16 @@ void CameraRig::Match(int camera) {
     if (!same && (!joined || pose.time <= before.time)) continue;
     matched_until_[other] = pose.time;
     if (same) matched_until_[camera] = now.time;
-    const double part = same || now.time == before.time
-                            ? 1
-                            : ToSeconds(pose.time - before.time) / ToSeconds(now.time - before.time);
-    const Rigid3 mine = Interpolate(before.camera_from_map, now.camera_from_map, part);
+    const double fraction = same || now.time == before.time
+                                ? 1
+                                : ToSeconds(pose.time - before.time) / ToSeconds(now.time - before.time);
+    const Rigid3 mine = Interpolate(before.camera_from_map, now.camera_from_map, fraction);
     const Rigid3& first = camera == 0 ? mine : pose.camera_from_map;
     const Rigid3& second = camera == 0 ? pose.camera_from_map : mine;
     samples_.push_back(second * first.inverse());
     if (samples_.size() > options_.window) samples_.pop_front();
     const auto near = [&](const Rotation3& seen) {
-      return (seen.inverse() * first.rotation).Angle() * kDegrees < options_.viewpoint_turn_deg;
+      return (seen.inverse() * first.rotation).Angle() * kDegrees < options_.viewpoint_rotation_deg;
     };
     if (viewpoints_.size() < options_.min_viewpoints &&
         std::none_of(viewpoints_.begin(), viewpoints_.end(), near)) {
@@ -172,8 +172,8 @@ void CameraRig::Update() {
   if (samples_.size() < options_.min_samples) return;
   RigEstimate estimate = RobustRelativePose({samples_.begin(), samples_.end()});
   estimate.rigid = viewpoints_.size() >= options_.min_viewpoints &&
-                   estimate.position_spread <= options_.max_rigid_spread * estimate.Baseline() &&
-                   estimate.turn_spread_deg <= options_.max_rigid_turn_deg;
+                   estimate.position_sigma <= options_.max_rigid_position_sigma * estimate.Baseline() &&
+                   estimate.rotation_sigma_deg <= options_.max_rigid_rotation_deg;
   estimate_ = estimate;
 }
 

@@ -8,14 +8,14 @@ namespace docent::app {
 
 namespace {
 
-// Enough that the noise of single points, which the next image makes smaller, neither shifts nor tilts
-// what stands among them.
-constexpr std::size_t kPointsAbout = 150;
-// Of the distance to the points: below it nothing is seen to move.
-constexpr double kLeast = 1e-5;
+// Enough points that the noise of single points, which later observations reduce, neither shifts nor tilts
+// the entity among them.
+constexpr std::size_t kAnchorPoints = 150;
+// Ratio of the distance to the points; smaller motion is not visible.
+constexpr double kMinMotion = 1e-5;
 
-// By how much the motion moves things near `place`, as a share of `reach`.
-double Extent(const engine::Sim3& motion, const Eigen::Vector3d& place, double reach) {
+// Size of the motion at `place`: the largest of shift over `reach`, rotation angle and scale change.
+double RelativeMotion(const engine::Sim3& motion, const Eigen::Vector3d& place, double reach) {
   return std::max(
       {(motion * place - place).norm() / reach, motion.rotation.Angle(), std::abs(motion.scale - 1)});
 }
@@ -31,17 +31,17 @@ ContentFollower::Motions ContentFollower::Follow(const content::Scene& scene,
     const Eigen::Vector3d place = content::PlaceOf(entity);
     Anchor& anchor = anchors_[entity.name];
     if (anchor.points.ids.empty() || !anchor.place.isApprox(place, 1e-9))
-      anchor = {engine::PointsAbout(before, place, kPointsAbout), place, {}};
-    const auto motion = engine::MotionOf(anchor.points, now);
+      anchor = {engine::NearestPoints(before, place, kAnchorPoints), place, {}};
+    const auto motion = engine::EstimateMotion(anchor.points, now);
     if (!motion) {
-      anchors_.erase(entity.name);  // the points that are there now are its ground from here on
+      anchors_.erase(entity.name);  // the next call anchors it to the points that exist then
       continue;
     }
     const engine::Sim3 step = *motion * anchor.motion.inverse();
     double reach = 0;
     for (const Eigen::Vector3d& position : anchor.points.positions)
       reach = std::max(reach, (anchor.motion * position - place).norm());
-    if (Extent(step, place, reach) < kLeast) continue;
+    if (RelativeMotion(step, place, reach) < kMinMotion) continue;
     anchor.motion = *motion;
     anchor.place = step * place;
     motions.emplace_back(entity.name, step);
@@ -54,7 +54,7 @@ std::shared_ptr<const content::Scene> Moved(const content::Scene& scene,
   auto moved = std::make_shared<content::Scene>(scene);
   for (const auto& [name, motion] : motions) {
     for (content::Entity& entity : moved->entities) {
-      if (entity.name == name) content::MoveAlong(motion, &entity);
+      if (entity.name == name) content::MoveWithAnchor(motion, &entity);
     }
   }
   return moved;

@@ -12,29 +12,29 @@
 
 namespace docent::app {
 
-// Keeps content where it was put while the map under it is adjusted: each thing stands among the points about
-// it, and goes where they go. Measured from where the points were when the thing was put there, so that
-// nothing adds up. One a map; the session guards it.
+// Keeps content in place while its map is adjusted: each entity moves with its anchor, the map points around
+// it. The motion is measured from the anchor as it was when the entity was placed, so that errors do not
+// accumulate. One for each map; the session guards it.
 class ContentFollower {
  public:
   using Motions = std::vector<std::pair<std::string, engine::Sim3>>;
 
-  // The similarities in the map that take things, by name, from where they stand in `before` to where they
-  // belong in `now`; what has not moved is not among them. A thing that an edit has put elsewhere since the
-  // last call belongs where it is in `before`.
+  // The similarities, in map coordinates, that move each entity (by name) from its place in `before` to its
+  // place in `now`; entities that did not move are left out. An entity that an edit moved since the last call
+  // is anchored at its place in `before`.
   Motions Follow(const content::Scene& scene, const engine::MapSnapshot& before,
                  const engine::MapSnapshot& now);
 
  private:
   struct Anchor {
     engine::LocalPoints points;
-    Eigen::Vector3d place = Eigen::Vector3d::Zero();  // of the thing, as the last call left it
-    engine::Sim3 motion;                              // of the points, up to the last call
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();  // of the entity after the last call
+    engine::Sim3 motion;                              // of the points up to the last call
   };
   std::map<std::string, Anchor> anchors_;
 };
 
-// The scene with these motions carried out.
+// The scene with these motions applied.
 std::shared_ptr<const content::Scene> Moved(const content::Scene& scene,
                                             const ContentFollower::Motions& motions);
 

@@ -17,15 +17,15 @@ namespace docent::app {
 
 namespace {
 
-// Plays images by their own times. Shared by the cameras of a session; any thread.
+// Plays images at their own times. Shared by the cameras of a session; any thread.
 class RealtimeClock {
  public:
   explicit RealtimeClock(PlayClock* clock) : clock_(clock) {}
-  // The present is the time of this image. Before any other call.
+  // Defines the present as the time of this image. To be called before any other function.
   void Start(Timestamp time) { start_ = clock_->Now() - time; }
   // Waits until the image is due.
   void WaitFor(Timestamp time, const std::stop_token& stop) { clock_->WaitUntil(Due(time), stop); }
-  // Whether the image's successor is due already.
+  // Whether the next image is due already.
   bool IsLate(Timestamp time, Timestamp period) { return clock_->Now() > Due(time) + period; }
   Timestamp Due(Timestamp time) const { return start_ + time; }
   Timestamp Now() { return clock_->Now(); }
@@ -35,8 +35,8 @@ class RealtimeClock {
   Timestamp start_{};  // when an image of time 0 would have been due
 };
 
-// Holds cameras together that are fed as fast as they are tracked: none goes on to an image that lies more
-// than the slack after one that another camera has not finished. Any thread.
+// Synchronizes cameras that are processed as fast as possible: none proceeds to an image that is later, by
+// more than the slack, than one that another camera has not finished. Any thread.
 class ImageGate {
  public:
   ImageGate(std::size_t cameras, Timestamp slack) : times_(cameras, Timestamp::min()), slack_(slack) {}
@@ -48,7 +48,7 @@ class ImageGate {
     changed_.wait(lock, stop,
                   [&] { return time <= *std::min_element(times_.begin(), times_.end()) + slack_; });
   }
-  // This camera has no more images, or none for now.
+  // The camera has no more images, or none for now.
   void Leave(std::size_t camera) {
     const std::scoped_lock lock(mutex_);
     times_[camera] = Timestamp::max() - slack_;
@@ -56,23 +56,23 @@ class ImageGate {
   }
 
  private:
-  std::vector<Timestamp> times_;  // of the image that each is at
+  std::vector<Timestamp> times_;  // of the image that each camera is at
   const Timestamp slack_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
 };
 
-// Carries out what is due, from the script and from the inbox, and tells of it.
-class Commander {
+// Executes the commands that are due, from the script and from the inbox, and reports them.
+class CommandRunner {
  public:
-  Commander(const FrameLoopOptions& options, Session* session)
+  CommandRunner(const FrameLoopOptions& options, Session* session)
       : options_(options), session_(session), next_(options.script.begin()) {}
 
-  // now: from the first image.
-  void CarryOutDue(Timestamp now, const engine::TrackedFrame& frame) {
+  // now: time since the first image.
+  void RunDue(Timestamp now, const engine::TrackedFrame& frame) {
     for (; next_ != options_.script.end() && next_->time <= now; ++next_) {
       try {
-        CarryOut(next_->command, now, frame);
+        Run(next_->command, now, frame);
       } catch (const Error& error) {
         throw Error(Line(*next_) + error.what() + ".");
       }
@@ -81,15 +81,16 @@ class Commander {
     for (const CommandInbox::Entry& entry : options_.inbox->TakeAll()) {
       try {
         const engine::TrackedFrame& seen = entry.frame ? *entry.frame : frame;
-        // A recorded script gives it at the frame that the person saw, so that its pixel means the same.
-        CarryOut(entry.command, now - (frame.frame.time - seen.frame.time), seen);
+        // Recorded with the time of the frame that the user saw, so that its pixel keeps its meaning on
+        // replay.
+        Run(entry.command, now - (frame.frame.time - seen.frame.time), seen);
       } catch (const Error& error) {
         if (options_.refused) options_.refused(error.what());
       }
     }
   }
 
-  // Nothing of the script may be left when the images have ended.
+  // Throws when the images ended before the last command of the script.
   void CheckAllDone() const {
     if (next_ == options_.script.end()) return;
     throw Error(Line(*next_) + "the images ended before the time of this command.");
@@ -99,7 +100,7 @@ class Commander {
   std::string Line(const TimedCommand& command) const {
     return options_.script_name + ", line " + std::to_string(command.line) + ": ";
   }
-  void CarryOut(const Command& command, Timestamp time, const engine::TrackedFrame& frame) {
+  void Run(const Command& command, Timestamp time, const engine::TrackedFrame& frame) {
     session_->Execute(command, frame, options_.model_folder);
     last_time_ = std::max(last_time_, time);
     if (options_.carried_out) options_.carried_out({last_time_, 0, command});
@@ -108,11 +109,11 @@ class Commander {
   const FrameLoopOptions& options_;
   Session* const session_;
   std::vector<TimedCommand>::const_iterator next_;
-  Timestamp last_time_{};  // scripts never go back in time
+  Timestamp last_time_{};  // the times of a recorded script must not decrease
 };
 
-// Hands on what a source lost before this image, as its index tells. After an absence the index goes on
-// where it was, so that nothing is made up for the time in between.
+// Reports the images that a source lost before this one, from the gap in the indices. While a device is away
+// its index does not advance, so no frames are invented for that time.
 class GapReporter {
  public:
   void Report(const engine::Frame& frame, const std::function<void(const engine::TrackedFrame&)>& shown) {
@@ -144,7 +145,7 @@ void PreloadModels(const FrameLoopOptions& options, Session* session) {
   }
 }
 
-// One camera's way through a session, an image at a time.
+// One camera of a session, processed image by image.
 class CameraFeed {
  public:
   CameraFeed(const CameraRun& run, Session* session, RealtimeClock* clock)
@@ -153,19 +154,19 @@ class CameraFeed {
         clock_(clock),
         live_(run.camera->source->info().live),
         period_(FromSeconds(1 / run.camera->source->info().nominal_fps)),
-        commander_(run.options, session) {}
+        command_runner_(run.options, session) {}
 
-  // Goes on to the next image; false at the end of the source or when stop is requested.
+  // Gets the next image; false at the end of the source or when stop is requested.
   bool Fetch(const std::stop_token& stop) {
     FrameSource& source = *run_.camera->source;
     while (!stop.stop_requested()) {
-      late_ = MustBeLate();
+      late_ = WillBeLate();
       frame_ = engine::Frame();
       if (!(late_ ? source.NextLate(&frame_) : source.Next(&frame_))) return false;
       frame_.camera = run_.options.camera;
       frame_.time -= clock_offset_;
       if (late_) {
-        // Recordings with gaps: what comes after one may be early.
+        // In a recording with gaps, the image after a gap may not be late.
         late_ = frame_.image.empty() || clock_->IsLate(frame_.time, period_);
         return true;
       }
@@ -187,18 +188,18 @@ class CameraFeed {
   Timestamp period() const { return period_; }
   bool live() const { return live_; }
 
-  // Between the first Fetch and the first Handle: this source's clock is ahead by so much.
+  // To be called between the first Fetch and the first Handle, with the lead of this source's clock.
   void SetClockOffset(Timestamp offset) {
     clock_offset_ = offset;
     frame_.time -= offset;
     *first_time_ -= offset;
   }
 
-  // The image that was fetched.
+  // Processes the image of the last Fetch.
   void Handle(const std::stop_token& stop) {
     const Pace pace = run_.options.pace;
     engine::TrackedFrame tracked;
-    // A device keeps time itself, and drops what nobody fetches.
+    // Only recordings are paced: a device drops images that are not fetched in time.
     if (late_) {
       tracked.frame = frame_;
       tracked.state = engine::TrackingState::kDropped;
@@ -207,46 +208,47 @@ class CameraFeed {
     }
     if (pace == Pace::kRealtime && !live_) clock_->WaitFor(frame_.time, stop);
     if (pace == Pace::kEager) WaitForMapper(stop);
-    FollowHead();
+    SetHeadRotation();
     tracked = session_->Process(frame_);
-    TellLatency();
-    commander_.CarryOutDue(frame_.time - *first_time_, tracked);
+    ReportLatency();
+    command_runner_.RunDue(frame_.time - *first_time_, tracked);
     run_.shown(tracked);
   }
 
-  void CheckAllDone() const { commander_.CheckAllDone(); }
+  void CheckAllDone() const { command_runner_.CheckAllDone(); }
 
  private:
-  // A file delivers faster than a camera and would run away from the mapper, which in the world has the whole
-  // time between images; so whoever feeds waits, never the tracker.
+  // A file delivers faster than a camera, and would run ahead of the mapper, which with a real camera has the
+  // whole time between images. The source waits therefore, never the tracker.
   void WaitForMapper(const std::stop_token& stop) {
     auto due = std::chrono::steady_clock::now();
-    if (handed_on_) due = handed_on_->first + (frame_.time - handed_on_->second);
+    if (last_processed_) due = last_processed_->first + (frame_.time - last_processed_->second);
     session_->WaitUntilIdle(due, stop);
-    handed_on_ = {std::chrono::steady_clock::now(), frame_.time};
+    last_processed_ = {std::chrono::steady_clock::now(), frame_.time};
   }
 
-  // Tells the tracker how far the camera was told to turn since the last image that was tracked.
-  void FollowHead() {
+  // Tells the tracker how far the head was commanded to rotate since the last tracked image.
+  void SetHeadRotation() {
     Head* const head = run_.camera->source->head();
     if (head == nullptr) return;
     const engine::Rotation3 now = CarrierFromCamera(head->At(frame_.time));
     constexpr double kStill_rad = 1e-4;
-    if (before_) {
-      const engine::Rotation3 turn = now.inverse() * *before_;
-      if (turn.Angle() > kStill_rad) frame_.turned = turn;
+    if (last_head_rotation_) {
+      const engine::Rotation3 turn = now.inverse() * *last_head_rotation_;
+      if (turn.Angle() > kStill_rad) frame_.commanded_rotation = turn;
     }
-    before_ = now;
+    last_head_rotation_ = now;
   }
 
-  // Judged before an image is fetched: one that is slow to make (a simulation on a busy machine) is as old
-  // as it is, but those that would be late were it there at once are passed over.
-  bool MustBeLate() {
+  // Decided before an image is fetched: an image that is slow to produce (a simulation on a busy machine) is
+  // tracked although it is old, but images that would be late even if they were available at once are
+  // skipped.
+  bool WillBeLate() {
     return run_.options.pace == Pace::kRealtime && !live_ && first_time_ &&
            clock_->IsLate(frame_.time + period_, period_);
   }
 
-  void TellLatency() {
+  void ReportLatency() {
     if (!run_.options.latency) return;
     if (live_) {
       run_.options.latency(clock_->Now() - (frame_.time + clock_offset_));
@@ -258,39 +260,41 @@ class CameraFeed {
   const CameraRun& run_;
   Session* const session_;
   RealtimeClock* const clock_;
-  std::optional<engine::Rotation3> before_;  // carrier_from_camera of the head at the last tracked image
+  std::optional<engine::Rotation3>
+      last_head_rotation_;  // carrier_from_camera of the head at the last tracked image
   const bool live_;
   const Timestamp period_;
-  Commander commander_;
+  CommandRunner command_runner_;
   GapReporter gaps_;
   engine::Frame frame_;
   bool late_ = false;  // the image is to be dropped
   std::optional<Timestamp> first_time_;
   Timestamp clock_offset_{};
-  // Eager: when the image before was handed on, and its own time.
-  std::optional<std::pair<std::chrono::steady_clock::time_point, Timestamp>> handed_on_;
+  // Eager pace: when the previous image was processed, and its own time.
+  std::optional<std::pair<std::chrono::steady_clock::time_point, Timestamp>> last_processed_;
   std::string trouble_;
 };
 
-// All cameras on this thread, always the one whose image is the oldest; the first of two that are as old.
-void TakeTurns(std::vector<CameraFeed>* feeds, const std::stop_token& stop) {
-  std::vector<CameraFeed*> going;
-  for (CameraFeed& feed : *feeds) going.push_back(&feed);
+// Runs all cameras on this thread, always the one with the oldest image next; the first one of equally old
+// ones.
+void RunInterleaved(std::vector<CameraFeed>* feeds, const std::stop_token& stop) {
+  std::vector<CameraFeed*> running;
+  for (CameraFeed& feed : *feeds) running.push_back(&feed);
   while (!stop.stop_requested()) {
-    const auto oldest = std::min_element(going.begin(), going.end(),
+    const auto oldest = std::min_element(running.begin(), running.end(),
                                          [](const auto* a, const auto* b) { return a->time() < b->time(); });
     (*oldest)->Handle(stop);
     if ((*oldest)->Fetch(stop)) continue;
     if (*oldest == &feeds->front()) return;
-    going.erase(oldest);
+    running.erase(oldest);
   }
 }
 
-void RunSideBySide(std::vector<CameraFeed>* feeds, Pace pace, std::stop_source* stopping) {
+void RunConcurrently(std::vector<CameraFeed>* feeds, Pace pace, std::stop_source* stopping) {
   const std::stop_token stop = stopping->get_token();
   ImageGate gate(feeds->size(), feeds->front().period());
   for (std::size_t i = 0; i < feeds->size(); ++i) {
-    if ((*feeds)[i].live()) gate.Leave(i);  // devices keep time together by themselves
+    if ((*feeds)[i].live()) gate.Leave(i);  // devices need no synchronization
   }
   const auto run = [&](std::size_t i) {
     CameraFeed& feed = (*feeds)[i];
@@ -359,13 +363,13 @@ void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const s
     const Timestamp ahead = feed.time() - feeds.front().time();
     if (ahead > kSameClock || ahead < -kSameClock) feed.SetClockOffset(ahead);
   }
-  // Not before all first images are there, or those who had to wait for the others would begin too late.
+  // Only after all first images are there; otherwise cameras that waited for the others would start late.
   clock.Start(feeds.front().time());
   const Pace pace = cameras.front().options.pace;
   if (pace == Pace::kLockstep) {
-    TakeTurns(&feeds, stopping.get_token());
+    RunInterleaved(&feeds, stopping.get_token());
   } else {
-    RunSideBySide(&feeds, pace, &stopping);
+    RunConcurrently(&feeds, pace, &stopping);
   }
   if (stop.stop_requested()) return;
   for (const CameraFeed& feed : feeds) feed.CheckAllDone();

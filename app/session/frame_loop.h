@@ -17,10 +17,10 @@
 
 namespace docent::app {
 
-// Commands that come while the images run, from a window. Any thread.
+// Commands given from a window while images are processed. Any thread.
 class CommandInbox {
  public:
-  // A command and the frame that the person saw when giving it: a pixel of it means what was seen there.
+  // A command and the frame that the user saw when giving it, to which its pixel refers.
   struct Entry {
     Command command;
     std::shared_ptr<const engine::TrackedFrame> frame;
@@ -39,8 +39,8 @@ class CommandInbox {
   std::vector<Entry> entries_;
 };
 
-// The clock by which recordings are played in realtime and the age of images is told: CLOCK_MONOTONIC,
-// which devices stamp their images with, too. Tests bring one of their own. Any thread.
+// The clock for realtime playback and for the age of images: CLOCK_MONOTONIC, which devices use for their
+// timestamps too. Tests substitute their own. Any thread.
 class PlayClock {
  public:
   virtual ~PlayClock() = default;
@@ -49,41 +49,43 @@ class PlayClock {
   virtual void WaitUntil(Timestamp time, const std::stop_token& stop);
 };
 
-// One camera's way through a session.
+// How one camera is fed to a session.
 struct FrameLoopOptions {
   Pace pace = Pace::kEager;
   int camera = 0;                      // index in the session
   std::vector<TimedCommand> script;    // by ascending time
-  std::string script_name;             // for sentences
-  std::filesystem::path model_folder;  // where the script's models are
+  std::string script_name;             // for error messages
+  std::filesystem::path model_folder;  // folder of the script's models
   CommandInbox* inbox = nullptr;       // may be null
-  // Told of every command that was carried out, with its time from the first image, and of what was wrong
-  // with one from the inbox (a script's fault ends the run instead). On the camera's thread; may be empty.
+  // `carried_out` is called after every executed command, with its time from the first image. `refused` is
+  // called with the error of a command from the inbox; an error of a script ends the run instead. Both run on
+  // the camera's thread and may be empty.
   std::function<void(const TimedCommand&)> carried_out;
   std::function<void(const std::string&)> refused;
-  // Told when the source has no images to give, with a sentence for the wearer and the time on its clock,
-  // and with an empty sentence when it is back. On the camera's thread; may be empty.
+  // Called when the source cannot deliver images, with a sentence for the wearer and the time on its clock,
+  // and with an empty sentence when it delivers again. On the camera's thread; may be empty.
   std::function<void(const std::string&, Timestamp)> trouble;
-  // Told of every image that was tracked, before it is handed on, how long ago it was taken: for a device
-  // by its own stamp, for a recording in realtime by the time at which it was due. On the camera's thread;
-  // may be empty.
+  // Called for every tracked image, before its frame is passed on, with its age: for a device since its
+  // timestamp, for a recording in realtime since the time at which it was due. On the camera's thread; may be
+  // empty.
   std::function<void(Timestamp)> latency;
-  PlayClock* clock = nullptr;  // of the first camera, for all; null: the machine's
+  PlayClock* clock = nullptr;  // the first camera's is used for all; null: the system clock
 };
 
 using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
 
-// Feeds the images of a source to a session until the source ends or stop is requested, carries out the
-// script's commands, and hands every frame on, dropped ones too. `shown` runs on the calling thread, which is
-// the camera's. Throws Error for what the source or a command's line has wrong; what was done before stands.
+// Feeds the images of a source to a session until the source ends or stop is requested, executes the script's
+// commands, and passes every frame on, including dropped ones. `shown` runs on the calling thread, which is
+// the camera's. Throws Error for a fault of the source or of a command's line; everything done before
+// remains.
 //
 //   lockstep   one image after the other; the session runs its mapper in between
-//   eager      as fast as the tracker is while the mapper rests, and no faster than the images' times while
-//              it works: never further ahead of the mapper than a camera would be
-//   realtime   by the images' times; what is overtaken by its successor before it is asked for is dropped,
-//              as a camera drops it
+//   eager      as fast as the tracker while the mapper is idle, and no faster than the images' times while
+//              it works, so never further ahead of the mapper than a camera would be
+//   realtime   by the images' times; an image whose successor is due before it is requested is dropped, as
+//              a camera would drop it
 //
-// A live source drops by itself: what is missing between two of its images is handed on as dropped, each
+// A live source drops images by itself: images missing between two others are passed on as dropped, each
 // frame with its time and no image.
 void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,
                const FrameCallback& shown, const std::stop_token& stop);
@@ -91,16 +93,15 @@ void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOption
 // One of several cameras of a session.
 struct CameraRun {
   CalibratedCamera* camera = nullptr;
-  FrameLoopOptions options;  // of one pace for all; options.camera is the place in the list
-  FrameCallback shown;       // on this camera's thread
+  FrameLoopOptions options;  // all of one pace; options.camera is the index in the list
+  FrameCallback shown;       // called on this camera's thread
 };
 
-// The same for several cameras side by side, until the first one's images end: the first on the calling
-// thread, each other on a thread of its own. In lockstep all take turns on the calling thread, by the times
-// of their images, which also hold them together in the other paces: none runs further ahead of the others
-// than one image. Cameras whose first images lie more than ten seconds apart have clocks of their own:
-// they are taken to begin together, and times are the first camera's. The first fault stops all and is
-// thrown.
+// The same for several cameras in parallel, until the images of the first one end. The first camera runs on
+// the calling thread, each other one on a thread of its own. In lockstep all run interleaved on the calling
+// thread, by the times of their images; in the eager pace none runs further ahead of the others than one
+// image. Cameras whose first images are more than ten seconds apart have separate clocks: they are assumed to
+// start together, and times are those of the first camera. The first error stops all cameras and is thrown.
 void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const std::stop_token& stop);
 
 }  // namespace docent::app

@@ -18,7 +18,7 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
 }
 
 void ViewRecorder::Write(const cv::Mat& image, std::uint64_t index) {
-  // A source that leaves a long gap (a device that was unplugged) is not filled up.
+  // A longer gap (a device that was unplugged) is not filled with repeated images.
   constexpr std::uint64_t kLongestGap = 300;
   if (last_index_ && index > *last_index_ + 1) {
     const std::uint64_t missing = std::min(index - *last_index_ - 1, kLongestGap);

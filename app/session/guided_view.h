@@ -10,32 +10,32 @@
 #include "ui/recorder.h"
 #include "ui/renderer.h"
 
-// From what a session says of a frame to the image that a person sees of it.
+// Converts what a session knows about a frame into the image that a user sees.
 namespace docent::app {
 
-// A tracked frame with what belongs to it: the window's thread draws it while the camera's goes on.
+// A tracked frame with its content. The window's thread draws it while the camera's thread continues.
 struct ShownFrame {
   engine::TrackedFrame tracked;
   Session::Shown shown;
   double seconds = 0;  // since the first image
-  // When it was taken, on CLOCK_MONOTONIC; empty where nobody knows (see FrameLoopOptions::latency).
+  // Capture time on CLOCK_MONOTONIC; empty where it is unknown (see FrameLoopOptions::latency).
   std::optional<Timestamp> taken = {};
   std::string message;  // one sentence, often empty
 };
 
-// What the renderer is asked to draw; points into `frame` and `camera`.
+// The input of the renderer; it points into `frame` and `camera`.
 ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera);
 
-// Writes the drawn frames as a video that runs as fast as the images came: frames that were not drawn
-// (dropped, or overtaken on their way to the window) repeat the one before. One thread.
+// Records the drawn frames as a video with the speed of the camera: frames that were not drawn (dropped, or
+// replaced by a newer one before the window drew them) repeat the previous one. One thread.
 class ViewRecorder {
  public:
   ViewRecorder(const std::filesystem::path& path, double frames_per_second)
       : recorder_(path.string(), frames_per_second) {}
 
-  // The image of frame `index`; ascending.
+  // The image of frame `index`; indices ascend.
   void Write(const cv::Mat& image, std::uint64_t index);
-  // Throws Error when the file is not whole.
+  // Throws Error when the file is incomplete.
   void Close() { recorder_.Close(); }
 
  private:

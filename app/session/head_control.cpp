@@ -7,9 +7,10 @@ namespace docent::app {
 
 namespace {
 
-constexpr Timestamp kPatience = std::chrono::milliseconds(400);  // a track that is lost for less comes back
-constexpr Timestamp kBetweenMoves = std::chrono::milliseconds(500);
-constexpr double kWorthMoving_rad = 0.09;
+constexpr Timestamp kMinLossTime =
+    std::chrono::milliseconds(400);  // after a shorter loss, tracking usually recovers without a search
+constexpr Timestamp kMinTimeBetweenMoves = std::chrono::milliseconds(500);
+constexpr double kMinMove_rad = 0.09;
 
 std::vector<engine::MapPointId> Inliers(const engine::TrackedFrame& frame) {
   std::vector<engine::MapPointId> seen;
@@ -32,7 +33,7 @@ void HeadControl::AddView(const engine::TrackedFrame& frame) {
     return;
   }
   const PanTilt at = head_->At(frame.frame.time);
-  engine::HasPose(frame.state) ? Tracked(frame, at) : Lost(frame, at);
+  engine::HasPose(frame.state) ? HandleTracked(frame, at) : HandleLost(frame, at);
 }
 
 bool HeadControl::searching() const {
@@ -40,26 +41,27 @@ bool HeadControl::searching() const {
   return search_.has_value();
 }
 
-void HeadControl::Tracked(const engine::TrackedFrame& frame, const PanTilt& at) {
+void HeadControl::HandleTracked(const engine::TrackedFrame& frame, const PanTilt& at) {
   search_.reset();
   map_ = frame.map;
   map_key_ = frame.map_key;
   carrier_from_map_ = engine::Rigid3(CarrierFromCamera(at), Eigen::Vector3d::Zero()) * frame.camera_from_map;
   tracked_at_ = frame.frame.time;
-  if (!map_ || !map_->HasFinitePoints() || frame.frame.time - moved_at_ < kBetweenMoves) return;
+  if (!map_ || !map_->HasFinitePoints() || frame.frame.time - moved_at_ < kMinTimeBetweenMoves) return;
   if (policy_ == HeadPolicy::kFollowGaze) {
     if (gaze_ && gaze_key_ == map_key_) LookAt(TowardPoint(carrier_from_map_, *gaze_), frame.frame.time);
     return;
   }
   const HeadSearch view(head_->range(), *model_, *map_, carrier_from_map_);
   const PanTilt best = view.Best();
-  constexpr double kGoodEnough = 0.7;
-  if (view.Odds(at) < kGoodEnough * view.Odds(best)) LookAt(best, frame.frame.time);
+  constexpr double kSufficientRatio = 0.7;
+  if (view.RecognitionProbability(at) < kSufficientRatio * view.RecognitionProbability(best))
+    LookAt(best, frame.frame.time);
   moved_at_ = frame.frame.time;
 }
 
-void HeadControl::Lost(const engine::TrackedFrame& frame, const PanTilt& at) {
-  if (!map_ || !map_->HasFinitePoints() || frame.frame.time - tracked_at_ < kPatience) return;
+void HeadControl::HandleLost(const engine::TrackedFrame& frame, const PanTilt& at) {
+  if (!map_ || !map_->HasFinitePoints() || frame.frame.time - tracked_at_ < kMinLossTime) return;
   if (!search_) search_.emplace(head_->range(), *model_, *map_, carrier_from_map_);
   search_->AddEmptyView(at);
   head_->LookAt(search_->Next(at), frame.frame.time);
@@ -67,7 +69,7 @@ void HeadControl::Lost(const engine::TrackedFrame& frame, const PanTilt& at) {
 
 void HeadControl::LookAt(const PanTilt& wanted, Timestamp now) {
   const PanTilt to = head_->range().Clamped(wanted), from = head_->At(now);
-  if (std::hypot(to.pan_rad - from.pan_rad, to.tilt_rad - from.tilt_rad) < kWorthMoving_rad) return;
+  if (std::hypot(to.pan_rad - from.pan_rad, to.tilt_rad - from.tilt_rad) < kMinMove_rad) return;
   head_->LookAt(to, now);
   moved_at_ = now;
 }

@@ -13,16 +13,15 @@
 
 namespace docent::app {
 
-// What a camera that can turn its head does with it while it is tracked.
+// Where a pan-tilt camera looks while it is tracked.
 enum class HeadPolicy { kFollowGaze, kKeepMapInView };
 
-// Turns the head of one camera of a session by what the trackers say: while it is tracked it looks at what
-// the other camera looks at, or where most of the map is; when it is lost it looks for the map (see
-// HeadSearch). Told of every frame of every camera, on any thread; never waits for a device longer than its
-// control takes.
+// Controls the pan-tilt head of one camera of a session. While its camera is tracked, it points at what the
+// other camera looks at, or where most of the map is visible; when its camera is lost, it searches for the
+// map (see HeadSearch). Any thread; a call waits for the device at most as long as one control command takes.
 class HeadControl {
  public:
-  // head must outlive it; camera is the place of the head's camera in the session.
+  // head must outlive this; camera is the index in the session of the camera on the head.
   HeadControl(Head* head, int camera, std::shared_ptr<const engine::CameraModel> model, HeadPolicy policy)
       : head_(head), camera_(camera), model_(std::move(model)), policy_(policy) {}
 
@@ -30,16 +29,16 @@ class HeadControl {
   bool searching() const;
 
  private:
-  void Tracked(const engine::TrackedFrame& frame, const PanTilt& at);
-  void Lost(const engine::TrackedFrame& frame, const PanTilt& at);
+  void HandleTracked(const engine::TrackedFrame& frame, const PanTilt& at);
+  void HandleLost(const engine::TrackedFrame& frame, const PanTilt& at);
   void LookAt(const PanTilt& wanted, Timestamp now);
 
   Head* const head_;
   const int camera_;
   const std::shared_ptr<const engine::CameraModel> model_;
   const HeadPolicy policy_;
-  mutable std::mutex mutex_;  // guards all that follows
-  // Where the carrier was when its camera was tracked last.
+  mutable std::mutex mutex_;  // guards the members below
+  // Pose of the carrier when its camera was last tracked.
   std::shared_ptr<const engine::MapSnapshot> map_;
   std::uint64_t map_key_ = 0;
   engine::Rigid3 carrier_from_map_;

@@ -12,19 +12,19 @@ namespace {
 
 constexpr double kTau = 2 * std::numbers::pi;
 
-double Bell(double x) {
+double Gaussian(double x) {
   return std::exp(-0.5 * x * x);
 }
 
-// Points with a place, at most so many, taken evenly.
-std::vector<Eigen::Vector3d> SomePoints(const engine::MapSnapshot& map, std::size_t most) {
+// Positions of at most `count` finite points, evenly sampled.
+std::vector<Eigen::Vector3d> SampleFinitePoints(const engine::MapSnapshot& map, std::size_t count) {
   std::vector<Eigen::Vector3d> points;
   for (const engine::MapPoint& point : map.points) {
     if (!point.infinite()) points.push_back(point.position());
   }
-  if (points.size() <= most) return points;
+  if (points.size() <= count) return points;
   std::vector<Eigen::Vector3d> some;
-  for (std::size_t i = 0; i < most; ++i) some.push_back(points[i * points.size() / most]);
+  for (std::size_t i = 0; i < count; ++i) some.push_back(points[i * points.size() / count]);
   return some;
 }
 
@@ -57,14 +57,14 @@ std::optional<Eigen::Vector3d> GazePoint(const engine::MapSnapshot& map,
 HeadSearch::HeadSearch(const PanTiltRange& range, const engine::CameraModel& camera,
                        const engine::MapSnapshot& map, const engine::Rigid3& carrier_from_map,
                        const HeadSearchOptions& options)
-    : range_(range), options_(options), belief_(kYaws) {
+    : range_(range), options_(options), yaw_distribution_(kYaws) {
   constexpr double kRow_rad = 0.17;
   const double height = range.highest.tilt_rad - range.lowest.tilt_rad;
   const int rows = 1 + static_cast<int>(std::ceil(height / kRow_rad));
   for (int row = 0; row < rows; ++row)
     tilts_.push_back(range.lowest.tilt_rad + (rows == 1 ? 0.5 : row / (rows - 1.0)) * height);
-  constexpr std::size_t kMostPoints = 400;
-  const std::vector<Eigen::Vector3d> points = SomePoints(map, kMostPoints);
+  constexpr std::size_t kMaxPoints = 400;
+  const std::vector<Eigen::Vector3d> points = SampleFinitePoints(map, kMaxPoints);
   std::size_t finite = 0;
   for (const engine::MapPoint& point : map.points) finite += !point.infinite();
   const double each = points.empty() ? 0 : static_cast<double>(finite) / static_cast<double>(points.size());
@@ -74,27 +74,29 @@ HeadSearch::HeadSearch(const PanTiltRange& range, const engine::CameraModel& cam
       const engine::Rigid3 camera_from_carrier(CarrierFromCamera({yaw * kTau / kYaws, tilt}).inverse(),
                                                Eigen::Vector3d::Zero());
       const engine::Rigid3 camera_from_map = camera_from_carrier * carrier_from_map;
-      double likeness = 0;
+      double similarity = 0;
       for (const engine::KeyFrame& keyframe : map.keyframes) {
         const double depth = std::max(1e-9, keyframe.mean_depth);
         const double shift = (keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
         const double turn = (keyframe.camera_from_map.rotation * camera_from_map.rotation.inverse()).Angle();
-        likeness =
-            std::max(likeness, Bell(turn / options.likeness_rad) * Bell(shift / options.likeness_shift));
+        similarity = std::max(similarity, Gaussian(turn / options.view_rotation_sigma_rad) *
+                                              Gaussian(shift / options.view_shift_sigma));
       }
       double visible = 0;
       for (const Eigen::Vector3d& point : points) {
         const auto pixel = camera.Project(camera_from_map * point);
         if (pixel && camera.IsInside(*pixel)) visible += each;
       }
-      odds_.push_back(options.best_odds * likeness * std::min(1.0, visible / options.enough_points));
+      probabilities_.push_back(options.max_probability * similarity *
+                               std::min(1.0, visible / options.sufficient_points));
     }
   }
   for (int i = 0; i < kYaws; ++i) {
-    const double turned = std::remainder(i * kTau / kYaws, kTau);
-    belief_[static_cast<std::size_t>(i)] = (1 - options.anywhere) * Bell(turned / options.turn_sigma_rad) *
-                                               kTau / kYaws / options.turn_sigma_rad / std::sqrt(kTau) +
-                                           options.anywhere / kYaws;
+    const double yaw = std::remainder(i * kTau / kYaws, kTau);
+    yaw_distribution_[static_cast<std::size_t>(i)] = (1 - options.uniform_weight) *
+                                                         Gaussian(yaw / options.yaw_sigma_rad) * kTau /
+                                                         kYaws / options.yaw_sigma_rad / std::sqrt(kTau) +
+                                                     options.uniform_weight / kYaws;
   }
 }
 
@@ -109,20 +111,21 @@ std::size_t HeadSearch::Column(double yaw_rad) {
   return static_cast<std::size_t>(((std::lround(yaw_rad / kTau * kYaws) % kYaws) + kYaws) % kYaws);
 }
 
-double HeadSearch::OddsIn(double yaw_rad, double tilt_rad) const {
-  return odds_[Row(tilt_rad) * kYaws + Column(yaw_rad)];
+double HeadSearch::ProbabilityAt(double yaw_rad, double tilt_rad) const {
+  return probabilities_[Row(tilt_rad) * kYaws + Column(yaw_rad)];
 }
 
-double HeadSearch::Odds(const PanTilt& at) const {
-  return OddsIn(at.pan_rad, at.tilt_rad);
+double HeadSearch::RecognitionProbability(const PanTilt& at) const {
+  return ProbabilityAt(at.pan_rad, at.tilt_rad);
 }
 
-std::vector<double> HeadSearch::Expected() const {
-  std::vector<double> expected(odds_.size(), 0);
+std::vector<double> HeadSearch::ExpectedProbabilities() const {
+  std::vector<double> expected(probabilities_.size(), 0);
   for (std::size_t row = 0; row < tilts_.size(); ++row) {
     for (std::size_t pan = 0; pan < kYaws; ++pan) {
-      for (std::size_t turned = 0; turned < kYaws; ++turned)
-        expected[row * kYaws + pan] += belief_[turned] * odds_[row * kYaws + (pan + turned) % kYaws];
+      for (std::size_t yaw = 0; yaw < kYaws; ++yaw)
+        expected[row * kYaws + pan] +=
+            yaw_distribution_[yaw] * probabilities_[row * kYaws + (pan + yaw) % kYaws];
     }
   }
   return expected;
@@ -133,9 +136,9 @@ PanTilt HeadSearch::Best() const {
   double most = -1;
   for (const double tilt : tilts_) {
     for (double pan = range_.lowest.pan_rad; pan <= range_.highest.pan_rad; pan += kTau / kYaws) {
-      const double odds = OddsIn(pan, tilt);
-      if (odds <= most) continue;
-      most = odds;
+      const double probability = ProbabilityAt(pan, tilt);
+      if (probability <= most) continue;
+      most = probability;
       best = {pan, tilt};
     }
   }
@@ -145,32 +148,32 @@ PanTilt HeadSearch::Best() const {
 void HeadSearch::AddEmptyView(const PanTilt& at) {
   double all = 0;
   for (int i = 0; i < kYaws; ++i) {
-    double& belief = belief_[static_cast<std::size_t>(i)];
-    belief *= 1 - OddsIn(at.pan_rad + i * kTau / kYaws, at.tilt_rad);
-    all += belief;
+    double& weight = yaw_distribution_[static_cast<std::size_t>(i)];
+    weight *= 1 - ProbabilityAt(at.pan_rad + i * kTau / kYaws, at.tilt_rad);
+    all += weight;
   }
-  for (double& belief : belief_) belief /= all;
+  for (double& weight : yaw_distribution_) weight /= all;
 }
 
 PanTilt HeadSearch::Next(const PanTilt& at) const {
-  const std::vector<double> expected = Expected();
+  const std::vector<double> expected = ExpectedProbabilities();
   constexpr double kStep_s = 0.15;
   PanTilt next = at;
   double best = -1;
   for (const double tilt : tilts_) {
     for (double pan = range_.lowest.pan_rad; pan <= range_.highest.pan_rad; pan += kTau / kYaws) {
       const PanTilt there{pan, tilt};
-      const double way_s = range_.TravelSeconds(at, there);
-      const int steps = 1 + static_cast<int>(way_s / kStep_s);
-      double in_vain = 1;
+      const double travel_s = range_.TravelSeconds(at, there);
+      const int steps = 1 + static_cast<int>(travel_s / kStep_s);
+      double miss_probability = 1;
       for (int i = 1; i <= steps; ++i) {
         const PanTilt between{at.pan_rad + i * (there.pan_rad - at.pan_rad) / steps,
                               at.tilt_rad + i * (there.tilt_rad - at.tilt_rad) / steps};
-        in_vain *= 1 - expected[Row(between.tilt_rad) * kYaws + Column(between.pan_rad)];
+        miss_probability *= 1 - expected[Row(between.tilt_rad) * kYaws + Column(between.pan_rad)];
       }
-      const double soon = (1 - in_vain) / (way_s + options_.dwell_s);
-      if (soon <= best) continue;
-      best = soon;
+      const double rate = (1 - miss_probability) / (travel_s + options_.dwell_s);
+      if (rate <= best) continue;
+      best = rate;
       next = there;
     }
   }

@@ -18,29 +18,32 @@ void InitializationMonitor::Add(const engine::TrackedFrame& frame) {
                      [](const engine::KeyFrame& k) { return k.kind == engine::KeyFrameKind::kSixDof; });
     if (localized != frame.map->keyframes.rend()) depth_ = std::max(localized->mean_depth, 1e-9);
   }
-  const double share = frame.finite_points > 0 ? frame.quality : 0.0;
-  if (now - first_time_ <= options_.first_share) {
-    first_sum_ += share;
-    ++first_count_;
+  const double inlier_ratio = frame.finite_points > 0 ? frame.quality : 0.0;
+  if (now - first_time_ <= options_.initial_period) {
+    initial_sum_ += inlier_ratio;
+    ++initial_count_;
     return;
   }
-  recent_.push_back({now, share});
-  std::erase_if(recent_, [&](const Sample& sample) { return now - sample.time > options_.recent_share; });
+  recent_.push_back({now, inlier_ratio});
+  std::erase_if(recent_, [&](const Sample& sample) { return now - sample.time > options_.recent_period; });
   const engine::Rigid3 moved = frame.camera_from_map * first_pose_->inverse();
-  near_ = moved.translation.norm() <= options_.max_distance * depth_ &&
-          moved.rotation.Angle() <= options_.max_turn;
+  is_near_ = moved.translation.norm() <= options_.max_distance * depth_ &&
+             moved.rotation.Angle() <= options_.max_rotation;
 }
 
 std::optional<std::string> InitializationMonitor::Fault() const {
-  if (first_count_ == 0 || recent_.size() < 3 || !near_) return std::nullopt;
-  const double first = first_sum_ / first_count_;
-  const double recent = std::accumulate(recent_.begin(), recent_.end(), 0.0,
-                                        [](double sum, const Sample& sample) { return sum + sample.share; }) /
-                        static_cast<double>(recent_.size());
-  if (recent >= options_.min_share_kept * first) return std::nullopt;
-  const auto percent = [](double share) { return std::to_string(std::lround(100 * share)) + " %"; };
-  return "the share of its points that are found fell from " + percent(first) + " to " + percent(recent) +
-         " while the camera hardly moved";
+  if (initial_count_ == 0 || recent_.size() < 3 || !is_near_) return std::nullopt;
+  const double initial = initial_sum_ / initial_count_;
+  const double recent =
+      std::accumulate(recent_.begin(), recent_.end(), 0.0,
+                      [](double sum, const Sample& sample) { return sum + sample.inlier_ratio; }) /
+      static_cast<double>(recent_.size());
+  if (recent >= options_.min_inlier_ratio_kept * initial) return std::nullopt;
+  const auto percent = [](double inlier_ratio) {
+    return std::to_string(std::lround(100 * inlier_ratio)) + " %";
+  };
+  return "the inlier ratio fell from " + percent(initial) + " to " + percent(recent) +
+         " although the camera hardly moved";
 }
 
 }  // namespace docent::app

@@ -9,10 +9,10 @@
 
 namespace docent::app {
 
-void TakeInScene(const content::Scene& b, const std::string& name_of_a, const std::string& name_of_b,
-                 const engine::JoinedMap& joined, content::Scene* scene) {
+void MergeScene(const content::Scene& b, const std::string& name_of_a, const std::string& name_of_b,
+                const engine::JoinedMap& joined, content::Scene* scene) {
   content::Scene aligned = b;
-  for (content::Entity& entity : aligned.entities) content::MoveAlong(joined.a_from_b, &entity);
+  for (content::Entity& entity : aligned.entities) content::MoveWithAnchor(joined.a_from_b, &entity);
   const auto moved = Moved(aligned, ContentFollower().Follow(aligned, *joined.aligned, *joined.map));
   for (content::Entity entity : moved->entities) {
     entity.name = scene->FreeName(entity.name);
@@ -27,11 +27,11 @@ void TakeInScene(const content::Scene& b, const std::string& name_of_a, const st
 content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const std::string& name_of_a,
                           const std::string& name_of_b, const engine::JoinedMap& joined) {
   content::Scene both = *Moved(a, ContentFollower().Follow(a, *joined.aligned, *joined.map));
-  TakeInScene(b, name_of_a, name_of_b, joined, &both);
+  MergeScene(b, name_of_a, name_of_b, joined, &both);
   return both;
 }
 
-bool RedirectSignpostsIn(const std::string& from, const std::string& into, content::Scene* scene) {
+bool RedirectSceneSignposts(const std::string& from, const std::string& into, content::Scene* scene) {
   bool changed = false;
   for (content::Entity& entity : scene->entities) {
     if (entity.signpost.to_map != from) continue;
@@ -44,13 +44,13 @@ bool RedirectSignpostsIn(const std::string& from, const std::string& into, conte
 std::optional<std::string> RedirectSignposts(const std::string& text, const std::string& from,
                                              const std::string& into) {
   if (text.empty()) return std::nullopt;
-  // Only their ids are written again.
+  // Encoding writes only the ids of assets, so their bytes are not needed.
   content::Scene scene = content::DecodeScene(text, "its scene", [](const std::string& id) {
     auto asset = std::make_shared<content::Asset>();
     asset->id = id;
     return asset;
   });
-  if (!RedirectSignpostsIn(from, into, &scene)) return std::nullopt;
+  if (!RedirectSceneSignposts(from, into, &scene)) return std::nullopt;
   return content::EncodeScene(scene);
 }
 

@@ -8,29 +8,28 @@
 #include "engine/mapping/map_joining.h"
 #include "maps/joining.h"
 
-// What becomes of the content of maps when two of them become one (maps/joining.h). Pure functions; any
-// thread.
+// What happens to the content of two maps that are joined (maps/joining.h). Pure functions; any thread.
 namespace docent::app {
 
-// Adds what stands in B to `scene`, which is that of A in the joined map: each thing among the points that it
-// was placed among. Names that are taken get a number. A signpost that pointed from one of the two to the
-// other points nowhere.
-void TakeInScene(const content::Scene& b, const std::string& name_of_a, const std::string& name_of_b,
-                 const engine::JoinedMap& joined, content::Scene* scene);
+// Adds the entities of map B to `scene`, the scene of map A in the joined map; each entity stays with its
+// anchor. Duplicate names get a number. A signpost that led from one of the two maps to the other leads
+// nowhere.
+void MergeScene(const content::Scene& b, const std::string& name_of_a, const std::string& name_of_b,
+                const engine::JoinedMap& joined, content::Scene* scene);
 
-// What stands in both maps, in the coordinates of the joined one.
+// The content of both maps, in the coordinates of the joined one.
 content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const std::string& name_of_a,
                           const std::string& name_of_b, const engine::JoinedMap& joined);
 
-// Lets signposts to the map `from` point to `into` instead; false when there is none.
-bool RedirectSignpostsIn(const std::string& from, const std::string& into, content::Scene* scene);
+// Redirects signposts that lead to the map `from` to the map `into`; returns false when there were none.
+bool RedirectSceneSignposts(const std::string& from, const std::string& into, content::Scene* scene);
 
-// The text of a scene whose signposts to the map `from` point to `into` instead; empty when it has none.
-// Throws docent::Error when the text does not hold.
+// The same for an encoded scene; empty when it has no such signpost. Throws docent::Error when the text is
+// invalid.
 std::optional<std::string> RedirectSignposts(const std::string& text, const std::string& from,
                                              const std::string& into);
 
-// Both, as a library takes them. file: of the library, for sentences.
+// Both functions, as a library uses them. file: the library's, for error messages.
 maps::SceneJoiner LibrarySceneJoiner(const std::string& file);
 
 }  // namespace docent::app

@@ -13,7 +13,7 @@
 
 namespace docent::app {
 
-// A map of a session that nobody is in, and that may be adjusted.
+// A map of the session that no camera is in and that may be adjusted.
 struct IdleMap {
   std::uint64_t key = 0;
   std::string name;
@@ -21,8 +21,8 @@ struct IdleMap {
   bool changed = false;  // in this session
 };
 
-// Which resting map is in most need of upkeep (ptamm §3.1): one that was changed before one that was not, and
-// among these the one whose points lie furthest from where they were seen. One thread.
+// Chooses the idle map that needs maintenance most (ptamm §3.1): maps changed in this session first, and
+// among these the one with the largest RMS reprojection error. One thread.
 class MaintenanceOrder {
  public:
   // Empty when there is none, or when it was interrupted.

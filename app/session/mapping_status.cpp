@@ -19,16 +19,16 @@ const char* ToString(MappingStatus status) {
   return "";
 }
 
-MappingStatus MappingStatusOf(const engine::TrackedFrame& frame, bool grows) {
+MappingStatus MappingStatusOf(const engine::TrackedFrame& frame, bool extended) {
   using engine::TrackingState;
   constexpr Timestamp kExtendingFor = std::chrono::seconds(2);
   if (frame.state == TrackingState::kInitializing) return MappingStatus::kStarting;
-  const bool well = engine::HasPose(frame.state) && frame.state != TrackingState::kPanorama &&
-                    frame.quality_class == engine::TrackingQuality::kGood;
-  if (!well || !frame.map || frame.map->keyframes.empty()) return MappingStatus::kLimited;
+  const bool tracked_well = engine::HasPose(frame.state) && frame.state != TrackingState::kPanorama &&
+                            frame.quality_class == engine::TrackingQuality::kGood;
+  if (!tracked_well || !frame.map || frame.map->keyframes.empty()) return MappingStatus::kLimited;
   const Timestamp since = frame.frame.time - frame.map->keyframes.back().time;
-  const bool extends = grows && since >= Timestamp{} && since < kExtendingFor;
-  return extends ? MappingStatus::kExtending : MappingStatus::kMapped;
+  const bool extending = extended && since >= Timestamp{} && since < kExtendingFor;
+  return extending ? MappingStatus::kExtending : MappingStatus::kMapped;
 }
 
 }  // namespace docent::app

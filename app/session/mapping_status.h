@@ -5,18 +5,18 @@
 
 namespace docent::app {
 
-// How far the map about the camera has come, for whoever builds it.
+// State of the map around the camera, for the user who builds it.
 enum class MappingStatus {
-  kStarting,   // there is no map yet: the first two views are looked for
-  kLimited,    // what is here would not hold a map: the camera is lost, or follows little or directions alone
+  kStarting,   // there is no map yet: two initial views are being searched
+  kLimited,    // the map cannot be extended: tracking is lost, poor or rotation-only
   kExtending,  // keyframes are being added
-  kMapped,     // the camera is followed well and has shown nothing new for a while
+  kMapped,     // tracking is good and no keyframe was added recently
 };
-// starting, limited, extending, mapped.
+// "starting", "limited", "extending" or "mapped"; the user interface shows a sentence for each.
 const char* ToString(MappingStatus status);
 
-// The status at a frame. grows: whether keyframes of this frame's map come from this session. A map counts as
+// The status of a frame. extended: whether this session adds keyframes to the frame's map. A map counts as
 // extending for two seconds after its newest keyframe.
-MappingStatus MappingStatusOf(const engine::TrackedFrame& frame, bool grows);
+MappingStatus MappingStatusOf(const engine::TrackedFrame& frame, bool extended);
 
 }  // namespace docent::app

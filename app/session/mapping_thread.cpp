@@ -14,14 +14,13 @@ namespace docent::app {
 
 namespace {
 
-// An image that waits for the mapper is late; a keyframe that waits for images is none the worse. Where
-// there are fewer processors than threads, the trackers go first: five steps of niceness are a third of
-// their share.
-void LetOthersGoFirst() {
+// A delayed image is lost time for the user, a delayed keyframe is not. Where there are fewer processors than
+// threads, the trackers have priority: five steps of niceness reduce the mapper to a third of their share.
+void LowerThreadPriority() {
   constexpr int kSteps = 5;
   const auto thread = static_cast<id_t>(gettid());
   const int now = getpriority(PRIO_PROCESS, thread);
-  setpriority(PRIO_PROCESS, thread, now + kSteps);  // where it is refused all go alike
+  setpriority(PRIO_PROCESS, thread, now + kSteps);  // when refused, all threads have equal priority
 }
 
 engine::MapperOptions WithImageFiles(engine::MapperOptions options) {
@@ -31,11 +30,11 @@ engine::MapperOptions WithImageFiles(engine::MapperOptions options) {
 
 }  // namespace
 
-MappingThread::MappingThread(const engine::MapperOptions& options, bool threaded, Tell tell)
-    : mapper_(WithImageFiles(options)), tell_(std::move(tell)) {
+MappingThread::MappingThread(const engine::MapperOptions& options, bool threaded, UpdateCallback on_update)
+    : mapper_(WithImageFiles(options)), on_update_(std::move(on_update)) {
   if (!threaded) return;
   worker_.emplace("mapper", [this](const std::stop_token& stop) {
-    LetOthersGoFirst();
+    LowerThreadPriority();
     try {
       Run(stop);
     } catch (...) {
@@ -52,24 +51,24 @@ MappingThread::MappingThread(const engine::MapperOptions& options, bool threaded
 void MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot) {
   {
     const std::scoped_lock lock(mutex_);
-    wanted_key_ = key;
+    requested_key_ = key;
     adoption_ = Adoption{key, std::move(snapshot)};
     pair_.reset();
     join_.reset();
     interrupt_join_ = true;
     starting_ = false;
-    work_ = true;
+    has_work_ = true;
   }
   changed_.notify_all();
-  if (!worker_) TakeOver();
+  if (!worker_) ApplyAdoption();
 }
 
 void MappingThread::Start(std::uint64_t key, engine::InitialPair pair) {
   {
     const std::scoped_lock lock(mutex_);
-    if (key != wanted_key_) return;
+    if (key != requested_key_) return;
     pair_ = std::move(pair);
-    starting_ = work_ = true;
+    starting_ = has_work_ = true;
   }
   changed_.notify_all();
 }
@@ -78,9 +77,9 @@ void MappingThread::Join(std::uint64_t key, std::uint64_t number,
                          std::shared_ptr<const engine::MapSnapshot> other) {
   {
     const std::scoped_lock lock(mutex_);
-    if (key != wanted_key_) return;
+    if (key != requested_key_) return;
     join_ = JoinRequest{number, std::move(other)};
-    work_ = true;
+    has_work_ = true;
   }
   changed_.notify_all();
 }
@@ -89,27 +88,27 @@ bool MappingThread::Offer(std::uint64_t key, engine::KeyFrameCandidate candidate
                           std::vector<engine::PointReport> reports) {
   {
     const std::scoped_lock lock(mutex_);
-    // A keyframe that came before the adoption was carried out would be dropped by it, or worse, join the
-    // map before.
-    if (key != wanted_key_ || adoption_) return false;
+    // Before the adoption is applied, a keyframe would be dropped by it or, worse, be added to the previous
+    // map.
+    if (key != requested_key_ || adoption_) return false;
     mapper_.Report(std::move(reports));
     if (!mapper_.Offer(std::move(candidate))) return false;
-    work_ = true;
+    has_work_ = true;
   }
   changed_.notify_all();
   return true;
 }
 
-void MappingThread::TakeOver() {
+void MappingThread::ApplyAdoption() {
   std::unique_lock lock(mutex_);
   while (adoption_) {
-    // The copy of a large map takes a while; adoption_ stays set meanwhile, so that nobody offers to it.
+    // Copying a large map takes a while; adoption_ stays set meanwhile, so that no keyframe is offered.
     const Adoption adoption = *adoption_;
     lock.unlock();
     mapper_.Adopt(adoption.snapshot);
-    mapper_.TakeEvents();  // of the map before
+    mapper_.TakeEvents();  // discards events of the previous map
     key_ = adoption.key;
-    told_ = adoption.snapshot;
+    last_snapshot_ = adoption.snapshot;
     lock.lock();
     if (adoption_->key == adoption.key && adoption_->snapshot == adoption.snapshot) adoption_.reset();
   }
@@ -117,7 +116,7 @@ void MappingThread::TakeOver() {
   pair_.reset();
 }
 
-void MappingThread::JoinIfAsked() {
+void MappingThread::JoinIfRequested() {
   std::optional<JoinRequest> request;
   {
     const std::scoped_lock lock(mutex_);
@@ -125,35 +124,36 @@ void MappingThread::JoinIfAsked() {
     request = std::exchange(join_, std::nullopt);
     interrupt_join_ = false;
   }
-  MapperUpdate news;
-  news.key = key_;
-  news.join = MapperUpdate::Join{request->number, mapper_.Join(*request->other, &interrupt_join_)};
+  MapperUpdate update;
+  update.key = key_;
+  update.join = MapperUpdate::Join{request->number, mapper_.Join(*request->other, &interrupt_join_)};
   request.reset();
-  if (news.join->attempt.joined) news.snapshot = told_ = mapper_.Snapshot();
-  tell_(news);
+  if (update.join->attempt.joined) update.snapshot = last_snapshot_ = mapper_.Snapshot();
+  on_update_(update);
 }
 
 bool MappingThread::StepOnce() {
   const bool worked = mapper_.Step();
-  MapperUpdate news;
-  news.key = key_;
-  news.events = mapper_.TakeEvents();
-  if (auto snapshot = mapper_.Snapshot(); snapshot != told_) news.snapshot = told_ = std::move(snapshot);
-  if (news.snapshot || !news.events.empty()) {
-    tell_(news);
+  MapperUpdate update;
+  update.key = key_;
+  update.events = mapper_.TakeEvents();
+  if (auto snapshot = mapper_.Snapshot(); snapshot != last_snapshot_)
+    update.snapshot = last_snapshot_ = std::move(snapshot);
+  if (update.snapshot || !update.events.empty()) {
+    on_update_(update);
     using Kind = engine::MapperEvent::Kind;
-    for (const engine::MapperEvent& event : news.events) {
+    for (const engine::MapperEvent& event : update.events) {
       if (event.kind != Kind::kMapStarted && event.kind != Kind::kStartFailed) continue;
       const std::scoped_lock lock(mutex_);
-      if (wanted_key_ == key_) starting_ = false;
+      if (requested_key_ == key_) starting_ = false;
     }
   }
   return worked;
 }
 
-void MappingThread::RunInTurn() {
-  TakeOver();
-  JoinIfAsked();
+void MappingThread::RunLockstep() {
+  ApplyAdoption();
+  JoinIfRequested();
   for (int step = 0; step < kMaxSteps && !mapper_.IsIdle(); ++step) StepOnce();
   StepOnce();
 }
@@ -162,19 +162,19 @@ void MappingThread::Run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     {
       std::unique_lock lock(mutex_);
-      resting_ = true;
+      idle_ = true;
       changed_.notify_all();
-      if (!changed_.wait(lock, stop, [this] { return work_; })) return;
-      resting_ = work_ = false;
+      if (!changed_.wait(lock, stop, [this] { return has_work_; })) return;
+      idle_ = has_work_ = false;
     }
-    TakeOver();
-    JoinIfAsked();
+    ApplyAdoption();
+    JoinIfRequested();
     bool more = true;
     while (more && !stop.stop_requested()) {
       more = StepOnce();
       {
         const std::scoped_lock lock(mutex_);
-        // work_ is set as well: the outer loop goes on with them.
+        // has_work_ is set as well, so the outer loop continues with them.
         if (adoption_ || pair_ || join_) more = false;
       }
       changed_.notify_all();
@@ -182,24 +182,24 @@ void MappingThread::Run(const std::stop_token& stop) {
   }
 }
 
-bool MappingThread::Busy() const {
+bool MappingThread::IsBehind() const {
   return adoption_.has_value() || starting_ || mapper_.QueueLength() > 1;
 }
 
-bool MappingThread::Resting() const {
+bool MappingThread::IsIdle() const {
   const std::scoped_lock lock(mutex_);
-  return resting_ && !work_;
+  return idle_ && !has_work_;
 }
 
 void MappingThread::WaitUntilIdle(std::chrono::steady_clock::time_point latest, const std::stop_token& stop) {
   if (!worker_) return;
   std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, stop, latest, [this] { return failed_ || (resting_ && !work_); });
-  changed_.wait(lock, stop, [this] { return failed_ || !Busy(); });
+  changed_.wait_until(lock, stop, latest, [this] { return failed_ || (idle_ && !has_work_); });
+  changed_.wait(lock, stop, [this] { return failed_ || !IsBehind(); });
 }
 
 void MappingThread::Finish() {
-  // In turn the number of steps ends it and not the clock, so that two runs make the same map.
+  // In lockstep the number of steps is limited, not the time, so that two runs give the same map.
   constexpr int kMaxLastSteps = 500;
   constexpr auto kLongest = std::chrono::seconds(2);
   const bool threaded = worker_.has_value();

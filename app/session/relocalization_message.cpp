@@ -5,59 +5,60 @@ namespace docent::app {
 
 namespace {
 
-constexpr Timestamp kReadingTime = std::chrono::seconds(1);
+constexpr Timestamp kMinDisplayTime = std::chrono::seconds(1);
 
-bool SameToSay(const engine::RelocalizationResult& a, const engine::RelocalizationResult& b) {
-  if (a.doubt != b.doubt) return false;
-  // Where hardly anything is recognised the nearest map is another one in every image, and is not named.
-  return a.doubt == engine::RejectionReason::kFewPoints ||
+bool HasSameMessage(const engine::RelocalizationResult& a, const engine::RelocalizationResult& b) {
+  if (a.rejection != b.rejection) return false;
+  // With few inliers the best map changes with every image, and the message does not name it.
+  return a.rejection == engine::RejectionReason::kFewPoints ||
          (a.map_key == b.map_key && a.competitor_key == b.competitor_key);
 }
 
-std::string InWords(const engine::RelocalizationResult& verdict, const RelocalizationMessage::NameOf& name) {
-  const std::string map = name(verdict.map_key);
-  const std::string points = std::to_string(verdict.inliers) + " points";
-  switch (verdict.doubt) {
+std::string Describe(const engine::RelocalizationResult& result, const RelocalizationMessage::NameOf& name) {
+  const std::string map = name(result.map_key);
+  switch (result.rejection) {
     case engine::RejectionReason::kNone:
       break;
     case engine::RejectionReason::kFewPoints:
-      return "too few known points are seen (" + std::to_string(verdict.inliers) + ")";
+      return "I don't recognise this place yet. Step back and look around slowly.";
     case engine::RejectionReason::kPoorFit:
-      return "it resembles " + map + ", but does not fit it";
-    case engine::RejectionReason::kOneCorner:
-      return points + " of " + map + " are seen, but all in one corner of the image";
-    case engine::RejectionReason::kLookAlikes:
-      if (verdict.competitor_key == verdict.map_key) return "it may be one place in " + map + " or another";
-      return "it may be " + map + " or " + name(verdict.competitor_key);
+      return "This resembles " + map + ", but does not match it. Move a little and look again.";
+    case engine::RejectionReason::kClustered:
+      return "Only one corner of the image shows " + map + ". Turn so that more of it is visible.";
+    case engine::RejectionReason::kAmbiguous:
+      if (result.competitor_key == result.map_key)
+        return "This could be either of two places in " + map + ". Move so that more is visible.";
+      return "This could be " + map + " or " + name(result.competitor_key) +
+             ". Move so that more is visible.";
     case engine::RejectionReason::kUnconfirmed:
-      return "it looks like " + map + ", to be confirmed";
+      return "Probably " + map + "; hold still";
   }
   return {};
 }
 
 }  // namespace
 
-bool RelocalizationMessage::See(Timestamp time, bool has_pose, const engine::RelocalizationResult& verdict,
-                                const NameOf& name) {
+bool RelocalizationMessage::Update(Timestamp time, bool has_pose, const engine::RelocalizationResult& result,
+                                   const NameOf& name) {
   if (has_pose) {
-    told_ = {};
-    words_.clear();
+    reported_ = {};
+    text_.clear();
     return false;
   }
-  if (verdict.doubt != engine::RejectionReason::kNone) seen_at_ = time;
-  if (told_at_ && time - *told_at_ < kReadingTime) return false;
-  if (verdict.doubt == engine::RejectionReason::kNone) {
-    // Nothing resembles what is seen any more: that is no doubt.
-    if (!seen_at_ || time - *seen_at_ >= kReadingTime) {
-      told_ = {};
-      words_.clear();
+  if (result.rejection != engine::RejectionReason::kNone) rejected_at_ = time;
+  if (reported_at_ && time - *reported_at_ < kMinDisplayTime) return false;
+  if (result.rejection == engine::RejectionReason::kNone) {
+    // No place resembles the image any more, so the message no longer applies.
+    if (!rejected_at_ || time - *rejected_at_ >= kMinDisplayTime) {
+      reported_ = {};
+      text_.clear();
     }
     return false;
   }
-  if (SameToSay(verdict, told_)) return false;
-  told_ = verdict;
-  told_at_ = time;
-  words_ = InWords(verdict, name);
+  if (HasSameMessage(result, reported_)) return false;
+  reported_ = result;
+  reported_at_ = time;
+  text_ = Describe(result, name);
   return true;
 }
 

@@ -11,23 +11,24 @@
 
 namespace docent::app {
 
-// What a person is told of one camera that is lost and not sure where it is. Verdicts change with every
-// image; what is told stays for a second at least, so that it can be read and events.csv is not flooded.
-// Its owner guards it.
+// The message for a user while a camera is lost and no hypothesis is accepted. The rejection reason changes
+// with every image; a message stays for at least a second, so that it can be read and events.csv does not
+// fill with repetitions. Its owner guards it.
 class RelocalizationMessage {
  public:
   // The name of a map by its key.
   using NameOf = std::function<std::string(std::uint64_t)>;
 
-  // Every frame's verdict, by ascending time. True when there is something new to tell: words().
-  bool See(Timestamp time, bool has_pose, const engine::RelocalizationResult& verdict, const NameOf& name);
-  // Part of a sentence, without its full stop; empty when there is no doubt to tell of.
-  const std::string& words() const { return words_; }
+  // To be called with the result of every frame, by ascending time. Returns true when text() is a new
+  // message.
+  bool Update(Timestamp time, bool has_pose, const engine::RelocalizationResult& result, const NameOf& name);
+  // Text for the screen; empty when there is no rejection to report.
+  const std::string& text() const { return text_; }
 
  private:
-  engine::RelocalizationResult told_;
-  std::optional<Timestamp> told_at_, seen_at_;
-  std::string words_;
+  engine::RelocalizationResult reported_;
+  std::optional<Timestamp> reported_at_, rejected_at_;
+  std::string text_;
 };
 
 }  // namespace docent::app

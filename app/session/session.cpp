@@ -18,15 +18,15 @@ Session::Session(const SessionOptions& options,
       library_(library),
       association_(cameras.size()),
       mapping_(options.mapper, options.threaded && options.may_write,
-               [this](const MappingThread::MapperUpdate& news) { OnMapperUpdate(news); }) {
-  // Trackers and mapper have the processors; OpenCV's own threads would only get into their way.
+               [this](const MappingThread::MapperUpdate& update) { OnMapperUpdate(update); }) {
+  // Trackers and mapper use the processors; OpenCV's own threads would only compete with them.
   cv::setNumThreads(1);
   engine::TrackerOptions tracker_options = options.tracker;
   tracker_options.build_maps = options.may_write;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     Camera camera;
     camera.tracker = std::make_unique<engine::Tracker>(tracker_options, cameras[i], options.seed + i);
-    camera.lens = std::make_unique<CalibrationMonitor>(cameras[i]);
+    camera.calibration_monitor = std::make_unique<CalibrationMonitor>(cameras[i]);
     camera.model = std::move(cameras[i]);
     cameras_.push_back(std::move(camera));
   }
@@ -44,7 +44,7 @@ Session::~Session() {
   try {
     Finish();
   } catch (const std::exception& error) {
-    // Whoever wants to know calls Finish before.
+    // Callers that need the error call Finish before.
     spdlog::error("{}", error.what());
   }
 }
@@ -53,7 +53,7 @@ void Session::AddEvent(Timestamp time, std::string event, std::string detail) {
   events_.push_back({time, std::move(event), std::move(detail)});
 }
 
-CameraPlaceFinder Session::FollowOrders(std::size_t index, Timestamp time) {
+CameraPlaceFinder Session::ApplyOrder(std::size_t index, Timestamp time) {
   Camera* const camera = &cameras_[index];
   engine::Tracker& tracker = *camera->tracker;
   std::uint64_t searched = 0;
@@ -64,14 +64,15 @@ CameraPlaceFinder Session::FollowOrders(std::size_t index, Timestamp time) {
   {
     const std::scoped_lock lock(mutex_);
     order = std::exchange(camera->order, Camera::Order::kNone);
-    if (order == Camera::Order::kStart || order == Camera::Order::kStartAfterLoss) camera->starting = true;
-    if (order == Camera::Order::kLeave || order == Camera::Order::kGo) camera->starting = false;
+    if (order == Camera::Order::kStart || order == Camera::Order::kStartAfterLoss)
+      camera->initializing = true;
+    if (order == Camera::Order::kLeave || order == Camera::Order::kEnter) camera->initializing = false;
     if (const auto found = maps_.find(camera->map_key); found != maps_.end()) {
       snapshot = found->second.snapshot;
       key = camera->map_key;
     }
-    // A map of directions alone waits for its start still.
-    if (snapshot && snapshot->HasFinitePoints()) camera->starting = false;
+    // A map without finite points still waits for its initialization.
+    if (snapshot && snapshot->HasFinitePoints()) camera->initializing = false;
     searched = association_.SearchedMap(index);
     if (snapshot && index < 2 && !association_.IsTracked(index)) {
       if (const auto pose = rig_.Predict(static_cast<int>(index), time, key))
@@ -95,12 +96,12 @@ CameraPlaceFinder Session::FollowOrders(std::size_t index, Timestamp time) {
 engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   const auto index = static_cast<std::size_t>(frame.camera);
   Camera& camera = cameras_.at(index);
-  const CameraPlaceFinder places = FollowOrders(index, frame.time);
+  const CameraPlaceFinder places = ApplyOrder(index, frame.time);
   engine::TrackedFrame tracked = camera.tracker->Track(frame, &places);
   HandleResult(index, &tracked);
   if (options_.may_write) {
     OfferToMapper(&camera, tracked);
-    if (!options_.threaded) mapping_.RunInTurn();
+    if (!options_.threaded) mapping_.RunLockstep();
     Autosave(frame.time);
   }
   return tracked;
@@ -111,11 +112,11 @@ void Session::HandleResult(std::size_t index, engine::TrackedFrame* frame) {
   Camera* const camera = &cameras_[index];
   camera->last_time = frame->frame.time;
   if (!engine::HasPose(frame->state)) {
-    association_.Lost(index);
+    association_.SetLost(index);
   } else if (const auto map = maps_.find(frame->map_key); camera->order != Camera::Order::kNone ||
-                                                          map == maps_.end() || !map->second.IsActive() ||
-                                                          !association_.Tracked(index, frame->map_key)) {
-    association_.Lost(index);
+                                                          map == maps_.end() || !map->second.Exists() ||
+                                                          !association_.SetTracked(index, frame->map_key)) {
+    association_.SetLost(index);
     RejectPose(camera, frame);
   }
   const bool has_pose = engine::HasPose(frame->state);
@@ -128,18 +129,18 @@ void Session::HandleResult(std::size_t index, engine::TrackedFrame* frame) {
   }
   if (has_pose) {
     camera->lost_since.reset();
-    WatchLens(index, *frame);
-    WatchRig(index, *frame);
+    CheckCalibration(index, *frame);
+    UpdateRig(index, *frame);
   } else if (frame->state == engine::TrackingState::kLost && !camera->lost_since) {
     camera->lost_since = frame->frame.time;
   }
-  // Of several cameras, one that is tracked shows that a start holds.
-  if (has_pose || !association_.AnyTracked()) WatchProbation(camera, *frame);
-  if (!has_pose) WatchLoss(camera, *frame);
+  // With several cameras, one that is tracked shows that the initialization holds.
+  if (has_pose || !association_.AnyTracked()) CheckProvisionalMap(camera, *frame);
+  if (!has_pose) CheckLoss(camera, *frame);
 }
 
-// The frame's pose is in a map that is not the cameras' any more: while it was worked out, another camera was
-// found elsewhere, or somebody chose another map.
+// Handles a pose in a map that the cameras are no longer in: while the frame was tracked, another camera
+// relocalized elsewhere, or the user chose another map.
 void Session::RejectPose(Camera* camera, engine::TrackedFrame* frame) {
   frame->state = engine::TrackingState::kLost;
   frame->quality_class = engine::TrackingQuality::kLost;
@@ -147,9 +148,9 @@ void Session::RejectPose(Camera* camera, engine::TrackedFrame* frame) {
   frame->map_key = 0;
   frame->matches.clear();
   frame->finite_points = frame->infinite_points = 0;
-  frame->hint = "look where the other camera looks";
-  camera->doubts = {};
-  if (camera->order == Camera::Order::kNone) camera->order = Camera::Order::kGo;
+  frame->hint = "Point this camera at what the other camera sees";
+  camera->relocalization_message = {};
+  if (camera->order == Camera::Order::kNone) camera->order = Camera::Order::kEnter;
 }
 
 void Session::ReportRejection(Camera* camera, engine::TrackedFrame* frame) {
@@ -157,36 +158,37 @@ void Session::ReportRejection(Camera* camera, engine::TrackedFrame* frame) {
     const auto found = maps_.find(key);
     return found != maps_.end() ? found->second.name : std::string();
   };
-  const bool news =
-      camera->doubts.See(frame->frame.time, engine::HasPose(frame->state), frame->verdict, name);
-  const std::string& words = camera->doubts.words();
-  if (words.empty()) return;
-  frame->hint = "not sure: " + words;
-  if (!news) return;
+  const bool is_new = camera->relocalization_message.Update(frame->frame.time, engine::HasPose(frame->state),
+                                                            frame->relocalization, name);
+  const std::string& text = camera->relocalization_message.text();
+  if (text.empty()) return;
+  frame->hint = text;
+  if (!is_new) return;
   const std::string by =
       cameras_.size() > 1 ? "camera " + std::to_string(frame->frame.camera) + ": " : std::string();
-  AddEvent(frame->frame.time, "not sure", by + words);
+  AddEvent(frame->frame.time, "not sure",
+           by + text + " (" + std::to_string(frame->relocalization.inliers) + " inliers)");
 }
 
-void Session::WatchRig(std::size_t index, const engine::TrackedFrame& frame) {
+void Session::UpdateRig(std::size_t index, const engine::TrackedFrame& frame) {
   if (cameras_.size() < 2 || index > 1) return;
   rig_.Add(static_cast<int>(index), frame.frame.time, frame.map_key, frame.camera_from_map);
   const auto& estimate = rig_.estimate();
   const bool rigid = estimate && estimate->rigid;
-  if (rigid == rig_told_) return;
-  rig_told_ = rigid;
+  if (rigid == rig_reported_) return;
+  rig_reported_ = rigid;
   if (!estimate) return;
-  std::string words = maps_.at(frame.map_key).name + ": " + estimate->Words();
+  std::string detail = maps_.at(frame.map_key).name + ": " + estimate->ToString();
   if (rigid && options_.baseline_m > 0) {
-    words += ", one unit of the map is " + FormatNumber(options_.baseline_m / estimate->Baseline(), 4) + " m";
+    detail += ", one map unit is " + FormatNumber(options_.baseline_m / estimate->Baseline(), 4) + " m";
   }
-  AddEvent(frame.frame.time, "rig", words);
+  AddEvent(frame.frame.time, "rig", detail);
 }
 
-void Session::WatchLens(std::size_t index, const engine::TrackedFrame& frame) {
+void Session::CheckCalibration(std::size_t index, const engine::TrackedFrame& frame) {
   Camera& camera = cameras_[index];
-  camera.lens->Add(frame);
-  const auto warning = camera.lens->TakeWarning();
+  camera.calibration_monitor->Add(frame);
+  const auto warning = camera.calibration_monitor->TakeWarning();
   if (!warning) return;
   const std::string which = cameras_.size() > 1 ? "camera " + std::to_string(index) + ": " : std::string();
   AddEvent(frame.frame.time, "warning", which + *warning);
@@ -201,7 +203,7 @@ void Session::Advise(Camera* camera, const std::string& sentence) {
 
 CalibrationMonitor::Profile Session::LensErrors(std::size_t camera) const {
   const std::scoped_lock lock(mutex_);
-  return cameras_.at(camera).lens->profile();
+  return cameras_.at(camera).calibration_monitor->profile();
 }
 
 std::optional<RigEstimate> Session::Rig() const {
@@ -219,50 +221,50 @@ void Session::OfferToMapper(Camera* camera, const engine::TrackedFrame& frame) {
     const std::scoped_lock lock(mutex_);
     key = camera->map_key;
     const auto found = maps_.find(key);
-    if (found == maps_.end() || key != extended_key_) return;
+    if (found == maps_.end() || key != active_key_) return;
     if (pair && found->second.snapshot && found->second.snapshot->HasFinitePoints()) return;
     if (candidate && !MayExtend(found->second, frame.camera_from_map)) candidate.reset();
   }
-  if (saver_) saver_->InterruptMaintenance();  // the present map comes first
+  if (saver_) saver_->InterruptMaintenance();  // the active map has priority
   if (pair) mapping_.Start(key, std::move(*pair));
   if (candidate) mapping_.Offer(key, std::move(*candidate), tracker.TakeReports());
 }
 
-void Session::OnMapperUpdate(const MappingThread::MapperUpdate& news) {
+void Session::OnMapperUpdate(const MappingThread::MapperUpdate& update) {
   using Kind = engine::MapperEvent::Kind;
-  // New keyframes are described before the lock: frames go on meanwhile.
+  // Visual words of new keyframes are computed before locking, so that frames are processed meanwhile.
   std::vector<maps::KeyFrameWords> described;
-  if (news.snapshot) described = index_.DescribeNew(news.key, *news.snapshot);
+  if (update.snapshot) described = index_.DescribeNew(update.key, *update.snapshot);
   const std::scoped_lock lock(mutex_);
-  const auto found = maps_.find(news.key);
-  // MapperUpdate that comes late, of a map that was closed or given up meanwhile, is let go.
-  if (found == maps_.end() || news.key != extended_key_ || !found->second.IsActive()) return;
+  const auto found = maps_.find(update.key);
+  // A late update of a map that was closed or discarded meanwhile is ignored.
+  if (found == maps_.end() || update.key != active_key_ || !found->second.Exists()) return;
   SessionMap& map = found->second;
-  if (news.join && !Expects(*news.join, map)) return;
-  if (news.snapshot) {
-    map.Grow(news.snapshot);
-    index_.SetMap(map.key, news.snapshot, described);
+  if (update.join && !IsAwaited(*update.join, map)) return;
+  if (update.snapshot) {
+    map.UpdateSnapshot(update.snapshot);
+    index_.SetMap(map.key, update.snapshot, described);
   }
-  if (news.join) {
-    EndJoining(news.join->attempt, &map);
-  } else if (news.snapshot) {
-    AskToJoin(map);
+  if (update.join) {
+    HandleJoinAttempt(update.join->attempt, &map);
+  } else if (update.snapshot) {
+    RequestJoin(map);
   }
-  for (const engine::MapperEvent& event : news.events) {
+  for (const engine::MapperEvent& event : update.events) {
     switch (event.kind) {
       case Kind::kMapStarted:
         map.started = event.time;
-        map.on_probation = true;
-        map.start_watch = InitializationMonitor();
+        map.provisional = true;
+        map.initialization_monitor = InitializationMonitor();
         for (std::size_t i = 0; i < cameras_.size(); ++i) {
-          if (cameras_[i].map_key == map.key && cameras_[i].starting) association_.Tracked(i, map.key);
+          if (cameras_[i].map_key == map.key && cameras_[i].initializing) association_.SetTracked(i, map.key);
         }
         AddEvent(event.time, "map", "started " + map.name + ": " + event.detail);
         break;
       case Kind::kStartFailed:
-        AddEvent(event.time, "warning", "no start for " + map.name + ": " + event.detail);
+        AddEvent(event.time, "warning", "could not initialize " + map.name + ": " + event.detail);
         for (Camera& camera : cameras_) {
-          if (camera.map_key == map.key && camera.starting) {
+          if (camera.map_key == map.key && camera.initializing) {
             camera.order = map.snapshot     ? Camera::Order::kStartAgain
                            : map.after_loss ? Camera::Order::kStartAfterLoss
                                             : Camera::Order::kStart;
@@ -285,14 +287,13 @@ void Session::OnMapperUpdate(const MappingThread::MapperUpdate& news) {
         AddEvent(event.time, "points", map.name + ": " + event.detail);
         break;
       case Kind::kKeyFrameRemoved:
-        AddEvent(event.time, "keyframe",
-                 "removed from " + map.name + ", as others know what it shows: " + event.detail);
+        AddEvent(event.time, "keyframe", "removed from " + map.name + " as redundant: " + event.detail);
         break;
       case Kind::kLoopClosed:
         AddEvent(event.time, "loop", "closed in " + map.name + ": " + event.detail);
         break;
       case Kind::kGlobalAdjustment:
-        // Its last words are how long it took, which differs from run to run; events of one input do not.
+        // The last part of the detail is the duration, which differs between runs; events must not.
         AddEvent(event.time, "adjustment",
                  map.name + ": " + event.detail.substr(0, event.detail.rfind(", ")));
         break;
@@ -306,8 +307,8 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
   if (frame.frame.time < camera.advice_end) shown.advice = camera.advice;
   if (options_.may_write) {
-    const bool grows = extended_key_ != 0 && extended_key_ == frame.map_key;
-    shown.mapping = MappingStatusOf(frame, grows);
+    const bool extended = active_key_ != 0 && active_key_ == frame.map_key;
+    shown.mapping = MappingStatusOf(frame, extended);
   }
   const auto found = maps_.find(frame.map_key);
   if (found == maps_.end()) return shown;
@@ -320,7 +321,7 @@ std::vector<std::string> Session::MapNames() const {
   const std::scoped_lock lock(mutex_);
   std::vector<std::string> names;
   for (const auto& [key, map] : maps_) {
-    if (map.IsActive()) names.push_back(map.name);
+    if (map.Exists()) names.push_back(map.name);
   }
   return names;
 }
@@ -345,11 +346,11 @@ void Session::Finish() {
   try {
     mapping_.Finish();
   } catch (...) {
-    failure = std::current_exception();  // what it made before is saved all the same
+    failure = std::current_exception();  // what was mapped before is saved all the same
   }
   if (saver_) {
     saver_->EndMaintenance();
-    saver_->Flush();  // so that what fails now is tried again with the rest
+    saver_->Flush();  // so that failed saves are repeated below
     {
       const std::scoped_lock lock(mutex_);
       const Timestamp time = LastTime();

@@ -29,7 +29,7 @@ const content::Entity& FindEntity(const content::Scene& scene, const std::string
 void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
                       const std::filesystem::path& model_folder) {
   if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
-    throw Error("nothing can be changed on a tour; use docent author");
+    throw Error("a tour is read-only; use docent author to make changes");
   }
   LoadIntoMemory(command);
   const std::scoped_lock lock(mutex_);
@@ -53,7 +53,7 @@ std::shared_ptr<const content::Asset> Session::LoadAsset(const std::string& file
   std::error_code error;
   if (!std::filesystem::exists(path, error)) path = file;
   auto asset = std::make_shared<content::Asset>(content::ImportAsset(path));
-  // The same bytes may stand in a map already: one copy serves both.
+  // The same bytes may already be in use in a map: one copy is shared.
   auto& kept = assets_[asset->id];
   if (!kept) kept = std::move(asset);
   return model = kept;
@@ -61,7 +61,7 @@ std::shared_ptr<const content::Asset> Session::LoadAsset(const std::string& file
 
 SessionMap* Session::FindByName(const std::string& name) {
   for (auto& [key, map] : maps_) {
-    if (map.IsActive() && map.name == name) return &map;
+    if (map.Exists() && map.name == name) return &map;
   }
   return nullptr;
 }
@@ -75,57 +75,57 @@ SessionMap& Session::AddMap(const std::string& name) {
   return map;
 }
 
-// The map of `key` rests from now on: it is saved as it stands, or forgotten if it never began.
+// Makes the map of `key` idle: it is saved, or removed if it was never initialized.
 void Session::LeaveMap(std::uint64_t key) {
-  if (extended_key_ == key) {
+  if (active_key_ == key) {
     AssignMapper(0, nullptr);
   }
   const auto found = maps_.find(key);
-  if (found == maps_.end() || !found->second.IsActive()) return;
+  if (found == maps_.end() || !found->second.Exists()) return;
   SessionMap& map = found->second;
   Timestamp time{};
   for (Camera& camera : cameras_) {
     time = std::max(time, camera.last_time);
     if (camera.map_key != key) continue;
     camera.map_key = 0;
-    camera.starting = false;
+    camera.initializing = false;
     camera.lost_since.reset();
     camera.order = Camera::Order::kLeave;
   }
   if (association_.map() == key) association_.Release();
-  map.on_probation = false;
+  map.provisional = false;
   if (map.snapshot) {
     if (options_.may_write) SaveMap(&map, time);
     return;
   }
-  AddEvent(time, "warning", "no map " + map.name + " was made: no two views were found to start it from");
+  AddEvent(time, "warning", "the map " + map.name + " was not created, because it was never initialized");
   maps_.erase(found);
 }
 
 void Session::ExtendMap(const SessionMap& map) {
-  const bool grows = options_.may_write && !map.rests && maps::MayChangeStructure(map.policy);
-  AssignMapper(grows ? map.key : 0, grows ? map.snapshot : nullptr);
+  const bool extended = options_.may_write && !map.stopped && maps::MayChangeStructure(map.policy);
+  AssignMapper(extended ? map.key : 0, extended ? map.snapshot : nullptr);
 }
 
 void Session::AssignMapper(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot) {
-  extended_key_ = key;
-  joining_.reset();  // whatever the mapper had joined, it begins from the snapshot
+  active_key_ = key;
+  joining_.reset();  // the mapper continues from the snapshot, whatever it had joined
   mapping_.Adopt(key, std::move(snapshot));
 }
 
 void Session::Apply(const NewMap& command, const engine::TrackedFrame& frame) {
   CheckName(command.name);
   if (FindByName(command.name) != nullptr) throw Error("there is already a map '" + command.name + "'");
-  const std::uint64_t before = extended_key_;
-  const SessionMap& map = AddMap(command.name);  // first, because it may fail
+  const std::uint64_t before = active_key_;
+  const SessionMap& map = AddMap(command.name);  // first, because it may throw
   if (before != 0) LeaveMap(before);
   ExtendMap(map);
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     const bool begins = static_cast<int>(i) == frame.frame.camera;
     cameras_[i].map_key = map.key;
     cameras_[i].lost_since.reset();
-    cameras_[i].began = begins;
-    cameras_[i].order = begins ? Camera::Order::kStart : Camera::Order::kGo;
+    cameras_[i].started_map = begins;
+    cameras_[i].order = begins ? Camera::Order::kStart : Camera::Order::kEnter;
   }
   association_.Begin(map.key);
 }
@@ -133,15 +133,15 @@ void Session::Apply(const NewMap& command, const engine::TrackedFrame& frame) {
 void Session::Apply(const StopMap&, const engine::TrackedFrame& frame) {
   const std::uint64_t key = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
   if (key == 0) throw Error("there is no current map to stop");
-  maps_.at(key).rests = true;
+  maps_.at(key).stopped = true;
   LeaveMap(key);
 }
 
 void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
   SessionMap* map = FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
-  if (!map->snapshot) throw Error("the map '" + command.name + "' has not begun yet");
-  map->rests = false;
+  if (!map->snapshot) throw Error("the map '" + command.name + "' is not initialized yet");
+  map->stopped = false;
   const std::uint64_t before = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
   if (before == map->key) return ExtendMap(*map);
   if (before != 0) LeaveMap(before);
@@ -149,7 +149,7 @@ void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
   for (Camera& camera : cameras_) {
     camera.map_key = map->key;
     camera.lost_since.reset();
-    camera.order = Camera::Order::kGo;
+    camera.order = Camera::Order::kEnter;
   }
   PinMapsInUse();
   ExtendMap(*map);
@@ -158,16 +158,16 @@ void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
 void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame) {
   SessionMap* map = FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
-  if (!map->snapshot) throw Error("the map '" + command.name + "' has not begun yet");
+  if (!map->snapshot) throw Error("the map '" + command.name + "' is not initialized yet");
   std::optional<maps::Bounds> bounds;
   if (saver_) {
-    // The library fixes the bounds from what it holds, so everything must be there first. This is the one
+    // The library computes the bounds from what it holds, so everything must be saved first. This is the one
     // command that waits for the disk.
     SaveMap(map, frame.frame.time);
     saver_->Flush();
     ReportSaveFailure(frame.frame.time);
     if (map->NeedsSave())
-      throw Error("the map '" + map->name + "' could not be saved, so its policy stays as it is");
+      throw Error("the map '" + map->name + "' could not be saved, so its policy was not changed");
     library_->SetPolicy(map->key, command.policy);
     bounds = library_->Find(map->key).bounds;
   } else if (command.policy == maps::Policy::kBounded) {
@@ -183,11 +183,11 @@ SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
   if (engine::HasPose(frame.state)) key = frame.map_key;
   const auto found = maps_.find(key);
   if (found == maps_.end() || !found->second.snapshot) throw Error("there is no current map");
-  if (found->second.discarded) throw Error("the map of this frame has been given up");
-  if (!found->second.IsActive()) throw Error("the map of this frame is a part of another one now");
+  if (found->second.discarded) throw Error("the map of this frame was discarded");
+  if (!found->second.Exists()) throw Error("the map of this frame was joined into another one");
   if (!maps::MayChangeContent(found->second.policy)) {
     throw Error("the map '" + found->second.name + "' is " + maps::ToString(found->second.policy) +
-                ": its content stays as it is");
+                ": its content cannot be changed");
   }
   return found->second;
 }
@@ -225,7 +225,7 @@ void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& fr
   entity.signpost.text = command.text;
   entity.signpost.anchor = hit.point;
   entity.signpost.up = UpInMap(*frame.map);
-  // A map's metres mean nothing to the person: what looks right from where it was put up is.
+  // Map units mean nothing to the user, so the size is chosen by the distance from the camera.
   entity.signpost.height_m = options_.signpost_height * (frame.camera_from_map * hit.point).norm();
   entity.signpost.to_map = command.to_map;
   Edit(&map, content::AddSignpostEdit(std::move(entity), {command.pixel.x(), command.pixel.y()}));

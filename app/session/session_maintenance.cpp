@@ -8,13 +8,14 @@
 #include "app/session/session.h"
 #include "maps/maintenance.h"
 
-// What is done for maps that nobody is in (ptamm §3.1: a map maker that roves), on the saver's thread, while
-// nothing waits to be saved and the mapper of the present map has nothing to do.
+// Maintenance of idle maps (ptamm §3.1: the map maker roves through all maps). It runs on the saver's thread,
+// while nothing waits to be saved and the mapper of the active map is idle.
 namespace docent::app {
 
 namespace {
 
-// Whoever holds the lock may wait for a save, which then interrupts: so that this one never waits for good.
+// The thread that holds the lock may wait for a save, which sets `interrupt`; giving up then avoids a
+// deadlock.
 std::unique_lock<std::mutex> LockUnless(const std::atomic<bool>& interrupt, std::mutex* mutex) {
   std::unique_lock lock(*mutex, std::defer_lock);
   while (!interrupt && !lock.try_lock()) std::this_thread::sleep_for(std::chrono::microseconds(200));
@@ -27,36 +28,36 @@ bool Session::IsIdle(const SessionMap& map) const {
   const bool used = std::any_of(cameras_.begin(), cameras_.end(),
                                 [&](const Camera& camera) { return camera.map_key == map.key; });
   const bool joined = joining_ && joining_->from == map.key;
-  return !used && !joined && map.key != extended_key_ && map.IsActive() && map.snapshot && !map.NeedsSave() &&
+  return !used && !joined && map.key != active_key_ && map.Exists() && map.snapshot && !map.NeedsSave() &&
          maps::MayChangeStructure(map.policy);
 }
 
 std::vector<IdleMap> Session::MapsForMaintenance() const {
-  std::vector<IdleMap> resting;
+  std::vector<IdleMap> idle;
   for (const auto& [key, map] : maps_) {
-    if (IsIdle(map) && map.upkept_revision != map.snapshot->revision)
-      resting.push_back({key, map.name, map.snapshot, map.changed});
+    if (IsIdle(map) && map.maintained_revision != map.snapshot->revision)
+      idle.push_back({key, map.name, map.snapshot, map.changed});
   }
-  return resting;
+  return idle;
 }
 
-// The map, as long as it still rests as it did.
-SessionMap* Session::FindIdleMap(const IdleMap& resting) {
-  const auto found = maps_.find(resting.key);
-  if (found == maps_.end() || !IsIdle(found->second) || found->second.snapshot != resting.snapshot)
+// Returns the map if it is still idle and unchanged.
+SessionMap* Session::FindIdleMap(const IdleMap& idle) {
+  const auto found = maps_.find(idle.key);
+  if (found == maps_.end() || !IsIdle(found->second) || found->second.snapshot != idle.snapshot)
     return nullptr;
   return &found->second;
 }
 
 bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
-  std::vector<IdleMap> resting;
+  std::vector<IdleMap> idle;
   {
     const auto lock = LockUnless(interrupt, &mutex_);
-    if (!lock || !mapping_.Resting()) return false;
-    resting = MapsForMaintenance();
+    if (!lock || !mapping_.IsIdle()) return false;
+    idle = MapsForMaintenance();
   }
   std::shared_ptr<const content::Scene> scene;
-  const std::optional<IdleMap> chosen = maintenance_order_.Next(resting, interrupt);
+  const std::optional<IdleMap> chosen = maintenance_order_.Next(idle, interrupt);
   if (!chosen) return false;
   const maps::AdjustedMap adjusted = maps::AdjustIdleMap(*chosen->snapshot, &interrupt);
   const maps::Optimization& done = adjusted.optimization;
@@ -65,8 +66,8 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
     const auto lock = LockUnless(interrupt, &mutex_);
     SessionMap* const map = lock ? FindIdleMap(*chosen) : nullptr;
     if (map == nullptr) return false;
-    // Whatever becomes of it: once is enough.
-    map->upkept_revision = chosen->snapshot->revision;
+    // Once per revision, whatever the outcome.
+    map->maintained_revision = chosen->snapshot->revision;
     scene = map->scene;
   }
   if (!adjusted.snapshot) return true;
@@ -74,21 +75,21 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
   record.key = chosen->key;
   record.name = chosen->name;
   record.snapshot = adjusted.snapshot;
-  record.over_revision = chosen->snapshot->revision;
+  record.expected_revision = chosen->snapshot->revision;
   const auto motions = ContentFollower().Follow(*scene, *chosen->snapshot, *adjusted.snapshot);
   if (!motions.empty())
     record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*Moved(*scene, motions)));
   if (!library_->Save(record)) return true;
   const auto lock = LockUnless(interrupt, &mutex_);
-  // Somebody came back meanwhile: that one goes on with the map as it was, and will save it so.
+  // A camera entered the map meanwhile: it continues with the map as it was, and will save that.
   SessionMap* const map = lock ? FindIdleMap(*chosen) : nullptr;
   if (map == nullptr) return true;
-  map->Grow(adjusted.snapshot);
+  map->UpdateSnapshot(adjusted.snapshot);
   map->saved_snapshot = adjusted.snapshot;
-  map->upkept_revision = adjusted.snapshot->revision;
+  map->maintained_revision = adjusted.snapshot->revision;
   index_.SetMap(map->key, adjusted.snapshot);
-  AddEvent(LastTime(), "upkeep",
-           map->name + ": " + FormatNumber(done.rms_before_px, 3) + " px before, " +
+  AddEvent(LastTime(), "maintenance",
+           map->name + ": reprojection error " + FormatNumber(done.rms_before_px, 3) + " px before, " +
                FormatNumber(done.rms_after_px, 3) + " px after");
   return true;
 }

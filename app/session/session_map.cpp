@@ -5,13 +5,13 @@
 
 namespace docent::app {
 
-void SessionMap::Grow(std::shared_ptr<const engine::MapSnapshot> grown) {
-  const auto before = std::exchange(snapshot, std::move(grown));
+void SessionMap::UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer) {
+  const auto before = std::exchange(snapshot, std::move(newer));
   if (!before || !snapshot || scene->entities.empty()) return;
   const ContentFollower::Motions motions = follower.Follow(*scene, *before, *snapshot);
   if (motions.empty()) return;
   scene = Moved(*scene, motions);
-  for (const auto& [entity, motion] : motions) history.MoveAlong(entity, motion);
+  for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
 }
 
 }  // namespace docent::app

@@ -17,51 +17,50 @@
 
 namespace docent::app {
 
-// One map as a session knows it, whether it came from the library or is being made. Owned by the session,
-// which guards it; snapshots and scenes never change once they are in here, so copies of the pointers may
-// leave.
+// One map of a session, whether it was read from the library or is being built. Owned by the session, which
+// guards it. Snapshots and scenes are immutable once they are stored here, so copies of the pointers may be
+// given out.
 struct SessionMap {
   std::uint64_t key = 0;
   std::string name;
   maps::Policy policy = maps::Policy::kOpen;
-  std::optional<maps::Bounds> bounds;  // of a bounded map
-  std::shared_ptr<const engine::MapSnapshot>
-      snapshot;  // null while its start is looked for, or not in memory
+  std::optional<maps::Bounds> bounds;  // only of a bounded map
+  // Null while initialization is pending, or when not in memory.
+  std::shared_ptr<const engine::MapSnapshot> snapshot;
   std::shared_ptr<const content::Scene> scene = std::make_shared<content::Scene>();  // never null
   content::EditHistory history;
   ContentFollower follower;
 
-  // What the library holds of it, or will hold when the saver has caught up; null when never saved.
+  // What the library holds of the map, or will hold once the saver has finished; null when never saved.
   std::shared_ptr<const engine::MapSnapshot> saved_snapshot;
   std::shared_ptr<const content::Scene> saved_scene;
 
-  bool in_library =
-      false;             // it was there when the session began: without a snapshot it is merely not in memory
-  bool changed = false;  // in this session: it stays in memory until the end
+  bool in_library = false;  // when the session began; without a snapshot it is then not in memory
+  bool changed = false;     // in this session: it stays in memory until the end
 
-  // The state that upkeep has left behind, or looked at without finding anything to do; 0 for none.
-  std::uint64_t upkept_revision = 0;
+  // Revision for which maintenance is complete, whether it changed the map or not; 0 for none.
+  std::uint64_t maintained_revision = 0;
 
-  bool rests = false;  // the person stopped it: it grows no further until it is taken up again by name
+  bool stopped = false;  // by the user: it is not extended again until it is selected by name
 
-  // Of a map made in this session: a start that does not hold is given up (see Session).
-  bool on_probation = false;
-  InitializationMonitor start_watch;  // while on_probation
+  // A map made in this session is provisional until its depth is confirmed (see Session).
+  bool provisional = false;
+  InitializationMonitor initialization_monitor;  // while provisional
   bool discarded = false;
-  bool after_loss = false;  // begun because the camera was lost in another map
-  Timestamp started{};      // of the frame that completed its first pair
+  bool after_loss = false;  // started because the camera was lost in another map
+  Timestamp started{};      // time of the frame that completed its initial pair
 
   // See session_joining.cpp.
-  std::uint64_t join_with = 0;       // the map that the camera went back to from it; 0 for none
-  std::size_t join_at = 0;           // keyframes of both, from which on it is tried
-  std::uint64_t joined_into = 0;     // the map that it is a part of now; 0 for none
-  std::vector<std::uint64_t> holds;  // that were joined into it
+  std::uint64_t join_with = 0;             // the map that the camera returned to from this one; 0 for none
+  std::size_t join_at = 0;                 // number of keyframes of both maps from which joining is attempted
+  std::uint64_t joined_into = 0;           // the map that it was joined into; 0 for none
+  std::vector<std::uint64_t> joined_keys;  // keys of the maps that were joined into it
 
-  // The mapper has made this of it; what stands in it moves along with its ground.
-  void Grow(std::shared_ptr<const engine::MapSnapshot> grown);
+  // Replaces the snapshot by a newer one of the mapper; content moves along with its anchors.
+  void UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer);
 
-  // It is a map of its own still: neither given up nor a part of another one.
-  bool IsActive() const { return !discarded && joined_into == 0; }
+  // False once the map was discarded or joined into another one.
+  bool Exists() const { return !discarded && joined_into == 0; }
   bool NeedsSave() const { return snapshot && (snapshot != saved_snapshot || scene != saved_scene); }
 };
 

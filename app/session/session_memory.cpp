@@ -3,7 +3,7 @@
 
 #include "app/session/session.h"
 
-// Which of the library's maps are in memory: the pager reads and lets go, the session says what it has in
+// Which maps of the library are in memory: the pager loads and evicts maps, the session tells it which are in
 // use.
 namespace docent::app {
 
@@ -19,7 +19,7 @@ void Session::LoadMaps() {
   }
   maps::MapPager::Callbacks callbacks;
   callbacks.loaded = [this](const maps::StoredMap& stored) { AddLoadedMap(stored); };
-  callbacks.let_go = [this](std::uint64_t key) { return Evict(key); };
+  callbacks.evict = [this](std::uint64_t key) { return Evict(key); };
   callbacks.failed = [this](std::uint64_t, const std::string& problem) {
     const std::scoped_lock lock(mutex_);
     AddEvent(LastTime(), "warning", problem);
@@ -34,12 +34,12 @@ void Session::AddLoadedMap(const maps::StoredMap& stored) {
     const std::scoped_lock lock(mutex_);
     assets = assets_;
   }
-  // Models are decoded without the lock: frames go on meanwhile.
+  // Models are decoded without the lock, so that frames are processed meanwhile.
   auto scene = std::make_shared<const content::Scene>(
       SceneFromRecord(stored.scene, library_->file() + ", map '" + stored.info.name + "'", &assets));
   const std::scoped_lock lock(mutex_);
   assets_.merge(assets);
-  // A map that somebody else saved since the session began is not one of it.
+  // A map that another process saved since the session began is not part of the session.
   const auto found = maps_.find(stored.info.key);
   if (found == maps_.end() || found->second.changed) return;
   SessionMap& map = found->second;
@@ -54,7 +54,7 @@ bool Session::Evict(std::uint64_t key) {
   SessionMap& map = found->second;
   const bool used = std::any_of(cameras_.begin(), cameras_.end(),
                                 [&](const Camera& camera) { return camera.map_key == key; });
-  if (used || map.changed || map.NeedsSave() || key == extended_key_) return false;
+  if (used || map.changed || map.NeedsSave() || key == active_key_) return false;
   map.snapshot.reset();
   map.saved_snapshot.reset();
   map.scene = map.saved_scene = std::make_shared<content::Scene>();
@@ -62,7 +62,7 @@ bool Session::Evict(std::uint64_t key) {
   return true;
 }
 
-// The map that a command names, where it works on the map itself.
+// Loads the map that a command names, if the command needs the map itself.
 void Session::LoadIntoMemory(const Command& command) {
   const auto* use = std::get_if<UseMap>(&command);
   const auto* policy = std::get_if<SetPolicy>(&command);
@@ -80,10 +80,10 @@ void Session::PinMapsInUse() {
   if (!pager_) return;
   std::vector<std::uint64_t> keys;
   for (const Camera& camera : cameras_) keys.push_back(camera.map_key);
-  pager_->Hold(keys);
+  pager_->Pin(keys);
 }
 
-// Where the signposts of a map point to, somebody will go.
+// A camera is likely to go where the signposts of its map lead.
 void Session::ExpectNeighbours(const SessionMap& map) {
   if (!pager_) return;
   std::vector<std::uint64_t> keys;
@@ -92,7 +92,7 @@ void Session::ExpectNeighbours(const SessionMap& map) {
     const SessionMap* const neighbour = FindByName(entity.signpost.to_map);
     if (neighbour != nullptr && neighbour->in_library) keys.push_back(neighbour->key);
   }
-  pager_->Expect(keys);
+  pager_->Prefetch(keys);
 }
 
 }  // namespace docent::app

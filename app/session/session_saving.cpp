@@ -10,7 +10,7 @@
 
 namespace docent::app {
 
-// On the saver's thread. From here on the save may not be lost.
+// Called on the saver's thread once the record is on disk.
 void Session::ReportSaved(const maps::MapRecord& record) {
   const std::string revision =
       record.snapshot ? "revision " + std::to_string(record.snapshot->revision) : "content";
@@ -18,9 +18,9 @@ void Session::ReportSaved(const maps::MapRecord& record) {
 }
 
 void Session::StartSaver() {
-  // A place for every map, so that a save is never waited for; in lockstep nothing happens by itself.
+  // Unlimited capacity, so that submitting never waits. In lockstep there is no maintenance.
   constexpr std::size_t kAnyNumber = std::numeric_limits<std::size_t>::max();
-  maps::Saver::Upkeep maintenance;
+  maps::Saver::Maintenance maintenance;
   if (options_.threaded && options_.maintenance)
     maintenance = [this](const std::atomic<bool>& interrupt) { return RunMaintenance(interrupt); };
   saver_.emplace(library_, kAnyNumber, ReportSaved, std::move(maintenance));
@@ -32,14 +32,14 @@ Timestamp Session::LastTime() const {
   return time;
 }
 
-// Hands what has changed of a map to the saver, which writes it in the background.
+// Passes the changes of a map to the saver, which writes them in the background.
 void Session::SaveMap(SessionMap* map, Timestamp time) {
-  if (!saver_ || !map->IsActive() || !map->NeedsSave() || !map->snapshot->HasFinitePoints()) return;
+  if (!saver_ || !map->Exists() || !map->NeedsSave() || !map->snapshot->HasFinitePoints()) return;
   maps::MapRecord record;
   record.key = map->key;
   record.name = map->name;
   record.policy = map->policy;
-  record.holds = map->holds;
+  record.joined_keys = map->joined_keys;
   const bool structure = map->snapshot != map->saved_snapshot;
   const bool content = map->scene != map->saved_scene;
   if (structure) record.snapshot = map->snapshot;
@@ -62,13 +62,13 @@ void Session::Autosave(Timestamp time) {
   last_save_ = time;
   ReportSaveFailure(time);
   for (auto& [key, map] : maps_) {
-    if (!map.on_probation) SaveMap(&map, time);
+    if (!map.provisional) SaveMap(&map, time);
   }
 }
 
-// A save that failed does not end the session: the person hears of it at once, and what any save since the
-// last report may not have written is tried again by the next one. What could be written no more once the
-// map's policy had changed was on disk before it changed (see SetPolicy).
+// A failed save does not end the session: it is reported at once, and the next save writes everything again
+// that any save since the last report may not have written. Changes that a new policy forbids to write were
+// on disk before the policy changed (see SetPolicy).
 void Session::ReportSaveFailure(Timestamp time) {
   const std::exception_ptr failure = saver_->TakeError();
   if (!failure) return;

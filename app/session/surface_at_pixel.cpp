@@ -12,13 +12,13 @@ namespace docent::app {
 content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engine::CameraModel& camera,
                                    const Eigen::Vector2d& pixel) {
   if (!engine::HasPose(frame.state) || !frame.map) {
-    throw Error("nothing can be placed while the camera does not know where it is");
+    throw Error("nothing can be placed while the camera is lost");
   }
   const std::string at =
       "pixel " + std::to_string(std::lround(pixel.x())) + " " + std::to_string(std::lround(pixel.y()));
   if (!camera.IsInside(pixel, -0.5)) throw Error(at + " lies outside the image");
   const auto ray = camera.Unproject(pixel);
-  if (!ray) throw Error("the lens has no ray for " + at);
+  if (!ray) throw Error("the camera model has no ray for " + at);
   std::vector<Eigen::Vector3d> points;
   for (const engine::MapPoint& point : frame.map->points) {
     if (point.infinite()) continue;

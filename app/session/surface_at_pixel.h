@@ -7,7 +7,7 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/tracking/tracked_frame.h"
 
-// From a pixel that a person points at to the map's surface seen there. Pure functions; any thread.
+// Finds the point of the map's surface at a pixel that a user points at. Pure functions; any thread.
 namespace docent::app {
 
 // The surface that the frame shows at a pixel. Throws Error with one sentence when the frame has no pose, the
@@ -15,9 +15,9 @@ namespace docent::app {
 content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engine::CameraModel& camera,
                                    const Eigen::Vector2d& pixel);
 
-// Upwards in a map, unit length: against the mean of where its keyframes' images have their lower edge. A
-// map knows no gravity; people hold cameras level on the whole, and the mean of many keyframes is steadier
-// than the first one alone.
+// The up direction in a map, unit length: opposite to the mean image-down direction (camera y axis) of its
+// keyframes. A map does not know gravity; users hold cameras level on average, and the mean over many
+// keyframes is more reliable than the first one alone.
 Eigen::Vector3d UpInMap(const engine::MapSnapshot& map);
 
 }  // namespace docent::app

@@ -11,7 +11,7 @@ namespace {
 
 using engine::CameraModel;
 
-constexpr int kGrid = 24;  // rays along a side of the image
+constexpr int kGrid = 24;  // Rays along each side of the image.
 
 CameraModel WithFirstCoefficient(const CameraModel& lens, double value) {
   std::array<double, 5> distortion = lens.distortion();
@@ -19,28 +19,29 @@ CameraModel WithFirstCoefficient(const CameraModel& lens, double value) {
   return {lens.lens(), lens.intrinsics(), distortion};
 }
 
-// The change of the first coefficient that misplaces rays by so many pixels.
+// Change of the first coefficient that displaces rays by the given RMS distance.
 double CoefficientChange(const CameraModel& lens, double distortion_error_px) {
   const double sign = distortion_error_px < 0 ? -1 : 1, wanted = std::abs(distortion_error_px);
-  const auto misplaced = [&](double change) {
+  const auto displacement = [&](double change) {
     const double value = lens.distortion()[0] + sign * change;
     if (CameraModel::Validate(lens.lens(), lens.intrinsics(), WithFirstCoefficient(lens, value).distortion()))
       return std::optional<double>();
     return MisplacementRms(WithFirstCoefficient(lens, value), lens);
   };
-  // The misplacement grows with the change: bracketed by doubling, then halved.
+  // The displacement grows with the change, so the change is bracketed by doubling and then found by
+  // bisection.
   double low = 0, high = 1e-6;
   for (;; high *= 2) {
-    const auto error = misplaced(high);
+    const auto error = displacement(high);
     if (!error || high > 10) {
-      throw Error("No calibration of this lens is wrong by so many pixels of distortion; ask for fewer.");
+      throw Error("This lens cannot have such a large distortion error; choose a smaller one.");
     }
     if (*error >= wanted) break;
     low = high;
   }
   for (int step = 0; step < 60; ++step) {
     const double middle = 0.5 * (low + high);
-    (misplaced(middle).value_or(wanted) < wanted ? low : high) = middle;
+    (displacement(middle).value_or(wanted) < wanted ? low : high) = middle;
   }
   return sign * 0.5 * (low + high);
 }
@@ -55,7 +56,7 @@ std::optional<double> MisplacementRms(const CameraModel& calibration, const Came
       const Eigen::Vector2d pixel((column + 0.5) / kGrid * lens.width_px() - 0.5,
                                   (row + 0.5) / kGrid * lens.height_px() - 0.5);
       const auto ray = lens.Unproject(pixel);
-      if (!ray) continue;  // outside the circle of a wide lens
+      if (!ray) continue;  // Outside of the image circle of a wide lens.
       const auto projected = calibration.Project(*ray);
       if (!projected) return std::nullopt;
       sum += (*projected - pixel).squaredNorm();

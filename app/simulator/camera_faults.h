@@ -6,31 +6,30 @@
 
 namespace docent::app {
 
-// What real cameras and their calibrations do that an ideal one does not. Every fault is off by default, and
-// then the simulation is the same to the byte as without it. Timestamps and ground truth stay true: a
-// calibration error is in the calibration that comes with the sequence, not in the lens, and a hand's tremor
-// is part of the true pose. Which frame suffers follows from the seed of the simulation.
+// Imperfections of real cameras and their calibrations. Every fault is off by default and then does not
+// change any byte of the simulation. Timestamps and ground truth stay exact: a calibration error affects the
+// calibration file of the sequence and not the lens, and hand tremor is part of the true pose. The seed of
+// the simulation determines the affected frames.
 struct CameraFaults {
-  // Time from the exposure of the first row to that of the last, seconds. The image's time, and its true
-  // pose, are those of the row in the middle. Eight phones took 28 to 61 ms (Ringaby and Forssen 2012,
-  // "Efficient video rectification and stabilisation for cell-phones").
+  // Rolling shutter: time from the exposure of the first row to that of the last, in seconds. Timestamp and
+  // true pose of an image are those of the middle row. Eight phones took 28 to 61 ms (Ringaby and Forssen
+  // 2012, "Efficient video rectification and stabilisation for cell-phones").
   double readout_s = 0;
-  // Interlacing: the odd rows are exposed half a frame later than the even ones, to which the time belongs.
+  // Interlacing: odd rows are exposed half a frame later than even rows, to which the timestamp belongs.
   bool interlaced = false;
 
-  double focal_error = 0;  // the calibration's focal length is too long by this part of it; 0.01: 1 %
-  double distortion_error_px =
-      0;  // root mean square over the image of where the calibration's distortion misplaces
-          // a ray; negative: the calibration's first coefficient is too small
+  double focal_error = 0;          // Relative error of the calibrated focal length; 0.01: 1 % too long.
+  double distortion_error_px = 0;  // RMS displacement of rays over the image by the calibrated distortion;
+                                   // negative: the first coefficient of the calibration is too small.
 
-  double gain = 1;                 // of the whole exposure; above 1 highlights are clipped at 255
-  double exposure_jump_stops = 0;  // largest jump of the exposure (ExposureJumps); one stop doubles it
-  double gain_noise_sigma = 0;  // standard deviation of the noise of a signal of 128 grey levels at gain 1;
-                                // its variance grows with the signal and the gain (photon noise, EMVA 1288)
-  double dropped_share = 0;     // of the frames that are lost on the way (KeptFrames), [0, 0.9]
-  double tremor_deg = 0;        // root mean square rotation of the hand's tremor about each axis (Tremor)
+  double gain = 1;                 // Factor of the exposure; above 1, highlights are clipped at 255.
+  double exposure_jump_stops = 0;  // Largest jump of the exposure (see ExposureJumps); one stop doubles it.
+  double gain_noise_sigma = 0;  // Standard deviation of the noise at a signal of 128 grey levels and gain 1;
+                                // the variance grows with signal and gain (photon noise, EMVA 1288).
+  double dropped_share = 0;     // Ratio of frames that are lost (see KeptFrames), in [0, 0.9].
+  double tremor_deg = 0;        // RMS rotation of the hand tremor about each axis (see Tremor).
 
-  // A sentence that says what is wrong with these faults, or empty.
+  // Describes the first invalid value in one sentence, or empty.
   std::optional<std::string> Validate(double frame_rate_hz) const;
 };
 

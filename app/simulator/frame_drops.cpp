@@ -8,9 +8,9 @@ namespace docent::app {
 std::vector<int> KeptFrames(int count, double dropped_share, std::uint64_t seed) {
   constexpr int kShortest = 3, kLongest = 10;
   constexpr double kMeanBurst = 0.5 * (kShortest + kLongest);
-  // At each step one frame is kept, or one is lost (probability x), or a burst is (probability x /
-  // kMeanBurst), so that both lose alike. Of the 1 + x - x / kMeanBurst frames of a step 2 x are lost, which
-  // gives x.
+  // Each step keeps one frame, loses one (probability x), or loses a burst (probability x / kMeanBurst), so
+  // that single losses and bursts lose equally many. Of the 1 + x - x / kMeanBurst frames of a mean step, 2 x
+  // are lost, which gives x for the wanted ratio.
   const double single = dropped_share / (2 - dropped_share + dropped_share / kMeanBurst);
   const double burst = single / kMeanBurst;
   Random random(seed);

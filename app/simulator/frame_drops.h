@@ -6,9 +6,9 @@
 
 namespace docent::app {
 
-// Numbers of those of `count` frames that are not lost, in their order. Half of the lost frames are lost one
-// by one and half in bursts of three to ten, as when a machine is busy for a moment. The first frame is kept.
-// The share holds on average over long sequences.
+// Returns the indices of the frames out of `count` that are not lost, in order. Half of the lost frames are
+// lost singly and half in bursts of three to ten, as on a busy machine. The first frame is always kept. The
+// ratio of lost frames holds on average over long sequences.
 std::vector<int> KeptFrames(int count, double dropped_share, std::uint64_t seed);
 
 }  // namespace docent::app

@@ -13,36 +13,38 @@ namespace {
 using Options = SimulationOptions;
 
 constexpr NamedOption kOptions[] = {
-    {"duration", "SECONDS", "seconds at most; 0 for the whole way", 0, 86400,
+    {"duration", "SECONDS", "maximum duration; 0 for the whole trajectory", 0, 86400,
      [](double value, Options* options) { options->duration_s = value; }},
-    {"fps", "HZ", "images a second", 0.01, 1000,
+    {"fps", "HZ", "frame rate, images per second", 0.01, 1000,
      [](double value, Options* options) { options->frame_rate_hz = value; }},
-    {"noise", "LEVELS", "noise that is the same everywhere, grey levels of 255", 0, 100,
+    {"noise", "LEVELS", "standard deviation of the constant image noise, grey levels of 255", 0, 100,
      [](double value, Options* options) { options->noise_sigma = value; }},
-    {"gain-noise", "LEVELS", "noise that grows with signal and gain: grey levels at a signal of 128", 0, 50,
+    {"gain-noise", "LEVELS",
+     "standard deviation of the noise that grows with signal and gain, grey levels at a signal of 128", 0, 50,
      [](double value, Options* options) { options->faults.gain_noise_sigma = value; }},
-    {"blur", "N", "renderings averaged over an exposure; 1 for no motion blur", 1, 64,
+    {"blur", "N", "images averaged over an exposure to simulate motion blur; 1 for none", 1, 64,
      [](double value, Options* options) { options->blur_samples = static_cast<int>(value); }, true},
-    {"exposure", "MS", "time of an exposure, milliseconds; matters with blur", 0, 1000,
+    {"exposure", "MS", "exposure time in milliseconds; only used with blur", 0, 1000,
      [](double value, Options* options) { options->exposure_s = value / 1000; }},
-    {"rolling-shutter", "MS", "time from the exposure of the first row to that of the last, milliseconds", 0,
-     1000, [](double value, Options* options) { options->faults.readout_s = value / 1000; }},
-    {"interlaced", nullptr, "expose the odd rows half a frame after the even ones", 0, 1,
+    {"rolling-shutter", "MS", "time from the exposure of the first row to that of the last row, milliseconds",
+     0, 1000, [](double value, Options* options) { options->faults.readout_s = value / 1000; }},
+    {"interlaced", nullptr, "expose odd rows half a frame later than even rows", 0, 1,
      [](double value, Options* options) { options->faults.interlaced = value != 0; }},
-    {"focal-error", "PERCENT", "the calibration's focal length is too long by so much", -50, 100,
+    {"focal-error", "PERCENT", "error of the calibrated focal length; positive: too long", -50, 100,
      [](double value, Options* options) { options->faults.focal_error = value / 100; }},
     {"distortion-error", "PIXELS",
-     "the calibration's distortion misplaces rays by so much, as root mean square over the image", -20, 20,
+     "error of the calibrated distortion: RMS displacement of rays over the image", -20, 20,
      [](double value, Options* options) { options->faults.distortion_error_px = value; }},
-    {"gain", "FACTOR", "of the exposure; above 1 highlights are clipped", 0.05, 20,
+    {"gain", "FACTOR", "factor of the exposure; above 1, highlights are clipped", 0.05, 20,
      [](double value, Options* options) { options->faults.gain = value; }},
-    {"exposure-jumps", "STOPS", "largest jump of the exposure, at random times, with recovery", 0, 4,
+    {"exposure-jumps", "STOPS", "largest exposure jump; jumps occur at random times and decay", 0, 4,
      [](double value, Options* options) { options->faults.exposure_jump_stops = value; }},
-    {"drops", "PERCENT", "share of the frames that are lost, alone and in bursts", 0, 90,
+    {"drops", "PERCENT", "percentage of frames that are lost, singly and in bursts", 0, 90,
      [](double value, Options* options) { options->faults.dropped_share = value / 100; }},
-    {"tremor", "DEGREES", "root mean square rotation of a hand's tremor of 4 to 12 Hz about each axis", 0, 5,
+    {"tremor", "DEGREES", "RMS rotation about each axis of the hand tremor of 4 to 12 Hz", 0, 5,
      [](double value, Options* options) { options->faults.tremor_deg = value; }},
-    {"identical-places", nullptr, "make all bays and desks look the same", 0, 1,
+    {"identical-places", nullptr,
+     "give all bays or desks the same content, so that they cannot be distinguished", 0, 1,
      [](double value, Options* options) { options->identical_places = value != 0; }},
 };
 
@@ -93,7 +95,7 @@ void SetNamedOptions(std::string_view text, SimulationOptions* options) {
     const std::string_view name = word.substr(0, equals);
     const NamedOption& option = OptionOf(name);
     if (!taken.insert(name).second)
-      throw Error("The simulator's option '" + std::string(name) + "' is given twice.");
+      throw Error("The simulator's option '" + std::string(name) + "' is specified twice.");
     const bool has_number = equals != std::string_view::npos;
     if (option.unit != nullptr && !has_number) {
       throw Error("The simulator's option '" + std::string(name) + "' needs a number: " + std::string(name) +

@@ -10,8 +10,8 @@
 namespace docent::app {
 namespace {
 
-constexpr double kFullTurn = 2 * std::numbers::pi;
-// OpenCV draws at 1/16 pixel with this shift.
+constexpr double kFullCircle = 2 * std::numbers::pi;
+// OpenCV draws with a resolution of 1/16 pixel with this shift.
 constexpr int kShift = 4;
 
 cv::Point Fixed(cv::Point2d p) {
@@ -35,8 +35,8 @@ void DrawLetter(cv::Point2d corner, double width, double height, int thickness, 
 
 cv::Scalar ColorFromHue(double hue, double saturation, double brightness) {
   const auto channel = [&](double offset) {
-    const double turn = hue + offset - std::floor(hue + offset);
-    const double ramp = std::clamp(std::abs(turn * 6 - 3) - 1, 0.0, 1.0);
+    const double phase = hue + offset - std::floor(hue + offset);
+    const double ramp = std::clamp(std::abs(phase * 6 - 3) - 1, 0.0, 1.0);
     return 255 * brightness * (1 - saturation + saturation * ramp);
   };
   return {channel(1.0 / 3), channel(2.0 / 3), channel(0)};
@@ -111,7 +111,7 @@ void DrawWriting(const cv::Rect& area, int letter_px, const cv::Scalar& color, R
 }
 
 void DrawShape(cv::Point2d center, double radius, const cv::Scalar& color, Random* random, cv::Mat* image) {
-  const double turn = random->Uniform(0, kFullTurn);
+  const double rotation = random->Uniform(0, kFullCircle);
   const int kind = random->Below(6);
   const int thickness = std::max(1, static_cast<int>(radius * 0.15));
   if (kind == 0) {
@@ -122,17 +122,17 @@ void DrawShape(cv::Point2d center, double radius, const cv::Scalar& color, Rando
   if (kind == 1) {
     cv::ellipse(*image, Fixed(center),
                 {static_cast<int>(radius * (1 << kShift)), static_cast<int>(radius * 0.6 * (1 << kShift))},
-                turn * 57, 0, 360, color, thickness, cv::LINE_AA, kShift);
+                rotation * 57, 0, 360, color, thickness, cv::LINE_AA, kShift);
     return;
   }
   std::vector<cv::Point> corners;
   const bool is_bar = kind == 2, is_star = kind == 3;
   const int count = is_bar ? 4 : is_star ? 10 : 3 + static_cast<int>(random->Below(3));
   for (int i = 0; i < count; ++i) {
-    double angle = turn + kFullTurn * i / count, reach = radius;
+    double angle = rotation + kFullCircle * i / count, reach = radius;
     if (is_bar)
-      angle =
-          turn + (i < 2 ? -0.22 : 0.22) + (i == 1 || i == 2 ? std::numbers::pi - (i == 1 ? -0.44 : 0.44) : 0);
+      angle = rotation + (i < 2 ? -0.22 : 0.22) +
+              (i == 1 || i == 2 ? std::numbers::pi - (i == 1 ? -0.44 : 0.44) : 0);
     if (is_star && i % 2 == 1) reach *= 0.45;
     if (kind >= 4) reach *= random->Uniform(0.7, 1.2);
     corners.push_back(Fixed(center + reach * cv::Point2d(std::cos(angle), std::sin(angle))));
@@ -159,7 +159,7 @@ void Weather(double amount, Random* random, cv::Mat* image) {
   }
   for (int i = 0; i < scratches; ++i) {
     cv::Point2d from(random->Uniform(0, image->cols), random->Uniform(0, image->rows));
-    double angle = random->Uniform(0, kFullTurn);
+    double angle = random->Uniform(0, kFullCircle);
     const cv::Scalar color = cv::Scalar::all(random->Uniform(40, 200));
     for (int piece = 2 + random->Below(5); piece > 0; --piece) {
       angle += random->Uniform(-0.7, 0.7);

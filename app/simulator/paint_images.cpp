@@ -13,7 +13,7 @@ cv::Point2d RandomPoint(const cv::Rect& area, Random* random) {
   return {area.x + random->Uniform() * area.width, area.y + random->Uniform() * area.height};
 }
 
-// Strokes that take their colour from an under-painting and their direction from a field.
+// Brush strokes whose colour comes from a background image and whose direction comes from a field.
 void BrushOver(const cv::Rect& area, const cv::Mat& colors, const cv::Mat& direction, int strokes,
                Random* random, cv::Mat* image) {
   for (int i = 0; i < strokes; ++i) {
@@ -111,8 +111,7 @@ cv::Mat PaintCollage(cv::Size size, std::uint64_t seed) {
   const cv::Mat shading = NoiseField(size, 3, 3, 6, 0.7, &random);
   const double side = std::sqrt(static_cast<double>(size.area()));
   for (int i = 0; i < 700; ++i) {
-    // A power law between the smallest and the largest radius; the large ones come first, so that small ones
-    // stay.
+    // Radii follow a power law. Large shapes are drawn first, so that they do not cover the small ones.
     const double t = std::pow((i + random.Uniform()) / 700, 1.6), low = 0.008, high = 0.35;
     const double radius = side / std::sqrt(1 / (high * high) + t * (1 / (low * low) - 1 / (high * high)));
     DrawShape(RandomPoint(area, &random), radius, RandomColor(&random, 0.05, 1.0), &random, &image);
@@ -132,7 +131,7 @@ cv::Mat PaintBooks(cv::Size size, int shelves, std::uint64_t seed) {
     for (int x = board; x < size.width - board;) {
       const int thickness = std::max(5, static_cast<int>(shelf_height * random.Uniform(0.08, 0.24)));
       const int height = static_cast<int>((shelf_height - board) * random.Uniform(0.6, 0.94));
-      if (random.Below(12) == 0) x += thickness;  // a gap
+      if (random.Below(12) == 0) x += thickness;  // A gap between books.
       const cv::Rect spine(x, floor_y - height, std::min(thickness, size.width - board - x), height);
       const cv::Scalar color = RandomColor(&random, 0.2, 0.95), ink = RandomColor(&random, 0.1, 1.0);
       if (spine.width < 4) break;
@@ -141,13 +140,13 @@ cv::Mat PaintBooks(cv::Size size, int shelves, std::uint64_t seed) {
         const int y = spine.y + static_cast<int>(random.Uniform(0.05, 0.95) * height);
         cv::rectangle(image, cv::Rect(spine.x, y, spine.width, 2 + height / 30) & spine, ink, cv::FILLED);
       }
-      // The title runs down the spine: written on a lying strip that is turned.
-      cv::Mat strip(spine.width, height, CV_8UC3, color), turned;
+      // The title runs down the spine, so it is drawn on a horizontal strip that is rotated.
+      cv::Mat strip(spine.width, height, CV_8UC3, color), rotated;
       const int letter = std::max(3, spine.width / 2);
       DrawWriting({height / 8, (spine.width - letter) / 2, height * 5 / 8, letter}, letter, ink, &random,
                   &strip);
-      cv::rotate(strip, turned, cv::ROTATE_90_CLOCKWISE);
-      turned(cv::Rect(0, height / 8, spine.width, height * 6 / 8))
+      cv::rotate(strip, rotated, cv::ROTATE_90_CLOCKWISE);
+      rotated(cv::Rect(0, height / 8, spine.width, height * 6 / 8))
           .copyTo(image(cv::Rect(spine.x, spine.y + height / 8, spine.width, height * 6 / 8)));
       cv::rectangle(image, spine, color * 0.3, 1, cv::LINE_AA);
       x += spine.width;

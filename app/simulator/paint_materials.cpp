@@ -9,8 +9,7 @@
 namespace docent::app {
 namespace {
 
-// A patch of the material inside `area` of the image, brightened by a random amount: one brick, plank, or
-// tile.
+// Brightens `area` of the image by a random amount: one brick, plank or tile.
 void Tone(const cv::Rect& area, double low, double high, Random* random, cv::Mat* image) {
   const cv::Rect inside = area & cv::Rect(0, 0, image->cols, image->rows);
   if (inside.empty()) return;
@@ -18,7 +17,7 @@ void Tone(const cv::Rect& area, double low, double high, Random* random, cv::Mat
   patch.convertTo(patch, -1, random->Uniform(low, high), 0);
 }
 
-// A disc that goes on at the opposite border where it crosses one.
+// Draws a disc that wraps around the image borders.
 void DrawWrapped(cv::Point center, int radius, const cv::Scalar& color, cv::Mat* image) {
   for (const int dx : {-image->cols, 0, image->cols}) {
     for (const int dy : {-image->rows, 0, image->rows}) {
@@ -127,7 +126,7 @@ cv::Mat PaintStone(cv::Size size, const cv::Scalar& color, std::uint64_t seed) {
   Random random(seed);
   const cv::Mat cloud = NoiseField(size, 4, 4, 6, 0.7, &random);
   cv::Mat image = ColorsAlong(cloud, color * 0.6, color * 1.3);
-  // Veins lie where a second field passes through zero.
+  // Veins are drawn where a second field crosses zero.
   const cv::Mat vein_field = NoiseField(size, 3, 3, 5, 0.65, &random);
   cv::Mat veins = 1.0 - cv::abs(vein_field) * 14.0;
   cv::max(veins, 0.0, veins);
@@ -163,7 +162,7 @@ cv::Mat PaintCarpet(cv::Size size, std::uint64_t seed) {
 cv::Mat PaintGrass(cv::Size size, std::uint64_t seed) {
   Random random(seed);
   cv::Mat image(size, CV_8UC3, cv::Scalar(25, 60, 45));
-  // Bare earth, moss and clover in patches of all sizes, then blades, then flowers and leaves on top.
+  // Bare earth, moss and clover in patches of all sizes, then grass blades, then flowers and leaves on top.
   for (int i = 0; i < 90; ++i) {
     const int radius = static_cast<int>(size.width * (0.012 + 0.1 * std::pow(random.Uniform(), 2)));
     const cv::Scalar color = random.Below(3) == 0
@@ -174,8 +173,8 @@ cv::Mat PaintGrass(cv::Size size, std::uint64_t seed) {
   }
   const int blades = size.width * size.height / 60;
   for (int i = 0; i < blades; ++i) {
-    const double shade = 0.3 + 0.7 * i / blades;  // later blades lie on top, in the light
-    // Half of them take the tone of what grows or lies below them.
+    const double shade = 0.3 + 0.7 * i / blades;  // Later blades are on top and brighter.
+    // Half of the blades take the colour below them.
     const cv::Point root(random.Below(size.width), random.Below(size.height));
     const cv::Vec3b below = image.at<cv::Vec3b>(root);
     cv::Scalar color =
@@ -183,7 +182,7 @@ cv::Mat PaintGrass(cv::Size size, std::uint64_t seed) {
     if (random.Below(4) != 0) color = 0.6 * cv::Scalar(below[0], below[1], below[2]) + 0.4 * color;
     const cv::Point tip(static_cast<int>(random.Uniform(-9, 9)), static_cast<int>(random.Uniform(-22, -6)));
     const int thickness = 1 + static_cast<int>(random.Below(2));
-    // Drawn once more across each border that it may cross.
+    // Each blade is drawn again at the opposite border that it may cross, so that the texture is tileable.
     for (const int dx : {0, size.width, -size.width}) {
       for (const int dy : {0, size.height}) {
         const cv::Point from = root + cv::Point(dx, dy);

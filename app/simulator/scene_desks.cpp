@@ -9,9 +9,9 @@
 namespace docent::app {
 namespace {
 
-constexpr double kDeskPitch = 2.1;                                        // metres along the row
-constexpr double kDeskWidth = 1.6, kDeskDepth = 0.8, kDeskHeight = 0.74;  // metres
-constexpr double kDeskMiddle = 1.25, kPartition = 1.7;                    // ahead of the visitor
+constexpr double kDeskPitch = 2.1;                                        // Metres along the row.
+constexpr double kDeskWidth = 1.6, kDeskDepth = 0.8, kDeskHeight = 0.74;  // Metres.
+constexpr double kDeskMiddle = 1.25, kPartition = 1.7;  // Distances in front of the visitor, metres.
 
 struct SharedTextures {
   int top, body, partition, bezel, keyboard;
@@ -31,7 +31,7 @@ void FurnishDesk(const Stand& stand, const SharedTextures& shared, std::uint64_t
   }
   surfaces.AddBox(stand.Point({0, 0, kPartition}), kDeskPitch - 0.05, 1.35, 0.04, 0, shared.partition,
                   shared.partition);
-  // The same monitor everywhere, with something else on it.
+  // All desks have the same monitor with different content on the screen.
   const int screen = surfaces.AddTexture(PaintScreen({512, 256}, random.Next()));
   const double monitor_x = random.Uniform(-0.12, 0.12), monitor_yaw = random.Uniform(-0.2, 0.2);
   surfaces.AddBox(stand.Point({monitor_x, -kDeskHeight, kDeskMiddle + 0.22}), 0.12, 0.12, 0.1, 0,
@@ -54,8 +54,8 @@ void FurnishDesk(const Stand& stand, const SharedTextures& shared, std::uint64_t
     const int note = surfaces.AddTexture(kind == 0   ? PaintPage({256, 256}, note_seed)
                                          : kind == 1 ? PaintPoster({256, 256}, note_seed)
                                                      : PaintCollage({256, 256}, note_seed));
-    HangPicture(stand, {left + width / 2, -random.Uniform(0.98, 1.14), kPartition - 0.025}, width, height,
-                note, scene);
+    HangPainting(stand, {left + width / 2, -random.Uniform(0.98, 1.14), kPartition - 0.025}, width, height,
+                 note, scene);
     left += width + random.Uniform(0.03, 0.3);
   }
 }
@@ -90,13 +90,13 @@ Scene BuildDesks(const SceneRequest& request) {
     const std::uint64_t own_seed = desk == 0 ? first_seed : random.Next();
     FurnishDesk(stand, shared, request.identical_places ? first_seed : own_seed, &scene);
     scene.places.push_back({std::to_string(desk), stand.Point({0, -kDeskHeight, kDeskMiddle})});
-    // Images on the wall behind the partitions.
+    // A painting on the wall behind the partitions.
     const double width = random.Uniform(0.8, 1.3);
     Stand wall;
     wall.origin = {kDeskPitch * desk, 0, hall.high.z()};
     const int image = surfaces.AddTexture(PaintPainting({512, 512}, random.Next()));
-    HangPicture(wall, {random.Uniform(-0.4, 0.4), -1.85, -0.02}, width, random.Uniform(0.6, 0.9), image,
-                &scene);
+    HangPainting(wall, {random.Uniform(-0.4, 0.4), -1.85, -0.02}, width, random.Uniform(0.6, 0.9), image,
+                 &scene);
   }
   Viewing viewing;
   viewing.eye_height = 1.3;

@@ -11,11 +11,11 @@
 namespace docent::app {
 namespace {
 
-constexpr double kBayPitch = 3.6;  // metres along the nave
-constexpr double kHalfNave = 3.1;  // from the middle of the nave to a bay's wall
+constexpr double kBayPitch = 3.6;  // Metres along the hall.
+constexpr double kHalfNave = 3.1;  // Metres from the middle of the hall to a bay's wall.
 constexpr double kCabinetHeight = 0.95, kCabinetWidth = 1.7, kCabinetDepth = 0.65;
 
-// What all bays share, which makes them look alike.
+// Textures that all bays share, so that they look alike.
 struct SharedTextures {
   int column, cabinet_front, cabinet_body, plinth;
 };
@@ -23,7 +23,7 @@ struct SharedTextures {
 Stand BayStand(int bay, int bays) {
   const int right_bays = (bays + 1) / 2;
   Stand stand;
-  // Up along the right side, back down along the left one.
+  // The bays are numbered forward along the right side and back along the left side.
   const bool is_right = bay < right_bays;
   const int row = is_right ? bay : bays - 1 - bay;
   stand.origin = {0, 0, kBayPitch * row};
@@ -39,7 +39,7 @@ void FurnishBay(const Stand& stand, const SharedTextures& shared, std::uint64_t 
                   shared.cabinet_body, shared.cabinet_front);
   AddClutter(stand, {0, -kCabinetHeight, cabinet_z}, kCabinetWidth - 0.1, kCabinetDepth - 0.06, 6, 0.45,
              &random, scene);
-  // Images in two rows, none in the same place as in another bay.
+  // Two rows of paintings and posters, at different positions in each bay.
   double left = -1.5 + random.Uniform(0, 0.15);
   while (left < 0.95) {
     const double width = random.Uniform(0.5, 0.95), height = random.Uniform(0.55, 0.95);
@@ -47,13 +47,13 @@ void FurnishBay(const Stand& stand, const SharedTextures& shared, std::uint64_t 
     const std::uint64_t painting_seed = random.Next();
     const int texture = surfaces.AddTexture(random.Below(3) == 0 ? PaintPoster({512, 512}, painting_seed)
                                                                  : PaintPainting({512, 512}, painting_seed));
-    HangPicture(stand, center, width, height, texture, scene);
+    HangPainting(stand, center, width, height, texture, scene);
     left += width + random.Uniform(0.06, 0.25);
   }
   const int label = surfaces.AddTexture(PaintPage({256, 256}, random.Next()));
-  HangPicture(stand, {random.Uniform(-1.3, 1.3), -random.Uniform(1.05, 1.25), kHalfNave - 0.02}, 0.3, 0.36,
-              label, scene);
-  // An exhibit on a plinth, to one side and nearer to the visitor.
+  HangPainting(stand, {random.Uniform(-1.3, 1.3), -random.Uniform(1.05, 1.25), kHalfNave - 0.02}, 0.3, 0.36,
+               label, scene);
+  // An exhibit on a plinth, at one side and closer to the visitor.
   const double side = random.Below(2) == 0 ? -1.25 : 1.25;
   const Eigen::Vector3d foot(side, 0, kHalfNave - 0.75 + random.Uniform(-0.15, 0.15));
   const double plinth_height = random.Uniform(0.6, 0.85);
@@ -103,13 +103,13 @@ Scene BuildMuseum(const SceneRequest& request) {
       surfaces.AddColumn({side * (kHalfNave - 0.3), 0, kBayPitch * (row - 0.5)}, 0.2, 3.6, 14, shared.column);
     }
   }
-  // The ends of the nave: a large image each.
+  // A large painting at each end of the hall.
   for (const double yaw : {0.0, std::numbers::pi}) {
     Stand end;
     end.yaw_rad = yaw;
     end.origin = {0, 0, yaw == 0 ? hall.high.z() : hall.low.z()};
-    HangPicture(end, {0, -1.8, -0.02}, 2.6, 2.0,
-                surfaces.AddTexture(PaintPainting({512, 512}, random.Next())), &scene);
+    HangPainting(end, {0, -1.8, -0.02}, 2.6, 2.0,
+                 surfaces.AddTexture(PaintPainting({512, 512}, random.Next())), &scene);
   }
   TourPlaces(stands, Viewing{}, &random, &scene);
   return scene;

@@ -12,14 +12,14 @@ namespace {
 
 constexpr double kTau = 2 * std::numbers::pi;
 
-// Square images of this side, beside and below each other, on one canvas.
+// A canvas that is tiled with different square images.
 cv::Mat Frieze(cv::Size size, int side, Random* random) {
   cv::Mat canvas(size, CV_8UC3);
   const int columns = size.width / side;
   for (int i = 0; i < columns * (size.height / side); ++i) {
     const std::uint64_t seed = random->Next();
     const cv::Size square(side, side);
-    const int kind = (i + i / columns) % 4;  // a different one below
+    const int kind = (i + i / columns) % 4;  // The row below gets a different kind.
     const cv::Mat image = kind == 0   ? PaintCollage(square, seed)
                           : kind == 1 ? PaintPoster(square, seed)
                           : kind == 2 ? PaintPainting(square, seed)
@@ -29,10 +29,10 @@ cv::Mat Frieze(cv::Size size, int side, Random* random) {
   return canvas;
 }
 
-// A walk about the middle: where the eye is and where it looks go around on ellipses with these half axes
-// along x and z.
+// A walk around the origin: camera position and target move on ellipses with these semi-axes along x and z,
+// metres.
 struct Round {
-  int steps = 1, beyond = 0;  // of a whole round, and of the part of it that is walked a second time
+  int steps = 1, beyond = 0;  // Steps of one round, and of the part that is walked a second time.
   double step_s = 1;
   Eigen::Vector2d eye, gaze;
   double gaze_height = 0;
@@ -48,7 +48,8 @@ void Walk(const Round& round, Trajectory* trajectory) {
   }
 }
 
-// A round wall of flat panels, painted once around. rim(angle): its upper edge.
+// A round wall of flat panels with the texture wrapped once around it. rim(angle) is a point of the upper
+// edge.
 template <typename Rim>
 void AddRoundWall(int panels, const Rim& rim, double height, int texture, Surfaces* surfaces) {
   for (int i = 0; i < panels; ++i) {
@@ -58,7 +59,7 @@ void AddRoundWall(int panels, const Rim& rim, double height, int texture, Surfac
   }
 }
 
-// Two by three cabinets back to back, fronts outwards, and once around them.
+// A block of cabinets with the fronts outwards, and a walk around it.
 void BuildCabinets(Random* random, Scene* scene) {
   Surfaces& surfaces = scene->surfaces;
   for (int side = 0; side < 4; ++side) {
@@ -81,17 +82,22 @@ void BuildCabinets(Random* random, Scene* scene) {
        &scene->trajectory);
 }
 
-// A round tower up to the ceiling, painted all over, and once around it, close by: nothing that is seen in
-// one place is seen again before the camera is back there.
+// A textured round tower up to the ceiling, and a walk around it at a short distance, so that no part is seen
+// again before the loop is complete.
 void BuildTower(Random* random, Scene* scene) {
-  constexpr double kRadius = 2.2, kHeight = 3.2, kWay = 3.4;
+  constexpr double kRadius = 2.2, kHeight = 3.2, kWalkRadius = 3.4;
   const int texture = scene->surfaces.AddTexture(Frieze({4096, 1024}, 512, random));
   const auto rim = [](double angle) {
     return Eigen::Vector3d(kRadius * std::cos(angle), -kHeight, kRadius * std::sin(angle));
   };
   AddRoundWall(72, rim, kHeight, texture, &scene->surfaces);
   scene->places.push_back({"tower", {0, -1.5, -kRadius}});
-  Walk({.steps = 88, .beyond = 14, .step_s = 0.3, .eye = {kWay, kWay}, .gaze = {0, 0}, .gaze_height = 1.5},
+  Walk({.steps = 88,
+        .beyond = 14,
+        .step_s = 0.3,
+        .eye = {kWalkRadius, kWalkRadius},
+        .gaze = {0, 0},
+        .gaze_height = 1.5},
        &scene->trajectory);
 }
 
@@ -101,7 +107,7 @@ Scene BuildCylinder(const SceneRequest& request) {
   Random random(request.seed);
   Scene scene;
   scene.trajectory = Trajectory(random.Next());
-  // Ninety panels: nowhere more than 0.3 mm inside the round wall, and the truth is that of the panels.
+  // Ninety panels deviate by at most 0.3 mm from a cylinder; the ground truth is computed with the panels.
   constexpr double kRadius = 0.5, kHeight = 0.8;
   const int texture = scene.surfaces.AddTexture(Frieze({4096, 1024}, 512, &random));
   const auto rim = [](double angle) {
@@ -109,7 +115,7 @@ Scene BuildCylinder(const SceneRequest& request) {
   };
   AddRoundWall(90, rim, kHeight, texture, &scene.surfaces);
   scene.places.push_back({"cylinder", {0, 0, kRadius}});
-  // 64 degrees across, without distortion, as in the paper.
+  // A horizontal field of view of 64 degrees without distortion, as in the paper.
   engine::CameraModel::Intrinsics intrinsics{640, 480, 0, 0, 319.5, 239.5};
   intrinsics.fx = intrinsics.fy = 320 / std::tan(kTau * 32 / 360);
   scene.camera = engine::CameraModel(engine::LensModel::kRadialTangential, intrinsics, {});
@@ -128,7 +134,7 @@ Scene BuildGrass(const SceneRequest& request) {
   Random random(request.seed);
   Scene scene;
   scene.trajectory = Trajectory(random.Next());
-  constexpr double kSide = 60, kPitch = 1.5;  // metres
+  constexpr double kSide = 60, kPitch = 1.5;  // Metres.
   const int lawn = scene.surfaces.AddTexture(PaintGrass({1024, 1024}, random.Next()), true);
   scene.surfaces.AddRectangle({-kSide / 2, 0, kSide / 2}, {kSide, 0, 0}, {0, 0, -kSide}, lawn,
                               {0, 0, kSide / kPitch, kSide / kPitch});
@@ -163,8 +169,8 @@ Scene BuildLoop(const SceneRequest& request) {
     for (int i = 0; i < 4; ++i) {
       const int image = surfaces.AddTexture(i % 2 == 0 ? PaintPainting({512, 512}, random.Next())
                                                        : PaintPoster({512, 512}, random.Next()));
-      HangPicture(stand, {-3.0 + 2 * i + random.Uniform(-0.2, 0.2), -1.7, -0.02}, random.Uniform(0.9, 1.4),
-                  random.Uniform(0.8, 1.2), image, &scene);
+      HangPainting(stand, {-3.0 + 2 * i + random.Uniform(-0.2, 0.2), -1.7, -0.02}, random.Uniform(0.9, 1.4),
+                   random.Uniform(0.8, 1.2), image, &scene);
     }
   }
   if (request.parameter == 0) {

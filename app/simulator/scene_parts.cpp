@@ -12,10 +12,11 @@
 namespace docent::app {
 namespace {
 
-constexpr double kWalkingSpeed = 1.5;  // metres a second
-constexpr double kTurningSpeed = 1.9;  // radians a second
+constexpr double kWalkingSpeed = 1.5;   // m/s.
+constexpr double kRotationSpeed = 1.9;  // rad/s.
 
-// Waypoints in a stand's frame: x, height above the floor and z of the camera, shift of the target, seconds.
+// Waypoints in a stand's frame: x, height above the floor and z of the camera (metres), x of the target
+// (metres), and seconds since the previous waypoint.
 struct Step {
   double x, height, z, target_x, seconds;
 };
@@ -28,18 +29,18 @@ void Walk(const Stand& stand, const Viewing& viewing, const std::vector<Step>& s
   }
 }
 
-// From where the camera is to the start of the next walk, no faster than a person.
+// Moves the camera to the start of the next walk at the speed of a person.
 void Travel(const Stand& stand, const Viewing& viewing, const Step& start, Scene* scene) {
   Trajectory& trajectory = scene->trajectory;
   trajectory.BeginSegment("travel");
   const Eigen::Vector3d goal = stand.Point({start.x, -start.height, start.z});
   const Eigen::Vector3d gaze =
       stand.Point({start.target_x, -viewing.target_height, viewing.target_ahead}) - goal;
-  const double turn =
+  const double rotation =
       std::remainder(std::atan2(gaze.x(), gaze.z()) - trajectory.last_yaw_rad(), 2 * std::numbers::pi);
-  // A curve that starts and ends at rest is half as fast again in its middle.
+  // A cubic that starts and ends at rest reaches 1.5 times its mean speed.
   const double seconds = std::max({1.5, 1.5 * (goal - trajectory.last_position()).norm() / kWalkingSpeed,
-                                   1.5 * std::abs(turn) / kTurningSpeed});
+                                   1.5 * std::abs(rotation) / kRotationSpeed});
   Walk(stand, viewing, {{start.x, start.height, start.z, start.target_x, seconds}}, scene);
 }
 
@@ -49,8 +50,8 @@ Eigen::Vector3d Stand::Direction(const Eigen::Vector3d& direction) const {
   return Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitY()) * direction;
 }
 
-void HangPicture(const Stand& stand, const Eigen::Vector3d& center, double width, double height, int texture,
-                 Scene* scene) {
+void HangPainting(const Stand& stand, const Eigen::Vector3d& center, double width, double height, int texture,
+                  Scene* scene) {
   scene->surfaces.AddRectangle(stand.Point(center - Eigen::Vector3d(width / 2, height / 2, 0)),
                                stand.Direction({width, 0, 0}), stand.Direction({0, height, 0}), texture);
 }
@@ -140,7 +141,7 @@ void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, Random
     }
     Walk(stands[k], viewing, {steps.begin() + 1, steps.end()}, scene);
   }
-  // Another order: one of the second half, one of the first, and so on.
+  // The visits alternate between places of the second and the first half.
   std::vector<int> order;
   for (int k = 0; k < count / 2; ++k) {
     order.push_back(count / 2 + k);

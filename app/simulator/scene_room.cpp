@@ -11,8 +11,8 @@
 namespace docent::app {
 namespace {
 
-constexpr double kHalfWidth = 2.8, kHalfDepth = 2.5, kHeight = 2.6;           // of the room, metres
-constexpr double kTableWidth = 1.5, kTableDepth = 0.95, kTableHeight = 0.75;  // metres
+constexpr double kHalfWidth = 2.8, kHalfDepth = 2.5, kHeight = 2.6;           // Of the room, metres.
+constexpr double kTableWidth = 1.5, kTableDepth = 0.95, kTableHeight = 0.75;  // Metres.
 constexpr double kTau = 2 * std::numbers::pi;
 
 void AddTable(Random* random, Scene* scene) {
@@ -40,7 +40,7 @@ void AddTable(Random* random, Scene* scene) {
   }
 }
 
-// Posters and paintings along one wall, between those of the furniture.
+// Posters and paintings along one wall, between the furniture.
 void DecorateWall(const Stand& wall, double length, Random* random, Scene* scene) {
   double left = -length / 2 + random->Uniform(0.1, 0.3);
   while (left < length / 2 - 0.8) {
@@ -48,7 +48,8 @@ void DecorateWall(const Stand& wall, double length, Random* random, Scene* scene
     const std::uint64_t seed = random->Next();
     const int texture = scene->surfaces.AddTexture(random->Below(2) == 0 ? PaintPoster({512, 512}, seed)
                                                                          : PaintPainting({512, 512}, seed));
-    HangPicture(wall, {left + width / 2, -random->Uniform(1.35, 1.75), -0.02}, width, height, texture, scene);
+    HangPainting(wall, {left + width / 2, -random->Uniform(1.35, 1.75), -0.02}, width, height, texture,
+                 scene);
     left += width + random->Uniform(0.1, 0.4);
   }
 }
@@ -73,7 +74,7 @@ void Furnish(Random* random, Scene* scene) {
                  length = wall % 2 == 0 ? 2 * kHalfWidth : 2 * kHalfDepth;
     stand.origin = stand.Direction({0, 0, distance});
     DecorateWall(stand, length, random, scene);
-    // A bookcase, chest, or stack of boxes in front of the wall, to one side.
+    // A bookcase, chest or stack of boxes in front of the wall, at one side.
     const double x = random->Uniform(-0.3, 0.3) * length;
     const int body = surfaces.AddTexture(PaintWood({256, 256}, {60, 95, 130}, 4, random->Next()));
     if (wall % 2 == 0) {
@@ -88,7 +89,7 @@ void Furnish(Random* random, Scene* scene) {
   }
 }
 
-// About the table, as a person would who looks at what lies on it; the same spots come again.
+// Camera position on a periodic path around the table, which rerotations to the same places.
 Eigen::Vector3d EyeAt(double time_s) {
   const double angle = -kTau / 4 + 0.95 * std::sin(kTau * time_s / 17);
   const double radius = 1.55 + 0.2 * std::sin(kTau * time_s / 11 + 0.5);
@@ -115,17 +116,18 @@ Scene BuildRoom(const SceneRequest& request) {
   FurnishRoom(&random, &scene);
 
   Trajectory& trajectory = scene.trajectory;
-  const double step = 0.5, stretch = 9;  // seconds between waypoints, and of motion between two turns
+  const double step = 0.5,
+               stretch = 9;  // Seconds between waypoints, and of motion between two pure rotations.
   const double motion = request.parameter == 0 ? 30 : stretch * (request.parameter + 1);
   trajectory.BeginSegment("general");
   trajectory.LookFrom(EyeAt(0), GazeAt(0), 0);
-  int turns = 0;
+  int rotations = 0;
   for (int i = 1; i * step <= motion; ++i) {
     trajectory.LookFrom(EyeAt(i * step), GazeAt(i * step), step);
-    if (turns >= request.parameter || i * step < stretch * (turns + 1)) continue;
-    // Turn on the spot to one side, on a tripod, and back to the table.
+    if (rotations >= request.parameter || i * step < stretch * (rotations + 1)) continue;
+    // A pure rotation without sway to one side and back to the table.
     const Eigen::Vector3d spot = trajectory.last_position();
-    const double yaw = trajectory.last_yaw_rad(), side = turns % 2 == 0 ? 1 : -1;
+    const double yaw = trajectory.last_yaw_rad(), side = rotations % 2 == 0 ? 1 : -1;
     const double pitch = trajectory.last_pitch_rad();
     trajectory.MoveTo(spot, yaw, pitch, 0.4, 0);
     trajectory.BeginSegment("rotation");
@@ -134,7 +136,7 @@ Scene BuildRoom(const SceneRequest& request) {
     trajectory.MoveTo(spot, yaw + side * 1.0, 0.5 * pitch, 1.6, 0);
     trajectory.MoveTo(spot, yaw, pitch, 1.6, 0);
     trajectory.BeginSegment("general");
-    ++turns;
+    ++rotations;
   }
   return scene;
 }

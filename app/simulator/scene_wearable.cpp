@@ -5,23 +5,22 @@
 #include "app/simulator/scene.h"
 #include "app/simulator/scene_parts.h"
 
-// One person with two cameras at the table of the furnished room: one in the hand, one on the shoulder
-// (ptamm §4, Fig. 4 and 5). The two scenes are views of the same walk, so that a pair of sources makes a
-// wearable.
+// A person with two cameras at the table of the furnished room: one in the hand, one on the shoulder ([PTAMM]
+// 4, Fig. 4 and 5). Both scenes show the same walk, so that a pair of sources simulates a wearable.
 namespace docent::app {
 namespace {
 
 constexpr double kTau = 2 * std::numbers::pi;
 constexpr double kStep_s = 0.25, kBeginning_s = 5, kDuration_s = 24;
 
-// Where the person stands on an arc about the table, radians from the middle.
+// Position of the person on an arc around the table, in radians from its middle.
 double StandAt(double time_s) {
   return 0.42 * std::sin(kTau * time_s / 9);
 }
 
-// How far to the right a camera looks, metres at the table: in the beginning at what both see, then the hand
-// to one side and the shoulder to the other, then the other way round, so that each comes to what only the
-// other one has seen.
+// Horizontal target of a camera, in metres to the right at the table. At first both cameras see the same
+// area. Then the hand camera looks to one side and the shoulder camera to the other, then the other way
+// round, so that each camera comes to areas that only the other one has seen.
 double LookRight(double time_s) {
   if (time_s < kBeginning_s) return 0;
   return 1.15 * std::sin(kTau * (time_s - kBeginning_s) / (kDuration_s - kBeginning_s));
@@ -55,7 +54,7 @@ Trajectory ShoulderTrajectory(std::uint64_t seed) {
   return trajectory;
 }
 
-// Both see 94 degrees across, each through a lens of its own kind.
+// Both cameras have a horizontal field of view of 94 degrees, with different lens models.
 engine::CameraModel HandCamera() {
   return {
       engine::LensModel::kRadialTangential, {640, 480, 358.0, 358.4, 318.7, 240.6}, {-0.18, 0.03, 0, 0, 0}};
@@ -76,7 +75,7 @@ Scene BuildWearable(const SceneRequest& request, Place place) {
   scene.camera = is_hand ? HandCamera() : ShoulderCamera();
   if (!is_hand) {
     if (is_rigid) scene.carrier_from_camera = WearableRig();
-    // Another make of camera: it takes less light.
+    // A different camera model with less light sensitivity.
     scene.sensor_gain = 0.8;
     scene.sensor_number = 1;
   }

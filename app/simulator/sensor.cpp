@@ -11,7 +11,7 @@ namespace docent::app {
 namespace {
 
 constexpr std::size_t kNoiseCount = std::size_t{1} << 17;
-// Signals that are clipped anyway share the noise of this one, in grey levels.
+// Brighter signals are clipped in any case and use the noise of this one, in grey levels.
 constexpr int kBrightestSignal = 1023;
 
 }  // namespace
@@ -36,7 +36,7 @@ Sensor::Sensor(const Options& options) : options_(options) {
     const double sigma = options.gain_noise_sigma > 0 ? 1 : options.noise_sigma;
     noise_q12_.resize(kNoiseCount);
     for (std::int32_t& noise : noise_q12_) {
-      // A sum of twelve uniform numbers is normal enough, and the same with every mathematics library.
+      // The sum of twelve uniform numbers is nearly normal, and does not depend on the mathematics library.
       double sum = -6;
       for (int i = 0; i < 12; ++i) sum += random.Uniform();
       noise = static_cast<std::int32_t>(std::lround(sum * sigma * 4096));
@@ -45,10 +45,10 @@ Sensor::Sensor(const Options& options) : options_(options) {
 }
 
 double Sensor::Gain(double time_s) const {
-  const double turn = 2 * std::numbers::pi;
-  const double wandering =
-      std::sin(turn * 0.07 * time_s + phases_rad_[0]) + 0.5 * std::sin(turn * 0.23 * time_s + phases_rad_[1]);
-  return options_.gain * std::exp(options_.exposure_drift * wandering) * options_.exposure_jumps.Gain(time_s);
+  const double tau = 2 * std::numbers::pi;
+  const double drift =
+      std::sin(tau * 0.07 * time_s + phases_rad_[0]) + 0.5 * std::sin(tau * 0.23 * time_s + phases_rad_[1]);
+  return options_.gain * std::exp(options_.exposure_drift * drift) * options_.exposure_jumps.Gain(time_s);
 }
 
 std::vector<std::int32_t> Sensor::NoiseOfSignals_q12(double gain) const {

@@ -8,8 +8,7 @@
 
 namespace docent::app {
 
-// A head that does as it is told: 150 degrees to either side, 40 down and 30 up, 60 degrees a second. Any
-// thread.
+// An ideal pan-tilt head: 150 degrees to either side, 40 degrees down and 30 up, 60 degrees/s. Any thread.
 class SimulatedHead : public Head {
  public:
   static PanTiltRange Range() {

@@ -18,7 +18,7 @@ namespace {
 constexpr int kLargestSide_px = 8192;
 constexpr double kLongestDuration_s = 86400;
 
-// Parts of a camera that draw from the seed each for themselves.
+// Parts of a camera that have independent random numbers.
 enum class SeedOf : std::uint64_t { kSensor, kExposureJumps, kFrameDrops, kTremor };
 
 std::uint64_t MixedSeed(const SimulationOptions& options, const Scene& scene, SeedOf part) {
@@ -54,7 +54,7 @@ const SceneRecipe& RecipeOf(const std::string& name) {
   for (const SceneRecipe& recipe : SceneRecipes()) {
     if (recipe.name == name) return recipe;
   }
-  throw Error("There is no simulated scene \"" + name + "\"; the scenes are:\n" + ListOfScenes());
+  throw Error("There is no simulated scene \"" + name + "\"; the available scenes are:\n" + ListOfScenes());
 }
 
 int ParameterOf(const SceneRecipe& recipe, const std::string& spec, const std::string& text) {
@@ -74,22 +74,20 @@ int ParameterOf(const SceneRecipe& recipe, const std::string& spec, const std::s
 }  // namespace
 
 std::optional<std::string> SimulationOptions::Validate() const {
-  // Written so that a number that is not one fails too.
+  // The conditions are negated, so that NaN is rejected too.
   if (!(frame_rate_hz > 0 && frame_rate_hz <= 1000))
-    return "The frame rate of a simulation lies above 0 and up to 1000 Hz.";
+    return "The frame rate must be above 0 and at most 1000 Hz.";
   if (!(duration_s >= 0 && duration_s <= kLongestDuration_s))
-    return "The duration of a simulation lies from 0 s to one day.";
+    return "The duration must be from 0 s to one day.";
   if (!(exposure_s >= 0 && exposure_s * frame_rate_hz <= 1)) {
-    return "The exposure of a simulation lies from 0 s to the time between two frames.";
+    return "The exposure time must be from 0 s to the time between two frames.";
   }
-  if (blur_samples < 1 || blur_samples > 64) return "The motion blur of a simulation takes 1 to 64 samples.";
-  if (!(noise_sigma >= 0 && noise_sigma <= 100))
-    return "The noise of a simulation lies from 0 to 100 grey levels.";
-  if (!(exposure_drift >= 0 && exposure_drift <= 1))
-    return "The exposure drift of a simulation lies from 0 to 1.";
-  if (!(vignetting >= 0 && vignetting < 1)) return "The vignetting of a simulation lies from 0 to below 1.";
+  if (blur_samples < 1 || blur_samples > 64) return "The number of motion blur samples must be from 1 to 64.";
+  if (!(noise_sigma >= 0 && noise_sigma <= 100)) return "The noise must be from 0 to 100 grey levels.";
+  if (!(exposure_drift >= 0 && exposure_drift <= 1)) return "The exposure drift must be from 0 to 1.";
+  if (!(vignetting >= 0 && vignetting < 1)) return "The vignetting must be at least 0 and below 1.";
   if (camera && (camera->width_px() > kLargestSide_px || camera->height_px() > kLargestSide_px)) {
-    return "The image of a simulation has at most 8192 pixels along a side.";
+    return "The image must have at most 8192 pixels along each side.";
   }
   return faults.Validate(frame_rate_hz);
 }
@@ -107,7 +105,7 @@ engine::CameraModel SimulatedCamera(int width_px) {
   intrinsics.height_px = static_cast<int>(std::lround(480 * scale));
   intrinsics.fx = 402.0 * scale;
   intrinsics.fy = 403.2 * scale;
-  // The centre of the top-left pixel is (0, 0), so a scale acts about its corner.
+  // The centre of the top-left pixel is (0, 0), so scaling is about that pixel's outer corner.
   intrinsics.cx = (317.6 + 0.5) * scale - 0.5;
   intrinsics.cy = (241.3 + 0.5) * scale - 0.5;
   return {engine::LensModel::kRadialTangential, intrinsics, {-0.105, 0.012, 0.0005, -0.0004, 0}};
@@ -123,7 +121,7 @@ Simulation::Simulation(const std::string& name, Scene scene, const SimulationOpt
       duration_s_(DurationOf(scene_, options)),
       sensor_(SensorOf(scene_, options, {camera_.width_px(), camera_.height_px()})),
       tremor_(options.faults.tremor_deg, MixedSeed(options, scene_, SeedOf::kTremor)) {
-  // The last frame is not lost to the rounding of the product.
+  // The tolerance keeps the last frame despite rounding of the product.
   const int count = static_cast<int>(std::floor(duration_s_ * options.frame_rate_hz + 1e-6)) + 1;
   exposures_ =
       KeptFrames(count, options.faults.dropped_share, MixedSeed(options, scene_, SeedOf::kFrameDrops));
@@ -146,11 +144,11 @@ double Simulation::RowOffset_s(double row) const {
   return faults.readout_s * ((row + 0.5) / height - 0.5) + field_s;
 }
 
-void Simulation::RenderLight(double time_s, const std::optional<engine::Rigid3>& camera_from_turned,
+void Simulation::RenderLight(double time_s, const std::optional<engine::Rigid3>& camera_from_rotated,
                              cv::Mat* bgr) const {
   const auto pose_at = [&](double row_time_s) {
     const engine::Rigid3 pose = PoseAt(row_time_s);
-    return (camera_from_turned ? pose * *camera_from_turned : pose).inverse();
+    return (camera_from_rotated ? pose * *camera_from_rotated : pose).inverse();
   };
   if (!rows_differ()) {
     renderer_.Render(pose_at(time_s), bgr);
@@ -171,17 +169,17 @@ const std::string& Simulation::label(int frame) const {
   return scene_.trajectory.LabelAt(ToSeconds(time(frame)));
 }
 
-void Simulation::RenderTurned(int frame, const std::optional<engine::Rigid3>& camera_from_turned,
-                              cv::Mat* bgr) const {
+void Simulation::RenderRotated(int frame, const std::optional<engine::Rigid3>& camera_from_rotated,
+                               cv::Mat* bgr) const {
   const double time_s = ToSeconds(time(frame));
   if (options_.blur_samples == 1) {
-    RenderLight(time_s, camera_from_turned, bgr);
+    RenderLight(time_s, camera_from_rotated, bgr);
   } else {
     const int samples = options_.blur_samples;
     cv::Mat sum, sample, wide;
     for (int i = 0; i < samples; ++i) {
       const double offset_s = options_.exposure_s * ((i + 0.5) / samples - 0.5);
-      RenderLight(time_s + offset_s, camera_from_turned, &sample);
+      RenderLight(time_s + offset_s, camera_from_rotated, &sample);
       sample.convertTo(wide, CV_16UC3);
       if (i == 0) {
         sum = wide.clone();
@@ -218,9 +216,9 @@ bool Simulation::IsVisible(int frame, const Eigen::Vector3d& point_in_world) con
   const engine::Rigid3 pose = world_from_camera(frame);
   const std::optional<Eigen::Vector2d> pixel = camera_.Project(pose.inverse() * point_in_world);
   if (!pixel || !camera_.IsInside(*pixel)) return false;
-  const Eigen::Vector3d way = point_in_world - pose.translation;
-  const auto hit = scene_.surfaces.Intersect(pose.translation, way.normalized());
-  return !hit || hit->distance > way.norm() - 0.01;
+  const Eigen::Vector3d offset = point_in_world - pose.translation;
+  const auto hit = scene_.surfaces.Intersect(pose.translation, offset.normalized());
+  return !hit || hit->distance > offset.norm() - 0.01;
 }
 
 std::unique_ptr<Simulation> MakeSimulation(const std::string& scene_spec, const SimulationOptions& defaults) {

@@ -10,14 +10,14 @@
 namespace docent::app {
 namespace {
 
-// Hair's breadth that closes the seam between rectangles that share an edge.
+// Rectangles are enlarged by this factor to close the seams between rectangles that share an edge.
 constexpr float kSeam = 1.00001f;
 constexpr int kNothing = -1;
-// A real lens is a little softer than its pixels: the texture is read this much coarser (1/256 of a mip
-// level).
+// Real lenses blur slightly, so textures are sampled at a coarser level (units of 1/256 mip level).
 constexpr int kSoftnessQ8 = 90;
 
-// Logarithm to base 2 in units of 1/256, linear between powers of two (at most 0.09 of a level off).
+// Base-2 logarithm in units of 1/256, interpolated linearly between powers of two (error at most 0.09 of a
+// level).
 int Log2Q8(float x) {
   return (std::bit_cast<int>(x) - (127 << 23)) >> 15;
 }
@@ -59,7 +59,7 @@ SurfaceRenderer::SurfaceRenderer(const Surfaces* surfaces, const engine::CameraM
 
 SurfaceRenderer::Cone SurfaceRenderer::ConeOver(const engine::CameraModel& camera, int left, int top,
                                                 int size) const {
-  // Lines between pixels are bent by the lens, by much less than this margin over the side of a group.
+  // The lens bends lines between pixels, but by much less than this margin over the side of a group.
   const double margin = 1.0 + 0.04 * size;
   const double low_x = left - margin, high_x = left + size - 1 + margin;
   const double low_y = top - margin, high_y = top + size - 1 + margin;
@@ -85,7 +85,7 @@ std::vector<SurfaceRenderer::Facet> SurfaceRenderer::FacetsFrom(
     const Eigen::Vector3d half_u = rotation * rectangle.half_u, half_v = rotation * rectangle.half_v;
     const Eigen::Vector3d normal = half_u.cross(half_v).normalized();
     const double plane_distance = normal.dot(center);
-    if (std::abs(plane_distance) < 1e-6) {  // seen exactly from the side: a line without area
+    if (std::abs(plane_distance) < 1e-6) {  // Seen exactly edge-on: a line without area.
       facets.push_back({Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()});
       facets.back().rectangle = static_cast<int>(i);
       continue;
@@ -114,7 +114,7 @@ std::vector<SurfaceRenderer::Facet> SurfaceRenderer::FacetsFrom(
 bool SurfaceRenderer::MayShow(const Facet& facet, const Cone& cone) {
   if (!cone.is_known) return true;
   const Eigen::Vector4f u = cone.corners * facet.u, v = cone.corners * facet.v, w = cone.corners * facet.w;
-  // A linear function that is negative at every corner is negative in all of the cone.
+  // A linear function that is negative at all corners is negative in the whole cone.
   return w.maxCoeff() > 0 && (w - u).maxCoeff() >= 0 && (w + u).maxCoeff() >= 0 && (w - v).maxCoeff() >= 0 &&
          (w + v).maxCoeff() >= 0;
 }
@@ -122,7 +122,7 @@ bool SurfaceRenderer::MayShow(const Facet& facet, const Cone& cone) {
 void SurfaceRenderer::CandidatesOf(const std::vector<Facet>& facets, const std::vector<int>& group,
                                    const Cone& cone, std::vector<Candidate>* candidates) const {
   candidates->clear();
-  float covered_from = 0;  // everything whose inverse distance is below this is hidden
+  float covered_from = 0;  // Surfaces with a smaller inverse distance are hidden.
   for (const int index : group) {
     const Facet& facet = facets[index];
     if (!cone.is_known) {
@@ -134,8 +134,8 @@ void SurfaceRenderer::CandidatesOf(const std::vector<Facet>& facets, const std::
           (w + v).maxCoeff() >= 0)) {
       continue;
     }
-    // A unit ray inside the cone is a positive combination of the corner rays with weights that sum to a
-    // little more than one, hence the two per cent.
+    // A unit ray inside of the cone is a positive combination of the corner rays with weights that sum to
+    // slightly more than one, hence the margin of two percent.
     candidates->push_back({index, 1.02f * w.maxCoeff()});
     if (w.minCoeff() > 0 && (w - u.cwiseAbs()).minCoeff() > 0 && (w - v.cwiseAbs()).minCoeff() > 0) {
       covered_from = std::max(covered_from, w.minCoeff());
@@ -147,7 +147,7 @@ void SurfaceRenderer::CandidatesOf(const std::vector<Facet>& facets, const std::
 template <int kCount>
 void SurfaceRenderer::Trace(const std::vector<Facet>& facets, const std::vector<Candidate>& candidates,
                             const Rays& rays, int first_pixel, int* nearest) {
-  // Local arrays of fixed size and no branches: the compiler turns the loop into vector code.
+  // Local arrays of fixed size without branches, so that the compiler vectorizes the loop.
   float best[kCount];
   int best_index[kCount];
   for (int i = 0; i < kCount; ++i) {
@@ -195,8 +195,8 @@ cv::Vec3b SurfaceRenderer::Shade(const Facet& facet, const Eigen::Vector3f& ray,
   const Rectangle& rectangle = surfaces_->rectangles()[facet.rectangle];
   const float inverse_distance = facet.w.dot(ray);
   const float u = facet.u.dot(ray) / inverse_distance, v = facet.v.dot(ray) / inverse_distance;
-  // A pixel covers distance * angle across and that over the cosine of the slant along; the level follows the
-  // geometric mean. The cosine is plane_distance / distance.
+  // A pixel covers distance * angle in one direction, and that divided by the cosine of the slant in the
+  // other; the level follows the geometric mean. The cosine is plane_distance / distance.
   const float slant = inverse_distance * facet.plane_distance;
   const float footprint =
       facet.texels_per_metre * pixel_angle / (inverse_distance * std::sqrt(std::max(slant, 0.02f)));
@@ -240,7 +240,8 @@ void SurfaceRenderer::ShadeTile(const FacetsOfRow& facets_of_row, const std::vec
         out[column] = index == kNothing ? cv::Vec3b() : Shade(facets[index], ray, pixel_angle);
         continue;
       }
-      // The lens is smooth: half a pixel beside a pixel the next ray's difference is exact enough.
+      // The lens is smooth, so linear interpolation between neighbouring rays is accurate enough for
+      // sub-rays.
       const int left = column > 0 ? i - 1 : i, top = row > 0 ? i - kTile : i;
       const Eigen::Vector3f right_step = ray_at(left + 1) - ray_at(left);
       const Eigen::Vector3f down_step =
@@ -305,7 +306,8 @@ void SurfaceRenderer::CandidatesOfRows(std::span<const std::vector<Facet>> row_f
   std::vector<int> group;
   std::vector<Candidate> of_row;
   candidates->clear();
-  // Between these rows a facet moves evenly, and interlaced rows of either parity are a case of their own.
+  // A facet moves monotonically between the first and the last row; with interlacing, this holds for each
+  // parity separately.
   for (const int row : {0, std::min(1, last), std::max(0, last - 1), last}) {
     const std::vector<Facet>& facets = row_facets[row];
     group.clear();
@@ -315,7 +317,7 @@ void SurfaceRenderer::CandidatesOfRows(std::span<const std::vector<Facet>> row_f
     CandidatesOf(facets, group, tile_cones_[tile], &of_row);
     candidates->insert(candidates->end(), of_row.begin(), of_row.end());
   }
-  // The order decides between surfaces that coincide: it is that of Render.
+  // The order decides between coincident surfaces, so it must be the same as in Render.
   std::sort(candidates->begin(), candidates->end(),
             [](const Candidate& a, const Candidate& b) { return a.facet < b.facet; });
   candidates->erase(std::unique(candidates->begin(), candidates->end(),

@@ -8,8 +8,8 @@
 namespace docent::app {
 namespace {
 
-// A lamp from above and in front to the left: each side of a box gets its own brightness, which makes its
-// edges visible as they are in a photograph.
+// Light from the upper left front: the sides of a box have different brightness, so that its edges are
+// visible.
 float LightOn(const Eigen::Vector3d& normal) {
   static const Eigen::Vector3d to_light = Eigen::Vector3d(-0.45, -0.8, -0.4).normalized();
   return static_cast<float>(0.78 + 0.24 * normal.dot(to_light));
@@ -54,7 +54,7 @@ void Surfaces::AddBox(const Eigen::Vector3d& base_center, double width, double h
     Rectangle& side =
         AddRectangle(sides[i].corner, sides[i].right, down, own_image ? front : texture, window);
     side.light = LightOn(sides[i].normal);
-    side.light_v = -0.06f;  // darker towards the ground
+    side.light_v = -0.06f;  // Darker towards the ground.
   }
   Rectangle& lid =
       AddRectangle(top - half_x + half_z, 2 * half_x, -2 * half_z, texture, {0.1, 0.1, 0.9, 0.9});
@@ -73,7 +73,7 @@ void Surfaces::AddColumn(const Eigen::Vector3d& base_center, double radius, doub
                                    {left, window.top, right, window.bottom});
     side.light = LightOn(Eigen::Vector3d(a.x() + b.x(), 0, a.z() + b.z()).normalized());
   }
-  // The inscribed square covers what a camera above the rim would see through.
+  // A square inside of the rim closes the top, which a camera above could otherwise see through.
   const double half = radius * std::numbers::sqrt2 / 2;
   Rectangle& lid = AddRectangle(base_center + Eigen::Vector3d(-half, -height, half), {2 * half, 0, 0},
                                 {0, 0, -2 * half}, texture, {0.1, 0.1, 0.4, 0.4});

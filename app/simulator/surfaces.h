@@ -7,51 +7,51 @@
 
 #include "app/simulator/texture.h"
 
-// What a simulated world is made of: textured rectangles, and helpers that build boxes and round columns of
-// them. World frame x right, y down, z forward, metres; the floor is the plane y = 0, so things stand at
-// negative y.
+// The geometry of a simulated world: textured rectangles, and functions that build boxes and columns of them.
+// World frame: x right, y down, z forward, metres. The floor is the plane y = 0, so objects have negative y.
 namespace docent::app {
 
-// The part of a texture that a rectangle shows, in units of the whole texture; beyond 1 a repeating one
-// repeats.
+// The part of a texture that a rectangle shows, in units of the texture's size; repeating textures may
+// exceed 1.
 struct TextureWindow {
   double left = 0, top = 0, right = 1, bottom = 1;
 };
 
-// A flat rectangle { center + u half_u + v half_v : |u|, |v| <= 1 }, seen from both sides. half_u points
-// along the texture's rows (to the right), half_v along its columns (down); the two are perpendicular.
+// A planar rectangle { center + u half_u + v half_v : |u|, |v| <= 1 }, visible from both sides. half_u is
+// along the texture's rows (to the right), half_v along its columns (down); they are perpendicular.
 struct Rectangle {
   Eigen::Vector3d center, half_u, half_v;
   int texture = 0;
   TextureWindow window;
-  // Light that falls on it, 1 = as painted: light + light_u u + light_v v.
+  // Brightness factor of the texture: light + light_u u + light_v v.
   float light = 1, light_u = 0, light_v = 0;
 };
 
-// Where a ray meets the surfaces.
+// Intersection of a ray with the surfaces.
 struct SurfaceHit {
   Eigen::Vector3d point;
-  double distance = 0;  // metres along the unit ray
+  double distance = 0;  // Metres along the unit ray.
   int rectangle = -1;
 };
 
-// Rectangles and their textures. Built by one thread, then only read.
+// Rectangles and their textures. Built by one thread, then read by any thread.
 class Surfaces {
  public:
   int AddTexture(const cv::Mat& bgr, bool repeat = false);
-  // A rectangle from its top-left corner and its whole sides.
+  // Adds a rectangle given by its top-left corner and its full sides.
   Rectangle& AddRectangle(const Eigen::Vector3d& top_left, const Eigen::Vector3d& right,
                           const Eigen::Vector3d& down, int texture, const TextureWindow& window = {});
-  // An upright box that stands on y = base: footprint width (along its own x) times depth (its own z), turned
-  // by yaw about the vertical. Sides show the texture's left, middle and right thirds in turn, the lid a
-  // square of it. `front`, when not negative, is shown on the side that looks along -z before the turn.
+  // Adds an upright box with a footprint of width (local x) by depth (local z), rotated by yaw about the
+  // vertical. The sides show the left, middle and right third of the texture in turn, the top shows a square
+  // of it. `front`, if not negative, is the texture of the side that faces -z before the rotation.
   void AddBox(const Eigen::Vector3d& base_center, double width, double height, double depth, double yaw_rad,
               int texture, int front = -1);
-  // An upright prism of many sides with the texture wrapped once around it: a column, a vase, a mug.
+  // Adds an upright prism with many sides and the texture wrapped once around it: a column, a vase, a mug.
   void AddColumn(const Eigen::Vector3d& base_center, double radius, double height, int sides, int texture,
                  const TextureWindow& window = {});
 
-  // The nearest surface along a ray (direction of unit length), found by trying every one, in double.
+  // The nearest surface along a ray (direction of unit length), by testing all rectangles in double
+  // precision.
   std::optional<SurfaceHit> Intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
   const std::vector<Rectangle>& rectangles() const { return rectangles_; }

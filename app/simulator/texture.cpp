@@ -10,12 +10,12 @@
 namespace docent::app {
 namespace {
 
-// Bytes b g r 0 to 16-bit lanes b r g 0.
+// Spreads the bytes b g r 0 to the 16-bit lanes b r g 0.
 std::uint64_t Spread(std::uint32_t texel) {
   return (texel & 0x00FF00FFu) | std::uint64_t{texel >> 8 & 0x00FF00FFu} << 32;
 }
 
-// weight in [0, 256].
+// weight is in [0, 256].
 std::uint64_t Blend(std::uint64_t a, std::uint64_t b, unsigned weight) {
   return (a * (256 - weight) + b * weight + 0x0080008000800080ull) >> 8 & 0x00FF00FF00FF00FFull;
 }
@@ -25,7 +25,7 @@ std::uint64_t Blend(std::uint64_t a, std::uint64_t b, unsigned weight) {
 Texture::Texture(const cv::Mat& bgr, bool repeat) : repeat_(repeat) {
   if (bgr.type() != CV_8UC3 || !std::has_single_bit(static_cast<unsigned>(bgr.cols)) ||
       !std::has_single_bit(static_cast<unsigned>(bgr.rows))) {
-    throw std::invalid_argument("a texture is a CV_8UC3 image whose sides are powers of two");
+    throw std::invalid_argument("a texture must be a CV_8UC3 image whose sides are powers of two");
   }
   cv::Mat image = bgr;
   while (true) {
@@ -73,7 +73,8 @@ std::uint64_t Texture::Sample(float x, float y, int level_q8) const {
   level_q8 = std::clamp(level_q8, 0, top * 256);
   const int level = level_q8 >> 8;
   const auto x_q16 = static_cast<std::int64_t>(x * 65536.0f), y_q16 = static_cast<std::int64_t>(y * 65536.0f);
-  // A level's texel k covers texels [k 2^level, (k+1) 2^level) of level 0, and its colour sits in the middle.
+  // Texel k of a level covers the texels [k 2^level, (k+1) 2^level) of level 0; its colour is that of their
+  // centre.
   constexpr std::int64_t kHalf = 1 << 15;
   const std::uint64_t fine = SampleLevel(levels_[level], (x_q16 >> level) - kHalf, (y_q16 >> level) - kHalf);
   const unsigned weight = level_q8 & 255;

@@ -12,7 +12,7 @@ namespace docent::app {
 Trajectory::Trajectory(std::uint64_t seed) {
   Random random(seed);
   for (std::size_t axis = 0; axis < sway_.size(); ++axis) {
-    // Up to 6 mm and 0.4 degrees together, slow waves larger than quick ones as in a hand.
+    // Up to 6 mm and 0.4 degrees in total; slow waves are larger than fast ones, as with a hand.
     const double amplitude = axis < 3 ? 0.003 : 0.0035;
     for (std::size_t i = 0; i < 3; ++i) {
       sway_[axis][i] = {random.Uniform(0.3, 0.6) * static_cast<double>(1 << i),
@@ -37,15 +37,15 @@ void Trajectory::MoveTo(const Eigen::Vector3d& position, double yaw_rad, double 
   Waypoint waypoint;
   waypoint.time_s = duration_s() + (waypoints_.empty() ? 0 : seconds);
   if (!waypoints_.empty()) {
-    // The short way round.
-    const double turn = 2 * std::numbers::pi;
-    yaw_rad += turn * std::round((last_yaw_rad() - yaw_rad) / turn);
+    // The yaw angle nearest to the previous one avoids a rotation the long way round.
+    const double tau = 2 * std::numbers::pi;
+    yaw_rad += tau * std::round((last_yaw_rad() - yaw_rad) / tau);
   }
   waypoint.values << position, yaw_rad, pitch_rad, sway;
   waypoints_.push_back(waypoint);
 }
 
-// Harmonic mean of the two neighbouring slopes, zero where they differ in sign or at the ends.
+// Harmonic mean of the two neighbouring slopes; zero when their signs differ, and at the ends.
 Trajectory::Values Trajectory::Slope(std::size_t waypoint) const {
   Values slope = Values::Zero();
   if (waypoint == 0 || waypoint + 1 >= waypoints_.size()) return slope;

@@ -11,35 +11,35 @@
 
 namespace docent::app {
 
-// The way of a hand-held camera: waypoints joined by cubic curves that never overshoot (Fritsch and Carlson
-// 1980), so that a camera told to stand really stands, plus the sway of a hand (a few millimetres and tenths
-// of a degree, smooth, from a seed). World frame x right, y down, z forward. Written by one thread, then only
-// read.
+// Trajectory of a hand-held camera: waypoints joined by monotone cubic curves (Fritsch and Carlson 1980),
+// which do not overshoot, so that a camera between equal waypoints does not move; plus the smooth sway of a
+// hand (a few millimetres and tenths of a degree, from a seed). World frame: x right, y down, z forward.
+// Written by one thread, then read by any thread.
 class Trajectory {
  public:
   explicit Trajectory(std::uint64_t seed);
 
-  // Everything from the end of what exists on has this label, until the next.
+  // The trajectory from its present end on has this label, until the next call.
   void BeginSegment(const std::string& label);
-  // Reaches `position`, looking at `target`, `seconds` after the last waypoint (0 for the first one).
-  // sway: how much of the hand's sway there is, 0 = on a tripod.
+  // Adds a waypoint at `position`, looking at `target`, `seconds` after the last waypoint (0 for the first
+  // one). sway: factor of the hand sway; 0: tripod.
   void LookFrom(const Eigen::Vector3d& position, const Eigen::Vector3d& target, double seconds,
                 double sway = 1);
-  // The same by angles: yaw to the right from +z, pitch upwards.
+  // Adds a waypoint given by angles: yaw to the right from +z, pitch upwards.
   void MoveTo(const Eigen::Vector3d& position, double yaw_rad, double pitch_rad, double seconds,
               double sway = 1);
 
   double duration_s() const { return waypoints_.empty() ? 0 : waypoints_.back().time_s; }
-  // Pose at a time, held before the beginning and after the end.
+  // Pose at a time; constant before the beginning and after the end.
   engine::Rigid3 WorldFromCamera(double time_s) const;
   const std::string& LabelAt(double time_s) const;
-  // Where the last waypoint ended.
+  // Values of the last waypoint.
   Eigen::Vector3d last_position() const { return waypoints_.back().values.head<3>(); }
   double last_yaw_rad() const { return waypoints_.back().values[3]; }
   double last_pitch_rad() const { return waypoints_.back().values[4]; }
 
  private:
-  using Values = Eigen::Matrix<double, 6, 1>;  // position, yaw, pitch, sway
+  using Values = Eigen::Matrix<double, 6, 1>;  // Position, yaw, pitch, sway.
   struct Waypoint {
     double time_s;
     Values values;
@@ -55,7 +55,7 @@ class Trajectory {
 
   std::vector<Waypoint> waypoints_;
   std::vector<Segment> segments_;
-  std::array<std::array<Wave, 3>, 6> sway_;  // metres along x y z, radians about x y z
+  std::array<std::array<Wave, 3>, 6> sway_;  // Metres along x y z, radians about x y z.
 };
 
 }  // namespace docent::app

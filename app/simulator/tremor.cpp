@@ -14,7 +14,7 @@ Tremor::Tremor(double rotation_deg, std::uint64_t seed) : is_still_(rotation_deg
     double power = 0;
     for (int i = 0; i < kWaves; ++i) {
       Wave& wave = waves_[axis][static_cast<std::size_t>(i)];
-      // One wave in each part of the band, so that none of it is empty.
+      // One wave in each part of the band, so that the band has no gaps.
       wave.frequency_hz = kLowest_hz + (kHighest_hz - kLowest_hz) * (i + random.Uniform()) / kWaves;
       wave.phase_rad = random.Uniform(0, 2 * std::numbers::pi);
       wave.amplitude = 1 / (wave.frequency_hz * wave.frequency_hz);

@@ -10,27 +10,27 @@
 namespace docent::app {
 namespace {
 
-// Whether the folder was there (empty) before. Throws where it is anything else.
+// Returns true for an existing empty folder, false if the path does not exist. Throws Error otherwise.
 bool ExistsEmpty(const std::filesystem::path& folder) {
   std::error_code error;
   if (!std::filesystem::exists(folder, error)) {
-    if (error) throw Error("Cannot look at '" + folder.string() + "': " + error.message() + ".");
+    if (error) throw Error("Cannot access '" + folder.string() + "': " + error.message() + ".");
     return false;
   }
   if (!std::filesystem::is_directory(folder, error)) {
-    throw Error("'" + folder.string() + "' is not a folder; a sequence needs a new or an empty one.");
+    throw Error("'" + folder.string() + "' is not a folder; choose a new or empty folder.");
   }
   const bool is_empty = std::filesystem::is_empty(folder, error);
-  if (error) throw Error("Cannot look into the folder '" + folder.string() + "': " + error.message() + ".");
+  if (error) throw Error("Cannot read the folder '" + folder.string() + "': " + error.message() + ".");
   if (!is_empty) {
     throw Error("The folder '" + folder.string() +
-                "' is not empty; choose another, so that no images are overwritten or mixed.");
+                "' is not empty; choose another one, so that no images are overwritten.");
   }
   return true;
 }
 
-void TakeAway(const std::filesystem::path& folder, bool keep_folder) {
-  // The first error is the one to report; what cannot be removed stays.
+void RemoveIncomplete(const std::filesystem::path& folder, bool keep_folder) {
+  // Errors are ignored, because the error that led here is the one to report.
   std::error_code ignored;
   if (!keep_folder) {
     std::filesystem::remove_all(folder, ignored);
@@ -61,7 +61,7 @@ void WriteSequence(const Simulation& simulation, const std::filesystem::path& fo
     }
     writer.Close();
   } catch (...) {
-    TakeAway(folder, existed);
+    RemoveIncomplete(folder, existed);
     throw;
   }
 }

@@ -8,11 +8,11 @@
 
 namespace docent::app {
 
-// Writes a whole simulation as a sequence in TUM layout (rgb/*.png, rgb.txt, groundtruth.txt with camera to
-// world, calibration.yaml, segments.txt). Where the calibration has an error, true_calibration.yaml has the
-// lens as it is. The folder must not exist or be empty; otherwise, and when anything cannot be written,
-// throws docent::Error, and a folder that could not be finished is taken away again. progress (may be empty):
-// called after each image with how many are written, of how many.
+// Writes a simulation as a sequence in TUM layout: rgb/*.png, rgb.txt, groundtruth.txt (camera to world),
+// calibration.yaml and segments.txt. If the calibration has an error, true_calibration.yaml has the true
+// lens. The folder must not exist or must be empty. Throws docent::Error otherwise, and when a file cannot be
+// written; the incomplete sequence is then removed. progress (may be empty) is called after each image with
+// the number of written images and the total.
 void WriteSequence(const Simulation& simulation, const std::filesystem::path& folder,
                    const std::function<void(int written, int total)>& progress = {});
 

@@ -13,18 +13,19 @@
 namespace docent {
 
 // A first-in, first-out queue of limited length between threads. Any number of threads may push and pop at
-// once. A full queue makes Push wait: that is the back-pressure that keeps a fast producer from running away
-// from a slow consumer. Once closed it takes nothing more, wakes everybody who waits, and still hands out
-// what it holds. The lock is never held while an item is used, only while it is moved in or out.
+// the same time. Push waits while the queue is full; this back-pressure limits how far a fast producer runs
+// ahead of a slow consumer. A closed queue accepts no more items, wakes all waiting threads, and still
+// returns the items that it holds. The lock is held only while an item is moved in or out.
 template <typename Item>
 class BoundedQueue {
  public:
-  // capacity: items held at most; 0 counts as 1.
+  // capacity: maximum number of items; 0 counts as 1.
   explicit BoundedQueue(std::size_t capacity) : capacity_(std::max<std::size_t>(1, capacity)) {}
   BoundedQueue(const BoundedQueue&) = delete;
   BoundedQueue& operator=(const BoundedQueue&) = delete;
 
-  // Waits for room. False, and the item is dropped, when the queue is closed or `stop` is requested first.
+  // Waits for a free slot. Returns false and drops the item if the queue is closed or `stop` is requested
+  // first.
   bool Push(Item item, std::stop_token stop = {}) {
     std::unique_lock lock(mutex_);
     const bool woken = changed_.wait(lock, stop, [this] { return closed_ || items_.size() < capacity_; });
@@ -35,7 +36,7 @@ class BoundedQueue {
     return true;
   }
 
-  // Never waits. False when the queue is full or closed; the item is then left as it was.
+  // Never waits. Returns false and leaves the item unchanged if the queue is full or closed.
   bool TryPush(Item& item) {
     {
       std::scoped_lock lock(mutex_);
@@ -47,7 +48,7 @@ class BoundedQueue {
   }
   bool TryPush(Item&& item) { return TryPush(item); }
 
-  // Waits for an item. Empty when the queue is closed and holds nothing, or `stop` is requested first.
+  // Waits for an item. Empty if the queue is closed and holds no items, or if `stop` is requested first.
   std::optional<Item> Pop(std::stop_token stop = {}) {
     std::unique_lock lock(mutex_);
     const bool woken = changed_.wait(lock, stop, [this] { return closed_ || !items_.empty(); });
@@ -55,14 +56,14 @@ class BoundedQueue {
     return TakeFront(lock);
   }
 
-  // Never waits. Empty when the queue holds nothing.
+  // Never waits. Empty if the queue holds no items.
   std::optional<Item> TryPop() {
     std::unique_lock lock(mutex_);
     if (items_.empty()) return std::nullopt;
     return TakeFront(lock);
   }
 
-  // Takes no more items from now on. May be called more than once.
+  // Accepts no more items from now on. May be called more than once.
   void Close() {
     {
       std::scoped_lock lock(mutex_);
@@ -92,7 +93,7 @@ class BoundedQueue {
 
   const std::size_t capacity_;
   mutable std::mutex mutex_;
-  std::condition_variable_any changed_;  // any, because it can also be woken by a stop token
+  std::condition_variable_any changed_;  // _any, because a stop token can wake it too
   std::deque<Item> items_;
   bool closed_ = false;
 };

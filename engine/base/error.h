@@ -6,9 +6,9 @@
 
 namespace docent {
 
-// The outside world's fault: a file, a camera, a device. The message is one sentence for the person at the
-// keyboard that says what is wrong, where (file, field, line) and, if it helps, what to do. Thrown only where
-// the outside world is read; never inside the frame loop.
+// An error outside the program, in a file, camera or device. The message is one sentence for the user that
+// says what is wrong, where (file, field, line) and, if it helps, what to do. Thrown only where external data
+// are read, never in the frame loop.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -5,8 +5,8 @@
 
 namespace docent {
 
-// A small seeded generator (SplitMix64, Steele et al. 2014). Unlike <random>'s distributions its numbers are
-// the same with every standard library, which repeatable runs need. Not for cryptography.
+// A small seeded generator (SplitMix64, Steele et al. 2014). In contrast to the distributions of <random>,
+// its numbers are the same with every standard library, which repeatable runs need. Not for cryptography.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed) {}

@@ -5,7 +5,7 @@
 
 namespace docent {
 
-// Time of an image, in integer nanoseconds on its source's own clock, so that times compare exactly.
+// Time of an image in integer nanoseconds on its source's own clock. Integers compare exactly.
 using Timestamp = std::chrono::nanoseconds;
 
 inline double ToSeconds(std::chrono::nanoseconds time) {

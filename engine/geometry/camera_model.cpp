@@ -15,13 +15,13 @@ namespace docent::engine {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// Tangent of the largest angle for lenses that see less than 90 degrees to the side (89.94 degrees).
+// Tangent of the largest angle of lens models limited to less than 90 degrees from the axis (89.94 degrees).
 constexpr double kMaxRadius = 1000.0;
-// The one-to-one range ends a little before the radius where the image's growth is exactly zero.
+// The one-to-one range ends slightly before the radius at which the image radius stops growing.
 constexpr double kRangeMargin = 1 - 1e-6;
 constexpr int kMaxNewtonSteps = 100;
 
-// Up to where the polynomial, positive at zero, stays positive; `limit` where it always does.
+// The argument up to which the polynomial, positive at zero, stays positive; `limit` if it always does.
 double PositiveUpTo(const std::vector<double>& coefficients, double limit) {
   const std::vector<double> changes = SignChanges(coefficients, limit);
   return changes.empty() ? limit : changes.front() * kRangeMargin;
@@ -63,7 +63,7 @@ double KannalaBrandtRadius(const std::array<double, 5>& k, double angle, double*
 }
 
 // Solves radius(x) = target on [0, limit], where radius grows from zero to at least the target: Newton's
-// steps, halving the bracket instead wherever one leaves it.
+// method, with bisection where a step leaves the bracket.
 double InvertRadius(double (*radius)(const std::array<double, 5>&, double, double*),
                     const std::array<double, 5>& k, double target, double limit) {
   double low = 0, high = limit, x = std::min(target, limit);
@@ -84,13 +84,13 @@ double InvertRadius(double (*radius)(const std::array<double, 5>&, double, doubl
   return x;
 }
 
-// The Brown model on the plane z = 1 with its (symmetric) Jacobian. `Out` takes x, y, xx, xy, yy as
-// CameraModel::ImagePoint does. Inlined, what its caller does not use is not worked out.
+// The Brown model on the plane z = 1 with its (symmetric) Jacobian. `Out` receives x, y, xx, xy, yy as in
+// CameraModel::ImagePoint. After inlining, outputs that the caller does not use are not computed.
 template <typename Out>
 inline void BrownDistort(const std::array<double, 5>& k, double x, double y, Out* out) {
   const double s = x * x + y * y;
   const double radial = 1 + s * (k[0] + s * (k[1] + s * k[4]));
-  const double twice_slope = 2 * (k[0] + s * (2 * k[1] + s * 3 * k[4]));  // of radial by s
+  const double twice_slope = 2 * (k[0] + s * (2 * k[1] + s * 3 * k[4]));  // derivative of radial by s
   const double px = k[3], py = k[2];
   const double scale = radial + 2 * (px * x + py * y);
   out->x = scale * x + px * s;
@@ -116,8 +116,8 @@ struct BrownError {
   }
 };
 
-// Inverse of BrownDistort within the radius, or empty. Starts at the solution without tangential part and
-// goes on with Newton steps that are halved until they bring the image nearer.
+// Inverse of BrownDistort within the radius, or empty. Starts at the solution without the tangential part and
+// continues with Newton steps that are halved until they reduce the error.
 std::optional<Eigen::Vector2d> BrownUndistort(const std::array<double, 5>& k,
                                               const Eigen::Vector2d& distorted, double max_radius,
                                               double max_image_radius) {
@@ -239,7 +239,7 @@ std::optional<std::string> CameraModel::Validate(LensModel lens, const Intrinsic
   }
   for (const auto& [what, focal] :
        {std::pair{"The focal length fx", in.fx}, {"The focal length fy", in.fy}}) {
-    // 360 degrees across the image make 0.16 widths; no lens is a thousand times longer than its sensor.
+    // A view of 360 degrees across the image has 0.16 widths; no focal length is a thousand sensor widths.
     if (!(focal >= 0.01 * in.width_px && focal <= 1000.0 * in.width_px)) {
       return Sentence(what, focal, "between 0.01 and 1000 times the image's width in pixels");
     }
@@ -253,7 +253,8 @@ std::optional<std::string> CameraModel::Validate(LensModel lens, const Intrinsic
   if (auto complaint = ComplainAboutDistortion(lens, distortion)) {
     return complaint;
   }
-  // A lens that folds back within the image was calibrated wrongly. A few pixels in the corners may be.
+  // A model that folds back within the image is a wrong calibration. A few pixels in the corners are
+  // tolerated.
   constexpr int kGrid = 9;
   const CameraModel camera(lens, intrinsics, distortion);
   int without_ray = 0;
@@ -264,13 +265,14 @@ std::optional<std::string> CameraModel::Validate(LensModel lens, const Intrinsic
   }
   if (without_ray > kGrid * kGrid / 2) {
     return "The distortion of the " + std::string(Name(lens)) +
-           " lens leaves more than half of the image without a ray: check the coefficients and their "
+           " lens is invalid in more than half of the image: check the coefficients and their "
            "order.";
   }
   return std::nullopt;
 }
 
-// Through the plane z = 1, which Brown's and the FOV lens map to the image with a symmetric Jacobian.
+// Projects through the plane z = 1, from which the Brown and FOV models map to the image with a symmetric
+// Jacobian.
 bool CameraModel::ProjectThroughPlane(const Eigen::Vector3d& point, bool with_jacobian,
                                       ImagePoint* result) const {
   const double z = point.z();
@@ -302,7 +304,7 @@ bool CameraModel::ProjectThroughPlane(const Eigen::Vector3d& point, bool with_ja
   return true;
 }
 
-// Through the angle from the axis: Kannala and Brandt's lens, also beyond 90 degrees.
+// Projects through the angle from the axis, with the Kannala-Brandt model, also beyond 90 degrees.
 bool CameraModel::ProjectByAngle(const Eigen::Vector3d& point, ImagePoint* result) const {
   const double x = point.x(), y = point.y(), z = point.z();
   const double radius_squared = x * x + y * y, radius = std::sqrt(radius_squared);
@@ -314,7 +316,7 @@ bool CameraModel::ProjectByAngle(const Eigen::Vector3d& point, ImagePoint* resul
   const double image_radius = KannalaBrandtRadius(distortion_, angle, &slope);
   const bool is_axis = radius < 1e-8 * z;
   const double scale = is_axis ? 1 / z : image_radius / radius;
-  // The curvature is multiplied by x and y, so that it may be dropped on the axis.
+  // The curvature is multiplied by x and y, so it may be omitted on the axis.
   const double by_depth = slope / (radius_squared + z * z);
   const double curvature = is_axis ? 0 : (by_depth * z - scale) / radius_squared;
   *result = {

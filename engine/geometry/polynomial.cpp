@@ -6,7 +6,7 @@
 namespace docent::engine {
 namespace {
 
-// Zero of a polynomial between two arguments where its signs differ, by bisection down to the last digit.
+// Zero of a polynomial between two arguments at which its signs differ, by bisection to machine precision.
 double Bisect(const std::vector<double>& coefficients, double low, double high) {
   const bool low_is_positive = EvaluatePolynomial(coefficients, low) > 0;
   for (int i = 0; i < 200; ++i) {
@@ -29,7 +29,8 @@ double EvaluatePolynomial(const std::vector<double>& coefficients, double x) {
   return value;
 }
 
-// Between two neighbouring extrema there is at most one, and the extrema are the derivative's sign changes.
+// Between two neighbouring extrema there is at most one zero, and the extrema are the derivative's sign
+// changes.
 std::vector<double> SignChanges(const std::vector<double>& coefficients, double limit) {
   if (coefficients.size() < 2) {
     return {};

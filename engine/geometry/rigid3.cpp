@@ -7,8 +7,8 @@
 namespace docent::engine {
 namespace {
 
-// Below this squared angle the closed forms lose digits to cancellation and the series, cut after four terms,
-// are exact to rounding.
+// Below this squared angle the closed forms lose precision to cancellation, and the series of four terms are
+// exact to rounding.
 constexpr double kSeriesAngleSquared = 0.01;
 
 // (1 - cos t) / t^2.
@@ -63,7 +63,7 @@ Rotation3 Rotation3::Exp(const Eigen::Vector3d& rotation_vector) {
 }
 
 Eigen::Vector3d Rotation3::Log() const {
-  // Of the two quaternions of a rotation the one with the positive real part turns by pi at most.
+  // Of the two quaternions of a rotation, the one with a non-negative real part has an angle of at most pi.
   const double sign = quaternion_.w() < 0 ? -1.0 : 1.0;
   const Eigen::Vector3d imaginary = sign * quaternion_.vec();
   const double real = sign * quaternion_.w();

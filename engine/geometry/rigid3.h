@@ -6,7 +6,7 @@
 #include <iosfwd>
 
 // Rotations and rigid transforms. A variable is named a_from_b and maps coordinates in b to coordinates in a:
-// x_in_a = a_from_b * x_in_b, and c_from_a = c_from_b * b_from_a. Lengths in metres, angles in radians.
+// x_in_a = a_from_b * x_in_b, and c_from_a = c_from_b * b_from_a. Lengths in map units, angles in radians.
 namespace docent::engine {
 
 // [v]x, the matrix with Hat(v) * w = v.cross(w).
@@ -20,7 +20,7 @@ class Rotation3 {
   explicit Rotation3(const Eigen::Quaterniond& quaternion) : quaternion_(quaternion.normalized()) {}
   explicit Rotation3(const Eigen::Matrix3d& matrix) : quaternion_(Eigen::Quaterniond(matrix).normalized()) {}
 
-  // Exponential map: the rotation by |rotation_vector| radians about its direction; exact also near zero.
+  // Exponential map: the rotation by |rotation_vector| radians about its direction; accurate also near zero.
   static Rotation3 Exp(const Eigen::Vector3d& rotation_vector);
   // Inverse of Exp; the result's norm is at most pi.
   Eigen::Vector3d Log() const;
@@ -52,9 +52,9 @@ struct Rigid3 {
   Rigid3(const Rotation3& rotation_in, const Eigen::Vector3d& translation_in)
       : rotation(rotation_in), translation(translation_in) {}
 
-  // Twist (v, w), translation part first, rotation part last: the usual exponential map of SE(3). Small
-  // updates are applied on the left: camera_from_map = Exp(twist) * camera_from_map, so that the twist lives
-  // in the camera frame.
+  // Twist (v, w), translation part first, rotation part last: the standard exponential map of SE(3). Small
+  // updates are applied on the left, camera_from_map = Exp(twist) * camera_from_map, so the twist is
+  // expressed in the camera frame.
   static Rigid3 Exp(const Eigen::Matrix<double, 6, 1>& twist);
   Eigen::Matrix<double, 6, 1> Log() const;
 
@@ -62,7 +62,7 @@ struct Rigid3 {
     const Rotation3 inverse_rotation = rotation.inverse();
     return {inverse_rotation, -(inverse_rotation * translation)};
   }
-  // For camera_from_map: the camera's centre in the map, metres.
+  // For camera_from_map: the camera centre in the map, map units.
   Eigen::Vector3d OriginInSource() const { return -(rotation.inverse() * translation); }
 
   Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return rotation * x + translation; }
@@ -77,7 +77,7 @@ struct Rigid3 {
   }
 };
 
-// True where the transforms differ by at most these amounts (metres, radians).
+// True if the transforms differ by at most these amounts (map units, radians).
 bool IsNear(const Rigid3& a, const Rigid3& b, double translation_tolerance, double rotation_tolerance);
 std::ostream& operator<<(std::ostream& out, const Rotation3& rotation);
 std::ostream& operator<<(std::ostream& out, const Rigid3& transform);

@@ -10,7 +10,7 @@
 namespace docent::engine {
 namespace {
 
-// Second largest spread of a cloud as a fraction of its largest below which the cloud counts as a line.
+// A cloud counts as a line if its second largest spread is below this ratio of its largest.
 constexpr double kLineRatio = 1e-6;
 
 Eigen::Vector3d Mean(std::span<const Eigen::Vector3d> points) {
@@ -21,7 +21,7 @@ Eigen::Vector3d Mean(std::span<const Eigen::Vector3d> points) {
   return sum / static_cast<double>(points.size());
 }
 
-// Whether all points lie on one line through their mean. Distances rather than squared ones are compared: a
+// Whether all points lie on one line through their mean. Compares distances instead of squared distances: a
 // scatter matrix would lose half of the digits.
 bool IsLine(std::span<const Eigen::Vector3d> points, const Eigen::Vector3d& mean) {
   const auto farthest = std::max_element(points.begin(), points.end(), [&](const auto& a, const auto& b) {
@@ -77,13 +77,14 @@ std::optional<Sim3> AlignSim3(std::span<const Eigen::Vector3d> points_in_a,
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Vector3d singular = svd.singularValues();
-  // Two clouds that each have an extent may still be unrelated: then no rotation is best.
+  // The clouds may have an extent each and still be uncorrelated: then no rotation is best.
   if (!(singular[1] > kLineRatio * kLineRatio * singular[0])) {
     return std::nullopt;
   }
   Eigen::Vector3d sign = Eigen::Vector3d::Ones();
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) {
-    sign[2] = -1;  // the best orthogonal matrix is a reflection; turn its weakest axis round
+    // The best orthogonal matrix is a reflection; the axis with the smallest singular value is inverted.
+    sign[2] = -1;
   }
   Sim3 result;
   result.rotation = Rotation3(Eigen::Matrix3d(svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose()));

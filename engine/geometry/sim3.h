@@ -21,14 +21,13 @@ struct Sim3 {
   Sim3 operator*(const Sim3& other) const;
 };
 
-// The same without a change of scale.
+// The rigid transform without the scale.
 inline Sim3 AsSim3(const Rigid3& rigid) {
   return {rigid.rotation, rigid.translation, 1.0};
 }
 
-// The similarity a_from_b that minimises sum |a_i - a_from_b * b_i|^2 (Umeyama 1991). Empty with fewer than
-// three points or points on one line. With fixed_scale the scale stays 1 and two spread-out clouds may
-// differ.
+// The similarity a_from_b that minimises sum |a_i - a_from_b * b_i|^2 (Umeyama 1991). Empty for fewer than
+// three points and for collinear points. With fixed_scale the scale stays 1.
 std::optional<Sim3> AlignSim3(std::span<const Eigen::Vector3d> points_in_a,
                               std::span<const Eigen::Vector3d> points_in_b, bool fixed_scale = false);
 

@@ -13,8 +13,8 @@ namespace {
 constexpr int kMaxPlaneSamples = 500;
 constexpr double kPlaneConfidence = 0.9999;
 constexpr int kPlaneRefinements = 10;
-// Height of a triangle as a fraction of its longest side, and second spread of a cloud as a fraction of its
-// first, below which there is only a line.
+// A triangle or cloud counts as a line if its height is below this ratio of its longest side, or its second
+// spread below this ratio of its first.
 constexpr double kLineRatio = 1e-6;
 
 std::optional<Plane> PlaneThrough(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
@@ -29,7 +29,7 @@ std::optional<Plane> PlaneThrough(const Eigen::Vector3d& a, const Eigen::Vector3
   return Plane{normal / norm, -normal.dot(a) / norm};
 }
 
-// Total least squares through those points that lie near `start`.
+// Total least squares over the points near `start`.
 std::optional<Plane> RefinePlane(std::span<const Eigen::Vector3d> points, const Plane& start,
                                  double inlier_distance) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -58,8 +58,8 @@ std::optional<Plane> RefinePlane(std::span<const Eigen::Vector3d> points, const 
   return Plane{normal, -normal.dot(mean)};
 }
 
-// A plane with the sum of its squared distances, each cut at the inlier distance (Torr and Zisserman 2000).
-// Unlike the number of inliers it can only fall when the inliers' plane is refined.
+// A plane with the sum of its squared distances, each truncated at the inlier distance (Torr and Zisserman
+// 2000). In contrast to the number of inliers, refining the plane on its inliers can only decrease it.
 struct ScoredPlane {
   PlaneFit fit;
   double cost = 0;
@@ -76,7 +76,7 @@ ScoredPlane Score(std::span<const Eigen::Vector3d> points, const Plane& plane, d
   return result;
 }
 
-// How many samples of three find one without outlier at the confidence, given the inlier ratio.
+// Number of samples of three that contains one without outliers at the given confidence and inlier ratio.
 double SamplesNeeded(double inlier_ratio) {
   const double good = std::pow(inlier_ratio, 3);
   return good >= 1.0 ? 1.0 : std::log(1 - kPlaneConfidence) / std::log1p(-good);
@@ -93,14 +93,14 @@ std::optional<Eigen::Vector3d> Triangulate(const Eigen::Vector3d& ray_in_a, cons
   if (!(sine_squared > 1e-18)) {
     return std::nullopt;
   }
-  // Depths of the two points where the rays' lines come nearest to each other.
+  // Depths of the closest points of the two rays.
   const double depth_a = center_b.cross(direction_b).dot(common_normal) / sine_squared;
   const double depth_b = center_b.cross(ray_in_a).dot(common_normal) / sine_squared;
   if (!(depth_a > 0) || !(depth_b > 0)) {
     return std::nullopt;
   }
-  // A point between them errs only across the rays' plane, by (its distance to a ray) / depth; the sum of the
-  // squared angles is least with weights 1 / depth^2.
+  // The angular error of a point between them is (its distance to a ray) / depth; the sum of the squared
+  // angles is smallest with weights 1 / depth^2.
   const double weight_a = 1.0 / (depth_a * depth_a), weight_b = 1.0 / (depth_b * depth_b);
   const Eigen::Vector3d point =
       (weight_a * (depth_a * ray_in_a) + weight_b * (center_b + depth_b * direction_b)) /

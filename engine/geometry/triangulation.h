@@ -10,9 +10,9 @@
 
 namespace docent::engine {
 
-// The point seen along ray_a and ray_b (unit vectors in the frames of two cameras), in frame a, metres.
-// Minimises the angular errors to first order (midpoint weighted by inverse squared depth). Empty when the
-// rays meet behind either camera or are parallel to within 1e-9 rad.
+// The point seen along ray_a and ray_b (unit vectors in the frames of two cameras), in frame a, map units.
+// Minimises the angular errors to first order (midpoint weighted by inverse squared depth). Empty if the rays
+// intersect behind a camera or are parallel to within 1e-9 rad.
 std::optional<Eigen::Vector3d> Triangulate(const Eigen::Vector3d& ray_in_a, const Eigen::Vector3d& ray_in_b,
                                            const Rigid3& b_from_a);
 
@@ -28,8 +28,8 @@ struct Plane {
   double SignedDistance(const Eigen::Vector3d& x) const { return normal.dot(x) + offset; }
 };
 
-// Least-squares plane by RANSAC under the seed, then refined on its inliers: points nearer than
-// inlier_distance (metres). Empty with fewer than three points or points on one line.
+// Plane estimate by RANSAC with the given seed, then least squares over its inliers: points nearer than
+// inlier_distance (map units). Empty for fewer than three points and for collinear points.
 struct PlaneFit {
   Plane plane;
   int inliers = 0;

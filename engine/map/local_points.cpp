@@ -8,17 +8,17 @@ namespace docent::engine {
 
 namespace {
 
-constexpr std::size_t kFewest = 12;
-constexpr double kOutlier = 2.5;  // times the median distance that a similarity leaves
-constexpr int kRounds = 5;        // each with those alone that fitted the last
+constexpr std::size_t kMinPoints = 12;
+constexpr double kOutlier = 2.5;  // times the median residual of the similarity
+constexpr int kRounds = 5;        // each with the inliers of the previous one
 
 }  // namespace
 
-LocalPoints PointsAbout(const MapSnapshot& map, const Eigen::Vector3d& place, std::size_t count) {
+LocalPoints NearestPoints(const MapSnapshot& map, const Eigen::Vector3d& position, std::size_t count) {
   std::vector<std::pair<double, const MapPoint*>> nearest;
   nearest.reserve(map.points.size());
   for (const MapPoint& point : map.points) {
-    if (!point.infinite()) nearest.emplace_back((point.position() - place).squaredNorm(), &point);
+    if (!point.infinite()) nearest.emplace_back((point.position() - position).squaredNorm(), &point);
   }
   count = std::min(count, nearest.size());
   std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(count), nearest.end(),
@@ -34,27 +34,27 @@ LocalPoints PointsAbout(const MapSnapshot& map, const Eigen::Vector3d& place, st
   return local;
 }
 
-std::optional<Sim3> MotionOf(const LocalPoints& then, const MapSnapshot& now) {
+std::optional<Sim3> EstimateMotion(const LocalPoints& before, const MapSnapshot& now) {
   std::vector<Eigen::Vector3d> from, to;
-  for (std::size_t i = 0; i < then.ids.size(); ++i) {
-    const MapPoint* point = now.FindPoint(then.ids[i]);
+  for (std::size_t i = 0; i < before.ids.size(); ++i) {
+    const MapPoint* point = now.FindPoint(before.ids[i]);
     if (!point || point->infinite()) continue;
-    from.push_back(then.positions[i]);
+    from.push_back(before.positions[i]);
     to.push_back(point->position());
   }
-  if (from.size() < kFewest) return std::nullopt;
+  if (from.size() < kMinPoints) return std::nullopt;
   std::optional<Sim3> motion = AlignSim3(to, from);
-  std::vector<double> left(from.size()), sorted;
+  std::vector<double> residuals(from.size()), sorted;
   std::vector<Eigen::Vector3d> kept_from, kept_to;
   for (int round = 0; motion && round < kRounds; ++round) {
-    for (std::size_t i = 0; i < from.size(); ++i) left[i] = (to[i] - *motion * from[i]).norm();
-    sorted = left;
+    for (std::size_t i = 0; i < from.size(); ++i) residuals[i] = (to[i] - *motion * from[i]).norm();
+    sorted = residuals;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
     kept_from.clear();
     kept_to.clear();
     for (std::size_t i = 0; i < from.size(); ++i) {
-      if (left[i] > kOutlier * *middle) continue;
+      if (residuals[i] > kOutlier * *middle) continue;
       kept_from.push_back(from[i]);
       kept_to.push_back(to[i]);
     }

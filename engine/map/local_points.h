@@ -9,21 +9,22 @@
 #include "engine/geometry/sim3.h"
 #include "engine/map/map_snapshot.h"
 
-// How a part of a map moves when the map is adjusted. What stands in a map stands among points, and should
-// stay among them: adjustments move, turn and stretch one part of a map otherwise than another.
+// Estimates how a part of a map moves in an adjustment. Placed models must keep their place relative to the
+// map points around them, and an adjustment moves, rotates and scales one part of a map differently from
+// another.
 namespace docent::engine {
 
-// Finite points about a place, as they were at some time.
+// Finite points near a position, with their coordinates at one time.
 struct LocalPoints {
   std::vector<MapPointId> ids;             // ascending
   std::vector<Eigen::Vector3d> positions;  // in the map
 };
 
-// The `count` finite points nearest to the place, or all that there are.
-LocalPoints PointsAbout(const MapSnapshot& map, const Eigen::Vector3d& place, std::size_t count);
+// The `count` finite points nearest to a position, or all if there are fewer.
+LocalPoints NearestPoints(const MapSnapshot& map, const Eigen::Vector3d& position, std::size_t count);
 
-// The similarity now_from_then that took these points to where `now` has them; those that went another way
-// than most count for nothing. Empty when too few are left, or they stand on one line.
-std::optional<Sim3> MotionOf(const LocalPoints& then, const MapSnapshot& now);
+// The similarity now_from_before between the points' former and present positions, without points that moved
+// differently from most. Empty if fewer than 12 of the points still exist or the points are collinear.
+std::optional<Sim3> EstimateMotion(const LocalPoints& before, const MapSnapshot& now);
 
 }  // namespace docent::engine

@@ -102,7 +102,7 @@ void Map::RemoveKeyFrame(KeyFrameId id) {
   if (!record) return;
   const std::vector<Observation> observations = record->observations;
   for (const Observation& observation : observations) RemoveObservation(id, observation.point);
-  // A map that was stored may hold points that their own source keyframe does not observe.
+  // A stored map may contain points that their own source keyframe does not observe.
   for (const PointRecord& point : points_) {
     if (point.alive && point.point.source_keyframe == id) RemovePoint(point.point.id);
   }
@@ -146,7 +146,7 @@ void Map::Correct(const std::map<KeyFrameId, Sim3>& after_from_before) {
     const auto found = after_from_before.find(leader);
     const Sim3 moved = found != after_from_before.end() ? found->second : Sim3();
     correction->after_from_before[id] = moved;
-    keyframe.camera_from_map = CarriedAlong(keyframe.camera_from_map, moved);
+    keyframe.camera_from_map = CorrectedPose(keyframe.camera_from_map, moved);
     keyframe.mean_depth *= moved.scale;
     keyframe.depth_sigma *= moved.scale;
   }
@@ -165,7 +165,7 @@ void Map::Correct(const std::map<KeyFrameId, Sim3>& after_from_before) {
   if (corrections_.size() > kRemembered) corrections_.erase(corrections_.begin());
 }
 
-// Without its reference nothing says where a panorama map stands.
+// Without its reference a panorama map has no position.
 void Map::ClosePanorama(PanoramaId id) {
   std::vector<KeyFrameId> dependents;
   for (auto& [keyframe, record] : keyframes_) {
@@ -195,14 +195,14 @@ PanoramaId Map::OpenPanorama(KeyFrameId reference) {
     if (!record.alive || record.point.panorama != before || record.point.source_keyframe != reference)
       continue;
     record.point.panorama = id;
-    // What others saw of it was seen about another centre.
+    // Other keyframes observed them from another centre.
     const std::vector<KeyFrameId> observers = record.observers;
     for (const KeyFrameId observer : observers) {
       if (observer != reference) RemoveObservation(observer, record.point.id);
     }
     UpdateDirection(&record);
   }
-  // Nor does it belong among those who see the other points of the panorama it left.
+  // It no longer observes the other points of the panorama map that it left.
   const std::vector<Observation> observations = FindKeyFrame(reference)->observations;
   for (const Observation& observation : observations) {
     const PointRecord* point = FindPoint(observation.point);

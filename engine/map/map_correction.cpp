@@ -3,7 +3,7 @@
 
 namespace docent::engine {
 
-Rigid3 CarriedAlong(const Rigid3& camera_from_map, const Sim3& after_from_before) {
+Rigid3 CorrectedPose(const Rigid3& camera_from_map, const Sim3& after_from_before) {
   const Rotation3 rotation = camera_from_map.rotation * after_from_before.rotation.inverse();
   return {rotation,
           after_from_before.scale * camera_from_map.translation - rotation * after_from_before.translation};

@@ -9,16 +9,16 @@
 
 namespace docent::engine {
 
-// How a map was moved as a whole, part by part, when a loop was closed: by so much that whoever holds a pose
-// or a place in the coordinates before must carry it along. The parts are the reference_keyframe of
-// keyframes. Made by the mapper; immutable in snapshots.
+// The motion of a map's parts when a loop was closed: poses and positions in the former coordinates must be
+// transformed by it. A part is a keyframe with the points that it is the source of. Created by the mapper;
+// immutable in snapshots.
 struct MapCorrection {
-  std::uint64_t revision = 0;                            // of the first snapshot that is corrected
-  std::map<std::uint32_t, Sim3> after_from_before = {};  // by keyframe, of all there were
+  std::uint64_t revision = 0;                            // of the first corrected snapshot
+  std::map<std::uint32_t, Sim3> after_from_before = {};  // by keyframe, for all that existed then
 };
 
-// The pose of a camera that goes along with a part of the map: it sees of it what it saw before. Lengths in
-// the camera's frame are `after_from_before.scale` times what they were.
-Rigid3 CarriedAlong(const Rigid3& camera_from_map, const Sim3& after_from_before);
+// The pose of a camera that moves with a part of the map, so that its view of the part stays the same.
+// Lengths in the camera frame are scaled by `after_from_before.scale`.
+Rigid3 CorrectedPose(const Rigid3& camera_from_map, const Sim3& after_from_before);
 
 }  // namespace docent::engine

@@ -25,7 +25,7 @@ std::string CheckKeyFrames(const MapSnapshot& map) {
     if (!keyframe.features || keyframe.features->levels[0].empty()) return name + " has no image";
     if (keyframe.features->levels[0].cols != keyframe.camera->width_px() ||
         keyframe.features->levels[0].rows != keyframe.camera->height_px()) {
-      return name + " has an image of another size than its camera";
+      return name + " has an image whose size differs from the camera's";
     }
     const auto& pose = keyframe.camera_from_map;
     if (!pose.translation.allFinite() || !pose.rotation.quaternion().coeffs().allFinite() ||
@@ -47,14 +47,14 @@ std::string CheckPanoramas(const MapSnapshot& map) {
     if (panorama.id < next || panorama.id >= map.next_panorama) return name + " is out of order";
     next = panorama.id + 1;
     const KeyFrame* reference = map.FindKeyFrame(panorama.reference);
-    if (!reference) return name + " names a reference keyframe that is not there";
+    if (!reference) return name + " refers to a missing reference keyframe";
     if (reference->kind != KeyFrameKind::kSixDof || reference->panorama != panorama.id)
       return name + " has a reference keyframe that does not belong to it";
   }
   for (const KeyFrame& keyframe : map.keyframes) {
     const bool dependent = keyframe.kind == KeyFrameKind::kPanorama;
     if (keyframe.panorama == kNoId ? dependent : !map.FindPanorama(keyframe.panorama))
-      return "keyframe " + std::to_string(keyframe.id) + " names a panorama map that is not there";
+      return "keyframe " + std::to_string(keyframe.id) + " refers to a missing panorama map";
   }
   return {};
 }
@@ -71,10 +71,10 @@ std::string CheckPoints(const MapSnapshot& map) {
     }
     if (!point.normal.allFinite()) return name + " has no valid normal";
     if (point.infinite() ? !map.FindPanorama(point.panorama) : point.panorama != kNoId)
-      return name + " names a panorama map that is not there";
+      return name + " refers to a missing panorama map";
     const KeyFrame* source = map.FindKeyFrame(point.source_keyframe);
-    if (!source) return name + " names a source keyframe that is not there";
-    if (point.source_level >= kPyramidLevels) return name + " names a pyramid level that is not there";
+    if (!source) return name + " refers to a missing source keyframe";
+    if (point.source_level >= kPyramidLevels) return name + " refers to a missing pyramid level";
     const cv::Mat& level = source->features->levels[point.source_level];
     if (!point.source_pixel.allFinite() || point.source_pixel.minCoeff() < 0 ||
         point.source_pixel.x() > static_cast<float>(level.cols - 1) ||
@@ -96,9 +96,9 @@ std::string CheckObservations(const MapSnapshot& map) {
     }
     previous = &observation;
     const KeyFrame* keyframe = map.FindKeyFrame(observation.keyframe);
-    if (!keyframe) return name + " names a keyframe that is not there";
-    if (!map.FindPoint(observation.point)) return name + " names a point that is not there";
-    if (observation.level >= kPyramidLevels) return name + " names a pyramid level that is not there";
+    if (!keyframe) return name + " refers to a missing keyframe";
+    if (!map.FindPoint(observation.point)) return name + " refers to a missing point";
+    if (observation.level >= kPyramidLevels) return name + " refers to a missing pyramid level";
     if (!observation.pixel.allFinite() || !keyframe->camera->IsInside(observation.pixel.cast<double>())) {
       return name + " lies outside the image";
     }

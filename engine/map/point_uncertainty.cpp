@@ -10,7 +10,7 @@ namespace docent::engine {
 
 namespace {
 
-// Information that an observation gives of the place, in the map; zero where the point cannot be seen.
+// Information of an observation on the point's position in the map; zero if the point does not project.
 Eigen::Matrix3d InformationOf(const KeyFrame& keyframe, const Eigen::Vector3d& position, int level) {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> pixel_from_camera;

@@ -14,109 +14,111 @@ namespace {
 
 using Outcome = BundleSummary::Outcome;
 
-// The robust threshold follows the residuals when they ask for less than this part of the one in use, and
-// the descent goes on when at its end the two differ by more than the second.
+// The robust threshold is lowered as soon as the residuals ask for less than this ratio of the current one;
+// and the descent continues if, at its end, the two differ by more than the second ratio.
 constexpr double kThresholdDrop = 0.8;
 constexpr double kThresholdChange = 0.1;
-// The descent has arrived when a step changes the cost by less than this part of it, or the state by less
-// than the second, or when no slope is left.
+// The descent has converged if a step changes the cost by less than this ratio, or the state by less than the
+// second, or if no component of the gradient is larger than the third.
 constexpr double kCostTolerance = 1e-6;
 constexpr double kStepTolerance = 1e-9;
-constexpr double kSlopeTolerance = 1e-10;
-// Of the predicted decrease: what a step must keep.
-constexpr double kLeastGain = 1e-3;
+constexpr double kGradientTolerance = 1e-10;
+// A step is accepted if it achieves at least this ratio of the predicted decrease.
+constexpr double kMinGain = 1e-3;
 
 double RobustThreshold(const BundleOptions& options, double sigma) {
   return options.threshold_factor * std::max(options.min_sigma, sigma);
 }
 
-// How far the quadratic model is trusted, as the inverse of the damping (Nielsen, "Damping Parameter in
-// Marquardt's Method", 1999).
-class Trust {
+// The radius within which the quadratic model is trusted, as the inverse of the damping (Nielsen, "Damping
+// Parameter in Marquardt's Method", 1999).
+class TrustRegion {
  public:
   double damping() const { return 1 / radius_; }
-  void Succeeded(double gain) {
-    radius_ = std::min(kMost, radius_ / std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3)));
+  void Expand(double gain) {
+    radius_ = std::min(kMaxRadius, radius_ / std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3)));
     shrink_ = 2;
   }
-  void Failed() {
+  void Shrink() {
     radius_ /= shrink_;
     shrink_ *= 2;
   }
-  void StartAgain() {
-    radius_ = std::max(kFirst, radius_);
+  void Restart() {
+    radius_ = std::max(kInitialRadius, radius_);
     shrink_ = 2;
   }
-  bool lost() const { return radius_ < kLeast; }
+  bool exhausted() const { return radius_ < kMinRadius; }
 
  private:
-  static constexpr double kFirst = 1e4;
-  // Beyond this the damping would vanish beside the curvature in double precision, and a point seen once
-  // would be free along its ray.
-  static constexpr double kMost = 1e8;
-  static constexpr double kLeast = 1e-20;
-  double radius_ = kFirst, shrink_ = 2;
+  static constexpr double kInitialRadius = 1e4;
+  // Beyond this the damping would vanish beside the curvature in double precision, and a point with a single
+  // observation would be free along its ray.
+  static constexpr double kMaxRadius = 1e8;
+  static constexpr double kMinRadius = 1e-20;
+  double radius_ = kInitialRadius, shrink_ = 2;
 };
 
 class Descent {
  public:
   Descent(const BundleOptions& options, BundleSystem* system, BundleSummary* summary)
       : options_(options), system_(*system), summary_(*summary) {
-    SetThreshold(Wanted());
+    SetThreshold(DesiredThreshold());
   }
 
   Outcome Run() {
     if (system_.interrupted()) return Outcome::kInterrupted;
     if (system_.empty()) return Outcome::kConverged;
     while (summary_.iterations < options_.max_iterations) {
-      const auto step = system_.Step(threshold_, trust_.damping());
+      const auto step = system_.Step(threshold_, region_.damping());
       if (step == BundleSystem::Outcome::kInterrupted) return Outcome::kInterrupted;
-      const bool flat = step == BundleSystem::Outcome::kDone && system_.steepest_slope() <= kSlopeTolerance;
-      if (!flat) ++summary_.iterations;
-      if (!(flat || Take(step))) continue;
-      // Arrived under this threshold; another one may be due.
-      const double wanted = Wanted();
-      if (std::abs(wanted - threshold_) < kThresholdChange * threshold_) return Outcome::kConverged;
-      SetThreshold(wanted);
-      trust_.StartAgain();
+      const bool stationary =
+          step == BundleSystem::Outcome::kDone && system_.max_gradient() <= kGradientTolerance;
+      if (!stationary) ++summary_.iterations;
+      if (!(stationary || TakeStep(step))) continue;
+      // The descent has converged under this threshold; the residuals may now ask for another one.
+      const double desired = DesiredThreshold();
+      if (std::abs(desired - threshold_) < kThresholdChange * threshold_) return Outcome::kConverged;
+      SetThreshold(desired);
+      region_.Restart();
     }
     return Outcome::kIterationLimit;
   }
 
  private:
-  double Wanted() const { return RobustThreshold(options_, system_.Sigma()); }
+  double DesiredThreshold() const { return RobustThreshold(options_, system_.Sigma()); }
   void SetThreshold(double threshold) {
     threshold_ = threshold;
     cost_ = RobustCost(options_.loss, threshold_, system_.squared_norms());
   }
 
-  // Goes where the step leads if that is better; true at the end of the way.
-  bool Take(BundleSystem::Outcome step) {
+  // Accepts the step if it reduces the cost; returns true if the descent has converged or cannot continue.
+  bool TakeStep(BundleSystem::Outcome step) {
     if (step == BundleSystem::Outcome::kSingular) {
-      trust_.Failed();
-      return trust_.lost();
+      region_.Shrink();
+      return region_.exhausted();
     }
     const double cost = RobustCost(options_.loss, threshold_, system_.next_squared_norms());
     const double decrease = cost_ - cost, gain = decrease / system_.predicted_decrease();
-    const bool arrived =
+    const bool converged =
         std::abs(decrease) <= kCostTolerance * cost_ || system_.relative_length() <= kStepTolerance;
-    if (!(decrease > 0 && gain > kLeastGain)) {
-      trust_.Failed();
-      return arrived || trust_.lost();
+    if (!(decrease > 0 && gain > kMinGain)) {
+      region_.Shrink();
+      return converged || region_.exhausted();
     }
     system_.Accept();
     cost_ = cost;
-    trust_.Succeeded(gain);
-    if (!arrived) {
-      if (const double wanted = Wanted(); wanted < kThresholdDrop * threshold_) SetThreshold(wanted);
+    region_.Expand(gain);
+    if (!converged) {
+      if (const double desired = DesiredThreshold(); desired < kThresholdDrop * threshold_)
+        SetThreshold(desired);
     }
-    return arrived;
+    return converged;
   }
 
   const BundleOptions& options_;
   BundleSystem& system_;
   BundleSummary& summary_;
-  Trust trust_;
+  TrustRegion region_;
   double threshold_ = 0, cost_ = 0;
 };
 
@@ -160,9 +162,9 @@ BundleSummary AdjustBundle(const BundleOptions& options, BundleProblem* problem)
   BundleSystem system(*problem, options.loss, options.interrupt);
   summary.outcome = Descent(options, &system, &summary).Run();
   summary.sigma = system.Sigma();
-  const std::vector<double>& start_norms = system.MeasureAgain(*problem);
+  const std::vector<double>& start_norms = system.EvaluateAt(*problem);
   double threshold = RobustThreshold(options, summary.sigma);
-  // Both under the same threshold: otherwise a tighter one alone would look like progress.
+  // Both costs use the same threshold: otherwise a lower threshold alone would look like progress.
   summary.initial_cost = RobustCost(options.loss, threshold, start_norms);
   summary.final_cost = RobustCost(options.loss, threshold, system.squared_norms());
   if (summary.final_cost <= summary.initial_cost) {

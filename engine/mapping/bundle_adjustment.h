@@ -10,31 +10,32 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 
-// Robust non-linear refinement of keyframe poses and points (ptamm §2.3, eq. 4-7).
+// Robust non-linear refinement of keyframe poses and point positions (ptamm §2.3, eq. 4-7).
 namespace docent::engine {
 
 enum class RobustLoss { kHuber, kTukey };
 
-// A problem in structure-of-arrays form; indices refer to the vectors of the same struct.
+// A bundle adjustment problem as flat arrays; every index refers to the vectors of the same struct.
 struct BundleProblem {
   struct Camera {
     std::shared_ptr<const CameraModel> model;
-    Rigid3 camera_from_map;  // in: start; out: result
+    Rigid3 camera_from_map;  // in: initial value; out: result
     bool fixed = false;
   };
   struct Point {
-    Eigen::Vector3d position = Eigen::Vector3d::Zero();  // in: start; out: result (finite points only)
+    // In: initial value; out: result (finite points only).
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
     bool fixed = false;
   };
   struct Measurement {
     int camera = 0, point = 0;
     Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // level 0
-    float sigma_px = 1;                               // 2^level
-    bool outlier = false;                             // out: residual beyond the robust threshold
+    float sigma_px = 1;                               // standard deviation: 2^level of the observation
+    bool outlier = false;                             // out: the residual exceeds the robust threshold
   };
   std::vector<Camera> cameras;
   std::vector<Point> points;
-  // In any order; by ascending point they are gone through as they lie in memory.
+  // In any order. Measurements that are sorted by point are read in the order in which they lie in memory.
   std::vector<Measurement> measurements;
 };
 
@@ -45,30 +46,31 @@ struct BundleOptions {
   // normalised residuals' standard deviation, never below min_sigma. 4.685 is Tukey's 95 % efficiency.
   double threshold_factor = 4.685;
   double min_sigma = 0.4;
-  // Stops when this becomes true, which is looked at every few points and before each product of panels; what
-  // was reached is kept when it is better than the start. May be null.
+  // The adjustment stops once this becomes true; it is read every few points and before each product of
+  // panels. The state that was reached is kept if its cost is lower than that of the initial state. May be
+  // null.
   const std::atomic<bool>* interrupt = nullptr;
 };
 
-// What happened, as data.
+// The result of an adjustment as figures, for logs and decisions.
 struct BundleSummary {
   enum class Outcome { kConverged, kIterationLimit, kInterrupted, kFailed };
   Outcome outcome = Outcome::kFailed;
-  // Half the sums of the robust losses of all measurements, both under the threshold that was reached last;
-  // final_cost <= initial_cost always.
+  // Half the sum of the robust losses of all measurements. Both costs use the threshold that was reached
+  // last; final_cost <= initial_cost always.
   double initial_cost = 0, final_cost = 0;
-  double sigma = 0;  // of the normalised residuals along one axis, after
+  double sigma = 0;  // of the normalised residuals along one axis, at the final state
   int iterations = 0;
   int outliers = 0;
   double seconds = 0;
   std::string Brief() const;
 };
 
-// Adjusts the free cameras and points in place. At least one camera should be fixed (two, or a fixed point,
-// to hold the scale); the gauge is otherwise held by Levenberg-Marquardt's damping. A measurement whose point
-// is behind its camera counts as an outlier, as does one of a point or camera that is not finite (which then
-// stays as it is). Indices must be valid and models not null. Deterministic: single-threaded, same input,
-// same result.
+// Adjusts the free cameras and points in place. At least one camera should be fixed, and a second camera or a
+// point to fix the scale; otherwise only the damping of Levenberg-Marquardt fixes the gauge. A measurement
+// counts as an outlier if its point is behind the camera, or if its point or camera is not finite (such a
+// camera or point is left unchanged). Indices must be valid and models not null. Single-threaded and
+// deterministic: equal input gives an equal result.
 BundleSummary AdjustBundle(const BundleOptions& options, BundleProblem* problem);
 
 }  // namespace docent::engine

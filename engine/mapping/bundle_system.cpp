@@ -12,10 +12,10 @@
 namespace docent::engine {
 namespace {
 
-// An unknown's own curvature counts as at least this much when it is damped: what nothing was measured of
-// stays where it is.
-constexpr double kLeastCurvature = 1e-6;
-// Points between two looks at the interrupt: well below 0.1 ms.
+// Lower limit of the curvature by which the damping is multiplied: an unknown without measurements stays
+// where it is.
+constexpr double kMinCurvature = 1e-6;
+// Points between two checks of the interrupt: well below 0.1 ms.
 constexpr std::size_t kInterruptStride = 32;
 
 using Twist = Eigen::Matrix<double, 6, 1>;
@@ -44,13 +44,13 @@ BundleSystem::BundleSystem(const BundleProblem& problem, RobustLoss loss, const 
   next_positions_ = positions_;
   squared_norms_.resize(order_.size());
   next_squared_norms_.resize(order_.size());
-  squared_norms_ = MeasureAgain(problem);
+  squared_norms_ = EvaluateAt(problem);
   const auto size = static_cast<Eigen::Index>(6 * free_cameras_.size());
-  camera_step_ = right_side_ = camera_gradient_ = camera_damping_ = Eigen::VectorXd::Zero(size);
+  camera_step_ = right_hand_side_ = camera_gradient_ = camera_damping_ = Eigen::VectorXd::Zero(size);
   eliminated_.resize(free_points_.size());
 }
 
-const std::vector<double>& BundleSystem::MeasureAgain(const BundleProblem& problem) {
+const std::vector<double>& BundleSystem::EvaluateAt(const BundleProblem& problem) {
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     next_cameras_[i].camera_from_map = problem.cameras[i].camera_from_map;
     next_cameras_[i].rotation = problem.cameras[i].camera_from_map.rotation.matrix();
@@ -66,7 +66,7 @@ const std::vector<double>& BundleSystem::MeasureAgain(const BundleProblem& probl
   return next_squared_norms_;
 }
 
-// A counting sort by point. What is fixed, not finite or never measured is no unknown.
+// A counting sort by point. Cameras and points that are fixed, not finite or never measured are not unknowns.
 void BundleSystem::Pack(const BundleProblem& problem) {
   const std::size_t camera_count = problem.cameras.size(), point_count = problem.points.size();
   std::vector<char> measured(camera_count, 0);
@@ -108,7 +108,7 @@ void BundleSystem::Pack(const BundleProblem& problem) {
     order_[next[static_cast<std::size_t>(measurements_[i].point)]++] = static_cast<int>(i);
 }
 
-// Two cameras are coupled where they measured the same free point.
+// Two cameras are coupled if they measured the same free point.
 SkylineCholesky BundleSystem::MakeReduced() const {
   std::vector<int> first(free_cameras_.size());
   std::iota(first.begin(), first.end(), 0);
@@ -160,8 +160,8 @@ bool BundleSystem::Reduce(double threshold, double damping) {
   reduced_.SetZero();
   camera_gradient_.setZero();
   camera_damping_.setZero();
-  right_side_.setZero();
-  steepest_slope_ = 0;
+  right_hand_side_.setZero();
+  max_gradient_ = 0;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     if (i % kInterruptStride == 0 && interrupted()) return false;
     ReducePoint(points_[i], threshold, damping);
@@ -169,12 +169,11 @@ bool BundleSystem::Reduce(double threshold, double damping) {
   for (std::size_t i = 0; i < free_cameras_.size(); ++i) {
     const auto begin = static_cast<Eigen::Index>(6 * i);
     auto curvature = camera_damping_.segment<6>(begin);
-    curvature = damping * curvature.cwiseMax(kLeastCurvature);
+    curvature = damping * curvature.cwiseMax(kMinCurvature);
     reduced_.At(static_cast<int>(i), static_cast<int>(i)).diagonal() += curvature;
   }
-  right_side_ -= camera_gradient_;
-  if (!free_cameras_.empty())
-    steepest_slope_ = std::max(steepest_slope_, camera_gradient_.cwiseAbs().maxCoeff());
+  right_hand_side_ -= camera_gradient_;
+  if (!free_cameras_.empty()) max_gradient_ = std::max(max_gradient_, camera_gradient_.cwiseAbs().maxCoeff());
   return true;
 }
 
@@ -212,20 +211,20 @@ void BundleSystem::Eliminate(const Point& point, double damping, const Eigen::Ma
                              const Eigen::Vector3d& gradient) {
   Eliminated& result = eliminated_[static_cast<std::size_t>(point.unknown)];
   result.gradient = gradient;
-  result.damping = damping * hessian.diagonal().cwiseMax(kLeastCurvature);
-  steepest_slope_ = std::max(steepest_slope_, gradient.cwiseAbs().maxCoeff());
+  result.damping = damping * hessian.diagonal().cwiseMax(kMinCurvature);
+  max_gradient_ = std::max(max_gradient_, gradient.cwiseAbs().maxCoeff());
   Eigen::Matrix3d damped = hessian;
   damped.diagonal() += result.damping;
   const Eigen::LLT<Eigen::Matrix3d> factor(damped);
   if (factor.info() != Eigen::Success) {
-    result.inverse_hessian.setZero();  // it stays where it is in this step
+    result.inverse_hessian.setZero();  // the point does not move in this step
     return;
   }
   result.inverse_hessian = factor.solve(Eigen::Matrix3d::Identity());
   for (std::size_t a = 0; a < couplings_.size(); ++a) {
     Coupling& coupling = couplings_[a];
     coupling.solved.noalias() = coupling.block * result.inverse_hessian;
-    right_side_.segment<6>(6 * coupling.camera) += coupling.solved * gradient;
+    right_hand_side_.segment<6>(6 * coupling.camera) += coupling.solved * gradient;
     for (std::size_t b = 0; b <= a; ++b) {
       const Coupling& other = couplings_[b];
       const bool ordered = coupling.camera >= other.camera;
@@ -233,7 +232,7 @@ void BundleSystem::Eliminate(const Point& point, double damping, const Eigen::Ma
       const Coupling& column = ordered ? other : coupling;
       auto target = reduced_.At(row.camera, column.camera);
       target.noalias() -= row.solved * column.block.transpose();
-      // A point that one image shows twice, which no map holds but the problem allows.
+      // One image may contain two measurements of a point: no map has this, but the problem allows it.
       if (a != b && row.camera == column.camera) target.noalias() -= column.solved * row.block.transpose();
     }
   }
@@ -244,14 +243,15 @@ BundleSystem::Outcome BundleSystem::Step(double threshold, double damping) {
   const auto factored = reduced_.Factor([this] { return interrupted(); });
   if (factored == SkylineCholesky::Outcome::kInterrupted) return Outcome::kInterrupted;
   if (factored == SkylineCholesky::Outcome::kNotPositive) return Outcome::kSingular;
-  camera_step_ = right_side_;
+  camera_step_ = right_hand_side_;
   reduced_.Solve(&camera_step_);
   if (!camera_step_.allFinite()) return Outcome::kSingular;
-  return Follow(threshold) ? Outcome::kDone : Outcome::kInterrupted;
+  return BackSubstitute(threshold) ? Outcome::kDone : Outcome::kInterrupted;
 }
 
-// The points go where they fit best beside the moved cameras; and everything is measured again there.
-bool BundleSystem::Follow(double threshold) {
+// Back-substitution: moves the points to the optimum for the moved cameras, and evaluates all residuals
+// there.
+bool BundleSystem::BackSubstitute(double threshold) {
   predicted_decrease_ = 0.5 * camera_step_.dot(camera_damping_.cwiseProduct(camera_step_) - camera_gradient_);
   double squared_length = camera_step_.squaredNorm(), squared_state = 0;
   for (std::size_t i = 0; i < free_cameras_.size(); ++i) {
@@ -263,7 +263,7 @@ bool BundleSystem::Follow(double threshold) {
   }
   for (std::size_t i = 0; i < points_.size(); ++i) {
     if (i % kInterruptStride == 0 && interrupted()) return false;
-    FollowPoint(points_[i], threshold);
+    BackSubstitutePoint(points_[i], threshold);
     if (points_[i].unknown < 0) continue;
     const auto index = static_cast<std::size_t>(points_[i].index);
     squared_length += (next_positions_[index] - positions_[index]).squaredNorm();
@@ -273,11 +273,11 @@ bool BundleSystem::Follow(double threshold) {
   return true;
 }
 
-void BundleSystem::FollowPoint(const Point& point, double threshold) {
+void BundleSystem::BackSubstitutePoint(const Point& point, double threshold) {
   const auto index = static_cast<std::size_t>(point.index);
   if (point.unknown >= 0) {
     const Eliminated& eliminated = eliminated_[static_cast<std::size_t>(point.unknown)];
-    Eigen::Vector3d pull = eliminated.gradient;
+    Eigen::Vector3d gradient = eliminated.gradient;
     Linearized linearized;
     for (std::size_t i = point.begin; i < point.end; ++i) {
       const Camera& camera = cameras_[static_cast<std::size_t>(MeasurementAt(i).camera)];
@@ -286,10 +286,10 @@ void BundleSystem::FollowPoint(const Point& point, double threshold) {
         continue;
       const Twist twist = camera_step_.segment<6>(6 * camera.unknown);
       const Eigen::Vector3d moved = twist.head<3>() + twist.tail<3>().cross(linearized.in_camera);
-      pull.noalias() +=
+      gradient.noalias() +=
           camera.rotation.transpose() * (linearized.jacobian.transpose() * (linearized.jacobian * moved));
     }
-    const Eigen::Vector3d step = -(eliminated.inverse_hessian * pull);
+    const Eigen::Vector3d step = -(eliminated.inverse_hessian * gradient);
     next_positions_[index] = positions_[index] + step;
     predicted_decrease_ += 0.5 * step.dot(eliminated.damping.cwiseProduct(step) - eliminated.gradient);
   }
@@ -304,7 +304,7 @@ void BundleSystem::FollowPoint(const Point& point, double threshold) {
 }
 
 void BundleSystem::Accept() {
-  // Both sides were equal in all that is fixed, and a step overwrites all that is free.
+  // Both states are equal in everything that is fixed, and a step overwrites everything that is free.
   cameras_.swap(next_cameras_);
   positions_.swap(next_positions_);
   squared_norms_.swap(next_squared_norms_);

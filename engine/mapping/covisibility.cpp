@@ -29,33 +29,34 @@ std::size_t Covisibility::IndexOf(KeyFrameId id) const {
 }
 
 bool Covisibility::AreNeighbours(std::size_t a, std::size_t b) const {
-  constexpr double kMinShare = 0.2;
+  constexpr double kMinRatio = 0.2;
   constexpr int kMinShared = 15;
   const std::size_t count = keyframes_.size();
-  const int seen = std::min(counts_[a * count + a], counts_[b * count + b]);
-  return Shared(a, b) >= std::max(kMinShared, static_cast<int>(kMinShare * seen));
+  const int observed = std::min(counts_[a * count + a], counts_[b * count + b]);
+  return Shared(a, b) >= std::max(kMinShared, static_cast<int>(kMinRatio * observed));
 }
 
 double Covisibility::PathLengthBetween(KeyFrameId from, KeyFrameId to, const Map& map) const {
-  constexpr double kFar = std::numeric_limits<double>::infinity();
+  constexpr double kUnreachable = std::numeric_limits<double>::infinity();
   const std::size_t count = keyframes_.size(), start = IndexOf(from), end = IndexOf(to);
-  if (start == count || end == count) return kFar;
+  if (start == count || end == count) return kUnreachable;
   std::vector<Eigen::Vector3d> centers;
   for (const KeyFrameId id : keyframes_)
     centers.push_back(map.keyframes().at(id).keyframe.camera_from_map.OriginInSource());
-  std::vector<double> way(count, kFar);
-  std::vector<bool> settled(count, false);
-  way[start] = 0;
+  std::vector<double> length(count, kUnreachable);
+  std::vector<bool> visited(count, false);
+  length[start] = 0;
   for (;;) {  // Dijkstra on a dense graph
     std::size_t nearest = count;
     for (std::size_t i = 0; i < count; ++i) {
-      if (!settled[i] && way[i] < kFar && (nearest == count || way[i] < way[nearest])) nearest = i;
+      if (!visited[i] && length[i] < kUnreachable && (nearest == count || length[i] < length[nearest]))
+        nearest = i;
     }
-    if (nearest == count || nearest == end) return way[end];
-    settled[nearest] = true;
+    if (nearest == count || nearest == end) return length[end];
+    visited[nearest] = true;
     for (std::size_t i = 0; i < count; ++i) {
       if (!AreNeighbours(nearest, i)) continue;
-      way[i] = std::min(way[i], way[nearest] + (centers[i] - centers[nearest]).norm());
+      length[i] = std::min(length[i], length[nearest] + (centers[i] - centers[nearest]).norm());
     }
   }
 }

@@ -8,7 +8,7 @@
 namespace docent::engine {
 namespace {
 
-// Polynomials in (x, y, z). Monomials in the order that the elimination wants, highest degree first:
+// Polynomials in (x, y, z). The monomials are in the order that the elimination needs, highest degree first:
 //   cubic      x3 x2y x2z xy2 xyz xz2 y3 y2z yz2 z3 | then quadratic's
 //   quadratic  x2 xy xz y2 yz z2 | then linear's
 //   linear     x y z 1
@@ -73,7 +73,7 @@ Eigen::Matrix<double, 10, 20> MakeConstraints(const Eigen::Matrix<double, 9, 4>&
 
 std::vector<Eigen::Matrix3d> SolveFivePoint(std::span<const Eigen::Vector3d, 5> rays_in_a,
                                             std::span<const Eigen::Vector3d, 5> rays_in_b) {
-  // Columns: one pair's coefficients of E's entries, row by row.
+  // Each column holds one pair's coefficients of the entries of E, row by row.
   Eigen::Matrix<double, 9, 5> coefficients;
   for (int i = 0; i < 5; ++i)
     for (int row = 0; row < 3; ++row)

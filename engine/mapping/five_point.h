@@ -12,18 +12,18 @@
 // Free functions without state; any thread.
 namespace docent::engine {
 
-// Every real essential matrix (at most ten) that five ray pairs allow, each of Frobenius norm 1: the cubic
-// constraints on the null space (Nister 2004) solved through the eigenvectors of a 10x10 action matrix
-// (Stewenius, Engels and Nister 2006). The rays need not be of unit length. Empty where the five pairs are
+// Every real essential matrix (at most ten) that satisfies five ray pairs, each of Frobenius norm 1. The
+// cubic constraints on the null space (Nister 2004) are solved through the eigenvectors of a 10x10 action
+// matrix (Stewenius, Engels and Nister 2006). The rays need not have unit length. Empty if the five pairs are
 // degenerate.
 std::vector<Eigen::Matrix3d> SolveFivePoint(std::span<const Eigen::Vector3d, 5> rays_in_a,
                                             std::span<const Eigen::Vector3d, 5> rays_in_b);
 
-// [t]x R of a pose.
+// The essential matrix [t]x R of a pose.
 Eigen::Matrix3d EssentialFromPose(const Rigid3& b_from_a);
 
-// The four poses of an essential matrix, |translation| = 1. Only cheirality tells them apart: two rotations
-// (the twisted pair), each with both signs of the translation. The first two share a rotation.
+// The four poses of an essential matrix, with |translation| = 1: two rotations (the twisted pair), each with
+// both signs of the translation. Only cheirality distinguishes them. The first two share a rotation.
 std::array<Rigid3, 4> PosesFromEssential(const Eigen::Matrix3d& essential);
 
 }  // namespace docent::engine

@@ -10,7 +10,7 @@ int MatchMapPoints(const GuidedMatchingOptions& options, KeyFrameId keyframe, Po
   const Map::KeyFrameRecord* const record = map->FindKeyFrame(keyframe);
   if (!record || record->keyframe.kind != KeyFrameKind::kSixDof) return 0;
   std::vector<Observation> found;
-  const auto look_for = [&](const Map::PointRecord& point) {
+  const auto search = [&](const Map::PointRecord& point) {
     if (!point.alive || point.point.infinite()) return;
     if (std::binary_search(point.observers.begin(), point.observers.end(), keyframe)) return;
     const Map::KeyFrameRecord* const source = map->FindKeyFrame(point.point.source_keyframe);
@@ -27,10 +27,10 @@ int MatchMapPoints(const GuidedMatchingOptions& options, KeyFrameId keyframe, Po
   };
   if (among != nullptr) {
     for (const MapPointId id : *among) {
-      if (const Map::PointRecord* point = map->FindPoint(id)) look_for(*point);
+      if (const Map::PointRecord* point = map->FindPoint(id)) search(*point);
     }
   } else {
-    for (const Map::PointRecord& point : map->points()) look_for(point);
+    for (const Map::PointRecord& point : map->points()) search(point);
   }
   for (const Observation& observation : found) map->AddObservation(observation);
   return static_cast<int>(found.size());

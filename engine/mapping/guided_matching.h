@@ -9,15 +9,16 @@
 namespace docent::engine {
 
 struct GuidedMatchingOptions {
-  float radius_px = 6;            // about where the point projects, level 0
-  double max_error_sigmas = 3.0;  // of what was found, in pixels of its level: further off is another thing
+  float radius_px = 6;  // search radius about the projection of a point, level 0
+  // Pixels of the match's level; a match further off is taken to be another feature.
+  double max_error_sigmas = 3.0;
 };
 
-// Appearance in a localized keyframe for the finite points that it does not see yet although it should, and
-// adds what it finds as observations: points that were made after the keyframe, and points that an earlier
-// search missed (ptamm §2.3, data association refinement). The images' features are those of MakeFeatures.
-// Returns how many were found. among: of these points alone (may be null). The caller adjusts the map
-// afterwards; the searcher holds patches of this map alone.
+// Searches a localized keyframe for finite points that it should see but does not observe yet, and adds the
+// matches as observations (ptamm §2.3, data association refinement). These are points that were created after
+// the keyframe, and points that an earlier search missed. The features of the images must come from
+// MakeFeatures. among: restricts the search to these points (may be null). Returns the number of matches. The
+// caller adjusts the map afterwards; `searcher` must hold patches of this map only.
 int MatchMapPoints(const GuidedMatchingOptions& options, KeyFrameId keyframe, PointSearcher* searcher,
                    Map* map, const std::vector<MapPointId>* among = nullptr);
 

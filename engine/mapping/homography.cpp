@@ -8,7 +8,7 @@
 namespace docent::engine {
 namespace {
 
-// Two directions perpendicular to a unit vector and to each other.
+// Two unit vectors perpendicular to a unit vector and to each other.
 Eigen::Matrix<double, 2, 3> TangentBasis(const Eigen::Vector3d& ray) {
   Eigen::Matrix<double, 2, 3> basis;
   const Eigen::Vector3d first = ray.unitOrthogonal();
@@ -21,7 +21,7 @@ Eigen::Matrix<double, 2, 3> TangentBasis(const Eigen::Vector3d& ray) {
 
 std::optional<Eigen::Matrix3d> SolveFourPoint(std::span<const Eigen::Vector3d, 4> rays_in_a,
                                               std::span<const Eigen::Vector3d, 4> rays_in_b) {
-  // With the first three rays as a basis, the fourth's coordinates fix how far each ray is stretched.
+  // With the first three rays as a basis, the coordinates of the fourth determine the scale of each ray.
   Eigen::Matrix3d basis_a, basis_b;
   basis_a << rays_in_a[0], rays_in_a[1], rays_in_a[2];
   basis_b << rays_in_b[0], rays_in_b[1], rays_in_b[2];
@@ -30,10 +30,10 @@ std::optional<Eigen::Matrix3d> SolveFourPoint(std::span<const Eigen::Vector3d, 4
     return std::nullopt;
   const Eigen::Matrix3d inverse_a = basis_a.inverse();
   const Eigen::Vector3d along_a = inverse_a * rays_in_a[3], along_b = basis_b.inverse() * rays_in_b[3];
-  const Eigen::Vector3d stretch = along_b.cwiseQuotient(along_a);
-  // All four in front of both cameras: every stretch is positive.
-  if (!(stretch.minCoeff() > 0) || !stretch.allFinite()) return std::nullopt;
-  return basis_b * stretch.asDiagonal() * inverse_a;
+  const Eigen::Vector3d scales = along_b.cwiseQuotient(along_a);
+  // All four points must lie in front of both cameras, so every scale must be positive.
+  if (!(scales.minCoeff() > 0) || !scales.allFinite()) return std::nullopt;
+  return basis_b * scales.asDiagonal() * inverse_a;
 }
 
 std::optional<Eigen::Matrix3d> ScaleHomography(const Eigen::Matrix3d& homography) {
@@ -47,7 +47,8 @@ std::optional<Eigen::Matrix3d> ScaleHomography(const Eigen::Matrix3d& homography
 std::optional<Eigen::Matrix3d> FitHomography(std::span<const Eigen::Vector3d> rays_in_a,
                                              std::span<const Eigen::Vector3d> rays_in_b) {
   if (rays_in_a.size() < 4 || rays_in_a.size() != rays_in_b.size()) return std::nullopt;
-  // Each pair asks that H ray_a has no component across ray_b: two rows on H's entries, row by row.
+  // Each pair requires that H ray_a has no component perpendicular to ray_b: two rows on the entries of H,
+  // row by row.
   Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
   Eigen::Matrix<double, 2, 9> rows;
   for (std::size_t i = 0; i < rays_in_a.size(); ++i) {
@@ -57,7 +58,7 @@ std::optional<Eigen::Matrix3d> FitHomography(std::span<const Eigen::Vector3d> ra
     normal.noalias() += rows.transpose() * rows;
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(normal);
-  // One null direction is the answer, a second one means that the rays do not determine it.
+  // The null direction is the solution; a second one means that the rays do not determine it.
   if (eigen.info() != Eigen::Success || !(eigen.eigenvalues()[1] > 1e-12 * eigen.eigenvalues()[8]))
     return std::nullopt;
   const Eigen::Matrix<double, 9, 1> entries = eigen.eigenvectors().col(0);
@@ -74,8 +75,8 @@ std::optional<Eigen::Matrix3d> FitHomography(std::span<const Eigen::Vector3d> ra
 
 std::vector<PlaneMotion> DecomposeHomography(const Eigen::Matrix3d& b_from_a) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(b_from_a.transpose() * b_from_a);
-  // Descending: largest >= 1 >= smallest. Where rounding leaves the middle one a little off 1, its own value
-  // is the unit.
+  // Eigenvalues with largest >= 1 >= smallest. Rounding may leave the middle one slightly off 1, so it serves
+  // as the unit.
   const double middle = eigen.eigenvalues()[1];
   if (!(middle > 1e-12)) return {};
   const double largest = eigen.eigenvalues()[2] / middle, smallest = eigen.eigenvalues()[0] / middle;
@@ -88,12 +89,12 @@ std::vector<PlaneMotion> DecomposeHomography(const Eigen::Matrix3d& b_from_a) {
 
   std::vector<PlaneMotion> motions;
   for (const double sign : {1.0, -1.0}) {
-    // v2 and u span a plane on which H keeps all lengths: a rotation does the same to both.
+    // v2 and u span a plane on which H preserves all lengths; the rotation maps both in the same way.
     const Eigen::Vector3d u = along * v1 + sign * across * v3;
     Eigen::Matrix3d before, after;
     before << v2, u, v2.cross(u);
-    const Eigen::Vector3d turned_v2 = homography * v2, turned_u = homography * u;
-    after << turned_v2, turned_u, turned_v2.cross(turned_u);
+    const Eigen::Vector3d rotated_v2 = homography * v2, rotated_u = homography * u;
+    after << rotated_v2, rotated_u, rotated_v2.cross(rotated_u);
     const Eigen::Matrix3d rotation_matrix = after * before.transpose();
     const Eigen::Vector3d normal = v2.cross(u);
     const Eigen::Vector3d translation = (homography - rotation_matrix) * normal;

@@ -11,13 +11,13 @@ namespace docent::engine {
 namespace {
 
 constexpr float kMinCorrelation = 0.8f;
-constexpr float kMaxRoundTripPx = 0.7f;  // of the corner's level: there and back again
-constexpr float kMaxStepPx = 4.0f;       // of each level: how far alignment may move from its prediction
+constexpr float kMaxRoundTripPx = 0.7f;  // of the corner's level, tracked forwards and backwards
+constexpr float kMaxStepPx = 4.0f;       // of each level: how far the alignment may move from the prediction
 
-// Follows one place of `from` into `to`, coarse to fine, down to the corner's own level.
-std::optional<Eigen::Vector2f> FollowPatch(const ImageFeatures& from, const Eigen::Vector2f& pixel,
-                                           const ImageFeatures& to, const Eigen::Vector2f& prediction,
-                                           int level) {
+// Tracks one patch of `from` into `to`, from coarse levels to the corner's own level.
+std::optional<Eigen::Vector2f> TrackPatch(const ImageFeatures& from, const Eigen::Vector2f& pixel,
+                                          const ImageFeatures& to, const Eigen::Vector2f& prediction,
+                                          int level) {
   Eigen::Vector2d guess = prediction.cast<double>();
   PatchTemplate patch;
   for (int l = kPyramidLevels - 1; l >= level; --l) {
@@ -39,7 +39,7 @@ std::optional<Eigen::Vector2f> FollowPatch(const ImageFeatures& from, const Eige
   return guess.cast<float>();
 }
 
-// The best corners of a level, at most `count`, thinned so that they cover the image.
+// The best corners of a level, at most `count`, one per grid cell so that they cover the image.
 std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t level, int count) {
   const cv::Mat& image = features.levels[level];
   const double cell = std::max(8.0, std::sqrt(static_cast<double>(image.total()) / (1.3 * count)));
@@ -99,11 +99,11 @@ void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeature
   first_time_ = time;
   first_ = previous_ = features;
   hint_ = static_cast<int>(trails_.size()) < options_.min_alive
-              ? "too little texture: point at something with detail"
+              ? "too little detail here: point the camera at the exhibit"
               : "move sideways";
 }
 
-void Initializer::Follow(const ImageFeatures& features) {
+void Initializer::TrackCorners(const ImageFeatures& features) {
   const auto rotation = AlignRotation(previous_->small_blurry, *camera_, features.small_blurry, *camera_);
   const Rotation3 now_from_previous = rotation && rotation->converged ? rotation->b_from_a : Rotation3();
   std::erase_if(trails_, [&](Trail& trail) {
@@ -111,9 +111,9 @@ void Initializer::Follow(const ImageFeatures& features) {
     if (!ray) return true;
     const auto prediction = camera_->Project(now_from_previous * *ray);
     if (!prediction || !camera_->IsInside(*prediction, 6)) return true;
-    const auto now = FollowPatch(*previous_, trail.now, features, prediction->cast<float>(), trail.level);
+    const auto now = TrackPatch(*previous_, trail.now, features, prediction->cast<float>(), trail.level);
     if (!now || !camera_->IsInside(now->cast<double>(), 6)) return true;
-    const auto back = FollowPatch(features, *now, *previous_, trail.now, trail.level);
+    const auto back = TrackPatch(features, *now, *previous_, trail.now, trail.level);
     if (!back || (*back - trail.now).norm() > kMaxRoundTripPx * static_cast<float>(1 << trail.level))
       return true;
     trail.step = *now - trail.now;
@@ -130,12 +130,12 @@ std::optional<InitialPair> Initializer::Track(Timestamp time,
     return std::nullopt;
   }
   ++age_frames_;
-  Follow(*features);
+  TrackCorners(*features);
   previous_ = features;
-  const bool faded =
+  const bool too_few =
       trails_.size() < static_cast<std::size_t>(options_.min_alive) ||
       static_cast<double>(trails_.size()) < options_.min_alive_ratio * static_cast<double>(trails_at_start_);
-  if (faded || age_frames_ > options_.max_age_frames) {
+  if (too_few || age_frames_ > options_.max_age_frames) {
     Start(time, features);
     return std::nullopt;
   }
@@ -146,13 +146,13 @@ std::optional<InitialPair> Initializer::Track(Timestamp time,
   const auto middle = motion.begin() + static_cast<std::ptrdiff_t>(motion.size() / 2);
   std::nth_element(motion.begin(), middle, motion.end());
   if (*middle < options_.min_motion_px * camera_->width_px() / 640.0) {
-    hint_ = Advice(TwoViewVerdict::kStill);
+    hint_ = Advice(TwoViewOutcome::kStill);
     return std::nullopt;
   }
   return Attempt(time, features);
 }
 
-// By how much faster the image moves now than it did in the first view: the median over the keypoints.
+// The difference of the image speed between the current and the first view: the median over the keypoints.
 double Initializer::SpeedChange() const {
   std::vector<float> changes;
   changes.reserve(trails_.size());
@@ -204,12 +204,12 @@ std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const 
   options.depth_noise.speed_change_px = speed_change_px;
   options.seed = random_.Next();
   pair.geometry = EstimateTwoViews(rays_a, rays_b, options);
-  hint_ = Advice(pair.geometry.verdict);
-  if (pair.geometry.verdict != TwoViewVerdict::kGeneral && pair.geometry.verdict != TwoViewVerdict::kPlanar) {
+  hint_ = Advice(pair.geometry.outcome);
+  if (pair.geometry.outcome != TwoViewOutcome::kGeneral && pair.geometry.outcome != TwoViewOutcome::kPlanar) {
     return std::nullopt;
   }
   if (!confirmation->Confirm(a.time, kept, pair.geometry)) {
-    hint_ = Advice(TwoViewVerdict::kTooLittleParallax);
+    hint_ = Advice(TwoViewOutcome::kTooLittleParallax);
     return std::nullopt;
   }
   pair.camera = camera_;

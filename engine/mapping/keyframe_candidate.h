@@ -12,37 +12,38 @@
 
 namespace docent::engine {
 
-// What a frame is to become (hybrid-slam §4).
+// The kind of keyframe that a frame becomes (hybrid-slam §4).
 enum class KeyFrameChoice : std::uint8_t {
   kNone,
   kSixDof,
-  kLocalizedPanorama,  // six degrees of freedom, and the reference of a new panorama map
-  kPanorama,           // turned only: a dependent keyframe of the panorama map that is open
-  kFirst,              // the first of an empty map, which is a panorama map until it knows depth
+  kLocalizedPanorama,  // a 6-DoF keyframe that is also the reference of a new panorama map
+  kPanorama,           // rotation only: a dependent keyframe of the open panorama map
+  kFirst,  // the first keyframe of an empty map, which is a panorama map until finite points exist
 };
 
-// A frame that a tracker offers to the mapper as a keyframe (ptamm §2.2), with what it saw there.
+// A frame that a tracker offers to the mapper as a keyframe (ptamm §2.2), with the matches found in it.
 struct KeyFrameCandidate {
   KeyFrameChoice choice = KeyFrameChoice::kSixDof;
-  PanoramaId panorama = kNoId;  // that a kPanorama joins
+  PanoramaId panorama = kNoId;  // the panorama map that a kPanorama keyframe joins
   Timestamp time{};
   std::shared_ptr<const CameraModel> camera;
   std::shared_ptr<const ImageFeatures> features;
   Rigid3 camera_from_map;
   std::vector<PointMatch> matches;  // inliers only
-  // The snapshot that the pose is in, and the keyframe that most of what it shows was first seen in: should
-  // the map be moved before the keyframe joins it, it goes along with that one. 0: the newest.
+  // Revision of the snapshot that the pose refers to, and the keyframe that shares most points with the
+  // frame. If the map is corrected before the mapper inserts the candidate, its pose moves with that
+  // keyframe. Revision 0: the newest.
   std::uint64_t map_revision = 0;
   KeyFrameId reference_keyframe = kNoId;
 };
 
-// How often each point was looked for, found and believed since the last report: the trackers' verdict on it.
+// Counts of how the trackers' searches for one point ended since the last report.
 struct PointReport {
   MapPointId point = kNoId;
   int inlier = 0, outlier = 0, not_found = 0;
 };
 
-// Two views with matched corners and the pose between them: enough to start a map.
+// Two views with matched corners and the relative pose between them: sufficient to initialize a map.
 struct InitialPair {
   struct View {
     Timestamp time{};
@@ -50,14 +51,14 @@ struct InitialPair {
   };
   struct Match {
     Eigen::Vector2f pixel_a, pixel_b;  // level 0
-    std::uint8_t level = 0;            // that the corner was found on, in view a
+    std::uint8_t level = 0;            // pyramid level of the corner in view a
   };
   std::shared_ptr<const CameraModel> camera;
   View a, b;
   std::vector<Match> matches;
-  Rigid3 a_from_map;       // where the first view is, if the map exists already as a panorama; else identity
-  TwoViewResult geometry;  // one inlier flag and point a match
-  double baseline_m = 0;   // the true distance of the views; 0 where nothing tells it
+  Rigid3 a_from_map;       // pose of the first view if the map already exists as a panorama; else identity
+  TwoViewResult geometry;  // one inlier flag and one point per match
+  double baseline_m = 0;   // distance of the views in metres; 0 if unknown
 };
 
 }  // namespace docent::engine

@@ -28,7 +28,7 @@ bool IsRedundant(const KeyFrameCullingOptions& options, const Map::KeyFrameRecor
     }
     known += observers == options.min_observers;
   }
-  return points > 0 && known >= options.min_known * points;
+  return points > 0 && known >= options.min_redundant_ratio * points;
 }
 
 bool HasNeighbour(const KeyFrameCullingOptions& options, const KeyFrame& keyframe, const Map& map) {
@@ -37,10 +37,10 @@ bool HasNeighbour(const KeyFrameCullingOptions& options, const KeyFrame& keyfram
     if (other.id == keyframe.id || other.kind == KeyFrameKind::kPanorama) return false;
     const double distance =
         (other.camera_from_map.OriginInSource() - keyframe.camera_from_map.OriginInSource()).norm();
-    const double turn =
+    const double rotation =
         (other.camera_from_map.rotation * keyframe.camera_from_map.rotation.inverse()).Angle();
     return distance <= options.max_distance * keyframe.mean_depth &&
-           turn <= options.max_turn_deg * std::numbers::pi / 180;
+           rotation <= options.max_rotation_deg * std::numbers::pi / 180;
   });
 }
 
@@ -70,7 +70,7 @@ void CullKeyFrame(KeyFrameId id, Map* map) {
       const Observation* seen = FindObservation(*map->FindKeyFrame(other), observation.point);
       if (seen && (!finest || seen->level < finest->level)) finest = seen;
     }
-    if (!finest) continue;  // it goes with its only keyframe
+    if (!finest) continue;  // the point is removed with its only keyframe
     point->point.source_keyframe = finest->keyframe;
     point->point.source_level = finest->level;
     point->point.source_pixel = LevelFromLevelZero(finest->pixel.cast<double>(), finest->level).cast<float>();

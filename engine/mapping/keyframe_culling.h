@@ -6,21 +6,23 @@
 namespace docent::engine {
 
 struct KeyFrameCullingOptions {
-  double min_known = 0.95;  // share of a keyframe's points ...
-  int min_observers = 4;    // ... that so many others see as well or from nearer
-  int min_keyframes = 8;    // of a map of which none is missed
-  // Another keyframe must stand as near and look the same way: places are recognised by keyframes too.
-  double max_distance = 0.15;  // of the depth
-  double max_turn_deg = 15;
+  double min_redundant_ratio = 0.95;  // A keyframe is redundant if this ratio of its points ...
+  int min_observers = 4;  // ... is seen by at least this many others on the same or a finer level.
+  int min_keyframes = 8;  // Maps with no more keyframes than this are not culled.
+  // Another keyframe must also be this close in position and orientation, because keyframes serve place
+  // recognition too.
+  double max_distance = 0.15;  // ratio of the keyframe's median depth
+  double max_rotation_deg = 15;
 };
 
-// A localized keyframe that adds nothing to what others know; kNoId for none. Never a fixed one, a reference
-// of a panorama map, or one from `newest` on, round which the map still grows.
+// Finds a localized keyframe whose points other keyframes see well enough; kNoId if there is none. Never
+// returns a fixed keyframe, a reference of a panorama map, or one with an id from `newest` on, where the map
+// is still being extended.
 KeyFrameId FindRedundantKeyFrame(const KeyFrameCullingOptions& options, KeyFrameId newest, Map* map);
 
-// Removes a localized keyframe without its points: those that it is the source of take another observer for
-// their source, the one that sees them on the finest level. So the cost of a map follows the space it shows
-// and not the time spent in it.
+// Removes a localized keyframe but keeps its points: a point whose source it is gets the observer on the
+// finest level as its new source. Culling keeps the cost of a map proportional to the space that it covers
+// and not to the time spent there.
 void CullKeyFrame(KeyFrameId keyframe, Map* map);
 
 }  // namespace docent::engine

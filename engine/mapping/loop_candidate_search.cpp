@@ -10,7 +10,7 @@
 
 namespace docent::engine {
 
-std::set<KeyFrameId> Neighbourhood(KeyFrameId keyframe, double min_share, int hops, Map* map) {
+std::set<KeyFrameId> Neighbourhood(KeyFrameId keyframe, double min_covisibility_ratio, int hops, Map* map) {
   std::set<KeyFrameId> known = {keyframe};
   for (int hop = 0; hop < hops; ++hop) {
     std::vector<MapPointId> points;
@@ -28,26 +28,26 @@ std::set<KeyFrameId> Neighbourhood(KeyFrameId keyframe, double min_share, int ho
     }
     for (const auto& [id, count] : shared) {
       const auto all = static_cast<double>(map->FindKeyFrame(id)->observations.size());
-      if (static_cast<double>(count) >= min_share * all) known.insert(id);
+      if (static_cast<double>(count) >= min_covisibility_ratio * all) known.insert(id);
     }
   }
   return known;
 }
 
-double SimilaritySize::largest() const {
-  return std::max({shift, turn, scale});
+double SimilarityMagnitude::largest() const {
+  return std::max({translation, rotation, log_scale});
 }
 
-SimilaritySize SizeAt(const Sim3& after_from_before, const KeyFrame& keyframe) {
+SimilarityMagnitude MagnitudeAt(const Sim3& after_from_before, const KeyFrame& keyframe) {
   const Eigen::Vector3d center = keyframe.camera_from_map.OriginInSource();
   return {(after_from_before * center - center).norm() / keyframe.mean_depth,
           after_from_before.rotation.Angle(), std::abs(std::log(after_from_before.scale))};
 }
 
-Sim3 KnownFromRecent(const LoopCandidate& sighting, Map* map) {
-  const Sim3 keyframe = AsSim3(map->FindKeyFrame(sighting.keyframe)->keyframe.camera_from_map);
-  const Sim3 place = AsSim3(map->FindKeyFrame(sighting.place)->keyframe.camera_from_map);
-  return (sighting.keyframe_from_place * place).inverse() * keyframe;
+Sim3 KnownFromRecent(const LoopCandidate& candidate, Map* map) {
+  const Sim3 keyframe = AsSim3(map->FindKeyFrame(candidate.keyframe)->keyframe.camera_from_map);
+  const Sim3 place = AsSim3(map->FindKeyFrame(candidate.place)->keyframe.camera_from_map);
+  return (candidate.keyframe_from_place * place).inverse() * keyframe;
 }
 
 void LoopCandidateSearch::Find(KeyFrameId id, const std::set<KeyFrameId>& here, Map* map,
@@ -58,9 +58,9 @@ void LoopCandidateSearch::Find(KeyFrameId id, const std::set<KeyFrameId>& here, 
   pose_options.inlier_px = options_.inlier_px;
   pose_options.min_inliers = options_.min_pose_inliers;
   pose_options.seed = id + 1;
-  for (const Suggestion& suggestion : Compare(id, here, map)) {
+  for (const PlaceMatches& place : Compare(id, here, map)) {
     std::vector<Eigen::Vector3d> rays, points;
-    for (const Match& match : suggestion.matches) {
+    for (const Match& match : place.matches) {
       const Map::PointRecord* point = map->FindPoint(match.point);
       const auto ray = keyframe.camera->Unproject(match.pixel.cast<double>());
       if (!point || point->point.infinite() || !ray) continue;
@@ -69,46 +69,46 @@ void LoopCandidateSearch::Find(KeyFrameId id, const std::set<KeyFrameId>& here, 
     }
     const auto pose = EstimateAbsolutePose(rays, points, pose_options);
     if (!pose) continue;
-    auto sighting = VerifyLoopCandidate(options_.verification, id, suggestion.group, pose->camera_from_map,
-                                        map, searcher);
-    if (sighting && take(std::move(*sighting))) return;
+    auto candidate =
+        VerifyLoopCandidate(options_.verification, id, place.group, pose->camera_from_map, map, searcher);
+    if (candidate && take(std::move(*candidate))) return;
   }
 }
 
-// The places whose points look most like the keyframe's, the best first.
-std::vector<LoopCandidateSearch::Suggestion> LoopCandidateSearch::Compare(KeyFrameId id,
-                                                                          const std::set<KeyFrameId>& here,
-                                                                          Map* map) {
+// The places with most descriptor matches with the keyframe, best first.
+std::vector<LoopCandidateSearch::PlaceMatches> LoopCandidateSearch::Compare(KeyFrameId id,
+                                                                            const std::set<KeyFrameId>& here,
+                                                                            Map* map) {
   std::erase_if(described_, [&](const auto& entry) { return !map->FindKeyFrame(entry.first); });
   Describe(id, map);
-  std::vector<Suggestion> suggestions;
+  std::vector<PlaceMatches> places;
   std::size_t new_descriptions = 0;
-  for (const KeyFrameId best : Resembling(map->FindKeyFrame(id)->keyframe, here, map)) {
-    Suggestion suggestion;
-    suggestion.group = {best};
-    const std::set<KeyFrameId> about = Neighbourhood(best, options_.min_share, 1, map);
+  for (const KeyFrameId best : RankByThumbnail(map->FindKeyFrame(id)->keyframe, here, map)) {
+    PlaceMatches place;
+    place.group = {best};
+    const std::set<KeyFrameId> about = Neighbourhood(best, options_.min_covisibility_ratio, 1, map);
     for (const auto& [other, shared] : map->Covisible(best)) {
-      if (suggestion.group.size() >= options_.group) break;
-      if (about.contains(other) && !here.contains(other)) suggestion.group.push_back(other);
+      if (place.group.size() >= options_.max_group) break;
+      if (about.contains(other) && !here.contains(other)) place.group.push_back(other);
     }
-    for (std::size_t i = 0; i < std::min(options_.compared, suggestion.group.size()); ++i) {
-      const KeyFrameId known = suggestion.group[i];
-      if (!described_.contains(known) && ++new_descriptions > options_.new_descriptions) continue;
+    for (std::size_t i = 0; i < std::min(options_.max_compared, place.group.size()); ++i) {
+      const KeyFrameId known = place.group[i];
+      if (!described_.contains(known) && ++new_descriptions > options_.max_new_descriptions) continue;
       Describe(known, map);
-      AddMatches(described_.at(id), described_.at(known), &suggestion.matches);
+      AddMatches(described_.at(id), described_.at(known), &place.matches);
     }
-    if (suggestion.matches.size() >= options_.min_matches) suggestions.push_back(std::move(suggestion));
+    if (place.matches.size() >= options_.min_matches) places.push_back(std::move(place));
   }
-  std::stable_sort(suggestions.begin(), suggestions.end(), [](const Suggestion& a, const Suggestion& b) {
+  std::stable_sort(places.begin(), places.end(), [](const PlaceMatches& a, const PlaceMatches& b) {
     return a.matches.size() > b.matches.size();
   });
-  if (suggestions.size() > options_.proved) suggestions.resize(options_.proved);
-  return suggestions;
+  if (places.size() > options_.max_verified) places.resize(options_.max_verified);
+  return places;
 }
 
-// Keyframes of different places that are not here, the most alike at first sight first.
-std::vector<KeyFrameId> LoopCandidateSearch::Resembling(const KeyFrame& keyframe,
-                                                        const std::set<KeyFrameId>& here, Map* map) {
+// Keyframes of different places outside `here`, the most similar thumbnail first.
+std::vector<KeyFrameId> LoopCandidateSearch::RankByThumbnail(const KeyFrame& keyframe,
+                                                             const std::set<KeyFrameId>& here, Map* map) {
   std::vector<std::pair<double, KeyFrameId>> ranked;
   for (const auto& [id, record] : map->keyframes()) {
     if (record.keyframe.kind != KeyFrameKind::kSixDof || here.contains(id)) continue;
@@ -120,17 +120,17 @@ std::vector<KeyFrameId> LoopCandidateSearch::Resembling(const KeyFrame& keyframe
   std::vector<KeyFrameId> places;
   std::set<KeyFrameId> covered;
   for (const auto& [difference, id] : ranked) {
-    if (places.size() >= options_.places) break;
+    if (places.size() >= options_.max_places) break;
     if (covered.contains(id)) continue;
     places.push_back(id);
-    covered.merge(Neighbourhood(id, options_.min_share, 1, map));
+    covered.merge(Neighbourhood(id, options_.min_covisibility_ratio, 1, map));
   }
   return places;
 }
 
 void LoopCandidateSearch::Describe(KeyFrameId id, Map* map) {
-  const auto [place, fresh] = described_.try_emplace(id);
-  if (!fresh) return;
+  const auto [place, is_new] = described_.try_emplace(id);
+  if (!is_new) return;
   const Map::KeyFrameRecord& record = *map->FindKeyFrame(id);
   std::vector<Observation> observations;
   for (const Observation& observation : record.observations) {
@@ -139,20 +139,20 @@ void LoopCandidateSearch::Describe(KeyFrameId id, Map* map) {
   }
   std::stable_sort(observations.begin(), observations.end(),
                    [](const Observation& a, const Observation& b) { return a.level > b.level; });
-  if (observations.size() > options_.described_points) observations.resize(options_.described_points);
-  std::vector<DescribedPlace> looks;
+  if (observations.size() > options_.max_described_points) observations.resize(options_.max_described_points);
+  std::vector<DescribedKeypoint> descriptions;
   for (const Observation& observation : observations) {
-    looks.clear();
-    DescribePlace(*record.keyframe.features, observation.pixel, observation.level - options_.levels_around,
-                  observation.level + options_.levels_around, &looks);
-    for (const DescribedPlace& look : looks) {
-      place->second.push_back(
-          {look.oriented.descriptor, observation.point, observation.pixel, look.level == observation.level});
+    descriptions.clear();
+    DescribeKeypoint(*record.keyframe.features, observation.pixel, observation.level - options_.levels_around,
+                     observation.level + options_.levels_around, &descriptions);
+    for (const DescribedKeypoint& description : descriptions) {
+      place->second.push_back({description.oriented.descriptor, observation.point, observation.pixel,
+                               description.level == observation.level});
     }
   }
 }
 
-// Pairs that are each other's nearest, and clearly nearer than any other point.
+// Adds pairs that are mutual nearest neighbours and pass the ratio test against every other point.
 void LoopCandidateSearch::AddMatches(const std::vector<Described>& own, const std::vector<Described>& known,
                                      std::vector<Match>* matches) const {
   constexpr int kFar = std::numeric_limits<int>::max();

@@ -13,42 +13,44 @@ namespace docent::engine {
 
 struct LoopOptions {
   bool enabled = true;
-  LoopDetectorOptions finder;
+  LoopDetectorOptions detector;
   LoopCorrectionOptions correction;
 };
 
-// Closes the loops of one map: looks at new keyframes, has the geometry of several in a row prove that they
-// show a known place, spreads the error over the way between, moves the map, and makes one of what was mapped
-// twice (ptamm §6.2). Each step is short, so that a keyframe never waits for long: the error is spread on a
-// copy of the poses, step by step, and the map is then moved at once. The mapper owns it; its thread alone.
+// Closes the loops of one map (ptamm §6.2): checks new keyframes until several in a row are verified to show
+// a known place, distributes the error over the pose graph between them, corrects the map, and fuses points
+// that were mapped twice. Each step is short, so that a keyframe never waits for long: the pose graph is
+// optimized on a copy of the poses, a few iterations at a time, and the map is then corrected in one step.
+// Owned by the mapper and used on its thread only.
 class LoopCloser {
  public:
   LoopCloser(const LoopOptions& options, const SearchOptions& search)
-      : options_(options), finder_(options.finder), searcher_(search) {}
+      : options_(options), detector_(options.detector), searcher_(search) {}
 
-  // Another map from now on.
-  void Begin();
-  // A keyframe that is localized, after its points were made.
-  void Look(KeyFrameId keyframe);
+  // Resets everything for another map.
+  void Reset();
+  // Queues a localized keyframe for the search, after its points were created.
+  void Enqueue(KeyFrameId keyframe);
 
   enum class Progress : std::uint8_t {
-    kNothing,  // there was nothing to do
+    kNothing,  // there was no work
     kWorked,
-    kMoved,  // the map was moved, and points were fused
-    kFused,  // the last step of a loop: the map is to be adjusted as a whole
+    kMoved,  // the map was corrected and points were fused
+    kFused,  // the last step of a loop: the whole map must be adjusted now
   };
-  // The most urgent piece of work: on a loop that was found, else the search for one, which can wait.
+  // Does the most urgent step: continues a loop that was found, or else searches for one, which is less
+  // urgent.
   Progress Step(Map* map);
-  bool HasFound() const { return loop_.has_value() || !to_fuse_.empty(); }
-  // About the loop that the last step with kMoved closed.
+  bool HasLoop() const { return loop_.has_value() || !to_fuse_.empty(); }
+  // A description of the loop that the last kMoved step closed.
   const std::string& report() const { return report_; }
-  // Its last keyframe; kNoId before the first.
+  // The last keyframe of that loop; kNoId before the first loop.
   KeyFrameId closed_by() const { return closed_by_; }
 
  private:
-  // One that was found, while its error is being spread.
+  // A loop that was found and whose pose graph is being optimized.
   struct Loop {
-    std::vector<LoopCandidate> sightings;
+    std::vector<LoopCandidate> candidates;
     LoopGraph graph;
     int rounds = 0;
   };
@@ -58,11 +60,11 @@ class LoopCloser {
   void Fuse(Map* map);
 
   const LoopOptions options_;
-  LoopDetector finder_;
-  PointSearcher searcher_;  // its own, so that a search for loops that finds none leaves no trace
-  std::deque<KeyFrameId> to_look_;
+  LoopDetector detector_;
+  PointSearcher searcher_;  // separate from the mapper's, so that a search without result has no side effects
+  std::deque<KeyFrameId> queue_;
   std::optional<Loop> loop_;
-  std::vector<KeyFrameId> about_;  // keyframes on both sides of where the last loop was closed
+  std::vector<KeyFrameId> nearby_;  // keyframes on both sides of the loop that was closed last
   std::deque<KeyFrameId> to_fuse_;
   std::string report_;
   KeyFrameId closed_by_ = kNoId;

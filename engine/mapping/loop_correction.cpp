@@ -13,13 +13,13 @@
 
 namespace docent::engine {
 
-LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& sightings,
+LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& candidates,
                         Map* map) {
   const Covisibility sharing(*map);
   const std::size_t count = sharing.keyframes().size();
   LoopGraph result;
   result.keyframes = sharing.keyframes();
-  result.sightings = sightings.size();
+  result.candidates = candidates.size();
   bool any_fixed = false;
   for (const KeyFrameId id : sharing.keyframes()) {
     const KeyFrame& keyframe = map->FindKeyFrame(id)->keyframe;
@@ -47,7 +47,8 @@ LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<
       if (sharing.AreNeighbours(i, order[k])) join(i, order[k]);
     }
   }
-  // Whatever would fall apart is held by the strongest links there are, and at last by the order of coming.
+  // Components of the graph that are not connected yet are joined by the strongest remaining links, and
+  // failing those by the order of the keyframes.
   std::vector<std::size_t> part(count);
   std::iota(part.begin(), part.end(), 0);
   const auto root = [&](std::size_t i) {
@@ -68,38 +69,40 @@ LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<
     part[root(a)] = root(b);
     join(a, b);
   }
-  // Hundreds of points tell it to a pixel.
-  constexpr double kSightingWeight = 10;
-  for (const LoopCandidate& sighting : sightings) {
-    result.graph.edges.push_back({static_cast<int>(sharing.IndexOf(sighting.keyframe)),
-                                  static_cast<int>(sharing.IndexOf(sighting.place)),
-                                  sighting.keyframe_from_place, kSightingWeight});
+  // The pose of a loop candidate is known to about a pixel from hundreds of points, so it outweighs the other
+  // edges.
+  constexpr double kCandidateWeight = 10;
+  for (const LoopCandidate& candidate : candidates) {
+    result.graph.edges.push_back({static_cast<int>(sharing.IndexOf(candidate.keyframe)),
+                                  static_cast<int>(sharing.IndexOf(candidate.place)),
+                                  candidate.keyframe_from_place, kCandidateWeight});
   }
   return result;
 }
 
-bool IsConsistent(const LoopCorrectionOptions& options, const LoopGraph& relaxed) {
-  const std::size_t first_sighting = relaxed.graph.edges.size() - relaxed.sightings;
-  for (std::size_t i = 0; i < relaxed.graph.edges.size(); ++i) {
-    const PoseGraph::Edge& edge = relaxed.graph.edges[i];
-    const double left = LargestError(relaxed.graph, edge);
-    if (i < first_sighting ? edge.weight * left > options.max_edge_residual : left > options.max_misfit)
+bool IsConsistent(const LoopCorrectionOptions& options, const LoopGraph& optimized) {
+  const std::size_t first_candidate = optimized.graph.edges.size() - optimized.candidates;
+  for (std::size_t i = 0; i < optimized.graph.edges.size(); ++i) {
+    const PoseGraph::Edge& edge = optimized.graph.edges[i];
+    const double left = LargestError(optimized.graph, edge);
+    if (i < first_candidate ? edge.weight * left > options.max_edge_residual
+                            : left > options.max_loop_residual)
       return false;
   }
   return true;
 }
 
-void ApplyLoopGraph(const LoopGraph& relaxed, Map* map) {
+void ApplyLoopGraph(const LoopGraph& optimized, Map* map) {
   std::map<KeyFrameId, Sim3> after_from_before;
-  for (std::size_t i = 0; i < relaxed.keyframes.size(); ++i) {
-    const Map::KeyFrameRecord* record = map->FindKeyFrame(relaxed.keyframes[i]);
-    if (!record || relaxed.graph.nodes[i].fixed) continue;
-    after_from_before[relaxed.keyframes[i]] =
-        relaxed.graph.nodes[i].node_from_map.inverse() * AsSim3(record->keyframe.camera_from_map);
+  for (std::size_t i = 0; i < optimized.keyframes.size(); ++i) {
+    const Map::KeyFrameRecord* record = map->FindKeyFrame(optimized.keyframes[i]);
+    if (!record || optimized.graph.nodes[i].fixed) continue;
+    after_from_before[optimized.keyframes[i]] =
+        optimized.graph.nodes[i].node_from_map.inverse() * AsSim3(record->keyframe.camera_from_map);
   }
   for (const auto& [id, record] : map->keyframes()) {
     if (record.keyframe.kind != KeyFrameKind::kSixDof ||
-        std::binary_search(relaxed.keyframes.begin(), relaxed.keyframes.end(), id))
+        std::binary_search(optimized.keyframes.begin(), optimized.keyframes.end(), id))
       continue;
     for (const auto& [other, shared] : map->Covisible(id)) {
       const auto moved = after_from_before.find(other);
@@ -111,10 +114,10 @@ void ApplyLoopGraph(const LoopGraph& relaxed, Map* map) {
   map->Correct(after_from_before);
 }
 
-int FuseTwins(const LoopCandidate& sighting, Map* map) {
-  for (const Observation& observation : sighting.seen) map->AddObservation(observation);
+int FuseCandidateDuplicates(const LoopCandidate& candidate, Map* map) {
+  for (const Observation& observation : candidate.seen) map->AddObservation(observation);
   int fused = 0;
-  for (const DuplicatePoints& duplicates : sighting.duplicates) {
+  for (const DuplicatePoints& duplicates : candidate.duplicates) {
     if (!map->FindPoint(duplicates.known) || !map->FindPoint(duplicates.recent)) continue;
     map->FusePoints(duplicates.known, duplicates.recent);
     ++fused;
@@ -122,8 +125,9 @@ int FuseTwins(const LoopCandidate& sighting, Map* map) {
   return fused;
 }
 
-int FuseSeenTwice(KeyFrameId id, const std::vector<MapPointId>& points, Map* map, PointSearcher* searcher) {
-  constexpr float kRadiusPx = 10;      // level 0: what the spreading of the error has left
+int MatchAndFusePoints(KeyFrameId id, const std::vector<MapPointId>& points, Map* map,
+                       PointSearcher* searcher) {
+  constexpr float kRadiusPx = 10;  // level 0: covers the error that remains after the pose graph optimization
   constexpr double kMaxErrorPx = 5;    // of the level
   constexpr double kSamePx = 1.5;      // of the coarser level
   constexpr double kSameDepth = 0.08;  // relative

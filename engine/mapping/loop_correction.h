@@ -6,40 +6,43 @@
 #include "engine/mapping/loop_detector.h"
 #include "engine/mapping/pose_graph.h"
 
-// How a map is put right once a loop is known: the error is spread over the whole way, and what was mapped
-// twice becomes one. For the mapper's thread.
+// Corrects the map once a loop is known: distributes the error over the pose graph, and fuses points that
+// were mapped twice. For the mapper's thread.
 namespace docent::engine {
 
 struct LoopCorrectionOptions {
   PoseGraphOptions graph;
-  int edges = 6;  // of each keyframe, to those that share most with it
-  // By how much the sightings may still disagree with the map once the error is spread: of the depth,
-  // radians, logarithm of the scale.
-  double max_misfit = 0.05;
-  // By how much keyframes that share a hundred points may have been wrong to each other, in the same units. A
-  // look-alike that is joined to its duplicate asks more of those in between.
+  int edges = 6;  // of each keyframe, to those that share most points with it
+  // Largest residual of a loop candidate's edge after the optimization: ratio of the median depth, radians,
+  // or logarithm of the scale.
+  double max_loop_residual = 0.05;
+  // Largest weighted residual of every other edge after the optimization, in the same units; the weight is 1
+  // for keyframes that share a hundred points. A false loop between two similar places would bend the edges
+  // between them by more.
   double max_edge_residual = 0.02;
 };
 
-// The keyframes and what they know of each other, and after these edges one for each of the sightings.
+// The pose graph of the keyframes: covisibility edges first, then one edge for each loop candidate.
 struct LoopGraph {
   PoseGraph graph;
   std::vector<KeyFrameId> keyframes;  // of each node
-  std::size_t sightings = 0;
+  std::size_t candidates = 0;
 };
-LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& sightings,
+LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& candidates,
                         Map* map);
-// Whether the relaxed graph has room for the sightings: what is left of them, and what they have asked of the
-// other edges, is small.
-bool IsConsistent(const LoopCorrectionOptions& options, const LoopGraph& relaxed);
-// Moves the map as the relaxed graph says; keyframes that came since go with the one they share most with.
-void ApplyLoopGraph(const LoopGraph& relaxed, Map* map);
-// Makes one of each two points that the sighting has shown to be one; returns how many there were.
-int FuseTwins(const LoopCandidate& sighting, Map* map);
+// True if the optimized graph is consistent with the loop candidates: the residuals of their edges, and those
+// that they cause in the other edges, are small.
+bool IsConsistent(const LoopCorrectionOptions& options, const LoopGraph& optimized);
+// Moves the map to the poses of the optimized graph. A keyframe that was added since moves with the keyframe
+// that shares most points with it.
+void ApplyLoopGraph(const LoopGraph& optimized, Map* map);
+// Fuses the pairs of duplicate points of a loop candidate; returns the number of pairs.
+int FuseCandidateDuplicates(const LoopCandidate& candidate, Map* map);
 
-// Appearance in a keyframe for points of other keyframes that it should see, further off than MatchMapPoints,
-// and makes one of those that are then seen twice at the same place. Returns how many became one.
-int FuseSeenTwice(KeyFrameId keyframe, const std::vector<MapPointId>& points, Map* map,
-                  PointSearcher* searcher);
+// Searches a keyframe for points of other keyframes that it should see, with a wider radius than
+// MatchMapPoints. Adds the matches as observations, and fuses a match with the point that the keyframe
+// already observes at the same pixel and depth. Returns the number of fused pairs.
+int MatchAndFusePoints(KeyFrameId keyframe, const std::vector<MapPointId>& points, Map* map,
+                       PointSearcher* searcher);
 
 }  // namespace docent::engine

@@ -6,45 +6,47 @@
 
 #include "engine/mapping/loop_candidate_search.h"
 
-// A camera that walks around something and comes back is, for its map, somewhere else by then: small errors
-// have added up, and what was known is mapped a second time (ptamm §6.2, Fig. 15). Here the map finds out:
-// keyframes that look like known ones they share nothing with, and proof by geometry that holds for several
-// in a row. For the mapper's thread.
+// Detects loops. When a camera moves around an object and returns, accumulated drift places it elsewhere in
+// the map, and known surfaces are mapped a second time (ptamm §6.2, Fig. 15). A loop is detected when several
+// keyframes in a row resemble known keyframes that share no points with them, and geometry verifies it each
+// time. For the mapper's thread.
 namespace docent::engine {
 
 struct LoopDetectorOptions {
   LoopCandidateSearchOptions search;
-  // An error of less than this (of the depth, radians, logarithm of the scale) active search deals with.
-  double least_error = 0.02;
-  // Of more than this the place is another one that looks alike: what gathers on a way is small against it.
-  double max_shift = 0.1;  // of the way between the two
-  double max_turn = 0.35;  // radians
-  double max_scale = 0.4;  // logarithm
-  // So many keyframes in a row must say the same.
-  std::size_t agreeing = 3;
-  double max_disagreement = 0.05;  // of the depth, radians, logarithm of the scale
+  // Active search copes with errors below this (ratio of the median depth, radians, logarithm of the scale),
+  // so they need no loop closing.
+  double min_error = 0.02;
+  // Drift is small relative to the path that the camera took. A candidate that implies a larger error is
+  // taken for a similar-looking but different place.
+  double max_translation = 0.1;  // ratio of the path length between the two keyframes
+  double max_rotation = 0.35;    // radians
+  double max_log_scale = 0.4;    // logarithm of the scale
+  // This many keyframes in a row must agree.
+  std::size_t min_consecutive = 3;
+  double max_disagreement = 0.05;  // ratio of the median depth, radians, logarithm of the scale
 };
 
-// Watches keyframes as they come. Everything it keeps are looks, ids and similarities between keyframes,
-// which hold while the map is adjusted.
+// Examines keyframes in the order in which they are added. It stores descriptors, ids and relative poses
+// between keyframes only, which stay valid while the map is adjusted.
 class LoopDetector {
  public:
   explicit LoopDetector(const LoopDetectorOptions& options) : options_(options), search_(options.search) {}
 
   void Clear();
-  // Appearance at a localized keyframe. When it is the last of enough that agree: all of them, and the finder
-  // begins anew. Else empty.
-  std::vector<LoopCandidate> Look(KeyFrameId keyframe, Map* map, PointSearcher* searcher);
+  // Searches a known place for a localized keyframe. When this completes a series of keyframes that agree,
+  // returns the candidates of the whole series and starts anew; empty otherwise.
+  std::vector<LoopCandidate> Detect(KeyFrameId keyframe, Map* map, PointSearcher* searcher);
 
  private:
-  std::optional<LoopCandidate> Sight(KeyFrameId keyframe, Map* map, PointSearcher* searcher);
-  // Whether it tells of an error, and of one that may have come about.
-  bool IsPlausible(const LoopCandidate& sighting, Map* map) const;
+  std::optional<LoopCandidate> FindCandidate(KeyFrameId keyframe, Map* map, PointSearcher* searcher);
+  // True if the implied error is large enough to matter and small enough to be drift.
+  bool IsPlausible(const LoopCandidate& candidate, Map* map) const;
   bool Agree(const LoopCandidate& a, const LoopCandidate& b, Map* map) const;
 
   const LoopDetectorOptions options_;
   LoopCandidateSearch search_;
-  std::vector<LoopCandidate> sightings_;  // of keyframes in a row
+  std::vector<LoopCandidate> candidates_;  // of keyframes in a row
 };
 
 }  // namespace docent::engine

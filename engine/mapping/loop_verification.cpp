@@ -20,7 +20,7 @@ struct Found {
   MapPointId point = kNoId;
   Eigen::Vector2f pixel;
   int level = 0;
-  double error = 0;  // against the prediction, in pixels of the level
+  double error = 0;  // distance from the prediction, in pixels of the level
 };
 
 double Median(std::vector<double>* values) {
@@ -40,15 +40,15 @@ std::vector<MapPointId> FinitePointsOf(std::span<const KeyFrameId> keyframes, Ma
   return {points.begin(), points.end()};
 }
 
-// No more than so many, evenly.
-std::vector<MapPointId> Some(const std::vector<MapPointId>& points, std::size_t count) {
+// At most `count` of the points, evenly selected.
+std::vector<MapPointId> Subsample(const std::vector<MapPointId>& points, std::size_t count) {
   std::vector<MapPointId> some;
   const std::size_t stride = 1 + (points.size() - (points.empty() ? 0 : 1)) / count;
   for (std::size_t i = 0; i < points.size(); i += stride) some.push_back(points[i]);
   return some;
 }
 
-// *expected: how many should be in the image.
+// *expected: the number of points that project into the image.
 std::vector<Found> Search(std::span<const MapPointId> points, const KeyFrame& keyframe,
                           const Rigid3& camera_from_map, float radius_px, Map* map, PointSearcher* searcher,
                           int* expected) {
@@ -93,11 +93,13 @@ int OccupiedCells(const std::vector<Found>& found, const CameraModel& camera) {
   return static_cast<int>(cells.count());
 }
 
-// Pairs what was found of the place with what the keyframe knows there by recent points. The scale is the
-// median of the depths' ratios, recent to known; empty where too few agree on it.
-std::optional<double> PairTwins(const LoopVerificationOptions& options, const Map::KeyFrameRecord& keyframe,
-                                const Rigid3& camera_from_place, const std::vector<Found>& found, Map* map,
-                                std::vector<DuplicatePoints>* duplicates) {
+// Pairs the points of the place that were found with the recent points that the keyframe observes at the same
+// pixel. Returns the scale, which is the median ratio of their depths, recent to known; empty if too few
+// agree on it.
+std::optional<double> PairDuplicates(const LoopVerificationOptions& options,
+                                     const Map::KeyFrameRecord& keyframe, const Rigid3& camera_from_place,
+                                     const std::vector<Found>& found, Map* map,
+                                     std::vector<DuplicatePoints>* duplicates) {
   std::vector<double> ratios;
   std::set<MapPointId> known;
   for (const Found& f : found) known.insert(f.point);
@@ -105,7 +107,7 @@ std::optional<double> PairTwins(const LoopVerificationOptions& options, const Ma
     MapPointId nearest = kNoId;
     double least = 0, ratio = 0;
     for (const Observation& observation : keyframe.observations) {
-      const double limit = options.twin_px * (1 << std::max<int>(f.level, observation.level));
+      const double limit = options.max_duplicate_px * (1 << std::max<int>(f.level, observation.level));
       const double distance = (observation.pixel - f.pixel).norm();
       if (distance > limit || (nearest != kNoId && distance >= least)) continue;
       const Map::PointRecord* recent = map->FindPoint(observation.point);
@@ -121,7 +123,7 @@ std::optional<double> PairTwins(const LoopVerificationOptions& options, const Ma
     duplicates->push_back({f.point, nearest});
     ratios.push_back(std::log(ratio));
   }
-  if (static_cast<int>(ratios.size()) < options.min_twins) return std::nullopt;
+  if (static_cast<int>(ratios.size()) < options.min_duplicates) return std::nullopt;
   std::vector<double> sorted = ratios;
   const double middle = Median(&sorted);
   for (double& value : sorted) value = std::abs(value - middle);
@@ -132,7 +134,7 @@ std::optional<double> PairTwins(const LoopVerificationOptions& options, const Ma
     if (std::abs(ratios[i] - middle) <= 3 * std::max(spread, 0.01)) agreeing.push_back((*duplicates)[i]);
   }
   *duplicates = std::move(agreeing);
-  if (static_cast<int>(duplicates->size()) < options.min_twins) return std::nullopt;
+  if (static_cast<int>(duplicates->size()) < options.min_duplicates) return std::nullopt;
   return std::exp(middle);
 }
 
@@ -141,8 +143,8 @@ std::optional<double> PairTwins(const LoopVerificationOptions& options, const Ma
 std::string LoopCandidate::Brief() const {
   char text[160];
   std::snprintf(text, sizeof(text),
-                "keyframe %u shows the place of %u: %zu of %d points, %zu duplicates, %d back", keyframe,
-                place, seen.size(), expected, duplicates.size(), back_inliers);
+                "keyframe %u matches keyframe %u: %zu of %d points, %zu duplicates, %d in reverse", keyframe,
+                place, seen.size(), expected, duplicates.size(), reverse_inliers);
   return text;
 }
 
@@ -158,20 +160,20 @@ std::optional<LoopCandidate> VerifyLoopCandidate(const LoopVerificationOptions& 
     const auto& observers = map->FindPoint(point)->observers;
     return std::binary_search(observers.begin(), observers.end(), id);
   });
-  LoopCandidate sighting;
-  sighting.keyframe = id;
-  sighting.place = place.front();
+  LoopCandidate candidate;
+  candidate.keyframe = id;
+  candidate.place = place.front();
   std::vector<PoseMeasurement> measurements;
-  // Some of them, from far off, and then all.
-  points = Some(points, options.max_points);
-  const std::vector<MapPointId> some = Some(points, options.first_points);
+  // First some of the points with a wide radius, then all with a narrow one.
+  points = Subsample(points, options.max_points);
+  const std::vector<MapPointId> some = Subsample(points, options.first_points);
   std::vector<Found> found =
-      Search(some, keyframe, camera_from_map, options.first_radius_px, map, searcher, &sighting.expected);
-  if (found.size() < options.min_first_found) return std::nullopt;
+      Search(some, keyframe, camera_from_map, options.first_radius_px, map, searcher, &candidate.expected);
+  if (found.size() < options.min_first_matches) return std::nullopt;
   PoseRefinement pose = Refine(found, *keyframe.camera, camera_from_map, map, &measurements);
   if (!pose.converged) return std::nullopt;
   found =
-      Search(points, keyframe, pose.camera_from_map, options.radius_px, map, searcher, &sighting.expected);
+      Search(points, keyframe, pose.camera_from_map, options.radius_px, map, searcher, &candidate.expected);
   if (static_cast<int>(found.size()) < options.min_inliers) return std::nullopt;
   pose = Refine(found, *keyframe.camera, pose.camera_from_map, map, &measurements);
   std::vector<Found> inliers;
@@ -181,42 +183,43 @@ std::optional<LoopCandidate> VerifyLoopCandidate(const LoopVerificationOptions& 
   const double variance = pose.covariance.topLeftCorner<3, 3>().trace();
   if (!pose.converged || pose.sigma > options.max_sigma || pose.observed != ObservedMotion::kSixDof ||
       static_cast<int>(inliers.size()) < options.min_inliers ||
-      static_cast<double>(inliers.size()) < options.min_inlier_ratio * sighting.expected ||
+      static_cast<double>(inliers.size()) < options.min_inlier_ratio * candidate.expected ||
       OccupiedCells(inliers, *keyframe.camera) < options.min_cells ||
       !(std::sqrt(variance) <= options.max_position_sigma * pose.mean_depth))
     return std::nullopt;
-  const auto scale = PairTwins(options, *record, pose.camera_from_map, inliers, map, &sighting.duplicates);
+  const auto scale =
+      PairDuplicates(options, *record, pose.camera_from_map, inliers, map, &candidate.duplicates);
   if (!scale) return std::nullopt;
 
-  const KeyFrame& known = map->FindKeyFrame(sighting.place)->keyframe;
-  sighting.keyframe_from_place = AsSim3(pose.camera_from_map * known.camera_from_map.inverse());
-  sighting.keyframe_from_place.translation *= *scale;
-  sighting.keyframe_from_place.scale = *scale;
+  const KeyFrame& known = map->FindKeyFrame(candidate.place)->keyframe;
+  candidate.keyframe_from_place = AsSim3(pose.camera_from_map * known.camera_from_map.inverse());
+  candidate.keyframe_from_place.translation *= *scale;
+  candidate.keyframe_from_place.scale = *scale;
   for (const Found& f : inliers)
-    sighting.seen.push_back({id, f.point, f.pixel, static_cast<std::uint8_t>(f.level)});
+    candidate.seen.push_back({id, f.point, f.pixel, static_cast<std::uint8_t>(f.level)});
 
-  // The other way about, in the recent points' coordinates.
+  // The reverse check, in the coordinates of the recent points.
   Rigid3 place_from_keyframe;
-  place_from_keyframe.rotation = sighting.keyframe_from_place.rotation.inverse();
+  place_from_keyframe.rotation = candidate.keyframe_from_place.rotation.inverse();
   place_from_keyframe.translation =
-      -(place_from_keyframe.rotation * sighting.keyframe_from_place.translation);
+      -(place_from_keyframe.rotation * candidate.keyframe_from_place.translation);
   const std::array<KeyFrameId, 1> own = {id};
   std::vector<MapPointId> recent = FinitePointsOf(own, map);
   std::erase_if(recent, [&](MapPointId point) {
     const auto& observers = map->FindPoint(point)->observers;
     return std::binary_search(observers.begin(), observers.end(), known.id);
   });
-  recent = Some(recent, options.max_points);
-  constexpr double kMaxBackError = 3;  // pixels of the level
+  recent = Subsample(recent, options.max_points);
+  constexpr double kMaxReverseError = 3;  // pixels of the level
   int expected = 0;
   const std::vector<Found> back = Search(recent, known, place_from_keyframe * keyframe.camera_from_map,
                                          options.radius_px, map, searcher, &expected);
-  sighting.back_inliers = static_cast<int>(
-      std::count_if(back.begin(), back.end(), [](const Found& f) { return f.error <= kMaxBackError; }));
-  if (sighting.back_inliers < options.min_back_inliers ||
-      sighting.back_inliers < options.min_back_ratio * expected)
+  candidate.reverse_inliers = static_cast<int>(
+      std::count_if(back.begin(), back.end(), [](const Found& f) { return f.error <= kMaxReverseError; }));
+  if (candidate.reverse_inliers < options.min_reverse_inliers ||
+      candidate.reverse_inliers < options.min_reverse_ratio * expected)
     return std::nullopt;
-  return sighting;
+  return candidate;
 }
 
 }  // namespace docent::engine

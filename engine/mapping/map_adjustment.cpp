@@ -13,7 +13,7 @@ namespace docent::engine {
 
 namespace {
 
-// Translates between the map's ids and the problem's indices.
+// A bundle problem with the map ids of its cameras and points.
 struct Assembly {
   BundleProblem problem;
   std::vector<KeyFrameId> cameras;
@@ -70,7 +70,7 @@ BundleSummary Solve(const BundleOptions& options, Assembly* assembly, Map* map) 
   for (std::size_t i = 0; i < assembly->points.size(); ++i) {
     map->FindPoint(assembly->points[i])->point.point_in_map.head<3>() = assembly->problem.points[i].position;
   }
-  // An adjustment that was cut short has not yet earned the right to call a measurement wrong.
+  // Residuals of an interrupted adjustment are not reliable enough to reject measurements.
   if (summary.outcome != BundleSummary::Outcome::kInterrupted) {
     for (const BundleProblem::Measurement& measurement : assembly->problem.measurements) {
       if (measurement.outlier) {
@@ -87,7 +87,7 @@ BundleSummary Solve(const BundleOptions& options, Assembly* assembly, Map* map) 
   return summary;
 }
 
-// By ascending id.
+// In ascending order of id.
 std::vector<MapPointId> FinitePointsSeenBy(Map* map, const std::set<KeyFrameId>& keyframes) {
   std::vector<MapPointId> points;
   for (const KeyFrameId id : keyframes)

@@ -11,18 +11,18 @@ namespace docent::engine {
 
 struct MapAdjustmentOptions {
   int window = 7;      // keyframes adjusted besides the newest: those that share most points with it
-  int max_fixed = 20;  // further observers held fixed
+  int max_fixed = 20;  // further observers of their points, held fixed
   int local_iterations = 5;
   int global_iterations = 12;
-  // Huber's still pulls where much is wrong at once, as after a loop was closed.
+  // Huber's loss still attracts large residuals, as they occur after a loop was closed.
   RobustLoss global_loss = RobustLoss::kTukey;
 };
 
-// Adjusts `keyframe`, the keyframes that share most points with it and all their points, the rest fixed
-// (ptamm §2.3). Outlying observations are removed. Nothing changes when the adjustment fails.
+// Adjusts `keyframe`, the keyframes that share most points with it, and all their points; everything else is
+// fixed (ptamm §2.3). Removes outlying observations. A failed adjustment changes nothing.
 BundleSummary AdjustLocally(const MapAdjustmentOptions& options, KeyFrameId keyframe,
                             const std::atomic<bool>* interrupt, Map* map);
-// The same with every keyframe and point; the keyframes marked `fixed` hold the frame.
+// The same for every keyframe and point; the keyframes marked `fixed` define the coordinate frame.
 BundleSummary AdjustGlobally(const MapAdjustmentOptions& options, const std::atomic<bool>* interrupt,
                              Map* map);
 

@@ -47,10 +47,10 @@ bool MapDescriptors::UpdateOne(const AppearanceOptions& options, Map* map) {
 
 std::optional<Rigid3> MapDescriptors::SuggestPose(const AppearanceOptions& options, const KeyFrame& keyframe,
                                                   std::uint64_t seed, Map* map) const {
-  const std::vector<DescribedPlace> places = DescribeCorners(*keyframe.features);
+  const std::vector<DescribedKeypoint> places = DescribeCorners(*keyframe.features);
   std::vector<Descriptor> queries;
   queries.reserve(places.size());
-  for (const DescribedPlace& place : places) queries.push_back(place.oriented.descriptor);
+  for (const DescribedKeypoint& place : places) queries.push_back(place.oriented.descriptor);
   std::vector<Eigen::Vector3d> rays, points;
   for (const DescriptorDatabase::Match& match : database_.FindMatches(queries, {})) {
     const Map::PointRecord* point = map->FindPoint(match.entry.point);

@@ -12,25 +12,25 @@
 namespace docent::engine {
 
 struct AppearanceOptions {
-  int levels_around = 1;  // on which an observation is described beside its own
-  double inlier_px = 4;   // RANSAC, level 0
-  int min_inliers = 15;   // of matches by looks alone; what they suggest is searched for thoroughly then
+  int levels_around = 1;  // observations are described on so many levels above and below their own
+  double inlier_px = 4;   // RANSAC, pixels of level 0
+  int min_inliers = 15;  // of descriptor matches; low, since the pose is verified by active search afterwards
   double min_inlier_ratio = 0.1;
 };
 
-// The finite points of a map by their looks: for a keyframe whose pose is too far off for active search
-// (hybrid-slam §5.1, §5.4). Owned by the mapper and touched by its thread alone. Brought into step with the
-// map keyframe by keyframe, and only when somebody is going to ask.
+// Descriptors of the finite points of a map, to estimate the pose of a keyframe that is too far off for
+// active search (hybrid-slam §5.1, §5.4). Owned by the mapper and used on its thread only. Updated keyframe
+// by keyframe, and only before a query.
 class MapDescriptors {
  public:
   explicit MapDescriptors(const VocabularyTree& tree) : database_(tree) {}
 
   void Clear();
-  // Describes what one keyframe saw and is not known here yet, and forgets what it no longer sees; false when
-  // every keyframe is in step.
+  // Describes the new observations of one keyframe and removes the descriptors of those that it lost. Returns
+  // false if every keyframe is up to date.
   bool UpdateOne(const AppearanceOptions& options, Map* map);
-  // The pose of a keyframe by three-point RANSAC over points that look like its corners; empty where too few
-  // agree. Nothing but a suggestion: many of them may look alike.
+  // The pose of a keyframe from three-point RANSAC over descriptor matches of its corners; empty if there are
+  // too few inliers. The pose is unverified, since repeated structure gives wrong matches.
   std::optional<Rigid3> SuggestPose(const AppearanceOptions& options, const KeyFrame& keyframe,
                                     std::uint64_t seed, Map* map) const;
 
@@ -38,8 +38,8 @@ class MapDescriptors {
 
  private:
   DescriptorDatabase database_;
-  std::map<KeyFrameId, std::vector<MapPointId>> described_;  // ascending points
-  std::vector<MapPointId> finite_;                           // scratch
+  std::map<KeyFrameId, std::vector<MapPointId>> described_;  // points described per keyframe, ascending
+  std::vector<MapPointId> finite_;                           // scratch memory
 };
 
 }  // namespace docent::engine

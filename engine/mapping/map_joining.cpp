@@ -13,9 +13,10 @@
 namespace docent::engine {
 namespace {
 
-constexpr std::size_t kNeighbours = 16;  // of each sighting's keyframe, that are gone through: as for a loop
+// Neighbours of each candidate's keyframe that are searched for duplicate points, as for a loop.
+constexpr std::size_t kNeighbours = 16;
 
-// Moves the part of B by the similarity.
+// Transforms the part of the map that came from B by the similarity.
 void MoveB(const Sim3& a_from_b, KeyFrameId first_of_b, Map* map) {
   std::map<KeyFrameId, Sim3> after_from_before;
   for (const auto& [id, record] : map->keyframes()) {
@@ -24,38 +25,38 @@ void MoveB(const Sim3& a_from_b, KeyFrameId first_of_b, Map* map) {
   map->Correct(after_from_before);
 }
 
-// The sightings were made before B was moved: their places and keyframes have one unit now.
-void Rescale(const Sim3& a_from_b, KeyFrameId first_of_b, std::vector<LoopCandidate>* sightings) {
-  for (LoopCandidate& sighting : *sightings) {
-    // Lengths in the keyframe's frame over lengths in the place's frame.
-    const bool of_b = sighting.keyframe >= first_of_b;
+// Updates candidates that were made before B was moved: keyframe and place now have the same scale.
+void Rescale(const Sim3& a_from_b, KeyFrameId first_of_b, std::vector<LoopCandidate>* candidates) {
+  for (LoopCandidate& candidate : *candidates) {
+    // A scale is lengths in the keyframe's frame over lengths in the frame of the place.
+    const bool of_b = candidate.keyframe >= first_of_b;
     const double unit = of_b ? a_from_b.scale : 1 / a_from_b.scale;
-    sighting.keyframe_from_place.scale *= unit;
-    // The translation is in the keyframe's frame: only B's keyframes have changed their unit.
-    if (of_b) sighting.keyframe_from_place.translation *= a_from_b.scale;
+    candidate.keyframe_from_place.scale *= unit;
+    // The translation is in the keyframe's frame, and only the keyframes of B have changed their scale.
+    if (of_b) candidate.keyframe_from_place.translation *= a_from_b.scale;
   }
 }
 
-// Spreads what the maps have drifted over both. False where they would have to be bent too far.
-bool SpreadDrift(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& sightings,
+// Distributes the drift of both maps over their pose graph. Returns false if that would bend them too far.
+bool SpreadDrift(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& candidates,
                  Map* map) {
-  LoopGraph graph = MakeLoopGraph(options, sightings, map);
-  if (!RelaxPoseGraph(options.graph, &graph.graph).solved || !IsConsistent(options, graph)) return false;
+  LoopGraph graph = MakeLoopGraph(options, candidates, map);
+  if (!SolvePoseGraph(options.graph, &graph.graph).solved || !IsConsistent(options, graph)) return false;
   ApplyLoopGraph(graph, map);
   return true;
 }
 
-// What both maps have keeps the id of A: content of A stands among these points.
-void KeepIdsOfA(MapPointId first_of_b, std::vector<LoopCandidate>* sightings) {
-  for (LoopCandidate& sighting : *sightings) {
-    for (DuplicatePoints& duplicates : sighting.duplicates) {
+// A point that both maps contain keeps the id of A, because content of A is anchored to these points.
+void KeepIdsOfA(MapPointId first_of_b, std::vector<LoopCandidate>* candidates) {
+  for (LoopCandidate& candidate : *candidates) {
+    for (DuplicatePoints& duplicates : candidate.duplicates) {
       if (duplicates.known >= first_of_b) std::swap(duplicates.known, duplicates.recent);
     }
   }
 }
 
-// The error of a seam sinks into the map slowly: with Huber's loss on as long as it becomes clearly less, and
-// then once more with the usual one. False where the adjustment fails.
+// The remaining error at the seam takes several adjustments: rounds with Huber's loss while the cost
+// decreases considerably, then one with the standard loss. Returns false if the adjustment fails.
 bool Adjust(const MapJoiningOptions& options, const std::atomic<bool>* interrupt, Map* map) {
   MapAdjustmentOptions adjustment;
   adjustment.global_iterations = options.global_iterations;
@@ -63,24 +64,24 @@ bool Adjust(const MapJoiningOptions& options, const std::atomic<bool>* interrupt
   for (int round = 0; round < options.max_rounds; ++round) {
     const BundleSummary summary = AdjustGlobally(adjustment, interrupt, map);
     if (summary.outcome == BundleSummary::Outcome::kFailed) return false;
-    if (summary.final_cost >= options.clearly_less * summary.initial_cost) break;
+    if (summary.final_cost >= options.max_cost_ratio * summary.initial_cost) break;
   }
   adjustment.global_loss = RobustLoss::kTukey;
   return AdjustGlobally(adjustment, interrupt, map).outcome != BundleSummary::Outcome::kFailed;
 }
 
-// Makes one of each two points that the maps have of one physical point; returns how many there were. What
-// one map has twice by itself stays: each keyframe is searched for points of the other map alone.
-int FuseDuplicatePoints(const JoinedIds& ids, const std::vector<LoopCandidate>& sightings,
+// Fuses pairs of points that the two maps have of one physical point; returns the number of pairs. Duplicates
+// within one map stay: each keyframe is searched for points of the other map only.
+int FuseDuplicatePoints(const JoinedIds& ids, const std::vector<LoopCandidate>& candidates,
                         const std::atomic<bool>* interrupt, Map* map) {
   std::set<KeyFrameId> about;
   int merged = 0;
-  for (const LoopCandidate& sighting : sightings) {
-    merged += FuseTwins(sighting, map);
-    about.insert({sighting.keyframe, sighting.place});
+  for (const LoopCandidate& candidate : candidates) {
+    merged += FuseCandidateDuplicates(candidate, map);
+    about.insert({candidate.keyframe, candidate.place});
   }
-  for (const LoopCandidate& sighting : sightings) {
-    auto neighbours = map->Covisible(sighting.keyframe);
+  for (const LoopCandidate& candidate : candidates) {
+    auto neighbours = map->Covisible(candidate.keyframe);
     if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
     for (const auto& [id, shared] : neighbours) about.insert(id);
   }
@@ -97,7 +98,7 @@ int FuseDuplicatePoints(const JoinedIds& ids, const std::vector<LoopCandidate>& 
           points.insert(observation.point);
       }
     }
-    merged += FuseSeenTwice(id, {points.begin(), points.end()}, map, &searcher);
+    merged += MatchAndFusePoints(id, {points.begin(), points.end()}, map, &searcher);
   }
   return merged;
 }
@@ -140,7 +141,7 @@ MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, 
   const auto full = [](std::uint32_t next_a, std::uint32_t next_b) { return next_b >= kNoId - next_a; };
   if (full(a.next_keyframe, b.next_keyframe) || full(a.next_point, b.next_point) ||
       full(a.next_panorama, b.next_panorama)) {
-    attempt.refusal = "together they have given out more ids than a map has";
+    attempt.refusal = "together they have more ids than one map can hold";
     return attempt;
   }
   auto joined = std::make_shared<JoinedMap>();
@@ -151,16 +152,16 @@ MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, 
   if (!attempt.refusal.empty()) return attempt;
 
   joined->a_from_b = attempt.overlap.a_from_b;
-  std::vector<LoopCandidate> sightings = attempt.overlap.sightings;
+  std::vector<LoopCandidate> candidates = attempt.overlap.candidates;
   MoveB(joined->a_from_b, first_of_b, &map);
-  Rescale(joined->a_from_b, first_of_b, &sightings);
+  Rescale(joined->a_from_b, first_of_b, &candidates);
   joined->aligned = map.Snapshot();
-  if (!SpreadDrift(options.correction, sightings, &map)) {
-    attempt.refusal = "one of them would have to be bent too far to fit the other";
+  if (!SpreadDrift(options.correction, candidates, &map)) {
+    attempt.refusal = "one map would have to be bent too far to fit the other";
     return attempt;
   }
-  KeepIdsOfA(joined->ids.first_point, &sightings);
-  joined->points_merged = FuseDuplicatePoints(joined->ids, sightings, interrupt, &map);
+  KeepIdsOfA(joined->ids.first_point, &candidates);
+  joined->points_merged = FuseDuplicatePoints(joined->ids, candidates, interrupt, &map);
   if (!Adjust(options, interrupt, &map)) {
     attempt.refusal = "the joined map cannot be adjusted";
     return attempt;

@@ -19,24 +19,24 @@ std::pair<int, int> CellOf(const Eigen::Vector2d& pixel, const KeyFrame& keyfram
           static_cast<int>(across * pixel.y() / keyframe.camera->height_px())};
 }
 
-// A keyframe of B that was recognised, and where it puts B.
+// A recognised keyframe of B, and the similarity that it implies.
 struct Recognition {
-  std::size_t order = 0;  // of the keyframe in B
-  LoopCandidate sighting;
+  std::size_t order = 0;  // index of the keyframe in in_b_
+  LoopCandidate candidate;
   Sim3 a_from_b;
 };
 
-// What the keyframes of both maps say of one similarity.
+// The evidence that the keyframes of both maps give about one similarity.
 struct Evidence {
   Sim3 a_from_b;
-  std::size_t in_a_row = 0, looking = 0;
-  std::vector<LoopCandidate> sightings;
-  double found = 0;
+  std::size_t consecutive = 0, with_view = 0;
+  std::vector<LoopCandidate> candidates;
+  double found_ratio = 0;
   std::size_t regions = 0, contradicted = 0;
 
   std::size_t Points() const {
     std::size_t points = 0;
-    for (const LoopCandidate& sighting : sightings) points += sighting.seen.size();
+    for (const LoopCandidate& candidate : candidates) points += candidate.seen.size();
     return points;
   }
 };
@@ -57,17 +57,17 @@ class OverlapFinder {
   }
 
   MapOverlap Find() {
-    using Verdict = MapOverlap::Verdict;
+    using Outcome = MapOverlap::Outcome;
     MapOverlap overlap;
-    const std::size_t fewest = options_.in_a_row;
-    if (in_a_.size() < fewest || in_b_.size() < fewest) return overlap;
-    Recognise(&overlap);
-    overlap.verdict = Verdict::kNothingRecognised;
+    const std::size_t min_keyframes = options_.min_consecutive;
+    if (in_a_.size() < min_keyframes || in_b_.size() < min_keyframes) return overlap;
+    RecogniseKeyFrames(&overlap);
+    overlap.outcome = Outcome::kNothingRecognised;
     std::vector<Evidence> examined;
     for (const std::size_t seed : BySupport()) {
-      if (examined.size() >= options_.hypotheses || Interrupted()) break;
+      if (examined.size() >= options_.max_hypotheses || Interrupted()) break;
       const bool known = std::any_of(examined.begin(), examined.end(), [&](const Evidence& evidence) {
-        return Says(evidence, recognitions_[seed].sighting);
+        return Confirms(evidence, recognitions_[seed].candidate);
       });
       if (!known) examined.push_back(Examine(seed));
     }
@@ -76,24 +76,24 @@ class OverlapFinder {
     Evidence best;
     if (!examined.empty()) best = std::move(examined.front());
     for (std::size_t i = 1; i < examined.size(); ++i) {
-      std::size_t elsewhere = 0;
-      for (const LoopCandidate& sighting : examined[i].sightings)
-        elsewhere += Says(best, sighting) ? 0 : sighting.seen.size();
-      overlap.second_points = std::max(overlap.second_points, elsewhere);
+      std::size_t other_points = 0;
+      for (const LoopCandidate& candidate : examined[i].candidates)
+        other_points += Confirms(best, candidate) ? 0 : candidate.seen.size();
+      overlap.second_points = std::max(overlap.second_points, other_points);
     }
     overlap.a_from_b = best.a_from_b;
-    overlap.in_a_row = best.in_a_row;
-    overlap.looking = best.looking;
-    overlap.confirmed = best.sightings.size();
-    overlap.found = best.found;
+    overlap.consecutive = best.consecutive;
+    overlap.with_view = best.with_view;
+    overlap.confirmed = best.candidates.size();
+    overlap.found_ratio = best.found_ratio;
     overlap.points = best.Points();
     overlap.regions = best.regions;
     overlap.contradicted = best.contradicted;
-    overlap.sightings = std::move(best.sightings);
+    overlap.candidates = std::move(best.candidates);
     if (Interrupted()) {
-      overlap.verdict = Verdict::kInterrupted;
+      overlap.outcome = Outcome::kInterrupted;
     } else if (overlap.recognised > 0) {
-      overlap.verdict = Judge(overlap);
+      overlap.outcome = Decide(overlap);
     }
     return overlap;
   }
@@ -102,24 +102,24 @@ class OverlapFinder {
   const KeyFrame& At(KeyFrameId id) const { return map_->keyframes().at(id).keyframe; }
   bool IsOfA(KeyFrameId id) const { return id < first_of_b_; }
   bool Interrupted() const { return interrupt_ && *interrupt_; }
-  MapOverlap::Verdict Judge(const MapOverlap& overlap) const;
-  void Recognise(MapOverlap* overlap);
+  MapOverlap::Outcome Decide(const MapOverlap& overlap) const;
+  void RecogniseKeyFrames(MapOverlap* overlap);
   std::vector<std::size_t> BySupport() const;
-  bool Says(const Evidence& evidence, const LoopCandidate& sighting) const;
-  std::size_t LongestRow(const Sim3& a_from_b) const;
-  bool IsFromElsewhere(const KeyFrame& a, const KeyFrame& b) const;
-  // Of the two at a keyframe, in the coordinates of B.
+  bool Confirms(const Evidence& evidence, const LoopCandidate& candidate) const;
+  std::size_t LongestSeries(const Sim3& a_from_b) const;
+  bool IsOtherViewpoint(const KeyFrame& a, const KeyFrame& b) const;
+  // The difference of two similarities at a keyframe of B, in the coordinates of B.
   double Difference(const Sim3& a_from_b, const Sim3& other_a_from_b, const KeyFrame& keyframe) const {
-    return SizeAt(a_from_b.inverse() * other_a_from_b, keyframe).largest();
+    return MagnitudeAt(a_from_b.inverse() * other_a_from_b, keyframe).largest();
   }
   Evidence Examine(std::size_t seed);
-  std::vector<KeyFrameId> KeyFramesWithTheView(const KeyFrame& keyframe, const Rigid3& camera_from_other,
-                                               double scale) const;
+  std::vector<KeyFrameId> KeyFramesWithSameView(const KeyFrame& keyframe, const Rigid3& camera_from_other,
+                                                double scale) const;
   std::vector<MapPointId> PointsInView(const KeyFrame& keyframe, const std::vector<KeyFrameId>& others,
                                        const Rigid3& camera_from_other);
   std::optional<PredictedPoint> Predict(MapPointId id, const KeyFrame& keyframe,
                                         const Rigid3& camera_from_other);
-  void CompareSurfaces(const LoopCandidate& sighting, const std::vector<MapPointId>& points,
+  void CompareSurfaces(const LoopCandidate& candidate, const std::vector<MapPointId>& points,
                        Evidence* evidence);
   bool HasSurface(const Map::KeyFrameRecord& keyframe, const Eigen::Vector2d& pixel, double depth) const;
 
@@ -129,35 +129,36 @@ class OverlapFinder {
   Map* const map_;
   LoopCandidateSearch search_;
   PointSearcher searcher_;
-  std::vector<KeyFrameId> in_a_, in_b_;  // localized, in the order in which they were made
+  std::vector<KeyFrameId> in_a_, in_b_;  // localized, in order of creation
   std::vector<Recognition> recognitions_;
 };
 
-MapOverlap::Verdict OverlapFinder::Judge(const MapOverlap& overlap) const {
-  using Verdict = MapOverlap::Verdict;
-  if (overlap.in_a_row < options_.in_a_row) return Verdict::kTooFewInARow;
+MapOverlap::Outcome OverlapFinder::Decide(const MapOverlap& overlap) const {
+  using Outcome = MapOverlap::Outcome;
+  if (overlap.consecutive < options_.min_consecutive) return Outcome::kTooFewConsecutive;
   const auto confirmed = static_cast<double>(overlap.confirmed);
-  if (confirmed < options_.min_confirmed * static_cast<double>(overlap.looking) ||
-      overlap.found < options_.min_found ||
+  if (confirmed < options_.min_confirmed_ratio * static_cast<double>(overlap.with_view) ||
+      overlap.found_ratio < options_.min_found_ratio ||
       static_cast<double>(overlap.contradicted) >
-          options_.max_contradicted * static_cast<double>(overlap.regions)) {
-    return Verdict::kContradicted;
+          options_.max_contradicted_ratio * static_cast<double>(overlap.regions)) {
+    return Outcome::kContradicted;
   }
-  if (static_cast<double>(overlap.second_points) > options_.max_second * static_cast<double>(overlap.points))
-    return Verdict::kAmbiguous;
-  return Verdict::kOverlap;
+  if (static_cast<double>(overlap.second_points) >
+      options_.max_second_ratio * static_cast<double>(overlap.points))
+    return Outcome::kAmbiguous;
+  return Outcome::kOverlap;
 }
 
-void OverlapFinder::Recognise(MapOverlap* overlap) {
+void OverlapFinder::RecogniseKeyFrames(MapOverlap* overlap) {
   std::set<KeyFrameId> all_of_b;
   for (const auto& [id, record] : map_->keyframes()) {
     if (!IsOfA(id)) all_of_b.insert(id);
   }
   for (std::size_t order = 0; order < in_b_.size() && !Interrupted(); ++order) {
     const std::size_t before = recognitions_.size();
-    search_.Find(in_b_[order], all_of_b, map_, &searcher_, [&](LoopCandidate sighting) {
-      const Sim3 a_from_b = KnownFromRecent(sighting, map_);
-      recognitions_.push_back({order, std::move(sighting), a_from_b});
+    search_.Find(in_b_[order], all_of_b, map_, &searcher_, [&](LoopCandidate candidate) {
+      const Sim3 a_from_b = KnownFromRecent(candidate, map_);
+      recognitions_.push_back({order, std::move(candidate), a_from_b});
       return false;
     });
     if (recognitions_.size() > before) ++overlap->recognised;
@@ -165,13 +166,13 @@ void OverlapFinder::Recognise(MapOverlap* overlap) {
   search_.Clear();
 }
 
-// The recognitions, those first that most keyframes agree with.
+// Indices of the recognitions, those with most agreeing keyframes first.
 std::vector<std::size_t> OverlapFinder::BySupport() const {
   std::vector<std::pair<std::size_t, std::size_t>> ranked;
   for (std::size_t seed = 0; seed < recognitions_.size(); ++seed) {
     std::set<std::size_t> agreeing;
     for (const Recognition& other : recognitions_) {
-      if (Difference(recognitions_[seed].a_from_b, other.a_from_b, At(other.sighting.keyframe)) <=
+      if (Difference(recognitions_[seed].a_from_b, other.a_from_b, At(other.candidate.keyframe)) <=
           options_.max_disagreement)
         agreeing.insert(other.order);
     }
@@ -184,37 +185,37 @@ std::vector<std::size_t> OverlapFinder::BySupport() const {
   return seeds;
 }
 
-// Whether the evidence has the keyframe of the sighting at the same place: one similarity that drift bends is
-// no second hypothesis.
-bool OverlapFinder::Says(const Evidence& evidence, const LoopCandidate& sighting) const {
-  const Sim3 said = KnownFromRecent(sighting, map_);
-  return std::any_of(evidence.sightings.begin(), evidence.sightings.end(), [&](const LoopCandidate& other) {
-    return other.keyframe == sighting.keyframe &&
-           SizeAt(said.inverse() * KnownFromRecent(other, map_), At(other.keyframe)).largest() <=
-               options_.distinct;
+// True if the evidence places the candidate's keyframe at about the same pose. Drift bends a map, so one
+// similarity that varies slightly is not a second hypothesis.
+bool OverlapFinder::Confirms(const Evidence& evidence, const LoopCandidate& candidate) const {
+  const Sim3 implied = KnownFromRecent(candidate, map_);
+  return std::any_of(evidence.candidates.begin(), evidence.candidates.end(), [&](const LoopCandidate& other) {
+    return other.keyframe == candidate.keyframe &&
+           MagnitudeAt(implied.inverse() * KnownFromRecent(other, map_), At(other.keyframe)).largest() <=
+               options_.min_hypothesis_difference;
   });
 }
 
-bool OverlapFinder::IsFromElsewhere(const KeyFrame& a, const KeyFrame& b) const {
+bool OverlapFinder::IsOtherViewpoint(const KeyFrame& a, const KeyFrame& b) const {
   const double shift = (a.camera_from_map.OriginInSource() - b.camera_from_map.OriginInSource()).norm();
-  const double turn = (a.camera_from_map.rotation * b.camera_from_map.rotation.inverse()).Angle();
-  return shift > options_.min_viewpoint_step * b.mean_depth || turn > options_.min_viewpoint_step;
+  const double rotation = (a.camera_from_map.rotation * b.camera_from_map.rotation.inverse()).Angle();
+  return shift > options_.min_viewpoint_step * b.mean_depth || rotation > options_.min_viewpoint_step;
 }
 
-// The most keyframes of B in a row that were recognised where the similarity puts them.
-std::size_t OverlapFinder::LongestRow(const Sim3& a_from_b) const {
+// The largest number of consecutive keyframes of B that were recognised in agreement with the similarity.
+std::size_t OverlapFinder::LongestSeries(const Sim3& a_from_b) const {
   std::set<std::size_t> agreeing;
   for (const Recognition& recognition : recognitions_) {
-    if (Difference(a_from_b, recognition.a_from_b, At(recognition.sighting.keyframe)) <=
+    if (Difference(a_from_b, recognition.a_from_b, At(recognition.candidate.keyframe)) <=
         options_.max_disagreement)
       agreeing.insert(recognition.order);
   }
   std::size_t longest = 0, row = 0, last = 0;
   for (const std::size_t order : agreeing) {
-    const bool goes_on = row > 0 && order == last + 1;
-    if (!goes_on) {
+    const bool continues = row > 0 && order == last + 1;
+    if (!continues) {
       row = 1;
-    } else if (IsFromElsewhere(At(in_b_[last]), At(in_b_[order]))) {
+    } else if (IsOtherViewpoint(At(in_b_[last]), At(in_b_[order]))) {
       ++row;
     }
     last = order;
@@ -223,12 +224,12 @@ std::size_t OverlapFinder::LongestRow(const Sim3& a_from_b) const {
   return longest;
 }
 
-// Goes through the keyframes of both maps from the seed outwards, each where the nearest confirmed one puts
-// it: drift within a map bends what one similarity cannot.
+// Visits the keyframes of both maps from the seed outwards. Each is predicted from the nearest confirmed
+// keyframe, because drift within a map bends it in ways that one similarity cannot describe.
 Evidence OverlapFinder::Examine(std::size_t seed) {
   Evidence evidence;
   evidence.a_from_b = recognitions_[seed].a_from_b;
-  evidence.in_a_row = LongestRow(evidence.a_from_b);
+  evidence.consecutive = LongestSeries(evidence.a_from_b);
   struct Known {
     Eigen::Vector3d center_in_a;
     Sim3 a_from_b;
@@ -237,11 +238,11 @@ Evidence OverlapFinder::Examine(std::size_t seed) {
     const Eigen::Vector3d center = At(id).camera_from_map.OriginInSource();
     return IsOfA(id) ? center : evidence.a_from_b * center;
   };
-  std::vector<Known> known = {{center_in_a(recognitions_[seed].sighting.keyframe), evidence.a_from_b}};
+  std::vector<Known> known = {{center_in_a(recognitions_[seed].candidate.keyframe), evidence.a_from_b}};
   struct Pending {
     KeyFrameId id;
     double distance;
-    std::size_t nearest;  // of those known
+    std::size_t nearest;  // index of the nearest known keyframe
   };
   std::vector<Pending> pending;
   for (const auto* ids : {&in_a_, &in_b_}) {
@@ -257,20 +258,21 @@ Evidence OverlapFinder::Examine(std::size_t seed) {
     const Sim3 a_from_b = known[next->nearest].a_from_b;
     pending.erase(next);
     const Sim3 other_from_own = IsOfA(id) ? a_from_b.inverse() : a_from_b;
-    const Rigid3 camera_from_other = CarriedAlong(At(id).camera_from_map, other_from_own);
+    const Rigid3 camera_from_other = CorrectedPose(At(id).camera_from_map, other_from_own);
     const std::vector<KeyFrameId> others =
-        KeyFramesWithTheView(At(id), camera_from_other, other_from_own.scale);
+        KeyFramesWithSameView(At(id), camera_from_other, other_from_own.scale);
     const std::vector<MapPointId> points = PointsInView(At(id), others, camera_from_other);
     if (points.empty()) continue;
-    ++evidence.looking;
+    ++evidence.with_view;
     shares.push_back(0);
-    auto sighting =
+    auto candidate =
         VerifyLoopCandidate(options_.search.verification, id, others, camera_from_other, map_, &searcher_);
-    if (!sighting) continue;
-    const Sim3 says = KnownFromRecent(*sighting, map_);
-    if (SizeAt(other_from_own.inverse() * says, At(id)).largest() > options_.max_disagreement) continue;
-    shares.back() = static_cast<double>(sighting->seen.size()) / sighting->expected;
-    known.push_back({center_in_a(id), IsOfA(id) ? says.inverse() : says});
+    if (!candidate) continue;
+    const Sim3 implied = KnownFromRecent(*candidate, map_);
+    if (MagnitudeAt(other_from_own.inverse() * implied, At(id)).largest() > options_.max_disagreement)
+      continue;
+    shares.back() = static_cast<double>(candidate->seen.size()) / candidate->expected;
+    known.push_back({center_in_a(id), IsOfA(id) ? implied.inverse() : implied});
     for (Pending& other : pending) {
       const double distance = (center_in_a(other.id) - known.back().center_in_a).norm();
       if (distance < other.distance) {
@@ -278,27 +280,28 @@ Evidence OverlapFinder::Examine(std::size_t seed) {
         other.nearest = known.size() - 1;
       }
     }
-    CompareSurfaces(*sighting, points, &evidence);
-    evidence.sightings.push_back(std::move(*sighting));
+    CompareSurfaces(*candidate, points, &evidence);
+    evidence.candidates.push_back(std::move(*candidate));
   }
   if (!shares.empty()) {
     const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
     std::nth_element(shares.begin(), middle, shares.end());
-    evidence.found = *middle;
+    evidence.found_ratio = *middle;
   }
   return evidence;
 }
 
-// Keyframes of the other map with about the same view, the most alike first. scale: of the other map's unit.
-std::vector<KeyFrameId> OverlapFinder::KeyFramesWithTheView(const KeyFrame& keyframe,
-                                                            const Rigid3& camera_from_other,
-                                                            double scale) const {
+// Keyframes of the other map with about the same view, the most similar first. scale: of the other map's
+// unit.
+std::vector<KeyFrameId> OverlapFinder::KeyFramesWithSameView(const KeyFrame& keyframe,
+                                                             const Rigid3& camera_from_other,
+                                                             double scale) const {
   std::vector<std::pair<double, KeyFrameId>> ranked;
   for (const KeyFrameId id : IsOfA(keyframe.id) ? in_b_ : in_a_) {
     const Rigid3& other = At(id).camera_from_map;
     const double distance =
         (camera_from_other.OriginInSource() - other.OriginInSource()).norm() / (scale * keyframe.mean_depth);
-    // Between the optical axes: a camera that rolls sees the same.
+    // The angle between the optical axes, since a camera that rolls sees the same.
     const double cosine = (camera_from_other.rotation.inverse() * Eigen::Vector3d::UnitZ())
                               .dot(other.rotation.inverse() * Eigen::Vector3d::UnitZ());
     const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
@@ -306,14 +309,14 @@ std::vector<KeyFrameId> OverlapFinder::KeyFramesWithTheView(const KeyFrame& keyf
     ranked.emplace_back(distance + angle, id);
   }
   std::sort(ranked.begin(), ranked.end());
-  if (ranked.size() > options_.search.group) ranked.resize(options_.search.group);
+  if (ranked.size() > options_.search.max_group) ranked.resize(options_.search.max_group);
   std::vector<KeyFrameId> ids;
   for (const auto& [difference, id] : ranked) ids.push_back(id);
   return ids;
 }
 
-// The points of the others that should be seen in the keyframe; none where they are too few, or not spread
-// over the image.
+// Points of the given keyframes that should be visible in the keyframe; none if they are too few or do not
+// cover enough of the image.
 std::vector<MapPointId> OverlapFinder::PointsInView(const KeyFrame& keyframe,
                                                     const std::vector<KeyFrameId>& others,
                                                     const Rigid3& camera_from_other) {
@@ -345,7 +348,7 @@ std::optional<PredictedPoint> OverlapFinder::Predict(MapPointId id, const KeyFra
   return searcher_.Predict(record->point, source->keyframe, *keyframe.camera, camera_from_other);
 }
 
-// Whether the keyframe's own map has a surface at a pixel, at about this depth.
+// True if the keyframe's own map has a surface at this pixel and about this depth.
 bool OverlapFinder::HasSurface(const Map::KeyFrameRecord& keyframe, const Eigen::Vector2d& pixel,
                                double depth) const {
   return std::any_of(keyframe.observations.begin(), keyframe.observations.end(),
@@ -359,13 +362,13 @@ bool OverlapFinder::HasSurface(const Map::KeyFrameRecord& keyframe, const Eigen:
                      });
 }
 
-// Where both maps have a surface at one depth, the points of one are found in a keyframe of the other, unless
-// something else is to be seen there.
-void OverlapFinder::CompareSurfaces(const LoopCandidate& sighting, const std::vector<MapPointId>& points,
+// Where both maps have a surface at the same depth, the points of one must be found in a keyframe of the
+// other, unless the surfaces differ.
+void OverlapFinder::CompareSurfaces(const LoopCandidate& candidate, const std::vector<MapPointId>& points,
                                     Evidence* evidence) {
-  const Map::KeyFrameRecord& record = *map_->FindKeyFrame(sighting.keyframe);
+  const Map::KeyFrameRecord& record = *map_->FindKeyFrame(candidate.keyframe);
   const KeyFrame& keyframe = record.keyframe;
-  const Sim3 seen_from_other = sighting.keyframe_from_place * AsSim3(At(sighting.place).camera_from_map);
+  const Sim3 seen_from_other = candidate.keyframe_from_place * AsSim3(At(candidate.place).camera_from_map);
   const Rigid3 camera_from_other{seen_from_other.rotation,
                                  seen_from_other.translation / seen_from_other.scale};
   struct Region {
@@ -389,7 +392,7 @@ void OverlapFinder::CompareSurfaces(const LoopCandidate& sighting, const std::ve
   for (const auto& [cell, region] : regions) {
     if (region.points < options_.min_region_points) continue;
     ++evidence->regions;
-    if (region.found <= options_.min_region_found * region.points) ++evidence->contradicted;
+    if (region.found <= options_.min_region_found_ratio * region.points) ++evidence->contradicted;
   }
 }
 
@@ -397,53 +400,52 @@ void OverlapFinder::CompareSurfaces(const LoopCandidate& sighting, const std::ve
 
 LoopCandidateSearchOptions MapOverlapOptions::ThoroughSearch() {
   LoopCandidateSearchOptions search;
-  search.new_descriptions = std::numeric_limits<std::size_t>::max();
-  search.proved = 4;
+  search.max_new_descriptions = std::numeric_limits<std::size_t>::max();
+  search.max_verified = 4;
   return search;
 }
 
 std::string MapOverlap::Brief() const {
   char text[320];
-  std::snprintf(text, sizeof(text),
-                "%zu keyframes recognised, %zu in a row, %zu of %zu that look at the other map confirm it, "
-                "median share of points found %.2f, %zu of %zu regions contradict, %zu points in all, %zu of "
-                "another hypothesis, scale %.4g",
-                recognised, in_a_row, confirmed, looking, found, contradicted, regions, points, second_points,
-                a_from_b.scale);
+  std::snprintf(
+      text, sizeof(text),
+      "%zu keyframes recognised, %zu consecutive, %zu of %zu with a view of the other map confirm it, "
+      "median ratio of points found %.2f, %zu of %zu regions contradict, %zu points in total, %zu "
+      "for another hypothesis, scale %.4g",
+      recognised, consecutive, confirmed, with_view, found_ratio, contradicted, regions, points,
+      second_points, a_from_b.scale);
   return text;
 }
 
 std::string ReasonNotToJoin(const MapOverlap& overlap) {
-  using Verdict = MapOverlap::Verdict;
+  using Outcome = MapOverlap::Outcome;
   char text[200] = "";
-  switch (overlap.verdict) {
-    case Verdict::kOverlap:
+  switch (overlap.outcome) {
+    case Outcome::kOverlap:
       break;
-    case Verdict::kNothingToCompare:
-      return "one of them has too few keyframes with a position to be compared";
-    case Verdict::kNothingRecognised:
-      return "no place of one is recognised in the other";
-    case Verdict::kTooFewInARow:
-      std::snprintf(text, sizeof(text), "only %zu keyframes in a row are recognised at the same place",
-                    overlap.in_a_row);
+    case Outcome::kNothingToCompare:
+      return "one of the maps has too few localized keyframes to be compared";
+    case Outcome::kNothingRecognised:
+      return "no place of one map is recognised in the other";
+    case Outcome::kTooFewConsecutive:
+      std::snprintf(text, sizeof(text), "only %zu consecutive keyframes are recognised at the same place",
+                    overlap.consecutive);
       break;
-    case Verdict::kContradicted:
-      if (overlap.contradicted > 0 && overlap.confirmed == overlap.looking) {
-        std::snprintf(
-            text, sizeof(text),
-            "they look alike, but in %zu of %zu parts of the images where both show a surface it is "
-            "another one",
-            overlap.contradicted, overlap.regions);
+    case Outcome::kContradicted:
+      if (overlap.contradicted > 0 && overlap.confirmed == overlap.with_view) {
+        std::snprintf(text, sizeof(text),
+                      "they look alike, but their surfaces differ in %zu of %zu image regions",
+                      overlap.contradicted, overlap.regions);
         break;
       }
       std::snprintf(text, sizeof(text),
-                    "they look alike, but only %zu of %zu keyframes that should show the other map do, and "
-                    "find %.0f %% of its points",
-                    overlap.confirmed, overlap.looking, 100 * overlap.found);
+                    "they look alike, but only %zu of %zu keyframes that should show the other map match it, "
+                    "and find %.0f %% of its points",
+                    overlap.confirmed, overlap.with_view, 100 * overlap.found_ratio);
       break;
-    case Verdict::kAmbiguous:
-      return "more than one place of the other map looks the same";
-    case Verdict::kInterrupted:
+    case Outcome::kAmbiguous:
+      return "several places in the other map look the same";
+    case Outcome::kInterrupted:
       return "the comparison was interrupted";
   }
   return text;

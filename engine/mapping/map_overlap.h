@@ -9,75 +9,82 @@
 
 #include "engine/mapping/loop_candidate_search.h"
 
-// Whether two maps show one place, and how they lie to each other. Keyframes of one map are recognised in the
-// other as for a loop (loop_candidate_search.h). Between two maps no drift bound tells a place from a
-// look-alike, so a similarity must also explain whatever it puts into view: of the keyframes that look at
-// points of the other map under it most must find most of these points again, and no other similarity may do
-// nearly as well. For one thread at a time; the same input gives the same result.
+// Decides whether two maps show one place, and estimates the similarity between them. Keyframes of one map
+// are recognised in the other as for a loop (loop_candidate_search.h). Between two maps no limit on drift
+// rules out a similar-looking but different place. A similarity is therefore also checked against everything
+// that it brings into view: of the keyframes that should see points of the other map, most must find most of
+// these points, and no other similarity may do nearly as well. For one thread at a time; equal input gives an
+// equal result.
 namespace docent::engine {
 
 struct MapOverlapOptions {
   LoopCandidateSearchOptions search = ThoroughSearch();
-  // So many keyframes in a row (as they were made, each from elsewhere than the one before) must be
-  // recognised and agree: as for a loop.
-  std::size_t in_a_row = 3;
-  double max_disagreement = 0.05;    // of the depth, radians, logarithm of the scale: as for a loop
-  double min_viewpoint_step = 0.02;  // of the depth or radians, between two keyframes in a row
-  // Similarities that put a keyframe further apart than this are two hypotheses.
-  double distinct = 0.2;       // of the depth, radians, logarithm of the scale
-  std::size_t hypotheses = 3;  // that are examined, those with most keyframes first
-  // A keyframe is compared with keyframes of the other map that show the same from about the same place: from
-  // further off other things hide what it should see.
-  double max_view_distance = 0.5;  // of the depth
-  double max_view_angle = 0.5;     // radians
-  // With fewer expected points, or with points in fewer cells of a 4x4 grid, it says neither yes nor no.
+  // This many consecutive keyframes, each from another viewpoint than the one before, must be recognised and
+  // agree, as for a loop.
+  std::size_t min_consecutive = 3;
+  // Ratio of the median depth, radians, logarithm of the scale: as for a loop.
+  double max_disagreement = 0.05;
+  // Ratio of the median depth, or radians, between two consecutive keyframes.
+  double min_viewpoint_step = 0.02;
+  // Two similarities that place a keyframe further apart than this are different hypotheses.
+  double min_hypothesis_difference = 0.2;  // ratio of the median depth, radians, logarithm of the scale
+  std::size_t max_hypotheses = 3;          // that are examined, those with most keyframes first
+  // A keyframe is compared with keyframes of the other map that have about the same view: from further away,
+  // other objects occlude what it should see.
+  double max_view_distance = 0.5;  // ratio of the median depth
+  double max_view_angle = 0.5;     // radians, between the optical axes
+  // A keyframe with fewer expected points, or with points in fewer cells of a 4x4 grid, is not counted.
   int min_expected = 150;
   int min_cells = 7;
-  // Shares of the keyframes that look at the other map and are confirmed, and of the expected points that the
-  // median of these keyframes finds. Measured: 1.00 of the keyframes, and 0.35-0.54 (desks seen again on
-  // another way) or 0.75 (halves of one recording) of the points where two maps truly overlap; where bays of
-  // a museum share cabinets, columns and plinths, 0.62-0.71 of the keyframes and 0.16-0.17 of the points.
-  double min_confirmed = 0.8;
-  double min_found = 0.25;
-  // Two places may hold the same things, so that all that was asked so far is found, and differ in what is
-  // about these. A keyframe is divided into regions; a point counts in its region when it is found, or when
-  // the keyframe's own map has a surface there at its depth, so that nothing hides it. A region of so many
-  // points contradicts when so few of them are found. Measured: 0.1-5.2 % of the regions of desks seen again,
-  // 18-21 % where every desk holds the same things and other images hang on the wall behind.
+  // Minimum ratio of the keyframes with a view of the other map that confirm the similarity, and of the
+  // expected points that such keyframes find in the median. Measured: where two maps truly overlap, 1.00 of
+  // the keyframes, and of the points 0.35-0.54 (desks seen again on another path) or 0.75 (halves of one
+  // recording); where bays of a museum share cabinets, columns and plinths, 0.62-0.71 of the keyframes and
+  // 0.16-0.17 of the points.
+  double min_confirmed_ratio = 0.8;
+  double min_found_ratio = 0.25;
+  // Two places may contain the same objects, so that the checks so far pass, and differ around them. A
+  // keyframe is therefore divided into regions. A point counts in its region if it is found, or if the
+  // keyframe's own map has a surface there at the same depth, so that nothing occludes it. A region with at
+  // least min_region_points points contradicts if at most the ratio min_region_found_ratio of them is found.
+  // Measured: 0.1-5.2 % of the regions contradict for desks seen again, 18-21 % where every desk holds the
+  // same objects and other images hang on the wall behind.
   int regions_across = 8;
   int min_region_points = 8;
-  double min_region_found = 0.1;
-  double max_error_px = 3;      // of the level, for a point to count as found
-  double surface_px = 16;       // level 0: half a patch of a middle level
-  double surface_depth = 0.05;  // relative
-  double max_contradicted = 0.1;
-  // Of the points that confirm the best hypothesis, that another one may explain: 0.16 in the museum.
-  double max_second = 0.5;
+  double min_region_found_ratio = 0.1;
+  double max_error_px = 3;              // of the level, for a point to count as found
+  double surface_px = 16;               // level 0: half a patch of a middle level
+  double surface_depth = 0.05;          // largest relative difference of depth on one surface
+  double max_contradicted_ratio = 0.1;  // ratio of the regions
+  // Largest ratio of the best hypothesis's points that another hypothesis may explain: 0.16 in the museum.
+  double max_second_ratio = 0.5;
 
-  // Every candidate is described and proved: two maps are compared once, not with every new keyframe.
+  // Options by which every candidate is described and verified, since two maps are compared once and not with
+  // every new keyframe.
   static LoopCandidateSearchOptions ThoroughSearch();
 };
 
-// What became of the comparison.
+// The result of a comparison, with its figures.
 struct MapOverlap {
-  enum class Verdict : std::uint8_t {
+  enum class Outcome : std::uint8_t {
     kOverlap,
     kNothingToCompare,   // a map has too few localized keyframes or no finite points
-    kNothingRecognised,  // no keyframe of B shows a place of A
-    kTooFewInARow,
-    kContradicted,  // what should be in view is not found
-    kAmbiguous,     // another similarity explains nearly as much
+    kNothingRecognised,  // no keyframe of B was recognised in A
+    kTooFewConsecutive,
+    kContradicted,  // expected points are not found
+    kAmbiguous,     // another similarity explains nearly as many points
     kInterrupted,
   };
-  Verdict verdict = Verdict::kNothingToCompare;
-  Sim3 a_from_b;                           // of the best hypothesis
-  std::vector<LoopCandidate> sightings;    // that confirm it, of keyframes of both maps
-  std::size_t recognised = 0;              // keyframes of B that were recognised, whatever they say
-  std::size_t in_a_row = 0;                // that agree
-  std::size_t looking = 0, confirmed = 0;  // keyframes of both maps, under the best hypothesis
-  double found = 0;                        // median share of the expected points, over the looking keyframes
+  Outcome outcome = Outcome::kNothingToCompare;
+  Sim3 a_from_b;                          // similarity of the best hypothesis
+  std::vector<LoopCandidate> candidates;  // candidates that confirm it, of keyframes of both maps
+  std::size_t recognised = 0;   // keyframes of B that were recognised, whatever similarity they imply
+  std::size_t consecutive = 0;  // consecutive keyframes that agree
+  std::size_t with_view = 0, confirmed = 0;  // keyframes of both maps with a view of the other map, and those
+                                             // of them that confirm the best hypothesis
+  double found_ratio = 0;  // median over the keyframes with a view of the ratio of expected points found
   std::size_t regions = 0, contradicted = 0;  // of these keyframes
-  // Found in the keyframes that confirm it, and in those that confirm the second hypothesis instead.
+  // Points found in the keyframes that confirm it, and in those that confirm the second hypothesis instead.
   std::size_t points = 0, second_points = 0;
   // The figures in one line, for logs.
   std::string Brief() const;
@@ -86,8 +93,8 @@ struct MapOverlap {
 // One sentence that says why two maps are not joined; empty for kOverlap.
 std::string ReasonNotToJoin(const MapOverlap& overlap);
 
-// map: both maps, which share nothing; the keyframes of B have the ids from first_of_b on. Changes nothing in
-// it. interrupt may be null.
+// map: both maps side by side, without shared points or keyframes; the keyframes of B have the ids from
+// first_of_b on. Does not change the map. interrupt may be null.
 MapOverlap FindOverlap(const MapOverlapOptions& options, KeyFrameId first_of_b,
                        const std::atomic<bool>* interrupt, Map* map);
 

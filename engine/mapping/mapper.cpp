@@ -18,7 +18,7 @@ double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// Of this thread, whoever else uses the machine.
+// CPU time of this thread, so that other processes do not distort it.
 double ProcessorSeconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -33,7 +33,7 @@ Mapper::Mapper(const MapperOptions& options)
       descriptors_(DefaultVocabulary()),
       loops_(options.loops, options.search) {}
 
-// What the stepping thread knows of its map begins anew; what waits is not touched.
+// Resets the state of the stepping thread to a map; the queue is not changed.
 void Mapper::ResumeFrom(const MapSnapshot* snapshot) {
   map_ = snapshot ? Map(*snapshot) : Map();
   searcher_.Clear();
@@ -42,7 +42,7 @@ void Mapper::ResumeFrom(const MapSnapshot* snapshot) {
   to_match_.clear();
   to_localize_.clear();
   to_convert_.clear();
-  loops_.Begin();
+  loops_.Reset();
   for (const auto& [id, record] : map_.keyframes()) {
     if (record.keyframe.kind == KeyFrameKind::kPanorama) to_localize_.push_back({id});
   }
@@ -66,7 +66,7 @@ MapJoinAttempt Mapper::Join(const MapSnapshot& other, const std::atomic<bool>* i
     const std::lock_guard lock(mutex_);
     stepping_ = true;
   }
-  // As for a global adjustment, but of two maps.
+  // Frees memory as before a global adjustment, since this one involves two maps.
   searcher_.Release();
   if (options_.images) options_.images->EvictAll();
   MapJoinAttempt attempt = JoinMaps(options_.joining, *map_.Snapshot(), other, interrupt);
@@ -126,7 +126,7 @@ bool Mapper::IsIdle() const {
   return QueueLength() == 0 && locally_adjusted_;
 }
 
-void Mapper::Tell(MapperEvent::Kind kind, Timestamp time, std::string detail) {
+void Mapper::AddEvent(MapperEvent::Kind kind, Timestamp time, std::string detail) {
   const std::lock_guard lock(mutex_);
   events_.push_back({kind, time, std::move(detail)});
 }
@@ -151,9 +151,9 @@ bool Mapper::Step() {
   }
   double MapperTimes::*account = &MapperTimes::other;
   if (task) {
-    KeepImages(&*task);
+    StoreImages(&*task);
     if (const auto* candidate = std::get_if<KeyFrameCandidate>(&*task)) {
-      InsertKeyFrame(UpToDate(*candidate));
+      InsertKeyFrame(WithCorrections(*candidate));
     } else {
       StartMap(std::get<InitialPair>(*task));
     }
@@ -164,7 +164,7 @@ bool Mapper::Step() {
   return account != nullptr;
 }
 
-// account: null when there was nothing to do.
+// account: null if there was nothing to do.
 void Mapper::EndWork(double seconds, double MapperTimes::*account) {
   const std::lock_guard lock(mutex_);
   stepping_ = false;
@@ -174,7 +174,8 @@ void Mapper::EndWork(double seconds, double MapperTimes::*account) {
   if (account != nullptr) times_.*account += seconds;
 }
 
-// The most urgent piece of work that no keyframe asks for; the account that its time goes to, null for none.
+// Does the most urgent task apart from queued keyframes. Returns the account for its time; null if there was
+// none.
 double MapperTimes::*Mapper::DoNextTask() {
   if (!to_match_.empty()) {
     MatchNewPoints();
@@ -184,8 +185,8 @@ double MapperTimes::*Mapper::DoNextTask() {
     LocalAdjustment();
     return &MapperTimes::bundle_adjustment;
   }
-  if (loops_.HasFound() && WorkOnLoops()) return &MapperTimes::loop_closing;
-  // New points carry the camera on; what could not be localized so far can wait for them.
+  if (loops_.HasLoop() && WorkOnLoops()) return &MapperTimes::loop_closing;
+  // New points keep the camera tracked, so they come before keyframes that could not be localized so far.
   if (LocalizeNew()) return &MapperTimes::panorama_localization;
   if (ConvertOne()) return &MapperTimes::infinite_triangulation;
   if (LocalizeAgain()) return &MapperTimes::panorama_localization;
@@ -206,7 +207,7 @@ bool Mapper::IsFinite() const {
 }
 
 void Mapper::ApplyReports() {
-  constexpr int kEnough = 20;
+  constexpr int kMinTries = 20;
   std::vector<PointReport> reports;
   {
     const std::lock_guard lock(mutex_);
@@ -219,12 +220,13 @@ void Mapper::ApplyReports() {
     record->seen_outlier += report.outlier;
     record->not_found += report.not_found;
     const int tries = record->seen_inlier + record->seen_outlier + record->not_found;
-    // A point that is found in the wrong place, or that was never found beyond its two first views, harms.
-    const bool wrong = record->seen_outlier > kEnough && record->seen_outlier > record->seen_inlier;
+    // Points that are mostly matched in the wrong place, or never beyond their first two views, harm
+    // tracking.
+    const bool wrong = record->seen_outlier > kMinTries && record->seen_outlier > record->seen_inlier;
     const std::size_t first_views = record->point.infinite() ? 1 : 2;
-    const bool phantom =
-        tries > kEnough && record->observers.size() <= first_views && record->seen_inlier * 5 < tries;
-    if (wrong || phantom) map_.RemovePoint(report.point);
+    const bool unconfirmed =
+        tries > kMinTries && record->observers.size() <= first_views && record->seen_inlier * 5 < tries;
+    if (wrong || unconfirmed) map_.RemovePoint(report.point);
   }
 }
 
@@ -269,15 +271,16 @@ void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecor
   }
   PlanConversions(id);
   newest_ = id;
-  loops_.Look(id);
+  loops_.Enqueue(id);
   ++keyframes_since_global_;
   locally_adjusted_ = false;
   Publish();
   if (candidate.choice == KeyFrameChoice::kLocalizedPanorama) {
-    Tell(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " directions");
+    AddEvent(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " infinite points");
   } else {
-    Tell(MapperEvent::Kind::kKeyFrame, candidate.time,
-         std::to_string(created.size()) + " new points, " + std::to_string(map_.AlivePoints()) + " in all");
+    AddEvent(
+        MapperEvent::Kind::kKeyFrame, candidate.time,
+        std::to_string(created.size()) + " new points, " + std::to_string(map_.AlivePoints()) + " in total");
   }
 }
 
@@ -294,7 +297,7 @@ std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
     const Rigid3& pose = map_.FindKeyFrame(other)->keyframe.camera_from_map;
     const double baseline = (pose.OriginInSource() - center).norm() / record.keyframe.mean_depth;
     if (baseline < options_.min_partner_baseline || baseline > options_.max_partner_baseline) continue;
-    // Much overlap for matching, a baseline of about 0.15 depths for triangulating.
+    // Large overlap helps matching; a baseline of about 0.15 depths helps triangulation.
     const double fit = std::min(baseline / 0.15, 0.15 / baseline);
     scored.push_back({-shared * std::sqrt(fit), other});
   }
@@ -308,10 +311,10 @@ std::vector<KeyFrameId> Mapper::Partners(KeyFrameId id) {
   return partners;
 }
 
-void Mapper::KeepImages(Task* task) const {
+void Mapper::StoreImages(Task* task) const {
   if (!options_.images) return;
   const auto keep = [this](std::shared_ptr<const ImageFeatures>* features) {
-    *features = options_.images->Keep(std::move(*features));
+    *features = options_.images->Store(std::move(*features));
   };
   if (auto* candidate = std::get_if<KeyFrameCandidate>(task)) {
     keep(&candidate->features);
@@ -323,7 +326,7 @@ void Mapper::KeepImages(Task* task) const {
 }
 
 void Mapper::MatchNewPoints() {
-  // New points are looked for in the keyframes that share most with the newest one.
+  // New points are searched in the keyframes that share most points with the newest one.
   constexpr std::size_t kNeighbours = 8;
   if (newest_ != kNoId) {
     auto neighbours = map_.Covisible(newest_);
@@ -341,7 +344,7 @@ void Mapper::LocalAdjustment() {
 }
 
 void Mapper::GlobalAdjustment() {
-  // No time needs more memory than this one.
+  // The global adjustment has the highest memory use of all tasks.
   searcher_.Release();
   if (options_.images) options_.images->EvictAll();
   MapAdjustmentOptions adjustment = options_.adjustment;
@@ -349,17 +352,18 @@ void Mapper::GlobalAdjustment() {
   const BundleSummary summary = AdjustGlobally(adjustment, &interrupt_, &map_);
   global_interrupted_ = summary.outcome == BundleSummary::Outcome::kInterrupted;
   if (global_interrupted_) return;
-  // The error of a loop sinks into the map slowly: on as long as it becomes clearly less, and then once more
-  // as ever. To give up early would be to take the seam for outliers, and tear it open again.
-  constexpr double kClearlyLess = 0.9;
+  // The remaining error of a loop takes several adjustments: rounds with Huber's loss while the cost
+  // decreases considerably, then one with the standard loss. Switching too early would reject the
+  // observations at the seam as outliers and open the loop again.
+  constexpr double kMaxCostRatio = 0.9;
   global_interrupted_ = std::exchange(
-      loop_to_adjust_, loop_to_adjust_ && summary.final_cost < kClearlyLess * summary.initial_cost);
+      loop_to_adjust_, loop_to_adjust_ && summary.final_cost < kMaxCostRatio * summary.initial_cost);
   keyframes_since_global_ = 0;
   culling_due_ = true;
   Publish();
   if (map_.empty()) return;
-  Tell(MapperEvent::Kind::kGlobalAdjustment, map_.keyframes().rbegin()->second.keyframe.time,
-       summary.Brief());
+  AddEvent(MapperEvent::Kind::kGlobalAdjustment, map_.keyframes().rbegin()->second.keyframe.time,
+           summary.Brief());
 }
 
 void Mapper::CullRedundantKeyFrame() {
@@ -370,7 +374,7 @@ void Mapper::CullRedundantKeyFrame() {
   CullKeyFrame(redundant, &map_);
   searcher_.Clear();
   Publish();
-  Tell(MapperEvent::Kind::kKeyFrameRemoved, time, "keyframe " + std::to_string(redundant));
+  AddEvent(MapperEvent::Kind::kKeyFrameRemoved, time, "keyframe " + std::to_string(redundant));
 }
 
 }  // namespace docent::engine

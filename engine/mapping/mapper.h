@@ -26,30 +26,32 @@
 namespace docent::engine {
 
 struct MapperOptions {
-  std::size_t max_queue = 3;           // keyframes waiting (ptamm §2.2)
-  double initial_baseline_m = 0.1;     // ptamm §2.3
-  int partners = 3;                    // keyframes in which a new one's corners are looked for
-  double min_partner_baseline = 0.03;  // of the mean depth
-  double max_partner_baseline = 0.6;
-  int min_initial_points = 60;  // after the first adjustment, else the start is given up
+  std::size_t max_queue = 3;           // keyframes that wait to be inserted (ptamm §2.2)
+  double initial_baseline_m = 0.1;     // distance of the two initial views if it is unknown, ptamm §2.3
+  int partners = 3;                    // keyframes in which the corners of a new keyframe are searched
+  double min_partner_baseline = 0.03;  // ratio of the keyframe's median depth
+  double max_partner_baseline = 0.6;   // ratio of the keyframe's median depth
+  int min_initial_points = 60;  // after the first adjustment; with fewer the initialization is given up
   GuidedMatchingOptions guided_matching;
   PointCreationOptions creation;
   InfinitePointOptions infinite;
   LocalizationOptions localization;
   AppearanceOptions appearance;
   KeyFrameCullingOptions culling;
-  int min_initial_directions = 40;  // in the first image, for a map to begin as a panorama
-  // Of the infinite points: what is seen from two panorama maps is mostly further away (hybrid-slam §5.2).
+  int min_initial_directions = 40;  // infinite points in the first image that start a map as a panorama
+  // Minimum parallax to triangulate infinite points: points that are seen from two panorama maps are mostly
+  // further away (hybrid-slam §5.2).
   double min_infinite_parallax_deg = 1.5;
-  int conversion_partners = 30;  // keyframes in which a localized keyframe's infinite points are looked for
+  // Keyframes in which the infinite points of a localized keyframe are searched.
+  int conversion_partners = 30;
   MapAdjustmentOptions adjustment;
   LoopOptions loops;
   MapJoiningOptions joining;
   SearchOptions search;
-  std::shared_ptr<ImageStore> images;  // where keyframes' images lie; null: in memory
+  std::shared_ptr<ImageStore> images;  // stores the keyframes' images; null: in memory
 };
 
-// What the mapper did, for events and reports.
+// An action of the mapper, for events and reports.
 struct MapperEvent {
   enum class Kind {
     kMapStarted,
@@ -68,41 +70,42 @@ struct MapperEvent {
   std::string detail;
 };
 
-// Seconds of processor time by task.
+// CPU seconds by task.
 struct MapperTimes {
   double bundle_adjustment = 0, panorama_localization = 0, infinite_triangulation = 0, loop_closing = 0,
          other = 0;
   int loops_closed = 0;
-  double max_queue_latency = 0;  // for which a piece of work made an offered keyframe wait
+  double max_queue_latency = 0;  // seconds; longest time that one step delayed an offered keyframe
 };
 
-// Grows and refines one map (ptamm §2.3, Fig. 2b): starts it from two views, takes keyframes in, makes
-// points, adjusts, finds points again. Work is done by Step() on one thread at a time; Offer(), Report(),
-// Snapshot() and the other questions may be asked from any thread. Long adjustments stop when a keyframe is
-// offered.
+// Extends and refines one map (ptamm §2.3, Fig. 2b): initializes it from two views, inserts keyframes,
+// creates points, adjusts, and matches points in existing keyframes. Step() does the work, on one thread at a
+// time; Offer(), Report(), Snapshot() and the other queries may be called from any thread. Long adjustments
+// stop when a keyframe is offered.
 class Mapper {
  public:
   explicit Mapper(const MapperOptions& options);
 
-  // Goes on with a map from the library, or with nothing (null). Drops whatever waits. Not during a Step().
+  // Continues with a map of the library, or with an empty map (null). Discards the queue. Must not be called
+  // during a Step().
   void Adopt(std::shared_ptr<const MapSnapshot> snapshot);
-  // Takes another map into the present one where both show one place (map_joining.h): this one keeps its ids
-  // and coordinates, and what was offered waits on. Without `joined` in the answer nothing has changed. Takes
-  // seconds; not during a Step(). interrupt may be null.
+  // Joins another map with the current one if both show one place (map_joining.h). The current map keeps its
+  // ids and coordinates, and the queue remains. Nothing changes if the result has no `joined` map. Takes
+  // seconds; must not be called during a Step(). interrupt may be null.
   MapJoinAttempt Join(const MapSnapshot& other, const std::atomic<bool>* interrupt);
 
-  // False when the queue is full. Times of one map ascend.
+  // Both return false if the queue is full. The times of the keyframes of one map ascend.
   bool Offer(KeyFrameCandidate candidate);
   bool Start(InitialPair pair);
   void Report(std::vector<PointReport> reports);
   std::size_t QueueLength() const;
 
-  // Does the most urgent piece of work; false when there was none.
+  // Does the most urgent task; false if there was none.
   bool Step();
-  // True while nothing urgent waits: no keyframe, and the newest one is adjusted.
+  // True if nothing urgent waits: no keyframe is queued, and the newest one is adjusted.
   bool IsIdle() const;
 
-  // The newest published state; null while there is no map.
+  // The last published state; null while there is no map.
   std::shared_ptr<const MapSnapshot> Snapshot() const;
   std::vector<MapperEvent> TakeEvents();
   MapperTimes Times() const;
@@ -110,11 +113,12 @@ class Mapper {
  private:
   using Task = std::variant<KeyFrameCandidate, InitialPair>;
 
-  // A dependent panorama keyframe that waits to be localized, and what the map knew when that was last tried.
+  // A dependent panorama keyframe that is not localized yet, and the number of finite points at the last
+  // attempt.
   struct Unlocalized {
     KeyFrameId keyframe = kNoId;
     std::size_t tried_with_points = 0;
-    bool appearance_due = false;  // active search failed; its looks have not been asked yet
+    bool appearance_due = false;  // active search failed, and descriptor matching has not been tried since
   };
 
   void ResumeFrom(const MapSnapshot* snapshot);
@@ -125,34 +129,34 @@ class Mapper {
   void InsertKeyFrame(const KeyFrameCandidate& candidate);
   void InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecord* record);
   void InsertPanorama(const KeyFrameCandidate& candidate);
-  // Tries one waiting panorama keyframe, of those that were never tried or of the others; false when none is
-  // worth trying.
+  // Both try to localize one panorama keyframe: LocalizeNew one that was never tried, LocalizeAgain one of
+  // the others. They return false if there is none worth trying.
   bool LocalizeNew();
   bool LocalizeAgain();
   void TryToLocalize(Unlocalized* waiting, std::size_t finite);
   std::size_t CountFinite() const;
   // guess: see LocalizePanoramaKeyFrame.
   bool Localize(KeyFrameId keyframe, const Rigid3* guess);
-  // Appearance for the infinite points of one pair of keyframes; false when no pair waits.
+  // Triangulates the infinite points of one pair of keyframes; false if no pair waits.
   bool ConvertOne();
   void PlanConversions(KeyFrameId keyframe);
-  bool IsFinite() const;  // the map knows depth
+  bool IsFinite() const;  // the map has finite points
   void ApplyReports();
   std::vector<KeyFrameId> Partners(KeyFrameId keyframe);
   void MatchNewPoints();
   void LocalAdjustment();
   void GlobalAdjustment();
-  // The most urgent step towards closing a loop; false when there is none.
+  // Does the most urgent step towards closing a loop; false if there is none.
   bool WorkOnLoops();
-  void KeepImages(Task* task) const;
-  // A candidate as it would have been offered had it been tracked in the map as it is now.
-  KeyFrameCandidate UpToDate(KeyFrameCandidate candidate) const;
+  void StoreImages(Task* task) const;
+  // The candidate with the corrections applied that the map received since the pose was estimated.
+  KeyFrameCandidate WithCorrections(KeyFrameCandidate candidate) const;
   void CullRedundantKeyFrame();  // removes one redundant keyframe
   void Publish();
-  void Tell(MapperEvent::Kind kind, Timestamp time, std::string detail);
+  void AddEvent(MapperEvent::Kind kind, Timestamp time, std::string detail);
 
   const MapperOptions options_;
-  // Touched by the stepping thread alone.
+  // The members down to the atomics are used by the stepping thread only.
   Map map_;
   PointSearcher searcher_;
   MapDescriptors descriptors_;
@@ -161,14 +165,14 @@ class Mapper {
   std::vector<Unlocalized> to_localize_;
   std::deque<std::pair<KeyFrameId, KeyFrameId>> to_convert_;  // (reference, partner)
   LoopCloser loops_;
-  bool loop_to_adjust_ = false;  // by the next global adjustment
+  bool loop_to_adjust_ = false;  // the next global adjustment follows a loop
   std::size_t keyframes_since_global_ = 0;
-  bool global_interrupted_ = false;  // or due for another reason
-  bool culling_due_ = false;         // the map has settled since keyframes were last looked through
+  bool global_interrupted_ = false;  // a global adjustment was interrupted, or is due for another reason
+  bool culling_due_ = false;         // the map was adjusted since keyframes were last checked for redundancy
 
   std::atomic<bool> interrupt_{false};
   std::atomic<bool> locally_adjusted_{true};
-  mutable std::mutex mutex_;  // guards what follows; held for copies of pointers and small lists only
+  mutable std::mutex mutex_;  // guards the members below; held only while pointers and small lists are copied
   std::deque<Task> queue_;
   std::optional<std::chrono::steady_clock::time_point> offered_during_step_;
   bool stepping_ = false;

@@ -12,8 +12,8 @@ bool Mapper::WorkOnLoops() {
     case LoopCloser::Progress::kMoved: {
       searcher_.Clear();
       Publish();
-      Tell(MapperEvent::Kind::kLoopClosed, map_.FindKeyFrame(loops_.closed_by())->keyframe.time,
-           loops_.report());
+      AddEvent(MapperEvent::Kind::kLoopClosed, map_.FindKeyFrame(loops_.closed_by())->keyframe.time,
+               loops_.report());
       const std::lock_guard lock(mutex_);
       ++times_.loops_closed;
       break;
@@ -26,13 +26,13 @@ bool Mapper::WorkOnLoops() {
   return true;
 }
 
-KeyFrameCandidate Mapper::UpToDate(KeyFrameCandidate candidate) const {
+KeyFrameCandidate Mapper::WithCorrections(KeyFrameCandidate candidate) const {
   if (candidate.map_revision == 0) return candidate;
   for (const auto& correction : map_.corrections()) {
     if (correction->revision <= candidate.map_revision) continue;
     const auto moved = correction->after_from_before.find(candidate.reference_keyframe);
     if (moved != correction->after_from_before.end())
-      candidate.camera_from_map = CarriedAlong(candidate.camera_from_map, moved->second);
+      candidate.camera_from_map = CorrectedPose(candidate.camera_from_map, moved->second);
   }
   return candidate;
 }

@@ -19,8 +19,8 @@ void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
   keyframe.time = candidate.time;
   keyframe.camera = candidate.camera;
   keyframe.features = candidate.features;
-  // Where it really stood is not known (hybrid-slam §2): near the reference's centre, as far off as the turn
-  // of a camera in the hand took it.
+  // The true position of the camera is unknown (hybrid-slam §2). It is near the centre of the reference, up
+  // to the displacement that rotating a hand-held camera causes.
   keyframe.camera_from_map = candidate.camera_from_map;
   keyframe.mean_depth = reference.mean_depth;
   keyframe.depth_sigma = reference.depth_sigma;
@@ -36,10 +36,11 @@ void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
     }
   }
   const int rays = AddInfinitePoints(options_.infinite, id, taken, &map_);
-  DropInfiniteOutliers(candidate.panorama, &map_);
+  RemoveInfiniteOutliers(candidate.panorama, &map_);
   to_localize_.push_back({id});
   Publish();
-  Tell(MapperEvent::Kind::kPanoramaKeyFrame, candidate.time, std::to_string(rays) + " new directions");
+  AddEvent(MapperEvent::Kind::kPanoramaKeyFrame, candidate.time,
+           std::to_string(rays) + " new infinite points");
 }
 
 std::size_t Mapper::CountFinite() const {
@@ -70,7 +71,7 @@ bool Mapper::LocalizeNew() {
 
 bool Mapper::LocalizeAgain() {
   if (to_localize_.empty()) return false;
-  // Worth another try when the map has grown.
+  // Localization is retried when the number of finite points has grown by this factor.
   constexpr double kGrowth = 1.1;
   const std::size_t finite = CountFinite();
   for (Unlocalized& waiting : to_localize_) {
@@ -78,7 +79,7 @@ bool Mapper::LocalizeAgain() {
     TryToLocalize(&waiting, finite);
     return true;
   }
-  // Where active search saw nothing, its pose may be too far off: what looks like its corners says another.
+  // If active search failed, the pose may be too far off; matching descriptors does not depend on it.
   const auto due = std::find_if(to_localize_.begin(), to_localize_.end(),
                                 [](const Unlocalized& waiting) { return waiting.appearance_due; });
   if (due == to_localize_.end()) return false;
@@ -95,18 +96,18 @@ bool Mapper::Localize(KeyFrameId id, const Rigid3* guess) {
   if (!LocalizePanoramaKeyFrame(options_.localization, id, id + 1, &map_, &searcher_, guess)) return false;
   PlanConversions(id);
   newest_ = id;
-  loops_.Look(id);
+  loops_.Enqueue(id);
   ++keyframes_since_global_;
   locally_adjusted_ = false;
   Publish();
-  Tell(MapperEvent::Kind::kLocalized, map_.FindKeyFrame(id)->keyframe.time,
-       "keyframe " + std::to_string(id) + (guess != nullptr ? ", by its looks" : ""));
+  AddEvent(MapperEvent::Kind::kLocalized, map_.FindKeyFrame(id)->keyframe.time,
+           "keyframe " + std::to_string(id) + (guess != nullptr ? ", by its descriptors" : ""));
   return true;
 }
 
 void Mapper::PlanConversions(KeyFrameId id) {
-  // Pairs with this keyframe that look the same way from places far enough apart.
-  constexpr double kMaxTurn = 0.8;  // radians
+  // Pairs of this keyframe with others that have a similar orientation and a sufficient baseline.
+  constexpr double kMaxRotation = 0.8;  // radians
   const KeyFrame& keyframe = map_.FindKeyFrame(id)->keyframe;
   const Eigen::Vector3d center = keyframe.camera_from_map.OriginInSource();
   std::vector<std::pair<double, std::pair<KeyFrameId, KeyFrameId>>> pairs;
@@ -115,11 +116,11 @@ void Mapper::PlanConversions(KeyFrameId id) {
     const double depth = std::min(record.keyframe.mean_depth, keyframe.mean_depth);
     const double baseline = (record.keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
     if (baseline < options_.min_partner_baseline || baseline > 2 * options_.max_partner_baseline) continue;
-    const double turn =
+    const double rotation =
         (keyframe.camera_from_map.rotation * record.keyframe.camera_from_map.rotation.inverse()).Angle();
-    if (turn > kMaxTurn) continue;
-    if (record.keyframe.panorama != kNoId) pairs.push_back({turn, {other, id}});
-    if (keyframe.panorama != kNoId) pairs.push_back({turn, {id, other}});
+    if (rotation > kMaxRotation) continue;
+    if (record.keyframe.panorama != kNoId) pairs.push_back({rotation, {other, id}});
+    if (keyframe.panorama != kNoId) pairs.push_back({rotation, {id, other}});
   }
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -138,9 +139,9 @@ bool Mapper::ConvertOne() {
   if (conversion.converted.empty() && conversion.merged == 0) return true;
   to_match_.insert(to_match_.end(), conversion.converted.begin(), conversion.converted.end());
   Publish();
-  Tell(MapperEvent::Kind::kConverted, map_.FindKeyFrame(partner)->keyframe.time,
-       std::to_string(conversion.converted.size()) + " directions became points, " +
-           std::to_string(conversion.merged) + " were known");
+  AddEvent(MapperEvent::Kind::kConverted, map_.FindKeyFrame(partner)->keyframe.time,
+           std::to_string(conversion.converted.size()) + " infinite points triangulated, " +
+               std::to_string(conversion.merged) + " fused");
   return true;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the mapper's map begins: with two views that have depth, or with one that shows directions alone.
+// Starting the mapper's map: from two views with depth, or from one view that gives only infinite points.
 #include <algorithm>
 #include <string>
 #include <utility>
@@ -9,7 +9,7 @@
 namespace docent::engine {
 
 void Mapper::StartMap(const InitialPair& pair) {
-  // A map of directions alone gains depth; any other is begun anew.
+  // A map of infinite points only is extended by depth; any other map is replaced.
   const bool panorama = !map_.panoramas().empty() && !IsFinite();
   const Map before = panorama ? map_ : Map();
   if (!panorama) map_ = Map();
@@ -17,13 +17,13 @@ void Mapper::StartMap(const InitialPair& pair) {
   descriptors_.Clear();
   to_match_.clear();
   to_convert_.clear();
-  loops_.Begin();
+  loops_.Reset();
   keyframes_since_global_ = 0;
   const double scale = pair.baseline_m > 0 ? pair.baseline_m : options_.initial_baseline_m;
   Rigid3 b_from_a = pair.geometry.b_from_a;
   b_from_a.translation *= scale / b_from_a.translation.norm();
 
-  // The first view may be a keyframe already; and it holds the map's frame from now on.
+  // The first view may be a keyframe already. From now on it defines the coordinate frame of the map.
   KeyFrameId a = kNoId;
   for (auto& [id, record] : map_.keyframes()) {
     record.keyframe.fixed = false;
@@ -62,31 +62,32 @@ void Mapper::StartMap(const InitialPair& pair) {
   newest_ = b;
   AdjustGlobally(options_.adjustment, nullptr, &map_);
   for (auto& [id, record] : map_.keyframes()) map_.UpdateDepth(&record);
-  // The first corners are few; the rest of the image joins at once, from both sides.
+  // The initial corners are few, so more points are created at once, from both sides.
   CreatePoints(options_.creation, b, a, &map_, &searcher_);
   CreatePoints(options_.creation, a, b, &map_, &searcher_);
   AdjustGlobally(options_.adjustment, nullptr, &map_);
-  const auto agreeing =
+  const auto finite_points =
       std::count_if(map_.points().begin(), map_.points().end(),
                     [](const Map::PointRecord& record) { return record.alive && !record.point.infinite(); });
-  if (agreeing < options_.min_initial_points) {
-    Tell(MapperEvent::Kind::kStartFailed, pair.b.time, "only " + std::to_string(agreeing) + " points agree");
+  if (finite_points < options_.min_initial_points) {
+    AddEvent(MapperEvent::Kind::kStartFailed, pair.b.time,
+             "only " + std::to_string(finite_points) + " points are consistent");
     map_ = before;
     searcher_.Clear();
     newest_ = kNoId;
-    if (panorama) return;  // what was published goes on
+    if (panorama) return;  // the published panorama map stays
     const std::lock_guard lock(mutex_);
     snapshot_.reset();
     return;
   }
-  DropInfiniteTwins(a, &map_);
+  RemoveDuplicateInfinitePoints(a, &map_);
   if (panorama) to_convert_.emplace_back(a, b);
   locally_adjusted_ = true;
   Publish();
-  Tell(MapperEvent::Kind::kMapStarted, pair.b.time, std::to_string(agreeing) + " points");
+  AddEvent(MapperEvent::Kind::kMapStarted, pair.b.time, std::to_string(finite_points) + " points");
 }
 
-// A map without depth yet: its first keyframe is the reference of a panorama map, and stands at the origin.
+// A map without finite points: its first keyframe is the reference of a panorama map, at the origin.
 void Mapper::StartFromPanorama(const KeyFrameCandidate& candidate) {
   KeyFrame keyframe;
   keyframe.fixed = true;
@@ -97,12 +98,12 @@ void Mapper::StartFromPanorama(const KeyFrameCandidate& candidate) {
   map_.OpenPanorama(id);
   const int rays = AddInfinitePoints(options_.infinite, id, {}, &map_);
   if (rays < options_.min_initial_directions) {
-    map_ = Map();  // a dark or empty image; the next one may be better
+    map_ = Map();  // the image is too dark or has too little texture; the next one may be better
     return;
   }
   newest_ = id;
   Publish();
-  Tell(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " directions");
+  AddEvent(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " infinite points");
 }
 
 }  // namespace docent::engine

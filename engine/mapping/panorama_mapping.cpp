@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kCellsAcross = 4;
 
-// A finite point found in the keyframe.
+// A finite point that was found in the keyframe.
 struct Found {
   MapPointId point;
   Eigen::Vector2f pixel;
@@ -49,7 +49,8 @@ int OccupiedCells(const std::vector<Eigen::Vector2f>& pixels, const CameraModel&
   return static_cast<int>(cells.count());
 }
 
-// The RANSAC inliers of `found`, as measurements; empty where no pose has enough.
+// The pose from RANSAC over `found`, which is reduced to the inliers; their measurements are appended. Empty
+// if no pose has enough inliers.
 std::optional<Rigid3> PoseFrom(const LocalizationOptions& options, const KeyFrame& keyframe, Map* map,
                                std::uint64_t seed, std::vector<Found>* found,
                                std::vector<PoseMeasurement>* measurements) {
@@ -81,7 +82,7 @@ std::optional<Rigid3> PoseFrom(const LocalizationOptions& options, const KeyFram
   return pose->camera_from_map;
 }
 
-bool IsSure(const LocalizationOptions& options, const PoseRefinement& refined, double mean_depth) {
+bool IsReliable(const LocalizationOptions& options, const PoseRefinement& refined, double mean_depth) {
   if (!refined.converged || refined.sigma > options.max_sigma || refined.inliers < options.min_inliers)
     return false;
   const double variance = refined.covariance.topLeftCorner<3, 3>().trace();
@@ -152,7 +153,7 @@ bool LocalizePanoramaKeyFrame(const LocalizationOptions& options, KeyFrameId id,
   if (depths.empty()) return false;
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
-  if (!IsSure(options, refined, *middle) ||
+  if (!IsReliable(options, refined, *middle) ||
       OccupiedCells(pixels, *record->keyframe.camera) < options.min_cells)
     return false;
 
@@ -163,11 +164,11 @@ bool LocalizePanoramaKeyFrame(const LocalizationOptions& options, KeyFrameId id,
     map->AddObservation({id, found[i].point, found[i].pixel, static_cast<std::uint8_t>(found[i].level)});
   }
   map->UpdateDepth(record);
-  DropInfiniteTwins(id, map);
+  RemoveDuplicateInfinitePoints(id, map);
   return true;
 }
 
-int DropInfiniteTwins(KeyFrameId id, Map* map) {
+int RemoveDuplicateInfinitePoints(KeyFrameId id, Map* map) {
   constexpr float kSamePx = 2.0f;  // of the infinite point's level
   const Map::KeyFrameRecord* record = map->FindKeyFrame(id);
   if (!record) return 0;
@@ -195,9 +196,9 @@ int DropInfiniteTwins(KeyFrameId id, Map* map) {
   return dropped;
 }
 
-int DropInfiniteOutliers(PanoramaId panorama, Map* map) {
-  // Of the level; what a camera that is taken to turn about a point moves beside it shifts all of an image
-  // alike, and less than this between keyframes that see the same point.
+int RemoveInfiniteOutliers(PanoramaId panorama, Map* map) {
+  // In pixels of the level. The translation of a camera that is assumed to rotate about its centre shifts the
+  // whole image alike, by less than this between keyframes that see the same point.
   constexpr double kMaxErrorPx = 6;
   std::vector<Observation> outliers;
   for (const auto& [id, record] : map->keyframes()) {

@@ -10,13 +10,13 @@ PanoramaRegistration::PanoramaRegistration(const Map& map) {
 }
 
 void PanoramaRegistration::Follow(Map* map) const {
-  // What a keyframe saw in the map before is what it sees in the map after: after_from_before.
+  // after_from_before keeps every point at the same place relative to the keyframe.
   std::map<PanoramaId, Rigid3> after_from_before;
   for (const PanoramaMap& panorama : map->panoramas()) {
     const auto before = reference_from_map_.find(panorama.id);
     if (before == reference_from_map_.end()) continue;
     const Rigid3& after = map->FindKeyFrame(panorama.reference)->keyframe.camera_from_map;
-    // One that was not moved keeps its points to the last bit.
+    // If the reference did not move, the points stay bitwise equal.
     if (after.translation == before->second.translation &&
         after.rotation.quaternion().coeffs() == before->second.rotation.quaternion().coeffs())
       continue;

@@ -7,10 +7,10 @@
 
 namespace docent::engine {
 
-// Keeps panorama maps registered in the 3D map while their reference keyframes are moved (hybrid-slam §5.3):
-// made before the poses change, Follow() afterwards moves the dependent keyframes with their reference, and
-// turns the infinite points to where the keyframes now see them. Rotations within a panorama map stay as they
-// are. For the mapper's thread.
+// Keeps panorama maps registered in the 3D map while their reference keyframes move (hybrid-slam §5.3).
+// Constructed before the poses change; Follow() afterwards moves the dependent keyframes with their reference
+// and updates the directions of the infinite points. Relative rotations within a panorama map do not change.
+// For the mapper's thread.
 class PanoramaRegistration {
  public:
   explicit PanoramaRegistration(const Map& map);

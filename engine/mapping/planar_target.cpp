@@ -18,18 +18,19 @@ namespace docent::engine {
 
 namespace {
 
-constexpr int kMinSide = 64;  // of an image that features are extracted from
+constexpr int kMinSide = 64;  // pixels, of an image for which features are computed
 constexpr std::size_t kMinDescriptors = 100;
-constexpr double kElsewhere_px = 8;  // of the model: further apart are two places
-// A descriptor is kept in several leaves and looked for in more: finds nearly what comparing with all does.
-constexpr std::size_t kKeptLeaves = 4, kSearchedLeaves = 8;
-constexpr int kPointsALevel = 250;
+constexpr double kDistinct_px = 8;  // of the model: descriptors further apart belong to different points
+// A descriptor is stored in several leaves and searched in more; this finds nearly all that an exhaustive
+// comparison would.
+constexpr std::size_t kStoredLeaves = 4, kSearchedLeaves = 8;
+constexpr int kPointsPerLevel = 250;
 constexpr float kMinPointScore = 60;  // Shi-Tomasi, grey values squared
 
 // Whole-pixel local maxima of the Shi-Tomasi score on a grid, best first.
-std::vector<Corner> SpreadPoints(const ImageFeatures& features) {
+std::vector<Corner> SelectPoints(const ImageFeatures& features) {
   const cv::Mat& image = features.levels[0];
-  const double cell = std::max(5.0, std::sqrt(static_cast<double>(image.total()) / (1.5 * kPointsALevel)));
+  const double cell = std::max(5.0, std::sqrt(static_cast<double>(image.total()) / (1.5 * kPointsPerLevel)));
   const int columns = static_cast<int>(image.cols / cell) + 1, rows = static_cast<int>(image.rows / cell) + 1;
   struct Scored {
     float score = kMinPointScore;
@@ -50,17 +51,18 @@ std::vector<Corner> SpreadPoints(const ImageFeatures& features) {
   return corners;
 }
 
-// Keeps the matches that are turned like most others: true ones agree to within what slant does.
+// Keeps the matches whose rotation agrees with the most common one. True matches differ only by the effect of
+// slant.
 template <class Match>
-void KeepCommonTurn(std::vector<Match>* matches) {
+void KeepConsistentRotations(std::vector<Match>* matches) {
   constexpr std::size_t kBins = 24;
-  constexpr float kTurn = 2 * std::numbers::pi_v<float>;
+  constexpr float kFullTurn = 2 * std::numbers::pi_v<float>;
   std::array<int, kBins> votes{};
-  const auto bin_of = [](float turn) {
-    const float part = turn / kTurn - std::floor(turn / kTurn);
+  const auto bin_of = [](float rotation) {
+    const float part = rotation / kFullTurn - std::floor(rotation / kFullTurn);
     return std::min(static_cast<std::size_t>(part * kBins), kBins - 1);
   };
-  for (const Match& match : *matches) ++votes[bin_of(match.turn_rad)];
+  for (const Match& match : *matches) ++votes[bin_of(match.rotation_rad)];
   std::size_t best = 0;
   int most = -1;
   for (std::size_t i = 0; i < kBins; ++i) {
@@ -71,14 +73,14 @@ void KeepCommonTurn(std::vector<Match>* matches) {
     }
   }
   std::erase_if(*matches, [&](const Match& match) {
-    const std::size_t apart = (bin_of(match.turn_rad) + kBins - best) % kBins;
+    const std::size_t apart = (bin_of(match.rotation_rad) + kBins - best) % kBins;
     return apart > 3 && apart < kBins - 3;
   });
 }
 
-// The other pose from which a distant plane looks nearly the same: tilted to the other side of the line of
+// The second pose from which a distant plane looks nearly the same: tilted to the other side of the line of
 // sight (Schweighofer and Pinz 2006).
-Rigid3 TiltedOtherWay(const Rigid3& camera_from_target) {
+Rigid3 MirroredPose(const Rigid3& camera_from_target) {
   const Eigen::Vector3d sight = camera_from_target.translation.normalized();
   return {Rotation3::Exp(std::numbers::pi * sight) * camera_from_target.rotation *
               Rotation3::Exp(Eigen::Vector3d(0, 0, std::numbers::pi)),
@@ -90,10 +92,10 @@ Rigid3 TiltedOtherWay(const Rigid3& camera_from_target) {
 PlanarTarget::PlanarTarget(const cv::Mat& gray, double width_m, const PlanarTargetOptions& options)
     : options_(options), width_m_(width_m) {
   if (!(width_m > 0) || !std::isfinite(width_m))
-    throw Error("The width of a target is a positive number of metres.");
+    throw Error("The width of the target must be a positive number of metres.");
   if (gray.cols < kMinSide || gray.rows < kMinSide) {
-    throw Error("A target's image has at least " + std::to_string(kMinSide) +
-                " pixels on each side, and this one " + std::to_string(gray.cols) + " by " +
+    throw Error("The target image must have at least " + std::to_string(kMinSide) +
+                " pixels on each side; this one has " + std::to_string(gray.cols) + " by " +
                 std::to_string(gray.rows) + ".");
   }
   height_m_ = width_m * gray.rows / gray.cols;
@@ -110,17 +112,18 @@ PlanarTarget::PlanarTarget(const cv::Mat& gray, double width_m, const PlanarTarg
     cv::resize(finer(cv::Rect(cv::Point(), half * 2)), levels_[level], half, 0, 0, cv::INTER_AREA);
   }
   MakePoints();
-  // Frames have levels a factor two apart and descriptors bear a third more or less: steps of a square root
-  // of two down to where the target is small, and the same seen aslant from eight sides.
+  // The levels of a frame are a factor of two apart, and descriptors tolerate a scale change of about a
+  // third. Views are therefore described in scale steps of a square root of two down to where the target is
+  // small, and also slanted in four directions.
   for (const double scale : {1.0, 0.71, 0.5, 0.35, 0.25}) {
     DescribeView(scale, 1, 0);
     if (scale < 0.3) continue;
     for (int side = 0; side < 4; ++side) DescribeView(scale, 0.6, side * std::numbers::pi / 4);
   }
   if (descriptors_.size() < kMinDescriptors)
-    throw Error("This image shows too little detail to be found by; choose one with many corners all over.");
+    throw Error("This image has too little detail to be detected; choose one with many corners all over.");
   leaves_.resize(VocabularyTree::kLeaves);
-  std::array<std::uint32_t, kKeptLeaves> leaves;
+  std::array<std::uint32_t, kStoredLeaves> leaves;
   for (std::uint32_t i = 0; i < descriptors_.size(); ++i) {
     const std::size_t count = DefaultVocabulary().NearestLeaves(descriptors_[i].descriptor, leaves);
     for (std::size_t k = 0; k < count; ++k) leaves_[leaves[k]].push_back(i);
@@ -131,14 +134,14 @@ void PlanarTarget::MakePoints() {
   std::uint32_t id = 0;
   for (std::size_t level = 0; level < kModelLevels; ++level) {
     if (levels_[level].cols < kMinSide || levels_[level].rows < kMinSide) break;
-    for (const Corner& corner : SpreadPoints(*MakeFeatures(levels_[level]))) {
+    for (const Corner& corner : SelectPoints(*MakeFeatures(levels_[level]))) {
       points_[level].push_back(
           {id++, LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), static_cast<int>(level))});
     }
   }
 }
 
-void PlanarTarget::DescribeView(double scale, double squeeze, double squeeze_rad) {
+void PlanarTarget::DescribeView(double scale, double shortening, double shortening_rad) {
   const cv::Mat& model = levels_[0];
   const cv::Size size(static_cast<int>(model.cols * scale), static_cast<int>(model.rows * scale));
   if (size.width < kMinSide || size.height < kMinSide) return;
@@ -148,25 +151,25 @@ void PlanarTarget::DescribeView(double scale, double squeeze, double squeeze_rad
                               static_cast<double>(size.height) / model.rows);
   Eigen::Matrix2d slant = Eigen::Matrix2d::Identity();
   const Eigen::Vector2d middle(0.5 * (size.width - 1), 0.5 * (size.height - 1));
-  if (squeeze < 1) {
-    const Eigen::Vector2d along(std::cos(squeeze_rad), std::sin(squeeze_rad));
-    slant -= (1 - squeeze) * along * along.transpose();
+  if (shortening < 1) {
+    const Eigen::Vector2d along(std::cos(shortening_rad), std::sin(shortening_rad));
+    slant -= (1 - shortening) * along * along.transpose();
     const Eigen::Vector2d offset = middle - slant * middle;
     const cv::Matx23d warp(slant(0, 0), slant(0, 1), offset.x(), slant(1, 0), slant(1, 1), offset.y());
     cv::Mat smooth;
-    cv::GaussianBlur(view, smooth, {}, 0.6);  // what is squeezed would alias
+    cv::GaussianBlur(view, smooth, {}, 0.6);  // prevents aliasing in the shortened direction
     cv::warpAffine(smooth, view, warp, size, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   }
   CornerDescriptionOptions corners = options_.corners;
-  corners.corners = {static_cast<int>((squeeze < 1 ? 280 : 400) * scale) + 40, 0, 0, 0};
+  corners.corners = {static_cast<int>((shortening < 1 ? 280 : 400) * scale) + 40, 0, 0, 0};
   const Eigen::Matrix2d back = slant.inverse();
-  for (const DescribedPlace& place : DescribeCorners(*MakeFeatures(view), corners)) {
+  for (const DescribedKeypoint& place : DescribeCorners(*MakeFeatures(view), corners)) {
     const Eigen::Vector2d in_scaled = middle + back * (place.pixel.cast<double>() - middle);
     const Eigen::Vector2d pixel = (in_scaled.array() + 0.5) / scales - 0.5;
-    // Beyond the image's edge there is but its smear.
+    // Beyond the edge of the image there are only replicated pixels.
     if (pixel.x() < 4 || pixel.y() < 4 || pixel.x() > model.cols - 5 || pixel.y() > model.rows - 5) continue;
-    const double turn = place.oriented.direction_rad;
-    const Eigen::Vector2d direction = back * Eigen::Vector2d(std::cos(turn), std::sin(turn));
+    const double angle = place.oriented.direction_rad;
+    const Eigen::Vector2d direction = back * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     descriptors_.push_back(
         {place.oriented.descriptor, pixel, static_cast<float>(std::atan2(direction.y(), direction.x()))});
   }
@@ -181,7 +184,7 @@ std::vector<PlanarTarget::DescriptorMatch> PlanarTarget::MatchDescriptors(
     const ImageFeatures& features) const {
   std::vector<DescriptorMatch> matches;
   std::array<std::uint32_t, kSearchedLeaves> leaves;
-  for (const DescribedPlace& place : DescribeCorners(features, options_.corners)) {
+  for (const DescribedKeypoint& place : DescribeCorners(features, options_.corners)) {
     int best = std::numeric_limits<int>::max(), second = best;
     const ModelDescriptor* nearest = nullptr;
     const std::size_t count = DefaultVocabulary().NearestLeaves(place.oriented.descriptor, leaves);
@@ -191,7 +194,7 @@ std::vector<PlanarTarget::DescriptorMatch> PlanarTarget::MatchDescriptors(
         const int distance = SquaredDistance(place.oriented.descriptor, candidate.descriptor);
         if (distance >= second) continue;
         const bool same_place =
-            nearest && (candidate.pixel - nearest->pixel).squaredNorm() < kElsewhere_px * kElsewhere_px;
+            nearest && (candidate.pixel - nearest->pixel).squaredNorm() < kDistinct_px * kDistinct_px;
         if (distance < best) {
           if (!same_place) second = best;
           best = distance;
@@ -205,7 +208,7 @@ std::vector<PlanarTarget::DescriptorMatch> PlanarTarget::MatchDescriptors(
     matches.push_back(
         {place.pixel.cast<double>(), nearest->pixel, place.oriented.direction_rad - nearest->direction_rad});
   }
-  KeepCommonTurn(&matches);
+  KeepConsistentRotations(&matches);
   return matches;
 }
 
@@ -226,14 +229,14 @@ std::optional<TargetDetection> PlanarTarget::Detect(const ImageFeatures& feature
   options.seed = seed;
   const auto consensus = EstimateAbsolutePose(rays, points, options);
   if (!consensus) return std::nullopt;
-  auto sighting = Align(features, camera, consensus->camera_from_map);
-  // A plane far away has two poses that look nearly alike: alignment from either tells which fits.
+  auto detection = Align(features, camera, consensus->camera_from_map);
+  // A distant plane has two poses that look nearly alike; alignment from both shows which one fits better.
   const auto other = Align(
-      features, camera, TiltedOtherWay(sighting ? sighting->camera_from_target : consensus->camera_from_map));
-  const auto evidence = [](const std::optional<TargetDetection>& s) {
+      features, camera, MirroredPose(detection ? detection->camera_from_target : consensus->camera_from_map));
+  const auto score = [](const std::optional<TargetDetection>& s) {
     return s ? static_cast<double>(s->points.size()) / (0.1 + s->rms_px) : 0.0;
   };
-  return evidence(other) > evidence(sighting) ? other : sighting;
+  return score(other) > score(detection) ? other : detection;
 }
 
 }  // namespace docent::engine

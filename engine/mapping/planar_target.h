@@ -16,21 +16,21 @@
 namespace docent::engine {
 
 struct PlanarTargetOptions {
-  int model_size_px = 480;          // longer side that the image is reduced to
+  int model_size_px = 480;          // longer side to which the image is reduced
   CornerDescriptionOptions corners  // of the frame, for detection
       = {.corners = {300, 200, 120, 60}, .min_score = 20};
-  int max_distance = 60000;  // squared, of matched descriptors
-  double max_ratio = 0.64;   // of squared distances, against the best one elsewhere on the target
-  int min_matches = 7;       // that agree on a pose, before alignment is asked
-  double consensus_px = 4;   // corners of coarse levels lie this far off
-  int points_a_stage = 120;  // aligned at most
-  float min_correlation = 0.75f;
-  double aligned_px = 2.0;        // residual at which an aligned point counts as inlier
-  int min_inliers = 20;           // of aligned points
-  double min_inlier_ratio = 0.4;  // of the points that should be seen
+  int max_distance = 60000;        // largest squared distance of matched descriptors
+  double max_ratio = 0.64;         // of squared distances: best to best elsewhere on the target
+  int min_matches = 7;             // that agree with a pose, before alignment is tried
+  double consensus_px = 4;         // RANSAC; corners of coarse levels are off by this much
+  int max_points_per_stage = 120;  // points aligned per pyramid level, at most
+  float min_correlation = 0.75f;   // of an aligned patch, normalised
+  double aligned_px = 2.0;         // residual below which an aligned point is an inlier, level 0
+  int min_inliers = 20;            // of aligned points
+  double min_inlier_ratio = 0.4;   // of the points that project into the frame
 };
 
-// Where the target was found in one frame.
+// The detection of a target in one frame.
 struct TargetDetection {
   struct Point {
     std::uint32_t id = 0;  // of the target's point: the same in every frame
@@ -38,30 +38,31 @@ struct TargetDetection {
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // level 0
   };
   Rigid3 camera_from_target;  // metres
-  std::vector<Point> points;  // that agree with the pose, by ascending id
-  int looked_for = 0;         // points that should have been there
-  double rms_px = 0;          // of `points`
+  std::vector<Point> points;  // inliers, by ascending id
+  int searched = 0;           // points that were searched
+  double rms_px = 0;          // of the inliers' residuals
 };
 
-// A printed image of known width that tells a camera where it is, in metres (hybrid-slam §5.5): found by
-// descriptors without any prior, then aligned patch by patch. Target frame: origin in the image's middle, x
-// right, y down in the plane, z away from the viewer. The patches follow the pose, so that scale and slant
-// cost no accuracy. Immutable; safe to share across threads.
+// A printed image of known width that gives a camera its pose in metres (hybrid-slam §5.5). It is detected by
+// descriptors without any prior, then aligned patch by patch. Target frame: origin in the image's centre, x
+// right, y down in the plane, z away from the viewer. The patches are warped with the pose, so that scale and
+// slant cost no accuracy. Immutable; safe to share across threads.
 class PlanarTarget {
  public:
-  // gray: CV_8UC1. Throws docent::Error with one sentence where the image is too small (64 pixels on a
-  // side) or shows too little to be found by, or the width is no positive length.
+  // gray: CV_8UC1. Throws docent::Error with one sentence if the image is too small (64 pixels on a side),
+  // has too few features, or the width is not positive.
   PlanarTarget(const cv::Mat& gray, double width_m, const PlanarTargetOptions& options = {});
 
   double width_m() const { return width_m_; }
   double height_m() const { return height_m_; }
 
-  // Finds the target anywhere in a frame, most often where it is seen up to about 50 degrees aslant and is at
-  // least 150 pixels wide. Some milliseconds; deterministic under the seed. Empty where it is not seen.
+  // Detects the target anywhere in a frame. Works mostly where it is seen at an angle of up to about 50
+  // degrees and is at least 150 pixels wide. Takes some milliseconds; deterministic under the seed. Empty if
+  // it is not found.
   std::optional<TargetDetection> Detect(const ImageFeatures& features, const CameraModel& camera,
                                         std::uint64_t seed) const;
-  // The target near a pose that is right to within about ten pixels of the frame. Empty where it is not
-  // there.
+  // Aligns the target near a pose whose projection is off by at most about ten pixels of the frame. Empty if
+  // it is not found there.
   std::optional<TargetDetection> Align(const ImageFeatures& features, const CameraModel& camera,
                                        const Rigid3& camera_from_target) const;
 
@@ -71,7 +72,7 @@ class PlanarTarget {
     std::uint32_t id = 0;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // of model level 0
   };
-  // The descriptor of a place of the target as some view shows it.
+  // The descriptor of a point of the target in one synthetic view.
   struct ModelDescriptor {
     Descriptor descriptor;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // of model level 0
@@ -79,22 +80,23 @@ class PlanarTarget {
   };
   struct DescriptorMatch {
     Eigen::Vector2d pixel, model_pixel;
-    float turn_rad = 0;  // from the model to the frame
+    float rotation_rad = 0;  // rotation in the image from the model to the frame
   };
   struct PatchMatch;
 
   void MakePoints();
-  void DescribeView(double scale, double squeeze, double squeeze_rad);
+  void DescribeView(double scale, double shortening, double shortening_rad);
   std::vector<DescriptorMatch> MatchDescriptors(const ImageFeatures& features) const;
   Eigen::Vector3d InTarget(const Eigen::Vector2d& model_pixel) const;
   std::vector<PatchMatch> AlignPoints(const ImageFeatures& features, const CameraModel& camera,
                                       const Rigid3& camera_from_target, int level, float max_shift_px,
-                                      int* looked_for) const;
+                                      int* searched) const;
 
   PlanarTargetOptions options_;
   double width_m_ = 0, height_m_ = 0;
   std::array<cv::Mat, kModelLevels> levels_;
-  std::array<std::vector<ModelPoint>, kModelLevels> points_;  // by the level they are corners of, best first
+  std::array<std::vector<ModelPoint>, kModelLevels>
+      points_;  // by the level on which they are corners, best first
   std::vector<ModelDescriptor> descriptors_;
   std::vector<std::vector<std::uint32_t>> leaves_;  // indices of descriptors, by vocabulary leaf
 };

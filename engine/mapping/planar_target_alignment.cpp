@@ -7,19 +7,19 @@
 #include "engine/recognition/absolute_pose.h"
 #include "engine/vision/patch.h"
 
-// The second half of PlanarTarget: from about the right pose to the exact one.
+// The second step of PlanarTarget: refines an approximate pose by aligning patches.
 namespace docent::engine {
 
 namespace {
 
-// Frame levels that alignment goes through, coarse to fine, and how far a patch may move on each.
+// A frame level of the alignment, coarse to fine, and the distance that a patch may move on it.
 struct Stage {
   int level;
   float max_shift_px;
 };
 constexpr std::array<Stage, 4> kStages = {{{3, 3}, {2, 4}, {1, 3}, {0, 3}}};
-// Times as wide: points of a coarse stage are fewer and their residuals larger.
-constexpr double kCoarseInlier_px = 1.5;  // of the stage's level
+// Inlier threshold on coarse levels, where points are fewer and their residuals larger.
+constexpr double kCoarseInlier_px = 1.5;  // pixels of the level
 
 }  // namespace
 
@@ -32,19 +32,19 @@ struct PlanarTarget::PatchMatch {
 std::vector<PlanarTarget::PatchMatch> PlanarTarget::AlignPoints(const ImageFeatures& features,
                                                                 const CameraModel& camera,
                                                                 const Rigid3& camera_from_target, int level,
-                                                                float max_shift_px, int* looked_for) const {
+                                                                float max_shift_px, int* searched) const {
   std::vector<PatchMatch> matches;
   const cv::Mat& image = features.levels[static_cast<std::size_t>(level)];
   const Eigen::Matrix3d rotation = camera_from_target.rotation.matrix();
-  Eigen::Matrix<double, 3, 2> model_pixel;  // of the target's plane, metres
+  Eigen::Matrix<double, 3, 2> model_pixel;  // metres on the target's plane per model pixel
   model_pixel << width_m_ / levels_[0].cols, 0, 0, height_m_ / levels_[0].rows, 0, 0;
-  *looked_for = 0;
+  *searched = 0;
   for (std::size_t model_level = 0; model_level < kModelLevels; ++model_level) {
     for (const ModelPoint& point : points_[model_level]) {
-      if (*looked_for >= options_.points_a_stage) return matches;
+      if (*searched >= options_.max_points_per_stage) return matches;
       const Eigen::Vector3d in_target = InTarget(point.pixel);
       const Eigen::Vector3d in_camera = rotation * in_target + camera_from_target.translation;
-      // Seen from behind, the image is not there.
+      // The image is not visible from behind.
       if (!(in_camera.dot(rotation.col(2)) > 0)) continue;
       Eigen::Vector2d pixel;
       Eigen::Matrix<double, 2, 3> jacobian;
@@ -54,9 +54,9 @@ std::vector<PlanarTarget::PatchMatch> PlanarTarget::AlignPoints(const ImageFeatu
         continue;
       const Eigen::Matrix2d level_from_model = jacobian * rotation * model_pixel / (1 << level);
       const double area = std::abs(level_from_model.determinant());
-      // Each patch comes from the model's level that has the frame's resolution there.
-      constexpr double kLargestBlowUp = 16;
-      if (!(area > 1e-6) || area > kLargestBlowUp) continue;
+      // Each patch is taken from the model level whose resolution matches that of the frame.
+      constexpr double kMaxMagnification = 16;
+      if (!(area > 1e-6) || area > kMaxMagnification) continue;
       const int wanted = std::clamp(static_cast<int>(std::lround(-0.5 * std::log2(area))), 0, 100);
       if (wanted != static_cast<int>(model_level)) continue;
       PatchTemplate patch;
@@ -66,7 +66,7 @@ std::vector<PlanarTarget::PatchMatch> PlanarTarget::AlignPoints(const ImageFeatu
                     source_from_patch.cast<float>(), &patch)) {
         continue;
       }
-      ++*looked_for;
+      ++*searched;
       const auto aligned = AlignPatch(patch, image, predicted.cast<float>(), max_shift_px, 12);
       if (!aligned || aligned->correlation < options_.min_correlation) continue;
       const Eigen::Vector2d found = LevelZeroFromLevel(aligned->pixel.cast<double>(), level);
@@ -79,14 +79,14 @@ std::vector<PlanarTarget::PatchMatch> PlanarTarget::AlignPoints(const ImageFeatu
 
 std::optional<TargetDetection> PlanarTarget::Align(const ImageFeatures& features, const CameraModel& camera,
                                                    const Rigid3& camera_from_target) const {
-  std::optional<TargetDetection> sighting;
+  std::optional<TargetDetection> detection;
   Rigid3 pose = camera_from_target;
   for (const Stage& stage : kStages) {
-    int looked_for = 0;
+    int searched = 0;
     const std::vector<PatchMatch> matches =
-        AlignPoints(features, camera, pose, stage.level, stage.max_shift_px, &looked_for);
-    constexpr std::size_t kFewest = 8;
-    if (matches.size() < kFewest) continue;
+        AlignPoints(features, camera, pose, stage.level, stage.max_shift_px, &searched);
+    constexpr std::size_t kMinMatches = 8;
+    if (matches.size() < kMinMatches) continue;
     std::vector<Eigen::Vector3d> rays, points;
     for (const PatchMatch& match : matches) {
       rays.push_back(match.ray);
@@ -107,26 +107,26 @@ std::optional<TargetDetection> PlanarTarget::Align(const ImageFeatures& features
         count += inlier[i];
         if (inlier[i]) squares += squared;
       }
-      if (count < kFewest) break;
+      if (count < kMinMatches) break;
       if (round == 0)
         refined = RefineAbsolutePose(rays, points, inlier, refined, camera.PixelAngle(), 0.5 * inlier_px);
     }
-    if (count < kFewest) continue;
+    if (count < kMinMatches) continue;
     pose = refined;
     if (stage.level > 1) continue;
-    // A frame too blurred for its finest level still has the one above.
+    // A frame that is too blurred for its finest level keeps the result of the level above.
     if (static_cast<int>(count) < options_.min_inliers ||
-        static_cast<double>(count) < options_.min_inlier_ratio * looked_for) {
+        static_cast<double>(count) < options_.min_inlier_ratio * searched) {
       continue;
     }
-    sighting.emplace();
-    sighting->camera_from_target = pose;
-    sighting->looked_for = looked_for;
-    sighting->rms_px = std::sqrt(squares / static_cast<double>(count));
+    detection.emplace();
+    detection->camera_from_target = pose;
+    detection->searched = searched;
+    detection->rms_px = std::sqrt(squares / static_cast<double>(count));
     for (std::size_t i = 0; i < matches.size(); ++i)
-      if (inlier[i]) sighting->points.push_back({matches[i].id, matches[i].point, matches[i].pixel});
+      if (inlier[i]) detection->points.push_back({matches[i].id, matches[i].point, matches[i].pixel});
   }
-  return sighting;
+  return detection;
 }
 
 }  // namespace docent::engine

@@ -14,10 +14,10 @@ namespace docent::engine {
 namespace {
 
 struct DepthRange {
-  double near = 0, far = 0;  // metres along the ray
+  double near = 0, far = 0;  // map units along the ray
 };
 
-// A point of the target that is known already: its pixel and distance.
+// A finite point that the target observes: its pixel and its distance from the camera.
 struct KnownDepth {
   Eigen::Vector2f pixel;
   double distance;
@@ -34,7 +34,8 @@ std::vector<KnownDepth> KnownDepths(Map& map, const Map::KeyFrameRecord& target)
   return known;
 }
 
-// Depths near a pixel say how far to look; where the image knows nothing, the keyframe's own spread does.
+// The range to search, from the depths of nearby points, or from the depth statistics of the keyframe if
+// there are none.
 DepthRange GuessRange(const std::vector<KnownDepth>& known, const KeyFrame& target,
                       const Eigen::Vector2f& pixel) {
   constexpr std::size_t kNeighbours = 6;
@@ -64,7 +65,7 @@ DepthRange GuessRange(const std::vector<KnownDepth>& known, const KeyFrame& targ
   return range;
 }
 
-// How far the background is looked for, in mean depths of the keyframe.
+// Maximum search distance for the background, as a ratio of the keyframe's median depth.
 constexpr double kFarthestDepths = 30;
 
 struct EpipolarMatch {
@@ -87,8 +88,8 @@ class PairSearch {
                                       const Eigen::Vector3d& ray, const DepthRange& range) {
     const auto predicted = PredictPatch(source_pixel, level, ray, range);
     if (!predicted) return std::nullopt;
-    target_.features->Look();
-    partner_.features->Look();
+    target_.features->MarkInUse();
+    partner_.features->MarkInUse();
     const auto search_level = static_cast<std::size_t>(predicted->level);
     const cv::Mat& image = partner_.features->levels[search_level];
     PatchTemplate patch;
@@ -126,11 +127,11 @@ class PairSearch {
   }
 
  private:
-  // How the patch would look in the partner if it stood in the middle of the range.
+  // The appearance of the patch in the partner at the middle of the depth range (harmonic mean).
   std::optional<PredictedPoint> PredictPatch(const Eigen::Vector2f& source_pixel, int level,
                                              const Eigen::Vector3d& ray, const DepthRange& range) {
     MapPoint point;
-    // Ids of points that exist never reach this one, so the searcher's cache cannot confuse them.
+    // Ids of existing points stay below these, so the searcher's cache cannot confuse them.
     point.id = kNoId - 1 - (scratch_id_++ % 1024);
     point.source_keyframe = target_.id;
     point.source_level = static_cast<std::uint8_t>(level);
@@ -164,7 +165,7 @@ class PairSearch {
       band_ = std::max(band_, options_.epipolar_tolerance_px + std::abs(across_.dot(p - line_.front())));
   }
 
-  // A lens bends the line by little: most corners are out of reach of its chord already.
+  // Lens distortion bends the line only slightly, so this test rejects most corners cheaply.
   bool NearChord(float x, float y) const {
     return std::abs(across_.dot(Eigen::Vector2f(x, y) - line_.front())) <= band_;
   }
@@ -182,7 +183,7 @@ class PairSearch {
     return false;
   }
 
-  // The corner near the line that resembles the patch most, when no other one comes close.
+  // The corner near the line with the highest correlation, if it is unambiguous.
   const Corner* BestCorner(const PatchTemplate& patch, std::size_t level) const {
     if (line_.empty()) return nullptr;
     Eigen::Vector2f low = line_[0], high = line_[0];
@@ -205,7 +206,7 @@ class PairSearch {
         continue;
       const float correlation = PatchCorrelation(patch, features.levels[level], corner.x, corner.y);
       if (correlation > best) {
-        // A neighbour on the same structure is no competitor.
+        // A corner within four pixels belongs to the same structure and does not make the match ambiguous.
         const bool competitor =
             best_corner && std::abs(best_corner->x - corner.x) + std::abs(best_corner->y - corner.y) > 4;
         if (competitor) second = best;
@@ -226,12 +227,13 @@ class PairSearch {
   PointSearcher* searcher_;
   Rigid3 map_from_target_, partner_from_target_;
   std::vector<Eigen::Vector2f> line_;
-  Eigen::Vector2f across_ = Eigen::Vector2f::Zero();  // unit, across the line's chord; zero for no chord
-  float band_ = 0;                                    // half the width about the chord that holds the line
+  // Unit vector perpendicular to the line's chord; zero if there is no chord.
+  Eigen::Vector2f across_ = Eigen::Vector2f::Zero();
+  float band_ = 0;  // half the width of the band about the chord that contains the line
   std::uint32_t scratch_id_ = 0;
 };
 
-// How many points each part of the image has.
+// The number of points in each cell of the image.
 class CellCounts {
  public:
   explicit CellCounts(const CameraModel& camera)
@@ -300,9 +302,9 @@ std::vector<MapPointId> CreatePoints(const PointCreationOptions& options, KeyFra
 
 namespace {
 
-// The finite point that a keyframe sees at this place already; null for none.
-Map::PointRecord* KnownAt(Map* map, const Map::KeyFrameRecord& keyframe, const Eigen::Vector2f& pixel,
-                          int level) {
+// The finite point that a keyframe already observes at this pixel; null if there is none.
+Map::PointRecord* FinitePointAt(Map* map, const Map::KeyFrameRecord& keyframe, const Eigen::Vector2f& pixel,
+                                int level) {
   constexpr float kSamePx = 1.5f;  // of the level
   const float limit = kSamePx * static_cast<float>(1 << level);
   for (const Observation& observation : keyframe.observations) {
@@ -330,20 +332,20 @@ InfiniteConversion ConvertInfinitePoints(const PointCreationOptions& options, Ke
     const auto ray = reference->keyframe.camera->Unproject(observation.pixel.cast<double>());
     if (!ray) continue;
     const int level = record->point.source_level;
-    // What lies beside known things may be as near as they are; the background may be anywhere.
+    // A point next to known surfaces may be as near as they are; the background may be at any distance.
     DepthRange range = GuessRange(known, reference->keyframe, observation.pixel);
     range.far = std::max(range.far, kFarthestDepths * reference->keyframe.mean_depth);
     const auto match = search.Search(record->point.source_pixel, level, *ray, range);
     if (!match) continue;
     const auto position = search.Intersect(*ray, *match, level);
     if (!position) continue;
-    // Perhaps the map knew it all along, from elsewhere.
+    // The map may already contain this point as a finite one, created from elsewhere.
     const MapPointId id = record->point.id;
-    if (Map::PointRecord* same = KnownAt(map, *partner, match->pixel.cast<float>(), match->level)) {
-      const auto again =
+    if (Map::PointRecord* same = FinitePointAt(map, *partner, match->pixel.cast<float>(), match->level)) {
+      const auto reprojected =
           reference->keyframe.camera->Project(reference->keyframe.camera_from_map * same->point.position());
-      if (!again || (*again - observation.pixel.cast<double>()).norm() >
-                        options.max_reprojection_sigma * (1 << level)) {
+      if (!reprojected || (*reprojected - observation.pixel.cast<double>()).norm() >
+                              options.max_reprojection_sigma * (1 << level)) {
         continue;
       }
       const MapPointId same_id = same->point.id;

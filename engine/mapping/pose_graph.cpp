@@ -10,11 +10,11 @@
 namespace docent::engine {
 namespace {
 
-constexpr int kFreedoms = 7;  // translation, rotation, logarithm of the scale
-using Vector7 = Eigen::Matrix<double, kFreedoms, 1>;
-using Matrix7 = Eigen::Matrix<double, kFreedoms, kFreedoms>;
+constexpr int kDimension = 7;  // translation, rotation, logarithm of the scale
+using Vector7 = Eigen::Matrix<double, kDimension, 1>;
+using Matrix7 = Eigen::Matrix<double, kDimension, kDimension>;
 
-// The similarity that a small step stands for, applied on the left of a node.
+// The similarity of a small step, applied on the left of a node.
 Sim3 Step(const Vector7& step) {
   Sim3 result;
   result.translation = step.head<3>();
@@ -23,15 +23,15 @@ Sim3 Step(const Vector7& step) {
   return result;
 }
 
-Sim3 Left(const PoseGraph& graph, const PoseGraph::Edge& edge) {
+Sim3 Residual(const PoseGraph& graph, const PoseGraph::Edge& edge) {
   const auto& a = graph.nodes[static_cast<std::size_t>(edge.a)];
   const auto& b = graph.nodes[static_cast<std::size_t>(edge.b)];
   return edge.a_from_b * (b.node_from_map * a.node_from_map.inverse());
 }
 
-Vector7 Error(const Sim3& left, double depth) {
+Vector7 Error(const Sim3& residual, double depth) {
   Vector7 error;
-  error << left.translation / depth, left.rotation.Log(), std::log(left.scale);
+  error << residual.translation / depth, residual.rotation.Log(), std::log(residual.scale);
   return error;
 }
 
@@ -46,38 +46,38 @@ Eigen::Matrix3d InverseLeftJacobian(const Eigen::Vector3d& rotation) {
 
 struct Linearized {
   Vector7 error;
-  Matrix7 by_a, by_b;  // derivatives by steps on the left of the nodes
+  Matrix7 by_a, by_b;  // derivatives with respect to steps on the left of the nodes
 };
 
 Linearized Linearize(const PoseGraph& graph, const PoseGraph::Edge& edge) {
   const double depth = graph.nodes[static_cast<std::size_t>(edge.a)].depth;
-  const Sim3 left = Left(graph, edge);
+  const Sim3 residual = Residual(graph, edge);
   Linearized result;
-  result.error = Error(left, depth);
+  result.error = Error(residual, depth);
   const Eigen::Vector3d rotation = result.error.segment<3>(3);
   const Eigen::Matrix3d inverse_jacobian = InverseLeftJacobian(rotation);
 
-  // A step of b seen from a: Z * step * Z^-1, as a step on the left of what is left.
-  const Eigen::Matrix3d turn = edge.a_from_b.rotation.matrix();
-  const Eigen::Vector3d& shift = edge.a_from_b.translation;
-  Matrix7 carried = Matrix7::Zero();
-  carried.block<3, 3>(0, 0) = edge.a_from_b.scale * turn;
-  carried.block<3, 3>(0, 3) = Hat(shift) * turn;
-  carried.block<3, 1>(0, 6) = -shift;
-  carried.block<3, 3>(3, 3) = turn;
-  carried(6, 6) = 1;
+  // A step of b transferred to a: Z * step * Z^-1, as a step on the left of the residual similarity.
+  const Eigen::Matrix3d edge_rotation = edge.a_from_b.rotation.matrix();
+  const Eigen::Vector3d& edge_translation = edge.a_from_b.translation;
+  Matrix7 transferred = Matrix7::Zero();
+  transferred.block<3, 3>(0, 0) = edge.a_from_b.scale * edge_rotation;
+  transferred.block<3, 3>(0, 3) = Hat(edge_translation) * edge_rotation;
+  transferred.block<3, 1>(0, 6) = -edge_translation;
+  transferred.block<3, 3>(3, 3) = edge_rotation;
+  transferred(6, 6) = 1;
   Matrix7 by_step = Matrix7::Zero();
   by_step.block<3, 3>(0, 0).setIdentity();
-  by_step.block<3, 3>(0, 3) = -Hat(left.translation);
-  by_step.block<3, 1>(0, 6) = left.translation;
+  by_step.block<3, 3>(0, 3) = -Hat(residual.translation);
+  by_step.block<3, 1>(0, 6) = residual.translation;
   by_step.topRows<3>() /= depth;
   by_step.block<3, 3>(3, 3) = inverse_jacobian;
   by_step(6, 6) = 1;
-  result.by_b = by_step * carried;
+  result.by_b = by_step * transferred;
 
-  // The inverse of a step of a, on its right.
+  // The inverse of a step of a, on the right of the residual similarity.
   result.by_a.setZero();
-  result.by_a.block<3, 3>(0, 0) = -left.scale / depth * left.rotation.matrix();
+  result.by_a.block<3, 3>(0, 0) = -residual.scale / depth * residual.rotation.matrix();
   result.by_a.block<3, 3>(3, 3) = -inverse_jacobian.transpose();
   result.by_a(6, 6) = -1;
   return result;
@@ -91,12 +91,12 @@ struct Normal {
 
 Normal Assemble(const PoseGraph& graph, const std::vector<int>& first_row, int rows) {
   std::vector<Eigen::Triplet<double>> triplets;
-  triplets.reserve(graph.edges.size() * 3 * kFreedoms * kFreedoms);
+  triplets.reserve(graph.edges.size() * 3 * kDimension * kDimension);
   Normal normal;
   normal.gradient = Eigen::VectorXd::Zero(rows);
   const auto add = [&](int row, int column, const Matrix7& block) {
-    for (int i = 0; i < kFreedoms; ++i) {
-      for (int j = 0; j < kFreedoms; ++j) {
+    for (int i = 0; i < kDimension; ++i) {
+      for (int j = 0; j < kDimension; ++j) {
         if (row + i >= column + j) triplets.emplace_back(row + i, column + j, block(i, j));
       }
     }
@@ -107,11 +107,11 @@ Normal Assemble(const PoseGraph& graph, const std::vector<int>& first_row, int r
               b = first_row[static_cast<std::size_t>(edge.b)];
     if (a >= 0) {
       add(a, a, edge.weight * linear.by_a.transpose() * linear.by_a);
-      normal.gradient.segment<kFreedoms>(a) += edge.weight * linear.by_a.transpose() * linear.error;
+      normal.gradient.segment<kDimension>(a) += edge.weight * linear.by_a.transpose() * linear.error;
     }
     if (b >= 0) {
       add(b, b, edge.weight * linear.by_b.transpose() * linear.by_b);
-      normal.gradient.segment<kFreedoms>(b) += edge.weight * linear.by_b.transpose() * linear.error;
+      normal.gradient.segment<kDimension>(b) += edge.weight * linear.by_b.transpose() * linear.error;
     }
     if (a >= 0 && b >= 0) {
       const Matrix7 cross = edge.weight * linear.by_a.transpose() * linear.by_b;
@@ -127,19 +127,19 @@ Normal Assemble(const PoseGraph& graph, const std::vector<int>& first_row, int r
   return normal;
 }
 
-bool AllHeld(const PoseGraph& graph) {
-  std::vector<bool> held;
-  for (const PoseGraph::Node& node : graph.nodes) held.push_back(node.fixed);
+bool AllConstrained(const PoseGraph& graph) {
+  std::vector<bool> constrained;
+  for (const PoseGraph::Node& node : graph.nodes) constrained.push_back(node.fixed);
   bool more = true;
   while (more) {
     more = false;
     for (const PoseGraph::Edge& edge : graph.edges) {
       const auto a = static_cast<std::size_t>(edge.a), b = static_cast<std::size_t>(edge.b);
-      if (held[a] == held[b]) continue;
-      held[a] = held[b] = more = true;
+      if (constrained[a] == constrained[b]) continue;
+      constrained[a] = constrained[b] = more = true;
     }
   }
-  return std::find(held.begin(), held.end(), false) == held.end();
+  return std::find(constrained.begin(), constrained.end(), false) == constrained.end();
 }
 
 }  // namespace
@@ -148,33 +148,33 @@ double PoseGraphCost(const PoseGraph& graph) {
   double cost = 0;
   for (const PoseGraph::Edge& edge : graph.edges) {
     const double depth = graph.nodes[static_cast<std::size_t>(edge.a)].depth;
-    cost += 0.5 * edge.weight * Error(Left(graph, edge), depth).squaredNorm();
+    cost += 0.5 * edge.weight * Error(Residual(graph, edge), depth).squaredNorm();
   }
   return cost;
 }
 
 double LargestError(const PoseGraph& graph, const PoseGraph::Edge& edge) {
-  const Vector7 error = Error(Left(graph, edge), graph.nodes[static_cast<std::size_t>(edge.a)].depth);
+  const Vector7 error = Error(Residual(graph, edge), graph.nodes[static_cast<std::size_t>(edge.a)].depth);
   return std::max({error.head<3>().norm(), error.segment<3>(3).norm(), std::abs(error[6])});
 }
 
-PoseGraphSummary RelaxPoseGraph(const PoseGraphOptions& options, PoseGraph* graph) {
+PoseGraphSummary SolvePoseGraph(const PoseGraphOptions& options, PoseGraph* graph) {
   PoseGraphSummary summary;
   std::vector<int> first_row;
   int rows = 0;
   for (const PoseGraph::Node& node : graph->nodes) {
     first_row.push_back(node.fixed ? -1 : rows);
-    if (!node.fixed) rows += kFreedoms;
+    if (!node.fixed) rows += kDimension;
   }
   double cost = summary.initial_cost = summary.final_cost = PoseGraphCost(*graph);
-  if (rows == 0 || !std::isfinite(cost) || !AllHeld(*graph)) return summary;
+  if (rows == 0 || !std::isfinite(cost) || !AllConstrained(*graph)) return summary;
   const std::vector<PoseGraph::Node> start = graph->nodes;
   double damping = 1e-8;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver;
   bool analyzed = false;
-  constexpr double kMostDamping = 1e3;
-  constexpr double kLeastStep = 1e-12;  // a number's last bits
-  while (summary.iterations < options.max_iterations && damping < kMostDamping) {
+  constexpr double kMaxDamping = 1e3;
+  constexpr double kMinStep = 1e-12;  // near machine precision
+  while (summary.iterations < options.max_iterations && damping < kMaxDamping) {
     ++summary.iterations;
     Normal normal = Assemble(*graph, first_row, rows);
     for (int i = 0; i < rows; ++i) normal.matrix.coeffRef(i, i) *= 1 + damping;
@@ -188,12 +188,12 @@ PoseGraphSummary RelaxPoseGraph(const PoseGraphOptions& options, PoseGraph* grap
       summary.final_cost = summary.initial_cost;
       return summary;
     }
-    if (step.lpNorm<Eigen::Infinity>() < kLeastStep) break;
+    if (step.lpNorm<Eigen::Infinity>() < kMinStep) break;
     const std::vector<PoseGraph::Node> before = graph->nodes;
     for (std::size_t i = 0; i < graph->nodes.size(); ++i) {
       if (first_row[i] < 0) continue;
       Sim3& pose = graph->nodes[i].node_from_map;
-      pose = Step(step.segment<kFreedoms>(first_row[i])) * pose;
+      pose = Step(step.segment<kDimension>(first_row[i])) * pose;
     }
     const double next = PoseGraphCost(*graph);
     if (!(next <= cost)) {
@@ -202,10 +202,10 @@ PoseGraphSummary RelaxPoseGraph(const PoseGraphOptions& options, PoseGraph* grap
       continue;
     }
     const double decrease = cost - next;
-    const bool settled = decrease <= options.min_decrease * cost;
+    const bool converged = decrease <= options.min_decrease * cost;
     cost = next;
     damping *= 0.1;
-    if (settled) break;
+    if (converged) break;
   }
   summary.final_cost = cost;
   summary.solved = true;

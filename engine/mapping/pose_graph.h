@@ -6,20 +6,20 @@
 
 #include "engine/geometry/sim3.h"
 
-// Keyframes as nodes that hold to each other by measured similarities: where a loop closes, the error that
-// has gathered along it, of scale too, is spread over its edges (Strasdat, Montiel and Davison 2010). A pure
-// function of its input: single-threaded, same input, same result.
+// A pose graph: keyframes as nodes, measured relative similarities as edges. After a loop the accumulated
+// error, scale drift included, is distributed over the edges (Strasdat, Montiel and Davison 2010). A pure
+// function of its input: single-threaded, equal input gives an equal result.
 namespace docent::engine {
 
 struct PoseGraph {
   struct Node {
-    Sim3 node_from_map;  // in: start; out: result
+    Sim3 node_from_map;  // in: initial value; out: result
     bool fixed = false;
-    double depth = 1;  // of what it sees, in its own units: the length in which its translations are weighed
+    double depth = 1;  // median depth in its own units: the unit in which its translation errors are weighted
   };
   struct Edge {
     int a = 0, b = 0;  // indices of nodes
-    Sim3 a_from_b;     // as measured
+    Sim3 a_from_b;     // measurement
     double weight = 1;
   };
   std::vector<Node> nodes;
@@ -28,24 +28,24 @@ struct PoseGraph {
 
 struct PoseGraphOptions {
   int max_iterations = 20;
-  double min_decrease = 1e-6;  // of the cost, relative: with less it has converged
+  double min_decrease = 1e-6;  // relative decrease of the cost below which it has converged
 };
 
-// Half the weighted sum of squared errors; the error of an edge is what is left of a_from_b * b_from_a: its
-// translation in depths, its rotation vector, and the logarithm of its scale.
+// Half the weighted sum of squared errors. The error of an edge is that of a_from_b * b_from_a: its
+// translation as a ratio of the depth, its rotation vector, and the logarithm of its scale.
 double PoseGraphCost(const PoseGraph& graph);
-// The largest part of one edge's error: of the depth, radians, or logarithm of the scale.
+// The largest component of one edge's error: ratio of the depth, radians, or logarithm of the scale.
 double LargestError(const PoseGraph& graph, const PoseGraph::Edge& edge);
 
 struct PoseGraphSummary {
-  bool solved = false;  // false: the nodes are as they were
+  bool solved = false;  // false: the nodes are unchanged
   int iterations = 0;
   double initial_cost = 0, final_cost = 0;
 };
 
-// Moves the free nodes to the least cost near their start (Levenberg-Marquardt on Sim(3), sparse). At least
-// one node of each connected part must be fixed, and depths and weights be positive; else it says so by
-// `solved`.
-PoseGraphSummary RelaxPoseGraph(const PoseGraphOptions& options, PoseGraph* graph);
+// Moves the free nodes to the nearest minimum of the cost (Levenberg-Marquardt on Sim(3), sparse). Each
+// connected component needs a fixed node, and depths and weights must be positive; otherwise `solved` is
+// false.
+PoseGraphSummary SolvePoseGraph(const PoseGraphOptions& options, PoseGraph* graph);
 
 }  // namespace docent::engine

@@ -10,7 +10,7 @@ namespace {
 
 // Median of the norm of a two-dimensional normal variable, in standard deviations: sqrt(2 ln 2).
 constexpr double kRayleighMedian = 1.1774100225154747;
-// Residual, in thresholds, that Huber's loss charges for a measurement that does not project.
+// Residual, in units of the threshold, that Huber's loss assigns to a measurement that does not project.
 constexpr double kUnprojectableThresholds = 10;
 
 }  // namespace

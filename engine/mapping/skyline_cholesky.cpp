@@ -7,8 +7,8 @@
 namespace docent::engine {
 namespace {
 
-// Blocks in a panel: products of 48 rows keep the multiplication units busy, and a local adjustment's eight
-// keyframes are one panel.
+// Blocks per panel: products of 48 rows use the multiplication units well, and the eight keyframes of a local
+// adjustment fit in one panel.
 constexpr int kPanelBlocks = 8;
 constexpr Eigen::Index kPanelScalars = static_cast<Eigen::Index>(kPanelBlocks) * SkylineCholesky::kBlock;
 

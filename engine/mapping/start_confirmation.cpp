@@ -16,8 +16,8 @@ double Median(std::vector<double>* values) {
 
 }  // namespace
 
-void StartConfirmation::Keep(Timestamp first_view, std::span<const std::uint32_t> ids,
-                             const TwoViewResult& geometry) {
+void StartConfirmation::Store(Timestamp first_view, std::span<const std::uint32_t> ids,
+                              const TwoViewResult& geometry) {
   first_view_ = first_view;
   parallax_deg_ = geometry.median_parallax_deg;
   ids_.clear();
@@ -32,7 +32,7 @@ void StartConfirmation::Keep(Timestamp first_view, std::span<const std::uint32_t
 bool StartConfirmation::Confirm(Timestamp first_view, std::span<const std::uint32_t> ids,
                                 const TwoViewResult& geometry) {
   if (ids_.empty() || first_view != first_view_) {
-    Keep(first_view, ids, geometry);
+    Store(first_view, ids, geometry);
     return false;
   }
   if (geometry.median_parallax_deg < options_.min_growth * parallax_deg_) return false;
@@ -48,10 +48,10 @@ bool StartConfirmation::Confirm(Timestamp first_view, std::span<const std::uint3
   if (agree) {
     const double middle = Median(&ratios);
     for (double& ratio : ratios) ratio = std::abs(ratio - middle);
-    constexpr double kSigmaFromMedian = 1.4826;  // of a normal distribution's absolute deviations
+    constexpr double kSigmaFromMedian = 1.4826;  // for absolute deviations of a normal distribution
     agree = kSigmaFromMedian * Median(&ratios) <= options_.max_depth_spread;
   }
-  if (!agree) Keep(first_view, ids, geometry);
+  if (!agree) Store(first_view, ids, geometry);
   return agree;
 }
 

@@ -16,11 +16,11 @@ namespace {
 constexpr const char* kFindTarget = "point the camera at the target";
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-InitializerOptions FollowOnly() {
+InitializerOptions TrackOnlyOptions() {
   InitializerOptions options;
   options.attempt_interval = std::numeric_limits<int>::max();
   options.max_age_frames = std::numeric_limits<int>::max();
-  options.min_alive = 0;  // the target alone will do
+  options.min_alive = 0;  // the points of the target alone suffice
   return options;
 }
 
@@ -31,7 +31,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// Adds one match with its point in a; the baseline is the unit.
+// Adds one match with its point in frame a, in units of the baseline.
 void Append(const InitialPair::Match& match, const Eigen::Vector3d& point_in_a, double baseline_m,
             InitialPair* pair) {
   pair->matches.push_back(match);
@@ -40,17 +40,17 @@ void Append(const InitialPair::Match& match, const Eigen::Vector3d& point_in_a, 
   ++pair->geometry.inlier_count;
 }
 
-// Points of the target that both views saw; answers with the angles under which they are seen, degrees.
+// Adds the points of the target that both views detect; returns their parallax in degrees.
 std::vector<double> AppendTargetPoints(const TargetView& a, const TargetView& b, const Rigid3& b_from_a,
                                        InitialPair* pair) {
   std::vector<double> parallax_deg;
   const double baseline_m = b_from_a.translation.norm();
-  auto other = b.sighting.points.begin();
-  for (const TargetDetection::Point& point : a.sighting.points) {
-    while (other != b.sighting.points.end() && other->id < point.id) ++other;
-    if (other == b.sighting.points.end()) break;
+  auto other = b.detection.points.begin();
+  for (const TargetDetection::Point& point : a.detection.points) {
+    while (other != b.detection.points.end() && other->id < point.id) ++other;
+    if (other == b.detection.points.end()) break;
     if (other->id != point.id) continue;
-    const Eigen::Vector3d in_a = a.sighting.camera_from_target * point.point_in_target;
+    const Eigen::Vector3d in_a = a.detection.camera_from_target * point.point_in_target;
     Append({point.pixel.cast<float>(), other->pixel.cast<float>(), 0}, in_a, baseline_m, pair);
     parallax_deg.push_back(ParallaxAngle(Eigen::Vector3d::Zero(), b_from_a.OriginInSource(), in_a) *
                            kDegrees);
@@ -58,18 +58,18 @@ std::vector<double> AppendTargetPoints(const TargetView& a, const TargetView& b,
   return parallax_deg;
 }
 
-// Whether a point is where the view shows it.
+// True if the point projects near the pixel.
 bool Agrees(const CameraModel& camera, const Eigen::Vector3d& point_in_camera, const Eigen::Vector2f& pixel,
             double max_residual_px) {
   const auto projected = camera.Project(point_in_camera);
   return projected && (projected->cast<float>() - pixel).norm() < max_residual_px;
 }
 
-void AppendFollowed(const CameraModel& camera, const std::vector<InitialPair::Match>& followed,
-                    const Rigid3& b_from_a, const TargetStartOptions& options, InitialPair* pair) {
+void AppendTrackedCorners(const CameraModel& camera, const std::vector<InitialPair::Match>& tracked,
+                          const Rigid3& b_from_a, const TargetStartOptions& options, InitialPair* pair) {
   constexpr float kSamePlace_px = 4;
   const std::size_t on_target = pair->matches.size();
-  for (const InitialPair::Match& match : followed) {
+  for (const InitialPair::Match& match : tracked) {
     const bool known = std::any_of(
         pair->matches.begin(), pair->matches.begin() + static_cast<std::ptrdiff_t>(on_target),
         [&](const auto& other) { return (other.pixel_a - match.pixel_a).norm() < kSamePlace_px; });
@@ -94,15 +94,15 @@ void AppendFollowed(const CameraModel& camera, const std::vector<InitialPair::Ma
 
 std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraModel>& camera,
                                            const TargetView& a, const TargetView& b,
-                                           const std::vector<InitialPair::Match>& followed,
+                                           const std::vector<InitialPair::Match>& tracked,
                                            const TargetStartOptions& options, std::string* hint) {
   TargetStart start;
-  start.a_from_target = a.sighting.camera_from_target;
-  const Rigid3 b_from_a = b.sighting.camera_from_target * a.sighting.camera_from_target.inverse();
+  start.a_from_target = a.detection.camera_from_target;
+  const Rigid3 b_from_a = b.detection.camera_from_target * a.detection.camera_from_target.inverse();
   start.pair.baseline_m = b_from_a.translation.norm();
-  // Where nothing moved there is no unit to measure in.
+  // Without motion there is no baseline to serve as unit.
   if (!(start.pair.baseline_m > 1e-9)) {
-    *hint = Advice(TwoViewVerdict::kStill);
+    *hint = Advice(TwoViewOutcome::kStill);
     return std::nullopt;
   }
   InitialPair& pair = start.pair;
@@ -112,17 +112,17 @@ std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraMod
   const std::vector<double> parallax_deg = AppendTargetPoints(a, b, b_from_a, &pair);
   pair.geometry.median_parallax_deg = Median(parallax_deg);
   if (pair.geometry.median_parallax_deg < options.min_parallax_deg) {
-    *hint = Advice(TwoViewVerdict::kTooLittleParallax);
+    *hint = Advice(TwoViewOutcome::kTooLittleParallax);
     return std::nullopt;
   }
-  AppendFollowed(*camera, followed, b_from_a, options, &pair);
+  AppendTrackedCorners(*camera, tracked, b_from_a, options, &pair);
   if (pair.geometry.inlier_count < options.min_matches) {
-    *hint = Advice(TwoViewVerdict::kTooFewMatches);
+    *hint = Advice(TwoViewOutcome::kTooFewMatches);
     return std::nullopt;
   }
-  // Beside the target there is depth, or there is nothing but the target.
-  pair.geometry.verdict =
-      pair.matches.size() > parallax_deg.size() ? TwoViewVerdict::kGeneral : TwoViewVerdict::kPlanar;
+  // Points beside the target have depth; otherwise the structure is the target's plane alone.
+  pair.geometry.outcome =
+      pair.matches.size() > parallax_deg.size() ? TwoViewOutcome::kGeneral : TwoViewOutcome::kPlanar;
   pair.geometry.b_from_a = b_from_a;
   pair.geometry.b_from_a.translation /= start.pair.baseline_m;
   hint->clear();
@@ -136,63 +136,63 @@ TargetInitializer::TargetInitializer(std::shared_ptr<const PlanarTarget> target,
       options_(options),
       camera_(std::move(camera)),
       random_(seed),
-      follower_(FollowOnly(), camera_, seed) {
+      corner_tracker_(TrackOnlyOptions(), camera_, seed) {
   Reset();
 }
 
 void TargetInitializer::Reset() {
-  follower_.Reset();
+  corner_tracker_.Reset();
   first_.reset();
-  sighting_.reset();
+  detection_.reset();
   previous_.reset();
   hint_ = kFindTarget;
 }
 
-std::optional<TargetDetection> TargetInitializer::Sight(const ImageFeatures& features) {
-  if (sighting_ && previous_) {
-    // What a hand does between two frames is mostly a rotation.
+std::optional<TargetDetection> TargetInitializer::DetectOrAlign(const ImageFeatures& features) {
+  if (detection_ && previous_) {
+    // The motion of a hand-held camera between two frames is mostly a rotation.
     const auto rotation = AlignRotation(previous_->small_blurry, *camera_, features.small_blurry, *camera_);
     const Rotation3 now_from_previous = rotation && rotation->converged ? rotation->b_from_a : Rotation3();
     if (auto tracked = target_->Align(
             features, *camera_,
-            Rigid3(now_from_previous, Eigen::Vector3d::Zero()) * sighting_->camera_from_target)) {
+            Rigid3(now_from_previous, Eigen::Vector3d::Zero()) * detection_->camera_from_target)) {
       return tracked;
     }
-    if (auto tracked = target_->Align(features, *camera_, sighting_->camera_from_target)) return tracked;
+    if (auto tracked = target_->Align(features, *camera_, detection_->camera_from_target)) return tracked;
   }
   return target_->Detect(features, *camera_, random_.Next());
 }
 
 std::optional<TargetStart> TargetInitializer::Track(Timestamp time,
                                                     const std::shared_ptr<const ImageFeatures>& features) {
-  sighting_ = Sight(*features);
+  detection_ = DetectOrAlign(*features);
   previous_ = features;
   if (first_) {
-    follower_.Track(time, features);
-    // The follower takes a new first view when too few corners are left of the old one: nothing has moved
-    // since then.
-    const bool begun_anew = !trails().empty() && std::all_of(trails().begin(), trails().end(),
-                                                             [](const Initializer::Trail& trail) {
-                                                               return trail.first == trail.now;
-                                                             });
-    if (begun_anew) first_.reset();
+    corner_tracker_.Track(time, features);
+    // The corner tracker takes a new first view when too few corners of the old one are left. All corners are
+    // then unmoved, and this initializer must take a new first view too.
+    const bool restarted = !trails().empty() &&
+                           std::all_of(trails().begin(), trails().end(), [](const Initializer::Trail& trail) {
+                             return trail.first == trail.now;
+                           });
+    if (restarted) first_.reset();
   }
-  if (!sighting_) {
+  if (!detection_) {
     hint_ = kFindTarget;
     return std::nullopt;
   }
-  const TargetView now{{time, features}, *sighting_};
+  const TargetView now{{time, features}, *detection_};
   if (!first_) {
-    follower_.Reset();
-    follower_.Track(time, features);
+    corner_tracker_.Reset();
+    corner_tracker_.Track(time, features);
     first_ = now;
-    hint_ = Advice(TwoViewVerdict::kStill);
+    hint_ = Advice(TwoViewOutcome::kStill);
     return std::nullopt;
   }
-  std::vector<InitialPair::Match> followed;
+  std::vector<InitialPair::Match> tracked;
   for (const Initializer::Trail& trail : trails())
-    followed.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
-  auto start = MakeTargetStart(camera_, *first_, now, followed, options_, &hint_);
+    tracked.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
+  auto start = MakeTargetStart(camera_, *first_, now, tracked, options_, &hint_);
   if (start) Reset();
   return start;
 }

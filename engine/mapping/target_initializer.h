@@ -12,35 +12,36 @@
 namespace docent::engine {
 
 struct TargetStartOptions {
-  double min_parallax_deg = 3.0;        // median over the target's points
+  double min_parallax_deg = 3.0;        // median over the points of the target
   int min_matches = 50;                 // triangulated, on the target and beside it
-  double max_residual_px = 2.0;         // of a triangulated point, in either view, times 2^level
-  double min_point_parallax_deg = 1.0;  // of a point beside the target: below it depth is a guess
+  double max_residual_px = 2.0;         // of a triangulated point in either view, pixels of the level
+  double min_point_parallax_deg = 1.0;  // of a point beside the target; below it the depth is too uncertain
 };
 
-// Two views in which a target was seen: the start of a map in metres.
+// Two views in which a target was detected: they initialize a map in metres.
 struct TargetStart {
-  // As from two views alone: |translation| = 1, and the points in that unit; pair.baseline_m tells the unit.
+  // The same as from two views alone: |translation| = 1, and the points in that unit; pair.baseline_m gives
+  // the unit in metres.
   InitialPair pair;
   Rigid3 a_from_target;  // metres
 };
 
-// A view, where the target was in it, and its corners that were followed to the other view.
+// A view and the detection of the target in it.
 struct TargetView {
   InitialPair::View view;
-  TargetDetection sighting;
+  TargetDetection detection;
 };
-// The start that two views give: points of the target that both saw, where the plane says they are, and
-// followed corners beside it, triangulated. Empty where parallax or points are too few; *hint then says what
-// the person can do.
+// Initializes a map from two views: points of the target that both views detect, placed on its plane, and
+// triangulated corners beside it. Empty if there is too little parallax or there are too few points; *hint
+// then advises the user.
 std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraModel>& camera,
                                            const TargetView& a, const TargetView& b,
-                                           const std::vector<InitialPair::Match>& followed,
+                                           const std::vector<InitialPair::Match>& tracked,
                                            const TargetStartOptions& options, std::string* hint);
 
-// Waits for the target, tracks the camera from it, and follows corners all over the image beside it, until
-// two views start a map (hybrid-slam §5.5). Used like an Initializer, in its place: one a camera, on the
-// tracker's thread.
+// Detects the target, tracks the camera from it, and tracks corners in the whole image, until two views can
+// initialize a map (hybrid-slam §5.5). Takes the place of an Initializer and is used in the same way: one per
+// camera, on the tracker's thread.
 class TargetInitializer {
  public:
   TargetInitializer(std::shared_ptr<const PlanarTarget> target, const TargetStartOptions& options,
@@ -48,28 +49,28 @@ class TargetInitializer {
 
   // Starts again from the next frame.
   void Reset();
-  // A start once it is certain; then Reset() has happened.
+  // Returns a start once it is reliable, and then resets itself.
   std::optional<TargetStart> Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
 
-  // Of the first view that is waited with; far in the past when there is none.
+  // Time of the first view; Timestamp::min() if there is none.
   Timestamp first_time() const { return first_ ? first_->view.time : Timestamp::min(); }
-  // Why there is no map so far.
+  // Advice to the user on why there is no map yet.
   const std::string& hint() const { return hint_; }
-  // Where the target was in the last frame; empty when it was not seen there.
-  const std::optional<TargetDetection>& sighting() const { return sighting_; }
-  // Corners being followed since the first view.
-  const std::vector<Initializer::Trail>& trails() const { return follower_.trails(); }
+  // The detection in the last frame; empty if the target was not found there.
+  const std::optional<TargetDetection>& detection() const { return detection_; }
+  // Corners tracked since the first view.
+  const std::vector<Initializer::Trail>& trails() const { return corner_tracker_.trails(); }
 
  private:
-  std::optional<TargetDetection> Sight(const ImageFeatures& features);
+  std::optional<TargetDetection> DetectOrAlign(const ImageFeatures& features);
 
   std::shared_ptr<const PlanarTarget> target_;
   TargetStartOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   Random random_;
-  Initializer follower_;  // of corners; never asked for a pose
+  Initializer corner_tracker_;  // tracks corners; its two-view geometry is not used
   std::optional<TargetView> first_;
-  std::optional<TargetDetection> sighting_;
+  std::optional<TargetDetection> detection_;
   std::shared_ptr<const ImageFeatures> previous_;
   std::string hint_;
 };

@@ -18,8 +18,8 @@ namespace {
 constexpr int kLocalRounds = 2;
 constexpr int kLocalIterations = 4;
 
-// What the sampling loop needs to know of a model: how many pairs make one, how to make it, how to judge it
-// and how to improve it on the pairs that it explains.
+// The operations that the sampling loop needs for each model: the sample size, the minimal solver, the
+// residuals, and the refinement over inliers.
 struct RotationKind {
   static constexpr int kSampleSize = 2;
 
@@ -83,18 +83,18 @@ struct EssentialKind {
   }
   static Eigen::Matrix3d Improve(const RayPairs& pairs, const Weights& weights, const Eigen::Matrix3d& model,
                                  double inlier_px) {
-    // All four poses of an essential matrix have the same residuals: any of them will do.
+    // All four poses of an essential matrix have the same residuals, so any of them can be refined.
     return EssentialFromPose(
         RefinePose(pairs, weights, PosesFromEssential(model)[0], inlier_px, kLocalIterations));
   }
 };
 
-Consensus Judge(const Eigen::Matrix3d& model, Eigen::ArrayXd squared_px, double inlier_px) {
+Consensus Evaluate(const Eigen::Matrix3d& model, Eigen::ArrayXd squared_px, double inlier_px) {
   const double limit = inlier_px * inlier_px;
   Consensus result;
   result.found = true;
   result.model = model;
-  // Not a number compares false: such a residual counts as the limit, and not as an inlier.
+  // NaN compares false, so such a residual counts as the limit and not as an inlier.
   result.cost = (squared_px < limit).select(squared_px, limit).sum();
   result.inliers = static_cast<int>((squared_px < limit).count());
   result.squared_px = std::move(squared_px);
@@ -107,15 +107,15 @@ void OptimiseLocally(const RayPairs& pairs, double inlier_px, Consensus* best) {
     if (best->inliers < Kind::kSampleSize + 1) return;
     const Weights weights = (best->squared_px < inlier_px * inlier_px).template cast<double>();
     const Eigen::Matrix3d model = Kind::Improve(pairs, weights, best->model, inlier_px);
-    Consensus improved = Judge(model, Kind::Residuals(pairs, model), inlier_px);
+    Consensus improved = Evaluate(model, Kind::Residuals(pairs, model), inlier_px);
     if (!(improved.cost < best->cost)) return;
     *best = std::move(improved);
   }
 }
 
-// Samples that must be drawn until one without outliers is among them with this confidence.
+// The number of samples until one without outliers is among them with this confidence.
 int IterationsNeeded(int inliers, Eigen::Index total, int sample_size, double confidence) {
-  // Not std::pow, which an optimiser replaces for some exponents and the library rounds otherwise.
+  // Avoids std::pow: an optimiser replaces it for some exponents, which changes the rounding.
   double clean = 1;
   for (int i = 0; i < sample_size; ++i) clean *= static_cast<double>(inliers) / static_cast<double>(total);
   if (clean >= 1) return 1;
@@ -149,7 +149,7 @@ Consensus FindConsensus(const RayPairs& pairs, const ConsensusOptions& options) 
     Consensus best_of_sample;
     best_of_sample.cost = std::numeric_limits<double>::infinity();
     for (const Eigen::Matrix3d& model : models) {
-      Consensus candidate = Judge(model, Kind::Residuals(pairs, model), options.inlier_px);
+      Consensus candidate = Evaluate(model, Kind::Residuals(pairs, model), options.inlier_px);
       if (candidate.cost < best_of_sample.cost) best_of_sample = std::move(candidate);
     }
     if (!(best_of_sample.cost < best.cost)) continue;
@@ -177,7 +177,7 @@ Consensus FindEssential(const RayPairs& pairs, const ConsensusOptions& options) 
 void OfferPose(const RayPairs& pairs, const ConsensusOptions& options, const Rigid3& b_from_a,
                Consensus* best) {
   const Eigen::Matrix3d model = EssentialFromPose(b_from_a);
-  Consensus offered = Judge(model, EssentialResiduals(pairs, model), options.inlier_px);
+  Consensus offered = Evaluate(model, EssentialResiduals(pairs, model), options.inlier_px);
   OptimiseLocally<EssentialKind>(pairs, options.inlier_px, &offered);
   if (!best->found || offered.cost < best->cost) *best = std::move(offered);
 }

@@ -7,15 +7,16 @@
 #include "engine/mapping/two_view_models.h"
 
 // Robust estimation of one two-view model from ray pairs with outliers: random sampling with a truncated
-// quadratic score (MSAC, Torr and Zisserman 2000) and local optimisation of every new best (LO-RANSAC, Chum,
-// Matas and Kittler 2003). Deterministic under the seed; any thread.
+// quadratic score (MSAC, Torr and Zisserman 2000) and local optimisation of every new best model (LO-RANSAC,
+// Chum, Matas and Kittler 2003). Deterministic under the seed; any thread.
 namespace docent::engine {
 
 struct ConsensusOptions {
   double inlier_px = 1.5;  // Sampson residual
   int max_iterations = 300;
   double confidence = 0.999;
-  // A smaller consensus is of no interest: sampling ends once one of this size would have been met.
+  // Smaller consensus sets are of no interest: the sampling ends once a set of this size would have been
+  // found.
   int min_inliers = 0;
   std::uint64_t seed = 1;
 };
@@ -28,12 +29,12 @@ struct Consensus {
   int inliers = 0;
 };
 
-// Models of four (homography), two (rotation) and five (essential matrix) pairs.
+// Minimal samples: two pairs (rotation), four (homography), five (essential matrix).
 Consensus FindRotation(const RayPairs& pairs, const ConsensusOptions& options);
 Consensus FindHomography(const RayPairs& pairs, const ConsensusOptions& options);
 Consensus FindEssential(const RayPairs& pairs, const ConsensusOptions& options);
 
-// Optimises a pose locally and takes it over where it explains the pairs better than `best`.
+// Optimises a pose locally and replaces *best if its cost is lower.
 void OfferPose(const RayPairs& pairs, const ConsensusOptions& options, const Rigid3& b_from_a,
                Consensus* best);
 

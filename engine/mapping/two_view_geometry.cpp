@@ -17,11 +17,12 @@ namespace docent::engine {
 namespace {
 
 constexpr double kDegreesPerRadian = 57.295779513082321;
-// Two constraints a pair instead of one: the radius that holds the same share of a normal distribution.
+// A pair has two constraints instead of one: factor to the radius that contains the same share of a normal
+// distribution.
 constexpr double kTwoDimensional = 1.25;
-// A point whose rays differ by less than this many inlier thresholds has no depth worth the name.
+// A point whose rays differ by less than this many inlier thresholds has no reliable depth.
 constexpr double kMinParallaxThresholds = 2.0;
-// Keypoints are never better placed than this.
+// Keypoints are never localized more precisely than this.
 constexpr double kMinScatterPx = 0.1;
 
 bool IsUnitRay(const Eigen::Vector3d& ray) {
@@ -35,7 +36,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// One estimation: the pairs, the three models, and the questions that the verdict asks of them.
+// One estimation: the pairs, the three models, and the checks that decide the outcome.
 class TwoViewEstimator {
  public:
   TwoViewEstimator(const RayPairs& pairs, const TwoViewOptions& options) : pairs_(pairs), options_(options) {
@@ -47,33 +48,34 @@ class TwoViewEstimator {
     wide_options_.inlier_px *= kTwoDimensional;
   }
 
-  // Sets the verdict and, where there is one, the pose; the caller's vectors are filled by Fill.
-  TwoViewVerdict Decide() {
-    if (MedianDisplacementPx() <= options_.inlier_px) return TwoViewVerdict::kStill;
+  // Decides the outcome and computes the pose, if there is one.
+  TwoViewOutcome Decide() {
+    if (MedianDisplacementPx() <= options_.inlier_px) return TwoViewOutcome::kStill;
     essential_ = FindEssential(pairs_, consensus_options_);
-    // Neither matters where it explains less than half of what the loosest model does.
+    // A rotation or homography with less than half the inliers of the most flexible model is irrelevant.
     wide_options_.min_inliers = std::max(essential_.inliers, MinInliersByRatio()) / 2;
     rotation_ = FindRotation(pairs_, wide_options_);
     homography_ = FindHomography(pairs_, wide_options_);
     OfferSimplerModels();
-    if (!essential_.found) return TwoViewVerdict::kInconsistent;
+    if (!essential_.found) return TwoViewOutcome::kInconsistent;
     const int most = std::max({rotation_.inliers, homography_.inliers, essential_.inliers});
-    if (most < MinInliersByRatio()) return TwoViewVerdict::kInconsistent;
-    if (most < options_.min_inliers) return TwoViewVerdict::kTooFewMatches;
+    if (most < MinInliersByRatio()) return TwoViewOutcome::kInconsistent;
+    if (most < options_.min_inliers) return TwoViewOutcome::kTooFewMatches;
 
     scatter_px_ = EstimateScatter(pairs_, essential_, options_.inlier_px);
-    // Corners are hardly ever better placed than a quarter pixel; and beyond the threshold nothing was seen.
+    // Keypoints are hardly ever more precise than a quarter pixel, and residuals beyond the threshold were
+    // not counted.
     noise_px_ = std::clamp(scatter_px_, 0.25, options_.inlier_px);
     model_ = SelectModel(rotation_, homography_, essential_, options_.inlier_px, noise_px_);
-    if (model_ == ModelKind::kRotation) return RotationVerdict();
-    if (!RotationLeavesParallax()) return TwoViewVerdict::kTooLittleParallax;
+    if (model_ == ModelKind::kRotation) return ClassifyRotation();
+    if (!RotationLeavesParallax()) return TwoViewOutcome::kTooLittleParallax;
     return DecidePose();
   }
 
   const Rigid3& b_from_a() const { return b_from_a_; }
   double median_parallax_deg() const { return median_parallax_deg_; }
   const DepthSignificance& significance() const { return significance_; }
-  // Pairs that the pose explains, at a depth that can be told.
+  // Pairs that agree with the pose and have a reliable depth.
   const std::vector<bool>& inlier() const { return inlier_; }
 
  private:
@@ -81,7 +83,7 @@ class TwoViewEstimator {
     return static_cast<int>(std::ceil(options_.min_inlier_ratio * static_cast<double>(pairs_.size())));
   }
 
-  // Over both images' noise, how far rays moved with the camera taken as still.
+  // Squared displacement of the rays for a camera that is assumed to be still, over the noise of both images.
   Eigen::ArrayXd SquaredDisplacementPx() const {
     return 2 * RotationResiduals(pairs_, Eigen::Matrix3d::Identity());
   }
@@ -90,14 +92,15 @@ class TwoViewEstimator {
     return std::sqrt(Median({squared.data(), squared.data() + squared.size()}));
   }
 
-  // Five noisy pairs with little parallax seldom find what a plane's or a rotation's fit over all pairs
-  // offers: a better start for the essential matrix.
+  // Five noisy pairs with little parallax seldom give a good pose. The homography and the rotation are fitted
+  // to all pairs, so they offer better starts for the essential matrix.
   void OfferSimplerModels() {
     if (homography_.found && 2 * homography_.inliers > essential_.inliers) {
       if (const auto scaled = ScaleHomography(homography_.model)) {
         const auto motions = DecomposeHomography(*scaled);
         for (std::size_t i = 0; i < motions.size();
-             i += 2) {  // the sign of the translation does not matter here
+             i +=
+             2) {  // each pair of motions differs only in the sign of the translation, which is irrelevant
           const Eigen::Vector3d& translation = motions[i].b_from_a.translation;
           if (translation.norm() > 1e-9)
             OfferPose(pairs_, consensus_options_, {motions[i].b_from_a.rotation, translation.normalized()},
@@ -111,59 +114,60 @@ class TwoViewEstimator {
                   &essential_);
   }
 
-  TwoViewVerdict RotationVerdict() const {
+  TwoViewOutcome ClassifyRotation() const {
     const double angle_px = Rotation3(rotation_.model).Angle() / pairs_.pixel_angle;
-    return angle_px < options_.inlier_px ? TwoViewVerdict::kStill : TwoViewVerdict::kPureRotation;
+    return angle_px < options_.inlier_px ? TwoViewOutcome::kStill : TwoViewOutcome::kPureRotation;
   }
 
-  // Small errors of the calibration let a pure rotation look like structure. So what the best rotation leaves
-  // must stand out from the noise, and from what a lens model may be wrong by.
+  // Small calibration errors make a pure rotation look like structure. The residuals of the best rotation
+  // must therefore exceed the noise, and also the possible errors of a lens model.
   bool RotationLeavesParallax() const {
     constexpr double kMinNoises = 1.6, kMinPx = 0.6;
     const double limit = options_.inlier_px * options_.inlier_px;
-    const Weights counted = (essential_.squared_px < limit).cast<double>();
-    const Eigen::Matrix3d rotation = FitRotation(pairs_, counted);
+    const Weights inliers = (essential_.squared_px < limit).cast<double>();
+    const Eigen::Matrix3d rotation = FitRotation(pairs_, inliers);
     std::vector<double> squared;
     for (const Eigen::Matrix3d* model : {&rotation, &rotation_.model}) {
       const Eigen::ArrayXd residuals = RotationResiduals(pairs_, *model);
       std::vector<double> of_inliers;
       for (Eigen::Index i = 0; i < pairs_.size(); ++i)
-        if (counted[i] != 0) of_inliers.push_back(residuals[i]);
+        if (inliers[i] != 0) of_inliers.push_back(residuals[i]);
       squared.push_back(Median(std::move(of_inliers)));
     }
     // 1.386 sigma^2 is the median of the sum of two squared normal variables.
     const double deviation = std::sqrt(std::min(squared[0], squared[1]) / 1.386);
     if (deviation > std::max(kMinNoises * noise_px_, kMinPx)) return true;
-    // Corners followed so well that they show less than that: clearly more than they scatter, and more of
-    // them than chance or one ill-followed thing could sway.
+    // Precisely tracked corners may show less parallax than that. It must then clearly exceed their scatter,
+    // and enough corners must contribute that neither chance nor one badly tracked object decides.
     constexpr double kClearNoises = 2.8, kMinClear = 100;
-    return counted.sum() >= kMinClear && deviation > kClearNoises * std::max(scatter_px_, kMinScatterPx);
+    return inliers.sum() >= kMinClear && deviation > kClearNoises * std::max(scatter_px_, kMinScatterPx);
   }
 
-  TwoViewVerdict DecidePose() {
+  TwoViewOutcome DecidePose() {
     const std::vector<PoseCandidate> ranked =
         RankPoses(pairs_, homography_, essential_, options_.inlier_px, noise_px_);
     b_from_a_ = ranked.front().b_from_a;
     const Eigen::ArrayXd squared = EssentialResiduals(pairs_, EssentialFromPose(b_from_a_));
     const std::vector<Depth> depths =
-        JudgeDepths(pairs_, b_from_a_, kMinParallaxThresholds * options_.inlier_px);
+        ClassifyDepths(pairs_, b_from_a_, kMinParallaxThresholds * options_.inlier_px);
     Classify(squared, depths);
-    if (consistent_ < MinInliersByRatio()) return TwoViewVerdict::kInconsistent;
-    if (HasSecondMotion(squared) || LooksStillButForOneThing()) return TwoViewVerdict::kInconsistent;
+    if (consistent_ < MinInliersByRatio()) return TwoViewOutcome::kInconsistent;
+    if (HasSecondMotion(squared) || IsStillCameraWithMovingObject()) return TwoViewOutcome::kInconsistent;
     MeasureParallax();
-    // Many points without depth beside some with: a thing that moves before a turning camera looks the same.
+    // Many points without depth beside some with depth also occur when an object moves in front of a rotating
+    // camera.
     constexpr double kMaxFarShare = 0.3;
     if (median_parallax_deg_ < options_.min_parallax_deg || far_ > kMaxFarShare * consistent_)
-      return TwoViewVerdict::kTooLittleParallax;
+      return TwoViewOutcome::kTooLittleParallax;
     significance_ = MeasureDepthSignificance(
-        pairs_, visible_inlier_ratio_, b_from_a_,
+        pairs_, is_consistent_, b_from_a_,
         model_ == ModelKind::kHomography ? StructureModel::kPlane : StructureModel::kGeneral,
         std::max(scatter_px_, kMinScatterPx), options_.depth_noise);
-    if (!DepthIsSignificant()) return TwoViewVerdict::kTooLittleParallax;
-    if (IsAmbiguous(ranked)) return TwoViewVerdict::kAmbiguousPlane;
+    if (!DepthIsSignificant()) return TwoViewOutcome::kTooLittleParallax;
+    if (IsAmbiguous(ranked)) return TwoViewOutcome::kAmbiguousPlane;
     if (std::count(inlier_.begin(), inlier_.end(), true) < options_.min_inliers)
-      return TwoViewVerdict::kTooFewMatches;
-    return model_ == ModelKind::kHomography ? TwoViewVerdict::kPlanar : TwoViewVerdict::kGeneral;
+      return TwoViewOutcome::kTooFewMatches;
+    return model_ == ModelKind::kHomography ? TwoViewOutcome::kPlanar : TwoViewOutcome::kGeneral;
   }
 
   bool DepthIsSignificant() const {
@@ -173,19 +177,19 @@ class TwoViewEstimator {
            sigma <= options_.max_plane_depth_sigma;
   }
 
-  // consistent_: explained by the pose and not behind; far_: of these, too far for a depth.
+  // consistent_: pairs with a small residual that are not behind a camera; far_: those of them without depth.
   void Classify(const Eigen::ArrayXd& squared, const std::vector<Depth>& depths) {
     const double limit = options_.inlier_px * options_.inlier_px;
     inlier_.assign(depths.size(), false);
-    visible_inlier_ratio_.assign(depths.size(), false);
+    is_consistent_.assign(depths.size(), false);
     for (std::size_t i = 0; i < depths.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
       if (!(squared[row] < limit) || depths[i] == Depth::kBehind) continue;
-      visible_inlier_ratio_[i] = true;
+      is_consistent_[i] = true;
       ++consistent_;
       far_ += depths[i] == Depth::kTooFar;
-      // On a plane the homography says more than the epipolar line: a match that slid along the line is
-      // wrong.
+      // On a plane the homography is stricter than the epipolar constraint: a match that slid along the
+      // epipolar line is wrong.
       const bool on_plane = model_ != ModelKind::kHomography ||
                             homography_.squared_px[row] < limit * kTwoDimensional * kTwoDimensional;
       inlier_[i] = on_plane && depths[i] == Depth::kInFront;
@@ -195,8 +199,8 @@ class TwoViewEstimator {
   void MeasureParallax() {
     const Eigen::Matrix3d rotation = b_from_a_.rotation.matrix();
     std::vector<double> angles;
-    for (std::size_t i = 0; i < visible_inlier_ratio_.size(); ++i) {
-      if (!visible_inlier_ratio_[i]) continue;
+    for (std::size_t i = 0; i < is_consistent_.size(); ++i) {
+      if (!is_consistent_[i]) continue;
       const auto row = static_cast<Eigen::Index>(i);
       const double chord = (rotation * pairs_.RayA(row) - pairs_.RayB(row)).norm();
       angles.push_back(2 * std::asin(std::min(chord / 2, 1.0)));
@@ -204,13 +208,12 @@ class TwoViewEstimator {
     median_parallax_deg_ = kDegreesPerRadian * Median(std::move(angles));
   }
 
-  // Whether many of the pairs that the pose leaves out move as one: then it may be the pose that follows a
-  // moving thing. Rotation (the still camera's among them) is what a background shows when the camera does
-  // not move.
+  // True if many of the pairs that disagree with the pose move as one, because the pose may then be that of a
+  // moving object. The motion of the background is a rotation (or none) if the camera does not translate.
   bool HasSecondMotion(const Eigen::ArrayXd& squared) const {
-    constexpr double kClearlyOut = 2.0, kMinShare = 0.06;
+    constexpr double kOutlierFactor = 2.0, kMinShare = 0.06;
     constexpr int kMinPairs = 10;
-    const double limit_px = kClearlyOut * options_.inlier_px, limit = limit_px * limit_px;
+    const double limit_px = kOutlierFactor * options_.inlier_px, limit = limit_px * limit_px;
     std::vector<Eigen::Vector3d> rays_in_a, rays_in_b;
     for (Eigen::Index i = 0; i < pairs_.size(); ++i) {
       const double plane = model_ == ModelKind::kHomography
@@ -227,13 +230,14 @@ class TwoViewEstimator {
            options.min_inliers;
   }
 
-  // A share of the image did not move at all and has no parallax either, while the rest has: more likely a
-  // still camera and a moving thing than a camera that moved without turning before a far background.
-  bool LooksStillButForOneThing() const {
+  // True if part of the image has neither motion nor parallax while the rest has. A still camera and a moving
+  // object are then more likely than a camera that translates without rotation in front of a distant
+  // background.
+  bool IsStillCameraWithMovingObject() const {
     constexpr double kMinStillShare = 0.08, kMinFarShare = 0.5;
-    constexpr double kStillNoises = 3.0;  // holds nine in ten of what does not move
+    constexpr double kStillNoises = 3.0;  // contains nine in ten of the points that do not move
     const double still_px = std::max(kTwoDimensional * options_.inlier_px, kStillNoises * noise_px_);
-    constexpr double kFarRatio = 1.5;  // the rotation is only known within the noise
+    constexpr double kFarRatio = 1.5;  // tolerance for the uncertainty of the rotation
     const double far_px = kFarRatio * still_px;
     const Eigen::ArrayXd squared = SquaredDisplacementPx();
     const Eigen::ArrayXd squared_parallax = 2 * RotationResiduals(pairs_, b_from_a_.rotation.matrix());
@@ -250,10 +254,10 @@ class TwoViewEstimator {
   const TwoViewOptions& options_;
   ConsensusOptions consensus_options_, wide_options_;
   Consensus rotation_, homography_, essential_;
-  double scatter_px_ = 0, noise_px_ = 0;  // as seen; and as it is at least
+  double scatter_px_ = 0, noise_px_ = 0;  // as measured, and with a lower limit
   ModelKind model_ = ModelKind::kRotation;
   Rigid3 b_from_a_;
-  std::vector<bool> inlier_, visible_inlier_ratio_;
+  std::vector<bool> inlier_, is_consistent_;
   int consistent_ = 0, far_ = 0;
   double median_parallax_deg_ = 0;
   DepthSignificance significance_;
@@ -261,23 +265,23 @@ class TwoViewEstimator {
 
 }  // namespace
 
-const char* Advice(TwoViewVerdict verdict) {
-  switch (verdict) {
-    case TwoViewVerdict::kGeneral:
-    case TwoViewVerdict::kPlanar:
+const char* Advice(TwoViewOutcome outcome) {
+  switch (outcome) {
+    case TwoViewOutcome::kGeneral:
+    case TwoViewOutcome::kPlanar:
       return "";
-    case TwoViewVerdict::kStill:
+    case TwoViewOutcome::kStill:
       return "move sideways";
-    case TwoViewVerdict::kPureRotation:
+    case TwoViewOutcome::kPureRotation:
       return "move sideways instead of turning";
-    case TwoViewVerdict::kTooLittleParallax:
+    case TwoViewOutcome::kTooLittleParallax:
       return "move further sideways";
-    case TwoViewVerdict::kAmbiguousPlane:
-      return "move sideways in another direction, or look at something with depth";
-    case TwoViewVerdict::kTooFewMatches:
-      return "look at something with more texture, and move slowly";
-    case TwoViewVerdict::kInconsistent:
-      return "wait until nothing moves in the image, then move sideways";
+    case TwoViewOutcome::kAmbiguousPlane:
+      return "move in another direction, or point the camera at something less flat";
+    case TwoViewOutcome::kTooFewMatches:
+      return "point the camera at something with more detail, and move slowly";
+    case TwoViewOutcome::kInconsistent:
+      return "wait until nothing moves in view, then move sideways";
   }
   return "";
 }
@@ -288,7 +292,7 @@ TwoViewResult EstimateTwoViews(std::span<const Eigen::Vector3d> rays_in_a,
   TwoViewResult result;
   result.points_in_a.assign(count, Eigen::Vector3d::Zero());
   result.inlier.assign(count, false);
-  // What is no unit ray (not a number, zero) takes no part.
+  // Rays that are not unit vectors (NaN, zero) are ignored.
   std::vector<Eigen::Vector3d> usable_a, usable_b;
   std::vector<std::size_t> index;
   for (std::size_t i = 0; i < count; ++i) {
@@ -297,15 +301,15 @@ TwoViewResult EstimateTwoViews(std::span<const Eigen::Vector3d> rays_in_a,
     usable_b.push_back(rays_in_b[i]);
     index.push_back(i);
   }
-  constexpr int kFewest = 8;  // below it even noise fits an essential matrix
-  if (static_cast<int>(index.size()) < std::max(options.min_inliers, kFewest)) return result;
+  constexpr int kMinPairs = 8;  // with fewer pairs even noise fits an essential matrix
+  if (static_cast<int>(index.size()) < std::max(options.min_inliers, kMinPairs)) return result;
 
   const RayPairs pairs = MakeRayPairs(usable_a, usable_b, options.pixel_angle);
   TwoViewEstimator estimator(pairs, options);
-  result.verdict = estimator.Decide();
+  result.outcome = estimator.Decide();
   result.median_parallax_deg = estimator.median_parallax_deg();
   result.significance = estimator.significance();
-  if (result.verdict != TwoViewVerdict::kGeneral && result.verdict != TwoViewVerdict::kPlanar) return result;
+  if (result.outcome != TwoViewOutcome::kGeneral && result.outcome != TwoViewOutcome::kPlanar) return result;
   result.b_from_a = estimator.b_from_a();
   for (std::size_t i = 0; i < index.size(); ++i) {
     if (!estimator.inlier()[i]) continue;

@@ -12,7 +12,7 @@ namespace {
 
 using Columns = Eigen::Array<double, Eigen::Dynamic, 3>;
 
-// matrix * ray of every row.
+// matrix * ray for every row.
 Columns Map(const Eigen::Matrix3d& matrix, const Columns& rays) {
   Columns result(rays.rows(), 3);
   for (int i = 0; i < 3; ++i)
@@ -24,7 +24,7 @@ Eigen::ArrayXd Dot(const Columns& a, const Columns& b) {
   return a.col(0) * b.col(0) + a.col(1) * b.col(1) + a.col(2) * b.col(2);
 }
 
-// |x / |x| - y|^2 for unit y: the squared chord, which also grows for rays that point away.
+// |x / |x| - y|^2 for unit y: the squared chord, which is also large for rays that point the opposite way.
 Eigen::ArrayXd SquaredChord(const Columns& x, const Columns& y) {
   return 2 - 2 * Dot(x, y) / (Dot(x, x) + 1e-300).sqrt();
 }
@@ -52,8 +52,8 @@ struct NormalEquations {
   }
 };
 
-// Levenberg-Marquardt for any model: linearize(model) gives NormalEquations, cost(model) the loss, and
-// apply(model, step) the moved model.
+// Levenberg-Marquardt for any model: linearize(model) returns NormalEquations, cost(model) the loss, and
+// apply(model, step) the model after the step.
 template <class Model, class Linearize, class Cost, class Apply>
 Model Minimise(const Model& start, int max_iterations, const Linearize& linearize, const Cost& cost,
                const Apply& apply) {
@@ -67,10 +67,10 @@ Model Minimise(const Model& start, int max_iterations, const Linearize& lineariz
     const Model candidate = apply(best, step);
     const double candidate_cost = cost(candidate);
     if (candidate_cost < best_cost) {
-      const bool settled = best_cost - candidate_cost < 1e-6 * best_cost;
+      const bool converged = best_cost - candidate_cost < 1e-6 * best_cost;
       best = candidate;
       best_cost = candidate_cost;
-      if (settled) break;
+      if (converged) break;
       damping = std::max(damping * 0.1, 1e-9);
       equations = linearize(best);
     } else {
@@ -81,7 +81,7 @@ Model Minimise(const Model& start, int max_iterations, const Linearize& lineariz
   return best;
 }
 
-// Directions in which a unit vector can turn.
+// Two orthogonal directions in which a unit vector can rotate.
 Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& unit) {
   Eigen::Matrix<double, 3, 2> basis;
   basis.col(0) = unit.unitOrthogonal();
@@ -89,7 +89,7 @@ Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& unit) {
   return basis;
 }
 
-// The denominator is held fixed: near the solution the numerator is small and its change is what counts.
+// The denominator is held fixed: near the solution the numerator is small, so its change dominates.
 NormalEquations<5> LinearizePose(const RayPairs& pairs, const Weights& weights, const Rigid3& pose,
                                  double huber_px) {
   NormalEquations<5> equations;
@@ -99,13 +99,13 @@ NormalEquations<5> LinearizePose(const RayPairs& pairs, const Weights& weights, 
   const double per_pixel_squared = 1 / (pairs.pixel_angle * pairs.pixel_angle);
   for (Eigen::Index i = 0; i < pairs.size(); ++i) {
     if (weights[i] == 0) continue;
-    const Eigen::Vector3d turned = rotation * pairs.RayA(i), ray_b = pairs.RayB(i);
-    const Eigen::Vector3d plane_a = translation.cross(turned), plane_b = ray_b.cross(translation);
+    const Eigen::Vector3d rotated = rotation * pairs.RayA(i), ray_b = pairs.RayB(i);
+    const Eigen::Vector3d plane_a = translation.cross(rotated), plane_b = ray_b.cross(translation);
     const double weight_of_angle =
         per_pixel_squared / (plane_a.squaredNorm() + plane_b.squaredNorm() + 1e-18);
     const double numerator = ray_b.dot(plane_a);
     Eigen::Matrix<double, 5, 1> jacobian;
-    jacobian << turned.cross(plane_b), basis.transpose() * turned.cross(ray_b);
+    jacobian << rotated.cross(plane_b), basis.transpose() * rotated.cross(ray_b);
     const double weight =
         weights[i] * weight_of_angle * HuberSlope(numerator * numerator * weight_of_angle, huber_px);
     equations.information.noalias() += weight * jacobian * jacobian.transpose();
@@ -117,7 +117,7 @@ NormalEquations<5> LinearizePose(const RayPairs& pairs, const Weights& weights, 
 NormalEquations<9> LinearizeHomography(const RayPairs& pairs, const Weights& weights,
                                        const Eigen::Matrix3d& homography, double huber_px) {
   NormalEquations<9> equations;
-  // Half of the one-way transfer error, squared: the first-order joint distance where H is nearly a rotation.
+  // Half of the squared one-way transfer error: the first-order joint distance if H is nearly a rotation.
   const double per_pixel_squared = 0.5 / (pairs.pixel_angle * pairs.pixel_angle);
   for (Eigen::Index i = 0; i < pairs.size(); ++i) {
     if (weights[i] == 0) continue;
@@ -133,9 +133,9 @@ NormalEquations<9> LinearizeHomography(const RayPairs& pairs, const Weights& wei
     // Parameters column by column: d mapped / d (column j) = ray_a[j] * identity, and slope' slope = slope /
     // length.
     const Eigen::Matrix3d block = weight / length * slope;
-    const Eigen::Vector3d pull = weight * slope * residual;
+    const Eigen::Vector3d pixel_gradient = weight * slope * residual;
     for (int j = 0; j < 3; ++j) {
-      equations.gradient.segment<3>(3 * j) += ray_a[j] * pull;
+      equations.gradient.segment<3>(3 * j) += ray_a[j] * pixel_gradient;
       for (int k = j; k < 3; ++k)
         equations.information.block<3, 3>(3 * j, 3 * k) += ray_a[j] * ray_a[k] * block;
     }
@@ -164,7 +164,7 @@ Eigen::ArrayXd EssentialResiduals(const RayPairs& pairs, const Eigen::Matrix3d& 
   const Columns lines_b = Map(essential, pairs.a);
   const Columns lines_a = Map(essential.transpose(), pairs.b);
   const Eigen::ArrayXd numerator = Dot(lines_b, pairs.b);
-  // Of the lines' normals only what lies across the ray moves the residual.
+  // Only the component of the epipolar line's normal that is perpendicular to the ray affects the residual.
   const Eigen::ArrayXd squared = numerator.square();
   const Eigen::ArrayXd denominator = Dot(lines_a, lines_a) + Dot(lines_b, lines_b) - 2 * squared;
   return squared / (denominator.max(1e-18) * (pairs.pixel_angle * pairs.pixel_angle));

@@ -22,26 +22,28 @@ double Median(std::vector<double> values) {
 // Truncation of the squared normalised residuals of poses: two standard deviations.
 constexpr double kMaxSquared = 4.0;
 
-// Two constraints a pair instead of one: the radius that holds the same share of a normal distribution.
+// A pair has two constraints instead of one: factor to the radius that contains the same share of a normal
+// distribution.
 constexpr double kTwoDimensional = 1.25;
 
 struct Evidence {
-  Weights counted, on_plane;  // 0 or 1 a pair
+  Weights counted, on_plane;  // 0 or 1 per pair
   double noise_px = 1;
 };
 
-PoseCandidate JudgePose(const RayPairs& pairs, const Evidence& evidence, const Rigid3& b_from_a) {
-  constexpr double kMinParallaxSigmas = 4;  // of the noise: below it front and behind are a matter of luck
+PoseCandidate EvaluatePose(const RayPairs& pairs, const Evidence& evidence, const Rigid3& b_from_a) {
+  // Standard deviations of the noise; with less parallax, front and behind cannot be distinguished.
+  constexpr double kMinParallaxSigmas = 4;
   const Eigen::ArrayXd squared =
       EssentialResiduals(pairs, EssentialFromPose(b_from_a)) / (evidence.noise_px * evidence.noise_px);
-  const std::vector<Depth> depths = JudgeDepths(pairs, b_from_a, kMinParallaxSigmas * evidence.noise_px);
+  const std::vector<Depth> depths = ClassifyDepths(pairs, b_from_a, kMinParallaxSigmas * evidence.noise_px);
   PoseCandidate candidate{.b_from_a = b_from_a};
   for (Eigen::Index i = 0; i < pairs.size(); ++i) {
     if (evidence.counted[i] == 0) continue;
     const bool behind = depths[static_cast<std::size_t>(i)] == Depth::kBehind;
-    const double misfit = behind ? kMaxSquared : std::min(squared[i], kMaxSquared);
-    candidate.misfit += misfit;
-    if (behind || evidence.on_plane[i] == 0) candidate.evidence += misfit;
+    const double cost = behind ? kMaxSquared : std::min(squared[i], kMaxSquared);
+    candidate.cost += cost;
+    if (behind || evidence.on_plane[i] == 0) candidate.off_plane_cost += cost;
   }
   return candidate;
 }
@@ -53,9 +55,8 @@ double Gric(const Consensus& consensus, const Weights& counted, double noise_px,
   const double count = counted.sum();
   const double limit = kTruncation * (kDataDimension - dimension);
   const Eigen::ArrayXd normalised = consensus.squared_px / (noise_px * noise_px);
-  const double misfit = (counted * (normalised < limit).select(normalised, limit)).sum();
-  return misfit + std::log(kDataDimension) * dimension * count +
-         std::log(kDataDimension * count) * parameters;
+  const double cost = (counted * (normalised < limit).select(normalised, limit)).sum();
+  return cost + std::log(kDataDimension) * dimension * count + std::log(kDataDimension * count) * parameters;
 }
 
 bool IsVariant(const Rigid3& a, const Rigid3& b) {
@@ -80,8 +81,8 @@ ModelKind SelectModel(const Consensus& rotation, const Consensus& homography, co
   for (const Consensus* consensus : {&rotation, &homography, &essential})
     if (consensus->found)
       counted = counted.max((consensus->squared_px < inlier_px * inlier_px).cast<double>());
-  // Somewhat more noise than estimated: the small misfits of a lens model, and an estimate that the
-  // truncation made too low, must not look like structure. Real depth exceeds any of this.
+  // Assumes somewhat more noise than estimated, so that small errors of a lens model, and an estimate that
+  // the truncation made too low, do not look like structure. Real depth exceeds any of this.
   constexpr double kNoiseMargin = 1.25;
   const double noise = kNoiseMargin * noise_px;
   const double of_rotation = Gric(rotation, counted, noise, 2, 3);
@@ -91,17 +92,17 @@ ModelKind SelectModel(const Consensus& rotation, const Consensus& homography, co
   return of_homography <= of_essential ? ModelKind::kHomography : ModelKind::kEssential;
 }
 
-std::vector<Depth> JudgeDepths(const RayPairs& pairs, const Rigid3& b_from_a, double min_parallax_px) {
+std::vector<Depth> ClassifyDepths(const RayPairs& pairs, const Rigid3& b_from_a, double min_parallax_px) {
   std::vector<Depth> depths(static_cast<std::size_t>(pairs.size()), Depth::kTooFar);
   const Eigen::Matrix3d rotation = b_from_a.rotation.matrix();
   const double min_parallax = min_parallax_px * pairs.pixel_angle;
   for (Eigen::Index i = 0; i < pairs.size(); ++i) {
-    const Eigen::Vector3d turned = rotation * pairs.RayA(i), ray_b = pairs.RayB(i);
-    if ((turned - ray_b).squaredNorm() < min_parallax * min_parallax) continue;
-    // depth_b * ray_b = depth_a * turned + translation, solved by crossing with either ray.
-    const Eigen::Vector3d normal = turned.cross(ray_b);
+    const Eigen::Vector3d rotated = rotation * pairs.RayA(i), ray_b = pairs.RayB(i);
+    if ((rotated - ray_b).squaredNorm() < min_parallax * min_parallax) continue;
+    // depth_b * ray_b = depth_a * rotated + translation, solved by crossing with either ray.
+    const Eigen::Vector3d normal = rotated.cross(ray_b);
     const double depth_a = ray_b.cross(b_from_a.translation).dot(normal);
-    const double depth_b = turned.cross(b_from_a.translation).dot(normal);
+    const double depth_b = rotated.cross(b_from_a.translation).dot(normal);
     depths[static_cast<std::size_t>(i)] = depth_a > 0 && depth_b > 0 ? Depth::kInFront : Depth::kBehind;
   }
   return depths;
@@ -114,11 +115,12 @@ std::vector<PoseCandidate> RankPoses(const RayPairs& pairs, const Consensus& hom
   const Weights essential_inliers = (essential.squared_px < limit).cast<double>();
   Evidence evidence{essential_inliers, Weights::Zero(pairs.size()), noise_px};
   std::vector<PoseCandidate> candidates;
-  // Refined or not, all poses of one essential matrix have equal residuals; cheirality tells them apart.
-  const auto add_all = [&](const Rigid3& pose, bool reading) {
+  // Whether refined or not, all poses of one essential matrix have equal residuals; cheirality distinguishes
+  // them.
+  const auto add_all = [&](const Rigid3& pose, bool exact) {
     for (const Rigid3& variant : PosesFromEssential(EssentialFromPose(pose))) {
-      candidates.push_back(JudgePose(pairs, evidence, variant));
-      candidates.back().reading = reading;
+      candidates.push_back(EvaluatePose(pairs, evidence, variant));
+      candidates.back().exact = exact;
     }
   };
   const bool plane = homography.found && 2 * homography.inliers >= essential.inliers;
@@ -135,14 +137,14 @@ std::vector<PoseCandidate> RankPoses(const RayPairs& pairs, const Consensus& hom
       plane_squared = HomographyResiduals(pairs, refined);
     }
     evidence.counted = evidence.counted.max(plane_inliers);
-    // Wide enough that no point of the plane is taken for relief because of its noise: of those, the winning
-    // essential matrix has picked the ones that happen to suit it.
-    constexpr double kSurelyOffPlane = 3.7;  // standard deviations; exceeded by one in a thousand
-    const double off_plane_px = std::max(plane_px, kSurelyOffPlane * noise_px);
+    // Wide enough that noise puts no point of the plane off it: among such points the winning essential
+    // matrix has selected those that happen to agree with it.
+    constexpr double kOffPlaneSigmas = 3.7;  // standard deviations; exceeded by one in a thousand
+    const double off_plane_px = std::max(plane_px, kOffPlaneSigmas * noise_px);
     evidence.on_plane = (plane_squared < off_plane_px * off_plane_px).cast<double>();
     if (const auto scaled = ScaleHomography(refined)) {
       const auto motions = DecomposeHomography(*scaled);
-      for (std::size_t i = 0; i < motions.size(); i += 2) {  // the next one differs by the sign alone
+      for (std::size_t i = 0; i < motions.size(); i += 2) {  // motions come in pairs that differ only in sign
         const double length = motions[i].b_from_a.translation.norm();
         if (!(length > 1e-9)) continue;
         const Rigid3 pose{motions[i].b_from_a.rotation, motions[i].b_from_a.translation / length};
@@ -156,21 +158,22 @@ std::vector<PoseCandidate> RankPoses(const RayPairs& pairs, const Consensus& hom
       !plane);
 
   std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const PoseCandidate& a, const PoseCandidate& b) { return a.misfit < b.misfit; });
+                   [](const PoseCandidate& a, const PoseCandidate& b) { return a.cost < b.cost; });
   return candidates;
 }
 
 bool IsAmbiguous(const std::vector<PoseCandidate>& ranked) {
-  // In units of twice the log-likelihood: the constants guard against chance, the shares against a lens model
-  // whose small errors favour one pose systematically.
-  constexpr double kMinEvidence = 40, kMinEvidenceShare = 0.1, kChanceDeviations = 5, kMisfitShare = 0.4;
+  // In units of twice the log-likelihood. The constants guard against chance, the ratios against a lens model
+  // whose small errors systematically favour one pose.
+  constexpr double kMinEvidence = 40, kMinEvidenceRatio = 0.1, kChanceDeviations = 5, kCostRatio = 0.4;
   const PoseCandidate& best = ranked.front();
-  const double evidence = best.evidence + std::max(kMinEvidence, kMinEvidenceShare * best.evidence);
-  // The noise on a plane's points differs between two epipolar directions: a sum of independent terms.
-  const double misfit =
-      best.misfit + std::max(kChanceDeviations * std::sqrt(2 * best.misfit), kMisfitShare * best.misfit);
+  const double evidence =
+      best.off_plane_cost + std::max(kMinEvidence, kMinEvidenceRatio * best.off_plane_cost);
+  // The noise of the plane's points differs between two epipolar directions: a sum of independent terms.
+  const double cost =
+      best.cost + std::max(kChanceDeviations * std::sqrt(2 * best.cost), kCostRatio * best.cost);
   return std::any_of(ranked.begin() + 1, ranked.end(), [&](const PoseCandidate& other) {
-    return other.reading && other.evidence < evidence && other.misfit < misfit &&
+    return other.exact && other.off_plane_cost < evidence && other.cost < cost &&
            !IsVariant(other.b_from_a, best.b_from_a);
   });
 }

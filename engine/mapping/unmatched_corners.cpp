@@ -32,10 +32,10 @@ std::size_t Occupancy::Index(const Eigen::Vector2f& pixel) const {
 std::vector<ScoredCorner> UnmatchedCorners(const Map::KeyFrameRecord& keyframe, std::size_t level,
                                            float min_score, Occupancy* occupancy) {
   const ImageFeatures& features = *keyframe.keyframe.features;
-  features.Look();
+  features.MarkInUse();
   const cv::Mat& image = features.levels[level];
   for (const Observation& observation : keyframe.observations) {
-    // A point of a neighbouring level stands for the same structure.
+    // An observation on a neighbouring level belongs to the same structure.
     if (std::abs(static_cast<int>(observation.level) - static_cast<int>(level)) > 1) continue;
     occupancy->Take(
         LevelFromLevelZero(observation.pixel.cast<double>(), static_cast<int>(level)).cast<float>());

@@ -7,14 +7,14 @@
 
 #include "engine/map/map.h"
 
-// Corners of a keyframe that no point of the map explains yet: what new points are made of. For the mapper's
-// thread.
+// Corners of a keyframe that are not observations of a map point yet, from which new points are created. For
+// the mapper's thread.
 namespace docent::engine {
 
-// Which places of a pyramid level are taken: a coarse raster about the features that are.
+// A coarse grid over a pyramid level that marks which cells already have a feature.
 class Occupancy {
  public:
-  // cell: pixels of the level.
+  // cell: width of a cell, in pixels of the level.
   Occupancy(const cv::Mat& image, float cell);
   void Take(const Eigen::Vector2f& pixel);
   bool Taken(const Eigen::Vector2f& pixel) const;
@@ -32,9 +32,9 @@ struct ScoredCorner {
   Corner corner;
 };
 
-// The corners of a level that score at least min_score, best first, where neither *occupancy nor an
-// observation of the keyframe on this or a neighbouring level has taken the place; the observations are
-// entered into *occupancy.
+// The corners of a level with a score of at least min_score, best first, in cells that neither *occupancy nor
+// an observation of the keyframe on this or a neighbouring level has taken. Marks the observations in
+// *occupancy.
 std::vector<ScoredCorner> UnmatchedCorners(const Map::KeyFrameRecord& keyframe, std::size_t level,
                                            float min_score, Occupancy* occupancy);
 

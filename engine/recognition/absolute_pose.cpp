@@ -13,7 +13,7 @@
 namespace docent::engine {
 namespace {
 
-// Coefficients from the constant up.
+// Coefficients, constant term first.
 template <std::size_t m, std::size_t n>
 std::array<double, m + n - 1> Multiply(const std::array<double, m>& a, const std::array<double, n>& b) {
   std::array<double, m + n - 1> product{};
@@ -22,8 +22,8 @@ std::array<double, m + n - 1> Multiply(const std::array<double, m>& a, const std
   return product;
 }
 
-// Real roots of a quartic, nearly double ones included: the real parts of all its roots whose imaginary part
-// is small. The caller polishes and checks them.
+// Real roots of a quartic, including nearly double ones: the real parts of all roots with a small imaginary
+// part. The caller refines and checks them.
 std::vector<double> NearlyRealRoots(const std::array<double, 5>& coefficients) {
   const double largest =
       std::abs(*std::max_element(coefficients.begin(), coefficients.end(),
@@ -53,7 +53,7 @@ struct Triangle {
   double cosine01 = 0, cosine02 = 0, cosine12 = 0;
   double side01 = 0, side02 = 0, side12 = 0;  // squared
 
-  // Misfit of the law of cosines on each side.
+  // Residual of the law of cosines on each side.
   Eigen::Vector3d Residuals(const Eigen::Vector3d& s) const {
     return {s[0] * s[0] + s[1] * s[1] - 2 * s[0] * s[1] * cosine01 - side01,
             s[0] * s[0] + s[2] * s[2] - 2 * s[0] * s[2] * cosine02 - side02,
@@ -68,7 +68,7 @@ struct Triangle {
   }
 };
 
-// Newton's method on the distances; empty when they do not come to fit.
+// Newton's method on the distances; empty if it does not converge.
 std::optional<Eigen::Vector3d> Polish(const Triangle& triangle, Eigen::Vector3d distances) {
   constexpr int kIterations = 8;
   const double scale = std::max({triangle.side01, triangle.side02, triangle.side12});
@@ -84,8 +84,9 @@ std::optional<Eigen::Vector3d> Polish(const Triangle& triangle, Eigen::Vector3d 
   return distances;
 }
 
-// All distances along the rays, from ratios u = s1 / s0 and v = s2 / s0. Subtracting the sides' equations
-// leaves u as a quotient p(v) / q(v); put into the first, that makes a quartic in v.
+// All distances along the rays, from the ratios u = s1 / s0 and v = s2 / s0. The difference of the equations
+// of two sides gives u as a quotient p(v) / q(v); inserted into the first equation, this gives a quartic in
+// v.
 std::vector<Eigen::Vector3d> SolveDistances(const Triangle& t) {
   const double k = (t.side12 - t.side01) / t.side02, m = t.side01 / t.side02;
   const std::array<double, 3> p = {k + 1, -2 * k * t.cosine02, k - 1};
@@ -113,7 +114,8 @@ std::vector<Eigen::Vector3d> SolveDistances(const Triangle& t) {
   for (const double v : NearlyRealRoots(quartic)) {
     const double denominator = q[0] + q[1] * v;
     if (std::abs(denominator) > 1e-5) add((p[0] + v * (p[1] + v * p[2])) / denominator, v);
-    // Where numerator and denominator vanish together (symmetric views), the first side alone gives u, twice.
+    // If numerator and denominator vanish together (symmetric views), the first side alone gives two values
+    // of u.
     if (std::abs(denominator) < 1e-3) {
       const double constant = 1 - m * (third[0] + v * (third[1] + v * third[2]));
       const double root = std::sqrt(std::max(t.cosine01 * t.cosine01 - constant, 0.0));
@@ -124,7 +126,7 @@ std::vector<Eigen::Vector3d> SolveDistances(const Triangle& t) {
   return solutions;
 }
 
-// An orthonormal frame that a triangle defines; empty where the triangle is a line.
+// An orthonormal frame defined by a triangle; empty if the triangle is a line.
 std::optional<Eigen::Matrix3d> TriangleFrame(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                              const Eigen::Vector3d& c) {
   const Eigen::Vector3d ab = b - a, ac = c - a, normal = ab.cross(ac);
@@ -141,7 +143,8 @@ struct Correspondences {
   std::vector<std::size_t> index;  // in the caller's vectors
   double pixel_angle = 1;
 
-  // Chord between ray and direction to the point, pixels, squared: also large where the point is behind.
+  // Squared chord between ray and direction to the point, in pixels; large too if the point is behind the
+  // camera.
   double Squared(std::size_t i, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) const {
     const Eigen::Vector3d x = rotation * points[i] + translation;
     const double length = x.norm();
@@ -158,7 +161,7 @@ struct Support {
   double sum_of_squares = 0;  // of the inliers
 };
 
-Support Judge(const Correspondences& all, const Rigid3& pose, double inlier_px) {
+Support EvaluateSupport(const Correspondences& all, const Rigid3& pose, double inlier_px) {
   Support support;
   support.pose = pose;
   support.cost = 0;
@@ -183,7 +186,7 @@ Support OptimiseLocally(const Correspondences& all, Support best, double inlier_
   for (int round = 0; round < rounds && best.inliers >= 4; ++round) {
     const Rigid3 pose =
         RefineAbsolutePose(all.rays, all.points, best.inlier, best.pose, all.pixel_angle, inlier_px / 2, 5);
-    Support improved = Judge(all, pose, inlier_px);
+    Support improved = EvaluateSupport(all, pose, inlier_px);
     if (!(improved.cost < best.cost)) break;
     best = std::move(improved);
   }
@@ -216,7 +219,7 @@ Support FindSupport(const Correspondences& all, const AbsolutePoseOptions& optio
                                                    all.points[sample[2]]};
     Support best_of_sample;
     for (const Rigid3& pose : SolveThreePoints(rays, points)) {
-      Support support = Judge(all, pose, options.inlier_px);
+      Support support = EvaluateSupport(all, pose, options.inlier_px);
       if (support.cost < best_of_sample.cost) best_of_sample = std::move(support);
     }
     if (!(best_of_sample.cost < best.cost)) continue;

@@ -14,14 +14,15 @@ namespace {
 
 constexpr int kFar = std::numeric_limits<int>::max();
 
-// A total order, so that of equally near entries always the same one is taken.
+// A total order, so that the choice among equally near entries is deterministic.
 auto KeyOf(const DescriptorDatabase::Entry& entry) {
   return std::tuple(entry.keyframe, entry.point, entry.level, entry.pixel.x(), entry.pixel.y(),
                     entry.descriptor.values);
 }
 
-// Where an entry is kept: of the leaves that a descent with some alternatives reaches, the nearest. A single
-// descent often misses it by an early turn, and a query would look elsewhere.
+// The leaf that stores an entry: the nearest of the leaves that a descent along several branches reaches. A
+// descent along one branch often misses it because of an early decision, and a query would search other
+// leaves.
 std::uint32_t HomeLeaf(const VocabularyTree& tree, const Descriptor& descriptor) {
   std::array<std::uint32_t, 4> leaves;
   tree.NearestLeaves(descriptor, leaves);
@@ -30,7 +31,7 @@ std::uint32_t HomeLeaf(const VocabularyTree& tree, const Descriptor& descriptor)
 
 }  // namespace
 
-// The best entry for a query, and the distance to the best one of another point.
+// The best entry for a query, and the distance to the best entry of another point.
 struct DescriptorDatabase::Best {
   int distance = kFar, second = kFar;
   std::uint32_t leaf = 0, slot = 0;
@@ -54,7 +55,8 @@ void DescriptorDatabase::Add(const Entry& entry) {
 }
 
 void DescriptorDatabase::RemovePlace(std::vector<Place>* places, std::size_t index) {
-  // The last ones move into the gaps, in the leaf and in the keyframe's list, and are told where they are.
+  // The last elements move into the gaps, in the leaf and in the keyframe's list, and their positions are
+  // updated.
   const Place place = (*places)[index];
   Leaf& leaf = leaves_[place.leaf];
   if (place.slot + 1 != leaf.stored.size()) {
@@ -104,8 +106,8 @@ std::vector<DescriptorDatabase::Entry> DescriptorDatabase::EntriesOf(KeyFrameId 
   return entries;
 }
 
-void DescriptorDatabase::Look(const Descriptor& query, const MatchOptions& options,
-                              std::unordered_map<KeyFrameId, Best>* best_of) const {
+void DescriptorDatabase::SearchLeaves(const Descriptor& query, const MatchOptions& options,
+                                      std::unordered_map<KeyFrameId, Best>* best_of) const {
   std::array<std::uint32_t, VocabularyTree::kMaxNearestLeaves> leaves;
   const std::size_t count = tree_->NearestLeaves(
       query, std::span(leaves).first(std::clamp<std::size_t>(options.leaves, 1, leaves.size())));
@@ -134,7 +136,7 @@ void DescriptorDatabase::Look(const Descriptor& query, const MatchOptions& optio
         best.second = best.distance;
         replace();
       } else {
-        // One as near as the best leaves the two undecided, whichever came first.
+        // A second entry as near as the best makes the match ambiguous, whichever came first.
         best.second = std::min(best.second, distance);
       }
     }
@@ -148,10 +150,10 @@ std::vector<DescriptorDatabase::Match> DescriptorDatabase::FindMatches(std::span
   std::unordered_map<KeyFrameId, Best> best_of;
   for (std::size_t query = 0; query < queries.size(); ++query) {
     best_of.clear();
-    Look(queries[query], options, &best_of);
+    SearchLeaves(queries[query], options, &best_of);
     for (const auto& [keyframe, best] : best_of) {
       if (best.distance > options.max_distance) continue;
-      // Nobody to compare with is no reason for doubt.
+      // Without a second entry the ratio test passes.
       if (best.second != kFar && !(best.distance < options.max_ratio * best.second)) continue;
       matches.push_back({query, EntryAt(best.leaf, best.slot), best.distance});
     }
@@ -165,7 +167,7 @@ std::vector<DescriptorDatabase::Match> DescriptorDatabase::FindMatches(std::span
       return false;
     });
   }
-  // Of several descriptors that chose one point the nearest keeps it.
+  // If several descriptors chose one point, the nearest keeps it.
   std::map<std::pair<MapPointId, KeyFrameId>, std::tuple<int, std::size_t>> winner;
   const auto target = [&](const Match& match) {
     return std::pair(match.entry.point, options.each_keyframe ? match.entry.keyframe : kNoId);
@@ -238,10 +240,10 @@ bool DescriptorDatabase::operator==(const DescriptorDatabase& other) const {
 
 void AddObservation(const ImageFeatures& features, const Observation& observation, int levels_around,
                     DescriptorDatabase* database) {
-  std::vector<DescribedPlace> places;
-  DescribePlace(features, observation.pixel, observation.level - levels_around,
-                observation.level + levels_around, &places);
-  for (const DescribedPlace& place : places) {
+  std::vector<DescribedKeypoint> places;
+  DescribeKeypoint(features, observation.pixel, observation.level - levels_around,
+                   observation.level + levels_around, &places);
+  for (const DescribedKeypoint& place : places) {
     database->Add(
         {place.oriented.descriptor, observation.keyframe, observation.point, place.pixel, place.level});
   }

@@ -14,11 +14,11 @@
 
 namespace docent::engine {
 
-// Finds which observations of a map look like those of an image, without knowing where the image was
-// taken: the descriptors of observations in the leaves of a vocabulary tree (hybrid-slam §5.4). The mapper
-// owns one for observations of finite points and one for those of infinite points, and keeps them in step
-// with the map; adding and removing cost the same however large the map is. Const members may be called from
-// any thread while nobody changes it. Answers depend on the entries alone, not on the order of their coming.
+// Matches descriptors of an image with the observations of a map, without a pose prior. The observations'
+// descriptors are stored in the leaves of a vocabulary tree (hybrid-slam §5.4). The mapper owns one database
+// for observations of finite points and one for those of infinite points, and updates them with the map;
+// adding and removing cost the same whatever the map size. Const members may be called from any thread while
+// no thread modifies the database. Results depend on the entries alone, not on the order of insertion.
 class DescriptorDatabase {
  public:
   struct Entry {
@@ -26,18 +26,18 @@ class DescriptorDatabase {
     KeyFrameId keyframe = kNoId;
     MapPointId point = kNoId;
     Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  // level 0
-    std::uint8_t level = 0;                           // that it was described on
+    std::uint8_t level = 0;                           // of the description
     bool operator==(const Entry&) const = default;
   };
 
   // The tree must outlive the database.
   explicit DescriptorDatabase(const VocabularyTree& tree) : tree_(&tree), leaves_(VocabularyTree::kLeaves) {}
 
-  // An observation may have several entries, one a level and direction.
+  // An observation may have several entries, one per level and direction.
   void Add(const Entry& entry);
-  // All of a keyframe's entries.
+  // Removes all entries of a keyframe.
   void RemoveKeyFrame(KeyFrameId keyframe);
-  // Those of one point in one keyframe. In the time of looking through that keyframe's entries.
+  // Removes the entries of one point in one keyframe. Linear in the keyframe's number of entries.
   void RemoveObservation(KeyFrameId keyframe, MapPointId point);
   void Clear();
 
@@ -48,39 +48,41 @@ class DescriptorDatabase {
   std::vector<Entry> EntriesOf(KeyFrameId keyframe) const;
 
   struct MatchOptions {
-    std::size_t leaves = 4;    // looked into for each descriptor, up to VocabularyTree::kMaxNearestLeaves
+    std::size_t leaves = 4;    // leaves searched per descriptor, up to VocabularyTree::kMaxNearestLeaves
     int max_distance = 60000;  // squared, see kDescriptorLength
-    // Of squared distances: the best against the best of another point; 0.8 squared (Lowe 2004).
+    // Largest ratio of the squared distances of the best entry and of the best entry of another point; 0.8
+    // squared (Lowe 2004).
     double max_ratio = 0.64;
-    bool mutual = true;  // no other of the descriptors is nearer to the entry
-    // Best and second best are sought in each keyframe by itself: for infinite points, of which two may be
-    // the same place seen in two keyframes.
+    bool mutual = true;  // the entry has no closer descriptor among the queries
+    // Applies the ratio test within each keyframe separately: for infinite points, two of which may be the
+    // same scene point observed in two keyframes.
     bool each_keyframe = false;
-    KeyFrameId only_keyframe = kNoId, except_keyframe = kNoId;  // kNoId: no such bound
+    KeyFrameId only_keyframe = kNoId, except_keyframe = kNoId;  // kNoId: no restriction
   };
   struct Match {
     std::size_t query = 0;  // index of the descriptor
     Entry entry;
     int distance = 0;  // squared
   };
-  // By query, then keyframe; at most one for each point (for each point and keyframe with each_keyframe).
+  // By query, then keyframe; at most one match per point (per point and keyframe with each_keyframe).
   std::vector<Match> FindMatches(std::span<const Descriptor> queries, const MatchOptions& options) const;
 
   struct Vote {
     KeyFrameId keyframe = kNoId;
-    // What part of the descriptors' leaves the keyframe shares, rare leaves counting more (term frequency and
-    // inverse document frequency, Sivic and Zisserman 2003); 1 for the keyframe itself, 0 for nothing shared.
+    // Similarity of the keyframe's leaves to those of the descriptors, with rare leaves weighted more (term
+    // frequency and inverse document frequency, Sivic and Zisserman 2003); 1 for the keyframe itself, 0 for
+    // no common leaf.
     double score = 0;
   };
-  // The `count` keyframes most like an image with these descriptors, best first.
+  // The `count` keyframes most similar to an image with these descriptors, best first.
   std::vector<Vote> FindKeyFrames(std::span<const Descriptor> descriptors, std::size_t count,
                                   KeyFrameId except_keyframe = kNoId) const;
 
-  // The same entries, in whatever order.
+  // Whether both have the same entries, in any order.
   bool operator==(const DescriptorDatabase& other) const;
 
  private:
-  // Where a keyframe's entry is kept.
+  // Position of an entry of a keyframe.
   struct Place {
     std::uint32_t leaf = 0, slot = 0;
   };
@@ -89,26 +91,28 @@ class DescriptorDatabase {
     MapPointId point = kNoId;
     Eigen::Vector2f pixel;
     std::uint8_t level = 0;
-    std::uint32_t place = 0;  // index in the keyframe's places
+    std::uint32_t place = 0;  // index in the keyframe's list of positions
   };
   struct Leaf {
-    std::vector<Descriptor> descriptors;  // apart, as a query reads all of them and few of the rest
+    // Separate, because a query reads all of them and few of the other data.
+    std::vector<Descriptor> descriptors;
     std::vector<Stored> stored;
   };
   struct Best;
   Entry EntryAt(std::uint32_t leaf, std::uint32_t slot) const;
   void RemovePlace(std::vector<Place>* places, std::size_t index);
-  void Look(const Descriptor& query, const MatchOptions& options,
-            std::unordered_map<KeyFrameId, Best>* best) const;
+  void SearchLeaves(const Descriptor& query, const MatchOptions& options,
+                    std::unordered_map<KeyFrameId, Best>* best) const;
 
   const VocabularyTree* tree_;
   std::vector<Leaf> leaves_;
-  std::unordered_map<KeyFrameId, std::vector<Place>> keyframes_;  // never empty ones
+  std::unordered_map<KeyFrameId, std::vector<Place>> keyframes_;  // without empty lists
   std::size_t size_ = 0;
 };
 
-// Adds the descriptors of an observation in its keyframe's image: on its level and `levels_around` coarser
-// and finer ones, as far as the patch fits into them, so that it is recognised from nearer and further too.
+// Adds the descriptors of an observation, computed in its keyframe's image: on its level and on up to
+// `levels_around` coarser and finer levels on which the patch fits, so that it is recognized from different
+// distances too.
 void AddObservation(const ImageFeatures& features, const Observation& observation, int levels_around,
                     DescriptorDatabase* database);
 

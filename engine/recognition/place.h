@@ -11,7 +11,7 @@
 
 namespace docent::engine {
 
-// A keyframe that looks like the present image, in one of the maps. Appearance only: nothing is verified.
+// A keyframe of one of the maps whose appearance resembles the present image. Not verified geometrically.
 struct PlaceCandidate {
   std::uint64_t map_key = 0;
   std::shared_ptr<const MapSnapshot> map;
@@ -19,28 +19,28 @@ struct PlaceCandidate {
   double difference = 0;  // mean squared difference of the thumbnails
 };
 
-// What is known of the image whose place is sought. A view: whoever asks keeps both until the answer.
+// The appearance of the image whose place is wanted. A view: the caller keeps both objects alive.
 struct PlaceQuery {
-  // By its thumbnail alone.
+  // Retrieval by thumbnail alone.
   PlaceQuery(const SmallBlurryImage& thumbnail)  // NOLINT(google-explicit-constructor)
       : image(&thumbnail) {}
-  // By its words as well; empty ones are none.
+  // Retrieval by thumbnail and visual words; an empty bag counts as none.
   PlaceQuery(const SmallBlurryImage& thumbnail, const WordBag& visual_words)
       : image(&thumbnail), words(&visual_words) {}
 
   const SmallBlurryImage* image;
   const WordBag* words = nullptr;
-  // Different places first; else the most alike keyframes, whatever place they are of.
+  // If true, candidates of distinct places come first; otherwise the most similar keyframes of any place.
   bool places_first = true;
 };
 
-// Whoever knows all maps (the library's place index) answers this; the engine asks it when it is lost.
-// May be called from several threads at once.
+// Place recognition over all maps, implemented by the library's place index; trackers use it when they are
+// lost. May be called from several threads at once.
 class PlaceFinder {
  public:
   virtual ~PlaceFinder() = default;
-  // The best `count` candidates, most alike first, at most `per_map` of one map. With only_map != 0 the
-  // search stays in that map (ptamm §3.3). Never throws for lack of maps: the answer is empty.
+  // The best `count` candidates, most similar first, at most `per_map` of one map. only_map: restricts the
+  // search to that map unless it is 0 (ptamm §3.3). Returns an empty vector if there are no maps.
   virtual std::vector<PlaceCandidate> FindPlaces(const PlaceQuery& query, int count, int per_map,
                                                  std::uint64_t only_map) const = 0;
 };

@@ -12,7 +12,7 @@
 
 namespace docent::engine {
 
-// In a source that the build makes from vocabulary.bin.
+// Defined in a source that the build generates from vocabulary.bin.
 extern const unsigned char vocabulary_bytes[];
 extern const std::size_t vocabulary_bytes_size;
 
@@ -43,8 +43,8 @@ std::size_t Nearest(const Descriptor* centers, const Descriptor& descriptor) {
   return best;
 }
 
-// Centres far apart from each other: each next one is drawn with a chance that grows with the squared
-// distance from those there are (k-means++, Arthur and Vassilvitskii 2007).
+// Distant initial centres: each next one is drawn with a probability proportional to the squared distance
+// from the previous ones (k-means++, Arthur and Vassilvitskii 2007).
 Centers SpreadCenters(std::span<const Descriptor> descriptors, Random* random) {
   Centers centers;
   centers.fill(descriptors[random->Below(static_cast<std::uint32_t>(descriptors.size()))]);
@@ -55,7 +55,7 @@ Centers SpreadCenters(std::span<const Descriptor> descriptors, Random* random) {
       distance[i] = std::min(distance[i], SquaredDistance(descriptors[i], centers[k - 1]));
       sum += distance[i];
     }
-    if (sum <= 0) break;  // fewer different descriptors than children: the rest stay empty
+    if (sum <= 0) break;  // fewer distinct descriptors than children: the others stay empty
     double left = random->Uniform() * sum;
     std::size_t chosen = 0;
     for (std::size_t i = 0; i < descriptors.size(); ++i) {
@@ -69,7 +69,7 @@ Centers SpreadCenters(std::span<const Descriptor> descriptors, Random* random) {
   return centers;
 }
 
-// Lloyd's iteration on rounded centres, so that training goes the way that a later descent goes. Answers with
+// Lloyd's iteration on rounded centres, so that training assigns descriptors as a later descent does. Returns
 // each descriptor's cluster.
 std::vector<std::uint8_t> Cluster(std::span<const Descriptor> descriptors, Centers* centers) {
   std::vector<std::uint8_t> assigned(descriptors.size(), kBranching);
@@ -96,13 +96,13 @@ std::vector<std::uint8_t> Cluster(std::span<const Descriptor> descriptors, Cente
 
 }  // namespace
 
-void VocabularyTree::Settle(std::span<Descriptor> descriptors, std::size_t level, std::size_t node,
-                            std::uint64_t seed, std::size_t* settled,
-                            const std::function<void(std::size_t)>& progress) {
+void VocabularyTree::TrainNode(std::span<Descriptor> descriptors, std::size_t level, std::size_t node,
+                               std::uint64_t seed, std::size_t* trained,
+                               const std::function<void(std::size_t)>& progress) {
   Centers centers{};
   std::array<std::size_t, kBranching + 1> begin{};
   if (!descriptors.empty()) {
-    // A seed of its own: what one node does changes nothing in its neighbours.
+    // Each node has its own seed, so that nodes do not influence each other.
     Random random(seed ^ (0x9E3779B97F4A7C15ull * (FirstChild(level, node) + 1)));
     centers = SpreadCenters(descriptors, &random);
     const std::vector<std::uint8_t> assigned = Cluster(descriptors, &centers);
@@ -115,12 +115,12 @@ void VocabularyTree::Settle(std::span<Descriptor> descriptors, std::size_t level
   }
   std::copy(centers.begin(), centers.end(),
             centers_.begin() + static_cast<std::ptrdiff_t>(FirstChild(level, node)));
-  *settled += kBranching;
-  if (progress) progress(*settled);
+  *trained += kBranching;
+  if (progress) progress(*trained);
   if (level + 1 == kLevels) return;
   for (std::size_t k = 0; k < kBranching; ++k) {
-    Settle(descriptors.subspan(begin[k], begin[k + 1] - begin[k]), level + 1, node * kBranching + k, seed,
-           settled, progress);
+    TrainNode(descriptors.subspan(begin[k], begin[k + 1] - begin[k]), level + 1, node * kBranching + k, seed,
+              trained, progress);
   }
 }
 
@@ -132,8 +132,8 @@ VocabularyTree VocabularyTree::Train(std::vector<Descriptor> descriptors, std::u
                 "; give more images, or images with more texture.");
   }
   VocabularyTree tree;
-  std::size_t settled = 0;
-  tree.Settle(descriptors, 0, 0, seed, &settled, progress);
+  std::size_t trained = 0;
+  tree.TrainNode(descriptors, 0, 0, seed, &trained, progress);
   return tree;
 }
 
@@ -149,7 +149,7 @@ std::vector<std::uint8_t> VocabularyTree::ToBytes() const {
 
 VocabularyTree VocabularyTree::FromBytes(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < kMagic.size() || !std::equal(kMagic.begin(), kMagic.end(), bytes.begin()))
-    throw Error("This is no vocabulary: it does not begin with DOCVOC01.");
+    throw Error("This is not a vocabulary: it does not begin with DOCVOC01.");
   if (bytes.size() != kBytes) {
     throw Error("This vocabulary has " + std::to_string(bytes.size()) + " bytes instead of " +
                 std::to_string(kBytes) + "; train it again with 'docent train-vocabulary'.");

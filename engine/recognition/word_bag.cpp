@@ -19,9 +19,9 @@ WordBag MakeWordBag(std::vector<std::uint32_t> leaves) {
 WordBag MakeWordBag(const ImageFeatures& features, const VocabularyTree& tree,
                     const WordBagOptions& options) {
   std::vector<std::uint32_t> leaves;
-  for (const DescribedPlace& place : DescribeCorners(features, options.corners)) {
-    // The nearest of those that a descent with some alternatives reaches: a single descent often misses it by
-    // an early turn.
+  for (const DescribedKeypoint& place : DescribeCorners(features, options.corners)) {
+    // The nearest of the leaves that a descent along several branches reaches: a descent along one branch
+    // often misses it because of an early decision.
     std::array<std::uint32_t, 4> nearest;
     tree.NearestLeaves(place.oriented.descriptor, nearest);
     leaves.push_back(nearest[0]);

@@ -10,8 +10,8 @@
 
 namespace docent::engine {
 
-// A leaf of the vocabulary tree and how often an image has it, in two bytes: what looks alike has one word
-// (Sivic and Zisserman 2003). A word that is there more often than kMaxCount counts as kMaxCount.
+// A visual word and its count in an image, in two bytes. Similar descriptors share a word (Sivic and
+// Zisserman 2003). Counts are limited to kMaxCount.
 class VisualWord {
  public:
   static constexpr int kMaxCount = 16;
@@ -32,20 +32,20 @@ class VisualWord {
   std::uint16_t bits_;
 };
 
-// What an image shows, without where: by ascending leaf, each leaf once. Where a camera rolls, comes nearer
-// or looks aside, the words that stay in sight stay the same.
+// The visual words of an image without their positions: by ascending leaf, each leaf once. Mostly invariant
+// to roll, small changes of distance and direction.
 using WordBag = std::vector<VisualWord>;
 
 struct WordBagOptions {
-  // None of the finest level: its corners are noise and motion blur first of all, and every word has its
-  // price. An image of 640 x 480 gets about 190 words.
+  // The finest level is not used: its corners are affected most by noise and motion blur, and each word has a
+  // cost. A 640x480 image has about 190 words.
   CornerDescriptionOptions corners{.corners = {0, 60, 60, 40}, .min_score = 20};
 };
 
 // The words of the best corners of an image. The same features and tree give the same words.
 WordBag MakeWordBag(const ImageFeatures& features, const VocabularyTree& tree = DefaultVocabulary(),
                     const WordBagOptions& options = {});
-// Of leaves in any order.
+// A word bag of leaves in any order.
 WordBag MakeWordBag(std::vector<std::uint32_t> leaves);
 
 }  // namespace docent::engine

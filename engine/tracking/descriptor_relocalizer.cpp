@@ -14,7 +14,8 @@ namespace docent::engine {
 
 DescribedImage DescribeAtResolution(const ImageFeatures& features, const CameraModel& camera,
                                     double pixel_angle) {
-  constexpr double kFinest = 0.8, kMinSide = 64;  // what features need
+  // Limit of the resampling and smallest image side for feature extraction.
+  constexpr double kFinest = 0.8, kMinSide = 64;
   const double ratio = camera.PixelAngle() / pixel_angle;
   const cv::Mat& image = features.levels[0];
   const int width = static_cast<int>(image.cols * ratio), height = static_cast<int>(image.rows * ratio);
@@ -26,20 +27,21 @@ DescribedImage DescribeAtResolution(const ImageFeatures& features, const CameraM
   DescribedImage result{DescribeCorners(*described), MakeWordBag(*described)};
   const Eigen::Array2f larger(static_cast<float>(image.cols) / static_cast<float>(width),
                               static_cast<float>(image.rows) / static_cast<float>(height));
-  for (DescribedPlace& corner : result.corners) corner.pixel = (corner.pixel.array() + 0.5f) * larger - 0.5f;
+  for (DescribedKeypoint& corner : result.corners)
+    corner.pixel = (corner.pixel.array() + 0.5f) * larger - 0.5f;
   return result;
 }
 
 struct DescriptorRelocalizer::DescribedMap {
   struct DescribedKeyFrame {
     KeyFrameId id = kNoId;
-    std::weak_ptr<const ImageFeatures> features;  // that were described
+    std::weak_ptr<const ImageFeatures> features;  // the features that were described
   };
   DescribedMap(std::uint64_t key, const VocabularyTree& tree) : map_key(key), database(tree) {}
 
   std::uint64_t map_key;
   DescriptorDatabase database;
-  std::vector<DescribedKeyFrame> keyframes;  // the last used last
+  std::vector<DescribedKeyFrame> keyframes;  // most recently used last
 };
 
 DescriptorRelocalizer::DescriptorRelocalizer(const DescriptorRelocalizerOptions& options,
@@ -58,7 +60,7 @@ DescriptorRelocalizer::DescribedMap& DescriptorRelocalizer::Find(std::uint64_t m
   if (found != maps_.end()) {
     std::rotate(maps_.begin(), found, found + 1);
   } else {
-    if (maps_.size() >= options_.max_maps) maps_.pop_back();
+    if (maps_.size() >= options_.max_cached_maps) maps_.pop_back();
     maps_.insert(maps_.begin(), std::make_unique<DescribedMap>(map_key, *tree_));
   }
   return *maps_.front();
@@ -79,7 +81,7 @@ void DescriptorRelocalizer::Describe(const MapSnapshot& map, const KeyFrame& key
   }
   if (*budget <= 0) return;
   --*budget;
-  if (known.size() >= options_.max_keyframes) {
+  if (known.size() >= options_.max_cached_keyframes) {
     described->database.RemoveKeyFrame(known.front().id);
     known.erase(known.begin());
   }
@@ -95,11 +97,11 @@ void DescriptorRelocalizer::Describe(const MapSnapshot& map, const KeyFrame& key
 }
 
 std::optional<DescriptorRelocalizer::Suggestion> DescriptorRelocalizer::SuggestIn(
-    const DescribedMap& described, std::span<const DescribedPlace> corners, const CameraModel& camera,
+    const DescribedMap& described, std::span<const DescribedKeypoint> corners, const CameraModel& camera,
     const MapSnapshot& map, std::uint64_t seed) const {
   std::vector<Descriptor> queries;
   queries.reserve(corners.size());
-  for (const DescribedPlace& corner : corners) queries.push_back(corner.oriented.descriptor);
+  for (const DescribedKeypoint& corner : corners) queries.push_back(corner.oriented.descriptor);
   std::vector<Eigen::Vector3d> rays, points;
   std::vector<KeyFrameId> keyframes;  // of each match
   for (const DescriptorDatabase::Match& match : described.database.FindMatches(queries, {})) {
@@ -134,14 +136,14 @@ std::optional<DescriptorRelocalizer::Suggestion> DescriptorRelocalizer::SuggestI
 }
 
 std::vector<DescriptorRelocalizer::Suggestion> DescriptorRelocalizer::Suggest(
-    std::span<const DescribedPlace> corners, const CameraModel& camera,
+    std::span<const DescribedKeypoint> corners, const CameraModel& camera,
     std::span<const PlaceCandidate> candidates, std::uint64_t seed) {
   std::vector<Suggestion> suggestions;
   std::vector<std::uint64_t> keys;
-  int budget = options_.keyframes_a_call;
+  int budget = options_.max_keyframes_per_call;
   for (const PlaceCandidate& candidate : candidates) {
     if (!candidate.map || std::find(keys.begin(), keys.end(), candidate.map_key) != keys.end()) continue;
-    if (keys.size() == options_.maps) break;
+    if (keys.size() == options_.max_maps_per_call) break;
     keys.push_back(candidate.map_key);
     DescribedMap& described = Find(candidate.map_key);
     for (const PlaceCandidate& other : candidates) {

@@ -10,7 +10,7 @@ namespace docent::engine {
 
 namespace {
 
-// Of finite points.
+// Number of observations of a keyframe; of finite points only unless with_infinite.
 std::ptrdiff_t CountObservations(const MapSnapshot& map, KeyFrameId id, bool with_infinite) {
   const auto before = [](const Observation& observation, KeyFrameId wanted) {
     return observation.keyframe < wanted;
@@ -26,33 +26,35 @@ std::ptrdiff_t CountObservations(const MapSnapshot& map, KeyFrameId id, bool wit
 
 }  // namespace
 
-bool WantsKeyFrame(const KeyFrameNoveltyOptions& options, const MapSnapshot& map,
+bool NeedsKeyFrame(const KeyFrameNoveltyOptions& options, const MapSnapshot& map,
                    const Rigid3& camera_from_map, const MapTrackResult& tracked) {
   const Eigen::Vector3d center = camera_from_map.OriginInSource();
   const double depth = tracked.median_depth > 0 ? tracked.median_depth : 1.0;
   double nearest = std::numeric_limits<double>::max();
-  double nearest_distance = 0, nearest_turn_deg = 0;
+  double nearest_distance = 0, nearest_rotation_deg = 0;
   const KeyFrame* nearest_keyframe = nullptr;
   for (const KeyFrame& keyframe : map.keyframes) {
-    if (keyframe.kind == KeyFrameKind::kPanorama) continue;  // its place is not known
+    if (keyframe.kind == KeyFrameKind::kPanorama) continue;  // its position is unknown
     const double distance = (keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
-    const double turn_deg = (camera_from_map.rotation * keyframe.camera_from_map.rotation.inverse()).Angle() *
-                            180 / std::numbers::pi;
-    const double novelty = std::hypot(distance / options.min_distance, turn_deg / options.min_turn_deg);
+    const double rotation_deg =
+        (camera_from_map.rotation * keyframe.camera_from_map.rotation.inverse()).Angle() * 180 /
+        std::numbers::pi;
+    const double novelty =
+        std::hypot(distance / options.min_distance, rotation_deg / options.min_rotation_deg);
     if (novelty < nearest) {
       nearest = novelty;
       nearest_distance = distance;
-      nearest_turn_deg = turn_deg;
+      nearest_rotation_deg = rotation_deg;
       nearest_keyframe = &keyframe;
     }
   }
   if (nearest > 1.0) return true;
-  const bool moved =
-      nearest_distance > options.min_distance_when_few || nearest_turn_deg > options.min_turn_when_few_deg;
+  const bool moved = nearest_distance > options.min_distance_when_few ||
+                     nearest_rotation_deg > options.min_rotation_when_few_deg;
   if (!moved || !nearest_keyframe) return false;
-  const auto known =
+  const auto observed =
       static_cast<double>(CountObservations(map, nearest_keyframe->id, nearest_keyframe->panorama != kNoId));
-  return tracked.finite_inliers < options.min_found_ratio * std::min(known, options.max_known);
+  return tracked.finite_inliers < options.min_found_ratio * std::min(observed, options.max_expected_points);
 }
 
 }  // namespace docent::engine

@@ -29,21 +29,21 @@ void KeyFramePolicy::Reset() {
   history_.clear();
 }
 
-// hybrid-slam §4.1: the angle under which two centres are seen from the scene between them.
-bool KeyFramePolicy::Parallax(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double depth) const {
+// hybrid-slam §4.1: the angle between the rays from both centres to a point at this depth.
+bool KeyFramePolicy::HasParallax(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double depth) const {
   const double angle = 2 * std::atan2((a - b).norm(), 2 * depth);
   return angle > options_.min_parallax_deg * std::numbers::pi / 180;
 }
 
-// hybrid-slam §4.2: some pose of a while ago stood here and looked elsewhere.
+// hybrid-slam §4.2: an earlier pose in the history had the same centre and another viewing direction.
 bool KeyFramePolicy::IsPureRotation(const Pose& now, double depth) const {
   return std::any_of(history_.begin(), history_.end(), [&](const Pose& before) {
-    return !Parallax(before.center, now.center, depth) &&
+    return !HasParallax(before.center, now.center, depth) &&
            AngleBetween(before.axis, now.axis) > options_.min_view_ratio * field_of_view_;
   });
 }
 
-void KeyFramePolicy::Remember(const Pose& pose) {
+void KeyFramePolicy::AddToHistory(const Pose& pose) {
   while (!history_.empty() && pose.time - history_.front().time > options_.history)
     history_.erase(history_.begin());
   if (history_.empty() || pose.time - history_.back().time >= options_.history_interval)
@@ -61,13 +61,14 @@ PanoramaId KeyFramePolicy::OpenPanorama(const MapSnapshot& map) const {
 
 PanoramaId KeyFramePolicy::PanoramaNear(const Rigid3& camera_from_map, double depth,
                                         const MapSnapshot& map) const {
-  constexpr double kNear = 0.5;  // of the parallax at which a panorama is left
+  constexpr double kNear = 0.5;  // ratio of the parallax at which a panorama map is left
   const Eigen::Vector3d center = camera_from_map.OriginInSource(), axis = AxisOf(camera_from_map);
   PanoramaId best = kNoId;
   double smallest = std::numeric_limits<double>::max();
   for (const PanoramaMap& panorama : map.panoramas) {
     const KeyFrame* reference = map.FindKeyFrame(panorama.reference);
-    if (!reference || Parallax(reference->camera_from_map.OriginInSource(), center, kNear * depth)) continue;
+    if (!reference || HasParallax(reference->camera_from_map.OriginInSource(), center, kNear * depth))
+      continue;
     for (const KeyFrame& keyframe : map.keyframes) {
       if (keyframe.panorama != panorama.id) continue;
       const double angle = AngleBetween(AxisOf(keyframe.camera_from_map), axis);
@@ -89,47 +90,52 @@ void KeyFramePolicy::Reopen(const PanoramaMap& panorama, const MapSnapshot& map)
 KeyFrameChoice KeyFramePolicy::Select(const PolicyFrame& frame, const MapSnapshot& map) {
   const Pose now{frame.time, frame.camera_from_map.OriginInSource(), AxisOf(frame.camera_from_map)};
   const bool localized = frame.observed != ObservedMotion::kPanorama;
-  if (mode_ == Mode::kPanorama && frame.time - reference_time_ > options_.patience &&
+  if (mode_ == Mode::kPanorama && frame.time - reference_time_ > options_.open_timeout &&
       OpenPanorama(map) == kNoId)
     mode_ = Mode::kSixDof;
   if (mode_ == Mode::kPanorama && localized) {
-    // hybrid-slam §4.5. A few finite points are seen all through a turn; that alone is no return.
+    // hybrid-slam §4.5. Some finite points may stay visible during a whole rotation; they alone do not end
+    // the panorama map.
     const PanoramaMap* panorama = map.FindPanorama(OpenPanorama(map));
     const KeyFrame* reference = panorama ? map.FindKeyFrame(panorama->reference) : nullptr;
     const bool away =
-        reference && Parallax(reference->camera_from_map.OriginInSource(), now.center, frame.median_depth);
+        reference && HasParallax(reference->camera_from_map.OriginInSource(), now.center, frame.median_depth);
     if (away || frame.finite_coverage >= options_.min_coverage) mode_ = Mode::kSixDof;
   }
   if (mode_ == Mode::kSixDof) {
-    if (!localized) return KeyFrameChoice::kNone;  // infinite points of a closed panorama carry the camera
+    // The pose comes from infinite points of a closed panorama map.
+    if (!localized) return KeyFrameChoice::kNone;
     const bool unknown = frame.finite_coverage < options_.min_coverage;
-    const bool runs_out = unknown && frame.points < options_.few_points;
-    const bool turned = unknown && IsPureRotation(now, frame.median_depth);
-    Remember(now);
-    // However the camera came here: directions are better than nothing.
-    if (runs_out && PanoramaNear(frame.camera_from_map, frame.median_depth, map) == kNoId)
+    const bool leaves_map = unknown && frame.points < options_.few_points;
+    const bool pure_rotation = unknown && IsPureRotation(now, frame.median_depth);
+    AddToHistory(now);
+    // Whatever the motion was, infinite points are better than losing the track.
+    if (leaves_map && PanoramaNear(frame.camera_from_map, frame.median_depth, map) == kNoId)
       return KeyFrameChoice::kLocalizedPanorama;
-    if (turned && frame.coverage < options_.min_panorama_coverage) {
+    if (pure_rotation && frame.coverage < options_.min_panorama_coverage) {
       const bool parallax = std::all_of(map.keyframes.begin(), map.keyframes.end(), [&](const KeyFrame& k) {
         return k.kind == KeyFrameKind::kPanorama ||
-               Parallax(k.camera_from_map.OriginInSource(), now.center, frame.median_depth);
+               HasParallax(k.camera_from_map.OriginInSource(), now.center, frame.median_depth);
       });
       if (!parallax) return KeyFrameChoice::kLocalizedPanorama;
     }
-    return frame.wants_six_dof ? KeyFrameChoice::kSixDof : KeyFrameChoice::kNone;
+    return frame.needs_six_dof ? KeyFrameChoice::kSixDof : KeyFrameChoice::kNone;
   }
   const PanoramaId open = OpenPanorama(map);
   if (open == kNoId || frame.coverage >= options_.min_panorama_coverage) return KeyFrameChoice::kNone;
-  // In a map of directions alone, hardly one of which is where it was, the camera has moved among near
-  // things: what it sees now is taken in, wherever it looks. A map that knows depth does not pay the drift
-  // for that.
-  if (frame.points < options_.fewest_points && !map.HasFinitePoints()) return KeyFrameChoice::kPanorama;
+  // In a map without finite points, few inliers mean that the camera has translated near the scene. A
+  // keyframe then adds what is visible now, for any viewing direction. A map with finite points would only
+  // gain drift from that.
+  if (frame.points < options_.few_points_without_rotation && !map.HasFinitePoints())
+    return KeyFrameChoice::kPanorama;
   const double ratio =
       frame.points < options_.few_points ? options_.min_view_ratio_when_few : options_.min_view_ratio;
-  const bool elsewhere = std::all_of(map.keyframes.begin(), map.keyframes.end(), [&](const KeyFrame& k) {
-    return k.panorama != open || AngleBetween(AxisOf(k.camera_from_map), now.axis) > ratio * field_of_view_;
-  });
-  return elsewhere ? KeyFrameChoice::kPanorama : KeyFrameChoice::kNone;
+  const bool is_new_direction =
+      std::all_of(map.keyframes.begin(), map.keyframes.end(), [&](const KeyFrame& k) {
+        return k.panorama != open ||
+               AngleBetween(AxisOf(k.camera_from_map), now.axis) > ratio * field_of_view_;
+      });
+  return is_new_direction ? KeyFrameChoice::kPanorama : KeyFrameChoice::kNone;
 }
 
 void KeyFramePolicy::Offered(KeyFrameChoice choice, Timestamp time) {

@@ -12,12 +12,13 @@ namespace docent::engine {
 
 namespace {
 
-constexpr int kCellsAcross = 4;                         // of the grid that inliers must be spread over
+constexpr int kCellsAcross = 4;  // rows and columns of the grid that measures the spread of inliers
 constexpr int kCoverageColumns = 4, kCoverageRows = 3;  // hybrid-slam §4.1
-// An infinite point is left out where a finite one, or another, falls into the same cell (hybrid-slam §3.1).
-constexpr int kTakenCellPx = 16;
+// An infinite point is skipped if a finite point, or another infinite one, projects into the same cell
+// (hybrid-slam §3.1).
+constexpr int kProjectedCellPx = 16;
 constexpr std::size_t kMissesSlots = 16384;
-constexpr std::uint8_t kMostMisses = 4;  // in a row, that are told from more
+constexpr std::uint8_t kMaxMisses = 4;  // consecutive misses are counted up to this value
 
 std::size_t CellOf(const Eigen::Vector2d& pixel, const CameraModel& camera, int columns, int rows) {
   const int column = std::clamp(static_cast<int>(pixel.x() * columns / camera.width_px()), 0, columns - 1);
@@ -33,61 +34,62 @@ MapTracker::MapTracker(const MapTrackerOptions& options, std::shared_ptr<const C
 void MapTracker::Clear() {
   searcher_.Clear();
   misses_.clear();
-  Forget();
+  ForgetLastFrame();
 }
 
-// Those of the points that fall into the image, into visible_.
+// Collects the points that project into the image in visible_.
 void MapTracker::Project(const std::vector<NearbyPoint>& points, bool infinite,
                          const Rigid3& camera_from_map) {
   visible_.clear();
   const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
   const Eigen::Vector3d translation = camera_from_map.translation;
   const double min_cosine = options_.search.min_view_cosine;
-  const int columns = camera_->width_px() / kTakenCellPx + 1;
+  const int columns = camera_->width_px() / kProjectedCellPx + 1;
   for (const NearbyPoint& local : points) {
-    const Eigen::Vector3d x = rotation * local.place.head<3>() + local.place[3] * translation;
+    const Eigen::Vector3d x = rotation * local.point_in_map.head<3>() + local.point_in_map[3] * translation;
     if (!(x.z() > 0)) continue;
     const Eigen::Vector3d normal = rotation * local.normal.cast<double>();
     const double facing = -normal.dot(x);
     if (facing <= 0 || facing * facing < min_cosine * min_cosine * x.squaredNorm()) continue;
     const auto pixel = camera_->Project(x);
     if (!pixel || !camera_->IsInside(*pixel, kPatchSize / 2)) continue;
-    std::uint8_t& cell = taken_[static_cast<std::size_t>(
-        static_cast<int>(pixel->y()) / kTakenCellPx * columns + static_cast<int>(pixel->x()) / kTakenCellPx)];
+    std::uint8_t& cell =
+        projected_cells_[static_cast<std::size_t>(static_cast<int>(pixel->y()) / kProjectedCellPx * columns +
+                                                  static_cast<int>(pixel->x()) / kProjectedCellPx)];
     if (infinite && cell != 0) continue;
     cell = 1;
     visible_.push_back(local);
   }
 }
 
-void MapTracker::Remember() {
+void MapTracker::RecordMisses() {
   misses_.resize(kMissesSlots);
   for (const Attempt& attempt : attempts_) {
     Misses& misses = misses_[attempt.point % kMissesSlots];
     if (misses.point != attempt.point) misses = {attempt.point, 0};
     misses.in_a_row =
-        attempt.inlier ? std::uint8_t{0} : std::min<std::uint8_t>(misses.in_a_row + 1, kMostMisses);
+        attempt.inlier ? std::uint8_t{0} : std::min<std::uint8_t>(misses.in_a_row + 1, kMaxMisses);
   }
 }
 
-// Ever fewer tries for what was missed again and again, but never none: what hid it may be gone.
-bool MapTracker::IsWorthATry(MapPointId point, Random* random) const {
+// The probability of a search falls with the number of consecutive misses, but never to zero: the occluder
+// may be gone.
+bool MapTracker::ShouldSearch(MapPointId point, Random* random) const {
   if (misses_.empty()) return true;
   const Misses& misses = misses_[point % kMissesSlots];
   if (misses.point != point || misses.in_a_row == 0) return true;
   return random->Below(1 + misses.in_a_row) == 0;
 }
 
-// The order in which visible_ is tried. A choice among many is spread over the image and over the map as if
-// it were drawn at random, but for the most part it is the choice of the frame before: patches that were cut
-// still fit, and the pose does not tremble with the choice. Every point draws anew once in kDrawFrames
-// frames.
-void MapTracker::Draw() {
+// Determines the search order of visible_. It is pseudo-random, so that a subset is spread over the image and
+// the map, but mostly the same as in the previous frame: warped patches remain valid, and the pose does not
+// jitter with the selection. Each point gets a new position once in kOrderFrames frames.
+void MapTracker::SetSearchOrder() {
   constexpr std::size_t kBins = 256;
   std::array<std::uint32_t, kBins + 1> begin{};
   bins_.clear();
   for (const NearbyPoint& local : visible_) {
-    const std::uint64_t draw = (draw_frame_ + local.id) / kDrawFrames;
+    const std::uint64_t draw = (order_frame_ + local.id) / kOrderFrames;
     const auto bin = static_cast<std::uint8_t>(Random(std::uint64_t{local.id} << 32 ^ draw).Next() >> 56);
     bins_.push_back(bin);
     ++begin[bin + std::size_t{1}];
@@ -98,22 +100,22 @@ void MapTracker::Draw() {
 }
 
 void MapTracker::AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random) {
-  Draw();
+  SetSearchOrder();
   const std::size_t before = candidates_.size();
   for (const std::uint32_t which : order_) {
     if (candidates_.size() - before >= wanted) break;
     const NearbyPoint& local = visible_[which];
-    if (!IsWorthATry(local.id, random)) {
+    if (!ShouldSearch(local.id, random)) {
       ++skipped_as_occluded_;
       continue;
     }
     const auto predicted =
-        searcher_.Predict(*local.point, *local.source, *camera_, camera_from_map, local.place);
-    if (predicted) candidates_.push_back({local.point, local.source, local.place, *predicted});
+        searcher_.Predict(*local.point, *local.source, *camera_, camera_from_map, local.point_in_map);
+    if (predicted) candidates_.push_back({local.point, local.source, local.point_in_map, *predicted});
   }
   const std::size_t count = candidates_.size() - before;
   if (count == 0) return;
-  // Large patches that fail must not be the ones that the next frame begins with.
+  // The start is random, so that large patches that fail are not searched first again in the next frame.
   const std::size_t first = random->Below(static_cast<std::uint32_t>(count));
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t index = before + (first + i) % count;
@@ -128,11 +130,11 @@ void MapTracker::CollectVisible(const MapSnapshot& map, const Rigid3& camera_fro
   coarse_.clear();
   fine_.clear();
   skipped_as_occluded_ = 0;
-  ++draw_frame_;
-  taken_.assign(static_cast<std::size_t>((camera_->width_px() / kTakenCellPx + 1) *
-                                         (camera_->height_px() / kTakenCellPx + 1)),
-                0);
-  nearby_.Update(map, camera_from_map, last_inliers_, panorama_, turn_.pivot);
+  ++order_frame_;
+  projected_cells_.assign(static_cast<std::size_t>((camera_->width_px() / kProjectedCellPx + 1) *
+                                                   (camera_->height_px() / kProjectedCellPx + 1)),
+                          0);
+  nearby_.Update(map, camera_from_map, last_inliers_, panorama_, pivot_estimate_.pivot);
   Project(nearby_.finite(), false, camera_from_map);
   visible_finite_ = static_cast<int>(visible_.size());
   AddCandidates(camera_from_map, static_cast<std::size_t>(options_.max_fine), random);
@@ -151,7 +153,7 @@ void MapTracker::Search(const std::vector<std::uint32_t>& which, const ImageFeat
     attempts_.push_back({candidate.point->id, found.has_value(), false});
     if (!found) continue;
     measured_.push_back(index);
-    measurements_.push_back({candidate.place, found->pixel.cast<double>(),
+    measurements_.push_back({candidate.point_in_map, found->pixel.cast<double>(),
                              1.0 / static_cast<double>(1 << candidate.predicted.level), 1.0,
                              candidate.point->infinite()});
     matches_.push_back(
@@ -163,15 +165,14 @@ void MapTracker::Repredict(const Rigid3& camera_from_map) {
   std::size_t kept = 0;
   for (const std::uint32_t index : fine_) {
     Candidate& candidate = candidates_[index];
-    if (searcher_.Repredict(*candidate.point, *camera_, camera_from_map, candidate.place,
+    if (searcher_.Repredict(*candidate.point, *camera_, camera_from_map, candidate.point_in_map,
                             &candidate.predicted))
       fine_[kept++] = index;
   }
   fine_.resize(kept);
 }
 
-// Many of these matches are wrong, as the search is wide: three-point RANSAC finds those that belong
-// together.
+// The search is wide and many of these matches are wrong; three-point RANSAC finds the consistent ones.
 std::optional<Rigid3> MapTracker::PoseFromPatches(const ImageFeatures& features, Random* random) {
   std::vector<std::uint32_t> chosen = coarse_;
   for (const std::uint32_t index : fine_) {
@@ -207,22 +208,24 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   CollectVisible(map, predicted, random);
 
   if (effort == Effort::kRecovery) {
-    // Of directions alone there is no pose without a guess; the guess has turned as the image has.
+    // RANSAC needs finite points. Infinite points are searched from the prediction, which includes the
+    // rotation of the whole image.
     if (!nearby_.infinite().empty() && panorama_ != kNoId && visible_finite_ < options_.min_coarse)
       return Track(map, features, predicted, Effort::kWide, random);
     const auto recovered = PoseFromPatches(features, random);
     if (!recovered) return result;
-    Forget();
+    ForgetLastFrame();
     return Track(map, features, *recovered, Effort::kStandard, random);
   }
   const bool wide = effort == Effort::kWide;
   Search(coarse_, features, wide ? options_.wide_radius_px : options_.coarse_radius_px, false);
   result.coarse_attempted = static_cast<int>(coarse_.size());
   result.coarse_found = static_cast<int>(measurements_.size());
-  float radius = wide ? options_.coarse_radius_px : options_.fine_radius_alone_px;
+  float radius = wide ? options_.coarse_radius_px : options_.fine_radius_without_coarse_px;
   if (result.coarse_found >= options_.min_coarse) {
-    const PoseRefinement coarse = RefinePose(*camera_, predicted, options_.refinement, &measurements_,
-                                             &memory_, {turn_.pivot, predicted, turn_.sure});
+    const PoseRefinement coarse =
+        RefinePose(*camera_, predicted, options_.refinement, &measurements_, &memory_,
+                   {pivot_estimate_.pivot, predicted, pivot_estimate_.reliable});
     if (coarse.converged && coarse.inliers >= options_.min_coarse / 2) {
       result.camera_from_map = coarse.camera_from_map;
       radius = options_.fine_radius_px;
@@ -233,8 +236,9 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   result.attempted = static_cast<int>(attempts_.size());
   result.skipped_as_occluded = skipped_as_occluded_;
   result.found = static_cast<int>(measurements_.size());
-  const PoseRefinement fine = RefinePose(*camera_, result.camera_from_map, options_.refinement,
-                                         &measurements_, &memory_, {turn_.pivot, predicted, turn_.sure});
+  const PoseRefinement fine =
+      RefinePose(*camera_, result.camera_from_map, options_.refinement, &measurements_, &memory_,
+                 {pivot_estimate_.pivot, predicted, pivot_estimate_.reliable});
   result.camera_from_map = fine.camera_from_map;
   result.camera_from_map_without_prior = fine.camera_from_map_without_prior;
   result.covariance = fine.covariance;
@@ -271,7 +275,7 @@ void MapTracker::CountInliers(MapTrackResult* result) {
   result->occupied_cells = static_cast<int>(cells.count());
   const auto share = [&](const auto& counts) {
     return static_cast<double>(std::count_if(counts.begin(), counts.end(),
-                                             [&](int n) { return n >= options_.min_points_a_cell; })) /
+                                             [&](int n) { return n >= options_.min_points_per_cell; })) /
            static_cast<double>(counts.size());
   };
   result->finite_coverage = share(finite);
@@ -288,7 +292,7 @@ FrameInspection MapTracker::Inspect(const Rigid3& camera_from_map) const {
   inspection.predicted = predicted_;
   inspection.visible_points = visible_finite_;
   inspection.panorama = panorama_;
-  // A search after a loss has no attempts for all candidates when its patches did not agree.
+  // After a recovery search without a pose not all candidates were attempted.
   std::vector<std::uint32_t> order = coarse_;
   order.insert(order.end(), fine_.begin(), fine_.end());
   if (order.size() != attempts_.size()) return inspection;

@@ -9,8 +9,8 @@
 
 namespace docent::engine {
 
-// Predicts the next pose: constant velocity while frames are tracked, decaying while they are not (ptamm
-// §2.1).
+// Predicts the next pose: constant velocity while frames are tracked, decaying velocity while they are not
+// (ptamm §2.1).
 class MotionModel {
  public:
   void Reset(Timestamp time, const Rigid3& camera_from_map) {
@@ -23,30 +23,31 @@ class MotionModel {
     if (seconds > 0) {
       const Eigen::Matrix<double, 6, 1> measured =
           (camera_from_map * camera_from_map_.inverse()).Log() / seconds;
-      // Half old, half new: hand-held motion is smooth, single measurements are not.
+      // Low-pass filter: hand-held motion is smooth, single measurements are noisy.
       twist_per_second_ = 0.4 * twist_per_second_ + 0.6 * measured;
     }
     time_ = time;
     camera_from_map_ = camera_from_map;
   }
-  // No pose was found at this time: the camera is taken to slow down where it was.
+  // To be called when no pose was found: the velocity is halved.
   void Miss(Timestamp time) {
     camera_from_map_ = Predict(time);
     time_ = time;
     twist_per_second_ *= 0.5;
   }
   Rigid3 Predict(Timestamp time) const {
-    // A gap in the video says nothing about how the motion went on.
+    // Beyond 0.2 s the velocity is not extrapolated: a gap in the video tells nothing about the motion within
+    // it.
     const double seconds = std::clamp(ToSeconds(time - time_), 0.0, 0.2);
     return Rigid3::Exp(twist_per_second_ * seconds) * camera_from_map_;
   }
-  // Only the sideways and the rotating part replaced by what the images say; see Tracker.
+  // Rotates the last pose by a given rotation, without translation.
   Rigid3 PredictWithRotation(const Rotation3& now_from_previous) const {
     return Rigid3(now_from_previous, Eigen::Vector3d::Zero()) * camera_from_map_;
   }
-  // The map has moved under the camera.
-  void Follow(const Sim3& after_from_before) {
-    camera_from_map_ = CarriedAlong(camera_from_map_, after_from_before);
+  // To be called when the mapper has moved this part of the map.
+  void ApplyCorrection(const Sim3& after_from_before) {
+    camera_from_map_ = CorrectedPose(camera_from_map_, after_from_before);
     twist_per_second_.head<3>() *= after_from_before.scale;
   }
   const Rigid3& last() const { return camera_from_map_; }

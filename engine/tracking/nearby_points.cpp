@@ -10,7 +10,7 @@ namespace docent::engine {
 
 namespace {
 
-// The first item that is not before what is looked for; it is taken to be near the begin.
+// The first item for which is_before is false; fast if it is close to begin.
 template <typename Item, typename IsBefore>
 const Item* FirstNot(const Item* begin, const Item* end, const IsBefore& is_before) {
   std::ptrdiff_t step = 1;
@@ -27,9 +27,9 @@ std::span<const Observation> ObservationsOf(const MapSnapshot& map, KeyFrameId k
           FirstNot(begin, all_end, [keyframe](const Observation& o) { return o.keyframe <= keyframe; })};
 }
 
-// How unlike two views of a point are, squared: the angle between the lines of sight, by its chord, and the
-// ratio r of the distances, by (r - 1/r) / 3, about its logarithm times 2/3.
-double SquaredMisfit(const Eigen::Vector3d& view, const Eigen::Vector3d& other) {
+// Squared difference between two views of a point: the angle between the lines of sight, approximated by its
+// chord, and the ratio r of the distances, as (r - 1/r) / 3, about 2/3 of its logarithm.
+double SquaredViewDifference(const Eigen::Vector3d& view, const Eigen::Vector3d& other) {
   const double a = view.squaredNorm(), b = other.squaredNorm();
   if (!(a > 0 && b > 0)) return std::numeric_limits<double>::infinity();
   const double squared_chord = 2 - 2 * view.dot(other) / std::sqrt(a * b);
@@ -57,23 +57,23 @@ void NearbyPoints::Update(const MapSnapshot& map, const Rigid3& camera_from_map,
   revision_ = map.revision;
 }
 
-// The points of the keyframes that see most of what the last frame saw; without a last frame, of those
-// nearest to the guessed pose. A point that only far-off keyframes know is likely hidden here, and would
-// count as a failure of tracking that it is not (ptamm §5.2).
+// Selects the points of the keyframes that share the most points with the last frame; without a last frame,
+// of those nearest to the predicted pose. A point that only distant keyframes observe is probably occluded
+// here, and its failed search would lower the inlier ratio although tracking works (ptamm §5.2).
 void NearbyPoints::ChooseFinite(const MapSnapshot& map, const Rigid3& camera_from_map,
                                 const std::vector<MapPointId>& seen) {
   ranked_.clear();
   const Eigen::Vector3d center = camera_from_map.OriginInSource();
   for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
     const KeyFrame& keyframe = map.keyframes[i];
-    // What it knows is looked for by its panorama map.
+    // Its points are infinite and belong to its panorama map.
     if (keyframe.kind == KeyFrameKind::kPanorama) continue;
     const double distance = (keyframe.camera_from_map.OriginInSource() - center).norm() / keyframe.mean_depth;
-    const double turn =
+    const double angle_term =
         1.0 - std::abs((camera_from_map.rotation.inverse() * keyframe.camera_from_map.rotation)
                            .quaternion()
                            .w());  // grows with the angle between the views, 0 for none
-    ranked_.emplace_back(1.0 - 1.0 / (1.0 + distance + 10 * turn), i);
+    ranked_.emplace_back(1.0 - 1.0 / (1.0 + distance + 10 * angle_term), i);
   }
   const auto keep_best = [this](std::size_t most) {
     if (ranked_.size() <= most) return;
@@ -81,7 +81,7 @@ void NearbyPoints::ChooseFinite(const MapSnapshot& map, const Rigid3& camera_fro
     ranked_.resize(most);
   };
   keep_best(options_.examined_keyframes);
-  // Shared points come first; the nearness decides among keyframes that share none.
+  // Shared points come first; distance decides among keyframes that share equally many.
   wanted_.Clear(map.next_point);
   for (const MapPointId id : seen) wanted_.Insert(id);
   for (auto& [rank, index] : ranked_) {
@@ -97,23 +97,23 @@ void NearbyPoints::ChooseFinite(const MapSnapshot& map, const Rigid3& camera_fro
     for (const Observation& observation : ObservationsOf(map, map.keyframes[index].id))
       wanted_.Insert(observation.point);
   }
-  Take(map, false, &finite_);
+  CopyWanted(map, false, &finite_);
   ChooseSources(map, camera_from_map);
 }
 
-// The infinite points that keyframes of the panorama map see.
+// Selects the infinite points that keyframes of the panorama map observe.
 void NearbyPoints::ChooseInfinite(const MapSnapshot& map) {
   wanted_.Clear(map.next_point);
   for (const KeyFrame& keyframe : map.keyframes) {
     if (keyframe.panorama != panorama_) continue;
     for (const Observation& observation : ObservationsOf(map, keyframe.id)) wanted_.Insert(observation.point);
   }
-  Take(map, true, &infinite_);
+  CopyWanted(map, true, &infinite_);
 }
 
-void NearbyPoints::Take(const MapSnapshot& map, bool infinite, std::vector<NearbyPoint>* points) {
+void NearbyPoints::CopyWanted(const MapSnapshot& map, bool infinite, std::vector<NearbyPoint>* points) {
   points->clear();
-  double nearness = 0;  // of infinite points; 1 / metres
+  double nearness = 0;  // assumed inverse depth of infinite points, 1 / map unit
   if (infinite && has_pivot_) {
     const PanoramaMap* panorama = map.FindPanorama(panorama_);
     const KeyFrame* reference = panorama ? map.FindKeyFrame(panorama->reference) : nullptr;
@@ -121,26 +121,27 @@ void NearbyPoints::Take(const MapSnapshot& map, bool infinite, std::vector<Nearb
   }
   const MapPoint* next = map.points.data();
   const MapPoint* const end = next + map.points.size();
-  const KeyFrame* source = nullptr;  // of the point before: points come in the order in which they were made
+  // Source of the previous point: points of one keyframe have consecutive ids.
+  const KeyFrame* source = nullptr;
   wanted_.ForEach([&](MapPointId id) {
     next = FirstNot(next, end, [id](const MapPoint& point) { return point.id < id; });
     if (next == end || next->id != id || next->infinite() != infinite) return;
     if (infinite && next->panorama != panorama_) return;
     if (!source || source->id != next->source_keyframe) source = map.FindKeyFrame(next->source_keyframe);
     if (!source) return;
-    Eigen::Vector4d place = next->point_in_map;
-    if (infinite) place += nearness * source->camera_from_map.OriginInSource().homogeneous();
-    points->push_back({next, source, id, next->normal, place});
+    Eigen::Vector4d point_in_map = next->point_in_map;
+    if (infinite) point_in_map += nearness * source->camera_from_map.OriginInSource().homogeneous();
+    points->push_back({next, source, id, next->normal, point_in_map});
   });
 }
 
-// The first view of a point is the one that all others were measured against, and stays the source wherever
-// it will do. From the side, or from much nearer or further, a warped patch is a poor image of it: then it
-// is cut where the chosen keyframe that sees it most alike shows it (ptamm §2.1 has the first view alone).
+// The first view of a point is the reference of all other measurements and remains the source where possible.
+// From a very different angle or distance a warped patch no longer resembles the point: then the patch is
+// taken from the selected keyframe with the most similar view (ptamm §2.1 uses the first view only).
 void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_from_map) {
   const Eigen::Vector3d center = camera_from_map.OriginInSource();
-  const double most = options_.max_source_misfit * options_.max_source_misfit;
-  const double better = options_.better_source * options_.better_source;
+  const double max_difference = options_.max_source_difference * options_.max_source_difference;
+  const double ratio = options_.max_difference_ratio * options_.max_difference_ratio;
   poorly_viewed_.clear();
   const KeyFrame* source = nullptr;
   Eigen::Vector3d source_center = Eigen::Vector3d::Zero();
@@ -149,13 +150,13 @@ void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_fr
       source = finite_[i].source;
       source_center = source->camera_from_map.OriginInSource();
     }
-    const Eigen::Vector3d position = finite_[i].place.head<3>();
-    const double misfit = SquaredMisfit(source_center - position, center - position);
-    if (misfit > most)
-      poorly_viewed_.push_back({finite_[i].id, static_cast<std::uint32_t>(i), better * misfit});
+    const Eigen::Vector3d position = finite_[i].point_in_map.head<3>();
+    const double difference = SquaredViewDifference(source_center - position, center - position);
+    if (difference > max_difference)
+      poorly_viewed_.push_back({finite_[i].id, static_cast<std::uint32_t>(i), ratio * difference});
   }
-  resourced_.clear();
-  resourced_.reserve(poorly_viewed_.size());
+  reassigned_.clear();
+  reassigned_.reserve(poorly_viewed_.size());
   if (poorly_viewed_.empty()) return;
   for (const auto& [rank, index] : ranked_) {
     const KeyFrame& keyframe = map.keyframes[index];
@@ -166,30 +167,30 @@ void NearbyPoints::ChooseSources(const MapSnapshot& map, const Rigid3& camera_fr
       while (next != end && next->point < observation.point) ++next;
       if (next == end) break;
       if (next->point != observation.point) continue;
-      const Eigen::Vector3d position = finite_[next->index].place.head<3>();
-      const double misfit = SquaredMisfit(keyframe_center - position, center - position);
-      if (misfit < next->wanted) TakeSource(keyframe, observation, misfit, next);
+      const Eigen::Vector3d position = finite_[next->index].point_in_map.head<3>();
+      const double difference = SquaredViewDifference(keyframe_center - position, center - position);
+      if (difference < next->max_difference) ReplaceSource(keyframe, observation, difference, next);
     }
   }
 }
 
-void NearbyPoints::TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit,
-                              PoorlyViewed* poor) {
+void NearbyPoints::ReplaceSource(const KeyFrame& keyframe, const Observation& observation, double difference,
+                                 PoorlyViewed* poor) {
   NearbyPoint& nearby = finite_[poor->index];
-  // The patch is cut where the point was seen, not where the map puts it: what a wrong lens does to the map
-  // must show in the residuals. But the two must agree.
+  // The patch is sampled at the observed pixel, not at the projection, so that a calibration error remains
+  // visible in the residuals. Both must agree within one sigma.
   const auto pixel =
-      keyframe.camera->Project(keyframe.camera_from_map * Eigen::Vector3d(nearby.place.head<3>()));
+      keyframe.camera->Project(keyframe.camera_from_map * Eigen::Vector3d(nearby.point_in_map.head<3>()));
   if (!pixel) return;
   const float sigma = static_cast<float>(1 << observation.level);
   if ((pixel->cast<float>() - observation.pixel).squaredNorm() > sigma * sigma) return;
-  poor->wanted = misfit;
-  if (poor->resourced < 0) {
-    poor->resourced = static_cast<std::int32_t>(resourced_.size());
-    resourced_.push_back(*nearby.point);
-    nearby.point = &resourced_.back();
+  poor->max_difference = difference;
+  if (poor->reassigned < 0) {
+    poor->reassigned = static_cast<std::int32_t>(reassigned_.size());
+    reassigned_.push_back(*nearby.point);
+    nearby.point = &reassigned_.back();
   }
-  MapPoint& point = resourced_[static_cast<std::size_t>(poor->resourced)];
+  MapPoint& point = reassigned_[static_cast<std::size_t>(poor->reassigned)];
   point.source_keyframe = keyframe.id;
   point.source_level = observation.level;
   point.source_pixel = LevelFromLevelZero(observation.pixel.cast<double>(), observation.level).cast<float>();

@@ -12,45 +12,50 @@
 namespace docent::engine {
 
 struct NearbyPointOptions {
-  int frames = 6;              // for which a choice is good, as the camera goes on
-  std::size_t keyframes = 20;  // whose points are looked for: those that share most with the last frame
-  // The nearest ones, among which these are chosen: in a large map the others are not even looked at.
+  int frames = 6;  // frames for which a selection is reused while the camera moves on
+  // The points of this many keyframes are searched: those that share the most points with the last frame.
+  std::size_t keyframes = 20;
+  // The nearest keyframes, among which those are selected; the bound keeps the cost independent of the map
+  // size.
   std::size_t examined_keyframes = 100;
-  // A point that was first seen from further off than this (radians between the lines of sight; a third of
-  // the scale counts as much) is looked for as a nearer keyframe shows it.
-  double max_source_misfit = 0.3;
-  // Of the first view's misfit: a later one is worth its own error of alignment when it fits this much
-  // better.
-  double better_source = 0.6;
+  // If the present view of a point differs more than this from its source view, its patch is taken from a
+  // more similar keyframe. The measure is in radians between the lines of sight; a scale change of 1/3 counts
+  // as much as one radian.
+  double max_source_difference = 0.3;
+  // Another keyframe replaces the source only if its view differs by less than this ratio of the source's
+  // difference: each replacement adds its own alignment error.
+  double max_difference_ratio = 0.6;
 };
 
-// A point that may be looked for.
+// A candidate for the search.
 struct NearbyPoint {
-  const MapPoint* point;   // its source is the keyframe whose view of it resembles the present one
-  const KeyFrame* source;  // that keyframe
-  // As in *point, beside what else it takes to tell whether it is in the image.
+  const MapPoint* point;   // its source is the keyframe with the view most similar to the present one
+  const KeyFrame* source;  // the source keyframe
+  // Copies from *point and data for the visibility test.
   MapPointId id;
   Eigen::Vector3f normal;
-  // Homogeneous, in the map. While the camera turns about a point that is not its own centre, a direction
-  // is taken to be as far from its source as the panorama map's reference sees the scene: nearer to the
+  // Homogeneous, in the map. While the camera rotates about a pivot other than its centre, an infinite point
+  // is assumed to be at the median depth of the panorama map's reference keyframe: that is closer to the
   // truth than infinity.
-  Eigen::Vector4d place;
+  Eigen::Vector4d point_in_map;
 };
 
-// What of a map may be seen from about here, finite and infinite: chosen anew when the map has changed and
-// every few frames. One a tracker, on its thread; allocates nothing once it has grown to the map.
+// Selects the map points that may be visible from the current pose, finite and infinite. The selection is
+// renewed when the map has changed and every few frames. Each tracker owns one and uses it on its thread; it
+// stops allocating once its buffers have the size of the map.
 class NearbyPoints {
  public:
   explicit NearbyPoints(const NearbyPointOptions& options) : options_(options) {}
 
-  // seen: the last frame's inliers by ascending id, empty where the pose is all that is known. panorama:
-  // whose directions are wanted, kNoId for none. pivot: see Turn. The snapshot must live until the next call.
+  // seen: inliers of the last frame by ascending id; empty if only the pose is known. panorama: panorama map
+  // whose infinite points are wanted, kNoId for none. pivot: see PivotEstimate. The snapshot must outlive the
+  // next call.
   void Update(const MapSnapshot& map, const Rigid3& camera_from_map, const std::vector<MapPointId>& seen,
               PanoramaId panorama, const Eigen::Vector3d& pivot);
-  // The next choice is made by the pose alone.
-  void Forget() { map_ = nullptr; }
+  // The next selection uses the pose alone.
+  void ForgetLastFrame() { map_ = nullptr; }
 
-  // By ascending id, good until the next Update().
+  // By ascending id, valid until the next Update().
   const std::vector<NearbyPoint>& finite() const { return finite_; }
   const std::vector<NearbyPoint>& infinite() const { return infinite_; }
 
@@ -58,29 +63,29 @@ class NearbyPoints {
   void ChooseFinite(const MapSnapshot& map, const Rigid3& camera_from_map,
                     const std::vector<MapPointId>& seen);
   void ChooseInfinite(const MapSnapshot& map);
-  // The points of wanted_.
-  void Take(const MapSnapshot& map, bool infinite, std::vector<NearbyPoint>* points);
+  // Copies the points of wanted_ that are finite or infinite as asked.
+  void CopyWanted(const MapSnapshot& map, bool infinite, std::vector<NearbyPoint>* points);
   void ChooseSources(const MapSnapshot& map, const Rigid3& camera_from_map);
-  // A point of finite_ that its source shows poorly.
+  // A point of finite_ whose source view differs too much from the present view.
   struct PoorlyViewed {
     MapPointId point;
-    std::uint32_t index;          // in finite_
-    double wanted;                // squared misfit that a view must stay below
-    std::int32_t resourced = -1;  // place in resourced_
+    std::uint32_t index;           // index in finite_
+    double max_difference;         // squared view difference below which another keyframe replaces the source
+    std::int32_t reassigned = -1;  // index in reassigned_, -1 for none
   };
-  void TakeSource(const KeyFrame& keyframe, const Observation& observation, double misfit,
-                  PoorlyViewed* poor);
+  void ReplaceSource(const KeyFrame& keyframe, const Observation& observation, double difference,
+                     PoorlyViewed* poor);
 
   NearbyPointOptions options_;
   std::vector<NearbyPoint> finite_, infinite_;
   const MapSnapshot* map_ = nullptr;
   std::uint64_t revision_ = 0;
   int age_frames_ = 0;
-  PanoramaId panorama_ = kNoId;  // of infinite_
-  bool has_pivot_ = false;       // at infinite_'s choice
-  // Points with another source than the map's.
-  std::vector<MapPoint> resourced_;
-  // Scratch, kept to save allocations.
+  PanoramaId panorama_ = kNoId;  // panorama map of infinite_
+  bool has_pivot_ = false;       // whether infinite_ was selected with a pivot
+  // Copies of points whose source differs from the map's.
+  std::vector<MapPoint> reassigned_;
+  // Scratch memory, kept to avoid allocations.
   std::vector<std::pair<double, std::size_t>> ranked_;  // (rank, keyframe index), best first
   PointIdSet wanted_;
   std::vector<PoorlyViewed> poorly_viewed_;  // by ascending point

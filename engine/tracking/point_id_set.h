@@ -10,11 +10,11 @@
 
 namespace docent::engine {
 
-// A set of points of one map, one bit an id: filling it neither sorts nor, once it has grown to the map,
-// allocates, and it is gone through by ascending id. Not thread safe.
+// A set of point ids of one map, stored as one bit per id. Insertion does not sort, nothing is allocated once
+// the set has the size of the map, and iteration is by ascending id. Not thread safe.
 class PointIdSet {
  public:
-  // Empty; ids below `end` may be inserted from now on, others are left out.
+  // Empties the set. Ids below `end` may be inserted afterwards; Insert ignores others.
   void Clear(MapPointId end) { words_.assign((static_cast<std::size_t>(end) + kBits - 1) / kBits, 0); }
   void Insert(MapPointId id) {
     if (id / kBits < words_.size()) words_[id / kBits] |= std::uint64_t{1} << (id % kBits);
@@ -22,7 +22,7 @@ class PointIdSet {
   bool Contains(MapPointId id) const {
     return id / kBits < words_.size() && (words_[id / kBits] >> (id % kBits) & 1) != 0;
   }
-  // visit(MapPointId), by ascending id.
+  // Calls visit(MapPointId) by ascending id.
   template <typename Visit>
   void ForEach(Visit&& visit) const {
     for (std::size_t i = 0; i < words_.size(); ++i) {

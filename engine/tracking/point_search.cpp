@@ -10,9 +10,9 @@ namespace docent::engine {
 namespace {
 
 constexpr std::size_t kCacheSlots = 16384;
-// The patch is cut again when the warp differs by more than this from the one it was cut for.
+// The patch is resampled if the warp differs by more than this from the one it was sampled with.
 constexpr float kWarpTolerance = 0.08f;
-// Range of area ratios between a patch's pixels and those of the level that it is searched on.
+// Range of the ratio between the areas of a patch pixel and of a pixel of the search level.
 constexpr float kMinAreaRatio = 0.25f;
 constexpr float kMaxAreaRatio = 3.0f;
 
@@ -51,20 +51,20 @@ PointSearcher::Cached& PointSearcher::Entry(const MapPoint& point) {
   return entry;
 }
 
-bool PointSearcher::FindPlace(const MapPoint& point, const CameraModel& camera,
-                              const Eigen::Matrix3d& rotation, const Rigid3& camera_from_map,
-                              const Eigen::Vector4d& place, PredictedPoint* predicted) const {
+bool PointSearcher::ProjectPoint(const MapPoint& point, const CameraModel& camera,
+                                 const Eigen::Matrix3d& rotation, const Rigid3& camera_from_map,
+                                 const Eigen::Vector4d& point_in_map, PredictedPoint* predicted) const {
   Eigen::Vector3d& x = predicted->point_in_camera;
-  x = rotation * place.head<3>() + place[3] * camera_from_map.translation;
+  x = rotation * point_in_map.head<3>() + point_in_map[3] * camera_from_map.translation;
   if (!camera.Project(x, &predicted->pixel, &predicted->jacobian)) return false;
   if (!camera.IsInside(predicted->pixel, kPatchSize / 2)) return false;
   const Eigen::Vector3d normal = rotation * point.normal.cast<double>();
   return -normal.dot(x) >= options_.min_view_cosine * x.norm();
 }
 
-// The steps of one source pixel on the surface, through its tangent plane.
-bool PointSearcher::FindSteps(const MapPoint& point, const KeyFrame& source, const Eigen::Vector4d& place,
-                              PredictedPoint* predicted) {
+// Computes the displacement of one source pixel on the surface, approximated by its tangent plane.
+bool PointSearcher::ComputeSurfaceSteps(const MapPoint& point, const KeyFrame& source,
+                                        const Eigen::Vector4d& point_in_map, PredictedPoint* predicted) {
   Cached& entry = Entry(point);
   if (!entry.has_rays) {
     const Eigen::Vector2d pixel = point.source_pixel.cast<double>();
@@ -82,7 +82,7 @@ bool PointSearcher::FindSteps(const MapPoint& point, const KeyFrame& source, con
   const Eigen::Matrix3d source_from_map = source.camera_from_map.rotation.matrix();
   const Eigen::Vector3d normal_in_source = source_from_map * point.normal.cast<double>();
   const Eigen::Vector3d point_in_source =
-      source_from_map * place.head<3>() + place[3] * source.camera_from_map.translation;
+      source_from_map * point_in_map.head<3>() + point_in_map[3] * source.camera_from_map.translation;
   const double distance = normal_in_source.dot(point_in_source);
   const Eigen::Vector3d ray = entry.ray.cast<double>();
   const Eigen::Vector3d ray_right = entry.ray_right.cast<double>(), ray_down = entry.ray_down.cast<double>();
@@ -97,8 +97,8 @@ bool PointSearcher::FindSteps(const MapPoint& point, const KeyFrame& source, con
   return true;
 }
 
-// How the patch is stretched in the present image, and the level that shows it about as large.
-bool PointSearcher::FindWarp(const Eigen::Matrix3d& rotation, PredictedPoint* predicted) {
+// Computes the warp of the patch in the present image, and the level on which it has about its original size.
+bool PointSearcher::ComputeWarp(const Eigen::Matrix3d& rotation, PredictedPoint* predicted) {
   const Eigen::Matrix<double, 3, 2> steps_in_camera = rotation * predicted->steps_in_map;
   predicted->pixel_from_source = (predicted->jacobian * steps_in_camera).cast<float>();
   float area = std::abs(predicted->pixel_from_source.determinant());
@@ -112,20 +112,20 @@ bool PointSearcher::FindWarp(const Eigen::Matrix3d& rotation, PredictedPoint* pr
 
 std::optional<PredictedPoint> PointSearcher::Predict(const MapPoint& point, const KeyFrame& source,
                                                      const CameraModel& camera, const Rigid3& camera_from_map,
-                                                     const Eigen::Vector4d& place) {
+                                                     const Eigen::Vector4d& point_in_map) {
   PredictedPoint predicted;
   const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
-  if (!FindPlace(point, camera, rotation, camera_from_map, place, &predicted) ||
-      !FindSteps(point, source, place, &predicted) || !FindWarp(rotation, &predicted))
+  if (!ProjectPoint(point, camera, rotation, camera_from_map, point_in_map, &predicted) ||
+      !ComputeSurfaceSteps(point, source, point_in_map, &predicted) || !ComputeWarp(rotation, &predicted))
     return std::nullopt;
   return predicted;
 }
 
 bool PointSearcher::Repredict(const MapPoint& point, const CameraModel& camera, const Rigid3& camera_from_map,
-                              const Eigen::Vector4d& place, PredictedPoint* predicted) const {
+                              const Eigen::Vector4d& point_in_map, PredictedPoint* predicted) const {
   const Eigen::Matrix3d rotation = camera_from_map.rotation.matrix();
-  return FindPlace(point, camera, rotation, camera_from_map, place, predicted) &&
-         FindWarp(rotation, predicted);
+  return ProjectPoint(point, camera, rotation, camera_from_map, point_in_map, predicted) &&
+         ComputeWarp(rotation, predicted);
 }
 
 bool PointSearcher::PreparePatch(const MapPoint& point, const KeyFrame& source,
@@ -139,7 +139,7 @@ bool PointSearcher::PreparePatch(const MapPoint& point, const KeyFrame& source,
   entry->level = predicted.level;
   entry->pixel_from_source = predicted.pixel_from_source;
   const Eigen::Matrix2f source_from_patch = (predicted.pixel_from_source * scale).inverse();
-  source.features->Look();
+  source.features->MarkInUse();
   entry->has_patch = CutPatch(source.features->levels[point.source_level], point.source_pixel,
                               source_from_patch, &PatchOf(entry));
   return entry->has_patch;
@@ -150,7 +150,7 @@ std::optional<FoundPoint> PointSearcher::Find(const MapPoint& point, const KeyFr
                                               float radius_px, bool direct) {
   Cached& entry = Entry(point);
   if (!PreparePatch(point, source, predicted, &entry)) return std::nullopt;
-  features.Look();
+  features.MarkInUse();
   const PatchTemplate& patch = PatchOf(&entry);
   const auto level = static_cast<std::size_t>(predicted.level);
   const cv::Mat& image = features.levels[level];

@@ -10,86 +10,90 @@
 
 namespace docent::engine {
 
-// One point found in the frame: where it is in the map, where it was seen, and how well.
+// A map point found in the frame: its position in the map, its pixel and the accuracy of the pixel.
 struct PoseMeasurement {
   Eigen::Vector4d point_in_map;  // homogeneous
   Eigen::Vector2d pixel;         // level 0
   double inverse_sigma = 1;      // 1 / pixels; 2^-level (ptamm §2.1)
-  double weight = 1;             // out: robust weight at the end, 0 for an outlier
-  // It tells a direction alone; its w is 0 or says how near it is presumed to be.
+  double weight = 1;             // output: final robust weight, 0 for an outlier
+  // The point constrains the rotation only; its fourth coordinate is 0 or an assumed inverse distance.
   bool direction = false;
 
   bool infinite() const { return direction || point_in_map[3] == 0; }
 };
 
 struct PoseRefinementOptions {
-  int iterations = 10;            // ptamm §2.1: ten are adequate
-  double tukey_factor = 4.685;    // times the robust sigma: 95 % efficiency under Gaussian noise
-  double min_sigma = 0.5;         // of the normalised residuals: below it the noise is better than the model
-  double min_weight = 1e-3;       // a measurement with less is an outlier
-  double infinite_weight = 0.01;  // of an infinite point beside finite ones (hybrid-slam §3.1)
-  // With fewer finite points there is no telling where the camera moved: beside infinite ones it is taken to
-  // have turned only (hybrid-slam §4.3).
+  int iterations = 10;          // ptamm §2.1: ten are adequate
+  double tukey_factor = 4.685;  // times the robust sigma: 95 % efficiency under Gaussian noise
+  // Lower bound of the normalised residuals' sigma: a smaller value is more optimistic than the noise model.
+  double min_sigma = 0.5;
+  double min_weight = 1e-3;       // A measurement with a smaller weight is an outlier.
+  double infinite_weight = 0.01;  // weight of an infinite point when there are finite ones (hybrid-slam §3.1)
+  // With fewer finite points than this the translation is not observable: if there are infinite points, only
+  // the rotation is estimated (hybrid-slam §4.3).
   int min_finite = 15;
-  // Nor is there where they say it less surely than this, of the depth of what they show: a few points at the
-  // rim of the image err together, by ten times what each by itself would let one think. Then the camera is
-  // taken to have turned, and to have moved beside that by no more than about as much: where the points do
-  // tell something of the way, it is not thrown away.
+  // Largest standard deviation of the camera position, as a ratio of the mean depth, at which the finite
+  // points determine the translation. A few points near the border of the image have correlated errors, ten
+  // times those that the covariance of independent errors predicts. Above this value the motion is taken for
+  // a rotation, and the translation is constrained to this size rather than fixed, so that the information in
+  // the finite points is still used.
   double max_position_sigma = 0.003;
-  // As far goes a camera beside a turn that is sure, in a frame; of the depth too, and taken as much less as
-  // points seem surer than they are. It counts from half of max_position_sigma on: what places the camera
-  // well must be free to say that it turns no more.
+  // Standard deviation of the translation between frames during a reliable rotation, as a ratio of the mean
+  // depth; smaller than the true one by the factor by which the points' covariance is too optimistic. The
+  // prior applies above half of max_position_sigma, so that well determined positions can end the rotation.
   double prior_translation_sigma = 0.0003;
 };
 
-// What the measurements could tell of the pose.
+// The degrees of freedom that the measurements determine.
 enum class ObservedMotion : std::uint8_t {
   kSixDof,    // rotation and translation, from finite points
-  kHybrid,    // the same, with infinite points beside
-  kPanorama,  // the rotation alone; the pivot (or the camera's own centre) is about where it was at the start
+  kHybrid,    // rotation and translation, from finite and infinite points
+  kPanorama,  // rotation only; the pivot (or the camera centre) keeps about its initial position
 };
 
 struct PoseRefinement {
   Rigid3 camera_from_map;
   // Of the left twist in the camera frame; zero for a translation that was not estimated.
   Eigen::Matrix<double, 6, 6> covariance;
-  // The same without the turn that was expected; where `observed` is not kPanorama.
+  // The pose without the rotation prior; set unless the rotation alone was estimated.
   Rigid3 camera_from_map_without_prior;
   ObservedMotion observed = ObservedMotion::kSixDof;
   double sigma = 0;  // robust, of the normalised residuals
   int inliers = 0;
-  int finite_inliers = 0;  // of these
-  double mean_depth = 0;   // of the finite inliers; 0 for none
-  bool converged = false;  // also false where the measurements do not hold the degrees of freedom asked for
+  int finite_inliers = 0;  // contained in `inliers`
+  double mean_depth = 0;   // map units, of the finite inliers; 0 if there are none
+  bool converged = false;  // false too if the measurements do not determine the degrees of freedom asked for
 };
 
-// The turn that the motion so far lets expect.
+// The rotation that the previous motion predicts.
 struct RotationPrior {
-  // A point that stays where `camera_from_map` has it; camera frame, zero for the camera's own centre.
+  // The fixed point of the rotation in the camera frame; zero for the camera centre. camera_from_map gives
+  // its position in the map.
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
   Rigid3 camera_from_map;
-  // Else it is resorted to only where the place cannot be told and infinite points are seen.
-  bool sure = false;
+  // If false, the prior is used only where the translation is not observable and infinite points are
+  // projections.
+  bool reliable = false;
 };
 
-// What a refinement writes while it works; kept by its caller, so that the next one need not allocate.
+// Working memory of RefinePose. The caller keeps it to avoid allocations.
 struct PoseRefinementMemory {
-  struct Seen {
-    Eigen::Vector3d point_in_camera;       // homogeneous as the measurement's
-    Eigen::Vector2d error;                 // normalised by sigma
+  struct Projection {
+    Eigen::Vector3d point_in_camera;       // homogeneous like the measurement
+    Eigen::Vector2d error;                 // normalised by the sigma of the level
     Eigen::Matrix<double, 2, 3> jacobian;  // d normalised pixel / d point_in_camera
     bool valid = false;
   };
-  std::vector<Seen> seen;  // one a measurement
+  std::vector<Projection> projections;  // one per measurement
   std::vector<double> squared_errors;
 };
 
-// Robust Gauss-Newton on reprojection errors of finite and infinite points from `start` (ptamm eq. 1-3,
-// hybrid-slam eq. 1-2): Huber while far away, Tukey for the last iterations. The scale of the errors is
-// estimated for each kind by itself: what little translation does to infinite points is no noise of finite
-// ones. Does not allocate beyond *memory.
+// Robust Gauss-Newton on the reprojection errors of finite and infinite points from `start` (ptamm eq. 1-3,
+// hybrid-slam eq. 1-2), with Huber weights in the first iterations and Tukey weights in the last. The error
+// scales of finite and infinite points are estimated separately, because a small translation shifts infinite
+// points and must not count as noise of finite ones. Allocates only in *memory.
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          PoseRefinementMemory* memory, const RotationPrior& turn);
+                          PoseRefinementMemory* memory, const RotationPrior& prior);
 
 }  // namespace docent::engine

@@ -17,7 +17,7 @@ KeyFrameId FindReferenceKeyFrame(const MapSnapshot& map, std::span<const PointMa
     if (point) ++votes[point->source_keyframe];
   }
   if (votes.empty()) return map.keyframes.back().id;
-  // Of equal ones the newest.
+  // With equal counts the newest.
   return std::max_element(votes.begin(), votes.end(),
                           [](const auto& a, const auto& b) {
                             return std::pair(a.second, a.first) < std::pair(b.second, b.first);
@@ -25,7 +25,7 @@ KeyFrameId FindReferenceKeyFrame(const MapSnapshot& map, std::span<const PointMa
       ->first;
 }
 
-void Tracker::FollowCorrections(const MapSnapshot& newer) {
+void Tracker::ApplyCorrections(const MapSnapshot& newer) {
   if (newer.corrections.empty() || newer.corrections.back()->revision <= map_->revision) return;
   const KeyFrameId reference_keyframe = FindReferenceKeyFrame(
       *map_, tracking_ ? std::span(map_tracker_.matches()) : std::span<const PointMatch>());
@@ -33,10 +33,10 @@ void Tracker::FollowCorrections(const MapSnapshot& newer) {
     if (correction->revision <= map_->revision || correction->revision > newer.revision) continue;
     const auto moved = correction->after_from_before.find(reference_keyframe);
     if (moved == correction->after_from_before.end()) continue;
-    motion_.Follow(moved->second);
-    anchor_pose_ = CarriedAlong(anchor_pose_, moved->second);
+    motion_.ApplyCorrection(moved->second);
+    rotation_reference_pose_ = CorrectedPose(rotation_reference_pose_, moved->second);
     median_depth_ *= moved->second.scale;
-    turn_.pivot *= moved->second.scale;
+    pivot_estimate_.pivot *= moved->second.scale;
     rotation_center_.Reset();
   }
 }

@@ -8,9 +8,9 @@
 
 namespace docent::engine {
 
-// The keyframe whose part of the map a frame is tracked in: the source of most of the points that it
-// believes; the newest keyframe where it believes none, kNoId in an empty map. For whoever must carry the
-// frame's pose along when parts of the map are moved (MapCorrection).
+// The reference keyframe of a frame: the source keyframe of most of its inliers; the newest keyframe if there
+// are no inliers, kNoId in an empty map. The frame's pose follows the correction (MapCorrection) of this
+// keyframe when the mapper moves parts of the map.
 KeyFrameId FindReferenceKeyFrame(const MapSnapshot& map, std::span<const PointMatch> matches);
 
 }  // namespace docent::engine

@@ -4,32 +4,32 @@
 #include <cstdint>
 #include <tuple>
 
-// The answer of a camera that is lost and has found places that its image resembles: a pose, or why there
-// is none. A pose is believed by its geometry alone (ptamm §5.3, §6.3): enough points, well fitted, spread
-// over the image, the best map clearly ahead of the others, and, in a map that it was not in before, for
-// several frames. Plain values.
+// The result of a relocalization attempt: a pose, or the reason why there is none. A pose is accepted by its
+// geometry alone (ptamm §5.3, §6.3): enough inliers, small residuals, inliers spread over the image, a
+// best-to-second ratio that excludes ambiguity and, in another map than before, agreement over several
+// frames. Plain values.
 namespace docent::engine {
 
 enum class RejectionReason : std::uint8_t {
   kNone,
-  kFewPoints,   // too few of the points of any place are found
-  kPoorFit,     // points are found, but no pose explains them
-  kOneCorner,   // they are gathered in a part of the image
-  kLookAlikes,  // another map, or another place in the same one, explains the image nearly as well
-  kUnconfirmed  // it is right in this image, but not in several in a row yet
+  kFewPoints,   // too few map points of any candidate were found
+  kPoorFit,     // points were found, but no pose fits them
+  kClustered,   // the inliers are clustered in one part of the image
+  kAmbiguous,   // another map, or another place in the same map, explains the image about as well
+  kUnconfirmed  // the hypothesis holds in this frame, but not yet in enough consecutive frames
 };
 
-// What came nearest to a pose in one frame.
+// The hypothesis of one frame that came closest to acceptance.
 struct RelocalizationResult {
-  RejectionReason doubt = RejectionReason::kNone;
+  RejectionReason rejection = RejectionReason::kNone;
   std::uint64_t map_key = 0,
-                competitor_key = 0;  // the competitor is of kLookAlikes alone, and may be the same map
+                competitor_key = 0;  // of kAmbiguous only; may be the same map
   int inliers = 0;                   // points that agree
-  int frames = 0;                    // that agreed so far, of kUnconfirmed
+  int frames = 0;                    // consecutive frames that agree so far, of kUnconfirmed
 
-  // Of all that speaks against a pose in one frame that is kept which came nearest.
+  // Keeps the result that came closer to acceptance.
   void Consider(const RelocalizationResult& other) {
-    if (std::tie(other.doubt, other.inliers) > std::tie(doubt, inliers)) *this = other;
+    if (std::tie(other.rejection, other.inliers) > std::tie(rejection, inliers)) *this = other;
   }
 };
 

@@ -10,43 +10,48 @@
 namespace docent::engine {
 
 struct RotationCenterOptions {
-  bool enabled = true;  // else every turn is about the camera's own centre (hybrid-slam §4.3)
-  Timestamp window = std::chrono::milliseconds(2000);  // of poses that are looked at
-  Timestamp interval = std::chrono::milliseconds(30);  // between them
+  bool enabled = true;  // if false, every rotation is about the camera centre (hybrid-slam §4.3)
+  Timestamp window = std::chrono::milliseconds(2000);  // age of the oldest pose used
+  Timestamp interval = std::chrono::milliseconds(30);  // between the poses used
   int min_poses = 8;
-  double min_turn_deg = 8.0;         // between the views of the window: less does not tell a centre
-  double position_noise = 0.002;     // of the depth, of a tracked centre
-  double rotation_noise = 0.01;      // radians; a turn that shows no more tells nothing
-  double max_position_sigma = 0.01;  // of the depth, of poses that are taken
-  double max_distance = 2.0;         // of the depth: further off, the camera walks and does not turn
-  double max_misfit = 0.25;          // share of the centres' spread that turning leaves unexplained
-  // Less than this, and of the depth, and it surely turns: a hand that walks while it turns leaves more.
-  double max_sure_misfit = 0.08;
-  double max_sure_offset = 0.006;
+  double min_rotation_deg = 8.0;  // Smallest rotation within the window that the estimate needs.
+  double position_noise = 0.002;  // of a tracked camera centre, as a ratio of the median depth
+  double rotation_noise = 0.01;   // radians; rotations about an axis below this do not determine the pivot
+  // Poses with a larger position sigma are ignored; a ratio of the median depth.
+  double max_position_sigma = 0.01;
+  // Largest distance of a pivot, as a ratio of the median depth: beyond it the camera translates.
+  double max_distance = 2.0;
+  // Largest residual that the rotation leaves, as a ratio of the spread of the centres.
+  double max_residual_ratio = 0.25;
+  // The same for a reliable pivot, and as a ratio of the median depth. A person who walks while rotating
+  // leaves larger residuals.
+  double max_reliable_residual_ratio = 0.08;
+  double max_reliable_residual = 0.006;
 };
 
-// What the camera turns about.
-struct Turn {
-  // Camera frame, units of the map; zero, the camera's own centre, also where the poses do not tell one.
+// The pivot that the camera rotates about.
+struct PivotEstimate {
+  // Camera frame, map units. Zero for the camera centre, also if the poses do not determine a pivot.
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
-  bool sure = false;  // the poses of the last moments leave next to no doubt that the camera turns about it
+  bool reliable = false;  // the recent poses fit a pure rotation about the pivot closely
 };
 
-// A camera in the hand or on the head turns about the person, not about its own centre. From the poses of the
-// last moments this finds the point that stayed where it was while the camera turned, so that a turn that no
-// finite point can tell is taken to go on about it. (Past hybrid-slam §4.3, which turns about the centre.)
-// One a tracker, on its thread; allocates nothing once the window is full.
+// A camera in the hand or on the head rotates about the person, not about its own centre. This class
+// estimates the point that stayed fixed during the recent rotation, so that a rotation without finite points
+// can be continued about it. (An extension of hybrid-slam §4.3, which rotates about the camera centre.) Each
+// tracker owns one and uses it on its thread; it does not allocate once the window is full.
 class RotationCenter {
  public:
   explicit RotationCenter(const RotationCenterOptions& options) : options_(options) {}
 
-  // The poses that follow do not continue those before.
+  // To be called when the next pose does not continue the previous ones.
   void Reset() { poses_.clear(); }
-  // A pose that finite points told. covariance: of the left twist, camera frame; depth: of what it looks at.
+  // Adds a pose that finite points determine. covariance: of the left twist, camera frame. depth: median
+  // depth of the visible points, map units.
   void Add(Timestamp time, const Rigid3& camera_from_map, const Eigen::Matrix<double, 6, 6>& covariance,
            double depth);
-  // What the camera turned about in the last moments. depth: of what it looks at.
-  Turn Estimate(double depth) const;
+  // The pivot of the recent rotation. depth: as in Add.
+  PivotEstimate Estimate(double depth) const;
 
  private:
   struct Pose {
@@ -58,7 +63,8 @@ class RotationCenter {
   std::vector<Pose> poses_;  // ascending in time
 };
 
-// The pose with this rotation that leaves the point `pivot` (camera frame) where `camera_from_map` has it.
+// The pose with this rotation that keeps the point `pivot` (camera frame) at its position under
+// `camera_from_map`.
 Rigid3 RotatedAbout(const Eigen::Vector3d& pivot, const Rigid3& camera_from_map, const Rotation3& rotation);
 
 }  // namespace docent::engine

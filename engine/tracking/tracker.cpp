@@ -20,16 +20,17 @@ double FieldOfView(const CameraModel& camera) {
   return left && right ? std::acos(std::clamp(left->dot(*right), -1.0, 1.0)) : 1.0;
 }
 
-// A small share of the points tells a pose where they fit it. Measured with images that differ from the
-// map's: right poses leave 0.8 to 1.1; of those by less than a fifth of the points, and 1.0 or more, some had
-// jumped by a third of a metre.
+// A pose with a small inlier ratio is accepted only if its residuals are small. Measured with images that
+// differ from the map's: right poses have a sigma of 0.8 to 1.1; of the poses with an inlier ratio below 0.2
+// and a sigma of 1.0 or more, some were off by a third of a metre.
 bool FitsWell(const MapTrackResult& result) {
-  constexpr double kSmallShare = 0.2;
-  constexpr double kMaxSigma = 1.5, kMaxSigmaOfSmallShare = 0.8;
-  return result.sigma <= (result.Quality() >= kSmallShare ? kMaxSigma : kMaxSigmaOfSmallShare);
+  constexpr double kSmallRatio = 0.2;
+  constexpr double kMaxSigma = 1.5, kMaxSigmaAtSmallRatio = 0.8;
+  return result.sigma <= (result.Quality() >= kSmallRatio ? kMaxSigma : kMaxSigmaAtSmallRatio);
 }
 
-constexpr Timestamp kLongAgo = -std::chrono::hours(24 * 365 * 50);  // from which any time may be subtracted
+// Any frame time can be subtracted without overflow.
+constexpr Timestamp kDistantPast = -std::chrono::hours(24 * 365 * 50);
 
 }  // namespace
 
@@ -40,7 +41,7 @@ Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraMode
       map_tracker_(options.map_tracker, camera_),
       competing_tracker_(options.map_tracker, camera_),
       initializer_(options.initializer, camera_, random_.Next()),
-      selector_(options.selector, FieldOfView(*camera_)),
+      keyframe_policy_(options.keyframe_policy, FieldOfView(*camera_)),
       rotation_center_(options.rotation_center) {
   if (options.target) target_initializer_.emplace(options.target, options.target_start, camera_, seed);
 }
@@ -70,19 +71,19 @@ void Tracker::Reset() {
   map_.reset();
   map_key_ = 0;
   starting_ = pair_given_ = tracking_ = search_known_maps_ = false;
-  anchor_.reset();
+  rotation_reference_.reset();
   rotation_center_.Reset();
-  turn_ = {};
+  pivot_estimate_ = {};
   hypothesis_key_ = leader_key_ = 0;
-  hypothesis_frames_ = leader_frames_ = doubtful_frames_ = 0;
+  hypothesis_frames_ = leader_frames_ = unconfirmed_frames_ = 0;
   ResetStart();
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(kNoId);
-  selector_.Reset();
+  keyframe_policy_.Reset();
   reports_.clear();
   candidate_.reset();
   pair_.reset();
-  keyframe_turn_rates_.clear();
+  keyframe_rotation_rates_.clear();
 }
 
 void Tracker::StartFailed() {
@@ -97,7 +98,7 @@ void Tracker::StartNewMap(bool search_known_maps) {
 
 void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_key) {
   const bool same = map_key == map_key_;
-  if (same && map_ && map) FollowCorrections(*map);
+  if (same && map_ && map) ApplyCorrections(*map);
   map_ = map && !map->keyframes.empty() ? std::move(map) : nullptr;
   map_key_ = map_ ? map_key : 0;
   if (!map_) {
@@ -105,45 +106,45 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     return;
   }
   if (starting_ && !map_->HasFinitePoints()) {
-    // Our own first image became a map of directions.
+    // The mapper made a panorama map of this tracker's first image.
     if (same && tracking_) return;
     const KeyFrame& first = map_->keyframes.front();
     map_tracker_.Clear();
     motion_.Reset(first.time, first.camera_from_map);
-    // The corners that are followed must begin where the pose is known.
+    // The keypoint tracks of the initializer must start in a frame with a known pose.
     first_view_from_map_ = first.camera_from_map;
     if (FirstViewTime() != first.time) ResetStart();
-    selector_.Offered(KeyFrameChoice::kFirst, first.time);
+    keyframe_policy_.Offered(KeyFrameChoice::kFirst, first.time);
     observed_ = ObservedMotion::kPanorama;
     tracking_ = true;
-    lost_since_ = kLongAgo;
+    lost_since_ = kDistantPast;
   } else if (pair_given_) {
-    // Our own pair became a map: its newest keyframe is where the camera was a moment ago.
+    // The mapper made a map of this tracker's pair: its newest keyframe is the latest known pose.
     starting_ = pair_given_ = false;
     map_tracker_.Clear();
     map_tracker_.EnablePanorama(kNoId);
-    selector_.Reset();
+    keyframe_policy_.Reset();
     motion_.Reset(map_->keyframes.back().time, map_->keyframes.back().camera_from_map);
     observed_ = ObservedMotion::kSixDof;
     tracking_ = true;
   } else if (!same) {
     map_tracker_.EnablePanorama(kNoId);
-    selector_.Reset();
+    keyframe_policy_.Reset();
     rotation_center_.Reset();
-    turn_ = {};
+    pivot_estimate_ = {};
     map_tracker_.Clear();
     reports_.clear();
-    anchor_.reset();
+    rotation_reference_.reset();
     mean_visible_inlier_ratio_ = 1;
     tracking_ = false;
-    lost_since_ = kLongAgo;
+    lost_since_ = kDistantPast;
   }
 }
 
 std::shared_ptr<ImageFeatures> Tracker::NextFeatures(const Frame& frame) {
   std::shared_ptr<ImageFeatures> features;
   for (const auto& pooled : pool_) {
-    // Keyframes keep theirs; what nobody else holds is written again.
+    // Keyframes hold theirs; features without another owner are reused.
     if (pooled.use_count() == 1) {
       features = pooled;
       break;
@@ -175,9 +176,11 @@ std::optional<Rotation3> Tracker::RotationFromPrevious() const {
 }
 
 bool Tracker::IsAccepted(const MapTrackResult& result) const {
-  const bool sure = result.observed == ObservedMotion::kPanorama || result.Quality() >= options_.sure_quality;
-  const int min_inliers = sure ? options_.min_sure_inliers : options_.min_inliers;
-  // What is compared tolerantly is found by chance more often, and visitors must not see exhibits jump.
+  const bool low_requirement =
+      result.observed == ObservedMotion::kPanorama || result.Quality() >= options_.high_quality;
+  const int min_inliers = low_requirement ? options_.min_inliers_at_high_quality : options_.min_inliers;
+  // Photometric tolerance matches by chance more often, and while maps are only viewed, content must not
+  // jump.
   const bool strict = comparison_ == PatchComparison::kTolerant || !options_.build_maps;
   const bool fits = !strict || result.Quality() >= options_.good_quality || FitsWell(result);
   return fits && result.converged && result.sigma <= options_.max_sigma && result.inliers >= min_inliers &&
@@ -185,15 +188,15 @@ bool Tracker::IsAccepted(const MapTrackResult& result) const {
          (result.Quality() >= options_.lost_quality || HasWideConsensus(result));
 }
 
-// Whether so many points agree on the pose that it is right whatever else was looked for in vain.
+// Whether the inliers alone show that the pose is right, whatever the ratio of points found.
 bool Tracker::HasWideConsensus(const MapTrackResult& result) const {
   return result.inliers >= options_.min_consensus_inliers && result.sigma <= options_.max_consensus_sigma &&
          result.inliers >= options_.min_consensus_ratio * result.found;
 }
 
-// Where a visitor's camera sees few points of the map, as its lens shows a small part of it or its images
-// differ, few tell the pose nevertheless when they fit. Only where the camera was a moment ago: by such a
-// pose no place is recognised, and no map grows.
+// Keeps the track with few points that fit closely, for cameras whose images show little of the map because
+// of their field of view or photometric differences. Only while maps are not extended, and only continuing a
+// recent pose: no place is recognized by such a pose.
 bool Tracker::HoldsTrack(const MapTrackResult& result) const {
   if (options_.build_maps || !result.converged || result.observed != ObservedMotion::kSixDof) return false;
   if (result.occupied_cells < options_.min_recovery_cells || result.Quality() < options_.lost_quality)
@@ -202,10 +205,10 @@ bool Tracker::HoldsTrack(const MapTrackResult& result) const {
   return result.inliers >= options_.min_tight_inliers && result.sigma <= options_.max_tight_sigma;
 }
 
-// Whether a turn, if it is one that the result tells of, explains what was seen.
-bool Tracker::IsTurn(const MapTrackResult& result, const MapSnapshot& map) const {
+// Whether a pose that is a pure rotation fits the measurements; true for all other poses.
+bool Tracker::FitsRotation(const MapTrackResult& result, const MapSnapshot& map) const {
   return result.observed != ObservedMotion::kPanorama || !map.HasFinitePoints() ||
-         result.sigma <= options_.max_turn_sigma;
+         result.sigma <= options_.max_rotation_sigma;
 }
 
 TrackedFrame Tracker::Track(const Frame& frame, const PlaceFinder* places) {
@@ -244,21 +247,21 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   out->tracking_time = std::chrono::steady_clock::now() - start;
 }
 
-// Follows corners for two views that start a map; beside it a map of directions may already be tracked.
+// Runs the initializer; a panorama map may be tracked at the same time.
 void Tracker::SearchInitialPair(const Frame& frame, TrackedFrame* out) {
   if (!map_) out->state = TrackingState::kInitializing;
   if (pair_given_) {
-    if (!map_) out->hint = "hold on, making a map";
+    if (!map_) out->hint = "Starting the map. Please wait.";
     return;
   }
   const bool posed = HasPose(out->state);
   if (map_ && !posed) {
-    // The first view's pose would be lost with the track.
+    // Without a pose the initializer's first view would have no position in the map.
     ResetStart();
     return;
   }
   const bool directions = options_.hybrid && options_.build_maps;
-  if (!map_ && directions) ResetStart();  // its first view is to be the map's, too
+  if (!map_ && directions) ResetStart();  // the map's first image is also the initializer's first view
   pair_ = TrackStart(frame, &out->hint);
   if (pair_) pair_->a_from_map = first_view_from_map_;
   if (!pair_ && posed && directions && !target_initializer_) pair_ = TryPanoramaViews(frame, *out);
@@ -267,120 +270,124 @@ void Tracker::SearchInitialPair(const Frame& frame, TrackedFrame* out) {
   if (!map_ && directions) OfferKeyFrame(KeyFrameChoice::kFirst, frame, Rigid3(), {});
 }
 
-// The panorama map whose points are looked for: the one that is open, or one whose centre the camera is back
-// in when the map of finite points does not fill the image.
+// The panorama map to search: the open one, or one to whose centre the camera has returned if the finite
+// points do not cover the image.
 PanoramaId Tracker::PanoramaFor(const Rigid3& predicted) const {
   if (map_->panoramas.empty()) return kNoId;
-  if (selector_.mode() == KeyFramePolicy::Mode::kPanorama) return selector_.OpenPanorama(*map_);
+  if (keyframe_policy_.mode() == KeyFramePolicy::Mode::kPanorama) return keyframe_policy_.OpenPanorama(*map_);
   const bool needed =
-      observed_ == ObservedMotion::kPanorama || finite_coverage_ < options_.selector.min_coverage;
-  return needed ? selector_.PanoramaNear(predicted, median_depth_, *map_) : kNoId;
+      observed_ == ObservedMotion::kPanorama || finite_coverage_ < options_.keyframe_policy.min_coverage;
+  return needed ? keyframe_policy_.PanoramaNear(predicted, median_depth_, *map_) : kNoId;
 }
 
-void Tracker::Compare(PatchComparison comparison) {
+void Tracker::SetComparison(PatchComparison comparison) {
   comparison_ = comparison;
-  map_tracker_.Compare(comparison);
-  competing_tracker_.Compare(comparison);
+  map_tracker_.SetComparison(comparison);
+  competing_tracker_.SetComparison(comparison);
 }
 
-MapTrackResult Tracker::TrackFrom(const Rigid3& predicted) {
+MapTrackResult Tracker::TrackFromPrediction(const Rigid3& predicted) {
   const auto track = [&] {
     return map_tracker_.Track(*map_, *features_, predicted, MapTracker::Effort::kStandard, &random_);
   };
   if (comparison_ == PatchComparison::kStandard) {
     const MapTrackResult result = track();
-    // What differed may do so again.
+    // The photometric difference may have returned.
     if (frames_tolerant_ == 0 || result.Quality() >= options_.good_quality) return result;
-    Compare(PatchComparison::kTolerant);
+    SetComparison(PatchComparison::kTolerant);
     return track();
   }
-  // Ever more seldom, as it costs as much as the frame itself.
-  constexpr unsigned kSeldom = 32;
+  // Less and less often, as an attempt costs as much as the frame itself.
+  constexpr unsigned kMaxInterval = 32;
   ++frames_tolerant_;
-  if (std::has_single_bit(frames_tolerant_) || frames_tolerant_ % kSeldom == 0) {
-    Compare(PatchComparison::kStandard);
+  if (std::has_single_bit(frames_tolerant_) || frames_tolerant_ % kMaxInterval == 0) {
+    SetComparison(PatchComparison::kStandard);
     const MapTrackResult result = track();
-    if (IsAccepted(result) && result.inliers >= options_.standard_share * inliers_) return result;
-    Compare(PatchComparison::kTolerant);
+    if (IsAccepted(result) && result.inliers >= options_.min_standard_ratio * inliers_) return result;
+    SetComparison(PatchComparison::kTolerant);
   }
   return track();
 }
 
 void Tracker::EnterLostState(const Frame& frame, TrackedFrame* out) {
-  map_tracker_.Forget();
+  map_tracker_.ForgetLastFrame();
   tracking_ = false;
-  misfit_frames_ = 0;
+  poor_rotation_frames_ = 0;
   lost_since_ = frame.time;
   frames_lost_ = 0;
   motion_.Miss(frame.time);
   out->state = TrackingState::kLost;
-  out->hint = "look back at what was mapped";
+  out->hint = "Look back at a place you have seen before.";
 }
 
 void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
-  // What was commanded is known better than what was observed before.
-  Rigid3 predicted = frame.turned ? motion_.PredictWithRotation(*frame.turned) : motion_.Predict(frame.time);
+  // A commanded rotation is more accurate than the motion model.
+  Rigid3 predicted = frame.commanded_rotation ? motion_.PredictWithRotation(*frame.commanded_rotation)
+                                              : motion_.Predict(frame.time);
   if (observed_ == ObservedMotion::kPanorama)
-    predicted = RotatedAbout(turn_.pivot, motion_.last(), predicted.rotation);
+    predicted = RotatedAbout(pivot_estimate_.pivot, motion_.last(), predicted.rotation);
   map_tracker_.EnablePanorama(PanoramaFor(predicted));
-  map_tracker_.SetRotationPrior(turn_);
-  MapTrackResult result = TrackFrom(predicted);
+  map_tracker_.SetPivot(pivot_estimate_);
+  MapTrackResult result = TrackFromPrediction(predicted);
   if (!IsAccepted(result)) {
-    // A second try, wider and turned as the whole image turned.
+    // A second attempt with larger radii, from the last pose rotated by the alignment of the thumbnails.
     const auto rotation = RotationFromPrevious();
-    const Rigid3 turned = rotation ? motion_.PredictWithRotation(*rotation) : predicted;
-    result = map_tracker_.Track(*map_, *features_, turned, MapTracker::Effort::kWide, &random_);
+    const Rigid3 rotated = rotation ? motion_.PredictWithRotation(*rotation) : predicted;
+    result = map_tracker_.Track(*map_, *features_, rotated, MapTracker::Effort::kWide, &random_);
   }
   if (!IsAccepted(result) && !HoldsTrack(result)) {
-    map_tracker_.Forget();
+    map_tracker_.ForgetLastFrame();
     if (options_.hybrid && TrackRotationDirectly(frame, result, out)) return;
     EnterLostState(frame, out);
-    // The same image may show a place that is recognised: a surprising motion need not cost a frame.
+    // The same image may be recognized, so that unexpected motion does not cost a frame.
     Recover(frame, places, out);
     return;
   }
-  misfit_frames_ = IsTurn(result, *map_) ? 0 : misfit_frames_ + 1;
-  if (misfit_frames_ >= options_.frames_of_misfit) {
+  poor_rotation_frames_ = FitsRotation(result, *map_) ? 0 : poor_rotation_frames_ + 1;
+  if (poor_rotation_frames_ >= options_.max_poor_rotation_frames) {
     EnterLostState(frame, out);
-    out->hint = "you have walked where nothing is mapped: look back";
+    out->hint = "You have left the mapped area: look back.";
     return;
   }
   out->state = TrackingState::kSixDof;
   Accept(frame, result, out);
 }
 
-// On a bare wall there are edges and shades, but hardly a corner: the whole image still tells how the
-// camera has turned (ptamm §3.2). Only where few points are to be expected, or are there; where many are and
-// fail, the pose is wrong.
+// With low texture there are edges and shading but hardly a keypoint; all pixels together still determine the
+// rotation (ptamm §3.2). Only if few points are expected or most of them are found: if many points fail, the
+// pose is wrong.
 bool Tracker::TrackRotationDirectly(const Frame& frame, const MapTrackResult& tried, TrackedFrame* out) {
-  // A map of directions alone claims nothing but turns.
-  const bool bare = tried.attempted <= options_.low_texture_points ||
-                    tried.Quality() >= options_.sure_quality || !map_->HasFinitePoints();
-  if (!anchor_ || !bare || frame.time - last_points_ > FromSeconds(options_.max_image_s)) return false;
+  // A map without finite points represents rotations only.
+  const bool low_texture = tried.attempted <= options_.low_texture_points ||
+                           tried.Quality() >= options_.high_quality || !map_->HasFinitePoints();
+  if (!rotation_reference_ || !low_texture ||
+      frame.time - last_points_ > FromSeconds(options_.max_direct_rotation_s))
+    return false;
   const SmallBlurryImage& image = features_->small_blurry;
   const double spread = cv::norm(image.pixels, cv::NORM_L2SQR) / static_cast<double>(image.pixels.total());
   const Rotation3 predicted = motion_.Predict(frame.time).rotation;
-  std::optional<RotationAlignment> turn;
+  std::optional<RotationAlignment> rotation;
   const auto align = [&] {
-    turn = AlignRotation(anchor_->small_blurry, *camera_, image, *camera_,
-                         predicted * anchor_pose_.rotation.inverse(), 10, turn_.pivot / median_depth_);
-    return turn && turn->converged && turn->overlap >= options_.min_image_overlap &&
-           turn->rms * turn->rms <= (1 - options_.min_image_agreement) * spread;
+    rotation = AlignRotation(rotation_reference_->small_blurry, *camera_, image, *camera_,
+                             predicted * rotation_reference_pose_.rotation.inverse(), 10,
+                             pivot_estimate_.pivot / median_depth_);
+    return rotation && rotation->converged && rotation->overlap >= options_.min_image_overlap &&
+           rotation->rms * rotation->rms <= (1 - options_.min_explained_variance) * spread;
   };
-  // The older the image that the turn is measured from, the less errors add up; the newer, the more it has
-  // in common with this one.
+  // An old reference image accumulates less error; a new one overlaps more with the present image.
   if (!align()) {
-    if (!previous_ || anchor_ == previous_) return false;
-    anchor_ = previous_;
-    anchor_pose_ = motion_.last();
+    if (!previous_ || rotation_reference_ == previous_) return false;
+    rotation_reference_ = previous_;
+    rotation_reference_pose_ = motion_.last();
     if (!align()) return false;
   }
   MapTrackResult result;
-  result.camera_from_map = RotatedAbout(turn_.pivot, anchor_pose_, turn->b_from_a * anchor_pose_.rotation);
+  result.camera_from_map = RotatedAbout(pivot_estimate_.pivot, rotation_reference_pose_,
+                                        rotation->b_from_a * rotation_reference_pose_.rotation);
   result.observed = ObservedMotion::kPanorama;
   result.attempted = tried.attempted;
   Accept(frame, result, out);
-  out->hint = "a bare place: only turns are followed";
+  out->hint = "Too little detail here: point the camera at the exhibit.";
   return true;
 }
 
@@ -388,39 +395,39 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   const bool good = result.Quality() >= options_.good_quality || HasWideConsensus(result);
   const Rotation3 previous_rotation = motion_.last().rotation;
   if (out->state == TrackingState::kRelocalized) {
-    doubtful_frames_ = options_.agreeing_frames;
+    unconfirmed_frames_ = options_.confirming_frames;
     required_inlier_ratio_ = RequiredInlierRatio(frame, result.camera_from_map);
     frames_since_recovery_ = frames_tolerant_ = 0;
     leader_frames_ = 0;
     motion_.Reset(frame.time, result.camera_from_map);
-    selector_.Reset();
+    keyframe_policy_.Reset();
     rotation_center_.Reset();
   } else {
     motion_.Update(frame.time, result.camera_from_map);
     if (result.observed == ObservedMotion::kHybrid) out->state = TrackingState::kHybrid;
     if (result.observed == ObservedMotion::kPanorama) out->state = TrackingState::kPanorama;
   }
-  // What was found again is not extended before it has held (ptamm §6.3) and explains most of what is in
-  // view: the furniture of a room fits another one, too.
-  const bool doubtful = doubtful_frames_ > 0;
-  if (doubtful && out->state != TrackingState::kRelocalized) {
-    if (!good) doubtful_frames_ = options_.agreeing_frames;
-    if (result.VisibleInlierRatio() >= required_inlier_ratio_) --doubtful_frames_;
+  // After a relocalization the map is not extended until enough frames confirm the pose (ptamm §6.3) and
+  // explain most of what is in view: the furniture of one room may fit another one too.
+  const bool unconfirmed = unconfirmed_frames_ > 0;
+  if (unconfirmed && out->state != TrackingState::kRelocalized) {
+    if (!good) unconfirmed_frames_ = options_.confirming_frames;
+    if (result.VisibleInlierRatio() >= required_inlier_ratio_) --unconfirmed_frames_;
   }
-  turn_rate_ = (result.camera_from_map.rotation * previous_rotation.inverse()).Log();
+  rotation_rate_ = (result.camera_from_map.rotation * previous_rotation.inverse()).Log();
   tracking_ = true;
   observed_ = result.observed;
   inliers_ = result.inliers;
   visible_inlier_ratio_ = result.VisibleInlierRatio();
-  constexpr double kKept = 0.9;  // of the average in each frame
-  if (!doubtful && result.inliers > 0)
-    mean_visible_inlier_ratio_ = kKept * mean_visible_inlier_ratio_ + (1 - kKept) * visible_inlier_ratio_;
-  out->verdict = {};
+  constexpr double kDecay = 0.9;  // weight of the previous average
+  if (!unconfirmed && result.inliers > 0)
+    mean_visible_inlier_ratio_ = kDecay * mean_visible_inlier_ratio_ + (1 - kDecay) * visible_inlier_ratio_;
+  out->relocalization = {};
   finite_coverage_ = result.finite_coverage;
   if (result.finite_inliers > 0 && result.median_depth > 0) median_depth_ = result.median_depth;
   if (options_.hybrid && result.observed != ObservedMotion::kPanorama) {
     rotation_center_.Add(frame.time, result.camera_from_map_without_prior, result.covariance, median_depth_);
-    turn_ = rotation_center_.Estimate(median_depth_);
+    pivot_estimate_ = rotation_center_.Estimate(median_depth_);
   }
   out->map = map_;
   out->map_key = map_key_;
@@ -430,22 +437,22 @@ void Tracker::Accept(const Frame& frame, const MapTrackResult& result, TrackedFr
   out->quality_class = good ? TrackingQuality::kGood : TrackingQuality::kBad;
   out->finite_points = result.finite_inliers;
   out->infinite_points = result.inliers - result.finite_inliers;
-  const bool by_points = result.inliers > 0;
-  if (by_points) {
-    anchor_ = features_;
-    anchor_pose_ = result.camera_from_map;
+  const bool from_points = result.inliers > 0;
+  if (from_points) {
+    rotation_reference_ = features_;
+    rotation_reference_pose_ = result.camera_from_map;
     last_points_ = frame.time;
     out->matches = map_tracker_.matches();
-    map_tracker_.Remember();
-    if (!doubtful) CollectReports();
+    map_tracker_.RecordMisses();
+    if (!unconfirmed) CollectReports();
   }
-  if (!good) out->hint = "few points are found: slow down";
-  if ((good || !by_points) && !doubtful && options_.build_maps) ChooseKeyFrame(frame, result, *out);
+  if (!good) out->hint = "Move more slowly.";
+  if ((good || !from_points) && !unconfirmed && options_.build_maps) ChooseKeyFrame(frame, result, *out);
 }
 
 FrameInspection Tracker::Inspect(const TrackedFrame& tracked) const {
   FrameInspection inspection;
-  // What was searched in vain after a loss may belong to maps that are gone.
+  // After a failed relocalization the searched map may no longer exist.
   if (HasPose(tracked.state)) {
     inspection = map_tracker_.Inspect(tracked.camera_from_map);
   } else if (searched_) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tracker has for the mapper: keyframes, pairs to start a map from, and how its points fare.
+// What the tracker passes to the mapper: keyframe candidates, initial pairs and statistics of its points.
 #include <algorithm>
 #include <utility>
 
@@ -9,24 +9,25 @@
 namespace docent::engine {
 
 void Tracker::ChooseKeyFrame(const Frame& frame, const MapTrackResult& result, const TrackedFrame& out) {
-  const bool wants_six_dof = result.observed != ObservedMotion::kPanorama &&
-                             WantsKeyFrame(options_.keyframes, *map_, result.camera_from_map, result);
-  KeyFrameChoice choice = wants_six_dof ? KeyFrameChoice::kSixDof : KeyFrameChoice::kNone;
+  const bool needs_six_dof = result.observed != ObservedMotion::kPanorama &&
+                             NeedsKeyFrame(options_.keyframes, *map_, result.camera_from_map, result);
+  KeyFrameChoice choice = needs_six_dof ? KeyFrameChoice::kSixDof : KeyFrameChoice::kNone;
   if (options_.hybrid) {
-    // What carries the camera is what grows.
-    if (selector_.mode() == KeyFramePolicy::Mode::kSixDof && result.observed == ObservedMotion::kPanorama) {
+    // The panorama map that the pose comes from is the one to extend.
+    if (keyframe_policy_.mode() == KeyFramePolicy::Mode::kSixDof &&
+        result.observed == ObservedMotion::kPanorama) {
       if (const PanoramaMap* panorama = map_->FindPanorama(map_tracker_.panorama()))
-        selector_.Reopen(*panorama, *map_);
+        keyframe_policy_.Reopen(*panorama, *map_);
     }
-    choice = selector_.Select({.time = frame.time,
-                               .camera_from_map = result.camera_from_map,
-                               .observed = result.observed,
-                               .finite_coverage = result.finite_coverage,
-                               .coverage = result.coverage,
-                               .points = result.inliers,
-                               .median_depth = median_depth_,
-                               .wants_six_dof = wants_six_dof},
-                              *map_);
+    choice = keyframe_policy_.Select({.time = frame.time,
+                                      .camera_from_map = result.camera_from_map,
+                                      .observed = result.observed,
+                                      .finite_coverage = result.finite_coverage,
+                                      .coverage = result.coverage,
+                                      .points = result.inliers,
+                                      .median_depth = median_depth_,
+                                      .needs_six_dof = needs_six_dof},
+                                     *map_);
   }
   if (choice == KeyFrameChoice::kNone || frames_since_keyframe_ < options_.frames_between_keyframes) return;
   OfferKeyFrame(choice, frame, result.camera_from_map, out.matches);
@@ -49,8 +50,8 @@ void Tracker::OfferKeyFrame(KeyFrameChoice choice, const Frame& frame, const Rig
     if (match.inlier) candidate.matches.push_back(match);
   }
   candidate_ = std::move(candidate);
-  selector_.Offered(choice, frame.time);
-  if (starting_) keyframe_turn_rates_.emplace_back(frame.time, turn_rate_);
+  keyframe_policy_.Offered(choice, frame.time);
+  if (starting_) keyframe_rotation_rates_.emplace_back(frame.time, rotation_rate_);
 }
 
 void Tracker::CollectReports() {
@@ -60,7 +61,7 @@ void Tracker::CollectReports() {
   for (const MapTracker::Attempt& attempt : map_tracker_.attempts()) {
     const PointReport wanted{.point = attempt.point};
     const auto known = std::lower_bound(reports_.begin(), reports_.end(), wanted, earlier);
-    // Each point is attempted once, so that new ones need not be looked for among the new.
+    // Each point is attempted once per frame, so new reports need no search for duplicates.
     PointReport& report =
         known != reports_.end() && known->point == attempt.point ? *known : new_reports_.emplace_back(wanted);
     if (attempt.inlier) {
@@ -72,7 +73,7 @@ void Tracker::CollectReports() {
     }
   }
   std::sort(new_reports_.begin(), new_reports_.end(), earlier);
-  // Merged from the back, in place: std::inplace_merge would ask for memory.
+  // Merged from the back, in place: std::inplace_merge allocates.
   auto old = reports_.size(), fresh = new_reports_.size();
   reports_.resize(old + fresh);
   for (auto to = reports_.size(); fresh > 0;) {

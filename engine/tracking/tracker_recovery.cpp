@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a tracker comes back after a loss, and from one map to another (ptamm §3.2, §5.3, §6.3).
+// Relocalization after a loss, and changes from one map to another (ptamm §3.2, §5.3, §6.3).
 #include <algorithm>
 #include <bit>
 #include <utility>
@@ -8,34 +8,35 @@
 
 namespace docent::engine {
 
-// Whether a pose that was found after a loss counts: kNone, or what speaks against it.
 RejectionReason Tracker::RejectionReasonOf(const MapTrackResult& result, const MapSnapshot& map) const {
-  // Images that differ from the map's show fewer of its points, but still many of them, which fit well.
+  // Images that differ photometrically from the map's show fewer of its points, but still many, with small
+  // residuals.
   const bool fits = comparison_ == PatchComparison::kTolerant &&
-                    result.inliers >= options_.min_fitting_inliers &&
-                    result.sigma <= options_.max_fitting_sigma;
+                    result.inliers >= options_.min_tolerant_inliers &&
+                    result.sigma <= options_.max_tolerant_sigma;
   const double min_quality = fits ? options_.lost_quality : options_.min_recovery_quality;
   if (result.inliers < options_.min_recovery_inliers || result.Quality() < min_quality)
     return RejectionReason::kFewPoints;
-  if (!result.converged || result.sigma > options_.max_sigma || !IsTurn(result, map))
+  if (!result.converged || result.sigma > options_.max_sigma || !FitsRotation(result, map))
     return RejectionReason::kPoorFit;
-  if (result.occupied_cells < options_.min_recovery_cells) return RejectionReason::kOneCorner;
+  if (result.occupied_cells < options_.min_recovery_cells) return RejectionReason::kClustered;
   return RejectionReason::kNone;
 }
 
-// What a frame must explain after a recovery to count for the map's extension. A camera that was lost a
-// moment ago and is found about where it was lost has hardly come to a place that looks alike. Where things
-// hide each other a map never explained much of what is in view; it explains enough when it explains about as
-// much as before.
+// The visible inlier ratio that a frame needs after a relocalization to count towards extending the map. A
+// camera that is found shortly after the loss near the lost pose has hardly reached another place of similar
+// appearance. With many occlusions the ratio was never high; then about the ratio from before the loss
+// suffices.
 double Tracker::RequiredInlierRatio(const Frame& frame, const Rigid3& found_camera_from_map) const {
-  constexpr double kNear = 0.5;  // of the depth, and radians: half the field of view of a 60 degree lens
+  // Ratio of the median depth, and radians: half the field of view of a 60 degree lens.
+  constexpr double kNear = 0.5;
   const Rigid3& lost = motion_.last();
   const double shift = (lost.OriginInSource() - found_camera_from_map.OriginInSource()).norm();
-  const double turn = (lost.rotation * found_camera_from_map.rotation.inverse()).Angle();
+  const double angle = (lost.rotation * found_camera_from_map.rotation.inverse()).Angle();
   if (frame.time - lost_since_ > FromSeconds(options_.short_loss_s) || shift > kNear * median_depth_ ||
-      turn > kNear)
-    return options_.poor_quality;
-  return std::min(options_.poor_quality, mean_visible_inlier_ratio_ / options_.better_quality);
+      angle > kNear)
+    return options_.poor_visible_ratio;
+  return std::min(options_.poor_visible_ratio, mean_visible_inlier_ratio_ / options_.better_ratio);
 }
 
 bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
@@ -45,9 +46,9 @@ bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, Track
   map_tracker_.EnablePanorama(PanoramaFor(guess));
   MapTrackResult result =
       map_tracker_.Track(*map_, *features_, guess, MapTracker::Effort::kRecovery, &random_);
-  const RejectionReason doubt = RejectionReasonOf(result, *map_);
-  if (doubt != RejectionReason::kNone && !options_.build_maps) {
-    // Where the patches of the upper levels are too few to tell a pose, the guess may still be good.
+  const RejectionReason rejection = RejectionReasonOf(result, *map_);
+  if (rejection != RejectionReason::kNone && !options_.build_maps) {
+    // With too few patches on the upper levels for a pose, the predicted pose may still be good.
     for (const auto effort : {MapTracker::Effort::kStandard, MapTracker::Effort::kWide}) {
       if (HoldsTrack(result)) break;
       result = map_tracker_.Track(*map_, *features_, guess, effort, &random_);
@@ -58,13 +59,13 @@ bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, Track
       return true;
     }
   }
-  if (doubt == RejectionReason::kNone) {
-    // What is poorly seen may be something else that is only alike.
-    const auto is_better = [&](const std::optional<FoundPlace>& competitor) {
+  if (rejection == RejectionReason::kNone) {
+    // A place with a low visible inlier ratio may be another one of similar appearance.
+    const auto is_better = [&](const std::optional<VerifiedPlace>& competitor) {
       return competitor &&
-             competitor->result.VisibleInlierRatio() >= options_.better_quality * result.VisibleInlierRatio();
+             competitor->result.VisibleInlierRatio() >= options_.better_ratio * result.VisibleInlierRatio();
     };
-    const bool poor = places && result.VisibleInlierRatio() < options_.poor_quality;
+    const bool poor = places && result.VisibleInlierRatio() < options_.poor_visible_ratio;
     if (!poor || !(is_better(BestElsewhere(*places, map_key_, result.camera_from_map, kNoId, out)) ||
                    is_better(BestCompetingMap(BestPlaces(*places), {map_key_}, out)))) {
       if (poor) {
@@ -78,8 +79,8 @@ bool Tracker::RecoverNearby(const Frame& frame, const PlaceFinder* places, Track
       return true;
     }
   }
-  out->verdict.Consider({.doubt = doubt, .map_key = map_key_, .inliers = result.inliers});
-  map_tracker_.Forget();
+  out->relocalization.Consider({.rejection = rejection, .map_key = map_key_, .inliers = result.inliers});
+  map_tracker_.ForgetLastFrame();
   motion_.Reset(frame.time, guess);
   return false;
 }
@@ -90,12 +91,12 @@ bool Tracker::IsUnambiguous(std::uint64_t best_key, double best_quality, std::ui
   if (best_key != leader_key_ || !ahead) leader_frames_ = 0;
   if (ahead) ++leader_frames_;
   leader_key_ = best_key;
-  // Whoever was in one of them stays there in case of doubt.
-  const double lead = second_key == map_key_ ? options_.better_quality : options_.min_quality_ratio;
+  // The map that the camera was in is preferred.
+  const double lead = second_key == map_key_ ? options_.better_ratio : options_.min_quality_ratio;
   return ahead && (best_quality >= lead * second_quality || leader_frames_ >= options_.min_leading_frames);
 }
 
-void Tracker::BeginRelocalization(const FoundPlace& found) {
+void Tracker::BeginRelocalization(const VerifiedPlace& found) {
   hypothesis_key_ = found.place.candidate.map_key;
   hypothesis_panorama_ = found.panorama;
   hypothesis_pose_ = found.result.camera_from_map;
@@ -111,16 +112,16 @@ std::shared_ptr<const MapSnapshot> Tracker::TrackHypothesis(const PlaceFinder& p
     map = found.front().map;
   }
   const auto rotation = RotationFromPrevious();
-  const Rigid3 turn(rotation ? *rotation : Rotation3(), Eigen::Vector3d::Zero());
+  const Rigid3 rotated(rotation ? *rotation : Rotation3(), Eigen::Vector3d::Zero());
   tracker->Clear();
   tracker->EnablePanorama(hypothesis_panorama_);
-  *result = tracker->Track(*map, *features_, turn * hypothesis_pose_, MapTracker::Effort::kWide, &random_);
+  *result = tracker->Track(*map, *features_, rotated * hypothesis_pose_, MapTracker::Effort::kWide, &random_);
   return map;
 }
 
-void Tracker::Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, const MapTrackResult& result,
-                    TrackedFrame* out) {
-  if (hypothesis_key_ != map_key_) mean_visible_inlier_ratio_ = 1;  // unknown, in another map
+void Tracker::EnterMap(const Frame& frame, std::shared_ptr<const MapSnapshot> map,
+                       const MapTrackResult& result, TrackedFrame* out) {
+  if (hypothesis_key_ != map_key_) mean_visible_inlier_ratio_ = 1;  // unknown in another map
   map_ = std::move(map);
   map_key_ = hypothesis_key_;
   hypothesis_frames_ = 0;
@@ -128,42 +129,44 @@ void Tracker::Enter(const Frame& frame, std::shared_ptr<const MapSnapshot> map, 
   out->state = TrackingState::kRelocalized;
   out->hint.clear();
   Accept(frame, result, out);
-  // The frames that agreed have counted already where the camera is about where it was lost.
-  if (required_inlier_ratio_ < options_.poor_quality) doubtful_frames_ = 1;
+  // Near the lost pose the confirming frames count already.
+  if (required_inlier_ratio_ < options_.poor_visible_ratio) unconfirmed_frames_ = 1;
 }
 
-// Where maps overlap the camera is carried from one into another by what both show; what was left in the
-// other is only seen once it is entered. It is, when it explains the image clearly better (ptamm §5.3).
+// Where maps overlap, the points that both contain keep the camera in its present map although the other one
+// may show more from here. The other map is entered when its visible inlier ratio is clearly higher (ptamm
+// §5.3).
 void Tracker::SearchBetterMap(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
-  if (visible_inlier_ratio_ >= options_.poor_quality) {
+  if (visible_inlier_ratio_ >= options_.poor_visible_ratio) {
     hypothesis_frames_ = 0;
     return;
   }
   const auto better = [&](const MapTrackResult& result) {
-    return result.VisibleInlierRatio() > options_.better_quality * visible_inlier_ratio_;
+    return result.VisibleInlierRatio() > options_.better_ratio * visible_inlier_ratio_;
   };
   MapTrackResult result;
   if (hypothesis_frames_ > 0) {
     const auto map = TrackHypothesis(places, &competing_tracker_, &result);
     if (!map || RejectionReasonOf(result, *map) != RejectionReason::kNone || !better(result)) {
       hypothesis_frames_ = 0;
-    } else if (hypothesis_pose_ = result.camera_from_map; ++hypothesis_frames_ >= options_.agreeing_frames) {
-      // Once more as its own, so that all that a frame tells is of the new map.
+    } else if (hypothesis_pose_ = result.camera_from_map;
+               ++hypothesis_frames_ >= options_.confirming_frames) {
+      // Tracks once more with the main tracker, so that all results of the frame refer to the new map.
       map_tracker_.Clear();
       map_tracker_.EnablePanorama(hypothesis_panorama_);
       result =
           map_tracker_.Track(*map, *features_, hypothesis_pose_, MapTracker::Effort::kStandard, &random_);
-      Enter(frame, map, result, out);
+      EnterMap(frame, map, result, out);
     }
     return;
   }
-  const bool well_enough = out->quality >= options_.good_quality;
-  if (++frames_since_better_map_search_ < options_.frames_between_better_map_searches && well_enough) return;
+  const bool good = out->quality >= options_.good_quality;
+  if (++frames_since_better_map_search_ < options_.frames_between_better_map_searches && good) return;
   frames_since_better_map_search_ = 0;
   std::vector<AlignedPlace> others = BestPlaces(places, map_key_);
-  if (others.size() > options_.candidates) others.resize(options_.candidates);
+  if (others.size() > options_.max_verified) others.resize(options_.max_verified);
   for (const AlignedPlace& place : others) {
-    result = TryPlace(place, &competing_tracker_);
+    result = VerifyPlace(place, &competing_tracker_);
     if (RejectionReasonOf(result, *place.candidate.map) != RejectionReason::kNone || !better(result))
       continue;
     BeginRelocalization({place, result, competing_tracker_.panorama()});
@@ -171,74 +174,76 @@ void Tracker::SearchBetterMap(const Frame& frame, const PlaceFinder& places, Tra
   }
 }
 
-// A map that was begun because the camera was lost: where another map explains the image, the camera goes
-// back there, as if it were still lost, so that the same place is not mapped twice.
+// Used in a map that was started because the camera was lost: if a known map explains the image, the camera
+// returns to it as if it were still lost, so that no place is mapped twice.
 void Tracker::SearchKnownMaps(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
-  // A search costs as much as ten frames: about four a second, and more as long as hardly anything would be
-  // lost by going back.
+  // A search costs as much as ten frames: about four per second, and more often while little would be lost by
+  // returning.
   const int frames_between = map_->HasFinitePoints() ? 8 : 2;
   if (hypothesis_frames_ > 0 && hypothesis_key_ != map_key_) {
     MapTrackResult result;
     const auto map = TrackHypothesis(places, &competing_tracker_, &result);
     if (!map || RejectionReasonOf(result, *map) != RejectionReason::kNone ||
-        result.VisibleInlierRatio() < options_.poor_quality) {
+        result.VisibleInlierRatio() < options_.poor_visible_ratio) {
       hypothesis_frames_ = 0;
       return;
     }
     hypothesis_pose_ = result.camera_from_map;
-    if (++hypothesis_frames_ < options_.agreeing_frames) return;
+    if (++hypothesis_frames_ < options_.confirming_frames) return;
     map_tracker_.Clear();
     map_tracker_.EnablePanorama(hypothesis_panorama_);
     result = map_tracker_.Track(*map, *features_, hypothesis_pose_, MapTracker::Effort::kStandard, &random_);
     starting_ = pair_given_ = search_known_maps_ = false;
     candidate_.reset();
     ResetStart();
-    Enter(frame, map, result, out);
+    EnterMap(frame, map, result, out);
     return;
   }
   if (++frames_since_better_map_search_ < frames_between) return;
   frames_since_better_map_search_ = 0;
-  const RelocalizationResult before = out->verdict;
-  const std::vector<FoundPlace> found = FindMaps(places, BestPlaces(places, map_key_), out);
-  out->verdict = before;
-  if (found.empty() || found.front().result.VisibleInlierRatio() < options_.poor_quality) return;
+  const RelocalizationResult before = out->relocalization;
+  const std::vector<VerifiedPlace> found = VerifyPlaces(places, BestPlaces(places, map_key_), out);
+  out->relocalization = before;
+  if (found.empty() || found.front().result.VisibleInlierRatio() < options_.poor_visible_ratio) return;
   const bool competitor = found.size() > 1 && found.front().result.Quality() <
                                                   options_.min_quality_ratio * found[1].result.Quality();
   if (!competitor) BeginRelocalization(found.front());
 }
 
-// What was found again by a part of what is in view may be another place that looks alike: as long as it is
-// seen no better, the others are asked.
+// A relocalization with a low visible inlier ratio may be at another place of similar appearance: until the
+// ratio is high enough, other places of the map are tried.
 void Tracker::SearchBetterPlace(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
-  if (doubtful_frames_ == 0) return;
+  if (unconfirmed_frames_ == 0) return;
   ++frames_since_recovery_;
-  if (visible_inlier_ratio_ >= options_.poor_quality) return;
-  // A look costs as much as ten frames: ever more seldom, for a place may have changed for good.
-  constexpr unsigned kSeldom = 32;
+  if (visible_inlier_ratio_ >= options_.poor_visible_ratio) return;
+  // A search costs as much as ten frames, so it runs less and less often: the place may have changed
+  // permanently.
+  constexpr unsigned kMaxInterval = 32;
   const unsigned frames = frames_since_recovery_;
-  if (frames < 2 || !(std::has_single_bit(frames) || frames % kSeldom == 0)) return;
+  if (frames < 2 || !(std::has_single_bit(frames) || frames % kMaxInterval == 0)) return;
   const auto other = BestElsewhere(places, map_key_, out->camera_from_map, kNoId, out);
-  const double needed = std::max(options_.poor_quality, options_.better_quality * visible_inlier_ratio_);
-  if (other && other->result.VisibleInlierRatio() >= needed) Return(frame, *other, out);
-  out->verdict = {};
+  const double needed = std::max(options_.poor_visible_ratio, options_.better_ratio * visible_inlier_ratio_);
+  if (other && other->result.VisibleInlierRatio() >= needed) ReturnToMap(frame, *other, out);
+  out->relocalization = {};
 }
 
 void Tracker::SetUnconfirmed(const MapTrackResult& result, TrackedFrame* out) const {
-  out->verdict = {.doubt = RejectionReason::kUnconfirmed,
-                  .map_key = hypothesis_key_,
-                  .inliers = result.inliers,
-                  .frames = hypothesis_frames_};
+  out->relocalization = {.rejection = RejectionReason::kUnconfirmed,
+                         .map_key = hypothesis_key_,
+                         .inliers = result.inliers,
+                         .frames = hypothesis_frames_};
 }
 
-// A map that is about to be entered is followed, not searched anew; false when it does not hold. Its poses
-// agree: each is looked for close about the one before.
+// Continues a hypothesis by tracking it from its previous pose, which makes consecutive poses agree; false if
+// it fails.
 bool Tracker::ContinueRelocalization(const Frame& frame, const PlaceFinder& places, TrackedFrame* out) {
   if (hypothesis_frames_ == 0) return false;
   MapTrackResult result;
   const auto map = TrackHypothesis(places, &map_tracker_, &result);
-  const RejectionReason doubt = map ? RejectionReasonOf(result, *map) : RejectionReason::kFewPoints;
-  if (doubt != RejectionReason::kNone) {
-    out->verdict.Consider({.doubt = doubt, .map_key = hypothesis_key_, .inliers = result.inliers});
+  const RejectionReason rejection = map ? RejectionReasonOf(result, *map) : RejectionReason::kFewPoints;
+  if (rejection != RejectionReason::kNone) {
+    out->relocalization.Consider(
+        {.rejection = rejection, .map_key = hypothesis_key_, .inliers = result.inliers});
     hypothesis_frames_ = 0;
     return false;
   }
@@ -246,26 +251,27 @@ bool Tracker::ContinueRelocalization(const Frame& frame, const PlaceFinder& plac
     const std::uint64_t competitor_key = competitor->place.candidate.map_key;
     if (!IsUnambiguous(hypothesis_key_, result.Quality(), competitor_key, competitor->result.Quality())) {
       hypothesis_frames_ = 0;
-      out->verdict = {.doubt = RejectionReason::kLookAlikes,
-                      .map_key = hypothesis_key_,
-                      .competitor_key = competitor_key,
-                      .inliers = result.inliers};
+      out->relocalization = {.rejection = RejectionReason::kAmbiguous,
+                             .map_key = hypothesis_key_,
+                             .competitor_key = competitor_key,
+                             .inliers = result.inliers};
       return true;
     }
   }
   hypothesis_pose_ = result.camera_from_map;
-  if (++hypothesis_frames_ >= options_.agreeing_frames) {
-    Enter(frame, map, result, out);
+  if (++hypothesis_frames_ >= options_.confirming_frames) {
+    EnterMap(frame, map, result, out);
   } else {
     SetUnconfirmed(result, out);
   }
   return true;
 }
 
-// Into the map that the camera was in: once more as its own, so that all that the frame tells is of it.
-void Tracker::Return(const Frame& frame, const FoundPlace& found, TrackedFrame* out) {
-  if (found.result.VisibleInlierRatio() < options_.poor_quality) {
-    // What fits a part of what is in view may be alike only.
+// Returns to the map that the camera was in: tracks once more with the main tracker, so that all results of
+// the frame refer to this place.
+void Tracker::ReturnToMap(const Frame& frame, const VerifiedPlace& found, TrackedFrame* out) {
+  if (found.result.VisibleInlierRatio() < options_.poor_visible_ratio) {
+    // Too little of what is in view fits; it may be a place of similar appearance.
     BeginRelocalization(found);
     SetUnconfirmed(found.result, out);
     return;
@@ -275,8 +281,9 @@ void Tracker::Return(const Frame& frame, const FoundPlace& found, TrackedFrame* 
   map_tracker_.EnablePanorama(found.panorama);
   const MapTrackResult result = map_tracker_.Track(*map_, *features_, found.result.camera_from_map,
                                                    MapTracker::Effort::kStandard, &random_);
-  if (const RejectionReason doubt = RejectionReasonOf(result, *map_); doubt != RejectionReason::kNone) {
-    out->verdict.Consider({.doubt = doubt, .map_key = map_key_, .inliers = result.inliers});
+  if (const RejectionReason rejection = RejectionReasonOf(result, *map_);
+      rejection != RejectionReason::kNone) {
+    out->relocalization.Consider({.rejection = rejection, .map_key = map_key_, .inliers = result.inliers});
     return;
   }
   out->state = TrackingState::kRelocalized;
@@ -286,52 +293,54 @@ void Tracker::Return(const Frame& frame, const FoundPlace& found, TrackedFrame* 
 
 void Tracker::Recover(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
   out->state = map_ || !options_.build_maps ? TrackingState::kLost : TrackingState::kInitializing;
-  out->hint = "look back at what was mapped";
-  // Every other frame: the exposure or sharpness may have changed. A map that is about to be entered is
-  // followed as it was found.
+  out->hint = map_ || !options_.build_maps ? "Look back at a place you have seen before."
+                                           : "Press New map to begin, or look at a mapped place.";
+  // The exposure or sharpness may have changed, so every other frame uses photometric tolerance. A hypothesis
+  // is continued with the comparison that found it.
   if (hypothesis_frames_ == 0 && frames_lost_++ > 0) {
-    Compare(comparison_ == PatchComparison::kStandard ? PatchComparison::kTolerant
-                                                      : PatchComparison::kStandard);
+    SetComparison(comparison_ == PatchComparison::kStandard ? PatchComparison::kTolerant
+                                                            : PatchComparison::kStandard);
   }
   if (map_ && RecoverNearby(frame, places, out)) return;
   if (!places || ContinueRelocalization(frame, *places, out)) return;
-  // What was hidden from where a visitor was lost is so for a while.
+  // For a short time after the loss the same points are still occluded.
   if (options_.build_maps || !map_ || frame.time - lost_since_ > FromSeconds(options_.short_loss_s))
     map_tracker_.Clear();
-  const std::vector<AlignedPlace> alike = BestPlaces(*places);
-  std::vector<FoundPlace> found = FindMaps(*places, alike, out);
-  if (found.empty() && out->verdict.doubt != RejectionReason::kLookAlikes) {
-    // What does not look alike at once may still show the same things; what does is a competitor at least.
-    std::vector<AlignedPlace> others = PlacesByWords(*places, alike);
+  const std::vector<AlignedPlace> by_thumbnail = BestPlaces(*places);
+  std::vector<VerifiedPlace> found = VerifyPlaces(*places, by_thumbnail, out);
+  if (found.empty() && out->relocalization.rejection != RejectionReason::kAmbiguous) {
+    // Visual words retrieve places whose thumbnails differ; the places found by thumbnail remain as
+    // competitors.
+    std::vector<AlignedPlace> others = PlacesByWords(*places, by_thumbnail);
     if (!others.empty()) {
-      others.insert(others.end(), alike.begin(), alike.end());
-      found = FindMaps(*places, others, out);
+      others.insert(others.end(), by_thumbnail.begin(), by_thumbnail.end());
+      found = VerifyPlaces(*places, others, out);
     }
   }
-  if (found.empty() && out->verdict.doubt != RejectionReason::kLookAlikes) {
-    // No keyframe is near enough to be turned until it fits; descriptors tell the pose from further away.
+  if (found.empty() && out->relocalization.rejection != RejectionReason::kAmbiguous) {
+    // No keyframe is close enough for an alignment by rotation; descriptor matching works from further away.
     std::vector<AlignedPlace> others = PlacesByDescriptors(*places);
     if (!others.empty()) {
-      others.insert(others.end(), alike.begin(), alike.end());
-      found = FindMaps(*places, others, out);
+      others.insert(others.end(), by_thumbnail.begin(), by_thumbnail.end());
+      found = VerifyPlaces(*places, others, out);
     }
   }
   if (found.empty()) return;
   const auto key = [&](std::size_t i) { return found[i].place.candidate.map_key; };
   if (found.size() > 1 &&
       !IsUnambiguous(key(0), found[0].result.Quality(), key(1), found[1].result.Quality())) {
-    // In case of doubt the camera is still where it was.
-    const auto own = std::find_if(found.begin(), found.end(), [&](const FoundPlace& place) {
+    // With an ambiguity the camera is assumed to be still in its map.
+    const auto own = std::find_if(found.begin(), found.end(), [&](const VerifiedPlace& place) {
       return place.place.candidate.map_key == map_key_;
     });
-    if (own != found.end()) return Return(frame, *own, out);
-    out->verdict = {.doubt = RejectionReason::kLookAlikes,
-                    .map_key = key(0),
-                    .competitor_key = key(1),
-                    .inliers = found[0].result.inliers};
+    if (own != found.end()) return ReturnToMap(frame, *own, out);
+    out->relocalization = {.rejection = RejectionReason::kAmbiguous,
+                           .map_key = key(0),
+                           .competitor_key = key(1),
+                           .inliers = found[0].result.inliers};
     return;
   }
-  if (key(0) == map_key_) return Return(frame, found[0], out);
+  if (key(0) == map_key_) return ReturnToMap(frame, found[0], out);
   BeginRelocalization(found[0]);
   SetUnconfirmed(found[0].result, out);
 }

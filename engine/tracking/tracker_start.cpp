@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a tracker finds the two views with which a panorama map gains depth.
+// Finds the two views from which a panorama map gets finite points.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -10,7 +10,8 @@ namespace docent::engine {
 
 namespace {
 
-// What a keyframe and the present frame both see of a panorama map. Both ranges ascend by point.
+// Calls `each` for every point that both a keyframe and the present frame observe. Both ranges ascend by
+// point.
 template <class Each>
 void ForShared(const MapSnapshot& map, KeyFrameId keyframe, const std::vector<PointMatch>& matches,
                const Each& each) {
@@ -31,10 +32,12 @@ void ForShared(const MapSnapshot& map, KeyFrameId keyframe, const std::vector<Po
 
 }  // namespace
 
-// The keyframe against which the image shows most parallax: the largest median distance of its directions
-// from where the rotation alone expects them. Null where none shows enough to ask for the geometry.
-const KeyFrame* Tracker::WidestPanoramaView(const TrackedFrame& out) {
-  constexpr double kMinParallaxPx = 4;  // below it no start is significant at a keypoint noise of 0.3 pixels
+// The panorama keyframe with the largest parallax to the image: the largest median distance of its points
+// from the pixels that the rotation alone predicts. Null if no keyframe has enough parallax for the
+// initializer.
+const KeyFrame* Tracker::FindMaxParallaxKeyFrame(const TrackedFrame& out) {
+  // With less, no initialization is significant at a keypoint noise of 0.3 pixels.
+  constexpr double kMinParallaxPx = 4;
   constexpr std::size_t kMinShared = 60;
   sorted_matches_ = out.matches;
   std::sort(sorted_matches_.begin(), sorted_matches_.end(),
@@ -64,10 +67,10 @@ const KeyFrame* Tracker::WidestPanoramaView(const TrackedFrame& out) {
 }
 
 std::optional<InitialPair> Tracker::TryPanoramaViews(const Frame& frame, const TrackedFrame& out) {
-  constexpr int kInterval = 3;  // frames; the initializer asks every second one for the same
+  constexpr int kInterval = 3;  // frames; the initializer itself makes such an attempt every second frame
   if (++frames_since_views_ < kInterval || !map_ || out.matches.empty()) return std::nullopt;
   frames_since_views_ = 0;
-  const KeyFrame* const keyframe = WidestPanoramaView(out);
+  const KeyFrame* const keyframe = FindMaxParallaxKeyFrame(out);
   if (!keyframe) return std::nullopt;
   std::vector<InitialPair::Match> matches;
   std::vector<std::uint32_t> ids;
@@ -75,13 +78,13 @@ std::optional<InitialPair> Tracker::TryPanoramaViews(const Frame& frame, const T
     matches.push_back({seen.pixel, match.pixel, seen.level});
     ids.push_back(seen.point);
   });
-  const auto rate = std::find_if(keyframe_turn_rates_.begin(), keyframe_turn_rates_.end(),
+  const auto rate = std::find_if(keyframe_rotation_rates_.begin(), keyframe_rotation_rates_.end(),
                                  [&](const auto& entry) { return entry.first == keyframe->time; });
   const Eigen::Vector3d before =
-      rate != keyframe_turn_rates_.end() ? rate->second : Eigen::Vector3d(Eigen::Vector3d::Zero());
+      rate != keyframe_rotation_rates_.end() ? rate->second : Eigen::Vector3d(Eigen::Vector3d::Zero());
   auto pair =
       initializer_.TryViews({keyframe->time, keyframe->features}, {frame.time, features_}, std::move(matches),
-                            ids, (turn_rate_ - before).norm() / camera_->PixelAngle());
+                            ids, (rotation_rate_ - before).norm() / camera_->PixelAngle());
   if (pair) pair->a_from_map = keyframe->camera_from_map;
   return pair;
 }

@@ -14,30 +14,30 @@ namespace {
 
 constexpr int kPatchWidth = 15, kHalfPatch = kPatchWidth / 2;
 constexpr int kCells = 3, kDirections = 4;
-constexpr int kRadius = 13;  // of the window that is cut: the turned patch, its gradients and the blur
+constexpr int kRadius = 13;  // of the sampled window: the rotated patch, its gradients and the blur
 constexpr int kWindow = 2 * kRadius + 1;
 constexpr int kSmoothed = kWindow - 2;
-constexpr int kTurned = kPatchWidth + 2;  // with a border for the gradients
-constexpr int kLanes = 16;                // a row of the patch, filled up for vector units
-constexpr float kMaxValue = 0.3f;         // of the unit vector; more than that is one edge that outshines all
-constexpr float kMinStrength = 60.0f;     // length before normalisation: about twice that of sensor noise
+constexpr int kRotatedWidth = kPatchWidth + 2;  // with a border for the gradients
+constexpr int kLanes = 16;                      // a row of the patch, padded to the vector width
+constexpr float kMaxValue = 0.3f;      // of the unit vector; limits the influence of a single strong edge
+constexpr float kMinStrength = 60.0f;  // norm before normalisation: about twice that of sensor noise
 constexpr int kDirectionBins = 36;
-constexpr float kSecondPeak = 0.8f;  // of the strongest one (Lowe 2004)
+constexpr float kSecondPeak = 0.8f;  // ratio of the strongest peak (Lowe 2004)
 
 struct Tables {
-  // How much of a patch row (or column) goes to each cell: linear between the cells' middles, Gaussian
-  // towards the border, where a slightly wrong direction or scale tells most.
+  // Weights of a patch row (or column) for each cell: linear between the cell centres, Gaussian towards the
+  // border, where an error of direction or scale has the largest effect.
   alignas(32) std::array<std::array<float, kLanes>, kCells> cell_weight{};
-  // Of the gradients that vote on the direction: a disc of the patch's size.
+  // Weights of the gradients that vote for the direction: a disc of the patch's size.
   std::array<std::array<float, kPatchWidth>, kPatchWidth> direction_weight{};
 
   Tables() {
     for (int cell = 0; cell < kCells; ++cell) {
       for (int i = 0; i < kPatchWidth; ++i) {
         const float offset = static_cast<float>(i - kHalfPatch);
-        const float apart = std::abs(offset - 5.0f * static_cast<float>(cell - 1)) / 5.0f;
+        const float distance = std::abs(offset - 5.0f * static_cast<float>(cell - 1)) / 5.0f;
         cell_weight[static_cast<std::size_t>(cell)][static_cast<std::size_t>(i)] =
-            std::max(0.0f, 1 - apart) * std::exp(-offset * offset / (2 * 7.5f * 7.5f));
+            std::max(0.0f, 1 - distance) * std::exp(-offset * offset / (2 * 7.5f * 7.5f));
       }
     }
     for (int y = -kHalfPatch; y <= kHalfPatch; ++y) {
@@ -52,13 +52,13 @@ struct Tables {
 };
 const Tables kTables;
 
-// The reference_keyframe of the pixel, blurred with a 3x3 binomial; the pixel itself is in the middle.
-class FindReferenceKeyFrame {
+// The neighbourhood of the pixel, blurred with a 3x3 binomial filter; the pixel itself is in the middle.
+class BlurredWindow {
  public:
-  FindReferenceKeyFrame(const cv::Mat& image, const Eigen::Vector2f& pixel) {
+  BlurredWindow(const cv::Mat& image, const Eigen::Vector2f& pixel) {
     const int x0 = static_cast<int>(pixel.x()) - kRadius, y0 = static_cast<int>(pixel.y()) - kRadius;
     const float fx = pixel.x() - std::floor(pixel.x()), fy = pixel.y() - std::floor(pixel.y());
-    // Bilinear interpolation and the binomial 1 2 1 in one pass over four neighbours.
+    // Bilinear interpolation and the binomial filter 1 2 1 combined over four neighbours.
     const std::array<float, 4> across = Kernel(fx), down = Kernel(fy);
     std::array<std::array<float, kSmoothed>, kWindow + 1> rows;
     for (int row = 0; row <= kWindow; ++row) {
@@ -82,7 +82,7 @@ class FindReferenceKeyFrame {
   float At(int x, int y) const {
     return values_[static_cast<std::size_t>((y + kRadius - 1) * kSmoothed + x + kRadius - 1)];
   }
-  float Between(float x, float y) const {
+  float Interpolate(float x, float y) const {
     const float left = x + kRadius - 1, top = y + kRadius - 1;
     const int x0 = static_cast<int>(left), y0 = static_cast<int>(top);
     const float fx = left - static_cast<float>(x0), fy = top - static_cast<float>(y0);
@@ -101,8 +101,8 @@ class FindReferenceKeyFrame {
   std::array<float, kSmoothed * kSmoothed> values_;
 };
 
-// Angle in parts of a full turn, [0, 1); to about 0.1 degrees, which the histogram is far coarser than.
-float TurnsOf(float x, float y) {
+// Angle as a ratio of 360 degrees, [0, 1); accurate to about 0.1 degrees, much finer than the histogram.
+float AngleRatio(float x, float y) {
   const float ax = std::abs(x), ay = std::abs(y);
   const float ratio = std::min(ax, ay) / (std::max(ax, ay) + 1e-12f);
   const float squared = ratio * ratio;
@@ -111,23 +111,23 @@ float TurnsOf(float x, float y) {
   if (ay > ax) angle = 0.5f * std::numbers::pi_v<float> - angle;
   if (x < 0) angle = std::numbers::pi_v<float> - angle;
   if (y < 0) angle = -angle;
-  const float turns = angle * (0.5f / std::numbers::pi_v<float>);
-  return turns < 0 ? turns + 1 : turns;
+  const float fraction = angle * (0.5f / std::numbers::pi_v<float>);
+  return fraction < 0 ? fraction + 1 : fraction;
 }
 
 using DirectionHistogram = std::array<float, kDirectionBins>;
 
-DirectionHistogram HistogramOf(const FindReferenceKeyFrame& reference_keyframe) {
-  // One bin more, so that the last one can share with its neighbour without asking.
+DirectionHistogram HistogramOf(const BlurredWindow& window) {
+  // One extra bin, so that the last bin can be interpolated without a test.
   std::array<float, kDirectionBins + 2> bins{};
   for (int y = -kHalfPatch; y <= kHalfPatch; ++y) {
     for (int x = -kHalfPatch; x <= kHalfPatch; ++x) {
       const float weight = kTables.direction_weight[static_cast<std::size_t>(y + kHalfPatch)]
                                                    [static_cast<std::size_t>(x + kHalfPatch)];
       if (weight == 0) continue;
-      const float gx = reference_keyframe.At(x + 1, y) - reference_keyframe.At(x - 1, y);
-      const float gy = reference_keyframe.At(x, y + 1) - reference_keyframe.At(x, y - 1);
-      const float place = TurnsOf(gx, gy) * kDirectionBins;
+      const float gx = window.At(x + 1, y) - window.At(x - 1, y);
+      const float gy = window.At(x, y + 1) - window.At(x, y - 1);
+      const float place = AngleRatio(gx, gy) * kDirectionBins;
       const auto bin = static_cast<std::size_t>(place);
       const float share = place - static_cast<float>(bin);
       const float vote = weight * std::sqrt(gx * gx + gy * gy);
@@ -139,7 +139,7 @@ DirectionHistogram HistogramOf(const FindReferenceKeyFrame& reference_keyframe) 
   bins[1] += bins[kDirectionBins + 1];
   DirectionHistogram histogram, previous;
   std::copy_n(bins.begin(), kDirectionBins, histogram.begin());
-  // About a Gaussian of 14 degrees.
+  // Approximates a Gaussian of 14 degrees.
   for (int round = 0; round < 4; ++round) {
     previous = histogram;
     for (std::size_t i = 0; i < kDirectionBins; ++i) {
@@ -150,7 +150,7 @@ DirectionHistogram HistogramOf(const FindReferenceKeyFrame& reference_keyframe) 
   return histogram;
 }
 
-// The strongest directions, radians, strongest first; how many there are.
+// Writes the strongest directions in radians, strongest first, and returns their number.
 int DominantDirections(const DirectionHistogram& histogram, std::array<float, kMaxDirections>* directions) {
   struct Peak {
     float height = 0, bin = 0;
@@ -160,7 +160,7 @@ int DominantDirections(const DirectionHistogram& histogram, std::array<float, kM
     const float before = histogram[(i + kDirectionBins - 1) % kDirectionBins], here = histogram[i],
                 after = histogram[(i + 1) % kDirectionBins];
     if (!(here > before && here >= after)) continue;
-    // The top of the parabola through the three.
+    // Vertex of the parabola through the three values.
     const float offset = 0.5f * (before - after) / (before - 2 * here + after);
     const Peak peak{here, static_cast<float>(i) + offset};
     if (peak.height > peaks[0].height) {
@@ -179,12 +179,13 @@ int DominantDirections(const DirectionHistogram& histogram, std::array<float, kM
   return count;
 }
 
-// False where there is too little texture.
+// False if there is too little texture.
 bool Normalise(std::array<float, kDescriptorSize>* values, Descriptor* descriptor) {
   Eigen::Map<Eigen::Array<float, kDescriptorSize, 1>> vector(values->data());
   const float strength = std::sqrt(vector.square().sum());
   if (!(strength > kMinStrength)) return false;
-  // Square roots of shares compare histograms by Hellinger's distance (Arandjelovic and Zisserman 2012).
+  // The Euclidean distance of square roots of ratios is the Hellinger distance of histograms (Arandjelovic
+  // and Zisserman 2012).
   vector = (vector / vector.sum()).sqrt().min(kMaxValue);
   vector *= kDescriptorLength / std::sqrt(vector.square().sum());
   for (std::size_t i = 0; i < kDescriptorSize; ++i)
@@ -192,36 +193,37 @@ bool Normalise(std::array<float, kDescriptorSize>* values, Descriptor* descripto
   return true;
 }
 
-bool DescribeTurned(const FindReferenceKeyFrame& reference_keyframe, float direction_rad,
-                    Descriptor* descriptor) {
+bool DescribeRotated(const BlurredWindow& window, float direction_rad, Descriptor* descriptor) {
   const float cosine = std::cos(direction_rad), sine = std::sin(direction_rad);
-  std::array<std::array<float, kTurned>, kTurned> turned;
-  for (int row = 0; row < kTurned; ++row) {
-    const float v = static_cast<float>(row - kTurned / 2);
-    for (int column = 0; column < kTurned; ++column) {
-      const float u = static_cast<float>(column - kTurned / 2);
-      turned[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)] =
-          reference_keyframe.Between(cosine * u - sine * v, sine * u + cosine * v);
+  std::array<std::array<float, kRotatedWidth>, kRotatedWidth> rotated;
+  for (int row = 0; row < kRotatedWidth; ++row) {
+    const float v = static_cast<float>(row - kRotatedWidth / 2);
+    for (int column = 0; column < kRotatedWidth; ++column) {
+      const float u = static_cast<float>(column - kRotatedWidth / 2);
+      rotated[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)] =
+          window.Interpolate(cosine * u - sine * v, sine * u + cosine * v);
     }
   }
-  // Each gradient counts for the half axes that it leans to, in the measure that it does: no angle is needed,
-  // and a small turn changes little.
+  // Each gradient contributes its components to the half axes: no angle is needed, and a small rotation
+  // changes little.
   using Lanes = std::array<float, kLanes>;
   alignas(32) std::array<std::array<Lanes, kDirections>, kCells> by_row{};
   for (std::size_t y = 0; y < kPatchWidth; ++y) {
-    alignas(32) std::array<Lanes, kDirections> lean{};
+    alignas(32) std::array<Lanes, kDirections> components{};
     for (std::size_t x = 0; x < kPatchWidth; ++x) {
-      const float gx = turned[y + 1][x + 2] - turned[y + 1][x], gy = turned[y + 2][x + 1] - turned[y][x + 1];
-      lean[0][x] = std::max(gx, 0.0f);
-      lean[1][x] = std::max(-gx, 0.0f);
-      lean[2][x] = std::max(gy, 0.0f);
-      lean[3][x] = std::max(-gy, 0.0f);
+      const float gx = rotated[y + 1][x + 2] - rotated[y + 1][x],
+                  gy = rotated[y + 2][x + 1] - rotated[y][x + 1];
+      components[0][x] = std::max(gx, 0.0f);
+      components[1][x] = std::max(-gx, 0.0f);
+      components[2][x] = std::max(gy, 0.0f);
+      components[3][x] = std::max(-gy, 0.0f);
     }
     for (std::size_t cell = 0; cell < kCells; ++cell) {
       const float weight = kTables.cell_weight[cell][y];
       if (weight == 0) continue;
       for (std::size_t direction = 0; direction < kDirections; ++direction)
-        for (std::size_t x = 0; x < kLanes; ++x) by_row[cell][direction][x] += weight * lean[direction][x];
+        for (std::size_t x = 0; x < kLanes; ++x)
+          by_row[cell][direction][x] += weight * components[direction][x];
     }
   }
   std::array<float, kDescriptorSize> values;
@@ -246,8 +248,8 @@ bool DescriptorFits(const cv::Mat& image, const Eigen::Vector2f& pixel) {
 }
 
 void Append(const ImageFeatures& features, const Eigen::Vector2f& pixel, int level,
-            std::vector<DescribedPlace>* places) {
-  features.Look();
+            std::vector<DescribedKeypoint>* places) {
+  features.MarkInUse();
   const auto description = Describe(features.levels[static_cast<std::size_t>(level)],
                                     LevelFromLevelZero(pixel.cast<double>(), level).cast<float>());
   if (!description) return;
@@ -255,10 +257,10 @@ void Append(const ImageFeatures& features, const Eigen::Vector2f& pixel, int lev
     places->push_back({description->of_direction[i], pixel, static_cast<std::uint8_t>(level)});
 }
 
-// The best corners of a level, at most `count`, no two in one cell of a grid of about as many cells.
+// The best corners of a level, at most `count`, with at most one per cell of a grid of about as many cells.
 std::vector<Corner> BestCorners(const ImageFeatures& features, std::size_t level, int count,
                                 float min_score) {
-  features.Look();
+  features.MarkInUse();
   const cv::Mat& image = features.levels[level];
   if (image.cols <= 2 * kDescriptorBorder || image.rows <= 2 * kDescriptorBorder || count <= 0) return {};
   const double cell = std::max(4.0, std::sqrt(static_cast<double>(image.total()) / (2.0 * count)));
@@ -300,13 +302,13 @@ int SquaredDistance(const Descriptor& a, const Descriptor& b) {
 
 std::optional<Description> Describe(const cv::Mat& level_image, const Eigen::Vector2f& pixel_of_level) {
   if (!DescriptorFits(level_image, pixel_of_level)) return std::nullopt;
-  const FindReferenceKeyFrame reference_keyframe(level_image, pixel_of_level);
+  const BlurredWindow window(level_image, pixel_of_level);
   std::array<float, kMaxDirections> directions;
-  const int found = DominantDirections(HistogramOf(reference_keyframe), &directions);
+  const int found = DominantDirections(HistogramOf(window), &directions);
   Description description;
   for (std::size_t i = 0; i < static_cast<std::size_t>(found); ++i) {
     OrientedDescriptor& oriented = description.of_direction[i];
-    if (!DescribeTurned(reference_keyframe, directions[i], &oriented.descriptor)) break;
+    if (!DescribeRotated(window, directions[i], &oriented.descriptor)) break;
     oriented.direction_rad = directions[i];
     ++description.count;
   }
@@ -314,15 +316,15 @@ std::optional<Description> Describe(const cv::Mat& level_image, const Eigen::Vec
   return description;
 }
 
-void DescribePlace(const ImageFeatures& features, const Eigen::Vector2f& pixel, int first_level,
-                   int last_level, std::vector<DescribedPlace>* places) {
+void DescribeKeypoint(const ImageFeatures& features, const Eigen::Vector2f& pixel, int first_level,
+                      int last_level, std::vector<DescribedKeypoint>* places) {
   for (int level = std::max(first_level, 0); level <= std::min(last_level, kPyramidLevels - 1); ++level)
     Append(features, pixel, level, places);
 }
 
-std::vector<DescribedPlace> DescribeCorners(const ImageFeatures& features,
-                                            const CornerDescriptionOptions& options) {
-  std::vector<DescribedPlace> places;
+std::vector<DescribedKeypoint> DescribeCorners(const ImageFeatures& features,
+                                               const CornerDescriptionOptions& options) {
+  std::vector<DescribedKeypoint> places;
   for (int level = 0; level < kPyramidLevels; ++level) {
     const auto index = static_cast<std::size_t>(level);
     for (const Corner& corner : BestCorners(features, index, options.corners[index], options.min_score)) {

@@ -20,7 +20,7 @@ constexpr int kRadius = 3;
 using Lanes = ByteLanes;
 using RingOffsets = std::array<std::ptrdiff_t, kRing>;
 
-// The circle of radius three about a pixel, once around.
+// The circle of radius three around a pixel, in order.
 RingOffsets MakeRing(std::ptrdiff_t step) {
   constexpr std::array<std::array<int, 2>, kRing> kCircle = {{{0, 3},
                                                               {1, 3},
@@ -52,8 +52,8 @@ struct Darker {
   static Lanes Stronger(const Lanes& a, const Lanes& b) { return cv::v_min(a, b); }
 };
 
-// Over all arcs of nine, the strongest; an arc is as strong as the weakest of its pixels. Two arcs that
-// differ by one step share eight pixels.
+// The strength of the strongest arc of nine pixels; the strength of an arc is that of its weakest pixel. Arcs
+// that differ by one step share eight pixels.
 template <typename Kind>
 Lanes StrongestArc(const Lanes (&ring)[kRing]) {
   Lanes pairs[kRing / 2];
@@ -70,12 +70,12 @@ Lanes StrongestArc(const Lanes (&ring)[kRing]) {
   return strongest;
 }
 
-// One less than the largest difference that makes the pixel a corner; 0 where it is none at this threshold.
+// The largest difference for which the pixel is a corner, minus one; 0 if it is none at this threshold.
 Lanes Scores(const std::uint8_t* pixel, const RingOffsets& offsets, const Lanes& threshold) {
   const Lanes center = LoadBytes(pixel);
   Lanes ring[kRing];
   for (const std::size_t i : {0, 4, 8, 12}) ring[i] = LoadBytes(pixel + offsets[i]);
-  // Every arc of nine holds one of each two opposite pixels. Differences saturate at 0.
+  // Every arc of nine contains one of each two opposite pixels. Differences saturate at 0.
   const Lanes bright = cv::v_min(cv::v_max(ring[0], ring[8]), cv::v_max(ring[4], ring[12])) - center;
   const Lanes dark = center - cv::v_max(cv::v_min(ring[0], ring[8]), cv::v_min(ring[4], ring[12]));
   if (!cv::v_check_any(cv::v_max(bright, dark) > threshold)) return AllBytes(0);
@@ -85,16 +85,17 @@ Lanes Scores(const std::uint8_t* pixel, const RingOffsets& offsets, const Lanes&
   return (best - AllBytes(1)) & (best > threshold);
 }
 
-// Scores of the columns first to end - 1; up to a block more is written behind them.
+// Scores of the columns first to end - 1; writes up to one block more behind them.
 void ScoreRow(const std::uint8_t* row, int columns, int first, int end, const RingOffsets& offsets,
               const Lanes& threshold, std::uint8_t* scores) {
   for (int x = first; x < end; x += kLanes) {
-    const int at = std::min(x, columns - kRadius - kLanes);  // a second time rather than beyond the row
+    // Overlaps the previous block instead of exceeding the row.
+    const int at = std::min(x, columns - kRadius - kLanes);
     cv::v_store(scores + at, Scores(row + at, offsets, threshold));
   }
 }
 
-// Corners of one row: what scores more than all eight about it.
+// Corners of one row: pixels that score more than all eight neighbours.
 void TakePeaks(const std::uint8_t* above, const std::uint8_t* scores, const std::uint8_t* below, int first,
                int end, int y, std::vector<Corner>* corners) {
   for (int x = first; x < end; x += kLanes) {
@@ -122,7 +123,7 @@ void DetectFastCorners(const cv::Mat& image, int threshold, int border, std::vec
   row_begin->assign(static_cast<std::size_t>(image.rows) + 1, 0);
   if (image.rows <= 2 * border || image.cols <= 2 * border) return;
   cv::Mat pixels = image;
-  // A whole block must fit between the margins; what is added is never a corner's neighbour.
+  // A whole block must fit between the margins; additional columns are never neighbours of a corner.
   const int least = border + kLanes + kRadius;
   thread_local std::vector<std::uint8_t> widened;
   if (image.cols < least) {

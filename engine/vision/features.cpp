@@ -11,12 +11,12 @@ namespace docent::engine {
 namespace {
 
 constexpr double kReferenceArea = 640.0 * 480.0;
-// The patch border: a corner nearer to the edge could not be matched.
+// Border of the patch: a corner nearer to the image border could not be matched.
 constexpr int kBorder = 6;
 
-// A step towards the threshold that gives the wanted count; counts fall roughly as exp(-threshold / 8).
-int NextThreshold(int threshold, std::size_t found, double wanted, const FeatureOptions& options) {
-  const double ratio = (static_cast<double>(found) + 1.0) / (wanted + 1.0);
+// A step towards the threshold for the target number; the number falls roughly as exp(-threshold / 8).
+int NextThreshold(int threshold, std::size_t found, double target, const FeatureOptions& options) {
+  const double ratio = (static_cast<double>(found) + 1.0) / (target + 1.0);
   int step = static_cast<int>(std::lround(std::clamp(6.0 * std::log(ratio), -6.0, 10.0)));
   return std::clamp(threshold + step, options.min_threshold, options.max_threshold);
 }
@@ -33,14 +33,15 @@ void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
   features->levels[0] = gray;
   for (std::size_t level = 0; level < kPyramidLevels; ++level) {
     if (level > 0) HalveImage(features->levels[level - 1], &features->levels[level]);
-    const double wanted = WantedCorners(options, gray, static_cast<int>(level));
+    const double target = WantedCorners(options, gray, static_cast<int>(level));
     int threshold = threshold_hint[level] > 0 ? threshold_hint[level] : 15;
     DetectFastCorners(features->levels[level], threshold, kBorder, &features->corners[level],
                       &features->row_begin[level]);
     const std::size_t found = features->corners[level].size();
-    const int next = NextThreshold(threshold, found, wanted, options);
-    // An image that suddenly blurs or clears is detected again at once; otherwise the next one profits.
-    if (static_cast<double>(found) < 0.4 * wanted && next < threshold) {
+    const int next = NextThreshold(threshold, found, target, options);
+    // After a sudden change of sharpness the image is processed again; otherwise the new threshold applies to
+    // the next one.
+    if (static_cast<double>(found) < 0.4 * target && next < threshold) {
       DetectFastCorners(features->levels[level], next, kBorder, &features->corners[level],
                         &features->row_begin[level]);
     }

@@ -8,20 +8,20 @@
 namespace docent::engine {
 
 struct FeatureOptions {
-  // Corners aimed at for a 640x480 image, by level; scaled with the image's area.
+  // Target number of corners per level for a 640x480 image; scaled with the image area.
   std::array<int, kPyramidLevels> wanted_corners = {1600, 900, 450, 220};
-  int min_threshold = 5;  // grey values; below it FAST fires on sensor noise
+  int min_threshold = 5;  // grey values; below it FAST responds to sensor noise
   int max_threshold = 60;
 };
 
-// Pyramid, FAST corners and thumbnail of a grey image (CV_8UC1, at least 64x64). The threshold of each
-// level moves from `threshold_hint` (the previous image's thresholds, zeros for none) towards the wanted
-// count. Reuses the memory of *features. The image itself becomes level 0 without a copy.
+// Pyramid, FAST corners and thumbnail of a grey image (CV_8UC1, at least 64x64). The threshold of each level
+// is adapted from `threshold_hint` (the previous image's thresholds, zeros for none) towards the target
+// number. Reuses the memory of *features. The image itself becomes level 0 without a copy.
 void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
                      const std::array<int, kPyramidLevels>& threshold_hint, ImageFeatures* features);
 
-// For a stored image: extraction from scratch, the threshold settled by repeated steps, so that the result
-// depends on the image alone.
+// For a stored image: adapts the threshold iteratively from scratch, so that the result depends on the image
+// alone.
 std::shared_ptr<const ImageFeatures> MakeFeatures(const cv::Mat& gray, const FeatureOptions& options = {});
 
 }  // namespace docent::engine

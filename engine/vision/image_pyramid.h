@@ -14,8 +14,8 @@ namespace docent::engine {
 
 inline constexpr int kPyramidLevels = 4;  // ptamm §2.1
 
-// Pixel of level 0 that a pixel of a level stands for, with pixel centres at integers: level l halves the
-// image l times, and each of its pixels covers 2^l by 2^l pixels of level 0.
+// Level-0 pixel of a pixel of another level, with pixel centres at integers: level l halves the image l
+// times, and each of its pixels covers 2^l by 2^l pixels of level 0.
 inline Eigen::Vector2d LevelZeroFromLevel(const Eigen::Vector2d& pixel, int level) {
   const double scale = 1 << level;
   return (pixel.array() + 0.5) * scale - 0.5;
@@ -25,38 +25,39 @@ inline Eigen::Vector2d LevelFromLevelZero(const Eigen::Vector2d& pixel, int leve
   return (pixel.array() + 0.5) * scale - 0.5;
 }
 
-// 2x2 means, rounded. An odd last row or column is left out: it would stretch every pixel a little beyond
-// 2x2. *half keeps its memory when its size is the same.
+// Means of 2x2 pixels, rounded. An odd last row or column is dropped, because including it would stretch the
+// other pixels. *half keeps its memory if its size is unchanged.
 void HalveImage(const cv::Mat& image, cv::Mat* half);
 
-// A FAST corner of one level, at whole pixels of that level.
+// A FAST corner at integer pixel coordinates of one level.
 struct Corner {
   std::int16_t x = 0, y = 0;
 };
 
-// Images that a ImageStore keeps.
-class KeptImages {
+// Images held by an ImageStore.
+class StoredImages {
  public:
-  virtual ~KeptImages() = default;
-  // See ImageFeatures::Look. Any thread.
-  virtual void Look() const = 0;
+  virtual ~StoredImages() = default;
+  // See ImageFeatures::MarkInUse. Any thread.
+  virtual void MarkInUse() const = 0;
 };
 
-// Everything of one image that tracking and mapping look at. Level 0 is the full grey image (CV_8UC1),
-// each further level half the size (2x2 mean). Corners are sorted by row, then column.
+// Everything that tracking and mapping use of one image. Level 0 is the full grey image (CV_8UC1), each
+// further level half its size (2x2 mean). Corners are sorted by row, then column.
 struct ImageFeatures {
   std::array<cv::Mat, kPyramidLevels> levels;
   std::array<std::vector<Corner>, kPyramidLevels> corners;
-  // row_begin[l][y] is the index of the first corner of level l at row y or below; has rows + 1 entries.
+  // row_begin[l][y] is the index of the first corner of level l in row y or below; it has rows + 1 entries.
   std::array<std::vector<int>, kPyramidLevels> row_begin;
   std::array<int, kPyramidLevels> fast_threshold{};
   SmallBlurryImage small_blurry;
-  std::shared_ptr<const KeptImages> kept;  // null where the levels lie in ordinary memory
+  std::shared_ptr<const StoredImages> stored;  // null if the levels are in ordinary memory
 
-  // Says that the levels are about to be read, so that a store lets others rest. Whoever goes from keyframe
-  // to keyframe says so for each; it costs next to nothing, and who forgets it reads the same pixels.
-  void Look() const {
-    if (kept) kept->Look();
+  // To be called before the levels are read, so that the image store can evict other images. Code that
+  // iterates over keyframes calls it for each of them; the cost is negligible, and without the call the
+  // pixels are the same.
+  void MarkInUse() const {
+    if (stored) stored->MarkInUse();
   }
 };
 

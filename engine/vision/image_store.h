@@ -7,22 +7,21 @@
 
 namespace docent::engine {
 
-// Where the images of keyframes lie. They are most of a map's bytes, and of most of them nothing is looked
-// at for minutes: a store keeps them where they need no memory in the meantime. It lets images rest by
-// itself where others are looked at (ImageFeatures::Look), so that their memory has a bound however large the
-// map is. The engine knows no files; whoever owns a mapper may give it a store, which must outlive none of
-// the images that it kept.
+// Memory management for keyframe images. These are most of a map's bytes, and most are not read for minutes.
+// A store keeps images where they can be evicted from memory, and evicts images when others are used
+// (ImageFeatures::MarkInUse), so that their memory is bounded whatever the size of the map. The engine does
+// not access files; the owner of a mapper may provide a store. Stored images may outlive the store.
 //
-// What holds: a kept image has the same pixels at the same address for as long as anyone holds it, resting
-// or not, so who reads it needs to know nothing of all this. Any thread may call anything.
+// A stored image has the same pixels at the same address for as long as it is referenced, evicted or not, so
+// code that reads it need not know about the store. All functions may be called from any thread.
 class ImageStore {
  public:
   virtual ~ImageStore() = default;
 
-  // The same features with their pyramid in the store; never to be written again. The argument itself when
-  // the store has no room.
-  virtual std::shared_ptr<const ImageFeatures> Keep(std::shared_ptr<const ImageFeatures> features) = 0;
-  // All that were looked at may rest, for something else is about to need the memory. Looking brings it back.
+  // The same features with their pyramid in the store; they must not be modified any more. Returns the
+  // argument itself if the store has no room.
+  virtual std::shared_ptr<const ImageFeatures> Store(std::shared_ptr<const ImageFeatures> features) = 0;
+  // Evicts all images from memory, because something else needs it. Reading an image loads it again.
   virtual void EvictAll() = 0;
 };
 

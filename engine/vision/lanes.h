@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <opencv2/core/simd_intrinsics.hpp>
 
-// OpenCV's universal intrinsics at the widths that this folder works in: bytes as wide as the target has them
-// up to 32, floats eight at a time, which is a patch's row. Results are the same to the bit at every width.
-// opencv2/core/hal/intrin.hpp alone knows only four floats, whatever the compiler's target.
+// OpenCV's universal intrinsics at the widths used in this folder: bytes at the width of the target up to 32,
+// floats eight at a time, which is a row of a patch. Results are identical at every width.
+// opencv2/core/hal/intrin.hpp alone provides only four floats, whatever the compiler's target.
 namespace docent::engine {
 
 #if CV_SIMD256
@@ -105,7 +105,7 @@ inline void StoreTruncated(const EightFloats& lanes, int* to) {
 
 inline constexpr int kByteLanes = ByteLanes::nlanes;
 
-// Always in the same order, whatever the width.
+// Sums in the same order at every width.
 inline float Sum(const EightFloats& lanes) {
   std::array<float, 8> all;
   Store(lanes, all.data());

@@ -14,11 +14,11 @@ namespace {
 
 constexpr int kBordered = kPatchSize + 2;
 constexpr float kHalf = kPatchSize / 2;
-// Grey values squared; below it a patch is sensor noise.
+// Grey values squared; a patch below it contains only sensor noise.
 constexpr float kMinVariance = 9.0f;
 constexpr float kMinDeterminant = 1e3f;  // of the Hessian
-// Within which the contrast of an image may differ from the patch's: two f-stops either way. Blur lowers it,
-// exposure raises or lowers it.
+// Range of the image's contrast relative to the patch's: two f-stops either way. Blur lowers it; exposure
+// raises or lowers it.
 constexpr float kMinContrast = 0.25f, kMaxContrast = 4.0f;
 
 float SampleBilinear(const cv::Mat& image, float x, float y) {
@@ -33,7 +33,7 @@ float SampleBilinear(const cv::Mat& image, float x, float y) {
 
 bool CutBordered(const cv::Mat& source, const Eigen::Vector2f& center, const Eigen::Matrix2f& warp,
                  std::array<float, kBordered * kBordered>* out) {
-  // The corners of the warped square bound it, as the warp is affine.
+  // The corners of the warped patch bound it, as the warp is affine.
   for (const float i : {-kHalf - 1, kHalf}) {
     for (const float j : {-kHalf - 1, kHalf}) {
       const Eigen::Vector2f corner = center + warp * Eigen::Vector2f(i, j);
@@ -54,14 +54,14 @@ bool CutBordered(const cv::Mat& source, const Eigen::Vector2f& center, const Eig
   return true;
 }
 
-// Over the image's values under the patch, less the patch's mean, which keeps the sums small.
+// Over the image values under the patch, minus the patch's mean, which keeps the sums small.
 struct ShiftedSums {
   float value, value_squared, value_times_pixel;
   Eigen::Vector2f value_times_gradient;
 };
 
-// left, top: of the patch in the image, interpolated between pixels. With kLimited brighter values count as
-// `limit`.
+// left, top: position of the patch in the image, interpolated between pixels. With kLimited, brighter values
+// count as `limit`.
 template <bool kLimited>
 ShiftedSums SumShifted(const PatchTemplate& patch, const cv::Mat& image, float left, float top,
                        float limit = 0) {
@@ -95,8 +95,8 @@ ShiftedSums SumShifted(const PatchTemplate& patch, const cv::Mat& image, float l
 
 using PatchPixels = std::array<std::uint8_t, kPatchArea>;
 
-// Those of the patch about a whole pixel, which lies inside.
-PatchPixels PixelsAbout(const cv::Mat& image, int x, int y) {
+// The pixels of a patch around an integer pixel; the patch must lie inside the image.
+PatchPixels PixelsAround(const cv::Mat& image, int x, int y) {
   PatchPixels pixels;
   const std::uint8_t* row = image.ptr<std::uint8_t>(y - kPatchSize / 2) + x - kPatchSize / 2;
   for (std::size_t i = 0; i < kPatchSize; ++i, row += image.step[0])
@@ -132,7 +132,7 @@ float CorrelationOf(const PatchPixels& a, const PatchPixels& b) {
   return product > 1.0f ? covariance / std::sqrt(product) : 0.0f;
 }
 
-// All sums and the Hessian, out of pixels and gradients. False where too little texture is left.
+// Computes all sums and the Hessian from pixels and gradients. False if too little texture is left.
 bool Summarise(PatchTemplate* patch) {
   int sum = 0, sum_of_squares = 0, sum_x = 0, sum_y = 0, dot_x = 0, dot_y = 0, xx = 0, xy = 0, yy = 0;
   for (std::size_t at = 0; at < kPatchArea; ++at) {
@@ -164,7 +164,7 @@ bool Summarise(PatchTemplate* patch) {
   return true;
 }
 
-// The patch with its `count` brightest pixels equally bright; false where too little texture is left.
+// The patch with its `count` brightest pixels set equally bright; false if too little texture is left.
 bool LimitBrightness(const PatchTemplate& patch, int count, PatchTemplate* limited) {
   const std::uint8_t limit = NthBrightest(patch.pixels, count);
   for (std::size_t at = 0; at < kPatchArea; ++at) {
@@ -176,7 +176,7 @@ bool LimitBrightness(const PatchTemplate& patch, int count, PatchTemplate* limit
   return Summarise(limited);
 }
 
-// The contrast of the image against the patch's.
+// The contrast of the image relative to the patch's.
 enum class Contrast { kEqual, kEstimated };
 
 // kLimited: see SumShifted.
@@ -200,7 +200,7 @@ std::optional<PatchAlignment> Align(const PatchTemplate& patch, const cv::Mat& i
     if (converged) break;
     Eigen::Vector2f step;
     if constexpr (kContrast == Contrast::kEqual) {
-      // Of the error: value - pixel - brightness.
+      // Steepest-descent terms of the error value - pixel - brightness.
       const Eigen::Vector2f steepest =
           sums.value_times_gradient - patch.gradient_dot_pixel - brightness * patch.gradient_sum;
       const Eigen::Vector3f update =
@@ -209,10 +209,10 @@ std::optional<PatchAlignment> Align(const PatchTemplate& patch, const cv::Mat& i
       step = update.head<2>();
       brightness += update[2];
     } else {
-      // The image's contrast in units of the patch's, as the regression of the one on the other. A step that
-      // took the two for equal would be too long or too short by that: at twice the contrast it never ends.
+      // The image's contrast relative to the patch's, by linear regression. Without it the step would be too
+      // long or too short by this factor: at twice the contrast the iteration never converges.
       const float contrast = std::clamp(covariance / patch.Variance(), kMinContrast, kMaxContrast);
-      // Of the error: value - contrast * pixel - brightness.
+      // Steepest-descent terms of the error value - contrast * pixel - brightness.
       const Eigen::Vector2f steepest =
           sums.value_times_gradient - contrast * patch.gradient_dot_pixel - brightness * patch.gradient_sum;
       const Eigen::Vector3f update =
@@ -225,7 +225,7 @@ std::optional<PatchAlignment> Align(const PatchTemplate& patch, const cv::Mat& i
     y -= step[1];
     const float shift_x = x - start.x(), shift_y = y - start.y();
     if (!(shift_x * shift_x + shift_y * shift_y <= max_shift_px * max_shift_px)) return std::nullopt;
-    // One more pass after convergence measures the correlation where the patch came to rest.
+    // One more iteration after convergence measures the correlation at the final position.
     converged = step[0] * step[0] + step[1] * step[1] < kConverged * kConverged;
   }
   if (!converged) return std::nullopt;
@@ -288,11 +288,12 @@ float PatchCorrelation(const PatchTemplate& patch, const cv::Mat& image, int x, 
   const std::uint8_t* row = image.ptr<std::uint8_t>(y - kPatchSize / 2) + x - kPatchSize / 2;
   for (std::size_t i = 0; i < kPatchSize; ++i, row += image.step[0]) {
     const cv::v_uint16x8 value = cv::v_load_expand(row);
-    const cv::v_int16x8 seen = cv::v_reinterpret_as_s16(value);
-    const cv::v_int16x8 wanted = cv::v_reinterpret_as_s16(cv::v_load_expand(&patch.pixels[i * kPatchSize]));
+    const cv::v_int16x8 image_values = cv::v_reinterpret_as_s16(value);
+    const cv::v_int16x8 template_values =
+        cv::v_reinterpret_as_s16(cv::v_load_expand(&patch.pixels[i * kPatchSize]));
     values += value;
-    squares += cv::v_dotprod(seen, seen);
-    cross += cv::v_dotprod(seen, wanted);
+    squares += cv::v_dotprod(image_values, image_values);
+    cross += cv::v_dotprod(image_values, template_values);
   }
   const int sum = static_cast<int>(cv::v_reduce_sum(values));
   const float n = kPatchArea;
@@ -313,30 +314,32 @@ std::optional<PatchAlignment> AlignPatch(const PatchTemplate& patch, const cv::M
 }
 
 float TolerantPatchCorrelation(const PatchTemplate& patch, const cv::Mat& image, int x, int y) {
-  PatchPixels seen = PixelsAbout(image, x, y);
-  const int count = std::max(CountSaturated(patch.pixels), CountSaturated(seen));
+  PatchPixels image_values = PixelsAround(image, x, y);
+  const int count = std::max(CountSaturated(patch.pixels), CountSaturated(image_values));
   if (count == 0) return PatchCorrelation(patch, image, x, y);
   if (count > kMaxSaturatedPixels) return 0;
-  PatchPixels wanted = patch.pixels;
-  const std::uint8_t seen_limit = NthBrightest(seen, count), wanted_limit = NthBrightest(wanted, count);
-  for (std::uint8_t& value : seen) value = std::min(value, seen_limit);
-  for (std::uint8_t& value : wanted) value = std::min(value, wanted_limit);
-  return CorrelationOf(wanted, seen);
+  PatchPixels template_values = patch.pixels;
+  const std::uint8_t image_limit = NthBrightest(image_values, count),
+                     template_limit = NthBrightest(template_values, count);
+  for (std::uint8_t& value : image_values) value = std::min(value, image_limit);
+  for (std::uint8_t& value : template_values) value = std::min(value, template_limit);
+  return CorrelationOf(template_values, image_values);
 }
 
 std::optional<PatchAlignment> AlignPatchTolerantly(const PatchTemplate& patch, const cv::Mat& image,
                                                    const Eigen::Vector2f& start, float max_shift_px,
                                                    int max_iterations) {
-  // What saturates is told where the search begins, and is taken to be the same a pixel or two from there.
+  // Saturation is determined where the search starts and assumed to be the same one or two pixels away.
   if (!PatchFits(image, start.x(), start.y(), 1.0f)) return std::nullopt;
-  const PatchPixels seen = PixelsAbout(image, static_cast<int>(start.x()), static_cast<int>(start.y()));
-  const int count = std::max(CountSaturated(patch.pixels), CountSaturated(seen));
+  const PatchPixels image_values =
+      PixelsAround(image, static_cast<int>(start.x()), static_cast<int>(start.y()));
+  const int count = std::max(CountSaturated(patch.pixels), CountSaturated(image_values));
   if (count == 0)
     return Align<Contrast::kEstimated, false>(patch, image, start, max_shift_px, max_iterations);
   PatchTemplate limited;
   if (count > kMaxSaturatedPixels || !LimitBrightness(patch, count, &limited)) return std::nullopt;
   return Align<Contrast::kEstimated, true>(limited, image, start, max_shift_px, max_iterations,
-                                           NthBrightest(seen, count));
+                                           NthBrightest(image_values, count));
 }
 
 float ShiTomasiScore(const cv::Mat& image, int x, int y) {

@@ -14,8 +14,8 @@
 namespace docent::engine {
 namespace {
 
-// Every kStride-th thumbnail pixel in both directions is compared: thumbnails are blurred, so that those
-// between say nothing new.
+// Only every kStride-th thumbnail pixel in both directions is compared: thumbnails are blurred, so that the
+// pixels between are redundant.
 constexpr int kStride = 2;
 
 struct Sample {
@@ -23,15 +23,15 @@ struct Sample {
   Eigen::Matrix<float, 2, 3> pixel_from_rotation;  // d thumbnail pixel / d small rotation of the ray
   Eigen::Matrix<float, 2, 3> pixel_from_ray;       // d thumbnail pixel / d ray
   int x = 0, y = 0;                                // thumbnail pixels
-  bool valid = false;                              // the lens has a ray here
+  bool valid = false;                              // the lens model has a ray here
 };
 
-// What a camera's lens says about the sampled thumbnail pixels.
+// The rays and derivatives of the sampled thumbnail pixels of a camera.
 struct SampleTable {
   CameraModel camera;
   cv::Size size;
   int scale = 0;
-  int columns = 0, rows = 0;  // samples
+  int columns = 0, rows = 0;  // number of samples
   std::vector<Sample> samples;
 
   const Sample& Nearest(float x, float y) const {
@@ -74,8 +74,8 @@ SampleTable MakeSampleTable(const CameraModel& camera, cv::Size size, int scale)
   return table;
 }
 
-// The table depends on its key alone, so remembering it changes no result; one memory a thread needs no lock.
-// A session has at most a few cameras, each seen at two thumbnail sizes.
+// The table depends on its key alone, so caching it changes no result; one cache per thread needs no lock. A
+// session has at most a few cameras, each with two thumbnail sizes.
 const SampleTable& FindSampleTable(const CameraModel& camera, cv::Size size, int scale) {
   constexpr std::size_t kRemembered = 8;
   thread_local std::vector<std::unique_ptr<SampleTable>> tables;
@@ -91,7 +91,8 @@ const SampleTable& FindSampleTable(const CameraModel& camera, cv::Size size, int
   return *tables.front();
 }
 
-// Grey value and its gradient (grey a thumbnail pixel) side by side, so that one interpolation reads all.
+// Grey value and gradient (grey values per thumbnail pixel) in one vector, so that one interpolation reads
+// all of them.
 struct GradientImage {
   cv::Size size;
   std::vector<Eigen::Vector4f, Eigen::aligned_allocator<Eigen::Vector4f>> texels;  // value, d/dx, d/dy, 0
@@ -129,8 +130,8 @@ struct GradientImage {
   }
 };
 
-// The comparison at one rotation: b's grey = gain * a's grey + offset + noise. Gain and offset are solved for
-// in closed form, which makes a change of exposure harmless.
+// The comparison at one rotation: grey_b = gain * grey_a + offset + noise. Gain and offset are solved in
+// closed form, which compensates changes of exposure.
 struct Comparison {
   double mean_squared = std::numeric_limits<double>::infinity();
   double overlap = 0;
@@ -139,12 +140,13 @@ struct Comparison {
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();     // J'r
 };
 
-// Sums over the overlap, of the columns J (rotation, 3), a, 1, b.
+// Sums over the overlap of the columns J (rotation, 3), a, 1, b.
 struct Sums {
   Eigen::Matrix<double, 6, 6> products = Eigen::Matrix<double, 6, 6>::Zero();
-  int valid = 0;     // samples of a
-  int inside = 0;    // of these, inside b
-  int compared = 0;  // of these, away from the borders of both: the products' number of rows
+  int valid = 0;   // samples of a
+  int inside = 0;  // contained in `valid`; inside b
+  // Contained in `inside`; away from the borders of both: the number of rows of the products.
+  int compared = 0;
 };
 
 Comparison Summarise(const Sums& sums) {
@@ -156,7 +158,7 @@ Comparison Summarise(const Sums& sums) {
   const double variance_a = m(3, 3) - count * mean_a * mean_a;
   const double variance_b = m(5, 5) - count * mean_b * mean_b;
   const double covariance = m(3, 5) - count * mean_a * mean_b;
-  // A free gain would let two unlike images "agree" by fading one of them to flat grey.
+  // A free gain would let two unrelated images agree by reducing one of them to flat grey.
   result.gain = variance_a > 1e-6 * count ? std::clamp(covariance / variance_a, 0.5, 2.0) : 1.0;
   const double squared = variance_b - 2 * result.gain * covariance + result.gain * result.gain * variance_a;
   result.mean_squared = std::max(squared, 0.0) / count;
@@ -179,12 +181,12 @@ class RotationAligner {
         pivot_(pivot),
         hat_of_pivot_(Hat(pivot).cast<float>()),
         turns_about_itself_(pivot.isZero(0)) {
-    // The tables outlive this aligner: one AlignRotation looks up at most four, fewer than are remembered.
+    // The tables outlive this aligner: one AlignRotation requests at most four, fewer than the cache holds.
     table_a_ = &FindSampleTable(camera_a, a.size(), scale_a);
     table_b_ = &FindSampleTable(camera_b, b.size(), scale_b);
   }
 
-  // gain weighs the reference's gradient against the current one's: the value that the last comparison found.
+  // gain: the value of the last comparison; weights the reference's gradient relative to the current one's.
   Comparison Compare(const Rotation3& b_from_a, double gain) const {
     Sums sums;
     const Eigen::Matrix3d rotation = b_from_a.matrix();
@@ -193,7 +195,7 @@ class RotationAligner {
     const float max_y = static_cast<float>(image_b_.size.height - 1);
     Eigen::Matrix<float, 6, 6> row_sum;
     for (int row = 0; row < table_a_->rows; ++row) {
-      row_sum.setZero();  // floats hold one row's sum exactly enough, doubles the image's
+      row_sum.setZero();  // row sums are exact enough in single precision, sums over the image need double
       for (int column = 0; column < table_a_->columns; ++column) {
         const Sample& sample = table_a_->samples[static_cast<std::size_t>(row * table_a_->columns + column)];
         if (!sample.valid) continue;
@@ -228,9 +230,9 @@ class RotationAligner {
     if (turns_about_itself_) return sample.pixel_from_rotation;
     return sample.pixel_from_rotation + sample.pixel_from_ray * hat_of_pivot_;
   }
-  // There the blur mixed in mirrored grey values, which do not move as the scene does.
+  // Near the border the blur includes mirrored grey values, which do not move with the scene.
   static bool IsNearBorder(const GradientImage& image, float x, float y) {
-    constexpr float kBorder = 4;  // thumbnail pixels; 1.6 sigma of the usual blur
+    constexpr float kBorder = 4;  // thumbnail pixels; 1.6 sigma of the default blur
     const float border_x = std::min(kBorder, static_cast<float>(image.size.width) / 8);
     const float border_y = std::min(kBorder, static_cast<float>(image.size.height) / 8);
     return x < border_x || y < border_y || x > static_cast<float>(image.size.width - 1) - border_x ||
@@ -257,8 +259,8 @@ struct Descent {
 constexpr double kStepTolerance = 1e-4;  // radians; a hundredth of a thumbnail pixel
 
 // Gauss-Newton on the second-order (mean gradient) Jacobian. The rotation is updated on the right, in frame
-// a: there the reference's Jacobian is the same at every step, as ESM asks. Damped only after a step that
-// failed.
+// a: there the reference's Jacobian is the same in every iteration, as ESM requires. Damped only after a step
+// that failed.
 Descent Descend(const RotationAligner& aligner, const Descent& start, int max_iterations) {
   Descent best = start;
   double damping = 0;
@@ -268,7 +270,7 @@ Descent Descend(const RotationAligner& aligner, const Descent& start, int max_it
     damped.diagonal().array() += 1e-9 * damped.trace() + 1e-12;
     Eigen::Vector3d step = -damped.ldlt().solve(best.comparison.gradient);
     if (!step.allFinite()) break;
-    constexpr double kMaxStep = 0.15;  // radians: beyond it the gradients describe another place
+    constexpr double kMaxStep = 0.15;  // radians: beyond it the gradients belong to another part of the scene
     if (step.norm() > kMaxStep) step *= kMaxStep / step.norm();
     const Rotation3 candidate = best.b_from_a * Rotation3::Exp(step);
     if (step.norm() < kStepTolerance) {  // too small to change the comparison
@@ -288,7 +290,7 @@ Descent Descend(const RotationAligner& aligner, const Descent& start, int max_it
   return best;
 }
 
-// Half as large and twice as blurred: a wide valley for large rotations.
+// Half the size and twice the blur: a wide basin of convergence for large rotations.
 cv::Mat Coarser(const cv::Mat& pixels) {
   const cv::Size size(pixels.cols / 2, pixels.rows / 2);
   cv::Mat half, blurred;
@@ -297,11 +299,11 @@ cv::Mat Coarser(const cv::Mat& pixels) {
   return blurred;
 }
 
-// Whether the image holds the rotation in place: the standard deviation that its texture leaves, from the
-// residuals (never below what quantised images show) and the number of independent samples.
+// Whether the image determines the rotation: compares the standard deviation that follows from its texture,
+// the residuals (at least those of quantised images) and the number of independent samples.
 bool IsObservable(const Comparison& comparison) {
   constexpr double kMinNoise = 0.1;              // grey values
-  constexpr double kSamplesOneIndependent = 20;  // the blur's area, 4 pi sigma^2, in units of kStride^2
+  constexpr double kSamplesOneIndependent = 20;  // area of the blur, 4 pi sigma^2, in units of kStride^2
   constexpr double kMaxDeviation = 0.02;         // radians
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(comparison.information, Eigen::EigenvaluesOnly);
   const double smallest = eigen.eigenvalues()[0];
@@ -324,7 +326,7 @@ std::optional<RotationAlignment> AlignRotation(const SmallBlurryImage& a, const 
     const RotationAligner coarse(Coarser(a.pixels), camera_a, Coarser(b.pixels), camera_b, 2 * a.scale,
                                  2 * b.scale, pivot);
     const Descent guess = Descend(coarse, {initial, coarse.Compare(initial, 1.0)}, max_iterations);
-    // The coarse images suggest; the thumbnails themselves decide.
+    // The coarse images provide the initial rotation; the full thumbnails decide.
     const Comparison comparison = fine.Compare(guess.b_from_a, 1.0);
     if (comparison.mean_squared < descent.comparison.mean_squared) descent = {guess.b_from_a, comparison};
   }

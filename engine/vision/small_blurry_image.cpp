@@ -28,16 +28,16 @@ void AddRow(const std::uint8_t* row, int width, std::uint16_t* sums) {
   for (; x < width; ++x) sums[x] = static_cast<std::uint16_t>(sums[x] + row[x]);
 }
 
-// What a thumbnail is made in; every thread keeps its own, so that the next one need not allocate.
+// Working memory for thumbnails, one per thread to avoid allocations.
 struct Workspace {
-  std::vector<std::uint16_t> sums;  // of the columns of a row of blocks
-  std::vector<float> totals;        // of these blocks
-  std::vector<float> kernel;        // the blur's, from its middle outwards
+  std::vector<std::uint16_t> sums;  // column sums of a row of blocks
+  std::vector<float> totals;        // sums of these blocks
+  std::vector<float> kernel;        // of the blur, from its centre outwards
   double kernel_sigma_px = 0;
-  std::vector<float> padded;  // a row, or rows of a column, with what the border reflects
+  std::vector<float> padded;  // a row, or rows of a column, with the mirrored border
 };
 
-// Mean of scale x scale blocks; rows and columns beyond the last whole block are left out. Grey values keep
+// Mean of scale x scale blocks; rows and columns beyond the last whole block are dropped. Grey values keep
 // their fraction, which an 8-bit resize would round away.
 void MeanOfBlocks(const cv::Mat& gray, int scale, Workspace* workspace, cv::Mat* result) {
   const int width = gray.cols / scale, height = gray.rows / scale;
@@ -82,7 +82,7 @@ void MakeKernel(double sigma_px, Workspace* workspace) {
   for (float& weight : workspace->kernel) weight = static_cast<float>(weight / sum);
 }
 
-// The index that an image mirrored about its outermost pixels has there.
+// The index in an image mirrored about its outermost pixels.
 int Reflect(int index, int size) {
   if (size == 1) return 0;
   const int period = 2 * (size - 1);
@@ -90,7 +90,7 @@ int Reflect(int index, int size) {
   return index < size ? index : period - index;
 }
 
-// Blurs in place, first along the rows, then along the columns, all columns side by side.
+// Blurs in place, first along the rows, then along the columns, with all columns side by side.
 void Blur(Workspace* workspace, cv::Mat* pixels) {
   using Row = Eigen::Map<Eigen::ArrayXf>;
   const std::vector<float>& kernel = workspace->kernel;
@@ -125,7 +125,7 @@ void MakeSmallBlurryImage(const cv::Mat& gray, double blur_sigma_px, SmallBlurry
   CV_Assert(gray.type() == CV_8UC1 && !gray.empty());
   thread_local Workspace workspace;
   result->scale = std::min((gray.cols + kMaxWidth - 1) / kMaxWidth, gray.rows);
-  // Whoever took the thumbnail that was here before keeps it.
+  // If the previous thumbnail has another owner, it is left unchanged.
   if (result->pixels.u && result->pixels.u->refcount > 1) result->pixels.release();
   MeanOfBlocks(gray, result->scale, &workspace, &result->pixels);
   if (blur_sigma_px > 0) {

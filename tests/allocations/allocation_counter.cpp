@@ -4,7 +4,7 @@
 #include <cerrno>
 #include <cstddef>
 
-// The C library's own, by the names under which it offers them to those who replace the usual ones.
+// The C library's allocation functions, under the names that it provides for programs that replace malloc.
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
@@ -14,12 +14,12 @@ void* __libc_memalign(std::size_t alignment, std::size_t size);
 
 namespace {
 
-// Plain data, as it is used before any constructor has run.
+// A plain integer, because it is used before any constructor has run.
 thread_local std::size_t allocations = 0;
 
 }  // namespace
 
-// Names and types are the C library's.
+// These names and types are prescribed by the C library.
 extern "C" {
 
 void* malloc(std::size_t size) {

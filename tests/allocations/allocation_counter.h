@@ -3,11 +3,11 @@
 
 #include <cstddef>
 
-// Counts what this thread takes from the heap, by whatever way: the program's malloc, which operator new,
-// OpenCV and Eigen end in, is replaced by one that counts and then does what the C library's does.
+// Counts the heap allocations of this thread. The program's malloc, which operator new, OpenCV and Eigen
+// call, is replaced by one that counts and then calls the C library's.
 namespace docent::testing_allocations {
 
-// Since the thread began.
+// The number of allocations since the thread began.
 std::size_t AllocationsOfThisThread();
 
 }  // namespace docent::testing_allocations

@@ -19,7 +19,7 @@ using testing_world::Camera;
 using testing_world::CameraAt;
 using testing_world::World;
 
-constexpr int kFrames = 24;  // of one sway to the side and back
+constexpr int kFrames = 24;  // frames of one sideways oscillation
 constexpr std::uint64_t kKey = 1;
 
 Rigid3 Pose(int frame) {
@@ -52,14 +52,14 @@ class OneMap : public PlaceFinder {
   }
 };
 
-// A keyframe, which the mapper keeps, is no part of a steady frame; the first one would be due here.
+// Adding a keyframe allocates memory that the mapper keeps, so that keyframes are disabled here.
 TrackerOptions WithoutKeyFrames() {
   TrackerOptions options;
   options.frames_between_keyframes = std::numeric_limits<int>::max();
   return options;
 }
 
-// What each frame of a sway allocates, once the same sway has been gone through a few times.
+// Expects that no frame of an oscillation allocates memory, after a few identical oscillations.
 void ExpectNoAllocations(const TrackerOptions& options) {
   cv::setNumThreads(1);
   const OneMap places;
@@ -79,8 +79,8 @@ void ExpectNoAllocations(const TrackerOptions& options) {
   }
 }
 
-TEST(AllocationCounter, CountsWhatIsAllocated) {
-  static int* volatile number;  // what nobody could see, the compiler would leave out
+TEST(AllocationCounter, CountsAllocations) {
+  static int* volatile number;  // volatile, because the compiler could otherwise remove the allocation
   const std::size_t before = AllocationsOfThisThread();
   number = new int(3);
   const std::size_t after = AllocationsOfThisThread();
@@ -90,7 +90,7 @@ TEST(AllocationCounter, CountsWhatIsAllocated) {
   EXPECT_GT(AllocationsOfThisThread(), after);
 }
 
-TEST(SteadyFrames, AllocateNothingOnATour) {
+TEST(SteadyFrames, AllocateNothingInAReadOnlyMap) {
   TrackerOptions options;
   options.build_maps = false;
   ExpectNoAllocations(options);

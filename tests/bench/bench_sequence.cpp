@@ -39,7 +39,7 @@ void ReadImages(BenchSequence* sequence) {
   }
 }
 
-// As a session in lockstep does.
+// As a session does in lockstep.
 void MakeMap(BenchSequence* sequence) {
   engine::Lockstep lockstep({}, sequence->camera, 1);
   for (const engine::Frame& frame : sequence->frames) {

@@ -11,25 +11,25 @@
 #include "engine/recognition/place.h"
 #include "tests/engine/lockstep.h"
 
-// What every benchmark measures on: grey images of one sequence in memory, and the map that tracker and
-// mapper, run in turn, made of them. The sequence is the folder or file that the environment variable
-// DOCENT_BENCH_SEQUENCE names (anything that --camera takes; its calibration beside it), else ten seconds of
-// the simulator's room. Made once a process, by the first benchmark that asks; all on the calling thread.
+// The data of all benchmarks: grey images of one sequence in memory, and the map that tracker and mapper made
+// of them, run in turn. The environment variable DOCENT_BENCH_SEQUENCE names the sequence (anything that
+// --camera accepts, with its calibration beside it); the default is ten seconds of the simulator's room.
+// Created once per process, by the first benchmark that needs it, on the calling thread.
 namespace docent::bench {
 
 struct BenchSequence {
   std::string name;
   std::shared_ptr<const engine::CameraModel> camera;
   std::vector<engine::Frame> frames;               // CV_8UC1
-  std::shared_ptr<const engine::MapSnapshot> map;  // null when no map could be started
-  std::vector<engine::TrackedFrame> tracked;       // one a frame: the pass that made the map
+  std::shared_ptr<const engine::MapSnapshot> map;  // null if no map could be started
+  std::vector<engine::TrackedFrame> tracked;       // one per frame, from the pass that made the map
 };
 
-// Throws docent::Error when the sequence cannot be read.
+// Throws docent::Error if the sequence cannot be read.
 const BenchSequence& Sequence();
 
-// The first `keyframes` keyframes of one map by their thumbnails, so that a second pass may enter it from
-// anywhere.
+// A place index of the first `keyframes` keyframes of one map by their thumbnails, so that a second pass can
+// be relocalized anywhere in it.
 class MapPlaces : public engine::PlaceFinder {
  public:
   static constexpr std::uint64_t kKey = engine::Lockstep::kMapKey;
@@ -44,11 +44,10 @@ class MapPlaces : public engine::PlaceFinder {
   std::size_t keyframes_;
 };
 
-// Milliseconds that this thread has computed: on a machine that others use as well, the time on the wall
-// measures them too.
+// CPU time of this thread in milliseconds. Wall time would include other processes of the machine.
 double ThreadMilliseconds();
 
-// The value below which this part of the values lies; the values are sorted by it.
+// The value below which this ratio of the values lies; sorts the values.
 double Quantile(std::vector<double>* values, double part);
 
 }  // namespace docent::bench

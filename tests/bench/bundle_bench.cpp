@@ -4,14 +4,14 @@
 #include "engine/mapping/bundle_system.h"
 #include "tests/engine/mapping/bundle_scene.h"
 
-// One step of bundle adjustment, against the arithmetic that it must do.
+// One step of bundle adjustment, compared with the arithmetic operations that it needs.
 namespace docent::bench {
 namespace {
 
 // Multiplications and additions, counted from the formulas: a projection with its Jacobian about 110, with
 // the loss and weights 130; a point's 3x3 block and gradient 60; a pose's 6x6 block, gradient and its 6x3
 // block with the point 280; elimination 220 for each pair of free cameras that see the same point, and 150
-// for each one that does. Following a point linearises again, and measures what came of it (70).
+// for each such camera. Back-substitution linearises again and evaluates the residuals (70).
 double Operations(const engine::BundleProblem& problem) {
   std::vector<int> free_views(problem.points.size(), 0);
   double operations = 0;
@@ -39,7 +39,7 @@ void BundleStep(benchmark::State& state) {
   state.counters["operations"] = benchmark::Counter(
       Operations(problem), benchmark::Counter::kIsIterationInvariantRate, benchmark::Counter::kIs1000);
 }
-// A local adjustment's share of free keyframes, and a whole map.
+// The ratio of free keyframes of a local adjustment, and a whole map.
 BENCHMARK(BundleStep)->Args({28, 20, 2000})->Args({100, 1, 5000})->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -9,18 +9,17 @@
 #include "engine/tracking/tracker.h"
 #include "tests/bench/bench_sequence.h"
 
-// What a frame costs in maps of 1 000 to 50 000 points. The sequence's own map is thinned where it has more,
-// and where it has fewer is put beside itself again and again, as the rooms of a larger house would lie; the
-// camera walks through the first of them, and is told so where it asks: exact copies cannot be told apart,
-// and what finding a place costs has a benchmark of its own. Counters: the map's points and keyframes, the
-// points looked for in a tracked frame, and the frames' median and 95th percentile in milliseconds of
-// computing.
+// The cost of a frame in maps of 1 000 to 50 000 points. The sequence's own map is reduced if it has more
+// points; if it has fewer, shifted copies of it are added, like the rooms of a larger house. The camera moves
+// through the first copy. Relocalization is told which copy that is, since exact copies cannot be
+// distinguished, and has a benchmark of its own. Counters: the map's points and keyframes, the points
+// searched per tracked frame, and the frames' median and 95th percentile of CPU time in milliseconds.
 namespace docent::bench {
 namespace {
 
 using engine::MapSnapshot;
 
-// The same place again, `apart` further to the right; ids follow those that the map has.
+// Adds a copy of the map, `apart` to the right; its ids continue those of the map.
 void AddCopy(const MapSnapshot& source, std::size_t every, double apart, MapSnapshot* map) {
   const engine::KeyFrameId first_keyframe = map->next_keyframe;
   const engine::MapPointId first_point = map->next_point;

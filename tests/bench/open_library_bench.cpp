@@ -12,10 +12,10 @@
 #include "maps/library.h"
 #include "maps/place_index.h"
 
-// Opening a library of many maps for a tour: its entries, thumbnails and words are read and the place index
-// is made; maps stay on disk. 150 keyframes a map, of small images, whose thumbnails are as large as usual
-// ones, with 190 words each, as an image of 640 x 480 has. The library is written to the folder for
-// temporary files first, 0.8 GB of it for 1000 maps.
+// Opens a library of many maps for a tour: reads its entries, thumbnails and words and builds the place
+// index; the maps stay on disk. Each map has 150 keyframes with small images, but with thumbnails of the
+// usual size and 190 words each, as an image of 640 x 480 has. The library is first written to the folder for
+// temporary files, 0.8 GB for 1000 maps.
 namespace docent::bench {
 namespace {
 
@@ -78,8 +78,8 @@ void OpenLibrary(benchmark::State& state) {
     std::size_t wanted = 0;
     for (const maps::MapInfo& info : library.List()) wanted += info.keyframes;
     index.Reserve(wanted);
-    library.LoadAppearance([&](const maps::MapInfo& info, const maps::Library::Appearance& looks) {
-      index.SetAppearance(info.key, looks.thumbnails, looks.words);
+    library.LoadAppearance([&](const maps::MapInfo& info, const maps::Library::Appearance& appearance) {
+      index.SetAppearance(info.key, appearance.thumbnails, appearance.words);
     });
     words = index.words();
     keyframes = index.keyframes();

@@ -15,7 +15,7 @@
 #include "engine/vision/rotation_alignment.h"
 #include "tests/bench/bench_sequence.h"
 
-// The parts that a frame and a keyframe are made of, each alone.
+// The components of tracking a frame and of inserting a keyframe, each alone.
 namespace docent::bench {
 namespace {
 
@@ -53,7 +53,7 @@ void AlignRotation(benchmark::State& state) {
 }
 BENCHMARK(AlignRotation)->Unit(benchmark::kMicrosecond);
 
-// A point of the map, looked for in a frame that was tracked, about where it should be.
+// Searches a point of the map in a tracked frame, near its prediction.
 void PredictAndFindAPoint(benchmark::State& state) {
   if (!HasMap(&state)) return;
   const BenchSequence& sequence = Sequence();
@@ -67,7 +67,7 @@ void PredictAndFindAPoint(benchmark::State& state) {
   const engine::Rigid3& pose = sequence.tracked[index].camera_from_map;
   engine::PointSearcher searcher;
   std::size_t next = 0;
-  double looked_for = 0, found = 0;
+  double searched = 0, found = 0;
   for (auto _ : state) {
     std::optional<engine::PredictedPoint> predicted;
     while (!predicted) {
@@ -76,15 +76,15 @@ void PredictAndFindAPoint(benchmark::State& state) {
       const engine::KeyFrame& source = *sequence.map->FindKeyFrame(point.source_keyframe);
       predicted = searcher.Predict(point, source, *sequence.camera, pose);
       if (!predicted) continue;
-      ++looked_for;
+      ++searched;
       found += searcher.Find(point, source, *predicted, *features, 7, true).has_value();
     }
   }
-  state.counters["found"] = looked_for > 0 ? found / looked_for : 0;
+  state.counters["found"] = searched > 0 ? found / searched : 0;
 }
 BENCHMARK(PredictAndFindAPoint)->Unit(benchmark::kMicrosecond);
 
-// Whether any of these pixels passes the corner detector's first test.
+// True if any of these pixels passes the first test of the corner detector.
 bool PassesFirstTest(const cv::Mat& image, int y, int begin, int end, int threshold) {
   for (int x = begin; x < end; ++x) {
     const auto at = [&](int dx, int dy) { return static_cast<int>(image.at<std::uint8_t>(y + dy, x + dx)); };
@@ -96,10 +96,10 @@ bool PassesFirstTest(const cv::Mat& image, int y, int begin, int end, int thresh
   return false;
 }
 
-// Per image. "operations" counts those on a vector of bytes that the test cannot do without: five loads,
-// nine comparisons and differences, a branch and a store for each block; and for a block that passes the
-// first test twelve loads, 46 minima and maxima for the strongest bright arc, as many for the dark one, and
-// seven more.
+// Per image. "operations" counts the operations on a vector of bytes that the test needs at least: five
+// loads, nine comparisons and differences, a branch and a store for each block; and for a block that passes
+// the first test twelve loads, 46 minima and maxima for the strongest bright arc, as many for the dark one,
+// and seven more.
 void DetectCorners(benchmark::State& state) {
   const BenchSequence& sequence = Sequence();
   const auto features = engine::MakeFeatures(sequence.frames[sequence.frames.size() / 2].image);
@@ -128,7 +128,7 @@ BENCHMARK(DetectCorners)->Unit(benchmark::kMicrosecond);
 
 struct CornersOfAnImage {
   cv::Mat image;
-  std::vector<Eigen::Vector2f> corners;  // that patches fit about
+  std::vector<Eigen::Vector2f> corners;  // around which a patch fits
 };
 CornersOfAnImage SomeCorners() {
   const BenchSequence& sequence = Sequence();
@@ -147,8 +147,8 @@ Eigen::Matrix2f SomeWarp() {
   return warp;
 }
 
-// "operations": 100 bilinear samples of 22 on single numbers; eight rows of 16 on vectors and eight of 14 for
-// the integer sums; 100 for the sums of gradients and the matrix.
+// "operations": 100 bilinear samples of 22 scalar operations; eight rows of 16 vector operations and eight of
+// 14 for the integer sums; 100 for the sums of gradients and the matrix.
 void CutAPatch(benchmark::State& state) {
   const CornersOfAnImage some = SomeCorners();
   const Eigen::Matrix2f warp = SomeWarp();
@@ -163,9 +163,8 @@ void CutAPatch(benchmark::State& state) {
 }
 BENCHMARK(CutAPatch)->Unit(benchmark::kNanosecond);
 
-// From where the patch lies already: one pass that finds no step to take, and the one that measures.
-// "operations" on vectors of eight: 8 for the first row and 26 for each of eight, 40 for the five totals, 40
-// for the step.
+// Starts at the solution: one iteration that finds no step to take, and the final measurement. "operations"
+// on vectors of eight: 8 for the first row and 26 for each of eight, 40 for the five totals, 40 for the step.
 void AlignAPatch(benchmark::State& state) {
   const CornersOfAnImage some = SomeCorners();
   const Eigen::Matrix2f warp = SomeWarp();
@@ -197,7 +196,7 @@ void AdjustLocally(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
     engine::Map map(snapshot);
-    // About the error that a new keyframe comes with.
+    // The typical error of a new keyframe's initial pose.
     engine::Rigid3& pose = map.FindKeyFrame(newest)->keyframe.camera_from_map;
     pose.translation.x() += 0.002 * map.FindKeyFrame(newest)->keyframe.mean_depth;
     state.ResumeTiming();

@@ -18,16 +18,16 @@
 #include "maps/place_index.h"
 #include "tests/bench/bench_sequence.h"
 
-// The search for a place among all keyframes of all maps. The maps are those of the simulator's museum and
-// desks: keyframes from where each place is built, questions from where it is visited later, by another way.
-// Larger libraries hold the same maps again, with thumbnails mirrored and under noise as coarse as what they
-// show, and half of each keyframe's words those of others; 150 keyframes a map. The counters:
-//   median_ms, p95_ms       a question, in milliseconds of computing, its words being known
-//   recall_at_1, _5         part of the questions whose map is first, or among the first five candidates
-//   bytes_a_keyframe        resident memory that the index takes
-// FindChangedPlaces asks the same questions under changes that a visitor brings about, of thumbnails and
-// words each alone and of both; SearchWords is the search of the inverted file alone and DescribeAQuestion
-// what a question costs that has words.
+// Place recognition among all keyframes of all maps. The maps are those of the simulator's museum and desks:
+// the keyframes are from the walks on which each place is mapped, the queries from later visits on other
+// paths. Larger libraries contain replicas of these maps: thumbnails are mirrored and changed by noise as
+// coarse as their content, and half of each keyframe's words are replaced; 150 keyframes per map. Counters:
+//   median_ms, p95_ms       CPU time of a query in milliseconds, its words being given
+//   recall_at_1, _5         ratio of the queries whose map is first, or among the first five candidates
+//   bytes_a_keyframe        resident memory of the index
+// FindChangedPlaces runs the same queries under changes that a visitor causes, with thumbnails and words each
+// alone and with both. SearchWords is the search of the inverted file alone. DescribeAQuery is the cost of
+// computing the words of a query.
 namespace docent::bench {
 namespace {
 
@@ -53,7 +53,7 @@ View ViewOf(const cv::Mat& gray) {
   return {features->small_blurry, engine::MakeWordBag(*features)};
 }
 
-// Every fourth frame of building is a keyframe and every eighth of visiting a question.
+// Every fourth frame of a mapping walk is a keyframe, and every eighth of a visit a query.
 void AddScene(const std::string& name, std::uint64_t first_key, Places* places) {
   const auto simulation = app::MakeSimulation(name);
   for (int frame = 0; frame < simulation->frame_count(); frame += 4) {
@@ -83,9 +83,9 @@ const Places& SimulatedPlaces() {
   return places;
 }
 
-// The same view of another place: mirrored, and half of what it shows is something else.
+// A replica of a view as another place: mirrored, and half of its content replaced.
 engine::SmallBlurryImage Replica(const engine::SmallBlurryImage& image, bool mirrored, Random* random) {
-  constexpr int kCell = 6;  // thumbnail pixels, as the blur
+  constexpr int kCell = 6;  // thumbnail pixels, as large as the blur
   cv::Mat cells(image.pixels.rows / kCell, image.pixels.cols / kCell, CV_32FC1), noise;
   for (int y = 0; y < cells.rows; ++y) {
     for (int x = 0; x < cells.cols; ++x) cells.at<float>(y, x) = static_cast<float>(random->Uniform(-1, 1));
@@ -105,7 +105,7 @@ engine::SmallBlurryImage Replica(const engine::SmallBlurryImage& image, bool mir
   return replica;
 }
 
-// Half of the words, and as many that any keyframe has, the commoner ones oftener.
+// Keeps half of the words and adds as many from other keyframes, common ones more often.
 engine::WordBag Replica(const engine::WordBag& words, Random* random) {
   static const std::vector<std::uint32_t> all = [] {
     std::vector<std::uint32_t> leaves;
@@ -127,8 +127,8 @@ engine::WordBag Replica(const engine::WordBag& words, Random* random) {
   return engine::MakeWordBag(std::move(leaves));
 }
 
-// Keys of the simulated places as they are, and replicas of them from 1000 on, each filled up to a map's
-// size.
+// The simulated places with their own keys, and replicas of them with keys from 1000 on, each filled up to
+// the size of a map.
 void FillIndex(std::size_t maps, maps::PlaceIndex* index) {
   const Places& places = SimulatedPlaces();
   Random random(7);
@@ -146,7 +146,7 @@ void FillIndex(std::size_t maps, maps::PlaceIndex* index) {
         const bool itself = round == 0 && i < views.size();
         thumbnails.push_back({id, maps::Pack(itself ? original.thumbnail
                                                     : Replica(original.thumbnail, round % 2 == 1, &random))});
-        // Five keyframes are a place.
+        // Five consecutive keyframes form a place.
         words.push_back({id, id / 5 * 5, itself ? original.words : Replica(original.words, &random)});
       }
       index->SetAppearance(round == 0 ? key : 1000 * round + key, thumbnails, words);
@@ -156,14 +156,14 @@ void FillIndex(std::size_t maps, maps::PlaceIndex* index) {
 }
 
 double ResidentBytes() {
-  malloc_trim(0);  // what was freed before would hide what is taken now
+  malloc_trim(0);  // memory that was freed before would hide new allocations
   std::ifstream file("/proc/self/statm");
   double total = 0, resident = 0;
   file >> total >> resident;
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-// Where a map comes among the candidates; 1000 where it does not.
+// The rank of a map among the candidates; 1000 if it is not among them.
 std::size_t RankOf(const std::vector<engine::PlaceCandidate>& candidates, std::uint64_t key) {
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (candidates[i].map_key == key) return i;
@@ -212,8 +212,8 @@ BENCHMARK(FindPlaces)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
 
-// What a visitor's camera does: it is rolled, further away or nearer, looks aside (the rest of the image is
-// black), or the light is another.
+// Changes that a visitor's camera causes: it rolls, is further away or nearer, is shifted sideways (the rest
+// of the image is black), or the light differs.
 cv::Mat Changed(const cv::Mat& gray, int change) {
   const auto warped = [&](double angle_deg, double scale, double aside) {
     cv::Mat warp = cv::getRotationMatrix2D({gray.cols / 2.0f, gray.rows / 2.0f}, angle_deg, scale), out;
@@ -289,15 +289,15 @@ BENCHMARK(FindChangedPlaces)
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);
 
-void DescribeAQuestion(benchmark::State& state) {
+void DescribeAQuery(benchmark::State& state) {
   const auto features = engine::MakeFeatures(SimulatedPlaces().visits.front().gray);
   std::size_t words = 0;
   for (auto _ : state) words = engine::MakeWordBag(*features).size();
   state.counters["words"] = static_cast<double>(words);
 }
-BENCHMARK(DescribeAQuestion)->Unit(benchmark::kMillisecond);
+BENCHMARK(DescribeAQuery)->Unit(benchmark::kMillisecond);
 
-// What a question reads of the inverted file: the search by words alone.
+// The postings that a query reads from the inverted file: the search by words alone.
 void SearchWords(benchmark::State& state) {
   const Places& places = SimulatedPlaces();
   Random random(7);

@@ -9,17 +9,17 @@
 #include "engine/vision/features.h"
 #include "tests/bench/bench_sequence.h"
 
-// Descriptors, the tree they are sorted by, the database of a map, and a planar target.
+// Descriptors, the vocabulary tree that sorts them, the database of a map, and a planar target.
 namespace docent::bench {
 namespace {
 
-using engine::DescribedPlace;
+using engine::DescribedKeypoint;
 using engine::DescriptorDatabase;
 
-// The described corners of images all over the sequence.
-const std::vector<std::vector<DescribedPlace>>& DescribedImages() {
-  static const std::vector<std::vector<DescribedPlace>> described = [] {
-    std::vector<std::vector<DescribedPlace>> images;
+// The described corners of images from the whole sequence.
+const std::vector<std::vector<DescribedKeypoint>>& DescribedImages() {
+  static const std::vector<std::vector<DescribedKeypoint>> described = [] {
+    std::vector<std::vector<DescribedKeypoint>> images;
     const std::size_t step = std::max<std::size_t>(1, Sequence().frames.size() / 50);
     for (std::size_t i = 0; i < Sequence().frames.size(); i += step)
       images.push_back(DescribeCorners(*engine::MakeFeatures(Sequence().frames[i].image)));
@@ -28,16 +28,16 @@ const std::vector<std::vector<DescribedPlace>>& DescribedImages() {
   return described;
 }
 
-std::vector<engine::Descriptor> DescriptorsOf(const std::vector<DescribedPlace>& places) {
+std::vector<engine::Descriptor> DescriptorsOf(const std::vector<DescribedKeypoint>& places) {
   std::vector<engine::Descriptor> descriptors;
-  for (const DescribedPlace& place : places) descriptors.push_back(place.oriented.descriptor);
+  for (const DescribedKeypoint& place : places) descriptors.push_back(place.oriented.descriptor);
   return descriptors;
 }
 
-// A database of this many keyframes: the sequence's, again and again.
+// A database of this many keyframes: copies of those of the sequence.
 void AddKeyFrame(engine::KeyFrameId id, DescriptorDatabase* database) {
   const auto& images = DescribedImages();
-  const std::vector<DescribedPlace>& places = images[id % images.size()];
+  const std::vector<DescribedKeypoint>& places = images[id % images.size()];
   for (std::size_t i = 0; i < places.size(); ++i) {
     database->Add({places[i].oriented.descriptor, id, static_cast<engine::MapPointId>(i), places[i].pixel,
                    places[i].level});
@@ -78,7 +78,7 @@ void CompareDescriptors(benchmark::State& state) {
 }
 BENCHMARK(CompareDescriptors);
 
-// Argument: how many leaves are looked for.
+// Argument: the number of leaves that are searched.
 void DescendTheTree(benchmark::State& state) {
   const auto descriptors = DescriptorsOf(DescribedImages().front());
   std::array<std::uint32_t, engine::VocabularyTree::kMaxNearestLeaves> leaves;
@@ -118,7 +118,7 @@ void VoteForKeyFrames(benchmark::State& state) {
 }
 BENCHMARK(VoteForKeyFrames)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 
-// The sequence's first image as a target, seen as it is.
+// The sequence's first image as a target, detected in the same image.
 void DetectATarget(benchmark::State& state) {
   const cv::Mat& image = Sequence().frames.front().image;
   const engine::PlanarTarget target(image, 1.0);
@@ -129,20 +129,20 @@ void DetectATarget(benchmark::State& state) {
 }
 BENCHMARK(DetectATarget)->Unit(benchmark::kMillisecond);
 
-// From a pose that is a little off, as from frame to frame.
+// Aligns from a pose that is slightly off, as from frame to frame.
 void AlignATarget(benchmark::State& state) {
   const cv::Mat& image = Sequence().frames.front().image;
   const engine::PlanarTarget target(image, 1.0);
   const auto features = engine::MakeFeatures(image);
-  const auto sighting = target.Detect(*features, *Sequence().camera, 1);
-  if (!sighting) {
+  const auto detection = target.Detect(*features, *Sequence().camera, 1);
+  if (!detection) {
     state.SkipWithError("the image is not found in itself");
     return;
   }
   const engine::Rigid3 off(engine::Rotation3::Exp({0.005, -0.005, 0.005}), {0.005, 0.005, 0.005});
   double found = 0;
   for (auto _ : state)
-    found = target.Align(*features, *Sequence().camera, off * sighting->camera_from_target).has_value();
+    found = target.Align(*features, *Sequence().camera, off * detection->camera_from_target).has_value();
   state.counters["found"] = found;
 }
 BENCHMARK(AlignATarget)->Unit(benchmark::kMillisecond);

@@ -7,16 +7,16 @@
 #include "engine/tracking/tracker.h"
 #include "tests/bench/bench_sequence.h"
 
-// What a frame costs: tracking it in a finished map, beside the extraction of a thousand ORB features from
-// the same image, which trackers of another kind begin with. All on one thread, in milliseconds of
-// computing. The counters:
-//   *_median_ms, *_p95_ms   over the frames; lost ones count, with what their recovery costs
-//   tracked                 part of the frames that had a pose
-//   median_ratio, p95_ratio tracking by ORB
+// The cost of a frame: tracking it in a finished map, compared with the extraction of a thousand ORB features
+// from the same image, the first step of feature-based trackers. All on one thread, in milliseconds of CPU
+// time. Counters:
+//   *_median_ms, *_p95_ms    over the frames, lost ones with their relocalization included
+//   tracked                  ratio of the frames that had a pose
+//   median_ratio, p95_ratio  tracking divided by ORB
 namespace docent::bench {
 namespace {
 
-// A tracker that tours the finished map.
+// A tracker in the finished map, which stays unchanged.
 engine::Tracker TourOf(const BenchSequence& sequence) {
   engine::TrackerOptions options;
   options.build_maps = false;
@@ -106,7 +106,7 @@ void TrackFrame(benchmark::State& state) {
 void OrbExtraction1000(benchmark::State& state) {
   Measure(false, true, &state);
 }
-// One frame of each in turn, so that whatever slows the machine slows both.
+// One frame of each in turn, so that a slow machine affects both alike.
 void TrackFrameAgainstOrb(benchmark::State& state) {
   Measure(true, true, &state);
 }

@@ -13,18 +13,18 @@
 #include "app/simulator/simulation.h"
 #include "tests/bench/bench_sequence.h"
 
-// What a second camera costs the first: two trackers and the mapper together, beside each camera alone with
-// the mapper, all at the pace of real cameras with images that lie in memory, one run after the other so
-// that whatever slows the machine slows all three. The counters, for the camera in the hand (hand) and the
+// The cost that a second camera adds to the first: two trackers and the mapper together, compared with each
+// camera alone with the mapper. All run at the rate of real cameras with images in memory, one run after the
+// other, so that a slow machine affects all three alike. Counters, for the hand-held camera (hand) and the
 // one on the shoulder (shoulder):
-//   *_alone_p95_ms, *_pair_p95_ms  tracking of a frame on the wall, as report.json has it
-//   *_ratio                        the second by the first
-//   *_cpu_ratio                    the same for the computing of the camera's thread alone, which does not
-//                                  grow by waiting for a processor
-//   *_pair_tracked                 part of the pair's frames, from the first with a pose on, that had one
-//   dropped                        part of the pair's images that came too late
-// DOCENT_BENCH_SECONDS shortens the walk of 24 s. Repetitions (--benchmark_repetitions) give medians. To be
-// run on two processors (taskset) of a machine that does nothing else:
+//   *_alone_p95_ms, *_pair_p95_ms  wall time of tracking a frame, as in report.json
+//   *_ratio                        the second divided by the first
+//   *_cpu_ratio                    the same for the CPU time of the camera's thread, which does not include
+//                                  waiting for a processor
+//   *_pair_tracked                 ratio of the pair's frames, from the first with a pose on, that have one
+//   dropped                        ratio of the pair's images that came too late
+// DOCENT_BENCH_SECONDS shortens the walk of 24 s. --benchmark_repetitions gives medians. To be run on two
+// processors (taskset) of an otherwise idle machine:
 //
 //   taskset -c 0,1 docent_bench --benchmark_filter=WearablePair --benchmark_repetitions=5
 //       --benchmark_report_aggregates_only=true
@@ -76,7 +76,7 @@ class FilmSource : public app::FrameSource {
   std::size_t next_ = 0;
 };
 
-// One camera's frames of one run.
+// The frames of one camera in one run.
 struct Measured {
   std::vector<double> wall_ms, cpu_ms;
   int dropped = 0, tracked = 0, since_first = 0;

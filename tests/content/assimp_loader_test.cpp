@@ -61,15 +61,15 @@ TEST_F(OtherFormats, AnObjBecomesTrianglesWithItsMaterialAndTexture) {
   EXPECT_EQ(material.base_color_texture.texture, 0);
   ASSERT_EQ(asset.model->images.size(), 1u);
   for (const Vertex& vertex : primitive.vertices) {
-    // OBJ counts v from the bottom, glTF from the top.
+    // In OBJ v starts at the bottom, in glTF at the top.
     EXPECT_FLOAT_EQ(vertex.uv0.y, 1 - vertex.position.y / 3);
   }
-  // The asset stands alone.
+  // The asset is self-contained.
   std::filesystem::remove_all(folder_);
   EXPECT_EQ(AssetFromGlb(asset.name, asset.glb).model->images.size(), 1u);
 }
 
-TEST_F(OtherFormats, ATextureThatCannotBeShownIsAWarning) {
+TEST_F(OtherFormats, AnUnusableTextureGivesAWarning) {
   Write("square.mtl", "newmtl red\nKd 1 1 1\nmap_Kd ../../../etc/passwd\n");
   const Asset asset = ImportAsset(Write("square.obj", kSquare));
   EXPECT_TRUE(asset.model->images.empty());
@@ -102,7 +102,7 @@ TEST_F(OtherFormats, DamagedFilesAreRefusedInOneSentence) {
   EXPECT_THROW(ImportAsset(folder_ / "missing.obj"), Error);
 }
 
-TEST_F(OtherFormats, LimitsHoldForThemToo) {
+TEST_F(OtherFormats, LimitsApplyToOtherFormats) {
   LoadLimits limits;
   limits.max_vertices = 3;
   const std::filesystem::path path = Write("square.obj", kSquare);
@@ -112,7 +112,7 @@ TEST_F(OtherFormats, LimitsHoldForThemToo) {
   EXPECT_THROW(ImportAsset(path, limits), Error);
 }
 
-TEST(AssimpFormats, GltfNeverGoesThroughAssimp) {
+TEST(AssimpFormats, GltfIsNotLoadedWithAssimp) {
   EXPECT_FALSE(IsAssimpFormat("a.gltf"));
   EXPECT_FALSE(IsAssimpFormat("a.GLB"));
   EXPECT_TRUE(IsAssimpFormat("a.OBJ"));

@@ -32,7 +32,7 @@ Entity SignEntity(const std::string& name) {
   return entity;
 }
 
-Scene TwoThings() {
+Scene ThreeEntities() {
   Scene scene;
   scene.entities = {ModelEntity("helmet"), SignEntity("sign-1"), ModelEntity("old fox")};
   return scene;
@@ -48,7 +48,7 @@ std::string Refusal(const Action& action) {
   return "";
 }
 
-TEST(Edits, EachOneIsTakenBackExactly) {
+TEST(Edits, UndoRevertsEachEditExactly) {
   std::vector<std::unique_ptr<Edit>> edits;
   edits.push_back(PlaceModelEdit(ModelEntity("fox"), "fox.glb", {10, 20}));
   edits.push_back(AddSignpostEdit(SignEntity("sign-2"), {10, 20}));
@@ -60,7 +60,7 @@ TEST(Edits, EachOneIsTakenBackExactly) {
   edits.push_back(RemoveEdit("helmet"));
   edits.push_back(RemoveEdit("sign-1"));
   for (const auto& edit : edits) {
-    Scene scene = TwoThings();
+    Scene scene = ThreeEntities();
     const std::string before = EncodeScene(scene);
     edit->Apply(&scene);
     EXPECT_NE(EncodeScene(scene), before) << edit->Text();
@@ -69,11 +69,11 @@ TEST(Edits, EachOneIsTakenBackExactly) {
   }
 }
 
-TEST(Edits, AreTakenBackAndDoneAgainOnGroundThatHasMoved) {
+TEST(Edits, UndoAndRedoFollowAMovedAnchor) {
   const engine::Sim3 motion{engine::Rotation3::Exp({0, 0.1, 0}), {0.5, 0, -0.5}, 1.25};
   const auto move_all = [&](EditHistory* history, Scene* scene) {
-    for (Entity& entity : scene->entities) MoveAlong(motion, &entity);
-    for (const char* name : {"helmet", "sign-1", "old fox", "fox"}) history->MoveAlong(name, motion);
+    for (Entity& entity : scene->entities) MoveWithAnchor(motion, &entity);
+    for (const char* name : {"helmet", "sign-1", "old fox", "fox"}) history->MoveWithAnchor(name, motion);
   };
   const auto same = [](const Scene& a, const Scene& b) {
     ASSERT_EQ(a.entities.size(), b.entities.size());
@@ -84,11 +84,11 @@ TEST(Edits, AreTakenBackAndDoneAgainOnGroundThatHasMoved) {
     }
   };
   EditHistory history;
-  Scene scene = TwoThings();
-  std::vector<Scene> moved;  // after each edit, as it would stand on the ground that has moved
+  Scene scene = ThreeEntities();
+  std::vector<Scene> moved;  // The scene after each edit, transformed by the anchor's motion.
   const auto keep = [&] {
     moved.push_back(scene);
-    for (Entity& entity : moved.back().entities) MoveAlong(motion, &entity);
+    for (Entity& entity : moved.back().entities) MoveWithAnchor(motion, &entity);
   };
   keep();
   for (const auto make : {+[] {
@@ -101,7 +101,7 @@ TEST(Edits, AreTakenBackAndDoneAgainOnGroundThatHasMoved) {
     history.Do(make(), &scene);
     keep();
   }
-  ASSERT_TRUE(history.Undo(&scene));  // so that something waits to be done again
+  ASSERT_TRUE(history.Undo(&scene));  // So that there is an edit to redo.
   move_all(&history, &scene);
   same(scene, moved[3]);
   for (int i = 2; i >= 0; --i) {
@@ -114,27 +114,27 @@ TEST(Edits, AreTakenBackAndDoneAgainOnGroundThatHasMoved) {
   }
 }
 
-TEST(Edits, MoveRotateAndScaleDoWhatTheySay) {
-  Scene scene = TwoThings();
+TEST(Edits, MoveRotateAndScaleChangeThePoseAsDocumented) {
+  Scene scene = ThreeEntities();
   const engine::Sim3& pose = scene.entities[0].model.map_from_model;
   MoveEdit("helmet", {4, 5, 6})->Apply(&scene);
   EXPECT_EQ(pose.translation, Eigen::Vector3d(4, 5, 6));
   ScaleEdit("helmet", 1.5)->Apply(&scene);
   EXPECT_DOUBLE_EQ(pose.scale, 3);
-  // About its own y axis, counter-clockwise seen from above: z goes to x.
+  // About its own y axis, counter-clockwise seen from above: z moves to x.
   scene.entities[0].model.map_from_model.rotation =
       engine::Rotation3::Exp(Eigen::Vector3d::UnitX() * std::numbers::pi / 2);
   RotateEdit("helmet", 90)->Apply(&scene);
   const Eigen::Vector3d front = pose.rotation * Eigen::Vector3d::UnitZ();
   EXPECT_LT((front - Eigen::Vector3d::UnitX()).norm(), 1e-12);
   const Eigen::Vector3d up = pose.rotation * Eigen::Vector3d::UnitY();
-  EXPECT_LT((up - Eigen::Vector3d::UnitZ()).norm(), 1e-12) << "up stays where it was";
+  EXPECT_LT((up - Eigen::Vector3d::UnitZ()).norm(), 1e-12) << "the up axis must not change";
   ScaleEdit("sign-1", 2)->Apply(&scene);
   EXPECT_DOUBLE_EQ(scene.entities[1].signpost.height_m, 0.2);
 }
 
-TEST(Edits, WhatDoesNotFitTheSceneIsRefusedAndChangesNothing) {
-  Scene scene = TwoThings();
+TEST(Edits, InvalidEditsThrowAndChangeNothing) {
+  Scene scene = ThreeEntities();
   const std::string before = EncodeScene(scene);
   EXPECT_THAT(Refusal([&] { MoveEdit("cat", {0, 0, 0})->Apply(&scene); }), HasSubstr("no 'cat'"));
   EXPECT_THAT(Refusal([&] { RotateEdit("sign-1", 5)->Apply(&scene); }), HasSubstr("signpost"));
@@ -146,7 +146,7 @@ TEST(Edits, WhatDoesNotFitTheSceneIsRefusedAndChangesNothing) {
   EXPECT_EQ(EncodeScene(scene), before);
 }
 
-TEST(EditHistory, UndoAndRedoWalkTheSamePath) {
+TEST(EditHistory, UndoAndRedoRestoreTheSameScenes) {
   Scene scene;
   EditHistory history;
   std::vector<std::string> states = {EncodeScene(scene)};
@@ -177,17 +177,17 @@ TEST(EditHistory, UndoAndRedoWalkTheSamePath) {
   EXPECT_FALSE(history.Redo(&scene));
   history.Undo(&scene);
   history.Do(MoveEdit("fox", {0, 0, 0}), &scene);
-  EXPECT_FALSE(history.can_redo()) << "a new edit ends what could be redone";
+  EXPECT_FALSE(history.can_redo()) << "a new edit discards undone edits";
 }
 
-TEST(EditHistory, AnEditThatIsRefusedIsNotKept) {
+TEST(EditHistory, AnEditThatThrowsIsNotStored) {
   Scene scene;
   EditHistory history;
   EXPECT_THROW(history.Do(RemoveEdit("fox"), &scene), Error);
   EXPECT_FALSE(history.can_undo());
 }
 
-TEST(EditScript, WordsAreSplitAndQuotedAlike) {
+TEST(EditScript, QuotingInvertsSplitting) {
   EXPECT_THAT(SplitWords("12.5 map new \"Desk 3\"  # a comment"),
               ElementsAre("12.5", "map", "new", "Desk 3"));
   EXPECT_THAT(SplitWords("  a\tb # c"), ElementsAre("a", "b"));
@@ -217,9 +217,9 @@ TEST(EditScript, LinesOfEditsReadBackToTheSameEdits) {
     const std::unique_ptr<Edit> edit = ParseEdit(words);
     ASSERT_NE(edit, nullptr) << line;
     EXPECT_EQ(edit->Text(), line);
-    Scene scene = TwoThings();
+    Scene scene = ThreeEntities();
     edit->Apply(&scene);
-    EXPECT_NE(EncodeScene(scene), EncodeScene(TwoThings()));
+    EXPECT_NE(EncodeScene(scene), EncodeScene(ThreeEntities()));
   }
   const auto parse = [](const char* line) { return ParseEdit(SplitWords(line)); };
   EXPECT_EQ(parse("undo"), nullptr);

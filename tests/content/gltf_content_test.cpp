@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What sound files mean: values worked out by hand from the standard.
+// Contents of valid files: expected values were computed by hand from the standard.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ void ExpectNear(const glm::vec3& a, const glm::vec3& b, float tolerance = 1e-5f)
       << a.x << " " << a.y << " " << a.z << " is not " << b.x << " " << b.y << " " << b.z;
 }
 
-// Five points in a row above two others, so that each corner can be told by its x.
+// Five points in a row above two others, so that each corner is identified by its x.
 GltfFile FiveVertices(int mode) {
   GltfFile file;
   const int positions = file.AddFloats({0, 0, 0, 1, 1, 0, 2, 0, 0, 3, 1, 0, 4, 0, 0}, "VEC3", 5);
@@ -84,7 +84,7 @@ TEST(GltfContent, MissingTangentsFollowTheTextureCoordinates) {
     const auto model = file.Load();
     for (const Vertex& vertex : model->meshes[0].primitives[0].vertices) {
       ExpectNear(glm::vec3(vertex.tangent), {0, 1, 0});
-      // The bitangent, cross(normal, tangent) * w, points where v grows.
+      // The bitangent cross(normal, tangent) * w points in the direction of increasing v.
       ExpectNear(glm::cross(vertex.normal, glm::vec3(vertex.tangent)) * vertex.tangent.w,
                  {-handedness, 0, 0});
     }
@@ -127,7 +127,7 @@ TEST(GltfContent, SparseAccessorsReplaceTheirElements) {
   EXPECT_NE(file.Refusal(), "");
 }
 
-TEST(GltfContent, NodesComeParentsFirstAndOnlyTheSceneIsShown) {
+TEST(GltfContent, ParentNodesComeFirstAndOnlyTheSceneIsVisible) {
   GltfFile file = TriangleFile();
   file.json["nodes"] = {{{"name", "leaf"}, {"mesh", 0}, {"translation", {0, 2, 0}}},
                         {{"name", "root"}, {"children", {0}}, {"scale", {2, 2, 2}}},
@@ -143,9 +143,9 @@ TEST(GltfContent, NodesComeParentsFirstAndOnlyTheSceneIsShown) {
   ExpectNear(model->bounds_max, {2, 6, 0});
 }
 
-TEST(GltfContent, MatricesAreTakenApartIntoTheSameTransform) {
+TEST(GltfContent, DecomposedMatricesGiveTheSameTransform) {
   GltfFile file = TriangleFile();
-  // Columns: 90 degrees about z, scaled by (2, 3, -4), moved by (5, 6, 7).
+  // Columns: 90 degrees about z, scaled by (2, 3, -4), translated by (5, 6, 7).
   const std::vector<float> matrix = {0, 2, 0, 0, -3, 0, 0, 0, 0, 0, -4, 0, 5, 6, 7, 1};
   file.json["nodes"] = {{{"mesh", 0}, {"matrix", matrix}}};
   const auto model = file.Load();
@@ -165,7 +165,7 @@ GltfFile AnimatedFile(const char* path, const char* interpolation, const std::ve
   return file;
 }
 
-TEST(GltfContent, AnimationsStepAndBlend) {
+TEST(GltfContent, AnimationsUseStepAndLinearInterpolation) {
   const auto step = AnimatedFile("translation", "STEP", {1, 0, 0, 5, 0, 0}, 3).Load();
   const auto linear = AnimatedFile("translation", "LINEAR", {1, 0, 0, 5, 0, 0}, 3).Load();
   const auto x_at = [](const Model& model, double seconds) {
@@ -186,7 +186,7 @@ TEST(GltfContent, AnimationsStepAndBlend) {
 TEST(GltfContent, RotationsTakeTheShorterArc) {
   const float h = std::sqrt(0.5f);
   for (const float sign : {1.0f, -1.0f}) {
-    // From none to 90 degrees about z; the second quaternion may be written with either sign.
+    // From no rotation to 90 degrees about z; the second quaternion may have either sign.
     const auto model = AnimatedFile("rotation", "LINEAR", {0, 0, 0, 1, 0, 0, sign * h, sign * h}, 4).Load();
     const glm::vec3 x_axis(NodeMatrices(*model, 0, 2.0)[0][0]);
     ExpectNear(x_axis, {h, h, 0});
@@ -194,7 +194,7 @@ TEST(GltfContent, RotationsTakeTheShorterArc) {
 }
 
 TEST(GltfContent, CubicSplinesAreHermitePolynomials) {
-  // p(s) on [1, 3] with value 1, slope 0.5 at the left and value 2, slope -1 at the right end.
+  // p(s) on [1, 3] with value 1 and slope 0.5 at the left end and value 2 and slope -1 at the right end.
   const std::vector<float> values = {0, 0, 0, 1, 0, 0, 0.5f, 0, 0, -1, 0, 0, 2, 0, 0, 0, 0, 0};
   const auto model = AnimatedFile("translation", "CUBICSPLINE", values, 3).Load();
   const auto hermite = [](double t) {
@@ -211,7 +211,7 @@ TEST(GltfContent, CubicSplinesAreHermitePolynomials) {
   EXPECT_NEAR(slope, 0.5, 0.02);
 }
 
-TEST(GltfContent, SkinnedBoundsAreThoseOfTheJoints) {
+TEST(GltfContent, SkinnedBoundsFollowTheJoints) {
   GltfFile file = TriangleFile();
   nlohmann::json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
   attributes["JOINTS_0"] = file.AddAccessor<std::uint8_t>(std::vector<std::uint8_t>(12, 0), 5121, "VEC4", 3);
@@ -222,7 +222,7 @@ TEST(GltfContent, SkinnedBoundsAreThoseOfTheJoints) {
   file.json["skins"] = {{{"joints", {1}}}};
   const auto model = file.Load();
   EXPECT_FLOAT_EQ(model->meshes[0].primitives[0].vertices[0].weights.x, 1.0f)
-      << "weights are brought to sum 1";
+      << "weights are normalized to sum 1";
   ExpectNear(model->bounds_min, {0, 0, 10});
   ExpectNear(model->bounds_max, {1, 1, 10});
 }
@@ -260,8 +260,8 @@ TEST(GltfContent, MaterialsAndTheirExtensionsAreRead) {
   EXPECT_TRUE(material.unlit);
   EXPECT_EQ(material.base_color_texture.texture, 0);
   EXPECT_EQ(material.base_color_texture.uv_set, 1);
-  // KHR_texture_transform: offset + R(rotation) * (scale * uv), rotating counter-clockwise in its uv plane,
-  // which with v down takes (1, 0) to (0, -1).
+  // KHR_texture_transform: offset + R(rotation) * (scale * uv), with a counter-clockwise rotation in the uv
+  // plane, which takes (1, 0) to (0, -1) because v points down.
   ExpectNear(material.base_color_texture.uv_transform * glm::vec3(1, 0, 1), {0.5f, 0.25f - 2, 1});
   ExpectNear(material.base_color_texture.uv_transform * glm::vec3(0, 1, 1), {0.5f + 3, 0.25f, 1});
   EXPECT_FALSE(model->textures[0].repeat_u);
@@ -279,7 +279,7 @@ TEST(GltfContent, SpecularGlossinessKeepsItsReflectance) {
   EXPECT_FLOAT_EQ(MetallicFromSpecular(glm::vec3(0.5f), glm::vec3(0)).metallic, 0.0f);
 }
 
-TEST(GltfContent, DataUrisAreDecodedAfterTheirStandards) {
+TEST(GltfContent, DataUrisAreDecodedAccordingToTheirStandards) {
   const auto text = [](const char* uri) -> std::optional<std::string> {
     const auto bytes = DecodeDataUri(uri);
     if (!bytes) return std::nullopt;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whole files: models that must load, damaged files that must be refused with a sentence and nothing worse.
+// Complete files: valid models must load, and damaged files must be rejected with a clear message and no
+// crash.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +31,7 @@ std::vector<std::filesystem::path> GltfFilesUnder(const std::filesystem::path& f
 }
 
 // What a renderer relies on (content/model.h).
-void ExpectSound(const Model& model, const std::string& file) {
+void ExpectValid(const Model& model, const std::string& file) {
   const auto in = [](int index, std::size_t count) { return index >= -1 && index < static_cast<int>(count); };
   for (const Image& image : model.images) {
     EXPECT_EQ(image.rgba.size(), static_cast<std::size_t>(image.width_px * image.height_px * 4)) << file;
@@ -67,12 +68,12 @@ void ExpectSound(const Model& model, const std::string& file) {
   EXPECT_TRUE(glm::all(glm::lessThanEqual(model.bounds_min, model.bounds_max))) << file;
 }
 
-// The file's refusal, empty when it loads.
+// Returns the error message for a file, or an empty text when it loads.
 std::string Refusal(const std::filesystem::path& path) {
   try {
     const Asset asset = ImportAsset(path);
-    ExpectSound(*asset.model, path.string());
-    // What was packed must load by itself, to the same asset.
+    ExpectValid(*asset.model, path.string());
+    // The packed file must load without other files and give the same asset.
     const Asset again = AssetFromGlb(asset.name, asset.glb);
     EXPECT_EQ(again.id, asset.id) << path;
     EXPECT_EQ(again.model->meshes.size(), asset.model->meshes.size()) << path;
@@ -83,13 +84,13 @@ std::string Refusal(const std::filesystem::path& path) {
 }
 
 TEST(GltfFiles, EveryModelLoads) {
-  if (!std::filesystem::exists(kAssets / "models")) GTEST_SKIP() << "the shared models are not here";
+  if (!std::filesystem::exists(kAssets / "models")) GTEST_SKIP() << "the shared models are missing";
   int loaded = 0;
   for (const std::filesystem::path& path : GltfFilesUnder(kAssets / "models")) {
     const std::string sentence = Refusal(path);
-    // A model may be here without one of its files; the sentence must then name a file that is truly missing.
+    // The shared folder may lack one of a model's files; the message must then name a missing file.
     const std::size_t quote = sentence.find('\'');
-    if (quote != std::string::npos && sentence.ends_with("which is not there.")) {
+    if (quote != std::string::npos && sentence.ends_with("which does not exist.")) {
       const std::string missing = sentence.substr(quote + 1, sentence.find('\'', quote + 1) - quote - 1);
       EXPECT_FALSE(std::filesystem::exists(path.parent_path() / missing)) << sentence;
       continue;
@@ -100,9 +101,9 @@ TEST(GltfFiles, EveryModelLoads) {
   EXPECT_GT(loaded, 10);
 }
 
-TEST(GltfFiles, EveryEdgeCaseLoadsOrIsRefusedInOneSentence) {
+TEST(GltfFiles, EveryEdgeCaseLoadsOrThrowsAClearError) {
   if (!std::filesystem::exists(kAssets / "gltf-edge-cases"))
-    GTEST_SKIP() << "the shared edge cases are not here";
+    GTEST_SKIP() << "the shared edge cases are missing";
   int refused = 0, loaded = 0;
   for (const std::filesystem::path& path : GltfFilesUnder(kAssets / "gltf-edge-cases")) {
     const std::string sentence = Refusal(path);
@@ -119,7 +120,7 @@ TEST(GltfFiles, EveryEdgeCaseLoadsOrIsRefusedInOneSentence) {
   EXPECT_GT(loaded, 100);
 }
 
-// Codes of Khronos' validator for numbers that would lead a reader outside its data.
+// Codes of the Khronos validator for numbers that would make a reader access data out of range.
 bool IsAboutRange(const std::string& code) {
   static const std::set<std::string> codes = {"UNRESOLVED_REFERENCE",
                                               "VALUE_NOT_IN_RANGE",
@@ -177,10 +178,10 @@ bool IsAboutRange(const std::string& code) {
   return codes.contains(code);
 }
 
-// Cases where Docent differs from the validator on purpose.
+// Cases where Docent intentionally differs from the validator.
 bool DiffersOnPurpose(const std::string& file) {
   static const std::map<std::string, std::string> reasons = {
-      // accepted: the fault lies where nothing is read from
+      // Accepted: the error is in data that is not read.
       {"accessor_data/invalid_elements_float.gltf", "no mesh uses the accessor"},
       {"buffer_view/invalid_stride_wrong_target.gltf", "nothing uses the view"},
       {"image/invalid_data_uri_mime_type.gltf", "no texture shows the images"},
@@ -188,12 +189,12 @@ bool DiffersOnPurpose(const std::string& file) {
       {"image/png_eos.gltf", "no texture shows the image"},
       {"mesh_data/joints_weights_complex.gltf", "the second set of joints is left out"},
       {"root/extensions_non_objects.gltf", "extensions of these names are not read"},
-      // accepted: harmless
+      // Accepted: harmless.
       {"json/bom.gltf", "a byte order mark before the JSON text"},
       {"animation_data/invalid_input_values.gltf", "times before zero and equal times occur in real files"},
       {"glb/bom.glb", "a byte order mark before the JSON text"},
       {"buffer/no_bin_chunk.glb", "nothing uses the missing buffer"},
-      // refused although valid
+      // Rejected although valid.
       {"accessor/valid.gltf", "its buffer has no bytes"},
       {"json/integer_written_as_float.gltf", "its buffer has no bytes"},
       {"root/named_objects.gltf", "its buffer has no bytes"},
@@ -203,7 +204,7 @@ bool DiffersOnPurpose(const std::string& file) {
       {"buffer/non_relative_uri.gltf", "points to another machine"},
       {"mesh/valid.gltf", "indices without a buffer view, which tinygltf does not read"},
   };
-  // Objects of these extensions are not read at all, so that nothing in them can be out of range.
+  // Objects of these extensions are not read, so nothing in them can be out of range.
   for (const char* unread :
        {"KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_dispersion", "KHR_materials_ior",
         "KHR_materials_specular", "KHR_materials_variants", "KHR_materials_volume"}) {
@@ -213,9 +214,9 @@ bool DiffersOnPurpose(const std::string& file) {
                      [&](const auto& entry) { return file.ends_with(entry.first); });
 }
 
-TEST(GltfFiles, WhatKhronosFindsOutOfRangeIsRefusedAndWhatItFindsValidLoads) {
+TEST(GltfFiles, AgreesWithTheKhronosValidatorOnRangesAndValidFiles) {
   const std::filesystem::path folder = kAssets / "gltf-edge-cases" / "khronos_validator" / "test";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the validator's cases are not here";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the validator's cases are missing";
   int out_of_range = 0, out_of_range_refused = 0, other_errors = 0, other_refused = 0, valid = 0,
       valid_loaded = 0, on_purpose = 0;
   for (const std::filesystem::path& path : GltfFilesUnder(folder)) {

@@ -11,14 +11,14 @@
 #include "content/gltf_loader.h"
 #include "engine/base/error.h"
 
-// Small glTF files for tests, built in memory and easily damaged.
+// Small glTF files for tests, built in memory and easy to damage.
 namespace docent::content {
 
 struct GltfFile {
   nlohmann::json json = {{"asset", {{"version", "2.0"}}}};
   std::vector<std::uint8_t> bin;
 
-  // Appends one entry to an array of the root and returns its index.
+  // Appends an entry to an array of the root and returns its index.
   int Add(const char* array, nlohmann::json entry) {
     if (!json.contains(array)) json[array] = nlohmann::json::array();
     json[array].push_back(std::move(entry));
@@ -59,7 +59,7 @@ struct GltfFile {
     return LoadGltf("test.glb", Glb(), std::nullopt, limits).model;
   }
 
-  // The sentence with which the file is refused, empty when it is not.
+  // Returns the error message for the file, or an empty text when it loads.
   std::string Refusal(const LoadLimits& limits = {}) const {
     try {
       Load(limits);
@@ -70,7 +70,7 @@ struct GltfFile {
   }
 };
 
-// One triangle (0,0,0) (1,0,0) (0,1,0) without normals, shown by node 0.
+// One triangle (0,0,0) (1,0,0) (0,1,0) without normals, referenced by node 0.
 inline GltfFile TriangleFile() {
   GltfFile file;
   const int positions = file.AddFloats({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3", 3);

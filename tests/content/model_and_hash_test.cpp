@@ -14,8 +14,8 @@ std::string HashOf(const std::string& text) {
   return Sha256Hex({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
-TEST(Sha256, GivesTheDigestsOfItsStandard) {
-  // FIPS 180-4's examples (NIST, "Examples with intermediate values"), and the empty message.
+TEST(Sha256, MatchesTheExamplesOfTheStandard) {
+  // The examples of FIPS 180-4 (NIST, "Examples with intermediate values"), and the empty message.
   EXPECT_EQ(HashOf(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   EXPECT_EQ(HashOf("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(HashOf("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
@@ -24,7 +24,7 @@ TEST(Sha256, GivesTheDigestsOfItsStandard) {
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
-TEST(Sha256, EveryLengthAroundABlockIsPaddedDifferently) {
+TEST(Sha256, PadsEveryLengthAroundABlockDifferently) {
   std::string previous;
   for (std::size_t length = 50; length < 140; ++length) {
     const std::string hash = HashOf(std::string(length, 'x'));
@@ -34,7 +34,7 @@ TEST(Sha256, EveryLengthAroundABlockIsPaddedDifferently) {
   }
 }
 
-TEST(Asset, AGlbIsKeptByteForByteAndNamedByItsHash) {
+TEST(Asset, AGlbIsKeptExactlyAndIdentifiedByItsHash) {
   const std::vector<std::uint8_t> glb = TriangleFile().Glb();
   const Asset asset = AssetFromGlb("triangle.glb", glb);
   EXPECT_EQ(asset.glb, glb);

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// Points spread evenly over a patch: centre + [-half, half] along each of two directions, with noise along
-// the third.
+// Points distributed uniformly over a patch: centre + [-half, half] along each of two directions, with noise
+// along the third.
 std::vector<Eigen::Vector3d> Patch(const Eigen::Vector3d& centre, const Eigen::Vector3d& side1,
                                    const Eigen::Vector3d& side2, int count, double noise, Random* random) {
   const Eigen::Vector3d normal = side1.cross(side2).normalized();
@@ -31,7 +31,7 @@ void Append(const std::vector<Eigen::Vector3d>& more, std::vector<Eigen::Vector3
   points->insert(points->end(), more.begin(), more.end());
 }
 
-TEST(FindSurface, HitsASlantedPlaneWhereTheRayMeetsIt) {
+TEST(FindSurface, HitsASlantedPlaneAtItsIntersectionWithTheRay) {
   Random random(1);
   for (int trial = 0; trial < 50; ++trial) {
     const Eigen::Vector3d normal =
@@ -51,20 +51,20 @@ TEST(FindSurface, HitsASlantedPlaneWhereTheRayMeetsIt) {
   }
 }
 
-TEST(FindSurface, TakesTheNearestOfTwoSurfacesThatTheRayGoesThrough) {
+TEST(FindSurface, UsesTheNearestOfTwoSurfacesOnTheRay) {
   Random random(2);
   std::vector<Eigen::Vector3d> points = Patch({0, 0, 3}, {2, 0, 0}, {0, 2, 0}, 1500, 0.005, &random);
   Append(Patch({0, 0, 1}, {0.1, 0, 0}, {0, 0.1, 0}, 60, 0.002, &random), &points);
   const SurfaceResult front = FindSurface(points, Eigen::Vector3d::Zero(), {0, 0, 1});
   ASSERT_TRUE(front.hit.has_value());
   EXPECT_NEAR(front.hit->point.z(), 1, 0.02);
-  // Past the edge of the near one the wall is seen.
+  // Beyond the edge of the near surface the wall is visible.
   const SurfaceResult beside = FindSurface(points, Eigen::Vector3d::Zero(), {0.14, 0, 1});
   ASSERT_TRUE(beside.hit.has_value());
   EXPECT_NEAR(beside.hit->point.z(), 3, 0.05);
 }
 
-TEST(FindSurface, OutliersDoNotMoveThePlane) {
+TEST(FindSurface, IsRobustToOutliers) {
   Random random(3);
   std::vector<Eigen::Vector3d> points = Patch({0, 0, 2}, {0.5, 0, 0}, {0, 0.5, 0.2}, 400, 0.004, &random);
   for (int i = 0; i < 40; ++i) {
@@ -76,7 +76,7 @@ TEST(FindSurface, OutliersDoNotMoveThePlane) {
   EXPECT_NEAR(result.hit->point.z(), 2, 0.03);
 }
 
-TEST(FindSurface, AFewPointsGiveTheirMedianDepth) {
+TEST(FindSurface, UsesTheMedianDepthOfFewPoints) {
   const std::vector<Eigen::Vector3d> points = {{0.01, 0, 2.0}, {-0.01, 0.01, 2.1}, {0, -0.01, 2.05}};
   const SurfaceResult result = FindSurface(points, Eigen::Vector3d::Zero(), {0, 0, 2});
   ASSERT_TRUE(result.hit.has_value());
@@ -85,19 +85,22 @@ TEST(FindSurface, AFewPointsGiveTheirMedianDepth) {
   EXPECT_DOUBLE_EQ(result.hit->normal.z(), -1);
 }
 
-TEST(FindSurface, SaysWhyThereIsNone) {
+TEST(FindSurface, GivesTheReasonWhenThereIsNoHit) {
   const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), ahead(0, 0, 1);
   EXPECT_FALSE(FindSurface({}, origin, ahead).hit.has_value());
   const std::vector<Eigen::Vector3d> behind = {{0, 0, -1}, {0, 0, -2}, {0.1, 0, -1}, {0, 0.1, -1}};
-  EXPECT_EQ(FindSurface(behind, origin, ahead).reason, "The map has no point near this pixel.");
+  EXPECT_EQ(FindSurface(behind, origin, ahead).reason,
+            "The map has no points near this pixel; choose a place with more detail.");
   const std::vector<Eigen::Vector3d> aside = {{1, 0, 1}, {1, 0.1, 1}, {1, 0, 1.1}};
-  EXPECT_EQ(FindSurface(aside, origin, ahead).reason, "The map has no point near this pixel.");
+  EXPECT_EQ(FindSurface(aside, origin, ahead).reason,
+            "The map has no points near this pixel; choose a place with more detail.");
   const std::vector<Eigen::Vector3d> two = {{0, 0, 1}, {0.01, 0, 1}};
-  EXPECT_EQ(FindSurface(two, origin, ahead).reason, "The map has too few points near this pixel.");
-  EXPECT_EQ(FindSurface(two, origin, Eigen::Vector3d::Zero()).reason, "The pixel has no ray.");
+  EXPECT_EQ(FindSurface(two, origin, ahead).reason,
+            "The map has too few points near this pixel; choose a place with more detail.");
+  EXPECT_EQ(FindSurface(two, origin, Eigen::Vector3d::Zero()).reason, "The lens has no ray for this pixel.");
 }
 
-TEST(FindSurface, DoesNotDependOnScaleOrPlaceOfTheMap) {
+TEST(FindSurface, IsInvariantToScaleAndPoseOfTheMap) {
   Random random(5);
   const auto points = Patch({0, 0, 2}, {0.5, 0, 0.1}, {0, 0.5, 0.2}, 300, 0.004, &random);
   const SurfaceResult first = FindSurface(points, Eigen::Vector3d::Zero(), {0, 0, 1});
@@ -114,7 +117,7 @@ TEST(FindSurface, DoesNotDependOnScaleOrPlaceOfTheMap) {
   EXPECT_GT((b_from_a.rotation * first.hit->normal).dot(second.hit->normal), 0.999);
 }
 
-TEST(UprightPose, StandsUprightWithItsFootOnThePointAndItsFrontOffTheWall) {
+TEST(UprightPose, IsUprightWithItsFootOnThePointAndFacesAwayFromTheWall) {
   Random random(7);
   for (int trial = 0; trial < 100; ++trial) {
     const auto any = [&] {
@@ -130,14 +133,14 @@ TEST(UprightPose, StandsUprightWithItsFootOnThePointAndItsFrontOffTheWall) {
     if (level.norm() > 0.5) {
       EXPECT_GT((pose.rotation * Eigen::Vector3d::UnitZ()).dot(level.normalized()), 1 - 1e-9);
     }
-    // Yaw turns about up: a quarter brings the front to where the model's x axis was.
+    // Yaw rotates about up: 90 degrees take the front to the previous direction of the model's x axis.
     const engine::Sim3 turned = UprightPose(point, normal, up, kPi / 2, 0.25);
     EXPECT_LT((turned.rotation * Eigen::Vector3d::UnitZ() - pose.rotation * Eigen::Vector3d::UnitX()).norm(),
               1e-9);
   }
 }
 
-TEST(UprightPose, WithoutAnUpTheSurfaceIsTheGround) {
+TEST(UprightPose, UsesTheSurfaceNormalWithoutAnUpDirection) {
   const Eigen::Vector3d normal(0.6, 0, -0.8);
   const engine::Sim3 pose = UprightPose({1, 2, 3}, normal, Eigen::Vector3d::Zero(), 0, 1);
   EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitY() - normal).norm(), 1e-9);

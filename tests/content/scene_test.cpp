@@ -64,7 +64,7 @@ TEST(Scene, FreeNamesCountUpwards) {
   EXPECT_EQ(scene.Find("dog"), nullptr);
 }
 
-TEST(SceneCodec, WhatIsWrittenReadsBackToTheSameNumbers) {
+TEST(SceneCodec, DecodingReproducesTheNumbersExactly) {
   const Scene scene = TestScene();
   const std::string text = EncodeScene(scene);
   EXPECT_THAT(SceneAssetIds(text), ElementsAre("abc"));
@@ -89,7 +89,7 @@ TEST(SceneCodec, WhatIsWrittenReadsBackToTheSameNumbers) {
   EXPECT_TRUE(DecodeScene(EncodeScene(Scene{}), "the library", Known()).entities.empty());
 }
 
-TEST(SceneCodec, EveryChangedMemberIsRefusedWithItsPlace) {
+TEST(SceneCodec, InvalidMembersAreRejectedWithTheirLocation) {
   const nlohmann::json good = nlohmann::json::parse(EncodeScene(TestScene()));
   const auto with = [&](const char* pointer, const nlohmann::json& value) {
     nlohmann::json changed = good;
@@ -98,7 +98,7 @@ TEST(SceneCodec, EveryChangedMemberIsRefusedWithItsPlace) {
   };
   EXPECT_EQ(Refusal(good.dump()), "");
   EXPECT_THAT(with("/docent_scene", 2), HasSubstr("newer version"));
-  EXPECT_THAT(with("/entities/0/asset", "xyz"), HasSubstr("entities[0] shows the asset xyz"));
+  EXPECT_THAT(with("/entities/0/asset", "xyz"), HasSubstr("entities[0] uses the asset xyz"));
   EXPECT_THAT(with("/entities/0/kind", "lamp"), HasSubstr("neither a model nor a signpost"));
   EXPECT_THAT(with("/entities/0/animation", 0.5), HasSubstr("entities[0].animation"));
   EXPECT_THAT(with("/entities/0/map_from_model/scale", 0), HasSubstr("map_from_model.scale"));
@@ -118,7 +118,7 @@ TEST(SceneCodec, EveryChangedMemberIsRefusedWithItsPlace) {
   EXPECT_THAT(Refusal("{"), HasSubstr("not valid JSON"));
 }
 
-TEST(SceneCodec, EveryMissingMemberIsRefused) {
+TEST(SceneCodec, MissingMembersAreRejected) {
   const nlohmann::json good = nlohmann::json::parse(EncodeScene(TestScene()));
   int removed = 0;
   for (std::size_t entity = 0; entity < 2; ++entity) {

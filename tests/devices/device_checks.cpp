@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs as the only program of an emulated machine (run_in_qemu.sh): cameras by the kernel's vivid and
-// v4l2loopback drivers. The machine is slow, so nothing here is about speed.
+// Runs as the only program of an emulated machine (run_in_qemu.sh), with cameras provided by the kernel's
+// vivid and v4l2loopback drivers. The machine is slow, so that no test measures speed.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ using ::testing::IsEmpty;
 
 constexpr char kVivid[] = "/dev/video0", kLoopback[] = "/dev/video9";
 
-// Open files of the process and mapped memory of devices: what a leak would raise.
+// The open device files and mapped device memory of the process, to detect leaks.
 std::vector<std::string> HeldDevices() {
   std::vector<std::string> held;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
@@ -44,12 +44,12 @@ std::vector<std::string> HeldDevices() {
   return held;
 }
 
-// Sets a control of vivid by the driver's name for it.
+// Sets a control of vivid by its name in the driver.
 void SetByName(const std::string& name, std::int64_t value) {
   const auto system = MakeDeviceSystem();
   const int file = system->Open(kVivid);
   ASSERT_GE(file, 0);
-  // Buttons have no value and are missing from the list; so the names are asked for here.
+  // Button controls have no value and are missing from the device description, so the names are queried here.
   v4l2_queryctrl query{};
   query.id = V4L2_CTRL_FLAG_NEXT_CTRL;
   bool found = false;
@@ -71,7 +71,7 @@ CameraOptions Options(std::uint32_t pixel_format) {
   return options;
 }
 
-// Fetches images and checks what holds for all of them. Answers with the last one.
+// Fetches images, checks their sizes, times, indices and counters, and returns the last frame.
 engine::Frame Fetch(FrameSource* source, int count) {
   engine::Frame frame;
   std::optional<Timestamp> time;
@@ -93,7 +93,7 @@ engine::Frame Fetch(FrameSource* source, int count) {
   return frame;
 }
 
-TEST(Vivid, IsListedWithFormatsAndControls) {
+TEST(Vivid, ListsFormatsAndControls) {
   const auto devices = ListDevices(MakeDeviceSystem().get());
   ASSERT_FALSE(devices.empty());
   EXPECT_EQ(devices.front().path, kVivid);
@@ -110,21 +110,21 @@ TEST(Vivid, IsListedWithFormatsAndControls) {
   EXPECT_THAT(HeldDevices(), IsEmpty());
 }
 
-TEST(Vivid, DeliversSixtyYuyvImagesInOrderAndIsLetGoOf) {
+TEST(Vivid, DeliversSixtyYuyvImagesInOrderAndReleasesTheDevice) {
   {
     const auto source = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
     Fetch(source.get(), 60);
     EXPECT_EQ(source->delivery().delivered, 60u);
     EXPECT_EQ(source->delivery().broken, 0u);
-    // The stamps are of the clock that the latency is measured with.
+    // The time stamps come from the clock that the latency is measured with.
     EXPECT_LT(source->delivery().median_latency, std::chrono::seconds(20));
     EXPECT_FALSE(HeldDevices().empty());
   }
   EXPECT_THAT(HeldDevices(), IsEmpty());
 }
 
-// The same test image must come out of every pixel format. Its lower part has no text in it.
-TEST(Vivid, LooksTheSameInEveryPixelFormat) {
+// Every pixel format must give the same test image. Its lower part contains no text.
+TEST(Vivid, GivesTheSameImageInEveryPixelFormat) {
   const cv::Rect bars(0, 300, 640, 100);
   const auto column_means = [&](std::uint32_t pixel_format) {
     const auto source = OpenDevice(kVivid, Options(pixel_format));
@@ -138,34 +138,34 @@ TEST(Vivid, LooksTheSameInEveryPixelFormat) {
   EXPECT_LT(cv::norm(yuyv, nv12, cv::NORM_L1) / (640 * 3), 3);
   double darkest = 0, brightest = 0;
   cv::minMaxLoc(yuyv.reshape(1), &darkest, &brightest);
-  EXPECT_GT(brightest - darkest, 100);  // colour bars, no grey field
+  EXPECT_GT(brightest - darkest, 100);  // colour bars, not a uniform image
   const cv::Mat grey = column_means(V4L2_PIX_FMT_GREY);
   ASSERT_EQ(grey.type(), CV_32FC1);
   cv::Mat expected;
   cv::transform(yuyv, expected, cv::Matx13f(0.114f, 0.587f, 0.299f));
-  // Device luma may be limited to 16-235, so the two agree up to a straight line.
+  // Device luma may be limited to 16-235, so the two agree up to a linear function.
   cv::Scalar mean_a, deviation_a, mean_b, deviation_b;
   cv::meanStdDev(grey, mean_a, deviation_a);
   cv::meanStdDev(expected, mean_b, deviation_b);
   const double correlation =
       cv::mean((grey - mean_a).mul(expected - mean_b))[0] / (deviation_a[0] * deviation_b[0]);
-  EXPECT_GT(correlation, 0.95);  // colours outside the screen's range are clipped
+  EXPECT_GT(correlation, 0.95);  // colours outside the displayable range are clipped
 }
 
-TEST(Vivid, ThatDropsThreeImagesInTenIsCountedRightly) {
+TEST(Vivid, CountsDroppedImages) {
   SetByName("Percentage of Dropped Buffers", 30);
   {
     const auto source = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
     Fetch(source.get(), 60);
     const Delivery delivery = source->delivery();
-    // A slow machine may add to the driver's own three in ten, but never take from them: with 60 delivered
-    // about 26 are dropped, and fewer than 8 with a probability below one in ten thousand.
+    // The driver drops three images in ten, and a slow machine may drop more. With 60 delivered images about
+    // 26 are dropped, and fewer than 8 with a probability below one in ten thousand.
     EXPECT_GE(delivery.missed, 8u);
   }
   SetByName("Percentage of Dropped Buffers", 0);
 }
 
-TEST(Vivid, ThatMarksAnImageAsBrokenIsPassedOver) {
+TEST(Vivid, SkipsABrokenImage) {
   const auto source = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
   Fetch(source.get(), 2);
   SetByName("Inject V4L2_BUF_FLAG_ERROR", 1);
@@ -173,7 +173,7 @@ TEST(Vivid, ThatMarksAnImageAsBrokenIsPassedOver) {
   EXPECT_EQ(source->delivery().broken, 1u);
 }
 
-TEST(Vivid, GivesTheNewestImageToASlowReader) {
+TEST(Vivid, DeliversTheNewestImageToASlowReader) {
   const auto source = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
   Fetch(source.get(), 2);
   std::this_thread::sleep_for(std::chrono::seconds(1));
@@ -181,7 +181,7 @@ TEST(Vivid, GivesTheNewestImageToASlowReader) {
   EXPECT_GE(source->delivery().late, 1u);
 }
 
-TEST(Vivid, ThatIsUnpluggedSaysSo) {
+TEST(Vivid, ReportsThatItWasUnplugged) {
   const auto source = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
   Fetch(source.get(), 2);
   SetByName("Disconnect", 1);
@@ -196,12 +196,12 @@ TEST(Vivid, ThatIsUnpluggedSaysSo) {
   EXPECT_THAT(HeldDevices(), IsEmpty());
 }
 
-TEST(Vivid, ThatIsUnpluggedAndPluggedInAgainGoesOn) {
+TEST(Vivid, ContinuesAfterReconnection) {
   CameraOptions options = Options(V4L2_PIX_FMT_YUYV);
   options.reconnect = true;
   const auto source = OpenDevice(kVivid, options);
   const engine::Frame before = Fetch(source.get(), 5);
-  // vivid comes back when its last user has let go of it: this one holds it away.
+  // vivid reappears only after its last user has closed it, so that this open file keeps it unplugged.
   const int holder = open(kVivid, O_RDWR);
   ASSERT_GE(holder, 0);
   SetByName("Disconnect", 1);
@@ -220,7 +220,7 @@ TEST(Vivid, ThatIsUnpluggedAndPluggedInAgainGoesOn) {
   EXPECT_EQ(source->delivery().reconnections, 1);
 }
 
-TEST(Vivid, HasItsAutomaticGainHeldAndGivenBack) {
+TEST(Vivid, LocksTheAutomaticGainAndRestoresIt) {
   const auto gain = [] {
     const auto system = MakeDeviceSystem();
     const int file = system->Open(kVivid);
@@ -241,9 +241,9 @@ TEST(Vivid, HasItsAutomaticGainHeldAndGivenBack) {
   EXPECT_EQ(gain(), 1);
 }
 
-constexpr int kNumbers = 64;
+constexpr int kNumbers = 64;  // six bits
 
-// An image whose grey levels tell its number.
+// An image that encodes a number as six black or white stripes.
 cv::Mat Numbered(int number) {
   cv::Mat image(480, 640, CV_8UC3, cv::Scalar::all(30));
   for (int bit = 0; bit < 6; ++bit) {
@@ -260,7 +260,7 @@ int NumberOf(const cv::Mat& image) {
   return number;
 }
 
-// Feeds Motion-JPEG into the loopback device until it ends.
+// Feeds Motion-JPEG images into the loopback device until destruction.
 class JpegFeeder {
  public:
   JpegFeeder() : file_(open(kLoopback, O_RDWR)) {
@@ -315,11 +315,11 @@ TEST(Loopback, DeliversSixtyMotionJpegImagesInOrder) {
     if (last >= 0) steps.push_back((number - last + kNumbers) % kNumbers);
     last = number;
   }
-  // In order, and none twice; where a slow machine left some out, still forwards.
+  // The images must be in order without repetition; a slow machine may skip some.
   for (const int step : steps) EXPECT_TRUE(step >= 1 && step < kNumbers / 2) << step;
 }
 
-TEST(Devices, WorkSideBySide) {
+TEST(Devices, WorkInParallel) {
   const JpegFeeder feeder;
   const auto jpeg = OpenDevice(kLoopback, Options(V4L2_PIX_FMT_MJPEG));
   const auto yuyv = OpenDevice(kVivid, Options(V4L2_PIX_FMT_YUYV));
@@ -328,7 +328,7 @@ TEST(Devices, WorkSideBySide) {
   other.join();
 }
 
-TEST(Devices, SurviveStartsStopsAndUnpluggingInRandomOrder) {
+TEST(Devices, HandleStartsStopsAndUnpluggingInRandomOrder) {
   Random random(7);
   for (int round = 0; round < 12; ++round) {
     CameraOptions options = Options(random.Below(2) == 0 ? V4L2_PIX_FMT_YUYV : V4L2_PIX_FMT_NV12);

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Boots Debian's kernel in QEMU with its virtual video devices and runs a program in it:
 #   run_in_qemu.sh PROGRAM FOLDER
-# FOLDER is what prepare_kernel.sh leaves. The program finds vivid's camera as /dev/video0 and v4l2loopback's as
-# /dev/video9; its exit status is this script's. Status 77 (skipped) where QEMU or the kernel is missing, with CI=true
-# a failure: a check that nobody runs is none.
+# FOLDER is the output folder of prepare_kernel.sh. The program finds vivid's camera as /dev/video0 and v4l2loopback's
+# as /dev/video9. The exit status is that of the program, or 77 (skipped) where QEMU or the kernel is missing. With
+# CI=true that is a failure, so that the check is never skipped silently.
 set -euo pipefail
 readonly program=$(realpath "$1") folder=$2
 
@@ -51,7 +51,7 @@ INIT
 chmod +x "$root/init"
 (cd "$root" && find . | cpio --create --format=newc --quiet) >"$work/disk.cpio"
 
-# Emulated, so that it runs the same with and without hardware support.
+# Full emulation behaves the same with and without hardware support.
 timeout 300 qemu-system-x86_64 -accel tcg -cpu max -smp 2 -m 1024 -nographic -no-reboot -nodefaults -serial stdio \
   -kernel "$folder/vmlinuz" -initrd "$work/disk.cpio" \
   -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr random.trust_cpu=on tsc=unstable" \

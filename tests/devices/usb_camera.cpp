@@ -24,9 +24,9 @@ constexpr int kPort = 0;
 constexpr std::uint32_t kDevice = 0x00010002, kSubmit = 1, kUnlink = 2, kReturnSubmit = 3, kReturnUnlink = 4;
 constexpr std::size_t kPayloadBytes = 16384, kPayloadHeaderBytes = 2;
 constexpr std::size_t kImageBytes = UsbCamera::kWidth_px * UsbCamera::kHeight_px * 2;
-constexpr std::uint32_t kInterval = 400000;  // of 100 ns: 25 images a second
+constexpr std::uint32_t kInterval = 400000;  // in units of 100 ns: 25 images per second
 
-// Little endian, as USB has it.
+// Appends a little-endian value, the byte order of USB.
 void Put(Bytes* bytes, std::uint32_t value, int size) {
   for (int i = 0; i < size; ++i) bytes->push_back(static_cast<std::uint8_t>(value >> (8 * i)));
 }
@@ -50,12 +50,11 @@ Bytes DeviceDescriptor() {
 }
 
 Bytes ConfigurationDescriptor() {
-  Bytes control = {13, 0x24, 1, 0x00, 0x01, 13 + 18 + 9, 0, 0x00, 0x6C, 0xDC, 0x02, 1,
-                   1,  // header: one streaming
-                       // interface
-                   18, 0x24, 2, 1, 0x01, 0x02, 0, 0, 0, 0, 0, 0, 0, 0, 3, 0x00, 0x08,
-                   0x00,                                 // camera with absolute pan, tilt
-                   9, 0x24, 3, 2, 0x01, 0x01, 0, 1, 0};  // to USB
+  Bytes control = {13,   0x24, 1, 0x00, 0x01, 13 + 18 + 9, 0, 0x00, 0x6C, 0xDC, 0x02, 1,
+                   1,  // header: one streaming interface
+                   18,   0x24, 2, 1,    0x01, 0x02,        0, 0,    0,    0,    0,    0, 0, 0, 3, 0x00, 0x08,
+                   0x00,                                                 // camera with absolute pan and tilt
+                   9,    0x24, 3, 2,    0x01, 0x01,        0, 1,    0};  // output to USB
   Bytes streaming = {14,   0x24, 1,    1,    14 + 27 + 30, 0,   0x81, 0,   2, 0, 0,    0,  1,    0, 27,
                      0x24, 4,    1,    1,    'Y',          'U', 'Y',  '2', 0, 0, 0x10, 0,  0x80, 0, 0,
                      0xAA, 0,    0x38, 0x9B, 0x71,         16,  1,    0,   0, 0, 0,    30, 0x24, 5, 1,
@@ -68,13 +67,13 @@ Bytes ConfigurationDescriptor() {
   Put(&streaming, kInterval, 4);
   Put(&streaming, 1, 1);
   Put(&streaming, kInterval, 4);
-  Bytes all = {9, 2,  0, 0, 2,    1,    0, 0x80, 50,  // two interfaces, from the bus's power
-               8, 11, 0, 2, 0x0E, 3,    0, 0,         // which make one video function
+  Bytes all = {9, 2,  0, 0, 2,    1,    0, 0x80, 50,  // two interfaces, bus-powered
+               8, 11, 0, 2, 0x0E, 3,    0, 0,         // interface association: one video function
                9, 4,  0, 0, 0,    0x0E, 1, 0,    0};
   Append(&all, control);
   Append(&all, {9, 4, 1, 0, 1, 0x0E, 2, 0, 0});
   Append(&all, streaming);
-  Append(&all, {7, 5, 0x81, 2, 0x00, 0x02, 0});  // bulk, 512 bytes a packet
+  Append(&all, {7, 5, 0x81, 2, 0x00, 0x02, 0});  // bulk, 512 bytes per packet
   all[2] = static_cast<std::uint8_t>(all.size());
   all[3] = static_cast<std::uint8_t>(all.size() >> 8);
   return all;
@@ -89,7 +88,7 @@ Bytes StringDescriptor(std::uint8_t index) {
   return bytes;
 }
 
-// What the streaming interface agrees to: its one format, size and rate.
+// The streaming parameters: the only format, size and rate.
 Bytes Probe() {
   Bytes bytes;
   Put(&bytes, 1, 2);
@@ -102,10 +101,10 @@ Bytes Probe() {
   return bytes;
 }
 
-void Tell(const char* file, const std::string& words) {
+void WriteToController(const char* file, const std::string& text) {
   std::ofstream out(std::string(kController) + file);
-  out << words << std::flush;
-  if (!out) throw std::runtime_error("vhci_hcd refuses '" + words + "' in " + file);
+  out << text << std::flush;
+  if (!out) throw std::runtime_error("vhci_hcd rejects '" + text + "' in " + file);
 }
 
 bool ReadAll(int file, std::uint8_t* bytes, std::size_t size) {
@@ -118,7 +117,7 @@ bool ReadAll(int file, std::uint8_t* bytes, std::size_t size) {
   return true;
 }
 
-// The video device that the driver has made of this camera, empty while there is none.
+// The video device that the driver has created for this camera; empty while there is none.
 std::string VideoDevice() {
   const auto first_line = [](const std::filesystem::path& path) {
     std::string line;
@@ -128,7 +127,7 @@ std::string VideoDevice() {
   };
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator("/sys/class/video4linux", error)) {
-    // Its second device, for data about the images, has the index 1.
+    // The camera's second device, for metadata, has the index 1.
     if (first_line(entry.path() / "name").starts_with(UsbCamera::kName) &&
         first_line(entry.path() / "index") == "0")
       return "/dev/" + entry.path().filename().string();
@@ -136,7 +135,7 @@ std::string VideoDevice() {
   return {};
 }
 
-// For ten seconds at most.
+// Waits for a condition for ten seconds at most.
 template <typename Condition>
 void WaitFor(const Condition& condition) {
   for (int i = 0; i < 200 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -146,9 +145,9 @@ int PlugIn() {
   int ends[2];
   if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) throw std::runtime_error("no socket");
   constexpr int kHighSpeed = 3;
-  Tell("attach", std::to_string(kPort) + " " + std::to_string(ends[0]) + " " + std::to_string(kDevice) + " " +
-                     std::to_string(kHighSpeed));
-  close(ends[0]);  // the kernel has taken it
+  WriteToController("attach", std::to_string(kPort) + " " + std::to_string(ends[0]) + " " +
+                                  std::to_string(kDevice) + " " + std::to_string(kHighSpeed));
+  close(ends[0]);  // the kernel has its own reference
   return ends[1];
 }
 
@@ -163,15 +162,15 @@ UsbCamera::~UsbCamera() {
   shutdown(device_end_, SHUT_RDWR);
   worker_.Join();
   close(device_end_);
-  // The port is free again when the kernel has seen to all that hung on it.
-  const auto free = [] {
+  // The port becomes free after the kernel has removed all devices on it.
+  const auto port_is_free = [] {
     std::ifstream status(std::string(kController) + "status");
     std::string header, hub, port, state;
     std::getline(status, header);
     status >> hub >> port >> state;
     return state == "004";
   };
-  WaitFor([&] { return free() && VideoDevice().empty(); });
+  WaitFor([&] { return port_is_free() && VideoDevice().empty(); });
 }
 
 std::string UsbCamera::Path() const {
@@ -215,7 +214,7 @@ void UsbCamera::Serve() {
   for (;;) {
     Request request;
     if (!Receive(&request)) return;
-    Answer answer;  // an unlink comes too late: everything is answered at once
+    Answer answer;  // an unlink always comes too late, because every request is answered immediately
     if (request.command == kSubmit) {
       answer = request.endpoint == 0 ? OnControl(request) : NextPayload(request.length);
       if (answer.data.size() > request.length) answer.data.resize(request.length);
@@ -227,12 +226,12 @@ void UsbCamera::Serve() {
 }
 
 UsbCamera::Answer UsbCamera::OnControl(const Request& request) {
-  const std::uint8_t type = request.setup[0], what = request.setup[1];
+  const std::uint8_t type = request.setup[0], request_code = request.setup[1];
   if ((type & 0x60) == 0x20) return OnClassRequest(request);
   constexpr std::uint8_t kGetStatus = 0, kGetDescriptor = 6, kGetConfiguration = 8;
-  if (what == kGetStatus) return {0, {0, 0}};
-  if (what == kGetConfiguration) return {0, {1}};
-  if (what != kGetDescriptor) return {};
+  if (request_code == kGetStatus) return {0, {0, 0}};
+  if (request_code == kGetConfiguration) return {0, {1}};
+  if (request_code != kGetDescriptor) return {};
   switch (request.setup[3]) {
     case 1:
       return {0, DeviceDescriptor()};
@@ -246,31 +245,31 @@ UsbCamera::Answer UsbCamera::OnControl(const Request& request) {
 }
 
 UsbCamera::Answer UsbCamera::OnClassRequest(const Request& request) {
-  const std::uint8_t what = request.setup[1], selector = request.setup[3];
+  const std::uint8_t request_code = request.setup[1], selector = request.setup[3];
   const std::uint8_t interface = request.setup[4], entity = request.setup[5];
   constexpr std::uint8_t kSetCurrent = 0x01, kGetLength = 0x85, kGetInfo = 0x86;
-  if (interface == 0 && entity == 1 && selector == 0x0D) return OnPanTilt(what, request);
+  if (interface == 0 && entity == 1 && selector == 0x0D) return OnPanTilt(request_code, request);
   if (interface == 0 && entity == 0 && selector == 0x02) return {0, {last_error_}};
   if (interface != 1 || entity != 0 || (selector != 1 && selector != 2)) return {-EPIPE, {}};
-  if (what == kSetCurrent) {
+  if (request_code == kSetCurrent) {
     sent_bytes_ = 0;
     return {};
   }
-  if (what == kGetLength) return {0, {static_cast<std::uint8_t>(probe_.size()), 0}};
-  if (what == kGetInfo) return {0, {3}};
+  if (request_code == kGetLength) return {0, {static_cast<std::uint8_t>(probe_.size()), 0}};
+  if (request_code == kGetInfo) return {0, {3}};
   return {0, probe_};
 }
 
-UsbCamera::Answer UsbCamera::OnPanTilt(std::uint8_t what, const Request& request) {
+UsbCamera::Answer UsbCamera::OnPanTilt(std::uint8_t request_code, const Request& request) {
   const auto both = [](std::int32_t pan, std::int32_t tilt) {
     Bytes bytes;
     Put(&bytes, static_cast<std::uint32_t>(pan), 4);
     Put(&bytes, static_cast<std::uint32_t>(tilt), 4);
     return Answer{0, bytes};
   };
-  switch (what) {
+  switch (request_code) {
     case 0x01:  // set
-      last_error_ = refusal_;
+      last_error_ = rejection_code_;
       if (last_error_ != 0 || request.data.size() < 8) return {-EPIPE, {}};
       pan_ = Signed(request.data.data());
       tilt_ = Signed(request.data.data() + 4);
@@ -294,8 +293,8 @@ UsbCamera::Answer UsbCamera::OnPanTilt(std::uint8_t what, const Request& request
   }
 }
 
-// An image goes over in payloads, each with a header that says by a bit which image it is of and whether
-// it ends it. Every image has one grey level, and the next image the next level.
+// An image is sent in payloads. The header bits of a payload say to which image it belongs and whether it is
+// the last one. Every image is uniformly grey, one level brighter than the image before.
 UsbCamera::Answer UsbCamera::NextPayload(std::size_t room) {
   if (sent_bytes_ == 0) std::this_thread::sleep_for(std::chrono::milliseconds(40));
   const std::size_t left = kImageBytes - sent_bytes_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernel's driver for webcams, uvcvideo, on a camera that turns its head; see usb_camera.h.
+// Tests of the kernel's webcam driver, uvcvideo, with a camera that pans and tilts; see usb_camera.h.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ CameraOptions Options() {
   return options;
 }
 
-TEST(Webcam, IsListedWithPanAndTilt) {
+TEST(Webcam, ListsPanAndTiltControls) {
   const UsbCamera camera;
   const std::string path = camera.Path();
   ASSERT_NE(path, "");
@@ -38,7 +38,7 @@ TEST(Webcam, IsListedWithPanAndTilt) {
   EXPECT_THAT(names, ::testing::IsSupersetOf({HasSubstr("Pan"), HasSubstr("Tilt")}));
 }
 
-TEST(Webcam, TurnsItsHeadWhereItIsTold) {
+TEST(Webcam, TurnsItsHeadToTheRequestedAngles) {
   const UsbCamera camera;
   const auto head = OpenDeviceHead(MakeDeviceSystem(), camera.Path());
   ASSERT_TRUE(head);
@@ -46,30 +46,30 @@ TEST(Webcam, TurnsItsHeadWhereItIsTold) {
   EXPECT_NEAR(head->range().highest.tilt_rad, 100 * kDegree, 1e-9);
   head->LookAt({30 * kDegree, -12.4 * kDegree}, FromSeconds(1));
   EXPECT_EQ(camera.pan(), 30 * 3600);
-  EXPECT_EQ(camera.tilt(), -12 * 3600 - 1800) << "half degrees are its steps";
+  EXPECT_EQ(camera.tilt(), -12 * 3600 - 1800) << "its steps are half a degree";
   EXPECT_NEAR(head->At(FromSeconds(100)).tilt_rad, -12.5 * kDegree, 1e-9);
   head->LookAt({170 * kDegree, 0}, FromSeconds(100));
   EXPECT_EQ(camera.pan(), UsbCamera::kHighest);
   EXPECT_EQ(camera.tilt(), 0);
 }
 
-TEST(Webcam, ThatIsNotReadyStaysWhereItIsUntilItIs) {
+TEST(Webcam, KeepsItsHeadStillUntilTheDeviceIsReady) {
   UsbCamera camera;
   const auto head = OpenDeviceHead(MakeDeviceSystem(), camera.Path());
   ASSERT_TRUE(head);
   for (const std::uint8_t code : {1, 4}) {
-    camera.RefuseToTurn(code);
+    camera.RejectMotion(code);
     head->LookAt({20 * kDegree, 0}, FromSeconds(code));
     EXPECT_EQ(camera.pan(), 0);
     EXPECT_NEAR(head->At(FromSeconds(100)).pan_rad, 0, 1e-9);
-    camera.RefuseToTurn(0);
+    camera.RejectMotion(0);
     head->LookAt({20 * kDegree, 0}, FromSeconds(100 + code));
     EXPECT_EQ(camera.pan(), 20 * 3600);
     head->LookAt({}, FromSeconds(200));
   }
 }
 
-TEST(Webcam, ThatIsPulledOutAndPutBackGoesOnAndTurnsAgain) {
+TEST(Webcam, ContinuesAndTurnsItsHeadAfterReconnection) {
   std::optional<UsbCamera> camera(std::in_place);
   const std::string path = camera->Path();
   ASSERT_NE(path, "");
@@ -90,9 +90,9 @@ TEST(Webcam, ThatIsPulledOutAndPutBackGoesOnAndTurnsAgain) {
   for (int i = 0; i < 20 && source->trouble().empty(); ++i) ASSERT_TRUE(source->Next(&frame));
   EXPECT_THAT(source->trouble(), HasSubstr("unplugged"));
   head->LookAt({20 * kDegree, 0}, FromSeconds(1));
-  EXPECT_NEAR(head->At(FromSeconds(100)).pan_rad, 0, 1e-9) << "what is away cannot turn";
+  EXPECT_NEAR(head->At(FromSeconds(100)).pan_rad, 0, 1e-9) << "an unplugged camera cannot turn";
   camera.emplace();
-  ASSERT_EQ(camera->Path(), path) << "everybody has let go of it, so it has its name again";
+  ASSERT_EQ(camera->Path(), path) << "all users have closed it, so that it gets the same name";
   for (int i = 0; i < 50 && !source->trouble().empty(); ++i) ASSERT_TRUE(source->Next(&frame));
   EXPECT_EQ(source->trouble(), "");
   ASSERT_TRUE(source->Next(&frame));

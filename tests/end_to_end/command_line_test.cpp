@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real program, run as a person runs it: what it prints, where, and with which exit status.
+// Tests of the real program's output, errors and exit status.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-TEST(CommandLine, ShowsHelpWithAnExampleForEverySubcommand) {
+TEST(CommandLine, HelpShowsAnExampleForEverySubcommand) {
   const Outcome top = RunDocent({"--help"});
   EXPECT_EQ(top.exit_status, 0);
   EXPECT_THAT(top.errors, IsEmpty());
@@ -72,33 +72,33 @@ TEST(CommandLine, PrintsItsVersion) {
   EXPECT_THAT(outcome.output, StartsWith("docent "));
 }
 
-TEST(CommandLine, AnswersAWrongArgumentWithOneLineAndStatusTwo) {
-  ExpectComplaint({}, 2, "subcommand");
-  ExpectComplaint({"dance"}, 2, "There is no subcommand 'dance' (see docent --help)");
-  ExpectComplaint({"maps"}, 2, "docent maps --help");
-  ExpectComplaint({"maps", "list"}, 2, "--library is required");
-  ExpectComplaint({"maps", "dance"}, 2, "There is no subcommand 'dance'");
-  ExpectComplaint({"maps", "list", "--libary", "x"}, 2, "There is no option '--libary'");
-  ExpectComplaint({"maps", "list", "stray", "--library", "x"}, 2, "'stray' is too much");
-  ExpectComplaint({"maps", "policy", "Desk", "shut", "--library", "x"}, 2, "shut");
-  ExpectComplaint({"maps", "show", "--library", "x"}, 2, "NAME is required");
-  ExpectComplaint({"simulate", "room"}, 2, "--output is required");
-  ExpectComplaint({"simulate", "room", "--output", "x", "--fps", "-3"}, 2, "--fps");
-  ExpectComplaint({"simulate", "room", "--output", "x", "--seed", "many"}, 2, "many");
-  ExpectComplaint({"--quiet", "--verbose", "cameras"}, 2, "excludes");
+TEST(CommandLine, ReportsAWrongArgumentInOneLineWithExitStatusTwo) {
+  ExpectErrorLine({}, 2, "subcommand");
+  ExpectErrorLine({"dance"}, 2, "There is no subcommand 'dance' (see docent --help)");
+  ExpectErrorLine({"maps"}, 2, "docent maps --help");
+  ExpectErrorLine({"maps", "list"}, 2, "--library is required");
+  ExpectErrorLine({"maps", "dance"}, 2, "There is no subcommand 'dance'");
+  ExpectErrorLine({"maps", "list", "--libary", "x"}, 2, "There is no option '--libary'");
+  ExpectErrorLine({"maps", "list", "stray", "--library", "x"}, 2, "Unexpected argument 'stray'");
+  ExpectErrorLine({"maps", "policy", "Desk", "shut", "--library", "x"}, 2, "shut");
+  ExpectErrorLine({"maps", "show", "--library", "x"}, 2, "NAME is required");
+  ExpectErrorLine({"simulate", "room"}, 2, "--output is required");
+  ExpectErrorLine({"simulate", "room", "--output", "x", "--fps", "-3"}, 2, "--fps");
+  ExpectErrorLine({"simulate", "room", "--output", "x", "--seed", "many"}, 2, "many");
+  ExpectErrorLine({"--quiet", "--verbose", "cameras"}, 2, "excludes");
 }
 
-TEST(CommandLine, AnswersAFailureWithOneLineAndStatusOne) {
+TEST(CommandLine, ReportsAFailureInOneLineWithExitStatusOne) {
   const TemporaryFolder folder;
-  ExpectComplaint({"maps", "list", "--library", (folder / "none.docent").string()}, 1, "none.docent");
+  ExpectErrorLine({"maps", "list", "--library", (folder / "none.docent").string()}, 1, "none.docent");
   const auto broken = folder.Write("broken.docent", "this is no database");
-  ExpectComplaint({"maps", "list", "--library", broken.string()}, 1, "broken.docent");
-  ExpectComplaint({"maps", "verify", "--library", broken.string()}, 1, "broken.docent");
-  ExpectComplaint({"content", "list", "--library", broken.string()}, 1, "broken.docent");
+  ExpectErrorLine({"maps", "list", "--library", broken.string()}, 1, "broken.docent");
+  ExpectErrorLine({"maps", "verify", "--library", broken.string()}, 1, "broken.docent");
+  ExpectErrorLine({"content", "list", "--library", broken.string()}, 1, "broken.docent");
   EXPECT_EQ(ReadAll(broken), "this is no database");
-  ExpectComplaint({"simulate", "nowhere", "--output", (folder / "out").string()}, 1, "nowhere");
+  ExpectErrorLine({"simulate", "nowhere", "--output", (folder / "out").string()}, 1, "nowhere");
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
-  ExpectComplaint({"simulate", "room", "--output", (broken / "out").string()}, 1, "broken.docent");
+  ExpectErrorLine({"simulate", "room", "--output", (broken / "out").string()}, 1, "broken.docent");
 }
 
 TEST(CommandLine, ListsCamerasAsTextAndJson) {
@@ -108,7 +108,7 @@ TEST(CommandLine, ListsCamerasAsTextAndJson) {
   EXPECT_TRUE(nlohmann::json::parse(outcome.output).at("cameras").is_array());
 }
 
-TEST(CommandLine, SimulatesASequenceThatTheCamerasRead) {
+TEST(CommandLine, SimulatesASequenceThatCanBeReadBack) {
   const TemporaryFolder folder;
   const Outcome outcome = RunDocent(
       {"simulate", "cylinder:10", "--output", folder.path().string(), "--duration", "0.3", "--seed", "7"});
@@ -135,9 +135,9 @@ TEST(CommandLine, SimulatesASequenceThatTheCamerasRead) {
   EXPECT_EQ(ReadAll(folder / first), ReadAll(again / first));
 }
 
-TEST(CommandLine, CalibratesALensFromAFolderOfImages) {
+TEST(CommandLine, CalibratesACameraFromAFolderOfImages) {
   const TemporaryFolder folder;
-  std::filesystem::create_directory(folder / "pictures");
+  std::filesystem::create_directory(folder / "images");
   const engine::CameraModel truth(engine::LensModel::kFov, {640, 480, 360, 361, 316.4, 244.9}, {0.92});
   const BoardSpec board = ParseBoard("charuco:8x6:30");
   const BoardCamera camera(board, truth);
@@ -147,7 +147,7 @@ TEST(CommandLine, CalibratesALensFromAFolderOfImages) {
     const std::string name = "images/view" + std::to_string(++count) + ".png";
     cv::imwrite((folder / name).string(), camera.Image(pose, &random));
   }
-  const std::string images = (folder / "pictures").string(), output = (folder / "camera.yaml").string();
+  const std::string images = (folder / "images").string(), output = (folder / "camera.yaml").string();
   const Outcome outcome =
       RunDocent({"calibrate", "--camera", images, "--board", "charuco:8x6:30", "--lens", "fov", "--headless",
                  "--output", output, "--print", (folder / "board.pdf").string()});
@@ -156,34 +156,34 @@ TEST(CommandLine, CalibratesALensFromAFolderOfImages) {
   const engine::CameraModel found = ReadCalibration(output);
   EXPECT_NEAR(found.intrinsics().fx / 360, 1, 0.002);
   EXPECT_NEAR(found.intrinsics().cx, 316.4, 0.5);
-  EXPECT_THAT(ReadAll(output), HasSubstr("verdict: \"Good"));
-  // Two images are too few, and what was written stays.
+  EXPECT_THAT(ReadAll(output), HasSubstr("assessment: \"Good"));
+  // Two images are too few; the existing calibration file must stay unchanged.
   for (int i = 3; i <= count; ++i)
     std::filesystem::remove(folder / ("images/view" + std::to_string(i) + ".png"));
   const std::string before = ReadAll(output);
-  ExpectComplaint({"calibrate", "--camera", images, "--headless", "--output", output}, 1, "only 2 images");
+  ExpectErrorLine({"calibrate", "--camera", images, "--headless", "--output", output}, 1, "only 2 images");
   EXPECT_EQ(ReadAll(output), before);
-  ExpectComplaint({"calibrate"}, 2, "--print");
-  ExpectComplaint({"calibrate", "--print", "x.pdf", "--board", "charuco:8"}, 2, "calibration board");
+  ExpectErrorLine({"calibrate"}, 2, "--print");
+  ExpectErrorLine({"calibrate", "--print", "x.pdf", "--board", "charuco:8"}, 2, "calibration board");
 }
 
-TEST(CommandLine, CaresForAnEmptyLibrary) {
+TEST(CommandLine, HandlesAnEmptyLibrary) {
   const TemporaryFolder folder;
   const std::string path = (folder / "museum.docent").string();
   { maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes); }
   EXPECT_THAT(RunDocent({"maps", "list", "--library", path}).output, HasSubstr("no map"));
   const Outcome json = RunDocent({"maps", "list", "--library", path, "--json"});
   EXPECT_TRUE(nlohmann::json::parse(json.output).at("maps").empty());
-  EXPECT_THAT(RunDocent({"maps", "verify", "--library", path}).output, HasSubstr("all is well"));
-  EXPECT_THAT(RunDocent({"content", "list", "--library", path}).output, HasSubstr("Nothing"));
-  ExpectComplaint({"maps", "show", "Desk", "--library", path}, 1, "Desk");
-  ExpectComplaint({"maps", "rename", "Desk", "Kiosk", "--library", path}, 1, "Desk");
-  ExpectComplaint({"maps", "remove", "Desk", "--library", path}, 1, "Desk");
-  ExpectComplaint({"maps", "policy", "Desk", "read-only", "--library", path}, 1, "Desk");
-  ExpectComplaint({"content", "remove", "sign-1", "--map", "Desk", "--library", path}, 1, "Desk");
+  EXPECT_THAT(RunDocent({"maps", "verify", "--library", path}).output, HasSubstr("no problems found"));
+  EXPECT_THAT(RunDocent({"content", "list", "--library", path}).output, HasSubstr("no models or signposts"));
+  ExpectErrorLine({"maps", "show", "Desk", "--library", path}, 1, "Desk");
+  ExpectErrorLine({"maps", "rename", "Desk", "Kiosk", "--library", path}, 1, "Desk");
+  ExpectErrorLine({"maps", "remove", "Desk", "--library", path}, 1, "Desk");
+  ExpectErrorLine({"maps", "policy", "Desk", "read-only", "--library", path}, 1, "Desk");
+  ExpectErrorLine({"content", "remove", "sign-1", "--map", "Desk", "--library", path}, 1, "Desk");
 }
 
-TEST(CommandLine, SendsAMapToAnotherLibraryAndSavesWhatADamagedOneHolds) {
+TEST(CommandLine, ExportsImportsJoinsAndRecoversMaps) {
   const TemporaryFolder folder;
   const std::string path = (folder / "museum.docent").string(), other = (folder / "desk.docent").string();
   {
@@ -195,22 +195,22 @@ TEST(CommandLine, SendsAMapToAnotherLibraryAndSavesWhatADamagedOneHolds) {
   EXPECT_EQ(maps::Library::Open(path, maps::Access::kReadOnly).List().size(), 2u);
   EXPECT_THAT(RunDocent({"maps", "optimize", "--library", path}).output,
               HasSubstr("Desk too small to adjust"));
-  ExpectComplaint({"maps", "join", "Desk", "Desk (2)", "--library", path}, 1, "stay two maps, because");
-  ExpectComplaint({"maps", "join", "Desk", "Desk", "--library", path}, 1, "itself");
-  ExpectComplaint({"maps", "join", "Desk", "Kiosk", "--library", path}, 1, "Kiosk");
+  ExpectErrorLine({"maps", "join", "Desk", "Desk (2)", "--library", path}, 1, "cannot be joined, because");
+  ExpectErrorLine({"maps", "join", "Desk", "Desk", "--library", path}, 1, "itself");
+  ExpectErrorLine({"maps", "join", "Desk", "Kiosk", "--library", path}, 1, "Kiosk");
   for (const char* name : {"desk.ply", "desk.png", "colmap"}) {
     const std::string output = (folder / name).string();
     EXPECT_EQ(RunDocent({"maps", "export", "Desk", "--library", path, "--output", output}).exit_status, 0);
     EXPECT_TRUE(std::filesystem::exists(output));
-    ExpectComplaint({"maps", "export", "Desk", "--library", path, "--output", output}, 1, "exists already");
+    ExpectErrorLine({"maps", "export", "Desk", "--library", path, "--output", output}, 1, "already exists");
   }
   EXPECT_TRUE(std::filesystem::exists(folder / "colmap/points3D.txt"));
-  ExpectComplaint({"maps", "export", "Desk", "--library", path, "--output", (folder / "a.obj").string()}, 1,
-                  "no kind of export");
+  ExpectErrorLine({"maps", "export", "Desk", "--library", path, "--output", (folder / "a.obj").string()}, 1,
+                  "unknown file type");
   const std::string saved = (folder / "saved.docent").string();
   EXPECT_THAT(RunDocent({"maps", "recover", "--library", path, "--output", saved}).output,
-              HasSubstr("2 maps whole and 0 in part"));
-  ExpectComplaint({"maps", "recover", "--library", path, "--output", saved}, 1, "exists already");
+              HasSubstr("2 maps recovered completely and 0 partly"));
+  ExpectErrorLine({"maps", "recover", "--library", path, "--output", saved}, 1, "exists already");
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real program on simulated input: evaluate, author and tour as a person runs them.
+// Tests of the real program on simulated input: evaluate, author and tour.
 #include <gmock/gmock.h>
 #include <signal.h>
 
@@ -28,7 +28,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// A museum of two bays: where it is built and visited, and the script that authors it.
+// A museum of two bays: its simulation, the script that authors it, and the time at which the visits begin.
 struct Museum {
   std::unique_ptr<Simulation> simulation = MakeSimulation("museum:2");
   std::string camera = "sim:museum:2";
@@ -74,7 +74,7 @@ std::vector<std::string> AuthorArguments(const TemporaryFolder& folder, const Mu
           (folder / "author").string()};
 }
 
-TEST(Guide, EvaluatesTwiceInLockstepWithTheSameBytes) {
+TEST(Guide, EvaluationInLockstepIsBitIdenticalOnEveryRun) {
   const TemporaryFolder folder;
   std::vector<std::string> trajectories, events;
   std::vector<std::vector<Row>> frames;
@@ -100,7 +100,7 @@ TEST(Guide, EvaluatesTwiceInLockstepWithTheSameBytes) {
   EXPECT_EQ(events[0], events[1]);
 }
 
-TEST(Guide, TellsTheSpreadOverSeedsAndStartsWhateverTheNumberOfJobs) {
+TEST(Guide, ReportsTheSameDistributionForAnyNumberOfJobs) {
   const TemporaryFolder folder;
   std::vector<std::string> trajectories;
   std::vector<nlohmann::json> rows;
@@ -123,14 +123,14 @@ TEST(Guide, TellsTheSpreadOverSeedsAndStartsWhateverTheNumberOfJobs) {
     EXPECT_EQ(frames.size(), 30u) << "one second";
     trajectories.push_back(ReadAll(run / "trajectory.txt"));
     for (const auto& file : std::filesystem::directory_iterator(run))
-      EXPECT_NE(file.path().extension(), ".png") << "only one run is worth images";
+      EXPECT_NE(file.path().extension(), ".png") << "images are written for a single run only";
     EXPECT_THAT(ReadAll(output / "report.html"), HasSubstr("of each run, sorted"));
   }
   EXPECT_EQ(rows[0], rows[1]);
   EXPECT_EQ(trajectories[0], trajectories[1]);
 }
 
-TEST(Guide, ComparesBothEnginesAndStitchesWhatOneKnowsByTurning) {
+TEST(Guide, ComparesBothEnginesAndStitchesPanoramas) {
   const TemporaryFolder folder;
   const auto output = folder / "report";
   const Outcome outcome = RunDocent(
@@ -144,7 +144,7 @@ TEST(Guide, ComparesBothEnginesAndStitchesWhatOneKnowsByTurning) {
   EXPECT_EQ(report.at("compared").at(0).at("engine"), "sixdof");
   EXPECT_EQ(report.at("compared").at(0).at("keyframes").at("panorama"), 0);
   EXPECT_GT(hybrid.at("keyframes").at("panorama"), 2);
-  // Turned by 90 degrees about a place that it cannot know.
+  // The camera rotates by 90 degrees about its centre, so that its position is undefined.
   EXPECT_GT(hybrid.at("tracked"), 95);
   EXPECT_EQ(hybrid.at("directions_only_frames"), hybrid.at("tracked"));
   EXPECT_TRUE(hybrid.at("ate_rmse_m").is_null());
@@ -165,7 +165,7 @@ TEST(Guide, ComparesBothEnginesAndStitchesWhatOneKnowsByTurning) {
       AllOf(HasSubstr("<h4>hybrid</h4>"), HasSubstr("<h4>sixdof</h4>"), HasSubstr("data:image/png;base64,")));
 }
 
-TEST(Guide, AuthorsMapsThatATourNamesRightlyAndLeavesUntouched) {
+TEST(Guide, AuthorsMapsThatATourRecognizesAndLeavesUnchanged) {
   const TemporaryFolder folder;
   const Museum museum(WriteModel(folder));
   folder.Write("script.txt", museum.script);
@@ -199,7 +199,7 @@ TEST(Guide, AuthorsMapsThatATourNamesRightlyAndLeavesUntouched) {
   EXPECT_THAT(drawn, AllOf(HasSubstr(",Bay 0,exhibit,"), HasSubstr(",Bay 1,sign-1,")));
 }
 
-TEST(Guide, AuthorsWithTwoCamerasInOneMapAndToursWithBoth) {
+TEST(Guide, AuthorsAndToursWithTwoCamerasInOneMap) {
   const TemporaryFolder folder;
   const std::string library = (folder / "room.docent").string(), output = (folder / "out").string();
   folder.Write("walk.txt", std::string("0.2 map new \"Table\"\n"));
@@ -212,7 +212,7 @@ TEST(Guide, AuthorsWithTwoCamerasInOneMapAndToursWithBoth) {
       with_cameras({"author", "--library", library, "--script", (folder / "walk.txt").string(), "--until",
                     "4", "--output", output, "--record", (folder / "view.mp4").string()});
   ASSERT_EQ(authored.exit_status, 0) << authored.errors;
-  const auto joined = [](const std::vector<Row>& rows, const std::string& camera) {
+  const auto localized_ratio = [](const std::vector<Row>& rows, const std::string& camera) {
     int frames = 0, poses = 0;
     for (const Row& row : rows) {
       if (row.at("camera") != camera) continue;
@@ -221,7 +221,8 @@ TEST(Guide, AuthorsWithTwoCamerasInOneMapAndToursWithBoth) {
     }
     return frames > 0 ? static_cast<double>(poses) / frames : 0;
   };
-  for (const char* camera : {"0", "1"}) EXPECT_GT(joined(ReadFrames(folder / "out/frames.csv"), camera), 0.8);
+  for (const char* camera : {"0", "1"})
+    EXPECT_GT(localized_ratio(ReadFrames(folder / "out/frames.csv"), camera), 0.8);
   EXPECT_TRUE(std::filesystem::exists(folder / "out/trajectory_1.txt"));
   EXPECT_GT(std::filesystem::file_size(folder / "view.mp4"), 10000u);
 
@@ -229,17 +230,17 @@ TEST(Guide, AuthorsWithTwoCamerasInOneMapAndToursWithBoth) {
                                        "--output", (folder / "tour").string()});
   ASSERT_EQ(toured.exit_status, 0) << toured.errors;
   for (const char* camera : {"0", "1"})
-    EXPECT_GT(joined(ReadFrames(folder / "tour/frames.csv"), camera), 0.8);
+    EXPECT_GT(localized_ratio(ReadFrames(folder / "tour/frames.csv"), camera), 0.8);
 }
 
-TEST(Guide, LeavesALibraryThatVerifiesWhenItIsKilledWhileAuthoring) {
+TEST(Guide, LeavesAValidLibraryWhenKilledWhileAuthoring) {
   const TemporaryFolder folder;
   const Museum museum(WriteModel(folder));
   folder.Write("script.txt", museum.script);
   const pid_t child =
       StartDocent(AuthorArguments(folder, museum), (folder / "out").string(), (folder / "err").string());
-  // The first map is on its way to the disk, or has just come there, when the second one is begun. What was
-  // written lies in the log beside the library until SQLite moves it over.
+  // The program is killed while the first map is being saved or just after. Until SQLite's next checkpoint,
+  // the data is in the write-ahead log beside the library.
   const auto written = [&](const char* file) {
     std::error_code error;
     const auto bytes = std::filesystem::file_size(folder / file, error);
@@ -261,11 +262,11 @@ TEST(Guide, LeavesALibraryThatVerifiesWhenItIsKilledWhileAuthoring) {
     EXPECT_GE(library.Load(info.key).snapshot->keyframes.size(), 2u);
 }
 
-TEST(Guide, EndsWithOneLineWhenItsInputIsBad) {
+TEST(Guide, ReportsBadInputInOneLine) {
   const TemporaryFolder folder;
   const std::string library = (folder / "l.docent").string(), output = (folder / "out").string();
   const auto fails = [](const std::vector<std::string>& arguments, const std::string& part) {
-    ExpectComplaint(arguments, 1, part);
+    ExpectErrorLine(arguments, 1, part);
   };
   fails({"evaluate", (folder / "nowhere").string(), "--output", output}, "nowhere");
   const auto video = folder.Write("cut.mp4", std::string("\0\0\0\x20"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real program on a camera that turns on the spot: what is mapped by directions alone is kept, and found
-// again.
+// Tests of the real program with a purely rotating camera: panorama maps are saved, and the camera
+// relocalizes in them.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -39,8 +39,8 @@ std::vector<LivePose> ReadPoses(const std::filesystem::path& path) {
   return poses;
 }
 
-// Round the table, then 120 degrees away from it on the spot, and back.
-TEST(PanoramaLibrary, SurvivesBeingSavedAndIsRecognisedWhereItKnowsDirectionsAlone) {
+// The camera moves around the table, then rotates away from it by 120 degrees without translation, and back.
+TEST(PanoramaLibrary, RelocalizesInASavedMapWithInfinitePointsOnly) {
   const TemporaryFolder folder;
   const auto simulation = MakeSimulation("room:1");
   const auto truth = GroundTruthOf(*simulation);
@@ -59,7 +59,7 @@ TEST(PanoramaLibrary, SurvivesBeingSavedAndIsRecognisedWhereItKnowsDirectionsAlo
 
   const Outcome verified = RunDocent({"maps", "verify", "--library", file});
   EXPECT_EQ(verified.exit_status, 0) << verified.errors;
-  EXPECT_THAT(verified.output, HasSubstr("all is well"));
+  EXPECT_THAT(verified.output, HasSubstr("no problems found"));
   {
     const maps::Library library = maps::Library::Open(folder / "room.docent", maps::Access::kReadOnly);
     EXPECT_THAT(library.Verify(), IsEmpty());
@@ -70,8 +70,8 @@ TEST(PanoramaLibrary, SurvivesBeingSavedAndIsRecognisedWhereItKnowsDirectionsAlo
     }));
   }
 
-  // How the map lies in the room, by the walk about the table. Its rotation is that of the last orientation:
-  // a path that is nearly a line does not tell the turn about itself.
+  // The similarity between map and room is estimated from the walk around the table. Its rotation comes from
+  // the last orientation, because a nearly straight path does not constrain the rotation about itself.
   engine::Rotation3 truth_from_map_rotation;
   std::vector<Eigen::Vector3d> in_truth, in_map;
   for (const LivePose& pose : ReadPoses(folder / "author" / "frames.csv")) {
@@ -85,7 +85,8 @@ TEST(PanoramaLibrary, SurvivesBeingSavedAndIsRecognisedWhereItKnowsDirectionsAlo
   const auto truth_from_map = engine::AlignSim3(in_truth, in_map);
   ASSERT_TRUE(truth_from_map);
 
-  // Whoever comes in looking away from the table, about the middle of the turn, sees directions alone.
+  // A visitor who starts in the middle of the rotation, facing away from the table, sees infinite points
+  // only.
   const double middle = (begin + end) / 2;
   const std::string before = ReadAll(folder / "room.docent");
   const Outcome toured = RunDocent({"tour", "--library", file, "--camera", "sim:room:1", "--from",
@@ -106,7 +107,7 @@ TEST(PanoramaLibrary, SurvivesBeingSavedAndIsRecognisedWhereItKnowsDirectionsAlo
     const engine::Rotation3 rotation = truth_from_map_rotation * pose.map_from_camera.rotation;
     const double error_rad = (true_pose->truth_from_camera.rotation.inverse() * rotation).Angle();
     EXPECT_LT(error_rad * 180 / std::numbers::pi, 2.0) << ToSeconds(pose.time);
-    // It stands where the panorama was taken.
+    // The position must be that of the panorama map.
     const Eigen::Vector3d place = *truth_from_map * pose.map_from_camera.translation;
     EXPECT_LT((place - true_pose->truth_from_camera.translation).norm(), 0.05) << ToSeconds(pose.time);
   }

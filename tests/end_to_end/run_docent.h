@@ -19,10 +19,10 @@
 
 extern char** environ;
 
-// The real program, run as a person runs it, and what it leaves.
+// Helpers that run the real program as a user would, and read its output.
 namespace docent::app {
 
-// Its standard output and errors go to these files; nothing comes in.
+// Starts the program with its standard output and errors in these files and an empty standard input.
 inline pid_t StartDocent(std::vector<std::string> arguments, const std::string& output,
                          const std::string& errors) {
   arguments.insert(arguments.begin(), DOCENT_BINARY_DIR "/docent");
@@ -56,9 +56,9 @@ inline Outcome RunDocent(const std::vector<std::string>& arguments) {
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), ReadAll(output), ReadAll(errors)};
 }
 
-// Of frames.csv, by column.
-// One clear line on standard error, nothing else, and that exit status.
-inline void ExpectComplaint(const std::vector<std::string>& arguments, int exit_status,
+// Expects exactly one line on standard error, which contains `part`, nothing on standard output, and this
+// exit status.
+inline void ExpectErrorLine(const std::vector<std::string>& arguments, int exit_status,
                             const std::string& part) {
   const Outcome outcome = RunDocent(arguments);
   SCOPED_TRACE(testing::PrintToString(arguments));
@@ -69,6 +69,7 @@ inline void ExpectComplaint(const std::vector<std::string>& arguments, int exit_
   EXPECT_EQ(std::count(outcome.errors.begin(), outcome.errors.end(), '\n'), 1) << outcome.errors;
 }
 
+// A row of frames.csv, by column name.
 using Row = std::map<std::string, std::string>;
 
 inline std::vector<Row> ReadFrames(const std::filesystem::path& path) {

@@ -10,8 +10,9 @@
 
 namespace docent::engine {
 
-// A tracker and its mapper in turn on one thread, as a session in lockstep runs them: after every frame the
-// mapper has done what it was given, and the tracker goes on in the map that came of it. Begins a new map.
+// Runs a tracker and its mapper alternately on one thread, as a session in lockstep does: after every frame
+// the mapper finishes its queue, and the tracker continues in the resulting map. The constructor begins a new
+// map.
 class Lockstep {
  public:
   static constexpr std::uint64_t kMapKey = 1;
@@ -21,7 +22,7 @@ class Lockstep {
     tracker_.StartNewMap();
   }
 
-  // `places` as the tracker takes them.
+  // `places` is passed on to Tracker::Track.
   TrackedFrame Feed(const Frame& frame, const PlaceFinder* places = nullptr) {
     TrackedFrame tracked = tracker_.Track(frame, places);
     if (auto pair = tracker_.TakeInitialPair()) mapper_.Start(std::move(*pair));
@@ -42,9 +43,9 @@ class Lockstep {
     return tracked;
   }
 
-  // Null until there is one.
+  // Null until the first map exists.
   const std::shared_ptr<const MapSnapshot>& map() const { return map_; }
-  // All that the mapper has told, in its order.
+  // All events of the mapper so far, in order.
   const std::vector<MapperEvent>& events() const { return events_; }
 
  private:

@@ -22,16 +22,16 @@ float Sample(const cv::Mat& paint, float x, float y) {
   return (1 - fy) * (top[0] + fx * (top[1] - top[0])) + fy * (bottom[0] + fx * (bottom[1] - bottom[0]));
 }
 
-// A wall as one image sees it: from a ray d in the camera, coordinates on the wall by three dot products.
-struct SeenWall {
+// A wall in the frame of one camera: three dot products give the wall coordinates that a ray d meets.
+struct WallInCamera {
   Eigen::Vector3f normal, right, down;
   float distance;  // along the normal
   float right_offset, down_offset, half_width, half_height;
   const cv::Mat* paint;
 };
 
-std::vector<SeenWall> SeeWalls(const std::vector<Wall>& walls, const Rigid3& camera_from_world) {
-  std::vector<SeenWall> seen;
+std::vector<WallInCamera> WallsInCamera(const std::vector<Wall>& walls, const Rigid3& camera_from_world) {
+  std::vector<WallInCamera> seen;
   for (const Wall& wall : walls) {
     const Eigen::Vector3d center = camera_from_world * wall.center;
     const Eigen::Vector3d right = camera_from_world.rotation * wall.right;
@@ -45,10 +45,10 @@ std::vector<SeenWall> SeeWalls(const std::vector<Wall>& walls, const Rigid3& cam
   return seen;
 }
 
-float Grey(const std::vector<SeenWall>& walls, const Eigen::Vector3f& ray) {
+float Grey(const std::vector<WallInCamera>& walls, const Eigen::Vector3f& ray) {
   float nearest = std::numeric_limits<float>::max(), best_x = 0, best_y = 0;
-  const SeenWall* best = nullptr;
-  for (const SeenWall& wall : walls) {
+  const WallInCamera* best = nullptr;
+  for (const WallInCamera& wall : walls) {
     const float along = wall.normal.dot(ray);
     if (std::abs(along) < 1e-6f) continue;
     const float distance = wall.distance / along;
@@ -71,9 +71,10 @@ double Gaussian(Random* random) {
   return radius * std::cos(2 * std::numbers::pi * random->Uniform());
 }
 
-constexpr int kRaysAPixel = 4;
+constexpr int kRaysPerPixel = 4;
 
-// The rays of every pixel, row by row; kept for the last camera, as a test renders many images of one.
+// The rays of every pixel, row by row. Those of the last camera are cached, because a test renders many
+// images with one camera.
 const std::vector<Eigen::Vector3f>& RaysOf(const CameraModel& camera) {
   static thread_local CameraModel last;
   static thread_local std::vector<Eigen::Vector3f> rays;
@@ -82,9 +83,9 @@ const std::vector<Eigen::Vector3f>& RaysOf(const CameraModel& camera) {
   rays.clear();
   for (int y = 0; y < camera.height_px(); ++y) {
     for (int x = 0; x < camera.width_px(); ++x) {
-      for (int part = 0; part < kRaysAPixel; ++part) {
+      for (int part = 0; part < kRaysPerPixel; ++part) {
         const auto ray = camera.Unproject({x - 0.25 + 0.5 * (part & 1), y - 0.25 + 0.5 * (part >> 1)});
-        // A pixel without a ray shows what lies beyond all walls.
+        // The zero ray meets no wall, so that a pixel without a ray shows the background.
         rays.push_back(ray.value_or(Eigen::Vector3d::Zero()).cast<float>());
       }
     }
@@ -92,9 +93,11 @@ const std::vector<Eigen::Vector3f>& RaysOf(const CameraModel& camera) {
   return rays;
 }
 
-// Whether the wall shows all about the pixel, so that the corner there is paint and not a rim.
-bool AwayFromRims(const RenderedWorld& world, const CameraModel& camera, const Rigid3& camera_from_world,
-                  const Eigen::Vector2d& pixel, double radius_px, std::size_t wall) {
+// Whether one wall fills the neighbourhood of the pixel, so that a keypoint there lies on its texture and not
+// at its edge.
+bool IsAwayFromWallEdges(const RenderedWorld& world, const CameraModel& camera,
+                         const Rigid3& camera_from_world, const Eigen::Vector2d& pixel, double radius_px,
+                         std::size_t wall) {
   for (int i = 0; i < 8; ++i) {
     const double angle = i * std::numbers::pi / 4;
     const auto hit = world.AtPixel(camera, camera_from_world,
@@ -212,7 +215,7 @@ double RenderedWorld::DistanceToSurface(const Eigen::Vector3d& point) const {
 
 cv::Mat RenderedWorld::Render(const CameraModel& camera, const Rigid3& camera_from_world, double noise_sigma,
                               std::uint64_t noise_seed) const {
-  const std::vector<SeenWall> walls = SeeWalls(walls_, camera_from_world);
+  const std::vector<WallInCamera> walls = WallsInCamera(walls_, camera_from_world);
   const std::vector<Eigen::Vector3f>& rays = RaysOf(camera);
   cv::Mat image(camera.height_px(), camera.width_px(), CV_8UC1);
   Random random(noise_seed);
@@ -220,10 +223,10 @@ cv::Mat RenderedWorld::Render(const CameraModel& camera, const Rigid3& camera_fr
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
       float sum = 0;
-      for (int part = 0; part < kRaysAPixel; ++part) sum += Grey(walls, rays[next++]);
+      for (int part = 0; part < kRaysPerPixel; ++part) sum += Grey(walls, rays[next++]);
       const double noise = noise_sigma > 0 ? noise_sigma * Gaussian(&random) : 0;
       image.at<std::uint8_t>(y, x) =
-          cv::saturate_cast<std::uint8_t>(static_cast<double>(sum) / kRaysAPixel + noise);
+          cv::saturate_cast<std::uint8_t>(static_cast<double>(sum) / kRaysPerPixel + noise);
     }
   }
   return image;
@@ -247,8 +250,8 @@ const RenderedWorld& World() {
   return world;
 }
 
-Rigid3 CameraAt(const Eigen::Vector3d& center, const Eigen::Vector3d& turn_deg) {
-  return Rigid3(Rotation3::Exp(turn_deg * std::numbers::pi / 180), center).inverse();
+Rigid3 CameraAt(const Eigen::Vector3d& center, const Eigen::Vector3d& rotation_deg) {
+  return Rigid3(Rotation3::Exp(rotation_deg * std::numbers::pi / 180), center).inverse();
 }
 
 Frame MakeFrame(int index, const cv::Mat& image) {
@@ -274,7 +277,7 @@ KeyFrame MakeKeyFrame(const RenderedWorld& world, const std::shared_ptr<const Ca
 }
 
 Map TrueMap(const RenderedWorld& world, const std::shared_ptr<const CameraModel>& camera,
-            const std::vector<Rigid3>& poses, std::size_t max_points_a_keyframe) {
+            const std::vector<Rigid3>& poses, std::size_t max_points_per_keyframe) {
   Map map;
   for (const Rigid3& pose : poses) {
     KeyFrame keyframe = MakeKeyFrame(world, camera, pose);
@@ -282,21 +285,21 @@ Map TrueMap(const RenderedWorld& world, const std::shared_ptr<const CameraModel>
     keyframe.time = FromSeconds(static_cast<double>(map.keyframes().size()));
     map.AddKeyFrame(std::move(keyframe));
   }
-  const double least_distance = 6 * camera->PixelAngle();
+  const double min_distance = 6 * camera->PixelAngle();
   for (const auto& [id, record] : map.keyframes()) {
     const Rigid3& pose = record.keyframe.camera_from_map;
     std::size_t count = 0;
     for (int level = kPyramidLevels - 1; level >= 0; --level) {
       for (const Corner& corner : record.keyframe.features->corners[static_cast<std::size_t>(level)]) {
-        if (count >= max_points_a_keyframe) break;
+        if (count >= max_points_per_keyframe) break;
         const Eigen::Vector2d pixel = LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), level);
         const auto hit = world.AtPixel(*camera, pose, pixel);
         if (!hit || !world.Sees(*camera, pose, hit->point) ||
-            !AwayFromRims(world, *camera, pose, pixel, 7 << level, hit->wall)) {
+            !IsAwayFromWallEdges(world, *camera, pose, pixel, 7 << level, hit->wall)) {
           continue;
         }
         const bool known = std::any_of(map.points().begin(), map.points().end(), [&](const auto& other) {
-          return (other.point.position() - hit->point).norm() < least_distance * hit->point.z();
+          return (other.point.position() - hit->point).norm() < min_distance * hit->point.z();
         });
         if (known) continue;
         MapPoint point;
@@ -316,15 +319,15 @@ Map TrueMap(const RenderedWorld& world, const std::shared_ptr<const CameraModel>
   return map;
 }
 
-std::shared_ptr<const MapSnapshot> MapGoneAstray(const RenderedWorld& world,
-                                                 const std::shared_ptr<const CameraModel>& camera,
-                                                 const std::vector<Rigid3>& views,
-                                                 const std::function<bool(std::size_t)>& astray) {
+std::shared_ptr<const MapSnapshot> MapWithDisplacedPoints(const RenderedWorld& world,
+                                                          const std::shared_ptr<const CameraModel>& camera,
+                                                          const std::vector<Rigid3>& views,
+                                                          const std::function<bool(std::size_t)>& displaced) {
   Map map = TrueMap(world, camera, views);
   Random random(1);
   for (std::size_t i = 0; i < map.points().size(); ++i) {
-    const Eigen::Vector3d away(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5), 0);
-    if (astray(i)) map.points()[i].point.point_in_map.head<3>() += away;
+    const Eigen::Vector3d offset_in_map(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5), 0);
+    if (displaced(i)) map.points()[i].point.point_in_map.head<3>() += offset_in_map;
   }
   for (auto& [id, record] : map.keyframes()) map.UpdateDepth(&record);
   return map.Snapshot();

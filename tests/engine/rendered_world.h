@@ -15,16 +15,17 @@
 #include "engine/map/map.h"
 #include "engine/tracking/tracked_frame.h"
 
-// A small painted world for the engine's tests: a few flat walls, seen through a CameraModel by casting rays,
-// so that every pixel's true place is known. World frame x right, y down, z forward, metres.
+// A small synthetic world for the engine's tests: a few flat textured walls, rendered through a CameraModel
+// by ray casting, so that the true 3D point of every pixel is known. World frame: x right, y down, z forward,
+// metres.
 namespace docent::engine::testing_world {
 
-// A rectangle: center + x * right + y * down with |x| <= half_width, |y| <= half_height. It is seen from both
-// sides. The paint is smooth at the scale of a texel, so that four rays a pixel do not alias.
+// A rectangle: center + x * right + y * down with |x| <= half_width, |y| <= half_height, visible from both
+// sides. The texture is smooth at the scale of a texel, so that four rays per pixel do not alias.
 struct Wall {
-  Eigen::Vector3d center, right, down;  // right and down are unit vectors at a right angle
+  Eigen::Vector3d center, right, down;  // right and down are orthogonal unit vectors
   double half_width = 1, half_height = 1;
-  cv::Mat paint;  // CV_32FC1, kTexelSize metres a texel
+  cv::Mat paint;  // CV_32FC1, kTexelSize metres per texel
 
   Eigen::Vector3d Normal() const { return right.cross(down); }
 };
@@ -34,7 +35,7 @@ class RenderedWorld {
  public:
   explicit RenderedWorld(std::vector<Wall> walls) : walls_(std::move(walls)) {}
 
-  // A back wall three metres away, and before it three smaller ones at other depths and slants.
+  // A back wall three metres away, and three smaller walls in front of it at other depths and slants.
   static RenderedWorld Room(std::uint64_t seed);
   // One wall straight ahead, large enough to fill any image.
   static RenderedWorld SingleWall(double distance, std::uint64_t seed);
@@ -43,18 +44,20 @@ class RenderedWorld {
     std::size_t wall = 0;
     Eigen::Vector3d point;
   };
-  // The first wall along a ray; direction of any length.
+  // The nearest wall along a ray. The direction need not be normalized.
   std::optional<Hit> Cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
-  // What the camera shows at a pixel.
+  // The wall point that a pixel shows.
   std::optional<Hit> AtPixel(const CameraModel& camera, const Rigid3& camera_from_world,
                              const Eigen::Vector2d& pixel) const;
-  // Whether a point of a wall is in the image with nothing before it.
+  // Whether a point on a wall is in the image and not occluded.
   bool Sees(const CameraModel& camera, const Rigid3& camera_from_world, const Eigen::Vector3d& point,
             double margin_px = 8) const;
-  // From a point to the nearest wall, metres.
+  // The distance in metres from a point to the nearest wall.
   double DistanceToSurface(const Eigen::Vector3d& point) const;
 
-  // CV_8UC1; grey 128 where there is no wall. noise_sigma in grey values, drawn under noise_seed.
+  // A CV_8UC1 image, with grey value 128 where there is no wall. noise_sigma is in grey values; noise_seed
+  // seeds
+  // the noise.
   cv::Mat Render(const CameraModel& camera, const Rigid3& camera_from_world, double noise_sigma = 0,
                  std::uint64_t noise_seed = 1) const;
 
@@ -64,39 +67,41 @@ class RenderedWorld {
   std::vector<Wall> walls_;
 };
 
-// A wall painted with random figures from about 3 to 20 centimetres.
+// A wall textured with random shapes of about 3 to 20 centimetres.
 Wall PaintedWall(const Eigen::Vector3d& center, const Eigen::Vector3d& right, const Eigen::Vector3d& down,
                  double half_width, double half_height, std::uint64_t seed);
 
-// A pinhole camera with an image 77 degrees across.
+// A pinhole camera with a horizontal field of view of 77 degrees.
 std::shared_ptr<const CameraModel> PinholeCamera(int width_px, int height_px);
 
-// What most tests look through and at, made once: a camera of 320x240 pixels, and a room.
+// The camera (320x240 pixels) and the room that most tests use, created once.
 const std::shared_ptr<const CameraModel>& Camera();
 const RenderedWorld& World();
 
-// The pose of a camera at a place, turned by a rotation vector in degrees (world_from_camera).
-Rigid3 CameraAt(const Eigen::Vector3d& center, const Eigen::Vector3d& turn_deg = Eigen::Vector3d::Zero());
+// The camera_from_world pose of a camera at `center` whose orientation (world_from_camera) is the rotation
+// vector `rotation_deg`, in degrees.
+Rigid3 CameraAt(const Eigen::Vector3d& center, const Eigen::Vector3d& rotation_deg = Eigen::Vector3d::Zero());
 
-// The image of that number, of a camera that takes thirty a second.
+// The frame with this index, with the time stamp of a 30 Hz camera.
 Frame MakeFrame(int index, const cv::Mat& image);
-// The same, of what Camera() shows from a pose, with the noise that a sensor has.
+// The same, with the image that Camera() takes from this pose, with sensor noise of 1.5 grey values.
 Frame MakeFrame(int index, const RenderedWorld& world, const Rigid3& camera_from_world);
 
 KeyFrame MakeKeyFrame(const RenderedWorld& world, const std::shared_ptr<const CameraModel>& camera,
                       const Rigid3& camera_from_world);
 
-// A map without any error: keyframes at these poses, a point for corners of each of them, put on the wall
-// that the corner shows, observed exactly where it projects by every keyframe that sees it. Corners at a
-// wall's rim are left out, as are those near a point that is there already. The first keyframe is fixed.
+// A map without any error: keyframes at these poses, and map points at their keypoints, placed exactly on the
+// wall that the keypoint shows and observed exactly where they project by every keyframe that sees them.
+// Keypoints at a wall's edge are left out, as are those near an existing point. The first keyframe is fixed.
 Map TrueMap(const RenderedWorld& world, const std::shared_ptr<const CameraModel>& camera,
             const std::vector<Rigid3>& poses,
-            std::size_t max_points_a_keyframe = std::numeric_limits<std::size_t>::max());
+            std::size_t max_points_per_keyframe = std::numeric_limits<std::size_t>::max());
 
-// The same, published, with those points up to half a metre from where they were whose index is astray.
-std::shared_ptr<const MapSnapshot> MapGoneAstray(const RenderedWorld& world,
-                                                 const std::shared_ptr<const CameraModel>& camera,
-                                                 const std::vector<Rigid3>& views,
-                                                 const std::function<bool(std::size_t)>& astray);
+// A snapshot of the same map, in which each point whose index satisfies `displaced` is moved by up to half a
+// metre in x and in y.
+std::shared_ptr<const MapSnapshot> MapWithDisplacedPoints(const RenderedWorld& world,
+                                                          const std::shared_ptr<const CameraModel>& camera,
+                                                          const std::vector<Rigid3>& views,
+                                                          const std::function<bool(std::size_t)>& displaced);
 
 }  // namespace docent::engine::testing_world

@@ -12,7 +12,7 @@
 
 namespace docent::engine::testing_world {
 
-// Every keyframe of some maps, compared by thumbnail.
+// A place finder over a few maps that compares the query with the thumbnail of every keyframe.
 class SomeMaps : public PlaceFinder {
  public:
   void Add(std::uint64_t key, std::shared_ptr<const MapSnapshot> map) { maps_[key] = std::move(map); }
@@ -25,15 +25,15 @@ class SomeMaps : public PlaceFinder {
       std::vector<PlaceCandidate> of_map;
       for (const KeyFrame& keyframe : map->keyframes)
         of_map.push_back({key, map, keyframe.id, Difference(keyframe.features->small_blurry, *query.image)});
-      KeepMostAlike(per_map, &of_map);
+      KeepMostSimilar(per_map, &of_map);
       found.insert(found.end(), of_map.begin(), of_map.end());
     }
-    KeepMostAlike(count, &found);
+    KeepMostSimilar(count, &found);
     return found;
   }
 
  private:
-  static void KeepMostAlike(int count, std::vector<PlaceCandidate>* found) {
+  static void KeepMostSimilar(int count, std::vector<PlaceCandidate>* found) {
     std::sort(found->begin(), found->end(),
               [](const auto& a, const auto& b) { return a.difference < b.difference; });
     found->resize(std::min(found->size(), static_cast<std::size_t>(count)));

@@ -10,12 +10,12 @@
 
 namespace {
 
-std::atomic<std::size_t> largest_allowed = std::numeric_limits<std::size_t>::max();
+std::atomic<std::size_t> max_allocation = std::numeric_limits<std::size_t>::max();
 
 void OnMalloc(const volatile void*, std::size_t size) {
-  if (size <= largest_allowed) return;
-  largest_allowed = std::numeric_limits<std::size_t>::max();
-  constexpr char kMessage[] = "an allocation is larger than what is read justifies\n";
+  if (size <= max_allocation) return;
+  max_allocation = std::numeric_limits<std::size_t>::max();
+  constexpr char kMessage[] = "an allocation exceeds the limit for this input\n";
   if (write(STDERR_FILENO, kMessage, sizeof(kMessage) - 1) > 0) std::abort();
   std::abort();
 }
@@ -27,9 +27,9 @@ void OnFree(const volatile void*) {}
 AllocationLimit::AllocationLimit(std::size_t bytes) {
   static const int installed = __sanitizer_install_malloc_and_free_hooks(OnMalloc, OnFree);
   if (installed == 0) std::abort();
-  largest_allowed = bytes;
+  max_allocation = bytes;
 }
 
 AllocationLimit::~AllocationLimit() {
-  largest_allowed = std::numeric_limits<std::size_t>::max();
+  max_allocation = std::numeric_limits<std::size_t>::max();
 }

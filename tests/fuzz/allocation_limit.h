@@ -3,8 +3,8 @@
 
 #include <cstddef>
 
-// No single allocation may be larger than what is read justifies: while one exists, a larger one ends the
-// program with a message, which the fuzzer keeps as a crash. All threads; one at a time. Needs the address
+// While an object exists, any single allocation larger than `bytes`, in any thread, aborts the program with a
+// message, which the fuzzer reports as a crash. Only one object may exist at a time. Requires the address
 // sanitizer.
 class AllocationLimit {
  public:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as an asset of a library: they load, or they are refused by docent::Error. The limits are low, so
-// that a large but lawful demand does not look like a hang.
+// Loads any bytes as an asset of a library: they must load or be rejected with a docent::Error. The limits
+// are low, so that a large but valid asset does not appear as a hang.
 #include <cstddef>
 #include <cstdint>
 #include <vector>

@@ -19,20 +19,20 @@
 #include "maps/snapshot_reader.h"
 #include "tests/fuzz/allocation_limit.h"
 
-// Feeds a whole library file to everything that reads one: opening, listing, thumbnails, maps, scenes,
-// verifying, recovering. The input changes a small library that is right: it is a row of patches, each an
-// offset of 3 bytes, a length of 1 byte and that many bytes; a last patch that is cut off cuts the file
-// there. An input that begins as SQLite files do is the file itself. What the recovery writes must verify. No
-// allocation may be larger than four times the file, or than what SQLite takes for any database at all: its
-// lookaside memory of 48,000 bytes, which is less than four times the smallest library; the recovery, which
-// writes a library, may take four times that of an empty one.
+// Feeds a whole library file to all code that reads one: opening, listing, thumbnails, maps, scenes,
+// verification and recovery. The input modifies a small valid library: it is a sequence of patches, each an
+// offset of 3 bytes, a length of 1 byte and that many bytes; an incomplete last patch truncates the file at
+// its offset. An input that begins with SQLite's magic number is the file itself. The recovered library must
+// verify. No allocation may be larger than four times the file, or than what SQLite allocates for any
+// database: its lookaside memory of 48,000 bytes, which is less than four times the smallest library. The
+// recovery, which writes a library, may allocate four times the size of an empty one.
 namespace {
 
 namespace fs = std::filesystem;
 using docent::maps::Bytes;
 
 fs::path Folder() {
-  // Never destroyed: it is needed at the very end.
+  // Never destroyed, because the exit handler needs it.
   static const fs::path& folder = *new fs::path([] {
     const char* const memory = "/dev/shm";
     std::error_code error;
@@ -45,7 +45,7 @@ fs::path Folder() {
   return folder;
 }
 
-docent::maps::LibraryOptions Quick() {
+docent::maps::LibraryOptions FastOptions() {
   docent::maps::LibraryOptions options;
   options.make_features = docent::maps::MakeSizesOnly;
   options.load_threads = 1;
@@ -57,7 +57,7 @@ Bytes MakeSeed() {
   const fs::path path = Folder() / "seed.docent";
   {
     maps::Library library =
-        maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes, Quick());
+        maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes, FastOptions());
     const engine::CameraModel::Intrinsics intrinsics{64, 64, 60, 60, 32, 32};
     const auto camera = std::make_shared<const engine::CameraModel>(engine::LensModel::kRadialTangential,
                                                                     intrinsics, std::array<double, 5>{});
@@ -67,7 +67,7 @@ Bytes MakeSeed() {
         engine::KeyFrame keyframe;
         keyframe.id = i;
         keyframe.camera = camera;
-        // Squares, so that there are corners and the table of words has some.
+        // Squares, so that the image has keypoints and the word table is not empty.
         cv::Mat image(64, 64, CV_8UC1, cv::Scalar(50.0 + i));
         for (int square = 0; square < 9; ++square)
           image(cv::Rect(14 + square % 3 * 14, 14 + square / 3 * 14, 7, 7)) = cv::Scalar(120.0 + 15 * square);
@@ -94,7 +94,7 @@ Bytes MakeSeed() {
 std::size_t EmptyLibrarySize() {
   const fs::path path = Folder() / "empty.docent";
   docent::maps::Library::Open(path, docent::maps::Access::kReadWrite, docent::maps::CreateIfMissing::kYes,
-                              Quick());
+                              FastOptions());
   return fs::file_size(path);
 }
 
@@ -117,14 +117,14 @@ Bytes Patched(Bytes file, std::span<const std::uint8_t> patches) {
 
 void ReadAll(const fs::path& path) {
   using namespace docent::maps;
-  const Library library = Library::Open(path, Access::kReadOnly, CreateIfMissing::kNo, Quick());
+  const Library library = Library::Open(path, Access::kReadOnly, CreateIfMissing::kNo, FastOptions());
   library.Verify();
   library.LoadAppearance([](const MapInfo&, const Library::Appearance&) {});
   for (const MapInfo& info : library.List()) {
     try {
       library.Load(info.key);
     } catch (const docent::Error&) {
-      // The next one may be whole.
+      // The next map may be undamaged.
     }
   }
 }
@@ -135,7 +135,7 @@ void Recover(const fs::path& path) {
   std::error_code error;
   fs::remove(target, error);
   docent::maps::Recover(path, target);
-  const Library library = Library::Open(target, Access::kReadOnly, CreateIfMissing::kNo, Quick());
+  const Library library = Library::Open(target, Access::kReadOnly, CreateIfMissing::kNo, FastOptions());
   if (!library.Verify().empty()) std::abort();
 }
 
@@ -149,15 +149,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const fs::path path = Folder() / "input.docent";
   std::ofstream(path, std::ios::binary)
       .write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
-  constexpr std::size_t kForAnyDatabase = 48'000;
+  constexpr std::size_t kSqliteLookasideBytes = 48'000;
   static const std::size_t empty_size = EmptyLibrarySize();
   for (const bool recover : {false, true}) {
     const AllocationLimit limit(
-        std::max({4 * file.size(), kForAnyDatabase, recover ? 4 * empty_size : std::size_t{0}}));
+        std::max({4 * file.size(), kSqliteLookasideBytes, recover ? 4 * empty_size : std::size_t{0}}));
     try {
       recover ? Recover(path) : ReadAll(path);
     } catch (const docent::Error&) {
-      // The right answer to most inputs.
+      // An error is the expected result for most inputs.
     }
   }
   return 0;

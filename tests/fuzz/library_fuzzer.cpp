@@ -16,11 +16,10 @@
 #include "maps/word_rows.h"
 #include "tests/fuzz/allocation_limit.h"
 
-// Feeds the decoders of a library's binary columns. The first byte chooses the decoder; the rest is the
-// records, put into an envelope whose magic and checksum are right, because what is behind them is to be
-// reached. What is decoded must encode to the same bytes again: a decoder that ignores something would break
-// that. No allocation may be larger than four times the column's bytes, or than a few things that do not
-// grow with them.
+// Feeds the decoders of a library's binary columns. The first byte chooses the decoder. The rest are the
+// records, put into an envelope with a valid magic number and checksum, so that the input reaches the record
+// decoder. The decoded data must encode to the same bytes again, so that no decoder can ignore part of its
+// input. No allocation may be larger than four times the column's bytes or a small fixed overhead.
 namespace {
 
 using docent::maps::Bytes;
@@ -40,11 +39,11 @@ Bytes Enveloped(const docent::maps::EnvelopeKind& kind, std::uint64_t count,
   return docent::maps::FinishEnvelope(std::move(writer));
 }
 
-// A sentence, for which a stream begins with 513 bytes; and what zlib works with, 32 KiB that were
-// decompressed last among it.
-constexpr std::size_t kSmallThings = 1024, kImageWorkspace = 40 << 10;
+// An error message, for which a stream first allocates 513 bytes; and zlib's workspace, including its window
+// of 32 KiB.
+constexpr std::size_t kFixedOverhead = 1024, kImageWorkspace = 40 << 10;
 
-// Runs a decoder with its allocations limited by the size of what it reads, or by what any input takes.
+// Runs a decoder whose allocations are limited to four times its input or `at_least`.
 template <typename Decode>
 auto Limited(std::size_t bytes, std::size_t at_least, const Decode& decode) {
   const AllocationLimit limit(std::max(4 * bytes, at_least));
@@ -62,16 +61,16 @@ void DecodeTable(int which, std::span<const std::uint8_t> records) {
   const EnvelopeKind& kind = kKinds[static_cast<std::size_t>(which)];
   const Bytes bytes = Enveloped(kind, records.size() / kind.record_bytes, records);
   if (which == 0) {
-    Limited(bytes.size(), kSmallThings, [&] { return DecodeCameras(kMapKey, bytes); });
+    Limited(bytes.size(), kFixedOverhead, [&] { return DecodeCameras(kMapKey, bytes); });
   } else if (which == 1) {
     const CameraTable cameras = OneCamera();
-    Limited(bytes.size(), kSmallThings, [&] { return DecodeKeyFrames(kMapKey, bytes, cameras); });
+    Limited(bytes.size(), kFixedOverhead, [&] { return DecodeKeyFrames(kMapKey, bytes, cameras); });
   } else if (which == 2) {
-    const auto decoded = Limited(bytes.size(), kSmallThings, [&] { return DecodePoints(kMapKey, bytes); });
+    const auto decoded = Limited(bytes.size(), kFixedOverhead, [&] { return DecodePoints(kMapKey, bytes); });
     Expect(EncodePoints(kMapKey, decoded) == bytes);
   } else {
     const auto decoded =
-        Limited(bytes.size(), kSmallThings, [&] { return DecodeObservations(kMapKey, bytes); });
+        Limited(bytes.size(), kFixedOverhead, [&] { return DecodeObservations(kMapKey, bytes); });
     Expect(EncodeObservations(kMapKey, decoded) == bytes);
   }
 }
@@ -82,14 +81,14 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
     std::uint64_t count = 0;
     std::memcpy(&count, data.data(), sizeof(count));
     const Bytes bytes = Enveloped(kSceneKind, count, data.subspan(8));
-    const auto decoded = Limited(bytes.size(), kSmallThings, [&] { return DecodeScene(kMapKey, bytes); });
+    const auto decoded = Limited(bytes.size(), kFixedOverhead, [&] { return DecodeScene(kMapKey, bytes); });
     Expect(EncodeScene(kMapKey, decoded) == bytes);
   } else if (which == 7 && data.size() >= 8) {
     std::uint64_t count = 0;
     std::memcpy(&count, data.data(), sizeof(count));
     const Bytes bytes = Enveloped(kThumbnailTableKind, count, data.subspan(8));
     const auto decoded =
-        Limited(bytes.size(), kSmallThings, [&] { return DecodeThumbnails(kMapKey, bytes); });
+        Limited(bytes.size(), kFixedOverhead, [&] { return DecodeThumbnails(kMapKey, bytes); });
     Expect(EncodeThumbnails(kMapKey, decoded) == bytes);
   } else if (which == 8 && data.size() >= 8) {
     std::uint64_t count = 0;
@@ -102,12 +101,12 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
       parts.points.back().id = id;
     }
     const Bytes bytes = Enveloped(kPanoramaTableKind, count, data.subspan(8));
-    Limited(bytes.size(), kSmallThings, [&] { DecodePanoramas(kMapKey, bytes, &parts); });
+    Limited(bytes.size(), kFixedOverhead, [&] { DecodePanoramas(kMapKey, bytes, &parts); });
   } else if (which == 9 && data.size() >= 8) {
     std::uint64_t count = 0;
     std::memcpy(&count, data.data(), sizeof(count));
     const Bytes bytes = Enveloped(kWordTableKind, count, data.subspan(8));
-    const auto decoded = Limited(bytes.size(), kSmallThings, [&] { return DecodeWords(kMapKey, bytes); });
+    const auto decoded = Limited(bytes.size(), kFixedOverhead, [&] { return DecodeWords(kMapKey, bytes); });
     Expect(EncodeWords(kMapKey, decoded) == bytes);
   } else if (which == 5) {
     StoredKeyFrame keyframe;
@@ -116,14 +115,14 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
     const Bytes bytes = Enveloped(kImageKind, 1, data);
     Limited(bytes.size(), kImageWorkspace, [&] { return DecodeImage(kMapKey, keyframe, bytes); });
   } else {
-    DecodePoints(kMapKey, data);  // nothing made right: the envelope itself
+    DecodePoints(kMapKey, data);  // without a valid envelope, to test the envelope itself
     DecodeScene(kMapKey, data);
   }
 }
 
 }  // namespace
 
-// The first image that OpenCV decodes makes it set up all that it has decoders from.
+// OpenCV registers its image decoders when it decodes the first image, which allocates memory.
 extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
   std::vector<std::uint8_t> png;
   cv::imencode(".png", cv::Mat(8, 8, CV_8UC1, cv::Scalar(0)), png);
@@ -142,7 +141,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       DecodeOther(which, rest);
     }
   } catch (const docent::Error&) {
-    // The right answer to most inputs.
+    // An error is the expected result for most inputs.
   }
   return 0;
 }

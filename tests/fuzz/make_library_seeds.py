@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes inputs for library_fuzzer to begin with: one that is right for each binary column (maps/README.md).
+"""Writes seed inputs for library_fuzzer: at least one valid input for each binary column (maps/README.md).
 
     tests/fuzz/make_library_seeds.py seeds && build/fuzz/tests/fuzz/library_fuzzer seeds
 """

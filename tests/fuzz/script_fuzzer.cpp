@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as a script of commands: either commands that come back from their own text, or one sentence.
+// Parses any bytes as a script: the result must be a docent::Error, or commands that are unchanged after
+// formatting and parsing them again.
 #include <cstddef>
 #include <cstdint>
 #include <string>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as a vocabulary: either a tree or one sentence.
+// Reads any bytes as a vocabulary: the result must be a tree or a docent::Error.
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -11,7 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using docent::engine::VocabularyTree;
   try {
     const VocabularyTree tree = VocabularyTree::FromBytes({data, size});
-    // What was accepted must come back as the same bytes.
+    // An accepted tree must give the same bytes again.
     if (tree.ToBytes() != std::vector<std::uint8_t>(data, data + size)) __builtin_trap();
   } catch (const docent::Error&) {
   }

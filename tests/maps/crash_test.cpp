@@ -14,15 +14,15 @@
 #include "maps/library.h"
 #include "tests/maps/map_samples.h"
 
-// What a second process does to a library: an author who is killed at any moment, and one who writes while a
-// visitor reads. The second process is this program again, run for one test that is skipped otherwise.
+// Tests with a second process: an author who is killed at any moment, and one who writes while a visitor
+// reads. The second process is this program again, which runs one test that is skipped otherwise.
 namespace docent::maps {
 namespace {
 
 constexpr const char* kFileVariable = "DOCENT_AUTHOR_FILE";
 constexpr const char* kPipeVariable = "DOCENT_AUTHOR_PIPE";
 
-// The map of a round: made from the round alone, so that who reads it can say whether it is whole.
+// The map of a round. It depends only on the round, so that a reader can check whether it is complete.
 std::shared_ptr<engine::MapSnapshot> MapOfRound(std::uint64_t round) {
   auto map = MakeSampleMap(round, {.keyframes = 2 + static_cast<int>(round % 3), .points = 200});
   map->revision = round;
@@ -38,7 +38,7 @@ TEST(AuthorProcess, SavesRoundAfterRoundUntilItIsKilled) {
   const std::uint64_t key = maps.empty() ? library.NewKey() : maps.front().key;
   for (std::uint64_t round = maps.empty() ? 1 : maps.front().revision + 1;; ++round) {
     library.Save({key, "Desk", Policy::kOpen, MapOfRound(round), MakeSampleScene(round, 1)});
-    // Told after the save: from here on this round may not be lost.
+    // The round is reported after the save: from here on it must not be lost.
     if (write(pipe, &round, sizeof(round)) != static_cast<ssize_t>(sizeof(round))) break;
   }
 }
@@ -64,12 +64,12 @@ class Author {
   ~Author() {
     if (process_ > 0) Kill();
   }
-  // The round of the next save that is done; 0 when the author ended.
+  // Returns the round of the next finished save; 0 when the author has ended.
   std::uint64_t WaitForSave() {
     std::uint64_t round = 0;
     return read(pipe_, &round, sizeof(round)) == static_cast<ssize_t>(sizeof(round)) ? round : 0;
   }
-  // Kills and answers the last round that was told.
+  // Kills the author and returns the last reported round.
   std::uint64_t Kill() {
     kill(process_, SIGKILL);
     waitpid(process_, nullptr, 0);
@@ -85,47 +85,48 @@ class Author {
   int pipe_ = -1;
 };
 
-void ExpectWhole(const StoredMap& stored) {
+void ExpectComplete(const StoredMap& stored) {
   EXPECT_EQ(FirstDifference(*stored.snapshot, *MapOfRound(stored.info.revision)), "");
   EXPECT_EQ(FirstDifference(stored.scene, *MakeSampleScene(stored.info.revision, 1)), "");
 }
 
-// How often something is repeated: few enough for every day, or what the environment asks for.
-int Repetitions(const char* variable, int usual) {
+// The number of repetitions: a small default, or the value of an environment variable.
+int Repetitions(const char* variable, int default_count) {
   const char* const wanted = std::getenv(variable);
-  return wanted ? std::atoi(wanted) : usual;
+  return wanted ? std::atoi(wanted) : default_count;
 }
 
-TEST(Crash, AnAuthorKilledAtAnyMomentLosesAtMostTheSaveItWasIn) {
+TEST(Crash, AKilledAuthorLosesAtMostTheCurrentSave) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   Random random(1);
-  std::uint64_t told = 0;
+  std::uint64_t reported = 0;
   for (int kills = 0; kills < Repetitions("DOCENT_KILLS", 12); ++kills) {
     {
       Author author(file);
-      // Some are killed while they open, some in the middle of a save, some between two.
-      if (kills % 4 != 0) told = std::max(told, author.WaitForSave());
+      // Some are killed while they open the library, some during a save, some between two.
+      if (kills % 4 != 0) reported = std::max(reported, author.WaitForSave());
       std::this_thread::sleep_for(std::chrono::microseconds(random.Below(kills % 4 != 0 ? 60'000 : 120'000)));
-      told = std::max(told, author.Kill());
+      reported = std::max(reported, author.Kill());
     }
-    if (told == 0) continue;  // the file may not even have been begun
+    if (reported == 0) continue;  // The file may not exist yet.
     for (const Access access : {Access::kReadOnly, Access::kReadWrite}) {
-      if (access == Access::kReadWrite && kills % 2 == 0) continue;  // the next author finds the log as it is
+      if (access == Access::kReadWrite && kills % 2 == 0)
+        continue;  // The next author finds the log unchanged.
       const Library library = Library::Open(file, access, CreateIfMissing::kNo, QuickOptions());
       EXPECT_EQ(library.Verify(), std::vector<std::string>{});
       const auto maps = library.List();
       ASSERT_EQ(maps.size(), 1u);
-      EXPECT_GE(maps[0].revision, told) << "a save that had returned is lost";
-      EXPECT_LE(maps[0].revision, told + 1);
-      ExpectWhole(library.Load(maps[0].key));
-      told = maps[0].revision;
+      EXPECT_GE(maps[0].revision, reported) << "a finished save was lost";
+      EXPECT_LE(maps[0].revision, reported + 1);
+      ExpectComplete(library.Load(maps[0].key));
+      reported = maps[0].revision;
     }
   }
-  EXPECT_GT(told, 5u) << "the authors never came to save";
+  EXPECT_GT(reported, 5u) << "the authors never finished a save";
 }
 
-// Two maps of the samples, and what joins them.
+// Two sample maps and the record that joins them.
 JoinRecord JoinOf(const Library& library) {
   const StoredMap into = library.Load(library.FindByName("East").key),
                   from = library.Load(library.FindByName("West").key);
@@ -149,7 +150,7 @@ TEST(JoinerProcess, JoinsTwoMapsUntilItIsKilled) {
   if (write(std::atoi(std::getenv(kPipeVariable)), &begun, 1) == 1) library.Join(record);
 }
 
-TEST(Crash, MapsAreJoinedWholeOrNotAtAllWhenTheProgramIsKilledMeanwhile) {
+TEST(Crash, AJoinIsAtomicWhenTheProgramIsKilled) {
   const TemporaryFolder folder;
   Random random(3);
   for (int round = 0; round < Repetitions("DOCENT_KILLS", 12); ++round) {
@@ -191,7 +192,7 @@ TEST(Crash, MapsAreJoinedWholeOrNotAtAllWhenTheProgramIsKilledMeanwhile) {
   }
 }
 
-TEST(TwoProcesses, AVisitorSeesWholeSavesWhileAnAuthorWrites) {
+TEST(TwoProcesses, AVisitorSeesOnlyCompleteSavesWhileAnAuthorWrites) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   Author author(file);
@@ -199,17 +200,17 @@ TEST(TwoProcesses, AVisitorSeesWholeSavesWhileAnAuthorWrites) {
   const Library visitor = OpenToRead(file);
   std::uint64_t last = 0;
   for (int visits = 0; visits < 25; ++visits) {
-    const std::uint64_t told = author.WaitForSave();
+    const std::uint64_t reported = author.WaitForSave();
     const StoredMap stored = visitor.Load(visitor.List().front().key);
-    EXPECT_GE(stored.info.revision, told);
+    EXPECT_GE(stored.info.revision, reported);
     EXPECT_GE(stored.info.revision, last);
     last = stored.info.revision;
-    ExpectWhole(stored);
+    ExpectComplete(stored);
   }
   EXPECT_TRUE(visitor.Verify().empty());
 }
 
-TEST(TwoProcesses, TwoToursSeeWholeSavesWhileAnAuthorWrites) {
+TEST(TwoProcesses, TwoToursSeeOnlyCompleteSavesWhileAnAuthorWrites) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   Author author(file);
@@ -221,33 +222,33 @@ TEST(TwoProcesses, TwoToursSeeWholeSavesWhileAnAuthorWrites) {
     tours.emplace_back([&, tour] {
       std::uint64_t last = 0;
       for (int visit = 0; visit < visits; ++visit) {
-        // One stays, the other comes and goes.
+        // One tour stays open, the other reopens the library.
         const Library library = OpenToRead(file);
-        for (int look = 0; look < (tour == 0 ? 5 : 1); ++look) {
+        for (int round = 0; round < (tour == 0 ? 5 : 1); ++round) {
           const StoredMap stored = library.Load(library.List().front().key);
           EXPECT_GE(stored.info.revision, last);
           last = stored.info.revision;
-          ExpectWhole(stored);
-          library.LoadAppearance([&](const MapInfo& info, const Library::Appearance& looks) {
-            EXPECT_EQ(looks.problem, "");
-            EXPECT_EQ(looks.thumbnails.size(), info.keyframes);
-            EXPECT_EQ(looks.words.size(), info.keyframes);
+          ExpectComplete(stored);
+          library.LoadAppearance([&](const MapInfo& info, const Library::Appearance& appearance) {
+            EXPECT_EQ(appearance.problem, "");
+            EXPECT_EQ(appearance.thumbnails.size(), info.keyframes);
+            EXPECT_EQ(appearance.words.size(), info.keyframes);
           });
         }
       }
       done = true;
     });
   }
-  // What the author tells must be taken, or the pipe fills and it stands still.
+  // The author's reports must be read; otherwise the pipe fills up and blocks the author.
   while (!done && author.WaitForSave() != 0) continue;
   tours.clear();
-  const std::uint64_t told = author.Kill();
+  const std::uint64_t reported = author.Kill();
   const Library library = OpenToRead(file);
-  EXPECT_GE(library.List().front().revision, told);
+  EXPECT_GE(library.List().front().revision, reported);
   EXPECT_TRUE(library.Verify().empty());
 }
 
-TEST(TwoProcesses, AFileThatWasClosedStandsAlone) {
+TEST(TwoProcesses, AClosedLibraryIsASingleFile) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   std::uint64_t key = 0;
@@ -267,13 +268,13 @@ TEST(TwoProcesses, AFileThatWasClosedStandsAlone) {
   EXPECT_EQ(ReadWholeFile(file), before);
 }
 
-TEST(TwoProcesses, AFileThatWasLeftInLogModeIsReadWithoutANewFileBesideIt) {
+TEST(TwoProcesses, AFileLeftInLogModeIsReadWithoutCreatingFiles) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
-  Author(file).WaitForSave();  // killed: header says log
+  Author(file).WaitForSave();  // Killed: the header says that there is a log.
   OpenToRead(file);
   {
-    // A visitor keeps the log from being tidied away; what it holds moves into the file all the same.
+    // An open visitor prevents the log's removal, but its contents are still moved into the file.
     const Library visitor = OpenToRead(file);
     EXPECT_EQ(visitor.List().size(), 1u);
     Library author = Library::Open(file, Access::kReadWrite, CreateIfMissing::kNo, QuickOptions());
@@ -287,7 +288,7 @@ TEST(TwoProcesses, AFileThatWasLeftInLogModeIsReadWithoutANewFileBesideIt) {
   const auto maps = copy.List();
   ASSERT_EQ(maps.size(), 1u);
   EXPECT_EQ(maps[0].name, "Table");
-  ExpectWhole(copy.Load(maps[0].key));
+  ExpectComplete(copy.Load(maps[0].key));
   EXPECT_EQ(FilesIn(folder / "copy"), "a.docent");
   std::filesystem::permissions(folder / "copy", std::filesystem::perms::owner_all);
 }

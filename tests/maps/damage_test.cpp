@@ -16,7 +16,7 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-// A library with two maps and an asset, closed, and the folder it lies in.
+// A closed library with two maps and an asset, in its own folder.
 class Damage : public ::testing::Test {
  protected:
   Damage() {
@@ -29,7 +29,8 @@ class Damage : public ::testing::Test {
   }
   void RunSql(const std::string& sql) const { maps::RunSql(file_, sql); }
   std::vector<std::string> Verify() const { return Open(Access::kReadOnly).Verify(); }
-  // Opening fails with one sentence about the file, changes none of its bytes and leaves nothing beside it.
+  // Checks that opening fails with one sentence about the file, changes none of its bytes and creates no
+  // other file.
   void ExpectRefused(const std::string& part_of_sentence) const {
     const Bytes before = ReadWholeFile(file_);
     const auto modes = {std::pair{Access::kReadOnly, CreateIfMissing::kNo},
@@ -44,12 +45,13 @@ class Damage : public ::testing::Test {
       EXPECT_EQ(FilesIn(folder_.path()), "a.docent");
     }
   }
-  // Whatever can be read of a damaged file is what was saved, and a verdict of "all is well" is true.
+  // Checks that everything that can be read from a damaged file is what was saved, and that Verify finds no
+  // error only if there is none.
   void ExpectErrorOrTruth() {
-    bool whole = false;
+    bool valid = false;
     const std::string error = ErrorOf([&] {
       const Library library = Open(Access::kReadOnly);
-      whole = library.Verify().empty();
+      valid = library.Verify().empty();
       const auto keys = {std::pair{1, desk_.get()}, std::pair{2, door_.get()}};
       for (const auto& [key, expected] : keys) {
         const std::string map_error = ErrorOf([&, k = key, e = expected] {
@@ -61,12 +63,12 @@ class Damage : public ::testing::Test {
             EXPECT_EQ(FirstDifference(stored.scene, *scene_), "");
           }
         });
-        EXPECT_TRUE(!whole || map_error == "no error") << map_error;
+        EXPECT_TRUE(!valid || map_error == "no error") << map_error;
         if (map_error != "no error") ++errors_;
       }
     });
     if (error != "no error") ++errors_;
-    EXPECT_FALSE(whole && error != "no error") << error;
+    EXPECT_FALSE(valid && error != "no error") << error;
   }
 
   TemporaryFolder folder_;
@@ -77,7 +79,7 @@ class Damage : public ::testing::Test {
   int errors_ = 0;
 };
 
-TEST_F(Damage, AFileThatIsNotThereOrNoFileAtAllIsRefused) {
+TEST_F(Damage, MissingAndIrregularFilesAreRejected) {
   EXPECT_THAT(ErrorOf([&] { Library::Open(folder_ / "b.docent", Access::kReadOnly); }),
               HasSubstr("does not exist"));
   EXPECT_THAT(ErrorOf([&] { Library::Open(folder_ / "b.docent", Access::kReadWrite); }),
@@ -90,28 +92,28 @@ TEST_F(Damage, AFileThatIsNotThereOrNoFileAtAllIsRefused) {
   EXPECT_EQ(FilesIn(folder_.path()), "a.docent");
 }
 
-TEST_F(Damage, AFileOfAnotherKindIsRefused) {
+TEST_F(Damage, AFileOfAnotherTypeIsRejected) {
   const std::string text(5000, 'x');
   WriteWholeFile(file_, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   ExpectRefused("is not a library of maps");
 }
 
-TEST_F(Damage, AnSqliteFileOfAnotherProgramIsRefused) {
+TEST_F(Damage, AnSqliteFileOfAnotherProgramIsRejected) {
   RunSql("PRAGMA application_id = 7");
   ExpectRefused("SQLite file of another program");
 }
 
-TEST_F(Damage, ALibraryOfANewerProgramIsRefused) {
+TEST_F(Damage, ALibraryOfANewerFormatIsRejected) {
   RunSql("PRAGMA user_version = 4");
   ExpectRefused("written by a newer Docent (format 4;");
 }
 
-TEST_F(Damage, ALibraryWithOtherTablesIsRefused) {
+TEST_F(Damage, ALibraryWithOtherTablesIsRejected) {
   RunSql("CREATE TRIGGER t AFTER UPDATE ON maps BEGIN DELETE FROM pictures; END");
   ExpectRefused("its table 't' is not one");
 }
 
-TEST_F(Damage, AnEmptyFileIsRefusedUnlessALibraryIsToBeMade) {
+TEST_F(Damage, AnEmptyFileIsRejectedUnlessALibraryIsCreated) {
   WriteWholeFile(file_, {});
   EXPECT_THAT(ErrorOf([&] { Open(Access::kReadOnly); }), HasSubstr("is empty"));
   EXPECT_THAT(ErrorOf([&] { Open(Access::kReadWrite); }), HasSubstr("is empty"));
@@ -119,13 +121,13 @@ TEST_F(Damage, AnEmptyFileIsRefusedUnlessALibraryIsToBeMade) {
   EXPECT_TRUE(Open(Access::kReadWrite, CreateIfMissing::kYes).List().empty());
 }
 
-TEST_F(Damage, AFileCutOffAnywhereIsRefused) {
-  const Bytes whole = ReadWholeFile(file_);
+TEST_F(Damage, AFileTruncatedAnywhereIsRejected) {
+  const Bytes original = ReadWholeFile(file_);
   Random random(5);
   for (int i = 0; i < 60; ++i) {
     const std::size_t size =
-        i < 20 ? 1 + i * 37 : 1 + random.Below(static_cast<std::uint32_t>(whole.size() - 1));
-    WriteWholeFile(file_, std::span(whole).first(size));
+        i < 20 ? 1 + i * 37 : 1 + random.Below(static_cast<std::uint32_t>(original.size() - 1));
+    WriteWholeFile(file_, std::span(original).first(size));
     const std::string error = ErrorOf([&] { Open(Access::kReadOnly).List(); });
     EXPECT_THAT(error, StartsWith(file_.string())) << size;
     EXPECT_THAT(ErrorOf([&] { Open(Access::kReadWrite); }), StartsWith(file_.string())) << size;
@@ -135,23 +137,23 @@ TEST_F(Damage, AFileCutOffAnywhereIsRefused) {
 }
 
 TEST_F(Damage, FlippedBytesNeverGiveWrongData) {
-  const Bytes whole = ReadWholeFile(file_);
+  const Bytes original = ReadWholeFile(file_);
   Random random(11);
   for (int i = 0; i < 400; ++i) {
-    Bytes damaged = whole;
-    // Headers of pages decide most, so half of the flips go there.
-    const auto page = random.Below(static_cast<std::uint32_t>(whole.size() / 4096)) * 4096;
+    Bytes damaged = original;
+    // Page headers are the most critical bytes, so half of the flips are in them.
+    const auto page = random.Below(static_cast<std::uint32_t>(original.size() / 4096)) * 4096;
     const std::size_t at =
-        i % 2 == 0 ? page + random.Below(120) : random.Below(static_cast<std::uint32_t>(whole.size()));
+        i % 2 == 0 ? page + random.Below(120) : random.Below(static_cast<std::uint32_t>(original.size()));
     damaged[at] ^= static_cast<std::uint8_t>(1 + random.Below(255));
     WriteWholeFile(file_, damaged);
     ExpectErrorOrTruth();
     ASSERT_FALSE(HasFailure()) << "byte " << at;
   }
-  EXPECT_GT(errors_, 100) << "the flips hit nothing";
+  EXPECT_GT(errors_, 100) << "the flips caused too few errors";
 }
 
-TEST_F(Damage, ASmallFileMayNotAskForLargeImages) {
+TEST_F(Damage, ASmallFileCannotRequestLargeImages) {
   const engine::CameraModel::Intrinsics vast{8000, 8000, 500, 500, 4000, 4000};
   const CameraTable cameras(2, std::make_shared<const engine::CameraModel>(
                                    engine::LensModel::kRadialTangential, vast, std::array<double, 5>{}));
@@ -161,12 +163,11 @@ TEST_F(Damage, ASmallFileMayNotAskForLargeImages) {
   }
   RunSql("UPDATE parts SET data = x'" + hex + "' WHERE map_key = 1 AND part = 'cameras'");
   const Library library = Open(Access::kReadOnly);
-  EXPECT_THAT(ErrorOf([&] { library.Load(1); }),
-              HasSubstr("an image size that a file so small does not hold"));
+  EXPECT_THAT(ErrorOf([&] { library.Load(1); }), HasSubstr("image size is impossible for so small a file"));
   EXPECT_EQ(FirstDifference(*library.Load(2).snapshot, *door_), "");
 }
 
-TEST_F(Damage, ALargeImageWithNothingInItIsNoDamage) {
+TEST_F(Damage, ALargeUniformImageIsAccepted) {
   auto map = MakeSampleMap(3, {.keyframes = 1, .points = 0, .width_px = 2048, .height_px = 1536});
   auto features = std::make_shared<engine::ImageFeatures>(*map->keyframes[0].features);
   features->levels[0] = cv::Mat(1536, 2048, CV_8UC1, cv::Scalar(90));
@@ -177,7 +178,7 @@ TEST_F(Damage, ALargeImageWithNothingInItIsNoDamage) {
   EXPECT_TRUE(library.Verify().empty());
 }
 
-TEST_F(Damage, VerifyNamesWhatIsDamaged) {
+TEST_F(Damage, VerifyNamesEachDamagedPart) {
   const auto cases = {
       std::pair{
           "UPDATE parts SET data = substr(data, 1, length(data) - 9) WHERE map_key = 1 AND part = 'points'",
@@ -197,13 +198,13 @@ TEST_F(Damage, VerifyNamesWhatIsDamaged) {
                 "map 'Door' (2): the table of thumbnails belongs to another map"},
       std::pair{"DELETE FROM assets", "the asset asset-3 is missing"},
       std::pair{"UPDATE assets SET data = x'00'", "asset 'model 3.glb' is damaged"},
-      std::pair{"DELETE FROM maps WHERE key = 1", "it says it has 2 maps but 1 are there"},
+      std::pair{"DELETE FROM maps WHERE key = 1", "its first entry gives 2 maps but 1 are there"},
       std::pair{"DELETE FROM library", "its first entry is missing"},
   };
-  const Bytes whole = ReadWholeFile(file_);
+  const Bytes original = ReadWholeFile(file_);
   EXPECT_EQ(Verify(), std::vector<std::string>{});
   for (const auto& [sql, sentence] : cases) {
-    WriteWholeFile(file_, whole);
+    WriteWholeFile(file_, original);
     RunSql(sql);
     EXPECT_THAT(Verify(), Contains(HasSubstr(sentence))) << sql;
     for (const std::string& line : Verify()) EXPECT_THAT(line, StartsWith(file_.string()));

@@ -19,7 +19,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-TEST(Exchange, AMapGoesToAnotherLibraryWithAllThatBelongsToIt) {
+TEST(Exchange, ExportAndImportCopyAMapCompletely) {
   const TemporaryFolder folder;
   Library museum = OpenToWrite(folder / "museum.docent");
   const auto desk = MakeSampleMap(1, {.keyframes = 6});
@@ -46,7 +46,7 @@ TEST(Exchange, AMapGoesToAnotherLibraryWithAllThatBelongsToIt) {
   EXPECT_THAT(other.Verify(), IsEmpty());
 }
 
-TEST(Exchange, ALongNameStaysWithinItsLimitAndWhole) {
+TEST(Exchange, ALongNameIsCutBetweenCharactersToFitItsLimit) {
   const TemporaryFolder folder;
   Library museum = OpenToWrite(folder / "museum.docent");
   std::string name;
@@ -58,7 +58,7 @@ TEST(Exchange, ALongNameStaysWithinItsLimitAndWhole) {
   EXPECT_EQ(renamed, name.substr(0, 196) + " (2)");
 }
 
-TEST(Exchange, NothingIsWrittenOfALibraryThatIsDamaged) {
+TEST(Exchange, NothingIsImportedFromADamagedLibrary) {
   const TemporaryFolder folder;
   {
     Library museum = OpenToWrite(folder / "museum.docent");
@@ -72,7 +72,7 @@ TEST(Exchange, NothingIsWrittenOfALibraryThatIsDamaged) {
   EXPECT_EQ(FilesIn(folder.path()), "museum.docent");
 }
 
-TEST(Exchange, NothingIsLeftOfAnExportThatFails) {
+TEST(Exchange, AFailedExportLeavesNoFile) {
   const TemporaryFolder folder;
   Library museum = OpenToWrite(folder / "museum.docent");
   EXPECT_THROW(ExportMap(museum, 77, folder / "desk.docent"), Error);
@@ -80,7 +80,7 @@ TEST(Exchange, NothingIsLeftOfAnExportThatFails) {
   EXPECT_EQ(FilesIn(folder.path()).find("desk"), std::string::npos);
 }
 
-// The lines of a COLMAP file without its comments.
+// The lines of a COLMAP file without comments.
 std::vector<std::istringstream> LinesOf(const std::string& text) {
   std::vector<std::istringstream> lines;
   std::istringstream file(text);
@@ -90,7 +90,7 @@ std::vector<std::istringstream> LinesOf(const std::string& text) {
   return lines;
 }
 
-// OpenCV's and COLMAP's formulas, written down again: the pixel of a point in the camera frame.
+// An independent implementation of OpenCV's and COLMAP's formulas: the pixel of a point in the camera frame.
 Eigen::Vector2d ProjectAsColmap(const std::string& model, const std::vector<double>& p,
                                 const Eigen::Vector3d& point) {
   const double u = point.x() / point.z(), v = point.y() / point.z(), r2 = u * u + v * v, r = std::sqrt(r2);
@@ -107,7 +107,7 @@ Eigen::Vector2d ProjectAsColmap(const std::string& model, const std::vector<doub
   return {p[0] * distorted.x() + p[2], p[1] * distorted.y() + p[3]};
 }
 
-TEST(ColmapModel, SaysTheSameAsTheMapInColmapsConventions) {
+TEST(ColmapModel, MatchesTheMapInColmapsConventions) {
   const auto map = MakeSampleMap(5, {.keyframes = 6, .points = 60});
   const ColmapModel model = MakeColmapModel(*map);
   struct Camera {
@@ -127,7 +127,7 @@ TEST(ColmapModel, SaysTheSameAsTheMapInColmapsConventions) {
   ASSERT_EQ(cameras.size(), 2u);
 
   std::map<int, Eigen::Vector3d> points;
-  std::map<std::pair<int, int>, int> track_of;  // (image, index) to point
+  std::map<std::pair<int, int>, int> track_of;  // From (image, index) to the point.
   for (auto& line : LinesOf(model.points3d)) {
     int id = 0, red = 0, green = 0, blue = 0;
     double error = 0;
@@ -137,7 +137,7 @@ TEST(ColmapModel, SaysTheSameAsTheMapInColmapsConventions) {
     EXPECT_EQ(position, map->FindPoint(static_cast<engine::MapPointId>(id - 1))->position());
     for (int image = 0, index = 0; line >> image >> index;) track_of[{image, index}] = id;
   }
-  EXPECT_EQ(points.size(), 45u) << "three of four are finite";
+  EXPECT_EQ(points.size(), 45u) << "three of four points are finite";
 
   auto lines = LinesOf(model.images);
   ASSERT_EQ(lines.size(), 2 * map->keyframes.size());
@@ -152,12 +152,12 @@ TEST(ColmapModel, SaysTheSameAsTheMapInColmapsConventions) {
     EXPECT_EQ(id, static_cast<int>(keyframe.id) + 1);
     EXPECT_EQ(name, model.image_of[i].first);
     EXPECT_EQ(keyframe.id, model.image_of[i].second);
-    // A point goes through COLMAP's pose and lens to the same place in the image as through ours.
+    // COLMAP's pose and lens project a point to the same pixel as Docent's.
     for (const engine::MapPoint& point : map->points) {
       if (point.infinite()) continue;
       const Eigen::Vector3d in_camera = q * point.position() + t;
       const auto ours = keyframe.camera->Project(keyframe.camera_from_map * point.position());
-      if (!ours || ours->norm() > 1e4) continue;  // beyond, the last digits of a double are no pixels
+      if (!ours || ours->norm() > 1e4) continue;  // Farther out, rounding errors exceed the tolerance.
       const Camera& camera = cameras.at(camera_id);
       const Eigen::Vector2d theirs = ProjectAsColmap(camera.model, camera.parameters, in_camera);
       EXPECT_LT((theirs - (*ours + Eigen::Vector2d(0.5, 0.5))).norm(), 1e-6);
@@ -200,8 +200,8 @@ TEST(Ply, HasEveryFinitePointOnce) {
   }
 }
 
-TEST(ViewFromAbove, DrawsAPointWhereItLiesOnTheFloor) {
-  // A keyframe at the origin that looks ahead, and points ahead and to its right.
+TEST(ViewFromAbove, DrawsAPointAtItsPlaceInThePlan) {
+  // A keyframe at the origin that faces ahead, and points ahead and to its right.
   engine::MapSnapshot map;
   map.keyframes.emplace_back();
   const auto add = [&](double x, double y, double z) {
@@ -220,8 +220,8 @@ TEST(ViewFromAbove, DrawsAPointWhereItLiesOnTheFloor) {
     cv::minMaxLoc(patch, &lowest);
     return lowest < 120;
   };
-  EXPECT_TRUE(dark(50, 50)) << "straight ahead is up on the sheet";
-  EXPECT_TRUE(dark(450, 450)) << "what lies to the right is at the right";
+  EXPECT_TRUE(dark(50, 50)) << "ahead must be up in the plan";
+  EXPECT_TRUE(dark(450, 450)) << "a point to the right must be on the right";
   EXPECT_FALSE(dark(450, 50));
   EXPECT_FALSE(DrawFromAbove({}, -Eigen::Vector3d::UnitY()).empty());
 }

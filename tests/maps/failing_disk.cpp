@@ -14,7 +14,7 @@ std::atomic<int> writes_left = std::numeric_limits<int>::max();
 std::atomic<bool> only_read = false;
 sqlite3_vfs* system_vfs = nullptr;
 
-// Lies before the system's own file in memory.
+// The wrapper's file object, which precedes the system's in memory.
 struct File {
   sqlite3_file base;
   sqlite3_file* system() { return reinterpret_cast<sqlite3_file*>(this + 1); }
@@ -30,7 +30,7 @@ int Write(sqlite3_file* file, const void* bytes, int count, sqlite3_int64 offset
   return SQLITE_FULL;
 }
 
-// Everything else goes through.
+// All other functions call the system's.
 int Close(sqlite3_file* f) {
   return System(f)->pMethods ? System(f)->pMethods->xClose(System(f)) : SQLITE_OK;
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A disk that is full from a chosen write on, or may only be read, for every library that this process opens
-// while one exists: SQLite's own layer to the system, with a door before its writes. One at a time.
+// Simulates a disk that is full from a given write on, or read-only, for every library that this process
+// opens while the object exists. It wraps SQLite's interface to the operating system. One at a time.
 namespace docent::maps {
 
 class FailingDisk {
@@ -12,10 +12,10 @@ class FailingDisk {
   FailingDisk(const FailingDisk&) = delete;
   FailingDisk& operator=(const FailingDisk&) = delete;
 
-  // This many more writes go well; all that follow find the disk full.
+  // This many more writes succeed; later ones fail because the disk is full.
   void FailAfter(int writes);
   void Repair();
-  // Files can be opened for reading alone.
+  // Files can then only be opened for reading.
   void SetReadOnly(bool read_only);
 };
 

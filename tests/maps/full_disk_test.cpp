@@ -25,8 +25,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-// Saves again and again a second map beside the one that is there, each time with the disk filled to a
-// random degree: it is told in one sentence, what was there is read meanwhile and whole afterwards.
+// Repeatedly saves a second map, each time with the disk filled to a random degree. Expects a one-sentence
+// error, and that the first map can be read meanwhile and is intact afterwards.
 void ExpectNothingLost(const std::filesystem::path& file, const std::function<void(Random& random)>& fill,
                        const std::function<void()>& relieve) {
   const auto open = [&](Access access) {
@@ -55,7 +55,7 @@ void ExpectNothingLost(const std::filesystem::path& file, const std::function<vo
         EXPECT_THAT(error, StartsWith(file.string()));
         EXPECT_THAT(error, HasSubstr("the disk is full"));
         EXPECT_EQ(error.find('\n'), std::string::npos);
-        // What was there can be read while the disk is still full, and what failed is saved when it is not.
+        // The first map can be read while the disk is full, and the failed save succeeds once it is not.
         EXPECT_EQ(FirstDifference(*library.Load(1).snapshot, *desk), "");
         EXPECT_EQ(library.List().size(), 1u);
         if (i % 3 == 0) {
@@ -64,10 +64,10 @@ void ExpectNothingLost(const std::filesystem::path& file, const std::function<vo
           second_saved = true;
         }
       }
-      if (i % 3 == 1) relieve();  // otherwise it is closed with the disk full
+      if (i % 3 == 1) relieve();  // In the other rounds the library is closed with a full disk.
     }
     relieve();
-    { open(Access::kReadWrite); }  // tidies up what could not be tidied then
+    { open(Access::kReadWrite); }  // Completes what closing could not do on a full disk.
     const Library library = open(Access::kReadOnly);
     EXPECT_THAT(library.Verify(), IsEmpty());
     EXPECT_EQ(FirstDifference(*library.Load(1).snapshot, *desk), "");
@@ -92,7 +92,7 @@ class FullDisk : public ::testing::Test {
   FailingDisk disk_;
 };
 
-TEST_F(FullDisk, AtAnyWriteOfASaveIsToldAndNothingIsLost) {
+TEST_F(FullDisk, AtAnyWriteOfASaveIsReportedAndLosesNothing) {
   ExpectNothingLost(
       file_, [this](Random& random) { disk_.FailAfter(static_cast<int>(random.Below(120))); },
       [this] { disk_.Repair(); });
@@ -101,7 +101,7 @@ TEST_F(FullDisk, AtAnyWriteOfASaveIsToldAndNothingIsLost) {
 constexpr const char* kFolderVariable = "DOCENT_SMALL_DISK";
 constexpr int kCannotMount = 77;
 
-// A file system of a few megabytes that this process alone sees.
+// Mounts a file system of a few megabytes that only this process sees.
 bool MountSmallDisk(const char* folder) {
   const uid_t user = geteuid();
   const int spaces = CLONE_NEWNS | (user == 0 ? 0 : CLONE_NEWUSER);
@@ -128,7 +128,7 @@ TEST(SmallDiskProcess, FillsADiskAndSaves) {
       [&] { std::filesystem::remove(ballast); });
 }
 
-TEST(SmallDisk, ThatFillsUpIsToldAndNothingIsLost) {
+TEST(SmallDisk, ThatFillsUpIsReportedAndLosesNothing) {
   const TemporaryFolder folder;
   const pid_t process = fork();
   ASSERT_GE(process, 0);
@@ -140,11 +140,11 @@ TEST(SmallDisk, ThatFillsUpIsToldAndNothingIsLost) {
   int status = 0;
   ASSERT_EQ(waitpid(process, &status, 0), process);
   ASSERT_TRUE(WIFEXITED(status));
-  if (WEXITSTATUS(status) == kCannotMount) GTEST_SKIP() << "no file system may be mounted here";
-  EXPECT_EQ(WEXITSTATUS(status), 0) << "see the second process's own report above";
+  if (WEXITSTATUS(status) == kCannotMount) GTEST_SKIP() << "this process may not mount file systems";
+  EXPECT_EQ(WEXITSTATUS(status), 0) << "see the output of the second process above";
 }
 
-TEST(FileSizeLimit, IsToldAndNothingIsLost) {
+TEST(FileSizeLimit, IsReportedAndLosesNothing) {
   const TemporaryFolder folder;
   const std::filesystem::path file = folder / "a.docent";
   Library library = OpenToWrite(file);
@@ -167,20 +167,20 @@ TEST(FileSizeLimit, IsToldAndNothingIsLost) {
   EXPECT_EQ(FirstDifference(*library.Load(key).snapshot, *MakeSampleMap(2, {.keyframes = 8})), "");
 }
 
-TEST_F(FullDisk, WhenALibraryIsMadeOrClosedIsNoHarm) {
+TEST_F(FullDisk, IsHarmlessWhileALibraryIsCreatedOrClosed) {
   for (int writes = 0; writes < 12; ++writes) {
     disk_.FailAfter(writes);
     const std::string error = ErrorOf([&] { Open(Access::kReadWrite, CreateIfMissing::kYes); });
     EXPECT_THAT(error, AnyOf("no error", HasSubstr("the disk is full")));
     disk_.Repair();
-    Open(Access::kReadWrite, CreateIfMissing::kYes);  // the second try goes well
+    Open(Access::kReadWrite, CreateIfMissing::kYes);  // The second attempt succeeds.
     EXPECT_THAT(Open(Access::kReadOnly).Verify(), IsEmpty());
     std::filesystem::remove(file_);
   }
   {
     Library library = Open(Access::kReadWrite, CreateIfMissing::kYes);
     library.Save({library.NewKey(), "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
-    disk_.FailAfter(0);  // the log cannot be moved into the file
+    disk_.FailAfter(0);  // The log cannot be moved into the file.
   }
   disk_.Repair();
   const Library library = Open(Access::kReadOnly);
@@ -188,7 +188,7 @@ TEST_F(FullDisk, WhenALibraryIsMadeOrClosedIsNoHarm) {
   EXPECT_EQ(FirstDifference(*library.Load(1).snapshot, *MakeSampleMap(1)), "");
 }
 
-TEST_F(FullDisk, IsToldByTheSaverWhichGoesOn) {
+TEST_F(FullDisk, IsReportedByTheSaverWhichContinues) {
   Library library = Open(Access::kReadWrite, CreateIfMissing::kYes);
   const std::uint64_t key = library.NewKey();
   Saver saver(&library);
@@ -203,12 +203,12 @@ TEST_F(FullDisk, IsToldByTheSaverWhichGoesOn) {
   EXPECT_EQ(FirstDifference(*library.Load(key).snapshot, *MakeSampleMap(1)), "");
 }
 
-TEST_F(FullDisk, ADiskThatMayOnlyBeReadIsToldAndRead) {
+TEST_F(FullDisk, AReadOnlyDiskIsReportedAndReadable) {
   { Open(Access::kReadWrite, CreateIfMissing::kYes).NewKey(); }
   const Bytes before = ReadWholeFile(file_);
   disk_.SetReadOnly(true);
   const std::string error = ErrorOf([&] { Open(Access::kReadWrite); });
-  EXPECT_THAT(error, HasSubstr("may not be written; open it read only or change its permissions"));
+  EXPECT_THAT(error, HasSubstr("is not writable; open it read-only or change its permissions"));
   EXPECT_THAT(Open(Access::kReadOnly).Verify(), IsEmpty());
   EXPECT_EQ(ReadWholeFile(file_), before);
   EXPECT_EQ(FilesIn(folder_.path()), "a.docent");

@@ -14,7 +14,7 @@ namespace {
 
 using engine::WordBag;
 
-// `words` different ones of a range of leaves, each once.
+// A bag of `words` different words from a range of leaves, each once.
 WordBag RandomBag(std::uint64_t seed, std::size_t words, std::uint32_t first_leaf, std::uint32_t leaves) {
   Random random(seed);
   std::vector<std::uint32_t> chosen;
@@ -33,7 +33,7 @@ std::vector<std::pair<engine::KeyFrameId, double>> Answer(const InvertedFile& fi
 }
 
 TEST(InvertedFile, ScoresByTermFrequencyAndInverseDocumentFrequency) {
-  // Leaf 5 is in both keyframes, 7 and 9 in one each.
+  // Leaf 5 is in both keyframes, leaves 7 and 9 are in one each.
   InvertedFile file;
   file.Add(engine::MakeWordBag({5, 5, 5, 7}), {1, 10});
   file.Add(engine::MakeWordBag({5, 9}), {1, 20});
@@ -48,13 +48,13 @@ TEST(InvertedFile, ScoresByTermFrequencyAndInverseDocumentFrequency) {
               1e-6);
   EXPECT_EQ(hits[1].owner.keyframe, 20u);
   EXPECT_NEAR(hits[1].score, common / wanted, 1e-6);
-  // Half the L1 distance of the normalised vectors is what is missing to 1 (Nister and Stewenius 2006).
+  // One minus half the L1 distance of the normalized vectors (Nister and Stewenius 2006).
   const double distance = std::abs(common / wanted - 3 * common / (3 * common + rare)) +
                           std::abs(rare / wanted - rare / (3 * common + rare));
   EXPECT_NEAR(hits[0].score, 1 - distance / 2, 1e-6);
 }
 
-TEST(InvertedFile, AKeyframeScoresOneAgainstItselfAndNothingInCommonIsNoHit) {
+TEST(InvertedFile, AKeyframeScoresOneWithItselfAndUnrelatedOnesAreNoHits) {
   InvertedFile file;
   const auto own = file.Add(engine::MakeWordBag({1, 2, 2, 3}), {4, 1});
   const auto other = file.Add(engine::MakeWordBag({100, 200}), {4, 2});
@@ -83,7 +83,7 @@ TEST(InvertedFile, ARareWordCountsMoreThanACommonOne) {
   EXPECT_GT(hits[0].score, 2 * hits[1].score);
 }
 
-TEST(InvertedFile, AddingAndRemovingLeavesItAsItWas) {
+TEST(InvertedFile, RemovingAddedKeyframesRestoresTheResults) {
   InvertedFile file, never_touched;
   for (engine::KeyFrameId i = 0; i < 40; ++i) {
     file.Add(RandomBag(i, 30, 0, 200), {1, i});
@@ -98,9 +98,10 @@ TEST(InvertedFile, AddingAndRemovingLeavesItAsItWas) {
   EXPECT_EQ(file.size(), 40u);
   EXPECT_EQ(file.postings(), never_touched.postings());
   EXPECT_EQ(Answer(file, wanted), Answer(never_touched, wanted));
-  // Slots are used again.
+  // Slots are reused.
   EXPECT_EQ(file.Add(RandomBag(7, 30, 0, 200), {3, 9}), others.back());
-  EXPECT_EQ(file.Search(wanted, 2)[1].owner.map_key, 3u) << "as much alike as the first, which it is";
+  EXPECT_EQ(file.Search(wanted, 2)[1].owner.map_key, 3u)
+      << "it must score like the first, which has the same words";
 }
 
 TEST(InvertedFile, ReadsNoMoreWhenKeyframesWithOtherWordsAreAdded) {
@@ -118,9 +119,9 @@ TEST(InvertedFile, ReadsNoMoreWhenKeyframesWithOtherWordsAreAdded) {
   EXPECT_EQ(after.postings, before.postings);
 }
 
-TEST(InvertedFile, LeavesOutTheCommonestWordsWhereTheyWouldCostTooMuchAndFindsTheSame) {
+TEST(InvertedFile, SkipsTooFrequentWordsAndFindsTheSame) {
   InvertedFile file;
-  // 20,000 keyframes share the same 40 words and have ten of their own each.
+  // 20,000 keyframes share the same 40 words and have ten unique words each.
   WordBag common = RandomBag(1, 40, 0, 40);
   for (engine::KeyFrameId i = 0; i < 20'000; ++i) {
     WordBag bag = common;
@@ -132,13 +133,13 @@ TEST(InvertedFile, LeavesOutTheCommonestWordsWhereTheyWouldCostTooMuchAndFindsTh
   InvertedFile::Cost cost;
   const auto hits = file.Search(wanted, 3, &cost);
   EXPECT_EQ(hits[0].owner.keyframe, 777u);
-  EXPECT_NEAR(hits[0].score, 1, 1e-6) << "what is compared at last is compared by all words";
+  EXPECT_NEAR(hits[0].score, 1, 1e-6) << "the final comparison uses all words";
   EXPECT_GE(cost.words, 10u);
   EXPECT_LT(cost.words, 50u);
   EXPECT_LE(cost.postings, 300'000u);
 }
 
-TEST(InvertedFile, IsSearchedWhileKeyframesComeAndGo) {
+TEST(InvertedFile, CanBeSearchedWhileKeyframesAreAddedAndRemoved) {
   InvertedFile file;
   for (engine::KeyFrameId i = 0; i < 100; ++i) file.Add(RandomBag(i, 30, 0, 300), {1, i});
   std::atomic<bool> done = false;

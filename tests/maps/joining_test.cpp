@@ -14,7 +14,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Not a true overlap: what the library does with two maps does not depend on what they show.
+// Not a real overlap: the library joins two maps regardless of their contents.
 std::shared_ptr<const engine::MapSnapshot> BothOf(const StoredMap& into, const StoredMap& from) {
   engine::JoinedIds ids;
   return std::make_shared<engine::MapSnapshot>(engine::SideBySide(*into.snapshot, *from.snapshot, &ids));
@@ -35,7 +35,7 @@ JoinRecord RecordOf(const Library& library, const char* into, const char* from) 
   return record;
 }
 
-// East and West, and a hall in which a sign points to West.
+// East and West, and a hall with a signpost to West.
 class JoinedLibrary : public ::testing::Test {
  protected:
   void Add(const char* name, std::uint64_t seed, Policy policy = Policy::kOpen) {
@@ -59,7 +59,7 @@ class JoinedLibrary : public ::testing::Test {
   Library library_ = OpenToWrite(folder_ / "a.docent");
 };
 
-TEST_F(JoinedLibrary, HoldsOneMapWithEverythingOfBoth) {
+TEST_F(JoinedLibrary, HasOneMapWithEverythingOfBoth) {
   Add("East", 1);
   Add("West", 5);
   AddHall();
@@ -74,9 +74,9 @@ TEST_F(JoinedLibrary, HoldsOneMapWithEverythingOfBoth) {
   EXPECT_EQ(FirstDifference(joined.scene, *record.scene), "");
   EXPECT_EQ(joined.info.policy, Policy::kOpen);
   EXPECT_EQ(library_.LoadScene(library_.FindByName("Hall").key).text, "to East");
-  library_.LoadAppearance([](const MapInfo& info, const Library::Appearance& looks) {
-    EXPECT_EQ(looks.problem, "");
-    EXPECT_EQ(looks.thumbnails.size(), info.keyframes);
+  library_.LoadAppearance([](const MapInfo& info, const Library::Appearance& appearance) {
+    EXPECT_EQ(appearance.problem, "");
+    EXPECT_EQ(appearance.thumbnails.size(), info.keyframes);
   });
 }
 
@@ -97,7 +97,7 @@ TEST_F(JoinedLibrary, KeepsTheStricterPolicyAndTheBoundsOfBoth) {
   EXPECT_THAT(library_.Verify(), IsEmpty());
 }
 
-TEST_F(JoinedLibrary, LeavesMapsAloneWhosePolicyForbidsIt) {
+TEST_F(JoinedLibrary, DoesNotChangeMapsWhosePolicyForbidsIt) {
   Add("East", 1);
   Add("West", 5);
   JoinRecord record = RecordOf(library_, "East", "West");
@@ -117,7 +117,7 @@ TEST_F(JoinedLibrary, LeavesMapsAloneWhosePolicyForbidsIt) {
   EXPECT_EQ(Names(), (std::vector<std::string>{"East", "West"}));
 }
 
-TEST_F(JoinedLibrary, WritesNothingWhereASignpostMayNotBeRedirected) {
+TEST_F(JoinedLibrary, WritesNothingWhenASignpostMayNotBeRedirected) {
   Add("East", 1);
   Add("West", 5);
   AddHall(Policy::kReadOnly);
@@ -127,12 +127,12 @@ TEST_F(JoinedLibrary, WritesNothingWhereASignpostMayNotBeRedirected) {
   EXPECT_THAT(ErrorOf([&] { library_.Join(record); }), AllOf(HasSubstr("Hall"), HasSubstr("West")));
   EXPECT_EQ(Names(), (std::vector<std::string>{"East", "West", "Hall"}));
   EXPECT_EQ(FirstDifference(*library_.Load(before.info.key).snapshot, *before.snapshot), "");
-  // Nothing points to West there any more: then the hall is in nobody's way.
+  // When nothing refers to West, the hall's policy does not matter.
   record.redirect = [](const std::string&) { return std::nullopt; };
   EXPECT_TRUE(library_.Join(record));
 }
 
-TEST_F(JoinedLibrary, LeavesWhatAnotherProgramHasChangedMeanwhile) {
+TEST_F(JoinedLibrary, KeepsChangesOfAnotherProgram) {
   Add("East", 1);
   Add("West", 5);
   const JoinRecord record = RecordOf(library_, "East", "West");
@@ -142,12 +142,12 @@ TEST_F(JoinedLibrary, LeavesWhatAnotherProgramHasChangedMeanwhile) {
   EXPECT_EQ(Names(), (std::vector<std::string>{"East", "West"}));
 }
 
-TEST_F(JoinedLibrary, LosesAMapWithTheSaveOfTheOneThatHoldsIt) {
+TEST_F(JoinedLibrary, RemovesAJoinedMapWithTheSaveOfTheMapThatContainsIt) {
   Add("East", 1);
   Add("West", 5);
   const MapInfo east = library_.FindByName("East"), west = library_.FindByName("West");
   MapRecord record{east.key, "", Policy::kOpen, MakeSampleMap(3), MakeSampleScene(5, 1)};
-  record.holds = {west.key, west.key + 50};
+  record.joined_keys = {west.key, west.key + 50};
   library_.SetPolicy(west.key, Policy::kReadOnly);
   EXPECT_THAT(ErrorOf([&] { library_.Save(record); }), AllOf(HasSubstr("West"), HasSubstr("read-only")));
   EXPECT_EQ(library_.Find(east.key), east) << "nothing was written";
@@ -155,7 +155,7 @@ TEST_F(JoinedLibrary, LosesAMapWithTheSaveOfTheOneThatHoldsIt) {
   EXPECT_TRUE(library_.Save(record));
   EXPECT_EQ(Names(), std::vector<std::string>{"East"});
   EXPECT_EQ(FirstDifference(library_.Load(east.key).scene, *record.scene), "") << "with an asset of West";
-  EXPECT_TRUE(library_.Save(record)) << "what is gone already is no fault";
+  EXPECT_TRUE(library_.Save(record)) << "a map that was removed already is no error";
   EXPECT_THAT(library_.Verify(), IsEmpty());
 }
 
@@ -165,7 +165,7 @@ TEST_F(JoinedLibrary, KeepsTwoMapsThatDoNotOverlap) {
   Library library = Library::Open(folder_ / "a.docent", Access::kReadWrite);
   const std::uint64_t east = library.FindByName("East").key, west = library.FindByName("West").key;
   const JoinResult result = JoinMaps(&library, east, west, {}, nullptr);
-  EXPECT_NE(result.refusal, "") << "images of noise show no common place";
+  EXPECT_NE(result.refusal, "") << "noise images have no common place";
   EXPECT_EQ(Names(), (std::vector<std::string>{"East", "West"}));
   EXPECT_THAT(ErrorOf([&] { JoinMaps(&library, east, east, {}, nullptr); }), HasSubstr("itself"));
 }

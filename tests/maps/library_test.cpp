@@ -16,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-TEST(Library, GivesBackWhatWasSavedFieldByField) {
+TEST(Library, LoadsWhatWasSavedFieldByField) {
   const TemporaryFolder folder;
   const auto desk = MakeSampleMap(1);
   const auto door = MakeSampleMap(2, {.keyframes = 12, .points = 300});
@@ -52,7 +52,7 @@ TEST(Library, GivesBackWhatWasSavedFieldByField) {
   EXPECT_TRUE(library.Verify().empty());
 }
 
-TEST(Library, SharesOneCameraAmongTheKeyframesThatHaveIt) {
+TEST(Library, SharesOneCameraAmongItsKeyframes) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
@@ -63,7 +63,7 @@ TEST(Library, SharesOneCameraAmongTheKeyframesThatHaveIt) {
   EXPECT_EQ(loaded->keyframes[2].camera, loaded->keyframes[5].camera);
 }
 
-TEST(Library, RebuildsTheFeaturesOfTheEngineFromTheStoredImages) {
+TEST(Library, RecomputesFeaturesFromTheStoredImages) {
   const TemporaryFolder folder;
   const auto map = MakeSampleMap(3, {.keyframes = 5});
   Library library = Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes);
@@ -82,7 +82,7 @@ TEST(Library, RebuildsTheFeaturesOfTheEngineFromTheStoredImages) {
   }
 }
 
-TEST(Library, HoldsAMapWithoutKeyframes) {
+TEST(Library, StoresAMapWithoutKeyframes) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
@@ -91,7 +91,7 @@ TEST(Library, HoldsAMapWithoutKeyframes) {
   EXPECT_TRUE(library.Verify().empty());
 }
 
-TEST(Library, KeepsUpWithAMapThatGrowsShrinksAndMoves) {
+TEST(Library, UpdatesAMapThatGrowsShrinksAndMoves) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
@@ -112,7 +112,7 @@ TEST(Library, KeepsUpWithAMapThatGrowsShrinksAndMoves) {
   EXPECT_EQ(FirstDifference(*library.Load(key).snapshot, *map), "");
   EXPECT_TRUE(library.Verify().empty());
 
-  const auto other = MakeSampleMap(55);  // the same ids with other images
+  const auto other = MakeSampleMap(55);  // The same ids with other images.
   library.Save({key, "", Policy::kOpen, other, nullptr});
   EXPECT_EQ(FirstDifference(*library.Load(key).snapshot, *other), "");
   EXPECT_TRUE(library.Verify().empty());
@@ -130,12 +130,12 @@ TEST(Library, WritesLittleWhenOnlyPointsMoved) {
   library.Save({key, "", Policy::kOpen, map, nullptr});
   const auto written = std::filesystem::file_size(log) - before;
   EXPECT_GT(written, 0u);
-  EXPECT_LT(written, 64u << 10);  // four images of noise are some 500 KiB
+  EXPECT_LT(written, 64u << 10);  // Four noise images take about 500 KiB.
   library.Save({key, "", Policy::kOpen, map, nullptr});
-  EXPECT_EQ(std::filesystem::file_size(log), before + written) << "nothing changed, so nothing is written";
+  EXPECT_EQ(std::filesystem::file_size(log), before + written) << "an unchanged map must not be written";
 }
 
-TEST(Library, TellsTheTimesOfCreationAndOfTheLastChange) {
+TEST(Library, RecordsTheTimesOfCreationAndOfTheLastChange) {
   const TemporaryFolder folder;
   LibraryOptions options = QuickOptions();
   WallTime now{std::chrono::seconds(1000)};
@@ -149,7 +149,7 @@ TEST(Library, TellsTheTimesOfCreationAndOfTheLastChange) {
   EXPECT_EQ(library.Find(key).modified, WallTime(std::chrono::seconds(1005)));
 }
 
-TEST(Library, NeverGivesAKeyTwiceEvenAfterAMapIsRemovedAndTheFileReopened) {
+TEST(Library, NeverReusesAKey) {
   const TemporaryFolder folder;
   std::uint64_t first = 0;
   {
@@ -166,31 +166,31 @@ TEST(Library, NeverGivesAKeyTwiceEvenAfterAMapIsRemovedAndTheFileReopened) {
   EXPECT_THAT(ErrorOf([&] {
                 library.Save({1000, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
               }),
-              HasSubstr("key was not given out"));
+              HasSubstr("key was not issued"));
   EXPECT_THAT(ErrorOf([&] {
                 library.Save({0, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
               }),
               HasSubstr("has no key"));
 }
 
-TEST(Library, RefusesTwoMapsOfOneNameAndNamesThatCannotBeShown) {
+TEST(Library, RejectsDuplicateAndInvalidNames) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t a = library.NewKey(), b = library.NewKey();
   library.Save({a, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
   const MapRecord duplicate{b, "Desk", Policy::kOpen, MakeSampleMap(2), nullptr};
-  EXPECT_THAT(ErrorOf([&] { library.Save(duplicate); }), HasSubstr("another map of the name 'Desk'"));
+  EXPECT_THAT(ErrorOf([&] { library.Save(duplicate); }), HasSubstr("already a map named 'Desk'"));
   library.Save({b, "Door", Policy::kOpen, MakeSampleMap(2), nullptr});
-  EXPECT_THAT(ErrorOf([&] { library.Rename(b, "Desk"); }), HasSubstr("another map of the name 'Desk'"));
-  EXPECT_THAT(ErrorOf([&] { library.Rename(b, ""); }), HasSubstr("name has 1 to 200 bytes"));
-  EXPECT_THAT(ErrorOf([&] { library.Rename(b, "two\nlines"); }), HasSubstr("name has 1 to 200 bytes"));
+  EXPECT_THAT(ErrorOf([&] { library.Rename(b, "Desk"); }), HasSubstr("already a map named 'Desk'"));
+  EXPECT_THAT(ErrorOf([&] { library.Rename(b, ""); }), HasSubstr("name must have 1 to 200 bytes"));
+  EXPECT_THAT(ErrorOf([&] { library.Rename(b, "two\nlines"); }), HasSubstr("name must have 1 to 200 bytes"));
   library.Rename(b, "Gr\xC3\xBCne T\xC3\xBCr");
   EXPECT_EQ(library.FindByName("Gr\xC3\xBCne T\xC3\xBCr").key, b);
-  EXPECT_THAT(ErrorOf([&] { library.FindByName("Door"); }), HasSubstr("has no map of the name 'Door'"));
+  EXPECT_THAT(ErrorOf([&] { library.FindByName("Door"); }), HasSubstr("has no map named 'Door'"));
   EXPECT_THAT(ErrorOf([&] { library.Load(77); }), HasSubstr("has no map with the key 77"));
 }
 
-TEST(Library, ASaveOnItsWayDoesNotUndoANewNameOrPolicy) {
+TEST(Library, AWaitingSaveDoesNotRevertANewNameOrPolicy) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
@@ -202,7 +202,7 @@ TEST(Library, ASaveOnItsWayDoesNotUndoANewNameOrPolicy) {
   EXPECT_EQ(library.Find(key).policy, Policy::kBounded);
 }
 
-TEST(Library, KeepsAnAssetOnceHoweverManyScenesShowItAndDropsItWithTheLast) {
+TEST(Library, StoresASharedAssetOnceUntilNoSceneUsesIt) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t a = library.NewKey(), b = library.NewKey();
@@ -211,7 +211,7 @@ TEST(Library, KeepsAnAssetOnceHoweverManyScenesShowItAndDropsItWithTheLast) {
   scene->assets = {MakeSampleAsset(1, 200'000)};
   library.Save({a, "A", Policy::kOpen, MakeSampleMap(1), scene});
   auto by_id = std::make_shared<SceneRecord>(*scene);
-  by_id->assets[0].bytes = nullptr;  // it is there already
+  by_id->assets[0].bytes = nullptr;  // It is stored already.
   library.Save({b, "B", Policy::kOpen, MakeSampleMap(2), by_id});
   EXPECT_EQ(FirstDifference(library.LoadScene(b), *scene), "");
 
@@ -223,11 +223,11 @@ TEST(Library, KeepsAnAssetOnceHoweverManyScenesShowItAndDropsItWithTheLast) {
                 library.Save({b, "", Policy::kOpen, nullptr, by_id});
               }),
               HasSubstr("is not in the library"))
-      << "the bytes are gone with the last scene";
+      << "the bytes were removed with the last scene";
   EXPECT_TRUE(library.Verify().empty());
 }
 
-TEST(Library, RefusesOtherBytesUnderTheIdOfAnAsset) {
+TEST(Library, RejectsDifferentBytesForTheSameAssetId) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
@@ -244,7 +244,7 @@ TEST(Library, RefusesOtherBytesUnderTheIdOfAnAsset) {
   EXPECT_EQ(FirstDifference(library.LoadScene(key), *scene), "");
 }
 
-TEST(Library, RefusesAMapThatIsNotConsistentAndKeepsTheOldOne) {
+TEST(Library, RejectsAnInconsistentMapAndKeepsTheOldOne) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();

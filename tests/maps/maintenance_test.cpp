@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::IsEmpty;
 
-TEST(Upkeep, BringsAMapThatWasLeftCrookedBackToTheTruth) {
+TEST(Maintenance, RestoresAPerturbedMapToGroundTruth) {
   const TemporaryFolder folder;
   Library library = Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes);
   const auto truth = MakeTrueMap();
@@ -53,7 +53,7 @@ TEST(Upkeep, BringsAMapThatWasLeftCrookedBackToTheTruth) {
   EXPECT_THAT(library.Verify(), IsEmpty());
 }
 
-TEST(Upkeep, TakesContentAlongWithItsGround) {
+TEST(Maintenance, MovesContentWithItsAnchor) {
   const TemporaryFolder folder;
   Library library = Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes);
   auto crooked = std::make_shared<engine::MapSnapshot>(*MakeTrueMap());
@@ -72,7 +72,7 @@ TEST(Upkeep, TakesContentAlongWithItsGround) {
   EXPECT_EQ(library.Load(key).scene.text, "there");
 }
 
-TEST(Upkeep, LeavesAMapThatAnotherProgramHasChangedMeanwhile) {
+TEST(Maintenance, KeepsChangesOfAnotherProgram) {
   const TemporaryFolder folder;
   LibraryOptions options;
   std::optional<Library> other;
@@ -81,7 +81,7 @@ TEST(Upkeep, LeavesAMapThatAnotherProgramHasChangedMeanwhile) {
   for (engine::MapPoint& point : crooked->points) point.point_in_map.z() += point.id % 2 == 0 ? 0.02 : -0.02;
   const auto theirs = MakeSampleMap(5);
   theirs->revision = crooked->revision + 7;
-  // The other one saves while this one reads the images: after its transaction saw the file.
+  // The other one saves while this one reads the images, after this one's transaction has begun.
   std::once_flag once;
   std::jthread saves;
   options.make_features = [&](const cv::Mat& gray) {
@@ -99,12 +99,12 @@ TEST(Upkeep, LeavesAMapThatAnotherProgramHasChangedMeanwhile) {
   EXPECT_EQ(FirstDifference(*other->Load(key).snapshot, *theirs), "");
 }
 
-TEST(Upkeep, TakesRedundantKeyframesOutOfAMapThatRests) {
+TEST(Maintenance, CullsRedundantKeyframesOfAnIdleMap) {
   auto map = std::make_shared<engine::MapSnapshot>(*MakeTrueMap(12, 0.02));
   ASSERT_EQ(engine::Validate(*map), "");
   const AdjustedMap adjusted = AdjustIdleMap(*map, nullptr);
   ASSERT_EQ(adjusted.optimization.outcome, Optimization::Outcome::kAdjusted);
-  EXPECT_EQ(adjusted.optimization.keyframes_removed, 4u) << "all but the eight that every map keeps";
+  EXPECT_EQ(adjusted.optimization.keyframes_removed, 4u) << "all except the eight that every map keeps";
   EXPECT_EQ(adjusted.snapshot->keyframes.size(), 8u);
   EXPECT_EQ(adjusted.snapshot->points.size(), map->points.size()) << "no point is lost";
   EXPECT_EQ(adjusted.optimization.observations_removed, 0u);

@@ -21,7 +21,7 @@ std::span<const std::uint8_t> AsBytes(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-// Puts `value` at `offset` and makes the checksum right again, as a forger would.
+// Writes `value` at `offset` and updates the checksum, as a forger would.
 template <typename Number>
 Bytes Forged(Bytes bytes, std::size_t offset, Number value) {
   std::memcpy(bytes.data() + offset, &value, sizeof(value));
@@ -30,14 +30,14 @@ Bytes Forged(Bytes bytes, std::size_t offset, Number value) {
   return bytes;
 }
 
-TEST(Checksum, AgreesWithThePublishedValuesOfXxh64) {
+TEST(Checksum, MatchesPublishedValuesOfXxh64) {
   EXPECT_EQ(Checksum({}), 0xEF46DB3751D8E999ull);
   EXPECT_EQ(Checksum(AsBytes("a")), 0xD24EC4F1A98C6E5Bull);
   EXPECT_EQ(Checksum(AsBytes("abc")), 0x44BC2CF5AD770999ull);
   EXPECT_EQ(Checksum(AsBytes("Nobody inspects the spammish repetition")), 0xFBCEA83C8A378BF1ull);
 }
 
-TEST(MapCodec, EveryFlippedBitOfATableIsNoticed) {
+TEST(MapCodec, EveryFlippedBitOfATableIsDetected) {
   const auto map = MakeSampleMap(1, {.keyframes = 2, .points = 3});
   const Bytes points = EncodePoints(7, map->points);
   for (std::size_t bit = 0; bit < points.size() * 8; ++bit) {
@@ -49,21 +49,21 @@ TEST(MapCodec, EveryFlippedBitOfATableIsNoticed) {
     EXPECT_THROW(DecodePoints(7, std::span(points).first(size)), Error) << size;
   }
   EXPECT_THAT(ErrorOf([&] { DecodePoints(8, points); }), HasSubstr("belongs to another map"));
-  EXPECT_THAT(ErrorOf([&] { DecodeObservations(7, points); }), HasSubstr("does not begin as it should"));
+  EXPECT_THAT(ErrorOf([&] { DecodeObservations(7, points); }), HasSubstr("its header is not valid"));
 }
 
-TEST(MapCodec, ACountIsBelievedOnlyWhenTheBytesAreThere) {
+TEST(MapCodec, ACountMustMatchTheNumberOfBytes) {
   const Bytes points = EncodePoints(7, MakeSampleMap(1)->points);
   for (const std::uint64_t count :
        {std::uint64_t{0}, std::uint64_t{41}, std::uint64_t{1} << 60, ~std::uint64_t{0}}) {
-    EXPECT_THAT(ErrorOf([&] { DecodePoints(7, Forged(points, 16, count)); }), HasSubstr("says it has"));
+    EXPECT_THAT(ErrorOf([&] { DecodePoints(7, Forged(points, 16, count)); }), HasSubstr("its header gives"));
   }
   const Bytes scene = EncodeScene(7, {"text", {"a", "b"}});
   EXPECT_THROW(DecodeScene(7, Forged(scene, 16, ~std::uint64_t{0})), Error);
   EXPECT_THROW(DecodeScene(7, Forged(scene, 24, ~std::uint32_t{0})), Error);
 }
 
-TEST(MapCodec, ForgedNumbersOfCamerasAndKeyframesAreRefused) {
+TEST(MapCodec, ForgedNumbersOfCamerasAndKeyframesAreRejected) {
   const auto keyframes = MakeStoredKeyFrames(*MakeSampleMap(1));
   const CameraTable cameras = MakeCameraTable(keyframes);
   const Bytes camera_bytes = EncodeCameras(7, cameras);
@@ -87,7 +87,7 @@ TEST(MapCodec, ForgedNumbersOfCamerasAndKeyframesAreRefused) {
               HasSubstr("rotation"));
 }
 
-TEST(MapCodec, AImageOfAnotherSizeOrContentIsRefusedBeforeItIsUnpacked) {
+TEST(MapCodec, AnImageOfAnotherSizeOrContentIsRejected) {
   const auto map = MakeSampleMap(1);
   const auto keyframes = MakeStoredKeyFrames(*map);
   const Bytes bytes = EncodeImage(7, 0, map->keyframes[0].features->levels[0]);
@@ -103,7 +103,7 @@ TEST(MapCodec, AImageOfAnotherSizeOrContentIsRefusedBeforeItIsUnpacked) {
   EXPECT_THAT(ErrorOf([&] { DecodeImage(7, other, bytes); }), HasSubstr("not the one that was saved"));
 }
 
-TEST(MapCodec, PanoramaMapsAreBelievedOnlyWhereTheirMembersAre) {
+TEST(MapCodec, PanoramaMapsMustReferToExistingMembers) {
   const auto map = MakeSampleMap(1, {.keyframes = 6, .points = 40});
   const MapParts parts = {MakeStoredKeyFrames(*map), map->points, map->observations, map->panoramas,
                           map->next_panorama};
@@ -125,11 +125,12 @@ TEST(MapCodec, PanoramaMapsAreBelievedOnlyWhereTheirMembersAre) {
     EXPECT_THROW(DecodePanoramas(7, Forged(bytes, 16, count), &decoded), Error);
   }
   MapParts fewer = without;
-  fewer.points.pop_back();  // the last one is infinite
-  EXPECT_THAT(ErrorOf([&] { DecodePanoramas(7, bytes, &fewer); }), HasSubstr("names what is not there"));
+  fewer.points.pop_back();  // The last one is infinite.
+  EXPECT_THAT(ErrorOf([&] { DecodePanoramas(7, bytes, &fewer); }),
+              HasSubstr("refers to something that does not exist"));
 }
 
-TEST(MapCodec, ThumbnailsAreBelievedOnlyWhenTheirBytesAreThere) {
+TEST(MapCodec, ThumbnailsMustMatchTheNumberOfBytes) {
   const std::vector<KeyFrameThumbnail> thumbnails = {
       {2, {6, 3, {1, -2, 3, -4, 5, -6, 7, -8, 9, 1, -2, 3, -4, 5, -6, 7, -8, 9}}},
       {5, {4, 4, std::vector<std::int8_t>(16, 127)}}};
@@ -137,7 +138,7 @@ TEST(MapCodec, ThumbnailsAreBelievedOnlyWhenTheirBytesAreThere) {
   EXPECT_EQ(DecodeThumbnails(7, bytes), thumbnails);
   for (const std::uint64_t count : {std::uint64_t{1}, std::uint64_t{3}, ~std::uint64_t{0}})
     EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 16, count)), Error);
-  EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 24, std::uint32_t{5})), Error) << "twice the same keyframe";
+  EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 24, std::uint32_t{5})), Error) << "the same keyframe twice";
   EXPECT_THROW(DecodeThumbnails(7, EncodeThumbnails(7, std::vector<KeyFrameThumbnail>{{2, {1, 1, {127}}}})),
                Error)
       << "smaller than any image's";
@@ -145,12 +146,12 @@ TEST(MapCodec, ThumbnailsAreBelievedOnlyWhenTheirBytesAreThere) {
   EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 28, std::uint16_t{0xFFFF})), Error);
 }
 
-TEST(MapCodec, AMapThatIsReadAndWrittenAgainAndAgainHasNotChanged) {
+TEST(MapCodec, RepeatedReadingAndWritingDoesNotChangeAMap) {
   Random random(3);
   const engine::MapSnapshot sample = *MakeSampleMap(1, {.keyframes = 1});
   const StoredKeyFrame pattern = [&] {
     StoredKeyFrame keyframe = MakeStoredKeyFrames(sample)[0];
-    keyframe.keyframe.panorama = engine::kNoId;  // is kept elsewhere
+    keyframe.keyframe.panorama = engine::kNoId;  // It is stored elsewhere.
     return keyframe;
   }();
   MapParts first;
@@ -169,7 +170,7 @@ TEST(MapCodec, AMapThatIsReadAndWrittenAgainAndAgainHasNotChanged) {
   }
   again.keyframes[5].keyframe.camera_from_map.rotation =
       again.keyframes[5].keyframe.camera_from_map.rotation * engine::Rotation3::Exp({1e-9, 0, 0});
-  EXPECT_FALSE(SameStructure(first, again)) << "a small turn is a change";
+  EXPECT_FALSE(SameStructure(first, again)) << "a small rotation is a change";
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// A library of maps of equal size, with keys from 1 on, opened to be read, and an index over it.
+// A library of maps of equal size with keys from 1 on, opened read-only, and an index of it.
 class Pager : public ::testing::Test {
  protected:
   void MakeLibrary(int maps) {
@@ -36,7 +36,7 @@ class Pager : public ::testing::Test {
   static std::shared_ptr<engine::MapSnapshot> MapOf(std::uint64_t key) {
     return MakeSampleMap(1000 * key, {.keyframes = 2, .points = 10});
   }
-  // What a camera sees that stands where a map's first keyframe was taken.
+  // The thumbnail of a camera at the pose of a map's first keyframe.
   static engine::SmallBlurryImage ViewOf(std::uint64_t key) {
     return engine::MakeSmallBlurryImage(MapOf(key)->keyframes[0].features->levels[0]);
   }
@@ -53,14 +53,14 @@ class Pager : public ::testing::Test {
   std::size_t map_bytes_ = 0;
 };
 
-TEST_F(Pager, ReadsASmallLibraryWholeAtTheStart) {
+TEST_F(Pager, LoadsASmallLibraryCompletelyOnOpening) {
   MakeLibrary(3);
   MapPager pager(&*library_, &index_, {}, {});
   EXPECT_EQ(pager.Open().size(), 3u);
   EXPECT_EQ(pager.maps_in_memory().size(), 3u);
 }
 
-TEST_F(Pager, ReadsOnlyTheIndexOfALargerLibrary) {
+TEST_F(Pager, ReadsOnlyTheIndexOfALargeLibrary) {
   MakeLibrary(3);
   MapPager pager(&*library_, &index_, Options(2), {});
   pager.Open();
@@ -68,12 +68,12 @@ TEST_F(Pager, ReadsOnlyTheIndexOfALargerLibrary) {
   EXPECT_EQ(index_.keyframes(), 6u);
 }
 
-TEST_F(Pager, GivesAMapThatIsSeenAndLetsTheLeastRecentlyUsedGo) {
+TEST_F(Pager, LoadsAMapInViewAndEvictsTheLeastRecentlyUsed) {
   MakeLibrary(6);
   std::vector<std::uint64_t> read, gone;
   MapPager::Callbacks callbacks;
   callbacks.loaded = [&](const StoredMap& map) { read.push_back(map.info.key); };
-  callbacks.let_go = [&](std::uint64_t key) {
+  callbacks.evict = [&](std::uint64_t key) {
     gone.push_back(key);
     return true;
   };
@@ -92,7 +92,7 @@ TEST_F(Pager, GivesAMapThatIsSeenAndLetsTheLeastRecentlyUsedGo) {
   EXPECT_THAT(pager.maps_in_memory(), ElementsAre(4, 1));
 }
 
-TEST_F(Pager, NeverHoldsMoreThanTheBudgetOnATourOfManyMaps) {
+TEST_F(Pager, StaysWithinTheBudgetOnATourOfManyMaps) {
   MakeLibrary(120);
   MapPager pager(&*library_, &index_, Options(5), {});
   pager.Open();
@@ -104,22 +104,22 @@ TEST_F(Pager, NeverHoldsMoreThanTheBudgetOnATourOfManyMaps) {
   }
 }
 
-TEST_F(Pager, KeepsWhatIsHeldAndWhatMayNotGo) {
+TEST_F(Pager, KeepsPinnedMapsAndMapsThatMayNotBeEvicted) {
   MakeLibrary(5);
   MapPager::Callbacks callbacks;
-  callbacks.let_go = [](std::uint64_t key) { return key != 2; };
+  callbacks.evict = [](std::uint64_t key) { return key != 2; };
   MapPager pager(&*library_, &index_, Options(2.5), callbacks);
   pager.Open();
   pager.Load(1);
-  pager.Hold({1});
+  pager.Pin({1});
   for (const std::uint64_t key : {2, 3, 4, 5}) pager.Load(key);
   EXPECT_THAT(pager.maps_in_memory(), ElementsAre(5, 2, 1));
-  pager.Hold({});
+  pager.Pin({});
   pager.Load(3);
   EXPECT_THAT(pager.maps_in_memory(), ElementsAre(3, 2));
 }
 
-TEST_F(Pager, TellsOfAMapThatCannotBeReadOnceAndGoesOn) {
+TEST_F(Pager, ReportsAnUnreadableMapOnceAndContinues) {
   MakeLibrary(3);
   sqlite3* connection = nullptr;
   ASSERT_EQ(sqlite3_open((folder_ / "a.docent").c_str(), &connection), SQLITE_OK);
@@ -139,7 +139,7 @@ TEST_F(Pager, TellsOfAMapThatCannotBeReadOnceAndGoesOn) {
   EXPECT_EQ(pager.FindPlaces(ViewOf(3), 1, 1, 0).size(), 1u);
 }
 
-TEST_F(Pager, ReadsInTheBackgroundWhereNobodyMayWait) {
+TEST_F(Pager, LoadsInTheBackgroundWhenQueriesMustNotWait) {
   MakeLibrary(6);
   PagerOptions options = Options(2.5);
   options.wait_for_maps = false;
@@ -149,7 +149,7 @@ TEST_F(Pager, ReadsInTheBackgroundWhereNobodyMayWait) {
   MapPager pager(&*library_, &index_, options, callbacks);
   pager.Open();
   for (const std::uint64_t key : {4, 5, 6, 4}) {
-    // Whoever asks again finds it in the end; what it finds has its map.
+    // Repeated queries find it eventually, and a candidate always has its map.
     for (bool there = false; !there; std::this_thread::yield()) {
       for (const auto& candidate : pager.FindPlaces(ViewOf(key), 1, 1, 0)) {
         EXPECT_NE(candidate.map, nullptr);
@@ -158,7 +158,7 @@ TEST_F(Pager, ReadsInTheBackgroundWhereNobodyMayWait) {
     }
   }
   const int before = read;
-  pager.Expect({1});
+  pager.Prefetch({1});
   while (read == before) std::this_thread::yield();
 }
 

@@ -25,7 +25,7 @@ using engine::MapSnapshot;
 
 namespace {
 
-constexpr engine::PanoramaId kSamplePanorama = 3;  // the one of each map, about its first keyframe
+constexpr engine::PanoramaId kSamplePanorama = 3;  // The only one of each map, at its first keyframe.
 
 cv::Mat MakeImage(std::uint64_t seed, int width_px, int height_px, bool corners) {
   Random random(seed);
@@ -87,7 +87,7 @@ KeyFrame MakeKeyFrame(engine::KeyFrameId id, const Eigen::Vector3d& center, std:
 bool Same(const KeyFrame& a, const KeyFrame& b) {
   const cv::Mat& image_a = a.features->levels[0];
   const cv::Mat& image_b = b.features->levels[0];
-  // A rotation is normalized when it is read, which may move the last bits.
+  // Reading normalizes a rotation, which may change its last bits.
   return a.id == b.id && a.kind == b.kind && a.panorama == b.panorama && a.fixed == b.fixed &&
          a.time == b.time &&
          a.camera_from_map.rotation.quaternion().coeffs().isApprox(
@@ -107,7 +107,7 @@ std::shared_ptr<MapSnapshot> MakeSampleMap(std::uint64_t seed, const SampleOptio
   map->revision = 1 + random.Below(1000);
   const std::array cameras = {MakeCamera(options, 0), MakeCamera(options, 1)};
   for (int i = 0; i < options.keyframes; ++i) {
-    const auto id = static_cast<engine::KeyFrameId>(i + i / 2);  // ids with gaps, as after culling
+    const auto id = static_cast<engine::KeyFrameId>(i + i / 2);  // Ids with gaps, as after culling.
     const Eigen::Vector3d center(0.1 * i, random.Uniform(-0.05, 0.05), random.Uniform(-0.05, 0.05));
     map->keyframes.push_back(
         MakeKeyFrame(id, center, random.Next(), cameras[i % 3 == 2 ? 1 : 0], options.corners));
@@ -153,7 +153,7 @@ std::shared_ptr<engine::MapSnapshot> MakeTrueMap(int keyframes, double step) {
     engine::KeyFrame& keyframe = map->keyframes[i];
     keyframe.kind = engine::KeyFrameKind::kSixDof;
     keyframe.panorama = engine::kNoId;
-    keyframe.fixed = i < 2;  // two hold the scale
+    keyframe.fixed = i < 2;  // Two fixed keyframes define the scale.
     keyframe.camera = map->keyframes.front().camera;
     const double x = step * static_cast<double>(i);
     keyframe.camera_from_map = {engine::Rotation3::Exp({0.01 * x, -0.1 * x, 0.02}), {-x, 0.02 * x, 0.1 * x}};

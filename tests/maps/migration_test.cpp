@@ -22,23 +22,23 @@ Library Open(const std::filesystem::path& file, Access access) {
 
 std::vector<std::vector<KeyFrameThumbnail>> ThumbnailsIn(const Library& library) {
   std::vector<std::vector<KeyFrameThumbnail>> all;
-  library.LoadAppearance([&](const MapInfo&, Library::Appearance looks) {
-    EXPECT_EQ(looks.problem, "");
-    all.push_back(std::move(looks.thumbnails));
+  library.LoadAppearance([&](const MapInfo&, Library::Appearance appearance) {
+    EXPECT_EQ(appearance.problem, "");
+    all.push_back(std::move(appearance.thumbnails));
   });
   return all;
 }
 
 std::vector<std::vector<KeyFrameWords>> WordsIn(const Library& library) {
   std::vector<std::vector<KeyFrameWords>> all;
-  library.LoadAppearance([&](const MapInfo&, Library::Appearance looks) {
-    EXPECT_EQ(looks.problem, "");
-    all.push_back(std::move(looks.words));
+  library.LoadAppearance([&](const MapInfo&, Library::Appearance appearance) {
+    EXPECT_EQ(appearance.problem, "");
+    all.push_back(std::move(appearance.words));
   });
   return all;
 }
 
-// A library as an earlier version wrote it: its tables, by its own words, and two maps in them.
+// A library as an earlier version wrote it: the tables of that format, and two maps in them.
 class Migration : public ::testing::TestWithParam<int> {
  protected:
   Migration() {
@@ -92,7 +92,7 @@ class Migration : public ::testing::TestWithParam<int> {
 
   TemporaryFolder folder_;
   const std::filesystem::path file_ = folder_ / "a.docent";
-  // Nothing that the first format did not know.
+  // Removes what format 1 did not have.
   static std::shared_ptr<engine::MapSnapshot> WithoutPanoramas(std::shared_ptr<engine::MapSnapshot> map) {
     map->panoramas.clear();
     map->next_panorama = 0;
@@ -114,7 +114,7 @@ class Migration : public ::testing::TestWithParam<int> {
 };
 INSTANTIATE_TEST_SUITE_P(EachFormat, Migration, ::testing::Values(1, 2));
 
-TEST_P(Migration, AVisitorReadsAnEarlierFormatAndLeavesItAsItIs) {
+TEST_P(Migration, AVisitorReadsAnEarlierFormatWithoutChangingIt) {
   const Bytes before = ReadWholeFile(file_);
   const Library library = Open(file_, Access::kReadOnly);
   ExpectAllThere(library);
@@ -124,11 +124,11 @@ TEST_P(Migration, AVisitorReadsAnEarlierFormatAndLeavesItAsItIs) {
 }
 
 TEST_P(Migration, AnAuthorUpgradesAnEarlierFormatAndKeepsACopyOfIt) {
-  ASSERT_FALSE(words_.at(0).at(0).words.empty()) << "else nothing is tested";
+  ASSERT_FALSE(words_.at(0).at(0).words.empty()) << "without words the test is void";
   { ExpectUpgraded(Open(file_, Access::kReadWrite)); }
   EXPECT_EQ(FilesIn(folder_.path()), "a.docent " + CopyName());
   ExpectUpgraded(Open(file_, Access::kReadOnly));
-  // The copy is a library in itself, of that format.
+  // The copy is itself a library of that format.
   ExpectAllThere(Open(folder_ / CopyName(), Access::kReadOnly));
   const Bytes copy = ReadWholeFile(folder_ / CopyName());
   // The second time there is nothing to do.
@@ -138,7 +138,7 @@ TEST_P(Migration, AnAuthorUpgradesAnEarlierFormatAndKeepsACopyOfIt) {
   EXPECT_EQ(Open(folder_ / CopyName(), Access::kReadOnly).Find(1).name, "Desk");
 }
 
-TEST_P(Migration, ADamagedMapStopsTheUpgradeAndTheLibraryStaysAsItWas) {
+TEST_P(Migration, ADamagedMapStopsTheUpgradeWithoutChanges) {
   RunSql(file_, "DELETE FROM pictures WHERE map_key = 2 AND keyframe = 1");
   EXPECT_THAT(ErrorOf([&] { Open(file_, Access::kReadWrite); }),
               HasSubstr("map 'Door' (2): the image of keyframe 1"));
@@ -146,17 +146,17 @@ TEST_P(Migration, ADamagedMapStopsTheUpgradeAndTheLibraryStaysAsItWas) {
   EXPECT_EQ(FirstDifference(*library.Load(1).snapshot, *desk_), "");
 }
 
-TEST_P(Migration, WithoutRoomForACopyNothingIsUpgraded) {
+TEST_P(Migration, NothingIsUpgradedWhenTheCopyCannotBeMade) {
   const Bytes before = ReadWholeFile(file_);
   const auto unfinished = folder_ / (CopyName() + ".part");
-  std::filesystem::create_directory(unfinished);  // something in the copy's way
+  std::filesystem::create_directory(unfinished);  // It blocks the copy's path.
   WriteWholeFile(unfinished / "x", before);
   EXPECT_THAT(ErrorOf([&] { Open(file_, Access::kReadWrite); }),
               HasSubstr("no copy of it can be made beside it"));
   ExpectAllThere(Open(file_, Access::kReadOnly));
 }
 
-TEST_P(Migration, ADiskThatFillsUpAtAnyWriteLosesNothing) {
+TEST_P(Migration, AFullDiskAtAnyWriteLosesNothing) {
   const Bytes before = ReadWholeFile(file_);
   int failures = 0;
   for (int writes = 0; writes < 90; writes += 6) {
@@ -180,7 +180,7 @@ TEST_P(Migration, ADiskThatFillsUpAtAnyWriteLosesNothing) {
   EXPECT_GT(failures, 3) << "the disk was never full";
 }
 
-TEST(Thumbnails, AreThoseOfTheKeyframesAfterEverySave) {
+TEST(Thumbnails, MatchTheKeyframesAfterEverySave) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();
@@ -194,7 +194,7 @@ TEST(Thumbnails, AreThoseOfTheKeyframesAfterEverySave) {
   EXPECT_EQ(library.Verify(), std::vector<std::string>{});
 }
 
-TEST(Thumbnails, ThatAreDamagedAreToldAndTheOthersHandedOut) {
+TEST(Thumbnails, DamagedOnesAreReportedAndTheOthersLoaded) {
   const TemporaryFolder folder;
   {
     Library library = OpenToWrite(folder / "a.docent");
@@ -205,11 +205,11 @@ TEST(Thumbnails, ThatAreDamagedAreToldAndTheOthersHandedOut) {
   std::string problems;
   std::size_t keyframes = 0, words = 0;
   Open(folder / "a.docent", Access::kReadOnly)
-      .LoadAppearance([&](const MapInfo& info, const Library::Appearance& looks) {
-        problems += looks.problem;
-        keyframes += looks.thumbnails.size();
-        words += looks.words.size();
-        EXPECT_EQ(looks.thumbnails.empty(), info.name == "Desk");
+      .LoadAppearance([&](const MapInfo& info, const Library::Appearance& appearance) {
+        problems += appearance.problem;
+        keyframes += appearance.thumbnails.size();
+        words += appearance.words.size();
+        EXPECT_EQ(appearance.thumbnails.empty(), info.name == "Desk");
       });
   EXPECT_THAT(problems, HasSubstr("map 'Desk' (1): the table of thumbnails is cut off"));
   EXPECT_EQ(keyframes, 3u);

@@ -45,7 +45,7 @@ std::shared_ptr<const MapSnapshot> MakeMap(std::uint64_t first_seed, int keyfram
   return map;
 }
 
-// A thumbnail as an image of a scene gives one: what it shows is as coarse as the usual blur.
+// A thumbnail like that of a real scene, with structure as coarse as the usual blur.
 SmallBlurryImage MakeScene(std::uint64_t seed, int width = 80, int height = 60) {
   SmallBlurryImage image = MakeThumbnail(seed, width, height);
   cv::GaussianBlur(image.pixels, image.pixels, {}, 2.5);
@@ -53,7 +53,7 @@ SmallBlurryImage MakeScene(std::uint64_t seed, int width = 80, int height = 60) 
   return image;
 }
 
-// The same scene, seen `x` and `y` thumbnail pixels further to the right and down.
+// The same scene, shifted by `x` and `y` thumbnail pixels to the right and down.
 SmallBlurryImage Shifted(std::uint64_t seed, int x, int y) {
   constexpr int kMargin = 24;
   SmallBlurryImage image = MakeScene(seed, 80 + 2 * kMargin, 60 + 2 * kMargin);
@@ -68,13 +68,13 @@ std::vector<KeyFrameThumbnail> ThumbnailsOf(const MapSnapshot& map) {
   return thumbnails;
 }
 
-TEST(PlaceIndex, AnswersNothingWhenItKnowsNothing) {
+TEST(PlaceIndex, FindsNothingWhenItIsEmpty) {
   const PlaceIndex index;
   EXPECT_TRUE(index.FindPlaces(MakeThumbnail(1), 5, 5, 0).empty());
   EXPECT_TRUE(index.FindPlaces(SmallBlurryImage(), 5, 5, 0).empty());
 }
 
-TEST(PlaceIndex, FindsEachKeyframeAmongManyUnderNoise) {
+TEST(PlaceIndex, FindsEachKeyframeAmongManyDespiteNoise) {
   PlaceIndex index;
   std::vector<std::shared_ptr<const MapSnapshot>> maps;
   for (std::uint64_t key = 1; key <= 10; ++key) {
@@ -105,7 +105,7 @@ TEST(PlaceIndex, FindsEachKeyframeAmongManyUnderNoise) {
   }
 }
 
-TEST(PlaceIndex, FindsAKeyframeByAnImageThatIsTurnedAside) {
+TEST(PlaceIndex, FindsAKeyframeByAShiftedImage) {
   PlaceIndex index;
   auto map = std::make_shared<MapSnapshot>();
   for (std::uint64_t i = 0; i < 600; ++i) {
@@ -127,7 +127,7 @@ TEST(PlaceIndex, FindsAKeyframeByAnImageThatIsTurnedAside) {
   }
 }
 
-TEST(PlaceIndex, KnowsMapsThatAreNotInMemory) {
+TEST(PlaceIndex, FindsMapsThatAreNotInMemory) {
   PlaceIndex index;
   const auto map = MakeMap(1, 30);
   index.SetAppearance(4, ThumbnailsOf(*map));
@@ -145,13 +145,13 @@ TEST(PlaceIndex, KnowsMapsThatAreNotInMemory) {
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].keyframe, 7u);
   EXPECT_EQ(found[0].map, nullptr);
-  EXPECT_EQ(map.use_count(), 1) << "the index lets go of it";
-  // The same map once more, from a file: other features at perhaps the same addresses.
+  EXPECT_EQ(map.use_count(), 1) << "the index must release the map";
+  // The same map loaded from a file: other features, perhaps at the same addresses.
   index.SetMap(4, MakeMap(1, 30));
   EXPECT_EQ(index.FindPlaces(MakeThumbnail(8), 1, 1, 0)[0].keyframe, 7u);
 }
 
-TEST(PlaceIndex, AddedBrightnessAndContrastDoNotMatter) {
+TEST(PlaceIndex, IsInvariantToBrightnessAndContrast) {
   PlaceIndex index;
   index.SetMap(1, MakeMap(1, 10));
   SmallBlurryImage brighter = MakeThumbnail(4);
@@ -162,7 +162,7 @@ TEST(PlaceIndex, AddedBrightnessAndContrastDoNotMatter) {
   EXPECT_NEAR(found[0].difference, 0, 1);
 }
 
-TEST(PlaceIndex, KeepsTheLimitsOfAMapAndOfTheWholeAndStaysInOneMapWhenAsked) {
+TEST(PlaceIndex, ObeysTheLimitsPerMapAndInTotalAndTheRestrictionToOneMap) {
   PlaceIndex index;
   for (std::uint64_t key = 1; key <= 3; ++key) index.SetMap(key, MakeMap(100 * key, 20));
   const auto limited = index.FindPlaces(MakeThumbnail(7), 100, 2, 0);
@@ -178,7 +178,7 @@ TEST(PlaceIndex, KeepsTheLimitsOfAMapAndOfTheWholeAndStaysInOneMapWhenAsked) {
   EXPECT_TRUE(index.FindPlaces(MakeThumbnail(7), 5, 5, 9).empty());
 }
 
-TEST(PlaceIndex, FollowsAMapThatGrowsLosesKeyframesAndChangesAnImage) {
+TEST(PlaceIndex, UpdatesAMapThatGrowsLosesKeyframesAndChangesAnImage) {
   PlaceIndex index;
   auto map = std::make_shared<MapSnapshot>();
   for (int i = 0; i < 200; ++i) {
@@ -197,20 +197,20 @@ TEST(PlaceIndex, FollowsAMapThatGrowsLosesKeyframesAndChangesAnImage) {
   map->keyframes[10].features = features;
   index.SetMap(1, std::make_shared<const MapSnapshot>(*map));
   EXPECT_EQ(index.keyframes(), 100u);
-  EXPECT_GT(index.FindPlaces(MakeThumbnail(60), 1, 1, 0)[0].difference, 100) << "keyframe 60 is gone";
-  EXPECT_GT(index.FindPlaces(MakeThumbnail(10), 1, 1, 0)[0].difference, 100) << "its image is another";
+  EXPECT_GT(index.FindPlaces(MakeThumbnail(60), 1, 1, 0)[0].difference, 100) << "keyframe 60 was removed";
+  EXPECT_GT(index.FindPlaces(MakeThumbnail(10), 1, 1, 0)[0].difference, 100) << "its image has changed";
   EXPECT_EQ(index.FindPlaces(MakeThumbnail(5000), 1, 1, 0)[0].keyframe, 10u);
   index.RemoveMap(1);
   EXPECT_EQ(index.maps(), 0u);
   EXPECT_TRUE(index.FindPlaces(MakeThumbnail(5000), 1, 1, 0).empty());
 }
 
-TEST(PlaceIndex, PassesOverThumbnailsOfAnotherSize) {
+TEST(PlaceIndex, IgnoresThumbnailsOfAnotherSize) {
   PlaceIndex index;
   auto map = std::make_shared<MapSnapshot>();
   AddKeyFrame(1, map.get(), 80, 60);
   AddKeyFrame(2, map.get(), 80, 45);
-  AddKeyFrame(3, map.get(), 60, 80);  // as many pixels, another shape
+  AddKeyFrame(3, map.get(), 60, 80);  // The same number of pixels, another aspect ratio.
   index.SetMap(1, map);
   const auto found = index.FindPlaces(MakeThumbnail(9, 80, 45), 10, 10, 0);
   ASSERT_EQ(found.size(), 1u);
@@ -218,7 +218,7 @@ TEST(PlaceIndex, PassesOverThumbnailsOfAnotherSize) {
   EXPECT_EQ(index.FindPlaces(MakeThumbnail(9, 80, 60), 10, 10, 0).size(), 1u);
 }
 
-// The words of keyframe i of a map: twenty of its own and ten that all have.
+// The words of keyframe i of a map: twenty of its own and ten that all keyframes have.
 engine::WordBag WordsOfKeyFrame(std::uint64_t map, std::uint64_t i) {
   Random random(1000 * map + i);
   std::vector<std::uint32_t> leaves;
@@ -233,7 +233,7 @@ std::vector<KeyFrameWords> WordsOfMap(std::uint64_t key, const MapSnapshot& map)
   return words;
 }
 
-TEST(PlaceIndex, FindsAPlaceByItsWordsWhereItsThumbnailHelpsNobody) {
+TEST(PlaceIndex, FindsAPlaceByItsWordsWhenItsThumbnailIsUseless) {
   PlaceIndex index;
   for (std::uint64_t key = 1; key <= 8; ++key) {
     const auto map = MakeMap(100 * key, 50);
@@ -272,13 +272,13 @@ TEST(PlaceIndex, FindsKeyframesWithThumbnailsOfAnotherSizeByTheirWords) {
   }
 }
 
-TEST(PlaceIndex, AnswersWithDifferentPlacesFirst) {
+TEST(PlaceIndex, ReturnsDifferentPlacesFirst) {
   PlaceIndex index;
   const auto map = MakeMap(1, 30);
   std::vector<KeyFrameWords> words = WordsOfMap(1, *map);
   for (auto& of : words) of.place = of.keyframe / 10 * 10;
   index.SetAppearance(1, ThumbnailsOf(*map), words);
-  // Like the keyframes 11, 12 and 13, in this order.
+  // Similar to the keyframes 11, 12 and 13, in this order.
   SmallBlurryImage seen = MakeThumbnail(12);
   seen.pixels = seen.pixels + 0.8 * MakeThumbnail(13).pixels + 0.6 * MakeThumbnail(14).pixels;
   const auto found = index.FindPlaces(seen, 5, 5, 0);
@@ -291,7 +291,7 @@ TEST(PlaceIndex, AnswersWithDifferentPlacesFirst) {
   EXPECT_EQ(found[4].keyframe, 13u);
 }
 
-TEST(PlaceIndex, HasNoWordsLeftOfMapsThatGo) {
+TEST(PlaceIndex, RemovesTheWordsOfRemovedMaps) {
   PlaceIndex index;
   const auto map = MakeMap(1, 20);
   index.SetAppearance(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
@@ -299,7 +299,7 @@ TEST(PlaceIndex, HasNoWordsLeftOfMapsThatGo) {
   EXPECT_GT(before, 20u * 25);
   index.SetAppearance(2, ThumbnailsOf(*map), WordsOfMap(2, *map));
   EXPECT_GT(index.words(), before);
-  // In memory, let go, smaller, gone.
+  // In memory, evicted, smaller, removed.
   index.SetMap(2, map);
   index.ReleaseMap(2);
   EXPECT_GT(index.words(), before);
@@ -346,9 +346,9 @@ TEST(PlaceIndex, DescribesKeyframesOnce) {
   const auto news = index.DescribeNew(1, *longer);
   ASSERT_EQ(news.size(), 1u);
   EXPECT_EQ(news[0].keyframe, 3u);
-  index.SetMap(1, longer);  // describes what is new itself
+  index.SetMap(1, longer);  // Computes the missing words itself.
   EXPECT_EQ(index.words(), words + news[0].words.size());
-  // Words of a library are taken as they are; where it has none they are made when the map is in memory.
+  // Stored words are used as they are; missing ones are computed when the map is in memory.
   for (const bool stored : {true, false}) {
     PlaceIndex other;
     std::vector<KeyFrameWords> kept;
@@ -363,7 +363,7 @@ TEST(PlaceIndex, DescribesKeyframesOnce) {
   }
 }
 
-TEST(PlaceIndex, FindsImagesByWordsAfterARollThatThumbnailsDoNotKnow) {
+TEST(PlaceIndex, FindsRolledImagesByWordsWhereThumbnailsFail) {
   PlaceIndex index;
   const auto map = MakeMapOfImages(1, 60);
   index.SetMap(1, map);
@@ -381,7 +381,7 @@ TEST(PlaceIndex, FindsImagesByWordsAfterARollThatThumbnailsDoNotKnow) {
   EXPECT_LE(by_thumbnails, 6);
 }
 
-TEST(PlaceIndex, IsSearchedWhileMapsComeGrowAndGo) {
+TEST(PlaceIndex, CanBeSearchedWhileMapsAreAddedExtendedAndRemoved) {
   PlaceIndex index;
   const auto map = MakeMap(0, 30);
   index.SetAppearance(1, ThumbnailsOf(*map), WordsOfMap(1, *map));

@@ -17,14 +17,14 @@ using ::testing::HasSubstr;
 
 constexpr Policy kAll[] = {Policy::kOpen, Policy::kBounded, Policy::kAugmentOnly, Policy::kReadOnly};
 
-TEST(Policy, IsWrittenAsTheCommandLineSaysAndReadBack) {
+TEST(Policy, HasTheNamesOfTheCommandLine) {
   for (const Policy policy : kAll) EXPECT_EQ(ParsePolicy(ToString(policy)), policy);
   EXPECT_STREQ(ToString(Policy::kAugmentOnly), "augment-only");
   EXPECT_EQ(ParsePolicy("Open"), std::nullopt);
   EXPECT_EQ(ParsePolicy(""), std::nullopt);
 }
 
-TEST(Policy, AsksTheBoundsOnlyOfABoundedMap) {
+TEST(Policy, ChecksTheBoundsOnlyOfABoundedMap) {
   const Bounds bounds{{0, 0, 0}, {1, 2, 3}};
   const Eigen::Vector3d inside(1, 1, 3), outside(1, 2.001, 1);
   EXPECT_TRUE(KeyFrameAllowed(Policy::kOpen, std::nullopt, outside));
@@ -36,11 +36,11 @@ TEST(Policy, AsksTheBoundsOnlyOfABoundedMap) {
   EXPECT_FALSE(KeyFrameAllowed(Policy::kReadOnly, bounds, inside));
 }
 
-TEST(Policy, BoundsHoldAllKeyframesAndAreNotOpenedByAFewWildPoints) {
+TEST(Policy, BoundsContainAllKeyframesAndIgnoreOutliers) {
   engine::MapSnapshot map;
   EXPECT_EQ(ComputeBounds(map), std::nullopt);
   engine::KeyFrame keyframe;
-  keyframe.camera_from_map.translation = {0, 0, 5};  // centre at (0, 0, -5)
+  keyframe.camera_from_map.translation = {0, 0, 5};  // Centre at (0, 0, -5).
   map.keyframes.push_back(keyframe);
   EXPECT_EQ(ComputeBounds(map), (Bounds{{0, 0, -5}, {0, 0, -5}}));
   for (int i = 0; i <= 1000; ++i) {
@@ -59,7 +59,7 @@ TEST(Policy, BoundsHoldAllKeyframesAndAreNotOpenedByAFewWildPoints) {
   EXPECT_EQ(bounds.max.z(), 1);
 }
 
-// One library with a map of the policy, and what each way of writing answers.
+// A library with a map of the given policy, and the expected result of each way of writing.
 class EveryPolicy : public ::testing::TestWithParam<Policy> {
  protected:
   EveryPolicy() : library_(OpenToWrite(folder_ / "a.docent")) {
@@ -68,7 +68,7 @@ class EveryPolicy : public ::testing::TestWithParam<Policy> {
   }
   bool structure() const { return GetParam() == Policy::kOpen || GetParam() == Policy::kBounded; }
   bool content() const { return GetParam() != Policy::kReadOnly; }
-  // Runs `write`; a refusal must name the policy and change nothing.
+  // Runs `write`; a rejection must name the policy and change nothing.
   void ExpectAnswer(bool allowed, const std::function<void()>& write) {
     const auto before = library_.Load(key_);
     const std::string error = ErrorOf(write);
@@ -90,13 +90,13 @@ class EveryPolicy : public ::testing::TestWithParam<Policy> {
   std::uint64_t key_ = 0;
 };
 
-TEST_P(EveryPolicy, IsAskedWhenAKeyframeIsAddedInside) {
+TEST_P(EveryPolicy, IsCheckedWhenAKeyframeIsAddedInside) {
   auto changed = std::make_shared<engine::MapSnapshot>(*map_);
   AddSampleKeyFrame(5, {0.05, 0, 0}, changed.get());
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
 }
 
-TEST_P(EveryPolicy, IsAskedWhenAKeyframeIsAddedOutside) {
+TEST_P(EveryPolicy, IsCheckedWhenAKeyframeIsAddedOutside) {
   auto changed = std::make_shared<engine::MapSnapshot>(*map_);
   AddSampleKeyFrame(5, {50, 0, 0}, changed.get());
   ExpectAnswer(GetParam() == Policy::kOpen, [&] {
@@ -104,7 +104,7 @@ TEST_P(EveryPolicy, IsAskedWhenAKeyframeIsAddedOutside) {
   });
 }
 
-TEST_P(EveryPolicy, IsAskedWhenAKeyframeMovesOrGoesAway) {
+TEST_P(EveryPolicy, IsCheckedWhenAKeyframeMovesOrIsRemoved) {
   auto changed = std::make_shared<engine::MapSnapshot>(*map_);
   changed->keyframes[1].camera_from_map.translation.x() += 0.001;
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
@@ -116,20 +116,20 @@ TEST_P(EveryPolicy, IsAskedWhenAKeyframeMovesOrGoesAway) {
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
 }
 
-TEST_P(EveryPolicy, IsAskedWhenAPanoramaMapOpens) {
+TEST_P(EveryPolicy, IsCheckedWhenAPanoramaMapIsAdded) {
   auto changed = std::make_shared<engine::MapSnapshot>(*map_);
   changed->panoramas.push_back({changed->next_panorama, changed->keyframes[1].id});
   changed->keyframes[1].panorama = changed->next_panorama++;
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
 }
 
-TEST_P(EveryPolicy, IsAskedWhenAnImageIsExchanged) {
+TEST_P(EveryPolicy, IsCheckedWhenAnImageIsReplaced) {
   auto changed = std::make_shared<engine::MapSnapshot>(*map_);
   changed->keyframes[0].features = MakeSampleMap(77)->keyframes[0].features;
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
 }
 
-TEST_P(EveryPolicy, IsAskedWhenAPointOrAnObservationChanges) {
+TEST_P(EveryPolicy, IsCheckedWhenAPointOrAnObservationChanges) {
   auto changed = std::make_shared<engine::MapSnapshot>(*map_);
   changed->points[0].point_in_map.x() += 1;
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
@@ -138,30 +138,30 @@ TEST_P(EveryPolicy, IsAskedWhenAPointOrAnObservationChanges) {
   ExpectAnswer(structure(), [&] { library_.Save({key_, "", Policy::kOpen, changed, nullptr}); });
 }
 
-TEST_P(EveryPolicy, IsAskedWhenContentChanges) {
+TEST_P(EveryPolicy, IsCheckedWhenContentChanges) {
   ExpectAnswer(content(), [&] { library_.Save({key_, "", Policy::kOpen, nullptr, MakeSampleScene(9, 2)}); });
 }
 
-TEST_P(EveryPolicy, LetsContentAndAnUnchangedStructureBeSavedTogether) {
+TEST_P(EveryPolicy, AllowsSavingContentWithAnUnchangedStructure) {
   const auto loaded = library_.Load(key_).snapshot;
   ExpectAnswer(content(), [&] { library_.Save({key_, "", Policy::kOpen, loaded, MakeSampleScene(9, 2)}); });
 }
 
-TEST_P(EveryPolicy, DoesNotMindASaveThatChangesNothing) {
+TEST_P(EveryPolicy, AllowsASaveThatChangesNothing) {
   const auto before = library_.Find(key_);
   library_.Save({key_, "", Policy::kOpen, library_.Load(key_).snapshot, scene_});
   EXPECT_EQ(library_.Find(key_), before);
 }
 
-TEST_P(EveryPolicy, IsAskedForANewName) {
+TEST_P(EveryPolicy, IsCheckedWhenAMapIsRenamed) {
   ExpectAnswer(content(), [&] { library_.Rename(key_, "Table"); });
 }
 
-TEST_P(EveryPolicy, IsAskedForRemoval) {
+TEST_P(EveryPolicy, IsCheckedWhenAMapIsRemoved) {
   ExpectAnswer(structure(), [&] { library_.Remove(key_); });
 }
 
-TEST_P(EveryPolicy, IsAskedByTheSaverInTheBackground) {
+TEST_P(EveryPolicy, IsCheckedByTheSaverInTheBackground) {
   auto changed = std::make_shared<engine::MapSnapshot>(*map_);
   changed->points[0].point_in_map.x() += 1;
   Saver saver(&library_);
@@ -174,22 +174,22 @@ TEST_P(EveryPolicy, IsAskedByTheSaverInTheBackground) {
   ExpectAnswer(content(), [&] { save({key_, "", Policy::kOpen, nullptr, MakeSampleScene(9, 2)}); });
 }
 
-TEST_P(EveryPolicy, IsAskedWhenAnAdjustedMapIsSavedOverTheOldOne) {
+TEST_P(EveryPolicy, IsCheckedWhenAnAdjustedMapIsSaved) {
   auto changed = std::make_shared<engine::MapSnapshot>(*map_);
   for (engine::MapPoint& point : changed->points) {
     if (!point.infinite()) point.point_in_map.head<3>() *= 1.001;
   }
   ++changed->revision;
   MapRecord record{key_, "", Policy::kOpen, changed, nullptr};
-  record.over_revision = map_->revision;
+  record.expected_revision = map_->revision;
   ExpectAnswer(structure(), [&] { EXPECT_TRUE(library_.Save(record)); });
   if (!structure()) return;
   const auto saved = library_.Find(key_);
-  EXPECT_FALSE(library_.Save(record)) << "somebody has changed it since";
+  EXPECT_FALSE(library_.Save(record)) << "the stored map has changed since";
   EXPECT_EQ(library_.Find(key_), saved);
 }
 
-TEST_P(EveryPolicy, IsAskedWhenTheMapIsOptimized) {
+TEST_P(EveryPolicy, IsCheckedWhenTheMapIsOptimized) {
   auto crooked = std::make_shared<engine::MapSnapshot>(*MakeTrueMap());
   for (engine::MapPoint& point : crooked->points) point.point_in_map.z() += point.id % 2 == 0 ? 0.02 : -0.02;
   Library library = Library::Open(folder_ / "b.docent", Access::kReadWrite, CreateIfMissing::kYes);
@@ -202,7 +202,7 @@ TEST_P(EveryPolicy, IsAskedWhenTheMapIsOptimized) {
   EXPECT_EQ(same, !structure());
 }
 
-TEST_P(EveryPolicy, GoesWithTheMapThroughAnImportThatTouchesNoMapOfThatName) {
+TEST_P(EveryPolicy, IsImportedWithTheMapAndExistingMapsAreUnchanged) {
   const auto before = library_.Load(key_);
   {
     Library other = OpenToWrite(folder_ / "b.docent");
@@ -221,7 +221,7 @@ TEST_P(EveryPolicy, GoesWithTheMapThroughAnImportThatTouchesNoMapOfThatName) {
   ExpectAnswer(content(), [&] { library_.Save({key_, "", Policy::kOpen, nullptr, MakeSampleScene(9, 2)}); });
 }
 
-TEST_P(EveryPolicy, IsLoosenedBySetPolicyAlone) {
+TEST_P(EveryPolicy, IsRelaxedOnlyBySetPolicy) {
   library_.Save({key_, "", Policy::kOpen, nullptr, nullptr});
   EXPECT_EQ(library_.Find(key_).policy, GetParam());
   library_.SetPolicy(key_, Policy::kOpen);
@@ -245,12 +245,12 @@ TEST_P(EveryPolicy, CannotBeChangedInALibraryThatWasOpenedReadOnly) {
       [&] { visitor.Remove(key_); },
       [&] { visitor.SetPolicy(key_, Policy::kOpen); },
   };
-  for (const auto& write : writes) EXPECT_THAT(ErrorOf(write), HasSubstr("was opened read only"));
+  for (const auto& write : writes) EXPECT_THAT(ErrorOf(write), HasSubstr("was opened read-only"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Policies, EveryPolicy, ::testing::ValuesIn(kAll));
 
-TEST(BoundedMap, KeepsItsOriginalBoundsHoweverItGrowsUntilItIsOpened) {
+TEST(BoundedMap, KeepsItsOriginalBoundsUntilItIsOpen) {
   const TemporaryFolder folder;
   Library library = OpenToWrite(folder / "a.docent");
   const std::uint64_t key = library.NewKey();

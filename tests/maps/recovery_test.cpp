@@ -33,11 +33,11 @@ class Recovering : public ::testing::Test {
       MakeSampleMap(1), MakeSampleMap(2, {.keyframes = 6}), MakeSampleMap(3), MakeSampleMap(4)};
 };
 
-TEST_F(Recovering, AWholeLibraryComesBackWhole) {
+TEST_F(Recovering, AnUndamagedLibraryIsRecoveredCompletely) {
   const Bytes before = ReadWholeFile(file_);
   const Recovery recovery = Recover(file_, target_);
-  EXPECT_EQ(recovery.maps_whole, 4u);
-  EXPECT_EQ(recovery.maps_in_part, 0u);
+  EXPECT_EQ(recovery.maps_complete, 4u);
+  EXPECT_EQ(recovery.maps_partial, 0u);
   EXPECT_THAT(recovery.problems, IsEmpty());
   EXPECT_EQ(ReadWholeFile(file_), before);
   const Library library = OpenRecovered();
@@ -50,14 +50,14 @@ TEST_F(Recovering, AWholeLibraryComesBackWhole) {
   EXPECT_THAT(ErrorOf([&] { Recover(file_, target_); }), HasSubstr("exists already"));
 }
 
-TEST_F(Recovering, WhatIsLostIsNamedAndTheRestIsSaved) {
-  RunSql("DELETE FROM pictures WHERE map_key = 2 AND keyframe = 3");  // one keyframe of six
+TEST_F(Recovering, LossesAreNamedAndTheRestIsRecovered) {
+  RunSql("DELETE FROM pictures WHERE map_key = 2 AND keyframe = 3");  // One keyframe of six.
   RunSql("UPDATE parts SET data = x'00' WHERE map_key = 3 AND part = 'points'");
-  RunSql("UPDATE maps SET name = 'forged' WHERE key = 4");  // its entry is not to be believed
-  RunSql("DELETE FROM assets WHERE id = 'asset-0'");        // the scene of the first map
+  RunSql("UPDATE maps SET name = 'forged' WHERE key = 4");  // Its checksum no longer matches.
+  RunSql("DELETE FROM assets WHERE id = 'asset-0'");        // Used by the scene of the first map.
   const Recovery recovery = Recover(file_, target_);
-  EXPECT_EQ(recovery.maps_whole, 0u);
-  EXPECT_EQ(recovery.maps_in_part, 3u);
+  EXPECT_EQ(recovery.maps_complete, 0u);
+  EXPECT_EQ(recovery.maps_partial, 3u);
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the image of keyframe 3 is missing")));
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the table of points is cut off")));
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the entry of map 4: its checksum does not match")));
@@ -73,17 +73,17 @@ TEST_F(Recovering, WhatIsLostIsNamedAndTheRestIsSaved) {
   EXPECT_EQ(FirstDifference(library.Load(library.FindByName("map 4").key).scene, *MakeSampleScene(3, 1)), "");
 }
 
-TEST_F(Recovering, FromBytesFlippedAndFilesCutOffNothingFalseComesBack) {
-  const Bytes whole = ReadWholeFile(file_);
+TEST_F(Recovering, NothingWrongIsRecoveredFromFlippedBytesAndTruncatedFiles) {
+  const Bytes intact = ReadWholeFile(file_);
   Random random(9);
   int recovered = 0, nothing = 0;
   for (int i = 0; i < 120; ++i) {
-    Bytes damaged = whole;
+    Bytes damaged = intact;
     if (i % 3 == 0) {
-      damaged.resize(whole.size() / 3 + random.Below(static_cast<std::uint32_t>(2 * whole.size() / 3)));
+      damaged.resize(intact.size() / 3 + random.Below(static_cast<std::uint32_t>(2 * intact.size() / 3)));
     } else {
       for (int flips = 0; flips < 5; ++flips)
-        damaged[random.Below(static_cast<std::uint32_t>(whole.size()))] ^=
+        damaged[random.Below(static_cast<std::uint32_t>(intact.size()))] ^=
             static_cast<std::uint8_t>(1 + random.Below(255));
     }
     WriteWholeFile(file_, damaged);
@@ -101,19 +101,19 @@ TEST_F(Recovering, FromBytesFlippedAndFilesCutOffNothingFalseComesBack) {
     const Library library = OpenRecovered();
     EXPECT_THAT(library.Verify(), IsEmpty());
     const auto infos = library.List();
-    EXPECT_EQ(infos.size(), recovery.maps_whole + recovery.maps_in_part);
+    EXPECT_EQ(infos.size(), recovery.maps_complete + recovery.maps_partial);
     std::size_t equal = 0;
     for (const MapInfo& info : infos) {
       const auto map = library.Load(info.key).snapshot;
       for (const auto& original : maps_) equal += FirstDifference(*map, *original).empty();
     }
-    EXPECT_GE(equal, recovery.maps_whole);
+    EXPECT_GE(equal, recovery.maps_complete);
   }
   EXPECT_GT(recovered, 60);
   RecordProperty("nothing_recovered", nothing);
 }
 
-TEST_F(Recovering, NothingIsLeftWhereNothingCanBeSaved) {
+TEST_F(Recovering, NoFileIsLeftWhenNothingCanBeRecovered) {
   RunSql("DELETE FROM parts");
   EXPECT_THAT(ErrorOf([&] { Recover(file_, target_); }), HasSubstr("nothing could be recovered"));
   WriteWholeFile(file_, Bytes(5000, 'x'));

@@ -17,7 +17,7 @@ constexpr int kWidth = 320, kHeight = 240, kPartOfTheWall = 40;
 cv::Mat PaintWall() {
   cv::Mat wall(kHeight, 2200, CV_8UC1), sum = cv::Mat::zeros(kHeight, 2200, CV_32FC1);
   cv::RNG random(3);
-  // Structure of all sizes, as walls have.
+  // Structure at all scales, like real walls.
   for (const double sigma : {1.2, 4.0, 12.0}) {
     cv::Mat noise(wall.size(), CV_32FC1);
     random.fill(noise, cv::RNG::NORMAL, 0, sigma);
@@ -28,8 +28,8 @@ cv::Mat PaintWall() {
   return wall;
 }
 
-// Keyframes that look straight at a wall, each at an offset along it in pixels; the corners of each are
-// points, seen by all that have them in their image.
+// Keyframes that face a wall, each at an offset along it in pixels. The corners of each become points,
+// observed by all keyframes whose image contains them.
 engine::MapSnapshot MakeRow(const std::vector<int>& offsets) {
   const cv::Mat wall = PaintWall();
   const auto camera = std::make_shared<const engine::CameraModel>(
@@ -52,7 +52,7 @@ engine::MapSnapshot MakeRow(const std::vector<int>& offsets) {
       for (std::size_t i = 0; i < keyframe.features->corners[level].size(); i += 3) {
         const engine::Corner corner = keyframe.features->corners[level][i];
         const Eigen::Vector2d pixel = engine::LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), level);
-        // Each makes points in the middle of its image alone, so that none is made twice.
+        // Each keyframe makes points only in the middle of its image, so that none is made twice.
         if (std::abs(pixel.x() - 160) > kPartOfTheWall / 2.0) continue;
         engine::MapPoint point;
         point.id = map.next_point++;
@@ -75,10 +75,10 @@ engine::MapSnapshot MakeRow(const std::vector<int>& offsets) {
   return map;
 }
 
-TEST(RelocalizationCheck, FindsWhatOthersHoldUpAndMissesWhatStandsAlone) {
+TEST(RelocalizationCheck, FindsKeyframesWithNeighboursAndMissesIsolatedOnes) {
   std::vector<int> offsets;
   for (int i = 0; i < 8; ++i) offsets.push_back(i * kPartOfTheWall);
-  offsets.push_back(1500);  // nothing that another one sees
+  offsets.push_back(1500);  // Shares no points with another keyframe.
   const engine::MapSnapshot map = MakeRow(offsets);
   ASSERT_EQ(engine::Validate(map), "");
   const auto trials = LeaveEachKeyFrameOut(map);
@@ -99,18 +99,18 @@ TEST(RelocalizationCheck, FindsWhatOthersHoldUpAndMissesWhatStandsAlone) {
   for (const RelocalizationCell& cell : grid.cells) {
     in_cells += cell.trials;
     found_in_cells += cell.found;
-    EXPECT_EQ(cell.direction, 0) << "all look the same way";
-    EXPECT_EQ(cell.square.y(), 0) << "nobody stands ahead of the others";
+    EXPECT_EQ(cell.direction, 0) << "all face the same direction";
+    EXPECT_EQ(cell.square.y(), 0) << "none is ahead of the others";
     EXPECT_LT((cell.view - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
     EXPECT_LT((cell.place - Eigen::Vector3d(cell.square.x() * grid.side, 0, 0)).norm(), 1e-9);
   }
   EXPECT_EQ(in_cells, 9);
   EXPECT_EQ(found_in_cells, found);
-  EXPECT_EQ(grid.cells.back().square.x(), 10) << "1500 pixels are ten metres";
+  EXPECT_EQ(grid.cells.back().square.x(), 10) << "1500 pixels are ten map units";
   EXPECT_EQ(grid.cells.back().found, 0);
 }
 
-TEST(RelocalizationCheck, StopsWhenToldTo) {
+TEST(RelocalizationCheck, StopsWhenProgressReturnsFalse) {
   const engine::MapSnapshot map = MakeRow({0, 40, 80});
   const auto trials = LeaveEachKeyFrameOut(map, {}, [](std::size_t done) { return done < 2; });
   EXPECT_EQ(trials.size(), 2u);

@@ -31,7 +31,7 @@ class SaverTest : public ::testing::Test {
   }
 
   TemporaryFolder folder_;
-  std::atomic<bool> hold_ = false;  // a save that has begun waits while this is set
+  std::atomic<bool> hold_ = false;  // While it is set, a save that has begun waits.
   std::atomic<int> saves_ = 0;
   std::optional<Library> library_;
 };
@@ -49,7 +49,7 @@ TEST_F(SaverTest, SavesInTheBackgroundAndFlushWaitsForAll) {
   EXPECT_EQ(FirstDifference(*library_->Load(b).snapshot, *door), "");
 }
 
-TEST_F(SaverTest, TheLatestOfAMapWinsAndASceneIsNotLostToALaterSnapshot) {
+TEST_F(SaverTest, TheLatestSnapshotIsSavedAndAnEarlierSceneIsNotLost) {
   const std::uint64_t a = library_->NewKey(), b = library_->NewKey();
   Saver saver(&*library_);
   hold_ = true;
@@ -71,17 +71,17 @@ TEST_F(SaverTest, TheLatestOfAMapWinsAndASceneIsNotLostToALaterSnapshot) {
   EXPECT_EQ(FirstDifference(library_->LoadScene(b), *scene), "");
 }
 
-TEST_F(SaverTest, DoesNotBringBackAMapThatAnotherOneHolds) {
+TEST_F(SaverTest, DoesNotRestoreAMapThatWasJoinedIntoAnother) {
   const std::uint64_t a = library_->NewKey(), b = library_->NewKey();
   Saver saver(&*library_);
   hold_ = true;
   saver.Submit({b, "Door", Policy::kOpen, MakeSampleMap(2), nullptr});
   WaitUntilASaveRuns();
-  // The save of `a` that waits before that of `b` takes up that it holds `b`.
+  // The waiting save of `a` takes over that `b` was joined into it.
   saver.Submit({a, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
   saver.Submit({b, "", Policy::kOpen, MakeSampleMap(3), nullptr});
   MapRecord both{a, "", Policy::kOpen, MakeSampleMap(4), nullptr};
-  both.holds = {b};
+  both.joined_keys = {b};
   saver.Submit(both);
   EXPECT_EQ(saver.pending(), 2u);
   hold_ = false;
@@ -91,7 +91,7 @@ TEST_F(SaverTest, DoesNotBringBackAMapThatAnotherOneHolds) {
   EXPECT_EQ(FirstDifference(*library_->Load(a).snapshot, *both.snapshot), "");
 }
 
-TEST_F(SaverTest, HandsAFailureToWhoeverAsksAndGoesOn) {
+TEST_F(SaverTest, ReportsAFailureAndContinues) {
   const std::uint64_t key = library_->NewKey();
   Saver saver(&*library_);
   saver.Submit({key + 50, "Nowhere", Policy::kOpen, MakeSampleMap(1), nullptr});
@@ -104,7 +104,7 @@ TEST_F(SaverTest, HandsAFailureToWhoeverAsksAndGoesOn) {
   EXPECT_EQ(library_->List().size(), 1u);
 }
 
-TEST_F(SaverTest, WritesWhatStillWaitsBeforeItEnds) {
+TEST_F(SaverTest, WritesWaitingSavesBeforeItEnds) {
   const std::uint64_t first = library_->NewKey();
   for (int i = 1; i < 8; ++i) library_->NewKey();
   {
@@ -116,7 +116,7 @@ TEST_F(SaverTest, WritesWhatStillWaitsBeforeItEnds) {
   EXPECT_EQ(library_->List().size(), 8u);
 }
 
-TEST_F(SaverTest, ForgetsAMapThatIsToBeRemoved) {
+TEST_F(SaverTest, DropsTheSaveOfAMapThatWillBeRemoved) {
   const std::uint64_t a = library_->NewKey(), b = library_->NewKey();
   Saver saver(&*library_);
   hold_ = true;
@@ -125,14 +125,14 @@ TEST_F(SaverTest, ForgetsAMapThatIsToBeRemoved) {
   saver.Submit({b, "Gone", Policy::kOpen, MakeSampleMap(2), nullptr});
   saver.Forget(b);
   hold_ = false;
-  saver.Forget(a);  // runs already, so it is waited for
+  saver.Forget(a);  // Its save is running, so this waits for it.
   EXPECT_EQ(library_->Find(a).name, "Busy");
   library_->Remove(a);
   saver.Flush();
   EXPECT_TRUE(library_->List().empty());
 }
 
-TEST_F(SaverTest, AFullQueueMakesAnotherMapWaitButNotANewerStateOfTheSame) {
+TEST_F(SaverTest, AFullQueueBlocksOtherMapsButNotNewerStatesOfTheSame) {
   const std::uint64_t a = library_->NewKey(), b = library_->NewKey(), c = library_->NewKey();
   Saver saver(&*library_, 1);
   hold_ = true;
@@ -153,12 +153,12 @@ TEST_F(SaverTest, AFullQueueMakesAnotherMapWaitButNotANewerStateOfTheSame) {
   EXPECT_EQ(library_->List().size(), 3u);
 }
 
-TEST_F(SaverTest, UpkeepGivesWayToASave) {
+TEST_F(SaverTest, ASaveInterruptsMaintenance) {
   const std::uint64_t key = library_->NewKey();
   std::atomic<int> begun = 0, given_way = 0;
   Saver saver(&*library_, 16, {}, [&](const std::atomic<bool>& interrupt) {
     ++begun;
-    // Without end, but for the interruption.
+    // Runs until it is interrupted.
     while (!interrupt) std::this_thread::yield();
     ++given_way;
     return true;
@@ -175,14 +175,14 @@ TEST_F(SaverTest, UpkeepGivesWayToASave) {
   EXPECT_EQ(given_way, at_the_end);
   saver.Submit({key, "Desk", Policy::kOpen, MakeSampleMap(9), nullptr});
   saver.Flush();
-  EXPECT_EQ(begun, at_the_end) << "ended for good";
+  EXPECT_EQ(begun, at_the_end) << "it must not run again";
   EXPECT_EQ(saver.TakeError(), nullptr);
 }
 
-TEST_F(SaverTest, UpkeepGoesOnAfterASaveAndItsFailureIsTold) {
+TEST_F(SaverTest, MaintenanceResumesAfterASaveAndItsFailureIsReported) {
   std::atomic<int> begun = 0;
   Saver saver(&*library_, 16, {}, [&](const std::atomic<bool>&) -> bool {
-    if (++begun == 3) throw Error("no upkeep");
+    if (++begun == 3) throw Error("no maintenance");
     return begun < 3;
   });
   while (begun < 4) std::this_thread::yield();

@@ -20,16 +20,16 @@ using ::testing::IsEmpty;
 
 std::vector<KeyFrameWords> WordsIn(const Library& library) {
   std::vector<KeyFrameWords> all;
-  library.LoadAppearance([&](const MapInfo&, const Library::Appearance& looks) {
-    EXPECT_EQ(looks.problem, "");
-    all.insert(all.end(), looks.words.begin(), looks.words.end());
+  library.LoadAppearance([&](const MapInfo&, const Library::Appearance& appearance) {
+    EXPECT_EQ(appearance.problem, "");
+    all.insert(all.end(), appearance.words.begin(), appearance.words.end());
   });
   return all;
 }
 
 constexpr SampleOptions kWithWords = {.keyframes = 3, .width_px = 160, .height_px = 128, .corners = true};
 
-// A new library whose map 1, "Desk", is this one.
+// A new library in which map 1, "Desk", is this map.
 Library LibraryOf(const std::filesystem::path& file, const std::shared_ptr<const engine::MapSnapshot>& map) {
   Library library = OpenToWrite(file);
   library.Save({library.NewKey(), "Desk", Policy::kOpen, map, nullptr});
@@ -43,7 +43,7 @@ WordTable SampleTable() {
            {9, 9, MakeWordBag(std::vector<std::uint32_t>(40, 8))}}};
 }
 
-// A table of one keyframe 7 with these numbers for its place and words.
+// A table with keyframe 7 and these numbers for its place and words.
 Bytes OneKeyFrame(std::uint32_t place, const std::vector<std::uint16_t>& words) {
   ByteWriter writer = BeginEnvelope(kWordTableKind, 4, 1);
   writer.Put(std::uint64_t{77});
@@ -54,26 +54,26 @@ Bytes OneKeyFrame(std::uint32_t place, const std::vector<std::uint16_t>& words) 
   return FinishEnvelope(std::move(writer));
 }
 
-TEST(WordRows, AreReadAsTheyWereWritten) {
+TEST(WordRows, DecodingInvertsEncoding) {
   EXPECT_EQ(DecodeWords(4, EncodeWords(4, SampleTable())), SampleTable());
   EXPECT_EQ(DecodeWords(4, EncodeWords(4, {77, {}})), (WordTable{77, {}}));
   EXPECT_EQ(DecodeWords(4, OneKeyFrame(7, {5 << 4, 6 << 4 | 15})).keyframes[0].words,
             MakeWordBag({5, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6, 6}));
 }
 
-TEST(WordRows, BelieveNothing) {
+TEST(WordRows, RejectInvalidTables) {
   const auto error = [](const Bytes& bytes) { return ErrorOf([&] { DecodeWords(4, bytes); }); };
   EXPECT_THAT(error(EncodeWords(5, SampleTable())), HasSubstr("belongs to another map"));
-  EXPECT_THAT(error(OneKeyFrame(6, {})), HasSubstr("a place is none"));
-  EXPECT_THAT(error(OneKeyFrame(8, {})), HasSubstr("a place is none"));
+  EXPECT_THAT(error(OneKeyFrame(6, {})), HasSubstr("a keyframe has no valid place"));
+  EXPECT_THAT(error(OneKeyFrame(8, {})), HasSubstr("a keyframe has no valid place"));
   EXPECT_THAT(error(OneKeyFrame(7, {6 << 4, 5 << 4})), HasSubstr("out of order"));
   EXPECT_THAT(error(OneKeyFrame(7, {6 << 4, 6 << 4 | 1})), HasSubstr("out of order"));
   WordTable table = SampleTable();
   std::swap(table.keyframes[0], table.keyframes[2]);
   EXPECT_THAT(error(EncodeWords(4, table)), HasSubstr("out of order"));
   table = SampleTable();
-  table.keyframes[2].place = 3;  // which is no place of its own
-  EXPECT_THAT(error(EncodeWords(4, table)), HasSubstr("a place is none"));
+  table.keyframes[2].place = 3;  // It does not represent a place.
+  EXPECT_THAT(error(EncodeWords(4, table)), HasSubstr("a keyframe has no valid place"));
   ByteWriter writer = BeginEnvelope(kWordTableKind, 4, 1'000'000'000);
   writer.Put(std::uint64_t{77});
   EXPECT_THAT(error(FinishEnvelope(std::move(writer))), HasSubstr("its length does not match"));
@@ -85,7 +85,7 @@ TEST(WordRows, BelieveNothing) {
   }
 }
 
-TEST(WordRows, KeyframesNearEachOtherAreOnePlace) {
+TEST(WordRows, KeyframesCloseTogetherAreOnePlace) {
   engine::MapSnapshot map;
   const auto add = [&](double x, double turn_rad, double depth) {
     engine::KeyFrame keyframe;
@@ -95,17 +95,17 @@ TEST(WordRows, KeyframesNearEachOtherAreOnePlace) {
     keyframe.mean_depth = depth;
     map.keyframes.push_back(keyframe);
   };
-  add(0.0, 0.0, 2);    // 0: a place
-  add(0.9, 0.0, 2);    // 10: within half of the depth
-  add(1.8, 0.0, 2);    // 20: too far from the first, however near to the second
-  add(0.0, 0.5, 2);    // 30: turned by 29 degrees
-  add(0.0, 0.7, 2);    // 40: by 40 degrees
-  add(0.3, 0.0, 0.5);  // 50: what it sees is near, so this is far
+  add(0.0, 0.0, 2);    // 0: a new place
+  add(0.9, 0.0, 2);    // 10: within half of the depth of keyframe 0
+  add(1.8, 0.0, 2);    // 20: too far from keyframe 0, although close to keyframe 10
+  add(0.0, 0.5, 2);    // 30: rotated by 29 degrees
+  add(0.0, 0.7, 2);    // 40: rotated by 40 degrees
+  add(0.3, 0.0, 0.5);  // 50: too far for its small depth
   add(1.9, 0.1, 2);    // 60
   EXPECT_THAT(PlacesOf(map), ElementsAre(0, 0, 20, 0, 40, 50, 20));
 }
 
-TEST(WordRows, AreThoseOfTheKeyframesAfterEverySave) {
+TEST(WordRows, MatchTheKeyframesAfterEverySave) {
   const TemporaryFolder folder;
   auto map = MakeSampleMap(1, kWithWords);
   Library library = LibraryOf(folder / "a.docent", map);
@@ -125,12 +125,12 @@ TEST(WordRows, AreThoseOfTheKeyframesAfterEverySave) {
   EXPECT_EQ(library.Verify(), std::vector<std::string>{});
 }
 
-TEST(WordRows, OfAnImageThatStaysAreKeptAndOfAnotherMadeAnew) {
+TEST(WordRows, AreKeptForUnchangedImagesAndRecomputedForOthers) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   auto map = MakeSampleMap(1, kWithWords);
   LibraryOf(file, map);
-  // Words that nobody would make of these images.
+  // Artificial words that no algorithm computes from these images.
   std::vector<KeyFrameWords> marked = MakeWords(*map, {});
   for (KeyFrameWords& words : marked) words.words = MakeWordBag({words.keyframe});
   WriteWords(Database::OpenReadWrite(file, false), 1, marked);
@@ -146,7 +146,7 @@ TEST(WordRows, OfAnImageThatStaysAreKeptAndOfAnotherMadeAnew) {
   }
 }
 
-TEST(WordRows, OfAnotherVocabularyAreNone) {
+TEST(WordRows, OfAnotherVocabularyAreIgnored) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   auto map = MakeSampleMap(1, kWithWords);
@@ -164,7 +164,7 @@ TEST(WordRows, OfAnotherVocabularyAreNone) {
   EXPECT_EQ(WordsIn(library), MakeWords(*map, {}));
 }
 
-TEST(WordRows, ThatAreWrongAreFoundByVerifying) {
+TEST(WordRows, VerifyFindsWrongOnes) {
   const TemporaryFolder folder;
   const auto file = folder / "a.docent";
   const auto map = MakeSampleMap(1, kWithWords);
@@ -188,17 +188,17 @@ TEST(WordRows, ThatAreWrongAreFoundByVerifying) {
   EXPECT_THAT(verified_after([&](const Database& d) {
                 WriteWords(d, 1, {right.begin(), right.end() - 1});
               }),
-              HasSubstr("its words are of fewer or more keyframes than it has"));
+              HasSubstr("the number of its words' keyframes differs from that of its keyframes"));
   EXPECT_THAT(verified_after([&](const Database& d) {
                 auto others = right;
                 for (auto& words : others) words.place = words.keyframe;
                 others.back().keyframe = others.back().place = 1000;
                 WriteWords(d, 1, others);
               }),
-              HasSubstr("its words are those of other keyframes"));
+              HasSubstr("its words belong to other keyframes"));
 }
 
-TEST(WordRows, GoWithAMapThatIsExportedImportedOrRecovered) {
+TEST(WordRows, AreKeptByExportImportAndRecovery) {
   const TemporaryFolder folder;
   ExportMap(LibraryOf(folder / "a.docent", MakeSampleMap(1, kWithWords)), 1, folder / "exported.docent");
   const auto open = [&](const char* name) { return OpenToRead(folder / name); };

@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Measures how far from its place each augmentation of a tour was drawn, in pixels, and how often the right
-map was named.
+"""Measures the placement error of each augmentation of a tour, in pixels, and how often the right map was recognized.
 
   check_augmentations.py --docent build/docent --library L.docent --sequence FOLDER
                          --author AUTHOR_OUTPUT --tour TOUR_OUTPUT
 
-A thing's true place follows from the author's run: the similarity truth_from_map (Umeyama 1991) between the
-author's camera centres in that map and groundtruth.txt takes its anchor to the world. In each frame of the
-tour the true pose projects that point through calibration.yaml; the error is the distance to the pixel in
-augmentations.csv. The right map of a `visitK` segment is the one that was the current map in most frames of
-`buildK`. Needs only Python's standard library.
+The true position of an entity follows from the author's run: the similarity truth_from_map (Umeyama 1991) between the
+author's camera centres in that map and groundtruth.txt transforms its position to the world. In each frame of the tour
+the true pose projects this point through calibration.yaml; the error is its distance to the pixel in
+augmentations.csv. The right map of a `visitK` segment is the map that was current in most frames of `buildK`. Needs
+only Python's standard library.
 """
 import argparse
 import bisect
@@ -39,7 +38,7 @@ def transposed(matrix):
 
 
 def largest_eigenvector(matrix):
-    """Of a symmetric 4x4 matrix, by Jacobi rotations."""
+    """The eigenvector of a symmetric 4x4 matrix with the largest eigenvalue, by Jacobi rotations."""
     a = [row[:] for row in matrix]
     n = len(a)
     v = [[float(i == j) for j in range(n)] for i in range(n)]
@@ -61,7 +60,7 @@ def largest_eigenvector(matrix):
 
 
 def align(truth, points):
-    """truth = scale * R * point + t of least squares; the rotation by Horn's quaternion (1987)."""
+    """The least-squares similarity truth = scale * R * point + t; the rotation by Horn's quaternion method (1987)."""
     n = len(points)
     mean_t = [sum(p[i] for p in truth) / n for i in range(3)]
     mean_p = [sum(p[i] for p in points) / n for i in range(3)]
@@ -92,7 +91,7 @@ def read_calibration(path):
         if value.strip():
             values[key.strip()] = value.strip()
     if values.get("model", "radial_tangential") not in ("radial_tangential", "radtan", "brown"):
-        raise SystemExit(f"{path}: only radial-tangential lenses are known here")
+        raise SystemExit(f"{path}: only radial-tangential lenses are supported")
     return {k: float(values.get(k, 0)) for k in
             ("width", "height", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")}
 
@@ -116,7 +115,7 @@ class Truth:
         self.rows = rows
 
     def at(self, time):
-        """(position, rotation) of the camera, or None further than 10 ms from the next true pose."""
+        """(position, rotation) of the camera, or None if the nearest true pose is more than 10 ms away."""
         i = bisect.bisect(self.times, time)
         best = min((k for k in (i - 1, i) if 0 <= k < len(self.times)),
                    key=lambda k: abs(self.times[k] - time))
@@ -127,7 +126,7 @@ class Truth:
 
 
 def read_labels(path):
-    """Times and labels of segments.txt, or nothing when there is none."""
+    """Times and labels of segments.txt, or empty lists if it does not exist."""
     if not path.exists():
         return [], []
     rows = [line.split() for line in path.read_text().splitlines()
@@ -153,8 +152,8 @@ def report_maps(author, tour, times, labels):
         named += bool(row["map"])
         right += bool(row["map"]) and built[label[5:]].most_common(1)[0][0] == row["map"]
     if frames:
-        print(f"{right} of {named} frames that name a map name the right one "
-              f"({100 * right / max(1, named):.2f} %); {named} of {frames} frames of visits name one "
+        print(f"the map was right in {right} of {named} localized frames "
+              f"({100 * right / max(1, named):.2f} %); {named} of {frames} frames of visits were localized "
               f"({100 * named / frames:.1f} %)")
 
 
@@ -197,17 +196,17 @@ def main():
                 continue
             offset = [anchor[i] - pose[0][i] for i in range(3)]
             seen = project(camera, apply(transposed(pose[1]), offset))
-            # A thing that truly is behind the camera or far outside counts as missed by an image's width.
+            # The error is limited to the image width, also for an entity whose true position is behind the camera.
             error = camera["width"] if seen is None else math.dist(seen, (float(row["u"]), float(row["v"])))
             errors[row["map"], row["name"]].append(min(error, camera["width"]))
     everything = sorted(e for group in errors.values() for e in group)
-    for (name, thing), group in sorted(errors.items()):
+    for (name, entity), group in sorted(errors.items()):
         group.sort()
-        print(f"{name} / {thing}: {len(group)} frames, median {group[len(group) // 2]:.2f} px, "
+        print(f"{name} / {entity}: {len(group)} frames, median {group[len(group) // 2]:.2f} px, "
               f"mean {sum(group) / len(group):.2f} px, 95 % below {group[int(0.95 * len(group))]:.2f} px")
     if not everything:
-        raise SystemExit("nothing was drawn that could be compared with the truth")
-    print(f"all: {len(everything)} drawings, median {everything[len(everything) // 2]:.2f} px, "
+        raise SystemExit("No augmentation can be compared with the ground truth.")
+    print(f"all: {len(everything)} augmentations drawn, median {everything[len(everything) // 2]:.2f} px, "
           f"mean {sum(everything) / len(everything):.2f} px, "
           f"95 % below {everything[int(0.95 * len(everything))]:.2f} px")
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fails when an include breaks the layer table of the house.
+"""Fails if an include violates the layer table of the architecture.
 
 Each folder may include its own headers and those of the folders in its row; third-party headers are
 restricted where the table names them.

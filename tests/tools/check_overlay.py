@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Measures how far from a checkerboard's true corners they would be drawn in each frame of a run.
+"""Measures, in each frame of a run, the distance between the drawn and the true corners of a checkerboard.
 
   check_overlay.py --sequence FOLDER --run OUTPUT/NAME [--columns 9 --rows 6 --square 0.04]
 
-The board is the plane z = 0 of the sequence's groundtruth.txt, its first inner corner the origin. It is put
-into the map once, by the similarity that draws its corners best over all tracked frames, as a curator would
-put a thing there; then it stays, and each frame's live pose (trajectory.txt) draws it. The truth is drawn by
-groundtruth.txt through the same calibration.yaml (pinhole, radial-tangential). Prints the mean, median and
-95 % of the distances in pixels. Needs only Python's standard library.
+The board is the plane z = 0 of the sequence's groundtruth.txt, with its first inner corner at the origin. It is placed
+in the map once, by the similarity that fits its corners best over all tracked frames, as a curator would place an
+entity; then each frame's live pose (trajectory.txt) projects it. The true corners are projected with groundtruth.txt
+and the same calibration.yaml (pinhole, radial-tangential). Prints the mean, the median and the 95th percentile of the
+distances in pixels. Needs only Python's standard library.
 """
 import argparse
 import bisect
@@ -65,7 +65,7 @@ def read_calibration(path):
 
 
 def project(k, rotation, centre, point):
-    """Of a world point; rotation is world_from_camera. None behind the camera."""
+    """The pixel of a world point, or None behind the camera; rotation is world_from_camera."""
     d = [point[i] - centre[i] for i in range(3)]
     x, y, z = apply(transposed(rotation), d)
     if z <= 1e-6:
@@ -79,7 +79,7 @@ def project(k, rotation, centre, point):
 
 
 class Similarity:
-    """map_from_board."""
+    """The similarity map_from_board."""
 
     def __init__(self, rotation, translation, scale):
         self.rotation, self.translation, self.scale = rotation, translation, scale
@@ -88,7 +88,7 @@ class Similarity:
         r = apply(self.rotation, p)
         return [self.scale * r[i] + self.translation[i] for i in range(3)]
 
-    def nudged(self, d):
+    def perturbed(self, d):
         return Similarity(product(exponential(d[0:3]), self.rotation),
                           [self.translation[i] + d[3 + i] for i in range(3)],
                           self.scale * math.exp(d[6]))
@@ -107,8 +107,8 @@ def solve(a, b):
     return [m[i][n] / m[i][i] for i in range(n)]
 
 
-def start(pairs):
-    """From the first pose and the spread of the camera centres; good enough to begin with."""
+def initial_similarity(pairs):
+    """An initial value from the middle pose and the spread of the camera centres."""
     (_, rb, cb), (_, rm, cm) = pairs[len(pairs) // 2]
     spread = [math.sqrt(sum(math.dist(p[side][2], pairs[0][side][2]) ** 2 for p in pairs)) for side in (0, 1)]
     scale = spread[1] / spread[0]
@@ -132,11 +132,11 @@ def fit(k, board, pairs, truth, place):
         base = residuals(k, board, pairs, place, truth)
         columns = []
         for i, step in enumerate(steps):
-            nudge = [0.0] * 7
-            nudge[i] = step
-            moved = residuals(k, board, pairs, place.nudged(nudge), truth)
+            perturbation = [0.0] * 7
+            perturbation[i] = step
+            moved = residuals(k, board, pairs, place.perturbed(perturbation), truth)
             columns.append([((m[0] - b[0]) / step, (m[1] - b[1]) / step) for m, b in zip(moved, base)])
-        # Huber's loss, so that the first frames of a map in the making do not pull it away.
+        # Huber's loss limits the influence of the first frames, while the map is still inaccurate.
         weights = [1.0 if math.hypot(*b) < 2 else 2 / math.hypot(*b) for b in base]
         normal = [[sum(w * (p[0] * q[0] + p[1] * q[1]) for w, p, q in zip(weights, columns[i], columns[j]))
                    for j in range(7)] for i in range(7)]
@@ -145,7 +145,7 @@ def fit(k, board, pairs, truth, place):
         for i in range(7):
             normal[i][i] *= 1 + 1e-9
         step = solve(normal, right)
-        place = place.nudged(step)
+        place = place.perturbed(step)
         if max(abs(x) for x in step) < 1e-9:
             break
     return place
@@ -159,7 +159,7 @@ def main():
     parser.add_argument("--rows", type=int, default=6)
     parser.add_argument("--square", type=float, default=0.04)
     parser.add_argument("--skip-seconds", type=float, default=0,
-                        help="of frames after the first, as long as the map is being started")
+                        help="ignore frames this many seconds after the first, while the map is initialized")
     arguments = parser.parse_args()
     k = read_calibration(arguments.sequence / "calibration.yaml")
     board = [[c * arguments.square, r * arguments.square, 0.0]
@@ -173,10 +173,10 @@ def main():
             pairs.append((true_poses[i], pose))
     pairs = [p for p in pairs if p[1][0] - pairs[0][1][0] >= arguments.skip_seconds]
     if len(pairs) < 3:
-        raise SystemExit("fewer than three frames have both a pose and a true one")
+        raise SystemExit("Fewer than three frames have both a pose and a true pose.")
     truth = [[project(k, rotation, centre, corner) for corner in board] for (_, rotation, centre), _ in pairs]
     some = range(0, len(pairs), max(1, len(pairs) // 60))
-    place = fit(k, board, [pairs[i] for i in some], [truth[i] for i in some], start(pairs))
+    place = fit(k, board, [pairs[i] for i in some], [truth[i] for i in some], initial_similarity(pairs))
     errors = sorted(math.hypot(*r) for r in residuals(k, board, pairs, place, truth))
     print(f"{len(pairs)} frames, {len(board)} corners: mean {sum(errors) / len(errors):.2f} px, "
           f"median {errors[len(errors) // 2]:.2f} px, 95 % below {errors[int(0.95 * len(errors))]:.2f} px")

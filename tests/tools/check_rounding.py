@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fails when the compiler's vectoriser fused products with sums that the source does not fuse.
+"""Fails if the compiler's vectorizer fused multiplications and additions that the source does not fuse.
 
-Whether it does depends on how it arranges the code, so that a debug build, or the next version, would
-compute other figures. Eigen fuses on purpose, by vfmadd alone; the alternating vfmaddsub and vfmsubadd
-are written nowhere and come from the vectoriser, which does not heed -ffp-contract=off.
+Whether it fuses depends on the generated code, so that a debug build or another version would compute different
+numbers. Eigen fuses intentionally, but only with vfmadd. The alternating vfmaddsub and vfmsubadd are not in the source;
+they come from the vectorizer, which ignores -ffp-contract=off.
 Usage: check_rounding.py OBJDUMP PROGRAM
 """
 import re
@@ -30,7 +30,7 @@ def self_test():
     fine = ["0000000000001000 <f(double)>:",
             "    1000:\tvfmadd231pd %ymm2,%ymm1,%ymm0",
             "    1005:\tvaddsubpd %xmm1,%xmm0,%xmm0"]
-    assert not breaches(fine), "what Eigen writes is fine"
+    assert not breaches(fine), "Eigen's own instructions must be accepted"
     for name in ("vfmaddsub132pd", "vfmsubadd231ps"):
         found = breaches(fine + [f"    100a:\t{name} %xmm2,%xmm1,%xmm0"])
         assert found == ["f(double): 1 fused"], f"{name} must be found"

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Kills `docent author` with SIGKILL at random moments and looks at the library each time.
+"""Kills `docent author` with SIGKILL at random times and checks the library each time.
 
     tests/tools/kill_authors.py build/release/docent --kills 200
 
-Each author walks through the simulated museum, makes a map of its own and saves it many times a second. After the kill the
-library must open and verify, and hold of every map at least the revision that the author had told as saved. Every so
-many authors a fresh library is begun. Prints one line a hundred kills and a sum, and ends with status 1 on the first
-library that does not hold.
+Each author walks through the simulated museum, makes its own map and saves it many times per second. After the kill,
+the library must open and verify, and contain every map in at least the last revision that the author reported as
+saved. After every --authors-per-library authors a new library is begun. Prints one line per hundred kills and a
+summary, and ends with exit status 1 at the first library that fails.
 """
 import argparse
 import json
@@ -32,26 +32,26 @@ def author(docent, library, name, folder, seed):
     return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
 
 
-def listen(process, told, first_save):
+def listen(process, reported, first_save):
     for line in process.stderr:
         found = SAVED.search(line)
         if found:
-            told[found[1]] = max(told.get(found[1], 0), int(found[2]))
+            reported[found[1]] = max(reported.get(found[1], 0), int(found[2]))
             first_save.set()
 
 
-def held(docent, library, told):
-    """A sentence about what is wrong with the library, or None."""
+def library_problem(docent, library, reported):
+    """A sentence that describes what is wrong with the library, or None."""
     verify = subprocess.run([docent, "maps", "verify", "--library", library], capture_output=True, text=True)
     if verify.returncode != 0:
-        if not told and "does not exist" in verify.stderr:
+        if not reported and "does not exist" in verify.stderr:
             return None
         return "verify: " + verify.stdout + verify.stderr
     listed = subprocess.run([docent, "maps", "list", "--library", library, "--json"], capture_output=True, text=True)
     revisions = {m["name"]: m["revision"] for m in json.loads(listed.stdout)["maps"]}
-    for name, revision in told.items():
+    for name, revision in reported.items():
         if revisions.get(name, -1) < revision:
-            return f"{name} was saved in revision {revision} and is there in {revisions.get(name)}"
+            return f"{name} was saved in revision {revision}, but the library has revision {revisions.get(name)}"
     return None
 
 
@@ -59,27 +59,27 @@ def main():
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     arguments.add_argument("docent")
     arguments.add_argument("--kills", type=int, default=200)
-    arguments.add_argument("--authors-a-library", type=int, default=10)
+    arguments.add_argument("--authors-per-library", type=int, default=10)
     arguments.add_argument("--seed", type=int, default=1)
     options = arguments.parse_args()
     rng = random.Random(options.seed)
     kills = saves = ended = 0
     with tempfile.TemporaryDirectory() as folder:
-        library, told, made = None, {}, 0
+        library, reported, made = None, {}, 0
         while kills < options.kills:
-            if made % options.authors_a_library == 0:
+            if made % options.authors_per_library == 0:
                 if library:
                     for suffix in ("", "-wal", "-shm"):
                         if os.path.exists(library + suffix):
                             os.remove(library + suffix)
-                library, told = os.path.join(folder, f"library{made}.docent"), {}
+                library, reported = os.path.join(folder, f"library{made}.docent"), {}
             made += 1
-            before = sum(told.values())
+            before = sum(reported.values())
             process = author(options.docent, library, f"Map {made}", folder, made)
             first_save = threading.Event()
-            listener = threading.Thread(target=listen, args=(process, told, first_save))
+            listener = threading.Thread(target=listen, args=(process, reported, first_save))
             listener.start()
-            # One in five dies while it starts, the others somewhere between the first save and the end.
+            # One author in five is killed while it starts, the others between the first save and the end.
             if rng.random() < 0.2:
                 time.sleep(rng.uniform(0, 1.0))
             else:
@@ -93,15 +93,15 @@ def main():
                 ended += 1
             process.wait()
             listener.join()
-            saves += sum(told.values()) > before
-            problem = held(options.docent, library, told)
+            saves += sum(reported.values()) > before
+            problem = library_problem(options.docent, library, reported)
             if problem:
                 print(f"after {kills} kills: {problem}")
                 return 1
             if kills and kills % 100 == 0:
                 print(f"{kills} kills", flush=True)
-    print(f"{kills} kills ({saves} after a save was told, {ended} more authors ended before): every library opened, "
-          "verified and held its last save")
+    print(f"{kills} kills ({saves} after a reported save; {ended} more authors ended before their kill): every library "
+          "opened, verified and contained its last save")
     return 0
 
 

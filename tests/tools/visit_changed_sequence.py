@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Measures visits to a place whose images are changed: with motion blur, another exposure, a longer lens, people.
+"""Measures tours with changed images: with motion blur, another exposure, a longer focal length, or people.
 
   visit_changed_sequence.py --docent build/release/docent --change-tool build/release/tests/tools/change_sequence \\
                             --sequence kitchen --output visits --seeds 1,2,3
 
-A map is authored from the first half of the sequence (--build) and toured with the second half (--visit), as it
-is and with each of --changes. Sequences that lie in the output folder already are used again; authoring and
-tours are run anew. The true place of the map is the similarity truth_from_map between the author's live camera
-centres and groundtruth.txt (check_augmentations.py). A frame counts as posed in the states sixdof, hybrid,
-panorama and relocalized; a pose is wrong when its camera centre is more than --wrong metres from the truth.
+A map is authored from the first half of the sequence (--build) and toured with the second half (--visit), unchanged
+and with each of --changes. Existing sequences in the output folder are reused; authoring and tours are always repeated.
+The map is aligned with the world by the similarity truth_from_map between the author's live camera centres and
+groundtruth.txt (check_augmentations.py). A frame counts as posed in the states sixdof, hybrid, panorama and
+relocalized; a pose is wrong if its camera centre is more than --wrong metres from the truth.
 Needs only Python's standard library.
 """
 import argparse
@@ -48,7 +48,7 @@ def centre(row):
 
 
 def maps_in_world(frames, truth):
-    """truth_from_map of every map that has at least ten poses with truth, and the residual of each (metres)."""
+    """truth_from_map of every map with at least ten poses that have ground truth, and the RMSE of each in metres."""
     pairs = collections.defaultdict(lambda: ([], []))
     for row in frames:
         pose, point = truth.at(float(row["timestamp"])), centre(row)
@@ -69,8 +69,8 @@ def place(similarity, point):
     return [scale * turned[i] + t[i] for i in range(3)]
 
 
-def judge(frames, truth, placed, wrong_m):
-    """Figures of one visit."""
+def evaluate_visit(frames, truth, placed, wrong_m):
+    """The results of one visit."""
     errors, posed, unplaced, first = [], 0, 0, None
     for i, row in enumerate(frames):
         if row["state"] not in POSED or not row["map"]:
@@ -107,11 +107,11 @@ def visit(arguments, seed, visits, truth):
     for change, sequence in visits.items():
         output = folder / change.replace(":", "-")
         run(arguments.docent, "--quiet", "tour", *common, "--camera", sequence, "--output", output, *arguments.tour_option)
-        result = results[change] = judge(read_frames(output), truth, placed, arguments.wrong)
-        median, most = (("%.1f" % (100 * result[k]) if result[k] is not None else "-")
+        result = results[change] = evaluate_visit(read_frames(output), truth, placed, arguments.wrong)
+        median, maximum = (("%.1f" % (100 * result[k]) if result[k] is not None else "-")
                         for k in ("median_error_m", "max_error_m"))
         print(f"  {change:14} {100 * result['posed_ratio']:5.1f} % posed, first frame {result['first_posed_frame']}, "
-              f"{result['wrong']} wrong, median {median} cm, most {most} cm", flush=True)
+              f"{result['wrong']} wrong, median {median} cm, maximum {maximum} cm", flush=True)
     return results
 
 
@@ -119,14 +119,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     for name in ("docent", "change-tool", "sequence", "output"):
         parser.add_argument("--" + name, required=True, type=pathlib.Path)
-    parser.add_argument("--build", default=":50%", help="frames that the map is built from")
-    parser.add_argument("--visit", default="50%:", help="frames that visit it")
+    parser.add_argument("--build", default=":50%", help="range of frames that the map is built from")
+    parser.add_argument("--visit", default="50%:", help="range of frames of the tour")
     parser.add_argument("--changes", default=",".join(CHANGES))
     parser.add_argument("--seeds", default="1")
     parser.add_argument("--pace", default="lockstep")
-    parser.add_argument("--wrong", type=float, default=0.25, help="metres from which on a pose is wrong")
-    parser.add_argument("--author-option", action="append", default=[], help="a further word for docent author")
-    parser.add_argument("--tour-option", action="append", default=[], help="a further word for docent tour")
+    parser.add_argument("--wrong", type=float, default=0.25, help="position error in metres above which a pose is wrong")
+    parser.add_argument("--author-option", action="append", default=[], help="additional argument for docent author")
+    parser.add_argument("--tour-option", action="append", default=[], help="additional argument for docent tour")
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
     truth = Truth(arguments.sequence / "groundtruth.txt")
@@ -136,7 +136,7 @@ def main():
               for change in arguments.changes.split(",")}
     results = {seed: visit(arguments, seed, visits, truth) for seed in arguments.seeds.split(",")}
     (arguments.output / "visits.json").write_text(json.dumps(results, indent=1) + "\n")
-    print("least posed and most wrong of all seeds:")
+    print("worst case over all seeds:")
     for change in visits:
         ratios = sorted(results[seed][change]["posed_ratio"] for seed in results)
         print(f"  {change:14} {100 * ratios[0]:5.1f} % posed (median {100 * ratios[len(ratios) // 2]:.1f} %), "

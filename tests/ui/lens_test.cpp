@@ -12,8 +12,8 @@ namespace {
 using engine::CameraModel;
 using engine::LensModel;
 
-// Draws a small square around the point that each chosen pixel sees and measures where it appears.
-void ExpectContentLandsWhereTheLensProjects(const CameraModel& camera) {
+// Draws a small square around the 3D point that each chosen pixel sees and measures where the square appears.
+void ExpectContentAppearsWhereTheLensProjects(const CameraModel& camera) {
   Renderer renderer;
   const engine::TrackedFrame tracked =
       Tracked(cv::Mat::zeros(camera.height_px(), camera.width_px(), CV_8UC3));
@@ -43,38 +43,38 @@ void ExpectContentLandsWhereTheLensProjects(const CameraModel& camera) {
 using Lens = OffscreenTest;
 
 TEST_F(Lens, DrawsContentWhereAStronglyDistortedLensProjectsIt) {
-  ExpectContentLandsWhereTheLensProjects(StronglyDistorted());
+  ExpectContentAppearsWhereTheLensProjects(StronglyDistorted());
 }
 
 TEST_F(Lens, DrawsContentWhereAFieldOfViewLensProjectsIt) {
-  ExpectContentLandsWhereTheLensProjects(
+  ExpectContentAppearsWhereTheLensProjects(
       {LensModel::kFov, {640, 480, 300.0, 302.0, 322.0, 238.0}, {0.92, 0, 0, 0, 0}});
 }
 
 TEST_F(Lens, DrawsContentBesideAndBehindTheCameraOfAFisheyeLens) {
-  // The corners of the image look 115 degrees off the axis.
-  ExpectContentLandsWhereTheLensProjects(
+  // The rays of the image's corners are 115 degrees off the axis.
+  ExpectContentAppearsWhereTheLensProjects(
       {LensModel::kKannalaBrandt, {640, 480, 200.0, 200.0, 319.0, 240.0}, {0.01, -0.002, 0, 0, 0}});
 }
 
-TEST(LensWarp, NeedsOneViewForAnOrdinaryLensAndSeveralForAFisheye) {
+TEST(LensWarp, UsesOneFaceForAnOrdinaryLensAndSeveralForAFisheye) {
   const CameraModel ordinary = StronglyDistorted();
   const LensWarp one = MakeLensWarp(ordinary, 4096);
   ASSERT_EQ(one.faces.size(), 1u);
-  // The middle keeps its resolution: as many pixels a unit of tangent as the lens has.
+  // The centre keeps its resolution: the face has as many pixels per unit of tangent as the lens.
   const LensFace& face = one.faces[0];
   EXPECT_GE(face.width_px / (face.bounds.right - face.bounds.left), 0.999 * ordinary.intrinsics().fx);
   const CameraModel fisheye(LensModel::kKannalaBrandt, {640, 480, 200.0, 200.0, 319.0, 240.0}, {});
   EXPECT_GE(MakeLensWarp(fisheye, 4096).faces.size(), 5u);
 }
 
-TEST(LensWarp, StaysWithinTheLargestTexture) {
+TEST(LensWarp, FitsTheAtlasIntoTheLargestTexture) {
   const CameraModel fisheye(LensModel::kKannalaBrandt, {640, 480, 200.0, 200.0, 319.0, 240.0}, {});
   const LensWarp warp = MakeLensWarp(fisheye, 512);
   EXPECT_LE(std::max(warp.atlas_width_px, warp.atlas_height_px), 512);
 }
 
-TEST(LensWarp, LooksUpEachPixelWhereItsOwnRayWasDrawn) {
+TEST(LensWarp, MapsEachPixelToTheTexelOfItsRay) {
   const CameraModel camera = StronglyDistorted();
   const LensWarp warp = MakeLensWarp(camera, 4096);
   const LensFace& face = warp.faces[0];

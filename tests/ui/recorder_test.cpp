@@ -40,7 +40,7 @@ TEST(Recorder, WritesAVideoThatReadsBackWithTheSameImages) {
   std::filesystem::remove(path);
 }
 
-TEST(Recorder, RefusesWhatItCannotWriteWithASentence) {
+TEST(Recorder, ThrowsAClearErrorWhenItCannotWrite) {
   const auto message = [](const std::string& path, double rate) {
     try {
       Recorder recorder(path, rate);
@@ -54,32 +54,32 @@ TEST(Recorder, RefusesWhatItCannotWriteWithASentence) {
   EXPECT_NE(message(Scratch("video.mp4").string(), 0).find("rate"), std::string::npos);
 }
 
-TEST(Recorder, LeavesNoFileWithoutImages) {
+TEST(Recorder, LeavesNoFileWhenNoImageWasWritten) {
   const std::filesystem::path path = Scratch("empty.mp4");
   Recorder(path.string(), 30).Close();
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-TEST(MapView, LooksStraightDownFromAbove) {
+TEST(MapView, ViewsStraightDownAtMaximumElevation) {
   Orbit orbit;
   orbit.target = {1, 2, 3};
   orbit.distance_m = 4;
-  orbit.elevation = 10;  // clamped to a right angle
+  orbit.elevation = 10;  // Clamped to a right angle.
   const engine::Rigid3 camera_from_map = CameraFromMap(orbit);
   EXPECT_LT((camera_from_map.OriginInSource() - Eigen::Vector3d(1, -2, 3)).norm(), 1e-9);
   EXPECT_LT((camera_from_map * orbit.target - Eigen::Vector3d(0, 0, 4)).norm(), 1e-9);
 }
 
-TEST(MapView, TellsLengthsInUnitsOfTheMapWhichNeedNotBeMetres) {
+TEST(MapView, ShowsGridSpacingInMapUnits) {
   engine::MapSnapshot map;
   map.points.resize(3);
   map.keyframes.resize(2);
-  EXPECT_EQ(MapViewCounts(map, 0.2), "3 points, 2 keyframes, grid of 0.2 units");
+  EXPECT_EQ(MapViewCounts(map, 0.2), "3 points, 2 keyframes, grid spacing 0.2 map units");
 }
 
 using MapViewImage = OffscreenTest;
 
-TEST_F(MapViewImage, ShowsWhereAndWhitherALostCameraIsFoundAgain) {
+TEST_F(MapViewImage, ShowsPredictedRecallByPlaceAndDirection) {
   const engine::MapSnapshot map;
   Orbit orbit;
   orbit.distance_m = 4;
@@ -90,7 +90,7 @@ TEST_F(MapViewImage, ShowsWhereAndWhitherALostCameraIsFoundAgain) {
                                               {{0, 0, 0}, {0, 0, -1}, 2.0, 0.0}};
   view.Draw(map, nullptr, orbit, {}, found);
   view.ReadBack(&image);
-  // From above +z is up the image: green there, red below, on the middle column.
+  // Seen from above, +z is up in the image: green there and red below, on the middle column.
   const int x = image.cols / 2;
   const int step = image.rows / 12;
   const auto ahead = image.at<cv::Vec3b>(image.rows / 2 - step, x);
@@ -98,7 +98,7 @@ TEST_F(MapViewImage, ShowsWhereAndWhitherALostCameraIsFoundAgain) {
   EXPECT_GT(ahead[1], ahead[2] + 60);
   EXPECT_GT(behind[2], behind[1] + 60);
   const auto aside = image.at<cv::Vec3b>(image.rows / 2 + 3, x + step);
-  EXPECT_LT(std::abs(aside[1] - aside[2]), 40) << "nothing was tried there";
+  EXPECT_LT(std::abs(aside[1] - aside[2]), 40) << "this direction has no prediction";
 }
 
 TEST_F(MapViewImage, ShowsThePointsOfAMapInColour) {

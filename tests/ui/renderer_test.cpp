@@ -21,7 +21,7 @@ int CountDifferent(const cv::Mat& a, const cv::Mat& b) {
   return cv::countNonZero(difference.reshape(1));
 }
 
-TEST_F(RendererTest, KeepsEveryByteOfTheVideoWhereNothingStands) {
+TEST_F(RendererTest, KeepsVideoPixelsExactWhereThereIsNoContent) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   const cv::Mat video = NoiseImage(640, 480, CV_8UC3);
@@ -32,7 +32,7 @@ TEST_F(RendererTest, KeepsEveryByteOfTheVideoWhereNothingStands) {
   scene.entities.push_back(Facing(SquareModel(0.4f, glm::vec4(1, 0, 0, 1)), {0, 0, 2}));
   const cv::Mat drawn = DrawImage(&renderer, tracked, camera, scene);
   EXPECT_EQ(drawn.at<cv::Vec3b>(242, 319), cv::Vec3b(0, 0, 255));
-  // The square spans 81 pixels around the middle; beside it the video is untouched.
+  // The square spans 81 pixels around the middle; the video beside it is unchanged.
   const cv::Rect around(319 - 50, 242 - 50, 100, 100);
   cv::Mat rest = drawn.clone(), expected = video.clone();
   rest(around).setTo(0);
@@ -41,7 +41,7 @@ TEST_F(RendererTest, KeepsEveryByteOfTheVideoWhereNothingStands) {
   EXPECT_GT(CountDifferent(drawn, video), 3 * 70 * 70);
 }
 
-TEST_F(RendererTest, ShowsGreyVideoAndImagesWithinLargerOnes) {
+TEST_F(RendererTest, ShowsGreyVideoAndSubImages) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   const cv::Mat gray = NoiseImage(640, 480, CV_8UC1);
@@ -53,7 +53,7 @@ TEST_F(RendererTest, ShowsGreyVideoAndImagesWithinLargerOnes) {
   EXPECT_EQ(CountDifferent(DrawImage(&renderer, Tracked(part), camera, {}), part), 0);
 }
 
-TEST_F(RendererTest, ShowsAnotherCameraSmallInACornerAndNothingElsewhere) {
+TEST_F(RendererTest, ShowsAnotherCameraOnlyInTheInset) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   const engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(10, 20, 30)));
@@ -72,13 +72,13 @@ TEST_F(RendererTest, ShowsAnotherCameraSmallInACornerAndNothingElsewhere) {
   EXPECT_FALSE(inset.Contains({inset.x - 1, inset.y + 1}));
   const cv::Mat inside = drawn(cv::Rect(inset.x + 5, inset.y + 5, inset.width - 10, inset.height - 10));
   EXPECT_EQ(CountDifferent(inside, cv::Mat(inside.size(), CV_8UC3, cv::Scalar(200, 100, 50))), 0);
-  // Six pixels around it belong to its frame.
+  // The border of the inset is six pixels wide.
   drawn(cv::Rect(inset.x - 6, std::max(0, inset.y - 6), inset.width + 12, inset.height + 12))
       .setTo(cv::Scalar(10, 20, 30));
   EXPECT_EQ(CountDifferent(drawn, cv::Mat(480, 640, CV_8UC3, cv::Scalar(10, 20, 30))), 0);
 }
 
-TEST_F(RendererTest, HidesWhatStandsBehindWhateverTheOrderOfPlacing) {
+TEST_F(RendererTest, HidesOccludedContentInAnyPlacingOrder) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   const engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
@@ -108,7 +108,7 @@ TEST_F(RendererTest, BlendsTransparentContentOverTheVideoAndOverEachOther) {
   EXPECT_NEAR(twice[2], 0.25 * 255 + 0.75 * 0.5 * 40, 2);
 }
 
-TEST_F(RendererTest, DrawsEachImageWithItsOwnPoseAndForgetsTheOneBefore) {
+TEST_F(RendererTest, DrawsEachImageWithItsOwnPoseOnly) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   content::Scene scene;
@@ -159,7 +159,7 @@ TEST_F(RendererTest, MovesASkinnedMeshWithItsJoint) {
   EXPECT_LT((Centroid(drawn) - expected).norm(), 0.5);
 }
 
-TEST_F(RendererTest, FreesTheGraphicsMemoryOfModelsThatAreGone) {
+TEST_F(RendererTest, FreesGraphicsMemoryOfDeletedModels) {
   ContentLayer layer(4, 256);
   const RenderTarget target(640, 480, 1, false);
   const engine::CameraModel camera = StronglyDistorted();
@@ -174,7 +174,7 @@ TEST_F(RendererTest, FreesTheGraphicsMemoryOfModelsThatAreGone) {
   EXPECT_EQ(layer.cached_models(), 1u);
 }
 
-TEST_F(RendererTest, DrawsTheWearerIntoTheSearchWithAFigureThatMoves) {
+TEST_F(RendererTest, AnimatesTheSearchFigureWhileLost) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(90, 90, 90)));
@@ -193,7 +193,7 @@ TEST_F(RendererTest, DrawsTheWearerIntoTheSearchWithAFigureThatMoves) {
   EXPECT_GT(CountDifferent(early(middle), late(middle)), 1000);
 }
 
-TEST_F(RendererTest, SaysHowFarTheMapHasCome) {
+TEST_F(RendererTest, ShowsADifferentTextForEachMappingStatus) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(90, 90, 90)));

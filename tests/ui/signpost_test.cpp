@@ -29,21 +29,22 @@ TEST(Signpost, FacesTheReaderAboutItsUpAxisFromEverySide) {
     EXPECT_LT((pose * Eigen::Vector3d::Zero() - sign.anchor).norm(), 1e-12);
     EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitY() - sign.up).norm(), 1e-12);
     EXPECT_DOUBLE_EQ(pose.scale, 0.3);
-    // Of all turns about `up` it takes the one whose front looks at the reader: no part to the side is left.
+    // Among all rotations about `up`, the pose has the one whose front faces the reader, so the reader has no
+    // sideways coordinate.
     const Eigen::Vector3d eye_in_sign = pose.inverse() * eye;
     EXPECT_NEAR(eye_in_sign.x(), 0, 1e-9 * (1 + eye_in_sign.norm()));
     EXPECT_GT(eye_in_sign.z(), 0);
   }
 }
 
-TEST(Signpost, StandsSomehowWhenTheReaderIsStraightAbove) {
+TEST(Signpost, HasAValidPoseWhenTheReaderIsStraightAbove) {
   const content::Signpost sign = Sign("Roof");
   const engine::Sim3 pose = SignpostPose(sign, {0, -2, 0});
   EXPECT_TRUE(pose.rotation.matrix().allFinite());
   EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitY() - sign.up).norm(), 1e-12);
 }
 
-TEST(Signpost, KeepsItsTextureSmallHoweverLongTheText) {
+TEST(Signpost, LimitsTheTextureSizeForAnyTextLength) {
   for (const std::string& text : {std::string("Hi"), std::string(200000, 'W'), std::string(3000, '\n'),
                                   std::string("\xff\xc0 no UTF-8"), std::string()}) {
     const auto model = MakeSignpostModel(Sign(text, std::string(5000, 'M')));
@@ -53,7 +54,7 @@ TEST(Signpost, KeepsItsTextureSmallHoweverLongTheText) {
   }
 }
 
-TEST(Signpost, ShowsAStripWhenItPointsToAMap) {
+TEST(Signpost, ShowsAStripWhenItLeadsToAMap) {
   const auto plain = MakeSignpostModel(Sign("Elephants")),
              pointing = MakeSignpostModel(Sign("Elephants", "Bay 7"));
   EXPECT_GT(pointing->images[0].height_px, plain->images[0].height_px + 40);
@@ -89,10 +90,10 @@ TEST_F(SignpostImage, ShowsItsBoardToReadersOnBothSides) {
   scene.entities.push_back(entity);
   engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
   const cv::Mat front = DrawImage(&renderer, tracked, camera, scene);
-  // The same distance on the far side, looking back.
+  // The same distance on the other side, facing back.
   tracked.camera_from_map = {engine::Rotation3::Exp({0, 3.14159265358979, 0}), {0, 0, 4}};
   const cv::Mat back = DrawImage(&renderer, tracked, camera, scene);
-  // Both see letters: the same front, not its mirror image nor the plain back.
+  // Both readers see the text: the same front, not its mirror image or the plain back.
   cv::Mat difference;
   cv::absdiff(front, back, difference);
   EXPECT_GT(cv::mean(front)[2], 1.0);

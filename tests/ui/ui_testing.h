@@ -13,7 +13,8 @@
 #include "ui/context.h"
 #include "ui/renderer.h"
 
-// What the tests of the floor share: an offscreen context or a reason to skip, and small models made by hand.
+// Shared by the tests of ui/: a fixture with an offscreen context, which skips the test if there is none, and
+// small generated models.
 namespace docent::ui {
 
 class OffscreenTest : public ::testing::Test {
@@ -44,7 +45,8 @@ inline cv::Mat NoiseImage(int width_px, int height_px, int type) {
   return image;
 }
 
-// A square in the model's xy plane, `side` long, seen from both sides, in one unlit colour (linear).
+// A square of this side length in the model's xy plane, visible from both sides, in one unlit colour (linear
+// RGB).
 inline std::shared_ptr<content::Model> SquareModel(float side, const glm::vec4& color) {
   auto model = std::make_shared<content::Model>();
   content::Material material;
@@ -71,8 +73,7 @@ inline std::shared_ptr<content::Model> SquareModel(float side, const glm::vec4& 
   return model;
 }
 
-// The model at a point of the map, its +z axis against the ray from the map's origin, so that it faces a
-// camera there.
+// A model at a point of the map whose +z axis faces a camera at the map's origin.
 inline content::Entity Facing(std::shared_ptr<const content::Model> model, const Eigen::Vector3d& place) {
   auto asset = std::make_shared<content::Asset>();
   asset->model = std::move(model);
@@ -85,7 +86,7 @@ inline content::Entity Facing(std::shared_ptr<const content::Model> model, const
   return entity;
 }
 
-// A tracked frame with a pose at the map's origin over this image.
+// A tracked frame of this image with its pose at the map's origin.
 inline engine::TrackedFrame Tracked(const cv::Mat& image) {
   engine::TrackedFrame tracked;
   tracked.frame.image = image;
@@ -106,7 +107,7 @@ inline cv::Mat DrawImage(Renderer* renderer, const engine::TrackedFrame& tracked
   return image;
 }
 
-// Centre of what is brighter than black in an image, weighted by its green, pixels; (-1, -1) for nothing.
+// The centroid of the image weighted by its green channel, in pixels; (-1, -1) if the image is black.
 inline Eigen::Vector2d Centroid(const cv::Mat& image) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double weight = 0;

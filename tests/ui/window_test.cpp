@@ -19,7 +19,7 @@
 namespace docent::ui {
 namespace {
 
-// A screen of its own for these tests, on a display number that the server chooses.
+// A virtual X server for these tests, on a display number that the server chooses.
 class VirtualScreen {
  public:
   VirtualScreen() {
@@ -57,7 +57,7 @@ bool HasXdotool() {
   return std::system("command -v xdotool > /dev/null 2>&1") == 0;
 }
 
-// Draws until a click arrives or the patience ends; the click, if any.
+// Draws until a click arrives or about six seconds have passed. Returns the click, if any.
 std::optional<InputEvent> AwaitClick(Window* window, const std::function<void()>& draw) {
   for (int i = 0; i < 600; ++i) {
     for (const InputEvent& event : window->PollEvents()) {
@@ -69,18 +69,18 @@ std::optional<InputEvent> AwaitClick(Window* window, const std::function<void()>
   return std::nullopt;
 }
 
-TEST(Window, SaysInASentenceThatThereIsNoDisplay) {
+TEST(Window, ThrowsAClearErrorWithoutADisplay) {
   unsetenv("DISPLAY");
   unsetenv("WAYLAND_DISPLAY");
   try {
     Window window("none", 100, 100);
-    FAIL() << "a window without a display";
+    FAIL() << "a window was opened without a display";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("no display"), std::string::npos) << error.what();
   }
 }
 
-TEST(Window, ShowsTheImageAndPlacesWhatIsClicked) {
+TEST(Window, EmitsAPlaceCommandForAClickInTheImage) {
   VirtualScreen screen;
   if (!screen.works()) GTEST_SKIP() << "Xvfb is not installed";
   if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
@@ -103,7 +103,8 @@ TEST(Window, ShowsTheImageAndPlacesWhatIsClicked) {
     window.Show();
   };
   draw();
-  // Held long enough that no frame misses it; the window of a bare server has its corner at the screen's.
+  // The button is held long enough that some frame polls it. Without a window manager the window's corner is
+  // the screen's corner.
   std::thread hand([] {
     const int status =
         std::system("xdotool mousemove 200 400 && xdotool mousedown 1 && sleep 0.15 && xdotool mouseup 1");
@@ -132,7 +133,7 @@ TEST(Letterbox, MapsWindowPointsToImagePixels) {
   EXPECT_LT((box.ImageFromWindow({1279, 979}) - Eigen::Vector2d(639, 479)).norm(), 1e-12);
 }
 
-TEST(CommandText, QuotesWhatAPersonTyped) {
+TEST(CommandText, QuotesUserInput) {
   EXPECT_EQ(NewMapCommand("Desk 3"), "map new \"Desk 3\"");
   EXPECT_EQ(NewMapCommand("a \"b\" \\ c"), "map new \"a \\\"b\\\" \\\\ c\"");
   EXPECT_EQ(PlaceCommand("cake.glb", {320, 240.504}, 1, 0), "place \"cake.glb\" at pixel 320 240.5");

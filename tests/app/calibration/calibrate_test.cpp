@@ -21,7 +21,7 @@ using engine::Rigid3;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-// Lenses of the three kinds, with principal points off the middle.
+// Camera models of the three types, with principal points off the image centre.
 CameraModel LensOf(LensModel lens) {
   switch (lens) {
     case LensModel::kRadialTangential:
@@ -57,7 +57,7 @@ std::vector<BoardView> RenderAndDetect(const BoardSpec& board, const CameraModel
   return views;
 }
 
-// A focal length within a thousandth, a principal point within half a pixel.
+// Expects the focal length within a thousandth and the principal point within half a pixel.
 void ExpectNear(const CameraModel& found, const CameraModel& truth) {
   EXPECT_EQ(found.lens(), truth.lens());
   const auto record = [](const char* what, double value) {
@@ -98,27 +98,27 @@ TEST_P(EveryLens, IsRecoveredFromRenderedCheckerboards) {
   ExpectNear(calibration.camera, truth);
   EXPECT_LT(calibration.cross_validated_px, 0.05);
   RecordProperty("cross_validated_px", std::to_string(calibration.cross_validated_px));
-  EXPECT_THAT(calibration.verdict, StartsWith("Good"));
+  EXPECT_THAT(calibration.assessment, StartsWith("Good"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Calibrate, EveryLens,
                          testing::Values(LensModel::kRadialTangential, LensModel::kFov,
                                          LensModel::kKannalaBrandt));
 
-TEST(Calibrate, WorksWithCharucoBoardsThatAreSeenInPart) {
+TEST(Calibrate, SupportsPartlyVisibleCharucoBoards) {
   const BoardSpec board = ParseBoard("charuco:8x6:30");
   const CameraModel truth = LensOf(LensModel::kRadialTangential);
   const std::vector<BoardView> views = RenderAndDetect(board, truth, 20);
   ASSERT_GE(views.size(), 15u);
   const Calibration calibration = Calibrate(views, 640, 480, {});
-  // Other models may explain this lens as well; what they are judged by must be small.
+  // Other models may fit this lens as well; the cross-validation error must be small.
   EXPECT_LT(calibration.cross_validated_px, 0.1);
   CalibrationOptions options;
   options.lens = LensModel::kRadialTangential;
   ExpectNear(Calibrate(views, 640, 480, options).camera, truth);
 }
 
-TEST(Calibrate, ChoosesTheModelThatPredictsUnseenViews) {
+TEST(Calibrate, ChoosesTheModelByCrossValidation) {
   const BoardSpec board;
   Random random(3);
   for (const LensModel lens : {LensModel::kRadialTangential, LensModel::kFov, LensModel::kKannalaBrandt}) {
@@ -135,7 +135,7 @@ TEST(Calibrate, ChoosesTheModelThatPredictsUnseenViews) {
   }
 }
 
-TEST(Calibrate, LeavesOutAViewThatCannotBe) {
+TEST(Calibrate, RejectsAViewWithWrongCorners) {
   const BoardSpec board;
   const CameraModel truth = LensOf(LensModel::kFov);
   std::vector<BoardView> views;
@@ -148,12 +148,12 @@ TEST(Calibrate, LeavesOutAViewThatCannotBe) {
   EXPECT_NEAR(calibration.camera.intrinsics().fx, truth.intrinsics().fx, 0.01);
 }
 
-TEST(Calibrate, ChoosesViewsThatSayMostAndNotTheSameTwice) {
+TEST(Calibrate, ChoosesInformativeViewsWithoutDuplicates) {
   const BoardSpec board;
   const CameraModel truth = LensOf(LensModel::kFov);
   std::vector<BoardView> views;
   const std::vector<Rigid3> poses = BoardPoses(board, truth, 6);
-  for (int i = 0; i < 30; ++i) views.push_back(Projected(board, truth, poses[0]));  // thirty times the same
+  for (int i = 0; i < 30; ++i) views.push_back(Projected(board, truth, poses[0]));  // thirty identical views
   for (std::size_t i = 1; i < poses.size(); ++i) views.push_back(Projected(board, truth, poses[i]));
   const auto solution = SolveLens(LensModel::kFov, 640, 480, views);
   ASSERT_TRUE(solution);
@@ -162,27 +162,27 @@ TEST(Calibrate, ChoosesViewsThatSayMostAndNotTheSameTwice) {
   EXPECT_GE(std::count_if(chosen.begin(), chosen.end(), [](std::size_t i) { return i >= 30; }), 4);
 }
 
-TEST(Calibrate, SaysWhatIsMissing) {
+TEST(Calibrate, ReportsMissingViews) {
   EXPECT_THAT(ErrorOf([] { Calibrate(std::vector<BoardView>(2), 640, 480); }), HasSubstr("only 2 images"));
   const BoardSpec board;
   const CameraModel truth = LensOf(LensModel::kFov);
   Coverage coverage(640, 480);
   EXPECT_THAT(coverage.Advice(), HasSubstr("show the board"));
   for (const Rigid3& pose : BoardPoses(board, truth, 1)) coverage.Add(Projected(board, truth, pose));
-  EXPECT_GT(coverage.Share(), 0.05);
-  EXPECT_LT(coverage.Share(), 0.9);
+  EXPECT_GT(coverage.Ratio(), 0.05);
+  EXPECT_LT(coverage.Ratio(), 0.9);
 }
 
-TEST(Calibrate, WritesAFileThatReadsBackWithItsVerdict) {
+TEST(Calibrate, RoundTripsThroughAFileWithItsAssessment) {
   Calibration calibration;
   calibration.camera = LensOf(LensModel::kKannalaBrandt);
-  calibration.verdict = "Good: it is.";
+  calibration.assessment = "Good: it is.";
   const std::string text = FormatCalibration(calibration, BoardSpec());
   EXPECT_EQ(ParseCalibration(text, "file"), calibration.camera);
-  EXPECT_THAT(text, HasSubstr("verdict: \"Good: it is.\""));
+  EXPECT_THAT(text, HasSubstr("assessment: \"Good: it is.\""));
 }
 
-TEST(Boards, AreReadFromWordsOrRefused) {
+TEST(Boards, ParseValidTextAndRejectInvalidText) {
   EXPECT_EQ(FormatBoard(ParseBoard("checkerboard:9x6:24.5")), "checkerboard:9x6:24.5");
   EXPECT_EQ(FormatBoard(ParseBoard("charuco:8x6:30")), "charuco:8x6:30");
   for (const char* text : {"", "charuco", "charuco:8x6", "board:8x6:30", "charuco:8:30", "charuco:2x6:30",
@@ -191,7 +191,7 @@ TEST(Boards, AreReadFromWordsOrRefused) {
   }
 }
 
-TEST(Boards, ArePrintedAsPdf) {
+TEST(Boards, AreWrittenAsPdf) {
   const TemporaryFolder folder;
   for (const char* text : {"checkerboard:9x6:25", "charuco:8x6:30"}) {
     PrintBoard(ParseBoard(text), folder / "board.pdf");
@@ -203,8 +203,8 @@ TEST(Boards, ArePrintedAsPdf) {
   EXPECT_THAT(ErrorOf([&] { PrintBoard(BoardSpec(), folder / "no/board.pdf"); }), HasSubstr("Cannot write"));
 }
 
-// OpenCV's own way with the images: its search, its refinement with the window of its sample program, its
-// calibration.
+// The RMS error of OpenCV's own pipeline: its corner detection, its refinement with the window of its sample
+// program, and its calibration.
 double OpenCvRms(const std::vector<cv::Mat>& images, const BoardSpec& board) {
   std::vector<std::vector<cv::Point3f>> points;
   std::vector<std::vector<cv::Point2f>> pixels;
@@ -223,11 +223,12 @@ double OpenCvRms(const std::vector<cv::Mat>& images, const BoardSpec& board) {
                                  static_cast<float>(board.square_m * (i / board.columns)), 0.0f);
   }
   cv::Mat camera, distortion;
-  std::vector<cv::Mat> turns, shifts;
-  return cv::calibrateCamera(points, pixels, images.front().size(), camera, distortion, turns, shifts);
+  std::vector<cv::Mat> rotations, translations;
+  return cv::calibrateCamera(points, pixels, images.front().size(), camera, distortion, rotations,
+                             translations);
 }
 
-// The same corners through OpenCV's calibration.
+// The RMS error of OpenCV's calibration with our corners.
 double OpenCvRms(const std::vector<BoardView>& views, const cv::Size& size) {
   std::vector<std::vector<cv::Point3f>> points(views.size());
   std::vector<std::vector<cv::Point2f>> pixels(views.size());
@@ -240,12 +241,12 @@ double OpenCvRms(const std::vector<BoardView>& views, const cv::Size& size) {
     }
   }
   cv::Mat camera, distortion;
-  std::vector<cv::Mat> turns, shifts;
-  return cv::calibrateCamera(points, pixels, size, camera, distortion, turns, shifts);
+  std::vector<cv::Mat> rotations, translations;
+  return cv::calibrateCamera(points, pixels, size, camera, distortion, rotations, translations);
 }
 
-// OpenCV's own sample images, where Debian's opencv-doc is installed.
-TEST(Calibrate, IsNoWorseThanOpenCvOnItsOwnImages) {
+// Uses OpenCV's sample images, where Debian's opencv-doc is installed.
+TEST(Calibrate, IsAtLeastAsGoodAsOpenCvOnItsSampleImages) {
   const std::filesystem::path folder = "/usr/share/doc/opencv-doc/examples/data";
   const BoardSpec board = ParseBoard("checkerboard:9x6:25");
   const BoardDetector detector(board);

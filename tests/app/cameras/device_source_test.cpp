@@ -19,12 +19,12 @@ using ::testing::HasSubstr;
 
 constexpr std::uint32_t kWidth = 8, kHeight = 4;
 
-// A camera that answers as a driver does: one pixel format, three buffers, grey images numbered by
-// brightness.
+// A camera that behaves like a driver with one pixel format and three buffers. The grey value of an image is
+// its number.
 struct FakeCamera {
   bool plugged_in = true;
-  int backlog = 0;                  // images that wait already, besides the one that is waited for
-  std::uint32_t missed_before = 0;  // of the device's numbers, before every image but the first
+  int backlog = 0;                  // queued images besides the next one
+  std::uint32_t missed_before = 0;  // sequence numbers skipped before every image but the first
   std::map<std::uint32_t, std::int32_t> controls;
   std::chrono::milliseconds now{100500};
   int width = kWidth;
@@ -88,7 +88,7 @@ class FakeSystem : public DeviceSystem {
       case VIDIOC_S_FMT:
         return SetFormat(static_cast<v4l2_format*>(argument));
       case VIDIOC_G_PARM:
-      case VIDIOC_S_PARM:  // drivers answer with what they have
+      case VIDIOC_S_PARM:  // drivers return their actual setting
         static_cast<v4l2_streamparm*>(argument)->parm.capture = {V4L2_CAP_TIMEPERFRAME, 0, {1, 15}, 0, 0, {}};
         return 0;
       case VIDIOC_REQBUFS:
@@ -129,7 +129,7 @@ class FakeSystem : public DeviceSystem {
     return -1;
   }
   int SetFormat(v4l2_format* format) {
-    format->fmt.pix.pixelformat = camera_->pixel_format;  // drivers answer with what they have
+    format->fmt.pix.pixelformat = camera_->pixel_format;  // drivers return their actual format
     format->fmt.pix.width = static_cast<std::uint32_t>(camera_->width);
     format->fmt.pix.height = kHeight;
     format->fmt.pix.bytesperline = 0;
@@ -157,7 +157,7 @@ std::unique_ptr<FrameSource> Open(FakeCamera* camera, CameraOptions options = {}
   return OpenDevice("/dev/video9", options, std::make_unique<FakeSystem>(camera));
 }
 
-TEST(Device, StreamsImagesAndLetsGoOfEverything) {
+TEST(Device, StreamsImagesAndReleasesAllResources) {
   FakeCamera camera;
   {
     const auto source = Open(&camera);
@@ -165,7 +165,7 @@ TEST(Device, StreamsImagesAndLetsGoOfEverything) {
     EXPECT_DOUBLE_EQ(source->info().nominal_fps, 15);
     std::vector<engine::Frame> frames(10);
     for (engine::Frame& frame : frames) ASSERT_TRUE(source->Next(&frame));
-    for (int i = 0; i < 10; ++i) {  // an image stays as it was when its buffer is used again
+    for (int i = 0; i < 10; ++i) {  // an image does not change when its buffer is reused
       const engine::Frame& frame = frames[static_cast<std::size_t>(i)];
       EXPECT_EQ(frame.image.at<std::uint8_t>(3, 7), i);
       EXPECT_EQ(frame.time, std::chrono::seconds(100) + std::chrono::milliseconds(i));
@@ -178,7 +178,7 @@ TEST(Device, StreamsImagesAndLetsGoOfEverything) {
   EXPECT_EQ(camera.opened, 0);
 }
 
-TEST(Device, ThatIsUnpluggedSaysSo) {
+TEST(Device, ReportsThatItWasUnplugged) {
   FakeCamera camera;
   camera.images_until_unplugged = 2;
   const auto source = Open(&camera);
@@ -188,7 +188,7 @@ TEST(Device, ThatIsUnpluggedSaysSo) {
   EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("unplugged"));
 }
 
-TEST(Device, ThatIsWaitedForGoesOnWhenItIsBack) {
+TEST(Device, ContinuesAfterReconnection) {
   FakeCamera camera;
   CameraOptions options;
   options.reconnect = true;
@@ -202,7 +202,7 @@ TEST(Device, ThatIsWaitedForGoesOnWhenItIsBack) {
     ASSERT_TRUE(source->Next(&frame));
     EXPECT_TRUE(frame.image.empty());
     EXPECT_THAT(source->trouble(), HasSubstr("unplugged"));
-    EXPECT_EQ(camera.opened, 0);  // its number is free for when it comes back
+    EXPECT_EQ(camera.opened, 0);  // closed, so that the device can get the same name again
     EXPECT_EQ(camera.mapped, 0);
   }
   camera.width = kWidth * 2;
@@ -219,7 +219,7 @@ TEST(Device, ThatIsWaitedForGoesOnWhenItIsBack) {
   EXPECT_EQ(source->delivery().reconnections, 1);
 }
 
-TEST(Device, CountsTheImagesThatTheDriverMissed) {
+TEST(Device, CountsImagesThatTheDriverMissed) {
   FakeCamera camera;
   camera.missed_before = 2;
   const auto source = Open(&camera);
@@ -232,7 +232,7 @@ TEST(Device, CountsTheImagesThatTheDriverMissed) {
   EXPECT_EQ(source->delivery().delivered, 5u);
 }
 
-TEST(Device, GivesTheNewestImageAndCountsTheOvertaken) {
+TEST(Device, DeliversTheNewestImageAndCountsSkippedOnes) {
   FakeCamera camera;
   const auto source = Open(&camera);
   engine::Frame frame;
@@ -244,7 +244,7 @@ TEST(Device, GivesTheNewestImageAndCountsTheOvertaken) {
   EXPECT_EQ(source->delivery().late, 1u);
 }
 
-TEST(Device, HoldsItsAutomaticControlsOnceTheyHaveSettledAndPutsThemBack) {
+TEST(Device, LocksAutomaticControlsAfterAWhileAndRestoresThem) {
   FakeCamera camera;
   camera.controls = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
                      {V4L2_CID_EXPOSURE_ABSOLUTE, 123},
@@ -266,7 +266,7 @@ TEST(Device, HoldsItsAutomaticControlsOnceTheyHaveSettledAndPutsThemBack) {
   EXPECT_EQ(camera.controls, before);
 }
 
-TEST(Device, TellsTheLatencyOfItsImages) {
+TEST(Device, MeasuresTheLatencyOfItsImages) {
   FakeCamera camera;
   const auto source = Open(&camera);
   engine::Frame frame;
@@ -274,7 +274,7 @@ TEST(Device, TellsTheLatencyOfItsImages) {
   EXPECT_EQ(source->delivery().median_latency, std::chrono::milliseconds(500));
 }
 
-TEST(Device, ThatMayNotBeOpenedIsListedWithWhatToDo) {
+TEST(Device, ListsAnInaccessibleDeviceWithAdvice) {
   FakeCamera camera;
   camera.open_error = EACCES;
   FakeSystem system(&camera);
@@ -285,7 +285,7 @@ TEST(Device, ThatMayNotBeOpenedIsListedWithWhatToDo) {
   EXPECT_FALSE(DescribeDevice("/dev/video9", &system));
 }
 
-TEST(Device, ThatFallsSilentSaysSo) {
+TEST(Device, ReportsATimeout) {
   FakeCamera camera;
   camera.images_until_silent = 1;
   const auto source = Open(&camera);
@@ -294,7 +294,7 @@ TEST(Device, ThatFallsSilentSaysSo) {
   EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("no image for 2000 ms"));
 }
 
-TEST(Device, SkipsAFewBrokenImagesButNotEndlessly) {
+TEST(Device, SkipsAFewBrokenImagesButNotAll) {
   FakeCamera camera;
   camera.broken_images = 5;
   engine::Frame frame;
@@ -306,8 +306,8 @@ TEST(Device, SkipsAFewBrokenImagesButNotEndlessly) {
   EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }), HasSubstr("broken images"));
 }
 
-TEST(Device, ThatCannotBeUsedSaysWhy) {
-  const auto sentence = [](FakeCamera camera, CameraOptions options = {}) {
+TEST(Device, ReportsWhyItCannotBeUsed) {
+  const auto error = [](FakeCamera camera, CameraOptions options = {}) {
     const std::string text = ErrorOf([&] { Open(&camera, options); });
     EXPECT_EQ(camera.opened, 0);
     EXPECT_EQ(camera.mapped, 0);
@@ -315,24 +315,24 @@ TEST(Device, ThatCannotBeUsedSaysWhy) {
   };
   FakeCamera camera;
   camera.open_error = ENOENT;
-  EXPECT_THAT(sentence(camera), HasSubstr("There is no camera"));
+  EXPECT_THAT(error(camera), HasSubstr("There is no camera"));
   camera.open_error = EACCES;
-  EXPECT_THAT(sentence(camera), HasSubstr("group 'video'"));
+  EXPECT_THAT(error(camera), HasSubstr("group 'video'"));
   camera.open_error = EBUSY;
-  EXPECT_THAT(sentence(camera), HasSubstr("in use"));
+  EXPECT_THAT(error(camera), HasSubstr("in use"));
   camera.open_error = 0;
   camera.capabilities = V4L2_CAP_VIDEO_OUTPUT;
-  EXPECT_THAT(sentence(camera), HasSubstr("not one that streams"));
+  EXPECT_THAT(error(camera), HasSubstr("does not stream"));
   camera = {};
   camera.pixel_format = V4L2_PIX_FMT_RGB565;
-  EXPECT_THAT(sentence(camera), HasSubstr("no image format"));
+  EXPECT_THAT(error(camera), HasSubstr("no image format"));
   camera = {};
   CameraOptions options;
   options.device_format = {1920, 1080, 0};
-  EXPECT_THAT(sentence(camera, options), HasSubstr("1920x1080"));
+  EXPECT_THAT(error(camera, options), HasSubstr("1920x1080"));
 }
 
-TEST(Device, IsDescribedWithItsFormats) {
+TEST(Device, DescribesItsFormats) {
   FakeCamera camera;
   FakeSystem system(&camera);
   const auto device = DescribeDevice("/dev/video9", &system);
@@ -344,7 +344,7 @@ TEST(Device, IsDescribedWithItsFormats) {
 }
 
 TEST(DeviceImages, AreConvertedWithTheirStride) {
-  // Grey in YUYV is Y with U = V = 128; rows are two bytes longer than their pixels.
+  // Grey in YUYV is Y with U = V = 128; each row has two bytes of padding.
   std::vector<std::uint8_t> bytes;
   for (int row = 0; row < 2; ++row) {
     for (int column = 0; column < 4; ++column)
@@ -362,17 +362,17 @@ TEST(DeviceImages, AreConvertedWithTheirStride) {
               HasSubstr("bytes"));
 }
 
-TEST(DeviceImages, InMotionJpegAreDecodedAndTheirSizeIsChecked) {
+TEST(DeviceImages, MotionJpegIsDecodedAndItsSizeChecked) {
   std::vector<std::uint8_t> bytes;
   ASSERT_TRUE(cv::imencode(".jpg", cv::Mat(8, 16, CV_8UC3, cv::Scalar(10, 200, 30)), bytes));
   EXPECT_EQ(ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bytes, {16, 8}, 16, "image").type(), CV_8UC3);
   EXPECT_THAT(ErrorOf([&] {
                 ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bytes, {8, 8}, 8, "image");
               }),
-              HasSubstr("another size"));
+              HasSubstr("negotiated size"));
 }
 
-TEST(DeviceImages, InMotionJpegMayLeaveOutTheUsualTablesButNotTheirEnd) {
+TEST(DeviceImages, MotionJpegMayOmitHuffmanTablesButNotItsEnd) {
   cv::Mat image(48, 64, CV_8UC3);
   for (int row = 0; row < image.rows; ++row) {
     for (int column = 0; column < image.cols; ++column) {
@@ -384,17 +384,18 @@ TEST(DeviceImages, InMotionJpegMayLeaveOutTheUsualTablesButNotTheirEnd) {
   ASSERT_TRUE(cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 95}));
   const cv::Mat whole = ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bytes, {64, 48}, 0, "image");
   EXPECT_LT(cv::norm(whole, image, cv::NORM_L1) / static_cast<double>(image.total()), 12);
-  // Cameras leave out the DHT segments (FF C4, length) that the encoder above writes as in the standard.
-  std::vector<std::uint8_t> bare;
+  // Some cameras omit the DHT segments (FF C4, length), which the encoder above writes with the standard
+  // tables.
+  std::vector<std::uint8_t> without_tables;
   for (std::size_t i = 0; i < bytes.size();) {
     if (bytes[i] == 0xFF && i + 3 < bytes.size() && bytes[i + 1] == 0xC4) {
       i += 2 + static_cast<std::size_t>(bytes[i + 2] << 8 | bytes[i + 3]);
     } else {
-      bare.push_back(bytes[i++]);
+      without_tables.push_back(bytes[i++]);
     }
   }
-  ASSERT_LT(bare.size(), bytes.size());
-  EXPECT_EQ(cv::norm(ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bare, {64, 48}, 0, "image"), whole), 0);
+  ASSERT_LT(without_tables.size(), bytes.size());
+  EXPECT_EQ(cv::norm(ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, without_tables, {64, 48}, 0, "image"), whole), 0);
   bytes.resize(bytes.size() - 100);
   EXPECT_THAT(ErrorOf([&] {
                 ConvertDeviceImage(V4L2_PIX_FMT_MJPEG, bytes, {64, 48}, 0, "image");
@@ -402,15 +403,15 @@ TEST(DeviceImages, InMotionJpegMayLeaveOutTheUsualTablesButNotTheirEnd) {
               HasSubstr("cannot be decoded"));
 }
 
-TEST(DeviceImages, InNv12TakeTheirColourFromTheSecondPlane) {
-  // Two rows of luma and one of interleaved chroma, two bytes of padding after each.
+TEST(DeviceImages, Nv12TakesItsColourFromTheSecondPlane) {
+  // Two rows of luma and one of interleaved chroma, each with two bytes of padding.
   std::vector<std::uint8_t> bytes = {100, 100, 100, 100, 0,   0,   100, 100, 100,
                                      100, 0,   0,   128, 128, 128, 240, 0,   0};
   const cv::Mat image = ConvertDeviceImage(V4L2_PIX_FMT_NV12, bytes, {4, 2}, 6, "image");
   ASSERT_EQ(image.type(), CV_8UC3);
   const auto grey = image.at<cv::Vec3b>(1, 0), red = image.at<cv::Vec3b>(1, 3);
   EXPECT_EQ(grey[0], grey[2]);
-  EXPECT_GT(red[2], red[0] + 100);  // Cr above its middle is red
+  EXPECT_GT(red[2], red[0] + 100);  // Cr above 128 is red
   bytes.resize(15);
   EXPECT_THAT(ErrorOf([&] {
                 ConvertDeviceImage(V4L2_PIX_FMT_NV12, bytes, {4, 2}, 6, "image");
@@ -418,7 +419,7 @@ TEST(DeviceImages, InNv12TakeTheirColourFromTheSecondPlane) {
               HasSubstr("bytes"));
 }
 
-TEST(Device, ThatIsNoVideoDeviceSaysSo) {
+TEST(Device, ReportsThatAPathIsNoVideoDevice) {
   EXPECT_THAT(ErrorOf([] { OpenCamera("/dev/null"); }), HasSubstr("not a video device"));
   EXPECT_THAT(ErrorOf([] { OpenCamera("/dev/video987"); }), HasSubstr("There is no camera"));
 }

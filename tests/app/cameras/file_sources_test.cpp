@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 
 constexpr int kWidth = 64, kHeight = 48;
 
-// An image that tells its number: as bright as it.
+// An image whose brightness encodes its number.
 cv::Mat Numbered(int number) {
   return cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(10 * number + 5));
 }
@@ -49,13 +49,13 @@ class Cameras : public testing::Test {
  protected:
   static void SetUpTestSuite() { QuietDecoders(); }
 
-  // A TUM folder of three images.
+  // Writes a TUM folder with three images.
   void MakeTum() {
     for (int i = 0; i < 3; ++i) WritePng(folder_ / ("rgb/" + std::to_string(i) + ".png"), Numbered(i));
     folder_.Write("rgb.txt",
                   "# list\n1305031102.175304001 rgb/0.png\n1305031102.2 rgb/1.png\n1305031103 rgb/2.png\n");
   }
-  std::string SentenceOfReading() const {
+  std::string ErrorOfReading() const {
     return ErrorOf([&] { ReadFrames(OpenCamera(folder_.path().string()).get()); });
   }
 
@@ -93,7 +93,7 @@ TEST_F(Cameras, ReadEurocFoldersInNanoseconds) {
   }
 }
 
-TEST_F(Cameras, ReadNumberedImagesInTheOrderOfTheirNumbers) {
+TEST_F(Cameras, ReadNumberedImagesInNumericalOrder) {
   for (int i = 8; i <= 11; ++i) WritePng(folder_ / ("frame" + std::to_string(i) + ".png"), Numbered(i));
   CameraOptions options;
   options.image_fps = 10;
@@ -105,7 +105,7 @@ TEST_F(Cameras, ReadNumberedImagesInTheOrderOfTheirNumbers) {
   }
 }
 
-TEST_F(Cameras, GiveVideosTheTimesOfTheirList) {
+TEST_F(Cameras, UseTheTimestampListOfAVideo) {
   WriteVideo(folder_ / "video.mp4", 4);
   folder_.Write("timestamps.txt", "# seconds\n10.000000\n10.033333\n10.5\n11\n");
   const auto frames = ReadFrames(OpenCamera(folder_.path().string()).get());
@@ -117,7 +117,7 @@ TEST_F(Cameras, GiveVideosTheTimesOfTheirList) {
   }
 }
 
-TEST_F(Cameras, GiveVideosWithoutAListTheirOwnTimes) {
+TEST_F(Cameras, UseTheVideoTimesWithoutAList) {
   WriteVideo(folder_ / "v.mp4", 10);
   const auto frames = ReadFrames(OpenCamera((folder_ / "v.mp4").string()).get());
   ASSERT_EQ(frames.size(), 10u);
@@ -125,31 +125,31 @@ TEST_F(Cameras, GiveVideosWithoutAListTheirOwnTimes) {
     EXPECT_NEAR(ToSeconds(frames[i].time), 0.04 * static_cast<double>(i), 1e-6);
 }
 
-TEST_F(Cameras, DeliverWhatCameBeforeAVideoBreaksOffAndThenSayWhere) {
+TEST_F(Cameras, DeliverTheImagesOfATruncatedVideoAndReportWhereItEnds) {
   WriteVideo(folder_ / "video.mp4", 3);
   folder_.Write("timestamps.txt", "1\n2\n3\n4\n5\n");
   const auto source = OpenCamera(folder_.path().string());
   engine::Frame frame;
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(source->Next(&frame));
   EXPECT_THAT(ErrorOf([&] { source->Next(&frame); }),
-              AllOf(HasSubstr("breaks off at image 3"), HasSubstr("of the 5")));
+              AllOf(HasSubstr("truncated at image 3"), HasSubstr("of the 5")));
   EXPECT_FALSE(source->Next(&frame));
 }
 
-TEST_F(Cameras, SayWhenAVideoGoesOnAfterItsList) {
+TEST_F(Cameras, ReportAVideoThatIsLongerThanItsList) {
   WriteVideo(folder_ / "video.mp4", 3);
   folder_.Write("timestamps.txt", "1\n2\n");
-  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("has 2 times"), HasSubstr("goes on")));
+  EXPECT_THAT(ErrorOfReading(), AllOf(HasSubstr("has 2 times"), HasSubstr("has more images")));
 }
 
-TEST_F(Cameras, SayThatACutOffVideoCannotBeOpened) {
+TEST_F(Cameras, ReportATruncatedVideoThatCannotBeOpened) {
   WriteVideo(folder_ / "whole.mp4", 20);
   const std::string bytes = ReadAll(folder_ / "whole.mp4");
   folder_.Write("video.mp4", bytes.substr(0, bytes.size() / 2));
-  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("video.mp4"), HasSubstr("cannot be opened")));
+  EXPECT_THAT(ErrorOfReading(), AllOf(HasSubstr("video.mp4"), HasSubstr("cannot be opened")));
 }
 
-TEST_F(Cameras, SayWhenAnImageBreaksOff) {
+TEST_F(Cameras, ReportATruncatedImage) {
   cv::Mat noise(kHeight, kWidth, CV_8UC3);
   cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 255);
   for (const char* name : {"rgb/0.jpg", "rgb/0.png"}) {
@@ -157,45 +157,44 @@ TEST_F(Cameras, SayWhenAnImageBreaksOff) {
     const std::string bytes = ReadAll(folder_ / name);
     folder_.Write(name, bytes.substr(0, bytes.size() * 2 / 3));
     folder_.Write("rgb.txt", std::string("0 ") + name + "\n");
-    EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr(name), HasSubstr("breaks off")));
+    EXPECT_THAT(ErrorOfReading(), AllOf(HasSubstr(name), HasSubstr("is truncated")));
   }
   folder_.Write("rgb/0.png", "no image at all");
-  EXPECT_THAT(SentenceOfReading(), HasSubstr("cannot be decoded"));
+  EXPECT_THAT(ErrorOfReading(), HasSubstr("cannot be decoded"));
   folder_.Write("rgb/0.png", "");
-  EXPECT_THAT(SentenceOfReading(), HasSubstr("empty"));
+  EXPECT_THAT(ErrorOfReading(), HasSubstr("empty"));
 }
 
-TEST_F(Cameras, SayWhichImageIsMissingOrOfAnotherSize) {
+TEST_F(Cameras, ReportMissingImagesAndImagesOfAnotherSize) {
   MakeTum();
   WritePng(folder_ / "rgb/1.png", cv::Mat(20, 20, CV_8UC1, cv::Scalar(0)));
-  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("rgb/1.png"), HasSubstr("20x20"), HasSubstr("64x48")));
+  EXPECT_THAT(ErrorOfReading(), AllOf(HasSubstr("rgb/1.png"), HasSubstr("20x20"), HasSubstr("64x48")));
   std::filesystem::remove(folder_ / "rgb/1.png");
-  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("There is no file"), HasSubstr("rgb/1.png")));
+  EXPECT_THAT(ErrorOfReading(), AllOf(HasSubstr("There is no file"), HasSubstr("rgb/1.png")));
 }
 
-TEST_F(Cameras, NameTheLineOfABadList) {
+TEST_F(Cameras, NameTheLineOfAnInvalidList) {
   MakeTum();
   folder_.Write("rgb.txt", "1 rgb/0.png\n1 rgb/1.png\n");
-  EXPECT_THAT(SentenceOfReading(), AllOf(HasSubstr("line 2"), HasSubstr("does not come after")));
+  EXPECT_THAT(ErrorOfReading(), AllOf(HasSubstr("line 2"), HasSubstr("is not later than")));
   folder_.Write("rgb.txt", "1 rgb/0.png\n\nsoon rgb/1.png\n");
-  EXPECT_THAT(SentenceOfReading(), HasSubstr("line 3"));
+  EXPECT_THAT(ErrorOfReading(), HasSubstr("line 3"));
   folder_.Write("rgb.txt", "1\n");
-  EXPECT_THAT(SentenceOfReading(), HasSubstr("line 1"));
+  EXPECT_THAT(ErrorOfReading(), HasSubstr("line 1"));
   folder_.Write("rgb.txt", "# nothing\n");
-  EXPECT_THAT(SentenceOfReading(), HasSubstr("no images"));
+  EXPECT_THAT(ErrorOfReading(), HasSubstr("no images"));
 }
 
-TEST_F(Cameras, SayWhatIsNoSource) {
-  const auto sentence = [](const std::string& source) { return ErrorOf([&] { OpenCamera(source); }); };
-  EXPECT_THAT(sentence((folder_ / "none").string()), HasSubstr("There is no camera, video or folder"));
-  EXPECT_THAT(sentence(folder_.path().string()), HasSubstr("no image sequence"));
-  EXPECT_THAT(sentence(""), HasSubstr("no name"));
-  EXPECT_THAT(sentence("sim:nowhere"), HasSubstr("nowhere"));
-  EXPECT_THAT(sentence(folder_.Write("text.mp4", "hello").string()),
-              HasSubstr("cannot be opened as a video"));
+TEST_F(Cameras, ReportInvalidSources) {
+  const auto error = [](const std::string& source) { return ErrorOf([&] { OpenCamera(source); }); };
+  EXPECT_THAT(error((folder_ / "none").string()), HasSubstr("There is no camera, video or folder"));
+  EXPECT_THAT(error(folder_.path().string()), HasSubstr("no image sequence"));
+  EXPECT_THAT(error(""), HasSubstr("name is empty"));
+  EXPECT_THAT(error("sim:nowhere"), HasSubstr("nowhere"));
+  EXPECT_THAT(error(folder_.Write("text.mp4", "hello").string()), HasSubstr("cannot be opened as a video"));
 }
 
-TEST_F(Cameras, CanBeClippedToAPart) {
+TEST_F(Cameras, CanBeClippedToATimeRange) {
   for (int i = 0; i < 10; ++i) WritePng(folder_ / (std::to_string(i) + ".png"), Numbered(i));
   CameraOptions options;
   options.image_fps = 10;
@@ -207,7 +206,7 @@ TEST_F(Cameras, CanBeClippedToAPart) {
   EXPECT_EQ(frames[2].time, std::chrono::milliseconds(400));
 }
 
-TEST_F(Cameras, CanBeginAtAnyImageAsIfItWasTheFirst) {
+TEST_F(Cameras, CanBeginAtAnyImageAsIfItWereTheFirst) {
   for (int i = 0; i < 10; ++i) WritePng(folder_ / (std::to_string(i) + ".png"), Numbered(i));
   CameraOptions options;
   options.image_fps = 10;
@@ -221,15 +220,16 @@ TEST_F(Cameras, CanBeginAtAnyImageAsIfItWasTheFirst) {
   ASSERT_EQ(frames.size(), 4u);
   EXPECT_EQ(frames[0].index, 0u);
   EXPECT_EQ(frames[3].index, 3u);
-  EXPECT_EQ(frames[0].time, std::chrono::milliseconds(600)) << "the truth goes by the recording's times";
+  EXPECT_EQ(frames[0].time, std::chrono::milliseconds(600))
+      << "times must match the ground truth of the recording";
   EXPECT_FALSE(frames[0].image.empty());
-  EXPECT_EQ(ReadFrames(window(6, 200).get()).size(), 2u) << "the end is left out";
+  EXPECT_EQ(ReadFrames(window(6, 200).get()).size(), 2u) << "the end is exclusive";
   EXPECT_EQ(ReadFrames(window(0, 250).get()).size(), 3u);
   EXPECT_EQ(ReadFrames(window(8, 5000).get()).size(), 2u);
   EXPECT_TRUE(ReadFrames(window(10, 0).get()).empty());
 }
 
-TEST_F(Cameras, KeepTheirHeadWhenTheyAreClipped) {
+TEST_F(Cameras, KeepTheirHeadWhenClipped) {
   const auto source = OpenCamera("sim:head", {});
   Head* const head = source->head();
   ASSERT_NE(head, nullptr);
@@ -238,7 +238,7 @@ TEST_F(Cameras, KeepTheirHeadWhenTheyAreClipped) {
   EXPECT_NE(clipped->head(), nullptr);
 }
 
-TEST(DeviceFormats, AreParsedOrRefused) {
+TEST(DeviceFormats, ParseValidTextAndRejectInvalidText) {
   const DeviceFormat format = ParseDeviceFormat("640x480@29.97");
   EXPECT_EQ(format.width_px, 640);
   EXPECT_EQ(format.height_px, 480);
@@ -246,11 +246,11 @@ TEST(DeviceFormats, AreParsedOrRefused) {
   EXPECT_EQ(ParseDeviceFormat("1280x720").fps, 0);
   for (const char* text :
        {"", "640", "640x", "x480", "640x480@", "640x480@0", "-1x2", "640@30x480", "640x480x3"}) {
-    EXPECT_THAT(ErrorOf([&] { ParseDeviceFormat(text); }), HasSubstr("no camera format")) << text;
+    EXPECT_THAT(ErrorOf([&] { ParseDeviceFormat(text); }), HasSubstr("not a camera format")) << text;
   }
 }
 
-TEST_F(Cameras, ReadTheRecordedSequencesToTheirEnd) {
+TEST_F(Cameras, ReadTheRecordedSequencesToTheEnd) {
   const std::filesystem::path sequences = DOCENT_SOURCE_DIR "/../shared/sequences";
   if (!std::filesystem::exists(sequences)) GTEST_SKIP() << "the recorded sequences are not on this machine";
   const std::pair<const char*, std::size_t> expected[] = {

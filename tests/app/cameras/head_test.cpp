@@ -15,17 +15,17 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// A device with these controls and nothing else, which answers as V4L2's specification (VIDIOC_G_CTRL,
-// VIDIOC_S_CTRL) says drivers do: values are rounded to the control's steps and told back, one out of range
-// is ERANGE, a missing control EINVAL, one that another program holds EBUSY, and all are ENODEV while the
-// device is away.
+// A device with these controls only, which behaves as V4L2 specifies for drivers (VIDIOC_G_CTRL,
+// VIDIOC_S_CTRL): values are rounded to the control's steps and returned. A value out of range gives ERANGE,
+// a missing control EINVAL, a control that another program holds EBUSY, and every call ENODEV while the
+// device is unplugged.
 struct FakeDevice {
   std::map<std::uint32_t, v4l2_queryctrl> controls;
   std::map<std::uint32_t, std::int32_t> values;
-  std::vector<std::pair<std::uint32_t, std::int32_t>> written;  // as asked for
+  std::vector<std::pair<std::uint32_t, std::int32_t>> written;  // as requested, before rounding
   int open = 0;
-  bool away = false;
-  int refusal = 0;  // what every S_CTRL fails with; 0: it does not
+  bool unplugged = false;
+  int control_error = 0;  // error code of every S_CTRL; 0 if it succeeds
 
   void Add(std::uint32_t id, std::int32_t lowest, std::int32_t highest, std::int32_t step = 1) {
     v4l2_queryctrl query{};
@@ -48,13 +48,13 @@ class FakeSystem : public DeviceSystem {
  public:
   explicit FakeSystem(FakeDevice* device) : device_(device) {}
   int Open(const std::string&) override {
-    if (device_->away) return Fail(ENOENT);
+    if (device_->unplugged) return Fail(ENOENT);
     ++device_->open;
     return 3;
   }
   void Close(int) override { --device_->open; }
   int Control(int, unsigned long request, void* argument) override {
-    if (device_->away) return Fail(ENODEV);
+    if (device_->unplugged) return Fail(ENODEV);
     if (request == VIDIOC_QUERYCTRL) {
       auto* query = static_cast<v4l2_queryctrl*>(argument);
       const auto found = device_->controls.find(query->id);
@@ -70,7 +70,7 @@ class FakeSystem : public DeviceSystem {
       return 0;
     }
     if (request != VIDIOC_S_CTRL) return Fail(ENOTTY);
-    if (device_->refusal != 0) return Fail(device_->refusal);
+    if (device_->control_error != 0) return Fail(device_->control_error);
     const v4l2_queryctrl& query = found->second;
     if (control->value < query.minimum || control->value > query.maximum) return Fail(ERANGE);
     device_->written.emplace_back(control->id, control->value);
@@ -92,7 +92,7 @@ class FakeSystem : public DeviceSystem {
   FakeDevice* const device_;
 };
 
-TEST(Head, LooksTowardWhatItIsToldTo) {
+TEST(Head, TurnsTowardsTheGivenDirection) {
   for (const Eigen::Vector3d& direction : {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 0, 0.2),
                                            Eigen::Vector3d(-0.4, -0.5, 0.8), Eigen::Vector3d(0.3, 0.4, -1)}) {
     const Eigen::Vector3d ahead = CarrierFromCamera(Toward(direction)) * Eigen::Vector3d::UnitZ();
@@ -102,20 +102,20 @@ TEST(Head, LooksTowardWhatItIsToldTo) {
   EXPECT_GT(Toward({0, -1, 1}).tilt_rad, 0);  // upwards
 }
 
-TEST(Head, TurnsAtItsSpeedAndNoFartherThanItCan) {
+TEST(Head, TurnsAtItsSpeedWithinItsRange) {
   HeadMotion motion({{-1, -0.5}, {1, 0.5}, 0.5});
   motion.LookAt({5, 0.25}, FromSeconds(10));
   EXPECT_DOUBLE_EQ(motion.target().pan_rad, 1);
   EXPECT_DOUBLE_EQ(motion.At(FromSeconds(10)).pan_rad, 0);
   EXPECT_NEAR(motion.At(FromSeconds(11)).pan_rad, 0.5, 1e-12);
   EXPECT_NEAR(motion.At(FromSeconds(11)).tilt_rad, 0.25, 1e-12);
-  // Told otherwise on the way, it begins where it is.
+  // A new target during a motion starts from the current angles.
   motion.LookAt({0, 0}, FromSeconds(11));
   EXPECT_NEAR(motion.At(FromSeconds(11.5)).pan_rad, 0.25, 1e-12);
   EXPECT_NEAR(motion.At(FromSeconds(20)).pan_rad, 0, 1e-12);
 }
 
-TEST(Head, OfADeviceTurnsInSecondsOfArc) {
+TEST(Head, UsesArcSecondsOfADevice) {
   FakeDevice device;
   device.Add(V4L2_CID_PAN_ABSOLUTE, -100 * 3600, 100 * 3600);
   device.Add(V4L2_CID_TILT_ABSOLUTE, -20 * 3600, 20 * 3600);
@@ -131,7 +131,7 @@ TEST(Head, OfADeviceTurnsInSecondsOfArc) {
   EXPECT_EQ(device.open, 0);
 }
 
-TEST(Head, OfADeviceThatOnlyTurnsByStepsIsToldTheDifference) {
+TEST(Head, SendsDifferencesToADeviceWithRelativeControls) {
   FakeDevice device;
   device.Add(V4L2_CID_PAN_RELATIVE, -4480, 4480);
   const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
@@ -143,72 +143,72 @@ TEST(Head, OfADeviceThatOnlyTurnsByStepsIsToldTheDifference) {
   EXPECT_DOUBLE_EQ(head->range().highest.tilt_rad, 0);
 }
 
-TEST(Head, OfADeviceGoesByWholeStepsAndBeginsWhereItIs) {
+TEST(Head, RoundsToTheStepsOfADeviceAndStartsAtItsAngles) {
   FakeDevice device;
-  // A quarter of a degree from -50 degrees on: whole degrees are reached, others nearly.
+  // Steps of a quarter of a degree from -50 degrees: other angles are rounded.
   device.Add(V4L2_CID_PAN_ABSOLUTE, -50 * 3600, 50 * 3600, 900);
   device.values[V4L2_CID_PAN_ABSOLUTE] = 45 * 3600;
   const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
   ASSERT_TRUE(head);
-  EXPECT_NEAR(head->At({}).pan_rad, 45 * kDegree, 1e-9) << "it has yet to turn ahead";
+  EXPECT_NEAR(head->At({}).pan_rad, 45 * kDegree, 1e-9) << "it has not turned to the centre yet";
   EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9);
   head->LookAt({20.2 * kDegree, 0}, FromSeconds(40));
   EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), 20 * 3600 + 900);
   EXPECT_NEAR(head->At(FromSeconds(60)).pan_rad, 20.25 * kDegree, 1e-9);
   head->LookAt({-80 * kDegree, 0}, FromSeconds(60));
-  EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), -50 * 3600) << "never out of range";
+  EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), -50 * 3600) << "must stay within the range";
 }
 
-TEST(Head, OfADeviceBelievesWhatTheDriverSaysItTook) {
+TEST(Head, UsesTheValueThatTheDriverReturns) {
   FakeDevice device;
   device.Add(V4L2_CID_PAN_ABSOLUTE, -360000, 360000, 1);
   auto system = std::make_unique<FakeSystem>(&device);
   const auto head = OpenDeviceHead(std::move(system), "/dev/video0");
   ASSERT_TRUE(head);
-  // The firmware is coarser than its description.
+  // The firmware has coarser steps than its description.
   device.controls[V4L2_CID_PAN_ABSOLUTE].step = 10 * 3600;
   head->LookAt({37 * kDegree, 0}, FromSeconds(1));
   EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 30 * kDegree, 1e-9);
 }
 
-TEST(Head, OfADeviceThatIsHeldByAnotherProgramStaysAndGoesOnceItMay) {
-  for (const int refusal : {EBUSY, EACCES, ERANGE, EINVAL}) {
+TEST(Head, StaysWhileTheDeviceRejectsMotionAndMovesOnceItAccepts) {
+  for (const int control_error : {EBUSY, EACCES, ERANGE, EINVAL}) {
     FakeDevice device;
     device.Add(V4L2_CID_PAN_ABSOLUTE, -100 * 3600, 100 * 3600);
     const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
     ASSERT_TRUE(head);
-    device.refusal = refusal;
+    device.control_error = control_error;
     head->LookAt({30 * kDegree, 0}, FromSeconds(1));
-    EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9) << refusal;
-    device.refusal = 0;
+    EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9) << control_error;
+    device.control_error = 0;
     head->LookAt({30 * kDegree, 0}, FromSeconds(30));
-    EXPECT_NEAR(head->At(FromSeconds(60)).pan_rad, 30 * kDegree, 1e-9) << refusal;
+    EXPECT_NEAR(head->At(FromSeconds(60)).pan_rad, 30 * kDegree, 1e-9) << control_error;
     EXPECT_EQ(device.open, 1);
   }
 }
 
-TEST(Head, OfADeviceThatWasUnpluggedIsFoundAgain) {
+TEST(Head, ReopensADeviceThatWasUnplugged) {
   FakeDevice device;
   device.Add(V4L2_CID_PAN_ABSOLUTE, -100 * 3600, 100 * 3600);
   {
     const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
     ASSERT_TRUE(head);
     head->LookAt({30 * kDegree, 0}, FromSeconds(1));
-    device.away = true;
+    device.unplugged = true;
     head->LookAt({-30 * kDegree, 0}, FromSeconds(10));
-    EXPECT_EQ(device.open, 0) << "a dead device is let go of, so that its name is free when it comes back";
+    EXPECT_EQ(device.open, 0) << "an unplugged device must be closed, so that it can get the same name again";
     EXPECT_NEAR(head->At(FromSeconds(20)).pan_rad, 30 * kDegree, 1e-9);
     head->LookAt({-30 * kDegree, 0}, FromSeconds(20));
-    device.away = false;
-    device.values[V4L2_CID_PAN_ABSOLUTE] = 0;  // it starts anew
+    device.unplugged = false;
+    device.values[V4L2_CID_PAN_ABSOLUTE] = 0;  // it restarts at zero
     head->LookAt({-30 * kDegree, 0}, FromSeconds(30));
     EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), -30 * 3600);
     EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9);
     EXPECT_NEAR(head->At(FromSeconds(40)).pan_rad, -30 * kDegree, 1e-9);
-    // Another camera without a head in its place is left alone.
-    device.away = true;
+    // If another camera without pan control takes its place, it is not opened.
+    device.unplugged = true;
     head->LookAt({}, FromSeconds(50));
-    device.away = false;
+    device.unplugged = false;
     device.controls.clear();
     head->LookAt({}, FromSeconds(60));
     EXPECT_EQ(device.open, 0);
@@ -216,7 +216,7 @@ TEST(Head, OfADeviceThatWasUnpluggedIsFoundAgain) {
   EXPECT_EQ(device.open, 0);
 }
 
-TEST(Head, IsNotThereOnADeviceWithoutPan) {
+TEST(Head, DoesNotExistWithoutPanControl) {
   FakeDevice device;
   EXPECT_FALSE(OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0"));
   EXPECT_EQ(device.open, 0);

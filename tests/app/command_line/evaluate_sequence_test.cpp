@@ -9,13 +9,14 @@ namespace {
 
 using testing::ElementsAre;
 
-TEST(FirstFrames, LetsWindowsOfALengthEndWithinTheSequence) {
+TEST(FirstFrames, KeepsWindowsWithinTheSequence) {
   EXPECT_THAT(FirstFrames(5, 100, 20), ElementsAre(0, 20, 40, 60, 80));
-  EXPECT_THAT(FirstFrames(3, 100, 99), ElementsAre(0, 33, 66)) << "they do not fit at frames of their own";
+  EXPECT_THAT(FirstFrames(3, 100, 99), ElementsAre(0, 33, 66))
+      << "the windows do not fit with distinct first frames";
   EXPECT_THAT(FirstFrames(2, 100, 99), ElementsAre(0, 1));
 }
 
-TEST(FirstFrames, SpreadsWindowsToTheEndOverTheWholeSequence) {
+TEST(FirstFrames, SpreadsUnlimitedWindowsOverTheWholeSequence) {
   EXPECT_THAT(FirstFrames(4, 100, 0), ElementsAre(0, 25, 50, 75));
   EXPECT_THAT(FirstFrames(1, 100, 20), ElementsAre(0));
   EXPECT_THAT(FirstFrames(4, 100, 200), ElementsAre(0, 25, 50, 75))

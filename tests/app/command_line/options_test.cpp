@@ -12,7 +12,8 @@
 namespace docent::app {
 namespace {
 
-// The parser as the program sets it up, with one subcommand; answers with the options it was run with.
+// Parses a command line with one subcommand, as the program does; returns its options, or nothing on an
+// error.
 template <typename Options>
 std::optional<Options> Parse(void (*add)(CLI::App*, Invocation*,
                                          std::function<void(const Options&, Verbosity)>),
@@ -31,7 +32,7 @@ std::optional<Options> Parse(void (*add)(CLI::App*, Invocation*,
   return *parsed;
 }
 
-TEST(AuthorOptions, TakeEveryWordOfTheManual) {
+TEST(AuthorOptions, AcceptEveryDocumentedOption) {
   const auto options = Parse<AuthorOptions>(
       AddAuthorCommand,
       "author --library museum.docent --camera left --camera right --calibration l.yaml --calibration r.yaml "
@@ -54,25 +55,25 @@ TEST(AuthorOptions, TakeEveryWordOfTheManual) {
   EXPECT_EQ(options->record_script, "out.txt");
 }
 
-TEST(AuthorOptions, RefuseWhatMakesNoSense) {
-  const auto refused = [](const std::string& words) {
+TEST(AuthorOptions, RejectInvalidValues) {
+  const auto rejected = [](const std::string& words) {
     return !Parse<AuthorOptions>(AddAuthorCommand, "author --library l --camera c" + words);
   };
-  EXPECT_FALSE(refused(""));
-  EXPECT_TRUE(refused(" --camera d --camera e"));
-  EXPECT_TRUE(refused(" --calibration a --calibration b"));
-  EXPECT_TRUE(refused(" --pace slow"));
-  EXPECT_TRUE(refused(" --engine fast"));
-  EXPECT_TRUE(refused(" --camera-format big"));
-  EXPECT_TRUE(refused(" --seed -1"));
-  EXPECT_TRUE(refused(" --from -1"));
-  EXPECT_TRUE(refused(" --from 5 --until 4"));
-  EXPECT_TRUE(refused(" stray"));
+  EXPECT_FALSE(rejected(""));
+  EXPECT_TRUE(rejected(" --camera d --camera e"));
+  EXPECT_TRUE(rejected(" --calibration a --calibration b"));
+  EXPECT_TRUE(rejected(" --pace slow"));
+  EXPECT_TRUE(rejected(" --engine fast"));
+  EXPECT_TRUE(rejected(" --camera-format big"));
+  EXPECT_TRUE(rejected(" --seed -1"));
+  EXPECT_TRUE(rejected(" --from -1"));
+  EXPECT_TRUE(rejected(" --from 5 --until 4"));
+  EXPECT_TRUE(rejected(" stray"));
   EXPECT_FALSE(Parse<AuthorOptions>(AddAuthorCommand, "author --library l"));
   EXPECT_FALSE(Parse<AuthorOptions>(AddAuthorCommand, "author --camera c"));
 }
 
-TEST(TourOptions, NeedLibraryAndCamera) {
+TEST(TourOptions, RequireALibraryAndACamera) {
   const auto options = Parse<TourOptions>(AddTourCommand, "tour --library l --camera sim:museum");
   ASSERT_TRUE(options);
   EXPECT_EQ(options->run.cameras.sources.front(), "sim:museum");
@@ -80,7 +81,7 @@ TEST(TourOptions, NeedLibraryAndCamera) {
   EXPECT_FALSE(Parse<TourOptions>(AddTourCommand, "tour --library l"));
 }
 
-TEST(EvaluateOptions, TakeSeveralSequencesInAnyOrderOfWords) {
+TEST(EvaluateOptions, AcceptSeveralSequencesInAnyOrder) {
   const auto options = Parse<EvaluateOptions>(
       AddEvaluateCommand,
       "evaluate --calibration a.yaml kitchen --output out room --pace lockstep --engine sixdof");
@@ -94,7 +95,7 @@ TEST(EvaluateOptions, TakeSeveralSequencesInAnyOrderOfWords) {
   EXPECT_FALSE(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen"));
 }
 
-TEST(EvaluateOptions, TakeSeveralFramesToDump) {
+TEST(EvaluateOptions, AcceptSeveralFramesToDump) {
   const auto options = Parse<EvaluateOptions>(
       AddEvaluateCommand, "evaluate --dump-frame 0 kitchen --output out --dump-frame 412");
   ASSERT_TRUE(options);
@@ -104,7 +105,7 @@ TEST(EvaluateOptions, TakeSeveralFramesToDump) {
   EXPECT_FALSE(Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen --output out --dump-frame last"));
 }
 
-TEST(EvaluateOptions, TakeSeedsStartsAWindowAndJobs) {
+TEST(EvaluateOptions, AcceptSeedsStartsWindowAndJobs) {
   const auto options = Parse<EvaluateOptions>(
       AddEvaluateCommand,
       "evaluate kitchen --output out --pace lockstep --seed 7 --seeds 20 --starts 10 --window 2.5 --jobs 2");
@@ -120,21 +121,21 @@ TEST(EvaluateOptions, TakeSeedsStartsAWindowAndJobs) {
   EXPECT_FALSE(one->many_runs());
 }
 
-TEST(EvaluateOptions, RefuseCountsThatMakeNoSense) {
-  const auto refused = [](const std::string& words) {
+TEST(EvaluateOptions, RejectInvalidCounts) {
+  const auto rejected = [](const std::string& words) {
     return !Parse<EvaluateOptions>(AddEvaluateCommand, "evaluate kitchen --output out" + words);
   };
-  EXPECT_FALSE(refused(" --seeds 1000"));
+  EXPECT_FALSE(rejected(" --seeds 1000"));
   for (const char* words :
        {" --seeds 0", " --seeds -1", " --seeds 1001", " --seeds two", " --seeds 1.5", " --starts 0",
         " --starts -3", " --window -1", " --window nan", " --pace lockstep --jobs 0"}) {
-    EXPECT_TRUE(refused(words)) << words;
+    EXPECT_TRUE(rejected(words)) << words;
   }
-  EXPECT_TRUE(refused(" --jobs 2")) << "the pace is not lockstep";
-  EXPECT_TRUE(refused(" --seeds 2 --dump-frame 3"));
+  EXPECT_TRUE(rejected(" --jobs 2")) << "the pace is not lockstep";
+  EXPECT_TRUE(rejected(" --seeds 2 --dump-frame 3"));
 }
 
-TEST(DemoOptions, NeedAFolderWithoutAWindow) {
+TEST(DemoOptions, RequireAnOutputFolderWhenHeadless) {
   EXPECT_TRUE(Parse<DemoOptions>(AddDemoCommand, "demo"));
   EXPECT_FALSE(Parse<DemoOptions>(AddDemoCommand, "demo --headless"));
   EXPECT_EQ(Parse<DemoOptions>(AddDemoCommand, "demo --headless --output out")->output, "out");

@@ -15,7 +15,7 @@ engine::TrackedFrame FrameOf(engine::TrackingState state, int milliseconds) {
   return frame;
 }
 
-TEST(CameraReport, TellsOfEachCameraHowLongItsImagesTook) {
+TEST(CameraReport, ReportsTheLatenciesOfEachCamera) {
   using engine::TrackingState;
   CameraTally hand("hand"), shoulder("/dev/video1");
   for (int i = 1; i <= 100; ++i) hand.Add(FrameOf(TrackingState::kSixDof, i));
@@ -41,7 +41,7 @@ TEST(CameraReport, TellsOfEachCameraHowLongItsImagesTook) {
   EXPECT_NEAR(cameras[0]["tracking_ms"]["median"].get<double>(), 50, 1);
   EXPECT_NEAR(cameras[0]["tracking_ms"]["p95"].get<double>(), 95, 1);
   EXPECT_EQ(cameras[0]["tracking_ms"]["max"], 100);
-  EXPECT_TRUE(cameras[0]["latency_ms"]["tracked"].is_null()) << "nobody knows when a recording was taken";
+  EXPECT_TRUE(cameras[0]["latency_ms"]["tracked"].is_null()) << "the capture time of a recording is unknown";
   EXPECT_TRUE(cameras[0]["delivery"].is_null());
   EXPECT_NEAR(cameras[1]["latency_ms"]["tracked"]["median"].get<double>(), 100, 1e-9);
   EXPECT_NEAR(cameras[1]["latency_ms"]["drawn"]["p95"].get<double>(), 195, 1e-9);

@@ -27,7 +27,7 @@ Timestamp TimeOf(int frame) {
   return Timestamp(frame * 33'000'000LL);
 }
 
-// A camera that goes round on a rising helix and turns as it goes.
+// A camera that moves along a rising helix and rotates.
 std::vector<TimedPose> Helix(int count) {
   std::vector<TimedPose> poses;
   for (int i = 0; i < count; ++i) {
@@ -39,7 +39,7 @@ std::vector<TimedPose> Helix(int count) {
   return poses;
 }
 
-// What an engine that makes no mistake would say in a map whose frame and scale are its own.
+// The transform of an error-free map with an arbitrary frame and scale.
 const engine::Sim3 kTruthFromMap = [] {
   engine::Sim3 transform;
   transform.rotation = engine::Rotation3::Exp({0.5, -1, 0.2});
@@ -73,7 +73,7 @@ void MoveInTruth(FrameRecord* frame, const Eigen::Vector3d& by) {
   frame->camera_from_map = map_from_camera.inverse();
 }
 
-TEST(Evaluation, OfAPerfectRunFindsTheSimilarityAndNoError) {
+TEST(Evaluation, PerfectRunHasTheExactSimilarityAndNoError) {
   const auto truth = Helix(60);
   const SequenceReport report = EvaluateRun(PerfectRun(truth), truth, {});
   EXPECT_THAT(report.ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
@@ -84,21 +84,22 @@ TEST(Evaluation, OfAPerfectRunFindsTheSimilarityAndNoError) {
   EXPECT_EQ(report.first_tracked_frame, 0);
 }
 
-TEST(Evaluation, MeasuresTheAteThatWasPutIn) {
+TEST(Evaluation, MeasuresAKnownAte) {
   const auto truth = Helix(400);
   RunRecord run = PerfectRun(truth);
-  // Errors of 5 cm whose signs alternate leave the best similarity where it is, up to second order.
+  // Errors of 5 cm with alternating signs do not change the best similarity, up to second order.
   for (std::size_t i = 0; i < run.frames.size(); ++i)
     MoveInTruth(&run.frames[i], {0, i % 2 == 0 ? 0.05 : -0.05, 0});
   EXPECT_THAT(EvaluateRun(run, truth, {}).ate_rmse_m, Optional(DoubleNear(0.05, 5e-4)));
 }
 
-TEST(Evaluation, MeasuresWhatTheMapKnowsBesideWhatWasSeenLive) {
+TEST(Evaluation, MeasuresTheAteOfAdjustedKeyframesAndOfLivePoses) {
   const auto truth = Helix(400);
   RunRecord run = PerfectRun(truth);
   for (std::size_t i = 0; i < run.frames.size(); ++i)
     MoveInTruth(&run.frames[i], {0, i % 2 == 0 ? 0.05 : -0.05, 0});
-  EXPECT_FALSE(EvaluateRun(run, truth, {}).maps.at(0).keyframe_ate_rmse_m) << "nobody asked for it";
+  EXPECT_FALSE(EvaluateRun(run, truth, {}).maps.at(0).keyframe_ate_rmse_m)
+      << "there are no adjusted keyframes";
   MapRecord map;
   map.key = 1;
   for (std::size_t i = 0; i < truth.size(); i += 20) {
@@ -115,8 +116,8 @@ TEST(Evaluation, MeasuresWhatTheMapKnowsBesideWhatWasSeenLive) {
 TEST(Evaluation, MeasuresRotationErrorAndDriftSeparately) {
   const auto truth = Helix(201);
   RunRecord run = PerfectRun(truth);
-  // The camera's own x axis turns away evenly, by 4 degrees over the run: the alignment halves the largest
-  // error.
+  // A rotation error about the camera's x axis grows linearly to 4 degrees over the run; the alignment halves
+  // the largest error.
   for (std::size_t i = 0; i < run.frames.size(); ++i) {
     const double angle = 4 * kDegree * static_cast<double>(i) / 200;
     engine::Rigid3& pose = run.frames[i].camera_from_map;
@@ -126,33 +127,34 @@ TEST(Evaluation, MeasuresRotationErrorAndDriftSeparately) {
   EXPECT_THAT(report.rotation_drift_deg, Optional(DoubleNear(4, 1e-6)));
   ASSERT_TRUE(report.rotation_rmse_deg);
   EXPECT_GT(*report.rotation_rmse_deg,
-            1.0);  // an even spread over 4 degrees about its mean has 4 / sqrt(12) = 1.15
-  EXPECT_LT(*report.rotation_rmse_deg, 2.4);  // and unaligned it would be 4 / sqrt(3) = 2.3
+            1.0);  // a uniform distribution over 4 degrees has sigma 4 / sqrt(12) = 1.15
+  EXPECT_LT(*report.rotation_rmse_deg, 2.4);  // without alignment: 4 / sqrt(3) = 2.3
 }
 
-// The experiment of hybrid-slam §7.3: what is the error about the axis that the camera turned about?
-TEST(Evaluation, MeasuresHowMuchTooFarTheEngineTurned) {
+// The experiment of hybrid-slam §7.3: the error about the axis that the camera rotated about.
+TEST(Evaluation, MeasuresTheErrorOfThePureRotation) {
   const auto run_with = [](double turned_deg, double roll_deg) {
     std::vector<TimedPose> truth;
     RunRecord run;
     for (int i = 0; i <= 90; ++i) {
       truth.push_back({TimeOf(i), {engine::Rotation3::Exp({0, i * kDegree, 0}), Eigen::Vector3d::Zero()}});
-      TimedPose told = truth.back();
+      TimedPose estimated = truth.back();
       const double part = i / 90.0;
-      told.truth_from_camera.rotation = engine::Rotation3::Exp({0, turned_deg * part * kDegree, 0}) *
-                                        engine::Rotation3::Exp({0, 0, roll_deg * part * kDegree});
-      run.frames.push_back(PerfectFrame(told));
+      estimated.truth_from_camera.rotation = engine::Rotation3::Exp({0, turned_deg * part * kDegree, 0}) *
+                                             engine::Rotation3::Exp({0, 0, roll_deg * part * kDegree});
+      run.frames.push_back(PerfectFrame(estimated));
     }
     return EvaluateRun(run, truth, {});
   };
-  EXPECT_THAT(run_with(90, 0).turn_error_deg, Optional(DoubleNear(0, 1e-5)));
-  EXPECT_THAT(run_with(94, 0).turn_error_deg, Optional(DoubleNear(4, 1e-5)));
-  EXPECT_THAT(run_with(87.5, 0).turn_error_deg, Optional(DoubleNear(-2.5, 1e-5)));
-  EXPECT_THAT(run_with(94, 0).maps.at(0).turn_error_deg, Optional(DoubleNear(4, 1e-5)));
-  // A roll about another axis is drift, and no error of this turn.
-  EXPECT_THAT(run_with(90, 3).turn_error_deg, Optional(DoubleNear(0, 0.01)));
+  EXPECT_THAT(run_with(90, 0).axis_drift_deg, Optional(DoubleNear(0, 1e-5)));
+  EXPECT_THAT(run_with(94, 0).axis_drift_deg, Optional(DoubleNear(4, 1e-5)));
+  EXPECT_THAT(run_with(87.5, 0).axis_drift_deg, Optional(DoubleNear(-2.5, 1e-5)));
+  EXPECT_THAT(run_with(94, 0).maps.at(0).axis_drift_deg, Optional(DoubleNear(4, 1e-5)));
+  // A roll about another axis is drift, but not an error of this rotation.
+  EXPECT_THAT(run_with(90, 3).axis_drift_deg, Optional(DoubleNear(0, 0.01)));
   EXPECT_THAT(run_with(90, 3).rotation_drift_deg, Optional(DoubleNear(3, 1e-5)));
-  // Lost at frame 60 of 90, it is no figure of the whole turn, and says so.
+  // If tracking is lost at frame 60 of 90, the result covers only part of the rotation, and the report says
+  // so.
   RunRecord lost;
   std::vector<TimedPose> truth;
   for (int i = 0; i <= 90; ++i) {
@@ -165,10 +167,10 @@ TEST(Evaluation, MeasuresHowMuchTooFarTheEngineTurned) {
   EXPECT_THAT(FormatHtmlReport({evaluated}), HasSubstr("° at frame 60<"));
   auto back = Helix(30);
   for (TimedPose& pose : back) pose.truth_from_camera.rotation = engine::Rotation3();
-  EXPECT_FALSE(EvaluateRun(PerfectRun(back), back, {}).turn_error_deg);
+  EXPECT_FALSE(EvaluateRun(PerfectRun(back), back, {}).axis_drift_deg);
 }
 
-TEST(Evaluation, CountsFramesWithAPoseFromTheFirstTrackedOneOn) {
+TEST(Evaluation, CountsFramesWithAPoseFromTheFirstTrackedFrame) {
   const auto truth = Helix(10);
   RunRecord run = PerfectRun(truth);
   run.frames[0].state = run.frames[1].state = TrackingState::kInitializing;
@@ -198,10 +200,10 @@ TEST(Evaluation, CountsFramesOfDiscardedMapsAsUntracked) {
   EXPECT_EQ(report.keyframes.sixdof, 3);
   ASSERT_TRUE(report.largest_map);
   EXPECT_EQ(report.maps[*report.largest_map].name, "kept");
-  EXPECT_THAT(FormatSummary(report), HasSubstr("30 frames in maps given up"));
+  EXPECT_THAT(FormatSummary(report), HasSubstr("30 frames in maps discarded later"));
 }
 
-TEST(Evaluation, ComparesFramesOfAMapThatWasJoinedWithAnotherByThemselves) {
+TEST(Evaluation, AlignsFramesOfAJoinedMapSeparately) {
   const auto truth = Helix(50);
   RunRecord run = PerfectRun(truth);
   const engine::Rigid3 moved(engine::Rotation3::Exp({0, 0.5, 0}), {1, 2, 3});
@@ -214,7 +216,7 @@ TEST(Evaluation, ComparesFramesOfAMapThatWasJoinedWithAnotherByThemselves) {
               {9, "taken in", false, "kept", {2, 0, 0}, {50, 0, 0}, {}}};
   const SequenceReport report = EvaluateRun(run, truth, {});
   EXPECT_EQ(report.tracked, 50);
-  EXPECT_EQ(report.keyframes.sixdof, 5) << "those of the other are among them";
+  EXPECT_EQ(report.keyframes.sixdof, 5) << "includes those of the joined map";
   ASSERT_EQ(report.maps.size(), 2u);
   EXPECT_EQ(report.maps[0].joined_into, "kept");
   EXPECT_LT(report.maps[0].ate_rmse_m.value(), 1e-6);
@@ -222,10 +224,11 @@ TEST(Evaluation, ComparesFramesOfAMapThatWasJoinedWithAnotherByThemselves) {
   EXPECT_EQ(MakeRunRow({}, run, report, std::nullopt).maps, 1);
 }
 
-TEST(Evaluation, AlignsEveryMapByItselfAndReportsTheLargest) {
+TEST(Evaluation, AlignsEveryMapSeparatelyAndReportsTheLargest) {
   const auto truth = Helix(100);
   RunRecord run = PerfectRun(truth);
-  for (std::size_t i = 60; i < 100; ++i) {  // the second map has another frame, and errors of 10 cm
+  for (std::size_t i = 60; i < 100;
+       ++i) {  // the second map has another coordinate frame, and errors of 10 cm
     run.frames[i].map_key = 2;
     MoveInTruth(&run.frames[i], {5, i % 2 == 0 ? 0.1 : -0.1, 5});
   }
@@ -241,19 +244,20 @@ TEST(Evaluation, AlignsEveryMapByItselfAndReportsTheLargest) {
   EXPECT_THAT(report.segments[0].ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
 }
 
-// An instant start: the first frames turn about a place that nobody knows, whatever numbers stand for it.
-TEST(Evaluation, TakesNoPositionFromAMapOfDirectionsAlone) {
+// The first frames rotate about an unknown position in a map without finite points, so that their positions
+// are meaningless.
+TEST(Evaluation, IgnoresPositionsInAMapWithoutFinitePoints) {
   const auto truth = Helix(120);
   RunRecord run = PerfectRun(truth);
   for (std::size_t i = 0; i < run.frames.size(); ++i) {
     FrameRecord& frame = run.frames[i];
     frame.map_points = {i < 40 ? 0 : 500, 200, 0};
-    // After the start a panorama inside the map: there the camera stands where its centre is.
+    // Later panorama frames within a map that has finite points do have a known position.
     if (i < 40 || i > 100) frame.state = TrackingState::kPanorama;
     if (i < 40) MoveInTruth(&frame, {7, -3, 1});
   }
   run.frames[10].state = TrackingState::kRelocalized;
-  // A rotation counts all the same: frame 5 is off by one degree.
+  // Rotations are evaluated anyway: frame 5 has an error of one degree.
   engine::Rigid3& pose = run.frames[5].camera_from_map;
   pose = engine::Rigid3(engine::Rotation3::Exp({kDegree, 0, 0}), Eigen::Vector3d::Zero()) * pose;
   const SequenceReport report = EvaluateRun(run, truth, {{TimeOf(0), "start"}, {TimeOf(40), "walk"}});
@@ -273,10 +277,10 @@ TEST(Evaluation, TakesNoPositionFromAMapOfDirectionsAlone) {
   const auto json = nlohmann::json::parse(FormatJsonReport({report}));
   EXPECT_EQ(json.at("sequences").at(0).at("directions_only_frames"), 40);
   EXPECT_THAT(FormatHtmlReport({{run, truth, {}, report}}),
-              HasSubstr("40 frames were tracked while their map held"));
+              HasSubstr("40 frames were tracked in a map that had only infinite points"));
 }
 
-TEST(Evaluation, OfAPureRotationHasNoAteButARotationError) {
+TEST(Evaluation, PureRotationHasARotationErrorButNoAte) {
   auto truth = Helix(50);
   RunRecord run = PerfectRun(truth);
   for (std::size_t i = 0; i < truth.size(); ++i) {
@@ -289,14 +293,14 @@ TEST(Evaluation, OfAPureRotationHasNoAteButARotationError) {
   EXPECT_THAT(report.rotation_rmse_deg, Optional(DoubleNear(0, 1e-5)));
 }
 
-TEST(Evaluation, UsesOnlyTruthThatIsNearInTime) {
+TEST(Evaluation, UsesOnlyGroundTruthThatIsCloseInTime) {
   const auto truth = Helix(50);
   RunRecord run = PerfectRun(truth);
   for (FrameRecord& frame : run.frames) frame.time += std::chrono::seconds(100);
   EXPECT_FALSE(EvaluateRun(run, truth, {}).rotation_rmse_deg);
 }
 
-TEST(Evaluation, OfNothingIsEmpty) {
+TEST(Evaluation, IsEmptyForAnEmptyRun) {
   const SequenceReport report = EvaluateRun({}, {}, {});
   EXPECT_EQ(report.tracked_ratio, 0);
   EXPECT_FALSE(report.first_tracked_frame);
@@ -312,7 +316,7 @@ TEST(Quantiles, AreNearestRanks) {
   EXPECT_EQ(Quantile(values, 1), 100);
 }
 
-TEST(JsonReport, HasEveryFieldAndNullWhereNothingIsKnown) {
+TEST(JsonReport, HasEveryFieldAndNullForUnknownValues) {
   SequenceReport report;
   report.name = "a \"b\" \xff";
   const auto json = nlohmann::json::parse(FormatJsonReport({report}));
@@ -333,7 +337,7 @@ TEST(JsonReport, HasEveryFieldAndNullWhereNothingIsKnown) {
   }
 }
 
-TEST(HtmlReport, IsOnePageThatLoadsNothingAndEscapesNames) {
+TEST(HtmlReport, IsSelfContainedAndEscapesNames) {
   EvaluatedRun evaluated;
   evaluated.truth = Helix(300);
   evaluated.run = PerfectRun(evaluated.truth);
@@ -346,26 +350,26 @@ TEST(HtmlReport, IsOnePageThatLoadsNothingAndEscapesNames) {
   EXPECT_THAT(html, Not(HasSubstr("href=")));
   EXPECT_THAT(html, Not(HasSubstr("nan")));
   EXPECT_THAT(html, HasSubstr("Desk &amp; &quot;3&quot;"));
-  for (const char* title : {"Tracking by state", "Keyframes", "Points", "Time of tracking", "from above",
-                            "Error of the position", "Error of the rotation"}) {
+  for (const char* title : {"Tracking by state", "Keyframes", "Points", "Tracking time", "from above",
+                            "Position error", "Rotation error"}) {
     EXPECT_THAT(html, HasSubstr(title));
   }
 }
 
-TEST(GroundTruth, NamesTheLineOfWhatItCannotRead) {
-  const auto sentence = [](const std::string& text) {
+TEST(GroundTruth, NamesTheLineOfAnError) {
+  const auto error = [](const std::string& text) {
     return ErrorOf([&] { ParseGroundTruth(text, "truth"); });
   };
   EXPECT_EQ(ParseGroundTruth("# head\n1.5 1 2 3 0 0 0 1\n", "truth").at(0).time,
             std::chrono::milliseconds(1500));
-  EXPECT_THAT(sentence("1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0\n"), HasSubstr("truth, line 2"));
-  EXPECT_THAT(sentence("1 1 2 3 0 0 0 2\n"), HasSubstr("quaternion"));
-  EXPECT_THAT(sentence("1 1 2 nan 0 0 0 1\n"), HasSubstr("finite"));
-  EXPECT_THAT(sentence("2 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n"), HasSubstr("line 2"));
-  EXPECT_THAT(sentence("# nothing\n"), HasSubstr("no poses"));
+  EXPECT_THAT(error("1 1 2 3 0 0 0 1\n2 1 2 3 0 0 0\n"), HasSubstr("truth, line 2"));
+  EXPECT_THAT(error("1 1 2 3 0 0 0 2\n"), HasSubstr("quaternion"));
+  EXPECT_THAT(error("1 1 2 nan 0 0 0 1\n"), HasSubstr("finite"));
+  EXPECT_THAT(error("2 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n"), HasSubstr("line 2"));
+  EXPECT_THAT(error("# nothing\n"), HasSubstr("no poses"));
 }
 
-TEST(GroundTruth, IsFoundByTheNearestTime) {
+TEST(GroundTruth, FindsThePoseNearestInTime) {
   const auto truth = Helix(3);
   EXPECT_EQ(FindPose(truth, TimeOf(1) + std::chrono::milliseconds(9), std::chrono::milliseconds(10)),
             &truth[1]);
@@ -376,7 +380,7 @@ TEST(GroundTruth, IsFoundByTheNearestTime) {
   EXPECT_EQ(FindPose(truth, TimeOf(9), std::chrono::milliseconds(10)), nullptr);
 }
 
-TEST(GroundTruth, IsInterpolatedBetweenItsPoses) {
+TEST(GroundTruth, InterpolatesBetweenPoses) {
   std::vector<TimedPose> truth = {{TimeOf(0), {engine::Rotation3(), {1, 2, 3}}},
                                   {TimeOf(1), {engine::Rotation3::Exp({0, 0.4, 0}), {2, 2, 5}}}};
   const Timestamp quarter = TimeOf(1) / 4, far = std::chrono::seconds(1);
@@ -387,7 +391,7 @@ TEST(GroundTruth, IsInterpolatedBetweenItsPoses) {
       engine::IsNear(*InterpolatePose(truth, TimeOf(1), far), truth[1].truth_from_camera, 1e-9, 1e-9));
   EXPECT_TRUE(
       engine::IsNear(*InterpolatePose(truth, TimeOf(2), far), truth[1].truth_from_camera, 1e-9, 1e-9));
-  // One neighbour is too far away: the other stands for it; both: there is no pose.
+  // If one neighbour is too far away in time, the other is used; if both are, there is no pose.
   EXPECT_TRUE(
       engine::IsNear(*InterpolatePose(truth, quarter, quarter), truth[0].truth_from_camera, 1e-9, 1e-9));
   EXPECT_FALSE(InterpolatePose(truth, quarter, quarter / 2));

@@ -21,7 +21,7 @@ nlohmann::json ReadJson(const std::filesystem::path& path) {
   return nlohmann::json::parse(file);
 }
 
-// A short walk through the simulated room in lockstep, up to a frame that is tracked in a map of points.
+// A short walk through the simulated room in lockstep, up to a frame that is tracked with finite points.
 class FrameDump : public ::testing::Test {
  protected:
   void TrackUntilPosed() {
@@ -39,7 +39,7 @@ class FrameDump : public ::testing::Test {
       tracked_ = session_->Process(frame);
       if (tracked_.state == engine::TrackingState::kSixDof && tracked_.finite_points >= 50) return;
     }
-    FAIL() << "the walk was never tracked";
+    FAIL() << "no frame was tracked";
   }
 
   std::shared_ptr<const Simulation> simulation_;
@@ -49,7 +49,7 @@ class FrameDump : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(FrameDump, TellsOfEveryPointWhereItWasLookedForAndFound) {
+TEST_F(FrameDump, ListsWhereEveryPointWasSearchedAndFound) {
   TrackUntilPosed();
   WriteFrameDump(folder_.path(), 7, tracked_, session_->Inspect(tracked_));
   const nlohmann::json json = ReadJson(folder_.path() / "frame-7.json");
@@ -81,7 +81,7 @@ TEST_F(FrameDump, TellsOfEveryPointWhereItWasLookedForAndFound) {
   EXPECT_EQ(json["levels"].size(), static_cast<std::size_t>(engine::kPyramidLevels));
 }
 
-TEST_F(FrameDump, DrawsThePointsWhereTheyAre) {
+TEST_F(FrameDump, DrawsPointsAtTheirPixels) {
   TrackUntilPosed();
   const engine::FrameInspection inspection = session_->Inspect(tracked_);
   WriteFrameDump(folder_.path(), 0, tracked_, inspection);
@@ -94,7 +94,7 @@ TEST_F(FrameDump, DrawsThePointsWhereTheyAre) {
     for (int y = 0; y < drawn.rows; ++y)
       for (int x = 0; x < drawn.cols; ++x)
         changed.at<std::uint8_t>(y, x) = difference.at<cv::Vec3b>(y, x) != cv::Vec3b(0, 0, 0);
-    // Within a circle of what was found, something is drawn.
+    // Something must be drawn around every point that was found.
     for (const engine::InspectedPoint& point : inspection.points) {
       if (!point.found) continue;
       const int reach = 2 * (1 << point.level) + 2;
@@ -108,7 +108,7 @@ TEST_F(FrameDump, DrawsThePointsWhereTheyAre) {
   EXPECT_EQ(corners.cols, tracked_.frame.image.cols * 3 / 2);
 }
 
-TEST_F(FrameDump, OfADroppedFrameSaysNoMore) {
+TEST_F(FrameDump, DescribesADroppedFrameByItsStateOnly) {
   engine::TrackedFrame dropped;
   dropped.state = engine::TrackingState::kDropped;
   WriteFrameDump(folder_.path(), 3, dropped, {});

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// The textured cylinder, seen from its middle: 90 degrees in 100 images.
+// The textured cylinder seen from its axis: a rotation of 90 degrees in 100 images.
 const Simulation& Cylinder() {
   static const auto simulation = MakeSimulation("cylinder:0", SimulationOptions::Clean());
   return *simulation;
@@ -44,23 +44,23 @@ engine::KeyFrame MakeKeyFrame(engine::KeyFrameId id, int frame, engine::Panorama
   return keyframe;
 }
 
-// One panorama map of keyframes 15 degrees apart, at their true poses. The world is turned about the vertical
-// axis first.
-engine::MapSnapshot TrueMap(double world_turn_deg) {
+// One panorama map with keyframes 15 degrees apart, at their true poses in a world that is rotated about the
+// vertical axis.
+engine::MapSnapshot TrueMap(double world_rotation_deg) {
   engine::MapSnapshot map;
-  const engine::Rotation3 turned = engine::Rotation3::Exp({0, world_turn_deg * kDegree, 0});
+  const engine::Rotation3 turned = engine::Rotation3::Exp({0, world_rotation_deg * kDegree, 0});
   for (int i = 0; i < 6; ++i)
     map.keyframes.push_back(MakeKeyFrame(static_cast<engine::KeyFrameId>(i), 17 * i, 0, turned));
   map.panoramas = {{0, 0}};
   return map;
 }
 
-// How much a stitched image differs from a frame that it is not made of: the median of grey differences
-// over the frame, when its rays are turned by turn_deg first.
+// The median grey value difference between a stitched image and a frame that is not part of it, with the
+// frame's rays rotated by rotation_deg.
 double MedianDifference(const PanoramaImage& panorama, int frame, const engine::Rotation3& map_from_world,
-                        double turn_deg, int* compared) {
+                        double rotation_deg, int* compared) {
   const cv::Mat truth = Grey(frame);
-  const engine::Rotation3 more = engine::Rotation3::Exp({0, turn_deg * kDegree, 0});
+  const engine::Rotation3 more = engine::Rotation3::Exp({0, rotation_deg * kDegree, 0});
   const engine::Rotation3 map_from_camera =
       map_from_world * more * Cylinder().world_from_camera(frame).rotation;
   std::vector<int> differences;
@@ -80,44 +80,46 @@ double MedianDifference(const PanoramaImage& panorama, int frame, const engine::
   return differences[static_cast<std::size_t>(*compared / 2)];
 }
 
-TEST(PanoramaImage, ShowsWhatTheCameraSawBetweenItsKeyframes) {
-  // 180: what is shown lies across the place where the turns begin anew.
-  for (const double world_turn_deg : {0.0, 100.0, 180.0}) {
-    const auto images = StitchPanoramas(TrueMap(world_turn_deg));
+TEST(PanoramaImage, MatchesImagesBetweenItsKeyframes) {
+  // With 180 degrees, the panorama spans the wrap-around of the azimuth.
+  for (const double world_rotation_deg : {0.0, 100.0, 180.0}) {
+    const auto images = StitchPanoramas(TrueMap(world_rotation_deg));
     ASSERT_EQ(images.size(), 1u);
-    const engine::Rotation3 map_from_world = engine::Rotation3::Exp({0, -world_turn_deg * kDegree, 0});
+    const engine::Rotation3 map_from_world = engine::Rotation3::Exp({0, -world_rotation_deg * kDegree, 0});
     for (const int frame : {9, 43, 76}) {
       int compared = 0;
       const double difference = MedianDifference(images[0], frame, map_from_world, 0, &compared);
       EXPECT_GT(compared, 29'000);
       EXPECT_LT(difference, 5) << "grey levels, frame " << frame;
-      // Half a degree is two and a half pixels of the image: that would show.
-      for (const double turn_deg : {-0.5, 0.5})
-        EXPECT_GT(MedianDifference(images[0], frame, map_from_world, turn_deg, &compared), difference + 1);
+      // Half a degree is two and a half pixels, which the comparison must detect.
+      for (const double rotation_deg : {-0.5, 0.5})
+        EXPECT_GT(MedianDifference(images[0], frame, map_from_world, rotation_deg, &compared),
+                  difference + 1);
     }
   }
 }
 
-TEST(PanoramaImage, IsCutToWhatIsShown) {
+TEST(PanoramaImage, IsCroppedToItsContent) {
   const PanoramaImage image = StitchPanoramas(TrueMap(0)).at(0);
   EXPECT_EQ(image.keyframes, 6);
   EXPECT_EQ(image.panorama, 0u);
   ASSERT_EQ(image.image.size(), image.shown.size());
-  // From half a field of view left of the first keyframe to half of one right of the last.
+  // From half a field of view left of the first keyframe to half a field of view right of the last.
   const engine::CameraModel& camera = Cylinder().camera();
   const double half = std::acos(camera.Unproject({0, camera.height_px() / 2.0})->z());
   const double turn =
       (Cylinder().world_from_camera(0).rotation.inverse() * Cylinder().world_from_camera(85).rotation)
           .Angle();
-  EXPECT_NEAR(image.image.cols / image.pixels_a_radian, turn + 2 * half, 0.1);
+  EXPECT_NEAR(image.image.cols / image.pixels_per_radian, turn + 2 * half, 0.1);
   for (const int column : {0, image.shown.cols - 1}) EXPECT_GT(cv::countNonZero(image.shown.col(column)), 0);
   for (const int row : {0, image.shown.rows - 1}) EXPECT_GT(cv::countNonZero(image.shown.row(row)), 0);
   EXPECT_LT(cv::countNonZero(image.shown), static_cast<int>(image.shown.total()));
 }
 
-TEST(PanoramaImage, TakesInKeyframesThatWereLocalizedSinceAndNoOthers) {
+TEST(PanoramaImage, IncludesKeyframesThatWereLocalizedLaterAndNoOthers) {
   engine::MapSnapshot map = TrueMap(0);
-  // Two leave for panorama maps of their own, one of them a metre away; another is an ordinary keyframe.
+  // Two keyframes become references of new panorama maps, one of them a metre away; another becomes an
+  // ordinary one.
   const auto localize = [&](std::size_t index, engine::PanoramaId panorama, double away) {
     engine::KeyFrame& keyframe = map.keyframes[index];
     keyframe.kind = engine::KeyFrameKind::kSixDof;
@@ -129,19 +131,19 @@ TEST(PanoramaImage, TakesInKeyframesThatWereLocalizedSinceAndNoOthers) {
   localize(4, 2, 1.0);
   localize(5, engine::kNoId, 0);
   const auto images = StitchPanoramas(map);
-  ASSERT_EQ(images.size(), 1u) << "one place, and a single image elsewhere";
+  ASSERT_EQ(images.size(), 1u) << "one panorama; a single image elsewhere gives none";
   EXPECT_EQ(images[0].panorama, 0u);
   EXPECT_EQ(images[0].keyframes, 4);
 }
 
-TEST(PanoramaImage, IsMadeOfNoSingleImage) {
+TEST(PanoramaImage, IsNotMadeOfASingleImage) {
   engine::MapSnapshot map = TrueMap(0);
   map.keyframes.resize(1);
   EXPECT_TRUE(StitchPanoramas(map).empty());
   EXPECT_TRUE(StitchPanoramas({}).empty());
 }
 
-TEST(PanoramaImage, BecomesAPngThatReadsBack) {
+TEST(PanoramaImage, RoundTripsThroughPng) {
   cv::Mat image(40, 60, CV_8UC1);
   cv::randu(image, 0, 256);
   const cv::Mat read = cv::imdecode(EncodePng(image), cv::IMREAD_GRAYSCALE);

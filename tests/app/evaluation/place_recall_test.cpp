@@ -13,9 +13,10 @@
 #include "engine/vision/features.h"
 #include "maps/place_index.h"
 
-// How often the place index names the right one of twelve bays of the simulator's museum, which look alike,
-// among its first five candidates: keyframes from where the maps are built, questions from the visits later.
-// Whoever guesses is right with one candidate of twelve, and with five in a third of all questions.
+// Measures how often the place index retrieves the right one of twelve similar bays of the simulated museum
+// among its first five candidates. The keyframes come from the images where the maps are built, the queries
+// from the later visits. By chance, the first candidate is right in one of twelve queries, and one of five in
+// a third of them.
 namespace docent::app {
 namespace {
 
@@ -49,7 +50,7 @@ std::unique_ptr<const Museum> MakeMuseum() {
     engine::KeyFrame keyframe;
     keyframe.id = map->next_keyframe++;
     keyframe.features = engine::MakeFeatures(gray);
-    // Each a place of its own, so that five candidates are no more than five keyframes.
+    // The keyframes are far apart, so that each is a separate place and five candidates are five keyframes.
     keyframe.camera_from_map.translation.x() = 10.0 * keyframe.id;
     map->keyframes.push_back(keyframe);
   }
@@ -57,28 +58,28 @@ std::unique_ptr<const Museum> MakeMuseum() {
   return museum;
 }
 
-// What a visitor's camera does to the image that the author's took.
+// How the visitor's image differs from the author's.
 struct Change {
   const char* name;
   double angle_deg, scale;
-  double aside;  // of the image's width
+  double shift;  // ratio of the image width
   bool thumbnails_fail;
-  bool needs_both;  // neither thumbnails nor words alone are as often right with their first candidate
+  bool needs_both;  // with the first candidate, both cues together must beat thumbnails or words alone
 };
-constexpr Change kChanges[] = {{"as it is", 0, 1, 0, false, false},
+constexpr Change kChanges[] = {{"unchanged", 0, 1, 0, false, false},
                                {"nearer", 0, 1.4, 0, false, true},
                                {"rolled", 40, 1, 0, true, false},
-                               {"aside", 0, 1, 0.4, true, false}};
+                               {"shifted", 0, 1, 0.4, true, false}};
 
 cv::Mat Changed(const cv::Mat& gray, const Change& change) {
   const cv::Point2f middle(gray.cols / 2.0f, gray.rows / 2.0f);
   cv::Mat warp = cv::getRotationMatrix2D(middle, change.angle_deg, change.scale), out;
-  warp.at<double>(0, 2) += change.aside * gray.cols;
+  warp.at<double>(0, 2) += change.shift * gray.cols;
   cv::warpAffine(gray, out, warp, gray.size());
   return out;
 }
 
-// Parts of the questions whose map is among the first `count` candidates.
+// The ratio of queries whose map is among the first `count` candidates.
 struct Recall {
   double by_thumbnails = 0, by_words = 0, by_both = 0;
 };
@@ -96,11 +97,11 @@ Recall RecallOf(const Museum& museum, int count, const Change& change) {
                               [&](const auto& place) { return place.map_key == visit.map_key; });
     }
   }
-  const auto asked = static_cast<double>(museum.visits.size());
-  return {found[0] / asked, found[1] / asked, found[2] / asked};
+  const auto query_count = static_cast<double>(museum.visits.size());
+  return {found[0] / query_count, found[1] / query_count, found[2] / query_count};
 }
 
-TEST(PlaceRecall, IsHighWhateverAVisitorsCameraDoes) {
+TEST(PlaceRecall, IsHighForShiftedRotatedAndScaledImages) {
   const auto made = MakeMuseum();
   const Museum& museum = *made;
   ASSERT_GE(museum.visits.size(), 36u);

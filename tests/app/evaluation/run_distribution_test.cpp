@@ -54,26 +54,26 @@ FrameRecord FrameAt(int index, TrackingState state, std::uint64_t map_key) {
   return frame;
 }
 
-TEST(RunDistribution, TellsMinimumMedianMaximumAndTheWorstRunOfAFigure) {
+TEST(RunDistribution, ReportsMinimumMedianMaximumAndWorstRun) {
   const RunDistribution runs = FourRuns();
   const auto share = SpreadOf(FigureOf("tracked_share"), runs.rows);
   ASSERT_TRUE(share);
   EXPECT_EQ(share->runs, 4);
   EXPECT_DOUBLE_EQ(share->min, 0.1);
-  EXPECT_DOUBLE_EQ(share->median, 0.925) << "between the two in the middle";
+  EXPECT_DOUBLE_EQ(share->median, 0.925) << "the mean of the two middle values";
   EXPECT_DOUBLE_EQ(share->max, 1);
-  EXPECT_EQ(share->worst, 2u) << "the least tracked one";
+  EXPECT_EQ(share->worst, 2u) << "the run with the lowest ratio";
   const auto ate = SpreadOf(FigureOf("ate_rmse_m"), runs.rows);
   ASSERT_TRUE(ate);
-  EXPECT_EQ(ate->runs, 3) << "one has none";
+  EXPECT_EQ(ate->runs, 3) << "one run has no ATE";
   EXPECT_DOUBLE_EQ(ate->median, 0.03);
-  EXPECT_EQ(ate->worst, 1u) << "the one of the largest error";
+  EXPECT_EQ(ate->worst, 1u) << "the run with the largest error";
   EXPECT_DOUBLE_EQ(SpreadOf(FigureOf("unnoticed_false_starts"), runs.rows)->max, 1);
   EXPECT_FALSE(SpreadOf(FigureOf("first_3d_pose_s"), runs.rows));
   EXPECT_EQ(WorstRun(runs.rows), 2u);
 }
 
-TEST(RunDistribution, NamesTheLargerErrorAmongRunsThatAreTrackedAsLong) {
+TEST(RunDistribution, WorstOfEquallyTrackedRunsHasTheLargerError) {
   EXPECT_EQ(WorstRun({Row(1, 0.9, 0.02), Row(2, 0.9, 0.05), Row(4, 1, 0.3)}), 1u);
 }
 
@@ -81,7 +81,7 @@ TEST(RunDistribution, CountsAllFramesOfTheWindowAndAllKeptMaps) {
   RunRecord run;
   run.frames.push_back(FrameAt(0, TrackingState::kInitializing, 0));
   run.frames.push_back(FrameAt(1, TrackingState::kPanorama, 1));
-  run.frames.back().map_points.infinite = 10;  // directions alone
+  run.frames.back().map_points.infinite = 10;  // infinite points only
   run.frames.push_back(FrameAt(2, TrackingState::kSixDof, 2));
   run.frames.push_back(FrameAt(3, TrackingState::kSixDof, 1));
   run.frames.push_back(FrameAt(4, TrackingState::kLost, 1));
@@ -93,11 +93,11 @@ TEST(RunDistribution, CountsAllFramesOfTheWindowAndAllKeptMaps) {
     map.discarded = key == 2;
     run.maps.push_back(map);
   }
-  StartResult noticed;
-  noticed.verdict = StartVerdict::kFalsePath;
+  InitializationResult noticed;
+  noticed.outcome = InitializationOutcome::kFalsePath;
   noticed.discarded = true;
-  StartResult right;
-  right.verdict = StartVerdict::kRight;
+  InitializationResult right;
+  right.outcome = InitializationOutcome::kRight;
   const SequenceReport report = EvaluateRun(run, {}, {});
   const RunRow row = MakeRunRow({7, 2, 30}, run, report, {{noticed, right}});
   EXPECT_EQ(row.key.seed, 7u);
@@ -114,10 +114,10 @@ TEST(RunDistribution, CountsAllFramesOfTheWindowAndAllKeptMaps) {
   EXPECT_FALSE(without_truth.ate_m);
 }
 
-TEST(RunDistribution, TakesTheErrorOfEachFrameByItsOwnMap) {
+TEST(RunDistribution, AlignsEachFrameWithItsOwnMap) {
   RunRecord run;
   std::vector<TimedPose> truth;
-  // Two maps of the same way, whose scales differ by a factor of ten.
+  // Two maps of one path, whose scales differ by a factor of ten.
   for (int i = 0; i < 20; ++i) {
     run.frames.push_back(FrameAt(i, TrackingState::kSixDof, i < 12 ? 1 : 2));
     const Eigen::Vector3d center(i, i * i * 0.1, 1);
@@ -125,24 +125,26 @@ TEST(RunDistribution, TakesTheErrorOfEachFrameByItsOwnMap) {
     const double scale = i < 12 ? 1 : 10;
     run.frames.back().camera_from_map = engine::Rigid3(engine::Rotation3(), center * scale).inverse();
   }
-  const RunRow row = MakeRunRow({}, run, EvaluateRun(run, truth, {}), JudgeStarts(run, truth, {}));
+  const RunRow row =
+      MakeRunRow({}, run, EvaluateRun(run, truth, {}), ClassifyInitializations(run, truth, {}));
   EXPECT_THAT(row.ate_m, Optional(DoubleNear(0, 1e-9)));
   EXPECT_THAT(row.rotation_deg, Optional(DoubleNear(0, 1e-6)));
   EXPECT_EQ(row.maps, 2);
 }
 
-TEST(RunDistribution, IsAnEmptyRowWithoutAFrame) {
+TEST(RunDistribution, IsAnEmptyRowWithoutFrames) {
   const RunRow row = MakeRunRow({}, {}, EvaluateRun({}, {}, {}), std::nullopt);
   EXPECT_EQ(row.tracked_share, 0);
   EXPECT_FALSE(row.first_3d_pose_s);
 }
 
-TEST(RunDistribution, IsATableWithTheWorstRunNamed) {
+TEST(RunDistribution, TableNamesTheWorstRun) {
   const std::string table = FormatTable(FourRuns());
   EXPECT_THAT(table, HasSubstr("drone<1>, hybrid: 4 runs (4 seeds, 1 start)"));
   EXPECT_THAT(table, HasSubstr("10.0 %     92.5 %    100.0 %     4  seed 3\n"));
-  EXPECT_THAT(table, HasSubstr("false starts in 1 of 4 runs: 2 in all, 1 of them noticed; 0 undecided"));
-  EXPECT_THAT(table, HasSubstr("worst run: drone<1>, seed 3: tracked share 10.0 %"));
+  EXPECT_THAT(table,
+              HasSubstr("false initializations in 1 of 4 runs: 2 in total, 1 of them noticed; 0 undecided"));
+  EXPECT_THAT(table, HasSubstr("worst run: drone<1>, seed 3: tracked frames 10.0 %"));
   RunDistribution windows = FourRuns();
   windows.starts = 2;
   windows.window_s = 15;
@@ -150,7 +152,7 @@ TEST(RunDistribution, IsATableWithTheWorstRunNamed) {
   EXPECT_THAT(FormatTable(windows), HasSubstr("seed 3, start 0"));
 }
 
-TEST(RunDistribution, LeavesOutOfTheTableWhatNeedsATruthThatIsNotThere) {
+TEST(RunDistribution, TableOmitsErrorsWithoutGroundTruth) {
   RunDistribution runs = FourRuns();
   runs.has_truth = false;
   for (RunRow& row : runs.rows) {
@@ -158,11 +160,11 @@ TEST(RunDistribution, LeavesOutOfTheTableWhatNeedsATruthThatIsNotThere) {
     row.false_starts.reset();
     row.noticed.reset();
   }
-  EXPECT_THAT(FormatTable(runs), HasSubstr("unknown without a truth"));
+  EXPECT_THAT(FormatTable(runs), HasSubstr("unknown without ground truth"));
   EXPECT_THAT(FormatRunLine(runs.rows[0], runs), Not(HasSubstr("ATE")));
 }
 
-TEST(RunDistribution, StandsInTheJsonReportWithEveryRun) {
+TEST(RunDistribution, JsonReportContainsEveryRun) {
   const auto json = nlohmann::json::parse(FormatJsonReport({FourRuns()}, {}));
   const auto& sequence = json["sequences"][0];
   EXPECT_EQ(sequence["name"], "drone<1>");
@@ -180,11 +182,11 @@ TEST(RunDistribution, StandsInTheJsonReportWithEveryRun) {
   EXPECT_FALSE(json.contains("compared"));
 }
 
-TEST(RunDistribution, IsDrawnFromTheWorstRunToTheBest) {
+TEST(RunDistribution, IsPlottedFromTheWorstRunToTheBest) {
   const std::string html = FormatHtmlReport(std::vector{FourRuns()});
   EXPECT_THAT(html, HasSubstr("drone&lt;1&gt;, hybrid"));
   EXPECT_THAT(html, HasSubstr("Worst run: seed 3."));
-  EXPECT_THAT(html, HasSubstr("tracked share of each run, sorted"));
+  EXPECT_THAT(html, HasSubstr("tracked frames of each run, sorted"));
   EXPECT_THAT(html, HasSubstr("ATE of each run, sorted"));
   EXPECT_THAT(html, Not(HasSubstr("first 3D pose after of each run"))) << "no run has one";
 }

@@ -25,9 +25,9 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-// What is wrong with a piece of XML, or empty: tags nest, attributes are in quotes, nothing stands bare that
-// must be escaped.
-std::string FaultOf(const std::string& xml) {
+// The first error of a piece of XML, or empty: tags must nest, attributes must be quoted, and special
+// characters must be escaped.
+std::string XmlErrorOf(const std::string& xml) {
   static const std::regex tag(R"(^<(/?)([a-zA-Z][a-zA-Z0-9]*)((?:\s+[a-zA-Z:-]+="[^"<]*")*)\s*(/?)>)");
   static const std::regex entity(R"(^&(amp|lt|gt|quot|#39);)");
   std::vector<std::string> open;
@@ -36,22 +36,22 @@ std::string FaultOf(const std::string& xml) {
     const std::string around = xml.substr(i, 60);
     std::smatch match;
     if (xml[i] == '<') {
-      if (!std::regex_search(from, xml.end(), match, tag)) return "no tag: " + around;
+      if (!std::regex_search(from, xml.end(), match, tag)) return "not a tag: " + around;
       if (match[1].length() > 0) {
-        if (open.empty() || open.back() != match[2]) return "closes what is not open: " + around;
+        if (open.empty() || open.back() != match[2]) return "unmatched closing tag: " + around;
         open.pop_back();
       } else if (match[4].length() == 0) {
         open.push_back(match[2]);
       }
       i += static_cast<std::size_t>(match[0].length());
     } else if (xml[i] == '&') {
-      if (!std::regex_search(from, xml.end(), match, entity)) return "bare &: " + around;
+      if (!std::regex_search(from, xml.end(), match, entity)) return "unescaped &: " + around;
       i += static_cast<std::size_t>(match[0].length());
     } else {
       ++i;
     }
   }
-  return open.empty() ? std::string() : "left open: " + open.back();
+  return open.empty() ? std::string() : "not closed: " + open.back();
 }
 
 int Count(const std::string& text, const std::string& part) {
@@ -60,7 +60,7 @@ int Count(const std::string& text, const std::string& part) {
   return count;
 }
 
-// The cx and cy of the circles of one colour.
+// The centres of the circles of one colour.
 std::vector<SvgPlot::Point> Circles(const std::string& svg, const std::string& color) {
   const auto begin = svg.find("<g fill=\"" + color + "\">");
   if (begin == std::string::npos) return {};
@@ -72,7 +72,7 @@ std::vector<SvgPlot::Point> Circles(const std::string& svg, const std::string& c
   return circles;
 }
 
-// A hundred frames of an engine: the map grows, the mapper works at frames 20 and 60.
+// A made-up run of a hundred frames: the map grows, and the mapper works at frames 20 and 60.
 EvaluatedRun MadeUpRun(const std::string& engine, int keyframes) {
   EvaluatedRun evaluated;
   RunRecord& run = evaluated.run;
@@ -107,7 +107,7 @@ EvaluatedRun MadeUpRun(const std::string& engine, int keyframes) {
   return evaluated;
 }
 
-TEST(RunPlots, AreWellFormed) {
+TEST(RunPlots, AreWellFormedXml) {
   const EvaluatedRun run = MadeUpRun("hybrid", 40);
   const PlotRanges ranges = RangesOf(run);
   MapRecord map = run.run.maps[0];
@@ -117,38 +117,38 @@ TEST(RunPlots, AreWellFormed) {
         MappingPlot(run, ranges), TrackingTimePlot(run, ranges), ErrorPlots(run), PointViewPlot(run, map),
         PlaceViewPlot(run, map), AlignedTrajectoryPlot(run)}) {
     EXPECT_THAT(svg, HasSubstr("<svg "));
-    EXPECT_THAT(FaultOf(svg), IsEmpty());
+    EXPECT_THAT(XmlErrorOf(svg), IsEmpty());
     EXPECT_THAT(svg, Not(HasSubstr("nan")));
     EXPECT_THAT(svg, Not(HasSubstr("inf\"")));
   }
-  // The checker sees what is wrong.
+  // The checker itself must detect errors.
   for (const char* wrong : {"<svg><g></svg>", "<svg a=b/>", "<svg>a & b</svg>", "<svg>", "<svg x=\"<\"/>"})
-    EXPECT_THAT(FaultOf(wrong), Not(IsEmpty())) << wrong;
+    EXPECT_THAT(XmlErrorOf(wrong), Not(IsEmpty())) << wrong;
 }
 
-TEST(RunPlots, OfTwoEnginesHaveTheSameRanges) {
+TEST(RunPlots, UseTheSameRangesForBothEngines) {
   const EvaluatedRun few = MadeUpRun("sixdof", 10), many = MadeUpRun("hybrid", 400);
   EXPECT_THAT(KeyFramePlot(few, RangesOf(few)), Not(HasSubstr(">400<")));
   EXPECT_THAT(KeyFramePlot(few, Both(RangesOf(few), RangesOf(many))), HasSubstr(">400<"));
   EXPECT_THAT(KeyFramePlot(many, RangesOf(many)), HasSubstr(">400<"));
 }
 
-TEST(RunPlots, ShowTheMappersWorkWhereItWasDone) {
+TEST(RunPlots, ShowMappingTimeAtItsFrames) {
   const EvaluatedRun run = MadeUpRun("hybrid", 40);
   const PlotRanges ranges = RangesOf(run);
   EXPECT_NEAR(ranges.mapping_ms, 50, 1e-9);
   const std::string svg = MappingPlot(run, ranges);
-  // One stem for each task and frame that spent something.
-  const auto stems = [&svg](const std::string& color) {
+  // One line for each task and frame with mapping time.
+  const auto lines_of = [&svg](const std::string& color) {
     const std::regex path("stroke=\"" + color + "\" stroke-width=\"1.3\" d=\"([^\"]*)\"");
     std::smatch match;
     return std::regex_search(svg, match, path) ? match[1].str() : std::string();
   };
-  const std::string adjustment = stems("#2c8a4b"), localization = stems("#4a90c2");
+  const std::string adjustment = lines_of("#2c8a4b"), localization = lines_of("#4a90c2");
   EXPECT_EQ(Count(adjustment, "V"), 2);
   EXPECT_EQ(Count(localization, "V"), 1);
-  EXPECT_EQ(stems("#8e44ad"), "") << "nothing was triangulated";
-  // The 99 intervals lie over 824 pixels from 64 on.
+  EXPECT_EQ(lines_of("#8e44ad"), "") << "nothing was triangulated";
+  // The 99 intervals span 824 pixels, starting at 64.
   const auto at = [](int frame) {
     return "M" + FormatNumber(std::round((64 + 824.0 * frame / 99) * 10) / 10, 7);
   };
@@ -156,27 +156,28 @@ TEST(RunPlots, ShowTheMappersWorkWhereItWasDone) {
   EXPECT_THAT(localization, StartsWith(at(60)));
 }
 
-TEST(RunPlots, TellDirectionsThatBecamePointsFromOthers) {
+TEST(RunPlots, MarkConvertedInfinitePoints) {
   const EvaluatedRun run = MadeUpRun("hybrid", 40);
   const std::string svg = PointViewPlot(run, run.run.maps[0]);
   EXPECT_EQ(Circles(svg, "#8e44ad").size(), 10u);
   EXPECT_EQ(Circles(svg, "#333333").size(), 20u);
 }
 
-TEST(RunPlots, LeaveOutThePointsThatWouldMakeTheRestSmall) {
+TEST(RunPlots, OmitDistantPointsThatWouldShrinkTheRest) {
   EvaluatedRun run = MadeUpRun("hybrid", 40);
   MapRecord& map = run.run.maps[0];
   map.positions.push_back({5000, 0, 2});
   map.converted.push_back(false);
   const std::string svg = PointViewPlot(run, map);
   EXPECT_EQ(Circles(svg, "#333333").size(), 20u);
-  EXPECT_THAT(svg, HasSubstr("(1 lie further out)"));
+  EXPECT_THAT(svg, HasSubstr("(1 further points not shown)"));
 }
 
-TEST(RunPlots, ShowAMapFromAboveWithWhatLiesAheadOnTop) {
+TEST(RunPlots, ShowTheMapFromAboveWithTheForwardDirectionUp) {
   const EvaluatedRun run = MadeUpRun("hybrid", 40);
   const std::string svg = PlaceViewPlot(run, run.run.maps[0]);
-  // Centres: the origin, one to the right, one ahead. The map's y points down, as cameras' do.
+  // The centres are the origin, one to the right and one ahead. The map's y axis points down, as in a camera
+  // frame.
   const auto centers = Circles(svg, "#2c8a4b");
   ASSERT_EQ(centers.size(), 3u);
   EXPECT_GT(centers[1].x, centers[0].x + 10);
@@ -190,25 +191,25 @@ TEST(RunPlots, ShowAMapFromAboveWithWhatLiesAheadOnTop) {
   EXPECT_NEAR(panoramas[1].y, centers[2].y, 0.2);
 }
 
-TEST(ComparedReport, ShowsEveryFigureOfBothEngines) {
+TEST(ComparedReport, ShowsEveryPlotOfBothEngines) {
   EvaluatedRun run = MadeUpRun("hybrid", 40);
   run.compared = std::make_shared<EvaluatedRun>(MadeUpRun("sixdof", 10));
   const std::string html = FormatHtmlReport({run});
   for (const char* title :
-       {">Tracking by state<", ">Keyframes of the current map<", ">Points of the current map, ",
-        ">Finite points of the current map", ">Time of mapping<", ">Points of the map ",
+       {">Tracking by state<", ">Keyframes of the current map<", ">Points of the current map and ",
+        ">Finite points of the current map", ">Mapping time<", ">Points of the map ",
         ">Trajectory and keyframes in the map "}) {
     EXPECT_EQ(Count(html, title), 2) << title;
   }
   EXPECT_EQ(Count(html, "<h4>hybrid</h4>"), Count(html, "<h4>sixdof</h4>"));
   EXPECT_GT(Count(html, "<h4>hybrid</h4>"), 6);
   for (auto at = html.find("<svg "); at != std::string::npos; at = html.find("<svg ", at + 1))
-    EXPECT_THAT(FaultOf(html.substr(at, html.find("</svg>", at) + 6 - at)), IsEmpty());
+    EXPECT_THAT(XmlErrorOf(html.substr(at, html.find("</svg>", at) + 6 - at)), IsEmpty());
   run.compared.reset();
-  EXPECT_EQ(Count(FormatHtmlReport({run}), ">Time of mapping<"), 1);
+  EXPECT_EQ(Count(FormatHtmlReport({run}), ">Mapping time<"), 1);
 }
 
-TEST(ComparedReport, KeepsSequencesForTheEngineThatWasAskedFor) {
+TEST(ComparedReport, SequencesContainTheRequestedEngineOnly) {
   const auto hybrid = MadeUpRun("hybrid", 40).report, sixdof = MadeUpRun("sixdof", 10).report;
   const auto json = nlohmann::json::parse(FormatJsonReport({hybrid}, {sixdof}));
   ASSERT_EQ(json.at("sequences").size(), 1u);
@@ -218,9 +219,9 @@ TEST(ComparedReport, KeepsSequencesForTheEngineThatWasAskedFor) {
   EXPECT_FALSE(nlohmann::json::parse(FormatJsonReport({hybrid})).contains("compared"));
 }
 
-TEST(ComparedReport, HoldsItsPanoramasWithinItself) {
+TEST(ComparedReport, EmbedsItsPanoramas) {
   EvaluatedRun run = MadeUpRun("hybrid", 40);
-  // The test vectors of RFC 4648; what the bytes say is the browser's to judge.
+  // The test vectors of RFC 4648; the bytes need not be a valid image.
   const auto bytes = [](const std::string& text) {
     return std::vector<std::uint8_t>(text.begin(), text.end());
   };
@@ -233,7 +234,7 @@ TEST(ComparedReport, HoldsItsPanoramasWithinItself) {
   EXPECT_THAT(html, HasSubstr("one &lt;&amp;&gt;</figcaption>"));
 }
 
-TEST(MapRecords, SayWhereKeyframesAndPanoramasStand) {
+TEST(MapRecords, ContainTheCentresOfKeyframesAndPanoramas) {
   engine::MapSnapshot map;
   const auto add = [&](engine::KeyFrameKind kind, engine::PanoramaId panorama,
                        const Eigen::Vector3d& center) {

@@ -14,7 +14,7 @@
 namespace docent::app {
 namespace {
 
-// A grid over the image of a simulated camera.
+// A grid of pixels over the image of a simulated camera.
 std::vector<Eigen::Vector2f> Grid(const engine::CameraModel& camera) {
   std::vector<Eigen::Vector2f> pixels;
   for (int x = 1; x < 14; ++x) {
@@ -33,26 +33,26 @@ std::vector<double> RelativeErrors(const TrueDepths& measured, const TrueDepths&
   return errors;
 }
 
-TrueDepths Follow(const std::shared_ptr<const Simulation>& simulation, int frame,
-                  const std::vector<Eigen::Vector2f>& pixels, const std::vector<TimedPose>& truth) {
+TrueDepths MeasureDepths(const std::shared_ptr<const Simulation>& simulation, int frame,
+                         const std::vector<Eigen::Vector2f>& pixels, const std::vector<TimedPose>& truth) {
   TrueDepthOptions options;
-  options.longest = std::chrono::seconds(1);
+  options.max_duration = std::chrono::seconds(1);
   options.truth_noise_m = 0.001;
   CalibratedCamera camera =
       Calibrate(WindowOf(OpenSimulation(simulation), static_cast<std::uint64_t>(frame), {}), std::nullopt);
-  return FollowTrueDepths(&camera, truth, pixels, options);
+  return MeasureTrueDepths(&camera, truth, pixels, options);
 }
 
-TEST(TrueDepth, IsFoundByFollowingPixelsWithTheTruePoses) {
+TEST(TrueDepth, IsMeasuredByTrackingPixelsWithTheTruePoses) {
   const std::shared_ptr<const Simulation> simulation = MakeSimulation("room");
   constexpr int kFrame = 5;
   const auto pixels = Grid(simulation->camera());
   const TrueDepths known = SimulatedTrueDepths(*simulation, kFrame, pixels);
-  const TrueDepths measured = Follow(simulation, kFrame, pixels, GroundTruthOf(*simulation));
+  const TrueDepths measured = MeasureDepths(simulation, kFrame, pixels, GroundTruthOf(*simulation));
   const std::vector<double> errors = RelativeErrors(measured, known);
   ASSERT_GT(errors.size(), pixels.size() / 3);
   EXPECT_LT(errors[errors.size() / 2], 0.05);
-  // What it says of its own error must hold: two standard deviations and the flow's own error.
+  // The reported uncertainty must hold: two standard deviations plus 5 % for the error of the optical flow.
   int within = 0, counted = 0;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     if (!measured[i] || !known[i]) continue;
@@ -63,7 +63,7 @@ TEST(TrueDepth, IsFoundByFollowingPixelsWithTheTruePoses) {
   EXPECT_GT(within, 0.8 * counted);
 }
 
-TEST(TrueDepth, DoesNotHangOnTheOrientationsOfTheTruth) {
+TEST(TrueDepth, IsRobustToOrientationErrorsOfTheGroundTruth) {
   const std::shared_ptr<const Simulation> simulation = MakeSimulation("room");
   constexpr int kFrame = 5;
   const auto pixels = Grid(simulation->camera());
@@ -73,28 +73,29 @@ TEST(TrueDepth, DoesNotHangOnTheOrientationsOfTheTruth) {
     truth[i].truth_from_camera.rotation =
         truth[i].truth_from_camera.rotation * engine::Rotation3::Exp({error, -error, 0.5 * error});
   }
-  const auto errors = RelativeErrors(Follow(simulation, kFrame, pixels, truth),
+  const auto errors = RelativeErrors(MeasureDepths(simulation, kFrame, pixels, truth),
                                      SimulatedTrueDepths(*simulation, kFrame, pixels));
   ASSERT_GT(errors.size(), pixels.size() / 3);
   EXPECT_LT(errors[errors.size() / 2], 0.1);
 }
 
-TEST(TrueDepth, IsUnknownToACameraThatHasNotMoved) {
+TEST(TrueDepth, IsUnknownWithoutTranslation) {
   const std::shared_ptr<const Simulation> simulation = MakeSimulation("room");
   const auto pixels = Grid(simulation->camera());
   std::vector<TimedPose> truth = GroundTruthOf(*simulation);
   for (TimedPose& pose : truth) pose.truth_from_camera.translation = truth[0].truth_from_camera.translation;
-  for (const auto& depth : Follow(simulation, 5, pixels, truth)) EXPECT_FALSE(depth);
-  for (const auto& depth : Follow(simulation, 5, pixels, {})) EXPECT_FALSE(depth) << "without a truth";
+  for (const auto& depth : MeasureDepths(simulation, 5, pixels, truth)) EXPECT_FALSE(depth);
+  for (const auto& depth : MeasureDepths(simulation, 5, pixels, {}))
+    EXPECT_FALSE(depth) << "without ground truth";
 }
 
-TEST(TrueDepth, RefusesOptionsThatMakeNoSense) {
+TEST(TrueDepth, RejectsInvalidOptions) {
   TrueDepthOptions options;
   EXPECT_FALSE(options.Validate());
   options.truth_noise_m = -1;
   EXPECT_TRUE(options.Validate());
   CalibratedCamera camera;
-  EXPECT_THROW(FollowTrueDepths(&camera, {}, {}, options), Error);
+  EXPECT_THROW(MeasureTrueDepths(&camera, {}, {}, options), Error);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ TEST(CheckedFile, HasItsNameOnlyWhenItIsComplete) {
   EXPECT_FALSE(std::filesystem::exists(folder / "list.txt.part"));
 }
 
-TEST(CheckedFile, ThatIsNotClosedLeavesTheOldOneAlone) {
+TEST(CheckedFile, KeepsTheOldFileWithoutClose) {
   const TemporaryFolder folder;
   const auto path = folder.Write("list.txt", "old");
   { CheckedFile(path).Write("half"); }
@@ -36,12 +36,12 @@ TEST(CheckedFile, ThatIsNotClosedLeavesTheOldOneAlone) {
   EXPECT_EQ(ReadAll(folder / "list.txt.part"), "half");
 }
 
-TEST(CheckedFile, InAFolderThatIsNotThereSaysSo) {
+TEST(CheckedFile, ReportsAMissingFolder) {
   const TemporaryFolder folder;
   EXPECT_THAT(ErrorOf([&] { CheckedFile file(folder / "none/list.txt"); }), HasSubstr("none/list.txt"));
 }
 
-TEST(CheckedFile, ThatOutgrowsTheRoomItHasSaysSo) {
+TEST(CheckedFile, ReportsAFullDisk) {
   const TemporaryFolder folder;
   const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
   rlimit old_limit{};

@@ -28,7 +28,7 @@ using engine::ImageFeatures;
 constexpr int kNoDisk = 77;
 
 std::shared_ptr<const ImageFeatures> NoisyFeatures(std::uint64_t seed = 1) {
-  cv::Mat gray(241, 323, CV_8UC1);  // odd at every level
+  cv::Mat gray(241, 323, CV_8UC1);  // odd size at every level
   cv::RNG random(seed);
   random.fill(gray, cv::RNG::UNIFORM, 0, 256);
   return engine::MakeFeatures(gray);
@@ -53,7 +53,7 @@ void ExpectSame(const ImageFeatures& a, const ImageFeatures& b) {
   EXPECT_EQ(a.small_blurry.scale, b.small_blurry.scale);
 }
 
-// Of the mapping that holds the address; -1 where nothing is mapped.
+// Resident size of the mapping that contains the address; -1 where nothing is mapped.
 long ResidentKilobytes(const void* address) {
   const auto wanted = reinterpret_cast<std::uintptr_t>(address);
   std::ifstream maps("/proc/self/smaps");
@@ -69,24 +69,24 @@ long ResidentKilobytes(const void* address) {
   return -1;
 }
 
-TEST(ImageFiles, KeepAnEqualCopyThatSharesNothing) {
+TEST(ImageFiles, StoresAnEqualCopyThatSharesNothing) {
   const TemporaryFolder folder;
   ImageFiles files(folder.path());
   const auto features = NoisyFeatures();
-  const auto kept = files.Keep(features);
+  const auto kept = files.Store(features);
   ASSERT_NE(kept, features);
   ExpectSame(*kept, *features);
   EXPECT_NE(kept->levels[0].data, features->levels[0].data);
   EXPECT_NE(kept->small_blurry.pixels.data, features->small_blurry.pixels.data);
-  EXPECT_EQ(files.Keep(kept), kept);
+  EXPECT_EQ(files.Store(kept), kept);
 }
 
-TEST(ImageFiles, RestingImagesNeedNoMemoryAndAreTheSameAfterwards) {
+TEST(ImageFiles, EvictedImagesUseNoMemoryAndAreUnchangedAfterwards) {
   const TemporaryFolder folder;
   ImageFiles files(folder.path());
   const auto features = NoisyFeatures();
-  const auto kept = files.Keep(features);
-  kept->Look();
+  const auto kept = files.Store(features);
+  kept->MarkInUse();
   ExpectSame(*kept, *features);
   const std::uint8_t* const address = kept->levels[0].data;
   EXPECT_GE(ResidentKilobytes(address), 323 * 241 / 1024);
@@ -96,15 +96,15 @@ TEST(ImageFiles, RestingImagesNeedNoMemoryAndAreTheSameAfterwards) {
   ExpectSame(*kept, *features);
 }
 
-TEST(ImageFiles, WhoeverLooksIntoManyImagesWakesFewAtATime) {
+TEST(ImageFiles, FewImagesAreResidentWhenManyAreUsedInTurn) {
   const TemporaryFolder folder;
-  constexpr long kBytes = 323 * 241 * 4 / 3;  // of a pyramid
+  constexpr long kBytes = 323 * 241 * 4 / 3;  // size of one pyramid
   ImageFiles files(folder.path(), 3 * kBytes);
   std::vector<std::shared_ptr<const ImageFeatures>> kept;
-  for (std::uint64_t i = 0; i < 8; ++i) kept.push_back(files.Keep(NoisyFeatures(i)));
+  for (std::uint64_t i = 0; i < 8; ++i) kept.push_back(files.Store(NoisyFeatures(i)));
   for (int round = 0; round < 2; ++round) {
     for (std::uint64_t i = 0; i < kept.size(); ++i) {
-      kept[i]->Look();
+      kept[i]->MarkInUse();
       ExpectSame(*kept[i], *NoisyFeatures(i));
       long resident = 0;
       for (const auto& features : kept) resident += ResidentKilobytes(features->levels[0].data);
@@ -114,24 +114,24 @@ TEST(ImageFiles, WhoeverLooksIntoManyImagesWakesFewAtATime) {
   }
 }
 
-TEST(ImageFiles, NothingHappensToImagesInOrdinaryMemoryThatAreLookedAt) {
+TEST(ImageFiles, ImagesInOrdinaryMemoryCanBeUsedTheSameWay) {
   const auto features = NoisyFeatures();
-  features->Look();
+  features->MarkInUse();
   ExpectSame(*features, *NoisyFeatures());
 }
 
-TEST(ImageFiles, LeaveNothingInTheFolder) {
+TEST(ImageFiles, LeavesNothingInTheFolder) {
   const TemporaryFolder folder;
   ImageFiles files(folder.path());
-  const auto kept = files.Keep(NoisyFeatures());
+  const auto kept = files.Store(NoisyFeatures());
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-TEST(ImageFiles, ImagesOutliveTheirFeaturesAndTheStoreAndThenGiveTheirMemoryBack) {
+TEST(ImageFiles, ImagesOutliveTheStoreAndThenFreeTheirMemory) {
   const TemporaryFolder folder;
   auto files = std::make_unique<ImageFiles>(folder.path());
   const auto features = NoisyFeatures();
-  auto kept = files->Keep(features);
+  auto kept = files->Store(features);
   cv::Mat image = kept->levels[1];
   const std::uint8_t* const address = image.data;
   kept.reset();
@@ -141,11 +141,11 @@ TEST(ImageFiles, ImagesOutliveTheirFeaturesAndTheStoreAndThenGiveTheirMemoryBack
   EXPECT_EQ(ResidentKilobytes(address), -1);
 }
 
-// An image that is made like a kept one is nobody's business but its maker's.
-TEST(ImageFiles, AnotherImageInTheSameVariableLiesInOrdinaryMemory) {
+// Memory that a cv::Mat allocates after it held a stored image must not come from the store.
+TEST(ImageFiles, AReallocatedImageIsInOrdinaryMemory) {
   const TemporaryFolder folder;
   ImageFiles files(folder.path());
-  const auto kept = files.Keep(NoisyFeatures());
+  const auto kept = files.Store(NoisyFeatures());
   cv::Mat image = kept->levels[0];
   image.create(100, 100, CV_8UC1);
   image.setTo(7);
@@ -153,14 +153,14 @@ TEST(ImageFiles, AnotherImageInTheSameVariableLiesInOrdinaryMemory) {
   ExpectSame(*kept, *NoisyFeatures());
 }
 
-TEST(ImageFiles, WhereThereIsNoFolderImagesStayWhereTheyAre) {
+TEST(ImageFiles, ImagesStayInMemoryWithoutAFolder) {
   const TemporaryFolder folder;
   ImageFiles files(folder / "missing");
   const auto features = NoisyFeatures();
-  EXPECT_EQ(files.Keep(features), features);
+  EXPECT_EQ(files.Store(features), features);
 }
 
-TEST(ImageFiles, WhereTheDiskTakesNoMoreImagesStayWhereTheyAre) {
+TEST(ImageFiles, ImagesStayInMemoryAtTheFileSizeLimit) {
   const TemporaryFolder folder;
   ImageFiles files(folder.path());
   const auto features = NoisyFeatures();
@@ -168,17 +168,17 @@ TEST(ImageFiles, WhereTheDiskTakesNoMoreImagesStayWhereTheyAre) {
   rlimit limit{};
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &limit), 0);
   rlimit little = limit;
-  little.rlim_cur = features->levels[0].total() + 100;  // full within the second level
+  little.rlim_cur = features->levels[0].total() + 100;  // the limit is reached within the second level
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &little), 0);
-  const auto kept = files.Keep(features);
+  const auto kept = files.Store(features);
   setrlimit(RLIMIT_FSIZE, &limit);
   std::signal(SIGXFSZ, before);
   EXPECT_EQ(kept, features);
-  EXPECT_NE(files.Keep(features), features);  // there is room again
+  EXPECT_NE(files.Store(features), features);  // there is space again
 }
 
-// In a process of its own, on a disk of a quarter of a megabyte. Whoever maps a file without having room for
-// it is killed where it is touched.
+// Runs in a process of its own, on a file system of a quarter of a megabyte. Accessing a mapped file without
+// space for its pages kills the process.
 int FillADisk(const std::string& folder) {
   const std::string same_user = "0 " + std::to_string(geteuid()) + " 1";
   const std::string same_group = "0 " + std::to_string(getegid()) + " 1";
@@ -191,22 +191,22 @@ int FillADisk(const std::string& folder) {
   std::vector<std::shared_ptr<const ImageFeatures>> all;
   int in_files = 0;
   for (std::uint64_t i = 0; i < 5; ++i) {
-    all.push_back(files.Keep(NoisyFeatures(i)));
-    in_files += all.back()->kept ? 1 : 0;
+    all.push_back(files.Store(NoisyFeatures(i)));
+    in_files += all.back()->stored ? 1 : 0;
   }
   for (std::uint64_t i = 0; i < 5; ++i)
     if (!Same(all[i]->levels[0], NoisyFeatures(i)->levels[0])) return 1;
   return in_files == 2 ? 0 : 2;
 }
 
-TEST(ImageFiles, AFullDiskIsNoTrouble) {
+TEST(ImageFiles, ImagesStayInMemoryOnAFullDisk) {
   const TemporaryFolder folder;
   const pid_t child = fork();
   if (child == 0) _exit(FillADisk(folder.path().string()));
   int status = 0;
   ASSERT_EQ(waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status);
-  if (WEXITSTATUS(status) == kNoDisk) GTEST_SKIP() << "no disk of its own can be had here";
+  if (WEXITSTATUS(status) == kNoDisk) GTEST_SKIP() << "cannot mount a file system here";
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 

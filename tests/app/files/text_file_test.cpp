@@ -15,20 +15,20 @@ TEST(Seconds, AreExactToTheNanosecond) {
   EXPECT_EQ(ParseSeconds("1e-3"), Timestamp(1'000'000));
 }
 
-TEST(Seconds, ThatAreNoNumberAreRefused) {
+TEST(Seconds, AreRefusedWhenNotANumber) {
   for (const char* text : {"", "-", ".", "1.2.3", "1,5", "nan", "inf", "1e300", "12s", " 1"}) {
     EXPECT_FALSE(ParseSeconds(text)) << text;
   }
 }
 
-TEST(Seconds, ComeBackFromTheirText) {
+TEST(Seconds, AreReadBackEqual) {
   for (const std::int64_t count : {0LL, 1LL, -1LL, 999'999'999LL, 1403715273262142976LL, -1'500'000'000LL}) {
     EXPECT_EQ(ParseSeconds(FormatSeconds(Timestamp(count))), Timestamp(count))
         << FormatSeconds(Timestamp(count));
   }
 }
 
-TEST(ContentLines, KeepTheirNumbersAndLoseCommentsAndBlanks) {
+TEST(ContentLines, KeepTheirNumbersWithoutCommentsAndBlanks) {
   const auto lines = ContentLines("\xEF\xBB\xBF# head\r\n\r\n  a b # tail\r\nlast");
   ASSERT_EQ(lines.size(), 2u);
   EXPECT_EQ(lines[0].number, 3);

@@ -13,109 +13,109 @@
 namespace docent::app {
 namespace {
 
-class Thing : public WorkingSet::Member {
+class CountingMember : public WorkingSet::Member {
  public:
-  explicit Thing(std::size_t bytes = 10) : Member(bytes) {}
-  int rests() const { return rests_; }
+  explicit CountingMember(std::size_t bytes = 10) : Member(bytes) {}
+  int evictions() const { return evictions_; }
 
  protected:
-  void Rest() const override { ++rests_; }
+  void ReleaseMemory() const override { ++evictions_; }
 
  private:
-  mutable std::atomic<int> rests_{0};
+  mutable std::atomic<int> evictions_{0};
 };
 
-TEST(WorkingSet, AsManyAsFitStayAwake) {
+TEST(WorkingSet, MembersThatFitStayResident) {
   WorkingSet set(30);
-  const std::array<Thing, 3> things;
+  const std::array<CountingMember, 3> members;
   for (int round = 0; round < 5; ++round)
-    for (const Thing& thing : things) set.Look(thing);
-  for (const Thing& thing : things) EXPECT_EQ(thing.rests(), 0);
-  EXPECT_EQ(set.awake_bytes(), 30u);
+    for (const CountingMember& member : members) set.Touch(member);
+  for (const CountingMember& member : members) EXPECT_EQ(member.evictions(), 0);
+  EXPECT_EQ(set.resident_bytes(), 30u);
 }
 
-TEST(WorkingSet, TheEldestRestWhenOthersAreLookedAt) {
+TEST(WorkingSet, TheOldestAreEvictedWhenOthersAreUsed) {
   WorkingSet set(30);
-  const std::array<Thing, 5> things;
-  for (const Thing& thing : things) set.Look(thing);
-  EXPECT_EQ(things[0].rests(), 1);
-  EXPECT_EQ(things[1].rests(), 1);
-  for (std::size_t i = 2; i < things.size(); ++i) EXPECT_EQ(things[i].rests(), 0) << i;
-  EXPECT_EQ(set.awake_bytes(), 30u);
+  const std::array<CountingMember, 5> members;
+  for (const CountingMember& member : members) set.Touch(member);
+  EXPECT_EQ(members[0].evictions(), 1);
+  EXPECT_EQ(members[1].evictions(), 1);
+  for (std::size_t i = 2; i < members.size(); ++i) EXPECT_EQ(members[i].evictions(), 0) << i;
+  EXPECT_EQ(set.resident_bytes(), 30u);
 }
 
-TEST(WorkingSet, WhatIsLookedAtAgainAndAgainStaysAwakeHoweverManyOthersPass) {
+TEST(WorkingSet, AMemberInConstantUseStaysResident) {
   WorkingSet set(50);
-  const Thing at_work;
-  const std::array<Thing, 40> others;
+  const CountingMember at_work;
+  const std::array<CountingMember, 40> others;
   for (int round = 0; round < 3; ++round) {
-    for (const Thing& other : others) {
-      set.Look(at_work);
-      set.Look(other);
+    for (const CountingMember& other : others) {
+      set.Touch(at_work);
+      set.Touch(other);
     }
   }
-  EXPECT_EQ(at_work.rests(), 0);
-  for (const Thing& other : others) EXPECT_GE(other.rests(), 2);
+  EXPECT_EQ(at_work.evictions(), 0);
+  for (const CountingMember& other : others) EXPECT_GE(other.evictions(), 2);
 }
 
-TEST(WorkingSet, OneThatIsTooLargeIsAwakeAlone) {
+TEST(WorkingSet, AMemberLargerThanTheLimitIsResidentAlone) {
   WorkingSet set(30);
-  const Thing small, large(100);
-  set.Look(small);
-  set.Look(large);
-  EXPECT_EQ(small.rests(), 1);
-  EXPECT_EQ(large.rests(), 0);
-  set.Look(small);
-  EXPECT_EQ(large.rests(), 1);
-  EXPECT_EQ(set.awake_bytes(), 10u);
+  const CountingMember small, large(100);
+  set.Touch(small);
+  set.Touch(large);
+  EXPECT_EQ(small.evictions(), 1);
+  EXPECT_EQ(large.evictions(), 0);
+  set.Touch(small);
+  EXPECT_EQ(large.evictions(), 1);
+  EXPECT_EQ(set.resident_bytes(), 10u);
 }
 
-TEST(WorkingSet, AllRestWhenTheyAreToldTo) {
+TEST(WorkingSet, EvictAllEvictsAllResidentMembers) {
   WorkingSet set(100);
-  const std::array<Thing, 3> things;
-  set.Look(things[0]);
-  set.Look(things[1]);
+  const std::array<CountingMember, 3> members;
+  set.Touch(members[0]);
+  set.Touch(members[1]);
   set.EvictAll();
-  EXPECT_EQ(set.awake_bytes(), 0u);
-  EXPECT_EQ(things[0].rests(), 1);
-  EXPECT_EQ(things[1].rests(), 1);
-  EXPECT_EQ(things[2].rests(), 0);
-  set.Look(things[0]);
-  EXPECT_EQ(set.awake_bytes(), 10u);
+  EXPECT_EQ(set.resident_bytes(), 0u);
+  EXPECT_EQ(members[0].evictions(), 1);
+  EXPECT_EQ(members[1].evictions(), 1);
+  EXPECT_EQ(members[2].evictions(), 0);
+  set.Touch(members[0]);
+  EXPECT_EQ(set.resident_bytes(), 10u);
 }
 
-TEST(WorkingSet, NothingIsDoneToOneThatWasRemoved) {
+TEST(WorkingSet, ARemovedMemberIsNotAccessed) {
   WorkingSet set(30);
-  const std::array<Thing, 4> things;
+  const std::array<CountingMember, 4> members;
   {
-    const auto gone = std::make_unique<Thing>();
-    set.Look(*gone);
+    const auto gone = std::make_unique<CountingMember>();
+    set.Touch(*gone);
     set.Remove(*gone);
   }
-  EXPECT_EQ(set.awake_bytes(), 0u);
-  for (const Thing& thing : things) set.Look(thing);
-  set.Remove(things[0]);  // which rests already
-  EXPECT_EQ(set.awake_bytes(), 30u);
+  EXPECT_EQ(set.resident_bytes(), 0u);
+  for (const CountingMember& member : members) set.Touch(member);
+  set.Remove(members[0]);  // already evicted
+  EXPECT_EQ(set.resident_bytes(), 30u);
 }
 
-TEST(WorkingSet, ThreadsMayLookAtTheSameThings) {
+TEST(WorkingSet, ThreadsMayUseTheSameMembers) {
   WorkingSet set(40);
-  const std::array<Thing, 12> things;
+  const std::array<CountingMember, 12> members;
   {
     std::vector<std::jthread> threads;
     for (std::size_t k = 0; k < 3; ++k) {
       threads.emplace_back([&, k] {
-        for (std::size_t i = 0; i < 20000; ++i) set.Look(things[(i * (k + 1) + i / 7) % things.size()]);
+        for (std::size_t i = 0; i < 20000; ++i) set.Touch(members[(i * (k + 1) + i / 7) % members.size()]);
       });
     }
     threads.emplace_back([&] {
       for (int i = 0; i < 200; ++i) set.EvictAll();
     });
   }
-  EXPECT_LE(set.awake_bytes(), 40u);
+  EXPECT_LE(set.resident_bytes(), 40u);
   set.EvictAll();
-  for (const Thing& thing : things) set.Look(thing);
-  EXPECT_EQ(set.awake_bytes(), 40u);
+  for (const CountingMember& member : members) set.Touch(member);
+  EXPECT_EQ(set.resident_bytes(), 40u);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 namespace docent::app {
 namespace {
 
-// A camera at (1, 2, 3) in the map that looks along the map's x axis: turned by 90 degrees about y.
+// A camera at (1, 2, 3) in the map that looks along the map's x axis: rotated by 90 degrees about y.
 engine::TrackedFrame MakeFrame(engine::TrackingState state) {
   engine::TrackedFrame frame;
   frame.frame.time = std::chrono::milliseconds(12500);
@@ -25,17 +25,17 @@ engine::TrackedFrame MakeFrame(engine::TrackingState state) {
   return frame;
 }
 
-TEST(FramesFile, HasThePoseOfTheCameraInTheMap) {
+TEST(FramesFile, ContainsThePoseOfTheCameraInTheMap) {
   EXPECT_EQ(FormatFrameLine(MakeFrame(engine::TrackingState::kHybrid), "Desk 3"),
             "12.500000000,0,hybrid,Desk 3,120,7,0.75,3.25,1,2,3,0,0.707106781,0,0.707106781");
 }
 
-TEST(FramesFile, LeavesThePoseEmptyWhereThereIsNone) {
+TEST(FramesFile, LeavesMissingPosesEmpty) {
   EXPECT_EQ(FormatFrameLine(MakeFrame(engine::TrackingState::kLost), ""),
             "12.500000000,0,lost,,120,7,0.75,3.25,,,,,,,");
 }
 
-TEST(CsvFields, AreQuotedWhereTheyMust) {
+TEST(CsvFields, AreQuotedWhereNecessary) {
   EXPECT_EQ(CsvField("Desk 3"), "Desk 3");
   EXPECT_EQ(CsvField("a,b"), "\"a,b\"");
   EXPECT_EQ(CsvField("say \"x\"\n"), "\"say \"\"x\"\"\n\"");
@@ -64,10 +64,10 @@ TEST(RunOutput, WritesItsThreeFiles) {
             "timestamp,event,detail\n1.000000000,warning,\"slow, very\"\n");
 }
 
-TEST(RunOutput, IntoAFolderThatCannotBeMadeSaysSo) {
+TEST(RunOutput, ReportsAFolderThatCannotBeCreated) {
   const TemporaryFolder folder;
   folder.Write("file", "");
-  EXPECT_NE(ErrorOf([&] { RunOutput output(folder / "file/run"); }).find("Cannot make the folder"),
+  EXPECT_NE(ErrorOf([&] { RunOutput output(folder / "file/run"); }).find("Cannot create the folder"),
             std::string::npos);
 }
 

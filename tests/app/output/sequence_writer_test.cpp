@@ -13,7 +13,7 @@
 namespace docent::app {
 namespace {
 
-TEST(SequenceWriter, WritesWhatTheCamerasRead) {
+TEST(SequenceWriter, WritesASequenceThatCanBeRead) {
   const TemporaryFolder folder;
   const engine::CameraModel camera(engine::LensModel::kRadialTangential, {32, 24, 30, 30, 16, 12},
                                    {0.1, 0, 0, 0, 0});
@@ -41,7 +41,7 @@ TEST(SequenceWriter, WritesWhatTheCamerasRead) {
   EXPECT_EQ(ReadSegments(*source->info().segments_path).size(), 3u);
 }
 
-TEST(SequenceWriter, ThatIsNotClosedLeavesNoSequence) {
+TEST(SequenceWriter, LeavesNoSequenceWithoutClose) {
   const TemporaryFolder folder;
   { SequenceWriter(folder.path(), engine::CameraModel(), ImageFormat::kPng); }
   EXPECT_NE(ErrorOf([&] { OpenCamera(folder.path().string()); }), "");

@@ -47,7 +47,7 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
   EXPECT_EQ(commands[13].command, Command(UseMap{"Desk"}));
 }
 
-TEST(Script, ThatIsWrittenReadsBackEqual) {
+TEST(Script, IsReadBackEqualAfterWriting) {
   const std::vector<Command> commands = {
       NewMap{"stop"},
       NewMap{"a \"b\" \\ # c"},
@@ -79,7 +79,7 @@ TEST(Script, ThatIsWrittenReadsBackEqual) {
   }
 }
 
-TEST(Script, NamesTheLineOfWhatItCannotRead) {
+TEST(Script, NamesTheLineOfAnInvalidCommand) {
   const auto sentence = [](const std::string& line) {
     return ErrorOf([&] { ParseScript("0 save\n" + line + "\n", "'tour.txt'"); });
   };
@@ -121,7 +121,7 @@ TEST(Script, NamesTheLineOfWhatItCannotRead) {
   }
 }
 
-TEST(Script, WhoseTimesGoBackIsRefused) {
+TEST(Script, IsRefusedWhenTimesDecrease) {
   EXPECT_THAT(ErrorOf([] { ParseScript("2 save\n2 save\n1 save\n", "s"); }), HasSubstr("line 3"));
 }
 

@@ -18,8 +18,8 @@ using engine::CameraModel;
 using engine::LensModel;
 using ::testing::HasSubstr;
 
-// A frame of a camera that turns before a wall of points, found `outwards_px(radius)` farther from the middle
-// than they are expected, with noise.
+// Frames of a camera that rotates in front of a wall of points. Each point is found `outwards_px(radius)`
+// farther from the principal point than predicted, with noise.
 class Wall {
  public:
   explicit Wall(std::shared_ptr<const CameraModel> camera) : camera_(std::move(camera)) {
@@ -40,13 +40,13 @@ class Wall {
     frame.quality_class = engine::TrackingQuality::kGood;
     frame.map = map_;
     frame.camera_from_map.rotation = engine::Rotation3::Exp({0, turned_rad, 0});
-    const Eigen::Vector2d middle(camera_->intrinsics().cx, camera_->intrinsics().cy);
+    const Eigen::Vector2d center(camera_->intrinsics().cx, camera_->intrinsics().cy);
     for (const engine::MapPoint& point : map_->points) {
       const auto pixel = camera_->Project(frame.camera_from_map * point.position());
       if (!pixel || !camera_->IsInside(*pixel, 4)) continue;
-      const double radius = (*pixel - middle).norm();
+      const double radius = (*pixel - center).norm();
       const Eigen::Vector2d found =
-          *pixel + outwards_px(radius) / radius * (*pixel - middle) +
+          *pixel + outwards_px(radius) / radius * (*pixel - center) +
           noise_px * Eigen::Vector2d(random_.Uniform(-1, 1), random_.Uniform(-1, 1));
       frame.matches.push_back({point.id, found.cast<float>(), 0, true});
     }
@@ -64,51 +64,51 @@ std::shared_ptr<const CameraModel> Lens() {
 }
 
 TEST(CalibrationMonitor, MeasuresTheErrorOfEachRing) {
-  CalibrationMonitor watch(Lens());
+  CalibrationMonitor monitor(Lens());
   Wall wall(Lens());
   for (int i = 0; i < 400; ++i)
-    watch.Add(wall.Next([](double radius) { return radius < 200 ? -0.3 : 0.4; }, 0.3 * std::sin(i)));
-  EXPECT_NEAR(watch.profile()[1].mean_px, -0.3, 0.03);
-  EXPECT_NEAR(watch.profile()[4].mean_px, 0.4, 0.03);
-  EXPECT_GE(watch.profile()[1].samples, 90u);
-  EXPECT_LE(watch.profile()[1].samples, 134u) << "one frame in three is enough";
+    monitor.Add(wall.Next([](double radius) { return radius < 200 ? -0.3 : 0.4; }, 0.3 * std::sin(i)));
+  EXPECT_NEAR(monitor.profile()[1].mean_px, -0.3, 0.03);
+  EXPECT_NEAR(monitor.profile()[4].mean_px, 0.4, 0.03);
+  EXPECT_GE(monitor.profile()[1].samples, 90u);
+  EXPECT_LE(monitor.profile()[1].samples, 134u) << "one frame in three is sampled";
 }
 
-TEST(CalibrationMonitor, TellsOfAPatternOnceAndWhatToDo) {
-  CalibrationMonitor watch(Lens());
+TEST(CalibrationMonitor, WarnsOnceAboutAConsistentPatternAndSaysWhatToDo) {
+  CalibrationMonitor monitor(Lens());
   Wall wall(Lens());
-  int told = 0;
+  int warnings = 0;
   for (int i = 0; i < 800; ++i) {
-    watch.Add(wall.Next([](double radius) { return radius < 200 ? -0.5 : 0.6; }, 0.3 * std::sin(i)));
-    const auto warning = watch.TakeWarning();
+    monitor.Add(wall.Next([](double radius) { return radius < 200 ? -0.5 : 0.6; }, 0.3 * std::sin(i)));
+    const auto warning = monitor.TakeWarning();
     if (!warning) continue;
-    ++told;
+    ++warnings;
     EXPECT_THAT(*warning, HasSubstr("docent calibrate"));
   }
-  EXPECT_EQ(told, 1);
+  EXPECT_EQ(warnings, 1);
 }
 
-TEST(CalibrationMonitor, IsSilentAboutNoiseAndAboutErrorsThatChangeTheirSign) {
-  CalibrationMonitor watch(Lens());
+TEST(CalibrationMonitor, DoesNotWarnAboutNoiseOrErrorsOfAlternatingSign) {
+  CalibrationMonitor monitor(Lens());
   Wall wall(Lens());
   for (int i = 0; i < 800; ++i) {
     const double sign = i / 3 % 2 == 0 ? 1 : -1;
-    watch.Add(
+    monitor.Add(
         wall.Next([&](double radius) { return sign * (radius < 200 ? -1.0 : 1.0); }, 0.3 * std::sin(i), 2.5));
   }
-  EXPECT_FALSE(watch.TakeWarning());
+  EXPECT_FALSE(monitor.TakeWarning());
 }
 
-TEST(CalibrationMonitor, TakesNoImageOfACameraThatStandsStillTwice) {
-  CalibrationMonitor watch(Lens());
+TEST(CalibrationMonitor, SamplesAStationaryCameraOnlyOnce) {
+  CalibrationMonitor monitor(Lens());
   Wall wall(Lens());
-  for (int i = 0; i < 400; ++i) watch.Add(wall.Next([](double) { return 0.0; }, 0.001 * i / 400));
-  EXPECT_EQ(watch.profile()[2].samples, 1u);
+  for (int i = 0; i < 400; ++i) monitor.Add(wall.Next([](double) { return 0.0; }, 0.001 * i / 400));
+  EXPECT_EQ(monitor.profile()[2].samples, 1u);
 }
 
-// Walks about the simulated table through the scene's own lens, believing in another one; what the session
-// then says of the lens, until a while after it has said something.
-std::vector<std::string> WarningsWith(const CameraModel& believed) {
+// Runs the simulated walk around the table with an assumed camera model instead of the true one. Returns the
+// warnings about the calibration, up to two seconds after the first.
+std::vector<std::string> WarningsWith(const CameraModel& assumed) {
   SimulationOptions simulated;
   simulated.frame_rate_hz = 15;
   const auto simulation = MakeSimulation("hand", simulated);
@@ -116,7 +116,7 @@ std::vector<std::string> WarningsWith(const CameraModel& believed) {
   options.threaded = false;
   options.tracker.hybrid = true;
   options.first_map = "table";
-  Session session(options, {std::make_shared<CameraModel>(believed)}, nullptr);
+  Session session(options, {std::make_shared<CameraModel>(assumed)}, nullptr);
   std::vector<std::string> warnings;
   std::optional<Timestamp> enough;
   for (int i = 0; i < simulation->frame_count() && (!enough || simulation->time(i) < *enough); ++i) {
@@ -129,7 +129,7 @@ std::vector<std::string> WarningsWith(const CameraModel& believed) {
       if (event.event != "warning" || event.detail.find("calibration") == std::string::npos) continue;
       warnings.push_back(event.detail);
       enough = frame.time + std::chrono::seconds(2);
-      EXPECT_EQ(session.ShownWith(tracked).advice, event.detail) << "and on the screen";
+      EXPECT_EQ(session.ShownWith(tracked).advice, event.detail) << "must be shown on the screen too";
     }
   }
   return warnings;
@@ -139,11 +139,11 @@ CameraModel HandLens() {
   return MakeSimulation("hand")->camera();
 }
 
-TEST(CalibrationMonitor, IsSilentOverTheRightLens) {
+TEST(CalibrationMonitor, DoesNotWarnWithTheCorrectCalibration) {
   EXPECT_TRUE(WarningsWith(HandLens()).empty());
 }
 
-TEST(CalibrationMonitor, TellsOfAFocalLengthThatIsFivePercentOff) {
+TEST(CalibrationMonitor, WarnsAboutAFocalLengthThatIsFivePercentOff) {
   for (const double factor : {0.95, 1.05}) {
     const CameraModel right = HandLens();
     CameraModel::Intrinsics intrinsics = right.intrinsics();
@@ -153,7 +153,7 @@ TEST(CalibrationMonitor, TellsOfAFocalLengthThatIsFivePercentOff) {
   }
 }
 
-TEST(CalibrationMonitor, TellsOfADistortionThatWasLeftOut) {
+TEST(CalibrationMonitor, WarnsAboutMissingDistortion) {
   const CameraModel right = HandLens();
   EXPECT_EQ(WarningsWith({LensModel::kRadialTangential, right.intrinsics(), {}}).size(), 1u);
 }

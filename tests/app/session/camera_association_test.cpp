@@ -9,82 +9,82 @@ namespace {
 constexpr std::size_t kHand = 0, kShoulder = 1;
 constexpr std::uint64_t kEverywhere = 0;
 
-// The story of ptamm Fig. 7, step by step.
+// The example of ptamm Fig. 7, step by step.
 TEST(Association, KeepsTwoCamerasInOneMapAndMovesThemTogether) {
   CameraAssociation cameras(2);
   EXPECT_EQ(cameras.SearchedMap(), kEverywhere);
 
   // (a) Both are tracked in map 1.
-  EXPECT_TRUE(cameras.Tracked(kHand, 1));
+  EXPECT_TRUE(cameras.SetTracked(kHand, 1));
   EXPECT_EQ(cameras.SearchedMap(), 1u);
-  EXPECT_TRUE(cameras.Tracked(kShoulder, 1));
+  EXPECT_TRUE(cameras.SetTracked(kShoulder, 1));
 
-  // (b) The shoulder camera is lost and looks at map 2, but may be found in map 1 alone: it stays lost.
-  cameras.Lost(kShoulder);
+  // (b) The shoulder camera is lost and sees map 2, but may relocalize in map 1 only: it stays lost.
+  cameras.SetLost(kShoulder);
   EXPECT_EQ(cameras.SearchedMap(), 1u);
-  EXPECT_FALSE(cameras.Tracked(kShoulder, 2));
+  EXPECT_FALSE(cameras.SetTracked(kShoulder, 2));
   EXPECT_FALSE(cameras.IsTracked(kShoulder));
-  EXPECT_TRUE(cameras.Tracked(kHand, 1));
+  EXPECT_TRUE(cameras.SetTracked(kHand, 1));
   EXPECT_EQ(cameras.map(), 1u);
 
-  // (c) Now both are lost, and both search everything.
-  cameras.Lost(kHand);
+  // (c) Now both are lost, and both search all maps.
+  cameras.SetLost(kHand);
   EXPECT_FALSE(cameras.AnyTracked());
   EXPECT_EQ(cameras.SearchedMap(), kEverywhere);
 
-  // (d) The shoulder camera is the first to be found, in map 2: the hand-held one gives its search up.
-  EXPECT_TRUE(cameras.Tracked(kShoulder, 2));
+  // (d) The shoulder camera relocalizes first, in map 2: the hand-held one abandons its search.
+  EXPECT_TRUE(cameras.SetTracked(kShoulder, 2));
   EXPECT_EQ(cameras.map(), 2u);
   EXPECT_EQ(cameras.SearchedMap(), 2u);
 
-  // (e) It is found in the recovered map, and they go on together.
-  EXPECT_TRUE(cameras.Tracked(kHand, 2));
+  // (e) The hand-held one relocalizes in map 2 too, and both continue together.
+  EXPECT_TRUE(cameras.SetTracked(kHand, 2));
   EXPECT_TRUE(cameras.IsTracked(kHand) && cameras.IsTracked(kShoulder));
 }
 
-TEST(Association, LetsACameraThatIsTrackedAloneLeaveForAMapThatFitsBetter) {
+TEST(Association, LetsTheOnlyTrackedCameraEnterABetterMap) {
   CameraAssociation cameras(2);
-  EXPECT_TRUE(cameras.Tracked(kHand, 1));
+  EXPECT_TRUE(cameras.SetTracked(kHand, 1));
   EXPECT_EQ(cameras.SearchedMap(kHand), kEverywhere);
   EXPECT_EQ(cameras.SearchedMap(kShoulder), 1u);
-  EXPECT_TRUE(cameras.Tracked(kHand, 2));
+  EXPECT_TRUE(cameras.SetTracked(kHand, 2));
   EXPECT_EQ(cameras.map(), 2u);
-  EXPECT_TRUE(cameras.Tracked(kShoulder, 2));
+  EXPECT_TRUE(cameras.SetTracked(kShoulder, 2));
   EXPECT_EQ(cameras.SearchedMap(kHand), 2u);
-  EXPECT_FALSE(cameras.Tracked(kHand, 1)) << "the other one holds it";
+  EXPECT_FALSE(cameras.SetTracked(kHand, 1)) << "the other camera is tracked in map 2";
 }
 
-TEST(Association, BelievesTheFirstOfTwoThatAreFoundAtTheSameMoment) {
+TEST(Association, AcceptsTheFirstOfTwoCamerasThatRelocalizeAtTheSameTime) {
   CameraAssociation cameras(2);
-  EXPECT_TRUE(cameras.Tracked(kShoulder, 3));
-  EXPECT_FALSE(cameras.Tracked(kHand, 5));
+  EXPECT_TRUE(cameras.SetTracked(kShoulder, 3));
+  EXPECT_FALSE(cameras.SetTracked(kHand, 5));
   EXPECT_EQ(cameras.SearchedMap(), 3u);
-  EXPECT_TRUE(cameras.Tracked(kHand, 3));
+  EXPECT_TRUE(cameras.SetTracked(kHand, 3));
 }
 
-TEST(Association, HoldsAllCamerasAtAMapThatBegins) {
+TEST(Association, KeepsAllCamerasInANewMap) {
   CameraAssociation cameras(2);
-  EXPECT_TRUE(cameras.Tracked(kHand, 1));
-  EXPECT_TRUE(cameras.Tracked(kShoulder, 1));
+  EXPECT_TRUE(cameras.SetTracked(kHand, 1));
+  EXPECT_TRUE(cameras.SetTracked(kShoulder, 1));
   cameras.Begin(2);
   EXPECT_FALSE(cameras.AnyTracked());
   EXPECT_EQ(cameras.SearchedMap(), 2u);
-  EXPECT_FALSE(cameras.Tracked(kShoulder, 1));  // it still sees the old map
-  EXPECT_TRUE(cameras.Tracked(kHand, 2));
-  cameras.Lost(kHand);  // once somebody was in it, the usual rules hold
+  EXPECT_FALSE(cameras.SetTracked(kShoulder, 1));  // it still sees the old map
+  EXPECT_TRUE(cameras.SetTracked(kHand, 2));
+  cameras.SetLost(kHand);  // once a camera was tracked in the new map, the usual rules apply
   EXPECT_EQ(cameras.SearchedMap(), kEverywhere);
 }
 
-TEST(Association, LetsACameraThatIsAloneGoWhereItLikes) {
+TEST(Association, LetsASingleCameraEnterAnyMap) {
   CameraAssociation camera(1);
-  EXPECT_TRUE(camera.Tracked(0, 1));
-  EXPECT_TRUE(camera.Tracked(0, 2));
+  EXPECT_TRUE(camera.SetTracked(0, 1));
+  EXPECT_TRUE(camera.SetTracked(0, 2));
   EXPECT_EQ(camera.map(), 2u);
 }
 
-TEST(Association, IsForgottenWhenTheMapIsLeft) {
+TEST(Association, IsResetWhenTheMapIsLeft) {
   CameraAssociation cameras(2);
-  EXPECT_TRUE(cameras.Tracked(kHand, 1));
+  EXPECT_TRUE(cameras.SetTracked(kHand, 1));
   cameras.Release();
   EXPECT_EQ(cameras.SearchedMap(), kEverywhere);
   EXPECT_EQ(cameras.map(), 0u);

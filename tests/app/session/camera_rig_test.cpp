@@ -25,7 +25,7 @@ Eigen::Vector3d NormalVector(Random* random, double sigma) {
   return sigma * Eigen::Vector3d(Normal(random), Normal(random), Normal(random));
 }
 
-// A head that looks about while it walks: the first camera's pose.
+// The pose of the first camera, on a head that looks around while walking.
 Rigid3 FirstFromMap(double seconds) {
   const Rotation3 look =
       Rotation3::Exp({0.1 * std::sin(1.3 * seconds), 0.5 * std::sin(0.9 * seconds), 0.05 * seconds});
@@ -37,15 +37,15 @@ const Rigid3 kTruth(Rotation3::Exp({0.05, 0.3, -0.1}), {0.2, 0.13, -0.05});
 const double kBaseline = kTruth.translation.norm();
 
 struct Errors {
-  double baseline = 0, turn_deg = 0;  // baseline: part of the true one
+  double baseline = 0, turn_deg = 0;  // baseline: relative error
 };
 Errors Compare(const RigEstimate& estimate) {
   return {std::abs(estimate.Baseline() / kBaseline - 1),
           (estimate.second_from_first.rotation.inverse() * kTruth.rotation).Angle() / kDegree};
 }
 
-// Two cameras at 30 and 25 frames a second, each pose with the noise of a tracker, one in ten far off.
-// arm: relative motion of the second camera, by time.
+// Two cameras at 30 and 25 frames per second. Each pose has the noise of a tracker, one in ten is an outlier.
+// arm: motion of the second camera relative to the rig, by time.
 CameraRig Watch(double seconds, const std::function<Rigid3(double)>& arm, std::uint64_t map_key = 1) {
   CameraRig rig;
   Random random(5);
@@ -63,7 +63,7 @@ CameraRig Watch(double seconds, const std::function<Rigid3(double)>& arm, std::u
   return rig;
 }
 
-TEST(RelativePose, IsFoundThoughATenthOfTheSamplesIsFarOff) {
+TEST(RelativePose, IsCorrectWithTenPercentOutliers) {
   Random random(3);
   std::vector<Rigid3> samples;
   for (int i = 0; i < 300; ++i) {
@@ -74,29 +74,29 @@ TEST(RelativePose, IsFoundThoughATenthOfTheSamplesIsFarOff) {
   const RigEstimate estimate = RobustRelativePose(samples);
   EXPECT_LT(Compare(estimate).baseline, 0.01);
   EXPECT_LT(Compare(estimate).turn_deg, 0.05);
-  // The spread is that of the good samples.
-  EXPECT_NEAR(estimate.position_spread, 0.004, 0.001);
-  EXPECT_NEAR(estimate.turn_spread_deg, 0.2, 0.05);
+  // The sigma is that of the inliers.
+  EXPECT_NEAR(estimate.position_sigma, 0.004, 0.001);
+  EXPECT_NEAR(estimate.rotation_sigma_deg, 0.2, 0.05);
 }
 
-TEST(Rig, ThatIsRigidIsRecognisedFromCamerasThatDoNotExposeTogether) {
+TEST(Rig, IsRecognisedAsRigidFromUnsynchronizedCameras) {
   const CameraRig rig = Watch(8, [](double) { return Rigid3(); });
   ASSERT_TRUE(rig.estimate());
-  EXPECT_TRUE(rig.estimate()->rigid) << rig.estimate()->Words();
+  EXPECT_TRUE(rig.estimate()->rigid) << rig.estimate()->ToString();
   EXPECT_LT(Compare(*rig.estimate()).baseline, 0.01);
   EXPECT_LT(Compare(*rig.estimate()).turn_deg, 0.3);
 }
 
-TEST(Rig, OfAnArmThatMovesStaysFree) {
+TEST(Rig, IsNotRigidWhenTheCamerasMoveRelativeToEachOther) {
   const CameraRig rig = Watch(8, [](double time) {
     return Rigid3(Rotation3::Exp({0, 0.3 * std::sin(time), 0}), {0.1 * std::sin(1.7 * time), 0, 0});
   });
   ASSERT_TRUE(rig.estimate());
-  EXPECT_FALSE(rig.estimate()->rigid) << rig.estimate()->Words();
+  EXPECT_FALSE(rig.estimate()->rigid) << rig.estimate()->ToString();
   EXPECT_FALSE(rig.Predict(1, FromSeconds(8), 1));
 }
 
-TEST(Rig, ThatOnlyStoodStillIsNotCalledRigid) {
+TEST(Rig, IsNotRigidWhenTheCamerasOnlyStoodStill) {
   CameraRig rig;
   for (int i = 0; i < 300; ++i) {
     rig.Add(0, std::chrono::milliseconds(33 * i), 1, Rigid3());
@@ -115,11 +115,11 @@ TEST(Rig, PredictsEitherCameraFromTheOther) {
   ASSERT_TRUE(second && first);
   EXPECT_TRUE(IsNear(*second, kTruth * FirstFromMap(8), 0.01 * kBaseline, 0.3 * kDegree));
   EXPECT_TRUE(IsNear(*first, FirstFromMap(8), 0.01 * kBaseline, 0.3 * kDegree));
-  EXPECT_FALSE(rig.Predict(1, FromSeconds(9), 1)) << "from a pose that is a second old";
-  EXPECT_FALSE(rig.Predict(1, FromSeconds(8), 2)) << "in another map";
+  EXPECT_FALSE(rig.Predict(1, FromSeconds(9), 1)) << "the pose is a second old";
+  EXPECT_FALSE(rig.Predict(1, FromSeconds(8), 2)) << "the pose is in another map";
 }
 
-TEST(Rig, BeginsAnewInAnotherMapBecauseItsScaleIsAnother) {
+TEST(Rig, IsEstimatedAgainInAMapOfAnotherScale) {
   CameraRig rig = Watch(8, [](double) { return Rigid3(); });
   rig.Add(0, FromSeconds(9), 2, Rigid3());
   EXPECT_FALSE(rig.estimate());

@@ -61,10 +61,10 @@ SessionMap MapWithContent() {
   return map;
 }
 
-TEST(ContentFollower, TakesContentWhereItsGroundGoes) {
+TEST(ContentFollower, MovesContentWithItsAnchor) {
   SessionMap map = MapWithContent();
   const content::Scene before = *map.scene;
-  map.Grow(Moved(*map.snapshot, Bend()));
+  map.UpdateSnapshot(Moved(*map.snapshot, Bend()));
   const Sim3 model = map.scene->Find("fox")->model.map_from_model;
   const Sim3 wanted = Bend() * before.Find("fox")->model.map_from_model;
   EXPECT_LT((model.translation - wanted.translation).norm(), 1e-9);
@@ -75,47 +75,47 @@ TEST(ContentFollower, TakesContentWhereItsGroundGoes) {
   EXPECT_NEAR(sign.height_m, 0.95 * 0.2, 1e-9);
 }
 
-TEST(ContentFollower, LeavesTheSceneAloneWhileNothingMoves) {
+TEST(ContentFollower, KeepsTheSceneWhileNothingMoves) {
   SessionMap map = MapWithContent();
   const auto scene = map.scene;
-  map.Grow(std::make_shared<MapSnapshot>(*map.snapshot));
-  EXPECT_EQ(map.scene, scene) << "or it would be saved anew with every keyframe";
+  map.UpdateSnapshot(std::make_shared<MapSnapshot>(*map.snapshot));
+  EXPECT_EQ(map.scene, scene) << "otherwise it would be saved again with every keyframe";
 }
 
-// A thousand adjustments that each shake every point, about where it belongs.
-TEST(ContentFollower, AddsUpNoErrorsOfManyAdjustments) {
+// A thousand adjustments, each of which moves every point randomly about its true position.
+TEST(ContentFollower, DoesNotAccumulateErrorsOverManyAdjustments) {
   SessionMap map = MapWithContent();
   const auto truth = map.snapshot;
   const Eigen::Vector3d placed = content::PlaceOf(*map.scene->Find("fox"));
   double farthest = 0;
   for (std::uint64_t i = 1; i <= 1000; ++i) {
-    map.Grow(Moved(*truth, Sim3(), 0.01, i));
+    map.UpdateSnapshot(Moved(*truth, Sim3(), 0.01, i));
     farthest = std::max(farthest, (content::PlaceOf(*map.scene->Find("fox")) - placed).norm());
   }
-  EXPECT_LT(farthest, 0.004) << "150 points with an error of a centimetre";
-  map.Grow(truth);
+  EXPECT_LT(farthest, 0.004) << "anchored to 150 points with an error of 0.01 map units each";
+  map.UpdateSnapshot(truth);
   EXPECT_LT((content::PlaceOf(*map.scene->Find("fox")) - placed).norm(), 1e-9);
 }
 
-TEST(ContentFollower, LetsAnEditPutContentElsewhereAndTakesItAlongFromThere) {
+TEST(ContentFollower, FollowsContentFromItsNewPlaceAfterAnEdit) {
   SessionMap map = MapWithContent();
-  map.Grow(Moved(*map.snapshot, Bend()));
+  map.UpdateSnapshot(Moved(*map.snapshot, Bend()));
   auto scene = std::make_shared<content::Scene>(*map.scene);
   map.history.Do(content::MoveEdit("fox", {-0.5, 0.4, 2.6}), scene.get());
   map.scene = scene;
-  map.Grow(Moved(*map.snapshot, Bend()));
+  map.UpdateSnapshot(Moved(*map.snapshot, Bend()));
   EXPECT_LT((content::PlaceOf(*map.scene->Find("fox")) - Bend() * Eigen::Vector3d(-0.5, 0.4, 2.6)).norm(),
             1e-9);
   scene = std::make_shared<content::Scene>(*map.scene);
   ASSERT_TRUE(map.history.Undo(scene.get()));
   const Eigen::Vector3d wanted = Bend() * (Bend() * Eigen::Vector3d(0.2, 0.1, 2.8));
   EXPECT_LT((content::PlaceOf(*scene->Find("fox")) - wanted).norm(), 1e-9)
-      << "taken back to where it would be by now";
+      << "undo returns it to its first place, moved by both adjustments";
 }
 
-// Where a loop is closed one part of the map moves by several percent while another stays, and a good part of
-// the points is found to have been known before and goes.
-TEST(ContentFollower, GoesAlongWhenALoopIsClosed) {
+// Loop closing moves one part of the map by several percent while another stays, and removes a large part of
+// the points as duplicates.
+TEST(ContentFollower, FollowsTheMapWhenALoopIsClosed) {
   auto snapshot = Cloud();
   for (const engine::MapPoint& point : std::vector(snapshot->points)) {
     engine::MapPoint& other = snapshot->points.emplace_back(point);
@@ -138,24 +138,24 @@ TEST(ContentFollower, GoesAlongWhenALoopIsClosed) {
   engine::Map closed(*snapshot);
   closed.Correct({{1, Bend()}});
   for (engine::MapPointId id = 401; id <= 800; id += 2) closed.RemovePoint(id);
-  map.Grow(closed.Snapshot());
+  map.UpdateSnapshot(closed.Snapshot());
   const Eigen::Vector3d wanted = Bend() * scene.entities[0].model.map_from_model.translation;
   EXPECT_GT((wanted - content::PlaceOf(scene.entities[0])).norm(), 0.2);
   EXPECT_LT((content::PlaceOf(*map.scene->Find("fox")) - wanted).norm(), 1e-3);
   EXPECT_NEAR(map.scene->Find("fox")->model.map_from_model.scale, 0.95 * 0.3, 1e-3);
   EXPECT_LT((content::PlaceOf(*map.scene->Find("sign-1")) - content::PlaceOf(scene.entities[1])).norm(), 1e-3)
-      << "it stands in the part that stays";
+      << "it is in the part that does not move";
 }
 
-TEST(ContentFollower, KeepsContentWhenThePointsAboutItAreGone) {
+TEST(ContentFollower, KeepsContentInPlaceWhenItsAnchorPointsAreRemoved) {
   SessionMap map = MapWithContent();
   const content::Scene before = *map.scene;
   auto other = Moved(*map.snapshot, Bend());
   for (engine::MapPoint& point : other->points) point.id += 1000;
-  map.Grow(other);
+  map.UpdateSnapshot(other);
   EXPECT_EQ(content::PlaceOf(*map.scene->Find("fox")), content::PlaceOf(*before.Find("fox")));
-  // From now on these are its ground.
-  map.Grow(Moved(*other, Bend()));
+  // From now on these points are its anchor.
+  map.UpdateSnapshot(Moved(*other, Bend()));
   EXPECT_LT(
       (content::PlaceOf(*map.scene->Find("fox")) - Bend() * content::PlaceOf(*before.Find("fox"))).norm(),
       1e-9);

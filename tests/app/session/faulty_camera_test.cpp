@@ -5,7 +5,7 @@
 
 #include "tests/app/support/faulty_camera.h"
 
-// What must hold for every camera, however faulty: a map that it starts agrees with the world.
+// Must hold for every camera, however faulty: a map that it initializes agrees with the ground truth.
 namespace docent::app {
 namespace {
 
@@ -16,7 +16,7 @@ INSTANTIATE_TEST_SUITE_P(Session, FaultyCamera, ::testing::Values("room", "museu
                            return name.substr(0, name.find(':'));
                          });
 
-TEST_P(FaultyCamera, StartsAMapThatAgreesWithTheTruth) {
+TEST_P(FaultyCamera, InitializesAMapThatAgreesWithTheTruth) {
   for (const std::uint64_t seed : {1, 2}) {
     const auto simulation = faulty_camera::Sequence(GetParam(), seed, 4);
     SessionOptions options = simulated_session::Options(Pace::kLockstep, "map");

@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::ElementsAre;
 
-// A live source of black images; an entry without an image is a moment of trouble.
+// A live source of black images; an entry with a trouble sentence has no image.
 class ScriptedSource : public FrameSource {
  public:
   struct Entry {
@@ -66,7 +66,7 @@ Played Play(std::vector<ScriptedSource::Entry> entries) {
 
 constexpr auto kLost = engine::TrackingState::kLost, kDropped = engine::TrackingState::kDropped;
 
-TEST(FrameLoop, HandsOnWhatALiveSourceLostAsDropped) {
+TEST(FrameLoop, ReportsImagesThatALiveSourceLostAsDropped) {
   const Played played = Play({{4, Timestamp(100), ""}, {5, Timestamp(200), ""}, {8, Timestamp(500), ""}});
   EXPECT_THAT(played.frames,
               ElementsAre(std::pair(4ul, kLost), std::pair(5ul, kLost), std::pair(6ul, kDropped),
@@ -75,7 +75,7 @@ TEST(FrameLoop, HandsOnWhatALiveSourceLostAsDropped) {
               ElementsAre(Timestamp(100), Timestamp(200), Timestamp(300), Timestamp(400), Timestamp(500)));
 }
 
-TEST(FrameLoop, TellsOfTroubleOnceAndOfItsEndAndGoesOn) {
+TEST(FrameLoop, ReportsTroubleOnceAndItsEndAndContinues) {
   const Played played = Play({{0, Timestamp(100), ""},
                               {1, Timestamp(200), "It was unplugged."},
                               {1, Timestamp(300), "It was unplugged."},
@@ -84,7 +84,7 @@ TEST(FrameLoop, TellsOfTroubleOnceAndOfItsEndAndGoesOn) {
   EXPECT_THAT(played.frames, ElementsAre(std::pair(0ul, kLost), std::pair(1ul, kLost)));
 }
 
-// Time that passes only when somebody says so.
+// A clock that advances only when the test says so.
 class SteppedClock : public PlayClock {
  public:
   Timestamp Now() override { return now_; }
@@ -95,7 +95,7 @@ class SteppedClock : public PlayClock {
   Timestamp now_ = std::chrono::hours(5);
 };
 
-// A recording of black images, ten a second.
+// A recording of black images, ten per second.
 class Recording : public FrameSource {
  public:
   explicit Recording(std::uint64_t images) : images_(images) {
@@ -116,7 +116,7 @@ class Recording : public FrameSource {
   std::uint64_t next_ = 0;
 };
 
-TEST(FrameLoop, DropsAndCountsWhatIsOvertakenInRealtimeAndNeverQueuesIt) {
+TEST(FrameLoop, DropsLateImagesInRealtimeInsteadOfQueueingThem) {
   constexpr std::uint64_t kImages = 40;
   CalibratedCamera camera = Calibrate(std::make_unique<Recording>(kImages), std::nullopt);
   SessionOptions options;
@@ -134,25 +134,27 @@ TEST(FrameLoop, DropsAndCountsWhatIsOvertakenInRealtimeAndNeverQueuesIt) {
               all.push_back(frame.frame.index);
               if (frame.state == kDropped) return dropped.push_back(frame.frame.index);
               tracked.push_back(frame.frame.index);
-              // Whoever looks on takes two and a half images' time for the first twenty, then next to none.
+              // The callback takes two and a half frame periods for the first twenty images, then almost no
+              // time.
               clock.Pass(std::chrono::milliseconds(frame.frame.index < 20 ? 250 : 1));
             },
             {});
-  ASSERT_EQ(all.size(), kImages) << "each is told of, once";
-  for (std::uint64_t i = 0; i < kImages; ++i) EXPECT_EQ(all[i], i) << "and in its order";
-  // By hand: 0 ends at 250 ms, when the successor of 1 is due and that of 2 is not.
+  ASSERT_EQ(all.size(), kImages) << "every image is reported once";
+  for (std::uint64_t i = 0; i < kImages; ++i) EXPECT_EQ(all[i], i) << "images are reported in order";
+  // By hand: image 0 ends at 250 ms, when the successor of image 1 is due and that of image 2 is not.
   EXPECT_THAT(std::vector(tracked.begin(), tracked.begin() + 4), ElementsAre(0u, 2u, 4u, 7u));
   EXPECT_EQ(dropped.size(), 13u);
-  for (const std::uint64_t index : dropped) EXPECT_LT(index, 23u) << "nothing is left over from the bad time";
+  for (const std::uint64_t index : dropped)
+    EXPECT_LT(index, 23u) << "no image is dropped after the slow period";
   ASSERT_EQ(latencies.size(), tracked.size());
   for (const Timestamp latency : latencies) {
     EXPECT_GE(latency, Timestamp{});
-    EXPECT_LE(latency, std::chrono::milliseconds(100)) << "what is tracked is the newest image there is";
+    EXPECT_LE(latency, std::chrono::milliseconds(100)) << "the tracked image is the newest one";
   }
   EXPECT_EQ(latencies.back(), Timestamp{});
 }
 
-// Every image takes its time to make; what comes too late need not be made.
+// Every image takes time to produce; late images need not be produced.
 class SlowRecording : public Recording {
  public:
   SlowRecording(std::uint64_t images, SteppedClock* clock) : Recording(images), clock_(clock) {}
@@ -170,7 +172,7 @@ class SlowRecording : public Recording {
   SteppedClock* const clock_;
 };
 
-TEST(FrameLoop, TracksWhatItCanInRealtimeOfImagesThatAreSlowToMake) {
+TEST(FrameLoop, TracksAsManySlowlyRenderedImagesAsPossibleInRealtime) {
   SteppedClock clock;
   CalibratedCamera camera = Calibrate(std::make_unique<SlowRecording>(30, &clock), std::nullopt);
   SessionOptions options;
@@ -190,11 +192,11 @@ TEST(FrameLoop, TracksWhatItCanInRealtimeOfImagesThatAreSlowToMake) {
             {});
   ASSERT_EQ(all.size(), 30u);
   for (std::uint64_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i], i);
-  EXPECT_GE(tracked.size(), 11u) << "one image can be made in the time of two and a half";
-  EXPECT_LE(oldest, std::chrono::milliseconds(350)) << "by making it, and by less than one image";
+  EXPECT_GE(tracked.size(), 11u) << "rendering one image takes two and a half frame periods";
+  EXPECT_LE(oldest, std::chrono::milliseconds(350)) << "rendering time plus less than one frame period";
 }
 
-TEST(FrameLoop, TellsTheAgeOfALiveImageByItsOwnStamp) {
+TEST(FrameLoop, ReportsTheAgeOfALiveImageFromItsTimestamp) {
   SteppedClock clock;
   const Timestamp taken = clock.Now() - std::chrono::milliseconds(30);
   CalibratedCamera camera = Calibrate(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera on a shoulder that can turn its head, in the simulated room: real images, the real tracker.
+// A pan-tilt camera on a shoulder in the simulated room: rendered images and the real tracker.
 #include "app/session/head_search.h"
 
 #include <gmock/gmock.h>
@@ -25,7 +25,7 @@ using engine::Rotation3;
 
 constexpr double kDegree = std::numbers::pi / 180, kFramesPerSecond = 10;
 
-// The room with a map of its table, made by a walk before it, and a camera that turns.
+// The room with a map of its table, made by a walk, and a camera that can be pointed anywhere.
 class Room {
  public:
   Room() {
@@ -48,7 +48,7 @@ class Room {
 
   const std::shared_ptr<const engine::MapSnapshot>& map() const { return map_; }
   const std::shared_ptr<const engine::CameraModel>& camera() const { return camera_; }
-  // Where the walk began, looking straight ahead: level, and as far to the side as the walker.
+  // The carrier at the start of the walk, looking straight ahead: level, with the heading of the camera.
   Rigid3 world_from_carrier() const {
     const Rigid3 pose = world_->world_from_camera(0);
     const Eigen::Vector3d ahead = pose.rotation * Eigen::Vector3d::UnitZ();
@@ -68,7 +68,7 @@ class Room {
     tracker.SetMap(map_, kKey);
     return tracker;
   }
-  // As the tracker says it, from images of the table.
+  // As estimated by the tracker from images of the table.
   std::optional<Rigid3> CarrierFromMap() const {
     engine::Tracker tracker = NewTracker(1);
     const Rigid3 camera_from_carrier = world_->world_from_camera(0).inverse() * world_from_carrier();
@@ -94,7 +94,7 @@ const Room& TheRoom() {
   return room;
 }
 
-// To the nearer end, to the other end, then the next row, and so on for ever: level, downwards, upwards.
+// Sweeps to the nearer end, to the other end, then along the next row, and so on: level, downwards, upwards.
 class BlindSweep {
  public:
   BlindSweep(const PanTiltRange& range, const PanTilt& start)
@@ -104,7 +104,7 @@ class BlindSweep {
     if (std::abs(at.pan_rad - end) < 1e-6 && std::abs(at.tilt_rad - tilt_) < 1e-6) {
       right_ = !right_;
       constexpr double kRows[] = {0, -30 * kDegree, 28 * kDegree};
-      // The first row is gone through both ways, because it was begun in its middle.
+      // The first row is swept both ways, because the sweep begins inside it.
       if (++ends_ > 1) tilt_ = kRows[static_cast<std::size_t>(ends_ - 2) % 3];
       return {at.pan_rad, tilt_};
     }
@@ -118,20 +118,20 @@ class BlindSweep {
   int ends_ = 0;
 };
 
-// How the person stands after the loss, and where the head looked.
+// The carrier's pose after the loss, and the direction of the head.
 struct Loss {
   Rigid3 world_from_carrier;
   PanTilt at;
 };
 
-// Seconds until the tracker knows where it is; a minute when it never does.
+// Seconds until the tracker relocalizes; 60 when it never does.
 template <typename Next, typename AddEmptyView>
 double Find(const Room& room, const Loss& loss, std::uint64_t seed, const Next& next,
-            const AddEmptyView& saw_nothing) {
+            const AddEmptyView& not_recognised) {
   engine::Tracker tracker = room.NewTracker(seed);
   HeadMotion motion(SimulatedHead::Range());
   motion.LookAt(loss.at, {});
-  constexpr Timestamp kStart = std::chrono::seconds(10);  // the head is there by then
+  constexpr Timestamp kStart = std::chrono::seconds(10);  // the head has arrived by then
   constexpr int kMost = 600;
   for (int i = 0; i < kMost; ++i) {
     const Timestamp now = kStart + FromSeconds(i / kFramesPerSecond);
@@ -140,7 +140,7 @@ double Find(const Room& room, const Loss& loss, std::uint64_t seed, const Next& 
     engine::Frame frame = room.Image(loss.world_from_carrier * turn, i);
     frame.time = now;
     if (engine::HasPose(tracker.Track(frame, &room.index()).state)) return i / kFramesPerSecond;
-    saw_nothing(at);
+    not_recognised(at);
     motion.LookAt(next(at), now);
   }
   return kMost / kFramesPerSecond;
@@ -152,7 +152,7 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-TEST(HeadSearch, LooksFirstWhereTheMapWasAndThenElsewhere) {
+TEST(HeadSearch, LooksFirstWhereTheMapWasExpectedAndThenElsewhere) {
   const Room& room = TheRoom();
   const auto carrier_from_map = room.CarrierFromMap();
   ASSERT_TRUE(carrier_from_map);
@@ -160,11 +160,11 @@ TEST(HeadSearch, LooksFirstWhereTheMapWasAndThenElsewhere) {
   const PanTilt best = search.Best();
   EXPECT_LT(std::abs(best.pan_rad), 30 * kDegree);  // the walk looked straight ahead,
   EXPECT_LT(best.tilt_rad, 0);                      // down at the table
-  EXPECT_GT(search.Odds(best), 0.2);
-  EXPECT_LT(search.Odds({150 * kDegree, 0}), 0.05);
+  EXPECT_GT(search.RecognitionProbability(best), 0.2);
+  EXPECT_LT(search.RecognitionProbability({150 * kDegree, 0}), 0.05);
   const PanTilt first = search.Next({100 * kDegree, 0});
   EXPECT_LT(std::abs(first.pan_rad - best.pan_rad), 50 * kDegree);
-  // What was seen in vain is left.
+  // Directions without recognition are left.
   PanTilt at = first;
   double farthest = 0;
   for (int i = 0; i < 60; ++i) {
@@ -184,7 +184,7 @@ TEST(HeadSearch, FindsTheMapInHalfTheTimeOfABlindSweep) {
   Random random(77);
   std::vector<double> searched, swept, ratios;
   for (int i = 0; i < losses; ++i) {
-    // The person turned, by half a radian or so and now and then by anything, and took half a step.
+    // The user rotated by about half a radian, sometimes by any angle, and took half a step.
     const double much = random.Uniform(-1, 1) + random.Uniform(-1, 1) + random.Uniform(-1, 1);
     const double turned = random.Uniform() < 0.1 ? random.Uniform(-2.4, 2.4) : 0.5 * much;
     const Rigid3 body(Rotation3::Exp({0, turned, 0}),
@@ -210,7 +210,7 @@ TEST(HeadSearch, FindsTheMapInHalfTheTimeOfABlindSweep) {
   EXPECT_LE(Median(searched), 0.5 * Median(swept));
 }
 
-// A frame of a camera that sees all of the map's points from where it is.
+// A frame of a camera with all of the map's points as inliers.
 engine::TrackedFrame Seen(const Room& room, int camera, double seconds, const Rigid3& camera_from_map) {
   engine::TrackedFrame frame;
   frame.frame.camera = camera;
@@ -224,7 +224,7 @@ engine::TrackedFrame Seen(const Room& room, int camera, double seconds, const Ri
   return frame;
 }
 
-TEST(HeadControl, FollowsWhatTheOtherCameraLooksAt) {
+TEST(HeadControl, FollowsTheGazeOfTheOtherCamera) {
   const Room& room = TheRoom();
   const auto carrier_from_map = room.CarrierFromMap();
   ASSERT_TRUE(carrier_from_map);
@@ -240,7 +240,7 @@ TEST(HeadControl, FollowsWhatTheOtherCameraLooksAt) {
   EXPECT_NEAR(at.tilt_rad, there.tilt_rad, 1e-9);
 }
 
-TEST(HeadControl, TurnsBackToTheMapAndLooksForItWhenLost) {
+TEST(HeadControl, TurnsBackToTheMapAndSearchesItWhenLost) {
   const Room& room = TheRoom();
   const auto carrier_from_map = room.CarrierFromMap();
   ASSERT_TRUE(carrier_from_map);
@@ -252,7 +252,7 @@ TEST(HeadControl, TurnsBackToTheMapAndLooksForItWhenLost) {
   control.AddView(Seen(room, 0, 5, camera_from_carrier * *carrier_from_map));
   EXPECT_LT(std::abs(head.At(FromSeconds(20)).pan_rad), 40 * kDegree);
   EXPECT_FALSE(control.searching());
-  // Lost for a moment it waits, then it searches, also where it has not looked.
+  // It waits shortly after a loss, then searches, also in directions that it has not looked at.
   engine::TrackedFrame lost;
   lost.state = engine::TrackingState::kLost;
   double least = 10, most = -10;

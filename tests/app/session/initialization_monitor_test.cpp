@@ -13,10 +13,10 @@ std::shared_ptr<const engine::MapSnapshot> MapWithDepth() {
   return map;
 }
 
-// A second and a half at 30 Hz; the share of points that are found falls from 0.9 to `last`, and the camera
-// moves by so many units and radians.
+// 1.5 seconds at 30 Hz. The inlier ratio falls from 0.9 to `last`, and the camera moves by this distance (map
+// units) and rotation (radians).
 std::optional<std::string> FaultAfter(double last, double distance, double turn) {
-  InitializationMonitor watch;
+  InitializationMonitor monitor;
   const auto map = MapWithDepth();
   for (int i = 0; i <= 45; ++i) {
     const double part = i / 45.0;
@@ -28,31 +28,31 @@ std::optional<std::string> FaultAfter(double last, double distance, double turn)
     frame.quality = 0.9 + part * (last - 0.9);
     frame.camera_from_map =
         engine::Rigid3(engine::Rotation3::Exp({0, part * turn, 0}), Eigen::Vector3d(part * distance, 0, 0));
-    watch.Add(frame);
+    monitor.Add(frame);
   }
-  return watch.Fault();
+  return monitor.Fault();
 }
 
-TEST(InitializationMonitor, TellsAMapWhosePointsAreLostWhileTheCameraHardlyMoves) {
+TEST(InitializationMonitor, ReportsAMapWhosePointsAreLostWhileTheCameraHardlyMoves) {
   const auto fault = FaultAfter(0.1, 0.05, 0.05);
   ASSERT_TRUE(fault);
   EXPECT_NE(fault->find("fell from 8"), std::string::npos) << *fault;
 }
 
-TEST(InitializationMonitor, TrustsAMapWhosePointsAreStillFound) {
+TEST(InitializationMonitor, AcceptsAMapWhosePointsAreStillFound) {
   EXPECT_FALSE(FaultAfter(0.7, 0.05, 0.05));
 }
 
-TEST(InitializationMonitor, DoesNotExpectPointsWhereTheCameraHasLeftThem) {
+TEST(InitializationMonitor, IgnoresPointsThatTheCameraMovedAwayFrom) {
   EXPECT_FALSE(FaultAfter(0.1, 2.0, 0.0)) << "walked away";
   EXPECT_FALSE(FaultAfter(0.1, 0.05, 1.0)) << "turned away";
 }
 
-TEST(InitializationMonitor, SaysNothingBeforeThereAreFrames) {
-  InitializationMonitor watch;
-  EXPECT_FALSE(watch.Fault());
-  watch.Add(engine::TrackedFrame());
-  EXPECT_FALSE(watch.Fault());
+TEST(InitializationMonitor, ReportsNothingBeforeTheFirstFrame) {
+  InitializationMonitor monitor;
+  EXPECT_FALSE(monitor.Fault());
+  monitor.Add(engine::TrackedFrame());
+  EXPECT_FALSE(monitor.Fault());
 }
 
 }  // namespace

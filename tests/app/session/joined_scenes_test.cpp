@@ -21,7 +21,7 @@ content::Entity Sign(const std::string& name, const std::string& to_map, const E
   return sign;
 }
 
-// A joined map whose points the adjustment has left where they were.
+// A joined map whose points were not moved by the adjustment.
 engine::JoinedMap Joined(const Sim3& a_from_b) {
   Random random(1);
   auto map = std::make_shared<engine::MapSnapshot>();
@@ -37,7 +37,7 @@ engine::JoinedMap Joined(const Sim3& a_from_b) {
   return joined;
 }
 
-TEST(JoinedScenes, HoldWhatStoodInBothMapsInTheCoordinatesOfTheFirst) {
+TEST(JoinedScenes, HoldTheContentOfBothMapsInTheCoordinatesOfTheFirst) {
   content::Scene a, b;
   a.entities = {Sign("sign-1", "", {0.5, 0.2, 3})};
   b.entities = {Sign("sign-1", "Garden", {1, 2, 3})};
@@ -61,7 +61,7 @@ TEST(JoinedScenes, HoldWhatStoodInBothMapsInTheCoordinatesOfTheFirst) {
   EXPECT_NEAR(fox.scale, 0.75, 1e-9);
 }
 
-TEST(JoinedScenes, HaveNoSignpostThatPointsToTheirOwnMap) {
+TEST(JoinedScenes, HaveNoSignpostToTheirOwnMap) {
   content::Scene a, b;
   a.entities = {Sign("sign-1", "West", {0.5, 0.2, 3})};
   b.entities = {Sign("sign-2", "East", {1, 2, 3})};
@@ -70,7 +70,7 @@ TEST(JoinedScenes, HaveNoSignpostThatPointsToTheirOwnMap) {
   EXPECT_EQ(both.Find("sign-2")->signpost.to_map, "");
 }
 
-TEST(JoinedScenes, LetSignpostsOfOtherMapsPointToTheJoinedOne) {
+TEST(JoinedScenes, RedirectSignpostsOfOtherMapsToTheJoinedOne) {
   content::Scene hall;
   hall.entities = {Sign("sign-1", "West", {0, 0, 1}), Sign("sign-2", "Garden", {0, 0, 2})};
   content::Entity model;

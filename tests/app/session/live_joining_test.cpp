@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What becomes of the map that a session began where its camera was lost, once the camera is back in the
-// first one.
+// What happens to a map that a session started where its camera was lost, once the camera is back in the
+// first map.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using namespace simulated_session;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Frames of a simulation in an order of their own: where it jumps, the camera is somewhere else all at once.
+// Frames of a simulation in a given order; where the order jumps, the camera is displaced abruptly.
 class Detour : public FrameSource {
  public:
   Detour(std::shared_ptr<const Simulation> simulation, std::vector<int> order)
@@ -48,8 +48,8 @@ void Append(int from, int to, std::vector<int>* order) {
   for (int i = from; i != to; i += step) order->push_back(i);
 }
 
-// Along two sides of a block of cabinets: a beginning, a part that cannot be seen from there, from there back
-// into the beginning, and all the way once more.
+// Along two sides of a block of cabinets: a first part, a jump to a part that is not visible from there, from
+// there back into the first part, and the whole way once more.
 constexpr int kSeen = 90, kFar = 290;
 std::vector<int> Walk() {
   std::vector<int> order;
@@ -67,8 +67,8 @@ std::shared_ptr<const Simulation> Simulate(const std::string& scene) {
 
 struct Outcome {
   std::vector<engine::TrackedFrame> frames;
-  std::vector<Session::MapState> maps;  // that live
-  std::vector<std::string> events;      // about maps
+  std::vector<Session::MapState> maps;  // those that exist
+  std::vector<std::string> events;      // of the type "map"
 };
 
 Outcome Feed(const std::shared_ptr<const Simulation>& simulation, const std::vector<int>& order, Pace pace,
@@ -107,7 +107,7 @@ engine::Sim3 WorldFromMap(const Outcome& outcome, const Simulation& simulation, 
   return engine::AlignSim3(in_world, in_map).value();
 }
 
-// The walk with a signpost in either map, each in the middle of the image of its frame.
+// The walk with a signpost in each map, each at the image centre of its frame.
 constexpr int kSignInFirst = 80, kSignInSecond = kSeen + 100;
 const Eigen::Vector2d kMiddle(160, 120);
 std::vector<TimedCommand> Signs() {
@@ -122,7 +122,7 @@ const Outcome& JoinedWalk() {
   return outcome;
 }
 
-TEST(LiveJoining, MakesOneMapOfTheTwoBetweenWhichTheCameraWasLost) {
+TEST(LiveJoining, JoinsTheTwoMapsBetweenWhichTheCameraWasLost) {
   const Outcome& outcome = JoinedWalk();
   EXPECT_THAT(outcome.events, ::testing::Contains(HasSubstr("began Hall 2")));
   EXPECT_THAT(outcome.events, ::testing::Contains(HasSubstr("maps Hall and Hall 2 were joined")));
@@ -131,13 +131,14 @@ TEST(LiveJoining, MakesOneMapOfTheTwoBetweenWhichTheCameraWasLost) {
   EXPECT_EQ(engine::Validate(*outcome.maps[0].snapshot), "");
 }
 
-TEST(LiveJoining, GoesOnTrackingAllTheWayInTheCoordinatesOfTheFirst) {
+TEST(LiveJoining, KeepsTrackingInTheCoordinatesOfTheFirstMap) {
   const Outcome& outcome = JoinedWalk();
   ASSERT_EQ(outcome.maps.size(), 1u);
   const auto simulation = Simulate("loop");
   const std::vector<int> order = Walk();
   const std::uint64_t key = outcome.maps[0].key;
-  // How the first map lies in the world is told by its first frames, of which all that follows is to be true.
+  // The first frames define the alignment of the first map with the world, which must hold for all that
+  // follows.
   const engine::Sim3 world_from_map = WorldFromMap(outcome, *simulation, order, 0, kSeen, key);
   const std::size_t back = kSeen + static_cast<std::size_t>(kFar - 20);
   int lost = 0;
@@ -157,20 +158,20 @@ TEST(LiveJoining, GoesOnTrackingAllTheWayInTheCoordinatesOfTheFirst) {
   const auto count = static_cast<double>(order.size() - back);
   RecordProperty("rms_mm", static_cast<int>(1000 * std::sqrt(squares / count)));
   RecordProperty("worst_mm", static_cast<int>(1000 * worst));
-  EXPECT_EQ(lost, 0) << "of the way back through what the second map knew";
+  EXPECT_EQ(lost, 0) << "frames were lost on the way back through the second map";
   EXPECT_LT(std::sqrt(squares / count), 0.05);
   EXPECT_LT(worst, 0.15);
 }
 
-TEST(LiveJoining, KeepsWhatStandsInBothWhereItStood) {
+TEST(LiveJoining, KeepsTheContentOfBothMapsInPlace) {
   const Outcome& outcome = JoinedWalk();
   ASSERT_EQ(outcome.maps.size(), 1u);
   const content::Scene& scene = *outcome.maps[0].scene;
   ASSERT_EQ(scene.entities.size(), 2u);
   EXPECT_EQ(scene.entities[0].signpost.text, "first");
   EXPECT_EQ(scene.entities[1].signpost.text, "second");
-  EXPECT_NE(scene.entities[0].name, scene.entities[1].name) << "both were sign-1";
-  EXPECT_EQ(scene.entities[0].signpost.to_map, "") << "it is in the map that it pointed to";
+  EXPECT_NE(scene.entities[0].name, scene.entities[1].name) << "both were named sign-1";
+  EXPECT_EQ(scene.entities[0].signpost.to_map, "") << "it is now in the map that it led to";
   EXPECT_EQ(scene.entities[1].signpost.to_map, "Garden");
   const auto simulation = Simulate("loop");
   const std::vector<int> order = Walk();
@@ -179,7 +180,7 @@ TEST(LiveJoining, KeepsWhatStandsInBothWhereItStood) {
       WorldFromMap(outcome, *simulation, order, back, order.size(), outcome.maps[0].key);
   const auto lens = LensOf(*simulation).front();
   for (const auto& [entity, number] : {std::pair(0, kSignInFirst), std::pair(1, kSignInSecond)}) {
-    // Where it was put before the camera, which stood there in truth.
+    // Relative to the camera at placement, whose true pose is known.
     const auto i = static_cast<std::size_t>(number);
     const engine::TrackedFrame& frame = outcome.frames[i];
     const engine::Sim3 world_from_then =
@@ -189,7 +190,7 @@ TEST(LiveJoining, KeepsWhatStandsInBothWhereItStood) {
     const Eigen::Vector3d anchor = scene.entities[static_cast<std::size_t>(entity)].signpost.anchor;
     EXPECT_LT((world_from_map * anchor - simulation->world_from_camera(order[i]) * before_camera).norm(),
               0.02 * before_camera.norm())
-        << "of " << entity;
+        << "entity " << entity;
   }
 }
 
@@ -207,8 +208,8 @@ TEST(LiveJoining, LeavesOneMapInTheLibrary) {
   EXPECT_EQ(library.List()[0].name, "Hall");
 }
 
-// The camera is back at a desk after it was at another one that looks like it.
-TEST(LiveJoining, LeavesMapsOfLookAlikePlacesAlone) {
+// The camera returns to a desk after it was at another desk that looks like it.
+TEST(LiveJoining, DoesNotJoinMapsOfLookAlikePlaces) {
   const auto simulation = Simulate("desks:2");
   std::vector<int> first, second;
   for (int i = 0; i < simulation->frame_count(); ++i) {
@@ -220,13 +221,13 @@ TEST(LiveJoining, LeavesMapsOfLookAlikePlacesAlone) {
   order.insert(order.end(), first.begin(), first.end());
   const Outcome outcome = Feed(simulation, order, Pace::kLockstep, nullptr);
   EXPECT_THAT(outcome.events, ::testing::Contains(HasSubstr("began Hall 2")));
-  EXPECT_THAT(outcome.events, ::testing::Contains(HasSubstr("stay two")));
+  EXPECT_THAT(outcome.events, ::testing::Contains(HasSubstr("were not joined")));
   EXPECT_EQ(outcome.maps.size(), 2u) << ::testing::PrintToString(outcome.events);
   EXPECT_EQ(outcome.frames.back().map_key, outcome.maps[0].key);
 }
 
-// With threads of its own: what comes of it depends on the machine, but it holds.
-TEST(LiveJoining, HoldsWithThreads) {
+// With threads the result depends on the machine's speed, but it must be consistent.
+TEST(LiveJoining, StaysConsistentWithThreads) {
   const TemporaryFolder folder;
   maps::Library library =
       maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);

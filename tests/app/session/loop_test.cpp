@@ -6,8 +6,8 @@
 
 #include "tests/app/support/simulated_session.h"
 
-// Once around a tower with a calibration that is two per cent off: what the camera sees on its return it has
-// seen before, but by then the map has it elsewhere (ptamm §6.2, Fig. 15).
+// Once around a tower with a focal length that is two percent off: on its return the camera sees places that
+// it has seen before, but the drifted map has them elsewhere (ptamm §6.2, Fig. 15).
 namespace docent::app {
 namespace {
 
@@ -17,8 +17,8 @@ using simulated_session::Seen;
 struct Round {
   int closed = 0;
   int lost = 0;  // frames, after the first pose
-  // By how much the poses of the last second are turned wrong against those of a round before, of which the
-  // camera stood in the same places.
+  // Largest rotation error of the poses of the last second relative to those of one round before, when the
+  // camera was at the same places.
   double wrong_deg = 0;
 };
 
@@ -29,10 +29,10 @@ Round GoRound(bool close_loops) {
   simulated.frame_rate_hz = kFrameRate_hz;
   simulated.duration_s = kRound_s + 3;
   const std::shared_ptr<const Simulation> simulation = MakeSimulation("loop:1", simulated);
-  engine::CameraModel::Intrinsics believed = simulation->camera().intrinsics();
-  believed.fx *= 1.02;
-  believed.fy *= 1.02;
-  const auto lens = std::make_shared<engine::CameraModel>(simulation->camera().lens(), believed,
+  engine::CameraModel::Intrinsics assumed = simulation->camera().intrinsics();
+  assumed.fx *= 1.02;
+  assumed.fy *= 1.02;
+  const auto lens = std::make_shared<engine::CameraModel>(simulation->camera().lens(), assumed,
                                                           simulation->camera().distortion());
   SessionOptions options = simulated_session::Options(Pace::kLockstep, "round");
   options.mapper.loops.enabled = close_loops;

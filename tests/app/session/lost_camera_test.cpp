@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a session does with a camera that is lost where no map explains what it sees.
+// What a session does with a lost camera that recognises no map.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 using namespace simulated_session;
 
-// One place, then all at once another one, through the same lens; and the first one again when asked for.
+// One place, then abruptly another one, with the same lens; and optionally the first one again.
 class TwoPlaces : public FrameSource {
  public:
   TwoPlaces(double seconds, bool back) {
@@ -77,7 +77,7 @@ bool LastHasPose(const Outcome& outcome) {
   return engine::HasPose(outcome.frames.back().state);
 }
 
-TEST(LostCamera, BeginsANewMapInAPlaceThatNoMapExplains) {
+TEST(LostCamera, StartsANewMapInAnUnknownPlace) {
   const Outcome outcome = Feed(/*new_map=*/true, /*back=*/false);
   ASSERT_EQ(outcome.maps.size(), 2u);
   EXPECT_EQ(outcome.maps[0].name, "Hall");
@@ -87,16 +87,17 @@ TEST(LostCamera, BeginsANewMapInAPlaceThatNoMapExplains) {
   const auto lost =
       std::count_if(outcome.frames.begin(), outcome.frames.end(),
                     [](const engine::TrackedFrame& frame) { return !engine::HasPose(frame.state); });
-  EXPECT_LT(lost, 25) << "of " << outcome.frames.size() << " frames; the patience is 12 of them";
+  EXPECT_LT(lost, 25) << "of " << outcome.frames.size()
+                      << " frames; the time before a new map is started is at least 6 of them";
 }
 
-TEST(LostCamera, WaitsWhereItIsToldTo) {
+TEST(LostCamera, WaitsWhenNewMapsAreDisabled) {
   const Outcome outcome = Feed(/*new_map=*/false, /*back=*/false);
   ASSERT_EQ(outcome.maps.size(), 1u);
   EXPECT_FALSE(LastHasPose(outcome));
 }
 
-TEST(LostCamera, GoesBackToTheFirstMapWhereItSeesItAgain) {
+TEST(LostCamera, ReturnsToTheFirstMapWhenItSeesItAgain) {
   const Outcome outcome = Feed(/*new_map=*/true, /*back=*/true);
   ASSERT_GE(outcome.maps.size(), 1u);
   EXPECT_TRUE(LastHasPose(outcome));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a session does for maps that nobody is in.
+// What a session does for idle maps.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using namespace simulated_session;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// The map that a short walk leaves, made once.
+// The map of a short walk, made once.
 std::shared_ptr<const engine::MapSnapshot> WalkedMap() {
   static const auto map = [] {
     const auto simulation = Room(3);
@@ -30,7 +30,7 @@ std::shared_ptr<const engine::MapSnapshot> WalkedMap() {
   return map;
 }
 
-// The same with its points pushed about by up to so much of a metre.
+// The same map with random offsets of up to `by` map units along x and y on its points.
 std::shared_ptr<const engine::MapSnapshot> Crooked(double by) {
   auto map = std::make_shared<engine::MapSnapshot>(*WalkedMap());
   Random random(5);
@@ -41,7 +41,7 @@ std::shared_ptr<const engine::MapSnapshot> Crooked(double by) {
   return map;
 }
 
-TEST(MaintenanceOrder, TakesWhatWasChangedFirstAndThenWhatFitsWorst) {
+TEST(MaintenanceOrder, PrefersChangedMapsAndThenTheLargestReprojectionError) {
   const std::atomic<bool> go_on = false, interrupt = true;
   const IdleMap good{1, "good", Crooked(0.0005), false}, bad{2, "bad", Crooked(0.004), false},
       changed{3, "changed", Crooked(0.001), true}, changed_worse{4, "worse", Crooked(0.002), true};
@@ -49,7 +49,7 @@ TEST(MaintenanceOrder, TakesWhatWasChangedFirstAndThenWhatFitsWorst) {
   EXPECT_EQ(order.Next({good, bad, changed, changed_worse}, go_on)->name, "worse");
   EXPECT_EQ(order.Next({good, bad, changed}, go_on)->name, "changed");
   EXPECT_EQ(order.Next({good, bad}, go_on)->name, "bad");
-  // The same map in a new state is measured anew.
+  // A new revision of a map is evaluated again.
   auto better = std::make_shared<engine::MapSnapshot>(*Crooked(0.0001));
   better->revision = bad.snapshot->revision + 1;
   EXPECT_EQ(order.Next({good, {2, "bad", better, false}}, go_on)->name, "good");
@@ -57,10 +57,10 @@ TEST(MaintenanceOrder, TakesWhatWasChangedFirstAndThenWhatFitsWorst) {
   EXPECT_FALSE(order.Next({good}, interrupt));
 }
 
-// A library with two crooked maps, one of which may not be changed.
-class ResidentMaps : public ::testing::Test {
+// A library with two perturbed maps, one of which may not be changed.
+class IdleMaps : public ::testing::Test {
  protected:
-  ResidentMaps() {
+  IdleMaps() {
     auto library = maps::Library::Open(file_, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
     for (const auto& [name, policy] :
          {std::pair{"Open", maps::Policy::kOpen}, std::pair{"Fixed", maps::Policy::kReadOnly}})
@@ -70,10 +70,10 @@ class ResidentMaps : public ::testing::Test {
     const auto map = library.Load(library.FindByName(name).key).snapshot;
     return maps::ReprojectionRms(*map, *map);
   }
-  static std::vector<std::string> Upkept(Session* session) {
+  static std::vector<std::string> MaintenanceDetails(Session* session) {
     std::vector<std::string> details;
     for (const Event& event : session->TakeEvents()) {
-      if (event.event == "upkeep") details.push_back(event.detail);
+      if (event.event == "maintenance") details.push_back(event.detail);
     }
     return details;
   }
@@ -82,16 +82,16 @@ class ResidentMaps : public ::testing::Test {
   const std::filesystem::path file_ = folder_ / "a.docent";
 };
 
-TEST_F(ResidentMaps, AreAdjustedWhileAnAuthorRests) {
+TEST_F(IdleMaps, AreAdjustedWhileTheSessionIsIdle) {
   const auto simulation = Room(1);
   auto library = maps::Library::Open(file_, maps::Access::kReadWrite);
   const double before = RmsOf(library, "Open");
   Session session(Options(Pace::kEager, ""), LensOf(*simulation), &library);
   std::vector<std::string> done;
-  // Minutes at the most: a machine may be slow.
+  // Two minutes at most, as the machine may be slow.
   for (int i = 0; i < 6000 && done.empty(); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    for (std::string& detail : Upkept(&session)) done.push_back(std::move(detail));
+    for (std::string& detail : MaintenanceDetails(&session)) done.push_back(std::move(detail));
   }
   ASSERT_EQ(done.size(), 1u);
   EXPECT_THAT(done[0], HasSubstr("Open: "));
@@ -99,7 +99,7 @@ TEST_F(ResidentMaps, AreAdjustedWhileAnAuthorRests) {
   EXPECT_LT(RmsOf(library, "Open"), 0.5 * before);
   EXPECT_DOUBLE_EQ(RmsOf(library, "Fixed"), before);
   EXPECT_THAT(library.Verify(), IsEmpty());
-  // What the session has in memory is what was saved.
+  // The session has in memory what was saved.
   for (const Session::MapState& map : session.Maps()) {
     if (map.name == "Open") {
       EXPECT_EQ(map.snapshot->revision, library.FindByName("Open").revision);
@@ -107,7 +107,7 @@ TEST_F(ResidentMaps, AreAdjustedWhileAnAuthorRests) {
   }
 }
 
-TEST_F(ResidentMaps, AreLeftAloneOnATourAndInLockstep) {
+TEST_F(IdleMaps, AreNotAdjustedOnATourOrInLockstep) {
   const auto simulation = Room(1);
   for (const bool may_write : {false, true}) {
     auto library = maps::Library::Open(file_, may_write ? maps::Access::kReadWrite : maps::Access::kReadOnly);
@@ -115,20 +115,20 @@ TEST_F(ResidentMaps, AreLeftAloneOnATourAndInLockstep) {
     SessionOptions options = Options(may_write ? Pace::kLockstep : Pace::kEager, "");
     options.may_write = may_write;
     Session session(options, LensOf(*simulation), &library);
-    std::this_thread::sleep_for(std::chrono::milliseconds(600));  // in which upkeep would have begun
-    EXPECT_THAT(Upkept(&session), IsEmpty());
+    std::this_thread::sleep_for(std::chrono::milliseconds(600));  // maintenance would have started by then
+    EXPECT_THAT(MaintenanceDetails(&session), IsEmpty());
     session.Finish();
     EXPECT_EQ(library.List(), before);
   }
 }
 
-// For the sanitizers: frames, saves, commands, switches and upkeep at once.
-TEST_F(ResidentMaps, AreKeptWhileAnAuthorWorksBesideThem) {
+// For the sanitizers: frames, saves, commands, map switches and maintenance at the same time.
+TEST_F(IdleMaps, StayValidWhileOtherMapsAreExtended) {
   const auto simulation = Room(3);
   auto library = maps::Library::Open(file_, maps::Access::kReadWrite);
   SessionOptions options = Options(Pace::kEager, "New");
   options.autosave_interval = std::chrono::milliseconds(100);
-  options.probation = std::chrono::milliseconds(100);
+  options.provisional_time = std::chrono::milliseconds(100);
   Session session(options, LensOf(*simulation), &library);
   CalibratedCamera camera = CameraOf(simulation);
   FrameLoopOptions loop;

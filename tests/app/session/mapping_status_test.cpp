@@ -28,11 +28,12 @@ TEST(MappingStatus, IsStartingUntilThereIsAMap) {
 TEST(MappingStatus, IsExtendingWhileKeyFramesAreAddedAndMappedAfterwards) {
   EXPECT_EQ(MappingStatusOf(FrameAt(5, 4), true), MappingStatus::kExtending);
   EXPECT_EQ(MappingStatusOf(FrameAt(5, 2), true), MappingStatus::kMapped);
-  EXPECT_EQ(MappingStatusOf(FrameAt(5, 4), false), MappingStatus::kMapped) << "keyframes of another day";
+  EXPECT_EQ(MappingStatusOf(FrameAt(5, 4), false), MappingStatus::kMapped)
+      << "keyframes of an earlier session";
   EXPECT_EQ(MappingStatusOf(FrameAt(5, 60), true), MappingStatus::kMapped) << "keyframes of another clock";
 }
 
-TEST(MappingStatus, IsLimitedWhereTheCameraIsNotFollowedWell) {
+TEST(MappingStatus, IsLimitedWhenTrackingIsNotGood) {
   engine::TrackedFrame frame = FrameAt(5, 4);
   frame.quality_class = engine::TrackingQuality::kBad;
   EXPECT_EQ(MappingStatusOf(frame, true), MappingStatus::kLimited);

@@ -18,7 +18,7 @@ namespace {
 using std::chrono::hours;
 using std::chrono::steady_clock;
 
-// Enough corners for a map to begin with.
+// Has enough corners to initialize a map.
 cv::Mat ImageOfBlocks() {
   cv::Mat blocks(30, 40, CV_8UC1), image;
   cv::theRNG().state = 7;
@@ -35,63 +35,63 @@ engine::KeyFrameCandidate FirstKeyFrame() {
   return first;
 }
 
-// A mapper that is held at its first news until it is let go.
+// A mapper that blocks in the callback of its first update until it is released.
 class HeldMapper : public ::testing::Test {
  protected:
   HeldMapper() {
     mapping_.Adopt(1, nullptr);
     mapping_.WaitUntilIdle(steady_clock::now() + hours(1), {});
-    EXPECT_TRUE(mapping_.Resting());
+    EXPECT_TRUE(mapping_.IsIdle());
     EXPECT_TRUE(mapping_.Offer(1, FirstKeyFrame(), {}));
-    EXPECT_EQ(told_.get_future().wait_for(std::chrono::minutes(1)), std::future_status::ready);
+    EXPECT_EQ(first_update_.get_future().wait_for(std::chrono::minutes(1)), std::future_status::ready);
   }
   ~HeldMapper() override {
-    if (!let_go_) Evict();
+    if (!released_) Release();
   }
-  void Evict() {
-    let_go_ = true;
-    go_.set_value();
+  void Release() {
+    released_ = true;
+    release_.set_value();
   }
 
-  std::promise<void> told_, go_;
-  std::atomic<bool> let_go_ = false;
+  std::promise<void> first_update_, release_;
+  std::atomic<bool> released_ = false;
   MappingThread mapping_{{}, true, [this](const MappingThread::MapperUpdate&) {
-                           if (let_go_) return;
-                           told_.set_value();
-                           go_.get_future().wait();
+                           if (released_) return;
+                           first_update_.set_value();
+                           release_.get_future().wait();
                          }};
 };
 
-TEST_F(HeldMapper, HoldsAFeederNoLongerThanTheCameraWouldWait) {
+TEST_F(HeldMapper, DelaysASourceUntilTheGivenTimeOnly) {
   mapping_.WaitUntilIdle(steady_clock::now(), {});
-  EXPECT_FALSE(mapping_.Resting());
+  EXPECT_FALSE(mapping_.IsIdle());
 }
 
-TEST_F(HeldMapper, HoldsAFeederThatIsFasterThanACameraUntilItRests) {
-  std::thread later([this] { Evict(); });
+TEST_F(HeldMapper, DelaysAFastSourceUntilItIsIdle) {
+  std::thread later([this] { Release(); });
   mapping_.WaitUntilIdle(steady_clock::now() + hours(1), {});
-  EXPECT_TRUE(let_go_);
-  EXPECT_TRUE(mapping_.Resting());
+  EXPECT_TRUE(released_);
+  EXPECT_TRUE(mapping_.IsIdle());
   later.join();
 }
 
-TEST_F(HeldMapper, HoldsAFeederThatIsAWholeKeyFrameAheadHoweverLong) {
+TEST_F(HeldMapper, DelaysASourceBeyondTheGivenTimeWhenAKeyFrameBehind) {
   auto second = FirstKeyFrame(), third = FirstKeyFrame();
   second.time = FromSeconds(1);
   third.time = FromSeconds(2);
   ASSERT_TRUE(mapping_.Offer(1, second, {}));
   ASSERT_TRUE(mapping_.Offer(1, third, {}));
-  std::thread later([this] { Evict(); });
+  std::thread later([this] { Release(); });
   mapping_.WaitUntilIdle(steady_clock::now(), {});
-  EXPECT_TRUE(let_go_);
+  EXPECT_TRUE(released_);
   later.join();
 }
 
-TEST_F(HeldMapper, LetsAFeederGoThatIsToldToStop) {
+TEST_F(HeldMapper, EndsTheDelayWhenStopIsRequested) {
   std::stop_source stop;
   stop.request_stop();
   mapping_.WaitUntilIdle(steady_clock::now() + hours(1), stop.get_token());
-  EXPECT_FALSE(mapping_.Resting());
+  EXPECT_FALSE(mapping_.IsIdle());
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every way in which an author's session writes to a map, tried against each policy.
+// Tries every way in which an author's session writes to a map, against each policy.
 #include "maps/policy.h"
 
 #include <gmock/gmock.h>
@@ -18,7 +18,7 @@ using maps::Policy;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// A library with one open map of the first seconds of a walk that goes on, and a thing in it.
+// A library with one open map of the first seconds of a longer walk, with a signpost in it.
 const std::string& LibraryBytes() {
   static const std::string bytes = [] {
     const TemporaryFolder folder;
@@ -53,14 +53,14 @@ class EveryPolicyInASession : public ::testing::TestWithParam<Policy> {
   const TemporaryFolder folder_;
 };
 
-TEST_P(EveryPolicyInASession, IsAskedByTheMapperAndByEachEditOfContent) {
+TEST_P(EveryPolicyInASession, IsObservedByTheMapperAndByEachEditOfContent) {
   std::ofstream(folder_ / "a.docent", std::ios::binary) << LibraryBytes();
   auto library = maps::Library::Open(folder_ / "a.docent", maps::Access::kReadWrite);
   ASSERT_EQ(library.List().size(), 1u);
   const std::uint64_t key = library.List()[0].key;
   const maps::StoredMap before = library.Load(key);
   ASSERT_THAT(before.scene.text, HasSubstr("sign-1"));
-  // As the person says it while the session runs: the policy of the command and of the library are one.
+  // The policy is set by a command while the session runs, as a user would do it.
   const auto simulation = Room(5);
   Session session(Options(Pace::kLockstep, ""), LensOf(*simulation), &library);
   CalibratedCamera camera = CameraOf(simulation);
@@ -84,7 +84,7 @@ TEST_P(EveryPolicyInASession, IsAskedByTheMapperAndByEachEditOfContent) {
                 if (content()) {
                   EXPECT_EQ(error, "");
                 } else {
-                  EXPECT_THAT(error, HasSubstr("its content stays as it is"));
+                  EXPECT_THAT(error, HasSubstr("its content cannot be changed"));
                 }
               }
             },
@@ -102,12 +102,12 @@ TEST_P(EveryPolicyInASession, IsAskedByTheMapperAndByEachEditOfContent) {
     for (std::size_t i = 0; i < after.snapshot->points.size(); ++i)
       ASSERT_EQ(after.snapshot->points[i].point_in_map, before.snapshot->points[i].point_in_map);
   } else {
-    EXPECT_GT(after.info.revision, before.info.revision) << "adjusted at least";
+    EXPECT_GT(after.info.revision, before.info.revision) << "it must have been adjusted";
     int inside = 0, outside = 0;
     const maps::Bounds bounds = *maps::ComputeBounds(*before.snapshot);
     for (const engine::KeyFrame& keyframe : after.snapshot->keyframes) {
       if (keyframe.id < before.info.next_keyframe) continue;
-      const bool in = maps::KeyFrameAllowed(Policy::kBounded, maps::Grown(bounds, 0.05),
+      const bool in = maps::KeyFrameAllowed(Policy::kBounded, maps::Expanded(bounds, 0.05),
                                             keyframe.camera_from_map.OriginInSource());
       ++(in ? inside : outside);
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sessions that begin, load a map, leave it, start another and end, over and over again: what one leaves
-// behind the next one finds, and the mapper's thread comes and goes with each.
+// Many sessions, one after the other, that load a map, leave it, start another one and end: each finds what
+// the one before saved, and starts and ends its own mapping thread.
 #include <gmock/gmock.h>
 
 #include "app/session/session.h"
@@ -16,7 +16,7 @@ using engine::LensModel;
 constexpr int kCycles = 200;
 constexpr double kFramesASecond = 15;
 
-// A short walk about the table, painted once and gone through forth and back.
+// A short walk around the table, rendered once and played forwards and backwards.
 class Film {
  public:
   Film() {
@@ -61,7 +61,7 @@ void BuildTable(const Film& film, const std::filesystem::path& path) {
   session.Finish();
 }
 
-TEST(SessionCycle, BeginsLoadsLeavesResetsAndEndsTwoHundredTimes) {
+TEST(SessionCycle, StartsLoadsLeavesAndEndsTwoHundredTimes) {
   const TemporaryFolder folder;
   const std::filesystem::path path = folder / "l.docent";
   const Film film;
@@ -95,7 +95,7 @@ TEST(SessionCycle, BeginsLoadsLeavesResetsAndEndsTwoHundredTimes) {
       session.Execute(UseMap{"table"}, frame);
       feed(1);
     }
-    if (cycle % 3 != 0) session.Finish();  // else its end does
+    if (cycle % 3 != 0) session.Finish();  // otherwise the destructor does
   }
   EXPECT_GT(posed, kCycles);
   maps::Library library = OpenLibrary(path);

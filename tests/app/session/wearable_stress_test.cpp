@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two cameras, a mapper, and people who pull plugs: sessions begin and end, cameras leave and come back, in
-// an order that a seed decides. Meant for ThreadSanitizer, which needs many orders: DOCENT_STRESS_MINUTES
-// says how long; without it a few sessions are enough.
+// Two cameras, a mapper, and cameras that are unplugged: sessions begin and end, cameras leave and come back,
+// in an order that a seed decides. Meant for ThreadSanitizer, which needs many orders: DOCENT_STRESS_MINUTES
+// sets the duration; without it a few sessions are run.
 #include <gmock/gmock.h>
 
 #include <atomic>
@@ -20,7 +20,7 @@ namespace {
 using engine::CameraModel;
 using engine::LensModel;
 
-// Images of a walk, painted once and used by every session.
+// Images of a walk, rendered once and used by every session.
 struct Film {
   CameraModel camera;
   std::vector<cv::Mat> images;
@@ -37,7 +37,7 @@ Film Shoot(const std::string& scene, const CameraModel& camera) {
   return film;
 }
 
-// A device that somebody unplugs now and then: for a while it has no images and says why, then it is back.
+// A device that is unplugged at random: for a while it delivers no images and reports why, then it is back.
 class ShakySource : public FrameSource {
  public:
   ShakySource(const Film* film, std::uint64_t seed, int images)
@@ -58,8 +58,8 @@ class ShakySource : public FrameSource {
       std::this_thread::sleep_for(std::chrono::microseconds(200));
       return true;
     }
-    if (random_.Uniform(0, 1) < 0.05) index_ += 2;  // the driver had no buffer
-    // Forth and back through the film.
+    if (random_.Uniform(0, 1) < 0.05) index_ += 2;  // the driver dropped images
+    // The film is played forwards and backwards.
     const std::uint64_t length = film_->images.size(), turn = index_ % (2 * length);
     frame->image = film_->images[turn < length ? turn : 2 * length - 1 - turn];
     frame->index = index_++;
@@ -109,7 +109,7 @@ void RunOneSession(const Film films[2], Random* random, Tally* tally) {
       if (++shown == stop_after) stop.request_stop();
     };
   }
-  // Somebody looks on, as a window's thread does, and starts a new map in between.
+  // Another thread queries the session, as a window does, and starts a new map in between.
   const int new_map_at = static_cast<int>(random->Uniform(5, 150));
   std::jthread watcher([&](const std::stop_token& done) {
     bool asked = false;
@@ -129,10 +129,10 @@ void RunOneSession(const Film films[2], Random* random, Tally* tally) {
   RunCameras(runs, &session, stop.get_token());
   watcher.request_stop();
   watcher.join();
-  if (random->Uniform(0, 1) < 0.7) session.Finish();  // otherwise its end does
+  if (random->Uniform(0, 1) < 0.7) session.Finish();  // otherwise the destructor does
 }
 
-TEST(WearableStress, EndsWheneverCamerasLeaveOrComeBack) {
+TEST(WearableStress, EndsCleanlyWhenCamerasLeaveOrComeBack) {
   const Film films[2] = {
       Shoot("hand",
             {LensModel::kRadialTangential, {320, 240, 179, 179.2, 159.1, 120.05}, {-0.18, 0.03, 0, 0, 0}}),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two cameras in one session, on the simulated pair.
+// Two cameras in one session, on the simulated wearable.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// The scene's own lens at half the size, to be quick.
+// The scene's camera model at half the resolution, to save time.
 engine::CameraModel Halved(const engine::CameraModel& camera) {
   engine::CameraModel::Intrinsics intrinsics = camera.intrinsics();
   intrinsics.width_px /= 2;
@@ -45,7 +45,7 @@ struct Walk {
   std::optional<RigEstimate> rig;
 };
 
-// Feeds both views of a walk to one session that makes a map.
+// Feeds both views of a walk to one session that builds a map.
 Walk Take(const std::string& hand, const std::string& shoulder, double seconds, Pace pace) {
   CalibratedCamera cameras[2] = {Calibrate(OpenSimulation(View(hand, seconds)), std::nullopt),
                                  Calibrate(OpenSimulation(View(shoulder, seconds)), std::nullopt)};
@@ -73,7 +73,7 @@ Walk Take(const std::string& hand, const std::string& shoulder, double seconds, 
   return walk;
 }
 
-// Frames with a pose among those from the first one with a pose on.
+// Ratio of frames with a pose, from the first pose on.
 double TrackedAfterJoining(const std::vector<engine::TrackedFrame>& frames) {
   const auto tracked = [](const engine::TrackedFrame& frame) { return engine::HasPose(frame.state); };
   const auto first = std::find_if(frames.begin(), frames.end(), tracked);
@@ -91,7 +91,7 @@ TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
   ASSERT_FALSE(walk.maps.empty());
   const Session::MapState& map = walk.maps.back();
   ASSERT_TRUE(map.snapshot && !map.discarded);
-  // Keyframes tell by their lens which camera took them; some go again when others show the same.
+  // The camera model of a keyframe tells which camera took it. Redundant keyframes are removed again later.
   std::map<engine::KeyFrameId, int> taken_by;
   int keyframes[2] = {0, 0};
   const auto taker = [](const engine::KeyFrame& keyframe) {
@@ -106,8 +106,8 @@ TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
   }
   EXPECT_GE(keyframes[0], 5);
   EXPECT_GE(keyframes[1], 5);
-  // Each camera comes to where it finds enough points of the other one's keyframes to be tracked by those
-  // alone (ptamm Fig. 5).
+  // Each camera reaches places where it finds enough points of the other one's keyframes to be tracked by
+  // those alone (ptamm Fig. 5).
   for (int camera = 0; camera < 2; ++camera) {
     int most = 0;
     for (const engine::TrackedFrame& frame : walk.frames[camera]) {
@@ -123,19 +123,21 @@ TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
     RecordProperty("points_of_the_other_" + std::to_string(camera), most);
     EXPECT_GE(most, 2 * engine::TrackerOptions().min_recovery_inliers) << "camera " << camera;
   }
-  EXPECT_FALSE(walk.rig && walk.rig->rigid) << "these cameras move each on its own: " << walk.rig->Words();
+  EXPECT_FALSE(walk.rig && walk.rig->rigid)
+      << "these cameras move relative to each other: " << walk.rig->ToString();
 }
 
-TEST(Wearable, RecognisesThatItsCamerasAreFixedToOneAnother) {
+TEST(Wearable, RecognisesThatItsCamerasAreRigidlyConnected) {
   const Walk walk = Take("hand:1", "shoulder:1", 16, Pace::kLockstep);
   ASSERT_TRUE(walk.rig);
-  EXPECT_TRUE(walk.rig->rigid) << walk.rig->Words();
+  EXPECT_TRUE(walk.rig->rigid) << walk.rig->ToString();
   const engine::Rigid3 truth = WearableRig().inverse();  // shoulder_from_hand
   const double turn_deg =
       (walk.rig->second_from_first.rotation.inverse() * truth.rotation).Angle() * 57.29578;
   RecordProperty("turn_off_deg", std::to_string(turn_deg));
   EXPECT_LT(turn_deg, 0.3);
-  // The map has a scale of its own: the truth in its units follows from how far the hand moved.
+  // The map has an arbitrary scale; the true length of a map unit follows from the path of the hand-held
+  // camera.
   const auto hand = View("hand:1", 16);
   double in_map = 0, in_world = 0;
   const engine::TrackedFrame* before = nullptr;
@@ -159,7 +161,7 @@ TEST(Wearable, RecognisesThatItsCamerasAreFixedToOneAnother) {
                           [](const Event& event) { return event.event == "rig"; }));
 }
 
-// Makes a map of the beginning of a scene in a library.
+// Maps the beginning of a scene and saves it in a library.
 void MapScene(const std::string& name, const Simulation& simulation, maps::Library* library) {
   SessionOptions options;
   options.threaded = false;
@@ -176,13 +178,13 @@ void MapScene(const std::string& name, const Simulation& simulation, maps::Libra
   session.Finish();
 }
 
-// Two cameras on a tour, each shown what a test likes.
+// Two cameras on a tour, which are shown images of the test's choice.
 class Tourists {
  public:
   Tourists(std::shared_ptr<const engine::CameraModel> lens, maps::Library* library)
       : session_(Options(), {lens, lens}, library) {}
 
-  // Each camera is shown its image, the same again and again; -> the map in which each is then tracked.
+  // Shows each camera its image repeatedly; returns the map in which each is tracked after that.
   using MapNamesOfBoth = std::pair<std::string, std::string>;
   MapNamesOfBoth Look(const cv::Mat& first, const cv::Mat& second, int times = 25) {
     std::string names[2];
@@ -203,7 +205,7 @@ class Tourists {
     }
     return {names[0], names[1]};
   }
-  // Whether a camera was tracked in this map, or was "lost", at any time since this was forgotten.
+  // Whether a camera was tracked in this map, or was "lost", at any time since the last Forget.
   bool Seen(int camera, const std::string& map) const { return seen_.contains({camera, map}); }
   void Forget() { seen_.clear(); }
 
@@ -223,7 +225,7 @@ class Tourists {
 };
 
 // ptamm Fig. 7 and §3.3, step by step, with images.
-TEST(Wearable, SearchesAndIsCalledTogetherByTheRulesOfAssociatedCameras) {
+TEST(Wearable, FollowsTheRulesOfAssociatedCameras) {
   const TemporaryFolder folder;
   maps::Library library =
       maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
@@ -244,34 +246,35 @@ TEST(Wearable, SearchesAndIsCalledTogetherByTheRulesOfAssociatedCameras) {
   Tourists cameras(std::make_shared<engine::CameraModel>(room->camera()), &library);
   using Both = Tourists::MapNamesOfBoth;
 
-  // Nobody is tracked yet: whatever is looked at is found, and both are tracked in one map.
+  // No camera is tracked yet: any map may be entered, and both are tracked in one map.
   EXPECT_EQ(cameras.Look(of_room, of_room), Both("room", "room"));
-  // (b) One becomes lost and sees another map: it is not looked for there, and stays lost.
+  // (b) One camera becomes lost and sees another map: that map is not searched, and the camera stays lost.
   cameras.Look(of_room, dark);
   cameras.Forget();
   EXPECT_EQ(cameras.Look(of_room, of_desk, 60), Both("room", "lost"));
   EXPECT_FALSE(cameras.Seen(1, "desk"));
   EXPECT_FALSE(cameras.Seen(0, "lost"));
-  // It recovers into the current map alone.
+  // It relocalizes in the current map only.
   EXPECT_EQ(cameras.Look(of_room, of_room), Both("room", "room"));
-  // (c) Both are lost: each searches all maps. (d) The first to be found, in another map, calls the other
-  // one, which gives up its search: even what it sees of the map before does not make it be found there.
+  // (c) Both are lost: each searches all maps. (d) The first one to relocalize, in another map, brings the
+  // other one with it, which abandons its search: it does not relocalize in the previous map even if it sees
+  // it.
   EXPECT_EQ(cameras.Look(dark, dark), Both("lost", "lost"));
   EXPECT_EQ(cameras.Look(dark, of_desk), Both("lost", "desk"));
   cameras.Forget();
   EXPECT_EQ(cameras.Look(of_room, of_desk, 60), Both("lost", "desk"));
   EXPECT_FALSE(cameras.Seen(0, "room"));
   EXPECT_FALSE(cameras.Seen(1, "lost"));
-  // (e) It is found in the recovered map, and they go on together.
+  // (e) It relocalizes in that map, and both continue together.
   EXPECT_EQ(cameras.Look(of_desk, of_desk), Both("desk", "desk"));
-  // The rules know no first camera: the same the other way round.
+  // The rules do not depend on the order of the cameras: the same with the roles exchanged.
   EXPECT_EQ(cameras.Look(dark, dark), Both("lost", "lost"));
   EXPECT_EQ(cameras.Look(of_room, dark), Both("room", "lost"));
   EXPECT_EQ(cameras.Look(of_room, of_desk), Both("room", "lost"));
   EXPECT_EQ(cameras.Look(of_room, of_room), Both("room", "room"));
 }
 
-TEST(Wearable, WorksOnThreadsOfItsOwn) {
+TEST(Wearable, WorksWithOneThreadPerCamera) {
   const Walk walk = Take("hand", "shoulder", 8, Pace::kEager);
   EXPECT_EQ(walk.frames[0].size(), 161u);
   EXPECT_GE(walk.frames[1].size(), 150u);  // the run ends with the first camera

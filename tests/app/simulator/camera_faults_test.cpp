@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The faults of cameras against what mathematics says about them.
+// Tests of simulated camera faults against their exact mathematical effect.
 #include "app/simulator/camera_faults.h"
 
 #include <gmock/gmock.h>
@@ -30,14 +30,14 @@ using engine::LensModel;
 using ::testing::HasSubstr;
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kPanRate = 60 * kDegree;  // radians a second
+constexpr double kPanRate = 60 * kDegree;  // radians per second
 
 CameraModel Pinhole() {
   return {LensModel::kRadialTangential, {320, 240, 200, 200, 159.5, 119.5}, {}};
 }
 
-// A camera that turns evenly to the right before a wall, which is black to the left of a vertical edge
-// straight ahead at half a second, and white to the right of it.
+// A camera that pans to the right at a constant rate in front of a wall, which is black to the left and white
+// to the right of a vertical edge. The edge is straight ahead at half a second.
 Scene PannedEdge() {
   Scene scene;
   const int black = scene.surfaces.AddTexture(cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(0)));
@@ -59,19 +59,19 @@ Simulation Panned(const CameraFaults& faults) {
   return {"panned", PannedEdge(), options};
 }
 
-// Where the edge of PannedEdge lies in a row: what is right of it is white.
+// The x coordinate of the edge of PannedEdge in a row, from the number of white pixels.
 double EdgeIn(const cv::Mat& bgr, int row) {
   double white = 0;
   for (int x = 0; x < bgr.cols; ++x) white += bgr.at<cv::Vec3b>(row, x)[0] / 255.0;
   return bgr.cols - 0.5 - white;
 }
 
-// Where it lies at a time, by the pinhole's projection.
+// Its true x coordinate at a time, by the pinhole projection.
 double TrueEdge(double time_s) {
   return 159.5 - 200 * std::tan(kPanRate * (time_s - 0.5));
 }
 
-TEST(RollingShutter, SlantsAnEdgeByThePanRateTimesTheReadout) {
+TEST(RollingShutter, SlantsAnEdgeByThePanRateTimesTheReadoutTime) {
   constexpr double kReadout_s = 0.03;
   const Simulation simulation = Panned({.readout_s = kReadout_s});
   cv::Mat image;
@@ -80,13 +80,13 @@ TEST(RollingShutter, SlantsAnEdgeByThePanRateTimesTheReadout) {
     EXPECT_NEAR(EdgeIn(image, row), TrueEdge(0.5 + kReadout_s * ((row + 0.5) / 240 - 0.5)), 0.3) << row;
   const double slant = EdgeIn(image, 0) - EdgeIn(image, 239);
   EXPECT_NEAR(slant, 200 * kPanRate * kReadout_s * 239 / 240, 0.3);
-  EXPECT_NEAR(EdgeIn(image, 120), TrueEdge(0.5), 0.3) << "the time of the image is that of its middle row";
+  EXPECT_NEAR(EdgeIn(image, 120), TrueEdge(0.5), 0.3) << "the time of an image is that of its middle row";
 }
 
-TEST(RollingShutter, KeepsTheTruthOfTheMiddleRow) {
+TEST(RollingShutter, GroundTruthIsThePoseOfTheMiddleRow) {
   const Simulation rolling = Panned({.readout_s = 0.03}), global = Panned({});
   EXPECT_TRUE(engine::IsNear(rolling.world_from_camera(15), global.world_from_camera(15), 1e-12, 1e-12));
-  // A pixel shows what its own row saw: the wall straight ahead of the edge's pixel is the edge.
+  // SurfaceAt uses the pose of the pixel's own row, so that the pixel of the edge gives the edge.
   cv::Mat image;
   rolling.Render(15, &image);
   for (const int row : {5, 120, 235}) {
@@ -96,7 +96,7 @@ TEST(RollingShutter, KeepsTheTruthOfTheMiddleRow) {
   }
 }
 
-TEST(RollingShutter, IsTheWholeImageAtOnceWhenAllRowsHaveOnePose) {
+TEST(RollingShutter, EqualsAGlobalShutterIfAllRowsHaveOnePose) {
   const auto simulation = MakeSimulation("room", SimulationOptions::Clean());
   const Scene scene = BuildRoom({});
   const SurfaceRenderer renderer(&scene.surfaces, simulation->camera());
@@ -109,7 +109,7 @@ TEST(RollingShutter, IsTheWholeImageAtOnceWhenAllRowsHaveOnePose) {
   }
 }
 
-TEST(RollingShutter, ShowsEachRowAsAnImageFromItsOwnPoseDoes) {
+TEST(RollingShutter, RendersEachRowFromItsOwnPose) {
   SimulationOptions options = SimulationOptions::Clean();
   options.faults.readout_s = 0.03;
   options.faults.interlaced = true;
@@ -122,7 +122,7 @@ TEST(RollingShutter, ShowsEachRowAsAnImageFromItsOwnPoseDoes) {
     const double offset_s = 0.03 * ((row + 0.5) / 480 - 0.5) + (row % 2) / 60.0;
     const engine::Rigid3 pose = scene.trajectory.WorldFromCamera(45 / 30.0 + offset_s);
     renderer.Render(pose.inverse(), &whole);
-    // The rims of things are averaged over a pixel and see the rows beside them.
+    // Object edges are averaged over neighbouring rows, so that a few pixels may differ.
     int differing = 0;
     for (int x = 0; x < 640; ++x)
       differing += image.at<cv::Vec3b>(row, x) != whole.at<cv::Vec3b>(row, x) ? 1 : 0;
@@ -138,7 +138,7 @@ TEST(Interlacing, ShowsOddRowsHalfAFrameLater) {
     EXPECT_NEAR(EdgeIn(image, row), TrueEdge(0.5 + (row % 2) / 60.0), 0.3) << row;
 }
 
-TEST(CalibrationError, ChangesTheCalibrationAndNotTheLens) {
+TEST(CalibrationError, ChangesTheCalibrationButNotTheImages) {
   SimulationOptions options;
   options.camera = SimulatedCamera(320);
   const auto right = MakeSimulation("room", options);
@@ -150,13 +150,13 @@ TEST(CalibrationError, ChangesTheCalibrationAndNotTheLens) {
   EXPECT_DOUBLE_EQ(wrong->calibration().intrinsics().fy, 1.01 * right->camera().intrinsics().fy);
   EXPECT_EQ(wrong->calibration().intrinsics().cx, right->camera().intrinsics().cx);
   EXPECT_EQ(wrong->calibration().distortion(), right->camera().distortion());
-  cv::Mat as_it_is, as_it_was;
-  right->Render(3, &as_it_was);
-  wrong->Render(3, &as_it_is);
-  EXPECT_EQ(cv::norm(as_it_is, as_it_was, cv::NORM_INF), 0);
+  cv::Mat with_error, without_error;
+  right->Render(3, &without_error);
+  wrong->Render(3, &with_error);
+  EXPECT_EQ(cv::norm(with_error, without_error, cv::NORM_INF), 0);
 }
 
-TEST(CalibrationError, MisplacesRaysByTheGivenPixels) {
+TEST(CalibrationError, DisplacesRaysByTheGivenPixels) {
   const CameraModel::Intrinsics intrinsics{640, 480, 400, 401, 321, 238};
   for (const CameraModel& lens :
        {CameraModel(LensModel::kRadialTangential, intrinsics, {-0.1, 0.01, 0, 0, 0}),
@@ -171,7 +171,7 @@ TEST(CalibrationError, MisplacesRaysByTheGivenPixels) {
   }
 }
 
-TEST(FrameDrops, LoseTheirShareAloneAndInBursts) {
+TEST(FrameDrops, DropTheGivenRatioSinglyAndInBursts) {
   for (const double share : {0.05, 0.3, 0.8}) {
     constexpr int kFrames = 100000;
     const std::vector<int> kept = KeptFrames(kFrames, share, 7);
@@ -189,7 +189,7 @@ TEST(FrameDrops, LoseTheirShareAloneAndInBursts) {
   EXPECT_EQ(KeptFrames(100, 0, 7).size(), 100u);
 }
 
-TEST(FrameDrops, LeaveTimesAndPosesTrue) {
+TEST(FrameDrops, KeepTimesAndPosesOfTheRemainingFrames) {
   SimulationOptions options = SimulationOptions::Clean();
   options.camera = SimulatedCamera(160);
   const auto whole = MakeSimulation("room", options), lossy = MakeSimulation("room,drops=30", options);
@@ -238,8 +238,8 @@ TEST(Sensor, ClipsHighlightsWhenTheGainIsHigh) {
   EXPECT_EQ(bright.at<cv::Vec3b>(20, 20), cv::Vec3b(255, 255, 255));
 }
 
-TEST(Sensor, HasNoiseWhoseVarianceGrowsWithSignalAndGain) {
-  // Grey values are whole numbers, which adds a twelfth.
+TEST(Sensor, NoiseVarianceGrowsWithSignalAndGain) {
+  // Rounding to whole grey values adds a variance of 1/12.
   const auto variance = [](double light, double gain, double constant_sigma) {
     const Sensor sensor(
         {.size = {640, 480}, .noise_sigma = constant_sigma, .gain = gain, .gain_noise_sigma = 4});
@@ -256,10 +256,11 @@ TEST(Sensor, HasNoiseWhoseVarianceGrowsWithSignalAndGain) {
   EXPECT_NEAR(variance(64, 1, 3), 8 + 9, 0.04 * 17) << "variances add";
 }
 
-// Root mean square of the rotation about each axis, and the share of its power between two frequencies.
+// The RMS rotation about each axis and RMS translation, and the ratio of the rotation's power between two
+// frequencies.
 struct Motion {
   Eigen::Vector3d rotation_rms_rad, translation_rms_m;
-  double share_in_band = 0;
+  double power_ratio_in_band = 0;
 };
 
 Motion Analyse(const Tremor& tremor, double low_hz, double high_hz) {
@@ -275,7 +276,7 @@ Motion Analyse(const Tremor& tremor, double low_hz, double high_hz) {
   }
   motion.rotation_rms_rad = motion.rotation_rms_rad.cwiseSqrt();
   motion.translation_rms_m = motion.translation_rms_m.cwiseSqrt();
-  // The discrete Fourier transform under a Hann window.
+  // The discrete Fourier transform with a Hann window.
   double all = 0, inside = 0;
   for (int k = 1; k < kCount / 2; ++k) {
     const double frequency_hz = k / kDuration_s;
@@ -288,23 +289,24 @@ Motion Analyse(const Tremor& tremor, double low_hz, double high_hz) {
     all += std::norm(sum);
     if (frequency_hz >= low_hz && frequency_hz <= high_hz) inside += std::norm(sum);
   }
-  motion.share_in_band = inside / all;
+  motion.power_ratio_in_band = inside / all;
   return motion;
 }
 
-TEST(HandTremor, HasItsAmplitudeAndItsBand) {
+TEST(HandTremor, HasTheGivenAmplitudeAndFrequencyBand) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     const Motion motion = Analyse(Tremor(0.2, seed), 3.9, 12.1);
     for (int axis = 0; axis < 3; ++axis) {
       EXPECT_NEAR(motion.rotation_rms_rad[axis], 0.2 * kDegree, 0.02 * kDegree) << "axis " << axis;
       EXPECT_NEAR(motion.translation_rms_m[axis], 0.2 * kDegree * Tremor::kLever_m, 4e-5) << "axis " << axis;
     }
-    EXPECT_GT(motion.share_in_band, 0.999);
+    EXPECT_GT(motion.power_ratio_in_band, 0.999);
   }
-  EXPECT_LT(Analyse(Tremor(0.2, 1), 8, 12.1).share_in_band, 0.3) << "slow waves are larger than quick ones";
+  EXPECT_LT(Analyse(Tremor(0.2, 1), 8, 12.1).power_ratio_in_band, 0.3)
+      << "low frequencies have larger amplitudes";
 }
 
-TEST(HandTremor, IsPartOfTheTruth) {
+TEST(HandTremor, IsIncludedInTheGroundTruth) {
   SimulationOptions options = SimulationOptions::Clean();
   options.camera = SimulatedCamera(320);
   options.duration_s = 2;
@@ -317,14 +319,14 @@ TEST(HandTremor, IsPartOfTheTruth) {
   }
   EXPECT_GT(largest, 0.5 * kDegree);
   EXPECT_LT(largest, 4 * kDegree);
-  // The image is the one from the true pose.
+  // The image must be the one from the true pose.
   cv::Mat image, from_truth;
   trembling->Render(7, &image);
   steady->RenderFrom(trembling->world_from_camera(7), 7, &from_truth);
   EXPECT_EQ(cv::norm(image, from_truth, cv::NORM_INF), 0);
 }
 
-TEST(HandTremor, DiffersBetweenTheCamerasOfOnePerson) {
+TEST(HandTremor, DiffersBetweenTwoCamerasOfOnePerson) {
   SimulationOptions options = SimulationOptions::Clean();
   options.faults.tremor_deg = 0.5;
   const auto hand = MakeSimulation("hand:1", options), shoulder = MakeSimulation("shoulder:1", options);
@@ -342,7 +344,7 @@ std::string ErrorOf(const std::string& scene) {
   return "";
 }
 
-TEST(NamedOptions, FollowASceneAfterCommas) {
+TEST(NamedOptions, FollowTheSceneNameAfterCommas) {
   const auto simulation = MakeSimulation(
       "museum:2,rolling-shutter=20,focal-error=1,distortion-error=-0.5,gain=1.5,exposure-jumps=1,gain-noise="
       "3,"
@@ -367,7 +369,7 @@ TEST(NamedOptions, FollowASceneAfterCommas) {
   EXPECT_EQ(simulation->places().size(), 2u);
 }
 
-TEST(NamedOptions, SayWhatIsWrong) {
+TEST(NamedOptions, ReportWhatIsWrong) {
   EXPECT_THAT(ErrorOf("room,fog=1"), ::testing::AllOf(HasSubstr("'fog'"), HasSubstr("rolling-shutter"),
                                                       HasSubstr("tremor"), HasSubstr("drops")));
   EXPECT_THAT(ErrorOf("room,"), HasSubstr("no option ''"));
@@ -383,7 +385,7 @@ TEST(NamedOptions, SayWhatIsWrong) {
   EXPECT_THAT(ErrorOf("attic,drops=1"), HasSubstr("attic"));
 }
 
-TEST(CameraFaults, SayWhatIsWrong) {
+TEST(CameraFaults, ReportWhatIsWrong) {
   const auto sentence = [](auto change) {
     CameraFaults faults;
     change(faults);
@@ -396,7 +398,7 @@ TEST(CameraFaults, SayWhatIsWrong) {
   EXPECT_THAT(sentence([](auto& faults) { faults.gain = 0; }), HasSubstr("gain"));
   EXPECT_THAT(sentence([](auto& faults) { faults.exposure_jump_stops = 5; }), HasSubstr("stops"));
   EXPECT_THAT(sentence([](auto& faults) { faults.gain_noise_sigma = -1; }), HasSubstr("gain noise"));
-  EXPECT_THAT(sentence([](auto& faults) { faults.dropped_share = 1; }), HasSubstr("drops"));
+  EXPECT_THAT(sentence([](auto& faults) { faults.dropped_share = 1; }), HasSubstr("dropped frames"));
   EXPECT_THAT(sentence([](auto& faults) { faults.tremor_deg = 6; }), HasSubstr("tremor"));
 }
 

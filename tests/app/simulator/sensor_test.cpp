@@ -14,14 +14,14 @@ cv::Mat Grey(cv::Size size) {
   return cv::Mat(size, CV_8UC3, cv::Scalar::all(120));
 }
 
-TEST(Sensor, LeavesTheLightAloneWithoutFaults) {
+TEST(Sensor, DoesNotChangeTheImageWithoutFaults) {
   const Sensor sensor({.size = {64, 48}});
   cv::Mat image = Grey({64, 48});
   sensor.Apply(3, 1.5, &image);
   EXPECT_EQ(cv::norm(image, Grey({64, 48}), cv::NORM_INF), 0);
 }
 
-TEST(Sensor, AddsNoiseOfTheGivenStrengthThatDiffersFromFrameToFrame) {
+TEST(Sensor, AddsNoiseOfTheGivenSigmaThatDiffersBetweenFrames) {
   const Sensor sensor({.size = {640, 480}, .noise_sigma = 3});
   cv::Mat first = Grey({640, 480}), second = Grey({640, 480}), again = Grey({640, 480});
   sensor.Apply(0, 0, &first);
@@ -35,11 +35,11 @@ TEST(Sensor, AddsNoiseOfTheGivenStrengthThatDiffersFromFrameToFrame) {
   cv::Mat difference;
   cv::subtract(first, second, difference, cv::noArray(), CV_32F);
   cv::meanStdDev(difference, mean, deviation);
-  // Independent noises add as squares.
+  // The variances of independent noise add up.
   EXPECT_NEAR(deviation[1], 3 * std::sqrt(2.0), 0.15);
 }
 
-TEST(Sensor, DarkensTheCornersAndNotTheMiddle) {
+TEST(Sensor, VignettingDarkensTheCornersButNotTheCentre) {
   const Sensor sensor({.size = {65, 49}, .vignetting = 0.4});
   cv::Mat image = Grey({65, 49});
   sensor.Apply(0, 0, &image);
@@ -48,7 +48,7 @@ TEST(Sensor, DarkensTheCornersAndNotTheMiddle) {
   EXPECT_NEAR(image.at<cv::Vec3b>(48, 64)[2], 72, 1);
 }
 
-TEST(Sensor, LetsTheExposureWanderSlowly) {
+TEST(Sensor, ExposureDriftsSlowly) {
   const Sensor sensor({.size = {32, 32}, .exposure_drift = 0.1});
   double lowest = 2, highest = 0, largest_step = 0;
   for (int i = 0; i < 900; ++i) {

@@ -42,7 +42,7 @@ std::string ErrorOf(const std::string& scene, const SimulationOptions& options =
   return "";
 }
 
-// Labels in the order in which they begin.
+// The labels in the order in which they begin.
 std::vector<std::string> LabelSequence(const Simulation& simulation) {
   std::vector<std::string> labels;
   for (int i = 0; i < simulation.frame_count(); ++i) {
@@ -67,13 +67,13 @@ INSTANTIATE_TEST_SUITE_P(Simulation, EveryScene,
                            return name.substr(0, name.find(':'));
                          });
 
-// The truth and the images belong together: what frame i shows at a pixel, frame j shows where the truth
-// says. A truth that is two pixels off must fit worse.
-TEST_P(EveryScene, ShowsTheSamePointInTwoFramesWhereTheTruthSays) {
+// The ground truth must match the images: the surface point that frame i shows at a pixel appears in frame j
+// where the ground truth projects it. A position two pixels off must fit worse.
+TEST_P(EveryScene, GroundTruthMatchesTheImages) {
   const auto simulation = MakeSimulation(GetParam(), SmallAndClean());
   const engine::CameraModel& camera = simulation->camera();
   const int step = 8;
-  double at_truth = 0, beside_truth = 0;
+  double difference_at_truth = 0, difference_beside_truth = 0;
   int compared = 0;
   for (int i = 5; i + step < simulation->frame_count(); i += simulation->frame_count() / 4) {
     const int j = i + step;
@@ -89,18 +89,18 @@ TEST_P(EveryScene, ShowsTheSamePointInTwoFramesWhereTheTruthSays) {
         const auto pixel = camera.Project(simulation->world_from_camera(j).inverse() * *point);
         if (!pixel || !camera.IsInside(*pixel, 4)) continue;
         const double grey = grey_i.at<uchar>(y, x);
-        at_truth += std::abs(grey - GreyAt(grey_j, *pixel));
-        beside_truth += std::abs(grey - GreyAt(grey_j, *pixel + Eigen::Vector2d(2, 0)));
+        difference_at_truth += std::abs(grey - GreyAt(grey_j, *pixel));
+        difference_beside_truth += std::abs(grey - GreyAt(grey_j, *pixel + Eigen::Vector2d(2, 0)));
         ++compared;
       }
     }
   }
   ASSERT_GT(compared, 500);
-  EXPECT_LT(at_truth / compared, 6.0) << "grey levels";
-  EXPECT_LT(at_truth, 0.6 * beside_truth);
+  EXPECT_LT(difference_at_truth / compared, 6.0) << "grey levels";
+  EXPECT_LT(difference_at_truth, 0.6 * difference_beside_truth);
 }
 
-TEST_P(EveryScene, IsTheSameToTheByteForTheSameSeedAndAnotherForAnother) {
+TEST_P(EveryScene, IsBitIdenticalForASeedAndDiffersForAnother) {
   SimulationOptions options;
   options.camera = SimulatedCamera(160);
   options.blur_samples = 2;
@@ -118,14 +118,14 @@ TEST_P(EveryScene, IsTheSameToTheByteForTheSameSeedAndAnotherForAnother) {
   EXPECT_FALSE(SameImage(first, other));
 }
 
-TEST_P(EveryScene, IsRichInCornersAtEveryScaleAndEverywhereInTheImage) {
+TEST_P(EveryScene, HasManyKeypointsOnEveryLevelAllOverTheImage) {
   const auto simulation = MakeSimulation(GetParam(), SimulationOptions{});
   for (int part = 0; part < 5; ++part) {
     const int frame = (simulation->frame_count() - 1) * part / 4;
     cv::Mat image, grey;
     simulation->Render(frame, &image);
     cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-    constexpr int kFewest[] = {700, 400, 150, 50};
+    constexpr int kMinCorners[] = {700, 400, 150, 50};
     for (int level = 0; level < 4; ++level) {
       std::vector<cv::KeyPoint> corners;
       cv::FAST(grey, corners, 10);
@@ -134,17 +134,18 @@ TEST_P(EveryScene, IsRichInCornersAtEveryScaleAndEverywhereInTheImage) {
         cells.insert({static_cast<int>(corner.pt.x * 8 / static_cast<float>(grey.cols)),
                       static_cast<int>(corner.pt.y * 6 / static_cast<float>(grey.rows))});
       }
-      EXPECT_GT(static_cast<int>(corners.size()), kFewest[level]) << "frame " << frame << ", level " << level;
+      EXPECT_GT(static_cast<int>(corners.size()), kMinCorners[level])
+          << "frame " << frame << ", level " << level;
       EXPECT_GT(cells.size(), 24u) << "of 48 cells, frame " << frame << ", level " << level;
       cv::pyrDown(grey, grey);
     }
   }
 }
 
-TEST_P(EveryScene, MovesNoFasterThanAPersonAndHasALabelAndAPlace) {
+TEST_P(EveryScene, MovesAtWalkingSpeedAndHasLabelsAndPlaces) {
   const auto simulation = MakeSimulation(GetParam(), SmallAndClean());
   EXPECT_FALSE(simulation->places().empty());
-  double fastest = 0, quickest_turn = 0;
+  double fastest = 0, fastest_rotation = 0;
   for (int i = 0; i < simulation->frame_count(); ++i) {
     EXPECT_FALSE(simulation->label(i).empty());
     if (i == 0) continue;
@@ -152,13 +153,13 @@ TEST_P(EveryScene, MovesNoFasterThanAPersonAndHasALabelAndAPlace) {
         simulation->world_from_camera(i - 1).inverse() * simulation->world_from_camera(i);
     const double seconds = ToSeconds(simulation->time(i) - simulation->time(i - 1));
     fastest = std::max(fastest, step.translation.norm() / seconds);
-    quickest_turn = std::max(quickest_turn, step.rotation.Angle() / seconds);
+    fastest_rotation = std::max(fastest_rotation, step.rotation.Angle() / seconds);
   }
-  EXPECT_LT(fastest, 2.0) << "metres a second";
-  EXPECT_LT(quickest_turn, 2.6) << "radians a second";
+  EXPECT_LT(fastest, 2.0) << "metres per second";
+  EXPECT_LT(fastest_rotation, 2.6) << "radians per second";
 }
 
-TEST_P(EveryScene, IsImageFilling) {
+TEST_P(EveryScene, FillsTheImage) {
   const auto simulation = MakeSimulation(GetParam(), SmallAndClean());
   cv::Mat image;
   for (int part = 0; part < 4; ++part) {
@@ -174,7 +175,7 @@ TEST_P(EveryScene, IsImageFilling) {
   }
 }
 
-TEST(Simulation, LabelsAMuseumAsBuildTravelVisit) {
+TEST(Simulation, LabelsAMuseumAsBuildTravelAndVisit) {
   const auto simulation = MakeSimulation("museum", SmallAndClean());
   const std::vector<std::string> expected = {"build0", "travel", "build1", "travel", "build2",
                                              "travel", "build3", "travel", "visit2", "travel",
@@ -183,7 +184,7 @@ TEST(Simulation, LabelsAMuseumAsBuildTravelVisit) {
   EXPECT_EQ(simulation->places().size(), 4u);
 }
 
-TEST(Simulation, VisitsEveryPlaceOnceForAnyNumberOfThem) {
+TEST(Simulation, VisitsEveryPlaceOnceForAnyNumberOfPlaces) {
   for (int places = 1; places <= 5; ++places) {
     const auto simulation = MakeSimulation("desks:" + std::to_string(places), SmallAndClean());
     std::map<std::string, int> count;
@@ -196,7 +197,7 @@ TEST(Simulation, VisitsEveryPlaceOnceForAnyNumberOfThem) {
   }
 }
 
-TEST(Simulation, MovesSidewaysByAThirdOfAMetreInTheFirstTwoSecondsOfEveryBuild) {
+TEST(Simulation, MovesSidewaysAtTheStartOfEveryBuildSegment) {
   for (const char* scene : {"museum", "desks", "room"}) {
     const auto simulation = MakeSimulation(scene, SmallAndClean());
     for (int i = 0; i < simulation->frame_count(); ++i) {
@@ -218,7 +219,7 @@ TEST(Simulation, MovesSidewaysByAThirdOfAMetreInTheFirstTwoSecondsOfEveryBuild) 
   }
 }
 
-TEST(Simulation, SeesEveryPlaceWhileItIsBuiltAndVisited) {
+TEST(Simulation, ShowsEveryPlaceWhileItIsBuiltAndVisited) {
   for (const char* scene : {"museum:3", "desks:3"}) {
     const auto simulation = MakeSimulation(scene, SmallAndClean());
     for (const SimulatedPlace& place : simulation->places()) {
@@ -237,13 +238,13 @@ TEST(Simulation, SeesEveryPlaceWhileItIsBuiltAndVisited) {
   }
 }
 
-TEST(Simulation, TurnsInTheRoomExactlyOnTheSpotAndBack) {
+TEST(Simulation, RotatesInTheRoomWithoutTranslation) {
   EXPECT_EQ(LabelSequence(*MakeSimulation("room", SmallAndClean())), std::vector<std::string>{"general"});
   const auto simulation = MakeSimulation("room:2", SmallAndClean());
   const std::vector<std::string> expected = {"general", "rotation", "general", "rotation", "general"};
   EXPECT_EQ(LabelSequence(*simulation), expected);
   std::optional<engine::Rigid3> first;
-  double widest = 0;
+  double max_rotation = 0;
   for (int i = 0; i < simulation->frame_count(); ++i) {
     if (simulation->label(i) != "rotation") {
       first.reset();
@@ -252,19 +253,20 @@ TEST(Simulation, TurnsInTheRoomExactlyOnTheSpotAndBack) {
     const engine::Rigid3 pose = simulation->world_from_camera(i);
     if (!first) first = pose;
     EXPECT_LT((pose.translation - first->translation).norm(), 1e-9) << "frame " << i;
-    widest = std::max(widest, (first->rotation.inverse() * pose.rotation).Angle());
+    max_rotation = std::max(max_rotation, (first->rotation.inverse() * pose.rotation).Angle());
   }
-  EXPECT_GT(widest, 1.9) << "radians";
+  EXPECT_GT(max_rotation, 1.9) << "radians";
 }
 
-TEST(Simulation, TurnsInTheCylinderAsThePaperSays) {
+TEST(Simulation, RotatesInTheCylinderAsInHybridSlam) {
   for (const int radius_cm : {0, 5, 30}) {
     const auto simulation = MakeSimulation("cylinder:" + std::to_string(radius_cm));
     ASSERT_EQ(simulation->frame_count(), 100);
     EXPECT_NEAR(2 * std::atan(320 / simulation->camera().intrinsics().fx) * 180 / std::numbers::pi, 64, 1e-9);
     for (const int frame : {0, 40, 99}) {
       const engine::Rigid3 pose = simulation->world_from_camera(frame);
-      // World to camera is [R | (0, 0, -r)]: the camera's centre lies r before the axis, along its own view.
+      // camera_from_world is [R | (0, 0, -r)]: the camera centre is at distance r from the axis, in the
+      // viewing direction.
       EXPECT_LT((pose.inverse().translation - Eigen::Vector3d(0, 0, -radius_cm / 100.0)).norm(), 2e-4);
       const auto wall = simulation->SurfaceAt(frame, {319.5, 239.5});
       ASSERT_TRUE(wall);
@@ -274,12 +276,12 @@ TEST(Simulation, TurnsInTheCylinderAsThePaperSays) {
   }
 }
 
-TEST(Simulation, FillsIdenticalPlacesWithTheSameThings) {
+TEST(Simulation, IdenticalPlacesHaveTheSameGeometry) {
   for (const bool identical : {true, false}) {
     SimulationOptions options = SmallAndClean();
     options.identical_places = identical;
     const auto simulation = MakeSimulation("desks:3", options);
-    // The same view of the first and of the second desk, which stands 2.1 m to the right.
+    // The same view of the first desk and of the second, which is 2.1 m to the right.
     const engine::Rigid3 pose = simulation->world_from_camera(0);
     engine::Rigid3 beside = pose;
     beside.translation.x() +=
@@ -302,7 +304,7 @@ TEST(Simulation, FillsIdenticalPlacesWithTheSameThings) {
   }
 }
 
-TEST(Simulation, BlursAlongTheMotionAndKeepsTheMiddleOfTheExposure) {
+TEST(Simulation, MotionBlurDoesNotShiftTheImage) {
   SimulationOptions options = SmallAndClean();
   options.frame_rate_hz = 10;
   const auto sharp = MakeSimulation("room", options);
@@ -317,7 +319,7 @@ TEST(Simulation, BlursAlongTheMotionAndKeepsTheMiddleOfTheExposure) {
     return cv::norm(edges, cv::NORM_L1);
   };
   EXPECT_LT(detail(blurred_image), 0.8 * detail(sharp_image));
-  // Smoothed alike, the two agree: nothing has been shifted.
+  // After equal smoothing the two must agree, so that nothing was shifted.
   cv::GaussianBlur(sharp_image, sharp_image, {0, 0}, 4);
   cv::GaussianBlur(blurred_image, blurred_image, {0, 0}, 4);
   EXPECT_LT(cv::norm(sharp_image, blurred_image, cv::NORM_L1) / static_cast<double>(3 * sharp_image.total()),
@@ -334,7 +336,7 @@ TEST(Simulation, CountsFramesFromTheRateAndTheDuration) {
   EXPECT_EQ(simulation->time(50), FromSeconds(2.5));
 }
 
-TEST(Simulation, NamesTheScenesWhenAskedForAnUnknownOne) {
+TEST(Simulation, ListsTheScenesForAnUnknownName) {
   const std::string message = ErrorOf("attic");
   EXPECT_THAT(message, HasSubstr("attic"));
   for (const char* scene : {"room", "museum", "desks", "cylinder", "loop", "grass", "head"})
@@ -342,7 +344,7 @@ TEST(Simulation, NamesTheScenesWhenAskedForAnUnknownOne) {
   EXPECT_THAT(ErrorOf(""), HasSubstr("museum"));
 }
 
-TEST(Simulation, SaysWhichNumbersASceneTakes) {
+TEST(Simulation, ReportsTheValidNumbersOfAScene) {
   for (const char* scene :
        {"museum:0", "museum:99", "museum:", "museum:two", "museum:2x", "museum:-1", "museum:99999999999"}) {
     EXPECT_THAT(ErrorOf(scene), HasSubstr("from 1 to 24")) << scene;
@@ -350,7 +352,7 @@ TEST(Simulation, SaysWhichNumbersASceneTakes) {
   EXPECT_NE(ErrorOf("grass:1"), "");
 }
 
-TEST(Simulation, SaysWhatIsWrongWithOptions) {
+TEST(Simulation, ReportsInvalidOptions) {
   const auto fault = [](auto change) {
     SimulationOptions options;
     change(options);
@@ -367,7 +369,7 @@ TEST(Simulation, SaysWhatIsWrongWithOptions) {
   EXPECT_THAT(fault([](auto& options) { options.camera = SimulatedCamera(9000); }), HasSubstr("8192"));
 }
 
-TEST(Simulation, ReportsHowLongAnImageTakes) {
+TEST(Simulation, ReportsTheRenderingTime) {
   const auto simulation = MakeSimulation("museum:2");
   cv::Mat image;
   simulation->Render(0, &image);

@@ -32,7 +32,7 @@ engine::Rigid3 ObliquePose() {
   return {engine::Rotation3::Exp({0.12, -0.3, 0.2}), Eigen::Vector3d(0.1, -0.05, 1.9)};
 }
 
-// Small bright squares on a dark wall, at known places of the world.
+// Small bright squares on a dark wall, at known world positions.
 struct MarkedWall {
   Surfaces surfaces;
   std::vector<Eigen::Vector3d> markers;
@@ -57,7 +57,7 @@ MarkedWall MakeMarkedWall() {
   return wall;
 }
 
-// Centre of brightness about a pixel.
+// The centroid of the brightness around a pixel.
 Eigen::Vector2d Centroid(const cv::Mat& image, const Eigen::Vector2d& about, int reach) {
   double sum = 0;
   Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
@@ -72,7 +72,7 @@ Eigen::Vector2d Centroid(const cv::Mat& image, const Eigen::Vector2d& about, int
   return weighted / sum;
 }
 
-TEST(SurfaceRenderer, DrawsMarkersWhereEachLensSaysToATenthOfAPixel) {
+TEST(SurfaceRenderer, DrawsMarkersWithinATenthOfAPixelForEveryLens) {
   const MarkedWall wall = MakeMarkedWall();
   for (const engine::CameraModel& camera : Lenses()) {
     const SurfaceRenderer renderer(&wall.surfaces, camera);
@@ -84,9 +84,8 @@ TEST(SurfaceRenderer, DrawsMarkersWhereEachLensSaysToATenthOfAPixel) {
     for (const Eigen::Vector3d& marker : wall.markers) {
       const auto pixel = camera.Project(camera_from_world * marker);
       if (!pixel || !camera.IsInside(*pixel, 16)) continue;
-      // The centroid of a square seen obliquely through a lens is not the image of its centre: compare with
-      // the mean of the projections of many of its points, which weights them as the image does to first
-      // order.
+      // The centroid of an obliquely seen square is not the projection of its centre, so the expected value
+      // is the mean of the projections of many of its points, weighted by their image area to first order.
       double area = 0, reach = 0;
       Eigen::Vector2d expected = Eigen::Vector2d::Zero();
       constexpr int kGrid = 9;
@@ -112,9 +111,9 @@ TEST(SurfaceRenderer, DrawsMarkersWhereEachLensSaysToATenthOfAPixel) {
   }
 }
 
-// The tiles' short lists of rectangles must leave nothing out: the image equals that of rays tried against
-// all.
-TEST(SurfaceRenderer, FindsTheNearestOfManyRectanglesLikeTheSearchThroughAll) {
+// The rectangle lists of the image tiles must be complete: the image must equal that of exhaustive ray
+// casting.
+TEST(SurfaceRenderer, MatchesExhaustiveRayCasting) {
   Random random(5);
   Surfaces surfaces;
   std::vector<cv::Vec3b> colors;
@@ -126,7 +125,7 @@ TEST(SurfaceRenderer, FindsTheNearestOfManyRectanglesLikeTheSearchThroughAll) {
     const int texture = surfaces.AddTexture(cv::Mat(4, 4, CV_8UC3, cv::Scalar(color)));
     const engine::Rotation3 turn =
         engine::Rotation3::Exp({random.Uniform(-2, 2), random.Uniform(-2, 2), random.Uniform(-2, 2)});
-    // All around the camera, so that some reach behind it.
+    // The rectangles surround the camera, so that some extend behind it.
     const Eigen::Vector3d corner(random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(-3, 3));
     surfaces.AddRectangle(corner, turn * Eigen::Vector3d(random.Uniform(0.05, 1.2), 0, 0),
                           turn * Eigen::Vector3d(0, random.Uniform(0.05, 1.2), 0), texture);
@@ -138,7 +137,7 @@ TEST(SurfaceRenderer, FindsTheNearestOfManyRectanglesLikeTheSearchThroughAll) {
     int compared = 0, wrong = 0, empty = 0;
     for (int y = 2; y < 478; y += 3) {
       for (int x = 2; x < 638; x += 3) {
-        // Only where the neighbourhood shows one rectangle: elsewhere the image blends.
+        // Compare only where the neighbourhood shows a single rectangle; elsewhere the image is blended.
         std::array<int, 5> seen{};
         const std::array<Eigen::Vector2d, 5> offsets = {Eigen::Vector2d(0, 0), Eigen::Vector2d(-1, 0),
                                                         Eigen::Vector2d(1, 0), Eigen::Vector2d(0, -1),
@@ -165,7 +164,7 @@ TEST(SurfaceRenderer, FindsTheNearestOfManyRectanglesLikeTheSearchThroughAll) {
   }
 }
 
-TEST(SurfaceRenderer, IsBlackWhereNothingStands) {
+TEST(SurfaceRenderer, IsBlackWhereThereIsNoSurface) {
   const Surfaces nothing;
   cv::Mat image;
   SurfaceRenderer(&nothing, SimulatedCamera(160)).Render({}, &image);
@@ -173,8 +172,8 @@ TEST(SurfaceRenderer, IsBlackWhereNothingStands) {
   EXPECT_EQ(cv::norm(image, cv::NORM_INF), 0);
 }
 
-TEST(SurfaceRenderer, SoftensWhatIsFarAwayInsteadOfFlickering) {
-  // A chequered wall of fine squares: from far away it must be grey, not black and white.
+TEST(SurfaceRenderer, AveragesFineTextureFarAway) {
+  // A wall with a fine checkerboard pattern must appear grey from far away, not black and white.
   cv::Mat squares(256, 256, CV_8UC3);
   for (int y = 0; y < 256; ++y) {
     for (int x = 0; x < 256; ++x)

@@ -28,7 +28,7 @@ class WriteSequenceTest : public ::testing::Test {
   }
   ~WriteSequenceTest() override { std::filesystem::remove_all(folder_); }
 
-  // Lines without the comments.
+  // The lines of a file without comments.
   std::vector<std::string> LinesOf(const std::string& name) const {
     std::ifstream file(folder_ / name);
     std::vector<std::string> lines;
@@ -45,7 +45,7 @@ class WriteSequenceTest : public ::testing::Test {
   std::unique_ptr<Simulation> simulation_;
 };
 
-TEST_F(WriteSequenceTest, WritesImagesTruthLensAndLabels) {
+TEST_F(WriteSequenceTest, WritesImagesGroundTruthCalibrationAndLabels) {
   int calls = 0;
   WriteSequence(*simulation_, folder_, [&](int written, int total) {
     EXPECT_EQ(written, ++calls);
@@ -81,7 +81,7 @@ TEST_F(WriteSequenceTest, WritesImagesTruthLensAndLabels) {
   }
 }
 
-TEST_F(WriteSequenceTest, WritesAWrongCalibrationAndBesideItTheTrueLens) {
+TEST_F(WriteSequenceTest, WritesTheTrueCalibrationBesideAWrongOne) {
   WriteSequence(*simulation_, folder_ / "right");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "right" / "true_calibration.yaml"));
   const auto wrong = MakeSimulation("museum:1,focal-error=2,distortion-error=1,duration=0.1");
@@ -91,7 +91,7 @@ TEST_F(WriteSequenceTest, WritesAWrongCalibrationAndBesideItTheTrueLens) {
   EXPECT_EQ(FindCalibration(folder_ / "wrong"), folder_ / "wrong" / "calibration.yaml");
 }
 
-TEST_F(WriteSequenceTest, UsesAnEmptyFolderButNeverOneWithSomethingInIt) {
+TEST_F(WriteSequenceTest, UsesAnEmptyFolderButRejectsANonEmptyOne) {
   std::filesystem::create_directories(folder_);
   std::ofstream(folder_ / "mine.txt") << "keep";
   EXPECT_THROW(WriteSequence(*simulation_, folder_), Error);
@@ -103,7 +103,7 @@ TEST_F(WriteSequenceTest, UsesAnEmptyFolderButNeverOneWithSomethingInIt) {
   EXPECT_EQ(LinesOf("rgb.txt").size(), 10u);
 }
 
-TEST_F(WriteSequenceTest, LeavesNothingBehindWhenItIsStopped) {
+TEST_F(WriteSequenceTest, LeavesNoFilesWhenStopped) {
   const auto stop = [](int written, int) {
     if (written == 3) throw std::runtime_error("stopped");
   };

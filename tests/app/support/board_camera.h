@@ -13,10 +13,11 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 
-// Images of calibration boards whose every corner is known from mathematics.
+// Rendered images of calibration boards with exactly known corners.
 namespace docent::app {
 
-// Ways of holding a board before the camera: all over the image, near and far, tilted every way.
+// Random camera_from_board poses of a board in front of the camera: all over the image, near and far, tilted
+// in every direction.
 inline std::vector<engine::Rigid3> BoardPoses(const BoardSpec& board, const engine::CameraModel& camera,
                                               int count) {
   Random random(11);
@@ -43,13 +44,13 @@ inline std::vector<engine::Rigid3> BoardPoses(const BoardSpec& board, const engi
   return poses;
 }
 
-// A camera before a board, as exactly as rays can say: every pixel is the mean of sixteen rays through the
-// lens to the sheet, then softened as by a lens, with a little noise.
+// Renders a board exactly, by ray casting: every pixel is the mean of sixteen rays through the lens, followed
+// by a slight lens blur and a little noise.
 class BoardCamera {
  public:
   BoardCamera(const BoardSpec& board, const engine::CameraModel& camera)
       : board_(board), size_(camera.width_px(), camera.height_px()), sheet_(PaintBoard(board, kTexels)) {
-    // One ray a pixel's corner; within a pixel they are linear to a thousandth of it.
+    // One ray per pixel corner; within a pixel, rays are linear to a thousandth of a pixel.
     for (int y = 0; y <= size_.height; ++y) {
       for (int x = 0; x <= size_.width; ++x) {
         const auto ray = camera.Unproject({x - 0.5, y - 0.5});
@@ -59,21 +60,22 @@ class BoardCamera {
   }
 
   cv::Mat Image(const engine::Rigid3& camera_from_board, Random* random) const {
-    // The inverse of the plane's homography takes a ray to where it meets the sheet.
+    // The inverse of the plane's homography maps a ray to its intersection with the sheet.
     Eigen::Matrix3d plane = camera_from_board.rotation.matrix();
     plane.col(2) = camera_from_board.translation;
-    const Eigen::Matrix3f meets = plane.inverse().cast<float>();
-    // The sheet's border is one square; a checkerboard's frame begins one square inside of the sheet.
-    const float before = board_.kind == BoardSpec::Kind::kCharuco ? 1 : 2;
+    const Eigen::Matrix3f board_from_ray = plane.inverse().cast<float>();
+    // Squares between the edge of the sheet and the origin: the border is one square wide, and a
+    // checkerboard's first inner corner is one square further in.
+    const float margin_squares = board_.kind == BoardSpec::Kind::kCharuco ? 1 : 2;
     const auto scale = static_cast<float>(1 / board_.square_m);
-    cv::Mat fine(size_ * kFiner, CV_8UC1);
+    cv::Mat fine(size_ * kOversampling, CV_8UC1);
     for (int y = 0; y < fine.rows; ++y) {
       for (int x = 0; x < fine.cols; ++x) {
-        const Eigen::Vector3f hit = meets * Ray(x, y);
+        const Eigen::Vector3f hit = board_from_ray * Ray(x, y);
         uchar brightness = 120;
         if (hit.z() > 0) {
-          const float u = (hit.x() / hit.z() * scale + before) * kTexels;
-          const float v = (hit.y() / hit.z() * scale + before) * kTexels;
+          const float u = (hit.x() / hit.z() * scale + margin_squares) * kTexels;
+          const float v = (hit.y() / hit.z() * scale + margin_squares) * kTexels;
           if (u >= 0 && v >= 0 && u < sheet_.cols && v < sheet_.rows)
             brightness = sheet_.at<uchar>(static_cast<int>(v), static_cast<int>(u)) > 127 ? 210 : 30;
         }
@@ -90,13 +92,13 @@ class BoardCamera {
   }
 
  private:
-  static constexpr int kFiner = 4, kTexels = 200;
+  static constexpr int kOversampling = 4, kTexels = 200;
 
   Eigen::Vector3f Ray(int x, int y) const {
-    const float u = (static_cast<float>(x % kFiner) + 0.5f) / kFiner;
-    const float v = (static_cast<float>(y % kFiner) + 0.5f) / kFiner;
+    const float u = (static_cast<float>(x % kOversampling) + 0.5f) / kOversampling;
+    const float v = (static_cast<float>(y % kOversampling) + 0.5f) / kOversampling;
     const Eigen::Vector3f* upper =
-        &rays_[static_cast<std::size_t>(y / kFiner) * (size_.width + 1) + x / kFiner];
+        &rays_[static_cast<std::size_t>(y / kOversampling) * (size_.width + 1) + x / kOversampling];
     const Eigen::Vector3f* lower = upper + size_.width + 1;
     return (1 - v) * ((1 - u) * upper[0] + u * upper[1]) + v * ((1 - u) * lower[0] + u * lower[1]);
   }

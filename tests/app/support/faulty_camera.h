@@ -14,13 +14,13 @@
 #include "engine/base/random.h"
 #include "tests/app/support/simulated_session.h"
 
-// Simulated sequences of cameras with the faults of real ones, and a measure of how well a map that was
-// started on one agrees with the truth. For property tests: every property must hold for all seeds.
+// Simulated sequences with the faults of real cameras, and a measure of how well a new map agrees with the
+// ground truth. For property tests: every property must hold for all seeds.
 namespace docent::app::faulty_camera {
 
-// A hand-held webcam of 320x240 pixels: rolling shutter, a focal length and a distortion that were calibrated
-// wrongly (to either side, by the seed), a trembling hand, noise that grows with the signal, exposure jumps
-// and lost frames.
+// A hand-held webcam of 320x240 pixels with a rolling shutter, calibration errors of the focal length and
+// distortion (whose signs depend on the seed), hand tremor, signal-dependent noise, exposure jumps and
+// dropped frames.
 inline SimulationOptions Options(std::uint64_t seed, double seconds) {
   Random random(seed);
   const auto sign = [&] { return random.Uniform() < 0.5 ? -1 : 1; };
@@ -43,15 +43,15 @@ inline std::shared_ptr<const Simulation> Sequence(const std::string& scene, std:
   return MakeSimulation(scene, Options(seed, seconds));
 }
 
-// One map of points in a run: the first frame that had a pose in it, and how far its first second disagrees
-// with the truth.
+// The start of one map with finite points: its first frame with a pose, and the error of its first second.
 struct Start {
   std::size_t frame = 0;
-  double path_m = 0;   // of the true camera within that second
-  double error_m = 0;  // root mean square of the camera's places after the best similarity
+  double path_m = 0;   // true path length of the camera within that second
+  double error_m = 0;  // RMS error of the camera centres after alignment with a similarity
 };
 
-// Of every map in which frames were tracked by finite points for at least half a second, in their order.
+// The start of every map in which frames were tracked with finite points for at least half a second, in the
+// order of their first frames.
 inline std::vector<Start> StartsOf(const simulated_session::Seen& seen, const Simulation& simulation) {
   std::map<std::uint64_t, std::vector<std::size_t>> frames_of_map;
   for (std::size_t i = 0; i < seen.frames.size(); ++i) {

@@ -10,7 +10,7 @@
 #include "app/session/session.h"
 #include "app/simulator/simulation.h"
 
-// Sessions in the simulated museum, for tests.
+// Helpers for tests that run sessions in the simulated museum.
 namespace docent::app::simulated_session {
 
 inline std::shared_ptr<const Simulation> Room(double seconds) {
@@ -28,7 +28,7 @@ struct Seen {
   int poses = 0;
 };
 
-// Feeds a whole simulation to a session.
+// Feeds a whole simulation to a session and returns its tracked frames.
 inline Seen Feed(const std::shared_ptr<const Simulation>& simulation, Pace pace, Session* session,
                  std::vector<TimedCommand> script = {}, const std::filesystem::path& model_folder = {}) {
   CalibratedCamera camera = CameraOf(simulation);
@@ -55,7 +55,7 @@ inline SessionOptions Options(Pace pace, const std::string& first_map) {
   return options;
 }
 
-// The lens as the simulation's calibration describes it.
+// The camera model of the simulation's calibration.
 inline std::vector<std::shared_ptr<const engine::CameraModel>> LensOf(const Simulation& simulation) {
   return {std::make_shared<engine::CameraModel>(simulation.calibration())};
 }

@@ -14,7 +14,7 @@
 
 namespace docent::app {
 
-// A folder of its own for one test, gone when the test ends.
+// A temporary folder for one test, which the destructor removes.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -48,7 +48,7 @@ inline std::string ReadAll(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// The sentence of the Error that the call throws; empty when it throws none.
+// The message of the Error that the call throws; empty if it throws none.
 template <typename Call>
 std::string ErrorOf(const Call& call) {
   try {

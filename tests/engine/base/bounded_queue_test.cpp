@@ -11,14 +11,14 @@
 namespace docent {
 namespace {
 
-TEST(BoundedQueue, HandsItemsOutInTheOrderTheyCame) {
+TEST(BoundedQueue, ReturnsItemsInTheOrderTheyWerePushed) {
   BoundedQueue<int> queue(8);
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(queue.TryPush(int{i}));
   for (int i = 0; i < 5; ++i) EXPECT_EQ(queue.TryPop(), i);
   EXPECT_EQ(queue.TryPop(), std::nullopt);
 }
 
-TEST(BoundedQueue, RefusesWithoutWaitingWhenFullAndLeavesTheItemAlone) {
+TEST(BoundedQueue, TryPushFailsWhenFullAndLeavesTheItemUnchanged) {
   BoundedQueue<std::unique_ptr<int>> queue(1);
   EXPECT_TRUE(queue.TryPush(std::make_unique<int>(1)));
   auto second = std::make_unique<int>(2);
@@ -27,7 +27,7 @@ TEST(BoundedQueue, RefusesWithoutWaitingWhenFullAndLeavesTheItemAlone) {
   EXPECT_EQ(*second, 2);
 }
 
-TEST(BoundedQueue, NeverHoldsMoreThanItsCapacityWhileManyThreadsPushAndPop) {
+TEST(BoundedQueue, NeverExceedsItsCapacityWhileManyThreadsPushAndPop) {
   constexpr int kProducers = 3, kConsumers = 3, kEach = 4000;
   BoundedQueue<int> queue(4);
   std::atomic<long> sum = 0;
@@ -53,7 +53,7 @@ TEST(BoundedQueue, NeverHoldsMoreThanItsCapacityWhileManyThreadsPushAndPop) {
   EXPECT_FALSE(overfull);
 }
 
-TEST(BoundedQueue, AFullQueueMakesPushWaitUntilSomethingIsTaken) {
+TEST(BoundedQueue, PushWaitsWhileTheQueueIsFull) {
   BoundedQueue<int> queue(1);
   ASSERT_TRUE(queue.Push(1));
   std::atomic<bool> popped = false;
@@ -71,7 +71,7 @@ TEST(BoundedQueue, AFullQueueMakesPushWaitUntilSomethingIsTaken) {
   EXPECT_EQ(queue.Pop(), 2);
 }
 
-TEST(BoundedQueue, AClosedQueueTakesNothingButStillHandsOutWhatItHolds) {
+TEST(BoundedQueue, AClosedQueueRejectsNewItemsButReturnsRemainingOnes) {
   BoundedQueue<int> queue(2);
   ASSERT_TRUE(queue.Push(7));
   queue.Close();
@@ -82,7 +82,7 @@ TEST(BoundedQueue, AClosedQueueTakesNothingButStillHandsOutWhatItHolds) {
   EXPECT_TRUE(queue.closed());
 }
 
-TEST(BoundedQueue, ClosingWakesWhoeverWaits) {
+TEST(BoundedQueue, CloseWakesWaitingThreads) {
   BoundedQueue<int> empty(1), full(1);
   ASSERT_TRUE(full.Push(1));
   std::jthread popper([&] { EXPECT_EQ(empty.Pop(), std::nullopt); });
@@ -91,7 +91,7 @@ TEST(BoundedQueue, ClosingWakesWhoeverWaits) {
   full.Close();
 }
 
-TEST(BoundedQueue, AStopRequestWakesWhoeverWaits) {
+TEST(BoundedQueue, AStopRequestWakesWaitingThreads) {
   BoundedQueue<int> empty(1), full(1);
   ASSERT_TRUE(full.Push(1));
   std::jthread popper([&](std::stop_token stop) { EXPECT_EQ(empty.Pop(stop), std::nullopt); });

@@ -6,26 +6,27 @@
 namespace docent {
 namespace {
 
-// A plane rotation, as it stands in the eigenvalue solvers: to an optimiser, a difference beside a sum.
-[[gnu::noinline]] void Turn(double cosine, double sine, const double* from, double* to) {
+// A plane rotation as the eigenvalue solvers write it: a sum and a difference of products, which an optimizer
+// could contract to fused multiply-add instructions.
+[[gnu::noinline]] void Rotate(double cosine, double sine, const double* from, double* to) {
   const double x = from[0], y = from[1];
   to[0] = cosine * x - sine * y;
   to[1] = cosine * y + sine * x;
 }
 
 double Rounded(double a, double b) {
-  const volatile double product = a * b;  // in memory there is no digit more than a double has
+  const volatile double product = a * b;  // storing it in memory rounds it to double precision
   return product;
 }
 
-// A fused multiplication and addition would be more exact, and other in each build.
+// A fused multiply-add would be more exact, but its result would differ between builds.
 TEST(Products, AreRoundedBeforeTheyAreAdded) {
   Random random(1);
   for (int i = 0; i < 1000; ++i) {
     const double cosine = random.Uniform(-1, 1), sine = random.Uniform(-1, 1);
     const double from[2] = {random.Uniform(-1, 1), random.Uniform(-1, 1)};
     double to[2];
-    Turn(cosine, sine, from, to);
+    Rotate(cosine, sine, from, to);
     EXPECT_EQ(to[0], Rounded(cosine, from[0]) - Rounded(sine, from[1]));
     EXPECT_EQ(to[1], Rounded(cosine, from[1]) + Rounded(sine, from[0]));
   }

@@ -11,7 +11,7 @@
 namespace docent {
 namespace {
 
-TEST(Worker, StopsWhenItIsAsked) {
+TEST(Worker, StopsWhenRequested) {
   std::atomic<long> rounds = 0;
   Worker worker("counter", [&](std::stop_token stop) {
     while (!stop.stop_requested()) ++rounds;
@@ -24,7 +24,7 @@ TEST(Worker, StopsWhenItIsAsked) {
   EXPECT_TRUE(worker.finished());
 }
 
-TEST(Worker, HandsItsExceptionToWhoeverJoinsIt) {
+TEST(Worker, JoinRethrowsTheException) {
   Worker worker("thrower", [](std::stop_token) { throw std::runtime_error("out of paint"); });
   try {
     worker.Join();
@@ -32,10 +32,10 @@ TEST(Worker, HandsItsExceptionToWhoeverJoinsIt) {
   } catch (const std::runtime_error& error) {
     EXPECT_STREQ(error.what(), "out of paint");
   }
-  worker.Join();  // it was handed over already
+  worker.Join();  // the exception was already rethrown
 }
 
-TEST(Worker, JoiningWaitsForTheBodyToEndByItself) {
+TEST(Worker, JoinWaitsForTheBodyToFinish) {
   std::atomic<bool> done = false;
   Worker worker("sleeper", [&](std::stop_token) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -46,7 +46,7 @@ TEST(Worker, JoiningWaitsForTheBodyToEndByItself) {
   EXPECT_FALSE(worker.stop_requested());
 }
 
-TEST(Worker, IsStoppedAndWaitedForWhenItsOwnerGoesAway) {
+TEST(Worker, DestructorStopsAndJoinsTheThread) {
   std::atomic<bool> ended = false;
   {
     Worker worker("orphan", [&](std::stop_token stop) {

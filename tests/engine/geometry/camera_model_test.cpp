@@ -31,7 +31,7 @@ struct Lens {
   Distortion distortion;
 };
 
-// Lenses that are one-to-one over the whole of kIntrinsics' image, from none to strong.
+// Lenses that are one-to-one over the whole image of kIntrinsics, from no distortion to strong distortion.
 const std::vector<Lens>& Lenses() {
   static const std::vector<Lens> lenses = {
       {"pinhole", LensModel::kRadialTangential, {}},
@@ -64,7 +64,7 @@ std::vector<Eigen::Vector2d> WholeImage(const CameraModel& camera) {
   return pixels;
 }
 
-TEST(CameraModelTest, EveryPixelOfTheImageComesBackFromItsRay) {
+TEST(CameraModelTest, ProjectInvertsUnprojectForEveryPixel) {
   for (const Lens& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
     for (const Eigen::Vector2d& pixel : WholeImage(camera)) {
@@ -80,12 +80,12 @@ TEST(CameraModelTest, EveryPixelOfTheImageComesBackFromItsRay) {
   }
 }
 
-TEST(CameraModelTest, EveryRayOfTheRangeComesBackFromItsPixel) {
+TEST(CameraModelTest, UnprojectInvertsProjectWithinTheLensRange) {
   Random random(1);
   for (const Lens& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
     for (int i = 0; i < 500; ++i) {
-      // Near the limit a pixel covers ever more angle, and the end itself is excluded.
+      // Near the limit a pixel covers an ever larger angle, and the limit itself is excluded.
       const double angle = random.Uniform(0, 0.95 * camera.max_angle()), turn = random.Uniform(0, 2 * kPi);
       const Eigen::Vector3d ray(std::sin(angle) * std::cos(turn), std::sin(angle) * std::sin(turn),
                                 std::cos(angle));
@@ -98,7 +98,7 @@ TEST(CameraModelTest, EveryRayOfTheRangeComesBackFromItsPixel) {
   }
 }
 
-TEST(CameraModelTest, TheJacobianIsTheDerivative) {
+TEST(CameraModelTest, JacobianEqualsTheNumericDerivative) {
   Random random(2);
   for (const Lens& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
@@ -115,7 +115,7 @@ TEST(CameraModelTest, TheJacobianIsTheDerivative) {
       for (int axis = 0; axis < 3; ++axis) {
         const double h = 1e-5 * point.norm();
         const Eigen::Vector3d step = h * Eigen::Vector3d::Unit(axis);
-        // Five points: the error is of the fourth order in the step.
+        // A five-point stencil: its error is of fourth order in the step.
         const Eigen::Vector2d numeric =
             (8 * (*camera.Project(point + step) - *camera.Project(point - step)) -
              (*camera.Project(point + 2 * step) - *camera.Project(point - 2 * step))) /
@@ -127,7 +127,7 @@ TEST(CameraModelTest, TheJacobianIsTheDerivative) {
   }
 }
 
-TEST(CameraModelTest, AgreesWithOpenCvsPinhole) {
+TEST(CameraModelTest, MatchesTheOpenCvPinholeModel) {
   Random random(3);
   const cv::Matx33d matrix(kIntrinsics.fx, 0, kIntrinsics.cx, 0, kIntrinsics.fy, kIntrinsics.cy, 0, 0, 1);
   for (const Lens& lens : Lenses()) {
@@ -151,7 +151,7 @@ TEST(CameraModelTest, AgreesWithOpenCvsPinhole) {
   }
 }
 
-TEST(CameraModelTest, AgreesWithOpenCvsFisheye) {
+TEST(CameraModelTest, MatchesTheOpenCvFisheyeModel) {
   Random random(4);
   const cv::Matx33d matrix(kIntrinsics.fx, 0, kIntrinsics.cx, 0, kIntrinsics.fy, kIntrinsics.cy, 0, 0, 1);
   for (const Lens& lens : Lenses()) {
@@ -160,7 +160,8 @@ TEST(CameraModelTest, AgreesWithOpenCvsFisheye) {
     }
     const CameraModel camera = MakeCamera(lens);
     std::vector<cv::Point3d> points;
-    for (int i = 0; i < 500; ++i) {  // OpenCV's divides by z, so that only the half space in front compares
+    for (int i = 0; i < 500;
+         ++i) {  // OpenCV divides by z, so only points in front of the camera are comparable
       points.emplace_back(random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(0.3, 4));
     }
     std::vector<cv::Point2d> projected;
@@ -175,7 +176,7 @@ TEST(CameraModelTest, AgreesWithOpenCvsFisheye) {
   }
 }
 
-TEST(CameraModelTest, FovProjectsAsDevernayAndFaugerasWrite) {
+TEST(CameraModelTest, FovLensFollowsDevernayAndFaugeras) {
   constexpr double kOmega = 0.93;
   const CameraModel camera(LensModel::kFov, kIntrinsics, {kOmega});
   const Eigen::Vector3d point(0.6, -0.8, 1.25);
@@ -186,7 +187,7 @@ TEST(CameraModelTest, FovProjectsAsDevernayAndFaugerasWrite) {
   EXPECT_LT((*camera.Project(point) - expected).norm(), 1e-10);
 }
 
-TEST(CameraModelTest, NoPointBehindTheCameraFallsIntoTheImage) {
+TEST(CameraModelTest, PinholeAndFovDoNotProjectPointsBehindTheCamera) {
   Random random(5);
   for (const Lens& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
@@ -202,9 +203,9 @@ TEST(CameraModelTest, NoPointBehindTheCameraFallsIntoTheImage) {
   }
 }
 
-TEST(CameraModelTest, AFisheyeSeesBehindItself) {
+TEST(CameraModelTest, FisheyeProjectsPointsBehindTheCamera) {
   const CameraModel camera(LensModel::kKannalaBrandt, {1000, 1000, 200, 200, 500, 500}, {});
-  const double angle = 2.0;  // radians, 25 degrees behind the lens
+  const double angle = 2.0;  // radians, 25 degrees beyond the image plane
   const Eigen::Vector3d ray(std::sin(angle), 0, std::cos(angle));
   const auto pixel = camera.Project(ray);
   ASSERT_TRUE(pixel);
@@ -214,21 +215,21 @@ TEST(CameraModelTest, AFisheyeSeesBehindItself) {
   EXPECT_FALSE(camera.Project(Eigen::Vector3d(0, 0, 0)));
 }
 
-// With k1 < 0 alone the distorted radius r + k1 r^3 turns back at r = 1 / sqrt(-3 k1).
-TEST(CameraModelTest, PointsWhereTheLensFoldsBackDoNotProject) {
+// With k1 < 0 alone, the distorted radius r + k1 r^3 has its maximum at r = 1 / sqrt(-3 k1).
+TEST(CameraModelTest, PointsBeyondTheDistortionMaximumDoNotProject) {
   const CameraModel camera(LensModel::kRadialTangential, kIntrinsics, {-0.3});
   const double radius = 1 / std::sqrt(0.9);
   EXPECT_NEAR(camera.max_angle(), std::atan(radius), 2e-6);
   EXPECT_TRUE(camera.Project(Eigen::Vector3d(0.999 * radius, 0, 1)));
   EXPECT_FALSE(camera.Project(Eigen::Vector3d(1.001 * radius, 0, 1)));
-  // On the far side of the fold r (1 - 0.3 r^2) is zero again: it would land in the middle of the image.
+  // Beyond the maximum r (1 - 0.3 r^2) returns to zero: the point would project to the middle of the image.
   EXPECT_FALSE(camera.Project(Eigen::Vector3d(1 / std::sqrt(0.3), 0, 1)));
   const double edge = radius * (1 - 0.3 * radius * radius);
   EXPECT_TRUE(camera.Unproject({kIntrinsics.cx + 0.999 * edge * kIntrinsics.fx, kIntrinsics.cy}));
   EXPECT_FALSE(camera.Unproject({kIntrinsics.cx + 1.001 * edge * kIntrinsics.fx, kIntrinsics.cy}));
 }
 
-TEST(CameraModelTest, AFisheyesRangeEndsWhereItsAngleTurnsBack) {
+TEST(CameraModelTest, FisheyeRangeEndsAtTheDistortionMaximum) {
   const CameraModel camera(LensModel::kKannalaBrandt, kIntrinsics, {-0.1});
   const double angle = 1 / std::sqrt(0.3);
   EXPECT_NEAR(camera.max_angle(), angle, 1e-5);
@@ -236,8 +237,8 @@ TEST(CameraModelTest, AFisheyesRangeEndsWhereItsAngleTurnsBack) {
   EXPECT_FALSE(camera.Project(Eigen::Vector3d(std::sin(1.001 * angle), 0, std::cos(1.001 * angle))));
 }
 
-// The range is the first fold only, also where a later coefficient makes the lens grow again.
-TEST(CameraModelTest, AShortFoldBetweenTwoGrowingStretchesIsFound) {
+// The range ends at the first maximum, even where a higher coefficient makes the radius increase again later.
+TEST(CameraModelTest, FindsAShortDecreasingIntervalOfTheDistortion) {
   // (r d)' = 1 - 3 s + 2.2 s^2 in s = r^2 is negative between two roots; the first ends the range.
   const double k1 = -1.0, k2 = 2.2 / 5;
   const double first_root = (3 - std::sqrt(9 - 8.8)) / 4.4;
@@ -245,7 +246,7 @@ TEST(CameraModelTest, AShortFoldBetweenTwoGrowingStretchesIsFound) {
   EXPECT_NEAR(camera.max_angle(), std::atan(std::sqrt(first_root)), 2e-6);
 }
 
-TEST(CameraModelTest, WithinTheRangeNoTwoRaysShareAPixelDespiteDecentring) {
+TEST(CameraModelTest, IsOneToOneWithinTheRangeDespiteDecentring) {
   const CameraModel camera(LensModel::kRadialTangential, kIntrinsics, {-0.3, 0.05, 0.02, -0.03, 0});
   Random random(6);
   for (int i = 0; i < 2000; ++i) {
@@ -258,7 +259,7 @@ TEST(CameraModelTest, WithinTheRangeNoTwoRaysShareAPixelDespiteDecentring) {
   }
 }
 
-TEST(CameraModelTest, PixelsThatAreNoNumbersHaveNoRay) {
+TEST(CameraModelTest, NonFinitePixelsAndPointsAreRejected) {
   for (const Lens& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
     const double nan = std::numeric_limits<double>::quiet_NaN(),
@@ -270,7 +271,7 @@ TEST(CameraModelTest, PixelsThatAreNoNumbersHaveNoRay) {
   }
 }
 
-TEST(CameraModelTest, IsInsideCountsPixelCentres) {
+TEST(CameraModelTest, IsInsideRefersToPixelCentres) {
   const CameraModel camera(LensModel::kRadialTangential, kIntrinsics, {});
   EXPECT_TRUE(camera.IsInside({0, 0}));
   EXPECT_TRUE(camera.IsInside({751, 479}));
@@ -279,7 +280,7 @@ TEST(CameraModelTest, IsInsideCountsPixelCentres) {
   EXPECT_FALSE(camera.IsInside({3.9, 100}, 4));
 }
 
-TEST(CameraModelTest, GoodNumbersValidate) {
+TEST(CameraModelTest, ValidateAcceptsGoodParameters) {
   for (const Lens& lens : Lenses()) {
     EXPECT_EQ(CameraModel::Validate(lens.model, kIntrinsics, lens.distortion).value_or(""), "") << lens.name;
   }
@@ -287,9 +288,9 @@ TEST(CameraModelTest, GoodNumbersValidate) {
   EXPECT_FALSE(CameraModel::Validate(none.lens(), none.intrinsics(), none.distortion()));
 }
 
-TEST(CameraModelTest, BadNumbersGetASentenceThatNamesThem) {
+TEST(CameraModelTest, ValidateNamesTheBadParameter) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto complaint = [](LensModel lens, auto change) {
+  const auto validation_error = [](LensModel lens, auto change) {
     CameraModel::Intrinsics intrinsics = kIntrinsics;
     Distortion distortion{};
     change(intrinsics, distortion);
@@ -297,20 +298,23 @@ TEST(CameraModelTest, BadNumbersGetASentenceThatNamesThem) {
   };
   const LensModel brown = LensModel::kRadialTangential, fov = LensModel::kFov,
                   fisheye = LensModel::kKannalaBrandt;
-  EXPECT_NE(complaint(brown, [](auto& in, auto&) { in.width_px = 0; }).find("width is 0"), std::string::npos);
-  EXPECT_NE(complaint(brown, [](auto& in, auto&) { in.height_px = 70000; }).find("height"),
+  EXPECT_NE(validation_error(brown, [](auto& in, auto&) { in.width_px = 0; }).find("width is 0"),
             std::string::npos);
-  EXPECT_NE(complaint(brown, [](auto& in, auto&) { in.fx = -1; }).find("fx is -1"), std::string::npos);
-  EXPECT_NE(complaint(brown, [&](auto& in, auto&) { in.fy = nan; }).find("fy"), std::string::npos);
-  EXPECT_NE(complaint(brown, [&](auto& in, auto&) { in.cx = nan; }).find("cx"), std::string::npos);
-  EXPECT_NE(complaint(fisheye, [&](auto&, auto& d) { d[2] = nan; }).find("coefficient 3"), std::string::npos);
-  EXPECT_NE(complaint(fisheye, [](auto&, auto& d) { d[4] = 0.1; }).find("does not use"), std::string::npos);
-  EXPECT_NE(complaint(fov, [](auto&, auto& d) { d[0] = 3.2; }).find("omega"), std::string::npos);
-  EXPECT_NE(complaint(brown, [](auto&, auto& d) { d[0] = -30; }).find("half of the image"),
+  EXPECT_NE(validation_error(brown, [](auto& in, auto&) { in.height_px = 70000; }).find("height"),
+            std::string::npos);
+  EXPECT_NE(validation_error(brown, [](auto& in, auto&) { in.fx = -1; }).find("fx is -1"), std::string::npos);
+  EXPECT_NE(validation_error(brown, [&](auto& in, auto&) { in.fy = nan; }).find("fy"), std::string::npos);
+  EXPECT_NE(validation_error(brown, [&](auto& in, auto&) { in.cx = nan; }).find("cx"), std::string::npos);
+  EXPECT_NE(validation_error(fisheye, [&](auto&, auto& d) { d[2] = nan; }).find("coefficient 3"),
+            std::string::npos);
+  EXPECT_NE(validation_error(fisheye, [](auto&, auto& d) { d[4] = 0.1; }).find("does not use"),
+            std::string::npos);
+  EXPECT_NE(validation_error(fov, [](auto&, auto& d) { d[0] = 3.2; }).find("omega"), std::string::npos);
+  EXPECT_NE(validation_error(brown, [](auto&, auto& d) { d[0] = -30; }).find("half of the image"),
             std::string::npos);
 }
 
-TEST(CameraModelTest, EqualsOnlyTheSameNumbers) {
+TEST(CameraModelTest, CamerasAreEqualOnlyIfAllParametersAreEqual) {
   const CameraModel a(LensModel::kRadialTangential, kIntrinsics, {-0.3, 0.1});
   EXPECT_EQ(a, CameraModel(LensModel::kRadialTangential, kIntrinsics, {-0.3, 0.1}));
   EXPECT_FALSE(a == CameraModel(LensModel::kRadialTangential, kIntrinsics, {-0.3, 0.2}));
@@ -320,8 +324,8 @@ TEST(CameraModelTest, EqualsOnlyTheSameNumbers) {
   EXPECT_FALSE(a == CameraModel(LensModel::kRadialTangential, shifted, {-0.3, 0.1}));
 }
 
-// The recorded sequences' own lenses, where they are at hand: every pixel of them needs its ray.
-TEST(CameraModelTest, TheSequencesCalibrationsCoverTheirImages) {
+// Uses the recorded sequences where they are available: every pixel of their images needs a ray.
+TEST(CameraModelTest, SequenceCalibrationsUnprojectEveryPixel) {
   const std::filesystem::path folder = std::filesystem::path(DOCENT_SOURCE_DIR) / "../shared/sequences";
   if (!std::filesystem::is_directory(folder)) {
     GTEST_SKIP() << "no sequences at " << folder;

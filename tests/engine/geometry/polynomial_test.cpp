@@ -11,7 +11,7 @@
 namespace docent::engine {
 namespace {
 
-// Coefficients of the product of (x - root).
+// The coefficients of the product of (x - root) over all roots.
 std::vector<double> FromRoots(const std::vector<double>& roots) {
   std::vector<double> coefficients = {1};
   for (const double root : roots) {
@@ -25,12 +25,12 @@ std::vector<double> FromRoots(const std::vector<double>& roots) {
   return coefficients;
 }
 
-TEST(SignChangesTest, FindsAllRootsInsideTheIntervalAndNoOthers) {
+TEST(SignChangesTest, FindsExactlyTheRootsInsideTheInterval) {
   Random random(1);
   for (int trial = 0; trial < 200; ++trial) {
     std::vector<double> roots, inside;
     for (int i = 0; i < 6; ++i) {
-      // At least 0.3 apart, so that rounding cannot merge two of them.
+      // The roots are at least 0.3 apart, so that rounding cannot merge two of them.
       roots.push_back(-1.5 + i + random.Uniform(-0.35, 0.35));
       if (roots.back() > 0 && roots.back() < 3) {
         inside.push_back(roots.back());
@@ -44,7 +44,7 @@ TEST(SignChangesTest, FindsAllRootsInsideTheIntervalAndNoOthers) {
   }
 }
 
-TEST(SignChangesTest, APolynomialWithoutRootsHasNone) {
+TEST(SignChangesTest, FindsNoneWhereThePolynomialHasNoRoots) {
   EXPECT_TRUE(SignChanges({}, 10).empty());
   EXPECT_TRUE(SignChanges({3}, 10).empty());
   EXPECT_TRUE(SignChanges({1, 0, 1}, 10).empty());

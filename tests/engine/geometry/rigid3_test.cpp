@@ -22,7 +22,7 @@ Twist MakeTwist(const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
   return twist;
 }
 
-// The exponential as its defining power series of 4x4 matrices, after halving the argument until it is small.
+// The exponential by its defining power series of 4x4 matrices, with the argument halved until it is small.
 Eigen::Matrix4d SeriesExponential(const Twist& twist) {
   Eigen::Matrix4d generator = Eigen::Matrix4d::Zero();
   generator.topLeftCorner<3, 3>() = Hat(twist.tail<3>());
@@ -40,7 +40,7 @@ Eigen::Matrix4d SeriesExponential(const Twist& twist) {
   return sum;
 }
 
-TEST(Rotation3Test, KeepsTheGroupLaws) {
+TEST(Rotation3Test, SatisfiesTheGroupLaws) {
   Random random(1);
   std::vector<Rotation3> samples = {Rotation3()};
   for (const double angle : CriticalAngles()) {
@@ -49,7 +49,7 @@ TEST(Rotation3Test, KeepsTheGroupLaws) {
   ExpectGroupLaws(samples, 1e-14);
 }
 
-TEST(Rigid3Test, KeepsTheGroupLaws) {
+TEST(Rigid3Test, SatisfiesTheGroupLaws) {
   Random random(2);
   std::vector<Rigid3> samples = {Rigid3()};
   for (const double angle : CriticalAngles()) {
@@ -58,7 +58,7 @@ TEST(Rigid3Test, KeepsTheGroupLaws) {
   ExpectGroupLaws(samples, 1e-13);
 }
 
-TEST(Rotation3Test, LogInvertsExpFromZeroToHalfATurn) {
+TEST(Rotation3Test, LogInvertsExpFromZeroTo180Degrees) {
   Random random(3);
   for (const double angle : CriticalAngles()) {
     for (int i = 0; i < 20; ++i) {
@@ -71,7 +71,7 @@ TEST(Rotation3Test, LogInvertsExpFromZeroToHalfATurn) {
   }
 }
 
-TEST(Rotation3Test, LogOfMoreThanHalfATurnTakesTheShortWay) {
+TEST(Rotation3Test, LogOfMoreThan180DegreesReturnsTheSmallerAngle) {
   const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, -2) / 3;
   EXPECT_LT((Rotation3::Exp((kPi + 0.1) * axis).Log() + (kPi - 0.1) * axis).norm(), 1e-14);
   EXPECT_LT((Rotation3::Exp((2 * kPi - 1e-9) * axis).Log() + 1e-9 * axis).norm(), 1e-15);
@@ -84,7 +84,7 @@ TEST(Rotation3Test, AngleIsTheSameForBothQuaternionsOfARotation) {
   EXPECT_LT((Rotation3(q).Log() - Rotation3(negated).Log()).norm(), 1e-15);
 }
 
-TEST(Rotation3Test, ManyProductsStayUnit) {
+TEST(Rotation3Test, ManyProductsKeepUnitNorm) {
   Rotation3 rotation;
   const Rotation3 step = Rotation3::Exp({0.01, -0.02, 0.03});
   for (int i = 0; i < 100000; ++i) {
@@ -93,7 +93,7 @@ TEST(Rotation3Test, ManyProductsStayUnit) {
   EXPECT_NEAR(rotation.quaternion().norm(), 1.0, 1e-14);
 }
 
-TEST(Rotation3Test, MatrixIsWhatTheRotationDoes) {
+TEST(Rotation3Test, MatrixEqualsTheRotation) {
   const Rotation3 rotation = Rotation3::Exp({0.4, -1.2, 0.7});
   const Eigen::Vector3d x(1, 2, 3);
   EXPECT_LT((rotation.matrix() * x - rotation * x).norm(), 1e-14);
@@ -116,7 +116,7 @@ TEST(Rigid3Test, ExpIsTheMatrixExponential) {
   }
 }
 
-TEST(Rigid3Test, LogInvertsExpFromZeroToHalfATurn) {
+TEST(Rigid3Test, LogInvertsExpFromZeroTo180Degrees) {
   Random random(5);
   for (const double angle : CriticalAngles()) {
     const Twist twist = MakeTwist(RandomVector(&random, 3), angle * RandomDirection(&random));
@@ -124,7 +124,7 @@ TEST(Rigid3Test, LogInvertsExpFromZeroToHalfATurn) {
   }
 }
 
-TEST(Rigid3Test, ASmallTwistOnTheLeftMovesPointsAsItsGeneratorSays) {
+TEST(Rigid3Test, LeftMultipliedTwistHasTheExpectedDerivative) {
   const Rigid3 camera_from_map(Rotation3::Exp({0.3, -0.2, 0.9}), {1, 2, 3});
   const Eigen::Vector3d point(0.4, -1.1, 2.2), v(0.3, 0.5, -0.7), w(-0.2, 0.6, 0.1);
   constexpr double kStep = 1e-6;
@@ -134,7 +134,7 @@ TEST(Rigid3Test, ASmallTwistOnTheLeftMovesPointsAsItsGeneratorSays) {
   EXPECT_LT(((plus - minus) / (2 * kStep) - expected).norm(), 1e-9);
 }
 
-TEST(Rigid3Test, HomogeneousPointsAtInfinityOnlyTurn) {
+TEST(Rigid3Test, InfiniteHomogeneousPointsAreOnlyRotated) {
   const Rigid3 transform(Rotation3::Exp({0.3, -0.2, 0.9}), {1, 2, 3});
   const Eigen::Vector3d x(0.4, -1.1, 2.2);
   Eigen::Vector4d finite, infinite;
@@ -151,7 +151,7 @@ TEST(Rigid3Test, OriginInSourceIsWhatMapsToZero) {
   EXPECT_LT((transform * transform.OriginInSource()).norm(), 1e-14);
 }
 
-TEST(Rigid3Test, IsNearTellsTranslationFromRotation) {
+TEST(Rigid3Test, IsNearChecksTranslationAndRotationSeparately) {
   const Rigid3 a;
   const Rigid3 shifted(Rotation3(), {0.1, 0, 0}),
       turned(Rotation3::Exp({0, 0.1, 0}), Eigen::Vector3d::Zero());
@@ -161,7 +161,7 @@ TEST(Rigid3Test, IsNearTellsTranslationFromRotation) {
   EXPECT_FALSE(IsNear(a, turned, 1, 0.09));
 }
 
-TEST(Rigid3Test, PrintsItsNumbers) {
+TEST(Rigid3Test, PrintsTranslationAndQuaternion) {
   std::ostringstream text;
   text << Rigid3(Rotation3(), {1, 2, 3});
   EXPECT_EQ(text.str(), "translation 1 2 3, rotation (qx qy qz qw) 0 0 0 1");

@@ -38,7 +38,7 @@ double SquaredError(const Sim3& a_from_b, const std::vector<Eigen::Vector3d>& a,
   return sum;
 }
 
-TEST(Sim3Test, KeepsTheGroupLaws) {
+TEST(Sim3Test, SatisfiesTheGroupLaws) {
   Random random(1);
   std::vector<Sim3> samples = {Sim3()};
   for (int i = 0; i < 30; ++i) {
@@ -75,7 +75,7 @@ TEST(AlignSim3Test, AlignsPlanarCloudsWithoutMirroringThem) {
   }
 }
 
-TEST(AlignSim3Test, AMirroredCloudStillGivesARotation) {
+TEST(AlignSim3Test, ReturnsAProperRotationForAMirroredCloud) {
   Random random(4);
   std::vector<Eigen::Vector3d> a, b;
   for (int i = 0; i < 20; ++i) {
@@ -87,7 +87,7 @@ TEST(AlignSim3Test, AMirroredCloudStillGivesARotation) {
   EXPECT_NEAR(found->rotation.matrix().determinant(), 1.0, 1e-12);
 }
 
-TEST(AlignSim3Test, NoNeighbouringSimilarityFitsNoisyPointsBetter) {
+TEST(AlignSim3Test, IsALocalOptimumForNoisyPoints) {
   Random random(5);
   for (const bool fixed_scale : {false, true}) {
     Sim3 a_from_b = RandomSim3(&random);
@@ -117,7 +117,7 @@ TEST(AlignSim3Test, NoNeighbouringSimilarityFitsNoisyPointsBetter) {
   }
 }
 
-TEST(AlignSim3Test, AFixedScaleStaysOne) {
+TEST(AlignSim3Test, KeepsAFixedScaleAtOne) {
   Random random(6);
   Sim3 a_from_b = RandomSim3(&random);
   a_from_b.scale = 3;
@@ -131,7 +131,7 @@ TEST(AlignSim3Test, AFixedScaleStaysOne) {
   EXPECT_LT((found->rotation.inverse() * a_from_b.rotation).Angle(), 1e-10);
 }
 
-TEST(AlignSim3Test, RefusesWhatDoesNotFixASimilarity) {
+TEST(AlignSim3Test, RejectsDegenerateAndNonFiniteInput) {
   const std::vector<Eigen::Vector3d> two = {{0, 0, 0}, {1, 0, 0}};
   const std::vector<Eigen::Vector3d> line = {{0, 1, 2}, {1, 2, 3}, {2, 3, 4}, {7, 8, 9}};
   const std::vector<Eigen::Vector3d> same = {{1, 2, 3}, {1, 2, 3}, {1, 2, 3}, {1, 2, 3}};

@@ -10,16 +10,15 @@
 
 #include "engine/base/random.h"
 
-// The laws that every group of transforms of three-space keeps, checked for one type at a time, and the
-// numbers to check them with. `T` needs a default constructor (the identity), operator*, inverse() and an
-// action on Eigen::Vector3d.
+// Checks of the group laws for a type of 3D transforms, and the random numbers for them. `T` needs a default
+// constructor (the identity), operator*, inverse() and an action on Eigen::Vector3d.
 namespace docent::engine {
 
 inline Eigen::Vector3d RandomVector(Random* random, double size) {
   return {random->Uniform(-size, size), random->Uniform(-size, size), random->Uniform(-size, size)};
 }
 
-// A normal variable (Box and Muller 1958).
+// A standard normal variable (Box and Muller 1958).
 inline double RandomNormal(Random* random) {
   return std::sqrt(-2 * std::log(1 - random->Uniform())) * std::cos(2 * std::numbers::pi * random->Uniform());
 }
@@ -28,7 +27,7 @@ inline Eigen::Vector3d RandomDirection(Random* random) {
   return Eigen::Vector3d(RandomNormal(random), RandomNormal(random), RandomNormal(random)).normalized();
 }
 
-// Transforms are compared by what they do to four points that span space.
+// The largest distance between the images of four points that span space.
 template <typename T>
 double Difference(const T& a, const T& b) {
   double worst = (a * Eigen::Vector3d(0, 0, 0) - b * Eigen::Vector3d(0, 0, 0)).norm();
@@ -60,7 +59,8 @@ void ExpectGroupLaws(const std::vector<T>& samples, double tolerance) {
   }
 }
 
-// Angles from far below rounding through both ends of the series to half a turn.
+// Angles in radians from far below the rounding error, across both sides of the switch to the power series,
+// up to pi.
 inline std::vector<double> CriticalAngles() {
   const double pi = std::numbers::pi;
   return {0,   1e-300,    1e-160, 1e-20, 1e-12, 1e-9,   1e-8, 1e-7,      1e-5,      1e-3,      0.0999999,

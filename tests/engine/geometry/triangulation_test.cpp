@@ -22,7 +22,7 @@ double SquaredAngles(const Eigen::Vector3d& point_in_a, const Eigen::Vector3d& r
   return in_a * in_a + in_b * in_b;
 }
 
-TEST(TriangulateTest, FindsExactPointsFromNearToFar) {
+TEST(TriangulateTest, FindsExactPointsAtAllDepths) {
   Random random(1);
   for (int i = 0; i < 1000; ++i) {
     const Rigid3 b_from_a(Rotation3::Exp(RandomVector(&random, 1)), RandomVector(&random, 1));
@@ -34,9 +34,9 @@ TEST(TriangulateTest, FindsExactPointsFromNearToFar) {
   }
 }
 
-TEST(TriangulateTest, NoNeighbouringPointHasSmallerAngles) {
+TEST(TriangulateTest, IsALocalMinimumOfTheAngularErrors) {
   Random random(2);
-  constexpr double kNoise = 1e-4;  // radians; the claim holds to first order in it
+  constexpr double kNoise = 1e-4;  // radians; the result is optimal to first order in the noise
   for (int i = 0; i < 200; ++i) {
     const Rigid3 b_from_a(Rotation3::Exp(RandomVector(&random, 0.2)), Eigen::Vector3d(1, 0, 0.5));
     const Eigen::Vector3d point(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(1, 6));
@@ -53,8 +53,8 @@ TEST(TriangulateTest, NoNeighbouringPointHasSmallerAngles) {
   }
 }
 
-TEST(TriangulateTest, RefusesRaysThatMeetBehindACamera) {
-  const Rigid3 b_from_a(Rotation3(), {-1, 0, 0});  // b stands one metre to the right of a
+TEST(TriangulateTest, RejectsRaysThatMeetBehindACamera) {
+  const Rigid3 b_from_a(Rotation3(), {-1, 0, 0});  // camera b is one metre to the right of camera a
   const Eigen::Vector3d right = Eigen::Vector3d(0.2, 0, 1).normalized(),
                         left = Eigen::Vector3d(-0.2, 0, 1).normalized();
   EXPECT_TRUE(Triangulate(right, left, b_from_a));
@@ -63,7 +63,7 @@ TEST(TriangulateTest, RefusesRaysThatMeetBehindACamera) {
   EXPECT_FALSE(Triangulate(-right, left, b_from_a));
 }
 
-TEST(TriangulateTest, RefusesParallelRaysAndStandingStill) {
+TEST(TriangulateTest, RejectsParallelRaysAndAZeroBaseline) {
   const Rigid3 b_from_a(Rotation3(), {-1, 0, 0});
   const Eigen::Vector3d ahead(0, 0, 1);
   EXPECT_FALSE(Triangulate(ahead, ahead, b_from_a));
@@ -72,7 +72,7 @@ TEST(TriangulateTest, RefusesParallelRaysAndStandingStill) {
                            Rigid3()));
 }
 
-TEST(ParallaxAngleTest, IsTheAngleOfTheTriangle) {
+TEST(ParallaxAngleTest, IsTheAngleBetweenTheTwoRays) {
   EXPECT_NEAR(ParallaxAngle({0, 0, 0}, {1, 0, 0}, {0, 0, 1}), std::numbers::pi / 4, 1e-15);
   EXPECT_NEAR(ParallaxAngle({-1, 0, 0}, {1, 0, 0}, {0, 0, 1}), std::numbers::pi / 2, 1e-15);
   EXPECT_NEAR(ParallaxAngle({-1, 0, 0}, {1, 0, 0}, {0, 0, 1e9}), 2e-9, 1e-17);
@@ -99,7 +99,7 @@ PlanarScene MakePlane(Random* random, int inliers, int outliers, double noise) {
   return scene;
 }
 
-TEST(FitPlaneTest, FindsThePlaneAmongAsManyOutliers) {
+TEST(FitPlaneTest, FindsThePlaneWithFiftyPercentOutliers) {
   Random random(3);
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const PlanarScene scene = MakePlane(&random, 150, 150, 0.005);
@@ -125,7 +125,7 @@ TEST(FitPlaneTest, CountsTheInliersOfThePlaneItReturns) {
   EXPECT_EQ(fit->inliers, inliers);
 }
 
-TEST(FitPlaneTest, TheSameSeedGivesTheSameBytes) {
+TEST(FitPlaneTest, IsDeterministicForAGivenSeed) {
   Random random(5);
   const PlanarScene scene = MakePlane(&random, 60, 60, 0.01);
   const auto a = FitPlane(scene.points, 0.03, 7), b = FitPlane(scene.points, 0.03, 7);
@@ -134,7 +134,7 @@ TEST(FitPlaneTest, TheSameSeedGivesTheSameBytes) {
   EXPECT_EQ(a->plane.offset, b->plane.offset);
 }
 
-TEST(FitPlaneTest, ThreePointsAreEnoughAndALineIsNot) {
+TEST(FitPlaneTest, AcceptsThreePointsButNotALine) {
   const std::vector<Eigen::Vector3d> triangle = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
   const auto fit = FitPlane(triangle, 0.01, 1);
   ASSERT_TRUE(fit);

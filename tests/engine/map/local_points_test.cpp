@@ -21,7 +21,7 @@ MapSnapshot Cloud(int count, Random* random) {
   return map;
 }
 
-Sim3 Stretch() {
+Sim3 TrueMotion() {
   return {Rotation3::Exp({0.02, -0.05, 0.03}), Eigen::Vector3d(0.1, -0.2, 0.05), 1.07};
 }
 
@@ -31,12 +31,12 @@ MapSnapshot Moved(const MapSnapshot& map, const Sim3& motion) {
   return moved;
 }
 
-TEST(LocalPoints, AreTheNearestFiniteOnes) {
+TEST(LocalPoints, AreTheNearestFinitePoints) {
   Random random(1);
   MapSnapshot map = Cloud(200, &random);
   const Eigen::Vector3d place(0.2, 0.1, 2.5);
   for (std::size_t i = 0; i < map.points.size(); i += 3) map.points[i].point_in_map[3] = 0;
-  const LocalPoints local = PointsAbout(map, place, 20);
+  const LocalPoints local = NearestPoints(map, place, 20);
   ASSERT_EQ(local.ids.size(), 20u);
   double farthest = 0;
   for (std::size_t i = 0; i < 20; ++i) {
@@ -49,35 +49,35 @@ TEST(LocalPoints, AreTheNearestFiniteOnes) {
   for (const MapPoint& point : map.points)
     nearer += !point.infinite() && (point.position() - place).norm() < farthest;
   EXPECT_EQ(nearer, 19);
-  EXPECT_EQ(PointsAbout(map, place, 1000).ids.size(), 133u) << "all that there are";
+  EXPECT_EQ(NearestPoints(map, place, 1000).ids.size(), 133u) << "all finite points";
 }
 
-TEST(LocalPoints, TellHowTheirPartOfTheMapMoved) {
+TEST(LocalPoints, RecoverTheMotionOfThatPartOfTheMap) {
   Random random(2);
   const MapSnapshot then = Cloud(100, &random);
-  MapSnapshot now = Moved(then, Stretch());
-  // A fifth has gone another way, a fifth is gone.
+  MapSnapshot now = Moved(then, TrueMotion());
+  // A fifth of the points moved differently, and a fifth was removed.
   for (std::size_t i = 0; i < now.points.size(); i += 5) now.points[i].point_in_map[0] += 0.5;
   std::erase_if(now.points, [](const MapPoint& point) { return point.id % 5 == 0; });
-  const auto motion = MotionOf(PointsAbout(then, {0, 0, 3}, 80), now);
+  const auto motion = EstimateMotion(NearestPoints(then, {0, 0, 3}, 80), now);
   ASSERT_TRUE(motion);
   const Eigen::Vector3d place(0.3, -0.4, 2.2);
-  EXPECT_LT((*motion * place - Stretch() * place).norm(), 1e-9);
-  EXPECT_NEAR(motion->scale, Stretch().scale, 1e-9);
+  EXPECT_LT((*motion * place - TrueMotion() * place).norm(), 1e-9);
+  EXPECT_NEAR(motion->scale, TrueMotion().scale, 1e-9);
 }
 
-TEST(LocalPoints, TellNothingWhenTooFewAreLeftOrTheyAreOnALine) {
+TEST(LocalPoints, GiveNoMotionForTooFewOrCollinearPoints) {
   Random random(3);
   const MapSnapshot then = Cloud(100, &random);
-  const LocalPoints local = PointsAbout(then, {0, 0, 3}, 50);
+  const LocalPoints local = NearestPoints(then, {0, 0, 3}, 50);
   MapSnapshot few = then;
   few.points.resize(10);
-  EXPECT_FALSE(MotionOf(local, few));
-  EXPECT_FALSE(MotionOf(local, MapSnapshot()));
-  EXPECT_FALSE(MotionOf(LocalPoints(), then));
+  EXPECT_FALSE(EstimateMotion(local, few));
+  EXPECT_FALSE(EstimateMotion(local, MapSnapshot()));
+  EXPECT_FALSE(EstimateMotion(LocalPoints(), then));
   MapSnapshot line = then;
   for (MapPoint& point : line.points) point.point_in_map.head<2>().setZero();
-  EXPECT_FALSE(MotionOf(PointsAbout(line, {0, 0, 3}, 50), line));
+  EXPECT_FALSE(EstimateMotion(NearestPoints(line, {0, 0, 3}, 50), line));
 }
 
 }  // namespace

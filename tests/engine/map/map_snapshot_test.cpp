@@ -20,8 +20,8 @@ using ::testing::HasSubstr;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// Two keyframes with ids 2 and 5, the second turned about the first, points 3 (finite) and 7 (infinite), both
-// seen by both.
+// Two keyframes with ids 2 and 5, which differ by a rotation, and two points that both observe: 3 (finite)
+// and 7 (infinite).
 MapSnapshot GoodMap() {
   MapSnapshot map;
   auto features = std::make_shared<ImageFeatures>();
@@ -56,18 +56,18 @@ MapSnapshot GoodMap() {
   return map;
 }
 
-void ExpectComplaint(const std::function<void(MapSnapshot*)>& damage, const std::string& about) {
+void ExpectValidationError(const std::function<void(MapSnapshot*)>& damage, const std::string& about) {
   MapSnapshot map = GoodMap();
   damage(&map);
   EXPECT_THAT(Validate(map), HasSubstr(about));
 }
 
-TEST(MapSnapshot, IsGoodAsItIsAndWhenEmpty) {
+TEST(MapSnapshot, IsValidUnmodifiedAndEmpty) {
   EXPECT_EQ(Validate(GoodMap()), "");
   EXPECT_EQ(Validate(MapSnapshot()), "");
 }
 
-TEST(MapSnapshot, FindsByIdAndKnowsWhatIsMissing) {
+TEST(MapSnapshot, FindsItemsByIdAndReturnsNullForMissingOnes) {
   const MapSnapshot map = GoodMap();
   EXPECT_EQ(map.FindKeyFrame(5), &map.keyframes[1]);
   EXPECT_EQ(map.FindPoint(3), &map.points[0]);
@@ -77,90 +77,92 @@ TEST(MapSnapshot, FindsByIdAndKnowsWhatIsMissing) {
   }
 }
 
-TEST(MapSnapshot, NamesThePanoramaMapThatIsWrong) {
-  ExpectComplaint([](MapSnapshot* m) { m->next_panorama = 1; }, "panorama map 1 is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->panoramas.push_back(m->panoramas[0]); },
-                  "panorama map 1 is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->panoramas[0].reference = 4; },
-                  "reference keyframe that is not there");
-  ExpectComplaint([](MapSnapshot* m) { m->panoramas[0].reference = 5; }, "does not belong to it");
-  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].panorama = kNoId; },
-                  "keyframe 5 names a panorama map that is not there");
-  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].panorama = 0; },
-                  "keyframe 5 names a panorama map that is not there");
-  ExpectComplaint([](MapSnapshot* m) { m->points[1].panorama = kNoId; },
-                  "point 7 names a panorama map that is not there");
-  ExpectComplaint([](MapSnapshot* m) { m->points[0].panorama = 1; },
-                  "point 3 names a panorama map that is not there");
+TEST(MapSnapshot, ValidateNamesTheInvalidPanoramaMap) {
+  ExpectValidationError([](MapSnapshot* m) { m->next_panorama = 1; }, "panorama map 1 is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->panoramas.push_back(m->panoramas[0]); },
+                        "panorama map 1 is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->panoramas[0].reference = 4; }, "missing reference keyframe");
+  ExpectValidationError([](MapSnapshot* m) { m->panoramas[0].reference = 5; }, "does not belong to it");
+  ExpectValidationError([](MapSnapshot* m) { m->keyframes[1].panorama = kNoId; },
+                        "keyframe 5 refers to a missing panorama map");
+  ExpectValidationError([](MapSnapshot* m) { m->keyframes[1].panorama = 0; },
+                        "keyframe 5 refers to a missing panorama map");
+  ExpectValidationError([](MapSnapshot* m) { m->points[1].panorama = kNoId; },
+                        "point 7 refers to a missing panorama map");
+  ExpectValidationError([](MapSnapshot* m) { m->points[0].panorama = 1; },
+                        "point 3 refers to a missing panorama map");
 }
 
-TEST(MapSnapshot, NamesTheKeyframeThatIsWrong) {
-  ExpectComplaint([](MapSnapshot* m) { std::swap(m->keyframes[0], m->keyframes[1]); },
-                  "keyframe 2 is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].id = 2; }, "keyframe 2 is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->next_keyframe = 5; }, "keyframe 5 is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].camera.reset(); }, "keyframe 5 has no camera");
-  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].features.reset(); }, "keyframe 5 has no image");
-  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].features = std::make_shared<ImageFeatures>(); },
-                  "keyframe 5 has no image");
-  ExpectComplaint([](MapSnapshot* m) { m->keyframes[1].camera = testing_world::PinholeCamera(48, 64); },
-                  "keyframe 5 has an image of another size");
-  ExpectComplaint([](MapSnapshot* m) { m->keyframes[0].camera_from_map.translation.y() = kNan; },
-                  "keyframe 2 has no valid pose");
-  ExpectComplaint(
+TEST(MapSnapshot, ValidateNamesTheInvalidKeyframe) {
+  ExpectValidationError([](MapSnapshot* m) { std::swap(m->keyframes[0], m->keyframes[1]); },
+                        "keyframe 2 is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->keyframes[1].id = 2; }, "keyframe 2 is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->next_keyframe = 5; }, "keyframe 5 is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->keyframes[1].camera.reset(); }, "keyframe 5 has no camera");
+  ExpectValidationError([](MapSnapshot* m) { m->keyframes[1].features.reset(); }, "keyframe 5 has no image");
+  ExpectValidationError([](MapSnapshot* m) { m->keyframes[1].features = std::make_shared<ImageFeatures>(); },
+                        "keyframe 5 has no image");
+  ExpectValidationError([](MapSnapshot* m) { m->keyframes[1].camera = testing_world::PinholeCamera(48, 64); },
+                        "keyframe 5 has an image whose size differs");
+  ExpectValidationError([](MapSnapshot* m) { m->keyframes[0].camera_from_map.translation.y() = kNan; },
+                        "keyframe 2 has no valid pose");
+  ExpectValidationError(
       [](MapSnapshot* m) {
         m->keyframes[0].camera_from_map.rotation = Rotation3(Eigen::Quaterniond(0, 0, 0, 0));
       },
       "keyframe 2 has no valid pose");
   for (const double depth : {0.0, -1.0, kNan, std::numeric_limits<double>::infinity()})
-    ExpectComplaint([&](MapSnapshot* m) { m->keyframes[0].mean_depth = depth; },
-                    "keyframe 2 has no valid depth");
+    ExpectValidationError([&](MapSnapshot* m) { m->keyframes[0].mean_depth = depth; },
+                          "keyframe 2 has no valid depth");
   for (const double sigma : {-1.0, kNan, std::numeric_limits<double>::infinity()})
-    ExpectComplaint([&](MapSnapshot* m) { m->keyframes[0].depth_sigma = sigma; },
-                    "keyframe 2 has no valid depth");
+    ExpectValidationError([&](MapSnapshot* m) { m->keyframes[0].depth_sigma = sigma; },
+                          "keyframe 2 has no valid depth");
 }
 
-TEST(MapSnapshot, NamesThePointThatIsWrong) {
-  ExpectComplaint([](MapSnapshot* m) { std::swap(m->points[0], m->points[1]); }, "point 3 is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->points[1].id = 3; }, "point 3 is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->next_point = 7; }, "point 7 is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->points[0].point_in_map.x() = kNan; },
-                  "point 3 has no valid position");
-  ExpectComplaint([](MapSnapshot* m) { m->points[0].point_in_map[3] = 0.5; },
-                  "point 3 has no valid position");
-  ExpectComplaint([](MapSnapshot* m) { m->points[0].normal.z() = std::nanf(""); },
-                  "point 3 has no valid normal");
-  ExpectComplaint([](MapSnapshot* m) { m->points[1].source_keyframe = 3; },
-                  "point 7 names a source keyframe");
-  ExpectComplaint([](MapSnapshot* m) { m->points[1].source_level = kPyramidLevels; },
-                  "point 7 names a pyramid level");
+TEST(MapSnapshot, ValidateNamesTheInvalidPoint) {
+  ExpectValidationError([](MapSnapshot* m) { std::swap(m->points[0], m->points[1]); },
+                        "point 3 is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->points[1].id = 3; }, "point 3 is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->next_point = 7; }, "point 7 is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->points[0].point_in_map.x() = kNan; },
+                        "point 3 has no valid position");
+  ExpectValidationError([](MapSnapshot* m) { m->points[0].point_in_map[3] = 0.5; },
+                        "point 3 has no valid position");
+  ExpectValidationError([](MapSnapshot* m) { m->points[0].normal.z() = std::nanf(""); },
+                        "point 3 has no valid normal");
+  ExpectValidationError([](MapSnapshot* m) { m->points[1].source_keyframe = 3; },
+                        "point 7 refers to a missing source keyframe");
+  ExpectValidationError([](MapSnapshot* m) { m->points[1].source_level = kPyramidLevels; },
+                        "point 7 refers to a missing pyramid level");
   for (const Eigen::Vector2f& pixel : {Eigen::Vector2f(31.5f, 5), Eigen::Vector2f(5, 23.5f),
                                        Eigen::Vector2f(-1, 5), Eigen::Vector2f(std::nanf(""), 5)}) {
-    ExpectComplaint([&](MapSnapshot* m) { m->points[1].source_pixel = pixel; },
-                    "point 7 has its source outside the image");
+    ExpectValidationError([&](MapSnapshot* m) { m->points[1].source_pixel = pixel; },
+                          "point 7 has its source outside the image");
   }
 }
 
-TEST(MapSnapshot, NamesTheInfinitePointWithoutADirection) {
-  ExpectComplaint([](MapSnapshot* m) { m->points[1].point_in_map.setZero(); },
-                  "point 7 has no valid position");
-  ExpectComplaint([](MapSnapshot* m) { m->points[1].point_in_map *= 3; }, "point 7 has no valid position");
+TEST(MapSnapshot, ValidateNamesAnInfinitePointWithoutAUnitDirection) {
+  ExpectValidationError([](MapSnapshot* m) { m->points[1].point_in_map.setZero(); },
+                        "point 7 has no valid position");
+  ExpectValidationError([](MapSnapshot* m) { m->points[1].point_in_map *= 3; },
+                        "point 7 has no valid position");
 }
 
-TEST(MapSnapshot, NamesTheObservationThatIsWrong) {
+TEST(MapSnapshot, ValidateNamesTheInvalidObservation) {
   const std::string last = "observation of point 7 in keyframe 5";
-  ExpectComplaint([](MapSnapshot* m) { std::swap(m->observations[2], m->observations[3]); },
-                  "observation of point 3 in keyframe 5 is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->observations.push_back(m->observations.back()); },
-                  last + " is out of order");
-  ExpectComplaint([](MapSnapshot* m) { m->observations[3].keyframe = 6; },
-                  "observation of point 7 in keyframe 6 names a keyframe that is not there");
-  ExpectComplaint([](MapSnapshot* m) { m->observations[3].point = 8; },
-                  "observation of point 8 in keyframe 5 names a point that is not there");
-  ExpectComplaint([](MapSnapshot* m) { m->observations[3].level = 4; }, last + " names a pyramid level");
+  ExpectValidationError([](MapSnapshot* m) { std::swap(m->observations[2], m->observations[3]); },
+                        "observation of point 3 in keyframe 5 is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->observations.push_back(m->observations.back()); },
+                        last + " is out of order");
+  ExpectValidationError([](MapSnapshot* m) { m->observations[3].keyframe = 6; },
+                        "observation of point 7 in keyframe 6 refers to a missing keyframe");
+  ExpectValidationError([](MapSnapshot* m) { m->observations[3].point = 8; },
+                        "observation of point 8 in keyframe 5 refers to a missing point");
+  ExpectValidationError([](MapSnapshot* m) { m->observations[3].level = 4; },
+                        last + " refers to a missing pyramid level");
   for (const Eigen::Vector2f& pixel : {Eigen::Vector2f(63.5f, 5), Eigen::Vector2f(5, 47.5f),
                                        Eigen::Vector2f(-0.5f, 5), Eigen::Vector2f(5, std::nanf(""))}) {
-    ExpectComplaint([&](MapSnapshot* m) { m->observations[3].pixel = pixel; }, last + " lies outside");
+    ExpectValidationError([&](MapSnapshot* m) { m->observations[3].pixel = pixel; }, last + " lies outside");
   }
 }
 

@@ -24,11 +24,11 @@ MapPoint PointFrom(KeyFrameId source) {
   return point;
 }
 
-Observation Seen(KeyFrameId keyframe, MapPointId point) {
+Observation MakeObservation(KeyFrameId keyframe, MapPointId point) {
   return {keyframe, point, Eigen::Vector2f(10, 12), 1};
 }
 
-// What the map's header promises, asked in full.
+// Checks every invariant that map.h states.
 void ExpectConsistent(const Map& map) {
   std::set<std::pair<KeyFrameId, MapPointId>> from_keyframes, from_points;
   for (const auto& [id, record] : map.keyframes()) {
@@ -37,7 +37,7 @@ void ExpectConsistent(const Map& map) {
                                [](const auto& a, const auto& b) { return a.point < b.point; }));
     for (const Observation& observation : record.observations) {
       EXPECT_EQ(observation.keyframe, id);
-      EXPECT_TRUE(from_keyframes.emplace(id, observation.point).second) << "seen twice";
+      EXPECT_TRUE(from_keyframes.emplace(id, observation.point).second) << "observed twice";
     }
   }
   std::size_t alive = 0;
@@ -47,7 +47,7 @@ void ExpectConsistent(const Map& map) {
       continue;
     }
     ++alive;
-    EXPECT_TRUE(map.keyframes().contains(record.point.source_keyframe)) << "source is gone";
+    EXPECT_TRUE(map.keyframes().contains(record.point.source_keyframe)) << "the source keyframe is missing";
     EXPECT_TRUE(std::is_sorted(record.observers.begin(), record.observers.end()));
     for (const KeyFrameId observer : record.observers) from_points.emplace(observer, record.point.id);
   }
@@ -55,11 +55,11 @@ void ExpectConsistent(const Map& map) {
   EXPECT_EQ(alive, map.AlivePoints());
 }
 
-// A new point with the two observations that it is made of.
-MapPointId AddSeenPoint(Map* map, KeyFrameId source, KeyFrameId other) {
+// Adds a point with its two observations.
+MapPointId AddObservedPoint(Map* map, KeyFrameId source, KeyFrameId other) {
   const MapPointId id = map->AddPoint(PointFrom(source));
-  map->AddObservation(Seen(source, id));
-  map->AddObservation(Seen(other, id));
+  map->AddObservation(MakeObservation(source, id));
+  map->AddObservation(MakeObservation(other, id));
   return id;
 }
 
@@ -85,10 +85,10 @@ class RandomMap {
             : map->points()[random_.Below(static_cast<std::uint32_t>(map->points().size()))].point.id;
     if (action < 40) {
       if (one != other) {
-        EXPECT_TRUE(points_.insert(AddSeenPoint(map, one, other)).second) << "id given twice";
+        EXPECT_TRUE(points_.insert(AddObservedPoint(map, one, other)).second) << "id given twice";
       }
     } else if (action < 70) {
-      map->AddObservation(Seen(one, point));
+      map->AddObservation(MakeObservation(one, point));
     } else if (action < 85) {
       map->RemoveObservation(one, point);
     } else if (action < 93) {
@@ -127,12 +127,12 @@ TEST(Map, StaysConsistentUnderAnySequenceOfChanges) {
   }
 }
 
-TEST(Map, GivesNoIdASecondTimeEvenAfterBeingStored) {
+TEST(Map, NeverReusesIdsEvenAfterBeingStored) {
   for (std::uint64_t seed = 20; seed < 23; ++seed) {
     RandomMap world(seed);
     for (int round = 0; round < 10; ++round) {
       for (int step = 0; step < 60; ++step) world.Change(&world.map());
-      // The newest ids die before the map is stored.
+      // The newest ids are removed before the map is stored.
       const auto last = world.map().AddPoint(PointFrom(world.map().keyframes().begin()->first));
       world.map().RemovePoint(last);
       const auto newest = world.map().AddKeyFrame(BlankKeyFrame()).keyframe.id;
@@ -146,7 +146,7 @@ TEST(Map, GivesNoIdASecondTimeEvenAfterBeingStored) {
   }
 }
 
-TEST(Map, ComesBackFromItsSnapshotUnchanged) {
+TEST(Map, IsRestoredUnchangedFromItsSnapshot) {
   RandomMap world(5);
   for (int step = 0; step < 500; ++step) world.Change(&world.map());
   const auto first = world.map().Snapshot();
@@ -174,11 +174,11 @@ TEST(Map, ComesBackFromItsSnapshotUnchanged) {
   }
 }
 
-TEST(Map, PublishesWhatDoesNotChangeAfterwards) {
+TEST(Map, SnapshotIsNotAffectedByLaterChanges) {
   Map map;
   const auto a = map.AddKeyFrame(BlankKeyFrame()).keyframe.id,
              b = map.AddKeyFrame(BlankKeyFrame()).keyframe.id;
-  const auto point = AddSeenPoint(&map, a, b);
+  const auto point = AddObservedPoint(&map, a, b);
   const auto snapshot = map.Snapshot();
   map.FindPoint(point)->point.point_in_map.x() = 5;
   map.RemovePoint(point);
@@ -189,46 +189,47 @@ TEST(Map, PublishesWhatDoesNotChangeAfterwards) {
   EXPECT_EQ(map.Snapshot()->FindPoint(point), nullptr);
 }
 
-TEST(Map, DropsAPointThatTooFewSeeOrWhoseSourceLosesIt) {
+TEST(Map, RemovesAPointWithoutEnoughObservationsOrWithoutItsSource) {
   Map map;
   std::vector<KeyFrameId> keyframes;
   for (int i = 0; i < 4; ++i) keyframes.push_back(map.AddKeyFrame(BlankKeyFrame()).keyframe.id);
-  const auto few = AddSeenPoint(&map, keyframes[0], keyframes[1]);
+  const auto few = AddObservedPoint(&map, keyframes[0], keyframes[1]);
   map.RemoveObservation(keyframes[1], few);
   EXPECT_EQ(map.FindPoint(few), nullptr);
 
-  const auto many = AddSeenPoint(&map, keyframes[0], keyframes[1]);
-  map.AddObservation(Seen(keyframes[2], many));
+  const auto many = AddObservedPoint(&map, keyframes[0], keyframes[1]);
+  map.AddObservation(MakeObservation(keyframes[2], many));
   map.RemoveObservation(keyframes[1], many);
   ASSERT_NE(map.FindPoint(many), nullptr);
-  map.AddObservation(Seen(keyframes[3], many));
+  map.AddObservation(MakeObservation(keyframes[3], many));
   map.RemoveObservation(keyframes[0], many);
   EXPECT_EQ(map.FindPoint(many), nullptr);
   ExpectConsistent(map);
 }
 
-TEST(Map, KeepsNoPointWhoseSourceKeyframeIsGone) {
+TEST(Map, RemovesPointsWithTheirSourceKeyframe) {
   Map map;
   std::vector<KeyFrameId> keyframes;
   for (int i = 0; i < 4; ++i) keyframes.push_back(map.AddKeyFrame(BlankKeyFrame()).keyframe.id);
   // A stored map may hold a point that its own source does not observe.
   const MapPointId point = map.AddPoint(PointFrom(keyframes[0]));
-  for (int i = 1; i < 4; ++i) map.AddObservation(Seen(keyframes[static_cast<std::size_t>(i)], point));
+  for (int i = 1; i < 4; ++i)
+    map.AddObservation(MakeObservation(keyframes[static_cast<std::size_t>(i)], point));
   map.RemoveKeyFrame(keyframes[0]);
   ExpectConsistent(map);
   EXPECT_EQ(Validate(*map.Snapshot()), "");
 }
 
-TEST(Map, RefusesObservationsTwiceOrOfWhatIsNotThere) {
+TEST(Map, RejectsDuplicateObservationsAndUnknownIds) {
   Map map;
   const auto a = map.AddKeyFrame(BlankKeyFrame()).keyframe.id,
              b = map.AddKeyFrame(BlankKeyFrame()).keyframe.id;
-  const auto point = AddSeenPoint(&map, a, b);
-  EXPECT_FALSE(map.AddObservation(Seen(a, point)));
-  EXPECT_FALSE(map.AddObservation(Seen(99, point)));
-  EXPECT_FALSE(map.AddObservation(Seen(a, 99)));
+  const auto point = AddObservedPoint(&map, a, b);
+  EXPECT_FALSE(map.AddObservation(MakeObservation(a, point)));
+  EXPECT_FALSE(map.AddObservation(MakeObservation(99, point)));
+  EXPECT_FALSE(map.AddObservation(MakeObservation(a, 99)));
   map.RemovePoint(point);
-  EXPECT_FALSE(map.AddObservation(Seen(a, point)));
+  EXPECT_FALSE(map.AddObservation(MakeObservation(a, point)));
   map.RemovePoint(point);
   map.RemovePoint(77);
   map.RemoveObservation(a, point);
@@ -237,28 +238,28 @@ TEST(Map, RefusesObservationsTwiceOrOfWhatIsNotThere) {
   ExpectConsistent(map);
 }
 
-TEST(Map, KnowsWhichKeyframesShareMost) {
+TEST(Map, ListsCovisibleKeyframesMostSharedPointsFirst) {
   Map map;
   std::vector<KeyFrameId> keyframes;
   for (int i = 0; i < 4; ++i) keyframes.push_back(map.AddKeyFrame(BlankKeyFrame()).keyframe.id);
-  for (int i = 0; i < 5; ++i) AddSeenPoint(&map, keyframes[0], keyframes[2]);
-  for (int i = 0; i < 3; ++i) AddSeenPoint(&map, keyframes[1], keyframes[0]);
-  AddSeenPoint(&map, keyframes[1], keyframes[3]);
+  for (int i = 0; i < 5; ++i) AddObservedPoint(&map, keyframes[0], keyframes[2]);
+  for (int i = 0; i < 3; ++i) AddObservedPoint(&map, keyframes[1], keyframes[0]);
+  AddObservedPoint(&map, keyframes[1], keyframes[3]);
   using Shared = std::vector<std::pair<KeyFrameId, int>>;
   EXPECT_EQ(map.Covisible(keyframes[0]), (Shared{{keyframes[2], 5}, {keyframes[1], 3}}));
   EXPECT_EQ(map.Covisible(keyframes[3]), (Shared{{keyframes[1], 1}}));
   EXPECT_TRUE(map.Covisible(1234).empty());
 }
 
-TEST(Map, MeasuresDepthByTheMedianOfFinitePointsInFront) {
+TEST(Map, DepthIsTheMedianOfFinitePointsInFront) {
   Map map;
   const auto a = map.AddKeyFrame(BlankKeyFrame(CameraAt({0, 0, -1}))).keyframe.id;
   const auto b = map.AddKeyFrame(BlankKeyFrame()).keyframe.id;
   for (const double z : {1.0, 1.5, 2.0, 2.5, 50.0, -40.0}) {
-    const auto id = AddSeenPoint(&map, a, b);
+    const auto id = AddObservedPoint(&map, a, b);
     map.FindPoint(id)->point.point_in_map = {0, 0, z, 1};
   }
-  const auto infinite = AddSeenPoint(&map, a, b);
+  const auto infinite = AddObservedPoint(&map, a, b);
   map.FindPoint(infinite)->point.point_in_map = {0, 0, 1, 0};
   map.UpdateDepth(map.FindKeyFrame(a));
   EXPECT_DOUBLE_EQ(map.FindKeyFrame(a)->keyframe.mean_depth, 3.0);
@@ -266,11 +267,11 @@ TEST(Map, MeasuresDepthByTheMedianOfFinitePointsInFront) {
   EXPECT_NEAR(map.FindKeyFrame(a)->keyframe.depth_sigma, 1.4826 * 0.5, 1e-9);
 }
 
-TEST(Map, TurnsNormalsTowardsTheObservers) {
+TEST(Map, NormalsPointTowardsTheObservers) {
   Map map;
   const auto a = map.AddKeyFrame(BlankKeyFrame(CameraAt({-1, 0, 0}))).keyframe.id;
   const auto b = map.AddKeyFrame(BlankKeyFrame(CameraAt({1, 0, 0}))).keyframe.id;
-  const auto id = AddSeenPoint(&map, a, b);
+  const auto id = AddObservedPoint(&map, a, b);
   map.FindPoint(id)->point.point_in_map = {0, 0, 2, 1};
   map.UpdateNormal(map.FindPoint(id));
   EXPECT_LT((map.FindPoint(id)->point.normal - Eigen::Vector3f(0, 0, -1)).norm(), 1e-6f);
@@ -279,11 +280,11 @@ TEST(Map, TurnsNormalsTowardsTheObservers) {
   EXPECT_LT((map.FindPoint(id)->point.normal - Eigen::Vector3f(-1, 0, 0)).norm(), 1e-6f);
 }
 
-TEST(Map, MakesOneOfTwoPointsThatAreOne) {
+TEST(Map, FusePointsMergesObservationsAndCounts) {
   Map map;
   for (int i = 0; i < 4; ++i) map.AddKeyFrame(BlankKeyFrame());
-  const MapPointId known = AddSeenPoint(&map, 0, 1), duplicate = AddSeenPoint(&map, 2, 1);
-  map.AddObservation(Seen(3, duplicate));
+  const MapPointId known = AddObservedPoint(&map, 0, 1), duplicate = AddObservedPoint(&map, 2, 1);
+  map.AddObservation(MakeObservation(3, duplicate));
   map.FindPoint(known)->seen_inlier = 3;
   map.FindPoint(duplicate)->seen_inlier = 4;
   map.FusePoints(known, duplicate);
@@ -293,10 +294,10 @@ TEST(Map, MakesOneOfTwoPointsThatAreOne) {
   EXPECT_EQ(map.FindPoint(known)->seen_inlier, 7);
   map.FusePoints(known, known);
   map.FusePoints(known, duplicate);
-  EXPECT_EQ(map.AlivePoints(), 1u) << "neither with itself nor with what is gone";
+  EXPECT_EQ(map.AlivePoints(), 1u) << "a point is not fused with itself or with a removed point";
 }
 
-TEST(Map, MovesWhatIsAboutAKeyFrameWithIt) {
+TEST(Map, CorrectMovesTheNeighbourhoodOfAKeyFrame) {
   Map map;
   for (int i = 0; i < 4; ++i) {
     KeyFrame keyframe = BlankKeyFrame();
@@ -304,7 +305,7 @@ TEST(Map, MovesWhatIsAboutAKeyFrameWithIt) {
     keyframe.mean_depth = 2;
     map.AddKeyFrame(keyframe);
   }
-  const MapPointId stays = AddSeenPoint(&map, 0, 1), goes = AddSeenPoint(&map, 2, 1);
+  const MapPointId unmoved = AddObservedPoint(&map, 0, 1), moved_point = AddObservedPoint(&map, 2, 1);
   const PanoramaId panorama = map.OpenPanorama(2);
   KeyFrame& dependent = map.FindKeyFrame(3)->keyframe;
   dependent.kind = KeyFrameKind::kPanorama;
@@ -320,17 +321,18 @@ TEST(Map, MovesWhatIsAboutAKeyFrameWithIt) {
   moved.scale = 1.25;
   map.Correct({{2, moved}});
   ExpectConsistent(map);
-  // Everything in the camera's frame has grown, and is seen where it was.
-  EXPECT_LT((in_camera(map, 2, goes) - 1.25 * in_camera(before, 2, goes)).norm(), 1e-12);
-  EXPECT_LT((in_camera(map, 3, goes) - 1.25 * in_camera(before, 3, goes)).norm(), 1e-12)
-      << "a dependent keyframe goes with its reference";
+  // In the camera frame everything is scaled, so that every point still projects to the same pixel.
+  EXPECT_LT((in_camera(map, 2, moved_point) - 1.25 * in_camera(before, 2, moved_point)).norm(), 1e-12);
+  EXPECT_LT((in_camera(map, 3, moved_point) - 1.25 * in_camera(before, 3, moved_point)).norm(), 1e-12)
+      << "a dependent keyframe moves with its reference";
   EXPECT_DOUBLE_EQ(map.FindKeyFrame(2)->keyframe.mean_depth, 2.5);
-  EXPECT_LT((in_camera(map, 0, stays) - in_camera(before, 0, stays)).norm(), 1e-15);
+  EXPECT_LT((in_camera(map, 0, unmoved) - in_camera(before, 0, unmoved)).norm(), 1e-15);
   const auto snapshot = map.Snapshot();
   ASSERT_EQ(snapshot->corrections.size(), 1u);
   EXPECT_EQ(snapshot->corrections[0]->revision, snapshot->revision);
   EXPECT_EQ(snapshot->corrections[0]->after_from_before.size(), 4u);
-  EXPECT_EQ(Map(*snapshot).Snapshot()->corrections.size(), 1u) << "whoever goes on with it remembers";
+  EXPECT_EQ(Map(*snapshot).Snapshot()->corrections.size(), 1u)
+      << "a map made from the snapshot keeps its corrections";
 }
 
 }  // namespace

@@ -8,15 +8,15 @@
 #include "engine/map/map.h"
 #include "tests/engine/mapping/panorama_scene.h"
 
-// What a Map does for its panorama maps.
+// Tests of the panorama maps within a Map.
 namespace docent::engine {
 namespace {
 
 using testing_world::BlankKeyFrame;
 using testing_world::CameraAt;
 
-// Keyframe 0: the reference of panorama map 0. Keyframes 1 and 2: dependent ones, turned by 10 and 20
-// degrees. Keyframe 3: an ordinary one.
+// Keyframe 0 is the reference of panorama map 0. Keyframes 1 and 2 are its dependent keyframes, rotated by 10
+// and 20 degrees. Keyframe 3 is an ordinary keyframe.
 class PanoramaMaps : public ::testing::Test {
  protected:
   PanoramaMaps() {
@@ -30,15 +30,15 @@ class PanoramaMaps : public ::testing::Test {
     }
     map_.AddKeyFrame(BlankKeyFrame(CameraAt({0.5, 0, 0})));
   }
-  // An infinite point straight ahead of the map's origin.
+  // Adds an infinite point straight ahead of the map's origin.
   MapPointId AddInfinite(KeyFrameId source, const std::vector<KeyFrameId>& others = {}) {
     MapPoint point;
     point.point_in_map = {0, 0, 1, 0};
     point.panorama = map_.FindKeyFrame(source)->keyframe.panorama;
     point.source_keyframe = source;
     const MapPointId id = map_.AddPoint(point);
-    See(source, id);
-    for (const KeyFrameId other : others) See(other, id);
+    Observe(source, id);
+    for (const KeyFrameId other : others) Observe(other, id);
     return id;
   }
   MapPointId AddFinite(KeyFrameId source, KeyFrameId other) {
@@ -46,12 +46,12 @@ class PanoramaMaps : public ::testing::Test {
     point.point_in_map = {0, 0, 2, 1};
     point.source_keyframe = source;
     const MapPointId id = map_.AddPoint(point);
-    See(source, id);
-    See(other, id);
+    Observe(source, id);
+    Observe(other, id);
     return id;
   }
-  // Where the point truly appears.
-  void See(KeyFrameId keyframe, MapPointId id) {
+  // Adds an observation where the point truly projects.
+  void Observe(KeyFrameId keyframe, MapPointId id) {
     const KeyFrame& seeing = map_.FindKeyFrame(keyframe)->keyframe;
     const Eigen::Vector4d& x = map_.FindPoint(id)->point.point_in_map;
     const Eigen::Vector3d in_camera = seeing.camera_from_map.rotation * Eigen::Vector3d(x.head<3>()) +
@@ -62,7 +62,9 @@ class PanoramaMaps : public ::testing::Test {
     const Map::PointRecord* record = map_.FindPoint(id);
     return record ? record->observers : std::vector<KeyFrameId>();
   }
-  // Points and keyframes agree about who sees whom, and each infinite point is seen from its panorama alone.
+  // Points and keyframes list the same observations, and each infinite point is observed from its own
+  // panorama map
+  // only.
   void ExpectConsistent() {
     EXPECT_EQ(Validate(*map_.Snapshot()), "");
     std::size_t from_keyframes = 0, from_points = 0;
@@ -89,7 +91,7 @@ class PanoramaMaps : public ::testing::Test {
 
 using Ids = std::vector<KeyFrameId>;
 
-TEST_F(PanoramaMaps, OpenAtAnOrdinaryKeyframeThatKeepsWhatItSees) {
+TEST_F(PanoramaMaps, OpenAtAnOrdinaryKeyframeThatKeepsItsObservations) {
   const MapPointId finite = AddFinite(3, 0);
   const PanoramaId id = map_.OpenPanorama(3);
   EXPECT_NE(id, 0u);
@@ -101,11 +103,11 @@ TEST_F(PanoramaMaps, OpenAtAnOrdinaryKeyframeThatKeepsWhatItSees) {
   ExpectConsistent();
 }
 
-TEST_F(PanoramaMaps, TakeTheDirectionsAlongOfAKeyframeThatLeavesAnother) {
+TEST_F(PanoramaMaps, TakeOverTheInfinitePointsOfTheirNewReference) {
   const MapPointId own = AddInfinite(1), shared = AddInfinite(1, {0, 2}),
                    of_reference = AddInfinite(0, {1, 2});
   const MapPointId untouched = AddInfinite(2), seen_by_it_alone = AddInfinite(2, {1});
-  // It turns out to look 5 degrees further.
+  // Its corrected pose is rotated by 5 further degrees.
   map_.FindKeyFrame(1)->keyframe.camera_from_map = CameraAt({0.1, 0, 0}, {0, 15, 0});
   const PanoramaId id = map_.OpenPanorama(1);
   EXPECT_EQ(map_.FindKeyFrame(1)->keyframe.kind, KeyFrameKind::kSixDof);
@@ -124,7 +126,7 @@ TEST_F(PanoramaMaps, TakeTheDirectionsAlongOfAKeyframeThatLeavesAnother) {
   ExpectConsistent();
 }
 
-TEST_F(PanoramaMaps, GiveNoIdTwice) {
+TEST_F(PanoramaMaps, NeverReuseIds) {
   const PanoramaId first = map_.OpenPanorama(3);
   map_.RemoveKeyFrame(3);
   EXPECT_EQ(map_.panoramas().size(), 1u);
@@ -133,7 +135,7 @@ TEST_F(PanoramaMaps, GiveNoIdTwice) {
   EXPECT_GT(map_.OpenPanorama(other), first);
 }
 
-TEST_F(PanoramaMaps, HandTheReferenceOn) {
+TEST_F(PanoramaMaps, CanChangeTheirReference) {
   const MapPointId of_old = AddInfinite(0, {1}), of_new = AddInfinite(1);
   map_.SetReference(0, 1);
   ASSERT_EQ(map_.panoramas().size(), 1u);
@@ -144,12 +146,13 @@ TEST_F(PanoramaMaps, HandTheReferenceOn) {
   EXPECT_EQ(Observers(of_new), Ids{1});
   ExpectConsistent();
   map_.SetReference(0, 1);
-  EXPECT_EQ(map_.FindKeyFrame(1)->keyframe.kind, KeyFrameKind::kSixDof) << "to itself";
+  EXPECT_EQ(map_.FindKeyFrame(1)->keyframe.kind, KeyFrameKind::kSixDof)
+      << "setting the same reference again changes nothing";
   map_.SetReference(9, 3);
-  EXPECT_EQ(map_.panoramas()[0].reference, 1u) << "of a panorama map that is not there";
+  EXPECT_EQ(map_.panoramas()[0].reference, 1u) << "an unknown panorama map is ignored";
 }
 
-TEST_F(PanoramaMaps, EndWithTheirReference) {
+TEST_F(PanoramaMaps, AreRemovedWithTheirReference) {
   const MapPointId infinite = AddInfinite(1, {0}), finite = AddFinite(3, 0), other = AddFinite(3, 0);
   map_.OpenPanorama(3);
   const MapPointId elsewhere = AddInfinite(3);
@@ -158,13 +161,13 @@ TEST_F(PanoramaMaps, EndWithTheirReference) {
   EXPECT_EQ(map_.panoramas()[0].reference, 3u);
   EXPECT_EQ(map_.keyframes().size(), 1u);
   EXPECT_EQ(map_.FindPoint(infinite), nullptr);
-  EXPECT_EQ(map_.FindPoint(finite), nullptr) << "one observation holds no finite point";
+  EXPECT_EQ(map_.FindPoint(finite), nullptr) << "a finite point needs two observations";
   EXPECT_EQ(map_.FindPoint(other), nullptr);
   EXPECT_NE(map_.FindPoint(elsewhere), nullptr);
   ExpectConsistent();
 }
 
-TEST_F(PanoramaMaps, LoseADependentKeyframeAndItsOwnDirectionsOnly) {
+TEST_F(PanoramaMaps, LoseOnlyTheOwnInfinitePointsOfARemovedKeyframe) {
   const MapPointId own = AddInfinite(1), shared = AddInfinite(0, {1, 2});
   map_.RemoveKeyFrame(1);
   EXPECT_EQ(map_.panoramas().size(), 1u);
@@ -173,7 +176,7 @@ TEST_F(PanoramaMaps, LoseADependentKeyframeAndItsOwnDirectionsOnly) {
   ExpectConsistent();
 }
 
-TEST_F(PanoramaMaps, KeepADirectionThatOneKeyframeSeesAndDropItWithTheLast) {
+TEST_F(PanoramaMaps, KeepAnInfinitePointUntilItsLastObservationIsRemoved) {
   const MapPointId shared = AddInfinite(0, {1, 2});
   map_.RemoveObservation(1, shared);
   map_.RemoveObservation(2, shared);
@@ -183,7 +186,7 @@ TEST_F(PanoramaMaps, KeepADirectionThatOneKeyframeSeesAndDropItWithTheLast) {
   ExpectConsistent();
 }
 
-TEST_F(PanoramaMaps, ForgetWhatDependentKeyframesSawOfADirectionThatBecomesAPoint) {
+TEST_F(PanoramaMaps, RemoveDependentObservationsOfAPointThatBecomesFinite) {
   const MapPointId id = AddInfinite(0, {1, 2});
   map_.MakeFinite(map_.FindPoint(id), {0, 0, 2});
   const MapPoint& point = map_.FindPoint(id)->point;
@@ -191,12 +194,12 @@ TEST_F(PanoramaMaps, ForgetWhatDependentKeyframesSawOfADirectionThatBecomesAPoin
   EXPECT_TRUE(point.was_infinite);
   EXPECT_EQ(point.panorama, kNoId);
   EXPECT_EQ(Observers(id), Ids{0});
-  See(3, id);
+  Observe(3, id);
   EXPECT_EQ(Observers(id), (Ids{0, 3}));
   ExpectConsistent();
 }
 
-TEST_F(PanoramaMaps, KnowTheMeanOfTheRaysAsADirection) {
+TEST_F(PanoramaMaps, UpdateDirectionsToTheMeanRay) {
   const MapPointId id = AddInfinite(0, {1, 2});
   map_.FindPoint(id)->point.point_in_map = {0.6, 0, 0.8, 0};
   map_.UpdateDirection(map_.FindPoint(id));
@@ -204,7 +207,7 @@ TEST_F(PanoramaMaps, KnowTheMeanOfTheRaysAsADirection) {
   EXPECT_LT((map_.FindPoint(id)->point.normal + Eigen::Vector3f::UnitZ()).norm(), 1e-6f);
 }
 
-TEST_F(PanoramaMaps, ComeBackFromTheirSnapshot) {
+TEST_F(PanoramaMaps, AreRestoredFromTheirSnapshot) {
   AddInfinite(0, {1, 2});
   AddFinite(3, 0);
   map_.OpenPanorama(3);
@@ -228,7 +231,7 @@ TEST_F(PanoramaMaps, ComeBackFromTheirSnapshot) {
   EXPECT_EQ(after->observations.size(), before->observations.size());
 }
 
-TEST(MapOfDirections, HasNoFinitePoints) {
+TEST(MapOfDirections, HasNoFinitePointsUntilOneIsConverted) {
   Map map;
   map.AddKeyFrame(BlankKeyFrame());
   const PanoramaId panorama = map.OpenPanorama(0);

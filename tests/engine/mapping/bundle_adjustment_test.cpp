@@ -33,7 +33,7 @@ double WorstCenterError(const BundleScene& scene) {
   return worst;
 }
 
-// Over the points that several cameras see: the others' depth is open.
+// Over the points that several cameras see; the depth of the others is not determined.
 double WorstPointError(const BundleScene& scene) {
   std::vector<int> views(scene.problem.points.size(), 0);
   for (const BundleProblem::Measurement& measurement : scene.problem.measurements) {
@@ -79,7 +79,8 @@ struct Reprojection {
   const BundleProblem::Measurement* measurement;
 };
 
-// Of two thousand measurements whose pixels, below 1024, were rounded to floats: by up to 3e-5 in x and in y.
+// The cost of rounding the pixels of two thousand measurements, below 1024, to floats: up to 3e-5 in x and in
+// y.
 constexpr double kRoundingCost = 0.5 * 2000 * 2 * 3e-5 * 3e-5;
 
 BundleOptions WithIterations(int iterations) {
@@ -88,7 +89,7 @@ BundleOptions WithIterations(int iterations) {
   return options;
 }
 
-TEST(AdjustBundleTest, ExactMeasurementsLeadBackToTheTruthThroughEveryLens) {
+TEST(AdjustBundleTest, RecoversTheTruthFromExactMeasurementsForEveryLens) {
   const std::vector<std::pair<LensModel, std::array<double, 5>>> lenses = {
       {LensModel::kRadialTangential, {-0.296609, 0.080818, 0.001, -0.002}},
       {LensModel::kFov, {0.93}},
@@ -111,20 +112,21 @@ TEST(AdjustBundleTest, ExactMeasurementsLeadBackToTheTruthThroughEveryLens) {
   }
 }
 
-TEST(AdjustBundleTest, NoisyMeasurementsLeadNearTheTruthAndTellTheirSigma) {
+TEST(AdjustBundleTest, EstimatesTheTruthAndTheSigmaFromNoisyMeasurements) {
   BundleSceneOptions scene_options;
   scene_options.cameras = 12;
   scene_options.noise_px = 0.8;
   BundleScene scene = MakeBundleScene(scene_options);
   const BundleSummary summary = AdjustBundle(WithIterations(30), &scene.problem);
   EXPECT_EQ(summary.outcome, Outcome::kConverged) << summary.Brief();
-  // Twelve measurements of a point, 24 numbers, fix its three: the residuals keep 7/8 of the variance.
+  // Twelve measurements of a point give 24 numbers for its three coordinates: the residuals keep 7/8 of the
+  // variance.
   EXPECT_NEAR(summary.sigma, 0.8 * std::sqrt(7.0 / 8), 0.05) << summary.Brief();
   EXPECT_LT(WorstCenterError(scene), 0.01);
   EXPECT_LT(summary.outliers, static_cast<int>(scene.problem.measurements.size() / 200));
 }
 
-TEST(AdjustBundleTest, FindsTheOutliersAndOnlyThem) {
+TEST(AdjustBundleTest, MarksExactlyTheOutliers) {
   BundleSceneOptions scene_options;
   scene_options.cameras = 10;
   scene_options.noise_px = 0.5;
@@ -141,7 +143,8 @@ TEST(AdjustBundleTest, FindsTheOutliersAndOnlyThem) {
       false_alarms += !scene.is_outlier[i] && scene.problem.measurements[i].outlier ? 1 : 0;
     }
     EXPECT_EQ(summary.outliers, outliers);
-    // Huber's loss still gives each outlier some pull, which a point with few measurements cannot resist.
+    // Under Huber's loss each outlier still has some influence, which a point with few measurements cannot
+    // resist.
     const int allowed = static_cast<int>(scene.is_outlier.size()) / (loss == RobustLoss::kTukey ? 100 : 50);
     EXPECT_LE(missed, loss == RobustLoss::kTukey ? 0 : 5) << summary.Brief();
     EXPECT_LT(false_alarms, allowed) << summary.Brief();
@@ -149,15 +152,15 @@ TEST(AdjustBundleTest, FindsTheOutliersAndOnlyThem) {
   }
 }
 
-// Another solver as the judge, with differences instead of our Jacobians.
-TEST(AdjustBundleTest, ReachesTheMinimumThatCeresReaches) {
+// Compares with an independent solver that uses numerical derivatives instead of our Jacobians.
+TEST(AdjustBundleTest, ReachesTheSameMinimumAsCeres) {
   BundleSceneOptions scene_options;
   scene_options.noise_px = 1;
   BundleScene scene = MakeBundleScene(scene_options);
   BundleProblem other = scene.problem;
   BundleOptions options = WithIterations(100);
   options.loss = RobustLoss::kHuber;
-  // A threshold that stays what it is, and that many residuals pass.
+  // A fixed threshold that many residuals exceed.
   options.threshold_factor = 1;
   options.min_sigma = 1.2;
   const BundleSummary summary = AdjustBundle(options, &scene.problem);
@@ -217,7 +220,7 @@ TEST(AdjustBundleTest, FixedCamerasAndPointsDoNotMove) {
   EXPECT_NE(scene.problem.points[41].position, before.points[41].position);
 }
 
-TEST(AdjustBundleTest, FindsAPoseAmongFixedPoints) {
+TEST(AdjustBundleTest, EstimatesAPoseFromFixedPoints) {
   BundleSceneOptions scene_options;
   scene_options.cameras = 1;
   scene_options.fixed_cameras = 0;
@@ -228,7 +231,7 @@ TEST(AdjustBundleTest, FindsAPoseAmongFixedPoints) {
   EXPECT_LT(WorstCenterError(scene), 1e-6) << summary.Brief();
 }
 
-TEST(AdjustBundleTest, FindsPointsAmongFixedCameras) {
+TEST(AdjustBundleTest, EstimatesPointsFromFixedCameras) {
   BundleSceneOptions scene_options;
   scene_options.fixed_cameras = scene_options.cameras;
   BundleScene scene = MakeBundleScene(scene_options);
@@ -237,7 +240,7 @@ TEST(AdjustBundleTest, FindsPointsAmongFixedCameras) {
   EXPECT_LT(WorstPointError(scene), 1e-5) << summary.Brief();
 }
 
-TEST(AdjustBundleTest, WithNothingFixedTheResidualsStillVanish) {
+TEST(AdjustBundleTest, ReducesTheResidualsToZeroWithNothingFixed) {
   BundleSceneOptions scene_options;
   scene_options.fixed_cameras = 0;
   BundleScene scene = MakeBundleScene(scene_options);
@@ -245,7 +248,7 @@ TEST(AdjustBundleTest, WithNothingFixedTheResidualsStillVanish) {
   EXPECT_LT(summary.final_cost, kRoundingCost) << summary.Brief();
 }
 
-TEST(AdjustBundleTest, NothingFreeIsNothingToDo) {
+TEST(AdjustBundleTest, ConvergesAtOnceIfNothingIsFree) {
   BundleSceneOptions scene_options;
   scene_options.fixed_cameras = scene_options.cameras;
   scene_options.fixed_points = scene_options.points;
@@ -259,7 +262,7 @@ TEST(AdjustBundleTest, NothingFreeIsNothingToDo) {
   EXPECT_EQ(AdjustBundle(WithIterations(10), &empty).outcome, Outcome::kConverged);
 }
 
-TEST(AdjustBundleTest, PointsBehindTheirCamerasAreOutliersAndHarmNothing) {
+TEST(AdjustBundleTest, PointsBehindTheirCamerasAreOutliersAndDoNotAffectTheRest) {
   for (const RobustLoss loss : {RobustLoss::kTukey, RobustLoss::kHuber}) {
     BundleSceneOptions scene_options;
     scene_options.cameras = 8;
@@ -267,7 +270,7 @@ TEST(AdjustBundleTest, PointsBehindTheirCamerasAreOutliersAndHarmNothing) {
     const std::size_t exact = scene.problem.measurements.size();
     for (int i = 0; i < 20; ++i) {
       scene.problem.points[static_cast<std::size_t>(i)].position.z() *=
-          -1;  // every measurement of it is behind
+          -1;  // behind every camera that measured it
     }
     BundleProblem::Point behind;
     behind.position = {0, 0, -3};
@@ -278,7 +281,8 @@ TEST(AdjustBundleTest, PointsBehindTheirCamerasAreOutliersAndHarmNothing) {
     BundleOptions options = WithIterations(50);
     options.loss = loss;
     const BundleSummary summary = AdjustBundle(options, &scene.problem);
-    // The cost of what cannot be projected stays, and the solver's tolerance is relative to the whole.
+    // The cost of points that cannot be projected remains, and the solver's tolerance is relative to the
+    // total.
     EXPECT_LT(WorstCenterError(scene), 1e-4) << summary.Brief();
     for (std::size_t i = exact; i < scene.problem.measurements.size(); ++i) {
       EXPECT_TRUE(scene.problem.measurements[i].outlier);
@@ -291,7 +295,7 @@ TEST(AdjustBundleTest, PointsBehindTheirCamerasAreOutliersAndHarmNothing) {
   }
 }
 
-TEST(AdjustBundleTest, APointThatIsNoNumberIsAnOutlierAndHarmsNothing) {
+TEST(AdjustBundleTest, ANonFinitePointIsAnOutlierAndDoesNotAffectTheRest) {
   BundleScene scene = MakeBundleScene({});
   scene.problem.points[5].position.x() = std::numeric_limits<double>::quiet_NaN();
   const BundleSummary summary = AdjustBundle(WithIterations(50), &scene.problem);
@@ -301,10 +305,10 @@ TEST(AdjustBundleTest, APointThatIsNoNumberIsAnOutlierAndHarmsNothing) {
   }
 }
 
-TEST(AdjustBundleTest, APointWithOneMeasurementDoesNotRunAway) {
+TEST(AdjustBundleTest, APointWithOneMeasurementDoesNotDiverge) {
   BundleSceneOptions scene_options;
   BundleScene scene = MakeBundleScene(scene_options);
-  for (const int camera : {0, 4}) {  // a fixed one and a free one
+  for (const int camera : {0, 4}) {  // a fixed camera and a free one
     BundleScene lone = scene;
     const Eigen::Vector3d in_camera(0.2, 0.1, 3);
     const auto& truth = lone.cameras[static_cast<std::size_t>(camera)];
@@ -320,11 +324,11 @@ TEST(AdjustBundleTest, APointWithOneMeasurementDoesNotRunAway) {
   }
 }
 
-TEST(AdjustBundleTest, NeverEndsWorseThanItBegan) {
+TEST(AdjustBundleTest, NeverIncreasesTheCost) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     BundleSceneOptions scene_options;
     scene_options.seed = seed;
-    scene_options.pose_error = 0.3;  // far outside what the adjustment is made for
+    scene_options.pose_error = 0.3;  // far beyond the errors that the adjustment is designed for
     scene_options.point_error = 1.0;
     scene_options.outlier_ratio = 0.3;
     BundleScene scene = MakeBundleScene(scene_options);
@@ -336,7 +340,7 @@ TEST(AdjustBundleTest, NeverEndsWorseThanItBegan) {
   }
 }
 
-TEST(AdjustBundleTest, TheSameInputGivesTheSameBytes) {
+TEST(AdjustBundleTest, EqualInputGivesBitwiseEqualOutput) {
   BundleSceneOptions scene_options;
   scene_options.noise_px = 0.7;
   scene_options.outlier_ratio = 0.1;
@@ -348,7 +352,7 @@ TEST(AdjustBundleTest, TheSameInputGivesTheSameBytes) {
   EXPECT_EQ(a.iterations, b.iterations);
 }
 
-TEST(AdjustBundleTest, AnInterruptFromTheBeginningChangesNothing) {
+TEST(AdjustBundleTest, AnInterruptAtTheStartChangesNothing) {
   BundleScene scene = MakeBundleScene({});
   const BundleProblem before = scene.problem;
   const std::atomic<bool> interrupt{true};
@@ -360,9 +364,9 @@ TEST(AdjustBundleTest, AnInterruptFromTheBeginningChangesNothing) {
   EXPECT_TRUE(SameBytes(scene.problem, before));
 }
 
-// Wherever the interrupt falls, the result is a state that the adjustment passed through. A problem of this
+// Whenever the interrupt occurs, the result is a state that the adjustment passed through. A problem of this
 // size takes much longer than the waits, but nothing here depends on that.
-TEST(AdjustBundleTest, AnInterruptOnTheWayKeepsWhatWasReached) {
+TEST(AdjustBundleTest, AnInterruptKeepsTheStateReachedSoFar) {
   BundleSceneOptions scene_options;
   scene_options.cameras = 20;
   scene_options.points = 1500;
@@ -381,7 +385,7 @@ TEST(AdjustBundleTest, AnInterruptOnTheWayKeepsWhatWasReached) {
     other.join();
     interrupted += summary.outcome == Outcome::kInterrupted ? 1 : 0;
     EXPECT_LE(summary.final_cost, summary.initial_cost) << summary.Brief();
-    // A random move of the poses' own size never ends this near by chance: it is the start or better.
+    // Random poses would not be this close by chance: it is the initial state or a better one.
     EXPECT_LT(WorstCenterError(scene), 0.05 * std::sqrt(3.0)) << summary.Brief();
     if (summary.outcome == Outcome::kConverged) {
       EXPECT_LT(WorstCenterError(scene), 0.01) << summary.Brief();
@@ -390,13 +394,13 @@ TEST(AdjustBundleTest, AnInterruptOnTheWayKeepsWhatWasReached) {
   EXPECT_GT(interrupted, 0);
 }
 
-TEST(AdjustBundleTest, TheBriefSaysWhatHappened) {
+TEST(AdjustBundleTest, TheBriefDescribesTheResult) {
   BundleScene scene = MakeBundleScene({});
   const std::string brief = AdjustBundle(WithIterations(50), &scene.problem).Brief();
   EXPECT_EQ(brief.find("converged after"), 0u) << brief;
 }
 
-TEST(EstimateSigmaTest, FindsTheSigmaOfNormalResidualsDespiteOutliers) {
+TEST(EstimateSigmaTest, EstimatesTheSigmaOfNormalResidualsDespiteOutliers) {
   Random random(1);
   std::vector<double> squared_norms;
   for (int i = 0; i < 20000; ++i) {

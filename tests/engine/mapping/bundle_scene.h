@@ -23,8 +23,8 @@ struct BundleSceneOptions {
   std::uint64_t seed = 1;
 };
 
-// Cameras side by side that look at a box of points; every point in view is measured. The fixed ones are
-// exact.
+// Cameras side by side that see a box of points; every point in view is measured. Fixed cameras have no
+// error.
 struct BundleScene {
   BundleProblem problem;
   std::vector<Rigid3> cameras;

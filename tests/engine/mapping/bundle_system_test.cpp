@@ -16,7 +16,7 @@ namespace {
 using Outcome = BundleSystem::Outcome;
 constexpr double kThreshold = 15;
 
-// The problem's unknowns moved by a vector: six numbers for each camera, then three for each point.
+// The problem with its unknowns moved by a vector: six numbers for each camera, then three for each point.
 BundleProblem Moved(const BundleProblem& problem, const Eigen::VectorXd& step) {
   BundleProblem result = problem;
   const auto cameras = static_cast<Eigen::Index>(problem.cameras.size());
@@ -51,11 +51,11 @@ double Cost(const BundleProblem& problem, RobustLoss loss) {
   return RobustCost(loss, kThreshold, squared_norms);
 }
 
-// The damped normal equations written out in full, from differences of residuals.
+// The damped normal equations as full matrices, from finite differences of the residuals.
 struct Dense {
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
-  std::vector<Eigen::Index> unknowns;  // rows that are free
+  std::vector<Eigen::Index> unknowns;  // rows of the free unknowns
 };
 
 Dense MakeDense(const BundleProblem& problem, RobustLoss loss) {
@@ -123,30 +123,30 @@ class BundleSystemTest : public testing::TestWithParam<RobustLoss> {
     EXPECT_LT((found - expected).norm(), 1e-5 * expected.norm());
     const double decrease = -dense.gradient.dot(expected) - 0.5 * expected.dot(dense.hessian * expected);
     EXPECT_NEAR(system.predicted_decrease(), decrease, 1e-4 * decrease);
-    EXPECT_NEAR(system.steepest_slope(), dense.gradient.cwiseAbs().maxCoeff(),
+    EXPECT_NEAR(system.max_gradient(), dense.gradient.cwiseAbs().maxCoeff(),
                 1e-5 * dense.gradient.cwiseAbs().maxCoeff());
   }
   BundleProblem problem_;
 };
 
-TEST_P(BundleSystemTest, TheStepIsThatOfTheFullDampedNormalEquations) {
+TEST_P(BundleSystemTest, TheStepSolvesTheFullDampedNormalEquations) {
   ExpectTheDenseStep();
 }
 
-TEST_P(BundleSystemTest, APointThatOneImageShowsTwiceCountsTwice) {
+TEST_P(BundleSystemTest, TwoMeasurementsOfAPointInOneImageBothCount) {
   BundleProblem::Measurement again = problem_.measurements.back();  // by a free camera
   again.pixel.x() += 0.7f;
   problem_.measurements.insert(problem_.measurements.begin(), again);
   ExpectTheDenseStep();
 }
 
-// The order of the measurements is nobody's promise.
-TEST_P(BundleSystemTest, TheStepIsTheSameForMeasurementsInAnyOrder) {
+// The measurements may be in any order.
+TEST_P(BundleSystemTest, TheStepDoesNotDependOnTheOrderOfTheMeasurements) {
   std::reverse(problem_.measurements.begin(), problem_.measurements.end());
   ExpectTheDenseStep();
 }
 
-TEST_P(BundleSystemTest, TheGradientIsTheRobustCostsOwn) {
+TEST_P(BundleSystemTest, TheGradientIsThatOfTheRobustCost) {
   constexpr double kStep = 1e-6;
   const Dense dense = MakeDense(problem_, GetParam());
   const auto size = static_cast<Eigen::Index>(6 * problem_.cameras.size() + 3 * problem_.points.size());
@@ -159,10 +159,10 @@ TEST_P(BundleSystemTest, TheGradientIsTheRobustCostsOwn) {
   }
   BundleSystem system(problem_, GetParam(), nullptr);
   ASSERT_EQ(system.Step(kThreshold, 1e-4), Outcome::kDone);
-  EXPECT_NEAR(system.steepest_slope(), steepest, 1e-4 * steepest);
+  EXPECT_NEAR(system.max_gradient(), steepest, 1e-4 * steepest);
 }
 
-TEST_P(BundleSystemTest, TheNormsThereAreThoseOfTheMovedProblem) {
+TEST_P(BundleSystemTest, TheNormsAfterAStepAreThoseOfTheMovedProblem) {
   BundleSystem system(problem_, GetParam(), nullptr);
   ASSERT_EQ(system.Step(kThreshold, 1e-2), Outcome::kDone);
   const std::vector<double> next = system.next_squared_norms();
@@ -181,7 +181,7 @@ TEST_P(BundleSystemTest, TheNormsThereAreThoseOfTheMovedProblem) {
   }
 }
 
-TEST_P(BundleSystemTest, AnInterruptIsSeenInsideAStepAndLeavesTheState) {
+TEST_P(BundleSystemTest, AnInterruptDuringAStepLeavesTheStateUnchanged) {
   std::atomic<bool> interrupt{false};
   BundleSystem system(problem_, GetParam(), &interrupt);
   const std::vector<double> before = system.squared_norms();

@@ -39,7 +39,7 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-TEST(DepthSignificance, PredictsTheScatterOfDepthsThatNoiseCauses) {
+TEST(DepthSignificance, PredictsTheScatterOfDepthsCausedByNoise) {
   DepthNoiseOptions noise_alone;
   noise_alone.calibration_share = 0;
   for (const double baseline : {0.08, 0.2}) {
@@ -58,13 +58,13 @@ TEST(DepthSignificance, PredictsTheScatterOfDepthsThatNoiseCauses) {
         seen.push_back(std::abs(inverse_depth - 1));
       }
     }
-    const double scatter = 1.4826 * Median(seen);  // of a normal distribution
+    const double scatter = 1.4826 * Median(seen);  // for a normal distribution
     EXPECT_GT(Median(predicted), 0.6 * scatter) << "baseline " << baseline;
     EXPECT_LT(Median(predicted), 1.6 * scatter) << "baseline " << baseline;
   }
 }
 
-TEST(DepthSignificance, KnowsThePlaneBetterThanFreePointsOnIt) {
+TEST(DepthSignificance, IsHigherForAPlaneThanForFreePointsOnIt) {
   DepthNoiseOptions noise_alone;
   noise_alone.calibration_share = 0;
   Random random(2);
@@ -78,7 +78,7 @@ TEST(DepthSignificance, KnowsThePlaneBetterThanFreePointsOnIt) {
   EXPECT_GT(as_points, 2 * as_plane);
 }
 
-TEST(DepthSignificance, IsLargeWhereTheCameraMovedAmongThingsAtDifferentDepths) {
+TEST(DepthSignificance, IsLargeIfTheCameraMovedAmongObjectsAtDifferentDepths) {
   Random random(3);
   const Rigid3 truth = Motion({0.3, 0, 0}, {0, 1, 0});
   const TwoViews views = MakeTwoViews(Volume(2, 5), truth, {.noise_px = 0.4}, &random);
@@ -87,7 +87,7 @@ TEST(DepthSignificance, IsLargeWhereTheCameraMovedAmongThingsAtDifferentDepths) 
   EXPECT_LT(significance.relative_depth_sigma, 0.1);
 }
 
-TEST(DepthSignificance, IsSmallWhereACameraOfAWrongFocalLengthOnlyTurned) {
+TEST(DepthSignificance, IsSmallForPureRotationWithAWrongFocalLength) {
   for (const double focal_error : {0.98, 0.99, 1.01, 1.02}) {
     Random random(4);
     const TwoViews views = MakeTwoViews(Volume(2, 5), Motion({0, 0, 0}, {3, 12, 4}),
@@ -97,7 +97,7 @@ TEST(DepthSignificance, IsSmallWhereACameraOfAWrongFocalLengthOnlyTurned) {
   }
 }
 
-TEST(DepthSignificance, CountsTheSkewOfARollingShutter) {
+TEST(DepthSignificance, IncludesTheSkewOfARollingShutter) {
   Random random(5);
   const Rigid3 truth = Motion({0.1, 0, 0}, {0, 1, 0});
   const TwoViews views = MakeTwoViews(Volume(2, 5), truth, {.noise_px = 0.3}, &random);
@@ -105,11 +105,11 @@ TEST(DepthSignificance, CountsTheSkewOfARollingShutter) {
   fast.speed_change_px = 40;
   const DepthSignificance still = Measure(views, WithUnitBaseline(truth), 0.3);
   const DepthSignificance moving = Measure(views, WithUnitBaseline(truth), 0.3, fast);
-  EXPECT_GT(moving.explained_px, 2 * still.explained_px);
+  EXPECT_GT(moving.expected_error_px, 2 * still.expected_error_px);
   EXPECT_GT(moving.relative_depth_sigma, 2 * still.relative_depth_sigma);
 }
 
-TEST(DepthSignificance, IsNoneForAHandfulOfPairs) {
+TEST(DepthSignificance, IsZeroForTooFewPairs) {
   Random random(6);
   const Rigid3 truth = Motion({0.3, 0, 0}, {0, 0, 0});
   const TwoViews views = MakeTwoViews(Volume(2, 5), truth, {.count = 6}, &random);

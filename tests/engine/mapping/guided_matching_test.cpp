@@ -12,11 +12,11 @@
 namespace docent::engine {
 namespace {
 
-constexpr int kShift = 6;  // pixels by which the second image shows the wall further to the left
+constexpr int kShift = 6;  // pixels to the left by which the second image shows the wall
 constexpr double kDepth = 2, kFocal = 200;
 
-// A wall square to the cameras, seen from two places side by side; the points are corners of the first
-// image, and the second keyframe has seen none of them.
+// A wall parallel to the image planes of two cameras side by side. The points are corners of the first image,
+// and the second keyframe observes none of them.
 MapSnapshot MakeWall() {
   cv::Mat noise(240, 320 + kShift, CV_8UC1), wall;
   cv::RNG random(5);
@@ -51,7 +51,7 @@ MapSnapshot MakeWall() {
   return map;
 }
 
-TEST(Refinding, FindsWhatAKeyFrameShouldSeeWhereItIs) {
+TEST(GuidedMatching, FindsVisiblePointsAtTheirProjections) {
   const MapSnapshot wall = MakeWall();
   ASSERT_EQ(Validate(wall), "");
   ASSERT_GT(wall.points.size(), 200u);
@@ -70,11 +70,11 @@ TEST(Refinding, FindsWhatAKeyFrameShouldSeeWhereItIs) {
   }
   EXPECT_EQ(added, found);
   EXPECT_EQ(Validate(*after), "");
-  EXPECT_EQ(MatchMapPoints({}, 1, &searcher, &map), 0) << "nothing is found twice";
+  EXPECT_EQ(MatchMapPoints({}, 1, &searcher, &map), 0) << "every match is already an observation";
   EXPECT_EQ(MatchMapPoints({}, 7, &searcher, &map), 0) << "no such keyframe";
 }
 
-TEST(Refinding, FindsNothingWhereAKeyFrameLooksAtSomethingElse) {
+TEST(GuidedMatching, FindsNothingInAKeyFrameOfAnotherView) {
   MapSnapshot wall = MakeWall();
   cv::Mat other(240, 320, CV_8UC1);
   cv::RNG random(77);

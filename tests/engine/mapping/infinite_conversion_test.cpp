@@ -15,8 +15,8 @@ namespace {
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
 
-// hybrid-slam §5.2: what was a direction becomes a point of the room.
-class Converting : public ::testing::Test {
+// hybrid-slam §5.2: infinite points are triangulated and become finite.
+class ConvertInfinitePointsTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     world_ = new RenderedWorld(testing_world::Chamber(91));
@@ -33,8 +33,8 @@ class Converting : public ::testing::Test {
     keyframe.depth_sigma = 0.5;
     return keyframe;
   }
-  // Keyframe 0: the reference of a panorama map full of directions, at the origin. Keyframe 1: a localized
-  // keyframe elsewhere.
+  // Keyframe 0: the reference of a panorama map with many infinite points, at the origin. Keyframe 1: a
+  // localized keyframe elsewhere.
   static Map Pair(const Rigid3& partner) {
     Map map;
     map.AddKeyFrame(Image(CameraAt({0, 0, 0})));
@@ -43,7 +43,7 @@ class Converting : public ::testing::Test {
     map.AddKeyFrame(Image(partner));
     return map;
   }
-  // As the mapper asks: with more parallax than of an ordinary pair.
+  // As in the mapper: more parallax than for an ordinary pair.
   static InfiniteConversion Convert(Map* map, KeyFrameId reference = 0, KeyFrameId partner = 1) {
     PointCreationOptions options;
     options.min_parallax_deg = 1.5;
@@ -54,17 +54,17 @@ class Converting : public ::testing::Test {
   static RenderedWorld* world_;
   static std::shared_ptr<const CameraModel> camera_;
 };
-RenderedWorld* Converting::world_ = nullptr;
-std::shared_ptr<const CameraModel> Converting::camera_;
+RenderedWorld* ConvertInfinitePointsTest::world_ = nullptr;
+std::shared_ptr<const CameraModel> ConvertInfinitePointsTest::camera_;
 
-TEST_F(Converting, PutsDirectionsOnTheWalls) {
+TEST_F(ConvertInfinitePointsTest, TriangulatesInfinitePointsOnTheWalls) {
   for (const Rigid3& partner : {CameraAt({0.3, 0, 0}), CameraAt({-0.2, 0.15, 0.1}, {2, 4, 8}),
                                 CameraAt({0.25, 0, -0.2}, {0, -6, 0})}) {
     Map map = Pair(partner);
     const std::size_t before = map.AlivePoints();
     const InfiniteConversion conversion = Convert(&map);
     ASSERT_GT(conversion.converted.size(), 60u);
-    // Directions of two levels may be one corner; no other finite point was known.
+    // Infinite points of two levels may be one corner; no other finite point existed before.
     EXPECT_LT(conversion.merged, 10);
     EXPECT_EQ(map.AlivePoints(), before - static_cast<std::size_t>(conversion.merged));
     std::vector<double> distances;
@@ -80,13 +80,14 @@ TEST_F(Converting, PutsDirectionsOnTheWalls) {
     EXPECT_LT(distances[distances.size() / 2], 0.02);
     EXPECT_LT(distances[distances.size() * 9 / 10], 0.06);
     EXPECT_EQ(Validate(*map.Snapshot()), "");
-    // A second look at the same pair finds no more than the first one left.
+    // A second call for the same pair finds no more than the first one left.
     EXPECT_LT(Convert(&map).converted.size(), conversion.converted.size() / 4 + 1);
   }
 }
 
-TEST_F(Converting, RefusesParallaxThatTellsNoDepth) {
-  // Turned only, and moved by less than a degree and a half shows at the nearest wall, 2.1 metres away.
+TEST_F(ConvertInfinitePointsTest, RejectsInsufficientParallax) {
+  // A rotation, and a translation that causes less than 1.5 degrees of parallax at the nearest wall, 2.1
+  // metres away.
   for (const Rigid3& partner : {CameraAt({0, 0, 0}, {0, 10, 0}), CameraAt({0.04, 0, 0})}) {
     Map map = Pair(partner);
     const InfiniteConversion conversion = Convert(&map);
@@ -95,13 +96,13 @@ TEST_F(Converting, RefusesParallaxThatTellsNoDepth) {
   }
 }
 
-// The partner's image was taken on the other side of where its pose says: what truly matches would lie
-// behind both cameras.
-TEST_F(Converting, RefusesWhatWouldLieBehindTheCameras) {
+// The partner's image was taken on the opposite side of its pose, so correct matches would lie behind both
+// cameras.
+TEST_F(ConvertInfinitePointsTest, RejectsPointsBehindTheCameras) {
   Map right = Pair(CameraAt({0.3, 0, 0})), wrong = Pair(CameraAt({0.3, 0, 0}));
   wrong.FindKeyFrame(1)->keyframe.camera_from_map = CameraAt({-0.3, 0, 0});
   const std::size_t possible = Convert(&right).converted.size();
-  // Chance lets a few patches resemble a wrong one.
+  // By chance a few patches resemble a wrong one.
   EXPECT_LT(Convert(&wrong).converted.size(), possible / 8);
   for (const Map::PointRecord& record : wrong.points()) {
     if (!record.alive || record.point.infinite()) continue;
@@ -110,23 +111,24 @@ TEST_F(Converting, RefusesWhatWouldLieBehindTheCameras) {
   }
 }
 
-// A partner whose pose is off across the baseline: hardly a match lies on its epipolar line.
-TEST_F(Converting, RefusesWhatLiesOffTheEpipolarLine) {
+// The pose of the partner is wrong perpendicular to the baseline: hardly any match lies on its epipolar line.
+TEST_F(ConvertInfinitePointsTest, RejectsMatchesOffTheEpipolarLine) {
   Map right = Pair(CameraAt({0.3, 0, 0})), wrong = Pair(CameraAt({0.3, 0, 0}));
   wrong.FindKeyFrame(1)->keyframe.camera_from_map = CameraAt({0.3, 0, 0}, {4, 0, 0});
   const std::size_t possible = Convert(&right).converted.size();
   EXPECT_LT(Convert(&wrong).converted.size(), possible / 6);
 }
 
-TEST_F(Converting, ConvertsWhatTheReferenceIsTheSourceOfAlone) {
+TEST_F(ConvertInfinitePointsTest, ConvertsOnlyPointsWhoseSourceIsTheReference) {
   Map map = Pair(CameraAt({0.3, 0, 0}));
-  const Rigid3 turned = CameraAt({0, 0, 0}, {0, 12, 0});
+  const Rigid3 rotated = CameraAt({0, 0, 0}, {0, 12, 0});
   const KeyFrameId dependent =
-      map.AddKeyFrame(testing_world::MakeDependent(*world_, camera_, turned, 0, {0, 0, 0})).keyframe.id;
-  // The dependent keyframe sees the reference's directions, and has some of its own that the reference sees.
+      map.AddKeyFrame(testing_world::MakeDependent(*world_, camera_, rotated, 0, {0, 0, 0})).keyframe.id;
+  // The dependent keyframe observes the reference's infinite points, and has some of its own that the
+  // reference observes.
   std::vector<MapPointId> own;
   for (const Map::PointRecord& record : map.points()) {
-    const auto pixel = camera_->Project(turned.rotation * record.point.position());
+    const auto pixel = camera_->Project(rotated.rotation * record.point.position());
     if (pixel && camera_->IsInside(*pixel, 5))
       map.AddObservation({dependent, record.point.id, pixel->cast<float>(), record.point.source_level});
   }
@@ -140,20 +142,20 @@ TEST_F(Converting, ConvertsWhatTheReferenceIsTheSourceOfAlone) {
     own.push_back(map.AddPoint(point));
     map.AddObservation({0, own.back(), seen.pixel, seen.level});
     map.AddObservation({dependent, own.back(),
-                        camera_->Project(turned.rotation * point.position())->cast<float>(), seen.level});
+                        camera_->Project(rotated.rotation * point.position())->cast<float>(), seen.level});
   }
   ASSERT_GT(own.size(), 10u);
   const InfiniteConversion conversion = Convert(&map);
   ASSERT_GT(conversion.converted.size(), 40u);
   for (const MapPointId id : own) EXPECT_TRUE(map.FindPoint(id)->point.infinite()) << id;
-  // A dependent keyframe sees no finite points (hybrid-slam §2).
+  // A dependent keyframe observes no finite points (hybrid-slam §2).
   for (const Observation& observation : map.FindKeyFrame(dependent)->observations)
     EXPECT_TRUE(map.FindPoint(observation.point)->point.infinite());
   EXPECT_EQ(Validate(*map.Snapshot()), "");
 }
 
-// The partner knows the same corners as finite points already: no second point may be made of any.
-TEST_F(Converting, MakesNoTwinOfAPointThatTheMapKnows) {
+// The partner already observes the same corners as finite points, so no duplicate may be created.
+TEST_F(ConvertInfinitePointsTest, CreatesNoDuplicateOfAFinitePoint) {
   Map map = Pair(CameraAt({0.3, 0, 0}));
   map.AddKeyFrame(Image(CameraAt({0.55, 0, 0})));
   PointSearcher searcher;
@@ -175,10 +177,11 @@ TEST_F(Converting, MakesNoTwinOfAPointThatTheMapKnows) {
     EXPECT_LT((*camera_->Project(record.point.position()) - seen->pixel.cast<double>()).norm(),
               2.0 * (1 << seen->level) + 0.5);
   }
-  // A few met a point that was a direction itself, or one that the reference had met already.
+  // A few coincide with a point that was infinite itself, or with one that another point of the reference
+  // matched.
   EXPECT_LE(joined, conversion.merged);
   EXPECT_GT(joined, 3 * conversion.merged / 4);
-  // No two finite points at one place of the partner's image.
+  // No two finite points at one pixel of the partner's image.
   const auto& observations = map.FindKeyFrame(1)->observations;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
@@ -192,7 +195,7 @@ TEST_F(Converting, MakesNoTwinOfAPointThatTheMapKnows) {
   EXPECT_EQ(Validate(*map.Snapshot()), "");
 }
 
-TEST_F(Converting, DoesNothingWithKeyframesThatAreNotThere) {
+TEST_F(ConvertInfinitePointsTest, DoesNothingForKeyframesThatDoNotExist) {
   Map map = Pair(CameraAt({0.3, 0, 0}));
   for (const auto& [reference, partner] :
        std::vector<std::pair<KeyFrameId, KeyFrameId>>{{0, 0}, {0, 9}, {9, 0}, {1, 0}}) {

@@ -27,7 +27,7 @@ struct Outcome {
   int frames = 0;
 };
 
-// Shows the world from pose(0), pose(1), ... until the initializer is content or the frames end.
+// Renders the world from pose(0), pose(1), ... until the initializer returns a pair or the frames end.
 Outcome Show(const RenderedWorld& world, int frames, const std::function<Rigid3(int)>& pose) {
   Outcome outcome;
   Initializer initializer({}, Camera(), 5);
@@ -44,30 +44,30 @@ double DegreesBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
 }
 
-TEST(Initializer, StartsOnSidewaysMotionWithTheTrueGeometry) {
+TEST(Initializer, ReturnsTheTrueGeometryAfterSidewaysMotion) {
   const RenderedWorld world = RenderedWorld::Room(51);
-  const std::vector<std::function<Rigid3(int)>> ways = {
+  const std::vector<std::function<Rigid3(int)>> motions = {
       [](int i) {
         return CameraAt({0.012 * i, 0, 0});
       },
       [](int i) {
         return CameraAt({0.002 * i, 0.01 * i, 0}, {0, 0.1 * i, 0.2 * i});
       }};
-  for (const auto& way : ways) {
-    const Outcome outcome = Show(world, 60, way);
-    ASSERT_TRUE(outcome.pair) << "no start in 60 frames";
+  for (const auto& motion : motions) {
+    const Outcome outcome = Show(world, 60, motion);
+    ASSERT_TRUE(outcome.pair) << "no pair in 60 frames";
     const InitialPair& pair = *outcome.pair;
     EXPECT_LT(pair.a.time, pair.b.time);
-    EXPECT_EQ(pair.geometry.verdict, TwoViewVerdict::kGeneral);
+    EXPECT_EQ(pair.geometry.outcome, TwoViewOutcome::kGeneral);
     const auto frame_of = [](Timestamp time) { return static_cast<int>(std::lround(30 * ToSeconds(time))); };
-    const Rigid3 a = way(frame_of(pair.a.time)), b = way(frame_of(pair.b.time));
+    const Rigid3 a = motion(frame_of(pair.a.time)), b = motion(frame_of(pair.b.time));
     const Rigid3 truth = b * a.inverse();
     EXPECT_LT(DegreesBetween(pair.geometry.b_from_a.translation, truth.translation), 4);
     EXPECT_LT((pair.geometry.b_from_a.rotation * truth.rotation.inverse()).Angle() * 180 / std::numbers::pi,
               0.6);
 
     ASSERT_EQ(pair.geometry.inlier.size(), pair.matches.size());
-    std::vector<double> relative;  // distance to the surface in parts of the depth
+    std::vector<double> relative;  // distance to the surface as a ratio of the depth
     for (std::size_t i = 0; i < pair.matches.size(); ++i) {
       if (!pair.geometry.inlier[i]) continue;
       const Eigen::Vector3d point = truth.translation.norm() * pair.geometry.points_in_a[i];
@@ -80,30 +80,30 @@ TEST(Initializer, StartsOnSidewaysMotionWithTheTrueGeometry) {
   }
 }
 
-TEST(Initializer, NeverStartsWhileTheCameraStandsStill) {
+TEST(Initializer, NeverStartsWhileTheCameraIsStill) {
   const Outcome outcome = Show(RenderedWorld::Room(52), 25, [](int) { return CameraAt({0.1, 0, 0}); });
   EXPECT_FALSE(outcome.pair);
-  EXPECT_TRUE(outcome.hints.contains(Advice(TwoViewVerdict::kStill)));
+  EXPECT_TRUE(outcome.hints.contains(Advice(TwoViewOutcome::kStill)));
 }
 
-TEST(Initializer, NeverStartsWhileTheCameraOnlyTurns) {
+TEST(Initializer, NeverStartsDuringPureRotation) {
   const Outcome outcome = Show(RenderedWorld::Room(53), 50, [](int i) {
     return CameraAt({0, 0, 0}, {0.15 * i, 0.5 * i, 0.2 * i});
   });
   EXPECT_FALSE(outcome.pair);
-  EXPECT_TRUE(outcome.hints.contains(Advice(TwoViewVerdict::kPureRotation)));
+  EXPECT_TRUE(outcome.hints.contains(Advice(TwoViewOutcome::kPureRotation)));
 }
 
-TEST(Initializer, AsksForDetailWhereThereIsNone) {
+TEST(Initializer, AsksForDetailInABlankImage) {
   Initializer initializer({}, Camera(), 5);
   for (int i = 0; i < 5; ++i) {
     EXPECT_FALSE(
         initializer.Track(FromSeconds(i / 30.0), MakeFeatures(cv::Mat(240, 320, CV_8UC1, cv::Scalar(100)))));
-    EXPECT_NE(initializer.hint().find("texture"), std::string::npos) << initializer.hint();
+    EXPECT_NE(initializer.hint().find("detail"), std::string::npos) << initializer.hint();
   }
 }
 
-TEST(Initializer, FollowsCornersWhereTheyGo) {
+TEST(Initializer, TracksCornersToTheirTruePixels) {
   const RenderedWorld world = RenderedWorld::Room(54);
   Initializer initializer({}, Camera(), 5);
   const auto pose = [](int i) { return CameraAt({0.004 * i, 0, 0}, {0, 0, 0.5 * i}); };
@@ -123,7 +123,7 @@ TEST(Initializer, FollowsCornersWhereTheyGo) {
   EXPECT_LT(errors[errors.size() * 9 / 10], 1.5);
 }
 
-TEST(Initializer, StartsAnewAfterAReset) {
+TEST(Initializer, StartsAgainAfterAReset) {
   const RenderedWorld world = RenderedWorld::Room(55);
   Initializer initializer({}, Camera(), 5);
   initializer.Track(FromSeconds(0), MakeFeatures(world.Render(*Camera(), CameraAt({0, 0, 0}))));

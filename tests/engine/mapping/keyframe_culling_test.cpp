@@ -13,7 +13,7 @@ namespace {
 using testing_world::Camera;
 using testing_world::CameraAt;
 
-// Before one wall: keyframes at these places, sideways, all of which see the same points.
+// In front of one wall: keyframes at these lateral positions, all of which see the same points.
 Map MapFrom(const std::vector<double>& places) {
   static const auto world = testing_world::RenderedWorld::SingleWall(3, 5);
   std::vector<Rigid3> poses;
@@ -27,7 +27,7 @@ KeyFrameId Newest(const Map& map) {
   return map.keyframes().rbegin()->first;
 }
 
-TEST(Redundancy, IsAKeyFrameAmongManyThatSeeTheSame) {
+TEST(KeyFrameCulling, FindsAKeyFrameAmongManyWithTheSameView) {
   Map map = MapFrom({0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9});
   const KeyFrameId redundant = FindRedundantKeyFrame({}, Newest(map), &map);
   ASSERT_NE(redundant, kNoId);
@@ -35,13 +35,13 @@ TEST(Redundancy, IsAKeyFrameAmongManyThatSeeTheSame) {
   EXPECT_LT(redundant, Newest(map));
 }
 
-TEST(Redundancy, LeavesKeyFramesThatStandAlone) {
-  // A metre apart before a wall three metres away: others know the points, but not the view.
+TEST(KeyFrameCulling, KeepsKeyFramesWithoutNeighbours) {
+  // A metre apart, three metres from a wall: others observe the points, but have no similar view.
   Map map = MapFrom({0, 0.6, 1.2, 1.8, 2.4, 3.0, 3.6, 4.2, 4.8, 5.4});
   EXPECT_EQ(FindRedundantKeyFrame({}, Newest(map), &map), kNoId);
 }
 
-TEST(Redundancy, LeavesSmallMapsFixedOnesAndReferences) {
+TEST(KeyFrameCulling, KeepsSmallMapsFixedKeyFramesAndReferences) {
   Map small = MapFrom({0, 0.1, 0.2, 0.3, 0.4});
   EXPECT_EQ(FindRedundantKeyFrame({}, Newest(small), &small), kNoId);
   Map map = MapFrom({0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9});
@@ -54,20 +54,20 @@ TEST(Redundancy, LeavesSmallMapsFixedOnesAndReferences) {
   EXPECT_EQ(FindRedundantKeyFrame({}, Newest(map), &map), kNoId);
 }
 
-TEST(Redundancy, EndsWhenEveryPointIsLeftWithEnoughObservers) {
+TEST(KeyFrameCulling, KeepsEnoughObserversOfEveryPoint) {
   Map map = MapFrom({0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1});
   const std::size_t points = map.AlivePoints();
   int removed = 0;
   for (KeyFrameId id = 0; (id = FindRedundantKeyFrame({}, Newest(map), &map)) != kNoId; ++removed)
     CullKeyFrame(id, &map);
-  EXPECT_EQ(removed, 4) << "down to the eight that any map may keep";
-  EXPECT_GT(map.AlivePoints(), points * 98 / 100) << "only what a single keyframe saw goes with it";
+  EXPECT_EQ(removed, 4) << "down to the eight that every map keeps";
+  EXPECT_GT(map.AlivePoints(), points * 98 / 100) << "only points of a single keyframe are removed with it";
   const auto snapshot = map.Snapshot();
   EXPECT_NO_THROW(Validate(*snapshot));
   for (const MapPoint& point : snapshot->points) {
     const KeyFrame* source = snapshot->FindKeyFrame(point.source_keyframe);
     ASSERT_NE(source, nullptr);
-    // The new source sees the point where the point is.
+    // The new source observes the point where the point projects.
     const auto pixel = source->camera->Project(source->camera_from_map * point.position());
     ASSERT_TRUE(pixel);
     const Eigen::Vector2d seen = LevelZeroFromLevel(point.source_pixel.cast<double>(), point.source_level);

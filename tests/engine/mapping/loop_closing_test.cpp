@@ -13,8 +13,8 @@
 #include "engine/vision/features.h"
 #include "tests/engine/rendered_world.h"
 
-// A camera goes around a room, looking out, with a calibration that is two per cent off: by the time it is
-// back, the map is some degrees off, and knows the beginning twice (ptamm §6.2, Fig. 15).
+// A camera goes around a room, looking outwards, with a calibration that is wrong by two per cent. When it
+// returns, the map is off by some degrees and contains the beginning twice (ptamm §6.2, Fig. 15).
 namespace docent::engine {
 namespace {
 
@@ -40,13 +40,13 @@ const std::shared_ptr<const CameraModel>& BelievedCamera() {
   return camera;
 }
 
-// Four walls, and before each of them a smaller one.
+// Four walls, each with a smaller one in front of it.
 const RenderedWorld& Hall() {
   static const RenderedWorld hall = [] {
     std::vector<Wall> walls;
     for (int side = 0; side < 4; ++side) {
-      const double turn = side * std::numbers::pi / 2;
-      const Eigen::Vector3d out(std::sin(turn), 0, std::cos(turn)), right(std::cos(turn), 0, -std::sin(turn)),
+      const double yaw = side * std::numbers::pi / 2;
+      const Eigen::Vector3d out(std::sin(yaw), 0, std::cos(yaw)), right(std::cos(yaw), 0, -std::sin(yaw)),
           down(0, 1, 0);
       const auto seed = static_cast<std::uint64_t>(side);
       walls.push_back(PaintedWall(2.6 * out, right, down, 2.6, 1.8, 100 + seed));
@@ -64,14 +64,14 @@ Rigid3 OnTheRound(int step) {
   return CameraAt({kRadius * std::sin(angle), 0, kRadius * std::cos(angle)}, {0, step * kStep_deg, 0});
 }
 
-// Where a true pose sees what, as the believed lens has it.
+// The pixels that a camera at a true pose sees, in terms of the assumed calibration.
 InitialPair FirstPair(const RenderedWorld& world, const Rigid3& a, const Rigid3& b,
-                      const std::shared_ptr<const CameraModel>& believed) {
+                      const std::shared_ptr<const CameraModel>& assumed_camera) {
   InitialPair pair;
-  pair.camera = believed;
+  pair.camera = assumed_camera;
   pair.a = {FromSeconds(0), MakeFeatures(world.Render(*TrueCamera(), a, 1.5, 1))};
   pair.b = {FromSeconds(1), MakeFeatures(world.Render(*TrueCamera(), b, 1.5, 2))};
-  pair.geometry.verdict = TwoViewVerdict::kGeneral;
+  pair.geometry.outcome = TwoViewOutcome::kGeneral;
   pair.geometry.b_from_a = b * a.inverse();
   pair.baseline_m = pair.geometry.b_from_a.translation.norm();
   pair.geometry.b_from_a.translation /= pair.baseline_m;
@@ -90,25 +90,25 @@ InitialPair FirstPair(const RenderedWorld& world, const Rigid3& a, const Rigid3&
   return pair;
 }
 
-// What became of a walk: the map after each step, and what was closed.
+// The result of a walk: the map after each step, and the loops that were closed.
 struct Walk {
   std::vector<std::shared_ptr<const MapSnapshot>> maps;
   std::vector<MapperEvent> loops;
 };
 
-// Each keyframe is offered where the last one is in the map and the true step from there leads.
+// Each keyframe is offered at the pose of the last one in the map, moved by the true step.
 Walk GoAlong(const RenderedWorld& world, const std::vector<Rigid3>& poses, const MapperOptions& options,
-             const std::shared_ptr<const CameraModel>& believed) {
+             const std::shared_ptr<const CameraModel>& assumed_camera) {
   Walk walk;
   Mapper mapper(options);
-  mapper.Start(FirstPair(world, poses[0], poses[1], believed));
+  mapper.Start(FirstPair(world, poses[0], poses[1], assumed_camera));
   mapper.Step();
   for (std::size_t i = 2; i < poses.size(); ++i) {
     const auto map = mapper.Snapshot();
     if (!map) break;
     KeyFrameCandidate candidate;
     candidate.time = FromSeconds(static_cast<double>(i));
-    candidate.camera = believed;
+    candidate.camera = assumed_camera;
     candidate.features = MakeFeatures(world.Render(*TrueCamera(), poses[i], 1.5, i));
     candidate.camera_from_map = poses[i] * poses[i - 1].inverse() * map->keyframes.back().camera_from_map;
     candidate.map_revision = map->revision;
@@ -135,12 +135,12 @@ const KeyFrame& At(const MapSnapshot& map, double seconds) {
                        [&](const KeyFrame& keyframe) { return keyframe.time == FromSeconds(seconds); });
 }
 
-// By how much the map is wrong about where the camera stands that has gone all the way round: its keyframe
-// and that of the same place a round before. Degrees, and metres in the map's own unit.
+// The error of the map after a full round, between the keyframe and the keyframe at the same place one round
+// earlier. Degrees, and map units.
 struct Gap {
-  double turn_deg, distance;
+  double rotation_deg, distance;
 };
-Gap GapAfterTheRound(const MapSnapshot& map, int step) {
+Gap GapAfterARound(const MapSnapshot& map, int step) {
   const Rigid3 now = At(map, kRound + step).camera_from_map, then = At(map, step).camera_from_map;
   const Rigid3 left = now * then.inverse();
   return {left.rotation.Angle() * 180 / std::numbers::pi,
@@ -150,8 +150,8 @@ Gap GapAfterTheRound(const MapSnapshot& map, int step) {
 MapperOptions WithLoops(bool enabled) {
   MapperOptions options;
   options.loops.enabled = enabled;
-  options.loops.correction.max_edge_residual = 0.1;  // the steps here are far longer than those of a walk
-  options.culling.min_keyframes = 1000;              // all stay, for comparison
+  options.loops.correction.max_edge_residual = 0.1;  // the steps are far longer here than in a real walk
+  options.culling.min_keyframes = 1000;              // keep all, for comparison
   return options;
 }
 
@@ -160,29 +160,29 @@ const Walk& ClosedWalk() {
   return walk;
 }
 
-TEST(LoopClosing, WithoutItTheMapKnowsTheBeginningTwice) {
+TEST(LoopClosing, WithoutItTheMapContainsTheBeginningTwice) {
   const Walk walk = GoAlong(Hall(), Round(kRound + 6), WithLoops(false), BelievedCamera());
-  const Gap gap = GapAfterTheRound(*walk.maps.back(), 4);
-  EXPECT_GT(gap.turn_deg, 2.0);
+  const Gap gap = GapAfterARound(*walk.maps.back(), 4);
+  EXPECT_GT(gap.rotation_deg, 2.0);
   EXPECT_TRUE(walk.loops.empty());
 }
 
-TEST(LoopClosing, PutsTheMapRightWhenTheCameraIsBack) {
+TEST(LoopClosing, CorrectsTheMapWhenTheCameraReturns) {
   const Walk& walk = ClosedWalk();
   ASSERT_EQ(walk.loops.size(), 1u);
   const MapSnapshot& map = *walk.maps.back();
   EXPECT_EQ(Validate(map), "");
-  const Gap gap = GapAfterTheRound(map, 4);
-  EXPECT_LT(gap.turn_deg, 0.25);
+  const Gap gap = GapAfterARound(map, 4);
+  EXPECT_LT(gap.rotation_deg, 0.25);
   EXPECT_LT(gap.distance, 0.03);
-  // And all the way: against the true poses, in the first keyframe's frame.
+  // The whole round agrees with the true poses, in the first keyframe's frame.
   for (int step = 0; step < kRound; step += 6) {
     const Rigid3 estimated = At(map, step).camera_from_map,
                  truth = OnTheRound(step) * OnTheRound(0).inverse();
     EXPECT_LT((estimated.rotation * truth.rotation.inverse()).Angle() * 180 / std::numbers::pi, 1.5)
         << "step " << step;
   }
-  // What was twice is once: keyframes of both rounds see the same points.
+  // Duplicates are fused: keyframes of both rounds observe the same points.
   Map linked(map);
   int shared = 0;
   for (const auto& [id, count] : linked.Covisible(At(map, kRound + 4).id)) {
@@ -191,7 +191,7 @@ TEST(LoopClosing, PutsTheMapRightWhenTheCameraIsBack) {
   EXPECT_GE(shared, 60);
 }
 
-TEST(LoopClosing, TellsWhoeverHoldsAPoseHowTheMapWasMoved) {
+TEST(LoopClosing, RecordsTheCorrectionForHoldersOfPoses) {
   const Walk& walk = ClosedWalk();
   const auto moved = std::find_if(walk.maps.begin(), walk.maps.end(),
                                   [](const auto& map) { return !map->corrections.empty(); });
@@ -201,17 +201,17 @@ TEST(LoopClosing, TellsWhoeverHoldsAPoseHowTheMapWasMoved) {
   const MapCorrection& correction = *after.corrections.back();
   EXPECT_GT(correction.revision, before.revision);
   EXPECT_LE(correction.revision, after.revision);
-  // A camera that stood where the newest keyframe of the map before is, is carried to where that one is now.
+  // A camera that stood at the newest keyframe of the map before moves to where that keyframe is now.
   const KeyFrame& newest = before.keyframes.back();
-  const Rigid3 carried = CarriedAlong(newest.camera_from_map, correction.after_from_before.at(newest.id));
+  const Rigid3 carried = CorrectedPose(newest.camera_from_map, correction.after_from_before.at(newest.id));
   const Rigid3 now = after.FindKeyFrame(newest.id)->camera_from_map;
-  // The adjustments about it move it a little, too.
+  // The adjustments afterwards move the keyframe slightly, too.
   EXPECT_LT((carried.rotation * now.rotation.inverse()).Angle() * 180 / std::numbers::pi, 1.0);
   EXPECT_GT((newest.camera_from_map.rotation * now.rotation.inverse()).Angle() * 180 / std::numbers::pi, 2.0);
 }
 
-TEST(LoopClosing, NeverTakesALookAlikeForTheSamePlace) {
-  // One pattern again and again along a wall: every two metres all looks the same.
+TEST(LoopClosing, NeverClosesALoopBetweenSimilarPlaces) {
+  // One pattern repeats along a wall, so the view is the same every two metres.
   const Wall panel = PaintedWall({0, 0, 1.3}, {1, 0, 0}, {0, 1, 0}, 1.0, 1.2, 7);
   const Wall stand = PaintedWall({0.3, 0.2, 1.0}, {1, 0, 0}, {0, 1, 0}, 0.2, 0.25, 8);
   std::vector<Wall> walls;
@@ -227,11 +227,11 @@ TEST(LoopClosing, NeverTakesALookAlikeForTheSamePlace) {
   const Walk walk = GoAlong(RenderedWorld(walls), poses, options, TrueCamera());
   ASSERT_EQ(walk.maps.size(), 40u);
   EXPECT_TRUE(walk.loops.empty()) << walk.loops.front().detail;
-  // It is the implausible error that gives them away, or else the map, which would have to be bent: whoever
-  // believes in any error is taken in.
-  options.loops.finder.max_shift = 10;
+  // Such loops are rejected because the implied error is implausible, or because the map would have to be
+  // bent. If any error were accepted, false loops would be closed.
+  options.loops.detector.max_translation = 10;
   EXPECT_TRUE(GoAlong(RenderedWorld(walls), poses, options, TrueCamera()).loops.empty());
-  options.loops.correction.max_misfit = options.loops.correction.max_edge_residual = 10;
+  options.loops.correction.max_loop_residual = options.loops.correction.max_edge_residual = 10;
   EXPECT_FALSE(GoAlong(RenderedWorld(walls), poses, options, TrueCamera()).loops.empty());
 }
 

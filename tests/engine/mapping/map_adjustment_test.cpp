@@ -24,8 +24,8 @@ const std::vector<Rigid3>& Poses() {
   return poses;
 }
 
-// A true map whose first two keyframes are fixed, so that place and scale are held.
-class AdjustingAMap : public ::testing::Test {
+// A true map whose first two keyframes are fixed, which fixes the coordinate frame and the scale.
+class MapAdjustment : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     Map made =
@@ -77,9 +77,9 @@ class AdjustingAMap : public ::testing::Test {
 
   static std::shared_ptr<const MapSnapshot> truth_;
 };
-std::shared_ptr<const MapSnapshot> AdjustingAMap::truth_;
+std::shared_ptr<const MapSnapshot> MapAdjustment::truth_;
 
-TEST_F(AdjustingAMap, RemovesTheNoiseOfTheWholeMap) {
+TEST_F(MapAdjustment, RemovesTheNoiseOfTheWholeMap) {
   Map map = Noisy(0.02, 0.8, 1);
   EXPECT_GT(Compare(&map).median_point_m, 0.01);
   MapAdjustmentOptions options;
@@ -92,7 +92,7 @@ TEST_F(AdjustingAMap, RemovesTheNoiseOfTheWholeMap) {
   EXPECT_GT(map.AlivePoints(), truth_->points.size() * 9 / 10);
 }
 
-TEST_F(AdjustingAMap, LeavesFixedKeyframesWhereTheyAre) {
+TEST_F(MapAdjustment, DoesNotMoveFixedKeyframes) {
   Map map = Noisy(0.02, 0.8, 2);
   map.FindKeyFrame(3)->keyframe.fixed = true;
   const Rigid3 wrong = map.FindKeyFrame(3)->keyframe.camera_from_map;
@@ -104,7 +104,7 @@ TEST_F(AdjustingAMap, LeavesFixedKeyframesWhereTheyAre) {
   EXPECT_TRUE(IsNear(map.FindKeyFrame(3)->keyframe.camera_from_map, wrong, 1e-12, 1e-12));
 }
 
-TEST_F(AdjustingAMap, SettlesOneKeyframeAmongItsNeighbours) {
+TEST_F(MapAdjustment, AdjustsOneKeyframeAmongItsNeighbours) {
   Map map(*truth_);
   Rigid3& pose = map.FindKeyFrame(2)->keyframe.camera_from_map;
   pose = CameraAt({0.02, -0.015, 0.01}, {0.5, 0.5, -0.5}) * pose;
@@ -115,7 +115,7 @@ TEST_F(AdjustingAMap, SettlesOneKeyframeAmongItsNeighbours) {
   EXPECT_EQ(Validate(*map.Snapshot()), "");
 }
 
-TEST_F(AdjustingAMap, MovesNothingOutsideTheWindow) {
+TEST_F(MapAdjustment, MovesNothingOutsideTheWindow) {
   Map map = Noisy(0.01, 0.3, 3);
   MapAdjustmentOptions options;
   options.window = 1;
@@ -129,7 +129,7 @@ TEST_F(AdjustingAMap, MovesNothingOutsideTheWindow) {
   }
 }
 
-TEST_F(AdjustingAMap, ThrowsOutObservationsThatAreWrongAndKeepsTheOthers) {
+TEST_F(MapAdjustment, RemovesWrongObservationsAndKeepsTheOthers) {
   Map map = Noisy(0.002, 0.1, 4);
   std::vector<std::pair<KeyFrameId, MapPointId>> wrong;
   for (const Map::PointRecord& record : map.points()) {
@@ -161,7 +161,7 @@ TEST_F(AdjustingAMap, ThrowsOutObservationsThatAreWrongAndKeepsTheOthers) {
   EXPECT_LT(Compare(&map).worst_keyframe_m, 2e-3);
 }
 
-TEST_F(AdjustingAMap, KeepsTheMapWhenItIsInterrupted) {
+TEST_F(MapAdjustment, KeepsTheMapValidWhenInterrupted) {
   Map map = Noisy(0.02, 0.8, 5);
   const auto before = map.Snapshot();
   const std::atomic<bool> interrupt = true;
@@ -177,7 +177,7 @@ TEST_F(AdjustingAMap, KeepsTheMapWhenItIsInterrupted) {
   }
 }
 
-TEST_F(AdjustingAMap, DoesNothingWhereThereIsNothingToDo) {
+TEST_F(MapAdjustment, DoesNothingForEmptyMapsAndUnknownKeyframes) {
   Map empty;
   AdjustGlobally({}, nullptr, &empty);
   AdjustLocally({}, 0, nullptr, &empty);
@@ -188,7 +188,7 @@ TEST_F(AdjustingAMap, DoesNothingWhereThereIsNothingToDo) {
   EXPECT_TRUE(SamePoses(*before, *map.Snapshot()));
 }
 
-TEST_F(AdjustingAMap, SurvivesAPoseThatIsNoNumber) {
+TEST_F(MapAdjustment, SurvivesANonFinitePose) {
   Map map = Noisy(0.005, 0.2, 7);
   map.FindKeyFrame(3)->keyframe.camera_from_map.translation.x() = std::numeric_limits<double>::quiet_NaN();
   AdjustGlobally({}, nullptr, &map);

@@ -32,20 +32,20 @@ class MapDescriptorsTest : public testing::Test {
 std::shared_ptr<const CameraModel> MapDescriptorsTest::camera_;
 std::unique_ptr<RenderedWorld> MapDescriptorsTest::world_;
 
-TEST_F(MapDescriptorsTest, SuggestThePoseOfAnImageThatIsFarFromWhereItWasThought) {
+TEST_F(MapDescriptorsTest, EstimateThePoseOfAnImageWhosePoseIsFarOff) {
   Map map = TrueMap();
   MapDescriptors descriptors(DefaultVocabulary());
   Update(&descriptors, &map);
   const Rigid3 truth = CameraAt({0.12, 0.05, 0.05}, {3, 4, 8});
   KeyFrame keyframe = testing_world::MakeKeyFrame(*world_, camera_, truth);
-  keyframe.camera_from_map = CameraAt({3, 0, -2}, {0, 120, 0});  // nobody looks at it
+  keyframe.camera_from_map = CameraAt({3, 0, -2}, {0, 120, 0});  // a wrong pose: no point is in view
   const auto pose = descriptors.SuggestPose({}, keyframe, 1, &map);
   ASSERT_TRUE(pose);
   EXPECT_LT((pose->OriginInSource() - truth.OriginInSource()).norm(), 0.03);
   EXPECT_LT((pose->rotation * truth.rotation.inverse()).Angle(), 0.02);
 }
 
-TEST_F(MapDescriptorsTest, SuggestNothingForAnotherPlace) {
+TEST_F(MapDescriptorsTest, ReturnNoPoseForAnotherPlace) {
   Map map = TrueMap();
   MapDescriptors descriptors(DefaultVocabulary());
   Update(&descriptors, &map);
@@ -54,12 +54,12 @@ TEST_F(MapDescriptorsTest, SuggestNothingForAnotherPlace) {
   EXPECT_FALSE(descriptors.SuggestPose({}, keyframe, 1, &map));
 }
 
-TEST_F(MapDescriptorsTest, AreInStepWithTheMapHoweverItCame) {
+TEST_F(MapDescriptorsTest, FollowEveryChangeOfTheMap) {
   Map map = TrueMap();
   MapDescriptors grown(DefaultVocabulary());
   Update(&grown, &map);
   EXPECT_GT(grown.database().size(), 100u);
-  // Points and keyframes go, and the rest is as if it had been alone from the start.
+  // After points and keyframes are removed, the database equals one that never contained them.
   for (MapPointId id = 0; id < map.points().size(); id += 3) map.RemovePoint(id);
   map.RemoveKeyFrame(map.keyframes().rbegin()->first);
   Update(&grown, &map);

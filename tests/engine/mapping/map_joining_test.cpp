@@ -12,9 +12,8 @@
 #include "engine/mapping/mapper.h"
 #include "tests/engine/rendered_world.h"
 
-// Two cameras go along a gallery of painted panels, each with a smaller one standing before it, and each
-// makes a map of a part of it. The maps are without error, so that the truth of the joined map is the
-// gallery.
+// Two cameras go along a gallery of painted panels, each with a smaller panel in front of it, and each camera
+// maps a part of it. The maps have no error, so the joined map must equal the gallery.
 namespace docent::engine {
 namespace {
 
@@ -24,12 +23,12 @@ using testing_world::RenderedWorld;
 using testing_world::TrueMap;
 using testing_world::Wall;
 
-using RelocalizationResult = MapOverlap::RelocalizationResult;
+using Outcome = MapOverlap::Outcome;
 
-constexpr double kPitch = 2.0;  // metres, of the panels
+constexpr double kPitch = 2.0;  // metres, between panels
 constexpr std::size_t kPoints = 150;
 
-// The seeds of the panels and of what stands before them.
+// Seeds of the panels and of the smaller ones in front of them.
 RenderedWorld Gallery(const std::vector<std::uint64_t>& panels, const std::vector<std::uint64_t>& stands) {
   std::vector<Wall> walls;
   for (std::size_t i = 0; i < panels.size(); ++i) {
@@ -52,7 +51,7 @@ std::vector<Rigid3> Walk(double from, double to, double step, double height) {
   return poses;
 }
 
-// The map of a walk in coordinates and a unit of its own.
+// The map of a walk, in its own coordinates and scale.
 std::shared_ptr<const MapSnapshot> MapOfWalk(const RenderedWorld& world, const std::vector<Rigid3>& poses,
                                              const Sim3& own_from_world = {}) {
   Map map = TrueMap(world, Lens(), poses, kPoints);
@@ -82,9 +81,9 @@ const MapJoinAttempt& OverlappingAttempt() {
   return attempt;
 }
 
-TEST(MapJoining, FindsHowTwoMapsOfOnePlaceLieToEachOther) {
+TEST(MapJoining, FindsTheSimilarityBetweenTwoMapsOfOnePlace) {
   const MapJoinAttempt& attempt = OverlappingAttempt();
-  ASSERT_EQ(attempt.overlap.verdict, RelocalizationResult::kOverlap) << attempt.overlap.Brief();
+  ASSERT_EQ(attempt.overlap.outcome, Outcome::kOverlap) << attempt.overlap.Brief();
   ASSERT_NE(attempt.joined, nullptr) << attempt.refusal;
   EXPECT_EQ(attempt.refusal, "");
   const Sim3 left = attempt.joined->a_from_b * kOther;
@@ -93,7 +92,7 @@ TEST(MapJoining, FindsHowTwoMapsOfOnePlaceLieToEachOther) {
   EXPECT_NEAR(left.scale, 1, 0.01);
 }
 
-TEST(MapJoining, MakesOneTrueMapOfBoth) {
+TEST(MapJoining, MakesOneAccurateMapOfBoth) {
   const MapJoinAttempt& attempt = OverlappingAttempt();
   ASSERT_NE(attempt.joined, nullptr) << attempt.refusal;
   const auto& [a, b] = OverlappingPair();
@@ -111,7 +110,7 @@ TEST(MapJoining, MakesOneTrueMapOfBoth) {
   const Sim3 world_from_b = kOther.inverse();
   for (const KeyFrame& keyframe : b->keyframes) {
     const KeyFrame& joined = *map.FindKeyFrame(keyframe.id + ids.first_keyframe);
-    EXPECT_FALSE(joined.fixed) << "the keyframes of A hold the frame";
+    EXPECT_FALSE(joined.fixed) << "the keyframes of A define the coordinate frame";
     EXPECT_LT(
         (joined.camera_from_map.OriginInSource() - world_from_b * keyframe.camera_from_map.OriginInSource())
             .norm(),
@@ -121,7 +120,7 @@ TEST(MapJoining, MakesOneTrueMapOfBoth) {
   for (const MapPoint& point : map.points)
     astray += VariedGallery().DistanceToSurface(point.position()) > 0.02 ? 1 : 0;
   EXPECT_LT(astray, static_cast<int>(map.points.size() / 100));
-  // What both had is once: nearly half of either map overlaps.
+  // Common points exist once: nearly half of either map overlaps.
   EXPECT_GT(attempt.joined->points_merged, 200);
   EXPECT_LE(map.points.size() + static_cast<std::size_t>(attempt.joined->points_merged),
             a->points.size() + b->points.size());
@@ -136,7 +135,7 @@ TEST(MapJoining, MakesOneTrueMapOfBoth) {
   EXPECT_GE(shared_across, 60);
 }
 
-TEST(MapJoining, GivesTheSameMapEachTime) {
+TEST(MapJoining, IsDeterministic) {
   const MapJoinAttempt again = JoinMaps({}, *OverlappingPair().a, *OverlappingPair().b, nullptr);
   ASSERT_NE(again.joined, nullptr);
   const MapSnapshot &first = *OverlappingAttempt().joined->map, &second = *again.joined->map;
@@ -145,55 +144,52 @@ TEST(MapJoining, GivesTheSameMapEachTime) {
     EXPECT_EQ(first.points[i].point_in_map, second.points[i].point_in_map);
 }
 
-TEST(MapJoining, LeavesMapsOfDifferentPlacesAlone) {
+TEST(MapJoining, RejectsMapsOfDifferentPlaces) {
   const auto elsewhere = MapOfWalk(Gallery({21, 22}, {31, 32}), Walk(0, 2, 0.2, 0), kOther);
   const MapJoinAttempt attempt = JoinMaps({}, *OverlappingPair().a, *elsewhere, nullptr);
   EXPECT_EQ(attempt.joined, nullptr);
-  EXPECT_NE(attempt.overlap.verdict, RelocalizationResult::kOverlap);
+  EXPECT_NE(attempt.overlap.outcome, Outcome::kOverlap);
   EXPECT_NE(attempt.refusal, "");
 }
 
-TEST(MapJoining, RefusesALookAlikeThatOtherThingsStandAbout) {
-  // The same panel hangs in both places, but beside and before it is something else.
+TEST(MapJoining, RejectsASimilarPlaceWithDifferentSurfacesAroundIt) {
+  // The same panel hangs in both places, but different ones hang beside it and in front of it.
   const auto a = MapOfWalk(Gallery({1, 2, 3}, {11, 12, 13}), Walk(0.6, 3.4, 0.2, 0));
   const auto b = MapOfWalk(Gallery({5, 2, 6}, {14, 15, 16}), Walk(0.7, 3.5, 0.2, 0.1), kOther);
   const MapJoinAttempt attempt = JoinMaps({}, *a, *b, nullptr);
   EXPECT_EQ(attempt.joined, nullptr) << attempt.overlap.Brief();
   EXPECT_NE(attempt.refusal, "");
-  // What stands where the other map has another surface gives them away: every keyframe sees the common
-  // panel.
-  EXPECT_EQ(attempt.overlap.verdict, RelocalizationResult::kContradicted) << attempt.overlap.Brief();
+  // Every keyframe sees the common panel; only the surfaces beside it differ and contradict the similarity.
+  EXPECT_EQ(attempt.overlap.outcome, Outcome::kContradicted) << attempt.overlap.Brief();
   EXPECT_GT(attempt.overlap.contradicted * 5, attempt.overlap.regions) << attempt.overlap.Brief();
   MapJoiningOptions careless;
-  careless.overlap.max_contradicted = 1;
+  careless.overlap.max_contradicted_ratio = 1;
   const MapJoinAttempt taken_in = JoinMaps(careless, *a, *b, nullptr);
-  EXPECT_EQ(taken_in.overlap.verdict, RelocalizationResult::kOverlap) << taken_in.overlap.Brief();
+  EXPECT_EQ(taken_in.overlap.outcome, Outcome::kOverlap) << taken_in.overlap.Brief();
 }
 
-TEST(MapJoining, RefusesToChooseBetweenTwoPlacesThatLookTheSame) {
+TEST(MapJoining, RejectsAnAmbiguousOverlap) {
   const auto a = MapOfWalk(Gallery({2, 2, 2}, {12, 12, 12}), Walk(-0.4, 4.4, 0.2, 0));
   const auto b = MapOfWalk(Gallery({2, 2, 2}, {12, 12, 12}), Walk(1.7, 2.5, 0.2, 0.1), kOther);
   const MapJoinAttempt attempt = JoinMaps({}, *a, *b, nullptr);
   EXPECT_EQ(attempt.joined, nullptr);
-  EXPECT_EQ(attempt.overlap.verdict, RelocalizationResult::kAmbiguous) << attempt.overlap.Brief();
+  EXPECT_EQ(attempt.overlap.outcome, Outcome::kAmbiguous) << attempt.overlap.Brief();
 }
 
-TEST(MapJoining, SaysWhenAMapHasTooLittleToBeCompared) {
+TEST(MapJoining, ReportsAMapThatIsTooSmallToCompare) {
   MapSnapshot empty;
-  EXPECT_EQ(JoinMaps({}, *OverlappingPair().a, empty, nullptr).overlap.verdict,
-            RelocalizationResult::kNothingToCompare);
-  EXPECT_EQ(JoinMaps({}, empty, *OverlappingPair().b, nullptr).overlap.verdict,
-            RelocalizationResult::kNothingToCompare);
+  EXPECT_EQ(JoinMaps({}, *OverlappingPair().a, empty, nullptr).overlap.outcome, Outcome::kNothingToCompare);
+  EXPECT_EQ(JoinMaps({}, empty, *OverlappingPair().b, nullptr).overlap.outcome, Outcome::kNothingToCompare);
 }
 
 TEST(MapJoining, CanBeInterrupted) {
   const std::atomic<bool> interrupt = true;
   const MapJoinAttempt attempt = JoinMaps({}, *OverlappingPair().a, *OverlappingPair().b, &interrupt);
   EXPECT_EQ(attempt.joined, nullptr);
-  EXPECT_EQ(attempt.overlap.verdict, RelocalizationResult::kInterrupted);
+  EXPECT_EQ(attempt.overlap.outcome, Outcome::kInterrupted);
 }
 
-TEST(MapJoining, IsDoneByAMapperWhichKeepsWhatWasOffered) {
+TEST(MapJoining, KeepsTheQueueOfTheMapper) {
   const auto& [a, b] = OverlappingPair();
   Mapper mapper({});
   mapper.Adopt(a);
@@ -212,10 +208,10 @@ TEST(MapJoining, IsDoneByAMapperWhichKeepsWhatWasOffered) {
   const auto grown = mapper.Snapshot();
   EXPECT_EQ(Validate(*grown), "");
   EXPECT_EQ(grown->keyframes.size(), a->keyframes.size() + b->keyframes.size() + 1);
-  EXPECT_EQ(grown->keyframes.back().id, a->next_keyframe + b->next_keyframe) << "no id is given out twice";
+  EXPECT_EQ(grown->keyframes.back().id, a->next_keyframe + b->next_keyframe) << "no id is assigned twice";
 }
 
-TEST(MapJoining, LeavesTheMapOfAMapperAsItIsWhereItIsRefused) {
+TEST(MapJoining, LeavesTheMapOfTheMapperUnchangedIfRejected) {
   Mapper mapper({});
   mapper.Adopt(OverlappingPair().a);
   const std::atomic<bool> interrupt = true;
@@ -224,8 +220,8 @@ TEST(MapJoining, LeavesTheMapOfAMapperAsItIsWhereItIsRefused) {
   EXPECT_EQ(mapper.Snapshot(), OverlappingPair().a);
 }
 
-TEST(MapJoining, TakesPanoramaMapsAlong) {
-  // The last keyframe of B is the reference of a panorama map with one direction.
+TEST(MapJoining, TransformsPanoramaMapsToo) {
+  // The last keyframe of B is the reference of a panorama map with one infinite point.
   const auto& [a, b] = OverlappingPair();
   Map with_panorama(*b);
   const KeyFrameId reference = b->keyframes.back().id;

@@ -18,20 +18,21 @@ using testing_world::CameraAt;
 using testing_world::RenderedWorld;
 using Kind = MapperEvent::Kind;
 
-constexpr double kBaseline = 0.1;  // metres: the mapper's own unit, so that its map has the world's scale
+// Metres: the mapper's own unit, so that its map has the scale of the world.
+constexpr double kBaseline = 0.1;
 
 const std::shared_ptr<const CameraModel>& Camera() {
   static const auto camera = testing_world::PinholeCamera(400, 300);
   return camera;
 }
 
-// Two true views: corners of the first and where they are in the second.
+// Two true views: corners of the first, and their pixels in the second.
 InitialPair TruePair(const RenderedWorld& world, const Rigid3& a, const Rigid3& b, std::size_t most) {
   InitialPair pair;
   pair.camera = Camera();
   pair.a = {FromSeconds(0), MakeFeatures(world.Render(*Camera(), a, 1.5, 1))};
   pair.b = {FromSeconds(0.5), MakeFeatures(world.Render(*Camera(), b, 1.5, 2))};
-  pair.geometry.verdict = TwoViewVerdict::kGeneral;
+  pair.geometry.outcome = TwoViewOutcome::kGeneral;
   pair.geometry.b_from_a = b * a.inverse();
   const double baseline = pair.geometry.b_from_a.translation.norm();
   pair.geometry.b_from_a.translation /= baseline;
@@ -50,7 +51,7 @@ InitialPair TruePair(const RenderedWorld& world, const Rigid3& a, const Rigid3& 
   return pair;
 }
 
-// A frame tracked perfectly in the mapper's map, whose frame is the first view's.
+// A frame with a perfect pose in the mapper's map, whose coordinate frame is that of the first view.
 KeyFrameCandidate TrueCandidate(const RenderedWorld& world, const MapSnapshot& map, const Rigid3& pose,
                                 double seconds) {
   KeyFrameCandidate candidate;
@@ -78,7 +79,7 @@ void WorkUntilIdle(Mapper* mapper) {
   }
 }
 
-class Mapping : public ::testing::Test {
+class MapperTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     world_ = new RenderedWorld(RenderedWorld::Room(61));
@@ -107,11 +108,11 @@ class Mapping : public ::testing::Test {
   static InitialPair* pair_;
   static std::shared_ptr<const MapSnapshot> started_;
 };
-RenderedWorld* Mapping::world_ = nullptr;
-InitialPair* Mapping::pair_ = nullptr;
-std::shared_ptr<const MapSnapshot> Mapping::started_;
+RenderedWorld* MapperTest::world_ = nullptr;
+InitialPair* MapperTest::pair_ = nullptr;
+std::shared_ptr<const MapSnapshot> MapperTest::started_;
 
-TEST_F(Mapping, StartsAMapFromTwoViews) {
+TEST_F(MapperTest, StartsAMapFromTwoViews) {
   Mapper mapper({});
   EXPECT_EQ(mapper.Snapshot(), nullptr);
   EXPECT_TRUE(mapper.IsIdle());
@@ -120,7 +121,7 @@ TEST_F(Mapping, StartsAMapFromTwoViews) {
   EXPECT_FALSE(mapper.IsIdle());
   EXPECT_TRUE(mapper.Step());
   EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 1);
-  EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 0) << "events are given out once";
+  EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 0) << "events are returned once";
   const auto map = mapper.Snapshot();
   ASSERT_NE(map, nullptr);
   EXPECT_EQ(Validate(*map), "");
@@ -134,9 +135,9 @@ TEST_F(Mapping, StartsAMapFromTwoViews) {
   EXPECT_TRUE(mapper.IsIdle());
 }
 
-TEST_F(Mapping, TellsWhenAStartFails) {
+TEST_F(MapperTest, ReportsAFailedStart) {
   InitialPair poor = TruePair(*world_, CameraAt({0, 0, 0}), CameraAt({kBaseline, 0, 0}), 30);
-  // A blank second image: nothing can join the thirty.
+  // A blank second image: no points can be added to the thirty.
   poor.b.features = MakeFeatures(cv::Mat(300, 400, CV_8UC1, cv::Scalar(120)));
   Mapper mapper({});
   mapper.Start(poor);
@@ -147,7 +148,7 @@ TEST_F(Mapping, TellsWhenAStartFails) {
   EXPECT_FALSE(events[0].detail.empty());
   EXPECT_EQ(mapper.Snapshot(), nullptr);
   EXPECT_TRUE(mapper.IsIdle());
-  // A keyframe that comes too late is dropped without harm, and the next start succeeds.
+  // A keyframe that comes too late is ignored, and the next start succeeds.
   mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.2, 0, 0}), 1));
   WorkUntilIdle(&mapper);
   EXPECT_EQ(mapper.Snapshot(), nullptr);
@@ -156,7 +157,7 @@ TEST_F(Mapping, TellsWhenAStartFails) {
   EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 1);
 }
 
-TEST_F(Mapping, GrowsByKeyframesUntilSettled) {
+TEST_F(MapperTest, ExtendsTheMapByKeyframesUntilIdle) {
   Mapper mapper({});
   mapper.Adopt(started_);
   EXPECT_EQ(mapper.Snapshot(), started_);
@@ -183,7 +184,7 @@ TEST_F(Mapping, GrowsByKeyframesUntilSettled) {
   EXPECT_GT(mapper.Times().other, 0);
 }
 
-TEST_F(Mapping, TakesNoMoreThanItsQueueHolds) {
+TEST_F(MapperTest, AcceptsNoMoreThanItsQueueHolds) {
   MapperOptions options;
   options.max_queue = 2;
   Mapper mapper(options);
@@ -198,12 +199,12 @@ TEST_F(Mapping, TakesNoMoreThanItsQueueHolds) {
   EXPECT_FALSE(mapper.Step());
 }
 
-TEST_F(Mapping, TakesInAWaitingKeyframeBeforeItAdjusts) {
+TEST_F(MapperTest, InsertsAQueuedKeyframeBeforeItAdjusts) {
   Mapper mapper({});
   mapper.Adopt(started_);
   mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.25, 0, 0}), 1));
   ASSERT_TRUE(mapper.Step());
-  EXPECT_FALSE(mapper.IsIdle()) << "the newest keyframe has yet to be adjusted";
+  EXPECT_FALSE(mapper.IsIdle()) << "the newest keyframe is not adjusted yet";
   mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.45, 0, 0}), 2));
   ASSERT_TRUE(mapper.Step());
   EXPECT_EQ(mapper.Snapshot()->keyframes.size(), 4u);
@@ -211,7 +212,7 @@ TEST_F(Mapping, TakesInAWaitingKeyframeBeforeItAdjusts) {
   EXPECT_TRUE(mapper.IsIdle());
 }
 
-TEST_F(Mapping, StaysWholeWhileKeyframesInterruptIt) {
+TEST_F(MapperTest, KeepsTheMapValidWhileKeyframesInterruptIt) {
   Mapper mapper({});
   mapper.Adopt(started_);
   std::vector<KeyFrameCandidate> candidates;
@@ -233,7 +234,7 @@ TEST_F(Mapping, StaysWholeWhileKeyframesInterruptIt) {
   EXPECT_EQ(Validate(*mapper.Snapshot()), "");
 }
 
-TEST_F(Mapping, RemovesPointsThatTheTrackersFindInTheWrongPlace) {
+TEST_F(MapperTest, RemovesPointsThatTheTrackersReportAsOutliers) {
   Mapper mapper({});
   mapper.Adopt(started_);
   const MapPointId bad = started_->points[3].id, good = started_->points[5].id;
@@ -245,7 +246,7 @@ TEST_F(Mapping, RemovesPointsThatTheTrackersFindInTheWrongPlace) {
   EXPECT_EQ(Validate(*mapper.Snapshot()), "");
 }
 
-TEST_F(Mapping, IsTheSameOnEveryRun) {
+TEST_F(MapperTest, IsDeterministic) {
   std::shared_ptr<const MapSnapshot> maps[2];
   for (auto& map : maps) {
     Mapper mapper({});

@@ -21,7 +21,7 @@ using testing_world::RenderedWorld;
 constexpr double kDegree = std::numbers::pi / 180;
 const Eigen::Vector3d kCenter(0.1, -0.1, 0.2);
 
-// Everything but the revision.
+// Compares everything but the revision.
 void ExpectSameMap(const MapSnapshot& a, const MapSnapshot& b) {
   ASSERT_EQ(a.keyframes.size(), b.keyframes.size());
   ASSERT_EQ(a.points.size(), b.points.size());
@@ -47,12 +47,12 @@ void ExpectSameMap(const MapSnapshot& a, const MapSnapshot& b) {
   }
 }
 
-class PanoramaMapping : public ::testing::Test {
+class PanoramaMappingTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     world_ = new RenderedWorld(testing_world::Chamber(81));
     camera_ = testing_world::PinholeCamera(480, 360);
-    // True finite points of the front of the room, seen from about the centre, which is to be turned at.
+    // True finite points in the front of the room, seen from near its centre, where the panorama is taken.
     true_map_ = testing_world::TrueMap(*world_, camera_,
                                        {CameraAt({0, 0, 0}), CameraAt({0.35, 0, 0}, {0, 5, 0}),
                                         CameraAt({0.2, 0.1, 0.1}, {0, 25, 0})},
@@ -65,7 +65,7 @@ class PanoramaMapping : public ::testing::Test {
     camera_.reset();
     true_map_.reset();
   }
-  // The true map with a panorama map whose reference looks where nothing is known, and nothing else.
+  // The true map and a panorama map whose reference sees no finite points.
   static Map MapWithPanorama() {
     Map map(*true_map_);
     reference_ = map.AddKeyFrame(testing_world::MakeKeyFrame(*world_, camera_, CameraAt(kCenter, {0, 40, 0})))
@@ -73,13 +73,13 @@ class PanoramaMapping : public ::testing::Test {
     panorama_ = map.OpenPanorama(reference_);
     return map;
   }
-  // Adds a dependent keyframe that really stands off the centre that it is taken to stand at.
+  // Adds a dependent keyframe whose true position is off the centre that is assumed for it.
   static KeyFrameId AddDependent(Map* map, const Eigen::Vector3d& off, double turn_deg) {
     const Rigid3 truth = CameraAt(kCenter + off, {0, turn_deg, 0});
     return map->AddKeyFrame(testing_world::MakeDependent(*world_, camera_, truth, panorama_, kCenter))
         .keyframe.id;
   }
-  // Lowers the number of finite points; keep says which stay.
+  // Reduces the finite points to those for which `keep` is true.
   template <typename Keep>
   static void KeepPoints(Map* map, Keep keep) {
     std::vector<MapPointId> gone;
@@ -103,13 +103,13 @@ class PanoramaMapping : public ::testing::Test {
   static KeyFrameId reference_;
   static PanoramaId panorama_;
 };
-RenderedWorld* PanoramaMapping::world_ = nullptr;
-std::shared_ptr<const CameraModel> PanoramaMapping::camera_;
-std::shared_ptr<const MapSnapshot> PanoramaMapping::true_map_;
-KeyFrameId PanoramaMapping::reference_ = kNoId;
-PanoramaId PanoramaMapping::panorama_ = kNoId;
+RenderedWorld* PanoramaMappingTest::world_ = nullptr;
+std::shared_ptr<const CameraModel> PanoramaMappingTest::camera_;
+std::shared_ptr<const MapSnapshot> PanoramaMappingTest::true_map_;
+KeyFrameId PanoramaMappingTest::reference_ = kNoId;
+PanoramaId PanoramaMappingTest::panorama_ = kNoId;
 
-TEST_F(PanoramaMapping, AddsTheRaysOfCornersAsInfinitePoints) {
+TEST_F(PanoramaMappingTest, AddsInfinitePointsForCorners) {
   Map map = MapWithPanorama();
   const std::size_t before = map.AlivePoints();
   const int added = AddInfinitePoints({}, reference_, {}, &map);
@@ -136,7 +136,7 @@ TEST_F(PanoramaMapping, AddsTheRaysOfCornersAsInfinitePoints) {
     EXPECT_LE(by_level[level], InfinitePointOptions().max_points[level]);
 }
 
-TEST_F(PanoramaMapping, AddsNoneWhereSomethingIsKnown) {
+TEST_F(PanoramaMappingTest, AddsNoneNearKnownFeatures) {
   Map map = MapWithPanorama();
   std::vector<Eigen::Vector2f> known, taken;
   Random random(5);
@@ -166,24 +166,24 @@ TEST_F(PanoramaMapping, AddsNoneWhereSomethingIsKnown) {
       return cell_of(other) == cell_of(observation.pixel);
     };
     EXPECT_TRUE(std::none_of(taken.begin(), taken.end(), same_cell));
-    // What was measured on level 0 hides nothing on the coarse levels.
+    // Pixels that were measured on level 0 occupy no cell on the coarse levels.
     if (observation.level <= 1) {
       EXPECT_TRUE(std::none_of(known.begin(), known.end(), same_cell));
     }
   }
-  // Again and again, until every free corner is used.
+  // Repeats until every unmatched corner is used.
   int rounds = 0;
   while (rounds < 12 && AddInfinitePoints({}, reference_, taken, &map) > 0) ++rounds;
   EXPECT_LT(rounds, 12);
 }
 
-TEST_F(PanoramaMapping, AddsNoneOutsideAPanorama) {
+TEST_F(PanoramaMappingTest, AddsNoneOutsideAPanorama) {
   Map map = MapWithPanorama();
   EXPECT_EQ(AddInfinitePoints({}, 0, {}, &map), 0);
   EXPECT_EQ(AddInfinitePoints({}, 999, {}, &map), 0);
 }
 
-TEST_F(PanoramaMapping, LocalizesAKeyframeThatSeesTheMapAgain) {
+TEST_F(PanoramaMappingTest, LocalizesAKeyframeThatSeesFinitePoints) {
   for (const Eigen::Vector3d& off :
        {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.06, 0.02, -0.03), Eigen::Vector3d(-0.05, 0, 0.06)}) {
     Map map = MapWithPanorama();
@@ -197,8 +197,8 @@ TEST_F(PanoramaMapping, LocalizesAKeyframeThatSeesTheMapAgain) {
     EXPECT_LT((record.keyframe.camera_from_map.OriginInSource() - truth.OriginInSource()).norm(), 0.006);
     EXPECT_LT((record.keyframe.camera_from_map.rotation * truth.rotation.inverse()).Angle(), 0.1 * kDegree);
     EXPECT_EQ(record.keyframe.kind, KeyFrameKind::kSixDof);
-    // It leads a panorama map of its own, to which its own directions went, less those that were finite
-    // points all along.
+    // It is the reference of its own panorama map, which contains its own infinite points, except those that
+    // coincided with finite points.
     EXPECT_NE(record.keyframe.panorama, panorama_);
     int finite = 0, infinite = 0;
     for (const Observation& observation : record.observations) {
@@ -222,7 +222,7 @@ TEST_F(PanoramaMapping, LocalizesAKeyframeThatSeesTheMapAgain) {
   }
 }
 
-TEST_F(PanoramaMapping, LocalizesNothingByTooFewPoints) {
+TEST_F(PanoramaMappingTest, RejectsAPoseFromTooFewPoints) {
   Map map = MapWithPanorama();
   PointSearcher searcher;
   const KeyFrameId id = AddDependent(&map, {0.04, 0, 0}, 15);
@@ -237,7 +237,7 @@ TEST_F(PanoramaMapping, LocalizesNothingByTooFewPoints) {
   ExpectSameMap(*before, *map.Snapshot());
 }
 
-TEST_F(PanoramaMapping, LocalizesNothingByPointsOfOneCornerAlone) {
+TEST_F(PanoramaMappingTest, RejectsAPoseFromPointsInOneCornerOfTheImage) {
   Map map = MapWithPanorama();
   PointSearcher searcher;
   const KeyFrameId id = AddDependent(&map, {0.04, 0, 0}, 15);
@@ -252,7 +252,7 @@ TEST_F(PanoramaMapping, LocalizesNothingByPointsOfOneCornerAlone) {
   ExpectSameMap(*before, *map.Snapshot());
 }
 
-TEST_F(PanoramaMapping, LocalizesNoImageOfAnotherPlace) {
+TEST_F(PanoramaMappingTest, DoesNotLocalizeAnImageOfAnotherPlace) {
   const RenderedWorld other = testing_world::Chamber(8181);
   Map map = MapWithPanorama();
   PointSearcher searcher;
@@ -265,7 +265,7 @@ TEST_F(PanoramaMapping, LocalizesNoImageOfAnotherPlace) {
   ExpectSameMap(*before, *map.Snapshot());
 }
 
-TEST_F(PanoramaMapping, LocalizesOnlyDependentKeyframesThatAreThere) {
+TEST_F(PanoramaMappingTest, LocalizesOnlyExistingDependentKeyframes) {
   Map map = MapWithPanorama();
   PointSearcher searcher;
   const auto before = map.Snapshot();
@@ -275,7 +275,7 @@ TEST_F(PanoramaMapping, LocalizesOnlyDependentKeyframesThatAreThere) {
   ExpectSameMap(*before, *map.Snapshot());
 }
 
-TEST(InfiniteTwins, AreDroppedWhereAFinitePointIsSeenAtTheSamePlace) {
+TEST(DuplicateInfinitePoints, AreRemovedIfAFinitePointIsObservedAtTheSamePixel) {
   Map map;
   const KeyFrameId id = map.AddKeyFrame(BlankKeyFrame()).keyframe.id;
   const PanoramaId panorama = map.OpenPanorama(id);
@@ -290,12 +290,12 @@ TEST(InfiniteTwins, AreDroppedWhereAFinitePointIsSeenAtTheSamePlace) {
   };
   const MapPointId finite = add(false, {30, 30}, 0);
   const MapPointId duplicate = add(true, {31.9f, 30}, 0), apart = add(true, {32.1f, 30}, 0);
-  const MapPointId coarse_twin = add(true, {30, 37.9f}, 2), coarse_apart = add(true, {30, 38.1f}, 2);
-  EXPECT_EQ(DropInfiniteTwins(id, &map), 2);
-  for (const MapPointId gone : {duplicate, coarse_twin}) EXPECT_EQ(map.FindPoint(gone), nullptr) << gone;
+  const MapPointId coarse_duplicate = add(true, {30, 37.9f}, 2), coarse_apart = add(true, {30, 38.1f}, 2);
+  EXPECT_EQ(RemoveDuplicateInfinitePoints(id, &map), 2);
+  for (const MapPointId gone : {duplicate, coarse_duplicate}) EXPECT_EQ(map.FindPoint(gone), nullptr) << gone;
   for (const MapPointId kept : {finite, apart, coarse_apart}) EXPECT_NE(map.FindPoint(kept), nullptr) << kept;
-  EXPECT_EQ(DropInfiniteTwins(id, &map), 0);
-  EXPECT_EQ(DropInfiniteTwins(77, &map), 0);
+  EXPECT_EQ(RemoveDuplicateInfinitePoints(id, &map), 0);
+  EXPECT_EQ(RemoveDuplicateInfinitePoints(77, &map), 0);
   EXPECT_EQ(Validate(*map.Snapshot()), "");
 }
 

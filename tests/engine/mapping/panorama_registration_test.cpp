@@ -19,9 +19,9 @@ Eigen::Vector3d AnyVector(Random* random, double size) {
   return {random->Uniform(-size, size), random->Uniform(-size, size), random->Uniform(-size, size)};
 }
 
-// Two panorama maps of a reference and three dependent keyframes each, turned every way; every keyframe sees
-// the infinite points of its own panorama map at pixels of their own, as noisy as they come.
-class Registering : public ::testing::TestWithParam<std::uint64_t> {
+// Two panorama maps with a reference and three dependent keyframes each, in arbitrary orientations. Every
+// keyframe observes the infinite points of its own panorama map, at noisy pixels.
+class PanoramaRegistrationTest : public ::testing::TestWithParam<std::uint64_t> {
  protected:
   void SetUp() override {
     for (int i = 0; i < 2; ++i) AddPanorama();
@@ -64,12 +64,12 @@ class Registering : public ::testing::TestWithParam<std::uint64_t> {
     }
   }
 
-  // What each keyframe and infinite point is as seen from the reference of its panorama map.
+  // Every keyframe and infinite point relative to the reference of its panorama map.
   struct FromReference {
     std::map<KeyFrameId, Rigid3> keyframes;  // keyframe_from_reference
     std::map<MapPointId, Eigen::Vector3d> directions;
   };
-  FromReference Look(PanoramaId panorama) {
+  FromReference RelativeToReference(PanoramaId panorama) {
     FromReference seen;
     const Rigid3 reference_from_map =
         map_.FindKeyFrame(map_.panoramas()[panorama].reference)->keyframe.camera_from_map;
@@ -83,9 +83,9 @@ class Registering : public ::testing::TestWithParam<std::uint64_t> {
     }
     return seen;
   }
-  void MoveReference(PanoramaId panorama, const Eigen::Vector3d& by, const Eigen::Vector3d& turn) {
+  void MoveReference(PanoramaId panorama, const Eigen::Vector3d& by, const Eigen::Vector3d& rotation) {
     Rigid3& pose = map_.FindKeyFrame(map_.panoramas()[panorama].reference)->keyframe.camera_from_map;
-    pose = Rigid3(Rotation3::Exp(turn), by) * pose;
+    pose = Rigid3(Rotation3::Exp(rotation), by) * pose;
   }
   static void ExpectEqual(const FromReference& a, const FromReference& b, double tolerance) {
     ASSERT_EQ(a.keyframes.size(), b.keyframes.size());
@@ -101,20 +101,20 @@ class Registering : public ::testing::TestWithParam<std::uint64_t> {
   MapPointId finite_ = kNoId;
 };
 
-TEST_P(Registering, KeepsRotationsAndDirectionsAsTheReferenceSeesThem) {
+TEST_P(PanoramaRegistrationTest, KeepsRotationsAndDirectionsRelativeToTheReference) {
   for (int round = 0; round < 5; ++round) {
-    const FromReference before[2] = {Look(0), Look(1)};
+    const FromReference before[2] = {RelativeToReference(0), RelativeToReference(1)};
     const PanoramaRegistration registration(map_);
     MoveReference(0, AnyVector(&random_, 0.3), AnyVector(&random_, 0.5));
     MoveReference(1, AnyVector(&random_, 0.3), AnyVector(&random_, 0.5));
     registration.Follow(&map_);
-    ExpectEqual(before[0], Look(0), 1e-9);
-    ExpectEqual(before[1], Look(1), 1e-9);
+    ExpectEqual(before[0], RelativeToReference(0), 1e-9);
+    ExpectEqual(before[1], RelativeToReference(1), 1e-9);
     EXPECT_EQ(Validate(*map_.Snapshot()), "");
   }
 }
 
-TEST_P(Registering, KeepsDependentKeyframesAtTheReferencesCentre) {
+TEST_P(PanoramaRegistrationTest, KeepsDependentKeyframesAtTheReferencesCentre) {
   const PanoramaRegistration registration(map_);
   MoveReference(1, {0.1, -0.2, 0.4}, {0.2, -0.1, 0.7});
   registration.Follow(&map_);
@@ -128,7 +128,7 @@ TEST_P(Registering, KeepsDependentKeyframesAtTheReferencesCentre) {
   EXPECT_EQ(dependents, 3);
 }
 
-TEST_P(Registering, LeavesToTheLastBitWhatItsReferenceDidNotMove) {
+TEST_P(PanoramaRegistrationTest, LeavesPanoramasBitwiseEqualIfTheirReferenceDidNotMove) {
   const auto before = map_.Snapshot();
   const PanoramaRegistration registration(map_);
   MoveReference(0, {0.1, 0, 0}, {0, 0.1, 0});
@@ -147,9 +147,9 @@ TEST_P(Registering, LeavesToTheLastBitWhatItsReferenceDidNotMove) {
   }
 }
 
-// A panorama map that is opened in between has nothing to follow, and a dependent keyframe that was localized
-// in between stays where it was put.
-TEST_P(Registering, LeavesWhatWasLocalizedSinceAlone) {
+// A panorama map that is opened in between is not moved, and a dependent keyframe that was localized in
+// between keeps its pose.
+TEST_P(PanoramaRegistrationTest, LeavesKeyframesThatWereLocalizedSinceUnchanged) {
   const PanoramaRegistration registration(map_);
   KeyFrameId localized = kNoId;
   for (const auto& [id, record] : map_.keyframes()) {
@@ -164,7 +164,7 @@ TEST_P(Registering, LeavesWhatWasLocalizedSinceAlone) {
   EXPECT_EQ(Validate(*map_.Snapshot()), "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, Registering, ::testing::Values(1, 2, 3));
+INSTANTIATE_TEST_SUITE_P(Seeds, PanoramaRegistrationTest, ::testing::Values(1, 2, 3));
 
 }  // namespace
 }  // namespace docent::engine

@@ -6,10 +6,10 @@
 #include "engine/map/map.h"
 #include "tests/engine/rendered_world.h"
 
-// Panorama maps for tests: blank ones, and a room that surrounds the camera.
+// Panorama maps for tests: blank ones, and a room all around the camera.
 namespace docent::engine::testing_world {
 
-// A keyframe of 64x64 pixels that shows nothing, for what asks no image.
+// A keyframe of 64x64 blank pixels, for tests that need no image.
 inline KeyFrame BlankKeyFrame(const Rigid3& camera_from_map = {}) {
   static const auto camera = PinholeCamera(64, 64);
   static const auto features = [] {
@@ -26,13 +26,13 @@ inline KeyFrame BlankKeyFrame(const Rigid3& camera_from_map = {}) {
   return keyframe;
 }
 
-// To the last bit.
+// Bitwise equality.
 inline bool SamePose(const Rigid3& a, const Rigid3& b) {
   return a.translation == b.translation &&
          a.rotation.quaternion().coeffs() == b.rotation.quaternion().coeffs();
 }
 
-// Four walls three metres away on every side, and smaller ones before them.
+// Four walls, each three metres away, and smaller ones in front of them.
 inline RenderedWorld Chamber(std::uint64_t seed) {
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(),
                         z = Eigen::Vector3d::UnitZ();
@@ -44,8 +44,8 @@ inline RenderedWorld Chamber(std::uint64_t seed) {
        PaintedWall({2.2, 0.4, -0.4}, -z, y, 0.4, 0.5, seed + 6)});
 }
 
-// Like MakeKeyFrame, but only turned away from a panorama map's reference, at whose centre it is taken to
-// stand.
+// Like MakeKeyFrame, but for a dependent keyframe, which is rotated only: its assumed position is that of the
+// panorama map's reference.
 inline KeyFrame MakeDependent(const RenderedWorld& world, const std::shared_ptr<const CameraModel>& camera,
                               const Rigid3& camera_from_world, PanoramaId panorama,
                               const Eigen::Vector3d& reference_center) {

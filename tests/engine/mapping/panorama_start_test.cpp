@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A map that begins with one image's directions and gains depth.
+// A map that starts with the infinite points of one image and gains depth later.
 #include <gtest/gtest.h>
 
 #include "engine/mapping/mapper.h"
@@ -11,9 +11,9 @@ namespace {
 
 using testing_world::CameraAt;
 
-// The first image hands the reference on to the pair's first view; it is to be localized as any other
-// dependent keyframe is.
-TEST(PanoramaStart, TheFirstImageIsLocalizedOnceTheMapKnowsDepth) {
+// The first view of the pair becomes the reference instead of the first image, which must then be localized
+// like any other dependent keyframe.
+TEST(PanoramaStart, TheFirstImageIsLocalizedOnceTheMapHasFinitePoints) {
   const auto world = testing_world::Chamber(61);
   const auto camera = testing_world::PinholeCamera(400, 300);
   const auto image = [&](const Rigid3& pose, std::uint64_t seed) {
@@ -34,7 +34,7 @@ TEST(PanoramaStart, TheFirstImageIsLocalizedOnceTheMapKnowsDepth) {
   pair.a = {FromSeconds(1), image(a, 2)};
   pair.b = {FromSeconds(1.5), image(b, 3)};
   pair.a_from_map = a;
-  pair.geometry.verdict = TwoViewVerdict::kGeneral;
+  pair.geometry.outcome = TwoViewOutcome::kGeneral;
   pair.geometry.b_from_a = b * a.inverse();
   pair.geometry.b_from_a.translation /= 0.1;
   for (int level = 2; level >= 0; --level) {

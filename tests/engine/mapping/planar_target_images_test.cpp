@@ -14,7 +14,7 @@
 #include "engine/vision/features.h"
 #include "tests/engine/rendered_world.h"
 
-// Real paintings and photographs: what painted figures cannot show.
+// Real paintings and photographs, which differ from synthetic texture.
 namespace docent::engine {
 namespace {
 
@@ -22,7 +22,7 @@ const std::filesystem::path kTargets = std::filesystem::path(DOCENT_SOURCE_DIR) 
 const std::array<const char*, 4> kPaintings = {"painting-0.jpg", "painting-7.jpg", "painting-14.jpg",
                                                "painting-21.jpg"};
 
-class TargetImages : public testing::Test {
+class TargetImagesTest : public testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::exists(kTargets)) GTEST_SKIP() << "there are no images in " << kTargets;
@@ -34,7 +34,7 @@ class TargetImages : public testing::Test {
   }
 };
 
-// The image on a plane of its width, as the camera sees it before a photograph.
+// The painting on a plane of its width, as the camera sees it in front of a photograph.
 cv::Mat Hang(const cv::Mat& image, double width_m, const Rigid3& camera_from_target,
              const CameraModel& camera, const cv::Mat& background) {
   const double metres = width_m / image.cols;
@@ -56,7 +56,7 @@ cv::Mat Hang(const cv::Mat& image, double width_m, const Rigid3& camera_from_tar
   return frame;
 }
 
-TEST_F(TargetImages, PaintingsAreFoundWhereTheyHangAndNowhereElse) {
+TEST_F(TargetImagesTest, PaintingsAreDetectedAtTheirPosesAndNowhereElse) {
   constexpr double kWidth_m = 0.5;
   const auto camera = testing_world::PinholeCamera(640, 480);
   const cv::Mat wall = Read("graf/img1.png");
@@ -69,32 +69,33 @@ TEST_F(TargetImages, PaintingsAreFoundWhereTheyHangAndNowhereElse) {
     const PlanarTarget target(Read(kPaintings[i]), kWidth_m);
     for (std::size_t j = 0; j < frames.size(); ++j) {
       SCOPED_TRACE(testing::Message() << kPaintings[i] << " in frame " << j);
-      // The photograph alone is a larger image than the camera's; what counts is that nothing is found.
-      const auto sighting = target.Detect(*frames[j], *camera, 1);
-      ASSERT_EQ(sighting.has_value(), i == j);
-      if (!sighting) continue;
-      EXPECT_LT((sighting->camera_from_target.translation - pose.translation).norm(), 0.004);
-      EXPECT_LT((sighting->camera_from_target.rotation.inverse() * pose.rotation).Angle(), 0.01);
+      // The photograph alone has another size than the camera's image; it only matters that nothing is found
+      // in it.
+      const auto detection = target.Detect(*frames[j], *camera, 1);
+      ASSERT_EQ(detection.has_value(), i == j);
+      if (!detection) continue;
+      EXPECT_LT((detection->camera_from_target.translation - pose.translation).norm(), 0.004);
+      EXPECT_LT((detection->camera_from_target.rotation.inverse() * pose.rotation).Angle(), 0.01);
     }
   }
 }
 
-TEST_F(TargetImages, DescriptorsMatchAWallPhotographedFromTwoSides) {
+TEST_F(TargetImagesTest, DescriptorsMatchBetweenTwoViewsOfAWall) {
   Eigen::Matrix3d second_from_first;
   std::ifstream numbers(kTargets / "graf/H1to2p");
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 3; ++column) numbers >> second_from_first(row, column);
   ASSERT_TRUE(numbers);
   DescriptorDatabase database(DefaultVocabulary());
-  for (const DescribedPlace& place : DescribeCorners(*MakeFeatures(Read("graf/img2.png")))) {
-    // One place is one point, whatever level and direction it was described by.
+  for (const DescribedKeypoint& place : DescribeCorners(*MakeFeatures(Read("graf/img2.png")))) {
+    // One corner counts once, whatever level and direction it was described with.
     const auto point =
         static_cast<MapPointId>(std::lround(place.pixel.y() / 6) * 1000 + std::lround(place.pixel.x() / 6));
     database.Add({place.oriented.descriptor, 0, point, place.pixel, place.level});
   }
-  const std::vector<DescribedPlace> seen = DescribeCorners(*MakeFeatures(Read("graf/img1.png")));
+  const std::vector<DescribedKeypoint> seen = DescribeCorners(*MakeFeatures(Read("graf/img1.png")));
   std::vector<Descriptor> queries;
-  for (const DescribedPlace& place : seen) queries.push_back(place.oriented.descriptor);
+  for (const DescribedKeypoint& place : seen) queries.push_back(place.oriented.descriptor);
   int right = 0;
   const auto matches = database.FindMatches(queries, {});
   for (const auto& match : matches) {

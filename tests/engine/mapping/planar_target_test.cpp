@@ -34,7 +34,7 @@ struct View {
   double distance, slant_deg, rise_deg, roll_deg;
 };
 
-std::shared_ptr<const ImageFeatures> Look(const View& view, double noise = 1.5) {
+std::shared_ptr<const ImageFeatures> RenderFeatures(const View& view, double noise = 1.5) {
   const Rigid3 pose = LookAtBoard(view.distance, view.slant_deg, view.rise_deg, view.roll_deg);
   return MakeFeatures(Scene().world.Render(*Camera(), pose, noise));
 }
@@ -45,7 +45,7 @@ double AngleBetween(const Rigid3& a, const Rigid3& b) {
   return (a.rotation.inverse() * b.rotation).Angle() * 180 / std::numbers::pi;
 }
 
-TEST(PlanarTarget, IsFoundAtItsTruePlaceFromAllSides) {
+TEST(PlanarTarget, IsDetectedAtItsTruePoseFromAllSides) {
   for (const View& view : {View{1.6, 0, 0, 0},
                            {2, 30, 0, 0},
                            {2, -45, 10, 90},
@@ -56,24 +56,24 @@ TEST(PlanarTarget, IsFoundAtItsTruePlaceFromAllSides) {
                            {2.5, 50, -10, 20}}) {
     SCOPED_TRACE(testing::Message() << view.distance << " m, " << view.slant_deg << ", " << view.rise_deg
                                     << ", " << view.roll_deg);
-    const auto sighting = Target().Detect(*Look(view), *Camera(), 1);
-    ASSERT_TRUE(sighting);
-    EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation).norm(),
+    const auto detection = Target().Detect(*RenderFeatures(view), *Camera(), 1);
+    ASSERT_TRUE(detection);
+    EXPECT_LT((detection->camera_from_target.translation - Truth(view).translation).norm(),
               0.005 * view.distance);
-    EXPECT_LT(AngleBetween(sighting->camera_from_target, Truth(view)), 0.5);
-    EXPECT_LT(sighting->rms_px, 0.6);
+    EXPECT_LT(AngleBetween(detection->camera_from_target, Truth(view)), 0.5);
+    EXPECT_LT(detection->rms_px, 0.6);
   }
 }
 
-TEST(PlanarTarget, NamesPointsWhereTheyAre) {
+TEST(PlanarTarget, ReturnsPointsAtTheirTruePixels) {
   const View view{2, 20, 10, 15};
-  const auto sighting = Target().Detect(*Look(view), *Camera(), 1);
-  ASSERT_TRUE(sighting);
-  ASSERT_GE(sighting->points.size(), 50u);
-  for (std::size_t i = 0; i < sighting->points.size(); ++i) {
-    const TargetDetection::Point& point = sighting->points[i];
+  const auto detection = Target().Detect(*RenderFeatures(view), *Camera(), 1);
+  ASSERT_TRUE(detection);
+  ASSERT_GE(detection->points.size(), 50u);
+  for (std::size_t i = 0; i < detection->points.size(); ++i) {
+    const TargetDetection::Point& point = detection->points[i];
     if (i > 0) {
-      EXPECT_GT(point.id, sighting->points[i - 1].id);
+      EXPECT_GT(point.id, detection->points[i - 1].id);
     }
     EXPECT_EQ(point.point_in_target.z(), 0);
     EXPECT_LE(std::abs(point.point_in_target.x()), Target().width_m() / 2);
@@ -84,15 +84,15 @@ TEST(PlanarTarget, NamesPointsWhereTheyAre) {
   }
 }
 
-TEST(PlanarTarget, IsMeasuredInItsOwnWidth) {
+TEST(PlanarTarget, ScalesThePoseWithItsWidth) {
   const View view{2, 20, 0, 0};
   const PlanarTarget half(Scene().image, Scene().width_m / 2);
-  const auto sighting = half.Detect(*Look(view), *Camera(), 1);
-  ASSERT_TRUE(sighting);
-  EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation / 2).norm(), 0.005);
+  const auto detection = half.Detect(*RenderFeatures(view), *Camera(), 1);
+  ASSERT_TRUE(detection);
+  EXPECT_LT((detection->camera_from_target.translation - Truth(view).translation / 2).norm(), 0.005);
 }
 
-TEST(PlanarTarget, IsFoundInOtherLightAndBlurred) {
+TEST(PlanarTarget, IsDetectedInOtherLightAndBlurred) {
   const View view{2, 25, 10, 30};
   const cv::Mat image = Scene().world.Render(
       *Camera(), LookAtBoard(view.distance, view.slant_deg, view.rise_deg, view.roll_deg), 1.5);
@@ -100,33 +100,33 @@ TEST(PlanarTarget, IsFoundInOtherLightAndBlurred) {
   image.convertTo(dim, -1, 0.45, 10);
   cv::GaussianBlur(image, blurred, {}, 1.8);
   for (const cv::Mat& changed : {dim, blurred}) {
-    const auto sighting = Target().Detect(*MakeFeatures(changed), *Camera(), 1);
-    ASSERT_TRUE(sighting);
-    EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation).norm(), 0.02);
-    EXPECT_LT(AngleBetween(sighting->camera_from_target, Truth(view)), 0.7);
+    const auto detection = Target().Detect(*MakeFeatures(changed), *Camera(), 1);
+    ASSERT_TRUE(detection);
+    EXPECT_LT((detection->camera_from_target.translation - Truth(view).translation).norm(), 0.02);
+    EXPECT_LT(AngleBetween(detection->camera_from_target, Truth(view)), 0.7);
   }
 }
 
-TEST(PlanarTarget, IsFoundWhenAThirdIsHidden) {
+TEST(PlanarTarget, IsDetectedWhenAThirdIsOccluded) {
   const View view{2, 10, 0, 0};
   cv::Mat image = Scene().world.Render(*Camera(), LookAtBoard(2, 10, 0, 0), 1.5);
   image(cv::Rect(0, 0, 250, 480)) = cv::Scalar(60);
-  const auto sighting = Target().Detect(*MakeFeatures(image), *Camera(), 1);
-  ASSERT_TRUE(sighting);
-  EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation).norm(), 0.02);
+  const auto detection = Target().Detect(*MakeFeatures(image), *Camera(), 1);
+  ASSERT_TRUE(detection);
+  EXPECT_LT((detection->camera_from_target.translation - Truth(view).translation).norm(), 0.02);
 }
 
-TEST(PlanarTarget, IsFoundThroughAWideLens) {
+TEST(PlanarTarget, IsDetectedThroughAWideLens) {
   const CameraModel camera(LensModel::kFov, {640, 480, 330, 330, 322, 236}, {0.9});
   const Rigid3 pose = LookAtBoard(1.5, 25, 10, 5);
-  const auto sighting = Target().Detect(*MakeFeatures(Scene().world.Render(camera, pose, 1.5)), camera, 1);
-  ASSERT_TRUE(sighting);
+  const auto detection = Target().Detect(*MakeFeatures(Scene().world.Render(camera, pose, 1.5)), camera, 1);
+  ASSERT_TRUE(detection);
   const Rigid3 truth = pose * Scene().world_from_target;
-  EXPECT_LT((sighting->camera_from_target.translation - truth.translation).norm(), 0.01);
-  EXPECT_LT(AngleBetween(sighting->camera_from_target, truth), 0.5);
+  EXPECT_LT((detection->camera_from_target.translation - truth.translation).norm(), 0.01);
+  EXPECT_LT(AngleBetween(detection->camera_from_target, truth), 0.5);
 }
 
-TEST(PlanarTarget, IsNeverFoundInOtherImages) {
+TEST(PlanarTarget, IsNeverDetectedInOtherImages) {
   for (std::uint64_t seed = 500; seed < 512; ++seed) {
     const TargetScene other(seed);
     const auto features = MakeFeatures(other.world.Render(*Camera(), LookAtBoard(2, 15, 5, 10), 1.5));
@@ -141,33 +141,33 @@ TEST(PlanarTarget, IsNeverFoundInOtherImages) {
   EXPECT_FALSE(Target().Detect(*MakeFeatures(cv::Mat(480, 640, CV_8UC1, cv::Scalar(90))), *Camera(), 1));
 }
 
-TEST(PlanarTarget, IsNotFoundMirroredOrFromBehind) {
+TEST(PlanarTarget, IsNotDetectedMirroredOrFromBehind) {
   const TargetScene& scene = Scene();
   cv::Mat mirrored;
   cv::flip(scene.world.Render(*Camera(), LookAtBoard(2, 15, 5, 0), 1.5), mirrored, 1);
   EXPECT_FALSE(Target().Detect(*MakeFeatures(mirrored), *Camera(), 1));
 }
 
-TEST(PlanarTargetAlignment, ReachesTheTruthFromNearIt) {
+TEST(PlanarTargetAlignment, ReachesTheTruthFromANearbyPose) {
   const View view{2, 20, 10, 15};
-  const auto features = Look(view);
+  const auto features = RenderFeatures(view);
   Random random(4);
   int reached = 0;
   for (int trial = 0; trial < 20; ++trial) {
     Eigen::Matrix<double, 6, 1> twist;
     for (int i = 0; i < 6; ++i) twist[i] = random.Uniform(-1, 1) * (i < 3 ? 0.03 : 0.012);
-    const auto sighting = Target().Align(*features, *Camera(), Rigid3::Exp(twist) * Truth(view));
-    if (!sighting) continue;
+    const auto detection = Target().Align(*features, *Camera(), Rigid3::Exp(twist) * Truth(view));
+    if (!detection) continue;
     ++reached;
-    EXPECT_LT((sighting->camera_from_target.translation - Truth(view).translation).norm(), 0.01);
-    EXPECT_LT(AngleBetween(sighting->camera_from_target, Truth(view)), 0.4);
+    EXPECT_LT((detection->camera_from_target.translation - Truth(view).translation).norm(), 0.01);
+    EXPECT_LT(AngleBetween(detection->camera_from_target, Truth(view)), 0.4);
   }
   EXPECT_GE(reached, 18);
 }
 
-TEST(PlanarTargetAlignment, RefusesAPoseFromWhichItIsNotSeen) {
+TEST(PlanarTargetAlignment, RejectsAPoseFromWhichItIsNotVisible) {
   const View view{2, 20, 10, 15};
-  const auto features = Look(view);
+  const auto features = RenderFeatures(view);
   const Rigid3 aside = Rigid3(Rotation3(), {0.6, 0.2, 0}) * Truth(view);
   EXPECT_FALSE(Target().Align(*features, *Camera(), aside));
   const Rigid3 behind(Rotation3::Exp({0, std::numbers::pi, 0}) * Truth(view).rotation,
@@ -175,7 +175,7 @@ TEST(PlanarTargetAlignment, RefusesAPoseFromWhichItIsNotSeen) {
   EXPECT_FALSE(Target().Align(*features, *Camera(), behind));
 }
 
-TEST(MakingAPlanarTarget, RefusesWhatCannotBeFoundOrMeasured) {
+TEST(PlanarTargetConstruction, RejectsImagesAndWidthsThatCannotWork) {
   EXPECT_THROW(PlanarTarget(Scene().image, 0), Error);
   EXPECT_THROW(PlanarTarget(Scene().image, -1), Error);
   EXPECT_THROW(PlanarTarget(Scene().image, std::nan("")), Error);

@@ -17,7 +17,7 @@ namespace {
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
 
-class CreatingPoints : public ::testing::Test {
+class CreatePointsTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     world_ = new RenderedWorld(RenderedWorld::Room(41));
@@ -28,7 +28,7 @@ class CreatingPoints : public ::testing::Test {
     world_ = nullptr;
     camera_.reset();
   }
-  // Keyframes that know no points, and the mean depth alone.
+  // Keyframes without points, for which only the median depth is known.
   static Map WithoutPoints(const std::vector<Rigid3>& poses) {
     Map map;
     for (const Rigid3& pose : poses) {
@@ -50,10 +50,10 @@ class CreatingPoints : public ::testing::Test {
   static RenderedWorld* world_;
   static std::shared_ptr<const CameraModel> camera_;
 };
-RenderedWorld* CreatingPoints::world_ = nullptr;
-std::shared_ptr<const CameraModel> CreatingPoints::camera_;
+RenderedWorld* CreatePointsTest::world_ = nullptr;
+std::shared_ptr<const CameraModel> CreatePointsTest::camera_;
 
-TEST_F(CreatingPoints, PutsThemOnTheWalls) {
+TEST_F(CreatePointsTest, CreatesThemOnTheWalls) {
   for (const Rigid3& other : {CameraAt({0.3, 0, 0}), CameraAt({-0.1, 0.2, 0.1}, {2, 3, 10})}) {
     Map map = WithoutPoints({CameraAt({0, 0, 0}), other});
     PointSearcher searcher;
@@ -66,7 +66,7 @@ TEST_F(CreatingPoints, PutsThemOnTheWalls) {
   }
 }
 
-TEST_F(CreatingPoints, SeesEachInBothKeyframesWhereItProjects) {
+TEST_F(CreatePointsTest, AddsObservationsInBothKeyframesAtTheProjections) {
   Map map = WithoutPoints({CameraAt({0, 0, 0}), CameraAt({0.3, 0, 0})});
   PointSearcher searcher;
   const PointCreationOptions options;
@@ -92,7 +92,7 @@ TEST_F(CreatingPoints, SeesEachInBothKeyframesWhereItProjects) {
   }
 }
 
-TEST_F(CreatingPoints, MakesNoneWithoutParallax) {
+TEST_F(CreatePointsTest, CreatesNoneWithoutParallax) {
   PointSearcher searcher;
   for (const Rigid3& other : {CameraAt({0, 0, 0}, {0, 4, 2}), CameraAt({0.004, 0, 0}), CameraAt({0, 0, 0})}) {
     Map map = WithoutPoints({CameraAt({0, 0, 0}), other});
@@ -102,7 +102,7 @@ TEST_F(CreatingPoints, MakesNoneWithoutParallax) {
   }
 }
 
-TEST_F(CreatingPoints, MakesNoneTwiceAndComesToAnEnd) {
+TEST_F(CreatePointsTest, CreatesNoDuplicatesAndTerminates) {
   Map map = WithoutPoints({CameraAt({0, 0, 0}), CameraAt({0.3, 0, 0})});
   PointSearcher searcher;
   std::set<std::tuple<int, float, float>> corners;
@@ -119,7 +119,7 @@ TEST_F(CreatingPoints, MakesNoneTwiceAndComesToAnEnd) {
   EXPECT_GT(corners.size(), 200u);
 }
 
-TEST_F(CreatingPoints, MakesNoneOfKeyframesThatAreNotThere) {
+TEST_F(CreatePointsTest, CreatesNoneForKeyframesThatDoNotExist) {
   Map map = WithoutPoints({CameraAt({0, 0, 0}), CameraAt({0.3, 0, 0})});
   PointSearcher searcher;
   EXPECT_TRUE(CreatePoints({}, 0, 0, &map, &searcher).empty());
@@ -127,8 +127,8 @@ TEST_F(CreatingPoints, MakesNoneOfKeyframesThatAreNotThere) {
   EXPECT_TRUE(CreatePoints({}, 9, 0, &map, &searcher).empty());
 }
 
-// The searcher keeps patches of points by id; what it kept of one pair must not colour the next.
-TEST_F(CreatingPoints, DoesNotDependOnThePairsBefore) {
+// The searcher caches patches of points by id; the patches of one pair must not affect the next.
+TEST_F(CreatePointsTest, DoesNotDependOnEarlierPairs) {
   const std::vector<Rigid3> poses = {CameraAt({0, 0, 0}), CameraAt({0.3, 0, 0}),
                                      CameraAt({0.1, 0.15, 0}, {0, 20, 90})};
   Map used = WithoutPoints(poses), fresh = WithoutPoints(poses);

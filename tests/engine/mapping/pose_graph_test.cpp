@@ -21,13 +21,13 @@ Sim3 MakeSim3(const Eigen::Vector3d& rotation, const Eigen::Vector3d& translatio
   return result;
 }
 
-// What the error of an edge would be, without its weight: zero for equal ones.
+// The unweighted error of an edge between the two similarities: zero if they are equal.
 double Difference(const Sim3& a, const Sim3& b) {
   const Sim3 left = a * b.inverse();
   return std::max({left.translation.norm(), left.rotation.Angle(), std::abs(std::log(left.scale))});
 }
 
-// Cameras on a circle, each looking along it; of different units of length.
+// Cameras on a circle, each looking along it, with different units of length.
 std::vector<Sim3> Circle(int count) {
   std::vector<Sim3> nodes;
   for (int i = 0; i < count; ++i) {
@@ -44,7 +44,7 @@ Eigen::Vector3d Draw(Random* random, double size) {
   return {random->Uniform(-size, size), random->Uniform(-size, size), random->Uniform(-size, size)};
 }
 
-// Neighbours and next neighbours, all round.
+// Edges between neighbours and next neighbours, around the whole circle.
 PoseGraph ExactGraph(const std::vector<Sim3>& truth) {
   PoseGraph graph;
   const int count = static_cast<int>(truth.size());
@@ -61,7 +61,7 @@ PoseGraph ExactGraph(const std::vector<Sim3>& truth) {
   return graph;
 }
 
-TEST(PoseGraph, ComesBackToTheTruthFromADisturbedStart) {
+TEST(PoseGraph, ReturnsToTheTruthFromADisturbedStart) {
   const std::vector<Sim3> truth = Circle(30);
   PoseGraph graph = ExactGraph(truth);
   Random random(3);
@@ -70,18 +70,18 @@ TEST(PoseGraph, ComesBackToTheTruthFromADisturbedStart) {
       node.node_from_map =
           MakeSim3(Draw(&random, 0.2), Draw(&random, 0.5), random.Uniform(0.8, 1.2)) * node.node_from_map;
   }
-  const PoseGraphSummary summary = RelaxPoseGraph({}, &graph);
+  const PoseGraphSummary summary = SolvePoseGraph({}, &graph);
   EXPECT_TRUE(summary.solved);
   EXPECT_GT(summary.initial_cost, 0.1);
   EXPECT_LT(summary.final_cost, 1e-12);
-  // Wrong derivatives would take many more.
+  // Wrong derivatives would take many more iterations.
   EXPECT_LE(summary.iterations, 10);
   for (std::size_t i = 0; i < truth.size(); ++i)
     EXPECT_LT(Difference(graph.nodes[i].node_from_map, truth[i]), 1e-5) << "node " << i;
 }
 
-TEST(PoseGraph, SpreadsTheErrorOfALoopEvenlyOverIt) {
-  // Every step is measured 1 % too short, turned too little, and 0.5 % off in scale.
+TEST(PoseGraph, DistributesTheErrorOfALoopEvenly) {
+  // Every step is measured 1 % too short, with too little rotation, and 0.5 % off in scale.
   constexpr int kCount = 40;
   const std::vector<Sim3> truth = Circle(kCount);
   PoseGraph graph;
@@ -96,11 +96,11 @@ TEST(PoseGraph, SpreadsTheErrorOfALoopEvenlyOverIt) {
   const double drifted = Difference(graph.nodes.back().node_from_map, truth.back());
   EXPECT_GT(drifted, 0.15);
   graph.edges.push_back({kCount - 1, 0, truth.back() * truth.front().inverse(), 1.0});
-  const PoseGraphSummary summary = RelaxPoseGraph({}, &graph);
+  const PoseGraphSummary summary = SolvePoseGraph({}, &graph);
   ASSERT_TRUE(summary.solved);
   EXPECT_LT(summary.final_cost, 0.1 * summary.initial_cost);
   EXPECT_LT(Difference(graph.nodes.back().node_from_map, truth.back()), 0.1 * drifted);
-  // What is left is what each step slipped, and nowhere more.
+  // The remaining error of each edge is about the error of one step.
   const double slipped = Difference(slip, Sim3());
   for (const PoseGraph::Edge& edge : graph.edges) {
     const Sim3 a_from_b = graph.nodes[static_cast<std::size_t>(edge.a)].node_from_map *
@@ -109,26 +109,26 @@ TEST(PoseGraph, SpreadsTheErrorOfALoopEvenlyOverIt) {
   }
 }
 
-TEST(PoseGraph, RefusesAPartThatNothingHolds) {
+TEST(PoseGraph, RejectsAComponentWithoutAFixedNode) {
   const std::vector<Sim3> truth = Circle(6);
   PoseGraph graph = ExactGraph(truth);
   graph.nodes.push_back({Sim3(), false, 1.0});
   const PoseGraph before = graph;
-  EXPECT_FALSE(RelaxPoseGraph({}, &graph).solved);
+  EXPECT_FALSE(SolvePoseGraph({}, &graph).solved);
   for (std::size_t i = 0; i < graph.nodes.size(); ++i)
     EXPECT_EQ(graph.nodes[i].node_from_map.translation, before.nodes[i].node_from_map.translation) << i;
 }
 
-TEST(PoseGraph, LeavesFixedNodesAlone) {
+TEST(PoseGraph, DoesNotMoveFixedNodes) {
   const std::vector<Sim3> truth = Circle(8);
   PoseGraph graph = ExactGraph(truth);
   graph.nodes[3].fixed = true;
   graph.nodes[3].node_from_map.translation.x() += 0.3;
   const Sim3 held = graph.nodes[3].node_from_map;
-  EXPECT_TRUE(RelaxPoseGraph({}, &graph).solved);
+  EXPECT_TRUE(SolvePoseGraph({}, &graph).solved);
   EXPECT_EQ(graph.nodes[3].node_from_map.translation, held.translation);
   EXPECT_EQ(graph.nodes[0].node_from_map.translation, truth[0].translation);
-  EXPECT_GT(Difference(graph.nodes[4].node_from_map, truth[4]), 0.01) << "its neighbours follow it";
+  EXPECT_GT(Difference(graph.nodes[4].node_from_map, truth[4]), 0.01) << "its neighbours move with it";
 }
 
 }  // namespace

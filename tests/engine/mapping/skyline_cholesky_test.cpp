@@ -24,8 +24,8 @@ struct System {
   Eigen::VectorXd right_side;
 };
 
-// J^T J of random rows that each touch a stretch of neighbouring blocks, as a point does the cameras that saw
-// it; `revisit` lets the last block share rows with the first.
+// J^T J of random rows that each involve a few neighbouring blocks, as a point involves the cameras that see
+// it; with `revisit` the last block shares rows with the first.
 System MakeSystem(int blocks, int reach, bool revisit, std::uint64_t seed) {
   Random random(seed);
   System system;
@@ -56,7 +56,7 @@ SkylineCholesky Fill(const System& system) {
   return result;
 }
 
-TEST(SkylineCholesky, SolvesWhatADenseFactorSolves) {
+TEST(SkylineCholesky, AgreesWithADenseFactorization) {
   for (const int blocks : {1, 2, 7, 8, 9, 16, 23, 40}) {
     for (const int reach : {1, 3, 12, 40}) {
       for (const bool revisit : {false, true}) {
@@ -82,7 +82,7 @@ TEST(SkylineCholesky, ReadsTheLowerTriangleOfItsDiagonalBlocksOnly) {
   EXPECT_LT((system.matrix * found - system.right_side).norm(), 1e-9 * system.right_side.norm());
 }
 
-TEST(SkylineCholesky, OfNothingIsNothing) {
+TEST(SkylineCholesky, AcceptsAnEmptyMatrix) {
   SkylineCholesky skyline((std::vector<int>()));
   EXPECT_EQ(skyline.Factor(Never), Outcome::kDone);
   Eigen::VectorXd nothing(0);
@@ -90,14 +90,14 @@ TEST(SkylineCholesky, OfNothingIsNothing) {
   EXPECT_EQ(skyline.rows(), 0);
 }
 
-TEST(SkylineCholesky, SaysThatAMatrixIsNotPositive) {
+TEST(SkylineCholesky, ReportsThatAMatrixIsNotPositiveDefinite) {
   System system = MakeSystem(20, 3, false, 4);
   system.matrix(100, 100) = -1;
   SkylineCholesky skyline = Fill(system);
   EXPECT_EQ(skyline.Factor(Never), Outcome::kNotPositive);
 }
 
-TEST(SkylineCholesky, StopsWhereItIsInterrupted) {
+TEST(SkylineCholesky, StopsWhenInterrupted) {
   const System system = MakeSystem(64, 64, false, 5);
   SkylineCholesky skyline = Fill(system);
   int questions = 0;
@@ -105,7 +105,7 @@ TEST(SkylineCholesky, StopsWhereItIsInterrupted) {
   EXPECT_EQ(questions, 5);
 }
 
-TEST(SkylineCholesky, KeepsNothingLeftOfTheFirstBlocks) {
+TEST(SkylineCholesky, StoresNothingLeftOfTheFirstBlocks) {
   std::vector<int> band, full;
   for (int i = 0; i < 1000; ++i) {
     band.push_back(std::max(0, i - 20));

@@ -19,7 +19,8 @@ std::vector<std::uint32_t> Ids(std::size_t count) {
   return ids;
 }
 
-// Depths of 100 points, in units of a baseline that belongs to this parallax, each wrong by a random factor.
+// Depths of 100 points, in units of the baseline that corresponds to this parallax, each wrong by a random
+// factor.
 TwoViewResult Geometry(double parallax_deg, double relative_error, std::uint64_t seed) {
   Random depths(7), errors(seed);
   TwoViewResult result;
@@ -33,7 +34,7 @@ TwoViewResult Geometry(double parallax_deg, double relative_error, std::uint64_t
   return result;
 }
 
-TEST(StartConfirmation, AsksForAThirdViewThatAgrees) {
+TEST(StartConfirmation, RequiresAThirdViewThatAgrees) {
   StartConfirmation confirmation({});
   EXPECT_FALSE(confirmation.Confirm(kFirst, Ids(100), Geometry(1.0, 0.1, 1)));
   EXPECT_FALSE(confirmation.Confirm(kFirst, Ids(100), Geometry(1.05, 0.1, 2)))
@@ -41,15 +42,15 @@ TEST(StartConfirmation, AsksForAThirdViewThatAgrees) {
   EXPECT_TRUE(confirmation.Confirm(kFirst, Ids(100), Geometry(1.2, 0.1, 3)));
 }
 
-TEST(StartConfirmation, RefusesDepthsThatTheThirdViewContradicts) {
+TEST(StartConfirmation, RejectsDepthsThatTheThirdViewContradicts) {
   StartConfirmation confirmation({});
   EXPECT_FALSE(confirmation.Confirm(kFirst, Ids(100), Geometry(1.0, 1.0, 1)));
   EXPECT_FALSE(confirmation.Confirm(kFirst, Ids(100), Geometry(1.5, 0.1, 2)));
   EXPECT_TRUE(confirmation.Confirm(kFirst, Ids(100), Geometry(2.0, 0.1, 3)))
-      << "which agrees with the second try";
+      << "the third view agrees with the second estimate";
 }
 
-TEST(StartConfirmation, ComparesViewsOfOneFirstViewAlone) {
+TEST(StartConfirmation, ComparesOnlyGeometriesOfTheSameFirstView) {
   StartConfirmation confirmation({});
   EXPECT_FALSE(confirmation.Confirm(kFirst, Ids(100), Geometry(1.0, 0.1, 1)));
   EXPECT_FALSE(confirmation.Confirm(2 * kFirst, Ids(100), Geometry(1.5, 0.1, 2)));
@@ -57,7 +58,7 @@ TEST(StartConfirmation, ComparesViewsOfOneFirstViewAlone) {
   EXPECT_FALSE(confirmation.Confirm(2 * kFirst, Ids(100), Geometry(2.0, 0.1, 3)));
 }
 
-TEST(StartConfirmation, AsksForEnoughSharedPoints) {
+TEST(StartConfirmation, RequiresEnoughSharedPoints) {
   StartConfirmation confirmation({});
   EXPECT_FALSE(confirmation.Confirm(kFirst, Ids(100), Geometry(1.0, 0.1, 1)));
   TwoViewResult few = Geometry(1.5, 0.1, 2);

@@ -31,7 +31,7 @@ TargetInitializer MakeInitializer() {
   return TargetInitializer(target, {}, Camera(), 1);
 }
 
-TEST(TargetInitializer, StartsAMapInMetresFromASidewaysStep) {
+TEST(TargetInitializer, StartsAMapInMetresAfterSidewaysMotion) {
   TargetInitializer initializer = MakeInitializer();
   std::optional<TargetStart> start;
   std::vector<Rigid3> poses;
@@ -39,9 +39,9 @@ TEST(TargetInitializer, StartsAMapInMetresFromASidewaysStep) {
     poses.push_back(CameraAt({-0.1 + 0.02 * frame, 0.05, 0.1}, {0, -0.5 * frame, 0}));
     start = initializer.Track(std::chrono::milliseconds(33 * frame), Look(poses.back()));
     if (!start) {
-      ASSERT_TRUE(initializer.sighting()) << frame;
+      ASSERT_TRUE(initializer.detection()) << frame;
       const Rigid3 truth = poses.back() * Scene().world_from_target;
-      EXPECT_TRUE(IsNear(initializer.sighting()->camera_from_target, truth, 0.01, 0.008)) << frame;
+      EXPECT_TRUE(IsNear(initializer.detection()->camera_from_target, truth, 0.01, 0.008)) << frame;
       EXPECT_FALSE(initializer.hint().empty());
     }
   }
@@ -58,7 +58,7 @@ TEST(TargetInitializer, StartsAMapInMetresFromASidewaysStep) {
   EXPECT_LT((start->pair.geometry.b_from_a.rotation.inverse() * b_from_a.rotation).Angle(), 0.008);
 
   const TwoViewResult& geometry = start->pair.geometry;
-  EXPECT_EQ(geometry.verdict, TwoViewVerdict::kGeneral);
+  EXPECT_EQ(geometry.outcome, TwoViewOutcome::kGeneral);
   ASSERT_EQ(geometry.points_in_a.size(), start->pair.matches.size());
   ASSERT_EQ(geometry.inlier.size(), start->pair.matches.size());
   EXPECT_EQ(geometry.inlier_count, std::count(geometry.inlier.begin(), geometry.inlier.end(), true));
@@ -79,7 +79,7 @@ TEST(TargetInitializer, StartsAMapInMetresFromASidewaysStep) {
   EXPECT_LT(errors[errors.size() * 9 / 10], 0.08);
 }
 
-TEST(TargetInitializer, DoesNotStartFromATurn) {
+TEST(TargetInitializer, DoesNotStartFromPureRotation) {
   TargetInitializer initializer = MakeInitializer();
   for (int frame = 0; frame < 12; ++frame) {
     EXPECT_FALSE(initializer.Track(std::chrono::milliseconds(33 * frame),
@@ -88,29 +88,29 @@ TEST(TargetInitializer, DoesNotStartFromATurn) {
   }
 }
 
-TEST(TargetInitializer, AsksForATargetThatIsNotThere) {
+TEST(TargetInitializer, AsksForATargetThatIsNotInView) {
   TargetInitializer initializer = MakeInitializer();
   const auto away = Look(CameraAt({0, 0, 0}, {0, 180, 0}));
   for (int frame = 0; frame < 3; ++frame) {
     EXPECT_FALSE(initializer.Track(std::chrono::milliseconds(33 * frame), away));
-    EXPECT_FALSE(initializer.sighting());
+    EXPECT_FALSE(initializer.detection());
     EXPECT_EQ(initializer.hint(), "point the camera at the target");
   }
 }
 
-TEST(TargetInitializer, FindsTheTargetAgainAfterItWasGone) {
+TEST(TargetInitializer, DetectsTheTargetAgainAfterItWasOutOfView) {
   TargetInitializer initializer = MakeInitializer();
   const Rigid3 pose = CameraAt({0.1, 0, 0});
   initializer.Track(Timestamp(0), Look(CameraAt({0, 0, 0})));
-  ASSERT_TRUE(initializer.sighting());
+  ASSERT_TRUE(initializer.detection());
   for (int frame = 1; frame < 4; ++frame)
     initializer.Track(std::chrono::milliseconds(33 * frame), Look(CameraAt({0, 0, 0}, {0, 180, 0})));
-  EXPECT_FALSE(initializer.sighting());
-  // No corner can be followed across the gap: nothing starts from the view before it.
+  EXPECT_FALSE(initializer.detection());
+  // No corner can be tracked across the gap: the view before it must not initialize a map.
   EXPECT_FALSE(initializer.Track(std::chrono::milliseconds(200), Look(pose)));
-  ASSERT_TRUE(initializer.sighting());
+  ASSERT_TRUE(initializer.detection());
   EXPECT_TRUE(
-      IsNear(initializer.sighting()->camera_from_target, pose * Scene().world_from_target, 0.01, 0.008));
+      IsNear(initializer.detection()->camera_from_target, pose * Scene().world_from_target, 0.01, 0.008));
 }
 
 TEST(TargetStart, NeedsParallaxAndPoints) {
@@ -128,7 +128,7 @@ TEST(TargetStart, NeedsParallaxAndPoints) {
   const auto start = MakeTargetStart(Camera(), a, far, {}, {}, &hint);
   ASSERT_TRUE(start);
   EXPECT_EQ(hint, "");
-  EXPECT_EQ(start->pair.geometry.verdict, TwoViewVerdict::kPlanar);
+  EXPECT_EQ(start->pair.geometry.outcome, TwoViewOutcome::kPlanar);
   EXPECT_NEAR(start->pair.baseline_m, 0.3, 0.01);
   TargetStartOptions many;
   many.min_matches = 1000;

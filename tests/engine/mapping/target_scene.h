@@ -7,8 +7,8 @@
 #include "engine/mapping/planar_target.h"
 #include "tests/engine/rendered_world.h"
 
-// A painted board before a painted wall, and the image of it that a person would hand in: what the tests of
-// planar targets look at. World frame x right, y down, z forward, metres.
+// A painted board in front of a painted wall, and the image of the board that a user would supply, for tests
+// of planar targets. World frame: x right, y down, z forward, metres.
 namespace docent::engine::testing_world {
 
 struct TargetScene {
@@ -17,27 +17,28 @@ struct TargetScene {
   double width_m = 0;
   Rigid3 world_from_target;
 
-  // The board's middle is 2 m ahead.
-  explicit TargetScene(std::uint64_t seed, bool with_things = false) {
+  // The centre of the board is 2 m ahead.
+  explicit TargetScene(std::uint64_t seed, bool with_objects = false) {
     const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), middle(0, 0, 2);
     const Wall board = PaintedWall(middle, x, y, 0.8, 0.6, seed);
     std::vector<Wall> walls = {board, PaintedWall({0, 0, 3.2}, x, y, 5, 4, seed + 100)};
-    if (with_things) {
+    if (with_objects) {
       walls.push_back(PaintedWall({-1.3, 0.1, 2.2}, x, y, 0.35, 0.6, seed + 200));
       walls.push_back(PaintedWall({1.3, -0.1, 1.8}, x, y, 0.35, 0.6, seed + 300));
     }
     world = RenderedWorld(walls);
     board.paint.convertTo(image, CV_8UC1);
     width_m = image.cols * kTexelSize;
-    // The paint's first texel lies on the board's edge, an image's first pixel half a pixel inside.
+    // The first texel of the texture lies on the edge of the board, the first pixel of an image half a pixel
+    // inside.
     const Eigen::Vector3d off((image.cols - 1) * kTexelSize / 2 - 0.8,
                               (image.rows - 1) * kTexelSize / 2 - 0.6, 0);
     world_from_target = Rigid3(Rotation3(), middle + off);
   }
 };
 
-// A camera that looks at the board's middle from a distance, `slant_deg` to the right of its normal and
-// `rise_deg` above it, turned about its line of sight; camera_from_world.
+// A camera that looks at the centre of the board from a distance, `slant_deg` to the right of its normal and
+// `rise_deg` above it, rotated about its optical axis; camera_from_world.
 inline Rigid3 LookAtBoard(double distance, double slant_deg, double rise_deg, double roll_deg) {
   const auto radians = [](double degrees) { return degrees * std::numbers::pi / 180; };
   const Rotation3 world_from_camera = Rotation3::Exp({0, -radians(slant_deg), 0}) *

@@ -19,8 +19,8 @@ using namespace testing_scene;
 
 constexpr int kSeeds = 12;
 
-bool IsAccepted(TwoViewVerdict verdict) {
-  return verdict == TwoViewVerdict::kGeneral || verdict == TwoViewVerdict::kPlanar;
+bool IsAccepted(TwoViewOutcome outcome) {
+  return outcome == TwoViewOutcome::kGeneral || outcome == TwoViewOutcome::kPlanar;
 }
 
 using MakeViews = std::function<TwoViews(const SceneOptions&, Random*)>;
@@ -40,7 +40,7 @@ std::string NameOf(const testing::TestParamInfo<Case>& test) {
 struct Noise {
   double noise_px, outlier_ratio;
 };
-// What real matches look like: good and worst.
+// Noise and outlier ratios of real matches: good and worst.
 constexpr Noise kNoises[] = {{0.5, 0.05}, {0.5, 0.4}, {1.0, 0.05}};
 
 TwoViewResult Estimate(const TwoViews& views, std::uint64_t seed, double outlier_ratio,
@@ -48,16 +48,16 @@ TwoViewResult Estimate(const TwoViews& views, std::uint64_t seed, double outlier
   TwoViewOptions options;
   options.depth_noise = depth_noise;
   options.seed = seed;
-  // Noise beyond the threshold costs some of the correct pairs too.
+  // Noise beyond the threshold rejects some of the correct pairs too.
   options.min_inlier_ratio = std::min(options.min_inlier_ratio, 0.8 * (1 - outlier_ratio));
   return EstimateTwoViews(views.rays_in_a, views.rays_in_b, options);
 }
 
-// Scenes from which a map must start.
+// Scenes from which a map must be initialized.
 
 class TwoViewsWithParallax : public testing::TestWithParam<Case> {};
 
-TEST_P(TwoViewsWithParallax, GiveTheMotionAndTheStructure) {
+TEST_P(TwoViewsWithParallax, GiveTheTrueMotionAndStructure) {
   for (const auto& [noise_px, outlier_ratio] : kNoises) {
     int accepted = 0;
     std::vector<double> rotation_errors, direction_errors;
@@ -67,7 +67,7 @@ TEST_P(TwoViewsWithParallax, GiveTheMotionAndTheStructure) {
           GetParam().make({.count = 400, .noise_px = noise_px, .outlier_ratio = outlier_ratio}, &random);
       ASSERT_EQ(views.correct.size(), 400u);
       const TwoViewResult result = Estimate(views, seed, outlier_ratio);
-      if (!IsAccepted(result.verdict)) continue;
+      if (!IsAccepted(result.outcome)) continue;
       ++accepted;
       EXPECT_NEAR(result.b_from_a.translation.norm(), 1, 1e-9);
       rotation_errors.push_back(RotationErrorDeg(result.b_from_a, views.b_from_a));
@@ -84,16 +84,15 @@ TEST_P(TwoViewsWithParallax, GiveTheMotionAndTheStructure) {
         depth_errors.push_back(
             std::abs(scale * result.points_in_a[i].norm() / views.points_in_a[i].norm() - 1));
       }
-      // The worst: noise near the threshold, or a tenth that the plane leaves out.
+      // The worst case: noise near the threshold, or a tenth of the points off the plane.
       const auto possible = std::count(views.correct.begin(), views.correct.end(), true);
       EXPECT_GE(correct, (noise_px > 0.7 ? 0.65 : 0.8) * static_cast<double>(possible)) << seed;
-      EXPECT_LE(wrong, 8) << seed;  // those that lie on their epipolar lines by chance
+      EXPECT_LE(wrong, 8) << seed;  // outliers that lie on their epipolar lines by chance
       std::nth_element(depth_errors.begin(), depth_errors.begin() + depth_errors.size() / 2,
                        depth_errors.end());
       EXPECT_LT(depth_errors[depth_errors.size() / 2], 0.25) << seed;
     }
-    // Where keypoints are placed this badly, some of these motions are too small for a depth that is
-    // significant.
+    // With this much noise, some of these motions are too small for the depth to be significant.
     if (noise_px > 0.7 && rotation_errors.empty()) continue;
     if (noise_px < 0.7) {
       EXPECT_GE(accepted, kSeeds - 2) << "noise " << noise_px << " outliers " << outlier_ratio;
@@ -127,7 +126,7 @@ INSTANTIATE_TEST_SUITE_P(
              [](const SceneOptions& o, Random* r) {
                return MakeTwoViews(Volume(2, 6), Motion({0.02, 0.01, 0.8}, 2 * RandomDirection(r)), o, r);
              }},
-        Case{"PlaneSquareOn",
+        Case{"PlaneParallelToTheImage",
              [](const SceneOptions& o, Random* r) {
                const double angle = r->Uniform(0, 2 * kPi);
                return MakeTwoViews(
@@ -144,7 +143,7 @@ INSTANTIATE_TEST_SUITE_P(
                return MakeTwoViews(OnPlane({0, 0.6, 0.8}, 1), Motion({0.1, 0.01, 0}, 3 * RandomDirection(r)),
                                    o, r);
              }},
-        Case{"PlaneWithATenthOffIt",
+        Case{"PlaneWithATenthOfThePointsOffIt",
              [](const SceneOptions& o, Random* r) {
                const DepthAlong plane = OnPlane({0.5, 0.1, 0.85}, 1);
                return MakeTwoViews(
@@ -161,15 +160,17 @@ INSTANTIATE_TEST_SUITE_P(
              }}),
     NameOf);
 
-// A lens that is known exactly: no other says anything of depth where the camera turns much and moves little.
+// A lens without calibration error: with any error, a large rotation with a small translation says nothing
+// about depth.
 DepthNoiseOptions ExactLens() {
   DepthNoiseOptions options;
   options.calibration_share = 0;
   return options;
 }
 
-// The camera on a circle of 5 cm, looking outward at a wall: it turns thirty degrees while it moves 26 mm.
-TEST(TwoViewGeometry, TurningAndMovingBeforeAWallGivesTheMotion) {
+// The camera moves on a circle of 5 cm, looking outwards at a wall: it rotates by thirty degrees while it
+// moves 26 mm.
+TEST(TwoViewGeometry, RotatingAndMovingInFrontOfAWallGivesTheMotion) {
   int accepted = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     Random random(seed * 7919);
@@ -179,7 +180,7 @@ TEST(TwoViewGeometry, TurningAndMovingBeforeAWallGivesTheMotion) {
                      Motion({0.05 * std::sin(angle), 0, 0.05 * std::cos(angle) - 0.05}, {0, -30, 0}),
                      {.count = 400, .noise_px = 0.15, .outlier_ratio = 0.2}, &random);
     const TwoViewResult result = Estimate(views, seed, 0.2, ExactLens());
-    if (!IsAccepted(result.verdict)) continue;
+    if (!IsAccepted(result.outcome)) continue;
     ++accepted;
     EXPECT_LT(RotationErrorDeg(result.b_from_a, views.b_from_a), 0.4) << seed;
     EXPECT_LT(DirectionErrorDeg(result.b_from_a, views.b_from_a), 6) << seed;
@@ -188,9 +189,9 @@ TEST(TwoViewGeometry, TurningAndMovingBeforeAWallGivesTheMotion) {
   EXPECT_GE(accepted, kSeeds - 2);
 }
 
-// A wall curved about the circle that the camera turns on: all points are equally far, so that a turn alone
-// explains nearly everything and only well-followed corners tell the difference.
-TEST(TwoViewGeometry, WellFollowedCornersOnAWallCurvedAboutTheCameraGiveTheMotion) {
+// A curved wall, centred on the circle on which the camera moves: all points are equally far, so that a
+// rotation alone explains nearly everything and only precisely tracked corners reveal the translation.
+TEST(TwoViewGeometry, PreciseCornersOnAWallCurvedAroundTheCameraGiveTheMotion) {
   const auto curved = [](const Eigen::Vector3d& ray, Random*) {
     // |(0, 0, 0.05) + t ray| = 0.5 in the plane of the circle.
     const double a = ray.x() * ray.x() + ray.z() * ray.z(), b = 0.05 * ray.z(), c = 0.05 * 0.05 - 0.25;
@@ -204,7 +205,7 @@ TEST(TwoViewGeometry, WellFollowedCornersOnAWallCurvedAboutTheCameraGiveTheMotio
         MakeTwoViews(curved, Motion({0.05 * std::sin(angle), 0, 0.05 * std::cos(angle) - 0.05}, {0, -25, 0}),
                      {.count = 400, .noise_px = 0.1}, &random);
     const TwoViewResult result = Estimate(views, seed, 0, ExactLens());
-    if (!IsAccepted(result.verdict)) continue;
+    if (!IsAccepted(result.outcome)) continue;
     ++accepted;
     EXPECT_LT(RotationErrorDeg(result.b_from_a, views.b_from_a), 0.4) << seed;
     EXPECT_LT(DirectionErrorDeg(result.b_from_a, views.b_from_a), 8) << seed;
@@ -212,18 +213,18 @@ TEST(TwoViewGeometry, WellFollowedCornersOnAWallCurvedAboutTheCameraGiveTheMotio
   EXPECT_GE(accepted, kSeeds / 2);
 }
 
-TEST(TwoViewGeometry, AWellFollowedTurnIsRefusedThoughTheFocalLengthIsOnePercentWrong) {
+TEST(TwoViewGeometry, PreciseCornersUnderPureRotationAreRejectedWithAFocalLengthOnePercentWrong) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     for (const double turn_deg : {8.0, 16.0, 24.0}) {
       Random random(seed * 7919);
       const TwoViews views = MakeTwoViews(Volume(2, 6), Motion({0, 0, 0}, {1, turn_deg, 0}),
                                           {.count = 400, .noise_px = 0.1, .focal_error = 1.01}, &random);
-      EXPECT_FALSE(IsAccepted(Estimate(views, seed, 0).verdict)) << seed << " " << turn_deg;
+      EXPECT_FALSE(IsAccepted(Estimate(views, seed, 0).outcome)) << seed << " " << turn_deg;
     }
   }
 }
 
-TEST(TwoViewGeometry, APlaneIsCalledAPlaneAndARoomIsNot) {
+TEST(TwoViewGeometry, APlaneIsClassifiedAsPlanarAndARoomIsNot) {
   int planes = 0, rooms = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     Random random(seed);
@@ -232,8 +233,8 @@ TEST(TwoViewGeometry, APlaneIsCalledAPlaneAndARoomIsNot) {
         OnPlane({0.3, 0, 1}, 1), Motion({0.1, 0.02, 0}, 3 * RandomDirection(&random)), options, &random);
     const TwoViews room =
         MakeTwoViews(Volume(2, 6), Motion({0.3, 0.1, 0}, 3 * RandomDirection(&random)), options, &random);
-    planes += Estimate(plane, seed, 0.2).verdict == TwoViewVerdict::kPlanar;
-    rooms += Estimate(room, seed, 0.2).verdict == TwoViewVerdict::kGeneral;
+    planes += Estimate(plane, seed, 0.2).outcome == TwoViewOutcome::kPlanar;
+    rooms += Estimate(room, seed, 0.2).outcome == TwoViewOutcome::kGeneral;
   }
   EXPECT_GE(planes, kSeeds - 2);
   EXPECT_EQ(rooms, kSeeds);
@@ -243,17 +244,17 @@ TEST(TwoViewGeometry, APlaneIsCalledAPlaneAndARoomIsNot) {
 
 class TwoViewsWithoutStructure : public testing::TestWithParam<Case> {};
 
-TEST_P(TwoViewsWithoutStructure, AreRefused) {
+TEST_P(TwoViewsWithoutStructure, AreRejected) {
   for (const auto& [noise_px, outlier_ratio] : kNoises) {
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
       Random random(seed * 104729);
       const TwoViews views =
           GetParam().make({.count = 400, .noise_px = noise_px, .outlier_ratio = outlier_ratio}, &random);
       const TwoViewResult result = Estimate(views, seed, outlier_ratio);
-      EXPECT_FALSE(IsAccepted(result.verdict))
+      EXPECT_FALSE(IsAccepted(result.outcome))
           << "noise " << noise_px << " outliers " << outlier_ratio << " seed " << seed;
       EXPECT_EQ(result.inlier_count, 0);
-      EXPECT_STRNE(Advice(result.verdict), "");
+      EXPECT_STRNE(Advice(result.outcome), "");
     }
   }
 }
@@ -265,17 +266,17 @@ MakeViews Rotating(const Eigen::Vector3d& rotation_deg, double focal_error) {
   };
 }
 
-// A thing that moves by itself fills a share of the matches; the camera turns by camera_deg but stays in
-// place.
-MakeViews MovingThing(double share, const Eigen::Vector3d& camera_deg, const Rigid3& motion) {
+// An independently moving object has a ratio of the matches; the camera rotates by camera_deg but does not
+// translate.
+MakeViews MovingObject(double share, const Eigen::Vector3d& camera_deg, const Rigid3& motion) {
   return [=](const SceneOptions& options, Random* random) {
     const Rigid3 camera = Motion({0, 0, 0}, camera_deg);
     TwoViews views = MakeTwoViews(Volume(2, 6), camera, options, random);
-    const TwoViews thing = MakeTwoViews(OnPlane({0.1, 0.1, 1}, 1.2), camera * motion, options, random);
+    const TwoViews object = MakeTwoViews(OnPlane({0.1, 0.1, 1}, 1.2), camera * motion, options, random);
     for (std::size_t i = 0; i < views.correct.size(); ++i) {
       if (random->Uniform() >= share) continue;
-      views.rays_in_a[i] = thing.rays_in_a[i];
-      views.rays_in_b[i] = thing.rays_in_b[i];
+      views.rays_in_a[i] = object.rays_in_a[i];
+      views.rays_in_b[i] = object.rays_in_b[i];
     }
     return views;
   };
@@ -286,33 +287,34 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Case{"Still", Rotating({0, 0, 0}, 1)}, Case{"Rotation", Rotating({3, 10, 2}, 1)},
         Case{"LargeRotation", Rotating({2, 25, 1}, 1)},
-        Case{"RotationReadWithAFocalLengthTwoPercentWrong", Rotating({1, 10, 3}, 1.02)},
-        Case{"LargeRotationReadWithAFocalLengthThreePercentWrong", Rotating({5, 25, 3}, 1.03)},
+        Case{"RotationWithAFocalLengthTwoPercentWrong", Rotating({1, 10, 3}, 1.02)},
+        Case{"LargeRotationWithAFocalLengthThreePercentWrong", Rotating({5, 25, 3}, 1.03)},
         Case{"LittleParallax",
              [](const SceneOptions& o, Random* r) {
                return MakeTwoViews(Volume(2, 6), Motion({0.025, 0, 0}, 4 * RandomDirection(r)), o, r);
              }},
-        Case{"OneFifthMoves", MovingThing(0.2, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 0}))},
-        Case{"TwoFifthsMove", MovingThing(0.4, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 0}))},
-        Case{"ThreeFifthsMoveAndTurn", MovingThing(0.6, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 15}))},
-        Case{"FourFifthsMove", MovingThing(0.8, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 0}))},
-        Case{"FourFifthsMoveAndTurn", MovingThing(0.8, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 15}))},
-        Case{"HalfMovesWhileTheCameraTurns",
-             MovingThing(0.5, {0, 6, 1}, Motion({0.12, 0.05, 0}, {5, -8, 8}))}),
+        Case{"OneFifthMoves", MovingObject(0.2, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 0}))},
+        Case{"TwoFifthsMove", MovingObject(0.4, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 0}))},
+        Case{"ThreeFifthsMoveAndRotate", MovingObject(0.6, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 15}))},
+        Case{"FourFifthsMove", MovingObject(0.8, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 0}))},
+        Case{"FourFifthsMoveAndRotate", MovingObject(0.8, {0, 0, 0}, Motion({0.12, 0.05, 0}, {0, 0, 15}))},
+        Case{"HalfMovesWhileTheCameraRotates",
+             MovingObject(0.5, {0, 6, 1}, Motion({0.12, 0.05, 0}, {5, -8, 8}))}),
     NameOf);
 
-TEST(TwoViewGeometry, StillAndRotationAreCalledWhatTheyAre) {
+TEST(TwoViewGeometry, StillnessAndRotationAreClassifiedCorrectly) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     Random random(seed);
     const SceneOptions options{.count = 300, .noise_px = 0.5, .outlier_ratio = 0.2};
-    EXPECT_EQ(Estimate(Rotating({0, 0, 0}, 1)(options, &random), seed, 0.2).verdict, TwoViewVerdict::kStill);
-    EXPECT_EQ(Estimate(Rotating({2, 9, -3}, 1)(options, &random), seed, 0.2).verdict,
-              TwoViewVerdict::kPureRotation);
+    EXPECT_EQ(Estimate(Rotating({0, 0, 0}, 1)(options, &random), seed, 0.2).outcome, TwoViewOutcome::kStill);
+    EXPECT_EQ(Estimate(Rotating({2, 9, -3}, 1)(options, &random), seed, 0.2).outcome,
+              TwoViewOutcome::kPureRotation);
   }
 }
 
-// Towards a slanted plane both readings of the homography put every point in front of both cameras.
-TEST(TwoViewGeometry, APlaneWithTwoReadingsIsRefusedAsAmbiguous) {
+// When moving towards a slanted plane, both decompositions of the homography put every point in front of both
+// cameras.
+TEST(TwoViewGeometry, APlaneWithTwoDecompositionsIsRejectedAsAmbiguous) {
   int ambiguous = 0;
   for (const double outlier_ratio : {0.0, 0.3}) {
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -320,13 +322,13 @@ TEST(TwoViewGeometry, APlaneWithTwoReadingsIsRefusedAsAmbiguous) {
       const TwoViews views =
           MakeTwoViews(OnPlane({0.5, 0, 0.85}, 1), Motion({-0.05, 0, 0.25}, 2 * RandomDirection(&random)),
                        {.count = 400, .noise_px = 0.5, .outlier_ratio = outlier_ratio}, &random);
-      ambiguous += Estimate(views, seed, outlier_ratio).verdict == TwoViewVerdict::kAmbiguousPlane;
+      ambiguous += Estimate(views, seed, outlier_ratio).outcome == TwoViewOutcome::kAmbiguousPlane;
     }
   }
   EXPECT_EQ(ambiguous, 2 * kSeeds);
 }
 
-TEST(TwoViewGeometry, AFewPointsOffThePlaneSettleWhichReadingIsRight) {
+TEST(TwoViewGeometry, AFewPointsOffThePlaneResolveTheAmbiguity) {
   int right = 0, wrong = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     Random random(seed);
@@ -337,7 +339,7 @@ TEST(TwoViewGeometry, AFewPointsOffThePlaneSettleWhichReadingIsRight) {
         },
         Motion({-0.05, 0, 0.25}, 2 * RandomDirection(&random)), {.count = 400, .noise_px = 0.5}, &random);
     const TwoViewResult result = Estimate(views, seed, 0.3);
-    if (!IsAccepted(result.verdict)) continue;
+    if (!IsAccepted(result.outcome)) continue;
     (DirectionErrorDeg(result.b_from_a, views.b_from_a) < 5 ? right : wrong)++;
   }
   EXPECT_GE(right, kSeeds - 2);
@@ -349,54 +351,54 @@ TEST(TwoViewGeometry, WrongMatchesAloneAreInconsistent) {
     Random random(seed);
     const TwoViews views = MakeTwoViews(Volume(2, 6), Motion({0.3, 0, 0}, {0, 0, 0}),
                                         {.count = 200, .outlier_ratio = 1}, &random);
-    EXPECT_EQ(Estimate(views, seed, 0).verdict, TwoViewVerdict::kInconsistent);
+    EXPECT_EQ(Estimate(views, seed, 0).outcome, TwoViewOutcome::kInconsistent);
   }
 }
 
-TEST(TwoViewGeometry, AMovingMinorityDoesNotSpoilTheMotionOfTheCamera) {
+TEST(TwoViewGeometry, AMovingMinorityDoesNotAffectTheMotionOfTheCamera) {
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     Random random(seed);
     const SceneOptions options{.count = 400, .noise_px = 0.5};
     TwoViews views = MakeTwoViews(Volume(2, 6), Motion({0.35, 0.05, 0}, {1, 3, 0}), options, &random);
-    const TwoViews thing =
+    const TwoViews object =
         MakeTwoViews(OnPlane({0, 0, 1}, 2), Motion({0.1, -0.4, 0.2}, {0, 0, 8}), options, &random);
     for (std::size_t i = 0; i < 80; ++i) {
-      views.rays_in_a[i] = thing.rays_in_a[i];
-      views.rays_in_b[i] = thing.rays_in_b[i];
+      views.rays_in_a[i] = object.rays_in_a[i];
+      views.rays_in_b[i] = object.rays_in_b[i];
     }
     const TwoViewResult result = Estimate(views, seed, 0.2);
-    ASSERT_EQ(result.verdict, TwoViewVerdict::kGeneral) << seed;
+    ASSERT_EQ(result.outcome, TwoViewOutcome::kGeneral) << seed;
     EXPECT_LT(RotationErrorDeg(result.b_from_a, views.b_from_a), 0.4);
     EXPECT_LT(DirectionErrorDeg(result.b_from_a, views.b_from_a), 4);
     EXPECT_LE(std::count(result.inlier.begin(), result.inlier.begin() + 80, true), 12);
   }
 }
 
-TEST(TwoViewGeometry, TooFewOrUnusableMatchesAreRefused) {
+TEST(TwoViewGeometry, TooFewOrUnusableMatchesAreRejected) {
   Random random(3);
   TwoViews views = MakeTwoViews(Volume(2, 6), Motion({0.4, 0, 0}, {0, 2, 0}), {.count = 60}, &random);
-  EXPECT_EQ(EstimateTwoViews({}, {}, {}).verdict, TwoViewVerdict::kTooFewMatches);
+  EXPECT_EQ(EstimateTwoViews({}, {}, {}).outcome, TwoViewOutcome::kTooFewMatches);
   TwoViewOptions options;
-  EXPECT_EQ(EstimateTwoViews(views.rays_in_a, views.rays_in_b, options).verdict, TwoViewVerdict::kGeneral);
+  EXPECT_EQ(EstimateTwoViews(views.rays_in_a, views.rays_in_b, options).outcome, TwoViewOutcome::kGeneral);
   for (std::size_t i = 0; i < 15; ++i) {
     views.rays_in_a[i].setConstant(std::numeric_limits<double>::quiet_NaN());
     views.rays_in_b[i + 15].setZero();
   }
-  EXPECT_EQ(EstimateTwoViews(views.rays_in_a, views.rays_in_b, options).verdict,
-            TwoViewVerdict::kTooFewMatches);
+  EXPECT_EQ(EstimateTwoViews(views.rays_in_a, views.rays_in_b, options).outcome,
+            TwoViewOutcome::kTooFewMatches);
   options.min_inliers = 25;
   const TwoViewResult result = EstimateTwoViews(views.rays_in_a, views.rays_in_b, options);
-  EXPECT_EQ(result.verdict, TwoViewVerdict::kGeneral);
+  EXPECT_EQ(result.outcome, TwoViewOutcome::kGeneral);
   ASSERT_EQ(result.inlier.size(), 60u);
   for (std::size_t i = 0; i < 30; ++i) EXPECT_FALSE(result.inlier[i]);
 }
 
-TEST(TwoViewGeometry, IsTheSameForTheSameSeed) {
+TEST(TwoViewGeometry, IsDeterministicUnderTheSeed) {
   Random random(4);
   const TwoViews views = MakeTwoViews(Volume(2, 6), Motion({0.3, 0, 0.1}, {0, 2, 1}),
                                       {.count = 300, .noise_px = 0.7, .outlier_ratio = 0.3}, &random);
   const TwoViewResult first = Estimate(views, 9, 0.3), second = Estimate(views, 9, 0.3);
-  EXPECT_EQ(first.verdict, second.verdict);
+  EXPECT_EQ(first.outcome, second.outcome);
   EXPECT_EQ(first.inlier, second.inlier);
   EXPECT_EQ(first.b_from_a.translation, second.b_from_a.translation);
   EXPECT_EQ(first.b_from_a.rotation.quaternion().coeffs(), second.b_from_a.rotation.quaternion().coeffs());

@@ -11,8 +11,7 @@
 #include "engine/base/random.h"
 #include "engine/geometry/rigid3.h"
 
-// A scene that is known by construction, seen by two pinhole cameras of 640x480 pixels: the ground truth of
-// the two-view tests.
+// A synthetic scene seen by two pinhole cameras of 640x480 pixels, with ground truth for the two-view tests.
 namespace docent::engine::testing_scene {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -65,11 +64,11 @@ struct SceneOptions {
   int count = 400;
   double noise_px = 0.5;
   double outlier_ratio = 0;
-  // The focal length with which the images are read, relative to the one with which they were taken.
+  // The focal length that is assumed for the images, relative to the true one.
   double focal_error = 1;
 };
 
-// depth_along(ray, random): distance of the point seen by camera a along this ray (any length but zero).
+// depth_along(ray, random): distance of the point that camera a sees along this ray (of any length but zero).
 using DepthAlong = std::function<double(const Eigen::Vector3d& ray, Random* random)>;
 
 inline TwoViews MakeTwoViews(const DepthAlong& depth_along, const Rigid3& b_from_a,
@@ -109,7 +108,7 @@ inline DepthAlong OnPlane(const Eigen::Vector3d& normal, double distance) {
   return [=](const Eigen::Vector3d& ray, Random*) { return distance / normal.normalized().dot(ray); };
 }
 
-// b's camera centre in a, and the rotation of the camera.
+// The camera centre of b in a, and the rotation of the camera.
 inline Rigid3 Motion(const Eigen::Vector3d& center_of_b_in_a, const Eigen::Vector3d& rotation_vector_deg) {
   const Rotation3 b_from_a = Rotation3::Exp(rotation_vector_deg * (kPi / 180));
   return {b_from_a, -(b_from_a * center_of_b_in_a)};

@@ -50,7 +50,7 @@ TEST(FivePoint, FindsTheEssentialMatrixAmongItsSolutions) {
     }
     found += nearest < 1e-5;
   }
-  // Now and then five random points are near a degenerate configuration, or two roots merge.
+  // Occasionally five random points are near a degenerate configuration, or two roots merge.
   EXPECT_GE(found, kTrials * 98 / 100);
 }
 
@@ -89,7 +89,7 @@ Eigen::Matrix3d TrueHomography(const Rigid3& b_from_a, const Eigen::Vector3d& no
   return b_from_a.rotation.matrix() + b_from_a.translation * normal.normalized().transpose() / distance;
 }
 
-TEST(Homography, OfFourPairsAndOfManyIsTheTrueOne) {
+TEST(Homography, FromFourPairsAndFromManyIsTheTrueOne) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Random random(seed);
     const Rigid3 b_from_a = Motion(0.2 * RandomDirection(&random), 10 * RandomDirection(&random));
@@ -109,7 +109,7 @@ TEST(Homography, OfFourPairsAndOfManyIsTheTrueOne) {
   }
 }
 
-TEST(Homography, OneOfItsReadingsIsTheMotionPastThePlane) {
+TEST(Homography, OneOfItsDecompositionsIsTheTrueMotion) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Random random(seed);
     const Rigid3 b_from_a = Motion(0.3 * RandomDirection(&random), 20 * RandomDirection(&random));
@@ -121,7 +121,7 @@ TEST(Homography, OneOfItsReadingsIsTheMotionPastThePlane) {
     EXPECT_EQ(motions.size(), 4u);
     int found = 0;
     for (const PlaneMotion& motion : motions) {
-      // Every reading makes the same homography.
+      // Every decomposition must give the same homography.
       EXPECT_LT((TrueHomography(motion.b_from_a, motion.normal_in_a, 1) - *homography).norm(), 1e-6);
       found += IsNear(motion.b_from_a, {b_from_a.rotation, b_from_a.translation / 2}, 1e-6, 1e-6) &&
                (motion.normal_in_a - normal).norm() < 1e-5;
@@ -134,18 +134,19 @@ TEST(Homography, OfARotationHasNoPlane) {
   EXPECT_TRUE(DecomposeHomography(Rotation3::Exp({0.1, 0.2, -0.1}).matrix()).empty());
 }
 
-TEST(Homography, PairsOnALineDetermineNone) {
+TEST(Homography, PairsOnALineDoNotDetermineIt) {
   std::vector<Eigen::Vector3d> rays;
   for (int i = 0; i < 4; ++i) rays.push_back(Eigen::Vector3d(0.1 * i, 0, 1).normalized());
   EXPECT_FALSE(SolveFourPoint(First<4>(rays), First<4>(rays)));
   EXPECT_FALSE(FitHomography(rays, rays));
 }
 
-// The three residuals are comparable: with the true model, one sigma^2 an essential matrix, two the others.
-TEST(TwoViewModels, ResidualsOfTheTrueModelShowTheNoise) {
+// The three kinds of residuals are comparable: for the true model, sigma^2 for an essential matrix and 2
+// sigma^2 for the others.
+TEST(TwoViewModels, ResidualsOfTheTrueModelEqualTheNoise) {
   constexpr double kNoise = 0.7;
   Random random(5);
-  // A narrow view of the middle, where a pixel covers pixel_angle.
+  // A narrow view of the centre, where a pixel subtends pixel_angle.
   const auto middle = [](const TwoViews& views) {
     std::vector<Eigen::Vector3d> a, b;
     for (std::size_t i = 0; i < views.rays_in_a.size(); ++i) {
@@ -160,18 +161,18 @@ TEST(TwoViewModels, ResidualsOfTheTrueModelShowTheNoise) {
   const Eigen::Vector3d normal(0.1, -0.1, 1);
   const RayPairs room = middle(MakeTwoViews(Volume(2, 6), motion, options, &random));
   const RayPairs plane = middle(MakeTwoViews(OnPlane(normal, 2), motion, options, &random));
-  const Rigid3 turn = Motion({0, 0, 0}, {1, -2, 5});
-  const RayPairs turned = middle(MakeTwoViews(Volume(2, 6), turn, options, &random));
+  const Rigid3 rotation = Motion({0, 0, 0}, {1, -2, 5});
+  const RayPairs rotated = middle(MakeTwoViews(Volume(2, 6), rotation, options, &random));
   ASSERT_GT(room.size(), 1000);
   EXPECT_NEAR(EssentialResiduals(room, EssentialFromPose(motion)).mean(), kNoise * kNoise,
               0.06 * kNoise * kNoise);
   EXPECT_NEAR(HomographyResiduals(plane, TrueHomography(motion, normal, 2)).mean(), 2 * kNoise * kNoise,
               0.15 * kNoise * kNoise);
-  EXPECT_NEAR(RotationResiduals(turned, turn.rotation.matrix()).mean(), 2 * kNoise * kNoise,
+  EXPECT_NEAR(RotationResiduals(rotated, rotation.rotation.matrix()).mean(), 2 * kNoise * kNoise,
               0.12 * kNoise * kNoise);
 }
 
-TEST(TwoViewModels, RefinementsComeBackFromADisturbedStart) {
+TEST(TwoViewModels, RefinementsReturnToTheTruthFromADisturbedStart) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
     Rigid3 motion = Motion({0.3, 0.1, 0.05}, {1, 4, -2});
@@ -195,15 +196,15 @@ TEST(TwoViewModels, RefinementsComeBackFromADisturbedStart) {
   }
 }
 
-TEST(TwoViewModels, RotationFitsItsPairsAndIgnoresThoseWithoutWeight) {
+TEST(TwoViewModels, RotationFitIgnoresPairsWithoutWeight) {
   Random random(9);
-  const Rigid3 turn = Motion({0, 0, 0}, {4, -7, 12});
+  const Rigid3 rotation = Motion({0, 0, 0}, {4, -7, 12});
   const TwoViews views =
-      MakeTwoViews(Volume(2, 6), turn, {.count = 100, .noise_px = 0, .outlier_ratio = 0.3}, &random);
+      MakeTwoViews(Volume(2, 6), rotation, {.count = 100, .noise_px = 0, .outlier_ratio = 0.3}, &random);
   const RayPairs pairs = MakeRayPairs(views.rays_in_a, views.rays_in_b, 1 / kFocal);
   Weights weights(pairs.size());
   for (Eigen::Index i = 0; i < pairs.size(); ++i) weights[i] = views.correct[static_cast<std::size_t>(i)];
-  EXPECT_LT((FitRotation(pairs, weights) - turn.rotation.matrix()).norm(), 1e-9);
+  EXPECT_LT((FitRotation(pairs, weights) - rotation.rotation.matrix()).norm(), 1e-9);
 }
 
 }  // namespace

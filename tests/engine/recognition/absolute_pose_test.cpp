@@ -25,7 +25,7 @@ Rigid3 RandomPose(Random* random) {
   return {Rotation3::Exp(random->Uniform(0, kPi) * RandomDirection(random)), 3 * RandomDirection(random)};
 }
 
-// in_camera(random): a point in the camera frame.
+// in_camera(random) returns a random point in the camera frame.
 template <class InCamera>
 View MakeView(int count, double noise_px, double outlier_ratio, Random* random, const InCamera& in_camera) {
   View view;
@@ -46,7 +46,7 @@ View MakeView(int count, double noise_px, double outlier_ratio, Random* random, 
 Eigen::Vector3d InVolume(Random* random) {
   return random->Uniform(1, 4) * RayOfPixel(RandomPixel(random));
 }
-Eigen::Vector3d OnTable(Random* random) {
+Eigen::Vector3d OnPlane(Random* random) {
   const Eigen::Vector3d ray = RayOfPixel(RandomPixel(random));
   return 1.2 / Eigen::Vector3d(0, 0.6, 0.8).dot(ray) * ray;
 }
@@ -55,7 +55,7 @@ double CenterError(const Rigid3& a, const Rigid3& b) {
   return (a.OriginInSource() - b.OriginInSource()).norm();
 }
 
-TEST(ThreePoints, OneOfThePosesIsTheTrueOneAndAllFitExactly) {
+TEST(ThreePoints, SolutionsIncludeTheTruePoseAndAllFitExactly) {
   int found = 0;
   constexpr int kTrials = 2000;
   for (int trial = 0; trial < kTrials; ++trial) {
@@ -73,11 +73,11 @@ TEST(ThreePoints, OneOfThePosesIsTheTrueOneAndAllFitExactly) {
     }
     found += is_there;
   }
-  // Where the quartic's root is nearly double the last digits go; RANSAC draws another sample.
+  // A nearly double root of the quartic loses precision; RANSAC then draws another sample.
   EXPECT_GE(found, kTrials * 995 / 1000);
 }
 
-TEST(ThreePoints, SymmetricViewsWhoseQuotientVanishesAreSolved) {
+TEST(ThreePoints, SolvesSymmetricViewsWithAZeroDenominator) {
   std::array<Eigen::Vector3d, 3> points, rays;
   const Rigid3 camera_from_map(Rotation3(), {0, 0, 2});
   for (std::size_t i = 0; i < 3; ++i) {
@@ -91,7 +91,7 @@ TEST(ThreePoints, SymmetricViewsWhoseQuotientVanishesAreSolved) {
   EXPECT_TRUE(is_there);
 }
 
-TEST(ThreePoints, PointsOnALineHaveNoPose) {
+TEST(ThreePoints, CollinearPointsHaveNoPose) {
   const std::array<Eigen::Vector3d, 3> points = {Eigen::Vector3d(0, 0, 2), Eigen::Vector3d(0.5, 0, 2),
                                                  Eigen::Vector3d(1, 0, 2)};
   std::array<Eigen::Vector3d, 3> rays;
@@ -105,11 +105,11 @@ TEST(ThreePoints, PointsOnALineHaveNoPose) {
 
 class AbsolutePoseWithOutliers : public testing::TestWithParam<double> {};
 
-TEST_P(AbsolutePoseWithOutliers, IsFoundInVolumesAndOnTables) {
+TEST_P(AbsolutePoseWithOutliers, IsFoundForPointsInVolumesAndOnPlanes) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     for (const bool table : {false, true}) {
       Random random(seed);
-      const View view = MakeView(120, 1.0, GetParam(), &random, table ? OnTable : InVolume);
+      const View view = MakeView(120, 1.0, GetParam(), &random, table ? OnPlane : InVolume);
       const auto pose = EstimateAbsolutePose(view.rays, view.points, {.max_iterations = 1000, .seed = seed});
       ASSERT_TRUE(pose) << seed;
       EXPECT_LT(RotationErrorDeg(pose->camera_from_map, view.camera_from_map), 0.3) << seed << table;
@@ -140,7 +140,7 @@ TEST(AbsolutePose, WithoutNoiseIsExact) {
   EXPECT_EQ(pose->inlier_count, 20);
 }
 
-TEST(AbsolutePose, PointsBehindTheCameraAreNoInliers) {
+TEST(AbsolutePose, PointsBehindTheCameraAreNotInliers) {
   Random random(6);
   View view = MakeView(40, 0.3, 0, &random, InVolume);
   for (std::size_t i = 0; i < 10; ++i)
@@ -153,7 +153,7 @@ TEST(AbsolutePose, PointsBehindTheCameraAreNoInliers) {
   EXPECT_LT(CenterError(pose->camera_from_map, view.camera_from_map), 0.01);
 }
 
-TEST(AbsolutePose, WrongMatchesAloneGiveNone) {
+TEST(AbsolutePose, IsRejectedForWrongMatchesOnly) {
   int accepted = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Random random(seed);
@@ -163,7 +163,7 @@ TEST(AbsolutePose, WrongMatchesAloneGiveNone) {
   EXPECT_EQ(accepted, 0);
 }
 
-TEST(AbsolutePose, NeedsEnoughInliersByNumberAndByRatio) {
+TEST(AbsolutePose, RequiresAnInlierCountAndAnInlierRatio) {
   Random random(8);
   const View view = MakeView(50, 0.5, 0.5, &random, InVolume);
   EXPECT_TRUE(EstimateAbsolutePose(view.rays, view.points, {.min_inliers = 15}));
@@ -175,7 +175,7 @@ TEST(AbsolutePose, NeedsEnoughInliersByNumberAndByRatio) {
   EXPECT_FALSE(EstimateAbsolutePose(three_rays, three_points, {.min_inliers = 3}));
 }
 
-TEST(AbsolutePose, WhatIsNotFiniteTakesNoPart) {
+TEST(AbsolutePose, IgnoresNonFiniteInput) {
   Random random(9);
   View view = MakeView(40, 0.3, 0, &random, InVolume);
   view.rays[0].setZero();
@@ -188,7 +188,7 @@ TEST(AbsolutePose, WhatIsNotFiniteTakesNoPart) {
   EXPECT_LT(CenterError(pose->camera_from_map, view.camera_from_map), 0.01);
 }
 
-TEST(AbsolutePose, IsTheSameForTheSameSeed) {
+TEST(AbsolutePose, IsDeterministicForAGivenSeed) {
   Random random(10);
   const View view = MakeView(100, 1.0, 0.5, &random, InVolume);
   const auto first = EstimateAbsolutePose(view.rays, view.points, {.seed = 4});
@@ -200,7 +200,7 @@ TEST(AbsolutePose, IsTheSameForTheSameSeed) {
   EXPECT_EQ(first->inlier, second->inlier);
 }
 
-TEST(RefineAbsolutePose, ComesBackFromADisturbedStartAndResistsAFewOutliers) {
+TEST(RefineAbsolutePose, ConvergesFromAPerturbedPoseDespiteAFewOutliers) {
   Random random(11);
   View view = MakeView(60, 0.5, 0.05, &random, InVolume);
   const Rigid3 start =

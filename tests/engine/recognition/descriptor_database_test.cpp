@@ -22,22 +22,22 @@ using Entry = DescriptorDatabase::Entry;
 using Match = DescriptorDatabase::Match;
 using Vote = DescriptorDatabase::Vote;
 
-// A map's worth of points with a look of their own.
-class Appearance {
+// The distinct descriptors of the points of a made-up map.
+class PointDescriptors {
  public:
-  explicit Appearance(std::size_t points) {
+  explicit PointDescriptors(std::size_t points) {
     Random random(21);
-    for (std::size_t i = 0; i < points; ++i) looks_.push_back(MadeDescriptor(&random));
+    for (std::size_t i = 0; i < points; ++i) descriptors_.push_back(MadeDescriptor(&random));
   }
-  const Descriptor& operator[](std::size_t point) const { return looks_[point]; }
+  const Descriptor& operator[](std::size_t point) const { return descriptors_[point]; }
 
-  // A keyframe that sees points first, first + step ...
+  // The entries of a keyframe that observes the points from `first` to `first + count - 1`.
   std::vector<Entry> KeyFrame(KeyFrameId id, std::size_t first, std::size_t count, int noise = 6) const {
     Random random(1000 + id);
     std::vector<Entry> entries;
     for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t point = (first + i) % looks_.size();
-      entries.push_back({Disturbed(looks_[point], noise, &random), id, static_cast<MapPointId>(point),
+      const std::size_t point = (first + i) % descriptors_.size();
+      entries.push_back({Disturbed(descriptors_[point], noise, &random), id, static_cast<MapPointId>(point),
                          Eigen::Vector2f(static_cast<float>(random.Below(640)), 3),
                          static_cast<std::uint8_t>(random.Below(4))});
     }
@@ -45,11 +45,11 @@ class Appearance {
   }
 
  private:
-  std::vector<Descriptor> looks_;
+  std::vector<Descriptor> descriptors_;
 };
-const Appearance& Points() {
-  static const Appearance looks(2000);
-  return looks;
+const PointDescriptors& Points() {
+  static const PointDescriptors descriptors(2000);
+  return descriptors;
 }
 
 void AddAll(const std::vector<Entry>& entries, DescriptorDatabase* database) {
@@ -62,7 +62,7 @@ std::vector<Descriptor> DescriptorsOf(const std::vector<Entry>& entries) {
   return descriptors;
 }
 
-void ExpectSameAnswers(const DescriptorDatabase& a, const DescriptorDatabase& b) {
+void ExpectSameResults(const DescriptorDatabase& a, const DescriptorDatabase& b) {
   const std::vector<Descriptor> queries = DescriptorsOf(Points().KeyFrame(999, 150, 300, 10));
   for (const bool each_keyframe : {false, true}) {
     DescriptorDatabase::MatchOptions options;
@@ -83,13 +83,13 @@ void ExpectSameAnswers(const DescriptorDatabase& a, const DescriptorDatabase& b)
   }
 }
 
-TEST(DescriptorDatabase, IsAsBeforeAfterKeyFramesWereAddedAndRemoved) {
+TEST(DescriptorDatabase, IsRestoredByRemovingAddedKeyFrames) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     Random random(seed);
     DescriptorDatabase database(MadeTree());
     for (KeyFrameId id = 0; id < 6; ++id) AddAll(Points().KeyFrame(id, 60 * id, 150), &database);
     const DescriptorDatabase before = database;
-    // The entries of several come mixed, and some of the old ones go away and return.
+    // The entries of several keyframes are added interleaved, and an old keyframe is removed and added again.
     std::vector<Entry> fresh;
     for (KeyFrameId id = 100; id < 105; ++id) {
       const auto entries = Points().KeyFrame(id, random.Below(2000), 50 + random.Below(200));
@@ -98,22 +98,22 @@ TEST(DescriptorDatabase, IsAsBeforeAfterKeyFramesWereAddedAndRemoved) {
     for (std::size_t i = fresh.size(); i > 1; --i)
       std::swap(fresh[i - 1], fresh[random.Below(static_cast<std::uint32_t>(i))]);
     AddAll(fresh, &database);
-    const KeyFrameId gone = random.Below(6);
-    database.RemoveKeyFrame(gone);
+    const KeyFrameId removed = random.Below(6);
+    database.RemoveKeyFrame(removed);
     EXPECT_FALSE(database == before);
-    EXPECT_FALSE(database.Contains(gone));
+    EXPECT_FALSE(database.Contains(removed));
     std::vector<KeyFrameId> order = {100, 101, 102, 103, 104};
     for (std::size_t i = order.size(); i > 1; --i)
       std::swap(order[i - 1], order[random.Below(static_cast<std::uint32_t>(i))]);
     for (const KeyFrameId id : order) database.RemoveKeyFrame(id);
-    AddAll(Points().KeyFrame(gone, 60 * gone, 150), &database);
+    AddAll(Points().KeyFrame(removed, 60 * removed, 150), &database);
     EXPECT_TRUE(database == before);
     EXPECT_EQ(database.size(), before.size());
-    ExpectSameAnswers(database, before);
+    ExpectSameResults(database, before);
   }
 }
 
-TEST(DescriptorDatabase, HoldsWhatARandomHistoryLeaves) {
+TEST(DescriptorDatabase, MatchesTheExpectedEntriesAfterRandomChanges) {
   Random random(5);
   DescriptorDatabase database(MadeTree());
   std::vector<Entry> expected;
@@ -152,7 +152,7 @@ TEST(DescriptorDatabase, HoldsWhatARandomHistoryLeaves) {
   EXPECT_TRUE(database == DescriptorDatabase(MadeTree()));
 }
 
-TEST(DescriptorDatabase, ComparesEveryPartOfItsEntries) {
+TEST(DescriptorDatabase, EqualityComparesEveryFieldOfItsEntries) {
   const Entry entry{Points()[0], 1, 2, {3, 4}, 1};
   std::vector<Entry> others(5, entry);
   others[0].descriptor = Points()[1];
@@ -169,7 +169,7 @@ TEST(DescriptorDatabase, ComparesEveryPartOfItsEntries) {
   }
 }
 
-TEST(DescriptorMatches, LeadToThePointThatLooksTheSame) {
+TEST(DescriptorMatches, FindThePointWithTheMostSimilarDescriptor) {
   DescriptorDatabase database(MadeTree());
   for (KeyFrameId id = 0; id < 10; ++id) AddAll(Points().KeyFrame(id, 100 * id, 300), &database);
   const std::vector<Entry> seen = Points().KeyFrame(50, 200, 400);
@@ -186,7 +186,7 @@ TEST(DescriptorMatches, LeadToThePointThatLooksTheSame) {
   }
 }
 
-TEST(DescriptorMatches, AreTheNearestOfAllEntriesMostOften) {
+TEST(DescriptorMatches, AreUsuallyTheNearestOfAllEntries) {
   DescriptorDatabase database(MadeTree());
   std::vector<Entry> all;
   for (KeyFrameId id = 0; id < 4; ++id) {
@@ -209,18 +209,18 @@ TEST(DescriptorMatches, AreTheNearestOfAllEntriesMostOften) {
   EXPECT_GT(exact, 270u);
 }
 
-TEST(DescriptorMatches, AreRefusedWhereTwoPointsLookAlike) {
+TEST(DescriptorMatches, AreRejectedWhereTwoPointsAreSimilar) {
   DescriptorDatabase database(MadeTree());
   Random random(8);
   database.Add({Disturbed(Points()[0], 3, &random), 1, 10, {1, 1}, 0});
   const Descriptor query = Disturbed(Points()[0], 3, &random);
   EXPECT_EQ(database.FindMatches(std::span(&query, 1), {}).size(), 1u);
-  // The same point seen again leaves no doubt, another one does.
+  // A second observation of the same point is not ambiguous, another point is.
   database.Add({Disturbed(Points()[0], 3, &random), 2, 10, {1, 1}, 0});
   EXPECT_EQ(database.FindMatches(std::span(&query, 1), {}).size(), 1u);
   database.Add({Disturbed(Points()[0], 3, &random), 3, 11, {1, 1}, 0});
   EXPECT_EQ(database.FindMatches(std::span(&query, 1), {}).size(), 0u);
-  // In each keyframe by itself there is one.
+  // Within each single keyframe there is one unambiguous match.
   DescriptorDatabase::MatchOptions options;
   options.each_keyframe = true;
   const auto matches = database.FindMatches(std::span(&query, 1), options);
@@ -235,13 +235,14 @@ TEST(DescriptorMatches, AreRefusedWhereTwoPointsLookAlike) {
   EXPECT_EQ(only[0].entry.point, 11u);
 }
 
-TEST(DescriptorMatches, GiveAPointToTheNearestDescriptorAlone) {
+TEST(DescriptorMatches, AssignAPointToTheNearestDescriptorOnly) {
   DescriptorDatabase database(MadeTree());
   Random random(9);
-  const Descriptor look = Points()[5];
-  database.Add({look, 1, 10, {1, 1}, 0});
-  const std::vector<Descriptor> queries = {Disturbed(look, 5, &random), Disturbed(look, 1, &random),
-                                           Disturbed(look, 7, &random)};
+  const Descriptor descriptor = Points()[5];
+  database.Add({descriptor, 1, 10, {1, 1}, 0});
+  const std::vector<Descriptor> queries = {Disturbed(descriptor, 5, &random),
+                                           Disturbed(descriptor, 1, &random),
+                                           Disturbed(descriptor, 7, &random)};
   for (const bool mutual : {false, true}) {
     DescriptorDatabase::MatchOptions options;
     options.mutual = mutual;
@@ -251,7 +252,7 @@ TEST(DescriptorMatches, GiveAPointToTheNearestDescriptorAlone) {
   }
 }
 
-TEST(DescriptorMatches, AreNotMadeForWhatLooksLikeNothingThere) {
+TEST(DescriptorMatches, AreNotFoundForUnknownDescriptors) {
   DescriptorDatabase database(MadeTree());
   AddAll(Points().KeyFrame(1, 0, 500), &database);
   const auto matches = database.FindMatches(DescriptorsOf(Points().KeyFrame(2, 1000, 500)), {});
@@ -260,10 +261,10 @@ TEST(DescriptorMatches, AreNotMadeForWhatLooksLikeNothingThere) {
   EXPECT_TRUE(database.FindMatches({}, {}).empty());
 }
 
-TEST(KeyFrameVotes, RankKeyFramesByWhatTheyShare) {
+TEST(KeyFrameVotes, RankKeyFramesBySharedPoints) {
   DescriptorDatabase database(MadeTree());
   for (KeyFrameId id = 0; id < 10; ++id) AddAll(Points().KeyFrame(id, 100 * id, 200), &database);
-  // Appearance like a place between keyframes 4 (three quarters) and 5 (three quarters less a little).
+  // The query shares 80 % of its points with keyframe 4 and 70 % with keyframe 5.
   const auto votes = database.FindKeyFrames(DescriptorsOf(Points().KeyFrame(50, 440, 200)), 3);
   ASSERT_EQ(votes.size(), 3u);
   EXPECT_EQ(votes[0].keyframe, 4u);
@@ -271,7 +272,7 @@ TEST(KeyFrameVotes, RankKeyFramesByWhatTheyShare) {
   EXPECT_GT(votes[1].score, 1.5 * votes[2].score);
 }
 
-TEST(KeyFrameVotes, GiveAKeyFrameItselfTheFullScore) {
+TEST(KeyFrameVotes, ScoreAnIdenticalKeyFrameOne) {
   DescriptorDatabase database(MadeTree());
   for (KeyFrameId id = 0; id < 5; ++id) AddAll(Points().KeyFrame(id, 50 * id, 200), &database);
   const std::vector<Descriptor> own = DescriptorsOf(Points().KeyFrame(3, 150, 200));
@@ -287,7 +288,7 @@ TEST(KeyFrameVotes, GiveAKeyFrameItselfTheFullScore) {
   EXPECT_TRUE(database.FindKeyFrames({}, 10).empty());
 }
 
-TEST(KeyFrameVotes, CountWhatIsCommonForLess) {
+TEST(KeyFrameVotes, WeightCommonWordsLess) {
   DescriptorDatabase database(MadeTree());
   // All keyframes share points 0 to 99; each has a hundred of its own.
   for (KeyFrameId id = 0; id < 8; ++id) {
@@ -301,12 +302,12 @@ TEST(KeyFrameVotes, CountWhatIsCommonForLess) {
   const auto votes = database.FindKeyFrames(DescriptorsOf(seen), 2);
   ASSERT_EQ(votes.size(), 2u);
   EXPECT_EQ(votes[0].keyframe, 3u);
-  // By counting alone the others would reach half of its score.
+  // Without weights the other keyframes would reach half of its score.
   EXPECT_LT(votes[1].score, 0.4 * votes[0].score);
   EXPECT_EQ(common.size(), 1u);
 }
 
-TEST(DescribedObservations, AreFoundFromAnotherPlaceAndTwiceAsFarAway) {
+TEST(DescribedObservations, AreFoundFromAnotherPlaceAndFromTwiceTheDistance) {
   const auto world = testing_world::RenderedWorld::SingleWall(2, 4);
   const auto camera = testing_world::PinholeCamera(640, 480);
   const Rigid3 pose = testing_world::CameraAt({0, 0, 0});
@@ -320,7 +321,7 @@ TEST(DescribedObservations, AreFoundFromAnotherPlaceAndTwiceAsFarAway) {
                               testing_world::CameraAt({0, 0.1, -1.8}, {0, 0, -20})}) {
     const auto places = DescribeCorners(*MakeFeatures(world.Render(*camera, other, 1.5)));
     std::vector<Descriptor> queries;
-    for (const DescribedPlace& place : places) queries.push_back(place.oriented.descriptor);
+    for (const DescribedKeypoint& place : places) queries.push_back(place.oriented.descriptor);
     const auto matches = database.FindMatches(queries, {});
     int right = 0;
     for (const Match& match : matches) {
@@ -332,10 +333,10 @@ TEST(DescribedObservations, AreFoundFromAnotherPlaceAndTwiceAsFarAway) {
       right += expected && (expected->cast<float>() - places[match.query].pixel).norm() <
                                static_cast<float>(3 << places[match.query].level);
     }
-    EXPECT_GT(right, 20);  // a pose needs eight
+    EXPECT_GT(right, 20);  // a pose needs eight matches
     EXPECT_GT(right, static_cast<int>(matches.size()) / 2) << matches.size();
   }
-  // What the map forgets, the database forgets with it.
+  // Removing every observation leaves the database empty.
   for (const Observation& observation : record.observations)
     database.RemoveObservation(observation.keyframe, observation.point);
   EXPECT_EQ(database.size(), 0u);

@@ -10,10 +10,10 @@
 #include "engine/base/random.h"
 #include "engine/recognition/vocabulary_tree.h"
 
-// Descriptors made of random numbers, for the tests of whatever sorts and finds them.
+// Random descriptors for the tests of the vocabulary and of descriptor matching.
 namespace docent::engine::testing_descriptors {
 
-// Of the usual length, each element its own.
+// A random descriptor of the standard length.
 inline Descriptor MadeDescriptor(Random* random) {
   std::array<double, kDescriptorSize> values;
   double squared = 0;
@@ -29,21 +29,22 @@ inline Descriptor MadeDescriptor(Random* random) {
   return descriptor;
 }
 
-// With up to `most` more or less on each element.
-inline Descriptor Disturbed(Descriptor descriptor, int most, Random* random) {
+// Each element changed by up to `max_change`.
+inline Descriptor Disturbed(Descriptor descriptor, int max_change, Random* random) {
   for (std::uint8_t& value : descriptor.values) {
-    const int change = static_cast<int>(random->Below(static_cast<std::uint32_t>(2 * most + 1))) - most;
+    const int change =
+        static_cast<int>(random->Below(static_cast<std::uint32_t>(2 * max_change + 1))) - max_change;
     value = static_cast<std::uint8_t>(std::clamp(value + change, 0, 255));
   }
   return descriptor;
 }
 
-// `count` descriptors about `clusters` middles.
+// `count` descriptors around `clusters` cluster centres.
 inline std::vector<Descriptor> Clustered(std::size_t count, std::size_t clusters, std::uint64_t seed) {
   Random random(seed);
-  std::vector<Descriptor> middles, descriptors;
-  for (std::size_t i = 0; i < clusters; ++i) middles.push_back(MadeDescriptor(&random));
-  for (std::size_t i = 0; i < count; ++i) descriptors.push_back(Disturbed(middles[i % clusters], 8, &random));
+  std::vector<Descriptor> centers, descriptors;
+  for (std::size_t i = 0; i < clusters; ++i) centers.push_back(MadeDescriptor(&random));
+  for (std::size_t i = 0; i < count; ++i) descriptors.push_back(Disturbed(centers[i % clusters], 8, &random));
   return descriptors;
 }
 

@@ -28,7 +28,7 @@ std::string ErrorOf(const std::vector<std::uint8_t>& bytes) {
   return {};
 }
 
-TEST(VocabularyTree, SpreadsItsTrainingOverTheLeaves) {
+TEST(VocabularyTree, DistributesTheTrainingDescriptorsOverTheLeaves) {
   const std::vector<Descriptor> training = Clustered(20000, 3000, 1);
   const VocabularyTree tree = VocabularyTree::Train(training, 1);
   std::vector<int> count(VocabularyTree::kLeaves);
@@ -41,7 +41,7 @@ TEST(VocabularyTree, SpreadsItsTrainingOverTheLeaves) {
   EXPECT_LT(*std::max_element(count.begin(), count.end()), 200);
 }
 
-TEST(VocabularyTree, PutsLikeDescriptorsIntoOneLeafAndOthersElsewhere) {
+TEST(VocabularyTree, AssignsSimilarDescriptorsToTheSameLeaf) {
   Random random(4);
   int same = 0, near = 0, chance = 0;
   const std::vector<Descriptor> descriptors = Clustered(1000, 1000, 9);
@@ -60,7 +60,7 @@ TEST(VocabularyTree, PutsLikeDescriptorsIntoOneLeafAndOthersElsewhere) {
   EXPECT_LT(chance, 20);
 }
 
-TEST(VocabularyTree, FollowsOneNodeAsTheDescentDoes) {
+TEST(VocabularyTree, NearestLeavesOfOneEqualsLeaf) {
   for (const Descriptor& descriptor : Clustered(300, 300, 5)) {
     std::array<std::uint32_t, 1> leaf;
     ASSERT_EQ(MadeTree().NearestLeaves(descriptor, leaf), 1u);
@@ -68,7 +68,7 @@ TEST(VocabularyTree, FollowsOneNodeAsTheDescentDoes) {
   }
 }
 
-TEST(VocabularyTree, NamesNearLeavesInOrderAndOnlyOnce) {
+TEST(VocabularyTree, ListsDistinctNearestLeavesInOrder) {
   for (const Descriptor& descriptor : Clustered(100, 100, 6)) {
     std::array<std::uint32_t, VocabularyTree::kMaxNearestLeaves> leaves;
     ASSERT_EQ(MadeTree().NearestLeaves(descriptor, leaves), leaves.size());
@@ -80,37 +80,38 @@ TEST(VocabularyTree, NamesNearLeavesInOrderAndOnlyOnce) {
   }
 }
 
-TEST(VocabularyTree, IsTheSameForTheSameSeedAndAnotherForAnother) {
+TEST(VocabularyTree, IsReproducibleForASeedAndDiffersForAnother) {
   const std::vector<Descriptor> training = Clustered(17000, 2000, 2);
   const VocabularyTree tree = VocabularyTree::Train(training, 7);
   EXPECT_EQ(tree, VocabularyTree::Train(training, 7));
   EXPECT_FALSE(tree == VocabularyTree::Train(training, 8));
 }
 
-TEST(VocabularyTree, TellsHowFarTrainingHasCome) {
-  std::vector<std::size_t> told;
-  VocabularyTree::Train(Clustered(17000, 100, 2), 1, [&](std::size_t settled) { told.push_back(settled); });
-  ASSERT_FALSE(told.empty());
-  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
-  EXPECT_EQ(told.back(), VocabularyTree::kCenters);
+TEST(VocabularyTree, ReportsTrainingProgress) {
+  std::vector<std::size_t> reports;
+  VocabularyTree::Train(Clustered(17000, 100, 2), 1,
+                        [&](std::size_t finished_centers) { reports.push_back(finished_centers); });
+  ASSERT_FALSE(reports.empty());
+  EXPECT_TRUE(std::is_sorted(reports.begin(), reports.end()));
+  EXPECT_EQ(reports.back(), VocabularyTree::kCenters);
 }
 
-TEST(VocabularyTree, NeedsEnoughDescriptorsButNotDifferentOnes) {
+TEST(VocabularyTree, NeedsEnoughDescriptorsButAcceptsEqualOnes) {
   EXPECT_THROW(VocabularyTree::Train(Clustered(16383, 1000, 1), 1), Error);
-  const std::vector<Descriptor> alike(VocabularyTree::kMinTraining, Clustered(1, 1, 3)[0]);
-  const VocabularyTree tree = VocabularyTree::Train(alike, 1);
-  EXPECT_EQ(tree.LeafCenter(tree.Leaf(alike[0])), alike[0]);
+  const std::vector<Descriptor> equal_descriptors(VocabularyTree::kMinTraining, Clustered(1, 1, 3)[0]);
+  const VocabularyTree tree = VocabularyTree::Train(equal_descriptors, 1);
+  EXPECT_EQ(tree.LeafCenter(tree.Leaf(equal_descriptors[0])), equal_descriptors[0]);
 }
 
-TEST(VocabularyBytes, ComeBackAsTheSameTree) {
+TEST(VocabularyBytes, RoundTripToTheSameTree) {
   const std::vector<std::uint8_t> bytes = MadeTree().ToBytes();
   EXPECT_EQ(bytes.size(), VocabularyTree::kBytes);
   EXPECT_EQ(VocabularyTree::FromBytes(bytes), MadeTree());
 }
 
-TEST(VocabularyBytes, AreNotBelievedWhenAnythingIsWrong) {
+TEST(VocabularyBytes, AreRejectedWhenDamaged) {
   const std::vector<std::uint8_t> bytes = MadeTree().ToBytes();
-  EXPECT_THAT(ErrorOf({}), ::testing::HasSubstr("no vocabulary"));
+  EXPECT_THAT(ErrorOf({}), ::testing::HasSubstr("not a vocabulary"));
   for (const std::size_t size : {std::size_t{3}, std::size_t{8}, std::size_t{1000}, bytes.size() - 1}) {
     EXPECT_NE(ErrorOf({bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size)}), "") << size;
   }
@@ -126,20 +127,20 @@ TEST(VocabularyBytes, AreNotBelievedWhenAnythingIsWrong) {
   }
 }
 
-// The descriptors of a world that it was not trained on.
+// Descriptors of a room that the vocabulary was not trained on.
 std::vector<Descriptor> DescriptorsOfARoom() {
   const auto camera = testing_world::PinholeCamera(640, 480);
   std::vector<Descriptor> descriptors;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const cv::Mat image =
         testing_world::RenderedWorld::Room(seed).Render(*camera, testing_world::CameraAt({0, 0, 0}), 1.5);
-    for (const DescribedPlace& place : DescribeCorners(*MakeFeatures(image)))
+    for (const DescribedKeypoint& place : DescribeCorners(*MakeFeatures(image)))
       descriptors.push_back(place.oriented.descriptor);
   }
   return descriptors;
 }
 
-TEST(DefaultVocabulary, TellsAnImagesCornersApart) {
+TEST(DefaultVocabulary, DistinguishesTheKeypointsOfAnImage) {
   std::set<std::uint32_t> leaves;
   double centre_distance = 0;
   const std::vector<Descriptor> descriptors = DescriptorsOfARoom();

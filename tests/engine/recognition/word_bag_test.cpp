@@ -11,7 +11,7 @@
 namespace docent::engine {
 namespace {
 
-TEST(WordBag, CountsEachLeafOnceInOrder) {
+TEST(WordBag, ListsEachLeafOnceInOrderWithItsCount) {
   const WordBag bag = MakeWordBag({9, 4095, 9, 0, 9});
   ASSERT_EQ(bag.size(), 3u);
   EXPECT_EQ(bag[0], VisualWord(0, 1));
@@ -23,7 +23,7 @@ TEST(WordBag, CountsEachLeafOnceInOrder) {
   EXPECT_EQ(MakeWordBag(std::vector<std::uint32_t>(100, 7)).at(0).count(), VisualWord::kMaxCount);
 }
 
-TEST(WordBag, AWordIsItsTwoBytes) {
+TEST(WordBag, AWordIsStoredInTwoBytes) {
   for (const std::uint32_t leaf : {0u, 1u, 2048u, 4095u}) {
     for (int count = 1; count <= VisualWord::kMaxCount; ++count) {
       const VisualWord word(leaf, count);
@@ -34,7 +34,7 @@ TEST(WordBag, AWordIsItsTwoBytes) {
   }
 }
 
-// Blobs on a grey ground, in the middle of the image, so that nothing leaves it when it is turned.
+// Blobs on a grey background near the image centre, so that none leaves the image when it is rotated.
 cv::Mat Blobs(std::uint64_t seed) {
   Random random(seed);
   cv::Mat image(480, 640, CV_8UC1, cv::Scalar(128));
@@ -48,8 +48,8 @@ cv::Mat Blobs(std::uint64_t seed) {
   return image;
 }
 
-// What part of the words two bags share.
-double Shared(const WordBag& a, const WordBag& b) {
+// The ratio of the words of `a` that `b` contains too.
+double SharedRatio(const WordBag& a, const WordBag& b) {
   double shared = 0, all = 0;
   for (const VisualWord& word : a) {
     all += word.count();
@@ -59,20 +59,20 @@ double Shared(const WordBag& a, const WordBag& b) {
   return shared / all;
 }
 
-TEST(WordBag, MostWordsStayWhenTheImageTurnsOrDarkensAndFewAreThoseOfAnother) {
+TEST(WordBag, IsSimilarForARotatedOrDarkerImageAndNotForAnother) {
   const cv::Mat image = Blobs(1);
   const WordBag bag = MakeWordBag(*MakeFeatures(image));
   EXPECT_GT(bag.size(), 80u);
   EXPECT_EQ(MakeWordBag(*MakeFeatures(image)), bag);
-  const double other = Shared(bag, MakeWordBag(*MakeFeatures(Blobs(2))));
-  cv::Mat turned, dark;
-  cv::rotate(image, turned, cv::ROTATE_180);
+  const double other = SharedRatio(bag, MakeWordBag(*MakeFeatures(Blobs(2))));
+  cv::Mat rotated, dark;
+  cv::rotate(image, rotated, cv::ROTATE_180);
   image.convertTo(dark, CV_8U, 0.5, 5);
-  EXPECT_GT(Shared(bag, MakeWordBag(*MakeFeatures(turned))), 1.5 * other);
-  EXPECT_GT(Shared(bag, MakeWordBag(*MakeFeatures(dark))), 2 * other);
+  EXPECT_GT(SharedRatio(bag, MakeWordBag(*MakeFeatures(rotated))), 1.5 * other);
+  EXPECT_GT(SharedRatio(bag, MakeWordBag(*MakeFeatures(dark))), 2 * other);
 }
 
-TEST(WordBag, AImageWithoutTextureHasNone) {
+TEST(WordBag, IsEmptyForAnImageWithoutTexture) {
   EXPECT_TRUE(MakeWordBag(*MakeFeatures(cv::Mat(480, 640, CV_8UC1, cv::Scalar(90)))).empty());
 }
 

@@ -10,8 +10,8 @@
 #include "tests/engine/lockstep.h"
 #include "tests/engine/mapping/panorama_scene.h"
 
-// A tracker that knows panorama maps, and its mapper, on images of a painted room: an instant start, a
-// walk, a turn on the spot far beyond what the walk has seen, and the way back.
+// Runs a tracker with panorama maps, and its mapper, on images of a synthetic room: immediate initialization,
+// a walk, a pure rotation far beyond the field of view of the walk, and the way back.
 namespace docent::engine {
 namespace {
 
@@ -24,7 +24,8 @@ constexpr int kTurnBegins = kStill + kWalk, kTurnEnds = kTurnBegins + 2 * kTurn 
 constexpr int kFrames = kTurnEnds + kWalkAgain;
 constexpr double kDepth = 3;  // metres to the walls
 
-// Ahead, out to the side and back to the centre; then 110 degrees to the right on the spot, and back.
+// The camera moves forwards, sideways and back to the centre, then rotates by 110 degrees to the right
+// without translation, and back.
 Rigid3 Pose(int frame) {
   const auto walk = [](double part) {
     const double angle = 2 * std::numbers::pi * part;
@@ -87,29 +88,29 @@ const Tour& HybridTour() {
   return tour;
 }
 
-int FirstWithDepth(const Tour& tour) {
+int FirstFrameWithDepth(const Tour& tour) {
   int first = 0;
   while (first < kFrames && !(tour.At(first).map && tour.At(first).map->HasFinitePoints())) ++first;
   return first;
 }
 
-TEST(HybridTracker, StartsWithTheFirstImage) {
+TEST(HybridTracker, TracksFromTheFirstImage) {
   const Tour& tour = HybridTour();
   EXPECT_EQ(tour.At(0).state, TrackingState::kInitializing);
   for (int i = 1; i < kStill; ++i) {
     ASSERT_EQ(tour.At(i).state, TrackingState::kPanorama) << i;
     EXPECT_EQ(tour.At(i).finite_points, 0);
     EXPECT_GT(tour.At(i).infinite_points, 50);
-    // It stands where it began, and looks the way it did.
+    // The camera has neither moved nor rotated.
     EXPECT_LT(tour.At(i).camera_from_map.OriginInSource().norm(), 1e-9) << i;
     EXPECT_LT(tour.At(i).camera_from_map.rotation.Angle(), 0.05 * std::numbers::pi / 180) << i;
   }
   EXPECT_EQ(tour.events.front().kind, MapperEvent::Kind::kPanoramaOpened);
 }
 
-TEST(HybridTracker, GainsDepthWithoutLosingAFrameOrAKeyframe) {
+TEST(HybridTracker, GainsDepthWithoutLosingFramesOrKeyframes) {
   const Tour& tour = HybridTour();
-  const int first = FirstWithDepth(tour);
+  const int first = FirstFrameWithDepth(tour);
   ASSERT_LT(first, kStill + kWalk / 2);
   ASSERT_GT(first, kStill) << "no depth without parallax";
   for (int i = 1; i < kTurnBegins; ++i) {
@@ -125,9 +126,9 @@ TEST(HybridTracker, GainsDepthWithoutLosingAFrameOrAKeyframe) {
   }
 }
 
-TEST(HybridTracker, FollowsATurnOnTheSpotAndReturns) {
+TEST(HybridTracker, TracksAPureRotationAndReturns) {
   const Tour& tour = HybridTour();
-  const int first = FirstWithDepth(tour);
+  const int first = FirstFrameWithDepth(tour);
   ASSERT_LT(first, kTurnBegins);
   int lost = 0, by_directions = 0;
   for (int i = kTurnBegins; i < kFrames; ++i) {
@@ -137,7 +138,9 @@ TEST(HybridTracker, FollowsATurnOnTheSpotAndReturns) {
   }
   EXPECT_EQ(lost, 0);
   EXPECT_GT(by_directions, kTurn);
-  // Angles need no alignment: the turn since the walk's end, far out and after the return.
+  // Angles need no alignment with the truth. Checked are the rotation since the end of the walk at its
+  // maximum and
+  // after the return.
   const auto turn_error_deg = [&](int from, int to) {
     const Rotation3 tracked =
         tour.At(to).camera_from_map.rotation * tour.At(from).camera_from_map.rotation.inverse();
@@ -148,9 +151,9 @@ TEST(HybridTracker, FollowsATurnOnTheSpotAndReturns) {
   EXPECT_LT(turn_error_deg(kTurnBegins, kTurnEnds), 0.5);
 }
 
-TEST(HybridTracker, IsBackWhereItWasAfterTheTurn) {
+TEST(HybridTracker, KeepsItsPositionAccuracyAfterTheRotation) {
   const Tour& tour = HybridTour();
-  const int first = FirstWithDepth(tour);
+  const int first = FirstFrameWithDepth(tour);
   ASSERT_LT(first, kTurnBegins);
   std::vector<Eigen::Vector3d> in_map, in_truth;
   for (int i = first + 1; i < kTurnBegins; ++i) {
@@ -167,18 +170,19 @@ TEST(HybridTracker, IsBackWhereItWasAfterTheTurn) {
   }
 }
 
-TEST(HybridTracker, MakesAMapOfBothKinds) {
+TEST(HybridTracker, MakesAMapWithFiniteAndInfinitePoints) {
   const Tour& tour = HybridTour();
   ASSERT_NE(tour.map, nullptr);
   EXPECT_EQ(Validate(*tour.map), "");
   EXPECT_TRUE(tour.map->HasFinitePoints());
-  EXPECT_GE(tour.map->panoramas.size(), 2u) << "the start's, and the turn's";
+  EXPECT_GE(tour.map->panoramas.size(), 2u) << "one from the initialization, one from the rotation";
   int dependent = 0, infinite = 0;
   for (const KeyFrame& keyframe : tour.map->keyframes) dependent += keyframe.kind == KeyFrameKind::kPanorama;
   for (const MapPoint& point : tour.map->points) infinite += point.infinite();
   EXPECT_GT(dependent, 2);
   EXPECT_GT(infinite, 200);
-  // This camera turns about itself: dependent keyframes stand where their reference does, but for noise.
+  // This camera rotates about its own centre: dependent keyframes have the position of their reference, up to
+  // noise.
   for (const KeyFrame& keyframe : tour.map->keyframes) {
     if (keyframe.kind != KeyFrameKind::kPanorama) continue;
     const KeyFrame* reference = tour.map->FindKeyFrame(tour.map->FindPanorama(keyframe.panorama)->reference);
@@ -188,8 +192,8 @@ TEST(HybridTracker, MakesAMapOfBothKinds) {
   }
 }
 
-// Far out on the turn the camera walks ahead, where the map knows directions alone.
-TEST(HybridTracker, IsLostRatherThanTakeAWalkForATurn) {
+// At the maximum rotation, where the map has infinite points only, the camera starts to move forwards.
+TEST(HybridTracker, IsLostWhenTheCameraTranslatesWhereOnlyInfinitePointsAreMapped) {
   constexpr int kWalkBegins = kTurnBegins + kTurn + kHold, kWalkAhead = 40;
   const auto world = testing_world::Chamber(101);
   const Rigid3 turned = Pose(kWalkBegins);
@@ -201,12 +205,12 @@ TEST(HybridTracker, IsLostRatherThanTakeAWalkForATurn) {
     return testing_world::MakeFrame(index, world, pose);
   });
   EXPECT_EQ(tour.At(kWalkBegins - 1).state, TrackingState::kPanorama);
-  int lost = 0, told = 0;
+  int lost = 0, hints = 0;
   for (int i = kWalkBegins; i < kWalkBegins + kWalkAhead; ++i) {
     lost += tour.At(i).state == TrackingState::kLost;
-    told += tour.At(i).hint == "you have walked where nothing is mapped: look back";
+    hints += tour.At(i).hint == "You have left the mapped area: look back.";
     if (!HasPose(tour.At(i).state)) continue;
-    // Until then, nothing of the walk went into the direction.
+    // While there is a pose, the translation does not affect the rotation.
     EXPECT_LT(
         (tour.At(i).camera_from_map.rotation * tour.At(kWalkBegins - 1).camera_from_map.rotation.inverse())
             .Angle(),
@@ -214,10 +218,10 @@ TEST(HybridTracker, IsLostRatherThanTakeAWalkForATurn) {
         << i;
   }
   EXPECT_GT(lost, kWalkAhead / 2);
-  EXPECT_GE(told, 1);
+  EXPECT_GE(hints, 1);
 }
 
-TEST(PlainTracker, KnowsNoPanoramas) {
+TEST(PlainTracker, MakesNoPanoramaMaps) {
   const Tour tour = TakeTour(false);
   ASSERT_NE(tour.map, nullptr);
   EXPECT_TRUE(tour.map->panoramas.empty());

@@ -10,7 +10,7 @@ namespace {
 
 using testing_world::CameraAt;
 
-// Keyframes at these poses, each of which sees 200 points.
+// Keyframes at these poses, each of which observes the same 200 points.
 MapSnapshot MapWith(const std::vector<Rigid3>& poses) {
   MapSnapshot map;
   for (const Rigid3& pose : poses) {
@@ -35,16 +35,16 @@ MapTrackResult Tracked(int inliers, double median_depth) {
 }
 
 bool Wants(const MapSnapshot& map, const Rigid3& pose, int inliers = 190, double depth = 2) {
-  return WantsKeyFrame({}, map, pose, Tracked(inliers, depth));
+  return NeedsKeyFrame({}, map, pose, Tracked(inliers, depth));
 }
 
-TEST(KeyFrameSelection, WantsNoneWhereOneStands) {
+TEST(KeyFrameNovelty, WantsNoKeyframeNearAnExistingOne) {
   const MapSnapshot map = MapWith({CameraAt({0, 0, 0}), CameraAt({1, 0, 0})});
   EXPECT_FALSE(Wants(map, CameraAt({0, 0, 0})));
   EXPECT_FALSE(Wants(map, CameraAt({1.02, 0, 0.01}, {1, 0, 0})));
 }
 
-TEST(KeyFrameSelection, MeasuresDistanceInDepths) {
+TEST(KeyFrameNovelty, MeasuresDistanceRelativeToTheDepth) {
   const MapSnapshot map = MapWith({CameraAt({0, 0, 0})});
   const double threshold = KeyFrameNoveltyOptions().min_distance;
   for (const double depth : {0.5, 2.0, 10.0}) {
@@ -53,31 +53,31 @@ TEST(KeyFrameSelection, MeasuresDistanceInDepths) {
   }
 }
 
-TEST(KeyFrameSelection, CountsTheNearestKeyframeOnly) {
+TEST(KeyFrameNovelty, ComparesWithTheNearestKeyframeOnly) {
   const MapSnapshot map = MapWith({CameraAt({0, 0, 0}), CameraAt({1, 0, 0}), CameraAt({2, 0, 0})});
   EXPECT_TRUE(Wants(map, CameraAt({0.5, 0, 0})));
   EXPECT_FALSE(Wants(map, CameraAt({1.05, 0, 0})));
 }
 
-TEST(KeyFrameSelection, WantsOneThatLooksElsewhere) {
+TEST(KeyFrameNovelty, WantsAKeyframeAfterARotation) {
   const MapSnapshot map = MapWith({CameraAt({0, 0, 0})});
-  const double turn = KeyFrameNoveltyOptions().min_turn_deg;
+  const double turn = KeyFrameNoveltyOptions().min_rotation_deg;
   EXPECT_FALSE(Wants(map, CameraAt({0, 0, 0}, {0, 0.8 * turn, 0})));
   EXPECT_TRUE(Wants(map, CameraAt({0, 0, 0}, {0, 1.2 * turn, 0})));
-  // Half a step and half a turn together are not yet new, four fifths of each are.
+  // Half of each threshold together is not enough; four fifths of each is.
   EXPECT_FALSE(Wants(map, CameraAt({0.5 * 0.1 * 2, 0, 0}, {0, 0.5 * turn, 0})));
   EXPECT_TRUE(Wants(map, CameraAt({0.8 * 0.1 * 2, 0, 0}, {0, 0.8 * turn, 0})));
 }
 
-TEST(KeyFrameSelection, HurriesWhenTheMapRunsOutButNotWithoutParallax) {
+TEST(KeyFrameNovelty, LowersTheThresholdForFewInliersButRequiresParallax) {
   const MapSnapshot map = MapWith({CameraAt({0, 0, 0})});
-  const Rigid3 a_little = CameraAt({0.06 * 2, 0, 0}), hardly = CameraAt({0.02 * 2, 0, 0});
-  EXPECT_FALSE(Wants(map, a_little, 150));
-  EXPECT_TRUE(Wants(map, a_little, 90));
-  EXPECT_FALSE(Wants(map, hardly, 90));
+  const Rigid3 short_distance = CameraAt({0.06 * 2, 0, 0}), tiny_distance = CameraAt({0.02 * 2, 0, 0});
+  EXPECT_FALSE(Wants(map, short_distance, 150));
+  EXPECT_TRUE(Wants(map, short_distance, 90));
+  EXPECT_FALSE(Wants(map, tiny_distance, 90));
 }
 
-TEST(KeyFrameSelection, WantsTheFirstOfAMapWithoutAny) {
+TEST(KeyFrameNovelty, WantsTheFirstKeyframeOfAnEmptyMap) {
   EXPECT_TRUE(Wants(MapWith({}), CameraAt({0, 0, 0})));
 }
 

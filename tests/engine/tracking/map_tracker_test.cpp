@@ -49,8 +49,8 @@ class TrackingInAMap : public ::testing::Test {
     EXPECT_LT((result.camera_from_map.OriginInSource() - truth.OriginInSource()).norm(), 0.006);
     EXPECT_LT(Degrees((result.camera_from_map.rotation * truth.rotation.inverse()).Angle()), 0.15);
   }
-  // What the tracker asks at least of a pose before anything is made of it.
-  static bool Believed(const MapTrackResult& result) {
+  // The minimum requirements of the tracker for a pose.
+  static bool IsAcceptable(const MapTrackResult& result) {
     const TrackerOptions tracker;
     return result.converged && result.sigma <= tracker.max_sigma && result.inliers >= tracker.min_inliers &&
            result.occupied_cells >= tracker.min_cells && result.Quality() >= tracker.lost_quality;
@@ -86,21 +86,21 @@ TEST_F(TrackingInAMap, FindsThePoseFromAPerturbedPrediction) {
       EXPECT_GT(result.Quality(), 0.5);
       EXPECT_GT(result.inliers, 100);
       EXPECT_GE(result.occupied_cells, 10);
-      EXPECT_TRUE(Believed(result));
+      EXPECT_TRUE(IsAcceptable(result));
     }
   }
 }
 
-TEST_F(TrackingInAMap, TellsWhatItLookedForAndFound) {
+TEST_F(TrackingInAMap, ReportsAttemptsMatchesAndCovariance) {
   MapTracker tracker({}, camera_);
   Random random(2);
   const auto features = Show(*world_, Views()[0]);
   const MapTrackResult result = tracker.Track(*map_, *features, Views()[0], Effort::kStandard, &random);
   EXPECT_EQ(static_cast<int>(tracker.attempts().size()), result.attempted);
   EXPECT_EQ(static_cast<int>(tracker.matches().size()), result.found);
-  const auto inlying = [](const auto& item) { return item.inlier; };
-  EXPECT_EQ(std::count_if(tracker.attempts().begin(), tracker.attempts().end(), inlying), result.inliers);
-  EXPECT_EQ(std::count_if(tracker.matches().begin(), tracker.matches().end(), inlying), result.inliers);
+  const auto is_inlier = [](const auto& item) { return item.inlier; };
+  EXPECT_EQ(std::count_if(tracker.attempts().begin(), tracker.attempts().end(), is_inlier), result.inliers);
+  EXPECT_EQ(std::count_if(tracker.matches().begin(), tracker.matches().end(), is_inlier), result.inliers);
   for (const PointMatch& match : tracker.matches()) {
     const MapPoint* point = map_->FindPoint(match.point);
     ASSERT_NE(point, nullptr);
@@ -119,37 +119,37 @@ TEST_F(TrackingInAMap, TellsWhatItLookedForAndFound) {
   EXPECT_LT(std::sqrt(result.covariance.topLeftCorner<3, 3>().trace()), 0.01);
 }
 
-// Somebody stands before the left half of the image, and goes away again.
-TEST_F(TrackingInAMap, LooksLessOftenForWhatIsHidden) {
+// A person occludes the left half of the image for a while.
+TEST_F(TrackingInAMap, SearchesOccludedPointsLessOften) {
   MapTracker tracker({}, camera_);
   Random random(9);
   const Rigid3 view = Views()[0];
   cv::Mat image = world_->Render(*camera_, view, 1.5, 3);
-  const auto free = MakeFeatures(image.clone());
+  const auto unoccluded = MakeFeatures(image.clone());
   image(cv::Rect(0, 0, image.cols / 2, image.rows)).setTo(90);
-  const auto hidden = MakeFeatures(image);
+  const auto occluded = MakeFeatures(image);
   const auto track = [&](const ImageFeatures& features, int frames) {
     MapTrackResult result;
     for (int i = 0; i < frames; ++i) {
       result = tracker.Track(*map_, features, view, Effort::kStandard, &random);
-      tracker.Remember();
+      tracker.RecordMisses();
     }
     ExpectAt(result, view);
     return result;
   };
-  const MapTrackResult before = track(*free, 1);
-  const MapTrackResult first = track(*hidden, 1);
-  const MapTrackResult later = track(*hidden, 20);
+  const MapTrackResult before = track(*unoccluded, 1);
+  const MapTrackResult first = track(*occluded, 1);
+  const MapTrackResult later = track(*occluded, 20);
   EXPECT_LT(first.Quality(), 0.7 * before.Quality());
   EXPECT_GT(later.Quality(), 1.2 * first.Quality());
   EXPECT_LT(later.attempted, first.attempted);
-  EXPECT_GT(later.inliers, 0.9 * first.inliers) << "what is seen must not be given up";
-  const MapTrackResult again = track(*free, 20);
-  EXPECT_GT(again.inliers, 0.95 * before.inliers) << "it is looked for again when it may be seen";
+  EXPECT_GT(later.inliers, 0.9 * first.inliers) << "visible points must still be searched";
+  const MapTrackResult again = track(*unoccluded, 20);
+  EXPECT_GT(again.inliers, 0.95 * before.inliers) << "points are searched again once they are visible";
 }
 
-// Of what is in view a quarter may be looked for in a frame.
-TEST_F(TrackingInAMap, ChangesItsChoiceLittleByLittle) {
+// Only a quarter of the points in view may be searched per frame.
+TEST_F(TrackingInAMap, ChangesItsPointSelectionGradually) {
   Random random(4);
   const Rigid3 view = Views()[0];
   const auto features = Show(*world_, view);
@@ -178,13 +178,13 @@ TEST_F(TrackingInAMap, ChangesItsChoiceLittleByLittle) {
     ever.insert(now.begin(), now.end());
     before = now;
   }
-  EXPECT_LT(shared(before, first), 0.5) << "no choice is for ever";
-  EXPECT_GT(static_cast<double>(ever.size()), 0.7 * in_view) << "every point has its turn";
-  tracker.Forget();
-  EXPECT_LT(shared(choose(), before), 0.5) << "what was not believed is not tried again";
+  EXPECT_LT(shared(before, first), 0.5) << "the selection must change over time";
+  EXPECT_GT(static_cast<double>(ever.size()), 0.7 * in_view) << "most points must be selected at some time";
+  tracker.ForgetLastFrame();
+  EXPECT_LT(shared(choose(), before), 0.5) << "a rejected selection must not be repeated";
 }
 
-TEST_F(TrackingInAMap, ComesBackFromABadGuess) {
+TEST_F(TrackingInAMap, RecoversFromABadPrediction) {
   Random random(3);
   const std::vector<Rigid3> offsets = {CameraAt({0.15, 0, 0}, {0, 6, 0}),
                                        CameraAt({-0.1, 0.1, 0.1}, {-5, 0, 5}),
@@ -196,12 +196,12 @@ TEST_F(TrackingInAMap, ComesBackFromABadGuess) {
       const MapTrackResult result =
           tracker.Track(*map_, *features, offset * view, Effort::kRecovery, &random);
       ExpectAt(result, view);
-      EXPECT_TRUE(Believed(result));
+      EXPECT_TRUE(IsAcceptable(result));
     }
   }
 }
 
-TEST_F(TrackingInAMap, BelievesNothingOfAnotherWorld) {
+TEST_F(TrackingInAMap, RejectsImagesOfAnotherWorld) {
   const RenderedWorld other = RenderedWorld::Room(4711);
   Random random(4);
   for (const Rigid3& view : Views()) {
@@ -209,13 +209,13 @@ TEST_F(TrackingInAMap, BelievesNothingOfAnotherWorld) {
     for (const Effort effort : {Effort::kStandard, Effort::kWide, Effort::kRecovery}) {
       MapTracker tracker({}, camera_);
       const MapTrackResult result = tracker.Track(*map_, *features, view, effort, &random);
-      EXPECT_FALSE(Believed(result)) << "effort " << static_cast<int>(effort) << ": " << result.inliers
-                                     << " of " << result.attempted << ", sigma " << result.sigma;
+      EXPECT_FALSE(IsAcceptable(result)) << "effort " << static_cast<int>(effort) << ": " << result.inliers
+                                         << " of " << result.attempted << ", sigma " << result.sigma;
     }
   }
 }
 
-TEST_F(TrackingInAMap, BelievesNothingOfABlankImageOrAnEmptyMap) {
+TEST_F(TrackingInAMap, DoesNotConvergeOnABlankImageOrInAnEmptyMap) {
   Random random(5);
   const auto blank = MakeFeatures(cv::Mat(300, 400, CV_8UC1, cv::Scalar(90)));
   const auto features = Show(*world_, Views()[0]);
@@ -226,7 +226,7 @@ TEST_F(TrackingInAMap, BelievesNothingOfABlankImageOrAnEmptyMap) {
   }
 }
 
-TEST_F(TrackingInAMap, SeesNothingFromBehindTheWalls) {
+TEST_F(TrackingInAMap, SearchesNoPointsFromBehindTheWalls) {
   MapTracker tracker({}, camera_);
   Random random(6);
   const auto features = Show(*world_, Views()[0]);
@@ -236,7 +236,7 @@ TEST_F(TrackingInAMap, SeesNothingFromBehindTheWalls) {
   EXPECT_FALSE(result.converged);
 }
 
-TEST_F(TrackingInAMap, AnswersTheSameToTheSameSeed) {
+TEST_F(TrackingInAMap, IsDeterministicForAGivenSeed) {
   MapTrackResult results[2];
   for (MapTrackResult& result : results) {
     MapTracker tracker({}, camera_);

@@ -11,7 +11,7 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using testing_world::CameraAt;
 
-// A camera that keeps its twist: 0.3 m/s and 30 degrees a second.
+// The pose of a camera with a constant twist of 0.3 m/s and 30 degrees per second.
 Rigid3 Screw(double seconds) {
   Vector6 twist;
   twist << 0.3, -0.1, 0.05, 0.1, 0.5, -0.1;
@@ -26,7 +26,7 @@ TEST(MotionModel, LearnsAConstantVelocity) {
   EXPECT_TRUE(IsNear(model.Predict(FromSeconds(23 / 30.0)), Screw(23 / 30.0), 1e-4, 1e-4));
 }
 
-TEST(MotionModel, StandsStillAfterAResetAndAtItsOwnTime) {
+TEST(MotionModel, PredictsNoMotionAfterAResetOrForThePast) {
   MotionModel model;
   for (int i = 0; i <= 5; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
   EXPECT_TRUE(IsNear(model.Predict(FromSeconds(5 / 30.0)), Screw(5 / 30.0), 1e-12, 1e-12));
@@ -35,7 +35,7 @@ TEST(MotionModel, StandsStillAfterAResetAndAtItsOwnTime) {
   EXPECT_TRUE(IsNear(model.Predict(FromSeconds(2)), Screw(1), 1e-12, 1e-12));
 }
 
-TEST(MotionModel, DoesNotRunAwayThroughAGapInTheVideo) {
+TEST(MotionModel, LimitsThePredictionOverALongGap) {
   MotionModel model;
   model.Reset(FromSeconds(0), Screw(0));
   for (int i = 1; i <= 20; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
@@ -43,7 +43,7 @@ TEST(MotionModel, DoesNotRunAwayThroughAGapInTheVideo) {
   EXPECT_TRUE(IsNear(later, Screw(20 / 30.0 + 0.2), 1e-3, 1e-3));
 }
 
-TEST(MotionModel, SlowsDownWhileNothingIsFound) {
+TEST(MotionModel, DampsTheVelocityWhileTrackingFails) {
   MotionModel model;
   model.Reset(FromSeconds(0), Screw(0));
   for (int i = 1; i <= 20; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
@@ -58,7 +58,7 @@ TEST(MotionModel, SlowsDownWhileNothingIsFound) {
   EXPECT_LT(step, 1e-5);
 }
 
-TEST(MotionModel, TwoImagesOfOneTimeDoNotBreakIt) {
+TEST(MotionModel, HandlesTwoImagesWithTheSameTime) {
   MotionModel model;
   model.Reset(FromSeconds(1), Screw(0));
   model.Update(FromSeconds(1), Screw(0.1));
@@ -66,7 +66,7 @@ TEST(MotionModel, TwoImagesOfOneTimeDoNotBreakIt) {
   EXPECT_TRUE(IsNear(model.last(), Screw(0.1), 1e-12, 1e-12));
 }
 
-TEST(MotionModel, TurnsOnTheSpotWhenOnlyTheRotationIsKnown) {
+TEST(MotionModel, RotatesAboutTheCentreWhenOnlyTheRotationIsKnown) {
   MotionModel model;
   model.Reset(FromSeconds(0), Screw(0));
   const Rotation3 turn = Rotation3::Exp({0.1, -0.2, 0.05});

@@ -13,7 +13,7 @@ namespace {
 
 using testing_world::CameraAt;
 
-// A wall of points two metres ahead, seen by keyframes that stand side by side; the first has made them all.
+// A wall of points two metres ahead, observed by three keyframes. The first one is the source of all points.
 class NearbyPointsOfAWall : public ::testing::Test {
  protected:
   NearbyPointsOfAWall() {
@@ -27,7 +27,7 @@ class NearbyPointsOfAWall : public ::testing::Test {
       }
     }
     map_.next_point = static_cast<MapPointId>(map_.points.size());
-    // From the front, from half a metre before the wall, and from the side.
+    // One keyframe from the front, one half a metre in front of the wall, and one from the side.
     AddKeyFrame(CameraAt({0, 0, 0}), 0);
     AddKeyFrame(CameraAt({0, 0, 1.5}), 1);
     AddKeyFrame(Rigid3(Rotation3::Exp({0, 0.7, 0}), {0, 0, 0}) * CameraAt({1.5, 0, 0.2}), 0);
@@ -50,7 +50,7 @@ class NearbyPointsOfAWall : public ::testing::Test {
   }
 
   std::set<KeyFrameId> SourcesFrom(const Rigid3& camera_from_map) {
-    nearby_.Forget();
+    nearby_.ForgetLastFrame();
     nearby_.Update(map_, camera_from_map, {}, kNoId, Eigen::Vector3d::Zero());
     std::set<KeyFrameId> sources;
     for (const NearbyPoint& point : nearby_.finite()) {
@@ -65,21 +65,21 @@ class NearbyPointsOfAWall : public ::testing::Test {
   NearbyPoints nearby_{NearbyPointOptions{}};
 };
 
-TEST_F(NearbyPointsOfAWall, AreAllThatItsKeyframesSee) {
+TEST_F(NearbyPointsOfAWall, AreAllPointsThatItsKeyframesObserve) {
   SourcesFrom(CameraAt({0, 0, 0.1}));
   ASSERT_EQ(nearby_.finite().size(), map_.points.size());
   for (std::size_t i = 0; i < map_.points.size(); ++i) {
     EXPECT_EQ(nearby_.finite()[i].point->id, map_.points[i].id);
-    EXPECT_EQ(nearby_.finite()[i].place, map_.points[i].point_in_map);
+    EXPECT_EQ(nearby_.finite()[i].point_in_map, map_.points[i].point_in_map);
   }
 }
 
-TEST_F(NearbyPointsOfAWall, AreLookedForAsTheFirstViewShowsThemWhereThatWillDo) {
+TEST_F(NearbyPointsOfAWall, UseTheirSourceViewWhereItSuffices) {
   EXPECT_EQ(SourcesFrom(CameraAt({0, 0, 0})), std::set<KeyFrameId>{0});
   EXPECT_EQ(SourcesFrom(CameraAt({0.2, 0.1, 0.1})), std::set<KeyFrameId>{0});
 }
 
-TEST_F(NearbyPointsOfAWall, AreLookedForAsANearerViewShowsThem) {
+TEST_F(NearbyPointsOfAWall, UseACloserViewWhereItFitsBetter) {
   const std::set<KeyFrameId> sources = SourcesFrom(CameraAt({0, 0, 1.45}));
   EXPECT_TRUE(sources.contains(1));
   for (const NearbyPoint& point : nearby_.finite()) {
@@ -91,14 +91,14 @@ TEST_F(NearbyPointsOfAWall, AreLookedForAsANearerViewShowsThem) {
   EXPECT_TRUE(SourcesFrom(map_.keyframes[2].camera_from_map).contains(2));
 }
 
-TEST_F(NearbyPointsOfAWall, AreNotLookedForAsAViewShowsThemThatTheMapContradicts) {
+TEST_F(NearbyPointsOfAWall, DoNotUseViewsWithLargeReprojectionErrors) {
   for (Observation& observation : map_.observations) {
-    if (observation.keyframe == 1) observation.pixel.x() += 2.5f;  // its level's pixel is two wide
+    if (observation.keyframe == 1) observation.pixel.x() += 2.5f;  // a pixel of its level is two pixels wide
   }
   EXPECT_FALSE(SourcesFrom(CameraAt({0, 0, 1.45})).contains(1));
 }
 
-TEST_F(NearbyPointsOfAWall, AreChosenAgainWhenTheMapHasChanged) {
+TEST_F(NearbyPointsOfAWall, AreUpdatedWhenTheMapHasChanged) {
   SourcesFrom(CameraAt({0, 0, 0}));
   map_.points.pop_back();
   ++map_.revision;
@@ -106,7 +106,7 @@ TEST_F(NearbyPointsOfAWall, AreChosenAgainWhenTheMapHasChanged) {
   EXPECT_EQ(nearby_.finite().size(), map_.points.size());
 }
 
-TEST_F(NearbyPointsOfAWall, WithoutDepthAreThoseOfTheirPanoramaAlone) {
+TEST_F(NearbyPointsOfAWall, WithoutDepthComeFromTheGivenPanoramaOnly) {
   map_.panoramas = {{0, 0}, {1, 1}};
   map_.keyframes[0].panorama = 0;
   map_.keyframes[1].panorama = 1;
@@ -122,12 +122,12 @@ TEST_F(NearbyPointsOfAWall, WithoutDepthAreThoseOfTheirPanoramaAlone) {
   ASSERT_FALSE(nearby_.infinite().empty());
   for (const NearbyPoint& point : nearby_.infinite()) {
     EXPECT_EQ(point.point->panorama, 1u);
-    EXPECT_EQ(point.place[3], 0);
+    EXPECT_EQ(point.point_in_map[3], 0);
   }
-  // Turning about something else than its centre, the camera sees them as far away as the reference's scene.
+  // With a pivot off the camera centre, infinite points get the median depth of the reference keyframe.
   nearby_.Update(map_, CameraAt({0, 0, 0}), {}, 1, Eigen::Vector3d(0, 0, -0.2));
   for (const NearbyPoint& point : nearby_.infinite()) {
-    const Eigen::Vector3d place = point.place.head<3>() / point.place[3];
+    const Eigen::Vector3d place = point.point_in_map.head<3>() / point.point_in_map[3];
     EXPECT_NEAR((place - Eigen::Vector3d(0, 0, 1)).norm(), map_.keyframes[1].mean_depth, 1e-9);
   }
 }

@@ -17,7 +17,7 @@ std::vector<MapPointId> All(const PointIdSet& set) {
   return ids;
 }
 
-TEST(PointIdSet, IsGoneThroughInOrderEachIdOnce) {
+TEST(PointIdSet, IteratesOverEachIdOnceInOrder) {
   Random random(1);
   PointIdSet set;
   set.Clear(1000);
@@ -31,7 +31,7 @@ TEST(PointIdSet, IsGoneThroughInOrderEachIdOnce) {
   for (MapPointId id = 0; id < 1000; ++id) EXPECT_EQ(set.Contains(id), expected.count(id) == 1);
 }
 
-TEST(PointIdSet, HoldsTheFirstAndTheLastIdAndNoneBeyond) {
+TEST(PointIdSet, HoldsTheFirstAndLastIdAndIgnoresIdsBeyond) {
   PointIdSet set;
   for (const MapPointId end : {1u, 63u, 64u, 65u, 128u}) {
     set.Clear(end);

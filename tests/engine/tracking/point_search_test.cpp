@@ -16,7 +16,7 @@ namespace {
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
 
-// A wall two metres ahead and the map of it that one keyframe straight before it makes.
+// A wall two metres ahead, and a map of it with one keyframe that faces it.
 class PointSearch : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -32,7 +32,7 @@ class PointSearch : public ::testing::Test {
   }
   const KeyFrame& Source() const { return map_->keyframes[0]; }
 
-  // Where the wall's homography takes a pixel of a level of the source image.
+  // The pixel to which the wall's homography maps a pixel of a pyramid level of the source image.
   std::optional<Eigen::Vector2d> ThroughTheWall(const Eigen::Vector2d& source_pixel, int level,
                                                 const Rigid3& camera_from_world) const {
     const auto hit =
@@ -56,7 +56,7 @@ const std::vector<Rigid3>& Views() {
   return views;
 }
 
-TEST_F(PointSearch, PredictsThePlaceAndTheWarpOfTheHomography) {
+TEST_F(PointSearch, PredictsThePositionAndWarpOfTheHomography) {
   PointSearcher searcher;
   for (const Rigid3& view : Views()) {
     int predicted_count = 0;
@@ -79,7 +79,7 @@ TEST_F(PointSearch, PredictsThePlaceAndTheWarpOfTheHomography) {
   }
 }
 
-TEST_F(PointSearch, FindsPointsWhereTheHomographyPutsThem) {
+TEST_F(PointSearch, FindsPointsWhereTheHomographyPredictsThem) {
   PointSearcher searcher;
   for (const Rigid3& view : Views()) {
     const auto features = MakeFeatures(world_->Render(*camera_, view, 1.5, 5));
@@ -103,11 +103,11 @@ TEST_F(PointSearch, FindsPointsWhereTheHomographyPutsThem) {
   }
 }
 
-// As a camera takes the image with two and a half times the light.
-TEST_F(PointSearch, FindsMorePointsOfAnOverExposedImageWhenItComparesTolerantly) {
+// The images are overexposed by a factor of 2.5.
+TEST_F(PointSearch, PhotometricToleranceFindsMorePointsInOverexposedImages) {
   PointSearcher usual, tolerant;
-  tolerant.Compare(PatchComparison::kTolerant);
-  int found_usually = 0, found_tolerantly = 0;
+  tolerant.SetComparison(PatchComparison::kTolerant);
+  int found_plainly = 0, found_tolerantly = 0;
   std::vector<double> errors;  // of the tolerant search, in pixels of the level
   for (const Rigid3& view : Views()) {
     const cv::Mat image = world_->Render(*camera_, view, 1.5, 5);
@@ -117,20 +117,20 @@ TEST_F(PointSearch, FindsMorePointsOfAnOverExposedImageWhenItComparesTolerantly)
       if (!predicted) continue;
       const Eigen::Vector2d truth = predicted->pixel;
       predicted->pixel += Eigen::Vector2d(3, -2);
-      if (usual.Find(point, Source(), *predicted, *features, 8, true)) ++found_usually;
+      if (usual.Find(point, Source(), *predicted, *features, 8, true)) ++found_plainly;
       const auto found = tolerant.Find(point, Source(), *predicted, *features, 8, true);
       if (!found) continue;
       ++found_tolerantly;
       errors.push_back((found->pixel.cast<double>() - truth).norm() / (1 << predicted->level));
     }
   }
-  EXPECT_GT(found_tolerantly, 1.3 * found_usually);
+  EXPECT_GT(found_tolerantly, 1.3 * found_plainly);
   ASSERT_FALSE(errors.empty());
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[errors.size() / 2], 0.2);
 }
 
-TEST_F(PointSearch, ChoosesTheLevelThatShowsThePatchAtItsOwnSize) {
+TEST_F(PointSearch, ChoosesTheLevelWhereThePatchKeepsItsSize) {
   PointSearcher searcher;
   for (const double distance : {0.15, 0.3, 0.5, 1.0, 1.5, 2.0, 3.5, 5.0, 9.0, 20.0}) {
     const Rigid3 view = CameraAt({0, 0, 2 - distance});
@@ -154,7 +154,7 @@ TEST_F(PointSearch, ChoosesTheLevelThatShowsThePatchAtItsOwnSize) {
   }
 }
 
-TEST_F(PointSearch, PredictsNothingBehindOutsideOrEdgeOn) {
+TEST_F(PointSearch, RejectsPointsBehindOutsideOrSeenEdgeOn) {
   PointSearcher searcher;
   const std::vector<Rigid3> blind = {CameraAt({0, 0, 0}, {0, 180, 0}), CameraAt({0, 0, 0}, {0, 90, 0}),
                                      CameraAt({0, 0, 2.5}), CameraAt({-3, 0, 1.7}, {0, 88, 0})};
@@ -166,7 +166,7 @@ TEST_F(PointSearch, PredictsNothingBehindOutsideOrEdgeOn) {
   }
 }
 
-TEST_F(PointSearch, FindsNothingInAnImageOfSomethingElse) {
+TEST_F(PointSearch, FindsAlmostNothingInAnImageOfAnotherWorld) {
   const RenderedWorld other = RenderedWorld::SingleWall(2, 999);
   PointSearcher searcher;
   const auto features = MakeFeatures(other.Render(*camera_, Views()[0]));
@@ -181,7 +181,7 @@ TEST_F(PointSearch, FindsNothingInAnImageOfSomethingElse) {
   EXPECT_LT(found, visible / 5);
 }
 
-TEST_F(PointSearch, FindsWithoutACornerOnlyWhenItMay) {
+TEST_F(PointSearch, FindsPointsWithoutACornerOnlyWhenAllowed) {
   PointSearcher searcher;
   ImageFeatures features = *MakeFeatures(world_->Render(*camera_, Views()[0]));
   for (std::size_t level = 0; level < kPyramidLevels; ++level) {
@@ -200,7 +200,7 @@ TEST_F(PointSearch, FindsWithoutACornerOnlyWhenItMay) {
   EXPECT_GT(direct, 0.8 * visible);
 }
 
-TEST_F(PointSearch, DoesNotDependOnWhatWasSearchedBefore) {
+TEST_F(PointSearch, DoesNotDependOnEarlierSearches) {
   PointSearcher used, fresh;
   const auto features = MakeFeatures(world_->Render(*camera_, Views()[1]));
   for (const MapPoint& point : map_->points) {

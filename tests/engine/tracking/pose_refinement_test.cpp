@@ -37,8 +37,8 @@ Rigid3 Perturbed(Random* random, double distance_m, double angle_deg) {
   return Rigid3::Exp(twist) * Truth();
 }
 
-// Points spread over the image, one to four metres away, on four pyramid levels; the noise is that of the
-// level. infinite: directions instead.
+// Adds points spread over the image, one to four metres away, on four pyramid levels, with noise in
+// proportion to the pixel size of the level. With `infinite`, the points are infinite.
 void AddMeasurements(int count, double noise_sigmas, bool infinite, Random* random,
                      std::vector<PoseMeasurement>* measurements) {
   for (int i = 0; i < count; ++i) {
@@ -78,7 +78,7 @@ TEST(PoseRefinement, IsExactWithoutNoise) {
   }
 }
 
-TEST(PoseRefinement, FindsThePoseAmongThirtyPercentOutliers) {
+TEST(PoseRefinement, FindsThePoseWithThirtyPercentOutliers) {
   Random random(2);
   for (int trial = 0; trial < 30; ++trial) {
     std::vector<PoseMeasurement> measurements;
@@ -92,21 +92,21 @@ TEST(PoseRefinement, FindsThePoseAmongThirtyPercentOutliers) {
     EXPECT_LT(Error(refined).head<3>().norm(), 0.015);
     EXPECT_LT(Error(refined).tail<3>().norm(), 0.006);
     EXPECT_NEAR(refined.sigma, 0.7, 0.35);
-    int wrongly_believed = 0, wrongly_doubted = 0;
+    int accepted_outliers = 0, rejected_inliers = 0;
     for (std::size_t i = 0; i < 200; ++i) {
-      const bool believed = measurements[i].weight > 1e-3;
-      (i < 140 ? wrongly_doubted : wrongly_believed) += i < 140 ? !believed : believed;
+      const bool accepted = measurements[i].weight > 1e-3;
+      (i < 140 ? rejected_inliers : accepted_outliers) += i < 140 ? !accepted : accepted;
     }
-    EXPECT_EQ(wrongly_believed, 0);
-    EXPECT_LT(wrongly_doubted, 4);
+    EXPECT_EQ(accepted_outliers, 0);
+    EXPECT_LT(rejected_inliers, 4);
   }
 }
 
-TEST(PoseRefinement, TellsACovarianceThatItsErrorsHave) {
+TEST(PoseRefinement, CovarianceMatchesTheErrors) {
   Random random(3);
   constexpr int kTrials = 400;
   double squared_distance = 0;
-  Matrix6 scatter = Matrix6::Zero(), told = Matrix6::Zero();
+  Matrix6 scatter = Matrix6::Zero(), estimated = Matrix6::Zero();
   for (int trial = 0; trial < kTrials; ++trial) {
     std::vector<PoseMeasurement> measurements;
     AddMeasurements(100, 1, false, &random, &measurements);
@@ -115,18 +115,19 @@ TEST(PoseRefinement, TellsACovarianceThatItsErrorsHave) {
     const Vector6 error = Error(refined);
     squared_distance += error.dot(refined.covariance.ldlt().solve(error)) / kTrials;
     scatter += error * error.transpose() / kTrials;
-    told += refined.covariance / kTrials;
+    estimated += refined.covariance / kTrials;
   }
-  // Six degrees of freedom: six in the mean. Tukey's weights make the told covariance a little too large.
+  // With six degrees of freedom the mean is six. Tukey's weights make the estimated covariance slightly too
+  // large.
   EXPECT_GT(squared_distance, 4.2);
   EXPECT_LT(squared_distance, 7.0);
   for (int i = 0; i < 6; ++i) {
-    EXPECT_GT(told(i, i), 0.8 * scatter(i, i)) << i;
-    EXPECT_LT(told(i, i), 1.7 * scatter(i, i)) << i;
+    EXPECT_GT(estimated(i, i), 0.8 * scatter(i, i)) << i;
+    EXPECT_LT(estimated(i, i), 1.7 * scatter(i, i)) << i;
   }
 }
 
-TEST(PoseRefinement, GrowsSurerWithMoreMeasurements) {
+TEST(PoseRefinement, CovarianceShrinksWithMoreMeasurements) {
   Random random(4);
   std::vector<PoseMeasurement> few, many;
   AddMeasurements(50, 1, false, &random, &few);
@@ -136,14 +137,14 @@ TEST(PoseRefinement, GrowsSurerWithMoreMeasurements) {
   EXPECT_LT(ratio, 32);
 }
 
-TEST(PoseRefinement, DoesNotConvergeOnWhatHoldsNoPose) {
+TEST(PoseRefinement, DoesNotConvergeOnDegenerateMeasurements) {
   Random random(5);
   std::vector<PoseMeasurement> none, two, same, rays, line;
   AddMeasurements(2, 0, false, &random, &two);
   AddMeasurements(1, 0, false, &random, &same);
   same.resize(50, same[0]);
   AddMeasurements(4, 0.5, true, &random, &rays);
-  // Points of one line in space: the camera may turn about it.
+  // Points on one line in space: the camera could rotate about it.
   const Rigid3 map_from_camera = Truth().inverse();
   for (int i = 0; i < 50; ++i) {
     const Eigen::Vector3d x(-1 + 0.04 * i, 0.3 - 0.01 * i, 2 + 0.02 * i);
@@ -159,7 +160,7 @@ TEST(PoseRefinement, DoesNotConvergeOnWhatHoldsNoPose) {
   EXPECT_FALSE(Refine(Truth(), &line).converged);
 }
 
-TEST(PoseRefinement, DoesNotBelieveWhatLiesBehindTheCamera) {
+TEST(PoseRefinement, IgnoresPointsBehindTheCamera) {
   Random random(6);
   std::vector<PoseMeasurement> measurements;
   AddMeasurements(80, 0.5, false, &random, &measurements);
@@ -174,7 +175,7 @@ TEST(PoseRefinement, DoesNotBelieveWhatLiesBehindTheCamera) {
   for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(measurements[i].weight, 0);
 }
 
-TEST(PoseRefinement, IsHelpedInTheRotationByInfinitePoints) {
+TEST(PoseRefinement, InfinitePointsImproveTheRotation) {
   Random random(7);
   std::vector<PoseMeasurement> finite, mixed;
   AddMeasurements(60, 0.5, false, &random, &finite);
@@ -191,8 +192,8 @@ TEST(PoseRefinement, IsHelpedInTheRotationByInfinitePoints) {
             (alone.covariance.bottomRightCorner<3, 3>().trace()));
 }
 
-// Infinite points that are all seen as if the camera had turned half a degree more than the finite ones say:
-// a hundredth of the weight each (hybrid-slam §3.1), and none on the translation.
+// All infinite points indicate half a degree more rotation than the finite ones. They have a hundredth of the
+// weight each (hybrid-slam §3.1), and no influence on the translation.
 TEST(PoseRefinement, FollowsFinitePointsWhereInfiniteOnesDisagree) {
   Random random(11);
   std::vector<PoseMeasurement> finite, mixed, turned;
@@ -213,14 +214,14 @@ TEST(PoseRefinement, FollowsFinitePointsWhereInfiniteOnesDisagree) {
   EXPECT_LT((both.camera_from_map.OriginInSource() - alone.camera_from_map.OriginInSource()).norm(), 0.003);
 }
 
-TEST(PoseRefinement, TurnsAboutTheCentreItStartsFromByInfinitePointsAlone) {
+TEST(PoseRefinement, RotatesAboutTheInitialCentreWithInfinitePointsOnly) {
   Random random(13);
   for (const int finite : {0, 6}) {
     for (int round = 0; round < 20; ++round) {
       std::vector<PoseMeasurement> measurements;
       AddMeasurements(150, 0.5, true, &random, &measurements);
       AddMeasurements(finite, 0.5, false, &random, &measurements);
-      // Turned only: any other centre would do for the rays.
+      // The start differs by a rotation only; the rays do not constrain the centre.
       Rigid3 start = Perturbed(&random, 0, 2);
       start = Rigid3(start.rotation, -(start.rotation * Truth().OriginInSource()));
       const PoseRefinement refined = Refine(start, &measurements);
@@ -234,15 +235,15 @@ TEST(PoseRefinement, TurnsAboutTheCentreItStartsFromByInfinitePointsAlone) {
   }
 }
 
-// Directions with a presumed distance, seen by a camera that has turned about a point behind it.
-TEST(PoseRefinement, TurnsAboutThePivotWhereOnlyTheRotationIsTold) {
+// Infinite points with an assumed distance, observed by a camera that has rotated about a point behind it.
+TEST(PoseRefinement, RotatesAboutThePivotWhenOnlyTheRotationIsObserved) {
   Random random(12);
   const Eigen::Vector3d pivot(0.1, 0, -0.6);
   constexpr double kDistance = 2.5;
   const Rigid3 source = Truth();
-  const Rotation3 turn = Rotation3::Exp({0.02, 0.3, -0.01});
+  const Rotation3 rotation = Rotation3::Exp({0.02, 0.3, -0.01});
   const Eigen::Vector3d fixed_in_map = source.inverse() * pivot;
-  const Rigid3 turned(turn * source.rotation, pivot - turn * source.rotation * fixed_in_map);
+  const Rigid3 turned(rotation * source.rotation, pivot - rotation * source.rotation * fixed_in_map);
   std::vector<PoseMeasurement> measurements;
   while (measurements.size() < 60) {
     const Eigen::Vector3d ray = *kLens.Unproject({random.Uniform(10, 630), random.Uniform(10, 470)});
@@ -266,8 +267,8 @@ TEST(PoseRefinement, TurnsAboutThePivotWhereOnlyTheRotationIsTold) {
   EXPECT_LT((refined.camera_from_map * turned.inverse()).Log().norm(), 1e-6);
 }
 
-// However near a direction is presumed to be: the finite points alone say where the camera is.
-TEST(PoseRefinement, LetsNoPresumedDistanceMoveTheCamera) {
+// However small the assumed distance of an infinite point is, only the finite points determine the position.
+TEST(PoseRefinement, AssumedDistancesDoNotMoveTheCamera) {
   Random random(13);
   std::vector<PoseMeasurement> finite;
   AddMeasurements(80, 0.5, false, &random, &finite);
@@ -286,8 +287,7 @@ TEST(PoseRefinement, LetsNoPresumedDistanceMoveTheCamera) {
             3e-4);
 }
 
-// The normal equations' matrix that a refinement without any error ends with: there every robust weight is
-// one.
+// The matrix of the normal equations after a refinement without any error, where every robust weight is one.
 Matrix6 Information(std::vector<PoseMeasurement> measurements) {
   const PoseRefinement refined = Refine(Truth(), &measurements);
   EXPECT_TRUE(refined.converged);
@@ -296,9 +296,9 @@ Matrix6 Information(std::vector<PoseMeasurement> measurements) {
   return sigma * sigma * refined.covariance.inverse();
 }
 
-// What each measurement adds is J^T J, and J is what the projection's numeric derivative says, of a finite
-// point and of an infinite one.
-TEST(PoseRefinement, HasTheJacobiansThatNumericDifferencesHave) {
+// Each measurement adds J^T J, where J must equal the numeric derivative of the projection, for finite and
+// infinite points.
+TEST(PoseRefinement, JacobiansMatchNumericDifferences) {
   Random random(17);
   for (int round = 0; round < 10; ++round) {
     std::vector<PoseMeasurement> measurements;
@@ -324,8 +324,9 @@ TEST(PoseRefinement, HasTheJacobiansThatNumericDifferencesHave) {
   }
 }
 
-// They say nothing of the translation, nor of how it goes with the rotation (hybrid-slam eq. 1-2).
-TEST(PoseRefinement, TakesNothingOfTheTranslationFromInfinitePoints) {
+// Infinite points add no information on the translation or on its correlation with the rotation (hybrid-slam
+// eq. 1-2).
+TEST(PoseRefinement, InfinitePointsDoNotConstrainTheTranslation) {
   Random random(19);
   for (int round = 0; round < 10; ++round) {
     std::vector<PoseMeasurement> finite, mixed;
@@ -341,10 +342,10 @@ TEST(PoseRefinement, TakesNothingOfTheTranslationFromInfinitePoints) {
   }
 }
 
-// Twenty points place a camera when they are all over the image, not when they are about to leave it.
-// Points in a strip at the image's rim, which moving and turning shift alike.
-void AddPointsAtTheRim(int count, const Rigid3& seen_from, Random* random,
-                       std::vector<PoseMeasurement>* measurements) {
+// Adds points in a strip at the image border, where translation and rotation shift them alike. Twenty points
+// spread over the image determine a pose, but twenty in this strip do not.
+void AddPointsAtTheBorder(int count, const Rigid3& seen_from, Random* random,
+                          std::vector<PoseMeasurement>* measurements) {
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector2d pixel(random->Uniform(4, 30), random->Uniform(100, 300));
     PoseMeasurement measurement;
@@ -356,68 +357,70 @@ void AddPointsAtTheRim(int count, const Rigid3& seen_from, Random* random,
   }
 }
 
-double Moved(const PoseRefinement& refined, const Rigid3& from) {
+double DistanceMoved(const PoseRefinement& refined, const Rigid3& from) {
   return (refined.camera_from_map.OriginInSource() - from.OriginInSource()).norm();
 }
 
-TEST(PoseRefinement, HoldsTheCameraWhereItWasWhenFinitePointsPlaceItBadly) {
+TEST(PoseRefinement, KeepsThePositionWhenFinitePointsConstrainItPoorly) {
   Random random(23);
-  std::vector<PoseMeasurement> rim, spread;
-  AddMeasurements(100, 0.5, true, &random, &rim);
-  spread = rim;
+  std::vector<PoseMeasurement> at_border, spread;
+  AddMeasurements(100, 0.5, true, &random, &at_border);
+  spread = at_border;
   AddMeasurements(60, 0.2, false, &random, &spread);
-  AddPointsAtTheRim(20, Truth(), &random, &rim);
+  AddPointsAtTheBorder(20, Truth(), &random, &at_border);
   const Rigid3 start = Perturbed(&random, 0, 0.5);
-  const PoseRefinement held = Refine(start, &rim), placed = Refine(start, &spread);
-  EXPECT_EQ(held.observed, ObservedMotion::kPanorama);
-  EXPECT_LT(Moved(held, start), 2 * PoseRefinementOptions().max_position_sigma * held.mean_depth);
+  const PoseRefinement with_pivot = Refine(start, &at_border), placed = Refine(start, &spread);
+  EXPECT_EQ(with_pivot.observed, ObservedMotion::kPanorama);
+  EXPECT_LT(DistanceMoved(with_pivot, start),
+            2 * PoseRefinementOptions().max_position_sigma * with_pivot.mean_depth);
   EXPECT_EQ(placed.observed, ObservedMotion::kHybrid);
 }
 
-TEST(PoseRefinement, KeepsToASureTurnWherePointsTellLittleAndLeavesItWhereTheyTellMuch) {
+TEST(PoseRefinement, KeepsToACertainPivotUnlessPointsConstrainThePositionWell) {
   Random random(29);
   const Eigen::Vector3d pivot(0, 0, -0.5);
-  const Rotation3 turn = Rotation3::Exp({0, 0.02, 0});
+  const Rotation3 rotation = Rotation3::Exp({0, 0.02, 0});
   const Rigid3 before = Truth();
   const Eigen::Vector3d fixed_in_map = before.inverse() * pivot;
-  const Rigid3 turned(turn * before.rotation, pivot - turn * before.rotation * fixed_in_map);
+  const Rigid3 turned(rotation * before.rotation, pivot - rotation * before.rotation * fixed_in_map);
   PoseRefinementMemory memory;
-  double freely = 0, held = 0;
+  double without_pivot = 0, with_pivot = 0;
   constexpr int kTrials = 20;
   for (int trial = 0; trial < kTrials; ++trial) {
-    std::vector<PoseMeasurement> rim;
-    AddPointsAtTheRim(30, turned, &random, &rim);
-    const auto off = [&](bool sure) {
-      const PoseRefinement refined = RefinePose(kLens, before, {}, &rim, &memory, {pivot, before, sure});
-      EXPECT_EQ(refined.observed, sure ? ObservedMotion::kPanorama : ObservedMotion::kSixDof);
+    std::vector<PoseMeasurement> at_border;
+    AddPointsAtTheBorder(30, turned, &random, &at_border);
+    const auto mean_rotation_error = [&](bool reliable) {
+      const PoseRefinement refined =
+          RefinePose(kLens, before, {}, &at_border, &memory, {pivot, before, reliable});
+      EXPECT_EQ(refined.observed, reliable ? ObservedMotion::kPanorama : ObservedMotion::kSixDof);
       return (refined.camera_from_map.rotation * turned.rotation.inverse()).Angle() / kTrials;
     };
-    freely += off(false);
-    held += off(true);
+    without_pivot += mean_rotation_error(false);
+    with_pivot += mean_rotation_error(true);
   }
-  EXPECT_LT(held, 0.4 * freely);
+  EXPECT_LT(with_pivot, 0.4 * without_pivot);
 
-  // It has stepped aside by two hundredths of the depth, and points all over the image say so.
+  // The camera has moved sideways by two hundredths of the depth, and points all over the image show it.
   std::vector<PoseMeasurement> spread;
   AddMeasurements(400, 0.3, false, &random, &spread);
   const Rigid3 aside = testing_world::CameraAt({0.05, 0, 0}) * Truth();
   const PoseRefinement placed = RefinePose(kLens, aside, {}, &spread, &memory, {pivot, aside, true});
   EXPECT_EQ(placed.observed, ObservedMotion::kSixDof);
-  EXPECT_LT(Moved(placed, Truth()), 0.3 * 0.05);
+  EXPECT_LT(DistanceMoved(placed, Truth()), 0.3 * 0.05);
 }
 
-TEST(PoseRefinement, FollowsWhatFinitePointsTellOfTheWayThoughTheyPlaceTheCameraBadly) {
+TEST(PoseRefinement, MovesAlongWellConstrainedDirectionsOnly) {
   Random random(31);
-  // Up and down is told by the height of the strip, which is long.
+  // The strip is tall enough to constrain vertical motion.
   const Rigid3 start = Rigid3::Exp((Vector6() << 0, 0.01, 0, 0, 0, 0).finished()) * Truth();
-  std::vector<PoseMeasurement> rim;
-  AddMeasurements(100, 0.1, true, &random, &rim);
-  AddPointsAtTheRim(200, Truth(), &random, &rim);
+  std::vector<PoseMeasurement> at_border;
+  AddMeasurements(100, 0.1, true, &random, &at_border);
+  AddPointsAtTheBorder(200, Truth(), &random, &at_border);
   PoseRefinementOptions strict;
   strict.max_position_sigma = 0.0025;
   PoseRefinementMemory memory;
   const PoseRefinement refined =
-      RefinePose(kLens, start, strict, &rim, &memory, {Eigen::Vector3d::Zero(), start});
+      RefinePose(kLens, start, strict, &at_border, &memory, {Eigen::Vector3d::Zero(), start});
   EXPECT_EQ(refined.observed, ObservedMotion::kPanorama);
   EXPECT_LT(std::abs(Error(refined)[1]), 0.005);
 }

@@ -11,7 +11,7 @@
 #include "tests/engine/rendered_world.h"
 #include "tests/engine/some_maps.h"
 
-// What a tracker makes of a map that is moved under it.
+// Tests of a tracker whose map is corrected while it tracks.
 namespace docent::engine {
 namespace {
 
@@ -27,7 +27,7 @@ Frame FrameAt(int index) {
   return testing_world::MakeFrame(index, World(), Pose(index));
 }
 
-// A tracker that follows the first frames in an exact map.
+// A tracker that has tracked the first frames in an exact map.
 class MovedMap : public ::testing::Test {
  protected:
   static constexpr int kBefore = 12;
@@ -45,8 +45,8 @@ class MovedMap : public ::testing::Test {
     for (int i = 0; i < kBefore; ++i) last_ = tracker_.Track(FrameAt(i), &places);
     ASSERT_TRUE(HasPose(last_.state)) << "the test needs a tracked camera";
   }
-  // Half as large again, turned and shifted.
-  static Sim3 Moved() {
+  // The correction: a scale of 1.5, a rotation and a translation.
+  static Sim3 Correction() {
     Sim3 moved;
     moved.rotation = Rotation3::Exp({0.1, -0.4, 0.2});
     moved.translation = {0.5, 1.0, -2.0};
@@ -56,53 +56,54 @@ class MovedMap : public ::testing::Test {
   std::shared_ptr<const MapSnapshot> After() const {
     Map moved(*before_);
     std::map<KeyFrameId, Sim3> by;
-    for (const KeyFrame& keyframe : before_->keyframes) by[keyframe.id] = Moved();
+    for (const KeyFrame& keyframe : before_->keyframes) by[keyframe.id] = Correction();
     moved.Correct(by);
     return moved.Snapshot();
   }
 
   static Map* map_;
   std::shared_ptr<const MapSnapshot> before_ = map_->Snapshot();
-  static TrackerOptions OnTour() {
+  static TrackerOptions ReadOnlyOptions() {
     TrackerOptions options;
     options.build_maps = false;
     return options;
   }
-  Tracker tracker_{OnTour(), Camera(), 5};
+  Tracker tracker_{ReadOnlyOptions(), Camera(), 5};
   TrackedFrame last_;
 };
 Map* MovedMap::map_ = nullptr;
 
-TEST_F(MovedMap, CarriesTheTrackAlong) {
+TEST_F(MovedMap, TrackingContinuesAfterACorrection) {
   tracker_.SetMap(After(), 1);
   const TrackedFrame next = tracker_.Track(FrameAt(kBefore), nullptr);
   ASSERT_EQ(next.state, TrackingState::kSixDof) << next.hint;
-  // The map's unit is two thirds of a metre now: 3 mm of the truth.
-  EXPECT_TRUE(IsNear(next.camera_from_map, CarriedAlong(Pose(kBefore), Moved()), 0.0045, 0.003))
+  // The map unit is two thirds of a metre now, so that the tolerance is 3 mm.
+  EXPECT_TRUE(IsNear(next.camera_from_map, CorrectedPose(Pose(kBefore), Correction()), 0.0045, 0.003))
       << next.camera_from_map;
 }
 
-TEST_F(MovedMap, IsLostToATrackerThatIsNotTold) {
-  MapSnapshot silent = *After();
-  silent.corrections.clear();
-  tracker_.SetMap(std::make_shared<MapSnapshot>(silent), 1);
+TEST_F(MovedMap, TrackingIsLostWithoutTheCorrectionRecord) {
+  MapSnapshot without_corrections = *After();
+  without_corrections.corrections.clear();
+  tracker_.SetMap(std::make_shared<MapSnapshot>(without_corrections), 1);
   EXPECT_FALSE(HasPose(tracker_.Track(FrameAt(kBefore), nullptr).state));
 }
 
-TEST_F(MovedMap, IsNotFollowedTwice) {
+TEST_F(MovedMap, TheSameCorrectionIsAppliedOnlyOnce) {
   tracker_.SetMap(After(), 1);
   tracker_.SetMap(After(), 1);
   EXPECT_EQ(tracker_.Track(FrameAt(kBefore), nullptr).state, TrackingState::kSixDof);
 }
 
-TEST_F(MovedMap, IsTheMapAboutTheKeyFrameThatMostOfTheImageWasFirstSeenIn) {
+TEST_F(MovedMap, ReferenceKeyFrameIsTheSourceOfMostInliers) {
   std::map<KeyFrameId, int> sources;
   for (const PointMatch& match : last_.matches) {
     if (match.inlier) ++sources[before_->FindPoint(match.point)->source_keyframe];
   }
   const KeyFrameId reference_keyframe = FindReferenceKeyFrame(*before_, last_.matches);
   for (const auto& [keyframe, count] : sources) EXPECT_LE(count, sources[reference_keyframe]) << keyframe;
-  EXPECT_EQ(FindReferenceKeyFrame(*before_, {}), before_->keyframes.back().id) << "nothing seen: the newest";
+  EXPECT_EQ(FindReferenceKeyFrame(*before_, {}), before_->keyframes.back().id)
+      << "without matches, the newest keyframe";
   EXPECT_EQ(FindReferenceKeyFrame({}, {}), kNoId);
 }
 

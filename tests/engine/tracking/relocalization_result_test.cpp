@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a lost tracker answers where places resemble its image: a pose, or why there is none.
+// Tests of what a lost tracker returns where places resemble its image: a pose, or a rejection reason.
 #include "engine/tracking/relocalization_result.h"
 
 #include <gtest/gtest.h>
@@ -19,14 +19,14 @@ using testing_world::RenderedWorld;
 using testing_world::SomeMaps;
 using testing_world::World;
 
-// Three keyframes. Of every ten points `wrong` are not where they were.
+// A map with three keyframes, in which `wrong` of every ten points are displaced.
 std::shared_ptr<const MapSnapshot> MapWith(std::size_t wrong) {
-  return testing_world::MapGoneAstray(World(), Camera(),
-                                      {CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0}), CameraAt({0.2, 0, 0})},
-                                      [=](std::size_t i) { return i % 10 < wrong; });
+  return testing_world::MapWithDisplacedPoints(
+      World(), Camera(), {CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0}), CameraAt({0.2, 0, 0})},
+      [=](std::size_t i) { return i % 10 < wrong; });
 }
 
-// The same map, with those points alone that its first keyframe sees in one corner.
+// The map without errors, reduced to the points in one corner of its first keyframe's image.
 std::shared_ptr<const MapSnapshot> MapOfACorner() {
   auto map = std::make_shared<MapSnapshot>(*MapWith(0));
   const KeyFrame first = map->keyframes.front();
@@ -39,9 +39,9 @@ std::shared_ptr<const MapSnapshot> MapOfACorner() {
   return map;
 }
 
-constexpr double kBetweenPlaces = 10;
+constexpr double kBetweenPlaces = 10;  // metres
 
-// One map of two places, the second so many metres to the right of the first.
+// One map of two places, the second kBetweenPlaces metres to the right of the first.
 std::shared_ptr<const MapSnapshot> TwoPlaces(const MapSnapshot& first, const MapSnapshot& second) {
   auto both = std::make_shared<MapSnapshot>(first);
   const Eigen::Vector3d shift(kBetweenPlaces, 0, 0);
@@ -71,7 +71,7 @@ Frame FrameOf(int index, const RenderedWorld& world = World()) {
   return testing_world::MakeFrame(index, world, CameraAt({0.06 + 0.002 * index, 0.02, 0.03}));
 }
 
-// A visitor who was in no map yet.
+// The frames of a new visitor, who has not been localized in any map before.
 std::vector<TrackedFrame> Visit(const SomeMaps& maps, int frames, const RenderedWorld& world = World()) {
   TrackerOptions options;
   options.build_maps = false;
@@ -85,50 +85,50 @@ TEST(RelocalizationResult, IsUnconfirmedUntilSeveralFramesAgree) {
   SomeMaps maps;
   maps.Add(1, MapWith(0));
   const auto frames = Visit(maps, 4);
-  const auto wanted = static_cast<std::size_t>(TrackerOptions().agreeing_frames);
+  const auto wanted = static_cast<std::size_t>(TrackerOptions().confirming_frames);
   for (std::size_t i = 0; i + 1 < wanted; ++i) {
     EXPECT_EQ(frames[i].state, TrackingState::kLost);
-    EXPECT_EQ(frames[i].verdict.doubt, RejectionReason::kUnconfirmed);
-    EXPECT_EQ(frames[i].verdict.map_key, 1u);
-    EXPECT_EQ(frames[i].verdict.frames, static_cast<int>(i) + 1);
+    EXPECT_EQ(frames[i].relocalization.rejection, RejectionReason::kUnconfirmed);
+    EXPECT_EQ(frames[i].relocalization.map_key, 1u);
+    EXPECT_EQ(frames[i].relocalization.frames, static_cast<int>(i) + 1);
   }
   EXPECT_EQ(frames[wanted - 1].state, TrackingState::kRelocalized);
-  EXPECT_EQ(frames[wanted - 1].verdict.doubt, RejectionReason::kNone);
+  EXPECT_EQ(frames[wanted - 1].relocalization.rejection, RejectionReason::kNone);
 }
 
-TEST(RelocalizationResult, NamesTooFewPointsInAnotherPlace) {
+TEST(RelocalizationResult, ReportsTooFewPointsInAnotherPlace) {
   SomeMaps maps;
   maps.Add(1, MapWith(0));
   for (const TrackedFrame& frame : Visit(maps, 6, RenderedWorld::Room(7177))) {
     EXPECT_EQ(frame.state, TrackingState::kLost);
-    EXPECT_EQ(frame.verdict.doubt, RejectionReason::kFewPoints);
-    EXPECT_LT(frame.verdict.inliers, TrackerOptions().min_recovery_inliers);
+    EXPECT_EQ(frame.relocalization.rejection, RejectionReason::kFewPoints);
+    EXPECT_LT(frame.relocalization.inliers, TrackerOptions().min_recovery_inliers);
   }
 }
 
-TEST(RelocalizationResult, NamesPointsThatAreGatheredInOneCorner) {
+TEST(RelocalizationResult, ReportsPointsInOneCornerOnly) {
   SomeMaps maps;
   maps.Add(1, MapOfACorner());
   ASSERT_GT(maps.At(1)->points.size(), 60u);
   for (const TrackedFrame& frame : Visit(maps, 6)) {
     EXPECT_EQ(frame.state, TrackingState::kLost);
-    EXPECT_EQ(frame.verdict.doubt, RejectionReason::kOneCorner);
-    EXPECT_GE(frame.verdict.inliers, TrackerOptions().min_recovery_inliers);
+    EXPECT_EQ(frame.relocalization.rejection, RejectionReason::kClustered);
+    EXPECT_GE(frame.relocalization.inliers, TrackerOptions().min_recovery_inliers);
   }
 }
 
-TEST(RelocalizationResult, NamesTwoMapsThatLookAlike) {
+TEST(RelocalizationResult, ReportsTwoMapsThatLookAlike) {
   SomeMaps maps;
   maps.Add(1, MapWith(0));
   maps.Add(2, MapWith(0));
   for (const TrackedFrame& frame : Visit(maps, 30)) {
     EXPECT_EQ(frame.state, TrackingState::kLost) << frame.frame.index;
-    EXPECT_EQ(frame.verdict.doubt, RejectionReason::kLookAlikes);
-    EXPECT_EQ(frame.verdict.map_key + frame.verdict.competitor_key, 3u);
+    EXPECT_EQ(frame.relocalization.rejection, RejectionReason::kAmbiguous);
+    EXPECT_EQ(frame.relocalization.map_key + frame.relocalization.competitor_key, 3u);
   }
 }
 
-TEST(RelocalizationResult, TakesTheMapThatIsClearlyAheadWhicheverIsFoundFirst) {
+TEST(RelocalizationResult, AcceptsAClearlyBetterMapInAnyOrder) {
   for (const std::uint64_t right : {1u, 2u}) {
     SomeMaps maps;
     maps.Add(right, MapWith(0));
@@ -139,19 +139,19 @@ TEST(RelocalizationResult, TakesTheMapThatIsClearlyAheadWhicheverIsFoundFirst) {
   }
 }
 
-TEST(RelocalizationResult, TakesTheMapThatIsAlwaysAheadAfterAWhile) {
+TEST(RelocalizationResult, AcceptsAMapThatIsBetterInManyFrames) {
   SomeMaps maps;
   maps.Add(1, MapWith(1));
   maps.Add(2, MapWith(0));
   const auto frames = Visit(maps, 30);
   const auto waited = static_cast<std::size_t>(TrackerOptions().min_leading_frames - 1);
   for (std::size_t i = 0; i < waited; ++i)
-    EXPECT_EQ(frames[i].verdict.doubt, RejectionReason::kLookAlikes) << i;
+    EXPECT_EQ(frames[i].relocalization.rejection, RejectionReason::kAmbiguous) << i;
   EXPECT_TRUE(HasPose(frames.back().state));
   EXPECT_EQ(frames.back().map_key, 2u);
 }
 
-TEST(RelocalizationResult, KeepsToTheMapTheCameraWasInUnlessAnotherIsClearlyBetter) {
+TEST(RelocalizationResult, PrefersThePreviousMapUnlessAnotherIsClearlyBetter) {
   for (const std::size_t wrong : {1u, 5u}) {
     SomeMaps maps;
     maps.Add(1, MapWith(wrong));
@@ -167,7 +167,7 @@ TEST(RelocalizationResult, KeepsToTheMapTheCameraWasInUnlessAnotherIsClearlyBett
   }
 }
 
-TEST(RelocalizationResult, LetsNoMapBeExtendedThatWasJustFoundAgain) {
+TEST(RelocalizationResult, DelaysMapExtensionAfterRelocalization) {
   SomeMaps maps;
   maps.Add(1, MapWith(0));
   const RenderedWorld nothing{std::vector<testing_world::Wall>()};
@@ -175,7 +175,9 @@ TEST(RelocalizationResult, LetsNoMapBeExtendedThatWasJustFoundAgain) {
   options.keyframes.min_distance = 0.05;
   Tracker tracker(options, Camera(), 3);
   tracker.SetMap(maps.At(1), 1);
-  // Lost for longer than keyframes keep apart, then back at a place that is far enough from all keyframes.
+  // The camera is lost for longer than the minimum keyframe interval, and then relocalizes far enough from
+  // all
+  // keyframes for a new one.
   for (int i = 0; i < 8; ++i) EXPECT_FALSE(HasPose(tracker.Track(FrameOf(i, nothing), &maps).state));
   int first_pose = -1, first_keyframe = -1, first_reports = -1;
   for (int i = 100; i < 130; ++i) {
@@ -187,11 +189,11 @@ TEST(RelocalizationResult, LetsNoMapBeExtendedThatWasJustFoundAgain) {
   }
   ASSERT_GE(first_pose, 0);
   ASSERT_GE(first_keyframe, 0);
-  EXPECT_EQ(first_keyframe, first_pose + options.agreeing_frames + 1);
+  EXPECT_EQ(first_keyframe, first_pose + options.confirming_frames + 1);
   EXPECT_EQ(first_reports, first_keyframe);
 }
 
-TEST(RelocalizationResult, TakesTheBetterOfTwoPlacesInOneMapThatLookAlike) {
+TEST(RelocalizationResult, AcceptsTheBetterOfTwoSimilarPlacesInOneMap) {
   for (const bool second : {false, true}) {
     SomeMaps maps;
     maps.Add(1, second ? TwoPlaces(*MapWith(5), *MapWith(0)) : TwoPlaces(*MapWith(0), *MapWith(5)));
@@ -202,19 +204,19 @@ TEST(RelocalizationResult, TakesTheBetterOfTwoPlacesInOneMapThatLookAlike) {
   }
 }
 
-TEST(RelocalizationResult, NamesTwoPlacesInOneMapThatLookAlike) {
+TEST(RelocalizationResult, ReportsTwoPlacesInOneMapThatLookAlike) {
   SomeMaps maps;
   maps.Add(1, TwoPlaces(*MapWith(0), *MapWith(0)));
   for (const TrackedFrame& frame : Visit(maps, 10)) {
     EXPECT_EQ(frame.state, TrackingState::kLost) << frame.frame.index;
-    EXPECT_EQ(frame.verdict.doubt, RejectionReason::kLookAlikes);
-    EXPECT_EQ(frame.verdict.map_key, 1u);
-    EXPECT_EQ(frame.verdict.competitor_key, 1u);
+    EXPECT_EQ(frame.relocalization.rejection, RejectionReason::kAmbiguous);
+    EXPECT_EQ(frame.relocalization.map_key, 1u);
+    EXPECT_EQ(frame.relocalization.competitor_key, 1u);
   }
 }
 
-// The camera was found where a part of the map looks alike, and then sees what only the right place shows.
-TEST(RelocalizationResult, GoesOverToThePlaceThatExplainsMoreOfTheImage) {
+// The camera first relocalizes at a similar but wrong place, and then sees what only the right place shows.
+TEST(RelocalizationResult, SwitchesToThePlaceWithMoreInliers) {
   SomeMaps maps;
   maps.Add(1, TwoPlaces(*MapWith(5), *MapWith(10)));
   TrackerOptions options;
@@ -224,7 +226,7 @@ TEST(RelocalizationResult, GoesOverToThePlaceThatExplainsMoreOfTheImage) {
   int index = 0;
   while (index < 10 && !HasPose(frame.state)) frame = tracker.Track(FrameOf(index++), &maps);
   ASSERT_TRUE(HasPose(frame.state));
-  EXPECT_LT(frame.quality, options.poor_quality);
+  EXPECT_LT(frame.quality, options.poor_visible_ratio);
   EXPECT_NEAR(frame.camera_from_map.OriginInSource().x(), 0, 0.3);
   auto both = TwoPlaces(*MapWith(5), *MapWith(0));
   maps.Add(1, both);
@@ -232,7 +234,7 @@ TEST(RelocalizationResult, GoesOverToThePlaceThatExplainsMoreOfTheImage) {
   for (int i = 0; i < 5; ++i) frame = tracker.Track(FrameOf(index++), &maps);
   ASSERT_TRUE(HasPose(frame.state));
   EXPECT_NEAR(frame.camera_from_map.OriginInSource().x(), kBetweenPlaces, 0.3);
-  EXPECT_GT(frame.quality, options.poor_quality);
+  EXPECT_GT(frame.quality, options.poor_visible_ratio);
 }
 
 }  // namespace

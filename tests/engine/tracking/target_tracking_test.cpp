@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tracker and a mapper that start from a printed image of known width.
+// Runs a tracker and a mapper that initialize from a planar target, a printed image of known width.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -38,10 +38,10 @@ TEST_P(TargetTracking, MakesAMapInMetres) {
   }
   EXPECT_EQ(first_hint, "move sideways");
   ASSERT_GT(tracked.size(), 15u);
-  // No alignment: the map's unit is the metre, from the image's width alone.
-  const double went = (tracked.back().OriginInSource() - tracked.front().OriginInSource()).norm();
-  const double truly = (truth.back().OriginInSource() - truth.front().OriginInSource()).norm();
-  EXPECT_NEAR(went, truly, 0.03 * truly);
+  // No alignment is needed: the width of the target gives the map its scale in metres.
+  const double tracked_distance = (tracked.back().OriginInSource() - tracked.front().OriginInSource()).norm();
+  const double true_distance = (truth.back().OriginInSource() - truth.front().OriginInSource()).norm();
+  EXPECT_NEAR(tracked_distance, true_distance, 0.03 * true_distance);
 }
 
 INSTANTIATE_TEST_SUITE_P(Engines, TargetTracking, testing::Bool(), [](const auto& parameter) {

@@ -23,19 +23,19 @@ using testing_world::RenderedWorld;
 using testing_world::SomeMaps;
 using testing_world::World;
 
-constexpr double kFramesASecond = 30;
+constexpr double kFramesPerSecond = 30;
 constexpr int kWalk = 110;         // frames of the first walk
-constexpr int kShortlyHidden = 8;  // frames with a hand before the lens
-constexpr int kLookAgain = 20;
-constexpr int kFrames = kWalk + kShortlyHidden + kLookAgain;
+constexpr int kCoveredFrames = 8;  // frames with a hand in front of the lens
+constexpr int kFramesAfterwards = 20;
+constexpr int kFrames = kWalk + kCoveredFrames + kFramesAfterwards;
 
-bool Hidden(int frame) {
-  return frame >= kWalk && frame < kWalk + kShortlyHidden;
+bool IsCovered(int frame) {
+  return frame >= kWalk && frame < kWalk + kCoveredFrames;
 }
 
-// Out to the side, with the sway of a hand, and back.
+// The hand-held camera moves sideways and back.
 Rigid3 Pose(int frame) {
-  const double t = frame / kFramesASecond;
+  const double t = frame / kFramesPerSecond;
   return CameraAt({0.45 * std::sin(0.9 * t), 0.05 * std::sin(2.1 * t), 0.15 * (1 - std::cos(1.3 * t))},
                   {1.5 * std::sin(1.7 * t), -4 * std::sin(0.9 * t), 2 * std::sin(1.1 * t)});
 }
@@ -46,7 +46,7 @@ const std::vector<cv::Mat>& Images() {
     std::vector<cv::Mat> rendered;
     for (int i = 0; i < kFrames; ++i) {
       const auto seed = static_cast<std::uint64_t>(i) + 1;
-      if (Hidden(i)) {
+      if (IsCovered(i)) {
         const RenderedWorld nothing{std::vector<testing_world::Wall>()};
         rendered.push_back(nothing.Render(*Camera(), Pose(i), 1.5, seed));
       } else {
@@ -80,7 +80,7 @@ const Walk& OneWalk() {
   return walk;
 }
 
-// Scale, rotation and translation that lay the tracked camera centres on the true ones.
+// The similarity that aligns the tracked camera centres with the true ones.
 Eigen::Matrix4d WorldFromMap(const std::vector<TrackedFrame>& frames) {
   std::vector<Eigen::Vector3d> tracked, truth;
   for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -102,7 +102,7 @@ double DistanceFromTruth(const Eigen::Matrix4d& world_from_map, const Rigid3& ca
   return ((world_from_map * center).head<3>() - truth.OriginInSource()).norm();
 }
 
-TEST(Tracker, StartsAMapAndFollowsItClosely) {
+TEST(Tracker, StartsAMapAndTracksAccurately) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr) << "no map was started; last hint: " << walk.frames[kWalk - 1].hint;
   EXPECT_EQ(walk.frames[0].state, TrackingState::kInitializing);
@@ -129,7 +129,7 @@ TEST(Tracker, StartsAMapAndFollowsItClosely) {
   EXPECT_EQ(Validate(*walk.map), "");
 }
 
-TEST(Tracker, PutsTheMapOnTheWalls) {
+TEST(Tracker, PlacesMapPointsOnTheWalls) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
   const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
@@ -142,17 +142,17 @@ TEST(Tracker, PutsTheMapOnTheWalls) {
   EXPECT_LT(distances[distances.size() * 9 / 10], 0.1);
 }
 
-TEST(Tracker, IsLostWhileTheLensIsCoveredAndComesBack) {
+TEST(Tracker, IsLostWhileTheLensIsCoveredAndRelocalizesAfterwards) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
-  for (int i = kWalk; i < kWalk + kShortlyHidden; ++i) {
+  for (int i = kWalk; i < kWalk + kCoveredFrames; ++i) {
     const TrackedFrame& frame = walk.frames[static_cast<std::size_t>(i)];
     EXPECT_EQ(frame.state, TrackingState::kLost) << i;
     EXPECT_FALSE(frame.hint.empty());
   }
-  int back = kWalk + kShortlyHidden;
+  int back = kWalk + kCoveredFrames;
   while (back < kFrames && !HasPose(walk.frames[static_cast<std::size_t>(back)].state)) ++back;
-  ASSERT_LT(back, kWalk + kShortlyHidden + 6) << "not recovered in time";
+  ASSERT_LT(back, kWalk + kCoveredFrames + 6) << "not relocalized in time";
   EXPECT_EQ(walk.frames[static_cast<std::size_t>(back)].state, TrackingState::kRelocalized);
   const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
   for (int i = back; i < kFrames; ++i) {
@@ -162,7 +162,7 @@ TEST(Tracker, IsLostWhileTheLensIsCoveredAndComesBack) {
   }
 }
 
-TEST(Tracker, AnswersToTheByteTheSameOnEveryRun) {
+TEST(Tracker, IsBitIdenticalOnEveryRun) {
   const Walk again = TakeWalk(1);
   const Walk& walk = OneWalk();
   for (std::size_t i = 0; i < walk.frames.size(); ++i) {
@@ -186,7 +186,7 @@ TEST(Tracker, AnswersToTheByteTheSameOnEveryRun) {
               0);
 }
 
-TEST(Tracker, FindsItsPlaceInAMapThatItIsGivenWithTheHelpOfAPlaceFinder) {
+TEST(Tracker, RelocalizesInAGivenMapWithAPlaceFinder) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
   SomeMaps places;
@@ -206,13 +206,13 @@ TEST(Tracker, FindsItsPlaceInAMapThatItIsGivenWithTheHelpOfAPlaceFinder) {
     if (first < 0) continue;
     EXPECT_TRUE(HasPose(frame.state)) << i;
     EXPECT_LT(DistanceFromTruth(world_from_map, frame.camera_from_map, Pose(i)), 0.05) << i;
-    EXPECT_FALSE(tracker.TakeKeyFrameCandidate()) << "a tour adds nothing";
+    EXPECT_FALSE(tracker.TakeKeyFrameCandidate()) << "a read-only tracker must not offer keyframes";
   }
   EXPECT_GE(first, 40);
   EXPECT_LT(first, 46);
 }
 
-TEST(Tracker, FindsItsPlaceInOverExposedImagesAndStaysThereWhenTheExposureIsRightAgain) {
+TEST(Tracker, RelocalizesInOverexposedImagesAndKeepsTrackingAtNormalExposure) {
   constexpr double kGain = 2.5;
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
@@ -239,7 +239,7 @@ TEST(Tracker, FindsItsPlaceInOverExposedImagesAndStaysThereWhenTheExposureIsRigh
   EXPECT_LT(first, 48);
 }
 
-TEST(Tracker, EntersAnotherMapOnlyAfterSeveralFramesAgree) {
+TEST(Tracker, RelocalizesOnlyAfterSeveralFramesAgree) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
   SomeMaps places;
@@ -255,11 +255,11 @@ TEST(Tracker, EntersAnotherMapOnlyAfterSeveralFramesAgree) {
     EXPECT_EQ(frame.map_key, 9u);
     EXPECT_EQ(tracker.map_key(), 9u);
   }
-  EXPECT_GE(first, 40 + options.agreeing_frames - 1);
+  EXPECT_GE(first, 40 + options.confirming_frames - 1);
   EXPECT_LT(first, 50);
 }
 
-TEST(Tracker, IsLostAsSoonAsTheImageIsOfAnotherPlace) {
+TEST(Tracker, IsLostAsSoonAsTheImageShowsAnotherPlace) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
   SomeMaps places;
@@ -279,7 +279,7 @@ TEST(Tracker, IsLostAsSoonAsTheImageIsOfAnotherPlace) {
   }
 }
 
-TEST(Tracker, EntersNoMapOfAnotherPlace) {
+TEST(Tracker, DoesNotRelocalizeInAMapOfAnotherPlace) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
   SomeMaps places;
@@ -296,7 +296,7 @@ TEST(Tracker, EntersNoMapOfAnotherPlace) {
   }
 }
 
-// A grid of tiles before the lens, of which one in `every` is open.
+// Covers the image with a grid of tiles, of which one in `every` is left open.
 void CoverTiles(int every, cv::Mat* image) {
   constexpr int kTile = 40;  // pixels
   int tile = 0;
@@ -308,13 +308,13 @@ void CoverTiles(int every, cv::Mat* image) {
   }
 }
 
-TEST(Tracker, HoldsAPoseThatManyPointsAgreeOnThoughMostAreHidden) {
+TEST(Tracker, KeepsAPoseWithConsensusAlthoughMostPointsAreOccluded) {
   const Walk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
   TrackerOptions options;
   const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
-  for (const bool agreement_counts : {true, false}) {
-    if (!agreement_counts) options.min_consensus_inliers = 100000;
+  for (const bool consensus_suffices : {true, false}) {
+    if (!consensus_suffices) options.min_consensus_inliers = 100000;
     SomeMaps places;
     places.Add(9, walk.map);
     Tracker tracker(options, Camera(), 3);
@@ -325,7 +325,7 @@ TEST(Tracker, HoldsAPoseThatManyPointsAgreeOnThoughMostAreHidden) {
     frame.image = frame.image.clone();
     CoverTiles(8, &frame.image);
     const TrackedFrame tracked = tracker.Track(frame, nullptr);
-    if (agreement_counts) {
+    if (consensus_suffices) {
       ASSERT_EQ(tracked.state, TrackingState::kSixDof);
       EXPECT_LT(tracked.quality, options.lost_quality);
       EXPECT_GE(tracked.finite_points, options.min_consensus_inliers);
@@ -336,7 +336,7 @@ TEST(Tracker, HoldsAPoseThatManyPointsAgreeOnThoughMostAreHidden) {
   }
 }
 
-TEST(Tracker, ExtendsItsMapAgainAfterAShortLossThoughHalfOfItIsHidden) {
+TEST(Tracker, ExtendsItsMapAgainAfterAShortLossDespiteOcclusion) {
   constexpr int kCovered = 45, kLost = 78, kBack = 80;
   Lockstep lockstep({}, Camera(), 1);
   std::size_t keyframes = 0;
@@ -351,7 +351,7 @@ TEST(Tracker, ExtendsItsMapAgainAfterAShortLossThoughHalfOfItIsHidden) {
   EXPECT_GT(lockstep.map()->keyframes.size(), keyframes + 1);
 }
 
-TEST(Tracker, OffersEachKeyframeOnceAndNoneBeforeThereIsAMap) {
+TEST(Tracker, OffersNoKeyframesBeforeThereIsAMap) {
   Tracker tracker({}, Camera(), 1);
   tracker.StartNewMap();
   EXPECT_TRUE(tracker.starting());

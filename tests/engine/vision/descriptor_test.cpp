@@ -17,8 +17,8 @@
 namespace docent::engine {
 namespace {
 
-// Smooth random blobs, known at every real place, so that a turned or scaled image follows from
-// mathematics.
+// Smooth random blobs, defined at every real coordinate, so that a rotated or scaled image can be computed
+// exactly.
 class Blobs {
  public:
   explicit Blobs(std::uint64_t seed, double reach = 400) {
@@ -28,7 +28,7 @@ class Blobs {
       blobs_.push_back({random.Uniform(-reach / 2, reach / 2), random.Uniform(-reach / 2, reach / 2),
                         random.Uniform(2.0, 4.5), random.Uniform(-70, 70)});
     }
-    // Only near blobs are summed up: each cell of the grid knows those that reach it.
+    // Only nearby blobs are summed: each cell of the grid lists the blobs that reach it.
     cells_ = static_cast<int>(reach / kCell) + 1;
     origin_ = -reach / 2;
     grid_.resize(static_cast<std::size_t>(cells_ * cells_));
@@ -61,11 +61,11 @@ class Blobs {
   double origin_ = 0;
 };
 
-// An image of 41x41 pixels about a place: its middle is pixel (20, 20).
+// An image of 41x41 pixels around a place, which is at pixel (20, 20).
 cv::Mat Around(const std::function<double(double, double)>& grey, const Eigen::Vector2d& place,
-               double turn_rad = 0, double scale = 1) {
+               double rotation_rad = 0, double scale = 1) {
   cv::Mat image(41, 41, CV_8UC1);
-  const double c = scale * std::cos(turn_rad), s = scale * std::sin(turn_rad);
+  const double c = scale * std::cos(rotation_rad), s = scale * std::sin(rotation_rad);
   for (int y = 0; y < 41; ++y)
     for (int x = 0; x < 41; ++x)
       image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(
@@ -73,7 +73,7 @@ cv::Mat Around(const std::function<double(double, double)>& grey, const Eigen::V
   return image;
 }
 
-const Eigen::Vector2f kMiddle(20, 20);
+const Eigen::Vector2f kCenter(20, 20);
 
 std::vector<Eigen::Vector2d> Places(int count) {
   Random random(11);
@@ -82,23 +82,24 @@ std::vector<Eigen::Vector2d> Places(int count) {
   return places;
 }
 
-// Of the descriptors of two images of the same place: the nearest pair counts, as it does in matching.
+// The distance of the nearest pair of descriptors of two places, as matching uses it.
 int Difference(const Description& a, const Description& b) {
-  int least = 4 * kDescriptorLength * kDescriptorLength;
+  int min_distance = 4 * kDescriptorLength * kDescriptorLength;
   for (int i = 0; i < a.count; ++i)
     for (int j = 0; j < b.count; ++j)
-      least = std::min(least, SquaredDistance(a.of_direction[static_cast<std::size_t>(i)].descriptor,
-                                              b.of_direction[static_cast<std::size_t>(j)].descriptor));
-  return least;
+      min_distance =
+          std::min(min_distance, SquaredDistance(a.of_direction[static_cast<std::size_t>(i)].descriptor,
+                                                 b.of_direction[static_cast<std::size_t>(j)].descriptor));
+  return min_distance;
 }
 
-// Counts how often the changed image of a place is nearest, among all places, to the place itself.
-double PartRecognised(const std::function<cv::Mat(const Eigen::Vector2d&)>& changed) {
+// The ratio of places whose changed image has its nearest neighbour, among all places, in the place itself.
+double RecognitionRatio(const std::function<cv::Mat(const Eigen::Vector2d&)>& changed) {
   const Blobs blobs(5);
   std::vector<Description> known, seen;
   for (const Eigen::Vector2d& place : Places(150)) {
-    const auto before = Describe(Around(blobs, place), kMiddle);
-    const auto after = Describe(changed(place), kMiddle);
+    const auto before = Describe(Around(blobs, place), kCenter);
+    const auto after = Describe(changed(place), kCenter);
     EXPECT_TRUE(before && after);
     if (!before || !after) return 0;
     known.push_back(*before);
@@ -114,21 +115,21 @@ double PartRecognised(const std::function<cv::Mat(const Eigen::Vector2d&)>& chan
   return static_cast<double>(right) / static_cast<double>(seen.size());
 }
 
-TEST(Descriptor, RecognisesPlacesWhateverTheImageIsTurnedBy) {
+TEST(Descriptor, IsInvariantToRotation) {
   const Blobs blobs(5);
-  for (const double turn_deg : {10.0, 45.0, 90.0, 133.0, 180.0, -77.0}) {
-    EXPECT_GT(PartRecognised([&](const Eigen::Vector2d& place) {
-                return Around(blobs, place, turn_deg * std::numbers::pi / 180);
+  for (const double rotation_deg : {10.0, 45.0, 90.0, 133.0, 180.0, -77.0}) {
+    EXPECT_GT(RecognitionRatio([&](const Eigen::Vector2d& place) {
+                return Around(blobs, place, rotation_deg * std::numbers::pi / 180);
               }),
               0.95)
-        << turn_deg;
+        << rotation_deg;
   }
 }
 
-TEST(Descriptor, RecognisesPlacesInOtherLight) {
+TEST(Descriptor, IsInvariantToGainAndOffset) {
   const Blobs blobs(5);
   for (const auto& [gain, offset] : {std::pair{0.5, 0.0}, {0.6, 80.0}, {0.4, 100.0}, {0.8, -20.0}}) {
-    EXPECT_GT(PartRecognised([&, gain = gain, offset = offset](const Eigen::Vector2d& place) {
+    EXPECT_GT(RecognitionRatio([&, gain = gain, offset = offset](const Eigen::Vector2d& place) {
                 return Around([&](double x, double y) { return gain * blobs(x, y) + offset; }, place);
               }),
               0.97)
@@ -136,19 +137,19 @@ TEST(Descriptor, RecognisesPlacesInOtherLight) {
   }
 }
 
-TEST(Descriptor, RecognisesPlacesAThirdNearerOrFurther) {
+TEST(Descriptor, ToleratesScaleChangesOfAThird) {
   const Blobs blobs(5);
   for (const double scale : {0.75, 0.85, 1.2, 1.33}) {
-    EXPECT_GT(PartRecognised([&](const Eigen::Vector2d& place) { return Around(blobs, place, 0.4, scale); }),
-              0.9)
+    EXPECT_GT(
+        RecognitionRatio([&](const Eigen::Vector2d& place) { return Around(blobs, place, 0.4, scale); }), 0.9)
         << scale;
   }
 }
 
-TEST(Descriptor, RecognisesPlacesThroughNoiseAndAPixelOff) {
+TEST(Descriptor, ToleratesNoiseAndSubpixelShifts) {
   const Blobs blobs(5);
   Random random(2);
-  EXPECT_GT(PartRecognised([&](const Eigen::Vector2d& place) {
+  EXPECT_GT(RecognitionRatio([&](const Eigen::Vector2d& place) {
               const Eigen::Vector2d off(random.Uniform(-0.8, 0.8), random.Uniform(-0.8, 0.8));
               return Around([&](double x, double y) { return blobs(x, y) + random.Uniform(-8, 8); },
                             place + off, random.Uniform(0, 6.28));
@@ -156,29 +157,29 @@ TEST(Descriptor, RecognisesPlacesThroughNoiseAndAPixelOff) {
             0.93);
 }
 
-TEST(Descriptor, KeepsTheSameBytesUnderAnOffsetOfBrightness) {
+TEST(Descriptor, IsUnchangedByABrightnessOffset) {
   const Blobs blobs(6);
   for (const Eigen::Vector2d& place : Places(30)) {
     const cv::Mat image = Around([&](double x, double y) { return 0.3 * blobs(x, y) + 40; }, place);
     const cv::Mat brighter = image + cv::Scalar(60);
-    const auto a = Describe(image, kMiddle), b = Describe(brighter, kMiddle);
+    const auto a = Describe(image, kCenter), b = Describe(brighter, kCenter);
     ASSERT_TRUE(a && b);
     ASSERT_EQ(a->count, b->count);
     EXPECT_LT(Difference(*a, *b), 20);
   }
 }
 
-TEST(Descriptor, TurnsItsDirectionWithTheImage) {
+TEST(Descriptor, DirectionRotatesWithTheImage) {
   const Blobs blobs(7);
   int agree = 0, all = 0;
   for (const Eigen::Vector2d& place : Places(60)) {
     const double turn = 0.9;
-    const auto before = Describe(Around(blobs, place), kMiddle);
-    const auto after = Describe(Around(blobs, place, turn), kMiddle);
+    const auto before = Describe(Around(blobs, place), kCenter);
+    const auto after = Describe(Around(blobs, place, turn), kCenter);
     ASSERT_TRUE(before && after);
     if (before->count != 1 || after->count != 1) continue;
     ++all;
-    // Looking with a camera turned by `turn` turns what it sees the other way.
+    // Rotating the camera by `turn` rotates the image content the other way.
     const double change = after->of_direction[0].direction_rad - before->of_direction[0].direction_rad + turn;
     agree += std::abs(std::remainder(change, 2 * std::numbers::pi)) < 0.1;
   }
@@ -186,14 +187,14 @@ TEST(Descriptor, TurnsItsDirectionWithTheImage) {
   EXPECT_GE(agree, all * 9 / 10);
 }
 
-TEST(Descriptor, PointsAlongAnEdgesGradient) {
-  // Brighter to the lower right.
+TEST(Descriptor, DirectionFollowsTheGradientOfAnEdge) {
+  // The image is brighter to the lower right.
   const cv::Mat edge = Around([](double x, double y) { return 128 + 80 * std::tanh((x + y) / 4); }, {0, 0});
-  const auto description = Describe(edge, kMiddle);
+  const auto description = Describe(edge, kCenter);
   ASSERT_TRUE(description);
   EXPECT_EQ(description->count, 1);
   EXPECT_NEAR(description->of_direction[0].direction_rad, std::numbers::pi / 4, 0.03);
-  // Seen along its own direction all gradients are +x.
+  // Relative to its own direction, all gradients point along +x.
   for (std::size_t i = 0; i < kDescriptorSize; ++i) {
     if (i % 4 != 0) {
       EXPECT_LE(description->of_direction[0].descriptor.values[i], 30) << i;
@@ -201,17 +202,17 @@ TEST(Descriptor, PointsAlongAnEdgesGradient) {
   }
 }
 
-TEST(Descriptor, HasTheSameLengthEverywhere) {
+TEST(Descriptor, IsNormalizedToAConstantLength) {
   const Blobs blobs(8);
   for (const Eigen::Vector2d& place : Places(50)) {
-    const auto description = Describe(Around(blobs, place), kMiddle);
+    const auto description = Describe(Around(blobs, place), kCenter);
     ASSERT_TRUE(description);
     const int squared = SquaredDistance(description->of_direction[0].descriptor, {});
     EXPECT_NEAR(std::sqrt(squared), kDescriptorLength, 8);
   }
 }
 
-TEST(Descriptor, RefusesPlacesNearTheBorder) {
+TEST(Descriptor, RejectsPixelsNearTheBorder) {
   const cv::Mat image = Around(Blobs(9), {0, 0});
   EXPECT_TRUE(Describe(image, {14, 14}));
   EXPECT_TRUE(Describe(image, {26, 26}));
@@ -223,13 +224,13 @@ TEST(Descriptor, RefusesPlacesNearTheBorder) {
   }
 }
 
-TEST(Descriptor, RefusesFlatAndMerelyNoisyPatches) {
-  EXPECT_FALSE(Describe(Around([](double, double) { return 90; }, {0, 0}), kMiddle));
+TEST(Descriptor, RejectsUniformAndNoisyPatches) {
+  EXPECT_FALSE(Describe(Around([](double, double) { return 90; }, {0, 0}), kCenter));
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
-    // Deviation 1.4 grey values, as a webcam's.
+    // The noise has a standard deviation of 1.4 grey values, like that of a webcam.
     const cv::Mat noise = Around([&](double, double) { return 90.5 + random.Uniform(-2.4, 2.4); }, {0, 0});
-    EXPECT_FALSE(Describe(noise, kMiddle));
+    EXPECT_FALSE(Describe(noise, kCenter));
   }
 }
 
@@ -252,7 +253,7 @@ TEST(DescriptorDistance, EqualsItsDefinition) {
   EXPECT_EQ(SquaredDistance(zeros, full), 36 * 255 * 255);
 }
 
-TEST(DescribingCorners, FindsTheSamePlacesFromTwoViews) {
+TEST(DescribeCornersTest, FindsTheSamePlacesFromTwoViews) {
   const auto world = testing_world::RenderedWorld::SingleWall(2, 4);
   const auto camera = testing_world::PinholeCamera(480, 360);
   const Rigid3 pose_a = testing_world::CameraAt({0, 0, 0});
@@ -262,10 +263,10 @@ TEST(DescribingCorners, FindsTheSamePlacesFromTwoViews) {
   ASSERT_GT(a.size(), 300u);
   ASSERT_GT(b.size(), 300u);
   int accepted = 0, right = 0;
-  for (const DescribedPlace& seen : b) {
+  for (const DescribedKeypoint& seen : b) {
     int best = std::numeric_limits<int>::max(), second = best;
-    const DescribedPlace* nearest = nullptr;
-    for (const DescribedPlace& place : a) {
+    const DescribedKeypoint* nearest = nullptr;
+    for (const DescribedKeypoint& place : a) {
       const int distance = SquaredDistance(seen.oriented.descriptor, place.oriented.descriptor);
       if (nearest && (place.pixel - nearest->pixel).norm() < 6) {
         best = std::min(best, distance);
@@ -289,21 +290,21 @@ TEST(DescribingCorners, FindsTheSamePlacesFromTwoViews) {
   EXPECT_GT(right, accepted * 4 / 5) << accepted;
 }
 
-TEST(DescribingAPlace, TakesTheLevelsWhereItFits) {
+TEST(DescribePlaceTest, UsesTheLevelsWhereThePatchFits) {
   const auto features = MakeFeatures(testing_world::RenderedWorld::SingleWall(2, 4).Render(
       *testing_world::PinholeCamera(320, 240), testing_world::CameraAt({0, 0, 0})));
-  std::vector<DescribedPlace> places;
-  DescribePlace(*features, {160, 120}, -3, 9, &places);
+  std::vector<DescribedKeypoint> places;
+  DescribeKeypoint(*features, {160, 120}, -3, 9, &places);
   std::array<int, kPyramidLevels> count{};
-  for (const DescribedPlace& place : places) {
+  for (const DescribedKeypoint& place : places) {
     EXPECT_EQ(place.pixel, Eigen::Vector2f(160, 120));
     ++count[place.level];
   }
-  // 40x30 pixels are left of level 3: the middle alone is far enough from its border.
+  // Level 3 has 40x30 pixels, and only its centre is far enough from the border.
   for (std::size_t level = 0; level < kPyramidLevels; ++level) EXPECT_GE(count[level], 1) << level;
   places.clear();
-  DescribePlace(*features, {40, 120}, 0, 3, &places);
-  for (const DescribedPlace& place : places) EXPECT_LE(place.level, 1);
+  DescribeKeypoint(*features, {40, 120}, 0, 3, &places);
+  for (const DescribedKeypoint& place : places) EXPECT_LE(place.level, 1);
   EXPECT_FALSE(places.empty());
 }
 

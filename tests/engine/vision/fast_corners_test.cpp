@@ -50,27 +50,27 @@ void ExpectAsOpenCv(const cv::Mat& image, int threshold, int border) {
   }
 }
 
-TEST(FastCorners, AreThoseOfOpenCv) {
+TEST(FastCorners, MatchOpenCv) {
   for (const int threshold : {0, 1, 5, 12, 25, 60, 254, 255}) {
     ExpectAsOpenCv(Blurred(320, 240, 1), threshold, 6);
     ExpectAsOpenCv(Noise(161, 97, 2), threshold, 6);
   }
 }
 
-TEST(FastCorners, AreThoseOfOpenCvInImagesOfAnyWidth) {
+TEST(FastCorners, MatchOpenCvForAnyImageWidth) {
   for (int width = 9; width < 60; ++width) {
     ExpectAsOpenCv(Blurred(width, 31, static_cast<std::uint64_t>(width)), 8, 4);
     ExpectAsOpenCv(Blurred(width, 13, static_cast<std::uint64_t>(width)), 8, 6);
   }
 }
 
-TEST(FastCorners, AreFoundInAPartOfAnImage) {
+TEST(FastCorners, AreFoundInAnImageRegion) {
   const cv::Mat image = Blurred(200, 150, 3);
   ExpectAsOpenCv(image(cv::Rect(13, 7, 101, 90)), 10, 6);
 }
 
-TEST(FastCorners, NeedAllNineBeyondTheThreshold) {
-  // A corner of nine pixels, brighter by exactly 20.
+TEST(FastCorners, RequireNineContiguousPixelsBeyondTheThreshold) {
+  // A corner of nine circle pixels, each brighter than the centre by exactly 20.
   cv::Mat image(40, 40, CV_8UC1, cv::Scalar(100));
   for (const cv::Point& offset :
        {cv::Point(0, -3), {1, -3}, {2, -2}, {3, -1}, {3, 0}, {3, 1}, {2, 2}, {1, 3}, {0, 3}})
@@ -84,11 +84,11 @@ TEST(FastCorners, NeedAllNineBeyondTheThreshold) {
   };
   EXPECT_TRUE(finds(19));
   EXPECT_FALSE(finds(20));
-  image.at<std::uint8_t>(23, 20) = 100;  // eight are none
+  image.at<std::uint8_t>(23, 20) = 100;  // eight pixels are not enough
   EXPECT_FALSE(finds(5));
 }
 
-TEST(FastCorners, AreNoneWhereThereIsNoRoom) {
+TEST(FastCorners, AreEmptyForTooSmallImages) {
   for (const cv::Size size : {cv::Size(12, 40), cv::Size(40, 12), cv::Size(1, 1)}) {
     std::vector<Corner> corners(3);
     std::vector<int> row_begin;

@@ -13,7 +13,7 @@
 namespace docent::engine {
 namespace {
 
-// Random rectangles: corners in every size and contrast.
+// Random rectangles, which give corners of every scale and contrast.
 cv::Mat Rectangles(int width, int height, std::uint64_t seed, double contrast = 1) {
   Random random(seed);
   cv::Mat image(height, width, CV_8UC1, cv::Scalar(128));
@@ -42,7 +42,7 @@ bool SameFeatures(const ImageFeatures& a, const ImageFeatures& b) {
   return cv::norm(a.small_blurry.pixels, b.small_blurry.pixels, cv::NORM_INF) == 0;
 }
 
-TEST(PyramidCoordinates, GoThereAndBackAgain) {
+TEST(PyramidCoordinates, RoundTripBetweenLevels) {
   Random random(2);
   for (int trial = 0; trial < 100; ++trial) {
     const Eigen::Vector2d pixel(random.Uniform(0, 640), random.Uniform(0, 480));
@@ -52,9 +52,9 @@ TEST(PyramidCoordinates, GoThereAndBackAgain) {
   EXPECT_EQ(LevelZeroFromLevel({7, 9}, 0), Eigen::Vector2d(7, 9));
 }
 
-// On an image whose grey value is its own coordinate, a level's pixel must show the coordinate that the
-// pixel stands for, up to rounding in each level.
-TEST(PyramidCoordinates, AgreeWithTheLevelsOfAnySize) {
+// In an image whose grey value is the pixel coordinate, each pixel of a level must show the coordinate that
+// it maps to, up to the rounding of each level.
+TEST(PyramidCoordinates, MatchTheLevelsOfAnyImageSize) {
   for (const cv::Size size :
        {cv::Size(240, 240), cv::Size(241, 239), cv::Size(251, 255), cv::Size(246, 250)}) {
     cv::Mat columns(size, CV_8UC1), rows(size, CV_8UC1);
@@ -82,7 +82,7 @@ TEST(PyramidCoordinates, AgreeWithTheLevelsOfAnySize) {
   }
 }
 
-TEST(HalvedImage, IsTheRoundedMeanOfTwoByTwo) {
+TEST(HalvedImage, IsTheRoundedMeanOfTwoByTwoPixels) {
   Random random(12);
   for (const cv::Size size : {cv::Size(64, 48), cv::Size(37, 21), cv::Size(2, 2), cv::Size(33, 3)}) {
     cv::Mat image(size, CV_8UC1), half;
@@ -102,7 +102,7 @@ TEST(HalvedImage, IsTheRoundedMeanOfTwoByTwo) {
   }
 }
 
-TEST(Features, HaveCornersInOrderWithAnIndexByRow) {
+TEST(Features, HaveSortedCornersWithARowIndex) {
   const auto features = MakeFeatures(Rectangles(333, 251, 5));
   for (std::size_t level = 0; level < kPyramidLevels; ++level) {
     const cv::Mat& image = features->levels[level];
@@ -124,7 +124,7 @@ TEST(Features, HaveCornersInOrderWithAnIndexByRow) {
   }
 }
 
-TEST(Features, DependOnTheImageAlone) {
+TEST(Features, DependOnTheImageOnly) {
   const cv::Mat image = Rectangles(320, 240, 1), other = Rectangles(320, 240, 2, 0.2);
   const auto alone = MakeFeatures(image);
   MakeFeatures(other);
@@ -134,7 +134,7 @@ TEST(Features, DependOnTheImageAlone) {
   EXPECT_FALSE(SameFeatures(*alone, *MakeFeatures(other)));
 }
 
-TEST(Features, ComeOutTheSameInMemoryThatWasUsedBefore) {
+TEST(Features, DoNotDependOnReusedMemory) {
   const cv::Mat image = Rectangles(320, 240, 1), other = Rectangles(400, 300, 2, 0.5);
   const std::array<int, kPyramidLevels> hint = {12, 14, 16, 18};
   ImageFeatures fresh, used;
@@ -144,7 +144,7 @@ TEST(Features, ComeOutTheSameInMemoryThatWasUsedBefore) {
   EXPECT_TRUE(SameFeatures(fresh, used));
 }
 
-TEST(Features, ApproachTheWantedCountsFromFrameToFrame) {
+TEST(Features, ConvergeToTheWantedCornerCounts) {
   FeatureOptions options;
   options.wanted_corners = {800, 400, 150, 60};
   for (const double contrast : {1.0, 0.4}) {
@@ -175,7 +175,7 @@ TEST(Features, ApproachTheWantedCountsFromFrameToFrame) {
   }
 }
 
-TEST(Features, OfASmallOrEmptyImageAreFewButInOrder) {
+TEST(Features, AreValidForSmallAndUniformImages) {
   for (const cv::Mat& image : {Rectangles(64, 64, 3), cv::Mat(64, 80, CV_8UC1, cv::Scalar(100))}) {
     const auto features = MakeFeatures(image);
     for (std::size_t level = 0; level < kPyramidLevels; ++level) {

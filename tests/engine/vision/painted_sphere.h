@@ -10,8 +10,7 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 
-// Images of which the truth follows from mathematics, for tests of thumbnails and of the rotation between
-// them.
+// Synthetic images with exactly known rotations, for tests of thumbnails and of rotation alignment.
 namespace docent::engine {
 
 inline constexpr double kPi = 3.14159265358979323846;
@@ -22,8 +21,8 @@ inline double Radians(double degrees) {
   return degrees * kPi / 180;
 }
 
-// A painted sphere around the camera: grey values that depend on the direction alone, in patches of
-// 30 degrees down to 2 degrees, so that a rotation's image follows from mathematics.
+// A textured sphere around the camera: its grey value depends on the viewing direction only, with detail from
+// 30 degrees down to 2 degrees, so that the image after any rotation is known exactly.
 class PaintedSphere {
  public:
   explicit PaintedSphere(std::uint64_t seed) : seed_(seed) {}
@@ -36,12 +35,12 @@ class PaintedSphere {
     return grey;
   }
 
-  // gain and offset act as a change of exposure.
+  // gain and offset simulate a change of exposure.
   cv::Mat Render(const CameraModel& camera, const Rotation3& camera_from_sphere, double gain = 1,
                  double offset = 0, double noise = 0) const {
     const Rotation3 sphere_from_camera = camera_from_sphere.inverse();
     cv::Mat image(camera.height_px(), camera.width_px(), CV_8UC1, cv::Scalar(0));
-    // Other noise in every image: its seed comes from where the camera looks.
+    // The noise seed depends on the orientation, so that each image has different noise.
     const double bits = 1e9 * camera_from_sphere.Log().sum();
     Random random(seed_ + static_cast<std::uint64_t>(std::abs(bits)));
     for (int y = 0; y < image.rows; ++y)
@@ -59,7 +58,7 @@ class PaintedSphere {
     random.Next();
     return random.Uniform(-1, 1);
   }
-  // Values at the corners of a unit lattice, smoothly joined.
+  // Value noise: values at the corners of a unit lattice, smoothly interpolated.
   double Noise(const Eigen::Vector3d& position) const {
     const Eigen::Vector3i cell = position.array().floor().cast<int>();
     const Eigen::Array3d f = (position - cell.cast<double>()).array();

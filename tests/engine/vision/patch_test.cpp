@@ -16,8 +16,8 @@
 namespace docent::engine {
 namespace {
 
-// A smooth grey value for every place of an image: waves of 14 to 30 pixels in several directions. Shorter
-// ones would lose height between the pixels, where bilinear interpolation flattens them.
+// A smooth texture: waves with wavelengths of 14 to 30 pixels in several directions. Bilinear interpolation
+// would reduce the amplitude of shorter waves.
 double Texture(double x, double y) {
   return 128 + 30 * std::sin(0.30 * x + 0.20 * y) + 28 * std::cos(0.19 * x - 0.38 * y + 1) +
          20 * std::sin(0.44 * x - 0.11 * y + 2) + 18 * std::cos(0.08 * x + 0.33 * y + 0.5);
@@ -38,7 +38,7 @@ const cv::Mat& TextureImage() {
 
 const Eigen::Matrix2f kUnwarped = Eigen::Matrix2f::Identity();
 
-TEST(PatchAlignment, RecoversShiftsToATwentiethOfAPixel) {
+TEST(PatchAlignment, RecoversShiftsToFiveHundredthsOfAPixel) {
   Random random(3);
   std::vector<float> errors;
   for (int trial = 0; trial < 200; ++trial) {
@@ -55,13 +55,13 @@ TEST(PatchAlignment, RecoversShiftsToATwentiethOfAPixel) {
     errors.push_back((aligned->pixel - center - shift).norm());
     EXPECT_GT(aligned->correlation, 0.99f);
   }
-  // A patch on little more than an edge, half a pixel off, suffers from the interpolation.
+  // A patch with little more than an edge, half a pixel off, is less accurate because of the interpolation.
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[errors.size() * 3 / 4], 0.05f);
   EXPECT_LT(errors.back(), 0.12f);
 }
 
-TEST(PatchAlignment, TakesAFractionalPlaceOnBothSides) {
+TEST(PatchAlignment, AcceptsSubpixelPositionsInBothImages) {
   Random random(4);
   for (int trial = 0; trial < 100; ++trial) {
     const Eigen::Vector2f center(static_cast<float>(random.Uniform(20, 100)),
@@ -75,7 +75,7 @@ TEST(PatchAlignment, TakesAFractionalPlaceOnBothSides) {
   }
 }
 
-TEST(PatchAlignment, IgnoresAChangeOfBrightness) {
+TEST(PatchAlignment, IsInvariantToABrightnessOffset) {
   for (const double change : {-35.0, -10.0, 15.0, 30.0}) {
     const cv::Mat changed =
         Image(120, 100, [&](double x, double y) { return 0.7 * (Texture(x - 0.7, y + 0.4) - 128) + 128; });
@@ -83,7 +83,7 @@ TEST(PatchAlignment, IgnoresAChangeOfBrightness) {
     PatchTemplate patch, same_light;
     ASSERT_TRUE(CutPatch(TextureImage(), {60, 50}, kUnwarped, &patch));
     ASSERT_TRUE(CutPatch(changed, {60, 50}, kUnwarped, &same_light));
-    // A gain shows in the correlation not at all, an offset shows not even in the place.
+    // The correlation is invariant to gain and offset; the aligned position is invariant to the offset.
     const auto aligned = AlignPatch(same_light, brighter, {61, 49}, 3, 20);
     ASSERT_TRUE(aligned);
     EXPECT_LT((aligned->pixel - Eigen::Vector2f(60, 50)).norm(), 0.05f) << change;
@@ -93,7 +93,7 @@ TEST(PatchAlignment, IgnoresAChangeOfBrightness) {
   }
 }
 
-TEST(TolerantPatchAlignment, ConvergesAtAnyContrast) {
+TEST(TolerantPatchAlignment, ConvergesAtAnyContrastRatio) {
   Random random(11);
   for (const double contrast : {0.3, 0.5, 1.9, 2.5, 3.5}) {
     const double of_patch = std::min(1.0, 1 / contrast), of_image = of_patch * contrast;
@@ -118,7 +118,7 @@ TEST(TolerantPatchAlignment, ConvergesAtAnyContrast) {
   }
 }
 
-// As a camera takes the texture with so much more light.
+// The texture as a camera with `gain` times the exposure sees it.
 cv::Mat OverExposed(double gain, const Eigen::Vector2d& shift) {
   return Image(120, 100, [=](double x, double y) { return gain * Texture(x - shift.x(), y - shift.y()); });
 }
@@ -126,14 +126,14 @@ int SaturatedIn(const cv::Mat& image, int x, int y) {
   return cv::countNonZero(image(cv::Rect(x - 4, y - 4, kPatchSize, kPatchSize)) >= kSaturatedGrey);
 }
 
-TEST(TolerantPatchAlignment, FindsWhatSaturatesInOneImage) {
+TEST(TolerantPatchAlignment, FindsPatchesThatSaturateInOneImage) {
   Random random(12);
   int partly = 0, found = 0;
   for (int trial = 0; trial < 400; ++trial) {
     const Eigen::Vector2i center(20 + static_cast<int>(random.Below(80)),
                                  20 + static_cast<int>(random.Below(60)));
     const Eigen::Vector2d shift(random.Uniform(-1, 1), random.Uniform(-1, 1));
-    // Either the patch or the image may be the one that saturates.
+    // Alternately the patch and the image are the saturated one.
     const bool swapped = trial % 2 == 0;
     const cv::Mat bright = OverExposed(1.9, swapped ? Eigen::Vector2d::Zero() : shift);
     const cv::Mat fair = OverExposed(1, swapped ? shift : Eigen::Vector2d::Zero());
@@ -147,11 +147,11 @@ TEST(TolerantPatchAlignment, FindsWhatSaturatesInOneImage) {
     if ((aligned->pixel.cast<double>() - center.cast<double>() - shift).norm() < 0.3) ++found;
   }
   ASSERT_GT(partly, 100);
-  // Alignment that takes saturated pixels at their word finds a third.
+  // Alignment without special treatment of saturated pixels finds a third of them.
   EXPECT_GT(found, 0.7 * partly);
 }
 
-TEST(PatchAlignment, FollowsAnAffineWarp) {
+TEST(PatchAlignment, AlignsUnderAnAffineWarp) {
   Random random(5);
   for (int trial = 0; trial < 100; ++trial) {
     const double angle = random.Uniform(-3, 3), scale = random.Uniform(0.6, 1.7),
@@ -174,7 +174,7 @@ TEST(PatchAlignment, FollowsAnAffineWarp) {
   }
 }
 
-TEST(PatchAlignment, NeverEndsFurtherAwayThanAllowed) {
+TEST(PatchAlignment, NeverMovesFurtherThanAllowed) {
   Random random(6);
   int refused = 0, accepted = 0;
   for (int trial = 0; trial < 500; ++trial) {
@@ -194,20 +194,20 @@ TEST(PatchAlignment, NeverEndsFurtherAwayThanAllowed) {
   EXPECT_GT(accepted, 5);
 }
 
-TEST(PatchAlignment, RefusesToWanderToAPlaceThatItWouldReach) {
-  // Long waves only, so that alignment finds its way from six pixels off, when it is let.
+TEST(PatchAlignment, FailsWhenTheTargetIsBeyondTheAllowedDistance) {
+  // Long wavelengths only, so that alignment would converge from six pixels away if it were allowed to.
   const cv::Mat image = Image(120, 100, [](double x, double y) {
     return 128 + 60 * std::sin(0.11 * x + 0.02 * y) + 55 * std::cos(0.1 * y - 0.03 * x);
   });
   PatchTemplate patch;
   ASSERT_TRUE(CutPatch(image, {60, 50}, kUnwarped, &patch));
-  const auto free = AlignPatch(patch, image, {65, 53}, 20, 50);
-  ASSERT_TRUE(free);
-  EXPECT_LT((free->pixel - Eigen::Vector2f(60, 50)).norm(), 0.1f);
+  const auto unlimited = AlignPatch(patch, image, {65, 53}, 20, 50);
+  ASSERT_TRUE(unlimited);
+  EXPECT_LT((unlimited->pixel - Eigen::Vector2f(60, 50)).norm(), 0.1f);
   EXPECT_FALSE(AlignPatch(patch, image, {65, 53}, 3, 50));
 }
 
-TEST(PatchAlignment, StopsAtTheImageBorder) {
+TEST(PatchAlignment, FailsAtTheImageBorder) {
   PatchTemplate patch;
   ASSERT_TRUE(CutPatch(TextureImage(), {60, 50}, kUnwarped, &patch));
   for (const Eigen::Vector2f& start :
@@ -219,7 +219,7 @@ TEST(PatchAlignment, StopsAtTheImageBorder) {
   EXPECT_FALSE(AlignPatch(patch, TextureImage(), {nan, 50}));
 }
 
-TEST(CuttingAPatch, ShowsTheSourcePixelsItself) {
+TEST(CutPatchTest, CopiesTheSourcePixelsWithoutAWarp) {
   PatchTemplate patch;
   ASSERT_TRUE(CutPatch(TextureImage(), {60, 50}, kUnwarped, &patch));
   for (int row = 0; row < kPatchSize; ++row)
@@ -228,9 +228,9 @@ TEST(CuttingAPatch, ShowsTheSourcePixelsItself) {
                 TextureImage().at<std::uint8_t>(50 - 4 + row, 60 - 4 + column));
 }
 
-TEST(CuttingAPatch, NeedsAllOfTheWarpedSquareInside) {
+TEST(CutPatchTest, RequiresTheWholeWarpedSquareInsideTheImage) {
   PatchTemplate patch;
-  // Patch pixels -4 .. 3 and a border of one for the gradients.
+  // The patch covers pixels -4 .. 3, plus a border of one pixel for the gradients.
   EXPECT_TRUE(CutPatch(TextureImage(), {5, 50}, kUnwarped, &patch));
   EXPECT_FALSE(CutPatch(TextureImage(), {4.9f, 50}, kUnwarped, &patch));
   EXPECT_TRUE(CutPatch(TextureImage(), {114.9f, 50}, kUnwarped, &patch));
@@ -241,10 +241,10 @@ TEST(CuttingAPatch, NeedsAllOfTheWarpedSquareInside) {
   EXPECT_FALSE(CutPatch(TextureImage(), {std::nanf(""), 50}, kUnwarped, &patch));
 }
 
-TEST(CuttingAPatch, RefusesWhatCannotBeFoundAgain) {
+TEST(CutPatchTest, RejectsPatchesWithoutUsableTexture) {
   PatchTemplate patch;
   EXPECT_FALSE(CutPatch(Image(40, 40, [](double, double) { return 90; }), {20, 20}, kUnwarped, &patch));
-  // An edge holds the patch in one direction only.
+  // An edge constrains the patch in one direction only.
   EXPECT_FALSE(CutPatch(Image(40, 40, [](double x, double) { return x < 20 ? 30 : 200; }), {20, 20},
                         kUnwarped, &patch));
   Random random(1);
@@ -277,7 +277,7 @@ TEST(PatchCorrelation, EqualsItsDefinition) {
   }
 }
 
-TEST(PatchCorrelation, IsOneAtHomeMinusOneInTheNegativeAndNothingOnBlank) {
+TEST(PatchCorrelation, IsOneForThePatchMinusOneForItsNegativeAndZeroForBlank) {
   PatchTemplate patch;
   ASSERT_TRUE(CutPatch(TextureImage(), {60, 50}, kUnwarped, &patch));
   EXPECT_NEAR(PatchCorrelation(patch, TextureImage(), 60, 50), 1, 1e-5);
@@ -289,7 +289,7 @@ TEST(PatchCorrelation, IsOneAtHomeMinusOneInTheNegativeAndNothingOnBlank) {
   EXPECT_GT(PatchCorrelation(patch, dim, 60, 50), 0.999f);
 }
 
-TEST(TolerantPatchCorrelation, IsTheUsualOneWhereNothingSaturates) {
+TEST(TolerantPatchCorrelation, EqualsThePlainCorrelationWithoutSaturation) {
   Random random(14);
   const cv::Mat fair = Image(120, 100, [](double x, double y) { return 0.8 * (Texture(x, y) - 128) + 120; });
   for (int trial = 0; trial < 100; ++trial) {
@@ -300,7 +300,7 @@ TEST(TolerantPatchCorrelation, IsTheUsualOneWhereNothingSaturates) {
   }
 }
 
-TEST(TolerantPatchCorrelation, IsHighWhereTheImageSaturatesInPartAndNothingWhereItDoesNearlyEverywhere) {
+TEST(TolerantPatchCorrelation, IsHighForPartialSaturationAndZeroForNearlyFullSaturation) {
   const cv::Mat bright = OverExposed(1.9, Eigen::Vector2d::Zero());
   Random random(13);
   int partly = 0, nearly_all = 0;
@@ -315,7 +315,7 @@ TEST(TolerantPatchCorrelation, IsHighWhereTheImageSaturatesInPartAndNothingWhere
       EXPECT_EQ(TolerantPatchCorrelation(patch, bright, x, y), 0);
     } else if (saturated > 0) {
       ++partly;
-      // Pixels between kSaturatedGrey and white are not all the same.
+      // Saturated pixels may have any grey value from kSaturatedGrey to 255.
       EXPECT_GT(TolerantPatchCorrelation(patch, bright, x, y), 0.98f) << saturated;
     }
   }

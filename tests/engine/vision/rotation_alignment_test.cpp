@@ -51,7 +51,7 @@ INSTANTIATE_TEST_SUITE_P(Lenses, RotationAlignmentOfLens,
                                          AlignmentCase{"FisheyeTen", Fisheye(), 10, 0.1}),
                          [](const auto& test) { return test.param.name; });
 
-TEST(RotationAlignment, IsNotDisturbedByAChangeOfExposure) {
+TEST(RotationAlignment, IsInvariantToExposure) {
   const PaintedSphere sphere(11);
   const Rotation3 b_from_a = Rotation3::Exp({0.03, -0.05, 0.04});
   const auto a = MakeSmallBlurryImage(sphere.Render(Pinhole(), {}));
@@ -82,21 +82,21 @@ TEST(RotationAlignment, StartsFromTheInitialRotation) {
   EXPECT_LT(Degrees(AngleBetween(alignment->b_from_a, b_from_a)), 0.3);
 }
 
-TEST(RotationAlignment, IsEmptyWithoutOverlap) {
+TEST(RotationAlignment, FailsWithoutOverlap) {
   const PaintedSphere sphere(14);
   const auto a = MakeSmallBlurryImage(sphere.Render(Pinhole(), {}));
   EXPECT_FALSE(AlignRotation(a, Pinhole(), a, Pinhole(), Rotation3::Exp({0, 2.5, 0})));
   EXPECT_FALSE(AlignRotation({}, Pinhole(), a, Pinhole()));
 }
 
-TEST(RotationAlignment, DoesNotClaimToConvergeOnABlankWall) {
+TEST(RotationAlignment, DoesNotConvergeOnABlankImage) {
   const auto blank = MakeSmallBlurryImage(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)));
   const auto alignment = AlignRotation(blank, Pinhole(), blank, Pinhole());
   ASSERT_TRUE(alignment);
   EXPECT_FALSE(alignment->converged);
 }
 
-TEST(RotationAlignment, AnswersTheSameOnEveryThread) {
+TEST(RotationAlignment, IsDeterministicAcrossThreads) {
   const PaintedSphere sphere(15);
   const auto a = MakeSmallBlurryImage(sphere.Render(Pinhole(), {}));
   const auto b = MakeSmallBlurryImage(sphere.Render(Pinhole(), Rotation3::Exp({0.02, 0.03, 0.01})));
@@ -117,31 +117,33 @@ TEST(RotationAlignment, AnswersTheSameOnEveryThread) {
   for (const double difference : differences) EXPECT_EQ(difference, 0);
 }
 
-// What is painted lies on a sphere about the first camera; the second has turned about a point behind the
-// first, and so has gone to the side.
-TEST(AlignRotation, TakesTheTurnAboutAPointBehindTheCamera) {
+// The textured sphere is centred at the first camera. The second camera is rotated about a point behind the
+// first, and is therefore displaced sideways.
+TEST(AlignRotation, RecoversARotationAboutAPivotBehindTheCamera) {
   const CameraModel camera(LensModel::kRadialTangential, {320, 240, 260, 260, 160, 120}, {});
   const PaintedSphere sphere(5);
-  const Eigen::Vector3d pivot(0, 0, -0.5);  // of the sphere's radius
+  const Eigen::Vector3d pivot(0, 0, -0.5);  // in units of the sphere's radius
   const Rotation3 turn = Rotation3::Exp({0, Radians(6), 0});
-  cv::Mat there(camera.height_px(), camera.width_px(), CV_8UC1, cv::Scalar(0));
+  cv::Mat second_image(camera.height_px(), camera.width_px(), CV_8UC1, cv::Scalar(0));
   const Eigen::Vector3d center = pivot - turn.inverse() * pivot;
-  for (int y = 0; y < there.rows; ++y) {
-    for (int x = 0; x < there.cols; ++x) {
+  for (int y = 0; y < second_image.rows; ++y) {
+    for (int x = 0; x < second_image.cols; ++x) {
       const Eigen::Vector3d direction = turn.inverse() * *camera.Unproject({x, y});
       const double along = direction.dot(center);
       const double distance = -along + std::sqrt(along * along + 1 - center.squaredNorm());
-      there.at<std::uint8_t>(y, x) =
+      second_image.at<std::uint8_t>(y, x) =
           cv::saturate_cast<std::uint8_t>(sphere.Grey(center + distance * direction));
     }
   }
-  const SmallBlurryImage a = MakeSmallBlurryImage(sphere.Render(camera, {})), b = MakeSmallBlurryImage(there);
+  const SmallBlurryImage a = MakeSmallBlurryImage(sphere.Render(camera, {})),
+                         b = MakeSmallBlurryImage(second_image);
   const auto found = AlignRotation(a, camera, b, camera, {}, 10, pivot);
-  const auto as_if_still = AlignRotation(a, camera, b, camera, {}, 10);
-  ASSERT_TRUE(found && as_if_still);
+  const auto without_pivot = AlignRotation(a, camera, b, camera, {}, 10);
+  ASSERT_TRUE(found && without_pivot);
   EXPECT_TRUE(found->converged);
   EXPECT_LT(Degrees((found->b_from_a * turn.inverse()).Angle()), 0.1);
-  EXPECT_GT(Degrees(as_if_still->b_from_a.Angle()), 8.0) << "half as much again, from going to the side";
+  EXPECT_GT(Degrees(without_pivot->b_from_a.Angle()), 8.0)
+      << "the sideways displacement appears as additional rotation";
 }
 
 }  // namespace

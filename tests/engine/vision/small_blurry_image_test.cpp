@@ -27,7 +27,7 @@ cv::Mat NoiseImage(int width, int height, std::uint64_t seed) {
   return image;
 }
 
-TEST(MakingAThumbnail, BlursAsOpenCvDoes) {
+TEST(MakeThumbnail, BlursLikeOpenCv) {
   for (const double sigma_px : {0.8, 2.5}) {
     for (const cv::Size size : {cv::Size(640, 480), cv::Size(333, 251), cv::Size(64, 64), cv::Size(90, 3)}) {
       const cv::Mat image = NoiseImage(size.width, size.height, 4);
@@ -42,7 +42,7 @@ TEST(MakingAThumbnail, BlursAsOpenCvDoes) {
   }
 }
 
-TEST(MakingAThumbnail, UsesMemoryAgainUnlessSomebodyHoldsIt) {
+TEST(MakeThumbnail, ReusesMemoryUnlessAnotherOwnerHoldsIt) {
   const cv::Mat one = NoiseImage(320, 240, 1), other = NoiseImage(320, 240, 2);
   SmallBlurryImage thumbnail;
   MakeSmallBlurryImage(one, kThumbnailBlurPx, &thumbnail);
@@ -56,7 +56,7 @@ TEST(MakingAThumbnail, UsesMemoryAgainUnlessSomebodyHoldsIt) {
   EXPECT_EQ(Difference(thumbnail, MakeSmallBlurryImage(one)), 0);
 }
 
-TEST(SmallBlurryImage, IsAtMostEightyWideWithTheScaleThatMakesItSo) {
+TEST(SmallBlurryImage, IsAtMostEightyPixelsWide) {
   const struct {
     int width, height, scale, small_width, small_height;
   } cases[] = {{640, 480, 8, 80, 60}, {752, 480, 10, 75, 48},   {80, 60, 1, 80, 60},
@@ -69,7 +69,7 @@ TEST(SmallBlurryImage, IsAtMostEightyWideWithTheScaleThatMakesItSo) {
   }
 }
 
-TEST(SmallBlurryImage, KeepsBlockMeansWithTheirFractionAndNoMean) {
+TEST(SmallBlurryImage, HoldsBlockMeansMinusTheirMean) {
   cv::Mat image(16, 160, CV_8UC1);
   for (int y = 0; y < image.rows; ++y)
     for (int x = 0; x < image.cols; ++x)
@@ -86,7 +86,7 @@ TEST(SmallBlurryImage, KeepsBlockMeansWithTheirFractionAndNoMean) {
   EXPECT_NEAR(cv::mean(small.pixels)[0], 0, 1e-3);
 }
 
-TEST(SmallBlurryImage, SumsOfLargeBrightBlocksDoNotOverflow) {
+TEST(SmallBlurryImage, DoesNotOverflowForLargeBrightImages) {
   cv::Mat image(600, 24000, CV_8UC1, cv::Scalar(255));
   image.colRange(0, 12000).setTo(253);
   const SmallBlurryImage small = MakeSmallBlurryImage(image, 0);
@@ -95,7 +95,7 @@ TEST(SmallBlurryImage, SumsOfLargeBrightBlocksDoNotOverflow) {
   EXPECT_NEAR(small.pixels.at<float>(1, 79), 1, 1e-3);
 }
 
-TEST(SmallBlurryImage, DifferenceIsTheMeanSquareAndInfiniteForOtherSizes) {
+TEST(SmallBlurryImage, DifferenceIsTheMeanSquareOrInfiniteForDifferentSizes) {
   SmallBlurryImage a, b;
   a.pixels = cv::Mat(6, 7, CV_32FC1, cv::Scalar(2));
   b.pixels = cv::Mat(6, 7, CV_32FC1, cv::Scalar(2));
@@ -107,7 +107,7 @@ TEST(SmallBlurryImage, DifferenceIsTheMeanSquareAndInfiniteForOtherSizes) {
   EXPECT_EQ(Difference({}, {}), std::numeric_limits<double>::infinity());
 }
 
-TEST(SmallBlurryImage, TheSamePlaceDiffersLessThanAnotherPlace) {
+TEST(SmallBlurryImage, DiffersLessForTheSamePlaceThanForAnother) {
   const PaintedSphere sphere(3);
   const auto make = [&](const Rotation3& rotation) {
     return MakeSmallBlurryImage(sphere.Render(Pinhole(), rotation, 1, 0, 4));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes a part of a recorded sequence anew with its images changed as another visitor's camera would show
-// them. Timestamps, ground truth and segments go along, and the calibration is that of the changed images:
+// Writes a part of a recorded sequence with changed images, as another visitor's camera would show them.
+// Timestamps, ground truth and segments are copied, and the calibration is adapted to the changed images:
 //
 //   change_sequence kitchen kitchen-tele --frames 50%: --change tele:1.6
 //
-// --change may be repeated; the changes follow one another. Without it the part is copied as it is.
+// --change may be repeated; the changes are applied in order. Without it the images are copied unchanged.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
@@ -35,16 +35,16 @@ struct Options {
   std::uint64_t seed = 1;
 };
 
-// "500", or "50%" of the count, or nothing for the default.
+// Parses "500", or "50%" of the count; an empty text gives the default.
 std::uint64_t FrameNumber(const std::string& range, std::string_view text, std::uint64_t count,
                           std::uint64_t default_number) {
   if (text.empty()) return default_number;
   const bool percent = text.ends_with('%');
   const auto number = app::ParseNumber(percent ? text.substr(0, text.size() - 1) : text);
-  const double most = percent ? 100 : static_cast<double>(count);
-  if (!number || !(*number >= 0 && *number <= most) || (!percent && *number != std::floor(*number))) {
-    throw Error("The frames '" + range + "' are not two numbers of frames from 0 to " +
-                std::to_string(count) + ", or per cent of them, with a colon between.");
+  const double max_number = percent ? 100 : static_cast<double>(count);
+  if (!number || !(*number >= 0 && *number <= max_number) || (!percent && *number != std::floor(*number))) {
+    throw Error("The range '" + range + "' must be two frame numbers from 0 to " + std::to_string(count) +
+                ", or percentages, separated by a colon.");
   }
   return static_cast<std::uint64_t>(
       std::llround(percent ? *number / 100 * static_cast<double>(count) : *number));
@@ -56,20 +56,20 @@ struct Range {
 
 Range RangeOf(const std::string& text, std::uint64_t count) {
   const std::size_t colon = text.find(':');
-  if (colon == std::string::npos) throw Error("The frames '" + text + "' need a colon, as in 0:500 or 50%:.");
+  if (colon == std::string::npos) throw Error("The range '" + text + "' needs a colon, as in 0:500 or 50%:.");
   const Range range{FrameNumber(text, std::string_view(text).substr(0, colon), count, 0),
                     FrameNumber(text, std::string_view(text).substr(colon + 1), count, count)};
-  if (range.from >= range.until) throw Error("The frames '" + text + "' hold no frame.");
+  if (range.from >= range.until) throw Error("The range '" + text + "' contains no frames.");
   return range;
 }
 
-void CopyIfThere(const std::optional<fs::path>& from, const fs::path& to) {
+void CopyIfPresent(const std::optional<fs::path>& from, const fs::path& to) {
   if (from) fs::copy_file(*from, to, fs::copy_options::overwrite_existing);
 }
 
 class ImageWriter {
  public:
-  explicit ImageWriter(const fs::path& folder) : folder_(MadeFolder(folder)), list_(folder / "rgb.txt") {
+  explicit ImageWriter(const fs::path& folder) : folder_(CreateFolder(folder)), list_(folder / "rgb.txt") {
     list_.Write("# timestamp filename\n");
   }
   void Add(Timestamp time, const cv::Mat& image) {
@@ -85,9 +85,9 @@ class ImageWriter {
   void Close() { list_.Close(); }
 
  private:
-  static fs::path MadeFolder(const fs::path& folder) {
+  static fs::path CreateFolder(const fs::path& folder) {
     if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
-      throw Error("'" + folder.string() + "' is there already and is no empty folder.");
+      throw Error("'" + folder.string() + "' already exists and is not an empty folder.");
     app::MakeFolder(folder / "rgb");
     return folder;
   }
@@ -99,8 +99,7 @@ class ImageWriter {
 void Run(const Options& options) {
   const auto source = app::OpenFolder(options.input, {});
   const app::SourceInfo& info = source->info();
-  if (!info.frame_count)
-    throw Error("'" + options.input.string() + "' does not tell how many frames it has.");
+  if (!info.frame_count) throw Error("The number of frames in '" + options.input.string() + "' is unknown.");
   const Range range = RangeOf(options.frames, *info.frame_count);
   if (!info.calibration_path) throw Error("'" + options.input.string() + "' has no calibration.");
   engine::CameraModel lens = app::ReadCalibration(*info.calibration_path);
@@ -123,9 +122,9 @@ void Run(const Options& options) {
     writer.Add(frame.time, image);
   }
   app::WriteCalibration(options.output / "calibration.yaml", lens);
-  CopyIfThere(info.ground_truth_path, options.output / "groundtruth.txt");
-  CopyIfThere(info.segments_path, options.output / "segments.txt");
-  writer.Close();  // last: it is what makes the folder a sequence
+  CopyIfPresent(info.ground_truth_path, options.output / "groundtruth.txt");
+  CopyIfPresent(info.segments_path, options.output / "segments.txt");
+  writer.Close();  // last, because this file makes the folder a sequence
   for (const auto& change : changes) {
     if (const std::string summary = change->Summary(); !summary.empty()) std::printf("%s\n", summary.c_str());
   }
@@ -137,15 +136,16 @@ void Run(const Options& options) {
 
 int main(int argc, char** argv) {
   docent::testing::Options options;
-  CLI::App program("Writes a part of a recorded sequence anew with its images changed.");
+  CLI::App program("Writes a part of a recorded sequence with changed images.");
   program.add_option("SEQUENCE", options.input, "Folder with the sequence")->required();
-  program.add_option("OUTPUT", options.output, "Folder to write to; new or empty")->required();
-  program.add_option("--frames", options.frames, "FROM:UNTIL in frames or per cent, such as 0:500 or 50%:");
+  program.add_option("OUTPUT", options.output, "Output folder, new or empty")->required();
+  program.add_option("--frames", options.frames,
+                     "Range of frames FROM:UNTIL, as numbers or percentages, such as 0:500 or 50%:");
   program
       .add_option("--change", options.changes,
-                  "blur:LENGTH_PX[@ANGLE_DEG], exposure:FACTOR, tele:FACTOR, people:SHARE, rim:DIAMETER")
+                  "blur:LENGTH_PX[@ANGLE_DEG], exposure:FACTOR, tele:FACTOR, people:RATIO, rim:DIAMETER")
       ->allow_extra_args(false);
-  program.add_option("--seed", options.seed, "Of the people");
+  program.add_option("--seed", options.seed, "Seed of the people");
   CLI11_PARSE(program, argc, argv);
   try {
     docent::testing::Run(options);

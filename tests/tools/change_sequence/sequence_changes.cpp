@@ -28,8 +28,8 @@ class Blur : public SequenceChange {
   }
 
  private:
-  // The direction of the translation that aligns an image with the one before it (phase correlation). Where
-  // the image hardly moves, the direction of before is kept.
+  // Sets the direction to that of the translation between an image and the one before it (phase correlation).
+  // While the image hardly moves, the previous direction is kept.
   void FollowMotion(const cv::Mat& image) {
     cv::Mat grey = image;
     if (image.channels() == 3) cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
@@ -39,13 +39,13 @@ class Blur : public SequenceChange {
     if (!previous_.empty()) {
       if (window_.empty()) cv::createHanningWindow(window_, small.size(), CV_32F);
       const cv::Point2d motion = cv::phaseCorrelate(previous_, small, window_);
-      if (std::hypot(motion.x, motion.y) > kLeastMotion_px) angle_rad_ = std::atan2(motion.y, motion.x);
+      if (std::hypot(motion.x, motion.y) > kMinMotion_px) angle_rad_ = std::atan2(motion.y, motion.x);
     }
     previous_ = small;
   }
 
-  static constexpr double kLeastMotion_px =
-      0.25;  // of the half image: its direction is known to about 0.2 rad
+  static constexpr double kMinMotion_px =
+      0.25;  // at half resolution; above it the direction is known to about 0.2 rad
 
   const double length_px_;
   const bool along_motion_;
@@ -67,8 +67,9 @@ class Exposure : public SequenceChange {
   const double factor_;
 };
 
-// x' = factor (x - middle) + middle: the focal length and the offset of the principal point from the middle
-// grow by the factor. Distortion coefficients belong to directions, not pixels, and stay as they are.
+// x' = factor (x - middle) + middle: the focal length and the offset of the principal point from the image
+// centre are multiplied by the factor. Distortion coefficients apply to normalized coordinates and do not
+// change.
 class Tele : public SequenceChange {
  public:
   explicit Tele(double factor) : factor_(factor) {}
@@ -99,26 +100,26 @@ class Tele : public SequenceChange {
 
 class People : public SequenceChange {
  public:
-  People(double share, const ChangeContext& context) : people_(share, context) {}
+  People(double ratio, const ChangeContext& context) : people_(ratio, context) {}
 
   cv::Mat Apply(Timestamp time, const cv::Mat& image) override {
     if (!first_) first_ = time;
     cv::Mat changed = image.clone();
     const double time_s = ToSeconds(time - *first_);
     people_.Draw(time_s, &changed);
-    const double hidden = people_.HiddenShare(time_s);
-    least_hidden_ = std::min(least_hidden_, hidden);
-    most_hidden_ = std::max(most_hidden_, hidden);
+    const double occluded = people_.OccludedRatio(time_s);
+    min_occluded_ = std::min(min_occluded_, occluded);
+    max_occluded_ = std::max(max_occluded_, occluded);
     return changed;
   }
   std::string Summary() const override {
-    return "people hide " + app::FormatNumber(100 * least_hidden_, 2) + " to " +
-           app::FormatNumber(100 * most_hidden_, 2) + " % of the image";
+    return "people occlude " + app::FormatNumber(100 * min_occluded_, 2) + " to " +
+           app::FormatNumber(100 * max_occluded_, 2) + " % of the image";
   }
 
  private:
   WalkingPeople people_;
-  double least_hidden_ = 1, most_hidden_ = 0;
+  double min_occluded_ = 1, max_occluded_ = 0;
   std::optional<Timestamp> first_;
 };
 
@@ -149,7 +150,7 @@ class Rim : public SequenceChange {
     cv::merge(std::vector<cv::Mat>(static_cast<std::size_t>(image.channels()), mask), mask_);
   }
 
-  static constexpr double kSoftEdge_px = 6;  // the rim of a lens is out of focus
+  static constexpr double kSoftEdge_px = 6;  // the edge of the lens is out of focus
 
   const double diameter_;
   cv::Mat mask_;
@@ -169,17 +170,17 @@ double NumberIn(const std::string& change, std::string_view text, double low, do
 cv::Mat LineKernel(double length_px, double angle_rad) {
   const int half = static_cast<int>(std::ceil(0.5 * length_px)) + 1;
   cv::Mat kernel = cv::Mat::zeros(2 * half + 1, 2 * half + 1, CV_32F);
-  // Sixteen samples a pixel, each shared among its four neighbours by bilinear weights.
+  // Sixteen samples per pixel, each distributed over its four neighbours with bilinear weights.
   const int samples = std::max(1, static_cast<int>(std::lround(16 * length_px)));
   for (int i = 0; i < samples; ++i) {
     const double along = length_px * ((i + 0.5) / samples - 0.5);
     const double x = half + along * std::cos(angle_rad), y = half + along * std::sin(angle_rad);
     const int left = static_cast<int>(std::floor(x)), top = static_cast<int>(std::floor(y));
-    const double right_share = x - left, below_share = y - top;
-    kernel.at<float>(top, left) += static_cast<float>((1 - right_share) * (1 - below_share));
-    kernel.at<float>(top, left + 1) += static_cast<float>(right_share * (1 - below_share));
-    kernel.at<float>(top + 1, left) += static_cast<float>((1 - right_share) * below_share);
-    kernel.at<float>(top + 1, left + 1) += static_cast<float>(right_share * below_share);
+    const double right_weight = x - left, below_weight = y - top;
+    kernel.at<float>(top, left) += static_cast<float>((1 - right_weight) * (1 - below_weight));
+    kernel.at<float>(top, left + 1) += static_cast<float>(right_weight * (1 - below_weight));
+    kernel.at<float>(top + 1, left) += static_cast<float>((1 - right_weight) * below_weight);
+    kernel.at<float>(top + 1, left + 1) += static_cast<float>(right_weight * below_weight);
   }
   return kernel / cv::sum(kernel)[0];
 }
@@ -199,7 +200,7 @@ std::unique_ptr<SequenceChange> MakeChange(const std::string& text, const Change
   if (name == "tele") return std::make_unique<Tele>(NumberIn(text, rest, 1, 10));
   if (name == "people") return std::make_unique<People>(NumberIn(text, rest, 0.01, 0.9), context);
   if (name == "rim") return std::make_unique<Rim>(NumberIn(text, rest, 0.1, 1));
-  throw Error("There is no change '" + text + "'; the changes are blur, exposure, tele, people and rim.");
+  throw Error("Unknown change '" + text + "': the changes are blur, exposure, tele, people and rim.");
 }
 
 }  // namespace docent::testing

@@ -46,7 +46,7 @@ std::string ErrorOf(const std::string& change) {
   return "";
 }
 
-TEST(SequenceChanges, BlurIsALineOfItsLengthAndAngle) {
+TEST(SequenceChanges, BlurKernelHasItsLengthAndAngle) {
   for (const double angle : {0.0, 0.5, std::numbers::pi / 2}) {
     const cv::Mat kernel = LineKernel(13, angle);
     const cv::Moments moments = cv::moments(kernel);
@@ -55,7 +55,7 @@ TEST(SequenceChanges, BlurIsALineOfItsLengthAndAngle) {
                          2 * moments.mu11 * std::cos(angle) * std::sin(angle) +
                          moments.mu02 * std::sin(angle) * std::sin(angle);
     const double across = moments.mu20 + moments.mu02 - along;
-    // A uniform line of length L has the variance L^2 / 12; the bilinear weights add at most a quarter of a
+    // A uniform line of length L has a variance of L^2 / 12; the bilinear weights add at most a quarter of a
     // square pixel.
     EXPECT_NEAR(along, 13.0 * 13 / 12, 0.25);
     EXPECT_LT(across, 0.26);
@@ -84,7 +84,7 @@ TEST(SequenceChanges, ExposureMultipliesAndClips) {
   EXPECT_THAT(exposed("exposure:0.5"), ElementsAre(0, 50, 65, 100));
 }
 
-TEST(SequenceChanges, TeleShowsAPointWhereItsLensProjectsIt) {
+TEST(SequenceChanges, TeleImagesMatchTheirCameraModel) {
   const engine::CameraModel camera(engine::LensModel::kRadialTangential, {320, 240, 200, 201, 163, 117},
                                    {-0.2, 0.03, 0.001, -0.002, 0});
   const auto tele = MakeChange("tele:1.6", kContext);
@@ -96,13 +96,13 @@ TEST(SequenceChanges, TeleShowsAPointWhereItsLensProjectsIt) {
   EXPECT_DOUBLE_EQ(lens.intrinsics().fx, 1.6 * camera.intrinsics().fx);
 }
 
-TEST(SequenceChanges, PeopleHideTheirShareAndMove) {
+TEST(SequenceChanges, PeopleOccludeTheGivenRatioAndMove) {
   const WalkingPeople people(1.0 / 3, kContext);
   double mean = 0;
-  for (int i = 0; i < 100; ++i) mean += people.HiddenShare(0.1 * i) / 100;
+  for (int i = 0; i < 100; ++i) mean += people.OccludedRatio(0.1 * i) / 100;
   EXPECT_NEAR(mean, 1.0 / 3, 0.01);
-  // What changes alike on black and on white is hidden.
-  const auto hidden = [&](double time_s) {
+  // Pixels that are equal on a black and on a white image are occluded.
+  const auto occluded = [&](double time_s) {
     cv::Mat black(240, 320, CV_8UC3, cv::Scalar::all(0)), white(240, 320, CV_8UC3, cv::Scalar::all(255));
     people.Draw(time_s, &black);
     people.Draw(time_s, &white);
@@ -111,12 +111,12 @@ TEST(SequenceChanges, PeopleHideTheirShareAndMove) {
     cv::extractChannel(difference, difference, 0);
     return cv::Mat(difference == 0);
   };
-  const cv::Mat now = hidden(1), later = hidden(1.5);
-  EXPECT_NEAR(cv::countNonZero(now) / 76800.0, people.HiddenShare(1), 0.02);
+  const cv::Mat now = occluded(1), later = occluded(1.5);
+  EXPECT_NEAR(cv::countNonZero(now) / 76800.0, people.OccludedRatio(1), 0.02);
   EXPECT_GT(cv::countNonZero(now != later), 2000);
 }
 
-TEST(SequenceChanges, RimIsBlackOutsideItsCircleAlone) {
+TEST(SequenceChanges, RimIsBlackOnlyOutsideItsCircle) {
   const cv::Mat image(240, 320, CV_8UC3, cv::Scalar(10, 100, 200));
   const cv::Mat round = MakeChange("rim:0.8", kContext)->Apply({}, image);  // a circle of 320 pixels
   EXPECT_EQ(round.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 0, 0));
@@ -124,7 +124,7 @@ TEST(SequenceChanges, RimIsBlackOutsideItsCircleAlone) {
   EXPECT_EQ(round.at<cv::Vec3b>(239, 160), cv::Vec3b(10, 100, 200));
 }
 
-TEST(SequenceChanges, SaysWhatIsWrongWithAChange) {
+TEST(SequenceChanges, ReportsWhatIsWrongWithAChange) {
   EXPECT_THAT(ErrorOf("fog:3"), HasSubstr("blur, exposure, tele, people and rim"));
   EXPECT_THAT(ErrorOf("blur"), HasSubstr("needs a number from 1 to 200"));
   EXPECT_THAT(ErrorOf("tele:0.5"), HasSubstr("needs a number from 1 to 10"));

@@ -18,8 +18,8 @@ constexpr int kClothes_px = 480;  // side of the pattern
 constexpr int kOutlineBits = 4;   // fractional bits of cv::fillPoly's coordinates
 constexpr double kTwoPi = 2 * std::numbers::pi;
 
-// Half of the outline from the crown down, x to the right; proportions of an adult who is seen from the front
-// or from behind, down to the hips, which the image cuts off.
+// Half of the outline from the crown down, x to the right: the proportions of an adult seen from the front or
+// from behind, down to the hips, which the lower image border cuts off.
 constexpr std::array<std::array<double, 2>, 10> kHalfOutline = {{{0.000, 0.00},
                                                                  {0.050, 0.02},
                                                                  {0.085, 0.08},
@@ -50,29 +50,29 @@ cv::Mat MakeClothes(Random* random) {
 
 }  // namespace
 
-WalkingPeople::WalkingPeople(double share, const ChangeContext& context)
+WalkingPeople::WalkingPeople(double ratio, const ChangeContext& context)
     : width_px_(context.width_px), height_px_(context.height_px) {
   Random random(context.seed);
   for (int i = 0; i < kPeople; ++i) {
     Person person;
-    // At most half the width of the image in a second: a person who strolls by two metres away. Nearly equal
-    // periods keep them apart, so that the hidden share changes little.
+    // The speed is at most half the image width per second, that of a person who strolls by two metres away.
+    // Nearly equal periods keep the people apart, so that the occluded ratio changes little.
     person.period_s = random.Uniform(6.5, 7.5);
     person.phase_rad = kTwoPi * (i + random.Uniform(0, 0.2)) / kPeople;
-    person.step_hz = random.Uniform(1.6, 2.0);  // steps a second of a person who walks
+    person.step_hz = random.Uniform(1.6, 2.0);  // steps per second of a walking person
     person.step_phase_rad = random.Uniform(0, kTwoPi);
     person.stature = random.Uniform(0.85, 1.15);
     person.clothes = MakeClothes(&random);
     people_.push_back(std::move(person));
   }
-  // The share grows with the size, so that bisection finds it.
+  // The ratio increases with the size, so that bisection finds the size.
   double low = 0.05, high = 4;
   for (int step = 0; step < 20; ++step) {
     size_ = 0.5 * (low + high);
     constexpr int kTimes = 120;
     double mean = 0;
-    for (int i = 0; i < kTimes; ++i) mean += HiddenShare(context.duration_s * i / kTimes) / kTimes;
-    (mean < share ? low : high) = size_;
+    for (int i = 0; i < kTimes; ++i) mean += OccludedRatio(context.duration_s * i / kTimes) / kTimes;
+    (mean < ratio ? low : high) = size_;
   }
 }
 
@@ -80,7 +80,7 @@ cv::Matx23d WalkingPeople::ImageFromPerson(const Person& person, double time_s) 
   const double size_px = size_ * person.stature * height_px_;
   const double x = width_px_ * (0.5 + 0.45 * std::sin(kTwoPi * time_s / person.period_s + person.phase_rad));
   const double bob = 0.01 * std::sin(kTwoPi * person.step_hz * time_s + person.step_phase_rad);
-  // The hips are at the lower border; who is larger than the image looks over it.
+  // The hips are at the lower border; the head of a person larger than the image is above the upper border.
   const double y = height_px_ - (1 + bob) * size_px + 0.02 * size_px;
   return {size_px, 0, x, 0, size_px, y};
 }
@@ -94,14 +94,14 @@ std::vector<cv::Point> WalkingPeople::Outline(const Person& person, double time_
                          static_cast<int>(std::lround(pixel[1] * (1 << kOutlineBits))));
   };
   for (const auto& [x, y] : kHalfOutline) add(x, y);
-  add(kHalfOutline.back()[0], 1.1);  // below the border even when the person is at the top of a step
+  add(kHalfOutline.back()[0], 1.1);  // below the image even at the highest point of a step
   add(-kHalfOutline.back()[0], 1.1);
   for (auto point = kHalfOutline.rbegin(); point != kHalfOutline.rend(); ++point)
     add(-(*point)[0], (*point)[1]);
   return outline;
 }
 
-double WalkingPeople::HiddenShare(double time_s) const {
+double WalkingPeople::OccludedRatio(double time_s) const {
   constexpr double kScale = 0.25;
   cv::Mat mask =
       cv::Mat::zeros(static_cast<int>(height_px_ * kScale), static_cast<int>(width_px_ * kScale), CV_8U);
@@ -115,7 +115,7 @@ void WalkingPeople::Draw(double time_s, cv::Mat* image) const {
     cv::Mat mask = cv::Mat::zeros(image->size(), CV_8U);
     cv::fillPoly(mask, std::vector{Outline(person, time_s, 1)}, 255, cv::LINE_AA, kOutlineBits);
     const cv::Matx23d from_person = ImageFromPerson(person, time_s);
-    // The pattern covers x from -0.5 to 0.5 and y from 0 to 1, and is reflected beyond.
+    // The pattern covers x from -0.5 to 0.5 and y from 0 to 1, and is mirrored beyond.
     const cv::Matx23d from_clothes(from_person(0, 0) / kClothes_px, 0,
                                    from_person(0, 2) - 0.5 * from_person(0, 0), 0,
                                    from_person(1, 1) / kClothes_px, from_person(1, 2));

@@ -8,32 +8,32 @@
 
 namespace docent::testing {
 
-// Three opaque silhouettes (head, shoulders, trunk) with patterned clothes, who walk to and fro before the
-// camera. The pattern moves with its wearer, so that corners on it are found and do not belong to the world.
-// Their size follows from the share of the image that they hide on average over the duration. Immutable.
+// Three opaque silhouettes (head, shoulders, trunk) with patterned clothes, who walk to and fro in front of
+// the camera. The pattern moves with the person, so that its keypoints do not belong to the static world. The
+// size of the people follows from the ratio of the image that they occlude on average over the duration.
+// Immutable.
 class WalkingPeople {
  public:
-  WalkingPeople(double share, const ChangeContext& context);
+  WalkingPeople(double ratio, const ChangeContext& context);
 
   // Draws them over an image (CV_8UC3 or CV_8UC1).
   void Draw(double time_s, cv::Mat* image) const;
-  // The share of the image that is hidden at a time.
-  double HiddenShare(double time_s) const;
+  // The ratio of the image that is occluded at a time.
+  double OccludedRatio(double time_s) const;
 
  private:
   struct Person {
     double period_s, phase_rad;      // of walking to and fro
-    double step_hz, step_phase_rad;  // of going up and down with each step
-    double stature;                  // against the others
+    double step_hz, step_phase_rad;  // of moving up and down with each step
+    double stature;                  // relative to the others
     cv::Mat clothes;                 // CV_8UC3
   };
-  // Coordinates of an image from those of a person's unit frame: x from -0.5 to 0.5, y from 0 (the crown)
-  // to 1.
+  // Maps a person's unit frame (x from -0.5 to 0.5, y from 0 at the crown to 1) to image coordinates.
   cv::Matx23d ImageFromPerson(const Person& person, double time_s) const;
   std::vector<cv::Point> Outline(const Person& person, double time_s, double image_scale) const;
 
   int width_px_, height_px_;
-  double size_ = 1;  // of a person of stature 1, in heights of the image
+  double size_ = 1;  // of a person of stature 1, in image heights
   std::vector<Person> people_;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/evaluation/false_start.h"
+#include "app/evaluation/false_initialization.h"
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace docent::app {
 
 namespace {
 
-// A pose of the map and what it truly was.
+// A tracked pose and the true pose of the same image.
 struct Pair {
   engine::Rigid3 map_from_camera, truth_from_camera;
 };
@@ -34,7 +34,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// Centres about their means, those of the map turned into the truth's axes.
+// Camera centres relative to their mean; those of the map are rotated into the axes of the truth.
 struct Paths {
   std::vector<Eigen::Vector3d> truth, map;
 
@@ -61,7 +61,7 @@ struct Paths {
     return std::sqrt(sum / static_cast<double>(points.size()));
   }
 
-  // Of least squares, not negative.
+  // Least-squares scale, at least 0.
   double Scale() const {
     double product = 0, square = 0;
     for (std::size_t i = 0; i < map.size(); ++i) {
@@ -78,18 +78,19 @@ struct Paths {
   }
 };
 
-// What the true depths say of the map's scale, metres a unit.
+// Scale of the map in metres per map unit, estimated from the true depths.
 struct DepthComparison {
-  int points = 0;               // that could be followed
-  double inverse = 0;           // 1 / scale
-  double sigma = 0;             // of `inverse`
-  std::optional<double> error;  // relative, of the depths among each other
+  int points = 0;               // Number of points with a true depth.
+  double inverse = 0;           // 1 / scale.
+  double sigma = 0;             // Standard deviation of `inverse`.
+  std::optional<double> error;  // Median relative error of the depths after scaling.
 };
 
-// The median over the better known half of the points: those that were followed for long, and so seen from
-// far apart. The error of what is common to all of them is not smaller than each one's.
-DepthComparison CompareDepths(const StartRecord& start, const TrueDepthSource& true_depths,
-                              const FalseStartOptions& options) {
+// Uses the median over the half of the points with the smaller uncertainty: those that were tracked for long,
+// and so seen with a large baseline. The errors of the points are correlated, so the median is not more
+// accurate than a single point.
+DepthComparison CompareDepths(const InitializationRecord& start, const TrueDepthSource& true_depths,
+                              const FalseInitializationOptions& options) {
   DepthComparison comparison;
   if (!true_depths) return comparison;
   const TrueDepths depths = true_depths(start);
@@ -98,11 +99,11 @@ DepthComparison CompareDepths(const StartRecord& start, const TrueDepthSource& t
     if (depths[i] && start.points[i].depth > 0) known.push_back(i);
   }
   comparison.points = static_cast<int>(known.size());
-  if (known.size() < options.least_points) return comparison;
-  // Not by what the map told of them, which may be false.
+  if (known.size() < options.min_points) return comparison;
+  // Sorted by the uncertainty of the true depth, because the map depth may be wrong.
   std::stable_sort(known.begin(), known.end(),
                    [&depths](std::size_t a, std::size_t b) { return depths[a]->sigma < depths[b]->sigma; });
-  known.resize(std::max(options.least_points, known.size() / 2));
+  known.resize(std::max(options.min_points, known.size() / 2));
   std::vector<double> sigmas, values, errors;
   for (const std::size_t i : known) {
     sigmas.push_back(depths[i]->sigma * start.points[i].depth);
@@ -116,18 +117,18 @@ DepthComparison CompareDepths(const StartRecord& start, const TrueDepthSource& t
   return comparison;
 }
 
-class StartJudge {
+class InitializationClassifier {
  public:
-  StartJudge(const RunRecord& run, const std::vector<TimedPose>& truth, const TrueDepthSource& true_depths,
-             const FalseStartOptions& options)
+  InitializationClassifier(const RunRecord& run, const std::vector<TimedPose>& truth,
+                           const TrueDepthSource& true_depths, const FalseInitializationOptions& options)
       : run_(run),
         truth_(truth),
         true_depths_(true_depths),
         options_(options),
         noise_m_(options.sigmas * options.truth_noise_m) {}
 
-  StartResult Judge(const StartRecord& start) const {
-    StartResult result;
+  InitializationResult Classify(const InitializationRecord& start) const {
+    InitializationResult result;
     result.map_key = start.map_key;
     result.frame = start.frame;
     for (const MapRecord& map : run_.maps) {
@@ -136,46 +137,47 @@ class StartJudge {
     const DepthComparison depth = CompareDepths(start, true_depths_, options_);
     result.depth_points = depth.points;
     result.depth_error = depth.error;
-    const bool bounded = static_cast<std::size_t>(depth.points) >= options_.least_points;
-    const std::vector<Pair> pairs = FirstSecond(start, !bounded, &result);
+    const bool bounded = static_cast<std::size_t>(depth.points) >= options_.min_points;
+    const std::vector<Pair> pairs = PairsInWindow(start, !bounded, &result);
     result.centers = static_cast<int>(pairs.size());
     if (pairs.size() < 3) return result;
     const Paths paths(pairs);
-    const double told = run_.frames[start.frame].median_depth;
+    const double map_depth = run_.frames[start.frame].median_depth;
     double scale = paths.Scale();
     if (bounded) {
       const double margin = options_.sigmas * depth.sigma;
       const double most_inverse = depth.inverse + margin, least_inverse = depth.inverse - margin;
       if (most_inverse > 0) {
         scale = std::max(scale, 1 / most_inverse);
-        result.least_depth_m = told / most_inverse;
+        result.min_depth_m = map_depth / most_inverse;
       }
       if (least_inverse > 0) {
         scale = std::min(scale, 1 / least_inverse);
-        result.most_depth_m = told / least_inverse;
+        result.max_depth_m = map_depth / least_inverse;
       }
     }
-    if (told > 0) result.depth_m = scale * told;
+    if (map_depth > 0) result.depth_m = scale * map_depth;
     result.error_m = paths.Error(scale);
     result.path_m = scale * Paths::RootMeanSquare(paths.map);
     result.true_path_m = Paths::RootMeanSquare(paths.truth);
-    result.verdict = Decide(result);
+    result.outcome = Decide(result);
     return result;
   }
 
  private:
-  // Of the map's first second with depth.
-  std::vector<Pair> FirstSecond(const StartRecord& start, bool extended, StartResult* result) const {
+  // Pairs of the initial keyframes and of the frames in the window.
+  std::vector<Pair> PairsInWindow(const InitializationRecord& start, bool extended,
+                                  InitializationResult* result) const {
     std::vector<Pair> pairs;
     double reached_m = 0;
-    for (const StartRecord::KeyFrame& keyframe : start.keyframes)
+    for (const InitializationRecord::KeyFrame& keyframe : start.keyframes)
       AddPair(keyframe.time, keyframe.camera_from_map, &pairs, &reached_m);
     const Timestamp begin = run_.frames[start.frame].time;
-    const double enough_m = extended ? noise_m_ / options_.tolerance : 0;
+    const double required_m = extended ? noise_m_ / options_.tolerance : 0;
     for (std::size_t i = start.frame; i < run_.frames.size(); ++i) {
       const FrameRecord& frame = run_.frames[i];
       const Timestamp since = frame.time - begin;
-      if (since > options_.window && (since > options_.longest || reached_m >= enough_m)) break;
+      if (since > options_.window && (since > options_.max_window || reached_m >= required_m)) break;
       if (!engine::HasPose(frame.state) || frame.map_key != start.map_key) continue;
       if (!AddPair(frame.time, frame.camera_from_map, &pairs, &reached_m)) continue;
       result->window_s = ToSeconds(since);
@@ -183,7 +185,7 @@ class StartJudge {
     return pairs;
   }
 
-  // False where there is no truth. reached_m: how far the true centres are from the first one.
+  // Returns false when there is no truth. reached_m: largest distance of a true centre from the first one.
   bool AddPair(Timestamp time, const engine::Rigid3& camera_from_map, std::vector<Pair>* pairs,
                double* reached_m) const {
     const auto pose = InterpolatePose(truth_, time, options_.max_time_difference);
@@ -194,56 +196,61 @@ class StartJudge {
     return true;
   }
 
-  StartVerdict Decide(const StartResult& result) const {
+  InitializationOutcome Decide(const InitializationResult& result) const {
     if (result.error_m > std::max(options_.tolerance * result.path_m, noise_m_))
-      return StartVerdict::kFalsePath;
-    if (result.depth_error && *result.depth_error > options_.tolerance) return StartVerdict::kFalseDepth;
+      return InitializationOutcome::kFalsePath;
+    if (result.depth_error && *result.depth_error > options_.tolerance)
+      return InitializationOutcome::kFalseDepth;
     const double path_m = std::max(result.path_m, result.true_path_m);
-    return path_m > 0 && path_m >= noise_m_ ? StartVerdict::kRight : StartVerdict::kUndecided;
+    return path_m > 0 && path_m >= noise_m_ ? InitializationOutcome::kRight
+                                            : InitializationOutcome::kUndecided;
   }
 
   const RunRecord& run_;
   const std::vector<TimedPose>& truth_;
   const TrueDepthSource& true_depths_;
-  const FalseStartOptions& options_;
+  const FalseInitializationOptions& options_;
   const double noise_m_;
 };
 
 }  // namespace
 
-std::optional<std::string> FalseStartOptions::Validate() const {
-  if (window <= Timestamp{}) return "the window of a start must be positive";
-  if (longest < window) return "the longest window of a start must not be below the usual one";
-  if (!(tolerance > 0 && tolerance < 1)) return "the tolerance of a start must lie between 0 and 1";
-  if (!(sigmas >= 0)) return "the standard deviations that are allowed must not be negative";
-  if (least_points < 1) return "at least one point with a true depth must be asked for";
+std::optional<std::string> FalseInitializationOptions::Validate() const {
+  if (window <= Timestamp{}) return "the window must be positive";
+  if (max_window < window) return "the maximum window must not be shorter than the window";
+  if (!(tolerance > 0 && tolerance < 1)) return "the tolerance must be between 0 and 1";
+  if (!(sigmas >= 0)) return "the number of standard deviations must not be negative";
+  if (min_points < 1) return "at least one point with a true depth must be required";
   if (!(truth_noise_m >= 0 && std::isfinite(truth_noise_m)))
-    return "the noise of the truth must not be negative";
+    return "the noise of the truth must be finite and not negative";
   if (max_time_difference < Timestamp{}) return "the time difference to the truth must not be negative";
   return std::nullopt;
 }
 
-const char* ToString(StartVerdict verdict) {
-  switch (verdict) {
-    case StartVerdict::kRight:
+const char* ToString(InitializationOutcome outcome) {
+  switch (outcome) {
+    case InitializationOutcome::kRight:
       return "right";
-    case StartVerdict::kFalsePath:
+    case InitializationOutcome::kFalsePath:
       return "false path";
-    case StartVerdict::kFalseDepth:
+    case InitializationOutcome::kFalseDepth:
       return "false depth";
-    case StartVerdict::kUndecided:
+    case InitializationOutcome::kUndecided:
       return "undecided";
   }
   return "undecided";
 }
 
-std::vector<StartResult> JudgeStarts(const RunRecord& run, const std::vector<TimedPose>& truth,
-                                     const TrueDepthSource& true_depths, const FalseStartOptions& options) {
-  if (const auto fault = options.Validate()) throw Error("A start cannot be judged: " + *fault + ".");
-  std::vector<StartResult> results;
+std::vector<InitializationResult> ClassifyInitializations(const RunRecord& run,
+                                                          const std::vector<TimedPose>& truth,
+                                                          const TrueDepthSource& true_depths,
+                                                          const FalseInitializationOptions& options) {
+  if (const auto fault = options.Validate())
+    throw Error("Initializations cannot be classified: " + *fault + ".");
+  std::vector<InitializationResult> results;
   if (truth.empty()) return results;
-  const StartJudge judge(run, truth, true_depths, options);
-  for (const StartRecord& start : run.starts) results.push_back(judge.Judge(start));
+  const InitializationClassifier classifier(run, truth, true_depths, options);
+  for (const InitializationRecord& start : run.initializations) results.push_back(classifier.Classify(start));
   return results;
 }
 
