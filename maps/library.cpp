@@ -201,7 +201,7 @@ class Library::Impl {
     WriteParts(database_, info->key, parts);
     WriteThumbnails(database_, info->key, MakeThumbnails(snapshot));
     WriteWords(database_, info->key,
-               MakeWords(snapshot, UnchangedWords(database_, *info, stored_before, parts.keyframes)));
+               engine::MakeWords(snapshot, UnchangedWords(database_, *info, stored_before, parts.keyframes)));
     info->revision = snapshot.revision;
     info->next_keyframe = snapshot.next_keyframe;
     info->next_point = snapshot.next_point;

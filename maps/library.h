@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "engine/recognition/thumbnail_array.h"
 #include "maps/map_record.h"
 #include "maps/policy.h"
-#include "maps/thumbnail_array.h"
 #include "maps/word_rows.h"
 
 // A library of maps: one SQLite file, NAME.docent, which maps/README.md describes.
@@ -62,8 +62,8 @@ class Library {
   // kilobytes per keyframe and is read without points or images. For a damaged table the list is empty and
   // `problem` describes the error.
   struct Appearance {
-    std::vector<KeyFrameThumbnail> thumbnails;
-    std::vector<KeyFrameWords> words;  // Also empty when no words are stored; see ReadWords.
+    std::vector<engine::KeyFrameThumbnail> thumbnails;
+    std::vector<engine::KeyFrameWords> words;  // Also empty when no words are stored; see ReadWords.
     std::string problem;
   };
   using TakeAppearance = std::function<void(const MapInfo& info, Appearance appearance)>;

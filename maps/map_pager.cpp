@@ -44,7 +44,7 @@ std::size_t BytesOf(const engine::MapSnapshot& map) {
 
 class MapPager::Impl {
  public:
-  Impl(const Library* library, PlaceIndex* index, const PagerOptions& options, Callbacks callbacks)
+  Impl(const Library* library, engine::PlaceIndex* index, const PagerOptions& options, Callbacks callbacks)
       : library_(library), index_(index), options_(options), callbacks_(std::move(callbacks)) {}
 
   std::vector<MapInfo> Open();
@@ -79,7 +79,7 @@ class MapPager::Impl {
   void Touch(std::uint64_t key);
 
   const Library* const library_;
-  PlaceIndex* const index_;
+  engine::PlaceIndex* const index_;
   const PagerOptions options_;
   const Callbacks callbacks_;
 
@@ -261,7 +261,7 @@ std::vector<engine::PlaceCandidate> MapPager::Impl::FindPlaces(const engine::Pla
   return candidates;
 }
 
-MapPager::MapPager(const Library* library, PlaceIndex* index, const PagerOptions& options,
+MapPager::MapPager(const Library* library, engine::PlaceIndex* index, const PagerOptions& options,
                    Callbacks callbacks)
     : impl_(std::make_unique<Impl>(library, index, options, std::move(callbacks))) {}
 MapPager::~MapPager() = default;

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "engine/recognition/place.h"
+#include "engine/recognition/place_index.h"
 #include "maps/library.h"
-#include "maps/place_index.h"
 
 namespace docent::maps {
 
@@ -49,7 +49,8 @@ class MapPager : public engine::PlaceFinder {
   };
 
   // library and index must outlive the pager.
-  MapPager(const Library* library, PlaceIndex* index, const PagerOptions& options, Callbacks callbacks);
+  MapPager(const Library* library, engine::PlaceIndex* index, const PagerOptions& options,
+           Callbacks callbacks);
   ~MapPager() override;
 
   // Fills the index and loads maps according to the options. Call it once. Returns the library's list of

@@ -8,8 +8,8 @@
 #include <tuple>
 
 #include "engine/map/map.h"
+#include "engine/recognition/place_index.h"
 #include "engine/tracking/tracker.h"
-#include "maps/place_index.h"
 #include "maps/view_from_above.h"
 
 namespace docent::maps {
@@ -22,7 +22,7 @@ constexpr std::uint64_t kKey = 1;
 // longer in it.
 class RemainingPlaces : public engine::PlaceFinder {
  public:
-  RemainingPlaces(const PlaceIndex& index, std::shared_ptr<const engine::MapSnapshot> rest)
+  RemainingPlaces(const engine::PlaceIndex& index, std::shared_ptr<const engine::MapSnapshot> rest)
       : index_(index), rest_(std::move(rest)) {}
 
   std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
@@ -38,11 +38,11 @@ class RemainingPlaces : public engine::PlaceFinder {
   }
 
  private:
-  const PlaceIndex& index_;
+  const engine::PlaceIndex& index_;
   const std::shared_ptr<const engine::MapSnapshot> rest_;
 };
 
-RelocalizationTrial::Result Try(const engine::MapSnapshot& map, const PlaceIndex& index,
+RelocalizationTrial::Result Try(const engine::MapSnapshot& map, const engine::PlaceIndex& index,
                                 const engine::KeyFrame& keyframe, const RelocalizationOptions& options) {
   using Result = RelocalizationTrial::Result;
   engine::Map without(map);
@@ -80,7 +80,7 @@ RelocalizationTrial::Result Try(const engine::MapSnapshot& map, const PlaceIndex
 std::vector<RelocalizationTrial> LeaveEachKeyFrameOut(const engine::MapSnapshot& map,
                                                       const RelocalizationOptions& options,
                                                       const std::function<bool(std::size_t)>& progress) {
-  PlaceIndex index;
+  engine::PlaceIndex index;
   index.SetMap(kKey, std::make_shared<const engine::MapSnapshot>(map));
   std::vector<RelocalizationTrial> trials;
   for (const engine::KeyFrame& keyframe : map.keyframes) {

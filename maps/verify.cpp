@@ -75,7 +75,7 @@ std::vector<MapInfo> ReadableMaps(const Database& database, Report* report) {
 }
 
 void CheckThumbnails(const Database& database, const MapInfo& info) {
-  const std::vector<KeyFrameThumbnail> thumbnails = ReadThumbnails(database, info);
+  const std::vector<engine::KeyFrameThumbnail> thumbnails = ReadThumbnails(database, info);
   const std::vector<StoredKeyFrame> keyframes = ReadParts(database, info).keyframes;
   for (std::size_t i = 0; i < thumbnails.size(); ++i) {
     if (thumbnails[i].keyframe != keyframes[i].keyframe.id)
@@ -84,7 +84,7 @@ void CheckThumbnails(const Database& database, const MapInfo& info) {
 }
 
 void CheckWords(const Database& database, const MapInfo& info) {
-  const std::vector<KeyFrameWords> words = ReadWords(database, info);
+  const std::vector<engine::KeyFrameWords> words = ReadWords(database, info);
   const std::vector<StoredKeyFrame> keyframes = ReadParts(database, info).keyframes;
   for (std::size_t i = 0; i < words.size(); ++i) {
     if (words[i].keyframe != keyframes[i].keyframe.id) throw Error("its words belong to other keyframes");

@@ -2,13 +2,10 @@
 #include "maps/word_rows.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <string>
 #include <utility>
 
 #include "engine/base/error.h"
-#include "engine/vision/features.h"
 #include "maps/envelope.h"
 #include "maps/rows.h"
 #include "maps/schema.h"
@@ -16,11 +13,6 @@
 namespace docent::maps {
 
 namespace {
-
-// Limits for one place, within which most of the image is shared: the distance as a ratio of the median
-// depth, and the angle between the views.
-constexpr double kMaxPlaceDistance = 0.5;
-constexpr double kMaxPlaceAngle_rad = 35 * std::numbers::pi / 180;
 
 [[noreturn]] void Damaged(const char* what) {
   throw Error(std::string("the table of words is damaged: ") + what);
@@ -33,58 +25,10 @@ std::uint64_t VocabularyFingerprint() {
   return fingerprint;
 }
 
-std::vector<engine::KeyFrameId> PlacesOf(const engine::MapSnapshot& map) {
-  struct Place {
-    engine::KeyFrameId keyframe;
-    Eigen::Vector3d center, view;
-    double depth;
-  };
-  std::vector<Place> places;
-  std::vector<engine::KeyFrameId> place_of;
-  place_of.reserve(map.keyframes.size());
-  for (const engine::KeyFrame& keyframe : map.keyframes) {
-    const Place own{keyframe.id, keyframe.camera_from_map.OriginInSource(),
-                    keyframe.camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ(),
-                    keyframe.mean_depth};
-    const auto near = std::find_if(places.begin(), places.end(), [&](const Place& place) {
-      return (place.center - own.center).norm() <= kMaxPlaceDistance * std::min(place.depth, own.depth) &&
-             place.view.dot(own.view) >= std::cos(kMaxPlaceAngle_rad);
-    });
-    place_of.push_back(near == places.end() ? own.keyframe : near->keyframe);
-    if (near == places.end()) places.push_back(own);
-  }
-  return place_of;
-}
-
-engine::WordBag WordsOf(const engine::ImageFeatures& features) {
-  const bool has_corners = !features.row_begin[0].empty();
-  if (has_corners) return engine::MakeWordBag(features);
-  // The features may have been made without corners.
-  features.MarkInUse();
-  const cv::Mat& image = features.levels[0];
-  if (image.cols < kMinImageSidePx || image.rows < kMinImageSidePx) return {};
-  return engine::MakeWordBag(*engine::MakeFeatures(image));
-}
-
-std::vector<KeyFrameWords> MakeWords(const engine::MapSnapshot& map, std::span<const KeyFrameWords> known) {
-  const std::vector<engine::KeyFrameId> places = PlacesOf(map);
-  std::vector<KeyFrameWords> words;
-  words.reserve(map.keyframes.size());
-  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
-    const engine::KeyFrame& keyframe = map.keyframes[i];
-    const auto found =
-        std::lower_bound(known.begin(), known.end(), keyframe.id,
-                         [](const KeyFrameWords& k, engine::KeyFrameId id) { return k.keyframe < id; });
-    const bool is_known = found != known.end() && found->keyframe == keyframe.id;
-    words.push_back({keyframe.id, places[i], is_known ? found->words : WordsOf(*keyframe.features)});
-  }
-  return words;
-}
-
 Bytes EncodeWords(std::uint64_t map_key, const WordTable& table) {
   ByteWriter writer = BeginEnvelope(kWordTableKind, map_key, table.keyframes.size());
   writer.Put(table.vocabulary);
-  for (const KeyFrameWords& keyframe : table.keyframes) {
+  for (const engine::KeyFrameWords& keyframe : table.keyframes) {
     writer.Put(std::uint32_t{keyframe.keyframe});
     writer.Put(std::uint32_t{keyframe.place});
     writer.Put(static_cast<std::uint16_t>(keyframe.words.size()));
@@ -101,7 +45,7 @@ WordTable DecodeWords(std::uint64_t map_key, std::span<const std::uint8_t> bytes
   if (reader.failed() || count > reader.remaining() / kSmallestRecord) Damaged("its length does not match");
   table.keyframes.resize(count);
   for (std::uint64_t i = 0; i < count; ++i) {
-    KeyFrameWords& next = table.keyframes[i];
+    engine::KeyFrameWords& next = table.keyframes[i];
     next.keyframe = reader.Get<std::uint32_t>();
     next.place = reader.Get<std::uint32_t>();
     const std::size_t words = reader.Get<std::uint16_t>();
@@ -111,7 +55,7 @@ WordTable DecodeWords(std::uint64_t map_key, std::span<const std::uint8_t> bytes
     // The keyframe that represents a place comes first and represents itself.
     const auto leader = std::lower_bound(
         table.keyframes.begin(), table.keyframes.begin() + static_cast<std::ptrdiff_t>(i) + 1, next.place,
-        [](const KeyFrameWords& k, engine::KeyFrameId id) { return k.keyframe < id; });
+        [](const engine::KeyFrameWords& k, engine::KeyFrameId id) { return k.keyframe < id; });
     if (leader - table.keyframes.begin() > static_cast<std::ptrdiff_t>(i) || leader->keyframe != next.place ||
         leader->place != next.place) {
       Damaged("a keyframe has no valid place");
@@ -127,7 +71,7 @@ WordTable DecodeWords(std::uint64_t map_key, std::span<const std::uint8_t> bytes
   return table;
 }
 
-void WriteWords(const Database& database, std::uint64_t key, std::vector<KeyFrameWords> keyframes) {
+void WriteWords(const Database& database, std::uint64_t key, std::vector<engine::KeyFrameWords> keyframes) {
   const Bytes bytes = EncodeWords(key, {VocabularyFingerprint(), std::move(keyframes)});
   database.Prepare("INSERT OR REPLACE INTO words (map_key, data) VALUES (?, ?)")
       .Bind(1, static_cast<std::int64_t>(key))
@@ -135,7 +79,7 @@ void WriteWords(const Database& database, std::uint64_t key, std::vector<KeyFram
       .Run();
 }
 
-std::vector<KeyFrameWords> ReadWords(const Database& database, const MapInfo& info) {
+std::vector<engine::KeyFrameWords> ReadWords(const Database& database, const MapInfo& info) {
   if (SchemaVersion(database) < kWordsSince) return {};
   Statement query = database.Prepare("SELECT data FROM words WHERE map_key = ?");
   query.Bind(1, static_cast<std::int64_t>(info.key));
@@ -147,10 +91,10 @@ std::vector<KeyFrameWords> ReadWords(const Database& database, const MapInfo& in
   return std::move(table.keyframes);
 }
 
-std::vector<KeyFrameWords> UnchangedWords(const Database& database, const MapInfo& info,
-                                          const std::vector<StoredKeyFrame>& stored,
-                                          const std::vector<StoredKeyFrame>& wanted) {
-  std::vector<KeyFrameWords> words;
+std::vector<engine::KeyFrameWords> UnchangedWords(const Database& database, const MapInfo& info,
+                                                  const std::vector<StoredKeyFrame>& stored,
+                                                  const std::vector<StoredKeyFrame>& wanted) {
+  std::vector<engine::KeyFrameWords> words;
   if (stored.empty()) return words;
   try {
     words = ReadWords(database, info);
@@ -167,16 +111,16 @@ std::vector<KeyFrameWords> UnchangedWords(const Database& database, const MapInf
     const StoredKeyFrame *before = find(stored), *after = find(wanted);
     return before && after && before->image_hash == after->image_hash;
   };
-  std::erase_if(words, [&](const KeyFrameWords& of) { return !same_image(of.keyframe); });
+  std::erase_if(words, [&](const engine::KeyFrameWords& of) { return !same_image(of.keyframe); });
   return words;
 }
 
-std::vector<KeyFrameWords> WordsFromImages(const Database& database, const MapInfo& info) {
+std::vector<engine::KeyFrameWords> WordsFromImages(const Database& database, const MapInfo& info) {
   const MapParts parts = ReadParts(database, info);
   engine::MapSnapshot map;
   for (const StoredKeyFrame& stored : parts.keyframes) map.keyframes.push_back(stored.keyframe);
-  const std::vector<engine::KeyFrameId> places = PlacesOf(map);
-  std::vector<KeyFrameWords> words(parts.keyframes.size());
+  const std::vector<engine::KeyFrameId> places = engine::PlacesOf(map);
+  std::vector<engine::KeyFrameWords> words(parts.keyframes.size());
   ReadImages(
       database, info.key, parts.keyframes, [&](std::size_t index, std::span<const std::uint8_t> bytes) {
         const auto features = engine::MakeFeatures(DecodeImage(info.key, parts.keyframes[index], bytes));

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/map/map_snapshot.h"
-#include "engine/recognition/word_bag.h"
+#include "engine/recognition/keyframe_words.h"
 #include "maps/database.h"
 #include "maps/map_codec.h"
 #include "maps/map_record.h"
@@ -17,18 +17,10 @@
 // caller, validate what they read, and throw docent::Error.
 namespace docent::maps {
 
-struct KeyFrameWords {
-  engine::KeyFrameId keyframe = engine::kNoId;
-  engine::KeyFrameId place = engine::kNoId;  // The keyframe that represents its place; see PlacesOf.
-  engine::WordBag words;
-
-  bool operator==(const KeyFrameWords& other) const = default;
-};
-
 // By ascending keyframe.
 struct WordTable {
   std::uint64_t vocabulary = 0;  // Fingerprint of the vocabulary.
-  std::vector<KeyFrameWords> keyframes;
+  std::vector<engine::KeyFrameWords> keyframes;
 
   bool operator==(const WordTable& other) const = default;
 };
@@ -36,30 +28,18 @@ struct WordTable {
 // The fingerprint of this program's vocabulary.
 std::uint64_t VocabularyFingerprint();
 
-// For each keyframe, in their order, the keyframe that represents its place: the first earlier representative
-// that is close to it (within half of the smaller of their median depths and rotated by at most 35 degrees),
-// or itself if there is none.
-std::vector<engine::KeyFrameId> PlacesOf(const engine::MapSnapshot& map);
-
-// Returns the words of a map's keyframes: those in `known` (may be empty; by ascending keyframe) are copied,
-// the others are computed in some milliseconds each.
-std::vector<KeyFrameWords> MakeWords(const engine::MapSnapshot& map, std::span<const KeyFrameWords> known);
-
-// Returns the words of an image; empty if it is too small.
-engine::WordBag WordsOf(const engine::ImageFeatures& features);
-
 Bytes EncodeWords(std::uint64_t map_key, const WordTable& table);
 WordTable DecodeWords(std::uint64_t map_key, std::span<const std::uint8_t> bytes);
 
-void WriteWords(const Database& database, std::uint64_t key, std::vector<KeyFrameWords> keyframes);
+void WriteWords(const Database& database, std::uint64_t key, std::vector<engine::KeyFrameWords> keyframes);
 // Returns one entry for each keyframe that `info` counts, or none if the library's format has no such table
 // or another vocabulary was used.
-std::vector<KeyFrameWords> ReadWords(const Database& database, const MapInfo& info);
+std::vector<engine::KeyFrameWords> ReadWords(const Database& database, const MapInfo& info);
 // Returns the stored words of those keyframes whose image has not changed; unreadable words are left out.
-std::vector<KeyFrameWords> UnchangedWords(const Database& database, const MapInfo& info,
-                                          const std::vector<StoredKeyFrame>& stored,
-                                          const std::vector<StoredKeyFrame>& wanted);
+std::vector<engine::KeyFrameWords> UnchangedWords(const Database& database, const MapInfo& info,
+                                                  const std::vector<StoredKeyFrame>& stored,
+                                                  const std::vector<StoredKeyFrame>& wanted);
 // Computes the words from the images of a map, regardless of the table.
-std::vector<KeyFrameWords> WordsFromImages(const Database& database, const MapInfo& info);
+std::vector<engine::KeyFrameWords> WordsFromImages(const Database& database, const MapInfo& info);
 
 }  // namespace docent::maps

@@ -233,7 +233,7 @@ void Session::OfferToMapper(Camera* camera, const engine::TrackedFrame& frame) {
 void Session::OnMapperUpdate(const MappingThread::MapperUpdate& update) {
   using Kind = engine::MapperEvent::Kind;
   // Visual words of new keyframes are computed before locking, so that frames are processed meanwhile.
-  std::vector<maps::KeyFrameWords> described;
+  std::vector<engine::KeyFrameWords> described;
   if (update.snapshot) described = index_.DescribeNew(update.key, *update.snapshot);
   const std::scoped_lock lock(mutex_);
   const auto found = maps_.find(update.key);

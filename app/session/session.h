@@ -26,10 +26,10 @@
 #include "app/session/mapping_thread.h"
 #include "app/session/relocalization_message.h"
 #include "app/session/session_map.h"
+#include "engine/recognition/place_index.h"
 #include "engine/tracking/tracker.h"
 #include "maps/library.h"
 #include "maps/map_pager.h"
-#include "maps/place_index.h"
 #include "maps/saver.h"
 
 namespace docent::app {
@@ -231,7 +231,7 @@ class Session {
 
   const SessionOptions options_;
   maps::Library* const library_;
-  maps::PlaceIndex index_;
+  engine::PlaceIndex index_;
 
   mutable std::mutex mutex_;  // guards the members below except the mapping thread; never held while tracking
   std::vector<Camera> cameras_;

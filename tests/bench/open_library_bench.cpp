@@ -7,10 +7,10 @@
 #include <opencv2/core.hpp>
 
 #include "engine/base/random.h"
+#include "engine/recognition/place_index.h"
 #include "engine/vision/features.h"
 #include "maps/database.h"
 #include "maps/library.h"
-#include "maps/place_index.h"
 
 // Opens a library of many maps for a tour: reads its entries, thumbnails and words and builds the place
 // index; the maps stay on disk. Each map has 150 keyframes with small images, but with thumbnails of the
@@ -47,9 +47,9 @@ std::shared_ptr<const engine::MapSnapshot> MakeMap(int number) {
   return map;
 }
 
-std::vector<maps::KeyFrameWords> MakeWords(int number) {
+std::vector<engine::KeyFrameWords> MakeWords(int number) {
   Random random(static_cast<std::uint64_t>(number));
-  std::vector<maps::KeyFrameWords> words;
+  std::vector<engine::KeyFrameWords> words;
   for (engine::KeyFrameId i = 0; i < kKeyFramesOfAMap; ++i) {
     std::vector<std::uint32_t> leaves(200);
     for (std::uint32_t& leaf : leaves) leaf = random.Below(engine::VocabularyTree::kLeaves);
@@ -74,7 +74,7 @@ void OpenLibrary(benchmark::State& state) {
   std::size_t keyframes = 0, words = 0;
   for (auto _ : state) {
     const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
-    maps::PlaceIndex index;
+    engine::PlaceIndex index;
     std::size_t wanted = 0;
     for (const maps::MapInfo& info : library.List()) wanted += info.keyframes;
     index.Reserve(wanted);

@@ -13,9 +13,9 @@
 
 #include "app/simulator/simulation.h"
 #include "engine/base/random.h"
+#include "engine/recognition/inverted_file.h"
+#include "engine/recognition/place_index.h"
 #include "engine/vision/features.h"
-#include "maps/inverted_file.h"
-#include "maps/place_index.h"
 #include "tests/bench/bench_sequence.h"
 
 // Place recognition among all keyframes of all maps. The maps are those of the simulator's museum and desks:
@@ -129,7 +129,7 @@ engine::WordBag Replica(const engine::WordBag& words, Random* random) {
 
 // The simulated places with their own keys, and replicas of them with keys from 1000 on, each filled up to
 // the size of a map.
-void FillIndex(std::size_t maps, maps::PlaceIndex* index) {
+void FillIndex(std::size_t maps, engine::PlaceIndex* index) {
   const Places& places = SimulatedPlaces();
   Random random(7);
   index->Reserve(maps * kKeyFramesOfAMap);
@@ -138,8 +138,8 @@ void FillIndex(std::size_t maps, maps::PlaceIndex* index) {
     const std::size_t round = made / places.maps.size();
     for (const auto& [key, views] : places.maps) {
       if (made == maps) break;
-      std::vector<maps::KeyFrameThumbnail> thumbnails;
-      std::vector<maps::KeyFrameWords> words;
+      std::vector<engine::KeyFrameThumbnail> thumbnails;
+      std::vector<engine::KeyFrameWords> words;
       for (std::size_t i = 0; i < kKeyFramesOfAMap; ++i) {
         const auto id = static_cast<engine::KeyFrameId>(i);
         const View& original = views[i % views.size()];
@@ -174,7 +174,7 @@ std::size_t RankOf(const std::vector<engine::PlaceCandidate>& candidates, std::u
 void FindPlaces(benchmark::State& state) {
   const Places& places = SimulatedPlaces();
   const double before = ResidentBytes();
-  maps::PlaceIndex index;
+  engine::PlaceIndex index;
   FillIndex(static_cast<std::size_t>(state.range(0)), &index);
   const double bytes = ResidentBytes() - before;
   std::vector<double> milliseconds;
@@ -259,7 +259,7 @@ void FindChangedPlaces(benchmark::State& state) {
                                  "blurred by 21 pixels of motion"};
   const Places& places = SimulatedPlaces();
   const auto change = static_cast<int>(state.range(0));
-  maps::PlaceIndex index;
+  engine::PlaceIndex index;
   FillIndex(static_cast<std::size_t>(state.range(1)), &index);
   const engine::SmallBlurryImage nothing;
   std::array<double, 3> first{}, found{};
@@ -301,7 +301,7 @@ BENCHMARK(DescribeAQuery)->Unit(benchmark::kMillisecond);
 void SearchWords(benchmark::State& state) {
   const Places& places = SimulatedPlaces();
   Random random(7);
-  maps::InvertedFile file;
+  engine::InvertedFile file;
   for (engine::KeyFrameId i = 0; static_cast<std::int64_t>(file.size()) < state.range(0) * 150; ++i) {
     for (const auto& [key, views] : places.maps)
       file.Add(Replica(views[i % views.size()].words, &random), {key, i});
@@ -309,7 +309,7 @@ void SearchWords(benchmark::State& state) {
   std::vector<double> postings;
   std::size_t next = 0;
   for (auto _ : state) {
-    maps::InvertedFile::Cost cost;
+    engine::InvertedFile::Cost cost;
     benchmark::DoNotOptimize(file.Search(places.visits[next].view.words, 64, &cost));
     postings.push_back(static_cast<double>(cost.postings));
     next = next + 1 < places.visits.size() ? next + 1 : 0;

@@ -131,7 +131,7 @@ TEST(MapCodec, PanoramaMapsMustReferToExistingMembers) {
 }
 
 TEST(MapCodec, ThumbnailsMustMatchTheNumberOfBytes) {
-  const std::vector<KeyFrameThumbnail> thumbnails = {
+  const std::vector<engine::KeyFrameThumbnail> thumbnails = {
       {2, {6, 3, {1, -2, 3, -4, 5, -6, 7, -8, 9, 1, -2, 3, -4, 5, -6, 7, -8, 9}}},
       {5, {4, 4, std::vector<std::int8_t>(16, 127)}}};
   const Bytes bytes = EncodeThumbnails(7, thumbnails);
@@ -139,8 +139,9 @@ TEST(MapCodec, ThumbnailsMustMatchTheNumberOfBytes) {
   for (const std::uint64_t count : {std::uint64_t{1}, std::uint64_t{3}, ~std::uint64_t{0}})
     EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 16, count)), Error);
   EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 24, std::uint32_t{5})), Error) << "the same keyframe twice";
-  EXPECT_THROW(DecodeThumbnails(7, EncodeThumbnails(7, std::vector<KeyFrameThumbnail>{{2, {1, 1, {127}}}})),
-               Error)
+  EXPECT_THROW(
+      DecodeThumbnails(7, EncodeThumbnails(7, std::vector<engine::KeyFrameThumbnail>{{2, {1, 1, {127}}}})),
+      Error)
       << "smaller than any image's";
   EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 28, std::uint16_t{0})), Error);
   EXPECT_THROW(DecodeThumbnails(7, Forged(bytes, 28, std::uint16_t{0xFFFF})), Error);

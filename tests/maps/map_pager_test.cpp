@@ -49,7 +49,7 @@ class Pager : public ::testing::Test {
 
   TemporaryFolder folder_;
   std::optional<Library> library_;
-  PlaceIndex index_;
+  engine::PlaceIndex index_;
   std::size_t map_bytes_ = 0;
 };
 

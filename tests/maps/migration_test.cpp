@@ -20,8 +20,8 @@ Library Open(const std::filesystem::path& file, Access access) {
   return Library::Open(file, access, CreateIfMissing::kNo, QuickOptions());
 }
 
-std::vector<std::vector<KeyFrameThumbnail>> ThumbnailsIn(const Library& library) {
-  std::vector<std::vector<KeyFrameThumbnail>> all;
+std::vector<std::vector<engine::KeyFrameThumbnail>> ThumbnailsIn(const Library& library) {
+  std::vector<std::vector<engine::KeyFrameThumbnail>> all;
   library.LoadAppearance([&](const MapInfo&, Library::Appearance appearance) {
     EXPECT_EQ(appearance.problem, "");
     all.push_back(std::move(appearance.thumbnails));
@@ -29,8 +29,8 @@ std::vector<std::vector<KeyFrameThumbnail>> ThumbnailsIn(const Library& library)
   return all;
 }
 
-std::vector<std::vector<KeyFrameWords>> WordsIn(const Library& library) {
-  std::vector<std::vector<KeyFrameWords>> all;
+std::vector<std::vector<engine::KeyFrameWords>> WordsIn(const Library& library) {
+  std::vector<std::vector<engine::KeyFrameWords>> all;
   library.LoadAppearance([&](const MapInfo&, Library::Appearance appearance) {
     EXPECT_EQ(appearance.problem, "");
     all.push_back(std::move(appearance.words));
@@ -109,8 +109,8 @@ class Migration : public ::testing::TestWithParam<int> {
   std::shared_ptr<engine::MapSnapshot> door_ = WithoutPanoramas(
       MakeSampleMap(2, {.keyframes = 3, .points = 60, .width_px = 160, .height_px = 128, .corners = true}));
   std::shared_ptr<SceneRecord> scene_ = MakeSampleScene(3, 1);
-  std::vector<std::vector<KeyFrameThumbnail>> thumbnails_;
-  std::vector<std::vector<KeyFrameWords>> words_;
+  std::vector<std::vector<engine::KeyFrameThumbnail>> thumbnails_;
+  std::vector<std::vector<engine::KeyFrameWords>> words_;
 };
 INSTANTIATE_TEST_SUITE_P(EachFormat, Migration, ::testing::Values(1, 2));
 

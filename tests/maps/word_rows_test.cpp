@@ -18,8 +18,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-std::vector<KeyFrameWords> WordsIn(const Library& library) {
-  std::vector<KeyFrameWords> all;
+std::vector<engine::KeyFrameWords> WordsIn(const Library& library) {
+  std::vector<engine::KeyFrameWords> all;
   library.LoadAppearance([&](const MapInfo&, const Library::Appearance& appearance) {
     EXPECT_EQ(appearance.problem, "");
     all.insert(all.end(), appearance.words.begin(), appearance.words.end());
@@ -102,7 +102,7 @@ TEST(WordRows, KeyframesCloseTogetherAreOnePlace) {
   add(0.0, 0.7, 2);    // 40: rotated by 40 degrees
   add(0.3, 0.0, 0.5);  // 50: too far for its small depth
   add(1.9, 0.1, 2);    // 60
-  EXPECT_THAT(PlacesOf(map), ElementsAre(0, 0, 20, 0, 40, 50, 20));
+  EXPECT_THAT(engine::PlacesOf(map), ElementsAre(0, 0, 20, 0, 40, 50, 20));
 }
 
 TEST(WordRows, MatchTheKeyframesAfterEverySave) {
@@ -110,16 +110,16 @@ TEST(WordRows, MatchTheKeyframesAfterEverySave) {
   auto map = MakeSampleMap(1, kWithWords);
   Library library = LibraryOf(folder / "a.docent", map);
   const std::uint64_t key = library.FindByName("Desk").key;
-  const std::vector<KeyFrameWords> first = MakeWords(*map, {});
+  const std::vector<engine::KeyFrameWords> first = engine::MakeWords(*map, {});
   EXPECT_EQ(WordsIn(library), first);
   EXPECT_FALSE(first[0].words.empty());
   AddSampleKeyFrame(9, {1, 0, 0}, map.get());
   library.Save({key, "Desk", Policy::kOpen, map, nullptr});
-  EXPECT_EQ(WordsIn(library), MakeWords(*map, {}));
+  EXPECT_EQ(WordsIn(library), engine::MakeWords(*map, {}));
   EXPECT_EQ(WordsIn(library).size(), 4u);
   EXPECT_EQ(library.Verify(), std::vector<std::string>{});
   library.Rename(key, "Table");
-  EXPECT_EQ(WordsIn(library), MakeWords(*map, {}));
+  EXPECT_EQ(WordsIn(library), engine::MakeWords(*map, {}));
   library.Remove(key);
   EXPECT_THAT(WordsIn(library), IsEmpty());
   EXPECT_EQ(library.Verify(), std::vector<std::string>{});
@@ -131,8 +131,8 @@ TEST(WordRows, AreKeptForUnchangedImagesAndRecomputedForOthers) {
   auto map = MakeSampleMap(1, kWithWords);
   LibraryOf(file, map);
   // Artificial words that no algorithm computes from these images.
-  std::vector<KeyFrameWords> marked = MakeWords(*map, {});
-  for (KeyFrameWords& words : marked) words.words = MakeWordBag({words.keyframe});
+  std::vector<engine::KeyFrameWords> marked = engine::MakeWords(*map, {});
+  for (engine::KeyFrameWords& words : marked) words.words = MakeWordBag({words.keyframe});
   WriteWords(Database::OpenReadWrite(file, false), 1, marked);
   const engine::KeyFrameId changed = map->keyframes[1].id;
   map->keyframes[1].features = MakeSampleMap(5, kWithWords)->keyframes[1].features;
@@ -142,7 +142,7 @@ TEST(WordRows, AreKeptForUnchangedImagesAndRecomputedForOthers) {
   ASSERT_EQ(words.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(words[i].words,
-              words[i].keyframe == changed ? WordsOf(*map->keyframes[i].features) : marked[i].words);
+              words[i].keyframe == changed ? engine::WordsOf(*map->keyframes[i].features) : marked[i].words);
   }
 }
 
@@ -153,7 +153,7 @@ TEST(WordRows, OfAnotherVocabularyAreIgnored) {
   Library library = LibraryOf(file, map);
   {
     const Database database = Database::OpenReadWrite(file, false);
-    const Bytes bytes = EncodeWords(1, {VocabularyFingerprint() + 1, MakeWords(*map, {})});
+    const Bytes bytes = EncodeWords(1, {VocabularyFingerprint() + 1, engine::MakeWords(*map, {})});
     database.Prepare("UPDATE words SET data = ?").Bind(1, std::span<const std::uint8_t>(bytes)).Run();
   }
   EXPECT_THAT(WordsIn(library), IsEmpty());
@@ -161,7 +161,7 @@ TEST(WordRows, OfAnotherVocabularyAreIgnored) {
   // Until the map is saved again.
   AddSampleKeyFrame(9, {1, 0, 0}, map.get());
   library.Save({1, "Desk", Policy::kOpen, map, nullptr});
-  EXPECT_EQ(WordsIn(library), MakeWords(*map, {}));
+  EXPECT_EQ(WordsIn(library), engine::MakeWords(*map, {}));
 }
 
 TEST(WordRows, VerifyFindsWrongOnes) {
@@ -176,7 +176,7 @@ TEST(WordRows, VerifyFindsWrongOnes) {
     const auto sentences = library.Verify();
     return sentences.empty() ? std::string("all is well") : sentences.front();
   };
-  const std::vector<KeyFrameWords> right = MakeWords(*map, {});
+  const std::vector<engine::KeyFrameWords> right = engine::MakeWords(*map, {});
   EXPECT_EQ(verified_after([&](const Database&) {}), "all is well");
   EXPECT_THAT(verified_after([](const Database& d) { d.Execute("DELETE FROM words"); }),
               HasSubstr("map 'Desk' (1): its words are missing"));
@@ -205,7 +205,7 @@ TEST(WordRows, AreKeptByExportImportAndRecovery) {
   ImportMaps(open("a.docent"), folder / "imported.docent");
   RunSql(folder / "a.docent", "UPDATE words SET data = x'00'");
   Recover(folder / "a.docent", folder / "recovered.docent");
-  const std::vector<KeyFrameWords> words = MakeWords(*MakeSampleMap(1, kWithWords), {});
+  const std::vector<engine::KeyFrameWords> words = engine::MakeWords(*MakeSampleMap(1, kWithWords), {});
   EXPECT_FALSE(words[0].words.empty());
   for (const char* name : {"exported.docent", "imported.docent", "recovered.docent"}) {
     EXPECT_EQ(WordsIn(open(name)), words) << name;

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "app/simulator/simulation.h"
+#include "engine/recognition/place_index.h"
 #include "engine/vision/features.h"
-#include "maps/place_index.h"
 
 // Measures how often the place index retrieves the right one of twelve similar bays of the simulated museum
 // among its first five candidates. The keyframes come from the images where the maps are built, the queries
@@ -25,7 +25,7 @@ struct Visit {
   cv::Mat gray;
 };
 struct Museum {
-  maps::PlaceIndex index;
+  engine::PlaceIndex index;
   std::vector<Visit> visits;
 };
 

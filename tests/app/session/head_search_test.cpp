@@ -14,8 +14,8 @@
 #include "app/simulator/simulated_head.h"
 #include "app/simulator/simulation.h"
 #include "engine/base/random.h"
+#include "engine/recognition/place_index.h"
 #include "engine/tracking/tracker.h"
-#include "maps/place_index.h"
 
 namespace docent::app {
 namespace {
@@ -78,7 +78,7 @@ class Room {
     }
     return std::nullopt;
   }
-  const maps::PlaceIndex& index() const { return index_; }
+  const engine::PlaceIndex& index() const { return index_; }
 
   static constexpr std::uint64_t kKey = 1;
 
@@ -86,7 +86,7 @@ class Room {
   std::shared_ptr<const Simulation> world_;
   std::shared_ptr<const engine::CameraModel> camera_;
   std::shared_ptr<const engine::MapSnapshot> map_;
-  maps::PlaceIndex index_;
+  engine::PlaceIndex index_;
 };
 
 const Room& TheRoom() {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "maps/place_index.h"
+#include "engine/recognition/place_index.h"
 
 #include <gtest/gtest.h>
 
@@ -12,12 +12,8 @@
 #include "engine/base/random.h"
 #include "engine/vision/features.h"
 
-namespace docent::maps {
+namespace docent::engine {
 namespace {
-
-using engine::KeyFrameId;
-using engine::MapSnapshot;
-using engine::SmallBlurryImage;
 
 SmallBlurryImage MakeThumbnail(std::uint64_t seed, int width = 80, int height = 60) {
   Random random(seed);
@@ -31,9 +27,9 @@ SmallBlurryImage MakeThumbnail(std::uint64_t seed, int width = 80, int height = 
 }
 
 void AddKeyFrame(std::uint64_t seed, MapSnapshot* map, int width = 80, int height = 60) {
-  auto features = std::make_shared<engine::ImageFeatures>();
+  auto features = std::make_shared<ImageFeatures>();
   features->small_blurry = MakeThumbnail(seed, width, height);
-  engine::KeyFrame keyframe;
+  KeyFrame keyframe;
   keyframe.id = map->next_keyframe++;
   keyframe.features = std::move(features);
   map->keyframes.push_back(std::move(keyframe));
@@ -80,9 +76,9 @@ TEST(PlaceIndex, FindsEachKeyframeAmongManyDespiteNoise) {
   for (std::uint64_t key = 1; key <= 10; ++key) {
     auto map = std::make_shared<MapSnapshot>();
     for (std::uint64_t i = 0; i < 100; ++i) {
-      auto features = std::make_shared<engine::ImageFeatures>();
+      auto features = std::make_shared<ImageFeatures>();
       features->small_blurry = MakeScene(1000 * key + i);
-      engine::KeyFrame keyframe;
+      KeyFrame keyframe;
       keyframe.id = map->next_keyframe++;
       keyframe.features = features;
       map->keyframes.push_back(keyframe);
@@ -109,9 +105,9 @@ TEST(PlaceIndex, FindsAKeyframeByAShiftedImage) {
   PlaceIndex index;
   auto map = std::make_shared<MapSnapshot>();
   for (std::uint64_t i = 0; i < 600; ++i) {
-    auto features = std::make_shared<engine::ImageFeatures>();
+    auto features = std::make_shared<ImageFeatures>();
     features->small_blurry = Shifted(i, 0, 0);
-    engine::KeyFrame keyframe;
+    KeyFrame keyframe;
     keyframe.id = map->next_keyframe++;
     keyframe.features = features;
     map->keyframes.push_back(keyframe);
@@ -192,7 +188,7 @@ TEST(PlaceIndex, UpdatesAMapThatGrowsLosesKeyframesAndChangesAnImage) {
     EXPECT_LT(found[0].difference, 1e-6);
   }
   map->keyframes.erase(map->keyframes.begin() + 50, map->keyframes.begin() + 150);
-  auto features = std::make_shared<engine::ImageFeatures>();
+  auto features = std::make_shared<ImageFeatures>();
   features->small_blurry = MakeThumbnail(5000);
   map->keyframes[10].features = features;
   index.SetMap(1, std::make_shared<const MapSnapshot>(*map));
@@ -219,12 +215,12 @@ TEST(PlaceIndex, IgnoresThumbnailsOfAnotherSize) {
 }
 
 // The words of keyframe i of a map: twenty of its own and ten that all keyframes have.
-engine::WordBag WordsOfKeyFrame(std::uint64_t map, std::uint64_t i) {
+WordBag WordsOfKeyFrame(std::uint64_t map, std::uint64_t i) {
   Random random(1000 * map + i);
   std::vector<std::uint32_t> leaves;
   for (std::uint32_t k = 0; k < 20; ++k) leaves.push_back(100 + random.Below(3900));
   for (std::uint32_t k = 0; k < 10; ++k) leaves.push_back(k);
-  return engine::MakeWordBag(leaves);
+  return MakeWordBag(leaves);
 }
 std::vector<KeyFrameWords> WordsOfMap(std::uint64_t key, const MapSnapshot& map) {
   std::vector<KeyFrameWords> words;
@@ -243,7 +239,7 @@ TEST(PlaceIndex, FindsAPlaceByItsWordsWhenItsThumbnailIsUseless) {
   int alone = 0;
   for (std::uint64_t key = 1; key <= 8; ++key) {
     for (std::uint64_t i = 0; i < 50; i += 7) {
-      const engine::WordBag words = WordsOfKeyFrame(key, i);
+      const WordBag words = WordsOfKeyFrame(key, i);
       for (const SmallBlurryImage* image : {&unlike, &empty}) {
         const auto found = index.FindPlaces({*image, words}, 3, 3, 0);
         ASSERT_FALSE(found.empty());
@@ -264,7 +260,7 @@ TEST(PlaceIndex, FindsKeyframesWithThumbnailsOfAnotherSizeByTheirWords) {
   AddKeyFrame(1, map.get(), 80, 45);
   AddKeyFrame(2, map.get(), 80, 60);
   index.SetAppearance(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
-  const engine::WordBag words = WordsOfKeyFrame(1, 0);
+  const WordBag words = WordsOfKeyFrame(1, 0);
   for (const std::uint64_t only : {0, 1}) {
     const auto found = index.FindPlaces({MakeThumbnail(9, 80, 60), words}, 2, 2, only);
     ASSERT_EQ(found.size(), 2u);
@@ -323,9 +319,9 @@ std::shared_ptr<MapSnapshot> MakeMapOfImages(std::uint64_t seed, std::uint64_t k
         coarse.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
     }
     cv::resize(coarse, image, {320, 240}, 0, 0, cv::INTER_CUBIC);
-    engine::KeyFrame keyframe;
+    KeyFrame keyframe;
     keyframe.id = map->next_keyframe++;
-    keyframe.features = engine::MakeFeatures(image);
+    keyframe.features = MakeFeatures(image);
     map->keyframes.push_back(keyframe);
   }
   return map;
@@ -372,8 +368,8 @@ TEST(PlaceIndex, FindsRolledImagesByWordsWhereThumbnailsFail) {
     cv::Mat rolled;
     const cv::Mat turn = cv::getRotationMatrix2D({160, 120}, 50, 1);
     cv::warpAffine(map->keyframes[i].features->levels[0], rolled, turn, {320, 240});
-    const auto features = engine::MakeFeatures(rolled);
-    const engine::WordBag words = engine::MakeWordBag(*features);
+    const auto features = MakeFeatures(rolled);
+    const WordBag words = MakeWordBag(*features);
     by_thumbnails += index.FindPlaces(features->small_blurry, 1, 1, 0).at(0).keyframe == i;
     merged += index.FindPlaces({features->small_blurry, words}, 1, 1, 0).at(0).keyframe == i;
   }
@@ -386,7 +382,7 @@ TEST(PlaceIndex, CanBeSearchedWhileMapsAreAddedExtendedAndRemoved) {
   const auto map = MakeMap(0, 30);
   index.SetAppearance(1, ThumbnailsOf(*map), WordsOfMap(1, *map));
   const SmallBlurryImage seen = MakeThumbnail(11);
-  const engine::WordBag words = WordsOfKeyFrame(1, 11);
+  const WordBag words = WordsOfKeyFrame(1, 11);
   std::atomic<bool> done = false;
   std::atomic<int> wrong = 0;
   std::vector<std::jthread> readers;
@@ -394,7 +390,7 @@ TEST(PlaceIndex, CanBeSearchedWhileMapsAreAddedExtendedAndRemoved) {
     readers.emplace_back([&, r] {
       while (!done) {
         // With words and without.
-        const engine::PlaceQuery query = r == 0 ? engine::PlaceQuery(seen) : engine::PlaceQuery(seen, words);
+        const PlaceQuery query = r == 0 ? PlaceQuery(seen) : PlaceQuery(seen, words);
         const auto found = index.FindPlaces(query, 3, 3, 0);
         if (found.empty() || found[0].map_key != 1 || found[0].keyframe != 11 || found[0].difference > 1e-6)
           ++wrong;
@@ -415,4 +411,4 @@ TEST(PlaceIndex, CanBeSearchedWhileMapsAreAddedExtendedAndRemoved) {
 }
 
 }  // namespace
-}  // namespace docent::maps
+}  // namespace docent::engine

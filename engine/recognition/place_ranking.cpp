@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "maps/place_ranking.h"
+#include "engine/recognition/place_ranking.h"
 
 #include <algorithm>
 #include <map>
@@ -7,9 +7,9 @@
 #include <set>
 #include <utility>
 
-#include "maps/thumbnail_array.h"
+#include "engine/recognition/thumbnail_array.h"
 
-namespace docent::maps {
+namespace docent::engine {
 
 double PlaceSimilarity(const PlaceScore& score, const ChanceLevel& chance) {
   const double correlation = 1 - score.difference / (2 * kThumbnailContrast * kThumbnailContrast);
@@ -26,7 +26,7 @@ std::vector<std::size_t> RankPlaces(std::span<const PlaceScore> scores, const Ch
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return likeness[a] > likeness[b]; });
   std::map<std::uint64_t, std::size_t> given;  // The number of results by map.
-  std::set<std::pair<std::uint64_t, engine::KeyFrameId>> seen;
+  std::set<std::pair<std::uint64_t, KeyFrameId>> seen;
   std::vector<std::size_t> ranked, later;
   const auto take = [&](std::size_t index) {
     if (ranked.size() == count || given[scores[index].map_key] == per_map) return;
@@ -46,4 +46,4 @@ std::vector<std::size_t> RankPlaces(std::span<const PlaceScore> scores, const Ch
   return ranked;
 }
 
-}  // namespace docent::maps
+}  // namespace docent::engine

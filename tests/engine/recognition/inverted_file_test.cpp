@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "maps/inverted_file.h"
+#include "engine/recognition/inverted_file.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,8 @@
 
 #include "engine/base/random.h"
 
-namespace docent::maps {
+namespace docent::engine {
 namespace {
-
-using engine::WordBag;
 
 // A bag of `words` different words from a range of leaves, each once.
 WordBag RandomBag(std::uint64_t seed, std::size_t words, std::uint32_t first_leaf, std::uint32_t leaves) {
@@ -22,11 +20,11 @@ WordBag RandomBag(std::uint64_t seed, std::size_t words, std::uint32_t first_lea
     const std::uint32_t leaf = first_leaf + random.Below(leaves);
     if (std::find(chosen.begin(), chosen.end(), leaf) == chosen.end()) chosen.push_back(leaf);
   }
-  return engine::MakeWordBag(chosen);
+  return MakeWordBag(chosen);
 }
 
-std::vector<std::pair<engine::KeyFrameId, double>> Answer(const InvertedFile& file, const WordBag& wanted) {
-  std::vector<std::pair<engine::KeyFrameId, double>> answer;
+std::vector<std::pair<KeyFrameId, double>> Answer(const InvertedFile& file, const WordBag& wanted) {
+  std::vector<std::pair<KeyFrameId, double>> answer;
   for (const InvertedFile::Hit& hit : file.Search(wanted, 10))
     answer.emplace_back(hit.owner.keyframe, hit.score);
   return answer;
@@ -35,10 +33,10 @@ std::vector<std::pair<engine::KeyFrameId, double>> Answer(const InvertedFile& fi
 TEST(InvertedFile, ScoresByTermFrequencyAndInverseDocumentFrequency) {
   // Leaf 5 is in both keyframes, leaves 7 and 9 are in one each.
   InvertedFile file;
-  file.Add(engine::MakeWordBag({5, 5, 5, 7}), {1, 10});
-  file.Add(engine::MakeWordBag({5, 9}), {1, 20});
+  file.Add(MakeWordBag({5, 5, 5, 7}), {1, 10});
+  file.Add(MakeWordBag({5, 9}), {1, 20});
   const double common = std::log(1 + 2.0 / 2), rare = std::log(1 + 2.0 / 1);
-  const auto hits = file.Search(engine::MakeWordBag({5, 7}), 5);
+  const auto hits = file.Search(MakeWordBag({5, 7}), 5);
   ASSERT_EQ(hits.size(), 2u);
   const double wanted = common + rare;
   EXPECT_EQ(hits[0].owner.keyframe, 10u);
@@ -56,28 +54,28 @@ TEST(InvertedFile, ScoresByTermFrequencyAndInverseDocumentFrequency) {
 
 TEST(InvertedFile, AKeyframeScoresOneWithItselfAndUnrelatedOnesAreNoHits) {
   InvertedFile file;
-  const auto own = file.Add(engine::MakeWordBag({1, 2, 2, 3}), {4, 1});
-  const auto other = file.Add(engine::MakeWordBag({100, 200}), {4, 2});
-  const auto hits = file.Search(engine::MakeWordBag({1, 2, 2, 3}), 5);
+  const auto own = file.Add(MakeWordBag({1, 2, 2, 3}), {4, 1});
+  const auto other = file.Add(MakeWordBag({100, 200}), {4, 2});
+  const auto hits = file.Search(MakeWordBag({1, 2, 2, 3}), 5);
   ASSERT_EQ(hits.size(), 1u);
   EXPECT_EQ(hits[0].owner.map_key, 4u);
   EXPECT_EQ(hits[0].slot, own);
   EXPECT_NEAR(hits[0].score, 1, 1e-6);
   const std::vector<InvertedFile::Slot> slots = {other, own, InvertedFile::kNoSlot};
-  const auto scores = file.Scores(engine::MakeWordBag({1, 2, 2, 3}), slots);
+  const auto scores = file.Scores(MakeWordBag({1, 2, 2, 3}), slots);
   EXPECT_EQ(scores[0], 0);
   EXPECT_NEAR(scores[1], 1, 1e-6);
   EXPECT_EQ(scores[2], 0);
   EXPECT_TRUE(file.Search({}, 5).empty());
-  EXPECT_TRUE(file.Search(engine::MakeWordBag({7}), 5).empty());
-  EXPECT_TRUE(InvertedFile().Search(engine::MakeWordBag({7}), 5).empty());
+  EXPECT_TRUE(file.Search(MakeWordBag({7}), 5).empty());
+  EXPECT_TRUE(InvertedFile().Search(MakeWordBag({7}), 5).empty());
 }
 
 TEST(InvertedFile, ARareWordCountsMoreThanACommonOne) {
   InvertedFile file;
-  for (engine::KeyFrameId i = 0; i < 50; ++i) file.Add(engine::MakeWordBag({1, 1000 + i}), {1, i});
-  file.Add(engine::MakeWordBag({2, 3000}), {1, 50});
-  const auto hits = file.Search(engine::MakeWordBag({1, 2}), 51);
+  for (KeyFrameId i = 0; i < 50; ++i) file.Add(MakeWordBag({1, 1000 + i}), {1, i});
+  file.Add(MakeWordBag({2, 3000}), {1, 50});
+  const auto hits = file.Search(MakeWordBag({1, 2}), 51);
   ASSERT_EQ(hits.size(), 51u);
   EXPECT_EQ(hits[0].owner.keyframe, 50u);
   EXPECT_GT(hits[0].score, 2 * hits[1].score);
@@ -85,13 +83,12 @@ TEST(InvertedFile, ARareWordCountsMoreThanACommonOne) {
 
 TEST(InvertedFile, RemovingAddedKeyframesRestoresTheResults) {
   InvertedFile file, never_touched;
-  for (engine::KeyFrameId i = 0; i < 40; ++i) {
+  for (KeyFrameId i = 0; i < 40; ++i) {
     file.Add(RandomBag(i, 30, 0, 200), {1, i});
     never_touched.Add(RandomBag(i, 30, 0, 200), {1, i});
   }
   std::vector<InvertedFile::Slot> others;
-  for (engine::KeyFrameId i = 0; i < 25; ++i)
-    others.push_back(file.Add(RandomBag(100 + i, 30, 0, 200), {2, i}));
+  for (KeyFrameId i = 0; i < 25; ++i) others.push_back(file.Add(RandomBag(100 + i, 30, 0, 200), {2, i}));
   const WordBag wanted = RandomBag(7, 30, 0, 200);
   EXPECT_NE(Answer(file, wanted), Answer(never_touched, wanted));
   for (const InvertedFile::Slot slot : others) file.Remove(slot);
@@ -106,13 +103,13 @@ TEST(InvertedFile, RemovingAddedKeyframesRestoresTheResults) {
 
 TEST(InvertedFile, ReadsNoMoreWhenKeyframesWithOtherWordsAreAdded) {
   InvertedFile file;
-  for (engine::KeyFrameId i = 0; i < 100; ++i) file.Add(RandomBag(i, 50, 0, 500), {1, i});
+  for (KeyFrameId i = 0; i < 100; ++i) file.Add(RandomBag(i, 50, 0, 500), {1, i});
   const WordBag wanted = RandomBag(3, 50, 0, 500);
   InvertedFile::Cost before, after;
   file.Search(wanted, 5, &before);
   EXPECT_EQ(before.words, 50u);
   EXPECT_GT(before.postings, 50u);
-  for (engine::KeyFrameId i = 0; i < 2000; ++i) file.Add(RandomBag(1000 + i, 50, 500, 3000), {2, i});
+  for (KeyFrameId i = 0; i < 2000; ++i) file.Add(RandomBag(1000 + i, 50, 500, 3000), {2, i});
   const auto hits = file.Search(wanted, 5, &after);
   EXPECT_EQ(hits[0].owner.keyframe, 3u);
   EXPECT_EQ(after.words, before.words);
@@ -123,13 +120,13 @@ TEST(InvertedFile, SkipsTooFrequentWordsAndFindsTheSame) {
   InvertedFile file;
   // 20,000 keyframes share the same 40 words and have ten unique words each.
   WordBag common = RandomBag(1, 40, 0, 40);
-  for (engine::KeyFrameId i = 0; i < 20'000; ++i) {
+  for (KeyFrameId i = 0; i < 20'000; ++i) {
     WordBag bag = common;
-    for (const engine::VisualWord& word : RandomBag(i, 10, 40, 4000)) bag.push_back(word);
+    for (const VisualWord& word : RandomBag(i, 10, 40, 4000)) bag.push_back(word);
     file.Add(bag, {1, i});
   }
   WordBag wanted = common;
-  for (const engine::VisualWord& word : RandomBag(777, 10, 40, 4000)) wanted.push_back(word);
+  for (const VisualWord& word : RandomBag(777, 10, 40, 4000)) wanted.push_back(word);
   InvertedFile::Cost cost;
   const auto hits = file.Search(wanted, 3, &cost);
   EXPECT_EQ(hits[0].owner.keyframe, 777u);
@@ -141,7 +138,7 @@ TEST(InvertedFile, SkipsTooFrequentWordsAndFindsTheSame) {
 
 TEST(InvertedFile, CanBeSearchedWhileKeyframesAreAddedAndRemoved) {
   InvertedFile file;
-  for (engine::KeyFrameId i = 0; i < 100; ++i) file.Add(RandomBag(i, 30, 0, 300), {1, i});
+  for (KeyFrameId i = 0; i < 100; ++i) file.Add(RandomBag(i, 30, 0, 300), {1, i});
   std::atomic<bool> done = false;
   std::atomic<int> wrong = 0;
   std::vector<std::jthread> readers;
@@ -153,7 +150,7 @@ TEST(InvertedFile, CanBeSearchedWhileKeyframesAreAddedAndRemoved) {
       }
     });
   }
-  for (engine::KeyFrameId i = 0; i < 300; ++i) {
+  for (KeyFrameId i = 0; i < 300; ++i) {
     const auto slot = file.Add(RandomBag(1000 + i, 30, 0, 300), {2, i});
     if (i % 3 != 0) file.Remove(slot);
   }
@@ -164,4 +161,4 @@ TEST(InvertedFile, CanBeSearchedWhileKeyframesAreAddedAndRemoved) {
 }
 
 }  // namespace
-}  // namespace docent::maps
+}  // namespace docent::engine

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "maps/place_ranking.h"
+#include "engine/recognition/place_ranking.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace docent::maps {
+namespace docent::engine {
 namespace {
 
 using ::testing::ElementsAre;
@@ -13,7 +13,7 @@ using ::testing::IsEmpty;
 constexpr ChanceLevel kChance{};
 
 // A score whose thumbnails have this correlation.
-PlaceScore ScoreOf(std::uint64_t map, engine::KeyFrameId place, double correlation, double words = 0) {
+PlaceScore ScoreOf(std::uint64_t map, KeyFrameId place, double correlation, double words = 0) {
   return {map, place, 2 * 32.0 * 32.0 * (1 - correlation), words};
 }
 
@@ -26,7 +26,7 @@ TEST(PlaceRanking, TheBestKeyframesOfDifferentPlacesComeFirst) {
 
 TEST(PlaceRanking, AfterFiveDifferentPlacesTheMostSimilarFollow) {
   std::vector<PlaceScore> scores;
-  for (engine::KeyFrameId place = 0; place < 7; ++place) {
+  for (KeyFrameId place = 0; place < 7; ++place) {
     scores.push_back(ScoreOf(1, place, 0.9 - 0.1 * place));
     scores.push_back(ScoreOf(1, place, 0.85 - 0.1 * place));
   }
@@ -68,4 +68,4 @@ TEST(PlaceRanking, EitherMethodCanDecide) {
 }
 
 }  // namespace
-}  // namespace docent::maps
+}  // namespace docent::engine

@@ -7,12 +7,12 @@
 #include <span>
 #include <vector>
 
+#include "engine/recognition/inverted_file.h"
+#include "engine/recognition/keyframe_words.h"
 #include "engine/recognition/place.h"
-#include "maps/inverted_file.h"
-#include "maps/thumbnail_array.h"
-#include "maps/word_rows.h"
+#include "engine/recognition/thumbnail_array.h"
 
-namespace docent::maps {
+namespace docent::engine {
 
 // Finds the keyframes of all maps whose appearance is similar to an image ([PTAMM] 3.2 and 3.3). It combines
 // two methods: small blurry images, of which all are compared (thumbnail_array.h), and visual words, of which
@@ -25,17 +25,17 @@ namespace docent::maps {
 // microseconds.
 //
 // Memory per keyframe: 1.3 kB for the thumbnail in two sizes and about 1.4 kB for the words.
-class PlaceIndex : public engine::PlaceFinder {
+class PlaceIndex : public PlaceFinder {
  public:
   PlaceIndex();
   ~PlaceIndex() override;
 
   // Computes the words of those keyframes of a map that the index does not have yet, in one to two
   // milliseconds per keyframe. Call it before taking a lock under which SetMap is called.
-  std::vector<KeyFrameWords> DescribeNew(std::uint64_t key, const engine::MapSnapshot& map) const;
+  std::vector<KeyFrameWords> DescribeNew(std::uint64_t key, const MapSnapshot& map) const;
   // Adds or updates a map. Appearance that the index already has is not stored again. `described` is the
   // result of DescribeNew or a part of it; missing words are computed now if it is empty. key > 0.
-  void SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> map,
+  void SetMap(std::uint64_t key, std::shared_ptr<const MapSnapshot> map,
               const std::vector<KeyFrameWords>& described = {});
   // Adds a map that is not in memory, so that its candidates have no snapshot. Both lists are ordered by
   // ascending keyframe. Words of keyframes without a thumbnail are ignored; keyframes without words get them
@@ -58,8 +58,8 @@ class PlaceIndex : public engine::PlaceFinder {
   // first five results are five different places if the query asks for that. Without words in the query, only
   // thumbnails are used. Keyframes whose thumbnails have another size than the query's are found by words
   // alone. PlaceCandidate::map is null for maps that are not in memory.
-  std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
-                                                 std::uint64_t only_map) const override;
+  std::vector<PlaceCandidate> FindPlaces(const PlaceQuery& query, int count, int per_map,
+                                         std::uint64_t only_map) const override;
 
  private:
   struct Entry;
@@ -69,14 +69,14 @@ class PlaceIndex : public engine::PlaceFinder {
   class Merge;
   // The new data of a keyframe when its map is set. Null fields keep what the index has.
   struct KeyFrameUpdate {
-    engine::KeyFrameId keyframe = engine::kNoId, place = engine::kNoId;
+    KeyFrameId keyframe = kNoId, place = kNoId;
     const void* source = nullptr;  // See Entry.
     const PackedThumbnail* thumbnail = nullptr;
-    const engine::WordBag* words = nullptr;
+    const WordBag* words = nullptr;
   };
   std::shared_ptr<const State> Current() const;
   void Publish(std::shared_ptr<const State> state);
-  void Replace(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot,
+  void Replace(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot,
                std::span<const KeyFrameUpdate> updates);
   void RemoveWords(const Map* before, std::vector<InvertedFile::Slot> kept);
 
@@ -86,4 +86,4 @@ class PlaceIndex : public engine::PlaceFinder {
   std::shared_ptr<const State> state_;  // Never null.
 };
 
-}  // namespace docent::maps
+}  // namespace docent::engine

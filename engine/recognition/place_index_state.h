@@ -6,13 +6,13 @@
 #include <memory>
 #include <vector>
 
-#include "maps/inverted_file.h"
-#include "maps/place_index.h"
-#include "maps/thumbnail_array.h"
+#include "engine/recognition/inverted_file.h"
+#include "engine/recognition/place_index.h"
+#include "engine/recognition/thumbnail_array.h"
 
 // The data structures of the place index, shared by its two source files: place_index.cpp modifies them and
 // place_index_search.cpp reads them. States are shared between threads and are immutable once published.
-namespace docent::maps {
+namespace docent::engine {
 
 // The number of unused thumbnail slots, in addition to a sixteenth of all slots, above which an array is
 // compacted.
@@ -20,24 +20,23 @@ inline constexpr std::size_t kDeadThumbnailsAllowed = 128;
 
 // A keyframe of a map and the location of its thumbnail and words.
 struct PlaceIndex::Entry {
-  engine::KeyFrameId keyframe = engine::kNoId;
+  KeyFrameId keyframe = kNoId;
   std::uint32_t array = 0;       // Index in State::arrays.
   std::uint32_t slot = 0;        // Slot in that array.
   const void* source = nullptr;  // The features that it was computed from, while the map is in memory.
-  engine::KeyFrameId place = engine::kNoId;
+  KeyFrameId place = kNoId;
   bool described = false;                                // Its words were computed.
   InvertedFile::Slot word_slot = InvertedFile::kNoSlot;  // kNoSlot if it has no words.
 };
 
 struct PlaceIndex::Map {
   std::uint64_t key = 0;
-  std::shared_ptr<const engine::MapSnapshot> snapshot;  // Null while the map is not in memory.
-  std::vector<Entry> entries;                           // By ascending keyframe.
+  std::shared_ptr<const MapSnapshot> snapshot;  // Null while the map is not in memory.
+  std::vector<Entry> entries;                   // By ascending keyframe.
 
-  const Entry* Find(engine::KeyFrameId keyframe) const {
-    const auto entry =
-        std::lower_bound(entries.begin(), entries.end(), keyframe,
-                         [](const Entry& e, engine::KeyFrameId id) { return e.keyframe < id; });
+  const Entry* Find(KeyFrameId keyframe) const {
+    const auto entry = std::lower_bound(entries.begin(), entries.end(), keyframe,
+                                        [](const Entry& e, KeyFrameId id) { return e.keyframe < id; });
     return entry != entries.end() && entry->keyframe == keyframe ? &*entry : nullptr;
   }
 };
@@ -67,4 +66,4 @@ struct PlaceIndex::State {
   }
 };
 
-}  // namespace docent::maps
+}  // namespace docent::engine

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "maps/place_index.h"
+#include "engine/recognition/place_index.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "maps/place_index_state.h"
+#include "engine/recognition/place_index_state.h"
 
-namespace docent::maps {
+namespace docent::engine {
 
 namespace {
 
@@ -103,23 +103,23 @@ void PlaceIndex::Publish(std::shared_ptr<const State> state) {
   state_.swap(state);
 }
 
-std::vector<KeyFrameWords> PlaceIndex::DescribeNew(std::uint64_t key, const engine::MapSnapshot& map) const {
+std::vector<KeyFrameWords> PlaceIndex::DescribeNew(std::uint64_t key, const MapSnapshot& map) const {
   const auto state = Current();
   const Map* const before = state->Find(key);
   std::vector<KeyFrameWords> described;
-  for (const engine::KeyFrame& keyframe : map.keyframes) {
+  for (const KeyFrame& keyframe : map.keyframes) {
     const Entry* const entry = before ? before->Find(keyframe.id) : nullptr;
     if (entry && entry->described &&
         (entry->source == keyframe.features.get() ||
          state->Holds(*entry, Pack(keyframe.features->small_blurry)))) {
       continue;
     }
-    described.push_back({keyframe.id, engine::kNoId, WordsOf(*keyframe.features)});
+    described.push_back({keyframe.id, kNoId, WordsOf(*keyframe.features)});
   }
   return described;
 }
 
-void PlaceIndex::SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot,
+void PlaceIndex::SetMap(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot,
                         const std::vector<KeyFrameWords>& described) {
   if (!snapshot) return RemoveMap(key);
   if (described.empty()) {
@@ -127,7 +127,7 @@ void PlaceIndex::SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnap
     const std::vector<KeyFrameWords> own = DescribeNew(key, *snapshot);
     if (!own.empty()) return SetMap(key, std::move(snapshot), own);
   }
-  const std::vector<engine::KeyFrameId> places = PlacesOf(*snapshot);
+  const std::vector<KeyFrameId> places = PlacesOf(*snapshot);
   std::scoped_lock writing(write_mutex_);
   const auto state = Current();
   const Map* const before = state->Find(key);
@@ -136,7 +136,7 @@ void PlaceIndex::SetMap(std::uint64_t key, std::shared_ptr<const engine::MapSnap
   packed.reserve(snapshot->keyframes.size());
   auto words = described.begin();
   for (std::size_t i = 0; i < snapshot->keyframes.size(); ++i) {
-    const engine::KeyFrame& keyframe = snapshot->keyframes[i];
+    const KeyFrame& keyframe = snapshot->keyframes[i];
     KeyFrameUpdate next;
     next.keyframe = keyframe.id;
     next.place = places[i];
@@ -175,7 +175,7 @@ void PlaceIndex::SetAppearance(std::uint64_t key, std::span<const KeyFrameThumbn
   Replace(key, nullptr, updates);
 }
 
-void PlaceIndex::Replace(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot,
+void PlaceIndex::Replace(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot,
                          std::span<const KeyFrameUpdate> updates) {
   const auto state = Current();
   const Map* const before = state->Find(key);
@@ -265,4 +265,4 @@ std::size_t PlaceIndex::keyframes() const {
   return count;
 }
 
-}  // namespace docent::maps
+}  // namespace docent::engine

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "maps/thumbnail_array.h"
+#include "engine/recognition/thumbnail_array.h"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-namespace docent::maps {
+namespace docent::engine {
 
 namespace {
 
@@ -208,7 +208,7 @@ void SortHits(std::vector<ThumbnailArray::Hit>* hits) {
 
 }  // namespace
 
-PackedThumbnail Pack(const engine::SmallBlurryImage& image) {
+PackedThumbnail Pack(const SmallBlurryImage& image) {
   const cv::Mat& pixels = image.pixels;
   PackedThumbnail packed;
   if (pixels.type() != CV_32FC1 || pixels.empty()) return packed;
@@ -320,4 +320,4 @@ std::vector<ThumbnailArray::Hit> ThumbnailArray::Search(const PackedThumbnail& w
   return hits;
 }
 
-}  // namespace docent::maps
+}  // namespace docent::engine

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "maps/inverted_file.h"
+#include "engine/recognition/inverted_file.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
-namespace docent::maps {
+namespace docent::engine {
 
 namespace {
-
-using engine::VisualWord;
-using engine::WordBag;
 
 constexpr std::uint32_t kCountBits = 4;
 constexpr std::uint32_t kCountMask = (1u << kCountBits) - 1;
@@ -86,7 +83,7 @@ class InvertedFile::ReadLock {
   std::shared_lock<std::shared_mutex> lock_;
 };
 
-InvertedFile::InvertedFile() : lists_(engine::VocabularyTree::kLeaves) {}
+InvertedFile::InvertedFile() : lists_(VocabularyTree::kLeaves) {}
 InvertedFile::~InvertedFile() = default;
 
 InvertedFile::Slot InvertedFile::Add(const WordBag& bag, Owner owner) {
@@ -223,4 +220,4 @@ std::vector<double> InvertedFile::Scores(const WordBag& wanted, std::span<const 
   return scores;
 }
 
-}  // namespace docent::maps
+}  // namespace docent::engine

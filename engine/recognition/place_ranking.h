@@ -9,13 +9,13 @@
 #include "engine/map/map_snapshot.h"
 
 // Ranks keyframes that were compared with an image by thumbnail and by words.
-namespace docent::maps {
+namespace docent::engine {
 
 struct PlaceScore {
   std::uint64_t map_key = 0;
-  engine::KeyFrameId place = engine::kNoId;  // Within its map; keyframes of one place see nearly the same.
-  double difference = 0;                     // Of the thumbnails; see ThumbnailArray::Hit.
-  double words = 0;                          // Score of the shared words; see InvertedFile::Hit.
+  KeyFrameId place = kNoId;  // Within its map; keyframes of one place see nearly the same.
+  double difference = 0;     // Of the thumbnails; see ThumbnailArray::Hit.
+  double words = 0;          // Score of the shared words; see InvertedFile::Hit.
 };
 
 // The similarity that keyframes of other places have with the image by chance.
@@ -39,4 +39,4 @@ std::vector<std::size_t> RankPlaces(std::span<const PlaceScore> scores, const Ch
                                     std::size_t count, std::size_t per_map,
                                     std::size_t places = kDifferentPlaces);
 
-}  // namespace docent::maps
+}  // namespace docent::engine

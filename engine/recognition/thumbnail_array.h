@@ -15,12 +15,12 @@
 // all are compared in milliseconds. A camera at a keyframe's position with a slightly different orientation
 // sees a shifted image, so the search tries all shifts of up to a sixth of the image. The comparison is
 // invariant to brightness and contrast.
-namespace docent::maps {
+namespace docent::engine {
 
 // The standard deviation of a packed thumbnail's values; the range of int8 leaves room for four of them.
 inline constexpr float kThumbnailContrast = 32;
 
-// A thumbnail as the index and the library store it: half the width and height of engine::SmallBlurryImage
+// A thumbnail as the index and the library store it: half the width and height of SmallBlurryImage
 // (its blur leaves no finer detail), with the coarsest shading removed, mean 0 and standard deviation 32.
 struct PackedThumbnail {
   std::uint16_t width = 0, height = 0;
@@ -29,10 +29,10 @@ struct PackedThumbnail {
   bool operator==(const PackedThumbnail& other) const = default;
 };
 // Returns an empty thumbnail (width 0) when the image has no pixels.
-PackedThumbnail Pack(const engine::SmallBlurryImage& image);
+PackedThumbnail Pack(const SmallBlurryImage& image);
 
 struct KeyFrameThumbnail {
-  engine::KeyFrameId keyframe = engine::kNoId;
+  KeyFrameId keyframe = kNoId;
   PackedThumbnail thumbnail;
 
   bool operator==(const KeyFrameThumbnail& other) const = default;
@@ -57,7 +57,7 @@ class ThumbnailArray {
  public:
   struct Owner {
     std::uint64_t map_key = 0;
-    engine::KeyFrameId keyframe = engine::kNoId;
+    KeyFrameId keyframe = kNoId;
   };
   // A similar thumbnail. `difference` is the mean squared difference at the best shift, with both thumbnails
   // at a standard deviation of 32, divided by the overlapping ratio of the image to penalize small overlaps.
@@ -92,4 +92,4 @@ class ThumbnailArray {
   std::unique_ptr<Owner[]> owners_;
 };
 
-}  // namespace docent::maps
+}  // namespace docent::engine

@@ -12,7 +12,7 @@
 #include "engine/map/map_snapshot.h"
 #include "engine/recognition/word_bag.h"
 
-namespace docent::maps {
+namespace docent::engine {
 
 // An inverted file of visual words (Sivic and Zisserman 2003): the bag of words of each keyframe and, for
 // each word, the list of keyframes that contain it. A search reads only the lists of the words in the query,
@@ -28,7 +28,7 @@ class InvertedFile {
   static constexpr Slot kNoSlot = 0xFFFFFFFFu;
   struct Owner {
     std::uint64_t map_key = 0;
-    engine::KeyFrameId keyframe = engine::kNoId;
+    KeyFrameId keyframe = kNoId;
   };
   struct Hit {
     Slot slot = kNoSlot;
@@ -45,23 +45,23 @@ class InvertedFile {
   InvertedFile();
   ~InvertedFile();
 
-  Slot Add(const engine::WordBag& bag, Owner owner);
+  Slot Add(const WordBag& bag, Owner owner);
   void Remove(Slot slot);
   std::size_t size() const;  // The number of keyframes.
   std::size_t postings() const;
 
   // Returns the `count` most similar keyframes, best first; ties go to the lower slot. Candidates are
   // selected with the rarest words first and then ranked with all words.
-  std::vector<Hit> Search(const engine::WordBag& wanted, std::size_t count, Cost* cost = nullptr) const;
+  std::vector<Hit> Search(const WordBag& wanted, std::size_t count, Cost* cost = nullptr) const;
   // Returns the scores of the given slots, in their order, computed with all words.
-  std::vector<double> Scores(const engine::WordBag& wanted, std::span<const Slot> slots) const;
+  std::vector<double> Scores(const WordBag& wanted, std::span<const Slot> slots) const;
 
  private:
   struct Scratch;
   class Weights;
   // A shared lock for searches, which lets a waiting writer go first.
   class ReadLock;
-  std::vector<Slot> Shortlist(const engine::WordBag& wanted, const Weights& weights, std::size_t count,
+  std::vector<Slot> Shortlist(const WordBag& wanted, const Weights& weights, std::size_t count,
                               Cost* cost) const;
   std::unique_ptr<Scratch> TakeScratch() const;
   void ReturnScratch(std::unique_ptr<Scratch> scratch) const;
@@ -70,7 +70,7 @@ class InvertedFile {
   mutable std::shared_mutex mutex_;  // Guards the fields below.
   // For each word, slot << 4 | count - 1 of each keyframe that contains it, in no particular order.
   std::vector<std::vector<std::uint32_t>> lists_;
-  std::vector<engine::WordBag> bags_;   // By slot.
+  std::vector<WordBag> bags_;           // By slot.
   std::vector<std::uint16_t> lengths_;  // By slot: the number of words, counting repetitions.
   std::vector<Owner> owners_;           // By slot.
   std::vector<Slot> free_;
@@ -80,4 +80,4 @@ class InvertedFile {
   mutable std::vector<std::unique_ptr<Scratch>> scratch_;  // All zeros; one for each concurrent search.
 };
 
-}  // namespace docent::maps
+}  // namespace docent::engine

@@ -4,11 +4,11 @@
 #include <unordered_set>
 #include <utility>
 
-#include "maps/place_index.h"
-#include "maps/place_index_state.h"
-#include "maps/place_ranking.h"
+#include "engine/recognition/place_index.h"
+#include "engine/recognition/place_index_state.h"
+#include "engine/recognition/place_ranking.h"
 
-namespace docent::maps {
+namespace docent::engine {
 
 namespace {
 
@@ -29,8 +29,8 @@ class PlaceIndex::Merge {
   Merge(const State& state, const InvertedFile& words) : state_(state), words_(words) {}
 
   void AddByThumbnail(const PackedThumbnail& wanted, std::size_t count, const Map* only_map);
-  void AddByWords(const engine::WordBag& wanted, const Map* only_map);
-  std::vector<engine::PlaceCandidate> Best(std::size_t count, std::size_t per_map, std::size_t places) const;
+  void AddByWords(const WordBag& wanted, const Map* only_map);
+  std::vector<PlaceCandidate> Best(std::size_t count, std::size_t per_map, std::size_t places) const;
 
  private:
   struct Candidate {
@@ -39,9 +39,7 @@ class PlaceIndex::Merge {
     double difference = kUncorrelatedDifference;
     double words = 0;
   };
-  const Entry* Find(const Map* map, engine::KeyFrameId keyframe) const {
-    return map ? map->Find(keyframe) : nullptr;
-  }
+  const Entry* Find(const Map* map, KeyFrameId keyframe) const { return map ? map->Find(keyframe) : nullptr; }
   void Add(const Map* map, const Entry* entry, double difference) {
     if (known_.insert(entry).second) candidates_.push_back({map, entry, difference, 0});
   }
@@ -91,7 +89,7 @@ void PlaceIndex::Merge::AddByThumbnail(const PackedThumbnail& wanted, std::size_
   }
 }
 
-void PlaceIndex::Merge::AddByWords(const engine::WordBag& wanted, const Map* only_map) {
+void PlaceIndex::Merge::AddByWords(const WordBag& wanted, const Map* only_map) {
   const std::size_t first = candidates_.size();
   if (only_map) {
     for (const Entry& entry : only_map->entries) Add(only_map, &entry, kUncorrelatedDifference);
@@ -126,12 +124,12 @@ void PlaceIndex::Merge::Compare(std::size_t first) {
     candidates_[candidate_at.at(hit.slot)].difference = hit.difference;
 }
 
-std::vector<engine::PlaceCandidate> PlaceIndex::Merge::Best(std::size_t count, std::size_t per_map,
-                                                            std::size_t places) const {
+std::vector<PlaceCandidate> PlaceIndex::Merge::Best(std::size_t count, std::size_t per_map,
+                                                    std::size_t places) const {
   std::vector<PlaceScore> scores;
   for (const Candidate& candidate : candidates_)
     scores.push_back({candidate.map->key, candidate.entry->place, candidate.difference, candidate.words});
-  std::vector<engine::PlaceCandidate> best;
+  std::vector<PlaceCandidate> best;
   for (const std::size_t i : RankPlaces(scores, chance_, count, per_map, places)) {
     const Candidate& candidate = candidates_[i];
     best.push_back(
@@ -140,8 +138,8 @@ std::vector<engine::PlaceCandidate> PlaceIndex::Merge::Best(std::size_t count, s
   return best;
 }
 
-std::vector<engine::PlaceCandidate> PlaceIndex::FindPlaces(const engine::PlaceQuery& query, int count,
-                                                           int per_map, std::uint64_t only_map) const {
+std::vector<PlaceCandidate> PlaceIndex::FindPlaces(const PlaceQuery& query, int count, int per_map,
+                                                   std::uint64_t only_map) const {
   if (count <= 0 || per_map <= 0) return {};
   const auto state = Current();
   const Map* const only = only_map != 0 ? state->Find(only_map) : nullptr;
@@ -154,4 +152,4 @@ std::vector<engine::PlaceCandidate> PlaceIndex::FindPlaces(const engine::PlaceQu
                     query.places_first ? kDifferentPlaces : 0);
 }
 
-}  // namespace docent::maps
+}  // namespace docent::engine
