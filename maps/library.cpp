@@ -354,18 +354,18 @@ void Library::LoadAppearance(const TakeAppearance& take) const {
   });
 }
 
-std::uint64_t Library::NewKey() {
-  std::uint64_t key = 0;
+std::uint64_t Library::ReserveKeys(std::size_t count) {
+  constexpr auto kLargest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+  std::uint64_t first = 0;
   impl_->Write([&] {
     LibraryRow row = ReadLibraryRow(impl_->database());
-    if (row.next_key >= static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
-      throw Error(file() + " has no free keys left");
-    }
-    key = row.next_key++;
+    if (count > kLargest || row.next_key >= kLargest - count) throw Error(file() + " has no free keys left");
+    first = row.next_key;
+    row.next_key += count;
     WriteLibraryRow(impl_->database(), row);
     return true;
   });
-  return key;
+  return first;
 }
 
 bool Library::Save(const MapRecord& record) {

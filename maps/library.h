@@ -71,7 +71,9 @@ class Library {
 
   // Returns a key that no map of this library has or ever had. It is reserved on disk, so that two processes
   // never get the same one.
-  std::uint64_t NewKey();
+  std::uint64_t NewKey() { return ReserveKeys(1); }
+  // The same for `count` consecutive keys; returns the first.
+  std::uint64_t ReserveKeys(std::size_t count);
   // Adds or updates a map; see MapRecord and the table in policy.h. Unchanged parts, such as the images of
   // stored keyframes, are not rewritten. Maps that were joined into this one (MapRecord::joined_keys) are
   // removed in the same transaction. Returns false, and writes nothing, when the stored revision is not

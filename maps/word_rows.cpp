@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/vision/features.h"
 #include "maps/envelope.h"
 #include "maps/rows.h"
 #include "maps/schema.h"

@@ -210,7 +210,7 @@ RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequenc
   record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   record.peak_memory_mb = PeakMemoryMegabytes();
   record.mapping = MakeMappingTimes(session.MappingTimes());
-  for (const CalibrationMonitor::Ring& ring : session.LensErrors(0))
+  for (const engine::CalibrationMonitor::Ring& ring : session.LensErrors(0))
     record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
   // The session is destroyed first, because the adjustments below need memory for another copy of a map.
   std::vector<Session::MapState> maps = session.Maps();

@@ -15,46 +15,25 @@
 
 #include "app/output/run_output.h"
 #include "app/script/commands.h"
-#include "app/session/calibration_monitor.h"
-#include "app/session/camera_association.h"
-#include "app/session/camera_place_finder.h"
-#include "app/session/camera_rig.h"
-#include "app/session/initialization_monitor.h"
 #include "app/session/library_scene.h"
+#include "app/session/map_keys.h"
 #include "app/session/maintenance_order.h"
 #include "app/session/mapping_status.h"
-#include "app/session/mapping_thread.h"
 #include "app/session/relocalization_message.h"
 #include "app/session/session_map.h"
-#include "engine/recognition/place_index.h"
-#include "engine/tracking/tracker.h"
+#include "engine/system/system.h"
 #include "maps/library.h"
 #include "maps/map_pager.h"
 #include "maps/saver.h"
 
 namespace docent::app {
 
-struct SessionOptions {
-  engine::TrackerOptions tracker;  // build_maps is set by the session from may_write
-  engine::MapperOptions mapper;
-  bool threaded = true;   // mapper on its own thread; false: lockstep, runs are byte-identical
+// extend_maps and new_map_key are set by the session.
+struct SessionOptions : engine::SystemOptions {
   bool may_write = true;  // false: no map is extended and no content is edited
   std::string first_map;  // a map of this name is started without a command; empty: wait for `map new`
-  std::uint64_t seed = 1;
   // In image time. A map is also saved when it is left and at the end; 0 saves only then.
   Timestamp autosave_interval = std::chrono::seconds(10);
-  // A new map with finite points is provisional until this time has passed or it has this many keyframes. It
-  // is discarded and initialized again when tracking is lost for `provisional_loss_time` before that, or when
-  // InitializationMonitor finds its depth false.
-  Timestamp provisional_time = std::chrono::seconds(2);
-  Timestamp provisional_loss_time = std::chrono::milliseconds(400);
-  std::size_t provisional_keyframes = 5;
-  // A map without finite points is discarded and started again with the next image when tracking is lost for
-  // this time.
-  Timestamp panorama_loss_time = std::chrono::milliseconds(150);
-  // Whether a camera that is lost for `lost_time_before_new_map`, and recognises no map, starts a new map.
-  bool new_map_when_lost = false;
-  Timestamp lost_time_before_new_map = std::chrono::milliseconds(200);
   // Idle maps in memory are adjusted while there is nothing else to do; needs `threaded`.
   bool maintenance = true;
   double signpost_height = 0.12;  // ratio of its distance at placement
@@ -64,21 +43,18 @@ struct SessionOptions {
   double baseline_m = 0;
 };
 
-// The common core of authoring, touring, evaluation and the demo: cameras that are tracked in the maps of a
-// library, one active map that is extended, and the content of all maps. The uses differ only in their
-// options: with or without a library, with or without the right to write.
+// The common core of authoring, touring, evaluation and the demo: an engine::System with what an application
+// adds to it: maps that have names and policies and are kept in a library, and their content. The uses differ
+// only in their options: with or without a library, with or without the right to write.
 //
 // Threads: Process(frame) and Execute() are called on the thread of the frame's camera (frame.camera);
 // everything else may be called from any thread. Process waits neither for the mapper nor for a disk. Times
 // are those of the images; no system clock influences the results.
 //
-// Invariants: a map is extended only while its policy and the session's rights allow it, and only by frames
-// that are tracked in it. A camera that relocalizes in another map takes the session there: that map becomes
-// the active one, and its content is shown. Several cameras belong to one wearer and work in one map
-// together: see CameraAssociation. A false initialization (see SessionOptions::provisional_time) is discarded
-// and repeated under the same name, with an event that says why. With SessionOptions::new_map_when_lost, a
-// lost camera starts another map; once it is back in the first one, the two maps are joined where they
-// overlap.
+// Invariants: a map is extended only while its policy and the session's rights allow it. A map that replaces a
+// discarded one takes over its name; a map that was started after a loss gets the name of the previous one
+// with a number. What happens in the system becomes events in words and, where maps change, moves their
+// content along.
 class Session {
  public:
   // library may be null (nothing is saved) and must outlive the session. Its index is read at the start and
@@ -94,11 +70,11 @@ class Session {
   engine::TrackedFrame Process(const engine::Frame& frame);
   // Details of the frame that Process returned last as `frame`; on the thread of its camera.
   engine::FrameInspection Inspect(const engine::TrackedFrame& frame) const {
-    return cameras_.at(static_cast<std::size_t>(frame.frame.camera)).tracker->Inspect(frame);
+    return system_.Inspect(frame);
   }
-  // Delays a source that delivers faster than a camera; see MappingThread::WaitUntilIdle.
+  // Delays a source that delivers faster than a camera; see engine::System::WaitUntilIdle.
   void WaitUntilIdle(std::chrono::steady_clock::time_point latest, const std::stop_token& stop) {
-    mapping_.WaitUntilIdle(latest, stop);
+    system_.WaitUntilIdle(latest, stop);
   }
 
   // Executes a command at a frame that was processed before; its pixel refers to that frame. Throws Error
@@ -132,10 +108,12 @@ class Session {
   };
   std::vector<MapState> Maps() const;  // by key, including discarded and joined ones
   // The relative pose of the first two cameras in the current map; empty while it is unknown.
-  std::optional<RigEstimate> Rig() const;
-  // Mean radial reprojection errors by ring of the image; see CalibrationMonitor.
-  CalibrationMonitor::Profile LensErrors(std::size_t camera) const;
-  engine::MapperTimes MappingTimes() const { return mapping_.Times(); }
+  std::optional<engine::RigEstimate> Rig() const { return system_.Rig(); }
+  // Mean radial reprojection errors by ring of the image; see engine::CalibrationMonitor.
+  engine::CalibrationMonitor::Profile LensErrors(std::size_t camera) const {
+    return system_.RadialErrors(camera);
+  }
+  engine::MapperTimes MappingTimes() const { return system_.MappingTimes(); }
   std::vector<Event> TakeEvents();
 
   // Stops the mapper, saves all unsaved changes, and waits for the disk. Throws the first failure of either,
@@ -143,48 +121,50 @@ class Session {
   void Finish();
 
  private:
-  // State of a camera and its pending order. Guarded by mutex_ except for tracker, which belongs to the
-  // camera's thread.
+  // What a camera's user is told. Guarded by mutex_.
   struct Camera {
-    enum class Order { kNone, kStart, kStartAfterLoss, kStartAgain, kLeave, kEnter };
-    std::unique_ptr<engine::Tracker> tracker;
     std::shared_ptr<const engine::CameraModel> model;
-    std::unique_ptr<CalibrationMonitor> calibration_monitor;
-    std::uint64_t map_key = 0;  // the map it is tracked in; 0 while it searches all maps
-    Order order = Order::kNone;
-    bool initializing = false;            // it searches for the initial views of map_key
-    bool started_map = false;             // this camera started the current map
-    std::optional<Timestamp> lost_since;  // while it is lost in map_key
     Timestamp last_time{};
     std::string advice;  // shown until advice_end
     Timestamp advice_end{};
     RelocalizationMessage relocalization_message;
   };
 
-  // session.cpp, session_memory.cpp and session_growth.cpp
+  // session.cpp
+  void ReportRejection(Camera* camera, engine::TrackedFrame* frame);
+  static void Advise(Camera* camera, const std::string& sentence);
+  void AddEvent(Timestamp time, std::string event, std::string detail);
+  Timestamp LastTime() const;  // the latest of any camera
+
+  // session_memory.cpp
   void LoadMaps();
   void AddLoadedMap(const maps::StoredMap& stored);
   bool Evict(std::uint64_t key);
   void LoadIntoMemory(const Command& command);  // without mutex_
   void PinMapsInUse();
   void ExpectNeighbours(const SessionMap& map);
-  // Applies the pending order to the camera's tracker, and returns the places that it may search.
-  CameraPlaceFinder ApplyOrder(std::size_t index, Timestamp time);
-  void HandleResult(std::size_t index, engine::TrackedFrame* frame);
-  void RejectPose(Camera* camera, engine::TrackedFrame* frame);
-  void ReportRejection(Camera* camera, engine::TrackedFrame* frame);
-  void UpdateRig(std::size_t index, const engine::TrackedFrame& frame);
-  void CheckCalibration(std::size_t index, const engine::TrackedFrame& frame);
-  void OfferToMapper(Camera* camera, const engine::TrackedFrame& frame);
-  bool MayExtend(const SessionMap& map, const engine::Rigid3& camera_from_map) const;
-  void CheckProvisionalMap(Camera* camera, const engine::TrackedFrame& frame);
-  void CheckLoss(Camera* camera, const engine::TrackedFrame& frame);
-  void Discard(std::uint64_t key, Timestamp time, const std::string& reason);
+
+  // session_events.cpp; all with mutex_ held. Each brings the session up to date and adds an event in words.
+  void HandleSystemEvents();
+  void Handle(const engine::SystemEvent& event, const engine::MapEntered& what);
+  void Handle(const engine::SystemEvent& event, const engine::Relocalized& what);
+  void Handle(const engine::SystemEvent& event, const engine::PoseRejected& what);
+  void Handle(const engine::SystemEvent& event, const engine::MapLeft& what);
+  void Handle(const engine::SystemEvent& event, const engine::MapUpdated& what);
+  void Handle(const engine::SystemEvent& event, const engine::MapDiscarded& what);
+  void Handle(const engine::SystemEvent& event, const engine::MapStartedAfterLoss& what);
+  void Handle(const engine::SystemEvent& event, const engine::KeyFrameOffered& what);
+  void Handle(const engine::SystemEvent& event, const engine::JoinRequested& what);
+  void Handle(const engine::SystemEvent& event, const engine::MapsJoined& what);
+  void Handle(const engine::SystemEvent& event, const engine::JoinRefused& what);
+  void Handle(const engine::SystemEvent& event, const engine::RigChanged& what);
+  void Handle(const engine::SystemEvent& event, const engine::CalibrationMismatch& what);
+  void Handle(const engine::SystemEvent& event, const engine::MapperFailed& what);
+  void Handle(const engine::SystemEvent& event, const engine::MapperEvent& what);
+  std::string NameOf(std::uint64_t key) const;  // empty when the session has no such map
+  std::string CameraPrefix(std::size_t camera) const;
   std::string FreeMapName(const std::string& name) const;
-  static void Advise(Camera* camera, const std::string& sentence);
-  void OnMapperUpdate(const MappingThread::MapperUpdate& update);
-  void EnterMap(Camera* camera, std::uint64_t key, Timestamp time);
-  void AddEvent(Timestamp time, std::string event, std::string detail);
+  void AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into);
 
   // session_commands.cpp; all with mutex_ held unless noted
   void Apply(const NewMap& command, const engine::TrackedFrame& frame);
@@ -200,28 +180,21 @@ class Session {
   void Apply(const Undo& command, const engine::TrackedFrame& frame);
   void Apply(const Redo& command, const engine::TrackedFrame& frame);
   void Apply(const Save& command, const engine::TrackedFrame& frame);
-  SessionMap& AddMap(const std::string& name);
+  SessionMap& AddMap(std::uint64_t key, const std::string& name);
   SessionMap* FindByName(const std::string& name);
   SessionMap& MapToEdit(const engine::TrackedFrame& frame);
   void Edit(SessionMap* map, std::unique_ptr<content::Edit> edit);
   std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
-  void LeaveMap(std::uint64_t key);
-  void ExtendMap(const SessionMap& map);
-  void AssignMapper(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot);
-
-  // session_joining.cpp; all with mutex_ held
-  void RequestJoin(const SessionMap& into);
-  bool IsAwaited(const MappingThread::MapperUpdate::Join& update, const SessionMap& into);
-  void HandleJoinAttempt(const engine::MapJoinAttempt& attempt, SessionMap* into);
-  void AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into);
+  engine::MapPermissions PermissionsOf(const SessionMap& map) const;
+  void UpdatePermissions(const SessionMap& map);
+  std::uint64_t CurrentMap(const engine::TrackedFrame& frame) const;
 
   // session_saving.cpp
-  static void ReportSaved(const maps::MapRecord& record);
+  void OnSaved(const maps::MapRecord& record);
   void StartSaver();
   void SaveMap(SessionMap* map, Timestamp time);
-  void Autosave(Timestamp time);
+  void Autosave(Timestamp time);  // with mutex_ held
   void ReportSaveFailure(Timestamp time);
-  Timestamp LastTime() const;  // the latest of any camera
 
   // session_maintenance.cpp; RunMaintenance on the saver's thread and without mutex_
   bool RunMaintenance(const std::atomic<bool>& interrupt);
@@ -231,23 +204,12 @@ class Session {
 
   const SessionOptions options_;
   maps::Library* const library_;
-  engine::PlaceIndex index_;
+  MapKeys keys_;
+  engine::System system_;  // its lock may be taken while mutex_ is held, never the other way round
 
-  mutable std::mutex mutex_;  // guards the members below except the mapping thread; never held while tracking
+  mutable std::mutex mutex_;  // guards the members below; never held while tracking
   std::vector<Camera> cameras_;
   std::map<std::uint64_t, SessionMap> maps_;
-  CameraAssociation association_;
-  CameraRig rig_;
-  bool rig_reported_ = false;     // whether the rig was last reported as rigid
-  std::uint64_t active_key_ = 0;  // the map that the mapper works on; 0 for none
-  // The map that the mapper was asked to join into the active map; see session_joining.cpp.
-  struct Joining {
-    std::uint64_t number = 0, from = 0;
-    std::shared_ptr<const engine::MapSnapshot> snapshot;
-  };
-  std::optional<Joining> joining_;
-  std::uint64_t joins_requested_ = 0;
-  std::uint64_t next_key_ = 1;  // only without a library
   std::vector<Event> events_;
   AssetCache assets_;                                                    // by id
   std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by file name in commands
@@ -257,7 +219,6 @@ class Session {
   MaintenanceOrder maintenance_order_;  // accessed only by the saver's thread
   // Last, because their threads call back into the other members.
   std::optional<maps::MapPager> pager_;  // only with a library
-  MappingThread mapping_;
   std::optional<maps::Saver> saver_;  // only with a library opened for writing
 };
 

@@ -33,8 +33,10 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
   }
   LoadIntoMemory(command);
   const std::scoped_lock lock(mutex_);
+  HandleSystemEvents();
   model_folder_ = model_folder;
   std::visit([&](const auto& chosen) { Apply(chosen, frame); }, command);
+  HandleSystemEvents();
   AddEvent(frame.frame.time, "command", FormatCommand(command));
 }
 
@@ -66,8 +68,7 @@ SessionMap* Session::FindByName(const std::string& name) {
   return nullptr;
 }
 
-SessionMap& Session::AddMap(const std::string& name) {
-  const std::uint64_t key = saver_ ? library_->NewKey() : next_key_++;
+SessionMap& Session::AddMap(std::uint64_t key, const std::string& name) {
   SessionMap& map = maps_[key];
   map.key = key;
   map.name = name;
@@ -75,66 +76,39 @@ SessionMap& Session::AddMap(const std::string& name) {
   return map;
 }
 
-// Makes the map of `key` idle: it is saved, or removed if it was never initialized.
-void Session::LeaveMap(std::uint64_t key) {
-  if (active_key_ == key) {
-    AssignMapper(0, nullptr);
-  }
-  const auto found = maps_.find(key);
-  if (found == maps_.end() || !found->second.Exists()) return;
-  SessionMap& map = found->second;
-  Timestamp time{};
-  for (Camera& camera : cameras_) {
-    time = std::max(time, camera.last_time);
-    if (camera.map_key != key) continue;
-    camera.map_key = 0;
-    camera.initializing = false;
-    camera.lost_since.reset();
-    camera.order = Camera::Order::kLeave;
-  }
-  if (association_.map() == key) association_.Release();
-  map.provisional = false;
-  if (map.snapshot) {
-    if (options_.may_write) SaveMap(&map, time);
-    return;
-  }
-  AddEvent(time, "warning", "the map " + map.name + " was not created, because it was never initialized");
-  maps_.erase(found);
+std::uint64_t Session::CurrentMap(const engine::TrackedFrame& frame) const {
+  return system_.CurrentMap(static_cast<std::size_t>(frame.frame.camera));
 }
 
-void Session::ExtendMap(const SessionMap& map) {
-  const bool extended = options_.may_write && !map.stopped && maps::MayChangeStructure(map.policy);
-  AssignMapper(extended ? map.key : 0, extended ? map.snapshot : nullptr);
+engine::MapPermissions Session::PermissionsOf(const SessionMap& map) const {
+  engine::MapPermissions permissions;
+  permissions.extend = !map.stopped && maps::MayChangeStructure(map.policy);
+  if (map.policy == maps::Policy::kBounded) {
+    permissions.bounds.emplace();  // empty: a bounded map without bounds accepts no keyframe
+    if (map.bounds) permissions.bounds.emplace(map.bounds->min, map.bounds->max);
+  }
+  permissions.join = map.policy == maps::Policy::kOpen;
+  // A map that was saved or that has content is kept in any case.
+  permissions.discard = !map.saved_snapshot && map.scene->entities.empty();
+  return permissions;
 }
 
-void Session::AssignMapper(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot) {
-  active_key_ = key;
-  joining_.reset();  // the mapper continues from the snapshot, whatever it had joined
-  mapping_.Adopt(key, std::move(snapshot));
-}
+void Session::UpdatePermissions(const SessionMap& map) { system_.SetPermissions(map.key, PermissionsOf(map)); }
 
 void Session::Apply(const NewMap& command, const engine::TrackedFrame& frame) {
   CheckName(command.name);
   if (FindByName(command.name) != nullptr) throw Error("there is already a map '" + command.name + "'");
-  const std::uint64_t before = active_key_;
-  const SessionMap& map = AddMap(command.name);  // first, because it may throw
-  if (before != 0) LeaveMap(before);
-  ExtendMap(map);
-  for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    const bool begins = static_cast<int>(i) == frame.frame.camera;
-    cameras_[i].map_key = map.key;
-    cameras_[i].lost_since.reset();
-    cameras_[i].started_map = begins;
-    cameras_[i].order = begins ? Camera::Order::kStart : Camera::Order::kEnter;
-  }
-  association_.Begin(map.key);
+  const SessionMap& map = AddMap(keys_.Take(), command.name);  // first, because it may throw
+  system_.StartMap(map.key, static_cast<std::size_t>(frame.frame.camera));
 }
 
 void Session::Apply(const StopMap&, const engine::TrackedFrame& frame) {
-  const std::uint64_t key = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
-  if (key == 0) throw Error("there is no current map to stop");
-  maps_.at(key).stopped = true;
-  LeaveMap(key);
+  const std::uint64_t key = CurrentMap(frame);
+  const auto found = maps_.find(key);
+  if (found == maps_.end()) throw Error("there is no current map to stop");
+  found->second.stopped = true;
+  UpdatePermissions(found->second);
+  system_.LeaveMap(key);
 }
 
 void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
@@ -142,17 +116,9 @@ void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (!map->snapshot) throw Error("the map '" + command.name + "' is not initialized yet");
   map->stopped = false;
-  const std::uint64_t before = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
-  if (before == map->key) return ExtendMap(*map);
-  if (before != 0) LeaveMap(before);
-  association_.Release();
-  for (Camera& camera : cameras_) {
-    camera.map_key = map->key;
-    camera.lost_since.reset();
-    camera.order = Camera::Order::kEnter;
-  }
+  UpdatePermissions(*map);
+  system_.EnterMap(map->key, static_cast<std::size_t>(frame.frame.camera));
   PinMapsInUse();
-  ExtendMap(*map);
 }
 
 void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame) {
@@ -175,12 +141,12 @@ void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame)
   }
   map->policy = command.policy;
   map->bounds = bounds;
-  if (cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key == map->key) ExtendMap(*map);
+  UpdatePermissions(*map);
+  if (CurrentMap(frame) == map->key) system_.Activate(map->key);
 }
 
 SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
-  std::uint64_t key = cameras_.at(static_cast<std::size_t>(frame.frame.camera)).map_key;
-  if (engine::HasPose(frame.state)) key = frame.map_key;
+  const std::uint64_t key = engine::HasPose(frame.state) ? frame.map_key : CurrentMap(frame);
   const auto found = maps_.find(key);
   if (found == maps_.end() || !found->second.snapshot) throw Error("there is no current map");
   if (found->second.discarded) throw Error("the map of this frame was discarded");
@@ -196,6 +162,7 @@ void Session::Edit(SessionMap* map, std::unique_ptr<content::Edit> edit) {
   auto scene = std::make_shared<content::Scene>(*map->scene);
   map->history.Do(std::move(edit), scene.get());
   map->scene = std::move(scene);
+  UpdatePermissions(*map);
 }
 
 void Session::Apply(const PlaceModel& command, const engine::TrackedFrame& frame) {
@@ -263,6 +230,7 @@ void Session::Apply(const Undo&, const engine::TrackedFrame& frame) {
   auto scene = std::make_shared<content::Scene>(*map.scene);
   if (!map.history.Undo(scene.get())) throw Error("there is nothing to undo in '" + map.name + "'");
   map.scene = std::move(scene);
+  UpdatePermissions(map);
 }
 
 void Session::Apply(const Redo&, const engine::TrackedFrame& frame) {
@@ -270,6 +238,7 @@ void Session::Apply(const Redo&, const engine::TrackedFrame& frame) {
   auto scene = std::make_shared<content::Scene>(*map.scene);
   if (!map.history.Redo(scene.get())) throw Error("there is nothing to redo in '" + map.name + "'");
   map.scene = std::move(scene);
+  UpdatePermissions(map);
 }
 
 void Session::Apply(const Save&, const engine::TrackedFrame& frame) {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <chrono>
 #include <thread>
 #include <utility>
@@ -25,11 +24,8 @@ std::unique_lock<std::mutex> LockUnless(const std::atomic<bool>& interrupt, std:
 }  // namespace
 
 bool Session::IsIdle(const SessionMap& map) const {
-  const bool used = std::any_of(cameras_.begin(), cameras_.end(),
-                                [&](const Camera& camera) { return camera.map_key == map.key; });
-  const bool joined = joining_ && joining_->from == map.key;
-  return !used && !joined && map.key != active_key_ && map.Exists() && map.snapshot && !map.NeedsSave() &&
-         maps::MayChangeStructure(map.policy);
+  return map.Exists() && map.snapshot && !map.NeedsSave() && maps::MayChangeStructure(map.policy) &&
+         !system_.IsInUse(map.key);
 }
 
 std::vector<IdleMap> Session::MapsForMaintenance() const {
@@ -53,7 +49,7 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
   std::vector<IdleMap> idle;
   {
     const auto lock = LockUnless(interrupt, &mutex_);
-    if (!lock || !mapping_.IsIdle()) return false;
+    if (!lock || !system_.IsMapperIdle()) return false;
     idle = MapsForMaintenance();
   }
   std::shared_ptr<const content::Scene> scene;
@@ -83,11 +79,10 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
   const auto lock = LockUnless(interrupt, &mutex_);
   // A camera entered the map meanwhile: it continues with the map as it was, and will save that.
   SessionMap* const map = lock ? FindIdleMap(*chosen) : nullptr;
-  if (map == nullptr) return true;
+  if (map == nullptr || !system_.ReplaceSnapshot(map->key, chosen->snapshot, adjusted.snapshot)) return true;
   map->UpdateSnapshot(adjusted.snapshot);
   map->saved_snapshot = adjusted.snapshot;
   map->maintained_revision = adjusted.snapshot->revision;
-  index_.SetMap(map->key, adjusted.snapshot);
   AddEvent(LastTime(), "maintenance",
            map->name + ": reprojection error " + FormatNumber(done.rms_before_px, 3) + " px before, " +
                FormatNumber(done.rms_after_px, 3) + " px after");

@@ -8,10 +8,8 @@
 #include <vector>
 
 #include "app/session/content_follower.h"
-#include "app/session/initialization_monitor.h"
 #include "content/edits.h"
 #include "content/scene.h"
-#include "engine/base/time.h"
 #include "engine/map/map_snapshot.h"
 #include "maps/policy.h"
 
@@ -43,16 +41,7 @@ struct SessionMap {
 
   bool stopped = false;  // by the user: it is not extended again until it is selected by name
 
-  // A map made in this session is provisional until its depth is confirmed (see Session).
-  bool provisional = false;
-  InitializationMonitor initialization_monitor;  // while provisional
   bool discarded = false;
-  bool after_loss = false;  // started because the camera was lost in another map
-  Timestamp started{};      // time of the frame that completed its initial pair
-
-  // See session_joining.cpp.
-  std::uint64_t join_with = 0;             // the map that the camera returned to from this one; 0 for none
-  std::size_t join_at = 0;                 // number of keyframes of both maps from which joining is attempted
   std::uint64_t joined_into = 0;           // the map that it was joined into; 0 for none
   std::vector<std::uint64_t> joined_keys;  // keys of the maps that were joined into it
 

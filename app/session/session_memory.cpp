@@ -16,6 +16,7 @@ void Session::LoadMaps() {
     map.bounds = info.bounds;
     map.saved_scene = map.scene;
     map.in_library = true;
+    system_.AddMap(map.key, nullptr, PermissionsOf(map));
   }
   maps::MapPager::Callbacks callbacks;
   callbacks.loaded = [this](const maps::StoredMap& stored) { AddLoadedMap(stored); };
@@ -24,7 +25,8 @@ void Session::LoadMaps() {
     const std::scoped_lock lock(mutex_);
     AddEvent(LastTime(), "warning", problem);
   };
-  pager_.emplace(library_, &index_, options_.memory, std::move(callbacks));
+  pager_.emplace(library_, &system_.place_index(), options_.memory, std::move(callbacks));
+  system_.SetPlaceFinder(&*pager_);
   pager_->Open();
 }
 
@@ -45,6 +47,8 @@ void Session::AddLoadedMap(const maps::StoredMap& stored) {
   SessionMap& map = found->second;
   map.snapshot = map.saved_snapshot = stored.snapshot;
   map.scene = map.saved_scene = std::move(scene);
+  system_.SetSnapshot(map.key, map.snapshot);
+  UpdatePermissions(map);
 }
 
 bool Session::Evict(std::uint64_t key) {
@@ -52,9 +56,8 @@ bool Session::Evict(std::uint64_t key) {
   const auto found = maps_.find(key);
   if (found == maps_.end()) return true;
   SessionMap& map = found->second;
-  const bool used = std::any_of(cameras_.begin(), cameras_.end(),
-                                [&](const Camera& camera) { return camera.map_key == key; });
-  if (used || map.changed || map.NeedsSave() || key == active_key_) return false;
+  if (map.changed || map.NeedsSave() || system_.IsInUse(key)) return false;
+  system_.SetSnapshot(key, nullptr);
   map.snapshot.reset();
   map.saved_snapshot.reset();
   map.scene = map.saved_scene = std::make_shared<content::Scene>();
@@ -78,9 +81,7 @@ void Session::LoadIntoMemory(const Command& command) {
 
 void Session::PinMapsInUse() {
   if (!pager_) return;
-  std::vector<std::uint64_t> keys;
-  for (const Camera& camera : cameras_) keys.push_back(camera.map_key);
-  pager_->Pin(keys);
+  pager_->Pin(system_.MapsInUse());
 }
 
 // A camera is likely to go where the signposts of its map lead.

@@ -11,10 +11,11 @@
 namespace docent::app {
 
 // Called on the saver's thread once the record is on disk.
-void Session::ReportSaved(const maps::MapRecord& record) {
+void Session::OnSaved(const maps::MapRecord& record) {
   const std::string revision =
       record.snapshot ? "revision " + std::to_string(record.snapshot->revision) : "content";
   spdlog::debug("saved {}: {}", record.name, revision);
+  keys_.Refill();
 }
 
 void Session::StartSaver() {
@@ -23,13 +24,8 @@ void Session::StartSaver() {
   maps::Saver::Maintenance maintenance;
   if (options_.threaded && options_.maintenance)
     maintenance = [this](const std::atomic<bool>& interrupt) { return RunMaintenance(interrupt); };
-  saver_.emplace(library_, kAnyNumber, ReportSaved, std::move(maintenance));
-}
-
-Timestamp Session::LastTime() const {
-  Timestamp time{};
-  for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
-  return time;
+  saver_.emplace(
+      library_, kAnyNumber, [this](const maps::MapRecord& record) { OnSaved(record); }, std::move(maintenance));
 }
 
 // Passes the changes of a map to the saver, which writes them in the background.
@@ -47,6 +43,7 @@ void Session::SaveMap(SessionMap* map, Timestamp time) {
   map->saved_snapshot = map->snapshot;
   map->saved_scene = map->scene;
   map->changed = true;
+  UpdatePermissions(*map);
   saver_->Submit(std::move(record));
   AddEvent(time, "save",
            map->name + (structure ? ": " + std::to_string(map->snapshot->keyframes.size()) + " keyframes, " +
@@ -55,14 +52,13 @@ void Session::SaveMap(SessionMap* map, Timestamp time) {
 }
 
 void Session::Autosave(Timestamp time) {
-  const std::scoped_lock lock(mutex_);
   if (!saver_) return;
   if (!last_save_) last_save_ = time;
   if (options_.autosave_interval <= Timestamp{} || time - *last_save_ < options_.autosave_interval) return;
   last_save_ = time;
   ReportSaveFailure(time);
   for (auto& [key, map] : maps_) {
-    if (!map.provisional) SaveMap(&map, time);
+    if (!system_.IsProvisional(key)) SaveMap(&map, time);
   }
 }
 

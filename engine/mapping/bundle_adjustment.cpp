@@ -151,8 +151,8 @@ const char* Name(Outcome outcome) {
 std::string BundleSummary::Brief() const {
   char text[200];
   std::snprintf(text, sizeof(text),
-                "%s after %d iterations, cost %.6g -> %.6g, sigma %.3f, %d outliers, %.1f ms", Name(outcome),
-                iterations, initial_cost, final_cost, sigma, outliers, 1e3 * seconds);
+                "%s after %d iterations, cost %.6g -> %.6g, sigma %.3f, %d outliers", Name(outcome),
+                iterations, initial_cost, final_cost, sigma, outliers);
   return text;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/session/calibration_monitor.h"
+#include "engine/system/calibration_monitor.h"
 
 #include <gmock/gmock.h>
 
@@ -64,7 +64,7 @@ std::shared_ptr<const CameraModel> Lens() {
 }
 
 TEST(CalibrationMonitor, MeasuresTheErrorOfEachRing) {
-  CalibrationMonitor monitor(Lens());
+  engine::CalibrationMonitor monitor(Lens());
   Wall wall(Lens());
   for (int i = 0; i < 400; ++i)
     monitor.Add(wall.Next([](double radius) { return radius < 200 ? -0.3 : 0.4; }, 0.3 * std::sin(i)));
@@ -74,33 +74,36 @@ TEST(CalibrationMonitor, MeasuresTheErrorOfEachRing) {
   EXPECT_LE(monitor.profile()[1].samples, 134u) << "one frame in three is sampled";
 }
 
-TEST(CalibrationMonitor, WarnsOnceAboutAConsistentPatternAndSaysWhatToDo) {
-  CalibrationMonitor monitor(Lens());
+TEST(CalibrationMonitor, ReportsAConsistentPatternOnce) {
+  engine::CalibrationMonitor monitor(Lens());
   Wall wall(Lens());
   int warnings = 0;
   for (int i = 0; i < 800; ++i) {
     monitor.Add(wall.Next([](double radius) { return radius < 200 ? -0.5 : 0.6; }, 0.3 * std::sin(i)));
-    const auto warning = monitor.TakeWarning();
-    if (!warning) continue;
+    const auto mismatch = monitor.TakeMismatch();
+    if (!mismatch) continue;
     ++warnings;
-    EXPECT_THAT(*warning, HasSubstr("docent calibrate"));
+    EXPECT_NEAR(mismatch->outward_px, 0.6, 0.1);
+    EXPECT_NEAR(mismatch->inward_px, 0.5, 0.1);
+    EXPECT_GT(mismatch->outward_radius_px, 200);
+    EXPECT_LT(mismatch->inward_radius_px, 200);
   }
   EXPECT_EQ(warnings, 1);
 }
 
 TEST(CalibrationMonitor, DoesNotWarnAboutNoiseOrErrorsOfAlternatingSign) {
-  CalibrationMonitor monitor(Lens());
+  engine::CalibrationMonitor monitor(Lens());
   Wall wall(Lens());
   for (int i = 0; i < 800; ++i) {
     const double sign = i / 3 % 2 == 0 ? 1 : -1;
     monitor.Add(
         wall.Next([&](double radius) { return sign * (radius < 200 ? -1.0 : 1.0); }, 0.3 * std::sin(i), 2.5));
   }
-  EXPECT_FALSE(monitor.TakeWarning());
+  EXPECT_FALSE(monitor.TakeMismatch());
 }
 
 TEST(CalibrationMonitor, SamplesAStationaryCameraOnlyOnce) {
-  CalibrationMonitor monitor(Lens());
+  engine::CalibrationMonitor monitor(Lens());
   Wall wall(Lens());
   for (int i = 0; i < 400; ++i) monitor.Add(wall.Next([](double) { return 0.0; }, 0.001 * i / 400));
   EXPECT_EQ(monitor.profile()[2].samples, 1u);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/session/camera_association.h"
+#include "engine/system/camera_association.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ constexpr std::uint64_t kEverywhere = 0;
 
 // The example of ptamm Fig. 7, step by step.
 TEST(Association, KeepsTwoCamerasInOneMapAndMovesThemTogether) {
-  CameraAssociation cameras(2);
+  engine::CameraAssociation cameras(2);
   EXPECT_EQ(cameras.SearchedMap(), kEverywhere);
 
   // (a) Both are tracked in map 1.
@@ -43,7 +43,7 @@ TEST(Association, KeepsTwoCamerasInOneMapAndMovesThemTogether) {
 }
 
 TEST(Association, LetsTheOnlyTrackedCameraEnterABetterMap) {
-  CameraAssociation cameras(2);
+  engine::CameraAssociation cameras(2);
   EXPECT_TRUE(cameras.SetTracked(kHand, 1));
   EXPECT_EQ(cameras.SearchedMap(kHand), kEverywhere);
   EXPECT_EQ(cameras.SearchedMap(kShoulder), 1u);
@@ -55,7 +55,7 @@ TEST(Association, LetsTheOnlyTrackedCameraEnterABetterMap) {
 }
 
 TEST(Association, AcceptsTheFirstOfTwoCamerasThatRelocalizeAtTheSameTime) {
-  CameraAssociation cameras(2);
+  engine::CameraAssociation cameras(2);
   EXPECT_TRUE(cameras.SetTracked(kShoulder, 3));
   EXPECT_FALSE(cameras.SetTracked(kHand, 5));
   EXPECT_EQ(cameras.SearchedMap(), 3u);
@@ -63,7 +63,7 @@ TEST(Association, AcceptsTheFirstOfTwoCamerasThatRelocalizeAtTheSameTime) {
 }
 
 TEST(Association, KeepsAllCamerasInANewMap) {
-  CameraAssociation cameras(2);
+  engine::CameraAssociation cameras(2);
   EXPECT_TRUE(cameras.SetTracked(kHand, 1));
   EXPECT_TRUE(cameras.SetTracked(kShoulder, 1));
   cameras.Begin(2);
@@ -76,14 +76,14 @@ TEST(Association, KeepsAllCamerasInANewMap) {
 }
 
 TEST(Association, LetsASingleCameraEnterAnyMap) {
-  CameraAssociation camera(1);
+  engine::CameraAssociation camera(1);
   EXPECT_TRUE(camera.SetTracked(0, 1));
   EXPECT_TRUE(camera.SetTracked(0, 2));
   EXPECT_EQ(camera.map(), 2u);
 }
 
 TEST(Association, IsResetWhenTheMapIsLeft) {
-  CameraAssociation cameras(2);
+  engine::CameraAssociation cameras(2);
   EXPECT_TRUE(cameras.SetTracked(kHand, 1));
   cameras.Release();
   EXPECT_EQ(cameras.SearchedMap(), kEverywhere);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/session/camera_rig.h"
+#include "engine/system/camera_rig.h"
 
 #include <gtest/gtest.h>
 
@@ -39,15 +39,15 @@ const double kBaseline = kTruth.translation.norm();
 struct Errors {
   double baseline = 0, turn_deg = 0;  // baseline: relative error
 };
-Errors Compare(const RigEstimate& estimate) {
+Errors Compare(const engine::RigEstimate& estimate) {
   return {std::abs(estimate.Baseline() / kBaseline - 1),
           (estimate.second_from_first.rotation.inverse() * kTruth.rotation).Angle() / kDegree};
 }
 
 // Two cameras at 30 and 25 frames per second. Each pose has the noise of a tracker, one in ten is an outlier.
 // arm: motion of the second camera relative to the rig, by time.
-CameraRig Watch(double seconds, const std::function<Rigid3(double)>& arm, std::uint64_t map_key = 1) {
-  CameraRig rig;
+engine::CameraRig Watch(double seconds, const std::function<Rigid3(double)>& arm, std::uint64_t map_key = 1) {
+  engine::CameraRig rig;
   Random random(5);
   const auto noisy = [&](const Rigid3& pose) {
     const bool outlier = random.Below(10) == 0;
@@ -71,7 +71,7 @@ TEST(RelativePose, IsCorrectWithTenPercentOutliers) {
     samples.emplace_back(Rotation3::Exp(NormalVector(&random, outlier ? 1 : 0.2 * kDegree)) * kTruth.rotation,
                          kTruth.translation + NormalVector(&random, outlier ? 1 : 0.004));
   }
-  const RigEstimate estimate = RobustRelativePose(samples);
+  const engine::RigEstimate estimate = engine::RobustRelativePose(samples);
   EXPECT_LT(Compare(estimate).baseline, 0.01);
   EXPECT_LT(Compare(estimate).turn_deg, 0.05);
   // The sigma is that of the inliers.
@@ -80,7 +80,7 @@ TEST(RelativePose, IsCorrectWithTenPercentOutliers) {
 }
 
 TEST(Rig, IsRecognisedAsRigidFromUnsynchronizedCameras) {
-  const CameraRig rig = Watch(8, [](double) { return Rigid3(); });
+  const engine::CameraRig rig = Watch(8, [](double) { return Rigid3(); });
   ASSERT_TRUE(rig.estimate());
   EXPECT_TRUE(rig.estimate()->rigid) << rig.estimate()->ToString();
   EXPECT_LT(Compare(*rig.estimate()).baseline, 0.01);
@@ -88,7 +88,7 @@ TEST(Rig, IsRecognisedAsRigidFromUnsynchronizedCameras) {
 }
 
 TEST(Rig, IsNotRigidWhenTheCamerasMoveRelativeToEachOther) {
-  const CameraRig rig = Watch(8, [](double time) {
+  const engine::CameraRig rig = Watch(8, [](double time) {
     return Rigid3(Rotation3::Exp({0, 0.3 * std::sin(time), 0}), {0.1 * std::sin(1.7 * time), 0, 0});
   });
   ASSERT_TRUE(rig.estimate());
@@ -97,7 +97,7 @@ TEST(Rig, IsNotRigidWhenTheCamerasMoveRelativeToEachOther) {
 }
 
 TEST(Rig, IsNotRigidWhenTheCamerasOnlyStoodStill) {
-  CameraRig rig;
+  engine::CameraRig rig;
   for (int i = 0; i < 300; ++i) {
     rig.Add(0, std::chrono::milliseconds(33 * i), 1, Rigid3());
     rig.Add(1, std::chrono::milliseconds(33 * i), 1, kTruth);
@@ -107,7 +107,7 @@ TEST(Rig, IsNotRigidWhenTheCamerasOnlyStoodStill) {
 }
 
 TEST(Rig, PredictsEitherCameraFromTheOther) {
-  CameraRig rig = Watch(8, [](double) { return Rigid3(); });
+  engine::CameraRig rig = Watch(8, [](double) { return Rigid3(); });
   ASSERT_TRUE(rig.estimate() && rig.estimate()->rigid);
   rig.Add(0, FromSeconds(8), 1, FirstFromMap(8));
   rig.Add(1, FromSeconds(8), 1, kTruth * FirstFromMap(8));
@@ -120,7 +120,7 @@ TEST(Rig, PredictsEitherCameraFromTheOther) {
 }
 
 TEST(Rig, IsEstimatedAgainInAMapOfAnotherScale) {
-  CameraRig rig = Watch(8, [](double) { return Rigid3(); });
+  engine::CameraRig rig = Watch(8, [](double) { return Rigid3(); });
   rig.Add(0, FromSeconds(9), 2, Rigid3());
   EXPECT_FALSE(rig.estimate());
 }

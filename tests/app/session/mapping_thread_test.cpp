@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/session/mapping_thread.h"
+#include "engine/system/mapping_thread.h"
 
 #include <gtest/gtest.h>
 
@@ -55,11 +55,11 @@ class HeldMapper : public ::testing::Test {
 
   std::promise<void> first_update_, release_;
   std::atomic<bool> released_ = false;
-  MappingThread mapping_{{}, true, [this](const MappingThread::MapperUpdate&) {
-                           if (released_) return;
-                           first_update_.set_value();
-                           release_.get_future().wait();
-                         }};
+  engine::MappingThread mapping_{{}, true, [this](const engine::MappingThread::MapperUpdate&) {
+                                   if (released_) return;
+                                   first_update_.set_value();
+                                   release_.get_future().wait();
+                                 }};
 };
 
 TEST_F(HeldMapper, DelaysASourceUntilTheGivenTimeOnly) {

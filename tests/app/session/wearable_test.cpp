@@ -42,7 +42,7 @@ struct Walk {
   std::vector<engine::TrackedFrame> frames[2];
   std::vector<Session::MapState> maps;
   std::vector<Event> events;
-  std::optional<RigEstimate> rig;
+  std::optional<engine::RigEstimate> rig;
 };
 
 // Feeds both views of a walk to one session that builds a map.

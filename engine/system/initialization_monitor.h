@@ -2,12 +2,11 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "engine/tracking/tracked_frame.h"
 
-namespace docent::app {
+namespace docent::engine {
 
 struct InitializationMonitorOptions {
   // Points without a true depth are lost as soon as the camera moves: after false initializations of a real
@@ -32,9 +31,13 @@ class InitializationMonitor {
 
   // To be called with every frame that is tracked in the map, by ascending time. A frame for which the map
   // gave the rotation alone counts with an inlier ratio of 0.
-  void Add(const engine::TrackedFrame& frame);
-  // Why the map is false; empty while there is no evidence.
-  std::optional<std::string> Fault() const;
+  void Add(const TrackedFrame& frame);
+  // Evidence that the depth of the map is wrong.
+  struct Fault {
+    double initial_inlier_ratio = 0, recent_inlier_ratio = 0;
+  };
+  // Empty while there is no evidence.
+  std::optional<Fault> FindFault() const;
 
  private:
   struct Sample {
@@ -42,7 +45,7 @@ class InitializationMonitor {
     double inlier_ratio = 0;
   };
   InitializationMonitorOptions options_;
-  std::optional<engine::Rigid3> first_pose_;
+  std::optional<Rigid3> first_pose_;
   Timestamp first_time_{};
   double depth_ = 1;
   double initial_sum_ = 0;
@@ -51,4 +54,4 @@ class InitializationMonitor {
   bool is_near_ = true;  // the camera is still close to its first view
 };
 
-}  // namespace docent::app
+}  // namespace docent::engine

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/session/initialization_monitor.h"
+#include "engine/system/initialization_monitor.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-namespace docent::app {
+namespace docent::engine {
 
-void InitializationMonitor::Add(const engine::TrackedFrame& frame) {
-  if (!engine::HasPose(frame.state) || !frame.map || !frame.map->HasFinitePoints()) return;
+void InitializationMonitor::Add(const TrackedFrame& frame) {
+  if (!HasPose(frame.state) || !frame.map || !frame.map->HasFinitePoints()) return;
   const Timestamp now = frame.frame.time;
   if (!first_pose_) {
     first_pose_ = frame.camera_from_map;
     first_time_ = now;
     const auto localized =
         std::find_if(frame.map->keyframes.rbegin(), frame.map->keyframes.rend(),
-                     [](const engine::KeyFrame& k) { return k.kind == engine::KeyFrameKind::kSixDof; });
+                     [](const KeyFrame& k) { return k.kind == KeyFrameKind::kSixDof; });
     if (localized != frame.map->keyframes.rend()) depth_ = std::max(localized->mean_depth, 1e-9);
   }
   const double inlier_ratio = frame.finite_points > 0 ? frame.quality : 0.0;
@@ -26,12 +26,12 @@ void InitializationMonitor::Add(const engine::TrackedFrame& frame) {
   }
   recent_.push_back({now, inlier_ratio});
   std::erase_if(recent_, [&](const Sample& sample) { return now - sample.time > options_.recent_period; });
-  const engine::Rigid3 moved = frame.camera_from_map * first_pose_->inverse();
+  const Rigid3 moved = frame.camera_from_map * first_pose_->inverse();
   is_near_ = moved.translation.norm() <= options_.max_distance * depth_ &&
              moved.rotation.Angle() <= options_.max_rotation;
 }
 
-std::optional<std::string> InitializationMonitor::Fault() const {
+std::optional<InitializationMonitor::Fault> InitializationMonitor::FindFault() const {
   if (initial_count_ == 0 || recent_.size() < 3 || !is_near_) return std::nullopt;
   const double initial = initial_sum_ / initial_count_;
   const double recent =
@@ -39,11 +39,7 @@ std::optional<std::string> InitializationMonitor::Fault() const {
                       [](double sum, const Sample& sample) { return sum + sample.inlier_ratio; }) /
       static_cast<double>(recent_.size());
   if (recent >= options_.min_inlier_ratio_kept * initial) return std::nullopt;
-  const auto percent = [](double inlier_ratio) {
-    return std::to_string(std::lround(100 * inlier_ratio)) + " %";
-  };
-  return "the inlier ratio fell from " + percent(initial) + " to " + percent(recent) +
-         " although the camera hardly moved";
+  return Fault{initial, recent};
 }
 
-}  // namespace docent::app
+}  // namespace docent::engine

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/session/mapping_thread.h"
+#include "engine/system/mapping_thread.h"
 
 #include <sys/resource.h>
 #include <unistd.h>
@@ -8,9 +8,7 @@
 #include <memory>
 #include <utility>
 
-#include "app/files/image_files.h"
-
-namespace docent::app {
+namespace docent::engine {
 
 namespace {
 
@@ -23,15 +21,10 @@ void LowerThreadPriority() {
   setpriority(PRIO_PROCESS, thread, now + kSteps);  // when refused, all threads have equal priority
 }
 
-engine::MapperOptions WithImageFiles(engine::MapperOptions options) {
-  if (!options.images) options.images = std::make_shared<ImageFiles>();
-  return options;
-}
-
 }  // namespace
 
-MappingThread::MappingThread(const engine::MapperOptions& options, bool threaded, UpdateCallback on_update)
-    : mapper_(WithImageFiles(options)), on_update_(std::move(on_update)) {
+MappingThread::MappingThread(const MapperOptions& options, bool threaded, UpdateCallback on_update)
+    : mapper_(options), on_update_(std::move(on_update)) {
   if (!threaded) return;
   worker_.emplace("mapper", [this](const std::stop_token& stop) {
     LowerThreadPriority();
@@ -43,12 +36,27 @@ MappingThread::MappingThread(const engine::MapperOptions& options, bool threaded
         failed_ = true;
       }
       changed_.notify_all();
+      ReportFailure();
       throw;
     }
   });
 }
 
-void MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot) {
+// Inside a catch block: tells the owner at once what ended the thread, which only Finish would say otherwise.
+void MappingThread::ReportFailure() {
+  MapperUpdate update;
+  update.key = key_;
+  try {
+    throw;
+  } catch (const std::exception& error) {
+    update.failure = error.what();
+  } catch (...) {
+    update.failure = "an unknown exception";
+  }
+  on_update_(update);
+}
+
+void MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot) {
   {
     const std::scoped_lock lock(mutex_);
     requested_key_ = key;
@@ -63,7 +71,7 @@ void MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const engine::MapSn
   if (!worker_) ApplyAdoption();
 }
 
-void MappingThread::Start(std::uint64_t key, engine::InitialPair pair) {
+void MappingThread::Start(std::uint64_t key, InitialPair pair) {
   {
     const std::scoped_lock lock(mutex_);
     if (key != requested_key_) return;
@@ -74,7 +82,7 @@ void MappingThread::Start(std::uint64_t key, engine::InitialPair pair) {
 }
 
 void MappingThread::Join(std::uint64_t key, std::uint64_t number,
-                         std::shared_ptr<const engine::MapSnapshot> other) {
+                         std::shared_ptr<const MapSnapshot> other) {
   {
     const std::scoped_lock lock(mutex_);
     if (key != requested_key_) return;
@@ -84,8 +92,8 @@ void MappingThread::Join(std::uint64_t key, std::uint64_t number,
   changed_.notify_all();
 }
 
-bool MappingThread::Offer(std::uint64_t key, engine::KeyFrameCandidate candidate,
-                          std::vector<engine::PointReport> reports) {
+bool MappingThread::Offer(std::uint64_t key, KeyFrameCandidate candidate,
+                          std::vector<PointReport> reports) {
   {
     const std::scoped_lock lock(mutex_);
     // Before the adoption is applied, a keyframe would be dropped by it or, worse, be added to the previous
@@ -141,8 +149,8 @@ bool MappingThread::StepOnce() {
     update.snapshot = last_snapshot_ = std::move(snapshot);
   if (update.snapshot || !update.events.empty()) {
     on_update_(update);
-    using Kind = engine::MapperEvent::Kind;
-    for (const engine::MapperEvent& event : update.events) {
+    using Kind = MapperEvent::Kind;
+    for (const MapperEvent& event : update.events) {
       if (event.kind != Kind::kMapStarted && event.kind != Kind::kStartFailed) continue;
       const std::scoped_lock lock(mutex_);
       if (requested_key_ == key_) starting_ = false;
@@ -218,4 +226,4 @@ void MappingThread::Finish() {
   }
 }
 
-}  // namespace docent::app
+}  // namespace docent::engine

@@ -10,12 +10,13 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "engine/base/worker.h"
 #include "engine/mapping/mapper.h"
 
-namespace docent::app {
+namespace docent::engine {
 
 // Runs the one mapper of a session: on a thread of its own or, in lockstep, on the thread that calls
 // RunLockstep. The mapper works on one map at a time, identified by its key; 0 is none. All results are
@@ -28,29 +29,30 @@ class MappingThread {
  public:
   struct MapperUpdate {
     std::uint64_t key = 0;
-    std::shared_ptr<const engine::MapSnapshot> snapshot;  // null when nothing new was published
-    std::vector<engine::MapperEvent> events;
+    std::shared_ptr<const MapSnapshot> snapshot;  // null when nothing new was published
+    std::vector<MapperEvent> events;
     // Result of a Join. When the maps were joined, `snapshot` is the joined map.
     struct Join {
       std::uint64_t number = 0;  // that the request was given
-      engine::MapJoinAttempt attempt;
+      MapJoinAttempt attempt;
     };
     std::optional<Join> join = std::nullopt;
+    std::string failure;  // the exception that ended the thread; empty while it runs
   };
   using UpdateCallback = std::function<void(const MapperUpdate&)>;
 
-  MappingThread(const engine::MapperOptions& options, bool threaded, UpdateCallback on_update);
+  MappingThread(const MapperOptions& options, bool threaded, UpdateCallback on_update);
 
   // Continues with this map; pending requests for another one are dropped. A null snapshot waits for Start.
-  void Adopt(std::uint64_t key, std::shared_ptr<const engine::MapSnapshot> snapshot);
+  void Adopt(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);
   // Initializes the map of `key` from its first two views; ignored when another map was adopted since.
-  void Start(std::uint64_t key, engine::InitialPair pair);
+  void Start(std::uint64_t key, InitialPair pair);
   // Joins another map into the map of `key` (see Mapper::Join). Ignored when a map, even the same one, is
   // adopted before it is done; then no update reports it. A newer request replaces a pending one.
-  void Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const engine::MapSnapshot> other);
+  void Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const MapSnapshot> other);
   // Returns false when the mapper is busy or works on another map.
-  bool Offer(std::uint64_t key, engine::KeyFrameCandidate candidate,
-             std::vector<engine::PointReport> reports);
+  bool Offer(std::uint64_t key, KeyFrameCandidate candidate,
+             std::vector<PointReport> reports);
 
   // Lockstep only: runs steps until no urgent work is left (at most kMaxSteps), then one step of idle work.
   void RunLockstep();
@@ -60,7 +62,7 @@ class MappingThread {
   // whole keyframe behind or initializes a map.
   void WaitUntilIdle(std::chrono::steady_clock::time_point latest, const std::stop_token& stop);
 
-  engine::MapperTimes Times() const { return mapper_.Times(); }
+  MapperTimes Times() const { return mapper_.Times(); }
   // Ends the thread and rethrows its exception; then finishes the work that the last keyframes require, for
   // two seconds at most. Nothing may be requested afterwards.
   void Finish();
@@ -69,31 +71,32 @@ class MappingThread {
   static constexpr int kMaxSteps = 20;
   struct Adoption {
     std::uint64_t key = 0;
-    std::shared_ptr<const engine::MapSnapshot> snapshot;
+    std::shared_ptr<const MapSnapshot> snapshot;
   };
 
   struct JoinRequest {
     std::uint64_t number = 0;
-    std::shared_ptr<const engine::MapSnapshot> other;
+    std::shared_ptr<const MapSnapshot> other;
   };
 
   void Run(const std::stop_token& stop);
+  void ReportFailure();
   void ApplyAdoption();    // serves a pending adoption and start
   void JoinIfRequested();  // after ApplyAdoption
   bool StepOnce();
   bool IsBehind() const;  // with mutex_ held
 
-  engine::Mapper mapper_;
+  Mapper mapper_;
   const UpdateCallback on_update_;
   // Accessed only by the thread that runs the mapper.
   std::uint64_t key_ = 0;
-  std::shared_ptr<const engine::MapSnapshot> last_snapshot_;
+  std::shared_ptr<const MapSnapshot> last_snapshot_;
 
   mutable std::mutex mutex_;  // guards the members below; never held during a step
   std::condition_variable_any changed_;
   std::uint64_t requested_key_ = 0;
   std::optional<Adoption> adoption_;
-  std::optional<engine::InitialPair> pair_;
+  std::optional<InitialPair> pair_;
   std::optional<JoinRequest> join_;
   std::atomic<bool> interrupt_join_{false};  // read without the lock by the join that it interrupts
   bool starting_ = false;                    // from Start until its map or its failure was reported
@@ -103,4 +106,4 @@ class MappingThread {
   std::optional<Worker> worker_;             // last: it uses the other members
 };
 
-}  // namespace docent::app
+}  // namespace docent::engine

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace docent::app {
+namespace docent::engine {
 
 // Decides which maps the cameras of one wearer may search (ptamm §3.3 and Fig. 7). The cameras are
 // associated: all of them work in one map at a time.
@@ -46,4 +46,4 @@ class CameraAssociation {
   bool beginning_ = false;
 };
 
-}  // namespace docent::app
+}  // namespace docent::engine

@@ -5,14 +5,13 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "engine/geometry/camera_model.h"
 #include "engine/tracking/tracked_frame.h"
 
 // Detects a calibration that does not fit the lens, from the reprojection errors of tracking.
-namespace docent::app {
+namespace docent::engine {
 
 struct CalibrationMonitorOptions {
   int frames_between_samples = 3;
@@ -45,32 +44,37 @@ class CalibrationMonitor {
   };
   using Profile = std::array<Ring, kRings>;
 
-  explicit CalibrationMonitor(std::shared_ptr<const engine::CameraModel> camera,
+  explicit CalibrationMonitor(std::shared_ptr<const CameraModel> camera,
                               const CalibrationMonitorOptions& options = {});
 
   // To be called with every frame of the camera, in order.
-  void Add(const engine::TrackedFrame& frame);
+  void Add(const TrackedFrame& frame);
   const Profile& profile() const { return profile_; }
-  // One sentence when the calibration was found not to fit the lens; returned once.
-  std::optional<std::string> TakeWarning();
+  // Where points are seen farthest out and farthest in of where the calibration expects them, in pixels.
+  struct Mismatch {
+    double outward_radius_px = 0, outward_px = 0;  // distance from the principal point, and mean error there
+    double inward_radius_px = 0, inward_px = 0;
+  };
+  // Returned once, when the calibration was found not to fit the lens.
+  std::optional<Mismatch> TakeMismatch();
 
  private:
   struct Sums {
     double sum = 0, sum_squares = 0;
   };
-  void Sample(const engine::TrackedFrame& frame);
+  void Sample(const TrackedFrame& frame);
   void Evaluate();
 
-  const std::shared_ptr<const engine::CameraModel> camera_;
+  const std::shared_ptr<const CameraModel> camera_;
   const CalibrationMonitorOptions options_;
   double ring_width_px_ = 1;
   int frames_since_ = 0;
-  std::optional<engine::Rotation3> sampled_at_;
+  std::optional<Rotation3> sampled_at_;
   std::array<std::vector<double>, kRings> residuals_;  // radial errors by ring; kept to reuse their memory
   std::array<Sums, kRings> sums_;
   Profile profile_;
-  bool warned_ = false;
-  std::optional<std::string> warning_;
+  bool is_reported_ = false;
+  std::optional<Mismatch> mismatch_;
 };
 
-}  // namespace docent::app
+}  // namespace docent::engine

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/session/camera_rig.h"
+#include "engine/system/camera_rig.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,10 @@
 #include <limits>
 #include <numbers>
 
-namespace docent::app {
+namespace docent::engine {
 
 namespace {
 
-using engine::Rigid3;
-using engine::Rotation3;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 // For distances in 3D: the median of |x| for a normal x in three dimensions is 1.538 sigma.
@@ -186,4 +184,4 @@ std::optional<Rigid3> CameraRig::Predict(int camera, Timestamp time, std::uint64
   return camera == 1 ? estimate_->second_from_first * known : estimate_->second_from_first.inverse() * known;
 }
 
-}  // namespace docent::app
+}  // namespace docent::engine

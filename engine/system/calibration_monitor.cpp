@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/session/calibration_monitor.h"
+#include "engine/system/calibration_monitor.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <numbers>
 #include <utility>
 
-namespace docent::app {
+namespace docent::engine {
 
-CalibrationMonitor::CalibrationMonitor(std::shared_ptr<const engine::CameraModel> camera,
+CalibrationMonitor::CalibrationMonitor(std::shared_ptr<const CameraModel> camera,
                                        const CalibrationMonitorOptions& options)
     : camera_(std::move(camera)), options_(options) {
   const auto& lens = camera_->intrinsics();
@@ -19,20 +17,19 @@ CalibrationMonitor::CalibrationMonitor(std::shared_ptr<const engine::CameraModel
   ring_width_px_ = std::max(1.0, std::hypot(across, down) / kRings);
 }
 
-void CalibrationMonitor::Add(const engine::TrackedFrame& frame) {
-  using engine::TrackingState;
+void CalibrationMonitor::Add(const TrackedFrame& frame) {
   if (++frames_since_ < options_.frames_between_samples) return;
   const bool has_position = frame.state == TrackingState::kSixDof || frame.state == TrackingState::kHybrid;
-  if (!has_position || frame.quality_class != engine::TrackingQuality::kGood || !frame.map) return;
+  if (!has_position || frame.quality_class != TrackingQuality::kGood || !frame.map) return;
   constexpr double kDegrees = 180 / std::numbers::pi;
-  const engine::Rotation3& now = frame.camera_from_map.rotation;
+  const Rotation3& now = frame.camera_from_map.rotation;
   if (sampled_at_ &&
       (now * sampled_at_->inverse()).Angle() * kDegrees < options_.rotation_between_samples_deg)
     return;
   frames_since_ = 0;
   sampled_at_ = now;
   Sample(frame);
-  if (!warned_) Evaluate();
+  if (!is_reported_) Evaluate();
 }
 
 void CalibrationMonitor::Evaluate() {
@@ -50,32 +47,23 @@ void CalibrationMonitor::Evaluate() {
   const double difference = profile_[largest].mean_px - profile_[smallest].mean_px;
   const double sigma = std::sqrt(variance_of_mean(profile_[largest]) + variance_of_mean(profile_[smallest]));
   if (difference < options_.warning_px || difference < options_.warning_sigmas * sigma) return;
-  warned_ = true;
-  const auto radius = [this](std::size_t ring) {
-    return std::to_string(std::lround((static_cast<double>(ring) + 0.5) * ring_width_px_));
-  };
-  char text[400];
-  std::snprintf(
-      text, sizeof text,
-      "The calibration does not fit this lens: at %s pixels from the principal point, points are seen "
-      "%.1f pixels farther out than predicted, and at %s pixels %.1f pixels farther in. Calibrate the "
-      "camera again with `docent calibrate`.",
-      radius(largest).c_str(), std::max(0.0, profile_[largest].mean_px), radius(smallest).c_str(),
-      std::max(0.0, -profile_[smallest].mean_px));
-  warning_ = text;
+  is_reported_ = true;
+  const auto radius = [this](std::size_t ring) { return (static_cast<double>(ring) + 0.5) * ring_width_px_; };
+  mismatch_ = Mismatch{radius(largest), std::max(0.0, profile_[largest].mean_px), radius(smallest),
+                       std::max(0.0, -profile_[smallest].mean_px)};
 }
 
-std::optional<std::string> CalibrationMonitor::TakeWarning() {
-  return std::exchange(warning_, std::nullopt);
+std::optional<CalibrationMonitor::Mismatch> CalibrationMonitor::TakeMismatch() {
+  return std::exchange(mismatch_, std::nullopt);
 }
 
-void CalibrationMonitor::Sample(const engine::TrackedFrame& frame) {
+void CalibrationMonitor::Sample(const TrackedFrame& frame) {
   for (auto& ring : residuals_) ring.clear();
   const Eigen::Vector2d center(camera_->intrinsics().cx, camera_->intrinsics().cy);
   std::size_t used = 0;
-  for (const engine::PointMatch& match : frame.matches) {
+  for (const PointMatch& match : frame.matches) {
     if (match.level > 1) continue;
-    const engine::MapPoint* const point = frame.map->FindPoint(match.point);
+    const MapPoint* const point = frame.map->FindPoint(match.point);
     if (point == nullptr || point->infinite()) continue;
     const auto expected = camera_->Project(frame.camera_from_map * point->position());
     if (!expected) continue;
@@ -103,4 +91,4 @@ void CalibrationMonitor::Sample(const engine::TrackedFrame& frame) {
   }
 }
 
-}  // namespace docent::app
+}  // namespace docent::engine

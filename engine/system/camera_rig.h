@@ -11,7 +11,7 @@
 #include "engine/geometry/rigid3.h"
 
 // Estimates the relative pose of two cameras from the times at which both are tracked in one map.
-namespace docent::app {
+namespace docent::engine {
 
 struct RigOptions {
   std::size_t window = 300;      // number of the newest relative poses that are kept
@@ -26,7 +26,7 @@ struct RigOptions {
 
 // Relative pose of two cameras with its uncertainty. Lengths are in map units.
 struct RigEstimate {
-  engine::Rigid3 second_from_first;
+  Rigid3 second_from_first;
   double position_sigma = 0;  // robust sigma of a single sample about the estimate
   double rotation_sigma_deg = 0;
   std::size_t samples = 0;
@@ -40,7 +40,7 @@ struct RigEstimate {
 // The robust mean of relative poses: geometric median of the positions and L1 mean of the rotations by
 // Weiszfeld's iteration (Hartley, Aftab and Trumpf 2011), then the mean of the samples within three robust
 // sigmas. Tolerates up to half outliers. Needs at least one sample; does not set `rigid`.
-RigEstimate RobustRelativePose(const std::vector<engine::Rigid3>& second_from_first);
+RigEstimate RobustRelativePose(const std::vector<Rigid3>& second_from_first);
 
 // Determines from two trackers whether their cameras are rigidly connected. Every pose of one camera is
 // compared with the other's pose at the same time, interpolated between its frames, since the cameras are not
@@ -50,17 +50,17 @@ class CameraRig {
   explicit CameraRig(const RigOptions& options = {}) : options_(options) {}
 
   // camera is 0 or 1; the times of one camera ascend.
-  void Add(int camera, Timestamp time, std::uint64_t map_key, const engine::Rigid3& camera_from_map);
+  void Add(int camera, Timestamp time, std::uint64_t map_key, const Rigid3& camera_from_map);
   // Empty before min_samples. Updated once every few samples, not at every call.
   const std::optional<RigEstimate>& estimate() const { return estimate_; }
   // The pose of a camera at `time`, predicted from the other's newest pose. Empty unless the rig is rigid and
   // that pose is in the same map and no older than max_gap.
-  std::optional<engine::Rigid3> Predict(int camera, Timestamp time, std::uint64_t map_key) const;
+  std::optional<Rigid3> Predict(int camera, Timestamp time, std::uint64_t map_key) const;
 
  private:
   struct Pose {
     Timestamp time;
-    engine::Rigid3 camera_from_map;
+    Rigid3 camera_from_map;
   };
   void Match(int camera);
   void Update();
@@ -69,10 +69,10 @@ class CameraRig {
   std::uint64_t map_key_ = 0;
   std::deque<Pose> poses_[2];     // the newest few of each camera
   Timestamp matched_until_[2]{};  // time of the newest pose of each camera that was paired with the other
-  std::deque<engine::Rigid3> samples_;  // second_from_first
-  std::vector<engine::Rotation3> viewpoints_;
+  std::deque<Rigid3> samples_;  // second_from_first
+  std::vector<Rotation3> viewpoints_;
   std::size_t since_update_ = 0;
   std::optional<RigEstimate> estimate_;
 };
 
-}  // namespace docent::app
+}  // namespace docent::engine

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/session/camera_association.h"
+#include "engine/system/camera_association.h"
 
 #include <algorithm>
 
-namespace docent::app {
+namespace docent::engine {
 
 bool CameraAssociation::AnyTracked() const {
   return std::find(tracked_.begin(), tracked_.end(), true) != tracked_.end();
@@ -40,4 +40,4 @@ void CameraAssociation::Release() {
   beginning_ = false;
 }
 
-}  // namespace docent::app
+}  // namespace docent::engine

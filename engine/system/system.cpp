@@ -1,0 +1,511 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/system/system.h"
+
+#include <algorithm>
+#include <type_traits>
+#include <utility>
+
+namespace docent::engine {
+
+System::System(const SystemOptions& options, std::vector<std::shared_ptr<const CameraModel>> cameras)
+    : options_(options),
+      association_(cameras.size()),
+      mapping_(options.mapper, options.threaded && options.extend_maps,
+               [this](const MappingThread::MapperUpdate& update) { OnMapperUpdate(update); }) {
+  TrackerOptions tracker_options = options.tracker;
+  tracker_options.build_maps = options.extend_maps;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    Camera camera;
+    camera.tracker = std::make_unique<Tracker>(tracker_options, cameras[i], options.seed + i);
+    camera.calibration_monitor = std::make_unique<CalibrationMonitor>(std::move(cameras[i]));
+    cameras_.push_back(std::move(camera));
+  }
+}
+
+System::~System() = default;
+
+FrameInspection System::Inspect(const TrackedFrame& frame) const {
+  return cameras_.at(static_cast<std::size_t>(frame.frame.camera)).tracker->Inspect(frame);
+}
+
+TrackedFrame System::Process(const Frame& frame) {
+  const auto index = static_cast<std::size_t>(frame.camera);
+  Tracker& tracker = *cameras_.at(index).tracker;
+  const CameraPlaceFinder places = ApplyOrder(index, frame.time);
+  TrackedFrame tracked = tracker.Track(frame, &places);
+  {
+    const std::scoped_lock lock(mutex_);
+    HandleResult(index, &tracked);
+  }
+  if (options_.extend_maps) {
+    OfferToMapper(index, tracked);
+    if (!options_.threaded) mapping_.RunLockstep();
+  }
+  return tracked;
+}
+
+CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
+  Camera* const camera = &cameras_[index];
+  Tracker& tracker = *camera->tracker;
+  std::uint64_t searched = 0;
+  std::optional<CameraPlaceFinder::Prediction> prediction;
+  std::shared_ptr<const MapSnapshot> snapshot;
+  std::uint64_t key = 0;
+  Camera::Order order = Camera::Order::kNone;
+  {
+    const std::scoped_lock lock(mutex_);
+    order = std::exchange(camera->order, Camera::Order::kNone);
+    if (order == Camera::Order::kStart || order == Camera::Order::kStartAfterLoss)
+      camera->initializing = true;
+    if (order == Camera::Order::kLeave || order == Camera::Order::kEnter) camera->initializing = false;
+    if (const auto found = maps_.find(camera->map_key); found != maps_.end()) {
+      snapshot = found->second.snapshot;
+      key = camera->map_key;
+    }
+    // A map without finite points still waits for its initialization.
+    if (snapshot && snapshot->HasFinitePoints()) camera->initializing = false;
+    searched = association_.SearchedMap(index);
+    if (snapshot && index < 2 && !association_.IsTracked(index)) {
+      if (const auto pose = rig_.Predict(static_cast<int>(index), time, key))
+        prediction = CameraPlaceFinder::Prediction{key, snapshot, *pose};
+    }
+  }
+  if (order == Camera::Order::kStart) {
+    tracker.StartNewMap(/*search_known_maps=*/false);
+  } else if (order == Camera::Order::kStartAfterLoss) {
+    tracker.StartNewMap(/*search_known_maps=*/true);
+  } else if (order == Camera::Order::kStartAgain) {
+    tracker.StartFailed();
+  } else if (order != Camera::Order::kNone) {
+    tracker.Reset();
+  }
+  tracker.SetMap(std::move(snapshot), key);
+  const PlaceFinder* const all = finder_ != nullptr ? finder_ : &index_;
+  return CameraPlaceFinder(all, searched, std::move(prediction));
+}
+
+void System::HandleResult(std::size_t index, TrackedFrame* frame) {
+  Camera* const camera = &cameras_[index];
+  const Timestamp now = camera->last_time = frame->frame.time;
+  if (!HasPose(frame->state)) {
+    association_.SetLost(index);
+  } else if (const auto map = maps_.find(frame->map_key); camera->order != Camera::Order::kNone ||
+                                                          map == maps_.end() || !map->second.Exists() ||
+                                                          !association_.SetTracked(index, frame->map_key)) {
+    association_.SetLost(index);
+    RejectPose(index, frame);
+  }
+  const bool has_pose = HasPose(frame->state);
+  if (has_pose && frame->map_key != camera->map_key) {
+    EnterTrackedMap(index, frame->map_key, now);
+  } else if (frame->state == TrackingState::kRelocalized) {
+    Emit(now, frame->map_key, Relocalized{}, index);
+  }
+  if (has_pose) {
+    camera->lost_since.reset();
+    CheckCalibration(index, *frame);
+    UpdateRig(index, *frame);
+  } else if (frame->state == TrackingState::kLost && !camera->lost_since) {
+    camera->lost_since = now;
+  }
+  // With several cameras, one that is tracked shows that the initialization holds.
+  if (has_pose || !association_.AnyTracked()) CheckProvisionalMap(camera, *frame);
+  if (!has_pose) CheckLoss(index, *frame);
+}
+
+// Handles a pose in a map that the cameras are no longer in: while the frame was tracked, another camera
+// relocalized elsewhere, or the application chose another map.
+void System::RejectPose(std::size_t index, TrackedFrame* frame) {
+  Emit(frame->frame.time, frame->map_key, PoseRejected{}, index);
+  frame->state = TrackingState::kLost;
+  frame->quality_class = TrackingQuality::kLost;
+  frame->map.reset();
+  frame->map_key = 0;
+  frame->matches.clear();
+  frame->finite_points = frame->infinite_points = 0;
+  frame->hint = "Point this camera at what the other camera sees";
+  Camera& camera = cameras_[index];
+  if (camera.order == Camera::Order::kNone) camera.order = Camera::Order::kEnter;
+}
+
+void System::UpdateRig(std::size_t index, const TrackedFrame& frame) {
+  if (cameras_.size() < 2 || index > 1) return;
+  rig_.Add(static_cast<int>(index), frame.frame.time, frame.map_key, frame.camera_from_map);
+  const auto& estimate = rig_.estimate();
+  const bool rigid = estimate && estimate->rigid;
+  if (rigid == rig_reported_) return;
+  rig_reported_ = rigid;
+  if (estimate) Emit(frame.frame.time, frame.map_key, RigChanged{*estimate}, index);
+}
+
+void System::CheckCalibration(std::size_t index, const TrackedFrame& frame) {
+  CalibrationMonitor& monitor = *cameras_[index].calibration_monitor;
+  monitor.Add(frame);
+  if (const auto mismatch = monitor.TakeMismatch())
+    Emit(frame.frame.time, frame.map_key, CalibrationMismatch{*mismatch}, index);
+}
+
+void System::EnterTrackedMap(std::size_t index, std::uint64_t key, Timestamp time) {
+  const std::uint64_t previous = std::exchange(cameras_[index].map_key, key);
+  Emit(time, key, MapEntered{}, index);
+  // The other cameras abandon their search and enter this map (ptamm §3.3).
+  for (Camera& other : cameras_) {
+    if (other.map_key == key) continue;
+    other.map_key = key;
+    other.lost_since.reset();
+    other.order = Camera::Order::kEnter;
+  }
+  if (!options_.extend_maps || active_key_ == key) return;
+  LeavePreviousMap(previous, key, time);
+  const MapState& map = maps_.at(key);
+  ActivateNow(map);
+  RequestJoin(map);
+}
+
+// The previous map becomes idle, and is extended again when a camera returns to it.
+void System::LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, Timestamp time) {
+  const auto found = maps_.find(previous);
+  if (found == maps_.end() || !found->second.Exists()) return;
+  MapState& left = found->second;
+  left.provisional = false;
+  Emit(time, previous, MapLeft{});
+  if (!left.after_loss) return;
+  if (left.snapshot && left.snapshot->HasFinitePoints()) {
+    left.join_with = entered;
+    return;
+  }
+  left.discarded = true;
+  index_.RemoveMap(previous);
+  MapDiscarded event;
+  event.reason = MapDiscarded::Reason::kRelocalizedElsewhere;
+  event.other = entered;
+  Emit(time, previous, event);
+}
+
+void System::CheckProvisionalMap(Camera* camera, const TrackedFrame& frame) {
+  const auto found = maps_.find(camera->map_key);
+  if (found == maps_.end()) return;
+  MapState& map = found->second;
+  const Timestamp now = frame.frame.time;
+  MapDiscarded event;
+  if (options_.extend_maps && map.snapshot && !map.snapshot->HasFinitePoints()) {
+    // A map without finite points is quickly made again.
+    event.reason = MapDiscarded::Reason::kLostWithoutDepth;
+    if (camera->lost_since && now - *camera->lost_since > options_.panorama_loss_time)
+      Discard(map.key, now, event);
+    return;
+  }
+  if (!map.provisional) return;
+  if (frame.map_key == map.key) map.initialization_monitor.Add(frame);
+  const auto fault = map.initialization_monitor.FindFault();
+  if (fault && map.permissions.discard) {
+    event.reason = MapDiscarded::Reason::kFalseDepth;
+    event.fault = *fault;
+    Discard(map.key, now, event);
+    return;
+  }
+  if (!camera->lost_since) {
+    if (now - map.started > options_.provisional_time ||
+        map.snapshot->keyframes.size() >= options_.provisional_keyframes)
+      map.provisional = false;
+    return;
+  }
+  if (now - *camera->lost_since <= options_.provisional_loss_time) return;
+  if (!map.permissions.discard) {
+    map.provisional = false;
+    return;
+  }
+  event.reason = MapDiscarded::Reason::kLostWhileProvisional;
+  event.tracked_for = *camera->lost_since - map.started;
+  event.keyframes = map.snapshot->keyframes.size();
+  Discard(map.key, now, event);
+}
+
+// Starts a new map for a camera that is lost and recognises no map.
+void System::CheckLoss(std::size_t index, const TrackedFrame& frame) {
+  const Camera& camera = cameras_[index];
+  if (!options_.extend_maps || !options_.new_map_when_lost || !camera.lost_since || association_.AnyTracked())
+    return;
+  const auto found = maps_.find(camera.map_key);
+  // A map that the user stopped, or that may not be extended, is not left automatically.
+  if (found == maps_.end() || found->second.provisional || active_key_ != found->first) return;
+  const Timestamp now = frame.frame.time;
+  if (now - *camera.lost_since <= options_.lost_time_before_new_map) return;
+  if (frame.relocalization.rejection == RejectionReason::kUnconfirmed) return;  // relocalization is imminent
+  const std::uint64_t lost_in = found->first;
+  const std::uint64_t key = NewKey();
+  if (key == 0) return;
+  Emit(now, key, MapStartedAfterLoss{lost_in}, index);
+  StartMapAt(key, index);
+  maps_.at(key).after_loss = true;
+  cameras_[index].order = Camera::Order::kStartAfterLoss;
+}
+
+void System::Discard(std::uint64_t key, Timestamp time, MapDiscarded event) {
+  MapState& map = maps_.at(key);
+  const std::uint64_t next_key = NewKey();
+  if (next_key == 0) return;
+  map.discarded = true;
+  index_.RemoveMap(key);
+  MapState& next = AddState(next_key);
+  next.after_loss = map.after_loss;
+  event.replacement = next.key;
+  Emit(time, key, event);
+  AssignMapper(next.key, nullptr);
+  association_.Begin(next.key);
+  for (Camera& camera : cameras_) {
+    if (camera.map_key != key) continue;
+    camera.map_key = next.key;
+    camera.order = !camera.started_map ? Camera::Order::kEnter
+                   : next.after_loss   ? Camera::Order::kStartAfterLoss
+                                       : Camera::Order::kStart;
+    camera.lost_since.reset();
+  }
+}
+
+bool System::MayAddKeyFrame(const MapState& map, const Rigid3& camera_from_map) const {
+  if (!options_.extend_maps || !map.Exists() || !map.permissions.extend) return false;
+  return !map.permissions.bounds || map.permissions.bounds->contains(camera_from_map.OriginInSource());
+}
+
+void System::OfferToMapper(std::size_t index, const TrackedFrame& frame) {
+  Tracker& tracker = *cameras_[index].tracker;
+  std::optional<InitialPair> pair = tracker.TakeInitialPair();
+  std::optional<KeyFrameCandidate> candidate = tracker.TakeKeyFrameCandidate();
+  if (!pair && !candidate) return;
+  std::uint64_t key = 0;
+  {
+    const std::scoped_lock lock(mutex_);
+    key = cameras_[index].map_key;
+    const auto found = maps_.find(key);
+    if (found == maps_.end() || key != active_key_) return;
+    if (pair && found->second.snapshot && found->second.snapshot->HasFinitePoints()) return;
+    if (candidate && !MayAddKeyFrame(found->second, frame.camera_from_map)) candidate.reset();
+  }
+  if (!pair && !candidate) return;
+  bool accepted = pair.has_value();
+  if (pair) mapping_.Start(key, std::move(*pair));
+  if (candidate) accepted = mapping_.Offer(key, std::move(*candidate), tracker.TakeReports());
+  const std::scoped_lock lock(mutex_);
+  Emit(frame.frame.time, key, KeyFrameOffered{accepted}, index);
+}
+
+void System::OnMapperUpdate(const MappingThread::MapperUpdate& update) {
+  // Visual words of new keyframes are computed before locking, so that frames are processed meanwhile.
+  std::vector<KeyFrameWords> described;
+  if (update.snapshot) described = index_.DescribeNew(update.key, *update.snapshot);
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!update.failure.empty()) Emit(LastTime(), update.key, MapperFailed{update.failure});
+    const auto found = maps_.find(update.key);
+    // A late update of a map that was closed or discarded meanwhile is ignored.
+    const bool late = found == maps_.end() || update.key != active_key_ || !found->second.Exists();
+    if (!late && (!update.join || IsAwaited(*update.join, found->second))) {
+      MapState& map = found->second;
+      if (update.snapshot) {
+        map.snapshot = update.snapshot;
+        index_.SetMap(map.key, update.snapshot, described);
+        Emit(LastTime(), map.key, MapUpdated{update.snapshot});
+      }
+      if (update.join) {
+        HandleJoinAttempt(update.join->attempt, &map);
+      } else if (update.snapshot) {
+        RequestJoin(map);
+      }
+      for (const MapperEvent& event : update.events) HandleMapperEvent(event, &map);
+    }
+  }
+  if (event_hook_) event_hook_();
+}
+
+void System::HandleMapperEvent(const MapperEvent& event, MapState* map) {
+  if (event.kind == MapperEvent::Kind::kMapStarted) {
+    map->started = event.time;
+    map->provisional = true;
+    map->initialization_monitor = InitializationMonitor();
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      if (cameras_[i].map_key == map->key && cameras_[i].initializing) association_.SetTracked(i, map->key);
+    }
+  } else if (event.kind == MapperEvent::Kind::kStartFailed) {
+    for (Camera& camera : cameras_) {
+      if (camera.map_key != map->key || !camera.initializing) continue;
+      camera.order = map->snapshot     ? Camera::Order::kStartAgain
+                     : map->after_loss ? Camera::Order::kStartAfterLoss
+                                       : Camera::Order::kStart;
+    }
+  }
+  Emit(event.time, map->key, event);
+}
+
+// Maps
+
+System::MapState& System::AddState(std::uint64_t key) {
+  MapState& map = maps_[key];
+  map.key = key;
+  return map;
+}
+
+std::uint64_t System::NewKey() {
+  if (options_.new_map_key) return options_.new_map_key();
+  return maps_.empty() ? 1 : maps_.rbegin()->first + 1;
+}
+
+Timestamp System::LastTime() const {
+  Timestamp time{};
+  for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
+  return time;
+}
+
+void System::AddMap(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot,
+                    const MapPermissions& permissions) {
+  const std::scoped_lock lock(mutex_);
+  MapState& map = AddState(key);
+  map.snapshot = std::move(snapshot);
+  map.permissions = permissions;
+}
+
+void System::SetSnapshot(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot) {
+  const std::scoped_lock lock(mutex_);
+  if (const auto found = maps_.find(key); found != maps_.end() && key != active_key_)
+    found->second.snapshot = std::move(snapshot);
+}
+
+bool System::ReplaceSnapshot(std::uint64_t key, const std::shared_ptr<const MapSnapshot>& expected,
+                             std::shared_ptr<const MapSnapshot> snapshot) {
+  const std::scoped_lock lock(mutex_);
+  const auto found = maps_.find(key);
+  if (found == maps_.end() || IsUsed(key) || found->second.snapshot != expected) return false;
+  index_.SetMap(key, snapshot);
+  found->second.snapshot = std::move(snapshot);
+  return true;
+}
+
+void System::SetPermissions(std::uint64_t key, const MapPermissions& permissions) {
+  const std::scoped_lock lock(mutex_);
+  if (const auto found = maps_.find(key); found != maps_.end()) found->second.permissions = permissions;
+}
+
+void System::StartMap(std::uint64_t key, std::size_t camera) {
+  const std::scoped_lock lock(mutex_);
+  StartMapAt(key, camera);
+}
+
+void System::StartMapAt(std::uint64_t key, std::size_t camera) {
+  const std::uint64_t previous = active_key_;
+  if (previous != 0) LeaveMapNow(previous);
+  ActivateNow(AddState(key));
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    cameras_[i].map_key = key;
+    cameras_[i].lost_since.reset();
+    cameras_[i].started_map = i == camera;
+    cameras_[i].order = i == camera ? Camera::Order::kStart : Camera::Order::kEnter;
+  }
+  association_.Begin(key);
+}
+
+void System::EnterMap(std::uint64_t key, std::size_t camera) {
+  const std::scoped_lock lock(mutex_);
+  const MapState& map = maps_.at(key);
+  const std::uint64_t previous = cameras_.at(camera).map_key;
+  if (previous == key) return ActivateNow(map);
+  if (previous != 0) LeaveMapNow(previous);
+  association_.Release();
+  for (Camera& each : cameras_) {
+    each.map_key = key;
+    each.lost_since.reset();
+    each.order = Camera::Order::kEnter;
+  }
+  ActivateNow(map);
+}
+
+void System::LeaveMap(std::uint64_t key) {
+  const std::scoped_lock lock(mutex_);
+  LeaveMapNow(key);
+}
+
+void System::LeaveMapNow(std::uint64_t key) {
+  if (active_key_ == key) AssignMapper(0, nullptr);
+  const auto found = maps_.find(key);
+  if (found == maps_.end() || !found->second.Exists()) return;
+  Timestamp time{};
+  for (Camera& camera : cameras_) {
+    time = std::max(time, camera.last_time);
+    if (camera.map_key != key) continue;
+    camera.map_key = 0;
+    camera.initializing = false;
+    camera.lost_since.reset();
+    camera.order = Camera::Order::kLeave;
+  }
+  if (association_.map() == key) association_.Release();
+  found->second.provisional = false;
+  const bool forgotten = found->second.snapshot == nullptr;
+  if (forgotten) maps_.erase(found);
+  Emit(time, key, MapLeft{forgotten});
+}
+
+void System::Activate(std::uint64_t key) {
+  const std::scoped_lock lock(mutex_);
+  ActivateNow(maps_.at(key));
+}
+
+void System::ActivateNow(const MapState& map) {
+  const bool extend = options_.extend_maps && map.permissions.extend;
+  AssignMapper(extend ? map.key : 0, extend ? map.snapshot : nullptr);
+}
+
+void System::AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot) {
+  active_key_ = key;
+  joining_.reset();  // the mapper begins with the snapshot, whatever it had joined
+  mapping_.Adopt(key, std::move(snapshot));
+}
+
+std::uint64_t System::CurrentMap(std::size_t camera) const {
+  const std::scoped_lock lock(mutex_);
+  return cameras_.at(camera).map_key;
+}
+
+std::uint64_t System::ActiveMap() const {
+  const std::scoped_lock lock(mutex_);
+  return active_key_;
+}
+
+std::vector<std::uint64_t> System::MapsInUse() const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<std::uint64_t> keys;
+  for (const Camera& camera : cameras_) keys.push_back(camera.map_key);
+  return keys;
+}
+
+bool System::IsInUse(std::uint64_t key) const {
+  const std::scoped_lock lock(mutex_);
+  return IsUsed(key);
+}
+
+bool System::IsUsed(std::uint64_t key) const {
+  return key == active_key_ || (joining_ && joining_->from == key) ||
+         std::any_of(cameras_.begin(), cameras_.end(),
+                     [key](const Camera& camera) { return camera.map_key == key; });
+}
+
+bool System::IsProvisional(std::uint64_t key) const {
+  const std::scoped_lock lock(mutex_);
+  const auto found = maps_.find(key);
+  return found != maps_.end() && found->second.provisional;
+}
+
+std::optional<RigEstimate> System::Rig() const {
+  const std::scoped_lock lock(mutex_);
+  return rig_.estimate();
+}
+
+CalibrationMonitor::Profile System::RadialErrors(std::size_t camera) const {
+  const std::scoped_lock lock(mutex_);
+  return cameras_.at(camera).calibration_monitor->profile();
+}
+
+std::vector<SystemEvent> System::TakeEvents() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(events_, {});
+}
+
+}  // namespace docent::engine
