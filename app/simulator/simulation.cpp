@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 #include <utility>
 
@@ -47,7 +48,12 @@ Sensor::Options SensorOf(const Scene& scene, const SimulationOptions& options, c
 
 engine::CameraModel CameraOf(const Scene& scene, const SimulationOptions& options) {
   if (options.camera) return *options.camera;
-  return scene.camera ? *scene.camera : SimulatedCamera();
+  const engine::CameraModel own = scene.camera ? *scene.camera : SimulatedCamera();
+  if (options.field_of_view_deg <= 0) return own;
+  engine::CameraModel::Intrinsics intrinsics = own.intrinsics();
+  const double half = 0.5 * options.field_of_view_deg * std::numbers::pi / 180;
+  intrinsics.fx = intrinsics.fy = 0.5 * intrinsics.width_px / std::tan(half);
+  return {engine::LensModel::kRadialTangential, intrinsics, {}};
 }
 
 const SceneRecipe& RecipeOf(const std::string& name) {

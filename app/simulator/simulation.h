@@ -27,6 +27,9 @@ namespace docent::app {
 
 struct SimulationOptions {
   std::optional<engine::CameraModel> camera;  // Empty: that of the scene, or SimulatedCamera().
+  // Horizontal field of view of a lens without distortion that replaces the scene's lens; 0: the scene's
+  // lens.
+  double field_of_view_deg = 0;
   double frame_rate_hz = 30;
   double duration_s = 0;         // Maximum duration; 0: the whole trajectory of the scene.
   double exposure_s = 1.0 / 60;  // The timestamp of an image is the middle of its exposure.
