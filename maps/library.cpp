@@ -354,6 +354,10 @@ void Library::LoadAppearance(const TakeAppearance& take) const {
   });
 }
 
+std::vector<StoredLens> Library::Lenses() const {
+  return impl_->Read([&] { return ReadLenses(impl_->database()); });
+}
+
 std::uint64_t Library::ReserveKeys(std::size_t count) {
   constexpr auto kLargest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   std::uint64_t first = 0;
@@ -393,6 +397,7 @@ bool Library::Save(const MapRecord& record) {
       }
     });
     for (const std::uint64_t key : record.joined_keys) changed |= impl_->RemoveJoined(key);
+    for (const StoredLens& lens : record.lenses) changed |= WriteLens(impl_->database(), lens);
     return changed;
   });
   return wanted;

@@ -69,6 +69,10 @@ class Library {
   using TakeAppearance = std::function<void(const MapInfo& info, Appearance appearance)>;
   void LoadAppearance(const TakeAppearance& take) const;
 
+  // The estimated lenses that were saved (MapRecord::lenses), by ascending camera name. Throws Error if one
+  // is damaged.
+  std::vector<StoredLens> Lenses() const;
+
   // Returns a key that no map of this library has or ever had. It is reserved on disk, so that two processes
   // never get the same one.
   std::uint64_t NewKey() { return ReserveKeys(1); }

@@ -11,6 +11,7 @@
 
 #include "engine/map/map_snapshot.h"
 #include "maps/byte_stream.h"
+#include "maps/lens_rows.h"
 #include "maps/policy.h"
 
 // The values that are written to and read from a library. Large data is shared and immutable.
@@ -51,6 +52,8 @@ struct MapRecord {
   std::optional<std::uint64_t> expected_revision = std::nullopt;
   // Maps that were joined into this one. Those that are in the library are removed by this save.
   std::vector<std::uint64_t> joined_keys = {};
+  // Current estimates of unknown lenses. They replace the library's estimates for the same cameras.
+  std::vector<StoredLens> lenses = {};
 };
 
 // An entry of the list of maps, read without points or images.

@@ -55,6 +55,11 @@ void UpgradeToFormat3(const Database& database) {
   }
 }
 
+// Format 4 added the table of estimated lenses. It is empty at first.
+void UpgradeToFormat4(const Database& database) {
+  CreateTable(database, "lenses");
+}
+
 }  // namespace
 
 fs::path BackupPath(const fs::path& library, std::int64_t format) {
@@ -72,6 +77,8 @@ void UpgradeFormat(const Database& database) {
   if (SchemaVersion(database) < 2) UpgradeToFormat2(database);
   SetSchemaVersion(database, std::max<std::int64_t>(2, SchemaVersion(database)));
   if (SchemaVersion(database) < 3) UpgradeToFormat3(database);
+  SetSchemaVersion(database, std::max<std::int64_t>(3, SchemaVersion(database)));
+  if (SchemaVersion(database) < 4) UpgradeToFormat4(database);
   SetSchemaVersion(database, kSchemaVersion);
   transaction.Commit();
 }

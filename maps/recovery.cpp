@@ -31,6 +31,8 @@ class Salvage {
   }
 
   void Run(Library* target) {
+    // They are saved together with the first recovered map.
+    Try("the lenses of cameras", [&] { lenses_ = ReadLenses(database_); });
     for (const std::uint64_t key : Keys()) {
       complete_ = true;
       MapRecord record;
@@ -174,14 +176,16 @@ class Salvage {
     }
     if (record.policy == Policy::kBounded && !record.bounds) record.policy = Policy::kReadOnly;
     record.key = target->NewKey();
+    record.lenses = std::exchange(lenses_, {});
     if (!Try("map '" + name + "'", [&] { target->Save(record); })) return;
     ++(complete_ ? recovery_.maps_complete : recovery_.maps_partial);
   }
 
   Database database_;
   Transaction transaction_;
-  std::optional<MapInfo> info_;  // The last entry that was read.
-  bool complete_ = true;         // Whether the current map is complete so far.
+  std::optional<MapInfo> info_;     // The last entry that was read.
+  bool complete_ = true;            // Whether the current map is complete so far.
+  std::vector<StoredLens> lenses_;  // Not yet saved with a map.
   Recovery recovery_;
 };
 

@@ -19,7 +19,7 @@ struct Table {
 };
 
 // Never edit these: a change of the tables needs a new schema version and an upgrade step.
-constexpr std::array<Table, 7> kTables = {{
+constexpr std::array<Table, 8> kTables = {{
     {1, "library",
      "CREATE TABLE library (id INTEGER PRIMARY KEY CHECK (id = 1), next_key INTEGER NOT NULL, map_count "
      "INTEGER NOT "
@@ -47,6 +47,8 @@ constexpr std::array<Table, 7> kTables = {{
     {kThumbnailsSince, "thumbnails",
      "CREATE TABLE thumbnails (map_key INTEGER PRIMARY KEY, data BLOB NOT NULL) STRICT"},
     {kWordsSince, "words", "CREATE TABLE words (map_key INTEGER PRIMARY KEY, data BLOB NOT NULL) STRICT"},
+    {kLensesSince, "lenses",
+     "CREATE TABLE lenses (camera TEXT PRIMARY KEY, data BLOB NOT NULL, checksum INTEGER NOT NULL) STRICT"},
 }};
 
 }  // namespace

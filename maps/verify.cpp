@@ -6,6 +6,7 @@
 #include <set>
 
 #include "engine/base/error.h"
+#include "maps/lens_rows.h"
 #include "maps/rows.h"
 #include "maps/schema.h"
 #include "maps/snapshot_reader.h"
@@ -161,6 +162,7 @@ std::vector<std::string> VerifyAll(const Database& database, int threads) {
   for (const MapInfo& info : maps) CheckMap(database, info, threads, &wanted_assets, &report);
   CheckAssets(database, wanted_assets, &report);
   CheckStrays(database, &report);
+  report.Try([&] { ReadLenses(database); });
   return report.Take();
 }
 

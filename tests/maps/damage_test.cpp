@@ -104,8 +104,8 @@ TEST_F(Damage, AnSqliteFileOfAnotherProgramIsRejected) {
 }
 
 TEST_F(Damage, ALibraryOfANewerFormatIsRejected) {
-  RunSql("PRAGMA user_version = 4");
-  ExpectRefused("written by a newer Docent (format 4;");
+  RunSql("PRAGMA user_version = 5");
+  ExpectRefused("written by a newer Docent (format 5;");
 }
 
 TEST_F(Damage, ALibraryWithOtherTablesIsRejected) {
