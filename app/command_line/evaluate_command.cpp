@@ -78,7 +78,8 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
       ->type_name("DIR");
   command
       ->add_option("--calibration", options->calibrations,
-                   "Calibration file of each sequence, in the same order")
+                   "Calibration file of each sequence, in the same order; auto: estimate the calibration, as "
+                   "for a sequence without a calibration file")
       ->type_name("FILE")
       ->allow_extra_args(false);
   AddPaceOption(command, pace.get());

@@ -175,8 +175,9 @@ RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequenc
   const auto start = std::chrono::steady_clock::now();
   RunOutput output(request.folder);
   RunRecorder recorder;
-  std::optional<Session> owned_session(std::in_place, OptionsFor(options, request.key.seed),
-                                       std::vector{camera.model}, nullptr);
+  SessionOptions session_options = OptionsFor(options, request.key.seed);
+  session_options.mapper.lens.lenses = EstimatedLensesOf({&camera, 1});
+  std::optional<Session> owned_session(std::in_place, session_options, std::vector{camera.model}, nullptr);
   Session& session = *owned_session;
   Progress progress(request.name, camera.source->info().frame_count,
                     request.one_of_many ? Verbosity::kQuiet : verbosity);
@@ -210,6 +211,7 @@ RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequenc
   record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   record.peak_memory_mb = PeakMemoryMegabytes();
   record.mapping = MakeMappingTimes(session.MappingTimes());
+  if (const auto lens = session.EstimatedLensOf(0)) record.lens = MakeLensRecord(*lens);
   for (const engine::CalibrationMonitor::Ring& ring : session.LensErrors(0))
     record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
   // The session is destroyed first, because the adjustments below need memory for another copy of a map.

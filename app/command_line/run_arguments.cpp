@@ -129,8 +129,10 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
       ->allow_extra_args(false);
   command
       ->add_option("--calibration", run->cameras.calibrations,
-                   "Calibration file of each camera, in the same order")
-      ->type_name("FILE")
+                   "Calibration file of each camera, in the same order; auto: estimate the calibration while "
+                   "maps are built, and store it in the library under the camera's name, as for a camera "
+                   "without a calibration file")
+      ->type_name("FILE|auto")
       ->allow_extra_args(false);
   AddCameraFormatOption(command, &run->cameras.options);
   AddSecondsOption(command, "--from", &run->cameras.from,

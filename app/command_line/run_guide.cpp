@@ -74,7 +74,7 @@ class GuideRun {
   GuideRun(const GuideRequest& request, std::span<CalibratedCamera> cameras)
       : request_(request),
         cameras_(cameras),
-        session_(OptionsOf(request), ModelsOf(cameras), request.library),
+        session_(OptionsOf(request, cameras), ModelsOf(cameras), request.library),
         inboxes_(cameras.size()),
         camera_states_(cameras.size()) {
     for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
@@ -94,6 +94,7 @@ class GuideRun {
   void Run(const Show& show, std::stop_token window_closed) {
     files_.emplace(request_, *cameras_.front().model);
     const std::stop_callback forward(window_closed, [this] { stop_.request_stop(); });
+    WarnAboutUnknownLenses();
     std::exception_ptr fault;
     const auto guarded = [&fault](const auto& action) {
       try {
@@ -146,7 +147,7 @@ class GuideRun {
     std::shared_ptr<const ShownFrame> last;
   };
 
-  static SessionOptions OptionsOf(const GuideRequest& request) {
+  static SessionOptions OptionsOf(const GuideRequest& request, std::span<CalibratedCamera> cameras) {
     SessionOptions options;
     options.threaded = request.pace != Pace::kLockstep;
     options.may_write = request.may_write;
@@ -158,7 +159,27 @@ class GuideRun {
     options.memory.wait_for_maps = request.pace != Pace::kRealtime;
     options.baseline_m = request.baseline_m;
     options.tracker.target = request.target;
+    options.mapper.lens.lenses = EstimatedLensesOf(cameras);
     return options;
+  }
+
+  // A tour builds no map, so it cannot estimate a calibration.
+  void WarnAboutUnknownLenses() {
+    if (request_.may_write) return;
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      const auto& lens = cameras_[i].estimated_lens;
+      if (!lens || lens->fixed) continue;
+      const bool unknown = lens->focal_sigma > engine::LensEstimationOptions().max_sigma;
+      const std::string assumption =
+          unknown ? "is not in this library, so a field of view of " +
+                        FormatNumber(engine::kUnknownFieldOfView_deg, 3) + " degrees is assumed"
+                  : "is only a rough estimate, with a focal length of " + engine::FormatFocalLength(*lens);
+      const std::string warning =
+          "The calibration of camera \"" + lens->name + "\" " + assumption +
+          ". Build a map with this camera, or give its calibration with --calibration FILE.";
+      files_->Add({Event{{}, "warning", warning}});
+      camera_states_[i].message = warning;
+    }
   }
 
   CameraRun RunOf(std::size_t i, const Show& show) {
@@ -224,6 +245,8 @@ class GuideRun {
     auto frame = std::make_shared<ShownFrame>();
     frame->tracked = tracked;
     frame->shown = session_.ShownWith(tracked);
+    const auto lens = session_.EstimatedLensOf(static_cast<std::size_t>(tracked.frame.camera));
+    if (lens) frame->camera = lens->model;
     if (!state->first_time) state->first_time = tracked.frame.time;
     frame->seconds = ToSeconds(tracked.frame.time - *state->first_time);
     frame->message = state->message.empty() ? frame->shown.advice : state->message;
@@ -307,6 +330,7 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
 std::vector<Session::MapState> RunGuide(const GuideRequest& request, std::span<CalibratedCamera> cameras,
                                         Verbosity verbosity) {
   const Interruption interruption;
+  if (request.library != nullptr) LoadKnownLenses(*request.library, cameras);
   GuideRun run(request, cameras);
   if (request.headless) {
     RunHeadless(request, cameras, &run, verbosity);

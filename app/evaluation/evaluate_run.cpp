@@ -277,6 +277,7 @@ SequenceReport EvaluateRun(const RunRecord& run, const std::vector<TimedPose>& t
   report.engine = run.engine;
   report.mapping = run.mapping;
   report.wall_s = run.wall_s;
+  report.lens = run.lens;
   report.lens_rings = run.lens_rings;
   report.peak_memory_mb = run.peak_memory_mb;
   report.maps = ListMaps(run);

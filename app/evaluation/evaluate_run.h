@@ -79,6 +79,7 @@ struct SequenceReport {
   double tracking_median_ms = 0, tracking_p95_ms = 0, tracking_max_ms = 0;  // Without dropped frames.
   MappingTimes mapping;
   double wall_s = 0, peak_memory_mb = 0;
+  std::optional<LensRecord> lens;          // As in RunRecord.
   std::vector<LensRing> lens_rings;        // As in RunRecord.
   std::vector<MapResult> maps;             // In the order of their first frame, then those without frames.
   std::optional<std::size_t> largest_map;  // Index in maps.

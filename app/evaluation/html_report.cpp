@@ -54,6 +54,11 @@ std::string FigureTable(const SequenceReport& r) {
                              Fixed(r.mapping.infinite_triangulation_s, 2) + " s infinite triangulation, " +
                              Fixed(r.mapping.loop_closing_s, 2) + " s loop closing, " +
                              Fixed(r.mapping.other_s, 2) + " s other");
+  if (r.lens) {
+    html += Row("estimated focal length", Fixed(r.lens->focal_px, 1) + " px +-" +
+                                              Fixed(r.lens->focal_sigma_percent, 2) + " %, k1 " +
+                                              Fixed(r.lens->k1, 4) + (r.lens->fixed ? "" : ", not final"));
+  }
   html += Row("loops closed", std::to_string(r.mapping.loops_closed));
   html += Row("wall time", Fixed(r.wall_s, 1) + " s");
   html += Row("peak memory", Fixed(r.peak_memory_mb, 0) + " MB");

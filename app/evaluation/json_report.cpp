@@ -84,6 +84,12 @@ Json ToJson(const SequenceReport& report) {
   };
   for (const MapResult& map : report.maps) json["maps"].push_back(ToJson(map));
   for (const SegmentResult& segment : report.segments) json["segments"].push_back(ToJson(segment));
+  if (report.lens) {
+    json["lens"] = {{"focal_px", report.lens->focal_px},
+                    {"k1", report.lens->k1},
+                    {"focal_sigma_percent", report.lens->focal_sigma_percent},
+                    {"fixed", report.lens->fixed}};
+  }
   for (const LensRing& ring : report.lens_rings) {
     json["lens_residuals"].push_back(
         {{"samples", ring.samples}, {"mean_px", ring.mean_px}, {"sigma_px", ring.sigma_px}});

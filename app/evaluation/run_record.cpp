@@ -148,6 +148,13 @@ std::vector<std::pair<Timestamp, Eigen::Vector3d>> AdjustedCenters(const engine:
   return centers;
 }
 
+LensRecord MakeLensRecord(const engine::EstimatedLens& lens) {
+  return {.focal_px = lens.model->intrinsics().fx,
+          .k1 = lens.model->distortion()[0],
+          .focal_sigma_percent = 100 * lens.focal_sigma,
+          .fixed = lens.fixed};
+}
+
 MappingTimes MakeMappingTimes(const engine::MapperTimes& times) {
   return {times.bundle_adjustment,
           times.panorama_localization,

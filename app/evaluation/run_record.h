@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -79,6 +80,13 @@ struct LensRing {
   double mean_px = 0, sigma_px = 0;
 };
 
+// The estimated calibration at the end of a run.
+struct LensRecord {
+  double focal_px = 0, k1 = 0;
+  double focal_sigma_percent = 0;  // Standard deviation relative to the focal length.
+  bool fixed = false;              // The estimate was precise enough to be final.
+};
+
 struct MapRecord {
   std::uint64_t key = 0;
   std::string name;
@@ -110,7 +118,8 @@ struct RunRecord {
   double wall_s = 0;
   double peak_memory_mb = 0;
   std::vector<InitializationRecord> initializations = {};  // One for each map with finite points, by frame.
-  std::vector<LensRing> lens_rings = {};                   // From the image centre outwards.
+  std::optional<LensRecord> lens = {};    // Only of a camera whose calibration was estimated.
+  std::vector<LensRing> lens_rings = {};  // From the image centre outwards.
 };
 
 // Records the tracked frames of a session and the initializations of its maps. One thread.
@@ -138,6 +147,7 @@ MapRecord MakeMapRecord(std::uint64_t key, const std::string& name, const engine
 // Computes MapRecord::adjusted_centers on a copy of the map.
 std::vector<std::pair<Timestamp, Eigen::Vector3d>> AdjustedCenters(const engine::MapSnapshot& map);
 
+LensRecord MakeLensRecord(const engine::EstimatedLens& lens);
 MappingTimes MakeMappingTimes(const engine::MapperTimes& times);
 
 // Peak resident memory of this process since its start or since ResetPeakMemory, in units of 2^20 bytes; 0

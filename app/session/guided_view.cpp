@@ -8,7 +8,7 @@ namespace docent::app {
 ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   ui::View view;
   view.tracked = &frame.tracked;
-  view.camera = &camera;
+  view.camera = frame.camera ? frame.camera.get() : &camera;
   view.scene = frame.shown.scene.get();
   view.animation_seconds = frame.seconds;
   view.overlay.map_name = frame.shown.map_name;

@@ -21,6 +21,8 @@ struct ShownFrame {
   // Capture time on CLOCK_MONOTONIC; empty where it is unknown (see FrameLoopOptions::latency).
   std::optional<Timestamp> taken = {};
   std::string message;  // one sentence, often empty
+  // The current camera model of a camera whose calibration is estimated; else null.
+  std::shared_ptr<const engine::CameraModel> camera = nullptr;
 };
 
 // The input of the renderer; it points into `frame` and `camera`.

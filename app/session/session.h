@@ -16,8 +16,8 @@
 #include "app/output/run_output.h"
 #include "app/script/commands.h"
 #include "app/session/library_scene.h"
-#include "app/session/map_keys.h"
 #include "app/session/maintenance_order.h"
+#include "app/session/map_keys.h"
 #include "app/session/mapping_status.h"
 #include "app/session/relocalization_message.h"
 #include "app/session/session_map.h"
@@ -51,8 +51,8 @@ struct SessionOptions : engine::SystemOptions {
 // everything else may be called from any thread. Process waits neither for the mapper nor for a disk. Times
 // are those of the images; no system clock influences the results.
 //
-// Invariants: a map is extended only while its policy and the session's rights allow it. A map that replaces a
-// discarded one takes over its name; a map that was started after a loss gets the name of the previous one
+// Invariants: a map is extended only while its policy and the session's rights allow it. A map that replaces
+// a discarded one takes over its name; a map that was started after a loss gets the name of the previous one
 // with a number. What happens in the system becomes events in words and, where maps change, moves their
 // content along.
 class Session {
@@ -69,9 +69,7 @@ class Session {
   // Tracks one image, offers it to the mapper and applies the result to the session.
   engine::TrackedFrame Process(const engine::Frame& frame);
   // Details of the frame that Process returned last as `frame`; on the thread of its camera.
-  engine::FrameInspection Inspect(const engine::TrackedFrame& frame) const {
-    return system_.Inspect(frame);
-  }
+  engine::FrameInspection Inspect(const engine::TrackedFrame& frame) const { return system_.Inspect(frame); }
   // Delays a source that delivers faster than a camera; see engine::System::WaitUntilIdle.
   void WaitUntilIdle(std::chrono::steady_clock::time_point latest, const std::stop_token& stop) {
     system_.WaitUntilIdle(latest, stop);
@@ -112,6 +110,10 @@ class Session {
   // Mean radial reprojection errors by ring of the image; see engine::CalibrationMonitor.
   engine::CalibrationMonitor::Profile LensErrors(std::size_t camera) const {
     return system_.RadialErrors(camera);
+  }
+  // The current estimate of a camera with an unknown calibration; empty for a known one.
+  std::optional<engine::EstimatedLens> EstimatedLensOf(std::size_t camera) const {
+    return system_.EstimatedLensOf(camera);
   }
   engine::MapperTimes MappingTimes() const { return system_.MappingTimes(); }
   std::vector<Event> TakeEvents();
@@ -159,6 +161,7 @@ class Session {
   void Handle(const engine::SystemEvent& event, const engine::JoinRefused& what);
   void Handle(const engine::SystemEvent& event, const engine::RigChanged& what);
   void Handle(const engine::SystemEvent& event, const engine::CalibrationMismatch& what);
+  void Handle(const engine::SystemEvent& event, const engine::LensEstimated& what);
   void Handle(const engine::SystemEvent& event, const engine::MapperFailed& what);
   void Handle(const engine::SystemEvent& event, const engine::MapperEvent& what);
   std::string NameOf(std::uint64_t key) const;  // empty when the session has no such map
@@ -219,7 +222,7 @@ class Session {
   MaintenanceOrder maintenance_order_;  // accessed only by the saver's thread
   // Last, because their threads call back into the other members.
   std::optional<maps::MapPager> pager_;  // only with a library
-  std::optional<maps::Saver> saver_;  // only with a library opened for writing
+  std::optional<maps::Saver> saver_;     // only with a library opened for writing
 };
 
 }  // namespace docent::app

@@ -93,7 +93,9 @@ engine::MapPermissions Session::PermissionsOf(const SessionMap& map) const {
   return permissions;
 }
 
-void Session::UpdatePermissions(const SessionMap& map) { system_.SetPermissions(map.key, PermissionsOf(map)); }
+void Session::UpdatePermissions(const SessionMap& map) {
+  system_.SetPermissions(map.key, PermissionsOf(map));
+}
 
 void Session::Apply(const NewMap& command, const engine::TrackedFrame& frame) {
   CheckName(command.name);

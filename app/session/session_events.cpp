@@ -152,6 +152,14 @@ void Session::Handle(const engine::SystemEvent& event, const engine::Calibration
   Advise(&cameras_[event.camera], text);
 }
 
+void Session::Handle(const engine::SystemEvent& event, const engine::LensEstimated& what) {
+  cameras_[event.camera].model = what.lens.model;
+  AddEvent(event.time, "lens",
+           "Estimated calibration of camera \"" + what.lens.name + "\"" +
+               (what.lens.fixed ? " (final)" : "") + ": focal length " +
+               engine::FormatFocalLength(what.lens));
+}
+
 void Session::Handle(const engine::SystemEvent& event, const engine::MapperFailed& what) {
   const std::string text = "Mapping has stopped because of an error: " + what.what +
                            " Tracking continues, and what was mapped is saved.";
@@ -186,6 +194,14 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapperEvent
       return add("loop", "closed in ");
     case Kind::kGlobalAdjustment:
       return add("adjustment", "");
+    case Kind::kLensEstimated:
+      return;  // see LensEstimated
+    case Kind::kCalibrationContradicted:
+      AddEvent(event.time, "warning", what.detail);
+      for (std::size_t i = 0; i < cameras_.size(); ++i) {
+        if (!system_.EstimatedLensOf(i)) Advise(&cameras_[i], what.detail);
+      }
+      return;
   }
 }
 

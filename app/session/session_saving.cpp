@@ -25,7 +25,8 @@ void Session::StartSaver() {
   if (options_.threaded && options_.maintenance)
     maintenance = [this](const std::atomic<bool>& interrupt) { return RunMaintenance(interrupt); };
   saver_.emplace(
-      library_, kAnyNumber, [this](const maps::MapRecord& record) { OnSaved(record); }, std::move(maintenance));
+      library_, kAnyNumber, [this](const maps::MapRecord& record) { OnSaved(record); },
+      std::move(maintenance));
 }
 
 // Passes the changes of a map to the saver, which writes them in the background.
@@ -40,6 +41,10 @@ void Session::SaveMap(SessionMap* map, Timestamp time) {
   const bool content = map->scene != map->saved_scene;
   if (structure) record.snapshot = map->snapshot;
   if (content) record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*map->scene));
+  for (const engine::EstimatedLens& lens : system_.EstimatedLenses()) {
+    if (lens.focal_sigma <= options_.mapper.lens.max_sigma)
+      record.lenses.push_back({lens.name, *lens.model, lens.focal_sigma, lens.fixed});
+  }
   map->saved_snapshot = map->snapshot;
   map->saved_scene = map->scene;
   map->changed = true;

@@ -132,9 +132,7 @@ void Map::FusePoints(MapPointId into, MapPointId duplicate) {
 }
 
 void Map::Correct(const std::map<KeyFrameId, Sim3>& after_from_before) {
-  constexpr std::size_t kRemembered = 8;
-  auto correction = std::make_shared<MapCorrection>();
-  correction->revision = revision_ + 1;
+  std::map<KeyFrameId, Sim3> correction_of;
   for (auto& [id, record] : keyframes_) {
     KeyFrame& keyframe = record.keyframe;
     KeyFrameId leader = id;
@@ -145,15 +143,15 @@ void Map::Correct(const std::map<KeyFrameId, Sim3>& after_from_before) {
     }
     const auto found = after_from_before.find(leader);
     const Sim3 moved = found != after_from_before.end() ? found->second : Sim3();
-    correction->after_from_before[id] = moved;
+    correction_of[id] = moved;
     keyframe.camera_from_map = CorrectedPose(keyframe.camera_from_map, moved);
     keyframe.mean_depth *= moved.scale;
     keyframe.depth_sigma *= moved.scale;
   }
   for (PointRecord& record : points_) {
     if (!record.alive) continue;
-    const auto moved = correction->after_from_before.find(record.point.source_keyframe);
-    if (moved == correction->after_from_before.end()) continue;
+    const auto moved = correction_of.find(record.point.source_keyframe);
+    if (moved == correction_of.end()) continue;
     if (record.point.infinite()) {
       UpdateDirection(&record);
       continue;
@@ -161,8 +159,16 @@ void Map::Correct(const std::map<KeyFrameId, Sim3>& after_from_before) {
     record.point.point_in_map.head<3>() = moved->second * record.point.position();
     record.point.normal = (moved->second.rotation * record.point.normal.cast<double>()).cast<float>();
   }
+  AddCorrection(std::move(correction_of));
+}
+
+void Map::AddCorrection(std::map<KeyFrameId, Sim3> after_from_before) {
+  constexpr std::size_t kMaxCorrections = 8;
+  auto correction = std::make_shared<MapCorrection>();
+  correction->revision = revision_ + 1;
+  correction->after_from_before = std::move(after_from_before);
   corrections_.push_back(std::move(correction));
-  if (corrections_.size() > kRemembered) corrections_.erase(corrections_.begin());
+  if (corrections_.size() > kMaxCorrections) corrections_.erase(corrections_.begin());
 }
 
 // Without its reference a panorama map has no position.

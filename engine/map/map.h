@@ -73,6 +73,9 @@ class Map {
   // finite points with their source keyframe, dependent panorama keyframes and their points with the
   // reference keyframe. The next Snapshot() contains the correction.
   void Correct(const std::map<KeyFrameId, Sim3>& after_from_before);
+  // Adds a correction that the caller has already applied to keyframes and points. The next Snapshot()
+  // contains it.
+  void AddCorrection(std::map<KeyFrameId, Sim3> after_from_before);
   // By ascending revision.
   const std::vector<std::shared_ptr<const MapCorrection>>& corrections() const { return corrections_; }
 

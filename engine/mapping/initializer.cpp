@@ -76,6 +76,11 @@ Initializer::Initializer(const InitializerOptions& options, std::shared_ptr<cons
       confirmation_(options.confirmation),
       views_confirmation_(options.confirmation) {}
 
+void Initializer::SetCamera(std::shared_ptr<const CameraModel> camera) {
+  camera_ = std::move(camera);
+  Reset();
+}
+
 void Initializer::Reset() {
   trails_.clear();
   confirmation_.Reset();

@@ -36,6 +36,8 @@ class Initializer {
 
   // Starts again from the next frame.
   void Reset();
+  // Resets and uses another camera model from the next frame on.
+  void SetCamera(std::shared_ptr<const CameraModel> camera);
   // Returns a pair once the geometry is reliable and confirmed, and then resets itself.
   std::optional<InitialPair> Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
 

@@ -31,7 +31,9 @@ Mapper::Mapper(const MapperOptions& options)
     : options_(options),
       searcher_(options.search),
       descriptors_(DefaultVocabulary()),
-      loops_(options.loops, options.search) {}
+      loops_(options.loops, options.search),
+      lens_estimation_(options.lens),
+      lenses_(options.lens.lenses) {}
 
 // Resets the state of the stepping thread to a map; the queue is not changed.
 void Mapper::ResumeFrom(const MapSnapshot* snapshot) {
@@ -43,6 +45,7 @@ void Mapper::ResumeFrom(const MapSnapshot* snapshot) {
   to_localize_.clear();
   to_convert_.clear();
   loops_.Reset();
+  lens_estimation_.Reset();
   for (const auto& [id, record] : map_.keyframes()) {
     if (record.keyframe.kind == KeyFrameKind::kPanorama) to_localize_.push_back({id});
   }
@@ -122,6 +125,11 @@ MapperTimes Mapper::Times() const {
   return times_;
 }
 
+std::vector<EstimatedLens> Mapper::Lenses() const {
+  const std::lock_guard lock(mutex_);
+  return lenses_;
+}
+
 bool Mapper::IsIdle() const {
   return QueueLength() == 0 && locally_adjusted_;
 }
@@ -186,6 +194,7 @@ double MapperTimes::*Mapper::DoNextTask() {
     return &MapperTimes::bundle_adjustment;
   }
   if (loops_.HasLoop() && WorkOnLoops()) return &MapperTimes::loop_closing;
+  if (EstimateLenses()) return &MapperTimes::bundle_adjustment;
   // New points keep the camera tracked, so they come before keyframes that could not be localized so far.
   if (LocalizeNew()) return &MapperTimes::panorama_localization;
   if (ConvertOne()) return &MapperTimes::infinite_triangulation;
@@ -198,7 +207,9 @@ double MapperTimes::*Mapper::DoNextTask() {
     CullRedundantKeyFrame();
     return &MapperTimes::other;
   }
-  return WorkOnLoops() ? &MapperTimes::loop_closing : nullptr;
+  if (WorkOnLoops()) return &MapperTimes::loop_closing;
+  CheckGivenCalibrations();
+  return nullptr;
 }
 
 bool Mapper::IsFinite() const {
@@ -341,6 +352,34 @@ void Mapper::LocalAdjustment() {
   const BundleSummary summary = AdjustLocally(options_.adjustment, newest_, &interrupt_, &map_);
   if (summary.outcome != BundleSummary::Outcome::kInterrupted) locally_adjusted_ = true;
   Publish();
+}
+
+// The check never changes the map, so lockstep runs do not depend on whether it was finished.
+void Mapper::CheckGivenCalibrations() {
+  if (map_.keyframes().empty()) return;
+  if (const auto warning = lens_estimation_.Check(&interrupt_, map_)) {
+    AddEvent(MapperEvent::Kind::kCalibrationContradicted, map_.keyframes().rbegin()->second.keyframe.time,
+             *warning);
+  }
+}
+
+bool Mapper::EstimateLenses() {
+  const LensEstimation::Progress progress = lens_estimation_.Step(&searcher_, &interrupt_, &map_);
+  if (progress == LensEstimation::Progress::kNothing) return false;
+  if (progress == LensEstimation::Progress::kStepDone) return true;
+  if (progress == LensEstimation::Progress::kMapChanged) {
+    searcher_.Clear();
+    global_interrupted_ = true;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    lenses_ = lens_estimation_.lenses();
+  }
+  // The lenses are set first, so that a snapshot is never published with older ones.
+  if (progress == LensEstimation::Progress::kMapChanged) Publish();
+  AddEvent(MapperEvent::Kind::kLensEstimated, map_.keyframes().rbegin()->second.keyframe.time,
+           FormatFocalLength(lens_estimation_.last()));
+  return true;
 }
 
 void Mapper::GlobalAdjustment() {

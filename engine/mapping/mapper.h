@@ -15,6 +15,7 @@
 #include "engine/mapping/guided_matching.h"
 #include "engine/mapping/keyframe_candidate.h"
 #include "engine/mapping/keyframe_culling.h"
+#include "engine/mapping/lens_estimation.h"
 #include "engine/mapping/loop_closing.h"
 #include "engine/mapping/map_adjustment.h"
 #include "engine/mapping/map_descriptors.h"
@@ -47,6 +48,7 @@ struct MapperOptions {
   MapAdjustmentOptions adjustment;
   LoopOptions loops;
   MapJoiningOptions joining;
+  LensEstimationOptions lens;
   SearchOptions search;
   std::shared_ptr<ImageStore> images;  // stores the keyframes' images; null: in memory
 };
@@ -63,7 +65,9 @@ struct MapperEvent {
     kConverted,
     kKeyFrameRemoved,
     kGlobalAdjustment,
-    kLoopClosed
+    kLoopClosed,
+    kLensEstimated,           // Lenses() changed
+    kCalibrationContradicted  // the map contradicts a given calibration; the detail is a warning
   };
   Kind kind = Kind::kKeyFrame;
   Timestamp time{};
@@ -109,6 +113,8 @@ class Mapper {
   std::shared_ptr<const MapSnapshot> Snapshot() const;
   std::vector<MapperEvent> TakeEvents();
   MapperTimes Times() const;
+  // The estimated lenses of the newest snapshot, in the order of MapperOptions::lens.
+  std::vector<EstimatedLens> Lenses() const;
 
  private:
   using Task = std::variant<KeyFrameCandidate, InitialPair>;
@@ -146,6 +152,10 @@ class Mapper {
   void MatchNewPoints();
   void LocalAdjustment();
   void GlobalAdjustment();
+  // Does the most urgent step of lens estimation; false if there is none.
+  bool EstimateLenses();
+  // Adds an event if a given calibration contradicts the map.
+  void CheckGivenCalibrations();
   // Does the most urgent step towards closing a loop; false if there is none.
   bool WorkOnLoops();
   void StoreImages(Task* task) const;
@@ -165,6 +175,7 @@ class Mapper {
   std::vector<Unlocalized> to_localize_;
   std::deque<std::pair<KeyFrameId, KeyFrameId>> to_convert_;  // (reference, partner)
   LoopCloser loops_;
+  LensEstimation lens_estimation_;
   bool loop_to_adjust_ = false;  // the next global adjustment follows a loop
   std::size_t keyframes_since_global_ = 0;
   bool global_interrupted_ = false;  // a global adjustment was interrupted, or is due for another reason
@@ -179,6 +190,7 @@ class Mapper {
   std::vector<PointReport> reports_;
   std::shared_ptr<const MapSnapshot> snapshot_;
   std::vector<MapperEvent> events_;
+  std::vector<EstimatedLens> lenses_;
   MapperTimes times_;
 };
 

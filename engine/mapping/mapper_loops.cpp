@@ -27,6 +27,7 @@ bool Mapper::WorkOnLoops() {
 }
 
 KeyFrameCandidate Mapper::WithCorrections(KeyFrameCandidate candidate) const {
+  candidate.camera = lens_estimation_.CurrentModel(candidate.camera);
   if (candidate.map_revision == 0) return candidate;
   for (const auto& correction : map_.corrections()) {
     if (correction->revision <= candidate.map_revision) continue;

@@ -18,6 +18,7 @@ void Mapper::StartMap(const InitialPair& pair) {
   to_match_.clear();
   to_convert_.clear();
   loops_.Reset();
+  lens_estimation_.Reset();
   keyframes_since_global_ = 0;
   const double scale = pair.baseline_m > 0 ? pair.baseline_m : options_.initial_baseline_m;
   Rigid3 b_from_a = pair.geometry.b_from_a;
@@ -30,7 +31,7 @@ void Mapper::StartMap(const InitialPair& pair) {
     if (record.keyframe.time == pair.a.time) a = id;
   }
   KeyFrame view;
-  view.camera = pair.camera;
+  view.camera = lens_estimation_.CurrentModel(pair.camera);
   view.camera_from_map = pair.a_from_map;
   view.time = pair.a.time;
   view.features = pair.a.features;

@@ -6,8 +6,8 @@
 
 namespace docent::engine {
 
-std::vector<KeyFrameId> NearestViews(const MapSnapshot& map,
-                                             const Rigid3& camera_from_map, std::size_t count) {
+std::vector<KeyFrameId> NearestViews(const MapSnapshot& map, const Rigid3& camera_from_map,
+                                     std::size_t count) {
   std::vector<std::pair<double, KeyFrameId>> ranked;
   const Eigen::Vector3d center = camera_from_map.OriginInSource();
   for (const KeyFrame& keyframe : map.keyframes) {
@@ -23,8 +23,8 @@ std::vector<KeyFrameId> NearestViews(const MapSnapshot& map,
   return nearest;
 }
 
-std::vector<PlaceCandidate> CameraPlaceFinder::FindPlaces(const PlaceQuery& query, int count,
-                                                                  int per_map, std::uint64_t only_map) const {
+std::vector<PlaceCandidate> CameraPlaceFinder::FindPlaces(const PlaceQuery& query, int count, int per_map,
+                                                          std::uint64_t only_map) const {
   const std::uint64_t searched = only_map_ != 0 ? only_map_ : only_map;
   // The caller asks for a map that this camera may not search.
   if (only_map != 0 && searched != only_map) return {};

@@ -22,13 +22,12 @@ class CameraPlaceFinder : public PlaceFinder {
     Rigid3 camera_from_map;
   };
   // only_map 0 means every map. The index must outlive this.
-  CameraPlaceFinder(const PlaceFinder* index, std::uint64_t only_map,
-                    std::optional<Prediction> prediction)
+  CameraPlaceFinder(const PlaceFinder* index, std::uint64_t only_map, std::optional<Prediction> prediction)
       : index_(index), only_map_(only_map), prediction_(std::move(prediction)) {}
 
   // Returns the keyframes nearest to the prediction first, then those found by appearance.
   std::vector<PlaceCandidate> FindPlaces(const PlaceQuery& query, int count, int per_map,
-                                                 std::uint64_t only_map) const override;
+                                         std::uint64_t only_map) const override;
 
  private:
   const PlaceFinder* const index_;
@@ -38,7 +37,7 @@ class CameraPlaceFinder : public PlaceFinder {
 
 // At most `count` keyframes ranked by the distance of their position (in units of their median depth) plus
 // the angle (radians) between the views, nearest first.
-std::vector<KeyFrameId> NearestViews(const MapSnapshot& map,
-                                             const Rigid3& camera_from_map, std::size_t count);
+std::vector<KeyFrameId> NearestViews(const MapSnapshot& map, const Rigid3& camera_from_map,
+                                     std::size_t count);
 
 }  // namespace docent::engine

@@ -11,7 +11,6 @@ namespace docent::engine {
 
 namespace {
 
-
 constexpr double kDegrees = 180 / std::numbers::pi;
 // For distances in 3D: the median of |x| for a normal x in three dimensions is 1.538 sigma.
 constexpr double kSigmaOfMedianDistance = 1 / 1.538;

@@ -69,7 +69,7 @@ class CameraRig {
   std::uint64_t map_key_ = 0;
   std::deque<Pose> poses_[2];     // the newest few of each camera
   Timestamp matched_until_[2]{};  // time of the newest pose of each camera that was paired with the other
-  std::deque<Rigid3> samples_;  // second_from_first
+  std::deque<Rigid3> samples_;    // second_from_first
   std::vector<Rotation3> viewpoints_;
   std::size_t since_update_ = 0;
   std::optional<RigEstimate> estimate_;

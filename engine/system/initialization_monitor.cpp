@@ -13,9 +13,8 @@ void InitializationMonitor::Add(const TrackedFrame& frame) {
   if (!first_pose_) {
     first_pose_ = frame.camera_from_map;
     first_time_ = now;
-    const auto localized =
-        std::find_if(frame.map->keyframes.rbegin(), frame.map->keyframes.rend(),
-                     [](const KeyFrame& k) { return k.kind == KeyFrameKind::kSixDof; });
+    const auto localized = std::find_if(frame.map->keyframes.rbegin(), frame.map->keyframes.rend(),
+                                        [](const KeyFrame& k) { return k.kind == KeyFrameKind::kSixDof; });
     if (localized != frame.map->keyframes.rend()) depth_ = std::max(localized->mean_depth, 1e-9);
   }
   const double inlier_ratio = frame.finite_points > 0 ? frame.quality : 0.0;

@@ -81,8 +81,7 @@ void MappingThread::Start(std::uint64_t key, InitialPair pair) {
   changed_.notify_all();
 }
 
-void MappingThread::Join(std::uint64_t key, std::uint64_t number,
-                         std::shared_ptr<const MapSnapshot> other) {
+void MappingThread::Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const MapSnapshot> other) {
   {
     const std::scoped_lock lock(mutex_);
     if (key != requested_key_) return;
@@ -92,8 +91,7 @@ void MappingThread::Join(std::uint64_t key, std::uint64_t number,
   changed_.notify_all();
 }
 
-bool MappingThread::Offer(std::uint64_t key, KeyFrameCandidate candidate,
-                          std::vector<PointReport> reports) {
+bool MappingThread::Offer(std::uint64_t key, KeyFrameCandidate candidate, std::vector<PointReport> reports) {
   {
     const std::scoped_lock lock(mutex_);
     // Before the adoption is applied, a keyframe would be dropped by it or, worse, be added to the previous
@@ -145,6 +143,9 @@ bool MappingThread::StepOnce() {
   MapperUpdate update;
   update.key = key_;
   update.events = mapper_.TakeEvents();
+  for (const MapperEvent& event : update.events) {
+    if (event.kind == MapperEvent::Kind::kLensEstimated) update.lenses = mapper_.Lenses();
+  }
   if (auto snapshot = mapper_.Snapshot(); snapshot != last_snapshot_)
     update.snapshot = last_snapshot_ = std::move(snapshot);
   if (update.snapshot || !update.events.empty()) {

@@ -31,6 +31,8 @@ class MappingThread {
     std::uint64_t key = 0;
     std::shared_ptr<const MapSnapshot> snapshot;  // null when nothing new was published
     std::vector<MapperEvent> events;
+    // All estimated lenses if one of the events is kLensEstimated, else empty. `snapshot` uses them.
+    std::vector<EstimatedLens> lenses = {};
     // Result of a Join. When the maps were joined, `snapshot` is the joined map.
     struct Join {
       std::uint64_t number = 0;  // that the request was given
@@ -51,8 +53,7 @@ class MappingThread {
   // adopted before it is done; then no update reports it. A newer request replaces a pending one.
   void Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const MapSnapshot> other);
   // Returns false when the mapper is busy or works on another map.
-  bool Offer(std::uint64_t key, KeyFrameCandidate candidate,
-             std::vector<PointReport> reports);
+  bool Offer(std::uint64_t key, KeyFrameCandidate candidate, std::vector<PointReport> reports);
 
   // Lockstep only: runs steps until no urgent work is left (at most kMaxSteps), then one step of idle work.
   void RunLockstep();

@@ -10,6 +10,7 @@ namespace docent::engine {
 System::System(const SystemOptions& options, std::vector<std::shared_ptr<const CameraModel>> cameras)
     : options_(options),
       association_(cameras.size()),
+      lenses_(options.mapper.lens.lenses),
       mapping_(options.mapper, options.threaded && options.extend_maps,
                [this](const MappingThread::MapperUpdate& update) { OnMapperUpdate(update); }) {
   TrackerOptions tracker_options = options.tracker;
@@ -17,7 +18,11 @@ System::System(const SystemOptions& options, std::vector<std::shared_ptr<const C
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     Camera camera;
     camera.tracker = std::make_unique<Tracker>(tracker_options, cameras[i], options.seed + i);
-    camera.calibration_monitor = std::make_unique<CalibrationMonitor>(std::move(cameras[i]));
+    camera.calibration_monitor = std::make_unique<CalibrationMonitor>(cameras[i]);
+    for (std::size_t lens = 0; lens < lenses_.size(); ++lens) {
+      if (lenses_[lens].model == cameras[i]) camera.lens_index = lens;
+    }
+    camera.model = std::move(cameras[i]);
     cameras_.push_back(std::move(camera));
   }
 }
@@ -50,10 +55,12 @@ CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
   std::uint64_t searched = 0;
   std::optional<CameraPlaceFinder::Prediction> prediction;
   std::shared_ptr<const MapSnapshot> snapshot;
+  std::shared_ptr<const CameraModel> model;
   std::uint64_t key = 0;
   Camera::Order order = Camera::Order::kNone;
   {
     const std::scoped_lock lock(mutex_);
+    model = camera->model;
     order = std::exchange(camera->order, Camera::Order::kNone);
     if (order == Camera::Order::kStart || order == Camera::Order::kStartAfterLoss)
       camera->initializing = true;
@@ -79,6 +86,7 @@ CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
   } else if (order != Camera::Order::kNone) {
     tracker.Reset();
   }
+  tracker.SetCamera(std::move(model));
   tracker.SetMap(std::move(snapshot), key);
   const PlaceFinder* const all = finder_ != nullptr ? finder_ : &index_;
   return CameraPlaceFinder(all, searched, std::move(prediction));
@@ -139,10 +147,12 @@ void System::UpdateRig(std::size_t index, const TrackedFrame& frame) {
 }
 
 void System::CheckCalibration(std::size_t index, const TrackedFrame& frame) {
-  CalibrationMonitor& monitor = *cameras_[index].calibration_monitor;
-  monitor.Add(frame);
-  if (const auto mismatch = monitor.TakeMismatch())
-    Emit(frame.frame.time, frame.map_key, CalibrationMismatch{*mismatch}, index);
+  const Camera& camera = cameras_[index];
+  camera.calibration_monitor->Add(frame);
+  const auto mismatch = camera.calibration_monitor->TakeMismatch();
+  // A residual pattern is expected while the calibration is still being estimated.
+  const bool estimating = camera.lens_index && !lenses_[*camera.lens_index].fixed;
+  if (mismatch && !estimating) Emit(frame.frame.time, frame.map_key, CalibrationMismatch{*mismatch}, index);
 }
 
 void System::EnterTrackedMap(std::size_t index, std::uint64_t key, Timestamp time) {
@@ -296,6 +306,7 @@ void System::OnMapperUpdate(const MappingThread::MapperUpdate& update) {
   if (update.snapshot) described = index_.DescribeNew(update.key, *update.snapshot);
   {
     const std::scoped_lock lock(mutex_);
+    if (!update.lenses.empty()) SetLenses(update.lenses, update.events.back().time);
     if (!update.failure.empty()) Emit(LastTime(), update.key, MapperFailed{update.failure});
     const auto found = maps_.find(update.key);
     // A late update of a map that was closed or discarded meanwhile is ignored.
@@ -335,6 +346,35 @@ void System::HandleMapperEvent(const MapperEvent& event, MapState* map) {
     }
   }
   Emit(event.time, map->key, event);
+}
+
+// Passes the mapper's estimates of unknown calibrations to the trackers; to be called together with the
+// update of the snapshot that uses these lenses.
+void System::SetLenses(const std::vector<EstimatedLens>& lenses, Timestamp time) {
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    Camera& camera = cameras_[i];
+    if (!camera.lens_index) continue;
+    const EstimatedLens& lens = lenses[*camera.lens_index];
+    const EstimatedLens& before = lenses_[*camera.lens_index];
+    if (lens.model == before.model && lens.focal_sigma == before.focal_sigma && lens.fixed == before.fixed)
+      continue;
+    Emit(time, 0, LensEstimated{lens}, i);
+    if (lens.model == camera.model) continue;
+    camera.model = lens.model;
+    camera.calibration_monitor = std::make_unique<CalibrationMonitor>(lens.model);
+  }
+  lenses_ = lenses;
+}
+
+std::optional<EstimatedLens> System::EstimatedLensOf(std::size_t camera) const {
+  const std::scoped_lock lock(mutex_);
+  const auto& index = cameras_.at(camera).lens_index;
+  return index ? std::optional(lenses_[*index]) : std::nullopt;
+}
+
+std::vector<EstimatedLens> System::EstimatedLenses() const {
+  const std::scoped_lock lock(mutex_);
+  return lenses_;
 }
 
 // Maps

@@ -122,6 +122,10 @@ class System {
   // The relative pose of the first two cameras in the current map; empty while it is unknown.
   std::optional<RigEstimate> Rig() const;
   CalibrationMonitor::Profile RadialErrors(std::size_t camera) const;
+  // The current estimate of a camera with an unknown calibration (SystemOptions::mapper.lens); empty for a
+  // known calibration.
+  std::optional<EstimatedLens> EstimatedLensOf(std::size_t camera) const;
+  std::vector<EstimatedLens> EstimatedLenses() const;
 
   PlaceIndex& place_index() { return index_; }
   // Stands in front of the place index, for instance to load maps that are searched. Must outlive the system;
@@ -138,6 +142,8 @@ class System {
   struct Camera {
     enum class Order { kNone, kStart, kStartAfterLoss, kStartAgain, kLeave, kEnter };
     std::unique_ptr<Tracker> tracker;
+    std::shared_ptr<const CameraModel> model;
+    std::optional<std::size_t> lens_index;  // index in lenses_; empty for a known calibration
     std::unique_ptr<CalibrationMonitor> calibration_monitor;
     std::uint64_t map_key = 0;  // the map it is tracked in; 0 while it searches all maps
     Order order = Order::kNone;
@@ -191,6 +197,7 @@ class System {
   void LeaveMapNow(std::uint64_t key);
   void ActivateNow(const MapState& map);
   void AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);
+  void SetLenses(const std::vector<EstimatedLens>& lenses, Timestamp time);
   void HandleMapperEvent(const MapperEvent& event, MapState* map);
   void RequestJoin(const MapState& into);
   bool IsAwaited(const MappingThread::MapperUpdate::Join& update, const MapState& into);
@@ -219,6 +226,7 @@ class System {
   std::uint64_t active_key_ = 0;  // the map that the mapper works on; 0 for none
   std::optional<Joining> joining_;
   std::uint64_t joins_requested_ = 0;
+  std::vector<EstimatedLens> lenses_;  // of cameras with an unknown calibration
   std::vector<SystemEvent> events_;
   MappingThread mapping_;  // last, because its thread calls back into the other members
 };

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "engine/base/time.h"
+#include "engine/mapping/lens_estimation.h"
 #include "engine/mapping/map_joining.h"
 #include "engine/mapping/mapper.h"
 #include "engine/system/calibration_monitor.h"
@@ -74,6 +75,11 @@ struct RigChanged {
 struct CalibrationMismatch {
   CalibrationMonitor::Mismatch mismatch;
 };
+// The estimate of an unknown calibration became more precise or changed; the camera is tracked with it from
+// now on.
+struct LensEstimated {
+  EstimatedLens lens;
+};
 // The mapper's thread ended by an exception. Tracking continues; the map is no longer extended.
 struct MapperFailed {
   std::string what;
@@ -84,8 +90,8 @@ struct SystemEvent {
   std::uint64_t map = 0;   // key of the map that it concerns; 0 for none
   std::size_t camera = 0;  // index of the camera, where one is concerned
   std::variant<MapEntered, Relocalized, PoseRejected, MapLeft, MapUpdated, MapDiscarded, MapStartedAfterLoss,
-               KeyFrameOffered, JoinRequested, MapsJoined, JoinRefused, RigChanged, CalibrationMismatch,
-               MapperFailed, MapperEvent>
+               LensEstimated, KeyFrameOffered, JoinRequested, MapsJoined, JoinRefused, RigChanged,
+               CalibrationMismatch, MapperFailed, MapperEvent>
       what;
 };
 

@@ -58,6 +58,8 @@ class KeyFramePolicy {
   // field_of_view: horizontal angle of view in radians.
   KeyFramePolicy(const KeyFramePolicyOptions& options, double field_of_view);
 
+  // Sets a new field of view, as in the constructor, after the camera model was estimated anew.
+  void SetFieldOfView(double field_of_view) { field_of_view_ = field_of_view; }
   // Returns to kSixDof. To be called after a change of the map and after a pose that does not continue the
   // previous one.
   void Reset();
@@ -86,7 +88,7 @@ class KeyFramePolicy {
   void AddToHistory(const Pose& pose);
 
   const KeyFramePolicyOptions options_;
-  const double field_of_view_;
+  double field_of_view_;
   Mode mode_ = Mode::kSixDof;
   Timestamp reference_time_{};  // time of the open panorama map's reference keyframe
   std::vector<Pose> history_;   // does not allocate once it is full

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "engine/base/random.h"
@@ -92,6 +93,8 @@ class MapTracker {
   // A record of the last call of Track, evaluated at this pose. The snapshot given to Track must still exist.
   // The caller sets the image's features.
   FrameInspection Inspect(const Rigid3& camera_from_map) const;
+  // Sets the camera model of the images from the next one on.
+  void SetCamera(std::shared_ptr<const CameraModel> camera) { camera_ = std::move(camera); }
   // To be called before another map is tracked.
   void Clear();
   // Searches the infinite points of this panorama map in addition to the finite points; kNoId disables it.

@@ -46,6 +46,17 @@ Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraMode
   if (options.target) target_initializer_.emplace(options.target, options.target_start, camera_, seed);
 }
 
+void Tracker::SetCamera(std::shared_ptr<const CameraModel> camera) {
+  if (camera == camera_) return;
+  camera_ = std::move(camera);
+  map_tracker_.SetCamera(camera_);
+  competing_tracker_.SetCamera(camera_);
+  initializer_.SetCamera(camera_);
+  if (options_.target)
+    target_initializer_.emplace(options_.target, options_.target_start, camera_, random_.Next());
+  keyframe_policy_.SetFieldOfView(FieldOfView(*camera_));
+}
+
 void Tracker::ResetStart() {
   initializer_.Reset();
   if (target_initializer_) target_initializer_->Reset();

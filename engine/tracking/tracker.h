@@ -118,6 +118,10 @@ class Tracker {
  public:
   Tracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera, std::uint64_t seed);
 
+  // Sets the camera model of the frames from the next one on. If the model is being estimated, this has to be
+  // called together with the SetMap that brings the first snapshot with this model. A running initialization
+  // starts again.
+  void SetCamera(std::shared_ptr<const CameraModel> camera);
   // Sets the newest snapshot of the tracked map, or another map; null for none, with map_key 0. In another
   // map the camera is lost at first, unless the map was initialized from this tracker's own initial pair.
   void SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_key);
