@@ -315,7 +315,7 @@ std::optional<std::string> LensEstimation::Check(const std::atomic<bool>* interr
     const std::size_t keyframes = counts[checked.model.get()];
     // A large error is found in a small map already, and the cost of a check grows with the map.
     constexpr std::size_t kMaxCheckedKeyFrames = 24;
-    if (checked.warned || keyframes < checked.next_at || keyframes > kMaxCheckedKeyFrames) continue;
+    if (checked.done || keyframes < checked.next_at || keyframes > kMaxCheckedKeyFrames) continue;
     const auto& in = checked.model->intrinsics();
     const bool radial = checked.model->lens() == LensModel::kRadialTangential;
     const auto& k = checked.model->distortion();
@@ -338,6 +338,8 @@ std::optional<std::string> LensEstimation::Check(const std::atomic<bool>* interr
     if (estimate.outcome != SelfCalibration::Outcome::kDone) continue;
     const double change = std::abs(std::log(estimate.focal_px / focal));
     const double sigma = std::hypot(estimate.focal_sigma, options_.model_sigma);
+    // One precise estimate that agrees is enough; the check costs as much as several adjustments.
+    checked.done = sigma <= options_.max_sigma && change < options_.contradiction_change;
     if (sigma > options_.max_sigma || change < options_.contradiction_change ||
         change < options_.contradiction_sigmas * sigma)
       continue;
@@ -347,7 +349,7 @@ std::optional<std::string> LensEstimation::Check(const std::atomic<bool>* interr
     if (kept.outcome == SelfCalibration::Outcome::kDone &&
         estimate.sigma > options_.contradiction_residual * kept.sigma)
       continue;
-    checked.warned = true;
+    checked.done = true;
     char text[200];
     std::snprintf(
         text, sizeof text,

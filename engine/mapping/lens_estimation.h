@@ -55,9 +55,10 @@ struct LensEstimationOptions {
   std::size_t min_fixed_keyframes = 16;
   GuidedMatchingOptions search;  // of the guided matching after a change
   // A given calibration is checked at this number of keyframes, and again whenever the number has grown by
-  // `growth`. A warning needs a focal length that differs from the estimate by more than this, as a
-  // difference of logarithms and in standard deviations of the estimate, and residuals of the estimate below
-  // this ratio of those with the given calibration. CalibrationMonitor detects smaller errors.
+  // `growth`, until an estimate agrees with it. A warning needs a focal length that differs from the estimate
+  // by more than this, as a difference of logarithms and in standard deviations of the estimate, and
+  // residuals of the estimate below this ratio of those with the given calibration. CalibrationMonitor
+  // detects smaller errors.
   std::size_t min_checked_keyframes = 5;
   double contradiction_change = 0.2, contradiction_sigmas = 4, contradiction_residual = 0.9;
   SelfCalibrationOptions calibration = {.k2_prior_sigma = 0.15, .center_prior_sigma = 0.015};
@@ -121,7 +122,7 @@ class LensEstimation {
   struct GivenCalibration {
     std::shared_ptr<const CameraModel> model;
     std::size_t next_at = 0;  // number of its keyframes at the next check
-    bool warned = false;
+    bool done = false;        // it agrees with an estimate, or a warning was given
   };
   std::vector<GivenCalibration> given_;
   std::deque<KeyFrameId> to_match_;

@@ -126,7 +126,7 @@ TEST_P(Migration, AVisitorReadsAnEarlierFormatWithoutChangingIt) {
   const Bytes before = ReadWholeFile(file_);
   const Library library = Open(file_, Access::kReadOnly);
   ExpectAllThere(library);
-  const auto none = std::vector<std::vector<KeyFrameWords>>(2);
+  const auto none = std::vector<std::vector<engine::KeyFrameWords>>(2);
   EXPECT_EQ(WordsIn(library), GetParam() < 3 ? none : words_);
   EXPECT_THAT(library.Lenses(), ::testing::IsEmpty());
   EXPECT_EQ(ReadWholeFile(file_), before);

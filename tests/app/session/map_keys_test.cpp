@@ -10,6 +10,10 @@
 namespace docent::app {
 namespace {
 
+maps::Library OpenLibrary(const TemporaryFolder& folder) {
+  return maps::Library::Open(folder / "a.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+}
+
 TEST(MapKeys, CountUpWithoutALibrary) {
   MapKeys keys(nullptr);
   EXPECT_EQ(keys.TryTake(), 1u);
@@ -18,7 +22,7 @@ TEST(MapKeys, CountUpWithoutALibrary) {
 
 TEST(MapKeys, AreGivenOutOnceByTwoSessionsOfOneLibrary) {
   const TemporaryFolder folder;
-  maps::Library first((folder / "a.docent").string()), second((folder / "a.docent").string());
+  maps::Library first = OpenLibrary(folder), second = OpenLibrary(folder);
   MapKeys a(&first), b(&second);
   std::set<std::uint64_t> taken;
   for (int i = 0; i < 100; ++i) {
@@ -29,7 +33,7 @@ TEST(MapKeys, AreGivenOutOnceByTwoSessionsOfOneLibrary) {
 
 TEST(MapKeys, AreNotAskedOfTheDiskWhileReservedOnesAreLeft) {
   const TemporaryFolder folder;
-  maps::Library library((folder / "a.docent").string());
+  maps::Library library = OpenLibrary(folder);
   MapKeys keys(&library);
   int reserved = 0;
   while (keys.TryTake() != 0) ++reserved;
