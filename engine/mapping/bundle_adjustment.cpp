@@ -150,9 +150,8 @@ const char* Name(Outcome outcome) {
 
 std::string BundleSummary::Brief() const {
   char text[200];
-  std::snprintf(text, sizeof(text),
-                "%s after %d iterations, cost %.6g -> %.6g, sigma %.3f, %d outliers", Name(outcome),
-                iterations, initial_cost, final_cost, sigma, outliers);
+  std::snprintf(text, sizeof(text), "%s after %d iterations, cost %.6g -> %.6g, sigma %.3f, %d outliers",
+                Name(outcome), iterations, initial_cost, final_cost, sigma, outliers);
   return text;
 }
 

@@ -555,7 +555,8 @@ class Calibrator {
   const std::vector<char>& unknown_;
   int first_unknown_ = -1, anchor_ = -1;
   int width_px_ = 0, height_px_ = 0;
-  LensVector prior_ = LensVector::Zero(), expected_ = LensVector::Zero();  // A prior sigma of 0: not estimated.
+  LensVector prior_ = LensVector::Zero(),
+             expected_ = LensVector::Zero();  // A prior sigma of 0: not estimated.
   State state_;
   std::vector<std::size_t> order_, begin_;  // measurements by point
   std::vector<int> free_index_;             // of each camera: its index in free_, or -1

@@ -144,8 +144,9 @@ void FillIndex(std::size_t maps, engine::PlaceIndex* index) {
         const auto id = static_cast<engine::KeyFrameId>(i);
         const View& original = views[i % views.size()];
         const bool itself = round == 0 && i < views.size();
-        thumbnails.push_back({id, engine::Pack(itself ? original.thumbnail
-                                                    : Replica(original.thumbnail, round % 2 == 1, &random))});
+        thumbnails.push_back(
+            {id, engine::Pack(itself ? original.thumbnail
+                                     : Replica(original.thumbnail, round % 2 == 1, &random))});
         // Five consecutive keyframes form a place.
         words.push_back({id, id / 5 * 5, itself ? original.words : Replica(original.words, &random)});
       }
