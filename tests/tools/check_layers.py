@@ -23,7 +23,7 @@ ALLOWED = {
 PROJECT = ("engine/", "maps/", "content/", "ui/", "app/")
 # third-party header prefix -> the only places that may include it
 RESTRICTED = {
-    "ceres/": ["engine/mapping/bundle_adjustment.cpp", "app/calibration/lens_solver.cpp",
+    "ceres/": ["app/calibration/lens_solver.cpp",
               "app/evaluation/true_depth.cpp"],
     "sqlite3.h": ["maps/"],
     "tiny_gltf.h": ["content/"],
