@@ -43,6 +43,13 @@ if(DOCENT_SANITIZE)  # a plain if: the comma of "address,undefined" would end a 
   target_link_options(docent_compile_options INTERFACE -fsanitize=${DOCENT_SANITIZE})
 endif()
 target_include_directories(docent_compile_options INTERFACE "${PROJECT_SOURCE_DIR}")
+# Eigen aligns and allocates as the machine flags of the including file suggest, and headers of an installed Docent are
+# included by programs with other flags than its own. These are the values that x86-64-v3 suggests; every other target
+# machine, and every program that uses the package, is given them as definitions, so that all agree.
+set(DOCENT_EIGEN_LAYOUT EIGEN_MAX_ALIGN_BYTES=32 EIGEN_MAX_STATIC_ALIGN_BYTES=32 EIGEN_MALLOC_ALREADY_ALIGNED=0)
+if(NOT DOCENT_MARCH STREQUAL "x86-64-v3" OR NOT CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  target_compile_definitions(docent_compile_options INTERFACE ${DOCENT_EIGEN_LAYOUT})
+endif()
 
 # The headers that nearly every file reads, parsed once a target. Off by default, so that a build without it
 # shows a missing include; the presets switch it on.
@@ -50,6 +57,14 @@ function(docent_precompile name)
   if(DOCENT_PRECOMPILE)
     target_precompile_headers(${name} PRIVATE <algorithm> <functional> <map> <memory> <optional> <string> <vector>
       <Eigen/Core> <Eigen/Geometry> ${ARGN})
+  endif()
+endfunction()
+
+# Sources of a target are compiled several at once, because parsing the libraries' headers takes most of the time.
+# Off by default, so that a build without it shows a missing include.
+function(docent_unity name)
+  if(DOCENT_UNITY)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
   endif()
 endfunction()
 
@@ -70,15 +85,17 @@ function(docent_add_library name)
   endforeach()
   add_library(${name} STATIC ${sources})
   set_target_properties(${name} PROPERTIES LINKER_LANGUAGE CXX)
-  target_link_libraries(${name} PUBLIC docent_compile_options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  target_link_libraries(${name} PUBLIC $<BUILD_INTERFACE:docent_compile_options> ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   docent_precompile(${name})
+  docent_unity(${name})
 endfunction()
 
-# docent_add_tests(NAME LIBS libs... [DEPENDS targets...] [SUITES suites...]): every *_test.cpp below the folder,
-# discovered by ctest, each test a process of its own. A suite that is named here is one process, and one entry for
-# ctest: its tests look at the same run, which takes longer to make than to look at.
+# docent_add_tests(NAME LIBS libs... [DEPENDS targets...] [SUITES suites...] [UNITY]): every *_test.cpp below the
+# folder, discovered by ctest, each test a process of its own. A suite that is named here is one process, and one entry
+# for ctest: its tests look at the same run, which takes longer to make than to look at. With UNITY, the sources may be
+# compiled several at once, so that names in their anonymous namespaces must differ.
 function(docent_add_tests name)
-  cmake_parse_arguments(ARG "" "" "LIBS;DEPENDS;SUITES" ${ARGN})
+  cmake_parse_arguments(ARG "UNITY" "" "LIBS;DEPENDS;SUITES" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
   if(NOT sources)
     return()
@@ -88,6 +105,9 @@ function(docent_add_tests name)
   target_compile_definitions(${name} PRIVATE DOCENT_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     DOCENT_BINARY_DIR="${PROJECT_BINARY_DIR}")
   docent_precompile(${name} <gtest/gtest.h> <gmock/gmock.h>)
+  if(ARG_UNITY)
+    docent_unity(${name})
+  endif()
   if(ARG_DEPENDS)
     add_dependencies(${name} ${ARG_DEPENDS})
   endif()

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "content/assimp_loader.h"
-#include "content/gltf_loader.h"
-#include "content/gltf_resources.h"
+#include "content/gltf/loader.h"
+#include "content/gltf/resources.h"
 #include "content/sha256.h"
 
 namespace docent::content {

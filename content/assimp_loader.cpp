@@ -11,9 +11,9 @@
 #include <cmath>
 
 #include "content/assimp_material.h"
-#include "content/gltf_container.h"
-#include "content/gltf_json.h"
-#include "content/gltf_resources.h"
+#include "content/gltf/container.h"
+#include "content/gltf/json.h"
+#include "content/gltf/resources.h"
 
 namespace docent::content {
 namespace {

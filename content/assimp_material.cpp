@@ -6,8 +6,8 @@
 #include <cmath>
 #include <optional>
 
-#include "content/gltf_images.h"
-#include "content/gltf_resources.h"
+#include "content/gltf/images.h"
+#include "content/gltf/resources.h"
 #include "engine/base/error.h"
 
 namespace docent::content {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "content/gltf_json.h"
+#include "content/gltf/json.h"
 #include "content/load_limits.h"
 
 // Converts assimp's materials. Private to assimp_loader.

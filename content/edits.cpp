@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "content/edits.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
-#include "content/edit_script.h"
 #include "engine/base/error.h"
 
 namespace docent::content {
@@ -19,12 +17,11 @@ std::size_t IndexOf(const Scene& scene, const std::string& name) {
   return static_cast<std::size_t>(found - scene.entities.data());
 }
 
-class AddEdit : public Edit {
+class Add : public Edit {
  public:
-  AddEdit(Entity entity, std::string text) : entity_(std::move(entity)), text_(std::move(text)) {}
+  explicit Add(Entity entity) : entity_(std::move(entity)) {}
 
   void Apply(Scene* scene) override {
-    if (entity_.name.empty()) throw Error("An object without a name cannot be placed.");
     if (scene->Find(entity_.name) != nullptr)
       throw Error("There is already a '" + entity_.name + "' in this map.");
     scene->entities.push_back(entity_);
@@ -33,14 +30,12 @@ class AddEdit : public Edit {
     scene->entities.erase(scene->entities.begin() +
                           static_cast<std::ptrdiff_t>(IndexOf(*scene, entity_.name)));
   }
-  std::string Text() const override { return text_; }
   void MoveWithAnchor(const std::string& name, const engine::Sim3& motion) override {
     if (name == entity_.name) content::MoveWithAnchor(motion, &entity_);
   }
 
  private:
   Entity entity_;
-  std::string text_;
 };
 
 // An edit that changes one entity in place. Undo restores the previous entity.
@@ -77,15 +72,9 @@ class Move : public ChangeEdit {
  public:
   Move(std::string name, const Eigen::Vector3d& position)
       : ChangeEdit(std::move(name)), position_(position) {}
-  std::string Text() const override {
-    return "move " + QuoteWord(name()) + " " + NumberText(position_.x()) + " " + NumberText(position_.y()) +
-           " " + NumberText(position_.z());
-  }
 
  protected:
   void Change(Entity* entity) override {
-    if (!position_.allFinite())
-      throw Error("'" + name() + "' cannot be moved: the coordinates must be finite numbers.");
     if (entity->kind == Entity::Kind::kModel) {
       entity->model.map_from_model.translation = position_;
     } else {
@@ -101,12 +90,12 @@ class Move : public ChangeEdit {
 class Rotate : public ChangeEdit {
  public:
   Rotate(std::string name, double angle_deg) : ChangeEdit(std::move(name)), angle_deg_(angle_deg) {}
-  std::string Text() const override { return "rotate " + QuoteWord(name()) + " " + NumberText(angle_deg_); }
 
  protected:
   void Change(Entity* entity) override {
-    if (!std::isfinite(angle_deg_))
-      throw Error("'" + name() + "' cannot be rotated: the angle must be a finite number.");
+    if (!(std::abs(angle_deg_) <= kMaxAngle_deg))
+      throw Error("'" + name() + "' cannot be rotated: the angle must be at most " +
+                  std::to_string(std::lround(kMaxAngle_deg)) + " degrees.");
     if (entity->kind != Entity::Kind::kModel) {
       throw Error("'" + name() + "' is a signpost, which always faces the reader and cannot be rotated.");
     }
@@ -122,18 +111,12 @@ class Rotate : public ChangeEdit {
 class Scale : public ChangeEdit {
  public:
   Scale(std::string name, double factor) : ChangeEdit(std::move(name)), factor_(factor) {}
-  std::string Text() const override { return "scale " + QuoteWord(name()) + " " + NumberText(factor_); }
 
  protected:
   void Change(Entity* entity) override {
     double& size =
         entity->kind == Entity::Kind::kModel ? entity->model.map_from_model.scale : entity->signpost.height_m;
-    const double scaled = size * factor_;
-    // The limits keep the size within the range that a saved scene allows.
-    if (!(factor_ > 0) || !(scaled >= 1e-6) || !(scaled <= 1e6)) {
-      throw Error("'" + name() + "' cannot be scaled by " + NumberText(factor_) + ".");
-    }
-    size = scaled;
+    size *= factor_;
   }
 
  private:
@@ -152,7 +135,6 @@ class Remove : public Edit {
   void Undo(Scene* scene) override {
     scene->entities.insert(scene->entities.begin() + static_cast<std::ptrdiff_t>(index_), entity_);
   }
-  std::string Text() const override { return "remove " + QuoteWord(name_); }
   void MoveWithAnchor(const std::string& name, const engine::Sim3& motion) override {
     if (name == name_) content::MoveWithAnchor(motion, &entity_);
   }
@@ -163,26 +145,11 @@ class Remove : public Edit {
   Entity entity_;
 };
 
-std::string AtPixel(PixelRequest pixel) {
-  return " at pixel " + NumberText(pixel.u_px) + " " + NumberText(pixel.v_px);
-}
-
 }  // namespace
 
-std::unique_ptr<Edit> PlaceModelEdit(Entity entity, std::string file, PixelRequest pixel,
-                                     std::optional<double> scale, std::optional<double> yaw_deg) {
-  std::string text = "place " + QuoteWord(file) + AtPixel(pixel);
-  if (scale) text += " scale " + NumberText(*scale);
-  if (yaw_deg) text += " yaw " + NumberText(*yaw_deg);
-  return std::make_unique<AddEdit>(std::move(entity), std::move(text));
+std::unique_ptr<Edit> AddEdit(Entity entity) {
+  return std::make_unique<Add>(std::move(entity));
 }
-
-std::unique_ptr<Edit> AddSignpostEdit(Entity entity, PixelRequest pixel) {
-  std::string text = "signpost " + QuoteText(entity.signpost.text) + AtPixel(pixel);
-  if (!entity.signpost.to_map.empty()) text += " to " + QuoteWord(entity.signpost.to_map);
-  return std::make_unique<AddEdit>(std::move(entity), std::move(text));
-}
-
 std::unique_ptr<Edit> MoveEdit(std::string name, const Eigen::Vector3d& position_in_map) {
   return std::make_unique<Move>(std::move(name), position_in_map);
 }
@@ -196,8 +163,16 @@ std::unique_ptr<Edit> RemoveEdit(std::string name) {
   return std::make_unique<Remove>(std::move(name));
 }
 
-void EditHistory::Do(std::unique_ptr<Edit> edit, Scene* scene) {
+void ApplyChecked(Edit* edit, Scene* scene) {
   edit->Apply(scene);
+  const std::string problem = Validate(*scene);
+  if (problem.empty()) return;
+  edit->Undo(scene);
+  throw Error(problem);
+}
+
+void EditHistory::Do(std::unique_ptr<Edit> edit, Scene* scene) {
+  ApplyChecked(edit.get(), scene);
   done_.push_back(std::move(edit));
   undone_.clear();
 }
@@ -212,7 +187,7 @@ bool EditHistory::Undo(Scene* scene) {
 
 bool EditHistory::Redo(Scene* scene) {
   if (undone_.empty()) return false;
-  undone_.back()->Apply(scene);
+  ApplyChecked(undone_.back().get(), scene);
   done_.push_back(std::move(undone_.back()));
   undone_.pop_back();
   return true;
@@ -222,12 +197,6 @@ void EditHistory::MoveWithAnchor(const std::string& name, const engine::Sim3& mo
   for (auto* edits : {&done_, &undone_}) {
     for (const std::unique_ptr<Edit>& edit : *edits) edit->MoveWithAnchor(name, motion);
   }
-}
-
-std::vector<std::string> EditHistory::Lines() const {
-  std::vector<std::string> lines;
-  for (const std::unique_ptr<Edit>& edit : done_) lines.push_back(edit->Text());
-  return lines;
 }
 
 }  // namespace docent::content

@@ -19,9 +19,9 @@ struct LoadLimits {
   // The same, counting each mesh once for each node that shows it.
   std::uint64_t max_drawn_indices = 60'000'000;
   std::uint64_t max_key_frame_values = 8'000'000;  // For all animation channels.
-  int max_image_side_px = 16384;
-  std::uint64_t max_image_pixels = 128ull << 20;  // For all images together.
-  std::size_t max_nodes = 200'000;
+  int max_image_side_px = 16384;                   // For the longer side of an image.
+  std::uint64_t max_image_pixels = 128ull << 20;   // For all images together.
+  std::size_t max_nodes = 200'000;                 // For the whole file.
 };
 
 }  // namespace docent::content

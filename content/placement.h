@@ -13,6 +13,7 @@
 // surface at the pixel is estimated from the map points around its ray. Pure functions; thread-safe.
 namespace docent::content {
 
+// How FindSurface chooses among the points.
 struct PlacementOptions {
   double initial_cone_deg = 2.0;  // Half-angle of the initial cone around the ray.
   double max_cone_deg = 12.0;     // The cone is widened up to this until it contains enough points.
@@ -22,21 +23,22 @@ struct PlacementOptions {
   double depth_gap = 0.15;        // Ratio of the depth: a larger step in depth separates two surfaces.
   double inlier_distance = 0.02;  // Ratio of the depth: largest distance of an inlier from the plane.
   double max_incidence_deg = 80.0;  // Planes with a larger angle between normal and ray are rejected.
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;           // Of the random choices of the robust plane fit.
 };
 
 // The surface that a ray hits, in the map.
 struct SurfaceHit {
-  Eigen::Vector3d point;
+  Eigen::Vector3d point;   // Map units.
   Eigen::Vector3d normal;  // Unit vector towards the viewer.
   // False without a plane: the point is at the median depth and the normal opposes the ray.
   bool on_plane = false;
-  int supporting_points = 0;
+  int supporting_points = 0;  // Number of map points that the plane or depth was estimated from.
 };
 
+// A hit, or why there is none.
 struct SurfaceResult {
-  std::optional<SurfaceHit> hit;
-  std::string reason;  // Why there is no hit, as a sentence.
+  std::optional<SurfaceHit> hit;  // Empty where the points show no surface.
+  std::string reason;             // Why there is no hit, as a sentence.
 };
 
 // points_in_map are finite points in the camera's view. ray_origin and ray_direction (any nonzero length) are

@@ -2,8 +2,67 @@
 #include "content/scene.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
 
 namespace docent::content {
+namespace {
+
+std::string Brief(double number) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, number, std::chars_format::general, 6).ptr};
+}
+
+bool IsIn(double number, double least, double most) {
+  return number >= least && number <= most;  // false for NaN
+}
+
+std::string OutOfRange(const char* what, double number, double least, double most) {
+  return std::string("would have ") + what + " of " + Brief(number) + ", which is not between " +
+         Brief(least) + " and " + Brief(most);
+}
+
+// What is wrong with an entity's place and size, as the end of a sentence.
+std::string PoseProblem(const Entity& entity) {
+  for (const double coordinate : PlaceOf(entity)) {
+    if (!IsIn(coordinate, -kMaxCoordinate, kMaxCoordinate))
+      return OutOfRange("a coordinate", coordinate, -kMaxCoordinate, kMaxCoordinate);
+  }
+  if (entity.kind == Entity::Kind::kModel) {
+    const engine::Sim3& pose = entity.model.map_from_model;
+    if (!IsIn(pose.scale, kMinModelScale, kMaxModelScale))
+      return OutOfRange("a scale", pose.scale, kMinModelScale, kMaxModelScale);
+    if (!IsIn(pose.rotation.quaternion().norm(), 0.9999, 1.0001)) return "would have no valid rotation";
+    return "";
+  }
+  const Signpost& signpost = entity.signpost;
+  if (!IsIn(signpost.height_m, kMinBoardHeight, kMaxBoardHeight))
+    return OutOfRange("a height", signpost.height_m, kMinBoardHeight, kMaxBoardHeight);
+  if (!IsIn(signpost.up.norm(), 0.9999, 1.0001)) return "would have no valid up direction";
+  return "";
+}
+
+// What is wrong with an entity, as the end of a sentence.
+std::string Problem(const Entity& entity) {
+  const auto is_text = [](const std::string& text) { return text.size() <= kMaxTextBytes && IsUtf8(text); };
+  const std::string not_text =
+      "that is not UTF-8 text of at most " + std::to_string(kMaxTextBytes) + " bytes";
+  if (entity.name.empty()) return "would have no name";
+  if (!is_text(entity.name)) return "would have a name " + not_text;
+  if (entity.kind == Entity::Kind::kModel) {
+    const PlacedModel& model = entity.model;
+    if (!model.asset || model.asset->id.empty() || !is_text(model.asset->id)) return "would have no model";
+    if (!IsIn(model.animation, -1, kMaxAnimation)) return "would have an animation that is out of range";
+  } else {
+    if (!is_text(entity.signpost.text)) return "would have a text " + not_text;
+    if (!is_text(entity.signpost.to_map)) return "would lead to a map with a name " + not_text;
+  }
+  return PoseProblem(entity);
+}
+
+}  // namespace
 
 Eigen::Vector3d PlaceOf(const Entity& entity) {
   return entity.kind == Entity::Kind::kModel ? entity.model.map_from_model.translation
@@ -11,13 +70,20 @@ Eigen::Vector3d PlaceOf(const Entity& entity) {
 }
 
 void MoveWithAnchor(const engine::Sim3& motion, Entity* entity) {
+  Entity moved;
+  moved.kind = entity->kind;
   if (entity->kind == Entity::Kind::kModel) {
-    entity->model.map_from_model = motion * entity->model.map_from_model;
+    moved.model.map_from_model = motion * entity->model.map_from_model;
   } else {
-    entity->signpost.anchor = motion * entity->signpost.anchor;
-    entity->signpost.up = motion.rotation * entity->signpost.up;
-    entity->signpost.height_m *= motion.scale;
+    moved.signpost.anchor = motion * entity->signpost.anchor;
+    moved.signpost.up = motion.rotation * entity->signpost.up;
+    moved.signpost.height_m = entity->signpost.height_m * motion.scale;
   }
+  if (!PoseProblem(moved).empty()) return;
+  entity->model.map_from_model = moved.model.map_from_model;
+  entity->signpost.anchor = moved.signpost.anchor;
+  entity->signpost.up = moved.signpost.up;
+  entity->signpost.height_m = moved.signpost.height_m;
 }
 
 const Entity* Scene::Find(const std::string& name) const {
@@ -32,6 +98,44 @@ std::string Scene::FreeName(const std::string& base) const {
     const std::string name = base + "-" + std::to_string(number);
     if (Find(name) == nullptr) return name;
   }
+}
+
+std::string Scene::FreeSignpostName() const {
+  for (int number = 1;; ++number) {
+    const std::string name = "sign-" + std::to_string(number);
+    if (Find(name) == nullptr) return name;
+  }
+}
+
+std::string Validate(const Scene& scene) {
+  if (scene.entities.size() > kMaxEntities)
+    return "A map can hold at most " + std::to_string(kMaxEntities) + " models and signposts.";
+  std::set<std::string_view> names;
+  std::size_t bytes = 0;
+  for (const Entity& entity : scene.entities) {
+    if (const std::string problem = Problem(entity); !problem.empty())
+      return "'" + entity.name.substr(0, 80) + "' " + problem + ".";
+    if (!names.insert(entity.name).second) return "There are two '" + entity.name + "' in this map.";
+    bytes += entity.name.size() + entity.signpost.text.size() + entity.signpost.to_map.size();
+  }
+  if (bytes > kMaxSceneTextBytes)
+    return "The names and texts in a map can have at most " + std::to_string(kMaxSceneTextBytes) + " bytes.";
+  return "";
+}
+
+bool IsUtf8(std::string_view text) {
+  try {
+    (void)nlohmann::json(text).dump();
+    return true;
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
+}
+
+std::string NameFromFile(const std::filesystem::path& file) {
+  const nlohmann::json stem(file.stem().string());
+  return nlohmann::json::parse(stem.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace))
+      .get<std::string>();
 }
 
 }  // namespace docent::content

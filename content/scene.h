@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "content/model.h"
@@ -13,41 +15,57 @@
 // The content of one map.
 namespace docent::content {
 
+// Limits of a scene: edits refuse what exceeds them, and scene_codec.h neither writes nor reads it. They are
+// far beyond any room that is measured in map units, and keep all arithmetic finite.
+inline constexpr double kMaxCoordinate = 1e6;                           // map units
+inline constexpr double kMinModelScale = 1e-9, kMaxModelScale = 1e9;    // map units per metre
+inline constexpr double kMinBoardHeight = 1e-6, kMaxBoardHeight = 1e6;  // map units
+inline constexpr double kMaxAngle_deg =
+    1e6;  // of a rotation; beyond it little of the angle is left of a double
+inline constexpr int kMaxAnimation = 1'000'000;
+inline constexpr std::size_t kMaxTextBytes = 10'000;  // of each text and name
+// With the texts below, the encoded scene stays within LoadLimits.
+inline constexpr std::size_t kMaxEntities = 50'000;
+inline constexpr std::size_t kMaxSceneTextBytes = 4u << 20;  // all names and texts together
+
 // A glTF file as the library stores it: one self-contained GLB, identified by the hash of its bytes.
 struct Asset {
-  std::string id;    // Lower-case hex of a hash of `glb` with at least 128 bits.
-  std::string name;  // The file's name without its folder, for display.
-  std::vector<std::uint8_t> glb;
-  std::shared_ptr<const Model> model;
+  std::string id;                      // Lower-case hex of a hash of `glb` with at least 128 bits.
+  std::string name;                    // The file's name without its folder, for display.
+  std::vector<std::uint8_t> glb;       // The file's bytes.
+  std::shared_ptr<const Model> model;  // The decoded file; never null.
 };
 
 // A model in a map. map_from_model transforms from glTF axes (y up) to the map.
 struct PlacedModel {
-  std::shared_ptr<const Asset> asset;
-  engine::Sim3 map_from_model;
-  int animation = 0;  // None if it is -1 or out of range.
+  std::shared_ptr<const Asset> asset;  // Never null.
+  engine::Sim3 map_from_model;         // Its scale is the number of map units per metre of the model.
+  int animation = 0;                   // None if it is -1 or out of range.
 };
 
 // A board with text that rotates about its `up` axis to face the reader; `anchor` is its foot in the map.
 struct Signpost {
-  std::string text;
-  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();
-  Eigen::Vector3d up = -Eigen::Vector3d::UnitY();  // Unit vector in the map.
-  double height_m = 0.1;                           // Height of the board, in map units.
-  std::string to_map;                              // Name of the map it leads to, empty for none.
+  std::string text;                                  // UTF-8.
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // In the map, map units.
+  Eigen::Vector3d up = -Eigen::Vector3d::UnitY();    // Unit vector in the map.
+  double height_m = 0.1;                             // Height of the board, in map units.
+  std::string to_map;                                // Name of the map it leads to, empty for none.
 };
 
 // An entity with a name that is unique in its scene ("helmet", "helmet-2", "sign-1").
 struct Entity {
-  std::string name;
-  enum class Kind { kModel, kSignpost } kind = Kind::kSignpost;
-  PlacedModel model;
-  Signpost signpost;
+  std::string name;  // Unique in the scene.
+  // Which of the two members counts.
+  enum class Kind { kModel, kSignpost };
+  Kind kind = Kind::kSignpost;  // What it is.
+  PlacedModel model;            // Of kModel.
+  Signpost signpost;            // Of kSignpost.
 };
 
 // The position of an entity's foot in the map.
 Eigen::Vector3d PlaceOf(const Entity& entity);
-// Transforms an entity after its anchor has moved in the map by `motion`.
+// Transforms an entity after its anchor has moved in the map by `motion`. An entity that would leave the
+// limits above stays as it is.
 void MoveWithAnchor(const engine::Sim3& motion, Entity* entity);
 
 // A value type with cheap copies (assets are shared), so that edits change a copy that then replaces the
@@ -55,9 +73,21 @@ void MoveWithAnchor(const engine::Sim3& motion, Entity* entity);
 struct Scene {
   std::vector<Entity> entities;  // In the order of placement.
 
+  // Null if there is none with that name.
   const Entity* Find(const std::string& name) const;
   // Returns the first unused name of "base", "base-2", "base-3" …
   std::string FreeName(const std::string& base) const;
+  // Returns the first unused name of "sign-1", "sign-2" …
+  std::string FreeSignpostName() const;
 };
+
+// A sentence that says why the scene cannot be stored (a number outside its limits, a text that is not UTF-8,
+// a name that is used twice, a model without asset); empty if it can.
+std::string Validate(const Scene& scene);
+
+bool IsUtf8(std::string_view text);
+// The base of an entity's name for a model's file: its name without folder and extension, in which bytes that
+// are not UTF-8 are replaced.
+std::string NameFromFile(const std::filesystem::path& file);
 
 }  // namespace docent::content

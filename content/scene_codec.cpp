@@ -6,15 +6,13 @@
 #include <initializer_list>
 #include <set>
 
-#include "content/gltf_json.h"
+#include "content/gltf/json.h"
+#include "engine/base/error.h"
 
 namespace docent::content {
 namespace {
 
 constexpr int kVersion = 1;
-constexpr double kMaxMetres = 1e6;
-constexpr std::size_t kMaxTextBytes = 10'000;
-constexpr std::size_t kMaxEntities = 100'000;
 
 Json ToJson(const Eigen::Vector3d& v) {
   return {v.x(), v.y(), v.z()};
@@ -119,15 +117,15 @@ Entity ReadModel(std::string_view where, const std::string& place, const Json& j
   entity.model.asset = find_asset(id);
   if (!entity.model.asset)
     Refuse(where, place, "uses the asset " + id.substr(0, 64) + ", which does not exist.");
-  const double animation = reader.Number("animation", -1, 1e6);
+  const double animation = reader.Number("animation", -1, kMaxAnimation);
   if (animation != std::floor(animation)) Refuse(where, place + ".animation", "is not an integer.");
   entity.model.animation = static_cast<int>(animation);
   const ObjectReader pose(where, place + ".map_from_model", reader.Member("map_from_model"),
                           {"rotation_xyzw", "translation_m", "scale"});
   const Eigen::Vector4d q = pose.UnitVector<4>("rotation_xyzw");
   entity.model.map_from_model.rotation = engine::Rotation3(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
-  entity.model.map_from_model.translation = pose.Vector<3>("translation_m", kMaxMetres);
-  entity.model.map_from_model.scale = pose.Number("scale", 1e-9, 1e9);
+  entity.model.map_from_model.translation = pose.Vector<3>("translation_m", kMaxCoordinate);
+  entity.model.map_from_model.scale = pose.Number("scale", kMinModelScale, kMaxModelScale);
   return entity;
 }
 
@@ -138,9 +136,9 @@ Entity ReadSignpost(std::string_view where, const std::string& place, const Json
   entity.kind = Entity::Kind::kSignpost;
   entity.name = reader.Text("name");
   entity.signpost.text = reader.Text("text");
-  entity.signpost.anchor = reader.Vector<3>("anchor_m", kMaxMetres);
+  entity.signpost.anchor = reader.Vector<3>("anchor_m", kMaxCoordinate);
   entity.signpost.up = reader.UnitVector<3>("up");
-  entity.signpost.height_m = reader.Number("height_m", 1e-6, kMaxMetres);
+  entity.signpost.height_m = reader.Number("height_m", kMinBoardHeight, kMaxBoardHeight);
   entity.signpost.to_map = reader.Text("to_map");
   return entity;
 }
@@ -162,6 +160,7 @@ Json ParseScene(std::string_view text, std::string_view where) {
 }  // namespace
 
 std::string EncodeScene(const Scene& scene) {
+  if (const std::string problem = Validate(scene); !problem.empty()) throw Error(problem);
   std::set<std::string> assets;
   Json entities = Json::array();
   for (const Entity& entity : scene.entities) {
@@ -169,8 +168,7 @@ std::string EncodeScene(const Scene& scene) {
     entities.push_back(ToJson(entity));
   }
   const Json json{{"docent_scene", kVersion}, {"assets", assets}, {"entities", entities}};
-  // Invalid UTF-8 is replaced, so that the rest of the scene is not lost.
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json.dump();
 }
 
 std::vector<std::string> SceneAssetIds(std::string_view text) {

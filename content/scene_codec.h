@@ -21,6 +21,7 @@
 // Numbers are written so that they read back to the same bits (rotations are normalized again).
 namespace docent::content {
 
+// DecodeScene reads what this returns. Throws Error for a scene that cannot be stored (Validate in scene.h).
 std::string EncodeScene(const Scene& scene);
 
 // Returns the ids in "assets", so that a library can fetch them first. Throws Error like DecodeScene.

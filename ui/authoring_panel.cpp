@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "ui/command_text.h"
 
 namespace docent::ui {
 namespace {
@@ -36,7 +35,7 @@ void LoadFont() {
 
 struct AuthoringPanel::Impl {
   Window* window = nullptr;
-  Emit emit;
+  AuthoringActions* actions = nullptr;
   std::vector<std::string> models, map_names;
   State state;
   ImGuiContext* context = nullptr;
@@ -44,16 +43,12 @@ struct AuthoringPanel::Impl {
   void DrawMapSection();
   void DrawPlaceSection();
   void DrawShowSection();
-  // Draws a button that emits this command.
-  void CommandButton(const char* label, const char* command) {
-    if (ImGui::Button(label)) emit(command);
-  }
 };
 
-AuthoringPanel::AuthoringPanel(Window* window, Emit emit, std::vector<std::string> models)
+AuthoringPanel::AuthoringPanel(Window* window, AuthoringActions* actions, std::vector<std::string> models)
     : impl_(std::make_unique<Impl>()) {
   impl_->window = window;
-  impl_->emit = std::move(emit);
+  impl_->actions = actions;
   impl_->models = std::move(models);
   if (!impl_->models.empty()) impl_->state.model_file = impl_->models.front();
   window->MakeCurrent();
@@ -118,16 +113,16 @@ void AuthoringPanel::Impl::DrawMapSection() {
   ImGui::InputTextWithHint("##map name", "Name of the new map", &state.map_name);
   ImGui::SameLine();
   if (ImGui::Button("New map") && !state.map_name.empty()) {
-    emit(NewMapCommand(state.map_name));
+    actions->NewMap(state.map_name);
     state.map_name.clear();
   }
-  CommandButton("Stop map", "map stop");
+  if (ImGui::Button("Stop map")) actions->StopMap();
   ImGui::SameLine();
-  CommandButton("Undo", "undo");
+  if (ImGui::Button("Undo")) actions->Undo();
   ImGui::SameLine();
-  CommandButton("Redo", "redo");
+  if (ImGui::Button("Redo")) actions->Redo();
   ImGui::SameLine();
-  CommandButton("Save", "save");
+  if (ImGui::Button("Save")) actions->Save();
 }
 
 void AuthoringPanel::Impl::DrawPlaceSection() {
@@ -184,11 +179,11 @@ bool AuthoringPanel::WantsKeyboard() const {
 bool AuthoringPanel::ClickImage(const Eigen::Vector2d& pixel) {
   const State& state = impl_->state;
   if (state.tool == Tool::kModel && !state.model_file.empty()) {
-    impl_->emit(PlaceCommand(state.model_file, pixel, state.scale, state.yaw_deg));
+    impl_->actions->PlaceModel(state.model_file, pixel, state.scale, state.yaw_deg);
     return true;
   }
   if (state.tool == Tool::kSignpost && !state.sign_text.empty()) {
-    impl_->emit(SignpostCommand(state.sign_text, pixel, state.sign_to_map));
+    impl_->actions->PlaceSignpost(state.sign_text, pixel, state.sign_to_map);
     return true;
   }
   return false;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,12 +11,28 @@
 
 namespace docent::ui {
 
+// What a person asks for in the panel. Called on the window's thread; implementations do not throw.
+class AuthoringActions {
+ public:
+  virtual ~AuthoringActions() = default;
+  virtual void NewMap(const std::string& name) = 0;
+  virtual void StopMap() = 0;
+  // At the surface that the image shows at this pixel. `scale` is in map units per metre of the model.
+  virtual void PlaceModel(const std::string& file, const Eigen::Vector2d& pixel, double scale,
+                          double yaw_deg) = 0;
+  // `to_map` is the map that the signpost leads to; empty for none.
+  virtual void PlaceSignpost(const std::string& text, const Eigen::Vector2d& pixel,
+                             const std::string& to_map) = 0;
+  virtual void Undo() = 0;
+  virtual void Redo() = 0;
+  virtual void Save() = 0;
+};
+
 // The small authoring panel over the image (Dear ImGui): new map, stop map, place model, signpost, undo,
-// redo, save, and display options. It changes nothing itself: every action is emitted as a line of the script
-// language. One panel per window, used on the window's thread and destroyed before the window.
+// redo, save, and display options. It changes nothing itself, but calls the actions. One panel per window,
+// used on the window's thread and destroyed before the window.
 class AuthoringPanel {
  public:
-  using Emit = std::function<void(std::string command)>;
   enum class Tool { kNone, kModel, kSignpost };
 
   // The user's choices. The panel shows and changes them, and so can its owner (for a key press or a test).
@@ -30,8 +45,8 @@ class AuthoringPanel {
     bool show_points = false, show_keyframes = false, show_hud = true;
   };
 
-  // `models` are the files to choose from.
-  AuthoringPanel(Window* window, Emit emit, std::vector<std::string> models = {});
+  // `actions` must outlive the panel. `models` are the files to choose from.
+  AuthoringPanel(Window* window, AuthoringActions* actions, std::vector<std::string> models = {});
   ~AuthoringPanel();
   AuthoringPanel(const AuthoringPanel&) = delete;
   AuthoringPanel& operator=(const AuthoringPanel&) = delete;
@@ -49,7 +64,7 @@ class AuthoringPanel {
   bool WantsMouse() const;
   bool WantsKeyboard() const;
   // Handles a click at this pixel of the image by placing what the selected tool places. Without a tool, or
-  // without a model or text to place, nothing happens. Returns whether a command was emitted.
+  // without a model or text to place, nothing happens. Returns whether an action was called.
   bool ClickImage(const Eigen::Vector2d& pixel);
 
  private:

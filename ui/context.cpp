@@ -49,11 +49,6 @@ EGLContext CreateCoreContext(EGLDisplay display) {
 
 }  // namespace
 
-std::string GraphicsContext::DriverName() const {
-  const GLubyte* name = glGetString(GL_RENDERER);
-  return name == nullptr ? std::string() : std::string(reinterpret_cast<const char*>(name));
-}
-
 // All contexts of the process share the EGL displays, so a display is never terminated here.
 struct OffscreenContext::Impl {
   EGLDisplay display = EGL_NO_DISPLAY;

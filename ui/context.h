@@ -14,8 +14,6 @@ class GraphicsContext {
   // Makes this context current on its thread, which is needed when several contexts exist. Throws
   // docent::Error when the driver fails to (for instance because the display has gone).
   virtual void MakeCurrent() = 0;
-  // The name of the driver ("llvmpipe (LLVM 15.0.6, 256 bits)"). The context must be current.
-  std::string DriverName() const;
 };
 
 // A context without a window or display, created with EGL: on Mesa's surfaceless platform if possible, else

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ui/map_view.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -17,7 +18,6 @@ namespace docent::ui {
 namespace {
 
 constexpr double kHalfViewHeight = 0.42;  // Tangent of half the vertical field of view.
-const Eigen::Vector3d kUp = -Eigen::Vector3d::UnitY();
 
 engine::CameraModel Pinhole(int width_px, int height_px) {
   const double focal_px = 0.5 * height_px / kHalfViewHeight;
@@ -51,24 +51,28 @@ class Drawing {
   // Draws a horizontal grid through the target with a spacing of `step_m` map units.
   void Grid(const Orbit& orbit, double step_m) {
     constexpr int kLines = 10;
-    const Eigen::Vector3d middle(std::round(orbit.target.x() / step_m) * step_m, orbit.target.y(),
-                                 std::round(orbit.target.z() / step_m) * step_m);
+    const engine::UprightAxes& axes = orbit.axes;
+    const double right = std::round(axes.right.dot(orbit.target) / step_m) * step_m;
+    const double ahead = std::round(axes.ahead.dot(orbit.target) / step_m) * step_m;
+    const Eigen::Vector3d middle =
+        right * axes.right + ahead * axes.ahead + axes.up.dot(orbit.target) * axes.up;
     const double reach = kLines * step_m;
     for (int i = -kLines; i <= kLines; ++i) {
-      const double offset = i * step_m;
       const Color color{0.5f, 0.6f, 0.7f, i == 0 ? 0.4f : 0.18f};
-      Line(middle + Eigen::Vector3d(offset, 0, -reach), middle + Eigen::Vector3d(offset, 0, reach), color);
-      Line(middle + Eigen::Vector3d(-reach, 0, offset), middle + Eigen::Vector3d(reach, 0, offset), color);
+      const Eigen::Vector3d aside = middle + i * step_m * axes.right,
+                            along = middle + i * step_m * axes.ahead;
+      Line(aside - reach * axes.ahead, aside + reach * axes.ahead, color);
+      Line(along - reach * axes.right, along + reach * axes.right, color);
     }
   }
 
-  void Wedge(const PredictedRecall& found) {
+  void Wedge(const Orbit& orbit, const PredictedRecall& found) {
     // The octant is filled with lines from the centre outwards that lie close together.
     constexpr int kStrokes = 9;
     constexpr double kHalfEighth = std::numbers::pi / 8 * 0.9;
     Color color = RecallColor(found.share);
     color.alpha = 0.75f;
-    const Eigen::Vector3d side = kUp.cross(found.direction);
+    const Eigen::Vector3d side = orbit.axes.up.cross(found.direction);
     const double depth = std::max(1e-9, (camera_from_map_ * found.place).z());
     const double width_px = 0.45 * found.side_m * kHalfEighth / kStrokes / (camera_.PixelAngle() * depth);
     for (int i = 0; i < kStrokes; ++i) {
@@ -139,10 +143,10 @@ void DrawCaption(const std::string& title, const std::string& counts, Canvas* ca
 engine::Rigid3 CameraFromMap(const Orbit& orbit) {
   const double half_pi = std::numbers::pi / 2;
   const double elevation = std::clamp(orbit.elevation, -half_pi, half_pi);
-  // Horizontal axes of the map: at azimuth 0 the viewpoint is at -z and faces +z, with +x to its right.
-  const Eigen::Vector3d ahead(std::sin(orbit.azimuth), 0, std::cos(orbit.azimuth));
-  const Eigen::Vector3d right(std::cos(orbit.azimuth), 0, -std::sin(orbit.azimuth));
-  const Eigen::Vector3d forward = std::cos(elevation) * ahead - std::sin(elevation) * kUp;
+  const engine::UprightAxes& axes = orbit.axes;
+  const Eigen::Vector3d ahead = std::sin(orbit.azimuth) * axes.right + std::cos(orbit.azimuth) * axes.ahead;
+  const Eigen::Vector3d right = std::cos(orbit.azimuth) * axes.right - std::sin(orbit.azimuth) * axes.ahead;
+  const Eigen::Vector3d forward = std::cos(elevation) * ahead - std::sin(elevation) * axes.up;
   const Eigen::Vector3d down = forward.cross(right);
   Eigen::Matrix3d rotation;
   rotation.row(0) = right;
@@ -166,25 +170,28 @@ Color RecallColor(double share) {
 }
 
 Orbit OrbitAbove(const engine::MapSnapshot& map, double width_over_height) {
+  Orbit orbit;
+  orbit.axes = engine::UprightAxesOf(map);
+  Eigen::Matrix3d axes_from_map;
+  axes_from_map << orbit.axes.right.transpose(), orbit.axes.ahead.transpose(), orbit.axes.up.transpose();
   std::vector<Eigen::Vector3d> places;
   for (const engine::MapPoint& point : map.points) {
-    if (!point.infinite()) places.push_back(point.position());
+    if (!point.infinite()) places.emplace_back(axes_from_map * point.position());
   }
-  Eigen::Vector3d low, high;
+  Eigen::Vector3d low = Eigen::Vector3d::Zero(), high = Eigen::Vector3d::Zero();
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const Eigen::Vector3d& place : places) values.push_back(place[axis]);
     low[axis] = Quantile(values, 0.05);
     high[axis] = Quantile(values, 0.95);
-    for (const engine::KeyFrame& keyframe : map.keyframes) {
-      const double at = keyframe.camera_from_map.OriginInSource()[axis];
-      low[axis] = places.empty() ? at : std::min(low[axis], at);
-      high[axis] = places.empty() ? at : std::max(high[axis], at);
-    }
   }
-  Orbit orbit;
-  orbit.target = 0.5 * (low + high);
-  const double radius = 0.5 * (high - low).norm();
+  Eigen::AlignedBox3d box;
+  if (!places.empty()) box.extend(low).extend(high);
+  for (const engine::KeyFrame& keyframe : map.keyframes)
+    box.extend(axes_from_map * keyframe.camera_from_map.OriginInSource());
+  if (box.isEmpty()) box.extend(Eigen::Vector3d::Zero().eval());
+  orbit.target = axes_from_map.transpose() * box.center();
+  const double radius = 0.5 * box.diagonal().norm();
   const double tangent = kHalfViewHeight * std::min(1.0, width_over_height);
   orbit.distance_m = radius > 0 ? 1.1 * radius * std::hypot(1.0, 1.0 / tangent) : 1.0;
   return orbit;
@@ -218,7 +225,7 @@ void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, 
   impl_->below.Begin(width_px, height_px);
   Drawing drawing(impl_->camera, camera_from_map, &impl_->below);
   drawing.Grid(orbit, grid);
-  for (const PredictedRecall& found : predicted_recall) drawing.Wedge(found);
+  for (const PredictedRecall& found : predicted_recall) drawing.Wedge(orbit, found);
   drawing.Points(map);
   DrawKeyFrames(map, impl_->camera, camera_from_map, &impl_->below);
   impl_->below.End();

@@ -10,25 +10,27 @@
 #include "content/scene.h"
 #include "engine/geometry/rigid3.h"
 #include "engine/map/map_snapshot.h"
+#include "engine/map/upright_axes.h"
 #include "ui/canvas.h"
 
 namespace docent::ui {
 
 // A viewpoint that circles around a target point of the map and always faces it.
 struct Orbit {
+  engine::UprightAxes axes;                          // The horizontal plane of the map.
   Eigen::Vector3d target = Eigen::Vector3d::Zero();  // Map coordinates.
   double distance_m = 1.0;                           // In map units.
-  // Radians about the map's up axis. At 0 the viewpoint lies on the side from which the map's first camera
-  // looks.
+  // Radians about the up axis, clockwise seen from above. At 0 the viewpoint lies on the side from which the
+  // map's first camera looks.
   double azimuth = 0.0;
   double elevation = 1.2;  // Radians above the horizontal plane, at most pi / 2 (from straight above).
 };
 
-// The pose of the viewing camera for an orbit. The map's up axis is -y, as everywhere in Docent.
+// The pose of the viewing camera for an orbit.
 engine::Rigid3 CameraFromMap(const Orbit& orbit);
 
-// An orbit that shows the whole map (all keyframes and the central nine tenths of the points along each axis)
-// from above, in an image of this aspect ratio.
+// An orbit that shows the whole map (all keyframes and the central nine tenths of the points along each of
+// the upright axes) from above, in an image of this aspect ratio.
 Orbit OrbitAbove(const engine::MapSnapshot& map, double width_over_height = 4.0 / 3.0);
 
 // The text below the title: the size of the map and the spacing of the grid. The spacing is in map units,

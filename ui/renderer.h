@@ -28,13 +28,14 @@ struct Overlay {
 
 // All inputs of one output image. The video, pose and content always belong to the same frame.
 struct View {
-  const engine::TrackedFrame* tracked = nullptr;
-  const engine::CameraModel* camera = nullptr;
-  const content::Scene* scene = nullptr;  // Null when there is no content.
-  double animation_seconds = 0;
-  Overlay overlay;
+  const engine::TrackedFrame* tracked = nullptr;  // Image, pose and map; null: a dark background.
+  const engine::CameraModel* camera = nullptr;    // The lens of the image; null: no content is drawn.
+  const content::Scene* scene = nullptr;          // Null when there is no content.
+  double animation_seconds = 0;                   // Time of the animations of the models, which repeat.
+  Overlay overlay;                                // What is drawn on top.
 };
 
+// Quality against speed.
 struct RendererOptions {
   int samples = 4;  // Multisampling of the content, per pixel; 1 disables anti-aliasing and is fastest.
   int max_texture_px = 2048;  // Largest side of a model's textures on the graphics card, in pixels.

@@ -19,6 +19,7 @@ engine::CameraModel ParseCalibration(const std::string& text, const std::string&
 
 // Writes Docent's own YAML, from which ReadCalibration restores an equal model. Throws Error.
 void WriteCalibration(const std::filesystem::path& path, const engine::CameraModel& camera);
+// The text that WriteCalibration writes.
 std::string FormatCalibration(const engine::CameraModel& camera);
 
 // Finds the calibration in a sequence folder: calibration.yaml, camera.yaml, camera_info.yaml, or the

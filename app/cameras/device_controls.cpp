@@ -17,21 +17,17 @@ constexpr std::uint32_t kMaxControls = 256;
 // An automatic control: its identifier, its value for manual mode, and the controls that it sets
 // automatically.
 struct AutomaticControl {
-  const char* name;
   std::uint32_t id;
   std::int64_t manual;
   std::array<std::uint32_t, 2> governed;  // 0: none.
 };
 constexpr std::array<AutomaticControl, 5> kAutomaticControls = {{
     // The first one allows the device to lower the frame rate for a longer exposure.
-    {"frame rate", V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0, {0, 0}},
-    {"exposure",
-     V4L2_CID_EXPOSURE_AUTO,
-     V4L2_EXPOSURE_MANUAL,
-     {V4L2_CID_EXPOSURE_ABSOLUTE, V4L2_CID_EXPOSURE}},
-    {"gain", V4L2_CID_AUTOGAIN, 0, {V4L2_CID_GAIN, 0}},
-    {"white balance", V4L2_CID_AUTO_WHITE_BALANCE, 0, {V4L2_CID_WHITE_BALANCE_TEMPERATURE, 0}},
-    {"focus", V4L2_CID_FOCUS_AUTO, 0, {V4L2_CID_FOCUS_ABSOLUTE, 0}},
+    {V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0, {0, 0}},
+    {V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL, {V4L2_CID_EXPOSURE_ABSOLUTE, V4L2_CID_EXPOSURE}},
+    {V4L2_CID_AUTOGAIN, 0, {V4L2_CID_GAIN, 0}},
+    {V4L2_CID_AUTO_WHITE_BALANCE, 0, {V4L2_CID_WHITE_BALANCE_TEMPERATURE, 0}},
+    {V4L2_CID_FOCUS_AUTO, 0, {V4L2_CID_FOCUS_ABSOLUTE, 0}},
 }};
 
 std::string FromDriver(std::span<const std::uint8_t> text) {
@@ -71,12 +67,6 @@ bool WriteControl(DeviceSystem* system, int file, std::uint32_t id, std::int64_t
   return system->Control(file, VIDIOC_S_CTRL, &control) >= 0;
 }
 
-std::string LockedControls::Words() const {
-  std::string words;
-  for (const std::string& name : names) words += (words.empty() ? "" : ", ") + name;
-  return words;
-}
-
 LockedControls LockControls(DeviceSystem* system, int file) {
   LockedControls locked;
   for (const AutomaticControl& automatic : kAutomaticControls) {
@@ -88,7 +78,6 @@ LockedControls LockControls(DeviceSystem* system, int file) {
     }
     if (!WriteControl(system, file, automatic.id, automatic.manual)) continue;
     locked.changes.push_back({automatic.id, *before});
-    locked.names.emplace_back(automatic.name);
     // Some devices return to the last manual values, so the values found automatically are written again.
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (found[i]) WriteControl(system, file, automatic.governed[i], *found[i]);

@@ -31,10 +31,6 @@ struct LockedControls {
     std::int64_t before;
   };
   std::vector<Change> changes;
-  std::vector<std::string> names;  // "exposure", "white balance" …, for messages.
-
-  // The names as one text, for instance "exposure, gain"; may be empty.
-  std::string Words() const;
 };
 
 // Switches automatic exposure, gain, white balance and focus to manual with their present values. Controls

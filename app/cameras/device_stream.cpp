@@ -5,8 +5,8 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <limits>
+#include <system_error>
 
 #include "app/cameras/device_image.h"
 #include "app/cameras/device_source.h"
@@ -41,7 +41,7 @@ void DeviceStream::Fail(const std::string& what, int error) const {
     throw DeviceGone("The camera " + path_ + " was unplugged or stopped answering.");
   }
   if (error == EBUSY) throw Error("The camera " + path_ + " is in use by another program.");
-  throw Error("The camera " + path_ + " " + what + ": " + std::strerror(error) + ".");
+  throw Error("The camera " + path_ + " " + what + ": " + std::generic_category().message(error) + ".");
 }
 
 void DeviceStream::Open() {

@@ -11,7 +11,7 @@
 
 #include "app/cameras/head.h"
 #include "engine/geometry/camera_model.h"
-#include "engine/tracking/tracked_frame.h"
+#include "engine/vision/frame.h"
 
 // Sources of images: OpenCamera parses the value of `--camera` and returns one interface for devices, videos,
 // image folders and the simulator. One thread at a time may use a source; CalibratedCamera owns it.
@@ -19,10 +19,10 @@ namespace docent::app {
 
 // Properties of a source that are known before its first image.
 struct SourceInfo {
-  std::string name;   // Name of the folder or file, for messages and reports.
-  bool live = false;  // A device, which delivers images at its own rate without end.
-  std::optional<std::uint64_t> frame_count;
-  double nominal_fps = 30;                                 // Images per second, positive.
+  std::string name;                          // Name of the folder or file, for messages and reports.
+  bool live = false;                         // A device, which delivers images at its own rate without end.
+  std::optional<std::uint64_t> frame_count;  // Empty if it is unknown or has no end.
+  double nominal_fps = 30;                   // Images per second, positive.
   std::optional<std::filesystem::path> calibration_path;   // Found in the folder.
   std::optional<engine::CameraModel> known_camera;         // For sources that need no calibration file.
   std::optional<std::filesystem::path> ground_truth_path;  // groundtruth.txt in the folder.
@@ -31,14 +31,15 @@ struct SourceInfo {
 
 // Statistics of a live source: how many images it has delivered, and how others were lost.
 struct Delivery {
-  std::uint64_t delivered = 0;
-  std::uint64_t missed = 0;  // Gaps in the device's sequence numbers: it had no free buffer.
-  std::uint64_t late = 0;    // Replaced by a newer image before they were fetched.
-  std::uint64_t broken = 0;  // Could not be decoded.
-  int reconnections = 0;
-  Timestamp median_latency{};  // From capture to delivery, over the last 128 images.
+  std::uint64_t delivered = 0;  // Images that were returned.
+  std::uint64_t missed = 0;     // Gaps in the device's sequence numbers: it had no free buffer.
+  std::uint64_t late = 0;       // Replaced by a newer image before they were fetched.
+  std::uint64_t broken = 0;     // Could not be decoded.
+  int reconnections = 0;        // How often a device that was unplugged came back.
+  Timestamp median_latency{};   // From capture to delivery, over the last 128 images.
 };
 
+// Images in the order of their times. Recordings deliver all their images; devices the newest one.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
@@ -58,16 +59,19 @@ class FrameSource {
 
   // One sentence for the user while there are no images; empty otherwise.
   virtual std::string trouble() const { return {}; }
+  // Statistics of a device; zero for other sources.
   virtual Delivery delivery() const { return {}; }
 
+  // What is known of the source; does not change.
   const SourceInfo& info() const { return info_; }
 
   // The pan-tilt head of the camera; null without one.
   virtual Head* head() const { return head_.get(); }
+  // Gives the camera a pan-tilt head.
   void SetHead(std::unique_ptr<Head> head) { head_ = std::move(head); }
 
  protected:
-  SourceInfo info_;
+  SourceInfo info_;  // Filled in by the constructor of the source.
 
  private:
   std::unique_ptr<Head> head_;
@@ -75,11 +79,12 @@ class FrameSource {
 
 // Requested image format of a device; zero leaves the choice to the device.
 struct DeviceFormat {
-  int width_px = 0, height_px = 0;
-  double fps = 0;
-  std::uint32_t pixel_format = 0;  // V4L2 FourCC.
+  int width_px = 0, height_px = 0;  // Of the image.
+  double fps = 0;                   // Images per second.
+  std::uint32_t pixel_format = 0;   // V4L2 FourCC.
 };
 
+// How a source is opened. Fields for other kinds of sources are ignored.
 struct CameraOptions {
   DeviceFormat device_format;                      // Devices only.
   std::chrono::milliseconds device_timeout{2000};  // Devices only: maximum wait for one image.

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "app/simulator/simulated_head.h"
+#include "app/cameras/simulated_head.h"
 
 namespace docent::app {
 

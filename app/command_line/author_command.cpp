@@ -5,7 +5,6 @@
 
 #include "app/command_line/program.h"
 #include "app/command_line/run_arguments.h"
-#include "app/files/text_file.h"
 
 namespace docent::app {
 
@@ -20,7 +19,10 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
       ->add_option("--library", options->library,
                    "The library's file, NAME.docent; created if it does not exist")
       ->required();
-  AddRunArguments(command, &options->run);
+  AddRunArguments(command,
+                  "estimate the calibration while maps are built, and store it in the library under the "
+                  "camera's name",
+                  &options->run);
   command->add_option("--script", options->script, "Run the commands in this script file")->type_name("FILE");
   command->add_option("--record-script", options->record_script, "Record all commands as a script file")
       ->type_name("FILE");
@@ -29,17 +31,8 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
                    "Initialize new maps from this printed image, so that they are in metres; needs "
                    "--target-width")
       ->type_name("IMAGE");
-  command
-      ->add_option_function<std::string>(
-          "--target-width",
-          [options](const std::string& text) {
-            const auto metres = ParseNumber(text);
-            if (!metres || *metres <= 0)
-              throw CLI::ValidationError("--target-width", "'" + text + "' is not a length in metres");
-            options->target_width_m = *metres;
-          },
-          "Width of the printed target")
-      ->type_name("METRES");
+  AddMetresOption(command, "--target-width", kMinLength_m, &options->target_width_m,
+                  "Width of the printed target");
   AddSecondsOption(command, "--autosave", &options->autosave_interval,
                    "Time between automatic saves; 0: save only when a map is left and at the end "
                    "(default 10)");

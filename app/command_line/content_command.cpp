@@ -1,15 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
 #include <set>
 
 #include "app/command_line/program.h"
+#include "app/files/text_file.h"
+#include "app/session/session.h"
+#include "content/asset.h"
+#include "content/edits.h"
+#include "content/placement.h"
 #include "content/scene_codec.h"
 #include "engine/base/error.h"
-#include "maps/library.h"
+#include "engine/map/upright_axes.h"
+#include "maps/library/library.h"
 
 namespace docent::app {
 
@@ -18,9 +28,15 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct ContentOptions {
-  std::filesystem::path library;
+  std::filesystem::path library, file;
   std::string map, name;
   bool as_json = false;
+  // Of `add`; see its help for units and frames.
+  std::string text, to_map;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double scale = 1, yaw_deg = 0;
+  std::optional<Eigen::Quaterniond> rotation;
+  double height = 0;  // 0: chosen by the size of what the map shows
 };
 
 // Decodes the scene with the names of its assets only, because listing and removing need no meshes.
@@ -39,6 +55,10 @@ content::Scene DecodeNames(const maps::SceneRecord& record, const std::string& w
 
 std::string Where(const maps::Library& library, const maps::MapInfo& map) {
   return library.file() + ", map '" + map.name + "'";
+}
+
+content::Scene StoredNames(const maps::Library& library, const maps::MapInfo& map) {
+  return DecodeNames(library.LoadScene(map.key), Where(library, map));
 }
 
 Json ToJson(const maps::MapInfo& map, const content::Entity& entity) {
@@ -69,7 +89,7 @@ void List(const ContentOptions& options) {
   }
   Json entries = Json::array();
   for (const maps::MapInfo& map : infos) {
-    const content::Scene scene = DecodeNames(library.LoadScene(map.key), Where(library, map));
+    const content::Scene scene = StoredNames(library, map);
     for (const content::Entity& entity : scene.entities) entries.push_back(ToJson(map, entity));
   }
   if (options.as_json) {
@@ -86,36 +106,174 @@ void List(const ContentOptions& options) {
   }
 }
 
-void Remove(const ContentOptions& options) {
-  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
-  const maps::MapInfo map = library.FindByName(options.map);
-  const maps::SceneRecord stored = library.LoadScene(map.key);
-  content::Scene scene = DecodeNames(stored, Where(library, map));
-  const std::size_t removed = std::erase_if(
-      scene.entities, [&](const content::Entity& entity) { return entity.name == options.name; });
-  if (removed == 0)
-    throw Error(Where(library, map) + " has no model or signpost named '" + options.name + "'.");
-
+// Applies an edit to the stored scene of a map. `added` is the asset of a model that the edit adds, else
+// null. Throws Error, and changes nothing, when the edit does not fit, or the policy of the map forbids it.
+void EditStoredScene(maps::Library* library, const maps::MapInfo& map, content::Edit* edit,
+                     const std::shared_ptr<const content::Asset>& added) {
+  const maps::SceneRecord stored = library->LoadScene(map.key);
+  content::Scene scene = DecodeNames(stored, Where(*library, map));
+  try {
+    content::ApplyChecked(edit, &scene);
+  } catch (const Error& error) {
+    throw Error(Where(*library, map) + ": " + error.what());
+  }
   auto changed = std::make_shared<maps::SceneRecord>();
   changed->text = content::EncodeScene(scene);
   const std::vector<std::string> ids = content::SceneAssetIds(changed->text);
   const std::set<std::string> used(ids.begin(), ids.end());
+  std::set<std::string> kept;
   for (const maps::AssetRecord& asset : stored.assets) {
-    if (used.contains(asset.id)) changed->assets.push_back(asset);
+    if (used.contains(asset.id) && kept.insert(asset.id).second) changed->assets.push_back(asset);
   }
+  if (added && kept.insert(added->id).second)
+    changed->assets.push_back({added->id, added->name, {added, &added->glb}});
   maps::MapRecord record;
   record.key = map.key;
   record.name = map.name;
   record.policy = map.policy;
   record.scene = std::move(changed);
-  library.Save(record);
+  library->Save(record);
+}
+
+// A pose that stands upright and faces the place of the first keyframe's camera, unless a rotation is given.
+content::Entity NewModel(const ContentOptions& options, const engine::UprightAxes& axes,
+                         const content::Scene& scene) {
+  content::Entity entity;
+  entity.kind = content::Entity::Kind::kModel;
+  entity.model.asset = std::make_shared<content::Asset>(content::ImportAsset(options.file));
+  entity.name = options.name.empty() ? scene.FreeName(content::NameFromFile(options.file)) : options.name;
+  engine::Sim3& pose = entity.model.map_from_model;
+  pose = content::UprightPose(options.position, -axes.ahead, axes.up,
+                              options.yaw_deg * std::numbers::pi / 180, options.scale);
+  if (options.rotation) pose.rotation = engine::Rotation3(*options.rotation);
+  return entity;
+}
+
+// Without a height, the signpost is as high as one that is placed by a click at the median distance of what
+// the first keyframe shows.
+content::Entity NewSignpost(const ContentOptions& options, const engine::MapSnapshot& map,
+                            const content::Scene& scene) {
+  content::Entity entity;
+  entity.name = options.name.empty() ? scene.FreeSignpostName() : options.name;
+  entity.signpost.text = options.text;
+  entity.signpost.anchor = options.position;
+  entity.signpost.up = engine::UpInMap(map);
+  entity.signpost.to_map = options.to_map;
+  const double distance = map.keyframes.empty() ? 1 : map.keyframes.front().mean_depth;
+  entity.signpost.height_m =
+      options.height > 0 ? options.height : SessionOptions().signpost_height * distance;
+  return entity;
+}
+
+void Add(const ContentOptions& options, Verbosity verbosity) {
+  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
+  const maps::MapInfo map = library.FindByName(options.map);
+  if (!options.to_map.empty()) (void)library.FindByName(options.to_map);  // Throws if there is none.
+  const auto snapshot = library.Load(map.key).snapshot;
+  const content::Scene scene = StoredNames(library, map);
+  const content::Entity entity = options.file.empty()
+                                     ? NewSignpost(options, *snapshot, scene)
+                                     : NewModel(options, engine::UprightAxesOf(*snapshot), scene);
+  EditStoredScene(&library, map, content::AddEdit(entity).get(), entity.model.asset);
+  if (verbosity != Verbosity::kQuiet) std::printf("%s\n", entity.name.c_str());
+}
+
+void Remove(const ContentOptions& options) {
+  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
+  EditStoredScene(&library, library.FindByName(options.map), content::RemoveEdit(options.name).get(),
+                  nullptr);
+}
+
+// An option with `count` numbers between `least` and `most`.
+CLI::Option* AddNumbers(CLI::App* command, const std::string& option, int count, double least, double most,
+                        const std::function<void(const std::vector<double>&)>& take,
+                        const std::string& description) {
+  return command
+      ->add_option_function<std::vector<std::string>>(
+          option,
+          [=](const std::vector<std::string>& words) {
+            std::vector<double> numbers;
+            for (const std::string& word : words) {
+              const auto number = ParseNumber(word);
+              if (!number || *number < least || *number > most) {
+                throw CLI::ValidationError(option, "'" + word + "' is not a number between " +
+                                                       FormatNumber(least) + " and " + FormatNumber(most));
+              }
+              numbers.push_back(*number);
+            }
+            take(numbers);
+          },
+          description)
+      ->expected(count);
+}
+
+void AddAddCommand(CLI::App* group, Invocation* invocation, const std::shared_ptr<ContentOptions>& options) {
+  CLI::App* add = AddSubcommand(
+      group, "add", "Add a model or a signpost to a saved map",
+      "docent content add fox.glb --map \"Desk 3\" --at 0.2 0.1 1.5 --scale 0.1 --library museum.docent\n"
+      "  docent content add --signpost \"To the foxes\" --to \"Desk 4\" --map \"Desk 3\" --at 0 0 2 "
+      "--library museum.docent");
+  add->alias("import");
+  CLI::Option* file =
+      add->add_option("FILE", options->file, "Model file: glTF, GLB, or a format that is converted");
+  CLI::Option* text = add->add_option("--signpost", options->text, "Add a signpost with this text instead")
+                          ->type_name("TEXT")
+                          ->excludes(file);
+  add->add_option("--map", options->map, "The map that it is added to")->required();
+  add->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+  AddNumbers(
+      add, "--at", 3, -content::kMaxCoordinate, content::kMaxCoordinate,
+      [=](const auto& n) {
+        options->position = {n[0], n[1], n[2]};
+      },
+      "Position of its foot along the map's axes, in map units")
+      ->type_name("X Y Z")
+      ->required();
+  add->add_option("--name", options->name, "Its name; by default made from the file, or sign-1, sign-2, ...");
+  AddNumbers(
+      add, "--scale", 1, content::kMinModelScale, content::kMaxModelScale,
+      [=](const auto& n) { options->scale = n[0]; }, "Map units per metre of the model (default 1)")
+      ->type_name("S")
+      ->excludes(text);
+  CLI::Option* yaw = AddNumbers(
+                         add, "--yaw", 1, -content::kMaxAngle_deg, content::kMaxAngle_deg,
+                         [=](const auto& n) { options->yaw_deg = n[0]; },
+                         "Angle about the map's up direction, counter-clockwise seen from above; at 0 the "
+                         "model faces against the view of the map's first keyframe (default 0)")
+                         ->type_name("DEG")
+                         ->excludes(text);
+  AddNumbers(
+      add, "--rotation", 4, -1.001, 1.001,
+      [=](const auto& n) {
+        const Eigen::Quaterniond rotation(n[3], n[0], n[1], n[2]);
+        if (std::abs(rotation.norm() - 1) > 1e-3)
+          throw CLI::ValidationError("--rotation", "the quaternion does not have length 1");
+        options->rotation = rotation;
+      },
+      "Rotation from the model's axes to the map's as a quaternion, instead of upright")
+      ->type_name("X Y Z W")
+      ->excludes(text)
+      ->excludes(yaw);
+  AddNumbers(
+      add, "--height", 1, content::kMinBoardHeight, content::kMaxBoardHeight,
+      [=](const auto& n) { options->height = n[0]; }, "Height of the signpost's board in map units")
+      ->type_name("H")
+      ->excludes(file);
+  add->add_option("--to", options->to_map, "The map that the signpost leads to")
+      ->type_name("MAP")
+      ->excludes(file);
+  add->callback([=] {
+    if (options->file.empty() && options->text.empty()) throw CLI::RequiredError("FILE or --signpost TEXT");
+    invocation->run = [=] { Add(*options, invocation->verbosity); };
+  });
 }
 
 }  // namespace
 
 void AddContentCommand(CLI::App* program, Invocation* invocation) {
-  CLI::App* group = AddSubcommand(program, "content", "List or remove the models and signposts in the maps",
-                                  "docent content list --library museum.docent");
+  CLI::App* group =
+      AddSubcommand(program, "content", "List, add or remove the models and signposts in the maps",
+                    "docent content list --library museum.docent");
   group->require_subcommand(1);
   const auto options = std::make_shared<ContentOptions>();
 
@@ -125,6 +283,8 @@ void AddContentCommand(CLI::App* program, Invocation* invocation) {
   list->add_option("--map", options->map, "Only the content of this map");
   list->add_flag("--json", options->as_json, "Print JSON");
   list->callback([=] { invocation->run = [=] { List(*options); }; });
+
+  AddAddCommand(group, invocation, options);
 
   CLI::App* remove = AddSubcommand(group, "remove", "Remove a model or a signpost",
                                    "docent content remove helmet --map \"Desk 3\" --library museum.docent");

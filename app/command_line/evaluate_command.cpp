@@ -41,18 +41,10 @@ void AddDistributionOptions(CLI::App* command, EvaluateOptions* options) {
       "within the sequence, so that all have the same length");
   AddSecondsOption(command, "--window", &options->window,
                    "Length of each run (0: to the end of the sequence)");
-  command
-      ->add_option_function<std::string>(
-          "--truth-noise",
-          [options](const std::string& text) {
-            const auto metres = ParseNumber(text);
-            if (!metres || *metres < 0)
-              throw CLI::ValidationError("--truth-noise", "'" + text + "' is not a length in metres");
-            options->truth_noise_m = *metres;
-          },
-          "Standard deviation of the ground-truth positions of recorded sequences, used to detect false "
-          "initializations (default 0.01)")
-      ->type_name("METRES");
+  AddMetresOption(
+      command, "--truth-noise", 0, &options->truth_noise_m,
+      "Standard deviation of the ground-truth positions of recorded sequences, used to detect false "
+      "initializations (default 0.01)");
   AddCountOption(command, "--jobs", &options->jobs, kMostJobs,
                  "Number of runs in parallel; only with --pace lockstep");
 }

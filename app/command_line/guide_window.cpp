@@ -7,8 +7,6 @@
 
 #include "app/command_line/interruption.h"
 #include "app/command_line/map_panel.h"
-#include "app/script/script_file.h"
-#include "engine/base/error.h"
 #include "ui/authoring_panel.h"
 #include "ui/inset.h"
 #include "ui/letterbox.h"
@@ -50,7 +48,7 @@ bool FrameSlot::closed() const {
 namespace {
 
 // The window, its renderers and the handling of keyboard and mouse input.
-class GuideWindow {
+class GuideWindow final : public ui::AuthoringActions {
  public:
   GuideWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras,
               std::span<CommandInbox> inboxes, const std::function<void(const ShownFrame&)>& drawn)
@@ -61,9 +59,7 @@ class GuideWindow {
         window_(request.title, cameras.front().model->width_px(), cameras.front().model->height_px()),
         shown_(cameras.size()) {
     if (request.record) recorder_.emplace(*request.record, cameras.front().source->info().nominal_fps);
-    if (request.may_write)
-      panel_.emplace(
-          &window_, [this](const std::string& line) { Emit(line); }, Models());
+    if (request.may_write) panel_.emplace(&window_, this, Models());
   }
 
   // Handles the input and draws the frames. Returns false when the window was closed.
@@ -132,7 +128,6 @@ class GuideWindow {
       map_names_.erase("");
       panel_->SetMapNames({map_names_.begin(), map_names_.end()});
     }
-    if (!command_error_.empty()) view.overlay.message = command_error_;
     renderer_.Draw(view);
     if (!recorder_ && !request_.on_image) return;
     renderer_.ReadBack(&image_);
@@ -145,19 +140,25 @@ class GuideWindow {
     if (request_.on_image) request_.on_image(*large(), image_);
   }
 
-  // Parses a line of the script language and queues it as a command for the frame on the screen.
-  void Emit(const std::string& line) {
-    command_error_.clear();
-    try {
-      for (const TimedCommand& command : ParseScript("0 " + line, "window")) {
-        const auto frame = large() ? std::shared_ptr<const engine::TrackedFrame>(large(), &large()->tracked)
-                                   : std::shared_ptr<const engine::TrackedFrame>();
-        inboxes_[large_].Push({command.command, frame});
-      }
-    } catch (const Error& error) {
-      command_error_ = error.what();
-    }
+  // Queues a command for the frame on the screen.
+  void Emit(Command command) {
+    const auto frame = large() ? std::shared_ptr<const engine::TrackedFrame>(large(), &large()->tracked)
+                               : std::shared_ptr<const engine::TrackedFrame>();
+    inboxes_[large_].Push({std::move(command), frame});
   }
+  void NewMap(const std::string& name) override { Emit(app::NewMap{name}); }
+  void StopMap() override { Emit(app::StopMap{}); }
+  void PlaceModel(const std::string& file, const Eigen::Vector2d& pixel, double scale,
+                  double yaw_deg) override {
+    Emit(app::PlaceModel{file, pixel, scale, yaw_deg});
+  }
+  void PlaceSignpost(const std::string& text, const Eigen::Vector2d& pixel,
+                     const std::string& to_map) override {
+    Emit(app::PlaceSignpost{text, pixel, to_map});
+  }
+  void Undo() override { Emit(app::Undo{}); }
+  void Redo() override { Emit(app::Redo{}); }
+  void Save() override { Emit(app::Save{}); }
 
   void HandleEvents() {
     using Kind = ui::InputEvent::Kind;
@@ -172,9 +173,9 @@ class GuideWindow {
   void HandleKey(const ui::InputEvent& event) {
     if (event.control) {
       if (!request_.may_write) return;
-      if (event.key == "z") Emit("undo");
-      if (event.key == "y") Emit("redo");
-      if (event.key == "s") Emit("save");
+      if (event.key == "z") Undo();
+      if (event.key == "y") Redo();
+      if (event.key == "s") Save();
       return;
     }
     if (event.key == "tab") Swap();
@@ -218,7 +219,6 @@ class GuideWindow {
   std::size_t large_ = 0;                                 // Index of the camera that is shown large.
   std::optional<std::uint64_t> recorded_;
   std::set<std::string> map_names_;
-  std::string command_error_;
   cv::Mat image_;
   bool points_ = false, keyframes_ = false, hud_ = true, shows_map_ = false, closing_ = false;
 };

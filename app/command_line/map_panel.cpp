@@ -3,8 +3,7 @@
 
 #include <utility>
 
-#include "app/session/surface_at_pixel.h"
-#include "maps/relocalization_check.h"
+#include "maps/maintenance/relocalization_check.h"
 
 namespace docent::app {
 
@@ -13,7 +12,7 @@ std::vector<ui::PredictedRecall> PredictRecall(const engine::MapSnapshot& map, c
       maps::LeaveEachKeyFrameOut(map, {}, [&](std::size_t) { return !stop.stop_requested(); });
   std::vector<ui::PredictedRecall> found;
   if (trials.empty()) return found;
-  const maps::RelocalizationGrid grid = maps::MakeRelocalizationGrid(map, trials, UpInMap(map));
+  const maps::RelocalizationGrid grid = maps::MakeRelocalizationGrid(map, trials);
   for (const maps::RelocalizationCell& cell : grid.cells)
     found.push_back({cell.place, cell.view, grid.side, static_cast<double>(cell.found) / cell.trials});
   return found;

@@ -14,9 +14,9 @@
 namespace docent::app {
 
 // Predicts where a lost camera can be relocalized: leaves each keyframe out in turn, tries to relocalize it,
-// and collects the results in grid cells; see maps/relocalization_check.h. Each keyframe needs one search, so
-// a map takes a second or more. After a request through `stop`, only the keyframes tried so far are counted.
-// The keyframes must have their features in memory.
+// and collects the results in grid cells; see maps/maintenance/relocalization_check.h. Each keyframe needs
+// one search, so a map takes a second or more. After a request through `stop`, only the keyframes tried so
+// far are counted. The keyframes must have their features in memory.
 std::vector<ui::PredictedRecall> PredictRecall(const engine::MapSnapshot& map,
                                                const std::stop_token& stop = {});
 

@@ -10,10 +10,9 @@
 #include "app/command_line/maps_exchange_command.h"
 #include "app/command_line/program.h"
 #include "app/command_line/progress.h"
-#include "app/session/surface_at_pixel.h"
 #include "engine/base/error.h"
-#include "maps/library.h"
-#include "maps/relocalization_check.h"
+#include "maps/library/library.h"
+#include "maps/maintenance/relocalization_check.h"
 
 namespace docent::app {
 
@@ -98,7 +97,7 @@ Json DescribeRelocalization(const engine::MapSnapshot& map, Verbosity verbosity)
     if (trial.result != Result::kFound) json["missed_keyframes"].push_back(trial.keyframe);
   }
   if (trials.empty()) return json;
-  const auto grid = maps::MakeRelocalizationGrid(map, trials, UpInMap(map));
+  const auto grid = maps::MakeRelocalizationGrid(map, trials);
   json["square_m"] = grid.side;
   json["grid"] = Json::array();
   for (const maps::RelocalizationCell& cell : grid.cells) {

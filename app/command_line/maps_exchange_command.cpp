@@ -13,18 +13,18 @@
 #include "app/command_line/interruption.h"
 #include "app/command_line/progress.h"
 #include "app/files/checked_file.h"
+#include "app/output/engine_text.h"
 #include "app/session/content_follower.h"
 #include "app/session/joined_scenes.h"
 #include "app/session/library_scene.h"
-#include "app/session/surface_at_pixel.h"
 #include "engine/base/error.h"
 #include "engine/base/worker.h"
-#include "maps/colmap_model.h"
-#include "maps/exchange.h"
-#include "maps/joining.h"
-#include "maps/maintenance.h"
-#include "maps/recovery.h"
-#include "maps/view_from_above.h"
+#include "maps/exchange/colmap_model.h"
+#include "maps/exchange/exchange.h"
+#include "maps/exchange/view_from_above.h"
+#include "maps/maintenance/joining.h"
+#include "maps/maintenance/maintenance.h"
+#include "maps/maintenance/recovery.h"
 
 namespace docent::app {
 
@@ -96,10 +96,7 @@ void Export(const ExchangeOptions& options, Verbosity verbosity) {
     const auto map = library.Load(key).snapshot;
     left_out = OmittedPointsNote(*map);
     if (kind == ".ply") WriteText(options.output, maps::MakePly(*map));
-    if (kind == ".png") {
-      const Eigen::Vector3d up = map->keyframes.empty() ? -Eigen::Vector3d::UnitY().eval() : UpInMap(*map);
-      WritePng(options.output, maps::DrawFromAbove(*map, up));
-    }
+    if (kind == ".png") WritePng(options.output, maps::DrawFromAbove(*map));
     if (kind.empty()) WriteColmap(options.output, *map);
   }
   if (verbosity != Verbosity::kQuiet)
@@ -208,11 +205,14 @@ void Join(const ExchangeOptions& options, Verbosity verbosity) {
   const InterruptFlag interrupt;
   const maps::JoinResult result =
       maps::JoinMaps(&library, into, from, LibrarySceneJoiner(options.library), interrupt.get());
-  if (Interruption::requested() && !result.refusal.empty()) throw Error("Interrupted; nothing was changed.");
-  if (verbosity == Verbosity::kVerbose) std::printf("%s\n", result.overlap.Brief().c_str());
-  if (!result.refusal.empty()) {
+  if (Interruption::requested() && !result.Joined()) throw Error("Interrupted; nothing was changed.");
+  if (verbosity == Verbosity::kVerbose) std::printf("%s\n", TextOf(result.overlap).c_str());
+  if (!result.Joined()) {
+    const std::string reason = result.changed_meanwhile
+                                   ? "one of them was changed by another program in the meantime"
+                                   : TextOf(result.refusal, result.overlap);
     throw Error("'" + options.name + "' and '" + options.other_name + "' cannot be joined, because " +
-                result.refusal);
+                reason);
   }
   if (verbosity != Verbosity::kQuiet) {
     const maps::MapInfo joined = library.Find(into);

@@ -3,18 +3,6 @@
 
 namespace docent::app {
 
-const char* ToString(Pace pace) {
-  switch (pace) {
-    case Pace::kLockstep:
-      return "lockstep";
-    case Pace::kEager:
-      return "eager";
-    case Pace::kRealtime:
-      return "realtime";
-  }
-  return "unknown";
-}
-
 const char* ToString(EngineKind engine) {
   return engine == EngineKind::kHybrid ? "hybrid" : "sixdof";
 }

@@ -9,6 +9,7 @@
 
 #include "app/cameras/frame_source.h"
 #include "app/session/head_control.h"
+#include "app/session/pace.h"
 #include "engine/base/time.h"
 #include "engine/geometry/camera_model.h"
 
@@ -18,11 +19,6 @@ namespace docent::app {
 
 enum class Verbosity { kQuiet, kNormal, kVerbose };
 
-enum class Pace {
-  kLockstep,  // Tracker and mapper alternate on one thread; results are byte-identical between runs.
-  kEager,     // Tracker and mapper run in parallel; no frame is dropped.
-  kRealtime,  // Tracker and mapper run in parallel; frames that are late by their timestamps are dropped.
-};
 enum class EngineKind {
   kHybrid,  // With panorama maps.
   kSixDof,  // Plain PTAM, without panorama maps.
@@ -32,7 +28,6 @@ enum class WhenLost {
   kNew,   // A new map is started after a short delay.
   kWait,  // The camera stays lost until it is relocalized in a known map.
 };
-const char* ToString(Pace pace);
 const char* ToString(EngineKind engine);
 
 struct CameraArguments {

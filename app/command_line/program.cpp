@@ -13,6 +13,7 @@
 
 #include "app/cameras/frame_source.h"
 #include "app/command_line/runs.h"
+#include "docent/version.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -105,7 +106,7 @@ int RunProgram(int argc, const char* const* argv) {
       "docent");
   program.footer("Example:\n  docent simulate room --output room\nEvery subcommand has its own --help.");
   program.require_subcommand(1);
-  program.set_version_flag("--version", "docent 0.1.0", "Print the version and exit");
+  program.set_version_flag("--version", std::string("docent ") + kVersion, "Print the version and exit");
   Invocation invocation;
   bool quiet = false, verbose = false;
   CLI::Option* quiet_option = program.add_flag("--quiet", quiet, "Print only errors");

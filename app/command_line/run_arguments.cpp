@@ -54,6 +54,24 @@ void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* t
       ->type_name("SECONDS");
 }
 
+void AddMetresOption(CLI::App* command, const std::string& option, double least, double* target,
+                     const std::string& description) {
+  constexpr double kMost_m = 1e4;
+  command
+      ->add_option_function<std::string>(
+          option,
+          [=](const std::string& text) {
+            const auto metres = ParseNumber(text);
+            if (!metres || *metres < least || *metres > kMost_m) {
+              throw CLI::ValidationError(option, "'" + text + "' is not a length in metres, from " +
+                                                     FormatNumber(least) + " to " + FormatNumber(kMost_m));
+            }
+            *target = *metres;
+          },
+          description)
+      ->type_name("METRES");
+}
+
 void AddPaceOption(CLI::App* command, std::optional<Pace>* pace) {
   AddChoice<Pace>(command, "--pace", pace,
                   "How images are processed: lockstep is reproducible, eager processes every image, realtime "
@@ -119,7 +137,7 @@ void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens) {
        {"kannala_brandt", LensModel::kKannalaBrandt}});
 }
 
-void AddRunArguments(CLI::App* command, RunArguments* run) {
+void AddRunArguments(CLI::App* command, const std::string& auto_calibration, RunArguments* run) {
   command
       ->add_option("--camera", run->cameras.sources,
                    "A device, a video file, a folder with an image sequence, or sim:SCENE[,OPTION=NUMBER...] "
@@ -129,9 +147,8 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
       ->allow_extra_args(false);
   command
       ->add_option("--calibration", run->cameras.calibrations,
-                   "Calibration file of each camera, in the same order; auto: estimate the calibration while "
-                   "maps are built, and store it in the library under the camera's name, as for a camera "
-                   "without a calibration file")
+                   "Calibration file of each camera, in the same order; auto, or no file for a camera: " +
+                       auto_calibration)
       ->type_name("FILE|auto")
       ->allow_extra_args(false);
   AddCameraFormatOption(command, &run->cameras.options);
@@ -143,22 +160,12 @@ void AddRunArguments(CLI::App* command, RunArguments* run) {
   AddEngineOption(command, &run->engine);
   AddSeedOption(command, &run->seed);
   AddMemoryOption(command, &run->memory_budget_bytes);
-  command
-      ->add_option_function<std::string>(
-          "--baseline",
-          [run](const std::string& text) {
-            const auto metres = ParseNumber(text);
-            if (!metres || *metres <= 0)
-              throw CLI::ValidationError("--baseline", "'" + text + "' is not a length in metres");
-            run->baseline_m = *metres;
-          },
-          "Distance between two cameras mounted rigidly together; sets the scale of their maps")
-      ->type_name("METRES");
+  AddMetresOption(command, "--baseline", kMinLength_m, &run->baseline_m,
+                  "Distance between two cameras mounted rigidly together; sets the scale of their maps");
   AddChoice<std::optional<HeadPolicy>>(
       command, "--head", &run->head,
       "Where a camera with a pan-tilt head looks: at the wearer's gaze, or so that the map stays in view; a "
-      "lost "
-      "camera searches for the map",
+      "lost camera searches for the map",
       {{"gaze", HeadPolicy::kFollowGaze}, {"map", HeadPolicy::kKeepMapInView}});
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");

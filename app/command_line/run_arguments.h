@@ -12,6 +12,8 @@ class App;
 // Options that several subcommands share, so that an option means the same everywhere.
 namespace docent::app {
 
+inline constexpr double kMinLength_m = 1e-6;  // of what a person measured
+
 void AddPaceOption(CLI::App* command, std::optional<Pace>* pace);
 void AddEngineOption(CLI::App* command, EngineKind* engine);
 // Adds --when-lost. `otherwise` is the default's name in the help text.
@@ -20,6 +22,9 @@ void AddSeedOption(CLI::App* command, std::uint64_t* seed);
 // Adds an option whose value is a number of seconds, 0 or more.
 void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* target,
                       const std::string& description);
+// Adds an option whose value is a length in metres, from `least` to 10 km.
+void AddMetresOption(CLI::App* command, const std::string& option, double least, double* target,
+                     const std::string& description);
 void AddMemoryOption(CLI::App* command, std::size_t* bytes);
 void AddCameraFormatOption(CLI::App* command, CameraOptions* options);
 // Adds --lens: auto, or the name of a lens model.
@@ -27,7 +32,8 @@ void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens);
 // Adds the options that all subcommands with tracking share: --camera, --calibration, --camera-format,
 // --from,
 // --until, --pace, --engine, --seed, --memory-budget, --baseline, --head, --headless, --output and --record.
-void AddRunArguments(CLI::App* command, RunArguments* run);
+// `auto_calibration` is the help on `--calibration auto`.
+void AddRunArguments(CLI::App* command, const std::string& auto_calibration, RunArguments* run);
 // Checks combinations of options after parsing: the number of cameras and calibrations, a baseline without a
 // second camera, and --until before --from. Throws CLI::ValidationError.
 void CheckRunArguments(const RunArguments& run);

@@ -8,7 +8,7 @@
 #include "app/command_line/runs.h"
 #include "app/script/script_file.h"
 #include "engine/base/error.h"
-#include "engine/mapping/planar_target.h"
+#include "engine/initialization/planar_target.h"
 
 namespace docent::app {
 

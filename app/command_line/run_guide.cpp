@@ -11,6 +11,7 @@
 #include "app/command_line/progress.h"
 #include "app/evaluation/camera_report.h"
 #include "app/files/text_file.h"
+#include "app/output/engine_text.h"
 #include "engine/base/error.h"
 #include "engine/base/worker.h"
 #include "ui/context.h"
@@ -173,7 +174,7 @@ class GuideRun {
       const std::string assumption =
           unknown ? "is not in this library, so a field of view of " +
                         FormatNumber(engine::kUnknownFieldOfView_deg, 3) + " degrees is assumed"
-                  : "is only a rough estimate, with a focal length of " + engine::FormatFocalLength(*lens);
+                  : "is only a rough estimate, with a focal length of " + FormatFocalLength(*lens);
       const std::string warning =
           "The calibration of camera \"" + lens->name + "\" " + assumption +
           ". Build a map with this camera, or give its calibration with --calibration FILE.";

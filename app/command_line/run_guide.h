@@ -14,7 +14,7 @@
 #include "app/session/calibrated_camera.h"
 #include "app/session/frame_loop.h"
 #include "app/session/guided_view.h"
-#include "maps/library.h"
+#include "maps/library/library.h"
 
 // Common part of authoring, touring and the demonstration: feeds one camera, or the two of a wearable,
 // through a session that uses a library, with or without a window. Commands of the script and the director

@@ -15,7 +15,10 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
                     "docent tour --library museum.docent --camera /dev/video0 --calibration camera.yaml");
   const auto options = std::make_shared<TourOptions>();
   command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
-  AddRunArguments(command, &options->run);
+  AddRunArguments(command,
+                  "take the calibration that the library has stored for a camera of this name; a tour builds "
+                  "no map and estimates none",
+                  &options->run);
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
     invocation->run = [=] { run(*options, invocation->verbosity); };

@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json Spread(const std::vector<double>& values) {
+Json Percentiles(const std::vector<double>& values) {
   if (values.empty()) return nullptr;
   return {{"median", Quantile(values, 0.5)}, {"p95", Quantile(values, 0.95)}, {"max", Quantile(values, 1)}};
 }
@@ -46,9 +46,9 @@ std::string FormatCameraReport(const std::vector<CameraTally>& cameras) {
          {"frames", camera.frames_},
          {"with_pose", camera.with_pose_},
          {"dropped", camera.dropped_},
-         {"tracking_ms", Spread(camera.tracking_ms_)},
+         {"tracking_ms", Percentiles(camera.tracking_ms_)},
          {"latency_ms",
-          {{"tracked", Spread(camera.tracked_ages_ms_)}, {"drawn", Spread(camera.drawn_ages_ms_)}}},
+          {{"tracked", Percentiles(camera.tracked_ages_ms_)}, {"drawn", Percentiles(camera.drawn_ages_ms_)}}},
          {"delivery", camera.delivery_ ? ToJson(*camera.delivery_) : Json(nullptr)}});
   }
   const Json json = {{"cameras", list}};

@@ -7,6 +7,8 @@
 #include <map>
 #include <numbers>
 
+#include "app/evaluation/mean_rotation.h"
+
 namespace docent::app {
 
 namespace {
@@ -40,19 +42,13 @@ class RootMeanSquare {
   std::size_t count_ = 0;
 };
 
-// The rotation truth_from_map that is nearest to all truth_from_camera * camera_from_map in the sum of
-// squared chords (Hartley et al., "Rotation Averaging", 2013, section 5.3).
-engine::Rotation3 AlignRotations(const std::vector<Pair>& pairs) {
-  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+// The rotation that maps the axes of the map to those of the truth.
+engine::Rotation3 TruthFromMapRotation(const std::vector<Pair>& pairs) {
+  std::vector<engine::Rotation3> rotations;
   for (const Pair& pair : pairs) {
-    sum += (pair.truth_from_camera.rotation * pair.map_from_camera.rotation.inverse()).matrix();
+    rotations.push_back(pair.truth_from_camera.rotation * pair.map_from_camera.rotation.inverse());
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
-  if (rotation.determinant() < 0) {
-    rotation = svd.matrixU() * Eigen::Vector3d(1, 1, -1).asDiagonal() * svd.matrixV().transpose();
-  }
-  return engine::Rotation3(rotation);
+  return MeanRotation(rotations);
 }
 
 // The true rotation from the first to the last frame and the error of the tracked one, in the first camera's
@@ -81,7 +77,7 @@ std::optional<double> ErrorAboutAxis(const RotationDrift& drift) {
 
 void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<FrameResult>* frames) {
   if (pairs.empty()) return;
-  const engine::Rotation3 truth_from_map_rotation = AlignRotations(pairs);
+  const engine::Rotation3 truth_from_map_rotation = TruthFromMapRotation(pairs);
   RootMeanSquare rotation_error;
   for (const Pair& pair : pairs) {
     const engine::Rotation3 aligned = truth_from_map_rotation * pair.map_from_camera.rotation;

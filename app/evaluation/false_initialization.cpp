@@ -5,42 +5,30 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/evaluation/mean_rotation.h"
 #include "engine/base/error.h"
+#include "engine/base/median.h"
 
 namespace docent::app {
 
 namespace {
 
 // A tracked pose and the true pose of the same image.
-struct Pair {
+struct PosePair {
   engine::Rigid3 map_from_camera, truth_from_camera;
 };
-
-// As in EvaluateRun: Hartley et al., "Rotation Averaging", 2013, section 5.3.
-engine::Rotation3 AlignRotations(const std::vector<Pair>& pairs) {
-  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (const Pair& pair : pairs)
-    sum += (pair.truth_from_camera.rotation * pair.map_from_camera.rotation.inverse()).matrix();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d u = svd.matrixU();
-  if ((u * svd.matrixV().transpose()).determinant() < 0) u.col(2) *= -1;
-  return engine::Rotation3(Eigen::Matrix3d(u * svd.matrixV().transpose()));
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Camera centres relative to their mean; those of the map are rotated into the axes of the truth.
 struct Paths {
   std::vector<Eigen::Vector3d> truth, map;
 
-  explicit Paths(const std::vector<Pair>& pairs) {
-    const engine::Rotation3 truth_from_map = AlignRotations(pairs);
-    for (const Pair& pair : pairs) {
+  explicit Paths(const std::vector<PosePair>& pairs) {
+    std::vector<engine::Rotation3> rotations;
+    for (const PosePair& pair : pairs) {
+      rotations.push_back(pair.truth_from_camera.rotation * pair.map_from_camera.rotation.inverse());
+    }
+    const engine::Rotation3 truth_from_map = MeanRotation(rotations);
+    for (const PosePair& pair : pairs) {
       truth.push_back(pair.truth_from_camera.translation);
       map.push_back(truth_from_map * pair.map_from_camera.translation);
     }
@@ -138,7 +126,7 @@ class InitializationClassifier {
     result.depth_points = depth.points;
     result.depth_error = depth.error;
     const bool bounded = static_cast<std::size_t>(depth.points) >= options_.min_points;
-    const std::vector<Pair> pairs = PairsInWindow(start, !bounded, &result);
+    const std::vector<PosePair> pairs = PairsInWindow(start, !bounded, &result);
     result.centers = static_cast<int>(pairs.size());
     if (pairs.size() < 3) return result;
     const Paths paths(pairs);
@@ -166,9 +154,9 @@ class InitializationClassifier {
 
  private:
   // Pairs of the initial keyframes and of the frames in the window.
-  std::vector<Pair> PairsInWindow(const InitializationRecord& start, bool extended,
-                                  InitializationResult* result) const {
-    std::vector<Pair> pairs;
+  std::vector<PosePair> PairsInWindow(const InitializationRecord& start, bool extended,
+                                      InitializationResult* result) const {
+    std::vector<PosePair> pairs;
     double reached_m = 0;
     for (const InitializationRecord::KeyFrame& keyframe : start.keyframes)
       AddPair(keyframe.time, keyframe.camera_from_map, &pairs, &reached_m);
@@ -186,7 +174,7 @@ class InitializationClassifier {
   }
 
   // Returns false when there is no truth. reached_m: largest distance of a true centre from the first one.
-  bool AddPair(Timestamp time, const engine::Rigid3& camera_from_map, std::vector<Pair>* pairs,
+  bool AddPair(Timestamp time, const engine::Rigid3& camera_from_map, std::vector<PosePair>* pairs,
                double* reached_m) const {
     const auto pose = InterpolatePose(truth_, time, options_.max_time_difference);
     if (!pose) return false;

@@ -8,8 +8,8 @@
 #include "app/evaluation/distribution_section.h"
 #include "app/evaluation/run_plots.h"
 #include "app/evaluation/svg_plot.h"
-#include "app/files/checked_file.h"
 #include "app/files/text_file.h"
+#include "engine/base/base64.h"
 
 namespace docent::app {
 
@@ -107,25 +107,12 @@ std::string SegmentTable(const SequenceReport& r) {
   return html + "</table>\n";
 }
 
-// RFC 4648, section 4.
-std::string Base64(const std::vector<std::uint8_t>& bytes) {
-  constexpr const char* kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t three = 0;
-    for (std::size_t j = 0; j < 3; ++j) three = three << 8 | (i + j < bytes.size() ? bytes[i + j] : 0u);
-    for (std::size_t j = 0; j < 4; ++j)
-      text += i + j <= bytes.size() ? kLetters[three >> (18 - 6 * j) & 63] : '=';
-  }
-  return text;
-}
-
 std::string PanoramaImages(const EvaluatedRun& run) {
   if (run.panoramas.empty()) return {};
   std::string html = "<h3>Panorama maps</h3>\n";
   for (const ShownPanorama& panorama : run.panoramas) {
     html += "<figure><img alt=\"" + EscapeHtml(panorama.caption) + "\" src=\"data:image/png;base64," +
-            Base64(panorama.png) + "\"><figcaption>" + EscapeHtml(panorama.caption) +
+            EncodeBase64(panorama.png) + "\"><figcaption>" + EscapeHtml(panorama.caption) +
             "</figcaption></figure>\n";
   }
   return html;
@@ -152,7 +139,7 @@ std::string SideBySide(const EvaluatedRun& run, const Draw& draw) {
   return "<div class=\"pair\">" + column(run) + column(*run.compared) + "</div>\n";
 }
 
-std::string Figures(const EvaluatedRun& run) {
+std::string RunPlots(const EvaluatedRun& run) {
   const PlotRanges ranges = run.compared ? Both(RangesOf(run), RangesOf(*run.compared)) : RangesOf(run);
   const auto with_ranges = [&ranges](auto plot) {
     return [&ranges, plot](const EvaluatedRun& one) { return plot(one, ranges); };
@@ -179,7 +166,7 @@ std::string Tables(const EvaluatedRun& run) {
 std::string Section(const EvaluatedRun& run) {
   std::string html = "<section><h2>" + EscapeHtml(run.report.name) + "</h2>\n";
   html += SideBySide(run, [](const EvaluatedRun& one) { return FigureTable(one.report); });
-  html += Figures(run) + SideBySide(run, Tables);
+  html += RunPlots(run) + SideBySide(run, Tables);
   return html + "</section>\n";
 }
 
@@ -213,12 +200,6 @@ std::string PageHead() {
          "h4{margin:.4em 0 0}figure{margin:1em 0}img{max-width:100%}\n</style></head>";
 }
 
-void WriteAll(const std::filesystem::path& path, const std::string& html) {
-  CheckedFile file(path);
-  file.Write(html);
-  file.Close();
-}
-
 }  // namespace
 
 std::string FormatHtmlReport(const std::vector<EvaluatedRun>& runs) {
@@ -239,7 +220,7 @@ std::string FormatHtmlReport(const std::vector<EvaluatedRun>& runs) {
 }
 
 void WriteHtmlReport(const std::filesystem::path& path, const std::vector<EvaluatedRun>& runs) {
-  WriteAll(path, FormatHtmlReport(runs));
+  WriteTextFile(path, FormatHtmlReport(runs));
 }
 
 std::string FormatHtmlReport(const std::vector<RunDistribution>& distributions) {
@@ -249,7 +230,7 @@ std::string FormatHtmlReport(const std::vector<RunDistribution>& distributions) 
 }
 
 void WriteHtmlReport(const std::filesystem::path& path, const std::vector<RunDistribution>& distributions) {
-  WriteAll(path, FormatHtmlReport(distributions));
+  WriteTextFile(path, FormatHtmlReport(distributions));
 }
 
 }  // namespace docent::app

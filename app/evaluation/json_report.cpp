@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "app/files/checked_file.h"
+#include "app/files/text_file.h"
 
 namespace docent::app {
 
@@ -171,12 +171,6 @@ std::string FormatAll(const std::vector<Report>& reports, const std::vector<Repo
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-void WriteAll(const std::filesystem::path& path, const std::string& text) {
-  CheckedFile file(path);
-  file.Write(text);
-  file.Close();
-}
-
 std::string Format(const char* format, double value) {
   char text[64];
   std::snprintf(text, sizeof text, format, value);
@@ -197,12 +191,12 @@ std::string FormatJsonReport(const std::vector<RunDistribution>& distributions,
 
 void WriteJsonReport(const std::filesystem::path& path, const std::vector<SequenceReport>& reports,
                      const std::vector<SequenceReport>& compared) {
-  WriteAll(path, FormatJsonReport(reports, compared));
+  WriteTextFile(path, FormatJsonReport(reports, compared));
 }
 
 void WriteJsonReport(const std::filesystem::path& path, const std::vector<RunDistribution>& distributions,
                      const std::vector<RunDistribution>& compared) {
-  WriteAll(path, FormatJsonReport(distributions, compared));
+  WriteTextFile(path, FormatJsonReport(distributions, compared));
 }
 
 std::string FormatSummary(const SequenceReport& report) {

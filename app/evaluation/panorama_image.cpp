@@ -7,8 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 
-#include "app/session/surface_at_pixel.h"
 #include "engine/base/error.h"
+#include "engine/map/upright_axes.h"
 
 namespace docent::app {
 
@@ -34,7 +34,7 @@ std::vector<const engine::KeyFrame*> KeyFramesAbout(const engine::MapSnapshot& m
 
 // Frame of the panorama: upright, with yaw 0 in the viewing direction of the reference.
 engine::Rotation3 ViewFromMap(const engine::MapSnapshot& map, const engine::KeyFrame& reference) {
-  const Eigen::Vector3d down = -UpInMap(map);
+  const Eigen::Vector3d down = -engine::UpInMap(map);
   const Eigen::Vector3d axis =
       reference.camera_from_map.rotation.inverse() * Eigen::Vector3d(Eigen::Vector3d::UnitZ());
   Eigen::Vector3d right = down.cross(axis);

@@ -5,9 +5,9 @@
 #include <fstream>
 
 #include "app/files/text_file.h"
-#include "app/session/surface_at_pixel.h"
 #include "engine/map/map.h"
-#include "engine/mapping/map_adjustment.h"
+#include "engine/map/upright_axes.h"
+#include "engine/mapping/bundle/map_adjustment.h"
 
 namespace docent::app {
 
@@ -126,14 +126,9 @@ MapRecord MakeMapRecord(std::uint64_t key, const std::string& name, const engine
     if (const engine::KeyFrame* reference = map.FindKeyFrame(panorama.reference))
       record.panorama_centers.push_back(reference->camera_from_map.OriginInSource());
   }
-  if (map.keyframes.empty()) return record;
-  record.up = UpInMap(map);
-  const Eigen::Vector3d axis =
-      map.keyframes.front().camera_from_map.rotation.inverse() * Eigen::Vector3d(Eigen::Vector3d::UnitZ());
-  const Eigen::Vector3d level = axis - axis.dot(record.up) * record.up;
-  // A camera that looks straight up or down has no horizontal viewing direction, so any horizontal one is
-  // used.
-  record.forward = level.norm() > 1e-3 ? level.normalized() : record.up.unitOrthogonal();
+  const engine::UprightAxes axes = engine::UprightAxesOf(map);
+  record.up = axes.up;
+  record.forward = axes.ahead;
   return record;
 }
 

@@ -2,8 +2,8 @@
 #include "app/files/checked_file.h"
 
 #include <cerrno>
-#include <cstring>
 #include <string>
+#include <system_error>
 
 #include "engine/base/error.h"
 
@@ -20,7 +20,7 @@ CheckedFile::~CheckedFile() {
 }
 
 void CheckedFile::Fail(int error) const {
-  throw Error("Cannot write '" + path_.string() + "': " + std::strerror(error) + ".");
+  throw Error("Cannot write '" + path_.string() + "': " + std::generic_category().message(error) + ".");
 }
 
 void CheckedFile::Write(std::string_view text) {

@@ -10,9 +10,9 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <opencv2/core.hpp>
 #include <string>
+#include <system_error>
 #include <utility>
 
 namespace docent::app {
@@ -173,7 +173,7 @@ std::shared_ptr<const engine::ImageFeatures> ImageFiles::Store(
   const int error = errno;
   if (!warned_.exchange(true)) {
     spdlog::warn("Keyframe images stay in memory, because no file can be written in '{}' ({}).",
-                 folder_.string(), std::strerror(error));
+                 folder_.string(), std::generic_category().message(error));
   }
   return features;
 }

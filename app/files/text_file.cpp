@@ -6,9 +6,10 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <memory>
+#include <system_error>
 
+#include "app/files/checked_file.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -37,7 +38,8 @@ void ReadInto(const std::filesystem::path& path, std::size_t max_bytes, Buffer* 
                 std::to_string(max_bytes) + " are allowed.");
   }
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
-  if (!file) throw Error("Cannot open '" + path.string() + "': " + std::strerror(errno) + ".");
+  if (!file)
+    throw Error("Cannot open '" + path.string() + "': " + std::generic_category().message(errno) + ".");
   buffer->resize(static_cast<std::size_t>(size));
   const std::size_t read = size == 0 ? 0 : std::fread(buffer->data(), 1, buffer->size(), file.get());
   if (read != buffer->size()) throw Error("Cannot read '" + path.string() + "' completely.");
@@ -49,6 +51,12 @@ std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_byte
   std::string text;
   ReadInto(path, max_bytes, &text);
   return text;
+}
+
+void WriteTextFile(const std::filesystem::path& path, std::string_view text) {
+  CheckedFile file(path);
+  file.Write(text);
+  file.Close();
 }
 
 void ReadBytes(const std::filesystem::path& path, std::size_t max_bytes, std::vector<std::uint8_t>* bytes) {

@@ -11,12 +11,14 @@
 
 #include "engine/base/time.h"
 
-// Reads small external files: whole files of bounded size, lines with their numbers, and numbers that are
-// validated. Nothing here depends on the locale.
+// Reads and writes small external files: whole files of bounded size, lines with their numbers, and numbers
+// that are validated. Nothing here depends on the locale.
 namespace docent::app {
 
 // Returns the whole file. Throws Error when it is missing, a folder, unreadable, or larger than max_bytes.
 std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{64} << 20);
+// Replaces the file. Throws Error when the disk does not take all of it.
+void WriteTextFile(const std::filesystem::path& path, std::string_view text);
 // Reads a binary file, such as an image, into a buffer that is reused.
 void ReadBytes(const std::filesystem::path& path, std::size_t max_bytes, std::vector<std::uint8_t>* bytes);
 

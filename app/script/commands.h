@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "engine/base/time.h"
-#include "maps/policy.h"
+#include "maps/storage/policy.h"
 
 // Every change that a user can make, as data. The window, script files and tests all use these structs; the
-// session executes them. They do not depend on how that is done.
+// session executes them. They do not depend on how that is done. docs/scripts.md describes them for users.
 namespace docent::app {
 
 struct NewMap {
@@ -78,6 +78,12 @@ struct Save {
 
 using Command = std::variant<NewMap, StopMap, UseMap, SetPolicy, PlaceModel, PlaceSignpost, MoveEntity,
                              RotateEntity, ScaleEntity, RemoveEntity, Undo, Redo, Save>;
+
+// What is wrong with the command's values, whatever the map holds, as a sentence without capital and full
+// stop
+// ("the scale must be between 1e-09 and 1e+09"); empty if nothing is. Every command is checked where it
+// enters: when a script is parsed, and before the session executes one.
+std::string Validate(const Command& command);
 
 struct TimedCommand {
   Timestamp time{};  // from the first frame; not negative

@@ -2,7 +2,6 @@
 #include "app/script/script_file.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "app/files/text_file.h"
 #include "engine/base/error.h"
@@ -10,8 +9,6 @@
 namespace docent::app {
 
 namespace {
-
-constexpr double kMaxPixel = 1e6;
 
 struct Word {
   std::string text;
@@ -54,7 +51,6 @@ class LineReader {
     Expect("pixel");
     const double u = TakeNumber("a pixel's column");
     const double v = TakeNumber("a pixel's row");
-    if (std::abs(u) > kMaxPixel || std::abs(v) > kMaxPixel) Fail("the pixel is far outside any image");
     return {u, v};
   }
   void ExpectEnd() {
@@ -131,7 +127,6 @@ Command ParsePlace(LineReader* line) {
   while (!line->AtEnd()) {
     if (line->TakeIf("scale")) {
       command.scale = line->TakeNumber("a scale");
-      if (command.scale <= 0) line->Fail("the scale must be above 0");
     } else if (line->TakeIf("yaw")) {
       command.yaw_deg = line->TakeNumber("an angle in degrees");
     } else {
@@ -168,9 +163,7 @@ Command ParseRotate(LineReader* line) {
 
 Command ParseScale(LineReader* line) {
   const std::string name = line->TakeName("a name");
-  const double factor = line->TakeNumber("a factor");
-  if (factor <= 0) line->Fail("the factor must be above 0");
-  return ScaleEntity{name, factor};
+  return ScaleEntity{name, line->TakeNumber("a factor")};
 }
 
 Command ParseCommand(LineReader* line) {
@@ -267,6 +260,7 @@ std::vector<TimedCommand> ParseScript(std::string_view text, const std::string& 
       line.Fail("the time is earlier than that of the previous command");
     TimedCommand command{*time, number, ParseCommand(&line)};
     line.ExpectEnd();
+    if (const std::string problem = Validate(command.command); !problem.empty()) line.Fail(problem);
     commands.push_back(std::move(command));
   }
   return commands;

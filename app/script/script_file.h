@@ -8,21 +8,15 @@
 
 #include "app/script/commands.h"
 
-// Command scripts: one command per line, with its time in seconds from the first frame, as in `12.5 map new
-// "Desk 3"`; '#' begins a comment. A word that contains blanks, quotes or '#' is put in double quotes, in
-// which \" is a quote, \\ a backslash and \n a line break. Besides the commands of command-line.md:
-//   move NAME X Y Z           by this offset in map units along the map's axes
-//   move NAME to pixel U V    to the surface visible at that pixel
-//   rotate NAME DEG           about its own up axis
-//   scale NAME FACTOR
-//   remove NAME
+// The one text form of commands, which docs/scripts.md describes: its parser and its formatter. A script has
+// one command per line, with its time in seconds from the first frame.
 namespace docent::app {
 
-// Times must not decrease. Throws Error with file and line.
+// Times must not decrease, and every command must be valid (Validate). Throws Error with file and line.
 std::vector<TimedCommand> ReadScript(const std::filesystem::path& path);
 std::vector<TimedCommand> ParseScript(std::string_view text, const std::string& name);
 
-// Formats a command without and with its time; ParseScript returns an equal command.
+// Formats a command without and with its time. If the command is valid, ParseScript returns an equal one.
 std::string FormatCommand(const Command& command);
 std::string FormatScriptLine(const TimedCommand& command);
 

@@ -14,10 +14,7 @@ void AugmentationLog::Add(const engine::TrackedFrame& frame, const engine::Camer
                           const std::string& map_name, const content::Scene& scene) {
   if (!engine::HasPose(frame.state)) return;
   for (const content::Entity& entity : scene.entities) {
-    const Eigen::Vector3d& foot = entity.kind == content::Entity::Kind::kModel
-                                      ? entity.model.map_from_model.translation
-                                      : entity.signpost.anchor;
-    const auto pixel = camera.Project(frame.camera_from_map * foot);
+    const auto pixel = camera.Project(frame.camera_from_map * content::PlaceOf(entity));
     if (!pixel || !camera.IsInside(*pixel)) continue;
     file_.Write(FormatSeconds(frame.frame.time) + ',' + CsvField(map_name) + ',' + CsvField(entity.name) +
                 ',' + FormatNumber(pixel->x(), 7) + ',' + FormatNumber(pixel->y(), 7) + '\n');

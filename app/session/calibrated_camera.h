@@ -10,8 +10,8 @@
 
 #include "app/cameras/frame_source.h"
 #include "engine/geometry/camera_model.h"
-#include "engine/mapping/lens_estimation.h"
-#include "maps/library.h"
+#include "engine/mapping/calibration/lens_estimation.h"
+#include "maps/library/library.h"
 
 namespace docent::app {
 

@@ -74,7 +74,8 @@ class CommandRunner {
       try {
         Run(next_->command, now, frame);
       } catch (const Error& error) {
-        throw Error(Line(*next_) + error.what() + ".");
+        const std::string sentence = error.what();
+        throw Error(Line(*next_) + sentence + (sentence.ends_with('.') ? "" : "."));
       }
     }
     if (options_.inbox == nullptr) return;

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "app/command_line/options.h"
 #include "app/script/commands.h"
 #include "app/session/calibrated_camera.h"
+#include "app/session/pace.h"
 #include "app/session/session.h"
 
 namespace docent::app {

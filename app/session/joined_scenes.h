@@ -5,10 +5,11 @@
 #include <string>
 
 #include "app/session/library_scene.h"
-#include "engine/mapping/map_joining.h"
-#include "maps/joining.h"
+#include "engine/mapping/loops/map_joining.h"
+#include "maps/maintenance/joining.h"
 
-// What happens to the content of two maps that are joined (maps/joining.h). Pure functions; any thread.
+// What happens to the content of two maps that are joined (maps/maintenance/joining.h). Pure functions; any
+// thread.
 namespace docent::app {
 
 // Adds the entities of map B to `scene`, the scene of map A in the joined map; each entity stays with its

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "content/scene.h"
-#include "maps/map_record.h"
+#include "maps/storage/map_record.h"
 
 // Converts between a scene and the record that a library stores of it. An asset that is placed in several
 // maps is decoded once and shared.

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "maps/maintenance.h"
+#include "maps/maintenance/maintenance.h"
 
 namespace docent::app {
 

@@ -6,7 +6,7 @@
 #include <deque>
 #include <mutex>
 
-#include "maps/library.h"
+#include "maps/library/library.h"
 
 namespace docent::app {
 

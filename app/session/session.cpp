@@ -111,15 +111,6 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   return shown;
 }
 
-std::vector<std::string> Session::MapNames() const {
-  const std::scoped_lock lock(mutex_);
-  std::vector<std::string> names;
-  for (const auto& [key, map] : maps_) {
-    if (map.Exists()) names.push_back(map.name);
-  }
-  return names;
-}
-
 std::vector<Session::MapState> Session::Maps() const {
   const std::scoped_lock lock(mutex_);
   std::vector<MapState> states;

@@ -22,9 +22,9 @@
 #include "app/session/relocalization_message.h"
 #include "app/session/session_map.h"
 #include "engine/system/system.h"
-#include "maps/library.h"
-#include "maps/map_pager.h"
-#include "maps/saver.h"
+#include "maps/library/library.h"
+#include "maps/library/map_pager.h"
+#include "maps/library/saver.h"
 
 namespace docent::app {
 
@@ -93,7 +93,6 @@ class Session {
     std::string advice;                    // a sentence about the frame's camera; often empty
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
-  std::vector<std::string> MapNames() const;
   // The session's state of a map.
   struct MapState {
     std::uint64_t key = 0;
@@ -173,7 +172,9 @@ class Session {
   void Apply(const NewMap& command, const engine::TrackedFrame& frame);
   void Apply(const StopMap& command, const engine::TrackedFrame& frame);
   void Apply(const UseMap& command, const engine::TrackedFrame& frame);
-  void Apply(const SetPolicy& command, const engine::TrackedFrame& frame);
+  void Apply(const SetPolicy& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
+  void ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestamp time,
+                    std::unique_lock<std::mutex>* lock);
   void Apply(const PlaceModel& command, const engine::TrackedFrame& frame);
   void Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame);
   void Apply(const MoveEntity& command, const engine::TrackedFrame& frame);
@@ -210,7 +211,8 @@ class Session {
   MapKeys keys_;
   engine::System system_;  // its lock may be taken while mutex_ is held, never the other way round
 
-  mutable std::mutex mutex_;  // guards the members below; never held while tracking
+  // Guards the members below; never held while tracking or waiting for another thread.
+  mutable std::mutex mutex_;
   std::vector<Camera> cameras_;
   std::map<std::uint64_t, SessionMap> maps_;
   std::vector<Event> events_;

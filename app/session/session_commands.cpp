@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <numbers>
+#include <type_traits>
 #include <utility>
 
 #include "app/script/script_file.h"
@@ -9,14 +10,11 @@
 #include "content/asset.h"
 #include "content/placement.h"
 #include "engine/base/error.h"
+#include "engine/map/upright_axes.h"
 
 namespace docent::app {
 
 namespace {
-
-void CheckName(const std::string& name) {
-  if (name.empty()) throw Error("a map needs a name");
-}
 
 const content::Entity& FindEntity(const content::Scene& scene, const std::string& name) {
   const content::Entity* entity = scene.Find(name);
@@ -31,11 +29,19 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
   if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
     throw Error("a tour is read-only; use docent author to make changes");
   }
+  if (const std::string problem = Validate(command); !problem.empty()) throw Error(problem);
   LoadIntoMemory(command);
-  const std::scoped_lock lock(mutex_);
+  std::unique_lock lock(mutex_);
   HandleSystemEvents();
   model_folder_ = model_folder;
-  std::visit([&](const auto& chosen) { Apply(chosen, frame); }, command);
+  const auto apply = [&](const auto& chosen) {
+    if constexpr (std::is_same_v<decltype(chosen), const SetPolicy&>) {
+      Apply(chosen, frame, &lock);
+    } else {
+      Apply(chosen, frame);
+    }
+  };
+  std::visit(apply, command);
   HandleSystemEvents();
   AddEvent(frame.frame.time, "command", FormatCommand(command));
 }
@@ -98,7 +104,6 @@ void Session::UpdatePermissions(const SessionMap& map) {
 }
 
 void Session::Apply(const NewMap& command, const engine::TrackedFrame& frame) {
-  CheckName(command.name);
   if (FindByName(command.name) != nullptr) throw Error("there is already a map '" + command.name + "'");
   const SessionMap& map = AddMap(keys_.Take(), command.name);  // first, because it may throw
   system_.StartMap(map.key, static_cast<std::size_t>(frame.frame.camera));
@@ -123,28 +128,57 @@ void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
   PinMapsInUse();
 }
 
-void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame) {
-  SessionMap* map = FindByName(command.name);
+void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
+                    std::unique_lock<std::mutex>* lock) {
+  SessionMap* const map = FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (!map->snapshot) throw Error("the map '" + command.name + "' is not initialized yet");
-  std::optional<maps::Bounds> bounds;
+  const std::uint64_t key = map->key;
+  const auto extend_again = [&] {
+    UpdatePermissions(maps_.at(key));
+    if (CurrentMap(frame) == key) system_.Activate(key);
+  };
+  if (saver_ && CurrentMap(frame) == key) {
+    // The mapper must not change the map between the save and the new policy, which may forbid to save it.
+    engine::MapPermissions unchanged = PermissionsOf(*map);
+    unchanged.extend = false;
+    system_.SetPermissions(key, unchanged);
+    system_.Activate(key);
+    HandleSystemEvents();
+  }
+  try {
+    ChangePolicy(command, key, frame.frame.time, lock);
+  } catch (...) {
+    extend_again();
+    throw;
+  }
+  extend_again();
+}
+
+// Releases the lock while the disk works: the saver's thread takes it too, and no frame shall wait for a
+// disk.
+void Session::ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestamp time,
+                           std::unique_lock<std::mutex>* lock) {
+  SessionMap& map = maps_.at(key);
   if (saver_) {
     // The library computes the bounds from what it holds, so everything must be saved first. This is the one
     // command that waits for the disk.
-    SaveMap(map, frame.frame.time);
+    SaveMap(&map, time);
+    lock->unlock();
     saver_->Flush();
-    ReportSaveFailure(frame.frame.time);
-    if (map->NeedsSave())
-      throw Error("the map '" + map->name + "' could not be saved, so its policy was not changed");
-    library_->SetPolicy(map->key, command.policy);
-    bounds = library_->Find(map->key).bounds;
-  } else if (command.policy == maps::Policy::kBounded) {
-    bounds = map->bounds ? map->bounds : maps::ComputeBounds(*map->snapshot);
+    lock->lock();
+    ReportSaveFailure(time);
+    if (!map.Exists()) throw Error("the map '" + command.name + "' was discarded or joined meanwhile");
+    if (map.NeedsSave())
+      throw Error("the map '" + map.name + "' could not be saved, so its policy was not changed");
+    library_->SetPolicy(key, command.policy);
+    map.bounds = library_->Find(key).bounds;
+  } else if (command.policy != maps::Policy::kBounded) {
+    map.bounds.reset();
+  } else if (!map.bounds) {
+    map.bounds = maps::ComputeBounds(*map.snapshot);
   }
-  map->policy = command.policy;
-  map->bounds = bounds;
-  UpdatePermissions(*map);
-  if (CurrentMap(frame) == map->key) system_.Activate(map->key);
+  map.policy = command.policy;
 }
 
 SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
@@ -173,12 +207,11 @@ void Session::Apply(const PlaceModel& command, const engine::TrackedFrame& frame
   const content::SurfaceHit hit = SurfaceAtPixel(frame, *camera.model, command.pixel);
   content::Entity entity;
   entity.kind = content::Entity::Kind::kModel;
-  entity.name = map.scene->FreeName(std::filesystem::path(command.file).stem().string());
+  entity.name = map.scene->FreeName(content::NameFromFile(command.file));
   entity.model.asset = LoadAsset(command.file);
-  entity.model.map_from_model = content::UprightPose(hit.point, hit.normal, UpInMap(*frame.map),
+  entity.model.map_from_model = content::UprightPose(hit.point, hit.normal, engine::UpInMap(*frame.map),
                                                      command.yaw_deg * std::numbers::pi / 180, command.scale);
-  Edit(&map, content::PlaceModelEdit(std::move(entity), command.file, {command.pixel.x(), command.pixel.y()},
-                                     command.scale, command.yaw_deg));
+  Edit(&map, content::AddEdit(std::move(entity)));
 }
 
 void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame) {
@@ -187,25 +220,19 @@ void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& fr
   const content::SurfaceHit hit = SurfaceAtPixel(frame, *camera.model, command.pixel);
   content::Entity entity;
   entity.kind = content::Entity::Kind::kSignpost;
-  int number = 1;
-  do {
-    entity.name = "sign-" + std::to_string(number++);
-  } while (map.scene->Find(entity.name) != nullptr);
+  entity.name = map.scene->FreeSignpostName();
   entity.signpost.text = command.text;
   entity.signpost.anchor = hit.point;
-  entity.signpost.up = UpInMap(*frame.map);
+  entity.signpost.up = engine::UpInMap(*frame.map);
   // Map units mean nothing to the user, so the size is chosen by the distance from the camera.
   entity.signpost.height_m = options_.signpost_height * (frame.camera_from_map * hit.point).norm();
   entity.signpost.to_map = command.to_map;
-  Edit(&map, content::AddSignpostEdit(std::move(entity), {command.pixel.x(), command.pixel.y()}));
+  Edit(&map, content::AddEdit(std::move(entity)));
 }
 
 void Session::Apply(const MoveEntity& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
-  const content::Entity& entity = FindEntity(*map.scene, command.name);
-  Eigen::Vector3d place = entity.kind == content::Entity::Kind::kModel
-                              ? entity.model.map_from_model.translation
-                              : entity.signpost.anchor;
+  Eigen::Vector3d place = content::PlaceOf(FindEntity(*map.scene, command.name));
   if (command.to_pixel) {
     const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
     place = SurfaceAtPixel(frame, *camera.model, *command.to_pixel).point;

@@ -2,10 +2,13 @@
 // What a change in the system means for the session: its maps, their content, and what the user is told.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "app/files/text_file.h"
+#include "app/output/engine_text.h"
 #include "app/session/joined_scenes.h"
 #include "app/session/session.h"
 
@@ -135,7 +138,8 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapsJoined&
 
 void Session::Handle(const engine::SystemEvent& event, const engine::JoinRefused& what) {
   AddEvent(event.time, "map",
-           "maps " + NameOf(event.map) + " and " + NameOf(what.from) + " were not joined: " + what.reason);
+           "maps " + NameOf(event.map) + " and " + NameOf(what.from) +
+               " were not joined: " + TextOf(what.refusal, what.overlap));
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::RigChanged& what) {
@@ -156,8 +160,7 @@ void Session::Handle(const engine::SystemEvent& event, const engine::LensEstimat
   cameras_[event.camera].model = what.lens.model;
   AddEvent(event.time, "lens",
            "Estimated calibration of camera \"" + what.lens.name + "\"" +
-               (what.lens.fixed ? " (final)" : "") + ": focal length " +
-               engine::FormatFocalLength(what.lens));
+               (what.lens.fixed ? " (final)" : "") + ": focal length " + FormatFocalLength(what.lens));
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapperFailed& what) {
@@ -168,40 +171,12 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapperFaile
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapperEvent& what) {
-  using Kind = engine::MapperEvent::Kind;
-  const std::string name = NameOf(event.map);
-  const auto add = [&](const char* kind, const std::string& before) {
-    AddEvent(event.time, kind, before + name + ": " + what.detail);
-  };
-  switch (what.kind) {
-    case Kind::kMapStarted:
-      return add("map", "started ");
-    case Kind::kStartFailed:
-      return add("warning", "could not initialize ");
-    case Kind::kKeyFrame:
-      return add("keyframe", "sixdof in ");
-    case Kind::kPanoramaOpened:
-      return add("panorama", "opened in ");
-    case Kind::kPanoramaKeyFrame:
-      return add("keyframe", "panorama in ");
-    case Kind::kLocalized:
-      return add("keyframe", "localized in ");
-    case Kind::kConverted:
-      return add("points", "");
-    case Kind::kKeyFrameRemoved:
-      return AddEvent(event.time, "keyframe", "removed from " + name + " as redundant: " + what.detail);
-    case Kind::kLoopClosed:
-      return add("loop", "closed in ");
-    case Kind::kGlobalAdjustment:
-      return add("adjustment", "");
-    case Kind::kLensEstimated:
-      return;  // see LensEstimated
-    case Kind::kCalibrationContradicted:
-      AddEvent(event.time, "warning", what.detail);
-      for (std::size_t i = 0; i < cameras_.size(); ++i) {
-        if (!system_.EstimatedLensOf(i)) Advise(&cameras_[i], what.detail);
-      }
-      return;
+  const std::optional<EventText> text = TextOf(what, NameOf(event.map));
+  if (!text) return;
+  AddEvent(event.time, text->event, text->detail);
+  if (!std::holds_alternative<engine::MapperEvent::CalibrationContradicted>(what.what)) return;
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    if (!system_.EstimatedLensOf(i)) Advise(&cameras_[i], text->detail);
   }
 }
 

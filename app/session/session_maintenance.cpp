@@ -1,27 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <chrono>
-#include <thread>
 #include <utility>
 
 #include "app/files/text_file.h"
 #include "app/session/session.h"
-#include "maps/maintenance.h"
+#include "maps/maintenance/maintenance.h"
 
 // Maintenance of idle maps (ptamm §3.1: the map maker roves through all maps). It runs on the saver's thread,
-// while nothing waits to be saved and the mapper of the active map is idle.
+// while nothing waits to be saved and the mapper of the active map is idle. It takes the session's lock to
+// copy what it needs and to enter its result, and works without it.
 namespace docent::app {
-
-namespace {
-
-// The thread that holds the lock may wait for a save, which sets `interrupt`; giving up then avoids a
-// deadlock.
-std::unique_lock<std::mutex> LockUnless(const std::atomic<bool>& interrupt, std::mutex* mutex) {
-  std::unique_lock lock(*mutex, std::defer_lock);
-  while (!interrupt && !lock.try_lock()) std::this_thread::sleep_for(std::chrono::microseconds(200));
-  return lock;
-}
-
-}  // namespace
 
 bool Session::IsIdle(const SessionMap& map) const {
   return map.Exists() && map.snapshot && !map.NeedsSave() && maps::MayChangeStructure(map.policy) &&
@@ -48,8 +35,8 @@ SessionMap* Session::FindIdleMap(const IdleMap& idle) {
 bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
   std::vector<IdleMap> idle;
   {
-    const auto lock = LockUnless(interrupt, &mutex_);
-    if (!lock || !system_.IsMapperIdle()) return false;
+    const std::scoped_lock lock(mutex_);
+    if (!system_.IsMapperIdle()) return false;
     idle = MapsForMaintenance();
   }
   std::shared_ptr<const content::Scene> scene;
@@ -59,8 +46,8 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
   const maps::Optimization& done = adjusted.optimization;
   if (done.outcome == maps::Optimization::Outcome::kInterrupted) return false;
   {
-    const auto lock = LockUnless(interrupt, &mutex_);
-    SessionMap* const map = lock ? FindIdleMap(*chosen) : nullptr;
+    const std::scoped_lock lock(mutex_);
+    SessionMap* const map = FindIdleMap(*chosen);
     if (map == nullptr) return false;
     // Once per revision, whatever the outcome.
     map->maintained_revision = chosen->snapshot->revision;
@@ -76,9 +63,9 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
   if (!motions.empty())
     record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*Moved(*scene, motions)));
   if (!library_->Save(record)) return true;
-  const auto lock = LockUnless(interrupt, &mutex_);
+  const std::scoped_lock lock(mutex_);
   // A camera entered the map meanwhile: it continues with the map as it was, and will save that.
-  SessionMap* const map = lock ? FindIdleMap(*chosen) : nullptr;
+  SessionMap* const map = FindIdleMap(*chosen);
   if (map == nullptr || !system_.ReplaceSnapshot(map->key, chosen->snapshot, adjusted.snapshot)) return true;
   map->UpdateSnapshot(adjusted.snapshot);
   map->saved_snapshot = adjusted.snapshot;

@@ -11,7 +11,7 @@
 #include "content/edits.h"
 #include "content/scene.h"
 #include "engine/map/map_snapshot.h"
-#include "maps/policy.h"
+#include "maps/storage/policy.h"
 
 namespace docent::app {
 

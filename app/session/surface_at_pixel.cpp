@@ -32,13 +32,4 @@ content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engi
   return *result.hit;
 }
 
-Eigen::Vector3d UpInMap(const engine::MapSnapshot& map) {
-  Eigen::Vector3d down = Eigen::Vector3d::Zero();
-  for (const engine::KeyFrame& keyframe : map.keyframes) {
-    down += keyframe.camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitY();
-  }
-  return down.norm() > 1e-6 ? Eigen::Vector3d(-down.normalized())
-                            : Eigen::Vector3d(-Eigen::Vector3d::UnitY());
-}
-
 }  // namespace docent::app

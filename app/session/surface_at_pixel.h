@@ -15,9 +15,4 @@ namespace docent::app {
 content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engine::CameraModel& camera,
                                    const Eigen::Vector2d& pixel);
 
-// The up direction in a map, unit length: opposite to the mean image-down direction (camera y axis) of its
-// keyframes. A map does not know gravity; users hold cameras level on average, and the mean over many
-// keyframes is more reliable than the first one alone.
-Eigen::Vector3d UpInMap(const engine::MapSnapshot& map);
-
 }  // namespace docent::app

@@ -13,11 +13,11 @@ constexpr double kDeskPitch = 2.1;                                        // Met
 constexpr double kDeskWidth = 1.6, kDeskDepth = 0.8, kDeskHeight = 0.74;  // Metres.
 constexpr double kDeskMiddle = 1.25, kPartition = 1.7;  // Distances in front of the visitor, metres.
 
-struct SharedTextures {
+struct DeskTextures {
   int top, body, partition, bezel, keyboard;
 };
 
-void FurnishDesk(const Stand& stand, const SharedTextures& shared, std::uint64_t seed, Scene* scene) {
+void FurnishDesk(const Stand& stand, const DeskTextures& shared, std::uint64_t seed, Scene* scene) {
   Random random(seed);
   Surfaces& surfaces = scene->surfaces;
   const double front = kDeskMiddle - kDeskDepth / 2;
@@ -75,7 +75,7 @@ Scene BuildDesks(const SceneRequest& request) {
   hall.walls = surfaces.AddTexture(PaintPlaster({1024, 1024}, {170, 178, 180}, random.Next()), true);
   hall.ceiling = surfaces.AddTexture(PaintTiles({512, 512}, 4, random.Next()), true);
   AddHall(hall, &scene);
-  const SharedTextures shared = {
+  const DeskTextures shared = {
       surfaces.AddTexture(PaintWood({1024, 512}, {120, 160, 190}, 4, random.Next())),
       surfaces.AddTexture(PaintPlaster({256, 256}, {110, 112, 115}, random.Next())),
       surfaces.AddTexture(PaintPlaster({512, 512}, {135, 110, 85}, random.Next())),

@@ -16,7 +16,7 @@ constexpr double kHalfNave = 3.1;  // Metres from the middle of the hall to a ba
 constexpr double kCabinetHeight = 0.95, kCabinetWidth = 1.7, kCabinetDepth = 0.65;
 
 // Textures that all bays share, so that they look alike.
-struct SharedTextures {
+struct BayTextures {
   int column, cabinet_front, cabinet_body, plinth;
 };
 
@@ -31,7 +31,7 @@ Stand BayStand(int bay, int bays) {
   return stand;
 }
 
-void FurnishBay(const Stand& stand, const SharedTextures& shared, std::uint64_t seed, Scene* scene) {
+void FurnishBay(const Stand& stand, const BayTextures& shared, std::uint64_t seed, Scene* scene) {
   Random random(seed);
   Surfaces& surfaces = scene->surfaces;
   const double cabinet_z = kHalfNave - 0.25 - kCabinetDepth / 2;
@@ -84,7 +84,7 @@ Scene BuildMuseum(const SceneRequest& request) {
   hall.ceiling = surfaces.AddTexture(PaintBricks({512, 512}, {120, 130, 140}, 8, random.Next()), true);
   hall.floor_pitch = 2.4;
   AddHall(hall, &scene);
-  const SharedTextures shared = {
+  const BayTextures shared = {
       surfaces.AddTexture(PaintStone({512, 1024}, {135, 140, 145}, random.Next())),
       surfaces.AddTexture(PaintCabinet({1024, 512}, {55, 85, 125}, random.Next())),
       surfaces.AddTexture(PaintWood({512, 512}, {50, 80, 115}, 6, random.Next())),

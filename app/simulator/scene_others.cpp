@@ -10,8 +10,6 @@
 namespace docent::app {
 namespace {
 
-constexpr double kTau = 2 * std::numbers::pi;
-
 // A canvas that is tiled with different square images.
 cv::Mat Frieze(cv::Size size, int side, Random* random) {
   cv::Mat canvas(size, CV_8UC3);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@
 // Parts that several scenes share: local frames, clutter on a surface, the walls of a hall, and the tour of
 // places.
 namespace docent::app {
+
+inline constexpr double kTau = 2 * std::numbers::pi;
 
 // An upright frame in the world: x right, y down, z ahead for a person who stands at its origin.
 struct Stand {

@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kHalfWidth = 2.8, kHalfDepth = 2.5, kHeight = 2.6;           // Of the room, metres.
 constexpr double kTableWidth = 1.5, kTableDepth = 0.95, kTableHeight = 0.75;  // Metres.
-constexpr double kTau = 2 * std::numbers::pi;
 
 void AddTable(Random* random, Scene* scene) {
   Surfaces& surfaces = scene->surfaces;

@@ -10,7 +10,6 @@
 namespace docent::app {
 namespace {
 
-constexpr double kTau = 2 * std::numbers::pi;
 constexpr double kStep_s = 0.25, kBeginning_s = 5, kDuration_s = 24;
 
 // Position of the person on an arc around the table, in radians from its middle.

@@ -9,6 +9,7 @@
 
 namespace docent::engine {
 
+// How a lens distorts, with the meaning of CameraModel::distortion.
 enum class LensModel {
   kRadialTangential,  // k1 k2 p1 p2 k3, Brown 1966 as OpenCV's pinhole model
   kFov,               // omega, Devernay and Faugeras 2001
@@ -22,8 +23,9 @@ enum class LensModel {
 // point folds back into the image.
 class CameraModel {
  public:
+  // Size of the image, focal lengths and principal point.
   struct Intrinsics {
-    int width_px = 0, height_px = 0;
+    int width_px = 0, height_px = 0;        // pixels
     double fx = 0, fy = 0, cx = 0, cy = 0;  // pixels
   };
 
@@ -55,16 +57,18 @@ class CameraModel {
            pixel.y() <= intrinsics_.height_px - 1 - margin_px;
   }
 
-  LensModel lens() const { return lens_; }
-  const Intrinsics& intrinsics() const { return intrinsics_; }
+  LensModel lens() const { return lens_; }                      // the meaning of distortion()
+  const Intrinsics& intrinsics() const { return intrinsics_; }  // pixels
+  // k1 k2 p1 p2 k3 | omega | k1 k2 k3 k4, unused entries zero.
   const std::array<double, 5>& distortion() const { return distortion_; }
-  int width_px() const { return intrinsics_.width_px; }
-  int height_px() const { return intrinsics_.height_px; }
+  int width_px() const { return intrinsics_.width_px; }    // of the image
+  int height_px() const { return intrinsics_.height_px; }  // of the image
   // Angle between the optical axis and the most oblique ray that projects, radians.
   double max_angle() const { return max_angle_; }
   // Angle of one pixel at the image centre, radians: 1 / mean focal length.
   double PixelAngle() const { return 2.0 / (intrinsics_.fx + intrinsics_.fy); }
 
+  // Whether all numbers are equal.
   bool operator==(const CameraModel& other) const;
 
  private:
@@ -85,6 +89,7 @@ class CameraModel {
   double fov_scale_ = 1;         // 2 tan(omega / 2) / omega
 };
 
+// For messages and tests.
 std::ostream& operator<<(std::ostream& out, const CameraModel& camera);
 
 }  // namespace docent::engine

@@ -5,6 +5,11 @@
 #include <ostream>
 
 namespace docent::engine {
+
+// Programs that use the installed package count on it; see DOCENT_EIGEN_LAYOUT in cmake/DocentTargets.cmake.
+static_assert(EIGEN_MAX_ALIGN_BYTES == 32 && EIGEN_MAX_STATIC_ALIGN_BYTES == 32 &&
+                  EIGEN_MALLOC_ALREADY_ALIGNED == 0,
+              "types with Eigen members have the same layout in every build");
 namespace {
 
 // Below this squared angle the closed forms lose precision to cancellation, and the series of four terms are

@@ -18,6 +18,7 @@ class Rotation3 {
   Rotation3() : quaternion_(Eigen::Quaterniond::Identity()) {}
   // Normalizes; the quaternion must not be zero.
   explicit Rotation3(const Eigen::Quaterniond& quaternion) : quaternion_(quaternion.normalized()) {}
+  // The rotation nearest to the matrix, which must be orthonormal except for rounding.
   explicit Rotation3(const Eigen::Matrix3d& matrix) : quaternion_(Eigen::Quaterniond(matrix).normalized()) {}
 
   // Exponential map: the rotation by |rotation_vector| radians about its direction; accurate also near zero.
@@ -25,13 +26,16 @@ class Rotation3 {
   // Inverse of Exp; the result's norm is at most pi.
   Eigen::Vector3d Log() const;
 
-  const Eigen::Quaterniond& quaternion() const { return quaternion_; }
-  Eigen::Matrix3d matrix() const { return quaternion_.toRotationMatrix(); }
+  const Eigen::Quaterniond& quaternion() const { return quaternion_; }       // unit length
+  Eigen::Matrix3d matrix() const { return quaternion_.toRotationMatrix(); }  // orthonormal
+  // For a_from_b: b_from_a.
   Rotation3 inverse() const { return FromUnit(quaternion_.conjugate()); }
   // Angle of the rotation, in [0, pi].
   double Angle() const { return Log().norm(); }
 
+  // Rotates a vector.
   Eigen::Vector3d operator*(const Eigen::Vector3d& v) const { return quaternion_ * v; }
+  // a_from_b * b_from_c.
   Rotation3 operator*(const Rotation3& other) const { return Rotation3(quaternion_ * other.quaternion_); }
 
  private:
@@ -45,10 +49,11 @@ class Rotation3 {
 
 // A rigid transform (SE(3)): x_in_a = rotation * x_in_b + translation.
 struct Rigid3 {
-  Rotation3 rotation;
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  Rotation3 rotation;                                     // applied first
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  // length units of a
 
-  Rigid3() = default;
+  Rigid3() = default;  // the identity
+  // Rotates, then translates.
   Rigid3(const Rotation3& rotation_in, const Eigen::Vector3d& translation_in)
       : rotation(rotation_in), translation(translation_in) {}
 
@@ -56,8 +61,10 @@ struct Rigid3 {
   // updates are applied on the left, camera_from_map = Exp(twist) * camera_from_map, so the twist is
   // expressed in the camera frame.
   static Rigid3 Exp(const Eigen::Matrix<double, 6, 1>& twist);
+  // The inverse of Exp.
   Eigen::Matrix<double, 6, 1> Log() const;
 
+  // For a_from_b: b_from_a.
   Rigid3 inverse() const {
     const Rotation3 inverse_rotation = rotation.inverse();
     return {inverse_rotation, -(inverse_rotation * translation)};
@@ -65,6 +72,7 @@ struct Rigid3 {
   // For camera_from_map: the camera centre in the map, map units.
   Eigen::Vector3d OriginInSource() const { return -(rotation.inverse() * translation); }
 
+  // Transforms a point.
   Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return rotation * x + translation; }
   // Homogeneous (X, w): w = 1 finite, w = 0 a direction.
   Eigen::Vector4d operator*(const Eigen::Vector4d& x) const {
@@ -72,6 +80,7 @@ struct Rigid3 {
     result << rotation * Eigen::Vector3d(x.head<3>()) + translation * x[3], x[3];
     return result;
   }
+  // a_from_b * b_from_c.
   Rigid3 operator*(const Rigid3& other) const {
     return {rotation * other.rotation, rotation * other.translation + translation};
   }
@@ -79,7 +88,9 @@ struct Rigid3 {
 
 // True if the transforms differ by at most these amounts (map units, radians).
 bool IsNear(const Rigid3& a, const Rigid3& b, double translation_tolerance, double rotation_tolerance);
+// For messages and tests.
 std::ostream& operator<<(std::ostream& out, const Rotation3& rotation);
+// For messages and tests.
 std::ostream& operator<<(std::ostream& out, const Rigid3& transform);
 
 }  // namespace docent::engine

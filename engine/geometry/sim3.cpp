@@ -76,7 +76,7 @@ std::optional<Sim3> AlignSim3(std::span<const Eigen::Vector3d> points_in_a,
     variance_b += b.squaredNorm();
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d singular = svd.singularValues();
+  const Eigen::Vector3d& singular = svd.singularValues();
   // The clouds may have an extent each and still be uncorrelated: then no rotation is best.
   if (!(singular[1] > kLineRatio * kLineRatio * singular[0])) {
     return std::nullopt;

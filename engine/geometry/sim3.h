@@ -12,12 +12,15 @@ namespace docent::engine {
 
 // A similarity (Sim(3)): x_in_a = scale * (rotation * x_in_b) + translation, scale > 0.
 struct Sim3 {
-  Rotation3 rotation;
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  double scale = 1.0;
+  Rotation3 rotation;                                     // applied first
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  // applied last, length units of a
+  double scale = 1.0;                                     // length units of a per length unit of b
 
+  // For a_from_b: b_from_a.
   Sim3 inverse() const;
+  // Transforms a point.
   Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return scale * (rotation * x) + translation; }
+  // a_from_b * b_from_c.
   Sim3 operator*(const Sim3& other) const;
 };
 
@@ -31,6 +34,7 @@ inline Sim3 AsSim3(const Rigid3& rigid) {
 std::optional<Sim3> AlignSim3(std::span<const Eigen::Vector3d> points_in_a,
                               std::span<const Eigen::Vector3d> points_in_b, bool fixed_scale = false);
 
+// For messages and tests.
 std::ostream& operator<<(std::ostream& out, const Sim3& transform);
 
 }  // namespace docent::engine

@@ -15,7 +15,7 @@ constexpr double kPlaneConfidence = 0.9999;
 constexpr int kPlaneRefinements = 10;
 // A triangle or cloud counts as a line if its height is below this ratio of its longest side, or its second
 // spread below this ratio of its first.
-constexpr double kLineRatio = 1e-6;
+constexpr double kCollinearRatio = 1e-6;
 
 std::optional<Plane> PlaneThrough(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                   const Eigen::Vector3d& c) {
@@ -23,7 +23,7 @@ std::optional<Plane> PlaneThrough(const Eigen::Vector3d& a, const Eigen::Vector3
   const Eigen::Vector3d normal = ab.cross(ac);
   const double longest_squared = std::max({ab.squaredNorm(), ac.squaredNorm(), (c - b).squaredNorm()});
   const double norm = normal.norm();
-  if (!(norm > kLineRatio * longest_squared)) {
+  if (!(norm > kCollinearRatio * longest_squared)) {
     return std::nullopt;
   }
   return Plane{normal / norm, -normal.dot(a) / norm};
@@ -51,7 +51,7 @@ std::optional<Plane> RefinePlane(std::span<const Eigen::Vector3d> points, const 
     }
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter);
-  if (!(solver.eigenvalues()[1] > kLineRatio * kLineRatio * solver.eigenvalues()[2])) {
+  if (!(solver.eigenvalues()[1] > kCollinearRatio * kCollinearRatio * solver.eigenvalues()[2])) {
     return std::nullopt;
   }
   const Eigen::Vector3d normal = solver.eigenvectors().col(0).normalized();

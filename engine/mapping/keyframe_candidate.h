@@ -7,8 +7,8 @@
 #include "engine/base/time.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
-#include "engine/mapping/two_view_geometry.h"
-#include "engine/tracking/tracked_frame.h"
+#include "engine/initialization/initial_pair.h"
+#include "engine/matching/point_match.h"
 
 namespace docent::engine {
 
@@ -41,24 +41,6 @@ struct KeyFrameCandidate {
 struct PointReport {
   MapPointId point = kNoId;
   int inlier = 0, outlier = 0, not_found = 0;
-};
-
-// Two views with matched corners and the relative pose between them: sufficient to initialize a map.
-struct InitialPair {
-  struct View {
-    Timestamp time{};
-    std::shared_ptr<const ImageFeatures> features;
-  };
-  struct Match {
-    Eigen::Vector2f pixel_a, pixel_b;  // level 0
-    std::uint8_t level = 0;            // pyramid level of the corner in view a
-  };
-  std::shared_ptr<const CameraModel> camera;
-  View a, b;
-  std::vector<Match> matches;
-  Rigid3 a_from_map;       // pose of the first view if the map already exists as a panorama; else identity
-  TwoViewResult geometry;  // one inlier flag and one point per match
-  double baseline_m = 0;   // distance of the views in metres; 0 if unknown
 };
 
 }  // namespace docent::engine

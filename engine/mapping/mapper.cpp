@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/base/option_check.h"
 #include "engine/geometry/triangulation.h"
 
 namespace docent::engine {
@@ -28,7 +29,7 @@ double ProcessorSeconds() {
 }  // namespace
 
 Mapper::Mapper(const MapperOptions& options)
-    : options_(options),
+    : options_(Checked(options)),
       searcher_(options.search),
       descriptors_(DefaultVocabulary()),
       loops_(options.loops, options.search),
@@ -132,11 +133,6 @@ std::vector<EstimatedLens> Mapper::Lenses() const {
 
 bool Mapper::IsIdle() const {
   return QueueLength() == 0 && locally_adjusted_;
-}
-
-void Mapper::AddEvent(MapperEvent::Kind kind, Timestamp time, std::string detail) {
-  const std::lock_guard lock(mutex_);
-  events_.push_back({kind, time, std::move(detail)});
 }
 
 void Mapper::Publish() {
@@ -287,11 +283,9 @@ void Mapper::InsertSixDof(const KeyFrameCandidate& candidate, Map::KeyFrameRecor
   locally_adjusted_ = false;
   Publish();
   if (candidate.choice == KeyFrameChoice::kLocalizedPanorama) {
-    AddEvent(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " infinite points");
+    AddEvent(candidate.time, MapperEvent::PanoramaOpened{rays});
   } else {
-    AddEvent(
-        MapperEvent::Kind::kKeyFrame, candidate.time,
-        std::to_string(created.size()) + " new points, " + std::to_string(map_.AlivePoints()) + " in total");
+    AddEvent(candidate.time, MapperEvent::KeyFrameAdded{created.size(), map_.AlivePoints()});
   }
 }
 
@@ -357,10 +351,9 @@ void Mapper::LocalAdjustment() {
 // The check never changes the map, so lockstep runs do not depend on whether it was finished.
 void Mapper::CheckGivenCalibrations() {
   if (map_.keyframes().empty()) return;
-  if (const auto warning = lens_estimation_.Check(&interrupt_, map_)) {
-    AddEvent(MapperEvent::Kind::kCalibrationContradicted, map_.keyframes().rbegin()->second.keyframe.time,
-             *warning);
-  }
+  if (const auto contradiction = lens_estimation_.Check(&interrupt_, map_))
+    AddEvent(map_.keyframes().rbegin()->second.keyframe.time,
+             MapperEvent::CalibrationContradicted{*contradiction});
 }
 
 bool Mapper::EstimateLenses() {
@@ -377,8 +370,7 @@ bool Mapper::EstimateLenses() {
   }
   // The lenses are set first, so that a snapshot is never published with older ones.
   if (progress == LensEstimation::Progress::kMapChanged) Publish();
-  AddEvent(MapperEvent::Kind::kLensEstimated, map_.keyframes().rbegin()->second.keyframe.time,
-           FormatFocalLength(lens_estimation_.last()));
+  AddEvent(map_.keyframes().rbegin()->second.keyframe.time, MapperEvent::LensesEstimated{});
   return true;
 }
 
@@ -401,8 +393,7 @@ void Mapper::GlobalAdjustment() {
   culling_due_ = true;
   Publish();
   if (map_.empty()) return;
-  AddEvent(MapperEvent::Kind::kGlobalAdjustment, map_.keyframes().rbegin()->second.keyframe.time,
-           summary.Brief());
+  AddEvent(map_.keyframes().rbegin()->second.keyframe.time, MapperEvent::GloballyAdjusted{summary});
 }
 
 void Mapper::CullRedundantKeyFrame() {
@@ -413,7 +404,7 @@ void Mapper::CullRedundantKeyFrame() {
   CullKeyFrame(redundant, &map_);
   searcher_.Clear();
   Publish();
-  AddEvent(MapperEvent::Kind::kKeyFrameRemoved, time, "keyframe " + std::to_string(redundant));
+  AddEvent(time, MapperEvent::KeyFrameRemoved{redundant});
 }
 
 }  // namespace docent::engine

@@ -8,71 +8,19 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
-#include "engine/mapping/guided_matching.h"
+#include "engine/mapping/calibration/lens_estimation.h"
 #include "engine/mapping/keyframe_candidate.h"
-#include "engine/mapping/keyframe_culling.h"
-#include "engine/mapping/lens_estimation.h"
-#include "engine/mapping/loop_closing.h"
-#include "engine/mapping/map_adjustment.h"
-#include "engine/mapping/map_descriptors.h"
-#include "engine/mapping/map_joining.h"
-#include "engine/mapping/panorama_mapping.h"
-#include "engine/mapping/point_creation.h"
-#include "engine/vision/image_store.h"
+#include "engine/mapping/loops/loop_closing.h"
+#include "engine/mapping/loops/map_joining.h"
+#include "engine/mapping/mapper_event.h"
+#include "engine/mapping/mapper_options.h"
+#include "engine/mapping/points/map_descriptors.h"
 
 namespace docent::engine {
-
-struct MapperOptions {
-  std::size_t max_queue = 3;           // keyframes that wait to be inserted (ptamm §2.2)
-  double initial_baseline_m = 0.1;     // distance of the two initial views if it is unknown, ptamm §2.3
-  int partners = 3;                    // keyframes in which the corners of a new keyframe are searched
-  double min_partner_baseline = 0.03;  // ratio of the keyframe's median depth
-  double max_partner_baseline = 0.6;   // ratio of the keyframe's median depth
-  int min_initial_points = 60;  // after the first adjustment; with fewer the initialization is given up
-  GuidedMatchingOptions guided_matching;
-  PointCreationOptions creation;
-  InfinitePointOptions infinite;
-  LocalizationOptions localization;
-  AppearanceOptions appearance;
-  KeyFrameCullingOptions culling;
-  int min_initial_directions = 40;  // infinite points in the first image that start a map as a panorama
-  // Minimum parallax to triangulate infinite points: points that are seen from two panorama maps are mostly
-  // further away (hybrid-slam §5.2).
-  double min_infinite_parallax_deg = 1.5;
-  // Keyframes in which the infinite points of a localized keyframe are searched.
-  int conversion_partners = 30;
-  MapAdjustmentOptions adjustment;
-  LoopOptions loops;
-  MapJoiningOptions joining;
-  LensEstimationOptions lens;
-  SearchOptions search;
-  std::shared_ptr<ImageStore> images;  // stores the keyframes' images; null: in memory
-};
-
-// An action of the mapper, for events and reports.
-struct MapperEvent {
-  enum class Kind {
-    kMapStarted,
-    kStartFailed,
-    kKeyFrame,
-    kPanoramaOpened,
-    kPanoramaKeyFrame,
-    kLocalized,
-    kConverted,
-    kKeyFrameRemoved,
-    kGlobalAdjustment,
-    kLoopClosed,
-    kLensEstimated,           // Lenses() changed
-    kCalibrationContradicted  // the map contradicts a given calibration; the detail is a warning
-  };
-  Kind kind = Kind::kKeyFrame;
-  Timestamp time{};
-  std::string detail;
-};
 
 // CPU seconds by task.
 struct MapperTimes {
@@ -163,7 +111,11 @@ class Mapper {
   KeyFrameCandidate WithCorrections(KeyFrameCandidate candidate) const;
   void CullRedundantKeyFrame();  // removes one redundant keyframe
   void Publish();
-  void AddEvent(MapperEvent::Kind kind, Timestamp time, std::string detail);
+  template <typename What>
+  void AddEvent(Timestamp time, What what) {
+    const std::lock_guard lock(mutex_);
+    events_.push_back({time, std::move(what)});
+  }
 
   const MapperOptions options_;
   // The members down to the atomics are used by the stepping thread only.

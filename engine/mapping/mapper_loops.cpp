@@ -12,8 +12,8 @@ bool Mapper::WorkOnLoops() {
     case LoopCloser::Progress::kMoved: {
       searcher_.Clear();
       Publish();
-      AddEvent(MapperEvent::Kind::kLoopClosed, map_.FindKeyFrame(loops_.closed_by())->keyframe.time,
-               loops_.report());
+      const ClosedLoop& loop = loops_.last();
+      AddEvent(map_.FindKeyFrame(loop.keyframe)->keyframe.time, MapperEvent::LoopClosed{loop});
       const std::lock_guard lock(mutex_);
       ++times_.loops_closed;
       break;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The mapper's tasks on panorama maps (hybrid-slam §5).
 #include <algorithm>
-#include <string>
 
 #include "engine/mapping/mapper.h"
 
@@ -39,8 +38,7 @@ void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
   RemoveInfiniteOutliers(candidate.panorama, &map_);
   to_localize_.push_back({id});
   Publish();
-  AddEvent(MapperEvent::Kind::kPanoramaKeyFrame, candidate.time,
-           std::to_string(rays) + " new infinite points");
+  AddEvent(candidate.time, MapperEvent::PanoramaKeyFrameAdded{rays});
 }
 
 std::size_t Mapper::CountFinite() const {
@@ -100,8 +98,7 @@ bool Mapper::Localize(KeyFrameId id, const Rigid3* guess) {
   ++keyframes_since_global_;
   locally_adjusted_ = false;
   Publish();
-  AddEvent(MapperEvent::Kind::kLocalized, map_.FindKeyFrame(id)->keyframe.time,
-           "keyframe " + std::to_string(id) + (guess != nullptr ? ", by its descriptors" : ""));
+  AddEvent(map_.FindKeyFrame(id)->keyframe.time, MapperEvent::KeyFrameLocalized{id, guess != nullptr});
   return true;
 }
 
@@ -139,9 +136,8 @@ bool Mapper::ConvertOne() {
   if (conversion.converted.empty() && conversion.merged == 0) return true;
   to_match_.insert(to_match_.end(), conversion.converted.begin(), conversion.converted.end());
   Publish();
-  AddEvent(MapperEvent::Kind::kConverted, map_.FindKeyFrame(partner)->keyframe.time,
-           std::to_string(conversion.converted.size()) + " infinite points triangulated, " +
-               std::to_string(conversion.merged) + " fused");
+  AddEvent(map_.FindKeyFrame(partner)->keyframe.time,
+           MapperEvent::InfinitePointsTriangulated{conversion.converted.size(), conversion.merged});
   return true;
 }
 

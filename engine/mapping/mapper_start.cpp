@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Starting the mapper's map: from two views with depth, or from one view that gives only infinite points.
 #include <algorithm>
-#include <string>
 #include <utility>
 
 #include "engine/mapping/mapper.h"
@@ -67,12 +66,9 @@ void Mapper::StartMap(const InitialPair& pair) {
   CreatePoints(options_.creation, b, a, &map_, &searcher_);
   CreatePoints(options_.creation, a, b, &map_, &searcher_);
   AdjustGlobally(options_.adjustment, nullptr, &map_);
-  const auto finite_points =
-      std::count_if(map_.points().begin(), map_.points().end(),
-                    [](const Map::PointRecord& record) { return record.alive && !record.point.infinite(); });
-  if (finite_points < options_.min_initial_points) {
-    AddEvent(MapperEvent::Kind::kStartFailed, pair.b.time,
-             "only " + std::to_string(finite_points) + " points are consistent");
+  const std::size_t finite_points = CountFinite();
+  if (static_cast<int>(finite_points) < options_.min_initial_points) {
+    AddEvent(pair.b.time, MapperEvent::StartFailed{finite_points});
     map_ = before;
     searcher_.Clear();
     newest_ = kNoId;
@@ -85,7 +81,7 @@ void Mapper::StartMap(const InitialPair& pair) {
   if (panorama) to_convert_.emplace_back(a, b);
   locally_adjusted_ = true;
   Publish();
-  AddEvent(MapperEvent::Kind::kMapStarted, pair.b.time, std::to_string(finite_points) + " points");
+  AddEvent(pair.b.time, MapperEvent::MapStarted{finite_points});
 }
 
 // A map without finite points: its first keyframe is the reference of a panorama map, at the origin.
@@ -104,7 +100,7 @@ void Mapper::StartFromPanorama(const KeyFrameCandidate& candidate) {
   }
   newest_ = id;
   Publish();
-  AddEvent(MapperEvent::Kind::kPanoramaOpened, candidate.time, std::to_string(rays) + " infinite points");
+  AddEvent(candidate.time, MapperEvent::PanoramaOpened{rays});
 }
 
 }  // namespace docent::engine

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/base/option_check.h"
 #include "engine/base/random.h"
 
 namespace docent::engine {
@@ -233,6 +234,17 @@ Support FindSupport(const Correspondences& all, const AbsolutePoseOptions& optio
 
 }  // namespace
 
+std::optional<std::string> AbsolutePoseOptions::Validate() const {
+  return OptionCheck()
+      .Positive(pixel_angle, "angle of a pixel")
+      .Positive(inlier_px, "inlier threshold of an absolute pose")
+      .AtLeast(max_iterations, 1, "number of iterations of an absolute pose")
+      .Ratio(confidence, "confidence of an absolute pose")
+      .AtLeast(min_inliers, 0, "number of inliers of an absolute pose")
+      .Ratio(min_inlier_ratio, "inlier ratio of an absolute pose")
+      .fault();
+}
+
 std::vector<Rigid3> SolveThreePoints(std::span<const Eigen::Vector3d, 3> rays_in_camera,
                                      std::span<const Eigen::Vector3d, 3> points_in_map) {
   const auto map_frame = TriangleFrame(points_in_map[0], points_in_map[1], points_in_map[2]);
@@ -321,6 +333,7 @@ Rigid3 RefineAbsolutePose(std::span<const Eigen::Vector3d> rays_in_camera,
 std::optional<AbsolutePose> EstimateAbsolutePose(std::span<const Eigen::Vector3d> rays_in_camera,
                                                  std::span<const Eigen::Vector3d> points_in_map,
                                                  const AbsolutePoseOptions& options) {
+  Checked(options);
   const std::size_t count = std::min(rays_in_camera.size(), points_in_map.size());
   Correspondences all;
   all.pixel_angle = options.pixel_angle;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/geometry/rigid3.h"
@@ -22,6 +23,9 @@ struct AbsolutePoseOptions {
   int min_inliers = 8;  // at least 4: three points fit any pose exactly
   double min_inlier_ratio = 0.0;
   std::uint64_t seed = 1;
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 struct AbsolutePose {

@@ -8,6 +8,8 @@
 #include <tuple>
 #include <utility>
 
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
 
 namespace {
@@ -30,6 +32,15 @@ std::uint32_t HomeLeaf(const VocabularyTree& tree, const Descriptor& descriptor)
 }
 
 }  // namespace
+
+std::optional<std::string> DescriptorDatabase::MatchOptions::Validate() const {
+  return OptionCheck()
+      .Within(static_cast<double>(leaves), 1, static_cast<double>(VocabularyTree::kMaxNearestLeaves),
+              "number of searched leaves")
+      .AtLeast(max_distance, 0, "squared distance of two descriptors")
+      .Ratio(max_ratio, "ratio of the distances of two matches")
+      .fault();
+}
 
 // The best entry for a query, and the distance to the best entry of another point.
 struct DescriptorDatabase::Best {
@@ -146,6 +157,7 @@ void DescriptorDatabase::SearchLeaves(const Descriptor& query, const MatchOption
 
 std::vector<DescriptorDatabase::Match> DescriptorDatabase::FindMatches(std::span<const Descriptor> queries,
                                                                        const MatchOptions& options) const {
+  Checked(options);
   std::vector<Match> matches;
   std::unordered_map<KeyFrameId, Best> best_of;
   for (std::size_t query = 0; query < queries.size(); ++query) {

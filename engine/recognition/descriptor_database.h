@@ -4,7 +4,9 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -58,6 +60,9 @@ class DescriptorDatabase {
     // same scene point observed in two keyframes.
     bool each_keyframe = false;
     KeyFrameId only_keyframe = kNoId, except_keyframe = kNoId;  // kNoId: no restriction
+
+    // Describes the first invalid option in one sentence, or empty.
+    std::optional<std::string> Validate() const;
   };
   struct Match {
     std::size_t query = 0;  // index of the descriptor

@@ -13,10 +13,10 @@ namespace docent::engine {
 
 // A keyframe of one of the maps whose appearance resembles the present image. Not verified geometrically.
 struct PlaceCandidate {
-  std::uint64_t map_key = 0;
-  std::shared_ptr<const MapSnapshot> map;
-  KeyFrameId keyframe = kNoId;
-  double difference = 0;  // mean squared difference of the thumbnails
+  std::uint64_t map_key = 0;               // the map that it belongs to
+  std::shared_ptr<const MapSnapshot> map;  // null if the map is not in memory
+  KeyFrameId keyframe = kNoId;             // of that map
+  double difference = 0;                   // mean squared difference of the thumbnails
 };
 
 // The appearance of the image whose place is wanted. A view: the caller keeps both objects alive.
@@ -28,8 +28,8 @@ struct PlaceQuery {
   PlaceQuery(const SmallBlurryImage& thumbnail, const WordBag& visual_words)
       : image(&thumbnail), words(&visual_words) {}
 
-  const SmallBlurryImage* image;
-  const WordBag* words = nullptr;
+  const SmallBlurryImage* image;   // never null
+  const WordBag* words = nullptr;  // null: none
   // If true, candidates of distinct places come first; otherwise the most similar keyframes of any place.
   bool places_first = true;
 };

@@ -44,13 +44,14 @@ class PlaceIndex : public PlaceFinder {
                      std::span<const KeyFrameWords> words = {});
   // Releases a map's snapshot but keeps its appearance.
   void ReleaseMap(std::uint64_t key);
+  // Forgets a map; does nothing if there is none with that key.
   void RemoveMap(std::uint64_t key);
   // Reserves memory for this many thumbnails of images with an aspect ratio of 4:3, so that loading a library
   // allocates once.
   void Reserve(std::size_t keyframes);
 
-  std::size_t maps() const;
-  std::size_t keyframes() const;
+  std::size_t maps() const;                                // The number of maps.
+  std::size_t keyframes() const;                           // The number of keyframes of all maps.
   std::size_t words() const { return words_.postings(); }  // The number of words in all keyframes.
 
   // Retrieves the best keyframes by each method, then compares all of them by both methods and ranks them by

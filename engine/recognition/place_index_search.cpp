@@ -14,7 +14,7 @@ namespace {
 
 // The number of thumbnails that the exhaustive search passes to the fine comparison. Of the 80
 // pixels of the small blurry image's width, a coarse cell covers six and a fine pixel two.
-constexpr std::size_t kFineCandidates = 256;
+constexpr std::size_t kFineThumbnails = 256;
 // The number of candidates that the search by words contributes.
 constexpr std::size_t kWordCandidates = 64;
 constexpr double kMaxChanceCorrelation = 0.9;
@@ -68,7 +68,7 @@ void PlaceIndex::Merge::AddByThumbnail(const PackedThumbnail& wanted, std::size_
   if (!only_map) {
     const std::size_t dead = array->size - array->alive;
     hits = array->thumbnails->Search(
-        wanted, array->size, std::max(kFineCandidates, count) + std::min(dead, kDeadThumbnailsAllowed));
+        wanted, array->size, std::max(kFineThumbnails, count) + std::min(dead, kDeadThumbnailsAllowed));
   } else {
     std::vector<std::size_t> slots;
     for (const Entry& entry : only_map->entries) {

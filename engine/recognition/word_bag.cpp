@@ -3,6 +3,8 @@
 
 #include <array>
 
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
 
 WordBag MakeWordBag(std::vector<std::uint32_t> leaves) {
@@ -18,6 +20,7 @@ WordBag MakeWordBag(std::vector<std::uint32_t> leaves) {
 
 WordBag MakeWordBag(const ImageFeatures& features, const VocabularyTree& tree,
                     const WordBagOptions& options) {
+  Checked(options);
   std::vector<std::uint32_t> leaves;
   for (const DescribedKeypoint& place : DescribeCorners(features, options.corners)) {
     // The nearest of the leaves that a descent along several branches reaches: a descent along one branch

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "engine/recognition/vocabulary_tree.h"
@@ -40,6 +42,9 @@ struct WordBagOptions {
   // The finest level is not used: its corners are affected most by noise and motion blur, and each word has a
   // cost. A 640x480 image has about 190 words.
   CornerDescriptionOptions corners{.corners = {0, 60, 60, 40}, .min_score = 20};
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const { return corners.Validate(); }
 };
 
 // The words of the best corners of an image. The same features and tree give the same words.

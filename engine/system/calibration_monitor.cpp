@@ -6,11 +6,25 @@
 #include <numbers>
 #include <utility>
 
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
+
+std::optional<std::string> CalibrationMonitorOptions::Validate() const {
+  return OptionCheck()
+      .AtLeast(frames_between_samples, 0, "number of frames between samples")
+      .AtLeast(rotation_between_samples_deg, 0, "rotation between samples")
+      .That(min_ring_matches > 0, "A ring needs at least one match.")
+      .That(min_samples > 1, "A ring needs at least two samples.")
+      .That(min_rings > 1 && min_rings <= CalibrationMonitor::kRings, "From 2 to 6 rings must be required.")
+      .Positive(warning_px, "difference between rings")
+      .AtLeast(warning_sigmas, 0, "number of standard deviations")
+      .fault();
+}
 
 CalibrationMonitor::CalibrationMonitor(std::shared_ptr<const CameraModel> camera,
                                        const CalibrationMonitorOptions& options)
-    : camera_(std::move(camera)), options_(options) {
+    : camera_(std::move(camera)), options_(Checked(options)) {
   const auto& lens = camera_->intrinsics();
   const double across = std::max(lens.cx, lens.width_px - 1 - lens.cx);
   const double down = std::max(lens.cy, lens.height_px - 1 - lens.cy);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "engine/geometry/camera_model.h"
@@ -25,6 +26,9 @@ struct CalibrationMonitorOptions {
   // and more.
   double warning_px = 0.3;
   double warning_sigmas = 5;  // the difference must also exceed this many of its standard deviations
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // Monitors one camera. With the correct calibration, reprojection errors are unbiased everywhere in the

@@ -7,6 +7,9 @@
 #include <limits>
 #include <numbers>
 
+#include "engine/base/median.h"
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
 
 namespace {
@@ -14,12 +17,6 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;
 // For distances in 3D: the median of |x| for a normal x in three dimensions is 1.538 sigma.
 constexpr double kSigmaOfMedianDistance = 1 / 1.538;
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Eigen::Vector3d GeometricMedian(const std::vector<Rigid3>& poses) {
   // Start at the medians of the coordinates, which are close already.
@@ -76,6 +73,17 @@ Rigid3 Interpolate(const Rigid3& a, const Rigid3& b, double fraction) {
 }
 
 }  // namespace
+
+std::optional<std::string> RigOptions::Validate() const {
+  return OptionCheck()
+      .That(min_samples > 0, "A rig needs at least one sample.")
+      .That(window >= min_samples, "The window of a rig must hold the samples that an estimate needs.")
+      .AtLeast(viewpoint_rotation_deg, 0, "rotation between viewpoints")
+      .Positive(max_rigid_position_sigma, "position sigma of a rigid rig")
+      .Positive(max_rigid_rotation_deg, "rotation sigma of a rigid rig")
+      .NotNegative(max_gap, "gap between poses of a rig")
+      .fault();
+}
 
 std::string RigEstimate::ToString() const {
   char text[160];

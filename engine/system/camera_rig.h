@@ -7,31 +7,37 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/option_check.h"
 #include "engine/base/time.h"
 #include "engine/geometry/rigid3.h"
 
 // Estimates the relative pose of two cameras from the times at which both are tracked in one map.
 namespace docent::engine {
 
+// When the estimate of a rig counts as known and as rigid.
 struct RigOptions {
   std::size_t window = 300;      // number of the newest relative poses that are kept
   std::size_t min_samples = 45;  // fewer give no estimate
   // Viewpoints must be viewpoint_rotation_deg or more apart, so that standing still does not count as rigid.
   std::size_t min_viewpoints = 4;
-  double viewpoint_rotation_deg = 3;
+  double viewpoint_rotation_deg = 3;       // see min_viewpoints
   double max_rigid_position_sigma = 0.02;  // ratio of the baseline; robust sigma of the relative position
   double max_rigid_rotation_deg = 0.5;     // robust sigma of the relative rotation
   Timestamp max_gap = std::chrono::milliseconds(120);  // between poses that are interpolated
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // Relative pose of two cameras with its uncertainty. Lengths are in map units.
 struct RigEstimate {
-  Rigid3 second_from_first;
-  double position_sigma = 0;  // robust sigma of a single sample about the estimate
-  double rotation_sigma_deg = 0;
-  std::size_t samples = 0;
+  Rigid3 second_from_first;       // between the frames of the two cameras
+  double position_sigma = 0;      // robust sigma of a single sample about the estimate
+  double rotation_sigma_deg = 0;  // the same for the rotation
+  std::size_t samples = 0;        // number of relative poses that it was made from
   bool rigid = false;  // whether the cameras keep their relative pose, up to the noise of two trackers
 
+  // The distance of the camera centres.
   double Baseline() const { return second_from_first.translation.norm(); }
   // "rigid, baseline 0.25 (sigma 0.001), rotation 12.3 degrees (sigma 0.05)"
   std::string ToString() const;
@@ -47,7 +53,8 @@ RigEstimate RobustRelativePose(const std::vector<Rigid3>& second_from_first);
 // synchronized. Maps differ in scale, so a new map starts a new estimate. Its owner guards it.
 class CameraRig {
  public:
-  explicit CameraRig(const RigOptions& options = {}) : options_(options) {}
+  // Begins without an estimate. Throws Error if the options are invalid.
+  explicit CameraRig(const RigOptions& options = {}) : options_(Checked(options)) {}
 
   // camera is 0 or 1; the times of one camera ascend.
   void Add(int camera, Timestamp time, std::uint64_t map_key, const Rigid3& camera_from_map);

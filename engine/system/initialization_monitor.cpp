@@ -5,7 +5,19 @@
 #include <cmath>
 #include <numeric>
 
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
+
+std::optional<std::string> InitializationMonitorOptions::Validate() const {
+  return OptionCheck()
+      .Ratio(min_inlier_ratio_kept, "inlier ratio kept")
+      .NotNegative(initial_period, "initial period")
+      .NotNegative(recent_period, "recent period")
+      .Positive(max_distance, "distance from the first view")
+      .Positive(max_rotation, "rotation from the first view")
+      .fault();
+}
 
 void InitializationMonitor::Add(const TrackedFrame& frame) {
   if (!HasPose(frame.state) || !frame.map || !frame.map->HasFinitePoints()) return;

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "engine/base/option_check.h"
 #include "engine/tracking/tracked_frame.h"
 
 namespace docent::engine {
@@ -21,13 +23,17 @@ struct InitializationMonitorOptions {
   // correct map may be out of view.
   double max_distance = 0.3;
   double max_rotation = 0.35;  // radians
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // Checks, in the first frames that are tracked in a new map with finite points, whether its depth is false.
 // One for each new map; its owner guards it.
 class InitializationMonitor {
  public:
-  explicit InitializationMonitor(const InitializationMonitorOptions& options = {}) : options_(options) {}
+  explicit InitializationMonitor(const InitializationMonitorOptions& options = {})
+      : options_(Checked(options)) {}
 
   // To be called with every frame that is tracked in the map, by ascending time. A frame for which the map
   // gave the rotation alone counts with an inlier ratio of 0.

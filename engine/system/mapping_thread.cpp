@@ -7,6 +7,7 @@
 #include <chrono>
 #include <memory>
 #include <utility>
+#include <variant>
 
 namespace docent::engine {
 
@@ -71,14 +72,15 @@ void MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const MapSnapshot> 
   if (!worker_) ApplyAdoption();
 }
 
-void MappingThread::Start(std::uint64_t key, InitialPair pair) {
+bool MappingThread::Start(std::uint64_t key, InitialPair pair) {
   {
     const std::scoped_lock lock(mutex_);
-    if (key != requested_key_) return;
+    if (key != requested_key_) return false;
     pair_ = std::move(pair);
     starting_ = has_work_ = true;
   }
   changed_.notify_all();
+  return true;
 }
 
 void MappingThread::Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const MapSnapshot> other) {
@@ -118,8 +120,12 @@ void MappingThread::ApplyAdoption() {
     lock.lock();
     if (adoption_->key == adoption.key && adoption_->snapshot == adoption.snapshot) adoption_.reset();
   }
-  if (pair_) mapper_.Start(std::move(*pair_));
-  pair_.reset();
+  if (!pair_) return;
+  if (mapper_.Start(*pair_)) {
+    pair_.reset();
+  } else {
+    has_work_ = true;  // the queue is full: again after the next step
+  }
 }
 
 void MappingThread::JoinIfRequested() {
@@ -144,15 +150,16 @@ bool MappingThread::StepOnce() {
   update.key = key_;
   update.events = mapper_.TakeEvents();
   for (const MapperEvent& event : update.events) {
-    if (event.kind == MapperEvent::Kind::kLensEstimated) update.lenses = mapper_.Lenses();
+    if (std::holds_alternative<MapperEvent::LensesEstimated>(event.what)) update.lenses = mapper_.Lenses();
   }
   if (auto snapshot = mapper_.Snapshot(); snapshot != last_snapshot_)
     update.snapshot = last_snapshot_ = std::move(snapshot);
   if (update.snapshot || !update.events.empty()) {
     on_update_(update);
-    using Kind = MapperEvent::Kind;
     for (const MapperEvent& event : update.events) {
-      if (event.kind != Kind::kMapStarted && event.kind != Kind::kStartFailed) continue;
+      if (!std::holds_alternative<MapperEvent::MapStarted>(event.what) &&
+          !std::holds_alternative<MapperEvent::StartFailed>(event.what))
+        continue;
       const std::scoped_lock lock(mutex_);
       if (requested_key_ == key_) starting_ = false;
     }

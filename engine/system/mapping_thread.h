@@ -31,7 +31,7 @@ class MappingThread {
     std::uint64_t key = 0;
     std::shared_ptr<const MapSnapshot> snapshot;  // null when nothing new was published
     std::vector<MapperEvent> events;
-    // All estimated lenses if one of the events is kLensEstimated, else empty. `snapshot` uses them.
+    // All estimated lenses if one of the events is LensesEstimated, else empty. `snapshot` uses them.
     std::vector<EstimatedLens> lenses = {};
     // Result of a Join. When the maps were joined, `snapshot` is the joined map.
     struct Join {
@@ -47,8 +47,9 @@ class MappingThread {
 
   // Continues with this map; pending requests for another one are dropped. A null snapshot waits for Start.
   void Adopt(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);
-  // Initializes the map of `key` from its first two views; ignored when another map was adopted since.
-  void Start(std::uint64_t key, InitialPair pair);
+  // Initializes the map of `key` from its first two views; false when another map was adopted since. The pair
+  // waits while the queue of keyframes is full.
+  bool Start(std::uint64_t key, InitialPair pair);
   // Joins another map into the map of `key` (see Mapper::Join). Ignored when a map, even the same one, is
   // adopted before it is done; then no update reports it. A newer request replaces a pending one.
   void Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const MapSnapshot> other);

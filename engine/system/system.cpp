@@ -5,10 +5,20 @@
 #include <type_traits>
 #include <utility>
 
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
 
+std::optional<std::string> SystemOptions::Validate() const {
+  return OptionCheck()
+      .NotNegative(lost_time_before_new_map, "loss before a new map")
+      .Contained(provisional.Validate())
+      .Contained(tracker.Validate())
+      .fault();
+}
+
 System::System(const SystemOptions& options, std::vector<std::shared_ptr<const CameraModel>> cameras)
-    : options_(options),
+    : options_(Checked(options)),
       association_(cameras.size()),
       lenses_(options.mapper.lens.lenses),
       mapping_(options.mapper, options.threaded && options.extend_maps,
@@ -50,6 +60,7 @@ TrackedFrame System::Process(const Frame& frame) {
 }
 
 CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
+  using Order = MapAssignment::Order;
   Camera* const camera = &cameras_[index];
   Tracker& tracker = *camera->tracker;
   std::uint64_t searched = 0;
@@ -57,33 +68,28 @@ CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
   std::shared_ptr<const MapSnapshot> snapshot;
   std::shared_ptr<const CameraModel> model;
   std::uint64_t key = 0;
-  Camera::Order order = Camera::Order::kNone;
+  auto order = Order::kNone;
   {
     const std::scoped_lock lock(mutex_);
     model = camera->model;
-    order = std::exchange(camera->order, Camera::Order::kNone);
-    if (order == Camera::Order::kStart || order == Camera::Order::kStartAfterLoss)
-      camera->initializing = true;
-    if (order == Camera::Order::kLeave || order == Camera::Order::kEnter) camera->initializing = false;
-    if (const auto found = maps_.find(camera->map_key); found != maps_.end()) {
+    if (const auto found = maps_.find(camera->assignment.map()); found != maps_.end()) {
       snapshot = found->second.snapshot;
-      key = camera->map_key;
+      key = found->first;
     }
-    // A map without finite points still waits for its initialization.
-    if (snapshot && snapshot->HasFinitePoints()) camera->initializing = false;
+    order = camera->assignment.TakeOrder(snapshot && snapshot->HasFinitePoints());
     searched = association_.SearchedMap(index);
     if (snapshot && index < 2 && !association_.IsTracked(index)) {
       if (const auto pose = rig_.Predict(static_cast<int>(index), time, key))
         prediction = CameraPlaceFinder::Prediction{key, snapshot, *pose};
     }
   }
-  if (order == Camera::Order::kStart) {
+  if (order == Order::kStart) {
     tracker.StartNewMap(/*search_known_maps=*/false);
-  } else if (order == Camera::Order::kStartAfterLoss) {
+  } else if (order == Order::kStartAfterLoss) {
     tracker.StartNewMap(/*search_known_maps=*/true);
-  } else if (order == Camera::Order::kStartAgain) {
+  } else if (order == Order::kStartAgain) {
     tracker.StartFailed();
-  } else if (order != Camera::Order::kNone) {
+  } else if (order != Order::kNone) {
     tracker.Reset();
   }
   tracker.SetCamera(std::move(model));
@@ -97,27 +103,27 @@ void System::HandleResult(std::size_t index, TrackedFrame* frame) {
   const Timestamp now = camera->last_time = frame->frame.time;
   if (!HasPose(frame->state)) {
     association_.SetLost(index);
-  } else if (const auto map = maps_.find(frame->map_key); camera->order != Camera::Order::kNone ||
+  } else if (const auto map = maps_.find(frame->map_key); camera->assignment.has_order() ||
                                                           map == maps_.end() || !map->second.Exists() ||
                                                           !association_.SetTracked(index, frame->map_key)) {
     association_.SetLost(index);
     RejectPose(index, frame);
   }
   const bool has_pose = HasPose(frame->state);
-  if (has_pose && frame->map_key != camera->map_key) {
+  if (has_pose && frame->map_key != camera->assignment.map()) {
     EnterTrackedMap(index, frame->map_key, now);
   } else if (frame->state == TrackingState::kRelocalized) {
     Emit(now, frame->map_key, Relocalized{}, index);
   }
   if (has_pose) {
-    camera->lost_since.reset();
+    camera->assignment.SetTracked();
     CheckCalibration(index, *frame);
     UpdateRig(index, *frame);
-  } else if (frame->state == TrackingState::kLost && !camera->lost_since) {
-    camera->lost_since = now;
+  } else if (frame->state == TrackingState::kLost) {
+    camera->assignment.SetLost(now);
   }
   // With several cameras, one that is tracked shows that the initialization holds.
-  if (has_pose || !association_.AnyTracked()) CheckProvisionalMap(camera, *frame);
+  if (has_pose || !association_.AnyTracked()) CheckProvisionalMap(*camera, *frame);
   if (!has_pose) CheckLoss(index, *frame);
 }
 
@@ -132,8 +138,7 @@ void System::RejectPose(std::size_t index, TrackedFrame* frame) {
   frame->matches.clear();
   frame->finite_points = frame->infinite_points = 0;
   frame->hint = "Point this camera at what the other camera sees";
-  Camera& camera = cameras_[index];
-  if (camera.order == Camera::Order::kNone) camera.order = Camera::Order::kEnter;
+  cameras_[index].assignment.SearchAgain();
 }
 
 void System::UpdateRig(std::size_t index, const TrackedFrame& frame) {
@@ -156,14 +161,12 @@ void System::CheckCalibration(std::size_t index, const TrackedFrame& frame) {
 }
 
 void System::EnterTrackedMap(std::size_t index, std::uint64_t key, Timestamp time) {
-  const std::uint64_t previous = std::exchange(cameras_[index].map_key, key);
+  const std::uint64_t previous = cameras_[index].assignment.map();
+  cameras_[index].assignment.Follow(key);
   Emit(time, key, MapEntered{}, index);
   // The other cameras abandon their search and enter this map (ptamm §3.3).
   for (Camera& other : cameras_) {
-    if (other.map_key == key) continue;
-    other.map_key = key;
-    other.lost_since.reset();
-    other.order = Camera::Order::kEnter;
+    if (other.assignment.map() != key) other.assignment.Enter(key);
   }
   if (!options_.extend_maps || active_key_ == key) return;
   LeavePreviousMap(previous, key, time);
@@ -177,7 +180,7 @@ void System::LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, Tim
   const auto found = maps_.find(previous);
   if (found == maps_.end() || !found->second.Exists()) return;
   MapState& left = found->second;
-  left.provisional = false;
+  left.provisional.End();
   Emit(time, previous, MapLeft{});
   if (!left.after_loss) return;
   if (left.snapshot && left.snapshot->HasFinitePoints()) {
@@ -192,63 +195,35 @@ void System::LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, Tim
   Emit(time, previous, event);
 }
 
-void System::CheckProvisionalMap(Camera* camera, const TrackedFrame& frame) {
-  const auto found = maps_.find(camera->map_key);
+void System::CheckProvisionalMap(const Camera& camera, const TrackedFrame& frame) {
+  const auto found = maps_.find(camera.assignment.map());
   if (found == maps_.end()) return;
   MapState& map = found->second;
-  const Timestamp now = frame.frame.time;
-  MapDiscarded event;
-  if (options_.extend_maps && map.snapshot && !map.snapshot->HasFinitePoints()) {
-    // A map without finite points is quickly made again.
-    event.reason = MapDiscarded::Reason::kLostWithoutDepth;
-    if (camera->lost_since && now - *camera->lost_since > options_.panorama_loss_time)
-      Discard(map.key, now, event);
-    return;
-  }
-  if (!map.provisional) return;
-  if (frame.map_key == map.key) map.initialization_monitor.Add(frame);
-  const auto fault = map.initialization_monitor.FindFault();
-  if (fault && map.permissions.discard) {
-    event.reason = MapDiscarded::Reason::kFalseDepth;
-    event.fault = *fault;
-    Discard(map.key, now, event);
-    return;
-  }
-  if (!camera->lost_since) {
-    if (now - map.started > options_.provisional_time ||
-        map.snapshot->keyframes.size() >= options_.provisional_keyframes)
-      map.provisional = false;
-    return;
-  }
-  if (now - *camera->lost_since <= options_.provisional_loss_time) return;
-  if (!map.permissions.discard) {
-    map.provisional = false;
-    return;
-  }
-  event.reason = MapDiscarded::Reason::kLostWhileProvisional;
-  event.tracked_for = *camera->lost_since - map.started;
-  event.keyframes = map.snapshot->keyframes.size();
-  Discard(map.key, now, event);
+  const auto reason =
+      map.provisional.Check(options_.provisional, {.frame = frame,
+                                                   .in_map = frame.map_key == map.key,
+                                                   .map = map.snapshot.get(),
+                                                   .lost_since = camera.assignment.lost_since(),
+                                                   .may_extend = options_.extend_maps,
+                                                   .may_discard = map.permissions.discard});
+  if (reason) Discard(map.key, frame.frame.time, *reason);
 }
 
 // Starts a new map for a camera that is lost and recognises no map.
 void System::CheckLoss(std::size_t index, const TrackedFrame& frame) {
-  const Camera& camera = cameras_[index];
-  if (!options_.extend_maps || !options_.new_map_when_lost || !camera.lost_since || association_.AnyTracked())
-    return;
-  const auto found = maps_.find(camera.map_key);
+  const MapAssignment& assignment = cameras_[index].assignment;
+  if (!options_.extend_maps || !options_.new_map_when_lost || association_.AnyTracked()) return;
+  const auto found = maps_.find(assignment.map());
   // A map that the user stopped, or that may not be extended, is not left automatically.
-  if (found == maps_.end() || found->second.provisional || active_key_ != found->first) return;
+  if (found == maps_.end() || found->second.provisional.is_pending() || active_key_ != found->first) return;
   const Timestamp now = frame.frame.time;
-  if (now - *camera.lost_since <= options_.lost_time_before_new_map) return;
+  if (!assignment.IsLostFor(options_.lost_time_before_new_map, now)) return;
   if (frame.relocalization.rejection == RejectionReason::kUnconfirmed) return;  // relocalization is imminent
   const std::uint64_t lost_in = found->first;
   const std::uint64_t key = NewKey();
   if (key == 0) return;
   Emit(now, key, MapStartedAfterLoss{lost_in}, index);
-  StartMapAt(key, index);
-  maps_.at(key).after_loss = true;
-  cameras_[index].order = Camera::Order::kStartAfterLoss;
+  StartMapAt(key, index, true);
 }
 
 void System::Discard(std::uint64_t key, Timestamp time, MapDiscarded event) {
@@ -264,12 +239,7 @@ void System::Discard(std::uint64_t key, Timestamp time, MapDiscarded event) {
   AssignMapper(next.key, nullptr);
   association_.Begin(next.key);
   for (Camera& camera : cameras_) {
-    if (camera.map_key != key) continue;
-    camera.map_key = next.key;
-    camera.order = !camera.started_map ? Camera::Order::kEnter
-                   : next.after_loss   ? Camera::Order::kStartAfterLoss
-                                       : Camera::Order::kStart;
-    camera.lost_since.reset();
+    if (camera.assignment.map() == key) camera.assignment.Replace(next.key, next.after_loss);
   }
 }
 
@@ -286,16 +256,26 @@ void System::OfferToMapper(std::size_t index, const TrackedFrame& frame) {
   std::uint64_t key = 0;
   {
     const std::scoped_lock lock(mutex_);
-    key = cameras_[index].map_key;
+    key = cameras_[index].assignment.map();
     const auto found = maps_.find(key);
-    if (found == maps_.end() || key != active_key_) return;
+    if (found == maps_.end() || key != active_key_) {
+      if (pair) tracker.StartFailed();
+      return;
+    }
+    // With finite points in the map, the next frame ends the initialization.
     if (pair && found->second.snapshot && found->second.snapshot->HasFinitePoints()) return;
     if (candidate && !MayAddKeyFrame(found->second, frame.camera_from_map)) candidate.reset();
   }
   if (!pair && !candidate) return;
-  bool accepted = pair.has_value();
-  if (pair) mapping_.Start(key, std::move(*pair));
-  if (candidate) accepted = mapping_.Offer(key, std::move(*candidate), tracker.TakeReports());
+  bool accepted = false;
+  if (pair) {
+    accepted = mapping_.Start(key, std::move(*pair));
+    if (!accepted) tracker.StartFailed();
+  }
+  if (candidate) {
+    accepted = mapping_.Offer(key, std::move(*candidate), tracker.TakeReports());
+    if (accepted) tracker.KeyFrameAccepted();
+  }
   const std::scoped_lock lock(mutex_);
   Emit(frame.frame.time, key, KeyFrameOffered{accepted}, index);
 }
@@ -330,19 +310,16 @@ void System::OnMapperUpdate(const MappingThread::MapperUpdate& update) {
 }
 
 void System::HandleMapperEvent(const MapperEvent& event, MapState* map) {
-  if (event.kind == MapperEvent::Kind::kMapStarted) {
-    map->started = event.time;
-    map->provisional = true;
-    map->initialization_monitor = InitializationMonitor();
+  if (std::holds_alternative<MapperEvent::MapStarted>(event.what)) {
+    map->provisional.Begin(event.time);
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      if (cameras_[i].map_key == map->key && cameras_[i].initializing) association_.SetTracked(i, map->key);
+      const MapAssignment& assignment = cameras_[i].assignment;
+      if (assignment.map() == map->key && assignment.is_starting()) association_.SetTracked(i, map->key);
     }
-  } else if (event.kind == MapperEvent::Kind::kStartFailed) {
+  } else if (std::holds_alternative<MapperEvent::StartFailed>(event.what)) {
     for (Camera& camera : cameras_) {
-      if (camera.map_key != map->key || !camera.initializing) continue;
-      camera.order = map->snapshot     ? Camera::Order::kStartAgain
-                     : map->after_loss ? Camera::Order::kStartAfterLoss
-                                       : Camera::Order::kStart;
+      if (camera.assignment.map() == map->key)
+        camera.assignment.FailStart(map->snapshot != nullptr, map->after_loss);
     }
   }
   Emit(event.time, map->key, event);
@@ -427,18 +404,21 @@ void System::SetPermissions(std::uint64_t key, const MapPermissions& permissions
 
 void System::StartMap(std::uint64_t key, std::size_t camera) {
   const std::scoped_lock lock(mutex_);
-  StartMapAt(key, camera);
+  StartMapAt(key, camera, false);
 }
 
-void System::StartMapAt(std::uint64_t key, std::size_t camera) {
+void System::StartMapAt(std::uint64_t key, std::size_t camera, bool after_loss) {
   const std::uint64_t previous = active_key_;
   if (previous != 0) LeaveMapNow(previous);
-  ActivateNow(AddState(key));
+  MapState& map = AddState(key);
+  if (after_loss) map.after_loss = true;
+  ActivateNow(map);
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    cameras_[i].map_key = key;
-    cameras_[i].lost_since.reset();
-    cameras_[i].started_map = i == camera;
-    cameras_[i].order = i == camera ? Camera::Order::kStart : Camera::Order::kEnter;
+    if (i == camera) {
+      cameras_[i].assignment.Start(key, after_loss);
+    } else {
+      cameras_[i].assignment.WaitFor(key);
+    }
   }
   association_.Begin(key);
 }
@@ -446,15 +426,11 @@ void System::StartMapAt(std::uint64_t key, std::size_t camera) {
 void System::EnterMap(std::uint64_t key, std::size_t camera) {
   const std::scoped_lock lock(mutex_);
   const MapState& map = maps_.at(key);
-  const std::uint64_t previous = cameras_.at(camera).map_key;
+  const std::uint64_t previous = cameras_.at(camera).assignment.map();
   if (previous == key) return ActivateNow(map);
   if (previous != 0) LeaveMapNow(previous);
   association_.Release();
-  for (Camera& each : cameras_) {
-    each.map_key = key;
-    each.lost_since.reset();
-    each.order = Camera::Order::kEnter;
-  }
+  for (Camera& each : cameras_) each.assignment.Enter(key);
   ActivateNow(map);
 }
 
@@ -470,14 +446,10 @@ void System::LeaveMapNow(std::uint64_t key) {
   Timestamp time{};
   for (Camera& camera : cameras_) {
     time = std::max(time, camera.last_time);
-    if (camera.map_key != key) continue;
-    camera.map_key = 0;
-    camera.initializing = false;
-    camera.lost_since.reset();
-    camera.order = Camera::Order::kLeave;
+    if (camera.assignment.map() == key) camera.assignment.Leave();
   }
   if (association_.map() == key) association_.Release();
-  found->second.provisional = false;
+  found->second.provisional.End();
   const bool forgotten = found->second.snapshot == nullptr;
   if (forgotten) maps_.erase(found);
   Emit(time, key, MapLeft{forgotten});
@@ -501,7 +473,7 @@ void System::AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> 
 
 std::uint64_t System::CurrentMap(std::size_t camera) const {
   const std::scoped_lock lock(mutex_);
-  return cameras_.at(camera).map_key;
+  return cameras_.at(camera).assignment.map();
 }
 
 std::uint64_t System::ActiveMap() const {
@@ -512,7 +484,7 @@ std::uint64_t System::ActiveMap() const {
 std::vector<std::uint64_t> System::MapsInUse() const {
   const std::scoped_lock lock(mutex_);
   std::vector<std::uint64_t> keys;
-  for (const Camera& camera : cameras_) keys.push_back(camera.map_key);
+  for (const Camera& camera : cameras_) keys.push_back(camera.assignment.map());
   return keys;
 }
 
@@ -524,13 +496,13 @@ bool System::IsInUse(std::uint64_t key) const {
 bool System::IsUsed(std::uint64_t key) const {
   return key == active_key_ || (joining_ && joining_->from == key) ||
          std::any_of(cameras_.begin(), cameras_.end(),
-                     [key](const Camera& camera) { return camera.map_key == key; });
+                     [key](const Camera& camera) { return camera.assignment.map() == key; });
 }
 
 bool System::IsProvisional(std::uint64_t key) const {
   const std::scoped_lock lock(mutex_);
   const auto found = maps_.find(key);
-  return found != maps_.end() && found->second.provisional;
+  return found != maps_.end() && found->second.provisional.is_pending();
 }
 
 std::optional<RigEstimate> System::Rig() const {

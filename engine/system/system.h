@@ -11,6 +11,7 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "engine/recognition/place_index.h"
@@ -18,35 +19,33 @@
 #include "engine/system/camera_association.h"
 #include "engine/system/camera_place_finder.h"
 #include "engine/system/camera_rig.h"
-#include "engine/system/initialization_monitor.h"
+#include "engine/system/map_assignment.h"
 #include "engine/system/mapping_thread.h"
+#include "engine/system/provisional_map.h"
 #include "engine/system/system_event.h"
 #include "engine/tracking/tracker.h"
 
 namespace docent::engine {
 
+// What a System is made with. Fields of `tracker` and `mapper` are tuned together and may change with any
+// version, except tracker.hybrid, tracker.target and mapper.lens.
 struct SystemOptions {
-  TrackerOptions tracker;  // build_maps is set by the system from extend_maps
-  MapperOptions mapper;
+  TrackerOptions tracker;   // build_maps is set by the system from extend_maps
+  MapperOptions mapper;     // initialization, keyframes, adjustment, loops, unknown lenses
   bool threaded = true;     // mapper on its own thread; false: lockstep, runs are byte-identical
   bool extend_maps = true;  // false: known maps are tracked and never changed
-  std::uint64_t seed = 1;
-  // In image time. A new map with finite points is provisional until this time has passed or it has this many
-  // keyframes. It is discarded and initialized again when tracking is lost for `provisional_loss_time` before
-  // that, or when InitializationMonitor finds its depth false.
-  Timestamp provisional_time = std::chrono::seconds(2);
-  Timestamp provisional_loss_time = std::chrono::milliseconds(400);
-  std::size_t provisional_keyframes = 5;
-  // A map without finite points is discarded and started again with the next image when tracking is lost for
-  // this time.
-  Timestamp panorama_loss_time = std::chrono::milliseconds(150);
+  std::uint64_t seed = 1;   // of the random choices of robust estimation; equal seeds give equal runs
+  ProvisionalMapOptions provisional;  // when a new map is confirmed, or discarded and started again
   // Whether a camera that is lost for `lost_time_before_new_map`, and recognises no map, starts a new map.
   bool new_map_when_lost = false;
-  Timestamp lost_time_before_new_map = std::chrono::milliseconds(200);
+  Timestamp lost_time_before_new_map = std::chrono::milliseconds(200);  // image time
   // Gives the key of a map that the system starts by itself, after a discarded one or a loss; 0 when there is
   // none now, then it tries again with the next frame. Must not block. Empty: keys count up from the largest
   // that was used.
   std::function<std::uint64_t()> new_map_key;
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // What the application allows for a map.
@@ -73,6 +72,10 @@ struct MapPermissions {
 // no system clock influences the results. What happened is queued as SystemEvents, in order, for TakeEvents.
 class System {
  public:
+  // One model for each camera, in the order of Frame::camera; none is null. A camera whose calibration is
+  // unknown has its initial model in options.mapper.lens too. Starts the mapper's thread unless the options
+  // forbid it; no map is known yet, and the cameras are lost until StartMap, or AddMap with the place index,
+  // gives them one. Throws Error if the options are invalid.
   System(const SystemOptions& options, std::vector<std::shared_ptr<const CameraModel>> cameras);
   ~System();
   System(const System&) = delete;
@@ -99,6 +102,7 @@ class System {
   // Replaces the snapshot of a map that is not in use, if it is still `expected`; false otherwise.
   bool ReplaceSnapshot(std::uint64_t key, const std::shared_ptr<const MapSnapshot>& expected,
                        std::shared_ptr<const MapSnapshot> snapshot);
+  // Changes what is allowed for a known map, from the next image on.
   void SetPermissions(std::uint64_t key, const MapPermissions& permissions);
 
   // The camera starts a new map; the others follow. The active map is left.
@@ -112,56 +116,56 @@ class System {
 
   // The map that the camera is in or searches; 0 for none.
   std::uint64_t CurrentMap(std::size_t camera) const;
-  std::uint64_t ActiveMap() const;
+  std::uint64_t ActiveMap() const;               // the map that is extended; 0 for none
   std::vector<std::uint64_t> MapsInUse() const;  // of all cameras
   // Whether a camera is in the map, or the mapper works on it or joins it.
   bool IsInUse(std::uint64_t key) const;
+  // Whether the map was started here and its depth has not been confirmed yet; it may still be discarded.
   bool IsProvisional(std::uint64_t key) const;
+  // Whether the mapper has nothing urgent to do.
   bool IsMapperIdle() const { return mapping_.IsIdle(); }
+  // What the mapper has spent its time on so far.
   MapperTimes MappingTimes() const { return mapping_.Times(); }
   // The relative pose of the first two cameras in the current map; empty while it is unknown.
   std::optional<RigEstimate> Rig() const;
+  // Mean radial reprojection errors of a camera by rings of the image, in pixels; see CalibrationMonitor.
   CalibrationMonitor::Profile RadialErrors(std::size_t camera) const;
   // The current estimate of a camera with an unknown calibration (SystemOptions::mapper.lens); empty for a
   // known calibration.
   std::optional<EstimatedLens> EstimatedLensOf(std::size_t camera) const;
+  // The current estimates of all cameras with an unknown calibration.
   std::vector<EstimatedLens> EstimatedLenses() const;
 
+  // Where lost cameras search. The system adds the maps that it extends; whoever adds others adds their
+  // appearance.
   PlaceIndex& place_index() { return index_; }
   // Stands in front of the place index, for instance to load maps that are searched. Must outlive the system;
   // null for the index itself. To be called before the first frame.
   void SetPlaceFinder(const PlaceFinder* finder) { finder_ = finder; }
 
+  // What happened since the last call, in order. To be called regularly: the events keep snapshots in memory.
   std::vector<SystemEvent> TakeEvents();
   // Called on the mapper's thread, without a lock, whenever it has queued events; before the first frame.
   void SetEventHook(std::function<void()> hook) { event_hook_ = std::move(hook); }
 
  private:
-  // State of a camera and its pending order. Guarded by mutex_ except for tracker, which belongs to the
+  // State of a camera. Guarded by mutex_ except for tracker, which belongs to the
   // camera's thread.
   struct Camera {
-    enum class Order { kNone, kStart, kStartAfterLoss, kStartAgain, kLeave, kEnter };
     std::unique_ptr<Tracker> tracker;
     std::shared_ptr<const CameraModel> model;
     std::optional<std::size_t> lens_index;  // index in lenses_; empty for a known calibration
     std::unique_ptr<CalibrationMonitor> calibration_monitor;
-    std::uint64_t map_key = 0;  // the map it is tracked in; 0 while it searches all maps
-    Order order = Order::kNone;
-    bool initializing = false;            // it searches for the initial views of map_key
-    bool started_map = false;             // this camera started the current map
-    std::optional<Timestamp> lost_since;  // while it is lost in map_key
+    MapAssignment assignment;
     Timestamp last_time{};
   };
   struct MapState {
     std::uint64_t key = 0;
     std::shared_ptr<const MapSnapshot> snapshot;  // null while initialization is pending, or not in memory
     MapPermissions permissions;
-    // A map that was started here is provisional until its depth is confirmed.
-    bool provisional = false;
-    InitializationMonitor initialization_monitor;  // while provisional
+    ProvisionalMap provisional;  // pending for a map that was started here until its depth is confirmed
     bool discarded = false;
     bool after_loss = false;        // started because the camera was lost in another map
-    Timestamp started{};            // time of the frame that completed its initial pair
     std::uint64_t join_with = 0;    // the map that the camera returned to from this one; 0 for none
     std::size_t join_at = 0;        // number of keyframes of both maps from which joining is attempted
     std::uint64_t joined_into = 0;  // the map that it was joined into; 0 for none
@@ -188,12 +192,12 @@ class System {
   void RejectPose(std::size_t index, TrackedFrame* frame);
   void UpdateRig(std::size_t index, const TrackedFrame& frame);
   void CheckCalibration(std::size_t index, const TrackedFrame& frame);
-  void CheckProvisionalMap(Camera* camera, const TrackedFrame& frame);
+  void CheckProvisionalMap(const Camera& camera, const TrackedFrame& frame);
   void CheckLoss(std::size_t index, const TrackedFrame& frame);
   void EnterTrackedMap(std::size_t index, std::uint64_t key, Timestamp time);
   void LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, Timestamp time);
   void Discard(std::uint64_t key, Timestamp time, MapDiscarded event);
-  void StartMapAt(std::uint64_t key, std::size_t camera);
+  void StartMapAt(std::uint64_t key, std::size_t camera, bool after_loss);
   void LeaveMapNow(std::uint64_t key);
   void ActivateNow(const MapState& map);
   void AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);

@@ -8,8 +8,8 @@
 #include <variant>
 
 #include "engine/base/time.h"
-#include "engine/mapping/lens_estimation.h"
-#include "engine/mapping/map_joining.h"
+#include "engine/mapping/calibration/lens_estimation.h"
+#include "engine/mapping/loops/map_joining.h"
 #include "engine/mapping/mapper.h"
 #include "engine/system/calibration_monitor.h"
 #include "engine/system/camera_rig.h"
@@ -27,64 +27,70 @@ struct Relocalized {};
 struct PoseRejected {};
 // The map is no longer extended. forgotten: it had never been initialized.
 struct MapLeft {
-  bool forgotten = false;
+  bool forgotten = false;  // the system no longer knows the map
 };
 // The snapshot of the active map was replaced by a newer one.
 struct MapUpdated {
-  std::shared_ptr<const MapSnapshot> snapshot;
+  std::shared_ptr<const MapSnapshot> snapshot;  // never null
 };
+// A map was discarded, because it was not initialized well enough to be kept.
 struct MapDiscarded {
+  // Why.
   enum class Reason : std::uint8_t {
     kFalseDepth,            // the map was provisional, and most of its points were not found again
     kLostWhileProvisional,  // tracking was lost soon after initialization
     kLostWithoutDepth,      // tracking was lost before the map had finite points
     kRelocalizedElsewhere,  // the map had no finite points yet when the camera relocalized in `other`
   };
-  Reason reason = Reason::kFalseDepth;
-  std::uint64_t replacement = 0;  // key of the map that is started instead; 0 for none
-  std::uint64_t other = 0;
-  InitializationMonitor::Fault fault;  // of kFalseDepth
-  Timestamp tracked_for{};             // of kLostWhileProvisional: from initialization to the loss
-  std::size_t keyframes = 0;
+  Reason reason = Reason::kFalseDepth;  // why
+  std::uint64_t replacement = 0;        // key of the map that is started instead; 0 for none
+  std::uint64_t other = 0;              // of kRelocalizedElsewhere: key of the map that the camera is in now
+  InitializationMonitor::Fault fault;   // of kFalseDepth
+  Timestamp tracked_for{};              // of kLostWhileProvisional: from initialization to the loss
+  std::size_t keyframes = 0;            // of kLostWhileProvisional: that the map had
 };
 // A new map was started as the camera was lost in `lost_in`.
 struct MapStartedAfterLoss {
-  std::uint64_t lost_in = 0;
+  std::uint64_t lost_in = 0;  // key of the map
 };
 // A keyframe or an initial pair was offered to the mapper. accepted: false when it was busy.
 struct KeyFrameOffered {
-  bool accepted = false;
+  bool accepted = false;  // whether the mapper will use it
 };
+// The mapper was asked to join another map into this one.
 struct JoinRequested {
-  std::uint64_t from = 0;
+  std::uint64_t from = 0;  // key of the other map
 };
 // Another map was joined into this one; MapUpdated came before.
 struct MapsJoined {
-  std::uint64_t from = 0;
-  std::shared_ptr<const JoinedMap> joined;
+  std::uint64_t from = 0;                   // key of the other map, which does not exist any more
+  std::shared_ptr<const JoinedMap> joined;  // how its coordinates and ids changed; never null
 };
+// Two maps were not joined; it is attempted again when they have more keyframes.
 struct JoinRefused {
-  std::uint64_t from = 0;
-  std::string reason;  // a sentence without full stop; see ReasonNotToJoin
+  std::uint64_t from = 0;  // key of the other map
+  JoinRefusal refusal = JoinRefusal::kNone;
+  MapOverlap overlap;  // what the comparison found; without candidates
 };
 // The relative pose of the first two cameras became rigid, or is no longer rigid.
 struct RigChanged {
-  RigEstimate estimate;
+  RigEstimate estimate;  // with `rigid`, whether it is rigid now
 };
 // The calibration does not describe the lens; see CalibrationMonitor.
 struct CalibrationMismatch {
-  CalibrationMonitor::Mismatch mismatch;
+  CalibrationMonitor::Mismatch mismatch;  // how far off, and where in the image
 };
 // The estimate of an unknown calibration became more precise or changed; the camera is tracked with it from
 // now on.
 struct LensEstimated {
-  EstimatedLens lens;
+  EstimatedLens lens;  // the new estimate
 };
 // The mapper's thread ended by an exception. Tracking continues; the map is no longer extended.
 struct MapperFailed {
-  std::string what;
+  std::string what;  // the exception's message
 };
 
+// One of the above, with its time and what it concerns.
 struct SystemEvent {
   Timestamp time{};        // image time
   std::uint64_t map = 0;   // key of the map that it concerns; 0 for none
@@ -92,7 +98,7 @@ struct SystemEvent {
   std::variant<MapEntered, Relocalized, PoseRejected, MapLeft, MapUpdated, MapDiscarded, MapStartedAfterLoss,
                LensEstimated, KeyFrameOffered, JoinRequested, MapsJoined, JoinRefused, RigChanged,
                CalibrationMismatch, MapperFailed, MapperEvent>
-      what;
+      what;  // the event itself
 };
 
 }  // namespace docent::engine

@@ -57,8 +57,10 @@ void System::HandleJoinAttempt(const MapJoinAttempt& attempt, MapState* into) {
   if (!attempt.joined) {
     if (attempt.overlap.outcome == MapOverlap::Outcome::kInterrupted) return;
     from.join_at =
-        CompareAgainAt(KeyFramesOf(*into->snapshot, *from.snapshot), options_.provisional_keyframes);
-    Emit(LastTime(), into->key, JoinRefused{from.key, attempt.refusal});
+        CompareAgainAt(KeyFramesOf(*into->snapshot, *from.snapshot), options_.provisional.keyframes);
+    JoinRefused event{from.key, attempt.refusal, attempt.overlap};
+    event.overlap.candidates.clear();
+    Emit(LastTime(), into->key, std::move(event));
     return;
   }
   from.joined_into = into->key;

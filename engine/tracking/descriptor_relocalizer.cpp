@@ -6,11 +6,26 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "engine/base/option_check.h"
 #include "engine/recognition/absolute_pose.h"
 #include "engine/vision/descriptor.h"
 #include "engine/vision/features.h"
 
 namespace docent::engine {
+
+std::optional<std::string> DescriptorRelocalizerOptions::Validate() const {
+  return OptionCheck()
+      .AtLeast(max_keyframes_per_call, 1, "number of keyframes described per call")
+      .That(max_maps_per_call > 0, "A pose must be estimated in at least one map per call.")
+      .That(max_cached_maps > 0, "The descriptors of at least one map must be cached.")
+      .That(max_cached_keyframes > 0, "The descriptors of at least one keyframe must be cached.")
+      .Within(levels_around, 0, kPyramidLevels, "number of pyramid levels around an observation")
+      .Positive(inlier_px, "distance of an inlier")
+      .AtLeast(min_inliers, 3, "number of inliers of a suggestion")
+      .Ratio(min_inlier_ratio, "inlier ratio of a suggestion")
+      .AtLeast(max_iterations, 1, "number of iterations")
+      .fault();
+}
 
 DescribedImage DescribeAtResolution(const ImageFeatures& features, const CameraModel& camera,
                                     double pixel_angle) {
@@ -46,13 +61,9 @@ struct DescriptorRelocalizer::DescribedMap {
 
 DescriptorRelocalizer::DescriptorRelocalizer(const DescriptorRelocalizerOptions& options,
                                              const VocabularyTree& tree)
-    : options_(options), tree_(&tree) {}
+    : options_(Checked(options)), tree_(&tree) {}
 DescriptorRelocalizer::~DescriptorRelocalizer() = default;
 DescriptorRelocalizer::DescriptorRelocalizer(DescriptorRelocalizer&&) noexcept = default;
-
-void DescriptorRelocalizer::Clear() {
-  maps_.clear();
-}
 
 DescriptorRelocalizer::DescribedMap& DescriptorRelocalizer::Find(std::uint64_t map_key) {
   const auto found = std::find_if(maps_.begin(), maps_.end(),

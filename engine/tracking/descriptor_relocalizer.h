@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/geometry/camera_model.h"
@@ -41,6 +42,9 @@ struct DescriptorRelocalizerOptions {
   int min_inliers = 10;  // A pose with fewer inliers is not worth the search for map points that verifies it.
   double min_inlier_ratio = 0.06;  // of the matches
   int max_iterations = 1000;       // finds a pose with 10 % inliers with a probability of 63 %
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // Suggests poses for a lost camera from the descriptors of its keypoints alone. It matches them with the
@@ -50,8 +54,8 @@ struct DescriptorRelocalizerOptions {
 // map's points from each suggested pose.
 //
 // Descriptors of keyframes are cached from call to call. One tracker owns the object and uses it on its
-// thread alone; it takes no lock and never waits. The result depends only on the seeds and on the calls since
-// Clear.
+// thread alone; it takes no lock and never waits. The result depends only on the seeds and on the calls
+// before.
 class DescriptorRelocalizer {
  public:
   explicit DescriptorRelocalizer(const DescriptorRelocalizerOptions& options = {},
@@ -68,7 +72,6 @@ class DescriptorRelocalizer {
   // suggestion per map, in descending order of inliers.
   std::vector<Suggestion> Suggest(std::span<const DescribedKeypoint> corners, const CameraModel& camera,
                                   std::span<const PlaceCandidate> candidates, std::uint64_t seed);
-  void Clear();
 
  private:
   struct DescribedMap;

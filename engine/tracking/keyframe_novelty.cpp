@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
 
 namespace {
@@ -25,6 +27,17 @@ std::ptrdiff_t CountObservations(const MapSnapshot& map, KeyFrameId id, bool wit
 }
 
 }  // namespace
+
+std::optional<std::string> KeyFrameNoveltyOptions::Validate() const {
+  return OptionCheck()
+      .Positive(min_distance, "distance between keyframes")
+      .Positive(min_rotation_deg, "rotation between keyframes")
+      .Ratio(min_found_ratio, "ratio of points found")
+      .AtLeast(max_expected_points, 0, "number of expected points")
+      .AtLeast(min_distance_when_few, 0, "distance between keyframes when few points are found")
+      .AtLeast(min_rotation_when_few_deg, 0, "rotation between keyframes when few points are found")
+      .fault();
+}
 
 bool NeedsKeyFrame(const KeyFrameNoveltyOptions& options, const MapSnapshot& map,
                    const Rigid3& camera_from_map, const MapTrackResult& tracked) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "engine/map/map_snapshot.h"
 #include "engine/tracking/map_tracker.h"
 
@@ -20,6 +23,9 @@ struct KeyFrameNoveltyOptions {
   // depth: without parallax it could not add points.
   double min_distance_when_few = 0.04;
   double min_rotation_when_few_deg = 5.0;  // the same for the rotation
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // Whether this frame should become a keyframe: its view differs enough from all keyframes, or it is about to

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
 
 namespace {
@@ -20,8 +22,23 @@ Eigen::Vector3d AxisOf(const Rigid3& camera_from_map) {
 
 }  // namespace
 
+std::optional<std::string> KeyFramePolicyOptions::Validate() const {
+  return OptionCheck()
+      .Within(min_parallax_deg, 0, 180, "parallax of a keyframe")
+      .Ratio(min_coverage, "coverage of the map")
+      .AtLeast(min_view_ratio, 0, "angle between viewing directions")
+      .Ratio(min_panorama_coverage, "coverage of a panorama map")
+      .AtLeast(few_points, 0, "number of few points")
+      .AtLeast(min_view_ratio_when_few, 0, "angle between viewing directions when points are few")
+      .AtLeast(few_points_without_rotation, 0, "number of few points without rotation")
+      .NotNegative(history, "history of poses")
+      .NotNegative(open_timeout, "time to open a panorama map")
+      .NotNegative(history_interval, "interval between poses of the history")
+      .fault();
+}
+
 KeyFramePolicy::KeyFramePolicy(const KeyFramePolicyOptions& options, double field_of_view)
-    : options_(options), field_of_view_(field_of_view) {}
+    : options_(Checked(options)), field_of_view_(field_of_view) {}
 
 void KeyFramePolicy::Reset() {
   mode_ = Mode::kSixDof;
@@ -138,7 +155,7 @@ KeyFrameChoice KeyFramePolicy::Select(const PolicyFrame& frame, const MapSnapsho
   return is_new_direction ? KeyFrameChoice::kPanorama : KeyFrameChoice::kNone;
 }
 
-void KeyFramePolicy::Offered(KeyFrameChoice choice, Timestamp time) {
+void KeyFramePolicy::Accepted(KeyFrameChoice choice, Timestamp time) {
   if (choice != KeyFrameChoice::kLocalizedPanorama && choice != KeyFrameChoice::kFirst) return;
   mode_ = Mode::kPanorama;
   reference_time_ = time;

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "engine/base/time.h"
 #include "engine/geometry/rigid3.h"
 #include "engine/map/map_snapshot.h"
 #include "engine/mapping/keyframe_candidate.h"
-#include "engine/tracking/pose_refinement.h"
+#include "engine/matching/pose_refinement.h"
 
 namespace docent::engine {
 
@@ -27,9 +29,13 @@ struct KeyFramePolicyOptions {
   int few_points_without_rotation = 30;
   // Poses of this period are compared to tell pure rotation from translation.
   Timestamp history = std::chrono::seconds(10);
-  // A panorama map that the mapper has not opened within this time was refused.
+  // A panorama map that the mapper has not opened within this time after it accepted the keyframe is given
+  // up: the keyframe had too few corners, or its map was replaced meanwhile.
   Timestamp open_timeout = std::chrono::seconds(1);
   Timestamp history_interval = std::chrono::milliseconds(60);  // Interval between the poses of the history.
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // The facts about a tracked frame that the policy decides by.
@@ -66,8 +72,8 @@ class KeyFramePolicy {
   // Returns what kind of keyframe this frame should become. The caller may ignore it; a later frame is chosen
   // again.
   KeyFrameChoice Select(const PolicyFrame& frame, const MapSnapshot& map);
-  // To be called when the frame of this time was offered to the mapper as a keyframe of this kind.
-  void Offered(KeyFrameChoice choice, Timestamp time);
+  // To be called when the mapper has accepted the frame of this time as a keyframe of this kind.
+  void Accepted(KeyFrameChoice choice, Timestamp time);
 
   Mode mode() const { return mode_; }
   // The open panorama map in this snapshot; kNoId if none is open or the mapper has not created it yet.

@@ -6,13 +6,15 @@
 #include <bitset>
 #include <cmath>
 
+#include "engine/base/option_check.h"
+#include "engine/geometry/image_grid.h"
 #include "engine/recognition/absolute_pose.h"
 
 namespace docent::engine {
 
 namespace {
 
-constexpr int kCellsAcross = 4;  // rows and columns of the grid that measures the spread of inliers
+constexpr int kSpreadCells = 4;  // rows and columns of the grid that measures the spread of inliers
 constexpr int kCoverageColumns = 4, kCoverageRows = 3;  // hybrid-slam §4.1
 // An infinite point is skipped if a finite point, or another infinite one, projects into the same cell
 // (hybrid-slam §3.1).
@@ -20,16 +22,31 @@ constexpr int kProjectedCellPx = 16;
 constexpr std::size_t kMissesSlots = 16384;
 constexpr std::uint8_t kMaxMisses = 4;  // consecutive misses are counted up to this value
 
-std::size_t CellOf(const Eigen::Vector2d& pixel, const CameraModel& camera, int columns, int rows) {
-  const int column = std::clamp(static_cast<int>(pixel.x() * columns / camera.width_px()), 0, columns - 1);
-  const int row = std::clamp(static_cast<int>(pixel.y() * rows / camera.height_px()), 0, rows - 1);
-  return static_cast<std::size_t>(row * columns + column);
-}
-
 }  // namespace
 
+std::optional<std::string> MapTrackerOptions::Validate() const {
+  return OptionCheck()
+      .AtLeast(min_coarse, 0, "number of coarse points")
+      .AtLeast(max_coarse, min_coarse, "largest number of coarse points")
+      .AtLeast(max_recovery, 1, "number of points after a loss")
+      .Positive(recovery_inlier_px, "distance of an inlier after a loss")
+      .AtLeast(max_fine, 1, "number of fine points")
+      .Positive(coarse_radius_px, "coarse search radius")
+      .Positive(wide_radius_px, "wide search radius")
+      .Positive(fine_radius_px, "fine search radius")
+      .Positive(fine_radius_without_coarse_px, "fine search radius without a coarse pose")
+      .Positive(infinite_radius_px, "search radius of infinite points")
+      .AtLeast(max_infinite, 0, "number of infinite points")
+      .AtLeast(min_points_per_cell, 1, "number of points in a covered cell")
+      .Contained(nearby.Validate())
+      .fault();
+}
+
 MapTracker::MapTracker(const MapTrackerOptions& options, std::shared_ptr<const CameraModel> camera)
-    : options_(options), camera_(std::move(camera)), searcher_(options.search), nearby_(options.nearby) {}
+    : options_(Checked(options)),
+      camera_(std::move(camera)),
+      searcher_(options.search),
+      nearby_(options.nearby) {}
 
 void MapTracker::Clear() {
   searcher_.Clear();
@@ -53,6 +70,7 @@ void MapTracker::Project(const std::vector<NearbyPoint>& points, bool infinite,
     if (facing <= 0 || facing * facing < min_cosine * min_cosine * x.squaredNorm()) continue;
     const auto pixel = camera_->Project(x);
     if (!pixel || !camera_->IsInside(*pixel, kPatchSize / 2)) continue;
+    if (rim_ && !rim_->IsInside(*pixel, 0)) continue;
     std::uint8_t& cell =
         projected_cells_[static_cast<std::size_t>(static_cast<int>(pixel->y()) / kProjectedCellPx * columns +
                                                   static_cast<int>(pixel->x()) / kProjectedCellPx)];
@@ -219,10 +237,8 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   }
   const bool wide = effort == Effort::kWide;
   Search(coarse_, features, wide ? options_.wide_radius_px : options_.coarse_radius_px, false);
-  result.coarse_attempted = static_cast<int>(coarse_.size());
-  result.coarse_found = static_cast<int>(measurements_.size());
   float radius = wide ? options_.coarse_radius_px : options_.fine_radius_without_coarse_px;
-  if (result.coarse_found >= options_.min_coarse) {
+  if (static_cast<int>(measurements_.size()) >= options_.min_coarse) {
     const PoseRefinement coarse =
         RefinePose(*camera_, predicted, options_.refinement, &measurements_, &memory_,
                    {pivot_estimate_.pivot, predicted, pivot_estimate_.reliable});
@@ -250,7 +266,7 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
 }
 
 void MapTracker::CountInliers(MapTrackResult* result) {
-  std::bitset<kCellsAcross * kCellsAcross> cells;
+  std::bitset<kSpreadCells * kSpreadCells> cells;
   std::array<int, kCoverageColumns * kCoverageRows> finite{}, all{};
   depths_.clear();
   last_inliers_.clear();
@@ -262,8 +278,8 @@ void MapTracker::CountInliers(MapTrackResult* result) {
     ++match;
     if (!attempt.inlier) continue;
     ++result->inliers;
-    cells.set(CellOf(measurement.pixel, *camera_, kCellsAcross, kCellsAcross));
-    const std::size_t cell = CellOf(measurement.pixel, *camera_, kCoverageColumns, kCoverageRows);
+    cells.set(GridCell(measurement.pixel, *camera_, kSpreadCells, kSpreadCells));
+    const std::size_t cell = GridCell(measurement.pixel, *camera_, kCoverageColumns, kCoverageRows);
     ++all[cell];
     last_inliers_.push_back(attempt.point);
     if (measurement.infinite()) continue;

@@ -3,17 +3,20 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "engine/base/random.h"
 #include "engine/map/map_snapshot.h"
+#include "engine/matching/point_search.h"
+#include "engine/matching/pose_refinement.h"
 #include "engine/tracking/frame_inspection.h"
 #include "engine/tracking/nearby_points.h"
-#include "engine/tracking/point_search.h"
-#include "engine/tracking/pose_refinement.h"
 #include "engine/tracking/rotation_center.h"
 #include "engine/tracking/tracked_frame.h"
+#include "engine/vision/rim_mask.h"
 
 // Estimates the pose of one frame in one map from a predicted pose: coarse stage, fine stage, robust pose
 // estimate (ptamm §2.1). It does not model time; motion prediction and relocalization belong to the Tracker.
@@ -38,6 +41,9 @@ struct MapTrackerOptions {
   NearbyPointOptions nearby;
   SearchOptions search;
   PoseRefinementOptions refinement;
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 struct MapTrackResult {
@@ -51,7 +57,6 @@ struct MapTrackResult {
   // Ratio of the cells of a 4x3 image grid that hold enough inliers, of finite points and of all points
   // (hybrid-slam §4.1).
   double finite_coverage = 0, coverage = 0;
-  int coarse_attempted = 0, coarse_found = 0;
   double sigma = 0;  // robust, of the normalised residuals
   // Cells of a 4x4 image grid with an inlier; measures how well the inliers are spread.
   int occupied_cells = 0;
@@ -99,6 +104,8 @@ class MapTracker {
   void Clear();
   // Searches the infinite points of this panorama map in addition to the finite points; kNoId disables it.
   void EnablePanorama(PanoramaId panorama) { panorama_ = panorama; }
+  // Points that project outside the image circle are not searched. Null for none; must outlive its use.
+  void SetRim(const RimMask* rim) { rim_ = rim; }
   PanoramaId panorama() const { return panorama_; }
   // Selects how patches are compared from now on; kStandard initially.
   void SetComparison(PatchComparison comparison) { searcher_.SetComparison(comparison); }
@@ -135,6 +142,7 @@ class MapTracker {
   MapTrackerOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   PointSearcher searcher_;
+  const RimMask* rim_ = nullptr;
   Rigid3 predicted_;  // pose that the last search started from
   PanoramaId panorama_ = kNoId;
   PivotEstimate pivot_estimate_;

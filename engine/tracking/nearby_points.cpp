@@ -6,6 +6,8 @@
 #include <limits>
 #include <span>
 
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
 
 namespace {
@@ -37,6 +39,16 @@ double SquaredViewDifference(const Eigen::Vector3d& view, const Eigen::Vector3d&
 }
 
 }  // namespace
+
+std::optional<std::string> NearbyPointOptions::Validate() const {
+  return OptionCheck()
+      .AtLeast(frames, 1, "number of frames of a selection")
+      .That(keyframes > 0, "The points of at least one keyframe must be searched.")
+      .That(examined_keyframes >= keyframes, "At least as many keyframes must be examined as are searched.")
+      .Positive(max_source_difference, "difference from the source view")
+      .Ratio(max_difference_ratio, "ratio of the differences of two source views")
+      .fault();
+}
 
 void NearbyPoints::Update(const MapSnapshot& map, const Rigid3& camera_from_map,
                           const std::vector<MapPointId>& seen, PanoramaId panorama,

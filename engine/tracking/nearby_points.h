@@ -3,9 +3,12 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "engine/base/option_check.h"
 #include "engine/map/map_snapshot.h"
 #include "engine/tracking/point_id_set.h"
 
@@ -25,6 +28,9 @@ struct NearbyPointOptions {
   // Another keyframe replaces the source only if its view differs by less than this ratio of the source's
   // difference: each replacement adds its own alignment error.
   double max_difference_ratio = 0.6;
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // A candidate for the search.
@@ -45,7 +51,7 @@ struct NearbyPoint {
 // stops allocating once its buffers have the size of the map.
 class NearbyPoints {
  public:
-  explicit NearbyPoints(const NearbyPointOptions& options) : options_(options) {}
+  explicit NearbyPoints(const NearbyPointOptions& options) : options_(Checked(options)) {}
 
   // seen: inliers of the last frame by ascending id; empty if only the pose is known. panorama: panorama map
   // whose infinite points are wanted, kNoId for none. pivot: see PivotEstimate. The snapshot must outlive the

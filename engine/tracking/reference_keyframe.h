@@ -4,7 +4,7 @@
 #include <span>
 
 #include "engine/map/map_snapshot.h"
-#include "engine/tracking/tracked_frame.h"
+#include "engine/matching/point_match.h"
 
 namespace docent::engine {
 

@@ -10,6 +10,7 @@
 // frames. Plain values.
 namespace docent::engine {
 
+// Why no pose was accepted, ordered by how close it came.
 enum class RejectionReason : std::uint8_t {
   kNone,
   kFewPoints,   // too few map points of any candidate were found
@@ -21,9 +22,10 @@ enum class RejectionReason : std::uint8_t {
 
 // The hypothesis of one frame that came closest to acceptance.
 struct RelocalizationResult {
-  RejectionReason rejection = RejectionReason::kNone;
-  std::uint64_t map_key = 0,
-                competitor_key = 0;  // of kAmbiguous only; may be the same map
+  RejectionReason rejection =
+      RejectionReason::kNone;        // kNone: a pose was accepted, or there was no hypothesis
+  std::uint64_t map_key = 0;         // the map of the hypothesis
+  std::uint64_t competitor_key = 0;  // of kAmbiguous only; may be the same map
   int inliers = 0;                   // points that agree
   int frames = 0;                    // consecutive frames that agree so far, of kUnconfirmed
 

@@ -6,7 +6,25 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/base/option_check.h"
+
 namespace docent::engine {
+
+std::optional<std::string> RotationCenterOptions::Validate() const {
+  return OptionCheck()
+      .NotNegative(window, "window of the rotation centre")
+      .NotNegative(interval, "interval between poses of the rotation centre")
+      .AtLeast(min_poses, 3, "number of poses of the rotation centre")
+      .Positive(min_rotation_deg, "rotation about the rotation centre")
+      .Positive(position_noise, "position noise")
+      .Positive(rotation_noise, "rotation noise")
+      .Positive(max_position_sigma, "sigma of the position")
+      .Positive(max_distance, "distance of the rotation centre")
+      .Positive(max_residual_ratio, "residual ratio of the rotation centre")
+      .Positive(max_reliable_residual_ratio, "residual ratio of a reliable rotation centre")
+      .Positive(max_reliable_residual, "residual of a reliable rotation centre")
+      .fault();
+}
 
 void RotationCenter::Add(Timestamp time, const Rigid3& camera_from_map,
                          const Eigen::Matrix<double, 6, 6>& covariance, double depth) {

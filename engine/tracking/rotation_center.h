@@ -2,8 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "engine/base/option_check.h"
 #include "engine/base/time.h"
 #include "engine/geometry/rigid3.h"
 
@@ -27,6 +30,9 @@ struct RotationCenterOptions {
   // leaves larger residuals.
   double max_reliable_residual_ratio = 0.08;
   double max_reliable_residual = 0.006;
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // The pivot that the camera rotates about.
@@ -42,7 +48,7 @@ struct PivotEstimate {
 // tracker owns one and uses it on its thread; it does not allocate once the window is full.
 class RotationCenter {
  public:
-  explicit RotationCenter(const RotationCenterOptions& options) : options_(options) {}
+  explicit RotationCenter(const RotationCenterOptions& options) : options_(Checked(options)) {}
 
   // To be called when the next pose does not continue the previous ones.
   void Reset() { poses_.clear(); }

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <opencv2/core/hal/intrin.hpp>
 
+#include "engine/base/option_check.h"
 #include "engine/vision/patch.h"
 
 namespace docent::engine {
@@ -289,6 +290,14 @@ std::vector<Corner> BestCorners(const ImageFeatures& features, std::size_t level
 }
 
 }  // namespace
+
+std::optional<std::string> CornerDescriptionOptions::Validate() const {
+  return OptionCheck()
+      .That(std::ranges::all_of(corners, [](int count) { return count >= 0; }),
+            "The number of described corners of a level must be at least 0.")
+      .AtLeast(min_score, 0, "score of a described corner")
+      .fault();
+}
 
 int SquaredDistance(const Descriptor& a, const Descriptor& b) {
   const std::uint8_t *p = a.values.data(), *q = b.values.data();

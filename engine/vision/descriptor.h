@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "engine/vision/image_pyramid.h"
@@ -65,6 +66,9 @@ struct CornerDescriptionOptions {
   // Number of corners per level: those with the highest Shi-Tomasi score, spread over the image.
   std::array<int, kPyramidLevels> corners = {300, 200, 120, 60};
   float min_score = 20;  // Shi-Tomasi score, grey values squared
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 // Describes the best corners of an image, level by level.
 std::vector<DescribedKeypoint> DescribeCorners(const ImageFeatures& features,

@@ -13,9 +13,9 @@ namespace docent::engine {
 
 namespace {
 
-constexpr int kLanes = kByteLanes;
+constexpr int kByteLanesAtOnce = kByteLanes;
 constexpr std::size_t kRing = 16;
-constexpr int kRadius = 3;
+constexpr int kCircleRadius = 3;
 
 using Lanes = ByteLanes;
 using RingOffsets = std::array<std::ptrdiff_t, kRing>;
@@ -88,9 +88,9 @@ Lanes Scores(const std::uint8_t* pixel, const RingOffsets& offsets, const Lanes&
 // Scores of the columns first to end - 1; writes up to one block more behind them.
 void ScoreRow(const std::uint8_t* row, int columns, int first, int end, const RingOffsets& offsets,
               const Lanes& threshold, std::uint8_t* scores) {
-  for (int x = first; x < end; x += kLanes) {
+  for (int x = first; x < end; x += kByteLanesAtOnce) {
     // Overlaps the previous block instead of exceeding the row.
-    const int at = std::min(x, columns - kRadius - kLanes);
+    const int at = std::min(x, columns - kCircleRadius - kByteLanesAtOnce);
     cv::v_store(scores + at, Scores(row + at, offsets, threshold));
   }
 }
@@ -98,7 +98,7 @@ void ScoreRow(const std::uint8_t* row, int columns, int first, int end, const Ri
 // Corners of one row: pixels that score more than all eight neighbours.
 void TakePeaks(const std::uint8_t* above, const std::uint8_t* scores, const std::uint8_t* below, int first,
                int end, int y, std::vector<Corner>* corners) {
-  for (int x = first; x < end; x += kLanes) {
+  for (int x = first; x < end; x += kByteLanesAtOnce) {
     const Lanes score = LoadBytes(scores + x);
     if (!cv::v_check_any(score > AllBytes(0))) continue;
     Lanes competitor = cv::v_max(LoadBytes(scores + x - 1), LoadBytes(scores + x + 1));
@@ -107,7 +107,7 @@ void TakePeaks(const std::uint8_t* above, const std::uint8_t* scores, const std:
       competitor = cv::v_max(competitor, cv::v_max(LoadBytes(other + x - 1), LoadBytes(other + x + 1)));
     }
     auto peaks = static_cast<std::uint32_t>(cv::v_signmask(score > competitor));
-    if (end - x < kLanes) peaks &= (std::uint32_t{1} << (end - x)) - 1;
+    if (end - x < kByteLanesAtOnce) peaks &= (std::uint32_t{1} << (end - x)) - 1;
     for (; peaks != 0; peaks &= peaks - 1)
       corners->push_back(
           {static_cast<std::int16_t>(x + std::countr_zero(peaks)), static_cast<std::int16_t>(y)});
@@ -118,13 +118,13 @@ void TakePeaks(const std::uint8_t* above, const std::uint8_t* scores, const std:
 
 void DetectFastCorners(const cv::Mat& image, int threshold, int border, std::vector<Corner>* corners,
                        std::vector<int>* row_begin) {
-  CV_Assert(image.type() == CV_8UC1 && border > kRadius);
+  CV_Assert(image.type() == CV_8UC1 && border > kCircleRadius);
   corners->clear();
   row_begin->assign(static_cast<std::size_t>(image.rows) + 1, 0);
   if (image.rows <= 2 * border || image.cols <= 2 * border) return;
   cv::Mat pixels = image;
   // A whole block must fit between the margins; additional columns are never neighbours of a corner.
-  const int least = border + kLanes + kRadius;
+  const int least = border + kByteLanesAtOnce + kCircleRadius;
   thread_local std::vector<std::uint8_t> widened;
   if (image.cols < least) {
     widened.assign(static_cast<std::size_t>(image.rows) * static_cast<std::size_t>(least), 0);
@@ -132,7 +132,7 @@ void DetectFastCorners(const cv::Mat& image, int threshold, int border, std::vec
     image.copyTo(pixels.colRange(0, image.cols));
   }
 
-  const auto width = static_cast<std::size_t>(pixels.cols + 2 * kLanes);
+  const auto width = static_cast<std::size_t>(pixels.cols + 2 * kByteLanesAtOnce);
   thread_local std::vector<std::uint8_t> memory;
   memory.assign(3 * width, 0);
   std::uint8_t* above = memory.data();

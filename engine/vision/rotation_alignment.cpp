@@ -232,9 +232,9 @@ class RotationAligner {
   }
   // Near the border the blur includes mirrored grey values, which do not move with the scene.
   static bool IsNearBorder(const GradientImage& image, float x, float y) {
-    constexpr float kBorder = 4;  // thumbnail pixels; 1.6 sigma of the default blur
-    const float border_x = std::min(kBorder, static_cast<float>(image.size.width) / 8);
-    const float border_y = std::min(kBorder, static_cast<float>(image.size.height) / 8);
+    constexpr float kBlurBorder = 4;  // thumbnail pixels; 1.6 sigma of the default blur
+    const float border_x = std::min(kBlurBorder, static_cast<float>(image.size.width) / 8);
+    const float border_y = std::min(kBlurBorder, static_cast<float>(image.size.height) / 8);
     return x < border_x || y < border_y || x > static_cast<float>(image.size.width - 1) - border_x ||
            y > static_cast<float>(image.size.height - 1) - border_y;
   }

@@ -13,6 +13,7 @@
 
 #include "app/cameras/frame_source.h"
 #include "app/session/calibrated_camera.h"
+#include "app/session/session.h"
 
 namespace docent::bench {
 
@@ -39,14 +40,16 @@ void ReadImages(BenchSequence* sequence) {
   }
 }
 
-// As a session does in lockstep.
 void MakeMap(BenchSequence* sequence) {
-  engine::Lockstep lockstep({}, sequence->camera, 1);
-  for (const engine::Frame& frame : sequence->frames) {
-    std::optional<MapPlaces> places;
-    if (sequence->map) places.emplace(sequence->map);
-    sequence->tracked.push_back(lockstep.Feed(frame, places ? &*places : nullptr));
-    sequence->map = lockstep.map();
+  app::SessionOptions options;
+  options.threaded = false;
+  options.tracker.hybrid = true;
+  options.first_map = "map";
+  app::Session session(options, {sequence->camera}, nullptr);
+  for (const engine::Frame& frame : sequence->frames) sequence->tracked.push_back(session.Process(frame));
+  session.Finish();
+  for (const app::Session::MapState& map : session.Maps()) {
+    if (!map.discarded && map.snapshot) sequence->map = map.snapshot;
   }
 }
 

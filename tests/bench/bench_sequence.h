@@ -9,10 +9,11 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/map/map_snapshot.h"
 #include "engine/recognition/place.h"
-#include "tests/engine/lockstep.h"
+#include "engine/tracking/tracker.h"
 
-// The data of all benchmarks: grey images of one sequence in memory, and the map that tracker and mapper made
-// of them, run in turn. The environment variable DOCENT_BENCH_SEQUENCE names the sequence (anything that
+// The data of all benchmarks: grey images of one sequence in memory, and the map that a session in lockstep
+// with the program's defaults, panorama maps included, made of them. The environment variable
+// DOCENT_BENCH_SEQUENCE names the sequence (anything that
 // --camera accepts, with its calibration beside it); the default is ten seconds of the simulator's room.
 // Created once per process, by the first benchmark that needs it, on the calling thread.
 namespace docent::bench {
@@ -25,6 +26,14 @@ struct BenchSequence {
   std::vector<engine::TrackedFrame> tracked;       // one per frame, from the pass that made the map
 };
 
+// The tracker's options of a tour with the program's defaults: panorama maps, and no new maps.
+inline engine::TrackerOptions TourOptions() {
+  engine::TrackerOptions options;
+  options.hybrid = true;
+  options.build_maps = false;
+  return options;
+}
+
 // Throws docent::Error if the sequence cannot be read.
 const BenchSequence& Sequence();
 
@@ -32,7 +41,7 @@ const BenchSequence& Sequence();
 // be relocalized anywhere in it.
 class MapPlaces : public engine::PlaceFinder {
  public:
-  static constexpr std::uint64_t kKey = engine::Lockstep::kMapKey;
+  static constexpr std::uint64_t kKey = 1;
   explicit MapPlaces(std::shared_ptr<const engine::MapSnapshot> map,
                      std::size_t keyframes = std::numeric_limits<std::size_t>::max())
       : map_(std::move(map)), keyframes_(std::min(keyframes, map_->keyframes.size())) {}

@@ -23,15 +23,15 @@ using engine::MapSnapshot;
 void AddCopy(const MapSnapshot& source, std::size_t every, double apart, MapSnapshot* map) {
   const engine::KeyFrameId first_keyframe = map->next_keyframe;
   const engine::MapPointId first_point = map->next_point;
+  const engine::PanoramaId first_panorama = map->next_panorama;
   const Eigen::Vector3d offset(apart, 0, 0);
   const auto is_kept = [&](const engine::MapPoint& point) {
-    return !point.infinite() && static_cast<std::size_t>(&point - source.points.data()) % every == 0;
+    return static_cast<std::size_t>(&point - source.points.data()) % every == 0;
   };
   for (const engine::KeyFrame& keyframe : source.keyframes) {
-    if (keyframe.kind != engine::KeyFrameKind::kSixDof) continue;
     engine::KeyFrame copy = keyframe;
     copy.id += first_keyframe;
-    copy.panorama = engine::kNoId;
+    if (copy.panorama != engine::kNoId) copy.panorama += first_panorama;
     copy.camera_from_map.translation -= copy.camera_from_map.rotation * offset;
     map->keyframes.push_back(copy);
   }
@@ -40,26 +40,26 @@ void AddCopy(const MapSnapshot& source, std::size_t every, double apart, MapSnap
     engine::MapPoint copy = point;
     copy.id += first_point;
     copy.source_keyframe += first_keyframe;
-    copy.point_in_map.head<3>() += offset;
+    if (copy.infinite()) {
+      copy.panorama += first_panorama;
+    } else {
+      copy.point_in_map.head<3>() += offset;
+    }
     map->points.push_back(copy);
   }
   for (const engine::Observation& observation : source.observations) {
     const engine::MapPoint* point = source.FindPoint(observation.point);
-    const engine::KeyFrame* keyframe = source.FindKeyFrame(observation.keyframe);
-    if (!point || !is_kept(*point) || keyframe->kind != engine::KeyFrameKind::kSixDof) continue;
+    if (!is_kept(*point)) continue;
     engine::Observation copy = observation;
     copy.keyframe += first_keyframe;
     copy.point += first_point;
     map->observations.push_back(copy);
   }
+  for (const engine::PanoramaMap& panorama : source.panoramas)
+    map->panoramas.push_back({panorama.id + first_panorama, panorama.reference + first_keyframe});
   map->next_keyframe += source.next_keyframe;
   map->next_point += source.next_point;
-}
-
-std::size_t RoomKeyframes(const MapSnapshot& source) {
-  return static_cast<std::size_t>(
-      std::count_if(source.keyframes.begin(), source.keyframes.end(),
-                    [](const engine::KeyFrame& k) { return k.kind == engine::KeyFrameKind::kSixDof; }));
+  map->next_panorama += source.next_panorama;
 }
 
 std::shared_ptr<const MapSnapshot> MapOf(std::size_t points, const MapSnapshot& source) {
@@ -86,14 +86,12 @@ void TrackFrameInMapOf(benchmark::State& state) {
     state.SkipWithError(fault.c_str());
     return;
   }
-  const MapPlaces places(map, RoomKeyframes(*sequence.map));
+  const MapPlaces places(map, sequence.map->keyframes.size());
   std::vector<double> milliseconds;
   int tracked = 0;
   double searched = 0;
   for (auto _ : state) {
-    engine::TrackerOptions options;
-    options.build_maps = false;
-    engine::Tracker tracker(options, sequence.camera, 1);
+    engine::Tracker tracker(TourOptions(), sequence.camera, 1);
     tracker.SetMap(map, MapPlaces::kKey);
     engine::TrackedFrame out;
     double total = 0;

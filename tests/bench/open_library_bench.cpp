@@ -9,8 +9,9 @@
 #include "engine/base/random.h"
 #include "engine/recognition/place_index.h"
 #include "engine/vision/features.h"
-#include "maps/database.h"
-#include "maps/library.h"
+#include "maps/library/library.h"
+#include "maps/storage/database.h"
+#include "tests/bench/library_size.h"
 
 // Opens a library of many maps for a tour: reads its entries, thumbnails and words and builds the place
 // index; the maps stay on disk. Each map has 150 keyframes with small images, but with thumbnails of the
@@ -19,20 +20,19 @@
 namespace docent::bench {
 namespace {
 
-constexpr int kKeyFramesOfAMap = 150;
-
 std::shared_ptr<const engine::MapSnapshot> MakeMap(int number) {
   constexpr int kWidth = 80, kHeight = 64;
   auto map = std::make_shared<engine::MapSnapshot>();
   const engine::CameraModel::Intrinsics intrinsics{kWidth, kHeight, 70, 70, 40, 32};
   const auto camera = std::make_shared<const engine::CameraModel>(engine::LensModel::kRadialTangential,
                                                                   intrinsics, std::array<double, 5>{});
-  for (int i = 0; i < kKeyFramesOfAMap; ++i) {
+  for (std::size_t i = 0; i < kKeyFramesOfAMap; ++i) {
     cv::Mat gray(kHeight, kWidth, CV_8UC1);
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x)
-        gray.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(
-            128 + 100 * std::sin(0.01 * (number + 1) * x) * std::cos(0.05 * (i + 1) + 0.1 * y));
+        gray.at<std::uint8_t>(y, x) =
+            static_cast<std::uint8_t>(128 + 100 * std::sin(0.01 * (number + 1) * x) *
+                                                std::cos(0.05 * static_cast<double>(i + 1) + 0.1 * y));
     }
     auto features = std::make_shared<engine::ImageFeatures>();
     features->levels[0] = gray;

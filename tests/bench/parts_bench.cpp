@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/mapping/map_adjustment.h"
-#include "engine/tracking/point_search.h"
+#include "engine/mapping/bundle/map_adjustment.h"
+#include "engine/matching/point_search.h"
 #include "engine/vision/fast_corners.h"
 #include "engine/vision/features.h"
 #include "engine/vision/lanes.h"

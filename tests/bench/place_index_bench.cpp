@@ -17,6 +17,7 @@
 #include "engine/recognition/place_index.h"
 #include "engine/vision/features.h"
 #include "tests/bench/bench_sequence.h"
+#include "tests/bench/library_size.h"
 
 // Place recognition among all keyframes of all maps. The maps are those of the simulator's museum and desks:
 // the keyframes are from the walks on which each place is mapped, the queries from later visits on other
@@ -31,7 +32,6 @@
 namespace docent::bench {
 namespace {
 
-constexpr std::size_t kKeyFramesOfAMap = 150;
 constexpr std::size_t kQuestions = 1000;
 
 struct View {

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "engine/mapping/planar_target.h"
+#include "engine/initialization/planar_target.h"
 #include "engine/recognition/descriptor_database.h"
 #include "engine/vision/features.h"
 #include "tests/bench/bench_sequence.h"

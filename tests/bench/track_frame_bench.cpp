@@ -18,9 +18,7 @@ namespace {
 
 // A tracker in the finished map, which stays unchanged.
 engine::Tracker TourOf(const BenchSequence& sequence) {
-  engine::TrackerOptions options;
-  options.build_maps = false;
-  engine::Tracker tracker(options, sequence.camera, 1);
+  engine::Tracker tracker(TourOptions(), sequence.camera, 1);
   tracker.SetMap(sequence.map, MapPlaces::kKey);
   return tracker;
 }

@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "content/asset.h"
-#include "content/gltf_resources.h"
+#include "content/gltf/resources.h"
 #include "engine/base/error.h"
 
 namespace docent::content {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "content/gltf_material.h"
-#include "content/gltf_resources.h"
+#include "content/gltf/material.h"
+#include "content/gltf/resources.h"
 #include "tests/content/make_gltf.h"
 
 namespace docent::content {

@@ -13,7 +13,7 @@
 #include <set>
 
 #include "content/asset.h"
-#include "engine/base/error.h"
+#include "tests/support/error_of.h"
 
 namespace docent::content {
 namespace {
@@ -69,25 +69,22 @@ void ExpectValid(const Model& model, const std::string& file) {
 }
 
 // Returns the error message for a file, or an empty text when it loads.
-std::string Refusal(const std::filesystem::path& path) {
-  try {
+std::string ErrorOfFile(const std::filesystem::path& path) {
+  return ErrorOf([&] {
     const Asset asset = ImportAsset(path);
     ExpectValid(*asset.model, path.string());
     // The packed file must load without other files and give the same asset.
     const Asset again = AssetFromGlb(asset.name, asset.glb);
     EXPECT_EQ(again.id, asset.id) << path;
     EXPECT_EQ(again.model->meshes.size(), asset.model->meshes.size()) << path;
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  });
 }
 
 TEST(GltfFiles, EveryModelLoads) {
   if (!std::filesystem::exists(kAssets / "models")) GTEST_SKIP() << "the shared models are missing";
   int loaded = 0;
   for (const std::filesystem::path& path : GltfFilesUnder(kAssets / "models")) {
-    const std::string sentence = Refusal(path);
+    const std::string sentence = ErrorOfFile(path);
     // The shared folder may lack one of a model's files; the message must then name a missing file.
     const std::size_t quote = sentence.find('\'');
     if (quote != std::string::npos && sentence.ends_with("which does not exist.")) {
@@ -106,7 +103,7 @@ TEST(GltfFiles, EveryEdgeCaseLoadsOrThrowsAClearError) {
     GTEST_SKIP() << "the shared edge cases are missing";
   int refused = 0, loaded = 0;
   for (const std::filesystem::path& path : GltfFilesUnder(kAssets / "gltf-edge-cases")) {
-    const std::string sentence = Refusal(path);
+    const std::string sentence = ErrorOfFile(path);
     if (sentence.empty()) {
       ++loaded;
       continue;
@@ -231,7 +228,7 @@ TEST(GltfFiles, AgreesWithTheKhronosValidatorOnRangesAndValidFiles) {
       is_range = is_range || IsAboutRange(message["code"]);
       codes += message["code"].get<std::string>() + " at " + message.value("pointer", "") + "; ";
     }
-    const std::string sentence = Refusal(path);
+    const std::string sentence = ErrorOfFile(path);
     const bool agrees = has_error == !sentence.empty();
     if ((is_range || !has_error) && !agrees && DiffersOnPurpose(path.generic_string())) {
       ++on_purpose;

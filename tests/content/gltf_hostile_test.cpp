@@ -7,8 +7,8 @@
 #include <fstream>
 
 #include "content/asset.h"
-#include "content/gltf_images.h"
-#include "content/gltf_resources.h"
+#include "content/gltf/images.h"
+#include "content/gltf/resources.h"
 #include "tests/content/make_gltf.h"
 
 namespace docent::content {
@@ -37,12 +37,7 @@ class HostileFiles : public ::testing::Test {
     nlohmann::json json = {{"asset", {{"version", "2.0"}}}};
     json["buffers"] = {{{"uri", uri}, {"byteLength", 36}}};
     Write("model/test.gltf", json.dump());
-    try {
-      ImportAsset(folder_ / "model" / "test.gltf");
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return ErrorOf([&] { ImportAsset(folder_ / "model" / "test.gltf"); });
   }
 
   std::filesystem::path folder_;
@@ -125,28 +120,23 @@ TEST(HostileGltf, AGlbTruncatedAnywhereIsRejected) {
 
 TEST(HostileGltf, AnyDamagedByteThrowsOrLoads) {
   const std::vector<std::uint8_t> whole = TriangleFile().Glb();
+  int refused = 0, loaded = 0;
   for (std::size_t at = 0; at < whole.size(); ++at) {
     for (const int flip : {0x01, 0x20, 0x80, 0xFF}) {
       std::vector<std::uint8_t> damaged = whole;
       damaged[at] = static_cast<std::uint8_t>(damaged[at] ^ flip);
-      try {
-        AssetFromGlb("damaged.glb", damaged);
-      } catch (const Error&) {
-        continue;  // An Error is expected; any other exception fails the test.
-      }
+      // An exception that is not an Error fails the test.
+      ++(ErrorOf([&] { AssetFromGlb("damaged.glb", damaged); }).empty() ? loaded : refused);
     }
   }
+  EXPECT_GT(refused, 100) << "most bytes matter";
+  EXPECT_GT(loaded, 10) << "a coordinate may have any finite value";
 }
 
 TEST(HostileGltf, JsonBombsStopAtTheirLimits) {
   const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
-  const auto refusal = [](const std::string& text) -> std::string {
-    try {
-      LoadGltf("bomb.gltf", {text.begin(), text.end()}, std::nullopt);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+  const auto refusal = [](const std::string& text) {
+    return ErrorOf([&] { LoadGltf("bomb.gltf", {text.begin(), text.end()}, std::nullopt); });
   };
   EXPECT_THAT(refusal("{\"extras\":" + deep + "}"), HasSubstr("nested deeper"));
   std::string wide = "{\"extras\":[0";
@@ -236,13 +226,8 @@ TEST(HostileGltf, AnImageThatIsTooLargeIsRejectedFromItsHeader) {
   EXPECT_EQ(size->height_px, 4);
   LoadLimits limits;
   std::uint64_t pixels_left = 1'000'000;
-  const auto refusal = [&]() -> std::string {
-    try {
-      DecodeImage("a.glb", "images[0]", png, limits, &pixels_left);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+  const auto refusal = [&]() {
+    return ErrorOf([&] { DecodeImage("a.glb", "images[0]", png, limits, &pixels_left); });
   };
   EXPECT_THAT(refusal(), HasSubstr("20000 x 4"));
   limits.max_image_side_px = 30000;

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "content/gltf_container.h"
-#include "content/gltf_loader.h"
-#include "engine/base/error.h"
+#include "content/gltf/container.h"
+#include "content/gltf/loader.h"
+#include "tests/support/error_of.h"
 
 // Small glTF files for tests, built in memory and easy to damage.
 namespace docent::content {
@@ -61,12 +61,7 @@ struct GltfFile {
 
   // Returns the error message for the file, or an empty text when it loads.
   std::string Refusal(const LoadLimits& limits = {}) const {
-    try {
-      Load(limits);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return ErrorOf([&] { Load(limits); });
   }
 };
 

@@ -6,7 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "content/scene_codec.h"
-#include "engine/base/error.h"
+#include "engine/base/random.h"
+#include "tests/support/error_of.h"
 
 namespace docent::content {
 namespace {
@@ -46,13 +47,8 @@ AssetLookup Known() {
   return [](const std::string& id) { return id == "abc" ? MakeTestAsset(id) : nullptr; };
 }
 
-std::string Refusal(const std::string& text) {
-  try {
-    DecodeScene(text, "the library", Known());
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+std::string ErrorOfScene(const std::string& text) {
+  return ErrorOf([&] { DecodeScene(text, "the library", Known()); });
 }
 
 TEST(Scene, FreeNamesCountUpwards) {
@@ -94,9 +90,9 @@ TEST(SceneCodec, InvalidMembersAreRejectedWithTheirLocation) {
   const auto with = [&](const char* pointer, const nlohmann::json& value) {
     nlohmann::json changed = good;
     changed[nlohmann::json::json_pointer(pointer)] = value;
-    return Refusal(changed.dump());
+    return ErrorOfScene(changed.dump());
   };
-  EXPECT_EQ(Refusal(good.dump()), "");
+  EXPECT_EQ(ErrorOfScene(good.dump()), "");
   EXPECT_THAT(with("/docent_scene", 2), HasSubstr("newer version"));
   EXPECT_THAT(with("/entities/0/asset", "xyz"), HasSubstr("entities[0] uses the asset xyz"));
   EXPECT_THAT(with("/entities/0/kind", "lamp"), HasSubstr("neither a model nor a signpost"));
@@ -114,8 +110,133 @@ TEST(SceneCodec, InvalidMembersAreRejectedWithTheirLocation) {
   EXPECT_THAT(with("/entities/1/text", 5), HasSubstr("entities[1].text"));
   EXPECT_THAT(with("/entities/1/text", nullptr), HasSubstr("entities[1].text"));
   EXPECT_THAT(with("/entities", nlohmann::json::object()), HasSubstr("not lists"));
-  EXPECT_THAT(Refusal("[1,2]"), HasSubstr("the library"));
-  EXPECT_THAT(Refusal("{"), HasSubstr("not valid JSON"));
+  EXPECT_THAT(ErrorOfScene("[1,2]"), HasSubstr("the library"));
+  EXPECT_THAT(ErrorOfScene("{"), HasSubstr("not valid JSON"));
+}
+
+// Mostly ordinary values, and every limit, each side of it, and what is no number.
+double AnyNumber(Random* random, double typical) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const std::vector<double> odd = {
+      0,     -0.0,   1e-9, 1e-6, 1e6,       1e9,        1e12,
+      1e300, 5e-324, -1,   -1e6, kInfinity, -kInfinity, std::numeric_limits<double>::quiet_NaN()};
+  if (random->Uniform(0, 1) < 0.97) return random->Uniform(-typical, typical);
+  const double value = odd[static_cast<std::size_t>(random->Uniform(0, static_cast<double>(odd.size())))];
+  return value * (random->Uniform(0, 1) < 0.5 ? 1 : 1.0000001);
+}
+
+std::string AnyText(Random* random) {
+  const std::vector<std::string> parts = {"a",
+                                          "\"",
+                                          "\\",
+                                          "\n",
+                                          std::string(1, '\0'),
+                                          "\x01",
+                                          "é",
+                                          "→",
+                                          "\xE9",
+                                          "\x7F",
+                                          "#",
+                                          "\xED\xA0\x80",
+                                          " ",
+                                          "-2",
+                                          "\xC0",
+                                          std::string(9'999, 'x')};
+  std::string text = "name" + std::to_string(static_cast<int>(random->Uniform(0, 1e6)));
+  while (random->Uniform(0, 1) < 0.4)
+    text += parts[static_cast<std::size_t>(
+        random->Uniform(0, random->Uniform(0, 1) < 0.1 ? static_cast<double>(parts.size()) : 8.0))];
+  return random->Uniform(0, 1) < 0.01 ? "" : text;
+}
+
+Entity AnyEntity(Random* random) {
+  const auto vector = [&](double typical) {
+    return Eigen::Vector3d(AnyNumber(random, typical), AnyNumber(random, typical),
+                           AnyNumber(random, typical));
+  };
+  Entity entity;
+  entity.name = AnyText(random);
+  if (random->Uniform(0, 1) < 0.5) {
+    entity.kind = Entity::Kind::kModel;
+    if (random->Uniform(0, 1) < 0.98) entity.model.asset = MakeTestAsset("abc");
+    entity.model.animation = static_cast<int>(random->Uniform(-1.5, 2));
+    if (random->Uniform(0, 1) < 0.02) entity.model.animation = std::numeric_limits<int>::max();
+    entity.model.map_from_model.rotation = engine::Rotation3::Exp(vector(3));
+    entity.model.map_from_model.translation = vector(100);
+    entity.model.map_from_model.scale = std::abs(AnyNumber(random, 10));
+  } else {
+    entity.signpost.text = AnyText(random);
+    entity.signpost.anchor = vector(100);
+    entity.signpost.up = vector(1);
+    if (random->Uniform(0, 1) < 0.98) entity.signpost.up.normalize();
+    entity.signpost.height_m = AnyNumber(random, 10);
+    entity.signpost.to_map = AnyText(random);
+  }
+  return entity;
+}
+
+TEST(SceneCodec, EveryRandomSceneIsRefusedByTheWriterOrReadBackEqual) {
+  Random random(17);
+  int written = 0, refused = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    Scene scene;
+    const int count = static_cast<int>(random.Uniform(0, 4));
+    for (int i = 0; i < count; ++i) scene.entities.push_back(AnyEntity(&random));
+    const std::string problem = Validate(scene);
+    if (!problem.empty()) {
+      EXPECT_THROW(EncodeScene(scene), Error) << problem;
+      EXPECT_EQ(problem.back(), '.') << problem;
+      ++refused;
+      continue;
+    }
+    const std::string text = EncodeScene(scene);
+    ASSERT_EQ(ErrorOfScene(text), "") << text;
+    const Scene read = DecodeScene(text, "the library", Known());
+    ASSERT_EQ(read.entities.size(), scene.entities.size());
+    for (std::size_t i = 0; i < read.entities.size(); ++i) {
+      const Entity &a = scene.entities[i], &b = read.entities[i];
+      EXPECT_EQ(a.name, b.name);
+      EXPECT_EQ(a.signpost.text, b.signpost.text);
+      EXPECT_EQ(a.signpost.to_map, b.signpost.to_map);
+      EXPECT_EQ(PlaceOf(a), PlaceOf(b));
+      EXPECT_EQ(a.model.map_from_model.scale, b.model.map_from_model.scale);
+      EXPECT_EQ(a.signpost.height_m, b.signpost.height_m);
+    }
+    ++written;
+  }
+  EXPECT_GT(written, 500);
+  EXPECT_GT(refused, 500);
+}
+
+TEST(SceneCodec, TheLargestScenesThatAreWrittenCanBeRead) {
+  Scene scene;
+  Entity model = TestScene().entities[0];
+  model.model.map_from_model.translation = {-1.0 / 3e5, 123456.78901234567, -1e-300};
+  const std::string digits(60, '\x01');  // The longest in JSON: six bytes each.
+  for (std::size_t i = 0; i < kMaxEntities; ++i) {
+    model.name = digits + std::to_string(i);
+    scene.entities.push_back(model);
+  }
+  ASSERT_EQ(Validate(scene), "");
+  EXPECT_EQ(ErrorOfScene(EncodeScene(scene)), "");
+  scene.entities.push_back(model);
+  scene.entities.back().name = "one more";
+  EXPECT_THAT(Validate(scene), HasSubstr("at most 50000"));
+  scene.entities.clear();
+  Entity sign = TestScene().entities[1];
+  sign.signpost.text = std::string(kMaxTextBytes, '\x01');
+  for (int i = 0; Validate(scene).empty(); ++i) {
+    sign.name = std::to_string(i);
+    scene.entities.push_back(sign);
+  }
+  EXPECT_THAT(Validate(scene), HasSubstr("names and texts"));
+  scene.entities.pop_back();
+  EXPECT_EQ(ErrorOfScene(EncodeScene(scene)), "");
+}
+
+TEST(Scene, AModelsNameComesFromItsFile) {
+  EXPECT_EQ(NameFromFile("models/old fox.glb"), "old fox");
+  EXPECT_EQ(NameFromFile("caf\xE9.glb"), "caf\xEF\xBF\xBD");
 }
 
 TEST(SceneCodec, MissingMembersAreRejected) {
@@ -125,7 +246,7 @@ TEST(SceneCodec, MissingMembersAreRejected) {
     for (const auto& [name, value] : good["entities"][entity].items()) {
       nlohmann::json changed = good;
       changed["entities"][entity].erase(name);
-      EXPECT_NE(Refusal(changed.dump()), "") << name;
+      EXPECT_NE(ErrorOfScene(changed.dump()), "") << name;
       ++removed;
     }
   }

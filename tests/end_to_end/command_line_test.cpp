@@ -10,8 +10,10 @@
 
 #include "app/calibration/calibration_file.h"
 #include "app/cameras/frame_source.h"
+#include "app/demo/exhibit_model.h"
 #include "app/evaluation/ground_truth.h"
-#include "maps/library.h"
+#include "app/session/library_scene.h"
+#include "maps/library/library.h"
 #include "tests/app/support/board_camera.h"
 #include "tests/app/support/temporary_folder.h"
 #include "tests/end_to_end/run_docent.h"
@@ -22,6 +24,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 TEST(CommandLine, HelpShowsAnExampleForEverySubcommand) {
@@ -52,6 +55,8 @@ TEST(CommandLine, HelpShowsAnExampleForEverySubcommand) {
       {"maps", "recover"},
       {"content"},
       {"content", "list"},
+      {"content", "add"},
+      {"content", "import"},
       {"content", "remove"},
   };
   for (std::vector<std::string> command : commands) {
@@ -64,6 +69,20 @@ TEST(CommandLine, HelpShowsAnExampleForEverySubcommand) {
     EXPECT_THAT(outcome.output, AllOf(HasSubstr("Usage:"), HasSubstr("Example:\n  docent")));
     EXPECT_THAT(outcome.errors, IsEmpty());
   }
+}
+
+TEST(CommandLine, SaysThatATourEstimatesNoCalibration) {
+  const auto help = [](const std::string& command) {
+    std::string text;  // Without the line breaks, whose places depend on the width.
+    for (const char c : RunDocent({command, "--help"}).output) {
+      const char shown = c == '\n' ? ' ' : c;
+      if (shown != ' ' || !text.ends_with(' ')) text += shown;
+    }
+    return text;
+  };
+  EXPECT_THAT(help("author"), HasSubstr("estimate the calibration while maps are built"));
+  EXPECT_THAT(help("tour"), HasSubstr("a tour builds no map and estimates none"));
+  EXPECT_THAT(help("tour"), Not(HasSubstr("while maps are built")));
 }
 
 TEST(CommandLine, PrintsItsVersion) {
@@ -181,6 +200,88 @@ TEST(CommandLine, HandlesAnEmptyLibrary) {
   ExpectErrorLine({"maps", "remove", "Desk", "--library", path}, 1, "Desk");
   ExpectErrorLine({"maps", "policy", "Desk", "read-only", "--library", path}, 1, "Desk");
   ExpectErrorLine({"content", "remove", "sign-1", "--map", "Desk", "--library", path}, 1, "Desk");
+}
+
+TEST(CommandLine, AddsModelsAndSignpostsToASavedMap) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "museum.docent").string();
+  const std::vector<std::uint8_t> glb = MakeExhibitGlb();
+  const std::string model = folder.Write("exhibit.glb", {glb.begin(), glb.end()}).string();
+  {
+    maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    for (const char* name : {"Desk", "Kiosk"}) {
+      library.Save({library.NewKey(), name, maps::Policy::kOpen, nullptr, nullptr});
+    }
+  }
+  const auto arguments = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"content", "add", "--library", path, "--map", "Desk"});
+    return more;
+  };
+  const auto added = [&](const std::vector<std::string>& more) {
+    const Outcome outcome = RunDocent(arguments(more));
+    EXPECT_EQ(outcome.exit_status, 0) << outcome.errors;
+    return outcome.output;
+  };
+  EXPECT_EQ(added({model, "--at", "1", "-2", "3.5", "--scale", "0.25", "--yaw", "-90"}), "exhibit\n");
+  EXPECT_EQ(added({model, "--at", "0", "0", "0", "--rotation", "0", "1", "0", "0"}), "exhibit-2\n");
+  EXPECT_EQ(added({model, "--at", "0", "0", "0", "--name", "obelisk"}), "obelisk\n");
+  EXPECT_EQ(added({"--signpost", "To the kiosk", "--at", "-1", "0", "2", "--to", "Kiosk", "--height", "0.5"}),
+            "sign-1\n");
+  EXPECT_EQ(added({"--signpost", "Café", "--at", "-1", "0", "2", "--quiet"}), "");
+
+  const Outcome list = RunDocent({"content", "list", "--library", path, "--json"});
+  const auto content = nlohmann::json::parse(list.output).at("content");
+  ASSERT_EQ(content.size(), 5u);
+  EXPECT_EQ(content[0]["position_m"], nlohmann::json({1.0, -2.0, 3.5}));
+  EXPECT_EQ(content[0]["scale"], 0.25);
+  EXPECT_EQ(content[0]["file"], "exhibit.glb");
+  EXPECT_EQ(content[3]["to_map"], "Kiosk");
+  EXPECT_EQ(content[4]["text"], "Café");
+  {
+    const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
+    EXPECT_THAT(library.Verify(), IsEmpty());
+    const maps::SceneRecord record = library.LoadScene(library.FindByName("Desk").key);
+    EXPECT_EQ(record.assets.size(), 1u) << "the same model is stored once";
+    AssetCache assets;
+    const content::Scene scene = SceneFromRecord(record, "Desk", &assets);
+    const engine::Sim3& upright = scene.entities[0].model.map_from_model;
+    // Up is -y of a map without keyframes. At yaw 0 the front faces -z; -90 degrees turn it clockwise seen
+    // from above.
+    EXPECT_LT((upright.rotation * Eigen::Vector3d::UnitY() + Eigen::Vector3d::UnitY()).norm(), 1e-9);
+    EXPECT_LT((upright.rotation * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitX()).norm(), 1e-9);
+    const engine::Sim3& free = scene.entities[1].model.map_from_model;
+    EXPECT_LT((free.rotation * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+    EXPECT_EQ(scene.entities[3].signpost.height_m, 0.5);
+  }
+
+  const auto list_content = [&] { return RunDocent({"content", "list", "--library", path}).output; };
+  const std::string before = list_content();
+  ExpectErrorLine(arguments({model, "--at", "0", "0", "0", "--name", "obelisk"}), 1, "already a 'obelisk'");
+  ExpectErrorLine(arguments({"none.glb", "--at", "0", "0", "0"}), 1, "none.glb");
+  ExpectErrorLine(arguments({"--signpost", "x", "--at", "0", "0", "0", "--to", "Nowhere"}), 1, "Nowhere");
+  ExpectErrorLine(arguments({"--signpost", std::string(10'001, 'x'), "--at", "0", "0", "0"}), 1,
+                  "10000 bytes");
+  ExpectErrorLine(arguments({"--signpost", "caf\xE9", "--at", "0", "0", "0"}), 1, "UTF-8");
+  ExpectErrorLine(arguments({model, "--at", "0", "0", "1e300"}), 2, "--at");
+  ExpectErrorLine(arguments({model, "--at", "0", "0"}), 2, "--at");
+  ExpectErrorLine(arguments({model, "--at", "0", "0", "nan"}), 2, "'nan' is not a number");
+  ExpectErrorLine(arguments({model, "--at", "0", "0", "0", "--scale", "1e12"}), 2, "--scale");
+  ExpectErrorLine(arguments({model, "--at", "0", "0", "0", "--scale", "0"}), 2, "--scale");
+  ExpectErrorLine(arguments({model, "--at", "0", "0", "0", "--rotation", "1", "1", "0", "0"}), 2, "length 1");
+  ExpectErrorLine(arguments({model, "--at", "0", "0", "0", "--signpost", "x"}), 2, "excludes");
+  ExpectErrorLine(arguments({model}), 2, "--at is required");
+  ExpectErrorLine(arguments({"--at", "0", "0", "0"}), 2, "FILE or --signpost TEXT");
+  EXPECT_EQ(list_content(), before);
+
+  EXPECT_EQ(RunDocent({"maps", "policy", "Desk", "read-only", "--library", path}).exit_status, 0);
+  ExpectErrorLine(arguments({model, "--at", "0", "0", "0"}), 1, "read-only");
+  EXPECT_EQ(RunDocent({"maps", "policy", "Desk", "augment-only", "--library", path}).exit_status, 0);
+  for (const char* name : {"exhibit", "exhibit-2", "obelisk"}) {
+    EXPECT_EQ(RunDocent({"content", "remove", name, "--map", "Desk", "--library", path}).exit_status, 0);
+  }
+  ExpectErrorLine({"content", "remove", "exhibit", "--map", "Desk", "--library", path}, 1, "no 'exhibit'");
+  const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
+  EXPECT_TRUE(library.LoadScene(library.FindByName("Desk").key).assets.empty());
 }
 
 TEST(CommandLine, ExportsImportsJoinsAndRecoversMaps) {

@@ -11,7 +11,7 @@
 #include "app/evaluation/simulated_truth.h"
 #include "app/simulator/simulation.h"
 #include "engine/geometry/sim3.h"
-#include "maps/library.h"
+#include "maps/library/library.h"
 #include "tests/end_to_end/run_docent.h"
 
 namespace docent::app {

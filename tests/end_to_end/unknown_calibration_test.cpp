@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/files/text_file.h"
-#include "maps/library.h"
+#include "maps/library/library.h"
 #include "tests/end_to_end/run_docent.h"
 
 namespace docent::app {

@@ -25,15 +25,16 @@ class Lockstep {
   // `places` is passed on to Tracker::Track.
   TrackedFrame Feed(const Frame& frame, const PlaceFinder* places = nullptr) {
     TrackedFrame tracked = tracker_.Track(frame, places);
-    if (auto pair = tracker_.TakeInitialPair()) mapper_.Start(std::move(*pair));
+    if (auto pair = tracker_.TakeInitialPair(); pair && !mapper_.Start(std::move(*pair)))
+      tracker_.StartFailed();
     if (auto candidate = tracker_.TakeKeyFrameCandidate()) {
       mapper_.Report(tracker_.TakeReports());
-      mapper_.Offer(std::move(*candidate));
+      if (mapper_.Offer(std::move(*candidate))) tracker_.KeyFrameAccepted();
     }
     for (int step = 0; step < 20 && !mapper_.IsIdle(); ++step) mapper_.Step();
     mapper_.Step();
     for (MapperEvent& event : mapper_.TakeEvents()) {
-      if (event.kind == MapperEvent::Kind::kStartFailed) tracker_.StartFailed();
+      if (std::holds_alternative<MapperEvent::StartFailed>(event.what)) tracker_.StartFailed();
       events_.push_back(std::move(event));
     }
     if (mapper_.Snapshot() != map_) {

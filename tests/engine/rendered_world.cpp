@@ -3,17 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "engine/base/random.h"
 #include "engine/vision/features.h"
+#include "tests/engine/geometry/test_math.h"
 
 namespace docent::engine::testing_world {
 
 namespace {
 
-float Sample(const cv::Mat& paint, float x, float y) {
+float SamplePaint(const cv::Mat& paint, float x, float y) {
   const int x0 = std::clamp(static_cast<int>(x), 0, paint.cols - 2);
   const int y0 = std::clamp(static_cast<int>(y), 0, paint.rows - 2);
   const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
@@ -63,12 +63,8 @@ float Grey(const std::vector<WallInCamera>& walls, const Eigen::Vector3f& ray) {
   }
   if (!best) return 128;
   constexpr float kScale = static_cast<float>(1 / kTexelSize);
-  return Sample(*best->paint, (best_x + best->half_width) * kScale, (best_y + best->half_height) * kScale);
-}
-
-double Gaussian(Random* random) {
-  const double radius = std::sqrt(-2 * std::log(1 - random->Uniform()));
-  return radius * std::cos(2 * std::numbers::pi * random->Uniform());
+  return SamplePaint(*best->paint, (best_x + best->half_width) * kScale,
+                     (best_y + best->half_height) * kScale);
 }
 
 constexpr int kRaysPerPixel = 4;
@@ -99,7 +95,7 @@ bool IsAwayFromWallEdges(const RenderedWorld& world, const CameraModel& camera,
                          const Rigid3& camera_from_world, const Eigen::Vector2d& pixel, double radius_px,
                          std::size_t wall) {
   for (int i = 0; i < 8; ++i) {
-    const double angle = i * std::numbers::pi / 4;
+    const double angle = i * kPi / 4;
     const auto hit = world.AtPixel(camera, camera_from_world,
                                    pixel + radius_px * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
     if (!hit || hit->wall != wall) return false;
@@ -224,7 +220,7 @@ cv::Mat RenderedWorld::Render(const CameraModel& camera, const Rigid3& camera_fr
     for (int x = 0; x < image.cols; ++x) {
       float sum = 0;
       for (int part = 0; part < kRaysPerPixel; ++part) sum += Grey(walls, rays[next++]);
-      const double noise = noise_sigma > 0 ? noise_sigma * Gaussian(&random) : 0;
+      const double noise = noise_sigma > 0 ? noise_sigma * RandomNormal(&random) : 0;
       image.at<std::uint8_t>(y, x) =
           cv::saturate_cast<std::uint8_t>(static_cast<double>(sum) / kRaysPerPixel + noise);
     }
@@ -251,7 +247,7 @@ const RenderedWorld& World() {
 }
 
 Rigid3 CameraAt(const Eigen::Vector3d& center, const Eigen::Vector3d& rotation_deg) {
-  return Rigid3(Rotation3::Exp(rotation_deg * std::numbers::pi / 180), center).inverse();
+  return Rigid3(Rotation3::Exp(rotation_deg * kPi / 180), center).inverse();
 }
 
 Frame MakeFrame(int index, const cv::Mat& image) {

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "engine/base/error.h"
-#include "maps/library.h"
-#include "maps/recovery.h"
-#include "maps/snapshot_reader.h"
+#include "maps/library/library.h"
+#include "maps/maintenance/recovery.h"
+#include "maps/storage/snapshot_reader.h"
 #include "tests/fuzz/allocation_limit.h"
 
 // Feeds a whole library file to all code that reads one: opening, listing, thumbnails, maps, scenes,

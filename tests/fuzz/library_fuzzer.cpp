@@ -8,12 +8,12 @@
 #include <span>
 
 #include "engine/base/error.h"
-#include "maps/checksum.h"
-#include "maps/envelope.h"
-#include "maps/map_codec.h"
-#include "maps/panorama_codec.h"
-#include "maps/thumbnail_rows.h"
-#include "maps/word_rows.h"
+#include "maps/index/thumbnail_rows.h"
+#include "maps/index/word_rows.h"
+#include "maps/storage/checksum.h"
+#include "maps/storage/envelope.h"
+#include "maps/storage/map_codec.h"
+#include "maps/storage/panorama_codec.h"
 #include "tests/fuzz/allocation_limit.h"
 
 // Feeds the decoders of a library's binary columns. The first byte chooses the decoder. The rest are the

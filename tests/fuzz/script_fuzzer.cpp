@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses any bytes as a script: the result must be a docent::Error, or commands that are unchanged after
-// formatting and parsing them again.
+// Parses any bytes as a script: the result must be a docent::Error, or valid commands that are unchanged
+// after formatting and parsing them again.
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -17,7 +17,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   std::string text;
-  for (const auto& command : commands) text += docent::app::FormatScriptLine(command) + "\n";
+  for (const auto& command : commands) {
+    if (!docent::app::Validate(command.command).empty()) __builtin_trap();
+    text += docent::app::FormatScriptLine(command) + "\n";
+  }
   const auto again = docent::app::ParseScript(text, "again");  // an Error here is a finding
   if (again.size() != commands.size()) __builtin_trap();
   for (std::size_t i = 0; i < again.size(); ++i) {

@@ -107,24 +107,24 @@ int Open(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* out
   return result;
 }
 
-sqlite3_vfs door;
+sqlite3_vfs failing_vfs;
 
 }  // namespace
 
 FailingDisk::FailingDisk() {
   system_vfs = sqlite3_vfs_find(nullptr);
-  door = *system_vfs;
-  door.zName = "failing-disk";
-  door.szOsFile = static_cast<int>(sizeof(File)) + system_vfs->szOsFile;
-  door.xOpen = Open;
+  failing_vfs = *system_vfs;
+  failing_vfs.zName = "failing-disk";
+  failing_vfs.szOsFile = static_cast<int>(sizeof(File)) + system_vfs->szOsFile;
+  failing_vfs.xOpen = Open;
   Repair();
-  sqlite3_vfs_register(&door, 1);
+  sqlite3_vfs_register(&failing_vfs, 1);
 }
 
 FailingDisk::~FailingDisk() {
   Repair();
   SetReadOnly(false);
-  sqlite3_vfs_unregister(&door);
+  sqlite3_vfs_unregister(&failing_vfs);
   sqlite3_vfs_register(system_vfs, 1);
 }
 

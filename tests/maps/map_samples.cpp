@@ -14,7 +14,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/random.h"
-#include "maps/snapshot_reader.h"
+#include "maps/storage/snapshot_reader.h"
 
 namespace docent::maps {
 
@@ -297,15 +297,6 @@ std::string FilesIn(const fs::path& folder) {
   std::string line;
   for (const std::string& name : names) line += (line.empty() ? "" : " ") + name;
   return line;
-}
-
-std::string ErrorOf(const std::function<void()>& body) {
-  try {
-    body();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 }  // namespace docent::maps

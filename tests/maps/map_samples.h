@@ -7,8 +7,9 @@
 #include <string>
 
 #include "engine/map/map_snapshot.h"
-#include "maps/library.h"
-#include "maps/map_record.h"
+#include "maps/library/library.h"
+#include "maps/storage/map_record.h"
+#include "tests/support/error_of.h"
 
 // Random maps with a seed, and temporary folders, for the tests of the library.
 namespace docent::maps {
@@ -62,7 +63,5 @@ void WriteWholeFile(const std::filesystem::path& path, std::span<const std::uint
 void RunSql(const std::filesystem::path& file, const std::string& sql);
 // The names in a folder, sorted and separated by spaces.
 std::string FilesIn(const std::filesystem::path& folder);
-// Returns the message of the docent::Error that `body` throws, or "no error".
-std::string ErrorOf(const std::function<void()>& body);
 
 }  // namespace docent::maps

@@ -10,15 +10,55 @@ import re
 import sys
 import tempfile
 
-# folder prefix -> project prefixes that it may include (the longest matching prefix decides)
+# folder prefix -> project prefixes that it may include (the longest matching prefix decides). Every folder below
+# engine/ and app/ has a row of its own, and a row names only folders that stand above it, so that there are no
+# circles.
+ENGINE_BASE = ["engine/base", "engine/geometry"]
+ENGINE_MAP = ENGINE_BASE + ["engine/vision", "engine/map"]
+ENGINE_MATCHING = ENGINE_MAP + ["engine/matching", "engine/recognition"]
+MAPPING_PARTS = ["engine/mapping/points", "engine/mapping/panorama", "engine/mapping/bundle",
+                 "engine/mapping/calibration", "engine/mapping/loops"]
+ENGINE_MAPPING = ENGINE_MATCHING + ["engine/initialization", "engine/mapping"]
+APP_INPUT = ["engine", "app/files", "app/calibration"]
 ALLOWED = {
     "engine/base": ["engine/base"],
-    "engine/geometry": ["engine/base", "engine/geometry"],
-    "engine": ["engine"],
+    "engine/geometry": ENGINE_BASE,
+    "engine/vision": ENGINE_BASE + ["engine/vision"],
+    "engine/map": ENGINE_MAP,
+    "engine/matching": ENGINE_MAP + ["engine/matching"],
+    "engine/recognition": ENGINE_MATCHING,
+    "engine/initialization": ENGINE_MATCHING + ["engine/initialization"],
+    "engine/mapping/points": ENGINE_MATCHING + MAPPING_PARTS[:1],
+    "engine/mapping/panorama": ENGINE_MATCHING + MAPPING_PARTS[:2],
+    "engine/mapping/bundle": ENGINE_MATCHING + MAPPING_PARTS[:3],
+    "engine/mapping/calibration": ENGINE_MATCHING + MAPPING_PARTS[:4],
+    "engine/mapping/loops": ENGINE_MATCHING + MAPPING_PARTS,
+    "engine/mapping": ENGINE_MAPPING,
+    "engine/tracking": ENGINE_MAPPING + ["engine/tracking"],
+    "engine/system": ["engine"],
+    "engine/public": ["engine"],
     "maps": ["engine", "maps"],
+    "maps/storage": ["engine", "maps/storage"],
+    "maps/index": ["engine", "maps/storage", "maps/index"],
+    "maps/library": ["engine", "maps/storage", "maps/index", "maps/library"],
+    "maps/exchange": ["engine", "maps/storage", "maps/index", "maps/library", "maps/exchange"],
+    "maps/maintenance": ["engine", "maps/storage", "maps/index", "maps/library", "maps/exchange", "maps/maintenance"],
     "content": ["engine/base", "engine/geometry", "content"],
+    "content/gltf": ["engine/base", "engine/geometry", "content"],
     "ui": ["engine", "content", "ui"],
     "app": ["engine", "maps", "content", "ui", "app"],
+    "app/files": ["engine", "maps", "app/files"],
+    "app/calibration": APP_INPUT,
+    "app/public": ["engine", "app/calibration", "app/cameras"],
+    "app/output": APP_INPUT + ["maps", "ui", "content", "app/output"],
+    "app/simulator": APP_INPUT + ["app/output", "app/simulator"],
+    "app/cameras": APP_INPUT + ["app/simulator", "app/cameras"],
+    "app/script": APP_INPUT + ["content", "maps", "app/script"],
+    "app/session": APP_INPUT + ["maps", "content", "ui", "app/output", "app/simulator", "app/cameras", "app/script",
+                                "app/session"],
+    "app/evaluation": APP_INPUT + ["maps", "app/output", "app/simulator", "app/cameras", "app/session",
+                                   "app/evaluation"],
+    "app/demo": APP_INPUT + ["maps", "content", "app/simulator", "app/script", "app/session", "app/demo"],
 }
 PROJECT = ("engine/", "maps/", "content/", "ui/", "app/")
 # third-party header prefix -> the only places that may include it
@@ -32,7 +72,7 @@ RESTRICTED = {
     "epoxy/": ["ui/"],
     "imgui": ["ui/"],
     "pango/": ["ui/"],
-    "opencv2/": ["engine/vision/", "engine/map/", "engine/tracking/", "engine/mapping/",
+    "opencv2/": ["engine/vision/", "engine/map/", "engine/matching/", "engine/initialization/", "engine/tracking/", "engine/mapping/",
                  "engine/recognition/", "maps/", "ui/", "app/"],
     "filesystem": ["maps/", "content/", "ui/", "app/"],
     "fstream": ["maps/", "content/", "ui/", "app/"],

@@ -70,6 +70,24 @@ TEST(MapView, ViewsStraightDownAtMaximumElevation) {
   EXPECT_LT((camera_from_map * orbit.target - Eigen::Vector3d(0, 0, 4)).norm(), 1e-9);
 }
 
+TEST(MapView, LooksDownAlongTheUpDirectionOfTheMap) {
+  // The first camera is tilted; the others are level on average, and their up direction counts.
+  engine::MapSnapshot map;
+  for (const double tilt : {0.9, -0.2, 0.2, 0.0, -0.9}) {
+    engine::KeyFrame keyframe;
+    keyframe.camera_from_map.rotation =
+        engine::Rotation3::Exp({tilt, 0, 0}) * engine::Rotation3::Exp({0, 0, 0.4});
+    map.keyframes.push_back(keyframe);
+  }
+  map.keyframes.back().camera_from_map.translation = {1, 0, 0};
+  Orbit orbit = OrbitAbove(map);
+  orbit.elevation = std::numbers::pi / 2;
+  const Eigen::Vector3d forward = CameraFromMap(orbit).rotation.inverse() * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d up = engine::Rotation3::Exp({0, 0, -0.4}) * -Eigen::Vector3d::UnitY();
+  EXPECT_LT((forward + up).norm(), 1e-9);
+  EXPECT_LT((forward + engine::UpInMap(map)).norm(), 1e-12);
+}
+
 TEST(MapView, ShowsGridSpacingInMapUnits) {
   engine::MapSnapshot map;
   map.points.resize(3);

@@ -13,7 +13,6 @@
 
 #include "tests/ui/ui_testing.h"
 #include "ui/authoring_panel.h"
-#include "ui/command_text.h"
 #include "ui/letterbox.h"
 
 namespace docent::ui {
@@ -80,16 +79,39 @@ TEST(Window, ThrowsAClearErrorWithoutADisplay) {
   }
 }
 
-TEST(Window, EmitsAPlaceCommandForAClickInTheImage) {
+// The models that were placed; other actions are failures.
+class PlacedModels : public AuthoringActions {
+ public:
+  struct Model {
+    std::string file;
+    Eigen::Vector2d pixel;
+    double scale, yaw_deg;
+  };
+  void PlaceModel(const std::string& file, const Eigen::Vector2d& pixel, double scale,
+                  double yaw_deg) override {
+    models.push_back({file, pixel, scale, yaw_deg});
+  }
+  void NewMap(const std::string&) override { FAIL(); }
+  void StopMap() override { FAIL(); }
+  void PlaceSignpost(const std::string&, const Eigen::Vector2d&, const std::string&) override { FAIL(); }
+  void Undo() override { FAIL(); }
+  void Redo() override { FAIL(); }
+  void Save() override { FAIL(); }
+
+  std::vector<Model> models;
+};
+
+TEST(Window, AClickInTheImagePlacesTheChosenModelThere) {
   VirtualScreen screen;
   if (!screen.works()) GTEST_SKIP() << "Xvfb is not installed";
   if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
   Window window("Docent", 800, 600);
   Renderer renderer;
-  std::vector<std::string> commands;
-  AuthoringPanel panel(&window, [&](std::string command) { commands.push_back(std::move(command)); },
-                       {"cake.glb"});
+  PlacedModels placed;
+  AuthoringPanel panel(&window, &placed, {"cake.glb"});
   panel.state().tool = AuthoringPanel::Tool::kModel;
+  panel.state().scale = 0.25;
+  panel.state().yaw_deg = -90;
   const engine::CameraModel camera = StronglyDistorted();
   const engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(30, 60, 90)));
   View view;
@@ -120,8 +142,11 @@ TEST(Window, EmitsAPlaceCommandForAClickInTheImage) {
   const Eigen::Vector2d pixel = box.ImageFromWindow(click->position);
   EXPECT_TRUE(camera.IsInside(pixel));
   EXPECT_TRUE(panel.ClickImage(pixel));
-  ASSERT_EQ(commands.size(), 1u);
-  EXPECT_EQ(commands[0], PlaceCommand("cake.glb", pixel, 1, 0));
+  ASSERT_EQ(placed.models.size(), 1u);
+  EXPECT_EQ(placed.models[0].file, "cake.glb");
+  EXPECT_EQ(placed.models[0].pixel, pixel);
+  EXPECT_EQ(placed.models[0].scale, 0.25);
+  EXPECT_EQ(placed.models[0].yaw_deg, -90);
 }
 
 TEST(Letterbox, MapsWindowPointsToImagePixels) {
@@ -131,15 +156,6 @@ TEST(Letterbox, MapsWindowPointsToImagePixels) {
   EXPECT_EQ(box.y, 20);
   EXPECT_LT((box.ImageFromWindow({1, 21}) - Eigen::Vector2d(0, 0)).norm(), 1e-12);
   EXPECT_LT((box.ImageFromWindow({1279, 979}) - Eigen::Vector2d(639, 479)).norm(), 1e-12);
-}
-
-TEST(CommandText, QuotesUserInput) {
-  EXPECT_EQ(NewMapCommand("Desk 3"), "map new \"Desk 3\"");
-  EXPECT_EQ(NewMapCommand("a \"b\" \\ c"), "map new \"a \\\"b\\\" \\\\ c\"");
-  EXPECT_EQ(PlaceCommand("cake.glb", {320, 240.504}, 1, 0), "place \"cake.glb\" at pixel 320 240.5");
-  EXPECT_EQ(PlaceCommand("cake.glb", {1, 2}, 0.25, -90),
-            "place \"cake.glb\" at pixel 1 2 scale 0.25 yaw -90");
-  EXPECT_EQ(SignpostCommand("up\ndown", {1, 2}, "Bay 7"), "signpost \"up\\ndown\" at pixel 1 2 to \"Bay 7\"");
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr std::uint32_t kWidth = 8, kHeight = 4;
+constexpr std::uint32_t kDeviceWidth = 8, kDeviceHeight = 4;
 
 // A camera that behaves like a driver with one pixel format and three buffers. The grey value of an image is
 // its number.
@@ -27,7 +27,7 @@ struct FakeCamera {
   std::uint32_t missed_before = 0;  // sequence numbers skipped before every image but the first
   std::map<std::uint32_t, std::int32_t> controls;
   std::chrono::milliseconds now{100500};
-  int width = kWidth;
+  int width = kDeviceWidth;
   std::uint32_t pixel_format = V4L2_PIX_FMT_GREY;
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   int open_error = 0;
@@ -39,9 +39,9 @@ struct FakeCamera {
   bool streaming = false;
 };
 
-class FakeSystem : public DeviceSystem {
+class StreamingSystem : public DeviceSystem {
  public:
-  explicit FakeSystem(FakeCamera* camera) : camera_(camera) {}
+  explicit StreamingSystem(FakeCamera* camera) : camera_(camera) {}
 
   int Open(const std::string&) override {
     if (camera_->open_error != 0) return Fail(camera_->open_error);
@@ -93,11 +93,11 @@ class FakeSystem : public DeviceSystem {
         return 0;
       case VIDIOC_REQBUFS:
         static_cast<v4l2_requestbuffers*>(argument)->count = 3;
-        camera_->buffers.assign(3, std::vector<std::uint8_t>(kWidth * kHeight * 2));
+        camera_->buffers.assign(3, std::vector<std::uint8_t>(kDeviceWidth * kDeviceHeight * 2));
         return 0;
       case VIDIOC_QUERYBUF: {
         auto* buffer = static_cast<v4l2_buffer*>(argument);
-        buffer->length = kWidth * kHeight * 2;
+        buffer->length = kDeviceWidth * kDeviceHeight * 2;
         buffer->m.offset = buffer->index;
         return 0;
       }
@@ -131,7 +131,7 @@ class FakeSystem : public DeviceSystem {
   int SetFormat(v4l2_format* format) {
     format->fmt.pix.pixelformat = camera_->pixel_format;  // drivers return their actual format
     format->fmt.pix.width = static_cast<std::uint32_t>(camera_->width);
-    format->fmt.pix.height = kHeight;
+    format->fmt.pix.height = kDeviceHeight;
     format->fmt.pix.bytesperline = 0;
     return 0;
   }
@@ -144,8 +144,8 @@ class FakeSystem : public DeviceSystem {
     buffer->flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
     if (camera_->sequence > 0) camera_->sequence += camera_->missed_before;
     buffer->sequence = camera_->sequence++;
-    std::memset(camera_->buffers[buffer->index].data(), number, kWidth * kHeight);
-    buffer->bytesused = number < camera_->broken_images ? 3 : kWidth * kHeight;
+    std::memset(camera_->buffers[buffer->index].data(), number, kDeviceWidth * kDeviceHeight);
+    buffer->bytesused = number < camera_->broken_images ? 3 : kDeviceWidth * kDeviceHeight;
     buffer->timestamp = {100, number * 1000};
     return 0;
   }
@@ -154,7 +154,7 @@ class FakeSystem : public DeviceSystem {
 };
 
 std::unique_ptr<FrameSource> Open(FakeCamera* camera, CameraOptions options = {}) {
-  return OpenDevice("/dev/video9", options, std::make_unique<FakeSystem>(camera));
+  return OpenDevice("/dev/video9", options, std::make_unique<StreamingSystem>(camera));
 }
 
 TEST(Device, StreamsImagesAndReleasesAllResources) {
@@ -205,12 +205,12 @@ TEST(Device, ContinuesAfterReconnection) {
     EXPECT_EQ(camera.opened, 0);  // closed, so that the device can get the same name again
     EXPECT_EQ(camera.mapped, 0);
   }
-  camera.width = kWidth * 2;
+  camera.width = kDeviceWidth * 2;
   camera.plugged_in = true;
   ASSERT_TRUE(source->Next(&frame));
   EXPECT_TRUE(frame.image.empty());
   EXPECT_THAT(source->trouble(), HasSubstr("at 8x4"));
-  camera.width = kWidth;
+  camera.width = kDeviceWidth;
   ASSERT_TRUE(source->Next(&frame));
   EXPECT_FALSE(frame.image.empty());
   EXPECT_EQ(source->trouble(), "");
@@ -277,7 +277,7 @@ TEST(Device, MeasuresTheLatencyOfItsImages) {
 TEST(Device, ListsAnInaccessibleDeviceWithAdvice) {
   FakeCamera camera;
   camera.open_error = EACCES;
-  FakeSystem system(&camera);
+  StreamingSystem system(&camera);
   const auto device = DescribeDevice("/dev/video9", &system);
   ASSERT_TRUE(device);
   EXPECT_THAT(device->trouble, HasSubstr("group 'video'"));
@@ -334,7 +334,7 @@ TEST(Device, ReportsWhyItCannotBeUsed) {
 
 TEST(Device, DescribesItsFormats) {
   FakeCamera camera;
-  FakeSystem system(&camera);
+  StreamingSystem system(&camera);
   const auto device = DescribeDevice("/dev/video9", &system);
   ASSERT_TRUE(device);
   EXPECT_EQ(device->card, "Fake");

@@ -16,11 +16,11 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr int kWidth = 64, kHeight = 48;
+constexpr int kFileWidth = 64, kFileHeight = 48;
 
 // An image whose brightness encodes its number.
 cv::Mat Numbered(int number) {
-  return cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(10 * number + 5));
+  return cv::Mat(kFileHeight, kFileWidth, CV_8UC1, cv::Scalar(10 * number + 5));
 }
 
 void WritePng(const std::filesystem::path& path, const cv::Mat& image) {
@@ -30,7 +30,7 @@ void WritePng(const std::filesystem::path& path, const cv::Mat& image) {
 
 void WriteVideo(const std::filesystem::path& path, int count) {
   cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25,
-                         cv::Size(kWidth, kHeight));
+                         cv::Size(kFileWidth, kFileHeight));
   ASSERT_TRUE(writer.isOpened());
   cv::Mat image;
   for (int i = 0; i < count; ++i) {
@@ -150,7 +150,7 @@ TEST_F(Cameras, ReportATruncatedVideoThatCannotBeOpened) {
 }
 
 TEST_F(Cameras, ReportATruncatedImage) {
-  cv::Mat noise(kHeight, kWidth, CV_8UC3);
+  cv::Mat noise(kFileHeight, kFileWidth, CV_8UC3);
   cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 255);
   for (const char* name : {"rgb/0.jpg", "rgb/0.png"}) {
     WritePng(folder_ / name, noise);

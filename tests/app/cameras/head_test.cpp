@@ -7,19 +7,18 @@
 #include <cerrno>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <vector>
+
+#include "tests/app/support/rad_per_degree.h"
 
 namespace docent::app {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // A device with these controls only, which behaves as V4L2 specifies for drivers (VIDIOC_G_CTRL,
 // VIDIOC_S_CTRL): values are rounded to the control's steps and returned. A value out of range gives ERANGE,
 // a missing control EINVAL, a control that another program holds EBUSY, and every call ENODEV while the
 // device is unplugged.
-struct FakeDevice {
+struct FakeHeadDevice {
   std::map<std::uint32_t, v4l2_queryctrl> controls;
   std::map<std::uint32_t, std::int32_t> values;
   std::vector<std::pair<std::uint32_t, std::int32_t>> written;  // as requested, before rounding
@@ -44,9 +43,9 @@ struct FakeDevice {
   }
 };
 
-class FakeSystem : public DeviceSystem {
+class HeadControlSystem : public DeviceSystem {
  public:
-  explicit FakeSystem(FakeDevice* device) : device_(device) {}
+  explicit HeadControlSystem(FakeHeadDevice* device) : device_(device) {}
   int Open(const std::string&) override {
     if (device_->unplugged) return Fail(ENOENT);
     ++device_->open;
@@ -89,7 +88,7 @@ class FakeSystem : public DeviceSystem {
     errno = error;
     return -1;
   }
-  FakeDevice* const device_;
+  FakeHeadDevice* const device_;
 };
 
 TEST(Head, TurnsTowardsTheGivenDirection) {
@@ -116,95 +115,95 @@ TEST(Head, TurnsAtItsSpeedWithinItsRange) {
 }
 
 TEST(Head, UsesArcSecondsOfADevice) {
-  FakeDevice device;
+  FakeHeadDevice device;
   device.Add(V4L2_CID_PAN_ABSOLUTE, -100 * 3600, 100 * 3600);
   device.Add(V4L2_CID_TILT_ABSOLUTE, -20 * 3600, 20 * 3600);
   {
-    const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
+    const auto head = OpenDeviceHead(std::make_unique<HeadControlSystem>(&device), "/dev/video0");
     ASSERT_TRUE(head);
-    EXPECT_NEAR(head->range().highest.pan_rad, 100 * kDegree, 1e-9);
-    head->LookAt({30 * kDegree, -90 * kDegree}, FromSeconds(1));
+    EXPECT_NEAR(head->range().highest.pan_rad, 100 * kRadPerDegree, 1e-9);
+    head->LookAt({30 * kRadPerDegree, -90 * kRadPerDegree}, FromSeconds(1));
     EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), 30 * 3600);
     EXPECT_EQ(device.Last(V4L2_CID_TILT_ABSOLUTE), -20 * 3600);
-    EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 30 * kDegree, 1e-9);
+    EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 30 * kRadPerDegree, 1e-9);
   }
   EXPECT_EQ(device.open, 0);
 }
 
 TEST(Head, SendsDifferencesToADeviceWithRelativeControls) {
-  FakeDevice device;
+  FakeHeadDevice device;
   device.Add(V4L2_CID_PAN_RELATIVE, -4480, 4480);
-  const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
+  const auto head = OpenDeviceHead(std::make_unique<HeadControlSystem>(&device), "/dev/video0");
   ASSERT_TRUE(head);
-  head->LookAt({10 * kDegree, 0}, FromSeconds(1));
+  head->LookAt({10 * kRadPerDegree, 0}, FromSeconds(1));
   EXPECT_EQ(device.Last(V4L2_CID_PAN_RELATIVE), 640);
-  head->LookAt({4 * kDegree, 0}, FromSeconds(2));
+  head->LookAt({4 * kRadPerDegree, 0}, FromSeconds(2));
   EXPECT_EQ(device.Last(V4L2_CID_PAN_RELATIVE), -384);
   EXPECT_DOUBLE_EQ(head->range().highest.tilt_rad, 0);
 }
 
 TEST(Head, RoundsToTheStepsOfADeviceAndStartsAtItsAngles) {
-  FakeDevice device;
+  FakeHeadDevice device;
   // Steps of a quarter of a degree from -50 degrees: other angles are rounded.
   device.Add(V4L2_CID_PAN_ABSOLUTE, -50 * 3600, 50 * 3600, 900);
   device.values[V4L2_CID_PAN_ABSOLUTE] = 45 * 3600;
-  const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
+  const auto head = OpenDeviceHead(std::make_unique<HeadControlSystem>(&device), "/dev/video0");
   ASSERT_TRUE(head);
-  EXPECT_NEAR(head->At({}).pan_rad, 45 * kDegree, 1e-9) << "it has not turned to the centre yet";
+  EXPECT_NEAR(head->At({}).pan_rad, 45 * kRadPerDegree, 1e-9) << "it has not turned to the centre yet";
   EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9);
-  head->LookAt({20.2 * kDegree, 0}, FromSeconds(40));
+  head->LookAt({20.2 * kRadPerDegree, 0}, FromSeconds(40));
   EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), 20 * 3600 + 900);
-  EXPECT_NEAR(head->At(FromSeconds(60)).pan_rad, 20.25 * kDegree, 1e-9);
-  head->LookAt({-80 * kDegree, 0}, FromSeconds(60));
+  EXPECT_NEAR(head->At(FromSeconds(60)).pan_rad, 20.25 * kRadPerDegree, 1e-9);
+  head->LookAt({-80 * kRadPerDegree, 0}, FromSeconds(60));
   EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), -50 * 3600) << "must stay within the range";
 }
 
 TEST(Head, UsesTheValueThatTheDriverReturns) {
-  FakeDevice device;
+  FakeHeadDevice device;
   device.Add(V4L2_CID_PAN_ABSOLUTE, -360000, 360000, 1);
-  auto system = std::make_unique<FakeSystem>(&device);
+  auto system = std::make_unique<HeadControlSystem>(&device);
   const auto head = OpenDeviceHead(std::move(system), "/dev/video0");
   ASSERT_TRUE(head);
   // The firmware has coarser steps than its description.
   device.controls[V4L2_CID_PAN_ABSOLUTE].step = 10 * 3600;
-  head->LookAt({37 * kDegree, 0}, FromSeconds(1));
-  EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 30 * kDegree, 1e-9);
+  head->LookAt({37 * kRadPerDegree, 0}, FromSeconds(1));
+  EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 30 * kRadPerDegree, 1e-9);
 }
 
 TEST(Head, StaysWhileTheDeviceRejectsMotionAndMovesOnceItAccepts) {
   for (const int control_error : {EBUSY, EACCES, ERANGE, EINVAL}) {
-    FakeDevice device;
+    FakeHeadDevice device;
     device.Add(V4L2_CID_PAN_ABSOLUTE, -100 * 3600, 100 * 3600);
-    const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
+    const auto head = OpenDeviceHead(std::make_unique<HeadControlSystem>(&device), "/dev/video0");
     ASSERT_TRUE(head);
     device.control_error = control_error;
-    head->LookAt({30 * kDegree, 0}, FromSeconds(1));
+    head->LookAt({30 * kRadPerDegree, 0}, FromSeconds(1));
     EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9) << control_error;
     device.control_error = 0;
-    head->LookAt({30 * kDegree, 0}, FromSeconds(30));
-    EXPECT_NEAR(head->At(FromSeconds(60)).pan_rad, 30 * kDegree, 1e-9) << control_error;
+    head->LookAt({30 * kRadPerDegree, 0}, FromSeconds(30));
+    EXPECT_NEAR(head->At(FromSeconds(60)).pan_rad, 30 * kRadPerDegree, 1e-9) << control_error;
     EXPECT_EQ(device.open, 1);
   }
 }
 
 TEST(Head, ReopensADeviceThatWasUnplugged) {
-  FakeDevice device;
+  FakeHeadDevice device;
   device.Add(V4L2_CID_PAN_ABSOLUTE, -100 * 3600, 100 * 3600);
   {
-    const auto head = OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0");
+    const auto head = OpenDeviceHead(std::make_unique<HeadControlSystem>(&device), "/dev/video0");
     ASSERT_TRUE(head);
-    head->LookAt({30 * kDegree, 0}, FromSeconds(1));
+    head->LookAt({30 * kRadPerDegree, 0}, FromSeconds(1));
     device.unplugged = true;
-    head->LookAt({-30 * kDegree, 0}, FromSeconds(10));
+    head->LookAt({-30 * kRadPerDegree, 0}, FromSeconds(10));
     EXPECT_EQ(device.open, 0) << "an unplugged device must be closed, so that it can get the same name again";
-    EXPECT_NEAR(head->At(FromSeconds(20)).pan_rad, 30 * kDegree, 1e-9);
-    head->LookAt({-30 * kDegree, 0}, FromSeconds(20));
+    EXPECT_NEAR(head->At(FromSeconds(20)).pan_rad, 30 * kRadPerDegree, 1e-9);
+    head->LookAt({-30 * kRadPerDegree, 0}, FromSeconds(20));
     device.unplugged = false;
     device.values[V4L2_CID_PAN_ABSOLUTE] = 0;  // it restarts at zero
-    head->LookAt({-30 * kDegree, 0}, FromSeconds(30));
+    head->LookAt({-30 * kRadPerDegree, 0}, FromSeconds(30));
     EXPECT_EQ(device.Last(V4L2_CID_PAN_ABSOLUTE), -30 * 3600);
     EXPECT_NEAR(head->At(FromSeconds(30)).pan_rad, 0, 1e-9);
-    EXPECT_NEAR(head->At(FromSeconds(40)).pan_rad, -30 * kDegree, 1e-9);
+    EXPECT_NEAR(head->At(FromSeconds(40)).pan_rad, -30 * kRadPerDegree, 1e-9);
     // If another camera without pan control takes its place, it is not opened.
     device.unplugged = true;
     head->LookAt({}, FromSeconds(50));
@@ -217,8 +216,8 @@ TEST(Head, ReopensADeviceThatWasUnplugged) {
 }
 
 TEST(Head, DoesNotExistWithoutPanControl) {
-  FakeDevice device;
-  EXPECT_FALSE(OpenDeviceHead(std::make_unique<FakeSystem>(&device), "/dev/video0"));
+  FakeHeadDevice device;
+  EXPECT_FALSE(OpenDeviceHead(std::make_unique<HeadControlSystem>(&device), "/dev/video0"));
   EXPECT_EQ(device.open, 0);
 }
 

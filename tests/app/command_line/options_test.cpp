@@ -68,6 +68,10 @@ TEST(AuthorOptions, RejectInvalidValues) {
   EXPECT_TRUE(rejected(" --seed -1"));
   EXPECT_TRUE(rejected(" --from -1"));
   EXPECT_TRUE(rejected(" --from 5 --until 4"));
+  EXPECT_TRUE(rejected(" --target a.png --target-width 1e300"));
+  EXPECT_TRUE(rejected(" --target a.png --target-width 0"));
+  EXPECT_TRUE(rejected(" --camera d --baseline 1e300"));
+  EXPECT_TRUE(rejected(" --camera d --baseline -1"));
   EXPECT_TRUE(rejected(" stray"));
   EXPECT_FALSE(Parse<AuthorOptions>(AddAuthorCommand, "author --library l"));
   EXPECT_FALSE(Parse<AuthorOptions>(AddAuthorCommand, "author --camera c"));

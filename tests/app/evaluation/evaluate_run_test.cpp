@@ -5,11 +5,12 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "app/evaluation/html_report.h"
 #include "app/evaluation/json_report.h"
 #include "app/evaluation/run_distribution.h"
+#include "tests/app/support/known_run.h"
+#include "tests/app/support/rad_per_degree.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
@@ -20,12 +21,6 @@ using ::testing::DoubleNear;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::Optional;
-
-constexpr double kDegree = std::numbers::pi / 180;
-
-Timestamp TimeOf(int frame) {
-  return Timestamp(frame * 33'000'000LL);
-}
 
 // A camera that moves along a rising helix and rotates.
 std::vector<TimedPose> Helix(int count) {
@@ -39,24 +34,13 @@ std::vector<TimedPose> Helix(int count) {
   return poses;
 }
 
-// The transform of an error-free map with an arbitrary frame and scale.
-const engine::Sim3 kTruthFromMap = [] {
-  engine::Sim3 transform;
-  transform.rotation = engine::Rotation3::Exp({0.5, -1, 0.2});
-  transform.translation = {3, -4, 5};
-  transform.scale = 2.5;
-  return transform;
-}();
-
 FrameRecord PerfectFrame(const TimedPose& truth, std::uint64_t map_key = 1) {
   FrameRecord frame;
   frame.time = truth.time;
   frame.state = TrackingState::kSixDof;
   frame.map_key = map_key;
   frame.tracking_ms = 4;
-  const engine::Rigid3 map_from_camera(kTruthFromMap.rotation.inverse() * truth.truth_from_camera.rotation,
-                                       kTruthFromMap.inverse() * truth.truth_from_camera.translation);
-  frame.camera_from_map = map_from_camera.inverse();
+  frame.camera_from_map = CameraFromMap(truth.truth_from_camera);
   return frame;
 }
 
@@ -119,7 +103,7 @@ TEST(Evaluation, MeasuresRotationErrorAndDriftSeparately) {
   // A rotation error about the camera's x axis grows linearly to 4 degrees over the run; the alignment halves
   // the largest error.
   for (std::size_t i = 0; i < run.frames.size(); ++i) {
-    const double angle = 4 * kDegree * static_cast<double>(i) / 200;
+    const double angle = 4 * kRadPerDegree * static_cast<double>(i) / 200;
     engine::Rigid3& pose = run.frames[i].camera_from_map;
     pose = engine::Rigid3(engine::Rotation3::Exp({angle, 0, 0}), Eigen::Vector3d::Zero()) * pose;
   }
@@ -137,11 +121,13 @@ TEST(Evaluation, MeasuresTheErrorOfThePureRotation) {
     std::vector<TimedPose> truth;
     RunRecord run;
     for (int i = 0; i <= 90; ++i) {
-      truth.push_back({TimeOf(i), {engine::Rotation3::Exp({0, i * kDegree, 0}), Eigen::Vector3d::Zero()}});
+      truth.push_back(
+          {TimeOf(i), {engine::Rotation3::Exp({0, i * kRadPerDegree, 0}), Eigen::Vector3d::Zero()}});
       TimedPose estimated = truth.back();
       const double part = i / 90.0;
-      estimated.truth_from_camera.rotation = engine::Rotation3::Exp({0, turned_deg * part * kDegree, 0}) *
-                                             engine::Rotation3::Exp({0, 0, roll_deg * part * kDegree});
+      estimated.truth_from_camera.rotation =
+          engine::Rotation3::Exp({0, turned_deg * part * kRadPerDegree, 0}) *
+          engine::Rotation3::Exp({0, 0, roll_deg * part * kRadPerDegree});
       run.frames.push_back(PerfectFrame(estimated));
     }
     return EvaluateRun(run, truth, {});
@@ -158,7 +144,8 @@ TEST(Evaluation, MeasuresTheErrorOfThePureRotation) {
   RunRecord lost;
   std::vector<TimedPose> truth;
   for (int i = 0; i <= 90; ++i) {
-    truth.push_back({TimeOf(i), {engine::Rotation3::Exp({0, i * kDegree, 0}), Eigen::Vector3d::Zero()}});
+    truth.push_back(
+        {TimeOf(i), {engine::Rotation3::Exp({0, i * kRadPerDegree, 0}), Eigen::Vector3d::Zero()}});
     lost.frames.push_back(PerfectFrame(truth.back()));
     if (i > 60) lost.frames.back().state = TrackingState::kLost;
   }
@@ -259,7 +246,7 @@ TEST(Evaluation, IgnoresPositionsInAMapWithoutFinitePoints) {
   run.frames[10].state = TrackingState::kRelocalized;
   // Rotations are evaluated anyway: frame 5 has an error of one degree.
   engine::Rigid3& pose = run.frames[5].camera_from_map;
-  pose = engine::Rigid3(engine::Rotation3::Exp({kDegree, 0, 0}), Eigen::Vector3d::Zero()) * pose;
+  pose = engine::Rigid3(engine::Rotation3::Exp({kRadPerDegree, 0, 0}), Eigen::Vector3d::Zero()) * pose;
   const SequenceReport report = EvaluateRun(run, truth, {{TimeOf(0), "start"}, {TimeOf(40), "walk"}});
   EXPECT_EQ(report.tracked, 120);
   EXPECT_EQ(report.tracked_ratio, 1);
@@ -381,14 +368,14 @@ TEST(GroundTruth, FindsThePoseNearestInTime) {
 }
 
 TEST(GroundTruth, InterpolatesBetweenPoses) {
-  std::vector<TimedPose> truth = {{TimeOf(0), {engine::Rotation3(), {1, 2, 3}}},
-                                  {TimeOf(1), {engine::Rotation3::Exp({0, 0.4, 0}), {2, 2, 5}}}};
-  const Timestamp quarter = TimeOf(1) / 4, far = std::chrono::seconds(1);
+  std::vector<TimedPose> truth = {{Timestamp(0), {engine::Rotation3(), {1, 2, 3}}},
+                                  {Timestamp(40'000'000), {engine::Rotation3::Exp({0, 0.4, 0}), {2, 2, 5}}}};
+  const Timestamp quarter = truth[1].time / 4, far = std::chrono::seconds(1);
   const auto pose = InterpolatePose(truth, quarter, far);
   ASSERT_TRUE(pose);
   EXPECT_TRUE(engine::IsNear(*pose, {engine::Rotation3::Exp({0, 0.1, 0}), {1.25, 2, 3.5}}, 1e-9, 1e-9));
   EXPECT_TRUE(
-      engine::IsNear(*InterpolatePose(truth, TimeOf(1), far), truth[1].truth_from_camera, 1e-9, 1e-9));
+      engine::IsNear(*InterpolatePose(truth, truth[1].time, far), truth[1].truth_from_camera, 1e-9, 1e-9));
   EXPECT_TRUE(
       engine::IsNear(*InterpolatePose(truth, TimeOf(2), far), truth[1].truth_from_camera, 1e-9, 1e-9));
   // If one neighbour is too far away in time, the other is used; if both are, there is no pose.

@@ -4,11 +4,11 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <numbers>
 #include <random>
 
 #include "engine/base/error.h"
 #include "engine/geometry/sim3.h"
+#include "tests/app/support/known_run.h"
 
 namespace docent::app {
 namespace {
@@ -16,26 +16,14 @@ namespace {
 using engine::Rotation3;
 using engine::TrackingState;
 
-constexpr int kFrames = 90;      // three seconds
+constexpr int kRunFrames = 90;   // three seconds
 constexpr int kFirstDepth = 15;  // the frame at which the map gets depth
 constexpr double kSceneDepth_m = 2;
-
-Timestamp TimeOf(int frame) {
-  return Timestamp(frame * 33'333'333LL);
-}
-
-const engine::Sim3 kTruthFromMap = [] {
-  engine::Sim3 transform;
-  transform.rotation = Rotation3::Exp({0.5, -1, 0.2});
-  transform.translation = {3, -4, 5};
-  transform.scale = 2.5;
-  return transform;
-}();
 
 // A camera that moves sideways at `speed_m` metres per second on a curve, and rotates slightly.
 std::vector<TimedPose> Sideways(double speed_m) {
   std::vector<TimedPose> poses;
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < kRunFrames; ++i) {
     const double t = i / 30.0;
     poses.push_back({TimeOf(i),
                      {Rotation3::Exp({0.02 * t, 0.1 * t, 0}),
@@ -44,23 +32,16 @@ std::vector<TimedPose> Sideways(double speed_m) {
   return poses;
 }
 
-// The camera_from_map pose in an error-free map with its own frame and scale.
-engine::Rigid3 InMap(const engine::Rigid3& truth_from_camera) {
-  return engine::Rigid3(kTruthFromMap.rotation.inverse() * truth_from_camera.rotation,
-                        kTruthFromMap.inverse() * truth_from_camera.translation)
-      .inverse();
-}
-
 // A run with the estimated camera poses `estimated`, whose map was initialized from the keyframes 0 and
 // kFirstDepth.
 RunRecord RunOf(const std::vector<TimedPose>& estimated, double depth_m = kSceneDepth_m) {
   RunRecord run;
-  for (int i = kFirstDepth; i < kFrames; ++i) {
+  for (int i = kFirstDepth; i < kRunFrames; ++i) {
     FrameRecord frame;
     frame.time = TimeOf(i);
     frame.state = TrackingState::kSixDof;
     frame.map_key = 1;
-    frame.camera_from_map = InMap(estimated[static_cast<std::size_t>(i)].truth_from_camera);
+    frame.camera_from_map = CameraFromMap(estimated[static_cast<std::size_t>(i)].truth_from_camera);
     frame.median_depth = depth_m / kTruthFromMap.scale;
     run.frames.push_back(frame);
   }
@@ -69,7 +50,8 @@ RunRecord RunOf(const std::vector<TimedPose>& estimated, double depth_m = kScene
   for (int i = 0; i < 20; ++i)
     start.points.push_back({Eigen::Vector2f::Zero(), run.frames[0].median_depth * (0.5 + 0.05 * i)});
   for (const int i : {0, kFirstDepth})
-    start.keyframes.push_back({TimeOf(i), InMap(estimated[static_cast<std::size_t>(i)].truth_from_camera)});
+    start.keyframes.push_back(
+        {TimeOf(i), CameraFromMap(estimated[static_cast<std::size_t>(i)].truth_from_camera)});
   run.initializations.push_back(start);
   MapRecord map;
   map.key = 1;

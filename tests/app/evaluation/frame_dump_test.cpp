@@ -76,6 +76,7 @@ TEST_F(FrameDump, ListsWhereEveryPointWasSearchedAndFound) {
       EXPECT_GT(point["depth_deviation"], 0);
     }
   }
+  EXPECT_GT(inliers, 10u);
   EXPECT_EQ(found, tracked_.matches.size());
   EXPECT_EQ(inliers, static_cast<std::size_t>(tracked_.finite_points + tracked_.infinite_points));
   EXPECT_EQ(json["levels"].size(), static_cast<std::size_t>(engine::kPyramidLevels));
@@ -95,6 +96,7 @@ TEST_F(FrameDump, DrawsPointsAtTheirPixels) {
       for (int x = 0; x < drawn.cols; ++x)
         changed.at<std::uint8_t>(y, x) = difference.at<cv::Vec3b>(y, x) != cv::Vec3b(0, 0, 0);
     // Something must be drawn around every point that was found.
+    int found = 0;
     for (const engine::InspectedPoint& point : inspection.points) {
       if (!point.found) continue;
       const int reach = 2 * (1 << point.level) + 2;
@@ -102,7 +104,9 @@ TEST_F(FrameDump, DrawsPointsAtTheirPixels) {
       const cv::Rect about =
           cv::Rect(at.x - reach, at.y - reach, 2 * reach + 1, 2 * reach + 1) & cv::Rect({0, 0}, drawn.size());
       EXPECT_GT(cv::countNonZero(changed(about)), 0) << name;
+      ++found;
     }
+    EXPECT_GT(found, 10);
   }
   const cv::Mat corners = cv::imread((folder_.path() / "frame-0-corners.png").string());
   EXPECT_EQ(corners.cols, tracked_.frame.image.cols * 3 / 2);

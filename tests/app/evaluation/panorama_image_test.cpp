@@ -5,17 +5,15 @@
 
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "app/simulator/simulation.h"
 #include "engine/vision/features.h"
+#include "tests/app/support/rad_per_degree.h"
 
 namespace docent::app {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 // The textured cylinder seen from its axis: a rotation of 90 degrees in 100 images.
 const Simulation& Cylinder() {
@@ -48,7 +46,7 @@ engine::KeyFrame MakeKeyFrame(engine::KeyFrameId id, int frame, engine::Panorama
 // vertical axis.
 engine::MapSnapshot TrueMap(double world_rotation_deg) {
   engine::MapSnapshot map;
-  const engine::Rotation3 turned = engine::Rotation3::Exp({0, world_rotation_deg * kDegree, 0});
+  const engine::Rotation3 turned = engine::Rotation3::Exp({0, world_rotation_deg * kRadPerDegree, 0});
   for (int i = 0; i < 6; ++i)
     map.keyframes.push_back(MakeKeyFrame(static_cast<engine::KeyFrameId>(i), 17 * i, 0, turned));
   map.panoramas = {{0, 0}};
@@ -60,7 +58,7 @@ engine::MapSnapshot TrueMap(double world_rotation_deg) {
 double MedianDifference(const PanoramaImage& panorama, int frame, const engine::Rotation3& map_from_world,
                         double rotation_deg, int* compared) {
   const cv::Mat truth = Grey(frame);
-  const engine::Rotation3 more = engine::Rotation3::Exp({0, rotation_deg * kDegree, 0});
+  const engine::Rotation3 more = engine::Rotation3::Exp({0, rotation_deg * kRadPerDegree, 0});
   const engine::Rotation3 map_from_camera =
       map_from_world * more * Cylinder().world_from_camera(frame).rotation;
   std::vector<int> differences;
@@ -85,7 +83,8 @@ TEST(PanoramaImage, MatchesImagesBetweenItsKeyframes) {
   for (const double world_rotation_deg : {0.0, 100.0, 180.0}) {
     const auto images = StitchPanoramas(TrueMap(world_rotation_deg));
     ASSERT_EQ(images.size(), 1u);
-    const engine::Rotation3 map_from_world = engine::Rotation3::Exp({0, -world_rotation_deg * kDegree, 0});
+    const engine::Rotation3 map_from_world =
+        engine::Rotation3::Exp({0, -world_rotation_deg * kRadPerDegree, 0});
     for (const int frame : {9, 43, 76}) {
       int compared = 0;
       const double difference = MedianDifference(images[0], frame, map_from_world, 0, &compared);

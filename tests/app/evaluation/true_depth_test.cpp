@@ -14,6 +14,11 @@
 namespace docent::app {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::Each;
+using ::testing::Eq;
+using ::testing::SizeIs;
+
 // A grid of pixels over the image of a simulated camera.
 std::vector<Eigen::Vector2f> Grid(const engine::CameraModel& camera) {
   std::vector<Eigen::Vector2f> pixels;
@@ -84,9 +89,9 @@ TEST(TrueDepth, IsUnknownWithoutTranslation) {
   const auto pixels = Grid(simulation->camera());
   std::vector<TimedPose> truth = GroundTruthOf(*simulation);
   for (TimedPose& pose : truth) pose.truth_from_camera.translation = truth[0].truth_from_camera.translation;
-  for (const auto& depth : MeasureDepths(simulation, 5, pixels, truth)) EXPECT_FALSE(depth);
-  for (const auto& depth : MeasureDepths(simulation, 5, pixels, {}))
-    EXPECT_FALSE(depth) << "without ground truth";
+  const auto all_unknown = AllOf(SizeIs(pixels.size()), Each(Eq(std::nullopt)));
+  EXPECT_THAT(MeasureDepths(simulation, 5, pixels, truth), all_unknown);
+  EXPECT_THAT(MeasureDepths(simulation, 5, pixels, {}), all_unknown) << "without ground truth";
 }
 
 TEST(TrueDepth, RejectsInvalidOptions) {

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "engine/base/random.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
@@ -79,6 +80,102 @@ TEST(Script, IsReadBackEqualAfterWriting) {
   }
 }
 
+// Ordinary and odd texts: keywords, numbers, quotes, comments, blanks and bytes that are not UTF-8.
+std::string AnyText(Random* random) {
+  const std::vector<std::string> parts = {"a",
+                                          "to",
+                                          "pixel",
+                                          "at",
+                                          "map",
+                                          "stop",
+                                          "1e5",
+                                          "-",
+                                          "é",
+                                          "→",
+                                          " ",
+                                          "\"",
+                                          "\\",
+                                          "\\n",
+                                          "#",
+                                          "\t",
+                                          "\n",
+                                          "\r",
+                                          "\f",
+                                          "\v",
+                                          "\xE9",
+                                          "\x7F",
+                                          std::string(1, '\0'),
+                                          "\xEF\xBB\xBF"};
+  std::string text;
+  while (random->Uniform() < 0.6) text += parts[random->Below(parts.size())];
+  return random->Uniform() < 0.01 ? std::string(10'001, 'x') : text;
+}
+
+double AnyNumber(Random* random) {
+  const std::vector<double> odd = {0, 1, -1, 0.1, 1e-9, 1e9, 5e-324, 1.7e308, 1e12, 1.0 / 3, -2.5e-7};
+  if (random->Uniform() < 0.3) return odd[random->Below(odd.size())];
+  return random->Uniform(-1000, 1000);
+}
+
+Command AnyCommand(Random* random) {
+  const auto text = [&] { return AnyText(random); };
+  const auto number = [&] { return AnyNumber(random); };
+  const auto pixel = [&] { return Eigen::Vector2d(number(), number()); };
+  switch (random->Below(14)) {
+    case 0:
+      return NewMap{text()};
+    case 1:
+      return StopMap{};
+    case 2:
+      return UseMap{text()};
+    case 3:
+      return SetPolicy{text(), static_cast<maps::Policy>(random->Below(4))};
+    case 4:
+      return PlaceModel{text(), pixel(), number(), number()};
+    case 5:
+      return PlaceModel{text(), pixel()};
+    case 6:
+      return PlaceSignpost{text(), pixel(), text()};
+    case 7:
+      return MoveEntity{text(), {number(), number(), number()}, std::nullopt};
+    case 8:
+      return MoveEntity{text(), {0, 0, 0}, pixel()};
+    case 9:
+      return RotateEntity{text(), number()};
+    case 10:
+      return ScaleEntity{text(), number()};
+    case 11:
+      return RemoveEntity{text()};
+    case 12:
+      return Undo{};
+    default:
+      return random->Below(2) == 0 ? Command(Redo{}) : Command(Save{});
+  }
+}
+
+TEST(Script, EveryRandomCommandIsInvalidOrReadBackEqual) {
+  Random random(3);
+  int valid = 0, invalid = 0;
+  for (int trial = 0; trial < 20'000; ++trial) {
+    const TimedCommand command{Timestamp(static_cast<std::int64_t>(random.Uniform(0, 1e12))), 1,
+                               AnyCommand(&random)};
+    const std::string line = FormatScriptLine(command);
+    const std::string problem = Validate(command.command);
+    if (!problem.empty()) {
+      EXPECT_NE(ErrorOf([&] { ParseScript(line, "s"); }), "") << line << ": " << problem;
+      ++invalid;
+      continue;
+    }
+    const auto read = ParseScript(line, "s");
+    ASSERT_EQ(read.size(), 1u) << line;
+    EXPECT_EQ(read[0].command, command.command) << line;
+    EXPECT_EQ(read[0].time, command.time) << line;
+    ++valid;
+  }
+  EXPECT_GT(valid, 5000);
+  EXPECT_GT(invalid, 2000);
+}
+
 TEST(Script, NamesTheLineOfAnInvalidCommand) {
   const auto sentence = [](const std::string& line) {
     return ErrorOf([&] { ParseScript("0 save\n" + line + "\n", "'tour.txt'"); });
@@ -106,6 +203,16 @@ TEST(Script, NamesTheLineOfAnInvalidCommand) {
                            "1 place a.glb at pixel 1 inf",
                            "1 place a.glb at pixel 1 1e9",
                            "1 place a.glb at pixel 1 2 scale 0",
+                           "1 place a.glb at pixel 1 2 scale 1e12",
+                           "1 place a.glb at pixel 1 2 scale 1e-12",
+                           "1 place a.glb at pixel 1 2 yaw 1e300",
+                           "1 map new \"a\x01\"",
+                           "1 map new caf\xE9",
+                           "1 signpost caf\xE9 at pixel 1 2",
+                           "1 move a 0 0 1e300",
+                           "1 rotate a -1e300",
+                           "1 scale a 0",
+                           "1 scale a 1e300",
                            "1 place a.glb at pixel 1 2 scale",
                            "1 place a.glb at pixel 1 2 roll 3",
                            "1 signpost at pixel 1 2",
@@ -119,6 +226,8 @@ TEST(Script, NamesTheLineOfAnInvalidCommand) {
                            "1 \"save\""}) {
     EXPECT_THAT(sentence(line), AllOf(HasSubstr("'tour.txt', line 2"), testing::EndsWith("."))) << line;
   }
+  EXPECT_THAT(sentence("1 map new " + std::string(201, 'x')), HasSubstr("200 bytes"));
+  EXPECT_THAT(sentence("1 signpost " + std::string(10'001, 'x') + " at pixel 1 2"), HasSubstr("10000 bytes"));
 }
 
 TEST(Script, IsRefusedWhenTimesDecrease) {

@@ -117,7 +117,6 @@ std::vector<std::string> WarningsWith(const CameraModel& assumed) {
   const auto simulation = MakeSimulation("hand", simulated);
   SessionOptions options;
   options.threaded = false;
-  options.tracker.hybrid = true;
   options.first_map = "table";
   Session session(options, {std::make_shared<CameraModel>(assumed)}, nullptr);
   std::vector<std::string> warnings;

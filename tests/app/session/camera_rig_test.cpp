@@ -8,14 +8,13 @@
 #include <numbers>
 
 #include "engine/base/random.h"
+#include "tests/app/support/rad_per_degree.h"
 
 namespace docent::app {
 namespace {
 
 using engine::Rigid3;
 using engine::Rotation3;
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 double Normal(Random* random) {
   return std::sqrt(-2 * std::log(1 - random->Uniform())) * std::cos(2 * std::numbers::pi * random->Uniform());
@@ -41,7 +40,7 @@ struct Errors {
 };
 Errors Compare(const engine::RigEstimate& estimate) {
   return {std::abs(estimate.Baseline() / kBaseline - 1),
-          (estimate.second_from_first.rotation.inverse() * kTruth.rotation).Angle() / kDegree};
+          (estimate.second_from_first.rotation.inverse() * kTruth.rotation).Angle() / kRadPerDegree};
 }
 
 // Two cameras at 30 and 25 frames per second. Each pose has the noise of a tracker, one in ten is an outlier.
@@ -51,7 +50,7 @@ engine::CameraRig Watch(double seconds, const std::function<Rigid3(double)>& arm
   Random random(5);
   const auto noisy = [&](const Rigid3& pose) {
     const bool outlier = random.Below(10) == 0;
-    return Rigid3(Rotation3::Exp(NormalVector(&random, outlier ? 0.2 : 0.1 * kDegree)) * pose.rotation,
+    return Rigid3(Rotation3::Exp(NormalVector(&random, outlier ? 0.2 : 0.1 * kRadPerDegree)) * pose.rotation,
                   pose.translation + NormalVector(&random, outlier ? 0.2 : 0.002));
   };
   for (int tick = 0; tick * 1e-3 < seconds; ++tick) {
@@ -68,8 +67,9 @@ TEST(RelativePose, IsCorrectWithTenPercentOutliers) {
   std::vector<Rigid3> samples;
   for (int i = 0; i < 300; ++i) {
     const bool outlier = i % 10 == 0;
-    samples.emplace_back(Rotation3::Exp(NormalVector(&random, outlier ? 1 : 0.2 * kDegree)) * kTruth.rotation,
-                         kTruth.translation + NormalVector(&random, outlier ? 1 : 0.004));
+    samples.emplace_back(
+        Rotation3::Exp(NormalVector(&random, outlier ? 1 : 0.2 * kRadPerDegree)) * kTruth.rotation,
+        kTruth.translation + NormalVector(&random, outlier ? 1 : 0.004));
   }
   const engine::RigEstimate estimate = engine::RobustRelativePose(samples);
   EXPECT_LT(Compare(estimate).baseline, 0.01);
@@ -113,8 +113,8 @@ TEST(Rig, PredictsEitherCameraFromTheOther) {
   rig.Add(1, FromSeconds(8), 1, kTruth * FirstFromMap(8));
   const auto second = rig.Predict(1, FromSeconds(8.03), 1), first = rig.Predict(0, FromSeconds(8.03), 1);
   ASSERT_TRUE(second && first);
-  EXPECT_TRUE(IsNear(*second, kTruth * FirstFromMap(8), 0.01 * kBaseline, 0.3 * kDegree));
-  EXPECT_TRUE(IsNear(*first, FirstFromMap(8), 0.01 * kBaseline, 0.3 * kDegree));
+  EXPECT_TRUE(IsNear(*second, kTruth * FirstFromMap(8), 0.01 * kBaseline, 0.3 * kRadPerDegree));
+  EXPECT_TRUE(IsNear(*first, FirstFromMap(8), 0.01 * kBaseline, 0.3 * kRadPerDegree));
   EXPECT_FALSE(rig.Predict(1, FromSeconds(9), 1)) << "the pose is a second old";
   EXPECT_FALSE(rig.Predict(1, FromSeconds(8), 2)) << "the pose is in another map";
 }

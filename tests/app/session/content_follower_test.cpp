@@ -46,6 +46,9 @@ content::Scene TwoThings() {
   content::Entity model, sign;
   model.name = "fox";
   model.kind = content::Entity::Kind::kModel;
+  auto asset = std::make_shared<content::Asset>();
+  asset->id = "abc";
+  model.model.asset = asset;
   model.model.map_from_model = {engine::Rotation3(), {0.2, 0.1, 2.8}, 0.3};
   sign.name = "sign-1";
   sign.signpost.anchor = {-0.3, 0.2, 3.1};

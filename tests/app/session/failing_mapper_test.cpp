@@ -35,7 +35,6 @@ class FailingImageStore : public engine::ImageStore {
 TEST(FailingMapper, IsReportedAtOnceAndTrackingContinues) {
   const auto simulation = Room(4);
   SessionOptions options = Options(Pace::kEager, "Hall");
-  options.tracker.hybrid = true;
   options.mapper.images = std::make_shared<FailingImageStore>();
   Session session(options, LensOf(*simulation), nullptr);
   CalibratedCamera camera = CameraOf(simulation);

@@ -4,11 +4,16 @@
 #include <gmock/gmock.h>
 
 #include "app/simulator/simulation.h"
+#include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 // A live source of black images; an entry with a trouble sentence has no image.
 class ScriptedSource : public FrameSource {
@@ -115,6 +120,22 @@ class Recording : public FrameSource {
   const std::uint64_t images_;
   std::uint64_t next_ = 0;
 };
+
+TEST(FrameLoop, EndsWithOneSentenceAndTheLineOfACommandThatCannotBeCarriedOut) {
+  const auto refusal = [](const Command& command) {
+    CalibratedCamera camera = Calibrate(std::make_unique<Recording>(3), std::nullopt);
+    Session session({}, {camera.model}, nullptr);
+    FrameLoopOptions loop;
+    loop.script = {{Timestamp{}, 4, command}};
+    loop.script_name = "walk.txt";
+    return ErrorOf([&] { RunFrames(&camera, &session, loop, [](const engine::TrackedFrame&) {}, {}); });
+  };
+  EXPECT_EQ(refusal(UseMap{"Desk"}), "walk.txt, line 4: there is no map 'Desk'.");
+  EXPECT_EQ(refusal(NewMap{"a\nb"}),
+            "walk.txt, line 4: a map's name must have 1 to 200 bytes and no control characters.");
+  EXPECT_THAT(refusal(PlaceModel{"none.glb", {1, 2}, 1e12, 0}), AllOf(HasSubstr("line 4"), EndsWith(".")));
+  EXPECT_THAT(refusal(PlaceModel{"none.glb", {1, 2}, 1e12, 0}), Not(EndsWith("..")));
+}
 
 TEST(FrameLoop, DropsLateImagesInRealtimeInsteadOfQueueingThem) {
   constexpr std::uint64_t kImages = 40;

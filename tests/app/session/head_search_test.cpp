@@ -7,15 +7,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
 
+#include "app/cameras/simulated_head.h"
 #include "app/session/head_control.h"
 #include "app/session/session.h"
-#include "app/simulator/simulated_head.h"
 #include "app/simulator/simulation.h"
 #include "engine/base/random.h"
 #include "engine/recognition/place_index.h"
 #include "engine/tracking/tracker.h"
+#include "tests/app/support/rad_per_degree.h"
 
 namespace docent::app {
 namespace {
@@ -23,12 +23,12 @@ namespace {
 using engine::Rigid3;
 using engine::Rotation3;
 
-constexpr double kDegree = std::numbers::pi / 180, kFramesPerSecond = 10;
+constexpr double kFramesPerSecond = 10;
 
 // The room with a map of its table, made by a walk, and a camera that can be pointed anywhere.
-class Room {
+class RoomWithTable {
  public:
-  Room() {
+  RoomWithTable() {
     SimulationOptions options;
     options.camera = engine::CameraModel(engine::LensModel::kFov, {320, 240, 182.15, 182.15, 160.35, 118.9},
                                          {0.95, 0, 0, 0, 0});
@@ -89,8 +89,8 @@ class Room {
   engine::PlaceIndex index_;
 };
 
-const Room& TheRoom() {
-  static const Room room;
+const RoomWithTable& TheRoom() {
+  static const RoomWithTable room;
   return room;
 }
 
@@ -103,7 +103,7 @@ class BlindSweep {
     const double end = right_ ? range_.highest.pan_rad : range_.lowest.pan_rad;
     if (std::abs(at.pan_rad - end) < 1e-6 && std::abs(at.tilt_rad - tilt_) < 1e-6) {
       right_ = !right_;
-      constexpr double kRows[] = {0, -30 * kDegree, 28 * kDegree};
+      constexpr double kRows[] = {0, -30 * kRadPerDegree, 28 * kRadPerDegree};
       // The first row is swept both ways, because the sweep begins inside it.
       if (++ends_ > 1) tilt_ = kRows[static_cast<std::size_t>(ends_ - 2) % 3];
       return {at.pan_rad, tilt_};
@@ -126,7 +126,7 @@ struct Loss {
 
 // Seconds until the tracker relocalizes; 60 when it never does.
 template <typename Next, typename AddEmptyView>
-double Find(const Room& room, const Loss& loss, std::uint64_t seed, const Next& next,
+double Find(const RoomWithTable& room, const Loss& loss, std::uint64_t seed, const Next& next,
             const AddEmptyView& not_recognised) {
   engine::Tracker tracker = room.NewTracker(seed);
   HeadMotion motion(SimulatedHead::Range());
@@ -153,17 +153,17 @@ double Median(std::vector<double> values) {
 }
 
 TEST(HeadSearch, LooksFirstWhereTheMapWasExpectedAndThenElsewhere) {
-  const Room& room = TheRoom();
+  const RoomWithTable& room = TheRoom();
   const auto carrier_from_map = room.CarrierFromMap();
   ASSERT_TRUE(carrier_from_map);
   HeadSearch search(SimulatedHead::Range(), *room.camera(), *room.map(), *carrier_from_map);
   const PanTilt best = search.Best();
-  EXPECT_LT(std::abs(best.pan_rad), 30 * kDegree);  // the walk looked straight ahead,
-  EXPECT_LT(best.tilt_rad, 0);                      // down at the table
+  EXPECT_LT(std::abs(best.pan_rad), 30 * kRadPerDegree);  // the walk looked straight ahead,
+  EXPECT_LT(best.tilt_rad, 0);                            // down at the table
   EXPECT_GT(search.RecognitionProbability(best), 0.2);
-  EXPECT_LT(search.RecognitionProbability({150 * kDegree, 0}), 0.05);
-  const PanTilt first = search.Next({100 * kDegree, 0});
-  EXPECT_LT(std::abs(first.pan_rad - best.pan_rad), 50 * kDegree);
+  EXPECT_LT(search.RecognitionProbability({150 * kRadPerDegree, 0}), 0.05);
+  const PanTilt first = search.Next({100 * kRadPerDegree, 0});
+  EXPECT_LT(std::abs(first.pan_rad - best.pan_rad), 50 * kRadPerDegree);
   // Directions without recognition are left.
   PanTilt at = first;
   double farthest = 0;
@@ -172,11 +172,11 @@ TEST(HeadSearch, LooksFirstWhereTheMapWasExpectedAndThenElsewhere) {
     at = search.Next(at);
     farthest = std::max(farthest, std::abs(at.pan_rad - first.pan_rad));
   }
-  EXPECT_GT(farthest, 60 * kDegree);
+  EXPECT_GT(farthest, 60 * kRadPerDegree);
 }
 
 TEST(HeadSearch, FindsTheMapInHalfTheTimeOfABlindSweep) {
-  const Room& room = TheRoom();
+  const RoomWithTable& room = TheRoom();
   const auto carrier_from_map = room.CarrierFromMap();
   ASSERT_TRUE(carrier_from_map);
   const char* const asked = std::getenv("DOCENT_HEAD_LOSSES");
@@ -190,7 +190,7 @@ TEST(HeadSearch, FindsTheMapInHalfTheTimeOfABlindSweep) {
     const Rigid3 body(Rotation3::Exp({0, turned, 0}),
                       {random.Uniform(-0.25, 0.25), 0, random.Uniform(-0.25, 0.25)});
     const Loss loss{room.world_from_carrier() * body,
-                    {random.Uniform(-150, 150) * kDegree, random.Uniform(-40, 30) * kDegree}};
+                    {random.Uniform(-150, 150) * kRadPerDegree, random.Uniform(-40, 30) * kRadPerDegree}};
     HeadSearch search(SimulatedHead::Range(), *room.camera(), *room.map(), *carrier_from_map);
     searched.push_back(Find(
         room, loss, 100 + static_cast<std::uint64_t>(i), [&](const PanTilt& at) { return search.Next(at); },
@@ -211,13 +211,14 @@ TEST(HeadSearch, FindsTheMapInHalfTheTimeOfABlindSweep) {
 }
 
 // A frame of a camera with all of the map's points as inliers.
-engine::TrackedFrame Seen(const Room& room, int camera, double seconds, const Rigid3& camera_from_map) {
+engine::TrackedFrame FrameAt(const RoomWithTable& room, int camera, double seconds,
+                             const Rigid3& camera_from_map) {
   engine::TrackedFrame frame;
   frame.frame.camera = camera;
   frame.frame.time = FromSeconds(seconds);
   frame.state = engine::TrackingState::kSixDof;
   frame.map = room.map();
-  frame.map_key = Room::kKey;
+  frame.map_key = RoomWithTable::kKey;
   frame.camera_from_map = camera_from_map;
   for (const engine::MapPoint& point : room.map()->points)
     frame.matches.push_back({point.id, Eigen::Vector2f::Zero(), 0, true});
@@ -225,32 +226,36 @@ engine::TrackedFrame Seen(const Room& room, int camera, double seconds, const Ri
 }
 
 TEST(HeadControl, FollowsTheGazeOfTheOtherCamera) {
-  const Room& room = TheRoom();
+  const RoomWithTable& room = TheRoom();
   const auto carrier_from_map = room.CarrierFromMap();
   ASSERT_TRUE(carrier_from_map);
   SimulatedHead head;
   HeadControl control(&head, 1, room.camera(), HeadPolicy::kFollowGaze);
-  engine::TrackedFrame hand = Seen(room, 0, 1, Rigid3());
-  const engine::MapPoint& looked_at = room.map()->points.front();
+  engine::TrackedFrame hand = FrameAt(room, 0, 1, Rigid3());
+  const auto& points = room.map()->points;
+  const auto finite = std::find_if(points.begin(), points.end(),
+                                   [](const engine::MapPoint& point) { return !point.infinite(); });
+  ASSERT_NE(finite, points.end());
+  const engine::MapPoint& looked_at = *finite;
   hand.matches = {{looked_at.id, Eigen::Vector2f::Zero(), 0, true}};
   control.AddView(hand);
-  control.AddView(Seen(room, 1, 1, *carrier_from_map));
+  control.AddView(FrameAt(room, 1, 1, *carrier_from_map));
   const PanTilt there = TowardPoint(*carrier_from_map, looked_at.position()), at = head.At(FromSeconds(10));
   EXPECT_NEAR(at.pan_rad, there.pan_rad, 1e-9);
   EXPECT_NEAR(at.tilt_rad, there.tilt_rad, 1e-9);
 }
 
 TEST(HeadControl, TurnsBackToTheMapAndSearchesItWhenLost) {
-  const Room& room = TheRoom();
+  const RoomWithTable& room = TheRoom();
   const auto carrier_from_map = room.CarrierFromMap();
   ASSERT_TRUE(carrier_from_map);
   SimulatedHead head;
   HeadControl control(&head, 0, room.camera(), HeadPolicy::kKeepMapInView);
-  head.LookAt({90 * kDegree, 0}, {});
+  head.LookAt({90 * kRadPerDegree, 0}, {});
   const PanTilt aside = head.At(FromSeconds(5));
   const Rigid3 camera_from_carrier(CarrierFromCamera(aside).inverse(), Eigen::Vector3d::Zero());
-  control.AddView(Seen(room, 0, 5, camera_from_carrier * *carrier_from_map));
-  EXPECT_LT(std::abs(head.At(FromSeconds(20)).pan_rad), 40 * kDegree);
+  control.AddView(FrameAt(room, 0, 5, camera_from_carrier * *carrier_from_map));
+  EXPECT_LT(std::abs(head.At(FromSeconds(20)).pan_rad), 40 * kRadPerDegree);
   EXPECT_FALSE(control.searching());
   // It waits shortly after a loss, then searches, also in directions that it has not looked at.
   engine::TrackedFrame lost;
@@ -264,7 +269,7 @@ TEST(HeadControl, TurnsBackToTheMapAndSearchesItWhenLost) {
     most = std::max(most, head.At(lost.frame.time).pan_rad);
   }
   EXPECT_TRUE(control.searching());
-  EXPECT_GT(most - least, 60 * kDegree);
+  EXPECT_GT(most - least, 60 * kRadPerDegree);
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ void Append(int from, int to, std::vector<int>* order) {
 // Along two sides of a block of cabinets: a first part, a jump to a part that is not visible from there, from
 // there back into the first part, and the whole way once more.
 constexpr int kSeen = 90, kFar = 290;
-std::vector<int> Walk() {
+std::vector<int> DetourOrder() {
   std::vector<int> order;
   Append(0, kSeen, &order);
   Append(kFar, 20, &order);
@@ -65,38 +65,16 @@ std::shared_ptr<const Simulation> Simulate(const std::string& scene) {
   return MakeSimulation(scene, options);
 }
 
-struct Outcome {
-  std::vector<engine::TrackedFrame> frames;
-  std::vector<Session::MapState> maps;  // those that exist
-  std::vector<std::string> events;      // of the type "map"
-};
-
-Outcome Feed(const std::shared_ptr<const Simulation>& simulation, const std::vector<int>& order, Pace pace,
-             maps::Library* library, std::vector<TimedCommand> script = {}) {
+SourceRun RunInOrder(const std::shared_ptr<const Simulation>& simulation, const std::vector<int>& order,
+                     Pace pace, maps::Library* library, std::vector<TimedCommand> script = {}) {
   SessionOptions options = Options(pace, "Hall");
-  options.tracker.hybrid = true;
   options.new_map_when_lost = true;
-  Session session(options, LensOf(*simulation), library);
-  CalibratedCamera camera = Calibrate(std::make_unique<Detour>(simulation, order), std::nullopt);
-  Outcome outcome;
-  FrameLoopOptions loop;
-  loop.pace = pace;
-  loop.script = std::move(script);
-  loop.script_name = "script";
-  RunFrames(&camera, &session, loop,
-            [&](const engine::TrackedFrame& frame) { outcome.frames.push_back(frame); }, {});
-  session.Finish();
-  for (const Session::MapState& map : session.Maps()) {
-    if (!map.discarded && map.joined_into == 0) outcome.maps.push_back(map);
-  }
-  for (const Event& event : session.TakeEvents()) {
-    if (event.event == "map") outcome.events.push_back(event.detail);
-  }
-  return outcome;
+  return RunSource(std::make_unique<Detour>(simulation, order), pace, options, library, std::move(script));
 }
 
-engine::Sim3 WorldFromMap(const Outcome& outcome, const Simulation& simulation, const std::vector<int>& order,
-                          std::size_t from, std::size_t to, std::uint64_t key) {
+engine::Sim3 WorldFromMap(const SourceRun& outcome, const Simulation& simulation,
+                          const std::vector<int>& order, std::size_t from, std::size_t to,
+                          std::uint64_t key) {
   std::vector<Eigen::Vector3d> in_world, in_map;
   for (std::size_t i = from; i < to; ++i) {
     const engine::TrackedFrame& frame = outcome.frames[i];
@@ -117,25 +95,26 @@ std::vector<TimedCommand> Signs() {
   return {at(kSignInFirst, "first", "Hall 2"), at(kSignInSecond, "second", "Garden")};
 }
 
-const Outcome& JoinedWalk() {
-  static const Outcome outcome = Feed(Simulate("loop"), Walk(), Pace::kLockstep, nullptr, Signs());
+const SourceRun& JoinedWalk() {
+  static const SourceRun outcome =
+      RunInOrder(Simulate("loop"), DetourOrder(), Pace::kLockstep, nullptr, Signs());
   return outcome;
 }
 
 TEST(LiveJoining, JoinsTheTwoMapsBetweenWhichTheCameraWasLost) {
-  const Outcome& outcome = JoinedWalk();
-  EXPECT_THAT(outcome.events, ::testing::Contains(HasSubstr("began Hall 2")));
-  EXPECT_THAT(outcome.events, ::testing::Contains(HasSubstr("maps Hall and Hall 2 were joined")));
-  ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.events);
+  const SourceRun& outcome = JoinedWalk();
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("began Hall 2")));
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Hall and Hall 2 were joined")));
+  ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.map_events);
   EXPECT_EQ(outcome.maps[0].name, "Hall");
   EXPECT_EQ(engine::Validate(*outcome.maps[0].snapshot), "");
 }
 
 TEST(LiveJoining, KeepsTrackingInTheCoordinatesOfTheFirstMap) {
-  const Outcome& outcome = JoinedWalk();
+  const SourceRun& outcome = JoinedWalk();
   ASSERT_EQ(outcome.maps.size(), 1u);
   const auto simulation = Simulate("loop");
-  const std::vector<int> order = Walk();
+  const std::vector<int> order = DetourOrder();
   const std::uint64_t key = outcome.maps[0].key;
   // The first frames define the alignment of the first map with the world, which must hold for all that
   // follows.
@@ -164,7 +143,7 @@ TEST(LiveJoining, KeepsTrackingInTheCoordinatesOfTheFirstMap) {
 }
 
 TEST(LiveJoining, KeepsTheContentOfBothMapsInPlace) {
-  const Outcome& outcome = JoinedWalk();
+  const SourceRun& outcome = JoinedWalk();
   ASSERT_EQ(outcome.maps.size(), 1u);
   const content::Scene& scene = *outcome.maps[0].scene;
   ASSERT_EQ(scene.entities.size(), 2u);
@@ -174,7 +153,7 @@ TEST(LiveJoining, KeepsTheContentOfBothMapsInPlace) {
   EXPECT_EQ(scene.entities[0].signpost.to_map, "") << "it is now in the map that it led to";
   EXPECT_EQ(scene.entities[1].signpost.to_map, "Garden");
   const auto simulation = Simulate("loop");
-  const std::vector<int> order = Walk();
+  const std::vector<int> order = DetourOrder();
   const std::size_t back = kSeen + static_cast<std::size_t>(kFar - 20);
   const engine::Sim3 world_from_map =
       WorldFromMap(outcome, *simulation, order, back, order.size(), outcome.maps[0].key);
@@ -199,8 +178,8 @@ TEST(LiveJoining, LeavesOneMapInTheLibrary) {
   {
     maps::Library library =
         maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
-    const Outcome outcome = Feed(Simulate("loop"), Walk(), Pace::kLockstep, &library);
-    ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.events);
+    const SourceRun outcome = RunInOrder(Simulate("loop"), DetourOrder(), Pace::kLockstep, &library);
+    ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.map_events);
   }
   const maps::Library library = maps::Library::Open(folder / "l.docent", maps::Access::kReadOnly);
   EXPECT_THAT(library.Verify(), IsEmpty());
@@ -219,10 +198,10 @@ TEST(LiveJoining, DoesNotJoinMapsOfLookAlikePlaces) {
   std::vector<int> order = first;
   order.insert(order.end(), second.begin(), second.end());
   order.insert(order.end(), first.begin(), first.end());
-  const Outcome outcome = Feed(simulation, order, Pace::kLockstep, nullptr);
-  EXPECT_THAT(outcome.events, ::testing::Contains(HasSubstr("began Hall 2")));
-  EXPECT_THAT(outcome.events, ::testing::Contains(HasSubstr("were not joined")));
-  EXPECT_EQ(outcome.maps.size(), 2u) << ::testing::PrintToString(outcome.events);
+  const SourceRun outcome = RunInOrder(simulation, order, Pace::kLockstep, nullptr);
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("began Hall 2")));
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("were not joined")));
+  EXPECT_EQ(outcome.maps.size(), 2u) << ::testing::PrintToString(outcome.map_events);
   EXPECT_EQ(outcome.frames.back().map_key, outcome.maps[0].key);
 }
 
@@ -231,8 +210,9 @@ TEST(LiveJoining, StaysConsistentWithThreads) {
   const TemporaryFolder folder;
   maps::Library library =
       maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
-  const Outcome outcome = Feed(Simulate("loop"), Walk(), Pace::kEager, &library);
+  const SourceRun outcome = RunInOrder(Simulate("loop"), DetourOrder(), Pace::kEager, &library);
   EXPECT_THAT(library.Verify(), IsEmpty());
+  EXPECT_FALSE(outcome.maps.empty());
   EXPECT_EQ(library.List().size(), outcome.maps.size());
   for (const Session::MapState& map : outcome.maps) {
     EXPECT_EQ(engine::Validate(*map.snapshot), "");

@@ -38,7 +38,6 @@ class TwoPlaces : public FrameSource {
     frame->time = FromSeconds(static_cast<double>(frame->index) / 30);
     return true;
   }
-  const Simulation& first() const { return *first_; }
 
  private:
   std::shared_ptr<const Simulation> first_, second_;
@@ -48,37 +47,19 @@ class TwoPlaces : public FrameSource {
   std::uint64_t index_ = 0;
 };
 
-struct Outcome {
-  std::vector<engine::TrackedFrame> frames;
-  std::vector<Session::MapState> maps;
-};
-
-Outcome Feed(bool new_map, bool back) {
-  constexpr double kSeconds = 3;
-  auto source = std::make_unique<TwoPlaces>(kSeconds, back);
+SourceRun VisitTwoPlaces(bool new_map, bool back) {
   SessionOptions options = Options(Pace::kLockstep, "Hall");
-  options.tracker.hybrid = true;
   options.new_map_when_lost = new_map;
-  Session session(options, LensOf(source->first()), nullptr);
-  CalibratedCamera camera = Calibrate(std::move(source), std::nullopt);
-  Outcome outcome;
-  FrameLoopOptions loop;
-  loop.pace = Pace::kLockstep;
-  RunFrames(&camera, &session, loop,
-            [&](const engine::TrackedFrame& frame) { outcome.frames.push_back(frame); }, {});
-  session.Finish();
-  for (const auto& map : session.Maps()) {
-    if (!map.discarded && map.joined_into == 0) outcome.maps.push_back(map);
-  }
-  return outcome;
+  constexpr double kSeconds = 3;
+  return RunSource(std::make_unique<TwoPlaces>(kSeconds, back), Pace::kLockstep, options, nullptr);
 }
 
-bool LastHasPose(const Outcome& outcome) {
+bool LastHasPose(const SourceRun& outcome) {
   return engine::HasPose(outcome.frames.back().state);
 }
 
 TEST(LostCamera, StartsANewMapInAnUnknownPlace) {
-  const Outcome outcome = Feed(/*new_map=*/true, /*back=*/false);
+  const SourceRun outcome = VisitTwoPlaces(/*new_map=*/true, /*back=*/false);
   ASSERT_EQ(outcome.maps.size(), 2u);
   EXPECT_EQ(outcome.maps[0].name, "Hall");
   EXPECT_EQ(outcome.maps[1].name, "Hall 2");
@@ -92,13 +73,13 @@ TEST(LostCamera, StartsANewMapInAnUnknownPlace) {
 }
 
 TEST(LostCamera, WaitsWhenNewMapsAreDisabled) {
-  const Outcome outcome = Feed(/*new_map=*/false, /*back=*/false);
+  const SourceRun outcome = VisitTwoPlaces(/*new_map=*/false, /*back=*/false);
   ASSERT_EQ(outcome.maps.size(), 1u);
   EXPECT_FALSE(LastHasPose(outcome));
 }
 
 TEST(LostCamera, ReturnsToTheFirstMapWhenItSeesItAgain) {
-  const Outcome outcome = Feed(/*new_map=*/true, /*back=*/true);
+  const SourceRun outcome = VisitTwoPlaces(/*new_map=*/true, /*back=*/true);
   ASSERT_GE(outcome.maps.size(), 1u);
   EXPECT_TRUE(LastHasPose(outcome));
   EXPECT_EQ(outcome.frames.back().map_key, outcome.maps[0].key);

@@ -3,12 +3,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <cstdlib>
+#include <future>
 #include <thread>
 
+#include "app/session/library_scene.h"
 #include "app/session/maintenance_order.h"
 #include "engine/base/random.h"
-#include "maps/maintenance.h"
+#include "maps/maintenance/maintenance.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
 
@@ -77,6 +82,15 @@ class IdleMaps : public ::testing::Test {
     }
     return details;
   }
+  // Waits for maintenance to finish a map; two minutes at most, as the machine may be slow.
+  static std::vector<std::string> AwaitMaintenance(Session* session) {
+    std::vector<std::string> done;
+    for (int i = 0; i < 6000 && done.empty(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      done = MaintenanceDetails(session);
+    }
+    return done;
+  }
 
   const TemporaryFolder folder_;
   const std::filesystem::path file_ = folder_ / "a.docent";
@@ -87,12 +101,7 @@ TEST_F(IdleMaps, AreAdjustedWhileTheSessionIsIdle) {
   auto library = maps::Library::Open(file_, maps::Access::kReadWrite);
   const double before = RmsOf(library, "Open");
   Session session(Options(Pace::kEager, ""), LensOf(*simulation), &library);
-  std::vector<std::string> done;
-  // Two minutes at most, as the machine may be slow.
-  for (int i = 0; i < 6000 && done.empty(); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    for (std::string& detail : MaintenanceDetails(&session)) done.push_back(std::move(detail));
-  }
+  const std::vector<std::string> done = AwaitMaintenance(&session);
   ASSERT_EQ(done.size(), 1u);
   EXPECT_THAT(done[0], HasSubstr("Open: "));
   session.Finish();
@@ -100,26 +109,36 @@ TEST_F(IdleMaps, AreAdjustedWhileTheSessionIsIdle) {
   EXPECT_DOUBLE_EQ(RmsOf(library, "Fixed"), before);
   EXPECT_THAT(library.Verify(), IsEmpty());
   // The session has in memory what was saved.
-  for (const Session::MapState& map : session.Maps()) {
-    if (map.name == "Open") {
-      EXPECT_EQ(map.snapshot->revision, library.FindByName("Open").revision);
-    }
-  }
+  const auto maps = session.Maps();
+  const auto open =
+      std::find_if(maps.begin(), maps.end(), [](const auto& map) { return map.name == "Open"; });
+  ASSERT_NE(open, maps.end());
+  EXPECT_EQ(open->snapshot->revision, library.FindByName("Open").revision);
 }
 
 TEST_F(IdleMaps, AreNotAdjustedOnATourOrInLockstep) {
   const auto simulation = Room(1);
-  for (const bool may_write : {false, true}) {
-    auto library = maps::Library::Open(file_, may_write ? maps::Access::kReadWrite : maps::Access::kReadOnly);
-    const auto before = library.List();
-    SessionOptions options = Options(may_write ? Pace::kLockstep : Pace::kEager, "");
-    options.may_write = may_write;
-    Session session(options, LensOf(*simulation), &library);
-    std::this_thread::sleep_for(std::chrono::milliseconds(600));  // maintenance would have started by then
-    EXPECT_THAT(MaintenanceDetails(&session), IsEmpty());
-    session.Finish();
-    EXPECT_EQ(library.List(), before);
-  }
+  // Three sessions with a copy of the library each. The one that maintains its maps begins last: when it is
+  // done, the others have had more time for the same work.
+  const auto copy = [&](const std::string& name) {
+    std::filesystem::copy_file(file_, folder_ / name);
+    return folder_ / name;
+  };
+  auto toured = maps::Library::Open(copy("tour.docent"), maps::Access::kReadOnly);
+  auto in_lockstep = maps::Library::Open(copy("lockstep.docent"), maps::Access::kReadWrite);
+  auto maintained = maps::Library::Open(copy("maintained.docent"), maps::Access::kReadWrite);
+  const auto toured_before = toured.List(), in_lockstep_before = in_lockstep.List();
+  SessionOptions tour_options = Options(Pace::kEager, "");
+  tour_options.may_write = false;
+  Session tour(tour_options, LensOf(*simulation), &toured);
+  Session lockstep(Options(Pace::kLockstep, ""), LensOf(*simulation), &in_lockstep);
+  Session author(Options(Pace::kEager, ""), LensOf(*simulation), &maintained);
+  ASSERT_EQ(AwaitMaintenance(&author).size(), 1u);
+  EXPECT_THAT(MaintenanceDetails(&tour), IsEmpty());
+  EXPECT_THAT(MaintenanceDetails(&lockstep), IsEmpty());
+  for (Session* session : {&tour, &lockstep, &author}) session->Finish();
+  EXPECT_EQ(toured.List(), toured_before);
+  EXPECT_EQ(in_lockstep.List(), in_lockstep_before);
 }
 
 // For the sanitizers: frames, saves, commands, map switches and maintenance at the same time.
@@ -128,7 +147,7 @@ TEST_F(IdleMaps, StayValidWhileOtherMapsAreExtended) {
   auto library = maps::Library::Open(file_, maps::Access::kReadWrite);
   SessionOptions options = Options(Pace::kEager, "New");
   options.autosave_interval = std::chrono::milliseconds(100);
-  options.provisional_time = std::chrono::milliseconds(100);
+  options.provisional.time = std::chrono::milliseconds(100);
   Session session(options, LensOf(*simulation), &library);
   CalibratedCamera camera = CameraOf(simulation);
   FrameLoopOptions loop;
@@ -145,10 +164,77 @@ TEST_F(IdleMaps, StayValidWhileOtherMapsAreExtended) {
             {});
   session.Finish();
   EXPECT_THAT(library.Verify(), IsEmpty());
+  int validated = 0;
   for (const Session::MapState& map : session.Maps()) {
     if (map.discarded || !map.snapshot) continue;
     EXPECT_EQ(engine::Validate(*map.snapshot), "") << map.name;
+    ++validated;
   }
+  EXPECT_GE(validated, 2) << "both idle maps at least";
+}
+
+// Holds up the saves of a library, as a slow disk does: the library reads the clock in each of them.
+class SlowDisk {
+ public:
+  maps::LibraryOptions Options() {
+    maps::LibraryOptions options;
+    options.clock = [this] {
+      reached_ = true;
+      open_.wait(false);
+      return maps::WallTime();
+    };
+    return options;
+  }
+  bool IsReached() const { return reached_; }
+  void Open() {
+    open_ = true;
+    open_.notify_all();
+  }
+
+ private:
+  std::atomic<bool> reached_ = false, open_ = false;
+};
+
+// While maintenance saves a map and thus keeps the saver's thread busy, a command waits for another save.
+TEST_F(IdleMaps, AreSavedWhileAPolicyCommandWaitsForTheDiskWithoutDelayingFrames) {
+  using namespace std::chrono_literals;
+  {
+    content::Scene scene;
+    content::Entity sign;
+    sign.name = "sign-1";
+    sign.signpost.text = "here";
+    scene.entities.push_back(sign);
+    auto library = maps::Library::Open(file_, maps::Access::kReadWrite);
+    library.Save({library.NewKey(), "Current", maps::Policy::kAugmentOnly, WalkedMap(),
+                  std::make_shared<maps::SceneRecord>(RecordFromScene(scene))});
+  }
+  SlowDisk disk;
+  const auto simulation = Room(1);
+  auto library =
+      maps::Library::Open(file_, maps::Access::kReadWrite, maps::CreateIfMissing::kNo, disk.Options());
+  Session session(Options(Pace::kEager, ""), LensOf(*simulation), &library);
+  const engine::TrackedFrame no_frame;
+  session.Execute(UseMap{"Current"}, no_frame);
+  session.Execute(MoveEntity{"sign-1", {0.01, 0, 0}, {}}, no_frame);
+  for (int i = 0; i < 6000 && !disk.IsReached(); ++i) std::this_thread::sleep_for(20ms);
+  ASSERT_TRUE(disk.IsReached()) << "maintenance of the map Open must have come to its save";
+
+  auto command = std::async(std::launch::async, [&] {
+    session.Execute(SetPolicy{"Current", maps::Policy::kReadOnly}, no_frame);
+  });
+  EXPECT_EQ(command.wait_for(200ms), std::future_status::timeout) << "the command must wait for its save";
+  auto listed = std::async(std::launch::async, [&] { return session.Maps(); });
+  EXPECT_EQ(listed.wait_for(30s), std::future_status::ready) << "the session must not be locked meanwhile";
+  disk.Open();
+  if (command.wait_for(60s) != std::future_status::ready) {
+    ADD_FAILURE() << "deadlock";
+    std::abort();  // neither thread can be ended
+  }
+  command.get();
+  EXPECT_EQ(listed.get().size(), 3u);
+  session.Finish();
+  EXPECT_EQ(library.FindByName("Current").policy, maps::Policy::kReadOnly);
+  EXPECT_THAT(MaintenanceDetails(&session), ::testing::ElementsAre(HasSubstr("Open: ")));
 }
 
 }  // namespace

@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <future>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <thread>
+#include <vector>
 
 #include "app/simulator/simulation.h"
 #include "engine/vision/features.h"
@@ -92,6 +94,28 @@ TEST_F(HeldMapper, EndsTheDelayWhenStopIsRequested) {
   stop.request_stop();
   mapping_.WaitUntilIdle(steady_clock::now() + hours(1), stop.get_token());
   EXPECT_FALSE(mapping_.IsIdle());
+}
+
+TEST(MappingThread, KeepsAnInitialPairWhileTheQueueIsFull) {
+  std::vector<engine::MapperEvent> events;
+  engine::MappingThread mapping({}, false, [&](const engine::MappingThread::MapperUpdate& update) {
+    events.insert(events.end(), update.events.begin(), update.events.end());
+  });
+  mapping.Adopt(1, nullptr);
+  const engine::KeyFrameCandidate candidate = FirstKeyFrame();
+  for (std::size_t i = 0; i < engine::MapperOptions().max_queue; ++i)
+    ASSERT_TRUE(mapping.Offer(1, candidate, {}));
+  engine::InitialPair without_matches;
+  without_matches.camera = candidate.camera;
+  without_matches.a.features = without_matches.b.features = candidate.features;
+  without_matches.b.time = FromSeconds(1);
+  without_matches.geometry.b_from_a.translation.x() = 1;
+  ASSERT_TRUE(mapping.Start(1, without_matches));
+  mapping.RunLockstep();
+  mapping.RunLockstep();
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const engine::MapperEvent& event) {
+    return std::holds_alternative<engine::MapperEvent::StartFailed>(event.what);
+  })) << "the pair was dropped, and the camera waits for its map for ever";
 }
 
 }  // namespace

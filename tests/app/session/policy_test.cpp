@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tries every way in which an author's session writes to a map, against each policy.
-#include "maps/policy.h"
+#include "maps/storage/policy.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

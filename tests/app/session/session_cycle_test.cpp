@@ -5,67 +5,43 @@
 
 #include "app/session/session.h"
 #include "app/simulator/simulation.h"
+#include "tests/app/support/rendered_walk.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
 namespace {
 
-using engine::CameraModel;
-using engine::LensModel;
-
 constexpr int kCycles = 200;
-constexpr double kFramesASecond = 15;
 
-// A short walk around the table, rendered once and played forwards and backwards.
-class Film {
- public:
-  Film() {
-    SimulationOptions options;
-    options.camera = CameraModel(LensModel::kRadialTangential, {320, 240, 179, 179.2, 159.1, 120.05},
-                                 {-0.18, 0.03, 0, 0, 0});
-    options.frame_rate_hz = kFramesASecond;
-    options.duration_s = 4;
-    const auto simulation = MakeSimulation("hand", options);
-    for (int i = 0; i < simulation->frame_count(); ++i) simulation->Render(i, &images_.emplace_back());
-    camera_ = std::make_shared<CameraModel>(simulation->camera());
-  }
-  engine::Frame At(std::uint64_t index) const {
-    const std::uint64_t length = images_.size(), turn = index % (2 * length);
-    engine::Frame frame;
-    frame.index = index;
-    frame.time = FromSeconds(static_cast<double>(index) / kFramesASecond);
-    frame.image = images_[turn < length ? turn : 2 * length - 1 - turn];
-    return frame;
-  }
-  std::uint64_t length() const { return images_.size(); }
-  const std::shared_ptr<const CameraModel>& camera() const { return camera_; }
-
- private:
-  std::vector<cv::Mat> images_;
-  std::shared_ptr<const CameraModel> camera_;
-};
+RenderedWalk ShortWalk() {
+  SimulationOptions options;
+  options.camera = engine::CameraModel(engine::LensModel::kRadialTangential,
+                                       {320, 240, 179, 179.2, 159.1, 120.05}, {-0.18, 0.03, 0, 0, 0});
+  options.frame_rate_hz = 15;
+  options.duration_s = 4;
+  return {"hand", options};
+}
 
 maps::Library OpenLibrary(const std::filesystem::path& path) {
   return maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
 }
 
 // Builds the map "table" and saves it.
-void BuildTable(const Film& film, const std::filesystem::path& path) {
+void BuildTable(const RenderedWalk& walk, const std::filesystem::path& path) {
   maps::Library library = OpenLibrary(path);
   SessionOptions options;
   options.threaded = false;
-  options.tracker.hybrid = true;
   options.first_map = "table";
-  Session session(options, {film.camera()}, &library);
-  for (std::uint64_t i = 0; i < film.length(); ++i) session.Process(film.At(i));
+  Session session(options, {walk.camera()}, &library);
+  for (std::uint64_t i = 0; i < walk.length(); ++i) session.Process(walk.Frame(i));
   session.Finish();
 }
 
 TEST(SessionCycle, StartsLoadsLeavesAndEndsTwoHundredTimes) {
   const TemporaryFolder folder;
   const std::filesystem::path path = folder / "l.docent";
-  const Film film;
-  BuildTable(film, path);
+  const RenderedWalk walk = ShortWalk();
+  BuildTable(walk, path);
   const std::uint64_t built = OpenLibrary(path).FindByName("table").keyframes;
   ASSERT_GT(built, 1u);
   int posed = 0;
@@ -75,12 +51,12 @@ TEST(SessionCycle, StartsLoadsLeavesAndEndsTwoHundredTimes) {
     options.tracker.hybrid = cycle % 2 == 0;
     options.may_write = cycle % 5 != 4;
     options.seed = static_cast<std::uint64_t>(cycle) + 1;
-    Session session(options, {film.camera()}, &library);
-    std::uint64_t next = static_cast<std::uint64_t>(cycle) % film.length();
+    Session session(options, {walk.camera()}, &library);
+    std::uint64_t next = static_cast<std::uint64_t>(cycle) % walk.length();
     engine::TrackedFrame frame;
     const auto feed = [&](int count) {
       for (; count > 0; --count) {
-        frame = session.Process(film.At(next++));
+        frame = session.Process(walk.Frame(next++));
         posed += engine::HasPose(frame.state);
       }
     };

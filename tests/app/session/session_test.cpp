@@ -93,7 +93,6 @@ TEST(Session, NeverSavesAMapWithoutFinitePoints) {
   maps::Library library =
       maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   SessionOptions options = Options(Pace::kLockstep, "Turn");
-  options.tracker.hybrid = true;
   options.autosave_interval = std::chrono::milliseconds(200);
   Session session(options, LensOf(*simulation), &library);
   const Seen seen = Feed(simulation, Pace::kLockstep, &session);
@@ -114,7 +113,6 @@ TEST(Session, StartsAgainWithTheNextImageWhenTheFirstIsLost) {
   engine::Frame first;
   ASSERT_TRUE(source->Next(&first));
   SessionOptions options = Options(Pace::kLockstep, "Bay");
-  options.tracker.hybrid = true;
   Session session(options, LensOf(*simulation), nullptr);
   const auto frame_of = [&](std::uint64_t index) {
     engine::Frame frame = first;
@@ -150,7 +148,6 @@ class AuthoredBay : public ::testing::Test {
     maps::Library library =
         maps::Library::Open(run_->folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
     SessionOptions options = Options(Pace::kLockstep, "Bay");
-    options.tracker.hybrid = true;
     Session session(options, LensOf(*simulation), &library);
     run_->seen = Feed(simulation, Pace::kLockstep, &session);
   }
@@ -182,7 +179,6 @@ TEST_F(AuthoredBay, IsSavedOnceItHasFinitePointsAlthoughItBeganAsAPanorama) {
 TEST_F(AuthoredBay, IsTrackedWithEqualPosesOnEveryRunInLockstep) {
   const auto simulation = Room(2.5);
   SessionOptions options = Options(Pace::kLockstep, "Bay");
-  options.tracker.hybrid = true;
   Session session(options, LensOf(*simulation), nullptr);
   const Seen again = Feed(simulation, Pace::kLockstep, &session);
   ASSERT_GT(again.poses, 10);
@@ -258,7 +254,7 @@ TEST(Session, WarnsWhileTheDiskIsFullAndSavesEverythingLater) {
   maps::Library library =
       maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   SessionOptions options = Options(Pace::kLockstep, "Desk");
-  options.autosave_interval = options.provisional_time = std::chrono::milliseconds(200);
+  options.autosave_interval = options.provisional.time = std::chrono::milliseconds(200);
   Session session(options, LensOf(*simulation), &library);
   CalibratedCamera camera = CameraOf(simulation);
   FrameLoopOptions loop;
@@ -291,7 +287,7 @@ TEST(Session, ReportsAFailedSaveAtTheEndAndKeepsEarlierSaves) {
   maps::Library library =
       maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   SessionOptions options = Options(Pace::kLockstep, "Desk");
-  options.autosave_interval = options.provisional_time = std::chrono::milliseconds(200);
+  options.autosave_interval = options.provisional.time = std::chrono::milliseconds(200);
   Session session(options, LensOf(*simulation), &library);
   std::optional<NoRoom> full;
   CalibratedCamera camera = CameraOf(simulation);
@@ -307,18 +303,6 @@ TEST(Session, ReportsAFailedSaveAtTheEndAndKeepsEarlierSaves) {
   full.reset();
   EXPECT_THAT(library.Verify(), IsEmpty());
   EXPECT_GE(library.Load(library.FindByName("Desk").key).snapshot->keyframes.size(), 2u);
-}
-
-TEST(SurfaceAtPixel, DefinesUpAsOppositeToTheMeanImageDownDirection) {
-  engine::MapSnapshot map;
-  const engine::Rotation3 tilt = engine::Rotation3::Exp({0.3, 0, 0});
-  for (const double sign : {-1.0, 1.0}) {
-    engine::KeyFrame keyframe;
-    keyframe.camera_from_map.rotation = engine::Rotation3::Exp({sign * 0.2, 0, 0}) * tilt;
-    map.keyframes.push_back(keyframe);
-  }
-  const Eigen::Vector3d expected = -(tilt.inverse() * Eigen::Vector3d::UnitY());
-  EXPECT_LT((UpInMap(map) - expected).norm(), 1e-12);
 }
 
 }  // namespace

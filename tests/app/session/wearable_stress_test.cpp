@@ -13,6 +13,7 @@
 #include "app/session/session.h"
 #include "app/simulator/simulation.h"
 #include "engine/base/random.h"
+#include "tests/app/support/rendered_walk.h"
 
 namespace docent::app {
 namespace {
@@ -20,32 +21,23 @@ namespace {
 using engine::CameraModel;
 using engine::LensModel;
 
-// Images of a walk, rendered once and used by every session.
-struct Film {
-  CameraModel camera;
-  std::vector<cv::Mat> images;
-};
-
-Film Shoot(const std::string& scene, const CameraModel& camera) {
+RenderedWalk ShortWalkWith(const std::string& scene, const CameraModel& camera) {
   SimulationOptions options;
   options.camera = camera;
   options.frame_rate_hz = 15;
   options.duration_s = 4;
-  const auto simulation = MakeSimulation(scene, options);
-  Film film{camera, {}};
-  for (int i = 0; i < simulation->frame_count(); ++i) simulation->Render(i, &film.images.emplace_back());
-  return film;
+  return {scene, options};
 }
 
 // A device that is unplugged at random: for a while it delivers no images and reports why, then it is back.
 class ShakySource : public FrameSource {
  public:
-  ShakySource(const Film* film, std::uint64_t seed, int images)
-      : film_(film), random_(seed), images_(images) {
+  ShakySource(const RenderedWalk* walk, std::uint64_t seed, int images)
+      : walk_(walk), random_(seed), images_(images) {
     info_.name = "shaky";
     info_.live = true;
     info_.nominal_fps = 15;
-    info_.known_camera = film->camera;
+    info_.known_camera = *walk->camera();
   }
 
   bool Next(engine::Frame* frame) override {
@@ -59,16 +51,14 @@ class ShakySource : public FrameSource {
       return true;
     }
     if (random_.Uniform(0, 1) < 0.05) index_ += 2;  // the driver dropped images
-    // The film is played forwards and backwards.
-    const std::uint64_t length = film_->images.size(), turn = index_ % (2 * length);
-    frame->image = film_->images[turn < length ? turn : 2 * length - 1 - turn];
+    frame->image = walk_->Image(index_);
     frame->index = index_++;
     return true;
   }
   std::string trouble() const override { return away_ > 0 ? "The camera is unplugged." : ""; }
 
  private:
-  const Film* const film_;
+  const RenderedWalk* const walk_;
   Random random_;
   const int images_;
   std::uint64_t index_ = 0;
@@ -79,12 +69,12 @@ struct Tally {
   std::atomic<int> frames = 0, posed = 0, troubles = 0;
 };
 
-void RunOneSession(const Film films[2], Random* random, Tally* tally) {
+void RunOneSession(const RenderedWalk walks[2], Random* random, Tally* tally) {
   CalibratedCamera cameras[2];
   const int images = 20 + static_cast<int>(random->Uniform(0, 100));
   for (int i = 0; i < 2; ++i) {
     cameras[i] =
-        Calibrate(std::make_unique<ShakySource>(&films[i], random->Next(), images + 10 * i), std::nullopt);
+        Calibrate(std::make_unique<ShakySource>(&walks[i], random->Next(), images + 10 * i), std::nullopt);
   }
   SessionOptions options;
   options.tracker.hybrid = random->Uniform(0, 1) < 0.5;
@@ -115,7 +105,6 @@ void RunOneSession(const Film films[2], Random* random, Tally* tally) {
     bool asked = false;
     while (!done.stop_requested()) {
       session.Maps();
-      session.MapNames();
       session.Rig();
       session.MappingTimes();
       session.TakeEvents();
@@ -133,10 +122,12 @@ void RunOneSession(const Film films[2], Random* random, Tally* tally) {
 }
 
 TEST(WearableStress, EndsCleanlyWhenCamerasLeaveOrComeBack) {
-  const Film films[2] = {
-      Shoot("hand",
-            {LensModel::kRadialTangential, {320, 240, 179, 179.2, 159.1, 120.05}, {-0.18, 0.03, 0, 0, 0}}),
-      Shoot("shoulder", {LensModel::kFov, {320, 240, 182.15, 182.15, 160.35, 118.9}, {0.95, 0, 0, 0, 0}})};
+  const RenderedWalk walks[2] = {
+      ShortWalkWith(
+          "hand",
+          {LensModel::kRadialTangential, {320, 240, 179, 179.2, 159.1, 120.05}, {-0.18, 0.03, 0, 0, 0}}),
+      ShortWalkWith("shoulder",
+                    {LensModel::kFov, {320, 240, 182.15, 182.15, 160.35, 118.9}, {0.95, 0, 0, 0, 0}})};
   const char* const minutes = std::getenv("DOCENT_STRESS_MINUTES");
   const auto until = std::chrono::steady_clock::now() +
                      std::chrono::seconds(minutes ? static_cast<long>(60 * std::atof(minutes)) : 0);
@@ -145,7 +136,7 @@ TEST(WearableStress, EndsCleanlyWhenCamerasLeaveOrComeBack) {
   Tally tally;
   int sessions = 0;
   while (sessions < kFewSessions || std::chrono::steady_clock::now() < until) {
-    RunOneSession(films, &random, &tally);
+    RunOneSession(walks, &random, &tally);
     ++sessions;
   }
   RecordProperty("sessions", sessions);

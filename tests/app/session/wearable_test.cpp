@@ -38,7 +38,7 @@ std::shared_ptr<const Simulation> View(const std::string& scene, double seconds)
   return MakeSimulation(scene, options);
 }
 
-struct Walk {
+struct WalkOfTwoCameras {
   std::vector<engine::TrackedFrame> frames[2];
   std::vector<Session::MapState> maps;
   std::vector<Event> events;
@@ -46,15 +46,14 @@ struct Walk {
 };
 
 // Feeds both views of a walk to one session that builds a map.
-Walk Take(const std::string& hand, const std::string& shoulder, double seconds, Pace pace) {
+WalkOfTwoCameras Take(const std::string& hand, const std::string& shoulder, double seconds, Pace pace) {
   CalibratedCamera cameras[2] = {Calibrate(OpenSimulation(View(hand, seconds)), std::nullopt),
                                  Calibrate(OpenSimulation(View(shoulder, seconds)), std::nullopt)};
   SessionOptions options;
   options.threaded = pace != Pace::kLockstep;
-  options.tracker.hybrid = true;
   options.first_map = "table";
   Session session(options, {cameras[0].model, cameras[1].model}, nullptr);
-  Walk walk;
+  WalkOfTwoCameras walk;
   std::vector<CameraRun> runs(2);
   for (int i = 0; i < 2; ++i) {
     runs[i].camera = &cameras[i];
@@ -83,7 +82,7 @@ double TrackedAfterJoining(const std::vector<engine::TrackedFrame>& frames) {
 }
 
 TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
-  const Walk walk = Take("hand", "shoulder", 24, Pace::kLockstep);
+  const WalkOfTwoCameras walk = Take("hand", "shoulder", 24, Pace::kLockstep);
   RecordProperty("tracked_0", std::to_string(TrackedAfterJoining(walk.frames[0])));
   RecordProperty("tracked_1", std::to_string(TrackedAfterJoining(walk.frames[1])));
   EXPECT_GE(TrackedAfterJoining(walk.frames[0]), 0.98);
@@ -128,7 +127,7 @@ TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
 }
 
 TEST(Wearable, RecognisesThatItsCamerasAreRigidlyConnected) {
-  const Walk walk = Take("hand:1", "shoulder:1", 16, Pace::kLockstep);
+  const WalkOfTwoCameras walk = Take("hand:1", "shoulder:1", 16, Pace::kLockstep);
   ASSERT_TRUE(walk.rig);
   EXPECT_TRUE(walk.rig->rigid) << walk.rig->ToString();
   const engine::Rigid3 truth = WearableRig().inverse();  // shoulder_from_hand
@@ -165,7 +164,6 @@ TEST(Wearable, RecognisesThatItsCamerasAreRigidlyConnected) {
 void MapScene(const std::string& name, const Simulation& simulation, maps::Library* library) {
   SessionOptions options;
   options.threaded = false;
-  options.tracker.hybrid = true;
   options.first_map = name;
   Session session(options, {std::make_shared<engine::CameraModel>(simulation.camera())}, library);
   for (int i = 0; i < simulation.frame_count(); ++i) {
@@ -214,7 +212,6 @@ class Tourists {
     SessionOptions options;
     options.threaded = false;
     options.may_write = false;
-    options.tracker.hybrid = true;
     options.memory.wait_for_maps = true;
     return options;
   }
@@ -275,7 +272,7 @@ TEST(Wearable, FollowsTheRulesOfAssociatedCameras) {
 }
 
 TEST(Wearable, WorksWithOneThreadPerCamera) {
-  const Walk walk = Take("hand", "shoulder", 8, Pace::kEager);
+  const WalkOfTwoCameras walk = Take("hand", "shoulder", 8, Pace::kEager);
   EXPECT_EQ(walk.frames[0].size(), 161u);
   EXPECT_GE(walk.frames[1].size(), 150u);  // the run ends with the first camera
   EXPECT_GE(TrackedAfterJoining(walk.frames[0]), 0.9);

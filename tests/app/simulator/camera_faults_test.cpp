@@ -21,6 +21,8 @@
 #include "app/simulator/surface_renderer.h"
 #include "app/simulator/tremor.h"
 #include "engine/base/error.h"
+#include "tests/app/support/error_of_scene.h"
+#include "tests/app/support/rad_per_degree.h"
 
 namespace docent::app {
 namespace {
@@ -29,8 +31,7 @@ using engine::CameraModel;
 using engine::LensModel;
 using ::testing::HasSubstr;
 
-constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kPanRate = 60 * kDegree;  // radians per second
+constexpr double kPanRate = 60 * kRadPerDegree;  // radians per second
 
 CameraModel Pinhole() {
   return {LensModel::kRadialTangential, {320, 240, 200, 200, 159.5, 119.5}, {}};
@@ -297,8 +298,10 @@ TEST(HandTremor, HasTheGivenAmplitudeAndFrequencyBand) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     const Motion motion = Analyse(Tremor(0.2, seed), 3.9, 12.1);
     for (int axis = 0; axis < 3; ++axis) {
-      EXPECT_NEAR(motion.rotation_rms_rad[axis], 0.2 * kDegree, 0.02 * kDegree) << "axis " << axis;
-      EXPECT_NEAR(motion.translation_rms_m[axis], 0.2 * kDegree * Tremor::kLever_m, 4e-5) << "axis " << axis;
+      EXPECT_NEAR(motion.rotation_rms_rad[axis], 0.2 * kRadPerDegree, 0.02 * kRadPerDegree)
+          << "axis " << axis;
+      EXPECT_NEAR(motion.translation_rms_m[axis], 0.2 * kRadPerDegree * Tremor::kLever_m, 4e-5)
+          << "axis " << axis;
     }
     EXPECT_GT(motion.power_ratio_in_band, 0.999);
   }
@@ -317,8 +320,8 @@ TEST(HandTremor, IsIncludedInTheGroundTruth) {
     largest = std::max(largest, step.rotation.Angle());
     EXPECT_LT(step.translation.norm(), 0.01);
   }
-  EXPECT_GT(largest, 0.5 * kDegree);
-  EXPECT_LT(largest, 4 * kDegree);
+  EXPECT_GT(largest, 0.5 * kRadPerDegree);
+  EXPECT_LT(largest, 4 * kRadPerDegree);
   // The image must be the one from the true pose.
   cv::Mat image, from_truth;
   trembling->Render(7, &image);
@@ -333,15 +336,6 @@ TEST(HandTremor, DiffersBetweenTwoCamerasOfOnePerson) {
   const engine::Rigid3 before = hand->world_from_camera(0).inverse() * shoulder->world_from_camera(0),
                        after = hand->world_from_camera(4).inverse() * shoulder->world_from_camera(4);
   EXPECT_FALSE(engine::IsNear(before, after, 1e-4, 1e-4));
-}
-
-std::string ErrorOf(const std::string& scene) {
-  try {
-    MakeSimulation(scene, {});
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(NamedOptions, FollowTheSceneNameAfterCommas) {
@@ -370,19 +364,19 @@ TEST(NamedOptions, FollowTheSceneNameAfterCommas) {
 }
 
 TEST(NamedOptions, ReportWhatIsWrong) {
-  EXPECT_THAT(ErrorOf("room,fog=1"), ::testing::AllOf(HasSubstr("'fog'"), HasSubstr("rolling-shutter"),
-                                                      HasSubstr("tremor"), HasSubstr("drops")));
-  EXPECT_THAT(ErrorOf("room,"), HasSubstr("no option ''"));
-  EXPECT_THAT(ErrorOf("room,drops"), HasSubstr("needs a number"));
-  EXPECT_THAT(ErrorOf("room,drops="), HasSubstr("from 0 to 90"));
-  EXPECT_THAT(ErrorOf("room,drops=many"), HasSubstr("'many'"));
-  EXPECT_THAT(ErrorOf("room,drops=91"), HasSubstr("from 0 to 90"));
-  EXPECT_THAT(ErrorOf("room,blur=1.5"), HasSubstr("whole number"));
-  EXPECT_THAT(ErrorOf("room,interlaced=1"), HasSubstr("takes no number"));
-  EXPECT_THAT(ErrorOf("room,gain=2,gain=3"), HasSubstr("twice"));
-  EXPECT_THAT(ErrorOf("room,rolling-shutter=40"), HasSubstr("between two frames"));
-  EXPECT_THAT(ErrorOf("room,distortion-error=nan"), HasSubstr("from -20 to 20"));
-  EXPECT_THAT(ErrorOf("attic,drops=1"), HasSubstr("attic"));
+  EXPECT_THAT(ErrorOfScene("room,fog=1"), ::testing::AllOf(HasSubstr("'fog'"), HasSubstr("rolling-shutter"),
+                                                           HasSubstr("tremor"), HasSubstr("drops")));
+  EXPECT_THAT(ErrorOfScene("room,"), HasSubstr("no option ''"));
+  EXPECT_THAT(ErrorOfScene("room,drops"), HasSubstr("needs a number"));
+  EXPECT_THAT(ErrorOfScene("room,drops="), HasSubstr("from 0 to 90"));
+  EXPECT_THAT(ErrorOfScene("room,drops=many"), HasSubstr("'many'"));
+  EXPECT_THAT(ErrorOfScene("room,drops=91"), HasSubstr("from 0 to 90"));
+  EXPECT_THAT(ErrorOfScene("room,blur=1.5"), HasSubstr("whole number"));
+  EXPECT_THAT(ErrorOfScene("room,interlaced=1"), HasSubstr("takes no number"));
+  EXPECT_THAT(ErrorOfScene("room,gain=2,gain=3"), HasSubstr("twice"));
+  EXPECT_THAT(ErrorOfScene("room,rolling-shutter=40"), HasSubstr("between two frames"));
+  EXPECT_THAT(ErrorOfScene("room,distortion-error=nan"), HasSubstr("from -20 to 20"));
+  EXPECT_THAT(ErrorOfScene("attic,drops=1"), HasSubstr("attic"));
 }
 
 TEST(CameraFaults, ReportWhatIsWrong) {

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "engine/base/error.h"
+#include "tests/app/support/error_of_scene.h"
 
 namespace docent::app {
 namespace {
@@ -31,15 +32,6 @@ SimulationOptions SmallAndClean() {
 
 bool SameImage(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
-}
-
-std::string ErrorOf(const std::string& scene, const SimulationOptions& options = {}) {
-  try {
-    MakeSimulation(scene, options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 // The labels in the order in which they begin.
@@ -337,26 +329,26 @@ TEST(Simulation, CountsFramesFromTheRateAndTheDuration) {
 }
 
 TEST(Simulation, ListsTheScenesForAnUnknownName) {
-  const std::string message = ErrorOf("attic");
+  const std::string message = ErrorOfScene("attic");
   EXPECT_THAT(message, HasSubstr("attic"));
   for (const char* scene : {"room", "museum", "desks", "cylinder", "loop", "grass", "head"})
     EXPECT_THAT(message, HasSubstr(scene));
-  EXPECT_THAT(ErrorOf(""), HasSubstr("museum"));
+  EXPECT_THAT(ErrorOfScene(""), HasSubstr("museum"));
 }
 
 TEST(Simulation, ReportsTheValidNumbersOfAScene) {
   for (const char* scene :
        {"museum:0", "museum:99", "museum:", "museum:two", "museum:2x", "museum:-1", "museum:99999999999"}) {
-    EXPECT_THAT(ErrorOf(scene), HasSubstr("from 1 to 24")) << scene;
+    EXPECT_THAT(ErrorOfScene(scene), HasSubstr("from 1 to 24")) << scene;
   }
-  EXPECT_NE(ErrorOf("grass:1"), "");
+  EXPECT_NE(ErrorOfScene("grass:1"), "");
 }
 
 TEST(Simulation, ReportsInvalidOptions) {
   const auto fault = [](auto change) {
     SimulationOptions options;
     change(options);
-    return ErrorOf("grass", options);
+    return ErrorOfScene("grass", options);
   };
   EXPECT_THAT(fault([](auto& options) { options.frame_rate_hz = 0; }), HasSubstr("frame rate"));
   EXPECT_THAT(fault([](auto& options) { options.frame_rate_hz = std::nan(""); }), HasSubstr("frame rate"));

@@ -48,6 +48,35 @@ inline Seen Feed(const std::shared_ptr<const Simulation>& simulation, Pace pace,
   return seen;
 }
 
+// What a session made of one source.
+struct SourceRun {
+  std::vector<engine::TrackedFrame> frames;
+  std::vector<Session::MapState> maps;  // those that exist at the end
+  std::vector<std::string> map_events;  // in words
+};
+
+// Runs a session over a source, from its first image to Finish.
+inline SourceRun RunSource(std::unique_ptr<FrameSource> source, Pace pace, const SessionOptions& options,
+                           maps::Library* library, std::vector<TimedCommand> script = {}) {
+  CalibratedCamera camera = Calibrate(std::move(source), std::nullopt);
+  Session session(options, {camera.model}, library);
+  FrameLoopOptions loop;
+  loop.pace = pace;
+  loop.script = std::move(script);
+  loop.script_name = "script";
+  SourceRun run;
+  RunFrames(&camera, &session, loop, [&](const engine::TrackedFrame& frame) { run.frames.push_back(frame); },
+            {});
+  session.Finish();
+  for (const Session::MapState& map : session.Maps()) {
+    if (!map.discarded && map.joined_into == 0) run.maps.push_back(map);
+  }
+  for (const Event& event : session.TakeEvents()) {
+    if (event.event == "map") run.map_events.push_back(event.detail);
+  }
+  return run;
+}
+
 inline SessionOptions Options(Pace pace, const std::string& first_map) {
   SessionOptions options;
   options.threaded = pace != Pace::kLockstep;

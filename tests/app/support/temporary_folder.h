@@ -11,6 +11,7 @@
 #include <string>
 
 #include "engine/base/error.h"
+#include "tests/support/error_of.h"
 
 namespace docent::app {
 
@@ -46,17 +47,6 @@ class TemporaryFolder {
 inline std::string ReadAll(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
-}
-
-// The message of the Error that the call throws; empty if it throws none.
-template <typename Call>
-std::string ErrorOf(const Call& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
 }
 
 }  // namespace docent::app

@@ -16,7 +16,9 @@ TEST(Worker, StopsWhenRequested) {
   Worker worker("counter", [&](std::stop_token stop) {
     while (!stop.stop_requested()) ++rounds;
   });
-  while (rounds == 0) std::this_thread::yield();
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (rounds == 0 && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+  EXPECT_GT(rounds, 0) << "the body did not run";
   EXPECT_FALSE(worker.finished());
   worker.RequestStop();
   worker.Join();

@@ -9,7 +9,6 @@
 #include <fstream>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <sstream>
 #include <string>
@@ -20,20 +19,19 @@
 namespace docent::engine {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 using Distortion = std::array<double, 5>;
 
 constexpr CameraModel::Intrinsics kIntrinsics{752, 480, 420.5, 421.6, 355.2, 250.3};
 
-struct Lens {
+struct LensCase {
   const char* name;
   LensModel model;
   Distortion distortion;
 };
 
 // Lenses that are one-to-one over the whole image of kIntrinsics, from no distortion to strong distortion.
-const std::vector<Lens>& Lenses() {
-  static const std::vector<Lens> lenses = {
+const std::vector<LensCase>& Lenses() {
+  static const std::vector<LensCase> lenses = {
       {"pinhole", LensModel::kRadialTangential, {}},
       {"barrel", LensModel::kRadialTangential, {-0.296609, 0.080818}},
       {"barrel, decentred", LensModel::kRadialTangential, {-0.28, 0.09, 0.003, -0.004, -0.01}},
@@ -49,7 +47,7 @@ const std::vector<Lens>& Lenses() {
   return lenses;
 }
 
-CameraModel MakeCamera(const Lens& lens) {
+CameraModel MakeCamera(const LensCase& lens) {
   return {lens.model, kIntrinsics, lens.distortion};
 }
 
@@ -65,7 +63,7 @@ std::vector<Eigen::Vector2d> WholeImage(const CameraModel& camera) {
 }
 
 TEST(CameraModelTest, ProjectInvertsUnprojectForEveryPixel) {
-  for (const Lens& lens : Lenses()) {
+  for (const LensCase& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
     for (const Eigen::Vector2d& pixel : WholeImage(camera)) {
       const auto ray = camera.Unproject(pixel);
@@ -82,7 +80,7 @@ TEST(CameraModelTest, ProjectInvertsUnprojectForEveryPixel) {
 
 TEST(CameraModelTest, UnprojectInvertsProjectWithinTheLensRange) {
   Random random(1);
-  for (const Lens& lens : Lenses()) {
+  for (const LensCase& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
     for (int i = 0; i < 500; ++i) {
       // Near the limit a pixel covers an ever larger angle, and the limit itself is excluded.
@@ -100,7 +98,7 @@ TEST(CameraModelTest, UnprojectInvertsProjectWithinTheLensRange) {
 
 TEST(CameraModelTest, JacobianEqualsTheNumericDerivative) {
   Random random(2);
-  for (const Lens& lens : Lenses()) {
+  for (const LensCase& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
     std::vector<Eigen::Vector3d> points = {
         {0, 0, 2}, {1e-12, 0, 2}, {1e-9, -1e-9, 1}, {1e-6, 1e-6, 1}, {1e-4, 0, 3}};
@@ -130,7 +128,7 @@ TEST(CameraModelTest, JacobianEqualsTheNumericDerivative) {
 TEST(CameraModelTest, MatchesTheOpenCvPinholeModel) {
   Random random(3);
   const cv::Matx33d matrix(kIntrinsics.fx, 0, kIntrinsics.cx, 0, kIntrinsics.fy, kIntrinsics.cy, 0, 0, 1);
-  for (const Lens& lens : Lenses()) {
+  for (const LensCase& lens : Lenses()) {
     if (lens.model != LensModel::kRadialTangential) {
       continue;
     }
@@ -154,7 +152,7 @@ TEST(CameraModelTest, MatchesTheOpenCvPinholeModel) {
 TEST(CameraModelTest, MatchesTheOpenCvFisheyeModel) {
   Random random(4);
   const cv::Matx33d matrix(kIntrinsics.fx, 0, kIntrinsics.cx, 0, kIntrinsics.fy, kIntrinsics.cy, 0, 0, 1);
-  for (const Lens& lens : Lenses()) {
+  for (const LensCase& lens : Lenses()) {
     if (lens.model != LensModel::kKannalaBrandt) {
       continue;
     }
@@ -189,7 +187,7 @@ TEST(CameraModelTest, FovLensFollowsDevernayAndFaugeras) {
 
 TEST(CameraModelTest, PinholeAndFovDoNotProjectPointsBehindTheCamera) {
   Random random(5);
-  for (const Lens& lens : Lenses()) {
+  for (const LensCase& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
     if (lens.model == LensModel::kKannalaBrandt) {
       continue;
@@ -260,7 +258,7 @@ TEST(CameraModelTest, IsOneToOneWithinTheRangeDespiteDecentring) {
 }
 
 TEST(CameraModelTest, NonFinitePixelsAndPointsAreRejected) {
-  for (const Lens& lens : Lenses()) {
+  for (const LensCase& lens : Lenses()) {
     const CameraModel camera = MakeCamera(lens);
     const double nan = std::numeric_limits<double>::quiet_NaN(),
                  infinity = std::numeric_limits<double>::infinity();
@@ -281,7 +279,7 @@ TEST(CameraModelTest, IsInsideRefersToPixelCentres) {
 }
 
 TEST(CameraModelTest, ValidateAcceptsGoodParameters) {
-  for (const Lens& lens : Lenses()) {
+  for (const LensCase& lens : Lenses()) {
     EXPECT_EQ(CameraModel::Validate(lens.model, kIntrinsics, lens.distortion).value_or(""), "") << lens.name;
   }
   const CameraModel none;

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <sstream>
 #include <vector>
 
@@ -13,17 +12,14 @@
 namespace docent::engine {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-using Twist = Eigen::Matrix<double, 6, 1>;
-
-Twist MakeTwist(const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
-  Twist twist;
+Vector6 MakeTwist(const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
+  Vector6 twist;
   twist << v, w;
   return twist;
 }
 
 // The exponential by its defining power series of 4x4 matrices, with the argument halved until it is small.
-Eigen::Matrix4d SeriesExponential(const Twist& twist) {
+Eigen::Matrix4d SeriesExponential(const Vector6& twist) {
   Eigen::Matrix4d generator = Eigen::Matrix4d::Zero();
   generator.topLeftCorner<3, 3>() = Hat(twist.tail<3>());
   generator.topRightCorner<3, 1>() = twist.head<3>();
@@ -108,7 +104,7 @@ TEST(HatTest, IsTheCrossProduct) {
 TEST(Rigid3Test, ExpIsTheMatrixExponential) {
   Random random(4);
   for (const double angle : CriticalAngles()) {
-    const Twist twist = MakeTwist(RandomVector(&random, 3), angle * RandomDirection(&random));
+    const Vector6 twist = MakeTwist(RandomVector(&random, 3), angle * RandomDirection(&random));
     const Rigid3 transform = Rigid3::Exp(twist);
     const Eigen::Matrix4d expected = SeriesExponential(twist);
     EXPECT_LT((transform.rotation.matrix() - expected.topLeftCorner<3, 3>()).norm(), 1e-12) << angle;
@@ -119,7 +115,7 @@ TEST(Rigid3Test, ExpIsTheMatrixExponential) {
 TEST(Rigid3Test, LogInvertsExpFromZeroTo180Degrees) {
   Random random(5);
   for (const double angle : CriticalAngles()) {
-    const Twist twist = MakeTwist(RandomVector(&random, 3), angle * RandomDirection(&random));
+    const Vector6 twist = MakeTwist(RandomVector(&random, 3), angle * RandomDirection(&random));
     EXPECT_LT((Rigid3::Exp(twist).Log() - twist).norm(), 1e-12) << angle;
   }
 }

@@ -4,28 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
-#include <cmath>
-#include <numbers>
+#include <algorithm>
 #include <vector>
 
-#include "engine/base/random.h"
+#include "tests/engine/geometry/test_math.h"
 
-// Checks of the group laws for a type of 3D transforms, and the random numbers for them. `T` needs a default
-// constructor (the identity), operator*, inverse() and an action on Eigen::Vector3d.
+// Checks of the group laws for a type of 3D transforms. `T` needs a default constructor (the identity),
+// operator*, inverse() and an action on Eigen::Vector3d.
 namespace docent::engine {
-
-inline Eigen::Vector3d RandomVector(Random* random, double size) {
-  return {random->Uniform(-size, size), random->Uniform(-size, size), random->Uniform(-size, size)};
-}
-
-// A standard normal variable (Box and Muller 1958).
-inline double RandomNormal(Random* random) {
-  return std::sqrt(-2 * std::log(1 - random->Uniform())) * std::cos(2 * std::numbers::pi * random->Uniform());
-}
-
-inline Eigen::Vector3d RandomDirection(Random* random) {
-  return Eigen::Vector3d(RandomNormal(random), RandomNormal(random), RandomNormal(random)).normalized();
-}
 
 // The largest distance between the images of four points that span space.
 template <typename T>
@@ -62,9 +48,9 @@ void ExpectGroupLaws(const std::vector<T>& samples, double tolerance) {
 // Angles in radians from far below the rounding error, across both sides of the switch to the power series,
 // up to pi.
 inline std::vector<double> CriticalAngles() {
-  const double pi = std::numbers::pi;
-  return {0,   1e-300,    1e-160, 1e-20, 1e-12, 1e-9,   1e-8, 1e-7,      1e-5,      1e-3,      0.0999999,
-          0.1, 0.1000001, 0.5,    1.0,   2.0,   pi / 2, 3.0,  pi - 1e-3, pi - 1e-6, pi - 1e-9, pi - 1e-12};
+  return {0,       1e-300, 1e-160,     1e-20,      1e-12,      1e-9,       1e-8, 1e-7,
+          1e-5,    1e-3,   0.0999999,  0.1,        0.1000001,  0.5,        1.0,  2.0,
+          kPi / 2, 3.0,    kPi - 1e-3, kPi - 1e-6, kPi - 1e-9, kPi - 1e-12};
 }
 
 }  // namespace docent::engine

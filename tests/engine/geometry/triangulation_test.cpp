@@ -4,17 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "tests/engine/geometry/transform_laws.h"
 
 namespace docent::engine {
 namespace {
-
-double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 double SquaredAngles(const Eigen::Vector3d& point_in_a, const Eigen::Vector3d& ray_a,
                      const Eigen::Vector3d& ray_b, const Rigid3& b_from_a) {
@@ -73,8 +68,8 @@ TEST(TriangulateTest, RejectsParallelRaysAndAZeroBaseline) {
 }
 
 TEST(ParallaxAngleTest, IsTheAngleBetweenTheTwoRays) {
-  EXPECT_NEAR(ParallaxAngle({0, 0, 0}, {1, 0, 0}, {0, 0, 1}), std::numbers::pi / 4, 1e-15);
-  EXPECT_NEAR(ParallaxAngle({-1, 0, 0}, {1, 0, 0}, {0, 0, 1}), std::numbers::pi / 2, 1e-15);
+  EXPECT_NEAR(ParallaxAngle({0, 0, 0}, {1, 0, 0}, {0, 0, 1}), kPi / 4, 1e-15);
+  EXPECT_NEAR(ParallaxAngle({-1, 0, 0}, {1, 0, 0}, {0, 0, 1}), kPi / 2, 1e-15);
   EXPECT_NEAR(ParallaxAngle({-1, 0, 0}, {1, 0, 0}, {0, 0, 1e9}), 2e-9, 1e-17);
   EXPECT_EQ(ParallaxAngle({1, 2, 3}, {1, 2, 3}, {4, 5, 6}), 0);
 }

@@ -25,7 +25,7 @@ Sim3 TrueMotion() {
   return {Rotation3::Exp({0.02, -0.05, 0.03}), Eigen::Vector3d(0.1, -0.2, 0.05), 1.07};
 }
 
-MapSnapshot Moved(const MapSnapshot& map, const Sim3& motion) {
+MapSnapshot CloudMovedBy(const MapSnapshot& map, const Sim3& motion) {
   MapSnapshot moved = map;
   for (MapPoint& point : moved.points) point.point_in_map.head<3>() = motion * point.position();
   return moved;
@@ -55,7 +55,7 @@ TEST(LocalPoints, AreTheNearestFinitePoints) {
 TEST(LocalPoints, RecoverTheMotionOfThatPartOfTheMap) {
   Random random(2);
   const MapSnapshot then = Cloud(100, &random);
-  MapSnapshot now = Moved(then, TrueMotion());
+  MapSnapshot now = CloudMovedBy(then, TrueMotion());
   // A fifth of the points moved differently, and a fifth was removed.
   for (std::size_t i = 0; i < now.points.size(); i += 5) now.points[i].point_in_map[0] += 0.5;
   std::erase_if(now.points, [](const MapPoint& point) { return point.id % 5 == 0; });

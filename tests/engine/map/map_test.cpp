@@ -8,7 +8,7 @@
 #include <set>
 
 #include "engine/base/random.h"
-#include "tests/engine/mapping/panorama_scene.h"
+#include "tests/engine/mapping/panorama/panorama_scene.h"
 
 namespace docent::engine {
 namespace {

@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "engine/map/map.h"
-#include "tests/engine/mapping/panorama_scene.h"
+#include "tests/engine/geometry/test_math.h"
+#include "tests/engine/mapping/panorama/panorama_scene.h"
 
 // Tests of the panorama maps within a Map.
 namespace docent::engine {
@@ -89,7 +90,7 @@ class PanoramaMaps : public ::testing::Test {
   Map map_;
 };
 
-using Ids = std::vector<KeyFrameId>;
+using KeyFrameIds = std::vector<KeyFrameId>;
 
 TEST_F(PanoramaMaps, OpenAtAnOrdinaryKeyframeThatKeepsItsObservations) {
   const MapPointId finite = AddFinite(3, 0);
@@ -99,7 +100,7 @@ TEST_F(PanoramaMaps, OpenAtAnOrdinaryKeyframeThatKeepsItsObservations) {
   EXPECT_EQ(map_.panoramas()[1].reference, 3u);
   EXPECT_EQ(map_.FindKeyFrame(3)->keyframe.panorama, id);
   EXPECT_EQ(map_.FindKeyFrame(3)->keyframe.kind, KeyFrameKind::kSixDof);
-  EXPECT_EQ(Observers(finite), (Ids{0, 3}));
+  EXPECT_EQ(Observers(finite), (KeyFrameIds{0, 3}));
   ExpectConsistent();
 }
 
@@ -113,15 +114,15 @@ TEST_F(PanoramaMaps, TakeOverTheInfinitePointsOfTheirNewReference) {
   EXPECT_EQ(map_.FindKeyFrame(1)->keyframe.kind, KeyFrameKind::kSixDof);
   for (const MapPointId moved : {own, shared}) {
     EXPECT_EQ(map_.FindPoint(moved)->point.panorama, id);
-    EXPECT_EQ(Observers(moved), Ids{1});
-    const double five = 5 * std::numbers::pi / 180;
+    EXPECT_EQ(Observers(moved), KeyFrameIds{1});
+    const double five = Radians(5);
     EXPECT_LT(
         (map_.FindPoint(moved)->point.position() - Eigen::Vector3d(std::sin(five), 0, std::cos(five))).norm(),
         1e-6);
   }
-  EXPECT_EQ(Observers(of_reference), (Ids{0, 2}));
-  EXPECT_EQ(Observers(untouched), Ids{2});
-  EXPECT_EQ(Observers(seen_by_it_alone), Ids{2});
+  EXPECT_EQ(Observers(of_reference), (KeyFrameIds{0, 2}));
+  EXPECT_EQ(Observers(untouched), KeyFrameIds{2});
+  EXPECT_EQ(Observers(seen_by_it_alone), KeyFrameIds{2});
   EXPECT_EQ(map_.FindPoint(of_reference)->point.panorama, 0u);
   ExpectConsistent();
 }
@@ -142,8 +143,8 @@ TEST_F(PanoramaMaps, CanChangeTheirReference) {
   EXPECT_EQ(map_.panoramas()[0].reference, 1u);
   EXPECT_EQ(map_.FindKeyFrame(0)->keyframe.kind, KeyFrameKind::kPanorama);
   EXPECT_EQ(map_.FindKeyFrame(1)->keyframe.kind, KeyFrameKind::kSixDof);
-  EXPECT_EQ(Observers(of_old), (Ids{0, 1}));
-  EXPECT_EQ(Observers(of_new), Ids{1});
+  EXPECT_EQ(Observers(of_old), (KeyFrameIds{0, 1}));
+  EXPECT_EQ(Observers(of_new), KeyFrameIds{1});
   ExpectConsistent();
   map_.SetReference(0, 1);
   EXPECT_EQ(map_.FindKeyFrame(1)->keyframe.kind, KeyFrameKind::kSixDof)
@@ -172,7 +173,7 @@ TEST_F(PanoramaMaps, LoseOnlyTheOwnInfinitePointsOfARemovedKeyframe) {
   map_.RemoveKeyFrame(1);
   EXPECT_EQ(map_.panoramas().size(), 1u);
   EXPECT_EQ(map_.FindPoint(own), nullptr);
-  EXPECT_EQ(Observers(shared), (Ids{0, 2}));
+  EXPECT_EQ(Observers(shared), (KeyFrameIds{0, 2}));
   ExpectConsistent();
 }
 
@@ -180,7 +181,7 @@ TEST_F(PanoramaMaps, KeepAnInfinitePointUntilItsLastObservationIsRemoved) {
   const MapPointId shared = AddInfinite(0, {1, 2});
   map_.RemoveObservation(1, shared);
   map_.RemoveObservation(2, shared);
-  EXPECT_EQ(Observers(shared), Ids{0});
+  EXPECT_EQ(Observers(shared), KeyFrameIds{0});
   map_.RemoveObservation(0, shared);
   EXPECT_EQ(map_.FindPoint(shared), nullptr);
   ExpectConsistent();
@@ -193,9 +194,9 @@ TEST_F(PanoramaMaps, RemoveDependentObservationsOfAPointThatBecomesFinite) {
   EXPECT_EQ(point.point_in_map, Eigen::Vector4d(0, 0, 2, 1));
   EXPECT_TRUE(point.was_infinite);
   EXPECT_EQ(point.panorama, kNoId);
-  EXPECT_EQ(Observers(id), Ids{0});
+  EXPECT_EQ(Observers(id), KeyFrameIds{0});
   Observe(3, id);
-  EXPECT_EQ(Observers(id), (Ids{0, 3}));
+  EXPECT_EQ(Observers(id), (KeyFrameIds{0, 3}));
   ExpectConsistent();
 }
 

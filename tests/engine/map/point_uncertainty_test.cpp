@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "engine/base/random.h"
-#include "tests/engine/mapping/panorama_scene.h"
+#include "tests/engine/mapping/panorama/panorama_scene.h"
 
 namespace docent::engine {
 namespace {

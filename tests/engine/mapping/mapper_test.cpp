@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "engine/vision/features.h"
+#include "tests/engine/mapping/true_pair.h"
 #include "tests/engine/rendered_world.h"
 
 namespace docent::engine {
@@ -16,38 +19,19 @@ namespace {
 
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
-using Kind = MapperEvent::Kind;
 
 // Metres: the mapper's own unit, so that its map has the scale of the world.
 constexpr double kBaseline = 0.1;
 
-const std::shared_ptr<const CameraModel>& Camera() {
+const std::shared_ptr<const CameraModel>& MapperCamera() {
   static const auto camera = testing_world::PinholeCamera(400, 300);
   return camera;
 }
 
-// Two true views: corners of the first, and their pixels in the second.
-InitialPair TruePair(const RenderedWorld& world, const Rigid3& a, const Rigid3& b, std::size_t most) {
-  InitialPair pair;
-  pair.camera = Camera();
-  pair.a = {FromSeconds(0), MakeFeatures(world.Render(*Camera(), a, 1.5, 1))};
-  pair.b = {FromSeconds(0.5), MakeFeatures(world.Render(*Camera(), b, 1.5, 2))};
-  pair.geometry.outcome = TwoViewOutcome::kGeneral;
-  pair.geometry.b_from_a = b * a.inverse();
-  const double baseline = pair.geometry.b_from_a.translation.norm();
-  pair.geometry.b_from_a.translation /= baseline;
-  for (int level = 2; level >= 0; --level) {
-    for (const Corner& corner : pair.a.features->corners[static_cast<std::size_t>(level)]) {
-      const Eigen::Vector2d pixel = LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), level);
-      const auto hit = world.AtPixel(*Camera(), a, pixel);
-      if (pair.matches.size() >= most || !hit || !world.Sees(*Camera(), b, hit->point)) continue;
-      pair.matches.push_back({pixel.cast<float>(), Camera()->Project(b * hit->point)->cast<float>(),
-                              static_cast<std::uint8_t>(level)});
-      pair.geometry.points_in_a.push_back(a * hit->point / baseline);
-      pair.geometry.inlier.push_back(true);
-    }
-  }
-  pair.geometry.inlier_count = static_cast<int>(pair.matches.size());
+InitialPair FirstPair(const RenderedWorld& world, std::size_t max_matches) {
+  InitialPair pair = testing_world::TruePair(world, *MapperCamera(), MapperCamera(), CameraAt({0, 0, 0}),
+                                             CameraAt({kBaseline, 0, 0}), max_matches);
+  pair.b.time = FromSeconds(0.5);
   return pair;
 }
 
@@ -56,22 +40,24 @@ KeyFrameCandidate TrueCandidate(const RenderedWorld& world, const MapSnapshot& m
                                 double seconds) {
   KeyFrameCandidate candidate;
   candidate.time = FromSeconds(seconds);
-  candidate.camera = Camera();
+  candidate.camera = MapperCamera();
   candidate.features =
-      MakeFeatures(world.Render(*Camera(), pose, 1.5, static_cast<std::uint64_t>(1000 * seconds)));
+      MakeFeatures(world.Render(*MapperCamera(), pose, 1.5, static_cast<std::uint64_t>(1000 * seconds)));
   candidate.camera_from_map = pose;
   for (const MapPoint& point : map.points) {
-    const auto pixel = Camera()->Project(pose * point.position());
-    if (pixel && Camera()->IsInside(*pixel, 10) && point.id % 2 == 0)
+    const auto pixel = MapperCamera()->Project(pose * point.position());
+    if (pixel && MapperCamera()->IsInside(*pixel, 10) && point.id % 2 == 0)
       candidate.matches.push_back({point.id, pixel->cast<float>(), point.source_level, true});
   }
   return candidate;
 }
 
-int CountEvents(Mapper* mapper, Kind kind) {
+template <typename What>
+int CountEvents(Mapper* mapper) {
   const auto events = mapper->TakeEvents();
-  return static_cast<int>(
-      std::count_if(events.begin(), events.end(), [kind](const auto& event) { return event.kind == kind; }));
+  return static_cast<int>(std::count_if(events.begin(), events.end(), [](const MapperEvent& event) {
+    return std::holds_alternative<What>(event.what);
+  }));
 }
 
 void WorkUntilIdle(Mapper* mapper) {
@@ -83,7 +69,7 @@ class MapperTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     world_ = new RenderedWorld(RenderedWorld::Room(61));
-    pair_ = new InitialPair(TruePair(*world_, CameraAt({0, 0, 0}), CameraAt({kBaseline, 0, 0}), 250));
+    pair_ = new InitialPair(FirstPair(*world_, 250));
     Mapper mapper({});
     mapper.Start(*pair_);
     mapper.Step();
@@ -120,8 +106,8 @@ TEST_F(MapperTest, StartsAMapFromTwoViews) {
   ASSERT_TRUE(mapper.Start(*pair_));
   EXPECT_FALSE(mapper.IsIdle());
   EXPECT_TRUE(mapper.Step());
-  EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 1);
-  EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 0) << "events are returned once";
+  EXPECT_EQ(CountEvents<MapperEvent::MapStarted>(&mapper), 1);
+  EXPECT_EQ(CountEvents<MapperEvent::MapStarted>(&mapper), 0) << "events are returned once";
   const auto map = mapper.Snapshot();
   ASSERT_NE(map, nullptr);
   EXPECT_EQ(Validate(*map), "");
@@ -136,7 +122,7 @@ TEST_F(MapperTest, StartsAMapFromTwoViews) {
 }
 
 TEST_F(MapperTest, ReportsAFailedStart) {
-  InitialPair poor = TruePair(*world_, CameraAt({0, 0, 0}), CameraAt({kBaseline, 0, 0}), 30);
+  InitialPair poor = FirstPair(*world_, 30);
   // A blank second image: no points can be added to the thirty.
   poor.b.features = MakeFeatures(cv::Mat(300, 400, CV_8UC1, cv::Scalar(120)));
   Mapper mapper({});
@@ -144,8 +130,9 @@ TEST_F(MapperTest, ReportsAFailedStart) {
   WorkUntilIdle(&mapper);
   const auto events = mapper.TakeEvents();
   ASSERT_EQ(events.size(), 1u);
-  EXPECT_EQ(events[0].kind, Kind::kStartFailed);
-  EXPECT_FALSE(events[0].detail.empty());
+  const auto* const failed = std::get_if<MapperEvent::StartFailed>(&events[0].what);
+  ASSERT_NE(failed, nullptr);
+  EXPECT_LT(failed->points, static_cast<std::size_t>(MapperOptions().min_initial_points));
   EXPECT_EQ(mapper.Snapshot(), nullptr);
   EXPECT_TRUE(mapper.IsIdle());
   // A keyframe that comes too late is ignored, and the next start succeeds.
@@ -154,7 +141,7 @@ TEST_F(MapperTest, ReportsAFailedStart) {
   EXPECT_EQ(mapper.Snapshot(), nullptr);
   mapper.Start(*pair_);
   mapper.Step();
-  EXPECT_EQ(CountEvents(&mapper, Kind::kMapStarted), 1);
+  EXPECT_EQ(CountEvents<MapperEvent::MapStarted>(&mapper), 1);
 }
 
 TEST_F(MapperTest, ExtendsTheMapByKeyframesUntilIdle) {
@@ -178,7 +165,7 @@ TEST_F(MapperTest, ExtendsTheMapByKeyframesUntilIdle) {
     EXPECT_LT((after->keyframes.back().camera_from_map.OriginInSource() - pose.OriginInSource()).norm(),
               0.03);
   }
-  EXPECT_EQ(CountEvents(&mapper, Kind::kKeyFrame), 4);
+  EXPECT_EQ(CountEvents<MapperEvent::KeyFrameAdded>(&mapper), 4);
   EXPECT_LT(MedianDistanceToSurface(*mapper.Snapshot()), 0.04);
   EXPECT_GT(mapper.Times().bundle_adjustment, 0);
   EXPECT_GT(mapper.Times().other, 0);
@@ -218,15 +205,18 @@ TEST_F(MapperTest, KeepsTheMapValidWhileKeyframesInterruptIt) {
   std::vector<KeyFrameCandidate> candidates;
   for (int i = 0; i < 5; ++i)
     candidates.push_back(TrueCandidate(*world_, *started_, CameraAt({0.2 + 0.1 * i, 0.03 * i, 0}), 1 + i));
-  std::jthread tracker([&] {
+  std::jthread tracker([&](std::stop_token stop) {
     for (const KeyFrameCandidate& candidate : candidates)
-      while (!mapper.Offer(candidate)) std::this_thread::yield();
+      while (!mapper.Offer(candidate) && !stop.stop_requested()) std::this_thread::yield();
   });
-  while (mapper.Snapshot()->keyframes.size() < 7) {
+  // A mapper that stops taking keyframes fails the test instead of hanging it.
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (mapper.Snapshot()->keyframes.size() < 7 && std::chrono::steady_clock::now() < deadline) {
     mapper.Step();
     EXPECT_EQ(Validate(*mapper.Snapshot()), "");
     std::this_thread::yield();
   }
+  tracker.request_stop();
   tracker.join();
   WorkUntilIdle(&mapper);
   EXPECT_TRUE(mapper.IsIdle());

@@ -18,8 +18,8 @@ namespace {
 using testing_descriptors::Disturbed;
 using testing_descriptors::MadeDescriptor;
 using testing_descriptors::MadeTree;
-using Entry = DescriptorDatabase::Entry;
-using Match = DescriptorDatabase::Match;
+using DatabaseEntry = DescriptorDatabase::Entry;
+using DatabaseMatch = DescriptorDatabase::Match;
 using Vote = DescriptorDatabase::Vote;
 
 // The distinct descriptors of the points of a made-up map.
@@ -32,9 +32,10 @@ class PointDescriptors {
   const Descriptor& operator[](std::size_t point) const { return descriptors_[point]; }
 
   // The entries of a keyframe that observes the points from `first` to `first + count - 1`.
-  std::vector<Entry> KeyFrame(KeyFrameId id, std::size_t first, std::size_t count, int noise = 6) const {
+  std::vector<DatabaseEntry> KeyFrame(KeyFrameId id, std::size_t first, std::size_t count,
+                                      int noise = 6) const {
     Random random(1000 + id);
-    std::vector<Entry> entries;
+    std::vector<DatabaseEntry> entries;
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t point = (first + i) % descriptors_.size();
       entries.push_back({Disturbed(descriptors_[point], noise, &random), id, static_cast<MapPointId>(point),
@@ -52,13 +53,13 @@ const PointDescriptors& Points() {
   return descriptors;
 }
 
-void AddAll(const std::vector<Entry>& entries, DescriptorDatabase* database) {
-  for (const Entry& entry : entries) database->Add(entry);
+void AddAll(const std::vector<DatabaseEntry>& entries, DescriptorDatabase* database) {
+  for (const DatabaseEntry& entry : entries) database->Add(entry);
 }
 
-std::vector<Descriptor> DescriptorsOf(const std::vector<Entry>& entries) {
+std::vector<Descriptor> DescriptorsOf(const std::vector<DatabaseEntry>& entries) {
   std::vector<Descriptor> descriptors;
-  for (const Entry& entry : entries) descriptors.push_back(entry.descriptor);
+  for (const DatabaseEntry& entry : entries) descriptors.push_back(entry.descriptor);
   return descriptors;
 }
 
@@ -90,7 +91,7 @@ TEST(DescriptorDatabase, IsRestoredByRemovingAddedKeyFrames) {
     for (KeyFrameId id = 0; id < 6; ++id) AddAll(Points().KeyFrame(id, 60 * id, 150), &database);
     const DescriptorDatabase before = database;
     // The entries of several keyframes are added interleaved, and an old keyframe is removed and added again.
-    std::vector<Entry> fresh;
+    std::vector<DatabaseEntry> fresh;
     for (KeyFrameId id = 100; id < 105; ++id) {
       const auto entries = Points().KeyFrame(id, random.Below(2000), 50 + random.Below(200));
       fresh.insert(fresh.end(), entries.begin(), entries.end());
@@ -116,26 +117,27 @@ TEST(DescriptorDatabase, IsRestoredByRemovingAddedKeyFrames) {
 TEST(DescriptorDatabase, MatchesTheExpectedEntriesAfterRandomChanges) {
   Random random(5);
   DescriptorDatabase database(MadeTree());
-  std::vector<Entry> expected;
+  std::vector<DatabaseEntry> expected;
   for (int step = 0; step < 400; ++step) {
     const KeyFrameId keyframe = random.Below(12);
     switch (random.Below(8)) {
       case 0:
         database.RemoveKeyFrame(keyframe);
-        std::erase_if(expected, [&](const Entry& entry) { return entry.keyframe == keyframe; });
+        std::erase_if(expected, [&](const DatabaseEntry& entry) { return entry.keyframe == keyframe; });
         break;
       case 1:
       case 2: {
         const MapPointId point = random.Below(40);
         database.RemoveObservation(keyframe, point);
-        std::erase_if(expected,
-                      [&](const Entry& entry) { return entry.keyframe == keyframe && entry.point == point; });
+        std::erase_if(expected, [&](const DatabaseEntry& entry) {
+          return entry.keyframe == keyframe && entry.point == point;
+        });
         break;
       }
       default:
         for (int i = 0; i < 5; ++i) {
           const MapPointId point = random.Below(40);
-          const Entry entry{Disturbed(Points()[point], 5, &random), keyframe, point, {1, 2}, 0};
+          const DatabaseEntry entry{Disturbed(Points()[point], 5, &random), keyframe, point, {1, 2}, 0};
           database.Add(entry);
           expected.push_back(entry);
         }
@@ -146,15 +148,15 @@ TEST(DescriptorDatabase, MatchesTheExpectedEntriesAfterRandomChanges) {
   AddAll(expected, &again);
   EXPECT_TRUE(database == again);
   std::set<KeyFrameId> keyframes;
-  for (const Entry& entry : expected) keyframes.insert(entry.keyframe);
+  for (const DatabaseEntry& entry : expected) keyframes.insert(entry.keyframe);
   EXPECT_EQ(database.KeyFrameCount(), keyframes.size());
   database.Clear();
   EXPECT_TRUE(database == DescriptorDatabase(MadeTree()));
 }
 
 TEST(DescriptorDatabase, EqualityComparesEveryFieldOfItsEntries) {
-  const Entry entry{Points()[0], 1, 2, {3, 4}, 1};
-  std::vector<Entry> others(5, entry);
+  const DatabaseEntry entry{Points()[0], 1, 2, {3, 4}, 1};
+  std::vector<DatabaseEntry> others(5, entry);
   others[0].descriptor = Points()[1];
   others[1].keyframe = 7;
   others[2].point = 7;
@@ -162,7 +164,7 @@ TEST(DescriptorDatabase, EqualityComparesEveryFieldOfItsEntries) {
   others[4].level = 2;
   DescriptorDatabase one(MadeTree());
   one.Add(entry);
-  for (const Entry& other : others) {
+  for (const DatabaseEntry& other : others) {
     DescriptorDatabase two(MadeTree());
     two.Add(other);
     EXPECT_FALSE(one == two);
@@ -172,12 +174,12 @@ TEST(DescriptorDatabase, EqualityComparesEveryFieldOfItsEntries) {
 TEST(DescriptorMatches, FindThePointWithTheMostSimilarDescriptor) {
   DescriptorDatabase database(MadeTree());
   for (KeyFrameId id = 0; id < 10; ++id) AddAll(Points().KeyFrame(id, 100 * id, 300), &database);
-  const std::vector<Entry> seen = Points().KeyFrame(50, 200, 400);
+  const std::vector<DatabaseEntry> seen = Points().KeyFrame(50, 200, 400);
   const auto matches = database.FindMatches(DescriptorsOf(seen), {});
   EXPECT_GT(matches.size(), 300u);
   std::set<MapPointId> points;
   std::size_t last = 0;
-  for (const Match& match : matches) {
+  for (const DatabaseMatch& match : matches) {
     EXPECT_EQ(match.entry.point, seen[match.query].point);
     EXPECT_EQ(match.distance, SquaredDistance(seen[match.query].descriptor, match.entry.descriptor));
     EXPECT_TRUE(points.insert(match.entry.point).second);
@@ -188,7 +190,7 @@ TEST(DescriptorMatches, FindThePointWithTheMostSimilarDescriptor) {
 
 TEST(DescriptorMatches, AreUsuallyTheNearestOfAllEntries) {
   DescriptorDatabase database(MadeTree());
-  std::vector<Entry> all;
+  std::vector<DatabaseEntry> all;
   for (KeyFrameId id = 0; id < 4; ++id) {
     const auto entries = Points().KeyFrame(id, 300 * id, 300);
     all.insert(all.end(), entries.begin(), entries.end());
@@ -200,9 +202,9 @@ TEST(DescriptorMatches, AreUsuallyTheNearestOfAllEntries) {
   options.mutual = false;
   const std::vector<Descriptor> queries = DescriptorsOf(Points().KeyFrame(50, 100, 300, 12));
   std::size_t exact = 0;
-  for (const Match& match : database.FindMatches(queries, options)) {
+  for (const DatabaseMatch& match : database.FindMatches(queries, options)) {
     int least = match.distance;
-    for (const Entry& entry : all)
+    for (const DatabaseEntry& entry : all)
       least = std::min(least, SquaredDistance(queries[match.query], entry.descriptor));
     exact += least == match.distance;
   }
@@ -296,7 +298,7 @@ TEST(KeyFrameVotes, WeightCommonWordsLess) {
     AddAll(Points().KeyFrame(id, 200 + 100 * id, 100), &database);
   }
   const auto common = database.FindKeyFrames(DescriptorsOf(Points().KeyFrame(50, 0, 100)), 1);
-  std::vector<Entry> seen = Points().KeyFrame(50, 0, 100);
+  std::vector<DatabaseEntry> seen = Points().KeyFrame(50, 0, 100);
   const auto own = Points().KeyFrame(50, 500, 100);
   seen.insert(seen.end(), own.begin(), own.end());
   const auto votes = database.FindKeyFrames(DescriptorsOf(seen), 2);
@@ -324,7 +326,7 @@ TEST(DescribedObservations, AreFoundFromAnotherPlaceAndFromTwiceTheDistance) {
     for (const DescribedKeypoint& place : places) queries.push_back(place.oriented.descriptor);
     const auto matches = database.FindMatches(queries, {});
     int right = 0;
-    for (const Match& match : matches) {
+    for (const DatabaseMatch& match : matches) {
       const auto point = std::find_if(map.points().begin(), map.points().end(), [&](const auto& candidate) {
         return candidate.point.id == match.entry.point;
       });

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <latch>
 #include <thread>
 
 #include "engine/base/random.h"
@@ -141,15 +142,18 @@ TEST(InvertedFile, CanBeSearchedWhileKeyframesAreAddedAndRemoved) {
   for (KeyFrameId i = 0; i < 100; ++i) file.Add(RandomBag(i, 30, 0, 300), {1, i});
   std::atomic<bool> done = false;
   std::atomic<int> wrong = 0;
+  std::latch reading(2);  // without it, the changes may be over before the first search
   std::vector<std::jthread> readers;
   for (int r = 0; r < 2; ++r) {
     readers.emplace_back([&] {
-      while (!done) {
+      reading.count_down();
+      do {
         const auto hits = file.Search(RandomBag(42, 30, 0, 300), 1);
         if (hits.size() != 1 || hits[0].owner.keyframe != 42 || std::abs(hits[0].score - 1) > 1e-6) ++wrong;
-      }
+      } while (!done);
     });
   }
+  reading.wait();
   for (KeyFrameId i = 0; i < 300; ++i) {
     const auto slot = file.Add(RandomBag(1000 + i, 30, 0, 300), {2, i});
     if (i % 3 != 0) file.Remove(slot);

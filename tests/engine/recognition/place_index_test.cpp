@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <latch>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <thread>
@@ -385,18 +386,21 @@ TEST(PlaceIndex, CanBeSearchedWhileMapsAreAddedExtendedAndRemoved) {
   const WordBag words = WordsOfKeyFrame(1, 11);
   std::atomic<bool> done = false;
   std::atomic<int> wrong = 0;
+  std::latch reading(2);  // without it, the changes may be over before the first search
   std::vector<std::jthread> readers;
   for (int r = 0; r < 2; ++r) {
     readers.emplace_back([&, r] {
-      while (!done) {
+      reading.count_down();
+      do {
         // With words and without.
         const PlaceQuery query = r == 0 ? PlaceQuery(seen) : PlaceQuery(seen, words);
         const auto found = index.FindPlaces(query, 3, 3, 0);
         if (found.empty() || found[0].map_key != 1 || found[0].keyframe != 11 || found[0].difference > 1e-6)
           ++wrong;
-      }
+      } while (!done);
     });
   }
+  reading.wait();
   auto growing = std::make_shared<MapSnapshot>();
   for (int i = 0; i < 150; ++i) {
     AddKeyFrame(10'000 + static_cast<std::uint64_t>(i), growing.get());

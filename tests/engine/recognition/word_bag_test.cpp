@@ -35,7 +35,7 @@ TEST(WordBag, AWordIsStoredInTwoBytes) {
 }
 
 // Blobs on a grey background near the image centre, so that none leaves the image when it is rotated.
-cv::Mat Blobs(std::uint64_t seed) {
+cv::Mat RotatableBlobs(std::uint64_t seed) {
   Random random(seed);
   cv::Mat image(480, 640, CV_8UC1, cv::Scalar(128));
   for (int i = 0; i < 150; ++i) {
@@ -60,11 +60,11 @@ double SharedRatio(const WordBag& a, const WordBag& b) {
 }
 
 TEST(WordBag, IsSimilarForARotatedOrDarkerImageAndNotForAnother) {
-  const cv::Mat image = Blobs(1);
+  const cv::Mat image = RotatableBlobs(1);
   const WordBag bag = MakeWordBag(*MakeFeatures(image));
   EXPECT_GT(bag.size(), 80u);
   EXPECT_EQ(MakeWordBag(*MakeFeatures(image)), bag);
-  const double other = SharedRatio(bag, MakeWordBag(*MakeFeatures(Blobs(2))));
+  const double other = SharedRatio(bag, MakeWordBag(*MakeFeatures(RotatableBlobs(2))));
   cv::Mat rotated, dark;
   cv::rotate(image, rotated, cv::ROTATE_180);
   image.convertTo(dark, CV_8U, 0.5, 5);

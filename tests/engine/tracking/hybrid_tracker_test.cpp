@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "engine/geometry/sim3.h"
+#include "tests/engine/geometry/test_math.h"
 #include "tests/engine/lockstep.h"
-#include "tests/engine/mapping/panorama_scene.h"
+#include "tests/engine/mapping/panorama/panorama_scene.h"
 
 // Runs a tracker with panorama maps, and its mapper, on images of a synthetic room: immediate initialization,
 // a walk, a pure rotation far beyond the field of view of the walk, and the way back.
@@ -19,44 +19,44 @@ using testing_world::Camera;
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
 
-constexpr int kStill = 6, kWalk = 90, kTurn = 80, kHold = 10, kWalkAgain = 20;
-constexpr int kTurnBegins = kStill + kWalk, kTurnEnds = kTurnBegins + 2 * kTurn + kHold;
-constexpr int kFrames = kTurnEnds + kWalkAgain;
-constexpr double kDepth = 3;  // metres to the walls
+constexpr int kStillFrames = 6, kWalkFrames = 90, kTurnFrames = 80, kHoldFrames = 10, kWalkAgainFrames = 20;
+constexpr int kTurnBegin = kStillFrames + kWalkFrames, kTurnEnd = kTurnBegin + 2 * kTurnFrames + kHoldFrames;
+constexpr int kTourFrames = kTurnEnd + kWalkAgainFrames;
+constexpr double kWallDistance = 3;  // metres to the walls
 
 // The camera moves forwards, sideways and back to the centre, then rotates by 110 degrees to the right
 // without translation, and back.
-Rigid3 Pose(int frame) {
+Rigid3 TourPose(int frame) {
   const auto walk = [](double part) {
-    const double angle = 2 * std::numbers::pi * part;
+    const double angle = 2 * kPi * part;
     return Eigen::Vector3d(0.4 * std::sin(angle), 0.05 * std::sin(2 * angle), 0.1 * (1 - std::cos(angle)));
   };
-  if (frame < kStill) return CameraAt({0, 0, 0});
-  if (frame < kTurnBegins) {
-    const Eigen::Vector3d place = walk(static_cast<double>(frame - kStill) / kWalk);
+  if (frame < kStillFrames) return CameraAt({0, 0, 0});
+  if (frame < kTurnBegin) {
+    const Eigen::Vector3d place = walk(static_cast<double>(frame - kStillFrames) / kWalkFrames);
     return CameraAt(place, {4 * place.y(), -8 * place.x(), 0});
   }
-  if (frame < kTurnEnds) {
-    const int from_begin = frame - kTurnBegins, from_end = kTurnEnds - frame;
-    const double part = std::min({from_begin, from_end, kTurn}) / static_cast<double>(kTurn);
-    return CameraAt({0, 0, 0}, {0, 55 * (1 - std::cos(std::numbers::pi * part)), 0});
+  if (frame < kTurnEnd) {
+    const int from_begin = frame - kTurnBegin, from_end = kTurnEnd - frame;
+    const double part = std::min({from_begin, from_end, kTurnFrames}) / static_cast<double>(kTurnFrames);
+    return CameraAt({0, 0, 0}, {0, 55 * (1 - std::cos(kPi * part)), 0});
   }
-  return CameraAt(walk(static_cast<double>(frame - kTurnEnds) / kWalk), {0, 0, 0});
+  return CameraAt(walk(static_cast<double>(frame - kTurnEnd) / kWalkFrames), {0, 0, 0});
 }
 
-const std::vector<cv::Mat>& Images() {
+const std::vector<cv::Mat>& TourImages() {
   static const std::vector<cv::Mat> images = [] {
     const RenderedWorld world = testing_world::Chamber(101);
     std::vector<cv::Mat> rendered;
-    for (int i = 0; i < kFrames; ++i)
-      rendered.push_back(world.Render(*Camera(), Pose(i), 1.5, static_cast<std::uint64_t>(i) + 1));
+    for (int i = 0; i < kTourFrames; ++i)
+      rendered.push_back(world.Render(*Camera(), TourPose(i), 1.5, static_cast<std::uint64_t>(i) + 1));
     return rendered;
   }();
   return images;
 }
 
-Frame FrameOf(int index) {
-  return testing_world::MakeFrame(index, Images()[static_cast<std::size_t>(index)]);
+Frame TourFrame(int index) {
+  return testing_world::MakeFrame(index, TourImages()[static_cast<std::size_t>(index)]);
 }
 
 struct Tour {
@@ -68,7 +68,7 @@ struct Tour {
 };
 
 template <typename FrameAt>
-Tour Take(bool hybrid, int frames, const FrameAt& frame_at) {
+Tour TakeFrames(bool hybrid, int frames, const FrameAt& frame_at) {
   TrackerOptions options;
   options.hybrid = hybrid;
   Lockstep lockstep(options, Camera(), 1);
@@ -80,7 +80,7 @@ Tour Take(bool hybrid, int frames, const FrameAt& frame_at) {
 }
 
 Tour TakeTour(bool hybrid) {
-  return Take(hybrid, kFrames, FrameOf);
+  return TakeFrames(hybrid, kTourFrames, TourFrame);
 }
 
 const Tour& HybridTour() {
@@ -90,30 +90,30 @@ const Tour& HybridTour() {
 
 int FirstFrameWithDepth(const Tour& tour) {
   int first = 0;
-  while (first < kFrames && !(tour.At(first).map && tour.At(first).map->HasFinitePoints())) ++first;
+  while (first < kTourFrames && !(tour.At(first).map && tour.At(first).map->HasFinitePoints())) ++first;
   return first;
 }
 
 TEST(HybridTracker, TracksFromTheFirstImage) {
   const Tour& tour = HybridTour();
   EXPECT_EQ(tour.At(0).state, TrackingState::kInitializing);
-  for (int i = 1; i < kStill; ++i) {
+  for (int i = 1; i < kStillFrames; ++i) {
     ASSERT_EQ(tour.At(i).state, TrackingState::kPanorama) << i;
     EXPECT_EQ(tour.At(i).finite_points, 0);
     EXPECT_GT(tour.At(i).infinite_points, 50);
     // The camera has neither moved nor rotated.
     EXPECT_LT(tour.At(i).camera_from_map.OriginInSource().norm(), 1e-9) << i;
-    EXPECT_LT(tour.At(i).camera_from_map.rotation.Angle(), 0.05 * std::numbers::pi / 180) << i;
+    EXPECT_LT(tour.At(i).camera_from_map.rotation.Angle(), Radians(0.05)) << i;
   }
-  EXPECT_EQ(tour.events.front().kind, MapperEvent::Kind::kPanoramaOpened);
+  EXPECT_TRUE(std::holds_alternative<MapperEvent::PanoramaOpened>(tour.events.front().what));
 }
 
 TEST(HybridTracker, GainsDepthWithoutLosingFramesOrKeyframes) {
   const Tour& tour = HybridTour();
   const int first = FirstFrameWithDepth(tour);
-  ASSERT_LT(first, kStill + kWalk / 2);
-  ASSERT_GT(first, kStill) << "no depth without parallax";
-  for (int i = 1; i < kTurnBegins; ++i) {
+  ASSERT_LT(first, kStillFrames + kWalkFrames / 2);
+  ASSERT_GT(first, kStillFrames) << "no depth without parallax";
+  for (int i = 1; i < kTurnBegin; ++i) {
     EXPECT_TRUE(HasPose(tour.At(i).state)) << i;
     EXPECT_EQ(tour.At(i).map_key, 1u) << i;
   }
@@ -129,44 +129,44 @@ TEST(HybridTracker, GainsDepthWithoutLosingFramesOrKeyframes) {
 TEST(HybridTracker, TracksAPureRotationAndReturns) {
   const Tour& tour = HybridTour();
   const int first = FirstFrameWithDepth(tour);
-  ASSERT_LT(first, kTurnBegins);
+  ASSERT_LT(first, kTurnBegin);
   int lost = 0, by_directions = 0;
-  for (int i = kTurnBegins; i < kFrames; ++i) {
+  for (int i = kTurnBegin; i < kTourFrames; ++i) {
     lost += !HasPose(tour.At(i).state);
     by_directions +=
         tour.At(i).state == TrackingState::kPanorama || tour.At(i).state == TrackingState::kHybrid;
   }
   EXPECT_EQ(lost, 0);
-  EXPECT_GT(by_directions, kTurn);
+  EXPECT_GT(by_directions, kTurnFrames);
   // Angles need no alignment with the truth. Checked are the rotation since the end of the walk at its
   // maximum and
   // after the return.
   const auto turn_error_deg = [&](int from, int to) {
     const Rotation3 tracked =
         tour.At(to).camera_from_map.rotation * tour.At(from).camera_from_map.rotation.inverse();
-    const Rotation3 truth = Pose(to).rotation * Pose(from).rotation.inverse();
-    return (tracked * truth.inverse()).Angle() * 180 / std::numbers::pi;
+    const Rotation3 truth = TourPose(to).rotation * TourPose(from).rotation.inverse();
+    return Degrees(AngleBetween(tracked, truth));
   };
-  EXPECT_LT(turn_error_deg(kTurnBegins, kTurnBegins + kTurn + kHold / 2), 1.0);
-  EXPECT_LT(turn_error_deg(kTurnBegins, kTurnEnds), 0.5);
+  EXPECT_LT(turn_error_deg(kTurnBegin, kTurnBegin + kTurnFrames + kHoldFrames / 2), 1.0);
+  EXPECT_LT(turn_error_deg(kTurnBegin, kTurnEnd), 0.5);
 }
 
 TEST(HybridTracker, KeepsItsPositionAccuracyAfterTheRotation) {
   const Tour& tour = HybridTour();
   const int first = FirstFrameWithDepth(tour);
-  ASSERT_LT(first, kTurnBegins);
+  ASSERT_LT(first, kTurnBegin);
   std::vector<Eigen::Vector3d> in_map, in_truth;
-  for (int i = first + 1; i < kTurnBegins; ++i) {
+  for (int i = first + 1; i < kTurnBegin; ++i) {
     if (tour.At(i).finite_points == 0) continue;
     in_map.push_back(tour.At(i).camera_from_map.OriginInSource());
-    in_truth.push_back(Pose(i).OriginInSource());
+    in_truth.push_back(TourPose(i).OriginInSource());
   }
   const auto truth_from_map = AlignSim3(in_truth, in_map);
   ASSERT_TRUE(truth_from_map);
-  for (int i = kTurnEnds; i < kFrames; ++i) {
+  for (int i = kTurnEnd; i < kTourFrames; ++i) {
     EXPECT_GT(tour.At(i).finite_points, 0) << i;
     const Eigen::Vector3d center = *truth_from_map * tour.At(i).camera_from_map.OriginInSource();
-    EXPECT_LT((center - Pose(i).OriginInSource()).norm(), 0.02 * kDepth) << i;
+    EXPECT_LT((center - TourPose(i).OriginInSource()).norm(), 0.02 * kWallDistance) << i;
   }
 }
 
@@ -194,12 +194,12 @@ TEST(HybridTracker, MakesAMapWithFiniteAndInfinitePoints) {
 
 // At the maximum rotation, where the map has infinite points only, the camera starts to move forwards.
 TEST(HybridTracker, IsLostWhenTheCameraTranslatesWhereOnlyInfinitePointsAreMapped) {
-  constexpr int kWalkBegins = kTurnBegins + kTurn + kHold, kWalkAhead = 40;
+  constexpr int kWalkBegins = kTurnBegin + kTurnFrames + kHoldFrames, kWalkAhead = 40;
   const auto world = testing_world::Chamber(101);
-  const Rigid3 turned = Pose(kWalkBegins);
+  const Rigid3 turned = TourPose(kWalkBegins);
   const Eigen::Vector3d ahead = turned.rotation.inverse() * Eigen::Vector3d(0, 0, 1);
-  const Tour tour = Take(true, kWalkBegins + kWalkAhead, [&](int index) {
-    if (index < kWalkBegins) return FrameOf(index);
+  const Tour tour = TakeFrames(true, kWalkBegins + kWalkAhead, [&](int index) {
+    if (index < kWalkBegins) return TourFrame(index);
     const Eigen::Vector3d center = 0.03 * (index - kWalkBegins + 1) * ahead;
     const Rigid3 pose(turned.rotation, -(turned.rotation * center));
     return testing_world::MakeFrame(index, world, pose);
@@ -225,7 +225,7 @@ TEST(PlainTracker, MakesNoPanoramaMaps) {
   const Tour tour = TakeTour(false);
   ASSERT_NE(tour.map, nullptr);
   EXPECT_TRUE(tour.map->panoramas.empty());
-  for (int i = 0; i < kFrames; ++i) {
+  for (int i = 0; i < kTourFrames; ++i) {
     EXPECT_NE(tour.At(i).state, TrackingState::kPanorama) << i;
     EXPECT_NE(tour.At(i).state, TrackingState::kHybrid) << i;
     EXPECT_EQ(tour.At(i).infinite_points, 0) << i;

@@ -11,7 +11,7 @@ namespace {
 using testing_world::CameraAt;
 
 // Keyframes at these poses, each of which observes the same 200 points.
-MapSnapshot MapWith(const std::vector<Rigid3>& poses) {
+MapSnapshot MapOfPoses(const std::vector<Rigid3>& poses) {
   MapSnapshot map;
   for (const Rigid3& pose : poses) {
     KeyFrame keyframe;
@@ -39,13 +39,13 @@ bool Wants(const MapSnapshot& map, const Rigid3& pose, int inliers = 190, double
 }
 
 TEST(KeyFrameNovelty, WantsNoKeyframeNearAnExistingOne) {
-  const MapSnapshot map = MapWith({CameraAt({0, 0, 0}), CameraAt({1, 0, 0})});
+  const MapSnapshot map = MapOfPoses({CameraAt({0, 0, 0}), CameraAt({1, 0, 0})});
   EXPECT_FALSE(Wants(map, CameraAt({0, 0, 0})));
   EXPECT_FALSE(Wants(map, CameraAt({1.02, 0, 0.01}, {1, 0, 0})));
 }
 
 TEST(KeyFrameNovelty, MeasuresDistanceRelativeToTheDepth) {
-  const MapSnapshot map = MapWith({CameraAt({0, 0, 0})});
+  const MapSnapshot map = MapOfPoses({CameraAt({0, 0, 0})});
   const double threshold = KeyFrameNoveltyOptions().min_distance;
   for (const double depth : {0.5, 2.0, 10.0}) {
     EXPECT_FALSE(Wants(map, CameraAt({0.9 * threshold * depth, 0, 0}), 190, depth)) << depth;
@@ -54,13 +54,13 @@ TEST(KeyFrameNovelty, MeasuresDistanceRelativeToTheDepth) {
 }
 
 TEST(KeyFrameNovelty, ComparesWithTheNearestKeyframeOnly) {
-  const MapSnapshot map = MapWith({CameraAt({0, 0, 0}), CameraAt({1, 0, 0}), CameraAt({2, 0, 0})});
+  const MapSnapshot map = MapOfPoses({CameraAt({0, 0, 0}), CameraAt({1, 0, 0}), CameraAt({2, 0, 0})});
   EXPECT_TRUE(Wants(map, CameraAt({0.5, 0, 0})));
   EXPECT_FALSE(Wants(map, CameraAt({1.05, 0, 0})));
 }
 
 TEST(KeyFrameNovelty, WantsAKeyframeAfterARotation) {
-  const MapSnapshot map = MapWith({CameraAt({0, 0, 0})});
+  const MapSnapshot map = MapOfPoses({CameraAt({0, 0, 0})});
   const double turn = KeyFrameNoveltyOptions().min_rotation_deg;
   EXPECT_FALSE(Wants(map, CameraAt({0, 0, 0}, {0, 0.8 * turn, 0})));
   EXPECT_TRUE(Wants(map, CameraAt({0, 0, 0}, {0, 1.2 * turn, 0})));
@@ -70,7 +70,7 @@ TEST(KeyFrameNovelty, WantsAKeyframeAfterARotation) {
 }
 
 TEST(KeyFrameNovelty, LowersTheThresholdForFewInliersButRequiresParallax) {
-  const MapSnapshot map = MapWith({CameraAt({0, 0, 0})});
+  const MapSnapshot map = MapOfPoses({CameraAt({0, 0, 0})});
   const Rigid3 short_distance = CameraAt({0.06 * 2, 0, 0}), tiny_distance = CameraAt({0.02 * 2, 0, 0});
   EXPECT_FALSE(Wants(map, short_distance, 150));
   EXPECT_TRUE(Wants(map, short_distance, 90));
@@ -78,7 +78,7 @@ TEST(KeyFrameNovelty, LowersTheThresholdForFewInliersButRequiresParallax) {
 }
 
 TEST(KeyFrameNovelty, WantsTheFirstKeyframeOfAnEmptyMap) {
-  EXPECT_TRUE(Wants(MapWith({}), CameraAt({0, 0, 0})));
+  EXPECT_TRUE(Wants(MapOfPoses({}), CameraAt({0, 0, 0})));
 }
 
 }  // namespace

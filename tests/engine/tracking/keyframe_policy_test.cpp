@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "tests/engine/geometry/test_math.h"
 #include "tests/engine/rendered_world.h"
 
 // Tests each transition of Fig. 3 of hybrid-slam and each threshold from both sides. Poses and snapshots are
@@ -17,14 +18,13 @@ namespace {
 using testing_world::CameraAt;
 using Mode = KeyFramePolicy::Mode;
 
-constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kFieldOfView = 70 * kDegree;
+const double kFieldOfView = Radians(70);
 constexpr double kViewTurnDeg = 14;        // 0.2 of the field of view
 constexpr double kSmallViewTurnDeg = 2.1;  // 0.03 of it
-constexpr double kDepth = 2;               // metres
+constexpr double kPointDepth = 2;          // metres
 // Rays from two centres this far apart to a point in front of the middle between them have a parallax of five
 // degrees.
-const double kParallaxDistance = 2 * kDepth * std::tan(2.5 * kDegree);
+const double kParallaxDistance = 2 * kPointDepth * std::tan(Radians(2.5));
 
 Rigid3 RotatedBy(double degrees, const Eigen::Vector3d& center = Eigen::Vector3d::Zero()) {
   return CameraAt(center, {0, degrees, 0});
@@ -60,23 +60,23 @@ MapSnapshot OpenedMap() {
 }
 
 // A frame that the map covers completely, so that no keyframe is wanted.
-PolicyFrame Frame(double seconds, const Rigid3& pose) {
+PolicyFrame CoveredFrame(double seconds, const Rigid3& pose) {
   PolicyFrame frame;
   frame.time = FromSeconds(seconds);
   frame.camera_from_map = pose;
   frame.points = 200;
-  frame.median_depth = kDepth;
+  frame.median_depth = kPointDepth;
   return frame;
 }
 // A frame of which the map covers only half.
 PolicyFrame HalfCovered(double seconds, const Rigid3& pose) {
-  PolicyFrame frame = Frame(seconds, pose);
+  PolicyFrame frame = CoveredFrame(seconds, pose);
   frame.finite_coverage = frame.coverage = 0.5;
   return frame;
 }
 // A frame that is tracked by infinite points only.
 PolicyFrame RotationOnly(double seconds, const Rigid3& pose, double coverage = 0.5) {
-  PolicyFrame frame = Frame(seconds, pose);
+  PolicyFrame frame = CoveredFrame(seconds, pose);
   frame.observed = ObservedMotion::kPanorama;
   frame.finite_coverage = 0;
   frame.coverage = coverage;
@@ -89,12 +89,12 @@ class KeyFramePolicyTest : public ::testing::Test {
   static KeyFrameChoice ChoiceAfterRotation(const PolicyFrame& frame, const MapSnapshot& map,
                                             const Rigid3& before = RotatedBy(0)) {
     KeyFramePolicy policy({}, kFieldOfView);
-    EXPECT_EQ(policy.Select(Frame(1, before), map), KeyFrameChoice::kNone);
+    EXPECT_EQ(policy.Select(CoveredFrame(1, before), map), KeyFrameChoice::kNone);
     return policy.Select(frame, map);
   }
   // Opens the panorama map of OpenedMap().
   void Open() {
-    policy_.Offered(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1));
+    policy_.Accepted(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1));
     ASSERT_EQ(policy_.mode(), Mode::kPanorama);
     ASSERT_EQ(policy_.OpenPanorama(OpenedMap()), 3u);
   }
@@ -108,11 +108,11 @@ TEST_F(KeyFramePolicyTest, StartsInSixDofMode) {
 }
 
 TEST_F(KeyFramePolicyTest, PassesOnTheRequestForAnOrdinaryKeyframe) {
-  PolicyFrame frame = Frame(1, RotatedBy(0, {0.4, 0, 0}));
+  PolicyFrame frame = CoveredFrame(1, RotatedBy(0, {0.4, 0, 0}));
   EXPECT_EQ(policy_.Select(frame, PlainMap()), KeyFrameChoice::kNone);
   frame.needs_six_dof = true;
   EXPECT_EQ(policy_.Select(frame, PlainMap()), KeyFrameChoice::kSixDof);
-  policy_.Offered(KeyFrameChoice::kSixDof, frame.time);
+  policy_.Accepted(KeyFrameChoice::kSixDof, frame.time);
   EXPECT_EQ(policy_.mode(), Mode::kSixDof);
 }
 
@@ -152,7 +152,7 @@ TEST_F(KeyFramePolicyTest, DoesNotTakeTranslationForPureRotation) {
               KeyFrameChoice::kLocalizedPanorama);
     EXPECT_EQ(ChoiceAfterRotation(frame, map, from(1.01 * kParallaxDistance)), KeyFrameChoice::kNone);
     // At twice the depth, the same translation counts as a pure rotation.
-    frame.median_depth = 2 * kDepth;
+    frame.median_depth = 2 * kPointDepth;
     EXPECT_EQ(ChoiceAfterRotation(frame, map, from(1.01 * kParallaxDistance)),
               KeyFrameChoice::kLocalizedPanorama);
   }
@@ -164,8 +164,8 @@ TEST_F(KeyFramePolicyTest, IgnoresRotationsOlderThanTheHistory) {
   // The pose at 1 s leaves the history when the pose at 11.1 s enters it, so that the next frame no longer
   // sees the
   // rotation.
-  EXPECT_EQ(policy_.Select(Frame(1, RotatedBy(0)), map), KeyFrameChoice::kNone);
-  EXPECT_EQ(policy_.Select(Frame(11.1, RotatedBy(20)), map), KeyFrameChoice::kNone);
+  EXPECT_EQ(policy_.Select(CoveredFrame(1, RotatedBy(0)), map), KeyFrameChoice::kNone);
+  EXPECT_EQ(policy_.Select(CoveredFrame(11.1, RotatedBy(20)), map), KeyFrameChoice::kNone);
   EXPECT_EQ(policy_.Select(HalfCovered(11.2, RotatedBy(20)), map), KeyFrameChoice::kNone);
 }
 
@@ -209,7 +209,7 @@ TEST_F(KeyFramePolicyTest, OffersNothingWhileAClosedPanoramaTracksTheCamera) {
 TEST_F(KeyFramePolicyTest, IsInPanoramaModeAfterOfferingOne) {
   for (const KeyFrameChoice choice : {KeyFrameChoice::kLocalizedPanorama, KeyFrameChoice::kFirst}) {
     KeyFramePolicy policy({}, kFieldOfView);
-    policy.Offered(choice, FromSeconds(1));
+    policy.Accepted(choice, FromSeconds(1));
     EXPECT_EQ(policy.mode(), Mode::kPanorama);
     // The mapper has not made the panorama map yet.
     EXPECT_EQ(policy.OpenPanorama(PlainMap()), kNoId);
@@ -217,7 +217,7 @@ TEST_F(KeyFramePolicyTest, IsInPanoramaModeAfterOfferingOne) {
     EXPECT_EQ(policy.OpenPanorama(OpenedMap()), 3u);
     EXPECT_EQ(policy.Select(RotationOnly(2, RotatedBy(60)), OpenedMap()), KeyFrameChoice::kPanorama);
     // Another keyframe of the panorama map does not change the mode.
-    policy.Offered(KeyFrameChoice::kPanorama, FromSeconds(2));
+    policy.Accepted(KeyFrameChoice::kPanorama, FromSeconds(2));
     EXPECT_EQ(policy.mode(), Mode::kPanorama);
     EXPECT_EQ(policy.OpenPanorama(OpenedMap()), 3u);
   }
@@ -275,7 +275,7 @@ TEST_F(KeyFramePolicyTest, ReturnsToSixDofModeWhereFinitePointsCoverTheImage) {
   EXPECT_EQ(policy_.mode(), Mode::kPanorama);
   for (const ObservedMotion observed : {ObservedMotion::kSixDof, ObservedMotion::kHybrid}) {
     KeyFramePolicy policy({}, kFieldOfView);
-    policy.Offered(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1));
+    policy.Accepted(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1));
     frame.observed = observed;
     frame.finite_coverage = 0.75;
     frame.needs_six_dof = true;
@@ -312,12 +312,12 @@ TEST_F(KeyFramePolicyTest, OpensExtendsAndReusesOnePanoramaOverARotationAndBack)
       } else {
         map.keyframes.push_back(Dependent(id, seconds, frame.camera_from_map, policy_.OpenPanorama(map)));
       }
-      policy_.Offered(choice, frame.time);
+      policy_.Accepted(choice, frame.time);
       taken.push_back(choice);
     }
     seconds += 0.1;
   };
-  for (double turn = 0; turn <= 10; turn += 2) process(Frame(0, RotatedBy(turn)));
+  for (double turn = 0; turn <= 10; turn += 2) process(CoveredFrame(0, RotatedBy(turn)));
   EXPECT_TRUE(taken.empty());
   for (double turn = 12; turn <= 30; turn += 2) process(HalfCovered(0, RotatedBy(turn)));
   ASSERT_EQ(taken, std::vector{KeyFrameChoice::kLocalizedPanorama});
@@ -327,7 +327,7 @@ TEST_F(KeyFramePolicyTest, OpensExtendsAndReusesOnePanoramaOverARotationAndBack)
       << "the reference at 16 degrees, and one every 16 degrees up to 90: 32, 48, 64 and 80";
   for (double turn = 88; turn >= 20; turn -= 2) process(RotationOnly(0, RotatedBy(turn), 0.9));
   EXPECT_EQ(taken.size(), 5u);
-  process(Frame(0, RotatedBy(10)));
+  process(CoveredFrame(0, RotatedBy(10)));
   EXPECT_EQ(policy_.mode(), Mode::kSixDof);
   // A second rotation in the same direction finds the closed panorama map and opens no other.
   for (double turn = 12; turn <= 30; turn += 2) {
@@ -349,7 +349,7 @@ TEST_F(KeyFramePolicyTest, FindsTheOpenPanoramaInANewSnapshot) {
 
 TEST_F(KeyFramePolicyTest, EnablesAClosedPanoramaOnlyNearItsCentreAndViewingDirection) {
   const MapSnapshot map = OpenedMap();
-  const auto near = [&](const Rigid3& pose) { return policy_.PanoramaNear(pose, kDepth, map); };
+  const auto near = [&](const Rigid3& pose) { return policy_.PanoramaNear(pose, kPointDepth, map); };
   // The limit is half of the field of view from the viewing direction of its only keyframe, which is at 20
   // degrees.
   EXPECT_EQ(near(RotatedBy(20 + 34.9)), 3u);
@@ -358,7 +358,7 @@ TEST_F(KeyFramePolicyTest, EnablesAClosedPanoramaOnlyNearItsCentreAndViewingDire
   // The limit is half of the distance at which the camera would leave it.
   EXPECT_EQ(near(RotatedBy(20, {0, 0, -0.49 * kParallaxDistance})), 3u);
   EXPECT_EQ(near(RotatedBy(20, {0, 0, -0.51 * kParallaxDistance})), kNoId);
-  EXPECT_EQ(policy_.PanoramaNear(RotatedBy(20), kDepth, PlainMap()), kNoId);
+  EXPECT_EQ(policy_.PanoramaNear(RotatedBy(20), kPointDepth, PlainMap()), kNoId);
 }
 
 TEST_F(KeyFramePolicyTest, EnablesThePanoramaWithTheNearestViewingDirection) {
@@ -366,7 +366,9 @@ TEST_F(KeyFramePolicyTest, EnablesThePanoramaWithTheNearestViewingDirection) {
   map.keyframes.push_back(Dependent(2, 2, RotatedBy(50), 3));
   map.keyframes.push_back(SixDof(3, 3, RotatedBy(30), 5));
   map.panoramas.push_back({5, 3});
-  const auto near = [&](double degrees) { return policy_.PanoramaNear(RotatedBy(degrees), kDepth, map); };
+  const auto near = [&](double degrees) {
+    return policy_.PanoramaNear(RotatedBy(degrees), kPointDepth, map);
+  };
   EXPECT_EQ(near(20), 3u);
   EXPECT_EQ(near(31), 5u);
   EXPECT_EQ(near(45), 3u);
@@ -390,7 +392,7 @@ TEST_F(KeyFramePolicyTest, ResetClearsModeAndHistory) {
   EXPECT_EQ(policy_.mode(), Mode::kSixDof);
   EXPECT_EQ(policy_.OpenPanorama(OpenedMap()), kNoId);
   // The pose history is cleared too, because earlier poses belong to another map.
-  EXPECT_EQ(policy_.Select(Frame(1, RotatedBy(0)), PlainMap()), KeyFrameChoice::kNone);
+  EXPECT_EQ(policy_.Select(CoveredFrame(1, RotatedBy(0)), PlainMap()), KeyFrameChoice::kNone);
   policy_.Reset();
   EXPECT_EQ(policy_.Select(HalfCovered(2, RotatedBy(20)), PlainMap()), KeyFrameChoice::kNone);
 }
@@ -403,12 +405,12 @@ TEST_F(KeyFramePolicyTest, UsesTheGivenThresholds) {
   const MapSnapshot map = PlainMap();
   const auto choose = [&](double turn, double finite_coverage, double distance) {
     KeyFramePolicy policy(options, kFieldOfView);
-    policy.Select(Frame(1, RotatedBy(0, {distance, 0, 0})), map);
+    policy.Select(CoveredFrame(1, RotatedBy(0, {distance, 0, 0})), map);
     PolicyFrame frame = HalfCovered(2, RotatedBy(turn));
     frame.finite_coverage = finite_coverage;
     return policy.Select(frame, map);
   };
-  const double ten = 2 * kDepth * std::tan(5 * kDegree);
+  const double ten = 2 * kPointDepth * std::tan(Radians(5));
   EXPECT_EQ(choose(35.1, 0.29, 0.99 * ten), KeyFrameChoice::kLocalizedPanorama);
   EXPECT_EQ(choose(34.9, 0.29, 0.99 * ten), KeyFrameChoice::kNone);
   EXPECT_EQ(choose(35.1, 0.3, 0.99 * ten), KeyFrameChoice::kNone);
@@ -417,12 +419,12 @@ TEST_F(KeyFramePolicyTest, UsesTheGivenThresholds) {
 
 // If the mapper's queue was full or the map must not be extended here, the offered reference never appears.
 TEST(KeyFramePolicy, ReturnsToSixDofModeWhenItsReferenceWasDropped) {
-  KeyFramePolicy policy({}, 70 * std::numbers::pi / 180);
+  KeyFramePolicy policy({}, kFieldOfView);
   MapSnapshot map;
   KeyFrame first;
   first.id = 0;
   map.keyframes = {first};
-  policy.Offered(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1));
+  policy.Accepted(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1));
   KeyFrameChoice last = KeyFrameChoice::kNone;
   for (int i = 0; i < 300; ++i) {
     PolicyFrame frame;

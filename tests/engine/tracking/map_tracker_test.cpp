@@ -5,12 +5,12 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <numbers>
 #include <opencv2/core.hpp>
 #include <set>
 
 #include "engine/tracking/tracker.h"
 #include "engine/vision/features.h"
+#include "tests/engine/geometry/test_math.h"
 #include "tests/engine/rendered_world.h"
 
 namespace docent::engine {
@@ -19,10 +19,6 @@ namespace {
 using testing_world::CameraAt;
 using testing_world::RenderedWorld;
 using Effort = MapTracker::Effort;
-
-double Degrees(double radians) {
-  return radians * 180 / std::numbers::pi;
-}
 
 class TrackingInAMap : public ::testing::Test {
  protected:
@@ -47,7 +43,7 @@ class TrackingInAMap : public ::testing::Test {
   static void ExpectAt(const MapTrackResult& result, const Rigid3& truth) {
     EXPECT_TRUE(result.converged);
     EXPECT_LT((result.camera_from_map.OriginInSource() - truth.OriginInSource()).norm(), 0.006);
-    EXPECT_LT(Degrees((result.camera_from_map.rotation * truth.rotation.inverse()).Angle()), 0.15);
+    EXPECT_LT(RotationErrorDeg(result.camera_from_map, truth), 0.15);
   }
   // The minimum requirements of the tracker for a pose.
   static bool IsAcceptable(const MapTrackResult& result) {
@@ -64,7 +60,7 @@ RenderedWorld* TrackingInAMap::world_ = nullptr;
 std::shared_ptr<const CameraModel> TrackingInAMap::camera_;
 std::shared_ptr<const MapSnapshot> TrackingInAMap::map_;
 
-const std::vector<Rigid3>& Views() {
+const std::vector<Rigid3>& ViewsOfTheRoom() {
   static const std::vector<Rigid3> views = {CameraAt({0.1, 0.05, 0.1}, {1, -2, 3}),
                                             CameraAt({-0.2, 0, -0.2}, {-3, 4, -6}),
                                             CameraAt({0.25, -0.1, 0.3}, {2, 0, 0})};
@@ -74,7 +70,7 @@ const std::vector<Rigid3>& Views() {
 TEST_F(TrackingInAMap, FindsThePoseFromAPerturbedPrediction) {
   MapTracker tracker({}, camera_);
   Random random(1);
-  for (const Rigid3& view : Views()) {
+  for (const Rigid3& view : ViewsOfTheRoom()) {
     const auto features = Show(*world_, view);
     for (int trial = 0; trial < 4; ++trial) {
       const Rigid3 predicted =
@@ -94,8 +90,9 @@ TEST_F(TrackingInAMap, FindsThePoseFromAPerturbedPrediction) {
 TEST_F(TrackingInAMap, ReportsAttemptsMatchesAndCovariance) {
   MapTracker tracker({}, camera_);
   Random random(2);
-  const auto features = Show(*world_, Views()[0]);
-  const MapTrackResult result = tracker.Track(*map_, *features, Views()[0], Effort::kStandard, &random);
+  const auto features = Show(*world_, ViewsOfTheRoom()[0]);
+  const MapTrackResult result =
+      tracker.Track(*map_, *features, ViewsOfTheRoom()[0], Effort::kStandard, &random);
   EXPECT_EQ(static_cast<int>(tracker.attempts().size()), result.attempted);
   EXPECT_EQ(static_cast<int>(tracker.matches().size()), result.found);
   const auto is_inlier = [](const auto& item) { return item.inlier; };
@@ -105,12 +102,12 @@ TEST_F(TrackingInAMap, ReportsAttemptsMatchesAndCovariance) {
     const MapPoint* point = map_->FindPoint(match.point);
     ASSERT_NE(point, nullptr);
     if (!match.inlier) continue;
-    const auto truth = camera_->Project(Views()[0] * point->position());
+    const auto truth = camera_->Project(ViewsOfTheRoom()[0] * point->position());
     EXPECT_LT((match.pixel.cast<double>() - *truth).norm(), 3.0 * (1 << match.level));
   }
   std::vector<double> depths;
   for (const PointMatch& match : tracker.matches())
-    if (match.inlier) depths.push_back((Views()[0] * map_->FindPoint(match.point)->position()).z());
+    if (match.inlier) depths.push_back((ViewsOfTheRoom()[0] * map_->FindPoint(match.point)->position()).z());
   std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2),
                    depths.end());
   EXPECT_NEAR(result.median_depth, depths[depths.size() / 2], 0.02);
@@ -123,7 +120,7 @@ TEST_F(TrackingInAMap, ReportsAttemptsMatchesAndCovariance) {
 TEST_F(TrackingInAMap, SearchesOccludedPointsLessOften) {
   MapTracker tracker({}, camera_);
   Random random(9);
-  const Rigid3 view = Views()[0];
+  const Rigid3 view = ViewsOfTheRoom()[0];
   cv::Mat image = world_->Render(*camera_, view, 1.5, 3);
   const auto unoccluded = MakeFeatures(image.clone());
   image(cv::Rect(0, 0, image.cols / 2, image.rows)).setTo(90);
@@ -151,7 +148,7 @@ TEST_F(TrackingInAMap, SearchesOccludedPointsLessOften) {
 // Only a quarter of the points in view may be searched per frame.
 TEST_F(TrackingInAMap, ChangesItsPointSelectionGradually) {
   Random random(4);
-  const Rigid3 view = Views()[0];
+  const Rigid3 view = ViewsOfTheRoom()[0];
   const auto features = Show(*world_, view);
   MapTracker all({}, camera_);
   const int in_view = all.Track(*map_, *features, view, Effort::kStandard, &random).attempted;
@@ -189,7 +186,7 @@ TEST_F(TrackingInAMap, RecoversFromABadPrediction) {
   const std::vector<Rigid3> offsets = {CameraAt({0.15, 0, 0}, {0, 6, 0}),
                                        CameraAt({-0.1, 0.1, 0.1}, {-5, 0, 5}),
                                        CameraAt({0, 0, 0.2}, {3, -5, 0})};
-  for (const Rigid3& view : Views()) {
+  for (const Rigid3& view : ViewsOfTheRoom()) {
     const auto features = Show(*world_, view);
     for (const Rigid3& offset : offsets) {
       MapTracker tracker({}, camera_);
@@ -204,7 +201,7 @@ TEST_F(TrackingInAMap, RecoversFromABadPrediction) {
 TEST_F(TrackingInAMap, RejectsImagesOfAnotherWorld) {
   const RenderedWorld other = RenderedWorld::Room(4711);
   Random random(4);
-  for (const Rigid3& view : Views()) {
+  for (const Rigid3& view : ViewsOfTheRoom()) {
     const auto features = Show(other, view);
     for (const Effort effort : {Effort::kStandard, Effort::kWide, Effort::kRecovery}) {
       MapTracker tracker({}, camera_);
@@ -218,18 +215,18 @@ TEST_F(TrackingInAMap, RejectsImagesOfAnotherWorld) {
 TEST_F(TrackingInAMap, DoesNotConvergeOnABlankImageOrInAnEmptyMap) {
   Random random(5);
   const auto blank = MakeFeatures(cv::Mat(300, 400, CV_8UC1, cv::Scalar(90)));
-  const auto features = Show(*world_, Views()[0]);
+  const auto features = Show(*world_, ViewsOfTheRoom()[0]);
   for (const Effort effort : {Effort::kStandard, Effort::kWide, Effort::kRecovery}) {
     MapTracker tracker({}, camera_);
-    EXPECT_FALSE(tracker.Track(*map_, *blank, Views()[0], effort, &random).converged);
-    EXPECT_FALSE(tracker.Track(MapSnapshot(), *features, Views()[0], effort, &random).converged);
+    EXPECT_FALSE(tracker.Track(*map_, *blank, ViewsOfTheRoom()[0], effort, &random).converged);
+    EXPECT_FALSE(tracker.Track(MapSnapshot(), *features, ViewsOfTheRoom()[0], effort, &random).converged);
   }
 }
 
 TEST_F(TrackingInAMap, SearchesNoPointsFromBehindTheWalls) {
   MapTracker tracker({}, camera_);
   Random random(6);
-  const auto features = Show(*world_, Views()[0]);
+  const auto features = Show(*world_, ViewsOfTheRoom()[0]);
   const MapTrackResult result =
       tracker.Track(*map_, *features, CameraAt({0, 0, 6}, {0, 180, 0}), Effort::kStandard, &random);
   EXPECT_EQ(result.attempted, 0);
@@ -241,7 +238,7 @@ TEST_F(TrackingInAMap, IsDeterministicForAGivenSeed) {
   for (MapTrackResult& result : results) {
     MapTracker tracker({}, camera_);
     Random random(7);
-    for (const Rigid3& view : Views())
+    for (const Rigid3& view : ViewsOfTheRoom())
       result = tracker.Track(*map_, *Show(*world_, view), view, Effort::kStandard, &random);
   }
   EXPECT_EQ(results[0].camera_from_map.translation, results[1].camera_from_map.translation);

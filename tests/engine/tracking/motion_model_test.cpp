@@ -3,12 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/engine/geometry/test_math.h"
 #include "tests/engine/rendered_world.h"
 
 namespace docent::engine {
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
 using testing_world::CameraAt;
 
 // The pose of a camera with a constant twist of 0.3 m/s and 30 degrees per second.

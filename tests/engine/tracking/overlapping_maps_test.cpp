@@ -19,7 +19,7 @@ using testing_world::World;
 
 // A map with three keyframes, 10 cm apart, starting at x. Only one of every `period` points keeps its true
 // position.
-std::shared_ptr<const MapSnapshot> MapFrom(double x, std::size_t period) {
+std::shared_ptr<const MapSnapshot> MapStartingAt(double x, std::size_t period) {
   return testing_world::MapWithDisplacedPoints(
       World(), Camera(), {CameraAt({x, 0, 0}), CameraAt({x + 0.1, 0, 0}), CameraAt({x + 0.2, 0, 0})},
       [=](std::size_t i) { return i % period != 0; });
@@ -27,7 +27,7 @@ std::shared_ptr<const MapSnapshot> MapFrom(double x, std::size_t period) {
 
 // Walks from the place of map 1 to the place of map 2, and returns the key of the map that each frame was
 // tracked in.
-std::vector<std::uint64_t> Walk(const SomeMaps& maps, bool build_maps) {
+std::vector<std::uint64_t> WalkFromMap1ToMap2(const SomeMaps& maps, bool build_maps) {
   TrackerOptions options;
   options.build_maps = build_maps;
   Tracker tracker(options, Camera(), 3);
@@ -50,9 +50,9 @@ std::vector<std::uint64_t> Walk(const SomeMaps& maps, bool build_maps) {
 
 TEST(OverlappingMaps, AreLeftForAMapWithHigherQuality) {
   SomeMaps maps;
-  maps.Add(1, MapFrom(0, 2));
-  maps.Add(2, MapFrom(0.4, 1));
-  const auto keys = Walk(maps, false);
+  maps.Add(1, MapStartingAt(0, 2));
+  maps.Add(2, MapStartingAt(0.4, 1));
+  const auto keys = WalkFromMap1ToMap2(maps, false);
   EXPECT_EQ(keys[4], 1u);
   EXPECT_EQ(keys.back(), 2u);
   EXPECT_TRUE(std::is_sorted(keys.begin() + 4, keys.end())) << "the tracker must switch only once";
@@ -60,16 +60,16 @@ TEST(OverlappingMaps, AreLeftForAMapWithHigherQuality) {
 
 TEST(OverlappingMaps, AreKeptWhileTrackingIsGood) {
   SomeMaps maps;
-  maps.Add(1, MapFrom(0, 1));
-  maps.Add(2, MapFrom(0.4, 1));
-  EXPECT_EQ(Walk(maps, false).back(), 1u);
+  maps.Add(1, MapStartingAt(0, 1));
+  maps.Add(2, MapStartingAt(0.4, 1));
+  EXPECT_EQ(WalkFromMap1ToMap2(maps, false).back(), 1u);
 }
 
 TEST(OverlappingMaps, AreKeptWhileTheyAreExtended) {
   SomeMaps maps;
-  maps.Add(1, MapFrom(0, 2));
-  maps.Add(2, MapFrom(0.4, 1));
-  EXPECT_EQ(Walk(maps, true).back(), 1u);
+  maps.Add(1, MapStartingAt(0, 2));
+  maps.Add(2, MapStartingAt(0.4, 1));
+  EXPECT_EQ(WalkFromMap1ToMap2(maps, true).back(), 1u);
 }
 
 }  // namespace

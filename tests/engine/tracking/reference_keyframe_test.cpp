@@ -19,12 +19,12 @@ using testing_world::Camera;
 using testing_world::CameraAt;
 using testing_world::World;
 
-Rigid3 Pose(int frame) {
+Rigid3 SidewaysPose(int frame) {
   return CameraAt({0.01 * frame, 0.02 * std::sin(0.1 * frame), 0}, {0, -0.1 * frame, 0});
 }
 
-Frame FrameAt(int index) {
-  return testing_world::MakeFrame(index, World(), Pose(index));
+Frame SidewaysFrame(int index) {
+  return testing_world::MakeFrame(index, World(), SidewaysPose(index));
 }
 
 // A tracker that has tracked the first frames in an exact map.
@@ -32,7 +32,8 @@ class MovedMap : public ::testing::Test {
  protected:
   static constexpr int kBefore = 12;
   static void SetUpTestSuite() {
-    map_ = new Map(testing_world::TrueMap(World(), Camera(), {Pose(-20), Pose(0), Pose(20), Pose(40)}, 250));
+    map_ = new Map(testing_world::TrueMap(
+        World(), Camera(), {SidewaysPose(-20), SidewaysPose(0), SidewaysPose(20), SidewaysPose(40)}, 250));
   }
   static void TearDownTestSuite() {
     delete map_;
@@ -42,7 +43,7 @@ class MovedMap : public ::testing::Test {
     tracker_.SetMap(before_, 1);
     testing_world::SomeMaps places;
     places.Add(1, before_);
-    for (int i = 0; i < kBefore; ++i) last_ = tracker_.Track(FrameAt(i), &places);
+    for (int i = 0; i < kBefore; ++i) last_ = tracker_.Track(SidewaysFrame(i), &places);
     ASSERT_TRUE(HasPose(last_.state)) << "the test needs a tracked camera";
   }
   // The correction: a scale of 1.5, a rotation and a translation.
@@ -75,10 +76,10 @@ Map* MovedMap::map_ = nullptr;
 
 TEST_F(MovedMap, TrackingContinuesAfterACorrection) {
   tracker_.SetMap(After(), 1);
-  const TrackedFrame next = tracker_.Track(FrameAt(kBefore), nullptr);
+  const TrackedFrame next = tracker_.Track(SidewaysFrame(kBefore), nullptr);
   ASSERT_EQ(next.state, TrackingState::kSixDof) << next.hint;
   // The map unit is two thirds of a metre now, so that the tolerance is 3 mm.
-  EXPECT_TRUE(IsNear(next.camera_from_map, CorrectedPose(Pose(kBefore), Correction()), 0.0045, 0.003))
+  EXPECT_TRUE(IsNear(next.camera_from_map, CorrectedPose(SidewaysPose(kBefore), Correction()), 0.0045, 0.003))
       << next.camera_from_map;
 }
 
@@ -86,13 +87,13 @@ TEST_F(MovedMap, TrackingIsLostWithoutTheCorrectionRecord) {
   MapSnapshot without_corrections = *After();
   without_corrections.corrections.clear();
   tracker_.SetMap(std::make_shared<MapSnapshot>(without_corrections), 1);
-  EXPECT_FALSE(HasPose(tracker_.Track(FrameAt(kBefore), nullptr).state));
+  EXPECT_FALSE(HasPose(tracker_.Track(SidewaysFrame(kBefore), nullptr).state));
 }
 
 TEST_F(MovedMap, TheSameCorrectionIsAppliedOnlyOnce) {
   tracker_.SetMap(After(), 1);
   tracker_.SetMap(After(), 1);
-  EXPECT_EQ(tracker_.Track(FrameAt(kBefore), nullptr).state, TrackingState::kSixDof);
+  EXPECT_EQ(tracker_.Track(SidewaysFrame(kBefore), nullptr).state, TrackingState::kSixDof);
 }
 
 TEST_F(MovedMap, ReferenceKeyFrameIsTheSourceOfMostInliers) {

@@ -20,7 +20,7 @@ using testing_world::SomeMaps;
 using testing_world::World;
 
 // A map with three keyframes, in which `wrong` of every ten points are displaced.
-std::shared_ptr<const MapSnapshot> MapWith(std::size_t wrong) {
+std::shared_ptr<const MapSnapshot> MapWithWrongPoints(std::size_t wrong) {
   return testing_world::MapWithDisplacedPoints(
       World(), Camera(), {CameraAt({0, 0, 0}), CameraAt({0.1, 0, 0}), CameraAt({0.2, 0, 0})},
       [=](std::size_t i) { return i % 10 < wrong; });
@@ -28,7 +28,7 @@ std::shared_ptr<const MapSnapshot> MapWith(std::size_t wrong) {
 
 // The map without errors, reduced to the points in one corner of its first keyframe's image.
 std::shared_ptr<const MapSnapshot> MapOfACorner() {
-  auto map = std::make_shared<MapSnapshot>(*MapWith(0));
+  auto map = std::make_shared<MapSnapshot>(*MapWithWrongPoints(0));
   const KeyFrame first = map->keyframes.front();
   std::erase_if(map->points, [&](const MapPoint& point) {
     const auto pixel = Camera()->Project(first.camera_from_map * point.position());
@@ -67,7 +67,7 @@ std::shared_ptr<const MapSnapshot> TwoPlaces(const MapSnapshot& first, const Map
   return both;
 }
 
-Frame FrameOf(int index, const RenderedWorld& world = World()) {
+Frame VisitorFrame(int index, const RenderedWorld& world = World()) {
   return testing_world::MakeFrame(index, world, CameraAt({0.06 + 0.002 * index, 0.02, 0.03}));
 }
 
@@ -77,13 +77,13 @@ std::vector<TrackedFrame> Visit(const SomeMaps& maps, int frames, const Rendered
   options.build_maps = false;
   Tracker tracker(options, Camera(), 3);
   std::vector<TrackedFrame> seen;
-  for (int i = 0; i < frames; ++i) seen.push_back(tracker.Track(FrameOf(i, world), &maps));
+  for (int i = 0; i < frames; ++i) seen.push_back(tracker.Track(VisitorFrame(i, world), &maps));
   return seen;
 }
 
 TEST(RelocalizationResult, IsUnconfirmedUntilSeveralFramesAgree) {
   SomeMaps maps;
-  maps.Add(1, MapWith(0));
+  maps.Add(1, MapWithWrongPoints(0));
   const auto frames = Visit(maps, 4);
   const auto wanted = static_cast<std::size_t>(TrackerOptions().confirming_frames);
   for (std::size_t i = 0; i + 1 < wanted; ++i) {
@@ -98,7 +98,7 @@ TEST(RelocalizationResult, IsUnconfirmedUntilSeveralFramesAgree) {
 
 TEST(RelocalizationResult, ReportsTooFewPointsInAnotherPlace) {
   SomeMaps maps;
-  maps.Add(1, MapWith(0));
+  maps.Add(1, MapWithWrongPoints(0));
   for (const TrackedFrame& frame : Visit(maps, 6, RenderedWorld::Room(7177))) {
     EXPECT_EQ(frame.state, TrackingState::kLost);
     EXPECT_EQ(frame.relocalization.rejection, RejectionReason::kFewPoints);
@@ -119,8 +119,8 @@ TEST(RelocalizationResult, ReportsPointsInOneCornerOnly) {
 
 TEST(RelocalizationResult, ReportsTwoMapsThatLookAlike) {
   SomeMaps maps;
-  maps.Add(1, MapWith(0));
-  maps.Add(2, MapWith(0));
+  maps.Add(1, MapWithWrongPoints(0));
+  maps.Add(2, MapWithWrongPoints(0));
   for (const TrackedFrame& frame : Visit(maps, 30)) {
     EXPECT_EQ(frame.state, TrackingState::kLost) << frame.frame.index;
     EXPECT_EQ(frame.relocalization.rejection, RejectionReason::kAmbiguous);
@@ -131,8 +131,8 @@ TEST(RelocalizationResult, ReportsTwoMapsThatLookAlike) {
 TEST(RelocalizationResult, AcceptsAClearlyBetterMapInAnyOrder) {
   for (const std::uint64_t right : {1u, 2u}) {
     SomeMaps maps;
-    maps.Add(right, MapWith(0));
-    maps.Add(3 - right, MapWith(5));
+    maps.Add(right, MapWithWrongPoints(0));
+    maps.Add(3 - right, MapWithWrongPoints(5));
     const auto frames = Visit(maps, 5);
     EXPECT_TRUE(HasPose(frames.back().state));
     EXPECT_EQ(frames.back().map_key, right);
@@ -141,8 +141,8 @@ TEST(RelocalizationResult, AcceptsAClearlyBetterMapInAnyOrder) {
 
 TEST(RelocalizationResult, AcceptsAMapThatIsBetterInManyFrames) {
   SomeMaps maps;
-  maps.Add(1, MapWith(1));
-  maps.Add(2, MapWith(0));
+  maps.Add(1, MapWithWrongPoints(1));
+  maps.Add(2, MapWithWrongPoints(0));
   const auto frames = Visit(maps, 30);
   const auto waited = static_cast<std::size_t>(TrackerOptions().min_leading_frames - 1);
   for (std::size_t i = 0; i < waited; ++i)
@@ -154,14 +154,14 @@ TEST(RelocalizationResult, AcceptsAMapThatIsBetterInManyFrames) {
 TEST(RelocalizationResult, PrefersThePreviousMapUnlessAnotherIsClearlyBetter) {
   for (const std::size_t wrong : {1u, 5u}) {
     SomeMaps maps;
-    maps.Add(1, MapWith(wrong));
-    maps.Add(2, MapWith(0));
+    maps.Add(1, MapWithWrongPoints(wrong));
+    maps.Add(2, MapWithWrongPoints(0));
     TrackerOptions options;
     options.build_maps = false;
     Tracker tracker(options, Camera(), 3);
     tracker.SetMap(maps.At(1), 1);
     TrackedFrame last;
-    for (int i = 0; i < 4; ++i) last = tracker.Track(FrameOf(i), &maps);
+    for (int i = 0; i < 4; ++i) last = tracker.Track(VisitorFrame(i), &maps);
     EXPECT_TRUE(HasPose(last.state));
     EXPECT_EQ(last.map_key, wrong == 1 ? 1u : 2u);
   }
@@ -169,7 +169,7 @@ TEST(RelocalizationResult, PrefersThePreviousMapUnlessAnotherIsClearlyBetter) {
 
 TEST(RelocalizationResult, DelaysMapExtensionAfterRelocalization) {
   SomeMaps maps;
-  maps.Add(1, MapWith(0));
+  maps.Add(1, MapWithWrongPoints(0));
   const RenderedWorld nothing{std::vector<testing_world::Wall>()};
   TrackerOptions options;
   options.keyframes.min_distance = 0.05;
@@ -178,10 +178,10 @@ TEST(RelocalizationResult, DelaysMapExtensionAfterRelocalization) {
   // The camera is lost for longer than the minimum keyframe interval, and then relocalizes far enough from
   // all
   // keyframes for a new one.
-  for (int i = 0; i < 8; ++i) EXPECT_FALSE(HasPose(tracker.Track(FrameOf(i, nothing), &maps).state));
+  for (int i = 0; i < 8; ++i) EXPECT_FALSE(HasPose(tracker.Track(VisitorFrame(i, nothing), &maps).state));
   int first_pose = -1, first_keyframe = -1, first_reports = -1;
   for (int i = 100; i < 130; ++i) {
-    Frame frame = FrameOf(i);
+    Frame frame = VisitorFrame(i);
     frame.image = World().Render(*Camera(), CameraAt({0.45, 0.02, 0.03}), 1.5, frame.index + 1);
     if (HasPose(tracker.Track(frame, &maps).state) && first_pose < 0) first_pose = i;
     if (tracker.TakeKeyFrameCandidate() && first_keyframe < 0) first_keyframe = i;
@@ -196,7 +196,8 @@ TEST(RelocalizationResult, DelaysMapExtensionAfterRelocalization) {
 TEST(RelocalizationResult, AcceptsTheBetterOfTwoSimilarPlacesInOneMap) {
   for (const bool second : {false, true}) {
     SomeMaps maps;
-    maps.Add(1, second ? TwoPlaces(*MapWith(5), *MapWith(0)) : TwoPlaces(*MapWith(0), *MapWith(5)));
+    maps.Add(1, second ? TwoPlaces(*MapWithWrongPoints(5), *MapWithWrongPoints(0))
+                       : TwoPlaces(*MapWithWrongPoints(0), *MapWithWrongPoints(5)));
     ASSERT_EQ(Validate(*maps.At(1)), "");
     const TrackedFrame last = Visit(maps, 5).back();
     ASSERT_TRUE(HasPose(last.state));
@@ -206,7 +207,7 @@ TEST(RelocalizationResult, AcceptsTheBetterOfTwoSimilarPlacesInOneMap) {
 
 TEST(RelocalizationResult, ReportsTwoPlacesInOneMapThatLookAlike) {
   SomeMaps maps;
-  maps.Add(1, TwoPlaces(*MapWith(0), *MapWith(0)));
+  maps.Add(1, TwoPlaces(*MapWithWrongPoints(0), *MapWithWrongPoints(0)));
   for (const TrackedFrame& frame : Visit(maps, 10)) {
     EXPECT_EQ(frame.state, TrackingState::kLost) << frame.frame.index;
     EXPECT_EQ(frame.relocalization.rejection, RejectionReason::kAmbiguous);
@@ -218,20 +219,20 @@ TEST(RelocalizationResult, ReportsTwoPlacesInOneMapThatLookAlike) {
 // The camera first relocalizes at a similar but wrong place, and then sees what only the right place shows.
 TEST(RelocalizationResult, SwitchesToThePlaceWithMoreInliers) {
   SomeMaps maps;
-  maps.Add(1, TwoPlaces(*MapWith(5), *MapWith(10)));
+  maps.Add(1, TwoPlaces(*MapWithWrongPoints(5), *MapWithWrongPoints(10)));
   TrackerOptions options;
   options.build_maps = false;
   Tracker tracker(options, Camera(), 3);
   TrackedFrame frame;
   int index = 0;
-  while (index < 10 && !HasPose(frame.state)) frame = tracker.Track(FrameOf(index++), &maps);
+  while (index < 10 && !HasPose(frame.state)) frame = tracker.Track(VisitorFrame(index++), &maps);
   ASSERT_TRUE(HasPose(frame.state));
   EXPECT_LT(frame.quality, options.poor_visible_ratio);
   EXPECT_NEAR(frame.camera_from_map.OriginInSource().x(), 0, 0.3);
-  auto both = TwoPlaces(*MapWith(5), *MapWith(0));
+  auto both = TwoPlaces(*MapWithWrongPoints(5), *MapWithWrongPoints(0));
   maps.Add(1, both);
   tracker.SetMap(both, 1);
-  for (int i = 0; i < 5; ++i) frame = tracker.Track(FrameOf(index++), &maps);
+  for (int i = 0; i < 5; ++i) frame = tracker.Track(VisitorFrame(index++), &maps);
   ASSERT_TRUE(HasPose(frame.state));
   EXPECT_NEAR(frame.camera_from_map.OriginInSource().x(), kBetweenPlaces, 0.3);
   EXPECT_GT(frame.quality, options.poor_visible_ratio);

@@ -4,12 +4,13 @@
 
 #include <vector>
 
+#include "tests/engine/initialization/target_scene.h"
 #include "tests/engine/lockstep.h"
-#include "tests/engine/mapping/target_scene.h"
 
 namespace docent::engine {
 namespace {
 
+using testing_world::BoardCamera;
 using testing_world::CameraAt;
 using testing_world::TargetScene;
 
@@ -17,11 +18,10 @@ class TargetTracking : public testing::TestWithParam<bool> {};
 
 TEST_P(TargetTracking, MakesAMapInMetres) {
   static const TargetScene scene(31, true);
-  static const auto camera = testing_world::PinholeCamera(640, 480);
   TrackerOptions options;
   options.hybrid = GetParam();
   options.target = std::make_shared<const PlanarTarget>(scene.image, scene.width_m);
-  Lockstep lockstep(options, camera, 1);
+  Lockstep lockstep(options, BoardCamera(), 1);
   std::vector<Rigid3> truth, tracked;
   std::string first_hint;
   for (int i = 0; i < 36; ++i) {
@@ -29,7 +29,7 @@ TEST_P(TargetTracking, MakesAMapInMetres) {
     const std::uint64_t noise_seed = static_cast<std::uint64_t>(i) + 1;
     const auto map = lockstep.map();
     const TrackedFrame out =
-        lockstep.Feed(testing_world::MakeFrame(i, scene.world.Render(*camera, pose, 1.5, noise_seed)));
+        lockstep.Feed(testing_world::MakeFrame(i, scene.world.Render(*BoardCamera(), pose, 1.5, noise_seed)));
     if (i == 0) first_hint = out.hint;
     if (map && map->HasFinitePoints() && HasPose(out.state)) {
       truth.push_back(pose);

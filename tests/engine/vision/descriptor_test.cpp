@@ -12,6 +12,7 @@
 
 #include "engine/base/random.h"
 #include "engine/vision/features.h"
+#include "tests/engine/geometry/test_math.h"
 #include "tests/engine/rendered_world.h"
 
 namespace docent::engine {
@@ -73,7 +74,7 @@ cv::Mat Around(const std::function<double(double, double)>& grey, const Eigen::V
   return image;
 }
 
-const Eigen::Vector2f kCenter(20, 20);
+const Eigen::Vector2f kPlaceInImage(20, 20);
 
 std::vector<Eigen::Vector2d> Places(int count) {
   Random random(11);
@@ -83,7 +84,7 @@ std::vector<Eigen::Vector2d> Places(int count) {
 }
 
 // The distance of the nearest pair of descriptors of two places, as matching uses it.
-int Difference(const Description& a, const Description& b) {
+int NearestPairDistance(const Description& a, const Description& b) {
   int min_distance = 4 * kDescriptorLength * kDescriptorLength;
   for (int i = 0; i < a.count; ++i)
     for (int j = 0; j < b.count; ++j)
@@ -98,8 +99,8 @@ double RecognitionRatio(const std::function<cv::Mat(const Eigen::Vector2d&)>& ch
   const Blobs blobs(5);
   std::vector<Description> known, seen;
   for (const Eigen::Vector2d& place : Places(150)) {
-    const auto before = Describe(Around(blobs, place), kCenter);
-    const auto after = Describe(changed(place), kCenter);
+    const auto before = Describe(Around(blobs, place), kPlaceInImage);
+    const auto after = Describe(changed(place), kPlaceInImage);
     EXPECT_TRUE(before && after);
     if (!before || !after) return 0;
     known.push_back(*before);
@@ -109,7 +110,7 @@ double RecognitionRatio(const std::function<cv::Mat(const Eigen::Vector2d&)>& ch
   for (std::size_t i = 0; i < seen.size(); ++i) {
     std::size_t best = 0;
     for (std::size_t j = 1; j < known.size(); ++j)
-      if (Difference(seen[i], known[j]) < Difference(seen[i], known[best])) best = j;
+      if (NearestPairDistance(seen[i], known[j]) < NearestPairDistance(seen[i], known[best])) best = j;
     right += best == i;
   }
   return static_cast<double>(right) / static_cast<double>(seen.size());
@@ -118,9 +119,8 @@ double RecognitionRatio(const std::function<cv::Mat(const Eigen::Vector2d&)>& ch
 TEST(Descriptor, IsInvariantToRotation) {
   const Blobs blobs(5);
   for (const double rotation_deg : {10.0, 45.0, 90.0, 133.0, 180.0, -77.0}) {
-    EXPECT_GT(RecognitionRatio([&](const Eigen::Vector2d& place) {
-                return Around(blobs, place, rotation_deg * std::numbers::pi / 180);
-              }),
+    EXPECT_GT(RecognitionRatio(
+                  [&](const Eigen::Vector2d& place) { return Around(blobs, place, Radians(rotation_deg)); }),
               0.95)
         << rotation_deg;
   }
@@ -162,10 +162,10 @@ TEST(Descriptor, IsUnchangedByABrightnessOffset) {
   for (const Eigen::Vector2d& place : Places(30)) {
     const cv::Mat image = Around([&](double x, double y) { return 0.3 * blobs(x, y) + 40; }, place);
     const cv::Mat brighter = image + cv::Scalar(60);
-    const auto a = Describe(image, kCenter), b = Describe(brighter, kCenter);
+    const auto a = Describe(image, kPlaceInImage), b = Describe(brighter, kPlaceInImage);
     ASSERT_TRUE(a && b);
     ASSERT_EQ(a->count, b->count);
-    EXPECT_LT(Difference(*a, *b), 20);
+    EXPECT_LT(NearestPairDistance(*a, *b), 20);
   }
 }
 
@@ -174,8 +174,8 @@ TEST(Descriptor, DirectionRotatesWithTheImage) {
   int agree = 0, all = 0;
   for (const Eigen::Vector2d& place : Places(60)) {
     const double turn = 0.9;
-    const auto before = Describe(Around(blobs, place), kCenter);
-    const auto after = Describe(Around(blobs, place, turn), kCenter);
+    const auto before = Describe(Around(blobs, place), kPlaceInImage);
+    const auto after = Describe(Around(blobs, place, turn), kPlaceInImage);
     ASSERT_TRUE(before && after);
     if (before->count != 1 || after->count != 1) continue;
     ++all;
@@ -190,7 +190,7 @@ TEST(Descriptor, DirectionRotatesWithTheImage) {
 TEST(Descriptor, DirectionFollowsTheGradientOfAnEdge) {
   // The image is brighter to the lower right.
   const cv::Mat edge = Around([](double x, double y) { return 128 + 80 * std::tanh((x + y) / 4); }, {0, 0});
-  const auto description = Describe(edge, kCenter);
+  const auto description = Describe(edge, kPlaceInImage);
   ASSERT_TRUE(description);
   EXPECT_EQ(description->count, 1);
   EXPECT_NEAR(description->of_direction[0].direction_rad, std::numbers::pi / 4, 0.03);
@@ -205,7 +205,7 @@ TEST(Descriptor, DirectionFollowsTheGradientOfAnEdge) {
 TEST(Descriptor, IsNormalizedToAConstantLength) {
   const Blobs blobs(8);
   for (const Eigen::Vector2d& place : Places(50)) {
-    const auto description = Describe(Around(blobs, place), kCenter);
+    const auto description = Describe(Around(blobs, place), kPlaceInImage);
     ASSERT_TRUE(description);
     const int squared = SquaredDistance(description->of_direction[0].descriptor, {});
     EXPECT_NEAR(std::sqrt(squared), kDescriptorLength, 8);
@@ -225,12 +225,12 @@ TEST(Descriptor, RejectsPixelsNearTheBorder) {
 }
 
 TEST(Descriptor, RejectsUniformAndNoisyPatches) {
-  EXPECT_FALSE(Describe(Around([](double, double) { return 90; }, {0, 0}), kCenter));
+  EXPECT_FALSE(Describe(Around([](double, double) { return 90; }, {0, 0}), kPlaceInImage));
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Random random(seed);
     // The noise has a standard deviation of 1.4 grey values, like that of a webcam.
     const cv::Mat noise = Around([&](double, double) { return 90.5 + random.Uniform(-2.4, 2.4); }, {0, 0});
-    EXPECT_FALSE(Describe(noise, kCenter));
+    EXPECT_FALSE(Describe(noise, kPlaceInImage));
   }
 }
 

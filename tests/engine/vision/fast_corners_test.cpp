@@ -8,22 +8,14 @@
 #include <opencv2/imgproc.hpp>
 
 #include "engine/base/random.h"
+#include "tests/engine/vision/noise_image.h"
 
 namespace docent::engine {
 namespace {
 
-cv::Mat Noise(int width, int height, std::uint64_t seed) {
-  Random random(seed);
-  cv::Mat image(height, width, CV_8UC1);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
-  return image;
-}
-
 cv::Mat Blurred(int width, int height, std::uint64_t seed) {
   cv::Mat image;
-  cv::GaussianBlur(Noise(width, height, seed), image, {}, 1.2);
+  cv::GaussianBlur(NoiseImage(width, height, seed), image, {}, 1.2);
   return image;
 }
 
@@ -53,7 +45,7 @@ void ExpectAsOpenCv(const cv::Mat& image, int threshold, int border) {
 TEST(FastCorners, MatchOpenCv) {
   for (const int threshold : {0, 1, 5, 12, 25, 60, 254, 255}) {
     ExpectAsOpenCv(Blurred(320, 240, 1), threshold, 6);
-    ExpectAsOpenCv(Noise(161, 97, 2), threshold, 6);
+    ExpectAsOpenCv(NoiseImage(161, 97, 2), threshold, 6);
   }
 }
 
@@ -92,7 +84,7 @@ TEST(FastCorners, AreEmptyForTooSmallImages) {
   for (const cv::Size size : {cv::Size(12, 40), cv::Size(40, 12), cv::Size(1, 1)}) {
     std::vector<Corner> corners(3);
     std::vector<int> row_begin;
-    DetectFastCorners(Noise(size.width, size.height, 4), 5, 6, &corners, &row_begin);
+    DetectFastCorners(NoiseImage(size.width, size.height, 4), 5, 6, &corners, &row_begin);
     EXPECT_TRUE(corners.empty());
     EXPECT_EQ(row_begin, std::vector<int>(static_cast<std::size_t>(size.height) + 1, 0));
   }

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "engine/base/random.h"
+#include "tests/engine/vision/noise_image.h"
 
 namespace docent::engine {
 namespace {
@@ -83,12 +84,9 @@ TEST(PyramidCoordinates, MatchTheLevelsOfAnyImageSize) {
 }
 
 TEST(HalvedImage, IsTheRoundedMeanOfTwoByTwoPixels) {
-  Random random(12);
   for (const cv::Size size : {cv::Size(64, 48), cv::Size(37, 21), cv::Size(2, 2), cv::Size(33, 3)}) {
-    cv::Mat image(size, CV_8UC1), half;
-    for (int y = 0; y < size.height; ++y)
-      for (int x = 0; x < size.width; ++x)
-        image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
+    const cv::Mat image = NoiseImage(size.width, size.height, 12);
+    cv::Mat half;
     HalveImage(image, &half);
     ASSERT_EQ(half.size(), size / 2);
     for (int y = 0; y < half.rows; ++y) {

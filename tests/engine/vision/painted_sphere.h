@@ -9,17 +9,10 @@
 #include "engine/base/random.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
+#include "tests/engine/geometry/test_math.h"
 
 // Synthetic images with exactly known rotations, for tests of thumbnails and of rotation alignment.
 namespace docent::engine {
-
-inline constexpr double kPi = 3.14159265358979323846;
-inline double Degrees(double radians) {
-  return radians * 180 / kPi;
-}
-inline double Radians(double degrees) {
-  return degrees * kPi / 180;
-}
 
 // A textured sphere around the camera: its grey value depends on the viewing direction only, with detail from
 // 30 degrees down to 2 degrees, so that the image after any rotation is known exactly.
@@ -85,14 +78,7 @@ inline CameraModel Fisheye() {
 }
 
 inline Rotation3 RandomRotation(Random* random, double angle) {
-  Eigen::Vector3d axis;
-  do axis = {random->Uniform(-1, 1), random->Uniform(-1, 1), random->Uniform(-1, 1)};
-  while (axis.norm() < 0.1 || axis.norm() > 1);
-  return Rotation3::Exp(angle * axis.normalized());
-}
-
-inline double AngleBetween(const Rotation3& a, const Rotation3& b) {
-  return (a.inverse() * b).Angle();
+  return Rotation3::Exp(angle * RandomDirection(random));
 }
 
 }  // namespace docent::engine

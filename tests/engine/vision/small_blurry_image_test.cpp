@@ -13,19 +13,11 @@
 #include <vector>
 
 #include "engine/base/random.h"
+#include "tests/engine/vision/noise_image.h"
 #include "tests/engine/vision/painted_sphere.h"
 
 namespace docent::engine {
 namespace {
-
-cv::Mat NoiseImage(int width, int height, std::uint64_t seed) {
-  Random random(seed);
-  cv::Mat image(height, width, CV_8UC1);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random.Below(256));
-  return image;
-}
 
 TEST(MakeThumbnail, BlursLikeOpenCv) {
   for (const double sigma_px : {0.8, 2.5}) {

@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "engine/base/error.h"
+#include "tests/support/error_of.h"
 #include "tests/tools/change_sequence/walking_people.h"
 
 namespace docent::testing {
@@ -37,13 +37,8 @@ Eigen::Vector2d Centroid(const cv::Mat& image) {
   return {moments.m10 / moments.m00, moments.m01 / moments.m00};
 }
 
-std::string ErrorOf(const std::string& change) {
-  try {
-    MakeChange(change, kContext);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+std::string ErrorOfChange(const std::string& change) {
+  return ErrorOf([&] { MakeChange(change, kContext); });
 }
 
 TEST(SequenceChanges, BlurKernelHasItsLengthAndAngle) {
@@ -125,10 +120,10 @@ TEST(SequenceChanges, RimIsBlackOnlyOutsideItsCircle) {
 }
 
 TEST(SequenceChanges, ReportsWhatIsWrongWithAChange) {
-  EXPECT_THAT(ErrorOf("fog:3"), HasSubstr("blur, exposure, tele, people and rim"));
-  EXPECT_THAT(ErrorOf("blur"), HasSubstr("needs a number from 1 to 200"));
-  EXPECT_THAT(ErrorOf("tele:0.5"), HasSubstr("needs a number from 1 to 10"));
-  EXPECT_THAT(ErrorOf("blur:13@north"), HasSubstr("needs a number"));
+  EXPECT_THAT(ErrorOfChange("fog:3"), HasSubstr("blur, exposure, tele, people and rim"));
+  EXPECT_THAT(ErrorOfChange("blur"), HasSubstr("needs a number from 1 to 200"));
+  EXPECT_THAT(ErrorOfChange("tele:0.5"), HasSubstr("needs a number from 1 to 10"));
+  EXPECT_THAT(ErrorOfChange("blur:13@north"), HasSubstr("needs a number"));
 }
 
 }  // namespace

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "engine/mapping/loops/map_joining.h"
+#include "engine/mapping/mapper_event.h"
+
+// Results of the engine in the words of events, reports and messages.
+namespace docent::app {
+
+// "converged after 5 iterations, cost 120 -> 80, sigma 0.500, 3 outliers"
+std::string TextOf(const engine::BundleSummary& summary);
+// "drift of 1.2 % of the path, ...; keyframe 40 matches keyframe 2: ..."
+std::string TextOf(const engine::ClosedLoop& loop);
+// The figures in one line.
+std::string TextOf(const engine::MapOverlap& overlap);
+// A warning in whole sentences.
+std::string TextOf(const engine::CalibrationContradiction& contradiction);
+// "512.0 px (+-1.2 %)".
+std::string FormatFocalLength(const engine::EstimatedLens& lens);
+// Why two maps were not joined: one sentence without full stop. `overlap` belongs to the same attempt.
+std::string TextOf(engine::JoinRefusal refusal, const engine::MapOverlap& overlap);
+
+// The two columns of events.csv for an action of the mapper in the map of this name; empty for actions that
+// are not reported.
+struct EventText {
+  std::string event, detail;
+};
+std::optional<EventText> TextOf(const engine::MapperEvent& event, const std::string& map_name);
+
+}  // namespace docent::app

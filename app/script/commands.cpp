@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/script/commands.h"
+
+#include <cmath>
+
+#include "app/files/text_file.h"
+#include "content/scene.h"
+#include "maps/library/library.h"
+
+namespace docent::app {
+
+namespace {
+
+constexpr double kMaxPixel = 1e6;  // far outside any image
+constexpr const char* kNoMapName = "expected a map's name that is not empty";
+
+bool IsAtMost(double value, double most) {
+  return std::abs(value) <= most;  // false for NaN
+}
+
+std::string NameProblem(const std::string& name, const char* what) {
+  if (name.empty()) return std::string("expected ") + what + " that is not empty";
+  if (name.size() > content::kMaxTextBytes || !content::IsUtf8(name)) {
+    return std::string("expected ") + what + " in UTF-8 with at most " +
+           std::to_string(content::kMaxTextBytes) + " bytes";
+  }
+  return "";
+}
+
+std::string MapNameProblem(const std::string& name) {
+  if (!content::IsUtf8(name)) return "expected a map's name in UTF-8";
+  return maps::ValidateMapName(name);
+}
+
+std::string PixelProblem(const Eigen::Vector2d& pixel) {
+  const bool near = IsAtMost(pixel.x(), kMaxPixel) && IsAtMost(pixel.y(), kMaxPixel);
+  return near ? "" : "the pixel is far outside any image";
+}
+
+std::string AngleProblem(double angle_deg) {
+  if (IsAtMost(angle_deg, content::kMaxAngle_deg)) return "";
+  return "the angle must be at most " + FormatNumber(content::kMaxAngle_deg) + " degrees";
+}
+
+// Within the limits, the factor that makes the smallest model the largest one.
+std::string FactorProblem(double factor) {
+  constexpr double kLimit = content::kMaxModelScale / content::kMinModelScale;
+  if (factor >= 1 / kLimit && factor <= kLimit) return "";
+  return "the factor must be between " + FormatNumber(1 / kLimit) + " and " + FormatNumber(kLimit);
+}
+
+std::string ScaleProblem(double scale) {
+  if (scale >= content::kMinModelScale && scale <= content::kMaxModelScale) return "";
+  return "the scale must be between " + FormatNumber(content::kMinModelScale) + " and " +
+         FormatNumber(content::kMaxModelScale);
+}
+
+std::string First(std::initializer_list<std::string> problems) {
+  for (const std::string& problem : problems) {
+    if (!problem.empty()) return problem;
+  }
+  return "";
+}
+
+struct Validator {
+  std::string operator()(const NewMap& c) const { return MapNameProblem(c.name); }
+  std::string operator()(const StopMap&) const { return ""; }
+  // A map that was made by an earlier version may have a name that is not accepted for a new one.
+  std::string operator()(const UseMap& c) const { return c.name.empty() ? kNoMapName : ""; }
+  std::string operator()(const SetPolicy& c) const { return c.name.empty() ? kNoMapName : ""; }
+  std::string operator()(const PlaceModel& c) const {
+    if (c.file.empty()) return "expected a model's file";
+    return First({PixelProblem(c.pixel), ScaleProblem(c.scale), AngleProblem(c.yaw_deg)});
+  }
+  std::string operator()(const PlaceSignpost& c) const {
+    return First({NameProblem(c.text, "a signpost's text"), PixelProblem(c.pixel),
+                  c.to_map.empty() ? "" : MapNameProblem(c.to_map)});
+  }
+  std::string operator()(const MoveEntity& c) const {
+    if (c.to_pixel) return First({NameProblem(c.name, "a name"), PixelProblem(*c.to_pixel)});
+    const bool near =
+        IsAtMost(c.by_in_map.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), 2 * content::kMaxCoordinate);
+    return First({NameProblem(c.name, "a name"), near ? "" : "the offset leads out of any map"});
+  }
+  std::string operator()(const RotateEntity& c) const {
+    return First({NameProblem(c.name, "a name"), AngleProblem(c.angle_deg)});
+  }
+  std::string operator()(const ScaleEntity& c) const {
+    return First({NameProblem(c.name, "a name"), FactorProblem(c.factor)});
+  }
+  std::string operator()(const RemoveEntity& c) const { return NameProblem(c.name, "a name"); }
+  std::string operator()(const Undo&) const { return ""; }
+  std::string operator()(const Redo&) const { return ""; }
+  std::string operator()(const Save&) const { return ""; }
+};
+
+}  // namespace
+
+std::string Validate(const Command& command) {
+  return std::visit(Validator{}, command);
+}
+
+}  // namespace docent::app

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "content/gltf/mesh.h"
+
+#include <algorithm>
+
+#include "content/gltf/json.h"
+#include "content/mesh_tools.h"
+
+namespace docent::content {
+namespace {
+
+template <int N>
+glm::vec<N, float> ReadVector(const AccessorReader& reader, std::uint32_t element) {
+  glm::vec<N, float> value;
+  for (int k = 0; k < N; ++k) value[k] = reader.Float(element, k);
+  return value;
+}
+
+// Calls `emit` for the triangles formed by `count` vertices (§3.7.2.1); incomplete ones are left out.
+template <typename Emit>
+void ForEachTriangle(int mode, std::size_t count, const Emit& emit) {
+  if (count < 3) return;
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    for (std::size_t i = 0; i + 2 < count; i += 3) emit(i, i + 1, i + 2);
+  } else if (mode == TINYGLTF_MODE_TRIANGLE_STRIP) {
+    for (std::size_t i = 0; i + 2 < count; ++i) emit(i, i + 1 + i % 2, i + 2 - i % 2);
+  } else {
+    for (std::size_t i = 1; i + 1 < count; ++i) emit(i, i + 1, 0);
+  }
+}
+
+}  // namespace
+
+void MeshReader::Warn(const std::string& sentence) {
+  if (std::find(warnings_.begin(), warnings_.end(), sentence) == warnings_.end())
+    warnings_.push_back(sentence);
+}
+
+std::vector<std::uint32_t> MeshReader::ReadTriangles(const tinygltf::Primitive& primitive,
+                                                     std::size_t vertex_count, const std::string& place) {
+  const AccessorReader* indices = primitive.indices < 0 ? nullptr : &accessors_.Get(primitive.indices);
+  const std::size_t count = indices == nullptr ? vertex_count : indices->count();
+  const std::uint64_t corners = primitive.mode == TINYGLTF_MODE_TRIANGLES ? count : 3 * std::uint64_t{count};
+  indices_ += corners;
+  if (indices_ > limits_.max_indices) {
+    Refuse(file_, place,
+           "takes the model over the limit of " + std::to_string(limits_.max_indices / 3) + " triangles.");
+  }
+  const auto vertex_at = [&](std::size_t i) {
+    const std::uint32_t vertex = indices == nullptr ? static_cast<std::uint32_t>(i) : indices->Unsigned(i);
+    // glTF forbids the largest value of the type, because it restarts a strip on some graphics hardware.
+    if (vertex >= vertex_count || (indices != nullptr && vertex == indices->MaxUnsigned())) {
+      Refuse(file_, place + ".indices",
+             "refers to vertex " + std::to_string(vertex) + " of " + std::to_string(vertex_count) + ".");
+    }
+    return vertex;
+  };
+  // Vertices of incomplete triangles must be in range too.
+  std::vector<std::uint32_t> vertices(count);
+  for (std::size_t i = 0; i < count; ++i) vertices[i] = vertex_at(i);
+  std::vector<std::uint32_t> triangles;
+  triangles.reserve(corners);
+  ForEachTriangle(primitive.mode, count, [&](std::size_t a, std::size_t b, std::size_t c) {
+    for (const std::size_t corner : {a, b, c}) triangles.push_back(vertices[corner]);
+  });
+  return triangles;
+}
+
+void MeshReader::ReadVertices(const Attributes& attributes, std::span<const std::uint32_t> chosen,
+                              Primitive* result) {
+  result->vertices.resize(chosen.size());
+  const auto read = [&](const char* name, const auto& assign) {
+    const auto found = attributes.find(name);
+    if (found == attributes.end()) return;
+    const AccessorReader& reader = accessors_.Get(found->second);
+    for (std::size_t i = 0; i < chosen.size(); ++i) assign(reader, chosen[i], &result->vertices[i]);
+  };
+  read("POSITION", [](const AccessorReader& reader, std::uint32_t element, Vertex* vertex) {
+    vertex->position = ReadVector<3>(reader, element);
+  });
+  read("NORMAL", [](const AccessorReader& reader, std::uint32_t element, Vertex* vertex) {
+    vertex->normal = ReadVector<3>(reader, element);
+  });
+  read("TANGENT", [](const AccessorReader& reader, std::uint32_t element, Vertex* vertex) {
+    const glm::vec4 tangent = ReadVector<4>(reader, element);
+    vertex->tangent = glm::vec4(UnitOr(glm::vec3(tangent), glm::vec3(1, 0, 0)), tangent.w < 0 ? -1.0f : 1.0f);
+  });
+  read("TEXCOORD_0", [](const AccessorReader& reader, std::uint32_t element, Vertex* vertex) {
+    vertex->uv0 = ReadVector<2>(reader, element);
+  });
+  read("TEXCOORD_1", [](const AccessorReader& reader, std::uint32_t element, Vertex* vertex) {
+    vertex->uv1 = ReadVector<2>(reader, element);
+  });
+  read("COLOR_0", [](const AccessorReader& reader, std::uint32_t element, Vertex* vertex) {
+    const bool has_alpha = reader.components() == 4;
+    const glm::vec4 color =
+        has_alpha ? ReadVector<4>(reader, element) : glm::vec4(ReadVector<3>(reader, element), 1);
+    vertex->color = glm::clamp(color, 0.0f, 1.0f);
+  });
+  ReadSkinning(attributes, chosen, result);
+}
+
+void MeshReader::ReadSkinning(const Attributes& attributes, std::span<const std::uint32_t> chosen,
+                              Primitive* result) {
+  if (!attributes.contains("JOINTS_0") || !attributes.contains("WEIGHTS_0")) return;
+  if (attributes.contains("JOINTS_1")) Warn("Only four joints per vertex are used; the others are left out.");
+  const AccessorReader& joints = accessors_.Get(attributes.at("JOINTS_0"));
+  const AccessorReader& weights = accessors_.Get(attributes.at("WEIGHTS_0"));
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const glm::vec4 raw = glm::max(ReadVector<4>(weights, chosen[i]), glm::vec4(0));
+    const double sum = double{raw.x} + raw.y + raw.z + raw.w;
+    if (!(sum > 0)) continue;
+    Vertex& vertex = result->vertices[i];
+    for (int k = 0; k < 4; ++k) {
+      vertex.weights[k] = static_cast<float>(raw[k] / sum);
+      // A joint without weight may have any index; 0 is always valid.
+      const std::uint32_t joint = vertex.weights[k] > 0 ? joints.Unsigned(chosen[i], k) : 0;
+      vertex.joints[k] = static_cast<std::uint16_t>(joint);
+    }
+  }
+}
+
+Primitive MeshReader::ReadPrimitive(const tinygltf::Primitive& primitive, const std::string& place) {
+  Primitive result;
+  result.material = primitive.material;
+  const std::size_t vertex_count = accessors_.Get(primitive.attributes.at("POSITION")).count();
+  const std::vector<std::uint32_t> triangles = ReadTriangles(primitive, vertex_count, place);
+  // Keeps only the vertices that the triangles use, because primitives often share one long accessor.
+  std::vector<std::uint32_t> chosen = triangles;
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  const bool has_normals = primitive.attributes.contains("NORMAL");
+  vertices_ += has_normals ? chosen.size() : triangles.size();
+  if (vertices_ > limits_.max_vertices) {
+    Refuse(file_, place,
+           "takes the model over the limit of " + std::to_string(limits_.max_vertices) + " vertices.");
+  }
+  result.indices.resize(triangles.size());
+  std::transform(triangles.begin(), triangles.end(), result.indices.begin(), [&](std::uint32_t vertex) {
+    return static_cast<std::uint32_t>(std::lower_bound(chosen.begin(), chosen.end(), vertex) -
+                                      chosen.begin());
+  });
+  ReadVertices(primitive.attributes, chosen, &result);
+  if (has_normals) {
+    RepairNormals(&result);
+  } else {
+    MakeFlat(&result);
+  }
+  if (!has_normals || !primitive.attributes.contains("TANGENT")) {
+    const TextureUse* normal_map =
+        primitive.material < 0 ? nullptr
+                               : &materials_[static_cast<std::size_t>(primitive.material)].normal_texture;
+    if (normal_map != nullptr && normal_map->texture >= 0) ComputeTangents(normal_map->uv_set, &result);
+  }
+  return result;
+}
+
+Mesh MeshReader::Read(std::size_t mesh) {
+  const tinygltf::Mesh& source = source_.meshes[mesh];
+  Mesh result;
+  result.name = source.name;
+  for (std::size_t i = 0; i < source.primitives.size(); ++i) {
+    const tinygltf::Primitive& primitive = source.primitives[i];
+    if (!primitive.targets.empty()) Warn("Morph targets are left out.");
+    if (primitive.mode < TINYGLTF_MODE_TRIANGLES) {
+      Warn("Points and lines are left out.");
+    } else if (!primitive.attributes.contains("POSITION")) {
+      Warn("Primitives without positions are left out.");
+    } else {
+      result.primitives.push_back(
+          ReadPrimitive(primitive, Place("meshes", mesh) + "." + Place("primitives", i)));
+    }
+  }
+  return result;
+}
+
+int MeshReader::JointsNeeded(const Mesh& mesh) {
+  int needed = 0;
+  for (const Primitive& primitive : mesh.primitives) {
+    for (const Vertex& vertex : primitive.vertices) {
+      for (int k = 0; k < 4; ++k) {
+        if (vertex.weights[k] > 0) needed = std::max(needed, vertex.joints[k] + 1);
+      }
+    }
+  }
+  return needed;
+}
+
+}  // namespace docent::content

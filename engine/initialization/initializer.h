@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/base/random.h"
+#include "engine/initialization/initial_pair.h"
+#include "engine/initialization/start_confirmation.h"
+#include "engine/vision/patch.h"
+
+namespace docent::engine {
+
+struct InitializerOptions {
+  std::array<int, 3> corners = {350, 200, 100};  // maximum number to track, by level
+  // Median motion for a 640 pixel wide image, below which the geometry is not estimated.
+  double min_motion_px = 8;
+  double min_alive_ratio = 0.3;  // of the initial corners; with fewer, a new first view is taken
+  int min_alive = 80;            // corners; with fewer, a new first view is taken
+  int max_age_frames = 240;      // a first view older than this is replaced
+  int attempt_interval = 2;      // frames between two estimates of the geometry
+  TwoViewOptions two_view;
+  StartConfirmationOptions confirmation;
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
+};
+
+// Initializes a map from two views: tracks corners from a first view through the images and estimates the
+// two-view geometry until it is reliable (ptamm §2.3) and a third view has confirmed it. Until then hint()
+// says what is missing. One per camera, on the tracker's thread.
+class Initializer {
+ public:
+  Initializer(const InitializerOptions& options, std::shared_ptr<const CameraModel> camera,
+              std::uint64_t seed);
+
+  // Starts again from the next frame.
+  void Reset();
+  // Resets and uses another camera model from the next frame on.
+  void SetCamera(std::shared_ptr<const CameraModel> camera);
+  // Returns a pair once the geometry is reliable and confirmed, and then resets itself.
+  std::optional<InitialPair> Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
+
+  // The same for two views whose keypoints the caller has matched, such as the points of a panorama map in
+  // one of its keyframes and in the current frame. ids: one per match, ascending. speed_change_px: difference
+  // of the image speed between the two views, in pixels per frame.
+  std::optional<InitialPair> TryViews(const InitialPair::View& a, const InitialPair::View& b,
+                                      std::vector<InitialPair::Match> matches,
+                                      std::span<const std::uint32_t> ids, double speed_change_px);
+
+  // Time of the first view; Timestamp::min() if there is none.
+  Timestamp first_time() const { return first_ ? first_time_ : Timestamp::min(); }
+  // Advice to the user on why there is no map yet; empty right after Reset().
+  const std::string& hint() const { return hint_; }
+  // A tracked corner: its pixel in the first view and in the current frame, level 0.
+  struct Trail {
+    Eigen::Vector2f first, now;
+    int level = 0;
+    std::uint32_t id = 0;                                                                  // ascending
+    Eigen::Vector2f first_step = Eigen::Vector2f::Zero(), step = Eigen::Vector2f::Zero();  // pixels per frame
+  };
+  const std::vector<Trail>& trails() const { return trails_; }
+
+ private:
+  void Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
+  void TrackCorners(const ImageFeatures& features);
+  std::optional<InitialPair> Attempt(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
+  std::optional<InitialPair> Solve(const InitialPair::View& a, const InitialPair::View& b,
+                                   std::vector<InitialPair::Match> matches,
+                                   std::span<const std::uint32_t> ids, double speed_change_px,
+                                   StartConfirmation* confirmation);
+  double SpeedChange() const;
+
+  InitializerOptions options_;
+  std::shared_ptr<const CameraModel> camera_;
+  Random random_;
+  StartConfirmation confirmation_, views_confirmation_;
+  std::vector<Trail> trails_;
+  std::size_t trails_at_start_ = 0;
+  int age_frames_ = 0;
+  Timestamp first_time_{};
+  std::shared_ptr<const ImageFeatures> first_, previous_;
+  std::string hint_;
+};
+
+}  // namespace docent::engine

@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/matching/pose_refinement.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/base/option_check.h"
+
+namespace docent::engine {
+
+namespace {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix26 = Eigen::Matrix<double, 2, 6>;
+
+using Projection = PoseRefinementMemory::Projection;
+
+// rotation, translation: of camera_from_map; multiplying by a matrix takes half the time of a quaternion.
+Projection ProjectMeasurement(const CameraModel& camera, const Eigen::Matrix3d& rotation,
+                              const Eigen::Vector3d& translation, const PoseMeasurement& measurement) {
+  Projection projection;
+  projection.point_in_camera =
+      rotation * measurement.point_in_map.head<3>() + measurement.point_in_map[3] * translation;
+  Eigen::Vector2d pixel;
+  projection.valid = camera.Project(projection.point_in_camera, &pixel, &projection.jacobian);
+  if (!projection.valid) return projection;
+  projection.error = (measurement.pixel - pixel) * measurement.inverse_sigma;
+  projection.jacobian *= measurement.inverse_sigma;
+  return projection;
+}
+
+// d normalised pixel / d twist. pivot: centre of the three rotational degrees of freedom, camera frame.
+Matrix26 PoseJacobian(const Projection& projection, const PoseMeasurement& measurement,
+                      const Eigen::Vector3d& pivot) {
+  const double w = measurement.point_in_map[3];
+  Matrix26 jacobian;
+  // The assumed distance of an infinite point must not constrain the translation.
+  if (measurement.infinite()) {
+    jacobian.leftCols<3>().setZero();
+  } else {
+    jacobian.leftCols<3>() = w * projection.jacobian;
+  }
+  jacobian.rightCols<3>() = -projection.jacobian * Hat(projection.point_in_camera - w * pivot);
+  return jacobian;
+}
+
+// With fewer rays the rotation is not reliable.
+constexpr std::ptrdiff_t kMinRays = 8;
+
+double Square(double x) {
+  return x * x;
+}
+
+double RobustSigma(std::vector<double>* squared_errors) {
+  if (squared_errors->empty()) return 0;
+  const auto middle = squared_errors->begin() + static_cast<std::ptrdiff_t>(squared_errors->size() / 2);
+  std::nth_element(squared_errors->begin(), middle, squared_errors->end());
+  // The median of a Rayleigh variable is 1.1774 sigma: the two-dimensional counterpart of MAD.
+  return std::sqrt(*middle) / 1.1774;
+}
+
+// Scale of the residuals of one kind of points, finite or infinite, in one iteration.
+struct RobustScale {
+  double sigma = 0;      // robust, of the normalised residuals
+  double threshold = 0;  // threshold of the loss
+};
+
+RobustScale EstimateScale(const std::vector<PoseMeasurement>& measurements, bool infinite,
+                          const PoseRefinementOptions& options, bool tukey, PoseRefinementMemory* memory) {
+  memory->squared_errors.clear();
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    const Projection& projection = memory->projections[i];
+    if (projection.valid && measurements[i].infinite() == infinite)
+      memory->squared_errors.push_back(projection.error.squaredNorm());
+  }
+  RobustScale scale;
+  scale.sigma = RobustSigma(&memory->squared_errors);
+  scale.threshold = std::max(scale.sigma, options.min_sigma) * (tukey ? options.tukey_factor : 1.345);
+  return scale;
+}
+
+double LossWeight(double error, double threshold, bool tukey) {
+  if (!tukey) return error <= threshold ? 1 : threshold / error;
+  const double ratio = error / threshold;
+  return ratio < 1 ? (1 - ratio * ratio) * (1 - ratio * ratio) : 0;
+}
+
+// Prior constraints on the motion in addition to the measurements.
+struct MotionConstraint {
+  bool rotation_only = false;  // the pivot is fixed as in the rotation prior; only the rotation is estimated
+  double sigma = 0;  // otherwise: standard deviation of the pivot's position, map units; 0 for no constraint
+  double infinite_weight = 1;
+};
+
+PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const PoseRefinementOptions& options,
+                      const RotationPrior& prior, const MotionConstraint& constraint,
+                      std::vector<PoseMeasurement>* measurements, PoseRefinementMemory* memory) {
+  const bool rotation_only = constraint.rotation_only;
+  const Eigen::Vector3d pivot = rotation_only ? prior.pivot : Eigen::Vector3d::Zero();
+  const Eigen::Vector3d pivot_in_map = prior.camera_from_map.inverse() * prior.pivot;
+  PoseRefinement result;
+  result.camera_from_map = start;
+  result.covariance.setZero();
+  Matrix6 normal, measured;
+  RobustScale scales[2];  // finite, infinite
+  double depth = 0;       // summed over finite inliers
+  for (int iteration = 0; iteration <= options.iterations; ++iteration) {
+    // The last pass only computes weights and counts at the final pose.
+    const bool last = iteration == options.iterations;
+    const bool tukey = iteration >= options.iterations / 2;
+    const Eigen::Matrix3d rotation = result.camera_from_map.rotation.matrix();
+    memory->projections.clear();
+    for (const PoseMeasurement& measurement : *measurements)
+      memory->projections.push_back(
+          ProjectMeasurement(camera, rotation, result.camera_from_map.translation, measurement));
+    for (const bool infinite : {false, true})
+      scales[infinite] = EstimateScale(*measurements, infinite, options, tukey, memory);
+    normal.setZero();
+    Vector6 gradient = Vector6::Zero();
+    result.inliers = result.finite_inliers = 0;
+    depth = 0;
+    for (std::size_t i = 0; i < measurements->size(); ++i) {
+      PoseMeasurement& measurement = (*measurements)[i];
+      const Projection& projection = memory->projections[i];
+      const bool infinite = measurement.infinite();
+      measurement.weight = 0;
+      if (!projection.valid) continue;
+      measurement.weight = LossWeight(projection.error.norm(), scales[infinite].threshold, tukey);
+      if (measurement.weight > options.min_weight) {
+        ++result.inliers;
+        result.finite_inliers += !infinite;
+        if (!infinite) depth += projection.point_in_camera.z();
+      }
+      const double weight = measurement.weight * (infinite ? constraint.infinite_weight : 1.0);
+      const Matrix26 jacobian = PoseJacobian(projection, measurement, pivot);
+      normal.noalias() += weight * jacobian.transpose() * jacobian;
+      gradient.noalias() += weight * jacobian.transpose() * projection.error;
+    }
+    measured = normal;
+    if (constraint.sigma > 0) {
+      const double information = Square(std::max(scales[0].sigma, options.min_sigma) / constraint.sigma);
+      const Eigen::Vector3d now = result.camera_from_map * pivot_in_map;
+      Eigen::Matrix<double, 3, 6> jacobian;
+      jacobian << Eigen::Matrix3d::Identity(), -Hat(now);
+      normal.noalias() += information * jacobian.transpose() * jacobian;
+      gradient.noalias() += information * jacobian.transpose() * (prior.pivot - now);
+    } else if (rotation_only) {
+      // The few finite points left must not move the camera centre.
+      normal.leftCols<3>().setZero();
+      normal.topRows<3>().setZero();
+      normal.topLeftCorner<3, 3>().diagonal().setConstant(normal.diagonal().maxCoeff());
+      gradient.head<3>().setZero();
+    }
+    const int min_finite = constraint.infinite_weight < 1 ? 1 : options.min_finite;
+    result.sigma = scales[result.finite_inliers >= min_finite ? 0 : 1].sigma;
+    if (last) break;
+    const Eigen::LDLT<Matrix6> factor(normal);
+    const Vector6 pivots = factor.vectorD();
+    if (factor.info() != Eigen::Success || !(pivots.minCoeff() > 1e-12 * pivots.maxCoeff()) ||
+        result.inliers < 3) {
+      result.converged = false;
+      return result;
+    }
+    const Vector6 update = factor.solve(gradient);
+    if (rotation_only) {
+      const Rigid3 about_pivot(result.camera_from_map.rotation, result.camera_from_map.translation - pivot);
+      const Rigid3 rotated = Rigid3::Exp(update) * about_pivot;
+      result.camera_from_map = Rigid3(rotated.rotation, rotated.translation + pivot);
+    } else {
+      result.camera_from_map = Rigid3::Exp(update) * result.camera_from_map;
+    }
+    // Root mean square shift of the projections by this update, in sigmas of their levels.
+    const int infinite_inliers = result.inliers - result.finite_inliers;
+    const double counted = result.finite_inliers + constraint.infinite_weight * infinite_inliers;
+    const double shift = std::sqrt(std::max(0.0, update.dot(normal * update)) / (counted + 1.0));
+    // Tukey's weights may oscillate slightly without end; an invisible shift counts as converged.
+    result.converged = shift < 0.1;
+    // Negligible shifts end the loop early, but not before iterations with Tukey weights.
+    if (shift < 0.01)
+      iteration = std::max(iteration, tukey ? options.iterations - 1 : options.iterations / 2 - 1);
+  }
+  const double sigma = std::max(result.sigma, options.min_sigma);
+  result.covariance = sigma * sigma * measured.ldlt().solve(Matrix6::Identity());
+  result.mean_depth = result.finite_inliers > 0 ? depth / result.finite_inliers : 0;
+  if (rotation_only) {
+    result.covariance = sigma * sigma * normal.ldlt().solve(Matrix6::Identity());
+    result.covariance.leftCols<3>().setZero();
+    result.covariance.topRows<3>().setZero();
+  }
+  return result;
+}
+
+// Whether the finite points determine the camera position to within this ratio of the mean depth.
+bool IsPositionObservable(const PoseRefinement& result, double max_sigma) {
+  const double variance = result.covariance.topLeftCorner<3, 3>().trace();
+  return variance >= 0 && variance <= Square(max_sigma * result.mean_depth);
+}
+
+}  // namespace
+
+std::optional<std::string> PoseRefinementOptions::Validate() const {
+  return OptionCheck()
+      .AtLeast(iterations, 1, "number of iterations of the pose refinement")
+      .Positive(tukey_factor, "factor of the robust threshold")
+      .Positive(min_sigma, "smallest sigma of the residuals of a pose")
+      .Ratio(min_weight, "weight of an inlier")
+      .Ratio(infinite_weight, "weight of an infinite point")
+      .AtLeast(min_finite, 0, "number of finite points that determine the translation")
+      .Positive(max_position_sigma, "position sigma of a determined translation")
+      .Positive(prior_translation_sigma, "translation sigma of a rotation")
+      .fault();
+}
+
+PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
+                          const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
+                          PoseRefinementMemory* memory, const RotationPrior& prior) {
+  const auto finite = std::count_if(measurements->begin(), measurements->end(),
+                                    [](const PoseMeasurement& m) { return !m.infinite(); });
+  const auto infinite = static_cast<std::ptrdiff_t>(measurements->size()) - finite;
+  const bool rotation_observable = infinite >= kMinRays || (prior.reliable && infinite + finite >= kMinRays);
+  MotionConstraint constraint;
+  if (finite >= options.min_finite || !rotation_observable) {
+    constraint.infinite_weight = options.infinite_weight;
+    PoseRefinement result = Refine(camera, start, options, prior, constraint, measurements, memory);
+    const Rigid3 camera_from_map_without_prior = result.camera_from_map;
+    const bool enough_finite = result.finite_inliers >= options.min_finite;
+    const bool position_observable =
+        enough_finite && IsPositionObservable(result, options.max_position_sigma);
+    if (prior.reliable && enough_finite && !IsPositionObservable(result, options.max_position_sigma / 2)) {
+      constraint.sigma = options.prior_translation_sigma * result.mean_depth;
+      result = Refine(camera, start, options, prior, constraint, measurements, memory);
+    }
+    if (!rotation_observable || position_observable || constraint.sigma > 0) {
+      result.camera_from_map_without_prior = camera_from_map_without_prior;
+      const bool infinite_too = result.inliers > result.finite_inliers;
+      result.observed = infinite_too ? ObservedMotion::kHybrid : ObservedMotion::kSixDof;
+      if (rotation_observable && !position_observable) result.observed = ObservedMotion::kPanorama;
+      return result;
+    }
+    if (enough_finite) constraint.sigma = options.max_position_sigma * result.mean_depth;
+    constraint.infinite_weight = 1;
+  }
+  constraint.rotation_only = constraint.sigma == 0;
+  PoseRefinement result = Refine(camera, start, options, prior, constraint, measurements, memory);
+  result.observed = ObservedMotion::kPanorama;
+  return result;
+}
+
+}  // namespace docent::engine

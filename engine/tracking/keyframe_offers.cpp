@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/keyframe_offers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/tracking/keyframe_novelty.h"
+#include "engine/tracking/reference_keyframe.h"
+
+namespace docent::engine {
+
+namespace {
+
+double FieldOfView(const CameraModel& camera) {
+  const double middle = camera.height_px() / 2.0;
+  const auto left = camera.Unproject({0, middle});
+  const auto right = camera.Unproject({camera.width_px() - 1.0, middle});
+  return left && right ? std::acos(std::clamp(left->dot(*right), -1.0, 1.0)) : 1.0;
+}
+
+}  // namespace
+
+KeyFrameOffers::KeyFrameOffers(const TrackerOptions& options, const CameraModel& camera)
+    : options_(options), policy_(options.keyframe_policy, FieldOfView(camera)) {}
+
+void KeyFrameOffers::SetCamera(const CameraModel& camera) {
+  policy_.SetFieldOfView(FieldOfView(camera));
+}
+
+void KeyFrameOffers::Reset() {
+  policy_.Reset();
+  candidate_.reset();
+  taken_.reset();
+}
+
+void KeyFrameOffers::BeginFrame() {
+  candidate_.reset();
+  taken_.reset();
+  ++frames_since_keyframe_;
+}
+
+void KeyFrameOffers::Consider(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose) {
+  const MapTrackResult& result = pose.result;
+  const bool needs_six_dof = result.observed != ObservedMotion::kPanorama &&
+                             NeedsKeyFrame(options_.keyframes, map, result.camera_from_map, result);
+  KeyFrameChoice choice = needs_six_dof ? KeyFrameChoice::kSixDof : KeyFrameChoice::kNone;
+  if (options_.hybrid) {
+    // The panorama map that the pose comes from is the one to extend.
+    if (policy_.mode() == KeyFramePolicy::Mode::kSixDof && result.observed == ObservedMotion::kPanorama) {
+      if (const PanoramaMap* panorama = map.FindPanorama(pose.panorama)) policy_.Reopen(*panorama, map);
+    }
+    choice = policy_.Select({.time = image.time,
+                             .camera_from_map = result.camera_from_map,
+                             .observed = result.observed,
+                             .finite_coverage = result.finite_coverage,
+                             .coverage = result.coverage,
+                             .points = result.inliers,
+                             .median_depth = pose.median_depth,
+                             .needs_six_dof = needs_six_dof},
+                            map);
+  }
+  if (choice == KeyFrameChoice::kNone || frames_since_keyframe_ < options_.frames_between_keyframes) return;
+  Offer(choice, image, &map, result.camera_from_map, pose.matches, pose.panorama);
+}
+
+void KeyFrameOffers::OfferFirst(const CameraImage& image) {
+  Offer(KeyFrameChoice::kFirst, image, nullptr, Rigid3(), {}, kNoId);
+}
+
+void KeyFrameOffers::Offer(KeyFrameChoice choice, const CameraImage& image, const MapSnapshot* map,
+                           const Rigid3& camera_from_map, const std::vector<PointMatch>& matches,
+                           PanoramaId panorama) {
+  KeyFrameCandidate candidate;
+  candidate.choice = choice;
+  candidate.panorama = panorama;
+  candidate.time = image.time;
+  if (map) {
+    candidate.map_revision = map->revision;
+    candidate.reference_keyframe = FindReferenceKeyFrame(*map, matches);
+  }
+  candidate.camera = image.camera;
+  candidate.features = image.features;
+  candidate.camera_from_map = camera_from_map;
+  for (const PointMatch& match : matches) {
+    if (match.inlier) candidate.matches.push_back(match);
+  }
+  candidate_ = std::move(candidate);
+}
+
+std::optional<KeyFrameCandidate> KeyFrameOffers::Take() {
+  if (candidate_) taken_ = Taken{candidate_->choice, candidate_->time};
+  return std::exchange(candidate_, std::nullopt);
+}
+
+std::optional<Timestamp> KeyFrameOffers::Accept() {
+  if (!taken_) return std::nullopt;
+  frames_since_keyframe_ = 0;
+  policy_.Accepted(taken_->choice, taken_->time);
+  return std::exchange(taken_, std::nullopt)->time;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "engine/mapping/keyframe_candidate.h"
+#include "engine/tracking/camera_image.h"
+#include "engine/tracking/keyframe_policy.h"
+#include "engine/tracking/map_tracker.h"
+#include "engine/tracking/tracker_options.h"
+
+namespace docent::engine {
+
+// Decides which frames of one camera are offered to the mapper as keyframes, and keeps account of those that
+// it accepted. At most one offer per frame. Used on the camera's thread.
+class KeyFrameOffers {
+ public:
+  KeyFrameOffers(const TrackerOptions& options, const CameraModel& camera);
+
+  void SetCamera(const CameraModel& camera);
+  // To be called when the map is left.
+  void Reset();
+  // To be called after a change of the map, and after a pose that does not continue the previous one.
+  void Restart() { policy_.Reset(); }
+  // The previous frame's offer ends.
+  void BeginFrame();
+
+  // A tracked frame whose pose may be relied on.
+  struct TrackedPose {
+    const MapTrackResult& result;
+    const std::vector<PointMatch>& matches;
+    PanoramaId panorama = kNoId;  // whose points were searched
+    double median_depth = 1;      // map units, of the finite points
+  };
+  // Offers the frame if it should become a keyframe.
+  void Consider(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose);
+  // Offers the first image of a map that is empty so far.
+  void OfferFirst(const CameraImage& image);
+  // The mapper made a panorama map of the image of this time.
+  void FirstIsMapped(Timestamp time) { policy_.Accepted(KeyFrameChoice::kFirst, time); }
+  void Withdraw() { candidate_.reset(); }
+
+  // The offer of this frame, once.
+  std::optional<KeyFrameCandidate> Take();
+  // To be called when the mapper accepted what Take returned; without it, the offer counts as refused.
+  // Returns the keyframe's time; empty if nothing was taken from this frame.
+  std::optional<Timestamp> Accept();
+
+  const KeyFramePolicy& policy() const { return policy_; }
+
+ private:
+  struct Taken {
+    KeyFrameChoice choice = KeyFrameChoice::kNone;
+    Timestamp time{};
+  };
+  void Offer(KeyFrameChoice choice, const CameraImage& image, const MapSnapshot* map,
+             const Rigid3& camera_from_map, const std::vector<PointMatch>& matches, PanoramaId panorama);
+
+  TrackerOptions options_;
+  KeyFramePolicy policy_;
+  std::optional<KeyFrameCandidate> candidate_;
+  std::optional<Taken> taken_;  // what the mapper may still accept
+  int frames_since_keyframe_ = 0;
+};
+
+}  // namespace docent::engine

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/map_initialization.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace docent::engine {
+
+namespace {
+
+// Calls `each` for every point that both a keyframe and the present frame observe. Both ranges ascend by
+// point.
+template <class Each>
+void ForShared(const MapSnapshot& map, KeyFrameId keyframe, const std::vector<PointMatch>& matches,
+               const Each& each) {
+  auto seen = std::lower_bound(
+      map.observations.begin(), map.observations.end(), keyframe,
+      [](const Observation& observation, KeyFrameId wanted) { return observation.keyframe < wanted; });
+  auto match = matches.begin();
+  while (seen != map.observations.end() && seen->keyframe == keyframe && match != matches.end()) {
+    if (seen->point < match->point) {
+      ++seen;
+    } else if (match->point < seen->point) {
+      ++match;
+    } else {
+      each(*seen++, *match++);
+    }
+  }
+}
+
+}  // namespace
+
+MapInitialization::MapInitialization(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera,
+                                     std::uint64_t initializer_seed, std::uint64_t target_seed)
+    : options_(options), initializer_(options.initializer, camera, initializer_seed) {
+  if (options.target)
+    target_initializer_.emplace(options.target, options.target_start, std::move(camera), target_seed);
+}
+
+void MapInitialization::SetCamera(std::shared_ptr<const CameraModel> camera, Random* random) {
+  initializer_.SetCamera(camera);
+  if (options_.target)
+    target_initializer_.emplace(options_.target, options_.target_start, std::move(camera), random->Next());
+}
+
+void MapInitialization::ResetViews() {
+  initializer_.Reset();
+  if (target_initializer_) target_initializer_->Reset();
+}
+
+Timestamp MapInitialization::FirstViewTime() const {
+  return target_initializer_ ? target_initializer_->first_time() : initializer_.first_time();
+}
+
+void MapInitialization::Begin() {
+  Stop();
+  phase_ = Phase::kSearching;
+}
+
+void MapInitialization::Stop() {
+  phase_ = Phase::kOff;
+  pair_.reset();
+  keyframe_rotation_rates_.clear();
+  ResetViews();
+}
+
+void MapInitialization::PairFailed() {
+  if (phase_ == Phase::kPairGiven) phase_ = Phase::kSearching;
+}
+
+void MapInitialization::FirstIsMapped(Timestamp time, const Rigid3& camera_from_map) {
+  // The keypoint tracks of the initializer must start in a frame with a known pose.
+  first_view_from_map_ = camera_from_map;
+  if (FirstViewTime() != time) ResetViews();
+}
+
+void MapInitialization::AddKeyFrame(Timestamp time, const Eigen::Vector3d& rotation_rate) {
+  if (is_on()) keyframe_rotation_rates_.emplace_back(time, rotation_rate);
+}
+
+std::optional<InitialPair> MapInitialization::TrackViews(const CameraImage& image, std::string* hint) {
+  std::optional<InitialPair> pair;
+  if (target_initializer_) {
+    if (auto start = target_initializer_->Track(image.time, image.features)) pair = std::move(start->pair);
+    *hint = target_initializer_->hint();
+  } else {
+    pair = initializer_.Track(image.time, image.features);
+    *hint = initializer_.hint();
+  }
+  return pair;
+}
+
+void MapInitialization::Search(const CameraImage& image, const MapSnapshot* map, PanoramaId panorama,
+                               const Eigen::Vector3d& rotation_rate, TrackedFrame* out) {
+  if (!map) out->state = TrackingState::kInitializing;
+  if (phase_ == Phase::kPairGiven) {
+    if (!map) out->hint = "Starting the map. Please wait.";
+    return;
+  }
+  const bool posed = HasPose(out->state);
+  if (map && !posed) {
+    // Without a pose the initializer's first view would have no position in the map.
+    ResetViews();
+    return;
+  }
+  const bool directions = options_.hybrid && options_.build_maps;
+  if (!map && directions) ResetViews();  // the map's first image is also the initializer's first view
+  pair_ = TrackViews(image, &out->hint);
+  if (pair_) pair_->a_from_map = first_view_from_map_;
+  if (!pair_ && map && posed && directions && !target_initializer_)
+    pair_ = TryPanoramaViews(image, *map, panorama, rotation_rate, *out);
+  if (pair_) phase_ = Phase::kPairGiven;
+  if (FirstViewTime() == image.time) first_view_from_map_ = posed ? out->camera_from_map : Rigid3();
+}
+
+// The panorama keyframe with the largest parallax to the image: the largest median distance of its points
+// from the pixels that the rotation alone predicts. Null if no keyframe has enough parallax for the
+// initializer.
+const KeyFrame* MapInitialization::FindMaxParallaxKeyFrame(const CameraImage& image, const MapSnapshot& map,
+                                                           PanoramaId panorama, const TrackedFrame& tracked) {
+  // With less, no initialization is significant at a keypoint noise of 0.3 pixels.
+  constexpr double kMinParallaxPx = 4;
+  constexpr std::size_t kMinShared = 60;
+  sorted_matches_ = tracked.matches;
+  std::sort(sorted_matches_.begin(), sorted_matches_.end(),
+            [](const PointMatch& a, const PointMatch& b) { return a.point < b.point; });
+  const KeyFrame* widest = nullptr;
+  double widest_px = kMinParallaxPx;
+  std::vector<double> parallax_px;
+  for (const KeyFrame& keyframe : map.keyframes) {
+    if (keyframe.panorama == kNoId || keyframe.panorama != panorama) continue;
+    const Rotation3 now_from_keyframe =
+        tracked.camera_from_map.rotation * keyframe.camera_from_map.rotation.inverse();
+    parallax_px.clear();
+    ForShared(map, keyframe.id, sorted_matches_, [&](const Observation& seen, const PointMatch& match) {
+      const auto before = keyframe.camera->Unproject(seen.pixel.cast<double>());
+      if (!before) return;
+      const auto expected = image.camera->Project(now_from_keyframe * *before);
+      if (expected) parallax_px.push_back((*expected - match.pixel.cast<double>()).norm());
+    });
+    if (parallax_px.size() < kMinShared) continue;
+    const auto middle = parallax_px.begin() + static_cast<std::ptrdiff_t>(parallax_px.size() / 2);
+    std::nth_element(parallax_px.begin(), middle, parallax_px.end());
+    if (*middle <= widest_px) continue;
+    widest_px = *middle;
+    widest = &keyframe;
+  }
+  return widest;
+}
+
+std::optional<InitialPair> MapInitialization::TryPanoramaViews(const CameraImage& image,
+                                                               const MapSnapshot& map, PanoramaId panorama,
+                                                               const Eigen::Vector3d& rotation_rate,
+                                                               const TrackedFrame& tracked) {
+  constexpr int kInterval = 3;  // frames; the initializer itself makes such an attempt every second frame
+  if (++frames_since_views_ < kInterval || tracked.matches.empty()) return std::nullopt;
+  frames_since_views_ = 0;
+  const KeyFrame* const keyframe = FindMaxParallaxKeyFrame(image, map, panorama, tracked);
+  if (!keyframe) return std::nullopt;
+  std::vector<InitialPair::Match> matches;
+  std::vector<std::uint32_t> ids;
+  ForShared(map, keyframe->id, sorted_matches_, [&](const Observation& seen, const PointMatch& match) {
+    matches.push_back({seen.pixel, match.pixel, seen.level});
+    ids.push_back(seen.point);
+  });
+  const auto rate = std::find_if(keyframe_rotation_rates_.begin(), keyframe_rotation_rates_.end(),
+                                 [&](const auto& entry) { return entry.first == keyframe->time; });
+  const Eigen::Vector3d before =
+      rate != keyframe_rotation_rates_.end() ? rate->second : Eigen::Vector3d(Eigen::Vector3d::Zero());
+  auto pair = initializer_.TryViews({keyframe->time, keyframe->features}, {image.time, image.features},
+                                    std::move(matches), ids,
+                                    (rotation_rate - before).norm() / image.camera->PixelAngle());
+  if (pair) pair->a_from_map = keyframe->camera_from_map;
+  return pair;
+}
+
+}  // namespace docent::engine

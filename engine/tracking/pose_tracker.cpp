@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/pose_tracker.h"
+
+#include <bit>
+#include <opencv2/core.hpp>
+#include <utility>
+
+#include "engine/tracking/reference_keyframe.h"
+#include "engine/vision/rotation_alignment.h"
+
+namespace docent::engine {
+
+PoseTracker::PoseTracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera)
+    : options_(options),
+      criteria_(options),
+      map_tracker_(options.map_tracker, std::move(camera)),
+      rotation_center_(options.rotation_center) {}
+
+void PoseTracker::Reset() {
+  rotation_reference_.reset();
+  rotation_center_.Reset();
+  pivot_estimate_ = {};
+  map_tracker_.Clear();
+  map_tracker_.EnablePanorama(kNoId);
+}
+
+void PoseTracker::Begin(Timestamp time, const Rigid3& camera_from_map, ObservedMotion observed) {
+  map_tracker_.Clear();
+  map_tracker_.EnablePanorama(kNoId);
+  motion_.Reset(time, camera_from_map);
+  observed_ = observed;
+}
+
+void PoseTracker::ApplyCorrections(const MapSnapshot& before, const MapSnapshot& newer, bool tracked) {
+  if (newer.corrections.empty() || newer.corrections.back()->revision <= before.revision) return;
+  const KeyFrameId reference_keyframe = FindReferenceKeyFrame(
+      before, tracked ? std::span(map_tracker_.matches()) : std::span<const PointMatch>());
+  for (const auto& correction : newer.corrections) {
+    if (correction->revision <= before.revision || correction->revision > newer.revision) continue;
+    const auto moved = correction->after_from_before.find(reference_keyframe);
+    if (moved == correction->after_from_before.end()) continue;
+    motion_.ApplyCorrection(moved->second);
+    rotation_reference_pose_ = CorrectedPose(rotation_reference_pose_, moved->second);
+    median_depth_ *= moved->second.scale;
+    pivot_estimate_.pivot *= moved->second.scale;
+    rotation_center_.Reset();
+  }
+}
+
+PanoramaId PoseTracker::PanoramaFor(const Rigid3& predicted, const MapSnapshot& map,
+                                    const KeyFramePolicy& policy) const {
+  if (map.panoramas.empty()) return kNoId;
+  if (policy.mode() == KeyFramePolicy::Mode::kPanorama) return policy.OpenPanorama(map);
+  const bool needed =
+      observed_ == ObservedMotion::kPanorama || finite_coverage_ < options_.keyframe_policy.min_coverage;
+  return needed ? policy.PanoramaNear(predicted, median_depth_, map) : kNoId;
+}
+
+void PoseTracker::SearchPanoramaAt(const Rigid3& camera_from_map, const MapSnapshot& map,
+                                   const KeyFramePolicy& policy) {
+  map_tracker_.EnablePanorama(PanoramaFor(camera_from_map, map, policy));
+}
+
+void PoseTracker::SetComparison(PatchComparison comparison) {
+  comparison_ = comparison;
+  map_tracker_.SetComparison(comparison);
+}
+
+void PoseTracker::AlternateComparison() {
+  SetComparison(comparison_ == PatchComparison::kStandard ? PatchComparison::kTolerant
+                                                          : PatchComparison::kStandard);
+}
+
+MapTrackResult PoseTracker::TryFrom(const MapSnapshot& map, const CameraImage& image, const Rigid3& guess,
+                                    MapTracker::Effort effort, Random* random) {
+  return map_tracker_.Track(map, *image.features, guess, effort, random);
+}
+
+MapTrackResult PoseTracker::TryElsewhere(const MapSnapshot& map, const CameraImage& image,
+                                         const Rigid3& guess, PanoramaId panorama, MapTracker::Effort effort,
+                                         Random* random) {
+  map_tracker_.Clear();
+  map_tracker_.EnablePanorama(panorama);
+  return TryFrom(map, image, guess, effort, random);
+}
+
+Rigid3 PoseTracker::PredictAfterLoss(const CameraImage& image) const {
+  const auto rotation = image.RotationFromPrevious();
+  return rotation ? motion_.PredictWithRotation(*rotation) : motion_.Predict(image.time);
+}
+
+void PoseTracker::MissAt(Timestamp time, const Rigid3& camera_from_map) {
+  map_tracker_.ForgetLastFrame();
+  motion_.Reset(time, camera_from_map);
+}
+
+MapTrackResult PoseTracker::TrackFromPrediction(const MapSnapshot& map, const CameraImage& image,
+                                                const Rigid3& predicted, Random* random) {
+  const auto track = [&] { return TryFrom(map, image, predicted, MapTracker::Effort::kStandard, random); };
+  if (comparison_ == PatchComparison::kStandard) {
+    const MapTrackResult result = track();
+    // The photometric difference may have returned.
+    if (frames_tolerant_ == 0 || result.Quality() >= options_.good_quality) return result;
+    SetComparison(PatchComparison::kTolerant);
+    return track();
+  }
+  // Less and less often, as an attempt costs as much as the frame itself.
+  constexpr unsigned kMaxInterval = 32;
+  ++frames_tolerant_;
+  if (std::has_single_bit(frames_tolerant_) || frames_tolerant_ % kMaxInterval == 0) {
+    SetComparison(PatchComparison::kStandard);
+    const MapTrackResult result = track();
+    if (criteria_.IsAccepted(result, comparison_) && result.inliers >= options_.min_standard_ratio * inliers_)
+      return result;
+    SetComparison(PatchComparison::kTolerant);
+  }
+  return track();
+}
+
+PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraImage& image,
+                                         const std::optional<Rotation3>& commanded,
+                                         const KeyFramePolicy& policy, Random* random) {
+  using Outcome = Estimate::Outcome;
+  // A commanded rotation is more accurate than the motion model.
+  Rigid3 predicted = commanded ? motion_.PredictWithRotation(*commanded) : motion_.Predict(image.time);
+  if (observed_ == ObservedMotion::kPanorama)
+    predicted = RotatedAbout(pivot_estimate_.pivot, motion_.last(), predicted.rotation);
+  SearchPanoramaAt(predicted, map, policy);
+  map_tracker_.SetPivot(pivot_estimate_);
+  MapTrackResult result = TrackFromPrediction(map, image, predicted, random);
+  if (!criteria_.IsAccepted(result, comparison_)) {
+    // A second attempt with larger radii, from the last pose rotated by the alignment of the thumbnails.
+    const auto rotation = image.RotationFromPrevious();
+    const Rigid3 rotated = rotation ? motion_.PredictWithRotation(*rotation) : predicted;
+    result = TryFrom(map, image, rotated, MapTracker::Effort::kWide, random);
+  }
+  if (!criteria_.IsAccepted(result, comparison_) && !criteria_.HoldsTrack(result)) {
+    map_tracker_.ForgetLastFrame();
+    if (!options_.hybrid) return {Outcome::kLost, result};
+    const auto rotation_only = TrackRotationDirectly(map, image, result);
+    return rotation_only ? Estimate{Outcome::kRotationOnly, *rotation_only}
+                         : Estimate{Outcome::kLost, result};
+  }
+  poor_rotation_frames_ = criteria_.FitsRotation(result, map) ? 0 : poor_rotation_frames_ + 1;
+  const bool left = poor_rotation_frames_ >= options_.max_poor_rotation_frames;
+  return {left ? Outcome::kLeftMap : Outcome::kPose, result};
+}
+
+// With low texture there are edges and shading but hardly a keypoint; all pixels together still determine the
+// rotation (ptamm §3.2). Only if few points are expected or most of them are found: if many points fail, the
+// pose is wrong.
+std::optional<MapTrackResult> PoseTracker::TrackRotationDirectly(const MapSnapshot& map,
+                                                                 const CameraImage& image,
+                                                                 const MapTrackResult& tried) {
+  // A map without finite points represents rotations only.
+  const bool low_texture = tried.attempted <= options_.low_texture_points ||
+                           tried.Quality() >= options_.high_quality || !map.HasFinitePoints();
+  if (!rotation_reference_ || !low_texture ||
+      image.time - last_points_ > FromSeconds(options_.max_direct_rotation_s))
+    return std::nullopt;
+  const SmallBlurryImage& thumbnail = image.features->small_blurry;
+  const double spread =
+      cv::norm(thumbnail.pixels, cv::NORM_L2SQR) / static_cast<double>(thumbnail.pixels.total());
+  const Rotation3 predicted = motion_.Predict(image.time).rotation;
+  std::optional<RotationAlignment> rotation;
+  const auto align = [&] {
+    rotation = AlignRotation(rotation_reference_->small_blurry, *image.camera, thumbnail, *image.camera,
+                             predicted * rotation_reference_pose_.rotation.inverse(), 10,
+                             pivot_estimate_.pivot / median_depth_);
+    return rotation && rotation->converged && rotation->overlap >= options_.min_image_overlap &&
+           rotation->rms * rotation->rms <= (1 - options_.min_explained_variance) * spread;
+  };
+  // An old reference image accumulates less error; a new one overlaps more with the present image.
+  if (!align()) {
+    if (!image.previous || rotation_reference_ == image.previous) return std::nullopt;
+    rotation_reference_ = image.previous;
+    rotation_reference_pose_ = motion_.last();
+    if (!align()) return std::nullopt;
+  }
+  MapTrackResult result;
+  result.camera_from_map = RotatedAbout(pivot_estimate_.pivot, rotation_reference_pose_,
+                                        rotation->b_from_a * rotation_reference_pose_.rotation);
+  result.observed = ObservedMotion::kPanorama;
+  result.attempted = tried.attempted;
+  return result;
+}
+
+void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result, bool relocalized) {
+  const Rotation3 previous_rotation = motion_.last().rotation;
+  if (relocalized) {
+    frames_tolerant_ = 0;
+    motion_.Reset(image.time, result.camera_from_map);
+    rotation_center_.Reset();
+  } else {
+    motion_.Update(image.time, result.camera_from_map);
+  }
+  rotation_rate_ = (result.camera_from_map.rotation * previous_rotation.inverse()).Log();
+  observed_ = result.observed;
+  inliers_ = result.inliers;
+  finite_coverage_ = result.finite_coverage;
+  if (result.finite_inliers > 0 && result.median_depth > 0) median_depth_ = result.median_depth;
+  if (options_.hybrid && result.observed != ObservedMotion::kPanorama) {
+    rotation_center_.Add(image.time, result.camera_from_map_without_prior, result.covariance, median_depth_);
+    pivot_estimate_ = rotation_center_.Estimate(median_depth_);
+  }
+  if (result.inliers == 0) return;
+  rotation_reference_ = image.features;
+  rotation_reference_pose_ = result.camera_from_map;
+  last_points_ = image.time;
+  map_tracker_.RecordMisses();
+}
+
+void PoseTracker::Lose(Timestamp time) {
+  map_tracker_.ForgetLastFrame();
+  poor_rotation_frames_ = 0;
+  motion_.Miss(time);
+}
+
+}  // namespace docent::engine

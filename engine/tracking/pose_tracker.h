@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/base/random.h"
+#include "engine/tracking/camera_image.h"
+#include "engine/tracking/keyframe_policy.h"
+#include "engine/tracking/map_tracker.h"
+#include "engine/tracking/motion_model.h"
+#include "engine/tracking/pose_criteria.h"
+#include "engine/tracking/rotation_center.h"
+#include "engine/tracking/tracker_options.h"
+
+namespace docent::engine {
+
+// Follows the pose of one camera from frame to frame: predicts it, has a MapTracker estimate it, judges it,
+// and continues a rotation from all pixels where there are too few points. Knows nothing of other maps or
+// places. Poses are camera_from_map. Used on the camera's thread.
+class PoseTracker {
+ public:
+  PoseTracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera);
+
+  void SetRim(const RimMask* rim) { map_tracker_.SetRim(rim); }
+  void SetCamera(std::shared_ptr<const CameraModel> camera) { map_tracker_.SetCamera(std::move(camera)); }
+  // Forgets the map and the motion in it.
+  void Reset();
+  // A map was started, and this is the newest pose known in it.
+  void Begin(Timestamp time, const Rigid3& camera_from_map, ObservedMotion observed);
+  // Transforms everything in map coordinates by the corrections between two snapshots. tracked: the last
+  // frame had a pose.
+  void ApplyCorrections(const MapSnapshot& before, const MapSnapshot& newer, bool tracked);
+
+  struct Estimate {
+    enum class Outcome {
+      kPose,
+      kRotationOnly,  // from all pixels; `result` holds no points
+      kLost,
+      kLeftMap,  // the camera has translated where only infinite points are mapped
+    };
+    Outcome outcome = Outcome::kLost;
+    MapTrackResult result;
+  };
+  // Estimates the pose of the next frame of the track. commanded: the rotation since the previous frame,
+  // where it is known. The caller answers with Accept or Lose.
+  Estimate Track(const MapSnapshot& map, const CameraImage& image, const std::optional<Rotation3>& commanded,
+                 const KeyFramePolicy& policy, Random* random);
+  // The pose of the present frame. relocalized: it does not continue the previous ones.
+  void Accept(const CameraImage& image, const MapTrackResult& result, bool relocalized);
+  // The present frame has no pose.
+  void Lose(Timestamp time);
+
+  // For relocalization.
+  // The last pose, moved on by the rotation of the images or else by the motion model.
+  Rigid3 PredictAfterLoss(const CameraImage& image) const;
+  // Assumes this pose, which was tried in vain, in the next frame.
+  void MissAt(Timestamp time, const Rigid3& camera_from_map);
+  // Searches the points of the panorama map that this pose needs.
+  void SearchPanoramaAt(const Rigid3& camera_from_map, const MapSnapshot& map, const KeyFramePolicy& policy);
+  MapTrackResult TryFrom(const MapSnapshot& map, const CameraImage& image, const Rigid3& guess,
+                         MapTracker::Effort effort, Random* random);
+  // The same at a place that was not tracked in the last frame.
+  MapTrackResult TryElsewhere(const MapSnapshot& map, const CameraImage& image, const Rigid3& guess,
+                              PanoramaId panorama, MapTracker::Effort effort, Random* random);
+  void ForgetPatches() { map_tracker_.Clear(); }
+  // With the standard comparison next time if it was tolerant, and the other way round.
+  void AlternateComparison();
+
+  PatchComparison comparison() const { return comparison_; }
+  const MapTracker& map_tracker() const { return map_tracker_; }
+  const Rigid3& last() const { return motion_.last(); }
+  // Rotation vector per frame, of the last tracked frame.
+  const Eigen::Vector3d& rotation_rate() const { return rotation_rate_; }
+  double median_depth() const { return median_depth_; }
+
+ private:
+  // The panorama map to search: the open one, or one to whose centre the camera has returned if the finite
+  // points do not cover the image.
+  PanoramaId PanoramaFor(const Rigid3& predicted, const MapSnapshot& map, const KeyFramePolicy& policy) const;
+  // Tracks the map from the predicted pose. With photometric tolerance, tries the standard comparison from
+  // time to time and keeps it if it succeeds.
+  MapTrackResult TrackFromPrediction(const MapSnapshot& map, const CameraImage& image,
+                                     const Rigid3& predicted, Random* random);
+  std::optional<MapTrackResult> TrackRotationDirectly(const MapSnapshot& map, const CameraImage& image,
+                                                      const MapTrackResult& tried);
+  void SetComparison(PatchComparison comparison);
+
+  TrackerOptions options_;
+  PoseCriteria criteria_;
+  MapTracker map_tracker_;
+  MotionModel motion_;
+  RotationCenter rotation_center_;
+  PivotEstimate pivot_estimate_;  // pivot of the present rotation
+  // What the last pose determined. After kPanorama the camera centre is kept.
+  ObservedMotion observed_ = ObservedMotion::kSixDof;
+  PatchComparison comparison_ = PatchComparison::kStandard;
+  unsigned frames_tolerant_ = 0;                   // consecutive frames tracked with photometric tolerance
+  int inliers_ = 0;                                // of the last frame
+  double finite_coverage_ = 1, median_depth_ = 1;  // of the last frame with finite inliers
+  Eigen::Vector3d rotation_rate_ = Eigen::Vector3d::Zero();
+  int poor_rotation_frames_ = 0;  // consecutive frames whose residual no rotation explains
+  // Reference image of TrackRotationDirectly: the newest image whose pose came from map points or, in a long
+  // rotation, a later one.
+  std::shared_ptr<const ImageFeatures> rotation_reference_;
+  Rigid3 rotation_reference_pose_;
+  Timestamp last_points_{};  // time of the last pose from map points
+};
+
+}  // namespace docent::engine

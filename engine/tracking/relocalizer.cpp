@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/relocalizer.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace docent::engine {
+
+namespace {
+
+// Any frame time can be subtracted without overflow.
+constexpr Timestamp kDistantPast = -std::chrono::hours(24 * 365 * 50);
+
+}  // namespace
+
+void Relocalizer::Lose(Timestamp time) {
+  lost_since_ = time;
+  frames_lost_ = 0;
+}
+
+void Relocalizer::LoseLongAgo() {
+  lost_since_ = kDistantPast;
+}
+
+// A place with a low visible inlier ratio may be another one of similar appearance.
+bool Relocalizer::HasBetterCompetitor(const PoseSearch& search, const MapTrackResult& result,
+                                      TrackedFrame* out) const {
+  const auto is_better = [&](const std::optional<VerifiedPlace>& competitor) {
+    return competitor &&
+           competitor->result.VisibleInlierRatio() >= options_.better_ratio * result.VisibleInlierRatio();
+  };
+  const auto query = search.Query(&out->relocalization);
+  return is_better(
+             search.verification->BestElsewhere(query, search.map_key, result.camera_from_map, kNoId)) ||
+         is_better(search.verification->BestCompetingMap(
+             query, search.retrieval->ByThumbnail(search.image, *search.finder), {search.map_key}));
+}
+
+Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, TrackedFrame* out,
+                                               std::optional<FoundPose>* found) {
+  if (search.image.time - lost_since_ > FromSeconds(options_.short_loss_s)) return Attempt::kGoOn;
+  const Rigid3 guess = search.pose->PredictAfterLoss(search.image);
+  search.pose->SearchPanoramaAt(guess, *search.map, search.policy);
+  const auto track = [&](MapTracker::Effort effort) {
+    return search.pose->TryFrom(*search.map, search.image, guess, effort, search.random);
+  };
+  MapTrackResult result = track(MapTracker::Effort::kRecovery);
+  const RejectionReason rejection = search.RejectionReasonOf(result, *search.map);
+  if (rejection != RejectionReason::kNone && !options_.build_maps) {
+    // With too few patches on the upper levels for a pose, the predicted pose may still be good.
+    for (const auto effort : {MapTracker::Effort::kStandard, MapTracker::Effort::kWide}) {
+      if (search.criteria.HoldsTrack(result)) break;
+      result = track(effort);
+    }
+    if (search.criteria.HoldsTrack(result)) {
+      *found = FoundPose{FoundPose::How::kNearby, search.map, search.map_key, result};
+      return Attempt::kFound;
+    }
+  }
+  if (rejection == RejectionReason::kNone) {
+    const bool poor = search.finder && result.VisibleInlierRatio() < options_.poor_visible_ratio;
+    if (!poor || !HasBetterCompetitor(search, result, out)) {
+      if (!poor) {
+        *found = FoundPose{FoundPose::How::kNearby, search.map, search.map_key, result};
+        return Attempt::kFound;
+      }
+      if (search.hypothesis->exists()) return Attempt::kGoOn;
+      search.hypothesis->Begin(search.map_key, result.camera_from_map, search.pose->map_tracker().panorama());
+      out->relocalization = search.hypothesis->Unconfirmed(result);
+      return Attempt::kEnded;
+    }
+  }
+  out->relocalization.Consider(
+      {.rejection = rejection, .map_key = search.map_key, .inliers = result.inliers});
+  search.pose->MissAt(search.image.time, guess);
+  return Attempt::kGoOn;
+}
+
+bool Relocalizer::IsUnambiguous(std::uint64_t best_key, double best_quality, std::uint64_t second_key,
+                                double second_quality, std::uint64_t own) {
+  const bool ahead = best_quality > second_quality;
+  if (best_key != leader_.key || !ahead) leader_.frames = 0;
+  if (ahead) ++leader_.frames;
+  leader_.key = best_key;
+  // The map that the camera was in is preferred.
+  const double lead = second_key == own ? options_.better_ratio : options_.min_quality_ratio;
+  return ahead && (best_quality >= lead * second_quality || leader_.frames >= options_.min_leading_frames);
+}
+
+Relocalizer::Attempt Relocalizer::ContinueHypothesis(const PoseSearch& search, TrackedFrame* out,
+                                                     std::optional<FoundPose>* found) {
+  MapHypothesis& hypothesis = *search.hypothesis;
+  if (!hypothesis.exists()) return Attempt::kGoOn;
+  MapTrackResult result;
+  auto map = search.MapOfHypothesis();
+  if (map) {
+    result = search.pose->TryElsewhere(*map, search.image, hypothesis.Predict(search.image),
+                                       hypothesis.panorama(), MapTracker::Effort::kWide, search.random);
+  }
+  const RejectionReason rejection =
+      map ? search.RejectionReasonOf(result, *map) : RejectionReason::kFewPoints;
+  if (rejection != RejectionReason::kNone) {
+    out->relocalization.Consider(
+        {.rejection = rejection, .map_key = hypothesis.map_key(), .inliers = result.inliers});
+    hypothesis.Clear();
+    return Attempt::kGoOn;
+  }
+  if (const auto competitor = search.verification->BestCompetingMap(
+          search.Query(&out->relocalization), search.retrieval->ByThumbnail(search.image, *search.finder),
+          {hypothesis.map_key()})) {
+    const std::uint64_t competitor_key = competitor->place.candidate.map_key;
+    if (!IsUnambiguous(hypothesis.map_key(), result.Quality(), competitor_key, competitor->result.Quality(),
+                       search.map_key)) {
+      hypothesis.Clear();
+      out->relocalization = {.rejection = RejectionReason::kAmbiguous,
+                             .map_key = hypothesis.map_key(),
+                             .competitor_key = competitor_key,
+                             .inliers = result.inliers};
+      return Attempt::kEnded;
+    }
+  }
+  hypothesis.Confirm(result.camera_from_map);
+  if (hypothesis.frames() < options_.confirming_frames) {
+    out->relocalization = hypothesis.Unconfirmed(result);
+    return Attempt::kEnded;
+  }
+  *found = FoundPose{FoundPose::How::kEntered, std::move(map), hypothesis.map_key(), result};
+  hypothesis.Clear();
+  return Attempt::kFound;
+}
+
+std::optional<FoundPose> Relocalizer::SearchPlaces(const PoseSearch& search, TrackedFrame* out) {
+  const auto query = search.Query(&out->relocalization);
+  const auto go_on = [&](const std::vector<VerifiedPlace>& found) {
+    return found.empty() && out->relocalization.rejection != RejectionReason::kAmbiguous;
+  };
+  const std::vector<AlignedPlace> by_thumbnail = search.retrieval->ByThumbnail(search.image, *search.finder);
+  std::vector<VerifiedPlace> found = search.verification->Verify(query, by_thumbnail);
+  // The places found by thumbnail remain as competitors.
+  const auto verify_too = [&](std::vector<AlignedPlace> others) {
+    if (others.empty()) return;
+    others.insert(others.end(), by_thumbnail.begin(), by_thumbnail.end());
+    found = search.verification->Verify(query, others);
+  };
+  // Visual words retrieve places whose thumbnails differ.
+  if (go_on(found)) verify_too(search.retrieval->ByWords(search.image, *search.finder, by_thumbnail));
+  // No keyframe is close enough for an alignment by rotation; descriptor matching works from further away.
+  if (go_on(found))
+    verify_too(search.retrieval->ByDescriptors(search.image, *search.finder, search.map_key, search.random));
+  if (found.empty()) return std::nullopt;
+  const auto key = [&](std::size_t i) { return found[i].place.candidate.map_key; };
+  const auto return_to = [&](const VerifiedPlace& place) {
+    return ReturnToMap(search, place, options_.poor_visible_ratio, &out->relocalization);
+  };
+  if (found.size() > 1 &&
+      !IsUnambiguous(key(0), found[0].result.Quality(), key(1), found[1].result.Quality(), search.map_key)) {
+    // With an ambiguity the camera is assumed to be still in its map.
+    const auto own = std::find_if(found.begin(), found.end(), [&](const VerifiedPlace& place) {
+      return place.place.candidate.map_key == search.map_key;
+    });
+    if (own != found.end()) return return_to(*own);
+    out->relocalization = {.rejection = RejectionReason::kAmbiguous,
+                           .map_key = key(0),
+                           .competitor_key = key(1),
+                           .inliers = found[0].result.inliers};
+    return std::nullopt;
+  }
+  if (key(0) == search.map_key) return return_to(found[0]);
+  search.hypothesis->Begin(found[0]);
+  out->relocalization = search.hypothesis->Unconfirmed(found[0].result);
+  return std::nullopt;
+}
+
+std::optional<FoundPose> Relocalizer::Search(const PoseSearch& search, TrackedFrame* out) {
+  const bool known = search.map || !options_.build_maps;
+  out->state = known ? TrackingState::kLost : TrackingState::kInitializing;
+  out->hint = known ? "Look back at a place you have seen before."
+                    : "Press New map to begin, or look at a mapped place.";
+  // The exposure or sharpness may have changed, so every other frame uses photometric tolerance. A hypothesis
+  // is continued with the comparison that found it.
+  if (!search.hypothesis->exists() && frames_lost_++ > 0) search.pose->AlternateComparison();
+  std::optional<FoundPose> found;
+  if (search.map && SearchNearby(search, out, &found) != Attempt::kGoOn) return found;
+  if (!search.finder || ContinueHypothesis(search, out, &found) != Attempt::kGoOn) return found;
+  // For a short time after the loss the same points are still occluded.
+  if (options_.build_maps || !search.map ||
+      search.image.time - lost_since_ > FromSeconds(options_.short_loss_s))
+    search.pose->ForgetPatches();
+  return SearchPlaces(search, out);
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/library/saver.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace docent::maps {
+
+namespace {
+
+constexpr std::chrono::milliseconds kMaintenanceInterval{250};
+
+}  // namespace
+
+Saver::Saver(Library* library, std::size_t capacity, Saved saved, Maintenance maintenance)
+    : library_(library),
+      capacity_(std::max<std::size_t>(1, capacity)),
+      saved_(std::move(saved)),
+      maintenance_(std::move(maintenance)),
+      worker_("map-saver", [this](const std::stop_token& stop) { Run(stop); }) {}
+
+Saver::~Saver() {
+  EndMaintenance();
+  worker_.RequestStop();  // Run ends only when no save is waiting.
+  worker_.Join();
+}
+
+void Saver::Submit(MapRecord record) {
+  {
+    std::unique_lock lock(mutex_);
+    // A waiting save of a map that is now part of this one would restore it.
+    for (const std::uint64_t gone : record.joined_keys)
+      std::erase_if(waiting_, [&](const MapRecord& waiting) { return waiting.key == gone; });
+    const auto same_map = [&] {
+      return std::find_if(waiting_.begin(), waiting_.end(),
+                          [&](const MapRecord& waiting) { return waiting.key == record.key; });
+    };
+    changed_.wait(lock, [&] { return same_map() != waiting_.end() || waiting_.size() < capacity_; });
+    if (const auto place = same_map(); place != waiting_.end()) {
+      if (record.snapshot) place->snapshot = std::move(record.snapshot);
+      if (record.scene) place->scene = std::move(record.scene);
+      place->joined_keys.insert(place->joined_keys.end(), record.joined_keys.begin(),
+                                record.joined_keys.end());
+    } else {
+      waiting_.push_back(std::move(record));
+    }
+    interrupt_ = true;
+  }
+  changed_.notify_all();
+}
+
+void Saver::Flush() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return Idle(); });
+}
+
+std::exception_ptr Saver::TakeError() {
+  std::scoped_lock lock(mutex_);
+  return std::exchange(error_, nullptr);
+}
+
+std::size_t Saver::pending() const {
+  std::scoped_lock lock(mutex_);
+  return waiting_.size() + (running_ ? 1 : 0);
+}
+
+void Saver::EndMaintenance() {
+  std::unique_lock lock(mutex_);
+  maintenance_ended_ = interrupt_ = true;
+  changed_.wait(lock, [this] { return !maintenance_running_; });
+}
+
+// Requires the lock, which is released while the maintenance runs.
+bool Saver::RunMaintenance(std::unique_lock<std::mutex>* lock) {
+  maintenance_running_ = true;
+  interrupt_ = false;
+  lock->unlock();
+  bool more = false;
+  std::exception_ptr error;
+  try {
+    more = maintenance_(interrupt_);
+  } catch (...) {
+    error = std::current_exception();
+  }
+  lock->lock();
+  if (!error_) error_ = error;
+  maintenance_running_ = false;
+  changed_.notify_all();
+  return more;
+}
+
+void Saver::Run(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  const auto has_waiting = [this] { return !waiting_.empty(); };
+  while (true) {
+    bool more = false;
+    while (maintenance_ && !maintenance_ended_ && !has_waiting()) {
+      if (!more && changed_.wait_for(lock, stop, kMaintenanceInterval,
+                                     [&] { return has_waiting() || maintenance_ended_; }))
+        break;
+      if (stop.stop_requested()) break;
+      more = RunMaintenance(&lock);
+    }
+    if (!changed_.wait(lock, stop, has_waiting)) return;
+    MapRecord record = std::move(waiting_.front());
+    waiting_.pop_front();
+    running_ = record.key;
+    lock.unlock();
+    changed_.notify_all();
+    std::exception_ptr error;
+    try {
+      library_->Save(record);
+      if (saved_) saved_(record);
+    } catch (...) {
+      error = std::current_exception();
+    }
+    record = {};  // Large data is released before waiting threads are notified.
+    lock.lock();
+    if (!error_) error_ = error;
+    running_.reset();
+    changed_.notify_all();
+  }
+}
+
+}  // namespace docent::maps

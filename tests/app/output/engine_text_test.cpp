@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/output/engine_text.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <numbers>
+
+namespace docent::app {
+namespace {
+
+using engine::JoinRefusal;
+using engine::MapOverlap;
+using engine::MapperEvent;
+
+// "event: detail" of an action in the map "Hall".
+template <typename What>
+std::string InHall(const What& what) {
+  const std::optional<EventText> text = TextOf(MapperEvent{{}, what}, "Hall");
+  return text ? text->event + ": " + text->detail : "none";
+}
+
+TEST(MapperEventText, SaysWhatWasDoneAndWhere) {
+  EXPECT_EQ(InHall(MapperEvent::MapStarted{120}), "map: started Hall: 120 points");
+  EXPECT_EQ(InHall(MapperEvent::StartFailed{31}),
+            "warning: could not initialize Hall: only 31 points are consistent");
+  EXPECT_EQ(InHall(MapperEvent::KeyFrameAdded{40, 900}),
+            "keyframe: sixdof in Hall: 40 new points, 900 in total");
+  EXPECT_EQ(InHall(MapperEvent::PanoramaOpened{300}), "panorama: opened in Hall: 300 infinite points");
+  EXPECT_EQ(InHall(MapperEvent::PanoramaKeyFrameAdded{25}),
+            "keyframe: panorama in Hall: 25 new infinite points");
+  EXPECT_EQ(InHall(MapperEvent::KeyFrameLocalized{7, false}), "keyframe: localized in Hall: keyframe 7");
+  EXPECT_EQ(InHall(MapperEvent::KeyFrameLocalized{7, true}),
+            "keyframe: localized in Hall: keyframe 7, by its descriptors");
+  EXPECT_EQ(InHall(MapperEvent::InfinitePointsTriangulated{12, 3}),
+            "points: Hall: 12 infinite points triangulated, 3 fused");
+  EXPECT_EQ(InHall(MapperEvent::KeyFrameRemoved{9}), "keyframe: removed from Hall as redundant: keyframe 9");
+  EXPECT_EQ(InHall(MapperEvent::LensesEstimated{}), "none");
+}
+
+TEST(MapperEventText, GivesTheFiguresOfAnAdjustmentAndOfALoop) {
+  engine::BundleSummary summary;
+  summary.outcome = engine::BundleSummary::Outcome::kConverged;
+  summary.iterations = 5;
+  summary.initial_cost = 120.5;
+  summary.final_cost = 80;
+  summary.sigma = 0.5;
+  summary.outliers = 3;
+  EXPECT_EQ(InHall(MapperEvent::GloballyAdjusted{summary}),
+            "adjustment: Hall: converged after 5 iterations, cost 120.5 -> 80, sigma 0.500, 3 outliers");
+  engine::ClosedLoop loop;
+  loop.keyframe = 40;
+  loop.place = 2;
+  loop.drift = 0.012;
+  loop.rotation = std::numbers::pi / 90;
+  loop.scale = 0.97;
+  loop.found = 70;
+  loop.expected = 200;
+  loop.duplicates = 33;
+  loop.reverse_inliers = 51;
+  loop.fused = 99;
+  EXPECT_EQ(InHall(MapperEvent::LoopClosed{loop}),
+            "loop: closed in Hall: drift of 1.2 % of the path, 2.00 degrees, -3.0 % in scale; keyframe 40 "
+            "matches keyframe 2: 70 of 200 points, 33 duplicates, 51 in reverse, 99 points fused");
+}
+
+TEST(MapperEventText, WarnsAboutACalibrationInWholeSentences) {
+  EXPECT_EQ(InHall(MapperEvent::CalibrationContradicted{{620, 402.4, 0.002}}),
+            "warning: The calibration is probably wrong: its focal length is 620 px, but the map indicates "
+            "about 402 px (+-1 %). Calibrate the camera with `docent calibrate`.");
+}
+
+TEST(JoinRefusalText, SaysWhyTwoMapsWereNotJoined) {
+  EXPECT_EQ(TextOf(JoinRefusal::kNone, {}), "");
+  EXPECT_EQ(TextOf(JoinRefusal::kTooMuchDrift, {}), "one map would have to be bent too far to fit the other");
+  MapOverlap overlap;
+  overlap.outcome = MapOverlap::Outcome::kTooFewConsecutive;
+  overlap.consecutive = 2;
+  EXPECT_EQ(TextOf(JoinRefusal::kNoOverlap, overlap),
+            "only 2 consecutive keyframes are recognised at the same place");
+  overlap.outcome = MapOverlap::Outcome::kContradicted;
+  overlap.with_view = 8;
+  overlap.confirmed = 5;
+  overlap.found_ratio = 0.17;
+  EXPECT_EQ(
+      TextOf(JoinRefusal::kNoOverlap, overlap),
+      "they look alike, but only 5 of 8 keyframes that should show the other map match it, and find 17 % "
+      "of its points");
+  overlap.confirmed = 8;
+  overlap.contradicted = 12;
+  overlap.regions = 60;
+  EXPECT_EQ(TextOf(JoinRefusal::kNoOverlap, overlap),
+            "they look alike, but their surfaces differ in 12 of 60 image regions");
+}
+
+TEST(FocalLengthText, GivesPixelsAndPercent) {
+  engine::EstimatedLens lens;
+  lens.model = std::make_shared<const engine::CameraModel>(
+      engine::LensModel::kRadialTangential,
+      engine::CameraModel::Intrinsics{640, 480, 512.04, 512.04, 320, 240}, std::array<double, 5>{});
+  lens.focal_sigma = 0.012;
+  EXPECT_EQ(FormatFocalLength(lens), "512.0 px (+-1.2 %)");
+}
+
+}  // namespace
+}  // namespace docent::app

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/initialization/initializer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "engine/vision/features.h"
+#include "tests/engine/geometry/test_math.h"
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::Camera;
+using testing_world::CameraAt;
+using testing_world::RenderedWorld;
+
+struct ShownFrames {
+  std::optional<InitialPair> pair;
+  std::set<std::string> hints;  // all that were given
+  int frames = 0;
+};
+
+// Renders the world from pose(0), pose(1), ... until the initializer returns a pair or the frames end.
+ShownFrames Show(const RenderedWorld& world, int frames, const std::function<Rigid3(int)>& pose) {
+  ShownFrames outcome;
+  Initializer initializer({}, Camera(), 5);
+  for (; outcome.frames < frames && !outcome.pair; ++outcome.frames) {
+    const cv::Mat image =
+        world.Render(*Camera(), pose(outcome.frames), 1.5, static_cast<std::uint64_t>(outcome.frames) + 1);
+    outcome.pair = initializer.Track(FromSeconds(outcome.frames / 30.0), MakeFeatures(image));
+    if (!outcome.pair) outcome.hints.insert(initializer.hint());
+  }
+  return outcome;
+}
+
+TEST(Initializer, ReturnsTheTrueGeometryAfterSidewaysMotion) {
+  const RenderedWorld world = RenderedWorld::Room(51);
+  const std::vector<std::function<Rigid3(int)>> motions = {
+      [](int i) {
+        return CameraAt({0.012 * i, 0, 0});
+      },
+      [](int i) {
+        return CameraAt({0.002 * i, 0.01 * i, 0}, {0, 0.1 * i, 0.2 * i});
+      }};
+  for (const auto& motion : motions) {
+    const ShownFrames outcome = Show(world, 60, motion);
+    ASSERT_TRUE(outcome.pair) << "no pair in 60 frames";
+    const InitialPair& pair = *outcome.pair;
+    EXPECT_LT(pair.a.time, pair.b.time);
+    EXPECT_EQ(pair.geometry.outcome, TwoViewOutcome::kGeneral);
+    const auto frame_of = [](Timestamp time) { return static_cast<int>(std::lround(30 * ToSeconds(time))); };
+    const Rigid3 a = motion(frame_of(pair.a.time)), b = motion(frame_of(pair.b.time));
+    const Rigid3 truth = b * a.inverse();
+    EXPECT_LT(Degrees(AngleBetween(pair.geometry.b_from_a.translation, truth.translation)), 4);
+    EXPECT_LT(RotationErrorDeg(pair.geometry.b_from_a, truth), 0.6);
+
+    ASSERT_EQ(pair.geometry.inlier.size(), pair.matches.size());
+    std::vector<double> relative;  // distance to the surface as a ratio of the depth
+    for (std::size_t i = 0; i < pair.matches.size(); ++i) {
+      if (!pair.geometry.inlier[i]) continue;
+      const Eigen::Vector3d point = truth.translation.norm() * pair.geometry.points_in_a[i];
+      relative.push_back(world.DistanceToSurface(a.inverse() * point) / point.z());
+    }
+    ASSERT_GE(relative.size(), 50u);
+    std::nth_element(relative.begin(), relative.begin() + static_cast<std::ptrdiff_t>(relative.size() / 2),
+                     relative.end());
+    EXPECT_LT(relative[relative.size() / 2], 0.06);
+  }
+}
+
+TEST(Initializer, NeverStartsWhileTheCameraIsStill) {
+  const ShownFrames outcome = Show(RenderedWorld::Room(52), 25, [](int) { return CameraAt({0.1, 0, 0}); });
+  EXPECT_FALSE(outcome.pair);
+  EXPECT_TRUE(outcome.hints.contains(Advice(TwoViewOutcome::kStill)));
+}
+
+TEST(Initializer, NeverStartsDuringPureRotation) {
+  const ShownFrames outcome = Show(RenderedWorld::Room(53), 50, [](int i) {
+    return CameraAt({0, 0, 0}, {0.15 * i, 0.5 * i, 0.2 * i});
+  });
+  EXPECT_FALSE(outcome.pair);
+  EXPECT_TRUE(outcome.hints.contains(Advice(TwoViewOutcome::kPureRotation)));
+}
+
+TEST(Initializer, AsksForDetailInABlankImage) {
+  Initializer initializer({}, Camera(), 5);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_FALSE(
+        initializer.Track(FromSeconds(i / 30.0), MakeFeatures(cv::Mat(240, 320, CV_8UC1, cv::Scalar(100)))));
+    EXPECT_NE(initializer.hint().find("detail"), std::string::npos) << initializer.hint();
+  }
+}
+
+TEST(Initializer, TracksCornersToTheirTruePixels) {
+  const RenderedWorld world = RenderedWorld::Room(54);
+  Initializer initializer({}, Camera(), 5);
+  const auto pose = [](int i) { return CameraAt({0.004 * i, 0, 0}, {0, 0, 0.5 * i}); };
+  for (int i = 0; i < 8; ++i)
+    initializer.Track(FromSeconds(i / 30.0),
+                      MakeFeatures(world.Render(*Camera(), pose(i), 1.5, static_cast<std::uint64_t>(i) + 1)));
+  ASSERT_GT(initializer.trails().size(), 100u);
+  std::vector<double> errors;  // in pixels of the corner's level
+  for (const Initializer::Trail& trail : initializer.trails()) {
+    const auto hit = world.AtPixel(*Camera(), pose(0), trail.first.cast<double>());
+    ASSERT_TRUE(hit);
+    errors.push_back((*Camera()->Project(pose(7) * hit->point) - trail.now.cast<double>()).norm() /
+                     (1 << trail.level));
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.4);
+  EXPECT_LT(errors[errors.size() * 9 / 10], 1.5);
+}
+
+TEST(Initializer, StartsAgainAfterAReset) {
+  const RenderedWorld world = RenderedWorld::Room(55);
+  Initializer initializer({}, Camera(), 5);
+  initializer.Track(FromSeconds(0), MakeFeatures(world.Render(*Camera(), CameraAt({0, 0, 0}))));
+  EXPECT_FALSE(initializer.trails().empty());
+  EXPECT_FALSE(initializer.hint().empty());
+  initializer.Reset();
+  EXPECT_TRUE(initializer.trails().empty());
+  EXPECT_TRUE(initializer.hint().empty());
+}
+
+}  // namespace
+}  // namespace docent::engine

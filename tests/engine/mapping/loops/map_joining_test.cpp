@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/loops/map_joining.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "engine/mapping/mapper.h"
+#include "tests/engine/mapping/loops/gallery.h"
+
+// Two cameras go along the gallery, and each maps a part of it. The maps have no error, so the joined map
+// must equal the gallery.
+namespace docent::engine {
+namespace {
+
+using testing_world::Gallery;
+using testing_world::InTheGallery;
+using testing_world::RenderedWorld;
+using testing_world::VariedGallery;
+
+using OverlapOutcome = MapOverlap::Outcome;
+
+// The figures of a comparison, for messages.
+std::string Brief(const MapOverlap& overlap) {
+  std::ostringstream text;
+  text << "outcome " << static_cast<int>(overlap.outcome) << ", " << overlap.recognised
+       << " keyframes recognised, " << overlap.consecutive << " consecutive, " << overlap.confirmed << " of "
+       << overlap.with_view << " confirm, found ratio " << overlap.found_ratio << ", " << overlap.contradicted
+       << " of " << overlap.regions << " regions contradict, points " << overlap.points << " and "
+       << overlap.second_points;
+  return text.str();
+}
+
+// Poses every `step` metres of a walk along the gallery.
+std::vector<Rigid3> AlongTheGallery(double from, double to, double step, double height) {
+  std::vector<Rigid3> poses;
+  for (double x = from; x <= to; x += step) poses.push_back(InTheGallery(x, height));
+  return poses;
+}
+
+// The map of a walk, in its own coordinates and scale.
+std::shared_ptr<const MapSnapshot> MapOfWalk(const RenderedWorld& world, const std::vector<Rigid3>& poses,
+                                             const Sim3& own_from_world = {}) {
+  Map map = testing_world::MapOfGallery(world, poses);
+  testing_world::Transform(own_from_world, &map);
+  return map.Snapshot();
+}
+
+const Sim3 kOther{Rotation3::Exp({0.4, -1.1, 0.7}), {3, -2, 5}, 0.37};
+
+struct MapPair {
+  std::shared_ptr<const MapSnapshot> a, b;
+};
+const MapPair& OverlappingPair() {
+  static const MapPair pair = {MapOfWalk(VariedGallery(), AlongTheGallery(0, 3.4, 0.2, 0)),
+                               MapOfWalk(VariedGallery(), AlongTheGallery(2.1, 6, 0.2, 0.1), kOther)};
+  return pair;
+}
+const MapJoinAttempt& OverlappingAttempt() {
+  static const MapJoinAttempt attempt = JoinMaps({}, *OverlappingPair().a, *OverlappingPair().b, nullptr);
+  return attempt;
+}
+
+TEST(MapJoining, FindsTheSimilarityBetweenTwoMapsOfOnePlace) {
+  const MapJoinAttempt& attempt = OverlappingAttempt();
+  ASSERT_EQ(attempt.overlap.outcome, OverlapOutcome::kOverlap) << Brief(attempt.overlap);
+  ASSERT_NE(attempt.joined, nullptr) << Brief(attempt.overlap);
+  EXPECT_EQ(attempt.refusal, JoinRefusal::kNone);
+  const Sim3 left = attempt.joined->a_from_b * kOther;
+  EXPECT_LT(left.translation.norm(), 0.02);
+  EXPECT_LT(left.rotation.Angle(), 0.01);
+  EXPECT_NEAR(left.scale, 1, 0.01);
+}
+
+TEST(MapJoining, MakesOneAccurateMapOfBoth) {
+  const MapJoinAttempt& attempt = OverlappingAttempt();
+  ASSERT_NE(attempt.joined, nullptr) << Brief(attempt.overlap);
+  const auto& [a, b] = OverlappingPair();
+  const MapSnapshot& map = *attempt.joined->map;
+  const JoinedIds& ids = attempt.joined->ids;
+  EXPECT_EQ(Validate(map), "");
+  EXPECT_GT(map.revision, std::max(a->revision, b->revision));
+  ASSERT_EQ(map.keyframes.size(), a->keyframes.size() + b->keyframes.size());
+  for (const KeyFrame& keyframe : a->keyframes) {
+    EXPECT_LT((map.FindKeyFrame(keyframe.id)->camera_from_map.OriginInSource() -
+               keyframe.camera_from_map.OriginInSource())
+                  .norm(),
+              0.01);
+  }
+  const Sim3 world_from_b = kOther.inverse();
+  for (const KeyFrame& keyframe : b->keyframes) {
+    const KeyFrame& joined = *map.FindKeyFrame(keyframe.id + ids.first_keyframe);
+    EXPECT_FALSE(joined.fixed) << "the keyframes of A define the coordinate frame";
+    EXPECT_LT(
+        (joined.camera_from_map.OriginInSource() - world_from_b * keyframe.camera_from_map.OriginInSource())
+            .norm(),
+        0.02);
+  }
+  int astray = 0;
+  for (const MapPoint& point : map.points)
+    astray += VariedGallery().DistanceToSurface(point.position()) > 0.02 ? 1 : 0;
+  EXPECT_LT(astray, static_cast<int>(map.points.size() / 100));
+  // Common points exist once: nearly half of either map overlaps.
+  EXPECT_GT(attempt.joined->points_merged, 200);
+  EXPECT_LE(map.points.size() + static_cast<std::size_t>(attempt.joined->points_merged),
+            a->points.size() + b->points.size());
+  Map linked(map);
+  int shared_across = 0;
+  for (const auto& [id, record] : linked.keyframes()) {
+    for (const auto& [other, shared] : linked.Covisible(id)) {
+      if (id < ids.first_keyframe && other >= ids.first_keyframe)
+        shared_across = std::max(shared_across, shared);
+    }
+  }
+  EXPECT_GE(shared_across, 60);
+}
+
+TEST(MapJoining, IsDeterministic) {
+  const MapJoinAttempt again = JoinMaps({}, *OverlappingPair().a, *OverlappingPair().b, nullptr);
+  ASSERT_NE(again.joined, nullptr);
+  const MapSnapshot &first = *OverlappingAttempt().joined->map, &second = *again.joined->map;
+  ASSERT_EQ(first.points.size(), second.points.size());
+  for (std::size_t i = 0; i < first.points.size(); ++i)
+    EXPECT_EQ(first.points[i].point_in_map, second.points[i].point_in_map);
+}
+
+TEST(MapJoining, RejectsMapsOfDifferentPlaces) {
+  const auto elsewhere = MapOfWalk(Gallery({21, 22}, {31, 32}), AlongTheGallery(0, 2, 0.2, 0), kOther);
+  const MapJoinAttempt attempt = JoinMaps({}, *OverlappingPair().a, *elsewhere, nullptr);
+  EXPECT_EQ(attempt.joined, nullptr);
+  EXPECT_NE(attempt.overlap.outcome, OverlapOutcome::kOverlap);
+  EXPECT_EQ(attempt.refusal, JoinRefusal::kNoOverlap);
+}
+
+TEST(MapJoining, RejectsASimilarPlaceWithDifferentSurfacesAroundIt) {
+  // The same panel hangs in both places, but different ones hang beside it and in front of it.
+  const auto a = MapOfWalk(Gallery({1, 2, 3}, {11, 12, 13}), AlongTheGallery(0.6, 3.4, 0.2, 0));
+  const auto b = MapOfWalk(Gallery({5, 2, 6}, {14, 15, 16}), AlongTheGallery(0.7, 3.5, 0.2, 0.1), kOther);
+  const MapJoinAttempt attempt = JoinMaps({}, *a, *b, nullptr);
+  EXPECT_EQ(attempt.joined, nullptr) << Brief(attempt.overlap);
+  EXPECT_EQ(attempt.refusal, JoinRefusal::kNoOverlap);
+  // Every keyframe sees the common panel; only the surfaces beside it differ and contradict the similarity.
+  EXPECT_EQ(attempt.overlap.outcome, OverlapOutcome::kContradicted) << Brief(attempt.overlap);
+  EXPECT_GT(attempt.overlap.contradicted * 5, attempt.overlap.regions) << Brief(attempt.overlap);
+  MapJoiningOptions careless;
+  careless.overlap.max_contradicted_ratio = 1;
+  const MapJoinAttempt taken_in = JoinMaps(careless, *a, *b, nullptr);
+  EXPECT_EQ(taken_in.overlap.outcome, OverlapOutcome::kOverlap) << Brief(taken_in.overlap);
+}
+
+TEST(MapJoining, RejectsAnAmbiguousOverlap) {
+  const auto a = MapOfWalk(Gallery({2, 2, 2}, {12, 12, 12}), AlongTheGallery(-0.4, 4.4, 0.2, 0));
+  const auto b = MapOfWalk(Gallery({2, 2, 2}, {12, 12, 12}), AlongTheGallery(1.7, 2.5, 0.2, 0.1), kOther);
+  const MapJoinAttempt attempt = JoinMaps({}, *a, *b, nullptr);
+  EXPECT_EQ(attempt.joined, nullptr);
+  EXPECT_EQ(attempt.overlap.outcome, OverlapOutcome::kAmbiguous) << Brief(attempt.overlap);
+}
+
+TEST(MapJoining, ReportsAMapThatIsTooSmallToCompare) {
+  MapSnapshot empty;
+  EXPECT_EQ(JoinMaps({}, *OverlappingPair().a, empty, nullptr).overlap.outcome,
+            OverlapOutcome::kNothingToCompare);
+  EXPECT_EQ(JoinMaps({}, empty, *OverlappingPair().b, nullptr).overlap.outcome,
+            OverlapOutcome::kNothingToCompare);
+}
+
+TEST(MapJoining, CanBeInterrupted) {
+  const std::atomic<bool> interrupt = true;
+  const MapJoinAttempt attempt = JoinMaps({}, *OverlappingPair().a, *OverlappingPair().b, &interrupt);
+  EXPECT_EQ(attempt.joined, nullptr);
+  EXPECT_EQ(attempt.overlap.outcome, OverlapOutcome::kInterrupted);
+}
+
+TEST(MapJoining, KeepsTheQueueOfTheMapper) {
+  const auto& [a, b] = OverlappingPair();
+  Mapper mapper({});
+  mapper.Adopt(a);
+  const KeyFrame& last = a->keyframes.back();
+  KeyFrameCandidate candidate;
+  candidate.time = last.time;
+  candidate.camera = last.camera;
+  candidate.features = last.features;
+  candidate.camera_from_map = last.camera_from_map;
+  ASSERT_TRUE(mapper.Offer(candidate));
+  const MapJoinAttempt attempt = mapper.Join(*b, nullptr);
+  ASSERT_NE(attempt.joined, nullptr) << Brief(attempt.overlap);
+  EXPECT_EQ(mapper.Snapshot(), attempt.joined->map);
+  EXPECT_EQ(mapper.QueueLength(), 1u);
+  ASSERT_TRUE(mapper.Step());
+  const auto grown = mapper.Snapshot();
+  EXPECT_EQ(Validate(*grown), "");
+  EXPECT_EQ(grown->keyframes.size(), a->keyframes.size() + b->keyframes.size() + 1);
+  EXPECT_EQ(grown->keyframes.back().id, a->next_keyframe + b->next_keyframe) << "no id is assigned twice";
+}
+
+TEST(MapJoining, LeavesTheMapOfTheMapperUnchangedIfRejected) {
+  Mapper mapper({});
+  mapper.Adopt(OverlappingPair().a);
+  const std::atomic<bool> interrupt = true;
+  EXPECT_EQ(mapper.Join(*OverlappingPair().b, &interrupt).joined, nullptr);
+  EXPECT_EQ(mapper.Join(MapSnapshot(), nullptr).joined, nullptr);
+  EXPECT_EQ(mapper.Snapshot(), OverlappingPair().a);
+}
+
+TEST(MapJoining, TransformsPanoramaMapsToo) {
+  // The last keyframe of B is the reference of a panorama map with one infinite point.
+  const auto& [a, b] = OverlappingPair();
+  Map with_panorama(*b);
+  const KeyFrameId reference = b->keyframes.back().id;
+  const PanoramaId panorama = with_panorama.OpenPanorama(reference);
+  MapPoint direction;
+  const Eigen::Vector3d ray_in_b =
+      b->keyframes.back().camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
+  direction.point_in_map << ray_in_b, 0;
+  direction.panorama = panorama;
+  direction.source_keyframe = reference;
+  direction.source_pixel = {199.5F, 149.5F};
+  const MapPointId id = with_panorama.AddPoint(direction);
+  with_panorama.AddObservation({reference, id, {199.5F, 149.5F}, 0});
+  const auto before = with_panorama.Snapshot();
+  ASSERT_EQ(Validate(*before), "");
+  const MapJoinAttempt attempt = JoinMaps({}, *a, *before, nullptr);
+  ASSERT_NE(attempt.joined, nullptr) << Brief(attempt.overlap);
+  const MapSnapshot& map = *attempt.joined->map;
+  EXPECT_EQ(Validate(map), "");
+  ASSERT_EQ(map.panoramas.size(), 1u);
+  EXPECT_EQ(map.panoramas[0].reference, reference + attempt.joined->ids.first_keyframe);
+  const MapPoint* const joined = map.FindPoint(id + attempt.joined->ids.first_point);
+  ASSERT_NE(joined, nullptr);
+  EXPECT_TRUE(joined->infinite());
+  EXPECT_GT(joined->position().dot(attempt.joined->a_from_b.rotation * ray_in_b), std::cos(0.02));
+}
+
+}  // namespace
+}  // namespace docent::engine

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "engine/system/system.h"
+#include "tests/engine/rendered_world.h"
+
+namespace docent::engine {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// Expects that the default options are valid, and that they are not after each of these changes.
+template <typename Options>
+void ExpectRefused(const std::vector<std::function<void(Options*)>>& changes) {
+  EXPECT_EQ(Options().Validate(), std::nullopt);
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    Options options;
+    changes[i](&options);
+    EXPECT_TRUE(options.Validate()) << "change " << i;
+  }
+}
+
+TEST(SystemOptions, AreRefusedOutOfRange) {
+  ExpectRefused<SystemOptions>({[](auto* o) { o->provisional.time = -o->provisional.time; },
+                                [](auto* o) { o->lost_time_before_new_map = Timestamp(-1); },
+                                [](auto* o) { o->provisional.keyframes = 0; },
+                                [](auto* o) { o->tracker.good_quality = kNaN; }});
+}
+
+TEST(RigOptions, AreRefusedOutOfRange) {
+  ExpectRefused<RigOptions>({[](auto* o) { o->min_samples = 0; },
+                             [](auto* o) { o->window = o->min_samples - 1; },
+                             [](auto* o) { o->max_rigid_rotation_deg = 0; }});
+}
+
+TEST(CalibrationMonitorOptions, AreRefusedOutOfRange) {
+  ExpectRefused<CalibrationMonitorOptions>({[](auto* o) { o->min_rings = 7; },
+                                            [](auto* o) { o->min_samples = 1; },
+                                            [](auto* o) { o->warning_px = kNaN; }});
+}
+
+TEST(InitializationMonitorOptions, AreRefusedOutOfRange) {
+  ExpectRefused<InitializationMonitorOptions>({[](auto* o) { o->min_inlier_ratio_kept = 1.2; },
+                                               [](auto* o) { o->max_distance = 0; },
+                                               [](auto* o) { o->recent_period = Timestamp(-1); }});
+}
+
+TEST(System, ThrowsForInvalidOptions) {
+  SystemOptions options;
+  options.tracker.max_sigma = 0;
+  EXPECT_THROW(System(options, {testing_world::Camera()}), Error);
+}
+
+TEST(CameraRig, ThrowsForInvalidOptions) {
+  RigOptions options;
+  options.min_samples = 0;
+  EXPECT_THROW(CameraRig{options}, Error);
+}
+
+TEST(CalibrationMonitor, ThrowsForInvalidOptions) {
+  CalibrationMonitorOptions options;
+  options.min_ring_matches = 0;
+  EXPECT_THROW(CalibrationMonitor(testing_world::Camera(), options), Error);
+}
+
+TEST(InitializationMonitor, ThrowsForInvalidOptions) {
+  InitializationMonitorOptions options;
+  options.max_rotation = kNaN;
+  EXPECT_THROW(InitializationMonitor{options}, Error);
+}
+
+}  // namespace
+}  // namespace docent::engine

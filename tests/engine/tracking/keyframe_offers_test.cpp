@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/keyframe_offers.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/engine/tracking/tracked_image.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::Camera;
+using testing_world::CameraAt;
+using testing_world::ImageAt;
+
+// A map with one keyframe at the origin, and a tracked frame a metre beside it at a depth of two metres.
+class SidewaysStep : public ::testing::Test {
+ protected:
+  SidewaysStep() {
+    KeyFrame keyframe;
+    keyframe.id = 4;
+    map_.keyframes.push_back(keyframe);
+    map_.revision = 9;
+    result_.camera_from_map = CameraAt({1, 0, 0});
+    result_.median_depth = 2;
+    result_.inliers = result_.finite_inliers = 300;
+    result_.finite_coverage = result_.coverage = 1;
+    matches_.resize(2);
+    matches_[0].inlier = true;
+    matches_[1].inlier = false;
+  }
+  // Whether the next frame is offered; the mapper accepts it if `accepted`.
+  bool Offers(KeyFrameOffers* offers, bool accepted) {
+    offers->BeginFrame();
+    offers->Consider(image_, map_, {result_, matches_, kNoId, result_.median_depth});
+    last_ = offers->Take();
+    EXPECT_FALSE(offers->Take()) << "an offer is returned once";
+    if (accepted) {
+      EXPECT_EQ(offers->Accept().has_value(), last_.has_value());
+    }
+    return last_.has_value();
+  }
+
+  MapSnapshot map_;
+  MapTrackResult result_;
+  std::vector<PointMatch> matches_;
+  CameraImage image_ = ImageAt(CameraAt({1, 0, 0}), 30);
+  std::optional<KeyFrameCandidate> last_;
+};
+
+TrackerOptions AtOnce() {
+  TrackerOptions options;
+  options.frames_between_keyframes = 1;
+  return options;
+}
+
+TEST_F(SidewaysStep, IsOfferedWithItsPoseAndInliers) {
+  KeyFrameOffers offers(AtOnce(), *Camera());
+  ASSERT_TRUE(Offers(&offers, true));
+  EXPECT_EQ(last_->choice, KeyFrameChoice::kSixDof);
+  EXPECT_EQ(last_->time, image_.time);
+  EXPECT_EQ(last_->features, image_.features);
+  EXPECT_EQ(last_->matches.size(), 1u);
+  EXPECT_EQ(last_->map_revision, 9u);
+  EXPECT_EQ(last_->reference_keyframe, 4u);
+}
+
+TEST_F(SidewaysStep, IsOfferedAgainInTheNextFrameWhenItWasRefused) {
+  TrackerOptions options;
+  KeyFrameOffers offers(options, *Camera());
+  int first = 0;
+  while (first < 10 && !Offers(&offers, false)) ++first;
+  ASSERT_LT(first, 10);
+  EXPECT_TRUE(Offers(&offers, true));
+  for (int i = 1; i < options.frames_between_keyframes; ++i) EXPECT_FALSE(Offers(&offers, true)) << i;
+  EXPECT_TRUE(Offers(&offers, true));
+}
+
+TEST_F(SidewaysStep, OpensNoPanoramaMapWhenItsKeyFrameIsRefused) {
+  result_.finite_coverage = result_.coverage = 0.3;
+  result_.inliers = result_.finite_inliers = 40;  // the camera is about to leave the map
+  for (const bool accepted : {false, true}) {
+    KeyFrameOffers offers(AtOnce(), *Camera());
+    ASSERT_TRUE(Offers(&offers, accepted));
+    EXPECT_EQ(last_->choice, KeyFrameChoice::kLocalizedPanorama);
+    EXPECT_EQ(offers.policy().mode() == KeyFramePolicy::Mode::kPanorama, accepted);
+  }
+}
+
+TEST_F(SidewaysStep, CannotBeAcceptedInALaterFrame) {
+  KeyFrameOffers offers(AtOnce(), *Camera());
+  ASSERT_TRUE(Offers(&offers, false));
+  offers.BeginFrame();
+  EXPECT_FALSE(offers.Accept());
+}
+
+TEST_F(SidewaysStep, IsNotOfferedAfterItWasWithdrawn) {
+  KeyFrameOffers offers(AtOnce(), *Camera());
+  offers.BeginFrame();
+  offers.Consider(image_, map_, {result_, matches_, kNoId, result_.median_depth});
+  offers.Withdraw();
+  EXPECT_FALSE(offers.Take());
+}
+
+TEST(KeyFrameOffers, OfferTheFirstImageOfAMap) {
+  KeyFrameOffers offers(TrackerOptions(), *Camera());
+  offers.BeginFrame();
+  const CameraImage image = ImageAt(CameraAt({0, 0, 0}), 3);
+  offers.OfferFirst(image);
+  const auto first = offers.Take();
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->choice, KeyFrameChoice::kFirst);
+  EXPECT_EQ(offers.Accept(), image.time);
+  EXPECT_EQ(offers.policy().mode(), KeyFramePolicy::Mode::kPanorama);
+  offers.Reset();
+  EXPECT_EQ(offers.policy().mode(), KeyFramePolicy::Mode::kSixDof);
+}
+
+}  // namespace
+}  // namespace docent::engine

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/pose_tracker.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/engine/tracking/tracked_image.h"
+
+namespace docent::engine {
+namespace {
+
+using testing_world::Camera;
+using testing_world::CameraAt;
+using testing_world::ImageAt;
+using testing_world::RenderedWorld;
+using testing_world::World;
+using Outcome = PoseTracker::Estimate::Outcome;
+
+class KnownRoom : public ::testing::Test {
+ protected:
+  static Rigid3 Pose(int frame) { return CameraAt({0.01 * frame, 0, 0}, {0, 0.2 * frame, 0}); }
+  static const std::shared_ptr<const MapSnapshot>& TheMap() {
+    static const auto map =
+        testing_world::TrueMap(World(), Camera(), {CameraAt({0, 0, 0}), CameraAt({0.2, 0, 0})}).Snapshot();
+    return map;
+  }
+  PoseTracker::Estimate Track(const CameraImage& image) {
+    return tracker_.Track(*TheMap(), image, std::nullopt, policy_, &random_);
+  }
+  void Walk(int frames) {
+    tracker_.Begin(ImageAt(Pose(0)).time, Pose(0), ObservedMotion::kSixDof);
+    for (int i = 1; i <= frames; ++i) {
+      const CameraImage image = ImageAt(Pose(i), i);
+      const auto estimate = Track(image);
+      ASSERT_EQ(estimate.outcome, Outcome::kPose) << i;
+      tracker_.Accept(image, estimate.result, false);
+    }
+  }
+
+  PoseTracker tracker_{TrackerOptions(), Camera()};
+  KeyFramePolicy policy_{KeyFramePolicyOptions(), 1.3};
+  Random random_{1};
+};
+
+TEST_F(KnownRoom, IsTrackedFromFrameToFrame) {
+  Walk(8);
+  EXPECT_LT((tracker_.last().OriginInSource() - Pose(8).OriginInSource()).norm(), 0.01);
+  EXPECT_NEAR(tracker_.rotation_rate().norm(), 0.2 * M_PI / 180, 0.002);
+  EXPECT_NEAR(tracker_.median_depth(), 2.5, 1);
+}
+
+TEST_F(KnownRoom, IsLostWhenTheImageShowsNothingOfIt) {
+  Walk(4);
+  const RenderedWorld other = RenderedWorld::Room(7177);
+  EXPECT_EQ(Track(ImageAt(Pose(5), 5, other)).outcome, Outcome::kLost);
+}
+
+TEST_F(KnownRoom, IsFoundAgainFromThePoseBeforeTheLoss) {
+  Walk(4);
+  CameraImage image = ImageAt(Pose(5), 5);
+  tracker_.Lose(image.time);
+  image = ImageAt(Pose(6), 6);
+  const Rigid3 guess = tracker_.PredictAfterLoss(image);
+  const auto result = tracker_.TryFrom(*TheMap(), image, guess, MapTracker::Effort::kRecovery, &random_);
+  EXPECT_LT((result.camera_from_map.OriginInSource() - Pose(6).OriginInSource()).norm(), 0.01);
+}
+
+TEST_F(KnownRoom, AlternatesThePatchComparison) {
+  EXPECT_EQ(tracker_.comparison(), PatchComparison::kStandard);
+  tracker_.AlternateComparison();
+  EXPECT_EQ(tracker_.comparison(), PatchComparison::kTolerant);
+  tracker_.AlternateComparison();
+  EXPECT_EQ(tracker_.comparison(), PatchComparison::kStandard);
+}
+
+}  // namespace
+}  // namespace docent::engine
