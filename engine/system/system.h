@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Geometry>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -15,46 +14,15 @@
 #include <vector>
 
 #include "engine/recognition/place_index.h"
-#include "engine/system/calibration_monitor.h"
-#include "engine/system/camera_association.h"
+#include "engine/system/camera_calibrations.h"
 #include "engine/system/camera_place_finder.h"
-#include "engine/system/camera_rig.h"
-#include "engine/system/map_assignment.h"
+#include "engine/system/map_policy.h"
 #include "engine/system/mapping_thread.h"
-#include "engine/system/provisional_map.h"
 #include "engine/system/system_event.h"
-#include "engine/tracking/tracker.h"
+#include "engine/system/system_options.h"
+#include "engine/system/system_state.h"
 
 namespace docent::engine {
-
-// What a System is made with. Fields of `tracker` and `mapper` are tuned together and may change with any
-// version, except tracker.hybrid, tracker.target and mapper.lens.
-struct SystemOptions {
-  TrackerOptions tracker;   // build_maps is set by the system from extend_maps
-  MapperOptions mapper;     // initialization, keyframes, adjustment, loops, unknown lenses
-  bool threaded = true;     // mapper on its own thread; false: lockstep, runs are byte-identical
-  bool extend_maps = true;  // false: known maps are tracked and never changed
-  std::uint64_t seed = 1;   // of the random choices of robust estimation; equal seeds give equal runs
-  ProvisionalMapOptions provisional;  // when a new map is confirmed, or discarded and started again
-  // Whether a camera that is lost for `lost_time_before_new_map`, and recognises no map, starts a new map.
-  bool new_map_when_lost = false;
-  Timestamp lost_time_before_new_map = std::chrono::milliseconds(200);  // image time
-  // Gives the key of a map that the system starts by itself, after a discarded one or a loss; 0 when there is
-  // none now, then it tries again with the next frame. Must not block. Empty: keys count up from the largest
-  // that was used.
-  std::function<std::uint64_t()> new_map_key;
-
-  // Describes the first invalid option in one sentence, or empty.
-  std::optional<std::string> Validate() const;
-};
-
-// What the application allows for a map.
-struct MapPermissions {
-  bool extend = true;                         // keyframes may be added, and the map adjusted
-  std::optional<Eigen::AlignedBox3d> bounds;  // new keyframes only with their centre inside; map frame
-  bool join = true;                           // may be joined with another map
-  bool discard = true;                        // may be discarded while it is provisional
-};
 
 // The SLAM system: cameras that are tracked in several maps, of which one, the active map, is extended. It
 // owns the trackers, the mapper and its thread, the place index, the association of the cameras and the
@@ -149,89 +117,23 @@ class System {
   void SetEventHook(std::function<void()> hook) { event_hook_ = std::move(hook); }
 
  private:
-  // State of a camera. Guarded by mutex_ except for tracker, which belongs to the
-  // camera's thread.
-  struct Camera {
-    std::unique_ptr<Tracker> tracker;
-    std::shared_ptr<const CameraModel> model;
-    std::optional<std::size_t> lens_index;  // index in lenses_; empty for a known calibration
-    std::unique_ptr<CalibrationMonitor> calibration_monitor;
-    MapAssignment assignment;
-    Timestamp last_time{};
-  };
-  struct MapState {
-    std::uint64_t key = 0;
-    std::shared_ptr<const MapSnapshot> snapshot;  // null while initialization is pending, or not in memory
-    MapPermissions permissions;
-    ProvisionalMap provisional;  // pending for a map that was started here until its depth is confirmed
-    bool discarded = false;
-    bool after_loss = false;        // started because the camera was lost in another map
-    std::uint64_t join_with = 0;    // the map that the camera returned to from this one; 0 for none
-    std::size_t join_at = 0;        // number of keyframes of both maps from which joining is attempted
-    std::uint64_t joined_into = 0;  // the map that it was joined into; 0 for none
-
-    // False once the map was discarded or joined into another one.
-    bool Exists() const { return !discarded && joined_into == 0; }
-    bool MayBeJoined() const {
-      return Exists() && permissions.join && snapshot && snapshot->HasFinitePoints();
-    }
-  };
-  // A map that the mapper was asked to join into the active map.
-  struct Joining {
-    std::uint64_t number = 0, from = 0;
-    std::shared_ptr<const MapSnapshot> snapshot;
-  };
-
   // Applies the pending order to the camera's tracker, and returns the places that it may search.
   CameraPlaceFinder ApplyOrder(std::size_t index, Timestamp time);
   void OfferToMapper(std::size_t index, const TrackedFrame& frame);
   void OnMapperUpdate(const MappingThread::MapperUpdate& update);
-
-  // With mutex_ held.
-  void HandleResult(std::size_t index, TrackedFrame* frame);
-  void RejectPose(std::size_t index, TrackedFrame* frame);
-  void UpdateRig(std::size_t index, const TrackedFrame& frame);
-  void CheckCalibration(std::size_t index, const TrackedFrame& frame);
-  void CheckProvisionalMap(const Camera& camera, const TrackedFrame& frame);
-  void CheckLoss(std::size_t index, const TrackedFrame& frame);
-  void EnterTrackedMap(std::size_t index, std::uint64_t key, Timestamp time);
-  void LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, Timestamp time);
-  void Discard(std::uint64_t key, Timestamp time, MapDiscarded event);
-  void StartMapAt(std::uint64_t key, std::size_t camera, bool after_loss);
-  void LeaveMapNow(std::uint64_t key);
-  void ActivateNow(const MapState& map);
-  void AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);
-  void SetLenses(const std::vector<EstimatedLens>& lenses, Timestamp time);
-  void HandleMapperEvent(const MapperEvent& event, MapState* map);
-  void RequestJoin(const MapState& into);
-  bool IsAwaited(const MappingThread::MapperUpdate::Join& update, const MapState& into);
-  void HandleJoinAttempt(const MapJoinAttempt& attempt, MapState* into);
-  bool MayAddKeyFrame(const MapState& map, const Rigid3& camera_from_map) const;
-  MapState& AddState(std::uint64_t key);
-  bool IsUsed(std::uint64_t key) const;
-  std::uint64_t NewKey();
-  Timestamp LastTime() const;  // the latest of any camera
-  template <typename What>
-  void Emit(Timestamp time, std::uint64_t map, What what, std::size_t camera = 0) {
-    events_.push_back({time, map, camera, std::move(what)});
-  }
+  // Whether the mapper's answer belongs to the last request to join maps; with mutex_ held.
+  bool IsAwaited(const MappingThread::MapperUpdate::Join& update, const KnownMap& into);
 
   const SystemOptions options_;
   PlaceIndex index_;
   const PlaceFinder* finder_ = nullptr;
   std::function<void()> event_hook_;
 
-  mutable std::mutex mutex_;  // guards the members below except the mapping thread; never held while tracking
-  std::vector<Camera> cameras_;
-  std::map<std::uint64_t, MapState> maps_;
-  CameraAssociation association_;
-  CameraRig rig_;
-  bool rig_reported_ = false;     // whether the rig was last reported as rigid
-  std::uint64_t active_key_ = 0;  // the map that the mapper works on; 0 for none
-  std::optional<Joining> joining_;
-  std::uint64_t joins_requested_ = 0;
-  std::vector<EstimatedLens> lenses_;  // of cameras with an unknown calibration
-  std::vector<SystemEvent> events_;
+  // Guards the members below except the trackers and the mapping thread; never held while tracking.
+  mutable std::mutex mutex_;
+  SystemState state_;
+  CameraCalibrations calibrations_;
+  MapPolicy policy_;
   MappingThread mapping_;  // last, because its thread calls back into the other members
 };
 

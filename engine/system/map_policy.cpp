@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/system/map_policy.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace docent::engine {
+
+void MapPolicy::HandleResult(std::size_t index, TrackedFrame* frame) {
+  SystemCamera* const camera = &state_.cameras[index];
+  const Timestamp now = camera->last_time = frame->frame.time;
+  if (!HasPose(frame->state)) {
+    state_.association.SetLost(index);
+  } else if (const auto map = state_.maps.find(frame->map_key);
+             camera->assignment.has_order() || map == state_.maps.end() || !map->second.Exists() ||
+             !state_.association.SetTracked(index, frame->map_key)) {
+    state_.association.SetLost(index);
+    RejectPose(index, frame);
+  }
+  const bool has_pose = HasPose(frame->state);
+  if (has_pose && frame->map_key != camera->assignment.map()) {
+    EnterTrackedMap(index, frame->map_key, now);
+  } else if (frame->state == TrackingState::kRelocalized) {
+    state_.Emit(now, frame->map_key, Relocalized{}, index);
+  }
+  if (has_pose) {
+    camera->assignment.SetTracked();
+    calibrations_.AddFrame(index, *frame);
+  } else if (frame->state == TrackingState::kLost) {
+    camera->assignment.SetLost(now);
+  }
+  // With several cameras, one that is tracked shows that the initialization holds.
+  if (has_pose || !state_.association.AnyTracked()) CheckProvisionalMap(*camera, *frame);
+  if (!has_pose) CheckLoss(index, *frame);
+}
+
+// Handles a pose in a map that the cameras are no longer in: while the frame was tracked, another camera
+// relocalized elsewhere, or the application chose another map.
+void MapPolicy::RejectPose(std::size_t index, TrackedFrame* frame) {
+  state_.Emit(frame->frame.time, frame->map_key, PoseRejected{}, index);
+  frame->state = TrackingState::kLost;
+  frame->quality_class = TrackingQuality::kLost;
+  frame->map.reset();
+  frame->map_key = 0;
+  frame->matches.clear();
+  frame->finite_points = frame->infinite_points = 0;
+  frame->hint = "Point this camera at what the other camera sees";
+  state_.cameras[index].assignment.SearchAgain();
+}
+
+void MapPolicy::EnterTrackedMap(std::size_t index, std::uint64_t key, Timestamp time) {
+  const std::uint64_t previous = state_.cameras[index].assignment.map();
+  state_.cameras[index].assignment.Follow(key);
+  state_.Emit(time, key, MapEntered{}, index);
+  // The other cameras abandon their search and enter this map (ptamm §3.3).
+  for (SystemCamera& other : state_.cameras) {
+    if (other.assignment.map() != key) other.assignment.Enter(key);
+  }
+  if (!options_.extend_maps || state_.active_key == key) return;
+  LeavePreviousMap(previous, key, time);
+  const KnownMap& map = state_.maps.at(key);
+  Activate(map);
+  joins_.Request(map);
+}
+
+// The previous map becomes idle, and is extended again when a camera returns to it.
+void MapPolicy::LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, Timestamp time) {
+  const auto found = state_.maps.find(previous);
+  if (found == state_.maps.end() || !found->second.Exists()) return;
+  KnownMap& left = found->second;
+  left.provisional.End();
+  state_.Emit(time, previous, MapLeft{});
+  if (!left.after_loss) return;
+  if (left.snapshot && left.snapshot->HasFinitePoints()) {
+    left.join_with = entered;
+    return;
+  }
+  left.discarded = true;
+  index_.RemoveMap(previous);
+  MapDiscarded event;
+  event.reason = MapDiscarded::Reason::kRelocalizedElsewhere;
+  event.other = entered;
+  state_.Emit(time, previous, event);
+}
+
+void MapPolicy::CheckProvisionalMap(const SystemCamera& camera, const TrackedFrame& frame) {
+  const auto found = state_.maps.find(camera.assignment.map());
+  if (found == state_.maps.end()) return;
+  KnownMap& map = found->second;
+  const auto reason =
+      map.provisional.Check(options_.provisional, {.frame = frame,
+                                                   .in_map = frame.map_key == map.key,
+                                                   .map = map.snapshot.get(),
+                                                   .lost_since = camera.assignment.lost_since(),
+                                                   .may_extend = options_.extend_maps,
+                                                   .may_discard = map.permissions.discard});
+  if (reason) Discard(map.key, frame.frame.time, *reason);
+}
+
+// Starts a new map for a camera that is lost and recognises no map.
+void MapPolicy::CheckLoss(std::size_t index, const TrackedFrame& frame) {
+  const MapAssignment& assignment = state_.cameras[index].assignment;
+  if (!options_.extend_maps || !options_.new_map_when_lost || state_.association.AnyTracked()) return;
+  const auto found = state_.maps.find(assignment.map());
+  // A map that the user stopped, or that may not be extended, is not left automatically.
+  if (found == state_.maps.end() || found->second.provisional.is_pending() ||
+      state_.active_key != found->first)
+    return;
+  const Timestamp now = frame.frame.time;
+  if (!assignment.IsLostFor(options_.lost_time_before_new_map, now)) return;
+  if (frame.relocalization.rejection == RejectionReason::kUnconfirmed) return;  // relocalization is imminent
+  const std::uint64_t lost_in = found->first;
+  const std::uint64_t key = NewKey();
+  if (key == 0) return;
+  state_.Emit(now, key, MapStartedAfterLoss{lost_in}, index);
+  StartMap(key, index, true);
+}
+
+void MapPolicy::Discard(std::uint64_t key, Timestamp time, MapDiscarded event) {
+  KnownMap& map = state_.maps.at(key);
+  const std::uint64_t next_key = NewKey();
+  if (next_key == 0) return;
+  map.discarded = true;
+  index_.RemoveMap(key);
+  KnownMap& next = state_.AddMap(next_key);
+  next.after_loss = map.after_loss;
+  event.replacement = next.key;
+  state_.Emit(time, key, event);
+  AssignMapper(next.key, nullptr);
+  state_.association.Begin(next.key);
+  for (SystemCamera& camera : state_.cameras) {
+    if (camera.assignment.map() == key) camera.assignment.Replace(next.key, next.after_loss);
+  }
+}
+
+bool MapPolicy::MayAddKeyFrame(const KnownMap& map, const Rigid3& camera_from_map) const {
+  if (!options_.extend_maps || !map.Exists() || !map.permissions.extend) return false;
+  return !map.permissions.bounds || map.permissions.bounds->contains(camera_from_map.OriginInSource());
+}
+
+void MapPolicy::HandleMapperEvent(const MapperEvent& event, KnownMap* map) {
+  if (std::holds_alternative<MapperEvent::MapStarted>(event.what)) {
+    map->provisional.Begin(event.time);
+    for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
+      const MapAssignment& assignment = state_.cameras[i].assignment;
+      if (assignment.map() == map->key && assignment.is_starting())
+        state_.association.SetTracked(i, map->key);
+    }
+  } else if (std::holds_alternative<MapperEvent::StartFailed>(event.what)) {
+    for (SystemCamera& camera : state_.cameras) {
+      if (camera.assignment.map() == map->key)
+        camera.assignment.FailStart(map->snapshot != nullptr, map->after_loss);
+    }
+  }
+  state_.Emit(event.time, map->key, event);
+}
+
+std::uint64_t MapPolicy::NewKey() const {
+  if (options_.new_map_key) return options_.new_map_key();
+  return state_.maps.empty() ? 1 : state_.maps.rbegin()->first + 1;
+}
+
+void MapPolicy::StartMap(std::uint64_t key, std::size_t camera, bool after_loss) {
+  const std::uint64_t previous = state_.active_key;
+  if (previous != 0) LeaveMap(previous);
+  KnownMap& map = state_.AddMap(key);
+  if (after_loss) map.after_loss = true;
+  Activate(map);
+  for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
+    if (i == camera) {
+      state_.cameras[i].assignment.Start(key, after_loss);
+    } else {
+      state_.cameras[i].assignment.WaitFor(key);
+    }
+  }
+  state_.association.Begin(key);
+}
+
+void MapPolicy::EnterMap(std::uint64_t key, std::size_t camera) {
+  const KnownMap& map = state_.maps.at(key);
+  const std::uint64_t previous = state_.cameras.at(camera).assignment.map();
+  if (previous == key) return Activate(map);
+  if (previous != 0) LeaveMap(previous);
+  state_.association.Release();
+  for (SystemCamera& each : state_.cameras) each.assignment.Enter(key);
+  Activate(map);
+}
+
+void MapPolicy::LeaveMap(std::uint64_t key) {
+  if (state_.active_key == key) AssignMapper(0, nullptr);
+  const auto found = state_.maps.find(key);
+  if (found == state_.maps.end() || !found->second.Exists()) return;
+  Timestamp time{};
+  for (SystemCamera& camera : state_.cameras) {
+    time = std::max(time, camera.last_time);
+    if (camera.assignment.map() == key) camera.assignment.Leave();
+  }
+  if (state_.association.map() == key) state_.association.Release();
+  found->second.provisional.End();
+  const bool forgotten = found->second.snapshot == nullptr;
+  if (forgotten) state_.maps.erase(found);
+  state_.Emit(time, key, MapLeft{forgotten});
+}
+
+void MapPolicy::Activate(const KnownMap& map) {
+  const bool extend = options_.extend_maps && map.permissions.extend;
+  AssignMapper(extend ? map.key : 0, extend ? map.snapshot : nullptr);
+}
+
+void MapPolicy::AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot) {
+  state_.active_key = key;
+  joins_.Cancel();
+  mapping_.Adopt(key, std::move(snapshot));
+}
+
+bool MapPolicy::IsUsed(std::uint64_t key) const {
+  return key == state_.active_key || joins_.IsJoining(key) ||
+         std::any_of(state_.cameras.begin(), state_.cameras.end(),
+                     [key](const SystemCamera& camera) { return camera.assignment.map() == key; });
+}
+
+}  // namespace docent::engine
