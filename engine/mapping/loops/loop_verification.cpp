@@ -18,7 +18,7 @@ namespace {
 constexpr int kFoundCells = 4;
 constexpr double kInlierWeight = 0.1;
 
-struct Found {
+struct VerifiedPoint {
   MapPointId point = kNoId;
   Eigen::Vector2f pixel;
   int level = 0;
@@ -45,10 +45,10 @@ std::vector<MapPointId> Subsample(const std::vector<MapPointId>& points, std::si
 }
 
 // *expected: the number of points that project into the image.
-std::vector<Found> Search(std::span<const MapPointId> points, const KeyFrame& keyframe,
-                          const Rigid3& camera_from_map, float radius_px, Map* map, PointSearcher* searcher,
-                          int* expected) {
-  std::vector<Found> found;
+std::vector<VerifiedPoint> Search(std::span<const MapPointId> points, const KeyFrame& keyframe,
+                                  const Rigid3& camera_from_map, float radius_px, Map* map,
+                                  PointSearcher* searcher, int* expected) {
+  std::vector<VerifiedPoint> found;
   *expected = 0;
   for (const MapPointId id : points) {
     const Map::PointRecord* record = map->FindPoint(id);
@@ -67,10 +67,10 @@ std::vector<Found> Search(std::span<const MapPointId> points, const KeyFrame& ke
   return found;
 }
 
-PoseRefinement Refine(const std::vector<Found>& found, const CameraModel& camera, const Rigid3& start,
+PoseRefinement Refine(const std::vector<VerifiedPoint>& found, const CameraModel& camera, const Rigid3& start,
                       Map* map, std::vector<PoseMeasurement>* measurements) {
   measurements->clear();
-  for (const Found& f : found) {
+  for (const VerifiedPoint& f : found) {
     measurements->push_back({map->FindPoint(f.point)->point.point_in_map, f.pixel.cast<double>(),
                              1.0 / static_cast<double>(1 << f.level), 1.0});
   }
@@ -78,9 +78,9 @@ PoseRefinement Refine(const std::vector<Found>& found, const CameraModel& camera
   return RefinePose(camera, start, {}, measurements, &memory, {Eigen::Vector3d::Zero(), start});
 }
 
-int OccupiedCells(const std::vector<Found>& found, const CameraModel& camera) {
+int OccupiedCells(const std::vector<VerifiedPoint>& found, const CameraModel& camera) {
   std::bitset<kFoundCells * kFoundCells> cells;
-  for (const Found& f : found) {
+  for (const VerifiedPoint& f : found) {
     cells.set(GridCell(f.pixel.cast<int>().eval(), camera, kFoundCells, kFoundCells));
   }
   return static_cast<int>(cells.count());
@@ -91,12 +91,12 @@ int OccupiedCells(const std::vector<Found>& found, const CameraModel& camera) {
 // agree on it.
 std::optional<double> PairDuplicates(const LoopVerificationOptions& options,
                                      const Map::KeyFrameRecord& keyframe, const Rigid3& camera_from_place,
-                                     const std::vector<Found>& found, Map* map,
+                                     const std::vector<VerifiedPoint>& found, Map* map,
                                      std::vector<DuplicatePoints>* duplicates) {
   std::vector<double> ratios;
   std::set<MapPointId> known;
-  for (const Found& f : found) known.insert(f.point);
-  for (const Found& f : found) {
+  for (const VerifiedPoint& f : found) known.insert(f.point);
+  for (const VerifiedPoint& f : found) {
     MapPointId nearest = kNoId;
     double least = 0, ratio = 0;
     for (const Observation& observation : keyframe.observations) {
@@ -170,7 +170,7 @@ std::optional<LoopCandidate> VerifyLoopCandidate(const LoopVerificationOptions& 
   // First some of the points with a wide radius, then all with a narrow one.
   points = Subsample(points, options.max_points);
   const std::vector<MapPointId> some = Subsample(points, options.first_points);
-  std::vector<Found> found =
+  std::vector<VerifiedPoint> found =
       Search(some, keyframe, camera_from_map, options.first_radius_px, map, searcher, &candidate.expected);
   if (found.size() < options.min_first_matches) return std::nullopt;
   PoseRefinement pose = Refine(found, *keyframe.camera, camera_from_map, map, &measurements);
@@ -179,7 +179,7 @@ std::optional<LoopCandidate> VerifyLoopCandidate(const LoopVerificationOptions& 
       Search(points, keyframe, pose.camera_from_map, options.radius_px, map, searcher, &candidate.expected);
   if (static_cast<int>(found.size()) < options.min_inliers) return std::nullopt;
   pose = Refine(found, *keyframe.camera, pose.camera_from_map, map, &measurements);
-  std::vector<Found> inliers;
+  std::vector<VerifiedPoint> inliers;
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (measurements[i].weight > kInlierWeight) inliers.push_back(found[i]);
   }
@@ -198,7 +198,7 @@ std::optional<LoopCandidate> VerifyLoopCandidate(const LoopVerificationOptions& 
   candidate.keyframe_from_place = AsSim3(pose.camera_from_map * known.camera_from_map.inverse());
   candidate.keyframe_from_place.translation *= *scale;
   candidate.keyframe_from_place.scale = *scale;
-  for (const Found& f : inliers)
+  for (const VerifiedPoint& f : inliers)
     candidate.seen.push_back({id, f.point, f.pixel, static_cast<std::uint8_t>(f.level)});
 
   // The reverse check, in the coordinates of the recent points.
@@ -215,10 +215,11 @@ std::optional<LoopCandidate> VerifyLoopCandidate(const LoopVerificationOptions& 
   recent = Subsample(recent, options.max_points);
   constexpr double kMaxReverseError = 3;  // pixels of the level
   int expected = 0;
-  const std::vector<Found> back = Search(recent, known, place_from_keyframe * keyframe.camera_from_map,
-                                         options.radius_px, map, searcher, &expected);
-  candidate.reverse_inliers = static_cast<int>(
-      std::count_if(back.begin(), back.end(), [](const Found& f) { return f.error <= kMaxReverseError; }));
+  const std::vector<VerifiedPoint> back =
+      Search(recent, known, place_from_keyframe * keyframe.camera_from_map, options.radius_px, map, searcher,
+             &expected);
+  candidate.reverse_inliers = static_cast<int>(std::count_if(
+      back.begin(), back.end(), [](const VerifiedPoint& f) { return f.error <= kMaxReverseError; }));
   if (candidate.reverse_inliers < options.min_reverse_inliers ||
       candidate.reverse_inliers < options.min_reverse_ratio * expected)
     return std::nullopt;
