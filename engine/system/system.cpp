@@ -138,7 +138,7 @@ void System::RejectPose(std::size_t index, TrackedFrame* frame) {
   frame->map_key = 0;
   frame->matches.clear();
   frame->finite_points = frame->infinite_points = 0;
-  frame->hint = "Point this camera at what the other camera sees";
+  frame->hint = Hint::kFollowOtherCamera;
   cameras_[index].assignment.SearchAgain();
 }
 
