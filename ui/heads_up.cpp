@@ -274,7 +274,7 @@ void DrawHeadsUp(const View& view, Canvas* canvas) {
   if (view.overlay.status) DrawStatus(view, canvas);
   const double bottom =
       DrawSentence(view.overlay.message, 15 * unit, canvas->height_px() - 12 * unit, canvas) - 6 * unit;
-  const std::string& hint = tracked.hint;
+  const std::string& hint = view.overlay.hint;
   DrawSentence(hint.empty() && lost ? "Point the camera at a place that is already mapped." : hint, 18 * unit,
                bottom, canvas);
 }

@@ -21,6 +21,7 @@ struct Overlay {
   std::string map_name;    // Empty when there is no map.
   std::string mapping;     // Mapping status of the current map; empty when nobody extends it.
   std::string message;     // One sentence at the bottom; empty for none.
+  std::string hint;        // What to do so that the camera is tracked, above it; empty for none.
   // The newest frame of another camera, of any size; null for none. It is shown small in a corner (see
   // inset.h) with a border whose colour is its tracking state.
   const engine::TrackedFrame* inset = nullptr;

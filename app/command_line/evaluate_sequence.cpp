@@ -55,7 +55,8 @@ void DumpFrame(const std::filesystem::path& folder, std::size_t number, const en
                const Session& session) {
   // Dropped frames were not tracked, so there is nothing to inspect.
   const bool dropped = frame.state == engine::TrackingState::kDropped;
-  WriteFrameDump(folder, number, frame, dropped ? engine::FrameInspection() : session.Inspect(frame));
+  WriteFrameDump(folder, number, frame, dropped ? engine::FrameInspection() : session.Inspect(frame),
+                 dropped ? std::string() : session.ShownWith(frame).hint);
 }
 
 // Adds the session's maps to the record and, unless this is one of many runs, their panoramas to the report.

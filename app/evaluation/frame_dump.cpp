@@ -62,14 +62,14 @@ const char* ToString(engine::TrackingQuality quality) {
 }
 
 Json Describe(std::size_t number, const engine::TrackedFrame& frame,
-              const engine::FrameInspection& inspection) {
+              const engine::FrameInspection& inspection, const std::string& hint) {
   Json json = {{"frame", number},
                {"timestamp", ToSeconds(frame.frame.time)},
                {"camera", frame.frame.camera},
                {"state", engine::ToString(frame.state)},
                {"quality_class", ToString(frame.quality_class)},
                {"quality", frame.quality},
-               {"hint", frame.hint},
+               {"hint", hint},
                {"finite_inliers", frame.finite_points},
                {"infinite_inliers", frame.infinite_points},
                {"camera_from_map", nullptr},
@@ -195,9 +195,10 @@ void WriteImage(const std::filesystem::path& path, const cv::Mat& image) {
 }  // namespace
 
 void WriteFrameDump(const std::filesystem::path& folder, std::size_t number,
-                    const engine::TrackedFrame& frame, const engine::FrameInspection& inspection) {
+                    const engine::TrackedFrame& frame, const engine::FrameInspection& inspection,
+                    const std::string& hint) {
   const std::string name = "frame-" + std::to_string(number);
-  Write(folder / (name + ".json"), Describe(number, frame, inspection).dump(2) + "\n");
+  Write(folder / (name + ".json"), Describe(number, frame, inspection, hint).dump(2) + "\n");
   if (frame.state == engine::TrackingState::kDropped || frame.frame.image.empty()) return;
   WriteImage(folder / (name + "-points.png"), DrawPoints(frame.frame.image, inspection));
   WriteImage(folder / (name + "-residuals.png"), DrawResiduals(frame.frame.image, inspection));

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <string>
 
 #include "engine/tracking/frame_inspection.h"
 #include "engine/tracking/tracked_frame.h"
@@ -16,9 +17,10 @@
 // - frame-N-corners.png: the corners of all pyramid levels, with the smaller levels beside the image.
 namespace docent::app {
 
-// number: the frame's row in frames.csv, from 0. For a dropped frame, no images are written. Throws Error
-// when the folder cannot be written.
+// number: the frame's row in frames.csv, from 0. hint: what the person was asked to do; often empty. For a
+// dropped frame, no images are written. Throws Error when the folder cannot be written.
 void WriteFrameDump(const std::filesystem::path& folder, std::size_t number,
-                    const engine::TrackedFrame& frame, const engine::FrameInspection& inspection);
+                    const engine::TrackedFrame& frame, const engine::FrameInspection& inspection,
+                    const std::string& hint);
 
 }  // namespace docent::app

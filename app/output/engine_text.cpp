@@ -136,6 +136,51 @@ std::string TextOf(const engine::ClosedLoop& loop) {
       loop.place, loop.found, loop.expected, loop.duplicates, loop.reverse_inliers, loop.fused);
 }
 
+std::string TextOf(engine::Hint hint) {
+  using engine::Hint;
+  switch (hint) {
+    case Hint::kNone:
+      break;
+    case Hint::kChooseMap:
+      return "Press New map to begin, or look at a mapped place.";
+    case Hint::kMoveSideways:
+      return "move sideways";
+    case Hint::kMoveInsteadOfTurning:
+      return "move sideways instead of turning";
+    case Hint::kMoveFurther:
+      return "move further sideways";
+    case Hint::kAvoidPlane:
+      return "move in another direction, or point the camera at something less flat";
+    case Hint::kFindMoreDetail:
+      return "point the camera at something with more detail, and move slowly";
+    case Hint::kWaitUntilStill:
+      return "wait until nothing moves in view, then move sideways";
+    case Hint::kStartWhereThereIsDetail:
+      return "too little detail here: point the camera at the exhibit";
+    case Hint::kFindTarget:
+      return "point the camera at the target";
+    case Hint::kWaitForMap:
+      return "Starting the map. Please wait.";
+    case Hint::kMoveMoreSlowly:
+      return "Move more slowly.";
+    case Hint::kLowTexture:
+      return "Too little detail here: point the camera at the exhibit.";
+    case Hint::kLeftMap:
+      return "You have left the mapped area: look back.";
+    case Hint::kLookBack:
+      return "Look back at a place you have seen before.";
+    case Hint::kFollowOtherCamera:
+      return "Point this camera at what the other camera sees";
+  }
+  return {};
+}
+
+std::string TextOf(const engine::RigEstimate& rig) {
+  return Printed("%s, baseline %.4g (sigma %.2g), rotation %.4g degrees (sigma %.2g)",
+                 rig.rigid ? "rigid" : "articulated", rig.Baseline(), rig.position_sigma,
+                 rig.second_from_first.rotation.Angle() * 180 / std::numbers::pi, rig.rotation_sigma_deg);
+}
+
 std::string TextOf(const engine::MapOverlap& overlap) {
   return Printed(
       "%zu keyframes recognised, %zu consecutive, %zu of %zu with a view of the other map confirm it, median "

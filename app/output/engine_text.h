@@ -4,8 +4,10 @@
 #include <optional>
 #include <string>
 
+#include "engine/initialization/hint.h"
 #include "engine/mapping/loops/map_joining.h"
 #include "engine/mapping/mapper_event.h"
+#include "engine/system/camera_rig.h"
 
 // Results of the engine in the words of events, reports and messages.
 namespace docent::app {
@@ -14,6 +16,10 @@ namespace docent::app {
 std::string TextOf(const engine::BundleSummary& summary);
 // "drift of 1.2 % of the path, ...; keyframe 40 matches keyframe 2: ..."
 std::string TextOf(const engine::ClosedLoop& loop);
+// The sentence that a person reads, or part of one in lower case; empty for kNone.
+std::string TextOf(engine::Hint hint);
+// "rigid, baseline 0.25 (sigma 0.001), rotation 12.3 degrees (sigma 0.05)"
+std::string TextOf(const engine::RigEstimate& rig);
 // The figures in one line.
 std::string TextOf(const engine::MapOverlap& overlap);
 // A warning in whole sentences.

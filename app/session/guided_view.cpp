@@ -14,6 +14,7 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   view.overlay.map_name = frame.shown.map_name;
   if (frame.shown.mapping) view.overlay.mapping = ToString(*frame.shown.mapping);
   view.overlay.message = frame.message;
+  view.overlay.hint = frame.shown.hint;
   return view;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "app/files/image_files.h"
+#include "app/output/engine_text.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -73,22 +74,20 @@ engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   Camera& camera = cameras_[static_cast<std::size_t>(frame.camera)];
   camera.last_time = frame.time;
   HandleSystemEvents();
-  ReportRejection(&camera, &tracked);
+  ReportRejection(&camera, tracked);
   if (options_.may_write) Autosave(frame.time);
   return tracked;
 }
 
-void Session::ReportRejection(Camera* camera, engine::TrackedFrame* frame) {
+void Session::ReportRejection(Camera* camera, const engine::TrackedFrame& frame) {
   const auto name = [this](std::uint64_t key) { return NameOf(key); };
-  const bool is_new = camera->relocalization_message.Update(frame->frame.time, engine::HasPose(frame->state),
-                                                            frame->relocalization, name);
+  const bool is_new = camera->relocalization_message.Update(frame.frame.time, engine::HasPose(frame.state),
+                                                            frame.relocalization, name);
   const std::string& text = camera->relocalization_message.text();
-  if (text.empty()) return;
-  frame->hint = text;
-  if (!is_new) return;
-  AddEvent(frame->frame.time, "not sure",
-           CameraPrefix(static_cast<std::size_t>(frame->frame.camera)) + text + " (" +
-               std::to_string(frame->relocalization.inliers) + " inliers)");
+  if (text.empty() || !is_new) return;
+  AddEvent(frame.frame.time, "not sure",
+           CameraPrefix(static_cast<std::size_t>(frame.frame.camera)) + text + " (" +
+               std::to_string(frame.relocalization.inliers) + " inliers)");
 }
 
 void Session::Advise(Camera* camera, const std::string& sentence) {
@@ -103,6 +102,8 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   Shown shown;
   const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
   if (frame.frame.time < camera.advice_end) shown.advice = camera.advice;
+  const std::string& rejection = camera.relocalization_message.text();
+  shown.hint = rejection.empty() ? TextOf(frame.hint) : rejection;
   if (options_.may_write) shown.mapping = MappingStatusOf(frame, active != 0 && active == frame.map_key);
   const auto found = maps_.find(frame.map_key);
   if (found == maps_.end()) return shown;

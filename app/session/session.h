@@ -91,6 +91,7 @@ class Session {
     std::shared_ptr<const content::Scene> scene;
     std::optional<MappingStatus> mapping;  // only where the session may write
     std::string advice;                    // a sentence about the frame's camera; often empty
+    std::string hint;  // what to do so that the camera is tracked, as one sentence; often empty
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
   // The session's state of a map.
@@ -132,7 +133,7 @@ class Session {
   };
 
   // session.cpp
-  void ReportRejection(Camera* camera, engine::TrackedFrame* frame);
+  void ReportRejection(Camera* camera, const engine::TrackedFrame& frame);
   static void Advise(Camera* camera, const std::string& sentence);
   void AddEvent(Timestamp time, std::string event, std::string detail);
   Timestamp LastTime() const;  // the latest of any camera

@@ -143,7 +143,7 @@ void Session::Handle(const engine::SystemEvent& event, const engine::JoinRefused
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::RigChanged& what) {
-  std::string detail = NameOf(event.map) + ": " + what.estimate.ToString();
+  std::string detail = NameOf(event.map) + ": " + TextOf(what.estimate);
   if (what.estimate.rigid && options_.baseline_m > 0) {
     detail += ", one map unit is " + FormatNumber(options_.baseline_m / what.estimate.Baseline(), 4) + " m";
   }

@@ -7,7 +7,6 @@
 #include <deque>
 #include <mutex>
 #include <optional>
-#include <stop_token>
 #include <utility>
 
 namespace docent {
@@ -24,43 +23,27 @@ class BoundedQueue {
   BoundedQueue(const BoundedQueue&) = delete;
   BoundedQueue& operator=(const BoundedQueue&) = delete;
 
-  // Waits for a free slot. Returns false and drops the item if the queue is closed or `stop` is requested
-  // first.
-  bool Push(Item item, std::stop_token stop = {}) {
+  // Waits for a free slot. Returns false and drops the item if the queue is closed first.
+  bool Push(Item item) {
     std::unique_lock lock(mutex_);
-    const bool woken = changed_.wait(lock, stop, [this] { return closed_ || items_.size() < capacity_; });
-    if (!woken || closed_) return false;
+    changed_.wait(lock, [this] { return closed_ || items_.size() < capacity_; });
+    if (closed_) return false;
     items_.push_back(std::move(item));
     lock.unlock();
     changed_.notify_all();
     return true;
   }
 
-  // Never waits. Returns false and leaves the item unchanged if the queue is full or closed.
-  bool TryPush(Item& item) {
-    {
-      std::scoped_lock lock(mutex_);
-      if (closed_ || items_.size() >= capacity_) return false;
-      items_.push_back(std::move(item));
-    }
-    changed_.notify_all();
-    return true;
-  }
-  bool TryPush(Item&& item) { return TryPush(item); }
-
-  // Waits for an item. Empty if the queue is closed and holds no items, or if `stop` is requested first.
-  std::optional<Item> Pop(std::stop_token stop = {}) {
+  // Waits for an item. Empty if the queue is closed and holds no items.
+  std::optional<Item> Pop() {
     std::unique_lock lock(mutex_);
-    const bool woken = changed_.wait(lock, stop, [this] { return closed_ || !items_.empty(); });
-    if (!woken || items_.empty()) return std::nullopt;
-    return TakeFront(lock);
-  }
-
-  // Never waits. Empty if the queue holds no items.
-  std::optional<Item> TryPop() {
-    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return closed_ || !items_.empty(); });
     if (items_.empty()) return std::nullopt;
-    return TakeFront(lock);
+    std::optional<Item> item(std::move(items_.front()));
+    items_.pop_front();
+    lock.unlock();
+    changed_.notify_all();
+    return item;
   }
 
   // Accepts no more items from now on. May be called more than once.
@@ -83,17 +66,9 @@ class BoundedQueue {
   std::size_t capacity() const { return capacity_; }
 
  private:
-  std::optional<Item> TakeFront(std::unique_lock<std::mutex>& lock) {
-    std::optional<Item> item(std::move(items_.front()));
-    items_.pop_front();
-    lock.unlock();
-    changed_.notify_all();
-    return item;
-  }
-
   const std::size_t capacity_;
   mutable std::mutex mutex_;
-  std::condition_variable_any changed_;  // _any, because a stop token can wake it too
+  std::condition_variable changed_;
   std::deque<Item> items_;
   bool closed_ = false;
 };

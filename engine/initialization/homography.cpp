@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/geometry/tangent_basis.h"
-
 namespace docent::engine {
 
 std::optional<Eigen::Matrix3d> SolveFourPoint(std::span<const Eigen::Vector3d, 4> rays_in_a,
@@ -32,35 +30,6 @@ std::optional<Eigen::Matrix3d> ScaleHomography(const Eigen::Matrix3d& homography
   const double middle = eigen.eigenvalues()[1];
   if (!(middle > 1e-12 * eigen.eigenvalues()[2])) return std::nullopt;
   return homography / std::sqrt(middle);
-}
-
-std::optional<Eigen::Matrix3d> FitHomography(std::span<const Eigen::Vector3d> rays_in_a,
-                                             std::span<const Eigen::Vector3d> rays_in_b) {
-  if (rays_in_a.size() < 4 || rays_in_a.size() != rays_in_b.size()) return std::nullopt;
-  // Each pair requires that H ray_a has no component perpendicular to ray_b: two rows on the entries of H,
-  // row by row.
-  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
-  Eigen::Matrix<double, 2, 9> rows;
-  for (std::size_t i = 0; i < rays_in_a.size(); ++i) {
-    const Eigen::Matrix<double, 2, 3> tangents = TangentBasis(rays_in_b[i]).transpose();
-    for (int row = 0; row < 3; ++row)
-      rows.block<2, 3>(0, 3 * row) = tangents.col(row) * rays_in_a[i].transpose();
-    normal.noalias() += rows.transpose() * rows;
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(normal);
-  // The null direction is the solution; a second one means that the rays do not determine it.
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues()[1] > 1e-12 * eigen.eigenvalues()[8]))
-    return std::nullopt;
-  const Eigen::Matrix<double, 9, 1> entries = eigen.eigenvectors().col(0);
-  Eigen::Matrix3d homography = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(entries.data());
-  const auto scaled = ScaleHomography(homography);
-  if (!scaled) return std::nullopt;
-  homography = *scaled;
-  std::size_t opposite = 0;
-  for (std::size_t i = 0; i < rays_in_a.size(); ++i)
-    opposite += rays_in_b[i].dot(homography * rays_in_a[i]) < 0;
-  if (2 * opposite > rays_in_a.size()) homography = -homography;
-  return homography;
 }
 
 std::vector<PlaneMotion> DecomposeHomography(const Eigen::Matrix3d& b_from_a) {

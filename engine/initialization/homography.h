@@ -18,12 +18,6 @@ namespace docent::engine {
 std::optional<Eigen::Matrix3d> SolveFourPoint(std::span<const Eigen::Vector3d, 4> rays_in_a,
                                               std::span<const Eigen::Vector3d, 4> rays_in_b);
 
-// Linear least squares over at least four ray pairs (direct linear transform; unit rays need no further
-// conditioning). Scaled so that the middle singular value is 1 and most rays map to their partners rather
-// than to the opposite directions. Empty if the rays do not determine the homography.
-std::optional<Eigen::Matrix3d> FitHomography(std::span<const Eigen::Vector3d> rays_in_a,
-                                             std::span<const Eigen::Vector3d> rays_in_b);
-
 // Scales a homography so that its middle singular value is 1, as DecomposeHomography requires; empty if the
 // matrix is numerically singular.
 std::optional<Eigen::Matrix3d> ScaleHomography(const Eigen::Matrix3d& homography);

@@ -101,7 +101,7 @@ void Initializer::Reset() {
   confirmation_.Reset();
   first_.reset();
   previous_.reset();
-  hint_.clear();
+  hint_ = Hint::kNone;
 }
 
 void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
@@ -118,9 +118,8 @@ void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeature
   age_frames_ = 0;
   first_time_ = time;
   first_ = previous_ = features;
-  hint_ = static_cast<int>(trails_.size()) < options_.min_alive
-              ? "too little detail here: point the camera at the exhibit"
-              : "move sideways";
+  const bool enough = static_cast<int>(trails_.size()) >= options_.min_alive;
+  hint_ = enough ? Hint::kMoveSideways : Hint::kStartWhereThereIsDetail;
 }
 
 void Initializer::TrackCorners(const ImageFeatures& features) {
@@ -166,7 +165,7 @@ std::optional<InitialPair> Initializer::Track(Timestamp time,
   const auto middle = motion.begin() + static_cast<std::ptrdiff_t>(motion.size() / 2);
   std::nth_element(motion.begin(), middle, motion.end());
   if (*middle < options_.min_motion_px * camera_->width_px() / 640.0) {
-    hint_ = Advice(TwoViewOutcome::kStill);
+    hint_ = HintFor(TwoViewOutcome::kStill);
     return std::nullopt;
   }
   return Attempt(time, features);
@@ -224,12 +223,12 @@ std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const 
   options.depth_noise.speed_change_px = speed_change_px;
   options.seed = random_.Next();
   pair.geometry = EstimateTwoViews(rays_a, rays_b, options);
-  hint_ = Advice(pair.geometry.outcome);
+  hint_ = HintFor(pair.geometry.outcome);
   if (pair.geometry.outcome != TwoViewOutcome::kGeneral && pair.geometry.outcome != TwoViewOutcome::kPlanar) {
     return std::nullopt;
   }
   if (!confirmation->Confirm(a.time, kept, pair.geometry)) {
-    hint_ = Advice(TwoViewOutcome::kTooLittleParallax);
+    hint_ = HintFor(TwoViewOutcome::kTooLittleParallax);
     return std::nullopt;
   }
   pair.camera = camera_;

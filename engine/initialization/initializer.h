@@ -53,8 +53,8 @@ class Initializer {
 
   // Time of the first view; Timestamp::min() if there is none.
   Timestamp first_time() const { return first_ ? first_time_ : Timestamp::min(); }
-  // Advice to the user on why there is no map yet; empty right after Reset().
-  const std::string& hint() const { return hint_; }
+  // Why there is no map yet; kNone right after Reset().
+  Hint hint() const { return hint_; }
   // A tracked corner: its pixel in the first view and in the current frame, level 0.
   struct Trail {
     Eigen::Vector2f first, now;
@@ -83,7 +83,7 @@ class Initializer {
   int age_frames_ = 0;
   Timestamp first_time_{};
   std::shared_ptr<const ImageFeatures> first_, previous_;
-  std::string hint_;
+  Hint hint_ = Hint::kNone;
 };
 
 }  // namespace docent::engine

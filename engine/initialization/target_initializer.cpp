@@ -15,7 +15,6 @@ namespace docent::engine {
 
 namespace {
 
-constexpr const char* kFindTarget = "point the camera at the target";
 constexpr double kDegrees = 180 / std::numbers::pi;
 
 InitializerOptions TrackOnlyOptions() {
@@ -99,14 +98,14 @@ std::optional<std::string> TargetStartOptions::Validate() const {
 std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraModel>& camera,
                                            const TargetView& a, const TargetView& b,
                                            const std::vector<InitialPair::Match>& tracked,
-                                           const TargetStartOptions& options, std::string* hint) {
+                                           const TargetStartOptions& options, Hint* hint) {
   TargetStart start;
   start.a_from_target = a.detection.camera_from_target;
   const Rigid3 b_from_a = b.detection.camera_from_target * a.detection.camera_from_target.inverse();
   start.pair.baseline_m = b_from_a.translation.norm();
   // Without motion there is no baseline to serve as unit.
   if (!(start.pair.baseline_m > 1e-9)) {
-    *hint = Advice(TwoViewOutcome::kStill);
+    *hint = HintFor(TwoViewOutcome::kStill);
     return std::nullopt;
   }
   InitialPair& pair = start.pair;
@@ -116,12 +115,12 @@ std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraMod
   const std::vector<double> parallax_deg = AppendTargetPoints(a, b, b_from_a, &pair);
   pair.geometry.median_parallax_deg = Median(parallax_deg);
   if (pair.geometry.median_parallax_deg < options.min_parallax_deg) {
-    *hint = Advice(TwoViewOutcome::kTooLittleParallax);
+    *hint = HintFor(TwoViewOutcome::kTooLittleParallax);
     return std::nullopt;
   }
   AppendTrackedCorners(*camera, tracked, b_from_a, options, &pair);
   if (pair.geometry.inlier_count < options.min_matches) {
-    *hint = Advice(TwoViewOutcome::kTooFewMatches);
+    *hint = HintFor(TwoViewOutcome::kTooFewMatches);
     return std::nullopt;
   }
   // Points beside the target have depth; otherwise the structure is the target's plane alone.
@@ -129,7 +128,7 @@ std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraMod
       pair.matches.size() > parallax_deg.size() ? TwoViewOutcome::kGeneral : TwoViewOutcome::kPlanar;
   pair.geometry.b_from_a = b_from_a;
   pair.geometry.b_from_a.translation /= start.pair.baseline_m;
-  hint->clear();
+  *hint = Hint::kNone;
   return start;
 }
 
@@ -149,7 +148,7 @@ void TargetInitializer::Reset() {
   first_.reset();
   detection_.reset();
   previous_.reset();
-  hint_ = kFindTarget;
+  hint_ = Hint::kFindTarget;
 }
 
 std::optional<TargetDetection> TargetInitializer::DetectOrAlign(const ImageFeatures& features) {
@@ -182,7 +181,7 @@ std::optional<TargetStart> TargetInitializer::Track(Timestamp time,
     if (restarted) first_.reset();
   }
   if (!detection_) {
-    hint_ = kFindTarget;
+    hint_ = Hint::kFindTarget;
     return std::nullopt;
   }
   const TargetView now{{time, features}, *detection_};
@@ -190,7 +189,7 @@ std::optional<TargetStart> TargetInitializer::Track(Timestamp time,
     corner_tracker_.Reset();
     corner_tracker_.Track(time, features);
     first_ = now;
-    hint_ = Advice(TwoViewOutcome::kStill);
+    hint_ = HintFor(TwoViewOutcome::kStill);
     return std::nullopt;
   }
   std::vector<InitialPair::Match> tracked;

@@ -36,11 +36,11 @@ struct TargetView {
 };
 // Initializes a map from two views: points of the target that both views detect, placed on its plane, and
 // triangulated corners beside it. Empty if there is too little parallax or there are too few points; *hint
-// then advises the user.
+// then says what to do.
 std::optional<TargetStart> MakeTargetStart(const std::shared_ptr<const CameraModel>& camera,
                                            const TargetView& a, const TargetView& b,
                                            const std::vector<InitialPair::Match>& tracked,
-                                           const TargetStartOptions& options, std::string* hint);
+                                           const TargetStartOptions& options, Hint* hint);
 
 // Detects the target, tracks the camera from it, and tracks corners in the whole image, until two views can
 // initialize a map (hybrid-slam §5.5). Takes the place of an Initializer and is used in the same way: one per
@@ -57,8 +57,8 @@ class TargetInitializer {
 
   // Time of the first view; Timestamp::min() if there is none.
   Timestamp first_time() const { return first_ ? first_->view.time : Timestamp::min(); }
-  // Advice to the user on why there is no map yet.
-  const std::string& hint() const { return hint_; }
+  // Why there is no map yet.
+  Hint hint() const { return hint_; }
   // The detection in the last frame; empty if the target was not found there.
   const std::optional<TargetDetection>& detection() const { return detection_; }
   // Corners tracked since the first view.
@@ -75,7 +75,7 @@ class TargetInitializer {
   std::optional<TargetView> first_;
   std::optional<TargetDetection> detection_;
   std::shared_ptr<const ImageFeatures> previous_;
-  std::string hint_;
+  Hint hint_ = Hint::kNone;
 };
 
 }  // namespace docent::engine

@@ -277,25 +277,25 @@ std::optional<std::string> TwoViewOptions::Validate() const {
       .fault();
 }
 
-const char* Advice(TwoViewOutcome outcome) {
+Hint HintFor(TwoViewOutcome outcome) {
   switch (outcome) {
     case TwoViewOutcome::kGeneral:
     case TwoViewOutcome::kPlanar:
-      return "";
+      return Hint::kNone;
     case TwoViewOutcome::kStill:
-      return "move sideways";
+      return Hint::kMoveSideways;
     case TwoViewOutcome::kPureRotation:
-      return "move sideways instead of turning";
+      return Hint::kMoveInsteadOfTurning;
     case TwoViewOutcome::kTooLittleParallax:
-      return "move further sideways";
+      return Hint::kMoveFurther;
     case TwoViewOutcome::kAmbiguousPlane:
-      return "move in another direction, or point the camera at something less flat";
+      return Hint::kAvoidPlane;
     case TwoViewOutcome::kTooFewMatches:
-      return "point the camera at something with more detail, and move slowly";
+      return Hint::kFindMoreDetail;
     case TwoViewOutcome::kInconsistent:
-      return "wait until nothing moves in view, then move sideways";
+      return Hint::kWaitUntilStill;
   }
-  return "";
+  return Hint::kNone;
 }
 
 TwoViewResult EstimateTwoViews(std::span<const Eigen::Vector3d> rays_in_a,

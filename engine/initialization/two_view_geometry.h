@@ -10,6 +10,7 @@
 
 #include "engine/geometry/rigid3.h"
 #include "engine/initialization/depth_significance.h"
+#include "engine/initialization/hint.h"
 
 // The relative pose of two calibrated views and the structure between them, without a prior: the five-point
 // initialization of ptamm §2.3, made robust against planes, pure rotation and still cameras.
@@ -48,8 +49,8 @@ enum class TwoViewOutcome {
   kTooFewMatches,
   kInconsistent  // no rigid motion explains enough of the matches (moving objects, wrong matches)
 };
-// The advice that the user reads, e.g. "move sideways"; empty if the geometry was accepted.
-const char* Advice(TwoViewOutcome outcome);
+// What to do so that the next attempt succeeds; kNone if the geometry was accepted.
+Hint HintFor(TwoViewOutcome outcome);
 
 struct TwoViewResult {
   TwoViewOutcome outcome = TwoViewOutcome::kTooFewMatches;

@@ -326,4 +326,10 @@ std::shared_ptr<const MapSnapshot> Map::Snapshot() {
   return snapshot;
 }
 
+std::size_t Map::FinitePoints() const {
+  std::size_t finite = 0;
+  for (const PointRecord& record : points_) finite += record.alive && !record.point.infinite();
+  return finite;
+}
+
 }  // namespace docent::engine

@@ -90,6 +90,7 @@ class Map {
   // An immutable copy of the map with the next revision; drops removed points.
   std::shared_ptr<const MapSnapshot> Snapshot();
   std::size_t AlivePoints() const { return alive_points_; }
+  std::size_t FinitePoints() const;  // alive and finite; visits all points
 
  private:
   void ClosePanorama(PanoramaId id);

@@ -95,102 +95,155 @@ struct MotionConstraint {
   double infinite_weight = 1;
 };
 
-PoseRefinement Refine(const CameraModel& camera, const Rigid3& start, const PoseRefinementOptions& options,
-                      const RotationPrior& prior, const MotionConstraint& constraint,
-                      std::vector<PoseMeasurement>* measurements, PoseRefinementMemory* memory) {
-  const bool rotation_only = constraint.rotation_only;
-  const Eigen::Vector3d pivot = rotation_only ? prior.pivot : Eigen::Vector3d::Zero();
-  const Eigen::Vector3d pivot_in_map = prior.camera_from_map.inverse() * prior.pivot;
-  PoseRefinement result;
-  result.camera_from_map = start;
-  result.covariance.setZero();
-  Matrix6 normal, measured;
-  RobustScale scales[2];  // finite, infinite
-  double depth = 0;       // summed over finite inliers
-  for (int iteration = 0; iteration <= options.iterations; ++iteration) {
+// One robust Gauss-Newton refinement of a pose. Used on the stack of one RefinePose call.
+class PoseDescent {
+ public:
+  PoseDescent(const CameraModel& camera, const PoseRefinementOptions& options, const RotationPrior& prior,
+              const MotionConstraint& constraint, std::vector<PoseMeasurement>* measurements,
+              PoseRefinementMemory* memory)
+      : camera_(camera),
+        options_(options),
+        prior_(prior),
+        constraint_(constraint),
+        pivot_(constraint.rotation_only ? prior.pivot : Eigen::Vector3d::Zero()),
+        pivot_in_map_(prior.camera_from_map.inverse() * prior.pivot),
+        measurements_(*measurements),
+        memory_(*memory) {}
+
+  PoseRefinement From(const Rigid3& start);
+
+ private:
+  // Projects the measurements at the current pose, and estimates the scales of their residuals.
+  void Project(bool tukey);
+  // Sums the weighted normal equations of the measurements, and counts inliers.
+  void Accumulate(bool tukey);
+  void AddConstraint();
+  // Returns the root mean square shift of the projections by the update, in sigmas of their levels; empty if
+  // the equations do not determine an update.
+  std::optional<double> Update();
+  void EstimateCovariance();
+
+  const CameraModel& camera_;
+  const PoseRefinementOptions& options_;
+  const RotationPrior& prior_;
+  const MotionConstraint& constraint_;
+  const Eigen::Vector3d pivot_;  // of the rotation, camera frame
+  const Eigen::Vector3d pivot_in_map_;
+  std::vector<PoseMeasurement>& measurements_;
+  PoseRefinementMemory& memory_;
+  PoseRefinement result_;
+  Matrix6 normal_ = Matrix6::Zero(), measured_ = Matrix6::Zero();  // with the constraint, and without
+  Vector6 gradient_ = Vector6::Zero();
+  RobustScale scales_[2];  // finite, infinite
+  double depth_ = 0;       // summed over finite inliers
+};
+
+PoseRefinement PoseDescent::From(const Rigid3& start) {
+  result_ = PoseRefinement();
+  result_.camera_from_map = start;
+  const int min_finite = constraint_.infinite_weight < 1 ? 1 : options_.min_finite;
+  for (int iteration = 0; iteration <= options_.iterations; ++iteration) {
     // The last pass only computes weights and counts at the final pose.
-    const bool last = iteration == options.iterations;
-    const bool tukey = iteration >= options.iterations / 2;
-    const Eigen::Matrix3d rotation = result.camera_from_map.rotation.matrix();
-    memory->projections.clear();
-    for (const PoseMeasurement& measurement : *measurements)
-      memory->projections.push_back(
-          ProjectMeasurement(camera, rotation, result.camera_from_map.translation, measurement));
-    for (const bool infinite : {false, true})
-      scales[infinite] = EstimateScale(*measurements, infinite, options, tukey, memory);
-    normal.setZero();
-    Vector6 gradient = Vector6::Zero();
-    result.inliers = result.finite_inliers = 0;
-    depth = 0;
-    for (std::size_t i = 0; i < measurements->size(); ++i) {
-      PoseMeasurement& measurement = (*measurements)[i];
-      const Projection& projection = memory->projections[i];
-      const bool infinite = measurement.infinite();
-      measurement.weight = 0;
-      if (!projection.valid) continue;
-      measurement.weight = LossWeight(projection.error.norm(), scales[infinite].threshold, tukey);
-      if (measurement.weight > options.min_weight) {
-        ++result.inliers;
-        result.finite_inliers += !infinite;
-        if (!infinite) depth += projection.point_in_camera.z();
-      }
-      const double weight = measurement.weight * (infinite ? constraint.infinite_weight : 1.0);
-      const Matrix26 jacobian = PoseJacobian(projection, measurement, pivot);
-      normal.noalias() += weight * jacobian.transpose() * jacobian;
-      gradient.noalias() += weight * jacobian.transpose() * projection.error;
-    }
-    measured = normal;
-    if (constraint.sigma > 0) {
-      const double information = Square(std::max(scales[0].sigma, options.min_sigma) / constraint.sigma);
-      const Eigen::Vector3d now = result.camera_from_map * pivot_in_map;
-      Eigen::Matrix<double, 3, 6> jacobian;
-      jacobian << Eigen::Matrix3d::Identity(), -Hat(now);
-      normal.noalias() += information * jacobian.transpose() * jacobian;
-      gradient.noalias() += information * jacobian.transpose() * (prior.pivot - now);
-    } else if (rotation_only) {
-      // The few finite points left must not move the camera centre.
-      normal.leftCols<3>().setZero();
-      normal.topRows<3>().setZero();
-      normal.topLeftCorner<3, 3>().diagonal().setConstant(normal.diagonal().maxCoeff());
-      gradient.head<3>().setZero();
-    }
-    const int min_finite = constraint.infinite_weight < 1 ? 1 : options.min_finite;
-    result.sigma = scales[result.finite_inliers >= min_finite ? 0 : 1].sigma;
+    const bool last = iteration == options_.iterations;
+    const bool tukey = iteration >= options_.iterations / 2;
+    Project(tukey);
+    Accumulate(tukey);
+    measured_ = normal_;
+    AddConstraint();
+    result_.sigma = scales_[result_.finite_inliers >= min_finite ? 0 : 1].sigma;
     if (last) break;
-    const Eigen::LDLT<Matrix6> factor(normal);
-    const Vector6 pivots = factor.vectorD();
-    if (factor.info() != Eigen::Success || !(pivots.minCoeff() > 1e-12 * pivots.maxCoeff()) ||
-        result.inliers < 3) {
-      result.converged = false;
-      return result;
-    }
-    const Vector6 update = factor.solve(gradient);
-    if (rotation_only) {
-      const Rigid3 about_pivot(result.camera_from_map.rotation, result.camera_from_map.translation - pivot);
-      const Rigid3 rotated = Rigid3::Exp(update) * about_pivot;
-      result.camera_from_map = Rigid3(rotated.rotation, rotated.translation + pivot);
-    } else {
-      result.camera_from_map = Rigid3::Exp(update) * result.camera_from_map;
-    }
-    // Root mean square shift of the projections by this update, in sigmas of their levels.
-    const int infinite_inliers = result.inliers - result.finite_inliers;
-    const double counted = result.finite_inliers + constraint.infinite_weight * infinite_inliers;
-    const double shift = std::sqrt(std::max(0.0, update.dot(normal * update)) / (counted + 1.0));
+    const std::optional<double> shift = Update();
     // Tukey's weights may oscillate slightly without end; an invisible shift counts as converged.
-    result.converged = shift < 0.1;
+    result_.converged = shift && *shift < 0.1;
+    if (!shift) return result_;
     // Negligible shifts end the loop early, but not before iterations with Tukey weights.
-    if (shift < 0.01)
-      iteration = std::max(iteration, tukey ? options.iterations - 1 : options.iterations / 2 - 1);
+    if (*shift < 0.01)
+      iteration = std::max(iteration, tukey ? options_.iterations - 1 : options_.iterations / 2 - 1);
   }
-  const double sigma = std::max(result.sigma, options.min_sigma);
-  result.covariance = sigma * sigma * measured.ldlt().solve(Matrix6::Identity());
-  result.mean_depth = result.finite_inliers > 0 ? depth / result.finite_inliers : 0;
-  if (rotation_only) {
-    result.covariance = sigma * sigma * normal.ldlt().solve(Matrix6::Identity());
-    result.covariance.leftCols<3>().setZero();
-    result.covariance.topRows<3>().setZero();
+  EstimateCovariance();
+  result_.mean_depth = result_.finite_inliers > 0 ? depth_ / result_.finite_inliers : 0;
+  return result_;
+}
+
+void PoseDescent::Project(bool tukey) {
+  const Eigen::Matrix3d rotation = result_.camera_from_map.rotation.matrix();
+  memory_.projections.clear();
+  for (const PoseMeasurement& measurement : measurements_)
+    memory_.projections.push_back(
+        ProjectMeasurement(camera_, rotation, result_.camera_from_map.translation, measurement));
+  for (const bool infinite : {false, true})
+    scales_[infinite] = EstimateScale(measurements_, infinite, options_, tukey, &memory_);
+}
+
+void PoseDescent::Accumulate(bool tukey) {
+  normal_.setZero();
+  gradient_.setZero();
+  result_.inliers = result_.finite_inliers = 0;
+  depth_ = 0;
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    PoseMeasurement& measurement = measurements_[i];
+    const Projection& projection = memory_.projections[i];
+    const bool infinite = measurement.infinite();
+    measurement.weight = 0;
+    if (!projection.valid) continue;
+    measurement.weight = LossWeight(projection.error.norm(), scales_[infinite].threshold, tukey);
+    if (measurement.weight > options_.min_weight) {
+      ++result_.inliers;
+      result_.finite_inliers += !infinite;
+      if (!infinite) depth_ += projection.point_in_camera.z();
+    }
+    const double weight = measurement.weight * (infinite ? constraint_.infinite_weight : 1.0);
+    const Matrix26 jacobian = PoseJacobian(projection, measurement, pivot_);
+    normal_.noalias() += weight * jacobian.transpose() * jacobian;
+    gradient_.noalias() += weight * jacobian.transpose() * projection.error;
   }
-  return result;
+}
+
+void PoseDescent::AddConstraint() {
+  if (constraint_.sigma > 0) {
+    const double information = Square(std::max(scales_[0].sigma, options_.min_sigma) / constraint_.sigma);
+    const Eigen::Vector3d now = result_.camera_from_map * pivot_in_map_;
+    Eigen::Matrix<double, 3, 6> jacobian;
+    jacobian << Eigen::Matrix3d::Identity(), -Hat(now);
+    normal_.noalias() += information * jacobian.transpose() * jacobian;
+    gradient_.noalias() += information * jacobian.transpose() * (prior_.pivot - now);
+  } else if (constraint_.rotation_only) {
+    // The few finite points left must not move the camera centre.
+    normal_.leftCols<3>().setZero();
+    normal_.topRows<3>().setZero();
+    normal_.topLeftCorner<3, 3>().diagonal().setConstant(normal_.diagonal().maxCoeff());
+    gradient_.head<3>().setZero();
+  }
+}
+
+std::optional<double> PoseDescent::Update() {
+  const Eigen::LDLT<Matrix6> factor(normal_);
+  const Vector6 pivots = factor.vectorD();
+  if (factor.info() != Eigen::Success || !(pivots.minCoeff() > 1e-12 * pivots.maxCoeff()) ||
+      result_.inliers < 3)
+    return std::nullopt;
+  const Vector6 update = factor.solve(gradient_);
+  Rigid3& pose = result_.camera_from_map;
+  if (constraint_.rotation_only) {
+    const Rigid3 rotated = Rigid3::Exp(update) * Rigid3(pose.rotation, pose.translation - pivot_);
+    pose = Rigid3(rotated.rotation, rotated.translation + pivot_);
+  } else {
+    pose = Rigid3::Exp(update) * pose;
+  }
+  const int infinite_inliers = result_.inliers - result_.finite_inliers;
+  const double counted = result_.finite_inliers + constraint_.infinite_weight * infinite_inliers;
+  return std::sqrt(std::max(0.0, update.dot(normal_ * update)) / (counted + 1.0));
+}
+
+void PoseDescent::EstimateCovariance() {
+  const double sigma = std::max(result_.sigma, options_.min_sigma);
+  if (!constraint_.rotation_only) {
+    result_.covariance = sigma * sigma * measured_.ldlt().solve(Matrix6::Identity());
+    return;
+  }
+  result_.covariance = sigma * sigma * normal_.ldlt().solve(Matrix6::Identity());
+  result_.covariance.leftCols<3>().setZero();
+  result_.covariance.topRows<3>().setZero();
 }
 
 // Whether the finite points determine the camera position to within this ratio of the mean depth.
@@ -224,14 +277,14 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
   MotionConstraint constraint;
   if (finite >= options.min_finite || !rotation_observable) {
     constraint.infinite_weight = options.infinite_weight;
-    PoseRefinement result = Refine(camera, start, options, prior, constraint, measurements, memory);
+    PoseRefinement result = PoseDescent(camera, options, prior, constraint, measurements, memory).From(start);
     const Rigid3 camera_from_map_without_prior = result.camera_from_map;
     const bool enough_finite = result.finite_inliers >= options.min_finite;
     const bool position_observable =
         enough_finite && IsPositionObservable(result, options.max_position_sigma);
     if (prior.reliable && enough_finite && !IsPositionObservable(result, options.max_position_sigma / 2)) {
       constraint.sigma = options.prior_translation_sigma * result.mean_depth;
-      result = Refine(camera, start, options, prior, constraint, measurements, memory);
+      result = PoseDescent(camera, options, prior, constraint, measurements, memory).From(start);
     }
     if (!rotation_observable || position_observable || constraint.sigma > 0) {
       result.camera_from_map_without_prior = camera_from_map_without_prior;
@@ -244,7 +297,7 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
     constraint.infinite_weight = 1;
   }
   constraint.rotation_only = constraint.sigma == 0;
-  PoseRefinement result = Refine(camera, start, options, prior, constraint, measurements, memory);
+  PoseRefinement result = PoseDescent(camera, options, prior, constraint, measurements, memory).From(start);
   result.observed = ObservedMotion::kPanorama;
   return result;
 }

@@ -59,7 +59,7 @@ enum class ObservedMotion : std::uint8_t {
 struct PoseRefinement {
   Rigid3 camera_from_map;
   // Of the left twist in the camera frame; zero for a translation that was not estimated.
-  Eigen::Matrix<double, 6, 6> covariance;
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   // The pose without the rotation prior; set unless the rotation alone was estimated.
   Rigid3 camera_from_map_without_prior;
   ObservedMotion observed = ObservedMotion::kSixDof;

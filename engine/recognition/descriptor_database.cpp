@@ -2,7 +2,6 @@
 #include "engine/recognition/descriptor_database.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <tuple>
@@ -196,44 +195,6 @@ std::vector<DescriptorDatabase::Match> DescriptorDatabase::FindMatches(std::span
     return std::pair(a.query, a.entry.keyframe) < std::pair(b.query, b.entry.keyframe);
   });
   return matches;
-}
-
-std::vector<DescriptorDatabase::Vote> DescriptorDatabase::FindKeyFrames(
-    std::span<const Descriptor> descriptors, std::size_t count, KeyFrameId except_keyframe) const {
-  std::vector<std::uint32_t> words;
-  words.reserve(descriptors.size());
-  for (const Descriptor& descriptor : descriptors) words.push_back(HomeLeaf(*tree_, descriptor));
-  std::sort(words.begin(), words.end());
-  std::unordered_map<KeyFrameId, double> scores;
-  std::vector<KeyFrameId> owners;
-  double own_score = 0;
-  for (std::size_t begin = 0, end = 0; begin < words.size(); begin = end) {
-    while (end < words.size() && words[end] == words[begin]) ++end;
-    owners.clear();
-    for (const Stored& stored : leaves_[words[begin]].stored) owners.push_back(stored.keyframe);
-    std::sort(owners.begin(), owners.end());
-    double different = 0;
-    for (std::size_t i = 0; i < owners.size(); ++i) different += i == 0 || owners[i] != owners[i - 1];
-    // A leaf that no keyframe has is as rare as one that a single keyframe has.
-    const double rarity = std::log1p(static_cast<double>(std::max<std::size_t>(keyframes_.size(), 1)) /
-                                     std::max(different, 1.0));
-    const double wanted = static_cast<double>(end - begin) / static_cast<double>(words.size());
-    own_score += wanted * rarity;
-    for (std::size_t first = 0, last = 0; first < owners.size(); first = last) {
-      while (last < owners.size() && owners[last] == owners[first]) ++last;
-      if (except_keyframe != kNoId && owners[first] == except_keyframe) continue;
-      const double there =
-          static_cast<double>(last - first) / static_cast<double>(keyframes_.at(owners[first]).size());
-      scores[owners[first]] += std::min(wanted, there) * rarity;
-    }
-  }
-  std::vector<Vote> votes;
-  for (const auto& [keyframe, score] : scores) votes.push_back({keyframe, score / own_score});
-  std::sort(votes.begin(), votes.end(), [](const Vote& a, const Vote& b) {
-    return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe;
-  });
-  if (votes.size() > count) votes.resize(count);
-  return votes;
 }
 
 bool DescriptorDatabase::operator==(const DescriptorDatabase& other) const {

@@ -44,7 +44,6 @@ class DescriptorDatabase {
   void Clear();
 
   std::size_t size() const { return size_; }
-  std::size_t KeyFrameCount() const { return keyframes_.size(); }
   bool Contains(KeyFrameId keyframe) const { return keyframes_.contains(keyframe); }
   // In no particular order.
   std::vector<Entry> EntriesOf(KeyFrameId keyframe) const;
@@ -71,17 +70,6 @@ class DescriptorDatabase {
   };
   // By query, then keyframe; at most one match per point (per point and keyframe with each_keyframe).
   std::vector<Match> FindMatches(std::span<const Descriptor> queries, const MatchOptions& options) const;
-
-  struct Vote {
-    KeyFrameId keyframe = kNoId;
-    // Similarity of the keyframe's leaves to those of the descriptors, with rare leaves weighted more (term
-    // frequency and inverse document frequency, Sivic and Zisserman 2003); 1 for the keyframe itself, 0 for
-    // no common leaf.
-    double score = 0;
-  };
-  // The `count` keyframes most similar to an image with these descriptors, best first.
-  std::vector<Vote> FindKeyFrames(std::span<const Descriptor> descriptors, std::size_t count,
-                                  KeyFrameId except_keyframe = kNoId) const;
 
   // Whether both have the same entries, in any order.
   bool operator==(const DescriptorDatabase& other) const;

@@ -46,7 +46,6 @@ class VocabularyTree {
   // border.
   std::size_t NearestLeaves(const Descriptor& descriptor, std::span<std::uint32_t> leaves) const;
 
-  const Descriptor& LeafCenter(std::uint32_t leaf) const { return centers_[kCenters - kLeaves + leaf]; }
   bool operator==(const VocabularyTree&) const = default;
 
  private:

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 
@@ -14,7 +13,7 @@ namespace docent::engine {
 
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
+constexpr double kDegreesPerRadian = 180 / std::numbers::pi;
 // For distances in 3D: the median of |x| for a normal x in three dimensions is 1.538 sigma.
 constexpr double kSigmaOfMedianDistance = 1 / 1.538;
 
@@ -85,14 +84,6 @@ std::optional<std::string> RigOptions::Validate() const {
       .fault();
 }
 
-std::string RigEstimate::ToString() const {
-  char text[160];
-  std::snprintf(text, sizeof text, "%s, baseline %.4g (sigma %.2g), rotation %.4g degrees (sigma %.2g)",
-                rigid ? "rigid" : "articulated", Baseline(), position_sigma,
-                second_from_first.rotation.Angle() * kDegrees, rotation_sigma_deg);
-  return text;
-}
-
 RigEstimate RobustRelativePose(const std::vector<Rigid3>& second_from_first) {
   // Positions are compared as the first camera's centre in the second one's frame, which is the translation
   // itself and therefore independent of the rotation's noise.
@@ -106,7 +97,7 @@ RigEstimate RobustRelativePose(const std::vector<Rigid3>& second_from_first) {
   estimate.samples = second_from_first.size();
   estimate.position_sigma = kSigmaOfMedianDistance * Median(distances);
   const double rotation_sigma = kSigmaOfMedianDistance * Median(angles);
-  estimate.rotation_sigma_deg = rotation_sigma * kDegrees;
+  estimate.rotation_sigma_deg = rotation_sigma * kDegreesPerRadian;
   Eigen::Vector3d position = Eigen::Vector3d::Zero(), turn = Eigen::Vector3d::Zero();
   double count = 0;
   for (std::size_t i = 0; i < second_from_first.size(); ++i) {
@@ -160,7 +151,7 @@ void CameraRig::Match(int camera) {
     samples_.push_back(second * first.inverse());
     if (samples_.size() > options_.window) samples_.pop_front();
     const auto near = [&](const Rotation3& seen) {
-      return (seen.inverse() * first.rotation).Angle() * kDegrees < options_.viewpoint_rotation_deg;
+      return (seen.inverse() * first.rotation).Angle() * kDegreesPerRadian < options_.viewpoint_rotation_deg;
     };
     if (viewpoints_.size() < options_.min_viewpoints &&
         std::none_of(viewpoints_.begin(), viewpoints_.end(), near)) {

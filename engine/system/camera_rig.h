@@ -39,8 +39,6 @@ struct RigEstimate {
 
   // The distance of the camera centres.
   double Baseline() const { return second_from_first.translation.norm(); }
-  // "rigid, baseline 0.25 (sigma 0.001), rotation 12.3 degrees (sigma 0.05)"
-  std::string ToString() const;
 };
 
 // The robust mean of relative poses: geometric median of the positions and L1 mean of the rotations by

@@ -44,7 +44,7 @@ void MapPolicy::RejectPose(std::size_t index, TrackedFrame* frame) {
   frame->map_key = 0;
   frame->matches.clear();
   frame->finite_points = frame->infinite_points = 0;
-  frame->hint = "Point this camera at what the other camera sees";
+  frame->hint = Hint::kFollowOtherCamera;
   state_.cameras[index].assignment.SearchAgain();
 }
 

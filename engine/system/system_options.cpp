@@ -10,6 +10,7 @@ std::optional<std::string> SystemOptions::Validate() const {
       .NotNegative(lost_time_before_new_map, "loss before a new map")
       .Contained(provisional.Validate())
       .Contained(tracker.Validate())
+      .Contained(mapper.Validate())
       .fault();
 }
 

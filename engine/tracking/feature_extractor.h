@@ -5,6 +5,7 @@
 #include <memory>
 #include <opencv2/core/mat.hpp>
 
+#include "engine/base/option_check.h"
 #include "engine/tracking/feature_pool.h"
 #include "engine/vision/features.h"
 #include "engine/vision/rim_mask.h"
@@ -17,7 +18,8 @@ namespace docent::engine {
 // dropped on any thread.
 class FeatureExtractor {
  public:
-  explicit FeatureExtractor(const FeatureOptions& options) : options_(options) {}
+  // Throws Error if the options are invalid.
+  explicit FeatureExtractor(const FeatureOptions& options) : options_(Checked(options)) {}
 
   // image: grey (CV_8UC1) or BGR (CV_8UC3).
   std::shared_ptr<const ImageFeatures> Extract(const cv::Mat& image);

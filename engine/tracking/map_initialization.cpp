@@ -78,7 +78,7 @@ void MapInitialization::AddKeyFrame(Timestamp time, const Eigen::Vector3d& rotat
   if (is_on()) keyframe_rotation_rates_.emplace_back(time, rotation_rate);
 }
 
-std::optional<InitialPair> MapInitialization::TrackViews(const CameraImage& image, std::string* hint) {
+std::optional<InitialPair> MapInitialization::TrackViews(const CameraImage& image, Hint* hint) {
   std::optional<InitialPair> pair;
   if (target_initializer_) {
     if (auto start = target_initializer_->Track(image.time, image.features)) pair = std::move(start->pair);
@@ -94,7 +94,7 @@ void MapInitialization::Search(const CameraImage& image, const MapSnapshot* map,
                                const Eigen::Vector3d& rotation_rate, TrackedFrame* out) {
   if (!map) out->state = TrackingState::kInitializing;
   if (phase_ == Phase::kPairGiven) {
-    if (!map) out->hint = "Starting the map. Please wait.";
+    if (!map) out->hint = Hint::kWaitForMap;
     return;
   }
   const bool posed = HasPose(out->state);

@@ -59,7 +59,7 @@ class MapInitialization {
   void ResetViews();
   Timestamp FirstViewTime() const;
   // Runs the initializer in use: two arbitrary views or a planar target.
-  std::optional<InitialPair> TrackViews(const CameraImage& image, std::string* hint);
+  std::optional<InitialPair> TrackViews(const CameraImage& image, Hint* hint);
   // An initial pair of a keyframe of the panorama map and the present frame, matched by infinite points.
   // These survive when the camera rotates away and back, whereas the keypoint tracks of the initializer end.
   std::optional<InitialPair> TryPanoramaViews(const CameraImage& image, const MapSnapshot& map,

@@ -39,6 +39,8 @@ std::optional<std::string> MapTrackerOptions::Validate() const {
       .AtLeast(max_infinite, 0, "number of infinite points")
       .AtLeast(min_points_per_cell, 1, "number of points in a covered cell")
       .Contained(nearby.Validate())
+      .Contained(search.Validate())
+      .Contained(refinement.Validate())
       .fault();
 }
 

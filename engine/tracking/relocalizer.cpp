@@ -174,8 +174,7 @@ std::optional<FoundPose> Relocalizer::SearchPlaces(const PoseSearch& search, Tra
 std::optional<FoundPose> Relocalizer::Search(const PoseSearch& search, TrackedFrame* out) {
   const bool known = search.map || !options_.build_maps;
   out->state = known ? TrackingState::kLost : TrackingState::kInitializing;
-  out->hint = known ? "Look back at a place you have seen before."
-                    : "Press New map to begin, or look at a mapped place.";
+  out->hint = known ? Hint::kLookBack : Hint::kChooseMap;
   // The exposure or sharpness may have changed, so every other frame uses photometric tolerance. A hypothesis
   // is continued with the comparison that found it.
   if (!search.hypothesis->exists() && frames_lost_++ > 0) search.pose->AlternateComparison();

@@ -12,6 +12,7 @@
 
 #include "engine/base/time.h"
 #include "engine/geometry/rigid3.h"
+#include "engine/initialization/hint.h"
 #include "engine/map/map_snapshot.h"
 #include "engine/matching/point_match.h"
 #include "engine/tracking/relocalization_result.h"
@@ -51,7 +52,7 @@ struct TrackedFrame {
   int finite_points = 0, infinite_points = 0;  // inliers
   std::vector<PointMatch> matches;             // map points that were found in the image
   std::chrono::nanoseconds tracking_time{};    // by the system clock
-  std::string hint;                            // advice to the user as one sentence, often empty
+  Hint hint = Hint::kNone;                     // what a person can do so that tracking works
   RelocalizationResult relocalization;  // of a lost frame: why no hypothesis was accepted; kNone otherwise
 };
 

@@ -152,15 +152,14 @@ void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFra
   if (estimate.outcome == Outcome::kPose || estimate.outcome == Outcome::kRotationOnly) {
     out->state = TrackingState::kSixDof;
     Accept(estimate.result, out);
-    if (estimate.outcome == Outcome::kRotationOnly)
-      out->hint = "Too little detail here: point the camera at the exhibit.";
+    if (estimate.outcome == Outcome::kRotationOnly) out->hint = Hint::kLowTexture;
     return;
   }
   pose_.Lose(image_.time);
   relocalizer_.Lose(image_.time);
   state_ = CameraState::kLost;
   out->state = TrackingState::kLost;
-  out->hint = "You have left the mapped area: look back.";
+  out->hint = Hint::kLeftMap;
   // The same image may be recognized, so that unexpected motion does not cost a frame.
   if (estimate.outcome == Outcome::kLost) Use(relocalizer_.Search(SearchIn(places), out), out);
 }
@@ -206,7 +205,7 @@ void Tracker::Use(const std::optional<FoundPose>& found, TrackedFrame* out) {
     reports_.Clear();
   }
   out->state = TrackingState::kRelocalized;
-  if (found->how != FoundPose::How::kNearby) out->hint.clear();
+  if (found->how != FoundPose::How::kNearby) out->hint = Hint::kNone;
   Accept(found->result, out);
   if (entered) confirmation_.CountHypothesis();
 }
@@ -245,7 +244,7 @@ void Tracker::Accept(const MapTrackResult& result, TrackedFrame* out) {
     out->matches = tracked.matches();
     if (may_extend && options_.build_maps) reports_.Add(tracked.attempts());
   }
-  if (!good) out->hint = "Move more slowly.";
+  if (!good) out->hint = Hint::kMoveMoreSlowly;
   if ((good || !from_points) && may_extend && options_.build_maps)
     offers_.Consider(image_, *map_, {result, out->matches, tracked.panorama(), pose_.median_depth()});
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/option_check.h"
 #include "engine/vision/fast_corners.h"
 
 namespace docent::engine {
@@ -28,6 +29,15 @@ double WantedCorners(const FeatureOptions& options, const cv::Mat& gray, int lev
 
 }  // namespace
 
+std::optional<std::string> FeatureOptions::Validate() const {
+  return OptionCheck()
+      .That(std::ranges::all_of(wanted_corners, [](int count) { return count >= 0; }),
+            "The number of keypoints of a level must be at least 0.")
+      .Within(min_threshold, 1, 255, "smallest threshold of a keypoint")
+      .Within(max_threshold, min_threshold, 255, "largest threshold of a keypoint")
+      .fault();
+}
+
 void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
                      const std::array<int, kPyramidLevels>& threshold_hint, ImageFeatures* features) {
   features->levels[0] = gray;
@@ -51,6 +61,7 @@ void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
 }
 
 std::shared_ptr<const ImageFeatures> MakeFeatures(const cv::Mat& gray, const FeatureOptions& options) {
+  Checked(options);
   auto features = std::make_shared<ImageFeatures>();
   std::array<int, kPyramidLevels> hint{};
   for (int round = 0; round < 3; ++round) {

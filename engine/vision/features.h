@@ -2,6 +2,8 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
 
 #include "engine/vision/image_pyramid.h"
 
@@ -12,6 +14,9 @@ struct FeatureOptions {
   std::array<int, kPyramidLevels> wanted_corners = {1600, 900, 450, 220};
   int min_threshold = 5;  // grey values; below it FAST responds to sensor noise
   int max_threshold = 60;
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // Pyramid, FAST corners and thumbnail of a grey image (CV_8UC1, at least 64x64). The threshold of each level
@@ -21,7 +26,7 @@ void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
                      const std::array<int, kPyramidLevels>& threshold_hint, ImageFeatures* features);
 
 // For a stored image: adapts the threshold iteratively from scratch, so that the result depends on the image
-// alone.
+// alone. Throws Error if the options are invalid.
 std::shared_ptr<const ImageFeatures> MakeFeatures(const cv::Mat& gray, const FeatureOptions& options = {});
 
 }  // namespace docent::engine

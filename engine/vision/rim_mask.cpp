@@ -16,6 +16,17 @@ constexpr int kReach = 6;
 
 }  // namespace
 
+std::optional<std::string> RimMaskOptions::Validate() const {
+  return OptionCheck()
+      .Within(max_black, 0, 255, "black level of a rim")
+      .Within(max_above_black, 0, 255, "noise of a rim")
+      .Ratio(max_bright_ratio, "ratio of bright images of a rim")
+      .AtLeast(min_images, 1, "number of images of a rim")
+      .AtLeast(images_per_update, 1, "number of images between two updates of a rim")
+      .Ratio(min_ratio, "ratio of the image outside its circle")
+      .fault();
+}
+
 void RimMask::Add(const ImageFeatures& features) {
   const cv::Mat& image = features.levels[kCoarsest];
   if (image.empty()) return;

@@ -4,8 +4,11 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "engine/base/option_check.h"
 #include "engine/vision/image_pyramid.h"
 
 namespace docent::engine {
@@ -21,6 +24,9 @@ struct RimMaskOptions {
   int images_per_update = 20;
   // The least share of the image outside the circle. A vignette that does not reach black stays below it.
   double min_ratio = 0.02;
+
+  // Describes the first invalid option in one sentence, or empty.
+  std::optional<std::string> Validate() const;
 };
 
 // Finds the black rim of a lens whose image circle is smaller than the sensor, from the images alone: the
@@ -30,7 +36,8 @@ struct RimMaskOptions {
 // for each camera, used by its tracking thread. Does not allocate after the first image.
 class RimMask {
  public:
-  explicit RimMask(const RimMaskOptions& options = {}) : options_(options) {}
+  // Throws Error if the options are invalid.
+  explicit RimMask(const RimMaskOptions& options = {}) : options_(Checked(options)) {}
 
   // Adds an image, of which level kPyramidLevels - 1 is read. Images of another size begin a new mask.
   void Add(const ImageFeatures& features);

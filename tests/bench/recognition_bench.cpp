@@ -111,13 +111,6 @@ void MatchAnImage(benchmark::State& state) {
 }
 BENCHMARK(MatchAnImage)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
 
-void VoteForKeyFrames(benchmark::State& state) {
-  const DescriptorDatabase database = MakeDatabase(state.range(0));
-  const auto queries = DescriptorsOf(DescribedImages()[DescribedImages().size() / 2]);
-  for (auto _ : state) benchmark::DoNotOptimize(database.FindKeyFrames(queries, 5));
-}
-BENCHMARK(VoteForKeyFrames)->Arg(10)->Arg(100)->Unit(benchmark::kMillisecond);
-
 // The sequence's first image as a target, detected in the same image.
 void DetectATarget(benchmark::State& state) {
   const cv::Mat& image = Sequence().frames.front().image;

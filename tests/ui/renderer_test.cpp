@@ -214,10 +214,10 @@ TEST_F(RendererTest, SurvivesAnyTextInItsLabels) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
   engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
-  tracked.hint = std::string(100000, 'W');
   View view;
   view.tracked = &tracked;
   view.camera = &camera;
+  view.overlay.hint = std::string(100000, 'W');
   view.overlay.map_name = "\xff\xfe\x80 broken \xc3";
   view.overlay.message = std::string("nul\0inside", 10) + "\x01\x02";
   renderer.Draw(view);

@@ -310,11 +310,6 @@ void BundleSystem::Accept() {
   squared_norms_.swap(next_squared_norms_);
 }
 
-Eigen::Vector3d BundleSystem::PointStep(std::size_t i) const {
-  const auto index = static_cast<std::size_t>(free_points_[i]);
-  return next_positions_[index] - positions_[index];
-}
-
 void BundleSystem::WriteBack(BundleProblem* problem) const {
   for (const int i : free_cameras_) {
     const auto index = static_cast<std::size_t>(i);

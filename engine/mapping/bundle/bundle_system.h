@@ -58,13 +58,11 @@ class BundleSystem {
   // Makes the state after the last step the current one.
   void Accept();
 
-  // The step itself: twists that are applied on the left of camera_from_map, in the order of free_cameras(),
-  // and displacements of points in the order of free_points(). Both lists hold ascending indices into the
-  // problem.
+  // What is free: ascending indices into the problem.
   const std::vector<int>& free_cameras() const { return free_cameras_; }
   const std::vector<int>& free_points() const { return free_points_; }
+  // The step itself: twists that are applied on the left of camera_from_map, in the order of free_cameras().
   const Eigen::VectorXd& camera_step() const { return camera_step_; }
-  Eigen::Vector3d PointStep(std::size_t i) const;
 
   void WriteBack(BundleProblem* problem) const;
 

@@ -15,7 +15,7 @@ constexpr int kMaxRounds = 15;
 // Relative decrease of the cost in one round, below which it has converged.
 constexpr double kConverged = 1e-4;
 // Neighbours of each candidate's keyframe that are searched for duplicate points afterwards.
-constexpr std::size_t kNeighbours = 16;
+constexpr std::size_t kLoopNeighbours = 16;
 
 // The figures of the loop that a candidate implies, before the map is corrected.
 ClosedLoop FiguresOf(const LoopCandidate& candidate, Map* map) {
@@ -110,7 +110,7 @@ bool LoopCloser::Close(Map* map) {
     last_.fused += FuseCandidateDuplicates(candidate, map);
     about.insert({candidate.keyframe, candidate.place});
     auto neighbours = map->Covisible(candidate.keyframe);
-    if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
+    if (neighbours.size() > kLoopNeighbours) neighbours.resize(kLoopNeighbours);
     for (const auto& [id, shared] : neighbours) about.insert(id);
   }
   nearby_.assign(about.begin(), about.end());

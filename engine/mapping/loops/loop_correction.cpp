@@ -14,6 +14,96 @@
 
 namespace docent::engine {
 
+namespace {
+
+// Makes the pose graph of the localized keyframes of a map.
+class LoopGraphBuilder {
+ public:
+  explicit LoopGraphBuilder(Map* map) : sharing_(*map), count_(sharing_.keyframes().size()) {
+    result_.keyframes = sharing_.keyframes();
+    std::vector<PoseGraph::Node>& nodes = result_.graph.nodes;
+    bool any_fixed = false;
+    for (const KeyFrameId id : sharing_.keyframes()) {
+      const KeyFrame& keyframe = map->FindKeyFrame(id)->keyframe;
+      nodes.push_back({AsSim3(keyframe.camera_from_map), keyframe.fixed, keyframe.mean_depth});
+      any_fixed = any_fixed || keyframe.fixed;
+    }
+    if (!any_fixed && count_ > 0) nodes.front().fixed = true;
+  }
+
+  // Joins each keyframe to its neighbours among those that share most points with it.
+  void JoinNeighbours(std::size_t edges) {
+    const std::size_t most = std::min(count_, edges);
+    std::vector<std::size_t> order(count_);
+    for (std::size_t i = 0; i < count_; ++i) {
+      std::iota(order.begin(), order.end(), 0);
+      std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(most), order.end(),
+                        [&](std::size_t a, std::size_t b) {
+                          return std::pair(-sharing_.Shared(i, a), a) < std::pair(-sharing_.Shared(i, b), b);
+                        });
+      for (std::size_t k = 0; k < most; ++k) {
+        if (sharing_.AreNeighbours(i, order[k])) Join(i, order[k]);
+      }
+    }
+  }
+
+  // Joins components of the graph that are not connected yet by the strongest remaining links, and failing
+  // those by the order of the keyframes.
+  void JoinComponents() {
+    std::vector<std::size_t> part(count_);
+    std::iota(part.begin(), part.end(), 0);
+    const auto root = [&](std::size_t i) {
+      while (part[i] != i) i = part[i] = part[part[i]];
+      return i;
+    };
+    for (const auto& [a, b] : joined_) part[root(a)] = root(b);
+    std::vector<std::tuple<int, std::size_t, std::size_t>> links;
+    for (std::size_t a = 0; a < count_; ++a) {
+      for (std::size_t b = a + 1; b < count_; ++b) {
+        if (sharing_.Shared(a, b) > 0) links.emplace_back(-sharing_.Shared(a, b), a, b);
+      }
+      if (a + 1 < count_) links.emplace_back(0, a, a + 1);
+    }
+    std::sort(links.begin(), links.end());
+    for (const auto& [shared, a, b] : links) {
+      if (root(a) == root(b)) continue;
+      part[root(a)] = root(b);
+      Join(a, b);
+    }
+  }
+
+  void AddCandidates(const std::vector<LoopCandidate>& candidates) {
+    // The pose of a loop candidate is known to about a pixel from hundreds of points, so it outweighs the
+    // other edges.
+    constexpr double kCandidateWeight = 10;
+    result_.candidates = candidates.size();
+    for (const LoopCandidate& candidate : candidates) {
+      result_.graph.edges.push_back({static_cast<int>(sharing_.IndexOf(candidate.keyframe)),
+                                     static_cast<int>(sharing_.IndexOf(candidate.place)),
+                                     candidate.keyframe_from_place, kCandidateWeight});
+    }
+  }
+
+  LoopGraph Take() { return std::move(result_); }
+
+ private:
+  void Join(std::size_t a, std::size_t b) {
+    if (a > b) std::swap(a, b);
+    if (a == b || !joined_.emplace(a, b).second) return;
+    const std::vector<PoseGraph::Node>& nodes = result_.graph.nodes;
+    const Sim3 a_from_b = nodes[a].node_from_map * nodes[b].node_from_map.inverse();
+    const double weight = std::clamp(sharing_.Shared(a, b) / 100.0, 0.05, 1.0);
+    result_.graph.edges.push_back({static_cast<int>(a), static_cast<int>(b), a_from_b, weight});
+  }
+
+  const Covisibility sharing_;
+  const std::size_t count_;
+  LoopGraph result_;
+  std::set<std::pair<std::size_t, std::size_t>> joined_;
+};
+
+}  // namespace
+
 std::optional<std::string> LoopCorrectionOptions::Validate() const {
   return OptionCheck()
       .Contained(graph.Validate())
@@ -25,69 +115,11 @@ std::optional<std::string> LoopCorrectionOptions::Validate() const {
 
 LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<LoopCandidate>& candidates,
                         Map* map) {
-  const Covisibility sharing(*map);
-  const std::size_t count = sharing.keyframes().size();
-  LoopGraph result;
-  result.keyframes = sharing.keyframes();
-  result.candidates = candidates.size();
-  bool any_fixed = false;
-  for (const KeyFrameId id : sharing.keyframes()) {
-    const KeyFrame& keyframe = map->FindKeyFrame(id)->keyframe;
-    result.graph.nodes.push_back({AsSim3(keyframe.camera_from_map), keyframe.fixed, keyframe.mean_depth});
-    any_fixed = any_fixed || keyframe.fixed;
-  }
-  if (!any_fixed && count > 0) result.graph.nodes.front().fixed = true;
-  std::set<std::pair<std::size_t, std::size_t>> joined;
-  const auto join = [&](std::size_t a, std::size_t b) {
-    if (a > b) std::swap(a, b);
-    if (a == b || !joined.emplace(a, b).second) return;
-    const Sim3 a_from_b = result.graph.nodes[a].node_from_map * result.graph.nodes[b].node_from_map.inverse();
-    const double weight = std::clamp(sharing.Shared(a, b) / 100.0, 0.05, 1.0);
-    result.graph.edges.push_back({static_cast<int>(a), static_cast<int>(b), a_from_b, weight});
-  };
-  std::vector<std::size_t> order(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto most = std::min(count, static_cast<std::size_t>(options.edges));
-    std::iota(order.begin(), order.end(), 0);
-    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(most), order.end(),
-                      [&](std::size_t a, std::size_t b) {
-                        return std::pair(-sharing.Shared(i, a), a) < std::pair(-sharing.Shared(i, b), b);
-                      });
-    for (std::size_t k = 0; k < most; ++k) {
-      if (sharing.AreNeighbours(i, order[k])) join(i, order[k]);
-    }
-  }
-  // Components of the graph that are not connected yet are joined by the strongest remaining links, and
-  // failing those by the order of the keyframes.
-  std::vector<std::size_t> part(count);
-  std::iota(part.begin(), part.end(), 0);
-  const auto root = [&](std::size_t i) {
-    while (part[i] != i) i = part[i] = part[part[i]];
-    return i;
-  };
-  for (const auto& [a, b] : joined) part[root(a)] = root(b);
-  std::vector<std::tuple<int, std::size_t, std::size_t>> links;
-  for (std::size_t a = 0; a < count; ++a) {
-    for (std::size_t b = a + 1; b < count; ++b) {
-      if (sharing.Shared(a, b) > 0) links.emplace_back(-sharing.Shared(a, b), a, b);
-    }
-    if (a + 1 < count) links.emplace_back(0, a, a + 1);
-  }
-  std::sort(links.begin(), links.end());
-  for (const auto& [shared, a, b] : links) {
-    if (root(a) == root(b)) continue;
-    part[root(a)] = root(b);
-    join(a, b);
-  }
-  // The pose of a loop candidate is known to about a pixel from hundreds of points, so it outweighs the other
-  // edges.
-  constexpr double kCandidateWeight = 10;
-  for (const LoopCandidate& candidate : candidates) {
-    result.graph.edges.push_back({static_cast<int>(sharing.IndexOf(candidate.keyframe)),
-                                  static_cast<int>(sharing.IndexOf(candidate.place)),
-                                  candidate.keyframe_from_place, kCandidateWeight});
-  }
-  return result;
+  LoopGraphBuilder builder(map);
+  builder.JoinNeighbours(static_cast<std::size_t>(options.edges));
+  builder.JoinComponents();
+  builder.AddCandidates(candidates);
+  return builder.Take();
 }
 
 bool IsConsistent(const LoopCorrectionOptions& options, const LoopGraph& optimized) {

@@ -18,7 +18,7 @@ namespace {
 constexpr int kFoundCells = 4;
 constexpr double kInlierWeight = 0.1;
 
-struct Found {
+struct VerifiedPoint {
   MapPointId point = kNoId;
   Eigen::Vector2f pixel;
   int level = 0;
@@ -45,10 +45,10 @@ std::vector<MapPointId> Subsample(const std::vector<MapPointId>& points, std::si
 }
 
 // *expected: the number of points that project into the image.
-std::vector<Found> Search(std::span<const MapPointId> points, const KeyFrame& keyframe,
-                          const Rigid3& camera_from_map, float radius_px, Map* map, PointSearcher* searcher,
-                          int* expected) {
-  std::vector<Found> found;
+std::vector<VerifiedPoint> Search(std::span<const MapPointId> points, const KeyFrame& keyframe,
+                                  const Rigid3& camera_from_map, float radius_px, Map* map,
+                                  PointSearcher* searcher, int* expected) {
+  std::vector<VerifiedPoint> found;
   *expected = 0;
   for (const MapPointId id : points) {
     const Map::PointRecord* record = map->FindPoint(id);
@@ -67,10 +67,10 @@ std::vector<Found> Search(std::span<const MapPointId> points, const KeyFrame& ke
   return found;
 }
 
-PoseRefinement Refine(const std::vector<Found>& found, const CameraModel& camera, const Rigid3& start,
+PoseRefinement Refine(const std::vector<VerifiedPoint>& found, const CameraModel& camera, const Rigid3& start,
                       Map* map, std::vector<PoseMeasurement>* measurements) {
   measurements->clear();
-  for (const Found& f : found) {
+  for (const VerifiedPoint& f : found) {
     measurements->push_back({map->FindPoint(f.point)->point.point_in_map, f.pixel.cast<double>(),
                              1.0 / static_cast<double>(1 << f.level), 1.0});
   }
@@ -78,12 +78,78 @@ PoseRefinement Refine(const std::vector<Found>& found, const CameraModel& camera
   return RefinePose(camera, start, {}, measurements, &memory, {Eigen::Vector3d::Zero(), start});
 }
 
-int OccupiedCells(const std::vector<Found>& found, const CameraModel& camera) {
+int OccupiedCells(const std::vector<VerifiedPoint>& found, const CameraModel& camera) {
   std::bitset<kFoundCells * kFoundCells> cells;
-  for (const Found& f : found) {
+  for (const VerifiedPoint& f : found) {
     cells.set(GridCell(f.pixel.cast<int>().eval(), camera, kFoundCells, kFoundCells));
   }
   return static_cast<int>(cells.count());
+}
+
+// The finite points of the keyframes, or some of them, that this keyframe does not observe.
+std::vector<MapPointId> NewPointsOf(const LoopVerificationOptions& options,
+                                    std::span<const KeyFrameId> keyframes, KeyFrameId observer, Map* map) {
+  std::vector<MapPointId> points = FinitePointsOf(keyframes, map);
+  std::erase_if(points, [&](MapPointId point) {
+    const auto& observers = map->FindPoint(point)->observers;
+    return std::binary_search(observers.begin(), observers.end(), observer);
+  });
+  return Subsample(points, options.max_points);
+}
+
+struct LocatedKeyFrame {
+  Rigid3 camera_from_map;
+  std::vector<VerifiedPoint> points;  // inliers
+};
+
+// Estimates the pose of the keyframe from the points of a place: first from some of them with a wide radius,
+// then from all with a narrow one. *expected: the number of points that project into the image.
+std::optional<LocatedKeyFrame> LocateInPlace(const LoopVerificationOptions& options, const KeyFrame& keyframe,
+                                             const std::vector<MapPointId>& points,
+                                             const Rigid3& camera_from_map, Map* map, PointSearcher* searcher,
+                                             int* expected) {
+  const std::vector<MapPointId> some = Subsample(points, options.first_points);
+  std::vector<VerifiedPoint> found =
+      Search(some, keyframe, camera_from_map, options.first_radius_px, map, searcher, expected);
+  if (found.size() < options.min_first_matches) return std::nullopt;
+  std::vector<PoseMeasurement> measurements;
+  PoseRefinement pose = Refine(found, *keyframe.camera, camera_from_map, map, &measurements);
+  if (!pose.converged) return std::nullopt;
+  found = Search(points, keyframe, pose.camera_from_map, options.radius_px, map, searcher, expected);
+  if (static_cast<int>(found.size()) < options.min_inliers) return std::nullopt;
+  pose = Refine(found, *keyframe.camera, pose.camera_from_map, map, &measurements);
+  LocatedKeyFrame located{pose.camera_from_map, {}};
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (measurements[i].weight > kInlierWeight) located.points.push_back(found[i]);
+  }
+  const auto inliers = static_cast<int>(located.points.size());
+  const double variance = pose.covariance.topLeftCorner<3, 3>().trace();
+  if (!pose.converged || pose.sigma > options.max_sigma || pose.observed != ObservedMotion::kSixDof ||
+      inliers < options.min_inliers || inliers < options.min_inlier_ratio * *expected ||
+      OccupiedCells(located.points, *keyframe.camera) < options.min_cells ||
+      !(std::sqrt(variance) <= options.max_position_sigma * pose.mean_depth))
+    return std::nullopt;
+  return located;
+}
+
+// The reverse check, in the coordinates of the recent points: whether those of the keyframe are found in the
+// known one. Counts them in the candidate.
+bool HoldsInReverse(const LoopVerificationOptions& options, const KeyFrame& keyframe, const KeyFrame& known,
+                    Map* map, PointSearcher* searcher, LoopCandidate* candidate) {
+  constexpr double kMaxReverseError = 3;  // pixels of the level
+  Rigid3 place_from_keyframe;
+  place_from_keyframe.rotation = candidate->keyframe_from_place.rotation.inverse();
+  place_from_keyframe.translation =
+      -(place_from_keyframe.rotation * candidate->keyframe_from_place.translation);
+  const std::array<KeyFrameId, 1> own = {keyframe.id};
+  int expected = 0;
+  const std::vector<VerifiedPoint> back =
+      Search(NewPointsOf(options, own, known.id, map), known, place_from_keyframe * keyframe.camera_from_map,
+             options.radius_px, map, searcher, &expected);
+  candidate->reverse_inliers = static_cast<int>(std::count_if(
+      back.begin(), back.end(), [](const VerifiedPoint& f) { return f.error <= kMaxReverseError; }));
+  return candidate->reverse_inliers >= options.min_reverse_inliers &&
+         candidate->reverse_inliers >= options.min_reverse_ratio * expected;
 }
 
 // Pairs the points of the place that were found with the recent points that the keyframe observes at the same
@@ -91,12 +157,12 @@ int OccupiedCells(const std::vector<Found>& found, const CameraModel& camera) {
 // agree on it.
 std::optional<double> PairDuplicates(const LoopVerificationOptions& options,
                                      const Map::KeyFrameRecord& keyframe, const Rigid3& camera_from_place,
-                                     const std::vector<Found>& found, Map* map,
+                                     const std::vector<VerifiedPoint>& found, Map* map,
                                      std::vector<DuplicatePoints>* duplicates) {
   std::vector<double> ratios;
   std::set<MapPointId> known;
-  for (const Found& f : found) known.insert(f.point);
-  for (const Found& f : found) {
+  for (const VerifiedPoint& f : found) known.insert(f.point);
+  for (const VerifiedPoint& f : found) {
     MapPointId nearest = kNoId;
     double least = 0, ratio = 0;
     for (const Observation& observation : keyframe.observations) {
@@ -157,71 +223,23 @@ std::optional<LoopCandidate> VerifyLoopCandidate(const LoopVerificationOptions& 
                                                  PointSearcher* searcher) {
   const Map::KeyFrameRecord* record = map->FindKeyFrame(id);
   if (!record || place.empty()) return std::nullopt;
-  const KeyFrame& keyframe = record->keyframe;
-  std::vector<MapPointId> points = FinitePointsOf(place, map);
-  std::erase_if(points, [&](MapPointId point) {
-    const auto& observers = map->FindPoint(point)->observers;
-    return std::binary_search(observers.begin(), observers.end(), id);
-  });
   LoopCandidate candidate;
   candidate.keyframe = id;
   candidate.place = place.front();
-  std::vector<PoseMeasurement> measurements;
-  // First some of the points with a wide radius, then all with a narrow one.
-  points = Subsample(points, options.max_points);
-  const std::vector<MapPointId> some = Subsample(points, options.first_points);
-  std::vector<Found> found =
-      Search(some, keyframe, camera_from_map, options.first_radius_px, map, searcher, &candidate.expected);
-  if (found.size() < options.min_first_matches) return std::nullopt;
-  PoseRefinement pose = Refine(found, *keyframe.camera, camera_from_map, map, &measurements);
-  if (!pose.converged) return std::nullopt;
-  found =
-      Search(points, keyframe, pose.camera_from_map, options.radius_px, map, searcher, &candidate.expected);
-  if (static_cast<int>(found.size()) < options.min_inliers) return std::nullopt;
-  pose = Refine(found, *keyframe.camera, pose.camera_from_map, map, &measurements);
-  std::vector<Found> inliers;
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    if (measurements[i].weight > kInlierWeight) inliers.push_back(found[i]);
-  }
-  const double variance = pose.covariance.topLeftCorner<3, 3>().trace();
-  if (!pose.converged || pose.sigma > options.max_sigma || pose.observed != ObservedMotion::kSixDof ||
-      static_cast<int>(inliers.size()) < options.min_inliers ||
-      static_cast<double>(inliers.size()) < options.min_inlier_ratio * candidate.expected ||
-      OccupiedCells(inliers, *keyframe.camera) < options.min_cells ||
-      !(std::sqrt(variance) <= options.max_position_sigma * pose.mean_depth))
-    return std::nullopt;
+  const auto located = LocateInPlace(options, record->keyframe, NewPointsOf(options, place, id, map),
+                                     camera_from_map, map, searcher, &candidate.expected);
+  if (!located) return std::nullopt;
+  const Rigid3& camera_from_place = located->camera_from_map;
   const auto scale =
-      PairDuplicates(options, *record, pose.camera_from_map, inliers, map, &candidate.duplicates);
+      PairDuplicates(options, *record, camera_from_place, located->points, map, &candidate.duplicates);
   if (!scale) return std::nullopt;
-
   const KeyFrame& known = map->FindKeyFrame(candidate.place)->keyframe;
-  candidate.keyframe_from_place = AsSim3(pose.camera_from_map * known.camera_from_map.inverse());
+  candidate.keyframe_from_place = AsSim3(camera_from_place * known.camera_from_map.inverse());
   candidate.keyframe_from_place.translation *= *scale;
   candidate.keyframe_from_place.scale = *scale;
-  for (const Found& f : inliers)
+  for (const VerifiedPoint& f : located->points)
     candidate.seen.push_back({id, f.point, f.pixel, static_cast<std::uint8_t>(f.level)});
-
-  // The reverse check, in the coordinates of the recent points.
-  Rigid3 place_from_keyframe;
-  place_from_keyframe.rotation = candidate.keyframe_from_place.rotation.inverse();
-  place_from_keyframe.translation =
-      -(place_from_keyframe.rotation * candidate.keyframe_from_place.translation);
-  const std::array<KeyFrameId, 1> own = {id};
-  std::vector<MapPointId> recent = FinitePointsOf(own, map);
-  std::erase_if(recent, [&](MapPointId point) {
-    const auto& observers = map->FindPoint(point)->observers;
-    return std::binary_search(observers.begin(), observers.end(), known.id);
-  });
-  recent = Subsample(recent, options.max_points);
-  constexpr double kMaxReverseError = 3;  // pixels of the level
-  int expected = 0;
-  const std::vector<Found> back = Search(recent, known, place_from_keyframe * keyframe.camera_from_map,
-                                         options.radius_px, map, searcher, &expected);
-  candidate.reverse_inliers = static_cast<int>(
-      std::count_if(back.begin(), back.end(), [](const Found& f) { return f.error <= kMaxReverseError; }));
-  if (candidate.reverse_inliers < options.min_reverse_inliers ||
-      candidate.reverse_inliers < options.min_reverse_ratio * expected)
-    return std::nullopt;
+  if (!HoldsInReverse(options, record->keyframe, known, map, searcher, &candidate)) return std::nullopt;
   return candidate;
 }
 

@@ -15,7 +15,7 @@ namespace docent::engine {
 namespace {
 
 // Neighbours of each candidate's keyframe that are searched for duplicate points, as for a loop.
-constexpr std::size_t kNeighbours = 16;
+constexpr std::size_t kJoinNeighbours = 16;
 
 // Transforms the part of the map that came from B by the similarity.
 void MoveB(const Sim3& a_from_b, KeyFrameId first_of_b, Map* map) {
@@ -83,7 +83,7 @@ int FuseDuplicatePoints(const JoinedIds& ids, const std::vector<LoopCandidate>& 
   }
   for (const LoopCandidate& candidate : candidates) {
     auto neighbours = map->Covisible(candidate.keyframe);
-    if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
+    if (neighbours.size() > kJoinNeighbours) neighbours.resize(kJoinNeighbours);
     for (const auto& [id, shared] : neighbours) about.insert(id);
   }
   for (const KeyFrameId id : about) map->UpdateDepth(map->FindKeyFrame(id));
@@ -91,7 +91,7 @@ int FuseDuplicatePoints(const JoinedIds& ids, const std::vector<LoopCandidate>& 
   for (const KeyFrameId id : about) {
     if (interrupt && *interrupt) return merged;
     auto neighbours = map->Covisible(id);
-    if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
+    if (neighbours.size() > kJoinNeighbours) neighbours.resize(kJoinNeighbours);
     std::set<MapPointId> points;
     for (const auto& [other, shared] : neighbours) {
       for (const Observation& observation : map->FindKeyFrame(other)->observations) {

@@ -24,7 +24,7 @@ struct Recognition {
 };
 
 // The evidence that the keyframes of both maps give about one similarity.
-struct Evidence {
+struct OverlapEvidence {
   Sim3 a_from_b;
   std::size_t consecutive = 0, with_view = 0;
   std::vector<LoopCandidate> candidates;
@@ -60,17 +60,18 @@ class OverlapFinder {
     if (in_a_.size() < min_keyframes || in_b_.size() < min_keyframes) return overlap;
     RecogniseKeyFrames(&overlap);
     overlap.outcome = Outcome::kNothingRecognised;
-    std::vector<Evidence> examined;
+    std::vector<OverlapEvidence> examined;
     for (const std::size_t seed : BySupport()) {
       if (examined.size() >= options_.max_hypotheses || Interrupted()) break;
-      const bool known = std::any_of(examined.begin(), examined.end(), [&](const Evidence& evidence) {
+      const bool known = std::any_of(examined.begin(), examined.end(), [&](const OverlapEvidence& evidence) {
         return Confirms(evidence, recognitions_[seed].candidate);
       });
       if (!known) examined.push_back(Examine(seed));
     }
-    std::stable_sort(examined.begin(), examined.end(),
-                     [](const Evidence& a, const Evidence& b) { return a.Points() > b.Points(); });
-    Evidence best;
+    std::stable_sort(
+        examined.begin(), examined.end(),
+        [](const OverlapEvidence& a, const OverlapEvidence& b) { return a.Points() > b.Points(); });
+    OverlapEvidence best;
     if (!examined.empty()) best = std::move(examined.front());
     for (std::size_t i = 1; i < examined.size(); ++i) {
       std::size_t other_points = 0;
@@ -102,14 +103,16 @@ class OverlapFinder {
   MapOverlap::Outcome Decide(const MapOverlap& overlap) const;
   void RecogniseKeyFrames(MapOverlap* overlap);
   std::vector<std::size_t> BySupport() const;
-  bool Confirms(const Evidence& evidence, const LoopCandidate& candidate) const;
+  bool Confirms(const OverlapEvidence& evidence, const LoopCandidate& candidate) const;
   std::size_t LongestSeries(const Sim3& a_from_b) const;
   bool IsOtherViewpoint(const KeyFrame& a, const KeyFrame& b) const;
   // The difference of two similarities at a keyframe of B, in the coordinates of B.
   double Difference(const Sim3& a_from_b, const Sim3& other_a_from_b, const KeyFrame& keyframe) const {
     return MagnitudeAt(a_from_b.inverse() * other_a_from_b, keyframe).largest();
   }
-  Evidence Examine(std::size_t seed);
+  OverlapEvidence Examine(std::size_t seed);
+  std::optional<Sim3> VerifyPrediction(KeyFrameId id, const Sim3& a_from_b, OverlapEvidence* evidence,
+                                       std::vector<double>* shares);
   std::vector<KeyFrameId> KeyFramesWithSameView(const KeyFrame& keyframe, const Rigid3& camera_from_other,
                                                 double scale) const;
   std::vector<MapPointId> PointsInView(const KeyFrame& keyframe, const std::vector<KeyFrameId>& others,
@@ -117,7 +120,7 @@ class OverlapFinder {
   std::optional<PredictedPoint> Predict(MapPointId id, const KeyFrame& keyframe,
                                         const Rigid3& camera_from_other);
   void CompareSurfaces(const LoopCandidate& candidate, const std::vector<MapPointId>& points,
-                       Evidence* evidence);
+                       OverlapEvidence* evidence);
   bool HasSurface(const Map::KeyFrameRecord& keyframe, const Eigen::Vector2d& pixel, double depth) const;
 
   const MapOverlapOptions& options_;
@@ -184,7 +187,7 @@ std::vector<std::size_t> OverlapFinder::BySupport() const {
 
 // True if the evidence places the candidate's keyframe at about the same pose. Drift bends a map, so one
 // similarity that varies slightly is not a second hypothesis.
-bool OverlapFinder::Confirms(const Evidence& evidence, const LoopCandidate& candidate) const {
+bool OverlapFinder::Confirms(const OverlapEvidence& evidence, const LoopCandidate& candidate) const {
   const Sim3 implied = KnownFromRecent(candidate, map_);
   return std::any_of(evidence.candidates.begin(), evidence.candidates.end(), [&](const LoopCandidate& other) {
     return other.keyframe == candidate.keyframe &&
@@ -221,10 +224,34 @@ std::size_t OverlapFinder::LongestSeries(const Sim3& a_from_b) const {
   return longest;
 }
 
+// Verifies a keyframe that a similarity predicts, and adds what it shows to the evidence. Returns the
+// similarity that the keyframe implies; empty if it does not confirm the prediction.
+std::optional<Sim3> OverlapFinder::VerifyPrediction(KeyFrameId id, const Sim3& a_from_b,
+                                                    OverlapEvidence* evidence, std::vector<double>* shares) {
+  const Sim3 other_from_own = IsOfA(id) ? a_from_b.inverse() : a_from_b;
+  const Rigid3 camera_from_other = CorrectedPose(At(id).camera_from_map, other_from_own);
+  const std::vector<KeyFrameId> others =
+      KeyFramesWithSameView(At(id), camera_from_other, other_from_own.scale);
+  const std::vector<MapPointId> points = PointsInView(At(id), others, camera_from_other);
+  if (points.empty()) return std::nullopt;
+  ++evidence->with_view;
+  shares->push_back(0);
+  auto candidate =
+      VerifyLoopCandidate(options_.search.verification, id, others, camera_from_other, map_, &searcher_);
+  if (!candidate) return std::nullopt;
+  const Sim3 implied = KnownFromRecent(*candidate, map_);
+  if (MagnitudeAt(other_from_own.inverse() * implied, At(id)).largest() > options_.max_disagreement)
+    return std::nullopt;
+  shares->back() = static_cast<double>(candidate->seen.size()) / candidate->expected;
+  CompareSurfaces(*candidate, points, evidence);
+  evidence->candidates.push_back(std::move(*candidate));
+  return IsOfA(id) ? implied.inverse() : implied;
+}
+
 // Visits the keyframes of both maps from the seed outwards. Each is predicted from the nearest confirmed
 // keyframe, because drift within a map bends it in ways that one similarity cannot describe.
-Evidence OverlapFinder::Examine(std::size_t seed) {
-  Evidence evidence;
+OverlapEvidence OverlapFinder::Examine(std::size_t seed) {
+  OverlapEvidence evidence;
   evidence.a_from_b = recognitions_[seed].a_from_b;
   evidence.consecutive = LongestSeries(evidence.a_from_b);
   struct Known {
@@ -254,22 +281,9 @@ Evidence OverlapFinder::Examine(std::size_t seed) {
     const KeyFrameId id = next->id;
     const Sim3 a_from_b = known[next->nearest].a_from_b;
     pending.erase(next);
-    const Sim3 other_from_own = IsOfA(id) ? a_from_b.inverse() : a_from_b;
-    const Rigid3 camera_from_other = CorrectedPose(At(id).camera_from_map, other_from_own);
-    const std::vector<KeyFrameId> others =
-        KeyFramesWithSameView(At(id), camera_from_other, other_from_own.scale);
-    const std::vector<MapPointId> points = PointsInView(At(id), others, camera_from_other);
-    if (points.empty()) continue;
-    ++evidence.with_view;
-    shares.push_back(0);
-    auto candidate =
-        VerifyLoopCandidate(options_.search.verification, id, others, camera_from_other, map_, &searcher_);
-    if (!candidate) continue;
-    const Sim3 implied = KnownFromRecent(*candidate, map_);
-    if (MagnitudeAt(other_from_own.inverse() * implied, At(id)).largest() > options_.max_disagreement)
-      continue;
-    shares.back() = static_cast<double>(candidate->seen.size()) / candidate->expected;
-    known.push_back({center_in_a(id), IsOfA(id) ? implied.inverse() : implied});
+    const auto implied = VerifyPrediction(id, a_from_b, &evidence, &shares);
+    if (!implied) continue;
+    known.push_back({center_in_a(id), *implied});
     for (Pending& other : pending) {
       const double distance = (center_in_a(other.id) - known.back().center_in_a).norm();
       if (distance < other.distance) {
@@ -277,8 +291,6 @@ Evidence OverlapFinder::Examine(std::size_t seed) {
         other.nearest = known.size() - 1;
       }
     }
-    CompareSurfaces(*candidate, points, &evidence);
-    evidence.candidates.push_back(std::move(*candidate));
   }
   if (!shares.empty()) {
     const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
@@ -362,7 +374,7 @@ bool OverlapFinder::HasSurface(const Map::KeyFrameRecord& keyframe, const Eigen:
 // Where both maps have a surface at the same depth, the points of one must be found in a keyframe of the
 // other, unless the surfaces differ.
 void OverlapFinder::CompareSurfaces(const LoopCandidate& candidate, const std::vector<MapPointId>& points,
-                                    Evidence* evidence) {
+                                    OverlapEvidence* evidence) {
   const Map::KeyFrameRecord& record = *map_->FindKeyFrame(candidate.keyframe);
   const KeyFrame& keyframe = record.keyframe;
   const Sim3 seen_from_other = candidate.keyframe_from_place * AsSim3(At(candidate.place).camera_from_map);

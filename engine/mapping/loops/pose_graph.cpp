@@ -46,15 +46,15 @@ Eigen::Matrix3d InverseLeftJacobian(const Eigen::Vector3d& rotation) {
   return Eigen::Matrix3d::Identity() - 0.5 * hat + square * hat * hat;
 }
 
-struct Linearized {
+struct LinearizedEdge {
   Vector7 error;
   Matrix7 by_a, by_b;  // derivatives with respect to steps on the left of the nodes
 };
 
-Linearized Linearize(const PoseGraph& graph, const PoseGraph::Edge& edge) {
+LinearizedEdge Linearize(const PoseGraph& graph, const PoseGraph::Edge& edge) {
   const double depth = graph.nodes[static_cast<std::size_t>(edge.a)].depth;
   const Sim3 residual = Residual(graph, edge);
-  Linearized result;
+  LinearizedEdge result;
   result.error = Error(residual, depth);
   const Eigen::Vector3d rotation = result.error.segment<3>(3);
   const Eigen::Matrix3d inverse_jacobian = InverseLeftJacobian(rotation);
@@ -104,7 +104,7 @@ Normal Assemble(const PoseGraph& graph, const std::vector<int>& first_row, int r
     }
   };
   for (const PoseGraph::Edge& edge : graph.edges) {
-    const Linearized linear = Linearize(graph, edge);
+    const LinearizedEdge linear = Linearize(graph, edge);
     const int a = first_row[static_cast<std::size_t>(edge.a)],
               b = first_row[static_cast<std::size_t>(edge.b)];
     if (a >= 0) {

@@ -15,7 +15,9 @@ Covisibility::Covisibility(const Map& map) {
   for (const Map::PointRecord& point : map.points()) {
     if (!point.alive || point.point.infinite()) continue;
     indices.clear();
-    for (const KeyFrameId observer : point.observers) indices.push_back(IndexOf(observer));
+    for (const KeyFrameId observer : point.observers) {
+      if (const std::size_t index = IndexOf(observer); index < keyframes_.size()) indices.push_back(index);
+    }
     for (const std::size_t a : indices) {
       for (const std::size_t b : indices) ++counts_[a * keyframes_.size() + b];
     }

@@ -5,6 +5,7 @@
 // SystemEvent, MapSnapshot). Target: Docent::engine.
 
 #include "docent/geometry.h"
+#include "engine/initialization/hint.h"
 #include "engine/map/map_snapshot.h"
 #include "engine/matching/point_match.h"
 #include "engine/recognition/place.h"

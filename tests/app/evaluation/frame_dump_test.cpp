@@ -51,7 +51,7 @@ class FrameDump : public ::testing::Test {
 
 TEST_F(FrameDump, ListsWhereEveryPointWasSearchedAndFound) {
   TrackUntilPosed();
-  WriteFrameDump(folder_.path(), 7, tracked_, session_->Inspect(tracked_));
+  WriteFrameDump(folder_.path(), 7, tracked_, session_->Inspect(tracked_), "Move more slowly.");
   const nlohmann::json json = ReadJson(folder_.path() / "frame-7.json");
   EXPECT_EQ(json["frame"], 7);
   EXPECT_EQ(json["state"], "sixdof");
@@ -85,7 +85,7 @@ TEST_F(FrameDump, ListsWhereEveryPointWasSearchedAndFound) {
 TEST_F(FrameDump, DrawsPointsAtTheirPixels) {
   TrackUntilPosed();
   const engine::FrameInspection inspection = session_->Inspect(tracked_);
-  WriteFrameDump(folder_.path(), 0, tracked_, inspection);
+  WriteFrameDump(folder_.path(), 0, tracked_, inspection, "");
   for (const char* const name : {"frame-0-points.png", "frame-0-residuals.png"}) {
     const cv::Mat drawn = cv::imread((folder_.path() / name).string());
     ASSERT_EQ(drawn.size(), tracked_.frame.image.size()) << name;
@@ -115,7 +115,7 @@ TEST_F(FrameDump, DrawsPointsAtTheirPixels) {
 TEST_F(FrameDump, DescribesADroppedFrameByItsStateOnly) {
   engine::TrackedFrame dropped;
   dropped.state = engine::TrackingState::kDropped;
-  WriteFrameDump(folder_.path(), 3, dropped, {});
+  WriteFrameDump(folder_.path(), 3, dropped, {}, "");
   const nlohmann::json json = ReadJson(folder_.path() / "frame-3.json");
   EXPECT_EQ(json["state"], "dropped");
   EXPECT_TRUE(json["camera_from_map"].is_null());

@@ -5,6 +5,8 @@
 
 #include <memory>
 #include <numbers>
+#include <set>
+#include <string>
 
 namespace docent::app {
 namespace {
@@ -18,6 +20,31 @@ template <typename What>
 std::string InHall(const What& what) {
   const std::optional<EventText> text = TextOf(MapperEvent{{}, what}, "Hall");
   return text ? text->event + ": " + text->detail : "none";
+}
+
+TEST(HintText, IsASentenceForEachHintButNone) {
+  using engine::Hint;
+  EXPECT_EQ(TextOf(Hint::kNone), "");
+  EXPECT_EQ(TextOf(Hint::kMoveSideways), "move sideways");
+  EXPECT_EQ(TextOf(Hint::kStartWhereThereIsDetail),
+            "too little detail here: point the camera at the exhibit");
+  EXPECT_EQ(TextOf(Hint::kLeftMap), "You have left the mapped area: look back.");
+  std::set<std::string> texts;
+  constexpr int kHints = static_cast<int>(Hint::kFollowOtherCamera) + 1;
+  for (int i = 0; i < kHints; ++i) texts.insert(TextOf(static_cast<Hint>(i)));
+  EXPECT_EQ(texts.size(), static_cast<std::size_t>(kHints)) << "two hints have the same text";
+}
+
+TEST(RigText, SaysWhetherTheRigIsRigidAndItsFigures) {
+  engine::RigEstimate rig;
+  rig.rigid = true;
+  rig.second_from_first.translation = {0.25, 0, 0};
+  rig.second_from_first.rotation = Rotation3::Exp({0, std::numbers::pi / 6, 0});
+  rig.position_sigma = 0.001;
+  rig.rotation_sigma_deg = 0.05;
+  EXPECT_EQ(TextOf(rig), "rigid, baseline 0.25 (sigma 0.001), rotation 30 degrees (sigma 0.05)");
+  rig.rigid = false;
+  EXPECT_EQ(TextOf(rig), "articulated, baseline 0.25 (sigma 0.001), rotation 30 degrees (sigma 0.05)");
 }
 
 TEST(MapperEventText, SaysWhatWasDoneAndWhere) {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <numbers>
 
+#include "app/output/engine_text.h"
 #include "engine/base/random.h"
 #include "tests/app/support/rad_per_degree.h"
 
@@ -82,7 +83,7 @@ TEST(RelativePose, IsCorrectWithTenPercentOutliers) {
 TEST(Rig, IsRecognisedAsRigidFromUnsynchronizedCameras) {
   const engine::CameraRig rig = Watch(8, [](double) { return Rigid3(); });
   ASSERT_TRUE(rig.estimate());
-  EXPECT_TRUE(rig.estimate()->rigid) << rig.estimate()->ToString();
+  EXPECT_TRUE(rig.estimate()->rigid) << TextOf(*rig.estimate());
   EXPECT_LT(Compare(*rig.estimate()).baseline, 0.01);
   EXPECT_LT(Compare(*rig.estimate()).turn_deg, 0.3);
 }
@@ -92,7 +93,7 @@ TEST(Rig, IsNotRigidWhenTheCamerasMoveRelativeToEachOther) {
     return Rigid3(Rotation3::Exp({0, 0.3 * std::sin(time), 0}), {0.1 * std::sin(1.7 * time), 0, 0});
   });
   ASSERT_TRUE(rig.estimate());
-  EXPECT_FALSE(rig.estimate()->rigid) << rig.estimate()->ToString();
+  EXPECT_FALSE(rig.estimate()->rigid) << TextOf(*rig.estimate());
   EXPECT_FALSE(rig.Predict(1, FromSeconds(8), 1));
 }
 

@@ -208,7 +208,7 @@ TEST_F(AuthoredBay, GivesAVisitorElsewhereTheRejectionReasonWithFewEvents) {
   for (const Event& event : session.TakeEvents()) reported += event.event == "not sure";
   EXPECT_GE(reported, 1);
   EXPECT_LE(reported, 3);
-  EXPECT_THAT(seen.frames.back().hint,
+  EXPECT_THAT(session.ShownWith(seen.frames.back()).hint,
               AnyOf(HasSubstr("recognise"), HasSubstr("resembles"), HasSubstr("shows"), HasSubstr("could be"),
                     HasSubstr("Probably")));
 }

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "app/cameras/simulated_source.h"
+#include "app/output/engine_text.h"
 #include "app/session/frame_loop.h"
 #include "app/session/session.h"
 #include "app/simulator/scene.h"
@@ -123,13 +124,13 @@ TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
     EXPECT_GE(most, 2 * engine::TrackerOptions().min_recovery_inliers) << "camera " << camera;
   }
   EXPECT_FALSE(walk.rig && walk.rig->rigid)
-      << "these cameras move relative to each other: " << walk.rig->ToString();
+      << "these cameras move relative to each other: " << TextOf(*walk.rig);
 }
 
 TEST(Wearable, RecognisesThatItsCamerasAreRigidlyConnected) {
   const WalkOfTwoCameras walk = Take("hand:1", "shoulder:1", 16, Pace::kLockstep);
   ASSERT_TRUE(walk.rig);
-  EXPECT_TRUE(walk.rig->rigid) << walk.rig->ToString();
+  EXPECT_TRUE(walk.rig->rigid) << TextOf(*walk.rig);
   const engine::Rigid3 truth = WearableRig().inverse();  // shoulder_from_hand
   const double turn_deg =
       (walk.rig->second_from_first.rotation.inverse() * truth.rotation).Angle() * 57.29578;

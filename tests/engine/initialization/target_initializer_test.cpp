@@ -40,7 +40,7 @@ TEST(TargetInitializer, StartsAMapInMetresAfterSidewaysMotion) {
       ASSERT_TRUE(initializer.detection()) << frame;
       const Rigid3 truth = poses.back() * BoardAmongObjects().world_from_target;
       EXPECT_TRUE(IsNear(initializer.detection()->camera_from_target, truth, 0.01, 0.008)) << frame;
-      EXPECT_FALSE(initializer.hint().empty());
+      EXPECT_NE(initializer.hint(), Hint::kNone);
     }
   }
   ASSERT_TRUE(start);
@@ -83,7 +83,7 @@ TEST(TargetInitializer, DoesNotStartFromPureRotation) {
   for (int frame = 0; frame < 12; ++frame) {
     EXPECT_FALSE(initializer.Track(std::chrono::milliseconds(33 * frame),
                                    Look(CameraAt({0, 0, 0}, {0, 0.8 * frame, 0}))));
-    EXPECT_EQ(initializer.hint(), frame == 0 ? "move sideways" : "move further sideways");
+    EXPECT_EQ(initializer.hint(), frame == 0 ? Hint::kMoveSideways : Hint::kMoveFurther);
   }
 }
 
@@ -93,7 +93,7 @@ TEST(TargetInitializer, AsksForATargetThatIsNotInView) {
   for (int frame = 0; frame < 3; ++frame) {
     EXPECT_FALSE(initializer.Track(std::chrono::milliseconds(33 * frame), away));
     EXPECT_FALSE(initializer.detection());
-    EXPECT_EQ(initializer.hint(), "point the camera at the target");
+    EXPECT_EQ(initializer.hint(), Hint::kFindTarget);
   }
 }
 
@@ -119,20 +119,20 @@ TEST(TargetStart, NeedsParallaxAndPoints) {
     return TargetView{{Timestamp(0), features}, *target.Detect(*features, *BoardCamera(), 1)};
   };
   const TargetView a = view(0), near = view(0.03), far = view(0.3);
-  std::string hint;
+  Hint hint = Hint::kNone;
   EXPECT_FALSE(MakeTargetStart(BoardCamera(), a, a, {}, {}, &hint));
-  EXPECT_EQ(hint, "move sideways");
+  EXPECT_EQ(hint, Hint::kMoveSideways);
   EXPECT_FALSE(MakeTargetStart(BoardCamera(), a, near, {}, {}, &hint));
-  EXPECT_EQ(hint, "move further sideways");
+  EXPECT_EQ(hint, Hint::kMoveFurther);
   const auto start = MakeTargetStart(BoardCamera(), a, far, {}, {}, &hint);
   ASSERT_TRUE(start);
-  EXPECT_EQ(hint, "");
+  EXPECT_EQ(hint, Hint::kNone);
   EXPECT_EQ(start->pair.geometry.outcome, TwoViewOutcome::kPlanar);
   EXPECT_NEAR(start->pair.baseline_m, 0.3, 0.01);
   TargetStartOptions many;
   many.min_matches = 1000;
   EXPECT_FALSE(MakeTargetStart(BoardCamera(), a, far, {}, many, &hint));
-  EXPECT_FALSE(hint.empty());
+  EXPECT_EQ(hint, Hint::kFindMoreDetail);
 }
 
 }  // namespace

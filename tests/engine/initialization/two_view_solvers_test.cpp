@@ -95,7 +95,8 @@ Eigen::Matrix3d TrueHomography(const Rigid3& b_from_a, const Eigen::Vector3d& no
   return b_from_a.rotation.matrix() + b_from_a.translation * normal.normalized().transpose() / distance;
 }
 
-TEST(Homography, FromFourPairsAndFromManyIsTheTrueOne) {
+TEST(Homography, FromFourPairsIsTheTrueOne) {
+  int found = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Random random(seed);
     const Rigid3 b_from_a = Motion(0.2 * RandomDirection(&random), 10 * RandomDirection(&random));
@@ -104,15 +105,14 @@ TEST(Homography, FromFourPairsAndFromManyIsTheTrueOne) {
         MakeTwoViews(OnPlane(normal, 1.3), b_from_a, {.count = 30, .noise_px = 0}, &random);
     const auto truth = ScaleHomography(TrueHomography(b_from_a, normal, 1.3));
     ASSERT_TRUE(truth);
-    const auto many = FitHomography(views.rays_in_a, views.rays_in_b);
-    ASSERT_TRUE(many);
-    EXPECT_LT((*many - *truth).norm(), 1e-6) << seed;
     if (const auto four = SolveFourPoint(First<4>(views.rays_in_a), First<4>(views.rays_in_b))) {
       const auto scaled = ScaleHomography(*four);
       ASSERT_TRUE(scaled);
       EXPECT_LT((*scaled - *truth).norm(), 1e-4) << seed;
+      ++found;
     }
   }
+  EXPECT_GT(found, 45);  // three of the rays are coplanar now and then
 }
 
 TEST(Homography, OneOfItsDecompositionsIsTheTrueMotion) {
@@ -144,7 +144,6 @@ TEST(Homography, PairsOnALineDoNotDetermineIt) {
   std::vector<Eigen::Vector3d> rays;
   for (int i = 0; i < 4; ++i) rays.push_back(Eigen::Vector3d(0.1 * i, 0, 1).normalized());
   EXPECT_FALSE(SolveFourPoint(First<4>(rays), First<4>(rays)));
-  EXPECT_FALSE(FitHomography(rays, rays));
 }
 
 // The three kinds of residuals are comparable: for the true model, sigma^2 for an essential matrix and 2

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <set>
 
 #include "engine/base/error.h"
@@ -27,6 +28,22 @@ std::string ErrorOf(const std::vector<std::uint8_t>& bytes) {
   }
   return {};
 }
+
+// The centres of a tree's leaves, read from its bytes.
+class LeafCenters {
+ public:
+  explicit LeafCenters(const VocabularyTree& tree) : bytes_(tree.ToBytes()) {}
+  Descriptor Of(std::uint32_t leaf) const {
+    constexpr std::size_t kHeader = 8;
+    const std::size_t center = VocabularyTree::kCenters - VocabularyTree::kLeaves + leaf;
+    Descriptor descriptor;
+    std::memcpy(descriptor.values.data(), &bytes_[kHeader + center * kDescriptorSize], kDescriptorSize);
+    return descriptor;
+  }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
 
 TEST(VocabularyTree, DistributesTheTrainingDescriptorsOverTheLeaves) {
   const std::vector<Descriptor> training = Clustered(20000, 3000, 1);
@@ -69,13 +86,14 @@ TEST(VocabularyTree, NearestLeavesOfOneEqualsLeaf) {
 }
 
 TEST(VocabularyTree, ListsDistinctNearestLeavesInOrder) {
+  const LeafCenters made(MadeTree());
   for (const Descriptor& descriptor : Clustered(100, 100, 6)) {
     std::array<std::uint32_t, VocabularyTree::kMaxNearestLeaves> leaves;
     ASSERT_EQ(MadeTree().NearestLeaves(descriptor, leaves), leaves.size());
     EXPECT_EQ(std::set<std::uint32_t>(leaves.begin(), leaves.end()).size(), leaves.size());
     for (std::size_t i = 1; i < leaves.size(); ++i) {
-      EXPECT_LE(SquaredDistance(descriptor, MadeTree().LeafCenter(leaves[i - 1])),
-                SquaredDistance(descriptor, MadeTree().LeafCenter(leaves[i])));
+      EXPECT_LE(SquaredDistance(descriptor, made.Of(leaves[i - 1])),
+                SquaredDistance(descriptor, made.Of(leaves[i])));
     }
   }
 }
@@ -100,7 +118,7 @@ TEST(VocabularyTree, NeedsEnoughDescriptorsButAcceptsEqualOnes) {
   EXPECT_THROW(VocabularyTree::Train(Clustered(16383, 1000, 1), 1), Error);
   const std::vector<Descriptor> equal_descriptors(VocabularyTree::kMinTraining, Clustered(1, 1, 3)[0]);
   const VocabularyTree tree = VocabularyTree::Train(equal_descriptors, 1);
-  EXPECT_EQ(tree.LeafCenter(tree.Leaf(equal_descriptors[0])), equal_descriptors[0]);
+  EXPECT_EQ(LeafCenters(tree).Of(tree.Leaf(equal_descriptors[0])), equal_descriptors[0]);
 }
 
 TEST(VocabularyBytes, RoundTripToTheSameTree) {
@@ -141,6 +159,7 @@ std::vector<Descriptor> DescriptorsOfARoom() {
 }
 
 TEST(DefaultVocabulary, DistinguishesTheKeypointsOfAnImage) {
+  const LeafCenters centers(DefaultVocabulary());
   std::set<std::uint32_t> leaves;
   double centre_distance = 0;
   const std::vector<Descriptor> descriptors = DescriptorsOfARoom();
@@ -149,7 +168,7 @@ TEST(DefaultVocabulary, DistinguishesTheKeypointsOfAnImage) {
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
     const std::uint32_t leaf = DefaultVocabulary().Leaf(descriptors[i]);
     leaves.insert(leaf);
-    centre_distance += SquaredDistance(descriptors[i], DefaultVocabulary().LeafCenter(leaf));
+    centre_distance += SquaredDistance(descriptors[i], centers.Of(leaf));
     pair_distance += SquaredDistance(descriptors[i], descriptors[(i + 500) % descriptors.size()]);
   }
   EXPECT_GT(leaves.size(), descriptors.size() / 4);

@@ -30,7 +30,8 @@ TEST(SystemOptions, AreRefusedOutOfRange) {
   ExpectRefused<SystemOptions>({[](auto* o) { o->provisional.time = -o->provisional.time; },
                                 [](auto* o) { o->lost_time_before_new_map = Timestamp(-1); },
                                 [](auto* o) { o->provisional.keyframes = 0; },
-                                [](auto* o) { o->tracker.good_quality = kNaN; }});
+                                [](auto* o) { o->tracker.good_quality = kNaN; },
+                                [](auto* o) { o->mapper.max_queue = 0; }});
 }
 
 TEST(RigOptions, AreRefusedOutOfRange) {

@@ -208,7 +208,7 @@ TEST(HybridTracker, IsLostWhenTheCameraTranslatesWhereOnlyInfinitePointsAreMappe
   int lost = 0, hints = 0;
   for (int i = kWalkBegins; i < kWalkBegins + kWalkAhead; ++i) {
     lost += tour.At(i).state == TrackingState::kLost;
-    hints += tour.At(i).hint == "You have left the mapped area: look back.";
+    hints += tour.At(i).hint == Hint::kLeftMap;
     if (!HasPose(tour.At(i).state)) continue;
     // While there is a pose, the translation does not affect the rotation.
     EXPECT_LT(

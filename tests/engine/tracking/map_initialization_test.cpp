@@ -56,7 +56,7 @@ TEST_F(SidewaysWalk, WaitsForTheMapOfThePairAndSearchesAgainWhenItFails) {
   initialization_.Begin();
   WalkUntilThePair();
   ASSERT_EQ(initialization_.phase(), Phase::kPairGiven);
-  EXPECT_EQ(Next().hint, "Starting the map. Please wait.");
+  EXPECT_EQ(Next().hint, Hint::kWaitForMap);
   EXPECT_FALSE(initialization_.TakePair());
   initialization_.PairFailed();
   EXPECT_EQ(initialization_.phase(), Phase::kSearching);

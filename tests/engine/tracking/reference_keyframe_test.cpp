@@ -77,7 +77,7 @@ Map* MovedMap::map_ = nullptr;
 TEST_F(MovedMap, TrackingContinuesAfterACorrection) {
   tracker_.SetMap(After(), 1);
   const TrackedFrame next = tracker_.Track(SidewaysFrame(kBefore), nullptr);
-  ASSERT_EQ(next.state, TrackingState::kSixDof) << next.hint;
+  ASSERT_EQ(next.state, TrackingState::kSixDof) << static_cast<int>(next.hint);
   // The map unit is two thirds of a metre now, so that the tolerance is 3 mm.
   EXPECT_TRUE(IsNear(next.camera_from_map, CorrectedPose(SidewaysPose(kBefore), Correction()), 0.0045, 0.003))
       << next.camera_from_map;

@@ -23,7 +23,7 @@ TEST_P(TargetTracking, MakesAMapInMetres) {
   options.target = std::make_shared<const PlanarTarget>(scene.image, scene.width_m);
   Lockstep lockstep(options, BoardCamera(), 1);
   std::vector<Rigid3> truth, tracked;
-  std::string first_hint;
+  Hint first_hint = Hint::kNone;
   for (int i = 0; i < 36; ++i) {
     const Rigid3 pose = CameraAt({-0.15 + 0.02 * i, 0.05, 0.1}, {0, -0.4 * i, 0});
     const std::uint64_t noise_seed = static_cast<std::uint64_t>(i) + 1;
@@ -36,7 +36,7 @@ TEST_P(TargetTracking, MakesAMapInMetres) {
       tracked.push_back(out.camera_from_map);
     }
   }
-  EXPECT_EQ(first_hint, "move sideways");
+  EXPECT_EQ(first_hint, Hint::kMoveSideways);
   ASSERT_GT(tracked.size(), 15u);
   // No alignment is needed: the width of the target gives the map its scale in metres.
   const double tracked_distance = (tracked.back().OriginInSource() - tracked.front().OriginInSource()).norm();

@@ -111,9 +111,10 @@ double DistanceFromTruth(const Eigen::Matrix4d& world_from_map, const Rigid3& ca
 
 TEST(Tracker, StartsAMapAndTracksAccurately) {
   const TrackedWalk& walk = OneWalk();
-  ASSERT_NE(walk.map, nullptr) << "no map was started; last hint: " << walk.frames[kFramesOfTheWalk - 1].hint;
+  ASSERT_NE(walk.map, nullptr) << "no map was started; last hint: "
+                               << static_cast<int>(walk.frames[kFramesOfTheWalk - 1].hint);
   EXPECT_EQ(walk.frames[0].state, TrackingState::kInitializing);
-  EXPECT_FALSE(walk.frames[1].hint.empty());
+  EXPECT_NE(walk.frames[1].hint, Hint::kNone);
   int first = 0;
   while (first < kFramesOfTheWalk && !HasPose(walk.frames[static_cast<std::size_t>(first)].state)) ++first;
   EXPECT_LT(first, 60);
@@ -121,7 +122,7 @@ TEST(Tracker, StartsAMapAndTracksAccurately) {
   double squares = 0;
   for (int i = first; i < kFramesOfTheWalk; ++i) {
     const TrackedFrame& frame = walk.frames[static_cast<std::size_t>(i)];
-    ASSERT_EQ(frame.state, TrackingState::kSixDof) << i << ": " << frame.hint;
+    ASSERT_EQ(frame.state, TrackingState::kSixDof) << i << ": " << static_cast<int>(frame.hint);
     EXPECT_EQ(frame.map_key, 1u);
     ASSERT_NE(frame.map, nullptr);
     EXPECT_EQ(frame.frame.index, static_cast<std::uint64_t>(i));
@@ -155,7 +156,7 @@ TEST(Tracker, IsLostWhileTheLensIsCoveredAndRelocalizesAfterwards) {
   for (int i = kFramesOfTheWalk; i < kFramesOfTheWalk + kCoveredFrames; ++i) {
     const TrackedFrame& frame = walk.frames[static_cast<std::size_t>(i)];
     EXPECT_EQ(frame.state, TrackingState::kLost) << i;
-    EXPECT_FALSE(frame.hint.empty());
+    EXPECT_NE(frame.hint, Hint::kNone);
   }
   int back = kFramesOfTheWalk + kCoveredFrames;
   while (back < kAllFrames && !HasPose(walk.frames[static_cast<std::size_t>(back)].state)) ++back;

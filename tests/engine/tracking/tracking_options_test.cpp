@@ -34,8 +34,9 @@ TEST(TrackerOptions, AreRefusedOutOfRange) {
        [](auto* o) { o->max_sigma = kNaN; }, [](auto* o) { o->max_verified = 0; },
        [](auto* o) { o->confirming_frames = 0; }, [](auto* o) { o->better_ratio = 0.9; },
        [](auto* o) { o->min_cells = 17; }, [](auto* o) { o->map_tracker.max_fine = 0; },
-       [](auto* o) { o->map_tracker.nearby.frames = 0; }, [](auto* o) { o->keyframes.min_distance = -1; },
-       [](auto* o) { o->keyframe_policy.min_coverage = 2; },
+       [](auto* o) { o->features.min_threshold = 0; }, [](auto* o) { o->initializer.attempt_interval = 0; },
+       [](auto* o) { o->target_start.min_matches = 0; }, [](auto* o) { o->map_tracker.nearby.frames = 0; },
+       [](auto* o) { o->keyframes.min_distance = -1; }, [](auto* o) { o->keyframe_policy.min_coverage = 2; },
        [](auto* o) { o->rotation_center.min_poses = 0; }});
 }
 
@@ -46,9 +47,10 @@ TEST(TrackerOptions, SayWhatIsWrong) {
 }
 
 TEST(MapTrackerOptions, AreRefusedOutOfRange) {
-  ExpectRefused<MapTrackerOptions>({[](auto* o) { o->max_coarse = o->min_coarse - 1; },
-                                    [](auto* o) { o->coarse_radius_px = 0; },
-                                    [](auto* o) { o->min_points_per_cell = 0; }});
+  ExpectRefused<MapTrackerOptions>(
+      {[](auto* o) { o->max_coarse = o->min_coarse - 1; }, [](auto* o) { o->coarse_radius_px = 0; },
+       [](auto* o) { o->min_points_per_cell = 0; }, [](auto* o) { o->search.min_correlation = 2; },
+       [](auto* o) { o->refinement.iterations = 0; }});
 }
 
 TEST(NearbyPointOptions, AreRefusedOutOfRange) {

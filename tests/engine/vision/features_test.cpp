@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "engine/base/error.h"
 #include "engine/base/random.h"
 #include "tests/engine/vision/noise_image.h"
 
@@ -171,6 +172,17 @@ TEST(Features, ConvergeToTheWantedCornerCounts) {
       }
     }
   }
+}
+
+TEST(FeatureOptions, AreRefusedOutOfRange) {
+  EXPECT_EQ(FeatureOptions().Validate(), std::nullopt);
+  FeatureOptions options;
+  options.max_threshold = options.min_threshold - 1;
+  EXPECT_EQ(options.Validate(), "The largest threshold of a keypoint must be from 5 to 255.");
+  EXPECT_THROW(MakeFeatures(cv::Mat(64, 64, CV_8UC1, cv::Scalar(90)), options), Error);
+  options = {};
+  options.wanted_corners[2] = -1;
+  EXPECT_EQ(options.Validate(), "The number of keypoints of a level must be at least 0.");
 }
 
 TEST(Features, AreValidForSmallAndUniformImages) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "engine/base/error.h"
 #include "engine/base/random.h"
 #include "engine/vision/features.h"
 
@@ -26,6 +27,17 @@ cv::Mat DiscImage(std::uint64_t seed, double radius, int black = 8) {
     }
   }
   return image;
+}
+
+TEST(RimMaskOptions, AreRefusedOutOfRange) {
+  EXPECT_EQ(RimMaskOptions().Validate(), std::nullopt);
+  RimMaskOptions options;
+  options.images_per_update = 0;
+  EXPECT_EQ(options.Validate(), "The number of images between two updates of a rim must be at least 1.");
+  EXPECT_THROW(RimMask{options}, Error);
+  options = {};
+  options.max_bright_ratio = std::nan("");
+  EXPECT_EQ(options.Validate(), "The ratio of bright images of a rim must be from 0 to 1.");
 }
 
 double DistanceFromCenter(double x, double y) {

@@ -87,15 +87,21 @@ Dense MakeDense(const BundleProblem& problem, RobustLoss loss) {
   return dense;
 }
 
-Eigen::VectorXd StepOf(const BundleSystem& system, const BundleProblem& problem, const Dense& dense) {
+// The last step of a system that holds the state of the problem; takes the step.
+Eigen::VectorXd StepOf(const BundleProblem& problem, const Dense& dense, BundleSystem* system) {
+  system->Accept();
+  BundleProblem after = problem;
+  system->WriteBack(&after);
   const auto cameras = static_cast<Eigen::Index>(problem.cameras.size());
   Eigen::VectorXd full =
       Eigen::VectorXd::Zero(6 * cameras + static_cast<Eigen::Index>(3 * problem.points.size()));
-  for (std::size_t i = 0; i < system.free_cameras().size(); ++i)
-    full.segment<6>(6 * system.free_cameras()[i]) =
-        system.camera_step().segment<6>(static_cast<Eigen::Index>(6 * i));
-  for (std::size_t i = 0; i < system.free_points().size(); ++i)
-    full.segment<3>(6 * cameras + 3 * system.free_points()[i]) = system.PointStep(i);
+  for (std::size_t i = 0; i < system->free_cameras().size(); ++i)
+    full.segment<6>(6 * system->free_cameras()[i]) =
+        system->camera_step().segment<6>(static_cast<Eigen::Index>(6 * i));
+  for (const int i : system->free_points()) {
+    const auto index = static_cast<std::size_t>(i);
+    full.segment<3>(6 * cameras + 3 * i) = after.points[index].position - problem.points[index].position;
+  }
   return full(dense.unknowns);
 }
 
@@ -119,7 +125,7 @@ class BundleSystemTest : public testing::TestWithParam<RobustLoss> {
     Eigen::MatrixXd damped = dense.hessian;
     damped.diagonal() += kDamping * dense.hessian.diagonal().cwiseMax(1e-6);
     const Eigen::VectorXd expected = -damped.llt().solve(dense.gradient);
-    const Eigen::VectorXd found = StepOf(system, problem_, dense);
+    const Eigen::VectorXd found = StepOf(problem_, dense, &system);
     EXPECT_LT((found - expected).norm(), 1e-5 * expected.norm());
     const double decrease = -dense.gradient.dot(expected) - 0.5 * expected.dot(dense.hessian * expected);
     EXPECT_NEAR(system.predicted_decrease(), decrease, 1e-4 * decrease);

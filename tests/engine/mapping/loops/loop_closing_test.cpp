@@ -24,8 +24,8 @@ using testing_world::PaintedWall;
 using testing_world::RenderedWorld;
 using testing_world::Wall;
 
-constexpr double kStep_deg = 10;
-constexpr int kRound = 36;
+constexpr double kStep_deg = 6;
+constexpr int kRound = 60;
 constexpr double kRadius = 0.8;
 
 const std::shared_ptr<const CameraModel>& TrueCamera() {
@@ -128,8 +128,7 @@ Gap GapAfterARound(const MapSnapshot& map, int step) {
 MapperOptions WithLoops(bool enabled) {
   MapperOptions options;
   options.loops.enabled = enabled;
-  options.loops.correction.max_edge_residual = 0.1;  // the steps are far longer here than in a real walk
-  options.culling.min_keyframes = 1000;              // keep all, for comparison
+  options.culling.min_keyframes = 1000;  // keep all, for comparison
   return options;
 }
 

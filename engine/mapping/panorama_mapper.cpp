@@ -1,17 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// The mapper's tasks on panorama maps (hybrid-slam §5).
-#include <algorithm>
+#include "engine/mapping/panorama_mapper.h"
 
-#include "engine/mapping/mapper.h"
+#include <algorithm>
 
 namespace docent::engine {
 
-void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
+void PanoramaMapper::Reset() {
+  to_localize_.clear();
+  to_convert_.clear();
+  for (const auto& [id, record] : workspace_->map.keyframes()) {
+    if (record.keyframe.kind == KeyFrameKind::kPanorama) to_localize_.push_back({id});
+  }
+}
+
+void PanoramaMapper::Insert(const KeyFrameCandidate& candidate) {
+  Map& map = workspace_->map;
   const auto panorama =
-      std::find_if(map_.panoramas().begin(), map_.panoramas().end(),
+      std::find_if(map.panoramas().begin(), map.panoramas().end(),
                    [&](const PanoramaMap& known) { return known.id == candidate.panorama; });
-  if (panorama == map_.panoramas().end()) return;
-  const KeyFrame& reference = map_.FindKeyFrame(panorama->reference)->keyframe;
+  if (panorama == map.panoramas().end()) return;
+  const KeyFrame& reference = map.FindKeyFrame(panorama->reference)->keyframe;
   KeyFrame keyframe;
   keyframe.kind = KeyFrameKind::kPanorama;
   keyframe.panorama = candidate.panorama;
@@ -23,55 +31,50 @@ void Mapper::InsertPanorama(const KeyFrameCandidate& candidate) {
   keyframe.camera_from_map = candidate.camera_from_map;
   keyframe.mean_depth = reference.mean_depth;
   keyframe.depth_sigma = reference.depth_sigma;
-  const KeyFrameId id = map_.AddKeyFrame(keyframe).keyframe.id;
+  const KeyFrameId id = map.AddKeyFrame(keyframe).keyframe.id;
   std::vector<Eigen::Vector2f> taken;
   for (const PointMatch& match : candidate.matches) {
-    const Map::PointRecord* point = map_.FindPoint(match.point);
+    const Map::PointRecord* point = map.FindPoint(match.point);
     if (!point) continue;
     if (!point->point.infinite()) {
       taken.push_back(match.pixel);
     } else if (point->point.panorama == candidate.panorama) {
-      map_.AddObservation({id, match.point, match.pixel, match.level});
+      map.AddObservation({id, match.point, match.pixel, match.level});
     }
   }
-  const int rays = AddInfinitePoints(options_.infinite, id, taken, &map_);
-  RemoveInfiniteOutliers(candidate.panorama, &map_);
+  const int rays = AddInfinitePoints(options_.infinite, id, taken, &map);
+  RemoveInfiniteOutliers(candidate.panorama, &map);
   to_localize_.push_back({id});
-  Publish();
-  AddEvent(candidate.time, MapperEvent::PanoramaKeyFrameAdded{rays});
+  output_->Publish(map.Snapshot());
+  output_->AddEvent(candidate.time, MapperEvent::PanoramaKeyFrameAdded{rays});
 }
 
-std::size_t Mapper::CountFinite() const {
-  std::size_t finite = 0;
-  for (const Map::PointRecord& record : map_.points()) finite += record.alive && !record.point.infinite();
-  return finite;
-}
-
-void Mapper::TryToLocalize(Unlocalized* waiting, std::size_t finite) {
+void PanoramaMapper::TryToLocalize(Unlocalized* waiting, std::size_t finite) {
   waiting->tried_with_points = finite;
   waiting->appearance_due = !Localize(waiting->keyframe, nullptr);
 }
 
-bool Mapper::LocalizeNew() {
+bool PanoramaMapper::LocalizeNew() {
   if (to_localize_.empty()) return false;
   std::erase_if(to_localize_, [&](const Unlocalized& waiting) {
-    const Map::KeyFrameRecord* record = map_.FindKeyFrame(waiting.keyframe);
+    const Map::KeyFrameRecord* record = workspace_->map.FindKeyFrame(waiting.keyframe);
     return !record || record->keyframe.kind != KeyFrameKind::kPanorama;
   });
   const auto fresh = std::find_if(to_localize_.begin(), to_localize_.end(),
                                   [](const Unlocalized& waiting) { return waiting.tried_with_points == 0; });
   if (fresh == to_localize_.end()) return false;
-  const std::size_t finite = CountFinite();
+  const std::size_t finite = workspace_->map.FinitePoints();
   if (finite == 0) return false;
   TryToLocalize(&*fresh, finite);
   return true;
 }
 
-bool Mapper::LocalizeAgain() {
+bool PanoramaMapper::LocalizeAgain() {
+  Map& map = workspace_->map;
   if (to_localize_.empty()) return false;
   // Localization is retried when the number of finite points has grown by this factor.
   constexpr double kGrowth = 1.1;
-  const std::size_t finite = CountFinite();
+  const std::size_t finite = map.FinitePoints();
   for (Unlocalized& waiting : to_localize_) {
     if (static_cast<double>(finite) < kGrowth * static_cast<double>(waiting.tried_with_points) + 1) continue;
     TryToLocalize(&waiting, finite);
@@ -81,34 +84,35 @@ bool Mapper::LocalizeAgain() {
   const auto due = std::find_if(to_localize_.begin(), to_localize_.end(),
                                 [](const Unlocalized& waiting) { return waiting.appearance_due; });
   if (due == to_localize_.end()) return false;
-  if (descriptors_.UpdateOne(options_.appearance, &map_)) return true;
+  if (workspace_->descriptors.UpdateOne(options_.appearance, &map)) return true;
   due->appearance_due = false;
   const KeyFrameId id = due->keyframe;
   const auto guess =
-      descriptors_.SuggestPose(options_.appearance, map_.FindKeyFrame(id)->keyframe, id + 1, &map_);
+      workspace_->descriptors.SuggestPose(options_.appearance, map.FindKeyFrame(id)->keyframe, id + 1, &map);
   if (guess) Localize(id, &*guess);
   return true;
 }
 
-bool Mapper::Localize(KeyFrameId id, const Rigid3* guess) {
-  if (!LocalizePanoramaKeyFrame(options_.localization, id, id + 1, &map_, &searcher_, guess)) return false;
+bool PanoramaMapper::Localize(KeyFrameId id, const Rigid3* guess) {
+  Map& map = workspace_->map;
+  if (!LocalizePanoramaKeyFrame(options_.localization, id, id + 1, &map, &workspace_->searcher, guess))
+    return false;
   PlanConversions(id);
-  newest_ = id;
-  loops_.Enqueue(id);
-  ++keyframes_since_global_;
-  locally_adjusted_ = false;
-  Publish();
-  AddEvent(map_.FindKeyFrame(id)->keyframe.time, MapperEvent::KeyFrameLocalized{id, guess != nullptr});
+  refinement_->AddKeyFrame(id);
+  loops_->Enqueue(id);
+  output_->Publish(map.Snapshot());
+  output_->AddEvent(map.FindKeyFrame(id)->keyframe.time,
+                    MapperEvent::KeyFrameLocalized{id, guess != nullptr});
   return true;
 }
 
-void Mapper::PlanConversions(KeyFrameId id) {
+void PanoramaMapper::PlanConversions(KeyFrameId id) {
   // Pairs of this keyframe with others that have a similar orientation and a sufficient baseline.
   constexpr double kMaxRotation = 0.8;  // radians
-  const KeyFrame& keyframe = map_.FindKeyFrame(id)->keyframe;
+  const KeyFrame& keyframe = workspace_->map.FindKeyFrame(id)->keyframe;
   const Eigen::Vector3d center = keyframe.camera_from_map.OriginInSource();
   std::vector<std::pair<double, std::pair<KeyFrameId, KeyFrameId>>> pairs;
-  for (const auto& [other, record] : map_.keyframes()) {
+  for (const auto& [other, record] : workspace_->map.keyframes()) {
     if (other == id || record.keyframe.kind == KeyFrameKind::kPanorama) continue;
     const double depth = std::min(record.keyframe.mean_depth, keyframe.mean_depth);
     const double baseline = (record.keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
@@ -125,19 +129,20 @@ void Mapper::PlanConversions(KeyFrameId id) {
   for (std::size_t i = 0; i < pairs.size() && i < wanted; ++i) to_convert_.push_back(pairs[i].second);
 }
 
-bool Mapper::ConvertOne() {
+bool PanoramaMapper::ConvertOne() {
+  Map& map = workspace_->map;
   if (to_convert_.empty()) return false;
   const auto [reference, partner] = to_convert_.front();
   to_convert_.pop_front();
   PointCreationOptions creation = options_.creation;
   creation.min_parallax_deg = options_.min_infinite_parallax_deg;
   const InfiniteConversion conversion =
-      ConvertInfinitePoints(creation, reference, partner, &map_, &searcher_);
+      ConvertInfinitePoints(creation, reference, partner, &map, &workspace_->searcher);
   if (conversion.converted.empty() && conversion.merged == 0) return true;
-  to_match_.insert(to_match_.end(), conversion.converted.begin(), conversion.converted.end());
-  Publish();
-  AddEvent(map_.FindKeyFrame(partner)->keyframe.time,
-           MapperEvent::InfinitePointsTriangulated{conversion.converted.size(), conversion.merged});
+  refinement_->AddPoints(conversion.converted);
+  output_->Publish(map.Snapshot());
+  output_->AddEvent(map.FindKeyFrame(partner)->keyframe.time,
+                    MapperEvent::InfinitePointsTriangulated{conversion.converted.size(), conversion.merged});
   return true;
 }
 

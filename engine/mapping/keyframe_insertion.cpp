@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/keyframe_insertion.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace docent::engine {
+
+void KeyFrameInsertion::Insert(const KeyFrameCandidate& offered, std::span<const PointReport> reports) {
+  ApplyReports(reports);
+  const KeyFrameCandidate candidate = WithCorrections(offered);
+  if (candidate.choice == KeyFrameChoice::kPanorama) {
+    panoramas_->Insert(candidate);
+  } else {
+    InsertSixDof(candidate);
+  }
+}
+
+KeyFrameCandidate KeyFrameInsertion::WithCorrections(KeyFrameCandidate candidate) const {
+  candidate.camera = lens_estimation_->CurrentModel(candidate.camera);
+  if (candidate.map_revision == 0) return candidate;
+  for (const auto& correction : workspace_->map.corrections()) {
+    if (correction->revision <= candidate.map_revision) continue;
+    const auto moved = correction->after_from_before.find(candidate.reference_keyframe);
+    if (moved != correction->after_from_before.end())
+      candidate.camera_from_map = CorrectedPose(candidate.camera_from_map, moved->second);
+  }
+  return candidate;
+}
+
+void KeyFrameInsertion::ApplyReports(std::span<const PointReport> reports) {
+  constexpr int kMinTries = 20;
+  for (const PointReport& report : reports) {
+    Map::PointRecord* record = workspace_->map.FindPoint(report.point);
+    if (!record) continue;
+    record->seen_inlier += report.inlier;
+    record->seen_outlier += report.outlier;
+    record->not_found += report.not_found;
+    const int tries = record->seen_inlier + record->seen_outlier + record->not_found;
+    // Points that are mostly matched in the wrong place, or never beyond their first two views, harm
+    // tracking.
+    const bool wrong = record->seen_outlier > kMinTries && record->seen_outlier > record->seen_inlier;
+    const std::size_t first_views = record->point.infinite() ? 1 : 2;
+    const bool unconfirmed =
+        tries > kMinTries && record->observers.size() <= first_views && record->seen_inlier * 5 < tries;
+    if (wrong || unconfirmed) workspace_->map.RemovePoint(report.point);
+  }
+}
+
+void KeyFrameInsertion::InsertSixDof(const KeyFrameCandidate& candidate) {
+  Map& map = workspace_->map;
+  KeyFrame keyframe;
+  keyframe.time = candidate.time;
+  keyframe.camera = candidate.camera;
+  keyframe.features = candidate.features;
+  keyframe.camera_from_map = candidate.camera_from_map;
+  Map::KeyFrameRecord* record = &map.AddKeyFrame(keyframe);
+  const KeyFrameId id = record->keyframe.id;
+  for (const PointMatch& match : candidate.matches) {
+    const Map::PointRecord* point = map.FindPoint(match.point);
+    if (point && !point->point.infinite()) map.AddObservation({id, match.point, match.pixel, match.level});
+  }
+  map.UpdateDepth(record);
+  MatchMapPoints(options_.guided_matching, id, &workspace_->searcher, &map);
+  map.UpdateDepth(record);
+  std::vector<MapPointId> created;
+  for (const KeyFrameId partner : Partners(id)) {
+    const auto points = CreatePoints(options_.creation, id, partner, &map, &workspace_->searcher);
+    created.insert(created.end(), points.begin(), points.end());
+  }
+  refinement_->AddPoints(created);
+  int rays = 0;
+  if (candidate.choice == KeyFrameChoice::kLocalizedPanorama) {
+    map.OpenPanorama(id);
+    rays = AddInfinitePoints(options_.infinite, id, {}, &map);
+  }
+  panoramas_->PlanConversions(id);
+  refinement_->AddKeyFrame(id);
+  loops_->Enqueue(id);
+  output_->Publish(map.Snapshot());
+  if (candidate.choice == KeyFrameChoice::kLocalizedPanorama) {
+    output_->AddEvent(candidate.time, MapperEvent::PanoramaOpened{rays});
+  } else {
+    output_->AddEvent(candidate.time, MapperEvent::KeyFrameAdded{created.size(), map.AlivePoints()});
+  }
+}
+
+std::vector<KeyFrameId> KeyFrameInsertion::Partners(KeyFrameId id) {
+  Map& map = workspace_->map;
+  const Map::KeyFrameRecord& record = *map.FindKeyFrame(id);
+  const Eigen::Vector3d center = record.keyframe.camera_from_map.OriginInSource();
+  struct Scored {
+    double score;
+    KeyFrameId id;
+  };
+  std::vector<Scored> scored;
+  for (const auto& [other, shared] : map.Covisible(id)) {
+    if (shared < 15) break;
+    const Rigid3& pose = map.FindKeyFrame(other)->keyframe.camera_from_map;
+    const double baseline = (pose.OriginInSource() - center).norm() / record.keyframe.mean_depth;
+    if (baseline < options_.min_partner_baseline || baseline > options_.max_partner_baseline) continue;
+    // Large overlap helps matching; a baseline of about 0.15 depths helps triangulation.
+    const double fit = std::min(baseline / 0.15, 0.15 / baseline);
+    scored.push_back({-shared * std::sqrt(fit), other});
+  }
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](const Scored& a, const Scored& b) { return a.score < b.score; });
+  std::vector<KeyFrameId> partners;
+  for (const Scored& partner : scored) {
+    if (static_cast<int>(partners.size()) >= options_.partners) break;
+    partners.push_back(partner.id);
+  }
+  return partners;
+}
+
+}  // namespace docent::engine

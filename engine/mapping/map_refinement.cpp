@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/map_refinement.h"
+
+#include <utility>
+
+namespace docent::engine {
+
+void MapRefinement::Reset() {
+  Forget();
+  newest_ = kNoId;
+  global_due_ = culling_due_ = loop_to_adjust_ = false;
+  locally_adjusted_ = true;
+}
+
+void MapRefinement::Forget() {
+  to_match_.clear();
+  keyframes_since_global_ = 0;
+}
+
+void MapRefinement::AddKeyFrame(KeyFrameId keyframe) {
+  newest_ = keyframe;
+  ++keyframes_since_global_;
+  locally_adjusted_ = false;
+}
+
+void MapRefinement::AddPoints(std::span<const MapPointId> points) {
+  to_match_.insert(to_match_.end(), points.begin(), points.end());
+}
+
+bool MapRefinement::NeedsGlobalAdjustment() const {
+  return global_due_ || keyframes_since_global_ > 4 + workspace_->map.keyframes().size() / 6;
+}
+
+void MapRefinement::MatchNewPoints() {
+  constexpr std::size_t kNeighbours = 8;
+  if (newest_ != kNoId) {
+    auto neighbours = workspace_->map.Covisible(newest_);
+    if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
+    for (const auto& [id, shared] : neighbours)
+      MatchMapPoints(options_.guided_matching, id, &workspace_->searcher, &workspace_->map, &to_match_);
+  }
+  to_match_.clear();
+}
+
+void MapRefinement::AdjustAroundNewest() {
+  const BundleSummary summary = AdjustLocally(options_.adjustment, newest_, interrupt_, &workspace_->map);
+  if (summary.outcome != BundleSummary::Outcome::kInterrupted) locally_adjusted_ = true;
+  output_->Publish(workspace_->map.Snapshot());
+}
+
+void MapRefinement::AdjustWholeMap() {
+  // The global adjustment has the highest memory use of all tasks.
+  workspace_->searcher.Release();
+  if (options_.images) options_.images->EvictAll();
+  MapAdjustmentOptions adjustment = options_.adjustment;
+  if (loop_to_adjust_) adjustment.global_loss = RobustLoss::kHuber;
+  Map& map = workspace_->map;
+  const BundleSummary summary = AdjustGlobally(adjustment, interrupt_, &map);
+  global_due_ = summary.outcome == BundleSummary::Outcome::kInterrupted;
+  if (global_due_) return;
+  // The remaining error of a loop takes several adjustments: rounds with Huber's loss while the cost
+  // decreases considerably, then one with the standard loss. Switching too early would reject the
+  // observations at the seam as outliers and open the loop again.
+  constexpr double kMaxCostRatio = 0.9;
+  global_due_ = std::exchange(loop_to_adjust_,
+                              loop_to_adjust_ && summary.final_cost < kMaxCostRatio * summary.initial_cost);
+  keyframes_since_global_ = 0;
+  culling_due_ = true;
+  output_->Publish(map.Snapshot());
+  if (!map.empty()) output_->AddEvent(workspace_->NewestTime(), MapperEvent::GloballyAdjusted{summary});
+}
+
+void MapRefinement::CullRedundantKeyFrame() {
+  Map& map = workspace_->map;
+  const KeyFrameId redundant = FindRedundantKeyFrame(options_.culling, newest_, &map);
+  culling_due_ = redundant != kNoId;
+  if (!culling_due_) return;
+  const Timestamp time = map.FindKeyFrame(redundant)->keyframe.time;
+  CullKeyFrame(redundant, &map);
+  workspace_->searcher.Clear();
+  output_->Publish(map.Snapshot());
+  output_->AddEvent(time, MapperEvent::KeyFrameRemoved{redundant});
+}
+
+}  // namespace docent::engine

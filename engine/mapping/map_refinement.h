@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "engine/mapping/map_workspace.h"
+#include "engine/mapping/mapper_options.h"
+#include "engine/mapping/mapper_output.h"
+
+namespace docent::engine {
+
+// The mapper's tasks that improve a map without extending it: searching new points in earlier keyframes,
+// local and global bundle adjustment, and culling of keyframes. It remembers which of them is due. On the
+// stepping thread only, apart from IsLocallyAdjusted.
+class MapRefinement {
+ public:
+  // The pointers are borrowed. An adjustment stops when *interrupt becomes true, and remains due.
+  MapRefinement(const MapperOptions& options, const std::atomic<bool>* interrupt, MapWorkspace* workspace,
+                MapperOutput* output)
+      : options_(options), interrupt_(interrupt), workspace_(workspace), output_(output) {}
+
+  // Another map: nothing is due, and no keyframe is the newest.
+  void Reset();
+  // Drops what refers to keyframes and points of a map that is being replaced.
+  void Forget();
+  // The keyframe about which the next local tasks are done; kNoId for none.
+  void SetNewest(KeyFrameId keyframe) { newest_ = keyframe; }
+  // A keyframe with a known position was added.
+  void AddKeyFrame(KeyFrameId keyframe);
+  // New points, to be searched in earlier keyframes.
+  void AddPoints(std::span<const MapPointId> points);
+  void SetLocallyAdjusted() { locally_adjusted_ = true; }
+  // The next idle step adjusts the whole map.
+  void RequireGlobalAdjustment() { global_due_ = true; }
+  // The same, with the loss for the remaining error of a loop.
+  void RequireAdjustmentOfLoop() { global_due_ = loop_to_adjust_ = true; }
+
+  // True unless a new keyframe waits for its local adjustment. From any thread.
+  bool IsLocallyAdjusted() const { return locally_adjusted_; }
+  bool HasNewPoints() const { return !to_match_.empty(); }
+  bool NeedsGlobalAdjustment() const;
+  bool MayHaveRedundantKeyFrames() const { return culling_due_; }
+
+  // Searches the new points in the keyframes that share most points with the newest one.
+  void MatchNewPoints();
+  void AdjustAroundNewest();
+  void AdjustWholeMap();
+  // Removes one redundant keyframe if there is one.
+  void CullRedundantKeyFrame();
+
+ private:
+  const MapperOptions& options_;
+  const std::atomic<bool>* const interrupt_;
+  MapWorkspace* const workspace_;
+  MapperOutput* const output_;
+  KeyFrameId newest_ = kNoId;
+  std::vector<MapPointId> to_match_;
+  std::atomic<bool> locally_adjusted_{true};
+  bool loop_to_adjust_ = false;  // the next global adjustment follows a loop
+  std::size_t keyframes_since_global_ = 0;
+  bool global_due_ = false;   // a global adjustment was interrupted, or is due for another reason
+  bool culling_due_ = false;  // the map was adjusted since keyframes were last checked for redundancy
+};
+
+}  // namespace docent::engine
