@@ -13,6 +13,7 @@
 
 #include "app/command_line/program.h"
 #include "app/files/text_file.h"
+#include "app/session/library_scene.h"
 #include "app/session/session.h"
 #include "content/asset.h"
 #include "content/edits.h"
@@ -81,7 +82,7 @@ Json ToJson(const maps::MapInfo& map, const content::Entity& entity) {
 }
 
 void List(const ContentOptions& options) {
-  const maps::Library library = maps::Library::Open(options.library, maps::Access::kReadOnly);
+  const maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
   std::vector<maps::MapInfo> infos;
   if (options.map.empty()) {
     infos = library.List();
@@ -170,7 +171,7 @@ content::Entity NewSignpost(const ContentOptions& options, const engine::MapSnap
 }
 
 void Add(const ContentOptions& options, Verbosity verbosity) {
-  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
+  maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   const maps::MapInfo map = library.FindByName(options.map);
   if (!options.to_map.empty()) (void)library.FindByName(options.to_map);  // Throws if there is none.
   const auto snapshot = library.Load(map.key).snapshot;
@@ -185,7 +186,7 @@ void Add(const ContentOptions& options, Verbosity verbosity) {
 }
 
 void Remove(const ContentOptions& options) {
-  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
+  maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   EditStoredScene(
       &library, library.FindByName(options.map),
       [&](const content::Scene& stored) { return content::RemoveEdit(stored, {options.name}); }, nullptr);

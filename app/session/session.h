@@ -140,6 +140,9 @@ class Session {
   // session_memory.cpp
   void LoadMaps();
   void AddLoadedMap(const maps::StoredMap& stored);
+  content::EditHistory StoredHistory(std::uint64_t key, const std::string& where, AssetCache* assets,
+                                     std::vector<std::string>* problems) const;  // without mutex_
+  void ResolveSignposts(content::Scene* scene);
   bool Evict(std::uint64_t key);
   void LoadIntoMemory(const Command& command);  // without mutex_
   void PinMapsInUse();
