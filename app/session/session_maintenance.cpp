@@ -41,6 +41,7 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
   }
   std::shared_ptr<const content::Scene> scene;
   content::EditHistory history;
+  std::string name;
   const std::optional<IdleMap> chosen = maintenance_order_.Next(idle, interrupt);
   if (!chosen) return false;
   const maps::AdjustedMap adjusted = maps::AdjustIdleMap(*chosen->snapshot, &interrupt);
@@ -54,11 +55,12 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
     map->maintained_revision = chosen->snapshot->revision;
     scene = map->scene;
     history = map->history;
+    name = map->name;
   }
   if (!adjusted.snapshot) return true;
   maps::MapRecord record;
   record.key = chosen->key;
-  record.name = chosen->name;
+  record.name = name;
   record.snapshot = adjusted.snapshot;
   record.expected_revision = chosen->snapshot->revision;
   const auto motions = ContentFollower().Follow(*scene, *chosen->snapshot, *adjusted.snapshot);
