@@ -91,7 +91,7 @@ class DamagedFile {
   std::uint32_t LargestPage() const;
 
   mutable std::ifstream file_;
-  std::uint64_t size_ = 0;
+  std::uint64_t size_ = 0, rows_found_ = 0;
   std::uint32_t page_size_ = 4096, usable_ = 4096;
   std::uint32_t application_id_ = 0, format_ = 0, first_unused_ = 0;
   std::set<std::uint32_t> unused_;
