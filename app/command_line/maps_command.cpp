@@ -10,6 +10,7 @@
 #include "app/command_line/maps_exchange_command.h"
 #include "app/command_line/program.h"
 #include "app/command_line/progress.h"
+#include "app/session/library_scene.h"
 #include "engine/base/error.h"
 #include "maps/library/library.h"
 #include "maps/maintenance/relocalization_check.h"
@@ -24,7 +25,7 @@ using Json = nlohmann::ordered_json;
 struct MapsOptions {
   std::filesystem::path library;
   std::string name, new_name, policy;
-  bool as_json = false;
+  bool as_json = false, force = false;
   Verbosity verbosity = Verbosity::kNormal;
 };
 using MapsAction = void (*)(const MapsOptions& options);
@@ -39,10 +40,10 @@ std::string FormatWallTime(maps::WallTime time) {
 }
 
 maps::Library OpenToRead(const MapsOptions& options) {
-  return maps::Library::Open(options.library, maps::Access::kReadOnly);
+  return OpenLibrary(options.library, maps::Access::kReadOnly);
 }
 maps::Library OpenToWrite(const MapsOptions& options) {
-  return maps::Library::Open(options.library, maps::Access::kReadWrite);
+  return OpenLibrary(options.library, maps::Access::kReadWrite);
 }
 
 Json ToJson(const maps::MapInfo& map) {
@@ -166,9 +167,10 @@ void Show(const MapsOptions& options) {
 
 void Verify(const MapsOptions& options) {
   const maps::Library library = OpenToRead(options);
-  const std::vector<std::string> problems = library.Verify();
+  const std::vector<std::string> problems = library.Verify(), lost = library.SignpostsToNoMap();
+  for (const std::string& sentence : lost) std::printf("%s\n", sentence.c_str());
   if (problems.empty()) {
-    std::printf("%s: no problems found\n", library.file().c_str());
+    std::printf("%s: no %s found\n", library.file().c_str(), lost.empty() ? "problems" : "damage");
     return;
   }
   for (const std::string& problem : problems) std::printf("%s\n", problem.c_str());
@@ -184,7 +186,20 @@ void Rename(const MapsOptions& options) {
 
 void Remove(const MapsOptions& options) {
   maps::Library library = OpenToWrite(options);
-  library.Remove(library.FindByName(options.name).key);
+  const std::uint64_t key = library.FindByName(options.name).key;
+  const std::vector<maps::Library::Signpost> signposts = library.SignpostsTo(key);
+  for (const maps::Library::Signpost& signpost : signposts) {
+    if (options.verbosity != Verbosity::kQuiet || !options.force)
+      std::printf("map '%s': the signpost '%s' leads to '%s'\n", signpost.map.name.c_str(),
+                  signpost.name.c_str(), options.name.c_str());
+  }
+  if (!signposts.empty() && !options.force) {
+    throw Error(std::to_string(signposts.size()) +
+                (signposts.size() == 1 ? " signpost leads" : " signposts lead") + " to '" + options.name +
+                "', which was not removed; with --force it is removed, and they lead "
+                "nowhere.");
+  }
+  library.Remove(key);
 }
 
 void SetMapPolicy(const MapsOptions& options) {
@@ -228,7 +243,8 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
       ->add_option("NEW_NAME", options->new_name, "New name of the map")
       ->required();
   add_name(add("remove", "Remove a map and its content", "docent maps remove Kiosk --library museum.docent",
-               Remove));
+               Remove))
+      ->add_flag("--force", options->force, "Also if signposts lead to it, which then lead nowhere");
   add_name(add("policy", "Set what may be changed in a map",
                "docent maps policy Kiosk read-only --library museum.docent", SetMapPolicy))
       ->add_option("POLICY", options->policy, "open, bounded, augment-only or read-only")

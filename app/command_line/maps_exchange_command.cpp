@@ -78,7 +78,7 @@ std::string OmittedPointsNote(const engine::MapSnapshot& map) {
 }
 
 void Export(const ExchangeOptions& options, Verbosity verbosity) {
-  const maps::Library library = maps::Library::Open(options.library, maps::Access::kReadOnly);
+  const maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
   const std::uint64_t key = library.FindByName(options.name).key;
   const std::string kind = options.output.extension().string();
   if (kind != "" && kind != ".docent" && kind != ".ply" && kind != ".png") {
@@ -91,7 +91,7 @@ void Export(const ExchangeOptions& options, Verbosity verbosity) {
     throw Error("'" + options.output.string() + "' already exists; choose a new name.");
   std::string left_out;
   if (kind == ".docent") {
-    maps::ExportMap(library, key, options.output);
+    maps::ExportMap(library, key, options.output, LibrarySceneTools());
   } else {
     const auto map = library.Load(key).snapshot;
     left_out = OmittedPointsNote(*map);
@@ -104,8 +104,8 @@ void Export(const ExchangeOptions& options, Verbosity verbosity) {
 }
 
 void Import(const ExchangeOptions& options, Verbosity verbosity) {
-  const maps::Library from = maps::Library::Open(options.from, maps::Access::kReadOnly);
-  for (const maps::ImportedMap& map : maps::ImportMaps(from, options.library)) {
+  const maps::Library from = OpenLibrary(options.from, maps::Access::kReadOnly);
+  for (const maps::ImportedMap& map : maps::ImportMaps(from, options.library, LibrarySceneTools())) {
     if (verbosity == Verbosity::kQuiet) continue;
     if (map.name == map.name_before) {
       std::printf("%s\n", map.name.c_str());
@@ -139,13 +139,24 @@ const char* ToText(maps::Optimization::Outcome outcome) {
 
 // Moves content together with the map points that it is anchored to.
 maps::MoveScene SceneMover(const std::string& library) {
-  return [library](const maps::SceneRecord& record, const engine::MapSnapshot& before,
-                   const engine::MapSnapshot& after) -> std::shared_ptr<const maps::SceneRecord> {
+  return [library](const maps::StoredContent& stored, const engine::MapSnapshot& before,
+                   const engine::MapSnapshot& after) {
     AssetCache assets;
-    const content::Scene scene = SceneFromRecord(record, library, &assets);
+    maps::StoredContent moved;
+    const content::Scene scene = SceneFromRecord(*stored.scene, library, &assets);
     const auto motions = ContentFollower().Follow(scene, before, after);
-    if (motions.empty()) return nullptr;
-    return std::make_shared<maps::SceneRecord>(RecordFromScene(*Moved(scene, motions)));
+    if (motions.empty()) return moved;
+    const auto moved_scene = Moved(scene, motions);
+    moved.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*moved_scene));
+    if (!stored.history) return moved;
+    try {
+      content::EditHistory history = HistoryFromRecord(*stored.history, library, &assets);
+      for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
+      moved.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(history, *moved_scene));
+    } catch (const Error&) {
+      moved.history.reset();  // A damaged history costs nothing else.
+    }
+    return moved;
   };
 }
 
@@ -169,7 +180,7 @@ class InterruptFlag {
 };
 
 void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
-  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
+  maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   std::vector<maps::MapInfo> infos = library.List();
   if (!options.name.empty()) infos = {library.FindByName(options.name)};
   const InterruptFlag interrupt;
@@ -199,7 +210,7 @@ void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
 }
 
 void Join(const ExchangeOptions& options, Verbosity verbosity) {
-  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
+  maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   const std::uint64_t into = library.FindByName(options.name).key,
                       from = library.FindByName(options.other_name).key;
   const InterruptFlag interrupt;
@@ -224,7 +235,7 @@ void Join(const ExchangeOptions& options, Verbosity verbosity) {
 }
 
 void Recover(const ExchangeOptions& options, Verbosity verbosity) {
-  const maps::Recovery recovery = maps::Recover(options.library, options.output);
+  const maps::Recovery recovery = maps::Recover(options.library, options.output, LibrarySceneTools());
   if (verbosity == Verbosity::kQuiet) return;
   for (const std::string& problem : recovery.problems) std::printf("lost: %s\n", problem.c_str());
   std::printf("%zu %s recovered completely and %zu partly, written to %s\n", recovery.maps_complete,

@@ -7,6 +7,7 @@
 #include "app/command_line/run_guide.h"
 #include "app/command_line/runs.h"
 #include "app/script/script_file.h"
+#include "app/session/library_scene.h"
 #include "engine/base/error.h"
 #include "engine/initialization/planar_target.h"
 
@@ -58,8 +59,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   request.new_map_when_lost = options.when_lost.value_or(otherwise) == WhenLost::kNew;
   if (options.target) request.target = ReadTarget(*options.target, options.target_width_m);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
-  maps::Library library =
-      maps::Library::Open(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   request.library = &library;
   CopyRunArguments(options.run, AnyLive(cameras), &request);
   request.autosave_interval = options.autosave_interval;
@@ -76,7 +76,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
 
 void RunTour(const TourOptions& options, Verbosity verbosity) {
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
-  maps::Library library = maps::Library::Open(options.library, maps::Access::kReadOnly);
+  maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
   GuideRequest request;
   request.library = &library;
   request.title = "Docent - tour";

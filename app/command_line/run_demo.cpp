@@ -18,6 +18,7 @@
 #include "app/evaluation/json_report.h"
 #include "app/evaluation/simulated_truth.h"
 #include "app/files/text_file.h"
+#include "app/session/library_scene.h"
 #include "engine/base/error.h"
 #include "ui/context.h"
 #include "ui/map_view.h"
@@ -174,8 +175,7 @@ void RunDemo(const DemoOptions& options, Verbosity verbosity) {
   MuseumDirector director(*simulation, "exhibit.glb");
   DemoRun author(simulation, 0, director.first_visit_frame(), "author");
   {
-    maps::Library library =
-        maps::Library::Open(library_path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    maps::Library library = OpenLibrary(library_path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
     GuideRequest request = CommonRequest(options, &library, folder / "author");
     request.may_write = true;
     request.model_folder = folder;
@@ -188,7 +188,7 @@ void RunDemo(const DemoOptions& options, Verbosity verbosity) {
   DemoRun tour(simulation, director.first_visit_frame(), simulation->frame_count(), "tour");
   DrawingCheck check(*simulation, director.truths());
   {
-    maps::Library library = maps::Library::Open(library_path, maps::Access::kReadOnly);
+    maps::Library library = OpenLibrary(library_path, maps::Access::kReadOnly);
     GuideRequest request = CommonRequest(options, &library, folder / "tour");
     request.title = "Docent demonstration - the tour";
     request.record = options.record ? *options.record : folder / "tour.mp4";

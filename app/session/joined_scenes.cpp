@@ -5,11 +5,20 @@
 #include <utility>
 
 #include "app/session/content_follower.h"
-#include "content/scene_codec.h"
+#include "maps/library/signposts.h"
 
 namespace docent::app {
 
-void MergeScene(const content::Scene& b, const std::string& name_of_a, const std::string& name_of_b,
+namespace {
+
+bool LeadsToMap(const content::Entity& entity, const maps::MapInfo& map) {
+  return entity.kind == content::Entity::Kind::kSignpost &&
+         maps::LeadsTo({entity.signpost.to_key, entity.signpost.to_map}, map);
+}
+
+}  // namespace
+
+void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps::MapInfo& map_b,
                 const engine::JoinedMap& joined, content::Scene* scene) {
   content::Scene aligned = b;
   for (content::Entity& entity : aligned.entities) content::MoveWithAnchor(joined.a_from_b, &entity);
@@ -19,39 +28,28 @@ void MergeScene(const content::Scene& b, const std::string& name_of_a, const std
     scene->entities.push_back(std::move(entity));
   }
   for (content::Entity& entity : scene->entities) {
-    if (entity.signpost.to_map == name_of_a || entity.signpost.to_map == name_of_b)
-      entity.signpost.to_map.clear();
+    if (!LeadsToMap(entity, map_a) && !LeadsToMap(entity, map_b)) continue;
+    entity.signpost.to_map.clear();
+    entity.signpost.to_key = 0;
   }
 }
 
-content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const std::string& name_of_a,
-                          const std::string& name_of_b, const engine::JoinedMap& joined) {
+content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const maps::MapInfo& map_a,
+                          const maps::MapInfo& map_b, const engine::JoinedMap& joined) {
   content::Scene both = *Moved(a, ContentFollower().Follow(a, *joined.aligned, *joined.map));
-  MergeScene(b, name_of_a, name_of_b, joined, &both);
+  MergeScene(b, map_a, map_b, joined, &both);
   return both;
 }
 
-bool RedirectSceneSignposts(const std::string& from, const std::string& into, content::Scene* scene) {
+bool RedirectSceneSignposts(const maps::MapInfo& from, const maps::MapInfo& into, content::Scene* scene) {
   bool changed = false;
   for (content::Entity& entity : scene->entities) {
-    if (entity.signpost.to_map != from) continue;
-    entity.signpost.to_map = into;
+    if (!LeadsToMap(entity, from)) continue;
+    entity.signpost.to_map = into.name;
+    entity.signpost.to_key = into.key;
     changed = true;
   }
   return changed;
-}
-
-std::optional<std::string> RedirectSignposts(const std::string& text, const std::string& from,
-                                             const std::string& into) {
-  if (text.empty()) return std::nullopt;
-  // Encoding writes only the ids of assets, so their bytes are not needed.
-  content::Scene scene = content::DecodeScene(text, "its scene", [](const std::string& id) {
-    auto asset = std::make_shared<content::Asset>();
-    asset->id = id;
-    return asset;
-  });
-  if (!RedirectSceneSignposts(from, into, &scene)) return std::nullopt;
-  return content::EncodeScene(scene);
 }
 
 maps::SceneJoiner LibrarySceneJoiner(const std::string& file) {
@@ -63,9 +61,8 @@ maps::SceneJoiner LibrarySceneJoiner(const std::string& file) {
       return SceneFromRecord(map.scene, file + ", map '" + map.info.name + "'", &assets);
     };
     return std::make_shared<maps::SceneRecord>(
-        RecordFromScene(JoinScenes(scene_of(into), scene_of(from), into.info.name, from.info.name, joined)));
+        RecordFromScene(JoinScenes(scene_of(into), scene_of(from), into.info, from.info, joined)));
   };
-  joiner.redirect = RedirectSignposts;
   return joiner;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "app/session/library_scene.h"
@@ -15,22 +14,18 @@ namespace docent::app {
 // Adds the entities of map B to `scene`, the scene of map A in the joined map; each entity stays with its
 // anchor. Duplicate names get a number. A signpost that led from one of the two maps to the other leads
 // nowhere.
-void MergeScene(const content::Scene& b, const std::string& name_of_a, const std::string& name_of_b,
+void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps::MapInfo& map_b,
                 const engine::JoinedMap& joined, content::Scene* scene);
 
 // The content of both maps, in the coordinates of the joined one.
-content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const std::string& name_of_a,
-                          const std::string& name_of_b, const engine::JoinedMap& joined);
+content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const maps::MapInfo& map_a,
+                          const maps::MapInfo& map_b, const engine::JoinedMap& joined);
 
-// Redirects signposts that lead to the map `from` to the map `into`; returns false when there were none.
-bool RedirectSceneSignposts(const std::string& from, const std::string& into, content::Scene* scene);
+// Redirects signposts that lead to the map `from` to the map `into`; returns false when there were none. Of
+// both maps, only the key and the name matter, here and above.
+bool RedirectSceneSignposts(const maps::MapInfo& from, const maps::MapInfo& into, content::Scene* scene);
 
-// The same for an encoded scene; empty when it has no such signpost. Throws docent::Error when the text is
-// invalid.
-std::optional<std::string> RedirectSignposts(const std::string& text, const std::string& from,
-                                             const std::string& into);
-
-// Both functions, as a library uses them. file: the library's, for error messages.
+// JoinScenes, as a library uses it. file: the library's, for error messages.
 maps::SceneJoiner LibrarySceneJoiner(const std::string& file);
 
 }  // namespace docent::app

@@ -37,6 +37,14 @@ std::string ReasonOf(const engine::MapDiscarded& what, const std::string& other)
   return {};
 }
 
+// By what signposts know a map.
+maps::MapInfo IdentityOf(const SessionMap& map) {
+  maps::MapInfo info;
+  info.key = map.key;
+  info.name = map.name;
+  return info;
+}
+
 std::string TextOf(const engine::CalibrationMonitor::Mismatch& mismatch) {
   const auto radius = [](double px) { return std::to_string(std::lround(px)); };
   const auto pixels = [](double px) { return FormatNumber(std::round(10 * px) / 10, 3); };
@@ -104,6 +112,7 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapDiscarde
   AddEvent(event.time, "map", "discarded " + map.name + ": " + ReasonOf(what, NameOf(what.other)));
   if (what.replacement == 0) return;
   AddMap(what.replacement, map.name);
+  Retarget(event.map, map.name, what.replacement, map.name);
   // Content of the false initialization has lost its anchor.
   for (const content::Entity& entity : map.scene->entities) {
     AddEvent(event.time, "warning", "'" + entity.name + "' was removed with the discarded map");
@@ -199,7 +208,8 @@ std::string Session::FreeMapName(const std::string& name) const {
 // `into` already has the joined snapshot. Edits in `from` can no longer be undone, as its content was moved.
 void Session::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
   auto scene = std::make_shared<content::Scene>(*into->scene);
-  MergeScene(*from->scene, into->name, from->name, joined, scene.get());
+  const maps::MapInfo map_into = IdentityOf(*into), map_from = IdentityOf(*from);
+  MergeScene(*from->scene, map_into, map_from, joined, scene.get());
   into->scene = std::move(scene);
   into->joined_keys.push_back(from->key);
   into->joined_keys.insert(into->joined_keys.end(), from->joined_keys.begin(), from->joined_keys.end());
@@ -208,7 +218,7 @@ void Session::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, Sessi
   for (auto& [key, map] : maps_) {
     if (!map.Exists() || key == into->key) continue;
     auto other = std::make_shared<content::Scene>(*map.scene);
-    if (maps::MayChangeContent(map.policy) && RedirectSceneSignposts(from->name, into->name, other.get()))
+    if (maps::MayChangeContent(map.policy) && RedirectSceneSignposts(map_from, map_into, other.get()))
       map.scene = std::move(other);
   }
 }

@@ -40,6 +40,8 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
     idle = MapsForMaintenance();
   }
   std::shared_ptr<const content::Scene> scene;
+  content::EditHistory history;
+  std::string name;
   const std::optional<IdleMap> chosen = maintenance_order_.Next(idle, interrupt);
   if (!chosen) return false;
   const maps::AdjustedMap adjusted = maps::AdjustIdleMap(*chosen->snapshot, &interrupt);
@@ -52,16 +54,22 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
     // Once per revision, whatever the outcome.
     map->maintained_revision = chosen->snapshot->revision;
     scene = map->scene;
+    history = map->history;
+    name = map->name;
   }
   if (!adjusted.snapshot) return true;
   maps::MapRecord record;
   record.key = chosen->key;
-  record.name = chosen->name;
+  record.name = name;
   record.snapshot = adjusted.snapshot;
   record.expected_revision = chosen->snapshot->revision;
   const auto motions = ContentFollower().Follow(*scene, *chosen->snapshot, *adjusted.snapshot);
-  if (!motions.empty())
-    record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*Moved(*scene, motions)));
+  if (!motions.empty()) {
+    const auto moved = Moved(*scene, motions);
+    for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
+    record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*moved));
+    record.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(history, *moved));
+  }
   if (!library_->Save(record)) return true;
   const std::scoped_lock lock(mutex_);
   // A camera entered the map meanwhile: it continues with the map as it was, and will save that.

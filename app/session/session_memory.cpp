@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "app/session/session.h"
+#include "engine/base/error.h"
 
 // Which maps of the library are in memory: the pager loads and evicts maps, the session tells it which are in
 // use.
@@ -37,18 +38,52 @@ void Session::AddLoadedMap(const maps::StoredMap& stored) {
     assets = assets_;
   }
   // Models are decoded without the lock, so that frames are processed meanwhile.
-  auto scene = std::make_shared<const content::Scene>(
-      SceneFromRecord(stored.scene, library_->file() + ", map '" + stored.info.name + "'", &assets));
+  const std::string where = library_->file() + ", map '" + stored.info.name + "'";
+  std::vector<std::string> problems = stored.lost_content;
+  auto scene = std::make_shared<content::Scene>(ReadableScene(stored.scene, where, &assets, &problems));
+  content::EditHistory history;
+  if (options_.may_write && problems.empty())
+    history = StoredHistory(stored.info.key, where, &assets, &problems);
   const std::scoped_lock lock(mutex_);
+  for (const std::string& problem : problems) AddEvent(LastTime(), "warning", problem);
   assets_.merge(assets);
   // A map that another process saved since the session began is not part of the session.
   const auto found = maps_.find(stored.info.key);
   if (found == maps_.end() || found->second.changed) return;
   SessionMap& map = found->second;
   map.snapshot = map.saved_snapshot = stored.snapshot;
+  ResolveSignposts(scene.get());
   map.scene = map.saved_scene = std::move(scene);
+  map.history = std::move(history);
   system_.SetSnapshot(map.key, map.snapshot);
   UpdatePermissions(map);
+}
+
+// Empty when the library has none, or a damaged one, which costs nothing else.
+content::EditHistory Session::StoredHistory(std::uint64_t key, const std::string& where, AssetCache* assets,
+                                            std::vector<std::string>* problems) const {
+  try {
+    const std::optional<maps::SceneRecord> record = library_->LoadHistory(key);
+    if (record) return HistoryFromRecord(*record, where, assets);
+  } catch (const Error& error) {
+    problems->push_back(where + ": earlier changes cannot be undone: " + error.what());
+  }
+  return {};
+}
+
+// A signpost leads to a map by its key; the name is the one that the map has now. A signpost of an older
+// library has only the name.
+void Session::ResolveSignposts(content::Scene* scene) {
+  for (content::Entity& entity : scene->entities) {
+    if (entity.kind != content::Entity::Kind::kSignpost) continue;
+    content::Signpost& signpost = entity.signpost;
+    if (signpost.to_key != 0) {
+      if (const auto found = maps_.find(signpost.to_key); found != maps_.end())
+        signpost.to_map = found->second.name;
+    } else if (const SessionMap* const map = FindByName(signpost.to_map)) {
+      signpost.to_key = map->key;
+    }
+  }
 }
 
 bool Session::Evict(std::uint64_t key) {
@@ -61,19 +96,22 @@ bool Session::Evict(std::uint64_t key) {
   map.snapshot.reset();
   map.saved_snapshot.reset();
   map.scene = map.saved_scene = std::make_shared<content::Scene>();
+  map.history = {};
   std::erase_if(assets_, [](const auto& asset) { return asset.second.use_count() == 1; });
   return true;
 }
 
 // Loads the map that a command names, if the command needs the map itself.
 void Session::LoadIntoMemory(const Command& command) {
-  const auto* use = std::get_if<UseMap>(&command);
-  const auto* policy = std::get_if<SetPolicy>(&command);
-  if (!pager_ || (!use && !policy)) return;
+  const std::string* name = nullptr;
+  if (const auto* use = std::get_if<UseMap>(&command)) name = &use->name;
+  if (const auto* policy = std::get_if<SetPolicy>(&command)) name = &policy->name;
+  if (const auto* paste = std::get_if<PasteEntities>(&command)) name = &paste->from_map;
+  if (!pager_ || name == nullptr) return;
   std::uint64_t key = 0;
   {
     const std::scoped_lock lock(mutex_);
-    const SessionMap* const map = FindByName(use ? use->name : policy->name);
+    const SessionMap* const map = FindByName(*name);
     if (map != nullptr && map->in_library && !map->snapshot) key = map->key;
   }
   if (key != 0) pager_->Load(key);
@@ -89,9 +127,9 @@ void Session::ExpectNeighbours(const SessionMap& map) {
   if (!pager_) return;
   std::vector<std::uint64_t> keys;
   for (const content::Entity& entity : map.scene->entities) {
-    if (entity.kind != content::Entity::Kind::kSignpost || entity.signpost.to_map.empty()) continue;
-    const SessionMap* const neighbour = FindByName(entity.signpost.to_map);
-    if (neighbour != nullptr && neighbour->in_library) keys.push_back(neighbour->key);
+    if (entity.kind != content::Entity::Kind::kSignpost) continue;
+    const auto neighbour = maps_.find(entity.signpost.to_key);
+    if (neighbour != maps_.end() && neighbour->second.in_library) keys.push_back(neighbour->first);
   }
   pager_->Prefetch(keys);
 }

@@ -40,7 +40,10 @@ void Session::SaveMap(SessionMap* map, Timestamp time) {
   const bool structure = map->snapshot != map->saved_snapshot;
   const bool content = map->scene != map->saved_scene;
   if (structure) record.snapshot = map->snapshot;
-  if (content) record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*map->scene));
+  if (content) {
+    record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*map->scene));
+    record.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(map->history, *map->scene));
+  }
   for (const engine::EstimatedLens& lens : system_.EstimatedLenses()) {
     if (lens.focal_sigma <= options_.mapper.lens.max_sigma)
       record.lenses.push_back({lens.name, *lens.model, lens.focal_sigma, lens.fixed});

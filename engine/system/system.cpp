@@ -218,6 +218,15 @@ void System::LeaveMap(std::uint64_t key) {
   policy_.LeaveMap(key);
 }
 
+void System::RemoveMap(std::uint64_t key) {
+  const std::scoped_lock lock(mutex_);
+  LeaveMapNow(key);
+  const auto found = maps_.find(key);
+  if (found == maps_.end()) return;
+  found->second.discarded = true;  // Late updates of the mapper are ignored.
+  index_.RemoveMap(key);
+}
+
 void System::Activate(std::uint64_t key) {
   const std::scoped_lock lock(mutex_);
   policy_.Activate(state_.maps.at(key));

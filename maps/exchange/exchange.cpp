@@ -7,11 +7,13 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "maps/library/signposts.h"
 
 namespace docent::maps {
 
 namespace {
 
+// The undo history stays where the map comes from.
 MapRecord RecordOf(StoredMap map, std::uint64_t key, std::string name) {
   MapRecord record;
   record.key = key;
@@ -35,15 +37,35 @@ std::string FreeName(const std::string& name, const std::set<std::string>& taken
   }
 }
 
+// Makes the signposts of a map lead to where they lead in another library.
+void Redirect(const SceneTools& scenes, const Retarget& retarget, StoredMap* map) {
+  if (!scenes.retarget || map->scene.text.empty()) return;
+  if (const auto text = scenes.retarget(map->scene.text, retarget)) map->scene.text = *text;
+}
+
+LibraryOptions OptionsWith(const SceneTools& scenes) {
+  LibraryOptions options;
+  options.scenes = scenes;
+  return options;
+}
+
 }  // namespace
 
-void ExportMap(const Library& library, std::uint64_t key, const std::filesystem::path& path) {
+void ExportMap(const Library& library, std::uint64_t key, const std::filesystem::path& path,
+               const SceneTools& scenes) {
   std::error_code error;
   if (std::filesystem::exists(path, error))
     throw Error(path.string() + " exists already; choose a new file name for the map");
   StoredMap map = library.Load(key);
+  // The new library has other keys, and no other map; where a signpost led remains known by its name.
+  Redirect(
+      scenes,
+      [](const std::string&, const SignpostTarget& target) {
+        return SignpostTarget{0, target.map};
+      },
+      &map);
   try {
-    Library target = Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes);
+    Library target = Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes, OptionsWith(scenes));
     const std::string name = map.info.name;
     target.Save(RecordOf(std::move(map), target.NewKey(), name));
   } catch (const Error&) {
@@ -53,19 +75,35 @@ void ExportMap(const Library& library, std::uint64_t key, const std::filesystem:
   }
 }
 
-std::vector<ImportedMap> ImportMaps(const Library& from, const std::filesystem::path& path) {
+std::vector<ImportedMap> ImportMaps(const Library& from, const std::filesystem::path& path,
+                                    const SceneTools& scenes) {
   const std::vector<MapInfo> infos = from.List();
   if (infos.empty()) throw Error(from.file() + " contains no map to import");
   for (const MapInfo& info : infos) from.Load(info.key);
-  Library to = Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes);
+  Library to = Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes, OptionsWith(scenes));
+  const std::vector<MapInfo> there = to.List();
   std::set<std::string> taken;
-  for (const MapInfo& info : to.List()) taken.insert(info.name);
-  std::vector<ImportedMap> imported;
+  for (const MapInfo& info : there) taken.insert(info.name);
+  std::uint64_t key = to.ReserveKeys(infos.size());
+  std::vector<SignpostTarget> targets;  // What the maps are here, in their order.
   for (const MapInfo& info : infos) {
-    std::string name = FreeName(info.name, taken);
-    to.Save(RecordOf(from.Load(info.key), to.NewKey(), name));
-    taken.insert(name);
-    imported.push_back({std::move(name), info.name});
+    targets.push_back({key++, FreeName(info.name, taken)});
+    taken.insert(targets.back().map);
+  }
+  // A signpost to a map that does not come along leads to the one that has its name here, if there is one.
+  const auto retarget = [&](const std::string&, const SignpostTarget& target) {
+    for (std::size_t i = 0; i < infos.size(); ++i) {
+      if (LeadsTo(target, infos[i])) return targets[i];
+    }
+    const SignpostTarget by_name{0, target.map};
+    return KeyOfTarget(by_name, there).value_or(by_name);
+  };
+  std::vector<ImportedMap> imported;
+  for (std::size_t i = 0; i < infos.size(); ++i) {
+    StoredMap map = from.Load(infos[i].key);
+    Redirect(scenes, retarget, &map);
+    to.Save(RecordOf(std::move(map), targets[i].key, targets[i].map));
+    imported.push_back({targets[i].map, infos[i].name});
   }
   return imported;
 }

@@ -7,12 +7,15 @@
 
 #include "maps/library/library.h"
 
-// Copies maps between libraries with their content, policies and bounds.
+// Copies maps between libraries with their content, policies and bounds, but without the undo history of the
+// content. With functions for scenes, signposts lead to the same maps in the other library, if they are
+// there.
 namespace docent::maps {
 
 // Writes a new library that contains only this map. Throws docent::Error when the file already exists or the
 // map is invalid; then no file is left.
-void ExportMap(const Library& library, std::uint64_t key, const std::filesystem::path& path);
+void ExportMap(const Library& library, std::uint64_t key, const std::filesystem::path& path,
+               const SceneTools& scenes = {});
 
 struct ImportedMap {
   std::string name, name_before;  // They differ if the library already had a map with that name.
@@ -20,6 +23,7 @@ struct ImportedMap {
 // Adds all maps of a library to the library at `path`, which is created if it does not exist. A name that is
 // taken gets a number: "Desk" becomes "Desk (2)". Nothing is written before every map was read and validated.
 // Throws docent::Error; maps that were added before an error stay.
-std::vector<ImportedMap> ImportMaps(const Library& from, const std::filesystem::path& path);
+std::vector<ImportedMap> ImportMaps(const Library& from, const std::filesystem::path& path,
+                                    const SceneTools& scenes = {});
 
 }  // namespace docent::maps

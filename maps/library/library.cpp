@@ -13,8 +13,10 @@
 #include "maps/index/thumbnail_rows.h"
 #include "maps/index/word_rows.h"
 #include "maps/library/migration.h"
+#include "maps/library/signposts.h"
 #include "maps/library/verify.h"
 #include "maps/storage/database.h"
+#include "maps/storage/history_rows.h"
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
 #include "maps/storage/snapshot_reader.h"
@@ -88,7 +90,8 @@ WallTime SystemTime() {
   return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
 }
 
-Database OpenDatabase(const std::filesystem::path& path, Access access, CreateIfMissing create) {
+Database OpenDatabase(const std::filesystem::path& path, Access access, CreateIfMissing create,
+                      const SceneTools& scenes) {
   if (access == Access::kReadOnly) {
     Database database = Database::OpenReadOnly(path);
     CheckIsLibrary(database);
@@ -98,7 +101,7 @@ Database OpenDatabase(const std::filesystem::path& path, Access access, CreateIf
   if (create == CreateIfMissing::kYes && IsBlank(database)) CreateSchema(database);
   CheckIsLibrary(database);
   database.StartWriting();
-  UpgradeFormat(database);
+  UpgradeFormat(database, scenes);
   return database;
 }
 
@@ -146,6 +149,32 @@ class Library::Impl {
     return scene;
   }
 
+  SceneRecord ReadableScene(std::uint64_t key, std::vector<std::string>* problems) const {
+    SceneRecord scene;
+    try {
+      ScenePart part = ReadScenePart(database_, key);
+      scene.text = std::move(part.text);
+      for (const std::string& id : part.asset_ids) {
+        try {
+          scene.assets.push_back(ReadAsset(database_, id));
+        } catch (const Error& error) {
+          problems->emplace_back(error.what());
+        }
+      }
+    } catch (const Error& error) {
+      problems->emplace_back(error.what());
+    }
+    return scene;
+  }
+
+  std::optional<SceneRecord> LoadHistory(std::uint64_t key) const {
+    std::optional<HistoryPart> part = ReadHistory(database_, key);
+    if (!part || part->scene != SceneChecksum(key)) return std::nullopt;
+    SceneRecord history{std::move(part->changes.text), {}};
+    for (const std::string& id : part->changes.asset_ids) history.assets.push_back(ReadAsset(database_, id));
+    return history;
+  }
+
   void CheckNameIsFree(const std::string& name, std::uint64_t key) const {
     const auto other = FindMapByName(database_, name);
     if (other && *other != key) throw Error("there is already a map named '" + name + "'");
@@ -170,6 +199,7 @@ class Library::Impl {
     if (info.policy == Policy::kBounded && !info.bounds) info.bounds = BoundsOf(parts);
     WriteStructure(snapshot, parts, {}, &info);
     WriteScene(record.key, record.scene ? *record.scene : SceneRecord{});
+    if (record.history && !record.history->text.empty()) StoreHistory(*record.history, record.key);
     WriteMapRow(database_, info);
   }
 
@@ -178,6 +208,7 @@ class Library::Impl {
     bool changed = false;
     if (record.snapshot) changed |= UpdateStructure(*record.snapshot, &info);
     if (record.scene) changed |= UpdateScene(*record.scene, info);
+    if (record.history) changed |= UpdateHistory(*record.history, info);
     if (!changed) return false;
     info.modified = options_.clock();
     WriteMapRow(database_, info);
@@ -217,8 +248,49 @@ class Library::Impl {
     if (ReadScenePart(database_, info.key) == PartOf(scene)) return false;
     if (!MayChangeContent(info.policy)) Refuse(info.policy, "its content cannot be changed");
     WriteScene(info.key, scene);
+    RemoveHistory(database_, info.key);  // It belongs to the scene before.
     RemoveUnusedAssets(database_);
     return true;
+  }
+
+  // Returns whether something changed.
+  bool UpdateHistory(const SceneRecord& history, const MapInfo& info) {
+    std::optional<HistoryPart> stored;
+    try {
+      stored = ReadHistory(database_, info.key);
+    } catch (const Error&) {
+      stored.emplace();  // A damaged one is replaced or removed.
+    }
+    const ScenePart changes = PartOf(history);
+    if (stored ? stored->changes == changes && stored->scene == SceneChecksum(info.key)
+               : changes.text.empty())
+      return false;
+    if (!MayChangeContent(info.policy)) Refuse(info.policy, "its undo history cannot be changed");
+    if (changes.text.empty()) {
+      RemoveHistory(database_, info.key);
+    } else {
+      StoreHistory(history, info.key);
+    }
+    RemoveUnusedAssets(database_);
+    return true;
+  }
+
+  void StoreHistory(const SceneRecord& history, std::uint64_t key) {
+    const std::vector<std::string> of_scene = ReadScenePart(database_, key).asset_ids;
+    std::size_t bytes = 0;
+    for (const AssetRecord& asset : history.assets) {
+      const bool shared = std::find(of_scene.begin(), of_scene.end(), asset.id) != of_scene.end();
+      if (!shared && asset.bytes) bytes += asset.bytes->size();
+    }
+    if (bytes > kMaxHistoryAssetBytes)
+      throw Error("the models of its undo history have more than " +
+                  std::to_string(kMaxHistoryAssetBytes >> 20) + " MiB");
+    for (const AssetRecord& asset : history.assets) WriteAsset(database_, asset);
+    WriteHistory(database_, key, {SceneChecksum(key), PartOf(history)});
+  }
+
+  std::uint64_t SceneChecksum(std::uint64_t key) const {
+    return SceneTextChecksum(ReadScenePart(database_, key).text);
   }
 
   // Joins two maps and redirects everything that refers to the removed one.
@@ -228,23 +300,11 @@ class Library::Impl {
         if (!MayChangeStructure(info.policy)) Refuse(info.policy, "it cannot be joined with another map");
       });
     }
-    for (MapInfo info : ReadMapRows(database_)) {
-      if (info.key == record.into.key || info.key == record.from.key || !record.redirect) continue;
-      WithMapContext(database_, info, [&] {
-        ScenePart scene = ReadScenePart(database_, info.key);
-        const std::optional<std::string> text = record.redirect(scene.text);
-        if (!text) return;
-        if (!MayChangeContent(info.policy)) {
-          Refuse(info.policy, "its signposts to '" + record.from.name + "' cannot point to '" +
-                                  record.into.name + "' instead");
-        }
-        scene.text = *text;
-        WriteScenePart(database_, info.key, scene);
-        info.modified = options_.clock();
-        WriteMapRow(database_, info);
-      });
-    }
+    Redirect(
+        record.from, {record.into.key, record.into.name}, {record.into.key, record.from.key},
+        "its signposts to '" + record.from.name + "' cannot point to '" + record.into.name + "' instead");
     MapInfo info = record.into;
+    RemoveHistory(database_, info.key);  // It belongs to the scene before.
     WriteStructure(*record.snapshot, PartsOf(*record.snapshot), ReadParts(database_, info).keyframes, &info);
     WriteScene(info.key, *record.scene);
     info.policy = Stricter(record.into.policy, record.from.policy);
@@ -254,13 +314,63 @@ class Library::Impl {
     RemoveMap(record.from.key);
   }
 
+  // The text of a map's scene with other targets; empty if none changes, or the scene cannot be read and so
+  // leads nowhere.
+  std::optional<std::string> RetargetIn(const MapInfo& info, const Retarget& retarget) const {
+    if (!options_.scenes.retarget) return std::nullopt;
+    try {
+      const std::string text = ReadScenePart(database_, info.key).text;
+      return text.empty() ? std::nullopt : options_.scenes.retarget(text, retarget);
+    } catch (const Error&) {
+      return std::nullopt;
+    }
+  }
+
+  // Makes all signposts to the map `from` lead to another map or, with an empty target, nowhere. The maps
+  // with the keys `except` are left out. `refusal` says what cannot be done where the policy forbids it; if
+  // it is empty, the policy does not matter, because the signposts lead to the same place as before.
+  void Redirect(const MapInfo& from, const SignpostTarget& into, const std::vector<std::uint64_t>& except,
+                const std::string& refusal) {
+    for (MapInfo info : ReadMapRows(database_)) {
+      if (std::find(except.begin(), except.end(), info.key) != except.end()) continue;
+      const auto text = RetargetIn(info, [&](const std::string&, const SignpostTarget& target) {
+        return LeadsTo(target, from) && target != into ? std::optional(into) : std::nullopt;
+      });
+      if (!text) continue;
+      WithMapContext(database_, info, [&] {
+        if (!refusal.empty() && !MayChangeContent(info.policy)) Refuse(info.policy, refusal);
+        WriteSceneText(info.key, *text);
+      });
+      info.modified = options_.clock();
+      WriteMapRow(database_, info);
+    }
+  }
+
+  // The undo history of the scene still fits, as no entity was added, moved or removed.
+  void WriteSceneText(std::uint64_t key, const std::string& text) {
+    ScenePart scene = ReadScenePart(database_, key);
+    std::optional<HistoryPart> history;
+    try {
+      history = ReadHistory(database_, key);
+    } catch (const Error&) {
+      history.reset();  // It stays as it is, and Verify reports it.
+    }
+    const bool fits = history && history->scene == SceneTextChecksum(scene.text);
+    scene.text = text;
+    WriteScenePart(database_, key, scene);
+    if (!fits) return;
+    history->scene = SceneTextChecksum(text);
+    WriteHistory(database_, key, *history);
+  }
+
   // Returns false if the map no longer exists.
-  bool RemoveJoined(std::uint64_t key) {
+  bool RemoveJoined(std::uint64_t key, const SignpostTarget& into) {
     const std::optional<MapInfo> info = ReadMapRow(database_, key);
     if (!info) return false;
     WithMapContext(database_, *info, [&] {
       if (!MayRemove(info->policy)) Refuse(info->policy, "it cannot be joined into another map");
     });
+    Redirect(*info, into, {key}, "");
     RemoveMap(key);
     return true;
   }
@@ -293,7 +403,8 @@ Library::~Library() = default;
 
 Library Library::Open(const std::filesystem::path& path, Access access, CreateIfMissing create,
                       LibraryOptions options) {
-  return Library(std::make_unique<Impl>(OpenDatabase(path, access, create), std::move(options)));
+  Database database = OpenDatabase(path, access, create, options.scenes);
+  return Library(std::make_unique<Impl>(std::move(database), std::move(options)));
 }
 
 Access Library::access() const {
@@ -318,14 +429,15 @@ MapInfo Library::FindByName(const std::string& name) const {
   });
 }
 
-StoredMap Library::Load(std::uint64_t key) const {
+StoredMap Library::Load(std::uint64_t key, DamagedContent damaged) const {
   return impl_->Read([&] {
     StoredMap map;
     map.info = impl_->Get(key);
     WithMapContext(impl_->database(), map.info, [&] {
       map.snapshot = ReadSnapshot(impl_->database(), map.info, impl_->options().make_features,
                                   impl_->options().load_threads);
-      map.scene = impl_->ReadScene(key);
+      map.scene = damaged == DamagedContent::kRefuse ? impl_->ReadScene(key)
+                                                     : impl_->ReadableScene(key, &map.lost_content);
     });
     return map;
   });
@@ -336,6 +448,14 @@ SceneRecord Library::LoadScene(std::uint64_t key) const {
     SceneRecord scene;
     WithMapContext(impl_->database(), impl_->Get(key), [&] { scene = impl_->ReadScene(key); });
     return scene;
+  });
+}
+
+std::optional<SceneRecord> Library::LoadHistory(std::uint64_t key) const {
+  return impl_->Read([&] {
+    std::optional<SceneRecord> history;
+    WithMapContext(impl_->database(), impl_->Get(key), [&] { history = impl_->LoadHistory(key); });
+    return history;
   });
 }
 
@@ -399,7 +519,8 @@ bool Library::Save(const MapRecord& record) {
         impl_->Create(record);
       }
     });
-    for (const std::uint64_t key : record.joined_keys) changed |= impl_->RemoveJoined(key);
+    for (const std::uint64_t key : record.joined_keys)
+      changed |= impl_->RemoveJoined(key, {record.key, info ? info->name : record.name});
     for (const StoredLens& lens : record.lenses) changed |= WriteLens(impl_->database(), lens);
     return changed;
   });
@@ -415,6 +536,9 @@ void Library::Rename(std::uint64_t key, const std::string& name) {
       CheckName(name);
       impl_->CheckNameIsFree(name, key);
     });
+    // Signposts that were written without the map's key led to it by its name.
+    impl_->Redirect(info, {key, name}, {}, "");
+    info = impl_->Get(key);
     info.name = name;
     info.modified = impl_->options().clock();
     WriteMapRow(impl_->database(), info);
@@ -428,6 +552,7 @@ void Library::Remove(std::uint64_t key) {
     WithMapContext(impl_->database(), info, [&] {
       if (!MayRemove(info.policy)) Refuse(info.policy, "it cannot be removed");
     });
+    impl_->Redirect(info, {}, {key}, "its signposts to '" + info.name + "' cannot be changed");
     impl_->RemoveMap(key);
     return true;
   });
@@ -464,7 +589,27 @@ bool Library::Join(const JoinRecord& record) {
 }
 
 std::vector<std::string> Library::Verify() const {
-  return impl_->Read([&] { return VerifyAll(impl_->database(), impl_->options().load_threads); });
+  return impl_->Read(
+      [&] { return VerifyAll(impl_->database(), impl_->options().load_threads, impl_->options().scenes); });
+}
+
+std::vector<std::string> Library::SignpostsToNoMap() const {
+  return impl_->Read([&] { return maps::SignpostsToNoMap(impl_->database(), impl_->options().scenes); });
+}
+
+std::vector<Library::Signpost> Library::SignpostsTo(std::uint64_t key) const {
+  return impl_->Read([&] {
+    std::vector<Signpost> signposts;
+    const MapInfo wanted = impl_->Get(key);
+    for (const MapInfo& info : ReadMapRows(impl_->database())) {
+      if (info.key == key) continue;
+      impl_->RetargetIn(info, [&](const std::string& signpost, const SignpostTarget& target) {
+        if (LeadsTo(target, wanted)) signposts.push_back({info, signpost});
+        return std::optional<SignpostTarget>();
+      });
+    }
+    return signposts;
+  });
 }
 
 }  // namespace docent::maps

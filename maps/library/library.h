@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "maps/index/word_rows.h"
 #include "maps/storage/map_record.h"
 #include "maps/storage/policy.h"
+#include "maps/storage/scene_tools.h"
 
 // A library of maps: one SQLite file, NAME.docent, which maps/README.md describes.
 //
@@ -44,6 +46,7 @@ struct LibraryOptions {
   std::function<WallTime()> clock;  // For the creation and modification times; the system clock if empty.
   FeatureMaker make_features;       // engine::MakeFeatures if empty.
   int load_threads = 0;             // Threads that decode images; 0 means one per processor, at most 8.
+  SceneTools scenes;                // Without them, scenes are neither checked nor redirected.
 };
 
 // An open library; see the top of this file for its guarantees.
@@ -65,10 +68,14 @@ class Library {
   MapInfo Find(std::uint64_t key) const;              // Throws if there is no such map.
   MapInfo FindByName(const std::string& name) const;  // Throws if there is no such map.
   // Reads a map with points and images and computes the features of its keyframes. Throws if there is no such
-  // map or it is damaged.
-  StoredMap Load(std::uint64_t key) const;
+  // map or it is damaged; damaged content may be left out instead.
+  enum class DamagedContent { kRefuse, kLeaveOut };
+  StoredMap Load(std::uint64_t key, DamagedContent damaged = DamagedContent::kRefuse) const;
   // Reads the content of a map only. Throws as Load does.
   SceneRecord LoadScene(std::uint64_t key) const;
+  // Reads the changes of a map's scene that can be undone, with their assets; empty if there are none for the
+  // scene as it is. Throws when they are damaged, which nothing else depends on.
+  std::optional<SceneRecord> LoadHistory(std::uint64_t key) const;
   // The appearance of a map, which a place index needs. It has a few kilobytes per keyframe and is read
   // without points or images. For a damaged table the list is empty and `problem` describes the error.
   struct Appearance {
@@ -95,9 +102,11 @@ class Library {
   // removed in the same transaction. Returns false, and writes nothing, when the stored revision is not
   // MapRecord::expected_revision.
   bool Save(const MapRecord& record);
-  // Throws if there is no such map, its policy forbids it, or another map has the name.
+  // Signposts keep leading to the map. Throws if there is no such map, its policy forbids it, or another map
+  // has the name.
   void Rename(std::uint64_t key, const std::string& name);
-  // Removes a map with its content. Throws if there is no such map or its policy forbids it.
+  // Removes a map with its content. Signposts in other maps that lead to it lead nowhere afterwards. Throws
+  // if there is no such map, its policy forbids it, or that of a map with such a signpost does.
   void Remove(std::uint64_t key);
   // The only way to relax a policy. Setting `bounded` computes the bounds from the map's contents, unless it
   // was bounded before and has not been open since.
@@ -111,6 +120,14 @@ class Library {
 
   // Reads and validates everything. Returns one sentence for each error; empty if there is none.
   std::vector<std::string> Verify() const;
+  // One sentence for each signpost that leads to a map that does not exist.
+  std::vector<std::string> SignpostsToNoMap() const;
+  // The signposts in other maps that lead to this one.
+  struct Signpost {
+    MapInfo map;       // The map that it stands in.
+    std::string name;  // Unique in that map.
+  };
+  std::vector<Signpost> SignpostsTo(std::uint64_t key) const;
 
  private:
   class Impl;

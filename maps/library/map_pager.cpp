@@ -105,7 +105,7 @@ std::vector<MapInfo> MapPager::Impl::Open() {
     if (!appearance.problem.empty() && callbacks_.failed) callbacks_.failed(info.key, appearance.problem);
   });
   if (keyframes * kTypicalKeyFrameBytes <= std::min(options_.read_at_start_bytes, options_.budget_bytes)) {
-    for (const MapInfo& info : infos) Load(info.key);
+    for (const MapInfo& info : infos) TryLoad(info.key);
   }
   if (!options_.wait_for_maps) {
     worker_.emplace("map-pager", [this](const std::stop_token& stop) { Run(stop); });
@@ -152,7 +152,7 @@ void MapPager::Impl::Read(std::uint64_t key) {
   }
   std::size_t bytes = 0;
   try {
-    const StoredMap map = library_->Load(key);
+    const StoredMap map = library_->Load(key, Library::DamagedContent::kLeaveOut);
     bytes = BytesOf(*map.snapshot);
     if (callbacks_.loaded) callbacks_.loaded(map);
     index_->SetMap(key, map.snapshot);

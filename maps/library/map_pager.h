@@ -40,7 +40,8 @@ class MapPager : public engine::PlaceFinder {
  public:
   // What the owner of the maps is told and asked.
   struct Callbacks {
-    // Called when a map was read, before it is added to the index. May throw docent::Error to mark the map as
+    // Called when a map was read, before it is added to the index; damaged content was left out
+    // (StoredMap::lost_content). May throw docent::Error to mark the map as
     // unreadable.
     std::function<void(const StoredMap& map)> loaded;
     // Asks whether a map may be evicted now; return false if it has unsaved changes. After true the pager no
@@ -56,7 +57,7 @@ class MapPager : public engine::PlaceFinder {
   ~MapPager() override;
 
   // Fills the index and loads maps according to the options. Call it once. Returns the library's list of
-  // maps.
+  // maps. Maps that cannot be read are reported to Callbacks::failed.
   std::vector<MapInfo> Open();
 
   // Loads a map unless it is in memory, and waits for it. Throws docent::Error when it cannot be read.

@@ -8,6 +8,8 @@
 #include "engine/base/error.h"
 #include "maps/index/thumbnail_rows.h"
 #include "maps/index/word_rows.h"
+#include "maps/library/signposts.h"
+#include "maps/storage/block_checks.h"
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
 
@@ -60,6 +62,31 @@ void UpgradeToFormat4(const Database& database) {
   CreateTable(database, "lenses");
 }
 
+// Format 5 added checksums of the blocks of large columns, undo histories, and the keys of the maps that
+// signposts lead to. What is damaged stays as it is, for it does not keep the rest from being upgraded.
+void UpgradeToFormat5(const Database& database, const SceneTools& scenes) {
+  const std::vector<MapInfo> maps = ReadMapRows(database);
+  for (const MapInfo& info : maps) {
+    for (const std::string_view part : kPartsInBlocks) {
+      if (const auto column = FindPart(database, info.key, part))
+        WritePart(database, info.key, BlockChecksOf(part), EncodeBlockChecks(info.key, *column));
+    }
+    if (!scenes.retarget) continue;
+    try {
+      ScenePart scene = ReadScenePart(database, info.key);
+      if (scene.text.empty()) continue;
+      const auto text = scenes.retarget(scene.text, [&](const std::string&, const SignpostTarget& target) {
+        return KeyOfTarget(target, maps);
+      });
+      if (!text) continue;
+      scene.text = *text;
+      WriteScenePart(database, info.key, scene);
+    } catch (const Error&) {
+      continue;
+    }
+  }
+}
+
 }  // namespace
 
 fs::path BackupPath(const fs::path& library, std::int64_t format) {
@@ -68,7 +95,7 @@ fs::path BackupPath(const fs::path& library, std::int64_t format) {
   return path;
 }
 
-void UpgradeFormat(const Database& database) {
+void UpgradeFormat(const Database& database, const SceneTools& scenes) {
   const std::int64_t format = SchemaVersion(database);
   if (format == kSchemaVersion) return;
   MakeBackup(database, format);
@@ -79,6 +106,8 @@ void UpgradeFormat(const Database& database) {
   if (SchemaVersion(database) < 3) UpgradeToFormat3(database);
   SetSchemaVersion(database, std::max<std::int64_t>(3, SchemaVersion(database)));
   if (SchemaVersion(database) < 4) UpgradeToFormat4(database);
+  SetSchemaVersion(database, std::max<std::int64_t>(4, SchemaVersion(database)));
+  if (SchemaVersion(database) < 5) UpgradeToFormat5(database, scenes);
   SetSchemaVersion(database, kSchemaVersion);
   transaction.Commit();
 }

@@ -39,6 +39,8 @@ void Saver::Submit(MapRecord record) {
     changed_.wait(lock, [&] { return same_map() != waiting_.end() || waiting_.size() < capacity_; });
     if (const auto place = same_map(); place != waiting_.end()) {
       if (record.snapshot) place->snapshot = std::move(record.snapshot);
+      // The history belongs to the scene.
+      if (record.scene || record.history) place->history = std::move(record.history);
       if (record.scene) place->scene = std::move(record.scene);
       place->joined_keys.insert(place->joined_keys.end(), record.joined_keys.begin(),
                                 record.joined_keys.end());

@@ -8,6 +8,9 @@
 #include "engine/base/error.h"
 #include "maps/index/thumbnail_rows.h"
 #include "maps/index/word_rows.h"
+#include "maps/library/signposts.h"
+#include "maps/storage/block_checks.h"
+#include "maps/storage/history_rows.h"
 #include "maps/storage/lens_rows.h"
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
@@ -92,7 +95,37 @@ void CheckWords(const Database& database, const MapInfo& info) {
   }
 }
 
-void CheckMap(const Database& database, const MapInfo& info, int threads,
+void CheckBlocks(const Database& database, const MapInfo& info) {
+  for (const std::string_view part : kPartsInBlocks) {
+    const Bytes column = ReadPart(database, info.key, part);
+    if (ReadPart(database, info.key, BlockChecksOf(part)) != EncodeBlockChecks(info.key, column))
+      throw Error("the checksums of the blocks of its " + std::string(part) + " do not match");
+  }
+}
+
+// Runs `check` and reports what it throws as one about the map.
+void TryMap(const Database& database, const MapInfo& info, Report* report,
+            const std::function<void()>& check) {
+  report->Try([&] { WithMapContext(database, info, check); });
+}
+
+void CheckScene(const Database& database, const MapInfo& info, const SceneTools& scenes, Report* report) {
+  const ScenePart part = ReadScenePart(database, info.key);
+  SceneRecord scene{part.text, {}};
+  for (const std::string& id : part.asset_ids) {
+    try {
+      scene.assets.push_back(ReadAsset(database, id));
+    } catch (const Error&) {
+      continue;  // CheckAssets reports it.
+    }
+  }
+  std::vector<std::string> problems;
+  scenes.read(scene, &problems);
+  for (const std::string& problem : problems)
+    TryMap(database, info, report, [&] { throw Error("its content: " + problem); });
+}
+
+void CheckMap(const Database& database, const MapInfo& info, int threads, const SceneTools& scenes,
               std::set<std::string>* wanted_assets, Report* report) {
   report->Try(
       [&] { WithMapContext(database, info, [&] { ReadSnapshot(database, info, MakeSizesOnly, threads); }); });
@@ -100,13 +133,20 @@ void CheckMap(const Database& database, const MapInfo& info, int threads,
     WithMapContext(database, info, [&] {
       const ScenePart scene = ReadScenePart(database, info.key);
       wanted_assets->insert(scene.asset_ids.begin(), scene.asset_ids.end());
+      if (scenes.read) CheckScene(database, info, scenes, report);
     });
   });
+  TryMap(database, info, report, [&] {
+    const std::optional<HistoryPart> history = ReadHistory(database, info.key);
+    if (history) wanted_assets->insert(history->changes.asset_ids.begin(), history->changes.asset_ids.end());
+  });
+  if (SchemaVersion(database) >= kBlockChecksSince)
+    TryMap(database, info, report, [&] { CheckBlocks(database, info); });
   if (SchemaVersion(database) >= kThumbnailsSince) {
-    report->Try([&] { WithMapContext(database, info, [&] { CheckThumbnails(database, info); }); });
+    TryMap(database, info, report, [&] { CheckThumbnails(database, info); });
   }
   if (SchemaVersion(database) >= kWordsSince) {
-    report->Try([&] { WithMapContext(database, info, [&] { CheckWords(database, info); }); });
+    TryMap(database, info, report, [&] { CheckWords(database, info); });
   }
   report->Try([&] {
     Statement count = database.Prepare("SELECT count(*) FROM pictures WHERE map_key = ?");
@@ -154,15 +194,35 @@ void CheckStrays(const Database& database, Report* report) {
 
 }  // namespace
 
-std::vector<std::string> VerifyAll(const Database& database, int threads) {
+std::vector<std::string> VerifyAll(const Database& database, int threads, const SceneTools& scenes) {
   Report report;
   report.Try([&] { CheckPages(database, &report); });
   const std::vector<MapInfo> maps = ReadableMaps(database, &report);
   std::set<std::string> wanted_assets;
-  for (const MapInfo& info : maps) CheckMap(database, info, threads, &wanted_assets, &report);
+  for (const MapInfo& info : maps) CheckMap(database, info, threads, scenes, &wanted_assets, &report);
   CheckAssets(database, wanted_assets, &report);
   CheckStrays(database, &report);
   report.Try([&] { ReadLenses(database); });
+  return report.Take();
+}
+
+std::vector<std::string> SignpostsToNoMap(const Database& database, const SceneTools& scenes) {
+  Report report, ignored;
+  if (!scenes.retarget) return {};
+  const std::vector<MapInfo> maps = ReadableMaps(database, &ignored);
+  for (const MapInfo& info : maps) {
+    ignored.Try([&] {
+      const std::string text = ReadScenePart(database, info.key).text;
+      if (text.empty()) return;
+      scenes.retarget(text, [&](const std::string& signpost, const SignpostTarget& target) {
+        if (!LeadsToNoMap(target, maps)) return std::optional<SignpostTarget>();
+        report.Add(database.file() + ": map '" + info.name + "' (" + std::to_string(info.key) +
+                   "): the signpost '" + signpost + "' leads to the map '" + target.map +
+                   "', which does not exist");
+        return std::optional<SignpostTarget>();
+      });
+    });
+  }
   return report.Take();
 }
 

@@ -62,9 +62,6 @@ JoinResult JoinMaps(Library* library, std::uint64_t into_key, std::uint64_t from
   record.snapshot = joined.map;
   record.scene = scenes.join(into, from, joined);
   record.bounds = JoinedBounds(into, from, joined.a_from_b);
-  record.redirect = [&](const std::string& text) {
-    return scenes.redirect(text, from.info.name, into.info.name);
-  };
   result.changed_meanwhile = !library->Join(record);
   return result;
 }

@@ -24,10 +24,6 @@ struct SceneJoiner {
   std::function<std::shared_ptr<const SceneRecord>(const StoredMap& into, const StoredMap& from,
                                                    const engine::JoinedMap& joined)>
       join;
-  // See JoinRecord::redirect.
-  std::function<std::optional<std::string>(const std::string& text, const std::string& from,
-                                           const std::string& into)>
-      redirect;
 };
 
 struct JoinResult {

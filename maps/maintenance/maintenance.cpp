@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/base/error.h"
 #include "engine/map/map.h"
 #include "engine/mapping/bundle/map_adjustment.h"
 #include "engine/mapping/points/keyframe_culling.h"
@@ -144,7 +145,18 @@ Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<
   record.name = stored.info.name;
   record.snapshot = std::move(adjusted.snapshot);
   record.expected_revision = stored.info.revision;
-  if (move_scene) record.scene = move_scene(stored.scene, *stored.snapshot, *record.snapshot);
+  if (move_scene) {
+    StoredContent content{std::make_shared<const SceneRecord>(stored.scene), nullptr};
+    try {
+      if (auto history = library->LoadHistory(key))
+        content.history = std::make_shared<const SceneRecord>(std::move(*history));
+    } catch (const Error&) {
+      content.history.reset();  // A damaged history is lost when the scene moves.
+    }
+    StoredContent moved = move_scene(content, *stored.snapshot, *record.snapshot);
+    record.scene = std::move(moved.scene);
+    record.history = std::move(moved.history);
+  }
   if (!library->Save(record)) adjusted.optimization.outcome = Outcome::kChangedMeanwhile;
   return adjusted.optimization;
 }

@@ -38,10 +38,14 @@ struct AdjustedMap {
 };
 AdjustedMap AdjustIdleMap(const engine::MapSnapshot& map, const std::atomic<bool>* interrupt);
 
-// Moves the content of a map with its anchors from one state of the map to another; returns null if nothing
-// moves. Only the content library can do that.
-using MoveScene = std::function<std::shared_ptr<const SceneRecord>(
-    const SceneRecord& scene, const engine::MapSnapshot& before, const engine::MapSnapshot& after)>;
+// The content of a map and the changes of it that can be undone; null where there is nothing.
+struct StoredContent {
+  std::shared_ptr<const SceneRecord> scene, history;
+};
+// Moves the content of a map with its anchors from one state of the map to another; returns nothing if
+// nothing moves. Only the content library can do that.
+using MoveScene = std::function<StoredContent(const StoredContent& content, const engine::MapSnapshot& before,
+                                              const engine::MapSnapshot& after)>;
 
 // Applies AdjustIdleMap to a map of a library and saves the result if the map changed. Returns kNotAllowed if
 // the policy forbids changes to keyframes and points. `interrupt` may be null; an interrupted map stays

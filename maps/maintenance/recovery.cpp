@@ -9,8 +9,11 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/vision/image_pyramid.h"
 #include "maps/library/library.h"
+#include "maps/maintenance/salvaged_rows.h"
 #include "maps/storage/database.h"
+#include "maps/storage/history_rows.h"
 #include "maps/storage/panorama_codec.h"
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
@@ -20,115 +23,152 @@ namespace docent::maps {
 
 namespace {
 
-// Reads a file without trusting any of it. Every step may fail; failures are recorded and the affected data
-// is left out.
-class Salvage {
+namespace fs = std::filesystem;
+
+// The sentences about what is lost.
+class Losses {
  public:
-  explicit Salvage(const std::filesystem::path& path)
-      : database_(Database::OpenDamaged(path)), transaction_(database_, Transaction::Kind::kRead) {
-    if (database_.Number("PRAGMA application_id") != kApplicationId)
-      throw Error(database_.file() + " is not a library of maps");
+  void Add(const std::string& where, std::string what) {
+    // The advice after the semicolon is to recover the file, which is what happens here.
+    what.erase(std::min(what.size(), what.find(';')));
+    sentences_.push_back(where + ": " + what);
   }
-
-  void Run(Library* target) {
-    // They are saved together with the first recovered map.
-    Try("the lenses of cameras", [&] { lenses_ = ReadLenses(database_); });
-    for (const std::uint64_t key : Keys()) {
-      complete_ = true;
-      MapRecord record;
-      record.name = "map " + std::to_string(key);
-      const auto where = [&] { return "map '" + record.name + "'"; };
-      record.policy = Policy::kReadOnly;  // Prevents accidental changes if the map's own policy is lost.
-      if (!Try(where(), [&] { ReadEntry(key, &record); })) complete_ = false;
-      if (!Try(where(), [&] { record.snapshot = ReadMap(key, where()); })) continue;
-      auto scene = std::make_shared<SceneRecord>();
-      if (!Try(where(), [&] { *scene = ReadScene(key); })) {
-        complete_ = false;
-        *scene = {};
-      }
-      record.scene = std::move(scene);
-      Save(std::move(record), target);
-    }
-  }
-  Recovery Take() { return std::move(recovery_); }
-
- private:
   bool Try(const std::string& where, const std::function<void()>& step) {
     try {
       step();
       return true;
     } catch (const Error& error) {
-      std::string what = error.what();
-      // The advice after the semicolon is to recover the file, which is what happens here.
-      what.erase(std::min(what.size(), what.find(';')));
-      recovery_.problems.push_back(where + ": " + what);
+      Add(where, error.what());
       return false;
     }
   }
+  std::vector<std::string>* sentences() { return &sentences_; }
 
-  // The maps that appear in any table.
-  std::set<std::uint64_t> Keys() {
-    std::set<std::uint64_t> keys;
-    for (const char* sql : {"SELECT key FROM maps", "SELECT map_key FROM parts"}) {
-      Try("the list of maps", [&] {
-        Statement query = database_.Prepare(sql);
-        while (query.Step()) keys.insert(static_cast<std::uint64_t>(query.Integer(0)));
+ private:
+  std::vector<std::string> sentences_;
+};
+
+// Puts one map together from its rows.
+class MapSalvage {
+ public:
+  MapSalvage(const SalvagedRows& rows, const SceneTools& scenes, std::uint64_t key, Losses* losses)
+      : rows_(rows), scenes_(scenes), key_(key), losses_(losses) {}
+
+  // Empty when nothing of it can be read.
+  std::optional<MapRecord> Read() {
+    MapRecord record;
+    record.key = key_;
+    record.name = "map " + std::to_string(key_);
+    record.policy = Policy::kReadOnly;  // Prevents accidental changes if the map's own policy is lost.
+    name_ = record.name;
+    Try([&] {
+      info_ = rows_.Map(key_);
+      record.name = name_ = info_->name;
+      record.policy = info_->policy;
+      record.bounds = info_->bounds;
+    });
+    auto map = std::make_shared<engine::MapSnapshot>();
+    Try([&] { *map = ReadMap(); });
+    record.snapshot = map;
+    auto scene = std::make_shared<SceneRecord>();
+    Try([&] { *scene = ReadScene(); });
+    record.scene = scene;
+    if (rows_.HasPart(key_, "history") && !scene->text.empty()) {
+      // Without it, the map is as it was.
+      losses_->Try(where(), [&] { record.history = ReadHistory(*scene); });
+    }
+    if (record.policy == Policy::kBounded && !record.bounds) record.policy = Policy::kReadOnly;
+    const bool was_empty = info_ && info_->keyframes == 0;
+    if (map->keyframes.empty() && scene->text.empty() && !was_empty) return std::nullopt;
+    return record;
+  }
+  bool complete() const { return complete_; }
+
+ private:
+  std::string where() const { return "map '" + name_ + "'"; }
+  void Lose(const std::string& what) {
+    complete_ = false;
+    losses_->Add(where(), what);
+  }
+  bool Try(const std::function<void()>& step) {
+    const bool done = losses_->Try(where(), step);
+    complete_ = complete_ && done;
+    return done;
+  }
+
+  // Decodes a table, or the confirmed records of a damaged one. `count` is the number of records that the
+  // map's entry gives.
+  template <typename Decode>
+  auto ReadTable(const EnvelopeKind& kind, std::string_view part, std::uint64_t MapInfo::*count,
+                 const Decode& decode) {
+    decltype(decode(std::span<const std::uint8_t>())) table;
+    try {
+      rows_.Part(key_, part, [&](std::span<const std::uint8_t> bytes, bool current) {
+        table = decode(bytes);
+        if (!current && info_ && table.size() != (*info_).*count)
+          throw Error(std::string(kind.name) + " is of another state of the map");
+      });
+      return table;
+    } catch (const Error& error) {
+      Bytes records;
+      try {
+        records = rows_.ConfirmedRecordsOf(key_, part, kind);
+        table = decode(std::span<const std::uint8_t>(records));
+      } catch (const Error&) {
+        table.clear();
+      }
+      if (table.empty()) throw Error(error.what());
+      Lose(std::string(kind.name) + " is damaged: " + std::to_string(table.size()) +
+           (info_ ? " of its " + std::to_string((*info_).*count) : std::string()) + " records could be read");
+      return table;
+    }
+  }
+
+  engine::MapSnapshot ReadMap() {
+    MapParts parts;
+    CameraTable cameras;
+    rows_.Part(key_, "cameras", [&](std::span<const std::uint8_t> bytes, bool) {
+      cameras = CheckedCameras(key_, bytes, static_cast<std::int64_t>(rows_.file_bytes()));
+    });
+    parts.keyframes = ReadTable(kKeyFrameTableKind, "keyframes", &MapInfo::keyframes,
+                                [&](const auto& bytes) { return DecodeKeyFrames(key_, bytes, cameras); });
+    Try([&] {
+      parts.points = ReadTable(kPointTableKind, "points", &MapInfo::points,
+                               [&](const auto& bytes) { return DecodePoints(key_, bytes); });
+    });
+    const bool observed = Try([&] {
+      parts.observations = ReadTable(kObservationTableKind, "observations", &MapInfo::observations,
+                                     [&](const auto& bytes) { return DecodeObservations(key_, bytes); });
+    });
+    if (rows_.format() >= kPanoramasSince) {
+      Try([&] {
+        rows_.Part(key_, "panoramas", [&](std::span<const std::uint8_t> bytes, bool) {
+          MapParts with_panoramas = parts;
+          DecodePanoramas(key_, bytes, &with_panoramas,
+                          complete_ ? MissingMember::kRefuse : MissingMember::kLeaveOut);
+          parts = std::move(with_panoramas);
+        });
       });
     }
-    return keys;
-  }
-
-  void ReadEntry(std::uint64_t key, MapRecord* record) {
-    const std::optional<MapInfo> info = ReadMapRow(database_, key);
-    if (!info) throw Error("its entry is missing");
-    record->name = info->name;
-    record->policy = info->policy;
-    record->bounds = info->bounds;
-    info_ = info;
-  }
-
-  std::shared_ptr<const engine::MapSnapshot> ReadMap(std::uint64_t key, const std::string& where) {
-    MapParts parts;
-    const CameraTable cameras = ReadCameras(database_, key);
-    parts.keyframes = DecodeKeyFrames(key, ReadPart(database_, key, "keyframes"), cameras);
-    parts.points = DecodePoints(key, ReadPart(database_, key, "points"));
-    parts.observations = DecodeObservations(key, ReadPart(database_, key, "observations"));
-    MapParts with_panoramas = parts;
-    const bool first_format = SchemaVersion(database_) < kPanoramasSince;
-    if (first_format ||
-        Try(where, [&] { DecodePanoramas(key, ReadPart(database_, key, "panoramas"), &with_panoramas); })) {
-      parts = std::move(with_panoramas);
-    } else {
-      complete_ = false;
-    }
-    auto map = std::make_shared<engine::MapSnapshot>();
-    ReadImages(key, where, &parts, map.get());
-    Prune(parts, map.get());
-    if (info_ && info_->key == key) {
-      map->revision = info_->revision;
-      map->next_keyframe = info_->next_keyframe;
-      map->next_point = info_->next_point;
-    } else {
-      map->next_keyframe = parts.keyframes.empty() ? 0 : parts.keyframes.back().keyframe.id + 1;
-      map->next_point = parts.points.empty() ? 0 : parts.points.back().id + 1;
-    }
-    if (const std::string problem = engine::Validate(*map); !problem.empty()) throw Error(problem);
-    if (map->keyframes.empty() && !parts.keyframes.empty()) throw Error("none of its images could be read");
+    engine::MapSnapshot map;
+    ReadImages(parts, &map);
+    if (map.keyframes.empty() && !parts.keyframes.empty()) throw Error("none of its images could be read");
+    Prune(parts, &map);
+    if (!observed) ObserveFromSources(&map);
+    TakeNumbers(parts, &map);
+    if (const std::string problem = engine::Validate(map); !problem.empty()) throw Error(problem);
     return map;
   }
 
   // Keeps the keyframes whose images can be read.
-  void ReadImages(std::uint64_t key, const std::string& where, MapParts* parts, engine::MapSnapshot* map) {
-    for (const StoredKeyFrame& stored : parts->keyframes) {
-      const bool there = Try(where + ", keyframe " + std::to_string(stored.keyframe.id), [&] {
-        maps::ReadImages(database_, key, {stored}, [&](std::size_t, std::span<const std::uint8_t> bytes) {
-          map->keyframes.push_back(stored.keyframe);
-          map->keyframes.back().features = MakeSizesOnly(DecodeImage(key, stored, bytes));
-        });
+  void ReadImages(const MapParts& parts, engine::MapSnapshot* map) {
+    for (const StoredKeyFrame& stored : parts.keyframes) {
+      const bool read = losses_->Try(where() + ", keyframe " + std::to_string(stored.keyframe.id), [&] {
+        engine::KeyFrame keyframe = stored.keyframe;
+        keyframe.features = MakeSizesOnly(rows_.Image(key_, stored));
+        map->keyframes.push_back(std::move(keyframe));
       });
-      if (there) continue;
-      complete_ = false;
-      std::erase_if(map->keyframes, [](const engine::KeyFrame& keyframe) { return !keyframe.features; });
+      complete_ = complete_ && read;
     }
   }
 
@@ -141,6 +181,9 @@ class Salvage {
     std::erase_if(map->keyframes, [&](const engine::KeyFrame& keyframe) {
       return keyframe.kind == engine::KeyFrameKind::kPanorama && !map->FindPanorama(keyframe.panorama);
     });
+    for (engine::KeyFrame& keyframe : map->keyframes) {
+      if (!map->FindPanorama(keyframe.panorama)) keyframe.panorama = engine::kNoId;
+    }
     // A point all of whose observations were lost with their keyframes cannot be kept.
     std::unordered_set<engine::MapPointId> there, lost;
     for (const engine::Observation& observation : parts.observations) {
@@ -161,53 +204,197 @@ class Salvage {
     }
   }
 
-  SceneRecord ReadScene(std::uint64_t key) {
-    ScenePart part = ReadScenePart(database_, key);
+  // Each point was seen at least where its patch is.
+  static void ObserveFromSources(engine::MapSnapshot* map) {
+    for (const engine::MapPoint& point : map->points) {
+      const engine::KeyFrame* const source = map->FindKeyFrame(point.source_keyframe);
+      const Eigen::Vector2d pixel =
+          engine::LevelZeroFromLevel(point.source_pixel.cast<double>(), point.source_level);
+      if (source != nullptr && source->camera->IsInside(pixel))
+        map->observations.push_back({source->id, point.id, pixel.cast<float>(), point.source_level});
+    }
+    std::sort(map->observations.begin(), map->observations.end(), [](const auto& a, const auto& b) {
+      return std::pair(a.keyframe, a.point) < std::pair(b.keyframe, b.point);
+    });
+  }
+
+  void TakeNumbers(const MapParts& parts, engine::MapSnapshot* map) const {
+    map->next_keyframe = parts.keyframes.empty() ? 0 : parts.keyframes.back().keyframe.id + 1;
+    map->next_point = parts.points.empty() ? 0 : parts.points.back().id + 1;
+    if (!info_) return;
+    map->revision = info_->revision;
+    map->next_keyframe = std::max(map->next_keyframe, info_->next_keyframe);
+    map->next_point = std::max(map->next_point, info_->next_point);
+  }
+
+  SceneRecord ReadScene() {
+    ScenePart part;
+    rows_.Part(key_, "scene",
+               [&](std::span<const std::uint8_t> bytes, bool) { part = DecodeScene(key_, bytes); });
     SceneRecord scene{std::move(part.text), {}};
-    for (const std::string& id : part.asset_ids) scene.assets.push_back(ReadAsset(database_, id));
+    bool all = true;
+    for (const std::string& id : part.asset_ids)
+      all = Try([&] { scene.assets.push_back(rows_.Asset(id)); }) && all;
+    if (!scenes_.read) return all ? scene : SceneRecord{};
+    std::vector<std::string> problems;
+    scene = scenes_.read(scene, &problems);
+    for (const std::string& problem : problems) Lose(problem);
     return scene;
   }
 
-  void Save(MapRecord record, Library* target) {
+  std::shared_ptr<const SceneRecord> ReadHistory(const SceneRecord& scene) const {
+    HistoryPart part;
+    rows_.Part(key_, "history", [&](std::span<const std::uint8_t> bytes, bool) {
+      part = DecodeHistory(key_, bytes);
+      if (part.scene != SceneTextChecksum(scene.text))
+        throw Error("earlier changes of its content cannot be undone");
+    });
+    auto history = std::make_shared<SceneRecord>();
+    history->text = std::move(part.changes.text);
+    for (const std::string& id : part.changes.asset_ids) history->assets.push_back(rows_.Asset(id));
+    return history;
+  }
+
+  const SalvagedRows& rows_;
+  const SceneTools& scenes_;
+  const std::uint64_t key_;
+  Losses* const losses_;
+  std::string name_;
+  std::optional<MapInfo> info_;
+  bool complete_ = true;
+};
+
+// The file with what its log adds, as a copy that is removed at the end; the file itself if it has no log or
+// that cannot be read.
+class FileToSalvage {
+ public:
+  FileToSalvage(const fs::path& file, const fs::path& target, Losses* losses) : file_(file), copy_(target) {
+    copy_ += ".part";
+    std::error_code error;
+    const std::uintmax_t log = fs::file_size(fs::path(file).concat("-wal"), error);
+    if (error || log == 0) return;
+    fs::remove(copy_, error);
+    copied_ = losses->Try("the log of " + file.string(), [&] { Database::OpenDamaged(file).CopyTo(copy_); });
+  }
+  ~FileToSalvage() {
+    std::error_code error;
+    fs::remove(copy_, error);
+  }
+  FileToSalvage(const FileToSalvage&) = delete;
+  FileToSalvage& operator=(const FileToSalvage&) = delete;
+  const fs::path& path() const { return copied_ ? copy_ : file_; }
+
+ private:
+  fs::path file_, copy_;
+  bool copied_ = false;
+};
+
+// Signposts to maps that are lost lead nowhere.
+void CutLinks(const std::set<std::uint64_t>& keys, const SceneTools& scenes, MapRecord* record,
+              Losses* losses) {
+  if (!scenes.retarget || record->scene->text.empty()) return;
+  const auto text =
+      scenes.retarget(record->scene->text, [&](const std::string& signpost, const SignpostTarget& target) {
+        std::optional<SignpostTarget> changed;
+        if (target.key == 0 || keys.contains(target.key)) return changed;
+        losses->Add("map '" + record->name + "'", "the signpost '" + signpost + "' leads to the map '" +
+                                                      target.map + "', which could not be recovered");
+        changed.emplace();
+        return changed;
+      });
+  if (!text) return;
+  auto scene = std::make_shared<SceneRecord>(*record->scene);
+  scene->text = *text;
+  record->scene = std::move(scene);
+}
+
+class Salvage {
+ public:
+  Salvage(const SalvagedRows& rows, const SceneTools& scenes, Losses* losses)
+      : rows_(rows), scenes_(scenes), losses_(losses) {}
+
+  void Run(Library* target) {
+    constexpr std::uint64_t kLargestKey = std::uint64_t{1} << 62;
+    const std::set<std::uint64_t> keys = rows_.MapKeys();
+    std::uint64_t largest = 0;
+    for (const std::uint64_t key : keys) {
+      if (key < kLargestKey) largest = std::max(largest, key);
+    }
+    if (largest > 0) target->ReserveKeys(largest);
+    // They are saved together with the first recovered map.
+    lenses_ = rows_.Lenses(losses_->sentences());
+    for (const std::uint64_t key : keys) {
+      if (key >= kLargestKey) continue;
+      MapSalvage map(rows_, scenes_, key, losses_);
+      if (auto record = map.Read()) Save(std::move(*record), map.complete(), target);
+    }
+    CutLostLinks(target);
+  }
+  const Recovery& recovery() const { return recovery_; }
+
+ private:
+  void Save(MapRecord record, bool complete, Library* target) {
     const std::string name = record.name;
     // A map whose name was lost may have got a name that another map has.
     for (const MapInfo& info : target->List()) {
       if (info.name == record.name) record.name += " (recovered)";
     }
-    if (record.policy == Policy::kBounded && !record.bounds) record.policy = Policy::kReadOnly;
-    record.key = target->NewKey();
-    record.lenses = std::exchange(lenses_, {});
-    if (!Try("map '" + name + "'", [&] { target->Save(record); })) return;
-    ++(complete_ ? recovery_.maps_complete : recovery_.maps_partial);
+    record.lenses = lenses_;
+    if (!losses_->Try("map '" + name + "'", [&] { target->Save(record); })) return;
+    lenses_.clear();
+    ++(complete ? recovery_.maps_complete : recovery_.maps_partial);
   }
 
-  Database database_;
-  Transaction transaction_;
-  std::optional<MapInfo> info_;     // The last entry that was read.
-  bool complete_ = true;            // Whether the current map is complete so far.
+  void CutLostLinks(Library* target) {
+    if (!scenes_.retarget) return;
+    std::set<std::uint64_t> keys;
+    for (const MapInfo& info : target->List()) keys.insert(info.key);
+    for (const MapInfo& info : target->List()) {
+      MapRecord record;
+      record.key = info.key;
+      record.name = info.name;
+      const auto before = std::make_shared<const SceneRecord>(target->LoadScene(info.key));
+      record.scene = before;
+      CutLinks(keys, scenes_, &record, losses_);
+      if (record.scene == before) continue;
+      const Policy policy = info.policy;
+      if (policy == Policy::kReadOnly) target->SetPolicy(info.key, Policy::kAugmentOnly);
+      target->Save(record);
+      if (policy == Policy::kReadOnly) target->SetPolicy(info.key, policy);
+    }
+  }
+
+  const SalvagedRows& rows_;
+  const SceneTools& scenes_;
+  Losses* const losses_;
   std::vector<StoredLens> lenses_;  // Not yet saved with a map.
   Recovery recovery_;
 };
 
 }  // namespace
 
-Recovery Recover(const std::filesystem::path& damaged, const std::filesystem::path& target) {
+Recovery Recover(const fs::path& damaged, const fs::path& target, const SceneTools& scenes) {
   std::error_code error;
-  if (std::filesystem::exists(target, error))
+  if (fs::exists(target, error))
     throw Error(target.string() + " exists already; choose a new file name for the recovered maps");
-  Salvage salvage(damaged);
+  if (!fs::is_regular_file(damaged, error))
+    throw Error(damaged.string() + " does not exist or is not a file");
+  Losses losses;
+  const FileToSalvage file(damaged, target, &losses);
+  const SalvagedRows rows(file.path());
   Recovery recovery;
   try {
     Library library = Library::Open(target, Access::kReadWrite, CreateIfMissing::kYes);
+    Salvage salvage(rows, scenes, &losses);
     salvage.Run(&library);
-    recovery = salvage.Take();
+    recovery = salvage.recovery();
+    recovery.problems = std::move(*losses.sentences());
     if (recovery.maps_complete + recovery.maps_partial == 0) {
       throw Error("nothing could be recovered from " + damaged.string() +
                   (recovery.problems.empty() ? std::string() : ": " + recovery.problems.front()));
     }
   } catch (const Error&) {
-    for (const char* suffix : {"", "-wal", "-shm", "-journal"})
-      std::filesystem::remove(target.string() + suffix, error);
+    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) fs::remove(target.string() + suffix, error);
     throw;
   }
   return recovery;

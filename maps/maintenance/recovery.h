@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "maps/storage/scene_tools.h"
+
 namespace docent::maps {
 
 // The result of recovering a damaged library.
@@ -15,10 +17,18 @@ struct Recovery {
 };
 
 // Reads everything readable from a damaged file and writes it to a new library, which passes Library::Verify.
-// The damaged file is not changed. A keyframe without a readable image is dropped with its points. A map
-// without readable tables is dropped. A scene is dropped completely if one of its assets is unreadable,
-// because it would not open. Throws docent::Error when the file is not a library, the new file already exists
-// or cannot be written, or nothing could be recovered; then no new file is left.
-Recovery Recover(const std::filesystem::path& damaged, const std::filesystem::path& target);
+// The damaged file is not changed. The rows are searched in all pages of the file (storage/damaged_file.h),
+// so that one is lost only with its own pages, and only what checksums confirm is taken:
+//  - A keyframe without a readable image is dropped with the points that have their patch there.
+//  - Of a damaged table of keyframes, points or observations, the records in intact blocks are kept. Without
+//    observations, each point is observed by its source keyframe only.
+//  - A map without readable keyframes is kept only if it has content.
+//  - Of a scene, `scenes.read` keeps what is readable; without that function it is dropped if an asset is
+//    lost, because it would not open.
+//  - Maps keep their keys; signposts that lead to a map that is lost lead nowhere.
+// Thumbnails and words are computed anew. Throws docent::Error when the file is not a library, the new file
+// already exists or cannot be written, or nothing could be recovered; then no new file is left.
+Recovery Recover(const std::filesystem::path& damaged, const std::filesystem::path& target,
+                 const SceneTools& scenes = {});
 
 }  // namespace docent::maps

@@ -77,6 +77,11 @@ std::string ProblemOf(const StoredLens& lens) {
   return engine::CameraModel::Validate(lens.model.lens(), in, k).value_or("");
 }
 
+StoredLens CheckedLens(const std::string& camera, std::span<const std::uint8_t> data, std::int64_t checksum) {
+  if (checksum != ChecksumOf(camera, data)) throw Error("its checksum does not match");
+  return Decode(camera, data);
+}
+
 std::vector<StoredLens> ReadLenses(const Database& database) {
   std::vector<StoredLens> lenses;
   if (SchemaVersion(database) < kLensesSince) return lenses;
@@ -84,8 +89,7 @@ std::vector<StoredLens> ReadLenses(const Database& database) {
   while (query.Step()) {
     const std::string camera = query.Text(0);
     try {
-      if (query.Integer(2) != ChecksumOf(camera, query.Blob(1))) throw Error("its checksum does not match");
-      lenses.push_back(Decode(camera, query.Blob(1)));
+      lenses.push_back(CheckedLens(camera, query.Blob(1), query.Integer(2)));
     } catch (const Error& error) {
       const std::string what = error.what();
       if (what.starts_with(database.file())) throw;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,6 +26,9 @@ inline constexpr std::size_t kMaxCameraNameBytes = 200;
 
 // Why the values are invalid, or empty. Invalid values are neither written nor read.
 std::string ProblemOf(const StoredLens& lens);
+
+// A lens from the values of its row. Throws Error when they or the checksum are not valid.
+StoredLens CheckedLens(const std::string& camera, std::span<const std::uint8_t> data, std::int64_t checksum);
 
 // Reads all lenses by ascending name; none from a format without the table. Checks each row's checksum and
 // values and throws Error that begins with the file's name. Like WriteLens, runs in the caller's transaction.

@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,6 +34,10 @@ struct SceneRecord {
   std::vector<AssetRecord> assets;  // Each once.
 };
 
+// Limits of the undo history of a map: its text, and the assets that nothing but this history uses.
+inline constexpr std::size_t kMaxHistoryTextBytes = std::size_t{1} << 20;
+inline constexpr std::size_t kMaxHistoryAssetBytes = std::size_t{64} << 20;
+
 // The input of one save.
 struct MapRecord {
   std::uint64_t key = 0;  // From Library::NewKey or a loaded map.
@@ -54,6 +57,9 @@ struct MapRecord {
   std::vector<std::uint64_t> joined_keys = {};
   // Current estimates of unknown lenses. They replace the library's estimates for the same cameras.
   std::vector<StoredLens> lenses = {};
+  // The changes of the scene that can be undone. Null keeps the stored ones if the scene stays the same;
+  // those of another scene are removed. An empty text removes them.
+  std::shared_ptr<const SceneRecord> history = nullptr;
 };
 
 // An entry of the list of maps, read without points or images.
@@ -78,9 +84,6 @@ struct JoinRecord {
   std::shared_ptr<const engine::MapSnapshot> snapshot;  // The joined map.
   std::shared_ptr<const SceneRecord> scene;             // The joined scene.
   std::optional<Bounds> bounds;                         // Set if the stricter policy is bounded.
-  // Given the text of another map's scene, returns the text in which references to `from` are replaced; empty
-  // if there are none.
-  std::function<std::optional<std::string>(const std::string& text)> redirect;
 };
 
 // A map as it was read.
@@ -88,6 +91,8 @@ struct StoredMap {
   MapInfo info;                                         // As in the list of maps.
   std::shared_ptr<const engine::MapSnapshot> snapshot;  // Never null.
   SceneRecord scene;                                    // All assets have their bytes.
+  // One sentence for each asset of the scene, or the scene itself, that is damaged and was left out.
+  std::vector<std::string> lost_content = {};
 };
 
 }  // namespace docent::maps

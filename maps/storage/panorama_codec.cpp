@@ -34,20 +34,21 @@ engine::MapPoint* FindPoint(MapParts* parts, std::uint32_t id) {
   return found != parts->points.end() && found->id == id ? &*found : nullptr;
 }
 
-void ApplyMember(std::uint8_t kind, std::uint32_t id, std::uint32_t panorama, MapParts* parts) {
+// Returns false when there is no such keyframe or point.
+bool ApplyMember(std::uint8_t kind, std::uint32_t id, std::uint32_t panorama, MapParts* parts) {
   if (kind == static_cast<std::uint8_t>(Member::kKeyFrame)) {
     if (engine::KeyFrame* const keyframe = FindKeyFrame(parts, id)) {
       keyframe->panorama = panorama;
-      return;
+      return true;
     }
   } else if (kind <= static_cast<std::uint8_t>(Member::kPointThatWasInfinite)) {
     if (engine::MapPoint* const point = FindPoint(parts, id)) {
       point->panorama = panorama;
       point->was_infinite = kind == static_cast<std::uint8_t>(Member::kPointThatWasInfinite);
-      return;
+      return true;
     }
   }
-  throw Error("the table of panorama maps is damaged: it refers to something that does not exist");
+  return false;
 }
 
 }  // namespace
@@ -73,7 +74,8 @@ Bytes EncodePanoramas(std::uint64_t map_key, const MapParts& parts) {
   return FinishEnvelope(std::move(writer));
 }
 
-void DecodePanoramas(std::uint64_t map_key, std::span<const std::uint8_t> bytes, MapParts* parts) {
+void DecodePanoramas(std::uint64_t map_key, std::span<const std::uint8_t> bytes, MapParts* parts,
+                     MissingMember missing) {
   auto [reader, count] = OpenEnvelope(kPanoramaTableKind, map_key, bytes);
   parts->next_panorama = reader.Get<std::uint32_t>();
   constexpr std::size_t kPanoramaBytes = 8, kMemberBytes = 9;
@@ -89,7 +91,8 @@ void DecodePanoramas(std::uint64_t map_key, std::span<const std::uint8_t> bytes,
   while (reader.remaining() > 0) {
     const auto kind = reader.Get<std::uint8_t>();
     const auto id = reader.Get<std::uint32_t>(), panorama = reader.Get<std::uint32_t>();
-    ApplyMember(kind, id, panorama, parts);
+    if (!ApplyMember(kind, id, panorama, parts) && missing == MissingMember::kRefuse)
+      throw Error("the table of panorama maps is damaged: it refers to something that does not exist");
   }
 }
 

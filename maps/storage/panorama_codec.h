@@ -11,8 +11,11 @@
 namespace docent::maps {
 
 Bytes EncodePanoramas(std::uint64_t map_key, const MapParts& parts);
-// Decodes into `parts`, whose keyframes and points must already be those that were encoded. Throws
-// docent::Error.
-void DecodePanoramas(std::uint64_t map_key, std::span<const std::uint8_t> bytes, MapParts* parts);
+// What is done with a member that `parts` does not have.
+enum class MissingMember { kRefuse, kLeaveOut };
+// Decodes into `parts`, whose keyframes and points must already be those that were encoded, or some of them
+// if missing ones are left out. Throws docent::Error.
+void DecodePanoramas(std::uint64_t map_key, std::span<const std::uint8_t> bytes, MapParts* parts,
+                     MissingMember missing = MissingMember::kRefuse);
 
 }  // namespace docent::maps

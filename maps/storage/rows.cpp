@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "maps/storage/block_checks.h"
 #include "maps/storage/checksum.h"
+#include "maps/storage/history_rows.h"
 #include "maps/storage/panorama_codec.h"
 #include "maps/storage/schema.h"
 
@@ -62,42 +64,21 @@ std::uint64_t AssetChecksum(const std::string& id, const std::string& name,
   return Checksum(bytes, Checksum(writer.bytes()));
 }
 
-std::uint32_t Id(const Statement& row, int column) {
-  const std::int64_t value = row.Integer(column);
+std::uint32_t Id(std::int64_t value) {
   if (value < 0 || value > std::numeric_limits<std::uint32_t>::max()) throw Error("an id is out of range");
   return static_cast<std::uint32_t>(value);
 }
 
 MapInfo MapFromRow(const Statement& row) {
-  MapInfo info;
-  info.key = static_cast<std::uint64_t>(row.Integer(0));
-  info.name = row.Text(1);
-  const std::optional<Policy> policy = ParsePolicy(row.Text(2));
-  if (!policy) throw Error("its policy is unknown to this program");
-  info.policy = *policy;
-  info.created = WallTime(std::chrono::nanoseconds(row.Integer(3)));
-  info.modified = WallTime(std::chrono::nanoseconds(row.Integer(4)));
-  info.revision = static_cast<std::uint64_t>(row.Integer(5));
-  info.next_keyframe = Id(row, 6);
-  info.next_point = Id(row, 7);
-  info.keyframes = static_cast<std::uint64_t>(row.Integer(8));
-  info.points = static_cast<std::uint64_t>(row.Integer(9));
-  info.observations = static_cast<std::uint64_t>(row.Integer(10));
-  if (!row.IsNull(11)) {
-    ByteReader reader(row.Blob(11));
-    Bounds bounds;
-    bounds.min = reader.GetAll<Eigen::Vector3d>();
-    bounds.max = reader.GetAll<Eigen::Vector3d>();
-    if (reader.failed() || reader.remaining() != 0 || !bounds.min.allFinite() || !bounds.max.allFinite() ||
-        (bounds.min.array() > bounds.max.array()).any()) {
-      throw Error("its bounds are not valid");
-    }
-    info.bounds = bounds;
-  }
-  if (info.key == 0 || info.name.empty()) throw Error("it has no key or no name");
-  if (static_cast<std::uint64_t>(row.Integer(12)) != MapChecksum(info))
-    throw Error("its checksum does not match");
-  return info;
+  MapRowValues values;
+  values.key = row.Integer(0);
+  values.name = row.Text(1);
+  values.policy = row.Text(2);
+  for (int i = 0; i < static_cast<int>(values.numbers.size()); ++i)
+    values.numbers[static_cast<std::size_t>(i)] = row.Integer(3 + i);
+  if (!row.IsNull(11)) values.bounds = Bytes(row.Blob(11).begin(), row.Blob(11).end());
+  values.checksum = row.Integer(12);
+  return CheckedMap(values);
 }
 
 MapInfo CheckedMapFromRow(const Database& database, const Statement& row) {
@@ -109,22 +90,66 @@ MapInfo CheckedMapFromRow(const Database& database, const Statement& row) {
   }
 }
 
+}  // namespace
+
+MapInfo CheckedMap(const MapRowValues& values) {
+  MapInfo info;
+  info.key = static_cast<std::uint64_t>(values.key);
+  info.name = values.name;
+  const std::optional<Policy> policy = ParsePolicy(values.policy);
+  if (!policy) throw Error("its policy is unknown to this program");
+  info.policy = *policy;
+  info.created = WallTime(std::chrono::nanoseconds(values.numbers[0]));
+  info.modified = WallTime(std::chrono::nanoseconds(values.numbers[1]));
+  info.revision = static_cast<std::uint64_t>(values.numbers[2]);
+  info.next_keyframe = Id(values.numbers[3]);
+  info.next_point = Id(values.numbers[4]);
+  info.keyframes = static_cast<std::uint64_t>(values.numbers[5]);
+  info.points = static_cast<std::uint64_t>(values.numbers[6]);
+  info.observations = static_cast<std::uint64_t>(values.numbers[7]);
+  if (values.bounds) {
+    ByteReader reader(*values.bounds);
+    Bounds bounds;
+    bounds.min = reader.GetAll<Eigen::Vector3d>();
+    bounds.max = reader.GetAll<Eigen::Vector3d>();
+    if (reader.failed() || reader.remaining() != 0 || !bounds.min.allFinite() || !bounds.max.allFinite() ||
+        (bounds.min.array() > bounds.max.array()).any()) {
+      throw Error("its bounds are not valid");
+    }
+    info.bounds = bounds;
+  }
+  if (info.key == 0 || info.name.empty()) throw Error("it has no key or no name");
+  if (static_cast<std::uint64_t>(values.checksum) != MapChecksum(info))
+    throw Error("its checksum does not match");
+  return info;
+}
+
 void WritePart(const Database& database, std::uint64_t key, std::string_view part, const Bytes& bytes) {
-  database.Prepare("INSERT OR REPLACE INTO parts (map_key, part, data) VALUES (?, ?, ?)")
+  // The row stays in its page. A replaced one would move to the end of the file, which is lost first when the
+  // file is cut off.
+  database
+      .Prepare(
+          "INSERT INTO parts (map_key, part, data) VALUES (?, ?, ?) ON CONFLICT (map_key, part) DO UPDATE "
+          "SET "
+          "data = excluded.data WHERE data IS NOT excluded.data")
       .Bind(1, Signed(key))
       .Bind(2, part)
       .Bind(3, std::span<const std::uint8_t>(bytes))
       .Run();
 }
 
-}  // namespace
-
-Bytes ReadPart(const Database& database, std::uint64_t key, std::string_view part) {
+std::optional<Bytes> FindPart(const Database& database, std::uint64_t key, std::string_view part) {
   Statement query = database.Prepare("SELECT data FROM parts WHERE map_key = ? AND part = ?");
   query.Bind(1, Signed(key)).Bind(2, part);
-  if (!query.Step()) throw Error("its part '" + std::string(part) + "' is missing");
+  if (!query.Step()) return std::nullopt;
   const std::span<const std::uint8_t> bytes = query.Blob(0);
-  return {bytes.begin(), bytes.end()};
+  return Bytes(bytes.begin(), bytes.end());
+}
+
+Bytes ReadPart(const Database& database, std::uint64_t key, std::string_view part) {
+  std::optional<Bytes> bytes = FindPart(database, key, part);
+  if (!bytes) throw Error("its part '" + std::string(part) + "' is missing");
+  return std::move(*bytes);
 }
 
 LibraryRow ReadLibraryRow(const Database& database) {
@@ -192,16 +217,20 @@ std::optional<std::uint64_t> FindMapByName(const Database& database, const std::
   return static_cast<std::uint64_t>(query.Integer(0));
 }
 
-CameraTable ReadCameras(const Database& database, std::uint64_t key) {
-  CameraTable cameras = DecodeCameras(key, ReadPart(database, key, "cameras"));
+CameraTable CheckedCameras(std::uint64_t key, std::span<const std::uint8_t> bytes, std::int64_t file_bytes) {
+  CameraTable cameras = DecodeCameras(key, bytes);
   // Images are compressed, uniform ones by a factor of a thousand. Without this check a file of a few
   // kilobytes could request gigabytes of memory. Libraries of real images are far from the limit.
-  const std::int64_t most = kMaxPixelsPerByte * database.Bytes();
+  const std::int64_t most = kMaxPixelsPerByte * file_bytes;
   for (const auto& camera : cameras) {
     if (std::int64_t{camera->width_px()} * camera->height_px() > most)
       throw Error("its camera's image size is impossible for so small a file");
   }
   return cameras;
+}
+
+CameraTable ReadCameras(const Database& database, std::uint64_t key) {
+  return CheckedCameras(key, ReadPart(database, key, "cameras"), database.Bytes());
 }
 
 MapParts ReadParts(const Database& database, const MapInfo& info) {
@@ -222,9 +251,13 @@ MapParts ReadParts(const Database& database, const MapInfo& info) {
 void WriteParts(const Database& database, std::uint64_t key, const MapParts& parts) {
   const CameraTable cameras = MakeCameraTable(parts.keyframes);
   WritePart(database, key, "cameras", EncodeCameras(key, cameras));
-  WritePart(database, key, "keyframes", EncodeKeyFrames(key, parts.keyframes, cameras));
-  WritePart(database, key, "points", EncodePoints(key, parts.points));
-  WritePart(database, key, "observations", EncodeObservations(key, parts.observations));
+  const std::array<Bytes, kPartsInBlocks.size()> columns = {EncodeKeyFrames(key, parts.keyframes, cameras),
+                                                            EncodePoints(key, parts.points),
+                                                            EncodeObservations(key, parts.observations)};
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    WritePart(database, key, kPartsInBlocks[i], columns[i]);
+    WritePart(database, key, BlockChecksOf(kPartsInBlocks[i]), EncodeBlockChecks(key, columns[i]));
+  }
   WritePanoramas(database, key, parts);
 }
 
@@ -277,19 +310,19 @@ void WriteScenePart(const Database& database, std::uint64_t key, const ScenePart
   WritePart(database, key, "scene", EncodeScene(key, scene));
 }
 
+AssetRecord CheckedAsset(const std::string& id, const std::string& name, std::span<const std::uint8_t> bytes,
+                         std::int64_t checksum) {
+  if (static_cast<std::uint64_t>(checksum) != AssetChecksum(id, name, bytes))
+    throw Error("the asset '" + name + "' is damaged: its checksum does not match");
+  return {id, name, std::make_shared<const Bytes>(bytes.begin(), bytes.end())};
+}
+
 AssetRecord ReadAsset(const Database& database, const std::string& id) {
   Statement query = database.Prepare("SELECT name, data, checksum FROM assets WHERE id = ?");
   query.Bind(1, id);
   if (!query.Step()) throw Error("the asset " + id + " is missing");
-  AssetRecord asset;
-  asset.id = id;
-  asset.name = query.Text(0);
-  const std::span<const std::uint8_t> bytes = query.Blob(1);
-  if (static_cast<std::uint64_t>(query.Integer(2)) != AssetChecksum(id, asset.name, bytes)) {
-    throw Error("the asset '" + asset.name + "' is damaged: its checksum does not match");
-  }
-  asset.bytes = std::make_shared<const Bytes>(bytes.begin(), bytes.end());
-  return asset;
+  const std::string name = query.Text(0);
+  return CheckedAsset(id, name, query.Blob(1), query.Integer(2));
 }
 
 void WriteAsset(const Database& database, const AssetRecord& asset) {
@@ -317,13 +350,16 @@ void WriteAsset(const Database& database, const AssetRecord& asset) {
 
 void RemoveUnusedAssets(const Database& database) {
   std::set<std::string> used;
-  Statement scenes = database.Prepare("SELECT map_key, data FROM parts WHERE part = 'scene'");
-  while (scenes.Step()) {
+  Statement rows =
+      database.Prepare("SELECT map_key, part, data FROM parts WHERE part = 'scene' OR part = 'history'");
+  while (rows.Step()) {
     try {
-      const ScenePart scene = DecodeScene(static_cast<std::uint64_t>(scenes.Integer(0)), scenes.Blob(1));
-      used.insert(scene.asset_ids.begin(), scene.asset_ids.end());
+      const auto key = static_cast<std::uint64_t>(rows.Integer(0));
+      const ScenePart part =
+          rows.Text(1) == "scene" ? DecodeScene(key, rows.Blob(2)) : DecodeHistory(key, rows.Blob(2)).changes;
+      used.insert(part.asset_ids.begin(), part.asset_ids.end());
     } catch (const Error&) {
-      return;  // A damaged scene may refer to any of the assets.
+      return;  // A damaged scene or history may refer to any of the assets.
     }
   }
   std::vector<std::string> unused;

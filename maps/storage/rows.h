@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -26,6 +27,18 @@ struct LibraryRow {
 LibraryRow ReadLibraryRow(const Database& database);
 void WriteLibraryRow(const Database& database, const LibraryRow& row);
 
+// A row of the table `maps` as it is stored.
+struct MapRowValues {
+  std::int64_t key = 0;
+  std::string name, policy;
+  // created_ns, modified_ns, revision, next_keyframe, next_point, and the three counts.
+  std::array<std::int64_t, 8> numbers{};
+  std::optional<Bytes> bounds;
+  std::int64_t checksum = 0;
+};
+// Checks the values and their checksum. Throws docent::Error whose message begins with "its" or "it".
+MapInfo CheckedMap(const MapRowValues& values);
+
 // By ascending key.
 std::vector<MapInfo> ReadMapRows(const Database& database);
 std::optional<MapInfo> ReadMapRow(const Database& database, std::uint64_t key);
@@ -34,8 +47,15 @@ std::optional<std::uint64_t> FindMapByName(const Database& database, const std::
 
 // Returns the bytes of one binary column of a map; throws if it is missing.
 Bytes ReadPart(const Database& database, std::uint64_t key, std::string_view part);
+// The same; empty if it is missing.
+std::optional<Bytes> FindPart(const Database& database, std::uint64_t key, std::string_view part);
+void WritePart(const Database& database, std::uint64_t key, std::string_view part, const Bytes& bytes);
+// The parts of which the checksums of blocks are stored beside them.
+inline constexpr std::array<std::string_view, 3> kPartsInBlocks = {"keyframes", "points", "observations"};
 // Returns the cameras of a map; throws when images of their sizes could not be stored in a file of this size.
 CameraTable ReadCameras(const Database& database, std::uint64_t key);
+// The same for the bytes of that column, in a file of this size.
+CameraTable CheckedCameras(std::uint64_t key, std::span<const std::uint8_t> bytes, std::int64_t file_bytes);
 // Reads keyframes, points and observations without images; checks their counts against `info`.
 MapParts ReadParts(const Database& database, const MapInfo& info);
 void WriteParts(const Database& database, std::uint64_t key, const MapParts& parts);
@@ -54,10 +74,13 @@ void WriteImages(const Database& database, std::uint64_t key, const engine::MapS
 ScenePart ReadScenePart(const Database& database, std::uint64_t key);
 void WriteScenePart(const Database& database, std::uint64_t key, const ScenePart& scene);
 
+// An asset from the values of its row; throws when its checksum does not match.
+AssetRecord CheckedAsset(const std::string& id, const std::string& name, std::span<const std::uint8_t> bytes,
+                         std::int64_t checksum);
 AssetRecord ReadAsset(const Database& database, const std::string& id);
 // Stores an asset; if its id exists, checks that the stored asset is the same.
 void WriteAsset(const Database& database, const AssetRecord& asset);
-// Removes assets that no scene refers to.
+// Removes assets that no scene and no undo history refers to.
 void RemoveUnusedAssets(const Database& database);
 
 void RemoveMapRows(const Database& database, std::uint64_t key);

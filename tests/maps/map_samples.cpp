@@ -10,6 +10,7 @@
 #include <fstream>
 #include <iterator>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 
 #include "engine/base/error.h"
@@ -198,6 +199,53 @@ std::shared_ptr<SceneRecord> MakeSampleScene(std::uint64_t seed, int assets) {
   return scene;
 }
 
+SceneTools SampleSceneTools() {
+  SceneTools tools;
+  tools.read = [](const SceneRecord& scene, std::vector<std::string>* problems) {
+    SceneRecord left;
+    std::istringstream lines(scene.text);
+    for (std::string line; std::getline(lines, line);) {
+      std::string problem = line == "damaged" ? "a line is damaged" : "";
+      for (const AssetRecord& asset : scene.assets) {
+        if (line == "model " + asset.id) left.assets.push_back(asset);
+      }
+      const bool found = !left.assets.empty() && line == "model " + left.assets.back().id;
+      if (line.starts_with("model ") && !found) problem = "the asset of '" + line + "' is lost";
+      if (problem.empty()) {
+        left.text += (left.text.empty() ? "" : "\n") + line;
+      } else {
+        problems->push_back(problem);
+      }
+    }
+    if (problems->empty()) return scene;
+    return left;
+  };
+  tools.retarget = [](const std::string& text, const Retarget& retarget) {
+    std::string changed;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+      if (line == "damaged") throw Error("the scene is damaged");
+      std::istringstream words(line);
+      std::string kind, name;
+      SignpostTarget target;
+      if (words >> kind && kind == "sign" && words >> name >> target.key) {
+        std::getline(words >> std::ws, target.map);
+        if (const auto now = retarget(name, target))
+          line = "sign " + name + " " + std::to_string(now->key) + " " + now->map;
+      }
+      changed += (changed.empty() ? "" : "\n") + line;
+    }
+    return changed == text ? std::nullopt : std::optional(changed);
+  };
+  return tools;
+}
+
+std::shared_ptr<SceneRecord> MakeTextScene(std::string text) {
+  auto scene = std::make_shared<SceneRecord>();
+  scene->text = std::move(text);
+  return scene;
+}
+
 std::string FirstDifference(const MapSnapshot& a, const MapSnapshot& b) {
   if (a.revision != b.revision) return "revision";
   if (a.next_keyframe != b.next_keyframe || a.next_point != b.next_point) return "next ids";
@@ -257,6 +305,7 @@ LibraryOptions QuickOptions() {
   LibraryOptions options;
   options.make_features = MakeSizesOnly;
   options.load_threads = 1;
+  options.scenes = SampleSceneTools();
   return options;
 }
 

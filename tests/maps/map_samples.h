@@ -9,6 +9,7 @@
 #include "engine/map/map_snapshot.h"
 #include "maps/library/library.h"
 #include "maps/storage/map_record.h"
+#include "maps/storage/scene_tools.h"
 #include "tests/support/error_of.h"
 
 // Random maps with a seed, and temporary folders, for the tests of the library.
@@ -33,6 +34,11 @@ void AddSampleKeyFrame(std::uint64_t seed, const Eigen::Vector3d& center, engine
 AssetRecord MakeSampleAsset(std::uint64_t seed, std::size_t bytes);
 std::shared_ptr<SceneRecord> MakeSampleScene(std::uint64_t seed, int assets);
 
+// Functions for scenes with one entity per line: "sign NAME KEY MAP" is a signpost, "model ID" needs an
+// asset, and "damaged" is not readable; other lines are left as they are.
+SceneTools SampleSceneTools();
+std::shared_ptr<SceneRecord> MakeTextScene(std::string text);
+
 // Returns the first difference, or an empty text when both are equal field by field and pixel by pixel.
 std::string FirstDifference(const engine::MapSnapshot& a, const engine::MapSnapshot& b);
 std::string FirstDifference(const SceneRecord& a, const SceneRecord& b);
@@ -51,7 +57,8 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-// Options with features of the right sizes without corners: fast, for tests of the stored data.
+// Options with features of the right sizes without corners, and SampleSceneTools: fast, for tests of the
+// stored data.
 LibraryOptions QuickOptions();
 // Open with these options. OpenToWrite creates a missing library.
 Library OpenToWrite(const std::filesystem::path& file);

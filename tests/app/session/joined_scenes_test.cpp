@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "content/scene_codec.h"
 #include "engine/base/random.h"
 
 namespace docent::app {
@@ -19,6 +18,13 @@ content::Entity Sign(const std::string& name, const std::string& to_map, const E
   sign.signpost.height_m = 0.2;
   sign.signpost.to_map = to_map;
   return sign;
+}
+
+maps::MapInfo Map(std::uint64_t key, const std::string& name) {
+  maps::MapInfo info;
+  info.key = key;
+  info.name = name;
+  return info;
 }
 
 // A joined map whose points were not moved by the adjustment.
@@ -47,7 +53,7 @@ TEST(JoinedScenes, HoldTheContentOfBothMapsInTheCoordinatesOfTheFirst) {
   model.model.map_from_model = {engine::Rotation3::Exp({0, 0.3, 0}), {0.2, 0.1, 2.8}, 0.3};
   b.entities.push_back(model);
   const Sim3 a_from_b{engine::Rotation3::Exp({0.2, -0.5, 0.1}), {1, -2, 0.5}, 2.5};
-  const content::Scene both = JoinScenes(a, b, "East", "West", Joined(a_from_b));
+  const content::Scene both = JoinScenes(a, b, Map(1, "East"), Map(2, "West"), Joined(a_from_b));
   ASSERT_EQ(both.entities.size(), 3u);
   EXPECT_EQ(both.Find("sign-1")->signpost.anchor, a.entities[0].signpost.anchor);
   const content::Signpost& moved = both.Find("sign-1-2")->signpost;
@@ -65,7 +71,7 @@ TEST(JoinedScenes, HaveNoSignpostToTheirOwnMap) {
   content::Scene a, b;
   a.entities = {Sign("sign-1", "West", {0.5, 0.2, 3})};
   b.entities = {Sign("sign-2", "East", {1, 2, 3})};
-  const content::Scene both = JoinScenes(a, b, "East", "West", Joined({}));
+  const content::Scene both = JoinScenes(a, b, Map(1, "East"), Map(2, "West"), Joined({}));
   EXPECT_EQ(both.Find("sign-1")->signpost.to_map, "");
   EXPECT_EQ(both.Find("sign-2")->signpost.to_map, "");
 }
@@ -73,21 +79,16 @@ TEST(JoinedScenes, HaveNoSignpostToTheirOwnMap) {
 TEST(JoinedScenes, RedirectSignpostsOfOtherMapsToTheJoinedOne) {
   content::Scene hall;
   hall.entities = {Sign("sign-1", "West", {0, 0, 1}), Sign("sign-2", "Garden", {0, 0, 2})};
-  content::Entity model;
-  model.name = "fox";
-  model.kind = content::Entity::Kind::kModel;
-  auto asset = std::make_shared<content::Asset>();
-  asset->id = "0123456789abcdef0123456789abcdef";
-  model.model.asset = asset;
-  hall.entities.push_back(model);
-  const auto text = RedirectSignposts(content::EncodeScene(hall), "West", "East");
-  ASSERT_TRUE(text.has_value());
-  const content::Scene after = content::DecodeScene(*text, "test", [&](const std::string&) { return asset; });
-  EXPECT_EQ(after.Find("sign-1")->signpost.to_map, "East");
-  EXPECT_EQ(after.Find("sign-2")->signpost.to_map, "Garden");
-  EXPECT_EQ(after.Find("fox")->model.asset->id, asset->id);
-  EXPECT_EQ(RedirectSignposts(content::EncodeScene(hall), "Attic", "East"), std::nullopt);
-  EXPECT_EQ(RedirectSignposts("", "West", "East"), std::nullopt);
+  content::Entity renamed = Sign("sign-3", "old name", {0, 0, 3});
+  renamed.signpost.to_key = 2;
+  hall.entities.push_back(renamed);
+  EXPECT_TRUE(RedirectSceneSignposts(Map(2, "West"), Map(1, "East"), &hall));
+  EXPECT_EQ(hall.Find("sign-1")->signpost.to_map, "East");
+  EXPECT_EQ(hall.Find("sign-1")->signpost.to_key, 1u);
+  EXPECT_EQ(hall.Find("sign-2")->signpost.to_map, "Garden");
+  EXPECT_EQ(hall.Find("sign-3")->signpost.to_map, "East");
+  EXPECT_EQ(hall.Find("sign-3")->signpost.to_key, 1u);
+  EXPECT_FALSE(RedirectSceneSignposts(Map(7, "Attic"), Map(1, "East"), &hall));
 }
 
 }  // namespace

@@ -137,7 +137,6 @@ JoinRecord JoinOf(const Library& library) {
   record.snapshot =
       std::make_shared<engine::MapSnapshot>(engine::SideBySide(*into.snapshot, *from.snapshot, &ids));
   record.scene = std::make_shared<SceneRecord>(SceneRecord{"joined", into.scene.assets});
-  record.redirect = [](const std::string&) { return std::optional<std::string>("to East"); };
   return record;
 }
 
@@ -159,8 +158,7 @@ TEST(Crash, AJoinIsAtomicWhenTheProgramIsKilled) {
       Library library = OpenToWrite(file);
       for (const char* name : {"East", "West", "Hall"}) {
         library.Save({library.NewKey(), name, Policy::kOpen,
-                      MakeSampleMap(1, {.keyframes = 6, .points = 200}),
-                      std::make_shared<SceneRecord>(SceneRecord{"to West", {}})});
+                      MakeSampleMap(1, {.keyframes = 6, .points = 200}), MakeTextScene("sign a 0 West")});
       }
     }
     int ends[2];
@@ -185,10 +183,11 @@ TEST(Crash, AJoinIsAtomicWhenTheProgramIsKilled) {
     EXPECT_EQ(library.Verify(), std::vector<std::string>{});
     const bool done = library.List().size() == 2;
     EXPECT_EQ(library.List().size(), done ? 2u : 3u);
-    EXPECT_EQ(library.LoadScene(library.FindByName("Hall").key).text, done ? "to East" : "to West");
+    EXPECT_EQ(library.LoadScene(library.FindByName("Hall").key).text,
+              done ? "sign a 1 East" : "sign a 0 West");
     const StoredMap east = library.Load(library.FindByName("East").key);
     EXPECT_EQ(east.snapshot->keyframes.size(), done ? 12u : 6u);
-    EXPECT_EQ(east.scene.text, done ? "joined" : "to West");
+    EXPECT_EQ(east.scene.text, done ? "joined" : "sign a 0 West");
   }
 }
 

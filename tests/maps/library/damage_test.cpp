@@ -104,8 +104,8 @@ TEST_F(Damage, AnSqliteFileOfAnotherProgramIsRejected) {
 }
 
 TEST_F(Damage, ALibraryOfANewerFormatIsRejected) {
-  RunSql("PRAGMA user_version = 5");
-  ExpectRefused("written by a newer Docent (format 5;");
+  RunSql("PRAGMA user_version = 6");
+  ExpectRefused("written by a newer Docent (format 6;");
 }
 
 TEST_F(Damage, ALibraryWithOtherTablesIsRejected) {
@@ -192,6 +192,8 @@ TEST_F(Damage, VerifyNamesEachDamagedPart) {
                 "the entry of map 2: its checksum does not match"},
       std::pair{"DELETE FROM parts WHERE part = 'scene' AND map_key = 1",
                 "map 'Desk' (1): its part 'scene' is missing"},
+      std::pair{"DELETE FROM parts WHERE part = 'points.blocks' AND map_key = 1",
+                "map 'Desk' (1): its part 'points.blocks' is missing"},
       std::pair{"DELETE FROM words WHERE map_key = 2", "map 'Door' (2): its words are missing"},
       std::pair{"DELETE FROM thumbnails WHERE map_key = 2", "map 'Door' (2): its thumbnails are missing"},
       std::pair{"UPDATE thumbnails SET data = (SELECT data FROM thumbnails WHERE map_key = 1)",

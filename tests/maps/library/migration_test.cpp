@@ -62,7 +62,7 @@ class Migration : public ::testing::TestWithParam<int> {
                       R"sql(' AS newer;
       INSERT INTO library SELECT * FROM newer.library;
       INSERT INTO maps SELECT * FROM newer.maps;
-      INSERT INTO parts SELECT * FROM newer.parts WHERE part != 'panoramas';
+      INSERT INTO parts SELECT * FROM newer.parts WHERE part != 'panoramas' AND part NOT LIKE '%.blocks';
       INSERT INTO pictures SELECT * FROM newer.pictures;
       INSERT INTO assets SELECT * FROM newer.assets;)sql");
     if (GetParam() >= 2) {
@@ -81,6 +81,11 @@ class Migration : public ::testing::TestWithParam<int> {
       ATTACH ')sql" + newer.string() +
                         R"sql(' AS newer;
       INSERT INTO words SELECT * FROM newer.words;)sql");
+    }
+    if (GetParam() >= 4) {
+      RunSql(file_, R"sql(
+      CREATE TABLE lenses (camera TEXT PRIMARY KEY, data BLOB NOT NULL, checksum INTEGER NOT NULL) STRICT;
+      PRAGMA user_version = 4;)sql");
     }
     std::filesystem::remove(newer);
   }
@@ -120,7 +125,7 @@ class Migration : public ::testing::TestWithParam<int> {
   std::vector<std::vector<engine::KeyFrameThumbnail>> thumbnails_;
   std::vector<std::vector<engine::KeyFrameWords>> words_;
 };
-INSTANTIATE_TEST_SUITE_P(EachFormat, Migration, ::testing::Values(1, 2, 3));
+INSTANTIATE_TEST_SUITE_P(EachFormat, Migration, ::testing::Values(1, 2, 3, 4));
 
 TEST_P(Migration, AVisitorReadsAnEarlierFormatWithoutChangingIt) {
   const Bytes before = ReadWholeFile(file_);
@@ -146,6 +151,21 @@ TEST_P(Migration, AnAuthorUpgradesAnEarlierFormatAndKeepsACopyOfIt) {
   EXPECT_EQ(ReadWholeFile(folder_ / CopyName()), copy);
   EXPECT_EQ(Open(file_, Access::kReadOnly).Find(1).name, "Table");
   EXPECT_EQ(Open(folder_ / CopyName(), Access::kReadOnly).Find(1).name, "Desk");
+}
+
+TEST_P(Migration, SignpostsGetTheKeysOfTheirMapsAndMayLeadNowhere) {
+  { Open(file_, Access::kReadWrite); }
+  const std::string copy = (folder_ / CopyName()).string();
+  std::filesystem::remove(copy);
+  // The upgraded library is given back its older format, with a scene of that time.
+  Library::Open(file_, Access::kReadWrite, CreateIfMissing::kNo, QuickOptions())
+      .Save({1, "", Policy::kOpen, nullptr, MakeTextScene("sign a 0 Door\nsign b 0 Gone")});
+  RunSql(file_, "DELETE FROM parts WHERE part LIKE '%.blocks'; PRAGMA user_version = 4");
+  const Library library = Open(file_, Access::kReadWrite);
+  EXPECT_EQ(library.LoadScene(1).text, "sign a 2 Door\nsign b 0 Gone");
+  EXPECT_EQ(library.Verify(), std::vector<std::string>{});
+  EXPECT_THAT(library.SignpostsToNoMap(),
+              ::testing::ElementsAre(HasSubstr("the signpost 'b' leads to the map 'Gone'")));
 }
 
 TEST_P(Migration, ADamagedMapStopsTheUpgradeWithoutChanges) {

@@ -42,12 +42,7 @@ class JoinedLibrary : public ::testing::Test {
     library_.Save({library_.NewKey(), name, policy, MakeSampleMap(seed), MakeSampleScene(seed, 1)});
   }
   void AddHall(Policy policy = Policy::kOpen) {
-    auto scene = std::make_shared<SceneRecord>();
-    scene->text = "to West";
-    library_.Save({library_.NewKey(), "Hall", policy, MakeSampleMap(9), scene});
-  }
-  static std::optional<std::string> Redirect(const std::string& text) {
-    return text == "to West" ? std::optional<std::string>("to East") : std::nullopt;
+    library_.Save({library_.NewKey(), "Hall", policy, MakeSampleMap(9), MakeTextScene("sign a 0 West")});
   }
   std::vector<std::string> Names() const {
     std::vector<std::string> names;
@@ -64,8 +59,7 @@ TEST_F(JoinedLibrary, HasOneMapWithEverythingOfBoth) {
   Add("West", 5);
   AddHall();
   const std::uint64_t key = library_.FindByName("East").key;
-  JoinRecord record = RecordOf(library_, "East", "West");
-  record.redirect = Redirect;
+  const JoinRecord record = RecordOf(library_, "East", "West");
   ASSERT_TRUE(library_.Join(record));
   EXPECT_EQ(Names(), (std::vector<std::string>{"East", "Hall"}));
   EXPECT_THAT(library_.Verify(), IsEmpty());
@@ -73,7 +67,8 @@ TEST_F(JoinedLibrary, HasOneMapWithEverythingOfBoth) {
   EXPECT_EQ(FirstDifference(*joined.snapshot, *record.snapshot), "");
   EXPECT_EQ(FirstDifference(joined.scene, *record.scene), "");
   EXPECT_EQ(joined.info.policy, Policy::kOpen);
-  EXPECT_EQ(library_.LoadScene(library_.FindByName("Hall").key).text, "to East");
+  EXPECT_EQ(library_.LoadScene(library_.FindByName("Hall").key).text,
+            "sign a " + std::to_string(key) + " East");
   library_.LoadAppearance([](const MapInfo& info, const Library::Appearance& appearance) {
     EXPECT_EQ(appearance.problem, "");
     EXPECT_EQ(appearance.thumbnails.size(), info.keyframes);
@@ -122,13 +117,15 @@ TEST_F(JoinedLibrary, WritesNothingWhenASignpostMayNotBeRedirected) {
   Add("West", 5);
   AddHall(Policy::kReadOnly);
   const StoredMap before = library_.Load(library_.FindByName("East").key);
-  JoinRecord record = RecordOf(library_, "East", "West");
-  record.redirect = Redirect;
+  const JoinRecord record = RecordOf(library_, "East", "West");
   EXPECT_THAT(ErrorOf([&] { library_.Join(record); }), AllOf(HasSubstr("Hall"), HasSubstr("West")));
   EXPECT_EQ(Names(), (std::vector<std::string>{"East", "West", "Hall"}));
   EXPECT_EQ(FirstDifference(*library_.Load(before.info.key).snapshot, *before.snapshot), "");
   // When nothing refers to West, the hall's policy does not matter.
-  record.redirect = [](const std::string&) { return std::nullopt; };
+  library_.SetPolicy(library_.FindByName("Hall").key, Policy::kOpen);
+  library_.Save(
+      {library_.FindByName("Hall").key, "", Policy::kOpen, nullptr, MakeTextScene("sign a 0 East")});
+  library_.SetPolicy(library_.FindByName("Hall").key, Policy::kReadOnly);
   EXPECT_TRUE(library_.Join(record));
 }
 

@@ -60,16 +60,19 @@ TEST(Maintenance, MovesContentWithItsAnchor) {
   Random random(4);
   for (engine::MapPoint& point : crooked->points) point.point_in_map[2] += random.Uniform(-0.02, 0.02);
   const std::uint64_t key = library.NewKey();
-  library.Save({key, "a", Policy::kOpen, crooked, std::make_shared<SceneRecord>(SceneRecord{"here", {}})});
-  const auto move = [&](const SceneRecord& scene, const engine::MapSnapshot& before,
+  library.Save(
+      {key, "a", Policy::kOpen, crooked, MakeTextScene("here"), {}, {}, {}, {}, MakeTextScene("came here")});
+  const auto move = [&](const StoredContent& content, const engine::MapSnapshot& before,
                         const engine::MapSnapshot& after) {
-    EXPECT_EQ(scene.text, "here");
+    EXPECT_EQ(content.scene->text, "here");
+    EXPECT_EQ(content.history->text, "came here");
     EXPECT_EQ(FirstDifference(before, *crooked), "");
     EXPECT_NE(FirstDifference(after, *crooked), "");
-    return std::make_shared<SceneRecord>(SceneRecord{"there", {}});
+    return StoredContent{MakeTextScene("there"), MakeTextScene("came there")};
   };
   ASSERT_EQ(OptimizeMap(&library, key, nullptr, move).outcome, Optimization::Outcome::kAdjusted);
   EXPECT_EQ(library.Load(key).scene.text, "there");
+  EXPECT_EQ(library.LoadHistory(key)->text, "came there");
 }
 
 TEST(Maintenance, KeepsChangesOfAnotherProgram) {

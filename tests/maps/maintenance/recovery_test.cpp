@@ -57,14 +57,17 @@ TEST_F(Recovering, LossesAreNamedAndTheRestIsRecovered) {
   RunSql("DELETE FROM assets WHERE id = 'asset-0'");        // Used by the scene of the first map.
   const Recovery recovery = Recover(file_, target_);
   EXPECT_EQ(recovery.maps_complete, 0u);
-  EXPECT_EQ(recovery.maps_partial, 3u);
+  EXPECT_EQ(recovery.maps_partial, 4u);
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the image of keyframe 3 is missing")));
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the table of points is cut off")));
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the entry of map 4: its checksum does not match")));
   EXPECT_THAT(recovery.problems, Contains(HasSubstr("the asset asset-0 is missing")));
   const Library library = OpenRecovered();
   EXPECT_THAT(library.Verify(), IsEmpty());
-  EXPECT_EQ(library.List().size(), 3u);
+  EXPECT_EQ(library.List().size(), 4u);
+  const auto without_points = library.Load(library.FindByName(NameOf(2)).key).snapshot;
+  EXPECT_EQ(without_points->keyframes.size(), 3u);
+  EXPECT_EQ(without_points->points.size(), 0u);
   EXPECT_EQ(FirstDifference(*library.Load(library.FindByName(NameOf(0)).key).snapshot, *maps_[0]), "");
   const auto second = library.Load(library.FindByName(NameOf(1)).key).snapshot;
   EXPECT_EQ(second->keyframes.size(), 5u);

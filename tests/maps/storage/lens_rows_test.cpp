@@ -117,7 +117,7 @@ TEST_F(LensRows, DoNotPreventTheRecoveryOfMapsIfDamaged) {
   RunSql(file_, "UPDATE lenses SET data = x'00'");
   const auto saved = folder_ / "saved.docent";
   const Recovery recovery = Recover(file_, saved);
-  EXPECT_THAT(recovery.problems, ElementsAre(HasSubstr("the lenses of cameras: ")));
+  EXPECT_THAT(recovery.problems, ElementsAre(HasSubstr("the lens of camera 'phone': ")));
   EXPECT_EQ(recovery.maps_complete, 1u);
   EXPECT_THAT(OpenToRead(saved).Lenses(), IsEmpty());
 }
