@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/guide_window.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <set>
 #include <utility>
 
 #include "app/command_line/interruption.h"
 #include "app/command_line/map_panel.h"
+#include "app/command_line/window_times.h"
 #include "ui/authoring_panel.h"
 #include "ui/inset.h"
 #include "ui/letterbox.h"
@@ -64,7 +67,10 @@ class GuideWindow final : public ui::AuthoringActions {
 
   // Handles the input and draws the frames. Returns false when the window was closed.
   bool Update(std::vector<std::shared_ptr<const ShownFrame>> frames) {
+    using Part = WindowTimes::Part;
+    times_.Start();
     HandleEvents();
+    times_.Add(Part::kInput);
     if (window_.IsClosing() || closing_) return false;
     std::vector<std::shared_ptr<const ShownFrame>> fresh;
     for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -73,6 +79,7 @@ class GuideWindow final : public ui::AuthoringActions {
       fresh.push_back(shown_[i]);
     }
     if (!fresh.empty()) DrawImage();
+    times_.Add(Part::kImage);
     const Eigen::Vector2i size = window_.FramebufferSize();
     const int width_px = std::max(1, size.x()), height_px = std::max(1, size.y());
     if (shows_map_ && large()) {
@@ -81,14 +88,18 @@ class GuideWindow final : public ui::AuthoringActions {
     } else {
       renderer_.Present(width_px, height_px);
     }
+    times_.Add(Part::kPresent);
     if (panel_) panel_->Draw();
+    times_.Add(Part::kInterface);
     window_.Show();
+    times_.Add(Part::kShow);
     for (const auto& frame : fresh) drawn_(*frame);
     return true;
   }
 
   void Close() {
     if (recorder_) recorder_->Close();
+    spdlog::debug("{}", times_.Summary());
   }
 
  private:
@@ -213,6 +224,7 @@ class GuideWindow final : public ui::AuthoringActions {
   ui::Window window_;
   ui::Renderer renderer_;
   MapPanel map_panel_;
+  WindowTimes times_;
   std::optional<ui::AuthoringPanel> panel_;
   std::optional<ViewRecorder> recorder_;
   std::vector<std::shared_ptr<const ShownFrame>> shown_;  // By camera.
