@@ -1,202 +1,252 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "content/edits.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <numbers>
+#include <optional>
+#include <set>
 #include <utility>
 
+#include "content/placement.h"
 #include "engine/base/error.h"
 
 namespace docent::content {
 namespace {
 
-// Returns the index of the entity with this name; throws Error when there is none.
-std::size_t IndexOf(const Scene& scene, const std::string& name) {
-  const Entity* found = scene.Find(name);
-  if (found == nullptr) throw Error("There is no '" + name + "' in this map.");
-  return static_cast<std::size_t>(found - scene.entities.data());
+constexpr std::size_t kMaxNameInLabel = 60;  // bytes
+
+std::string InQuotes(const std::string& name) {
+  return "'" + Shortened(name, kMaxNameInLabel) + "'";
 }
 
-class Add : public Edit {
- public:
-  explicit Add(Entity entity) : entity_(std::move(entity)) {}
+// "'fox'", "'fox' and 2 others".
+std::string InWords(const std::vector<std::string>& names) {
+  if (names.size() == 1) return InQuotes(names.front());
+  const std::size_t others = names.size() - 1;
+  return InQuotes(names.front()) + " and " + std::to_string(others) + (others == 1 ? " other" : " others");
+}
 
-  void Apply(Scene* scene) override {
-    if (scene->Find(entity_.name) != nullptr)
-      throw Error("There is already a '" + entity_.name + "' in this map.");
-    scene->entities.push_back(entity_);
+// The indices of these entities, ascending. Throws Error when there is none with a name, or a name comes
+// twice.
+std::vector<std::size_t> IndicesOf(const Scene& scene, const std::vector<std::string>& names) {
+  if (names.empty()) throw Error("No model or signpost is named.");
+  std::map<std::string_view, std::size_t> places;
+  for (std::size_t i = 0; i < scene.entities.size(); ++i) places.emplace(scene.entities[i].name, i);
+  std::set<std::size_t> indices;
+  for (const std::string& name : names) {
+    const auto found = places.find(name);
+    if (found == places.end()) throw Error("There is no '" + name + "' in this map.");
+    if (!indices.insert(found->second).second) throw Error("'" + name + "' is named twice.");
   }
-  void Undo(Scene* scene) override {
-    scene->entities.erase(scene->entities.begin() +
-                          static_cast<std::ptrdiff_t>(IndexOf(*scene, entity_.name)));
+  return {indices.begin(), indices.end()};
+}
+
+void RefuseLocked(const Entity& entity) {
+  if (entity.locked) throw Error("'" + entity.name + "' is locked; unlock it to change it.");
+}
+
+// A change of one entity that is not locked.
+SceneChange ChangeOf(const Scene& scene, const std::string& name, const std::string& verb,
+                     const std::function<void(Entity*)>& change) {
+  const std::size_t index = IndicesOf(scene, {name}).front();
+  const Entity& before = scene.entities[index];
+  RefuseLocked(before);
+  Entity after = before;
+  change(&after);
+  return {verb + " " + InQuotes(name), {{index, before, std::move(after)}}};
+}
+
+Signpost& SignpostOf(Entity* entity, const char* why_not) {
+  if (entity->kind != Entity::Kind::kSignpost)
+    throw Error("'" + entity->name + "' is a model, which " + why_not);
+  return entity->signpost;
+}
+
+// "fox" for "fox-2", so that copies of copies are numbered on.
+std::string WithoutNumber(const std::string& name) {
+  std::size_t end = name.size();
+  while (end > 0 && std::isdigit(static_cast<unsigned char>(name[end - 1])) != 0) --end;
+  const bool numbered = end < name.size() && end > 1 && name[end - 1] == '-';
+  return numbered ? name.substr(0, end - 1) : name;
+}
+
+// Gives each entity a free name, and adds them at the end of the list.
+SceneChange AddCopies(const Scene& scene, std::vector<Entity> copies, const std::string& label) {
+  std::set<std::string, std::less<>> used;
+  for (const Entity& entity : scene.entities) used.insert(entity.name);
+  std::map<std::string, int> next_number;  // of each base, so that many copies take linear time
+  SceneChange change{label, {}};
+  std::size_t index = scene.entities.size();
+  for (Entity& copy : copies) {
+    const std::string base = WithoutNumber(copy.name);
+    std::string name = copy.name;
+    int& number = next_number.try_emplace(base, 2).first->second;
+    while (used.contains(name)) name = base + "-" + std::to_string(number++);
+    used.insert(name);
+    copy.name = std::move(name);
+    copy.locked = copy.hidden = false;
+    change.entities.push_back({index++, std::nullopt, std::move(copy)});
   }
-  void MoveWithAnchor(const std::string& name, const engine::Sim3& motion) override {
-    if (name == entity_.name) content::MoveWithAnchor(motion, &entity_);
-  }
+  return change;
+}
 
- private:
-  Entity entity_;
-};
-
-// An edit that changes one entity in place. Undo restores the previous entity.
-class ChangeEdit : public Edit {
- public:
-  explicit ChangeEdit(std::string name) : name_(std::move(name)) {}
-
-  void Apply(Scene* scene) final {
-    Entity& entity = scene->entities[IndexOf(*scene, name_)];
-    Entity changed = entity;
-    Change(&changed);
-    before_ = std::exchange(entity, std::move(changed));
-  }
-  void Undo(Scene* scene) final { scene->entities[IndexOf(*scene, name_)] = before_; }
-  void MoveWithAnchor(const std::string& name, const engine::Sim3& motion) final {
-    if (name != name_) return;
-    content::MoveWithAnchor(motion, &before_);
-    MoveTarget(motion);
-  }
-
- protected:
-  // Transforms the edit's target position in the map, if it has one.
-  virtual void MoveTarget(const engine::Sim3& /*motion*/) {}
-  // May throw, because it works on a copy.
-  virtual void Change(Entity* entity) = 0;
-  const std::string& name() const { return name_; }
-
- private:
-  std::string name_;
-  Entity before_;
-};
-
-class Move : public ChangeEdit {
- public:
-  Move(std::string name, const Eigen::Vector3d& position)
-      : ChangeEdit(std::move(name)), position_(position) {}
-
- protected:
-  void Change(Entity* entity) override {
-    if (entity->kind == Entity::Kind::kModel) {
-      entity->model.map_from_model.translation = position_;
-    } else {
-      entity->signpost.anchor = position_;
-    }
-  }
-  void MoveTarget(const engine::Sim3& motion) override { position_ = motion * position_; }
-
- private:
-  Eigen::Vector3d position_;
-};
-
-class Rotate : public ChangeEdit {
- public:
-  Rotate(std::string name, double angle_deg) : ChangeEdit(std::move(name)), angle_deg_(angle_deg) {}
-
- protected:
-  void Change(Entity* entity) override {
-    if (!(std::abs(angle_deg_) <= kMaxAngle_deg))
-      throw Error("'" + name() + "' cannot be rotated: the angle must be at most " +
-                  std::to_string(std::lround(kMaxAngle_deg)) + " degrees.");
-    if (entity->kind != Entity::Kind::kModel) {
-      throw Error("'" + name() + "' is a signpost, which always faces the reader and cannot be rotated.");
-    }
-    const Eigen::Vector3d turn = Eigen::Vector3d::UnitY() * (angle_deg_ * std::numbers::pi / 180);
-    engine::Rotation3& rotation = entity->model.map_from_model.rotation;
-    rotation = rotation * engine::Rotation3::Exp(turn);
-  }
-
- private:
-  double angle_deg_;
-};
-
-class Scale : public ChangeEdit {
- public:
-  Scale(std::string name, double factor) : ChangeEdit(std::move(name)), factor_(factor) {}
-
- protected:
-  void Change(Entity* entity) override {
-    double& size =
-        entity->kind == Entity::Kind::kModel ? entity->model.map_from_model.scale : entity->signpost.height_m;
-    size *= factor_;
-  }
-
- private:
-  double factor_;
-};
-
-class Remove : public Edit {
- public:
-  explicit Remove(std::string name) : name_(std::move(name)) {}
-
-  void Apply(Scene* scene) override {
-    index_ = IndexOf(*scene, name_);
-    entity_ = std::move(scene->entities[index_]);
-    scene->entities.erase(scene->entities.begin() + static_cast<std::ptrdiff_t>(index_));
-  }
-  void Undo(Scene* scene) override {
-    scene->entities.insert(scene->entities.begin() + static_cast<std::ptrdiff_t>(index_), entity_);
-  }
-  void MoveWithAnchor(const std::string& name, const engine::Sim3& motion) override {
-    if (name == name_) content::MoveWithAnchor(motion, &entity_);
-  }
-
- private:
-  std::string name_;
-  std::size_t index_ = 0;
-  Entity entity_;
-};
+// An offset that puts a copy beside its original.
+Eigen::Vector3d BesideOffset(const Entity& entity) {
+  constexpr double kGap = 1.1;  // Ratio of the width.
+  if (entity.kind == Entity::Kind::kSignpost)
+    return kGap * entity.signpost.height_m * entity.signpost.up.unitOrthogonal();
+  const engine::Sim3& pose = entity.model.map_from_model;
+  const auto& model = entity.model.asset->model;
+  const double width_m = model ? static_cast<double>(model->bounds_max.x - model->bounds_min.x) : 1.0;
+  return pose.rotation * Eigen::Vector3d(kGap * pose.scale * width_m, 0, 0);
+}
 
 }  // namespace
 
-std::unique_ptr<Edit> AddEdit(Entity entity) {
-  return std::make_unique<Add>(std::move(entity));
-}
-std::unique_ptr<Edit> MoveEdit(std::string name, const Eigen::Vector3d& position_in_map) {
-  return std::make_unique<Move>(std::move(name), position_in_map);
-}
-std::unique_ptr<Edit> RotateEdit(std::string name, double angle_deg) {
-  return std::make_unique<Rotate>(std::move(name), angle_deg);
-}
-std::unique_ptr<Edit> ScaleEdit(std::string name, double factor) {
-  return std::make_unique<Scale>(std::move(name), factor);
-}
-std::unique_ptr<Edit> RemoveEdit(std::string name) {
-  return std::make_unique<Remove>(std::move(name));
+SceneChange AddEdit(const Scene& scene, Entity entity) {
+  if (scene.Find(entity.name) != nullptr)
+    throw Error("There is already a '" + entity.name + "' in this map.");
+  const std::string label = "add " + InQuotes(entity.name);
+  return {label, {{scene.entities.size(), std::nullopt, std::move(entity)}}};
 }
 
-void ApplyChecked(Edit* edit, Scene* scene) {
-  edit->Apply(scene);
-  const std::string problem = Validate(*scene);
-  if (problem.empty()) return;
-  edit->Undo(scene);
-  throw Error(problem);
+SceneChange PasteEdit(const Scene& scene, std::vector<Entity> entities) {
+  if (entities.empty()) throw Error("There is nothing to paste.");
+  std::vector<std::string> names;
+  for (const Entity& entity : entities) names.push_back(entity.name);
+  return AddCopies(scene, std::move(entities), "paste " + InWords(names));
 }
 
-void EditHistory::Do(std::unique_ptr<Edit> edit, Scene* scene) {
-  ApplyChecked(edit.get(), scene);
-  done_.push_back(std::move(edit));
-  undone_.clear();
-}
-
-bool EditHistory::Undo(Scene* scene) {
-  if (done_.empty()) return false;
-  done_.back()->Undo(scene);
-  undone_.push_back(std::move(done_.back()));
-  done_.pop_back();
-  return true;
-}
-
-bool EditHistory::Redo(Scene* scene) {
-  if (undone_.empty()) return false;
-  ApplyChecked(undone_.back().get(), scene);
-  done_.push_back(std::move(undone_.back()));
-  undone_.pop_back();
-  return true;
-}
-
-void EditHistory::MoveWithAnchor(const std::string& name, const engine::Sim3& motion) {
-  for (auto* edits : {&done_, &undone_}) {
-    for (const std::unique_ptr<Edit>& edit : *edits) edit->MoveWithAnchor(name, motion);
+SceneChange DuplicateEdit(const Scene& scene, const std::vector<std::string>& names) {
+  std::vector<Entity> copies;
+  for (const std::size_t index : IndicesOf(scene, names)) {
+    Entity copy = scene.entities[index];
+    const Eigen::Vector3d offset = BesideOffset(copy);
+    copy.model.map_from_model.translation += offset;
+    copy.signpost.anchor += offset;
+    copies.push_back(std::move(copy));
   }
+  return AddCopies(scene, std::move(copies), "duplicate " + InWords(names));
+}
+
+SceneChange RemoveEdit(const Scene& scene, const std::vector<std::string>& names) {
+  std::vector<std::size_t> indices = IndicesOf(scene, names);
+  std::reverse(indices.begin(), indices.end());  // The others keep their indices.
+  SceneChange change{"remove " + InWords(names), {}};
+  for (const std::size_t index : indices) {
+    RefuseLocked(scene.entities[index]);
+    change.entities.push_back({index, scene.entities[index], std::nullopt});
+  }
+  return change;
+}
+
+SceneChange MoveEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& position_in_map) {
+  return ChangeOf(scene, name, "move", [&](Entity* entity) {
+    if (entity->kind == Entity::Kind::kModel) {
+      entity->model.map_from_model.translation = position_in_map;
+    } else {
+      entity->signpost.anchor = position_in_map;
+    }
+  });
+}
+
+SceneChange RotateEdit(const Scene& scene, const std::string& name, double angle_deg) {
+  return ChangeOf(scene, name, "rotate", [&](Entity* entity) {
+    if (!(std::abs(angle_deg) <= kMaxAngle_deg))
+      throw Error("'" + name + "' cannot be rotated: the angle must be at most " +
+                  std::to_string(std::lround(kMaxAngle_deg)) + " degrees.");
+    if (entity->kind != Entity::Kind::kModel)
+      throw Error("'" + name + "' is a signpost, which always faces the reader and cannot be rotated.");
+    const Eigen::Vector3d base = BaseInMap(*entity);
+    const Eigen::Vector3d turn = Eigen::Vector3d::UnitY() * (angle_deg * std::numbers::pi / 180);
+    engine::Sim3& pose = entity->model.map_from_model;
+    pose.rotation = pose.rotation * engine::Rotation3::Exp(turn);
+    pose.translation += base - BaseInMap(*entity);
+  });
+}
+
+SceneChange ScaleEdit(const Scene& scene, const std::string& name, double factor) {
+  return ChangeOf(scene, name, "scale", [&](Entity* entity) {
+    if (entity->kind == Entity::Kind::kSignpost) {
+      entity->signpost.height_m *= factor;
+      return;
+    }
+    const Eigen::Vector3d base = BaseInMap(*entity);
+    entity->model.map_from_model.scale *= factor;
+    entity->model.map_from_model.translation += base - BaseInMap(*entity);
+  });
+}
+
+SceneChange TransformEdit(const Scene& scene, const std::string& name, const engine::Sim3& map_from_entity) {
+  return ChangeOf(scene, name, "move", [&](Entity* entity) {
+    if (entity->kind == Entity::Kind::kModel) {
+      entity->model.map_from_model = map_from_entity;
+    } else {
+      entity->signpost.anchor = map_from_entity.translation;
+      entity->signpost.height_m = map_from_entity.scale;
+    }
+  });
+}
+
+SceneChange RenameEdit(const Scene& scene, const std::string& name, const std::string& new_name) {
+  SceneChange change = ChangeOf(scene, name, "rename", [&](Entity* entity) { entity->name = new_name; });
+  if (scene.Find(new_name) != nullptr) throw Error("There is already a '" + new_name + "' in this map.");
+  return change;
+}
+
+SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text) {
+  return ChangeOf(scene, name, "change the text of",
+                  [&](Entity* entity) { SignpostOf(entity, "has no text.").text = text; });
+}
+
+SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::string& to_map,
+                       std::uint64_t to_key) {
+  return ChangeOf(scene, name, "change the target of", [&](Entity* entity) {
+    Signpost& signpost = SignpostOf(entity, "cannot lead to a map.");
+    signpost.to_map = to_map;
+    signpost.to_key = to_key;
+  });
+}
+
+SceneChange FlagEdit(const Scene& scene, const std::vector<std::string>& names, EntityFlag flag, bool value) {
+  const bool is_lock = flag == EntityFlag::kLocked;
+  SceneChange change{
+      std::string(is_lock ? (value ? "lock " : "unlock ") : (value ? "hide " : "show ")) + InWords(names),
+      {}};
+  for (const std::size_t index : IndicesOf(scene, names)) {
+    const Entity& before = scene.entities[index];
+    if ((is_lock ? before.locked : before.hidden) == value) continue;
+    if (!is_lock) RefuseLocked(before);
+    Entity after = before;
+    (is_lock ? after.locked : after.hidden) = value;
+    change.entities.push_back({index, before, std::move(after)});
+  }
+  if (change.entities.empty()) {
+    throw Error(InWords(names) + (names.size() == 1 ? " is" : " are") + (value ? " already " : " not ") +
+                (is_lock ? "locked." : "hidden."));
+  }
+  return change;
+}
+
+SceneChange GroupEdit(const Scene& scene, const std::vector<std::string>& names, const std::string& group) {
+  SceneChange change{(group.empty() ? "ungroup " : "group ") + InWords(names), {}};
+  for (const std::size_t index : IndicesOf(scene, names)) {
+    const Entity& before = scene.entities[index];
+    RefuseLocked(before);
+    if (before.group == group) continue;
+    Entity after = before;
+    after.group = group;
+    change.entities.push_back({index, before, std::move(after)});
+  }
+  if (change.entities.empty()) {
+    throw Error(InWords(names) + (names.size() == 1 ? " is" : " are") +
+                (group.empty() ? " in no group." : " already in this group."));
+  }
+  return change;
 }
 
 }  // namespace docent::content

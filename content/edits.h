@@ -1,58 +1,50 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "content/scene.h"
+#include "content/edit_history.h"
 
-// Changes of a scene that can be undone. Commands of people and scripts are app/script/commands.h, which the
-// session turns into edits; command line tools apply edits to stored scenes. A scene is changed in no other
+// The changes that people make to a scene. Commands of people and scripts are app/script/commands.h, which
+// the session turns into these; command line tools use them for stored scenes. A scene is changed in no other
 // way by people.
+//
+// Each function returns the change and leaves the scene as it is; EditHistory::Do or ApplyChange applies it.
+// They throw Error with one sentence when the edit does not fit the scene: an entity does not exist, is named
+// twice, is locked, or is of the wrong kind. What could not be stored is refused where the change is applied.
+// Pure functions; thread-safe.
 namespace docent::content {
 
-class Edit {
- public:
-  virtual ~Edit() = default;
-  // Changes the scene and stores what Undo needs. Throws Error, without changing the scene, when the edit
-  // does not fit the scene ("There is no 'helmet' in this map.").
-  virtual void Apply(Scene* scene) = 0;
-  // Reverts Apply exactly. The scene must be as Apply left it.
-  virtual void Undo(Scene* scene) = 0;
-  // Transforms the stored poses of the entity with this name after its anchor has moved in the map.
-  virtual void MoveWithAnchor(const std::string& name, const engine::Sim3& motion) = 0;
-};
-
 // The entity's name must be unused (Scene::FreeName).
-std::unique_ptr<Edit> AddEdit(Entity entity);
-std::unique_ptr<Edit> MoveEdit(std::string name, const Eigen::Vector3d& position_in_map);
-// About the entity's own up axis, counter-clockwise seen from above. Signposts cannot be rotated.
-std::unique_ptr<Edit> RotateEdit(std::string name, double angle_deg);
-// Relative to the entity's foot.
-std::unique_ptr<Edit> ScaleEdit(std::string name, double factor);
-std::unique_ptr<Edit> RemoveEdit(std::string name);
+SceneChange AddEdit(const Scene& scene, Entity entity);
+// Copies of these entities, which may be from another scene, are added under free names. They are neither
+// locked nor hidden.
+SceneChange PasteEdit(const Scene& scene, std::vector<Entity> entities);
+// Copies of entities of this scene, each beside its original.
+SceneChange DuplicateEdit(const Scene& scene, const std::vector<std::string>& names);
+SceneChange RemoveEdit(const Scene& scene, const std::vector<std::string>& names);
 
-// Applies the edit. Throws Error, without changing the scene, when the edit does not fit the scene or the
-// result could not be stored (see Validate in scene.h).
-void ApplyChecked(Edit* edit, Scene* scene);
+// To this place of the entity's origin (PlaceOf).
+SceneChange MoveEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& position_in_map);
+// About the up axis of the model through its base, counter-clockwise seen from above. Signposts cannot be
+// rotated.
+SceneChange RotateEdit(const Scene& scene, const std::string& name, double angle_deg);
+// Relative to the entity's base (BaseInMap).
+SceneChange ScaleEdit(const Scene& scene, const std::string& name, double factor);
+// A model gets this pose; a signpost gets its translation as its place and its scale as its height.
+SceneChange TransformEdit(const Scene& scene, const std::string& name, const engine::Sim3& map_from_entity);
 
-// The applied and undone edits of a scene, in order. Owned by the scene's owner.
-class EditHistory {
- public:
-  // Applies and stores the edit as ApplyChecked does, and discards the undone edits. If it throws, nothing
-  // changes.
-  void Do(std::unique_ptr<Edit> edit, Scene* scene);
-  // Returns false when there is nothing to undo or redo. Redo throws like Do.
-  bool Undo(Scene* scene);
-  bool Redo(Scene* scene);
+SceneChange RenameEdit(const Scene& scene, const std::string& name, const std::string& new_name);
+// Of a signpost. to_map empty and to_key 0: it leads nowhere.
+SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text);
+SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::string& to_map,
+                       std::uint64_t to_key);
 
-  // Transforms all applied and undone edits after the anchor of the entity with this name has moved in the
-  // map.
-  void MoveWithAnchor(const std::string& name, const engine::Sim3& motion);
-
- private:
-  std::vector<std::unique_ptr<Edit>> done_, undone_;
-};
+enum class EntityFlag { kLocked, kHidden };
+// Throws Error when all of the entities have this value already.
+SceneChange FlagEdit(const Scene& scene, const std::vector<std::string>& names, EntityFlag flag, bool value);
+// An empty group takes the entities out of their groups.
+SceneChange GroupEdit(const Scene& scene, const std::vector<std::string>& names, const std::string& group);
 
 }  // namespace docent::content

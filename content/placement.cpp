@@ -168,4 +168,35 @@ engine::Sim3 UprightPose(const Eigen::Vector3d& point, const Eigen::Vector3d& no
   return map_from_model;
 }
 
+engine::Sim3 FacingPose(const Eigen::Vector3d& point, const Eigen::Vector3d& viewer,
+                        const Eigen::Vector3d& normal, const Eigen::Vector3d& map_up, double yaw,
+                        double scale) {
+  constexpr double kMinLevelPart = 0.05;  // Ratio; within 3 degrees of the vertical there is no direction.
+  const Eigen::Vector3d up = (map_up.norm() > 0 ? map_up : normal).normalized();
+  const Eigen::Vector3d to_viewer = viewer - point;
+  const Eigen::Vector3d level = to_viewer - up * up.dot(to_viewer);
+  const bool is_level = level.norm() > kMinLevelPart * to_viewer.norm();
+  return UprightPose(point, is_level ? level.normalized() : normal, up, yaw, scale);
+}
+
+Eigen::Vector3d BaseOf(const Model& model) {
+  const glm::vec3 &least = model.bounds_min, &most = model.bounds_max;
+  return {0.5 * (static_cast<double>(least.x) + static_cast<double>(most.x)), static_cast<double>(least.y),
+          0.5 * (static_cast<double>(least.z) + static_cast<double>(most.z))};
+}
+
+Eigen::Vector3d BaseInMap(const Entity& entity) {
+  if (entity.kind == Entity::Kind::kSignpost) return entity.signpost.anchor;
+  const std::shared_ptr<const Asset>& asset = entity.model.asset;
+  if (!asset || !asset->model) return entity.model.map_from_model.translation;
+  return entity.model.map_from_model * BaseOf(*asset->model);
+}
+
+double ScaleForSide(const Model& model, double side) {
+  const glm::vec3 extent = model.bounds_max - model.bounds_min;
+  const double largest = static_cast<double>(std::max({extent.x, extent.y, extent.z}));
+  if (!(largest > 0) || !std::isfinite(largest)) return 1;
+  return std::clamp(side / largest, kMinModelScale, kMaxModelScale);
+}
+
 }  // namespace docent::content

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "content/scene.h"
 #include "engine/geometry/sim3.h"
 
 // Computes the pose of an entity that a person places at a pixel. A map has points and no surfaces, so the
@@ -53,5 +54,22 @@ SurfaceResult FindSurface(std::span<const Eigen::Vector3d> points_in_map, const 
 // counter-clockwise seen from above). If map_up is zero, the normal is up.
 engine::Sim3 UprightPose(const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
                          const Eigen::Vector3d& map_up, double yaw, double scale);
+
+// The same, but the front faces the viewer, whose position is in the map. Where the viewer looks straight
+// down or up at the point, the front faces as UprightPose has it.
+engine::Sim3 FacingPose(const Eigen::Vector3d& point, const Eigen::Vector3d& viewer,
+                        const Eigen::Vector3d& normal, const Eigen::Vector3d& map_up, double yaw,
+                        double scale);
+
+// The middle of the bottom of a model's bounding box, in model axes and metres: the point that stands on a
+// surface.
+Eigen::Vector3d BaseOf(const Model& model);
+// Where the base of an entity is in the map: the base of its model (its origin, if the model is not loaded),
+// or the anchor of a signpost.
+Eigen::Vector3d BaseInMap(const Entity& entity);
+
+// The scale, in map units per metre, at which the largest side of the model has this length in map units,
+// within the limits of a scene; 1 for a model without extent.
+double ScaleForSide(const Model& model, double side);
 
 }  // namespace docent::content

@@ -44,13 +44,15 @@ std::string PoseProblem(const Entity& entity) {
   return "";
 }
 
-// What is wrong with an entity, as the end of a sentence.
-std::string Problem(const Entity& entity) {
+}  // namespace
+
+std::string Validate(const Entity& entity) {
   const auto is_text = [](const std::string& text) { return text.size() <= kMaxTextBytes && IsUtf8(text); };
   const std::string not_text =
       "that is not UTF-8 text of at most " + std::to_string(kMaxTextBytes) + " bytes";
   if (entity.name.empty()) return "would have no name";
   if (!is_text(entity.name)) return "would have a name " + not_text;
+  if (!is_text(entity.group)) return "would be in a group with a name " + not_text;
   if (entity.kind == Entity::Kind::kModel) {
     const PlacedModel& model = entity.model;
     if (!model.asset || model.asset->id.empty() || !is_text(model.asset->id)) return "would have no model";
@@ -61,8 +63,6 @@ std::string Problem(const Entity& entity) {
   }
   return PoseProblem(entity);
 }
-
-}  // namespace
 
 Eigen::Vector3d PlaceOf(const Entity& entity) {
   return entity.kind == Entity::Kind::kModel ? entity.model.map_from_model.translation
@@ -113,23 +113,51 @@ std::string Validate(const Scene& scene) {
   std::set<std::string_view> names;
   std::size_t bytes = 0;
   for (const Entity& entity : scene.entities) {
-    if (const std::string problem = Problem(entity); !problem.empty())
-      return "'" + entity.name.substr(0, 80) + "' " + problem + ".";
+    if (const std::string problem = Validate(entity); !problem.empty())
+      return "'" + Shortened(entity.name, 80) + "' " + problem + ".";
     if (!names.insert(entity.name).second) return "There are two '" + entity.name + "' in this map.";
-    bytes += entity.name.size() + entity.signpost.text.size() + entity.signpost.to_map.size();
+    bytes += TextBytes(entity);
   }
   if (bytes > kMaxSceneTextBytes)
     return "The names and texts in a map can have at most " + std::to_string(kMaxSceneTextBytes) + " bytes.";
   return "";
 }
 
+std::size_t TextBytes(const Entity& entity) {
+  return entity.name.size() + entity.group.size() + entity.signpost.text.size() +
+         entity.signpost.to_map.size();
+}
+
+std::string Shortened(const std::string& text, std::size_t max_bytes) {
+  if (text.size() <= max_bytes) return text;
+  std::size_t end = max_bytes;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  return text.substr(0, end);
+}
+
+// Well-formed byte sequences of the Unicode Standard, table 3-7: no overlong form, no surrogate, nothing
+// beyond U+10FFFF.
 bool IsUtf8(std::string_view text) {
-  try {
-    (void)nlohmann::json(text).dump();
-    return true;
-  } catch (const nlohmann::json::type_error&) {
-    return false;
+  const auto byte = [&](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : static_cast<unsigned char>(0);
+  };
+  for (std::size_t i = 0; i < text.size();) {
+    const unsigned char first = byte(i);
+    if (first < 0x80) {
+      ++i;
+      continue;
+    }
+    if (first < 0xC2 || first > 0xF4) return false;
+    const std::size_t length = first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
+    const unsigned char least = first == 0xE0 ? 0xA0 : first == 0xF0 ? 0x90 : 0x80;
+    const unsigned char most = first == 0xED ? 0x9F : first == 0xF4 ? 0x8F : 0xBF;
+    if (byte(i + 1) < least || byte(i + 1) > most) return false;
+    for (std::size_t k = 2; k < length; ++k) {
+      if ((byte(i + k) & 0xC0) != 0x80) return false;
+    }
+    i += length;
   }
+  return true;
 }
 
 std::string NameFromFile(const std::filesystem::path& file) {

@@ -49,7 +49,10 @@ struct Signpost {
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // In the map, map units.
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY();    // Unit vector in the map.
   double height_m = 0.1;                             // Height of the board, in map units.
-  std::string to_map;                                // Name of the map it leads to, empty for none.
+  // The map it leads to: its key in the library, 0 if it is not known, and its name when this was written,
+  // empty for none. The key decides; the name is shown where there is no map with this key.
+  std::uint64_t to_key = 0;
+  std::string to_map;
 };
 
 // An entity with a name that is unique in its scene ("helmet", "helmet-2", "sign-1").
@@ -60,6 +63,9 @@ struct Entity {
   Kind kind = Kind::kSignpost;  // What it is.
   PlacedModel model;            // Of kModel.
   Signpost signpost;            // Of kSignpost.
+  bool locked = false;          // No edit but unlocking changes it.
+  bool hidden = false;          // It is not drawn.
+  std::string group;            // Shared by entities that are selected together; empty for none.
 };
 
 // The position of an entity's foot in the map.
@@ -81,11 +87,19 @@ struct Scene {
   std::string FreeSignpostName() const;
 };
 
+// What is wrong with an entity by itself, as the end of a sentence about it ("would have no name"); empty if
+// nothing is.
+std::string Validate(const Entity& entity);
 // A sentence that says why the scene cannot be stored (a number outside its limits, a text that is not UTF-8,
 // a name that is used twice, a model without asset); empty if it can.
 std::string Validate(const Scene& scene);
 
+// Of an entity's names and texts, as kMaxSceneTextBytes counts them.
+std::size_t TextBytes(const Entity& entity);
+
 bool IsUtf8(std::string_view text);
+// The beginning of a UTF-8 text that has at most max_bytes, which never ends within a character.
+std::string Shortened(const std::string& text, std::size_t max_bytes);
 // The base of an entity's name for a model's file: its name without folder and extension, in which bytes that
 // are not UTF-8 are replaced.
 std::string NameFromFile(const std::filesystem::path& file);

@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "content/entity_codec.h"
 #include "content/scene.h"
 
 // Encodes a scene as JSON text, the form in which a library stores it (assets are stored separately, once
 // each, by id):
 //
-//   {"docent_scene": 1, "assets": [ID…], "entities": [
-//     {"kind": "model", "name": NAME, "asset": ID, "animation": N,
+//   {"docent_scene": 2, "assets": [ID…], "entities": [
+//     {"kind": "model", "name": NAME, "locked": false, "hidden": false, "group": NAME,
+//      "asset": ID, "animation": N,
 //      "map_from_model": {"rotation_xyzw": [x, y, z, w], "translation_m": [x, y, z], "scale": S}},
-//     {"kind": "signpost", "name": NAME, "text": TEXT, "anchor_m": [x, y, z], "up": [x, y, z],
-//      "height_m": H, "to_map": NAME}]}
+//     {"kind": "signpost", "name": NAME, "locked": false, "hidden": false, "group": NAME,
+//      "text": TEXT, "anchor_m": [x, y, z], "up": [x, y, z],
+//      "height_m": H, "to_map": NAME, "to_key": KEY}]}
 //
-// Numbers are written so that they read back to the same bits (rotations are normalized again).
+// Numbers are written so that they read back to the same bits (rotations are normalized again). Version 1,
+// without locked, hidden, group and to_key, is read as well.
 namespace docent::content {
 
 // DecodeScene reads what this returns. Throws Error for a scene that cannot be stored (Validate in scene.h).
@@ -27,11 +29,14 @@ std::string EncodeScene(const Scene& scene);
 // Returns the ids in "assets", so that a library can fetch them first. Throws Error like DecodeScene.
 std::vector<std::string> SceneAssetIds(std::string_view text);
 
-// Returns the asset with an id, or nullptr when there is none.
-using AssetLookup = std::function<std::shared_ptr<const Asset>(const std::string& id)>;
-
 // Parses strictly: unknown versions, kinds and members, missing members, numbers out of range, duplicate
 // names and unknown assets throw Error. `where` names the text in messages ("library.docent, map Desk").
 Scene DecodeScene(std::string_view text, std::string_view where, const AssetLookup& find_asset);
+
+// Reads what can be read of a damaged scene: an entity that DecodeScene would refuse is left out, and an
+// entity with the name of an earlier one gets a new name; both are named in `problems`, one sentence each.
+// Throws Error only when the text is no scene at all, or was written by a newer version.
+Scene ReadScene(std::string_view text, std::string_view where, const AssetLookup& find_asset,
+                std::vector<std::string>* problems);
 
 }  // namespace docent::content

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -106,14 +107,17 @@ void List(const ContentOptions& options) {
   }
 }
 
+// Makes the change of a scene; see content/edits.h.
+using MakeEdit = std::function<content::SceneChange(const content::Scene&)>;
+
 // Applies an edit to the stored scene of a map. `added` is the asset of a model that the edit adds, else
 // null. Throws Error, and changes nothing, when the edit does not fit, or the policy of the map forbids it.
-void EditStoredScene(maps::Library* library, const maps::MapInfo& map, content::Edit* edit,
+void EditStoredScene(maps::Library* library, const maps::MapInfo& map, const MakeEdit& edit,
                      const std::shared_ptr<const content::Asset>& added) {
   const maps::SceneRecord stored = library->LoadScene(map.key);
   content::Scene scene = DecodeNames(stored, Where(*library, map));
   try {
-    content::ApplyChecked(edit, &scene);
+    content::ApplyChange(edit(scene), &scene);
   } catch (const Error& error) {
     throw Error(Where(*library, map) + ": " + error.what());
   }
@@ -174,14 +178,17 @@ void Add(const ContentOptions& options, Verbosity verbosity) {
   const content::Entity entity = options.file.empty()
                                      ? NewSignpost(options, *snapshot, scene)
                                      : NewModel(options, engine::UprightAxesOf(*snapshot), scene);
-  EditStoredScene(&library, map, content::AddEdit(entity).get(), entity.model.asset);
+  EditStoredScene(
+      &library, map, [&](const content::Scene& stored) { return content::AddEdit(stored, entity); },
+      entity.model.asset);
   if (verbosity != Verbosity::kQuiet) std::printf("%s\n", entity.name.c_str());
 }
 
 void Remove(const ContentOptions& options) {
   maps::Library library = maps::Library::Open(options.library, maps::Access::kReadWrite);
-  EditStoredScene(&library, library.FindByName(options.map), content::RemoveEdit(options.name).get(),
-                  nullptr);
+  EditStoredScene(
+      &library, library.FindByName(options.map),
+      [&](const content::Scene& stored) { return content::RemoveEdit(stored, {options.name}); }, nullptr);
 }
 
 // An option with `count` numbers between `least` and `most`.

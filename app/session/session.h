@@ -187,7 +187,7 @@ class Session {
   SessionMap& AddMap(std::uint64_t key, const std::string& name);
   SessionMap* FindByName(const std::string& name);
   SessionMap& MapToEdit(const engine::TrackedFrame& frame);
-  void Edit(SessionMap* map, std::unique_ptr<content::Edit> edit);
+  void Edit(SessionMap* map, content::SceneChange change);
   std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
   engine::MapPermissions PermissionsOf(const SessionMap& map) const;
   void UpdatePermissions(const SessionMap& map);

@@ -8,6 +8,7 @@
 #include "app/session/session.h"
 #include "app/session/surface_at_pixel.h"
 #include "content/asset.h"
+#include "content/edits.h"
 #include "content/placement.h"
 #include "engine/base/error.h"
 #include "engine/map/upright_axes.h"
@@ -194,9 +195,9 @@ SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
   return found->second;
 }
 
-void Session::Edit(SessionMap* map, std::unique_ptr<content::Edit> edit) {
+void Session::Edit(SessionMap* map, content::SceneChange change) {
   auto scene = std::make_shared<content::Scene>(*map->scene);
-  map->history.Do(std::move(edit), scene.get());
+  map->history.Do(std::move(change), scene.get());
   map->scene = std::move(scene);
   UpdatePermissions(*map);
 }
@@ -211,7 +212,7 @@ void Session::Apply(const PlaceModel& command, const engine::TrackedFrame& frame
   entity.model.asset = LoadAsset(command.file);
   entity.model.map_from_model = content::UprightPose(hit.point, hit.normal, engine::UpInMap(*frame.map),
                                                      command.yaw_deg * std::numbers::pi / 180, command.scale);
-  Edit(&map, content::AddEdit(std::move(entity)));
+  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
 }
 
 void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame) {
@@ -227,7 +228,7 @@ void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& fr
   // Map units mean nothing to the user, so the size is chosen by the distance from the camera.
   entity.signpost.height_m = options_.signpost_height * (frame.camera_from_map * hit.point).norm();
   entity.signpost.to_map = command.to_map;
-  Edit(&map, content::AddEdit(std::move(entity)));
+  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
 }
 
 void Session::Apply(const MoveEntity& command, const engine::TrackedFrame& frame) {
@@ -239,19 +240,22 @@ void Session::Apply(const MoveEntity& command, const engine::TrackedFrame& frame
   } else {
     place += command.by_in_map;
   }
-  Edit(&map, content::MoveEdit(command.name, place));
+  Edit(&map, content::MoveEdit(*map.scene, command.name, place));
 }
 
 void Session::Apply(const RotateEntity& command, const engine::TrackedFrame& frame) {
-  Edit(&MapToEdit(frame), content::RotateEdit(command.name, command.angle_deg));
+  SessionMap& map = MapToEdit(frame);
+  Edit(&map, content::RotateEdit(*map.scene, command.name, command.angle_deg));
 }
 
 void Session::Apply(const ScaleEntity& command, const engine::TrackedFrame& frame) {
-  Edit(&MapToEdit(frame), content::ScaleEdit(command.name, command.factor));
+  SessionMap& map = MapToEdit(frame);
+  Edit(&map, content::ScaleEdit(*map.scene, command.name, command.factor));
 }
 
 void Session::Apply(const RemoveEntity& command, const engine::TrackedFrame& frame) {
-  Edit(&MapToEdit(frame), content::RemoveEdit(command.name));
+  SessionMap& map = MapToEdit(frame);
+  Edit(&map, content::RemoveEdit(*map.scene, {command.name}));
 }
 
 void Session::Apply(const Undo&, const engine::TrackedFrame& frame) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/session/content_follower.h"
-#include "content/edits.h"
+#include "content/edit_history.h"
 #include "content/scene.h"
 #include "engine/map/map_snapshot.h"
 #include "maps/storage/policy.h"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/base/random.h"
+#include "tests/content/edit_samples.h"
 
 namespace docent::content {
 namespace {
@@ -144,6 +145,38 @@ TEST(UprightPose, UsesTheSurfaceNormalWithoutAnUpDirection) {
   const Eigen::Vector3d normal(0.6, 0, -0.8);
   const engine::Sim3 pose = UprightPose({1, 2, 3}, normal, Eigen::Vector3d::Zero(), 0, 1);
   EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitY() - normal).norm(), 1e-9);
+}
+
+TEST(FacingPose, StandsUprightAndFacesTheViewer) {
+  Random random(8);
+  const auto any = [&] {
+    return Eigen::Vector3d(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1)).normalized();
+  };
+  for (int trial = 0; trial < 100; ++trial) {
+    const Eigen::Vector3d point = any(), normal = any(), up = any(), viewer = point + 3 * any();
+    const engine::Sim3 pose = FacingPose(point, viewer, normal, 2 * up, 0, 0.25);
+    EXPECT_LT((pose * Eigen::Vector3d::Zero() - point).norm(), 1e-12);
+    EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitY() - up).norm(), 1e-9);
+    const Eigen::Vector3d to_viewer = viewer - point;
+    const Eigen::Vector3d level = to_viewer - up * up.dot(to_viewer);
+    if (level.norm() < 0.2) continue;
+    EXPECT_GT((pose.rotation * Eigen::Vector3d::UnitZ()).dot(level.normalized()), 1 - 1e-9);
+  }
+  // From straight above there is no direction to the viewer: that of the wall is used.
+  const engine::Sim3 above = FacingPose({0, 0, 0}, {0, 5, 0}, {1, 0, 0}, {0, 1, 0}, 0, 1);
+  EXPECT_LT((above.rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(), 1e-9);
+}
+
+TEST(Base, IsTheMiddleOfTheBottomOfTheBoundingBox) {
+  const auto asset = AssetWithBox("box");
+  EXPECT_EQ(BaseOf(*asset->model), Eigen::Vector3d(1, -1, 2));
+  Entity entity = ModelEntity("box");
+  EXPECT_EQ(BaseInMap(entity), PlaceOf(entity)) << "the origin of a model that is not loaded";
+  entity.model.asset = asset;
+  EXPECT_EQ(BaseInMap(entity), Eigen::Vector3d(1 + 2, 2 - 2, 3 + 4));
+  EXPECT_DOUBLE_EQ(ScaleForSide(*asset->model, 2), 0.5) << "its largest side has 4 m";
+  EXPECT_EQ(ScaleForSide(Model(), 2), 1);
+  EXPECT_EQ(ScaleForSide(*asset->model, 1e300), kMaxModelScale);
 }
 
 }  // namespace

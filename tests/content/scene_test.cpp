@@ -39,6 +39,9 @@ Scene TestScene() {
   sign.signpost.up = Eigen::Vector3d(1, 2, 3).normalized();
   sign.signpost.height_m = 0.07;
   sign.signpost.to_map = "Desk 3";
+  sign.signpost.to_key = 18'000'000'000'000'000'000u;
+  sign.locked = sign.hidden = true;
+  sign.group = "Halle \"B\"";
   scene.entities.push_back(sign);
   return scene;
 }
@@ -82,6 +85,10 @@ TEST(SceneCodec, DecodingReproducesTheNumbersExactly) {
   EXPECT_EQ(sign.up, scene.entities[1].signpost.up);
   EXPECT_EQ(sign.height_m, 0.07);
   EXPECT_EQ(sign.to_map, "Desk 3");
+  EXPECT_EQ(sign.to_key, scene.entities[1].signpost.to_key);
+  EXPECT_TRUE(read.entities[1].locked && read.entities[1].hidden);
+  EXPECT_FALSE(read.entities[0].locked || read.entities[0].hidden);
+  EXPECT_EQ(read.entities[1].group, scene.entities[1].group);
   EXPECT_TRUE(DecodeScene(EncodeScene(Scene{}), "the library", Known()).entities.empty());
 }
 
@@ -93,7 +100,7 @@ TEST(SceneCodec, InvalidMembersAreRejectedWithTheirLocation) {
     return ErrorOfScene(changed.dump());
   };
   EXPECT_EQ(ErrorOfScene(good.dump()), "");
-  EXPECT_THAT(with("/docent_scene", 2), HasSubstr("newer version"));
+  EXPECT_THAT(with("/docent_scene", 3), HasSubstr("newer version"));
   EXPECT_THAT(with("/entities/0/asset", "xyz"), HasSubstr("entities[0] uses the asset xyz"));
   EXPECT_THAT(with("/entities/0/kind", "lamp"), HasSubstr("neither a model nor a signpost"));
   EXPECT_THAT(with("/entities/0/animation", 0.5), HasSubstr("entities[0].animation"));
@@ -109,6 +116,10 @@ TEST(SceneCodec, InvalidMembersAreRejectedWithTheirLocation) {
   EXPECT_THAT(with("/entities/1/height_m", 0), HasSubstr("height_m"));
   EXPECT_THAT(with("/entities/1/text", 5), HasSubstr("entities[1].text"));
   EXPECT_THAT(with("/entities/1/text", nullptr), HasSubstr("entities[1].text"));
+  EXPECT_THAT(with("/entities/1/locked", 1), HasSubstr("entities[1].locked"));
+  EXPECT_THAT(with("/entities/1/group", 1), HasSubstr("entities[1].group"));
+  EXPECT_THAT(with("/entities/1/to_key", -1), HasSubstr("entities[1].to_key"));
+  EXPECT_THAT(with("/docent_scene", 0), HasSubstr("no valid version"));
   EXPECT_THAT(with("/entities", nlohmann::json::object()), HasSubstr("not lists"));
   EXPECT_THAT(ErrorOfScene("[1,2]"), HasSubstr("the library"));
   EXPECT_THAT(ErrorOfScene("{"), HasSubstr("not valid JSON"));
@@ -171,7 +182,11 @@ Entity AnyEntity(Random* random) {
     if (random->Uniform(0, 1) < 0.98) entity.signpost.up.normalize();
     entity.signpost.height_m = AnyNumber(random, 10);
     entity.signpost.to_map = AnyText(random);
+    entity.signpost.to_key = static_cast<std::uint64_t>(random->Uniform(0, 1e18));
   }
+  entity.locked = random->Uniform(0, 1) < 0.5;
+  entity.hidden = random->Uniform(0, 1) < 0.5;
+  if (random->Uniform(0, 1) < 0.1) entity.group = AnyText(random);
   return entity;
 }
 
@@ -201,6 +216,10 @@ TEST(SceneCodec, EveryRandomSceneIsRefusedByTheWriterOrReadBackEqual) {
       EXPECT_EQ(PlaceOf(a), PlaceOf(b));
       EXPECT_EQ(a.model.map_from_model.scale, b.model.map_from_model.scale);
       EXPECT_EQ(a.signpost.height_m, b.signpost.height_m);
+      EXPECT_EQ(a.signpost.to_key, b.signpost.to_key);
+      EXPECT_EQ(a.locked, b.locked);
+      EXPECT_EQ(a.hidden, b.hidden);
+      EXPECT_EQ(a.group, b.group);
     }
     ++written;
   }
@@ -234,6 +253,34 @@ TEST(SceneCodec, TheLargestScenesThatAreWrittenCanBeRead) {
   EXPECT_EQ(ErrorOfScene(EncodeScene(scene)), "");
 }
 
+TEST(Scene, TextIsUtf8WhereJsonTakesIt) {
+  Random random(5);
+  int good = 0;
+  for (int trial = 0; trial < 200'000; ++trial) {
+    std::string text;
+    for (std::size_t n = random.Below(5); n > 0; --n) {
+      // The bytes at the borders of each class, and any byte.
+      constexpr unsigned char kBorders[] = {0x00, 0x41, 0x7F, 0x80, 0x8F, 0x90, 0x9F, 0xA0,
+                                            0xBF, 0xC0, 0xC1, 0xC2, 0xDF, 0xE0, 0xE1, 0xEC,
+                                            0xED, 0xEE, 0xEF, 0xF0, 0xF1, 0xF4, 0xF5, 0xFF};
+      const bool any = random.Uniform() < 0.2;
+      text += static_cast<char>(any ? random.Below(256) : kBorders[random.Below(std::size(kBorders))]);
+    }
+    bool accepted = true;
+    try {
+      (void)nlohmann::json(text).dump();
+    } catch (const nlohmann::json::type_error&) {
+      accepted = false;
+    }
+    ASSERT_EQ(IsUtf8(text), accepted) << nlohmann::json(std::vector<unsigned char>(text.begin(), text.end()));
+    good += accepted ? 1 : 0;
+  }
+  EXPECT_GT(good, 40'000);
+  EXPECT_LT(good, 160'000);
+  EXPECT_EQ(Shortened("aé", 2), "a");
+  EXPECT_EQ(Shortened("aé", 3), "aé");
+}
+
 TEST(Scene, AModelsNameComesFromItsFile) {
   EXPECT_EQ(NameFromFile("models/old fox.glb"), "old fox");
   EXPECT_EQ(NameFromFile("caf\xE9.glb"), "caf\xEF\xBF\xBD");
@@ -250,7 +297,56 @@ TEST(SceneCodec, MissingMembersAreRejected) {
       ++removed;
     }
   }
-  EXPECT_EQ(removed, 12);
+  EXPECT_EQ(removed, 19);
+}
+
+TEST(SceneCodec, ScenesOfTheFirstVersionAreRead) {
+  nlohmann::json old = nlohmann::json::parse(EncodeScene(TestScene()));
+  old["docent_scene"] = 1;
+  EXPECT_THAT(ErrorOfScene(old.dump()), HasSubstr("that this version of Docent does not know"));
+  for (nlohmann::json& entity : old["entities"]) {
+    for (const char* name : {"locked", "hidden", "group", "to_key"}) entity.erase(name);
+  }
+  const Scene read = DecodeScene(old.dump(), "the library", Known());
+  ASSERT_EQ(read.entities.size(), 2u);
+  EXPECT_FALSE(read.entities[1].locked || read.entities[1].hidden);
+  EXPECT_EQ(read.entities[1].group, "");
+  EXPECT_EQ(read.entities[1].signpost.to_key, 0u);
+  EXPECT_EQ(read.entities[1].signpost.to_map, "Desk 3");
+}
+
+TEST(SceneCodec, ADamagedEntityCostsOnlyThatEntity) {
+  Scene scene = TestScene();
+  for (const char* name : {"second", "third", "fourth"}) {
+    scene.entities.push_back(scene.entities[1]);
+    scene.entities.back().name = name;
+  }
+  const nlohmann::json good = nlohmann::json::parse(EncodeScene(scene));
+  std::vector<std::string> problems;
+  const auto read = [&](const nlohmann::json& json) {
+    problems.clear();
+    return ReadScene(json.dump(), "the library", Known(), &problems);
+  };
+  EXPECT_EQ(EncodeScene(read(good)), EncodeScene(scene));
+  EXPECT_TRUE(problems.empty());
+  nlohmann::json bad = good;
+  bad["entities"][0]["asset"] = "lost";
+  bad["entities"][1]["name"] = "third";
+  bad["entities"][2] = 5;
+  bad["entities"][4]["height_m"] = -1;
+  const Scene rest = read(bad);
+  ASSERT_EQ(rest.entities.size(), 2u);
+  EXPECT_EQ(rest.entities[0].name, "third");
+  EXPECT_EQ(rest.entities[1].name, "entity-4") << "the second 'third'";
+  ASSERT_EQ(problems.size(), 4u);
+  EXPECT_THAT(problems[0], testing::AllOf(HasSubstr("the asset lost"), HasSubstr("called 'helmet'")));
+  EXPECT_THAT(problems[1], HasSubstr("entities[2] is neither"));
+  EXPECT_THAT(problems[2], HasSubstr("entities[3] has the name of another entity"));
+  EXPECT_THAT(problems[3], HasSubstr("called 'fourth'"));
+  EXPECT_EQ(Validate(rest), "");
+  EXPECT_THAT(ErrorOf([&] { read("[]"); }), HasSubstr("the library"));
+  bad["docent_scene"] = 3;
+  EXPECT_THAT(ErrorOf([&] { read(bad); }), HasSubstr("newer version"));
 }
 
 }  // namespace

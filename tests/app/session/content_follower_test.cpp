@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "app/session/session_map.h"
+#include "content/edits.h"
 #include "engine/base/random.h"
 #include "engine/map/map.h"
 
@@ -104,7 +105,7 @@ TEST(ContentFollower, FollowsContentFromItsNewPlaceAfterAnEdit) {
   SessionMap map = MapWithContent();
   map.UpdateSnapshot(Moved(*map.snapshot, Bend()));
   auto scene = std::make_shared<content::Scene>(*map.scene);
-  map.history.Do(content::MoveEdit("fox", {-0.5, 0.4, 2.6}), scene.get());
+  map.history.Do(content::MoveEdit(*scene, "fox", {-0.5, 0.4, 2.6}), scene.get());
   map.scene = scene;
   map.UpdateSnapshot(Moved(*map.snapshot, Bend()));
   EXPECT_LT((content::PlaceOf(*map.scene->Find("fox")) - Bend() * Eigen::Vector3d(-0.5, 0.4, 2.6)).norm(),

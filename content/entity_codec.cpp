@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "content/entity_codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/base/error.h"
+
+namespace docent::content {
+namespace {
+
+Json VectorToJson(const Eigen::Vector3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+// Reads the members of one JSON object.
+class ObjectReader {
+ public:
+  ObjectReader(std::string_view where, std::string place, const Json& object)
+      : where_(where), place_(std::move(place)), object_(object) {
+    if (!object.is_object()) Refuse(where_, place_, "is not a JSON object.");
+  }
+
+  const Json& Member(const char* name) const {
+    const auto found = object_.find(name);
+    if (found == object_.end()) Refuse(where_, place_, "has no " + std::string(name) + ".");
+    return *found;
+  }
+
+  std::string Text(const char* name) const {
+    const Json& value = Member(name);
+    if (!value.is_string() || value.get_ref<const std::string&>().size() > kMaxTextBytes) {
+      Refuse(where_, PlaceOfMember(name),
+             "is not a string of at most " + std::to_string(kMaxTextBytes) + " bytes.");
+    }
+    return value.get<std::string>();
+  }
+
+  bool Truth(const char* name) const {
+    const Json& value = Member(name);
+    if (!value.is_boolean()) Refuse(where_, PlaceOfMember(name), "is neither true nor false.");
+    return value.get<bool>();
+  }
+
+  std::uint64_t Key(const char* name) const {
+    const Json& value = Member(name);
+    if (!value.is_number_unsigned()) Refuse(where_, PlaceOfMember(name), "is not the key of a map.");
+    return value.get<std::uint64_t>();
+  }
+
+  double Number(const char* name, double least, double most) const {
+    return AsNumber(Member(name), PlaceOfMember(name), least, most);
+  }
+
+  template <int N>
+  Eigen::Matrix<double, N, 1> Vector(const char* name, double most) const {
+    const Json& value = Member(name);
+    const std::string place = PlaceOfMember(name);
+    if (!value.is_array() || value.size() != N)
+      Refuse(where_, place, "is not a list of " + std::to_string(N) + " numbers.");
+    Eigen::Matrix<double, N, 1> vector;
+    for (int k = 0; k < N; ++k) vector[k] = AsNumber(value[static_cast<std::size_t>(k)], place, -most, most);
+    return vector;
+  }
+
+  // Reads a vector that must have length 1, up to rounding.
+  template <int N>
+  Eigen::Matrix<double, N, 1> UnitVector(const char* name) const {
+    const Eigen::Matrix<double, N, 1> vector = Vector<N>(name, 2);
+    if (std::abs(vector.norm() - 1) > 1e-3) Refuse(where_, PlaceOfMember(name), "does not have length 1.");
+    return vector;
+  }
+
+ private:
+  std::string PlaceOfMember(const char* name) const { return place_ + "." + name; }
+
+  double AsNumber(const Json& value, const std::string& place, double least, double most) const {
+    const double number = value.is_number() ? value.get<double>() : std::nan("");
+    if (!(number >= least && number <= most)) Refuse(where_, place, "is not a number in its range.");
+    return number;
+  }
+
+  std::string_view where_;
+  std::string place_;
+  const Json& object_;
+};
+
+void ReadModel(std::string_view where, const std::string& place, const Json& json, int version,
+               const AssetLookup& find_asset, Entity* entity) {
+  if (version == 1) {
+    CheckMembers(where, place, json, {"kind", "name", "asset", "animation", "map_from_model"});
+  } else {
+    CheckMembers(where, place, json,
+                 {"kind", "name", "asset", "animation", "map_from_model", "locked", "hidden", "group"});
+  }
+  const ObjectReader reader(where, place, json);
+  entity->kind = Entity::Kind::kModel;
+  const std::string id = reader.Text("asset");
+  entity->model.asset = find_asset(id);
+  if (!entity->model.asset)
+    Refuse(where, place, "uses the asset " + id.substr(0, 64) + ", which does not exist.");
+  const double animation = reader.Number("animation", -1, kMaxAnimation);
+  if (animation != std::floor(animation)) Refuse(where, place + ".animation", "is not an integer.");
+  entity->model.animation = static_cast<int>(animation);
+  const std::string pose_place = place + ".map_from_model";
+  CheckMembers(where, pose_place, reader.Member("map_from_model"),
+               {"rotation_xyzw", "translation_m", "scale"});
+  const ObjectReader pose(where, pose_place, reader.Member("map_from_model"));
+  const Eigen::Vector4d q = pose.UnitVector<4>("rotation_xyzw");
+  entity->model.map_from_model.rotation = engine::Rotation3(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
+  entity->model.map_from_model.translation = pose.Vector<3>("translation_m", kMaxCoordinate);
+  entity->model.map_from_model.scale = pose.Number("scale", kMinModelScale, kMaxModelScale);
+}
+
+void ReadSignpost(std::string_view where, const std::string& place, const Json& json, int version,
+                  Entity* entity) {
+  if (version == 1) {
+    CheckMembers(where, place, json, {"kind", "name", "text", "anchor_m", "up", "height_m", "to_map"});
+  } else {
+    CheckMembers(where, place, json,
+                 {"kind", "name", "text", "anchor_m", "up", "height_m", "to_map", "to_key", "locked",
+                  "hidden", "group"});
+  }
+  const ObjectReader reader(where, place, json);
+  entity->kind = Entity::Kind::kSignpost;
+  entity->signpost.text = reader.Text("text");
+  entity->signpost.anchor = reader.Vector<3>("anchor_m", kMaxCoordinate);
+  entity->signpost.up = reader.UnitVector<3>("up");
+  entity->signpost.height_m = reader.Number("height_m", kMinBoardHeight, kMaxBoardHeight);
+  entity->signpost.to_map = reader.Text("to_map");
+  if (version > 1) entity->signpost.to_key = reader.Key("to_key");
+}
+
+}  // namespace
+
+void CheckMembers(std::string_view where, std::string_view place, const Json& object,
+                  std::initializer_list<std::string_view> members) {
+  if (!object.is_object()) Refuse(where, place, "is not a JSON object.");
+  for (const auto& [name, value] : object.items()) {
+    if (std::find(members.begin(), members.end(), name) == members.end()) {
+      Refuse(where, place,
+             "has a member '" + name.substr(0, 40) + "' that this version of Docent does not know.");
+    }
+  }
+}
+
+Json EntityToJson(const Entity& entity) {
+  Json json{
+      {"name", entity.name}, {"locked", entity.locked}, {"hidden", entity.hidden}, {"group", entity.group}};
+  if (entity.kind == Entity::Kind::kSignpost) {
+    const Signpost& signpost = entity.signpost;
+    json.update({{"kind", "signpost"},
+                 {"text", signpost.text},
+                 {"anchor_m", VectorToJson(signpost.anchor)},
+                 {"up", VectorToJson(signpost.up)},
+                 {"height_m", signpost.height_m},
+                 {"to_map", signpost.to_map},
+                 {"to_key", signpost.to_key}});
+    return json;
+  }
+  const engine::Sim3& pose = entity.model.map_from_model;
+  const Eigen::Quaterniond& q = pose.rotation.quaternion();
+  json.update({{"kind", "model"},
+               {"asset", entity.model.asset ? entity.model.asset->id : ""},
+               {"animation", entity.model.animation},
+               {"map_from_model",
+                {{"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}},
+                 {"translation_m", VectorToJson(pose.translation)},
+                 {"scale", pose.scale}}}});
+  return json;
+}
+
+Entity EntityFromJson(std::string_view where, const std::string& place, const Json& json, int version,
+                      const AssetLookup& find_asset) {
+  const auto kind = json.is_object() ? json.find("kind") : json.end();
+  const bool has_kind = json.is_object() && kind != json.end();
+  const bool is_model = has_kind && *kind == "model";
+  if (!is_model && !(has_kind && *kind == "signpost"))
+    Refuse(where, place, "is neither a model nor a signpost.");
+  Entity entity;
+  if (is_model) {
+    ReadModel(where, place, json, version, find_asset, &entity);
+  } else {
+    ReadSignpost(where, place, json, version, &entity);
+  }
+  const ObjectReader reader(where, place, json);
+  entity.name = reader.Text("name");
+  if (entity.name.empty()) Refuse(where, place, "has an empty name.");
+  if (version > 1) {
+    entity.locked = reader.Truth("locked");
+    entity.hidden = reader.Truth("hidden");
+    entity.group = reader.Text("group");
+  }
+  return entity;
+}
+
+}  // namespace docent::content
