@@ -69,21 +69,20 @@ Eigen::Vector3d PlaceOf(const Entity& entity) {
                                              : entity.signpost.anchor;
 }
 
-void MoveWithAnchor(const engine::Sim3& motion, Entity* entity) {
-  Entity moved;
-  moved.kind = entity->kind;
+void TransformBy(const engine::Sim3& motion, Entity* entity) {
   if (entity->kind == Entity::Kind::kModel) {
-    moved.model.map_from_model = motion * entity->model.map_from_model;
+    entity->model.map_from_model = motion * entity->model.map_from_model;
   } else {
-    moved.signpost.anchor = motion * entity->signpost.anchor;
-    moved.signpost.up = motion.rotation * entity->signpost.up;
-    moved.signpost.height_m = entity->signpost.height_m * motion.scale;
+    entity->signpost.anchor = motion * entity->signpost.anchor;
+    entity->signpost.up = motion.rotation * entity->signpost.up;
+    entity->signpost.height_m *= motion.scale;
   }
-  if (!PoseProblem(moved).empty()) return;
-  entity->model.map_from_model = moved.model.map_from_model;
-  entity->signpost.anchor = moved.signpost.anchor;
-  entity->signpost.up = moved.signpost.up;
-  entity->signpost.height_m = moved.signpost.height_m;
+}
+
+void MoveWithAnchor(const engine::Sim3& motion, Entity* entity) {
+  Entity moved = *entity;
+  TransformBy(motion, &moved);
+  if (PoseProblem(moved).empty()) *entity = std::move(moved);
 }
 
 const Entity* Scene::Find(const std::string& name) const {

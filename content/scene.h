@@ -70,6 +70,8 @@ struct Entity {
 
 // The position of an entity's foot in the map.
 Eigen::Vector3d PlaceOf(const Entity& entity);
+// Transforms an entity by a similarity of the map, wherever that takes it.
+void TransformBy(const engine::Sim3& motion, Entity* entity);
 // Transforms an entity after its anchor has moved in the map by `motion`. An entity that would leave the
 // limits above stays as it is.
 void MoveWithAnchor(const engine::Sim3& motion, Entity* entity);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "content/placement.h"
+
 namespace docent::app {
 
 namespace {
@@ -103,9 +105,7 @@ void DrawingCheck::Add(const ShownFrame& frame) {
   for (const content::Entity& entity : frame.shown.scene->entities) {
     const auto truth = truths_.find({frame.shown.map_name, entity.name});
     if (truth == truths_.end()) continue;
-    const Eigen::Vector3d& foot = entity.kind == content::Entity::Kind::kModel
-                                      ? entity.model.map_from_model.translation
-                                      : entity.signpost.anchor;
+    const Eigen::Vector3d foot = content::BaseInMap(entity);
     const auto drawn = simulation_.camera().Project(frame.tracked.camera_from_map * foot);
     const auto seen = PixelOf(simulation_, index, truth->second);
     if (drawn && seen) errors_px_.push_back((*drawn - *seen).norm());

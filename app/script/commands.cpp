@@ -2,6 +2,7 @@
 #include "app/script/commands.h"
 
 #include <cmath>
+#include <set>
 
 #include "app/files/text_file.h"
 #include "content/scene.h"
@@ -55,6 +56,26 @@ std::string ScaleProblem(double scale) {
          FormatNumber(content::kMaxModelScale);
 }
 
+std::string NamesProblem(const std::vector<std::string>& names) {
+  if (names.empty()) return "expected the name of a model or a signpost";
+  if (names.size() > content::kMaxEntities) return "there are more names than a map can hold";
+  std::set<std::string_view> seen;
+  for (const std::string& name : names) {
+    if (const std::string problem = NameProblem(name, "a name"); !problem.empty()) return problem;
+    if (!seen.insert(name).second) return "'" + name + "' is named twice";
+  }
+  return "";
+}
+
+// Of a similarity that takes an entity to the map. The height of a signpost has narrower limits, which are
+// checked where it is known that the entity is one.
+std::string PoseProblem(const engine::Sim3& pose) {
+  if (!IsAtMost(pose.translation.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate))
+    return "the place is out of any map";
+  if (!IsAtMost(pose.rotation.quaternion().norm() - 1, 1e-4)) return "the rotation is not valid";
+  return ScaleProblem(pose.scale);
+}
+
 std::string First(std::initializer_list<std::string> problems) {
   for (const std::string& problem : problems) {
     if (!problem.empty()) return problem;
@@ -68,9 +89,14 @@ struct Validator {
   // A map that was made by an earlier version may have a name that is not accepted for a new one.
   std::string operator()(const UseMap& c) const { return c.name.empty() ? kNoMapName : ""; }
   std::string operator()(const SetPolicy& c) const { return c.name.empty() ? kNoMapName : ""; }
+  std::string operator()(const RenameMap& c) const {
+    return First({c.name.empty() ? kNoMapName : "", MapNameProblem(c.new_name)});
+  }
+  std::string operator()(const RemoveMap& c) const { return c.name.empty() ? kNoMapName : ""; }
   std::string operator()(const PlaceModel& c) const {
     if (c.file.empty()) return "expected a model's file";
-    return First({PixelProblem(c.pixel), ScaleProblem(c.scale), AngleProblem(c.yaw_deg)});
+    return First(
+        {PixelProblem(c.pixel), c.scale ? ScaleProblem(*c.scale) : std::string(), AngleProblem(c.yaw_deg)});
   }
   std::string operator()(const PlaceSignpost& c) const {
     return First({NameProblem(c.text, "a signpost's text"), PixelProblem(c.pixel),
@@ -88,13 +114,53 @@ struct Validator {
   std::string operator()(const ScaleEntity& c) const {
     return First({NameProblem(c.name, "a name"), FactorProblem(c.factor)});
   }
-  std::string operator()(const RemoveEntity& c) const { return NameProblem(c.name, "a name"); }
+  std::string operator()(const TransformEntity& c) const {
+    return First({NameProblem(c.name, "a name"), PoseProblem(c.map_from_entity)});
+  }
+  std::string operator()(const RemoveEntities& c) const { return NamesProblem(c.names); }
+  std::string operator()(const DuplicateEntities& c) const { return NamesProblem(c.names); }
+  std::string operator()(const RenameEntity& c) const {
+    return First({NameProblem(c.name, "a name"), NameProblem(c.new_name, "a new name")});
+  }
+  std::string operator()(const SetEntityText& c) const {
+    return First({NameProblem(c.name, "a name"), NameProblem(c.text, "a signpost's text")});
+  }
+  std::string operator()(const SetSignpostTarget& c) const {
+    return First({NameProblem(c.name, "a name"), c.to_map.empty() ? "" : MapNameProblem(c.to_map)});
+  }
+  std::string operator()(const SetEntityFlag& c) const { return NamesProblem(c.names); }
+  std::string operator()(const GroupEntities& c) const {
+    return First({NamesProblem(c.names), c.group.empty() ? "" : NameProblem(c.group, "a group's name")});
+  }
+  std::string operator()(const PasteEntities& c) const {
+    return First({NamesProblem(c.names), c.from_map.empty() ? kNoMapName : "",
+                  c.to_pixel ? PixelProblem(*c.to_pixel) : std::string()});
+  }
   std::string operator()(const Undo&) const { return ""; }
   std::string operator()(const Redo&) const { return ""; }
   std::string operator()(const Save&) const { return ""; }
 };
 
 }  // namespace
+
+engine::Rotation3 Settled(const engine::Rotation3& rotation) {
+  constexpr int kMostSteps = 10;  // One or two are needed.
+  engine::Rotation3 settled = rotation;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const engine::Rotation3 next(settled.quaternion());
+    if (next.quaternion().coeffs() == settled.quaternion().coeffs()) break;
+    settled = next;
+  }
+  return settled;
+}
+
+bool TransformEntity::operator==(const TransformEntity& other) const {
+  return name == other.name &&
+         Settled(map_from_entity.rotation).quaternion().coeffs() ==
+             Settled(other.map_from_entity.rotation).quaternion().coeffs() &&
+         map_from_entity.translation == other.map_from_entity.translation &&
+         map_from_entity.scale == other.map_from_entity.scale;
+}
 
 std::string Validate(const Command& command) {
   return std::visit(Validator{}, command);

@@ -7,7 +7,9 @@
 #include <variant>
 #include <vector>
 
+#include "content/edits.h"
 #include "engine/base/time.h"
+#include "engine/geometry/sim3.h"
 #include "maps/storage/policy.h"
 
 // Every change that a user can make, as data. The window, script files and tests all use these structs; the
@@ -31,12 +33,23 @@ struct SetPolicy {
   maps::Policy policy = maps::Policy::kOpen;
   bool operator==(const SetPolicy&) const = default;
 };
+struct RenameMap {
+  std::string name, new_name;
+  bool operator==(const RenameMap&) const = default;
+};
+// Removes the map with its content, which cannot be undone.
+struct RemoveMap {
+  std::string name;
+  bool operator==(const RemoveMap&) const = default;
+};
 // The pixel denotes the point of the map's surface that is visible there in the command's frame.
 struct PlaceModel {
   std::string file;  // as given; relative to the script's folder or the working folder
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-  double scale = 1;    // map units per metre of the model
-  double yaw_deg = 0;  // about the surface's normal
+  // Map units per metre of the model. Without it, the largest side of the model becomes a fifth of the
+  // distance between the camera and the surface.
+  std::optional<double> scale = std::nullopt;
+  double yaw_deg = 0;  // about the up axis; at 0 the model faces the viewer
   bool operator==(const PlaceModel&) const = default;
 };
 struct PlaceSignpost {
@@ -62,9 +75,56 @@ struct ScaleEntity {
   double factor = 1;  // positive
   bool operator==(const ScaleEntity&) const = default;
 };
-struct RemoveEntity {
+// Gives a model this pose. A signpost gets its translation as its place and its scale as its height.
+struct TransformEntity {
   std::string name;
-  bool operator==(const RemoveEntity&) const = default;
+  engine::Sim3 map_from_entity;
+  // Rotations are equal when they are equal after all rounding (Settled).
+  bool operator==(const TransformEntity& other) const;
+};
+struct RemoveEntities {
+  std::vector<std::string> names;
+  bool operator==(const RemoveEntities&) const = default;
+};
+// Each copy stands beside its original.
+struct DuplicateEntities {
+  std::vector<std::string> names;
+  bool operator==(const DuplicateEntities&) const = default;
+};
+struct RenameEntity {
+  std::string name, new_name;
+  bool operator==(const RenameEntity&) const = default;
+};
+// Of a signpost.
+struct SetEntityText {
+  std::string name, text;
+  bool operator==(const SetEntityText&) const = default;
+};
+struct SetSignpostTarget {
+  std::string name;
+  std::string to_map;  // the map it leads to; empty for none
+  bool operator==(const SetSignpostTarget&) const = default;
+};
+// Locks, unlocks, hides or shows entities.
+struct SetEntityFlag {
+  std::vector<std::string> names;
+  content::EntityFlag flag = content::EntityFlag::kLocked;
+  bool value = true;
+  bool operator==(const SetEntityFlag&) const = default;
+};
+struct GroupEntities {
+  std::vector<std::string> names;
+  std::string group;  // empty: they are in no group any more
+  bool operator==(const GroupEntities&) const = default;
+};
+// Copies entities of a map (which may be this one) to the surface at the pixel, or at the middle of the image
+// without one, where the middle of their bases then is. What is copied from another map is turned upright,
+// and is scaled by the ratio of the distances at which the first keyframes of the two maps see them.
+struct PasteEntities {
+  std::vector<std::string> names;
+  std::string from_map;
+  std::optional<Eigen::Vector2d> to_pixel;
+  bool operator==(const PasteEntities&) const = default;
 };
 struct Undo {
   bool operator==(const Undo&) const = default;
@@ -76,8 +136,15 @@ struct Save {
   bool operator==(const Save&) const = default;
 };
 
-using Command = std::variant<NewMap, StopMap, UseMap, SetPolicy, PlaceModel, PlaceSignpost, MoveEntity,
-                             RotateEntity, ScaleEntity, RemoveEntity, Undo, Redo, Save>;
+using Command =
+    std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, PlaceModel, PlaceSignpost,
+                 MoveEntity, RotateEntity, ScaleEntity, TransformEntity, RemoveEntities, DuplicateEntities,
+                 RenameEntity, SetEntityText, SetSignpostTarget, SetEntityFlag, GroupEntities, PasteEntities,
+                 Undo, Redo, Save>;
+
+// The same rotation, with a quaternion that normalizing does not change any more. A command that was written
+// to a script and read again thereby has exactly the rotation of the original.
+engine::Rotation3 Settled(const engine::Rotation3& rotation);
 
 // What is wrong with the command's values, whatever the map holds, as a sentence without capital and full
 // stop

@@ -2,6 +2,8 @@
 #include "app/script/script_file.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 #include "app/files/text_file.h"
 #include "engine/base/error.h"
@@ -106,6 +108,11 @@ Command ParseMap(LineReader* line) {
   if (line->TakeIf("new")) return NewMap{line->TakeName("a map's name")};
   if (line->TakeIf("stop")) return StopMap{};
   if (line->TakeIf("use")) return UseMap{line->TakeName("a map's name")};
+  if (line->TakeIf("rename")) {
+    const std::string name = line->TakeName("a map's name");
+    return RenameMap{name, line->TakeName("a new name")};
+  }
+  if (line->TakeIf("remove")) return RemoveMap{line->TakeName("a map's name")};
   if (line->TakeIf("policy")) {
     SetPolicy command;
     command.name = line->TakeName("a map's name");
@@ -115,8 +122,8 @@ Command ParseMap(LineReader* line) {
     command.policy = *policy;
     return command;
   }
-  const std::string word = line->Take("new, stop, use or policy");
-  line->Fail("unknown command 'map " + word + "'; use map new, map stop, map use or map policy");
+  const std::string word = line->Take("new, stop, use, policy, rename or remove");
+  line->Fail("unknown command 'map " + word + "'; use new, stop, use, policy, rename or remove after map");
 }
 
 Command ParsePlace(LineReader* line) {
@@ -166,14 +173,83 @@ Command ParseScale(LineReader* line) {
   return ScaleEntity{name, line->TakeNumber("a factor")};
 }
 
+Command ParseTransform(LineReader* line) {
+  TransformEntity command;
+  command.name = line->TakeName("a name");
+  engine::Sim3& pose = command.map_from_entity;
+  for (int axis = 0; axis < 3; ++axis) pose.translation[axis] = line->TakeNumber("X Y Z in map units");
+  Eigen::Vector4d quaternion;
+  for (int k = 0; k < 4; ++k) quaternion[k] = line->TakeNumber("a quaternion QX QY QZ QW");
+  if (!(std::abs(quaternion.norm() - 1) < 1e-3)) line->Fail("the quaternion does not have length 1");
+  pose.rotation = Settled(engine::Rotation3(Eigen::Quaterniond(quaternion)));
+  pose.scale = line->TakeNumber("a scale");
+  return command;
+}
+
+// Names up to the end of the line, or up to a keyword.
+std::vector<std::string> ParseNames(LineReader* line, std::string_view keyword = {}) {
+  std::vector<std::string> names;
+  while (!line->AtEnd() && (keyword.empty() || !line->TakeIf(keyword)))
+    names.push_back(line->TakeName("a name"));
+  return names;
+}
+
+Command ParseFlag(LineReader* line, content::EntityFlag flag, bool value) {
+  return SetEntityFlag{ParseNames(line), flag, value};
+}
+
+Command ParseGroup(LineReader* line) {
+  const std::string group = line->TakeName("a group's name");
+  return GroupEntities{ParseNames(line), group};
+}
+
+Command ParseTarget(LineReader* line) {
+  SetSignpostTarget command{line->TakeName("a name"), ""};
+  if (!line->AtEnd()) command.to_map = line->TakeName("a map's name");
+  return command;
+}
+
+Command ParsePaste(LineReader* line) {
+  PasteEntities command;
+  command.names = ParseNames(line, "from");
+  command.from_map = line->TakeName("'from' and a map's name");
+  if (line->TakeIf("at")) command.to_pixel = line->TakePixel();
+  return command;
+}
+
+// The commands that name models and signposts; empty for another command.
+std::optional<Command> ParseEdit(LineReader* line) {
+  using content::EntityFlag;
+  if (line->TakeIf("move")) return ParseMove(line);
+  if (line->TakeIf("rotate")) return ParseRotate(line);
+  if (line->TakeIf("scale")) return ParseScale(line);
+  if (line->TakeIf("transform")) return ParseTransform(line);
+  if (line->TakeIf("remove")) return RemoveEntities{ParseNames(line)};
+  if (line->TakeIf("duplicate")) return DuplicateEntities{ParseNames(line)};
+  if (line->TakeIf("rename")) {
+    const std::string name = line->TakeName("a name");
+    return RenameEntity{name, line->TakeName("a new name")};
+  }
+  if (line->TakeIf("text")) {
+    const std::string name = line->TakeName("a name");
+    return SetEntityText{name, line->TakeName("a text")};
+  }
+  if (line->TakeIf("target")) return ParseTarget(line);
+  if (line->TakeIf("lock")) return ParseFlag(line, EntityFlag::kLocked, true);
+  if (line->TakeIf("unlock")) return ParseFlag(line, EntityFlag::kLocked, false);
+  if (line->TakeIf("hide")) return ParseFlag(line, EntityFlag::kHidden, true);
+  if (line->TakeIf("show")) return ParseFlag(line, EntityFlag::kHidden, false);
+  if (line->TakeIf("group")) return ParseGroup(line);
+  if (line->TakeIf("ungroup")) return GroupEntities{ParseNames(line), ""};
+  if (line->TakeIf("paste")) return ParsePaste(line);
+  return std::nullopt;
+}
+
 Command ParseCommand(LineReader* line) {
   if (line->TakeIf("map")) return ParseMap(line);
   if (line->TakeIf("place")) return ParsePlace(line);
   if (line->TakeIf("signpost")) return ParseSignpost(line);
-  if (line->TakeIf("move")) return ParseMove(line);
-  if (line->TakeIf("rotate")) return ParseRotate(line);
-  if (line->TakeIf("scale")) return ParseScale(line);
-  if (line->TakeIf("remove")) return RemoveEntity{line->TakeName("a name")};
+  if (auto edit = ParseEdit(line)) return *std::move(edit);
   if (line->TakeIf("undo")) return Undo{};
   if (line->TakeIf("redo")) return Redo{};
   if (line->TakeIf("save")) return Save{};
@@ -210,6 +286,12 @@ std::string Pixel(const Eigen::Vector2d& pixel) {
   return "pixel " + Number(pixel.x()) + ' ' + Number(pixel.y());
 }
 
+std::string Names(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += ' ' + AlwaysQuoted(name);
+  return text;
+}
+
 struct Formatter {
   std::string operator()(const NewMap& c) const { return "map new " + AlwaysQuoted(c.name); }
   std::string operator()(const StopMap&) const { return "map stop"; }
@@ -217,9 +299,13 @@ struct Formatter {
   std::string operator()(const SetPolicy& c) const {
     return "map policy " + AlwaysQuoted(c.name) + ' ' + maps::ToString(c.policy);
   }
+  std::string operator()(const RenameMap& c) const {
+    return "map rename " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.new_name);
+  }
+  std::string operator()(const RemoveMap& c) const { return "map remove " + AlwaysQuoted(c.name); }
   std::string operator()(const PlaceModel& c) const {
     return "place " + Quoted(c.file) + " at " + Pixel(c.pixel) +
-           (c.scale != 1 ? " scale " + Number(c.scale) : "") +
+           (c.scale ? " scale " + Number(*c.scale) : "") +
            (c.yaw_deg != 0 ? " yaw " + Number(c.yaw_deg) : "");
   }
   std::string operator()(const PlaceSignpost& c) const {
@@ -237,7 +323,36 @@ struct Formatter {
   std::string operator()(const ScaleEntity& c) const {
     return "scale " + Quoted(c.name) + ' ' + Number(c.factor);
   }
-  std::string operator()(const RemoveEntity& c) const { return "remove " + Quoted(c.name); }
+  std::string operator()(const TransformEntity& c) const {
+    const engine::Sim3& pose = c.map_from_entity;
+    std::string text = "transform " + Quoted(c.name);
+    for (const double value : pose.translation) text += ' ' + Number(value);
+    for (const double value : Settled(pose.rotation).quaternion().coeffs()) text += ' ' + Number(value);
+    return text + ' ' + Number(pose.scale);
+  }
+  std::string operator()(const RemoveEntities& c) const { return "remove" + Names(c.names); }
+  std::string operator()(const DuplicateEntities& c) const { return "duplicate" + Names(c.names); }
+  std::string operator()(const RenameEntity& c) const {
+    return "rename " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.new_name);
+  }
+  std::string operator()(const SetEntityText& c) const {
+    return "text " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.text);
+  }
+  std::string operator()(const SetSignpostTarget& c) const {
+    return "target " + AlwaysQuoted(c.name) + (c.to_map.empty() ? "" : ' ' + AlwaysQuoted(c.to_map));
+  }
+  std::string operator()(const SetEntityFlag& c) const {
+    const bool is_lock = c.flag == content::EntityFlag::kLocked;
+    const char* const verb = is_lock ? (c.value ? "lock" : "unlock") : (c.value ? "hide" : "show");
+    return verb + Names(c.names);
+  }
+  std::string operator()(const GroupEntities& c) const {
+    return (c.group.empty() ? "ungroup" : "group " + AlwaysQuoted(c.group)) + Names(c.names);
+  }
+  std::string operator()(const PasteEntities& c) const {
+    return "paste" + Names(c.names) + " from " + AlwaysQuoted(c.from_map) +
+           (c.to_pixel ? " at " + Pixel(*c.to_pixel) : "");
+  }
   std::string operator()(const Undo&) const { return "undo"; }
   std::string operator()(const Redo&) const { return "redo"; }
   std::string operator()(const Save&) const { return "save"; }

@@ -3,6 +3,7 @@
 
 #include "app/files/text_file.h"
 #include "app/output/run_output.h"
+#include "content/placement.h"
 
 namespace docent::app {
 
@@ -14,7 +15,7 @@ void AugmentationLog::Add(const engine::TrackedFrame& frame, const engine::Camer
                           const std::string& map_name, const content::Scene& scene) {
   if (!engine::HasPose(frame.state)) return;
   for (const content::Entity& entity : scene.entities) {
-    const auto pixel = camera.Project(frame.camera_from_map * content::PlaceOf(entity));
+    const auto pixel = camera.Project(frame.camera_from_map * content::BaseInMap(entity));
     if (!pixel || !camera.IsInside(*pixel)) continue;
     file_.Write(FormatSeconds(frame.frame.time) + ',' + CsvField(map_name) + ',' + CsvField(entity.name) +
                 ',' + FormatNumber(pixel->x(), 7) + ',' + FormatNumber(pixel->y(), 7) + '\n');

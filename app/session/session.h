@@ -14,13 +14,14 @@
 #include <vector>
 
 #include "app/output/run_output.h"
-#include "app/script/commands.h"
+#include "app/script/scene_commands.h"
 #include "app/session/library_scene.h"
 #include "app/session/maintenance_order.h"
 #include "app/session/map_keys.h"
 #include "app/session/mapping_status.h"
 #include "app/session/relocalization_message.h"
 #include "app/session/session_map.h"
+#include "app/session/surface_at_pixel.h"
 #include "engine/system/system.h"
 #include "maps/library/library.h"
 #include "maps/library/map_pager.h"
@@ -37,6 +38,7 @@ struct SessionOptions : engine::SystemOptions {
   // Idle maps in memory are adjusted while there is nothing else to do; needs `threaded`.
   bool maintenance = true;
   double signpost_height = 0.12;  // ratio of its distance at placement
+  double model_side = 0.2;        // the same for the largest side of a model without a scale
   maps::PagerOptions memory;      // how much of the library is in memory at once
   // Measured distance in metres between the first two cameras of a rigid rig; 0 when not measured. Once the
   // rig is recognised, it gives the length of a map unit in metres.
@@ -175,23 +177,38 @@ class Session {
   void Apply(const SetPolicy& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
   void ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestamp time,
                     std::unique_lock<std::mutex>* lock);
-  void Apply(const PlaceModel& command, const engine::TrackedFrame& frame);
-  void Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame);
-  void Apply(const MoveEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const RotateEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const ScaleEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const RemoveEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const Undo& command, const engine::TrackedFrame& frame);
-  void Apply(const Redo& command, const engine::TrackedFrame& frame);
+  void Apply(const RenameMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
+  void Apply(const RemoveMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
   void Apply(const Save& command, const engine::TrackedFrame& frame);
+  SessionMap& InitializedMap(const std::string& name);
+  // Waits until the library holds all changes of the map that were submitted; returns whether it has the map.
+  bool FlushToLibrary(std::uint64_t key, const std::string& name, Timestamp time,
+                      std::unique_lock<std::mutex>* lock);
+  void Retarget(std::uint64_t from_key, const std::string& from, std::uint64_t to_key, const std::string& to);
   SessionMap& AddMap(std::uint64_t key, const std::string& name);
   SessionMap* FindByName(const std::string& name);
-  SessionMap& MapToEdit(const engine::TrackedFrame& frame);
-  void Edit(SessionMap* map, content::SceneChange change);
-  std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
   engine::MapPermissions PermissionsOf(const SessionMap& map) const;
   void UpdatePermissions(const SessionMap& map);
   std::uint64_t CurrentMap(const engine::TrackedFrame& frame) const;
+
+  // session_content.cpp; all with mutex_ held
+  void Apply(const PlaceModel& command, const engine::TrackedFrame& frame);
+  void Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame);
+  void Apply(const MoveEntity& command, const engine::TrackedFrame& frame);
+  void Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame);
+  void Apply(const PasteEntities& command, const engine::TrackedFrame& frame);
+  void Apply(const Undo& command, const engine::TrackedFrame& frame);
+  void Apply(const Redo& command, const engine::TrackedFrame& frame);
+  template <SceneCommand C>
+  void Apply(const C& command, const engine::TrackedFrame& frame) {
+    SessionMap& map = MapToEdit(frame);
+    Edit(&map, EditFor(*map.scene, command));
+  }
+  SessionMap& MapToEdit(const engine::TrackedFrame& frame);
+  void Edit(SessionMap* map, content::SceneChange change);
+  content::SurfaceHit SurfaceFor(const engine::TrackedFrame& frame, const Eigen::Vector2d& pixel) const;
+  std::uint64_t TargetKey(const SessionMap& map, const std::string& to_map);
+  std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
 
   // session_saving.cpp
   void OnSaved(const maps::MapRecord& record);

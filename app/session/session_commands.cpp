@@ -1,29 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <numbers>
-#include <type_traits>
 #include <utility>
 
 #include "app/script/script_file.h"
 #include "app/session/session.h"
-#include "app/session/surface_at_pixel.h"
-#include "content/asset.h"
-#include "content/edits.h"
-#include "content/placement.h"
 #include "engine/base/error.h"
-#include "engine/map/upright_axes.h"
 
 namespace docent::app {
-
-namespace {
-
-const content::Entity& FindEntity(const content::Scene& scene, const std::string& name) {
-  const content::Entity* entity = scene.Find(name);
-  if (entity == nullptr) throw Error("there is no '" + name + "' in this map");
-  return *entity;
-}
-
-}  // namespace
 
 void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
                       const std::filesystem::path& model_folder) {
@@ -36,8 +19,8 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
   HandleSystemEvents();
   model_folder_ = model_folder;
   const auto apply = [&](const auto& chosen) {
-    if constexpr (std::is_same_v<decltype(chosen), const SetPolicy&>) {
-      Apply(chosen, frame, &lock);
+    if constexpr (requires { Apply(chosen, frame, &lock); }) {
+      Apply(chosen, frame, &lock);  // waits for the disk
     } else {
       Apply(chosen, frame);
     }
@@ -47,32 +30,18 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
   AddEvent(frame.frame.time, "command", FormatCommand(command));
 }
 
-void Session::Preload(const Command& command, const std::filesystem::path& model_folder) {
-  const auto* place = std::get_if<PlaceModel>(&command);
-  if (place == nullptr) return;
-  const std::scoped_lock lock(mutex_);
-  model_folder_ = model_folder;
-  LoadAsset(place->file);
-}
-
-std::shared_ptr<const content::Asset> Session::LoadAsset(const std::string& file) {
-  auto& model = models_[(model_folder_ / file).string()];
-  if (model) return model;
-  std::filesystem::path path = model_folder_ / file;
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) path = file;
-  auto asset = std::make_shared<content::Asset>(content::ImportAsset(path));
-  // The same bytes may already be in use in a map: one copy is shared.
-  auto& kept = assets_[asset->id];
-  if (!kept) kept = std::move(asset);
-  return model = kept;
-}
-
 SessionMap* Session::FindByName(const std::string& name) {
   for (auto& [key, map] : maps_) {
     if (map.Exists() && map.name == name) return &map;
   }
   return nullptr;
+}
+
+SessionMap& Session::InitializedMap(const std::string& name) {
+  SessionMap* const map = FindByName(name);
+  if (map == nullptr) throw Error("there is no map '" + name + "'");
+  if (!map->snapshot) throw Error("the map '" + name + "' is not initialized yet");
+  return *map;
 }
 
 SessionMap& Session::AddMap(std::uint64_t key, const std::string& name) {
@@ -120,28 +89,24 @@ void Session::Apply(const StopMap&, const engine::TrackedFrame& frame) {
 }
 
 void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
-  SessionMap* map = FindByName(command.name);
-  if (map == nullptr) throw Error("there is no map '" + command.name + "'");
-  if (!map->snapshot) throw Error("the map '" + command.name + "' is not initialized yet");
-  map->stopped = false;
-  UpdatePermissions(*map);
-  system_.EnterMap(map->key, static_cast<std::size_t>(frame.frame.camera));
+  SessionMap& map = InitializedMap(command.name);
+  map.stopped = false;
+  UpdatePermissions(map);
+  system_.EnterMap(map.key, static_cast<std::size_t>(frame.frame.camera));
   PinMapsInUse();
 }
 
 void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
                     std::unique_lock<std::mutex>* lock) {
-  SessionMap* const map = FindByName(command.name);
-  if (map == nullptr) throw Error("there is no map '" + command.name + "'");
-  if (!map->snapshot) throw Error("the map '" + command.name + "' is not initialized yet");
-  const std::uint64_t key = map->key;
+  const SessionMap& map = InitializedMap(command.name);
+  const std::uint64_t key = map.key;
   const auto extend_again = [&] {
     UpdatePermissions(maps_.at(key));
     if (CurrentMap(frame) == key) system_.Activate(key);
   };
   if (saver_ && CurrentMap(frame) == key) {
     // The mapper must not change the map between the save and the new policy, which may forbid to save it.
-    engine::MapPermissions unchanged = PermissionsOf(*map);
+    engine::MapPermissions unchanged = PermissionsOf(map);
     unchanged.extend = false;
     system_.SetPermissions(key, unchanged);
     system_.Activate(key);
@@ -162,14 +127,9 @@ void Session::ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestam
                            std::unique_lock<std::mutex>* lock) {
   SessionMap& map = maps_.at(key);
   if (saver_) {
-    // The library computes the bounds from what it holds, so everything must be saved first. This is the one
-    // command that waits for the disk.
+    // The library computes the bounds from what it holds, so everything must be saved first.
     SaveMap(&map, time);
-    lock->unlock();
-    saver_->Flush();
-    lock->lock();
-    ReportSaveFailure(time);
-    if (!map.Exists()) throw Error("the map '" + command.name + "' was discarded or joined meanwhile");
+    FlushToLibrary(key, command.name, time, lock);
     if (map.NeedsSave())
       throw Error("the map '" + map.name + "' could not be saved, so its policy was not changed");
     library_->SetPolicy(key, command.policy);
@@ -182,96 +142,70 @@ void Session::ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestam
   map.policy = command.policy;
 }
 
-SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
-  const std::uint64_t key = engine::HasPose(frame.state) ? frame.map_key : CurrentMap(frame);
+bool Session::FlushToLibrary(std::uint64_t key, const std::string& name, Timestamp time,
+                             std::unique_lock<std::mutex>* lock) {
+  if (!saver_) return false;
+  lock->unlock();
+  saver_->InterruptMaintenance();  // it may write the map as it was
+  saver_->Flush();
+  lock->lock();
+  ReportSaveFailure(time);
   const auto found = maps_.find(key);
-  if (found == maps_.end() || !found->second.snapshot) throw Error("there is no current map");
-  if (found->second.discarded) throw Error("the map of this frame was discarded");
-  if (!found->second.Exists()) throw Error("the map of this frame was joined into another one");
-  if (!maps::MayChangeContent(found->second.policy)) {
-    throw Error("the map '" + found->second.name + "' is " + maps::ToString(found->second.policy) +
-                ": its content cannot be changed");
+  if (found == maps_.end() || !found->second.Exists())
+    throw Error("the map '" + name + "' was discarded or joined meanwhile");
+  const std::vector<maps::MapInfo> stored = library_->List();
+  return std::any_of(stored.begin(), stored.end(),
+                     [&](const maps::MapInfo& info) { return info.key == key; });
+}
+
+// Signposts that lead to one map lead to another one from now on, or nowhere (key 0). This is no edit that
+// could be undone: it follows from what happened to the maps.
+void Session::Retarget(std::uint64_t from_key, const std::string& from, std::uint64_t to_key,
+                       const std::string& to) {
+  for (auto& [key, map] : maps_) {
+    if (!map.Exists() || !maps::MayChangeContent(map.policy)) continue;
+    auto scene = std::make_shared<content::Scene>(*map.scene);
+    bool changed = false;
+    for (content::Entity& entity : scene->entities) {
+      content::Signpost& signpost = entity.signpost;
+      const bool leads = signpost.to_key != 0 ? signpost.to_key == from_key : signpost.to_map == from;
+      if (entity.kind != content::Entity::Kind::kSignpost || !leads) continue;
+      signpost.to_key = to_key;
+      signpost.to_map = to;
+      changed = true;
+    }
+    if (changed) map.scene = std::move(scene);
   }
-  return found->second;
 }
 
-void Session::Edit(SessionMap* map, content::SceneChange change) {
-  auto scene = std::make_shared<content::Scene>(*map->scene);
-  map->history.Do(std::move(change), scene.get());
-  map->scene = std::move(scene);
-  UpdatePermissions(*map);
-}
-
-void Session::Apply(const PlaceModel& command, const engine::TrackedFrame& frame) {
-  SessionMap& map = MapToEdit(frame);
-  const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
-  const content::SurfaceHit hit = SurfaceAtPixel(frame, *camera.model, command.pixel);
-  content::Entity entity;
-  entity.kind = content::Entity::Kind::kModel;
-  entity.name = map.scene->FreeName(content::NameFromFile(command.file));
-  entity.model.asset = LoadAsset(command.file);
-  entity.model.map_from_model = content::UprightPose(hit.point, hit.normal, engine::UpInMap(*frame.map),
-                                                     command.yaw_deg * std::numbers::pi / 180, command.scale);
-  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
-}
-
-void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame) {
-  SessionMap& map = MapToEdit(frame);
-  const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
-  const content::SurfaceHit hit = SurfaceAtPixel(frame, *camera.model, command.pixel);
-  content::Entity entity;
-  entity.kind = content::Entity::Kind::kSignpost;
-  entity.name = map.scene->FreeSignpostName();
-  entity.signpost.text = command.text;
-  entity.signpost.anchor = hit.point;
-  entity.signpost.up = engine::UpInMap(*frame.map);
-  // Map units mean nothing to the user, so the size is chosen by the distance from the camera.
-  entity.signpost.height_m = options_.signpost_height * (frame.camera_from_map * hit.point).norm();
-  entity.signpost.to_map = command.to_map;
-  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
-}
-
-void Session::Apply(const MoveEntity& command, const engine::TrackedFrame& frame) {
-  SessionMap& map = MapToEdit(frame);
-  Eigen::Vector3d place = content::PlaceOf(FindEntity(*map.scene, command.name));
-  if (command.to_pixel) {
-    const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
-    place = SurfaceAtPixel(frame, *camera.model, *command.to_pixel).point;
-  } else {
-    place += command.by_in_map;
+void Session::Apply(const RenameMap& command, const engine::TrackedFrame& frame,
+                    std::unique_lock<std::mutex>* lock) {
+  SessionMap* const map = FindByName(command.name);
+  if (map == nullptr) throw Error("there is no map '" + command.name + "'");
+  if (command.new_name == command.name) throw Error("the map has this name already");
+  if (!maps::MayChangeContent(map->policy)) {
+    throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be renamed");
   }
-  Edit(&map, content::MoveEdit(*map.scene, command.name, place));
+  const bool stored = FlushToLibrary(map->key, command.name, frame.frame.time, lock);
+  if (FindByName(command.new_name) != nullptr)
+    throw Error("there is already a map '" + command.new_name + "'");
+  if (stored) library_->Rename(map->key, command.new_name);
+  map->name = command.new_name;
+  Retarget(map->key, command.name, map->key, command.new_name);
 }
 
-void Session::Apply(const RotateEntity& command, const engine::TrackedFrame& frame) {
-  SessionMap& map = MapToEdit(frame);
-  Edit(&map, content::RotateEdit(*map.scene, command.name, command.angle_deg));
-}
-
-void Session::Apply(const ScaleEntity& command, const engine::TrackedFrame& frame) {
-  SessionMap& map = MapToEdit(frame);
-  Edit(&map, content::ScaleEdit(*map.scene, command.name, command.factor));
-}
-
-void Session::Apply(const RemoveEntity& command, const engine::TrackedFrame& frame) {
-  SessionMap& map = MapToEdit(frame);
-  Edit(&map, content::RemoveEdit(*map.scene, {command.name}));
-}
-
-void Session::Apply(const Undo&, const engine::TrackedFrame& frame) {
-  SessionMap& map = MapToEdit(frame);
-  auto scene = std::make_shared<content::Scene>(*map.scene);
-  if (!map.history.Undo(scene.get())) throw Error("there is nothing to undo in '" + map.name + "'");
-  map.scene = std::move(scene);
-  UpdatePermissions(map);
-}
-
-void Session::Apply(const Redo&, const engine::TrackedFrame& frame) {
-  SessionMap& map = MapToEdit(frame);
-  auto scene = std::make_shared<content::Scene>(*map.scene);
-  if (!map.history.Redo(scene.get())) throw Error("there is nothing to redo in '" + map.name + "'");
-  map.scene = std::move(scene);
-  UpdatePermissions(map);
+void Session::Apply(const RemoveMap& command, const engine::TrackedFrame& frame,
+                    std::unique_lock<std::mutex>* lock) {
+  SessionMap* const map = FindByName(command.name);
+  if (map == nullptr) throw Error("there is no map '" + command.name + "'");
+  if (!maps::MayRemove(map->policy)) {
+    throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be removed");
+  }
+  if (FlushToLibrary(map->key, command.name, frame.frame.time, lock)) library_->Remove(map->key);
+  map->discarded = true;  // before the cameras leave the map, so that it is not saved again
+  system_.RemoveMap(map->key);
+  Retarget(map->key, command.name, 0, "");
+  PinMapsInUse();
 }
 
 void Session::Apply(const Save&, const engine::TrackedFrame& frame) {

@@ -104,6 +104,7 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapDiscarde
   AddEvent(event.time, "map", "discarded " + map.name + ": " + ReasonOf(what, NameOf(what.other)));
   if (what.replacement == 0) return;
   AddMap(what.replacement, map.name);
+  Retarget(event.map, map.name, what.replacement, map.name);
   // Content of the false initialization has lost its anchor.
   for (const content::Entity& entity : map.scene->entities) {
     AddEvent(event.time, "warning", "'" + entity.name + "' was removed with the discarded map");

@@ -40,6 +40,7 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
     idle = MapsForMaintenance();
   }
   std::shared_ptr<const content::Scene> scene;
+  std::string name;
   const std::optional<IdleMap> chosen = maintenance_order_.Next(idle, interrupt);
   if (!chosen) return false;
   const maps::AdjustedMap adjusted = maps::AdjustIdleMap(*chosen->snapshot, &interrupt);
@@ -52,11 +53,12 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
     // Once per revision, whatever the outcome.
     map->maintained_revision = chosen->snapshot->revision;
     scene = map->scene;
+    name = map->name;
   }
   if (!adjusted.snapshot) return true;
   maps::MapRecord record;
   record.key = chosen->key;
-  record.name = chosen->name;
+  record.name = name;
   record.snapshot = adjusted.snapshot;
   record.expected_revision = chosen->snapshot->revision;
   const auto motions = ContentFollower().Follow(*scene, *chosen->snapshot, *adjusted.snapshot);

@@ -67,13 +67,15 @@ bool Session::Evict(std::uint64_t key) {
 
 // Loads the map that a command names, if the command needs the map itself.
 void Session::LoadIntoMemory(const Command& command) {
-  const auto* use = std::get_if<UseMap>(&command);
-  const auto* policy = std::get_if<SetPolicy>(&command);
-  if (!pager_ || (!use && !policy)) return;
+  const std::string* name = nullptr;
+  if (const auto* use = std::get_if<UseMap>(&command)) name = &use->name;
+  if (const auto* policy = std::get_if<SetPolicy>(&command)) name = &policy->name;
+  if (const auto* paste = std::get_if<PasteEntities>(&command)) name = &paste->from_map;
+  if (!pager_ || name == nullptr) return;
   std::uint64_t key = 0;
   {
     const std::scoped_lock lock(mutex_);
-    const SessionMap* const map = FindByName(use ? use->name : policy->name);
+    const SessionMap* const map = FindByName(*name);
     if (map != nullptr && map->in_library && !map->snapshot) key = map->key;
   }
   if (key != 0) pager_->Load(key);

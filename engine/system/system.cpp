@@ -455,6 +455,15 @@ void System::LeaveMapNow(std::uint64_t key) {
   Emit(time, key, MapLeft{forgotten});
 }
 
+void System::RemoveMap(std::uint64_t key) {
+  const std::scoped_lock lock(mutex_);
+  LeaveMapNow(key);
+  const auto found = maps_.find(key);
+  if (found == maps_.end()) return;
+  found->second.discarded = true;  // Late updates of the mapper are ignored.
+  index_.RemoveMap(key);
+}
+
 void System::Activate(std::uint64_t key) {
   const std::scoped_lock lock(mutex_);
   ActivateNow(maps_.at(key));

@@ -111,6 +111,8 @@ class System {
   void EnterMap(std::uint64_t key, std::size_t camera);
   // No camera stays in the map, and it is no longer extended. A map that was never initialized is forgotten.
   void LeaveMap(std::uint64_t key);
+  // Leaves the map, as LeaveMap does, and forgets it: no camera finds it any more.
+  void RemoveMap(std::uint64_t key);
   // The mapper works on this map from now on, if its permissions allow it, and on none otherwise.
   void Activate(std::uint64_t key);
 

@@ -26,9 +26,24 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "5 rotate helmet 45\n"
       "6 scale helmet 2\n"
       "7 remove helmet\n"
-      "8 undo\n9 redo\n10 save\n11 map stop\n12 map use Desk\n",
+      "8 undo\n9 redo\n10 save\n11 map stop\n12 map use Desk\n"
+      "13 place helmet.glb at pixel 1 2 yaw 5\n"
+      "14 transform helmet 1 2 3 0 0.6 0 0.8 2.5\n"
+      "14 remove helmet \"from\" sign-1\n"
+      "14 duplicate helmet\n"
+      "14 rename helmet hat\n"
+      "14 text sign-1 \"To the hats\"\n"
+      "14 target sign-1 \"Desk 3\"\n"
+      "14 target sign-1\n"
+      "14 lock hat sign-1\n14 unlock hat\n14 hide hat\n14 show hat\n"
+      "14 group \"Old hats\" hat sign-1\n"
+      "14 ungroup hat\n"
+      "14 paste hat \"from\" from \"Desk 3\"\n"
+      "14 paste hat from Desk at pixel 3 4\n"
+      "15 map rename Desk Bureau\n"
+      "16 map remove Bureau\n",
       "script");
-  ASSERT_EQ(commands.size(), 14u);
+  ASSERT_EQ(commands.size(), 32u);
   EXPECT_EQ(commands[0].command, Command(NewMap{"Desk 3"}));
   EXPECT_EQ(commands[0].line, 2);
   EXPECT_EQ(commands[1].time, std::chrono::milliseconds(1500));
@@ -40,12 +55,34 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
   EXPECT_EQ(commands[5].command, Command(MoveEntity{"helmet", {0, 0, 0}, Eigen::Vector2d(1, 2)}));
   EXPECT_EQ(commands[6].command, Command(RotateEntity{"helmet", 45}));
   EXPECT_EQ(commands[7].command, Command(ScaleEntity{"helmet", 2}));
-  EXPECT_EQ(commands[8].command, Command(RemoveEntity{"helmet"}));
+  EXPECT_EQ(commands[8].command, Command(RemoveEntities{{"helmet"}}));
   EXPECT_EQ(commands[9].command, Command(Undo{}));
   EXPECT_EQ(commands[10].command, Command(Redo{}));
   EXPECT_EQ(commands[11].command, Command(Save{}));
   EXPECT_EQ(commands[12].command, Command(StopMap{}));
   EXPECT_EQ(commands[13].command, Command(UseMap{"Desk"}));
+  EXPECT_EQ(commands[14].command, Command(PlaceModel{"helmet.glb", {1, 2}, std::nullopt, 5}));
+  const engine::Sim3 pose{engine::Rotation3(Eigen::Quaterniond(0.8, 0, 0.6, 0)), {1, 2, 3}, 2.5};
+  using Names = std::vector<std::string>;
+  using enum content::EntityFlag;
+  const std::vector<Command> rest = {TransformEntity{"helmet", pose},
+                                     RemoveEntities{{"helmet", "from", "sign-1"}},
+                                     DuplicateEntities{{"helmet"}},
+                                     RenameEntity{"helmet", "hat"},
+                                     SetEntityText{"sign-1", "To the hats"},
+                                     SetSignpostTarget{"sign-1", "Desk 3"},
+                                     SetSignpostTarget{"sign-1", ""},
+                                     SetEntityFlag{{"hat", "sign-1"}, kLocked, true},
+                                     SetEntityFlag{{"hat"}, kLocked, false},
+                                     SetEntityFlag{{"hat"}, kHidden, true},
+                                     SetEntityFlag{{"hat"}, kHidden, false},
+                                     GroupEntities{{"hat", "sign-1"}, "Old hats"},
+                                     GroupEntities{{"hat"}, ""},
+                                     PasteEntities{{"hat", "from"}, "Desk 3", std::nullopt},
+                                     PasteEntities{Names{"hat"}, "Desk", Eigen::Vector2d(3, 4)},
+                                     RenameMap{"Desk", "Bureau"},
+                                     RemoveMap{"Bureau"}};
+  for (std::size_t i = 0; i < rest.size(); ++i) EXPECT_EQ(commands[15 + i].command, rest[i]) << i;
 }
 
 TEST(Script, IsReadBackEqualAfterWriting) {
@@ -63,7 +100,8 @@ TEST(Script, IsReadBackEqualAfterWriting) {
       MoveEntity{"sign-1", {0, 0, 0}, Eigen::Vector2d(5, 6)},
       RotateEntity{"helmet", -12.5},
       ScaleEntity{"helmet", 0.5},
-      RemoveEntity{"helmet 2"},
+      RemoveEntities{{"helmet 2", "from"}},
+      PasteEntities{{"from", "at"}, "from", std::nullopt},
       Undo{},
       Redo{},
       Save{},
@@ -121,7 +159,12 @@ Command AnyCommand(Random* random) {
   const auto text = [&] { return AnyText(random); };
   const auto number = [&] { return AnyNumber(random); };
   const auto pixel = [&] { return Eigen::Vector2d(number(), number()); };
-  switch (random->Below(14)) {
+  const auto names = [&] {
+    std::vector<std::string> some;
+    while (random->Uniform() < 0.7) some.push_back(text());
+    return some;
+  };
+  switch (random->Below(23)) {
     case 0:
       return NewMap{text()};
     case 1:
@@ -145,9 +188,35 @@ Command AnyCommand(Random* random) {
     case 10:
       return ScaleEntity{text(), number()};
     case 11:
-      return RemoveEntity{text()};
+      return RemoveEntities{names()};
     case 12:
       return Undo{};
+    case 13: {
+      const Eigen::Vector3d turn(random->Uniform(-9, 9), random->Uniform(-9, 9), random->Uniform(-9, 9));
+      return TransformEntity{text(),
+                             {engine::Rotation3::Exp(turn), {number(), number(), number()}, number()}};
+    }
+    case 14:
+      return DuplicateEntities{names()};
+    case 15:
+      return RenameEntity{text(), text()};
+    case 16:
+      return SetEntityText{text(), text()};
+    case 17:
+      return SetSignpostTarget{text(), text()};
+    case 18:
+      return SetEntityFlag{
+          names(), random->Below(2) == 0 ? content::EntityFlag::kLocked : content::EntityFlag::kHidden,
+          random->Below(2) == 0};
+    case 19:
+      return GroupEntities{names(), text()};
+    case 20:
+      return random->Below(2) == 0 ? PasteEntities{names(), text(), pixel()}
+                                   : PasteEntities{names(), text(), std::nullopt};
+    case 21:
+      return RenameMap{text(), text()};
+    case 22:
+      return RemoveMap{text()};
     default:
       return random->Below(2) == 0 ? Command(Redo{}) : Command(Save{});
   }
@@ -174,6 +243,20 @@ TEST(Script, EveryRandomCommandIsInvalidOrReadBackEqual) {
   }
   EXPECT_GT(valid, 5000);
   EXPECT_GT(invalid, 2000);
+}
+
+// So that a replayed script gives a model exactly the pose that it had.
+TEST(Script, ARotationIsTheSameAfterItWasWrittenAndRead) {
+  Random random(9);
+  for (int trial = 0; trial < 20'000; ++trial) {
+    const Eigen::Vector4d q(random.Uniform(-1, 1), random.Uniform(-1, 1), random.Uniform(-1, 1),
+                            random.Uniform(-1, 1));
+    const engine::Rotation3 rotation = Settled(engine::Rotation3(Eigen::Quaterniond(q)));
+    ASSERT_EQ(engine::Rotation3(rotation.quaternion()).quaternion().coeffs(), rotation.quaternion().coeffs());
+    const std::string line = "0 " + FormatCommand(TransformEntity{"a", {rotation, {0, 0, 0}, 1}});
+    const auto read = std::get<TransformEntity>(ParseScript(line, "s").at(0).command);
+    ASSERT_EQ(read.map_from_entity.rotation.quaternion().coeffs(), rotation.quaternion().coeffs());
+  }
 }
 
 TEST(Script, NamesTheLineOfAnInvalidCommand) {
@@ -222,6 +305,28 @@ TEST(Script, NamesTheLineOfAnInvalidCommand) {
                            "1 rotate a",
                            "1 scale a -1",
                            "1 remove",
+                           "1 remove a a",
+                           "1 remove \"\"",
+                           "1 duplicate",
+                           "1 transform a 1 2 3 0 0 0 1",
+                           "1 transform a 1 2 3 0 0 0 2 1",
+                           "1 transform a 1 2 3 0 0 0 1 0",
+                           "1 transform a 1 2e6 3 0 0 0 1 1",
+                           "1 rename a",
+                           "1 rename a \"\"",
+                           "1 rename a b c",
+                           "1 text a",
+                           "1 target",
+                           "1 target a b c",
+                           "1 lock",
+                           "1 group g",
+                           "1 ungroup",
+                           "1 paste a b",
+                           "1 paste from Desk",
+                           "1 paste a from Desk at 1 2",
+                           "1 map rename a",
+                           "1 map rename a \"\"",
+                           "1 map remove",
                            "1 undo all",
                            "1 \"save\""}) {
     EXPECT_THAT(sentence(line), AllOf(HasSubstr("'tour.txt', line 2"), testing::EndsWith("."))) << line;

@@ -78,7 +78,7 @@ TEST_P(EveryPolicyInASession, IsObservedByTheMapperAndByEachEditOfContent) {
                                        PlaceSignpost{"there", {330, 290}, ""},
                                        Undo{},
                                        Redo{},
-                                       RemoveEntity{"sign-1"}};
+                                       RemoveEntities{{"sign-1"}}};
               for (const Command& edit : edits) {
                 const std::string error = ErrorOf([&] { session.Execute(edit, frame); });
                 if (content()) {

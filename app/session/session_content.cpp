@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <numbers>
+#include <utility>
+
+#include "app/session/session.h"
+#include "app/session/surface_at_pixel.h"
+#include "content/asset.h"
+#include "content/edits.h"
+#include "content/placement.h"
+#include "engine/base/error.h"
+#include "engine/map/upright_axes.h"
+
+// Commands that change the content of a map.
+namespace docent::app {
+
+namespace {
+
+const content::Entity& FindEntity(const content::Scene& scene, const std::string& name) {
+  const content::Entity* entity = scene.Find(name);
+  if (entity == nullptr) throw Error("there is no '" + name + "' in this map");
+  return *entity;
+}
+
+// The median distance of what the first keyframe sees: the size of a map's world in its unit.
+double FirstDistance(const engine::MapSnapshot& map) {
+  return map.keyframes.empty() ? 1 : map.keyframes.front().mean_depth;
+}
+
+}  // namespace
+
+void Session::Preload(const Command& command, const std::filesystem::path& model_folder) {
+  const auto* place = std::get_if<PlaceModel>(&command);
+  if (place == nullptr) return;
+  const std::scoped_lock lock(mutex_);
+  model_folder_ = model_folder;
+  LoadAsset(place->file);
+}
+
+std::shared_ptr<const content::Asset> Session::LoadAsset(const std::string& file) {
+  auto& model = models_[(model_folder_ / file).string()];
+  if (model) return model;
+  std::filesystem::path path = model_folder_ / file;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) path = file;
+  auto asset = std::make_shared<content::Asset>(content::ImportAsset(path));
+  // The same bytes may already be in use in a map: one copy is shared.
+  auto& kept = assets_[asset->id];
+  if (!kept) kept = std::move(asset);
+  return model = kept;
+}
+
+SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
+  const std::uint64_t key = engine::HasPose(frame.state) ? frame.map_key : CurrentMap(frame);
+  const auto found = maps_.find(key);
+  if (found == maps_.end() || !found->second.snapshot) throw Error("there is no current map");
+  if (found->second.discarded) throw Error("the map of this frame was discarded");
+  if (!found->second.Exists()) throw Error("the map of this frame was joined into another one");
+  if (!maps::MayChangeContent(found->second.policy)) {
+    throw Error("the map '" + found->second.name + "' is " + maps::ToString(found->second.policy) +
+                ": its content cannot be changed");
+  }
+  return found->second;
+}
+
+void Session::Edit(SessionMap* map, content::SceneChange change) {
+  auto scene = std::make_shared<content::Scene>(*map->scene);
+  map->history.Do(std::move(change), scene.get());
+  map->scene = std::move(scene);
+  UpdatePermissions(*map);
+}
+
+content::SurfaceHit Session::SurfaceFor(const engine::TrackedFrame& frame,
+                                        const Eigen::Vector2d& pixel) const {
+  return SurfaceAtPixel(frame, *cameras_.at(static_cast<std::size_t>(frame.frame.camera)).model, pixel);
+}
+
+// The key of the map that a signpost in `map` is to lead to; 0 for none.
+std::uint64_t Session::TargetKey(const SessionMap& map, const std::string& to_map) {
+  if (to_map.empty()) return 0;
+  const SessionMap* const target = FindByName(to_map);
+  if (target == nullptr) throw Error("there is no map '" + to_map + "' that the signpost could lead to");
+  if (target == &map) throw Error("a signpost cannot lead to its own map");
+  return target->key;
+}
+
+void Session::Apply(const PlaceModel& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const content::SurfaceHit hit = SurfaceFor(frame, command.pixel);
+  content::Entity entity;
+  entity.kind = content::Entity::Kind::kModel;
+  entity.name = map.scene->FreeName(content::NameFromFile(command.file));
+  entity.model.asset = LoadAsset(command.file);
+  const content::Model& model = *entity.model.asset->model;
+  const Eigen::Vector3d viewer = frame.camera_from_map.OriginInSource();
+  const double side = options_.model_side * (hit.point - viewer).norm();
+  const double scale = command.scale ? *command.scale : content::ScaleForSide(model, side);
+  entity.model.map_from_model =
+      content::FacingPose(hit.point, viewer, hit.normal, engine::UpInMap(*frame.map),
+                          command.yaw_deg * std::numbers::pi / 180, scale);
+  entity.model.map_from_model.translation += hit.point - content::BaseInMap(entity);
+  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
+}
+
+void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const content::SurfaceHit hit = SurfaceFor(frame, command.pixel);
+  content::Entity entity;
+  entity.kind = content::Entity::Kind::kSignpost;
+  entity.name = map.scene->FreeSignpostName();
+  entity.signpost.text = command.text;
+  entity.signpost.anchor = hit.point;
+  entity.signpost.up = engine::UpInMap(*frame.map);
+  // Map units mean nothing to the user, so the size is chosen by the distance from the camera.
+  entity.signpost.height_m = options_.signpost_height * (frame.camera_from_map * hit.point).norm();
+  entity.signpost.to_map = command.to_map;
+  entity.signpost.to_key = TargetKey(map, command.to_map);
+  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
+}
+
+void Session::Apply(const MoveEntity& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  if (!command.to_pixel) return Edit(&map, EditFor(*map.scene, command));
+  const content::Entity& entity = FindEntity(*map.scene, command.name);
+  const Eigen::Vector3d offset = SurfaceFor(frame, *command.to_pixel).point - content::BaseInMap(entity);
+  Edit(&map, content::MoveEdit(*map.scene, command.name, content::PlaceOf(entity) + offset));
+}
+
+void Session::Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const std::uint64_t key = TargetKey(map, command.to_map);
+  Edit(&map, content::TargetEdit(*map.scene, command.name, command.to_map, key));
+}
+
+void Session::Apply(const PasteEntities& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const SessionMap& from = InitializedMap(command.from_map);
+  std::vector<content::Entity> copies;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const std::string& name : command.names) {
+    content::Entity& copy = copies.emplace_back(FindEntity(*from.scene, name));
+    middle += content::BaseInMap(copy) / static_cast<double>(command.names.size());
+    if (copy.signpost.to_key != map.key) continue;
+    copy.signpost.to_key = 0;  // it would lead to its own map
+    copy.signpost.to_map.clear();
+  }
+  const engine::CameraModel& camera = *cameras_.at(static_cast<std::size_t>(frame.frame.camera)).model;
+  const Eigen::Vector2d centre(0.5 * (camera.width_px() - 1), 0.5 * (camera.height_px() - 1));
+  const content::SurfaceHit hit = SurfaceFor(frame, command.to_pixel.value_or(centre));
+  engine::Sim3 motion;
+  if (&from != &map) {
+    motion.rotation = engine::Rotation3(
+        Eigen::Quaterniond::FromTwoVectors(engine::UpInMap(*from.snapshot), engine::UpInMap(*map.snapshot)));
+    motion.scale = FirstDistance(*map.snapshot) / FirstDistance(*from.snapshot);
+  }
+  motion.translation = hit.point - motion * middle;
+  for (content::Entity& copy : copies) content::TransformBy(motion, &copy);
+  Edit(&map, content::PasteEdit(*map.scene, std::move(copies)));
+}
+
+void Session::Apply(const Undo&, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  auto scene = std::make_shared<content::Scene>(*map.scene);
+  if (!map.history.Undo(scene.get())) throw Error("there is nothing to undo in '" + map.name + "'");
+  map.scene = std::move(scene);
+  UpdatePermissions(map);
+}
+
+void Session::Apply(const Redo&, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  auto scene = std::make_shared<content::Scene>(*map.scene);
+  if (!map.history.Redo(scene.get())) throw Error("there is nothing to redo in '" + map.name + "'");
+  map.scene = std::move(scene);
+  UpdatePermissions(map);
+}
+
+}  // namespace docent::app
