@@ -10,6 +10,8 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <string>
+#include <utility>
 
 #include "engine/base/error.h"
 #include "ui/theme.h"
@@ -49,8 +51,23 @@ struct Gui::Impl {
   double scale = 0;
   int focus_frames = 0;  // During which a window that FocusWindow chose keeps the keyboard in any case.
 
+  std::string window_to_focus;  // By the next frame; empty for none.
+
   void Use() const { ImGui::SetCurrentContext(context); }
+  // Within a frame, because Dear ImGui forgets such requests between frames.
+  void Focus();
 };
+
+void Gui::Impl::Focus() {
+  const std::string name = std::exchange(window_to_focus, {});
+  ImGuiWindow* const found = name.empty() ? nullptr : ImGui::FindWindowByName(name.c_str());
+  if (found == nullptr) return;
+  ImGui::FocusWindow(found);
+  ImGui::NavInitWindow(found, true);
+  ImGui::GetCurrentContext()->NavDisableHighlight = false;
+  constexpr int kFocusFrames = 5;
+  focus_frames = kFocusFrames;
+}
 
 Gui::Gui(Window* window) : impl_(std::make_unique<Impl>()) {
   impl_->window = window;
@@ -89,6 +106,7 @@ void Gui::Begin(double scale) {
   }
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
+  impl_->Focus();
 }
 
 void Gui::Draw() {
@@ -123,14 +141,7 @@ bool Gui::IsNavigated() const {
 }
 
 void Gui::FocusWindow(const char* name) {
-  impl_->Use();
-  ImGuiWindow* const window = ImGui::FindWindowByName(name);
-  if (window == nullptr) return;
-  ImGui::FocusWindow(window);
-  ImGui::NavInitWindow(window, true);
-  ImGui::GetCurrentContext()->NavDisableHighlight = false;
-  constexpr int kFocusFrames = 5;
-  impl_->focus_frames = kFocusFrames;
+  impl_->window_to_focus = name;
 }
 
 void Gui::LeaveWidgets() {

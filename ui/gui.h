@@ -31,7 +31,7 @@ class Gui {
   bool HasPopup() const;
   // Whether arrow keys, Tab, Space and Enter go through the widgets, as after FocusWindow.
   bool IsNavigated() const;
-  // Lets the keyboard go through the widgets of a window, or leave all widgets.
+  // Lets the keyboard go through the widgets of a window from the next frame on, or leave all widgets.
   void FocusWindow(const char* name);
   void LeaveWidgets();
 

@@ -154,7 +154,7 @@ TEST_F(InterfaceOnScreen, TellsClicksInTheImageFromThoseInThePanel) {
 TEST_F(InterfaceOnScreen, EnterInTheNameStartsTheMap) {
   // The field is found by going through the panel with the keyboard: the first one that takes text.
   gui_->FocusWindow(AuthoringPanel::window_name());
-  Draw();
+  for (int i = 0; i < 10; ++i) Draw();
   EXPECT_TRUE(gui_->IsNavigated());
   for (int i = 0; i < 8 && !gui_->WritesText(); ++i) Press("Tab");
   ASSERT_TRUE(gui_->WritesText());
