@@ -1,192 +1,212 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ui/authoring_panel.h"
 
-#include <backends/imgui_impl_glfw.h>
-#include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
 #include <imgui_stdlib.h>
 
-#include <array>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <filesystem>
-#include <utility>
 
-#include "engine/base/error.h"
+#include "ui/strings.h"
+#include "ui/theme.h"
 
 namespace docent::ui {
 namespace {
 
-// Dear ImGui's built-in font covers Latin letters only. These fonts cover more, at the paths that Debian
-// installs them to.
-constexpr std::array<const char*, 2> kFonts = {"/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf",
-                                               "/usr/share/fonts/truetype/noto/NotoSans-Regular.ttf"};
+constexpr const char* kPanelWindow = "panel";
 
-void LoadFont() {
-  static const ImWchar kRanges[] = {0x20, 0x24F, 0x370, 0x52F, 0x2010, 0x2044, 0};
-  for (const char* font : kFonts) {
-    std::error_code ignored;
-    if (std::filesystem::exists(font, ignored) &&
-        ImGui::GetIO().Fonts->AddFontFromFileTTF(font, 15.0f, nullptr, kRanges) != nullptr)
-      return;
-  }
-  ImGui::GetIO().Fonts->AddFontDefault();
+ImVec4 TextColor(const Color& color) {
+  return {color.red, color.green, color.blue, color.alpha};
+}
+
+// Text that is broken into lines at the panel's edge.
+void Wrapped(const char* text, const Color& color) {
+  ImGui::PushStyleColor(ImGuiCol_Text, TextColor(color));
+  ImGui::PushTextWrapPos(0.0f);
+  ImGui::TextUnformatted(text);
+  ImGui::PopTextWrapPos();
+  ImGui::PopStyleColor();
+}
+
+// Continues the line if a button with this label still fits into it.
+void SameLineIfFits(const char* label) {
+  const ImGuiStyle& style = ImGui::GetStyle();
+  const float width = ImGui::CalcTextSize(label).x + 2 * style.FramePadding.x;
+  const float end = ImGui::GetItemRectMax().x + style.ItemSpacing.x + width;
+  if (end < ImGui::GetWindowPos().x + ImGui::GetContentRegionMax().x) ImGui::SameLine();
+}
+
+bool ButtonInRow(const char* label) {
+  SameLineIfFits(label);
+  return ImGui::Button(label);
+}
+
+bool Section(const char* title) {
+  return ImGui::CollapsingHeader(title, ImGuiTreeNodeFlags_DefaultOpen);
 }
 
 }  // namespace
 
-struct AuthoringPanel::Impl {
-  Window* window = nullptr;
-  AuthoringActions* actions = nullptr;
-  std::vector<std::string> models, map_names;
-  State state;
-  ImGuiContext* context = nullptr;
+std::string SavedText(const std::optional<double>& saved_ago_s) {
+  if (!saved_ago_s) return strings::kNothingSaved;
+  if (*saved_ago_s < 2) return strings::kSavedJustNow;
+  char text[64];
+  if (*saved_ago_s < 100) {
+    std::snprintf(text, sizeof text, strings::kSavedSecondsAgo, static_cast<int>(*saved_ago_s));
+  } else {
+    std::snprintf(text, sizeof text, strings::kSavedMinutesAgo,
+                  static_cast<int>(std::lround(*saved_ago_s / 60)));
+  }
+  return text;
+}
 
-  void DrawMapSection();
-  void DrawPlaceSection();
-  void DrawShowSection();
-};
-
-AuthoringPanel::AuthoringPanel(Window* window, AuthoringActions* actions, std::vector<std::string> models)
-    : impl_(std::make_unique<Impl>()) {
-  impl_->window = window;
-  impl_->actions = actions;
-  impl_->models = std::move(models);
-  if (!impl_->models.empty()) impl_->state.model_file = impl_->models.front();
-  window->MakeCurrent();
-  impl_->context = ImGui::CreateContext();
-  ImGui::SetCurrentContext(impl_->context);
-  ImGui::GetIO().IniFilename = nullptr;  // Otherwise ImGui writes a file into the working directory.
-  ImGui::StyleColorsDark();
-  ImGui::GetStyle().WindowRounding = 8.0f;
-  ImGui::GetStyle().FrameRounding = 4.0f;
-  LoadFont();
-  // ImGui chains to the callbacks that the window installed before.
-  if (!ImGui_ImplGlfw_InitForOpenGL(window->handle(), true) || !ImGui_ImplOpenGL3_Init("#version 330 core")) {
-    ImGui::DestroyContext(impl_->context);
-    throw Error("Cannot show the authoring panel: Dear ImGui does not work with this OpenGL driver.");
+std::string FreeMapName(const std::vector<std::string>& names) {
+  for (int number = 1;; ++number) {
+    char name[32];
+    std::snprintf(name, sizeof name, strings::kNumberedMap, number);
+    if (std::find(names.begin(), names.end(), name) == names.end()) return name;
   }
 }
 
-AuthoringPanel::~AuthoringPanel() {
-  impl_->window->MakeCurrent();
-  ImGui::SetCurrentContext(impl_->context);
-  ImGui_ImplOpenGL3_Shutdown();
-  ImGui_ImplGlfw_Shutdown();
-  ImGui::DestroyContext(impl_->context);
+const char* AuthoringPanel::window_name() {
+  return kPanelWindow;
 }
 
-void AuthoringPanel::SetMapNames(std::vector<std::string> map_names) {
-  impl_->map_names = std::move(map_names);
-}
-
-AuthoringPanel::State& AuthoringPanel::state() {
-  return impl_->state;
-}
-
-void AuthoringPanel::ApplyTo(Overlay* overlay) const {
-  overlay->points = impl_->state.show_points;
-  overlay->keyframes = impl_->state.show_keyframes;
-  overlay->hud = impl_->state.show_hud;
-}
-
-void AuthoringPanel::Draw() {
-  ImGui::SetCurrentContext(impl_->context);
-  ImGui_ImplOpenGL3_NewFrame();
-  ImGui_ImplGlfw_NewFrame();
-  ImGui::NewFrame();
-  const float width = ImGui::GetIO().DisplaySize.x;
-  ImGui::SetNextWindowPos(ImVec2(width - 10.0f, 10.0f), ImGuiCond_FirstUseEver, ImVec2(1.0f, 0.0f));
-  ImGui::SetNextWindowBgAlpha(0.8f);
-  ImGui::Begin("Author", nullptr, ImGuiWindowFlags_AlwaysAutoResize);
-  ImGui::PushItemWidth(150.0f);
-  impl_->DrawMapSection();
-  ImGui::Separator();
-  impl_->DrawPlaceSection();
-  ImGui::Separator();
-  impl_->DrawShowSection();
-  ImGui::PopItemWidth();
-  ImGui::End();
-  ImGui::Render();
-  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
-}
-
-void AuthoringPanel::Impl::DrawMapSection() {
-  ImGui::InputTextWithHint("##map name", "Name of the new map", &state.map_name);
-  ImGui::SameLine();
-  if (ImGui::Button("New map") && !state.map_name.empty()) {
-    actions->NewMap(state.map_name);
-    state.map_name.clear();
+void AuthoringPanel::Draw(const WindowLayout& layout, const AuthoringFacts& facts) {
+  ImGui::SetNextWindowPos(ImVec2(static_cast<float>(layout.panel.x), static_cast<float>(layout.panel.y)));
+  ImGui::SetNextWindowSize(
+      ImVec2(static_cast<float>(layout.panel.width), static_cast<float>(layout.panel.height)));
+  if (!layout.panel_open) ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(2, 8));
+  ImGui::Begin(kPanelWindow, nullptr,
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings |
+                   ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoBringToFrontOnFocus);
+  if (!layout.panel_open) {
+    ImGui::PopStyleVar();
+    if (ImGui::ArrowButton("open", ImGuiDir_Left)) choices_.panel_open = true;
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", strings::kShowPanel);
+    ImGui::End();
+    return;
   }
-  if (ImGui::Button("Stop map")) actions->StopMap();
-  ImGui::SameLine();
-  if (ImGui::Button("Undo")) actions->Undo();
-  ImGui::SameLine();
-  if (ImGui::Button("Redo")) actions->Redo();
-  ImGui::SameLine();
-  if (ImGui::Button("Save")) actions->Save();
-}
-
-void AuthoringPanel::Impl::DrawPlaceSection() {
-  const auto tool_button = [&](const char* label, Tool tool) {
-    if (ImGui::RadioButton(label, state.tool == tool)) state.tool = tool;
-  };
-  tool_button("View only", Tool::kNone);
-  ImGui::SameLine();
-  tool_button("Place model", Tool::kModel);
-  ImGui::SameLine();
-  tool_button("Signpost", Tool::kSignpost);
-  if (state.tool == Tool::kModel) {
-    ImGui::InputTextWithHint("Model file", "FILE.glb", &state.model_file);
-    for (const std::string& model : models) {
-      const std::string label = std::filesystem::path(model).filename().string() + "##" + model;
-      if (ImGui::Selectable(label.c_str(), state.model_file == model)) state.model_file = model;
-    }
-    constexpr double kScaleStep = 0.1, kYawStep = 15.0;
-    ImGui::InputDouble("Scale", &state.scale, kScaleStep, 10 * kScaleStep, "%.3g");
-    ImGui::InputDouble("Rotation", &state.yaw_deg, kYawStep, 6 * kYawStep, "%.0f deg");
-    if (!(state.scale > 0)) state.scale = kScaleStep;
-    ImGui::TextUnformatted("Click in the image to place the model.");
-  } else if (state.tool == Tool::kSignpost) {
-    ImGui::InputTextMultiline("Text", &state.sign_text, ImVec2(150.0f, 60.0f));
-    if (ImGui::BeginCombo("Leads to", state.sign_to_map.empty() ? "(none)" : state.sign_to_map.c_str())) {
-      if (ImGui::Selectable("(none)", state.sign_to_map.empty())) state.sign_to_map.clear();
-      for (const std::string& name : map_names) {
-        if (ImGui::Selectable(name.c_str(), state.sign_to_map == name)) state.sign_to_map = name;
+  DrawHeader(facts);
+  if (Section(strings::kMap)) DrawMap(facts);
+  if (Section(strings::kPlace)) DrawPlace(facts);
+  if (Section(strings::kContents)) entity_section_.DrawContents(facts);
+  if (Section(strings::kSelected)) entity_section_.DrawSelected(facts);
+  if (Section(strings::kView)) DrawView();
+  if (ImGui::CollapsingHeader(strings::kKeys)) {
+    if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
+      for (const strings::KeyHelp& help : strings::kKeyHelp) {
+        ImGui::TableNextColumn();
+        ImGui::TextUnformatted(help.key);
+        ImGui::TableNextColumn();
+        ImGui::TextUnformatted(help.effect);
       }
-      ImGui::EndCombo();
+      ImGui::EndTable();
     }
-    ImGui::TextUnformatted("Click in the image to place the signpost.");
   }
+  ImGui::End();
 }
 
-void AuthoringPanel::Impl::DrawShowSection() {
-  ImGui::Checkbox("Map points", &state.show_points);
+void AuthoringPanel::DrawHeader(const AuthoringFacts& facts) {
+  if (ImGui::ArrowButton("close", ImGuiDir_Right)) choices_.panel_open = false;
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", strings::kHidePanel);
   ImGui::SameLine();
-  ImGui::Checkbox("Keyframes", &state.show_keyframes);
+  ImGui::AlignTextToFramePadding();
+  const std::string name = facts.map_name.empty() ? strings::kNoMap : facts.map_name;
+  Wrapped(name.c_str(), theme::kText);
+  if (facts.unsaved) Wrapped(strings::kUnsaved, theme::kAccentText);
+  Wrapped(SavedText(facts.saved_ago_s).c_str(), theme::kMutedText);
+  if (choices_.frozen) Wrapped(strings::kFrozen, theme::kAccentText);
+}
+
+void AuthoringPanel::StartMap(const AuthoringFacts& facts) {
+  actions_->NewMap(choices_.map_name.empty() ? FreeMapName(facts.map_names) : choices_.map_name);
+  choices_.map_name.clear();
+}
+
+void AuthoringPanel::DrawMap(const AuthoringFacts& facts) {
+  if (facts.map_name.empty()) Wrapped(strings::kBegin, theme::kAccentText);
+  if (facts.starting) Wrapped(strings::kStarting, theme::kAccentText);
+  const ImGuiStyle& style = ImGui::GetStyle();
+  const float button = ImGui::CalcTextSize(strings::kNewMap).x + 2 * style.FramePadding.x;
+  ImGui::SetNextItemWidth(-button - style.ItemSpacing.x);
+  const bool entered = ImGui::InputTextWithHint("##map name", strings::kMapNameHint, &choices_.map_name,
+                                                ImGuiInputTextFlags_EnterReturnsTrue);
   ImGui::SameLine();
-  ImGui::Checkbox("Status", &state.show_hud);
+  if (ImGui::Button(strings::kNewMap) || (entered && !choices_.map_name.empty())) StartMap(facts);
+  ImGui::BeginDisabled(facts.map_name.empty());
+  if (ImGui::Button(strings::kStopMap)) actions_->StopMap();
+  if (ButtonInRow(strings::kUndo)) actions_->Undo();
+  if (ButtonInRow(strings::kRedo)) actions_->Redo();
+  ImGui::EndDisabled();
+  if (ButtonInRow(strings::kSave)) actions_->Save();
 }
 
-bool AuthoringPanel::WantsMouse() const {
-  ImGui::SetCurrentContext(impl_->context);
-  return ImGui::GetIO().WantCaptureMouse;
+void AuthoringPanel::DrawPlace(const AuthoringFacts& facts) {
+  const auto tool_button = [&](const char* label, AuthoringTool tool) {
+    if (ImGui::RadioButton(label, choices_.tool == tool)) choices_.tool = tool;
+  };
+  tool_button(strings::kToolSelect, AuthoringTool::kSelect);
+  SameLineIfFits(strings::kToolModel);
+  tool_button(strings::kToolModel, AuthoringTool::kModel);
+  SameLineIfFits(strings::kToolSignpost);
+  tool_button(strings::kToolSignpost, AuthoringTool::kSignpost);
+  if (choices_.tool == AuthoringTool::kModel) DrawModelChoice(facts);
+  if (choices_.tool == AuthoringTool::kSignpost) DrawSignChoice(facts);
 }
 
-bool AuthoringPanel::WantsKeyboard() const {
-  ImGui::SetCurrentContext(impl_->context);
-  return ImGui::GetIO().WantCaptureKeyboard;
-}
-
-bool AuthoringPanel::ClickImage(const Eigen::Vector2d& pixel) {
-  const State& state = impl_->state;
-  if (state.tool == Tool::kModel && !state.model_file.empty()) {
-    impl_->actions->PlaceModel(state.model_file, pixel, state.scale, state.yaw_deg);
-    return true;
+void AuthoringPanel::DrawModelChoice(const AuthoringFacts& facts) {
+  const ImGuiStyle& style = ImGui::GetStyle();
+  ImGui::SetNextItemWidth(-ImGui::CalcTextSize(strings::kBrowse).x - 2 * style.FramePadding.x -
+                          style.ItemSpacing.x);
+  ImGui::InputTextWithHint("##model file", strings::kModelFileHint, &choices_.model_file);
+  ImGui::SameLine();
+  if (ImGui::Button(strings::kBrowse)) actions_->ChooseModelFile();
+  if (facts.files != nullptr && !facts.files->empty()) {
+    Wrapped(strings::kFiles, theme::kMutedText);
+    const float rows = static_cast<float>(std::min<std::size_t>(facts.files->size(), 5));
+    if (ImGui::BeginChild("files", ImVec2(0, rows * ImGui::GetTextLineHeightWithSpacing() + 4))) {
+      for (const std::string& file : *facts.files) {
+        const std::string label = std::filesystem::path(file).filename().string() + "##" + file;
+        if (ImGui::Selectable(label.c_str(), choices_.model_file == file)) choices_.model_file = file;
+        if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", file.c_str());
+      }
+    }
+    ImGui::EndChild();
   }
-  if (state.tool == Tool::kSignpost && !state.sign_text.empty()) {
-    impl_->actions->PlaceSignpost(state.sign_text, pixel, state.sign_to_map);
-    return true;
+  ImGui::Checkbox(strings::kAutomaticSize, &choices_.automatic_size);
+  ImGui::PushItemWidth(0.55f * ImGui::GetContentRegionAvail().x);
+  constexpr double kScaleStep = 0.1, kYawStep = 15.0, kLeast = 1e-6, kMost = 1e6;
+  if (!choices_.automatic_size) {
+    ImGui::InputDouble(strings::kScale, &choices_.scale, kScaleStep, 10 * kScaleStep, "%.3g");
+    choices_.scale = choices_.scale > 0 ? std::clamp(choices_.scale, kLeast, kMost) : kScaleStep;
   }
-  return false;
+  ImGui::InputDouble(strings::kTurn, &choices_.yaw_deg, kYawStep, 6 * kYawStep, strings::kDegrees);
+  choices_.yaw_deg = std::isfinite(choices_.yaw_deg) ? std::remainder(choices_.yaw_deg, 360.0) : 0.0;
+  ImGui::PopItemWidth();
+  Wrapped(strings::kClickToPlaceModel, theme::kMutedText);
+  Wrapped(strings::kDropFiles, theme::kMutedText);
+}
+
+void AuthoringPanel::DrawSignChoice(const AuthoringFacts& facts) {
+  ImGui::InputTextMultiline("##sign text", &choices_.sign_text,
+                            ImVec2(-1.0f, 3.5f * ImGui::GetTextLineHeight()));
+  ImGui::SetNextItemWidth(0.6f * ImGui::GetContentRegionAvail().x);
+  DrawMapChoice(strings::kLeadsTo, facts.map_names, &choices_.sign_to_map);
+  Wrapped(choices_.sign_text.empty() ? strings::kWriteText : strings::kClickToPlaceSign, theme::kMutedText);
+}
+
+void AuthoringPanel::DrawView() {
+  ImGui::Checkbox(strings::kFreeze, &choices_.frozen);
+  ImGui::Checkbox(strings::kFromAbove, &choices_.from_above);
+  ImGui::Checkbox(strings::kMapPoints, &choices_.show_points);
+  SameLineIfFits(strings::kKeyframes);
+  ImGui::Checkbox(strings::kKeyframes, &choices_.show_keyframes);
+  ImGui::Checkbox(strings::kStatus, &choices_.show_status);
+  if (ButtonInRow(strings::kFullScreen)) actions_->ToggleFullScreen();
 }
 
 }  // namespace docent::ui

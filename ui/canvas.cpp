@@ -45,7 +45,8 @@ Canvas::Canvas() : program_("canvas", kCanvasVertexShader, kCanvasFragmentShader
   glBindVertexArray(0);
 }
 
-void Canvas::Begin(int width_px, int height_px) {
+void Canvas::Begin(int width_px, int height_px, bool to_window) {
+  to_window_ = to_window;
   width_px_ = width_px;
   height_px_ = height_px;
   ++frame_;
@@ -63,6 +64,7 @@ void Canvas::End() {
                GL_STREAM_DRAW);
   program_.Use();
   glUniform2f(program_.Uniform("target_size"), static_cast<float>(width_px_), static_cast<float>(height_px_));
+  glUniform1f(program_.Uniform("up"), to_window_ ? -1.0f : 1.0f);
   glActiveTexture(GL_TEXTURE0);
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);

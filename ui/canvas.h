@@ -20,7 +20,9 @@ class Canvas {
  public:
   Canvas();
 
-  void Begin(int width_px, int height_px);
+  // `to_window`: End draws into the current viewport of the default framebuffer, whose row 0 is at the
+  // bottom.
+  void Begin(int width_px, int height_px, bool to_window = false);
   void End();
 
   // A stroke_px of 0 fills the shape; otherwise an outline of that width is drawn just inside its edge.
@@ -63,6 +65,7 @@ class Canvas {
   GlVertexArray vertex_array_;
   GlBuffer buffer_;
   int width_px_ = 1, height_px_ = 1;
+  bool to_window_ = false;
   std::uint64_t frame_ = 0;
   std::vector<Vertex> vertices_;
   std::vector<Run> runs_;

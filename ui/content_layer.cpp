@@ -145,6 +145,7 @@ std::vector<ModelInstance> ContentLayer::Instances(const content::Scene& scene,
   std::vector<ModelInstance> instances;
   instances.reserve(scene.entities.size());
   for (const content::Entity& entity : scene.entities) {
+    if (entity.hidden) continue;
     ModelInstance instance;
     if (entity.kind == content::Entity::Kind::kModel) {
       if (entity.model.asset == nullptr || entity.model.asset->model == nullptr) continue;

@@ -7,15 +7,15 @@
 #include <numbers>
 #include <optional>
 
+#include "ui/theme.h"
+
 namespace docent::ui {
 namespace {
 
 using engine::TrackingState;
 
-constexpr Color kPanel{0.05f, 0.07f, 0.10f, 0.62f};
-constexpr Color kInk{0.97f, 0.97f, 0.95f, 1.0f};
-constexpr Color kGood{0.36f, 0.85f, 0.51f, 1.0f}, kFair{1.0f, 0.76f, 0.25f, 1.0f},
-    kPoor{1.0f, 0.42f, 0.36f, 1.0f};
+using theme::kFair, theme::kGood, theme::kPoor;
+constexpr Color kPanel = theme::kHeadsUp, kInk = theme::kText;
 constexpr Color kBeam{1.0f, 0.84f, 0.45f, 1.0f};
 constexpr double kPi = std::numbers::pi;
 
@@ -68,14 +68,8 @@ Color QualityColor(engine::TrackingQuality quality) {
   return kPoor;
 }
 
-// Text and lines scale with the image, so that they stay readable in a large window.
-double UnitPx(const Canvas& canvas) {
-  return std::clamp(canvas.height_px() / 480.0, 0.5, 4.0);
-}
-
-void DrawStatus(const View& view, Canvas* canvas) {
+void DrawStatus(const View& view, double unit, Canvas* canvas) {
   const engine::TrackedFrame& tracked = *view.tracked;
-  const double unit = UnitPx(*canvas);
   const bool named = !view.overlay.map_name.empty();
   TextStyle name_style, state_style;
   name_style.size_px = 17 * unit;
@@ -87,7 +81,7 @@ void DrawStatus(const View& view, Canvas* canvas) {
   state_style.bold = !named;
   state_style.size_px = (named ? 13 : 17) * unit;
 
-  std::string state = StateText(tracked.state);
+  std::string state = view.overlay.is_waiting ? "No map yet" : StateText(tracked.state);
   // During initialization the state already says this.
   if (!view.overlay.mapping.empty() && tracked.state != TrackingState::kInitializing)
     state += " · " + MappingText(view.overlay.mapping);
@@ -115,11 +109,10 @@ void DrawStatus(const View& view, Canvas* canvas) {
 }
 
 // Draws a sentence in a panel whose bottom is at this height. Returns the panel's top.
-double DrawSentence(const std::string& text, double size_px, double bottom, Canvas* canvas) {
+double DrawSentence(const std::string& text, double units, double bottom, double unit, Canvas* canvas) {
   if (text.empty()) return bottom;
-  const double unit = UnitPx(*canvas);
   TextStyle style;
-  style.size_px = size_px;
+  style.size_px = units * unit;
   style.centered = true;
   style.max_width_px = std::max(40, static_cast<int>(0.84 * canvas->width_px()));
   style.max_height_px = std::max(20, static_cast<int>(0.28 * canvas->height_px()));
@@ -252,16 +245,20 @@ void DrawKeyFrames(const engine::MapSnapshot& map, const engine::CameraModel& ca
   }
 }
 
-void DrawHeadsUp(const View& view, Canvas* canvas) {
+HeadsUpStyle HeadsUpStyleFor(int height_px) {
+  return {std::clamp(height_px / 480.0, 0.5, 4.0), 0};
+}
+
+void DrawHeadsUp(const View& view, const HeadsUpStyle& style, Canvas* canvas) {
+  const double unit = style.unit_px;
+  const double lowest = canvas->height_px() - 12 * unit - style.bottom_px;
   if (view.tracked == nullptr) {
-    DrawSentence(view.overlay.message, 15 * UnitPx(*canvas), canvas->height_px() - 12 * UnitPx(*canvas),
-                 canvas);
+    DrawSentence(view.overlay.message, 15, lowest, unit, canvas);
     return;
   }
   const engine::TrackedFrame& tracked = *view.tracked;
-  const double unit = UnitPx(*canvas);
   const bool lost = tracked.state == TrackingState::kLost;
-  const bool starting = tracked.state == TrackingState::kInitializing;
+  const bool starting = tracked.state == TrackingState::kInitializing && !view.overlay.is_waiting;
   const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.5 * (canvas->height_px() - 1));
   const double radius = 0.11 * std::min(canvas->width_px(), canvas->height_px());
   if (lost) {
@@ -271,16 +268,15 @@ void DrawHeadsUp(const View& view, Canvas* canvas) {
   } else if (starting) {
     DrawMoveFigure(middle, 0.7 * radius, view.animation_seconds, canvas);
   }
-  if (view.overlay.status) DrawStatus(view, canvas);
-  const double bottom =
-      DrawSentence(view.overlay.message, 15 * unit, canvas->height_px() - 12 * unit, canvas) - 6 * unit;
+  if (view.overlay.status) DrawStatus(view, unit, canvas);
+  const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;
   const std::string& hint = view.overlay.hint;
-  DrawSentence(hint.empty() && lost ? "Point the camera at a place that is already mapped." : hint, 18 * unit,
-               bottom, canvas);
+  DrawSentence(hint.empty() && lost ? "Point the camera at a place that is already mapped." : hint, 18,
+               bottom, unit, canvas);
 }
 
 void DrawInsetFrame(const engine::TrackedFrame& tracked, const Inset& inset, Canvas* canvas) {
-  const double stroke = 3 * UnitPx(*canvas);
+  const double stroke = 3 * HeadsUpStyleFor(canvas->height_px()).unit_px;
   const Color color = engine::HasPose(tracked.state) ? QualityColor(tracked.quality_class) : kPoor;
   canvas->Box({inset.x - stroke, inset.y - stroke},
               {inset.x + inset.width - 1 + stroke, inset.y + inset.height - 1 + stroke}, stroke, color,

@@ -19,10 +19,18 @@ void DrawPoints(const engine::TrackedFrame& tracked, Canvas* canvas);
 void DrawKeyFrames(const engine::MapSnapshot& map, const engine::CameraModel& camera,
                    const engine::Rigid3& camera_from_map, Canvas* canvas);
 
+// The size and place of the texts of DrawHeadsUp.
+struct HeadsUpStyle {
+  double unit_px = 1;    // Pixels of the canvas per unit; a text of normal size has 15 units.
+  double bottom_px = 0;  // Height at the bottom that the sentences leave free.
+};
+// For a canvas of this height: texts and lines grow with it, so that they stay readable in a large image.
+HeadsUpStyle HeadsUpStyleFor(int height_px);
+
 // Draws the state, map name, quality bar, hint and message. Without a pose it also draws an animated figure
 // that asks the wearer to search (a magnifying glass over a compass) or to move (a camera that moves
 // sideways).
-void DrawHeadsUp(const View& view, Canvas* canvas);
+void DrawHeadsUp(const View& view, const HeadsUpStyle& style, Canvas* canvas);
 
 // Draws the border of another camera's inset image; its colour is that camera's tracking quality.
 void DrawInsetFrame(const engine::TrackedFrame& tracked, const Inset& inset, Canvas* canvas);

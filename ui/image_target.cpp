@@ -91,17 +91,32 @@ void ImageTarget::ReadBack(cv::Mat* image) const {
   glPixelStorei(GL_PACK_ALIGNMENT, 4);
 }
 
-void ImageTarget::Present(int width_px, int height_px) const {
+void ImageTarget::CopyFrom(const ImageTarget& other) {
+  if (other.target_ == nullptr) return;
+  const int width_px = other.target_->width_px(), height_px = other.target_->height_px();
+  Bind(width_px, height_px);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, other.target_->readable_framebuffer());
+  glBlitFramebuffer(0, 0, width_px, height_px, 0, 0, width_px, height_px, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  target_->BindForDrawing();
+}
+
+void ImageTarget::Present(int x, int y, int width_px, int height_px, int window_height_px) const {
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
-  glViewport(0, 0, width_px, height_px);
+  // OpenGL's origin is at the bottom left.
+  const int bottom = window_height_px - y - height_px;
+  glViewport(x, bottom, width_px, height_px);
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(x, bottom, width_px, height_px);
   glClearColor(0.0f, 0.0f, 0.0f, 1.0f);
   glClear(GL_COLOR_BUFFER_BIT);
+  glDisable(GL_SCISSOR_TEST);
   if (target_ == nullptr || width_px < 1 || height_px < 1) return;
   const Letterbox box = FitImage(target_->width_px(), target_->height_px(), width_px, height_px);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, target_->readable_framebuffer());
   // Row 0 is the bottom of the window but the top of the image.
-  glBlitFramebuffer(0, 0, target_->width_px(), target_->height_px(), box.x, height_px - box.y,
-                    box.x + box.width, height_px - box.y - box.height, GL_COLOR_BUFFER_BIT, GL_LINEAR);
+  const int top = window_height_px - y - box.y;
+  glBlitFramebuffer(0, 0, target_->width_px(), target_->height_px(), x + box.x, top, x + box.x + box.width,
+                    top - box.height, GL_COLOR_BUFFER_BIT, GL_LINEAR);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
 }
 

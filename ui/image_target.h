@@ -25,8 +25,16 @@ class ImageTarget {
   // Copies the target to *image as CV_8UC3 (BGR) and reuses its memory if it fits. *image is empty before the
   // first Bind.
   void ReadBack(cv::Mat* image) const;
-  // Copies the target to the default framebuffer, centred and as large as fits, with black borders.
-  void Present(int width_px, int height_px) const;
+  // Makes this target a copy of another one's image and binds it for drawing. Without an image in the other
+  // one, nothing happens.
+  void CopyFrom(const ImageTarget& other);
+  // Copies the target to a part of the default framebuffer, centred and as large as fits; the rest of the
+  // part becomes black. (x, y) is the part's upper left corner in a window of this height.
+  void Present(int x, int y, int width_px, int height_px, int window_height_px) const;
+  bool empty() const { return target_ == nullptr; }
+  // Zero before the first Bind.
+  int width_px() const { return target_ == nullptr ? 0 : target_->width_px(); }
+  int height_px() const { return target_ == nullptr ? 0 : target_->height_px(); }
 
  private:
   // Draws a CV_8UC3 or CV_8UC1 image into the current viewport, which is `area`.

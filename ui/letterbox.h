@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ui/window_layout.h"
+
 namespace docent::ui {
 
 // The position of an image in a window that shows it centred, undistorted and as large as fits. Window
@@ -18,6 +20,10 @@ struct Letterbox {
   Eigen::Vector2d ImageFromWindow(const Eigen::Vector2d& point) const {
     return (point - Eigen::Vector2d(x, y)) / scale - Eigen::Vector2d(0.5, 0.5);
   }
+  // The inverse of ImageFromWindow.
+  Eigen::Vector2d WindowFromImage(const Eigen::Vector2d& pixel) const {
+    return scale * (pixel + Eigen::Vector2d(0.5, 0.5)) + Eigen::Vector2d(x, y);
+  }
 };
 
 // All sizes are positive.
@@ -29,6 +35,15 @@ inline Letterbox FitImage(int image_width, int image_height, int window_width, i
   box.height = std::max(1, static_cast<int>(std::lround(image_height * box.scale)));
   box.x = (window_width - box.width) / 2;
   box.y = (window_height - box.height) / 2;
+  return box;
+}
+
+// The same in a part of the window.
+inline Letterbox FitImage(int image_width, int image_height, const Area& area) {
+  Letterbox box = FitImage(image_width, image_height, std::max(1, static_cast<int>(area.width)),
+                           std::max(1, static_cast<int>(area.height)));
+  box.x += static_cast<int>(area.x);
+  box.y += static_cast<int>(area.y);
   return box;
 }
 

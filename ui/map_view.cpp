@@ -236,8 +236,8 @@ void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, 
   impl_->above.End();
 }
 
-void MapView::Present(int width_px, int height_px) {
-  impl_->image.Present(width_px, height_px);
+void MapView::Present(const WindowPart& part) {
+  impl_->image.Present(part.x, part.y, part.width_px, part.height_px, part.window_height_px);
 }
 
 void MapView::ReadBack(cv::Mat* image) {

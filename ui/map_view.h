@@ -12,6 +12,7 @@
 #include "engine/map/map_snapshot.h"
 #include "engine/map/upright_axes.h"
 #include "ui/canvas.h"
+#include "ui/renderer.h"
 
 namespace docent::ui {
 
@@ -67,8 +68,9 @@ class MapView {
   // the ground plane, below everything else.
   void Draw(const engine::MapSnapshot& map, const content::Scene* scene, const Orbit& orbit,
             const std::string& title = {}, const std::vector<PredictedRecall>& predicted_recall = {});
-  // See Renderer::Present and Renderer::ReadBack.
-  void Present(int width_px, int height_px);
+  // Shows the last drawing in a part of the default framebuffer, letterboxed.
+  void Present(const WindowPart& part);
+  // See Renderer::ReadBack.
   void ReadBack(cv::Mat* image);
 
  private:

@@ -12,8 +12,10 @@ struct Renderer::Impl {
   explicit Impl(const RendererOptions& options) : content(options.samples, options.max_texture_px) {}
 
   ImageTarget image;
+  ImageTarget copy;  // With the heads-up display, for ReadBackWithHeadsUp.
   ContentLayer content;
   Canvas canvas;
+  Canvas window_canvas;
 };
 
 Renderer::Renderer(const RendererOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -37,7 +39,7 @@ void Renderer::Draw(const View& view) {
   if (has_pose && view.overlay.keyframes && tracked->map != nullptr)
     DrawKeyFrames(*tracked->map, *view.camera, tracked->camera_from_map, &impl_->canvas);
   if (tracked != nullptr && view.overlay.points) DrawPoints(*tracked, &impl_->canvas);
-  if (view.overlay.hud) DrawHeadsUp(view, &impl_->canvas);
+  if (view.overlay.hud) DrawHeadsUp(view, HeadsUpStyleFor(height_px), &impl_->canvas);
   target.BindForDrawing();
   impl_->canvas.End();
   if (view.overlay.inset == nullptr || view.overlay.inset->frame.image.empty()) return;
@@ -51,11 +53,31 @@ void Renderer::Draw(const View& view) {
 }
 
 void Renderer::Present(int width_px, int height_px) {
-  impl_->image.Present(width_px, height_px);
+  impl_->image.Present(0, 0, width_px, height_px, height_px);
+}
+
+void Renderer::PresentWithHeadsUp(const View& view, const WindowPart& part, double unit_px,
+                                  double bottom_px) {
+  impl_->image.Present(part.x, part.y, part.width_px, part.height_px, part.window_height_px);
+  if (!view.overlay.hud) return;
+  Canvas& canvas = impl_->window_canvas;
+  canvas.Begin(part.width_px, part.height_px, true);
+  DrawHeadsUp(view, {unit_px, bottom_px}, &canvas);
+  glViewport(part.x, part.window_height_px - part.y - part.height_px, part.width_px, part.height_px);
+  canvas.End();
 }
 
 void Renderer::ReadBack(cv::Mat* image) {
   impl_->image.ReadBack(image);
+}
+
+void Renderer::ReadBackWithHeadsUp(const View& view, cv::Mat* image) {
+  if (!view.overlay.hud || impl_->image.empty()) return ReadBack(image);
+  impl_->copy.CopyFrom(impl_->image);
+  impl_->canvas.Begin(impl_->copy.width_px(), impl_->copy.height_px());
+  DrawHeadsUp(view, HeadsUpStyleFor(impl_->copy.height_px()), &impl_->canvas);
+  impl_->canvas.End();
+  impl_->copy.ReadBack(image);
 }
 
 }  // namespace docent::ui

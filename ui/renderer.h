@@ -14,14 +14,15 @@ namespace docent::ui {
 
 // What is drawn besides the video and the content.
 struct Overlay {
-  bool points = false;     // Matched map points, coloured by pyramid level.
-  bool keyframes = false;  // Keyframes of the map, as small frusta.
-  bool hud = true;         // State, map name and hint, and the search figure while there is no pose.
-  bool status = true;      // The state panel of the HUD; false when nothing is tracked.
-  std::string map_name;    // Empty when there is no map.
-  std::string mapping;     // Mapping status of the current map; empty when nobody extends it.
-  std::string message;     // One sentence at the bottom; empty for none.
-  std::string hint;        // What to do so that the camera is tracked, above it; empty for none.
+  bool points = false;      // Matched map points, coloured by pyramid level.
+  bool keyframes = false;   // Keyframes of the map, as small frusta.
+  bool hud = true;          // State, map name and hint, and the search figure while there is no pose.
+  bool status = true;       // The state panel of the HUD; false when nothing is tracked.
+  std::string map_name;     // Empty when there is no map.
+  bool is_waiting = false;  // No map is tracked or started: the HUD does not ask to move the camera.
+  std::string mapping;      // Mapping status of the current map; empty when nobody extends it.
+  std::string message;      // One sentence at the bottom; empty for none.
+  std::string hint;         // What to do so that the camera is tracked, above it; empty for none.
   // The newest frame of another camera, of any size; null for none. It is shown small in a corner (see
   // inset.h) with a border whose colour is its tracking state.
   const engine::TrackedFrame* inset = nullptr;
@@ -42,6 +43,13 @@ struct RendererOptions {
   int max_texture_px = 2048;  // Largest side of a model's textures on the graphics card, in pixels.
 };
 
+// A part of a window, in pixels of its framebuffer.
+struct WindowPart {
+  int x = 0, y = 0;                 // Upper left corner, from the window's upper left corner.
+  int width_px = 1, height_px = 1;  // Positive.
+  int window_height_px = 1;         // Height of the whole window.
+};
+
 // Draws a View with OpenGL 3.3 core into an internal framebuffer, from which it can be shown or read back. A
 // context (see context.h) must be current from construction to destruction, on one thread.
 class Renderer {
@@ -56,8 +64,16 @@ class Renderer {
   void Draw(const View& view);
   // Shows the last drawn image in the default framebuffer, letterboxed to width_px x height_px.
   void Present(int width_px, int height_px);
+  // Shows the last drawn image in a part of the default framebuffer, letterboxed, and over it the view's
+  // heads-up display at the window's resolution, whatever that of the camera is; the image should have been
+  // drawn without it. `unit_px` is the size of the texts: normal ones have 15 units. The sentences at the
+  // bottom leave bottom_px free.
+  void PresentWithHeadsUp(const View& view, const WindowPart& part, double unit_px, double bottom_px);
   // Reads back the last drawn image as CV_8UC3 (BGR). *image's memory is reused if it fits.
   void ReadBack(cv::Mat* image);
+  // The same with the view's heads-up display, which the drawn image shall not have. The drawn image is not
+  // changed.
+  void ReadBackWithHeadsUp(const View& view, cv::Mat* image);
 
  private:
   struct Impl;

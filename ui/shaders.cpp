@@ -219,6 +219,7 @@ layout(location = 1) in vec2 local;
 layout(location = 2) in vec4 shape;  // Half width, half height, corner radius, stroke width (0: filled).
 layout(location = 3) in vec4 shape_color;
 uniform vec2 target_size;
+uniform float up;  // -1 where row 0 of the framebuffer is at the bottom.
 out vec2 place;
 flat out vec4 form;
 flat out vec4 paint;
@@ -226,7 +227,7 @@ void main() {
   place = local;
   form = shape;
   paint = shape_color;
-  gl_Position = vec4((position_px + 0.5) / target_size * 2.0 - 1.0, 0.0, 1.0);
+  gl_Position = vec4((position_px + 0.5) / target_size * 2.0 - 1.0, 0.0, 1.0) * vec4(1.0, up, 1.0, 1.0);
 }
 )glsl";
 

@@ -6,6 +6,7 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -61,13 +62,14 @@ std::string NameOf(int key) {
 struct Window::Impl {
   GLFWwindow* window = nullptr;
   std::vector<InputEvent> events;
+  // The place and size of the window before it became full screen.
+  Eigen::Vector2i place = Eigen::Vector2i::Zero(), size = Eigen::Vector2i::Zero();
 
   static Impl& Of(GLFWwindow* window) { return *static_cast<Impl*>(glfwGetWindowUserPointer(window)); }
 
   static void OnButton(GLFWwindow* window, int button, int action, int modifiers) {
-    if (action != GLFW_PRESS) return;
     InputEvent event;
-    event.kind = InputEvent::Kind::kClick;
+    event.kind = action == GLFW_PRESS ? InputEvent::Kind::kClick : InputEvent::Kind::kRelease;
     glfwGetCursorPos(window, &event.position.x(), &event.position.y());
     event.button = button;
     event.control = (modifiers & GLFW_MOD_CONTROL) != 0;
@@ -78,9 +80,17 @@ struct Window::Impl {
     if (action == GLFW_RELEASE) return;
     InputEvent event;
     event.key = NameOf(key);
+    event.repeated = action == GLFW_REPEAT;
     event.control = (modifiers & GLFW_MOD_CONTROL) != 0;
     event.shift = (modifiers & GLFW_MOD_SHIFT) != 0;
     if (!event.key.empty()) Of(window).events.push_back(std::move(event));
+  }
+  static void OnDrop(GLFWwindow* window, int count, const char** paths) {
+    InputEvent event;
+    event.kind = InputEvent::Kind::kDrop;
+    glfwGetCursorPos(window, &event.position.x(), &event.position.y());
+    event.files.assign(paths, paths + count);
+    Of(window).events.push_back(std::move(event));
   }
   static void OnResize(GLFWwindow* window, int width_px, int height_px) {
     InputEvent event;
@@ -99,6 +109,12 @@ struct Window::Impl {
 Window::Window(const std::string& title, int width_px, int height_px) : impl_(std::make_unique<Impl>()) {
   if (window_count == 0 && glfwInit() != GLFW_TRUE)
     throw Error("Cannot open a window: there is no display (" + LastProblem() + "); use --headless.");
+  if (GLFWmonitor* const monitor = glfwGetPrimaryMonitor(); monitor != nullptr) {
+    int x = 0, y = 0, most_width = 0, most_height = 0;
+    glfwGetMonitorWorkarea(monitor, &x, &y, &most_width, &most_height);
+    if (most_width > 0) width_px = std::min(width_px, most_width);
+    if (most_height > 0) height_px = std::min(height_px, most_height);
+  }
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
@@ -113,6 +129,7 @@ Window::Window(const std::string& title, int width_px, int height_px) : impl_(st
   glfwSetWindowUserPointer(impl_->window, impl_.get());
   glfwSetMouseButtonCallback(impl_->window, Impl::OnButton);
   glfwSetKeyCallback(impl_->window, Impl::OnKey);
+  glfwSetDropCallback(impl_->window, Impl::OnDrop);
   glfwSetFramebufferSizeCallback(impl_->window, Impl::OnResize);
   glfwSetWindowCloseCallback(impl_->window, Impl::OnClose);
   glfwMakeContextCurrent(impl_->window);
@@ -139,6 +156,44 @@ void Window::Show() {
 
 bool Window::IsClosing() const {
   return glfwWindowShouldClose(impl_->window) == GLFW_TRUE;
+}
+
+void Window::KeepOpen() {
+  glfwSetWindowShouldClose(impl_->window, GLFW_FALSE);
+}
+
+void Window::ToggleFullScreen() {
+  GLFWwindow* const window = impl_->window;
+  if (glfwGetWindowMonitor(window) != nullptr) {
+    glfwSetWindowMonitor(window, nullptr, impl_->place.x(), impl_->place.y(), impl_->size.x(),
+                         impl_->size.y(), GLFW_DONT_CARE);
+    return;
+  }
+  GLFWmonitor* const monitor = glfwGetPrimaryMonitor();
+  const GLFWvidmode* const mode = monitor != nullptr ? glfwGetVideoMode(monitor) : nullptr;
+  if (mode == nullptr) return;
+  glfwGetWindowPos(window, &impl_->place.x(), &impl_->place.y());
+  glfwGetWindowSize(window, &impl_->size.x(), &impl_->size.y());
+  glfwSetWindowMonitor(window, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
+}
+
+Eigen::Vector2d Window::PointerPosition() const {
+  Eigen::Vector2d position;
+  glfwGetCursorPos(impl_->window, &position.x(), &position.y());
+  return position;
+}
+
+bool Window::IsControlDown() const {
+  return glfwGetKey(impl_->window, GLFW_KEY_LEFT_CONTROL) == GLFW_PRESS ||
+         glfwGetKey(impl_->window, GLFW_KEY_RIGHT_CONTROL) == GLFW_PRESS;
+}
+
+double Window::ContentScale() const {
+  float across = 1, down = 1;
+  glfwGetWindowContentScale(impl_->window, &across, &down);
+  // Where a window unit has several pixels, the texts are that much larger already.
+  const double pixels = static_cast<double>(FramebufferSize().x()) / std::max(1, WindowSize().x());
+  return pixels > 0 ? across / pixels : 1.0;
 }
 
 Eigen::Vector2i Window::FramebufferSize() const {

@@ -14,12 +14,15 @@ namespace docent::ui {
 
 // An input event of a window. Positions are in screen units from the window's top-left corner, y down.
 struct InputEvent {
-  enum class Kind { kClick, kKey, kResize, kClose } kind = Kind::kKey;
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();  // kClick: the position at which the button was pressed
-  int button = 0;                                      // kClick: 0 left, 1 right, 2 middle
+  enum class Kind { kClick, kRelease, kKey, kDrop, kResize, kClose } kind = Kind::kKey;
+  // kClick, kRelease, kDrop: where the button was pressed or released, or the files were dropped.
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();
+  int button = 0;  // kClick, kRelease: 0 left, 1 right, 2 middle
   // kKey: "a" … "z", "0" … "9", "escape", "space", "enter", "tab", "f1" … "f12", "left", "up" …
   std::string key;
   bool control = false, shift = false;  // kKey, kClick
+  bool repeated = false;                // kKey: the key is held
+  std::vector<std::string> files;       // kDrop: paths
   int width_px = 0, height_px = 0;      // kResize: the size of the framebuffer
 };
 
@@ -27,8 +30,8 @@ struct InputEvent {
 // which must be the program's main thread (a rule of GLFW).
 class Window : public GraphicsContext {
  public:
-  // Throws docent::Error with a one-sentence message when there is no display or the display has no OpenGL
-  // 3.3.
+  // The window is at most as large as the monitor allows. Throws docent::Error with a one-sentence message
+  // when there is no display or the display has no OpenGL 3.3.
   Window(const std::string& title, int width_px, int height_px);
   ~Window() override;
   Window(const Window&) = delete;
@@ -39,11 +42,19 @@ class Window : public GraphicsContext {
   std::vector<InputEvent> PollEvents();
   // Shows the contents of the default framebuffer; waits for the screen when vertical sync is on.
   void Show();
-  // Whether the user asked to close the window.
+  // Whether the user asked to close the window. KeepOpen takes that back.
   bool IsClosing() const;
+  void KeepOpen();
+  // Changes between a window and the whole primary monitor.
+  void ToggleFullScreen();
   // The size of the default framebuffer in pixels, and of the window in the units of InputEvent::position.
   Eigen::Vector2i FramebufferSize() const;
   Eigen::Vector2i WindowSize() const;
+  // The pointer in the units of InputEvent::position; outside the window it may be negative.
+  Eigen::Vector2d PointerPosition() const;
+  bool IsControlDown() const;
+  // The size that the monitor suggests for texts, relative to a monitor of 96 dpi, per window unit.
+  double ContentScale() const;
   // For the authoring panel, which handles input of the same window.
   GLFWwindow* handle() const;
 

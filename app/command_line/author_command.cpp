@@ -36,11 +36,18 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
   AddSecondsOption(command, "--autosave", &options->autosave_interval,
                    "Time between automatic saves; 0: save only when a map is left and at the end "
                    "(default 10)");
+  command
+      ->add_option("--ui-scale", options->ui_scale,
+                   "Size of the window's panel and texts, times what the monitor suggests; 0.5 to 4 (default "
+                   "1). A small window reduces it")
+      ->type_name("FACTOR");
   AddWhenLostOption(command, &options->when_lost, "new without a window, otherwise wait");
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
     if (options->target.has_value() != (options->target_width_m > 0))
       throw CLI::ValidationError("--target", "--target and --target-width must be given together");
+    if (!(options->ui_scale >= 0.5 && options->ui_scale <= 4))
+      throw CLI::ValidationError("--ui-scale", "must be between 0.5 and 4");
     invocation->run = [=] { run(*options, invocation->verbosity); };
   });
 }

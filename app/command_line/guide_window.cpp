@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/guide_window.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
-#include <set>
 #include <utility>
 
+#include "app/command_line/author_controls.h"
 #include "app/command_line/interruption.h"
 #include "app/command_line/map_panel.h"
-#include "ui/authoring_panel.h"
+#include "app/command_line/window_times.h"
 #include "ui/inset.h"
 #include "ui/letterbox.h"
 #include "ui/window.h"
@@ -47,90 +49,157 @@ bool FrameSlot::closed() const {
 
 namespace {
 
+constexpr int kAuthorWidth = 1280, kAuthorHeight = 800;
+
 // The window, its renderers and the handling of keyboard and mouse input.
-class GuideWindow final : public ui::AuthoringActions {
+class GuideWindow {
  public:
-  GuideWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras,
-              std::span<CommandInbox> inboxes, const std::function<void(const ShownFrame&)>& drawn)
+  GuideWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, const WindowLink& link)
       : request_(request),
-        drawn_(drawn),
+        link_(link),
         cameras_(cameras),
-        inboxes_(inboxes),
-        window_(request.title, cameras.front().model->width_px(), cameras.front().model->height_px()),
+        window_(request.title, request.may_write ? kAuthorWidth : cameras.front().model->width_px(),
+                request.may_write ? kAuthorHeight : cameras.front().model->height_px()),
+        newest_(cameras.size()),
         shown_(cameras.size()) {
     if (request.record) recorder_.emplace(*request.record, cameras.front().source->info().nominal_fps);
-    if (request.may_write) panel_.emplace(&window_, this, Models());
+    if (!request.may_write) return;
+    AuthorControls::Host host;
+    host.emit = [this](Command command) { Emit(std::move(command)); };
+    host.toggle_full_screen = [this] { window_.ToggleFullScreen(); };
+    host.swap_cameras = [this] { Swap(); };
+    controls_.emplace(&window_, std::move(host), request.model_folder);
   }
 
   // Handles the input and draws the frames. Returns false when the window was closed.
   bool Update(std::vector<std::shared_ptr<const ShownFrame>> frames) {
+    using Part = WindowTimes::Part;
+    times_.Start();
     HandleEvents();
-    if (window_.IsClosing() || closing_) return false;
-    std::vector<std::shared_ptr<const ShownFrame>> fresh;
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      if (!frames[i] || frames[i]->tracked.state == engine::TrackingState::kDropped) continue;
-      shown_[i] = std::move(frames[i]);
-      fresh.push_back(shown_[i]);
+    const auto fresh = Take(std::move(frames));
+    const ui::WindowLayout layout = Layout();
+    if (controls_) {
+      controls_->Take(link_.notices->TakeAll());
+      controls_->SetView(ViewIn(layout), link_.saving(), MapNames());
+      controls_->Update();
     }
-    if (!fresh.empty()) DrawImage();
-    const Eigen::Vector2i size = window_.FramebufferSize();
-    const int width_px = std::max(1, size.x()), height_px = std::max(1, size.y());
-    if (shows_map_ && large()) {
-      if (!fresh.empty()) map_panel_.Draw(*large(), width_px, height_px);
-      map_panel_.Present(width_px, height_px);
-    } else {
-      renderer_.Present(width_px, height_px);
-    }
-    if (panel_) panel_->Draw();
+    times_.Add(Part::kInput);
+    if (IsClosing()) return false;
+    if (!fresh.empty() || NeedsDrawing()) DrawImage();
+    times_.Add(Part::kImage);
+    Present(layout, !fresh.empty());
+    times_.Add(Part::kPresent);
+    if (controls_) message_height_ = controls_->Draw(layout);
+    times_.Add(Part::kInterface);
     window_.Show();
-    for (const auto& frame : fresh) drawn_(*frame);
+    times_.Add(Part::kShow);
+    for (const auto& frame : fresh) link_.drawn(*frame);
     return true;
   }
 
   void Close() {
     if (recorder_) recorder_->Close();
+    spdlog::debug("{}", times_.Summary());
   }
 
  private:
-  // Model files that the panel offers: those in the working directory.
-  static std::vector<std::string> Models() {
-    static const std::set<std::string> kEndings = {".glb", ".gltf", ".obj", ".ply", ".stl", ".fbx", ".dae"};
-    std::vector<std::string> models;
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(".", error)) {
-      if (kEndings.contains(entry.path().extension().string())) {
-        models.push_back(entry.path().filename().string());
-      }
+  const std::shared_ptr<const ShownFrame>& large() const { return shown_[large_]; }
+  const engine::CameraModel& camera() const {
+    return large() && large()->camera ? *large()->camera : *cameras_[large_].model;
+  }
+  bool has_inset() const { return shown_.size() > 1 && shown_[1 - large_]; }
+  bool is_frozen() const { return controls_ && controls_->choices().frozen; }
+  bool shows_map() const { return controls_ && controls_->choices().from_above && large(); }
+
+  // Keeps the frames; the shown ones stay while the view is frozen. Returns those that are new on the screen.
+  std::vector<std::shared_ptr<const ShownFrame>> Take(std::vector<std::shared_ptr<const ShownFrame>> frames) {
+    std::vector<std::shared_ptr<const ShownFrame>> fresh;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (!frames[i] || frames[i]->tracked.state == engine::TrackingState::kDropped) continue;
+      newest_[i] = std::move(frames[i]);
+      if (is_frozen() && shown_[i]) continue;
+      shown_[i] = newest_[i];
+      fresh.push_back(shown_[i]);
     }
-    std::sort(models.begin(), models.end());
-    return models;
+    if (std::exchange(was_frozen_, is_frozen()) && !is_frozen()) {
+      shown_ = newest_;
+      redraw_ = true;
+    }
+    return fresh;
   }
 
-  const std::shared_ptr<const ShownFrame>& large() const { return shown_[large_]; }
-  const engine::CameraModel& camera() const { return *cameras_[large_].model; }
+  // The content of the shown frame; with a frozen view that of the newest frame in the same map.
+  std::shared_ptr<const content::Scene> SceneOfLarge() {
+    const auto& newest = newest_[large_];
+    if (newest && newest->shown.scene && newest->tracked.map_key == large()->tracked.map_key)
+      newer_scene_ = {newest->tracked.map_key, newest->shown.scene};
+    const bool has_newer = newer_scene_.first == large()->tracked.map_key && newer_scene_.second;
+    return is_frozen() && has_newer ? newer_scene_.second : large()->shown.scene;
+  }
 
-  void Swap() {
-    if (shown_.size() < 2 || !shown_[1 - large_]) return;
-    large_ = 1 - large_;
-    DrawImage();
+  // What is drawn at present, without the heads-up display.
+  ui::View CurrentView() {
+    ui::View view = ViewOf(*large(), *cameras_[large_].model);
+    if (has_inset()) view.overlay.inset = &shown_[1 - large_]->tracked;
+    view.overlay.points = points_;
+    view.overlay.keyframes = keyframes_;
+    view.overlay.status = status_;
+    if (controls_) {
+      const ui::AuthoringChoices& choices = controls_->choices();
+      view.overlay.points = choices.show_points;
+      view.overlay.keyframes = choices.show_keyframes;
+      view.overlay.status = choices.show_status;
+      view.scene = controls_->Preview().get();
+    }
+    return view;
+  }
+
+  bool NeedsDrawing() {
+    bool needs = std::exchange(redraw_, false);
+    if (!controls_) return needs && large();
+    const ui::AuthoringChoices& choices = controls_->choices();
+    const auto drawn = std::pair(choices.show_points, choices.show_keyframes);
+    needs = std::exchange(drawn_choices_, drawn) != drawn || needs;
+    needs = controls_->TakePreviewChange() || needs;
+    return needs && large();
+  }
+
+  ui::WindowLayout Layout() const {
+    const Eigen::Vector2d size = window_.WindowSize().cwiseMax(1).cast<double>();
+    if (controls_)
+      return ui::LayOutWindow(size.x(), size.y(), request_.ui_scale * window_.ContentScale(),
+                              controls_->choices().panel_open);
+    ui::WindowLayout layout;
+    layout.image = {0, 0, size.x(), size.y()};
+    return layout;
+  }
+
+  AuthorView ViewIn(const ui::WindowLayout& layout) {
+    AuthorView view;
+    view.frame = large();
+    view.image = layout.image;
+    view.scale = layout.scale;
+    view.camera.lens = camera();
+    view.box = ui::FitImage(camera().width_px(), camera().height_px(), layout.image);
+    if (!large()) return view;
+    view.camera.camera_from_map = large()->tracked.camera_from_map;
+    view.scene = SceneOfLarge();
+    if (!has_inset()) return view;
+    const engine::CameraModel& other = *cameras_[1 - large_].model;
+    const ui::Inset inset =
+        ui::PlaceInset(camera().width_px(), camera().height_px(), other.width_px(), other.height_px());
+    const Eigen::Vector2d low = view.box.WindowFromImage({inset.x - 0.5, inset.y - 0.5});
+    view.inset = {low.x(), low.y(), inset.width * view.box.scale, inset.height * view.box.scale};
+    return view;
   }
 
   void DrawImage() {
-    if (!large()) return;
-    ui::View view = ViewOf(*large(), camera());
-    if (shown_.size() > 1 && shown_[1 - large_]) view.overlay.inset = &shown_[1 - large_]->tracked;
-    view.overlay.points = points_;
-    view.overlay.keyframes = keyframes_;
-    view.overlay.hud = hud_;
-    if (panel_) {
-      panel_->ApplyTo(&view.overlay);
-      map_names_.insert(large()->shown.map_name);
-      map_names_.erase("");
-      panel_->SetMapNames({map_names_.begin(), map_names_.end()});
-    }
+    ui::View view = CurrentView();
+    view.overlay.hud = false;
     renderer_.Draw(view);
     if (!recorder_ && !request_.on_image) return;
-    renderer_.ReadBack(&image_);
+    view.overlay.hud = true;
+    renderer_.ReadBackWithHeadsUp(view, &image_);
     // The video has the rate and size of the first camera, so a frame is written for each of that camera's
     // images.
     const std::uint64_t index = shown_[0] ? shown_[0]->tracked.frame.index : 0;
@@ -140,94 +209,114 @@ class GuideWindow final : public ui::AuthoringActions {
     if (request_.on_image) request_.on_image(*large(), image_);
   }
 
+  // The parts of the layout are in window units, which may have several pixels.
+  void Present(const ui::WindowLayout& layout, bool is_fresh) {
+    const Eigen::Vector2i size = window_.FramebufferSize().cwiseMax(1);
+    const double pixels = size.x() / std::max(1.0, layout.image.width + layout.panel.width);
+    ui::WindowPart part;
+    part.width_px = std::clamp(static_cast<int>(pixels * layout.image.width), 1, size.x());
+    part.height_px = part.window_height_px = size.y();
+    if (shows_map()) {
+      if (is_fresh) map_panel_.Draw(*large(), part.width_px, part.height_px);
+      map_panel_.Present(part);
+      return;
+    }
+    ui::View view;
+    if (large()) view = CurrentView();
+    view.overlay.hud = large() != nullptr;
+    const double unit_px = controls_ ? layout.scale * pixels : std::clamp(size.y() / 480.0, 0.5, 4.0);
+    renderer_.PresentWithHeadsUp(view, part, unit_px, message_height_ * pixels);
+  }
+
+  bool IsClosing() {
+    if (!controls_) return closing_ || window_.IsClosing();
+    if (controls_->ending() == AuthorControls::Ending::kDiscard) link_.discard_changes();
+    return controls_->ending() != AuthorControls::Ending::kNone;
+  }
+
+  void Swap() {
+    if (!has_inset()) return;
+    large_ = 1 - large_;
+    redraw_ = true;
+  }
+
   // Queues a command for the frame on the screen.
   void Emit(Command command) {
     const auto frame = large() ? std::shared_ptr<const engine::TrackedFrame>(large(), &large()->tracked)
                                : std::shared_ptr<const engine::TrackedFrame>();
-    inboxes_[large_].Push({std::move(command), frame});
+    link_.inboxes[large_].Push({std::move(command), frame});
   }
-  void NewMap(const std::string& name) override { Emit(app::NewMap{name}); }
-  void StopMap() override { Emit(app::StopMap{}); }
-  void PlaceModel(const std::string& file, const Eigen::Vector2d& pixel, double scale,
-                  double yaw_deg) override {
-    Emit(app::PlaceModel{file, pixel, scale, yaw_deg});
+
+  // All names, asked for once a second.
+  std::vector<std::string> MapNames() {
+    constexpr auto kOften = std::chrono::seconds(1);
+    const auto now = std::chrono::steady_clock::now();
+    if (!names_time_ || now - *names_time_ > kOften) {
+      map_names_ = link_.map_names();
+      names_time_ = now;
+    }
+    return map_names_;
   }
-  void PlaceSignpost(const std::string& text, const Eigen::Vector2d& pixel,
-                     const std::string& to_map) override {
-    Emit(app::PlaceSignpost{text, pixel, to_map});
-  }
-  void Undo() override { Emit(app::Undo{}); }
-  void Redo() override { Emit(app::Redo{}); }
-  void Save() override { Emit(app::Save{}); }
 
   void HandleEvents() {
     using Kind = ui::InputEvent::Kind;
     for (const ui::InputEvent& event : window_.PollEvents()) {
-      if (event.kind == Kind::kKey && !(panel_ && panel_->WantsKeyboard())) HandleKey(event);
-      if (event.kind == Kind::kClick && event.button == 0 && !(panel_ && panel_->WantsMouse())) {
-        HandleClick(event);
+      if (controls_) {
+        controls_->Handle(event);
+      } else if (event.kind == Kind::kKey && !event.repeated) {
+        HandleKey(event);
+      } else if (event.kind == Kind::kClick && event.button == 0 && large() &&
+                 ViewIn(Layout()).inset.Contains(event.position)) {
+        Swap();
       }
     }
   }
 
+  // Of a tour.
   void HandleKey(const ui::InputEvent& event) {
-    if (event.control) {
-      if (!request_.may_write) return;
-      if (event.key == "z") Undo();
-      if (event.key == "y") Redo();
-      if (event.key == "s") Save();
-      return;
-    }
-    if (event.key == "tab") Swap();
-    if (event.key == "m" && request_.may_write) shows_map_ = !shows_map_;
-    if (event.key == "escape" || event.key == "q") closing_ = true;
-    bool& points = panel_ ? panel_->state().show_points : points_;
-    bool& keyframes = panel_ ? panel_->state().show_keyframes : keyframes_;
-    bool& hud = panel_ ? panel_->state().show_hud : hud_;
-    if (event.key == "p") points = !points;
-    if (event.key == "k") keyframes = !keyframes;
-    if (event.key == "h") hud = !hud;
+    if (event.control && event.key == "q") closing_ = true;
+    if (event.control) return;
+    if (event.key == "tab" || event.key == "c") Swap();
+    if (event.key == "f11") window_.ToggleFullScreen();
+    if (event.key == "p") points_ = !points_;
+    if (event.key == "k") keyframes_ = !keyframes_;
+    if (event.key == "h") status_ = !status_;
+    redraw_ = true;
   }
 
-  void HandleClick(const ui::InputEvent& event) {
-    const Eigen::Vector2i size = window_.WindowSize();
-    if (!large() || size.x() < 1 || size.y() < 1) return;
-    const int width = camera().width_px(), height = camera().height_px();
-    const ui::Letterbox box = ui::FitImage(width, height, size.x(), size.y());
-    const Eigen::Vector2d pixel = box.ImageFromWindow(event.position);
-    if (shown_.size() > 1 && shown_[1 - large_]) {
-      const engine::CameraModel& other = *cameras_[1 - large_].model;
-      if (ui::PlaceInset(width, height, other.width_px(), other.height_px()).Contains(pixel)) return Swap();
-    }
-    if (panel_ && !shows_map_ && camera().IsInside(pixel)) panel_->ClickImage(pixel);
-  }
   bool HasFirstCameraSize(const cv::Mat& image) const {
     const engine::CameraModel& first = *cameras_.front().model;
     return image.cols == first.width_px() && image.rows == first.height_px();
   }
 
   const GuideRequest& request_;
-  const std::function<void(const ShownFrame&)>& drawn_;
+  const WindowLink& link_;
   const std::span<const CalibratedCamera> cameras_;
-  const std::span<CommandInbox> inboxes_;
   ui::Window window_;
   ui::Renderer renderer_;
   MapPanel map_panel_;
-  std::optional<ui::AuthoringPanel> panel_;
+  WindowTimes times_;
+  std::optional<AuthorControls> controls_;  // Only of an author.
   std::optional<ViewRecorder> recorder_;
-  std::vector<std::shared_ptr<const ShownFrame>> shown_;  // By camera.
-  std::size_t large_ = 0;                                 // Index of the camera that is shown large.
+  std::vector<std::shared_ptr<const ShownFrame>> newest_, shown_;  // By camera.
+  std::size_t large_ = 0;                                          // Index of the camera that is shown large.
+  // With a frozen view: the newest content, and its map.
+  std::pair<std::uint64_t, std::shared_ptr<const content::Scene>> newer_scene_;
   std::optional<std::uint64_t> recorded_;
-  std::set<std::string> map_names_;
+  std::vector<std::string> map_names_;
+  std::optional<std::chrono::steady_clock::time_point> names_time_;
+  std::pair<bool, bool> drawn_choices_;  // Points and keyframes.
+  double message_height_ = 0;            // Window units.
   cv::Mat image_;
-  bool points_ = false, keyframes_ = false, hud_ = true, shows_map_ = false, closing_ = false;
+  bool points_ = false, keyframes_ = false, status_ = true;  // Of a tour.
+  bool closing_ = false, redraw_ = false, was_frozen_ = false;
 };
 
 }  // namespace
 
 void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,
-                  std::span<CommandInbox> inboxes, const std::function<void(const ShownFrame&)>& drawn) {
-  GuideWindow window(request, cameras, inboxes, drawn);
+                  const WindowLink& link) {
+  GuideWindow window(request, cameras, link);
   while (!slot->closed() && !Interruption::requested()) {
     if (!window.Update(slot->Take())) break;
   }

@@ -2,12 +2,15 @@
 #pragma once
 
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "app/command_line/notices.h"
 #include "app/command_line/run_guide.h"
 
 namespace docent::app {
@@ -33,17 +36,25 @@ class FrameSlot {
   bool closed_ = false;
 };
 
-// Shows frames in a window until the frames end or the person closes it. The author's panel puts commands
-// into the inbox of the camera that is shown large. With two cameras, the first is shown large and the other
-// small; a click on the small image swaps them. Main thread only, as GLFW requires. Throws Error when there
-// is no display.
+// What the window needs from the run. Thread-safe.
+struct WindowLink {
+  std::span<CommandInbox> inboxes;  // By camera.
+  NoticeQueue* notices = nullptr;   // Never null.
+  std::function<SavingState()> saving;
+  std::function<std::vector<std::string>()> map_names;
+  // From now on nothing is saved.
+  std::function<void()> discard_changes;
+  // Called with each frame once it is on the screen.
+  std::function<void(const ShownFrame&)> drawn;
+};
+
+// Shows frames in a window until the frames end or the person closes it. The author's window puts commands
+// into the inbox of the camera that is shown large; ui/strings.h lists its keys. With two cameras, the first
+// is shown large and the other small; a click on the small image swaps them. Main thread only, as GLFW
+// requires. Throws Error when there is no display.
 //
-//   escape or q  close            p  points      k  keyframes      h  status      tab  swap cameras
-//   control-z    undo             control-y  redo                  control-s  save
-//   m            the map from above, coloured by how well a lost camera will be relocalized (authors only)
-//
-// `drawn` is called with each frame once it is on the screen.
+// Keys of a tour: p points, k keyframes, h status, c or tab swap cameras, f11 full screen, control-q close.
 void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,
-                  std::span<CommandInbox> inboxes, const std::function<void(const ShownFrame&)>& drawn);
+                  const WindowLink& link);
 
 }  // namespace docent::app

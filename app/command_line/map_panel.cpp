@@ -52,8 +52,8 @@ void MapPanel::Draw(const ShownFrame& frame, int width_px, int height_px) {
   view_->Draw(*map, frame.shown.scene.get(), orbit, frame.shown.map_name, predicted_recall_);
 }
 
-void MapPanel::Present(int width_px, int height_px) {
-  if (view_) view_->Present(width_px, height_px);
+void MapPanel::Present(const ui::WindowPart& part) {
+  if (view_) view_->Present(part);
 }
 
 }  // namespace docent::app

@@ -28,7 +28,7 @@ class MapPanel {
   ~MapPanel();
   // Draws the frame's map. Without a map the last drawing stays. Sizes in pixels.
   void Draw(const ShownFrame& frame, int width_px, int height_px);
-  void Present(int width_px, int height_px);
+  void Present(const ui::WindowPart& part);
 
  private:
   void Predict(const std::shared_ptr<const engine::MapSnapshot>& map, std::uint64_t key);

@@ -60,6 +60,7 @@ struct AuthorOptions {
   std::optional<std::filesystem::path> script, record_script;
   Timestamp autosave_interval = std::chrono::seconds(10);  // 0: save only when a map is left and at the end.
   std::optional<WhenLost> when_lost;  // Empty: kWait with a window, which offers a choice, else kNew.
+  double ui_scale = 1;                // Of the window's panel and texts, times what the monitor suggests.
 };
 
 struct TourOptions {

@@ -64,6 +64,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   CopyRunArguments(options.run, AnyLive(cameras), &request);
   request.autosave_interval = options.autosave_interval;
   request.record_script = options.record_script;
+  request.ui_scale = options.ui_scale;
   const auto maps = RunGuide(request, cameras, verbosity);
   if (verbosity == Verbosity::kQuiet) return;
   for (const Session::MapState& map : maps) {

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/run_guide.h"
 
+#include <algorithm>
+#include <cctype>
 #include <mutex>
+#include <set>
 #include <utility>
 
 #include "app/cameras/clipped_source.h"
@@ -61,6 +64,14 @@ std::string DeliveryText(const SourceInfo& info, const Delivery& delivery) {
          " replaced by newer ones, " + std::to_string(delivery.broken) + " broken, " +
          std::to_string(delivery.reconnections) + " reconnections, latency " +
          FormatNumber(1e3 * ToSeconds(delivery.median_latency), 3) + " ms";
+}
+
+// "there is no map" becomes "There is no map."
+std::string SentenceOf(std::string text) {
+  if (text.empty()) return text;
+  text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  if (!text.ends_with('.')) text += '.';
+  return text;
 }
 
 std::vector<std::shared_ptr<const engine::CameraModel>> ModelsOf(std::span<CalibratedCamera> cameras) {
@@ -137,6 +148,21 @@ class GuideRun {
   }
 
   std::span<CommandInbox> inboxes() { return inboxes_; }
+  // For the author's window; without one they are not filled.
+  NoticeQueue* notices() { return &notices_; }
+  SavingState Saving() const {
+    const Session::Saving saving = session_.SavingNow();
+    return {saving.unsaved, saving.saved_at};
+  }
+  std::vector<std::string> MapNames() const {
+    std::vector<std::string> names;
+    for (const Session::MapState& map : session_.Maps()) {
+      if (!map.discarded && map.joined_into == 0) names.push_back(map.name);
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+  void DiscardChanges() { session_.DiscardChanges(); }
   std::vector<Session::MapState> Maps() const { return session_.Maps(); }
 
  private:
@@ -195,9 +221,19 @@ class GuideRun {
     }
     run.options.model_folder = request_.model_folder;
     run.options.inbox = &inboxes_[i];
-    run.options.refused = [&state](const std::string& reason) { state.message = reason; };
+    run.options.refused = [this, &state](const std::string& reason) {
+      if (has_author_window()) {
+        notices_.Push({SentenceOf(reason), std::nullopt});
+      } else {
+        state.message = reason;
+      }
+    };
     run.options.carried_out = [this, &state](const TimedCommand& command) {
-      state.message.clear();
+      if (has_author_window()) {
+        notices_.Push({"", command.command});
+      } else {
+        state.message.clear();
+      }
       const std::scoped_lock lock(files_mutex_);
       files_->Add(command);
     };
@@ -217,7 +253,11 @@ class GuideRun {
     run.shown = [this, &state, &show](const engine::TrackedFrame& tracked) {
       if (Interruption::requested()) stop_.request_stop();
       const std::optional<Timestamp> age = std::exchange(state.age, std::nullopt);
-      auto frame = MakeShown(tracked, &state);
+      std::shared_ptr<ShownFrame> frame;
+      {
+        const std::scoped_lock lock(files_mutex_);
+        frame = MakeShown(tracked, &state);
+      }
       if (age) frame->taken = PlayClock().Now() - *age;
       {
         const std::scoped_lock lock(files_mutex_);
@@ -225,7 +265,9 @@ class GuideRun {
         tally.Add(tracked);
         if (age) tally.AddTrackedAge(*age);
         files_->Add(*frame);
-        files_->Add(session_.TakeEvents());
+        const std::vector<Event> events = session_.TakeEvents();
+        files_->Add(events);
+        Warn(events);
         if (request_.on_frame) request_.on_frame(*frame);
       }
       for (const auto& head : heads_) head->AddView(tracked);
@@ -234,6 +276,18 @@ class GuideRun {
       show(std::move(frame));
     };
     return run;
+  }
+
+  bool has_author_window() const { return request_.may_write && !request_.headless; }
+
+  // Warnings stay in the author's window until they are dismissed.
+  void Warn(const std::vector<Event>& events) {
+    if (!has_author_window()) return;
+    for (const Event& event : events) {
+      if (event.event != "warning") continue;
+      warnings_.insert(event.detail);
+      notices_.Push({SentenceOf(event.detail), std::nullopt});
+    }
   }
 
   void Direct(const std::shared_ptr<const ShownFrame>& frame) {
@@ -250,7 +304,10 @@ class GuideRun {
     if (lens) frame->camera = lens->model;
     if (!state->first_time) state->first_time = tracked.frame.time;
     frame->seconds = ToSeconds(tracked.frame.time - *state->first_time);
-    frame->message = state->message.empty() ? frame->shown.advice : state->message;
+    frame->message = state->message;
+    // What the window shows as a warning already is not shown twice.
+    if (state->message.empty() && !warnings_.contains(frame->shown.advice))
+      frame->message = frame->shown.advice;
     return frame;
   }
 
@@ -261,7 +318,9 @@ class GuideRun {
   std::vector<CameraState> camera_states_;
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
-  std::mutex files_mutex_;            // Guards files_ and tallies_.
+  NoticeQueue notices_;
+  std::mutex files_mutex_;            // Guards files_, tallies_ and warnings_.
+  std::set<std::string> warnings_;    // Those that the window was told of.
   std::vector<CameraTally> tallies_;  // By camera.
   std::optional<GuideFiles> files_;
 };
@@ -309,8 +368,14 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
   });
   std::exception_ptr fault;
   try {
-    ShowInWindow(request, cameras, &slot, run->inboxes(),
-                 [run](const ShownFrame& frame) { run->Drawn(frame); });
+    WindowLink link;
+    link.inboxes = run->inboxes();
+    link.notices = run->notices();
+    link.saving = [run] { return run->Saving(); };
+    link.map_names = [run] { return run->MapNames(); };
+    link.discard_changes = [run] { run->DiscardChanges(); };
+    link.drawn = [run](const ShownFrame& frame) { run->Drawn(frame); };
+    ShowInWindow(request, cameras, &slot, link);
   } catch (...) {
     fault = std::current_exception();
   }

@@ -12,6 +12,8 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   view.scene = frame.shown.scene.get();
   view.animation_seconds = frame.seconds;
   view.overlay.map_name = frame.shown.map_name;
+  view.overlay.is_waiting =
+      frame.tracked.state == engine::TrackingState::kInitializing && frame.shown.starting_map.empty();
   if (frame.shown.mapping) view.overlay.mapping = ToString(*frame.shown.mapping);
   view.overlay.message = frame.message;
   view.overlay.hint = frame.shown.hint;

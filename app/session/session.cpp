@@ -98,8 +98,10 @@ void Session::Advise(Camera* camera, const std::string& sentence) {
 
 Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   const std::uint64_t active = system_.ActiveMap();
+  const std::uint64_t current = CurrentMap(frame);
   const std::scoped_lock lock(mutex_);
   Shown shown;
+  if (frame.state == engine::TrackingState::kInitializing) shown.starting_map = NameOf(current);
   const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
   if (frame.frame.time < camera.advice_end) shown.advice = camera.advice;
   const std::string& rejection = camera.relocalization_message.text();
@@ -124,6 +126,22 @@ std::vector<Session::MapState> Session::Maps() const {
 std::vector<Event> Session::TakeEvents() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(events_, {});
+}
+
+Session::Saving Session::SavingNow() const {
+  Saving saving;
+  if (!saver_) return saving;
+  saving.unsaved = saver_->pending() > 0;
+  const std::scoped_lock lock(mutex_);
+  saving.saved_at = saved_at_;
+  for (const auto& [key, map] : maps_)
+    saving.unsaved = saving.unsaved || (map.Exists() && map.NeedsSave() && map.snapshot->HasFinitePoints());
+  return saving;
+}
+
+void Session::DiscardChanges() {
+  const std::scoped_lock lock(mutex_);
+  discards_changes_ = true;
 }
 
 void Session::Finish() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
@@ -94,6 +95,7 @@ class Session {
     std::optional<MappingStatus> mapping;  // only where the session may write
     std::string advice;                    // a sentence about the frame's camera; often empty
     std::string hint;  // what to do so that the camera is tracked, as one sentence; often empty
+    std::string starting_map;  // the map that is being initialized; empty once it has points, and for none
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
   // The session's state of a map.
@@ -119,6 +121,15 @@ class Session {
   }
   engine::MapperTimes MappingTimes() const { return system_.MappingTimes(); }
   std::vector<Event> TakeEvents();
+
+  // Whether something is not on disk yet, and when something was written last.
+  struct Saving {
+    bool unsaved = false;
+    std::optional<std::chrono::steady_clock::time_point> saved_at;  // empty before the first time
+  };
+  Saving SavingNow() const;
+  // From now on nothing is saved any more, neither by itself nor by Finish. What was saved stays.
+  void DiscardChanges();
 
   // Stops the mapper, saves all unsaved changes, and waits for the disk. Throws the first failure of either,
   // after everything else was done.
@@ -241,6 +252,8 @@ class Session {
   std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by file name in commands
   std::filesystem::path model_folder_;
   std::optional<Timestamp> last_save_;
+  std::optional<std::chrono::steady_clock::time_point> saved_at_;  // for people only
+  bool discards_changes_ = false;
   bool finished_ = false;
   MaintenanceOrder maintenance_order_;  // accessed only by the saver's thread
   // Last, because their threads call back into the other members.

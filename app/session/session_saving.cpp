@@ -16,6 +16,8 @@ void Session::OnSaved(const maps::MapRecord& record) {
       record.snapshot ? "revision " + std::to_string(record.snapshot->revision) : "content";
   spdlog::debug("saved {}: {}", record.name, revision);
   keys_.Refill();
+  const std::scoped_lock lock(mutex_);
+  saved_at_ = std::chrono::steady_clock::now();
 }
 
 void Session::StartSaver() {
@@ -31,7 +33,9 @@ void Session::StartSaver() {
 
 // Passes the changes of a map to the saver, which writes them in the background.
 void Session::SaveMap(SessionMap* map, Timestamp time) {
-  if (!saver_ || !map->Exists() || !map->NeedsSave() || !map->snapshot->HasFinitePoints()) return;
+  if (!saver_ || discards_changes_ || !map->Exists() || !map->NeedsSave() ||
+      !map->snapshot->HasFinitePoints())
+    return;
   maps::MapRecord record;
   record.key = map->key;
   record.name = map->name;

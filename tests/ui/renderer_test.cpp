@@ -226,5 +226,29 @@ TEST_F(RendererTest, SurvivesAnyTextInItsLabels) {
   EXPECT_EQ(image.size(), cv::Size(640, 480));
 }
 
+TEST(Renderer, ReadsBackWithTheHeadsUpDisplayWhatWasDrawnWithoutIt) {
+  OffscreenContext context;
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  const engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(30, 60, 90)));
+  View view;
+  view.tracked = &tracked;
+  view.camera = &camera;
+  view.overlay.map_name = "Hall";
+  view.overlay.message = "Point the camera at the elephants.";
+  cv::Mat with, plain, read;
+  renderer.Draw(view);
+  renderer.ReadBack(&with);
+  view.overlay.hud = false;
+  renderer.Draw(view);
+  renderer.ReadBack(&plain);
+  view.overlay.hud = true;
+  renderer.ReadBackWithHeadsUp(view, &read);
+  EXPECT_GT(cv::norm(with, plain, cv::NORM_INF), 50) << "the display is seen";
+  EXPECT_EQ(cv::norm(with, read, cv::NORM_INF), 0);
+  renderer.ReadBack(&read);
+  EXPECT_EQ(cv::norm(plain, read, cv::NORM_INF), 0) << "the drawn image stays";
+}
+
 }  // namespace
 }  // namespace docent::ui

@@ -1,72 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ui/window.h"
 
-#include <fcntl.h>
-#include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
+#include <gmock/gmock.h>
 
+#include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
+#include <optional>
 #include <thread>
 
+#include "tests/support/virtual_screen.h"
 #include "tests/ui/ui_testing.h"
 #include "ui/authoring_panel.h"
+#include "ui/gui.h"
 #include "ui/letterbox.h"
+#include "ui/message_area.h"
+#include "ui/message_board.h"
 
 namespace docent::ui {
 namespace {
-
-// A virtual X server for these tests, on a display number that the server chooses.
-class VirtualScreen {
- public:
-  VirtualScreen() {
-    int channel[2];
-    if (pipe(channel) != 0) return;
-    child_ = fork();
-    if (child_ == 0) {
-      const std::string descriptor = std::to_string(channel[1]);
-      const int nowhere = open("/dev/null", O_WRONLY);
-      dup2(nowhere, STDERR_FILENO);
-      execlp("Xvfb", "Xvfb", "-displayfd", descriptor.c_str(), "-screen", "0", "1024x768x24", "-nolisten",
-             "tcp", static_cast<char*>(nullptr));
-      _exit(127);
-    }
-    close(channel[1]);
-    char c = 0;
-    while (read(channel[0], &c, 1) == 1 && c != '\n') display_ += c;
-    close(channel[0]);
-    if (!display_.empty()) setenv("DISPLAY", (":" + display_).c_str(), 1);
-  }
-  ~VirtualScreen() {
-    unsetenv("DISPLAY");
-    if (child_ <= 0) return;
-    kill(child_, SIGTERM);
-    waitpid(child_, nullptr, 0);
-  }
-  bool works() const { return !display_.empty(); }
-
- private:
-  pid_t child_ = -1;
-  std::string display_;
-};
-
-bool HasXdotool() {
-  return std::system("command -v xdotool > /dev/null 2>&1") == 0;
-}
-
-// Draws until a click arrives or about six seconds have passed. Returns the click, if any.
-std::optional<InputEvent> AwaitClick(Window* window, const std::function<void()>& draw) {
-  for (int i = 0; i < 600; ++i) {
-    for (const InputEvent& event : window->PollEvents()) {
-      if (event.kind == InputEvent::Kind::kClick) return event;
-    }
-    draw();
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return std::nullopt;
-}
 
 TEST(Window, ThrowsAClearErrorWithoutADisplay) {
   unsetenv("DISPLAY");
@@ -79,74 +32,194 @@ TEST(Window, ThrowsAClearErrorWithoutADisplay) {
   }
 }
 
-// The models that were placed; other actions are failures.
-class PlacedModels : public AuthoringActions {
+// What was asked for, in words.
+class AskedFor : public AuthoringActions {
  public:
-  struct Model {
-    std::string file;
-    Eigen::Vector2d pixel;
-    double scale, yaw_deg;
-  };
-  void PlaceModel(const std::string& file, const Eigen::Vector2d& pixel, double scale,
-                  double yaw_deg) override {
-    models.push_back({file, pixel, scale, yaw_deg});
+  void NewMap(const std::string& name) override { words.push_back("new map " + name); }
+  void StopMap() override { words.push_back("stop"); }
+  void Undo() override { words.push_back("undo"); }
+  void Redo() override { words.push_back("redo"); }
+  void Save() override { words.push_back("save"); }
+  void Quit(bool save) override { words.push_back(save ? "save and quit" : "quit without saving"); }
+  void ChooseModelFile() override { words.push_back("choose"); }
+  void Select(const std::string& name, bool add) override {
+    words.push_back((add ? "add " : "select ") + name);
   }
-  void NewMap(const std::string&) override { FAIL(); }
-  void StopMap() override { FAIL(); }
-  void PlaceSignpost(const std::string&, const Eigen::Vector2d&, const std::string&) override { FAIL(); }
-  void Undo() override { FAIL(); }
-  void Redo() override { FAIL(); }
-  void Save() override { FAIL(); }
+  void RemoveSelected() override { words.push_back("remove"); }
+  void DuplicateSelected() override { words.push_back("duplicate"); }
+  void CopySelected() override { words.push_back("copy"); }
+  void Paste() override { words.push_back("paste"); }
+  void Rename(const std::string& name, const std::string& new_name) override {
+    words.push_back("rename " + name + " " + new_name);
+  }
+  void SetText(const std::string& name, const std::string& text) override {
+    words.push_back("text " + name + " " + text);
+  }
+  void SetTarget(const std::string& name, const std::string& to_map) override {
+    words.push_back("target " + name + " " + to_map);
+  }
+  void SetLocked(const std::vector<std::string>&, bool locked) override {
+    words.push_back(locked ? "lock" : "unlock");
+  }
+  void SetHidden(const std::vector<std::string>&, bool hidden) override {
+    words.push_back(hidden ? "hide" : "show");
+  }
+  void Group(const std::vector<std::string>&) override { words.push_back("group"); }
+  void Ungroup(const std::vector<std::string>&) override { words.push_back("ungroup"); }
+  void Transform(const std::string& name, const engine::Sim3&) override {
+    words.push_back("transform " + name);
+  }
+  void ToggleFullScreen() override { words.push_back("full screen"); }
 
-  std::vector<Model> models;
+  std::vector<std::string> words;
 };
 
-TEST(Window, AClickInTheImagePlacesTheChosenModelThere) {
-  VirtualScreen screen;
-  if (!screen.works()) GTEST_SKIP() << "Xvfb is not installed";
-  if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
-  Window window("Docent", 800, 600);
-  Renderer renderer;
-  PlacedModels placed;
-  AuthoringPanel panel(&window, &placed, {"cake.glb"});
-  panel.state().tool = AuthoringPanel::Tool::kModel;
-  panel.state().scale = 0.25;
-  panel.state().yaw_deg = -90;
-  const engine::CameraModel camera = StronglyDistorted();
-  const engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(30, 60, 90)));
-  View view;
-  view.tracked = &tracked;
-  view.camera = &camera;
-  const auto draw = [&] {
-    renderer.Draw(view);
-    const Eigen::Vector2i size = window.FramebufferSize();
-    renderer.Present(size.x(), size.y());
-    panel.Draw();
-    window.Show();
-  };
-  draw();
-  // The button is held long enough that some frame polls it. Without a window manager the window's corner is
-  // the screen's corner.
-  std::thread hand([] {
-    const int status =
-        std::system("xdotool mousemove 200 400 && xdotool mousedown 1 && sleep 0.15 && xdotool mouseup 1");
-    EXPECT_EQ(status, 0);
-  });
-  const std::optional<InputEvent> click = AwaitClick(&window, draw);
-  hand.join();
-  ASSERT_TRUE(click.has_value());
-  EXPECT_EQ(click->button, 0);
-  EXPECT_FALSE(panel.WantsMouse());
-  const Eigen::Vector2i size = window.WindowSize();
-  const Letterbox box = FitImage(640, 480, size.x(), size.y());
-  const Eigen::Vector2d pixel = box.ImageFromWindow(click->position);
-  EXPECT_TRUE(camera.IsInside(pixel));
-  EXPECT_TRUE(panel.ClickImage(pixel));
-  ASSERT_EQ(placed.models.size(), 1u);
-  EXPECT_EQ(placed.models[0].file, "cake.glb");
-  EXPECT_EQ(placed.models[0].pixel, pixel);
-  EXPECT_EQ(placed.models[0].scale, 0.25);
-  EXPECT_EQ(placed.models[0].yaw_deg, -90);
+// An author's interface on a virtual screen, with a person at it.
+class InterfaceOnScreen : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
+    if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+    window_.emplace("Docent", 800, 600);
+    gui_.emplace(&*window_);
+    panel_.emplace(&asked_);
+    facts_.selection = &selection_;
+    for (int i = 0; i < 3; ++i) Draw();
+  }
+
+  void Draw() {
+    for (InputEvent& event : window_->PollEvents()) events_.push_back(std::move(event));
+    const Eigen::Vector2i size = window_->WindowSize();
+    layout_ = LayOutWindow(size.x(), size.y(), 1, panel_->choices().panel_open);
+    gui_->Begin(layout_.scale);
+    panel_->Draw(layout_, facts_);
+    DrawMessages(layout_, &board_, &asked_);
+    dialog_.Draw(layout_, &asked_);
+    gui_->Draw();
+    window_->Show();
+  }
+
+  // Draws while the person acts; the words are those of xdotool. Without a window manager the window's corner
+  // is the screen's corner. Buttons and keys are held long enough that some frame polls them.
+  void Act(const std::string& xdotool) {
+    std::atomic<bool> done = false;
+    std::thread hand([&] {
+      EXPECT_EQ(std::system(("xdotool " + xdotool).c_str()), 0);
+      done = true;
+    });
+    while (!done) {
+      Draw();
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    hand.join();
+    for (int i = 0; i < 5; ++i) Draw();
+  }
+  void Click(const Eigen::Vector2d& point) {
+    Act("mousemove " + std::to_string(std::lround(point.x())) + " " + std::to_string(std::lround(point.y())) +
+        " sleep 0.1 mousedown 1 sleep 0.15 mouseup 1 sleep 0.1");
+  }
+  // The window has the keyboard focus without a window manager only if it is given to it.
+  void Press(const std::string& key) {
+    Act("search --name Docent windowfocus sleep 0.1 keydown " + key + " sleep 0.1 keyup " + key +
+        " sleep 0.1");
+  }
+
+  VirtualScreen screen_{"1024x768"};
+  std::optional<Window> window_;
+  std::optional<Gui> gui_;
+  AskedFor asked_;
+  std::optional<AuthoringPanel> panel_;
+  Selection selection_;
+  AuthoringFacts facts_;
+  MessageBoard board_;
+  QuitDialog dialog_;
+  WindowLayout layout_;
+  std::vector<InputEvent> events_;
+};
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+TEST_F(InterfaceOnScreen, TellsClicksInTheImageFromThoseInThePanel) {
+  Click({200, 300});
+  ASSERT_EQ(events_.size(), 2u);
+  EXPECT_EQ(events_[0].kind, InputEvent::Kind::kClick);
+  EXPECT_LT((events_[0].position - Eigen::Vector2d(200, 300)).norm(), 1);
+  EXPECT_EQ(events_[1].kind, InputEvent::Kind::kRelease);
+  EXPECT_FALSE(gui_->WantsMouse());
+  Click({layout_.panel.x + 0.5 * layout_.panel.width, 590});
+  EXPECT_TRUE(gui_->WantsMouse());
+}
+
+TEST_F(InterfaceOnScreen, EnterInTheNameStartsTheMap) {
+  // The field is found by going through the panel with the keyboard: the first one that takes text.
+  gui_->FocusWindow(AuthoringPanel::window_name());
+  for (int i = 0; i < 10; ++i) Draw();
+  EXPECT_TRUE(gui_->IsNavigated());
+  for (int i = 0; i < 8 && !gui_->WritesText(); ++i) Press("Tab");
+  ASSERT_TRUE(gui_->WritesText());
+  Act("search --name Docent windowfocus sleep 0.1 type --delay 60 Hall");
+  EXPECT_EQ(panel_->choices().map_name, "Hall");
+  Press("Return");
+  EXPECT_THAT(asked_.words, ElementsAre("new map Hall"));
+  EXPECT_TRUE(panel_->choices().map_name.empty());
+}
+
+TEST_F(InterfaceOnScreen, AMessageIsDismissedByItsButton) {
+  board_.AddError("There is no surface at this pixel.");
+  Draw();
+  // The button is at the right end of the message, above the image's lower edge.
+  const double right = 0.5 * layout_.image.width + std::min(280.0, 0.5 * layout_.image.width - 12);
+  Click({right - 35, layout_.image.bottom() - 12 - 14});
+  EXPECT_THAT(board_.messages(), IsEmpty());
+  EXPECT_THAT(asked_.words, IsEmpty());
+}
+
+TEST_F(InterfaceOnScreen, WhatWasDoneIsUndoneByItsButton) {
+  board_.AddDone("Placed fox.", true, 0);
+  Draw();
+  const double right = 0.5 * layout_.image.width + std::min(280.0, 0.5 * layout_.image.width - 12);
+  Click({right - 25, layout_.image.bottom() - 12 - 14});
+  EXPECT_THAT(asked_.words, ElementsAre("undo"));
+}
+
+TEST_F(InterfaceOnScreen, EscapeClosesTheQuestionAndQuitsNothing) {
+  dialog_.Open();
+  Draw();
+  Draw();
+  EXPECT_TRUE(dialog_.is_open());
+  EXPECT_TRUE(gui_->HasPopup());
+  Press("Escape");
+  EXPECT_FALSE(dialog_.is_open());
+  EXPECT_FALSE(window_->IsClosing());
+  EXPECT_THAT(asked_.words, IsEmpty());
+  dialog_.Open();
+  Draw();
+  Draw();
+  Press("Return");  // The first answer has the focus.
+  EXPECT_THAT(asked_.words, ElementsAre("save and quit"));
+}
+
+TEST_F(InterfaceOnScreen, ThePanelOpensAndCloses) {
+  const double open = layout_.panel.width;
+  Click({layout_.panel.x + 20, 20});
+  EXPECT_FALSE(panel_->choices().panel_open);
+  EXPECT_LT(layout_.panel.width, 0.2 * open);
+  Click({layout_.panel.x + 14, 20});
+  EXPECT_TRUE(panel_->choices().panel_open);
+}
+
+TEST_F(InterfaceOnScreen, TheListSelects) {
+  content::Scene scene;
+  scene.entities.resize(2);
+  scene.entities[0].name = "sign-1";
+  scene.entities[1].name = "sign-2";
+  facts_.scene = &scene;
+  facts_.map_name = "Hall";
+  Draw();
+  // Somewhere below the middle of the panel are the rows: clicks from top to bottom meet both in order.
+  for (double y = 200; y < 420 && asked_.words.size() < 1; y += 14) Click({layout_.panel.x + 40, y});
+  EXPECT_THAT(asked_.words, ElementsAre("select sign-1"));
 }
 
 TEST(Letterbox, MapsWindowPointsToImagePixels) {

@@ -1,0 +1,380 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/author_controls.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "app/command_line/command_words.h"
+#include "ui/strings.h"
+
+namespace docent::app {
+
+AuthorControls::AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder)
+    : window_(window),
+      host_(std::move(host)),
+      gui_(window),
+      panel_(this),
+      pointer_(&selection_, &shapes_, this),
+      ghost_(std::move(model_folder)),
+      recent_(RecentFiles::DefaultPlace()) {
+  files_ = ModelFilesIn(".");
+  for (const std::string& file : recent_.files()) {
+    std::error_code error;
+    const bool is_here = std::any_of(files_.begin(), files_.end(), [&](const std::string& other) {
+      return std::filesystem::equivalent(file, other, error);
+    });
+    if (!is_here) files_.push_back(file);
+  }
+  if (!files_.empty()) panel_.choices().model_file = files_.front();
+}
+
+double AuthorControls::Now() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void AuthorControls::Take(std::vector<Notice> notices) {
+  for (const Notice& notice : notices) {
+    board_.AddError(notice.problem);
+    if (!notice.done) continue;
+    board_.AddDone(DoneText(*notice.done), CanBeUndone(*notice.done), Now());
+    if (const auto* renamed = std::get_if<RenameEntity>(&*notice.done))
+      selection_.Rename(renamed->name, renamed->new_name);
+  }
+}
+
+void AuthorControls::SetView(AuthorView view, const SavingState& saving, std::vector<std::string> map_names) {
+  view_ = std::move(view);
+  saving_ = saving;
+  map_names_ = std::move(map_names);
+  const std::uint64_t map = view_.frame ? view_.frame->tracked.map_key : 0;
+  // Of a lost camera, the selection waits until it is back in the map.
+  if (map != 0 && std::exchange(scene_map_, map) != map) {
+    selection_.Clear();
+    pointer_.Cancel();
+    names_before_.reset();
+  }
+  if (map == 0) return;
+  SelectNew();
+  selection_.KeepExisting(view_.scene.get());
+}
+
+// Entities that a command of this window has added are selected when they appear.
+void AuthorControls::SelectNew() {
+  if (!names_before_ || !view_.scene) return;
+  std::vector<std::string> added;
+  for (const content::Entity& entity : view_.scene->entities) {
+    if (std::find(names_before_->begin(), names_before_->end(), entity.name) == names_before_->end())
+      added.push_back(entity.name);
+  }
+  if (added.empty()) return;
+  names_before_.reset();
+  selection_.Set(std::move(added));
+}
+
+void AuthorControls::RememberNames() {
+  names_before_.emplace();
+  if (!view_.scene) return;
+  for (const content::Entity& entity : view_.scene->entities) names_before_->push_back(entity.name);
+}
+
+bool AuthorControls::IsPlacing() const {
+  return panel_.choices().tool != ui::AuthoringTool::kSelect;
+}
+
+void AuthorControls::Handle(const ui::InputEvent& event) {
+  using Kind = ui::InputEvent::Kind;
+  if (event.kind == Kind::kClose) {
+    window_->KeepOpen();
+    return AskToQuit();
+  }
+  if (event.kind == Kind::kRelease && event.button == 0) return pointer_.Release();
+  if (quit_dialog_.is_open()) return;
+  if (event.kind == Kind::kKey) HandleKey(event);
+  if (event.kind == Kind::kClick && event.button == 0 && !gui_.WantsMouse()) HandleClick(event);
+  if (event.kind == Kind::kDrop) HandleDrop(event);
+}
+
+void AuthorControls::Escape() {
+  if (gui_.HasPopup()) return;  // It closes.
+  if (gui_.IsNavigated()) return gui_.LeaveWidgets();
+  if (pointer_.Cancel()) return;
+  if (IsPlacing()) {
+    panel_.choices().tool = ui::AuthoringTool::kSelect;
+    return;
+  }
+  selection_.Clear();
+}
+
+void AuthorControls::HandleKey(const ui::InputEvent& event) {
+  ui::AuthoringChoices& choices = panel_.choices();
+  if (event.key == "f11" && !event.repeated) return ToggleFullScreen();
+  if (event.key == "f9" && !event.repeated) {
+    choices.panel_open = !choices.panel_open;
+    return;
+  }
+  if (event.control && event.key == "q") return AskToQuit();
+  if (event.control && event.key == "s") return Save();
+  if (gui_.WritesText()) return;
+  if (event.key == "escape") return Escape();
+  if (gui_.HasPopup()) return;
+  if (event.control) return HandleControlKey(event.key);
+  if (event.key == "delete") return RemoveSelected();
+  if (event.key == "f2" && selection_.names().size() == 1) {
+    choices.panel_open = true;
+    return panel_.BeginRename();
+  }
+  if (event.key == "tab" && !gui_.IsNavigated()) {
+    choices.panel_open = true;
+    return gui_.FocusWindow(ui::AuthoringPanel::window_name());
+  }
+  if (!gui_.IsNavigated()) {
+    if (event.key == "left") pointer_.Nudge(view_, -1, 0);
+    if (event.key == "right") pointer_.Nudge(view_, 1, 0);
+    if (event.key == "up") pointer_.Nudge(view_, 0, 1);
+    if (event.key == "down") pointer_.Nudge(view_, 0, -1);
+  }
+  if (event.repeated) return;
+  if (event.key == "1") choices.tool = ui::AuthoringTool::kSelect;
+  if (event.key == "2") choices.tool = ui::AuthoringTool::kModel;
+  if (event.key == "3") choices.tool = ui::AuthoringTool::kSignpost;
+  if (event.key == "c") host_.swap_cameras();
+  if (event.key == "f") choices.frozen = !choices.frozen;
+  if (event.key == "m") choices.from_above = !choices.from_above;
+  if (event.key == "p") choices.show_points = !choices.show_points;
+  if (event.key == "k") choices.show_keyframes = !choices.show_keyframes;
+  if (event.key == "h") choices.show_status = !choices.show_status;
+}
+
+void AuthorControls::HandleControlKey(const std::string& key) {
+  if (key == "z") Undo();
+  if (key == "y") Redo();
+  if (key == "d") DuplicateSelected();
+  if (key == "c") CopySelected();
+  if (key == "v") Paste();
+}
+
+void AuthorControls::HandleClick(const ui::InputEvent& event) {
+  if (panel_.choices().from_above || !view_.frame) return;
+  if (view_.inset.Contains(event.position)) return host_.swap_cameras();
+  if (!view_.ShowsImageAt(event.position)) return;
+  const Eigen::Vector2d pixel = view_.PixelAt(event.position);
+  const ui::AuthoringChoices& choices = panel_.choices();
+  switch (choices.tool) {
+    case ui::AuthoringTool::kSelect:
+      return pointer_.Press(view_, event.position, event.shift);
+    case ui::AuthoringTool::kModel:
+      return PlaceModel(choices.model_file, pixel);
+    case ui::AuthoringTool::kSignpost:
+      if (choices.sign_text.empty()) return board_.AddDone(ui::strings::kWriteText, false, Now());
+      RememberNames();
+      return host_.emit(PlaceSignpost{choices.sign_text, pixel, choices.sign_to_map});
+  }
+}
+
+void AuthorControls::PlaceModel(const std::string& file, const Eigen::Vector2d& pixel) {
+  if (file.empty()) return board_.AddDone(ui::strings::kChooseFile, false, Now());
+  const ui::AuthoringChoices& choices = panel_.choices();
+  app::PlaceModel command{file, pixel, std::nullopt, choices.yaw_deg};
+  if (!choices.automatic_size) command.scale = choices.scale;
+  RememberNames();
+  host_.emit(std::move(command));
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return;
+  recent_.Add(file);
+  if (std::find(files_.begin(), files_.end(), file) == files_.end()) files_.push_back(file);
+}
+
+// The files are placed beside each other, in a row from the place where they were dropped.
+void AuthorControls::HandleDrop(const ui::InputEvent& event) {
+  constexpr double kStep = 60;  // Window units at a scale of 1.
+  Eigen::Vector2d point = event.position;
+  for (const std::string& file : event.files) {
+    if (!IsModelFile(file)) {
+      board_.AddError(std::filesystem::path(file).filename().string() + ui::strings::kNoModelFile);
+    } else if (!view_.ShowsImageAt(point)) {
+      board_.AddError(ui::strings::kDropOnImage);
+    } else {
+      PlaceModel(file, view_.PixelAt(point));
+      point.x() += kStep * view_.scale;
+    }
+  }
+}
+
+void AuthorControls::Update() {
+  if (const auto chosen = dialog_.Poll()) {
+    panel_.choices().model_file = chosen->string();
+    if (std::find(files_.begin(), files_.end(), chosen->string()) == files_.end())
+      files_.push_back(chosen->string());
+  }
+  pointer_.Move(view_, window_->PointerPosition(), window_->IsControlDown());
+  UpdatePreview();
+  board_.Expire(Now());
+}
+
+void AuthorControls::UpdatePreview() {
+  const std::shared_ptr<const content::Scene> before = std::move(preview_);
+  const Eigen::Vector2d point = window_->PointerPosition();
+  ghost_note_.clear();
+  const bool shows_ghost =
+      IsPlacing() && !panel_.choices().from_above && !gui_.WantsMouse() && view_.ShowsImageAt(point);
+  preview_ = shows_ghost
+                 ? ghost_.AddTo(view_.scene, view_, panel_.choices(), view_.PixelAt(point), &ghost_note_)
+                 : pointer_.Preview(view_.scene);
+  preview_changed_ = preview_changed_ || preview_ != before;
+}
+
+ui::AuthoringFacts AuthorControls::Facts() const {
+  ui::AuthoringFacts facts;
+  facts.map_names = map_names_;
+  facts.unsaved = saving_.unsaved;
+  if (saving_.saved_at)
+    facts.saved_ago_s =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - *saving_.saved_at).count();
+  facts.selection = &selection_;
+  facts.files = &files_;
+  facts.has_copy = !copied_names_.empty();
+  if (!view_.frame) return facts;
+  const engine::TrackedFrame& tracked = view_.frame->tracked;
+  const Session::Shown& shown = view_.frame->shown;
+  facts.starting = !shown.starting_map.empty();
+  facts.map_name = facts.starting ? shown.starting_map : shown.map_name;
+  facts.scene = view_.scene.get();
+  facts.has_pose = view_.has_pose();
+  facts.camera_from_map = view_.camera.camera_from_map;
+  if (facts.has_pose) facts.map_from_upright = UprightRotation(*tracked.map);
+  return facts;
+}
+
+double AuthorControls::Draw(const ui::WindowLayout& layout) {
+  gui_.Begin(layout.scale);
+  const ui::AuthoringFacts facts = Facts();
+  if (!panel_.choices().from_above) {
+    const Eigen::Vector2d pointer = window_->PointerPosition();
+    ui::SceneOverlay overlay(view_.camera, view_.box, view_.image, view_.scale);
+    if (preview_) pointer_.Draw(view_, *preview_, pointer, &overlay);
+    if (!ghost_note_.empty()) overlay.DrawNote(pointer, ghost_note_);
+    if (panel_.choices().frozen) overlay.DrawBanner(ui::strings::kFrozen);
+  }
+  panel_.Draw(layout, facts);
+  const double height = ui::DrawMessages(layout, &board_, this);
+  quit_dialog_.Draw(layout, this);
+  gui_.Draw();
+  return height;
+}
+
+void AuthorControls::AskToQuit() {
+  if (!saving_.unsaved) return Quit(true);
+  quit_dialog_.Open();
+}
+
+void AuthorControls::NewMap(const std::string& name) {
+  host_.emit(app::NewMap{name});
+}
+
+void AuthorControls::StopMap() {
+  host_.emit(app::StopMap{});
+}
+
+void AuthorControls::Undo() {
+  host_.emit(app::Undo{});
+}
+
+void AuthorControls::Redo() {
+  host_.emit(app::Redo{});
+}
+
+void AuthorControls::Save() {
+  host_.emit(app::Save{});
+}
+
+void AuthorControls::Quit(bool save) {
+  ending_ = save ? Ending::kSave : Ending::kDiscard;
+}
+
+void AuthorControls::ChooseModelFile() {
+  if (!FileDialog::IsAvailable() || !dialog_.Open(ui::strings::kBrowseTitle))
+    board_.AddError(ui::strings::kNoFileDialog);
+}
+
+// Entities of a group are selected together.
+void AuthorControls::Select(const std::string& name, bool add) {
+  const content::Entity* const entity = view_.scene ? view_.scene->Find(name) : nullptr;
+  if (entity == nullptr || entity->group.empty()) return selection_.Select(name, add);
+  const bool removes = add && selection_.Contains(name);
+  std::vector<std::string> names;
+  if (add) names = selection_.names();
+  for (const content::Entity& other : view_.scene->entities) {
+    if (other.group != entity->group) continue;
+    std::erase(names, other.name);
+    if (!removes) names.push_back(other.name);
+  }
+  selection_.Set(std::move(names));
+}
+
+void AuthorControls::RemoveSelected() {
+  if (!selection_.empty()) host_.emit(RemoveEntities{selection_.names()});
+}
+
+void AuthorControls::DuplicateSelected() {
+  if (selection_.empty()) return;
+  RememberNames();
+  host_.emit(DuplicateEntities{selection_.names()});
+}
+
+void AuthorControls::CopySelected() {
+  if (selection_.empty() || !view_.frame) return;
+  copied_names_ = selection_.names();
+  copied_from_ = view_.frame->shown.map_name;
+}
+
+// At the pointer, if it is over the image.
+void AuthorControls::Paste() {
+  if (copied_names_.empty()) return;
+  RememberNames();
+  PasteEntities command{copied_names_, copied_from_, std::nullopt};
+  const Eigen::Vector2d point = window_->PointerPosition();
+  if (!gui_.WantsMouse() && view_.ShowsImageAt(point)) command.to_pixel = view_.PixelAt(point);
+  host_.emit(std::move(command));
+}
+
+void AuthorControls::Rename(const std::string& name, const std::string& new_name) {
+  host_.emit(RenameEntity{name, new_name});
+}
+
+void AuthorControls::SetText(const std::string& name, const std::string& text) {
+  host_.emit(SetEntityText{name, text});
+}
+
+void AuthorControls::SetTarget(const std::string& name, const std::string& to_map) {
+  host_.emit(SetSignpostTarget{name, to_map});
+}
+
+void AuthorControls::SetLocked(const std::vector<std::string>& names, bool locked) {
+  host_.emit(SetEntityFlag{names, content::EntityFlag::kLocked, locked});
+}
+
+void AuthorControls::SetHidden(const std::vector<std::string>& names, bool hidden) {
+  host_.emit(SetEntityFlag{names, content::EntityFlag::kHidden, hidden});
+}
+
+// Under the first unused name of "group-1", "group-2" ...
+void AuthorControls::Group(const std::vector<std::string>& names) {
+  if (!view_.scene) return;
+  const auto is_used = [&](const std::string& group) {
+    return std::any_of(view_.scene->entities.begin(), view_.scene->entities.end(),
+                       [&](const content::Entity& entity) { return entity.group == group; });
+  };
+  int number = 1;
+  while (is_used("group-" + std::to_string(number))) ++number;
+  host_.emit(GroupEntities{names, "group-" + std::to_string(number)});
+}
+
+void AuthorControls::Ungroup(const std::vector<std::string>& names) {
+  host_.emit(GroupEntities{names, ""});
+}
+
+void AuthorControls::Transform(const std::string& name, const engine::Sim3& map_from_entity) {
+  host_.emit(TransformEntity{name, map_from_entity});
+}
+
+}  // namespace docent::app

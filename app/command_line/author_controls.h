@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/command_line/author_view.h"
+#include "app/command_line/file_dialog.h"
+#include "app/command_line/notices.h"
+#include "app/command_line/placing_ghost.h"
+#include "app/command_line/pointer_tool.h"
+#include "app/command_line/recent_files.h"
+#include "app/script/commands.h"
+#include "ui/authoring_panel.h"
+#include "ui/gui.h"
+#include "ui/message_area.h"
+#include "ui/message_board.h"
+
+namespace docent::app {
+
+// What an author does at the window: keys, clicks, drags and the panel become commands. On the window's
+// thread.
+class AuthorControls final : public ui::AuthoringActions {
+ public:
+  // How a session ends that the author wants to leave.
+  enum class Ending { kNone, kSave, kDiscard };
+  // What the controls need from the window.
+  struct Host {
+    // Queues a command for the frame on the screen.
+    std::function<void(Command)> emit;
+    std::function<void()> toggle_full_screen, swap_cameras;
+  };
+
+  AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder);
+
+  // Makes notices of the session messages.
+  void Take(std::vector<Notice> notices);
+  // What is shown from now on, until the next call.
+  void SetView(AuthorView view, const SavingState& saving, std::vector<std::string> map_names);
+  void Handle(const ui::InputEvent& event);
+  // Follows the pointer; once per frame after the events.
+  void Update();
+  // The content as it is drawn, with what is being dragged or about to be placed.
+  std::shared_ptr<const content::Scene> Preview() const { return preview_; }
+  // Whether the preview differs from what was drawn last, so that the image has to be drawn again.
+  bool TakePreviewChange() { return std::exchange(preview_changed_, false); }
+  // Draws panel, messages, dialogs, outlines and handles. Returns the height at the bottom of the image that
+  // the messages take, in window units.
+  double Draw(const ui::WindowLayout& layout);
+  // Asks whether to save, unless nothing is unsaved.
+  void AskToQuit();
+  Ending ending() const { return ending_; }
+  const ui::AuthoringChoices& choices() const { return panel_.choices(); }
+
+  // ui::AuthoringActions
+  void NewMap(const std::string& name) override;
+  void StopMap() override;
+  void Undo() override;
+  void Redo() override;
+  void Save() override;
+  void Quit(bool save) override;
+  void ChooseModelFile() override;
+  void Select(const std::string& name, bool add) override;
+  void RemoveSelected() override;
+  void DuplicateSelected() override;
+  void CopySelected() override;
+  void Paste() override;
+  void Rename(const std::string& name, const std::string& new_name) override;
+  void SetText(const std::string& name, const std::string& text) override;
+  void SetTarget(const std::string& name, const std::string& to_map) override;
+  void SetLocked(const std::vector<std::string>& names, bool locked) override;
+  void SetHidden(const std::vector<std::string>& names, bool hidden) override;
+  void Group(const std::vector<std::string>& names) override;
+  void Ungroup(const std::vector<std::string>& names) override;
+  void Transform(const std::string& name, const engine::Sim3& map_from_entity) override;
+  void ToggleFullScreen() override { host_.toggle_full_screen(); }
+
+ private:
+  void HandleKey(const ui::InputEvent& event);
+  void HandleControlKey(const std::string& key);
+  void Escape();
+  void HandleClick(const ui::InputEvent& event);
+  void HandleDrop(const ui::InputEvent& event);
+  void PlaceModel(const std::string& file, const Eigen::Vector2d& pixel);
+  bool IsPlacing() const;
+  // Before a command that adds entities, so that SelectNew finds them.
+  void RememberNames();
+  void SelectNew();
+  void UpdatePreview();
+  double Now() const;
+  ui::AuthoringFacts Facts() const;
+
+  ui::Window* const window_;
+  const Host host_;
+  ui::Gui gui_;
+  ui::AuthoringPanel panel_;
+  ui::MessageBoard board_;
+  ui::QuitDialog quit_dialog_;
+  ui::Selection selection_;
+  ui::EntityShapes shapes_;
+  PointerTool pointer_;
+  PlacingGhost ghost_;
+  FileDialog dialog_;
+  RecentFiles recent_;
+  std::vector<std::string> files_;  // To choose from: those in the working folder, then the recent ones.
+
+  AuthorView view_;
+  SavingState saving_;
+  std::vector<std::string> map_names_;
+  std::shared_ptr<const content::Scene> preview_;
+  bool preview_changed_ = false;
+  std::string ghost_note_;  // Why nothing can be placed under the pointer.
+  // What was copied, and the map that it is in.
+  std::vector<std::string> copied_names_;
+  std::string copied_from_;
+  // Names before a command that adds entities, which are selected when they appear.
+  std::optional<std::vector<std::string>> names_before_;
+  std::uint64_t scene_map_ = 0;  // The map whose entities are selected.
+  Ending ending_ = Ending::kNone;
+};
+
+}  // namespace docent::app

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/command_words.h"
+
+#include <filesystem>
+
+namespace docent::app {
+
+namespace {
+
+std::string NamesText(const std::vector<std::string>& names) {
+  if (names.size() == 1) return names.front();
+  return std::to_string(names.size()) + " objects";
+}
+
+struct DoneWriter {
+  std::string operator()(const NewMap& c) const { return "Started the map " + c.name + "."; }
+  std::string operator()(const StopMap&) const { return "Stopped the map."; }
+  std::string operator()(const UseMap& c) const { return "Went on in the map " + c.name + "."; }
+  std::string operator()(const SetPolicy& c) const {
+    return "The map " + c.name + " is " + maps::ToString(c.policy) + " now.";
+  }
+  std::string operator()(const RenameMap& c) const {
+    return "Renamed the map " + c.name + " to " + c.new_name + ".";
+  }
+  std::string operator()(const RemoveMap& c) const { return "Removed the map " + c.name + "."; }
+  std::string operator()(const PlaceModel& c) const {
+    return "Placed " + std::filesystem::path(c.file).filename().string() + ".";
+  }
+  std::string operator()(const PlaceSignpost&) const { return "Placed a signpost."; }
+  std::string operator()(const MoveEntity& c) const { return "Moved " + c.name + "."; }
+  std::string operator()(const RotateEntity& c) const { return "Rotated " + c.name + "."; }
+  std::string operator()(const ScaleEntity& c) const { return "Scaled " + c.name + "."; }
+  std::string operator()(const TransformEntity& c) const { return "Moved " + c.name + "."; }
+  std::string operator()(const RemoveEntities& c) const { return "Removed " + NamesText(c.names) + "."; }
+  std::string operator()(const DuplicateEntities& c) const {
+    return "Duplicated " + NamesText(c.names) + ".";
+  }
+  std::string operator()(const RenameEntity& c) const {
+    return "Renamed " + c.name + " to " + c.new_name + ".";
+  }
+  std::string operator()(const SetEntityText& c) const { return "Changed the text of " + c.name + "."; }
+  std::string operator()(const SetSignpostTarget& c) const {
+    return c.name + (c.to_map.empty() ? " leads nowhere now." : " leads to " + c.to_map + " now.");
+  }
+  std::string operator()(const SetEntityFlag& c) const {
+    const bool is_lock = c.flag == content::EntityFlag::kLocked;
+    const char* const verb = is_lock ? (c.value ? "Locked " : "Unlocked ") : (c.value ? "Hid " : "Showed ");
+    return verb + NamesText(c.names) + ".";
+  }
+  std::string operator()(const GroupEntities& c) const {
+    return (c.group.empty() ? "Ungrouped " : "Grouped ") + NamesText(c.names) + ".";
+  }
+  std::string operator()(const PasteEntities& c) const { return "Pasted " + NamesText(c.names) + "."; }
+  std::string operator()(const Undo&) const { return "Undid the last change."; }
+  std::string operator()(const Redo&) const { return "Did the change again."; }
+  std::string operator()(const Save&) const { return "Saving all maps."; }
+};
+
+template <typename... Commands>
+bool IsOneOf(const Command& command) {
+  return (std::holds_alternative<Commands>(command) || ...);
+}
+
+}  // namespace
+
+std::string DoneText(const Command& command) {
+  return std::visit(DoneWriter{}, command);
+}
+
+bool CanBeUndone(const Command& command) {
+  return !IsOneOf<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, Undo, Redo, Save>(command);
+}
+
+}  // namespace docent::app

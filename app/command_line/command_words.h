@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "app/script/commands.h"
+
+namespace docent::app {
+
+// What a command has done, for the person who gave it: "Placed fox.glb."
+std::string DoneText(const Command& command);
+// Whether undo takes the command back.
+bool CanBeUndone(const Command& command);
+
+}  // namespace docent::app

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "app/command_line/author_view.h"
+#include "engine/base/worker.h"
+#include "ui/authoring_actions.h"
+
+namespace docent::app {
+
+// Models for the window, read on a thread of their own so that no frame waits for a disk. Window's thread.
+class ModelPreviews {
+ public:
+  // Relative files are searched in this folder first, then in the working folder, as commands do.
+  explicit ModelPreviews(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  // The model of a file; null while it is read, and when it cannot be. One file is read at a time.
+  std::shared_ptr<const content::Asset> Get(const std::string& file);
+
+ private:
+  struct Read {
+    std::shared_ptr<const content::Asset> asset;  // Null when the file cannot be read.
+  };
+  const std::filesystem::path folder_;
+  std::mutex mutex_;
+  std::map<std::string, Read> read_;  // By file. Guarded by mutex_.
+  std::optional<Worker> worker_;      // Last: it uses the members above.
+};
+
+// What a click would place, under the pointer before the click. Window's thread.
+class PlacingGhost {
+ public:
+  explicit PlacingGhost(std::filesystem::path model_folder) : models_(std::move(model_folder)) {}
+
+  // The name that the placed entity has until it gets its own; no entity can have it.
+  static const char* name() { return "\n"; }
+  // The scene with the entity that a click at this pixel would place. Where nothing can be placed, it is the
+  // scene itself and *note says why, unless the file is still being read.
+  std::shared_ptr<const content::Scene> AddTo(const std::shared_ptr<const content::Scene>& scene,
+                                              const AuthorView& view, const ui::AuthoringChoices& choices,
+                                              const Eigen::Vector2d& pixel, std::string* note);
+
+ private:
+  ModelPreviews models_;
+};
+
+}  // namespace docent::app

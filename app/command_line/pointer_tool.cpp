@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/pointer_tool.h"
+
+#include <utility>
+
+#include "engine/map/upright_axes.h"
+
+namespace docent::app {
+
+namespace {
+
+constexpr double kHandleLength = 90, kHandleReach = 9, kDragThreshold = 4;  // Window units at a scale of 1.
+
+bool MayMove(const content::Entity& entity) {
+  return !entity.locked && !entity.hidden;
+}
+
+}  // namespace
+
+engine::Rotation3 UprightRotation(const engine::MapSnapshot& map) {
+  const engine::UprightAxes axes = engine::UprightAxesOf(map);
+  Eigen::Matrix3d columns;
+  columns << axes.right, axes.up, -axes.ahead;
+  return engine::Rotation3(columns);
+}
+
+std::optional<ui::Gizmo> PointerTool::SelectedGizmo(const AuthorView& view, const content::Scene& scene) {
+  if (!view.has_pose() || selection_->names().size() != 1) return std::nullopt;
+  const content::Entity* const entity = scene.Find(selection_->names().front());
+  if (entity == nullptr || !MayMove(*entity)) return std::nullopt;
+  const auto box = shapes_->BoxOf(*entity, view.eye());
+  if (!box) return std::nullopt;
+  ui::Gizmo gizmo;
+  gizmo.origin = box->Base();
+  gizmo.map_from_axes = box->map_from_box.rotation;
+  gizmo.turns = entity->kind == content::Entity::Kind::kModel;
+  const auto length = ui::GizmoLength(view.camera, gizmo.origin, kHandleLength * view.scale / view.box.scale);
+  if (!length) return std::nullopt;
+  gizmo.length = *length;
+  return gizmo;
+}
+
+const content::Entity* PointerTool::EntityAt(const AuthorView& view, const Eigen::Vector2d& pixel) {
+  const auto ray = view.RayAt(pixel);
+  if (!ray || !view.scene) return nullptr;
+  content::Scene shown = *view.scene;
+  std::erase_if(shown.entities, [](const content::Entity& entity) { return entity.hidden; });
+  const auto pick = content::PickEntity(*ray, shown, shapes_->PickOptionsAt(view.frame->seconds));
+  return pick ? view.scene->Find(shown.entities[pick->entity].name) : nullptr;
+}
+
+void PointerTool::Hold(const AuthorView& view, const ui::Gizmo& gizmo, ui::GizmoPart part,
+                       const Eigen::Vector2d& point) {
+  auto motion = ui::GizmoDrag::Begin(gizmo, part, view.camera, view.PixelAt(point));
+  if (!motion) return;
+  Drag drag{std::move(*motion), {}, point, false};
+  for (const std::string& name : selection_->names()) {
+    const content::Entity* const entity = view.scene->Find(name);
+    if (entity != nullptr && MayMove(*entity))
+      drag.held.push_back({name, ui::TransformOf(*entity, view.eye())});
+  }
+  if (!drag.held.empty()) drag_ = std::move(drag);
+}
+
+void PointerTool::Press(const AuthorView& view, const Eigen::Vector2d& point, bool add) {
+  drag_.reset();
+  if (!view.has_pose() || !view.scene) return;
+  const Eigen::Vector2d pixel = view.PixelAt(point);
+  if (const auto gizmo = SelectedGizmo(view, *view.scene); gizmo && !add) {
+    const ui::GizmoPart part =
+        ui::PartAt(*gizmo, view.camera, pixel, kHandleReach * view.scale / view.box.scale);
+    if (part != ui::GizmoPart::kNone) return Hold(view, *gizmo, part, point);
+  }
+  const content::Entity* const entity = EntityAt(view, pixel);
+  if (entity == nullptr) {
+    if (!add) selection_->Clear();
+    return;
+  }
+  if (add || !selection_->Contains(entity->name)) actions_->Select(entity->name, add);
+  if (add || !MayMove(*entity)) return;
+  const auto box = shapes_->BoxOf(*entity, view.eye());
+  if (!box) return;
+  ui::Gizmo ground;
+  ground.origin = box->Base();
+  ground.map_from_axes = UprightRotation(*view.frame->tracked.map);
+  ground.length = (ground.origin - view.eye()).norm();
+  Hold(view, ground, ui::GizmoPart::kGround, point);
+}
+
+void PointerTool::Move(const AuthorView& view, const Eigen::Vector2d& point, bool in_steps) {
+  if (!drag_) return;
+  if (!view.has_pose()) return;  // The entities stay where they are held.
+  drag_->moved = drag_->moved || (point - drag_->from).norm() > kDragThreshold * view.scale;
+  if (drag_->moved) drag_->motion.Update(view.camera, view.PixelAt(point), in_steps);
+}
+
+void PointerTool::Release() {
+  const auto drag = std::exchange(drag_, std::nullopt);
+  if (!drag || !drag->moved) return;
+  for (const Held& held : drag->held)
+    actions_->Transform(held.name, drag->motion.motion() * held.map_from_entity);
+}
+
+bool PointerTool::Cancel() {
+  return std::exchange(drag_, std::nullopt).has_value();
+}
+
+std::shared_ptr<const content::Scene> PointerTool::Preview(
+    const std::shared_ptr<const content::Scene>& scene) const {
+  if (!scene || !is_dragging()) return scene;
+  auto preview = std::make_shared<content::Scene>(*scene);
+  for (content::Entity& entity : preview->entities) {
+    for (const Held& held : drag_->held) {
+      if (held.name == entity.name) ui::SetTransform(drag_->motion.motion() * held.map_from_entity, &entity);
+    }
+  }
+  return preview;
+}
+
+void PointerTool::Draw(const AuthorView& view, const content::Scene& preview, const Eigen::Vector2d& pointer,
+                       ui::SceneOverlay* overlay) {
+  if (!view.has_pose()) return;
+  for (const std::string& name : selection_->names()) {
+    const content::Entity* const entity = preview.Find(name);
+    if (entity == nullptr) continue;
+    if (const auto box = shapes_->BoxOf(*entity, view.eye()))
+      overlay->DrawOutline(*box, name, entity->locked || entity->hidden);
+  }
+  const auto gizmo = SelectedGizmo(view, preview);
+  if (!gizmo || (drag_ && drag_->motion.part() == ui::GizmoPart::kGround && is_dragging())) return;
+  const ui::GizmoPart part = drag_ ? drag_->motion.part()
+                                   : ui::PartAt(*gizmo, view.camera, view.PixelAt(pointer),
+                                                kHandleReach * view.scale / view.box.scale);
+  overlay->DrawGizmo(*gizmo, part);
+}
+
+void PointerTool::Nudge(const AuthorView& view, int right, int away) {
+  constexpr double kShareOfDistance = 0.01;
+  if (!view.has_pose() || !view.scene) return;
+  const Eigen::Vector3d up = engine::UpInMap(*view.frame->tracked.map);
+  const engine::Rotation3 map_from_camera = view.camera.camera_from_map.rotation.inverse();
+  // The camera's right is level more often than its forward direction.
+  Eigen::Vector3d level_right = map_from_camera * Eigen::Vector3d::UnitX();
+  level_right -= up * up.dot(level_right);
+  if (level_right.norm() < 1e-6) return;
+  level_right.normalize();
+  const Eigen::Vector3d level_away = up.cross(level_right);
+  for (const std::string& name : selection_->names()) {
+    const content::Entity* const entity = view.scene->Find(name);
+    if (entity == nullptr) continue;
+    const double step = kShareOfDistance * (content::PlaceOf(*entity) - view.eye()).norm();
+    const Eigen::Vector3d offset = step * (right * level_right + away * level_away);
+    actions_->Transform(name, ui::TranslationBy(offset) * ui::TransformOf(*entity, view.eye()));
+  }
+}
+
+}  // namespace docent::app

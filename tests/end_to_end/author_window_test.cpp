@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// The author's window of the real program, used by keys and clicks on a virtual screen.
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "app/demo/exhibit_model.h"
+#include "app/files/text_file.h"
+#include "maps/library/library.h"
+#include "tests/end_to_end/run_docent.h"
+#include "tests/support/virtual_screen.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+// An author at a window of 1280 x 800: the image lies in the left 960 units, 960 x 720.
+class AuthorAtWindow : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
+    if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+    // The model is among the recent files, and so it is the one to place.
+    const std::vector<std::uint8_t> glb = MakeExhibitGlb();
+    folder_.Write("exhibit.glb", {glb.begin(), glb.end()});
+    std::filesystem::create_directories(folder_ / "docent");
+    folder_.Write("docent/recent-models", (folder_ / "exhibit.glb").string() + "\n");
+    setenv("XDG_STATE_HOME", (folder_ / "").parent_path().c_str(), 1);
+  }
+  void TearDown() override {
+    unsetenv("XDG_STATE_HOME");
+    if (child_ > 0) {
+      kill(child_, SIGKILL);
+      waitpid(child_, nullptr, 0);
+    }
+  }
+
+  void Start(const std::string& script, const std::string& autosave) {
+    folder_.Write("script.txt", script);
+    child_ = StartDocent({"author", "--library", library(), "--camera", "sim:room", "--script",
+                          (folder_ / "script.txt").string(), "--record-script",
+                          (folder_ / "recorded.txt").string(), "--autosave", autosave},
+                         (folder_ / "out").string(), (folder_ / "err").string());
+    Do("search --sync --onlyvisible --name Docent windowfocus");
+  }
+  std::string library() { return (folder_ / "room.docent").string(); }
+  static void Do(const std::string& xdotool) {
+    EXPECT_EQ(std::system(("xdotool " + xdotool + " > /dev/null").c_str()), 0) << xdotool;
+  }
+  static void Press(const std::string& key) {
+    Do("search --name Docent windowfocus sleep 0.2 key --delay 150 " + key + " sleep 0.2");
+  }
+  static void Click(int x, int y) {
+    Do("mousemove " + std::to_string(x) + " " + std::to_string(y) +
+       " sleep 0.3 mousedown 1 sleep 0.2 mouseup 1 "
+       "sleep 0.3");
+  }
+  // Waits up to half a minute until the recorded script has this text.
+  bool Records(const std::string& text) {
+    for (int i = 0; i < 300; ++i) {
+      if (ReadAll(folder_ / "recorded.txt").find(text) != std::string::npos) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    return false;
+  }
+  bool IsRunning() {
+    siginfo_t ended{};
+    waitid(P_PID, static_cast<id_t>(child_), &ended, WEXITED | WNOHANG | WNOWAIT);
+    return ended.si_pid == 0;
+  }
+  // Waits for the end, at most a minute.
+  std::optional<int> ExitStatus() {
+    for (int i = 0; i < 600 && IsRunning(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    if (IsRunning()) return std::nullopt;
+    int status = 0;
+    waitpid(std::exchange(child_, -1), &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+
+  const TemporaryFolder folder_;
+  VirtualScreen screen_{"1280x800"};
+  pid_t child_ = -1;
+};
+
+TEST_F(AuthorAtWindow, PlacesSelectsAndRemovesWithUndoAndSavesAtTheEnd) {
+  Start("0.1 map new Room\n", "0");
+  // The map needs finite points before something can be placed; until then the commands are refused.
+  Press("2");
+  for (int i = 0; i < 20 && ReadAll(folder_ / "recorded.txt").find("place") == std::string::npos; ++i)
+    Click(480, 520);
+  ASSERT_TRUE(Records("exhibit.glb at pixel")) << ReadAll(folder_ / "err");
+  Press("Escape");
+  // What was placed is selected.
+  Press("ctrl+d");
+  EXPECT_TRUE(Records("duplicate exhibit"));
+  Press("Delete");
+  EXPECT_TRUE(Records("remove exhibit-2"));
+  Press("ctrl+z");
+  EXPECT_TRUE(Records("undo"));
+  Press("Escape");
+  Press("q");
+  EXPECT_TRUE(IsRunning()) << "neither Escape nor q quits";
+  Press("ctrl+q");
+  EXPECT_TRUE(IsRunning()) << "it asks first";
+  Press("Escape");
+  EXPECT_TRUE(IsRunning());
+  Press("ctrl+q");
+  Press("Return");
+  EXPECT_EQ(ExitStatus(), 0) << ReadAll(folder_ / "err");
+  const maps::Library stored = maps::Library::Open(library(), maps::Access::kReadOnly);
+  ASSERT_EQ(stored.List().size(), 1u);
+  EXPECT_GE(stored.LoadScene(stored.List().front().key).assets.size(), 1u);
+}
+
+TEST_F(AuthorAtWindow, CanQuitWithoutSaving) {
+  Start("0.1 map new Room\n3 signpost Hello at pixel 320 300\n", "0");
+  ASSERT_TRUE(Records("signpost Hello")) << ReadAll(folder_ / "err");
+  Press("ctrl+q");
+  // The second answer.
+  Press("Right");
+  Press("Return");
+  EXPECT_EQ(ExitStatus(), 0) << ReadAll(folder_ / "err");
+  EXPECT_TRUE(maps::Library::Open(library(), maps::Access::kReadOnly).List().empty());
+}
+
+}  // namespace
+}  // namespace docent::app

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "content/scene.h"
+#include "engine/geometry/rigid3.h"
+#include "engine/geometry/sim3.h"
+#include "ui/selection.h"
+
+// What passes between the author's window and the program: what the window shows, what the person chose in
+// it, and what the person asks for. On the window's thread.
+namespace docent::ui {
+
+// What a person asks for. Implementations do not throw; what cannot be done becomes a message.
+class AuthoringActions {
+ public:
+  virtual ~AuthoringActions() = default;
+  virtual void NewMap(const std::string& name) = 0;
+  virtual void StopMap() = 0;
+  virtual void Undo() = 0;
+  virtual void Redo() = 0;
+  virtual void Save() = 0;
+  virtual void Quit(bool save) = 0;
+  // Opens the file dialog of the desktop.
+  virtual void ChooseModelFile() = 0;
+
+  // `add`: adds it to the selection, or takes it from there.
+  virtual void Select(const std::string& name, bool add) = 0;
+  virtual void RemoveSelected() = 0;
+  virtual void DuplicateSelected() = 0;
+  virtual void CopySelected() = 0;
+  virtual void Paste() = 0;
+  virtual void Rename(const std::string& name, const std::string& new_name) = 0;
+  virtual void SetText(const std::string& name, const std::string& text) = 0;
+  // To no map with an empty name.
+  virtual void SetTarget(const std::string& name, const std::string& to_map) = 0;
+  virtual void SetLocked(const std::vector<std::string>& names, bool locked) = 0;
+  virtual void SetHidden(const std::vector<std::string>& names, bool hidden) = 0;
+  virtual void Group(const std::vector<std::string>& names) = 0;
+  virtual void Ungroup(const std::vector<std::string>& names) = 0;
+  // See TransformOf in entity_shapes.h.
+  virtual void Transform(const std::string& name, const engine::Sim3& map_from_entity) = 0;
+
+  virtual void ToggleFullScreen() = 0;
+};
+
+// What the window shows. The pointers are valid while it is drawn.
+struct AuthoringFacts {
+  std::vector<std::string> map_names;  // To which signposts may lead.
+  std::string map_name;                // Of the current map; empty for none.
+  bool starting = false;               // The current map has no depth yet.
+  bool unsaved = false;
+  std::optional<double> saved_ago_s;      // Since the last save; empty before the first.
+  const content::Scene* scene = nullptr;  // Of the current map; null without one.
+  // Valid with has_pose.
+  engine::Rigid3 camera_from_map;
+  bool has_pose = false;
+  // The axes by which rotations are shown: right, up and towards the first viewer.
+  engine::Rotation3 map_from_upright;
+  const Selection* selection = nullptr;             // Never null when drawn.
+  const std::vector<std::string>* files = nullptr;  // Model files to choose from; null for none.
+  bool has_copy = false;                            // Something can be pasted.
+  bool has_two_cameras = false;
+};
+
+// What a click in the image does.
+enum class AuthoringTool { kSelect, kModel, kSignpost };
+
+// The person's choices. The panel shows and changes them, and so may its owner.
+struct AuthoringChoices {
+  AuthoringTool tool = AuthoringTool::kSelect;
+  std::string map_name;
+  std::string model_file;
+  bool automatic_size = true;
+  double scale = 1.0, yaw_deg = 0.0;
+  std::string sign_text, sign_to_map;
+  bool show_points = false, show_keyframes = false, show_status = true;
+  bool from_above = false;  // The map from above instead of the image.
+  bool frozen = false;      // The image and its pose stay.
+  bool panel_open = true;
+};
+
+}  // namespace docent::ui

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/entity_section.h"
+
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "ui/entity_shapes.h"
+#include "ui/strings.h"
+
+namespace docent::ui {
+namespace {
+
+constexpr double kRadPerDegree = std::numbers::pi / 180;
+
+void Remark(const char* text) {
+  ImGui::PushTextWrapPos(0.0f);
+  ImGui::TextDisabled("%s", text);
+  ImGui::PopTextWrapPos();
+}
+
+bool RowButton(const char* label) {
+  const ImGuiStyle& style = ImGui::GetStyle();
+  const float end = ImGui::GetItemRectMax().x + style.ItemSpacing.x + ImGui::CalcTextSize(label).x +
+                    2 * style.FramePadding.x;
+  if (end < ImGui::GetWindowPos().x + ImGui::GetContentRegionMax().x) ImGui::SameLine();
+  return ImGui::Button(label);
+}
+
+// Three numbers in a row. Returns whether a change of one of them was completed.
+bool NumberFields(const char* label, double* values, int count, const char* format) {
+  ImGui::TextUnformatted(label);
+  const float spacing = ImGui::GetStyle().ItemInnerSpacing.x;
+  const float width = (ImGui::GetContentRegionAvail().x - spacing * static_cast<float>(count - 1)) /
+                      static_cast<float>(count);
+  bool completed = false;
+  ImGui::PushID(label);
+  for (int i = 0; i < count; ++i) {
+    if (i > 0) ImGui::SameLine(0, spacing);
+    ImGui::PushID(i);
+    ImGui::SetNextItemWidth(width);
+    ImGui::InputDouble("##number", &values[i], 0, 0, format);
+    completed = ImGui::IsItemDeactivatedAfterEdit() || completed;
+    ImGui::PopID();
+  }
+  ImGui::PopID();
+  return completed;
+}
+
+}  // namespace
+
+bool DrawMapChoice(const char* label, const std::vector<std::string>& maps, std::string* chosen) {
+  const std::string before = *chosen;
+  if (ImGui::BeginCombo(label, chosen->empty() ? strings::kLeadsNowhere : chosen->c_str())) {
+    if (ImGui::Selectable(strings::kLeadsNowhere, chosen->empty())) chosen->clear();
+    for (const std::string& name : maps) {
+      if (ImGui::Selectable(name.c_str(), *chosen == name)) *chosen = name;
+    }
+    ImGui::EndCombo();
+  }
+  return *chosen != before;
+}
+
+Eigen::Vector3d AnglesOf(const engine::Rotation3& rotation) {
+  // R = Ry(up) Rx(right) Rz(front).
+  const Eigen::Matrix3d m = rotation.matrix();
+  const double right = std::asin(std::clamp(-m(1, 2), -1.0, 1.0));
+  double up, front = 0;
+  if (std::abs(m(1, 2)) < 1 - 1e-9) {
+    up = std::atan2(m(0, 2), m(2, 2));
+    front = std::atan2(m(1, 0), m(1, 1));
+  } else {  // The first and last axis coincide.
+    up = std::atan2(-m(2, 0), m(0, 0));
+  }
+  return Eigen::Vector3d(up, right, front) / kRadPerDegree;
+}
+
+engine::Rotation3 RotationOf(const Eigen::Vector3d& angles_deg) {
+  const Eigen::Vector3d angles = kRadPerDegree * angles_deg;
+  return engine::Rotation3::Exp(Eigen::Vector3d::UnitY() * angles.x()) *
+         engine::Rotation3::Exp(Eigen::Vector3d::UnitX() * angles.y()) *
+         engine::Rotation3::Exp(Eigen::Vector3d::UnitZ() * angles.z());
+}
+
+void EntitySection::DrawContents(const AuthoringFacts& facts) {
+  if (facts.scene == nullptr || facts.scene->entities.empty()) return Remark(strings::kNothingPlaced);
+  const auto& entities = facts.scene->entities;
+  constexpr int kMostRows = 7;
+  const float rows = static_cast<float>(std::min<std::size_t>(entities.size(), kMostRows) + 1);
+  constexpr ImGuiTableFlags kFlags = ImGuiTableFlags_ScrollY | ImGuiTableFlags_RowBg |
+                                     ImGuiTableFlags_SizingFixedFit | ImGuiTableFlags_NoPadOuterX;
+  if (!ImGui::BeginTable("contents", 5, kFlags, ImVec2(0, rows * (ImGui::GetFrameHeight() + 4)))) return;
+  ImGui::TableSetupScrollFreeze(0, 1);
+  ImGui::TableSetupColumn(strings::kName, ImGuiTableColumnFlags_WidthStretch);
+  for (const char* title : {strings::kKind, strings::kShown, strings::kLocked, strings::kDistance})
+    ImGui::TableSetupColumn(title);
+  ImGui::TableHeadersRow();
+  ImGuiListClipper clipper;
+  clipper.Begin(static_cast<int>(entities.size()));
+  while (clipper.Step()) {
+    for (int i = clipper.DisplayStart; i < clipper.DisplayEnd; ++i)
+      DrawRow(entities[static_cast<std::size_t>(i)], facts);
+  }
+  ImGui::EndTable();
+}
+
+void EntitySection::DrawRow(const content::Entity& entity, const AuthoringFacts& facts) {
+  ImGui::PushID(entity.name.c_str());
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::PushStyleVar(ImGuiStyleVar_SelectableTextAlign, ImVec2(0, 0.5f));
+  if (ImGui::Selectable(entity.name.c_str(), facts.selection->Contains(entity.name),
+                        ImGuiSelectableFlags_AllowItemOverlap, ImVec2(0, ImGui::GetFrameHeight())))
+    actions_->Select(entity.name, ImGui::GetIO().KeyShift || ImGui::GetIO().KeyCtrl);
+  ImGui::PopStyleVar();
+  if (ImGui::IsItemHovered() && !entity.group.empty()) ImGui::SetTooltip("%s", entity.group.c_str());
+  ImGui::TableNextColumn();
+  ImGui::TextDisabled(
+      "%s", entity.kind == content::Entity::Kind::kModel ? strings::kKindModel : strings::kKindSignpost);
+  ImGui::TableNextColumn();
+  bool shown = !entity.hidden;
+  if (ImGui::Checkbox("##shown", &shown)) actions_->SetHidden({entity.name}, !shown);
+  ImGui::TableNextColumn();
+  bool locked = entity.locked;
+  if (ImGui::Checkbox("##locked", &locked)) actions_->SetLocked({entity.name}, locked);
+  ImGui::TableNextColumn();
+  ImGui::AlignTextToFramePadding();
+  if (facts.has_pose) ImGui::Text("%.2f", (facts.camera_from_map * content::PlaceOf(entity)).norm());
+  ImGui::PopID();
+}
+
+void EntitySection::DrawSelected(const AuthoringFacts& facts) {
+  const std::vector<std::string>& names = facts.selection->names();
+  const content::Entity* const first =
+      facts.scene != nullptr && !names.empty() ? facts.scene->Find(names.front()) : nullptr;
+  if (first == nullptr) {
+    shown_.clear();
+    begin_rename_ = false;
+    Remark(strings::kNothingSelected);
+    ImGui::BeginDisabled(!facts.has_copy);
+    if (ImGui::Button(strings::kPaste)) actions_->Paste();
+    ImGui::EndDisabled();
+    return;
+  }
+  if (names.size() == 1) {
+    DrawFields(*first, facts);
+  } else {
+    ImGui::Text(strings::kManySelected, static_cast<int>(names.size()));
+  }
+  DrawButtons(*first, facts);
+}
+
+void EntitySection::Fill(const content::Entity& entity, const AuthoringFacts& facts) {
+  const bool other = std::exchange(shown_, entity.name) != entity.name;
+  if (is_writing_ && !other) return;
+  name_ = entity.name;
+  text_ = entity.signpost.text;
+  const engine::Sim3 pose = TransformOf(entity, facts.camera_from_map.OriginInSource());
+  const Eigen::Vector3d angles = AnglesOf(facts.map_from_upright.inverse() * pose.rotation);
+  for (int i = 0; i < 3; ++i) {
+    position_[i] = pose.translation[i];
+    angles_deg_[i] = angles[i];
+  }
+  size_ = pose.scale;
+}
+
+void EntitySection::DrawFields(const content::Entity& entity, const AuthoringFacts& facts) {
+  Fill(entity, facts);
+  is_writing_ = false;
+  ImGui::BeginDisabled(entity.locked);
+  ImGui::SetNextItemWidth(-1.0f);
+  if (std::exchange(begin_rename_, false)) ImGui::SetKeyboardFocusHere();
+  ImGui::InputText("##name", &name_);
+  is_writing_ = ImGui::IsItemActive();
+  if (ImGui::IsItemDeactivatedAfterEdit() && name_ != entity.name && !name_.empty())
+    actions_->Rename(entity.name, name_);
+  if (entity.kind == content::Entity::Kind::kSignpost) {
+    ImGui::InputTextMultiline("##text", &text_, ImVec2(-1.0f, 3.5f * ImGui::GetTextLineHeight()));
+    is_writing_ = ImGui::IsItemActive() || is_writing_;
+    if (ImGui::IsItemDeactivatedAfterEdit() && text_ != entity.signpost.text && !text_.empty())
+      actions_->SetText(entity.name, text_);
+    std::string to_map = entity.signpost.to_map;
+    ImGui::SetNextItemWidth(0.6f * ImGui::GetContentRegionAvail().x);
+    if (DrawMapChoice(strings::kLeadsTo, facts.map_names, &to_map)) actions_->SetTarget(entity.name, to_map);
+  }
+  DrawPose(entity, facts);
+  ImGui::EndDisabled();
+}
+
+void EntitySection::DrawPose(const content::Entity& entity, const AuthoringFacts& facts) {
+  ImGui::BeginGroup();
+  bool completed = NumberFields(strings::kPosition, position_, 3, "%.4g");
+  if (entity.kind == content::Entity::Kind::kModel)
+    completed = NumberFields(strings::kRotation, angles_deg_, 3, "%.1f°") || completed;
+  completed = NumberFields(strings::kSize, &size_, 1, "%.4g") || completed;
+  ImGui::EndGroup();
+  is_writing_ = ImGui::IsItemActive() || is_writing_;
+  if (!completed) return;
+  const Eigen::Vector3d angles(angles_deg_[0], angles_deg_[1], angles_deg_[2]);
+  engine::Sim3 pose = TransformOf(entity, facts.camera_from_map.OriginInSource());
+  // The rotation stays exactly as it is unless an angle was written.
+  const engine::Rotation3 before = facts.map_from_upright.inverse() * pose.rotation;
+  if (!angles.allFinite() || (angles - AnglesOf(before)).norm() > 1e-6)
+    pose.rotation = facts.map_from_upright * RotationOf(angles);
+  pose.translation = {position_[0], position_[1], position_[2]};
+  pose.scale = size_;
+  if (pose.translation.allFinite() && angles.allFinite() && std::isfinite(size_) && size_ > 0)
+    actions_->Transform(entity.name, pose);
+}
+
+void EntitySection::DrawButtons(const content::Entity& first, const AuthoringFacts& facts) {
+  const std::vector<std::string> names = facts.selection->names();
+  if (ImGui::Button(strings::kDuplicate)) actions_->DuplicateSelected();
+  if (RowButton(strings::kCopy)) actions_->CopySelected();
+  ImGui::BeginDisabled(!facts.has_copy);
+  if (RowButton(strings::kPaste)) actions_->Paste();
+  ImGui::EndDisabled();
+  if (RowButton(strings::kDelete)) actions_->RemoveSelected();
+  if (RowButton(first.locked ? strings::kUnlock : strings::kLock)) actions_->SetLocked(names, !first.locked);
+  if (RowButton(first.hidden ? strings::kShow : strings::kHide)) actions_->SetHidden(names, !first.hidden);
+  if (names.size() > 1 && RowButton(strings::kGroup)) actions_->Group(names);
+  if (!first.group.empty() && RowButton(strings::kUngroup)) actions_->Ungroup(names);
+}
+
+}  // namespace docent::ui

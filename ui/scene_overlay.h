@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "ui/entity_shapes.h"
+#include "ui/gizmo.h"
+#include "ui/letterbox.h"
+#include "ui/text.h"
+#include "ui/window_layout.h"
+
+namespace docent::ui {
+
+// Lines and texts over the image, below all widgets, at the window's resolution. One per frame, between
+// Gui::Begin and Gui::Draw.
+class SceneOverlay {
+ public:
+  // `scale` is that of the interface.
+  SceneOverlay(const GizmoCamera& camera, const Letterbox& box, const Area& image, double scale);
+  ~SceneOverlay();
+  SceneOverlay(const SceneOverlay&) = delete;
+  SceneOverlay& operator=(const SceneOverlay&) = delete;
+
+  // The edges of an entity's box, and its name above it.
+  void DrawOutline(const PlacedBox& placed, const std::string& name, bool is_locked);
+  // The handles; the one under the pointer or held is brighter.
+  void DrawGizmo(const Gizmo& gizmo, GizmoPart highlighted);
+  // A text at a point of the window, such as what is wrong below the pointer.
+  void DrawNote(const Eigen::Vector2d& point, const std::string& text);
+  // A text at the upper edge of the image.
+  void DrawBanner(const std::string& text);
+
+ private:
+  void DrawLines(const GizmoLines& lines, const Color& color, double width);
+
+  const GizmoCamera& camera_;
+  const Letterbox box_;
+  const Area image_;
+  const double scale_;
+};
+
+}  // namespace docent::ui

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// All texts of the author's window, in one place, so that they can be read together and translated. Texts
+// after "##" are not shown; they only tell widgets apart.
+namespace docent::ui::strings {
+
+// Panel.
+inline constexpr const char* kHidePanel = "Hide panel (F9)";
+inline constexpr const char* kShowPanel = "Show panel (F9)";
+inline constexpr const char* kNoMap = "No map";
+inline constexpr const char* kUnsaved = "Unsaved changes";
+inline constexpr const char* kSavedJustNow = "Saved just now";
+inline constexpr const char* kSavedSecondsAgo = "Saved %d s ago";
+inline constexpr const char* kSavedMinutesAgo = "Saved %d min ago";
+inline constexpr const char* kNothingSaved = "Nothing saved yet";
+
+// Map section.
+inline constexpr const char* kMap = "Map";
+inline constexpr const char* kMapNameHint = "Name of the new map";
+inline constexpr const char* kNewMap = "New map";
+inline constexpr const char* kStopMap = "Stop map";
+inline constexpr const char* kUndo = "Undo";
+inline constexpr const char* kRedo = "Redo";
+inline constexpr const char* kSave = "Save";
+inline constexpr const char* kNumberedMap = "Map %d";
+inline constexpr const char* kBegin = "Press New map to begin.";
+inline constexpr const char* kStarting = "Move the camera sideways, slowly.";
+
+// Place section.
+inline constexpr const char* kPlace = "Place";
+inline constexpr const char* kToolSelect = "Select";
+inline constexpr const char* kToolModel = "Model";
+inline constexpr const char* kToolSignpost = "Signpost";
+inline constexpr const char* kModelFile = "Model file";
+inline constexpr const char* kModelFileHint = "FILE.glb";
+inline constexpr const char* kBrowse = "Browse…";
+inline constexpr const char* kBrowseTitle = "Choose a model";
+inline constexpr const char* kNoFileDialog = "No file dialog is installed (zenity). Type the file's name.";
+inline constexpr const char* kFiles = "Files here and recent ones";
+inline constexpr const char* kDropFiles = "Or drop a file onto the image.";
+inline constexpr const char* kAutomaticSize = "Automatic size";
+inline constexpr const char* kScale = "Scale";
+inline constexpr const char* kTurn = "Turn";
+inline constexpr const char* kDegrees = "%.0f°";
+inline constexpr const char* kClickToPlaceModel = "Click in the image to place the model.";
+inline constexpr const char* kSignText = "Text";
+inline constexpr const char* kLeadsTo = "Leads to";
+inline constexpr const char* kLeadsNowhere = "(nowhere)";
+inline constexpr const char* kClickToPlaceSign = "Click in the image to place the signpost.";
+inline constexpr const char* kWriteText = "Write its text first.";
+inline constexpr const char* kChooseFile = "Choose a model file first.";
+inline constexpr const char* kNoModelFile = " is no model file.";  // After the file's name.
+inline constexpr const char* kDropOnImage = "Drop files onto the image to place them there.";
+inline constexpr const char* kNoSurface = "No surface is known here.";
+
+// Contents section.
+inline constexpr const char* kContents = "Contents";
+inline constexpr const char* kNothingPlaced = "Nothing is placed in this map.";
+inline constexpr const char* kName = "Name";
+inline constexpr const char* kKind = "Kind";
+inline constexpr const char* kKindModel = "model";
+inline constexpr const char* kKindSignpost = "sign";
+inline constexpr const char* kShown = "Shown";
+inline constexpr const char* kLocked = "Locked";
+inline constexpr const char* kDistance = "Distance";
+
+// Section of the selected entity.
+inline constexpr const char* kSelected = "Selected";
+inline constexpr const char* kNothingSelected = "Click an object to select it.";
+inline constexpr const char* kManySelected = "%d objects";
+inline constexpr const char* kRename = "Name";
+inline constexpr const char* kPosition = "Position";
+inline constexpr const char* kRotation = "Rotation";
+inline constexpr const char* kSize = "Size";
+inline constexpr const char* kDuplicate = "Duplicate";
+inline constexpr const char* kCopy = "Copy";
+inline constexpr const char* kPaste = "Paste";
+inline constexpr const char* kDelete = "Delete";
+inline constexpr const char* kLock = "Lock";
+inline constexpr const char* kUnlock = "Unlock";
+inline constexpr const char* kHide = "Hide";
+inline constexpr const char* kShow = "Show";
+inline constexpr const char* kGroup = "Group";
+inline constexpr const char* kUngroup = "Ungroup";
+
+// View section.
+inline constexpr const char* kView = "View";
+inline constexpr const char* kFreeze = "Freeze view";
+inline constexpr const char* kFrozen = "The view is frozen. Press F to go on.";
+inline constexpr const char* kMapPoints = "Map points";
+inline constexpr const char* kKeyframes = "Keyframes";
+inline constexpr const char* kStatus = "Status";
+inline constexpr const char* kFromAbove = "Map from above";
+inline constexpr const char* kFullScreen = "Full screen";
+inline constexpr const char* kKeys = "Keys";
+
+// Messages.
+inline constexpr const char* kDismiss = "Dismiss";
+inline constexpr const char* kDismissAll = "Dismiss all";
+inline constexpr const char* kTimes = "%s (%d times)";
+
+// Dialogs.
+inline constexpr const char* kQuitTitle = "Quit";
+inline constexpr const char* kQuitQuestion = "There are changes that are not saved.";
+inline constexpr const char* kSaveAndQuit = "Save and quit";
+inline constexpr const char* kQuitWithoutSaving = "Quit without saving";
+inline constexpr const char* kCancel = "Cancel";
+
+// Keys and what they do, in the order in which they are listed.
+struct KeyHelp {
+  const char* key;
+  const char* effect;
+};
+inline constexpr KeyHelp kKeyHelp[] = {
+    {"Click", "select; Shift adds"},
+    {"Drag", "move over the ground"},
+    {"Ctrl (drag)", "in steps"},
+    {"Arrows", "move a little"},
+    {"1, 2, 3", "select, model, signpost"},
+    {"Delete", "remove"},
+    {"Ctrl-D", "duplicate"},
+    {"Ctrl-C, Ctrl-V", "copy, paste"},
+    {"Ctrl-Z, Ctrl-Y", "undo, redo"},
+    {"F2", "rename"},
+    {"Escape", "end, close or deselect"},
+    {"Tab", "use the panel by keyboard"},
+    {"F", "freeze the view"},
+    {"C", "swap the cameras"},
+    {"M", "map from above"},
+    {"P, K, H", "points, keyframes, status"},
+    {"F9, F11", "panel, full screen"},
+    {"Ctrl-S, Ctrl-Q", "save, quit"},
+};
+
+}  // namespace docent::ui::strings
