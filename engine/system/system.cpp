@@ -220,10 +220,10 @@ void System::LeaveMap(std::uint64_t key) {
 
 void System::RemoveMap(std::uint64_t key) {
   const std::scoped_lock lock(mutex_);
-  LeaveMapNow(key);
-  const auto found = maps_.find(key);
-  if (found == maps_.end()) return;
-  found->second.discarded = true;  // Late updates of the mapper are ignored.
+  policy_.LeaveMap(key);
+  KnownMap* const map = state_.FindMap(key);
+  if (map == nullptr) return;
+  map->discarded = true;  // Late updates of the mapper are ignored.
   index_.RemoveMap(key);
 }
 

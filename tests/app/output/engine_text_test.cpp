@@ -39,7 +39,7 @@ TEST(RigText, SaysWhetherTheRigIsRigidAndItsFigures) {
   engine::RigEstimate rig;
   rig.rigid = true;
   rig.second_from_first.translation = {0.25, 0, 0};
-  rig.second_from_first.rotation = Rotation3::Exp({0, std::numbers::pi / 6, 0});
+  rig.second_from_first.rotation = engine::Rotation3::Exp({0, std::numbers::pi / 6, 0});
   rig.position_sigma = 0.001;
   rig.rotation_sigma_deg = 0.05;
   EXPECT_EQ(TextOf(rig), "rigid, baseline 0.25 (sigma 0.001), rotation 30 degrees (sigma 0.05)");
