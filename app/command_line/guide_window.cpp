@@ -217,10 +217,14 @@ class GuideWindow {
     part.width_px = std::clamp(static_cast<int>(pixels * layout.image.width), 1, size.x());
     part.height_px = part.window_height_px = size.y();
     if (shows_map()) {
-      if (is_fresh) map_panel_.Draw(*large(), part.width_px, part.height_px);
+      // The map goes on growing while the view is frozen.
+      const auto& newest = newest_[large_];
+      if ((is_fresh || is_frozen() || !std::exchange(showed_map_, true)) && newest)
+        map_panel_.Draw(*newest, part.width_px, part.height_px);
       map_panel_.Present(part);
       return;
     }
+    showed_map_ = false;
     ui::View view;
     if (large()) view = CurrentView();
     view.overlay.hud = large() != nullptr;
@@ -309,7 +313,7 @@ class GuideWindow {
   double message_height_ = 0;            // Window units.
   cv::Mat image_;
   bool points_ = false, keyframes_ = false, status_ = true;  // Of a tour.
-  bool closing_ = false, redraw_ = false, was_frozen_ = false;
+  bool closing_ = false, redraw_ = false, was_frozen_ = false, showed_map_ = false;
 };
 
 }  // namespace
