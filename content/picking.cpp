@@ -121,9 +121,12 @@ std::optional<Pick> PickEntity(const Ray& ray, const Scene& scene, const PickOpt
     const Entity& entity = scene.entities[i];
     std::optional<double> distance;
     if (entity.kind == Entity::Kind::kModel) {
-      if (!entity.model.asset || !entity.model.asset->model) continue;
-      distance = IntersectModel(ray, *entity.model.asset->model, entity.model.map_from_model,
-                                entity.model.animation, options.seconds);
+      if (!entity.model.asset) continue;
+      const std::shared_ptr<const Model> model =
+          options.model_shape ? options.model_shape(entity.model) : entity.model.asset->model;
+      if (!model) continue;
+      distance =
+          IntersectModel(ray, *model, entity.model.map_from_model, entity.model.animation, options.seconds);
     } else if (options.signpost_model && options.signpost_pose) {
       const std::shared_ptr<const Model> model = options.signpost_model(entity.signpost);
       if (!model) continue;
