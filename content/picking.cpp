@@ -10,12 +10,12 @@
 namespace docent::content {
 namespace {
 
-Eigen::Vector3d EigenFrom(const glm::vec3& v) {
+Eigen::Vector3d VectorFrom(const glm::vec3& v) {
   return {v.x, v.y, v.z};
 }
 
 Eigen::Vector3d Transformed(const glm::mat4& matrix, const glm::vec3& v) {
-  return EigenFrom(glm::vec3(matrix * glm::vec4(v, 1.0f)));
+  return VectorFrom(glm::vec3(matrix * glm::vec4(v, 1.0f)));
 }
 
 // Keeps distances: a point at a distance along the result is the transformed point at that distance.
@@ -91,7 +91,7 @@ std::optional<double> IntersectModel(const Ray& ray_in_map, const Model& model,
   const Ray ray = RayInModel(ray_in_map, map_from_model);
   const bool moves = animation >= 0 && animation < static_cast<int>(model.animations.size());
   // The box is that of the rest pose.
-  if (!moves && !IntersectBox(ray, EigenFrom(model.bounds_min), EigenFrom(model.bounds_max)))
+  if (!moves && !IntersectBox(ray, VectorFrom(model.bounds_min), VectorFrom(model.bounds_max)))
     return std::nullopt;
   const std::vector<glm::mat4> nodes = NodeMatrices(model, moves ? animation : -1, seconds);
   std::optional<double> nearest;
@@ -121,9 +121,12 @@ std::optional<Pick> PickEntity(const Ray& ray, const Scene& scene, const PickOpt
     const Entity& entity = scene.entities[i];
     std::optional<double> distance;
     if (entity.kind == Entity::Kind::kModel) {
-      if (!entity.model.asset || !entity.model.asset->model) continue;
-      distance = IntersectModel(ray, *entity.model.asset->model, entity.model.map_from_model,
-                                entity.model.animation, options.seconds);
+      if (!entity.model.asset) continue;
+      const std::shared_ptr<const Model> model =
+          options.model_shape ? options.model_shape(entity.model) : entity.model.asset->model;
+      if (!model) continue;
+      distance =
+          IntersectModel(ray, *model, entity.model.map_from_model, entity.model.animation, options.seconds);
     } else if (options.signpost_model && options.signpost_pose) {
       const std::shared_ptr<const Model> model = options.signpost_model(entity.signpost);
       if (!model) continue;

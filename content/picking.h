@@ -31,6 +31,8 @@ std::optional<double> IntersectModel(const Ray& ray, const Model& model, const e
 // How a scene is drawn, as far as picking depends on it.
 struct PickOptions {
   double seconds = 0;  // Time of the animations.
+  // The shape of a placed model where it is not that of its asset (BentModels); empty: that of the asset.
+  std::function<std::shared_ptr<const Model>(const PlacedModel&)> model_shape;
   // The model of a signpost and its pose, which depends on the reader's eye, the ray's origin.
   std::function<std::shared_ptr<const Model>(const Signpost&)> signpost_model;
   std::function<engine::Sim3(const Signpost&, const Eigen::Vector3d& eye)> signpost_pose;

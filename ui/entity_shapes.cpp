@@ -44,8 +44,8 @@ std::shared_ptr<const content::Model> EntityShapes::ModelOf(const content::Signp
 std::optional<PlacedBox> EntityShapes::BoxOf(const content::Entity& entity,
                                              const Eigen::Vector3d& eye_in_map) {
   const bool is_model = entity.kind == content::Entity::Kind::kModel;
-  if (is_model && (!entity.model.asset || !entity.model.asset->model)) return std::nullopt;
-  const auto model = is_model ? entity.model.asset->model : ModelOf(entity.signpost);
+  const auto model = is_model ? bent_models_.ShapeOf(entity.model) : ModelOf(entity.signpost);
+  if (!model) return std::nullopt;
   PlacedBox box;
   box.map_from_box = TransformOf(entity, eye_in_map);
   for (int axis = 0; axis < 3; ++axis) {
@@ -58,6 +58,7 @@ std::optional<PlacedBox> EntityShapes::BoxOf(const content::Entity& entity,
 content::PickOptions EntityShapes::PickOptionsAt(double seconds) {
   content::PickOptions options;
   options.seconds = seconds;
+  options.model_shape = [this](const content::PlacedModel& placed) { return bent_models_.ShapeOf(placed); };
   options.signpost_model = [this](const content::Signpost& signpost) { return ModelOf(signpost); };
   options.signpost_pose = SignpostPose;
   return options;

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "content/bent_models.h"
 #include "content/picking.h"
 #include "content/scene.h"
 #include "engine/geometry/sim3.h"
@@ -38,11 +39,15 @@ class EntityShapes {
  public:
   // The bounding box in the rest pose, as a reader at eye_in_map sees it; empty without a model.
   std::optional<PlacedBox> BoxOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map);
+  // Refers to this object.
   content::PickOptions PickOptionsAt(double seconds);
+  // Forgets the shapes of bent models that were not asked for since the last call.
+  void EndFrame() { bent_models_.EndFrame(); }
 
  private:
   std::shared_ptr<const content::Model> ModelOf(const content::Signpost& signpost);
 
+  content::BentModels bent_models_;
   std::map<std::pair<std::string, std::string>, std::shared_ptr<const content::Model>> signs_;
 };
 

@@ -209,6 +209,7 @@ void AuthorControls::Update() {
   pointer_.Move(view_, window_->PointerPosition(), window_->IsControlDown());
   UpdatePreview();
   board_.Expire(Now());
+  shapes_.EndFrame();
 }
 
 void AuthorControls::UpdatePreview() {

@@ -31,6 +31,9 @@ struct DoneWriter {
   std::string operator()(const RotateEntity& c) const { return "Rotated " + c.name + "."; }
   std::string operator()(const ScaleEntity& c) const { return "Scaled " + c.name + "."; }
   std::string operator()(const TransformEntity& c) const { return "Moved " + c.name + "."; }
+  std::string operator()(const AlignEntity& c) const { return "Aligned " + c.name + "."; }
+  std::string operator()(const BendEntity& c) const { return "Bent " + c.name + "."; }
+  std::string operator()(const UnbendEntity& c) const { return "Gave " + c.name + " its shape again."; }
   std::string operator()(const RemoveEntities& c) const { return "Removed " + NamesText(c.names) + "."; }
   std::string operator()(const DuplicateEntities& c) const {
     return "Duplicated " + NamesText(c.names) + ".";

@@ -143,6 +143,23 @@ TEST(Picking, TakesTheNearestEntity) {
   EXPECT_FALSE(PickEntity(Ahead(-1, -1), scene, {}));
 }
 
+TEST(Picking, TakesTheShapeThatIsShownInsteadOfTheAssets) {
+  Scene scene;
+  scene.entities = {PickableModel("bent", At(0, 0, 2))};
+  const auto bent = TriangleModel();
+  for (Vertex& vertex : bent->meshes[0].primitives[0].vertices) vertex.position.x += 4;
+  bent->bounds_min.x += 4;
+  bent->bounds_max.x += 4;
+  PickOptions options;
+  options.model_shape = [&](const PlacedModel& placed) {
+    EXPECT_EQ(placed.asset, scene.entities[0].model.asset);
+    return bent;
+  };
+  EXPECT_TRUE(PickEntity(Ahead(4.5, 0.5), scene, options));
+  EXPECT_FALSE(PickEntity(Ahead(0.5, 0.5), scene, options));
+  EXPECT_TRUE(PickEntity(Ahead(0.5, 0.5), scene, {}));
+}
+
 TEST(Picking, HitsSignpostsAsTheModelThatTheReaderSees) {
   Scene scene;
   scene.entities.resize(1);
