@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "content/placement.h"
+#include "content/warp.h"
 #include "engine/base/error.h"
 
 namespace docent::content {
@@ -64,6 +65,12 @@ Signpost& SignpostOf(Entity* entity, const char* why_not) {
   if (entity->kind != Entity::Kind::kSignpost)
     throw Error("'" + entity->name + "' is a model, which " + why_not);
   return entity->signpost;
+}
+
+PlacedModel& ModelOf(Entity* entity, const char* why_not) {
+  if (entity->kind != Entity::Kind::kModel)
+    throw Error("'" + entity->name + "' is a signpost, which " + why_not);
+  return entity->model;
 }
 
 // "fox" for "fox-2", so that copies of copies are numbered on.
@@ -189,6 +196,36 @@ SceneChange TransformEdit(const Scene& scene, const std::string& name, const eng
       entity->signpost.anchor = map_from_entity.translation;
       entity->signpost.height_m = map_from_entity.scale;
     }
+  });
+}
+
+SceneChange AlignEdit(const Scene& scene, const std::string& name,
+                      std::span<const Correspondence> correspondences, Alignment* alignment) {
+  return ChangeOf(scene, name, "align", [&](Entity* entity) {
+    PlacedModel& model = ModelOf(entity, "cannot be aligned.");
+    std::vector<Correspondence> drawn(correspondences.begin(), correspondences.end());
+    if (model.warp) {
+      for (Correspondence& pair : drawn) pair.in_model = (*model.warp)(pair.in_model);
+    }
+    const Alignment found = AlignModel(drawn);
+    model.map_from_model = found.map_from_model;
+    if (alignment != nullptr) *alignment = found;
+  });
+}
+
+SceneChange BendEdit(const Scene& scene, const std::string& name,
+                     std::span<const Correspondence> correspondences) {
+  return ChangeOf(scene, name, "bend", [&](Entity* entity) {
+    PlacedModel& model = ModelOf(entity, "cannot be bent.");
+    model.warp = std::make_shared<Warp>(FitWarp(correspondences, model.map_from_model));
+  });
+}
+
+SceneChange UnbendEdit(const Scene& scene, const std::string& name) {
+  return ChangeOf(scene, name, "unbend", [&](Entity* entity) {
+    PlacedModel& model = ModelOf(entity, "is not bent.");
+    if (!model.warp) throw Error("'" + name + "' is not bent.");
+    model.warp.reset();
   });
 }
 

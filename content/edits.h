@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
+#include "content/alignment.h"
 #include "content/edit_history.h"
 
 // The changes that people make to a scene. Commands of people and scripts are app/script/commands.h, which
@@ -34,6 +36,16 @@ SceneChange RotateEdit(const Scene& scene, const std::string& name, double angle
 SceneChange ScaleEdit(const Scene& scene, const std::string& name, double factor);
 // A model gets this pose; a signpost gets its translation as its place and its scale as its height.
 SceneChange TransformEdit(const Scene& scene, const std::string& name, const engine::Sim3& map_from_entity);
+
+// Gives a model the pose that fits correspondences of points of its drawn shape, bent if it is; see
+// alignment.h. `alignment` receives how well they fit; it may be null.
+SceneChange AlignEdit(const Scene& scene, const std::string& name,
+                      std::span<const Correspondence> correspondences, Alignment* alignment);
+// Bends a model so that these points of its original shape are at their places; see warp.h.
+SceneChange BendEdit(const Scene& scene, const std::string& name,
+                     std::span<const Correspondence> correspondences);
+// Gives a model its original shape again.
+SceneChange UnbendEdit(const Scene& scene, const std::string& name);
 
 SceneChange RenameEdit(const Scene& scene, const std::string& name, const std::string& new_name);
 // Of a signpost. to_map empty and to_key 0: it leads nowhere.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "content/warp.h"
 #include "engine/base/error.h"
 
 namespace docent::content {
@@ -12,6 +13,16 @@ namespace {
 
 Json VectorToJson(const Eigen::Vector3d& v) {
   return {v.x(), v.y(), v.z()};
+}
+
+Json WarpToJson(const Warp& warp) {
+  Json controls = Json::array(), weights = Json::array(), affine = Json::array();
+  for (const Eigen::Vector3d& control : warp.controls) controls.push_back(VectorToJson(control));
+  for (const Eigen::Vector3d& weight : warp.weights) weights.push_back(VectorToJson(weight));
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) affine.push_back(warp.affine(row, column));
+  }
+  return {{"controls_m", controls}, {"weights", weights}, {"affine", affine}};
 }
 
 // Reads the members of one JSON object.
@@ -64,6 +75,22 @@ class ObjectReader {
     return vector;
   }
 
+  // Reads a list of at most kMaxWarpPoints vectors.
+  std::vector<Eigen::Vector3d> Vectors(const char* name, double most) const {
+    const Json& value = Member(name);
+    const std::string place = PlaceOfMember(name);
+    if (!value.is_array() || value.size() > kMaxWarpPoints)
+      Refuse(where_, place, "is not a list of at most " + std::to_string(kMaxWarpPoints) + " points.");
+    std::vector<Eigen::Vector3d> vectors;
+    for (const Json& point : value) {
+      if (!point.is_array() || point.size() != 3) Refuse(where_, place, "is not a list of points.");
+      Eigen::Vector3d& vector = vectors.emplace_back();
+      for (int k = 0; k < 3; ++k)
+        vector[k] = AsNumber(point[static_cast<std::size_t>(k)], place, -most, most);
+    }
+    return vectors;
+  }
+
   // Reads a vector that must have length 1, up to rounding.
   template <int N>
   Eigen::Matrix<double, N, 1> UnitVector(const char* name) const {
@@ -86,13 +113,26 @@ class ObjectReader {
   const Json& object_;
 };
 
+Warp ReadWarp(std::string_view where, const std::string& place, const Json& json) {
+  CheckMembers(where, place, json, {"controls_m", "weights", "affine"});
+  const ObjectReader reader(where, place, json);
+  Warp warp;
+  warp.controls = reader.Vectors("controls_m", kMaxWarpNumber);
+  warp.weights = reader.Vectors("weights", kMaxWarpNumber);
+  const Eigen::Matrix<double, 12, 1> affine = reader.Vector<12>("affine", kMaxWarpNumber);
+  warp.affine = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(affine.data());
+  if (const std::string problem = Validate(warp); !problem.empty()) Refuse(where, place, problem + ".");
+  return warp;
+}
+
 void ReadModel(std::string_view where, const std::string& place, const Json& json, int version,
                const AssetLookup& find_asset, Entity* entity) {
   if (version == 1) {
     CheckMembers(where, place, json, {"kind", "name", "asset", "animation", "map_from_model"});
   } else {
-    CheckMembers(where, place, json,
-                 {"kind", "name", "asset", "animation", "map_from_model", "locked", "hidden", "group"});
+    CheckMembers(
+        where, place, json,
+        {"kind", "name", "asset", "animation", "map_from_model", "warp", "locked", "hidden", "group"});
   }
   const ObjectReader reader(where, place, json);
   entity->kind = Entity::Kind::kModel;
@@ -111,6 +151,8 @@ void ReadModel(std::string_view where, const std::string& place, const Json& jso
   entity->model.map_from_model.rotation = engine::Rotation3(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
   entity->model.map_from_model.translation = pose.Vector<3>("translation_m", kMaxCoordinate);
   entity->model.map_from_model.scale = pose.Number("scale", kMinModelScale, kMaxModelScale);
+  if (version > 1 && json.contains("warp"))
+    entity->model.warp = std::make_shared<Warp>(ReadWarp(where, place + ".warp", json["warp"]));
 }
 
 void ReadSignpost(std::string_view where, const std::string& place, const Json& json, int version,
@@ -168,6 +210,7 @@ Json EntityToJson(const Entity& entity) {
                 {{"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}},
                  {"translation_m", VectorToJson(pose.translation)},
                  {"scale", pose.scale}}}});
+  if (entity.model.warp) json["warp"] = WarpToJson(*entity.model.warp);
   return json;
 }
 

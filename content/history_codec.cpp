@@ -78,6 +78,7 @@ struct ParsedHistory {
 ParsedHistory ParseHistory(std::string_view text, std::string_view where) {
   LoadLimits limits;
   limits.max_json_bytes = kMaxHistoryBytes;
+  limits.max_json_values = kMaxHistoryBytes;  // A value has at least one byte.
   ParsedHistory parsed{ParseGltfJson(where, text, limits)};
   CheckMembers(where, kHistoryPlace, parsed.json, {"docent_history", "assets", "done", "undone"});
   const auto version = parsed.json.find("docent_history");

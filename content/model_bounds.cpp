@@ -5,9 +5,8 @@
 #include <limits>
 
 namespace docent::content {
-namespace {
 
-// model_from_vertex of each joint of a skin. The node of a skinned mesh does not move it (§3.7.3.3).
+// The node of a skinned mesh does not move it (§3.7.3.3).
 std::vector<glm::mat4> JointMatrices(const Skin& skin, const std::vector<glm::mat4>& nodes) {
   std::vector<glm::mat4> matrices(skin.joints.size());
   for (std::size_t i = 0; i < matrices.size(); ++i) {
@@ -16,18 +15,14 @@ std::vector<glm::mat4> JointMatrices(const Skin& skin, const std::vector<glm::ma
   return matrices;
 }
 
-glm::vec3 SkinnedPosition(const Vertex& vertex, const std::vector<glm::mat4>& joints,
-                          const glm::mat4& otherwise) {
-  const glm::vec4 position(vertex.position, 1);
-  if (joints.empty() || vertex.weights == glm::vec4(0)) return glm::vec3(otherwise * position);
-  glm::vec4 sum(0);
+glm::mat4 RestMatrix(const Vertex& vertex, const std::vector<glm::mat4>& joints, const glm::mat4& node) {
+  if (joints.empty() || vertex.weights == glm::vec4(0)) return node;
+  glm::mat4 sum(0);
   for (int k = 0; k < 4; ++k) {
-    if (vertex.weights[k] > 0) sum += vertex.weights[k] * (joints[vertex.joints[k]] * position);
+    if (vertex.weights[k] > 0) sum += vertex.weights[k] * joints[vertex.joints[k]];
   }
-  return glm::vec3(sum);
+  return sum;
 }
-
-}  // namespace
 
 std::optional<std::pair<glm::vec3, glm::vec3>> RestBounds(const Model& model) {
   const std::vector<glm::mat4> nodes = NodeMatrices(model, -1, 0);
@@ -40,7 +35,7 @@ std::optional<std::pair<glm::vec3, glm::vec3>> RestBounds(const Model& model) {
     if (node.skin >= 0) joints = JointMatrices(model.skins[static_cast<std::size_t>(node.skin)], nodes);
     for (const Primitive& primitive : model.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
       for (const Vertex& vertex : primitive.vertices) {
-        const glm::vec3 position = SkinnedPosition(vertex, joints, nodes[i]);
+        const glm::vec3 position(RestMatrix(vertex, joints, nodes[i]) * glm::vec4(vertex.position, 1));
         if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z)) {
           return std::nullopt;
         }

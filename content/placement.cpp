@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "content/warp.h"
 #include "engine/geometry/triangulation.h"
 
 namespace docent::content {
@@ -189,7 +190,8 @@ Eigen::Vector3d BaseInMap(const Entity& entity) {
   if (entity.kind == Entity::Kind::kSignpost) return entity.signpost.anchor;
   const std::shared_ptr<const Asset>& asset = entity.model.asset;
   if (!asset || !asset->model) return entity.model.map_from_model.translation;
-  return entity.model.map_from_model * BaseOf(*asset->model);
+  const Eigen::Vector3d base = BaseOf(*asset->model);
+  return entity.model.map_from_model * (entity.model.warp ? (*entity.model.warp)(base) : base);
 }
 
 double ScaleForSide(const Model& model, double side) {

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "content/warp.h"
+
 namespace docent::content {
 namespace {
 
@@ -57,6 +59,9 @@ std::string Validate(const Entity& entity) {
     const PlacedModel& model = entity.model;
     if (!model.asset || model.asset->id.empty() || !is_text(model.asset->id)) return "would have no model";
     if (!IsIn(model.animation, -1, kMaxAnimation)) return "would have an animation that is out of range";
+    if (model.warp) {
+      if (const std::string problem = Validate(*model.warp); !problem.empty()) return problem;
+    }
   } else {
     if (!is_text(entity.signpost.text)) return "would have a text " + not_text;
     if (!is_text(entity.signpost.to_map)) return "would lead to a map with a name " + not_text;
@@ -110,13 +115,16 @@ std::string Validate(const Scene& scene) {
   if (scene.entities.size() > kMaxEntities)
     return "A map can hold at most " + std::to_string(kMaxEntities) + " models and signposts.";
   std::set<std::string_view> names;
-  std::size_t bytes = 0;
+  std::size_t bytes = 0, warp_points = 0;
   for (const Entity& entity : scene.entities) {
     if (const std::string problem = Validate(entity); !problem.empty())
       return "'" + Shortened(entity.name, 80) + "' " + problem + ".";
     if (!names.insert(entity.name).second) return "There are two '" + entity.name + "' in this map.";
     bytes += TextBytes(entity);
+    if (entity.model.warp) warp_points += entity.model.warp->controls.size();
   }
+  if (warp_points > kMaxSceneWarpPoints)
+    return "The models in a map can be bent by at most " + std::to_string(kMaxSceneWarpPoints) + " points.";
   if (bytes > kMaxSceneTextBytes)
     return "The names and texts in a map can have at most " + std::to_string(kMaxSceneTextBytes) + " bytes.";
   return "";

@@ -28,6 +28,11 @@ inline constexpr std::size_t kMaxTextBytes = 10'000;  // of each text and name
 inline constexpr std::size_t kMaxEntities = 50'000;
 inline constexpr std::size_t kMaxSceneTextBytes = 4u << 20;  // all names and texts together
 
+inline constexpr std::size_t kMaxSceneWarpPoints = 50'000;  // Of all bent models together.
+
+// A smooth deformation of a model (warp.h).
+struct Warp;
+
 // A glTF file as the library stores it: one self-contained GLB, identified by the hash of its bytes.
 struct Asset {
   std::string id;                      // Lower-case hex of a hash of `glb` with at least 128 bits.
@@ -41,6 +46,8 @@ struct PlacedModel {
   std::shared_ptr<const Asset> asset;  // Never null.
   engine::Sim3 map_from_model;         // Its scale is the number of map units per metre of the model.
   int animation = 0;                   // None if it is -1 or out of range.
+  // Deforms the model, before map_from_model, into one without animations; null for none.
+  std::shared_ptr<const Warp> warp;
 };
 
 // A board with text that rotates about its `up` axis to face the reader; `anchor` is its foot in the map.
@@ -49,9 +56,9 @@ struct Signpost {
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // In the map, map units.
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY();    // Unit vector in the map.
   double height_m = 0.1;                             // Height of the board, in map units.
-  // The map it leads to: its key in the library, 0 if it is not known, and its name when this was written,
-  // empty for none. The key decides; the name is shown where there is no map with this key.
-  std::uint64_t to_key = 0;
+  std::uint64_t to_key = 0;  // Key of the map it leads to in the library; 0 for none, or if it is not known.
+  // Name of the map it leads to when this was written, empty for none. Where there is a map with the key, its
+  // name is shown instead.
   std::string to_map;
 };
 

@@ -3,10 +3,14 @@
 
 #include <set>
 
+#include "content/warp.h"
 #include "engine/base/error.h"
 
 namespace docent::content {
 namespace {
+
+// With keys: 30 for each entity, and 13 at most for each point that bends a model.
+constexpr std::size_t kMaxSceneValues = 100 + 31 * kMaxEntities + 14 * kMaxSceneWarpPoints;
 
 struct ParsedScene {
   Json json;
@@ -15,7 +19,9 @@ struct ParsedScene {
 
 // Returns the parsed text after checking its version and the types of its two lists.
 ParsedScene ParseScene(std::string_view text, std::string_view where) {
-  ParsedScene parsed{ParseGltfJson(where, text, LoadLimits{})};
+  LoadLimits limits;
+  limits.max_json_values = kMaxSceneValues;
+  ParsedScene parsed{ParseGltfJson(where, text, limits)};
   const Json& json = parsed.json;
   CheckMembers(where, "the scene", json, {"docent_scene", "assets", "entities"});
   for (const char* name : {"docent_scene", "assets", "entities"}) {
@@ -77,7 +83,7 @@ Scene ReadScene(std::string_view text, std::string_view where, const AssetLookup
   const ParsedScene parsed = ParseScene(text, where);
   Scene scene;
   std::set<std::string> names;
-  std::size_t bytes = 0;
+  std::size_t bytes = 0, warp_points = 0;
   const Json& entities = parsed.json["entities"];
   for (std::size_t i = 0; i < entities.size(); ++i) {
     const std::string place = Place("entities", i);
@@ -91,6 +97,9 @@ Scene ReadScene(std::string_view text, std::string_view where, const AssetLookup
       }
       if (bytes + TextBytes(entity) > kMaxSceneTextBytes)
         Refuse(where, place, "is left out, because the scene has too many names and texts.");
+      if (entity.model.warp) warp_points += entity.model.warp->controls.size();
+      if (warp_points > kMaxSceneWarpPoints)
+        Refuse(where, place, "is left out, because too many points bend the models of the scene.");
       bytes += TextBytes(entity);
       names.insert(entity.name);
       scene.entities.push_back(std::move(entity));

@@ -14,7 +14,9 @@
 //   {"docent_scene": 2, "assets": [ID…], "entities": [
 //     {"kind": "model", "name": NAME, "locked": false, "hidden": false, "group": NAME,
 //      "asset": ID, "animation": N,
-//      "map_from_model": {"rotation_xyzw": [x, y, z, w], "translation_m": [x, y, z], "scale": S}},
+//      "map_from_model": {"rotation_xyzw": [x, y, z, w], "translation_m": [x, y, z], "scale": S},
+//      and, if it is bent (warp.h; the affine part by rows),
+//      "warp": {"controls_m": [[x, y, z]…], "weights": [[x, y, z]…], "affine": [12 numbers]}},
 //     {"kind": "signpost", "name": NAME, "locked": false, "hidden": false, "group": NAME,
 //      "text": TEXT, "anchor_m": [x, y, z], "up": [x, y, z],
 //      "height_m": H, "to_map": NAME, "to_key": KEY}]}

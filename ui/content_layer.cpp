@@ -147,8 +147,8 @@ std::vector<ModelInstance> ContentLayer::Instances(const content::Scene& scene,
   for (const content::Entity& entity : scene.entities) {
     ModelInstance instance;
     if (entity.kind == content::Entity::Kind::kModel) {
-      if (entity.model.asset == nullptr || entity.model.asset->model == nullptr) continue;
-      instance.model = entity.model.asset->model;
+      instance.model = bent_models_.ShapeOf(entity.model);
+      if (instance.model == nullptr) continue;
       instance.map_from_model = GlmFrom(entity.model.map_from_model);
       instance.animation = entity.model.animation;
       instance.seconds = animation_seconds;
@@ -161,6 +161,7 @@ std::vector<ModelInstance> ContentLayer::Instances(const content::Scene& scene,
     }
     instances.push_back(std::move(instance));
   }
+  bent_models_.EndFrame();
   std::erase_if(signs_, [&](const auto& sign) { return sign.second.last_frame + kSignLifeFrames < frame_; });
   return instances;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "content/bent_models.h"
 #include "content/scene.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
@@ -55,7 +56,8 @@ class ContentLayer {
   MeshDrawer mesh_drawer_;
   GlProgram warp_program_;
   GlVertexArray empty_vertex_array_;
-  std::vector<std::unique_ptr<Lens>> lenses_;                  // Ordered by use, the most recently used last.
+  std::vector<std::unique_ptr<Lens>> lenses_;  // Ordered by use, the most recently used last.
+  content::BentModels bent_models_;
   std::map<std::pair<std::string, std::string>, Sign> signs_;  // Keyed by text and target map.
   std::uint64_t frame_ = 0;
 };

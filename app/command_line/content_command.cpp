@@ -1,24 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
-#include <set>
 
+#include "app/command_line/content_edit_command.h"
+#include "app/command_line/number_option.h"
 #include "app/command_line/program.h"
+#include "app/command_line/stored_scene.h"
 #include "app/files/text_file.h"
 #include "app/session/library_scene.h"
 #include "app/session/session.h"
 #include "content/asset.h"
 #include "content/edits.h"
 #include "content/placement.h"
-#include "content/scene_codec.h"
 #include "engine/base/error.h"
 #include "engine/map/upright_axes.h"
 #include "maps/library/library.h"
@@ -32,6 +31,7 @@ using Json = nlohmann::ordered_json;
 struct ContentOptions {
   std::filesystem::path library, file;
   std::string map, name;
+  std::vector<std::string> names;
   bool as_json = false;
   // Of `add`; see its help for units and frames.
   std::string text, to_map;
@@ -41,28 +41,6 @@ struct ContentOptions {
   double height = 0;  // 0: chosen by the size of what the map shows
 };
 
-// Decodes the scene with the names of its assets only, because listing and removing need no meshes.
-content::Scene DecodeNames(const maps::SceneRecord& record, const std::string& where) {
-  if (record.text.empty()) return {};
-  return content::DecodeScene(record.text, where, [&](const std::string& id) {
-    const auto found = std::find_if(record.assets.begin(), record.assets.end(),
-                                    [&](const maps::AssetRecord& asset) { return asset.id == id; });
-    if (found == record.assets.end()) return std::shared_ptr<const content::Asset>();
-    auto asset = std::make_shared<content::Asset>();
-    asset->id = found->id;
-    asset->name = found->name;
-    return std::shared_ptr<const content::Asset>(std::move(asset));
-  });
-}
-
-std::string Where(const maps::Library& library, const maps::MapInfo& map) {
-  return library.file() + ", map '" + map.name + "'";
-}
-
-content::Scene StoredNames(const maps::Library& library, const maps::MapInfo& map) {
-  return DecodeNames(library.LoadScene(map.key), Where(library, map));
-}
-
 Json ToJson(const maps::MapInfo& map, const content::Entity& entity) {
   Json json = {{"map", map.name}, {"name", entity.name}};
   if (entity.kind == content::Entity::Kind::kModel) {
@@ -71,6 +49,7 @@ Json ToJson(const maps::MapInfo& map, const content::Entity& entity) {
     json["file"] = entity.model.asset ? entity.model.asset->name : std::string();
     json["position_m"] = {t.x(), t.y(), t.z()};
     json["scale"] = entity.model.map_from_model.scale;
+    json["bent"] = entity.model.warp != nullptr;
   } else {
     const Eigen::Vector3d& anchor = entity.signpost.anchor;
     json["kind"] = "signpost";
@@ -78,6 +57,9 @@ Json ToJson(const maps::MapInfo& map, const content::Entity& entity) {
     json["position_m"] = {anchor.x(), anchor.y(), anchor.z()};
     json["to_map"] = entity.signpost.to_map;
   }
+  json["locked"] = entity.locked;
+  json["hidden"] = entity.hidden;
+  json["group"] = entity.group;
   return json;
 }
 
@@ -102,42 +84,14 @@ void List(const ContentOptions& options) {
   if (entries.empty()) std::puts("The maps hold no models or signposts.");
   for (const Json& entry : entries) {
     const bool model = entry["kind"] == "model";
-    std::printf("%-24s %-24s %-9s %s\n", entry["map"].get<std::string>().c_str(),
+    const char* const state = entry["locked"] == true
+                                  ? (entry["hidden"] == true ? "  (locked, hidden)" : "  (locked)")
+                              : entry["hidden"] == true ? "  (hidden)"
+                                                        : "";
+    std::printf("%-24s %-24s %-9s %s%s\n", entry["map"].get<std::string>().c_str(),
                 entry["name"].get<std::string>().c_str(), entry["kind"].get<std::string>().c_str(),
-                entry[model ? "file" : "text"].get<std::string>().c_str());
+                entry[model ? "file" : "text"].get<std::string>().c_str(), state);
   }
-}
-
-// Makes the change of a scene; see content/edits.h.
-using MakeEdit = std::function<content::SceneChange(const content::Scene&)>;
-
-// Applies an edit to the stored scene of a map. `added` is the asset of a model that the edit adds, else
-// null. Throws Error, and changes nothing, when the edit does not fit, or the policy of the map forbids it.
-void EditStoredScene(maps::Library* library, const maps::MapInfo& map, const MakeEdit& edit,
-                     const std::shared_ptr<const content::Asset>& added) {
-  const maps::SceneRecord stored = library->LoadScene(map.key);
-  content::Scene scene = DecodeNames(stored, Where(*library, map));
-  try {
-    content::ApplyChange(edit(scene), &scene);
-  } catch (const Error& error) {
-    throw Error(Where(*library, map) + ": " + error.what());
-  }
-  auto changed = std::make_shared<maps::SceneRecord>();
-  changed->text = content::EncodeScene(scene);
-  const std::vector<std::string> ids = content::SceneAssetIds(changed->text);
-  const std::set<std::string> used(ids.begin(), ids.end());
-  std::set<std::string> kept;
-  for (const maps::AssetRecord& asset : stored.assets) {
-    if (used.contains(asset.id) && kept.insert(asset.id).second) changed->assets.push_back(asset);
-  }
-  if (added && kept.insert(added->id).second)
-    changed->assets.push_back({added->id, added->name, {added, &added->glb}});
-  maps::MapRecord record;
-  record.key = map.key;
-  record.name = map.name;
-  record.policy = map.policy;
-  record.scene = std::move(changed);
-  library->Save(record);
 }
 
 // A pose that stands upright and faces the place of the first keyframe's camera, unless a rotation is given.
@@ -151,6 +105,7 @@ content::Entity NewModel(const ContentOptions& options, const engine::UprightAxe
   pose = content::UprightPose(options.position, -axes.ahead, axes.up,
                               options.yaw_deg * std::numbers::pi / 180, options.scale);
   if (options.rotation) pose.rotation = engine::Rotation3(*options.rotation);
+  pose.translation += options.position - content::BaseInMap(entity);
   return entity;
 }
 
@@ -173,46 +128,24 @@ content::Entity NewSignpost(const ContentOptions& options, const engine::MapSnap
 void Add(const ContentOptions& options, Verbosity verbosity) {
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   const maps::MapInfo map = library.FindByName(options.map);
-  if (!options.to_map.empty()) (void)library.FindByName(options.to_map);  // Throws if there is none.
+  std::uint64_t to_key = 0;
+  if (!options.to_map.empty()) to_key = library.FindByName(options.to_map).key;  // Throws if there is none.
+  if (to_key == map.key) throw Error(WhereStored(library, map) + ": a signpost cannot lead to its own map.");
   const auto snapshot = library.Load(map.key).snapshot;
   const content::Scene scene = StoredNames(library, map);
-  const content::Entity entity = options.file.empty()
-                                     ? NewSignpost(options, *snapshot, scene)
-                                     : NewModel(options, engine::UprightAxesOf(*snapshot), scene);
-  EditStoredScene(
-      &library, map, [&](const content::Scene& stored) { return content::AddEdit(stored, entity); },
-      entity.model.asset);
+  content::Entity entity = options.file.empty() ? NewSignpost(options, *snapshot, scene)
+                                                : NewModel(options, engine::UprightAxesOf(*snapshot), scene);
+  entity.signpost.to_key = to_key;
+  const MakeEdit edits[] = {[&](const content::Scene& stored) { return content::AddEdit(stored, entity); }};
+  EditStoredScene(&library, map, edits, ModelsNeeded::kNo, entity.model.asset);
   if (verbosity != Verbosity::kQuiet) std::printf("%s\n", entity.name.c_str());
 }
 
 void Remove(const ContentOptions& options) {
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
-  EditStoredScene(
-      &library, library.FindByName(options.map),
-      [&](const content::Scene& stored) { return content::RemoveEdit(stored, {options.name}); }, nullptr);
-}
-
-// An option with `count` numbers between `least` and `most`.
-CLI::Option* AddNumbers(CLI::App* command, const std::string& option, int count, double least, double most,
-                        const std::function<void(const std::vector<double>&)>& take,
-                        const std::string& description) {
-  return command
-      ->add_option_function<std::vector<std::string>>(
-          option,
-          [=](const std::vector<std::string>& words) {
-            std::vector<double> numbers;
-            for (const std::string& word : words) {
-              const auto number = ParseNumber(word);
-              if (!number || *number < least || *number > most) {
-                throw CLI::ValidationError(option, "'" + word + "' is not a number between " +
-                                                       FormatNumber(least) + " and " + FormatNumber(most));
-              }
-              numbers.push_back(*number);
-            }
-            take(numbers);
-          },
-          description)
-      ->expected(count);
+  const MakeEdit edits[] = {
+      [&](const content::Scene& stored) { return content::RemoveEdit(stored, options.names); }};
+  EditStoredScene(&library, library.FindByName(options.map), edits, ModelsNeeded::kNo);
 }
 
 void AddAddCommand(CLI::App* group, Invocation* invocation, const std::shared_ptr<ContentOptions>& options) {
@@ -280,7 +213,7 @@ void AddAddCommand(CLI::App* group, Invocation* invocation, const std::shared_pt
 
 void AddContentCommand(CLI::App* program, Invocation* invocation) {
   CLI::App* group =
-      AddSubcommand(program, "content", "List, add or remove the models and signposts in the maps",
+      AddSubcommand(program, "content", "List, add, change or remove the models and signposts in the maps",
                     "docent content list --library museum.docent");
   group->require_subcommand(1);
   const auto options = std::make_shared<ContentOptions>();
@@ -293,10 +226,11 @@ void AddContentCommand(CLI::App* program, Invocation* invocation) {
   list->callback([=] { invocation->run = [=] { List(*options); }; });
 
   AddAddCommand(group, invocation, options);
+  AddContentEditCommand(group, invocation);
 
-  CLI::App* remove = AddSubcommand(group, "remove", "Remove a model or a signpost",
+  CLI::App* remove = AddSubcommand(group, "remove", "Remove models and signposts",
                                    "docent content remove helmet --map \"Desk 3\" --library museum.docent");
-  remove->add_option("NAME", options->name, "Name of the model or signpost")->required();
+  remove->add_option("NAME", options->names, "Names of the models and signposts")->required();
   remove->add_option("--map", options->map, "The map that contains it")->required();
   remove->add_option("--library", options->library, "The library's file, NAME.docent")->required();
   remove->callback([=] { invocation->run = [=] { Remove(*options); }; });

@@ -6,13 +6,15 @@
 
 #include "app/files/text_file.h"
 #include "content/scene.h"
+#include "content/warp.h"
 #include "maps/library/library.h"
 
 namespace docent::app {
 
 namespace {
 
-constexpr double kMaxPixel = 1e6;  // far outside any image
+constexpr double kMaxPixel = 1e6;            // far outside any image
+constexpr double kMaxModelCoordinate = 1e9;  // metres
 constexpr const char* kNoMapName = "expected a map's name that is not empty";
 
 bool IsAtMost(double value, double most) {
@@ -76,6 +78,21 @@ std::string PoseProblem(const engine::Sim3& pose) {
   return ScaleProblem(pose.scale);
 }
 
+std::string PairsProblem(const std::vector<PointPair>& pairs) {
+  if (pairs.size() > content::kMaxWarpPoints)
+    return "expected at most " + std::to_string(content::kMaxWarpPoints) + " points";
+  for (const PointPair& pair : pairs) {
+    if (!IsAtMost(pair.in_model.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), kMaxModelCoordinate))
+      return "a point is far outside any model";
+    if (pair.pixel) {
+      if (const std::string problem = PixelProblem(*pair.pixel); !problem.empty()) return problem;
+    } else if (!IsAtMost(pair.in_map.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate)) {
+      return "a place is out of any map";
+    }
+  }
+  return "";
+}
+
 std::string First(std::initializer_list<std::string> problems) {
   for (const std::string& problem : problems) {
     if (!problem.empty()) return problem;
@@ -117,6 +134,18 @@ struct Validator {
   std::string operator()(const TransformEntity& c) const {
     return First({NameProblem(c.name, "a name"), PoseProblem(c.map_from_entity)});
   }
+  std::string operator()(const AlignEntity& c) const {
+    return First({NameProblem(c.name, "a name"), c.pairs.size() < 3 ? "expected at least 3 points" : "",
+                  PairsProblem(c.pairs)});
+  }
+  std::string operator()(const BendEntity& c) const {
+    return First({NameProblem(c.name, "a name"),
+                  c.pairs.size() < content::kMinWarpPoints
+                      ? "expected at least " + std::to_string(content::kMinWarpPoints) + " points"
+                      : "",
+                  PairsProblem(c.pairs)});
+  }
+  std::string operator()(const UnbendEntity& c) const { return NameProblem(c.name, "a name"); }
   std::string operator()(const RemoveEntities& c) const { return NamesProblem(c.names); }
   std::string operator()(const DuplicateEntities& c) const { return NamesProblem(c.names); }
   std::string operator()(const RenameEntity& c) const {
@@ -143,15 +172,23 @@ struct Validator {
 
 }  // namespace
 
+// Normalizing a quaternion again may change its last bits for ever. Where the computed norm is 1 it does not,
+// and a quaternion with such a norm is a few steps of the largest component away.
 engine::Rotation3 Settled(const engine::Rotation3& rotation) {
-  constexpr int kMostSteps = 10;  // One or two are needed.
-  engine::Rotation3 settled = rotation;
-  for (int step = 0; step < kMostSteps; ++step) {
-    const engine::Rotation3 next(settled.quaternion());
-    if (next.quaternion().coeffs() == settled.quaternion().coeffs()) break;
-    settled = next;
+  constexpr int kMostSteps = 8;
+  const Eigen::Vector4d start = rotation.quaternion().coeffs();
+  Eigen::Index largest = 0;
+  start.cwiseAbs().maxCoeff(&largest);
+  Eigen::Vector4d up = start, down = start;
+  for (int step = 0; step <= kMostSteps; ++step) {
+    for (const Eigen::Vector4d& tried : {up, down}) {
+      const engine::Rotation3 normalized{Eigen::Quaterniond(tried)};
+      if (normalized.quaternion().coeffs() == tried) return normalized;
+    }
+    up[largest] = std::nextafter(up[largest], 2.0);
+    down[largest] = std::nextafter(down[largest], -2.0);
   }
-  return settled;
+  return rotation;
 }
 
 bool TransformEntity::operator==(const TransformEntity& other) const {

@@ -82,6 +82,29 @@ struct TransformEntity {
   // Rotations are equal when they are equal after all rounding (Settled).
   bool operator==(const TransformEntity& other) const;
 };
+// A point of a model and its place in the map: a point of the surface at a pixel, or coordinates.
+struct PointPair {
+  Eigen::Vector3d in_model = Eigen::Vector3d::Zero();  // model axes, metres
+  Eigen::Vector3d in_map = Eigen::Vector3d::Zero();    // map units; ignored with `pixel`
+  std::optional<Eigen::Vector2d> pixel;
+  bool operator==(const PointPair&) const = default;
+};
+// Gives a model the pose that fits the pairs best; see content/alignment.h.
+struct AlignEntity {
+  std::string name;
+  std::vector<PointPair> pairs;
+  bool operator==(const AlignEntity&) const = default;
+};
+// Bends a model so that it fits each pair exactly; see content/warp.h.
+struct BendEntity {
+  std::string name;
+  std::vector<PointPair> pairs;
+  bool operator==(const BendEntity&) const = default;
+};
+struct UnbendEntity {
+  std::string name;
+  bool operator==(const UnbendEntity&) const = default;
+};
 struct RemoveEntities {
   std::vector<std::string> names;
   bool operator==(const RemoveEntities&) const = default;
@@ -138,9 +161,9 @@ struct Save {
 
 using Command =
     std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, PlaceModel, PlaceSignpost,
-                 MoveEntity, RotateEntity, ScaleEntity, TransformEntity, RemoveEntities, DuplicateEntities,
-                 RenameEntity, SetEntityText, SetSignpostTarget, SetEntityFlag, GroupEntities, PasteEntities,
-                 Undo, Redo, Save>;
+                 MoveEntity, RotateEntity, ScaleEntity, TransformEntity, AlignEntity, BendEntity,
+                 UnbendEntity, RemoveEntities, DuplicateEntities, RenameEntity, SetEntityText,
+                 SetSignpostTarget, SetEntityFlag, GroupEntities, PasteEntities, Undo, Redo, Save>;
 
 // The same rotation, with a quaternion that normalizing does not change any more. A command that was written
 // to a script and read again thereby has exactly the rotation of the original.

@@ -21,6 +21,9 @@ content::SceneChange EditFor(const content::Scene& scene, const TransformEntity&
   pose.rotation = Settled(pose.rotation);
   return content::TransformEdit(scene, command.name, pose);
 }
+content::SceneChange EditFor(const content::Scene& scene, const UnbendEntity& command) {
+  return content::UnbendEdit(scene, command.name);
+}
 content::SceneChange EditFor(const content::Scene& scene, const RemoveEntities& command) {
   return content::RemoveEdit(scene, command.names);
 }

@@ -12,6 +12,7 @@ content::SceneChange EditFor(const content::Scene& scene, const MoveEntity& comm
 content::SceneChange EditFor(const content::Scene& scene, const RotateEntity& command);
 content::SceneChange EditFor(const content::Scene& scene, const ScaleEntity& command);
 content::SceneChange EditFor(const content::Scene& scene, const TransformEntity& command);
+content::SceneChange EditFor(const content::Scene& scene, const UnbendEntity& command);
 content::SceneChange EditFor(const content::Scene& scene, const RemoveEntities& command);
 content::SceneChange EditFor(const content::Scene& scene, const DuplicateEntities& command);
 content::SceneChange EditFor(const content::Scene& scene, const RenameEntity& command);

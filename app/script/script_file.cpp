@@ -49,6 +49,16 @@ class LineReader {
     if (!value) Fail(std::string("expected ") + what + " instead of '" + text + "'");
     return *value;
   }
+  // The next number of a list whose items are separated by commas: `last` becomes true where no comma
+  // follows.
+  double TakeItemNumber(const char* what, bool* last) {
+    const std::string text = Take(what);
+    const bool comma = text.ends_with(',');
+    const auto value = ParseNumber(std::string_view(text).substr(0, text.size() - (comma ? 1 : 0)));
+    if (!value) Fail(std::string("expected ") + what + " instead of '" + text + "'");
+    *last = !comma && !TakeIf(",");
+    return *value;
+  }
   Eigen::Vector2d TakePixel() {
     Expect("pixel");
     const double u = TakeNumber("a pixel's column");
@@ -186,6 +196,23 @@ Command ParseTransform(LineReader* line) {
   return command;
 }
 
+std::vector<PointPair> ParsePairs(LineReader* line) {
+  std::vector<PointPair> pairs;
+  for (bool last = false; !last;) {
+    PointPair& pair = pairs.emplace_back();
+    for (double& coordinate : pair.in_model) coordinate = line->TakeNumber("a point X Y Z of the model");
+    line->Expect("to");
+    if (line->TakeIf("pixel")) {
+      const double u = line->TakeNumber("a pixel's column");
+      pair.pixel = {u, line->TakeItemNumber("a pixel's row", &last)};
+    } else {
+      for (const int axis : {0, 1}) pair.in_map[axis] = line->TakeNumber("X Y Z in map units");
+      pair.in_map[2] = line->TakeItemNumber("X Y Z in map units", &last);
+    }
+  }
+  return pairs;
+}
+
 // Names up to the end of the line, or up to a keyword.
 std::vector<std::string> ParseNames(LineReader* line, std::string_view keyword = {}) {
   std::vector<std::string> names;
@@ -224,6 +251,15 @@ std::optional<Command> ParseEdit(LineReader* line) {
   if (line->TakeIf("rotate")) return ParseRotate(line);
   if (line->TakeIf("scale")) return ParseScale(line);
   if (line->TakeIf("transform")) return ParseTransform(line);
+  if (line->TakeIf("align")) {
+    const std::string name = line->TakeName("a name");
+    return AlignEntity{name, ParsePairs(line)};
+  }
+  if (line->TakeIf("bend")) {
+    const std::string name = line->TakeName("a name");
+    return BendEntity{name, ParsePairs(line)};
+  }
+  if (line->TakeIf("unbend")) return UnbendEntity{line->TakeName("a name")};
   if (line->TakeIf("remove")) return RemoveEntities{ParseNames(line)};
   if (line->TakeIf("duplicate")) return DuplicateEntities{ParseNames(line)};
   if (line->TakeIf("rename")) {
@@ -292,6 +328,19 @@ std::string Names(const std::vector<std::string>& names) {
   return text;
 }
 
+std::string Point(const Eigen::Vector3d& point) {
+  return Number(point.x()) + ' ' + Number(point.y()) + ' ' + Number(point.z());
+}
+
+std::string Pairs(const std::vector<PointPair>& pairs) {
+  std::string text;
+  for (const PointPair& pair : pairs) {
+    text += (text.empty() ? " " : ", ") + Point(pair.in_model) + " to " +
+            (pair.pixel ? Pixel(*pair.pixel) : Point(pair.in_map));
+  }
+  return text;
+}
+
 struct Formatter {
   std::string operator()(const NewMap& c) const { return "map new " + AlwaysQuoted(c.name); }
   std::string operator()(const StopMap&) const { return "map stop"; }
@@ -327,9 +376,13 @@ struct Formatter {
     const engine::Sim3& pose = c.map_from_entity;
     std::string text = "transform " + Quoted(c.name);
     for (const double value : pose.translation) text += ' ' + Number(value);
-    for (const double value : Settled(pose.rotation).quaternion().coeffs()) text += ' ' + Number(value);
+    const Eigen::Vector4d quaternion = Settled(pose.rotation).quaternion().coeffs();
+    for (const double value : quaternion) text += ' ' + Number(value);
     return text + ' ' + Number(pose.scale);
   }
+  std::string operator()(const AlignEntity& c) const { return "align " + Quoted(c.name) + Pairs(c.pairs); }
+  std::string operator()(const BendEntity& c) const { return "bend " + Quoted(c.name) + Pairs(c.pairs); }
+  std::string operator()(const UnbendEntity& c) const { return "unbend " + Quoted(c.name); }
   std::string operator()(const RemoveEntities& c) const { return "remove" + Names(c.names); }
   std::string operator()(const DuplicateEntities& c) const { return "duplicate" + Names(c.names); }
   std::string operator()(const RenameEntity& c) const {

@@ -200,6 +200,8 @@ class Session {
   void Apply(const MoveEntity& command, const engine::TrackedFrame& frame);
   void Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame);
   void Apply(const PasteEntities& command, const engine::TrackedFrame& frame);
+  void Apply(const AlignEntity& command, const engine::TrackedFrame& frame);
+  void Apply(const BendEntity& command, const engine::TrackedFrame& frame);
   void Apply(const Undo& command, const engine::TrackedFrame& frame);
   void Apply(const Redo& command, const engine::TrackedFrame& frame);
   template <SceneCommand C>
@@ -210,6 +212,8 @@ class Session {
   SessionMap& MapToEdit(const engine::TrackedFrame& frame);
   void Edit(SessionMap* map, content::SceneChange change);
   content::SurfaceHit SurfaceFor(const engine::TrackedFrame& frame, const Eigen::Vector2d& pixel) const;
+  std::vector<content::Correspondence> Correspondences(const engine::TrackedFrame& frame,
+                                                       const std::vector<PointPair>& pairs) const;
   std::uint64_t TargetKey(const SessionMap& map, const std::string& to_map);
   std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
 

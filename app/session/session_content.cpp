@@ -2,6 +2,7 @@
 #include <numbers>
 #include <utility>
 
+#include "app/files/text_file.h"
 #include "app/session/session.h"
 #include "app/session/surface_at_pixel.h"
 #include "content/asset.h"
@@ -24,6 +25,17 @@ const content::Entity& FindEntity(const content::Scene& scene, const std::string
 // The median distance of what the first keyframe sees: the size of a map's world in its unit.
 double FirstDistance(const engine::MapSnapshot& map) {
   return map.keyframes.empty() ? 1 : map.keyframes.front().mean_depth;
+}
+
+// How well the points of an aligned model fit, in words. Residuals are in map units.
+std::string TextOf(const std::string& name, const content::Alignment& alignment) {
+  std::string residuals, left_out;
+  for (std::size_t i = 0; i < alignment.residuals.size(); ++i) {
+    residuals += (i > 0 ? ", " : "") + FormatNumber(alignment.residuals[i], 3);
+    if (!alignment.inliers[i]) left_out += (left_out.empty() ? "" : ", ") + std::to_string(i + 1);
+  }
+  return "'" + name + "' was aligned: residuals " + residuals + " map units" +
+         (left_out.empty() ? "" : "; without point " + left_out);
 }
 
 }  // namespace
@@ -155,6 +167,30 @@ void Session::Apply(const PasteEntities& command, const engine::TrackedFrame& fr
   motion.translation = hit.point - motion * middle;
   for (content::Entity& copy : copies) content::TransformBy(motion, &copy);
   Edit(&map, content::PasteEdit(*map.scene, std::move(copies)));
+}
+
+std::vector<content::Correspondence> Session::Correspondences(const engine::TrackedFrame& frame,
+                                                              const std::vector<PointPair>& pairs) const {
+  std::vector<content::Correspondence> correspondences;
+  for (const PointPair& pair : pairs) {
+    correspondences.push_back(
+        {pair.in_model, pair.pixel ? SurfaceFor(frame, *pair.pixel).point : pair.in_map});
+  }
+  return correspondences;
+}
+
+void Session::Apply(const AlignEntity& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  content::Alignment alignment;
+  Edit(&map, content::AlignEdit(*map.scene, command.name, Correspondences(frame, command.pairs), &alignment));
+  const std::string text = TextOf(command.name, alignment);
+  AddEvent(frame.frame.time, "align", text);
+  Advise(&cameras_.at(static_cast<std::size_t>(frame.frame.camera)), text);
+}
+
+void Session::Apply(const BendEntity& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  Edit(&map, content::BendEdit(*map.scene, command.name, Correspondences(frame, command.pairs)));
 }
 
 void Session::Apply(const Undo&, const engine::TrackedFrame& frame) {

@@ -9,6 +9,7 @@
 
 #include "content/placement.h"
 #include "content/scene_codec.h"
+#include "content/warp.h"
 #include "tests/content/edit_samples.h"
 #include "tests/support/error_of.h"
 
@@ -23,6 +24,9 @@ std::vector<std::string> NamesOf(const Scene& scene) {
   for (const Entity& entity : scene.entities) names.push_back(entity.name);
   return names;
 }
+
+const Correspondence kCorners[] = {
+    {{0, 0, 0}, {0, 0, 0}}, {{1, 0, 0}, {0.5, 0.1, 0}}, {{0, 1, 0}, {0, 0.5, 0}}, {{0, 0, 1}, {0, 0, 0.5}}};
 
 // One of each kind of edit, for the scene of edit_samples.h.
 std::vector<SceneChange> OneOfEach(const Scene& scene) {
@@ -40,6 +44,8 @@ std::vector<SceneChange> OneOfEach(const Scene& scene) {
           RenameEdit(scene, "helmet", "hat"),
           TextEdit(scene, "sign-1", "elsewhere"),
           TargetEdit(scene, "sign-1", "Desk 4", 9),
+          AlignEdit(scene, "helmet", kCorners, nullptr),
+          BendEdit(scene, "old fox", kCorners),
           FlagEdit(scene, {"helmet", "sign-1"}, EntityFlag::kLocked, true),
           FlagEdit(scene, {"old fox"}, EntityFlag::kHidden, true),
           GroupEdit(scene, {"old fox", "helmet"}, "animals"),
@@ -172,6 +178,39 @@ TEST(Edits, TheBaseOfAModelStaysWhereItIsWhenItIsScaledOrRotated) {
     EXPECT_LT((BaseInMap(after) - base).norm(), 1e-12) << change.label;
     EXPECT_GT((PlaceOf(after) - PlaceOf(scene.entities[0])).norm(), 0.1) << change.label;
   }
+}
+
+TEST(Edits, ABentModelIsAlignedByItsBentShapeAndUnbentAgain) {
+  Scene scene = ThreeEntities();
+  const std::string before = EncodeScene(scene);
+  ApplyChange(BendEdit(scene, "helmet", kCorners), &scene);
+  const Entity bent = scene.entities[0];
+  const auto drawn = [](const Entity& entity, const Eigen::Vector3d& x) {
+    return Eigen::Vector3d(entity.model.map_from_model * (*entity.model.warp)(x));
+  };
+  for (const Correspondence& pair : kCorners)
+    EXPECT_LT((drawn(bent, pair.in_model) - pair.in_map).norm(), 1e-9);
+  const engine::Sim3 motion{engine::Rotation3::Exp({0.1, 0.2, 0.3}), {1, 1, 1}, 3};
+  std::vector<Correspondence> moved;
+  for (const Correspondence& pair : kCorners)
+    moved.push_back({pair.in_model, motion * drawn(bent, pair.in_model)});
+  Alignment alignment;
+  ApplyChange(AlignEdit(scene, "helmet", moved, &alignment), &scene);
+  for (const double residual : alignment.residuals) EXPECT_LT(residual, 1e-9);
+  for (const Correspondence& pair : moved)
+    EXPECT_LT((drawn(scene.entities[0], pair.in_model) - pair.in_map).norm(), 1e-9);
+  const Scene read =
+      DecodeScene(EncodeScene(scene), "test", [](const std::string& id) { return AssetNamed(id); });
+  EXPECT_EQ(read.entities[0].model.warp->controls, scene.entities[0].model.warp->controls);
+  EXPECT_EQ(read.entities[0].model.warp->weights, scene.entities[0].model.warp->weights);
+  EXPECT_EQ(read.entities[0].model.warp->affine, scene.entities[0].model.warp->affine);
+  ApplyChange(AlignEdit(scene, "helmet", kCorners, nullptr), &scene);
+  ApplyChange(UnbendEdit(scene, "helmet"), &scene);
+  EXPECT_EQ(scene.entities[0].model.warp, nullptr);
+  EXPECT_THAT(ErrorOf([&] { UnbendEdit(scene, "helmet"); }), HasSubstr("is not bent"));
+  EXPECT_THAT(ErrorOf([&] { BendEdit(scene, "sign-1", kCorners); }), HasSubstr("is a signpost"));
+  EXPECT_THAT(ErrorOf([&] { AlignEdit(scene, "helmet", {}, nullptr); }), HasSubstr("At least three"));
+  EXPECT_NE(EncodeScene(scene), before);
 }
 
 TEST(Edits, CopiesHaveFreeNamesAndStandBesideTheirOriginals) {

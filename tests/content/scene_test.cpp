@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "content/scene_codec.h"
+#include "content/warp.h"
 #include "engine/base/random.h"
 #include "tests/support/error_of.h"
 
@@ -109,6 +110,15 @@ TEST(SceneCodec, InvalidMembersAreRejectedWithTheirLocation) {
   EXPECT_THAT(with("/entities/0/map_from_model/rotation_xyzw", {0, 0, 0, 0}), HasSubstr("length 1"));
   EXPECT_THAT(with("/entities/0/map_from_model/translation_m", {0, 0}), HasSubstr("list of 3 numbers"));
   EXPECT_THAT(with("/entities/0/map_from_model/translation_m/1", 1e300), HasSubstr("range"));
+  nlohmann::json warp = {{"controls_m", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                         {"weights", {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}}},
+                         {"affine", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}}};
+  EXPECT_EQ(with("/entities/0/warp", warp), "");
+  warp["weights"].erase(0);
+  EXPECT_THAT(with("/entities/0/warp", warp), HasSubstr("entities[0].warp"));
+  warp["weights"][2][0] = 1e300;
+  EXPECT_THAT(with("/entities/0/warp", warp), HasSubstr("entities[0].warp.weights"));
+  EXPECT_THAT(with("/entities/0/warp", nullptr), HasSubstr("entities[0].warp"));
   EXPECT_THAT(with("/entities/0/surprise", 1), HasSubstr("'surprise'"));
   EXPECT_THAT(with("/entities/0/name", "sign \"1\""), HasSubstr("name of another entity"));
   EXPECT_THAT(with("/entities/0/name", ""), HasSubstr("empty name"));
@@ -238,6 +248,19 @@ TEST(SceneCodec, TheLargestScenesThatAreWrittenCanBeRead) {
   }
   ASSERT_EQ(Validate(scene), "");
   EXPECT_EQ(ErrorOfScene(EncodeScene(scene)), "");
+  // As many bent models as there can be, with numbers of full length.
+  Warp warp;
+  warp.controls.assign(kMinWarpPoints, {-1.0 / 3e5, 123456.78901234567, -1e-300});
+  warp.weights = warp.controls;
+  warp.affine.setConstant(-1.0 / 3e5);
+  const Scene straight = scene;
+  for (std::size_t i = 0; i < kMaxSceneWarpPoints / kMinWarpPoints; ++i)
+    scene.entities[i].model.warp = std::make_shared<Warp>(warp);
+  ASSERT_EQ(Validate(scene), "");
+  EXPECT_EQ(ErrorOfScene(EncodeScene(scene)), "");
+  scene.entities.back().model.warp = std::make_shared<Warp>(warp);
+  EXPECT_THAT(Validate(scene), HasSubstr("at most 50000 points"));
+  scene = straight;
   scene.entities.push_back(model);
   scene.entities.back().name = "one more";
   EXPECT_THAT(Validate(scene), HasSubstr("at most 50000"));

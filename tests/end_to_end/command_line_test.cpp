@@ -57,6 +57,7 @@ TEST(CommandLine, HelpShowsAnExampleForEverySubcommand) {
       {"content", "list"},
       {"content", "add"},
       {"content", "import"},
+      {"content", "edit"},
       {"content", "remove"},
   };
   for (std::vector<std::string> command : commands) {
@@ -202,6 +203,83 @@ TEST(CommandLine, HandlesAnEmptyLibrary) {
   ExpectErrorLine({"content", "remove", "sign-1", "--map", "Desk", "--library", path}, 1, "Desk");
 }
 
+TEST(CommandLine, EditsTheContentOfASavedMap) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "museum.docent").string();
+  const std::vector<std::uint8_t> glb = MakeExhibitGlb();
+  const std::string model = folder.Write("exhibit.glb", {glb.begin(), glb.end()}).string();
+  std::uint64_t kiosk = 0;
+  {
+    maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    for (const char* name : {"Desk", "Kiosk"}) {
+      kiosk = library.NewKey();
+      library.Save({kiosk, name, maps::Policy::kOpen, nullptr, nullptr});
+    }
+  }
+  const auto run = [&](const std::string& verb, std::vector<std::string> more) {
+    more.insert(more.begin(), {"content", verb, "--library", path, "--map", "Desk"});
+    return more;
+  };
+  ASSERT_EQ(RunDocent(run("add", {model, "--at", "1", "2", "3"})).exit_status, 0);
+  ASSERT_EQ(RunDocent(run("add", {"--signpost", "x", "--at", "0", "0", "2"})).exit_status, 0);
+  const auto edited = [&](const std::vector<std::string>& more) {
+    const Outcome outcome = RunDocent(run("edit", more));
+    EXPECT_EQ(outcome.exit_status, 0) << outcome.errors;
+    const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
+    EXPECT_THAT(library.Verify(), IsEmpty());
+    AssetCache assets;
+    return SceneFromRecord(library.LoadScene(library.FindByName("Desk").key), "Desk", &assets);
+  };
+  content::Scene scene =
+      edited({"exhibit", "--move", "-1", "0.5", "0", "--scale", "2", "--rotate", "180", "--lock"});
+  const engine::Sim3 pose = scene.Find("exhibit")->model.map_from_model;
+  EXPECT_LT((pose.translation - Eigen::Vector3d(0, 2.5, 3)).norm(), 1e-12);
+  EXPECT_DOUBLE_EQ(pose.scale, 2);
+  // At yaw 0 the front faces -z; half a turn makes it +z.
+  EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
+  EXPECT_TRUE(scene.Find("exhibit")->locked);
+  ExpectErrorLine(run("edit", {"exhibit", "--hide"}), 1, "'exhibit' is locked; unlock it to change it.");
+  EXPECT_THAT(RunDocent({"content", "list", "--library", path}).output, HasSubstr("(locked)"));
+
+  scene = edited({"exhibit", "sign-1", "--duplicate"});
+  EXPECT_EQ(scene.entities.size(), 4u);
+  scene = edited({"exhibit", "exhibit-2", "--unlock", "--group", "pair", "--hide"});
+  EXPECT_TRUE(scene.Find("exhibit-2")->hidden);
+  EXPECT_EQ(scene.Find("exhibit")->group, "pair");
+  scene = edited({"exhibit", "exhibit-2", "--ungroup", "--show"});
+  EXPECT_FALSE(scene.Find("exhibit-2")->hidden);
+  EXPECT_EQ(scene.Find("exhibit")->group, "");
+  scene = edited({"sign-1", "--text", "To the kiosk", "--to", "Kiosk", "--rename", "kiosk sign"});
+  EXPECT_EQ(scene.Find("kiosk sign")->signpost.text, "To the kiosk");
+  EXPECT_EQ(scene.Find("kiosk sign")->signpost.to_key, kiosk);
+  scene = edited({"kiosk sign", "--to-nowhere", "--transform", "1", "2", "3", "0", "0", "0", "1", "0.5"});
+  EXPECT_EQ(scene.Find("kiosk sign")->signpost.to_map, "");
+  EXPECT_EQ(scene.Find("kiosk sign")->signpost.anchor, Eigen::Vector3d(1, 2, 3));
+  scene = edited({"exhibit", "--align", "0 0 0 to 5 0 0, 1 0 0 to 8 0 0, 0 1 0 to 5 3 0"});
+  EXPECT_NEAR(scene.Find("exhibit")->model.map_from_model.scale, 3, 1e-9);
+  EXPECT_LT((content::PlaceOf(*scene.Find("exhibit")) - Eigen::Vector3d(5, 0, 0)).norm(), 1e-9);
+  const std::string corners = "0 0 0 to 5 0 0, 1 0 0 to 8 0 1, 0 1 0 to 5 3 0, 0 0 1 to 5 0 3";
+  EXPECT_NE(edited({"exhibit", "--bend", corners}).Find("exhibit")->model.warp, nullptr);
+  EXPECT_EQ(edited({"exhibit", "--unbend"}).Find("exhibit")->model.warp, nullptr);
+
+  const std::string before = RunDocent({"content", "list", "--json", "--library", path}).output;
+  ExpectErrorLine(run("edit", {"exhibit"}), 1, "No change is given");
+  ExpectErrorLine(run("edit", {"fox", "--hide"}), 1, "no 'fox'");
+  ExpectErrorLine(run("edit", {"exhibit", "--text", "x"}), 1, "is a model");
+  ExpectErrorLine(run("edit", {"exhibit", "exhibit-2", "--rename", "x"}), 1, "not several");
+  ExpectErrorLine(run("edit", {"kiosk sign", "--to", "Desk"}), 1, "its own map");
+  ExpectErrorLine(run("edit", {"kiosk sign", "--to", "Attic"}), 1, "Attic");
+  ExpectErrorLine(run("edit", {"exhibit", "--scale", "0"}), 2, "--scale");
+  ExpectErrorLine(run("edit", {"exhibit", "--align", "0 0 0 to 1 1 1"}), 1, "at least 3 points");
+  ExpectErrorLine(run("edit", {"exhibit", "--align", "0 0 0 to pixel 1 1, 1 0 0 to 1 0 0, 0 1 0 to 1 1 0"}),
+                  1, "no image");
+  ExpectErrorLine(run("edit", {"exhibit", "--bend", corners + "\n0 map stop"}), 1, "--bend");
+  // What cannot be carried out as a whole changes nothing.
+  ExpectErrorLine(run("edit", {"exhibit", "--move", "1", "0", "0", "--unbend"}), 1, "is not bent");
+  ExpectErrorLine(run("edit", {"exhibit", "--move", "1", "0", "0", "--rename", "exhibit-2"}), 1, "already");
+  EXPECT_EQ(RunDocent({"content", "list", "--json", "--library", path}).output, before);
+}
+
 TEST(CommandLine, AddsModelsAndSignpostsToASavedMap) {
   const TemporaryFolder folder;
   const std::string path = (folder / "museum.docent").string();
@@ -273,12 +351,16 @@ TEST(CommandLine, AddsModelsAndSignpostsToASavedMap) {
   ExpectErrorLine(arguments({"--at", "0", "0", "0"}), 2, "FILE or --signpost TEXT");
   EXPECT_EQ(list_content(), before);
 
+  ExpectErrorLine(arguments({"--signpost", "x", "--at", "0", "0", "0", "--to", "Desk"}), 1, "its own map");
+  EXPECT_EQ(list_content(), before);
+
   EXPECT_EQ(RunDocent({"maps", "policy", "Desk", "read-only", "--library", path}).exit_status, 0);
   ExpectErrorLine(arguments({model, "--at", "0", "0", "0"}), 1, "read-only");
   EXPECT_EQ(RunDocent({"maps", "policy", "Desk", "augment-only", "--library", path}).exit_status, 0);
-  for (const char* name : {"exhibit", "exhibit-2", "obelisk"}) {
-    EXPECT_EQ(RunDocent({"content", "remove", name, "--map", "Desk", "--library", path}).exit_status, 0);
-  }
+  EXPECT_EQ(RunDocent({"content", "remove", "exhibit", "--map", "Desk", "--library", path}).exit_status, 0);
+  EXPECT_EQ(RunDocent({"content", "remove", "exhibit-2", "obelisk", "--map", "Desk", "--library", path})
+                .exit_status,
+            0);
   ExpectErrorLine({"content", "remove", "exhibit", "--map", "Desk", "--library", path}, 1, "no 'exhibit'");
   const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
   EXPECT_TRUE(library.LoadScene(library.FindByName("Desk").key).assets.empty());

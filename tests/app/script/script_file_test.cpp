@@ -40,10 +40,13 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "14 ungroup hat\n"
       "14 paste hat \"from\" from \"Desk 3\"\n"
       "14 paste hat from Desk at pixel 3 4\n"
+      "15 align hat 0 0 0 to pixel 1 2, 1 0 0 to 3 4 5 , 0 1 0 to pixel 6 7\n"
+      "15 bend hat 0 0 0 to 0 0 0, 1 0 0 to 1 0 0, 0 1 0 to 0 1 0, 0 0 1 to 0 0 1.5\n"
+      "15 unbend hat\n"
       "15 map rename Desk Bureau\n"
       "16 map remove Bureau\n",
       "script");
-  ASSERT_EQ(commands.size(), 32u);
+  ASSERT_EQ(commands.size(), 35u);
   EXPECT_EQ(commands[0].command, Command(NewMap{"Desk 3"}));
   EXPECT_EQ(commands[0].line, 2);
   EXPECT_EQ(commands[1].time, std::chrono::milliseconds(1500));
@@ -80,6 +83,16 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
                                      GroupEntities{{"hat"}, ""},
                                      PasteEntities{{"hat", "from"}, "Desk 3", std::nullopt},
                                      PasteEntities{Names{"hat"}, "Desk", Eigen::Vector2d(3, 4)},
+                                     AlignEntity{"hat",
+                                                 {{{0, 0, 0}, {0, 0, 0}, Eigen::Vector2d(1, 2)},
+                                                  {{1, 0, 0}, {3, 4, 5}, std::nullopt},
+                                                  {{0, 1, 0}, {0, 0, 0}, Eigen::Vector2d(6, 7)}}},
+                                     BendEntity{"hat",
+                                                {{{0, 0, 0}, {0, 0, 0}, std::nullopt},
+                                                 {{1, 0, 0}, {1, 0, 0}, std::nullopt},
+                                                 {{0, 1, 0}, {0, 1, 0}, std::nullopt},
+                                                 {{0, 0, 1}, {0, 0, 1.5}, std::nullopt}}},
+                                     UnbendEntity{"hat"},
                                      RenameMap{"Desk", "Bureau"},
                                      RemoveMap{"Bureau"}};
   for (std::size_t i = 0; i < rest.size(); ++i) EXPECT_EQ(commands[15 + i].command, rest[i]) << i;
@@ -164,7 +177,20 @@ Command AnyCommand(Random* random) {
     while (random->Uniform() < 0.7) some.push_back(text());
     return some;
   };
-  switch (random->Below(23)) {
+  const auto pairs = [&] {
+    std::vector<PointPair> some;
+    while (random->Uniform() < 0.8) {
+      PointPair& pair = some.emplace_back();
+      pair.in_model = {number(), number(), number()};
+      if (random->Below(2) == 0) {
+        pair.pixel = pixel();
+      } else {
+        pair.in_map = {number(), number(), number()};
+      }
+    }
+    return some;
+  };
+  switch (random->Below(26)) {
     case 0:
       return NewMap{text()};
     case 1:
@@ -217,6 +243,12 @@ Command AnyCommand(Random* random) {
       return RenameMap{text(), text()};
     case 22:
       return RemoveMap{text()};
+    case 23:
+      return AlignEntity{text(), pairs()};
+    case 24:
+      return BendEntity{text(), pairs()};
+    case 25:
+      return UnbendEntity{text()};
     default:
       return random->Below(2) == 0 ? Command(Redo{}) : Command(Save{});
   }
@@ -325,6 +357,16 @@ TEST(Script, NamesTheLineOfAnInvalidCommand) {
                            "1 paste from Desk",
                            "1 paste a from Desk at 1 2",
                            "1 map rename a",
+                           "1 align a",
+                           "1 align a 0 0 0 to 1 2",
+                           "1 align a 0 0 0 to 1 2 3, 0 0 1 to 1 2 3",
+                           "1 align a 0 0 0 to 1 2 3, 0 0 1 to 1 2 3,",
+                           "1 align a 0 0 0 to 1 2 3 0 0 1 to 1 2 3 0 1 0 to 1 1 1",
+                           "1 align a 0 0 0 to 1 2 3, 0 0 1 to 1 2 3, 0 1 0 to pixel 1 1e9",
+                           "1 align a 0 0 0 to 1 2 3, 0 0 1 to 1 2 3, 0 1 1e300 to 1 1 1",
+                           "1 bend a 0 0 0 to 1 2 3, 0 0 1 to 1 2 3, 0 1 0 to 1 1 1",
+                           "1 unbend",
+                           "1 unbend a b",
                            "1 map rename a \"\"",
                            "1 map remove",
                            "1 undo all",

@@ -211,7 +211,7 @@ class AbsurdEdits : public ::testing::Test {
 TEST_F(AbsurdEdits, NeverMakeALibraryUnreadable) {
   ASSERT_TRUE(engine::HasPose(frame_.state));
   const char* const wanted = std::getenv("DOCENT_EDIT_SCRIPTS");
-  const int scripts = wanted ? std::atoi(wanted) : 200;
+  const int scripts = wanted ? std::atoi(wanted) : 80;
   constexpr int kScriptsPerLibrary = 8;
   int accepted = 0;
   for (int i = 0; i < scripts; ++i) {

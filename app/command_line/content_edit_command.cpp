@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/content_edit_command.h"
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "app/command_line/number_option.h"
+#include "app/command_line/stored_scene.h"
+#include "app/script/scene_commands.h"
+#include "app/script/script_file.h"
+#include "app/session/library_scene.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+struct EditOptions {
+  std::filesystem::path library;
+  std::string map;
+  std::vector<std::string> names;
+  bool lock = false, unlock = false, hide = false, show = false, ungroup = false, unbend = false;
+  bool duplicate = false, nowhere = false;
+  std::optional<Eigen::Vector3d> move;
+  std::optional<double> rotate_deg, scale;
+  std::optional<engine::Sim3> transform;
+  std::string text, to_map, rename, group, align, bend;
+
+  // With a value for one entity only.
+  bool NamesOne() const {
+    return transform || !text.empty() || !rename.empty() || !align.empty() || !bend.empty();
+  }
+};
+
+// The pairs of `--align` and `--bend`, which have the form of the script commands `align` and `bend`.
+Command WithPairs(const std::string& verb, const std::string& name, const std::string& pairs) {
+  const std::string option = "--" + verb;
+  const std::string quoted = FormatCommand(UnbendEntity{name}).substr(std::string("unbend ").size());
+  const auto parsed = ParseScript("0 " + verb + ' ' + quoted + ' ' + pairs, option);
+  if (parsed.size() != 1) throw Error(option + ": expected one list of points.");
+  return parsed.front().command;
+}
+
+// The commands that the options stand for, in the order in which they are carried out: first what makes other
+// changes possible, last what makes them impossible or changes names.
+std::vector<Command> CommandsFor(const EditOptions& options) {
+  using content::EntityFlag;
+  std::vector<Command> commands;
+  const auto& names = options.names;
+  if (options.unlock) commands.emplace_back(SetEntityFlag{names, EntityFlag::kLocked, false});
+  if (options.duplicate) commands.emplace_back(DuplicateEntities{names});
+  for (const std::string& name : names) {
+    if (options.unbend) commands.emplace_back(UnbendEntity{name});
+    if (options.transform) commands.emplace_back(TransformEntity{name, *options.transform});
+    if (!options.align.empty()) commands.push_back(WithPairs("align", name, options.align));
+    if (!options.bend.empty()) commands.push_back(WithPairs("bend", name, options.bend));
+    if (options.scale) commands.emplace_back(ScaleEntity{name, *options.scale});
+    if (options.rotate_deg) commands.emplace_back(RotateEntity{name, *options.rotate_deg});
+    if (options.move) commands.emplace_back(MoveEntity{name, *options.move, std::nullopt});
+    if (!options.text.empty()) commands.emplace_back(SetEntityText{name, options.text});
+    if (options.nowhere || !options.to_map.empty())
+      commands.emplace_back(SetSignpostTarget{name, options.to_map});
+  }
+  if (options.ungroup) commands.emplace_back(GroupEntities{names, ""});
+  if (!options.group.empty()) commands.emplace_back(GroupEntities{names, options.group});
+  if (options.hide) commands.emplace_back(SetEntityFlag{names, EntityFlag::kHidden, true});
+  if (options.show) commands.emplace_back(SetEntityFlag{names, EntityFlag::kHidden, false});
+  if (options.lock) commands.emplace_back(SetEntityFlag{names, EntityFlag::kLocked, true});
+  // Last: a locked entity keeps its name, so the two cannot be combined.
+  if (!options.rename.empty()) commands.emplace_back(RenameEntity{names.front(), options.rename});
+  return commands;
+}
+
+std::vector<content::Correspondence> WithoutPixels(const std::vector<PointPair>& pairs) {
+  std::vector<content::Correspondence> correspondences;
+  for (const PointPair& pair : pairs) {
+    if (pair.pixel) throw Error("a saved map has no image with this pixel; give X Y Z in the map instead.");
+    correspondences.push_back({pair.in_model, pair.in_map});
+  }
+  return correspondences;
+}
+
+// Turns commands into edits of a stored scene.
+class StoredEdits {
+ public:
+  StoredEdits(const maps::Library& library, const maps::MapInfo& map) : library_(library), map_(map) {}
+
+  content::SceneChange operator()(const content::Scene& scene, const SceneCommand auto& command) const {
+    return EditFor(scene, command);
+  }
+  content::SceneChange operator()(const content::Scene& scene, const SetSignpostTarget& command) const {
+    const std::uint64_t key = command.to_map.empty() ? 0 : library_.FindByName(command.to_map).key;
+    if (key == map_.key) throw Error("a signpost cannot lead to its own map.");
+    return content::TargetEdit(scene, command.name, command.to_map, key);
+  }
+  content::SceneChange operator()(const content::Scene& scene, const AlignEntity& command) const {
+    return content::AlignEdit(scene, command.name, WithoutPixels(command.pairs), nullptr);
+  }
+  content::SceneChange operator()(const content::Scene& scene, const BendEntity& command) const {
+    return content::BendEdit(scene, command.name, WithoutPixels(command.pairs));
+  }
+  content::SceneChange operator()(const content::Scene&, const auto&) const {
+    throw Error("this command needs a camera.");
+  }
+
+ private:
+  const maps::Library& library_;
+  const maps::MapInfo& map_;
+};
+
+void RunEdit(const EditOptions& options) {
+  if (options.NamesOne() && options.names.size() > 1)
+    throw Error(
+        "--transform, --align, --bend, --text and --rename change one model or signpost, not several.");
+  const std::vector<Command> commands = CommandsFor(options);
+  if (commands.empty()) throw Error("No change is given; see docent content edit --help.");
+  for (const Command& command : commands) {
+    if (const std::string problem = Validate(command); !problem.empty())
+      throw Error(FormatCommand(command) + ": " + problem + ".");
+  }
+  maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
+  const maps::MapInfo map = library.FindByName(options.map);
+  const StoredEdits edit_for(library, map);
+  std::vector<MakeEdit> edits;
+  for (const Command& command : commands) {
+    edits.emplace_back([&](const content::Scene& scene) {
+      return std::visit([&](const auto& chosen) { return edit_for(scene, chosen); }, command);
+    });
+  }
+  EditStoredScene(&library, map, edits, ModelsNeeded::kYes);
+}
+
+void AddPoseOptions(CLI::App* edit, EditOptions* options) {
+  constexpr double kMost = content::kMaxCoordinate;
+  AddNumbers(
+      edit, "--move", 3, -2 * kMost, 2 * kMost,
+      [=](const auto& n) { options->move = Eigen::Vector3d(n[0], n[1], n[2]); },
+      "Move by this offset along the map's axes, in map units")
+      ->type_name("X Y Z");
+  AddNumbers(
+      edit, "--rotate", 1, -content::kMaxAngle_deg, content::kMaxAngle_deg,
+      [=](const auto& n) { options->rotate_deg = n[0]; },
+      "Rotate about the up axis through the base, counter-clockwise seen from above")
+      ->type_name("DEG");
+  AddNumbers(
+      edit, "--scale", 1, 1e-18, 1e18, [=](const auto& n) { options->scale = n[0]; },
+      "Multiply the size; the base stays where it is")
+      ->type_name("FACTOR");
+  AddNumbers(
+      edit, "--transform", 8, -1e9, 1e9,
+      [=](const auto& n) {
+        const Eigen::Quaterniond rotation(n[6], n[3], n[4], n[5]);
+        if (std::abs(rotation.norm() - 1) > 1e-3)
+          throw CLI::ValidationError("--transform", "the quaternion does not have length 1");
+        options->transform = engine::Sim3{engine::Rotation3(rotation), {n[0], n[1], n[2]}, n[7]};
+      },
+      "Give a model this place, rotation (a quaternion) and scale; a signpost gets the place, and the scale "
+      "as its height")
+      ->type_name("X Y Z QX QY QZ QW S");
+  edit->add_option("--align", options->align,
+                   "Give a model the pose that fits three or more points of it with their places in the map")
+      ->type_name("\"X Y Z to X Y Z, ...\"");
+  edit->add_option("--bend", options->bend,
+                   "Bend a model so that four or more points of it are at their places in the map")
+      ->type_name("\"X Y Z to X Y Z, ...\"");
+  edit->add_flag("--unbend", options->unbend, "Give a model its original shape again");
+}
+
+void AddPropertyOptions(CLI::App* edit, EditOptions* options) {
+  edit->add_option("--text", options->text, "Change the text of a signpost")->type_name("TEXT");
+  CLI::Option* to = edit->add_option("--to", options->to_map, "Let a signpost lead to this map");
+  to->type_name("MAP");
+  edit->add_flag("--to-nowhere", options->nowhere, "Let a signpost lead to no map")->excludes(to);
+  edit->add_option("--rename", options->rename, "Change the name")->type_name("NEW");
+  CLI::Option* group = edit->add_option("--group", options->group, "Put them in this group");
+  group->type_name("GROUP");
+  edit->add_flag("--ungroup", options->ungroup, "Take them out of their groups")->excludes(group);
+  CLI::Option* hide = edit->add_flag("--hide", options->hide, "Do not draw them");
+  edit->add_flag("--show", options->show, "Draw them again")->excludes(hide);
+  edit->add_flag("--lock", options->lock, "Refuse every change but --unlock");
+  edit->add_flag("--unlock", options->unlock, "Allow changes again; before the other changes");
+  edit->add_flag("--duplicate", options->duplicate, "Add a copy of each beside it; before the other changes");
+}
+
+}  // namespace
+
+void AddContentEditCommand(CLI::App* group, Invocation* invocation) {
+  const auto options = std::make_shared<EditOptions>();
+  CLI::App* edit = AddSubcommand(
+      group, "edit", "Change models and signposts",
+      "docent content edit fox --map \"Desk 3\" --move 0 0 0.1 --scale 2 --library museum.docent\n"
+      "  docent content edit sign-1 --map \"Desk 3\" --text \"Lions\" --to \"Desk 5\" "
+      "--library museum.docent");
+  edit->add_option("NAME", options->names, "Names of the models and signposts")->required();
+  edit->add_option("--map", options->map, "The map that contains them")->required();
+  edit->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+  AddPoseOptions(edit, options.get());
+  AddPropertyOptions(edit, options.get());
+  edit->callback([=] { invocation->run = [=] { RunEdit(*options); }; });
+}
+
+}  // namespace docent::app

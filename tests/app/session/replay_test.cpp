@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+// Records every command of a session as a script, and replays the script in another one.
+#include <gmock/gmock.h>
+
+#include <set>
+
+#include "app/demo/exhibit_model.h"
+#include "app/script/script_file.h"
+#include "tests/app/support/simulated_session.h"
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using namespace simulated_session;
+using ::testing::IsEmpty;
+
+struct Planned {
+  double seconds;
+  Command command;
+};
+
+// Every command. The first map is built for two seconds, then the second one.
+std::vector<Planned> EveryCommand() {
+  using enum content::EntityFlag;
+  const Eigen::Vector2d pixel(320, 290), other(300, 300);
+  const engine::Sim3 pose{engine::Rotation3::Exp({0.1, 0.2, 0.3}), {1.0 / 3, -0.1, 2}, 0.7};
+  const std::vector<PointPair> pairs = {{{0, 0, 0}, {0, 0, 0}, pixel},
+                                        {{1, 0, 0}, {0.5, 0.01, 2}, std::nullopt},
+                                        {{0, 1, 0}, {0.02, 0.5, 2}, std::nullopt},
+                                        {{0, 0, 1}, {0, 0.03, 2.5}, std::nullopt},
+                                        {{1, 1, 1}, {0.5, 0.5, 2.6}, std::nullopt}};
+  std::vector<Planned> plan = {{0, NewMap{"First hall"}}};
+  double seconds = 2;
+  const auto then = [&](Command command) {
+    plan.push_back({seconds, std::move(command)});
+    seconds += 0.01;  // Several commands come with one image.
+  };
+  then(PlaceModel{"exhibit.glb", pixel, std::nullopt, 1.0 / 3});
+  then(PlaceModel{"exhibit.glb", other, 0.1, 0});
+  then(PlaceSignpost{"two\nlines # of \"text\"", other, ""});
+  then(MoveEntity{"exhibit", {0.1 / 3, 0, 0}, std::nullopt});
+  then(MoveEntity{"exhibit", {0, 0, 0}, other});
+  then(RotateEntity{"exhibit", 10.0 / 3});
+  then(ScaleEntity{"exhibit", 1.0 / 0.7});
+  then(TransformEntity{"exhibit-2", pose});
+  then(AlignEntity{"exhibit", pairs});
+  then(BendEntity{"exhibit-2", pairs});
+  then(DuplicateEntities{{"exhibit-2", "sign-1"}});
+  then(UnbendEntity{"exhibit-2"});
+  then(RenameEntity{"exhibit", "from"});
+  then(SetEntityText{"sign-2", "ähnlich"});
+  then(SetEntityFlag{{"from", "sign-2"}, kLocked, true});
+  then(SetEntityFlag{{"from"}, kLocked, false});
+  then(SetEntityFlag{{"sign-1"}, kHidden, true});
+  then(GroupEntities{{"from", "sign-1"}, "a group"});
+  then(PasteEntities{{"from"}, "First hall", pixel});
+  then(RemoveEntities{{"exhibit-2"}});
+  then(Undo{});
+  then(Redo{});
+  then(SetPolicy{"First hall", maps::Policy::kAugmentOnly});
+  then(SetPolicy{"First hall", maps::Policy::kOpen});
+  then(Save{});
+  then(StopMap{});
+  plan.push_back({2.4, NewMap{"Second hall"}});
+  seconds = 4.4;
+  then(PlaceSignpost{"back", pixel, "First hall"});
+  then(SetSignpostTarget{"sign-1", ""});
+  then(SetSignpostTarget{"sign-1", "First hall"});
+  then(PasteEntities{{"from", "sign-2"}, "First hall", std::nullopt});
+  then(RenameMap{"First hall", "Old hall"});
+  then(UseMap{"Second hall"});
+  plan.push_back({4.9, RemoveMap{"Old hall"}});
+  return plan;
+}
+
+struct Recorded {
+  std::string script;
+  std::vector<std::string> maps;  // Name and scene of each map in the library.
+  std::vector<std::string> refused;
+};
+
+class Replay : public ::testing::Test {
+ protected:
+  Replay() {
+    const std::vector<std::uint8_t> glb = MakeExhibitGlb();
+    folder_.Write("exhibit.glb", {glb.begin(), glb.end()});
+  }
+
+  // Runs a session in lockstep with a script, and with commands from a window.
+  Recorded Run(const std::string& file, const std::vector<Planned>& plan, std::vector<TimedCommand> script) {
+    const auto simulation = Room(5);
+    maps::Library library =
+        maps::Library::Open(folder_ / file, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    Session session(Options(Pace::kLockstep, ""), LensOf(*simulation), &library);
+    CalibratedCamera camera = CameraOf(simulation);
+    CommandInbox inbox;
+    Recorded recorded;
+    FrameLoopOptions loop;
+    loop.pace = Pace::kLockstep;
+    loop.script = std::move(script);
+    loop.model_folder = folder_.path();
+    loop.inbox = &inbox;
+    loop.carried_out = [&](const TimedCommand& command) {
+      recorded.script += FormatScriptLine(command) + '\n';
+    };
+    loop.refused = [&](const std::string& error) { recorded.refused.push_back(error); };
+    std::size_t next = 0;
+    std::optional<Timestamp> first;
+    RunFrames(&camera, &session, loop,
+              [&](const engine::TrackedFrame& frame) {
+                if (!first) first = frame.frame.time;
+                for (; next < plan.size() && frame.frame.time - *first >= FromSeconds(plan[next].seconds);
+                     ++next)
+                  inbox.Push({plan[next].command, nullptr});
+              },
+              {});
+    session.Finish();
+    EXPECT_EQ(next, plan.size());
+    for (const maps::MapInfo& map : library.List())
+      recorded.maps.push_back(map.name + ": " + library.LoadScene(map.key).text);
+    EXPECT_THAT(library.Verify(), IsEmpty());
+    return recorded;
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(Replay, OfARecordedScriptGivesTheSameBytesOfEveryScene) {
+  std::vector<Planned> plan = EveryCommand();
+  std::set<std::size_t> kinds;
+  for (const Planned& planned : plan) kinds.insert(planned.command.index());
+  EXPECT_EQ(kinds.size(), std::variant_size_v<Command>) << "a command is not tested";
+  const Recorded removed = Run("removed.docent", plan, {});
+  EXPECT_THAT(removed.refused, IsEmpty());
+  ASSERT_EQ(removed.maps.size(), 1u) << "the other map was removed";
+  EXPECT_THAT(removed.maps[0], testing::HasSubstr("\"from\""));
+  EXPECT_EQ(Run("removed2.docent", {}, ParseScript(removed.script, "script")).maps, removed.maps);
+
+  plan.pop_back();  // The first map stays.
+  const Recorded first = Run("a.docent", plan, {});
+  EXPECT_THAT(first.refused, IsEmpty());
+  ASSERT_EQ(first.maps.size(), 2u);
+  const Recorded second = Run("b.docent", {}, ParseScript(first.script, "script"));
+  EXPECT_EQ(second.maps, first.maps);
+  EXPECT_EQ(second.script, first.script) << "a replayed script is recorded as it was";
+}
+
+}  // namespace
+}  // namespace docent::app
