@@ -67,9 +67,10 @@ class Library {
   std::vector<MapInfo> List() const;
   MapInfo Find(std::uint64_t key) const;              // Throws if there is no such map.
   MapInfo FindByName(const std::string& name) const;  // Throws if there is no such map.
+  // What Load does with content that is damaged.
+  enum class DamagedContent { kRefuse, kLeaveOut };
   // Reads a map with points and images and computes the features of its keyframes. Throws if there is no such
   // map or it is damaged; damaged content may be left out instead.
-  enum class DamagedContent { kRefuse, kLeaveOut };
   StoredMap Load(std::uint64_t key, DamagedContent damaged = DamagedContent::kRefuse) const;
   // Reads the content of a map only. Throws as Load does.
   SceneRecord LoadScene(std::uint64_t key) const;

@@ -14,9 +14,10 @@ namespace docent::maps {
 // The map that a signpost leads to: its key, 0 if it was written without one, and the name that it had. Both
 // are empty for a signpost that leads nowhere.
 struct SignpostTarget {
-  std::uint64_t key = 0;
-  std::string map;
+  std::uint64_t key = 0;  // Of the map.
+  std::string map;        // Its name.
 
+  // Whether both fields are equal.
   bool operator==(const SignpostTarget& other) const = default;
 };
 
