@@ -94,7 +94,7 @@ class Session {
     std::shared_ptr<const content::Scene> scene;
     std::optional<MappingStatus> mapping;  // only where the session may write
     std::string advice;                    // a sentence about the frame's camera; often empty
-    std::string hint;  // what to do so that the camera is tracked, as one sentence; often empty
+    std::string hint;          // what to do so that the camera is tracked, as one sentence; often empty
     std::string starting_map;  // the map that is being initialized; empty once it has points, and for none
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
