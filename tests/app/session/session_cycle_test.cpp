@@ -22,13 +22,13 @@ RenderedWalk ShortWalk() {
   return {"hand", options};
 }
 
-maps::Library OpenLibrary(const std::filesystem::path& path) {
+maps::Library OpenForWriting(const std::filesystem::path& path) {
   return maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
 }
 
 // Builds the map "table" and saves it.
 void BuildTable(const RenderedWalk& walk, const std::filesystem::path& path) {
-  maps::Library library = OpenLibrary(path);
+  maps::Library library = OpenForWriting(path);
   SessionOptions options;
   options.threaded = false;
   options.first_map = "table";
@@ -42,11 +42,11 @@ TEST(SessionCycle, StartsLoadsLeavesAndEndsTwoHundredTimes) {
   const std::filesystem::path path = folder / "l.docent";
   const RenderedWalk walk = ShortWalk();
   BuildTable(walk, path);
-  const std::uint64_t built = OpenLibrary(path).FindByName("table").keyframes;
+  const std::uint64_t built = OpenForWriting(path).FindByName("table").keyframes;
   ASSERT_GT(built, 1u);
   int posed = 0;
   for (int cycle = 0; cycle < kCycles; ++cycle) {
-    maps::Library library = OpenLibrary(path);
+    maps::Library library = OpenForWriting(path);
     SessionOptions options;
     options.tracker.hybrid = cycle % 2 == 0;
     options.may_write = cycle % 5 != 4;
@@ -74,7 +74,7 @@ TEST(SessionCycle, StartsLoadsLeavesAndEndsTwoHundredTimes) {
     if (cycle % 3 != 0) session.Finish();  // otherwise the destructor does
   }
   EXPECT_GT(posed, kCycles);
-  maps::Library library = OpenLibrary(path);
+  maps::Library library = OpenForWriting(path);
   EXPECT_THAT(library.Verify(), ::testing::IsEmpty());
   EXPECT_GE(library.FindByName("table").keyframes, built);
 }
