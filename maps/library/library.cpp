@@ -197,9 +197,11 @@ class Library::Impl {
     const MapParts parts = PartsOf(snapshot);
     info.bounds = record.bounds;
     if (info.policy == Policy::kBounded && !info.bounds) info.bounds = BoundsOf(parts);
+    // The images come last, because the file's end is lost first: a map can do without some of them.
     WriteStructure(snapshot, parts, {}, &info);
     WriteScene(record.key, record.scene ? *record.scene : SceneRecord{});
     if (record.history && !record.history->text.empty()) StoreHistory(*record.history, record.key);
+    WriteImages(database_, info.key, snapshot, parts.keyframes, {});
     WriteMapRow(database_, info);
   }
 
@@ -226,12 +228,12 @@ class Library::Impl {
     if (!MayChangeStructure(info->policy)) Refuse(info->policy, "its keyframes and points cannot be changed");
     if (info->policy == Policy::kBounded) CheckNewKeyFramesInside(*info, stored, wanted);
     WriteStructure(snapshot, wanted, stored.keyframes, info);
+    WriteImages(database_, info->key, snapshot, wanted.keyframes, stored.keyframes);
     return true;
   }
 
   void WriteStructure(const engine::MapSnapshot& snapshot, const MapParts& parts,
                       const std::vector<StoredKeyFrame>& stored_before, MapInfo* info) {
-    WriteImages(database_, info->key, snapshot, parts.keyframes, stored_before);
     WriteParts(database_, info->key, parts);
     WriteThumbnails(database_, info->key, MakeThumbnails(snapshot));
     WriteWords(database_, info->key,
@@ -305,7 +307,10 @@ class Library::Impl {
         "its signposts to '" + record.from.name + "' cannot point to '" + record.into.name + "' instead");
     MapInfo info = record.into;
     RemoveHistory(database_, info.key);  // It belongs to the scene before.
-    WriteStructure(*record.snapshot, PartsOf(*record.snapshot), ReadParts(database_, info).keyframes, &info);
+    const MapParts parts = PartsOf(*record.snapshot);
+    const std::vector<StoredKeyFrame> stored_before = ReadParts(database_, info).keyframes;
+    WriteStructure(*record.snapshot, parts, stored_before, &info);
+    WriteImages(database_, info.key, *record.snapshot, parts.keyframes, stored_before);
     WriteScene(info.key, *record.scene);
     info.policy = Stricter(record.into.policy, record.from.policy);
     info.bounds = record.bounds;
