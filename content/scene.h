@@ -17,12 +17,14 @@ namespace docent::content {
 
 // Limits of a scene: edits refuse what exceeds them, and scene_codec.h neither writes nor reads it. They are
 // far beyond any room that is measured in map units, and keep all arithmetic finite.
-inline constexpr double kMaxCoordinate = 1e6;                           // map units
-inline constexpr double kMinModelScale = 1e-9, kMaxModelScale = 1e9;    // map units per metre
-inline constexpr double kMinBoardHeight = 1e-6, kMaxBoardHeight = 1e6;  // map units
-inline constexpr double kMaxAngle_deg =
-    1e6;  // of a rotation; beyond it little of the angle is left of a double
-inline constexpr int kMaxAnimation = 1'000'000;
+inline constexpr double kMaxCoordinate = 1e6;    // map units
+inline constexpr double kMinModelScale = 1e-9;   // map units per metre
+inline constexpr double kMaxModelScale = 1e9;    // map units per metre
+inline constexpr double kMinBoardHeight = 1e-6;  // map units
+inline constexpr double kMaxBoardHeight = 1e6;   // map units
+// Of a rotation; beyond it little of the angle is left of a double.
+inline constexpr double kMaxAngle_deg = 1e6;
+inline constexpr int kMaxAnimation = 1'000'000;       // Index of an animation of a model.
 inline constexpr std::size_t kMaxTextBytes = 10'000;  // of each text and name
 // With the texts below, the encoded scene stays within LoadLimits.
 inline constexpr std::size_t kMaxEntities = 50'000;
@@ -106,6 +108,7 @@ std::string Validate(const Scene& scene);
 // Of an entity's names and texts, as kMaxSceneTextBytes counts them.
 std::size_t TextBytes(const Entity& entity);
 
+// Whether the bytes are valid UTF-8.
 bool IsUtf8(std::string_view text);
 // The beginning of a UTF-8 text that has at most max_bytes, which never ends within a character.
 std::string Shortened(const std::string& text, std::size_t max_bytes);

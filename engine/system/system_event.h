@@ -68,9 +68,9 @@ struct MapsJoined {
 };
 // Two maps were not joined; it is attempted again when they have more keyframes.
 struct JoinRefused {
-  std::uint64_t from = 0;  // key of the other map
-  JoinRefusal refusal = JoinRefusal::kNone;
-  MapOverlap overlap;  // what the comparison found; without candidates
+  std::uint64_t from = 0;                    // key of the other map
+  JoinRefusal refusal = JoinRefusal::kNone;  // why
+  MapOverlap overlap;                        // what the comparison found; without candidates
 };
 // The relative pose of the first two cameras became rigid, or is no longer rigid.
 struct RigChanged {

@@ -123,11 +123,12 @@ class Library {
   std::vector<std::string> Verify() const;
   // One sentence for each signpost that leads to a map that does not exist.
   std::vector<std::string> SignpostsToNoMap() const;
-  // The signposts in other maps that lead to this one.
+  // A signpost in a map.
   struct Signpost {
     MapInfo map;       // The map that it stands in.
     std::string name;  // Unique in that map.
   };
+  // The signposts in other maps that lead to this one.
   std::vector<Signpost> SignpostsTo(std::uint64_t key) const;
 
  private:

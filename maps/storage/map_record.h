@@ -34,8 +34,9 @@ struct SceneRecord {
   std::vector<AssetRecord> assets;  // Each once.
 };
 
-// Limits of the undo history of a map: its text, and the assets that nothing but this history uses.
+// Largest text of the undo history of a map.
 inline constexpr std::size_t kMaxHistoryTextBytes = std::size_t{1} << 20;
+// Largest size of the assets that nothing but the undo history of a map uses, together.
 inline constexpr std::size_t kMaxHistoryAssetBytes = std::size_t{64} << 20;
 
 // The input of one save.
