@@ -98,7 +98,7 @@ int main(int argc, char** argv) try {
       throw Error("An image cannot be written.");
   }
   system.Finish();
-  std::printf("drew over %d images with %s\n", drawn, context.DriverName().c_str());
+  std::printf("drew over %d images\n", drawn);
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 1;
