@@ -80,8 +80,9 @@ struct AuthoringChoices {
   double scale = 1.0, yaw_deg = 0.0;
   std::string sign_text, sign_to_map;
   bool show_points = false, show_keyframes = false, show_status = true;
-  bool from_above = false;  // The map from above instead of the image.
-  bool frozen = false;      // The image and its pose stay.
+  bool from_above = false;     // The map from above instead of the image.
+  bool show_coverage = false;  // A small map from above in a corner of the image.
+  bool frozen = false;         // The image and its pose stay.
   bool panel_open = true;
 };
 

@@ -202,6 +202,9 @@ void AuthoringPanel::DrawSignChoice(const AuthoringFacts& facts) {
 void AuthoringPanel::DrawView() {
   ImGui::Checkbox(strings::kFreeze, &choices_.frozen);
   ImGui::Checkbox(strings::kFromAbove, &choices_.from_above);
+  SameLineIfFits(strings::kCoverage);
+  ImGui::Checkbox(strings::kCoverage, &choices_.show_coverage);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", strings::kCoverageHelp);
   ImGui::Checkbox(strings::kMapPoints, &choices_.show_points);
   SameLineIfFits(strings::kKeyframes);
   ImGui::Checkbox(strings::kKeyframes, &choices_.show_keyframes);

@@ -184,6 +184,18 @@ void DrawMoveFigure(const Eigen::Vector2d& center, double radius, double seconds
   canvas->Disk(body, 0.16 * radius, Faded(kBeam, 0.5 + 0.3 * glide));
 }
 
+// A ring that fills clockwise from the top.
+void DrawProgressRing(const Eigen::Vector2d& center, double radius, double progress, Canvas* canvas) {
+  constexpr int kParts = 72;
+  const int filled = static_cast<int>(std::lround(kParts * std::clamp(progress, 0.0, 1.0)));
+  canvas->Disk(center, radius, Faded(kPanel, 0.8), 0.2 * radius);
+  for (int i = 0; i < filled; ++i) {
+    const double from = 2 * kPi * i / kParts - 0.5 * kPi, to = 2 * kPi * (i + 1) / kParts - 0.5 * kPi;
+    canvas->Line(OnCircle(center, radius, from), OnCircle(center, radius, to), 0.1 * radius,
+                 i + 1 == kParts ? kGood : kBeam);
+  }
+}
+
 // Draws a straight line of the map, distorted by the lens.
 void DrawMapLine(const Eigen::Vector3d& from_in_camera, const Eigen::Vector3d& to_in_camera,
                  const engine::CameraModel& camera, const Color& color, Canvas* canvas) {
@@ -258,7 +270,9 @@ void DrawHeadsUp(const View& view, const HeadsUpStyle& style, Canvas* canvas) {
   }
   const engine::TrackedFrame& tracked = *view.tracked;
   const bool lost = tracked.state == TrackingState::kLost;
-  const bool starting = tracked.state == TrackingState::kInitializing && !view.overlay.is_waiting;
+  // Without depth nothing can be placed yet, so the figure covers nothing that is needed.
+  const bool starting = (tracked.state == TrackingState::kInitializing && !view.overlay.is_waiting) ||
+                        (view.overlay.starting_progress && !lost);
   const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.5 * (canvas->height_px() - 1));
   const double radius = 0.11 * std::min(canvas->width_px(), canvas->height_px());
   if (lost) {
@@ -267,6 +281,8 @@ void DrawHeadsUp(const View& view, const HeadsUpStyle& style, Canvas* canvas) {
     DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
   } else if (starting) {
     DrawMoveFigure(middle, 0.7 * radius, view.animation_seconds, canvas);
+    if (view.overlay.starting_progress)
+      DrawProgressRing(middle, 1.8 * radius, *view.overlay.starting_progress, canvas);
   }
   if (view.overlay.status) DrawStatus(view, unit, canvas);
   const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;

@@ -83,6 +83,29 @@ class Drawing {
     }
   }
 
+  // A camera as a disk with a wedge in its viewing direction, of the same size wherever it is.
+  void Camera(const Orbit& orbit, const engine::Rigid3& camera_from_map) {
+    const Color color{1.0f, 1.0f, 1.0f, 1.0f}, edge{0.0f, 0.0f, 0.0f, 1.0f};
+    const Eigen::Vector3d place = camera_from_map.OriginInSource();
+    const auto pixel = camera_.Project(camera_from_map_ * place);
+    if (!pixel) return;
+    const double size = 0.06 * camera_.height_px();
+    Eigen::Vector3d forward = camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
+    forward -= orbit.axes.up.dot(forward) * orbit.axes.up;
+    const auto ahead =
+        camera_.Project(camera_from_map_ * Eigen::Vector3d(place + 1e-3 * orbit.distance_m * forward));
+    const Eigen::Vector2d way = ahead ? Eigen::Vector2d(*ahead - *pixel) : Eigen::Vector2d(0, 0);
+    if (way.norm() > 1e-9) {
+      const Eigen::Vector2d along = size * way.normalized(), aside(-along.y(), along.x());
+      for (const double share : {-0.6, 0.6}) {
+        canvas_->Line(*pixel, *pixel + along + share * aside, 4, edge);
+        canvas_->Line(*pixel, *pixel + along + share * aside, 2, color);
+      }
+    }
+    canvas_->Disk(*pixel, 0.35 * size + 1, edge);
+    canvas_->Disk(*pixel, 0.35 * size, color);
+  }
+
   // Points are drawn from far to near, so that near ones cover far ones.
   void Points(const engine::MapSnapshot& map) {
     struct Dot {
@@ -214,8 +237,7 @@ MapView::MapView(const MapViewOptions& options) : impl_(std::make_unique<Impl>(o
 
 MapView::~MapView() = default;
 
-void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, const Orbit& orbit,
-                   const std::string& title, const std::vector<PredictedRecall>& predicted_recall) {
+void MapView::Draw(const engine::MapSnapshot& map, const Orbit& orbit, const MapViewContents& contents) {
   const int width_px = impl_->options.width_px, height_px = impl_->options.height_px;
   const RenderTarget& target = impl_->image.Bind(width_px, height_px);
   impl_->image.DrawVideo(cv::Mat());
@@ -225,13 +247,16 @@ void MapView::Draw(const engine::MapSnapshot& map, const content::Scene* scene, 
   impl_->below.Begin(width_px, height_px);
   Drawing drawing(impl_->camera, camera_from_map, &impl_->below);
   drawing.Grid(orbit, grid);
-  for (const PredictedRecall& found : predicted_recall) drawing.Wedge(orbit, found);
+  for (const PredictedRecall& found : contents.predicted_recall) drawing.Wedge(orbit, found);
   drawing.Points(map);
   DrawKeyFrames(map, impl_->camera, camera_from_map, &impl_->below);
   impl_->below.End();
-  if (scene != nullptr) impl_->content.Draw(impl_->camera, camera_from_map, *scene, 0.0, target);
+  if (contents.scene != nullptr)
+    impl_->content.Draw(impl_->camera, camera_from_map, *contents.scene, 0.0, target);
   impl_->above.Begin(width_px, height_px);
-  DrawCaption(title, MapViewCounts(map, grid), &impl_->above);
+  if (contents.camera_from_map)
+    Drawing(impl_->camera, camera_from_map, &impl_->above).Camera(orbit, *contents.camera_from_map);
+  if (!contents.title.empty()) DrawCaption(contents.title, MapViewCounts(map, grid), &impl_->above);
   target.BindForDrawing();
   impl_->above.End();
 }

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,16 @@ struct PredictedRecall {
 };
 Color RecallColor(double share);
 
+// What a view of a map shows besides the map.
+struct MapViewContents {
+  const content::Scene* scene = nullptr;  // Null for none.
+  std::string title;                      // Shown in the corner with the counts; empty for none of both.
+  // Drawn on the ground plane, below everything else.
+  std::vector<PredictedRecall> predicted_recall;
+  // The pose of a camera, drawn above everything else; empty for none.
+  std::optional<engine::Rigid3> camera_from_map;
+};
+
 // Draws a map from outside: map points coloured by pyramid level, keyframes as frusta, the content, a grid
 // and its spacing. A context must be current from construction to destruction, on one thread.
 class MapView {
@@ -64,10 +75,7 @@ class MapView {
   MapView(const MapView&) = delete;
   MapView& operator=(const MapView&) = delete;
 
-  // `scene` may be null. `title` is shown in the corner when it is not empty. predicted_recall is drawn on
-  // the ground plane, below everything else.
-  void Draw(const engine::MapSnapshot& map, const content::Scene* scene, const Orbit& orbit,
-            const std::string& title = {}, const std::vector<PredictedRecall>& predicted_recall = {});
+  void Draw(const engine::MapSnapshot& map, const Orbit& orbit, const MapViewContents& contents);
   // Shows the last drawing in a part of the default framebuffer, letterboxed.
   void Present(const WindowPart& part);
   // See Renderer::ReadBack.

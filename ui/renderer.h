@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,9 @@ struct Overlay {
   std::string mapping;      // Mapping status of the current map; empty when nobody extends it.
   std::string message;      // One sentence at the bottom; empty for none.
   std::string hint;         // What to do so that the camera is tracked, above it; empty for none.
+  // How close a map that is being started has come to its first points with depth, 0 to 1; empty when none
+  // is.
+  std::optional<double> starting_progress;
   // The newest frame of another camera, of any size; null for none. It is shown small in a corner (see
   // inset.h) with a border whose colour is its tracking state.
   const engine::TrackedFrame* inset = nullptr;

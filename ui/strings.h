@@ -92,6 +92,9 @@ inline constexpr const char* kMapPoints = "Map points";
 inline constexpr const char* kKeyframes = "Keyframes";
 inline constexpr const char* kStatus = "Status";
 inline constexpr const char* kFromAbove = "Map from above";
+inline constexpr const char* kCoverage = "Coverage";
+inline constexpr const char* kCoverageHelp =
+    "A small map: visitors will be recognised where it is green; take more images where it is red.";
 inline constexpr const char* kFullScreen = "Full screen";
 inline constexpr const char* kKeys = "Keys";
 
@@ -127,7 +130,7 @@ inline constexpr KeyHelp kKeyHelp[] = {
     {"Tab", "use the panel by keyboard"},
     {"F", "freeze the view"},
     {"C", "swap the cameras"},
-    {"M", "map from above"},
+    {"M, G", "map from above, coverage"},
     {"P, K, H", "points, keyframes, status"},
     {"F9, F11", "panel, full screen"},
     {"Ctrl-S, Ctrl-Q", "save, quit"},

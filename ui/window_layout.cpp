@@ -21,4 +21,19 @@ WindowLayout LayOutWindow(double width, double height, double wanted_scale, bool
   return layout;
 }
 
+Area PlaceSmallMap(const Area& shown_image, const Area& inset, double scale) {
+  constexpr double kShare = 0.28, kMargin = 0.015;  // As the second camera's image; see inset.h.
+  constexpr double kAspect = 4.0 / 3.0, kLeastHeight = 60;
+  const double margin = kMargin * shown_image.width;
+  Area area;
+  area.width = kShare * shown_image.width;
+  area.height = area.width / kAspect;
+  area.x = shown_image.right() - margin - area.width;
+  area.y = (inset.height > 0 ? inset.bottom() : shown_image.y) + margin;
+  // The lower third belongs to the sentences.
+  area.height = std::min(area.height, shown_image.y + 0.67 * shown_image.height - area.y);
+  if (area.height < kLeastHeight * scale) return {};
+  return area;
+}
+
 }  // namespace docent::ui

@@ -32,4 +32,8 @@ inline constexpr double kMinWindowWidth = 640, kMinWindowHeight = 400;
 // Sizes are at least 1; in a window below 480 by 300 units, less than half of it is left to the image.
 WindowLayout LayOutWindow(double width, double height, double wanted_scale, bool panel_open);
 
+// Where a small map lies over an image: in its upper right corner, below the second camera's image (empty
+// without one). Empty where it would be too small to be read.
+Area PlaceSmallMap(const Area& shown_image, const Area& inset, double scale);
+
 }  // namespace docent::ui

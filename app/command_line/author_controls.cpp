@@ -140,6 +140,7 @@ void AuthorControls::HandleKey(const ui::InputEvent& event) {
   if (event.key == "c") host_.swap_cameras();
   if (event.key == "f") choices.frozen = !choices.frozen;
   if (event.key == "m") choices.from_above = !choices.from_above;
+  if (event.key == "g") choices.show_coverage = !choices.show_coverage;
   if (event.key == "p") choices.show_points = !choices.show_points;
   if (event.key == "k") choices.show_keyframes = !choices.show_keyframes;
   if (event.key == "h") choices.show_status = !choices.show_status;

@@ -220,7 +220,7 @@ class GuideWindow {
       // The map goes on growing while the view is frozen.
       const auto& newest = newest_[large_];
       if ((is_fresh || is_frozen() || !std::exchange(showed_map_, true)) && newest)
-        map_panel_.Draw(*newest, part.width_px, part.height_px);
+        map_panel_.Draw(*newest, part.width_px, part.height_px, true);
       map_panel_.Present(part);
       return;
     }
@@ -230,6 +230,29 @@ class GuideWindow {
     view.overlay.hud = large() != nullptr;
     const double unit_px = controls_ ? layout.scale * pixels : std::clamp(size.y() / 480.0, 0.5, 4.0);
     renderer_.PresentWithHeadsUp(view, part, unit_px, message_height_ * pixels);
+    if (controls_ && large() && controls_->choices().show_coverage) PresentSmallMap(layout, pixels);
+  }
+
+  // Drawn anew four times a second, since it costs more than the image itself.
+  void PresentSmallMap(const ui::WindowLayout& layout, double pixels) {
+    constexpr auto kInterval = std::chrono::milliseconds(250);
+    const AuthorView view = ViewIn(layout);
+    const ui::Area shown = {view.box.x + 0.0, view.box.y + 0.0, view.box.width + 0.0, view.box.height + 0.0};
+    const ui::Area area = ui::PlaceSmallMap(shown, view.inset, layout.scale);
+    const auto& newest = newest_[large_];
+    if (area.height <= 0 || !newest || !newest->tracked.map) return;
+    ui::WindowPart part;
+    part.x = static_cast<int>(pixels * area.x);
+    part.y = static_cast<int>(pixels * area.y);
+    part.width_px = std::max(1, static_cast<int>(pixels * area.width));
+    part.height_px = std::max(1, static_cast<int>(pixels * area.height));
+    part.window_height_px = window_.FramebufferSize().y();
+    const auto now = std::chrono::steady_clock::now();
+    if (now - small_map_drawn_ >= kInterval) {
+      map_panel_.Draw(*newest, part.width_px, part.height_px, false);
+      small_map_drawn_ = now;
+    }
+    map_panel_.Present(part);
   }
 
   bool IsClosing() {
@@ -309,6 +332,7 @@ class GuideWindow {
   std::optional<std::uint64_t> recorded_;
   std::vector<std::string> map_names_;
   std::optional<std::chrono::steady_clock::time_point> names_time_;
+  std::chrono::steady_clock::time_point small_map_drawn_{};
   std::pair<bool, bool> drawn_choices_;  // Points and keyframes.
   double message_height_ = 0;            // Window units.
   cv::Mat image_;

@@ -23,8 +23,14 @@ MapPanel::~MapPanel() {
 }
 
 void MapPanel::Predict(const std::shared_ptr<const engine::MapSnapshot>& map, std::uint64_t key) {
+  constexpr auto kOften = std::chrono::seconds(4);
   if (worker_ && !worker_->finished()) return;
-  if (predicted_key_ == key && predicted_keyframes_ == map->keyframes.size()) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (predicted_key_ == key &&
+      (predicted_keyframes_ == map->keyframes.size() || now - predicted_at_ < kOften)) {
+    return;
+  }
+  predicted_at_ = now;
   if (predicted_key_ != key) {
     const std::scoped_lock lock(mutex_);
     predicted_recall_.clear();
@@ -38,7 +44,7 @@ void MapPanel::Predict(const std::shared_ptr<const engine::MapSnapshot>& map, st
   });
 }
 
-void MapPanel::Draw(const ShownFrame& frame, int width_px, int height_px) {
+void MapPanel::Draw(const ShownFrame& frame, int width_px, int height_px, bool has_title) {
   if (!view_ || width_px_ != width_px || height_px_ != height_px) {
     view_.emplace(ui::MapViewOptions{.width_px = width_px, .height_px = height_px});
     width_px_ = width_px;
@@ -48,8 +54,15 @@ void MapPanel::Draw(const ShownFrame& frame, int width_px, int height_px) {
   if (!map || map->keyframes.empty()) return;
   Predict(map, frame.tracked.map_key);
   const ui::Orbit orbit = ui::OrbitAbove(*map, static_cast<double>(width_px) / height_px);
-  const std::scoped_lock lock(mutex_);
-  view_->Draw(*map, frame.shown.scene.get(), orbit, frame.shown.map_name, predicted_recall_);
+  ui::MapViewContents contents;
+  contents.scene = frame.shown.scene.get();
+  if (has_title) contents.title = frame.shown.map_name;
+  if (engine::HasPose(frame.tracked.state)) contents.camera_from_map = frame.tracked.camera_from_map;
+  {
+    const std::scoped_lock lock(mutex_);
+    contents.predicted_recall = predicted_recall_;
+  }
+  view_->Draw(*map, orbit, contents);
 }
 
 void MapPanel::Present(const ui::WindowPart& part) {

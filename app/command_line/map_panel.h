@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -20,14 +21,17 @@ namespace docent::app {
 std::vector<ui::PredictedRecall> PredictRecall(const engine::MapSnapshot& map,
                                                const std::stop_token& stop = {});
 
-// View of the active map from above for authors, with its content and with colours that show where a lost
-// camera will be relocalized. The colours are computed on a worker thread and appear later than the map; they
-// are recomputed when the number of keyframes changes. All members are called on the window's thread.
+// View of the active map from above for authors, with its content, with the camera, and with colours that
+// show where a lost camera will be relocalized. The colours are computed on a worker thread and appear later
+// than the map; they are computed again when the number of keyframes has changed, but not more often than
+// every four seconds, so that they do not keep a processor busy while a map grows. All members are called on
+// the window's thread.
 class MapPanel {
  public:
   ~MapPanel();
-  // Draws the frame's map. Without a map the last drawing stays. Sizes in pixels.
-  void Draw(const ShownFrame& frame, int width_px, int height_px);
+  // Draws the frame's map, with its name and size if `has_title`. Without a map the last drawing stays. Sizes
+  // in pixels.
+  void Draw(const ShownFrame& frame, int width_px, int height_px, bool has_title);
   void Present(const ui::WindowPart& part);
 
  private:
@@ -37,6 +41,7 @@ class MapPanel {
   int width_px_ = 0, height_px_ = 0;
   std::uint64_t predicted_key_ = 0;
   std::size_t predicted_keyframes_ = 0;
+  std::chrono::steady_clock::time_point predicted_at_{};
   std::mutex mutex_;  // Guards predicted_recall_.
   std::vector<ui::PredictedRecall> predicted_recall_;
   std::optional<Worker> worker_;  // Last member: its thread uses the others.

@@ -137,8 +137,8 @@ void DrawMaps(const std::vector<Session::MapState>& maps, const fs::path& folder
   cv::Mat image;
   for (const Session::MapState& map : maps) {
     if (map.discarded || !map.snapshot) continue;
-    view.Draw(*map.snapshot, map.scene.get(), ui::OrbitAbove(*map.snapshot), map.name,
-              PredictRecall(*map.snapshot));
+    view.Draw(*map.snapshot, ui::OrbitAbove(*map.snapshot),
+              {map.scene.get(), map.name, PredictRecall(*map.snapshot), std::nullopt});
     view.ReadBack(&image);
     WriteImage(folder / ("map-" + FileName(map.name) + ".png"), image);
   }

@@ -15,6 +15,8 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   view.overlay.is_waiting =
       frame.tracked.state == engine::TrackingState::kInitializing && frame.shown.starting_map.empty();
   if (frame.shown.mapping) view.overlay.mapping = ToString(*frame.shown.mapping);
+  if (!frame.shown.starting_map.empty())
+    view.overlay.starting_progress = frame.tracked.initialization_progress;
   view.overlay.message = frame.message;
   view.overlay.hint = frame.shown.hint;
   return view;

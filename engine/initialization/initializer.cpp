@@ -13,7 +13,10 @@ namespace {
 
 constexpr float kMinCorrelation = 0.8f;
 constexpr float kMaxRoundTripPx = 0.7f;  // of the corner's level, tracked forwards and backwards
-constexpr float kMaxStepPx = 4.0f;       // of each level: how far the alignment may move from the prediction
+// Shares of the progress: the image moves enough, and the parallax is significant; the third view is the
+// rest.
+constexpr double kMotionShare = 0.2, kParallaxShare = 0.6;
+constexpr float kMaxStepPx = 4.0f;  // of each level: how far the alignment may move from the prediction
 
 // Tracks one patch of `from` into `to`, from coarse levels to the corner's own level.
 std::optional<Eigen::Vector2f> TrackPatch(const ImageFeatures& from, const Eigen::Vector2f& pixel,
@@ -102,6 +105,12 @@ void Initializer::Reset() {
   first_.reset();
   previous_.reset();
   hint_ = Hint::kNone;
+  progress_ = 0;
+}
+
+void Initializer::UpdateProgress(double progress) {
+  constexpr double kKept = 0.95;  // Per attempt: half is gone after 14 attempts, about a second.
+  progress_ = std::max(progress, kKept * progress_);
 }
 
 void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
@@ -164,8 +173,10 @@ std::optional<InitialPair> Initializer::Track(Timestamp time,
   for (const Trail& trail : trails_) motion.push_back((trail.now - trail.first).norm());
   const auto middle = motion.begin() + static_cast<std::ptrdiff_t>(motion.size() / 2);
   std::nth_element(motion.begin(), middle, motion.end());
-  if (*middle < options_.min_motion_px * camera_->width_px() / 640.0) {
+  const double min_motion_px = options_.min_motion_px * camera_->width_px() / 640.0;
+  if (*middle < min_motion_px) {
     hint_ = HintFor(TwoViewOutcome::kStill);
+    UpdateProgress(kMotionShare * *middle / min_motion_px);
     return std::nullopt;
   }
   return Attempt(time, features);
@@ -224,6 +235,8 @@ std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const 
   options.seed = random_.Next();
   pair.geometry = EstimateTwoViews(rays_a, rays_b, options);
   hint_ = HintFor(pair.geometry.outcome);
+  UpdateProgress(kMotionShare + kParallaxShare * ParallaxProgress(pair.geometry, options) +
+                 (1 - kMotionShare - kParallaxShare) * confirmation->GrowthProgress(pair.geometry));
   if (pair.geometry.outcome != TwoViewOutcome::kGeneral && pair.geometry.outcome != TwoViewOutcome::kPlanar) {
     return std::nullopt;
   }

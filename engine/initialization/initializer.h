@@ -55,6 +55,9 @@ class Initializer {
   Timestamp first_time() const { return first_ ? first_time_ : Timestamp::min(); }
   // Why there is no map yet; kNone right after Reset().
   Hint hint() const { return hint_; }
+  // How close the camera has come to a map, from 0 (it has not moved) to 1, for a person who waits for it. It
+  // falls slowly when an attempt is worse than the one before, so that it does not flicker.
+  double progress() const { return progress_; }
   // A tracked corner: its pixel in the first view and in the current frame, level 0.
   struct Trail {
     Eigen::Vector2f first, now;
@@ -73,6 +76,7 @@ class Initializer {
                                    std::span<const std::uint32_t> ids, double speed_change_px,
                                    StartConfirmation* confirmation);
   double SpeedChange() const;
+  void UpdateProgress(double progress);
 
   InitializerOptions options_;
   std::shared_ptr<const CameraModel> camera_;
@@ -84,6 +88,7 @@ class Initializer {
   Timestamp first_time_{};
   std::shared_ptr<const ImageFeatures> first_, previous_;
   Hint hint_ = Hint::kNone;
+  double progress_ = 0;
 };
 
 }  // namespace docent::engine

@@ -30,6 +30,12 @@ void StartConfirmation::Store(Timestamp first_view, std::span<const std::uint32_
   }
 }
 
+double StartConfirmation::GrowthProgress(const TwoViewResult& geometry) const {
+  if (ids_.empty() || !(parallax_deg_ > 0)) return 0;
+  const double needed = std::max((options_.min_growth - 1) * parallax_deg_, 1e-9);
+  return std::clamp((geometry.median_parallax_deg - parallax_deg_) / needed, 0.0, 1.0);
+}
+
 bool StartConfirmation::Confirm(Timestamp first_view, std::span<const std::uint32_t> ids,
                                 const TwoViewResult& geometry) {
   if (ids_.empty() || first_view != first_view_) {

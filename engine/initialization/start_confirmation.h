@@ -31,6 +31,8 @@ class StartConfirmation {
   explicit StartConfirmation(const StartConfirmationOptions& options) : options_(options) {}
 
   void Reset() { ids_.clear(); }
+  // How much of the growth of the parallax is there that a third view needs, 0 to 1; 0 without a second view.
+  double GrowthProgress(const TwoViewResult& geometry) const;
   // ids: one per match of `geometry`, ascending; a point has the same id in every call with the same first
   // view. True if an earlier geometry of this first view agrees; otherwise this geometry is stored and waits
   // to be confirmed.

@@ -335,4 +335,27 @@ TwoViewResult EstimateTwoViews(std::span<const Eigen::Vector3d> rays_in_a,
   return result;
 }
 
+double ParallaxProgress(const TwoViewResult& result, const TwoViewOptions& options) {
+  switch (result.outcome) {
+    case TwoViewOutcome::kGeneral:
+    case TwoViewOutcome::kPlanar:
+    case TwoViewOutcome::kAmbiguousPlane:
+      return 1;
+    case TwoViewOutcome::kTooLittleParallax:
+      break;
+    case TwoViewOutcome::kStill:
+    case TwoViewOutcome::kPureRotation:
+    case TwoViewOutcome::kTooFewMatches:
+    case TwoViewOutcome::kInconsistent:
+      return 0;
+  }
+  const double by_angle = result.median_parallax_deg / options.min_parallax_deg;
+  // The significance is measured only once the angle is large enough.
+  if (by_angle < 1) return 0.5 * by_angle;
+  const double by_error = result.significance.Ratio() / options.min_parallax_ratio;
+  const double by_depth =
+      options.max_relative_depth_sigma / std::max(result.significance.relative_depth_sigma, 1e-9);
+  return 0.5 + 0.5 * std::clamp(std::min(by_error, by_depth), 0.0, 1.0);
+}
+
 }  // namespace docent::engine

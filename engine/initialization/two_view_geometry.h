@@ -69,4 +69,8 @@ struct TwoViewResult {
 TwoViewResult EstimateTwoViews(std::span<const Eigen::Vector3d> rays_in_a,
                                std::span<const Eigen::Vector3d> rays_in_b, const TwoViewOptions& options);
 
+// How much of the parallax is there that depth needs to be significant: 0 (the camera only rotated, or no
+// rigid motion was found) to 1 (enough).
+double ParallaxProgress(const TwoViewResult& result, const TwoViewOptions& options);
+
 }  // namespace docent::engine

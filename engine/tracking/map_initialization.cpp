@@ -94,6 +94,7 @@ void MapInitialization::Search(const CameraImage& image, const MapSnapshot* map,
                                const Eigen::Vector3d& rotation_rate, TrackedFrame* out) {
   if (!map) out->state = TrackingState::kInitializing;
   if (phase_ == Phase::kPairGiven) {
+    if (!target_initializer_) out->initialization_progress = 1;
     if (!map) out->hint = Hint::kWaitForMap;
     return;
   }
@@ -110,6 +111,7 @@ void MapInitialization::Search(const CameraImage& image, const MapSnapshot* map,
   if (!pair_ && map && posed && directions && !target_initializer_)
     pair_ = TryPanoramaViews(image, *map, panorama, rotation_rate, *out);
   if (pair_) phase_ = Phase::kPairGiven;
+  if (!target_initializer_) out->initialization_progress = pair_ ? 1 : initializer_.progress();
   if (FirstViewTime() == image.time) first_view_from_map_ = posed ? out->camera_from_map : Rigid3();
 }
 

@@ -53,6 +53,9 @@ struct TrackedFrame {
   std::vector<PointMatch> matches;             // map points that were found in the image
   std::chrono::nanoseconds tracking_time{};    // by the system clock
   Hint hint = Hint::kNone;                     // what a person can do so that tracking works
+  // How close a map that is being initialized has come to its first finite points, 0 to 1; empty when none
+  // is, and with a planar target.
+  std::optional<double> initialization_progress;
   RelocalizationResult relocalization;  // of a lost frame: why no hypothesis was accepted; kNone otherwise
 };
 

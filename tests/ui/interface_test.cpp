@@ -52,6 +52,23 @@ TEST(WindowLayout, KeepsTheWantedScaleWhereThereIsRoom) {
   EXPECT_EQ(LayOutWindow(100, 100, 1, true).scale, 0.75) << "still readable";
 }
 
+TEST(WindowLayout, PutsTheSmallMapBesideTheSecondCameraAndTheSentences) {
+  for (const auto& [width, height] : {std::pair(300.0, 225.0), {640.0, 480.0}, {1920.0, 1440.0}}) {
+    SCOPED_TRACE(width);
+    const Area image{20, 10, width, height};
+    const Area alone = PlaceSmallMap(image, {}, 1);
+    EXPECT_LE(alone.right(), image.right());
+    EXPECT_GE(alone.y, image.y);
+    EXPECT_LE(alone.bottom(), image.y + 0.7 * height);
+    const Area inset{20 + 0.7 * width, 12, 0.28 * width, 0.21 * height};
+    const Area below = PlaceSmallMap(image, inset, 1);
+    if (below.height == 0) continue;
+    EXPECT_GE(below.y, inset.bottom());
+    EXPECT_LE(below.bottom(), image.y + 0.7 * height);
+  }
+  EXPECT_EQ(PlaceSmallMap({0, 0, 100, 75}, {}, 1).height, 0) << "too small to be read";
+}
+
 TEST(Letterbox, IsTheSameInAPartOfTheWindow) {
   const Letterbox box = FitImage(640, 480, Area{100, 50, 320, 300});
   EXPECT_EQ(box.x, 100);

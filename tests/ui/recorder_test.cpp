@@ -106,7 +106,7 @@ TEST_F(MapViewImage, ShowsPredictedRecallByPlaceAndDirection) {
   cv::Mat image;
   const std::vector<PredictedRecall> found = {{{0, 0, 0}, {0, 0, 1}, 2.0, 1.0},
                                               {{0, 0, 0}, {0, 0, -1}, 2.0, 0.0}};
-  view.Draw(map, nullptr, orbit, {}, found);
+  view.Draw(map, orbit, {nullptr, "", found, std::nullopt});
   view.ReadBack(&image);
   // Seen from above, +z is up in the image: green there and red below, on the middle column.
   const int x = image.cols / 2;
@@ -132,9 +132,9 @@ TEST_F(MapViewImage, ShowsThePointsOfAMapInColour) {
   cv::Mat empty, full;
   const Orbit orbit = OrbitAbove(map);
   EXPECT_LT((orbit.target - Eigen::Vector3d(0, 0, 2)).norm(), 0.3);
-  view.Draw({}, nullptr, orbit);
+  view.Draw({}, orbit, {});
   view.ReadBack(&empty);
-  view.Draw(map, nullptr, orbit);
+  view.Draw(map, orbit, {});
   view.ReadBack(&full);
   cv::Mat red;
   cv::inRange(full, cv::Scalar(0, 0, 180), cv::Scalar(130, 130, 255), red);

@@ -24,7 +24,8 @@ using testing_world::RenderedWorld;
 
 struct ShownFrames {
   std::optional<InitialPair> pair;
-  std::set<Hint> hints;  // all that were given
+  std::set<Hint> hints;          // all that were given
+  std::vector<double> progress;  // after each frame without a pair
   int frames = 0;
 };
 
@@ -36,7 +37,9 @@ ShownFrames Show(const RenderedWorld& world, int frames, const std::function<Rig
     const cv::Mat image =
         world.Render(*Camera(), pose(outcome.frames), 1.5, static_cast<std::uint64_t>(outcome.frames) + 1);
     outcome.pair = initializer.Track(FromSeconds(outcome.frames / 30.0), MakeFeatures(image));
-    if (!outcome.pair) outcome.hints.insert(initializer.hint());
+    if (outcome.pair) continue;
+    outcome.hints.insert(initializer.hint());
+    outcome.progress.push_back(initializer.progress());
   }
   return outcome;
 }
@@ -74,6 +77,25 @@ TEST(Initializer, ReturnsTheTrueGeometryAfterSidewaysMotion) {
                      relative.end());
     EXPECT_LT(relative[relative.size() / 2], 0.06);
   }
+}
+
+TEST(Initializer, ProgressGrowsWithTheBaselineAndStaysSmallUnderRotation) {
+  const RenderedWorld world = RenderedWorld::Room(51);
+  const ShownFrames moved = Show(world, 60, [](int i) { return CameraAt({0.012 * i, 0, 0}); });
+  ASSERT_TRUE(moved.pair);
+  ASSERT_GE(moved.progress.size(), 6u);
+  for (const double progress : moved.progress) {
+    EXPECT_GE(progress, 0);
+    EXPECT_LE(progress, 1);
+  }
+  EXPECT_EQ(moved.progress.front(), 0);
+  EXPECT_GE(moved.progress.back(), 0.75) << "the ring must be nearly full just before the map begins";
+  const std::size_t third = moved.progress.size() / 3;
+  EXPECT_LT(moved.progress[third], moved.progress[2 * third]);
+
+  const ShownFrames rotated = Show(world, 40, [](int i) { return CameraAt({0, 0, 0}, {0, 0.4 * i, 0}); });
+  EXPECT_FALSE(rotated.pair);
+  for (const double progress : rotated.progress) EXPECT_LE(progress, 0.5);
 }
 
 TEST(Initializer, NeverStartsWhileTheCameraIsStill) {
