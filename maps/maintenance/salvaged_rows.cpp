@@ -165,8 +165,8 @@ std::vector<StoredLens> SalvagedRows::Lenses(std::vector<std::string>* problems)
   std::vector<StoredLens> lenses;
   for (const auto& [camera, places] : lenses_) {
     try {
-      UseFirst(Usable(&places), "it cannot be read", [&](const SalvagedRow& row, bool) {
-        lenses.push_back(CheckedLens(camera, row.values[1].bytes, row.values[2].integer));
+      UseFirst(Usable(&places), "it cannot be read", [&, &name = camera](const SalvagedRow& row, bool) {
+        lenses.push_back(CheckedLens(name, row.values[1].bytes, row.values[2].integer));
       });
     } catch (const Error& error) {
       // Such a row may also be one of another program; only what a camera can be called is worth a sentence.
