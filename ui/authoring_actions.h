@@ -22,6 +22,12 @@ class AuthoringActions {
   virtual ~AuthoringActions() = default;
   virtual void NewMap(const std::string& name) = 0;
   virtual void StopMap() = 0;
+  // Goes on in a map of the library.
+  virtual void UseMap(const std::string& name) = 0;
+  virtual void RenameMap(const std::string& name, const std::string& new_name) = 0;
+  virtual void RemoveMap(const std::string& name) = 0;
+  // `policy`: one of strings::kPolicies.
+  virtual void SetPolicy(const std::string& name, const std::string& policy) = 0;
   virtual void Undo() = 0;
   virtual void Redo() = 0;
   virtual void Save() = 0;
@@ -49,11 +55,20 @@ class AuthoringActions {
   virtual void ToggleFullScreen() = 0;
 };
 
+// A map of the library.
+struct MapFacts {
+  std::string name;
+  std::string policy;                        // One of strings::kPolicies.
+  bool is_initialized = false;               // It has keyframes, here or in the library.
+  bool objects_known = false;                // It is in memory, so that its size and content are known.
+  std::uint64_t keyframes = 0, objects = 0;  // Valid with objects_known.
+};
+
 // What the window shows. The pointers are valid while it is drawn.
 struct AuthoringFacts {
-  std::vector<std::string> map_names;  // To which signposts may lead.
-  std::string map_name;                // Of the current map; empty for none.
-  bool starting = false;               // The current map has no depth yet.
+  std::vector<MapFacts> maps;  // All of the library, by name.
+  std::string map_name;        // Of the current map; empty for none.
+  bool starting = false;       // The current map has no depth yet.
   bool unsaved = false;
   std::optional<double> saved_ago_s;      // Since the last save; empty before the first.
   const content::Scene* scene = nullptr;  // Of the current map; null without one.

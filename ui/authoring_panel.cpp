@@ -62,11 +62,12 @@ std::string SavedText(const std::optional<double>& saved_ago_s) {
   return text;
 }
 
-std::string FreeMapName(const std::vector<std::string>& names) {
+std::string FreeMapName(const std::vector<MapFacts>& maps) {
   for (int number = 1;; ++number) {
     char name[32];
     std::snprintf(name, sizeof name, strings::kNumberedMap, number);
-    if (std::find(names.begin(), names.end(), name) == names.end()) return name;
+    const auto has_name = [&](const MapFacts& map) { return map.name == name; };
+    if (std::none_of(maps.begin(), maps.end(), has_name)) return name;
   }
 }
 
@@ -92,6 +93,7 @@ void AuthoringPanel::Draw(const WindowLayout& layout, const AuthoringFacts& fact
   }
   DrawHeader(facts);
   if (Section(strings::kMap)) DrawMap(facts);
+  if (ImGui::CollapsingHeader(strings::kMaps)) map_section_.Draw(facts);
   if (Section(strings::kPlace)) DrawPlace(facts);
   if (Section(strings::kContents)) entity_section_.DrawContents(facts);
   if (Section(strings::kSelected)) entity_section_.DrawSelected(facts);
@@ -123,7 +125,7 @@ void AuthoringPanel::DrawHeader(const AuthoringFacts& facts) {
 }
 
 void AuthoringPanel::StartMap(const AuthoringFacts& facts) {
-  actions_->NewMap(choices_.map_name.empty() ? FreeMapName(facts.map_names) : choices_.map_name);
+  actions_->NewMap(choices_.map_name.empty() ? FreeMapName(facts.maps) : choices_.map_name);
   choices_.map_name.clear();
 }
 
@@ -195,7 +197,7 @@ void AuthoringPanel::DrawSignChoice(const AuthoringFacts& facts) {
   ImGui::InputTextMultiline("##sign text", &choices_.sign_text,
                             ImVec2(-1.0f, 3.5f * ImGui::GetTextLineHeight()));
   ImGui::SetNextItemWidth(0.6f * ImGui::GetContentRegionAvail().x);
-  DrawMapChoice(strings::kLeadsTo, facts.map_names, &choices_.sign_to_map);
+  DrawMapChoice(strings::kLeadsTo, facts.maps, &choices_.sign_to_map);
   Wrapped(choices_.sign_text.empty() ? strings::kWriteText : strings::kClickToPlaceSign, theme::kMutedText);
 }
 

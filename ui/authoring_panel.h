@@ -6,6 +6,7 @@
 
 #include "ui/authoring_actions.h"
 #include "ui/entity_section.h"
+#include "ui/map_section.h"
 #include "ui/window_layout.h"
 
 namespace docent::ui {
@@ -16,7 +17,8 @@ namespace docent::ui {
 class AuthoringPanel {
  public:
   // `actions` must outlive the panel.
-  explicit AuthoringPanel(AuthoringActions* actions) : actions_(actions), entity_section_(actions) {}
+  explicit AuthoringPanel(AuthoringActions* actions)
+      : actions_(actions), map_section_(actions), entity_section_(actions) {}
 
   AuthoringChoices& choices() { return choices_; }
   const AuthoringChoices& choices() const { return choices_; }
@@ -39,12 +41,13 @@ class AuthoringPanel {
 
   AuthoringActions* const actions_;
   AuthoringChoices choices_;
+  MapSection map_section_;
   EntitySection entity_section_;
 };
 
 // "Saved 12 s ago" and the like.
 std::string SavedText(const std::optional<double>& saved_ago_s);
-// The first of "Map 1", "Map 2" … that is not among the names.
-std::string FreeMapName(const std::vector<std::string>& names);
+// The first of "Map 1", "Map 2" … that no map has.
+std::string FreeMapName(const std::vector<MapFacts>& maps);
 
 }  // namespace docent::ui

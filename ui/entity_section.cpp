@@ -53,12 +53,12 @@ bool NumberFields(const char* label, double* values, int count, const char* form
 
 }  // namespace
 
-bool DrawMapChoice(const char* label, const std::vector<std::string>& maps, std::string* chosen) {
+bool DrawMapChoice(const char* label, const std::vector<MapFacts>& maps, std::string* chosen) {
   const std::string before = *chosen;
   if (ImGui::BeginCombo(label, chosen->empty() ? strings::kLeadsNowhere : chosen->c_str())) {
     if (ImGui::Selectable(strings::kLeadsNowhere, chosen->empty())) chosen->clear();
-    for (const std::string& name : maps) {
-      if (ImGui::Selectable(name.c_str(), *chosen == name)) *chosen = name;
+    for (const MapFacts& map : maps) {
+      if (ImGui::Selectable(map.name.c_str(), *chosen == map.name)) *chosen = map.name;
     }
     ImGui::EndCombo();
   }
@@ -185,7 +185,7 @@ void EntitySection::DrawFields(const content::Entity& entity, const AuthoringFac
       actions_->SetText(entity.name, text_);
     std::string to_map = entity.signpost.to_map;
     ImGui::SetNextItemWidth(0.6f * ImGui::GetContentRegionAvail().x);
-    if (DrawMapChoice(strings::kLeadsTo, facts.map_names, &to_map)) actions_->SetTarget(entity.name, to_map);
+    if (DrawMapChoice(strings::kLeadsTo, facts.maps, &to_map)) actions_->SetTarget(entity.name, to_map);
   }
   DrawPose(entity, facts);
   ImGui::EndDisabled();

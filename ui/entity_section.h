@@ -35,7 +35,7 @@ class EntitySection {
 };
 
 // A drop-down with the maps and "(nowhere)", the empty name. Returns whether *chosen changed.
-bool DrawMapChoice(const char* label, const std::vector<std::string>& maps, std::string* chosen);
+bool DrawMapChoice(const char* label, const std::vector<MapFacts>& maps, std::string* chosen);
 
 // A rotation as angles in degrees about up (y), right (x) and front (z), in this order, each about the
 // rotated axes, and back.

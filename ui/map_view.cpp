@@ -107,7 +107,8 @@ class Drawing {
   }
 
   // Points are drawn from far to near, so that near ones cover far ones.
-  void Points(const engine::MapSnapshot& map) {
+  void Points(const engine::MapSnapshot& map, bool grey) {
+    constexpr Color kGrey{0.62f, 0.66f, 0.7f, 0.8f};
     struct Dot {
       double depth;
       Eigen::Vector2d pixel;
@@ -119,7 +120,7 @@ class Drawing {
       const Eigen::Vector3d in_camera = camera_from_map_ * point.position();
       const std::optional<Eigen::Vector2d> pixel = camera_.Project(in_camera);
       if (pixel && camera_.IsInside(*pixel, -4))
-        dots.push_back({in_camera.z(), *pixel, LevelColor(point.source_level)});
+        dots.push_back({in_camera.z(), *pixel, grey ? kGrey : LevelColor(point.source_level)});
     }
     std::sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) { return a.depth > b.depth; });
     for (const Dot& dot : dots) canvas_->Disk(dot.pixel, 1.6, dot.color);
@@ -248,7 +249,7 @@ void MapView::Draw(const engine::MapSnapshot& map, const Orbit& orbit, const Map
   Drawing drawing(impl_->camera, camera_from_map, &impl_->below);
   drawing.Grid(orbit, grid);
   for (const PredictedRecall& found : contents.predicted_recall) drawing.Wedge(orbit, found);
-  drawing.Points(map);
+  drawing.Points(map, contents.grey_points);
   DrawKeyFrames(map, impl_->camera, camera_from_map, &impl_->below);
   impl_->below.End();
   if (contents.scene != nullptr)

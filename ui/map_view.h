@@ -62,6 +62,8 @@ struct MapViewContents {
   std::string title;                      // Shown in the corner with the counts; empty for none of both.
   // Drawn on the ground plane, below everything else.
   std::vector<PredictedRecall> predicted_recall;
+  // Points are grey instead of coloured by pyramid level, so that colours mean recall only.
+  bool grey_points = false;
   // The pose of a camera, drawn above everything else; empty for none.
   std::optional<engine::Rigid3> camera_from_map;
 };

@@ -27,6 +27,31 @@ inline constexpr const char* kNumberedMap = "Map %d";
 inline constexpr const char* kBegin = "Press New map to begin.";
 inline constexpr const char* kStarting = "Move the camera sideways, slowly.";
 
+// Section of all maps.
+inline constexpr const char* kMaps = "All maps";
+inline constexpr const char* kNoMaps = "There is no map yet.";
+inline constexpr const char* kFindMap = "Find a map";
+inline constexpr const char* kChooseMap = "Choose a map to continue, rename, protect or remove it.";
+inline constexpr const char* kMapSize = "%lu keyframes, %lu objects";
+inline constexpr const char* kNotInMemory = "Saved in the library, not in memory.";
+inline constexpr const char* kContinueMap = "Continue this map";
+inline constexpr const char* kPolicy = "Changes";
+inline constexpr const char* kRemoveMap = "Remove map…";
+inline constexpr const char* kRemoveMapQuestion =
+    "Remove this map with everything in it? This cannot be undone. Signposts to it will lead nowhere.";
+inline constexpr const char* kRemoveMapNow = "Remove for good";
+struct PolicyText {
+  const char* policy;  // Its name on the command line.
+  const char* label;
+  const char* explanation;
+};
+inline constexpr PolicyText kPolicies[] = {
+    {"open", "All allowed", "The map may grow, and its content may be changed."},
+    {"bounded", "Within its bounds", "The map does not grow beyond the space that it covers now."},
+    {"augment-only", "Content only", "The map stays as it is; its content may be changed."},
+    {"read-only", "None", "Nothing may be changed."},
+};
+
 // Place section.
 inline constexpr const char* kPlace = "Place";
 inline constexpr const char* kToolSelect = "Select";

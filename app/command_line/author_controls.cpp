@@ -42,10 +42,10 @@ void AuthorControls::Take(std::vector<Notice> notices) {
   }
 }
 
-void AuthorControls::SetView(AuthorView view, const SavingState& saving, std::vector<std::string> map_names) {
+void AuthorControls::SetView(AuthorView view, const SavingState& saving, std::vector<ui::MapFacts> maps) {
   view_ = std::move(view);
   saving_ = saving;
-  map_names_ = std::move(map_names);
+  maps_ = std::move(maps);
   const std::uint64_t map = view_.frame ? view_.frame->tracked.map_key : 0;
   // Of a lost camera, the selection waits until it is back in the map.
   if (map != 0 && std::exchange(scene_map_, map) != map) {
@@ -227,7 +227,7 @@ void AuthorControls::UpdatePreview() {
 
 ui::AuthoringFacts AuthorControls::Facts() const {
   ui::AuthoringFacts facts;
-  facts.map_names = map_names_;
+  facts.maps = maps_;
   facts.unsaved = saving_.unsaved;
   if (saving_.saved_at)
     facts.saved_ago_s =
@@ -275,6 +275,22 @@ void AuthorControls::NewMap(const std::string& name) {
 
 void AuthorControls::StopMap() {
   host_.emit(app::StopMap{});
+}
+
+void AuthorControls::UseMap(const std::string& name) {
+  host_.emit(app::UseMap{name});
+}
+
+void AuthorControls::RenameMap(const std::string& name, const std::string& new_name) {
+  host_.emit(app::RenameMap{name, new_name});
+}
+
+void AuthorControls::RemoveMap(const std::string& name) {
+  host_.emit(app::RemoveMap{name});
+}
+
+void AuthorControls::SetPolicy(const std::string& name, const std::string& policy) {
+  if (const auto parsed = maps::ParsePolicy(policy)) host_.emit(app::SetPolicy{name, *parsed});
 }
 
 void AuthorControls::Undo() {

@@ -40,7 +40,7 @@ class AuthorControls final : public ui::AuthoringActions {
   // Makes notices of the session messages.
   void Take(std::vector<Notice> notices);
   // What is shown from now on, until the next call.
-  void SetView(AuthorView view, const SavingState& saving, std::vector<std::string> map_names);
+  void SetView(AuthorView view, const SavingState& saving, std::vector<ui::MapFacts> maps);
   void Handle(const ui::InputEvent& event);
   // Follows the pointer; once per frame after the events.
   void Update();
@@ -59,6 +59,10 @@ class AuthorControls final : public ui::AuthoringActions {
   // ui::AuthoringActions
   void NewMap(const std::string& name) override;
   void StopMap() override;
+  void UseMap(const std::string& name) override;
+  void RenameMap(const std::string& name, const std::string& new_name) override;
+  void RemoveMap(const std::string& name) override;
+  void SetPolicy(const std::string& name, const std::string& policy) override;
   void Undo() override;
   void Redo() override;
   void Save() override;
@@ -110,7 +114,7 @@ class AuthorControls final : public ui::AuthoringActions {
 
   AuthorView view_;
   SavingState saving_;
-  std::vector<std::string> map_names_;
+  std::vector<ui::MapFacts> maps_;
   std::shared_ptr<const content::Scene> preview_;
   bool preview_changed_ = false;
   std::string ghost_note_;  // Why nothing can be placed under the pointer.

@@ -80,7 +80,7 @@ class GuideWindow {
     const ui::WindowLayout layout = Layout();
     if (controls_) {
       controls_->Take(link_.notices->TakeAll());
-      controls_->SetView(ViewIn(layout), link_.saving(), MapNames());
+      controls_->SetView(ViewIn(layout), link_.saving(), Maps());
       controls_->Update();
     }
     times_.Add(Part::kInput);
@@ -274,15 +274,15 @@ class GuideWindow {
     link_.inboxes[large_].Push({std::move(command), frame});
   }
 
-  // All names, asked for once a second.
-  std::vector<std::string> MapNames() {
+  // All maps, asked for once a second.
+  std::vector<ui::MapFacts> Maps() {
     constexpr auto kOften = std::chrono::seconds(1);
     const auto now = std::chrono::steady_clock::now();
-    if (!names_time_ || now - *names_time_ > kOften) {
-      map_names_ = link_.map_names();
-      names_time_ = now;
+    if (!maps_time_ || now - *maps_time_ > kOften) {
+      maps_ = link_.maps();
+      maps_time_ = now;
     }
-    return map_names_;
+    return maps_;
   }
 
   void HandleEvents() {
@@ -330,8 +330,8 @@ class GuideWindow {
   // With a frozen view: the newest content, and its map.
   std::pair<std::uint64_t, std::shared_ptr<const content::Scene>> newer_scene_;
   std::optional<std::uint64_t> recorded_;
-  std::vector<std::string> map_names_;
-  std::optional<std::chrono::steady_clock::time_point> names_time_;
+  std::vector<ui::MapFacts> maps_;
+  std::optional<std::chrono::steady_clock::time_point> maps_time_;
   std::chrono::steady_clock::time_point small_map_drawn_{};
   std::pair<bool, bool> drawn_choices_;  // Points and keyframes.
   double message_height_ = 0;            // Window units.

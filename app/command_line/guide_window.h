@@ -12,6 +12,7 @@
 
 #include "app/command_line/notices.h"
 #include "app/command_line/run_guide.h"
+#include "ui/authoring_actions.h"
 
 namespace docent::app {
 
@@ -41,7 +42,7 @@ struct WindowLink {
   std::span<CommandInbox> inboxes;  // By camera.
   NoticeQueue* notices = nullptr;   // Never null.
   std::function<SavingState()> saving;
-  std::function<std::vector<std::string>()> map_names;
+  std::function<std::vector<ui::MapFacts>()> maps;
   // From now on nothing is saved.
   std::function<void()> discard_changes;
   // Called with each frame once it is on the screen.

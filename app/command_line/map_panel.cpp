@@ -31,16 +31,13 @@ void MapPanel::Predict(const std::shared_ptr<const engine::MapSnapshot>& map, st
     return;
   }
   predicted_at_ = now;
-  if (predicted_key_ != key) {
-    const std::scoped_lock lock(mutex_);
-    predicted_recall_.clear();
-  }
   predicted_key_ = key;
   predicted_keyframes_ = map->keyframes.size();
-  worker_.emplace("recall", [this, map](const std::stop_token& stop) {
+  worker_.emplace("recall", [this, map, key](const std::stop_token& stop) {
     std::vector<ui::PredictedRecall> found = PredictRecall(*map, stop);
     const std::scoped_lock lock(mutex_);
     predicted_recall_ = std::move(found);
+    recall_key_ = key;
   });
 }
 
@@ -56,11 +53,12 @@ void MapPanel::Draw(const ShownFrame& frame, int width_px, int height_px, bool h
   const ui::Orbit orbit = ui::OrbitAbove(*map, static_cast<double>(width_px) / height_px);
   ui::MapViewContents contents;
   contents.scene = frame.shown.scene.get();
+  contents.grey_points = true;
   if (has_title) contents.title = frame.shown.map_name;
   if (engine::HasPose(frame.tracked.state)) contents.camera_from_map = frame.tracked.camera_from_map;
   {
     const std::scoped_lock lock(mutex_);
-    contents.predicted_recall = predicted_recall_;
+    if (recall_key_ == frame.tracked.map_key) contents.predicted_recall = predicted_recall_;
   }
   view_->Draw(*map, orbit, contents);
 }

@@ -42,8 +42,9 @@ class MapPanel {
   std::uint64_t predicted_key_ = 0;
   std::size_t predicted_keyframes_ = 0;
   std::chrono::steady_clock::time_point predicted_at_{};
-  std::mutex mutex_;  // Guards predicted_recall_.
+  std::mutex mutex_;  // Guards the next two.
   std::vector<ui::PredictedRecall> predicted_recall_;
+  std::uint64_t recall_key_ = 0;  // The map that it belongs to.
   std::optional<Worker> worker_;  // Last member: its thread uses the others.
 };
 

@@ -138,7 +138,7 @@ void DrawMaps(const std::vector<Session::MapState>& maps, const fs::path& folder
   for (const Session::MapState& map : maps) {
     if (map.discarded || !map.snapshot) continue;
     view.Draw(*map.snapshot, ui::OrbitAbove(*map.snapshot),
-              {map.scene.get(), map.name, PredictRecall(*map.snapshot), std::nullopt});
+              {map.scene.get(), map.name, PredictRecall(*map.snapshot), true, std::nullopt});
     view.ReadBack(&image);
     WriteImage(folder / ("map-" + FileName(map.name) + ".png"), image);
   }

@@ -154,13 +154,21 @@ class GuideRun {
     const Session::Saving saving = session_.SavingNow();
     return {saving.unsaved, saving.saved_at};
   }
-  std::vector<std::string> MapNames() const {
-    std::vector<std::string> names;
+  std::vector<ui::MapFacts> MapsForWindow() const {
+    std::vector<ui::MapFacts> all;
     for (const Session::MapState& map : session_.Maps()) {
-      if (!map.discarded && map.joined_into == 0) names.push_back(map.name);
+      if (map.discarded || map.joined_into != 0) continue;
+      ui::MapFacts facts;
+      facts.name = map.name;
+      facts.policy = maps::ToString(map.policy);
+      facts.is_initialized = map.snapshot || map.in_library;
+      facts.objects_known = map.snapshot != nullptr;
+      if (map.snapshot) facts.keyframes = map.snapshot->keyframes.size();
+      if (map.scene) facts.objects = map.scene->entities.size();
+      all.push_back(std::move(facts));
     }
-    std::sort(names.begin(), names.end());
-    return names;
+    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+    return all;
   }
   void DiscardChanges() { session_.DiscardChanges(); }
   std::vector<Session::MapState> Maps() const { return session_.Maps(); }
@@ -372,7 +380,7 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
     link.inboxes = run->inboxes();
     link.notices = run->notices();
     link.saving = [run] { return run->Saving(); };
-    link.map_names = [run] { return run->MapNames(); };
+    link.maps = [run] { return run->MapsForWindow(); };
     link.discard_changes = [run] { run->DiscardChanges(); };
     link.drawn = [run](const ShownFrame& frame) { run->Drawn(frame); };
     ShowInWindow(request, cameras, &slot, link);

@@ -144,21 +144,21 @@ std::string TextOf(engine::Hint hint) {
     case Hint::kChooseMap:
       return "Press New map to begin, or look at a mapped place.";
     case Hint::kMoveSideways:
-      return "move sideways";
+      return "Move sideways.";
     case Hint::kMoveInsteadOfTurning:
-      return "move sideways instead of turning";
+      return "Move sideways instead of turning.";
     case Hint::kMoveFurther:
-      return "move further sideways";
+      return "Move further sideways.";
     case Hint::kAvoidPlane:
-      return "move in another direction, or point the camera at something less flat";
+      return "Move in another direction, or point the camera at something less flat.";
     case Hint::kFindMoreDetail:
-      return "point the camera at something with more detail, and move slowly";
+      return "Point the camera at something with more detail, and move slowly.";
     case Hint::kWaitUntilStill:
-      return "wait until nothing moves in view, then move sideways";
+      return "Wait until nothing moves in view, then move sideways.";
     case Hint::kStartWhereThereIsDetail:
-      return "too little detail here: point the camera at the exhibit";
+      return "Too little detail here: point the camera at the exhibit.";
     case Hint::kFindTarget:
-      return "point the camera at the target";
+      return "Point the camera at the target.";
     case Hint::kWaitForMap:
       return "Starting the map. Please wait.";
     case Hint::kMoveMoreSlowly:
@@ -170,7 +170,7 @@ std::string TextOf(engine::Hint hint) {
     case Hint::kLookBack:
       return "Look back at a place you have seen before.";
     case Hint::kFollowOtherCamera:
-      return "Point this camera at what the other camera sees";
+      return "Point this camera at what the other camera sees.";
   }
   return {};
 }

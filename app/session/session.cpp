@@ -118,7 +118,8 @@ std::vector<Session::MapState> Session::Maps() const {
   const std::scoped_lock lock(mutex_);
   std::vector<MapState> states;
   for (const auto& [key, map] : maps_) {
-    states.push_back({key, map.name, map.policy, map.snapshot, map.scene, map.discarded, map.joined_into});
+    states.push_back(
+        {key, map.name, map.policy, map.snapshot, map.scene, map.in_library, map.discarded, map.joined_into});
   }
   return states;
 }

@@ -105,6 +105,7 @@ class Session {
     maps::Policy policy = maps::Policy::kOpen;
     std::shared_ptr<const engine::MapSnapshot> snapshot;  // null: not initialized yet, or not in memory
     std::shared_ptr<const content::Scene> scene;
+    bool in_library = false;  // when the session began
     bool discarded = false;
     std::uint64_t joined_into = 0;  // key of the map that it was joined into; 0 for none
   };

@@ -69,6 +69,14 @@ TEST(WindowLayout, PutsTheSmallMapBesideTheSecondCameraAndTheSentences) {
   EXPECT_EQ(PlaceSmallMap({0, 0, 100, 75}, {}, 1).height, 0) << "too small to be read";
 }
 
+TEST(MapSection, FindsMapsWhateverTheCase) {
+  EXPECT_TRUE(MatchesFilter("Elephants", ""));
+  EXPECT_TRUE(MatchesFilter("Elephants", "PHANT"));
+  EXPECT_TRUE(MatchesFilter("Hall of Bones", "hall"));
+  EXPECT_FALSE(MatchesFilter("Hall", "Halls"));
+  EXPECT_FALSE(MatchesFilter("", "a"));
+}
+
 TEST(Letterbox, IsTheSameInAPartOfTheWindow) {
   const Letterbox box = FitImage(640, 480, Area{100, 50, 320, 300});
   EXPECT_EQ(box.x, 100);
@@ -165,7 +173,11 @@ TEST(AuthoringPanel, SaysWhenTheLastSaveWas) {
 
 TEST(AuthoringPanel, SuggestsAnUnusedName) {
   EXPECT_EQ(FreeMapName({}), "Map 1");
-  EXPECT_EQ(FreeMapName({"Map 1", "Hall", "Map 3"}), "Map 2");
+  std::vector<MapFacts> maps(3);
+  maps[0].name = "Map 1";
+  maps[1].name = "Hall";
+  maps[2].name = "Map 3";
+  EXPECT_EQ(FreeMapName(maps), "Map 2");
 }
 
 TEST(EntityShapes, HaveTheBaseOfTheBoxWhereTheEntityStands) {

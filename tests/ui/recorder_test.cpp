@@ -106,7 +106,7 @@ TEST_F(MapViewImage, ShowsPredictedRecallByPlaceAndDirection) {
   cv::Mat image;
   const std::vector<PredictedRecall> found = {{{0, 0, 0}, {0, 0, 1}, 2.0, 1.0},
                                               {{0, 0, 0}, {0, 0, -1}, 2.0, 0.0}};
-  view.Draw(map, orbit, {nullptr, "", found, std::nullopt});
+  view.Draw(map, orbit, {nullptr, "", found, false, std::nullopt});
   view.ReadBack(&image);
   // Seen from above, +z is up in the image: green there and red below, on the middle column.
   const int x = image.cols / 2;

@@ -37,6 +37,14 @@ class AskedFor : public AuthoringActions {
  public:
   void NewMap(const std::string& name) override { words.push_back("new map " + name); }
   void StopMap() override { words.push_back("stop"); }
+  void UseMap(const std::string& name) override { words.push_back("use map " + name); }
+  void RenameMap(const std::string& name, const std::string& new_name) override {
+    words.push_back("rename map " + name + " to " + new_name);
+  }
+  void RemoveMap(const std::string& name) override { words.push_back("remove map " + name); }
+  void SetPolicy(const std::string& name, const std::string& policy) override {
+    words.push_back("policy of " + name + ": " + policy);
+  }
   void Undo() override { words.push_back("undo"); }
   void Redo() override { words.push_back("redo"); }
   void Save() override { words.push_back("save"); }

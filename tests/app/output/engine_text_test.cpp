@@ -25,9 +25,9 @@ std::string InHall(const What& what) {
 TEST(HintText, IsASentenceForEachHintButNone) {
   using engine::Hint;
   EXPECT_EQ(TextOf(Hint::kNone), "");
-  EXPECT_EQ(TextOf(Hint::kMoveSideways), "move sideways");
+  EXPECT_EQ(TextOf(Hint::kMoveSideways), "Move sideways.");
   EXPECT_EQ(TextOf(Hint::kStartWhereThereIsDetail),
-            "too little detail here: point the camera at the exhibit");
+            "Too little detail here: point the camera at the exhibit.");
   EXPECT_EQ(TextOf(Hint::kLeftMap), "You have left the mapped area: look back.");
   std::set<std::string> texts;
   constexpr int kHints = static_cast<int>(Hint::kFollowOtherCamera) + 1;

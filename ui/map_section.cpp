@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/map_section.h"
+
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "ui/strings.h"
+#include "ui/theme.h"
+
+namespace docent::ui {
+namespace {
+
+// Text in grey that is broken into lines.
+void MapRemark(const char* text) {
+  ImGui::PushTextWrapPos(0.0f);
+  ImGui::TextDisabled("%s", text);
+  ImGui::PopTextWrapPos();
+}
+
+char LowerCase(char letter) {
+  return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
+}
+
+const char* PolicyText(const std::string& policy) {
+  for (const strings::PolicyText& text : strings::kPolicies) {
+    if (policy == text.policy) return text.label;
+  }
+  return policy.c_str();
+}
+
+}  // namespace
+
+bool MatchesFilter(const std::string& name, const std::string& filter) {
+  return std::search(name.begin(), name.end(), filter.begin(), filter.end(),
+                     [](char a, char b) { return LowerCase(a) == LowerCase(b); }) != name.end() ||
+         filter.empty();
+}
+
+void MapSection::Draw(const AuthoringFacts& facts) {
+  if (facts.maps.empty()) return MapRemark(strings::kNoMaps);
+  constexpr std::size_t kFilterFrom = 8;  // Fewer maps are seen at once.
+  if (facts.maps.size() >= kFilterFrom) {
+    ImGui::SetNextItemWidth(-1);
+    ImGui::InputTextWithHint("##map filter", strings::kFindMap, &filter_);
+  } else {
+    filter_.clear();
+  }
+  DrawList(facts);
+  const auto found = std::find_if(facts.maps.begin(), facts.maps.end(),
+                                  [&](const MapFacts& map) { return map.name == chosen_; });
+  if (found == facts.maps.end()) {
+    chosen_.clear();
+    asks_removal_ = false;
+    return MapRemark(strings::kChooseMap);
+  }
+  DrawChosen(*found, facts);
+}
+
+void MapSection::DrawList(const AuthoringFacts& facts) {
+  const float rows = static_cast<float>(std::clamp<std::size_t>(facts.maps.size(), 1, 7));
+  if (ImGui::BeginChild("maps", ImVec2(0, rows * ImGui::GetTextLineHeightWithSpacing() + 6))) {
+    for (const MapFacts& map : facts.maps) {
+      if (!MatchesFilter(map.name, filter_)) continue;
+      const bool is_current = map.name == facts.map_name;
+      const std::string label = (is_current ? "> " : "") + map.name + "##" + map.name;
+      if (ImGui::Selectable(label.c_str(), chosen_ == map.name)) {
+        chosen_ = chosen_ == map.name ? "" : map.name;
+        name_ = chosen_;
+        asks_removal_ = false;
+      }
+    }
+  }
+  ImGui::EndChild();
+}
+
+void MapSection::DrawChosen(const MapFacts& map, const AuthoringFacts& facts) {
+  const bool is_current = map.name == facts.map_name;
+  char size[96];
+  std::snprintf(size, sizeof size, strings::kMapSize, static_cast<unsigned long>(map.keyframes),
+                static_cast<unsigned long>(map.objects));
+  MapRemark(map.objects_known ? size : strings::kNotInMemory);
+  if (map.is_initialized && !is_current && ImGui::Button(strings::kContinueMap)) actions_->UseMap(map.name);
+  ImGui::SetNextItemWidth(0.65f * ImGui::GetContentRegionAvail().x);
+  ImGui::InputText(strings::kRename, &name_);
+  // When the field is left; a name that is refused is reset.
+  if (ImGui::IsItemDeactivatedAfterEdit() && name_ != map.name) {
+    actions_->RenameMap(map.name, name_);
+    chosen_ = name_;
+  }
+  if (map.is_initialized) DrawPolicy(map);
+  DrawRemoval(map);
+}
+
+void MapSection::DrawPolicy(const MapFacts& map) {
+  ImGui::SetNextItemWidth(0.65f * ImGui::GetContentRegionAvail().x);
+  if (!ImGui::BeginCombo(strings::kPolicy, PolicyText(map.policy))) return;
+  for (const strings::PolicyText& text : strings::kPolicies) {
+    const bool is_this = map.policy == text.policy;
+    if (ImGui::Selectable(text.label, is_this) && !is_this) actions_->SetPolicy(map.name, text.policy);
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", text.explanation);
+  }
+  ImGui::EndCombo();
+}
+
+void MapSection::DrawRemoval(const MapFacts& map) {
+  if (!asks_removal_) {
+    if (ImGui::Button(strings::kRemoveMap)) asks_removal_ = true;
+    return;
+  }
+  MapRemark(strings::kRemoveMapQuestion);
+  if (ImGui::Button(strings::kRemoveMapNow)) {
+    actions_->RemoveMap(map.name);
+    asks_removal_ = false;
+  }
+  ImGui::SameLine();
+  if (ImGui::Button(strings::kCancel)) asks_removal_ = false;
+}
+
+}  // namespace docent::ui

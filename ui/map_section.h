@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "ui/authoring_actions.h"
+
+namespace docent::ui {
+
+// The list of all maps of the library, whether they are in memory or not, and what can be done with the
+// chosen one. Between Gui::Begin and Gui::Draw.
+class MapSection {
+ public:
+  // `actions` must outlive the section.
+  explicit MapSection(AuthoringActions* actions) : actions_(actions) {}
+
+  void Draw(const AuthoringFacts& facts);
+
+ private:
+  void DrawList(const AuthoringFacts& facts);
+  void DrawChosen(const MapFacts& map, const AuthoringFacts& facts);
+  void DrawPolicy(const MapFacts& map);
+  void DrawRemoval(const MapFacts& map);
+
+  AuthoringActions* const actions_;
+  std::string filter_;
+  std::string chosen_;  // Name of the chosen map; empty for none.
+  std::string name_;    // As it is being written.
+  bool asks_removal_ = false;
+};
+
+// Whether `name` contains `filter`, whatever the case of ASCII letters; true for an empty filter.
+bool MatchesFilter(const std::string& name, const std::string& filter);
+
+}  // namespace docent::ui
