@@ -130,7 +130,7 @@ void RunEdit(const EditOptions& options) {
       return std::visit([&](const auto& chosen) { return edit_for(scene, chosen); }, command);
     });
   }
-  EditStoredScene(&library, map, edits, ModelsNeeded::kYes);
+  EditStoredScene(&library, map, edits);
 }
 
 void AddPoseOptions(CLI::App* edit, EditOptions* options) {
