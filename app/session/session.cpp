@@ -29,12 +29,8 @@ Session::Session(const SessionOptions& options,
     : options_(options),
       library_(library),
       keys_(options.may_write ? library : nullptr),
-      system_(SystemOptionsOf(options, &keys_), cameras) {
-  for (auto& model : cameras) {
-    Camera camera;
-    camera.model = std::move(model);
-    cameras_.push_back(std::move(camera));
-  }
+      system_(SystemOptionsOf(options, &keys_), cameras),
+      state_(std::move(cameras)) {
   system_.SetEventHook([this] {
     const std::scoped_lock lock(mutex_);
     HandleSystemEvents();
@@ -58,20 +54,10 @@ Session::~Session() {
   }
 }
 
-void Session::AddEvent(Timestamp time, std::string event, std::string detail) {
-  events_.push_back({time, std::move(event), std::move(detail)});
-}
-
-Timestamp Session::LastTime() const {
-  Timestamp time{};
-  for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
-  return time;
-}
-
 engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   engine::TrackedFrame tracked = system_.Process(frame);
   const std::scoped_lock lock(mutex_);
-  Camera& camera = cameras_[static_cast<std::size_t>(frame.camera)];
+  SessionCamera& camera = state_.cameras[static_cast<std::size_t>(frame.camera)];
   camera.last_time = frame.time;
   HandleSystemEvents();
   ReportRejection(&camera, tracked);
@@ -79,36 +65,30 @@ engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   return tracked;
 }
 
-void Session::ReportRejection(Camera* camera, const engine::TrackedFrame& frame) {
-  const auto name = [this](std::uint64_t key) { return NameOf(key); };
+void Session::ReportRejection(SessionCamera* camera, const engine::TrackedFrame& frame) {
+  const auto name = [this](std::uint64_t key) { return state_.NameOf(key); };
   const bool is_new = camera->relocalization_message.Update(frame.frame.time, engine::HasPose(frame.state),
                                                             frame.relocalization, name);
   const std::string& text = camera->relocalization_message.text();
   if (text.empty() || !is_new) return;
-  AddEvent(frame.frame.time, "not sure",
-           CameraPrefix(static_cast<std::size_t>(frame.frame.camera)) + text + " (" +
-               std::to_string(frame.relocalization.inliers) + " inliers)");
-}
-
-void Session::Advise(Camera* camera, const std::string& sentence) {
-  constexpr Timestamp kShown = std::chrono::seconds(15);
-  camera->advice = sentence;
-  camera->advice_end = camera->last_time + kShown;
+  state_.AddEvent(frame.frame.time, "not sure",
+                  state_.CameraPrefix(CameraOf(frame)) + text + " (" +
+                      std::to_string(frame.relocalization.inliers) + " inliers)");
 }
 
 Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   const std::uint64_t active = system_.ActiveMap();
-  const std::uint64_t current = CurrentMap(frame);
+  const std::uint64_t current = system_.CurrentMap(CameraOf(frame));
   const std::scoped_lock lock(mutex_);
   Shown shown;
-  if (frame.state == engine::TrackingState::kInitializing) shown.starting_map = NameOf(current);
-  const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
+  if (frame.state == engine::TrackingState::kInitializing) shown.starting_map = state_.NameOf(current);
+  const SessionCamera& camera = state_.cameras.at(CameraOf(frame));
   if (frame.frame.time < camera.advice_end) shown.advice = camera.advice;
   const std::string& rejection = camera.relocalization_message.text();
   shown.hint = rejection.empty() ? TextOf(frame.hint) : rejection;
   if (options_.may_write) shown.mapping = MappingStatusOf(frame, active != 0 && active == frame.map_key);
-  const auto found = maps_.find(frame.map_key);
-  if (found == maps_.end()) return shown;
+  const auto found = state_.maps.find(frame.map_key);
+  if (found == state_.maps.end()) return shown;
   shown.map_name = found->second.name;
   shown.scene = found->second.scene;
   return shown;
@@ -117,7 +97,7 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
 std::vector<Session::MapState> Session::Maps() const {
   const std::scoped_lock lock(mutex_);
   std::vector<MapState> states;
-  for (const auto& [key, map] : maps_) {
+  for (const auto& [key, map] : state_.maps) {
     states.push_back(
         {key, map.name, map.policy, map.snapshot, map.scene, map.in_library, map.discarded, map.joined_into});
   }
@@ -126,7 +106,7 @@ std::vector<Session::MapState> Session::Maps() const {
 
 std::vector<Event> Session::TakeEvents() {
   const std::scoped_lock lock(mutex_);
-  return std::exchange(events_, {});
+  return std::exchange(state_.events, {});
 }
 
 Session::Saving Session::SavingNow() const {
@@ -135,7 +115,7 @@ Session::Saving Session::SavingNow() const {
   saving.unsaved = saver_->pending() > 0;
   const std::scoped_lock lock(mutex_);
   saving.saved_at = saved_at_;
-  for (const auto& [key, map] : maps_)
+  for (const auto& [key, map] : state_.maps)
     saving.unsaved = saving.unsaved || (map.Exists() && map.NeedsSave() && map.snapshot->HasFinitePoints());
   return saving;
 }
@@ -159,9 +139,9 @@ void Session::Finish() {
     {
       const std::scoped_lock lock(mutex_);
       HandleSystemEvents();
-      const Timestamp time = LastTime();
+      const Timestamp time = state_.LastTime();
       ReportSaveFailure(time);
-      for (auto& [key, map] : maps_) SaveMap(&map, time);
+      for (auto& [key, map] : state_.maps) SaveMap(&map, time);
     }
     saver_->Flush();
     if (!failure) failure = saver_->TakeError();

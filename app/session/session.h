@@ -20,8 +20,8 @@
 #include "app/session/maintenance_order.h"
 #include "app/session/map_keys.h"
 #include "app/session/mapping_status.h"
-#include "app/session/relocalization_message.h"
-#include "app/session/session_map.h"
+#include "app/session/session_options.h"
+#include "app/session/session_state.h"
 #include "app/session/surface_at_pixel.h"
 #include "engine/system/system.h"
 #include "maps/library/library.h"
@@ -29,22 +29,6 @@
 #include "maps/library/saver.h"
 
 namespace docent::app {
-
-// extend_maps and new_map_key are set by the session.
-struct SessionOptions : engine::SystemOptions {
-  bool may_write = true;  // false: no map is extended and no content is edited
-  std::string first_map;  // a map of this name is started without a command; empty: wait for `map new`
-  // In image time. A map is also saved when it is left and at the end; 0 saves only then.
-  Timestamp autosave_interval = std::chrono::seconds(10);
-  // Idle maps in memory are adjusted while there is nothing else to do; needs `threaded`.
-  bool maintenance = true;
-  double signpost_height = 0.12;  // ratio of its distance at placement
-  double model_side = 0.2;        // the same for the largest side of a model without a scale
-  maps::PagerOptions memory;      // how much of the library is in memory at once
-  // Measured distance in metres between the first two cameras of a rigid rig; 0 when not measured. Once the
-  // rig is recognised, it gives the length of a map unit in metres.
-  double baseline_m = 0;
-};
 
 // The common core of authoring, touring, evaluation and the demo: an engine::System with what an application
 // adds to it: maps that have names and policies and are kept in a library, and their content. The uses differ
@@ -137,20 +121,8 @@ class Session {
   void Finish();
 
  private:
-  // What a camera's user is told. Guarded by mutex_.
-  struct Camera {
-    std::shared_ptr<const engine::CameraModel> model;
-    Timestamp last_time{};
-    std::string advice;  // shown until advice_end
-    Timestamp advice_end{};
-    RelocalizationMessage relocalization_message;
-  };
-
   // session.cpp
-  void ReportRejection(Camera* camera, const engine::TrackedFrame& frame);
-  static void Advise(Camera* camera, const std::string& sentence);
-  void AddEvent(Timestamp time, std::string event, std::string detail);
-  Timestamp LastTime() const;  // the latest of any camera
+  void ReportRejection(SessionCamera* camera, const engine::TrackedFrame& frame);
 
   // session_memory.cpp
   void LoadMaps();
@@ -181,9 +153,6 @@ class Session {
   void Handle(const engine::SystemEvent& event, const engine::LensEstimated& what);
   void Handle(const engine::SystemEvent& event, const engine::MapperFailed& what);
   void Handle(const engine::SystemEvent& event, const engine::MapperEvent& what);
-  std::string NameOf(std::uint64_t key) const;  // empty when the session has no such map
-  std::string CameraPrefix(std::size_t camera) const;
-  std::string FreeMapName(const std::string& name) const;
   void AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into);
 
   // session_commands.cpp; all with mutex_ held unless noted
@@ -196,16 +165,9 @@ class Session {
   void Apply(const RenameMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
   void Apply(const RemoveMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
   void Apply(const Save& command, const engine::TrackedFrame& frame);
-  SessionMap& InitializedMap(const std::string& name);
   // Waits until the library holds all changes of the map that were submitted; returns whether it has the map.
   bool FlushToLibrary(std::uint64_t key, const std::string& name, Timestamp time,
                       std::unique_lock<std::mutex>* lock);
-  void Retarget(std::uint64_t from_key, const std::string& from, std::uint64_t to_key, const std::string& to);
-  SessionMap& AddMap(std::uint64_t key, const std::string& name);
-  SessionMap* FindByName(const std::string& name);
-  engine::MapPermissions PermissionsOf(const SessionMap& map) const;
-  void UpdatePermissions(const SessionMap& map);
-  std::uint64_t CurrentMap(const engine::TrackedFrame& frame) const;
 
   // session_content.cpp; all with mutex_ held
   void Apply(const PlaceModel& command, const engine::TrackedFrame& frame);
@@ -250,9 +212,7 @@ class Session {
 
   // Guards the members below; never held while tracking or waiting for another thread.
   mutable std::mutex mutex_;
-  std::vector<Camera> cameras_;
-  std::map<std::uint64_t, SessionMap> maps_;
-  std::vector<Event> events_;
+  SessionState state_;
   AssetCache assets_;                                                    // by id
   std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by file name in commands
   std::filesystem::path model_folder_;

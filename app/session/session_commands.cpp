@@ -27,86 +27,44 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
   };
   std::visit(apply, command);
   HandleSystemEvents();
-  AddEvent(frame.frame.time, "command", FormatCommand(command));
-}
-
-SessionMap* Session::FindByName(const std::string& name) {
-  for (auto& [key, map] : maps_) {
-    if (map.Exists() && map.name == name) return &map;
-  }
-  return nullptr;
-}
-
-SessionMap& Session::InitializedMap(const std::string& name) {
-  SessionMap* const map = FindByName(name);
-  if (map == nullptr) throw Error("there is no map '" + name + "'");
-  if (!map->snapshot) throw Error("the map '" + name + "' is not initialized yet");
-  return *map;
-}
-
-SessionMap& Session::AddMap(std::uint64_t key, const std::string& name) {
-  SessionMap& map = maps_[key];
-  map.key = key;
-  map.name = name;
-  map.changed = true;
-  return map;
-}
-
-std::uint64_t Session::CurrentMap(const engine::TrackedFrame& frame) const {
-  return system_.CurrentMap(static_cast<std::size_t>(frame.frame.camera));
-}
-
-engine::MapPermissions Session::PermissionsOf(const SessionMap& map) const {
-  engine::MapPermissions permissions;
-  permissions.extend = !map.stopped && maps::MayChangeStructure(map.policy);
-  if (map.policy == maps::Policy::kBounded) {
-    permissions.bounds.emplace();  // empty: a bounded map without bounds accepts no keyframe
-    if (map.bounds) permissions.bounds.emplace(map.bounds->min, map.bounds->max);
-  }
-  permissions.join = map.policy == maps::Policy::kOpen;
-  // A map that was saved or that has content is kept in any case.
-  permissions.discard = !map.saved_snapshot && map.scene->entities.empty();
-  return permissions;
-}
-
-void Session::UpdatePermissions(const SessionMap& map) {
-  system_.SetPermissions(map.key, PermissionsOf(map));
+  state_.AddEvent(frame.frame.time, "command", FormatCommand(command));
 }
 
 void Session::Apply(const NewMap& command, const engine::TrackedFrame& frame) {
-  if (FindByName(command.name) != nullptr) throw Error("there is already a map '" + command.name + "'");
-  const SessionMap& map = AddMap(keys_.Take(), command.name);  // first, because it may throw
-  system_.StartMap(map.key, static_cast<std::size_t>(frame.frame.camera));
+  if (state_.FindByName(command.name) != nullptr)
+    throw Error("there is already a map '" + command.name + "'");
+  const SessionMap& map = state_.AddMap(keys_.Take(), command.name);  // first, because it may throw
+  system_.StartMap(map.key, CameraOf(frame));
 }
 
 void Session::Apply(const StopMap&, const engine::TrackedFrame& frame) {
-  const std::uint64_t key = CurrentMap(frame);
-  const auto found = maps_.find(key);
-  if (found == maps_.end()) throw Error("there is no current map to stop");
-  found->second.stopped = true;
-  UpdatePermissions(found->second);
+  const std::uint64_t key = system_.CurrentMap(CameraOf(frame));
+  SessionMap* const map = state_.FindMap(key);
+  if (map == nullptr) throw Error("there is no current map to stop");
+  map->stopped = true;
+  system_.SetPermissions(key, map->Permissions());
   system_.LeaveMap(key);
 }
 
 void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
-  SessionMap& map = InitializedMap(command.name);
+  SessionMap& map = state_.InitializedMap(command.name);
   map.stopped = false;
-  UpdatePermissions(map);
-  system_.EnterMap(map.key, static_cast<std::size_t>(frame.frame.camera));
+  system_.SetPermissions(map.key, map.Permissions());
+  system_.EnterMap(map.key, CameraOf(frame));
   PinMapsInUse();
 }
 
 void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
                     std::unique_lock<std::mutex>* lock) {
-  const SessionMap& map = InitializedMap(command.name);
+  const SessionMap& map = state_.InitializedMap(command.name);
   const std::uint64_t key = map.key;
   const auto extend_again = [&] {
-    UpdatePermissions(maps_.at(key));
-    if (CurrentMap(frame) == key) system_.Activate(key);
+    system_.SetPermissions(key, state_.maps.at(key).Permissions());
+    if (system_.CurrentMap(CameraOf(frame)) == key) system_.Activate(key);
   };
-  if (saver_ && CurrentMap(frame) == key) {
+  if (saver_ && system_.CurrentMap(CameraOf(frame)) == key) {
     // The mapper must not change the map between the save and the new policy, which may forbid to save it.
-    engine::MapPermissions unchanged = PermissionsOf(map);
+    engine::MapPermissions unchanged = map.Permissions();
     unchanged.extend = false;
     system_.SetPermissions(key, unchanged);
     system_.Activate(key);
@@ -125,7 +83,7 @@ void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
 // disk.
 void Session::ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestamp time,
                            std::unique_lock<std::mutex>* lock) {
-  SessionMap& map = maps_.at(key);
+  SessionMap& map = state_.maps.at(key);
   if (saver_) {
     // The library computes the bounds from what it holds, so everything must be saved first.
     SaveMap(&map, time);
@@ -150,53 +108,33 @@ bool Session::FlushToLibrary(std::uint64_t key, const std::string& name, Timesta
   saver_->Flush();
   lock->lock();
   ReportSaveFailure(time);
-  const auto found = maps_.find(key);
-  if (found == maps_.end() || !found->second.Exists())
+  const SessionMap* const map = state_.FindMap(key);
+  if (map == nullptr || !map->Exists())
     throw Error("the map '" + name + "' was discarded or joined meanwhile");
   const std::vector<maps::MapInfo> stored = library_->List();
   return std::any_of(stored.begin(), stored.end(),
                      [&](const maps::MapInfo& info) { return info.key == key; });
 }
 
-// Signposts that lead to one map lead to another one from now on, or nowhere (key 0). This is no edit that
-// could be undone: it follows from what happened to the maps.
-void Session::Retarget(std::uint64_t from_key, const std::string& from, std::uint64_t to_key,
-                       const std::string& to) {
-  for (auto& [key, map] : maps_) {
-    if (!map.Exists() || !maps::MayChangeContent(map.policy)) continue;
-    auto scene = std::make_shared<content::Scene>(*map.scene);
-    bool changed = false;
-    for (content::Entity& entity : scene->entities) {
-      content::Signpost& signpost = entity.signpost;
-      const bool leads = signpost.to_key != 0 ? signpost.to_key == from_key : signpost.to_map == from;
-      if (entity.kind != content::Entity::Kind::kSignpost || !leads) continue;
-      signpost.to_key = to_key;
-      signpost.to_map = to;
-      changed = true;
-    }
-    if (changed) map.scene = std::move(scene);
-  }
-}
-
 void Session::Apply(const RenameMap& command, const engine::TrackedFrame& frame,
                     std::unique_lock<std::mutex>* lock) {
-  SessionMap* const map = FindByName(command.name);
+  SessionMap* const map = state_.FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (command.new_name == command.name) throw Error("the map has this name already");
   if (!maps::MayChangeContent(map->policy)) {
     throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be renamed");
   }
   const bool stored = FlushToLibrary(map->key, command.name, frame.frame.time, lock);
-  if (FindByName(command.new_name) != nullptr)
+  if (state_.FindByName(command.new_name) != nullptr)
     throw Error("there is already a map '" + command.new_name + "'");
   if (stored) library_->Rename(map->key, command.new_name);
   map->name = command.new_name;
-  Retarget(map->key, command.name, map->key, command.new_name);
+  state_.Retarget(map->key, command.name, map->key, command.new_name);
 }
 
 void Session::Apply(const RemoveMap& command, const engine::TrackedFrame& frame,
                     std::unique_lock<std::mutex>* lock) {
-  SessionMap* const map = FindByName(command.name);
+  SessionMap* const map = state_.FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (!maps::MayRemove(map->policy)) {
     throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be removed");
@@ -204,13 +142,13 @@ void Session::Apply(const RemoveMap& command, const engine::TrackedFrame& frame,
   if (FlushToLibrary(map->key, command.name, frame.frame.time, lock)) library_->Remove(map->key);
   map->discarded = true;  // before the cameras leave the map, so that it is not saved again
   system_.RemoveMap(map->key);
-  Retarget(map->key, command.name, 0, "");
+  state_.Retarget(map->key, command.name, 0, "");
   PinMapsInUse();
 }
 
 void Session::Apply(const Save&, const engine::TrackedFrame& frame) {
   if (!saver_) throw Error("there is no library to save to");
-  for (auto& [key, map] : maps_) SaveMap(&map, frame.frame.time);
+  for (auto& [key, map] : state_.maps) SaveMap(&map, frame.frame.time);
 }
 
 }  // namespace docent::app

@@ -62,34 +62,35 @@ std::shared_ptr<const content::Asset> Session::LoadAsset(const std::string& file
 }
 
 SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
-  const std::uint64_t key = engine::HasPose(frame.state) ? frame.map_key : CurrentMap(frame);
-  const auto found = maps_.find(key);
-  if (found == maps_.end() || !found->second.snapshot) throw Error("there is no current map");
-  if (found->second.discarded) throw Error("the map of this frame was discarded");
-  if (!found->second.Exists()) throw Error("the map of this frame was joined into another one");
-  if (!maps::MayChangeContent(found->second.policy)) {
-    throw Error("the map '" + found->second.name + "' is " + maps::ToString(found->second.policy) +
+  const std::uint64_t key =
+      engine::HasPose(frame.state) ? frame.map_key : system_.CurrentMap(CameraOf(frame));
+  SessionMap* const map = state_.FindMap(key);
+  if (map == nullptr || !map->snapshot) throw Error("there is no current map");
+  if (map->discarded) throw Error("the map of this frame was discarded");
+  if (!map->Exists()) throw Error("the map of this frame was joined into another one");
+  if (!maps::MayChangeContent(map->policy)) {
+    throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) +
                 ": its content cannot be changed");
   }
-  return found->second;
+  return *map;
 }
 
 void Session::Edit(SessionMap* map, content::SceneChange change) {
   auto scene = std::make_shared<content::Scene>(*map->scene);
   map->history.Do(std::move(change), scene.get());
   map->scene = std::move(scene);
-  UpdatePermissions(*map);
+  system_.SetPermissions(map->key, map->Permissions());
 }
 
 content::SurfaceHit Session::SurfaceFor(const engine::TrackedFrame& frame,
                                         const Eigen::Vector2d& pixel) const {
-  return SurfaceAtPixel(frame, *cameras_.at(static_cast<std::size_t>(frame.frame.camera)).model, pixel);
+  return SurfaceAtPixel(frame, *state_.cameras.at(CameraOf(frame)).model, pixel);
 }
 
 // The key of the map that a signpost in `map` is to lead to; 0 for none.
 std::uint64_t Session::TargetKey(const SessionMap& map, const std::string& to_map) {
   if (to_map.empty()) return 0;
-  const SessionMap* const target = FindByName(to_map);
+  const SessionMap* const target = state_.FindByName(to_map);
   if (target == nullptr) throw Error("there is no map '" + to_map + "' that the signpost could lead to");
   if (target == &map) throw Error("a signpost cannot lead to its own map");
   return target->key;
@@ -145,7 +146,7 @@ void Session::Apply(const SetSignpostTarget& command, const engine::TrackedFrame
 
 void Session::Apply(const PasteEntities& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
-  const SessionMap& from = InitializedMap(command.from_map);
+  const SessionMap& from = state_.InitializedMap(command.from_map);
   std::vector<content::Entity> copies;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const std::string& name : command.names) {
@@ -155,7 +156,7 @@ void Session::Apply(const PasteEntities& command, const engine::TrackedFrame& fr
     copy.signpost.to_key = 0;  // it would lead to its own map
     copy.signpost.to_map.clear();
   }
-  const engine::CameraModel& camera = *cameras_.at(static_cast<std::size_t>(frame.frame.camera)).model;
+  const engine::CameraModel& camera = *state_.cameras.at(CameraOf(frame)).model;
   const Eigen::Vector2d centre(0.5 * (camera.width_px() - 1), 0.5 * (camera.height_px() - 1));
   const content::SurfaceHit hit = SurfaceFor(frame, command.to_pixel.value_or(centre));
   engine::Sim3 motion;
@@ -184,8 +185,8 @@ void Session::Apply(const AlignEntity& command, const engine::TrackedFrame& fram
   content::Alignment alignment;
   Edit(&map, content::AlignEdit(*map.scene, command.name, Correspondences(frame, command.pairs), &alignment));
   const std::string text = TextOf(command.name, alignment);
-  AddEvent(frame.frame.time, "align", text);
-  Advise(&cameras_.at(static_cast<std::size_t>(frame.frame.camera)), text);
+  state_.AddEvent(frame.frame.time, "align", text);
+  state_.cameras.at(CameraOf(frame)).Advise(text);
 }
 
 void Session::Apply(const BendEntity& command, const engine::TrackedFrame& frame) {
@@ -198,7 +199,7 @@ void Session::Apply(const Undo&, const engine::TrackedFrame& frame) {
   auto scene = std::make_shared<content::Scene>(*map.scene);
   if (!map.history.Undo(scene.get())) throw Error("there is nothing to undo in '" + map.name + "'");
   map.scene = std::move(scene);
-  UpdatePermissions(map);
+  system_.SetPermissions(map.key, map.Permissions());
 }
 
 void Session::Apply(const Redo&, const engine::TrackedFrame& frame) {
@@ -206,7 +207,7 @@ void Session::Apply(const Redo&, const engine::TrackedFrame& frame) {
   auto scene = std::make_shared<content::Scene>(*map.scene);
   if (!map.history.Redo(scene.get())) throw Error("there is nothing to redo in '" + map.name + "'");
   map.scene = std::move(scene);
-  UpdatePermissions(map);
+  system_.SetPermissions(map.key, map.Permissions());
 }
 
 }  // namespace docent::app

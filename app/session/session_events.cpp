@@ -62,68 +62,60 @@ void Session::HandleSystemEvents() {
     std::visit([&](const auto& what) { Handle(event, what); }, event.what);
 }
 
-std::string Session::NameOf(std::uint64_t key) const {
-  const auto found = maps_.find(key);
-  return found != maps_.end() ? found->second.name : std::string();
-}
-
-std::string Session::CameraPrefix(std::size_t camera) const {
-  return cameras_.size() > 1 ? "camera " + std::to_string(camera) + ": " : std::string();
-}
-
 void Session::Handle(const engine::SystemEvent& event, const engine::MapEntered&) {
-  AddEvent(event.time, "map", "entered " + NameOf(event.map));
+  state_.AddEvent(event.time, "map", "entered " + state_.NameOf(event.map));
   PinMapsInUse();
-  if (const auto found = maps_.find(event.map); found != maps_.end()) ExpectNeighbours(found->second);
+  if (const SessionMap* const map = state_.FindMap(event.map)) ExpectNeighbours(*map);
   if (saver_) saver_->InterruptMaintenance();  // maintenance may be adjusting this map
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::Relocalized&) {
-  const std::string by = cameras_.size() > 1 ? " by camera " + std::to_string(event.camera) : std::string();
-  AddEvent(event.time, "relocalized", NameOf(event.map) + by);
+  const std::string by =
+      state_.cameras.size() > 1 ? " by camera " + std::to_string(event.camera) : std::string();
+  state_.AddEvent(event.time, "relocalized", state_.NameOf(event.map) + by);
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::PoseRejected&) {
-  cameras_[event.camera].relocalization_message = {};
+  state_.cameras[event.camera].relocalization_message = {};
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapLeft& what) {
-  const auto found = maps_.find(event.map);
-  if (found == maps_.end()) return;
+  const auto found = state_.maps.find(event.map);
+  if (found == state_.maps.end()) return;
   if (!what.forgotten) {
     if (options_.may_write) SaveMap(&found->second, event.time);
     return;
   }
-  AddEvent(event.time, "warning",
-           "the map " + found->second.name + " was not created, because it was never initialized");
-  maps_.erase(found);
+  state_.AddEvent(event.time, "warning",
+                  "the map " + found->second.name + " was not created, because it was never initialized");
+  state_.maps.erase(found);
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapUpdated& what) {
-  const auto found = maps_.find(event.map);
-  if (found != maps_.end()) found->second.UpdateSnapshot(what.snapshot);
+  if (SessionMap* const map = state_.FindMap(event.map)) map->UpdateSnapshot(what.snapshot);
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapDiscarded& what) {
-  const auto found = maps_.find(event.map);
-  if (found == maps_.end()) return;
-  SessionMap& map = found->second;
+  SessionMap* const found = state_.FindMap(event.map);
+  if (found == nullptr) return;
+  SessionMap& map = *found;
   map.discarded = true;
-  AddEvent(event.time, "map", "discarded " + map.name + ": " + ReasonOf(what, NameOf(what.other)));
+  state_.AddEvent(event.time, "map",
+                  "discarded " + map.name + ": " + ReasonOf(what, state_.NameOf(what.other)));
   if (what.replacement == 0) return;
-  AddMap(what.replacement, map.name);
-  Retarget(event.map, map.name, what.replacement, map.name);
+  state_.AddMap(what.replacement, map.name);
+  state_.Retarget(event.map, map.name, what.replacement, map.name);
   // Content of the false initialization has lost its anchor.
   for (const content::Entity& entity : map.scene->entities) {
-    AddEvent(event.time, "warning", "'" + entity.name + "' was removed with the discarded map");
+    state_.AddEvent(event.time, "warning", "'" + entity.name + "' was removed with the discarded map");
   }
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapStartedAfterLoss& what) {
-  const std::string before = NameOf(what.lost_in);
-  const std::string name = FreeMapName(before);
-  AddMap(event.map, name);
-  AddEvent(event.time, "map", "began " + name + ": the camera was lost in " + before);
+  const std::string before = state_.NameOf(what.lost_in);
+  const std::string name = state_.FreeMapName(before);
+  state_.AddMap(event.map, name);
+  state_.AddEvent(event.time, "map", "began " + name + ": the camera was lost in " + before);
 }
 
 void Session::Handle(const engine::SystemEvent&, const engine::KeyFrameOffered&) {
@@ -135,73 +127,58 @@ void Session::Handle(const engine::SystemEvent&, const engine::JoinRequested&) {
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapsJoined& what) {
-  const auto into = maps_.find(event.map), from = maps_.find(what.from);
-  if (into == maps_.end() || from == maps_.end()) return;
-  AbsorbMap(&from->second, *what.joined, &into->second);
-  const std::string sentence = "maps " + into->second.name + " and " + from->second.name + " were joined";
-  AddEvent(
+  SessionMap* const into = state_.FindMap(event.map);
+  SessionMap* const from = state_.FindMap(what.from);
+  if (into == nullptr || from == nullptr) return;
+  AbsorbMap(from, *what.joined, into);
+  const std::string sentence = "maps " + into->name + " and " + from->name + " were joined";
+  state_.AddEvent(
       event.time, "map",
       sentence + ": " + std::to_string(what.joined->points_merged) + " pairs of duplicate points were fused");
-  for (Camera& camera : cameras_) Advise(&camera, sentence);
+  for (SessionCamera& camera : state_.cameras) camera.Advise(sentence);
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::JoinRefused& what) {
-  AddEvent(event.time, "map",
-           "maps " + NameOf(event.map) + " and " + NameOf(what.from) +
-               " were not joined: " + TextOf(what.refusal, what.overlap));
+  state_.AddEvent(event.time, "map",
+                  "maps " + state_.NameOf(event.map) + " and " + state_.NameOf(what.from) +
+                      " were not joined: " + TextOf(what.refusal, what.overlap));
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::RigChanged& what) {
-  std::string detail = NameOf(event.map) + ": " + TextOf(what.estimate);
+  std::string detail = state_.NameOf(event.map) + ": " + TextOf(what.estimate);
   if (what.estimate.rigid && options_.baseline_m > 0) {
     detail += ", one map unit is " + FormatNumber(options_.baseline_m / what.estimate.Baseline(), 4) + " m";
   }
-  AddEvent(event.time, "rig", detail);
+  state_.AddEvent(event.time, "rig", detail);
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::CalibrationMismatch& what) {
   const std::string text = TextOf(what.mismatch);
-  AddEvent(event.time, "warning", CameraPrefix(event.camera) + text);
-  Advise(&cameras_[event.camera], text);
+  state_.AddEvent(event.time, "warning", state_.CameraPrefix(event.camera) + text);
+  state_.cameras[event.camera].Advise(text);
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::LensEstimated& what) {
-  cameras_[event.camera].model = what.lens.model;
-  AddEvent(event.time, "lens",
-           "Estimated calibration of camera \"" + what.lens.name + "\"" +
-               (what.lens.fixed ? " (final)" : "") + ": focal length " + FormatFocalLength(what.lens));
+  state_.cameras[event.camera].model = what.lens.model;
+  state_.AddEvent(event.time, "lens",
+                  "Estimated calibration of camera \"" + what.lens.name + "\"" +
+                      (what.lens.fixed ? " (final)" : "") + ": focal length " + FormatFocalLength(what.lens));
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapperFailed& what) {
   const std::string text = "Mapping has stopped because of an error: " + what.what +
                            " Tracking continues, and what was mapped is saved.";
-  AddEvent(event.time, "warning", text);
-  for (Camera& camera : cameras_) Advise(&camera, text);
+  state_.AddEvent(event.time, "warning", text);
+  for (SessionCamera& camera : state_.cameras) camera.Advise(text);
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapperEvent& what) {
-  const std::optional<EventText> text = TextOf(what, NameOf(event.map));
+  const std::optional<EventText> text = TextOf(what, state_.NameOf(event.map));
   if (!text) return;
-  AddEvent(event.time, text->event, text->detail);
+  state_.AddEvent(event.time, text->event, text->detail);
   if (!std::holds_alternative<engine::MapperEvent::CalibrationContradicted>(what.what)) return;
-  for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    if (!system_.EstimatedLensOf(i)) Advise(&cameras_[i], text->detail);
-  }
-}
-
-// "Hall" becomes "Hall 2", and "Hall 2" becomes "Hall 3".
-std::string Session::FreeMapName(const std::string& name) const {
-  std::string stem = name;
-  const std::size_t space = name.rfind(' ');
-  if (space != std::string::npos && space + 1 < name.size() &&
-      name.find_first_not_of("0123456789", space + 1) == std::string::npos)
-    stem = name.substr(0, space);
-  for (int number = 2;; ++number) {
-    const std::string candidate = stem + " " + std::to_string(number);
-    const bool taken = std::any_of(maps_.begin(), maps_.end(), [&](const auto& entry) {
-      return entry.second.Exists() && entry.second.name == candidate;
-    });
-    if (!taken) return candidate;
+  for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
+    if (!system_.EstimatedLensOf(i)) state_.cameras[i].Advise(text->detail);
   }
 }
 
@@ -214,8 +191,8 @@ void Session::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, Sessi
   into->joined_keys.push_back(from->key);
   into->joined_keys.insert(into->joined_keys.end(), from->joined_keys.begin(), from->joined_keys.end());
   from->joined_into = into->key;
-  UpdatePermissions(*into);
-  for (auto& [key, map] : maps_) {
+  system_.SetPermissions(into->key, into->Permissions());
+  for (auto& [key, map] : state_.maps) {
     if (!map.Exists() || key == into->key) continue;
     auto other = std::make_shared<content::Scene>(*map.scene);
     if (maps::MayChangeContent(map.policy) && RedirectSceneSignposts(map_from, map_into, other.get()))

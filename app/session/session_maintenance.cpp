@@ -17,7 +17,7 @@ bool Session::IsIdle(const SessionMap& map) const {
 
 std::vector<IdleMap> Session::MapsForMaintenance() const {
   std::vector<IdleMap> idle;
-  for (const auto& [key, map] : maps_) {
+  for (const auto& [key, map] : state_.maps) {
     if (IsIdle(map) && map.maintained_revision != map.snapshot->revision)
       idle.push_back({key, map.name, map.snapshot, map.changed});
   }
@@ -26,10 +26,8 @@ std::vector<IdleMap> Session::MapsForMaintenance() const {
 
 // Returns the map if it is still idle and unchanged.
 SessionMap* Session::FindIdleMap(const IdleMap& idle) {
-  const auto found = maps_.find(idle.key);
-  if (found == maps_.end() || !IsIdle(found->second) || found->second.snapshot != idle.snapshot)
-    return nullptr;
-  return &found->second;
+  SessionMap* const map = state_.FindMap(idle.key);
+  return map != nullptr && IsIdle(*map) && map->snapshot == idle.snapshot ? map : nullptr;
 }
 
 bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
@@ -78,9 +76,9 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
   map->UpdateSnapshot(adjusted.snapshot);
   map->saved_snapshot = adjusted.snapshot;
   map->maintained_revision = adjusted.snapshot->revision;
-  AddEvent(LastTime(), "maintenance",
-           map->name + ": reprojection error " + FormatNumber(done.rms_before_px, 3) + " px before, " +
-               FormatNumber(done.rms_after_px, 3) + " px after");
+  state_.AddEvent(state_.LastTime(), "maintenance",
+                  map->name + ": reprojection error " + FormatNumber(done.rms_before_px, 3) + " px before, " +
+                      FormatNumber(done.rms_after_px, 3) + " px after");
   return true;
 }
 

@@ -10,21 +10,21 @@ namespace docent::app {
 
 void Session::LoadMaps() {
   for (const maps::MapInfo& info : library_->List()) {
-    SessionMap& map = maps_[info.key];
+    SessionMap& map = state_.maps[info.key];
     map.key = info.key;
     map.name = info.name;
     map.policy = info.policy;
     map.bounds = info.bounds;
     map.saved_scene = map.scene;
     map.in_library = true;
-    system_.AddMap(map.key, nullptr, PermissionsOf(map));
+    system_.AddMap(map.key, nullptr, map.Permissions());
   }
   maps::MapPager::Callbacks callbacks;
   callbacks.loaded = [this](const maps::StoredMap& stored) { AddLoadedMap(stored); };
   callbacks.evict = [this](std::uint64_t key) { return Evict(key); };
   callbacks.failed = [this](std::uint64_t, const std::string& problem) {
     const std::scoped_lock lock(mutex_);
-    AddEvent(LastTime(), "warning", problem);
+    state_.AddEvent(state_.LastTime(), "warning", problem);
   };
   pager_.emplace(library_, &system_.place_index(), options_.memory, std::move(callbacks));
   system_.SetPlaceFinder(&*pager_);
@@ -45,18 +45,18 @@ void Session::AddLoadedMap(const maps::StoredMap& stored) {
   if (options_.may_write && problems.empty())
     history = StoredHistory(stored.info.key, where, &assets, &problems);
   const std::scoped_lock lock(mutex_);
-  for (const std::string& problem : problems) AddEvent(LastTime(), "warning", problem);
+  for (const std::string& problem : problems) state_.AddEvent(state_.LastTime(), "warning", problem);
   assets_.merge(assets);
   // A map that another process saved since the session began is not part of the session.
-  const auto found = maps_.find(stored.info.key);
-  if (found == maps_.end() || found->second.changed) return;
-  SessionMap& map = found->second;
+  SessionMap* const known = state_.FindMap(stored.info.key);
+  if (known == nullptr || known->changed) return;
+  SessionMap& map = *known;
   map.snapshot = map.saved_snapshot = stored.snapshot;
   ResolveSignposts(scene.get());
   map.scene = map.saved_scene = std::move(scene);
   map.history = std::move(history);
   system_.SetSnapshot(map.key, map.snapshot);
-  UpdatePermissions(map);
+  system_.SetPermissions(map.key, map.Permissions());
 }
 
 // Empty when the library has none, or a damaged one, which costs nothing else.
@@ -78,9 +78,8 @@ void Session::ResolveSignposts(content::Scene* scene) {
     if (entity.kind != content::Entity::Kind::kSignpost) continue;
     content::Signpost& signpost = entity.signpost;
     if (signpost.to_key != 0) {
-      if (const auto found = maps_.find(signpost.to_key); found != maps_.end())
-        signpost.to_map = found->second.name;
-    } else if (const SessionMap* const map = FindByName(signpost.to_map)) {
+      if (const SessionMap* const map = state_.FindMap(signpost.to_key)) signpost.to_map = map->name;
+    } else if (const SessionMap* const map = state_.FindByName(signpost.to_map)) {
       signpost.to_key = map->key;
     }
   }
@@ -88,9 +87,9 @@ void Session::ResolveSignposts(content::Scene* scene) {
 
 bool Session::Evict(std::uint64_t key) {
   const std::scoped_lock lock(mutex_);
-  const auto found = maps_.find(key);
-  if (found == maps_.end()) return true;
-  SessionMap& map = found->second;
+  SessionMap* const found = state_.FindMap(key);
+  if (found == nullptr) return true;
+  SessionMap& map = *found;
   if (map.changed || map.NeedsSave() || system_.IsInUse(key)) return false;
   system_.SetSnapshot(key, nullptr);
   map.snapshot.reset();
@@ -111,7 +110,7 @@ void Session::LoadIntoMemory(const Command& command) {
   std::uint64_t key = 0;
   {
     const std::scoped_lock lock(mutex_);
-    const SessionMap* const map = FindByName(*name);
+    const SessionMap* const map = state_.FindByName(*name);
     if (map != nullptr && map->in_library && !map->snapshot) key = map->key;
   }
   if (key != 0) pager_->Load(key);
@@ -128,8 +127,8 @@ void Session::ExpectNeighbours(const SessionMap& map) {
   std::vector<std::uint64_t> keys;
   for (const content::Entity& entity : map.scene->entities) {
     if (entity.kind != content::Entity::Kind::kSignpost) continue;
-    const auto neighbour = maps_.find(entity.signpost.to_key);
-    if (neighbour != maps_.end() && neighbour->second.in_library) keys.push_back(neighbour->first);
+    const SessionMap* const neighbour = state_.FindMap(entity.signpost.to_key);
+    if (neighbour != nullptr && neighbour->in_library) keys.push_back(neighbour->key);
   }
   pager_->Prefetch(keys);
 }

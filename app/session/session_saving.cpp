@@ -55,12 +55,13 @@ void Session::SaveMap(SessionMap* map, Timestamp time) {
   map->saved_snapshot = map->snapshot;
   map->saved_scene = map->scene;
   map->changed = true;
-  UpdatePermissions(*map);
+  system_.SetPermissions(map->key, map->Permissions());
   saver_->Submit(std::move(record));
-  AddEvent(time, "save",
-           map->name + (structure ? ": " + std::to_string(map->snapshot->keyframes.size()) + " keyframes, " +
-                                        std::to_string(map->snapshot->points.size()) + " points"
-                                  : ": content"));
+  state_.AddEvent(
+      time, "save",
+      map->name + (structure ? ": " + std::to_string(map->snapshot->keyframes.size()) + " keyframes, " +
+                                   std::to_string(map->snapshot->points.size()) + " points"
+                             : ": content"));
 }
 
 void Session::Autosave(Timestamp time) {
@@ -69,7 +70,7 @@ void Session::Autosave(Timestamp time) {
   if (options_.autosave_interval <= Timestamp{} || time - *last_save_ < options_.autosave_interval) return;
   last_save_ = time;
   ReportSaveFailure(time);
-  for (auto& [key, map] : maps_) {
+  for (auto& [key, map] : state_.maps) {
     if (!system_.IsProvisional(key)) SaveMap(&map, time);
   }
 }
@@ -84,9 +85,9 @@ void Session::ReportSaveFailure(Timestamp time) {
     std::rethrow_exception(failure);
   } catch (const std::exception& error) {
     spdlog::warn("{}", error.what());
-    AddEvent(time, "warning", error.what());
+    state_.AddEvent(time, "warning", error.what());
   }
-  for (auto& [key, map] : maps_) {
+  for (auto& [key, map] : state_.maps) {
     if (!map.changed) continue;
     if (maps::MayChangeStructure(map.policy)) map.saved_snapshot.reset();
     if (maps::MayChangeContent(map.policy)) map.saved_scene.reset();
