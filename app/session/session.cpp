@@ -30,14 +30,15 @@ Session::Session(const SessionOptions& options,
       library_(library),
       keys_(options.may_write ? library : nullptr),
       system_(SystemOptionsOf(options, &keys_), cameras),
-      state_(std::move(cameras)) {
+      state_(std::move(cameras)),
+      saving_(options_, library, &keys_, &system_, &mutex_, &state_) {
   system_.SetEventHook([this] {
     const std::scoped_lock lock(mutex_);
     HandleSystemEvents();
   });
   if (library_ != nullptr) {
     LoadMaps();
-    if (options.may_write) StartSaver();
+    if (options.may_write) saving_.Start();
   }
   if (!options.first_map.empty()) {
     const std::scoped_lock lock(mutex_);
@@ -61,7 +62,7 @@ engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   camera.last_time = frame.time;
   HandleSystemEvents();
   ReportRejection(&camera, tracked);
-  if (options_.may_write) Autosave(frame.time);
+  if (options_.may_write) saving_.Autosave(frame.time);
   return tracked;
 }
 
@@ -109,20 +110,9 @@ std::vector<Event> Session::TakeEvents() {
   return std::exchange(state_.events, {});
 }
 
-Session::Saving Session::SavingNow() const {
-  Saving saving;
-  if (!saver_) return saving;
-  saving.unsaved = saver_->pending() > 0;
-  const std::scoped_lock lock(mutex_);
-  saving.saved_at = saved_at_;
-  for (const auto& [key, map] : state_.maps)
-    saving.unsaved = saving.unsaved || (map.Exists() && map.NeedsSave() && map.snapshot->HasFinitePoints());
-  return saving;
-}
-
 void Session::DiscardChanges() {
   const std::scoped_lock lock(mutex_);
-  discards_changes_ = true;
+  saving_.DiscardChanges();
 }
 
 void Session::Finish() {
@@ -133,18 +123,18 @@ void Session::Finish() {
   } catch (...) {
     failure = std::current_exception();  // what was mapped before is saved all the same
   }
-  if (saver_) {
-    saver_->EndMaintenance();
-    saver_->Flush();  // so that failed saves are repeated below
+  if (saving_.HasStarted()) {
+    saving_.EndMaintenance();
+    saving_.Flush();  // so that failed saves are repeated below
     {
       const std::scoped_lock lock(mutex_);
       HandleSystemEvents();
       const Timestamp time = state_.LastTime();
-      ReportSaveFailure(time);
-      for (auto& [key, map] : state_.maps) SaveMap(&map, time);
+      saving_.ReportFailure(time);
+      saving_.SaveAll(time);
     }
-    saver_->Flush();
-    if (!failure) failure = saver_->TakeError();
+    saving_.Flush();
+    if (!failure) failure = saving_.TakeError();
   }
   if (failure) std::rethrow_exception(failure);
 }

@@ -17,16 +17,15 @@
 #include "app/output/run_output.h"
 #include "app/script/scene_commands.h"
 #include "app/session/library_scene.h"
-#include "app/session/maintenance_order.h"
 #include "app/session/map_keys.h"
 #include "app/session/mapping_status.h"
 #include "app/session/session_options.h"
+#include "app/session/session_saving.h"
 #include "app/session/session_state.h"
 #include "app/session/surface_at_pixel.h"
 #include "engine/system/system.h"
 #include "maps/library/library.h"
 #include "maps/library/map_pager.h"
-#include "maps/library/saver.h"
 
 namespace docent::app {
 
@@ -108,11 +107,8 @@ class Session {
   std::vector<Event> TakeEvents();
 
   // Whether something is not on disk yet, and when something was written last.
-  struct Saving {
-    bool unsaved = false;
-    std::optional<std::chrono::steady_clock::time_point> saved_at;  // empty before the first time
-  };
-  Saving SavingNow() const;
+  using Saving = SavingStatus;
+  Saving SavingNow() const { return saving_.Status(); }
   // From now on nothing is saved any more, neither by itself nor by Finish. What was saved stays.
   void DiscardChanges();
 
@@ -165,9 +161,6 @@ class Session {
   void Apply(const RenameMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
   void Apply(const RemoveMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
   void Apply(const Save& command, const engine::TrackedFrame& frame);
-  // Waits until the library holds all changes of the map that were submitted; returns whether it has the map.
-  bool FlushToLibrary(std::uint64_t key, const std::string& name, Timestamp time,
-                      std::unique_lock<std::mutex>* lock);
 
   // session_content.cpp; all with mutex_ held
   void Apply(const PlaceModel& command, const engine::TrackedFrame& frame);
@@ -192,19 +185,6 @@ class Session {
   std::uint64_t TargetKey(const SessionMap& map, const std::string& to_map);
   std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
 
-  // session_saving.cpp
-  void OnSaved(const maps::MapRecord& record);
-  void StartSaver();
-  void SaveMap(SessionMap* map, Timestamp time);
-  void Autosave(Timestamp time);  // with mutex_ held
-  void ReportSaveFailure(Timestamp time);
-
-  // session_maintenance.cpp; RunMaintenance on the saver's thread and without mutex_
-  bool RunMaintenance(const std::atomic<bool>& interrupt);
-  bool IsIdle(const SessionMap& map) const;
-  std::vector<IdleMap> MapsForMaintenance() const;
-  SessionMap* FindIdleMap(const IdleMap& idle);
-
   const SessionOptions options_;
   maps::Library* const library_;
   MapKeys keys_;
@@ -216,14 +196,10 @@ class Session {
   AssetCache assets_;                                                    // by id
   std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by file name in commands
   std::filesystem::path model_folder_;
-  std::optional<Timestamp> last_save_;
-  std::optional<std::chrono::steady_clock::time_point> saved_at_;  // for people only
-  bool discards_changes_ = false;
   bool finished_ = false;
-  MaintenanceOrder maintenance_order_;  // accessed only by the saver's thread
   // Last, because their threads call back into the other members.
   std::optional<maps::MapPager> pager_;  // only with a library
-  std::optional<maps::Saver> saver_;     // only with a library opened for writing
+  SessionSaving saving_;                 // started only with a library opened for writing
 };
 
 }  // namespace docent::app

@@ -62,7 +62,7 @@ void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
     system_.SetPermissions(key, state_.maps.at(key).Permissions());
     if (system_.CurrentMap(CameraOf(frame)) == key) system_.Activate(key);
   };
-  if (saver_ && system_.CurrentMap(CameraOf(frame)) == key) {
+  if (saving_.HasStarted() && system_.CurrentMap(CameraOf(frame)) == key) {
     // The mapper must not change the map between the save and the new policy, which may forbid to save it.
     engine::MapPermissions unchanged = map.Permissions();
     unchanged.extend = false;
@@ -84,10 +84,10 @@ void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
 void Session::ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestamp time,
                            std::unique_lock<std::mutex>* lock) {
   SessionMap& map = state_.maps.at(key);
-  if (saver_) {
+  if (saving_.HasStarted()) {
     // The library computes the bounds from what it holds, so everything must be saved first.
-    SaveMap(&map, time);
-    FlushToLibrary(key, command.name, time, lock);
+    saving_.SaveMap(&map, time);
+    saving_.FlushToLibrary(key, command.name, time, lock);
     if (map.NeedsSave())
       throw Error("the map '" + map.name + "' could not be saved, so its policy was not changed");
     library_->SetPolicy(key, command.policy);
@@ -100,22 +100,6 @@ void Session::ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestam
   map.policy = command.policy;
 }
 
-bool Session::FlushToLibrary(std::uint64_t key, const std::string& name, Timestamp time,
-                             std::unique_lock<std::mutex>* lock) {
-  if (!saver_) return false;
-  lock->unlock();
-  saver_->InterruptMaintenance();  // it may write the map as it was
-  saver_->Flush();
-  lock->lock();
-  ReportSaveFailure(time);
-  const SessionMap* const map = state_.FindMap(key);
-  if (map == nullptr || !map->Exists())
-    throw Error("the map '" + name + "' was discarded or joined meanwhile");
-  const std::vector<maps::MapInfo> stored = library_->List();
-  return std::any_of(stored.begin(), stored.end(),
-                     [&](const maps::MapInfo& info) { return info.key == key; });
-}
-
 void Session::Apply(const RenameMap& command, const engine::TrackedFrame& frame,
                     std::unique_lock<std::mutex>* lock) {
   SessionMap* const map = state_.FindByName(command.name);
@@ -124,7 +108,7 @@ void Session::Apply(const RenameMap& command, const engine::TrackedFrame& frame,
   if (!maps::MayChangeContent(map->policy)) {
     throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be renamed");
   }
-  const bool stored = FlushToLibrary(map->key, command.name, frame.frame.time, lock);
+  const bool stored = saving_.FlushToLibrary(map->key, command.name, frame.frame.time, lock);
   if (state_.FindByName(command.new_name) != nullptr)
     throw Error("there is already a map '" + command.new_name + "'");
   if (stored) library_->Rename(map->key, command.new_name);
@@ -139,7 +123,7 @@ void Session::Apply(const RemoveMap& command, const engine::TrackedFrame& frame,
   if (!maps::MayRemove(map->policy)) {
     throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be removed");
   }
-  if (FlushToLibrary(map->key, command.name, frame.frame.time, lock)) library_->Remove(map->key);
+  if (saving_.FlushToLibrary(map->key, command.name, frame.frame.time, lock)) library_->Remove(map->key);
   map->discarded = true;  // before the cameras leave the map, so that it is not saved again
   system_.RemoveMap(map->key);
   state_.Retarget(map->key, command.name, 0, "");
@@ -147,8 +131,8 @@ void Session::Apply(const RemoveMap& command, const engine::TrackedFrame& frame,
 }
 
 void Session::Apply(const Save&, const engine::TrackedFrame& frame) {
-  if (!saver_) throw Error("there is no library to save to");
-  for (auto& [key, map] : state_.maps) SaveMap(&map, frame.frame.time);
+  if (!saving_.HasStarted()) throw Error("there is no library to save to");
+  saving_.SaveAll(frame.frame.time);
 }
 
 }  // namespace docent::app

@@ -66,7 +66,7 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapEntered&
   state_.AddEvent(event.time, "map", "entered " + state_.NameOf(event.map));
   PinMapsInUse();
   if (const SessionMap* const map = state_.FindMap(event.map)) ExpectNeighbours(*map);
-  if (saver_) saver_->InterruptMaintenance();  // maintenance may be adjusting this map
+  saving_.InterruptMaintenance();  // maintenance may be adjusting this map
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::Relocalized&) {
@@ -83,7 +83,7 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapLeft& wh
   const auto found = state_.maps.find(event.map);
   if (found == state_.maps.end()) return;
   if (!what.forgotten) {
-    if (options_.may_write) SaveMap(&found->second, event.time);
+    if (options_.may_write) saving_.SaveMap(&found->second, event.time);
     return;
   }
   state_.AddEvent(event.time, "warning",
@@ -119,11 +119,11 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapStartedA
 }
 
 void Session::Handle(const engine::SystemEvent&, const engine::KeyFrameOffered&) {
-  if (saver_) saver_->InterruptMaintenance();  // the active map has priority
+  saving_.InterruptMaintenance();  // the active map has priority
 }
 
 void Session::Handle(const engine::SystemEvent&, const engine::JoinRequested&) {
-  if (saver_) saver_->InterruptMaintenance();  // maintenance may be adjusting the map
+  saving_.InterruptMaintenance();  // maintenance may be adjusting the map
 }
 
 void Session::Handle(const engine::SystemEvent& event, const engine::MapsJoined& what) {
