@@ -3,11 +3,12 @@
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <utility>
+#include <variant>
 
 #include "app/files/image_files.h"
 #include "app/output/engine_text.h"
+#include "app/script/script_file.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -27,22 +28,25 @@ engine::SystemOptions SystemOptionsOf(const SessionOptions& options, MapKeys* ke
 Session::Session(const SessionOptions& options,
                  std::vector<std::shared_ptr<const engine::CameraModel>> cameras, maps::Library* library)
     : options_(options),
-      library_(library),
       keys_(options.may_write ? library : nullptr),
       system_(SystemOptionsOf(options, &keys_), cameras),
       state_(std::move(cameras)),
+      event_handler_(options_, &system_, &state_, &memory_, &saving_),
+      map_commands_(library, &keys_, &system_, &state_, &event_handler_, &memory_, &saving_),
+      content_commands_(options_, &system_, &state_, &assets_),
+      memory_(options_, library, &system_, &mutex_, &state_, &assets_),
       saving_(options_, library, &keys_, &system_, &mutex_, &state_) {
   system_.SetEventHook([this] {
     const std::scoped_lock lock(mutex_);
-    HandleSystemEvents();
+    event_handler_.HandleEvents();
   });
-  if (library_ != nullptr) {
-    LoadMaps();
+  if (library != nullptr) {
+    memory_.Open();
     if (options.may_write) saving_.Start();
   }
   if (!options.first_map.empty()) {
     const std::scoped_lock lock(mutex_);
-    Apply(NewMap{options.first_map}, engine::TrackedFrame());
+    map_commands_.Apply(NewMap{options.first_map}, engine::TrackedFrame());
   }
 }
 
@@ -58,23 +62,43 @@ Session::~Session() {
 engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   engine::TrackedFrame tracked = system_.Process(frame);
   const std::scoped_lock lock(mutex_);
-  SessionCamera& camera = state_.cameras[static_cast<std::size_t>(frame.camera)];
-  camera.last_time = frame.time;
-  HandleSystemEvents();
-  ReportRejection(&camera, tracked);
+  state_.cameras[static_cast<std::size_t>(frame.camera)].last_time = frame.time;
+  event_handler_.HandleEvents();
+  event_handler_.ReportRejection(tracked);
   if (options_.may_write) saving_.Autosave(frame.time);
   return tracked;
 }
 
-void Session::ReportRejection(SessionCamera* camera, const engine::TrackedFrame& frame) {
-  const auto name = [this](std::uint64_t key) { return state_.NameOf(key); };
-  const bool is_new = camera->relocalization_message.Update(frame.frame.time, engine::HasPose(frame.state),
-                                                            frame.relocalization, name);
-  const std::string& text = camera->relocalization_message.text();
-  if (text.empty() || !is_new) return;
-  state_.AddEvent(frame.frame.time, "not sure",
-                  state_.CameraPrefix(CameraOf(frame)) + text + " (" +
-                      std::to_string(frame.relocalization.inliers) + " inliers)");
+void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
+                      const std::filesystem::path& model_folder) {
+  if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
+    throw Error("a tour is read-only; use docent author to make changes");
+  }
+  if (const std::string problem = Validate(command); !problem.empty()) throw Error(problem);
+  memory_.LoadFor(command);
+  std::unique_lock lock(mutex_);
+  event_handler_.HandleEvents();
+  assets_.SetFolder(model_folder);
+  const auto apply = [&](const auto& chosen) {
+    if constexpr (requires { map_commands_.Apply(chosen, frame, &lock); }) {
+      map_commands_.Apply(chosen, frame, &lock);  // waits for the disk
+    } else if constexpr (requires { map_commands_.Apply(chosen, frame); }) {
+      map_commands_.Apply(chosen, frame);
+    } else {
+      content_commands_.Apply(chosen, frame);
+    }
+  };
+  std::visit(apply, command);
+  event_handler_.HandleEvents();
+  state_.AddEvent(frame.frame.time, "command", FormatCommand(command));
+}
+
+void Session::Preload(const Command& command, const std::filesystem::path& model_folder) {
+  const auto* place = std::get_if<PlaceModel>(&command);
+  if (place == nullptr) return;
+  const std::scoped_lock lock(mutex_);
+  assets_.SetFolder(model_folder);
+  assets_.Load(place->file);
 }
 
 Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
@@ -128,7 +152,7 @@ void Session::Finish() {
     saving_.Flush();  // so that failed saves are repeated below
     {
       const std::scoped_lock lock(mutex_);
-      HandleSystemEvents();
+      event_handler_.HandleEvents();
       const Timestamp time = state_.LastTime();
       saving_.ReportFailure(time);
       saving_.SaveAll(time);

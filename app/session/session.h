@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -15,17 +13,19 @@
 #include <vector>
 
 #include "app/output/run_output.h"
-#include "app/script/scene_commands.h"
-#include "app/session/library_scene.h"
+#include "app/script/commands.h"
+#include "app/session/content_commands.h"
+#include "app/session/map_commands.h"
 #include "app/session/map_keys.h"
 #include "app/session/mapping_status.h"
+#include "app/session/session_assets.h"
+#include "app/session/session_memory.h"
 #include "app/session/session_options.h"
 #include "app/session/session_saving.h"
 #include "app/session/session_state.h"
-#include "app/session/surface_at_pixel.h"
+#include "app/session/system_event_handler.h"
 #include "engine/system/system.h"
 #include "maps/library/library.h"
-#include "maps/library/map_pager.h"
 
 namespace docent::app {
 
@@ -117,89 +117,22 @@ class Session {
   void Finish();
 
  private:
-  // session.cpp
-  void ReportRejection(SessionCamera* camera, const engine::TrackedFrame& frame);
-
-  // session_memory.cpp
-  void LoadMaps();
-  void AddLoadedMap(const maps::StoredMap& stored);
-  content::EditHistory StoredHistory(std::uint64_t key, const std::string& where, AssetCache* assets,
-                                     std::vector<std::string>* problems) const;  // without mutex_
-  void ResolveSignposts(content::Scene* scene);
-  bool Evict(std::uint64_t key);
-  void LoadIntoMemory(const Command& command);  // without mutex_
-  void PinMapsInUse();
-  void ExpectNeighbours(const SessionMap& map);
-
-  // session_events.cpp; all with mutex_ held. Each brings the session up to date and adds an event in words.
-  void HandleSystemEvents();
-  void Handle(const engine::SystemEvent& event, const engine::MapEntered& what);
-  void Handle(const engine::SystemEvent& event, const engine::Relocalized& what);
-  void Handle(const engine::SystemEvent& event, const engine::PoseRejected& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapLeft& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapUpdated& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapDiscarded& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapStartedAfterLoss& what);
-  void Handle(const engine::SystemEvent& event, const engine::KeyFrameOffered& what);
-  void Handle(const engine::SystemEvent& event, const engine::JoinRequested& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapsJoined& what);
-  void Handle(const engine::SystemEvent& event, const engine::JoinRefused& what);
-  void Handle(const engine::SystemEvent& event, const engine::RigChanged& what);
-  void Handle(const engine::SystemEvent& event, const engine::CalibrationMismatch& what);
-  void Handle(const engine::SystemEvent& event, const engine::LensEstimated& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapperFailed& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapperEvent& what);
-  void AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into);
-
-  // session_commands.cpp; all with mutex_ held unless noted
-  void Apply(const NewMap& command, const engine::TrackedFrame& frame);
-  void Apply(const StopMap& command, const engine::TrackedFrame& frame);
-  void Apply(const UseMap& command, const engine::TrackedFrame& frame);
-  void Apply(const SetPolicy& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
-  void ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestamp time,
-                    std::unique_lock<std::mutex>* lock);
-  void Apply(const RenameMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
-  void Apply(const RemoveMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
-  void Apply(const Save& command, const engine::TrackedFrame& frame);
-
-  // session_content.cpp; all with mutex_ held
-  void Apply(const PlaceModel& command, const engine::TrackedFrame& frame);
-  void Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame);
-  void Apply(const MoveEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame);
-  void Apply(const PasteEntities& command, const engine::TrackedFrame& frame);
-  void Apply(const AlignEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const BendEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const Undo& command, const engine::TrackedFrame& frame);
-  void Apply(const Redo& command, const engine::TrackedFrame& frame);
-  template <SceneCommand C>
-  void Apply(const C& command, const engine::TrackedFrame& frame) {
-    SessionMap& map = MapToEdit(frame);
-    Edit(&map, EditFor(*map.scene, command));
-  }
-  SessionMap& MapToEdit(const engine::TrackedFrame& frame);
-  void Edit(SessionMap* map, content::SceneChange change);
-  content::SurfaceHit SurfaceFor(const engine::TrackedFrame& frame, const Eigen::Vector2d& pixel) const;
-  std::vector<content::Correspondence> Correspondences(const engine::TrackedFrame& frame,
-                                                       const std::vector<PointPair>& pairs) const;
-  std::uint64_t TargetKey(const SessionMap& map, const std::string& to_map);
-  std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
-
   const SessionOptions options_;
-  maps::Library* const library_;
   MapKeys keys_;
   engine::System system_;  // its lock may be taken while mutex_ is held, never the other way round
+  bool finished_ = false;
 
-  // Guards the members below; never held while tracking or waiting for another thread.
+  // Guards the members below, as far as they do not say otherwise; never held while tracking or waiting for
+  // another thread.
   mutable std::mutex mutex_;
   SessionState state_;
-  AssetCache assets_;                                                    // by id
-  std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by file name in commands
-  std::filesystem::path model_folder_;
-  bool finished_ = false;
+  SessionAssets assets_;
+  SystemEventHandler event_handler_;
+  MapCommands map_commands_;
+  ContentCommands content_commands_;
   // Last, because their threads call back into the other members.
-  std::optional<maps::MapPager> pager_;  // only with a library
-  SessionSaving saving_;                 // started only with a library opened for writing
+  SessionMemory memory_;  // opened only with a library
+  SessionSaving saving_;  // started only with a library opened for writing
 };
 
 }  // namespace docent::app

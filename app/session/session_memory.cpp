@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
+#include "app/session/session_memory.h"
 
-#include "app/session/session.h"
+#include <memory>
+#include <utility>
+#include <variant>
+
+#include "app/session/library_scene.h"
 #include "engine/base/error.h"
 
-// Which maps of the library are in memory: the pager loads and evicts maps, the session tells it which are in
-// use.
 namespace docent::app {
 
-void Session::LoadMaps() {
+void SessionMemory::Open() {
   for (const maps::MapInfo& info : library_->List()) {
     SessionMap& map = state_.maps[info.key];
     map.key = info.key;
@@ -31,11 +33,11 @@ void Session::LoadMaps() {
   pager_->Open();
 }
 
-void Session::AddLoadedMap(const maps::StoredMap& stored) {
+void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   AssetCache assets;
   {
     const std::scoped_lock lock(mutex_);
-    assets = assets_;
+    assets = assets_.all();
   }
   // Models are decoded without the lock, so that frames are processed meanwhile.
   const std::string where = library_->file() + ", map '" + stored.info.name + "'";
@@ -46,7 +48,7 @@ void Session::AddLoadedMap(const maps::StoredMap& stored) {
     history = StoredHistory(stored.info.key, where, &assets, &problems);
   const std::scoped_lock lock(mutex_);
   for (const std::string& problem : problems) state_.AddEvent(state_.LastTime(), "warning", problem);
-  assets_.merge(assets);
+  assets_.Merge(&assets);
   // A map that another process saved since the session began is not part of the session.
   SessionMap* const known = state_.FindMap(stored.info.key);
   if (known == nullptr || known->changed) return;
@@ -60,8 +62,9 @@ void Session::AddLoadedMap(const maps::StoredMap& stored) {
 }
 
 // Empty when the library has none, or a damaged one, which costs nothing else.
-content::EditHistory Session::StoredHistory(std::uint64_t key, const std::string& where, AssetCache* assets,
-                                            std::vector<std::string>* problems) const {
+content::EditHistory SessionMemory::StoredHistory(std::uint64_t key, const std::string& where,
+                                                  AssetCache* assets,
+                                                  std::vector<std::string>* problems) const {
   try {
     const std::optional<maps::SceneRecord> record = library_->LoadHistory(key);
     if (record) return HistoryFromRecord(*record, where, assets);
@@ -73,7 +76,7 @@ content::EditHistory Session::StoredHistory(std::uint64_t key, const std::string
 
 // A signpost leads to a map by its key; the name is the one that the map has now. A signpost of an older
 // library has only the name.
-void Session::ResolveSignposts(content::Scene* scene) {
+void SessionMemory::ResolveSignposts(content::Scene* scene) {
   for (content::Entity& entity : scene->entities) {
     if (entity.kind != content::Entity::Kind::kSignpost) continue;
     content::Signpost& signpost = entity.signpost;
@@ -85,7 +88,7 @@ void Session::ResolveSignposts(content::Scene* scene) {
   }
 }
 
-bool Session::Evict(std::uint64_t key) {
+bool SessionMemory::Evict(std::uint64_t key) {
   const std::scoped_lock lock(mutex_);
   SessionMap* const found = state_.FindMap(key);
   if (found == nullptr) return true;
@@ -96,12 +99,11 @@ bool Session::Evict(std::uint64_t key) {
   map.saved_snapshot.reset();
   map.scene = map.saved_scene = std::make_shared<content::Scene>();
   map.history = {};
-  std::erase_if(assets_, [](const auto& asset) { return asset.second.use_count() == 1; });
+  assets_.EvictUnused();
   return true;
 }
 
-// Loads the map that a command names, if the command needs the map itself.
-void Session::LoadIntoMemory(const Command& command) {
+void SessionMemory::LoadFor(const Command& command) {
   const std::string* name = nullptr;
   if (const auto* use = std::get_if<UseMap>(&command)) name = &use->name;
   if (const auto* policy = std::get_if<SetPolicy>(&command)) name = &policy->name;
@@ -116,13 +118,13 @@ void Session::LoadIntoMemory(const Command& command) {
   if (key != 0) pager_->Load(key);
 }
 
-void Session::PinMapsInUse() {
+void SessionMemory::PinMapsInUse() {
   if (!pager_) return;
   pager_->Pin(system_.MapsInUse());
 }
 
 // A camera is likely to go where the signposts of its map lead.
-void Session::ExpectNeighbours(const SessionMap& map) {
+void SessionMemory::ExpectNeighbours(const SessionMap& map) {
   if (!pager_) return;
   std::vector<std::uint64_t> keys;
   for (const content::Entity& entity : map.scene->entities) {

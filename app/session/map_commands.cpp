@@ -1,43 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <utility>
+#include "app/session/map_commands.h"
 
-#include "app/script/script_file.h"
-#include "app/session/session.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
 
-void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
-                      const std::filesystem::path& model_folder) {
-  if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
-    throw Error("a tour is read-only; use docent author to make changes");
-  }
-  if (const std::string problem = Validate(command); !problem.empty()) throw Error(problem);
-  LoadIntoMemory(command);
-  std::unique_lock lock(mutex_);
-  HandleSystemEvents();
-  model_folder_ = model_folder;
-  const auto apply = [&](const auto& chosen) {
-    if constexpr (requires { Apply(chosen, frame, &lock); }) {
-      Apply(chosen, frame, &lock);  // waits for the disk
-    } else {
-      Apply(chosen, frame);
-    }
-  };
-  std::visit(apply, command);
-  HandleSystemEvents();
-  state_.AddEvent(frame.frame.time, "command", FormatCommand(command));
-}
-
-void Session::Apply(const NewMap& command, const engine::TrackedFrame& frame) {
+void MapCommands::Apply(const NewMap& command, const engine::TrackedFrame& frame) {
   if (state_.FindByName(command.name) != nullptr)
     throw Error("there is already a map '" + command.name + "'");
   const SessionMap& map = state_.AddMap(keys_.Take(), command.name);  // first, because it may throw
   system_.StartMap(map.key, CameraOf(frame));
 }
 
-void Session::Apply(const StopMap&, const engine::TrackedFrame& frame) {
+void MapCommands::Apply(const StopMap&, const engine::TrackedFrame& frame) {
   const std::uint64_t key = system_.CurrentMap(CameraOf(frame));
   SessionMap* const map = state_.FindMap(key);
   if (map == nullptr) throw Error("there is no current map to stop");
@@ -46,16 +21,16 @@ void Session::Apply(const StopMap&, const engine::TrackedFrame& frame) {
   system_.LeaveMap(key);
 }
 
-void Session::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
+void MapCommands::Apply(const UseMap& command, const engine::TrackedFrame& frame) {
   SessionMap& map = state_.InitializedMap(command.name);
   map.stopped = false;
   system_.SetPermissions(map.key, map.Permissions());
   system_.EnterMap(map.key, CameraOf(frame));
-  PinMapsInUse();
+  memory_.PinMapsInUse();
 }
 
-void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
-                    std::unique_lock<std::mutex>* lock) {
+void MapCommands::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
+                        std::unique_lock<std::mutex>* lock) {
   const SessionMap& map = state_.InitializedMap(command.name);
   const std::uint64_t key = map.key;
   const auto extend_again = [&] {
@@ -68,7 +43,7 @@ void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
     unchanged.extend = false;
     system_.SetPermissions(key, unchanged);
     system_.Activate(key);
-    HandleSystemEvents();
+    events_.HandleEvents();
   }
   try {
     ChangePolicy(command, key, frame.frame.time, lock);
@@ -79,10 +54,8 @@ void Session::Apply(const SetPolicy& command, const engine::TrackedFrame& frame,
   extend_again();
 }
 
-// Releases the lock while the disk works: the saver's thread takes it too, and no frame shall wait for a
-// disk.
-void Session::ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestamp time,
-                           std::unique_lock<std::mutex>* lock) {
+void MapCommands::ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestamp time,
+                               std::unique_lock<std::mutex>* lock) {
   SessionMap& map = state_.maps.at(key);
   if (saving_.HasStarted()) {
     // The library computes the bounds from what it holds, so everything must be saved first.
@@ -100,8 +73,8 @@ void Session::ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestam
   map.policy = command.policy;
 }
 
-void Session::Apply(const RenameMap& command, const engine::TrackedFrame& frame,
-                    std::unique_lock<std::mutex>* lock) {
+void MapCommands::Apply(const RenameMap& command, const engine::TrackedFrame& frame,
+                        std::unique_lock<std::mutex>* lock) {
   SessionMap* const map = state_.FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (command.new_name == command.name) throw Error("the map has this name already");
@@ -116,8 +89,8 @@ void Session::Apply(const RenameMap& command, const engine::TrackedFrame& frame,
   state_.Retarget(map->key, command.name, map->key, command.new_name);
 }
 
-void Session::Apply(const RemoveMap& command, const engine::TrackedFrame& frame,
-                    std::unique_lock<std::mutex>* lock) {
+void MapCommands::Apply(const RemoveMap& command, const engine::TrackedFrame& frame,
+                        std::unique_lock<std::mutex>* lock) {
   SessionMap* const map = state_.FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (!maps::MayRemove(map->policy)) {
@@ -127,10 +100,10 @@ void Session::Apply(const RemoveMap& command, const engine::TrackedFrame& frame,
   map->discarded = true;  // before the cameras leave the map, so that it is not saved again
   system_.RemoveMap(map->key);
   state_.Retarget(map->key, command.name, 0, "");
-  PinMapsInUse();
+  memory_.PinMapsInUse();
 }
 
-void Session::Apply(const Save&, const engine::TrackedFrame& frame) {
+void MapCommands::Apply(const Save&, const engine::TrackedFrame& frame) {
   if (!saving_.HasStarted()) throw Error("there is no library to save to");
   saving_.SaveAll(frame.frame.time);
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a change in the system means for the session: its maps, their content, and what the user is told.
-#include <algorithm>
+#include "app/session/system_event_handler.h"
+
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,7 +11,6 @@
 #include "app/files/text_file.h"
 #include "app/output/engine_text.h"
 #include "app/session/joined_scenes.h"
-#include "app/session/session.h"
 
 namespace docent::app {
 
@@ -57,29 +57,41 @@ std::string TextOf(const engine::CalibrationMonitor::Mismatch& mismatch) {
 
 }  // namespace
 
-void Session::HandleSystemEvents() {
+void SystemEventHandler::HandleEvents() {
   for (const engine::SystemEvent& event : system_.TakeEvents())
     std::visit([&](const auto& what) { Handle(event, what); }, event.what);
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::MapEntered&) {
+void SystemEventHandler::ReportRejection(const engine::TrackedFrame& frame) {
+  SessionCamera& camera = state_.cameras[CameraOf(frame)];
+  const auto name = [this](std::uint64_t key) { return state_.NameOf(key); };
+  const bool is_new = camera.relocalization_message.Update(frame.frame.time, engine::HasPose(frame.state),
+                                                           frame.relocalization, name);
+  const std::string& text = camera.relocalization_message.text();
+  if (text.empty() || !is_new) return;
+  state_.AddEvent(frame.frame.time, "not sure",
+                  state_.CameraPrefix(CameraOf(frame)) + text + " (" +
+                      std::to_string(frame.relocalization.inliers) + " inliers)");
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapEntered&) {
   state_.AddEvent(event.time, "map", "entered " + state_.NameOf(event.map));
-  PinMapsInUse();
-  if (const SessionMap* const map = state_.FindMap(event.map)) ExpectNeighbours(*map);
+  memory_.PinMapsInUse();
+  if (const SessionMap* const map = state_.FindMap(event.map)) memory_.ExpectNeighbours(*map);
   saving_.InterruptMaintenance();  // maintenance may be adjusting this map
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::Relocalized&) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::Relocalized&) {
   const std::string by =
       state_.cameras.size() > 1 ? " by camera " + std::to_string(event.camera) : std::string();
   state_.AddEvent(event.time, "relocalized", state_.NameOf(event.map) + by);
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::PoseRejected&) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::PoseRejected&) {
   state_.cameras[event.camera].relocalization_message = {};
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::MapLeft& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapLeft& what) {
   const auto found = state_.maps.find(event.map);
   if (found == state_.maps.end()) return;
   if (!what.forgotten) {
@@ -91,11 +103,11 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapLeft& wh
   state_.maps.erase(found);
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::MapUpdated& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapUpdated& what) {
   if (SessionMap* const map = state_.FindMap(event.map)) map->UpdateSnapshot(what.snapshot);
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::MapDiscarded& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapDiscarded& what) {
   SessionMap* const found = state_.FindMap(event.map);
   if (found == nullptr) return;
   SessionMap& map = *found;
@@ -111,22 +123,22 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapDiscarde
   }
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::MapStartedAfterLoss& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapStartedAfterLoss& what) {
   const std::string before = state_.NameOf(what.lost_in);
   const std::string name = state_.FreeMapName(before);
   state_.AddMap(event.map, name);
   state_.AddEvent(event.time, "map", "began " + name + ": the camera was lost in " + before);
 }
 
-void Session::Handle(const engine::SystemEvent&, const engine::KeyFrameOffered&) {
+void SystemEventHandler::Handle(const engine::SystemEvent&, const engine::KeyFrameOffered&) {
   saving_.InterruptMaintenance();  // the active map has priority
 }
 
-void Session::Handle(const engine::SystemEvent&, const engine::JoinRequested&) {
+void SystemEventHandler::Handle(const engine::SystemEvent&, const engine::JoinRequested&) {
   saving_.InterruptMaintenance();  // maintenance may be adjusting the map
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::MapsJoined& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapsJoined& what) {
   SessionMap* const into = state_.FindMap(event.map);
   SessionMap* const from = state_.FindMap(what.from);
   if (into == nullptr || from == nullptr) return;
@@ -138,13 +150,13 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapsJoined&
   for (SessionCamera& camera : state_.cameras) camera.Advise(sentence);
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::JoinRefused& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::JoinRefused& what) {
   state_.AddEvent(event.time, "map",
                   "maps " + state_.NameOf(event.map) + " and " + state_.NameOf(what.from) +
                       " were not joined: " + TextOf(what.refusal, what.overlap));
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::RigChanged& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::RigChanged& what) {
   std::string detail = state_.NameOf(event.map) + ": " + TextOf(what.estimate);
   if (what.estimate.rigid && options_.baseline_m > 0) {
     detail += ", one map unit is " + FormatNumber(options_.baseline_m / what.estimate.Baseline(), 4) + " m";
@@ -152,27 +164,27 @@ void Session::Handle(const engine::SystemEvent& event, const engine::RigChanged&
   state_.AddEvent(event.time, "rig", detail);
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::CalibrationMismatch& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::CalibrationMismatch& what) {
   const std::string text = TextOf(what.mismatch);
   state_.AddEvent(event.time, "warning", state_.CameraPrefix(event.camera) + text);
   state_.cameras[event.camera].Advise(text);
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::LensEstimated& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::LensEstimated& what) {
   state_.cameras[event.camera].model = what.lens.model;
   state_.AddEvent(event.time, "lens",
                   "Estimated calibration of camera \"" + what.lens.name + "\"" +
                       (what.lens.fixed ? " (final)" : "") + ": focal length " + FormatFocalLength(what.lens));
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::MapperFailed& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapperFailed& what) {
   const std::string text = "Mapping has stopped because of an error: " + what.what +
                            " Tracking continues, and what was mapped is saved.";
   state_.AddEvent(event.time, "warning", text);
   for (SessionCamera& camera : state_.cameras) camera.Advise(text);
 }
 
-void Session::Handle(const engine::SystemEvent& event, const engine::MapperEvent& what) {
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapperEvent& what) {
   const std::optional<EventText> text = TextOf(what, state_.NameOf(event.map));
   if (!text) return;
   state_.AddEvent(event.time, text->event, text->detail);
@@ -183,7 +195,7 @@ void Session::Handle(const engine::SystemEvent& event, const engine::MapperEvent
 }
 
 // `into` already has the joined snapshot. Edits in `from` can no longer be undone, as its content was moved.
-void Session::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
+void SystemEventHandler::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
   auto scene = std::make_shared<content::Scene>(*into->scene);
   const maps::MapInfo map_into = IdentityOf(*into), map_from = IdentityOf(*from);
   MergeScene(*from->scene, map_into, map_from, joined, scene.get());
