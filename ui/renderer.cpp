@@ -5,11 +5,18 @@
 #include "ui/content_layer.h"
 #include "ui/heads_up.h"
 #include "ui/image_target.h"
+#include "ui/visitor_display.h"
 
 namespace docent::ui {
 
 struct Renderer::Impl {
   explicit Impl(const RendererOptions& options) : content(options.samples, options.max_texture_px) {}
+
+  // Over the video, whose target is bound.
+  void DrawViews(const VisitorDisplay& visitor) {
+    const std::vector<Inset> areas = PlaceViews(visitor, image.width_px(), image.height_px());
+    for (std::size_t i = 0; i < areas.size(); ++i) image.DrawInset(visitor.views[i], areas[i]);
+  }
 
   ImageTarget image;
   ImageTarget copy;  // With the heads-up display, for ReadBackWithHeadsUp.
@@ -43,6 +50,7 @@ void Renderer::Draw(const View& view) {
   if (view.overlay.hud) DrawHeadsUp(view, HeadsUpStyleFor(height_px), &impl_->canvas);
   target.BindForDrawing();
   impl_->canvas.End();
+  if (view.overlay.visitor) impl_->DrawViews(*view.overlay.visitor);
   if (view.overlay.inset == nullptr || view.overlay.inset->frame.image.empty()) return;
   const cv::Mat& other = view.overlay.inset->frame.image;
   const Inset inset = PlaceInset(width_px, height_px, other.cols, other.rows);

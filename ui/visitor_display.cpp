@@ -68,14 +68,32 @@ void DrawStops(const std::vector<std::string>& stops, double unit, Canvas* canva
 
 }  // namespace
 
+std::vector<Inset> PlaceViews(const VisitorDisplay& visitor, int width_px, int height_px) {
+  constexpr double kWidth = 0.27, kGap = 0.03, kTop = 0.14;  // Ratios of the image's width or height.
+  std::vector<Inset> areas;
+  const auto count = static_cast<double>(visitor.views.size());
+  double left = 0.5 * (1 - count * kWidth - (count - 1) * kGap);
+  for (const cv::Mat& view : visitor.views) {
+    Inset area;
+    area.x = std::max(0, static_cast<int>(left * width_px));
+    area.y = static_cast<int>(kTop * height_px);
+    area.width = std::max(1, static_cast<int>(kWidth * width_px));
+    area.height = std::clamp(area.width * view.rows / std::max(1, view.cols), 1, height_px / 2);
+    areas.push_back(area);
+    left += kWidth + kGap;
+  }
+  return areas;
+}
+
 void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* canvas) {
   const VisitorDisplay& visitor = *view.overlay.visitor;
   const double unit = style.unit_px;
   const double lowest = canvas->height_px() - 12 * unit - style.bottom_px;
   if (visitor.is_searching) {
     const double radius = 0.1 * std::min(canvas->width_px(), canvas->height_px());
-    const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1),
-                                 (visitor.stops.empty() ? 0.5 : 0.66) * canvas->height_px());
+    const Eigen::Vector2d middle(
+        0.5 * (canvas->width_px() - 1),
+        (visitor.stops.empty() && visitor.views.empty() ? 0.5 : 0.66) * canvas->height_px());
     DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
     DrawStops(visitor.stops, unit, canvas);
   }

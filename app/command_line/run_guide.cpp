@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/run_guide.h"
-#include "app/session/visit_state.h"
+#include "app/session/visitor_guide.h"
 
 #include <algorithm>
 #include <cctype>
@@ -181,8 +181,7 @@ class GuideRun {
     std::optional<Timestamp> age;  // Age of the last tracked image when its tracking ended.
     std::string message;
     std::shared_ptr<const ShownFrame> last;
-    std::optional<VisitState> visit;  // Only on a tour.
-    std::shared_ptr<const ShownFrame> last_with_pose;
+    std::optional<VisitorGuide> visitor;  // Only on a tour.
   };
 
   static SessionOptions OptionsOf(const GuideRequest& request, std::span<CalibratedCamera> cameras) {
@@ -229,7 +228,7 @@ class GuideRun {
 
   CameraRun RunOf(std::size_t i, const Show& show) {
     CameraState& state = camera_states_[i];
-    if (!request_.may_write) state.visit.emplace(StopNames());
+    if (!request_.may_write) state.visitor.emplace(&session_, StopNames());
     CameraRun run;
     run.camera = &cameras_[i];
     run.options.pace = request_.pace;
@@ -327,22 +326,8 @@ class GuideRun {
     // What the window shows as a warning already is not shown twice.
     if (state->message.empty() && !warnings_.contains(frame->shown.advice))
       frame->message = frame->shown.advice;
-    if (state->visit) GuideVisitor(frame, state);
+    if (state->visitor) state->visitor->Guide(frame);
     return frame;
-  }
-
-  static void GuideVisitor(const std::shared_ptr<ShownFrame>& frame, CameraState* state) {
-    const bool has_pose = engine::HasPose(frame->tracked.state);
-    frame->visitor = state->visit->Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(),
-                                          frame->shown.hint);
-    if (has_pose) {
-      state->last_with_pose = frame;
-    } else if (state->last_with_pose && state->visit->HoldsContent(frame->seconds)) {
-      frame->held_camera_from_map = state->last_with_pose->tracked.camera_from_map;
-      frame->shown.scene = state->last_with_pose->shown.scene;
-    } else {
-      state->last_with_pose.reset();
-    }
   }
 
   const GuideRequest& request_;

@@ -3,6 +3,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 #include <variant>
 
@@ -10,6 +12,7 @@
 #include "app/output/engine_text.h"
 #include "app/script/script_file.h"
 #include "engine/base/error.h"
+#include "engine/vision/small_blurry_image.h"
 
 namespace docent::app {
 
@@ -117,6 +120,28 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   shown.map_name = found->second.name;
   shown.scene = found->second.scene;
   return shown;
+}
+
+std::vector<Session::SimilarView> Session::SimilarViews(const engine::Frame& frame, std::size_t count) {
+  cv::Mat gray = frame.image;
+  if (gray.channels() == 3) cv::cvtColor(frame.image, gray, cv::COLOR_BGR2GRAY);
+  if (gray.empty()) return {};
+  const engine::SmallBlurryImage thumbnail = engine::MakeSmallBlurryImage(gray);
+  // Candidates of maps that are not in memory are left out, so more are asked for.
+  const int asked = 4 * static_cast<int>(count);
+  std::vector<SimilarView> views;
+  for (const auto& place : system_.place_index().FindPlaces(thumbnail, asked, asked, 0)) {
+    if (views.size() >= count) break;
+    if (!place.map) continue;
+    const auto& keyframes = place.map->keyframes;
+    const auto keyframe = std::find_if(keyframes.begin(), keyframes.end(),
+                                       [&](const auto& candidate) { return candidate.id == place.keyframe; });
+    if (keyframe == keyframes.end()) continue;
+    keyframe->features->MarkInUse();
+    const std::scoped_lock lock(mutex_);
+    views.push_back({state_.NameOf(place.map_key), keyframe->features->levels[1].clone()});
+  }
+  return views;
 }
 
 std::vector<Session::MapState> Session::Maps() const {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -81,6 +82,14 @@ class Session {
     std::string starting_map;  // the map that is being initialized; empty once it has points, and for none
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
+  // A keyframe that resembles an image, for a visitor who is looking for a place.
+  struct SimilarView {
+    std::string map_name;
+    cv::Mat image;  // CV_8UC1, half the size of the keyframe's image
+  };
+  // At most `count` of those in memory, the most similar first, at most one of each place if there are
+  // several. Takes some milliseconds.
+  std::vector<SimilarView> SimilarViews(const engine::Frame& frame, std::size_t count);
   // The session's state of a map.
   struct MapState {
     std::uint64_t key = 0;

@@ -29,6 +29,12 @@ ui::VisitorDisplay VisitState::Update(double seconds, const std::string& place, 
   return display;
 }
 
+bool VisitState::WantsViews(double seconds) const {
+  if (!begin_ || HoldsContent(seconds)) return false;
+  const double searched = Searched(seconds);
+  return !stops_.empty() && searched >= times_.way_back && searched < times_.stops;
+}
+
 ui::VisitorDisplay VisitState::Search(double seconds, const std::string& hint) const {
   ui::VisitorDisplay display;
   display.is_searching = true;
@@ -36,7 +42,7 @@ ui::VisitorDisplay VisitState::Search(double seconds, const std::string& hint) c
     display.sentence = "There are no places in this library yet.";
     return display;
   }
-  const double searched = seconds - (last_pose_ ? *last_pose_ + times_.held : *begin_);
+  const double searched = Searched(seconds);
   if (searched >= times_.stops) {
     display.stops = stops_;
     display.sentence = "Go to one of these places and look around slowly.";

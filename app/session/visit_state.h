@@ -14,7 +14,7 @@ struct VisitTimes {
   double arrival = 2.5;  // A place is announced for this long, enough to read two short words twice.
   double fade = 0.4;     // The announcement appears and disappears within this time.
   double held = 0.5;     // After a loss the content stays where it was for this long: a hand that passes.
-  double way_back = 5;   // Searching longer than this, the visitor is led back to the last place,
+  double way_back = 5;   // Searching longer than this, the visitor is led to known views,
   double stops = 30;     // and longer than this, all places are listed.
 };
 
@@ -29,12 +29,18 @@ class VisitState {
   // A frame at this time, with a pose in the map of this name, or without a pose if it is empty. `hint` is
   // the engine's sentence about this frame; empty for none.
   ui::VisitorDisplay Update(double seconds, const std::string& place, const std::string& hint);
+  // Whether a visitor who searches at this time is helped by views of known places, as the display should
+  // have them: after a while, and until all places are listed.
+  bool WantsViews(double seconds) const;
 
   // Whether the content of the last frame with a pose is still to be drawn.
   bool HoldsContent(double seconds) const { return last_pose_ && seconds - *last_pose_ <= times_.held; }
 
  private:
   ui::VisitorDisplay Search(double seconds, const std::string& hint) const;
+  double Searched(double seconds) const {
+    return seconds - (last_pose_ ? *last_pose_ + times_.held : *begin_);
+  }
 
   const std::vector<std::string> stops_;
   const VisitTimes times_;

@@ -61,6 +61,9 @@ TEST(VisitState, HelpsMoreTheLongerAVisitorSearches) {
   EXPECT_THAT(visit.Update(times.held + times.way_back, "", "").sentence, HasSubstr("Go back to Lions"));
   EXPECT_THAT(visit.Update(times.held + times.way_back, "", "").stops, IsEmpty());
   EXPECT_THAT(visit.Update(times.held + times.stops, "", "").stops, ElementsAre("Lions", "Masks"));
+  EXPECT_FALSE(visit.WantsViews(times.held + 0.9 * times.way_back));
+  EXPECT_TRUE(visit.WantsViews(times.held + times.way_back));
+  EXPECT_FALSE(visit.WantsViews(times.held + times.stops));
   // Who was never recognised is helped as well.
   VisitState stranger({"Lions"});
   stranger.Update(5, "", "");
