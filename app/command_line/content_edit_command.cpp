@@ -9,6 +9,7 @@
 
 #include "app/command_line/number_option.h"
 #include "app/command_line/stored_scene.h"
+#include "app/script/format_command.h"
 #include "app/script/scene_commands.h"
 #include "app/script/script_file.h"
 #include "app/session/library_scene.h"

@@ -10,7 +10,7 @@
 
 #include "app/files/image_files.h"
 #include "app/output/engine_text.h"
-#include "app/script/script_file.h"
+#include "app/script/format_command.h"
 #include "engine/base/error.h"
 #include "engine/vision/small_blurry_image.h"
 

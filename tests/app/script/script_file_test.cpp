@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "app/script/format_command.h"
 #include "engine/base/random.h"
 #include "tests/app/support/temporary_folder.h"
 

@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "app/demo/exhibit_model.h"
-#include "app/script/script_file.h"
+#include "app/script/format_command.h"
 #include "content/placement.h"
 #include "content/scene_codec.h"
 #include "content/warp.h"

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "app/demo/exhibit_model.h"
+#include "app/script/format_command.h"
 #include "app/script/script_file.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
