@@ -235,9 +235,22 @@ SceneChange RenameEdit(const Scene& scene, const std::string& name, const std::s
   return change;
 }
 
-SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text) {
-  return ChangeOf(scene, name, "change the text of",
-                  [&](Entity* entity) { SignpostOf(entity, "has no text.").text = text; });
+SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text,
+                     const std::string& language) {
+  return ChangeOf(scene, name, "change the text of", [&](Entity* entity) {
+    Signpost& signpost = SignpostOf(entity, "has no text.");
+    if (language.empty()) {
+      signpost.text = text;
+      return;
+    }
+    const std::string tag = LanguageTag(language);
+    if (tag.empty()) throw Error("'" + Shortened(language, kMaxLanguageBytes) + "' is not a language tag.");
+    if (!text.empty()) {
+      signpost.translations[tag] = text;
+    } else if (signpost.translations.erase(tag) == 0) {
+      throw Error("'" + name + "' has no text in '" + tag + "'.");
+    }
+  });
 }
 
 SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::string& to_map,

@@ -48,8 +48,11 @@ SceneChange BendEdit(const Scene& scene, const std::string& name,
 SceneChange UnbendEdit(const Scene& scene, const std::string& name);
 
 SceneChange RenameEdit(const Scene& scene, const std::string& name, const std::string& new_name);
+// Of a signpost: its first text, or with a language (see LanguageTag) its variant in that language, which an
+// empty text removes.
+SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text,
+                     const std::string& language = "");
 // Of a signpost. to_map empty and to_key 0: it leads nowhere.
-SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text);
 SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::string& to_map,
                        std::uint64_t to_key);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "content/object_reader.h"
 #include "content/warp.h"
 #include "engine/base/error.h"
 
@@ -25,100 +26,12 @@ Json WarpToJson(const Warp& warp) {
   return {{"controls_m", controls}, {"weights", weights}, {"affine", affine}};
 }
 
-// Reads the members of one JSON object.
-class ObjectReader {
- public:
-  ObjectReader(std::string_view where, std::string place, const Json& object)
-      : where_(where), place_(std::move(place)), object_(object) {
-    if (!object.is_object()) Refuse(where_, place_, "is not a JSON object.");
-  }
-
-  const Json& Member(const char* name) const {
-    const auto found = object_.find(name);
-    if (found == object_.end()) Refuse(where_, place_, "has no " + std::string(name) + ".");
-    return *found;
-  }
-
-  std::string Text(const char* name) const {
-    const Json& value = Member(name);
-    if (!value.is_string() || value.get_ref<const std::string&>().size() > kMaxTextBytes) {
-      Refuse(where_, PlaceOfMember(name),
-             "is not a string of at most " + std::to_string(kMaxTextBytes) + " bytes.");
-    }
-    return value.get<std::string>();
-  }
-
-  bool Truth(const char* name) const {
-    const Json& value = Member(name);
-    if (!value.is_boolean()) Refuse(where_, PlaceOfMember(name), "is neither true nor false.");
-    return value.get<bool>();
-  }
-
-  std::uint64_t Key(const char* name) const {
-    const Json& value = Member(name);
-    if (!value.is_number_unsigned()) Refuse(where_, PlaceOfMember(name), "is not the key of a map.");
-    return value.get<std::uint64_t>();
-  }
-
-  double Number(const char* name, double least, double most) const {
-    return AsNumber(Member(name), PlaceOfMember(name), least, most);
-  }
-
-  template <int N>
-  Eigen::Matrix<double, N, 1> Vector(const char* name, double most) const {
-    const Json& value = Member(name);
-    const std::string place = PlaceOfMember(name);
-    if (!value.is_array() || value.size() != N)
-      Refuse(where_, place, "is not a list of " + std::to_string(N) + " numbers.");
-    Eigen::Matrix<double, N, 1> vector;
-    for (int k = 0; k < N; ++k) vector[k] = AsNumber(value[static_cast<std::size_t>(k)], place, -most, most);
-    return vector;
-  }
-
-  // Reads a list of at most kMaxWarpPoints vectors.
-  std::vector<Eigen::Vector3d> Vectors(const char* name, double most) const {
-    const Json& value = Member(name);
-    const std::string place = PlaceOfMember(name);
-    if (!value.is_array() || value.size() > kMaxWarpPoints)
-      Refuse(where_, place, "is not a list of at most " + std::to_string(kMaxWarpPoints) + " points.");
-    std::vector<Eigen::Vector3d> vectors;
-    for (const Json& point : value) {
-      if (!point.is_array() || point.size() != 3) Refuse(where_, place, "is not a list of points.");
-      Eigen::Vector3d& vector = vectors.emplace_back();
-      for (int k = 0; k < 3; ++k)
-        vector[k] = AsNumber(point[static_cast<std::size_t>(k)], place, -most, most);
-    }
-    return vectors;
-  }
-
-  // Reads a vector that must have length 1, up to rounding.
-  template <int N>
-  Eigen::Matrix<double, N, 1> UnitVector(const char* name) const {
-    const Eigen::Matrix<double, N, 1> vector = Vector<N>(name, 2);
-    if (std::abs(vector.norm() - 1) > 1e-3) Refuse(where_, PlaceOfMember(name), "does not have length 1.");
-    return vector;
-  }
-
- private:
-  std::string PlaceOfMember(const char* name) const { return place_ + "." + name; }
-
-  double AsNumber(const Json& value, const std::string& place, double least, double most) const {
-    const double number = value.is_number() ? value.get<double>() : std::nan("");
-    if (!(number >= least && number <= most)) Refuse(where_, place, "is not a number in its range.");
-    return number;
-  }
-
-  std::string_view where_;
-  std::string place_;
-  const Json& object_;
-};
-
 Warp ReadWarp(std::string_view where, const std::string& place, const Json& json) {
   CheckMembers(where, place, json, {"controls_m", "weights", "affine"});
   const ObjectReader reader(where, place, json);
   Warp warp;
-  warp.controls = reader.Vectors("controls_m", kMaxWarpNumber);
-  warp.weights = reader.Vectors("weights", kMaxWarpNumber);
+  warp.controls = reader.Vectors("controls_m", kMaxWarpPoints, kMaxWarpNumber);
+  warp.weights = reader.Vectors("weights", kMaxWarpPoints, kMaxWarpNumber);
   const Eigen::Matrix<double, 12, 1> affine = reader.Vector<12>("affine", kMaxWarpNumber);
   warp.affine = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(affine.data());
   if (const std::string problem = Validate(warp); !problem.empty()) Refuse(where, place, problem + ".");
@@ -159,10 +72,14 @@ void ReadSignpost(std::string_view where, const std::string& place, const Json& 
                   Entity* entity) {
   if (version == 1) {
     CheckMembers(where, place, json, {"kind", "name", "text", "anchor_m", "up", "height_m", "to_map"});
-  } else {
+  } else if (version == 2) {
     CheckMembers(where, place, json,
                  {"kind", "name", "text", "anchor_m", "up", "height_m", "to_map", "to_key", "locked",
                   "hidden", "group"});
+  } else {
+    CheckMembers(where, place, json,
+                 {"kind", "name", "text", "translations", "anchor_m", "up", "height_m", "to_map", "to_key",
+                  "locked", "hidden", "group"});
   }
   const ObjectReader reader(where, place, json);
   entity->kind = Entity::Kind::kSignpost;
@@ -172,6 +89,7 @@ void ReadSignpost(std::string_view where, const std::string& place, const Json& 
   entity->signpost.height_m = reader.Number("height_m", kMinBoardHeight, kMaxBoardHeight);
   entity->signpost.to_map = reader.Text("to_map");
   if (version > 1) entity->signpost.to_key = reader.Key("to_key");
+  if (version > 2) entity->signpost.translations = reader.TextByLanguage("translations");
 }
 
 }  // namespace
@@ -199,6 +117,7 @@ Json EntityToJson(const Entity& entity) {
                  {"height_m", signpost.height_m},
                  {"to_map", signpost.to_map},
                  {"to_key", signpost.to_key}});
+    if (!signpost.translations.empty()) json["translations"] = signpost.translations;
     return json;
   }
   const engine::Sim3& pose = entity.model.map_from_model;
@@ -234,6 +153,9 @@ Entity EntityFromJson(std::string_view where, const std::string& place, const Js
     entity.locked = reader.Truth("locked");
     entity.hidden = reader.Truth("hidden");
     entity.group = reader.Text("group");
+  }
+  if (version > 2) {
+    if (const std::string problem = Validate(entity); !problem.empty()) Refuse(where, place, problem + ".");
   }
   return entity;
 }

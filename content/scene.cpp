@@ -46,12 +46,30 @@ std::string PoseProblem(const Entity& entity) {
   return "";
 }
 
+bool IsEntityText(const std::string& text) {
+  return text.size() <= kMaxTextBytes && IsUtf8(text);
+}
+
+std::string NotText() {
+  return "that is not UTF-8 text of at most " + std::to_string(kMaxTextBytes) + " bytes";
+}
+
+std::string TranslationsProblem(const Translations& translations) {
+  if (translations.size() > kMaxTranslations)
+    return "would have a text in more than " + std::to_string(kMaxTranslations) + " languages";
+  for (const auto& [language, text] : translations) {
+    if (LanguageTag(language) != language || language.empty())
+      return "would have a text in a language whose tag is not valid";
+    if (text.empty() || !IsEntityText(text)) return "would have a text in '" + language + "' " + NotText();
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string Validate(const Entity& entity) {
-  const auto is_text = [](const std::string& text) { return text.size() <= kMaxTextBytes && IsUtf8(text); };
-  const std::string not_text =
-      "that is not UTF-8 text of at most " + std::to_string(kMaxTextBytes) + " bytes";
+  const auto is_text = IsEntityText;
+  const std::string not_text = NotText();
   if (entity.name.empty()) return "would have no name";
   if (!is_text(entity.name)) return "would have a name " + not_text;
   if (!is_text(entity.group)) return "would be in a group with a name " + not_text;
@@ -64,6 +82,8 @@ std::string Validate(const Entity& entity) {
     }
   } else {
     if (!is_text(entity.signpost.text)) return "would have a text " + not_text;
+    if (std::string problem = TranslationsProblem(entity.signpost.translations); !problem.empty())
+      return problem;
     if (!is_text(entity.signpost.to_map)) return "would lead to a map with a name " + not_text;
   }
   return PoseProblem(entity);
@@ -115,24 +135,29 @@ std::string Validate(const Scene& scene) {
   if (scene.entities.size() > kMaxEntities)
     return "A map can hold at most " + std::to_string(kMaxEntities) + " models and signposts.";
   std::set<std::string_view> names;
-  std::size_t bytes = 0, warp_points = 0;
+  std::size_t bytes = 0, warp_points = 0, translations = 0;
   for (const Entity& entity : scene.entities) {
     if (const std::string problem = Validate(entity); !problem.empty())
       return "'" + Shortened(entity.name, 80) + "' " + problem + ".";
     if (!names.insert(entity.name).second) return "There are two '" + entity.name + "' in this map.";
     bytes += TextBytes(entity);
+    translations += entity.signpost.translations.size();
     if (entity.model.warp) warp_points += entity.model.warp->controls.size();
   }
   if (warp_points > kMaxSceneWarpPoints)
     return "The models in a map can be bent by at most " + std::to_string(kMaxSceneWarpPoints) + " points.";
+  if (translations > kMaxSceneTranslations)
+    return "A map can hold at most " + std::to_string(kMaxSceneTranslations) + " translations.";
   if (bytes > kMaxSceneTextBytes)
     return "The names and texts in a map can have at most " + std::to_string(kMaxSceneTextBytes) + " bytes.";
   return "";
 }
 
 std::size_t TextBytes(const Entity& entity) {
-  return entity.name.size() + entity.group.size() + entity.signpost.text.size() +
-         entity.signpost.to_map.size();
+  std::size_t bytes =
+      entity.name.size() + entity.group.size() + entity.signpost.text.size() + entity.signpost.to_map.size();
+  for (const auto& [language, text] : entity.signpost.translations) bytes += language.size() + text.size();
+  return bytes;
 }
 
 std::string Shortened(const std::string& text, std::size_t max_bytes) {

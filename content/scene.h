@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "content/language.h"
 #include "content/model.h"
 #include "engine/geometry/sim3.h"
 
@@ -30,7 +31,8 @@ inline constexpr std::size_t kMaxTextBytes = 10'000;  // of each text and name
 inline constexpr std::size_t kMaxEntities = 50'000;
 inline constexpr std::size_t kMaxSceneTextBytes = 4u << 20;  // all names and texts together
 
-inline constexpr std::size_t kMaxSceneWarpPoints = 50'000;  // Of all bent models together.
+inline constexpr std::size_t kMaxSceneWarpPoints = 50'000;    // Of all bent models together.
+inline constexpr std::size_t kMaxSceneTranslations = 20'000;  // Of all texts together.
 
 // A smooth deformation of a model (warp.h).
 struct Warp;
@@ -55,6 +57,7 @@ struct PlacedModel {
 // A board with text that rotates about its `up` axis to face the reader; `anchor` is its foot in the map.
 struct Signpost {
   std::string text;                                  // UTF-8.
+  Translations translations;                         // Its variants in other languages, UTF-8.
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // In the map, map units.
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY();    // Unit vector in the map.
   double height_m = 0.1;                             // Height of the board, in map units.

@@ -9,8 +9,9 @@
 namespace docent::content {
 namespace {
 
-// With keys: 30 for each entity, and 13 at most for each point that bends a model.
-constexpr std::size_t kMaxSceneValues = 100 + 31 * kMaxEntities + 14 * kMaxSceneWarpPoints;
+// With keys: 30 for each entity, 13 at most for each point that bends a model, and 2 for each translation.
+constexpr std::size_t kMaxSceneValues =
+    100 + 33 * kMaxEntities + 14 * kMaxSceneWarpPoints + 2 * kMaxSceneTranslations;
 
 struct ParsedScene {
   Json json;
@@ -83,7 +84,7 @@ Scene ReadScene(std::string_view text, std::string_view where, const AssetLookup
   const ParsedScene parsed = ParseScene(text, where);
   Scene scene;
   std::set<std::string> names;
-  std::size_t bytes = 0, warp_points = 0;
+  std::size_t bytes = 0, warp_points = 0, translations = 0;
   const Json& entities = parsed.json["entities"];
   for (std::size_t i = 0; i < entities.size(); ++i) {
     const std::string place = Place("entities", i);
@@ -97,6 +98,9 @@ Scene ReadScene(std::string_view text, std::string_view where, const AssetLookup
       }
       if (bytes + TextBytes(entity) > kMaxSceneTextBytes)
         Refuse(where, place, "is left out, because the scene has too many names and texts.");
+      translations += entity.signpost.translations.size();
+      if (translations > kMaxSceneTranslations)
+        Refuse(where, place, "is left out, because the scene has too many translations.");
       if (entity.model.warp) warp_points += entity.model.warp->controls.size();
       if (warp_points > kMaxSceneWarpPoints)
         Refuse(where, place, "is left out, because too many points bend the models of the scene.");
