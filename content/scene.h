@@ -37,12 +37,19 @@ inline constexpr std::size_t kMaxSceneTranslations = 20'000;  // Of all texts to
 // A smooth deformation of a model (warp.h).
 struct Warp;
 
-// A glTF file as the library stores it: one self-contained GLB, identified by the hash of its bytes.
+// What a stored file is.
+enum class AssetKind { kModel, kImage, kSound };
+
+// A file as the library stores it, identified by the hash of its bytes: a model as one self-contained GLB, an
+// image (PNG or JPEG) or a sound (WAV, FLAC or Ogg) as it is. Where only ids are needed, there are assets
+// without bytes.
 struct Asset {
-  std::string id;                      // Lower-case hex of a hash of `glb` with at least 128 bits.
-  std::string name;                    // The file's name without its folder, for display.
-  std::vector<std::uint8_t> glb;       // The file's bytes.
-  std::shared_ptr<const Model> model;  // The decoded file; never null.
+  std::string id;                           // Lower-case hex of a hash of `bytes` with at least 128 bits.
+  std::string name;                         // The file's name without its folder, for display.
+  AssetKind kind = AssetKind::kModel;       // What the bytes are.
+  std::vector<std::uint8_t> bytes;          // The file's bytes.
+  std::shared_ptr<const Model> model = {};  // The decoded model, or a flat one that shows the image.
+  double seconds = 0;                       // Length of a sound.
 };
 
 // A model in a map. map_from_model transforms from glTF axes (y up) to the map.

@@ -58,7 +58,7 @@ void EditStoredScene(maps::Library* library, const maps::MapInfo& map, std::span
     if (used.contains(asset.id) && kept.insert(asset.id).second) changed->assets.push_back(asset);
   }
   if (added && kept.insert(added->id).second)
-    changed->assets.push_back({added->id, added->name, {added, &added->glb}});
+    changed->assets.push_back({added->id, added->name, {added, &added->bytes}});
   maps::MapRecord record;
   record.key = map.key;
   record.name = map.name;

@@ -23,11 +23,12 @@ content::AssetLookup LookupIn(const AssetCache& assets) {
 
 void DecodeAsset(const maps::AssetRecord& stored, AssetCache* assets) {
   if (!stored.bytes || assets->contains(stored.id)) return;
-  (*assets)[stored.id] = std::make_shared<content::Asset>(content::AssetFromGlb(stored.name, *stored.bytes));
+  (*assets)[stored.id] =
+      std::make_shared<content::Asset>(content::AssetFromBytes(stored.name, *stored.bytes));
 }
 
 maps::AssetRecord RecordOf(const std::shared_ptr<const content::Asset>& asset) {
-  return {asset->id, asset->name, std::shared_ptr<const maps::Bytes>(asset, &asset->glb)};
+  return {asset->id, asset->name, std::shared_ptr<const maps::Bytes>(asset, &asset->bytes)};
 }
 
 // Encoding writes only the ids of assets, so their bytes are not needed.
@@ -75,7 +76,7 @@ content::EditHistory WithinAssetLimit(const content::EditHistory& history, const
     auto first = changes.end();
     while (first != changes.begin()) {
       for (const auto& asset : content::EditHistory({*std::prev(first)}, {}).Assets()) {
-        if (counted.insert(asset->id).second) bytes += asset->glb.size();
+        if (counted.insert(asset->id).second) bytes += asset->bytes.size();
       }
       if (bytes > maps::kMaxHistoryAssetBytes) break;
       --first;
