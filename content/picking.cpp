@@ -55,7 +55,7 @@ std::vector<Eigen::Vector3d> PlacedVertices(const Model& model, const Node& node
 }
 
 EntityShape AssetShape(const Entity& entity) {
-  if (entity.kind != Entity::Kind::kModel || !entity.model.asset) return {};
+  if (!HasModel(entity) || !entity.model.asset) return {};
   return {entity.model.asset->model, entity.model.map_from_model};
 }
 

@@ -37,8 +37,8 @@ struct EntityShape {
 // How a scene is drawn, as far as picking depends on it.
 struct PickOptions {
   double seconds = 0;  // Time of the animations.
-  // The shape of an entity for a reader at `eye`, the ray's origin. Empty: placed models have the shapes of
-  // their assets, and all other entities none.
+  // The shape of an entity for a reader at `eye`, the ray's origin. Empty: models and images have the shapes
+  // of their assets, and all other entities none.
   std::function<EntityShape(const Entity&, const Eigen::Vector3d& eye)> shape;
 };
 

@@ -20,10 +20,19 @@
 //     {"kind": "signpost", "name": NAME, "locked": false, "hidden": false, "group": NAME,
 //      "text": TEXT, "anchor_m": [x, y, z], "up": [x, y, z],
 //      "height_m": H, "to_map": NAME, "to_key": KEY,
-//      and, if there are any, "translations": {LANGUAGE: TEXT…}}]}
+//      and, if there are any, "translations": {LANGUAGE: TEXT…}},
+//     {"kind": "label", …, "text": TEXT, "anchor_m": [x, y, z], "offset_m": [x, y, z], "up": [x, y, z],
+//      "text_height_m": H, and translations as a signpost},
+//     {"kind": "image", …, "asset": ID, "map_from_image": as map_from_model},
+//     {"kind": "sound", …, "asset": ID, "caption": TEXT, "position_m": [x, y, z], "range_m": R,
+//      and translations of the caption},
+//     {"kind": "trail", …, "points_m": [[x, y, z]…], "up": [x, y, z], "width_m": W}]}
+//
+// where … stands for name, locked, hidden and group.
 //
 // Numbers are written so that they read back to the same bits (rotations are normalized again). Version 1,
-// without locked, hidden, group and to_key, and version 2, without translations, are read as well.
+// without locked, hidden, group and to_key, and version 2, without translations and the last four kinds, are
+// read as well.
 namespace docent::content {
 
 // DecodeScene reads what this returns. Throws Error for a scene that cannot be stored (Validate in scene.h).

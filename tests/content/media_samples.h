@@ -41,19 +41,19 @@ inline std::vector<std::uint8_t> PngBytes(std::uint32_t width_px, std::uint32_t 
   const auto chunk = [&](const char* type, const std::vector<std::uint8_t>& data) {
     put(static_cast<std::uint32_t>(data.size()), &png);
     std::vector<std::uint8_t> body(type, type + 4);
-    body.insert(body.end(), data.begin(), data.end());
-    png.insert(png.end(), body.begin(), body.end());
+    for (const std::uint8_t byte : data) body.push_back(byte);
+    for (const std::uint8_t byte : body) png.push_back(byte);
     put(Crc32(body.data(), body.size()), &png);
   };
   std::vector<std::uint8_t> header;
   put(width_px, &header);
   put(height_px, &header);
-  header.insert(header.end(), {8, 0, 0, 0, 0});
+  for (const std::uint8_t byte : {8, 0, 0, 0, 0}) header.push_back(byte);
   chunk("IHDR", header);
   std::vector<std::uint8_t> rows;
   for (std::uint32_t y = 0; y < height_px; ++y) {
     rows.push_back(0);  // No filter.
-    rows.insert(rows.end(), width_px, grey);
+    for (std::uint32_t x = 0; x < width_px; ++x) rows.push_back(grey);
   }
   const auto length = static_cast<std::uint16_t>(rows.size());
   std::vector<std::uint8_t> data = {0x78,
@@ -63,7 +63,7 @@ inline std::vector<std::uint8_t> PngBytes(std::uint32_t width_px, std::uint32_t 
                                     static_cast<std::uint8_t>(length >> 8),
                                     static_cast<std::uint8_t>(~length & 0xFF),
                                     static_cast<std::uint8_t>((~length >> 8) & 0xFF)};
-  data.insert(data.end(), rows.begin(), rows.end());
+  for (const std::uint8_t byte : rows) data.push_back(byte);
   std::uint32_t a = 1, b = 0;  // Adler-32 (RFC 1950).
   for (const std::uint8_t byte : rows) {
     a = (a + byte) % 65'521;

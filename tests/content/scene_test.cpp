@@ -103,7 +103,7 @@ TEST(SceneCodec, InvalidMembersAreRejectedWithTheirLocation) {
   EXPECT_EQ(ErrorOfScene(good.dump()), "");
   EXPECT_THAT(with("/docent_scene", kSceneVersion + 1), HasSubstr("newer version"));
   EXPECT_THAT(with("/entities/0/asset", "xyz"), HasSubstr("entities[0] uses the asset xyz"));
-  EXPECT_THAT(with("/entities/0/kind", "lamp"), HasSubstr("neither a model nor a signpost"));
+  EXPECT_THAT(with("/entities/0/kind", "lamp"), HasSubstr("neither a model nor of another kind"));
   EXPECT_THAT(with("/entities/0/animation", 0.5), HasSubstr("entities[0].animation"));
   EXPECT_THAT(with("/entities/0/map_from_model/scale", 0), HasSubstr("map_from_model.scale"));
   EXPECT_THAT(with("/entities/0/map_from_model/scale", -1), HasSubstr("map_from_model.scale"));
