@@ -32,8 +32,9 @@ void Renderer::Draw(const View& view) {
   const RenderTarget& target = impl_->image.Bind(width_px, height_px);
   impl_->image.DrawVideo(image);
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
-  if (has_pose && view.scene != nullptr)
-    impl_->content.Draw(*view.camera, tracked->camera_from_map, *view.scene, view.animation_seconds, target);
+  const engine::Rigid3* const drawn_from = has_pose ? &tracked->camera_from_map : view.held_camera_from_map;
+  if (view.camera != nullptr && drawn_from != nullptr && view.scene != nullptr)
+    impl_->content.Draw(*view.camera, *drawn_from, *view.scene, view.animation_seconds, target);
 
   impl_->canvas.Begin(width_px, height_px);
   if (has_pose && view.overlay.keyframes && tracked->map != nullptr)

@@ -54,7 +54,7 @@ std::vector<Command> CommandsFor(const EditOptions& options) {
   if (options.duplicate) commands.emplace_back(DuplicateEntities{names});
   for (const std::string& name : names) {
     if (options.unbend) commands.emplace_back(UnbendEntity{name});
-    if (options.transform) commands.emplace_back(TransformEntity{name, *options.transform});
+    if (options.transform) commands.emplace_back(TransformEntities{{{name, *options.transform}}});
     if (!options.align.empty()) commands.push_back(WithPairs("align", name, options.align));
     if (!options.bend.empty()) commands.push_back(WithPairs("bend", name, options.bend));
     if (options.scale) commands.emplace_back(ScaleEntity{name, *options.scale});
@@ -130,7 +130,7 @@ void RunEdit(const EditOptions& options) {
       return std::visit([&](const auto& chosen) { return edit_for(scene, chosen); }, command);
     });
   }
-  EditStoredScene(&library, map, edits, ModelsNeeded::kYes);
+  EditStoredScene(&library, map, edits);
 }
 
 void AddPoseOptions(CLI::App* edit, EditOptions* options) {

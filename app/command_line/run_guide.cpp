@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/run_guide.h"
+#include "app/session/visit_state.h"
 
 #include <algorithm>
 #include <cctype>
@@ -180,6 +181,8 @@ class GuideRun {
     std::optional<Timestamp> age;  // Age of the last tracked image when its tracking ended.
     std::string message;
     std::shared_ptr<const ShownFrame> last;
+    std::optional<VisitState> visit;  // Only on a tour.
+    std::shared_ptr<const ShownFrame> last_with_pose;
   };
 
   static SessionOptions OptionsOf(const GuideRequest& request, std::span<CalibratedCamera> cameras) {
@@ -196,6 +199,13 @@ class GuideRun {
     options.tracker.target = request.target;
     options.mapper.lens.lenses = EstimatedLensesOf(cameras);
     return options;
+  }
+
+  std::vector<std::string> StopNames() const {
+    std::vector<std::string> names;
+    if (request_.library == nullptr) return names;
+    for (const maps::MapInfo& map : request_.library->List()) names.push_back(map.name);
+    return names;
   }
 
   // A tour builds no map, so it cannot estimate a calibration.
@@ -219,6 +229,7 @@ class GuideRun {
 
   CameraRun RunOf(std::size_t i, const Show& show) {
     CameraState& state = camera_states_[i];
+    if (!request_.may_write) state.visit.emplace(StopNames());
     CameraRun run;
     run.camera = &cameras_[i];
     run.options.pace = request_.pace;
@@ -316,7 +327,22 @@ class GuideRun {
     // What the window shows as a warning already is not shown twice.
     if (state->message.empty() && !warnings_.contains(frame->shown.advice))
       frame->message = frame->shown.advice;
+    if (state->visit) GuideVisitor(frame, state);
     return frame;
+  }
+
+  static void GuideVisitor(const std::shared_ptr<ShownFrame>& frame, CameraState* state) {
+    const bool has_pose = engine::HasPose(frame->tracked.state);
+    frame->visitor = state->visit->Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(),
+                                          frame->shown.hint);
+    if (has_pose) {
+      state->last_with_pose = frame;
+    } else if (state->last_with_pose && state->visit->HoldsContent(frame->seconds)) {
+      frame->held_camera_from_map = state->last_with_pose->tracked.camera_from_map;
+      frame->shown.scene = state->last_with_pose->shown.scene;
+    } else {
+      state->last_with_pose.reset();
+    }
   }
 
   const GuideRequest& request_;

@@ -184,15 +184,18 @@ Command ParseScale(LineReader* line) {
 }
 
 Command ParseTransform(LineReader* line) {
-  TransformEntity command;
-  command.name = line->TakeName("a name");
-  engine::Sim3& pose = command.map_from_entity;
-  for (int axis = 0; axis < 3; ++axis) pose.translation[axis] = line->TakeNumber("X Y Z in map units");
-  Eigen::Vector4d quaternion;
-  for (int k = 0; k < 4; ++k) quaternion[k] = line->TakeNumber("a quaternion QX QY QZ QW");
-  if (!(std::abs(quaternion.norm() - 1) < 1e-3)) line->Fail("the quaternion does not have length 1");
-  pose.rotation = Settled(engine::Rotation3(Eigen::Quaterniond(quaternion)));
-  pose.scale = line->TakeNumber("a scale");
+  TransformEntities command;
+  for (bool last = false; !last;) {
+    const std::string name = line->TakeName("a name");
+    engine::Sim3 pose;
+    for (double& coordinate : pose.translation) coordinate = line->TakeNumber("X Y Z in map units");
+    Eigen::Vector4d quaternion;
+    for (double& value : quaternion) value = line->TakeNumber("a quaternion QX QY QZ QW");
+    if (!(std::abs(quaternion.norm() - 1) < 1e-3)) line->Fail("the quaternion does not have length 1");
+    pose.rotation = Settled(engine::Rotation3(Eigen::Quaterniond(quaternion)));
+    pose.scale = line->TakeItemNumber("a scale", &last);
+    command.poses.push_back({name, pose});
+  }
   return command;
 }
 
@@ -372,13 +375,16 @@ struct Formatter {
   std::string operator()(const ScaleEntity& c) const {
     return "scale " + Quoted(c.name) + ' ' + Number(c.factor);
   }
-  std::string operator()(const TransformEntity& c) const {
-    const engine::Sim3& pose = c.map_from_entity;
-    std::string text = "transform " + Quoted(c.name);
-    for (const double value : pose.translation) text += ' ' + Number(value);
-    const Eigen::Vector4d quaternion = Settled(pose.rotation).quaternion().coeffs();
-    for (const double value : quaternion) text += ' ' + Number(value);
-    return text + ' ' + Number(pose.scale);
+  std::string operator()(const TransformEntities& c) const {
+    std::string text = "transform";
+    for (const auto& [name, pose] : c.poses) {
+      text += (&name == &c.poses.front().name ? " " : ", ") + Quoted(name);
+      for (const double value : pose.translation) text += ' ' + Number(value);
+      const Eigen::Vector4d quaternion = Settled(pose.rotation).quaternion().coeffs();
+      for (const double value : quaternion) text += ' ' + Number(value);
+      text += ' ' + Number(pose.scale);
+    }
+    return text;
   }
   std::string operator()(const AlignEntity& c) const { return "align " + Quoted(c.name) + Pairs(c.pairs); }
   std::string operator()(const BendEntity& c) const { return "bend " + Quoted(c.name) + Pairs(c.pairs); }

@@ -448,10 +448,12 @@ StoredMap Library::Load(std::uint64_t key, DamagedContent damaged) const {
   });
 }
 
-SceneRecord Library::LoadScene(std::uint64_t key) const {
+SceneRecord Library::LoadScene(std::uint64_t key, std::vector<std::string>* lost_content) const {
   return impl_->Read([&] {
     SceneRecord scene;
-    WithMapContext(impl_->database(), impl_->Get(key), [&] { scene = impl_->ReadScene(key); });
+    WithMapContext(impl_->database(), impl_->Get(key), [&] {
+      scene = lost_content ? impl_->ReadableScene(key, lost_content) : impl_->ReadScene(key);
+    });
     return scene;
   });
 }
