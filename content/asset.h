@@ -9,7 +9,7 @@
 #include "content/load_limits.h"
 #include "content/scene.h"
 
-// Makes an Asset, which can be placed in a map, from a model file or from bytes that a library stores. The
+// Makes an Asset, which can be placed in a map, from a file or from bytes that a library stores. The
 // functions are stateless and thread-safe. Every error in the file throws Error with a one-sentence message
 // that names the file.
 namespace docent::content {
@@ -18,8 +18,14 @@ namespace docent::content {
 // .off) with assimp. The asset is self-contained; its id is the SHA-256 of its GLB bytes.
 Asset ImportAsset(const std::filesystem::path& path, const LoadLimits& limits = {});
 
-// Makes an asset from stored bytes. `glb` is checked as thoroughly as any other file and must not refer to
-// other files.
-Asset AssetFromGlb(const std::string& name, std::vector<std::uint8_t> glb, const LoadLimits& limits = {});
+// Reads an image to be placed: PNG or JPEG, within the limits of flat_image.h.
+Asset ImportImage(const std::filesystem::path& path);
+// Reads a sound: WAV, FLAC or Ogg, within the limits of sound.h. All of it is decoded once, so that a damaged
+// file is refused here.
+Asset ImportSound(const std::filesystem::path& path);
+
+// Makes an asset of stored bytes, whose kind is known by how they begin. They are checked as thoroughly as
+// any other file and must not refer to other files; of a sound, only the header is read.
+Asset AssetFromBytes(const std::string& name, std::vector<std::uint8_t> bytes, const LoadLimits& limits = {});
 
 }  // namespace docent::content

@@ -111,8 +111,7 @@ std::vector<std::shared_ptr<const Asset>> EditHistory::Assets() const {
     for (const SceneChange& change : *changes) {
       for (const EntityChange& entity : change.entities) {
         for (const auto* state : {&entity.before, &entity.after}) {
-          if (*state && (*state)->model.asset)
-            by_id.emplace((*state)->model.asset->id, (*state)->model.asset);
+          if (const auto asset = *state ? AssetOf(**state) : nullptr) by_id.emplace(asset->id, asset);
         }
       }
     }

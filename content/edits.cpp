@@ -34,7 +34,7 @@ std::string InWords(const std::vector<std::string>& names) {
 // The indices of these entities, ascending. Throws Error when there is none with a name, or a name comes
 // twice.
 std::vector<std::size_t> IndicesOf(const Scene& scene, const std::vector<std::string>& names) {
-  if (names.empty()) throw Error("No model or signpost is named.");
+  if (names.empty()) throw Error("Nothing is named.");
   std::map<std::string_view, std::size_t> places;
   for (std::size_t i = 0; i < scene.entities.size(); ++i) places.emplace(scene.entities[i].name, i);
   std::set<std::size_t> indices;
@@ -61,16 +61,20 @@ SceneChange ChangeOf(const Scene& scene, const std::string& name, const std::str
   return {verb + " " + InQuotes(name), {{index, before, std::move(after)}}};
 }
 
-Signpost& SignpostOf(Entity* entity, const char* why_not) {
-  if (entity->kind != Entity::Kind::kSignpost)
-    throw Error("'" + entity->name + "' is a model, which " + why_not);
-  return entity->signpost;
+// "'sign-1' is a signpost, which cannot be bent."
+[[noreturn]] void RefuseKind(const Entity& entity, const char* why_not) {
+  const char* const article = entity.kind == Entity::Kind::kImage ? "an " : "a ";
+  throw Error("'" + entity.name + "' is " + article + NameOf(entity.kind) + ", which " + why_not);
 }
 
 PlacedModel& ModelOf(Entity* entity, const char* why_not) {
-  if (entity->kind != Entity::Kind::kModel)
-    throw Error("'" + entity->name + "' is a signpost, which " + why_not);
+  if (entity->kind != Entity::Kind::kModel) RefuseKind(*entity, why_not);
   return entity->model;
+}
+
+Trail& TrailOf(Entity* entity, const char* why_not) {
+  if (entity->kind != Entity::Kind::kTrail) RefuseKind(*entity, why_not);
+  return entity->trail;
 }
 
 // "fox" for "fox-2", so that copies of copies are numbered on.
@@ -104,8 +108,19 @@ SceneChange AddCopies(const Scene& scene, std::vector<Entity> copies, const std:
 // An offset that puts a copy beside its original.
 Eigen::Vector3d BesideOffset(const Entity& entity) {
   constexpr double kGap = 1.1;  // Ratio of the width.
-  if (entity.kind == Entity::Kind::kSignpost)
-    return kGap * entity.signpost.height_m * entity.signpost.up.unitOrthogonal();
+  switch (entity.kind) {
+    case Entity::Kind::kSignpost:
+      return kGap * entity.signpost.height_m * entity.signpost.up.unitOrthogonal();
+    case Entity::Kind::kLabel:
+      return 2 * kGap * entity.label.text_height * entity.label.up;
+    case Entity::Kind::kSound:
+      return {0.1 * kGap * entity.sound.range, 0, 0};
+    case Entity::Kind::kTrail:
+      return kGap * entity.trail.width * (PoseOf(entity).rotation * Eigen::Vector3d::UnitX());
+    case Entity::Kind::kModel:
+    case Entity::Kind::kImage:
+      break;
+  }
   const engine::Sim3& pose = entity.model.map_from_model;
   const auto& model = entity.model.asset->model;
   const double width_m = model ? static_cast<double>(model->bounds_max.x - model->bounds_min.x) : 1.0;
@@ -132,9 +147,9 @@ SceneChange DuplicateEdit(const Scene& scene, const std::vector<std::string>& na
   std::vector<Entity> copies;
   for (const std::size_t index : IndicesOf(scene, names)) {
     Entity copy = scene.entities[index];
-    const Eigen::Vector3d offset = BesideOffset(copy);
-    copy.model.map_from_model.translation += offset;
-    copy.signpost.anchor += offset;
+    engine::Sim3 motion;
+    motion.translation = BesideOffset(copy);
+    TransformBy(motion, &copy);
     copies.push_back(std::move(copy));
   }
   return AddCopies(scene, std::move(copies), "duplicate " + InWords(names));
@@ -153,11 +168,12 @@ SceneChange RemoveEdit(const Scene& scene, const std::vector<std::string>& names
 
 SceneChange MoveEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& position_in_map) {
   return ChangeOf(scene, name, "move", [&](Entity* entity) {
-    if (entity->kind == Entity::Kind::kModel) {
-      entity->model.map_from_model.translation = position_in_map;
-    } else {
-      entity->signpost.anchor = position_in_map;
-    }
+    engine::Sim3 motion;
+    motion.translation = position_in_map - PlaceOf(*entity);
+    if (entity->kind == Entity::Kind::kTrail) return TransformBy(motion, entity);
+    engine::Sim3 pose = PoseOf(*entity);  // To the last bit at the position.
+    pose.translation = position_in_map;
+    SetPose(pose, entity);
   });
 }
 
@@ -166,37 +182,30 @@ SceneChange RotateEdit(const Scene& scene, const std::string& name, double angle
     if (!(std::abs(angle_deg) <= kMaxAngle_deg))
       throw Error("'" + name + "' cannot be rotated: the angle must be at most " +
                   std::to_string(std::lround(kMaxAngle_deg)) + " degrees.");
-    if (entity->kind != Entity::Kind::kModel)
-      throw Error("'" + name + "' is a signpost, which always faces the reader and cannot be rotated.");
+    if (entity->kind == Entity::Kind::kSignpost || entity->kind == Entity::Kind::kLabel)
+      RefuseKind(*entity, "always faces the reader and cannot be rotated.");
+    if (entity->kind == Entity::Kind::kSound) RefuseKind(*entity, "has no direction and cannot be rotated.");
     const Eigen::Vector3d base = BaseInMap(*entity);
-    const Eigen::Vector3d turn = Eigen::Vector3d::UnitY() * (angle_deg * std::numbers::pi / 180);
-    engine::Sim3& pose = entity->model.map_from_model;
-    pose.rotation = pose.rotation * engine::Rotation3::Exp(turn);
-    pose.translation += base - BaseInMap(*entity);
+    engine::Sim3 pose = PoseOf(*entity);
+    pose.rotation = pose.rotation *
+                    engine::Rotation3::Exp(Eigen::Vector3d::UnitY() * (angle_deg * std::numbers::pi / 180));
+    SetPose(pose, entity);
+    if (HasModel(*entity)) entity->model.map_from_model.translation += base - BaseInMap(*entity);
   });
 }
 
 SceneChange ScaleEdit(const Scene& scene, const std::string& name, double factor) {
   return ChangeOf(scene, name, "scale", [&](Entity* entity) {
-    if (entity->kind == Entity::Kind::kSignpost) {
-      entity->signpost.height_m *= factor;
-      return;
-    }
     const Eigen::Vector3d base = BaseInMap(*entity);
-    entity->model.map_from_model.scale *= factor;
-    entity->model.map_from_model.translation += base - BaseInMap(*entity);
+    engine::Sim3 pose = PoseOf(*entity);
+    pose.scale *= factor;
+    SetPose(pose, entity);
+    if (HasModel(*entity)) entity->model.map_from_model.translation += base - BaseInMap(*entity);
   });
 }
 
 SceneChange TransformEdit(const Scene& scene, const std::string& name, const engine::Sim3& map_from_entity) {
-  return ChangeOf(scene, name, "move", [&](Entity* entity) {
-    if (entity->kind == Entity::Kind::kModel) {
-      entity->model.map_from_model = map_from_entity;
-    } else {
-      entity->signpost.anchor = map_from_entity.translation;
-      entity->signpost.height_m = map_from_entity.scale;
-    }
-  });
+  return ChangeOf(scene, name, "move", [&](Entity* entity) { SetPose(map_from_entity, entity); });
 }
 
 SceneChange AlignEdit(const Scene& scene, const std::string& name,
@@ -235,17 +244,44 @@ SceneChange RenameEdit(const Scene& scene, const std::string& name, const std::s
   return change;
 }
 
-SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text) {
-  return ChangeOf(scene, name, "change the text of",
-                  [&](Entity* entity) { SignpostOf(entity, "has no text.").text = text; });
+SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text,
+                     const std::string& language) {
+  return ChangeOf(scene, name, "change the text of", [&](Entity* entity) {
+    if (TextOf(entity) == nullptr) RefuseKind(*entity, "has no text.");
+    if (language.empty()) {
+      *TextOf(entity) = text;
+      return;
+    }
+    const std::string tag = LanguageTag(language);
+    if (tag.empty()) throw Error("'" + Shortened(language, kMaxLanguageBytes) + "' is not a language tag.");
+    if (!text.empty()) {
+      (*TranslationsOf(entity))[tag] = text;
+    } else if (TranslationsOf(entity)->erase(tag) == 0) {
+      throw Error("'" + name + "' has no text in '" + tag + "'.");
+    }
+  });
 }
 
 SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::string& to_map,
                        std::uint64_t to_key) {
   return ChangeOf(scene, name, "change the target of", [&](Entity* entity) {
-    Signpost& signpost = SignpostOf(entity, "cannot lead to a map.");
-    signpost.to_map = to_map;
-    signpost.to_key = to_key;
+    if (entity->kind != Entity::Kind::kSignpost) RefuseKind(*entity, "cannot lead to a map.");
+    entity->signpost.to_map = to_map;
+    entity->signpost.to_key = to_key;
+  });
+}
+
+SceneChange AddPointEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& point_in_map) {
+  return ChangeOf(scene, name, "add a point to",
+                  [&](Entity* entity) { TrailOf(entity, "has no points.").points.push_back(point_in_map); });
+}
+
+SceneChange RemovePointEdit(const Scene& scene, const std::string& name) {
+  return ChangeOf(scene, name, "remove a point of", [&](Entity* entity) {
+    Trail& trail = TrailOf(entity, "has no points.");
+    if (trail.points.size() <= kMinTrailPoints)
+      throw Error("'" + name + "' needs the points that it has; remove all of it instead.");
+    trail.points.pop_back();
   });
 }
 

@@ -29,12 +29,12 @@ SceneChange RemoveEdit(const Scene& scene, const std::vector<std::string>& names
 
 // To this place of the entity's origin (PlaceOf).
 SceneChange MoveEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& position_in_map);
-// About the up axis of the model through its base, counter-clockwise seen from above. Signposts cannot be
-// rotated.
+// About the up axis of a model, image or trail through its base, counter-clockwise seen from above. What
+// faces the reader, and a sound, cannot be rotated.
 SceneChange RotateEdit(const Scene& scene, const std::string& name, double angle_deg);
-// Relative to the entity's base (BaseInMap).
+// Relative to the entity's base (BaseInMap). Of a sound, the range is multiplied.
 SceneChange ScaleEdit(const Scene& scene, const std::string& name, double factor);
-// A model gets this pose; a signpost gets its translation as its place and its scale as its height.
+// The entity gets this pose (SetPose).
 SceneChange TransformEdit(const Scene& scene, const std::string& name, const engine::Sim3& map_from_entity);
 
 // Gives a model the pose that fits correspondences of points of its drawn shape, bent if it is; see
@@ -48,10 +48,17 @@ SceneChange BendEdit(const Scene& scene, const std::string& name,
 SceneChange UnbendEdit(const Scene& scene, const std::string& name);
 
 SceneChange RenameEdit(const Scene& scene, const std::string& name, const std::string& new_name);
+// Of a signpost, label or sound: its first text, or with a language (see LanguageTag) its variant in that
+// language, which an empty text removes.
+SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text,
+                     const std::string& language = "");
 // Of a signpost. to_map empty and to_key 0: it leads nowhere.
-SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text);
 SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::string& to_map,
                        std::uint64_t to_key);
+
+// Of a trail: a further point at its end, and without the last one.
+SceneChange AddPointEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& point_in_map);
+SceneChange RemovePointEdit(const Scene& scene, const std::string& name);
 
 enum class EntityFlag { kLocked, kHidden };
 // Throws Error when all of the entities have this value already.

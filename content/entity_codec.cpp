@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "content/object_reader.h"
 #include "content/warp.h"
 #include "engine/base/error.h"
 
@@ -25,104 +26,42 @@ Json WarpToJson(const Warp& warp) {
   return {{"controls_m", controls}, {"weights", weights}, {"affine", affine}};
 }
 
-// Reads the members of one JSON object.
-class ObjectReader {
- public:
-  ObjectReader(std::string_view where, std::string place, const Json& object)
-      : where_(where), place_(std::move(place)), object_(object) {
-    if (!object.is_object()) Refuse(where_, place_, "is not a JSON object.");
-  }
-
-  const Json& Member(const char* name) const {
-    const auto found = object_.find(name);
-    if (found == object_.end()) Refuse(where_, place_, "has no " + std::string(name) + ".");
-    return *found;
-  }
-
-  std::string Text(const char* name) const {
-    const Json& value = Member(name);
-    if (!value.is_string() || value.get_ref<const std::string&>().size() > kMaxTextBytes) {
-      Refuse(where_, PlaceOfMember(name),
-             "is not a string of at most " + std::to_string(kMaxTextBytes) + " bytes.");
-    }
-    return value.get<std::string>();
-  }
-
-  bool Truth(const char* name) const {
-    const Json& value = Member(name);
-    if (!value.is_boolean()) Refuse(where_, PlaceOfMember(name), "is neither true nor false.");
-    return value.get<bool>();
-  }
-
-  std::uint64_t Key(const char* name) const {
-    const Json& value = Member(name);
-    if (!value.is_number_unsigned()) Refuse(where_, PlaceOfMember(name), "is not the key of a map.");
-    return value.get<std::uint64_t>();
-  }
-
-  double Number(const char* name, double least, double most) const {
-    return AsNumber(Member(name), PlaceOfMember(name), least, most);
-  }
-
-  template <int N>
-  Eigen::Matrix<double, N, 1> Vector(const char* name, double most) const {
-    const Json& value = Member(name);
-    const std::string place = PlaceOfMember(name);
-    if (!value.is_array() || value.size() != N)
-      Refuse(where_, place, "is not a list of " + std::to_string(N) + " numbers.");
-    Eigen::Matrix<double, N, 1> vector;
-    for (int k = 0; k < N; ++k) vector[k] = AsNumber(value[static_cast<std::size_t>(k)], place, -most, most);
-    return vector;
-  }
-
-  // Reads a list of at most kMaxWarpPoints vectors.
-  std::vector<Eigen::Vector3d> Vectors(const char* name, double most) const {
-    const Json& value = Member(name);
-    const std::string place = PlaceOfMember(name);
-    if (!value.is_array() || value.size() > kMaxWarpPoints)
-      Refuse(where_, place, "is not a list of at most " + std::to_string(kMaxWarpPoints) + " points.");
-    std::vector<Eigen::Vector3d> vectors;
-    for (const Json& point : value) {
-      if (!point.is_array() || point.size() != 3) Refuse(where_, place, "is not a list of points.");
-      Eigen::Vector3d& vector = vectors.emplace_back();
-      for (int k = 0; k < 3; ++k)
-        vector[k] = AsNumber(point[static_cast<std::size_t>(k)], place, -most, most);
-    }
-    return vectors;
-  }
-
-  // Reads a vector that must have length 1, up to rounding.
-  template <int N>
-  Eigen::Matrix<double, N, 1> UnitVector(const char* name) const {
-    const Eigen::Matrix<double, N, 1> vector = Vector<N>(name, 2);
-    if (std::abs(vector.norm() - 1) > 1e-3) Refuse(where_, PlaceOfMember(name), "does not have length 1.");
-    return vector;
-  }
-
- private:
-  std::string PlaceOfMember(const char* name) const { return place_ + "." + name; }
-
-  double AsNumber(const Json& value, const std::string& place, double least, double most) const {
-    const double number = value.is_number() ? value.get<double>() : std::nan("");
-    if (!(number >= least && number <= most)) Refuse(where_, place, "is not a number in its range.");
-    return number;
-  }
-
-  std::string_view where_;
-  std::string place_;
-  const Json& object_;
-};
-
 Warp ReadWarp(std::string_view where, const std::string& place, const Json& json) {
   CheckMembers(where, place, json, {"controls_m", "weights", "affine"});
   const ObjectReader reader(where, place, json);
   Warp warp;
-  warp.controls = reader.Vectors("controls_m", kMaxWarpNumber);
-  warp.weights = reader.Vectors("weights", kMaxWarpNumber);
+  warp.controls = reader.Vectors("controls_m", kMaxWarpPoints, kMaxWarpNumber);
+  warp.weights = reader.Vectors("weights", kMaxWarpPoints, kMaxWarpNumber);
   const Eigen::Matrix<double, 12, 1> affine = reader.Vector<12>("affine", kMaxWarpNumber);
   warp.affine = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(affine.data());
   if (const std::string problem = Validate(warp); !problem.empty()) Refuse(where, place, problem + ".");
   return warp;
+}
+
+Json PoseToJson(const engine::Sim3& pose) {
+  const Eigen::Quaterniond& q = pose.rotation.quaternion();
+  return {{"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}},
+          {"translation_m", VectorToJson(pose.translation)},
+          {"scale", pose.scale}};
+}
+
+engine::Sim3 ReadPose(std::string_view where, const std::string& place, const Json& json) {
+  CheckMembers(where, place, json, {"rotation_xyzw", "translation_m", "scale"});
+  const ObjectReader reader(where, place, json);
+  const Eigen::Vector4d q = reader.UnitVector<4>("rotation_xyzw");
+  engine::Sim3 pose;
+  pose.rotation = engine::Rotation3(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
+  pose.translation = reader.Vector<3>("translation_m", kMaxCoordinate);
+  pose.scale = reader.Number("scale", kMinModelScale, kMaxModelScale);
+  return pose;
+}
+
+std::shared_ptr<const Asset> ReadAsset(std::string_view where, const std::string& place,
+                                       const ObjectReader& reader, const AssetLookup& find_asset) {
+  const std::string id = reader.Text("asset");
+  auto asset = find_asset(id);
+  if (!asset) Refuse(where, place, "uses the asset " + id.substr(0, 64) + ", which does not exist.");
+  return asset;
 }
 
 void ReadModel(std::string_view where, const std::string& place, const Json& json, int version,
@@ -135,22 +74,11 @@ void ReadModel(std::string_view where, const std::string& place, const Json& jso
         {"kind", "name", "asset", "animation", "map_from_model", "warp", "locked", "hidden", "group"});
   }
   const ObjectReader reader(where, place, json);
-  entity->kind = Entity::Kind::kModel;
-  const std::string id = reader.Text("asset");
-  entity->model.asset = find_asset(id);
-  if (!entity->model.asset)
-    Refuse(where, place, "uses the asset " + id.substr(0, 64) + ", which does not exist.");
+  entity->model.asset = ReadAsset(where, place, reader, find_asset);
   const double animation = reader.Number("animation", -1, kMaxAnimation);
   if (animation != std::floor(animation)) Refuse(where, place + ".animation", "is not an integer.");
   entity->model.animation = static_cast<int>(animation);
-  const std::string pose_place = place + ".map_from_model";
-  CheckMembers(where, pose_place, reader.Member("map_from_model"),
-               {"rotation_xyzw", "translation_m", "scale"});
-  const ObjectReader pose(where, pose_place, reader.Member("map_from_model"));
-  const Eigen::Vector4d q = pose.UnitVector<4>("rotation_xyzw");
-  entity->model.map_from_model.rotation = engine::Rotation3(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
-  entity->model.map_from_model.translation = pose.Vector<3>("translation_m", kMaxCoordinate);
-  entity->model.map_from_model.scale = pose.Number("scale", kMinModelScale, kMaxModelScale);
+  entity->model.map_from_model = ReadPose(where, place + ".map_from_model", reader.Member("map_from_model"));
   if (version > 1 && json.contains("warp"))
     entity->model.warp = std::make_shared<Warp>(ReadWarp(where, place + ".warp", json["warp"]));
 }
@@ -159,19 +87,136 @@ void ReadSignpost(std::string_view where, const std::string& place, const Json& 
                   Entity* entity) {
   if (version == 1) {
     CheckMembers(where, place, json, {"kind", "name", "text", "anchor_m", "up", "height_m", "to_map"});
-  } else {
+  } else if (version == 2) {
     CheckMembers(where, place, json,
                  {"kind", "name", "text", "anchor_m", "up", "height_m", "to_map", "to_key", "locked",
                   "hidden", "group"});
+  } else {
+    CheckMembers(where, place, json,
+                 {"kind", "name", "text", "translations", "anchor_m", "up", "height_m", "to_map", "to_key",
+                  "locked", "hidden", "group"});
   }
   const ObjectReader reader(where, place, json);
-  entity->kind = Entity::Kind::kSignpost;
   entity->signpost.text = reader.Text("text");
   entity->signpost.anchor = reader.Vector<3>("anchor_m", kMaxCoordinate);
   entity->signpost.up = reader.UnitVector<3>("up");
   entity->signpost.height_m = reader.Number("height_m", kMinBoardHeight, kMaxBoardHeight);
   entity->signpost.to_map = reader.Text("to_map");
   if (version > 1) entity->signpost.to_key = reader.Key("to_key");
+  if (version > 2) entity->signpost.translations = reader.TextByLanguage("translations");
+}
+
+void ReadLabel(std::string_view where, const std::string& place, const Json& json, Entity* entity) {
+  CheckMembers(where, place, json,
+               {"kind", "name", "text", "translations", "anchor_m", "offset_m", "up", "text_height_m",
+                "locked", "hidden", "group"});
+  const ObjectReader reader(where, place, json);
+  Label& label = entity->label;
+  label.text = reader.Text("text");
+  label.translations = reader.TextByLanguage("translations");
+  label.anchor = reader.Vector<3>("anchor_m", kMaxCoordinate);
+  label.offset = reader.Vector<3>("offset_m", kMaxCoordinate);
+  label.up = reader.UnitVector<3>("up");
+  label.text_height = reader.Number("text_height_m", kMinBoardHeight, kMaxBoardHeight);
+}
+
+void ReadImage(std::string_view where, const std::string& place, const Json& json,
+               const AssetLookup& find_asset, Entity* entity) {
+  CheckMembers(where, place, json, {"kind", "name", "asset", "map_from_image", "locked", "hidden", "group"});
+  const ObjectReader reader(where, place, json);
+  entity->model.asset = ReadAsset(where, place, reader, find_asset);
+  entity->model.map_from_model = ReadPose(where, place + ".map_from_image", reader.Member("map_from_image"));
+}
+
+void ReadSound(std::string_view where, const std::string& place, const Json& json,
+               const AssetLookup& find_asset, Entity* entity) {
+  CheckMembers(where, place, json,
+               {"kind", "name", "asset", "caption", "translations", "position_m", "range_m", "locked",
+                "hidden", "group"});
+  const ObjectReader reader(where, place, json);
+  Sound& sound = entity->sound;
+  sound.asset = ReadAsset(where, place, reader, find_asset);
+  sound.caption = reader.Text("caption");
+  sound.translations = reader.TextByLanguage("translations");
+  sound.position = reader.Vector<3>("position_m", kMaxCoordinate);
+  sound.range = reader.Number("range_m", kMinSoundRange, kMaxSoundRange);
+}
+
+void ReadTrail(std::string_view where, const std::string& place, const Json& json, Entity* entity) {
+  CheckMembers(where, place, json,
+               {"kind", "name", "points_m", "up", "width_m", "locked", "hidden", "group"});
+  const ObjectReader reader(where, place, json);
+  Trail& trail = entity->trail;
+  trail.points = reader.Vectors("points_m", kMaxTrailPoints, kMaxCoordinate);
+  trail.up = reader.UnitVector<3>("up");
+  trail.width = reader.Number("width_m", kMinTrailWidth, kMaxTrailWidth);
+}
+
+// The kind of an entity; signposts and models are the only kinds before version 3.
+Entity::Kind ReadKind(std::string_view where, const std::string& place, const Json& json, int version) {
+  using Kind = Entity::Kind;
+  const auto kind = json.is_object() ? json.find("kind") : json.end();
+  if (json.is_object() && kind != json.end()) {
+    for (const Kind known :
+         {Kind::kModel, Kind::kSignpost, Kind::kLabel, Kind::kImage, Kind::kSound, Kind::kTrail}) {
+      const bool is_old = known == Kind::kModel || known == Kind::kSignpost;
+      if ((version > 2 || is_old) && *kind == NameOf(known)) return known;
+    }
+  }
+  Refuse(where, place, "is neither a model nor of another kind that can be placed.");
+}
+
+Json KindToJson(const Signpost& signpost) {
+  return {{"text", signpost.text},           {"anchor_m", VectorToJson(signpost.anchor)},
+          {"up", VectorToJson(signpost.up)}, {"height_m", signpost.height_m},
+          {"to_map", signpost.to_map},       {"to_key", signpost.to_key}};
+}
+
+Json KindToJson(const Label& label) {
+  return {{"text", label.text},
+          {"anchor_m", VectorToJson(label.anchor)},
+          {"offset_m", VectorToJson(label.offset)},
+          {"up", VectorToJson(label.up)},
+          {"text_height_m", label.text_height}};
+}
+
+Json KindToJson(const Sound& sound) {
+  return {{"asset", sound.asset ? sound.asset->id : ""},
+          {"caption", sound.caption},
+          {"position_m", VectorToJson(sound.position)},
+          {"range_m", sound.range}};
+}
+
+Json KindToJson(const Trail& trail) {
+  Json points = Json::array();
+  for (const Eigen::Vector3d& point : trail.points) points.push_back(VectorToJson(point));
+  return {{"points_m", points}, {"up", VectorToJson(trail.up)}, {"width_m", trail.width}};
+}
+
+Json KindToJson(const PlacedModel& model, bool is_image) {
+  Json json{{"asset", model.asset ? model.asset->id : ""},
+            {is_image ? "map_from_image" : "map_from_model", PoseToJson(model.map_from_model)}};
+  if (!is_image) json["animation"] = model.animation;
+  if (model.warp) json["warp"] = WarpToJson(*model.warp);
+  return json;
+}
+
+Json KindToJson(const Entity& entity) {
+  switch (entity.kind) {
+    case Entity::Kind::kModel:
+      return KindToJson(entity.model, false);
+    case Entity::Kind::kSignpost:
+      return KindToJson(entity.signpost);
+    case Entity::Kind::kLabel:
+      return KindToJson(entity.label);
+    case Entity::Kind::kImage:
+      return KindToJson(entity.model, true);
+    case Entity::Kind::kSound:
+      return KindToJson(entity.sound);
+    case Entity::Kind::kTrail:
+      return KindToJson(entity.trail);
+  }
+  return {};
 }
 
 }  // namespace
@@ -188,44 +233,40 @@ void CheckMembers(std::string_view where, std::string_view place, const Json& ob
 }
 
 Json EntityToJson(const Entity& entity) {
-  Json json{
-      {"name", entity.name}, {"locked", entity.locked}, {"hidden", entity.hidden}, {"group", entity.group}};
-  if (entity.kind == Entity::Kind::kSignpost) {
-    const Signpost& signpost = entity.signpost;
-    json.update({{"kind", "signpost"},
-                 {"text", signpost.text},
-                 {"anchor_m", VectorToJson(signpost.anchor)},
-                 {"up", VectorToJson(signpost.up)},
-                 {"height_m", signpost.height_m},
-                 {"to_map", signpost.to_map},
-                 {"to_key", signpost.to_key}});
-    return json;
-  }
-  const engine::Sim3& pose = entity.model.map_from_model;
-  const Eigen::Quaterniond& q = pose.rotation.quaternion();
-  json.update({{"kind", "model"},
-               {"asset", entity.model.asset ? entity.model.asset->id : ""},
-               {"animation", entity.model.animation},
-               {"map_from_model",
-                {{"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}},
-                 {"translation_m", VectorToJson(pose.translation)},
-                 {"scale", pose.scale}}}});
-  if (entity.model.warp) json["warp"] = WarpToJson(*entity.model.warp);
+  Json json{{"kind", NameOf(entity.kind)},
+            {"name", entity.name},
+            {"locked", entity.locked},
+            {"hidden", entity.hidden},
+            {"group", entity.group}};
+  json.update(KindToJson(entity));
+  const Translations* const translations = TranslationsOf(entity);
+  if (translations != nullptr && !translations->empty()) json["translations"] = *translations;
   return json;
 }
 
 Entity EntityFromJson(std::string_view where, const std::string& place, const Json& json, int version,
                       const AssetLookup& find_asset) {
-  const auto kind = json.is_object() ? json.find("kind") : json.end();
-  const bool has_kind = json.is_object() && kind != json.end();
-  const bool is_model = has_kind && *kind == "model";
-  if (!is_model && !(has_kind && *kind == "signpost"))
-    Refuse(where, place, "is neither a model nor a signpost.");
   Entity entity;
-  if (is_model) {
-    ReadModel(where, place, json, version, find_asset, &entity);
-  } else {
-    ReadSignpost(where, place, json, version, &entity);
+  entity.kind = ReadKind(where, place, json, version);
+  switch (entity.kind) {
+    case Entity::Kind::kModel:
+      ReadModel(where, place, json, version, find_asset, &entity);
+      break;
+    case Entity::Kind::kSignpost:
+      ReadSignpost(where, place, json, version, &entity);
+      break;
+    case Entity::Kind::kLabel:
+      ReadLabel(where, place, json, &entity);
+      break;
+    case Entity::Kind::kImage:
+      ReadImage(where, place, json, find_asset, &entity);
+      break;
+    case Entity::Kind::kSound:
+      ReadSound(where, place, json, find_asset, &entity);
+      break;
+    case Entity::Kind::kTrail:
+      ReadTrail(where, place, json, &entity);
+      break;
   }
   const ObjectReader reader(where, place, json);
   entity.name = reader.Text("name");
@@ -234,6 +275,9 @@ Entity EntityFromJson(std::string_view where, const std::string& place, const Js
     entity.locked = reader.Truth("locked");
     entity.hidden = reader.Truth("hidden");
     entity.group = reader.Text("group");
+  }
+  if (version > 2) {
+    if (const std::string problem = Validate(entity); !problem.empty()) Refuse(where, place, problem + ".");
   }
   return entity;
 }

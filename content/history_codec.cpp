@@ -27,8 +27,7 @@ EncodedChange EncodeChange(const SceneChange& change) {
   Json entities = Json::array();
   for (const EntityChange& entity : change.entities) {
     for (const auto* state : {&entity.before, &entity.after}) {
-      if (*state && (*state)->kind == Entity::Kind::kModel && (*state)->model.asset)
-        encoded.assets.insert((*state)->model.asset->id);
+      if (const auto asset = *state ? AssetOf(**state) : nullptr) encoded.assets.insert(asset->id);
     }
     entities.push_back({{"index", entity.index},
                         {"before", StateToJson(entity.before)},

@@ -54,6 +54,11 @@ std::vector<Eigen::Vector3d> PlacedVertices(const Model& model, const Node& node
   return places;
 }
 
+EntityShape AssetShape(const Entity& entity) {
+  if (!HasModel(entity) || !entity.model.asset) return {};
+  return {entity.model.asset->model, entity.model.map_from_model};
+}
+
 }  // namespace
 
 std::optional<double> IntersectBox(const Ray& ray, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
@@ -119,20 +124,10 @@ std::optional<Pick> PickEntity(const Ray& ray, const Scene& scene, const PickOpt
   std::optional<Pick> nearest;
   for (std::size_t i = 0; i < scene.entities.size(); ++i) {
     const Entity& entity = scene.entities[i];
-    std::optional<double> distance;
-    if (entity.kind == Entity::Kind::kModel) {
-      if (!entity.model.asset) continue;
-      const std::shared_ptr<const Model> model =
-          options.model_shape ? options.model_shape(entity.model) : entity.model.asset->model;
-      if (!model) continue;
-      distance =
-          IntersectModel(ray, *model, entity.model.map_from_model, entity.model.animation, options.seconds);
-    } else if (options.signpost_model && options.signpost_pose) {
-      const std::shared_ptr<const Model> model = options.signpost_model(entity.signpost);
-      if (!model) continue;
-      distance = IntersectModel(ray, *model, options.signpost_pose(entity.signpost, ray.origin), -1,
-                                options.seconds);
-    }
+    const EntityShape shape = options.shape ? options.shape(entity, ray.origin) : AssetShape(entity);
+    if (!shape.model) continue;
+    const int animation = entity.kind == Entity::Kind::kModel ? entity.model.animation : -1;
+    const auto distance = IntersectModel(ray, *shape.model, shape.map_from_model, animation, options.seconds);
     if (distance && (!nearest || *distance < nearest->distance)) nearest = Pick{i, *distance};
   }
   return nearest;

@@ -28,14 +28,18 @@ std::optional<double> IntersectTriangle(const Ray& ray, const Eigen::Vector3d& a
 std::optional<double> IntersectModel(const Ray& ray, const Model& model, const engine::Sim3& map_from_model,
                                      int animation, double seconds);
 
+// What is drawn of an entity: a model and its pose in the map.
+struct EntityShape {
+  std::shared_ptr<const Model> model;  // Null where nothing is drawn.
+  engine::Sim3 map_from_model;
+};
+
 // How a scene is drawn, as far as picking depends on it.
 struct PickOptions {
   double seconds = 0;  // Time of the animations.
-  // The shape of a placed model where it is not that of its asset (BentModels); empty: that of the asset.
-  std::function<std::shared_ptr<const Model>(const PlacedModel&)> model_shape;
-  // The model of a signpost and its pose, which depends on the reader's eye, the ray's origin.
-  std::function<std::shared_ptr<const Model>(const Signpost&)> signpost_model;
-  std::function<engine::Sim3(const Signpost&, const Eigen::Vector3d& eye)> signpost_pose;
+  // The shape of an entity for a reader at `eye`, the ray's origin. Empty: models and images have the shapes
+  // of their assets, and all other entities none.
+  std::function<EntityShape(const Entity&, const Eigen::Vector3d& eye)> shape;
 };
 
 // What a ray hits.

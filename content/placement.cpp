@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "content/placement.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -180,6 +181,22 @@ engine::Sim3 FacingPose(const Eigen::Vector3d& point, const Eigen::Vector3d& vie
   return UprightPose(point, is_level ? level.normalized() : normal, up, yaw, scale);
 }
 
+engine::Sim3 FlushPose(const Eigen::Vector3d& point, const Eigen::Vector3d& viewer,
+                       const Eigen::Vector3d& normal, const Eigen::Vector3d& map_up, double scale) {
+  constexpr double kMinUprightPart = 0.1;  // Within 6 degrees of level ground, up is mostly noise.
+  const Eigen::Vector3d front = normal.normalized();
+  const auto across = [&](const Eigen::Vector3d& direction) -> Eigen::Vector3d {
+    return direction - front * front.dot(direction);
+  };
+  Eigen::Vector3d top = across(map_up);
+  if (!(top.norm() > kMinUprightPart * map_up.norm())) top = across(point - viewer);
+  if (!(top.norm() > 1e-6 * (point - viewer).norm())) top = front.unitOrthogonal();
+  top.normalize();
+  Eigen::Matrix3d axes;
+  axes << top.cross(front), top, front;
+  return {engine::Rotation3(axes), point, scale};
+}
+
 Eigen::Vector3d BaseOf(const Model& model) {
   const glm::vec3 &least = model.bounds_min, &most = model.bounds_max;
   return {0.5 * (static_cast<double>(least.x) + static_cast<double>(most.x)), static_cast<double>(least.y),
@@ -187,7 +204,7 @@ Eigen::Vector3d BaseOf(const Model& model) {
 }
 
 Eigen::Vector3d BaseInMap(const Entity& entity) {
-  if (entity.kind == Entity::Kind::kSignpost) return entity.signpost.anchor;
+  if (!HasModel(entity)) return PlaceOf(entity);
   const std::shared_ptr<const Asset>& asset = entity.model.asset;
   if (!asset || !asset->model) return entity.model.map_from_model.translation;
   const Eigen::Vector3d base = BaseOf(*asset->model);

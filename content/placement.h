@@ -64,8 +64,13 @@ engine::Sim3 FacingPose(const Eigen::Vector3d& point, const Eigen::Vector3d& vie
 // The middle of the bottom of a model's bounding box, in model axes and metres: the point that stands on a
 // surface.
 Eigen::Vector3d BaseOf(const Model& model);
+// The pose of an image that lies flush with a surface: its middle at `point`, its front along the surface's
+// normal, and upright as far as that allows. On level ground, its upper side points away from the viewer.
+engine::Sim3 FlushPose(const Eigen::Vector3d& point, const Eigen::Vector3d& viewer,
+                       const Eigen::Vector3d& normal, const Eigen::Vector3d& map_up, double scale);
+
 // Where the base of an entity is in the map: the base of its model (its origin, if the model is not loaded),
-// or the anchor of a signpost.
+// or the place of an entity of another kind (PlaceOf).
 Eigen::Vector3d BaseInMap(const Entity& entity);
 
 // The scale, in map units per metre, at which the largest side of the model has this length in map units,

@@ -2,92 +2,62 @@
 #include "content/scene.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <set>
-
-#include "content/warp.h"
+#include <utility>
 
 namespace docent::content {
-namespace {
 
-std::string Brief(double number) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, number, std::chars_format::general, 6).ptr};
-}
-
-bool IsIn(double number, double least, double most) {
-  return number >= least && number <= most;  // false for NaN
-}
-
-std::string OutOfRange(const char* what, double number, double least, double most) {
-  return std::string("would have ") + what + " of " + Brief(number) + ", which is not between " +
-         Brief(least) + " and " + Brief(most);
-}
-
-// What is wrong with an entity's place and size, as the end of a sentence.
-std::string PoseProblem(const Entity& entity) {
-  for (const double coordinate : PlaceOf(entity)) {
-    if (!IsIn(coordinate, -kMaxCoordinate, kMaxCoordinate))
-      return OutOfRange("a coordinate", coordinate, -kMaxCoordinate, kMaxCoordinate);
+const char* NameOf(Entity::Kind kind) {
+  switch (kind) {
+    case Entity::Kind::kModel:
+      return "model";
+    case Entity::Kind::kSignpost:
+      return "signpost";
+    case Entity::Kind::kLabel:
+      return "label";
+    case Entity::Kind::kImage:
+      return "image";
+    case Entity::Kind::kSound:
+      return "sound";
+    case Entity::Kind::kTrail:
+      return "trail";
   }
-  if (entity.kind == Entity::Kind::kModel) {
-    const engine::Sim3& pose = entity.model.map_from_model;
-    if (!IsIn(pose.scale, kMinModelScale, kMaxModelScale))
-      return OutOfRange("a scale", pose.scale, kMinModelScale, kMaxModelScale);
-    if (!IsIn(pose.rotation.quaternion().norm(), 0.9999, 1.0001)) return "would have no valid rotation";
-    return "";
-  }
-  const Signpost& signpost = entity.signpost;
-  if (!IsIn(signpost.height_m, kMinBoardHeight, kMaxBoardHeight))
-    return OutOfRange("a height", signpost.height_m, kMinBoardHeight, kMaxBoardHeight);
-  if (!IsIn(signpost.up.norm(), 0.9999, 1.0001)) return "would have no valid up direction";
   return "";
 }
 
-}  // namespace
-
-std::string Validate(const Entity& entity) {
-  const auto is_text = [](const std::string& text) { return text.size() <= kMaxTextBytes && IsUtf8(text); };
-  const std::string not_text =
-      "that is not UTF-8 text of at most " + std::to_string(kMaxTextBytes) + " bytes";
-  if (entity.name.empty()) return "would have no name";
-  if (!is_text(entity.name)) return "would have a name " + not_text;
-  if (!is_text(entity.group)) return "would be in a group with a name " + not_text;
-  if (entity.kind == Entity::Kind::kModel) {
-    const PlacedModel& model = entity.model;
-    if (!model.asset || model.asset->id.empty() || !is_text(model.asset->id)) return "would have no model";
-    if (!IsIn(model.animation, -1, kMaxAnimation)) return "would have an animation that is out of range";
-    if (model.warp) {
-      if (const std::string problem = Validate(*model.warp); !problem.empty()) return problem;
-    }
-  } else {
-    if (!is_text(entity.signpost.text)) return "would have a text " + not_text;
-    if (!is_text(entity.signpost.to_map)) return "would lead to a map with a name " + not_text;
-  }
-  return PoseProblem(entity);
+bool HasModel(const Entity& entity) {
+  return entity.kind == Entity::Kind::kModel || entity.kind == Entity::Kind::kImage;
 }
 
-Eigen::Vector3d PlaceOf(const Entity& entity) {
-  return entity.kind == Entity::Kind::kModel ? entity.model.map_from_model.translation
-                                             : entity.signpost.anchor;
+std::shared_ptr<const Asset> AssetOf(const Entity& entity) {
+  if (HasModel(entity)) return entity.model.asset;
+  return entity.kind == Entity::Kind::kSound ? entity.sound.asset : nullptr;
 }
 
-void TransformBy(const engine::Sim3& motion, Entity* entity) {
-  if (entity->kind == Entity::Kind::kModel) {
-    entity->model.map_from_model = motion * entity->model.map_from_model;
-  } else {
-    entity->signpost.anchor = motion * entity->signpost.anchor;
-    entity->signpost.up = motion.rotation * entity->signpost.up;
-    entity->signpost.height_m *= motion.scale;
-  }
+const std::string* TextOf(const Entity& entity) {
+  if (entity.kind == Entity::Kind::kSignpost) return &entity.signpost.text;
+  if (entity.kind == Entity::Kind::kLabel) return &entity.label.text;
+  return entity.kind == Entity::Kind::kSound ? &entity.sound.caption : nullptr;
 }
 
-void MoveWithAnchor(const engine::Sim3& motion, Entity* entity) {
-  Entity moved = *entity;
-  TransformBy(motion, &moved);
-  if (PoseProblem(moved).empty()) *entity = std::move(moved);
+std::string* TextOf(Entity* entity) {
+  return const_cast<std::string*>(TextOf(std::as_const(*entity)));
+}
+
+const Translations* TranslationsOf(const Entity& entity) {
+  if (entity.kind == Entity::Kind::kSignpost) return &entity.signpost.translations;
+  if (entity.kind == Entity::Kind::kLabel) return &entity.label.translations;
+  return entity.kind == Entity::Kind::kSound ? &entity.sound.translations : nullptr;
+}
+
+Translations* TranslationsOf(Entity* entity) {
+  return const_cast<Translations*>(TranslationsOf(std::as_const(*entity)));
+}
+
+const std::string& ShownText(const Entity& entity, const std::string& language) {
+  static const std::string kNoText;
+  const std::string* const text = TextOf(entity);
+  return text != nullptr ? TextFor(language, *text, *TranslationsOf(entity)) : kNoText;
 }
 
 const Entity* Scene::Find(const std::string& name) const {
@@ -104,35 +74,11 @@ std::string Scene::FreeName(const std::string& base) const {
   }
 }
 
-std::string Scene::FreeSignpostName() const {
+std::string Scene::FreeNumberedName(const std::string& base) const {
   for (int number = 1;; ++number) {
-    const std::string name = "sign-" + std::to_string(number);
+    const std::string name = base + "-" + std::to_string(number);
     if (Find(name) == nullptr) return name;
   }
-}
-
-std::string Validate(const Scene& scene) {
-  if (scene.entities.size() > kMaxEntities)
-    return "A map can hold at most " + std::to_string(kMaxEntities) + " models and signposts.";
-  std::set<std::string_view> names;
-  std::size_t bytes = 0, warp_points = 0;
-  for (const Entity& entity : scene.entities) {
-    if (const std::string problem = Validate(entity); !problem.empty())
-      return "'" + Shortened(entity.name, 80) + "' " + problem + ".";
-    if (!names.insert(entity.name).second) return "There are two '" + entity.name + "' in this map.";
-    bytes += TextBytes(entity);
-    if (entity.model.warp) warp_points += entity.model.warp->controls.size();
-  }
-  if (warp_points > kMaxSceneWarpPoints)
-    return "The models in a map can be bent by at most " + std::to_string(kMaxSceneWarpPoints) + " points.";
-  if (bytes > kMaxSceneTextBytes)
-    return "The names and texts in a map can have at most " + std::to_string(kMaxSceneTextBytes) + " bytes.";
-  return "";
-}
-
-std::size_t TextBytes(const Entity& entity) {
-  return entity.name.size() + entity.group.size() + entity.signpost.text.size() +
-         entity.signpost.to_map.size();
 }
 
 std::string Shortened(const std::string& text, std::size_t max_bytes) {

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "content/language.h"
 #include "content/model.h"
 #include "engine/geometry/sim3.h"
 
@@ -22,6 +23,11 @@ inline constexpr double kMinModelScale = 1e-9;   // map units per metre
 inline constexpr double kMaxModelScale = 1e9;    // map units per metre
 inline constexpr double kMinBoardHeight = 1e-6;  // map units
 inline constexpr double kMaxBoardHeight = 1e6;   // map units
+inline constexpr double kMinSoundRange = 1e-6;   // map units
+inline constexpr double kMaxSoundRange = 1e6;    // map units
+inline constexpr double kMinTrailWidth = 1e-6;   // map units
+inline constexpr double kMaxTrailWidth = 1e6;    // map units
+inline constexpr std::size_t kMinTrailPoints = 2, kMaxTrailPoints = 200;
 // Of a rotation; beyond it little of the angle is left of a double.
 inline constexpr double kMaxAngle_deg = 1e6;
 inline constexpr int kMaxAnimation = 1'000'000;       // Index of an animation of a model.
@@ -30,20 +36,29 @@ inline constexpr std::size_t kMaxTextBytes = 10'000;  // of each text and name
 inline constexpr std::size_t kMaxEntities = 50'000;
 inline constexpr std::size_t kMaxSceneTextBytes = 4u << 20;  // all names and texts together
 
-inline constexpr std::size_t kMaxSceneWarpPoints = 50'000;  // Of all bent models together.
+inline constexpr std::size_t kMaxSceneWarpPoints = 50'000;    // Of all bent models together.
+inline constexpr std::size_t kMaxSceneTranslations = 20'000;  // Of all texts together.
+inline constexpr std::size_t kMaxSceneTrailPoints = 20'000;   // Of all trails together.
 
 // A smooth deformation of a model (warp.h).
 struct Warp;
 
-// A glTF file as the library stores it: one self-contained GLB, identified by the hash of its bytes.
+// What a stored file is.
+enum class AssetKind { kModel, kImage, kSound };
+
+// A file as the library stores it, identified by the hash of its bytes: a model as one self-contained GLB, an
+// image (PNG or JPEG) or a sound (WAV, FLAC or Ogg) as it is. Where only ids are needed, there are assets
+// without bytes.
 struct Asset {
-  std::string id;                      // Lower-case hex of a hash of `glb` with at least 128 bits.
-  std::string name;                    // The file's name without its folder, for display.
-  std::vector<std::uint8_t> glb;       // The file's bytes.
-  std::shared_ptr<const Model> model;  // The decoded file; never null.
+  std::string id;                           // Lower-case hex of a hash of `bytes` with at least 128 bits.
+  std::string name;                         // The file's name without its folder, for display.
+  AssetKind kind = AssetKind::kModel;       // What the bytes are.
+  std::vector<std::uint8_t> bytes;          // The file's bytes.
+  std::shared_ptr<const Model> model = {};  // The decoded model, or a flat one that shows the image.
+  double seconds = 0;                       // Length of a sound.
 };
 
-// A model in a map. map_from_model transforms from glTF axes (y up) to the map.
+// A model in a map, or an image as a flat model. map_from_model transforms from glTF axes (y up) to the map.
 struct PlacedModel {
   std::shared_ptr<const Asset> asset;  // Never null.
   engine::Sim3 map_from_model;         // Its scale is the number of map units per metre of the model.
@@ -55,6 +70,7 @@ struct PlacedModel {
 // A board with text that rotates about its `up` axis to face the reader; `anchor` is its foot in the map.
 struct Signpost {
   std::string text;                                  // UTF-8.
+  Translations translations;                         // Its variants in other languages, UTF-8.
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // In the map, map units.
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY();    // Unit vector in the map.
   double height_m = 0.1;                             // Height of the board, in map units.
@@ -64,21 +80,71 @@ struct Signpost {
   std::string to_map;
 };
 
+// A text about a point of the map, on a board beside it that faces the reader. A leader line joins the two.
+struct Label {
+  std::string text;                                  // UTF-8.
+  Translations translations;                         // Its variants in other languages, UTF-8.
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // The point, in map units.
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // From there to the middle of the board's lower edge.
+  Eigen::Vector3d up = -Eigen::Vector3d::UnitY();    // Unit vector in the map.
+  double text_height = 0.05;                         // Height of a line of text, in map units.
+};
+
+// A sound that plays while the camera is near its position. Only authors see it.
+struct Sound {
+  std::shared_ptr<const Asset> asset;                  // Never null.
+  std::string caption;                                 // Shown while it plays. UTF-8.
+  Translations translations;                           // Variants of the caption.
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // In the map, map units.
+  double range = 1;                                    // It plays within this distance, in map units.
+};
+
+// A way over a surface, drawn as a flat ribbon with arrows from its first point to its last one.
+struct Trail {
+  std::vector<Eigen::Vector3d> points;             // In the map; kMinTrailPoints to kMaxTrailPoints.
+  Eigen::Vector3d up = -Eigen::Vector3d::UnitY();  // Unit vector across the surface, towards its front.
+  double width = 0.1;                              // Of the ribbon, in map units.
+};
+
 // An entity with a name that is unique in its scene ("helmet", "helmet-2", "sign-1").
 struct Entity {
   std::string name;  // Unique in the scene.
-  // Which of the two members counts.
-  enum class Kind { kModel, kSignpost };
+  // Which of the members below counts.
+  enum class Kind { kModel, kSignpost, kLabel, kImage, kSound, kTrail };
   Kind kind = Kind::kSignpost;  // What it is.
-  PlacedModel model;            // Of kModel.
+  PlacedModel model;            // Of kModel and kImage; an image is neither animated nor bent.
   Signpost signpost;            // Of kSignpost.
+  Label label;                  // Of kLabel.
+  Sound sound;                  // Of kSound.
+  Trail trail;                  // Of kTrail.
   bool locked = false;          // No edit but unlocking changes it.
-  bool hidden = false;          // It is not drawn.
+  bool hidden = false;          // It is not drawn, and a sound does not play.
   std::string group;            // Shared by entities that are selected together; empty for none.
 };
 
-// The position of an entity's foot in the map.
+// "model", "signpost", "label", "image", "sound" or "trail".
+const char* NameOf(Entity::Kind kind);
+// Whether Entity::model counts: a model or an image.
+bool HasModel(const Entity& entity);
+// The file that an entity needs; null for an entity without one.
+std::shared_ptr<const Asset> AssetOf(const Entity& entity);
+// The first text of a signpost, label or sound and its variants; null for other kinds.
+std::string* TextOf(Entity* entity);
+const std::string* TextOf(const Entity& entity);
+Translations* TranslationsOf(Entity* entity);
+const Translations* TranslationsOf(const Entity& entity);
+// The text of an entity for a reader of this language (TextFor); empty for kinds without text.
+const std::string& ShownText(const Entity& entity, const std::string& language);
+
+// The position of an entity in the map: of a model its origin, of an image its middle, of a signpost its
+// foot, of a label its anchor, of a trail its first point.
 Eigen::Vector3d PlaceOf(const Entity& entity);
+// Place, rotation and size as one similarity. Of a model and an image it is map_from_model. Of a trail y is
+// up, z the direction in which it begins, and the scale its width. Of the others the scale is the height of a
+// signpost, that of a label's text, or the range of a sound, and there is no rotation.
+engine::Sim3 PoseOf(const Entity& entity);
+// Gives an entity this pose; where PoseOf has no rotation, none is taken.
+void SetPose(const engine::Sim3& pose, Entity* entity);
 // Transforms an entity by a similarity of the map, wherever that takes it.
 void TransformBy(const engine::Sim3& motion, Entity* entity);
 // Transforms an entity after its anchor has moved in the map by `motion`. An entity that would leave the
@@ -94,19 +160,30 @@ struct Scene {
   const Entity* Find(const std::string& name) const;
   // Returns the first unused name of "base", "base-2", "base-3" …
   std::string FreeName(const std::string& base) const;
-  // Returns the first unused name of "sign-1", "sign-2" …
-  std::string FreeSignpostName() const;
+  // Returns the first unused name of "base-1", "base-2" …
+  std::string FreeNumberedName(const std::string& base) const;
+  // The same with "sign".
+  std::string FreeSignpostName() const { return FreeNumberedName("sign"); }
 };
 
 // What is wrong with an entity by itself, as the end of a sentence about it ("would have no name"); empty if
 // nothing is.
 std::string Validate(const Entity& entity);
 // A sentence that says why the scene cannot be stored (a number outside its limits, a text that is not UTF-8,
-// a name that is used twice, a model without asset); empty if it can.
+// a name that is used twice, a model without its file); empty if it can.
 std::string Validate(const Scene& scene);
+
+// The part of Validate that concerns an entity's place, rotation and size.
+std::string PoseProblem(const Entity& entity);
 
 // Of an entity's names and texts, as kMaxSceneTextBytes counts them.
 std::size_t TextBytes(const Entity& entity);
+// What the limits of a whole scene count.
+struct SceneTally {
+  std::size_t text_bytes = 0, translations = 0, warp_points = 0, trail_points = 0;
+  // Counts an entity. If a limit would be exceeded, it is not counted, and the sentence says which limit.
+  std::string Add(const Entity& entity);
+};
 
 // Whether the bytes are valid UTF-8.
 bool IsUtf8(std::string_view text);

@@ -3,14 +3,15 @@
 
 #include <set>
 
-#include "content/warp.h"
 #include "engine/base/error.h"
 
 namespace docent::content {
 namespace {
 
-// With keys: 30 for each entity, and 13 at most for each point that bends a model.
-constexpr std::size_t kMaxSceneValues = 100 + 31 * kMaxEntities + 14 * kMaxSceneWarpPoints;
+// With keys: 33 for each entity, 13 at most for each point that bends a model, 4 for each point of a trail,
+// and 2 for each translation.
+constexpr std::size_t kMaxSceneValues =
+    100 + 33 * kMaxEntities + 14 * kMaxSceneWarpPoints + 4 * kMaxSceneTrailPoints + 2 * kMaxSceneTranslations;
 
 struct ParsedScene {
   Json json;
@@ -47,7 +48,7 @@ std::string EncodeScene(const Scene& scene) {
   std::set<std::string> assets;
   Json entities = Json::array();
   for (const Entity& entity : scene.entities) {
-    if (entity.kind == Entity::Kind::kModel) assets.insert(entity.model.asset->id);
+    if (const auto asset = AssetOf(entity)) assets.insert(asset->id);
     entities.push_back(EntityToJson(entity));
   }
   const Json json{{"docent_scene", kSceneVersion}, {"assets", assets}, {"entities", entities}};
@@ -83,7 +84,7 @@ Scene ReadScene(std::string_view text, std::string_view where, const AssetLookup
   const ParsedScene parsed = ParseScene(text, where);
   Scene scene;
   std::set<std::string> names;
-  std::size_t bytes = 0, warp_points = 0;
+  SceneTally tally;
   const Json& entities = parsed.json["entities"];
   for (std::size_t i = 0; i < entities.size(); ++i) {
     const std::string place = Place("entities", i);
@@ -95,12 +96,8 @@ Scene ReadScene(std::string_view text, std::string_view where, const AssetLookup
                             " has the name of another entity and is now called '" + name + "'.");
         entity.name = name;
       }
-      if (bytes + TextBytes(entity) > kMaxSceneTextBytes)
-        Refuse(where, place, "is left out, because the scene has too many names and texts.");
-      if (entity.model.warp) warp_points += entity.model.warp->controls.size();
-      if (warp_points > kMaxSceneWarpPoints)
-        Refuse(where, place, "is left out, because too many points bend the models of the scene.");
-      bytes += TextBytes(entity);
+      if (const std::string problem = tally.Add(entity); !problem.empty())
+        Refuse(where, place, "is left out. " + problem);
       names.insert(entity.name);
       scene.entities.push_back(std::move(entity));
     } catch (const Error& error) {

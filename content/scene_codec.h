@@ -11,7 +11,7 @@
 // Encodes a scene as JSON text, the form in which a library stores it (assets are stored separately, once
 // each, by id):
 //
-//   {"docent_scene": 2, "assets": [ID…], "entities": [
+//   {"docent_scene": 3, "assets": [ID…], "entities": [
 //     {"kind": "model", "name": NAME, "locked": false, "hidden": false, "group": NAME,
 //      "asset": ID, "animation": N,
 //      "map_from_model": {"rotation_xyzw": [x, y, z, w], "translation_m": [x, y, z], "scale": S},
@@ -19,10 +19,20 @@
 //      "warp": {"controls_m": [[x, y, z]…], "weights": [[x, y, z]…], "affine": [12 numbers]}},
 //     {"kind": "signpost", "name": NAME, "locked": false, "hidden": false, "group": NAME,
 //      "text": TEXT, "anchor_m": [x, y, z], "up": [x, y, z],
-//      "height_m": H, "to_map": NAME, "to_key": KEY}]}
+//      "height_m": H, "to_map": NAME, "to_key": KEY,
+//      and, if there are any, "translations": {LANGUAGE: TEXT…}},
+//     {"kind": "label", …, "text": TEXT, "anchor_m": [x, y, z], "offset_m": [x, y, z], "up": [x, y, z],
+//      "text_height_m": H, and translations as a signpost},
+//     {"kind": "image", …, "asset": ID, "map_from_image": as map_from_model},
+//     {"kind": "sound", …, "asset": ID, "caption": TEXT, "position_m": [x, y, z], "range_m": R,
+//      and translations of the caption},
+//     {"kind": "trail", …, "points_m": [[x, y, z]…], "up": [x, y, z], "width_m": W}]}
+//
+// where … stands for name, locked, hidden and group.
 //
 // Numbers are written so that they read back to the same bits (rotations are normalized again). Version 1,
-// without locked, hidden, group and to_key, is read as well.
+// without locked, hidden, group and to_key, and version 2, without translations and the last four kinds, are
+// read as well.
 namespace docent::content {
 
 // DecodeScene reads what this returns. Throws Error for a scene that cannot be stored (Validate in scene.h).

@@ -5,13 +5,11 @@
 #include <cmath>
 
 #include "ui/shaders.h"
-#include "ui/signpost_model.h"
 
 namespace docent::ui {
 namespace {
 
 constexpr std::size_t kMaxLenses = 4;
-constexpr std::uint64_t kSignLifeFrames = 300;
 constexpr int kMaxAtlasSidePx = 4096;
 
 int MaxAtlasSide() {
@@ -46,7 +44,6 @@ ContentLayer::~ContentLayer() = default;
 
 void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
                         const content::Scene& scene, double animation_seconds, const RenderTarget& image) {
-  ++frame_;
   const std::vector<ModelInstance> instances =
       Instances(scene, camera_from_map.OriginInSource(), animation_seconds);
   mesh_drawer_.Prepare(instances, glm::vec3(0.0f, -1.0f, 0.0f));
@@ -146,24 +143,16 @@ std::vector<ModelInstance> ContentLayer::Instances(const content::Scene& scene,
   instances.reserve(scene.entities.size());
   for (const content::Entity& entity : scene.entities) {
     if (entity.hidden) continue;
+    content::EntityShape shape = shapes_.ShapeOf(entity, eye_in_map);
+    if (shape.model == nullptr) continue;
     ModelInstance instance;
-    if (entity.kind == content::Entity::Kind::kModel) {
-      instance.model = bent_models_.ShapeOf(entity.model);
-      if (instance.model == nullptr) continue;
-      instance.map_from_model = GlmFrom(entity.model.map_from_model);
-      instance.animation = entity.model.animation;
-      instance.seconds = animation_seconds;
-    } else {
-      Sign& sign = signs_[{entity.signpost.text, entity.signpost.to_map}];
-      if (sign.model == nullptr) sign.model = MakeSignpostModel(entity.signpost);
-      sign.last_frame = frame_;
-      instance.model = sign.model;
-      instance.map_from_model = GlmFrom(SignpostPose(entity.signpost, eye_in_map));
-    }
+    instance.model = std::move(shape.model);
+    instance.map_from_model = GlmFrom(shape.map_from_model);
+    if (entity.kind == content::Entity::Kind::kModel) instance.animation = entity.model.animation;
+    instance.seconds = animation_seconds;
     instances.push_back(std::move(instance));
   }
-  bent_models_.EndFrame();
-  std::erase_if(signs_, [&](const auto& sign) { return sign.second.last_frame + kSignLifeFrames < frame_; });
+  shapes_.EndFrame();
   return instances;
 }
 

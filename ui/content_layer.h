@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
-#include <map>
 #include <memory>
-#include <string>
-#include <utility>
 #include <vector>
 
-#include "content/bent_models.h"
 #include "content/scene.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
+#include "ui/entity_shapes.h"
 #include "ui/gl_objects.h"
 #include "ui/lens_warp.h"
 #include "ui/mesh_drawer.h"
@@ -41,10 +37,6 @@ class ContentLayer {
     std::unique_ptr<RenderTarget> atlas;
     std::vector<PixelRectangle> drawn;  // Rectangles of the atlas that are not transparent.
   };
-  struct Sign {
-    std::shared_ptr<const content::Model> model;
-    std::uint64_t last_frame = 0;
-  };
   // Draws the prepared content into the lens's atlas. Returns the part of the image that the content may
   // cover.
   PixelRectangle DrawAtlas(const engine::Rigid3& camera_from_map, Lens* lens);
@@ -57,9 +49,7 @@ class ContentLayer {
   GlProgram warp_program_;
   GlVertexArray empty_vertex_array_;
   std::vector<std::unique_ptr<Lens>> lenses_;  // Ordered by use, the most recently used last.
-  content::BentModels bent_models_;
-  std::map<std::pair<std::string, std::string>, Sign> signs_;  // Keyed by text and target map.
-  std::uint64_t frame_ = 0;
+  EntityShapes shapes_;
 };
 
 }  // namespace docent::ui

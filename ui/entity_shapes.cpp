@@ -34,23 +34,34 @@ Eigen::Vector3d PlacedBox::Top() const {
 }
 
 std::shared_ptr<const content::Model> EntityShapes::ModelOf(const content::Signpost& signpost) {
-  constexpr std::size_t kMostSigns = 2000;
-  if (signs_.size() > kMostSigns) signs_.clear();
-  auto& model = signs_[{signpost.text, signpost.to_map}];
-  if (!model) model = MakeSignpostModel(signpost);
-  return model;
+  Shape& sign = signs_[{signpost.text, signpost.to_map}];
+  if (!sign.model) sign.model = MakeSignpostModel(signpost);
+  sign.last_frame = frame_;
+  return sign.model;
+}
+
+content::EntityShape EntityShapes::ShapeOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map) {
+  const bool is_model = entity.kind == content::Entity::Kind::kModel;
+  return {is_model ? bent_models_.ShapeOf(entity.model) : ModelOf(entity.signpost),
+          TransformOf(entity, eye_in_map)};
+}
+
+void EntityShapes::EndFrame() {
+  constexpr std::uint64_t kLifeFrames = 300;
+  bent_models_.EndFrame();
+  std::erase_if(signs_, [&](const auto& sign) { return sign.second.last_frame + kLifeFrames < frame_; });
+  ++frame_;
 }
 
 std::optional<PlacedBox> EntityShapes::BoxOf(const content::Entity& entity,
                                              const Eigen::Vector3d& eye_in_map) {
-  const bool is_model = entity.kind == content::Entity::Kind::kModel;
-  const auto model = is_model ? bent_models_.ShapeOf(entity.model) : ModelOf(entity.signpost);
-  if (!model) return std::nullopt;
+  const content::EntityShape shape = ShapeOf(entity, eye_in_map);
+  if (!shape.model) return std::nullopt;
   PlacedBox box;
-  box.map_from_box = TransformOf(entity, eye_in_map);
+  box.map_from_box = shape.map_from_model;
   for (int axis = 0; axis < 3; ++axis) {
-    box.low[axis] = model->bounds_min[axis];
-    box.high[axis] = model->bounds_max[axis];
+    box.low[axis] = shape.model->bounds_min[axis];
+    box.high[axis] = shape.model->bounds_max[axis];
   }
   return box;
 }
@@ -58,9 +69,9 @@ std::optional<PlacedBox> EntityShapes::BoxOf(const content::Entity& entity,
 content::PickOptions EntityShapes::PickOptionsAt(double seconds) {
   content::PickOptions options;
   options.seconds = seconds;
-  options.model_shape = [this](const content::PlacedModel& placed) { return bent_models_.ShapeOf(placed); };
-  options.signpost_model = [this](const content::Signpost& signpost) { return ModelOf(signpost); };
-  options.signpost_pose = SignpostPose;
+  options.shape = [this](const content::Entity& entity, const Eigen::Vector3d& eye) {
+    return ShapeOf(entity, eye);
+  };
   return options;
 }
 

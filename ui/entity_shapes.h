@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
@@ -33,22 +34,30 @@ struct PlacedBox {
   Eigen::Vector3d Top() const;
 };
 
-// The shapes of entities in the image. It keeps the models of signposts, whose texts take long to lay out.
-// One thread.
+// The shapes of entities in the image. It keeps the models of signposts, whose texts take long to lay out, as
+// long as they are asked for. One thread.
 class EntityShapes {
  public:
+  // What is drawn of an entity for a reader at eye_in_map.
+  content::EntityShape ShapeOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map);
   // The bounding box in the rest pose, as a reader at eye_in_map sees it; empty without a model.
   std::optional<PlacedBox> BoxOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map);
   // Refers to this object.
   content::PickOptions PickOptionsAt(double seconds);
-  // Forgets the shapes of bent models that were not asked for since the last call.
-  void EndFrame() { bent_models_.EndFrame(); }
+  // Forgets the shapes of bent models that were not asked for since the last call, and other shapes that were
+  // not asked for since many calls.
+  void EndFrame();
 
  private:
+  struct Shape {
+    std::shared_ptr<const content::Model> model;
+    std::uint64_t last_frame = 0;
+  };
   std::shared_ptr<const content::Model> ModelOf(const content::Signpost& signpost);
 
   content::BentModels bent_models_;
-  std::map<std::pair<std::string, std::string>, std::shared_ptr<const content::Model>> signs_;
+  std::map<std::pair<std::string, std::string>, Shape> signs_;  // By text and target map.
+  std::uint64_t frame_ = 0;
 };
 
 }  // namespace docent::ui

@@ -23,11 +23,12 @@ content::AssetLookup LookupIn(const AssetCache& assets) {
 
 void DecodeAsset(const maps::AssetRecord& stored, AssetCache* assets) {
   if (!stored.bytes || assets->contains(stored.id)) return;
-  (*assets)[stored.id] = std::make_shared<content::Asset>(content::AssetFromGlb(stored.name, *stored.bytes));
+  (*assets)[stored.id] =
+      std::make_shared<content::Asset>(content::AssetFromBytes(stored.name, *stored.bytes));
 }
 
 maps::AssetRecord RecordOf(const std::shared_ptr<const content::Asset>& asset) {
-  return {asset->id, asset->name, std::shared_ptr<const maps::Bytes>(asset, &asset->glb)};
+  return {asset->id, asset->name, std::shared_ptr<const maps::Bytes>(asset, &asset->bytes)};
 }
 
 // Encoding writes only the ids of assets, so their bytes are not needed.
@@ -67,7 +68,7 @@ maps::SceneRecord ReadScene(const maps::SceneRecord& record, std::vector<std::st
 content::EditHistory WithinAssetLimit(const content::EditHistory& history, const content::Scene& scene) {
   std::set<std::string> counted;
   for (const content::Entity& entity : scene.entities) {
-    if (entity.kind == content::Entity::Kind::kModel) counted.insert(entity.model.asset->id);
+    if (const auto asset = content::AssetOf(entity)) counted.insert(asset->id);
   }
   std::size_t bytes = 0;
   // From the end, for the last change is the next one that is undone or redone.
@@ -75,7 +76,7 @@ content::EditHistory WithinAssetLimit(const content::EditHistory& history, const
     auto first = changes.end();
     while (first != changes.begin()) {
       for (const auto& asset : content::EditHistory({*std::prev(first)}, {}).Assets()) {
-        if (counted.insert(asset->id).second) bytes += asset->glb.size();
+        if (counted.insert(asset->id).second) bytes += asset->bytes.size();
       }
       if (bytes > maps::kMaxHistoryAssetBytes) break;
       --first;
@@ -103,7 +104,7 @@ content::Scene ReadableScene(const maps::SceneRecord& record, const std::string&
     try {
       DecodeAsset(stored, assets);
     } catch (const Error& error) {
-      problems->push_back(where + ": the model '" + stored.name + "' cannot be read: " + error.what());
+      problems->push_back(where + ": the file '" + stored.name + "' cannot be read: " + error.what());
     }
   }
   try {
@@ -119,9 +120,8 @@ maps::SceneRecord RecordFromScene(const content::Scene& scene) {
   record.text = content::EncodeScene(scene);
   std::set<std::string> seen;
   for (const content::Entity& entity : scene.entities) {
-    const std::shared_ptr<const content::Asset>& asset = entity.model.asset;
-    if (entity.kind != content::Entity::Kind::kModel || !seen.insert(asset->id).second) continue;
-    record.assets.push_back(RecordOf(asset));
+    const std::shared_ptr<const content::Asset> asset = content::AssetOf(entity);
+    if (asset && seen.insert(asset->id).second) record.assets.push_back(RecordOf(asset));
   }
   return record;
 }

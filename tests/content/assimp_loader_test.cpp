@@ -66,7 +66,7 @@ TEST_F(OtherFormats, AnObjBecomesTrianglesWithItsMaterialAndTexture) {
   }
   // The asset is self-contained.
   std::filesystem::remove_all(folder_);
-  EXPECT_EQ(AssetFromGlb(asset.name, asset.glb).model->images.size(), 1u);
+  EXPECT_EQ(AssetFromBytes(asset.name, asset.bytes).model->images.size(), 1u);
 }
 
 TEST_F(OtherFormats, AnUnusableTextureGivesAWarning) {

@@ -34,6 +34,57 @@ inline Entity SignEntity(const std::string& name) {
   return entity;
 }
 
+inline Entity LabelEntity(const std::string& name) {
+  Entity entity;
+  entity.name = name;
+  entity.kind = Entity::Kind::kLabel;
+  entity.label.text = "Löwe";
+  entity.label.translations = {{"es", "león"}};
+  entity.label.anchor = {1, 0.1, 3};
+  entity.label.offset = {0.1, -0.4, 1.0 / 3};
+  entity.label.up = Eigen::Vector3d(0.1, -1, 0.2).normalized();
+  entity.label.text_height = 0.07;
+  return entity;
+}
+
+inline Entity ImageEntity(const std::string& name) {
+  Entity entity = ModelEntity(name);
+  entity.kind = Entity::Kind::kImage;
+  entity.model.asset = AssetNamed("plan");
+  entity.model.map_from_model.rotation = engine::Rotation3::Exp({0.3, -0.2, 0.9});
+  return entity;
+}
+
+inline Entity SoundEntity(const std::string& name) {
+  Entity entity;
+  entity.name = name;
+  entity.kind = Entity::Kind::kSound;
+  entity.sound.asset = AssetNamed("roar");
+  entity.sound.caption = "The lion roars.";
+  entity.sound.translations = {{"de", "Der Löwe brüllt."}};
+  entity.sound.position = {-2, 0.3, 1};
+  entity.sound.range = 1.7;
+  return entity;
+}
+
+inline Entity TrailEntity(const std::string& name) {
+  Entity entity;
+  entity.name = name;
+  entity.kind = Entity::Kind::kTrail;
+  entity.trail.points = {{0, 1, 0}, {0.5, 1, 1.0 / 3}, {1, 1.1, 2}};
+  entity.trail.up = Eigen::Vector3d(0, -1, 0.1).normalized();
+  entity.trail.width = 0.2;
+  return entity;
+}
+
+// One entity of each kind.
+inline Scene AllKinds() {
+  Scene scene;
+  scene.entities = {ModelEntity("helmet"), SignEntity("sign-1"), LabelEntity("label-1"),
+                    ImageEntity("plan"),   SoundEntity("roar"),  TrailEntity("trail-1")};
+  return scene;
+}
+
 inline Scene ThreeEntities() {
   Scene scene;
   scene.entities = {ModelEntity("helmet"), SignEntity("sign-1"), ModelEntity("old fox")};

@@ -376,5 +376,22 @@ TEST(EditHistory, UndoIsRefusedWhereOthersChangedTheSceneMeanwhile) {
   EXPECT_THAT(NamesOf(scene), ElementsAre("old fox", "sign-1"));
 }
 
+TEST(Edits, ATextGetsVariantsByLanguage) {
+  Scene scene = ThreeEntities();
+  const auto perform = [&](const char* text, const char* language) {
+    ApplyChange(TextEdit(scene, "sign-1", text, language), &scene);
+  };
+  perform("Zur Katze", "de-AT");
+  perform("Al gato", "es");
+  perform("To the lion", "");
+  const Signpost& sign = scene.entities[1].signpost;
+  EXPECT_EQ(sign.text, "To the lion");
+  EXPECT_EQ(sign.translations, (Translations{{"de-at", "Zur Katze"}, {"es", "Al gato"}}));
+  perform("", "es");
+  EXPECT_EQ(sign.translations.count("es"), 0u);
+  EXPECT_EQ(ErrorOf([&] { perform("", "es"); }), "'sign-1' has no text in 'es'.");
+  EXPECT_EQ(ErrorOf([&] { perform("x", "no tag"); }), "'no tag' is not a language tag.");
+}
+
 }  // namespace
 }  // namespace docent::content

@@ -74,7 +74,7 @@ std::string ErrorOfFile(const std::filesystem::path& path) {
     const Asset asset = ImportAsset(path);
     ExpectValid(*asset.model, path.string());
     // The packed file must load without other files and give the same asset.
-    const Asset again = AssetFromGlb(asset.name, asset.glb);
+    const Asset again = AssetFromBytes(asset.name, asset.bytes);
     EXPECT_EQ(again.id, asset.id) << path;
     EXPECT_EQ(again.model->meshes.size(), asset.model->meshes.size()) << path;
   });

@@ -80,7 +80,7 @@ TEST_F(HostileFiles, OnlyRegularFilesAreRead) {
 TEST_F(HostileFiles, AnAssetOfALibraryMustBeSelfContained) {
   nlohmann::json json = {{"asset", {{"version", "2.0"}}}};
   json["buffers"] = {{{"uri", "inside.bin"}, {"byteLength", 36}}};
-  EXPECT_THROW(AssetFromGlb("test.glb", MakeGlb(json.dump(), {})), Error);
+  EXPECT_THROW(AssetFromBytes("test.glb", MakeGlb(json.dump(), {})), Error);
 }
 
 TEST(HostileGltf, TooManyVerticesAreRejectedBeforeAllocation) {
@@ -113,9 +113,9 @@ TEST(HostileGltf, AGlbTruncatedAnywhereIsRejected) {
   const std::vector<std::uint8_t> whole = TriangleFile().Glb();
   for (std::size_t length = 0; length < whole.size(); ++length) {
     const std::vector<std::uint8_t> part(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length));
-    EXPECT_THROW(AssetFromGlb("cut.glb", part), Error) << length;
+    EXPECT_THROW(AssetFromBytes("cut.glb", part), Error) << length;
   }
-  EXPECT_NO_THROW(AssetFromGlb("whole.glb", whole));
+  EXPECT_NO_THROW(AssetFromBytes("whole.glb", whole));
 }
 
 TEST(HostileGltf, AnyDamagedByteThrowsOrLoads) {
@@ -126,7 +126,7 @@ TEST(HostileGltf, AnyDamagedByteThrowsOrLoads) {
       std::vector<std::uint8_t> damaged = whole;
       damaged[at] = static_cast<std::uint8_t>(damaged[at] ^ flip);
       // An exception that is not an Error fails the test.
-      ++(ErrorOf([&] { AssetFromGlb("damaged.glb", damaged); }).empty() ? loaded : refused);
+      ++(ErrorOf([&] { AssetFromBytes("damaged.glb", damaged); }).empty() ? loaded : refused);
     }
   }
   EXPECT_GT(refused, 100) << "most bytes matter";

@@ -36,8 +36,8 @@ TEST(Sha256, PadsEveryLengthAroundABlockDifferently) {
 
 TEST(Asset, AGlbIsKeptExactlyAndIdentifiedByItsHash) {
   const std::vector<std::uint8_t> glb = TriangleFile().Glb();
-  const Asset asset = AssetFromGlb("triangle.glb", glb);
-  EXPECT_EQ(asset.glb, glb);
+  const Asset asset = AssetFromBytes("triangle.glb", glb);
+  EXPECT_EQ(asset.bytes, glb);
   EXPECT_EQ(asset.id, Sha256Hex(glb));
   EXPECT_EQ(asset.name, "triangle.glb");
   ASSERT_NE(asset.model, nullptr);

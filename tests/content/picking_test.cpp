@@ -151,9 +151,9 @@ TEST(Picking, TakesTheShapeThatIsShownInsteadOfTheAssets) {
   bent->bounds_min.x += 4;
   bent->bounds_max.x += 4;
   PickOptions options;
-  options.model_shape = [&](const PlacedModel& placed) {
-    EXPECT_EQ(placed.asset, scene.entities[0].model.asset);
-    return bent;
+  options.shape = [&](const Entity& entity, const Eigen::Vector3d&) {
+    EXPECT_EQ(entity.name, "bent");
+    return EntityShape{bent, entity.model.map_from_model};
   };
   EXPECT_TRUE(PickEntity(Ahead(4.5, 0.5), scene, options));
   EXPECT_FALSE(PickEntity(Ahead(0.5, 0.5), scene, options));
@@ -166,10 +166,10 @@ TEST(Picking, HitsSignpostsAsTheModelThatTheReaderSees) {
   scene.entities[0].kind = Entity::Kind::kSignpost;
   scene.entities[0].signpost.anchor = {1, 0, 3};
   PickOptions options;
-  options.signpost_model = [](const Signpost&) { return TriangleModel(); };
-  options.signpost_pose = [](const Signpost& signpost, const Eigen::Vector3d& eye) {
+  options.shape = [](const Entity& entity, const Eigen::Vector3d& eye) {
     EXPECT_EQ(eye, Eigen::Vector3d(1.5, 0.5, -5));
-    return At(signpost.anchor.x(), signpost.anchor.y(), signpost.anchor.z());
+    const Eigen::Vector3d& anchor = entity.signpost.anchor;
+    return EntityShape{TriangleModel(), At(anchor.x(), anchor.y(), anchor.z())};
   };
   const auto pick = PickEntity(Ahead(1.5, 0.5), scene, options);
   ASSERT_TRUE(pick);

@@ -101,9 +101,9 @@ TEST(SceneCodec, InvalidMembersAreRejectedWithTheirLocation) {
     return ErrorOfScene(changed.dump());
   };
   EXPECT_EQ(ErrorOfScene(good.dump()), "");
-  EXPECT_THAT(with("/docent_scene", 3), HasSubstr("newer version"));
+  EXPECT_THAT(with("/docent_scene", kSceneVersion + 1), HasSubstr("newer version"));
   EXPECT_THAT(with("/entities/0/asset", "xyz"), HasSubstr("entities[0] uses the asset xyz"));
-  EXPECT_THAT(with("/entities/0/kind", "lamp"), HasSubstr("neither a model nor a signpost"));
+  EXPECT_THAT(with("/entities/0/kind", "lamp"), HasSubstr("neither a model nor of another kind"));
   EXPECT_THAT(with("/entities/0/animation", 0.5), HasSubstr("entities[0].animation"));
   EXPECT_THAT(with("/entities/0/map_from_model/scale", 0), HasSubstr("map_from_model.scale"));
   EXPECT_THAT(with("/entities/0/map_from_model/scale", -1), HasSubstr("map_from_model.scale"));
@@ -193,6 +193,8 @@ Entity AnyEntity(Random* random) {
     entity.signpost.height_m = AnyNumber(random, 10);
     entity.signpost.to_map = AnyText(random);
     entity.signpost.to_key = static_cast<std::uint64_t>(random->Uniform(0, 1e18));
+    if (random->Uniform(0, 1) < 0.3) entity.signpost.translations["de-at"] = AnyText(random);
+    if (random->Uniform(0, 1) < 0.02) entity.signpost.translations["DE"] = "wrong";
   }
   entity.locked = random->Uniform(0, 1) < 0.5;
   entity.hidden = random->Uniform(0, 1) < 0.5;
@@ -222,6 +224,7 @@ TEST(SceneCodec, EveryRandomSceneIsRefusedByTheWriterOrReadBackEqual) {
       const Entity &a = scene.entities[i], &b = read.entities[i];
       EXPECT_EQ(a.name, b.name);
       EXPECT_EQ(a.signpost.text, b.signpost.text);
+      EXPECT_EQ(a.signpost.translations, b.signpost.translations);
       EXPECT_EQ(a.signpost.to_map, b.signpost.to_map);
       EXPECT_EQ(PlaceOf(a), PlaceOf(b));
       EXPECT_EQ(a.model.map_from_model.scale, b.model.map_from_model.scale);
@@ -338,6 +341,42 @@ TEST(SceneCodec, ScenesOfTheFirstVersionAreRead) {
   EXPECT_EQ(read.entities[1].signpost.to_map, "Desk 3");
 }
 
+TEST(SceneCodec, ScenesOfTheSecondVersionHaveNoTranslations) {
+  Scene scene = TestScene();
+  nlohmann::json old = nlohmann::json::parse(EncodeScene(scene));
+  old["docent_scene"] = 2;
+  EXPECT_EQ(EncodeScene(DecodeScene(old.dump(), "the library", Known())), EncodeScene(scene));
+  scene.entities[1].signpost.translations["es"] = "Al café";
+  old = nlohmann::json::parse(EncodeScene(scene));
+  EXPECT_EQ(DecodeScene(old.dump(), "the library", Known()).entities[1].signpost.translations,
+            scene.entities[1].signpost.translations);
+  old["docent_scene"] = 2;
+  EXPECT_THAT(ErrorOfScene(old.dump()), HasSubstr("'translations'"));
+}
+
+TEST(SceneCodec, TranslationsThatTheWriterRefusesAreNotRead) {
+  Scene scene = TestScene();
+  scene.entities[1].signpost.translations["es"] = "Al café";
+  const nlohmann::json good = nlohmann::json::parse(EncodeScene(scene));
+  const auto with = [&](const nlohmann::json& translations) {
+    nlohmann::json changed = good;
+    changed["entities"][1]["translations"] = translations;
+    return ErrorOfScene(changed.dump());
+  };
+  EXPECT_EQ(with({{"de", "Zum Café"}}), "");
+  EXPECT_THAT(with({{"DE", "Zum Café"}}), HasSubstr("tag is not valid"));
+  EXPECT_THAT(with({{"", "Zum Café"}}), HasSubstr("tag is not valid"));
+  EXPECT_THAT(with({{"de", ""}}), HasSubstr("'de'"));
+  EXPECT_THAT(with({{"de", std::string(kMaxTextBytes + 1, 'x')}}), HasSubstr("at most 10000 bytes"));
+  EXPECT_THAT(with({{"de", 5}}), HasSubstr("not a string"));
+  EXPECT_THAT(with({"de", "Zum Café"}), HasSubstr("translations is not a JSON object"));
+  nlohmann::json many;
+  for (char a = 'a'; a < 'c'; ++a) {
+    for (char b = 'a'; b < 'r'; ++b) many[std::string{a, b}] = "x";
+  }
+  EXPECT_THAT(with(many), HasSubstr("more than 32 languages"));
+}
+
 TEST(SceneCodec, ADamagedEntityCostsOnlyThatEntity) {
   Scene scene = TestScene();
   for (const char* name : {"second", "third", "fourth"}) {
@@ -368,7 +407,7 @@ TEST(SceneCodec, ADamagedEntityCostsOnlyThatEntity) {
   EXPECT_THAT(problems[3], HasSubstr("called 'fourth'"));
   EXPECT_EQ(Validate(rest), "");
   EXPECT_THAT(ErrorOf([&] { read("[]"); }), HasSubstr("the library"));
-  bad["docent_scene"] = 3;
+  bad["docent_scene"] = kSceneVersion + 1;
   EXPECT_THAT(ErrorOf([&] { read(bad); }), HasSubstr("newer version"));
 }
 

@@ -103,7 +103,7 @@ TEST(StoredHistories, KeepTheNewestChangesWithinTheLimitOfTheirModels) {
   const auto model_of = [](std::size_t megabytes, int number) {
     auto asset = std::make_shared<content::Asset>(content::Asset());
     asset->id = "asset-" + std::to_string(number);
-    asset->glb.resize(megabytes << 20);
+    asset->bytes.resize(megabytes << 20);
     content::Entity entity;
     entity.name = "model-" + std::to_string(number);
     entity.kind = content::Entity::Kind::kModel;

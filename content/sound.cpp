@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "content/sound.h"
+
+#include <sndfile.h>
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+#include <string_view>
+
+#include "content/gltf/json.h"
+
+namespace docent::content {
+namespace {
+
+// A file in memory, as libsndfile reads it.
+struct SoundBytes {
+  std::span<const std::uint8_t> bytes;
+  sf_count_t position = 0;
+
+  sf_count_t size() const { return static_cast<sf_count_t>(bytes.size()); }
+};
+
+sf_count_t SoundLength(void* user) {
+  return static_cast<SoundBytes*>(user)->size();
+}
+
+sf_count_t SeekSound(sf_count_t offset, int whence, void* user) {
+  auto* const file = static_cast<SoundBytes*>(user);
+  const sf_count_t from = whence == SEEK_CUR ? file->position : whence == SEEK_END ? file->size() : 0;
+  file->position = std::clamp<sf_count_t>(from + offset, 0, file->size());
+  return file->position;
+}
+
+sf_count_t ReadSoundBytes(void* target, sf_count_t count, void* user) {
+  auto* const file = static_cast<SoundBytes*>(user);
+  const sf_count_t length = std::clamp<sf_count_t>(count, 0, file->size() - file->position);
+  if (length > 0) std::memcpy(target, file->bytes.data() + file->position, static_cast<std::size_t>(length));
+  file->position += length;
+  return length;
+}
+
+sf_count_t WriteNoSoundBytes(const void* /*source*/, sf_count_t /*count*/, void* /*user*/) {
+  return 0;
+}
+
+sf_count_t SoundPosition(void* user) {
+  return static_cast<SoundBytes*>(user)->position;
+}
+
+struct CloseSound {
+  void operator()(SNDFILE* file) const { sf_close(file); }
+};
+using SoundFile = std::unique_ptr<SNDFILE, CloseSound>;
+
+// Opens the file and checks its format.
+SoundFile OpenSound(const std::string& name, SoundBytes* bytes, SoundFormat* format) {
+  if (bytes->bytes.size() > kMaxSoundFileBytes)
+    Refuse(name, "", "the sound has more than " + std::to_string(kMaxSoundFileBytes >> 20) + " MiB.");
+  if (!IsSoundFile(bytes->bytes)) Refuse(name, "", "is no sound in a WAV, FLAC or Ogg file.");
+  SF_VIRTUAL_IO reading{SoundLength, SeekSound, ReadSoundBytes, WriteNoSoundBytes, SoundPosition};
+  SF_INFO info{};
+  SoundFile file(sf_open_virtual(&reading, SFM_READ, &info, bytes));
+  if (!file) Refuse(name, "", "is a damaged sound.");
+  if (info.channels < 1 || info.channels > 2)
+    Refuse(name, "", "the sound has " + std::to_string(info.channels) + " channels; it may have 1 or 2.");
+  if (info.samplerate < kMinSoundRate || info.samplerate > kMaxSoundRate)
+    Refuse(name, "", "the sound has a rate that is not between 8000 and 192000 samples per second.");
+  if (info.frames < 1) Refuse(name, "", "the sound is empty.");
+  *format = {info.channels, info.samplerate, static_cast<std::uint64_t>(info.frames)};
+  if (format->seconds() > kMaxSoundSeconds ||
+      format->frames > kMaxSoundSamples / static_cast<std::uint64_t>(info.channels)) {
+    Refuse(name, "",
+           "the sound is longer than " + std::to_string(static_cast<int>(kMaxSoundSeconds) / 60) +
+               " minutes or has more than " + std::to_string(kMaxSoundSamples) + " samples.");
+  }
+  return file;
+}
+
+}  // namespace
+
+bool IsSoundFile(std::span<const std::uint8_t> bytes) {
+  const std::string_view begin(reinterpret_cast<const char*>(bytes.data()),
+                               std::min<std::size_t>(bytes.size(), 12));
+  const bool is_wave = begin.size() == 12 && begin.starts_with("RIFF") && begin.ends_with("WAVE");
+  return is_wave || begin.starts_with("fLaC") || begin.starts_with("OggS");
+}
+
+SoundFormat ReadSoundFormat(const std::string& file, std::span<const std::uint8_t> bytes) {
+  SoundBytes source{bytes};
+  SoundFormat format;
+  OpenSound(file, &source, &format);
+  return format;
+}
+
+SoundSamples DecodeSound(const std::string& file, std::span<const std::uint8_t> bytes) {
+  SoundBytes source{bytes};
+  SoundSamples sound;
+  const SoundFile opened = OpenSound(file, &source, &sound.format);
+  const auto channels = static_cast<std::uint64_t>(sound.format.channels);
+  // The header may promise more than the file has, so that memory is taken as samples come.
+  constexpr std::uint64_t kFramesAtOnce = 65'536;
+  for (std::uint64_t done = 0; done < sound.format.frames;) {
+    const std::uint64_t wanted = std::min(kFramesAtOnce, sound.format.frames - done);
+    sound.samples.resize((done + wanted) * channels);
+    const sf_count_t read =
+        sf_readf_short(opened.get(), sound.samples.data() + done * channels, static_cast<sf_count_t>(wanted));
+    if (read != static_cast<sf_count_t>(wanted)) Refuse(file, "", "the sound ends too early.");
+    done += wanted;
+  }
+  return sound;
+}
+
+}  // namespace docent::content

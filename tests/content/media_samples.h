@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <sndfile.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+// Small image and sound files for tests.
+namespace docent::content {
+
+inline void WriteBytes(const std::filesystem::path& path, const std::vector<std::uint8_t>& bytes) {
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+inline std::uint32_t Crc32(const std::uint8_t* bytes, std::size_t count) {
+  std::uint32_t crc = ~0u;
+  for (std::size_t i = 0; i < count; ++i) {
+    crc ^= bytes[i];
+    for (int k = 0; k < 8; ++k) crc = (crc >> 1) ^ (0xEDB88320u & (0u - (crc & 1u)));
+  }
+  return ~crc;
+}
+
+// A PNG (ISO/IEC 15948) of grey pixels, up to 200 of them, with stored (not compressed) data.
+inline std::vector<std::uint8_t> PngBytes(std::uint32_t width_px, std::uint32_t height_px,
+                                          std::uint8_t grey = 200) {
+  std::vector<std::uint8_t> png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+  const auto put = [](std::uint32_t value, std::vector<std::uint8_t>* bytes) {
+    for (int shift = 24; shift >= 0; shift -= 8) bytes->push_back(static_cast<std::uint8_t>(value >> shift));
+  };
+  const auto chunk = [&](const char* type, const std::vector<std::uint8_t>& data) {
+    put(static_cast<std::uint32_t>(data.size()), &png);
+    std::vector<std::uint8_t> body(type, type + 4);
+    for (const std::uint8_t byte : data) body.push_back(byte);
+    for (const std::uint8_t byte : body) png.push_back(byte);
+    put(Crc32(body.data(), body.size()), &png);
+  };
+  std::vector<std::uint8_t> header;
+  put(width_px, &header);
+  put(height_px, &header);
+  for (const std::uint8_t byte : {8, 0, 0, 0, 0}) header.push_back(byte);
+  chunk("IHDR", header);
+  std::vector<std::uint8_t> rows;
+  for (std::uint32_t y = 0; y < height_px; ++y) {
+    rows.push_back(0);  // No filter.
+    for (std::uint32_t x = 0; x < width_px; ++x) rows.push_back(grey);
+  }
+  const auto length = static_cast<std::uint16_t>(rows.size());
+  std::vector<std::uint8_t> data = {0x78,
+                                    0x01,
+                                    0x01,
+                                    static_cast<std::uint8_t>(length & 0xFF),
+                                    static_cast<std::uint8_t>(length >> 8),
+                                    static_cast<std::uint8_t>(~length & 0xFF),
+                                    static_cast<std::uint8_t>((~length >> 8) & 0xFF)};
+  for (const std::uint8_t byte : rows) data.push_back(byte);
+  std::uint32_t a = 1, b = 0;  // Adler-32 (RFC 1950).
+  for (const std::uint8_t byte : rows) {
+    a = (a + byte) % 65'521;
+    b = (b + a) % 65'521;
+  }
+  put(b << 16 | a, &data);
+  chunk("IDAT", data);
+  chunk("IEND", {});
+  return png;
+}
+
+// A tone of 440 Hz.
+inline std::int16_t SampleOfTone(std::size_t index, int rate) {
+  return static_cast<std::int16_t>(
+      std::lround(9000 * std::sin(2 * std::numbers::pi * 440 * static_cast<double>(index) / rate)));
+}
+
+// A sound file in a format of libsndfile; the second channel is the negative of the first.
+inline std::vector<std::uint8_t> SoundBytesOf(int format, int channels, int rate, std::size_t frames) {
+  const std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("docent-sound-" + std::to_string(::getpid()) + ".tmp");
+  SF_INFO info{};
+  info.channels = channels;
+  info.samplerate = rate;
+  info.format = format;
+  SNDFILE* const file = sf_open(path.c_str(), SFM_WRITE, &info);
+  if (file == nullptr) throw std::runtime_error(sf_strerror(nullptr));
+  std::vector<std::int16_t> samples;
+  for (std::size_t i = 0; i < frames; ++i) {
+    for (int channel = 0; channel < channels; ++channel)
+      samples.push_back(
+          static_cast<std::int16_t>(channel % 2 == 0 ? SampleOfTone(i, rate) : -SampleOfTone(i, rate)));
+  }
+  sf_writef_short(file, samples.data(), static_cast<sf_count_t>(frames));
+  sf_close(file);
+  std::ifstream read(path, std::ios::binary);
+  std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(read)), std::istreambuf_iterator<char>());
+  std::filesystem::remove(path);
+  return bytes;
+}
+
+}  // namespace docent::content
