@@ -62,12 +62,14 @@ bool MoveStored(const engine::Sim3& motion, bool backwards, SceneChange* change,
 SceneChange Reversed(const SceneChange& change) {
   SceneChange reversed{change.label, {change.entities.rbegin(), change.entities.rend()}};
   for (EntityChange& entity : reversed.entities) std::swap(entity.before, entity.after);
+  if (change.settings) reversed.settings = {change.settings->after, change.settings->before};
   return reversed;
 }
 
 void ApplyChange(const SceneChange& change, Scene* scene) {
   Scene changed = *scene;
   for (const EntityChange& entity : change.entities) ApplyToList(entity, &changed);
+  if (change.settings) changed.settings = change.settings->after;
   if (const std::string problem = Validate(changed); !problem.empty()) throw Error(problem);
   *scene = std::move(changed);
 }

@@ -20,10 +20,16 @@ struct EntityChange {
   std::optional<Entity> before, after;  // At least one.
 };
 
+// What becomes of the settings of a map.
+struct SettingsChange {
+  MapSettings before, after;
+};
+
 // One change of a scene, which is undone as a whole.
 struct SceneChange {
-  std::string label;                   // What it does, in words: "move 'fox'". UTF-8.
-  std::vector<EntityChange> entities;  // In the order in which they are applied.
+  std::string label;                            // What it does, in words: "move 'fox'". UTF-8.
+  std::vector<EntityChange> entities;           // In the order in which they are applied.
+  std::optional<SettingsChange> settings = {};  // Empty: they stay as they are.
 };
 
 // The change that takes everything back.

@@ -322,4 +322,9 @@ SceneChange GroupEdit(const Scene& scene, const std::vector<std::string>& names,
   return change;
 }
 
+SceneChange SettingsEdit(const Scene& scene, const MapSettings& settings, std::string label) {
+  if (settings == scene.settings) throw Error("Nothing would change.");
+  return {std::move(label), {}, SettingsChange{scene.settings, settings}};
+}
+
 }  // namespace docent::content

@@ -60,6 +60,9 @@ SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::s
 SceneChange AddPointEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& point_in_map);
 SceneChange RemovePointEdit(const Scene& scene, const std::string& name);
 
+// Of the map itself. Throws Error when the settings are these already.
+SceneChange SettingsEdit(const Scene& scene, const MapSettings& settings, std::string label);
+
 enum class EntityFlag { kLocked, kHidden };
 // Throws Error when all of the entities have this value already.
 SceneChange FlagEdit(const Scene& scene, const std::vector<std::string>& names, EntityFlag flag, bool value);

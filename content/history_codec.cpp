@@ -5,6 +5,7 @@
 #include <deque>
 #include <set>
 
+#include "content/object_reader.h"
 #include "engine/base/error.h"
 
 namespace docent::content {
@@ -33,7 +34,12 @@ EncodedChange EncodeChange(const SceneChange& change) {
                         {"before", StateToJson(entity.before)},
                         {"after", StateToJson(entity.after)}});
   }
-  encoded.text = Json{{"label", change.label}, {"changes", std::move(entities)}}.dump();
+  Json json{{"label", change.label}, {"changes", std::move(entities)}};
+  if (change.settings) {
+    json["settings"] = {{"before", SettingsToJson(change.settings->before)},
+                        {"after", SettingsToJson(change.settings->after)}};
+  }
+  encoded.text = json.dump();
   return encoded;
 }
 
@@ -112,12 +118,13 @@ class ChangeReader {
 
  private:
   SceneChange ReadChange(const Json& json, const std::string& place, bool* complete) {
-    CheckMembers(where_, place, json, {"label", "changes"});
+    CheckMembers(where_, place, json, {"label", "changes", "settings"});
     const auto label = json.find("label");
     if (label == json.end() || !label->is_string() ||
         label->get_ref<const std::string&>().size() > kMaxTextBytes)
       Refuse(where_, place, "has no valid label.");
     SceneChange change{label->get<std::string>(), {}};
+    if (json.contains("settings")) change.settings = ReadSettings(json["settings"], place + ".settings");
     const Json& entities = ListIn(json, "changes", where_, place);
     for (std::size_t i = 0; i < entities.size(); ++i) {
       const std::string entity_place = place + "." + Place("changes", i);
@@ -132,6 +139,14 @@ class ChangeReader {
       change.entities.push_back(std::move(read));
     }
     return change;
+  }
+
+  SettingsChange ReadSettings(const Json& json, const std::string& place) {
+    if (version_ < 3) Refuse(where_, place, "is not known to the version of this history.");
+    CheckMembers(where_, place, json, {"before", "after"});
+    const ObjectReader reader(where_, place, json);
+    return {SettingsFromJson(where_, place + ".before", reader.Member("before")),
+            SettingsFromJson(where_, place + ".after", reader.Member("after"))};
   }
 
   std::optional<Entity> ReadState(const Json& entity, const char* name, const std::string& place,

@@ -218,4 +218,9 @@ double ScaleForSide(const Model& model, double side) {
   return std::clamp(side / largest, kMinModelScale, kMaxModelScale);
 }
 
+double AutomaticScale(const Model& model, const MapSettings& settings, double side) {
+  if (settings.metres_per_unit == 0) return ScaleForSide(model, side);
+  return std::clamp(1 / settings.metres_per_unit, kMinModelScale, kMaxModelScale);
+}
+
 }  // namespace docent::content

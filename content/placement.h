@@ -76,5 +76,8 @@ Eigen::Vector3d BaseInMap(const Entity& entity);
 // The scale, in map units per metre, at which the largest side of the model has this length in map units,
 // within the limits of a scene; 1 for a model without extent.
 double ScaleForSide(const Model& model, double side);
+// The scale of a model that is placed without one: its true size where the length of a map unit is known,
+// else ScaleForSide.
+double AutomaticScale(const Model& model, const MapSettings& settings, double side);
 
 }  // namespace docent::content

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "content/language.h"
+#include "content/map_settings.h"
 #include "content/model.h"
 #include "engine/geometry/sim3.h"
 
@@ -155,6 +156,7 @@ void MoveWithAnchor(const engine::Sim3& motion, Entity* entity);
 // original.
 struct Scene {
   std::vector<Entity> entities;  // In the order of placement.
+  MapSettings settings;          // Of the map that holds the entities.
 
   // Null if there is none with that name.
   const Entity* Find(const std::string& name) const;

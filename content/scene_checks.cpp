@@ -155,6 +155,7 @@ std::string Validate(const Entity& entity) {
 std::string Validate(const Scene& scene) {
   if (scene.entities.size() > kMaxEntities)
     return "A map can hold at most " + std::to_string(kMaxEntities) + " objects.";
+  if (const std::string problem = Validate(scene.settings); !problem.empty()) return problem;
   std::set<std::string_view> names;
   SceneTally tally;
   for (const Entity& entity : scene.entities) {

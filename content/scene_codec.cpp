@@ -24,7 +24,7 @@ ParsedScene ParseScene(std::string_view text, std::string_view where) {
   limits.max_json_values = kMaxSceneValues;
   ParsedScene parsed{ParseGltfJson(where, text, limits)};
   const Json& json = parsed.json;
-  CheckMembers(where, "the scene", json, {"docent_scene", "assets", "entities"});
+  CheckMembers(where, "the scene", json, {"docent_scene", "assets", "entities", "settings"});
   for (const char* name : {"docent_scene", "assets", "entities"}) {
     if (!json.contains(name)) Refuse(where, "the scene", "has no " + std::string(name) + ".");
   }
@@ -38,6 +38,8 @@ ParsedScene ParseScene(std::string_view text, std::string_view where) {
     Refuse(where, "", "the scene's assets and entities are not lists.");
   }
   if (json["entities"].size() > kMaxEntities) Refuse(where, "", "the scene has too many entities.");
+  if (parsed.version < 3 && json.contains("settings"))
+    Refuse(where, "", "the scene has settings, which its version does not know.");
   return parsed;
 }
 
@@ -51,7 +53,8 @@ std::string EncodeScene(const Scene& scene) {
     if (const auto asset = AssetOf(entity)) assets.insert(asset->id);
     entities.push_back(EntityToJson(entity));
   }
-  const Json json{{"docent_scene", kSceneVersion}, {"assets", assets}, {"entities", entities}};
+  Json json{{"docent_scene", kSceneVersion}, {"assets", assets}, {"entities", entities}};
+  if (scene.settings != MapSettings()) json["settings"] = SettingsToJson(scene.settings);
   return json.dump();
 }
 
@@ -68,6 +71,8 @@ std::vector<std::string> SceneAssetIds(std::string_view text) {
 Scene DecodeScene(std::string_view text, std::string_view where, const AssetLookup& find_asset) {
   const ParsedScene parsed = ParseScene(text, where);
   Scene scene;
+  if (parsed.json.contains("settings"))
+    scene.settings = SettingsFromJson(where, "settings", parsed.json["settings"]);
   std::set<std::string> names;
   const Json& entities = parsed.json["entities"];
   for (std::size_t i = 0; i < entities.size(); ++i) {
@@ -83,6 +88,12 @@ Scene ReadScene(std::string_view text, std::string_view where, const AssetLookup
                 std::vector<std::string>* problems) {
   const ParsedScene parsed = ParseScene(text, where);
   Scene scene;
+  try {
+    if (parsed.json.contains("settings"))
+      scene.settings = SettingsFromJson(where, "settings", parsed.json["settings"]);
+  } catch (const Error& error) {
+    problems->emplace_back(error.what());
+  }
   std::set<std::string> names;
   SceneTally tally;
   const Json& entities = parsed.json["entities"];

@@ -243,7 +243,7 @@ ui::AuthoringFacts AuthorControls::Facts() const {
   facts.scene = view_.scene.get();
   facts.has_pose = view_.has_pose();
   facts.camera_from_map = view_.camera.camera_from_map;
-  if (facts.has_pose) facts.map_from_upright = UprightRotation(*tracked.map);
+  if (facts.has_pose && view_.scene) facts.map_from_upright = UprightRotation(*view_.scene, *tracked.map);
   return facts;
 }
 

@@ -23,6 +23,12 @@ struct DoneWriter {
     return "Renamed the map " + c.name + " to " + c.new_name + ".";
   }
   std::string operator()(const RemoveMap& c) const { return "Removed the map " + c.name + "."; }
+  std::string operator()(const SetMapUp& c) const {
+    return c.pixel ? "This surface is level now." : "The map finds out again which way is up.";
+  }
+  std::string operator()(const SetMapScale& c) const {
+    return c.length_m > 0 ? "The map is measured in metres now." : "The scale of the map is not known now.";
+  }
   std::string operator()(const PlaceModel& c) const {
     return "Placed " + std::filesystem::path(c.file).filename().string() + ".";
   }

@@ -14,12 +14,12 @@
 #include "app/command_line/stored_scene.h"
 #include "app/files/text_file.h"
 #include "app/session/library_scene.h"
+#include "app/session/map_axes.h"
 #include "app/session/session.h"
 #include "content/asset.h"
 #include "content/edits.h"
 #include "content/placement.h"
 #include "engine/base/error.h"
-#include "engine/map/upright_axes.h"
 #include "maps/library/library.h"
 
 namespace docent::app {
@@ -117,7 +117,7 @@ content::Entity NewSignpost(const ContentOptions& options, const engine::MapSnap
   entity.name = options.name.empty() ? scene.FreeSignpostName() : options.name;
   entity.signpost.text = options.text;
   entity.signpost.anchor = options.position;
-  entity.signpost.up = engine::UpInMap(map);
+  entity.signpost.up = UpOf(scene, map);
   entity.signpost.to_map = options.to_map;
   const double distance = map.keyframes.empty() ? 1 : map.keyframes.front().mean_depth;
   entity.signpost.height_m =
@@ -134,7 +134,7 @@ void Add(const ContentOptions& options, Verbosity verbosity) {
   const auto snapshot = library.Load(map.key).snapshot;
   const content::Scene scene = StoredNames(library, map);
   content::Entity entity = options.file.empty() ? NewSignpost(options, *snapshot, scene)
-                                                : NewModel(options, engine::UprightAxesOf(*snapshot), scene);
+                                                : NewModel(options, AxesOf(scene, *snapshot), scene);
   entity.signpost.to_key = to_key;
   const MakeEdit edits[] = {[&](const content::Scene& stored) { return content::AddEdit(stored, entity); }};
   EditStoredScene(&library, map, edits);

@@ -4,12 +4,12 @@
 #include <numbers>
 #include <utility>
 
+#include "app/session/map_axes.h"
 #include "app/session/session.h"
 #include "app/session/surface_at_pixel.h"
 #include "content/asset.h"
 #include "content/placement.h"
 #include "engine/base/error.h"
-#include "engine/map/upright_axes.h"
 #include "ui/strings.h"
 
 namespace docent::app {
@@ -61,12 +61,13 @@ std::shared_ptr<const content::Scene> PlacingGhost::AddTo(const std::shared_ptr<
     return scene;
   }
   const double distance = (hit.point - view.eye()).norm();
-  const Eigen::Vector3d up = engine::UpInMap(*frame.map);
+  const Eigen::Vector3d up = UpOf(*scene, *frame.map);
   if (entity.kind == content::Entity::Kind::kModel) {
     const content::Model& model = *entity.model.asset->model;
-    const double scale = choices.automatic_size
-                             ? content::ScaleForSide(model, SessionOptions().model_side * distance)
-                             : choices.scale;
+    const double scale =
+        choices.automatic_size
+            ? content::AutomaticScale(model, scene->settings, SessionOptions().model_side * distance)
+            : choices.scale;
     engine::Sim3& pose = entity.model.map_from_model;
     pose = content::FacingPose(hit.point, view.eye(), hit.normal, up,
                                choices.yaw_deg * std::numbers::pi / 180, scale);

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "engine/map/upright_axes.h"
+#include "app/session/map_axes.h"
 
 namespace docent::app {
 
@@ -17,8 +17,8 @@ bool MayMove(const content::Entity& entity) {
 
 }  // namespace
 
-engine::Rotation3 UprightRotation(const engine::MapSnapshot& map) {
-  const engine::UprightAxes axes = engine::UprightAxesOf(map);
+engine::Rotation3 UprightRotation(const content::Scene& scene, const engine::MapSnapshot& map) {
+  const engine::UprightAxes axes = AxesOf(scene, map);
   Eigen::Matrix3d columns;
   columns << axes.right, axes.up, -axes.ahead;
   return engine::Rotation3(columns);
@@ -82,7 +82,7 @@ void PointerTool::Press(const AuthorView& view, const Eigen::Vector2d& point, bo
   if (!box) return;
   ui::Gizmo ground;
   ground.origin = box->Base();
-  ground.map_from_axes = UprightRotation(*view.frame->tracked.map);
+  ground.map_from_axes = UprightRotation(*view.scene, *view.frame->tracked.map);
   ground.length = (ground.origin - view.eye()).norm();
   Hold(view, ground, ui::GizmoPart::kGround, point);
 }
@@ -138,7 +138,7 @@ void PointerTool::Draw(const AuthorView& view, const content::Scene& preview, co
 void PointerTool::Nudge(const AuthorView& view, int right, int away) {
   constexpr double kShareOfDistance = 0.01;
   if (!view.has_pose() || !view.scene) return;
-  const Eigen::Vector3d up = engine::UpInMap(*view.frame->tracked.map);
+  const Eigen::Vector3d up = UpOf(*view.scene, *view.frame->tracked.map);
   const engine::Rotation3 map_from_camera = view.camera.camera_from_map.rotation.inverse();
   // The camera's right is level more often than its forward direction.
   Eigen::Vector3d level_right = map_from_camera * Eigen::Vector3d::UnitX();

@@ -62,6 +62,6 @@ class PointerTool {
 };
 
 // The axes of the map's ground: right, up and towards the first viewer.
-engine::Rotation3 UprightRotation(const engine::MapSnapshot& map);
+engine::Rotation3 UprightRotation(const content::Scene& scene, const engine::MapSnapshot& map);
 
 }  // namespace docent::app

@@ -100,6 +100,9 @@ std::string First(std::initializer_list<std::string> problems) {
   return "";
 }
 
+// Lengths that a person measures in a building.
+constexpr double kMinLength_m = 1e-3, kMaxLength_m = 1e3;
+
 struct Validator {
   std::string operator()(const NewMap& c) const { return MapNameProblem(c.name); }
   std::string operator()(const StopMap&) const { return ""; }
@@ -110,6 +113,13 @@ struct Validator {
     return First({c.name.empty() ? kNoMapName : "", MapNameProblem(c.new_name)});
   }
   std::string operator()(const RemoveMap& c) const { return c.name.empty() ? kNoMapName : ""; }
+  std::string operator()(const SetMapUp& c) const { return c.pixel ? PixelProblem(*c.pixel) : ""; }
+  std::string operator()(const SetMapScale& c) const {
+    if (c.length_m == 0) return "";
+    const bool in_range = c.length_m >= kMinLength_m && c.length_m <= kMaxLength_m;
+    return First({PixelProblem(c.from), PixelProblem(c.to),
+                  in_range ? "" : "the length must be between 1 mm and 1 km, in metres"});
+  }
   std::string operator()(const PlaceModel& c) const {
     if (c.file.empty()) return "expected a model's file";
     return First(

@@ -42,6 +42,19 @@ struct RemoveMap {
   std::string name;
   bool operator==(const RemoveMap&) const = default;
 };
+// Makes the level surface at a pixel the ground of the current map, or lets its keyframes say again which way
+// is up.
+struct SetMapUp {
+  std::optional<Eigen::Vector2d> pixel = std::nullopt;
+  bool operator==(const SetMapUp&) const = default;
+};
+// Says how far the surfaces at two pixels are apart, or, with length 0, that the scale of the current map is
+// not known.
+struct SetMapScale {
+  Eigen::Vector2d from = Eigen::Vector2d::Zero(), to = Eigen::Vector2d::Zero();
+  double length_m = 0;
+  bool operator==(const SetMapScale&) const = default;
+};
 // The pixel denotes the point of the map's surface that is visible there in the command's frame.
 struct PlaceModel {
   std::string file;  // as given; relative to the script's folder or the working folder
@@ -164,9 +177,9 @@ struct Save {
 };
 
 using Command =
-    std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, PlaceModel, PlaceSignpost,
-                 MoveEntity, RotateEntity, ScaleEntity, TransformEntities, AlignEntity, BendEntity,
-                 UnbendEntity, RemoveEntities, DuplicateEntities, RenameEntity, SetEntityText,
+    std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, SetMapUp, SetMapScale, PlaceModel,
+                 PlaceSignpost, MoveEntity, RotateEntity, ScaleEntity, TransformEntities, AlignEntity,
+                 BendEntity, UnbendEntity, RemoveEntities, DuplicateEntities, RenameEntity, SetEntityText,
                  SetSignpostTarget, SetEntityFlag, GroupEntities, PasteEntities, Undo, Redo, Save>;
 
 // The same rotation, with a quaternion that normalizing does not change any more. A command that was written

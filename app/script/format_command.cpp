@@ -69,6 +69,13 @@ struct CommandFormatter {
     return "map rename " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.new_name);
   }
   std::string operator()(const RemoveMap& c) const { return "map remove " + AlwaysQuoted(c.name); }
+  std::string operator()(const SetMapUp& c) const {
+    return "map up " + (c.pixel ? Pixel(*c.pixel) : std::string("automatic"));
+  }
+  std::string operator()(const SetMapScale& c) const {
+    if (c.length_m == 0) return "map scale unknown";
+    return "map scale " + Pixel(c.from) + " to " + Pixel(c.to) + " is " + Number(c.length_m);
+  }
   std::string operator()(const PlaceModel& c) const {
     return "place " + Quoted(c.file) + " at " + Pixel(c.pixel) +
            (c.scale ? " scale " + Number(*c.scale) : "") +

@@ -12,6 +12,18 @@ namespace docent::app {
 
 namespace {
 
+Command ParseMapScale(LineReader* line) {
+  SetMapScale command;
+  if (line->TakeIf("unknown")) return command;
+  command.from = line->TakePixel();
+  line->Expect("to");
+  command.to = line->TakePixel();
+  line->Expect("is");
+  command.length_m = line->TakeNumber("a length in metres");
+  if (!(command.length_m > 0)) line->Fail("the length must be between 1 mm and 1 km, in metres");
+  return command;
+}
+
 Command ParseMap(LineReader* line) {
   if (line->TakeIf("new")) return NewMap{line->TakeName("a map's name")};
   if (line->TakeIf("stop")) return StopMap{};
@@ -30,8 +42,15 @@ Command ParseMap(LineReader* line) {
     command.policy = *policy;
     return command;
   }
-  const std::string word = line->Take("new, stop, use, policy, rename or remove");
-  line->Fail("unknown command 'map " + word + "'; use new, stop, use, policy, rename or remove after map");
+  if (line->TakeIf("up")) {
+    SetMapUp command;
+    if (!line->TakeIf("automatic")) command.pixel = line->TakePixel();
+    return command;
+  }
+  if (line->TakeIf("scale")) return ParseMapScale(line);
+  const std::string word = line->Take("new, stop, use, policy, rename, remove, up or scale");
+  line->Fail("unknown command 'map " + word +
+             "'; use new, stop, use, policy, rename, remove, up or scale after map");
 }
 
 Command ParsePlace(LineReader* line) {

@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "app/files/text_file.h"
+#include "app/session/map_axes.h"
 #include "app/session/surface_at_pixel.h"
 #include "content/asset.h"
 #include "engine/base/error.h"
-#include "engine/map/upright_axes.h"
 
 namespace docent::app {
 
@@ -25,6 +25,9 @@ const content::Entity& FindEntity(const content::Scene& scene, const std::string
 double FirstDistance(const engine::MapSnapshot& map) {
   return map.keyframes.empty() ? 1 : map.keyframes.front().mean_depth;
 }
+
+// A surface that is more than 45 degrees from what the keyframes suggest is a wall rather than a floor.
+constexpr double kMinLevelCosine = 0.7071;
 
 // How well the points of an aligned model fit, in words. Residuals are in map units.
 std::string TextOf(const std::string& name, const content::Alignment& alignment) {
@@ -84,9 +87,9 @@ void ContentCommands::Apply(const PlaceModel& command, const engine::TrackedFram
   const content::Model& model = *entity.model.asset->model;
   const Eigen::Vector3d viewer = frame.camera_from_map.OriginInSource();
   const double side = options_.model_side * (hit.point - viewer).norm();
-  const double scale = command.scale ? *command.scale : content::ScaleForSide(model, side);
+  const double scale = command.scale.value_or(content::AutomaticScale(model, map.scene->settings, side));
   entity.model.map_from_model =
-      content::FacingPose(hit.point, viewer, hit.normal, engine::UpInMap(*frame.map),
+      content::FacingPose(hit.point, viewer, hit.normal, UpOf(*map.scene, *frame.map),
                           command.yaw_deg * std::numbers::pi / 180, scale);
   entity.model.map_from_model.translation += hit.point - content::BaseInMap(entity);
   Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
@@ -100,7 +103,7 @@ void ContentCommands::Apply(const PlaceSignpost& command, const engine::TrackedF
   entity.name = map.scene->FreeSignpostName();
   entity.signpost.text = command.text;
   entity.signpost.anchor = hit.point;
-  entity.signpost.up = engine::UpInMap(*frame.map);
+  entity.signpost.up = UpOf(*map.scene, *frame.map);
   // Map units mean nothing to the user, so the size is chosen by the distance from the camera.
   entity.signpost.height_m = options_.signpost_height * (frame.camera_from_map * hit.point).norm();
   entity.signpost.to_map = command.to_map;
@@ -139,8 +142,8 @@ void ContentCommands::Apply(const PasteEntities& command, const engine::TrackedF
   const content::SurfaceHit hit = SurfaceFor(frame, command.to_pixel.value_or(centre));
   engine::Sim3 motion;
   if (&from != &map) {
-    motion.rotation = engine::Rotation3(
-        Eigen::Quaterniond::FromTwoVectors(engine::UpInMap(*from.snapshot), engine::UpInMap(*map.snapshot)));
+    motion.rotation = engine::Rotation3(Eigen::Quaterniond::FromTwoVectors(UpOf(*from.scene, *from.snapshot),
+                                                                           UpOf(*map.scene, *map.snapshot)));
     motion.scale = FirstDistance(*map.snapshot) / FirstDistance(*from.snapshot);
   }
   motion.translation = hit.point - motion * middle;
@@ -170,6 +173,34 @@ void ContentCommands::Apply(const AlignEntity& command, const engine::TrackedFra
 void ContentCommands::Apply(const BendEntity& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   Edit(&map, content::BendEdit(*map.scene, command.name, Correspondences(frame, command.pairs)));
+}
+
+void ContentCommands::Apply(const SetMapUp& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  content::MapSettings settings = map.scene->settings;
+  settings.up.reset();
+  if (command.pixel) {
+    const content::SurfaceHit hit = SurfaceFor(frame, *command.pixel);
+    if (!hit.on_plane) throw Error("there is no plane at this pixel; point at the floor or at a table");
+    const double cosine = hit.normal.dot(engine::UpInMap(*frame.map));
+    if (cosine < kMinLevelCosine)
+      throw Error("the surface there is not level; point at the floor or at a table");
+    settings.up = hit.normal.normalized();
+  }
+  Edit(&map, content::SettingsEdit(*map.scene, settings, "set the up direction"));
+}
+
+void ContentCommands::Apply(const SetMapScale& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  content::MapSettings settings = map.scene->settings;
+  settings.metres_per_unit = 0;
+  if (command.length_m > 0) {
+    const double distance =
+        (SurfaceFor(frame, command.from).point - SurfaceFor(frame, command.to).point).norm();
+    if (!(distance > 0)) throw Error("the two points are the same place");
+    settings.metres_per_unit = command.length_m / distance;
+  }
+  Edit(&map, content::SettingsEdit(*map.scene, settings, "set the scale"));
 }
 
 void ContentCommands::Apply(const Undo&, const engine::TrackedFrame& frame) {

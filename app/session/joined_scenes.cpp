@@ -27,6 +27,9 @@ void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps:
     entity.name = scene->FreeName(entity.name);
     scene->entities.push_back(std::move(entity));
   }
+  const content::MapSettings settings = content::Transformed(joined.a_from_b, b.settings);
+  if (!scene->settings.up) scene->settings.up = settings.up;
+  if (scene->settings.metres_per_unit == 0) scene->settings.metres_per_unit = settings.metres_per_unit;
   for (content::Entity& entity : scene->entities) {
     if (!LeadsToMap(entity, map_a) && !LeadsToMap(entity, map_b)) continue;
     entity.signpost.to_map.clear();

@@ -61,7 +61,8 @@ maps::SceneRecord ReadScene(const maps::SceneRecord& record, std::vector<std::st
   const content::Scene scene = ReadableScene(record, "its content", &assets, &found);
   if (found.empty()) return record;
   problems->insert(problems->end(), found.begin(), found.end());
-  return scene.entities.empty() ? maps::SceneRecord() : RecordFromScene(scene);
+  const bool is_empty = scene.entities.empty() && scene.settings == content::MapSettings();
+  return is_empty ? maps::SceneRecord() : RecordFromScene(scene);
 }
 
 // The newest changes whose models, as far as the scene does not use them, fit into the limit.

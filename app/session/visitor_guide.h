@@ -20,8 +20,8 @@ class VisitorGuide {
   VisitorGuide(Session* session, std::vector<std::string> stops)
       : session_(session), state_(std::move(stops)) {}
 
-  // Sets the frame's `visitor`. Shortly after a loss the frame gets the content and the pose of the last frame
-  // that had one.
+  // Sets the frame's `visitor`. Shortly after a loss the frame gets the content and the pose of the last
+  // frame that had one.
   void Guide(const std::shared_ptr<ShownFrame>& frame);
 
  private:

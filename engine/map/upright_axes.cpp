@@ -15,10 +15,16 @@ Eigen::Vector3d UpInMap(const MapSnapshot& map) {
 }
 
 UprightAxes UprightAxesOf(const MapSnapshot& map) {
+  if (map.keyframes.empty()) return {};
+  return UprightAxesOf(map, UpInMap(map));
+}
+
+UprightAxes UprightAxesOf(const MapSnapshot& map, const Eigen::Vector3d& up) {
   UprightAxes axes;
-  if (map.keyframes.empty()) return axes;
-  axes.up = UpInMap(map);
-  Eigen::Vector3d ahead = map.keyframes.front().camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
+  axes.up = up;
+  Eigen::Vector3d ahead = Eigen::Vector3d::UnitZ();
+  if (!map.keyframes.empty())
+    ahead = map.keyframes.front().camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
   ahead -= ahead.dot(axes.up) * axes.up;
   if (ahead.norm() < 1e-3) ahead = axes.up.unitOrthogonal();
   axes.ahead = ahead.normalized();

@@ -25,5 +25,7 @@ Eigen::Vector3d UpInMap(const MapSnapshot& map);
 
 // If the first keyframe looks straight up or down, `ahead` is any horizontal direction.
 UprightAxes UprightAxesOf(const MapSnapshot& map);
+// The same with an up direction that is known, a unit vector in the map.
+UprightAxes UprightAxesOf(const MapSnapshot& map, const Eigen::Vector3d& up);
 
 }  // namespace docent::engine

@@ -29,6 +29,10 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "7 remove helmet\n"
       "8 undo\n9 redo\n10 save\n11 map stop\n12 map use Desk\n"
       "13 place helmet.glb at pixel 1 2 yaw 5\n"
+      "14 map up pixel 1 2\n"
+      "14 map up automatic\n"
+      "14 map scale pixel 1 2 to pixel 3 4 is 2.5\n"
+      "14 map scale unknown\n"
       "14 transform helmet 1 2 3 0 0.6 0 0.8 2.5\n"
       "14 transform helmet 1 2 3 0 0.6 0 0.8 2.5, sign-1 1 2 3 0 0.6 0 0.8 2.5\n"
       "14 remove helmet \"from\" sign-1\n"
@@ -70,7 +74,11 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
   const engine::Sim3 pose{engine::Rotation3(Eigen::Quaterniond(0.8, 0, 0.6, 0)), {1, 2, 3}, 2.5};
   using Names = std::vector<std::string>;
   using enum content::EntityFlag;
-  const std::vector<Command> rest = {TransformEntities{{{"helmet", pose}}},
+  const std::vector<Command> rest = {SetMapUp{Eigen::Vector2d(1, 2)},
+                                     SetMapUp{},
+                                     SetMapScale{{1, 2}, {3, 4}, 2.5},
+                                     SetMapScale{},
+                                     TransformEntities{{{"helmet", pose}}},
                                      TransformEntities{{{"helmet", pose}, {"sign-1", pose}}},
                                      RemoveEntities{{"helmet", "from", "sign-1"}},
                                      DuplicateEntities{{"helmet"}},
@@ -346,6 +354,12 @@ TEST(Script, NamesTheLineOfAnInvalidCommand) {
                            "1 remove a a",
                            "1 remove \"\"",
                            "1 duplicate",
+                           "1 map up",
+                           "1 map up pixel 1",
+                           "1 map scale",
+                           "1 map scale pixel 1 2 to pixel 3 4",
+                           "1 map scale pixel 1 2 to pixel 3 4 is 0",
+                           "1 map scale pixel 1 2 to pixel 3 4 is 1e9",
                            "1 transform a 1 2 3 0 0 0 1",
                            "1 transform a 1 2 3 0 0 0 2 1",
                            "1 transform a 1 2 3 0 0 0 1 0",
