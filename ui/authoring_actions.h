@@ -58,6 +58,10 @@ class AuthoringActions {
   // All together, as one change.
   virtual void Transform(const std::vector<NewPose>& poses) = 0;
 
+  // Of the current map: its keyframes say which way is up; its scale is not known.
+  virtual void ForgetUp() = 0;
+  virtual void ForgetScale() = 0;
+
   virtual void ToggleFullScreen() = 0;
 };
 
@@ -92,6 +96,9 @@ struct AuthoringFacts {
 // What a click in the image does.
 enum class AuthoringTool { kSelect, kModel, kSignpost };
 
+// What the next click in the image says about the space of the map, before the tool is used.
+enum class MapPick { kNone, kFloor, kMeasureFrom, kMeasureTo };
+
 // The person's choices. The panel shows and changes them, and so may its owner.
 struct AuthoringChoices {
   AuthoringTool tool = AuthoringTool::kSelect;
@@ -100,6 +107,8 @@ struct AuthoringChoices {
   bool automatic_size = true;
   double scale = 1.0, yaw_deg = 0.0;
   std::string sign_text, sign_to_map;
+  MapPick pick = MapPick::kNone;
+  double length_m = 1;  // Between the two points that are measured.
   bool show_points = false, show_keyframes = false, show_status = true;
   bool from_above = false;     // The map from above instead of the image.
   bool show_coverage = false;  // A small map from above in a corner of the image.

@@ -93,6 +93,7 @@ void AuthoringPanel::Draw(const WindowLayout& layout, const AuthoringFacts& fact
   }
   DrawHeader(facts);
   if (Section(strings::kMap)) DrawMap(facts);
+  if (ImGui::CollapsingHeader(strings::kSpace)) space_section_.Draw(facts, &choices_);
   if (ImGui::CollapsingHeader(strings::kMaps)) map_section_.Draw(facts);
   if (Section(strings::kPlace)) DrawPlace(facts);
   if (Section(strings::kContents)) entity_section_.DrawContents(facts);

@@ -7,6 +7,7 @@
 #include "ui/authoring_actions.h"
 #include "ui/entity_section.h"
 #include "ui/map_section.h"
+#include "ui/space_section.h"
 #include "ui/window_layout.h"
 
 namespace docent::ui {
@@ -18,7 +19,7 @@ class AuthoringPanel {
  public:
   // `actions` must outlive the panel.
   explicit AuthoringPanel(AuthoringActions* actions)
-      : actions_(actions), map_section_(actions), entity_section_(actions) {}
+      : actions_(actions), map_section_(actions), space_section_(actions), entity_section_(actions) {}
 
   AuthoringChoices& choices() { return choices_; }
   const AuthoringChoices& choices() const { return choices_; }
@@ -42,6 +43,7 @@ class AuthoringPanel {
   AuthoringActions* const actions_;
   AuthoringChoices choices_;
   MapSection map_section_;
+  SpaceSection space_section_;
   EntitySection entity_section_;
 };
 

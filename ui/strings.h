@@ -27,6 +27,23 @@ inline constexpr const char* kNumberedMap = "Map %d";
 inline constexpr const char* kBegin = "Press New map to begin.";
 inline constexpr const char* kStarting = "Move the camera sideways, slowly.";
 
+// Section of the current map's space.
+inline constexpr const char* kSpace = "Floor and scale";
+inline constexpr const char* kNoMapForSpace = "There is no current map.";
+inline constexpr const char* kFloorEstimated = "Which way is up is estimated from how the camera was held.";
+inline constexpr const char* kFloorKnown = "The floor is known. Objects stand upright on it.";
+inline constexpr const char* kPickFloor = "Show the floor…";
+inline constexpr const char* kClickFloor = "Click on the floor or on a table in the image. Escape cancels.";
+inline constexpr const char* kForgetFloor = "Estimate it again";
+inline constexpr const char* kScaleUnknown =
+    "How large the map is cannot be seen. Measure something in it, and models get their true size.";
+inline constexpr const char* kScaleKnown = "One unit of this map is %.3g m.";
+inline constexpr const char* kLength = "Length (m)";
+inline constexpr const char* kMeasure = "Measure it…";
+inline constexpr const char* kClickFirstPoint = "Click on its first end in the image. Escape cancels.";
+inline constexpr const char* kClickSecondPoint = "Click on its other end.";
+inline constexpr const char* kForgetScale = "Forget the scale";
+
 // Section of all maps.
 inline constexpr const char* kMaps = "All maps";
 inline constexpr const char* kNoMaps = "There is no map yet.";

@@ -98,6 +98,9 @@ void AuthorControls::Escape() {
   if (gui_.HasPopup()) return;  // It closes.
   if (gui_.IsNavigated()) return gui_.LeaveWidgets();
   if (pointer_.Cancel()) return;
+  const ui::MapPick pick = std::exchange(panel_.choices().pick, ui::MapPick::kNone);
+  if (pick == ui::MapPick::kMeasureFrom || pick == ui::MapPick::kMeasureTo) panel_.choices().frozen = false;
+  if (pick != ui::MapPick::kNone) return;
   if (IsPlacing()) {
     panel_.choices().tool = ui::AuthoringTool::kSelect;
     return;
@@ -160,6 +163,7 @@ void AuthorControls::HandleClick(const ui::InputEvent& event) {
   if (!view_.ShowsImageAt(event.position)) return;
   const Eigen::Vector2d pixel = view_.PixelAt(event.position);
   const ui::AuthoringChoices& choices = panel_.choices();
+  if (choices.pick != ui::MapPick::kNone) return HandlePick(pixel);
   switch (choices.tool) {
     case ui::AuthoringTool::kSelect:
       return pointer_.Press(view_, event.position, event.shift);
@@ -395,6 +399,33 @@ void AuthorControls::Transform(const std::vector<ui::NewPose>& poses) {
   TransformEntities command;
   for (const auto& [name, map_from_entity] : poses) command.poses.push_back({name, map_from_entity});
   host_.emit(std::move(command));
+}
+
+void AuthorControls::ForgetUp() {
+  host_.emit(SetMapUp{});
+}
+
+void AuthorControls::ForgetScale() {
+  host_.emit(SetMapScale{});
+}
+
+// The view is frozen while a length is measured, so that both points are those of one image.
+void AuthorControls::HandlePick(const Eigen::Vector2d& pixel) {
+  ui::AuthoringChoices& choices = panel_.choices();
+  switch (std::exchange(choices.pick, ui::MapPick::kNone)) {
+    case ui::MapPick::kNone:
+      return;
+    case ui::MapPick::kFloor:
+      return host_.emit(SetMapUp{pixel});
+    case ui::MapPick::kMeasureFrom:
+      measured_from_ = pixel;
+      choices.pick = ui::MapPick::kMeasureTo;
+      return;
+    case ui::MapPick::kMeasureTo:
+      host_.emit(SetMapScale{measured_from_, pixel, choices.length_m});
+      choices.frozen = false;
+      return;
+  }
 }
 
 }  // namespace docent::app

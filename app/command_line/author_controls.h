@@ -81,6 +81,8 @@ class AuthorControls final : public ui::AuthoringActions {
   void Group(const std::vector<std::string>& names) override;
   void Ungroup(const std::vector<std::string>& names) override;
   void Transform(const std::vector<ui::NewPose>& poses) override;
+  void ForgetUp() override;
+  void ForgetScale() override;
   void ToggleFullScreen() override { host_.toggle_full_screen(); }
 
  private:
@@ -90,6 +92,7 @@ class AuthorControls final : public ui::AuthoringActions {
   void HandleClick(const ui::InputEvent& event);
   void HandleDrop(const ui::InputEvent& event);
   void PlaceModel(const std::string& file, const Eigen::Vector2d& pixel);
+  void HandlePick(const Eigen::Vector2d& pixel);
   bool IsPlacing() const;
   // Before a command that adds entities, so that SelectNew finds them.
   void RememberNames();
@@ -119,6 +122,7 @@ class AuthorControls final : public ui::AuthoringActions {
   bool preview_changed_ = false;
   std::string ghost_note_;  // Why nothing can be placed under the pointer.
   // What was copied, and the map that it is in.
+  Eigen::Vector2d measured_from_ = Eigen::Vector2d::Zero();  // Pixel of the first end; see ui::MapPick.
   std::vector<std::string> copied_names_;
   std::string copied_from_;
   // Names before a command that adds entities, which are selected when they appear.

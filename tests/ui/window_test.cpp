@@ -77,6 +77,8 @@ class AskedFor : public AuthoringActions {
   void Transform(const std::vector<NewPose>& poses) override {
     for (const NewPose& pose : poses) words.push_back("transform " + pose.name);
   }
+  void ForgetUp() override { words.push_back("forget up"); }
+  void ForgetScale() override { words.push_back("forget scale"); }
   void ToggleFullScreen() override { words.push_back("full screen"); }
 
   std::vector<std::string> words;

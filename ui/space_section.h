@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "ui/authoring_actions.h"
+
+namespace docent::ui {
+
+// What an author says about the space of the current map: where the floor is, and how long something in it
+// is. Between Gui::Begin and Gui::Draw.
+class SpaceSection {
+ public:
+  // `actions` must outlive the section.
+  explicit SpaceSection(AuthoringActions* actions) : actions_(actions) {}
+
+  void Draw(const AuthoringFacts& facts, AuthoringChoices* choices);
+
+ private:
+  void DrawScale(const AuthoringFacts& facts, AuthoringChoices* choices);
+
+  AuthoringActions* const actions_;
+};
+
+}  // namespace docent::ui
