@@ -32,7 +32,7 @@ class AbsurdCommands {
   explicit AbsurdCommands(std::uint64_t seed) : random_(seed) {}
 
   Command Next() {
-    switch (random_.Below(26)) {
+    switch (random_.Below(28)) {
       case 0:
         return NewMap{Name()};
       case 1:
@@ -88,6 +88,10 @@ class AbsurdCommands {
         return Undo{};
       case 24:
         return Redo{};
+      case 25:
+        return SetMapUp{Perhaps<Eigen::Vector2d>([&] { return Pixel(); })};
+      case 26:
+        return SetMapScale{Pixel(), Pixel(), Number()};
       default:
         return Save{};
     }

@@ -109,6 +109,25 @@ TEST_F(ContentInASession, AModelStandsWithItsBaseOnTheSurfaceAndFacesTheViewer) 
   });
 }
 
+TEST_F(ContentInASession, AMeasuredMapGivesModelsTheirTrueSize) {
+  Run([&] {
+    const Eigen::Vector2d other(280, 300);
+    ASSERT_EQ(Do(SetMapScale{kPixel, other, 0.5}), "");
+    const double metres_per_unit = Scene().settings.metres_per_unit;
+    // Signposts at the two pixels stand on the surfaces that were measured.
+    ASSERT_EQ(Do(PlaceSignpost{"one", kPixel, ""}), "");
+    ASSERT_EQ(Do(PlaceSignpost{"other", other, ""}), "");
+    EXPECT_NEAR((Named("sign-1").signpost.anchor - Named("sign-2").signpost.anchor).norm() * metres_per_unit,
+                0.5, 1e-9);
+    ASSERT_EQ(Do(PlaceModel{"exhibit.glb", kPixel}), "");
+    EXPECT_NEAR(Named("exhibit").model.map_from_model.scale, 1 / metres_per_unit, 1e-9);
+    ASSERT_EQ(Do(SetMapScale{}), "");
+    EXPECT_EQ(Scene().settings, content::MapSettings());
+    EXPECT_NE(Do(SetMapScale{kPixel, kPixel, 0.5}), "") << "a length between one point and itself";
+    EXPECT_NE(Do(SetMapUp{}), "") << "nothing would change";
+  });
+}
+
 TEST_F(ContentInASession, EveryCommandChangesTheContentAndIsUndone) {
   Run([&] {
     ASSERT_EQ(Do(PlaceModel{"exhibit.glb", kPixel}), "");
