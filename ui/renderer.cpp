@@ -33,7 +33,8 @@ void Renderer::Draw(const View& view) {
   impl_->image.DrawVideo(image);
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
   if (has_pose && view.scene != nullptr)
-    impl_->content.Draw(*view.camera, tracked->camera_from_map, *view.scene, view.animation_seconds, target);
+    impl_->content.Draw(*view.camera, tracked->camera_from_map, *view.scene, view.animation_seconds, target,
+                        view.surfaces);
 
   impl_->canvas.Begin(width_px, height_px);
   if (has_pose && view.overlay.keyframes && tracked->map != nullptr)

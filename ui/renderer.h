@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "content/scene.h"
+#include "engine/dense/surface_mesh.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/tracking/tracked_frame.h"
 
@@ -37,8 +38,10 @@ struct View {
   const engine::TrackedFrame* tracked = nullptr;  // Image, pose and map; null: a dark background.
   const engine::CameraModel* camera = nullptr;    // The lens of the image; null: no content is drawn.
   const content::Scene* scene = nullptr;          // Null when there is no content.
-  double animation_seconds = 0;                   // Time of the animations of the models, which repeat.
-  Overlay overlay;                                // What is drawn on top.
+  // What hides content behind it, in the map of the frame; null: nothing does.
+  std::shared_ptr<const engine::SurfaceMesh> surfaces;
+  double animation_seconds = 0;  // Time of the animations of the models, which repeat.
+  Overlay overlay;               // What is drawn on top.
 };
 
 // Quality against speed.
