@@ -17,6 +17,7 @@
 #include "maps/library/verify.h"
 #include "maps/storage/database.h"
 #include "maps/storage/history_rows.h"
+#include "maps/storage/mesh_rows.h"
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
 #include "maps/storage/snapshot_reader.h"
@@ -244,6 +245,23 @@ class Library::Impl {
     info->keyframes = parts.keyframes.size();
     info->points = parts.points.size();
     info->observations = parts.observations.size();
+    RemoveMeshUnlessRight(database_, info->key, snapshot);
+  }
+
+  // Returns false if the map is gone, or the mesh was made of another state of it.
+  bool StoreMesh(std::uint64_t key, const engine::MapMesh& mesh) {
+    const std::optional<MapInfo> info = ReadMapRow(database_, key);
+    if (!info) return false;
+    bool is_right = false;
+    WithMapContext(database_, *info, [&] {
+      engine::MapSnapshot map;
+      for (StoredKeyFrame& stored : ReadParts(database_, *info).keyframes)
+        map.keyframes.push_back(std::move(stored.keyframe));
+      if (engine::StateOf(mesh.keyframes, map) == engine::MeshState::kOutOfDate) return;
+      WriteMesh(database_, key, mesh);
+      is_right = true;
+    });
+    return is_right;
   }
 
   bool UpdateScene(const SceneRecord& scene, const MapInfo& info) {
@@ -462,6 +480,23 @@ std::optional<SceneRecord> Library::LoadHistory(std::uint64_t key) const {
     WithMapContext(impl_->database(), impl_->Get(key), [&] { history = impl_->LoadHistory(key); });
     return history;
   });
+}
+
+std::optional<engine::MapMesh> Library::LoadMesh(std::uint64_t key) const {
+  return impl_->Read([&] {
+    std::optional<engine::MapMesh> mesh;
+    WithMapContext(impl_->database(), impl_->Get(key), [&] { mesh = ReadMesh(impl_->database(), key); });
+    return mesh;
+  });
+}
+
+bool Library::SaveMesh(std::uint64_t key, const engine::MapMesh& mesh) {
+  bool stored = false;
+  impl_->Write([&] {
+    stored = impl_->StoreMesh(key, mesh);
+    return stored;
+  });
+  return stored;
 }
 
 void Library::LoadAppearance(const TakeAppearance& take) const {
