@@ -16,6 +16,12 @@
 // it, and what the person asks for. On the window's thread.
 namespace docent::ui {
 
+// The pose that an entity gets; see TransformOf in entity_shapes.h.
+struct NewPose {
+  std::string name;
+  engine::Sim3 map_from_entity;
+};
+
 // What a person asks for. Implementations do not throw; what cannot be done becomes a message.
 class AuthoringActions {
  public:
@@ -49,8 +55,8 @@ class AuthoringActions {
   virtual void SetHidden(const std::vector<std::string>& names, bool hidden) = 0;
   virtual void Group(const std::vector<std::string>& names) = 0;
   virtual void Ungroup(const std::vector<std::string>& names) = 0;
-  // See TransformOf in entity_shapes.h.
-  virtual void Transform(const std::string& name, const engine::Sim3& map_from_entity) = 0;
+  // All together, as one change.
+  virtual void Transform(const std::vector<NewPose>& poses) = 0;
 
   virtual void ToggleFullScreen() = 0;
 };

@@ -209,7 +209,7 @@ void EntitySection::DrawPose(const content::Entity& entity, const AuthoringFacts
   pose.translation = {position_[0], position_[1], position_[2]};
   pose.scale = size_;
   if (pose.translation.allFinite() && angles.allFinite() && std::isfinite(size_) && size_ > 0)
-    actions_->Transform(entity.name, pose);
+    actions_->Transform({{entity.name, pose}});
 }
 
 void EntitySection::DrawButtons(const content::Entity& first, const AuthoringFacts& facts) {

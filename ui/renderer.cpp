@@ -5,11 +5,18 @@
 #include "ui/content_layer.h"
 #include "ui/heads_up.h"
 #include "ui/image_target.h"
+#include "ui/visitor_display.h"
 
 namespace docent::ui {
 
 struct Renderer::Impl {
   explicit Impl(const RendererOptions& options) : content(options.samples, options.max_texture_px) {}
+
+  // Over the video, whose target is bound.
+  void DrawViews(const VisitorDisplay& visitor) {
+    const std::vector<Inset> areas = PlaceViews(visitor, image.width_px(), image.height_px());
+    for (std::size_t i = 0; i < areas.size(); ++i) image.DrawInset(visitor.views[i], areas[i]);
+  }
 
   ImageTarget image;
   ImageTarget copy;  // With the heads-up display, for ReadBackWithHeadsUp.
@@ -32,8 +39,9 @@ void Renderer::Draw(const View& view) {
   const RenderTarget& target = impl_->image.Bind(width_px, height_px);
   impl_->image.DrawVideo(image);
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
-  if (has_pose && view.scene != nullptr)
-    impl_->content.Draw(*view.camera, tracked->camera_from_map, *view.scene, view.animation_seconds, target,
+  const engine::Rigid3* const drawn_from = has_pose ? &tracked->camera_from_map : view.held_camera_from_map;
+  if (view.camera != nullptr && drawn_from != nullptr && view.scene != nullptr)
+    impl_->content.Draw(*view.camera, *drawn_from, *view.scene, view.animation_seconds, target,
                         view.surfaces);
 
   impl_->canvas.Begin(width_px, height_px);
@@ -43,6 +51,7 @@ void Renderer::Draw(const View& view) {
   if (view.overlay.hud) DrawHeadsUp(view, HeadsUpStyleFor(height_px), &impl_->canvas);
   target.BindForDrawing();
   impl_->canvas.End();
+  if (view.overlay.visitor) impl_->DrawViews(*view.overlay.visitor);
   if (view.overlay.inset == nullptr || view.overlay.inset->frame.image.empty()) return;
   const cv::Mat& other = view.overlay.inset->frame.image;
   const Inset inset = PlaceInset(width_px, height_px, other.cols, other.rows);

@@ -14,6 +14,18 @@
 
 namespace docent::ui {
 
+// What a visitor on a tour is told, without the words of an engineer.
+struct VisitorDisplay {
+  std::string place;               // The name of the place where the visitor is; empty while it is not known.
+  double arrival = 0;              // The opacity of its announcement in large letters, 0 to 1.
+  bool is_searching = false;       // The place is not known, and an animation asks to look around.
+  std::string sentence;            // What to do; empty for nothing.
+  std::vector<std::string> stops;  // The known places by name, as a help to find one.
+  // Images of known places that resemble what the camera sees (CV_8UC1 or CV_8UC3), which are drawn beside
+  // each other.
+  std::vector<cv::Mat> views;
+};
+
 // What is drawn besides the video and the content.
 struct Overlay {
   bool points = false;      // Matched map points, coloured by pyramid level.
@@ -28,6 +40,8 @@ struct Overlay {
   // How close a map that is being started has come to its first points with depth, 0 to 1; empty when none
   // is.
   std::optional<double> starting_progress;
+  // Given on a tour: it replaces state, map name and hint.
+  std::optional<VisitorDisplay> visitor;
   // The newest frame of another camera, of any size; null for none. It is shown small in a corner (see
   // inset.h) with a border whose colour is its tracking state.
   const engine::TrackedFrame* inset = nullptr;
@@ -38,7 +52,10 @@ struct View {
   const engine::TrackedFrame* tracked = nullptr;  // Image, pose and map; null: a dark background.
   const engine::CameraModel* camera = nullptr;    // The lens of the image; null: no content is drawn.
   const content::Scene* scene = nullptr;          // Null when there is no content.
-  // What hides content behind it, in the map of the frame; null: nothing does.
+  // Where the camera was a moment ago. If the frame has no pose, the content is drawn from there. Null for
+  // none.
+  const engine::Rigid3* held_camera_from_map = nullptr;
+  // What hides content behind it, in the map of the scene; null: nothing does.
   std::shared_ptr<const engine::SurfaceMesh> surfaces;
   double animation_seconds = 0;  // Time of the animations of the models, which repeat.
   Overlay overlay;               // What is drawn on top.

@@ -391,8 +391,10 @@ void AuthorControls::Ungroup(const std::vector<std::string>& names) {
   host_.emit(GroupEntities{names, ""});
 }
 
-void AuthorControls::Transform(const std::string& name, const engine::Sim3& map_from_entity) {
-  host_.emit(TransformEntity{name, map_from_entity});
+void AuthorControls::Transform(const std::vector<ui::NewPose>& poses) {
+  TransformEntities command;
+  for (const auto& [name, map_from_entity] : poses) command.poses.push_back({name, map_from_entity});
+  host_.emit(std::move(command));
 }
 
 }  // namespace docent::app

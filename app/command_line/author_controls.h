@@ -80,7 +80,7 @@ class AuthorControls final : public ui::AuthoringActions {
   void SetHidden(const std::vector<std::string>& names, bool hidden) override;
   void Group(const std::vector<std::string>& names) override;
   void Ungroup(const std::vector<std::string>& names) override;
-  void Transform(const std::string& name, const engine::Sim3& map_from_entity) override;
+  void Transform(const std::vector<ui::NewPose>& poses) override;
   void ToggleFullScreen() override { host_.toggle_full_screen(); }
 
  private:

@@ -30,7 +30,11 @@ struct DoneWriter {
   std::string operator()(const MoveEntity& c) const { return "Moved " + c.name + "."; }
   std::string operator()(const RotateEntity& c) const { return "Rotated " + c.name + "."; }
   std::string operator()(const ScaleEntity& c) const { return "Scaled " + c.name + "."; }
-  std::string operator()(const TransformEntity& c) const { return "Moved " + c.name + "."; }
+  std::string operator()(const TransformEntities& c) const {
+    std::vector<std::string> names;
+    for (const EntityPose& pose : c.poses) names.push_back(pose.name);
+    return "Moved " + NamesText(names) + ".";
+  }
   std::string operator()(const AlignEntity& c) const { return "Aligned " + c.name + "."; }
   std::string operator()(const BendEntity& c) const { return "Bent " + c.name + "."; }
   std::string operator()(const UnbendEntity& c) const { return "Gave " + c.name + " its shape again."; }

@@ -137,7 +137,7 @@ void Add(const ContentOptions& options, Verbosity verbosity) {
                                                 : NewModel(options, engine::UprightAxesOf(*snapshot), scene);
   entity.signpost.to_key = to_key;
   const MakeEdit edits[] = {[&](const content::Scene& stored) { return content::AddEdit(stored, entity); }};
-  EditStoredScene(&library, map, edits, ModelsNeeded::kNo, entity.model.asset);
+  EditStoredScene(&library, map, edits);
   if (verbosity != Verbosity::kQuiet) std::printf("%s\n", entity.name.c_str());
 }
 
@@ -145,7 +145,7 @@ void Remove(const ContentOptions& options) {
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   const MakeEdit edits[] = {
       [&](const content::Scene& stored) { return content::RemoveEdit(stored, options.names); }};
-  EditStoredScene(&library, library.FindByName(options.map), edits, ModelsNeeded::kNo);
+  EditStoredScene(&library, library.FindByName(options.map), edits);
 }
 
 void AddAddCommand(CLI::App* group, Invocation* invocation, const std::shared_ptr<ContentOptions>& options) {

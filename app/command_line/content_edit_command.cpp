@@ -9,6 +9,7 @@
 
 #include "app/command_line/number_option.h"
 #include "app/command_line/stored_scene.h"
+#include "app/script/format_command.h"
 #include "app/script/scene_commands.h"
 #include "app/script/script_file.h"
 #include "app/session/library_scene.h"
@@ -54,7 +55,7 @@ std::vector<Command> CommandsFor(const EditOptions& options) {
   if (options.duplicate) commands.emplace_back(DuplicateEntities{names});
   for (const std::string& name : names) {
     if (options.unbend) commands.emplace_back(UnbendEntity{name});
-    if (options.transform) commands.emplace_back(TransformEntity{name, *options.transform});
+    if (options.transform) commands.emplace_back(TransformEntities{{{name, *options.transform}}});
     if (!options.align.empty()) commands.push_back(WithPairs("align", name, options.align));
     if (!options.bend.empty()) commands.push_back(WithPairs("bend", name, options.bend));
     if (options.scale) commands.emplace_back(ScaleEntity{name, *options.scale});
@@ -130,7 +131,7 @@ void RunEdit(const EditOptions& options) {
       return std::visit([&](const auto& chosen) { return edit_for(scene, chosen); }, command);
     });
   }
-  EditStoredScene(&library, map, edits, ModelsNeeded::kYes);
+  EditStoredScene(&library, map, edits);
 }
 
 void AddPoseOptions(CLI::App* edit, EditOptions* options) {

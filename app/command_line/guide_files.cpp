@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/guide_files.h"
 
-#include "app/script/script_file.h"
+#include "app/script/format_command.h"
 
 namespace docent::app {
 

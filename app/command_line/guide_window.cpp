@@ -144,6 +144,8 @@ class GuideWindow {
     view.overlay.points = points_;
     view.overlay.keyframes = keyframes_;
     view.overlay.status = status_;
+    if (details_) view.overlay.visitor.reset();
+    if (!status_ && view.overlay.visitor) view.overlay.visitor->place.clear();
     if (controls_) {
       const ui::AuthoringChoices& choices = controls_->choices();
       view.overlay.points = choices.show_points;
@@ -308,6 +310,7 @@ class GuideWindow {
     if (event.key == "p") points_ = !points_;
     if (event.key == "k") keyframes_ = !keyframes_;
     if (event.key == "h") status_ = !status_;
+    if (event.key == "d") details_ = !details_;
     redraw_ = true;
   }
 
@@ -336,7 +339,7 @@ class GuideWindow {
   std::pair<bool, bool> drawn_choices_;  // Points and keyframes.
   double message_height_ = 0;            // Window units.
   cv::Mat image_;
-  bool points_ = false, keyframes_ = false, status_ = true;  // Of a tour.
+  bool points_ = false, keyframes_ = false, status_ = true, details_ = false;  // Of a tour.
   bool closing_ = false, redraw_ = false, was_frozen_ = false, showed_map_ = false;
 };
 

@@ -97,8 +97,9 @@ void PointerTool::Move(const AuthorView& view, const Eigen::Vector2d& point, boo
 void PointerTool::Release() {
   const auto drag = std::exchange(drag_, std::nullopt);
   if (!drag || !drag->moved) return;
-  for (const Held& held : drag->held)
-    actions_->Transform(held.name, drag->motion.motion() * held.map_from_entity);
+  std::vector<ui::NewPose> poses = drag->held;
+  for (ui::NewPose& pose : poses) pose.map_from_entity = drag->motion.motion() * pose.map_from_entity;
+  actions_->Transform(poses);
 }
 
 bool PointerTool::Cancel() {
@@ -110,7 +111,7 @@ std::shared_ptr<const content::Scene> PointerTool::Preview(
   if (!scene || !is_dragging()) return scene;
   auto preview = std::make_shared<content::Scene>(*scene);
   for (content::Entity& entity : preview->entities) {
-    for (const Held& held : drag_->held) {
+    for (const ui::NewPose& held : drag_->held) {
       if (held.name == entity.name) ui::SetTransform(drag_->motion.motion() * held.map_from_entity, &entity);
     }
   }
@@ -145,13 +146,15 @@ void PointerTool::Nudge(const AuthorView& view, int right, int away) {
   if (level_right.norm() < 1e-6) return;
   level_right.normalize();
   const Eigen::Vector3d level_away = up.cross(level_right);
+  std::vector<ui::NewPose> poses;
   for (const std::string& name : selection_->names()) {
     const content::Entity* const entity = view.scene->Find(name);
     if (entity == nullptr) continue;
     const double step = kShareOfDistance * (content::PlaceOf(*entity) - view.eye()).norm();
     const Eigen::Vector3d offset = step * (right * level_right + away * level_away);
-    actions_->Transform(name, ui::TranslationBy(offset) * ui::TransformOf(*entity, view.eye()));
+    poses.push_back({name, ui::TranslationBy(offset) * ui::TransformOf(*entity, view.eye())});
   }
+  if (!poses.empty()) actions_->Transform(poses);
 }
 
 }  // namespace docent::app

@@ -14,7 +14,7 @@
 namespace docent::app {
 
 // Selecting and dragging in the author's image. While a handle or an entity is dragged, only what is shown
-// changes; the release asks for one change of each entity. On the window's thread.
+// changes; the release asks for one change of all of them. On the window's thread.
 class PointerTool {
  public:
   // `selection`, `shapes` and `actions` must outlive the tool.
@@ -42,14 +42,10 @@ class PointerTool {
   void Nudge(const AuthorView& view, int right, int away);
 
  private:
-  struct Held {
-    std::string name;
-    engine::Sim3 map_from_entity;  // At the beginning of the drag.
-  };
   struct Drag {
     ui::GizmoDrag motion;
-    std::vector<Held> held;
-    Eigen::Vector2d from;  // In the window.
+    std::vector<ui::NewPose> held;  // At the beginning of the drag.
+    Eigen::Vector2d from;           // In the window.
     bool moved = false;
   };
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <span>
 #include <string>
 
@@ -10,26 +9,21 @@
 #include "maps/library/library.h"
 
 // Reads and changes the content of maps in a library, for command line tools. Throws Error, which names the
-// library and the map.
+// library and the map. Damaged content is left out with a warning on standard error.
 namespace docent::app {
 
 // "museum.docent, map 'Desk 3'".
 std::string WhereStored(const maps::Library& library, const maps::MapInfo& map);
 
-// The stored scene with the ids and names of its assets only, because listing and removing need no meshes.
+// The stored scene with the ids and names of its assets only, because listing needs no meshes.
 content::Scene StoredNames(const maps::Library& library, const maps::MapInfo& map);
 
 // Makes the change of a scene; see content/edits.h.
 using MakeEdit = std::function<content::SceneChange(const content::Scene&)>;
 
-// Whether the edits need the models of the scene, not only their names: those that keep the base of a model
-// in place or need its size.
-enum class ModelsNeeded { kNo, kYes };
-
-// Applies edits to the stored scene of a map, one after the other, and saves it once. `added` is the asset of
-// a model that they add, else null. Nothing changes when an edit does not fit, or the policy of the map
-// forbids it.
-void EditStoredScene(maps::Library* library, const maps::MapInfo& map, std::span<const MakeEdit> edits,
-                     ModelsNeeded needed, const std::shared_ptr<const content::Asset>& added = nullptr);
+// Applies edits to the stored scene of a map, one after the other, and saves it once. Together they are one
+// change, which a session can undo, as it can undo those before. Nothing changes when an edit does not fit,
+// or the policy of the map forbids it. If content is damaged, only this change can be undone.
+void EditStoredScene(maps::Library* library, const maps::MapInfo& map, std::span<const MakeEdit> edits);
 
 }  // namespace docent::app

@@ -131,8 +131,13 @@ struct Validator {
   std::string operator()(const ScaleEntity& c) const {
     return First({NameProblem(c.name, "a name"), FactorProblem(c.factor)});
   }
-  std::string operator()(const TransformEntity& c) const {
-    return First({NameProblem(c.name, "a name"), PoseProblem(c.map_from_entity)});
+  std::string operator()(const TransformEntities& c) const {
+    if (c.poses.empty()) return "expected a name";
+    for (const EntityPose& pose : c.poses) {
+      std::string problem = First({NameProblem(pose.name, "a name"), PoseProblem(pose.map_from_entity)});
+      if (!problem.empty()) return problem;
+    }
+    return "";
   }
   std::string operator()(const AlignEntity& c) const {
     return First({NameProblem(c.name, "a name"), c.pairs.size() < 3 ? "expected at least 3 points" : "",
@@ -191,7 +196,7 @@ engine::Rotation3 Settled(const engine::Rotation3& rotation) {
   return rotation;
 }
 
-bool TransformEntity::operator==(const TransformEntity& other) const {
+bool EntityPose::operator==(const EntityPose& other) const {
   return name == other.name &&
          Settled(map_from_entity.rotation).quaternion().coeffs() ==
              Settled(other.map_from_entity.rotation).quaternion().coeffs() &&

@@ -75,12 +75,16 @@ struct ScaleEntity {
   double factor = 1;  // positive
   bool operator==(const ScaleEntity&) const = default;
 };
-// Gives a model this pose. A signpost gets its translation as its place and its scale as its height.
-struct TransformEntity {
+// The pose that a model gets. A signpost gets its translation as its place and its scale as its height.
+struct EntityPose {
   std::string name;
   engine::Sim3 map_from_entity;
   // Rotations are equal when they are equal after all rounding (Settled).
-  bool operator==(const TransformEntity& other) const;
+  bool operator==(const EntityPose& other) const;
+};
+struct TransformEntities {
+  std::vector<EntityPose> poses;
+  bool operator==(const TransformEntities&) const = default;
 };
 // A point of a model and its place in the map: a point of the surface at a pixel, or coordinates.
 struct PointPair {
@@ -161,7 +165,7 @@ struct Save {
 
 using Command =
     std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, PlaceModel, PlaceSignpost,
-                 MoveEntity, RotateEntity, ScaleEntity, TransformEntity, AlignEntity, BendEntity,
+                 MoveEntity, RotateEntity, ScaleEntity, TransformEntities, AlignEntity, BendEntity,
                  UnbendEntity, RemoveEntities, DuplicateEntities, RenameEntity, SetEntityText,
                  SetSignpostTarget, SetEntityFlag, GroupEntities, PasteEntities, Undo, Redo, Save>;
 

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/script/scene_commands.h"
 
+#include <algorithm>
+#include <iterator>
+#include <set>
+#include <string_view>
+
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -16,10 +21,20 @@ content::SceneChange EditFor(const content::Scene& scene, const RotateEntity& co
 content::SceneChange EditFor(const content::Scene& scene, const ScaleEntity& command) {
   return content::ScaleEdit(scene, command.name, command.factor);
 }
-content::SceneChange EditFor(const content::Scene& scene, const TransformEntity& command) {
-  engine::Sim3 pose = command.map_from_entity;
-  pose.rotation = Settled(pose.rotation);
-  return content::TransformEdit(scene, command.name, pose);
+content::SceneChange EditFor(const content::Scene& scene, const TransformEntities& command) {
+  content::SceneChange all;
+  std::set<std::string_view> names;
+  for (const auto& [name, map_from_entity] : command.poses) {
+    if (!names.insert(name).second) throw Error("'" + name + "' is named twice.");
+    engine::Sim3 pose = map_from_entity;
+    pose.rotation = Settled(pose.rotation);
+    content::SceneChange one = content::TransformEdit(scene, name, pose);
+    if (all.label.empty()) all.label = one.label;
+    std::move(one.entities.begin(), one.entities.end(), std::back_inserter(all.entities));
+  }
+  const std::size_t others = command.poses.size() - 1;
+  if (others > 0) all.label += " and " + std::to_string(others) + (others == 1 ? " other" : " others");
+  return all;
 }
 content::SceneChange EditFor(const content::Scene& scene, const UnbendEntity& command) {
   return content::UnbendEdit(scene, command.name);

@@ -11,7 +11,7 @@ namespace docent::app {
 content::SceneChange EditFor(const content::Scene& scene, const MoveEntity& command);  // not to a pixel
 content::SceneChange EditFor(const content::Scene& scene, const RotateEntity& command);
 content::SceneChange EditFor(const content::Scene& scene, const ScaleEntity& command);
-content::SceneChange EditFor(const content::Scene& scene, const TransformEntity& command);
+content::SceneChange EditFor(const content::Scene& scene, const TransformEntities& command);
 content::SceneChange EditFor(const content::Scene& scene, const UnbendEntity& command);
 content::SceneChange EditFor(const content::Scene& scene, const RemoveEntities& command);
 content::SceneChange EditFor(const content::Scene& scene, const DuplicateEntities& command);

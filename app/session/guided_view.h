@@ -21,6 +21,10 @@ struct ShownFrame {
   // Capture time on CLOCK_MONOTONIC; empty where it is unknown (see FrameLoopOptions::latency).
   std::optional<Timestamp> taken = {};
   std::string message;  // one sentence, often empty
+  // Only on a tour; see VisitState.
+  std::optional<ui::VisitorDisplay> visitor = {};
+  // If a visitor was lost a moment ago: the last pose before, whose content is in `shown`.
+  std::optional<engine::Rigid3> held_camera_from_map = {};
   // The current camera model of a camera whose calibration is estimated; else null.
   std::shared_ptr<const engine::CameraModel> camera = nullptr;
 };

@@ -4,11 +4,15 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <opencv2/imgproc.hpp>
 #include <utility>
+#include <variant>
 
 #include "app/files/image_files.h"
 #include "app/output/engine_text.h"
+#include "app/script/format_command.h"
 #include "engine/base/error.h"
+#include "engine/vision/small_blurry_image.h"
 
 namespace docent::app {
 
@@ -27,25 +31,25 @@ engine::SystemOptions SystemOptionsOf(const SessionOptions& options, MapKeys* ke
 Session::Session(const SessionOptions& options,
                  std::vector<std::shared_ptr<const engine::CameraModel>> cameras, maps::Library* library)
     : options_(options),
-      library_(library),
       keys_(options.may_write ? library : nullptr),
-      system_(SystemOptionsOf(options, &keys_), cameras) {
-  for (auto& model : cameras) {
-    Camera camera;
-    camera.model = std::move(model);
-    cameras_.push_back(std::move(camera));
-  }
+      system_(SystemOptionsOf(options, &keys_), cameras),
+      state_(std::move(cameras)),
+      event_handler_(options_, &system_, &state_, &memory_, &saving_),
+      map_commands_(library, &keys_, &system_, &state_, &event_handler_, &memory_, &saving_),
+      content_commands_(options_, &system_, &state_, &assets_),
+      memory_(options_, library, &system_, &mutex_, &state_, &assets_),
+      saving_(options_, library, &keys_, &system_, &mutex_, &state_) {
   system_.SetEventHook([this] {
     const std::scoped_lock lock(mutex_);
-    HandleSystemEvents();
+    event_handler_.HandleEvents();
   });
-  if (library_ != nullptr) {
-    LoadMaps();
-    if (options.may_write) StartSaver();
+  if (library != nullptr) {
+    memory_.Open();
+    if (options.may_write) saving_.Start();
   }
   if (!options.first_map.empty()) {
     const std::scoped_lock lock(mutex_);
-    Apply(NewMap{options.first_map}, engine::TrackedFrame());
+    map_commands_.Apply(NewMap{options.first_map}, engine::TrackedFrame());
   }
 }
 
@@ -58,66 +62,92 @@ Session::~Session() {
   }
 }
 
-void Session::AddEvent(Timestamp time, std::string event, std::string detail) {
-  events_.push_back({time, std::move(event), std::move(detail)});
-}
-
-Timestamp Session::LastTime() const {
-  Timestamp time{};
-  for (const Camera& camera : cameras_) time = std::max(time, camera.last_time);
-  return time;
-}
-
 engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   engine::TrackedFrame tracked = system_.Process(frame);
   const std::scoped_lock lock(mutex_);
-  Camera& camera = cameras_[static_cast<std::size_t>(frame.camera)];
-  camera.last_time = frame.time;
-  HandleSystemEvents();
-  ReportRejection(&camera, tracked);
-  if (options_.may_write) Autosave(frame.time);
+  state_.cameras[static_cast<std::size_t>(frame.camera)].last_time = frame.time;
+  event_handler_.HandleEvents();
+  event_handler_.ReportRejection(tracked);
+  if (options_.may_write) saving_.Autosave(frame.time);
   return tracked;
 }
 
-void Session::ReportRejection(Camera* camera, const engine::TrackedFrame& frame) {
-  const auto name = [this](std::uint64_t key) { return NameOf(key); };
-  const bool is_new = camera->relocalization_message.Update(frame.frame.time, engine::HasPose(frame.state),
-                                                            frame.relocalization, name);
-  const std::string& text = camera->relocalization_message.text();
-  if (text.empty() || !is_new) return;
-  AddEvent(frame.frame.time, "not sure",
-           CameraPrefix(static_cast<std::size_t>(frame.frame.camera)) + text + " (" +
-               std::to_string(frame.relocalization.inliers) + " inliers)");
+void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
+                      const std::filesystem::path& model_folder) {
+  if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
+    throw Error("a tour is read-only; use docent author to make changes");
+  }
+  if (const std::string problem = Validate(command); !problem.empty()) throw Error(problem);
+  memory_.LoadFor(command);
+  std::unique_lock lock(mutex_);
+  event_handler_.HandleEvents();
+  assets_.SetFolder(model_folder);
+  const auto apply = [&](const auto& chosen) {
+    if constexpr (requires { map_commands_.Apply(chosen, frame, &lock); }) {
+      map_commands_.Apply(chosen, frame, &lock);  // waits for the disk
+    } else if constexpr (requires { map_commands_.Apply(chosen, frame); }) {
+      map_commands_.Apply(chosen, frame);
+    } else {
+      content_commands_.Apply(chosen, frame);
+    }
+  };
+  std::visit(apply, command);
+  event_handler_.HandleEvents();
+  state_.AddEvent(frame.frame.time, "command", FormatCommand(command));
 }
 
-void Session::Advise(Camera* camera, const std::string& sentence) {
-  constexpr Timestamp kShown = std::chrono::seconds(15);
-  camera->advice = sentence;
-  camera->advice_end = camera->last_time + kShown;
+void Session::Preload(const Command& command, const std::filesystem::path& model_folder) {
+  const auto* place = std::get_if<PlaceModel>(&command);
+  if (place == nullptr) return;
+  const std::scoped_lock lock(mutex_);
+  assets_.SetFolder(model_folder);
+  assets_.Load(place->file);
 }
 
 Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   const std::uint64_t active = system_.ActiveMap();
-  const std::uint64_t current = CurrentMap(frame);
+  const std::uint64_t current = system_.CurrentMap(CameraOf(frame));
   const std::scoped_lock lock(mutex_);
   Shown shown;
-  if (frame.state == engine::TrackingState::kInitializing) shown.starting_map = NameOf(current);
-  const Camera& camera = cameras_.at(static_cast<std::size_t>(frame.frame.camera));
+  if (frame.state == engine::TrackingState::kInitializing) shown.starting_map = state_.NameOf(current);
+  const SessionCamera& camera = state_.cameras.at(CameraOf(frame));
   if (frame.frame.time < camera.advice_end) shown.advice = camera.advice;
   const std::string& rejection = camera.relocalization_message.text();
   shown.hint = rejection.empty() ? TextOf(frame.hint) : rejection;
   if (options_.may_write) shown.mapping = MappingStatusOf(frame, active != 0 && active == frame.map_key);
-  const auto found = maps_.find(frame.map_key);
-  if (found == maps_.end()) return shown;
+  const auto found = state_.maps.find(frame.map_key);
+  if (found == state_.maps.end()) return shown;
   shown.map_name = found->second.name;
   shown.scene = found->second.scene;
   return shown;
 }
 
+std::vector<Session::SimilarView> Session::SimilarViews(const engine::Frame& frame, std::size_t count) {
+  cv::Mat gray = frame.image;
+  if (gray.channels() == 3) cv::cvtColor(frame.image, gray, cv::COLOR_BGR2GRAY);
+  if (gray.empty()) return {};
+  const engine::SmallBlurryImage thumbnail = engine::MakeSmallBlurryImage(gray);
+  // Candidates of maps that are not in memory are left out, so more are asked for.
+  const int asked = 4 * static_cast<int>(count);
+  std::vector<SimilarView> views;
+  for (const auto& place : system_.place_index().FindPlaces(thumbnail, asked, asked, 0)) {
+    if (views.size() >= count) break;
+    if (!place.map) continue;
+    const auto& keyframes = place.map->keyframes;
+    const auto keyframe = std::find_if(keyframes.begin(), keyframes.end(),
+                                       [&](const auto& candidate) { return candidate.id == place.keyframe; });
+    if (keyframe == keyframes.end()) continue;
+    keyframe->features->MarkInUse();
+    const std::scoped_lock lock(mutex_);
+    views.push_back({state_.NameOf(place.map_key), keyframe->features->levels[1].clone()});
+  }
+  return views;
+}
+
 std::vector<Session::MapState> Session::Maps() const {
   const std::scoped_lock lock(mutex_);
   std::vector<MapState> states;
-  for (const auto& [key, map] : maps_) {
+  for (const auto& [key, map] : state_.maps) {
     states.push_back(
         {key, map.name, map.policy, map.snapshot, map.scene, map.in_library, map.discarded, map.joined_into});
   }
@@ -126,23 +156,12 @@ std::vector<Session::MapState> Session::Maps() const {
 
 std::vector<Event> Session::TakeEvents() {
   const std::scoped_lock lock(mutex_);
-  return std::exchange(events_, {});
-}
-
-Session::Saving Session::SavingNow() const {
-  Saving saving;
-  if (!saver_) return saving;
-  saving.unsaved = saver_->pending() > 0;
-  const std::scoped_lock lock(mutex_);
-  saving.saved_at = saved_at_;
-  for (const auto& [key, map] : maps_)
-    saving.unsaved = saving.unsaved || (map.Exists() && map.NeedsSave() && map.snapshot->HasFinitePoints());
-  return saving;
+  return std::exchange(state_.events, {});
 }
 
 void Session::DiscardChanges() {
   const std::scoped_lock lock(mutex_);
-  discards_changes_ = true;
+  saving_.DiscardChanges();
 }
 
 void Session::Finish() {
@@ -153,18 +172,18 @@ void Session::Finish() {
   } catch (...) {
     failure = std::current_exception();  // what was mapped before is saved all the same
   }
-  if (saver_) {
-    saver_->EndMaintenance();
-    saver_->Flush();  // so that failed saves are repeated below
+  if (saving_.HasStarted()) {
+    saving_.EndMaintenance();
+    saving_.Flush();  // so that failed saves are repeated below
     {
       const std::scoped_lock lock(mutex_);
-      HandleSystemEvents();
-      const Timestamp time = LastTime();
-      ReportSaveFailure(time);
-      for (auto& [key, map] : maps_) SaveMap(&map, time);
+      event_handler_.HandleEvents();
+      const Timestamp time = state_.LastTime();
+      saving_.ReportFailure(time);
+      saving_.SaveAll(time);
     }
-    saver_->Flush();
-    if (!failure) failure = saver_->TakeError();
+    saving_.Flush();
+    if (!failure) failure = saving_.TakeError();
   }
   if (failure) std::rethrow_exception(failure);
 }

@@ -1,50 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <mutex>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "app/output/run_output.h"
-#include "app/script/scene_commands.h"
-#include "app/session/library_scene.h"
-#include "app/session/maintenance_order.h"
+#include "app/script/commands.h"
+#include "app/session/content_commands.h"
+#include "app/session/map_commands.h"
 #include "app/session/map_keys.h"
 #include "app/session/mapping_status.h"
-#include "app/session/relocalization_message.h"
-#include "app/session/session_map.h"
-#include "app/session/surface_at_pixel.h"
+#include "app/session/session_assets.h"
+#include "app/session/session_memory.h"
+#include "app/session/session_options.h"
+#include "app/session/session_saving.h"
+#include "app/session/session_state.h"
+#include "app/session/system_event_handler.h"
 #include "engine/system/system.h"
 #include "maps/library/library.h"
-#include "maps/library/map_pager.h"
-#include "maps/library/saver.h"
 
 namespace docent::app {
-
-// extend_maps and new_map_key are set by the session.
-struct SessionOptions : engine::SystemOptions {
-  bool may_write = true;  // false: no map is extended and no content is edited
-  std::string first_map;  // a map of this name is started without a command; empty: wait for `map new`
-  // In image time. A map is also saved when it is left and at the end; 0 saves only then.
-  Timestamp autosave_interval = std::chrono::seconds(10);
-  // Idle maps in memory are adjusted while there is nothing else to do; needs `threaded`.
-  bool maintenance = true;
-  double signpost_height = 0.12;  // ratio of its distance at placement
-  double model_side = 0.2;        // the same for the largest side of a model without a scale
-  maps::PagerOptions memory;      // how much of the library is in memory at once
-  // Measured distance in metres between the first two cameras of a rigid rig; 0 when not measured. Once the
-  // rig is recognised, it gives the length of a map unit in metres.
-  double baseline_m = 0;
-};
 
 // The common core of authoring, touring, evaluation and the demo: an engine::System with what an application
 // adds to it: maps that have names and policies and are kept in a library, and their content. The uses differ
@@ -98,6 +82,14 @@ class Session {
     std::string starting_map;  // the map that is being initialized; empty once it has points, and for none
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
+  // A keyframe that resembles an image, for a visitor who is looking for a place.
+  struct SimilarView {
+    std::string map_name;
+    cv::Mat image;  // CV_8UC1, half the size of the keyframe's image
+  };
+  // At most `count` of those in memory, the most similar first, at most one of each place if there are
+  // several. Takes some milliseconds.
+  std::vector<SimilarView> SimilarViews(const engine::Frame& frame, std::size_t count);
   // The session's state of a map.
   struct MapState {
     std::uint64_t key = 0;
@@ -124,11 +116,8 @@ class Session {
   std::vector<Event> TakeEvents();
 
   // Whether something is not on disk yet, and when something was written last.
-  struct Saving {
-    bool unsaved = false;
-    std::optional<std::chrono::steady_clock::time_point> saved_at;  // empty before the first time
-  };
-  Saving SavingNow() const;
+  using Saving = SavingStatus;
+  Saving SavingNow() const { return saving_.Status(); }
   // From now on nothing is saved any more, neither by itself nor by Finish. What was saved stays.
   void DiscardChanges();
 
@@ -137,133 +126,22 @@ class Session {
   void Finish();
 
  private:
-  // What a camera's user is told. Guarded by mutex_.
-  struct Camera {
-    std::shared_ptr<const engine::CameraModel> model;
-    Timestamp last_time{};
-    std::string advice;  // shown until advice_end
-    Timestamp advice_end{};
-    RelocalizationMessage relocalization_message;
-  };
-
-  // session.cpp
-  void ReportRejection(Camera* camera, const engine::TrackedFrame& frame);
-  static void Advise(Camera* camera, const std::string& sentence);
-  void AddEvent(Timestamp time, std::string event, std::string detail);
-  Timestamp LastTime() const;  // the latest of any camera
-
-  // session_memory.cpp
-  void LoadMaps();
-  void AddLoadedMap(const maps::StoredMap& stored);
-  content::EditHistory StoredHistory(std::uint64_t key, const std::string& where, AssetCache* assets,
-                                     std::vector<std::string>* problems) const;  // without mutex_
-  void ResolveSignposts(content::Scene* scene);
-  bool Evict(std::uint64_t key);
-  void LoadIntoMemory(const Command& command);  // without mutex_
-  void PinMapsInUse();
-  void ExpectNeighbours(const SessionMap& map);
-
-  // session_events.cpp; all with mutex_ held. Each brings the session up to date and adds an event in words.
-  void HandleSystemEvents();
-  void Handle(const engine::SystemEvent& event, const engine::MapEntered& what);
-  void Handle(const engine::SystemEvent& event, const engine::Relocalized& what);
-  void Handle(const engine::SystemEvent& event, const engine::PoseRejected& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapLeft& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapUpdated& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapDiscarded& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapStartedAfterLoss& what);
-  void Handle(const engine::SystemEvent& event, const engine::KeyFrameOffered& what);
-  void Handle(const engine::SystemEvent& event, const engine::JoinRequested& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapsJoined& what);
-  void Handle(const engine::SystemEvent& event, const engine::JoinRefused& what);
-  void Handle(const engine::SystemEvent& event, const engine::RigChanged& what);
-  void Handle(const engine::SystemEvent& event, const engine::CalibrationMismatch& what);
-  void Handle(const engine::SystemEvent& event, const engine::LensEstimated& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapperFailed& what);
-  void Handle(const engine::SystemEvent& event, const engine::MapperEvent& what);
-  std::string NameOf(std::uint64_t key) const;  // empty when the session has no such map
-  std::string CameraPrefix(std::size_t camera) const;
-  std::string FreeMapName(const std::string& name) const;
-  void AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into);
-
-  // session_commands.cpp; all with mutex_ held unless noted
-  void Apply(const NewMap& command, const engine::TrackedFrame& frame);
-  void Apply(const StopMap& command, const engine::TrackedFrame& frame);
-  void Apply(const UseMap& command, const engine::TrackedFrame& frame);
-  void Apply(const SetPolicy& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
-  void ChangePolicy(const SetPolicy& command, std::uint64_t key, Timestamp time,
-                    std::unique_lock<std::mutex>* lock);
-  void Apply(const RenameMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
-  void Apply(const RemoveMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
-  void Apply(const Save& command, const engine::TrackedFrame& frame);
-  SessionMap& InitializedMap(const std::string& name);
-  // Waits until the library holds all changes of the map that were submitted; returns whether it has the map.
-  bool FlushToLibrary(std::uint64_t key, const std::string& name, Timestamp time,
-                      std::unique_lock<std::mutex>* lock);
-  void Retarget(std::uint64_t from_key, const std::string& from, std::uint64_t to_key, const std::string& to);
-  SessionMap& AddMap(std::uint64_t key, const std::string& name);
-  SessionMap* FindByName(const std::string& name);
-  engine::MapPermissions PermissionsOf(const SessionMap& map) const;
-  void UpdatePermissions(const SessionMap& map);
-  std::uint64_t CurrentMap(const engine::TrackedFrame& frame) const;
-
-  // session_content.cpp; all with mutex_ held
-  void Apply(const PlaceModel& command, const engine::TrackedFrame& frame);
-  void Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame);
-  void Apply(const MoveEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame);
-  void Apply(const PasteEntities& command, const engine::TrackedFrame& frame);
-  void Apply(const AlignEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const BendEntity& command, const engine::TrackedFrame& frame);
-  void Apply(const Undo& command, const engine::TrackedFrame& frame);
-  void Apply(const Redo& command, const engine::TrackedFrame& frame);
-  template <SceneCommand C>
-  void Apply(const C& command, const engine::TrackedFrame& frame) {
-    SessionMap& map = MapToEdit(frame);
-    Edit(&map, EditFor(*map.scene, command));
-  }
-  SessionMap& MapToEdit(const engine::TrackedFrame& frame);
-  void Edit(SessionMap* map, content::SceneChange change);
-  content::SurfaceHit SurfaceFor(const engine::TrackedFrame& frame, const Eigen::Vector2d& pixel) const;
-  std::vector<content::Correspondence> Correspondences(const engine::TrackedFrame& frame,
-                                                       const std::vector<PointPair>& pairs) const;
-  std::uint64_t TargetKey(const SessionMap& map, const std::string& to_map);
-  std::shared_ptr<const content::Asset> LoadAsset(const std::string& file);
-
-  // session_saving.cpp
-  void OnSaved(const maps::MapRecord& record);
-  void StartSaver();
-  void SaveMap(SessionMap* map, Timestamp time);
-  void Autosave(Timestamp time);  // with mutex_ held
-  void ReportSaveFailure(Timestamp time);
-
-  // session_maintenance.cpp; RunMaintenance on the saver's thread and without mutex_
-  bool RunMaintenance(const std::atomic<bool>& interrupt);
-  bool IsIdle(const SessionMap& map) const;
-  std::vector<IdleMap> MapsForMaintenance() const;
-  SessionMap* FindIdleMap(const IdleMap& idle);
-
   const SessionOptions options_;
-  maps::Library* const library_;
   MapKeys keys_;
   engine::System system_;  // its lock may be taken while mutex_ is held, never the other way round
-
-  // Guards the members below; never held while tracking or waiting for another thread.
-  mutable std::mutex mutex_;
-  std::vector<Camera> cameras_;
-  std::map<std::uint64_t, SessionMap> maps_;
-  std::vector<Event> events_;
-  AssetCache assets_;                                                    // by id
-  std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by file name in commands
-  std::filesystem::path model_folder_;
-  std::optional<Timestamp> last_save_;
-  std::optional<std::chrono::steady_clock::time_point> saved_at_;  // for people only
-  bool discards_changes_ = false;
   bool finished_ = false;
-  MaintenanceOrder maintenance_order_;  // accessed only by the saver's thread
+
+  // Guards the members below, as far as they do not say otherwise; never held while tracking or waiting for
+  // another thread.
+  mutable std::mutex mutex_;
+  SessionState state_;
+  SessionAssets assets_;
+  SystemEventHandler event_handler_;
+  MapCommands map_commands_;
+  ContentCommands content_commands_;
   // Last, because their threads call back into the other members.
-  std::optional<maps::MapPager> pager_;  // only with a library
-  std::optional<maps::Saver> saver_;     // only with a library opened for writing
+  SessionMemory memory_;  // opened only with a library
+  SessionSaving saving_;  // started only with a library opened for writing
 };
 
 }  // namespace docent::app

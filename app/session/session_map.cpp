@@ -14,4 +14,17 @@ void SessionMap::UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer
   for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
 }
 
+engine::MapPermissions SessionMap::Permissions() const {
+  engine::MapPermissions permissions;
+  permissions.extend = !stopped && maps::MayChangeStructure(policy);
+  if (policy == maps::Policy::kBounded) {
+    permissions.bounds.emplace();  // empty: a bounded map without bounds accepts no keyframe
+    if (bounds) permissions.bounds.emplace(bounds->min, bounds->max);
+  }
+  permissions.join = policy == maps::Policy::kOpen;
+  // A map that was saved or that has content is kept in any case.
+  permissions.discard = !saved_snapshot && scene->entities.empty();
+  return permissions;
+}
+
 }  // namespace docent::app

@@ -11,6 +11,7 @@
 #include "content/edit_history.h"
 #include "content/scene.h"
 #include "engine/map/map_snapshot.h"
+#include "engine/system/map_permissions.h"
 #include "maps/storage/policy.h"
 
 namespace docent::app {
@@ -47,6 +48,9 @@ struct SessionMap {
 
   // Replaces the snapshot by a newer one of the mapper; content moves along with its anchors.
   void UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer);
+
+  // What the system may do with the map, from its policy and from what happened to it.
+  engine::MapPermissions Permissions() const;
 
   // False once the map was discarded or joined into another one.
   bool Exists() const { return !discarded && joined_into == 0; }

@@ -1,41 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
+#include "app/session/session_memory.h"
 
-#include "app/session/session.h"
+#include <memory>
+#include <utility>
+#include <variant>
+
+#include "app/session/library_scene.h"
 #include "engine/base/error.h"
 
-// Which maps of the library are in memory: the pager loads and evicts maps, the session tells it which are in
-// use.
 namespace docent::app {
 
-void Session::LoadMaps() {
+void SessionMemory::Open() {
   for (const maps::MapInfo& info : library_->List()) {
-    SessionMap& map = maps_[info.key];
+    SessionMap& map = state_.maps[info.key];
     map.key = info.key;
     map.name = info.name;
     map.policy = info.policy;
     map.bounds = info.bounds;
     map.saved_scene = map.scene;
     map.in_library = true;
-    system_.AddMap(map.key, nullptr, PermissionsOf(map));
+    system_.AddMap(map.key, nullptr, map.Permissions());
   }
   maps::MapPager::Callbacks callbacks;
   callbacks.loaded = [this](const maps::StoredMap& stored) { AddLoadedMap(stored); };
   callbacks.evict = [this](std::uint64_t key) { return Evict(key); };
   callbacks.failed = [this](std::uint64_t, const std::string& problem) {
     const std::scoped_lock lock(mutex_);
-    AddEvent(LastTime(), "warning", problem);
+    state_.AddEvent(state_.LastTime(), "warning", problem);
   };
   pager_.emplace(library_, &system_.place_index(), options_.memory, std::move(callbacks));
   system_.SetPlaceFinder(&*pager_);
   pager_->Open();
 }
 
-void Session::AddLoadedMap(const maps::StoredMap& stored) {
+void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   AssetCache assets;
   {
     const std::scoped_lock lock(mutex_);
-    assets = assets_;
+    assets = assets_.all();
   }
   // Models are decoded without the lock, so that frames are processed meanwhile.
   const std::string where = library_->file() + ", map '" + stored.info.name + "'";
@@ -45,23 +47,24 @@ void Session::AddLoadedMap(const maps::StoredMap& stored) {
   if (options_.may_write && problems.empty())
     history = StoredHistory(stored.info.key, where, &assets, &problems);
   const std::scoped_lock lock(mutex_);
-  for (const std::string& problem : problems) AddEvent(LastTime(), "warning", problem);
-  assets_.merge(assets);
+  for (const std::string& problem : problems) state_.AddEvent(state_.LastTime(), "warning", problem);
+  assets_.Merge(&assets);
   // A map that another process saved since the session began is not part of the session.
-  const auto found = maps_.find(stored.info.key);
-  if (found == maps_.end() || found->second.changed) return;
-  SessionMap& map = found->second;
+  SessionMap* const known = state_.FindMap(stored.info.key);
+  if (known == nullptr || known->changed) return;
+  SessionMap& map = *known;
   map.snapshot = map.saved_snapshot = stored.snapshot;
   ResolveSignposts(scene.get());
   map.scene = map.saved_scene = std::move(scene);
   map.history = std::move(history);
   system_.SetSnapshot(map.key, map.snapshot);
-  UpdatePermissions(map);
+  system_.SetPermissions(map.key, map.Permissions());
 }
 
 // Empty when the library has none, or a damaged one, which costs nothing else.
-content::EditHistory Session::StoredHistory(std::uint64_t key, const std::string& where, AssetCache* assets,
-                                            std::vector<std::string>* problems) const {
+content::EditHistory SessionMemory::StoredHistory(std::uint64_t key, const std::string& where,
+                                                  AssetCache* assets,
+                                                  std::vector<std::string>* problems) const {
   try {
     const std::optional<maps::SceneRecord> record = library_->LoadHistory(key);
     if (record) return HistoryFromRecord(*record, where, assets);
@@ -73,36 +76,34 @@ content::EditHistory Session::StoredHistory(std::uint64_t key, const std::string
 
 // A signpost leads to a map by its key; the name is the one that the map has now. A signpost of an older
 // library has only the name.
-void Session::ResolveSignposts(content::Scene* scene) {
+void SessionMemory::ResolveSignposts(content::Scene* scene) {
   for (content::Entity& entity : scene->entities) {
     if (entity.kind != content::Entity::Kind::kSignpost) continue;
     content::Signpost& signpost = entity.signpost;
     if (signpost.to_key != 0) {
-      if (const auto found = maps_.find(signpost.to_key); found != maps_.end())
-        signpost.to_map = found->second.name;
-    } else if (const SessionMap* const map = FindByName(signpost.to_map)) {
+      if (const SessionMap* const map = state_.FindMap(signpost.to_key)) signpost.to_map = map->name;
+    } else if (const SessionMap* const map = state_.FindByName(signpost.to_map)) {
       signpost.to_key = map->key;
     }
   }
 }
 
-bool Session::Evict(std::uint64_t key) {
+bool SessionMemory::Evict(std::uint64_t key) {
   const std::scoped_lock lock(mutex_);
-  const auto found = maps_.find(key);
-  if (found == maps_.end()) return true;
-  SessionMap& map = found->second;
+  SessionMap* const found = state_.FindMap(key);
+  if (found == nullptr) return true;
+  SessionMap& map = *found;
   if (map.changed || map.NeedsSave() || system_.IsInUse(key)) return false;
   system_.SetSnapshot(key, nullptr);
   map.snapshot.reset();
   map.saved_snapshot.reset();
   map.scene = map.saved_scene = std::make_shared<content::Scene>();
   map.history = {};
-  std::erase_if(assets_, [](const auto& asset) { return asset.second.use_count() == 1; });
+  assets_.EvictUnused();
   return true;
 }
 
-// Loads the map that a command names, if the command needs the map itself.
-void Session::LoadIntoMemory(const Command& command) {
+void SessionMemory::LoadFor(const Command& command) {
   const std::string* name = nullptr;
   if (const auto* use = std::get_if<UseMap>(&command)) name = &use->name;
   if (const auto* policy = std::get_if<SetPolicy>(&command)) name = &policy->name;
@@ -111,25 +112,25 @@ void Session::LoadIntoMemory(const Command& command) {
   std::uint64_t key = 0;
   {
     const std::scoped_lock lock(mutex_);
-    const SessionMap* const map = FindByName(*name);
+    const SessionMap* const map = state_.FindByName(*name);
     if (map != nullptr && map->in_library && !map->snapshot) key = map->key;
   }
   if (key != 0) pager_->Load(key);
 }
 
-void Session::PinMapsInUse() {
+void SessionMemory::PinMapsInUse() {
   if (!pager_) return;
   pager_->Pin(system_.MapsInUse());
 }
 
 // A camera is likely to go where the signposts of its map lead.
-void Session::ExpectNeighbours(const SessionMap& map) {
+void SessionMemory::ExpectNeighbours(const SessionMap& map) {
   if (!pager_) return;
   std::vector<std::uint64_t> keys;
   for (const content::Entity& entity : map.scene->entities) {
     if (entity.kind != content::Entity::Kind::kSignpost) continue;
-    const auto neighbour = maps_.find(entity.signpost.to_key);
-    if (neighbour != maps_.end() && neighbour->second.in_library) keys.push_back(neighbour->first);
+    const SessionMap* const neighbour = state_.FindMap(entity.signpost.to_key);
+    if (neighbour != nullptr && neighbour->in_library) keys.push_back(neighbour->key);
   }
   pager_->Prefetch(keys);
 }

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "app/session/session_saving.h"
+
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <limits>
 #include <utility>
 
-#include "app/session/session.h"
+#include "app/session/library_scene.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
 
 // Called on the saver's thread once the record is on disk.
-void Session::OnSaved(const maps::MapRecord& record) {
+void SessionSaving::OnSaved(const maps::MapRecord& record) {
   const std::string revision =
       record.snapshot ? "revision " + std::to_string(record.snapshot->revision) : "content";
   spdlog::debug("saved {}: {}", record.name, revision);
@@ -20,19 +22,19 @@ void Session::OnSaved(const maps::MapRecord& record) {
   saved_at_ = std::chrono::steady_clock::now();
 }
 
-void Session::StartSaver() {
+void SessionSaving::Start() {
   // Unlimited capacity, so that submitting never waits. In lockstep there is no maintenance.
   constexpr std::size_t kAnyNumber = std::numeric_limits<std::size_t>::max();
   maps::Saver::Maintenance maintenance;
   if (options_.threaded && options_.maintenance)
-    maintenance = [this](const std::atomic<bool>& interrupt) { return RunMaintenance(interrupt); };
+    maintenance = [this](const std::atomic<bool>& interrupt) { return maintenance_.Run(interrupt); };
   saver_.emplace(
       library_, kAnyNumber, [this](const maps::MapRecord& record) { OnSaved(record); },
       std::move(maintenance));
 }
 
 // Passes the changes of a map to the saver, which writes them in the background.
-void Session::SaveMap(SessionMap* map, Timestamp time) {
+void SessionSaving::SaveMap(SessionMap* map, Timestamp time) {
   if (!saver_ || discards_changes_ || !map->Exists() || !map->NeedsSave() ||
       !map->snapshot->HasFinitePoints())
     return;
@@ -55,42 +57,90 @@ void Session::SaveMap(SessionMap* map, Timestamp time) {
   map->saved_snapshot = map->snapshot;
   map->saved_scene = map->scene;
   map->changed = true;
-  UpdatePermissions(*map);
+  system_.SetPermissions(map->key, map->Permissions());
   saver_->Submit(std::move(record));
-  AddEvent(time, "save",
-           map->name + (structure ? ": " + std::to_string(map->snapshot->keyframes.size()) + " keyframes, " +
-                                        std::to_string(map->snapshot->points.size()) + " points"
-                                  : ": content"));
+  state_.AddEvent(
+      time, "save",
+      map->name + (structure ? ": " + std::to_string(map->snapshot->keyframes.size()) + " keyframes, " +
+                                   std::to_string(map->snapshot->points.size()) + " points"
+                             : ": content"));
 }
 
-void Session::Autosave(Timestamp time) {
+void SessionSaving::Autosave(Timestamp time) {
   if (!saver_) return;
   if (!last_save_) last_save_ = time;
   if (options_.autosave_interval <= Timestamp{} || time - *last_save_ < options_.autosave_interval) return;
   last_save_ = time;
-  ReportSaveFailure(time);
-  for (auto& [key, map] : maps_) {
+  ReportFailure(time);
+  for (auto& [key, map] : state_.maps) {
     if (!system_.IsProvisional(key)) SaveMap(&map, time);
   }
+}
+
+void SessionSaving::SaveAll(Timestamp time) {
+  for (auto& [key, map] : state_.maps) SaveMap(&map, time);
 }
 
 // A failed save does not end the session: it is reported at once, and the next save writes everything again
 // that any save since the last report may not have written. Changes that a new policy forbids to write were
 // on disk before the policy changed (see SetPolicy).
-void Session::ReportSaveFailure(Timestamp time) {
-  const std::exception_ptr failure = saver_->TakeError();
+void SessionSaving::ReportFailure(Timestamp time) {
+  const std::exception_ptr failure = TakeError();
   if (!failure) return;
   try {
     std::rethrow_exception(failure);
   } catch (const std::exception& error) {
     spdlog::warn("{}", error.what());
-    AddEvent(time, "warning", error.what());
+    state_.AddEvent(time, "warning", error.what());
   }
-  for (auto& [key, map] : maps_) {
+  for (auto& [key, map] : state_.maps) {
     if (!map.changed) continue;
     if (maps::MayChangeStructure(map.policy)) map.saved_snapshot.reset();
     if (maps::MayChangeContent(map.policy)) map.saved_scene.reset();
   }
+}
+
+bool SessionSaving::FlushToLibrary(std::uint64_t key, const std::string& name, Timestamp time,
+                                   std::unique_lock<std::mutex>* lock) {
+  if (!saver_) return false;
+  lock->unlock();
+  saver_->InterruptMaintenance();  // it may write the map as it was
+  saver_->Flush();
+  lock->lock();
+  ReportFailure(time);
+  const SessionMap* const map = state_.FindMap(key);
+  if (map == nullptr || !map->Exists())
+    throw Error("the map '" + name + "' was discarded or joined meanwhile");
+  const std::vector<maps::MapInfo> stored = library_->List();
+  return std::any_of(stored.begin(), stored.end(),
+                     [&](const maps::MapInfo& info) { return info.key == key; });
+}
+
+void SessionSaving::InterruptMaintenance() {
+  if (saver_) saver_->InterruptMaintenance();
+}
+
+SavingStatus SessionSaving::Status() const {
+  SavingStatus status;
+  if (!saver_) return status;
+  status.unsaved = saver_->pending() > 0;
+  const std::scoped_lock lock(mutex_);
+  status.saved_at = saved_at_;
+  for (const auto& [key, map] : state_.maps)
+    status.unsaved = status.unsaved || (map.Exists() && map.NeedsSave() && map.snapshot->HasFinitePoints());
+  return status;
+}
+
+void SessionSaving::EndMaintenance() {
+  if (saver_) saver_->EndMaintenance();
+}
+
+void SessionSaving::Flush() {
+  if (saver_) saver_->Flush();
+}
+
+std::exception_ptr SessionSaving::TakeError() {
+  return saver_ ? saver_->TakeError() : nullptr;
 }
 
 }  // namespace docent::app

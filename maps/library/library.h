@@ -73,8 +73,9 @@ class Library {
   // Reads a map with points and images and computes the features of its keyframes. Throws if there is no such
   // map or it is damaged; damaged content may be left out instead.
   StoredMap Load(std::uint64_t key, DamagedContent damaged = DamagedContent::kRefuse) const;
-  // Reads the content of a map only. Throws as Load does.
-  SceneRecord LoadScene(std::uint64_t key) const;
+  // Reads the content of a map only. Throws as Load does; if `lost_content` is given, damaged content is left
+  // out and described there instead.
+  SceneRecord LoadScene(std::uint64_t key, std::vector<std::string>* lost_content = nullptr) const;
   // Reads the changes of a map's scene that can be undone, with their assets; empty if there are none for the
   // scene as it is. Throws when they are damaged, which nothing else depends on.
   std::optional<SceneRecord> LoadHistory(std::uint64_t key) const;

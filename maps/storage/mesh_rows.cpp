@@ -214,15 +214,13 @@ std::optional<engine::MapMesh> ReadMesh(const Database& database, std::uint64_t 
   return DecodeMesh(key, *bytes);
 }
 
-void WriteMesh(const Database& database, std::uint64_t key, const engine::MapMesh& mesh) {
-  WritePart(database, key, kMeshPart, EncodeMesh(key, mesh));
-}
-
-void RemoveMesh(const Database& database, std::uint64_t key) {
-  database.Prepare("DELETE FROM parts WHERE map_key = ? AND part = ?")
-      .Bind(1, static_cast<std::int64_t>(key))
-      .Bind(2, std::string_view(kMeshPart))
-      .Run();
+bool ReplaceMesh(const Database& database, const MapInfo& info, const engine::MapMesh& mesh) {
+  engine::MapSnapshot map;
+  for (StoredKeyFrame& stored : ReadParts(database, info).keyframes)
+    map.keyframes.push_back(std::move(stored.keyframe));
+  if (engine::StateOf(mesh.keyframes, map) == engine::MeshState::kOutOfDate) return false;
+  WritePart(database, info.key, kMeshPart, EncodeMesh(info.key, mesh));
+  return true;
 }
 
 void RemoveMeshUnlessRight(const Database& database, std::uint64_t key, const engine::MapSnapshot& map) {
@@ -232,7 +230,10 @@ void RemoveMeshUnlessRight(const Database& database, std::uint64_t key, const en
   } catch (const Error&) {
     // A damaged one is removed too: it can be computed again.
   }
-  RemoveMesh(database, key);
+  database.Prepare("DELETE FROM parts WHERE map_key = ? AND part = ?")
+      .Bind(1, static_cast<std::int64_t>(key))
+      .Bind(2, std::string_view(kMeshPart))
+      .Run();
 }
 
 }  // namespace docent::maps

@@ -8,6 +8,7 @@
 #include "engine/dense/densification.h"
 #include "maps/storage/database.h"
 #include "maps/storage/map_codec.h"
+#include "maps/storage/map_record.h"
 
 // The part `mesh` of a map: its surfaces as one triangle mesh, with the keyframes and poses that it was made
 // from. It is computed from the rest of the map, so that a library without it is complete, and programs that
@@ -26,8 +27,8 @@ engine::MapMesh DecodeMesh(std::uint64_t map_key, std::span<const std::uint8_t> 
 
 // Empty if the map has none.
 std::optional<engine::MapMesh> ReadMesh(const Database& database, std::uint64_t key);
-void WriteMesh(const Database& database, std::uint64_t key, const engine::MapMesh& mesh);
-void RemoveMesh(const Database& database, std::uint64_t key);
+// Stores the mesh unless it was made of another state of the map than the stored one; returns whether it did.
+bool ReplaceMesh(const Database& database, const MapInfo& info, const engine::MapMesh& mesh);
 // Removes the stored mesh if it is damaged, or a keyframe that it was made from has moved or is gone.
 void RemoveMeshUnlessRight(const Database& database, std::uint64_t key, const engine::MapSnapshot& map);
 

@@ -280,6 +280,44 @@ TEST(CommandLine, EditsTheContentOfASavedMap) {
   EXPECT_EQ(RunDocent({"content", "list", "--json", "--library", path}).output, before);
 }
 
+TEST(CommandLine, KeepsChangesOfSavedContentUndoable) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "museum.docent").string();
+  const std::vector<std::uint8_t> glb = MakeExhibitGlb();
+  const std::string model = folder.Write("exhibit.glb", {glb.begin(), glb.end()}).string();
+  {
+    maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    library.Save({library.NewKey(), "Desk", maps::Policy::kOpen, nullptr, nullptr});
+  }
+  const auto run = [&](const std::string& verb, std::vector<std::string> more) {
+    more.insert(more.begin(), {"content", verb, "--library", path, "--map", "Desk"});
+    const Outcome outcome = RunDocent(more);
+    EXPECT_EQ(outcome.exit_status, 0) << outcome.errors;
+  };
+  run("add", {model, "--at", "1", "2", "3"});
+  run("edit", {"exhibit", "--move", "1", "0", "0", "--scale", "2"});
+  run("remove", {"exhibit"});
+
+  const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
+  const std::uint64_t key = library.FindByName("Desk").key;
+  AssetCache assets;
+  content::Scene scene = SceneFromRecord(library.LoadScene(key), "Desk", &assets);
+  EXPECT_THAT(scene.entities, IsEmpty());
+  const auto stored = library.LoadHistory(key);
+  ASSERT_TRUE(stored.has_value());
+  content::EditHistory history = HistoryFromRecord(*stored, "Desk", &assets);
+  ASSERT_EQ(history.done().size(), 3u);
+  EXPECT_EQ(history.done()[1].label, "scale 'exhibit' and more");
+  ASSERT_TRUE(history.Undo(&scene));
+  EXPECT_EQ(scene.Find("exhibit")->model.map_from_model.scale, 2);
+  ASSERT_TRUE(history.Undo(&scene));
+  EXPECT_EQ(scene.Find("exhibit")->model.map_from_model.scale, 1);
+  EXPECT_LT((scene.Find("exhibit")->model.map_from_model.translation - Eigen::Vector3d(1, 2, 3)).norm(),
+            1e-9);
+  ASSERT_TRUE(history.Undo(&scene));
+  EXPECT_THAT(scene.entities, IsEmpty());
+}
+
 TEST(CommandLine, AddsModelsAndSignpostsToASavedMap) {
   const TemporaryFolder folder;
   const std::string path = (folder / "museum.docent").string();

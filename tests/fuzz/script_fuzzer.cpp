@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "app/script/format_command.h"
 #include "app/script/script_file.h"
 #include "engine/base/error.h"
 

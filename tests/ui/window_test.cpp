@@ -74,8 +74,8 @@ class AskedFor : public AuthoringActions {
   }
   void Group(const std::vector<std::string>&) override { words.push_back("group"); }
   void Ungroup(const std::vector<std::string>&) override { words.push_back("ungroup"); }
-  void Transform(const std::string& name, const engine::Sim3&) override {
-    words.push_back("transform " + name);
+  void Transform(const std::vector<NewPose>& poses) override {
+    for (const NewPose& pose : poses) words.push_back("transform " + pose.name);
   }
   void ToggleFullScreen() override { words.push_back("full screen"); }
 

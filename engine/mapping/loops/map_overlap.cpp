@@ -2,40 +2,22 @@
 #include "engine/mapping/loops/map_overlap.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include "engine/base/option_check.h"
-#include "engine/geometry/image_grid.h"
+#include "engine/mapping/loops/overlap_verification.h"
 
 namespace docent::engine {
 namespace {
 
-constexpr int kVisibleCells = 4;
-
 // A recognised keyframe of B, and the similarity that it implies.
 struct Recognition {
-  std::size_t order = 0;  // index of the keyframe in in_b_
+  std::size_t order = 0;  // index of the keyframe in OverlapKeyFrames::in_b
   LoopCandidate candidate;
   Sim3 a_from_b;
-};
-
-// The evidence that the keyframes of both maps give about one similarity.
-struct OverlapEvidence {
-  Sim3 a_from_b;
-  std::size_t consecutive = 0, with_view = 0;
-  std::vector<LoopCandidate> candidates;
-  double found_ratio = 0;
-  std::size_t regions = 0, contradicted = 0;
-
-  std::size_t Points() const {
-    std::size_t points = 0;
-    for (const LoopCandidate& candidate : candidates) points += candidate.seen.size();
-    return points;
-  }
 };
 
 class OverlapFinder {
@@ -43,13 +25,14 @@ class OverlapFinder {
   OverlapFinder(const MapOverlapOptions& options, KeyFrameId first_of_b, const std::atomic<bool>* interrupt,
                 Map* map)
       : options_(options),
-        first_of_b_(first_of_b),
         interrupt_(interrupt),
         map_(map),
-        search_(options.search) {
+        search_(options.search),
+        keyframes_{first_of_b, {}, {}},
+        verification_(options, &keyframes_, map, &searcher_) {
     for (const auto& [id, record] : map->keyframes()) {
       if (record.keyframe.kind != KeyFrameKind::kSixDof) continue;
-      (id < first_of_b ? in_a_ : in_b_).push_back(id);
+      (keyframes_.IsOfA(id) ? keyframes_.in_a : keyframes_.in_b).push_back(id);
     }
   }
 
@@ -57,7 +40,7 @@ class OverlapFinder {
     using Outcome = MapOverlap::Outcome;
     MapOverlap overlap;
     const std::size_t min_keyframes = options_.min_consecutive;
-    if (in_a_.size() < min_keyframes || in_b_.size() < min_keyframes) return overlap;
+    if (keyframes_.in_a.size() < min_keyframes || keyframes_.in_b.size() < min_keyframes) return overlap;
     RecogniseKeyFrames(&overlap);
     overlap.outcome = Outcome::kNothingRecognised;
     std::vector<OverlapEvidence> examined;
@@ -83,7 +66,7 @@ class OverlapFinder {
     overlap.consecutive = best.consecutive;
     overlap.with_view = best.with_view;
     overlap.confirmed = best.candidates.size();
-    overlap.found_ratio = best.found_ratio;
+    overlap.found_ratio = best.MedianFoundRatio();
     overlap.points = best.Points();
     overlap.regions = best.regions;
     overlap.contradicted = best.contradicted;
@@ -98,7 +81,6 @@ class OverlapFinder {
 
  private:
   const KeyFrame& At(KeyFrameId id) const { return map_->keyframes().at(id).keyframe; }
-  bool IsOfA(KeyFrameId id) const { return id < first_of_b_; }
   bool Interrupted() const { return interrupt_ && *interrupt_; }
   MapOverlap::Outcome Decide(const MapOverlap& overlap) const;
   void RecogniseKeyFrames(MapOverlap* overlap);
@@ -111,25 +93,14 @@ class OverlapFinder {
     return MagnitudeAt(a_from_b.inverse() * other_a_from_b, keyframe).largest();
   }
   OverlapEvidence Examine(std::size_t seed);
-  std::optional<Sim3> VerifyPrediction(KeyFrameId id, const Sim3& a_from_b, OverlapEvidence* evidence,
-                                       std::vector<double>* shares);
-  std::vector<KeyFrameId> KeyFramesWithSameView(const KeyFrame& keyframe, const Rigid3& camera_from_other,
-                                                double scale) const;
-  std::vector<MapPointId> PointsInView(const KeyFrame& keyframe, const std::vector<KeyFrameId>& others,
-                                       const Rigid3& camera_from_other);
-  std::optional<PredictedPoint> Predict(MapPointId id, const KeyFrame& keyframe,
-                                        const Rigid3& camera_from_other);
-  void CompareSurfaces(const LoopCandidate& candidate, const std::vector<MapPointId>& points,
-                       OverlapEvidence* evidence);
-  bool HasSurface(const Map::KeyFrameRecord& keyframe, const Eigen::Vector2d& pixel, double depth) const;
 
   const MapOverlapOptions& options_;
-  const KeyFrameId first_of_b_;
   const std::atomic<bool>* const interrupt_;
   Map* const map_;
   LoopCandidateSearch search_;
   PointSearcher searcher_;
-  std::vector<KeyFrameId> in_a_, in_b_;  // localized, in order of creation
+  OverlapKeyFrames keyframes_;
+  OverlapVerification verification_;
   std::vector<Recognition> recognitions_;
 };
 
@@ -152,11 +123,11 @@ MapOverlap::Outcome OverlapFinder::Decide(const MapOverlap& overlap) const {
 void OverlapFinder::RecogniseKeyFrames(MapOverlap* overlap) {
   std::set<KeyFrameId> all_of_b;
   for (const auto& [id, record] : map_->keyframes()) {
-    if (!IsOfA(id)) all_of_b.insert(id);
+    if (!keyframes_.IsOfA(id)) all_of_b.insert(id);
   }
-  for (std::size_t order = 0; order < in_b_.size() && !Interrupted(); ++order) {
+  for (std::size_t order = 0; order < keyframes_.in_b.size() && !Interrupted(); ++order) {
     const std::size_t before = recognitions_.size();
-    search_.Find(in_b_[order], all_of_b, map_, &searcher_, [&](LoopCandidate candidate) {
+    search_.Find(keyframes_.in_b[order], all_of_b, map_, &searcher_, [&](LoopCandidate candidate) {
       const Sim3 a_from_b = KnownFromRecent(candidate, map_);
       recognitions_.push_back({order, std::move(candidate), a_from_b});
       return false;
@@ -215,37 +186,13 @@ std::size_t OverlapFinder::LongestSeries(const Sim3& a_from_b) const {
     const bool continues = row > 0 && order == last + 1;
     if (!continues) {
       row = 1;
-    } else if (IsOtherViewpoint(At(in_b_[last]), At(in_b_[order]))) {
+    } else if (IsOtherViewpoint(At(keyframes_.in_b[last]), At(keyframes_.in_b[order]))) {
       ++row;
     }
     last = order;
     longest = std::max(longest, row);
   }
   return longest;
-}
-
-// Verifies a keyframe that a similarity predicts, and adds what it shows to the evidence. Returns the
-// similarity that the keyframe implies; empty if it does not confirm the prediction.
-std::optional<Sim3> OverlapFinder::VerifyPrediction(KeyFrameId id, const Sim3& a_from_b,
-                                                    OverlapEvidence* evidence, std::vector<double>* shares) {
-  const Sim3 other_from_own = IsOfA(id) ? a_from_b.inverse() : a_from_b;
-  const Rigid3 camera_from_other = CorrectedPose(At(id).camera_from_map, other_from_own);
-  const std::vector<KeyFrameId> others =
-      KeyFramesWithSameView(At(id), camera_from_other, other_from_own.scale);
-  const std::vector<MapPointId> points = PointsInView(At(id), others, camera_from_other);
-  if (points.empty()) return std::nullopt;
-  ++evidence->with_view;
-  shares->push_back(0);
-  auto candidate =
-      VerifyLoopCandidate(options_.search.verification, id, others, camera_from_other, map_, &searcher_);
-  if (!candidate) return std::nullopt;
-  const Sim3 implied = KnownFromRecent(*candidate, map_);
-  if (MagnitudeAt(other_from_own.inverse() * implied, At(id)).largest() > options_.max_disagreement)
-    return std::nullopt;
-  shares->back() = static_cast<double>(candidate->seen.size()) / candidate->expected;
-  CompareSurfaces(*candidate, points, evidence);
-  evidence->candidates.push_back(std::move(*candidate));
-  return IsOfA(id) ? implied.inverse() : implied;
 }
 
 // Visits the keyframes of both maps from the seed outwards. Each is predicted from the nearest confirmed
@@ -260,7 +207,7 @@ OverlapEvidence OverlapFinder::Examine(std::size_t seed) {
   };
   const auto center_in_a = [&](KeyFrameId id) -> Eigen::Vector3d {
     const Eigen::Vector3d center = At(id).camera_from_map.OriginInSource();
-    return IsOfA(id) ? center : evidence.a_from_b * center;
+    return keyframes_.IsOfA(id) ? center : evidence.a_from_b * center;
   };
   std::vector<Known> known = {{center_in_a(recognitions_[seed].candidate.keyframe), evidence.a_from_b}};
   struct Pending {
@@ -269,11 +216,10 @@ OverlapEvidence OverlapFinder::Examine(std::size_t seed) {
     std::size_t nearest;  // index of the nearest known keyframe
   };
   std::vector<Pending> pending;
-  for (const auto* ids : {&in_a_, &in_b_}) {
+  for (const auto* ids : {&keyframes_.in_a, &keyframes_.in_b}) {
     for (const KeyFrameId id : *ids)
       pending.push_back({id, (center_in_a(id) - known[0].center_in_a).norm(), 0});
   }
-  std::vector<double> shares;
   while (!pending.empty() && !Interrupted()) {
     const auto next =
         std::min_element(pending.begin(), pending.end(),
@@ -281,7 +227,7 @@ OverlapEvidence OverlapFinder::Examine(std::size_t seed) {
     const KeyFrameId id = next->id;
     const Sim3 a_from_b = known[next->nearest].a_from_b;
     pending.erase(next);
-    const auto implied = VerifyPrediction(id, a_from_b, &evidence, &shares);
+    const auto implied = verification_.Verify(id, a_from_b, &evidence);
     if (!implied) continue;
     known.push_back({center_in_a(id), *implied});
     for (Pending& other : pending) {
@@ -292,118 +238,7 @@ OverlapEvidence OverlapFinder::Examine(std::size_t seed) {
       }
     }
   }
-  if (!shares.empty()) {
-    const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
-    std::nth_element(shares.begin(), middle, shares.end());
-    evidence.found_ratio = *middle;
-  }
   return evidence;
-}
-
-// Keyframes of the other map with about the same view, the most similar first. scale: of the other map's
-// unit.
-std::vector<KeyFrameId> OverlapFinder::KeyFramesWithSameView(const KeyFrame& keyframe,
-                                                             const Rigid3& camera_from_other,
-                                                             double scale) const {
-  std::vector<std::pair<double, KeyFrameId>> ranked;
-  for (const KeyFrameId id : IsOfA(keyframe.id) ? in_b_ : in_a_) {
-    const Rigid3& other = At(id).camera_from_map;
-    const double distance =
-        (camera_from_other.OriginInSource() - other.OriginInSource()).norm() / (scale * keyframe.mean_depth);
-    // The angle between the optical axes, since a camera that rolls sees the same.
-    const double cosine = (camera_from_other.rotation.inverse() * Eigen::Vector3d::UnitZ())
-                              .dot(other.rotation.inverse() * Eigen::Vector3d::UnitZ());
-    const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
-    if (distance > options_.max_view_distance || angle > options_.max_view_angle) continue;
-    ranked.emplace_back(distance + angle, id);
-  }
-  std::sort(ranked.begin(), ranked.end());
-  if (ranked.size() > options_.search.max_group) ranked.resize(options_.search.max_group);
-  std::vector<KeyFrameId> ids;
-  for (const auto& [difference, id] : ranked) ids.push_back(id);
-  return ids;
-}
-
-// Points of the given keyframes that should be visible in the keyframe; none if they are too few or do not
-// cover enough of the image.
-std::vector<MapPointId> OverlapFinder::PointsInView(const KeyFrame& keyframe,
-                                                    const std::vector<KeyFrameId>& others,
-                                                    const Rigid3& camera_from_other) {
-  std::set<MapPointId> points;
-  for (const KeyFrameId id : others) {
-    for (const Observation& observation : map_->FindKeyFrame(id)->observations)
-      points.insert(observation.point);
-  }
-  std::vector<MapPointId> in_view;
-  std::set<std::size_t> cells;
-  for (const MapPointId id : points) {
-    const auto predicted = Predict(id, keyframe, camera_from_other);
-    if (!predicted) continue;
-    in_view.push_back(id);
-    cells.insert(GridCell(predicted->pixel, *keyframe.camera, kVisibleCells, kVisibleCells));
-  }
-  if (static_cast<int>(in_view.size()) < options_.min_expected ||
-      static_cast<int>(cells.size()) < options_.min_cells)
-    in_view.clear();
-  return in_view;
-}
-
-std::optional<PredictedPoint> OverlapFinder::Predict(MapPointId id, const KeyFrame& keyframe,
-                                                     const Rigid3& camera_from_other) {
-  const Map::PointRecord* const record = map_->FindPoint(id);
-  if (!record || record->point.infinite()) return std::nullopt;
-  const Map::KeyFrameRecord* const source = map_->FindKeyFrame(record->point.source_keyframe);
-  if (!source) return std::nullopt;
-  return searcher_.Predict(record->point, source->keyframe, *keyframe.camera, camera_from_other);
-}
-
-// True if the keyframe's own map has a surface at this pixel and about this depth.
-bool OverlapFinder::HasSurface(const Map::KeyFrameRecord& keyframe, const Eigen::Vector2d& pixel,
-                               double depth) const {
-  return std::any_of(keyframe.observations.begin(), keyframe.observations.end(),
-                     [&](const Observation& observation) {
-                       if ((observation.pixel.cast<double>() - pixel).norm() > options_.surface_px)
-                         return false;
-                       const Map::PointRecord* const point = map_->FindPoint(observation.point);
-                       if (!point || point->point.infinite()) return false;
-                       const double own = (keyframe.keyframe.camera_from_map * point->point.position()).z();
-                       return std::abs(own - depth) <= options_.surface_depth * depth;
-                     });
-}
-
-// Where both maps have a surface at the same depth, the points of one must be found in a keyframe of the
-// other, unless the surfaces differ.
-void OverlapFinder::CompareSurfaces(const LoopCandidate& candidate, const std::vector<MapPointId>& points,
-                                    OverlapEvidence* evidence) {
-  const Map::KeyFrameRecord& record = *map_->FindKeyFrame(candidate.keyframe);
-  const KeyFrame& keyframe = record.keyframe;
-  const Sim3 seen_from_other = candidate.keyframe_from_place * AsSim3(At(candidate.place).camera_from_map);
-  const Rigid3 camera_from_other{seen_from_other.rotation,
-                                 seen_from_other.translation / seen_from_other.scale};
-  struct Region {
-    int points = 0, found = 0;
-  };
-  std::map<std::size_t, Region> regions;
-  for (const MapPointId id : points) {
-    const auto predicted = Predict(id, keyframe, camera_from_other);
-    if (!predicted) continue;
-    const MapPoint& point = map_->FindPoint(id)->point;
-    const auto match = searcher_.Find(point, At(point.source_keyframe), *predicted, *keyframe.features,
-                                      options_.search.verification.radius_px, false);
-    const bool found = match && (match->pixel.cast<double>() - predicted->pixel).norm() <=
-                                    options_.max_error_px * (1 << predicted->level);
-    const double depth = seen_from_other.scale * predicted->point_in_camera.z();
-    if (!found && !HasSurface(record, predicted->pixel, depth)) continue;
-    Region& region = regions[GridCell(predicted->pixel, *keyframe.camera, options_.regions_across,
-                                      options_.regions_across)];
-    ++region.points;
-    region.found += found ? 1 : 0;
-  }
-  for (const auto& [cell, region] : regions) {
-    if (region.points < options_.min_region_points) continue;
-    ++evidence->regions;
-    if (region.found <= options_.min_region_found_ratio * region.points) ++evidence->contradicted;
-  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "app/script/format_command.h"
 #include "engine/base/random.h"
 #include "tests/app/support/temporary_folder.h"
 
@@ -29,6 +30,7 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "8 undo\n9 redo\n10 save\n11 map stop\n12 map use Desk\n"
       "13 place helmet.glb at pixel 1 2 yaw 5\n"
       "14 transform helmet 1 2 3 0 0.6 0 0.8 2.5\n"
+      "14 transform helmet 1 2 3 0 0.6 0 0.8 2.5, sign-1 1 2 3 0 0.6 0 0.8 2.5\n"
       "14 remove helmet \"from\" sign-1\n"
       "14 duplicate helmet\n"
       "14 rename helmet hat\n"
@@ -68,7 +70,8 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
   const engine::Sim3 pose{engine::Rotation3(Eigen::Quaterniond(0.8, 0, 0.6, 0)), {1, 2, 3}, 2.5};
   using Names = std::vector<std::string>;
   using enum content::EntityFlag;
-  const std::vector<Command> rest = {TransformEntity{"helmet", pose},
+  const std::vector<Command> rest = {TransformEntities{{{"helmet", pose}}},
+                                     TransformEntities{{{"helmet", pose}, {"sign-1", pose}}},
                                      RemoveEntities{{"helmet", "from", "sign-1"}},
                                      DuplicateEntities{{"helmet"}},
                                      RenameEntity{"helmet", "hat"},
@@ -219,8 +222,11 @@ Command AnyCommand(Random* random) {
       return Undo{};
     case 13: {
       const Eigen::Vector3d turn(random->Uniform(-9, 9), random->Uniform(-9, 9), random->Uniform(-9, 9));
-      return TransformEntity{text(),
-                             {engine::Rotation3::Exp(turn), {number(), number(), number()}, number()}};
+      TransformEntities transform;
+      for (const std::string& name : names())
+        transform.poses.push_back(
+            {name, {engine::Rotation3::Exp(turn), {number(), number(), number()}, number()}});
+      return transform;
     }
     case 14:
       return DuplicateEntities{names()};
@@ -285,8 +291,8 @@ TEST(Script, ARotationIsTheSameAfterItWasWrittenAndRead) {
                             random.Uniform(-1, 1));
     const engine::Rotation3 rotation = Settled(engine::Rotation3(Eigen::Quaterniond(q)));
     ASSERT_EQ(engine::Rotation3(rotation.quaternion()).quaternion().coeffs(), rotation.quaternion().coeffs());
-    const std::string line = "0 " + FormatCommand(TransformEntity{"a", {rotation, {0, 0, 0}, 1}});
-    const auto read = std::get<TransformEntity>(ParseScript(line, "s").at(0).command);
+    const std::string line = "0 " + FormatCommand(TransformEntities{{{"a", {rotation, {0, 0, 0}, 1}}}});
+    const auto read = std::get<TransformEntities>(ParseScript(line, "s").at(0).command).poses.at(0);
     ASSERT_EQ(read.map_from_entity.rotation.quaternion().coeffs(), rotation.quaternion().coeffs());
   }
 }
@@ -343,6 +349,7 @@ TEST(Script, NamesTheLineOfAnInvalidCommand) {
                            "1 transform a 1 2 3 0 0 0 1",
                            "1 transform a 1 2 3 0 0 0 2 1",
                            "1 transform a 1 2 3 0 0 0 1 0",
+                           "1 transform a 1 2 3 0 0 0 1 1,",
                            "1 transform a 1 2e6 3 0 0 0 1 1",
                            "1 rename a",
                            "1 rename a \"\"",

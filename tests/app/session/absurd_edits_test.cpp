@@ -59,8 +59,12 @@ class AbsurdCommands {
         return RotateEntity{Name(), Number()};
       case 12:
         return ScaleEntity{Name(), Number()};
-      case 13:
-        return TransformEntity{Name(), {engine::Rotation3::Exp(Vector()), Vector(), Number()}};
+      case 13: {
+        TransformEntities transform;
+        for (const std::string& name : Names())
+          transform.poses.push_back({name, {engine::Rotation3::Exp(Vector()), Vector(), Number()}});
+        return transform;
+      }
       case 14:
         return RemoveEntities{Names()};
       case 15:

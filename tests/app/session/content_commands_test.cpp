@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "app/demo/exhibit_model.h"
-#include "app/script/script_file.h"
+#include "app/script/format_command.h"
 #include "content/placement.h"
 #include "content/scene_codec.h"
 #include "content/warp.h"
@@ -116,9 +116,14 @@ TEST_F(ContentInASession, EveryCommandChangesTheContentAndIsUndone) {
     const engine::Sim3 pose{engine::Rotation3::Exp({0.1, 0.2, 0.3}), {0.5, 0.25, 2}, 0.5};
     using enum content::EntityFlag;
     const std::vector<std::pair<Command, std::function<void()>>> commands = {
-        {TransformEntity{"exhibit", pose},
+        {TransformEntities{{{"exhibit", pose}}},
          [&] { EXPECT_EQ(Named("exhibit").model.map_from_model.translation, pose.translation); }},
-        {TransformEntity{"sign-1", pose}, [&] { EXPECT_EQ(Named("sign-1").signpost.height_m, 0.5); }},
+        {TransformEntities{{{"sign-1", pose}}}, [&] { EXPECT_EQ(Named("sign-1").signpost.height_m, 0.5); }},
+        {TransformEntities{{{"exhibit", pose}, {"sign-1", pose}}},
+         [&] {
+           EXPECT_EQ(Named("exhibit").model.map_from_model.scale, 0.5);
+           EXPECT_EQ(Named("sign-1").signpost.height_m, 0.5);
+         }},
         {RemoveEntities{{"exhibit", "sign-1"}}, [&] { EXPECT_THAT(Scene().entities, IsEmpty()); }},
         {DuplicateEntities{{"exhibit", "sign-1"}},
          [&] {
@@ -227,7 +232,7 @@ TEST_F(ContentInASession, ALockedEntityIsChangedOnlyAfterItWasUnlocked) {
     for (const Command& command :
          {Command(MoveEntity{"exhibit", {1, 0, 0}, {}}), Command(MoveEntity{"exhibit", {0, 0, 0}, kPixel}),
           Command(RotateEntity{"exhibit", 10}), Command(ScaleEntity{"exhibit", 2}),
-          Command(TransformEntity{"exhibit", {}}), Command(RemoveEntities{{"exhibit"}}),
+          Command(TransformEntities{{{"exhibit", {}}}}), Command(RemoveEntities{{"exhibit"}}),
           Command(RenameEntity{"exhibit", "x"}), Command(GroupEntities{{"exhibit"}, "x"}),
           Command(SetEntityFlag{{"exhibit"}, content::EntityFlag::kHidden, true})}) {
       EXPECT_EQ(Do(command), "'exhibit' is locked; unlock it to change it.") << FormatCommand(command);

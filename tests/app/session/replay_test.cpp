@@ -5,6 +5,7 @@
 #include <set>
 
 #include "app/demo/exhibit_model.h"
+#include "app/script/format_command.h"
 #include "app/script/script_file.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
@@ -43,7 +44,7 @@ std::vector<Planned> EveryCommand() {
   then(MoveEntity{"exhibit", {0, 0, 0}, other});
   then(RotateEntity{"exhibit", 10.0 / 3});
   then(ScaleEntity{"exhibit", 1.0 / 0.7});
-  then(TransformEntity{"exhibit-2", pose});
+  then(TransformEntities{{{"exhibit-2", pose}}});
   then(AlignEntity{"exhibit", pairs});
   then(BendEntity{"exhibit-2", pairs});
   then(DuplicateEntities{{"exhibit-2", "sign-1"}});

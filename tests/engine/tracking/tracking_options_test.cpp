@@ -1,32 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <limits>
-#include <optional>
-#include <vector>
 
 #include "engine/base/error.h"
 #include "engine/tracking/tracker.h"
+#include "tests/engine/refused_options.h"
 #include "tests/engine/rendered_world.h"
 
 namespace docent::engine {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
-// Expects that the default options are valid, and that they are not after each of these changes.
-template <typename Options>
-void ExpectRefused(const std::vector<std::function<void(Options*)>>& changes) {
-  EXPECT_EQ(Options().Validate(), std::nullopt);
-  for (std::size_t i = 0; i < changes.size(); ++i) {
-    Options options;
-    changes[i](&options);
-    const auto fault = options.Validate();
-    ASSERT_TRUE(fault) << "change " << i;
-    EXPECT_EQ(fault->back(), '.') << *fault;
-  }
-}
 
 TEST(TrackerOptions, AreRefusedOutOfRange) {
   ExpectRefused<TrackerOptions>(

@@ -1,23 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <utility>
+#include "app/session/idle_maintenance.h"
+
+#include <memory>
+#include <optional>
+#include <string>
 
 #include "app/files/text_file.h"
-#include "app/session/session.h"
+#include "app/session/library_scene.h"
 #include "maps/maintenance/maintenance.h"
 
-// Maintenance of idle maps (ptamm §3.1: the map maker roves through all maps). It runs on the saver's thread,
-// while nothing waits to be saved and the mapper of the active map is idle. It takes the session's lock to
-// copy what it needs and to enter its result, and works without it.
 namespace docent::app {
 
-bool Session::IsIdle(const SessionMap& map) const {
+bool IdleMaintenance::IsIdle(const SessionMap& map) const {
   return map.Exists() && map.snapshot && !map.NeedsSave() && maps::MayChangeStructure(map.policy) &&
          !system_.IsInUse(map.key);
 }
 
-std::vector<IdleMap> Session::MapsForMaintenance() const {
+std::vector<IdleMap> IdleMaintenance::MapsToAdjust() const {
   std::vector<IdleMap> idle;
-  for (const auto& [key, map] : maps_) {
+  for (const auto& [key, map] : state_.maps) {
     if (IsIdle(map) && map.maintained_revision != map.snapshot->revision)
       idle.push_back({key, map.name, map.snapshot, map.changed});
   }
@@ -25,24 +26,22 @@ std::vector<IdleMap> Session::MapsForMaintenance() const {
 }
 
 // Returns the map if it is still idle and unchanged.
-SessionMap* Session::FindIdleMap(const IdleMap& idle) {
-  const auto found = maps_.find(idle.key);
-  if (found == maps_.end() || !IsIdle(found->second) || found->second.snapshot != idle.snapshot)
-    return nullptr;
-  return &found->second;
+SessionMap* IdleMaintenance::FindIdleMap(const IdleMap& idle) {
+  SessionMap* const map = state_.FindMap(idle.key);
+  return map != nullptr && IsIdle(*map) && map->snapshot == idle.snapshot ? map : nullptr;
 }
 
-bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
+bool IdleMaintenance::Run(const std::atomic<bool>& interrupt) {
   std::vector<IdleMap> idle;
   {
     const std::scoped_lock lock(mutex_);
     if (!system_.IsMapperIdle()) return false;
-    idle = MapsForMaintenance();
+    idle = MapsToAdjust();
   }
   std::shared_ptr<const content::Scene> scene;
   content::EditHistory history;
   std::string name;
-  const std::optional<IdleMap> chosen = maintenance_order_.Next(idle, interrupt);
+  const std::optional<IdleMap> chosen = order_.Next(idle, interrupt);
   if (!chosen) return false;
   const maps::AdjustedMap adjusted = maps::AdjustIdleMap(*chosen->snapshot, &interrupt);
   const maps::Optimization& done = adjusted.optimization;
@@ -78,9 +77,9 @@ bool Session::RunMaintenance(const std::atomic<bool>& interrupt) {
   map->UpdateSnapshot(adjusted.snapshot);
   map->saved_snapshot = adjusted.snapshot;
   map->maintained_revision = adjusted.snapshot->revision;
-  AddEvent(LastTime(), "maintenance",
-           map->name + ": reprojection error " + FormatNumber(done.rms_before_px, 3) + " px before, " +
-               FormatNumber(done.rms_after_px, 3) + " px after");
+  state_.AddEvent(state_.LastTime(), "maintenance",
+                  map->name + ": reprojection error " + FormatNumber(done.rms_before_px, 3) + " px before, " +
+                      FormatNumber(done.rms_after_px, 3) + " px after");
   return true;
 }
 

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "app/session/content_commands.h"
+
+#include <memory>
 #include <numbers>
 #include <utility>
 
 #include "app/files/text_file.h"
-#include "app/session/session.h"
 #include "app/session/surface_at_pixel.h"
 #include "content/asset.h"
-#include "content/edits.h"
-#include "content/placement.h"
 #include "engine/base/error.h"
 #include "engine/map/upright_axes.h"
 
-// Commands that change the content of a map.
 namespace docent::app {
 
 namespace {
@@ -40,68 +39,48 @@ std::string TextOf(const std::string& name, const content::Alignment& alignment)
 
 }  // namespace
 
-void Session::Preload(const Command& command, const std::filesystem::path& model_folder) {
-  const auto* place = std::get_if<PlaceModel>(&command);
-  if (place == nullptr) return;
-  const std::scoped_lock lock(mutex_);
-  model_folder_ = model_folder;
-  LoadAsset(place->file);
-}
-
-std::shared_ptr<const content::Asset> Session::LoadAsset(const std::string& file) {
-  auto& model = models_[(model_folder_ / file).string()];
-  if (model) return model;
-  std::filesystem::path path = model_folder_ / file;
-  std::error_code error;
-  if (!std::filesystem::exists(path, error)) path = file;
-  auto asset = std::make_shared<content::Asset>(content::ImportAsset(path));
-  // The same bytes may already be in use in a map: one copy is shared.
-  auto& kept = assets_[asset->id];
-  if (!kept) kept = std::move(asset);
-  return model = kept;
-}
-
-SessionMap& Session::MapToEdit(const engine::TrackedFrame& frame) {
-  const std::uint64_t key = engine::HasPose(frame.state) ? frame.map_key : CurrentMap(frame);
-  const auto found = maps_.find(key);
-  if (found == maps_.end() || !found->second.snapshot) throw Error("there is no current map");
-  if (found->second.discarded) throw Error("the map of this frame was discarded");
-  if (!found->second.Exists()) throw Error("the map of this frame was joined into another one");
-  if (!maps::MayChangeContent(found->second.policy)) {
-    throw Error("the map '" + found->second.name + "' is " + maps::ToString(found->second.policy) +
+SessionMap& ContentCommands::MapToEdit(const engine::TrackedFrame& frame) {
+  const std::uint64_t key =
+      engine::HasPose(frame.state) ? frame.map_key : system_.CurrentMap(CameraOf(frame));
+  SessionMap* const map = state_.FindMap(key);
+  if (map == nullptr || !map->snapshot) throw Error("there is no current map");
+  if (map->discarded) throw Error("the map of this frame was discarded");
+  if (!map->Exists()) throw Error("the map of this frame was joined into another one");
+  if (!maps::MayChangeContent(map->policy)) {
+    throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) +
                 ": its content cannot be changed");
   }
-  return found->second;
+  return *map;
 }
 
-void Session::Edit(SessionMap* map, content::SceneChange change) {
+void ContentCommands::Edit(SessionMap* map, content::SceneChange change) {
   auto scene = std::make_shared<content::Scene>(*map->scene);
   map->history.Do(std::move(change), scene.get());
   map->scene = std::move(scene);
-  UpdatePermissions(*map);
+  system_.SetPermissions(map->key, map->Permissions());
 }
 
-content::SurfaceHit Session::SurfaceFor(const engine::TrackedFrame& frame,
-                                        const Eigen::Vector2d& pixel) const {
-  return SurfaceAtPixel(frame, *cameras_.at(static_cast<std::size_t>(frame.frame.camera)).model, pixel);
+content::SurfaceHit ContentCommands::SurfaceFor(const engine::TrackedFrame& frame,
+                                                const Eigen::Vector2d& pixel) const {
+  return SurfaceAtPixel(frame, *state_.cameras.at(CameraOf(frame)).model, pixel);
 }
 
 // The key of the map that a signpost in `map` is to lead to; 0 for none.
-std::uint64_t Session::TargetKey(const SessionMap& map, const std::string& to_map) {
+std::uint64_t ContentCommands::TargetKey(const SessionMap& map, const std::string& to_map) {
   if (to_map.empty()) return 0;
-  const SessionMap* const target = FindByName(to_map);
+  const SessionMap* const target = state_.FindByName(to_map);
   if (target == nullptr) throw Error("there is no map '" + to_map + "' that the signpost could lead to");
   if (target == &map) throw Error("a signpost cannot lead to its own map");
   return target->key;
 }
 
-void Session::Apply(const PlaceModel& command, const engine::TrackedFrame& frame) {
+void ContentCommands::Apply(const PlaceModel& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   const content::SurfaceHit hit = SurfaceFor(frame, command.pixel);
   content::Entity entity;
   entity.kind = content::Entity::Kind::kModel;
   entity.name = map.scene->FreeName(content::NameFromFile(command.file));
-  entity.model.asset = LoadAsset(command.file);
+  entity.model.asset = assets_.Load(command.file);
   const content::Model& model = *entity.model.asset->model;
   const Eigen::Vector3d viewer = frame.camera_from_map.OriginInSource();
   const double side = options_.model_side * (hit.point - viewer).norm();
@@ -113,7 +92,7 @@ void Session::Apply(const PlaceModel& command, const engine::TrackedFrame& frame
   Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
 }
 
-void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame) {
+void ContentCommands::Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   const content::SurfaceHit hit = SurfaceFor(frame, command.pixel);
   content::Entity entity;
@@ -129,7 +108,7 @@ void Session::Apply(const PlaceSignpost& command, const engine::TrackedFrame& fr
   Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
 }
 
-void Session::Apply(const MoveEntity& command, const engine::TrackedFrame& frame) {
+void ContentCommands::Apply(const MoveEntity& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   if (!command.to_pixel) return Edit(&map, EditFor(*map.scene, command));
   const content::Entity& entity = FindEntity(*map.scene, command.name);
@@ -137,15 +116,15 @@ void Session::Apply(const MoveEntity& command, const engine::TrackedFrame& frame
   Edit(&map, content::MoveEdit(*map.scene, command.name, content::PlaceOf(entity) + offset));
 }
 
-void Session::Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame) {
+void ContentCommands::Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   const std::uint64_t key = TargetKey(map, command.to_map);
   Edit(&map, content::TargetEdit(*map.scene, command.name, command.to_map, key));
 }
 
-void Session::Apply(const PasteEntities& command, const engine::TrackedFrame& frame) {
+void ContentCommands::Apply(const PasteEntities& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
-  const SessionMap& from = InitializedMap(command.from_map);
+  const SessionMap& from = state_.InitializedMap(command.from_map);
   std::vector<content::Entity> copies;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const std::string& name : command.names) {
@@ -155,7 +134,7 @@ void Session::Apply(const PasteEntities& command, const engine::TrackedFrame& fr
     copy.signpost.to_key = 0;  // it would lead to its own map
     copy.signpost.to_map.clear();
   }
-  const engine::CameraModel& camera = *cameras_.at(static_cast<std::size_t>(frame.frame.camera)).model;
+  const engine::CameraModel& camera = *state_.cameras.at(CameraOf(frame)).model;
   const Eigen::Vector2d centre(0.5 * (camera.width_px() - 1), 0.5 * (camera.height_px() - 1));
   const content::SurfaceHit hit = SurfaceFor(frame, command.to_pixel.value_or(centre));
   engine::Sim3 motion;
@@ -169,8 +148,8 @@ void Session::Apply(const PasteEntities& command, const engine::TrackedFrame& fr
   Edit(&map, content::PasteEdit(*map.scene, std::move(copies)));
 }
 
-std::vector<content::Correspondence> Session::Correspondences(const engine::TrackedFrame& frame,
-                                                              const std::vector<PointPair>& pairs) const {
+std::vector<content::Correspondence> ContentCommands::Correspondences(
+    const engine::TrackedFrame& frame, const std::vector<PointPair>& pairs) const {
   std::vector<content::Correspondence> correspondences;
   for (const PointPair& pair : pairs) {
     correspondences.push_back(
@@ -179,34 +158,34 @@ std::vector<content::Correspondence> Session::Correspondences(const engine::Trac
   return correspondences;
 }
 
-void Session::Apply(const AlignEntity& command, const engine::TrackedFrame& frame) {
+void ContentCommands::Apply(const AlignEntity& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   content::Alignment alignment;
   Edit(&map, content::AlignEdit(*map.scene, command.name, Correspondences(frame, command.pairs), &alignment));
   const std::string text = TextOf(command.name, alignment);
-  AddEvent(frame.frame.time, "align", text);
-  Advise(&cameras_.at(static_cast<std::size_t>(frame.frame.camera)), text);
+  state_.AddEvent(frame.frame.time, "align", text);
+  state_.cameras.at(CameraOf(frame)).Advise(text);
 }
 
-void Session::Apply(const BendEntity& command, const engine::TrackedFrame& frame) {
+void ContentCommands::Apply(const BendEntity& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   Edit(&map, content::BendEdit(*map.scene, command.name, Correspondences(frame, command.pairs)));
 }
 
-void Session::Apply(const Undo&, const engine::TrackedFrame& frame) {
+void ContentCommands::Apply(const Undo&, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   auto scene = std::make_shared<content::Scene>(*map.scene);
   if (!map.history.Undo(scene.get())) throw Error("there is nothing to undo in '" + map.name + "'");
   map.scene = std::move(scene);
-  UpdatePermissions(map);
+  system_.SetPermissions(map.key, map.Permissions());
 }
 
-void Session::Apply(const Redo&, const engine::TrackedFrame& frame) {
+void ContentCommands::Apply(const Redo&, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   auto scene = std::make_shared<content::Scene>(*map.scene);
   if (!map.history.Redo(scene.get())) throw Error("there is nothing to redo in '" + map.name + "'");
   map.scene = std::move(scene);
-  UpdatePermissions(map);
+  system_.SetPermissions(map.key, map.Permissions());
 }
 
 }  // namespace docent::app

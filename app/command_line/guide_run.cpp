@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/guide_run.h"
+
+#include <algorithm>
+#include <cctype>
+#include <exception>
+#include <utility>
+
+#include "app/command_line/interruption.h"
+#include "app/files/text_file.h"
+#include "app/output/engine_text.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+// Delivery statistics of a live camera for events.csv.
+std::string DeliveryText(const SourceInfo& info, const Delivery& delivery) {
+  return info.name + ": " + std::to_string(delivery.delivered) + " images delivered, " +
+         std::to_string(delivery.missed) + " missed by the device, " + std::to_string(delivery.late) +
+         " replaced by newer ones, " + std::to_string(delivery.broken) + " broken, " +
+         std::to_string(delivery.reconnections) + " reconnections, latency " +
+         FormatNumber(1e3 * ToSeconds(delivery.median_latency), 3) + " ms";
+}
+
+// "there is no map" becomes "There is no map."
+std::string SentenceOf(std::string text) {
+  if (text.empty()) return text;
+  text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  if (!text.ends_with('.')) text += '.';
+  return text;
+}
+
+std::vector<std::shared_ptr<const engine::CameraModel>> ModelsOf(std::span<CalibratedCamera> cameras) {
+  std::vector<std::shared_ptr<const engine::CameraModel>> models;
+  for (const CalibratedCamera& camera : cameras) models.push_back(camera.model);
+  return models;
+}
+
+std::vector<std::string> StopNames(const maps::Library* library) {
+  std::vector<std::string> names;
+  if (library == nullptr) return names;
+  for (const maps::MapInfo& map : library->List()) names.push_back(map.name);
+  return names;
+}
+
+SessionOptions SessionOptionsOf(const GuideRequest& request, std::span<CalibratedCamera> cameras) {
+  SessionOptions options;
+  options.threaded = request.pace != Pace::kLockstep;
+  options.may_write = request.may_write;
+  options.new_map_when_lost = request.new_map_when_lost;
+  options.seed = request.seed;
+  options.tracker.hybrid = request.engine == EngineKind::kHybrid;
+  options.autosave_interval = request.autosave_interval;
+  options.memory.budget_bytes = request.memory_budget_bytes;
+  options.memory.wait_for_maps = request.pace != Pace::kRealtime;
+  options.baseline_m = request.baseline_m;
+  options.tracker.target = request.target;
+  options.mapper.lens.lenses = EstimatedLensesOf(cameras);
+  return options;
+}
+
+}  // namespace
+
+GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> cameras)
+    : request_(request),
+      cameras_(cameras),
+      session_(SessionOptionsOf(request, cameras), ModelsOf(cameras), request.library),
+      inboxes_(cameras.size()),
+      camera_states_(cameras.size()) {
+  for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
+  if (!request.head) return;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    if (Head* const head = cameras[i].source->head())
+      heads_.push_back(
+          std::make_unique<HeadControl>(head, static_cast<int>(i), cameras[i].model, *request.head));
+  }
+  if (heads_.empty()) throw Error("No camera has a pan-tilt head; remove --head.");
+}
+
+void GuideRun::Run(const Show& show, std::stop_token window_closed) {
+  files_.emplace(request_, *cameras_.front().model);
+  const std::stop_callback forward(window_closed, [this] { stop_.request_stop(); });
+  WarnAboutUnknownLenses();
+  std::exception_ptr fault;
+  const auto guarded = [&fault](const auto& action) {
+    try {
+      action();
+    } catch (...) {
+      if (!fault) fault = std::current_exception();
+    }
+  };
+  guarded([&] {
+    std::vector<CameraRun> runs;
+    for (std::size_t i = 0; i < cameras_.size(); ++i) runs.push_back(RunOf(i, show));
+    RunCameras(runs, &session_, stop_.get_token());
+  });
+  guarded([&] { session_.Finish(); });
+  guarded([&] {
+    files_->Add(session_.TakeEvents());
+    WriteDelivery();
+    files_->Close();
+  });
+  guarded([&] {
+    const std::scoped_lock lock(files_mutex_);
+    if (request_.output) WriteCameraReport(*request_.output / "report.json", tallies_);
+  });
+  if (fault) std::rethrow_exception(fault);
+}
+
+// The images that live cameras delivered and missed, for the report and as events.
+void GuideRun::WriteDelivery() {
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    const FrameSource& source = *cameras_[i].source;
+    if (source.info().live) tallies_[i].SetDelivery(source.delivery());
+    if (source.info().live && camera_states_[i].last)
+      files_->Add({Event{camera_states_[i].last->tracked.frame.time, "camera",
+                         DeliveryText(source.info(), source.delivery())}});
+  }
+}
+
+void GuideRun::Drawn(const ShownFrame& frame) {
+  if (!frame.taken) return;
+  const Timestamp age = PlayClock().Now() - *frame.taken;
+  const std::scoped_lock lock(files_mutex_);
+  tallies_[static_cast<std::size_t>(frame.tracked.frame.camera)].AddDrawnAge(age);
+}
+
+SavingState GuideRun::Saving() const {
+  const Session::Saving saving = session_.SavingNow();
+  return {saving.unsaved, saving.saved_at};
+}
+
+std::vector<ui::MapFacts> GuideRun::MapsForWindow() const {
+  std::vector<ui::MapFacts> all;
+  for (const Session::MapState& map : session_.Maps()) {
+    if (map.discarded || map.joined_into != 0) continue;
+    ui::MapFacts facts;
+    facts.name = map.name;
+    facts.policy = maps::ToString(map.policy);
+    facts.is_initialized = map.snapshot || map.in_library;
+    facts.objects_known = map.snapshot != nullptr;
+    if (map.snapshot) facts.keyframes = map.snapshot->keyframes.size();
+    if (map.scene) facts.objects = map.scene->entities.size();
+    all.push_back(std::move(facts));
+  }
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  return all;
+}
+
+// A tour builds no map, so it cannot estimate a calibration.
+void GuideRun::WarnAboutUnknownLenses() {
+  if (request_.may_write) return;
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    const auto& lens = cameras_[i].estimated_lens;
+    if (!lens || lens->fixed) continue;
+    const bool unknown = lens->focal_sigma > engine::LensEstimationOptions().max_sigma;
+    const std::string assumption =
+        unknown ? "is not in this library, so a field of view of " +
+                      FormatNumber(engine::kUnknownFieldOfView_deg, 3) + " degrees is assumed"
+                : "is only a rough estimate, with a focal length of " + FormatFocalLength(*lens);
+    const std::string warning =
+        "The calibration of camera \"" + lens->name + "\" " + assumption +
+        ". Build a map with this camera, or give its calibration with --calibration FILE.";
+    files_->Add({Event{{}, "warning", warning}});
+    camera_states_[i].message = warning;
+  }
+}
+
+CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
+  CameraState& state = camera_states_[i];
+  if (!request_.may_write) state.visitor.emplace(&session_, StopNames(request_.library));
+  CameraRun run;
+  run.camera = &cameras_[i];
+  run.options.pace = request_.pace;
+  run.options.camera = static_cast<int>(i);
+  if (i == 0) {
+    run.options.script = request_.script;
+    run.options.script_name = request_.script_name;
+  }
+  run.options.model_folder = request_.model_folder;
+  run.options.inbox = &inboxes_[i];
+  run.options.refused = [this, &state](const std::string& reason) { HandleRefused(reason, &state); };
+  run.options.carried_out = [this, &state](const TimedCommand& command) {
+    HandleCarriedOut(command, &state);
+  };
+  run.options.trouble = [this, &state, &show](const std::string& sentence, Timestamp time) {
+    HandleTrouble(sentence, time, show, &state);
+  };
+  run.options.latency = [&state](Timestamp age) { state.age = age; };
+  run.shown = [this, &state, &show](const engine::TrackedFrame& tracked) {
+    HandleFrame(tracked, show, &state);
+  };
+  return run;
+}
+
+void GuideRun::HandleRefused(const std::string& reason, CameraState* state) {
+  if (has_author_window()) {
+    notices_.Push({SentenceOf(reason), std::nullopt});
+  } else {
+    state->message = reason;
+  }
+}
+
+void GuideRun::HandleCarriedOut(const TimedCommand& command, CameraState* state) {
+  if (has_author_window()) {
+    notices_.Push({"", command.command});
+  } else {
+    state->message.clear();
+  }
+  const std::scoped_lock lock(files_mutex_);
+  files_->Add(command);
+}
+
+void GuideRun::HandleTrouble(const std::string& sentence, Timestamp time, const Show& show,
+                             CameraState* state) {
+  state->message = sentence;
+  {
+    const std::scoped_lock lock(files_mutex_);
+    files_->Add({Event{time, "camera", sentence.empty() ? "The camera is back." : sentence}});
+  }
+  if (!state->last) return;
+  // There is no new image, so the last one is shown again with the message.
+  auto frame = std::make_shared<ShownFrame>(*state->last);
+  frame->message = sentence;
+  show(std::move(frame));
+}
+
+void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state) {
+  if (Interruption::requested()) stop_.request_stop();
+  const std::optional<Timestamp> age = std::exchange(state->age, std::nullopt);
+  std::shared_ptr<ShownFrame> frame;
+  {
+    const std::scoped_lock lock(files_mutex_);
+    frame = MakeShown(tracked, state);
+  }
+  if (age) frame->taken = PlayClock().Now() - *age;
+  {
+    const std::scoped_lock lock(files_mutex_);
+    CameraTally& tally = tallies_[static_cast<std::size_t>(tracked.frame.camera)];
+    tally.Add(tracked);
+    if (age) tally.AddTrackedAge(*age);
+    files_->Add(*frame);
+    const std::vector<Event> events = session_.TakeEvents();
+    files_->Add(events);
+    Warn(events);
+    if (request_.on_frame) request_.on_frame(*frame);
+  }
+  for (const auto& head : heads_) head->AddView(tracked);
+  if (tracked.frame.camera == 0) Direct(frame);
+  if (tracked.state != engine::TrackingState::kDropped) state->last = frame;
+  show(std::move(frame));
+}
+
+// Warnings stay in the author's window until they are dismissed.
+void GuideRun::Warn(const std::vector<Event>& events) {
+  if (!has_author_window()) return;
+  for (const Event& event : events) {
+    if (event.event != "warning") continue;
+    warnings_.insert(event.detail);
+    notices_.Push({SentenceOf(event.detail), std::nullopt});
+  }
+}
+
+void GuideRun::Direct(const std::shared_ptr<const ShownFrame>& frame) {
+  if (!request_.director) return;
+  const std::shared_ptr<const engine::TrackedFrame> tracked(frame, &frame->tracked);
+  for (Command& command : request_.director(*frame)) inboxes_[0].Push({std::move(command), tracked});
+}
+
+std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& tracked, CameraState* state) {
+  auto frame = std::make_shared<ShownFrame>();
+  frame->tracked = tracked;
+  frame->shown = session_.ShownWith(tracked);
+  const auto lens = session_.EstimatedLensOf(static_cast<std::size_t>(tracked.frame.camera));
+  if (lens) frame->camera = lens->model;
+  if (!state->first_time) state->first_time = tracked.frame.time;
+  frame->seconds = ToSeconds(tracked.frame.time - *state->first_time);
+  frame->message = state->message;
+  // What the window shows as a warning already is not shown twice.
+  if (state->message.empty() && !warnings_.contains(frame->shown.advice))
+    frame->message = frame->shown.advice;
+  if (state->visitor) state->visitor->Guide(frame);
+  return frame;
+}
+
+}  // namespace docent::app

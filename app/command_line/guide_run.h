@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "app/command_line/guide_files.h"
+#include "app/command_line/guide_window.h"
+#include "app/command_line/run_guide.h"
+#include "app/evaluation/camera_report.h"
+#include "app/session/visitor_guide.h"
+
+namespace docent::app {
+
+// One run of RunGuide: the session, the frame loops of its cameras and the files they write. What draws the
+// frames is up to the caller.
+class GuideRun {
+ public:
+  // Throws Error if a pan-tilt head is requested and no camera has one. The arguments must outlive the run.
+  GuideRun(const GuideRequest& request, std::span<CalibratedCamera> cameras);
+
+  // Called on the thread of the frame's camera.
+  using Show = std::function<void(std::shared_ptr<const ShownFrame>)>;
+  // Saves the maps and closes the files in any case; then throws the first error that occurred. The first
+  // camera runs on the calling thread.
+  void Run(const Show& show, std::stop_token window_closed);
+
+  // Records the latency of a frame that is now on the screen or in the video. Any thread, as all below.
+  void Drawn(const ShownFrame& frame);
+  std::span<CommandInbox> inboxes() { return inboxes_; }
+  // For the author's window; without one they are not filled.
+  NoticeQueue* notices() { return &notices_; }
+  SavingState Saving() const;
+  std::vector<ui::MapFacts> MapsForWindow() const;  // by name
+  void DiscardChanges() { session_.DiscardChanges(); }
+  std::vector<Session::MapState> Maps() const { return session_.Maps(); }
+
+ private:
+  // State of one camera; used on its thread only.
+  struct CameraState {
+    std::optional<Timestamp> first_time;
+    std::optional<Timestamp> age;  // Age of the last tracked image when its tracking ended.
+    std::string message;
+    std::shared_ptr<const ShownFrame> last;
+    std::optional<VisitorGuide> visitor;  // Only on a tour.
+  };
+
+  void WarnAboutUnknownLenses();
+  CameraRun RunOf(std::size_t i, const Show& show);
+  void HandleRefused(const std::string& reason, CameraState* state);
+  void HandleCarriedOut(const TimedCommand& command, CameraState* state);
+  void HandleTrouble(const std::string& sentence, Timestamp time, const Show& show, CameraState* state);
+  void HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state);
+  bool has_author_window() const { return request_.may_write && !request_.headless; }
+  void Warn(const std::vector<Event>& events);
+  void Direct(const std::shared_ptr<const ShownFrame>& frame);
+  std::shared_ptr<ShownFrame> MakeShown(const engine::TrackedFrame& tracked, CameraState* state);
+  void WriteDelivery();
+
+  const GuideRequest& request_;
+  const std::span<CalibratedCamera> cameras_;
+  Session session_;
+  std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
+  std::vector<CameraState> camera_states_;
+  std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
+  std::stop_source stop_;
+  NoticeQueue notices_;
+  std::mutex files_mutex_;            // Guards files_, tallies_ and warnings_.
+  std::set<std::string> warnings_;    // Those that the window was told of.
+  std::vector<CameraTally> tallies_;  // By camera.
+  std::optional<GuideFiles> files_;
+};
+
+}  // namespace docent::app

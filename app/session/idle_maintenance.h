@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <vector>
+
+#include "app/session/maintenance_order.h"
+#include "app/session/session_state.h"
+#include "engine/system/system.h"
+#include "maps/library/library.h"
+
+namespace docent::app {
+
+// Maintenance of idle maps (ptamm §3.1: the map maker roves through all maps). It runs on the saver's thread,
+// while nothing waits to be saved and the mapper of the active map is idle. It takes the session's mutex to
+// copy what it needs and to enter its result, and works without it.
+class IdleMaintenance {
+ public:
+  // All pointers must outlive this. library is null where nothing is saved; then Run is not called.
+  IdleMaintenance(maps::Library* library, engine::System* system, std::mutex* mutex, SessionState* state)
+      : library_(library), system_(*system), mutex_(*mutex), state_(*state) {}
+
+  // Adjusts the map that needs it most, and saves it. Without the session's mutex; ends soon after
+  // `interrupt` is set. Returns whether it did something.
+  bool Run(const std::atomic<bool>& interrupt);
+
+ private:
+  // With the session's mutex held.
+  bool IsIdle(const SessionMap& map) const;
+  std::vector<IdleMap> MapsToAdjust() const;
+  SessionMap* FindIdleMap(const IdleMap& idle);
+
+  maps::Library* const library_;
+  engine::System& system_;
+  std::mutex& mutex_;
+  SessionState& state_;
+  MaintenanceOrder order_;  // accessed only by the saver's thread
+};
+
+}  // namespace docent::app

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/session_assets.h"
+
+#include <system_error>
+#include <utility>
+
+namespace docent::app {
+
+std::shared_ptr<const content::Asset> SessionAssets::Load(const std::string& file) {
+  auto& model = models_[(folder_ / file).string()];
+  if (model) return model;
+  std::filesystem::path path = folder_ / file;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) path = file;
+  auto asset = std::make_shared<content::Asset>(content::ImportAsset(path));
+  // The same bytes may already be in use in a map: one copy is shared.
+  auto& kept = assets_[asset->id];
+  if (!kept) kept = std::move(asset);
+  return model = kept;
+}
+
+void SessionAssets::EvictUnused() {
+  std::erase_if(assets_, [](const auto& asset) { return asset.second.use_count() == 1; });
+}
+
+}  // namespace docent::app

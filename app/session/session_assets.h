@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "app/session/library_scene.h"
+#include "content/asset.h"
+
+namespace docent::app {
+
+// The models that a session has decoded, from files and from the library; the same bytes are kept once. The
+// session's mutex guards it.
+class SessionAssets {
+ public:
+  // Where relative files are searched first, before the working folder.
+  void SetFolder(const std::filesystem::path& folder) { folder_ = folder; }
+  // The model in this file, which is read once. Throws Error when it cannot be read.
+  std::shared_ptr<const content::Asset> Load(const std::string& file);
+
+  const AssetCache& all() const { return assets_; }
+  // Adds those that are not known yet, and takes them from `decoded`.
+  void Merge(AssetCache* decoded) { assets_.merge(*decoded); }
+  // Forgets what neither a map nor a file that was loaded uses.
+  void EvictUnused();
+
+ private:
+  AssetCache assets_;                                                    // by id
+  std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by file name in commands
+  std::filesystem::path folder_;
+};
+
+}  // namespace docent::app

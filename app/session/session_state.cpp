@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/session_state.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+void SessionCamera::Advise(const std::string& sentence) {
+  constexpr Timestamp kShown = std::chrono::seconds(15);
+  advice = sentence;
+  advice_end = last_time + kShown;
+}
+
+SessionState::SessionState(std::vector<std::shared_ptr<const engine::CameraModel>> models) {
+  for (auto& model : models) {
+    SessionCamera camera;
+    camera.model = std::move(model);
+    cameras.push_back(std::move(camera));
+  }
+}
+
+void SessionState::AddEvent(Timestamp time, std::string event, std::string detail) {
+  events.push_back({time, std::move(event), std::move(detail)});
+}
+
+Timestamp SessionState::LastTime() const {
+  Timestamp time{};
+  for (const SessionCamera& camera : cameras) time = std::max(time, camera.last_time);
+  return time;
+}
+
+std::string SessionState::CameraPrefix(std::size_t camera) const {
+  return cameras.size() > 1 ? "camera " + std::to_string(camera) + ": " : std::string();
+}
+
+SessionMap& SessionState::AddMap(std::uint64_t key, const std::string& name) {
+  SessionMap& map = maps[key];
+  map.key = key;
+  map.name = name;
+  map.changed = true;
+  return map;
+}
+
+SessionMap* SessionState::FindMap(std::uint64_t key) {
+  const auto found = maps.find(key);
+  return found == maps.end() ? nullptr : &found->second;
+}
+
+SessionMap* SessionState::FindByName(const std::string& name) {
+  for (auto& [key, map] : maps) {
+    if (map.Exists() && map.name == name) return &map;
+  }
+  return nullptr;
+}
+
+SessionMap& SessionState::InitializedMap(const std::string& name) {
+  SessionMap* const map = FindByName(name);
+  if (map == nullptr) throw Error("there is no map '" + name + "'");
+  if (!map->snapshot) throw Error("the map '" + name + "' is not initialized yet");
+  return *map;
+}
+
+std::string SessionState::NameOf(std::uint64_t key) const {
+  const auto found = maps.find(key);
+  return found != maps.end() ? found->second.name : std::string();
+}
+
+std::string SessionState::FreeMapName(const std::string& name) const {
+  std::string stem = name;
+  const std::size_t space = name.rfind(' ');
+  if (space != std::string::npos && space + 1 < name.size() &&
+      name.find_first_not_of("0123456789", space + 1) == std::string::npos)
+    stem = name.substr(0, space);
+  for (int number = 2;; ++number) {
+    const std::string candidate = stem + " " + std::to_string(number);
+    const bool taken = std::any_of(maps.begin(), maps.end(), [&](const auto& entry) {
+      return entry.second.Exists() && entry.second.name == candidate;
+    });
+    if (!taken) return candidate;
+  }
+}
+
+void SessionState::Retarget(std::uint64_t from_key, const std::string& from, std::uint64_t to_key,
+                            const std::string& to) {
+  for (auto& [key, map] : maps) {
+    if (!map.Exists() || !maps::MayChangeContent(map.policy)) continue;
+    auto scene = std::make_shared<content::Scene>(*map.scene);
+    bool changed = false;
+    for (content::Entity& entity : scene->entities) {
+      content::Signpost& signpost = entity.signpost;
+      const bool leads = signpost.to_key != 0 ? signpost.to_key == from_key : signpost.to_map == from;
+      if (entity.kind != content::Entity::Kind::kSignpost || !leads) continue;
+      signpost.to_key = to_key;
+      signpost.to_map = to;
+      changed = true;
+    }
+    if (changed) map.scene = std::move(scene);
+  }
+}
+
+}  // namespace docent::app

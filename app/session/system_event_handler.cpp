@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/system_event_handler.h"
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "app/files/text_file.h"
+#include "app/output/engine_text.h"
+#include "app/session/joined_scenes.h"
+
+namespace docent::app {
+
+namespace {
+
+std::string Percent(double ratio) {
+  return std::to_string(std::lround(100 * ratio)) + " %";
+}
+
+std::string ReasonOf(const engine::MapDiscarded& what, const std::string& other) {
+  using Reason = engine::MapDiscarded::Reason;
+  switch (what.reason) {
+    case Reason::kFalseDepth:
+      return "its depth was wrong: the inlier ratio fell from " + Percent(what.fault.initial_inlier_ratio) +
+             " to " + Percent(what.fault.recent_inlier_ratio) + " while the camera hardly moved";
+    case Reason::kLostWhileProvisional:
+      return "tracking was lost " + FormatNumber(ToSeconds(what.tracked_for), 3) +
+             " s after initialization, with " + std::to_string(what.keyframes) + " keyframes";
+    case Reason::kLostWithoutDepth:
+      return "tracking was lost before the map had finite points";
+    case Reason::kRelocalizedElsewhere:
+      return "the camera relocalized in " + other;
+  }
+  return {};
+}
+
+// By what signposts know a map.
+maps::MapInfo IdentityOf(const SessionMap& map) {
+  maps::MapInfo info;
+  info.key = map.key;
+  info.name = map.name;
+  return info;
+}
+
+std::string TextOf(const engine::CalibrationMonitor::Mismatch& mismatch) {
+  const auto radius = [](double px) { return std::to_string(std::lround(px)); };
+  const auto pixels = [](double px) { return FormatNumber(std::round(10 * px) / 10, 3); };
+  return "The calibration does not fit this lens: " + radius(mismatch.outward_radius_px) +
+         " pixels from the image centre, points appear " + pixels(mismatch.outward_px) +
+         " pixels too far out, and " + radius(mismatch.inward_radius_px) + " pixels from it " +
+         pixels(mismatch.inward_px) +
+         " pixels too far in. Calibrate the camera again with `docent calibrate`.";
+}
+
+}  // namespace
+
+void SystemEventHandler::HandleEvents() {
+  for (const engine::SystemEvent& event : system_.TakeEvents())
+    std::visit([&](const auto& what) { Handle(event, what); }, event.what);
+}
+
+void SystemEventHandler::ReportRejection(const engine::TrackedFrame& frame) {
+  SessionCamera& camera = state_.cameras[CameraOf(frame)];
+  const auto name = [this](std::uint64_t key) { return state_.NameOf(key); };
+  const bool is_new = camera.relocalization_message.Update(frame.frame.time, engine::HasPose(frame.state),
+                                                           frame.relocalization, name);
+  const std::string& text = camera.relocalization_message.text();
+  if (text.empty() || !is_new) return;
+  state_.AddEvent(frame.frame.time, "not sure",
+                  state_.CameraPrefix(CameraOf(frame)) + text + " (" +
+                      std::to_string(frame.relocalization.inliers) + " inliers)");
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapEntered&) {
+  state_.AddEvent(event.time, "map", "entered " + state_.NameOf(event.map));
+  memory_.PinMapsInUse();
+  if (const SessionMap* const map = state_.FindMap(event.map)) memory_.ExpectNeighbours(*map);
+  saving_.InterruptMaintenance();  // maintenance may be adjusting this map
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::Relocalized&) {
+  const std::string by =
+      state_.cameras.size() > 1 ? " by camera " + std::to_string(event.camera) : std::string();
+  state_.AddEvent(event.time, "relocalized", state_.NameOf(event.map) + by);
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::PoseRejected&) {
+  state_.cameras[event.camera].relocalization_message = {};
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapLeft& what) {
+  const auto found = state_.maps.find(event.map);
+  if (found == state_.maps.end()) return;
+  if (!what.forgotten) {
+    if (options_.may_write) saving_.SaveMap(&found->second, event.time);
+    return;
+  }
+  state_.AddEvent(event.time, "warning",
+                  "the map " + found->second.name + " was not created, because it was never initialized");
+  state_.maps.erase(found);
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapUpdated& what) {
+  if (SessionMap* const map = state_.FindMap(event.map)) map->UpdateSnapshot(what.snapshot);
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapDiscarded& what) {
+  SessionMap* const found = state_.FindMap(event.map);
+  if (found == nullptr) return;
+  SessionMap& map = *found;
+  map.discarded = true;
+  state_.AddEvent(event.time, "map",
+                  "discarded " + map.name + ": " + ReasonOf(what, state_.NameOf(what.other)));
+  if (what.replacement == 0) return;
+  state_.AddMap(what.replacement, map.name);
+  state_.Retarget(event.map, map.name, what.replacement, map.name);
+  // Content of the false initialization has lost its anchor.
+  for (const content::Entity& entity : map.scene->entities) {
+    state_.AddEvent(event.time, "warning", "'" + entity.name + "' was removed with the discarded map");
+  }
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapStartedAfterLoss& what) {
+  const std::string before = state_.NameOf(what.lost_in);
+  const std::string name = state_.FreeMapName(before);
+  state_.AddMap(event.map, name);
+  state_.AddEvent(event.time, "map", "began " + name + ": the camera was lost in " + before);
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent&, const engine::KeyFrameOffered&) {
+  saving_.InterruptMaintenance();  // the active map has priority
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent&, const engine::JoinRequested&) {
+  saving_.InterruptMaintenance();  // maintenance may be adjusting the map
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapsJoined& what) {
+  SessionMap* const into = state_.FindMap(event.map);
+  SessionMap* const from = state_.FindMap(what.from);
+  if (into == nullptr || from == nullptr) return;
+  AbsorbMap(from, *what.joined, into);
+  const std::string sentence = "maps " + into->name + " and " + from->name + " were joined";
+  state_.AddEvent(
+      event.time, "map",
+      sentence + ": " + std::to_string(what.joined->points_merged) + " pairs of duplicate points were fused");
+  for (SessionCamera& camera : state_.cameras) camera.Advise(sentence);
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::JoinRefused& what) {
+  state_.AddEvent(event.time, "map",
+                  "maps " + state_.NameOf(event.map) + " and " + state_.NameOf(what.from) +
+                      " were not joined: " + TextOf(what.refusal, what.overlap));
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::RigChanged& what) {
+  std::string detail = state_.NameOf(event.map) + ": " + TextOf(what.estimate);
+  if (what.estimate.rigid && options_.baseline_m > 0) {
+    detail += ", one map unit is " + FormatNumber(options_.baseline_m / what.estimate.Baseline(), 4) + " m";
+  }
+  state_.AddEvent(event.time, "rig", detail);
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::CalibrationMismatch& what) {
+  const std::string text = TextOf(what.mismatch);
+  state_.AddEvent(event.time, "warning", state_.CameraPrefix(event.camera) + text);
+  state_.cameras[event.camera].Advise(text);
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::LensEstimated& what) {
+  state_.cameras[event.camera].model = what.lens.model;
+  state_.AddEvent(event.time, "lens",
+                  "Estimated calibration of camera \"" + what.lens.name + "\"" +
+                      (what.lens.fixed ? " (final)" : "") + ": focal length " + FormatFocalLength(what.lens));
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapperFailed& what) {
+  const std::string text = "Mapping has stopped because of an error: " + what.what +
+                           " Tracking continues, and what was mapped is saved.";
+  state_.AddEvent(event.time, "warning", text);
+  for (SessionCamera& camera : state_.cameras) camera.Advise(text);
+}
+
+void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapperEvent& what) {
+  const std::optional<EventText> text = TextOf(what, state_.NameOf(event.map));
+  if (!text) return;
+  state_.AddEvent(event.time, text->event, text->detail);
+  if (!std::holds_alternative<engine::MapperEvent::CalibrationContradicted>(what.what)) return;
+  for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
+    if (!system_.EstimatedLensOf(i)) state_.cameras[i].Advise(text->detail);
+  }
+}
+
+// `into` already has the joined snapshot. Edits in `from` can no longer be undone, as its content was moved.
+void SystemEventHandler::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
+  auto scene = std::make_shared<content::Scene>(*into->scene);
+  const maps::MapInfo map_into = IdentityOf(*into), map_from = IdentityOf(*from);
+  MergeScene(*from->scene, map_into, map_from, joined, scene.get());
+  into->scene = std::move(scene);
+  into->joined_keys.push_back(from->key);
+  into->joined_keys.insert(into->joined_keys.end(), from->joined_keys.begin(), from->joined_keys.end());
+  from->joined_into = into->key;
+  system_.SetPermissions(into->key, into->Permissions());
+  for (auto& [key, map] : state_.maps) {
+    if (!map.Exists() || key == into->key) continue;
+    auto other = std::make_shared<content::Scene>(*map.scene);
+    if (maps::MayChangeContent(map.policy) && RedirectSceneSignposts(map_from, map_into, other.get()))
+      map.scene = std::move(other);
+  }
+}
+
+}  // namespace docent::app

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/visit_state.h"
+
+#include <algorithm>
+
+namespace docent::app {
+
+namespace {
+
+// 0 outside [0, length]; rises and falls linearly within `fade` of the ends.
+double Opacity(double time, double length, double fade) {
+  return std::clamp(std::min(time, length - time) / fade, 0.0, 1.0);
+}
+
+}  // namespace
+
+ui::VisitorDisplay VisitState::Update(double seconds, const std::string& place, const std::string& hint) {
+  if (!begin_) begin_ = seconds;
+  if (place.empty() && !HoldsContent(seconds)) return Search(seconds, hint);
+  if (!place.empty()) {
+    if (place != place_) arrival_ = seconds;
+    place_ = place;
+    last_pose_ = seconds;
+  }
+  ui::VisitorDisplay display;
+  display.place = place_;
+  if (!place.empty()) display.sentence = hint;
+  if (arrival_) display.arrival = Opacity(seconds - *arrival_, times_.arrival, times_.fade);
+  return display;
+}
+
+bool VisitState::WantsViews(double seconds) const {
+  if (!begin_ || HoldsContent(seconds)) return false;
+  const double searched = Searched(seconds);
+  return !stops_.empty() && searched >= times_.way_back && searched < times_.stops;
+}
+
+ui::VisitorDisplay VisitState::Search(double seconds, const std::string& hint) const {
+  ui::VisitorDisplay display;
+  display.is_searching = true;
+  if (stops_.empty()) {
+    display.sentence = "There are no places in this library yet.";
+    return display;
+  }
+  const double searched = Searched(seconds);
+  if (searched >= times_.stops) {
+    display.stops = stops_;
+    display.sentence = "Go to one of these places and look around slowly.";
+  } else if (!hint.empty()) {
+    display.sentence = hint;
+  } else if (place_.empty()) {
+    display.sentence = "Welcome. Look around slowly, and I will tell you where you are.";
+  } else if (searched >= times_.way_back) {
+    display.sentence = "Go back to " + place_ + ", and look around slowly.";
+  } else {
+    display.sentence = "Look around slowly.";
+  }
+  return display;
+}
+
+}  // namespace docent::app

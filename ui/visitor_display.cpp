@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/visitor_display.h"
+
+#include <algorithm>
+
+#include "ui/figures.h"
+#include "ui/theme.h"
+
+namespace docent::ui {
+
+namespace {
+
+constexpr Color kBoard = theme::kHeadsUp, kTitle = theme::kText;
+
+// The place in the corner, which stays while the visitor is there.
+void DrawPlace(const std::string& place, double unit, Canvas* canvas) {
+  if (place.empty()) return;
+  TextStyle style;
+  style.size_px = 18 * unit;
+  style.bold = true;
+  style.max_width_px = std::max(40, static_cast<int>(0.6 * canvas->width_px()));
+  style.max_height_px = static_cast<int>(32 * unit);
+  style.color = kTitle;
+  const Eigen::Vector2d size = canvas->Measure(place, style);
+  const Eigen::Vector2d corner(10 * unit, 10 * unit), padding(12 * unit, 7 * unit);
+  canvas->Box(corner, corner + size + 2 * padding, 9 * unit, kBoard);
+  canvas->Text(place, style, corner + padding);
+}
+
+// The name of a place in the middle of the image, in large letters.
+void DrawArrival(const std::string& place, double opacity, double unit, Canvas* canvas) {
+  if (place.empty() || opacity <= 0) return;
+  TextStyle style;
+  style.size_px = 40 * unit;
+  style.bold = true;
+  style.centered = true;
+  style.max_width_px = std::max(40, static_cast<int>(0.8 * canvas->width_px()));
+  style.max_height_px = std::max(20, static_cast<int>(0.4 * canvas->height_px()));
+  style.color = Faded(kTitle, opacity);
+  const Eigen::Vector2d size = canvas->Measure(place, style), padding(24 * unit, 14 * unit);
+  const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.38 * canvas->height_px());
+  canvas->Box(middle - 0.5 * size - padding, middle + 0.5 * size + padding, 14 * unit,
+              Faded(kBoard, opacity));
+  canvas->Text(place, style, {middle.x(), middle.y() - 0.5 * size.y()}, 0.5);
+}
+
+// Names below each other in the upper half of the image. Those that do not fit are counted in the last line.
+void DrawStops(const std::vector<std::string>& stops, double unit, Canvas* canvas) {
+  if (stops.empty()) return;
+  TextStyle style;
+  style.size_px = 20 * unit;
+  style.max_width_px = std::max(40, static_cast<int>(0.7 * canvas->width_px()));
+  style.max_height_px = static_cast<int>(34 * unit);
+  style.color = kTitle;
+  const double line = 30 * unit, top = 0.12 * canvas->height_px();
+  const auto most = static_cast<std::size_t>(std::max(1.0, 0.34 * canvas->height_px() / line));
+  std::vector<std::string> lines(stops.begin(), stops.begin() + std::min(most, stops.size()));
+  if (stops.size() > most) lines.back() = "…";
+  double width = 0;
+  for (const std::string& text : lines) width = std::max(width, canvas->Measure(text, style).x());
+  const double left = 0.5 * (canvas->width_px() - 1 - width),
+               height = line * static_cast<double>(lines.size());
+  canvas->Box({left - 18 * unit, top - 10 * unit}, {left + width + 18 * unit, top + height + 6 * unit},
+              12 * unit, kBoard);
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    canvas->Text(lines[i], style, {left, top + line * static_cast<double>(i)});
+}
+
+}  // namespace
+
+std::vector<Inset> PlaceViews(const VisitorDisplay& visitor, int width_px, int height_px) {
+  constexpr double kWidth = 0.27, kGap = 0.03, kTop = 0.14;  // Ratios of the image's width or height.
+  std::vector<Inset> areas;
+  const auto count = static_cast<double>(visitor.views.size());
+  double left = 0.5 * (1 - count * kWidth - (count - 1) * kGap);
+  for (const cv::Mat& view : visitor.views) {
+    Inset area;
+    area.x = std::max(0, static_cast<int>(left * width_px));
+    area.y = static_cast<int>(kTop * height_px);
+    area.width = std::max(1, static_cast<int>(kWidth * width_px));
+    area.height = std::clamp(area.width * view.rows / std::max(1, view.cols), 1, height_px / 2);
+    areas.push_back(area);
+    left += kWidth + kGap;
+  }
+  return areas;
+}
+
+void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* canvas) {
+  const VisitorDisplay& visitor = *view.overlay.visitor;
+  const double unit = style.unit_px;
+  const double lowest = canvas->height_px() - 12 * unit - style.bottom_px;
+  if (visitor.is_searching) {
+    const double radius = 0.1 * std::min(canvas->width_px(), canvas->height_px());
+    const Eigen::Vector2d middle(
+        0.5 * (canvas->width_px() - 1),
+        (visitor.stops.empty() && visitor.views.empty() ? 0.5 : 0.66) * canvas->height_px());
+    DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
+    DrawStops(visitor.stops, unit, canvas);
+  }
+  DrawPlace(visitor.place, unit, canvas);
+  DrawArrival(visitor.place, visitor.arrival, unit, canvas);
+  const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;
+  DrawSentence(visitor.sentence, 20, bottom, unit, canvas);
+}
+
+}  // namespace docent::ui
