@@ -172,8 +172,8 @@ maps::MoveScene SceneMover(const std::string& library) {
   };
 }
 
-// An atomic flag that is set, and a token that requests a stop, when the program is interrupted. Long
-// operations in `maps` poll one of them, because they do not know the program's signal handling.
+// An atomic flag that is set when the program is interrupted. Long operations in `maps` poll such a flag,
+// because they do not know the program's signal handling.
 class InterruptFlag {
  public:
   InterruptFlag()
@@ -182,15 +182,12 @@ class InterruptFlag {
             flag_ = Interruption::requested();
             std::this_thread::sleep_for(std::chrono::milliseconds(50));
           }
-          if (flag_) stop_.request_stop();
         }) {}
   const std::atomic<bool>* get() const { return &flag_; }
-  std::stop_token token() const { return stop_.get_token(); }
 
  private:
   const Interruption interruption_;
   std::atomic<bool> flag_ = false;
-  std::stop_source stop_;
   Worker watch_;  // Last member: its thread uses the others.
 };
 
@@ -234,7 +231,7 @@ void Densify(const ExchangeOptions& options, Verbosity verbosity) {
     progress.emplace(info.name + ", keyframes", info.keyframes, verbosity);
     const maps::DensifyResult result = maps::DensifyStoredMap(
         &library, info.key, {}, [&](std::size_t done, std::size_t) { progress->Update(done); },
-        interrupt.token());
+        interrupt.get());
     progress.reset();  // Erases its line.
     if (Interruption::requested())
       throw Error("Interrupted; the meshes computed so far are saved, and the same command continues.");

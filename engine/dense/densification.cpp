@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "engine/base/interrupt.h"
 #include "engine/base/median.h"
 #include "engine/base/option_check.h"
 #include "engine/dense/distance_field.h"
@@ -18,18 +19,18 @@ namespace {
 std::optional<std::vector<DepthMap>> EstimateAll(const std::shared_ptr<const MapSnapshot>& map,
                                                  const DepthOptions& options,
                                                  const DensificationProgress& progress,
-                                                 const std::stop_token& stop) {
+                                                 const std::atomic<bool>* interrupt) {
   DepthEstimator estimator(map, options);
   std::map<KeyFrameId, DepthMap> depths;
   for (const DepthViews& views : estimator.views()) {
-    std::optional<DepthMap> depth = estimator.Estimate(views, stop);
+    std::optional<DepthMap> depth = estimator.Estimate(views, interrupt);
     if (!depth) return std::nullopt;
     depths.emplace(views.keyframe, *std::move(depth));
     if (progress) progress(depths.size(), estimator.views().size());
   }
   std::vector<DepthMap> consistent;
   for (const DepthViews& views : estimator.views()) {
-    if (stop.stop_requested()) return std::nullopt;
+    if (IsInterrupted(interrupt)) return std::nullopt;
     std::vector<const DepthMap*> others;
     for (const KeyFrameId id : views.neighbours) {
       const auto found = depths.find(id);
@@ -42,14 +43,14 @@ std::optional<std::vector<DepthMap>> EstimateAll(const std::shared_ptr<const Map
 
 // Fuses the depth maps with voxels of at least this size; with larger ones if there are too many blocks.
 std::optional<DistanceField> Fuse(const std::vector<DepthMap>& depths, double voxel_size,
-                                  const DensificationOptions& options, const std::stop_token& stop) {
+                                  const DensificationOptions& options, const std::atomic<bool>* interrupt) {
   constexpr double kGrowth = 1.5;
   for (;; voxel_size *= kGrowth) {
     DistanceField field(voxel_size, options.truncation_voxels * voxel_size);
     const bool fits = std::all_of(depths.begin(), depths.end(), [&](const DepthMap& depth) {
-      return field.Add(depth, options.max_blocks, stop);
+      return field.Add(depth, options.max_blocks, interrupt);
     });
-    if (stop.stop_requested()) return std::nullopt;
+    if (IsInterrupted(interrupt)) return std::nullopt;
     if (fits) return field;
   }
 }
@@ -94,7 +95,7 @@ MeshState StateOf(const std::vector<MeshKeyFrame>& keyframes, const MapSnapshot&
 
 std::optional<MapMesh> DensifyMap(const std::shared_ptr<const MapSnapshot>& map,
                                   const DensificationOptions& options, const DensificationProgress& progress,
-                                  const std::stop_token& stop) {
+                                  const std::atomic<bool>* interrupt) {
   Checked(options);
   MapMesh result;
   for (const KeyFrame& keyframe : map->keyframes) {
@@ -102,16 +103,16 @@ std::optional<MapMesh> DensifyMap(const std::shared_ptr<const MapSnapshot>& map,
       result.keyframes.push_back({keyframe.id, keyframe.camera_from_map});
   }
   if (result.keyframes.empty()) return result;
-  const auto depths = EstimateAll(map, options.depth, progress, stop);
+  const auto depths = EstimateAll(map, options.depth, progress, interrupt);
   if (!depths) return std::nullopt;
   if (depths->empty()) return result;
-  const auto field = Fuse(*depths, options.voxel_size * MedianDepth(*map), options, stop);
+  const auto field = Fuse(*depths, options.voxel_size * MedianDepth(*map), options, interrupt);
   if (!field) return std::nullopt;
   const SurfaceMesh surface =
       RemoveSmallPieces(field->ExtractSurface(options.min_weight), options.min_piece_triangles);
-  result.mesh =
-      SimplifyMesh(surface, options.simplification_voxels * field->voxel_size(), options.max_triangles, stop);
-  if (stop.stop_requested()) return std::nullopt;
+  result.mesh = SimplifyMesh(surface, options.simplification_voxels * field->voxel_size(),
+                             options.max_triangles, interrupt);
+  if (IsInterrupted(interrupt)) return std::nullopt;
   return result;
 }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
-#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -59,6 +59,6 @@ using DensificationProgress = std::function<void(std::size_t done, std::size_t t
 std::optional<MapMesh> DensifyMap(const std::shared_ptr<const MapSnapshot>& map,
                                   const DensificationOptions& options = {},
                                   const DensificationProgress& progress = {},
-                                  const std::stop_token& stop = {});
+                                  const std::atomic<bool>* interrupt = nullptr);
 
 }  // namespace docent::engine

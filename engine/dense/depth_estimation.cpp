@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "engine/base/interrupt.h"
 #include "engine/base/option_check.h"
 #include "engine/dense/plane_sweep.h"
 
@@ -98,7 +99,8 @@ std::shared_ptr<const LevelRays> DepthEstimator::RaysOf(const KeyFrame& keyframe
   return rays_.back().second;
 }
 
-std::optional<DepthMap> DepthEstimator::Estimate(const DepthViews& views, const std::stop_token& stop) {
+std::optional<DepthMap> DepthEstimator::Estimate(const DepthViews& views,
+                                                 const std::atomic<bool>* interrupt) {
   const auto view_of = [&](KeyFrameId id) {
     const KeyFrame& keyframe = *map_->FindKeyFrame(id);
     keyframe.features->MarkInUse();
@@ -111,8 +113,8 @@ std::optional<DepthMap> DepthEstimator::Estimate(const DepthViews& views, const 
   for (const KeyFrameId id : views.neighbours) neighbours.push_back(view_of(id));
   const SweepPlanes planes = SpacePlanes(reference, neighbours, views.min_inverse_distance,
                                          views.max_inverse_distance, options_.max_planes);
-  const CostVolume volume = SweepCosts(reference, neighbours, planes, stop);
-  if (stop.stop_requested()) return std::nullopt;
+  const CostVolume volume = SweepCosts(reference, neighbours, planes, interrupt);
+  if (IsInterrupted(interrupt)) return std::nullopt;
   PlaneChoice choice = OptimizePlanes(volume, *reference.image, options_.smoothness);
 
   DepthMap depth;

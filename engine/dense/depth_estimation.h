@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <optional>
-#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -41,7 +41,7 @@ class DepthEstimator {
   // The keyframes whose depth can be estimated.
   const std::vector<DepthViews>& views() const { return views_; }
   // The depth of one of views(), not checked against others. Empty when asked to stop.
-  std::optional<DepthMap> Estimate(const DepthViews& views, const std::stop_token& stop = {});
+  std::optional<DepthMap> Estimate(const DepthViews& views, const std::atomic<bool>* interrupt = nullptr);
   // The depth map without the depths that too few of its neighbours' depth maps confirm. `others` may lack
   // some; null entries are ignored.
   DepthMap KeepConsistent(const DepthMap& depth, const std::vector<const DepthMap*>& others) const;

@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "engine/base/interrupt.h"
+
 namespace docent::engine {
 namespace {
 
@@ -126,12 +128,12 @@ void DistanceField::UpdateBlock(const DepthMap& depth, Block* block) const {
   }
 }
 
-bool DistanceField::Add(const DepthMap& depth, std::size_t max_blocks, const std::stop_token& stop) {
+bool DistanceField::Add(const DepthMap& depth, std::size_t max_blocks, const std::atomic<bool>* interrupt) {
   if (!CreateBlocks(depth, max_blocks)) return false;
   // Blocks whose bounding sphere leaves the image are left to UpdateBlock; those behind the camera are many.
   const double radius = voxel_size_ * kBlockSide;
   for (Block& block : blocks_) {
-    if (stop.stop_requested()) return false;
+    if (IsInterrupted(interrupt)) return false;
     const Eigen::Vector3d middle = (block.origin.cast<double>().array() + kBlockSide / 2.0) * voxel_size_;
     const Eigen::Vector3d in_camera = depth.camera_from_map * middle;
     const bool is_near = in_camera.norm() < 2 * radius;

@@ -3,9 +3,9 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <stop_token>
 #include <unordered_map>
 #include <vector>
 
@@ -24,7 +24,7 @@ class DistanceField {
   DistanceField(double voxel_size, double truncation);
 
   // Adds a depth map. Returns false, and adds no further blocks, once there are more than max_blocks.
-  bool Add(const DepthMap& depth, std::size_t max_blocks, const std::stop_token& stop = {});
+  bool Add(const DepthMap& depth, std::size_t max_blocks, const std::atomic<bool>* interrupt = nullptr);
   // The surface between voxels that at least min_weight depth maps measured, by surface nets (Gibson 1998):
   // one vertex in each cell that the surface passes through.
   SurfaceMesh ExtractSurface(double min_weight) const;

@@ -12,6 +12,8 @@
 #include <tuple>
 #include <utility>
 
+#include "engine/base/interrupt.h"
+
 namespace docent::engine {
 namespace {
 
@@ -67,8 +69,8 @@ class Simplification {
     for (const auto& [from, to] : edges) Push(from, to);
   }
 
-  void Run(double max_error, std::size_t max_triangles, const std::stop_token& stop) {
-    while (!queue_.empty() && !stop.stop_requested()) {
+  void Run(double max_error, std::size_t max_triangles, const std::atomic<bool>* interrupt) {
+    while (!queue_.empty() && !IsInterrupted(interrupt)) {
       const Collapse next = queue_.top();
       if (next.error > max_error && count_ <= max_triangles) return;
       queue_.pop();
@@ -218,9 +220,9 @@ class Simplification {
 }  // namespace
 
 SurfaceMesh SimplifyMesh(const SurfaceMesh& mesh, double max_distance, std::size_t max_triangles,
-                         const std::stop_token& stop) {
+                         const std::atomic<bool>* interrupt) {
   Simplification simplification(mesh);
-  simplification.Run(max_distance * max_distance, max_triangles, stop);
+  simplification.Run(max_distance * max_distance, max_triangles, interrupt);
   return simplification.Result();
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
-#include <stop_token>
 
 #include "engine/dense/surface_mesh.h"
 
@@ -13,7 +13,7 @@ namespace docent::engine {
 // max_triangles are left. Borders keep their shape. Stops early, with what has been reached, when asked to.
 // Deterministic; pure.
 SurfaceMesh SimplifyMesh(const SurfaceMesh& mesh, double max_distance, std::size_t max_triangles,
-                         const std::stop_token& stop = {});
+                         const std::atomic<bool>* interrupt = nullptr);
 
 // The mesh without connected pieces of fewer than min_triangles.
 SurfaceMesh RemoveSmallPieces(const SurfaceMesh& mesh, std::size_t min_triangles);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/base/interrupt.h"
+
 namespace docent::engine {
 namespace {
 
@@ -209,7 +211,7 @@ SweepPlanes SpacePlanes(const SweepView& reference, const std::vector<SweepView>
 }
 
 CostVolume SweepCosts(const SweepView& reference, const std::vector<SweepView>& neighbours,
-                      const SweepPlanes& planes, const std::stop_token& stop) {
+                      const SweepPlanes& planes, const std::atomic<bool>* interrupt) {
   const int width = reference.image->cols, height = reference.image->rows;
   CostVolume volume(width, height, planes.count);
   const auto masks = CensusMasks(GreyOf(*reference.image), width, height);
@@ -218,7 +220,7 @@ CostVolume SweepCosts(const SweepView& reference, const std::vector<SweepView>& 
     swept.push_back({&neighbour, {}, {}, GreyRows(reference.image->total()), {}});
     ProjectPlane(reference, neighbour, planes.InverseDistance(0), &swept.back().to);
   }
-  for (int plane = 0; plane < planes.count && !stop.stop_requested(); ++plane) {
+  for (int plane = 0; plane < planes.count && !IsInterrupted(interrupt); ++plane) {
     const int phase = plane % kExactEvery;
     for (SweptNeighbour& neighbour : swept) {
       if (phase == 0) {

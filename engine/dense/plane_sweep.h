@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <opencv2/core/mat.hpp>
-#include <stop_token>
 #include <vector>
 
 #include "engine/dense/depth_map.h"
@@ -36,6 +36,6 @@ SweepPlanes SpacePlanes(const SweepView& reference, const std::vector<SweepView>
 // depend on exposure. The cost of a pixel is that of the better half of the neighbours that see it, since the
 // others may see something in front. Stops early, with an incomplete result, when asked to.
 CostVolume SweepCosts(const SweepView& reference, const std::vector<SweepView>& neighbours,
-                      const SweepPlanes& planes, const std::stop_token& stop);
+                      const SweepPlanes& planes, const std::atomic<bool>* interrupt);
 
 }  // namespace docent::engine

@@ -195,6 +195,7 @@ StoredMap Library::Load(std::uint64_t key, DamagedContent damaged) const {
       map.scene = damaged == DamagedContent::kRefuse
                       ? ReadScene(impl_->database(), key)
                       : ReadUndamagedScene(impl_->database(), key, &map.lost_content);
+      map.mesh = FindUndamagedMesh(impl_->database(), key);
     });
     return map;
   });

@@ -37,12 +37,13 @@ engine::MapMesh MeshThatFits(engine::MapMesh mesh) {
 
 DensifyResult DensifyStoredMap(Library* library, std::uint64_t key,
                                const engine::DensificationOptions& options,
-                               const engine::DensificationProgress& progress, const std::stop_token& stop) {
+                               const engine::DensificationProgress& progress,
+                               const std::atomic<bool>* interrupt) {
   using Outcome = DensifyResult::Outcome;
   const std::shared_ptr<const engine::MapSnapshot> map =
       library->Load(key, Library::DamagedContent::kLeaveOut).snapshot;
   if (HasCurrentMesh(*library, key, *map)) return {Outcome::kUpToDate};
-  std::optional<engine::MapMesh> mesh = engine::DensifyMap(map, options, progress, stop);
+  std::optional<engine::MapMesh> mesh = engine::DensifyMap(map, options, progress, interrupt);
   if (!mesh) return {Outcome::kInterrupted};
   if (mesh->mesh.empty()) return {Outcome::kNoDepth};
   const engine::MapMesh fitting = MeshThatFits(*std::move(mesh));

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <stop_token>
 
 #include "engine/dense/densification.h"
 #include "maps/library/library.h"
@@ -29,7 +29,7 @@ struct DensifyResult {
 DensifyResult DensifyStoredMap(Library* library, std::uint64_t key,
                                const engine::DensificationOptions& options = {},
                                const engine::DensificationProgress& progress = {},
-                               const std::stop_token& stop = {});
+                               const std::atomic<bool>* interrupt = nullptr);
 
 // The mesh with as many triangles as can be stored.
 engine::MapMesh MeshThatFits(engine::MapMesh mesh);

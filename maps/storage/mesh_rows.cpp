@@ -214,6 +214,15 @@ std::optional<engine::MapMesh> ReadMesh(const Database& database, std::uint64_t 
   return DecodeMesh(key, *bytes);
 }
 
+std::shared_ptr<const engine::MapMesh> FindUndamagedMesh(const Database& database, std::uint64_t key) {
+  try {
+    std::optional<engine::MapMesh> mesh = ReadMesh(database, key);
+    return mesh ? std::make_shared<const engine::MapMesh>(*std::move(mesh)) : nullptr;
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
 bool ReplaceMesh(const Database& database, const MapInfo& info, const engine::MapMesh& mesh) {
   engine::MapSnapshot map;
   for (StoredKeyFrame& stored : ReadParts(database, info).keyframes)

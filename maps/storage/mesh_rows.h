@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -27,6 +28,8 @@ engine::MapMesh DecodeMesh(std::uint64_t map_key, std::span<const std::uint8_t> 
 
 // Empty if the map has none.
 std::optional<engine::MapMesh> ReadMesh(const Database& database, std::uint64_t key);
+// Null if the map has none, or a damaged one.
+std::shared_ptr<const engine::MapMesh> FindUndamagedMesh(const Database& database, std::uint64_t key);
 // Stores the mesh unless it was made of another state of the map than the stored one; returns whether it did.
 bool ReplaceMesh(const Database& database, const MapInfo& info, const engine::MapMesh& mesh);
 // Removes the stored mesh if it is damaged, or a keyframe that it was made from has moved or is gone.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -166,9 +167,9 @@ TEST_F(Densification, MakesAMeshOfTheSurfaces) {
 }
 
 TEST_F(Densification, StopsWhenAsked) {
-  std::stop_source stop;
+  std::atomic<bool> interrupt = false;
   EXPECT_FALSE(DensifyMap(
-      map_, {}, [&](std::size_t, std::size_t) { stop.request_stop(); }, stop.get_token()));
+      map_, {}, [&](std::size_t, std::size_t) { interrupt = true; }, &interrupt));
 }
 
 TEST_F(Densification, KnowsWhetherAMeshStillFitsItsMap) {
