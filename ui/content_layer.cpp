@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "ui/shaders.h"
 
@@ -43,10 +44,13 @@ ContentLayer::ContentLayer(int samples, int max_texture_px)
 ContentLayer::~ContentLayer() = default;
 
 void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-                        const content::Scene& scene, double animation_seconds, const RenderTarget& image) {
+                        const content::Scene& scene, double animation_seconds, const RenderTarget& image,
+                        std::shared_ptr<const engine::SurfaceMesh> surfaces) {
+  ++frame_;
   const std::vector<ModelInstance> instances =
       Instances(scene, camera_from_map.OriginInSource(), animation_seconds);
   mesh_drawer_.Prepare(instances, glm::vec3(0.0f, -1.0f, 0.0f));
+  surface_drawer_.Prepare(std::move(surfaces));
   if (instances.empty()) return;
   Lens& lens = FindLens(camera);
   const PixelRectangle region = DrawAtlas(camera_from_map, &lens);
@@ -98,7 +102,7 @@ PixelRectangle ContentLayer::DrawAtlas(const engine::Rigid3& camera_from_map, Le
   for (const Pass& pass : passes) {
     glViewport(pass.face->x_px, pass.face->y_px, pass.face->width_px, pass.face->height_px);
     glScissor(pass.rectangle.x, pass.rectangle.y, pass.rectangle.width, pass.rectangle.height);
-    mesh_drawer_.Draw(pass.view);
+    mesh_drawer_.Draw(pass.view, surface_drawer_);
   }
   glDisable(GL_SCISSOR_TEST);
   for (const PixelRectangle& rectangle : changed)

@@ -11,6 +11,7 @@
 #include "ui/gl_objects.h"
 #include "ui/lens_warp.h"
 #include "ui/mesh_drawer.h"
+#include "ui/surface_drawer.h"
 
 namespace docent::ui {
 
@@ -24,9 +25,11 @@ class ContentLayer {
   ~ContentLayer();
 
   // Composites the scene over the contents of `image`, an image target of the camera's size whose row 0 is
-  // the top. Pixels that no content covers keep their exact values.
+  // the top. Pixels that no content covers keep their exact values. Content behind the surfaces is hidden;
+  // null: none is.
   void Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-            const content::Scene& scene, double animation_seconds, const RenderTarget& image);
+            const content::Scene& scene, double animation_seconds, const RenderTarget& image,
+            std::shared_ptr<const engine::SurfaceMesh> surfaces = nullptr);
   std::size_t cached_models() const { return mesh_drawer_.cached_models(); }
 
  private:
@@ -46,6 +49,7 @@ class ContentLayer {
 
   int samples_;
   MeshDrawer mesh_drawer_;
+  SurfaceDrawer surface_drawer_;
   GlProgram warp_program_;
   GlVertexArray empty_vertex_array_;
   std::vector<std::unique_ptr<Lens>> lenses_;  // Ordered by use, the most recently used last.

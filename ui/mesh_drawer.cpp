@@ -171,7 +171,7 @@ MeshDrawer::Cover MeshDrawer::Covered(const PinholeView& view) const {
   return cover;
 }
 
-void MeshDrawer::Draw(const PinholeView& view) {
+void MeshDrawer::Draw(const PinholeView& view, const SurfaceDrawer& surfaces) {
   const glm::mat4 eye_from_map = GlEyeFromMap(view.camera_from_map);
   struct Visible {
     const Item* item;
@@ -190,7 +190,9 @@ void MeshDrawer::Draw(const PinholeView& view) {
   if (opaque.empty() && blended.empty()) return;
   farthest *= 1.01;
   const double near_m = std::max(nearest * 0.99, farthest / kMaxDepthRatio);
-  SetScene(view, GlClipFromGlEye(view.bounds, near_m, farthest) * eye_from_map);
+  const glm::mat4 clip_from_map = GlClipFromGlEye(view.bounds, near_m, farthest) * eye_from_map;
+  surfaces.Draw(clip_from_map, GlmFrom(view.camera_from_map.OriginInSource()));
+  SetScene(view, clip_from_map);
 
   const auto nearer = [](const Visible& a, const Visible& b) { return a.depth < b.depth; };
   std::stable_sort(opaque.begin(), opaque.end(),

@@ -11,6 +11,7 @@
 #include "ui/axes.h"
 #include "ui/gl_objects.h"
 #include "ui/model_resources.h"
+#include "ui/surface_drawer.h"
 
 namespace docent::ui {
 
@@ -44,8 +45,9 @@ class MeshDrawer {
     bool empty() const { return low.x >= high.x || low.y >= high.y; }
   };
   Cover Covered(const PinholeView& view) const;
-  // Draws the prepared instances into the current viewport. The depth range is fitted to them.
-  void Draw(const PinholeView& view);
+  // Draws the prepared instances into the current viewport, where the surfaces, drawn first, do not hide
+  // them. The depth range is fitted to the instances.
+  void Draw(const PinholeView& view, const SurfaceDrawer& surfaces);
   // The number of models that hold graphics memory.
   std::size_t cached_models() const { return cache_.size(); }
 

@@ -41,7 +41,8 @@ void Renderer::Draw(const View& view) {
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
   const engine::Rigid3* const drawn_from = has_pose ? &tracked->camera_from_map : view.held_camera_from_map;
   if (view.camera != nullptr && drawn_from != nullptr && view.scene != nullptr)
-    impl_->content.Draw(*view.camera, *drawn_from, *view.scene, view.animation_seconds, target);
+    impl_->content.Draw(*view.camera, *drawn_from, *view.scene, view.animation_seconds, target,
+                        view.surfaces);
 
   impl_->canvas.Begin(width_px, height_px);
   if (has_pose && view.overlay.keyframes && tracked->map != nullptr)

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "content/scene.h"
+#include "engine/dense/surface_mesh.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/tracking/tracked_frame.h"
 
@@ -54,6 +55,8 @@ struct View {
   // Where the camera was a moment ago. If the frame has no pose, the content is drawn from there. Null for
   // none.
   const engine::Rigid3* held_camera_from_map = nullptr;
+  // What hides content behind it, in the map of the scene; null: nothing does.
+  std::shared_ptr<const engine::SurfaceMesh> surfaces;
   double animation_seconds = 0;  // Time of the animations of the models, which repeat.
   Overlay overlay;               // What is drawn on top.
 };

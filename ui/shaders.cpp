@@ -213,6 +213,21 @@ void main() {
 }
 )glsl";
 
+// Moves each point away from the eye along its own ray, so that its pixel stays the same.
+const char* const kSurfaceVertexShader = R"glsl(#version 330 core
+layout(location = 0) in vec3 position_in_map;
+uniform mat4 clip_from_map;
+uniform vec3 eye_in_map;
+uniform float depth_bias;
+void main() {
+  gl_Position = clip_from_map * vec4(position_in_map + depth_bias * (position_in_map - eye_in_map), 1.0);
+}
+)glsl";
+
+const char* const kSurfaceFragmentShader = R"glsl(#version 330 core
+void main() {}
+)glsl";
+
 const char* const kCanvasVertexShader = R"glsl(#version 330 core
 layout(location = 0) in vec2 position_px;
 layout(location = 1) in vec2 local;

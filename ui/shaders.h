@@ -11,6 +11,8 @@ extern const char* const kVideoFragmentShader;
 extern const char* const kWarpFragmentShader;
 extern const char* const kMeshVertexShader;
 extern const char* const kMeshFragmentShader;
+extern const char* const kSurfaceVertexShader;
+extern const char* const kSurfaceFragmentShader;
 extern const char* const kCanvasVertexShader;
 extern const char* const kCanvasFragmentShader;
 

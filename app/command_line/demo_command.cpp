@@ -20,6 +20,7 @@ void AddDemoCommand(CLI::App* program, Invocation* invocation,
   command->add_option("--record", options->record, "Write the augmented view as a video")
       ->type_name("FILE.mp4");
   AddSeedOption(command, &options->seed);
+  AddOcclusionOption(command, &options->occlusion);
   command->callback([=, run = std::move(run)] {
     if (options->headless && !options->output) {
       throw CLI::ValidationError("--headless",

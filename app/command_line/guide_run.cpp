@@ -56,6 +56,7 @@ SessionOptions SessionOptionsOf(const GuideRequest& request, std::span<Calibrate
   options.memory.budget_bytes = request.memory_budget_bytes;
   options.memory.wait_for_maps = request.pace != Pace::kRealtime;
   options.baseline_m = request.baseline_m;
+  options.occlusion = request.occlusion;
   options.tracker.target = request.target;
   options.mapper.lens.lenses = EstimatedLensesOf(cameras);
   return options;

@@ -21,7 +21,9 @@
 #include "engine/base/worker.h"
 #include "maps/exchange/colmap_model.h"
 #include "maps/exchange/exchange.h"
+#include "maps/exchange/mesh_ply.h"
 #include "maps/exchange/view_from_above.h"
+#include "maps/maintenance/densify.h"
 #include "maps/maintenance/joining.h"
 #include "maps/maintenance/maintenance.h"
 #include "maps/maintenance/recovery.h"
@@ -35,6 +37,7 @@ namespace fs = std::filesystem;
 struct ExchangeOptions {
   fs::path library, output, from;
   std::string name, other_name;
+  bool as_mesh = false;
 };
 using ExchangeAction = void (*)(const ExchangeOptions& options, Verbosity verbosity);
 
@@ -77,6 +80,12 @@ std::string OmittedPointsNote(const engine::MapSnapshot& map) {
                         : " infinite points were left out, because they have no position");
 }
 
+std::string MeshFile(const maps::Library& library, std::uint64_t key, const std::string& name) {
+  const std::optional<engine::MapMesh> mesh = library.LoadMesh(key);
+  if (!mesh) throw Error("'" + name + "' has no mesh; run docent maps densify to compute it.");
+  return maps::MakeMeshPly(mesh->mesh);
+}
+
 void Export(const ExchangeOptions& options, Verbosity verbosity) {
   const maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
   const std::uint64_t key = library.FindByName(options.name).key;
@@ -86,12 +95,15 @@ void Export(const ExchangeOptions& options, Verbosity verbosity) {
         "'" + options.output.string() +
         "' has an unknown file type; use a .docent, .ply or .png file, or a folder for COLMAP's files.");
   }
+  if (options.as_mesh && kind != ".ply") throw Error("A mesh is written to a .ply file.");
   std::error_code error;
   if (fs::exists(options.output, error) && !(kind.empty() && fs::is_empty(options.output, error)))
     throw Error("'" + options.output.string() + "' already exists; choose a new name.");
   std::string left_out;
   if (kind == ".docent") {
     maps::ExportMap(library, key, options.output, LibrarySceneTools());
+  } else if (options.as_mesh) {
+    WriteText(options.output, MeshFile(library, key, options.name));
   } else {
     const auto map = library.Load(key).snapshot;
     left_out = OmittedPointsNote(*map);
@@ -209,6 +221,27 @@ void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
   if (Interruption::requested()) throw Error("Interrupted; the maps adjusted so far are saved.");
 }
 
+void Densify(const ExchangeOptions& options, Verbosity verbosity) {
+  maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
+  std::vector<maps::MapInfo> infos = library.List();
+  if (!options.name.empty()) infos = {library.FindByName(options.name)};
+  const InterruptFlag interrupt;
+  for (const maps::MapInfo& info : infos) {
+    std::optional<Progress> progress;
+    progress.emplace(info.name + ", keyframes", info.keyframes, verbosity);
+    const maps::DensifyResult result = maps::DensifyStoredMap(
+        &library, info.key, {}, [&](std::size_t done, std::size_t) { progress->Update(done); },
+        interrupt.get());
+    progress.reset();  // Erases its line.
+    if (Interruption::requested())
+      throw Error("Interrupted; the meshes computed so far are saved, and the same command continues.");
+    if (verbosity == Verbosity::kQuiet) continue;
+    std::printf("%s %s", info.name.c_str(), maps::ToText(result.outcome));
+    if (result.triangles > 0) std::printf(": %zu triangles, %zu kB", result.triangles, result.bytes / 1000);
+    std::printf("\n");
+  }
+}
+
 void Join(const ExchangeOptions& options, Verbosity verbosity) {
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   const std::uint64_t into = library.FindByName(options.name).key,
@@ -257,6 +290,9 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
       add("export", "Export one map as a library, a COLMAP model, a PLY point cloud or an image from above",
           "docent maps export \"Desk 3\" --library museum.docent --output desk.docent", Export);
   command->add_option("NAME", options->name, "Name of the map")->required();
+  command->add_flag(
+      "--mesh", options->as_mesh,
+      "With a .ply file: the mesh of the surfaces, which densify computes, instead of the points");
   command
       ->add_option("--output", options->output,
                    "A .docent library, a .ply point cloud, a .png image from above, or a folder for COLMAP's "
@@ -268,6 +304,11 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
       ->required();
   add("optimize", "Improve maps and remove redundant data", "docent maps optimize --library museum.docent",
       Optimize)
+      ->add_option("NAME", options->name, "Name of the map; without it, all maps");
+  add("densify",
+      "Compute the surfaces of maps, behind which content is hidden; maps that have them already are left "
+      "out",
+      "docent maps densify --library museum.docent", Densify)
       ->add_option("NAME", options->name, "Name of the map; without it, all maps");
   CLI::App* join = add(
       "join",

@@ -50,6 +50,7 @@ struct RunArguments {
   std::size_t memory_budget_bytes = std::size_t{1} << 30;  // For maps in memory.
   std::optional<HeadPolicy> head;                          // For cameras with a pan-tilt head.
   double baseline_m = 0;  // Measured distance between the two cameras; 0: not measured.
+  bool occlusion = true;  // Content is hidden behind the surfaces of maps.
 };
 
 struct AuthorOptions {
@@ -96,6 +97,7 @@ struct DemoOptions {
   bool headless = false;
   std::optional<std::filesystem::path> output, record;
   std::uint64_t seed = 1;
+  bool occlusion = true;  // As RunArguments.
 };
 
 struct CalibrateOptions {

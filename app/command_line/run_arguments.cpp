@@ -160,6 +160,7 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
   AddEngineOption(command, &run->engine);
   AddSeedOption(command, &run->seed);
   AddMemoryOption(command, &run->memory_budget_bytes);
+  AddOcclusionOption(command, &run->occlusion);
   AddMetresOption(command, "--baseline", kMinLength_m, &run->baseline_m,
                   "Distance between two cameras mounted rigidly together; sets the scale of their maps");
   AddChoice<std::optional<HeadPolicy>>(
@@ -170,6 +171,14 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");
   command->add_option("--record", run->record, "Write the augmented view as a video")->type_name("FILE.mp4");
+}
+
+void AddOcclusionOption(CLI::App* command, bool* occlusion) {
+  AddChoice<bool>(
+      command, "--occlusion", occlusion,
+      "What hides content: the surfaces of the map before it, which docent maps densify and, while a map is "
+      "idle, an author's session compute (default map)",
+      {{"map", true}, {"off", false}});
 }
 
 void AddMemoryOption(CLI::App* command, std::size_t* bytes) {

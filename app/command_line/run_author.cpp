@@ -29,6 +29,7 @@ void CopyRunArguments(const RunArguments& run, bool any_live, GuideRequest* requ
   request->headless = run.headless;
   request->seed = run.seed;
   request->memory_budget_bytes = run.memory_budget_bytes;
+  request->occlusion = run.occlusion;
   request->output = run.output;
   request->record = run.record;
 }

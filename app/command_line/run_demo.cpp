@@ -111,6 +111,7 @@ GuideRequest CommonRequest(const DemoOptions& options, maps::Library* library, c
   // Without a window the timestamps do not matter, and lockstep gives the same result on every machine.
   request.pace = options.headless ? Pace::kLockstep : Pace::kRealtime;
   request.seed = options.seed;
+  request.occlusion = options.occlusion;
   request.output = output;
   return request;
 }

@@ -45,6 +45,7 @@ struct GuideRequest {
   // the camera's thread.
   std::function<std::vector<Command>(const ShownFrame&)> director;
   double baseline_m = 0;                               // See SessionOptions.
+  bool occlusion = true;                               // See SessionOptions.
   std::shared_ptr<const engine::PlanarTarget> target;  // See engine::TrackerOptions; may be null.
   std::optional<HeadPolicy> head;
   // Called with each frame on its camera's thread, never concurrently; may be empty.

@@ -10,6 +10,7 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   view.tracked = &frame.tracked;
   view.camera = frame.camera ? frame.camera.get() : &camera;
   view.scene = frame.shown.scene.get();
+  view.surfaces = frame.shown.surfaces;
   view.animation_seconds = frame.seconds;
   view.overlay.map_name = frame.shown.map_name;
   view.overlay.is_waiting =

@@ -7,6 +7,7 @@
 
 #include "app/files/text_file.h"
 #include "app/session/library_scene.h"
+#include "maps/maintenance/densify.h"
 #include "maps/maintenance/maintenance.h"
 
 namespace docent::app {
@@ -31,38 +32,70 @@ SessionMap* IdleMaintenance::FindIdleMap(const IdleMap& idle) {
   return map != nullptr && IsIdle(*map) && map->snapshot == idle.snapshot ? map : nullptr;
 }
 
+// Surfaces are computed last, since an adjustment may move them.
+std::optional<IdleMap> IdleMaintenance::MapToMesh() const {
+  if (!with_meshes_) return std::nullopt;
+  for (const auto& [key, map] : state_.maps) {
+    if (IsIdle(map) && map.meshed_revision != map.snapshot->revision && !map.HasCurrentMesh())
+      return IdleMap{key, map.name, map.snapshot, map.changed};
+  }
+  return std::nullopt;
+}
+
 bool IdleMaintenance::Run(const std::atomic<bool>& interrupt) {
   std::vector<IdleMap> idle;
+  std::optional<IdleMap> without_mesh;
   {
     const std::scoped_lock lock(mutex_);
     if (!system_.IsMapperIdle()) return false;
     idle = MapsToAdjust();
+    if (idle.empty()) without_mesh = MapToMesh();
   }
+  if (without_mesh) return ComputeMesh(*without_mesh, interrupt);
+  const std::optional<IdleMap> chosen = order_.Next(idle, interrupt);
+  return chosen && Adjust(*chosen, interrupt);
+}
+
+bool IdleMaintenance::ComputeMesh(const IdleMap& chosen, const std::atomic<bool>& interrupt) {
+  std::optional<engine::MapMesh> mesh = engine::DensifyMap(chosen.snapshot, {}, {}, &interrupt);
+  if (!mesh) return false;
+  std::shared_ptr<const engine::MapMesh> fitting;
+  if (!mesh->mesh.empty()) {
+    fitting = std::make_shared<const engine::MapMesh>(maps::MeshThatFits(*std::move(mesh)));
+    library_->SaveMesh(chosen.key, *fitting);
+  }
+  const std::scoped_lock lock(mutex_);
+  SessionMap* const map = state_.FindMap(chosen.key);
+  if (map == nullptr) return true;
+  map->meshed_revision = chosen.snapshot->revision;
+  if (fitting) map->SetMesh(std::move(fitting));
+  return true;
+}
+
+bool IdleMaintenance::Adjust(const IdleMap& chosen, const std::atomic<bool>& interrupt) {
   std::shared_ptr<const content::Scene> scene;
   content::EditHistory history;
   std::string name;
-  const std::optional<IdleMap> chosen = order_.Next(idle, interrupt);
-  if (!chosen) return false;
-  const maps::AdjustedMap adjusted = maps::AdjustIdleMap(*chosen->snapshot, &interrupt);
+  const maps::AdjustedMap adjusted = maps::AdjustIdleMap(*chosen.snapshot, &interrupt);
   const maps::Optimization& done = adjusted.optimization;
   if (done.outcome == maps::Optimization::Outcome::kInterrupted) return false;
   {
     const std::scoped_lock lock(mutex_);
-    SessionMap* const map = FindIdleMap(*chosen);
+    SessionMap* const map = FindIdleMap(chosen);
     if (map == nullptr) return false;
     // Once per revision, whatever the outcome.
-    map->maintained_revision = chosen->snapshot->revision;
+    map->maintained_revision = chosen.snapshot->revision;
     scene = map->scene;
     history = map->history;
     name = map->name;
   }
   if (!adjusted.snapshot) return true;
   maps::MapRecord record;
-  record.key = chosen->key;
+  record.key = chosen.key;
   record.name = name;
   record.snapshot = adjusted.snapshot;
-  record.expected_revision = chosen->snapshot->revision;
-  const auto motions = ContentFollower().Follow(*scene, *chosen->snapshot, *adjusted.snapshot);
+  record.expected_revision = chosen.snapshot->revision;
+  const auto motions = ContentFollower().Follow(*scene, *chosen.snapshot, *adjusted.snapshot);
   if (!motions.empty()) {
     const auto moved = Moved(*scene, motions);
     for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
@@ -72,8 +105,8 @@ bool IdleMaintenance::Run(const std::atomic<bool>& interrupt) {
   if (!library_->Save(record)) return true;
   const std::scoped_lock lock(mutex_);
   // A camera entered the map meanwhile: it continues with the map as it was, and will save that.
-  SessionMap* const map = FindIdleMap(*chosen);
-  if (map == nullptr || !system_.ReplaceSnapshot(map->key, chosen->snapshot, adjusted.snapshot)) return true;
+  SessionMap* const map = FindIdleMap(chosen);
+  if (map == nullptr || !system_.ReplaceSnapshot(map->key, chosen.snapshot, adjusted.snapshot)) return true;
   map->UpdateSnapshot(adjusted.snapshot);
   map->saved_snapshot = adjusted.snapshot;
   map->maintained_revision = adjusted.snapshot->revision;

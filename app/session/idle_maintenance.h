@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "app/session/maintenance_order.h"
@@ -18,23 +19,30 @@ namespace docent::app {
 class IdleMaintenance {
  public:
   // All pointers must outlive this. library is null where nothing is saved; then Run is not called.
-  IdleMaintenance(maps::Library* library, engine::System* system, std::mutex* mutex, SessionState* state)
-      : library_(library), system_(*system), mutex_(*mutex), state_(*state) {}
+  // with_meshes: whether surfaces are computed.
+  IdleMaintenance(maps::Library* library, engine::System* system, std::mutex* mutex, SessionState* state,
+                  bool with_meshes)
+      : library_(library), system_(*system), mutex_(*mutex), state_(*state), with_meshes_(with_meshes) {}
 
-  // Adjusts the map that needs it most, and saves it. Without the session's mutex; ends soon after
-  // `interrupt` is set. Returns whether it did something.
+  // Adjusts the map that needs it most, or computes the surfaces of one that was adjusted, and saves it.
+  // Without the session's mutex; ends soon after `interrupt` is set. Returns whether it did something.
   bool Run(const std::atomic<bool>& interrupt);
 
  private:
   // With the session's mutex held.
   bool IsIdle(const SessionMap& map) const;
   std::vector<IdleMap> MapsToAdjust() const;
+  std::optional<IdleMap> MapToMesh() const;
   SessionMap* FindIdleMap(const IdleMap& idle);
+  // Without the session's mutex.
+  bool Adjust(const IdleMap& chosen, const std::atomic<bool>& interrupt);
+  bool ComputeMesh(const IdleMap& chosen, const std::atomic<bool>& interrupt);
 
   maps::Library* const library_;
   engine::System& system_;
   std::mutex& mutex_;
   SessionState& state_;
+  const bool with_meshes_;
   MaintenanceOrder order_;  // accessed only by the saver's thread
 };
 

@@ -119,6 +119,9 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   if (found == state_.maps.end()) return shown;
   shown.map_name = found->second.name;
   shown.scene = found->second.scene;
+  // The pointer to the triangles keeps the whole mesh alive.
+  const std::shared_ptr<const engine::MapMesh>& mesh = found->second.mesh;
+  if (options_.occlusion && mesh) shown.surfaces = {mesh, &mesh->mesh};
   return shown;
 }
 

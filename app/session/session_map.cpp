@@ -7,11 +7,22 @@ namespace docent::app {
 
 void SessionMap::UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer) {
   const auto before = std::exchange(snapshot, std::move(newer));
+  SetMesh(std::move(mesh));
   if (!before || !snapshot || scene->entities.empty()) return;
   const ContentFollower::Motions motions = follower.Follow(*scene, *before, *snapshot);
   if (motions.empty()) return;
   scene = Moved(*scene, motions);
   for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
+}
+
+void SessionMap::SetMesh(std::shared_ptr<const engine::MapMesh> made) {
+  const bool fits =
+      made && snapshot && engine::StateOf(made->keyframes, *snapshot) != engine::MeshState::kOutOfDate;
+  mesh = fits ? std::move(made) : nullptr;
+}
+
+bool SessionMap::HasCurrentMesh() const {
+  return mesh && snapshot && engine::StateOf(mesh->keyframes, *snapshot) == engine::MeshState::kCurrent;
 }
 
 engine::MapPermissions SessionMap::Permissions() const {

@@ -10,6 +10,7 @@
 #include "app/session/content_follower.h"
 #include "content/edit_history.h"
 #include "content/scene.h"
+#include "engine/dense/densification.h"
 #include "engine/map/map_snapshot.h"
 #include "engine/system/map_permissions.h"
 #include "maps/storage/policy.h"
@@ -34,6 +35,12 @@ struct SessionMap {
   std::shared_ptr<const engine::MapSnapshot> saved_snapshot;
   std::shared_ptr<const content::Scene> saved_scene;
 
+  // The mesh of its surfaces, behind which content is hidden; null while it is not known. It fits the
+  // snapshot.
+  std::shared_ptr<const engine::MapMesh> mesh;
+  // Revision for which a mesh was computed, whether there is one or not; 0 for none.
+  std::uint64_t meshed_revision = 0;
+
   bool in_library = false;  // when the session began; without a snapshot it is then not in memory
   bool changed = false;     // in this session: it stays in memory until the end
 
@@ -46,8 +53,14 @@ struct SessionMap {
   std::uint64_t joined_into = 0;           // the map that it was joined into; 0 for none
   std::vector<std::uint64_t> joined_keys;  // keys of the maps that were joined into it
 
-  // Replaces the snapshot by a newer one of the mapper; content moves along with its anchors.
+  // Replaces the snapshot by a newer one of the mapper; content moves along with its anchors, and a mesh that
+  // no longer fits is dropped.
   void UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer);
+
+  // Takes a mesh if it fits the snapshot.
+  void SetMesh(std::shared_ptr<const engine::MapMesh> made);
+  // Whether the mesh shows all that the snapshot does.
+  bool HasCurrentMesh() const;
 
   // What the system may do with the map, from its policy and from what happened to it.
   engine::MapPermissions Permissions() const;

@@ -57,6 +57,7 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   ResolveSignposts(scene.get());
   map.scene = map.saved_scene = std::move(scene);
   map.history = std::move(history);
+  map.SetMesh(stored.mesh);
   system_.SetSnapshot(map.key, map.snapshot);
   system_.SetPermissions(map.key, map.Permissions());
 }
@@ -99,6 +100,7 @@ bool SessionMemory::Evict(std::uint64_t key) {
   map.saved_snapshot.reset();
   map.scene = map.saved_scene = std::make_shared<content::Scene>();
   map.history = {};
+  map.mesh.reset();
   assets_.EvictUnused();
   return true;
 }

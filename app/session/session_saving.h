@@ -38,7 +38,7 @@ class SessionSaving {
         system_(*system),
         mutex_(*mutex),
         state_(*state),
-        maintenance_(library, system, mutex, state) {}
+        maintenance_(library, system, mutex, state, options.occlusion) {}
 
   // Starts the saver's thread; call it once, with a library opened for writing. Without the mutex.
   void Start();

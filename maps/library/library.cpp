@@ -20,6 +20,7 @@
 #include "maps/library/structure_storage.h"
 #include "maps/library/verify.h"
 #include "maps/storage/database.h"
+#include "maps/storage/mesh_rows.h"
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
 #include "maps/storage/snapshot_reader.h"
@@ -194,6 +195,7 @@ StoredMap Library::Load(std::uint64_t key, DamagedContent damaged) const {
       map.scene = damaged == DamagedContent::kRefuse
                       ? ReadScene(impl_->database(), key)
                       : ReadUndamagedScene(impl_->database(), key, &map.lost_content);
+      map.mesh = FindUndamagedMesh(impl_->database(), key);
     });
     return map;
   });
@@ -217,6 +219,25 @@ std::optional<SceneRecord> Library::LoadHistory(std::uint64_t key) const {
                    [&] { history = ReadSceneHistory(impl_->database(), key); });
     return history;
   });
+}
+
+std::optional<engine::MapMesh> Library::LoadMesh(std::uint64_t key) const {
+  return impl_->Read([&] {
+    std::optional<engine::MapMesh> mesh;
+    WithMapContext(impl_->database(), impl_->Get(key), [&] { mesh = ReadMesh(impl_->database(), key); });
+    return mesh;
+  });
+}
+
+bool Library::SaveMesh(std::uint64_t key, const engine::MapMesh& mesh) {
+  bool stored = false;
+  impl_->Write([&] {
+    const std::optional<MapInfo> info = ReadMapRow(impl_->database(), key);
+    if (info)
+      WithMapContext(impl_->database(), *info, [&] { stored = ReplaceMesh(impl_->database(), *info, mesh); });
+    return stored;
+  });
+  return stored;
 }
 
 void Library::LoadAppearance(const TakeAppearance& take) const {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/dense/densification.h"
 #include "engine/recognition/thumbnail_array.h"
 #include "maps/index/word_rows.h"
 #include "maps/storage/map_record.h"
@@ -78,6 +79,9 @@ class Library {
   // Reads the changes of a map's scene that can be undone, with their assets; empty if there are none for the
   // scene as it is. Throws when they are damaged, which nothing else depends on.
   std::optional<SceneRecord> LoadHistory(std::uint64_t key) const;
+  // Reads the mesh of a map's surfaces; empty if it has none. Throws when it is damaged, which nothing else
+  // depends on. engine::StateOf says whether the map has changed since.
+  std::optional<engine::MapMesh> LoadMesh(std::uint64_t key) const;
   // The appearance of a map, which a place index needs. It has a few kilobytes per keyframe and is read
   // without points or images. For a damaged table the list is empty and `problem` describes the error.
   struct Appearance {
@@ -104,6 +108,11 @@ class Library {
   // removed in the same transaction. Returns false, and writes nothing, when the stored revision is not
   // MapRecord::expected_revision.
   bool Save(const MapRecord& record);
+  // Stores the mesh of a map's surfaces. It is computed from the rest of the map, so that no policy forbids
+  // it and the map does not count as changed. A save that moves or removes a keyframe of the mesh removes it.
+  // Returns false, and writes nothing, when the map does not exist any more or the mesh does not belong to it
+  // as it is stored. Throws when the mesh is too large (see mesh_rows.h).
+  bool SaveMesh(std::uint64_t key, const engine::MapMesh& mesh);
   // Signposts keep leading to the map. Throws if there is no such map, its policy forbids it, or another map
   // has the name.
   void Rename(std::uint64_t key, const std::string& name);

@@ -8,6 +8,7 @@
 #include "maps/index/thumbnail_rows.h"
 #include "maps/index/word_rows.h"
 #include "maps/library/policy_refusal.h"
+#include "maps/storage/mesh_rows.h"
 #include "maps/storage/rows.h"
 
 namespace docent::maps {
@@ -61,6 +62,7 @@ void WriteStructure(const Database& database, const engine::MapSnapshot& snapsho
   info->keyframes = parts.keyframes.size();
   info->points = parts.points.size();
   info->observations = parts.observations.size();
+  RemoveMeshUnlessRight(database, info->key, snapshot);
 }
 
 bool UpdateStructure(const Database& database, const engine::MapSnapshot& snapshot, MapInfo* info) {

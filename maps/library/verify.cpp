@@ -12,6 +12,7 @@
 #include "maps/storage/block_checks.h"
 #include "maps/storage/history_rows.h"
 #include "maps/storage/lens_rows.h"
+#include "maps/storage/mesh_rows.h"
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
 #include "maps/storage/snapshot_reader.h"
@@ -140,6 +141,7 @@ void CheckMap(const Database& database, const MapInfo& info, int threads, const 
     const std::optional<HistoryPart> history = ReadHistory(database, info.key);
     if (history) wanted_assets->insert(history->changes.asset_ids.begin(), history->changes.asset_ids.end());
   });
+  TryMap(database, info, report, [&] { ReadMesh(database, info.key); });
   if (SchemaVersion(database) >= kBlockChecksSince)
     TryMap(database, info, report, [&] { CheckBlocks(database, info); });
   if (SchemaVersion(database) >= kThumbnailsSince) {

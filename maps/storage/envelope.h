@@ -37,6 +37,7 @@ inline constexpr EnvelopeKind kBlockCheckKind = {{'D', 'B', 'L', 'K'}, "the tabl
 inline constexpr EnvelopeKind kPanoramaTableKind = {{'D', 'P', 'A', 'N'}, "the table of panorama maps", 0};
 inline constexpr EnvelopeKind kThumbnailTableKind = {{'D', 'T', 'H', 'M'}, "the table of thumbnails", 0};
 inline constexpr EnvelopeKind kWordTableKind = {{'D', 'W', 'R', 'D'}, "the table of words", 0};
+inline constexpr EnvelopeKind kMeshKind = {{'D', 'M', 'S', 'H'}, "the mesh", 0};
 inline constexpr EnvelopeKind kImageKind = {{'D', 'P', 'I', 'C'}, "the image", 0};
 
 // Writes the header; the caller appends `count` records.

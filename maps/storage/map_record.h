@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/dense/densification.h"
 #include "engine/map/map_snapshot.h"
 #include "maps/storage/byte_stream.h"
 #include "maps/storage/lens_rows.h"
@@ -92,6 +93,8 @@ struct StoredMap {
   MapInfo info;                                         // As in the list of maps.
   std::shared_ptr<const engine::MapSnapshot> snapshot;  // Never null.
   SceneRecord scene;                                    // All assets have their bytes.
+  // The mesh of its surfaces; null if it has none, or a damaged one.
+  std::shared_ptr<const engine::MapMesh> mesh = nullptr;
   // One sentence for each asset of the scene, or the scene itself, that is damaged and was left out.
   std::vector<std::string> lost_content = {};
 };

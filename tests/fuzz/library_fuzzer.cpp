@@ -13,6 +13,7 @@
 #include "maps/storage/checksum.h"
 #include "maps/storage/envelope.h"
 #include "maps/storage/map_codec.h"
+#include "maps/storage/mesh_rows.h"
 #include "maps/storage/panorama_codec.h"
 #include "tests/fuzz/allocation_limit.h"
 
@@ -108,6 +109,14 @@ void DecodeOther(int which, std::span<const std::uint8_t> data) {
     const Bytes bytes = Enveloped(kWordTableKind, count, data.subspan(8));
     const auto decoded = Limited(bytes.size(), kFixedOverhead, [&] { return DecodeWords(kMapKey, bytes); });
     Expect(EncodeWords(kMapKey, decoded) == bytes);
+  } else if (which == 10 && data.size() >= 8) {
+    std::uint64_t count = 0;
+    std::memcpy(&count, data.data(), sizeof(count));
+    const Bytes bytes = Enveloped(kMeshKind, count, data.subspan(8));
+    const auto decoded = Limited(bytes.size(), kFixedOverhead, [&] { return DecodeMesh(kMapKey, bytes); });
+    // Positions are rounded again, so that only the triangles are the same.
+    const Bytes again = EncodeMesh(kMapKey, decoded);
+    Expect(DecodeMesh(kMapKey, again).mesh.triangles == decoded.mesh.triangles);
   } else if (which == 5) {
     StoredKeyFrame keyframe;
     keyframe.keyframe.id = 0;
@@ -132,7 +141,7 @@ extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
-  const int which = data[0] % 10;
+  const int which = data[0] % 11;
   const std::span<const std::uint8_t> rest(data + 1, size - 1);
   try {
     if (which < 4) {

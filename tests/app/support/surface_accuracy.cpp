@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/app/support/surface_accuracy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "content/scene.h"
+
+namespace docent::app {
+namespace {
+
+int CountSeeing(const Simulation& simulation, const std::vector<int>& frames, const Eigen::Vector3d& surface,
+                int enough) {
+  int seeing = 0;
+  for (const int frame : frames) {
+    if (seeing < enough && simulation.IsVisible(frame, surface)) ++seeing;
+  }
+  return seeing;
+}
+
+void AddDepthMap(const Simulation& simulation, const engine::DepthMap& depth, int frame,
+                 const std::vector<int>& others, double metres_per_unit, DepthFigures* figures) {
+  const engine::Rigid3 world_from_camera = simulation.world_from_camera(frame);
+  for (int y = 0; y < depth.inverse_distance.rows; ++y) {
+    for (int x = 0; x < depth.inverse_distance.cols; ++x) {
+      const auto surface =
+          simulation.SurfaceAlong(world_from_camera, engine::LevelZeroFromLevel({x, y}, depth.rays->level()));
+      if (!surface || CountSeeing(simulation, others, *surface, 1) == 0) continue;
+      ++figures->seen;
+      const double inverse = depth.inverse_distance.at<float>(y, x);
+      if (inverse <= 0) continue;
+      ++figures->known;
+      const double truth_m = (*surface - world_from_camera.translation).norm();
+      figures->correct += std::abs(metres_per_unit / inverse / truth_m - 1) < kDepthTolerance;
+    }
+  }
+}
+
+// A square of one unlit colour in the plane z = depth of the camera, far larger than the image.
+content::Scene PlaneBefore(const engine::Rigid3& camera_from_map, double depth) {
+  auto model = std::make_shared<content::Model>();
+  content::Material material;
+  material.base_color = glm::vec4(0, 1, 0, 1);
+  material.unlit = true;
+  material.double_sided = true;
+  model->materials.push_back(material);
+  content::Primitive primitive;
+  for (const glm::vec2& corner : {glm::vec2(-1, -1), glm::vec2(1, -1), glm::vec2(1, 1), glm::vec2(-1, 1)}) {
+    content::Vertex vertex;
+    vertex.position = glm::vec3(corner * static_cast<float>(5 * depth), 0);
+    primitive.vertices.push_back(vertex);
+  }
+  primitive.indices = {0, 1, 2, 0, 2, 3};
+  primitive.material = 0;
+  model->meshes.push_back({"plane", {primitive}});
+  content::Node node;
+  node.mesh = 0;
+  model->nodes.push_back(node);
+  model->roots.push_back(0);
+  auto asset = std::make_shared<content::Asset>();
+  asset->model = std::move(model);
+  content::Entity entity;
+  entity.kind = content::Entity::Kind::kModel;
+  entity.model.asset = asset;
+  const engine::Rigid3 map_from_camera = camera_from_map.inverse();
+  entity.model.map_from_model.rotation = map_from_camera.rotation;
+  entity.model.map_from_model.translation = map_from_camera * Eigen::Vector3d(0, 0, depth);
+  content::Scene scene;
+  scene.entities.push_back(std::move(entity));
+  return scene;
+}
+
+// True depths along the optical axis, metres; 0 where there is no surface.
+cv::Mat TrueDepthImage(const Simulation& simulation, int frame) {
+  const engine::Rigid3 camera_from_world = simulation.world_from_camera(frame).inverse();
+  cv::Mat depths = cv::Mat::zeros(simulation.camera().height_px(), simulation.camera().width_px(), CV_64FC1);
+  for (int y = 0; y < depths.rows; ++y) {
+    for (int x = 0; x < depths.cols; ++x) {
+      const auto surface = simulation.SurfaceAt(frame, Eigen::Vector2d(x, y));
+      if (surface) depths.at<double>(y, x) = (camera_from_world * *surface).z();
+    }
+  }
+  return depths;
+}
+
+double MedianOf(const cv::Mat& depths) {
+  std::vector<double> sorted;
+  for (auto depth = depths.begin<double>(); depth != depths.end<double>(); ++depth) {
+    if (*depth > 0) sorted.push_back(*depth);
+  }
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                   sorted.end());
+  return sorted[sorted.size() / 2];
+}
+
+// Pixels of a mask (0 or 255) that have a neighbour to the right or below of another value.
+cv::Mat BorderOf(const cv::Mat& mask) {
+  cv::Mat border;
+  cv::morphologyEx(mask, border, cv::MORPH_GRADIENT, cv::getStructuringElement(cv::MORPH_CROSS, {3, 3}));
+  return border;
+}
+
+void AddEdgeErrors(const cv::Mat& depths, double plane_m, const cv::Mat& visible, OcclusionFigures* figures) {
+  constexpr double kJump = 1.1;        // Depth on both sides of an edge of an object.
+  constexpr double kFarthest_px = 50;  // An edge that was not drawn at all.
+  constexpr int kBorder_px = 4;        // Edges at the border of the image leave it.
+  cv::Mat distance, inverted = 255 - BorderOf(visible);
+  cv::distanceTransform(inverted, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  for (int y = kBorder_px; y + kBorder_px < depths.rows; ++y) {
+    for (int x = kBorder_px; x + kBorder_px < depths.cols; ++x) {
+      for (const auto& [dx, dy] : {std::pair(1, 0), std::pair(0, 1)}) {
+        const auto [near, far] = std::minmax({depths.at<double>(y, x), depths.at<double>(y + dy, x + dx)});
+        if (!(near > 0 && near < 0.97 * plane_m && far > 1.03 * plane_m && far > kJump * near)) continue;
+        figures->edge_errors_px.push_back(std::min<double>(kFarthest_px, distance.at<float>(y, x)));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+DepthFigures MeasureDepthMaps(const Simulation& simulation,
+                              const std::shared_ptr<const engine::MapSnapshot>& map,
+                              const std::vector<int>& frames, const engine::Sim3& world_from_map) {
+  engine::DepthEstimator estimator(map);
+  std::map<engine::KeyFrameId, engine::DepthMap> depths;
+  for (const engine::DepthViews& views : estimator.views())
+    depths.emplace(views.keyframe, *estimator.Estimate(views));
+  const auto frame_of = [&](engine::KeyFrameId id) {
+    return frames[static_cast<std::size_t>(map->FindKeyFrame(id) - map->keyframes.data())];
+  };
+  DepthFigures figures;
+  for (const engine::DepthViews& views : estimator.views()) {
+    std::vector<const engine::DepthMap*> others;
+    std::vector<int> other_frames;
+    for (const engine::KeyFrameId id : views.neighbours) {
+      other_frames.push_back(frame_of(id));
+      if (const auto found = depths.find(id); found != depths.end()) others.push_back(&found->second);
+    }
+    AddDepthMap(simulation, estimator.KeepConsistent(depths.at(views.keyframe), others),
+                frame_of(views.keyframe), other_frames, world_from_map.scale, &figures);
+  }
+  return figures;
+}
+
+double OcclusionFigures::MedianEdgeError_px() const {
+  if (edge_errors_px.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> sorted = edge_errors_px;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                   sorted.end());
+  return sorted[sorted.size() / 2];
+}
+
+void AddOcclusion(const Simulation& simulation, int frame, const engine::Rigid3& camera_from_map,
+                  double map_units_per_metre, const std::vector<int>& keyframes,
+                  const std::shared_ptr<const engine::SurfaceMesh>& surfaces, ui::Renderer* renderer,
+                  OcclusionFigures* figures, cv::Mat* image) {
+  const cv::Mat depths = TrueDepthImage(simulation, frame);
+  const double plane_m = MedianOf(depths);
+  const content::Scene scene = PlaneBefore(camera_from_map, plane_m * map_units_per_metre);
+  engine::TrackedFrame tracked;
+  tracked.state = engine::TrackingState::kSixDof;
+  tracked.camera_from_map = camera_from_map;
+  simulation.Render(frame, &tracked.frame.image);
+  ui::View view;
+  view.tracked = &tracked;
+  view.camera = &simulation.camera();
+  view.scene = &scene;
+  view.surfaces = surfaces;
+  view.overlay.hud = false;
+  renderer->Draw(view);
+  cv::Mat drawn, visible;
+  renderer->ReadBack(&drawn);
+  if (image != nullptr) *image = drawn;
+  cv::inRange(drawn, cv::Scalar(0, 200, 0), cv::Scalar(60, 255, 60), visible);  // The content's colour.
+
+  for (int y = 0; y < depths.rows; ++y) {
+    for (int x = 0; x < depths.cols; ++x) {
+      const double depth_m = depths.at<double>(y, x);
+      if (depth_m <= 0 || std::abs(depth_m / plane_m - 1) < 0.03) continue;
+      const auto surface = simulation.SurfaceAt(frame, Eigen::Vector2d(x, y));
+      if (!surface || CountSeeing(simulation, keyframes, *surface, 2) < 2) continue;
+      const bool is_drawn = visible.at<std::uint8_t>(y, x) != 0;
+      if (depth_m < plane_m) {
+        ++figures->behind;
+        figures->hidden += !is_drawn;
+      } else {
+        ++figures->before;
+        figures->wrongly_hidden += !is_drawn;
+      }
+    }
+  }
+  AddEdgeErrors(depths, plane_m, visible, figures);
+}
+
+}  // namespace docent::app

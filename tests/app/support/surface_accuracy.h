@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "app/simulator/simulation.h"
+#include "engine/dense/densification.h"
+#include "engine/geometry/sim3.h"
+#include "ui/renderer.h"
+
+// Compares depth, meshes and hidden content with the exact surfaces of a simulation.
+namespace docent::app {
+
+inline constexpr double kDepthTolerance = 0.02;  // Relative to the true distance.
+
+// Counts of pixels; the shares are empty of meaning before something was counted.
+struct DepthFigures {
+  std::size_t seen = 0;     // Pixels whose surface another keyframe sees too.
+  std::size_t known = 0;    // Of these, those with a depth.
+  std::size_t correct = 0;  // Of these, those within kDepthTolerance of the true distance.
+
+  double Completeness() const { return static_cast<double>(correct) / static_cast<double>(seen); }
+  double Accuracy() const { return static_cast<double>(correct) / static_cast<double>(known); }
+};
+
+// Measures the depth maps of all keyframes, checked against each other. frames: the frame of each keyframe.
+// world_from_map: with the scale of the map.
+DepthFigures MeasureDepthMaps(const Simulation& simulation,
+                              const std::shared_ptr<const engine::MapSnapshot>& map,
+                              const std::vector<int>& frames, const engine::Sim3& world_from_map);
+
+struct OcclusionFigures {
+  std::size_t behind = 0,
+              hidden = 0;  // Content pixels behind a surface, and those of them that are not drawn.
+  std::size_t before = 0,
+              wrongly_hidden = 0;      // Content pixels before all surfaces, and those that are not drawn.
+  std::vector<double> edge_errors_px;  // From the true edges of objects before the content to the drawn ones.
+
+  double HiddenShare() const { return static_cast<double>(hidden) / static_cast<double>(behind); }
+  double WronglyHiddenShare() const {
+    return static_cast<double>(wrongly_hidden) / static_cast<double>(before);
+  }
+  double MedianEdgeError_px() const;
+};
+
+// Draws a plane of content across the view of a frame, in the middle of the depths that it sees, and adds
+// what is hidden. keyframes: the frames of the keyframes; pixels whose surface fewer than two of them see are
+// left out, as are those where the plane is within 3 % of the surface. image: receives the drawn image; may
+// be null.
+void AddOcclusion(const Simulation& simulation, int frame, const engine::Rigid3& camera_from_map,
+                  double map_units_per_metre, const std::vector<int>& keyframes,
+                  const std::shared_ptr<const engine::SurfaceMesh>& surfaces, ui::Renderer* renderer,
+                  OcclusionFigures* figures, cv::Mat* image);
+
+}  // namespace docent::app

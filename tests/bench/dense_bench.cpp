@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "maps/maintenance/densify.h"
+#include "maps/storage/mesh_rows.h"
+#include "tests/app/support/simulated_session.h"
+#include "tests/app/support/surface_accuracy.h"
+#include "ui/context.h"
+
+// The surfaces of maps that the program itself built in a simulated scene, against the truth: errors of the
+// camera poses and of the scale are part of it. Counters:
+//   keyframes, depth_s_per_keyframe, mesh_s   size of the map, time of the depth and of the mesh
+//   complete, accurate      share of the pixels that two keyframes see whose depth is within 2 % of the
+//   truth; the same of
+//                           those that have a depth
+//   triangles, mesh_kB      of the mesh as it is stored
+//   hidden, wrongly_hidden  share of the content pixels behind a surface that are hidden; of those before it
+//   edge_px                 median distance of the edges of objects in the drawn image from the true ones
+// DOCENT_BENCH_SCENE (default room) and DOCENT_BENCH_SECONDS (default 12) choose the scene and the duration.
+// With DOCENT_BENCH_IMAGES, the drawn images are written to that folder.
+//
+//   docent_bench --benchmark_filter=DenseSurfaces
+namespace docent::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// A map that was built from a simulation, with its place in the world.
+struct BuiltMap {
+  std::shared_ptr<const app::Simulation> simulation;
+  std::vector<engine::TrackedFrame> frames;
+  std::shared_ptr<const engine::MapSnapshot> map;
+  std::vector<int> keyframes;  // The frame of each keyframe.
+  engine::Sim3 world_from_map;
+};
+
+BuiltMap Build(const std::string& scene, double seconds) {
+  app::SimulationOptions options;
+  options.duration_s = seconds;
+  BuiltMap built;
+  built.simulation = app::MakeSimulation(scene, options);
+  app::simulated_session::SourceRun run = app::simulated_session::RunSource(
+      app::OpenSimulation(built.simulation), app::Pace::kLockstep,
+      app::simulated_session::Options(app::Pace::kLockstep, "map"), nullptr);
+  built.frames = std::move(run.frames);
+  built.map = run.maps.front().snapshot;
+  std::vector<Eigen::Vector3d> in_map, in_world;
+  for (const engine::KeyFrame& keyframe : built.map->keyframes) {
+    int frame = 0;
+    while (frame + 1 < built.simulation->frame_count() && built.simulation->time(frame) < keyframe.time)
+      ++frame;
+    built.keyframes.push_back(frame);
+    in_map.push_back(keyframe.camera_from_map.OriginInSource());
+    in_world.push_back(built.simulation->world_from_camera(frame).translation);
+  }
+  built.world_from_map = engine::AlignSim3(in_world, in_map).value();
+  return built;
+}
+
+app::OcclusionFigures MeasureHiding(const BuiltMap& built, const engine::SurfaceMesh& mesh) {
+  const ui::OffscreenContext context;
+  ui::Renderer renderer;
+  const auto surfaces = std::make_shared<const engine::SurfaceMesh>(mesh);
+  const char* const folder = std::getenv("DOCENT_BENCH_IMAGES");
+  app::OcclusionFigures figures;
+  constexpr std::size_t kEvery = 30;
+  for (std::size_t i = kEvery; i < built.frames.size(); i += kEvery) {
+    const engine::TrackedFrame& frame = built.frames[i];
+    // Earlier poses belong to earlier states of the map, which adjustments have moved since.
+    if (!engine::HasPose(frame.state) || frame.map == nullptr) continue;
+    cv::Mat image;
+    app::AddOcclusion(*built.simulation, static_cast<int>(i), frame.camera_from_map,
+                      1 / built.world_from_map.scale, built.keyframes, surfaces, &renderer, &figures, &image);
+    if (folder != nullptr)
+      cv::imwrite((std::filesystem::path(folder) / ("occlusion-" + std::to_string(i) + ".png")).string(),
+                  image);
+  }
+  return figures;
+}
+
+void DenseSurfaces(benchmark::State& state) {
+  const char* const scene = std::getenv("DOCENT_BENCH_SCENE");
+  const char* const seconds = std::getenv("DOCENT_BENCH_SECONDS");
+  for (auto _ : state) {
+    const BuiltMap built =
+        Build(scene != nullptr ? scene : "room", seconds != nullptr ? std::atof(seconds) : 12);
+    const app::DepthFigures depth =
+        app::MeasureDepthMaps(*built.simulation, built.map, built.keyframes, built.world_from_map);
+    const auto start = Clock::now();
+    double depth_s = 0;
+    std::size_t done = 0;
+    const auto mesh = engine::DensifyMap(built.map, {}, [&](std::size_t count, std::size_t) {
+      depth_s = SecondsSince(start);
+      done = count;
+    });
+    const double mesh_s = SecondsSince(start) - depth_s;
+    const app::OcclusionFigures hiding = MeasureHiding(built, mesh->mesh);
+    state.counters["keyframes"] = static_cast<double>(built.map->keyframes.size());
+    state.counters["depth_s_per_keyframe"] = depth_s / static_cast<double>(done);
+    state.counters["mesh_s"] = mesh_s;
+    state.counters["complete"] = depth.Completeness();
+    state.counters["accurate"] = depth.Accuracy();
+    state.counters["triangles"] = static_cast<double>(mesh->mesh.triangles.size());
+    state.counters["mesh_kB"] = static_cast<double>(maps::MeshBytes(*mesh)) / 1000;
+    state.counters["hidden"] = hiding.HiddenShare();
+    state.counters["wrongly_hidden"] = hiding.WronglyHiddenShare();
+    state.counters["edge_px"] = hiding.MedianEdgeError_px();
+  }
+}
+BENCHMARK(DenseSurfaces)->Unit(benchmark::kSecond)->Iterations(1);
+
+}  // namespace
+}  // namespace docent::bench

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/surface_drawer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "tests/ui/ui_testing.h"
+
+namespace docent::ui {
+namespace {
+
+// A rectangle of the plane z = depth in the map.
+std::shared_ptr<const engine::SurfaceMesh> Screen(float left, float right, float depth) {
+  auto mesh = std::make_shared<engine::SurfaceMesh>();
+  mesh->vertices = {{left, -9, depth}, {right, -9, depth}, {right, 9, depth}, {left, 9, depth}};
+  mesh->triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+class SurfaceDrawerTest : public OffscreenTest {
+ protected:
+  // Draws a green square of 1 x 1 units at a depth over a black image.
+  cv::Mat Draw(double content_depth, std::shared_ptr<const engine::SurfaceMesh> surfaces,
+               const engine::CameraModel& camera = StronglyDistorted()) {
+    if (renderer_ == nullptr) renderer_ = std::make_unique<Renderer>();
+    content::Scene scene;
+    scene.entities.push_back(Facing(SquareModel(1.0f, glm::vec4(0, 1, 0, 1)), {0, 0, content_depth}));
+    const engine::TrackedFrame tracked =
+        Tracked(cv::Mat::zeros(camera.height_px(), camera.width_px(), CV_8UC3));
+    View view;
+    view.tracked = &tracked;
+    view.camera = &camera;
+    view.scene = &scene;
+    view.surfaces = std::move(surfaces);
+    view.overlay.hud = false;
+    renderer_->Draw(view);
+    cv::Mat image;
+    renderer_->ReadBack(&image);
+    return image;
+  }
+  static int Green(const cv::Mat& image) {
+    cv::Mat channel;
+    cv::extractChannel(image, channel, 1);
+    return cv::countNonZero(channel > 127);
+  }
+
+ private:
+  std::unique_ptr<Renderer> renderer_;  // Needs the context of the fixture.
+};
+
+TEST_F(SurfaceDrawerTest, HidesContentBehindASurface) {
+  const int all = Green(Draw(2, nullptr));
+  ASSERT_GT(all, 10'000);
+  EXPECT_EQ(Green(Draw(2, Screen(-9, 9, 1))), 0);
+  EXPECT_NEAR(Green(Draw(2, Screen(-9, 0, 1))), 0.5 * all, 0.01 * all);
+  EXPECT_EQ(Green(Draw(2, Screen(-9, 9, 3))), all) << "the surface is behind";
+  EXPECT_EQ(Green(Draw(2, nullptr)), all) << "the surfaces of earlier images are forgotten";
+}
+
+TEST_F(SurfaceDrawerTest, ShowsContentThatStandsOnASurface) {
+  const int all = Green(Draw(2, nullptr));
+  EXPECT_EQ(Green(Draw(2, Screen(-9, 9, 2))), all);
+  EXPECT_EQ(Green(Draw(2, Screen(-9, 9, 1.97F))), all) << "within the depth bias";
+  EXPECT_EQ(Green(Draw(2, Screen(-9, 9, 1.93F))), 0);
+}
+
+TEST_F(SurfaceDrawerTest, HidesContentBehindASurfaceAtTheCamera) {
+  EXPECT_EQ(Green(Draw(50, Screen(-9, 9, 0.01F))), 0);
+}
+
+TEST_F(SurfaceDrawerTest, PutsEdgesWhereTheLensShowsThem) {
+  // The left edge of the surface is the plane x = 0.15 at depth 1, which the lens bends.
+  const engine::CameraModel camera = StronglyDistorted();
+  const cv::Mat image = Draw(1.5, Screen(0.15F, 9, 1));
+  for (const double y : {-0.25, 0.0, 0.25}) {
+    const auto edge = camera.Project({0.15, y, 1});
+    ASSERT_TRUE(edge);
+    int visible = 0;
+    const int row = static_cast<int>(std::lround(edge->y()));
+    for (int x = 0; x < image.cols; ++x) {
+      if (image.at<cv::Vec3b>(row, x)[1] > 127) visible = x;
+    }
+    EXPECT_NEAR(visible + 0.5, edge->x(), 1.0) << "in row " << row;
+  }
+}
+
+TEST_F(SurfaceDrawerTest, WorksInEveryFaceOfAFisheyeLens) {
+  const engine::CameraModel camera(engine::LensModel::kKannalaBrandt, {480, 480, 140, 140, 240, 240}, {});
+  ASSERT_GT(Green(Draw(0.3, nullptr, camera)), 10'000) << "the square must reach beyond one face";
+  EXPECT_EQ(Green(Draw(0.3, Screen(-9, 9, 0.2F), camera)), 0);
+}
+
+}  // namespace
+}  // namespace docent::ui
