@@ -15,6 +15,7 @@ void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame) {
   } else if (last_with_pose_ && state_.HoldsContent(frame->seconds)) {
     frame->held_camera_from_map = last_with_pose_->tracked.camera_from_map;
     frame->shown.scene = last_with_pose_->shown.scene;
+    frame->shown.surfaces = last_with_pose_->shown.surfaces;
   } else {
     last_with_pose_.reset();
   }
