@@ -11,8 +11,15 @@
 #include "engine/dense/surface_mesh.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/tracking/tracked_frame.h"
+#include "ui/edge_arrow.h"
 
 namespace docent::ui {
+
+// Where a visitor can go on, if that is outside the image.
+struct WayOn {
+  EdgeArrow arrow;   // In the camera's image.
+  std::string text;  // "To the lions".
+};
 
 // What a visitor on a tour is told, without the words of an engineer.
 struct VisitorDisplay {
@@ -21,6 +28,7 @@ struct VisitorDisplay {
   bool is_searching = false;       // The place is not known, and an animation asks to look around.
   std::string sentence;            // What to do; empty for nothing.
   std::vector<std::string> stops;  // The known places by name, as a help to find one.
+  std::optional<WayOn> way_on;
   // Images of known places that resemble what the camera sees (CV_8UC1 or CV_8UC3), which are drawn beside
   // each other.
   std::vector<cv::Mat> views;

@@ -2,8 +2,10 @@
 #include "ui/visitor_display.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "ui/figures.h"
+#include "ui/letterbox.h"
 #include "ui/theme.h"
 
 namespace docent::ui {
@@ -11,6 +13,7 @@ namespace docent::ui {
 namespace {
 
 constexpr Color kBoard = theme::kHeadsUp, kTitle = theme::kText;
+constexpr Color kWay{1.0f, 0.84f, 0.45f, 1.0f};
 
 // The place in the corner, which stays while the visitor is there.
 void DrawPlace(const std::string& place, double unit, Canvas* canvas) {
@@ -42,6 +45,33 @@ void DrawArrival(const std::string& place, double opacity, double unit, Canvas* 
   canvas->Box(middle - 0.5 * size - padding, middle + 0.5 * size + padding, 14 * unit,
               Faded(kBoard, opacity));
   canvas->Text(place, style, {middle.x(), middle.y() - 0.5 * size.y()}, 0.5);
+}
+
+// An arrow at the edge of the image with its text beside it.
+void DrawWayOn(const WayOn& way, const engine::CameraModel& camera, double unit, Canvas* canvas) {
+  const Letterbox box =
+      FitImage(camera.width_px(), camera.height_px(), canvas->width_px(), canvas->height_px());
+  const Eigen::Vector2d tip = box.WindowFromImage(way.arrow.tip), ahead = way.arrow.direction;
+  const Eigen::Vector2d aside(-ahead.y(), ahead.x()), tail = tip - 44 * unit * ahead;
+  for (const auto& [width, color] : {std::pair(12 * unit, kBoard), std::pair(7 * unit, kWay)}) {
+    canvas->Line(tail, tip, width, color);
+    for (const double side : {-1.0, 1.0})
+      canvas->Line(tip, tip - 18 * unit * ahead + side * 16 * unit * aside, width, color);
+  }
+  if (way.text.empty()) return;
+  TextStyle style;
+  style.size_px = 18 * unit;
+  style.max_width_px = std::max(40, static_cast<int>(0.4 * canvas->width_px()));
+  style.max_height_px = static_cast<int>(60 * unit);
+  style.color = kTitle;
+  const Eigen::Vector2d size = canvas->Measure(way.text, style), padding(10 * unit, 5 * unit);
+  // Behind the arrow, where its box does not touch the arrow, and inside the image.
+  const Eigen::Vector2d half = 0.5 * size + padding;
+  const double reach = 10 * unit + half.cwiseProduct(ahead).norm();
+  const Eigen::Vector2d last(canvas->width_px() - 1, canvas->height_px() - 1);
+  const Eigen::Vector2d middle = (tail - reach * ahead).cwiseMin(last - half).cwiseMax(half);
+  canvas->Box(middle - half, middle + half, 8 * unit, kBoard);
+  canvas->Text(way.text, style, middle - 0.5 * size);
 }
 
 // Names below each other in the upper half of the image. Those that do not fit are counted in the last line.
@@ -97,6 +127,7 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
     DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
     DrawStops(visitor.stops, unit, canvas);
   }
+  if (visitor.way_on && view.camera != nullptr) DrawWayOn(*visitor.way_on, *view.camera, unit, canvas);
   DrawPlace(visitor.place, unit, canvas);
   DrawArrival(visitor.place, visitor.arrival, unit, canvas);
   const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;

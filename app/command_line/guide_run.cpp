@@ -282,7 +282,8 @@ std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& trac
   // What the window shows as a warning already is not shown twice.
   if (state->message.empty() && !warnings_.contains(frame->shown.advice))
     frame->message = frame->shown.advice;
-  if (state->visitor) state->visitor->Guide(frame);
+  if (state->visitor)
+    state->visitor->Guide(frame, frame->camera ? *frame->camera : *cameras_[CameraOf(tracked)].model);
   return frame;
 }
 

@@ -164,7 +164,7 @@ std::string TextOf(engine::Hint hint) {
     case Hint::kMoveMoreSlowly:
       return "Move more slowly.";
     case Hint::kLowTexture:
-      return "Too little detail here: point the camera at the exhibit.";
+      return "Little detail is in view: turn towards the exhibit.";
     case Hint::kLeftMap:
       return "You have left the mapped area: look back.";
     case Hint::kLookBack:

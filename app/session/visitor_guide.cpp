@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/session/visitor_guide.h"
 
+#include <cmath>
+
 namespace docent::app {
 
-void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame) {
+void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine::CameraModel& camera) {
   const bool has_pose = engine::HasPose(frame->tracked.state);
   frame->visitor =
       state_.Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(), frame->shown.hint);
   FindViews(*frame);
   frame->visitor->views = views_;
   if (!views_.empty()) frame->visitor->sentence = "Go to where you see one of these.";
+  if (has_pose && frame->shown.scene)
+    frame->visitor->way_on = WayOutOfSight(*frame->shown.scene, camera, frame->tracked.camera_from_map);
   if (has_pose) {
     last_with_pose_ = frame;
   } else if (last_with_pose_ && state_.HoldsContent(frame->seconds)) {
@@ -19,6 +23,29 @@ void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame) {
   } else {
     last_with_pose_.reset();
   }
+}
+
+std::optional<ui::WayOn> WayOutOfSight(const content::Scene& scene, const engine::CameraModel& camera,
+                                       const engine::Rigid3& camera_from_map) {
+  constexpr double kMargin = 0.04;  // Ratio of the image's width.
+  const double margin_px = kMargin * camera.width_px();
+  std::optional<ui::WayOn> way;
+  double least_angle = 0;
+  for (const content::Entity& entity : scene.entities) {
+    if (entity.kind != content::Entity::Kind::kSignpost || entity.hidden || entity.signpost.to_key == 0)
+      continue;
+    // The middle of the board is what has to be seen.
+    const content::Signpost& sign = entity.signpost;
+    const Eigen::Vector3d board_in_map = sign.anchor + 0.5 * sign.height_m * sign.up;
+    const Eigen::Vector3d board = camera_from_map * board_in_map;
+    const auto arrow = ui::ArrowTowards(camera, board, margin_px);
+    if (!arrow) return std::nullopt;
+    const double angle = std::atan2(board.head<2>().norm(), board.z());
+    if (way && angle >= least_angle) continue;
+    way = ui::WayOn{*arrow, sign.to_map.empty() ? sign.text : "To " + sign.to_map};
+    least_angle = angle;
+  }
+  return way;
 }
 
 // Once a second while the visitor searches.

@@ -20,9 +20,9 @@ class VisitorGuide {
   VisitorGuide(Session* session, std::vector<std::string> stops)
       : session_(session), state_(std::move(stops)) {}
 
-  // Sets the frame's `visitor`. Shortly after a loss the frame gets the content and the pose of the last
-  // frame that had one.
-  void Guide(const std::shared_ptr<ShownFrame>& frame);
+  // Sets the frame's `visitor`; `camera` is the lens of its image. Shortly after a loss the frame gets the
+  // content and the pose of the last frame that had one.
+  void Guide(const std::shared_ptr<ShownFrame>& frame, const engine::CameraModel& camera);
 
  private:
   void FindViews(const ShownFrame& frame);
@@ -33,5 +33,10 @@ class VisitorGuide {
   std::optional<double> views_time_s_;
   std::shared_ptr<const ShownFrame> last_with_pose_;
 };
+
+// The nearest signpost in the scene that leads to another map, if none of those is seen; empty if one is, or
+// there is none. Nearest is what the camera has to turn least for.
+std::optional<ui::WayOn> WayOutOfSight(const content::Scene& scene, const engine::CameraModel& camera,
+                                       const engine::Rigid3& camera_from_map);
 
 }  // namespace docent::app

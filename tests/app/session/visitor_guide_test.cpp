@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/visitor_guide.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+namespace docent::app {
+
+namespace {
+
+engine::CameraModel Pinhole() {
+  engine::CameraModel::Intrinsics in;
+  in.width_px = 640;
+  in.height_px = 480;
+  in.fx = in.fy = 500;
+  in.cx = 319.5;
+  in.cy = 239.5;
+  return engine::CameraModel(engine::LensModel::kRadialTangential, in, {});
+}
+
+content::Entity SignAt(const Eigen::Vector3d& place, std::uint64_t to_key, const std::string& to_map) {
+  content::Entity entity;
+  entity.name = to_map;
+  entity.kind = content::Entity::Kind::kSignpost;
+  entity.signpost.text = "a sign";
+  entity.signpost.anchor = place;
+  entity.signpost.to_key = to_key;
+  entity.signpost.to_map = to_map;
+  return entity;
+}
+
+TEST(WayOutOfSight, IsThatToTheSignpostThatTheCameraHasToTurnLeastFor) {
+  content::Scene scene;
+  scene.entities = {SignAt({-3, 0, -1}, 1, "Masks"), SignAt({3, 0, 1}, 2, "Lions")};
+  const auto way = WayOutOfSight(scene, Pinhole(), {});
+  ASSERT_TRUE(way);
+  EXPECT_EQ(way->text, "To Lions");
+  EXPECT_GT(way->arrow.direction.x(), 0.99);
+  // After half a turn the other one is nearer, now to the right as well.
+  const engine::Rigid3 turned{engine::Rotation3::Exp({0, std::numbers::pi, 0}), {0, 0, 0}};
+  const auto other = WayOutOfSight(scene, Pinhole(), turned);
+  ASSERT_TRUE(other);
+  EXPECT_EQ(other->text, "To Masks");
+  EXPECT_GT(other->arrow.direction.x(), 0.99);
+}
+
+TEST(WayOutOfSight, IsNotShownWhereASignpostIsSeen) {
+  content::Scene scene;
+  scene.entities = {SignAt({-3, 0, -1}, 1, "Masks"), SignAt({0, 0, 2}, 2, "Lions")};
+  EXPECT_FALSE(WayOutOfSight(scene, Pinhole(), {}));
+  scene.entities.back().hidden = true;
+  EXPECT_TRUE(WayOutOfSight(scene, Pinhole(), {}));
+}
+
+TEST(WayOutOfSight, IgnoresSignpostsThatLeadNowhere) {
+  content::Scene scene;
+  EXPECT_FALSE(WayOutOfSight(scene, Pinhole(), {}));
+  scene.entities = {SignAt({3, 0, 1}, 0, "")};
+  EXPECT_FALSE(WayOutOfSight(scene, Pinhole(), {}));
+}
+
+}  // namespace
+
+}  // namespace docent::app
