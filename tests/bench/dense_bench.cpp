@@ -40,7 +40,6 @@ double SecondsSince(Clock::time_point start) {
 // A map that was built from a simulation, with its place in the world.
 struct BuiltMap {
   std::shared_ptr<const app::Simulation> simulation;
-  std::vector<engine::TrackedFrame> frames;
   std::shared_ptr<const engine::MapSnapshot> map;
   std::vector<int> keyframes;  // The frame of each keyframe.
   engine::Sim3 world_from_map;
@@ -54,7 +53,6 @@ BuiltMap Build(const std::string& scene, double seconds) {
   app::simulated_session::SourceRun run = app::simulated_session::RunSource(
       app::OpenSimulation(built.simulation), app::Pace::kLockstep,
       app::simulated_session::Options(app::Pace::kLockstep, "map"), nullptr);
-  built.frames = std::move(run.frames);
   built.map = run.maps.front().snapshot;
   std::vector<Eigen::Vector3d> in_map, in_world;
   for (const engine::KeyFrame& keyframe : built.map->keyframes) {
@@ -69,20 +67,25 @@ BuiltMap Build(const std::string& scene, double seconds) {
   return built;
 }
 
+// The true pose of a frame in the map, so that the error of tracking is not measured too.
+engine::Rigid3 CameraFromMap(const BuiltMap& built, int frame) {
+  const engine::Rigid3 camera_from_world = built.simulation->world_from_camera(frame).inverse();
+  const engine::Sim3& world_from_map = built.world_from_map;
+  return {camera_from_world.rotation * world_from_map.rotation,
+          camera_from_world * world_from_map.translation / world_from_map.scale};
+}
+
 app::OcclusionFigures MeasureHiding(const BuiltMap& built, const engine::SurfaceMesh& mesh) {
   const ui::OffscreenContext context;
   ui::Renderer renderer;
   const auto surfaces = std::make_shared<const engine::SurfaceMesh>(mesh);
   const char* const folder = std::getenv("DOCENT_BENCH_IMAGES");
   app::OcclusionFigures figures;
-  constexpr std::size_t kEvery = 30;
-  for (std::size_t i = kEvery; i < built.frames.size(); i += kEvery) {
-    const engine::TrackedFrame& frame = built.frames[i];
-    // Earlier poses belong to earlier states of the map, which adjustments have moved since.
-    if (!engine::HasPose(frame.state) || frame.map == nullptr) continue;
+  constexpr int kFirst = 45, kEvery = 60;
+  for (int i = kFirst; i < built.simulation->frame_count(); i += kEvery) {
     cv::Mat image;
-    app::AddOcclusion(*built.simulation, static_cast<int>(i), frame.camera_from_map,
-                      1 / built.world_from_map.scale, built.keyframes, surfaces, &renderer, &figures, &image);
+    app::AddOcclusion(*built.simulation, i, CameraFromMap(built, i), 1 / built.world_from_map.scale,
+                      built.keyframes, surfaces, &renderer, &figures, &image);
     if (folder != nullptr)
       cv::imwrite((std::filesystem::path(folder) / ("occlusion-" + std::to_string(i) + ".png")).string(),
                   image);

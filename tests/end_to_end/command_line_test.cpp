@@ -51,6 +51,7 @@ TEST(CommandLine, HelpShowsAnExampleForEverySubcommand) {
       {"maps", "export"},
       {"maps", "import"},
       {"maps", "optimize"},
+      {"maps", "densify"},
       {"maps", "join"},
       {"maps", "recover"},
       {"content"},
