@@ -119,8 +119,7 @@ void EntitySection::DrawRow(const content::Entity& entity, const AuthoringFacts&
   ImGui::PopStyleVar();
   if (ImGui::IsItemHovered() && !entity.group.empty()) ImGui::SetTooltip("%s", entity.group.c_str());
   ImGui::TableNextColumn();
-  ImGui::TextDisabled(
-      "%s", entity.kind == content::Entity::Kind::kModel ? strings::kKindModel : strings::kKindSignpost);
+  ImGui::TextDisabled("%s", strings::NameOf(entity.kind));
   ImGui::TableNextColumn();
   bool shown = !entity.hidden;
   if (ImGui::Checkbox("##shown", &shown)) actions_->SetHidden({entity.name}, !shown);
@@ -158,7 +157,8 @@ void EntitySection::Fill(const content::Entity& entity, const AuthoringFacts& fa
   const bool other = std::exchange(shown_, entity.name) != entity.name;
   if (is_writing_ && !other) return;
   name_ = entity.name;
-  text_ = entity.signpost.text;
+  const std::string* const text = content::TextOf(entity);
+  text_ = text != nullptr ? *text : "";
   const engine::Sim3 pose = TransformOf(entity, facts.camera_from_map.OriginInSource());
   const Eigen::Vector3d angles = AnglesOf(facts.map_from_upright.inverse() * pose.rotation);
   for (int i = 0; i < 3; ++i) {
@@ -194,7 +194,7 @@ void EntitySection::DrawFields(const content::Entity& entity, const AuthoringFac
 void EntitySection::DrawPose(const content::Entity& entity, const AuthoringFacts& facts) {
   ImGui::BeginGroup();
   bool completed = NumberFields(strings::kPosition, position_, 3, "%.4g");
-  if (entity.kind == content::Entity::Kind::kModel)
+  if (content::HasModel(entity) || entity.kind == content::Entity::Kind::kTrail)
     completed = NumberFields(strings::kRotation, angles_deg_, 3, "%.1f°") || completed;
   completed = NumberFields(strings::kSize, &size_, 1, "%.4g") || completed;
   ImGui::EndGroup();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "content/scene.h"
+
 // All texts of the author's window, in one place, so that they can be read together and translated. Texts
 // after "##" are not shown; they only tell widgets apart.
 namespace docent::ui::strings {
@@ -84,8 +86,23 @@ inline constexpr const char* kContents = "Contents";
 inline constexpr const char* kNothingPlaced = "Nothing is placed in this map.";
 inline constexpr const char* kName = "Name";
 inline constexpr const char* kKind = "Kind";
-inline constexpr const char* kKindModel = "model";
-inline constexpr const char* kKindSignpost = "sign";
+constexpr const char* NameOf(content::Entity::Kind kind) {
+  switch (kind) {
+    case content::Entity::Kind::kModel:
+      return "model";
+    case content::Entity::Kind::kSignpost:
+      return "sign";
+    case content::Entity::Kind::kLabel:
+      return "label";
+    case content::Entity::Kind::kImage:
+      return "image";
+    case content::Entity::Kind::kSound:
+      return "sound";
+    case content::Entity::Kind::kTrail:
+      return "trail";
+  }
+  return "";
+}
 inline constexpr const char* kShown = "Shown";
 inline constexpr const char* kLocked = "Locked";
 inline constexpr const char* kDistance = "Distance";
