@@ -6,113 +6,12 @@
 #include <optional>
 
 #include "app/files/text_file.h"
+#include "app/script/line_reader.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
 
 namespace {
-
-struct Word {
-  std::string text;
-  bool quoted = false;
-};
-
-// Reads the words of one line in order; its errors name the line.
-class LineReader {
- public:
-  LineReader(std::string_view line, std::string where) : where_(std::move(where)) { Split(line); }
-
-  bool AtEnd() const { return next_ == words_.size(); }
-
-  const std::string& Take(const char* what) {
-    if (AtEnd()) Fail(std::string("expected ") + what + " at the end of the line");
-    return words_[next_++].text;
-  }
-  // Consumes the next word if it is this keyword. A quoted word is never a keyword.
-  bool TakeIf(std::string_view keyword) {
-    if (AtEnd() || words_[next_].quoted || words_[next_].text != keyword) return false;
-    ++next_;
-    return true;
-  }
-  void Expect(std::string_view keyword) {
-    if (TakeIf(keyword)) return;
-    Fail("expected '" + std::string(keyword) + "'" + (AtEnd() ? " at the end of the line" : Instead()));
-  }
-  std::string TakeName(const char* what) {
-    const std::string& name = Take(what);
-    if (name.empty()) Fail(std::string("expected ") + what + " that is not empty");
-    return name;
-  }
-  double TakeNumber(const char* what) {
-    const std::string& text = Take(what);
-    const auto value = ParseNumber(text);
-    if (!value) Fail(std::string("expected ") + what + " instead of '" + text + "'");
-    return *value;
-  }
-  // The next number of a list whose items are separated by commas: `last` becomes true where no comma
-  // follows.
-  double TakeItemNumber(const char* what, bool* last) {
-    const std::string text = Take(what);
-    const bool comma = text.ends_with(',');
-    const auto value = ParseNumber(std::string_view(text).substr(0, text.size() - (comma ? 1 : 0)));
-    if (!value) Fail(std::string("expected ") + what + " instead of '" + text + "'");
-    *last = !comma && !TakeIf(",");
-    return *value;
-  }
-  Eigen::Vector2d TakePixel() {
-    Expect("pixel");
-    const double u = TakeNumber("a pixel's column");
-    const double v = TakeNumber("a pixel's row");
-    return {u, v};
-  }
-  void ExpectEnd() {
-    if (!AtEnd()) {
-      Fail("unexpected '" + words_[next_].text + "'; put a name with spaces in double quotes");
-    }
-  }
-  [[noreturn]] void Fail(const std::string& what) const { throw Error(where_ + ": " + what + "."); }
-
- private:
-  std::string Instead() const { return " instead of '" + words_[next_].text + "'"; }
-
-  void Split(std::string_view line) {
-    constexpr std::string_view kBlank = " \t\r\f\v";
-    for (std::size_t i = 0; i < line.size();) {
-      if (kBlank.find(line[i]) != std::string_view::npos) {
-        ++i;
-      } else if (line[i] == '#') {
-        return;
-      } else if (line[i] == '"') {
-        i = ReadQuoted(line, i + 1);
-      } else {
-        const std::size_t end = std::min(line.find_first_of(" \t\r\f\v#\"", i), line.size());
-        words_.push_back({std::string(line.substr(i, end - i)), false});
-        i = end;
-      }
-    }
-  }
-
-  // Returns the index after the closing quote.
-  std::size_t ReadQuoted(std::string_view line, std::size_t i) {
-    Word word{{}, true};
-    for (; i < line.size() && line[i] != '"'; ++i) {
-      if (line[i] != '\\') {
-        word.text += line[i];
-        continue;
-      }
-      const char escaped = ++i < line.size() ? line[i] : '\0';
-      if (escaped != '"' && escaped != '\\' && escaped != 'n') Fail("expected \", \\ or n after a backslash");
-      word.text += escaped == 'n' ? '\n' : escaped;
-    }
-    if (i >= line.size()) Fail("a double quote is not closed");
-    words_.push_back(std::move(word));
-    return i + 1;
-  }
-
-  std::string where_;
-  std::vector<Word> words_;
-  std::size_t next_ = 0;
-};
 
 Command ParseMap(LineReader* line) {
   if (line->TakeIf("new")) return NewMap{line->TakeName("a map's name")};
@@ -134,6 +33,12 @@ Command ParseMap(LineReader* line) {
   }
   const std::string word = line->Take("new, stop, use, policy, rename or remove");
   line->Fail("unknown command 'map " + word + "'; use new, stop, use, policy, rename or remove after map");
+}
+
+Eigen::Vector3d TakePoint(LineReader* line) {
+  Eigen::Vector3d point;
+  for (double& coordinate : point) coordinate = line->TakeNumber("X Y Z in map units");
+  return point;
 }
 
 Command ParsePlace(LineReader* line) {
@@ -159,6 +64,79 @@ Command ParseSignpost(LineReader* line) {
   line->Expect("at");
   command.pixel = line->TakePixel();
   if (line->TakeIf("to")) command.to_map = line->TakeName("a map's name");
+  return command;
+}
+
+Command ParseLabel(LineReader* line) {
+  PlaceLabel command;
+  command.text = line->TakeName("a label's text");
+  line->Expect("at");
+  command.pixel = line->TakePixel();
+  if (line->TakeIf("offset")) command.offset = TakePoint(line);
+  return command;
+}
+
+Command ParseImage(LineReader* line) {
+  PlaceImage command;
+  command.file = line->TakeName("an image's file");
+  line->Expect("at");
+  command.pixel = line->TakePixel();
+  while (!line->AtEnd()) {
+    if (line->TakeIf("scale")) {
+      command.scale = line->TakeNumber("a length in map units");
+    } else if (line->TakeIf("upright")) {
+      command.upright = true;
+    } else {
+      break;
+    }
+  }
+  return command;
+}
+
+Command ParseSound(LineReader* line) {
+  PlaceSound command;
+  command.file = line->TakeName("a sound's file");
+  command.caption = line->TakeName("a caption");
+  line->Expect("at");
+  command.pixel = line->TakePixel();
+  if (line->TakeIf("range")) command.range = line->TakeNumber("a range in map units");
+  return command;
+}
+
+MapPoint ParsePoint(LineReader* line, bool* last) {
+  MapPoint point;
+  if (line->TakeIf("pixel")) {
+    const double u = line->TakeNumber("a pixel's column");
+    point.pixel = {u, line->TakeItemNumber("a pixel's row", last)};
+  } else {
+    for (const int axis : {0, 1}) point.in_map[axis] = line->TakeNumber("X Y Z in map units");
+    point.in_map[2] = line->TakeItemNumber("X Y Z in map units", last);
+  }
+  return point;
+}
+
+Command ParseTrail(LineReader* line) {
+  bool last = false;
+  if (line->TakeIf("extend")) {
+    const std::string name = line->TakeName("a name");
+    line->Expect("to");
+    const MapPoint point = ParsePoint(line, &last);
+    if (!last) line->Fail("expected one point");
+    return ExtendTrail{name, point};
+  }
+  if (line->TakeIf("shorten")) return ShortenTrail{line->TakeName("a name")};
+  PlaceTrail command;
+  if (line->TakeIf("width")) command.width = line->TakeNumber("a width in map units");
+  line->Expect("at");
+  while (!last) command.points.push_back(ParsePoint(line, &last));
+  return command;
+}
+
+Command ParseText(LineReader* line) {
+  SetEntityText command;
+  command.name = line->TakeName("a name");
+  command.text = line->Take("a text");
+  if (line->TakeIf("in")) command.language = line->TakeName("a language tag");
   return command;
 }
 
@@ -205,13 +183,9 @@ std::vector<PointPair> ParsePairs(LineReader* line) {
     PointPair& pair = pairs.emplace_back();
     for (double& coordinate : pair.in_model) coordinate = line->TakeNumber("a point X Y Z of the model");
     line->Expect("to");
-    if (line->TakeIf("pixel")) {
-      const double u = line->TakeNumber("a pixel's column");
-      pair.pixel = {u, line->TakeItemNumber("a pixel's row", &last)};
-    } else {
-      for (const int axis : {0, 1}) pair.in_map[axis] = line->TakeNumber("X Y Z in map units");
-      pair.in_map[2] = line->TakeItemNumber("X Y Z in map units", &last);
-    }
+    const MapPoint place = ParsePoint(line, &last);
+    pair.in_map = place.in_map;
+    pair.pixel = place.pixel;
   }
   return pairs;
 }
@@ -247,7 +221,7 @@ Command ParsePaste(LineReader* line) {
   return command;
 }
 
-// The commands that name models and signposts; empty for another command.
+// The commands that name what is placed; empty for another command.
 std::optional<Command> ParseEdit(LineReader* line) {
   using content::EntityFlag;
   if (line->TakeIf("move")) return ParseMove(line);
@@ -269,9 +243,10 @@ std::optional<Command> ParseEdit(LineReader* line) {
     const std::string name = line->TakeName("a name");
     return RenameEntity{name, line->TakeName("a new name")};
   }
-  if (line->TakeIf("text")) {
+  if (line->TakeIf("text")) return ParseText(line);
+  if (line->TakeIf("offset")) {
     const std::string name = line->TakeName("a name");
-    return SetEntityText{name, line->TakeName("a text")};
+    return SetLabelOffset{name, TakePoint(line)};
   }
   if (line->TakeIf("target")) return ParseTarget(line);
   if (line->TakeIf("lock")) return ParseFlag(line, EntityFlag::kLocked, true);
@@ -288,6 +263,10 @@ Command ParseCommand(LineReader* line) {
   if (line->TakeIf("map")) return ParseMap(line);
   if (line->TakeIf("place")) return ParsePlace(line);
   if (line->TakeIf("signpost")) return ParseSignpost(line);
+  if (line->TakeIf("label")) return ParseLabel(line);
+  if (line->TakeIf("image")) return ParseImage(line);
+  if (line->TakeIf("sound")) return ParseSound(line);
+  if (line->TakeIf("trail")) return ParseTrail(line);
   if (auto edit = ParseEdit(line)) return *std::move(edit);
   if (line->TakeIf("undo")) return Undo{};
   if (line->TakeIf("redo")) return Redo{};
@@ -295,127 +274,6 @@ Command ParseCommand(LineReader* line) {
   const std::string word = line->Take("a command");
   line->Fail("unknown command '" + word + "'");
 }
-
-// Quotes the text if it would not be read back as one word otherwise.
-std::string Quoted(const std::string& text) {
-  const bool plain = !text.empty() && text.find_first_of(" \t\r\n\f\v#\"\\") == std::string::npos;
-  if (plain) return text;
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    if (c == '\n') {
-      quoted += "\\n";
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + '"';
-}
-
-// Names are always quoted, so that a name is never mistaken for an optional keyword.
-std::string AlwaysQuoted(const std::string& text) {
-  const std::string quoted = Quoted(text);
-  return quoted.starts_with('"') ? quoted : '"' + quoted + '"';
-}
-
-std::string Number(double value) {
-  return FormatNumber(value, 17);
-}
-std::string Pixel(const Eigen::Vector2d& pixel) {
-  return "pixel " + Number(pixel.x()) + ' ' + Number(pixel.y());
-}
-
-std::string Names(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += ' ' + AlwaysQuoted(name);
-  return text;
-}
-
-std::string Point(const Eigen::Vector3d& point) {
-  return Number(point.x()) + ' ' + Number(point.y()) + ' ' + Number(point.z());
-}
-
-std::string Pairs(const std::vector<PointPair>& pairs) {
-  std::string text;
-  for (const PointPair& pair : pairs) {
-    text += (text.empty() ? " " : ", ") + Point(pair.in_model) + " to " +
-            (pair.pixel ? Pixel(*pair.pixel) : Point(pair.in_map));
-  }
-  return text;
-}
-
-struct Formatter {
-  std::string operator()(const NewMap& c) const { return "map new " + AlwaysQuoted(c.name); }
-  std::string operator()(const StopMap&) const { return "map stop"; }
-  std::string operator()(const UseMap& c) const { return "map use " + AlwaysQuoted(c.name); }
-  std::string operator()(const SetPolicy& c) const {
-    return "map policy " + AlwaysQuoted(c.name) + ' ' + maps::ToString(c.policy);
-  }
-  std::string operator()(const RenameMap& c) const {
-    return "map rename " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.new_name);
-  }
-  std::string operator()(const RemoveMap& c) const { return "map remove " + AlwaysQuoted(c.name); }
-  std::string operator()(const PlaceModel& c) const {
-    return "place " + Quoted(c.file) + " at " + Pixel(c.pixel) +
-           (c.scale ? " scale " + Number(*c.scale) : "") +
-           (c.yaw_deg != 0 ? " yaw " + Number(c.yaw_deg) : "");
-  }
-  std::string operator()(const PlaceSignpost& c) const {
-    return "signpost " + AlwaysQuoted(c.text) + " at " + Pixel(c.pixel) +
-           (c.to_map.empty() ? "" : " to " + AlwaysQuoted(c.to_map));
-  }
-  std::string operator()(const MoveEntity& c) const {
-    const std::string begin = "move " + Quoted(c.name) + ' ';
-    if (c.to_pixel) return begin + "to " + Pixel(*c.to_pixel);
-    return begin + Number(c.by_in_map.x()) + ' ' + Number(c.by_in_map.y()) + ' ' + Number(c.by_in_map.z());
-  }
-  std::string operator()(const RotateEntity& c) const {
-    return "rotate " + Quoted(c.name) + ' ' + Number(c.angle_deg);
-  }
-  std::string operator()(const ScaleEntity& c) const {
-    return "scale " + Quoted(c.name) + ' ' + Number(c.factor);
-  }
-  std::string operator()(const TransformEntities& c) const {
-    std::string text = "transform";
-    for (const auto& [name, pose] : c.poses) {
-      text += (&name == &c.poses.front().name ? " " : ", ") + Quoted(name);
-      for (const double value : pose.translation) text += ' ' + Number(value);
-      const Eigen::Vector4d quaternion = Settled(pose.rotation).quaternion().coeffs();
-      for (const double value : quaternion) text += ' ' + Number(value);
-      text += ' ' + Number(pose.scale);
-    }
-    return text;
-  }
-  std::string operator()(const AlignEntity& c) const { return "align " + Quoted(c.name) + Pairs(c.pairs); }
-  std::string operator()(const BendEntity& c) const { return "bend " + Quoted(c.name) + Pairs(c.pairs); }
-  std::string operator()(const UnbendEntity& c) const { return "unbend " + Quoted(c.name); }
-  std::string operator()(const RemoveEntities& c) const { return "remove" + Names(c.names); }
-  std::string operator()(const DuplicateEntities& c) const { return "duplicate" + Names(c.names); }
-  std::string operator()(const RenameEntity& c) const {
-    return "rename " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.new_name);
-  }
-  std::string operator()(const SetEntityText& c) const {
-    return "text " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.text);
-  }
-  std::string operator()(const SetSignpostTarget& c) const {
-    return "target " + AlwaysQuoted(c.name) + (c.to_map.empty() ? "" : ' ' + AlwaysQuoted(c.to_map));
-  }
-  std::string operator()(const SetEntityFlag& c) const {
-    const bool is_lock = c.flag == content::EntityFlag::kLocked;
-    const char* const verb = is_lock ? (c.value ? "lock" : "unlock") : (c.value ? "hide" : "show");
-    return verb + Names(c.names);
-  }
-  std::string operator()(const GroupEntities& c) const {
-    return (c.group.empty() ? "ungroup" : "group " + AlwaysQuoted(c.group)) + Names(c.names);
-  }
-  std::string operator()(const PasteEntities& c) const {
-    return "paste" + Names(c.names) + " from " + AlwaysQuoted(c.from_map) +
-           (c.to_pixel ? " at " + Pixel(*c.to_pixel) : "");
-  }
-  std::string operator()(const Undo&) const { return "undo"; }
-  std::string operator()(const Redo&) const { return "redo"; }
-  std::string operator()(const Save&) const { return "save"; }
-};
 
 }  // namespace
 
@@ -442,17 +300,6 @@ std::vector<TimedCommand> ParseScript(std::string_view text, const std::string& 
 
 std::vector<TimedCommand> ReadScript(const std::filesystem::path& path) {
   return ParseScript(ReadTextFile(path, std::size_t{16} << 20), "'" + path.string() + "'");
-}
-
-std::string FormatCommand(const Command& command) {
-  return std::visit(Formatter{}, command);
-}
-
-std::string FormatScriptLine(const TimedCommand& command) {
-  std::string seconds = FormatSeconds(command.time);
-  seconds.erase(seconds.find_last_not_of('0') + 1);  // "12.5" is easier to read than "12.500000000"
-  if (seconds.ends_with('.')) seconds.pop_back();
-  return seconds + ' ' + FormatCommand(command.command);
 }
 
 }  // namespace docent::app

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <string>
+
+#include "app/files/text_file.h"
+#include "app/script/script_file.h"
+
+// FormatCommand and FormatScriptLine of script_file.h.
+namespace docent::app {
+
+namespace {
+
+// Quotes the text if it would not be read back as one word otherwise.
+std::string Quoted(const std::string& text) {
+  const bool plain = !text.empty() && text.find_first_of(" \t\r\n\f\v#\"\\") == std::string::npos;
+  if (plain) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    if (c == '\n') {
+      quoted += "\\n";
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + '"';
+}
+
+// Names are always quoted, so that a name is never mistaken for an optional keyword.
+std::string AlwaysQuoted(const std::string& text) {
+  const std::string quoted = Quoted(text);
+  return quoted.starts_with('"') ? quoted : '"' + quoted + '"';
+}
+
+std::string Number(double value) {
+  return FormatNumber(value, 17);
+}
+std::string Pixel(const Eigen::Vector2d& pixel) {
+  return "pixel " + Number(pixel.x()) + ' ' + Number(pixel.y());
+}
+
+std::string Names(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += ' ' + AlwaysQuoted(name);
+  return text;
+}
+
+std::string Point(const Eigen::Vector3d& point) {
+  return Number(point.x()) + ' ' + Number(point.y()) + ' ' + Number(point.z());
+}
+
+std::string Pairs(const std::vector<PointPair>& pairs) {
+  std::string text;
+  for (const PointPair& pair : pairs) {
+    text += (text.empty() ? " " : ", ") + Point(pair.in_model) + " to " +
+            (pair.pixel ? Pixel(*pair.pixel) : Point(pair.in_map));
+  }
+  return text;
+}
+
+std::string Place(const MapPoint& point) {
+  return point.pixel ? Pixel(*point.pixel) : Point(point.in_map);
+}
+
+struct Formatter {
+  std::string operator()(const NewMap& c) const { return "map new " + AlwaysQuoted(c.name); }
+  std::string operator()(const StopMap&) const { return "map stop"; }
+  std::string operator()(const UseMap& c) const { return "map use " + AlwaysQuoted(c.name); }
+  std::string operator()(const SetPolicy& c) const {
+    return "map policy " + AlwaysQuoted(c.name) + ' ' + maps::ToString(c.policy);
+  }
+  std::string operator()(const RenameMap& c) const {
+    return "map rename " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.new_name);
+  }
+  std::string operator()(const RemoveMap& c) const { return "map remove " + AlwaysQuoted(c.name); }
+  std::string operator()(const PlaceModel& c) const {
+    return "place " + Quoted(c.file) + " at " + Pixel(c.pixel) +
+           (c.scale ? " scale " + Number(*c.scale) : "") +
+           (c.yaw_deg != 0 ? " yaw " + Number(c.yaw_deg) : "");
+  }
+  std::string operator()(const PlaceSignpost& c) const {
+    return "signpost " + AlwaysQuoted(c.text) + " at " + Pixel(c.pixel) +
+           (c.to_map.empty() ? "" : " to " + AlwaysQuoted(c.to_map));
+  }
+  std::string operator()(const PlaceLabel& c) const {
+    return "label " + AlwaysQuoted(c.text) + " at " + Pixel(c.pixel) +
+           (c.offset ? " offset " + Point(*c.offset) : "");
+  }
+  std::string operator()(const PlaceImage& c) const {
+    return "image " + Quoted(c.file) + " at " + Pixel(c.pixel) +
+           (c.scale ? " scale " + Number(*c.scale) : "") + (c.upright ? " upright" : "");
+  }
+  std::string operator()(const PlaceSound& c) const {
+    return "sound " + Quoted(c.file) + ' ' + AlwaysQuoted(c.caption) + " at " + Pixel(c.pixel) +
+           (c.range ? " range " + Number(*c.range) : "");
+  }
+  std::string operator()(const PlaceTrail& c) const {
+    std::string points;
+    for (const MapPoint& point : c.points) points += (points.empty() ? " " : ", ") + Place(point);
+    return "trail" + (c.width ? " width " + Number(*c.width) : std::string()) + " at" + points;
+  }
+  std::string operator()(const ExtendTrail& c) const {
+    return "trail extend " + AlwaysQuoted(c.name) + " to " + Place(c.point);
+  }
+  std::string operator()(const ShortenTrail& c) const { return "trail shorten " + AlwaysQuoted(c.name); }
+  std::string operator()(const SetLabelOffset& c) const {
+    return "offset " + AlwaysQuoted(c.name) + ' ' + Point(c.offset);
+  }
+  std::string operator()(const MoveEntity& c) const {
+    const std::string begin = "move " + Quoted(c.name) + ' ';
+    if (c.to_pixel) return begin + "to " + Pixel(*c.to_pixel);
+    return begin + Number(c.by_in_map.x()) + ' ' + Number(c.by_in_map.y()) + ' ' + Number(c.by_in_map.z());
+  }
+  std::string operator()(const RotateEntity& c) const {
+    return "rotate " + Quoted(c.name) + ' ' + Number(c.angle_deg);
+  }
+  std::string operator()(const ScaleEntity& c) const {
+    return "scale " + Quoted(c.name) + ' ' + Number(c.factor);
+  }
+  std::string operator()(const TransformEntities& c) const {
+    std::string text = "transform";
+    for (const auto& [name, pose] : c.poses) {
+      text += (&name == &c.poses.front().name ? " " : ", ") + Quoted(name);
+      for (const double value : pose.translation) text += ' ' + Number(value);
+      const Eigen::Vector4d quaternion = Settled(pose.rotation).quaternion().coeffs();
+      for (const double value : quaternion) text += ' ' + Number(value);
+      text += ' ' + Number(pose.scale);
+    }
+    return text;
+  }
+  std::string operator()(const AlignEntity& c) const { return "align " + Quoted(c.name) + Pairs(c.pairs); }
+  std::string operator()(const BendEntity& c) const { return "bend " + Quoted(c.name) + Pairs(c.pairs); }
+  std::string operator()(const UnbendEntity& c) const { return "unbend " + Quoted(c.name); }
+  std::string operator()(const RemoveEntities& c) const { return "remove" + Names(c.names); }
+  std::string operator()(const DuplicateEntities& c) const { return "duplicate" + Names(c.names); }
+  std::string operator()(const RenameEntity& c) const {
+    return "rename " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.new_name);
+  }
+  std::string operator()(const SetEntityText& c) const {
+    return "text " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.text) +
+           (c.language.empty() ? "" : " in " + AlwaysQuoted(c.language));
+  }
+  std::string operator()(const SetSignpostTarget& c) const {
+    return "target " + AlwaysQuoted(c.name) + (c.to_map.empty() ? "" : ' ' + AlwaysQuoted(c.to_map));
+  }
+  std::string operator()(const SetEntityFlag& c) const {
+    const bool is_lock = c.flag == content::EntityFlag::kLocked;
+    const char* const verb = is_lock ? (c.value ? "lock" : "unlock") : (c.value ? "hide" : "show");
+    return verb + Names(c.names);
+  }
+  std::string operator()(const GroupEntities& c) const {
+    return (c.group.empty() ? "ungroup" : "group " + AlwaysQuoted(c.group)) + Names(c.names);
+  }
+  std::string operator()(const PasteEntities& c) const {
+    return "paste" + Names(c.names) + " from " + AlwaysQuoted(c.from_map) +
+           (c.to_pixel ? " at " + Pixel(*c.to_pixel) : "");
+  }
+  std::string operator()(const Undo&) const { return "undo"; }
+  std::string operator()(const Redo&) const { return "redo"; }
+  std::string operator()(const Save&) const { return "save"; }
+};
+
+}  // namespace
+
+std::string FormatCommand(const Command& command) {
+  return std::visit(Formatter{}, command);
+}
+
+std::string FormatScriptLine(const TimedCommand& command) {
+  std::string seconds = FormatSeconds(command.time);
+  seconds.erase(seconds.find_last_not_of('0') + 1);  // "12.5" is easier to read than "12.500000000"
+  if (seconds.ends_with('.')) seconds.pop_back();
+  return seconds + ' ' + FormatCommand(command.command);
+}
+
+}  // namespace docent::app
