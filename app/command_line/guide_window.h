@@ -54,7 +54,8 @@ struct WindowLink {
 // is shown large and the other small; a click on the small image swaps them. Main thread only, as GLFW
 // requires. Throws Error when there is no display.
 //
-// Keys of a tour: p points, k keyframes, h name of the place, d details of tracking, c or tab swap cameras, f11 full screen, control-q close.
+// Keys of a tour: p points, k keyframes, h name of the place, d details of tracking, c or tab swap cameras,
+// f11 full screen, control-q close.
 void ShowInWindow(const GuideRequest& request, std::span<const CalibratedCamera> cameras, FrameSlot* slot,
                   const WindowLink& link);
 
