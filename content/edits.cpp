@@ -271,6 +271,13 @@ SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::s
   });
 }
 
+SceneChange OffsetEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& offset_in_map) {
+  return ChangeOf(scene, name, "move the board of", [&](Entity* entity) {
+    if (entity->kind != Entity::Kind::kLabel) RefuseKind(*entity, "has no board beside it.");
+    entity->label.offset = offset_in_map;
+  });
+}
+
 SceneChange AddPointEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& point_in_map) {
   return ChangeOf(scene, name, "add a point to",
                   [&](Entity* entity) { TrailOf(entity, "has no points.").points.push_back(point_in_map); });

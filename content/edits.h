@@ -56,6 +56,8 @@ SceneChange TextEdit(const Scene& scene, const std::string& name, const std::str
 SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::string& to_map,
                        std::uint64_t to_key);
 
+// Of a label: where its board is, from its anchor.
+SceneChange OffsetEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& offset_in_map);
 // Of a trail: a further point at its end, and without the last one.
 SceneChange AddPointEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& point_in_map);
 SceneChange RemovePointEdit(const Scene& scene, const std::string& name);

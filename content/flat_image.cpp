@@ -47,7 +47,10 @@ std::shared_ptr<Model> FlatImageModel(const std::string& file, std::span<const s
   limits.max_image_side_px = kMaxImageSidePx;
   limits.max_image_pixels = kMaxImagePixels;
   std::uint64_t pixels_left = kMaxImagePixels;
-  Image image = DecodeImage(file, "the file", bytes, limits, &pixels_left);
+  return FlatModel(DecodeImage(file, "the file", bytes, limits, &pixels_left));
+}
+
+std::shared_ptr<Model> FlatModel(Image image) {
   const glm::vec2 size(image.width_px, image.height_px);
   const glm::vec2 half = 0.5f * size / std::max(size.x, size.y);
 

@@ -20,8 +20,11 @@ inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{32} << 20;
 bool IsImageFile(std::span<const std::uint8_t> bytes);
 
 // A rectangle that shows the image in its own colours, whatever the light: in the model's xy plane, upright
-// (y up) and seen from +z, around the origin, with a longer side of one metre. Its back is plain. Throws
-// Error, which names the file, when the bytes are no PNG or JPEG, damaged or too large.
+// (y up) and seen from +z, around the origin, with a longer side of one metre. Its back is plain. The image
+// has at least one pixel.
+std::shared_ptr<Model> FlatModel(Image image);
+// The same of a file. Throws Error, which names the file, when the bytes are no PNG or JPEG, damaged or too
+// large.
 std::shared_ptr<Model> FlatImageModel(const std::string& file, std::span<const std::uint8_t> bytes);
 
 }  // namespace docent::content

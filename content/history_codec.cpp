@@ -158,7 +158,9 @@ class ChangeReader {
       auto asset = find_asset_(id);
       if (asset) return asset;
       *complete = false;
-      return std::shared_ptr<const Asset>(std::make_shared<Asset>());
+      auto missing = std::make_shared<Asset>();
+      missing->id = id;
+      return std::shared_ptr<const Asset>(std::move(missing));
     };
     return EntityFromJson(where_, place + "." + name, *state, version_, find_or_note);
   }

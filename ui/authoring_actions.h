@@ -38,8 +38,8 @@ class AuthoringActions {
   virtual void Redo() = 0;
   virtual void Save() = 0;
   virtual void Quit(bool save) = 0;
-  // Opens the file dialog of the desktop.
-  virtual void ChooseModelFile() = 0;
+  // Opens the file dialog of the desktop for a file of this kind, which the choices then name.
+  virtual void ChooseFile(content::AssetKind kind) = 0;
 
   // `add`: adds it to the selection, or takes it from there.
   virtual void Select(const std::string& name, bool add) = 0;
@@ -48,7 +48,12 @@ class AuthoringActions {
   virtual void CopySelected() = 0;
   virtual void Paste() = 0;
   virtual void Rename(const std::string& name, const std::string& new_name) = 0;
-  virtual void SetText(const std::string& name, const std::string& text) = 0;
+  // For readers of this language, which is a tag (content/language.h); empty: for all others.
+  virtual void SetText(const std::string& name, const std::string& text, const std::string& language) = 0;
+  // Of the board of a label, in map units along the map's axes.
+  virtual void SetOffset(const std::string& name, const Eigen::Vector3d& offset) = 0;
+  // Removes the last point of a trail.
+  virtual void ShortenTrail(const std::string& name) = 0;
   // To no map with an empty name.
   virtual void SetTarget(const std::string& name, const std::string& to_map) = 0;
   virtual void SetLocked(const std::vector<std::string>& names, bool locked) = 0;
@@ -94,7 +99,7 @@ struct AuthoringFacts {
 };
 
 // What a click in the image does.
-enum class AuthoringTool { kSelect, kModel, kSignpost };
+enum class AuthoringTool { kSelect, kModel, kSignpost, kLabel, kImage, kSound, kTrail };
 
 // What the next click in the image says about the space of the map, before the tool is used.
 enum class MapPick { kNone, kFloor, kMeasureFrom, kMeasureTo };
@@ -109,6 +114,10 @@ struct AuthoringChoices {
   std::string sign_text, sign_to_map;
   MapPick pick = MapPick::kNone;
   double length_m = 1;  // Between the two points that are measured.
+  std::string label_text;
+  std::string image_file;
+  bool image_upright = false;  // Else flush with the surface.
+  std::string sound_file, caption;
   bool show_points = false, show_keyframes = false, show_status = true;
   bool from_above = false;     // The map from above instead of the image.
   bool show_coverage = false;  // A small map from above in a corner of the image.

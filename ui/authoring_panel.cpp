@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <utility>
 
 #include "ui/strings.h"
 #include "ui/theme.h"
@@ -31,9 +32,9 @@ void Wrapped(const char* text, const Color& color) {
 }
 
 // Continues the line if a button with this label still fits into it.
-void SameLineIfFits(const char* label) {
+void SameLineIfFits(const char* label, float extra = 0) {
   const ImGuiStyle& style = ImGui::GetStyle();
-  const float width = ImGui::CalcTextSize(label).x + 2 * style.FramePadding.x;
+  const float width = ImGui::CalcTextSize(label).x + 2 * style.FramePadding.x + extra;
   const float end = ImGui::GetItemRectMax().x + style.ItemSpacing.x + width;
   if (end < ImGui::GetWindowPos().x + ImGui::GetContentRegionMax().x) ImGui::SameLine();
 }
@@ -153,21 +154,57 @@ void AuthoringPanel::DrawPlace(const AuthoringFacts& facts) {
     if (ImGui::RadioButton(label, choices_.tool == tool)) choices_.tool = tool;
   };
   tool_button(strings::kToolSelect, AuthoringTool::kSelect);
-  SameLineIfFits(strings::kToolModel);
-  tool_button(strings::kToolModel, AuthoringTool::kModel);
-  SameLineIfFits(strings::kToolSignpost);
-  tool_button(strings::kToolSignpost, AuthoringTool::kSignpost);
+  constexpr std::pair<const char*, AuthoringTool> kTools[] = {
+      {strings::kToolModel, AuthoringTool::kModel}, {strings::kToolSignpost, AuthoringTool::kSignpost},
+      {strings::kToolLabel, AuthoringTool::kLabel}, {strings::kToolImage, AuthoringTool::kImage},
+      {strings::kToolSound, AuthoringTool::kSound}, {strings::kToolTrail, AuthoringTool::kTrail}};
+  for (const auto& [label, tool] : kTools) {
+    SameLineIfFits(label, ImGui::GetFrameHeight());
+    tool_button(label, tool);
+  }
   if (choices_.tool == AuthoringTool::kModel) DrawModelChoice(facts);
   if (choices_.tool == AuthoringTool::kSignpost) DrawSignChoice(facts);
+  if (choices_.tool == AuthoringTool::kLabel) DrawLabelChoice();
+  if (choices_.tool == AuthoringTool::kImage) DrawImageChoice();
+  if (choices_.tool == AuthoringTool::kSound) DrawSoundChoice();
+  if (choices_.tool == AuthoringTool::kTrail) Wrapped(strings::kClickToPlaceTrail, theme::kMutedText);
 }
 
-void AuthoringPanel::DrawModelChoice(const AuthoringFacts& facts) {
+void AuthoringPanel::DrawFileField(const char* hint, content::AssetKind kind, std::string* file) {
   const ImGuiStyle& style = ImGui::GetStyle();
   ImGui::SetNextItemWidth(-ImGui::CalcTextSize(strings::kBrowse).x - 2 * style.FramePadding.x -
                           style.ItemSpacing.x);
-  ImGui::InputTextWithHint("##model file", strings::kModelFileHint, &choices_.model_file);
+  ImGui::InputTextWithHint("##file", hint, file);
   ImGui::SameLine();
-  if (ImGui::Button(strings::kBrowse)) actions_->ChooseModelFile();
+  if (ImGui::Button(strings::kBrowse)) actions_->ChooseFile(kind);
+}
+
+void AuthoringPanel::DrawLabelChoice() {
+  ImGui::InputTextMultiline("##label text", &choices_.label_text,
+                            ImVec2(-1.0f, 3.5f * ImGui::GetTextLineHeight()));
+  Wrapped(choices_.label_text.empty() ? strings::kWriteText : strings::kClickToPlaceLabel, theme::kMutedText);
+}
+
+void AuthoringPanel::DrawImageChoice() {
+  DrawFileField(strings::kImageFileHint, content::AssetKind::kImage, &choices_.image_file);
+  ImGui::Checkbox(strings::kUpright, &choices_.image_upright);
+  Wrapped(choices_.image_file.empty() ? strings::kChooseImage : strings::kClickToPlaceImage,
+          theme::kMutedText);
+  Wrapped(strings::kDropFiles, theme::kMutedText);
+}
+
+void AuthoringPanel::DrawSoundChoice() {
+  DrawFileField(strings::kSoundFileHint, content::AssetKind::kSound, &choices_.sound_file);
+  ImGui::SetNextItemWidth(-1.0f);
+  ImGui::InputTextWithHint("##caption", strings::kCaptionHint, &choices_.caption);
+  Wrapped(choices_.sound_file.empty() ? strings::kChooseSound
+          : choices_.caption.empty()  ? strings::kWriteCaption
+                                      : strings::kClickToPlaceSound,
+          theme::kMutedText);
+}
+
+void AuthoringPanel::DrawModelChoice(const AuthoringFacts& facts) {
+  DrawFileField(strings::kModelFileHint, content::AssetKind::kModel, &choices_.model_file);
   if (facts.files != nullptr && !facts.files->empty()) {
     Wrapped(strings::kFiles, theme::kMutedText);
     const float rows = static_cast<float>(std::min<std::size_t>(facts.files->size(), 5));

@@ -37,6 +37,11 @@ class AuthoringPanel {
   void DrawPlace(const AuthoringFacts& facts);
   void DrawModelChoice(const AuthoringFacts& facts);
   void DrawSignChoice(const AuthoringFacts& facts);
+  void DrawLabelChoice();
+  void DrawImageChoice();
+  void DrawSoundChoice();
+  // A field for the name of a file of this kind, with a button that opens the desktop's dialog.
+  void DrawFileField(const char* hint, content::AssetKind kind, std::string* file);
   void DrawView();
   void StartMap(const AuthoringFacts& facts);
 

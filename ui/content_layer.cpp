@@ -34,21 +34,21 @@ PixelRectangle RectangleOf(const LensFace& face, const MeshDrawer::Cover& cover)
 
 }  // namespace
 
-ContentLayer::ContentLayer(int samples, int max_texture_px)
+ContentLayer::ContentLayer(int samples, int max_texture_px, const std::string& language)
     : samples_(samples),
       mesh_drawer_(max_texture_px),
-      warp_program_("lens warp", kFullScreenVertexShader, kWarpFragmentShader) {
+      warp_program_("lens warp", kFullScreenVertexShader, kWarpFragmentShader),
+      shapes_(language) {
   warp_program_.AssignTextureUnits({"lookup", "atlas"});
 }
 
 ContentLayer::~ContentLayer() = default;
 
 void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-                        const content::Scene& scene, double animation_seconds, const RenderTarget& image,
-                        std::shared_ptr<const engine::SurfaceMesh> surfaces) {
-  ++frame_;
+                        const content::Scene& scene, double animation_seconds, bool markers,
+                        const RenderTarget& image, std::shared_ptr<const engine::SurfaceMesh> surfaces) {
   const std::vector<ModelInstance> instances =
-      Instances(scene, camera_from_map.OriginInSource(), animation_seconds);
+      Instances(scene, camera_from_map.OriginInSource(), animation_seconds, markers);
   mesh_drawer_.Prepare(instances, glm::vec3(0.0f, -1.0f, 0.0f));
   surface_drawer_.Prepare(std::move(surfaces));
   if (instances.empty()) return;
@@ -142,11 +142,12 @@ ContentLayer::Lens& ContentLayer::FindLens(const engine::CameraModel& camera) {
 
 std::vector<ModelInstance> ContentLayer::Instances(const content::Scene& scene,
                                                    const Eigen::Vector3d& eye_in_map,
-                                                   double animation_seconds) {
+                                                   double animation_seconds, bool markers) {
   std::vector<ModelInstance> instances;
   instances.reserve(scene.entities.size());
   for (const content::Entity& entity : scene.entities) {
-    if (entity.hidden) continue;
+    if (entity.hidden || entity.kind == content::Entity::Kind::kLabel) continue;
+    if (entity.kind == content::Entity::Kind::kSound && !markers) continue;
     content::EntityShape shape = shapes_.ShapeOf(entity, eye_in_map);
     if (shape.model == nullptr) continue;
     ModelInstance instance;

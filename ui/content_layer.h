@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "content/scene.h"
@@ -21,14 +22,15 @@ namespace docent::ui {
 // cached between calls. Single thread, single context.
 class ContentLayer {
  public:
-  ContentLayer(int samples, int max_texture_px);
+  // `language`: that of the reader (see EntityShapes).
+  ContentLayer(int samples, int max_texture_px, const std::string& language);
   ~ContentLayer();
 
   // Composites the scene over the contents of `image`, an image target of the camera's size whose row 0 is
-  // the top. Pixels that no content covers keep their exact values. Content behind the surfaces is hidden;
-  // null: none is.
+  // the top. Pixels that no content covers keep their exact values. Labels are not drawn (see label_board.h),
+  // and sounds only with `markers`. Content behind the surfaces is hidden; null: none is.
   void Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-            const content::Scene& scene, double animation_seconds, const RenderTarget& image,
+            const content::Scene& scene, double animation_seconds, bool markers, const RenderTarget& image,
             std::shared_ptr<const engine::SurfaceMesh> surfaces = nullptr);
   std::size_t cached_models() const { return mesh_drawer_.cached_models(); }
 
@@ -45,7 +47,7 @@ class ContentLayer {
   PixelRectangle DrawAtlas(const engine::Rigid3& camera_from_map, Lens* lens);
   Lens& FindLens(const engine::CameraModel& camera);
   std::vector<ModelInstance> Instances(const content::Scene& scene, const Eigen::Vector3d& eye_in_map,
-                                       double animation_seconds);
+                                       double animation_seconds, bool markers);
 
   int samples_;
   MeshDrawer mesh_drawer_;

@@ -31,6 +31,20 @@ bool RowButton(const char* label) {
   return ImGui::Button(label);
 }
 
+const char* SizeLabel(content::Entity::Kind kind) {
+  if (kind == content::Entity::Kind::kSound) return strings::kRange;
+  return kind == content::Entity::Kind::kTrail ? strings::kWidth : strings::kSize;
+}
+
+// The first text of an entity, or its variant in a language, which is empty if there is none.
+std::string TextIn(const content::Entity& entity, const std::string& language) {
+  const std::string* const text = content::TextOf(entity);
+  if (text == nullptr || language.empty()) return text != nullptr ? *text : "";
+  const content::Translations& translations = *content::TranslationsOf(entity);
+  const auto found = translations.find(language);
+  return found != translations.end() ? found->second : "";
+}
+
 // Three numbers in a row. Returns whether a change of one of them was completed.
 bool NumberFields(const char* label, double* values, int count, const char* format) {
   ImGui::TextUnformatted(label);
@@ -119,8 +133,7 @@ void EntitySection::DrawRow(const content::Entity& entity, const AuthoringFacts&
   ImGui::PopStyleVar();
   if (ImGui::IsItemHovered() && !entity.group.empty()) ImGui::SetTooltip("%s", entity.group.c_str());
   ImGui::TableNextColumn();
-  ImGui::TextDisabled(
-      "%s", entity.kind == content::Entity::Kind::kModel ? strings::kKindModel : strings::kKindSignpost);
+  ImGui::TextDisabled("%s", strings::NameOf(entity.kind));
   ImGui::TableNextColumn();
   bool shown = !entity.hidden;
   if (ImGui::Checkbox("##shown", &shown)) actions_->SetHidden({entity.name}, !shown);
@@ -157,8 +170,10 @@ void EntitySection::DrawSelected(const AuthoringFacts& facts) {
 void EntitySection::Fill(const content::Entity& entity, const AuthoringFacts& facts) {
   const bool other = std::exchange(shown_, entity.name) != entity.name;
   if (is_writing_ && !other) return;
+  if (other) language_.clear();
   name_ = entity.name;
-  text_ = entity.signpost.text;
+  text_ = TextIn(entity, content::LanguageTag(language_));
+  for (int i = 0; i < 3; ++i) offset_[i] = entity.label.offset[i];
   const engine::Sim3 pose = TransformOf(entity, facts.camera_from_map.OriginInSource());
   const Eigen::Vector3d angles = AnglesOf(facts.map_from_upright.inverse() * pose.rotation);
   for (int i = 0; i < 3; ++i) {
@@ -178,25 +193,55 @@ void EntitySection::DrawFields(const content::Entity& entity, const AuthoringFac
   is_writing_ = ImGui::IsItemActive();
   if (ImGui::IsItemDeactivatedAfterEdit() && name_ != entity.name && !name_.empty())
     actions_->Rename(entity.name, name_);
+  if (content::TextOf(entity) != nullptr) DrawText(entity);
   if (entity.kind == content::Entity::Kind::kSignpost) {
-    ImGui::InputTextMultiline("##text", &text_, ImVec2(-1.0f, 3.5f * ImGui::GetTextLineHeight()));
-    is_writing_ = ImGui::IsItemActive() || is_writing_;
-    if (ImGui::IsItemDeactivatedAfterEdit() && text_ != entity.signpost.text && !text_.empty())
-      actions_->SetText(entity.name, text_);
     std::string to_map = entity.signpost.to_map;
     ImGui::SetNextItemWidth(0.6f * ImGui::GetContentRegionAvail().x);
     if (DrawMapChoice(strings::kLeadsTo, facts.maps, &to_map)) actions_->SetTarget(entity.name, to_map);
   }
+  DrawLabelAndTrail(entity);
   DrawPose(entity, facts);
+  ImGui::EndDisabled();
+}
+
+// The text and, below it, the language whose variant it is.
+void EntitySection::DrawText(const content::Entity& entity) {
+  ImGui::InputTextMultiline("##text", &text_, ImVec2(-1.0f, 3.5f * ImGui::GetTextLineHeight()));
+  is_writing_ = ImGui::IsItemActive() || is_writing_;
+  const std::string tag = content::LanguageTag(language_);
+  const bool is_valid = language_.empty() || !tag.empty();
+  const std::string shown = TextIn(entity, tag);
+  // An empty text removes the variant of a language.
+  if (ImGui::IsItemDeactivatedAfterEdit() && is_valid && text_ != shown && (!text_.empty() || !tag.empty()))
+    actions_->SetText(entity.name, text_, tag);
+  ImGui::SetNextItemWidth(-1.0f);
+  if (ImGui::InputTextWithHint("##language", strings::kLanguageHint, &language_))
+    text_ = TextIn(entity, content::LanguageTag(language_));
+  if (!is_valid) Remark(strings::kNoLanguage);
+}
+
+void EntitySection::DrawLabelAndTrail(const content::Entity& entity) {
+  if (entity.kind == content::Entity::Kind::kLabel) {
+    ImGui::BeginGroup();
+    const bool completed = NumberFields(strings::kBoardOffset, offset_, 3, "%.4g");
+    ImGui::EndGroup();
+    is_writing_ = ImGui::IsItemActive() || is_writing_;
+    const Eigen::Vector3d offset(offset_[0], offset_[1], offset_[2]);
+    if (completed && offset.allFinite()) actions_->SetOffset(entity.name, offset);
+  }
+  if (entity.kind != content::Entity::Kind::kTrail) return;
+  ImGui::Text(strings::kTrailPoints, static_cast<int>(entity.trail.points.size()));
+  ImGui::BeginDisabled(entity.trail.points.size() <= content::kMinTrailPoints);
+  if (RowButton(strings::kRemoveLastPoint)) actions_->ShortenTrail(entity.name);
   ImGui::EndDisabled();
 }
 
 void EntitySection::DrawPose(const content::Entity& entity, const AuthoringFacts& facts) {
   ImGui::BeginGroup();
   bool completed = NumberFields(strings::kPosition, position_, 3, "%.4g");
-  if (entity.kind == content::Entity::Kind::kModel)
+  if (content::HasModel(entity) || entity.kind == content::Entity::Kind::kTrail)
     completed = NumberFields(strings::kRotation, angles_deg_, 3, "%.1f°") || completed;
-  completed = NumberFields(strings::kSize, &size_, 1, "%.4g") || completed;
+  completed = NumberFields(SizeLabel(entity.kind), &size_, 1, "%.4g") || completed;
   ImGui::EndGroup();
   is_writing_ = ImGui::IsItemActive() || is_writing_;
   if (!completed) return;

@@ -22,6 +22,8 @@ class EntitySection {
  private:
   void DrawRow(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawFields(const content::Entity& entity, const AuthoringFacts& facts);
+  void DrawText(const content::Entity& entity);
+  void DrawLabelAndTrail(const content::Entity& entity);
   void DrawPose(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawButtons(const content::Entity& first, const AuthoringFacts& facts);
   // Copies what the fields show from the entity, unless it is being written.
@@ -31,6 +33,8 @@ class EntitySection {
   bool begin_rename_ = false, is_writing_ = false;
   std::string shown_;  // The entity that the fields belong to.
   std::string name_, text_;
+  std::string language_;  // Of the text that is shown; empty for the first one.
+  double offset_[3] = {};
   double position_[3] = {}, angles_deg_[3] = {}, size_ = 1;
 };
 

@@ -1,22 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ui/entity_shapes.h"
 
+#include "ui/label_board.h"
 #include "ui/signpost_model.h"
+#include "ui/sound_marker.h"
+#include "ui/trail_model.h"
 
 namespace docent::ui {
+namespace {
 
-engine::Sim3 TransformOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map) {
-  if (entity.kind == content::Entity::Kind::kModel) return entity.model.map_from_model;
-  return SignpostPose(entity.signpost, eye_in_map);
+// Relative to the first point, so that a trail that is only moved keeps its model.
+std::vector<double> TrailKey(const content::Trail& trail) {
+  std::vector<double> key = {trail.width, trail.up.x(), trail.up.y(), trail.up.z()};
+  for (const Eigen::Vector3d& point : trail.points) {
+    for (const double coordinate : point - trail.points.front()) key.push_back(coordinate);
+  }
+  return key;
 }
 
-void SetTransform(const engine::Sim3& map_from_entity, content::Entity* entity) {
-  if (entity->kind == content::Entity::Kind::kModel) {
-    entity->model.map_from_model = map_from_entity;
-    return;
-  }
-  entity->signpost.anchor = map_from_entity.translation;
-  entity->signpost.height_m = map_from_entity.scale;
+}  // namespace
+
+engine::Sim3 TransformOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map) {
+  return entity.kind == content::Entity::Kind::kSignpost ? SignpostPose(entity.signpost, eye_in_map)
+                                                         : content::PoseOf(entity);
 }
 
 Eigen::Vector3d PlacedBox::Corner(int bits) const {
@@ -33,23 +39,49 @@ Eigen::Vector3d PlacedBox::Top() const {
   return map_from_box * Eigen::Vector3d(0.5 * (low.x() + high.x()), high.y(), 0.5 * (low.z() + high.z()));
 }
 
-std::shared_ptr<const content::Model> EntityShapes::ModelOf(const content::Signpost& signpost) {
-  Shape& sign = signs_[{signpost.text, signpost.to_map}];
-  if (!sign.model) sign.model = MakeSignpostModel(signpost);
-  sign.last_frame = frame_;
-  return sign.model;
+template <typename Key, typename Make>
+std::shared_ptr<const content::Model> EntityShapes::Kept(std::map<Key, Shape>* shapes, const Key& key,
+                                                         const Make& make) {
+  Shape& shape = (*shapes)[key];
+  if (!shape.model) shape.model = make();
+  shape.last_frame = frame_;
+  return shape.model;
 }
 
 content::EntityShape EntityShapes::ShapeOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map) {
-  const bool is_model = entity.kind == content::Entity::Kind::kModel;
-  return {is_model ? bent_models_.ShapeOf(entity.model) : ModelOf(entity.signpost),
-          TransformOf(entity, eye_in_map)};
+  switch (entity.kind) {
+    case content::Entity::Kind::kModel:
+    case content::Entity::Kind::kImage:
+      return {bent_models_.ShapeOf(entity.model), entity.model.map_from_model};
+    case content::Entity::Kind::kSignpost: {
+      const std::string& text = content::ShownText(entity, language_);
+      const auto make = [&] { return MakeSignpostModel(text, entity.signpost.to_map); };
+      return {Kept(&signs_, std::pair(text, entity.signpost.to_map), make),
+              SignpostPose(entity.signpost, eye_in_map)};
+    }
+    case content::Entity::Kind::kLabel: {
+      const std::string& text = content::ShownText(entity, language_);
+      return {Kept(&labels_, text, [&] { return LabelBoardShape(text); }),
+              LabelPose(entity.label, eye_in_map)};
+    }
+    case content::Entity::Kind::kSound:
+      return {SoundMarkerModel(), SoundMarkerPose(entity.sound, eye_in_map)};
+    case content::Entity::Kind::kTrail: {
+      engine::Sim3 pose;
+      pose.translation = content::PlaceOf(entity);
+      return {Kept(&trails_, TrailKey(entity.trail), [&] { return MakeTrailModel(entity.trail); }), pose};
+    }
+  }
+  return {};
 }
 
 void EntityShapes::EndFrame() {
   constexpr std::uint64_t kLifeFrames = 300;
   bent_models_.EndFrame();
-  std::erase_if(signs_, [&](const auto& sign) { return sign.second.last_frame + kLifeFrames < frame_; });
+  const auto is_old = [&](const auto& shape) { return shape.second.last_frame + kLifeFrames < frame_; };
+  std::erase_if(signs_, is_old);
+  std::erase_if(labels_, is_old);
+  std::erase_if(trails_, is_old);
   ++frame_;
 }
 

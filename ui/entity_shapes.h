@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "content/bent_models.h"
 #include "content/picking.h"
@@ -16,11 +17,9 @@
 
 namespace docent::ui {
 
-// The pose of an entity as commands give it: that of a model; of a signpost its foot and height, with the
-// rotation in which a reader at eye_in_map sees it.
+// The pose of an entity as commands give it (content::PoseOf); of a signpost with the rotation in which a
+// reader at eye_in_map sees it. content::SetPose sets it.
 engine::Sim3 TransformOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map);
-// Sets it. Of a signpost only foot and height change.
-void SetTransform(const engine::Sim3& map_from_entity, content::Entity* entity);
 
 // A box with its pose in the map.
 struct PlacedBox {
@@ -34,11 +33,14 @@ struct PlacedBox {
   Eigen::Vector3d Top() const;
 };
 
-// The shapes of entities in the image. It keeps the models of signposts, whose texts take long to lay out, as
-// long as they are asked for. One thread.
+// The shapes of entities in the image. It keeps what takes long to make, as long as it is asked for: models
+// of signposts and labels, whose texts are laid out, and of trails. One thread.
 class EntityShapes {
  public:
-  // What is drawn of an entity for a reader at eye_in_map.
+  // `language`: that of the reader, for texts that have variants (content::TextFor).
+  explicit EntityShapes(std::string language = {}) : language_(std::move(language)) {}
+
+  // What is drawn of an entity for a reader at eye_in_map: of a label its board, of a sound its marker.
   content::EntityShape ShapeOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map);
   // The bounding box in the rest pose, as a reader at eye_in_map sees it; empty without a model.
   std::optional<PlacedBox> BoxOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map);
@@ -53,10 +55,16 @@ class EntityShapes {
     std::shared_ptr<const content::Model> model;
     std::uint64_t last_frame = 0;
   };
-  std::shared_ptr<const content::Model> ModelOf(const content::Signpost& signpost);
+  // The model under this key, which `make` makes if there is none.
+  template <typename Key, typename Make>
+  std::shared_ptr<const content::Model> Kept(std::map<Key, Shape>* shapes, const Key& key, const Make& make);
+
+  const std::string language_;
 
   content::BentModels bent_models_;
   std::map<std::pair<std::string, std::string>, Shape> signs_;  // By text and target map.
+  std::map<std::string, Shape> labels_;                         // By text.
+  std::map<std::vector<double>, Shape> trails_;                 // By all numbers of their shape.
   std::uint64_t frame_ = 0;
 };
 

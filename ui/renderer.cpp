@@ -1,16 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ui/renderer.h"
 
+#include <algorithm>
+
 #include "ui/canvas.h"
 #include "ui/content_layer.h"
+#include "ui/figures.h"
 #include "ui/heads_up.h"
 #include "ui/image_target.h"
+#include "ui/label_board.h"
+#include "ui/letterbox.h"
 #include "ui/visitor_display.h"
 
 namespace docent::ui {
 
+namespace {
+
+// The pose that the content is drawn from; null for none.
+const engine::Rigid3* DrawnFrom(const View& view) {
+  if (view.camera == nullptr) return nullptr;
+  const bool has_pose = view.tracked != nullptr && engine::HasPose(view.tracked->state);
+  return has_pose ? &view.tracked->camera_from_map : view.held_camera_from_map;
+}
+
+}  // namespace
+
 struct Renderer::Impl {
-  explicit Impl(const RendererOptions& options) : content(options.samples, options.max_texture_px) {}
+  explicit Impl(const RendererOptions& options)
+      : language(options.language), content(options.samples, options.max_texture_px, options.language) {}
+
+  // Draws labels and heads-up display into a canvas that shows the image in this part of it.
+  void DrawTexts(const View& view, const HeadsUpStyle& style, const Letterbox& box, Canvas* target) const {
+    const engine::Rigid3* const from = DrawnFrom(view);
+    if (from != nullptr && view.scene != nullptr)
+      DrawLabels(*view.scene, language, *view.camera, *from, box, target);
+    HeadsUpStyle above = style;
+    if (!view.overlay.caption.empty()) {
+      const double lowest = target->height_px() - 12 * style.unit_px - style.bottom_px;
+      const double top = DrawSentence(view.overlay.caption, 18, lowest, style.unit_px, target);
+      above.bottom_px += lowest - top + 6 * style.unit_px;
+    }
+    DrawHeadsUp(view, above, target);
+  }
+
+  const std::string language;
 
   // Over the video, whose target is bound.
   void DrawViews(const VisitorDisplay& visitor) {
@@ -39,16 +72,18 @@ void Renderer::Draw(const View& view) {
   const RenderTarget& target = impl_->image.Bind(width_px, height_px);
   impl_->image.DrawVideo(image);
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
-  const engine::Rigid3* const drawn_from = has_pose ? &tracked->camera_from_map : view.held_camera_from_map;
-  if (view.camera != nullptr && drawn_from != nullptr && view.scene != nullptr)
-    impl_->content.Draw(*view.camera, *drawn_from, *view.scene, view.animation_seconds, target,
-                        view.surfaces);
+  const engine::Rigid3* const drawn_from = DrawnFrom(view);
+  if (drawn_from != nullptr && view.scene != nullptr)
+    impl_->content.Draw(*view.camera, *drawn_from, *view.scene, view.animation_seconds, view.overlay.markers,
+                        target, view.surfaces);
 
   impl_->canvas.Begin(width_px, height_px);
   if (has_pose && view.overlay.keyframes && tracked->map != nullptr)
     DrawKeyFrames(*tracked->map, *view.camera, tracked->camera_from_map, &impl_->canvas);
   if (tracked != nullptr && view.overlay.points) DrawPoints(*tracked, &impl_->canvas);
-  if (view.overlay.hud) DrawHeadsUp(view, HeadsUpStyleFor(height_px), &impl_->canvas);
+  if (view.overlay.hud)
+    impl_->DrawTexts(view, HeadsUpStyleFor(height_px), FitImage(width_px, height_px, width_px, height_px),
+                     &impl_->canvas);
   target.BindForDrawing();
   impl_->canvas.End();
   if (view.overlay.visitor) impl_->DrawViews(*view.overlay.visitor);
@@ -72,7 +107,10 @@ void Renderer::PresentWithHeadsUp(const View& view, const WindowPart& part, doub
   if (!view.overlay.hud) return;
   Canvas& canvas = impl_->window_canvas;
   canvas.Begin(part.width_px, part.height_px, true);
-  DrawHeadsUp(view, {unit_px, bottom_px}, &canvas);
+  const int image_width = std::max(1, impl_->image.width_px()),
+            image_height = std::max(1, impl_->image.height_px());
+  impl_->DrawTexts(view, {unit_px, bottom_px},
+                   FitImage(image_width, image_height, part.width_px, part.height_px), &canvas);
   glViewport(part.x, part.window_height_px - part.y - part.height_px, part.width_px, part.height_px);
   canvas.End();
 }
@@ -85,7 +123,9 @@ void Renderer::ReadBackWithHeadsUp(const View& view, cv::Mat* image) {
   if (!view.overlay.hud || impl_->image.empty()) return ReadBack(image);
   impl_->copy.CopyFrom(impl_->image);
   impl_->canvas.Begin(impl_->copy.width_px(), impl_->copy.height_px());
-  DrawHeadsUp(view, HeadsUpStyleFor(impl_->copy.height_px()), &impl_->canvas);
+  const int width_px = impl_->copy.width_px(), height_px = impl_->copy.height_px();
+  impl_->DrawTexts(view, HeadsUpStyleFor(height_px), FitImage(width_px, height_px, width_px, height_px),
+                   &impl_->canvas);
   impl_->canvas.End();
   impl_->copy.ReadBack(image);
 }

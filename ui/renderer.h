@@ -36,9 +36,11 @@ struct VisitorDisplay {
 
 // What is drawn besides the video and the content.
 struct Overlay {
-  bool points = false;      // Matched map points, coloured by pyramid level.
-  bool keyframes = false;   // Keyframes of the map, as small frusta.
-  bool hud = true;          // State, map name and hint, and the search figure while there is no pose.
+  bool points = false;     // Matched map points, coloured by pyramid level.
+  bool keyframes = false;  // Keyframes of the map, as small frusta.
+  // State, map name and hint, the search figure while there is no pose, and the labels of the content, which
+  // have the resolution of these texts.
+  bool hud = true;
   bool status = true;       // The state panel of the HUD; false when nothing is tracked.
   std::string map_name;     // Empty when there is no map.
   bool is_waiting = false;  // No map is tracked or started: the HUD does not ask to move the camera.
@@ -53,6 +55,8 @@ struct Overlay {
   // The newest frame of another camera, of any size; null for none. It is shown small in a corner (see
   // inset.h) with a border whose colour is its tracking state.
   const engine::TrackedFrame* inset = nullptr;
+  bool markers = false;  // Where sounds are, for authors.
+  std::string caption;   // Of the sounds that play, near the bottom; empty for none.
 };
 
 // All inputs of one output image. The video, pose and content always belong to the same frame.
@@ -73,6 +77,7 @@ struct View {
 struct RendererOptions {
   int samples = 4;  // Multisampling of the content, per pixel; 1 disables anti-aliasing and is fastest.
   int max_texture_px = 2048;  // Largest side of a model's textures on the graphics card, in pixels.
+  std::string language = {};  // Of the reader, a tag in lower case; empty: every text is the first one.
 };
 
 // A part of a window, in pixels of its framebuffer.

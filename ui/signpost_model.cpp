@@ -71,9 +71,9 @@ void DrawArrow(const cv::Point& tail, int length, cv::Mat* image) {
 }
 
 // The complete front of the board, BGRA, opaque.
-cv::Mat DrawBoard(const content::Signpost& signpost) {
-  const cv::Mat text = LayOutText(signpost.text.empty() ? " " : signpost.text);
-  const bool points_on = !signpost.to_map.empty();
+cv::Mat DrawBoard(const std::string& words, const std::string& to_map) {
+  const cv::Mat text = LayOutText(words.empty() ? " " : words);
+  const bool points_on = !to_map.empty();
   cv::Mat target_name;
   constexpr int kArrowPx = 62;
   if (points_on) {
@@ -82,7 +82,7 @@ cv::Mat DrawBoard(const content::Signpost& signpost) {
     style.max_width_px = kMaxTextWidthPx - 2 * kArrowPx;
     style.max_height_px = kStripHeightPx - 8;
     style.color = kTextColor;
-    target_name = DrawText(signpost.to_map, style);
+    target_name = DrawText(to_map, style);
   }
   const int strip = points_on ? kStripHeightPx : 0;
   const int height = text.rows + 2 * kPaddingPx + strip;
@@ -198,8 +198,8 @@ content::Image ImageFrom(const cv::Mat& bgra) {
 
 }  // namespace
 
-std::shared_ptr<const content::Model> MakeSignpostModel(const content::Signpost& signpost) {
-  const cv::Mat board = DrawBoard(signpost);
+std::shared_ptr<const content::Model> MakeSignpostModel(const std::string& text, const std::string& to_map) {
+  const cv::Mat board = DrawBoard(text, to_map);
   const glm::vec2 half_size(0.5f * static_cast<float>(board.cols) / static_cast<float>(board.rows), 0.5f);
   const std::vector<glm::vec2> outline = RoundedOutline(half_size);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "content/scene.h"
 
@@ -11,7 +12,7 @@ namespace docent::ui {
 // +z); the foot is at the origin and the board is one unit high. The board shows the text and, if the sign
 // leads to a map, a strip with an arrow and that map's name. The texture is at most 1024 x 1024 pixels
 // however long the text is; text that does not fit ends with an ellipsis.
-std::shared_ptr<const content::Model> MakeSignpostModel(const content::Signpost& signpost);
+std::shared_ptr<const content::Model> MakeSignpostModel(const std::string& text, const std::string& to_map);
 
 // The pose of that model in the map: it stands on its anchor, aligned with `up` and rotated about it so that
 // the board faces a reader at eye_in_map (map units). When the reader looks along `up`, the rotation is

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "content/scene.h"
+
 // All texts of the author's window, in one place, so that they can be read together and translated. Texts
 // after "##" are not shown; they only tell widgets apart.
 namespace docent::ui::strings {
@@ -74,10 +76,29 @@ inline constexpr const char* kPlace = "Place";
 inline constexpr const char* kToolSelect = "Select";
 inline constexpr const char* kToolModel = "Model";
 inline constexpr const char* kToolSignpost = "Signpost";
+inline constexpr const char* kToolLabel = "Label";
+inline constexpr const char* kToolImage = "Image";
+inline constexpr const char* kToolSound = "Sound";
+inline constexpr const char* kToolTrail = "Trail";
+inline constexpr const char* kImageFileHint = "Image file (PNG, JPEG)";
+inline constexpr const char* kSoundFileHint = "Sound file (WAV, FLAC, Ogg)";
+inline constexpr const char* kUpright = "Upright, facing me";
+inline constexpr const char* kCaptionHint = "Caption, shown while it plays";
+inline constexpr const char* kClickToPlaceLabel = "Click on what the label is about.";
+inline constexpr const char* kClickToPlaceImage = "Click in the image to place it.";
+inline constexpr const char* kClickToPlaceSound = "Click where the sound shall be heard.";
+inline constexpr const char* kClickToPlaceTrail =
+    "Click along the way, point by point. A selected trail goes on; press Escape to end it.";
+inline constexpr const char* kWriteCaption = "Write its caption first.";
+inline constexpr const char* kChooseImage = "Choose an image file first.";
+inline constexpr const char* kChooseSound = "Choose a sound file first.";
+inline constexpr const char* kTrailBegun = "The trail begins here; click on its next point.";
 inline constexpr const char* kModelFile = "Model file";
 inline constexpr const char* kModelFileHint = "FILE.glb";
 inline constexpr const char* kBrowse = "Browse…";
 inline constexpr const char* kBrowseTitle = "Choose a model";
+inline constexpr const char* kBrowseImageTitle = "Choose an image";
+inline constexpr const char* kBrowseSoundTitle = "Choose a sound";
 inline constexpr const char* kNoFileDialog = "No file dialog is installed (zenity). Type the file's name.";
 inline constexpr const char* kFiles = "Files here and recent ones";
 inline constexpr const char* kDropFiles = "Or drop a file onto the image.";
@@ -92,7 +113,7 @@ inline constexpr const char* kLeadsNowhere = "(nowhere)";
 inline constexpr const char* kClickToPlaceSign = "Click in the image to place the signpost.";
 inline constexpr const char* kWriteText = "Write its text first.";
 inline constexpr const char* kChooseFile = "Choose a model file first.";
-inline constexpr const char* kNoModelFile = " is no model file.";  // After the file's name.
+inline constexpr const char* kNoModelFile = " is no file that can be placed.";  // After the file's name.
 inline constexpr const char* kDropOnImage = "Drop files onto the image to place them there.";
 inline constexpr const char* kNoSurface = "No surface is known here.";
 
@@ -101,8 +122,23 @@ inline constexpr const char* kContents = "Contents";
 inline constexpr const char* kNothingPlaced = "Nothing is placed in this map.";
 inline constexpr const char* kName = "Name";
 inline constexpr const char* kKind = "Kind";
-inline constexpr const char* kKindModel = "model";
-inline constexpr const char* kKindSignpost = "sign";
+constexpr const char* NameOf(content::Entity::Kind kind) {
+  switch (kind) {
+    case content::Entity::Kind::kModel:
+      return "model";
+    case content::Entity::Kind::kSignpost:
+      return "sign";
+    case content::Entity::Kind::kLabel:
+      return "label";
+    case content::Entity::Kind::kImage:
+      return "image";
+    case content::Entity::Kind::kSound:
+      return "sound";
+    case content::Entity::Kind::kTrail:
+      return "trail";
+  }
+  return "";
+}
 inline constexpr const char* kShown = "Shown";
 inline constexpr const char* kLocked = "Locked";
 inline constexpr const char* kDistance = "Distance";
@@ -115,6 +151,13 @@ inline constexpr const char* kRename = "Name";
 inline constexpr const char* kPosition = "Position";
 inline constexpr const char* kRotation = "Rotation";
 inline constexpr const char* kSize = "Size";
+inline constexpr const char* kRange = "Range";
+inline constexpr const char* kWidth = "Width";
+inline constexpr const char* kBoardOffset = "Board, from the point";
+inline constexpr const char* kLanguageHint = "Language of the text: de, es, …";
+inline constexpr const char* kNoLanguage = "This is no language tag.";
+inline constexpr const char* kTrailPoints = "%d points";
+inline constexpr const char* kRemoveLastPoint = "Remove last point";
 inline constexpr const char* kDuplicate = "Duplicate";
 inline constexpr const char* kCopy = "Copy";
 inline constexpr const char* kPaste = "Paste";
@@ -163,6 +206,7 @@ inline constexpr KeyHelp kKeyHelp[] = {
     {"Ctrl (drag)", "in steps"},
     {"Arrows", "move a little"},
     {"1, 2, 3", "select, model, signpost"},
+    {"4, 5, 6, 7", "label, image, sound, trail"},
     {"Delete", "remove"},
     {"Ctrl-D", "duplicate"},
     {"Ctrl-C, Ctrl-V", "copy, paste"},

@@ -5,9 +5,35 @@
 #include <utility>
 
 #include "app/command_line/command_words.h"
+#include "app/files/file_kind.h"
 #include "ui/strings.h"
 
 namespace docent::app {
+
+namespace {
+
+// Chooses the tool and the file with which a dropped file is placed. Returns false where it cannot be.
+bool ChooseToPlace(const std::string& file, ui::AuthoringChoices* choices) {
+  switch (KindOfFile(file)) {
+    case content::AssetKind::kImage:
+      choices->tool = ui::AuthoringTool::kImage;
+      choices->image_file = file;
+      return true;
+    case content::AssetKind::kSound:
+      choices->tool = ui::AuthoringTool::kSound;
+      choices->sound_file = file;
+      // Without another caption, its name is shown.
+      if (choices->caption.empty()) choices->caption = content::NameFromFile(file);
+      return true;
+    case content::AssetKind::kModel:
+      choices->tool = ui::AuthoringTool::kModel;
+      choices->model_file = file;
+      return IsModelFile(file);
+  }
+  return false;
+}
+
+}  // namespace
 
 AuthorControls::AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder)
     : window_(window),
@@ -51,6 +77,7 @@ void AuthorControls::SetView(AuthorView view, const SavingState& saving, std::ve
   if (map != 0 && std::exchange(scene_map_, map) != map) {
     selection_.Clear();
     pointer_.Cancel();
+    placing_.Cancel();
     names_before_.reset();
   }
   if (map == 0) return;
@@ -97,7 +124,7 @@ void AuthorControls::Handle(const ui::InputEvent& event) {
 void AuthorControls::Escape() {
   if (gui_.HasPopup()) return;  // It closes.
   if (gui_.IsNavigated()) return gui_.LeaveWidgets();
-  if (pointer_.Cancel()) return;
+  if (pointer_.Cancel() || placing_.Cancel()) return;
   const ui::MapPick pick = std::exchange(panel_.choices().pick, ui::MapPick::kNone);
   if (pick == ui::MapPick::kMeasureFrom || pick == ui::MapPick::kMeasureTo) panel_.choices().frozen = false;
   if (pick != ui::MapPick::kNone) return;
@@ -137,9 +164,8 @@ void AuthorControls::HandleKey(const ui::InputEvent& event) {
     if (event.key == "down") pointer_.Nudge(view_, 0, -1);
   }
   if (event.repeated) return;
-  if (event.key == "1") choices.tool = ui::AuthoringTool::kSelect;
-  if (event.key == "2") choices.tool = ui::AuthoringTool::kModel;
-  if (event.key == "3") choices.tool = ui::AuthoringTool::kSignpost;
+  if (event.key.size() == 1 && event.key[0] >= '1' && event.key[0] <= '7')
+    choices.tool = static_cast<ui::AuthoringTool>(event.key[0] - '1');  // In their order.
   if (event.key == "c") host_.swap_cameras();
   if (event.key == "f") choices.frozen = !choices.frozen;
   if (event.key == "m") choices.from_above = !choices.from_above;
@@ -162,29 +188,29 @@ void AuthorControls::HandleClick(const ui::InputEvent& event) {
   if (view_.inset.Contains(event.position)) return host_.swap_cameras();
   if (!view_.ShowsImageAt(event.position)) return;
   const Eigen::Vector2d pixel = view_.PixelAt(event.position);
-  const ui::AuthoringChoices& choices = panel_.choices();
-  if (choices.pick != ui::MapPick::kNone) return HandlePick(pixel);
-  switch (choices.tool) {
-    case ui::AuthoringTool::kSelect:
-      return pointer_.Press(view_, event.position, event.shift);
-    case ui::AuthoringTool::kModel:
-      return PlaceModel(choices.model_file, pixel);
-    case ui::AuthoringTool::kSignpost:
-      if (choices.sign_text.empty()) return board_.AddDone(ui::strings::kWriteText, false, Now());
-      RememberNames();
-      return host_.emit(PlaceSignpost{choices.sign_text, pixel, choices.sign_to_map});
-  }
+  if (panel_.choices().pick != ui::MapPick::kNone) return HandlePick(pixel);
+  if (!IsPlacing()) return pointer_.Press(view_, event.position, event.shift);
+  Place(panel_.choices(), pixel);
 }
 
-void AuthorControls::PlaceModel(const std::string& file, const Eigen::Vector2d& pixel) {
-  if (file.empty()) return board_.AddDone(ui::strings::kChooseFile, false, Now());
-  const ui::AuthoringChoices& choices = panel_.choices();
-  app::PlaceModel command{file, pixel, std::nullopt, choices.yaw_deg};
-  if (!choices.automatic_size) command.scale = choices.scale;
-  RememberNames();
-  host_.emit(std::move(command));
+// The name of the selected trail that further points may be added to; empty for none.
+std::string AuthorControls::SelectedTrail() const {
+  if (selection_.names().size() != 1 || !view_.scene) return "";
+  const content::Entity* const entity = view_.scene->Find(selection_.names().front());
+  const bool is_trail = entity != nullptr && entity->kind == content::Entity::Kind::kTrail && !entity->locked;
+  return is_trail ? entity->name : "";
+}
+
+void AuthorControls::Place(const ui::AuthoringChoices& choices, const Eigen::Vector2d& pixel) {
+  std::string note;
+  auto command = placing_.Click(view_, choices, pixel, SelectedTrail(), &note);
+  if (!note.empty()) board_.AddDone(note, false, Now());
+  if (!command) return;
+  if (!std::holds_alternative<ExtendTrail>(*command)) RememberNames();
+  host_.emit(*std::move(command));
+  const std::string& file = choices.model_file;
   std::error_code error;
-  if (!std::filesystem::exists(file, error)) return;
+  if (choices.tool != ui::AuthoringTool::kModel || !std::filesystem::exists(file, error)) return;
   recent_.Add(file);
   if (std::find(files_.begin(), files_.end(), file) == files_.end()) files_.push_back(file);
 }
@@ -194,12 +220,13 @@ void AuthorControls::HandleDrop(const ui::InputEvent& event) {
   constexpr double kStep = 60;  // Window units at a scale of 1.
   Eigen::Vector2d point = event.position;
   for (const std::string& file : event.files) {
-    if (!IsModelFile(file)) {
+    ui::AuthoringChoices choices = panel_.choices();
+    if (!ChooseToPlace(file, &choices)) {
       board_.AddError(std::filesystem::path(file).filename().string() + ui::strings::kNoModelFile);
     } else if (!view_.ShowsImageAt(point)) {
       board_.AddError(ui::strings::kDropOnImage);
     } else {
-      PlaceModel(file, view_.PixelAt(point));
+      Place(choices, view_.PixelAt(point));
       point.x() += kStep * view_.scale;
     }
   }
@@ -207,8 +234,12 @@ void AuthorControls::HandleDrop(const ui::InputEvent& event) {
 
 void AuthorControls::Update() {
   if (const auto chosen = dialog_.Poll()) {
-    panel_.choices().model_file = chosen->string();
-    if (std::find(files_.begin(), files_.end(), chosen->string()) == files_.end())
+    ui::AuthoringChoices& choices = panel_.choices();
+    (dialog_kind_ == content::AssetKind::kImage   ? choices.image_file
+     : dialog_kind_ == content::AssetKind::kSound ? choices.sound_file
+                                                  : choices.model_file) = chosen->string();
+    const bool is_model = dialog_kind_ == content::AssetKind::kModel;
+    if (is_model && std::find(files_.begin(), files_.end(), chosen->string()) == files_.end())
       files_.push_back(chosen->string());
   }
   pointer_.Move(view_, window_->PointerPosition(), window_->IsControlDown());
@@ -223,10 +254,18 @@ void AuthorControls::UpdatePreview() {
   ghost_note_.clear();
   const bool shows_ghost =
       IsPlacing() && !panel_.choices().from_above && !gui_.WantsMouse() && view_.ShowsImageAt(point);
-  preview_ = shows_ghost
-                 ? ghost_.AddTo(view_.scene, view_, panel_.choices(), view_.PixelAt(point), &ghost_note_)
-                 : pointer_.Preview(view_.scene);
+  preview_ = shows_ghost ? ghost_.AddTo(view_.scene, view_, panel_.choices(), view_.PixelAt(point),
+                                        TrailEnd(), &ghost_note_)
+                         : pointer_.Preview(view_.scene);
   preview_changed_ = preview_changed_ || preview_ != before;
+}
+
+// Where a trail that the pointer makes longer ends; empty if a click would begin one.
+std::optional<Eigen::Vector3d> AuthorControls::TrailEnd() const {
+  if (placing_.trail_begin()) return placing_.trail_begin();
+  const std::string name = SelectedTrail();
+  if (name.empty()) return std::nullopt;
+  return view_.scene->Find(name)->trail.points.back();
 }
 
 ui::AuthoringFacts AuthorControls::Facts() const {
@@ -313,8 +352,17 @@ void AuthorControls::Quit(bool save) {
   ending_ = save ? Ending::kSave : Ending::kDiscard;
 }
 
-void AuthorControls::ChooseModelFile() {
-  if (!FileDialog::IsAvailable() || !dialog_.Open(ui::strings::kBrowseTitle))
+void AuthorControls::ChooseFile(content::AssetKind kind) {
+  const bool is_image = kind == content::AssetKind::kImage, is_sound = kind == content::AssetKind::kSound;
+  const char* const title = is_image   ? ui::strings::kBrowseImageTitle
+                            : is_sound ? ui::strings::kBrowseSoundTitle
+                                       : ui::strings::kBrowseTitle;
+  const char* const patterns = is_image   ? "*.png *.jpg *.jpeg"
+                               : is_sound ? "*.wav *.flac *.ogg *.oga"
+                                          : "*.glb *.gltf *.obj *.ply *.stl *.fbx *.dae";
+  if (dialog_.is_open()) return;
+  dialog_kind_ = kind;
+  if (!FileDialog::IsAvailable() || !dialog_.Open(title, patterns))
     board_.AddError(ui::strings::kNoFileDialog);
 }
 
@@ -363,8 +411,16 @@ void AuthorControls::Rename(const std::string& name, const std::string& new_name
   host_.emit(RenameEntity{name, new_name});
 }
 
-void AuthorControls::SetText(const std::string& name, const std::string& text) {
-  host_.emit(SetEntityText{name, text});
+void AuthorControls::SetText(const std::string& name, const std::string& text, const std::string& language) {
+  host_.emit(SetEntityText{name, text, language});
+}
+
+void AuthorControls::SetOffset(const std::string& name, const Eigen::Vector3d& offset) {
+  host_.emit(SetLabelOffset{name, offset});
+}
+
+void AuthorControls::ShortenTrail(const std::string& name) {
+  host_.emit(app::ShortenTrail{name});
 }
 
 void AuthorControls::SetTarget(const std::string& name, const std::string& to_map) {

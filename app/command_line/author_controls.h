@@ -12,6 +12,7 @@
 #include "app/command_line/file_dialog.h"
 #include "app/command_line/notices.h"
 #include "app/command_line/placing_ghost.h"
+#include "app/command_line/placing_tool.h"
 #include "app/command_line/pointer_tool.h"
 #include "app/command_line/recent_files.h"
 #include "app/script/commands.h"
@@ -67,14 +68,16 @@ class AuthorControls final : public ui::AuthoringActions {
   void Redo() override;
   void Save() override;
   void Quit(bool save) override;
-  void ChooseModelFile() override;
+  void ChooseFile(content::AssetKind kind) override;
   void Select(const std::string& name, bool add) override;
   void RemoveSelected() override;
   void DuplicateSelected() override;
   void CopySelected() override;
   void Paste() override;
   void Rename(const std::string& name, const std::string& new_name) override;
-  void SetText(const std::string& name, const std::string& text) override;
+  void SetText(const std::string& name, const std::string& text, const std::string& language) override;
+  void SetOffset(const std::string& name, const Eigen::Vector3d& offset) override;
+  void ShortenTrail(const std::string& name) override;
   void SetTarget(const std::string& name, const std::string& to_map) override;
   void SetLocked(const std::vector<std::string>& names, bool locked) override;
   void SetHidden(const std::vector<std::string>& names, bool hidden) override;
@@ -91,8 +94,10 @@ class AuthorControls final : public ui::AuthoringActions {
   void Escape();
   void HandleClick(const ui::InputEvent& event);
   void HandleDrop(const ui::InputEvent& event);
-  void PlaceModel(const std::string& file, const Eigen::Vector2d& pixel);
   void HandlePick(const Eigen::Vector2d& pixel);
+  void Place(const ui::AuthoringChoices& choices, const Eigen::Vector2d& pixel);
+  std::string SelectedTrail() const;
+  std::optional<Eigen::Vector3d> TrailEnd() const;
   bool IsPlacing() const;
   // Before a command that adds entities, so that SelectNew finds them.
   void RememberNames();
@@ -110,8 +115,10 @@ class AuthorControls final : public ui::AuthoringActions {
   ui::Selection selection_;
   ui::EntityShapes shapes_;
   PointerTool pointer_;
+  PlacingTool placing_;
   PlacingGhost ghost_;
   FileDialog dialog_;
+  content::AssetKind dialog_kind_ = content::AssetKind::kModel;  // What it is open for.
   RecentFiles recent_;
   std::vector<std::string> files_;  // To choose from: those in the working folder, then the recent ones.
 

@@ -33,6 +33,17 @@ struct DoneWriter {
     return "Placed " + std::filesystem::path(c.file).filename().string() + ".";
   }
   std::string operator()(const PlaceSignpost&) const { return "Placed a signpost."; }
+  std::string operator()(const PlaceLabel&) const { return "Placed a label."; }
+  std::string operator()(const PlaceImage& c) const {
+    return "Placed " + std::filesystem::path(c.file).filename().string() + ".";
+  }
+  std::string operator()(const PlaceSound& c) const {
+    return "Placed " + std::filesystem::path(c.file).filename().string() + ".";
+  }
+  std::string operator()(const PlaceTrail&) const { return "Placed a trail."; }
+  std::string operator()(const ExtendTrail& c) const { return "Added a point to " + c.name + "."; }
+  std::string operator()(const ShortenTrail& c) const { return "Removed a point of " + c.name + "."; }
+  std::string operator()(const SetLabelOffset& c) const { return "Moved the board of " + c.name + "."; }
   std::string operator()(const MoveEntity& c) const { return "Moved " + c.name + "."; }
   std::string operator()(const RotateEntity& c) const { return "Rotated " + c.name + "."; }
   std::string operator()(const ScaleEntity& c) const { return "Scaled " + c.name + "."; }

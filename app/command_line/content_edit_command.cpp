@@ -28,11 +28,15 @@ struct EditOptions {
   std::optional<Eigen::Vector3d> move;
   std::optional<double> rotate_deg, scale;
   std::optional<engine::Sim3> transform;
-  std::string text, to_map, rename, group, align, bend;
+  std::string language, to_map, rename, group, align, bend, extend;
+  std::optional<std::string> text;
+  std::optional<Eigen::Vector3d> offset;
+  bool shorten = false;
 
   // With a value for one entity only.
   bool NamesOne() const {
-    return transform || !text.empty() || !rename.empty() || !align.empty() || !bend.empty();
+    return transform || text || offset || !extend.empty() || !rename.empty() || !align.empty() ||
+           !bend.empty();
   }
 };
 
@@ -42,6 +46,15 @@ Command WithPairs(const std::string& verb, const std::string& name, const std::s
   const std::string quoted = FormatCommand(UnbendEntity{name}).substr(std::string("unbend ").size());
   const auto parsed = ParseScript("0 " + verb + ' ' + quoted + ' ' + pairs, option);
   if (parsed.size() != 1) throw Error(option + ": expected one list of points.");
+  return parsed.front().command;
+}
+
+// The point of `--extend`, which has the form of that of the script command `trail extend`.
+Command Extension(const std::string& name, const std::string& point) {
+  const std::string verb = FormatCommand(ShortenTrail{name});
+  const std::string quoted = verb.substr(std::string("trail shorten ").size());
+  const auto parsed = ParseScript("0 trail extend " + quoted + " to " + point, "--extend");
+  if (parsed.size() != 1) throw Error("--extend: expected one point.");
   return parsed.front().command;
 }
 
@@ -61,7 +74,10 @@ std::vector<Command> CommandsFor(const EditOptions& options) {
     if (options.scale) commands.emplace_back(ScaleEntity{name, *options.scale});
     if (options.rotate_deg) commands.emplace_back(RotateEntity{name, *options.rotate_deg});
     if (options.move) commands.emplace_back(MoveEntity{name, *options.move, std::nullopt});
-    if (!options.text.empty()) commands.emplace_back(SetEntityText{name, options.text});
+    if (options.text) commands.emplace_back(SetEntityText{name, *options.text, options.language});
+    if (options.offset) commands.emplace_back(SetLabelOffset{name, *options.offset});
+    if (options.shorten) commands.emplace_back(ShortenTrail{name});
+    if (!options.extend.empty()) commands.push_back(Extension(name, options.extend));
     if (options.nowhere || !options.to_map.empty())
       commands.emplace_back(SetSignpostTarget{name, options.to_map});
   }
@@ -103,6 +119,10 @@ class StoredEdits {
   content::SceneChange operator()(const content::Scene& scene, const BendEntity& command) const {
     return content::BendEdit(scene, command.name, WithoutPixels(command.pairs));
   }
+  content::SceneChange operator()(const content::Scene& scene, const ExtendTrail& command) const {
+    if (command.point.pixel) throw Error("a saved map has no image with this pixel; give X Y Z instead.");
+    return content::AddPointEdit(scene, command.name, command.point.in_map);
+  }
   content::SceneChange operator()(const content::Scene&, const auto&) const {
     throw Error("this command needs a camera.");
   }
@@ -115,7 +135,8 @@ class StoredEdits {
 void RunEdit(const EditOptions& options) {
   if (options.NamesOne() && options.names.size() > 1)
     throw Error(
-        "--transform, --align, --bend, --text and --rename change one model or signpost, not several.");
+        "--transform, --align, --bend, --text, --offset, --extend and --rename change one object, not "
+        "several.");
   const std::vector<Command> commands = CommandsFor(options);
   if (commands.empty()) throw Error("No change is given; see docent content edit --help.");
   for (const Command& command : commands) {
@@ -171,7 +192,22 @@ void AddPoseOptions(CLI::App* edit, EditOptions* options) {
 }
 
 void AddPropertyOptions(CLI::App* edit, EditOptions* options) {
-  edit->add_option("--text", options->text, "Change the text of a signpost")->type_name("TEXT");
+  CLI::Option* text = edit->add_option("--text", options->text,
+                                       "Change the text of a signpost or label, or a sound's caption");
+  text->type_name("TEXT");
+  edit->add_option("--language", options->language,
+                   "Change the text for readers of this language only (a tag as de or es-419); an empty text "
+                   "removes it")
+      ->type_name("TAG")
+      ->needs(text);
+  AddNumbers(
+      edit, "--offset", 3, -content::kMaxCoordinate, content::kMaxCoordinate,
+      [=](const auto& n) { options->offset = Eigen::Vector3d(n[0], n[1], n[2]); },
+      "Put the board of a label here, from what it is about along the map's axes, in map units")
+      ->type_name("X Y Z");
+  edit->add_option("--extend", options->extend, "Add a point at the end of a trail, in map units")
+      ->type_name("\"X Y Z\"");
+  edit->add_flag("--shorten", options->shorten, "Remove the last point of a trail; before --extend");
   CLI::Option* to = edit->add_option("--to", options->to_map, "Let a signpost lead to this map");
   to->type_name("MAP");
   edit->add_flag("--to-nowhere", options->nowhere, "Let a signpost lead to no map")->excludes(to);
@@ -191,11 +227,11 @@ void AddPropertyOptions(CLI::App* edit, EditOptions* options) {
 void AddContentEditCommand(CLI::App* group, Invocation* invocation) {
   const auto options = std::make_shared<EditOptions>();
   CLI::App* edit = AddSubcommand(
-      group, "edit", "Change models and signposts",
+      group, "edit", "Change what is placed",
       "docent content edit fox --map \"Desk 3\" --move 0 0 0.1 --scale 2 --library museum.docent\n"
       "  docent content edit sign-1 --map \"Desk 3\" --text \"Lions\" --to \"Desk 5\" "
       "--library museum.docent");
-  edit->add_option("NAME", options->names, "Names of the models and signposts")->required();
+  edit->add_option("NAME", options->names, "Names of what is changed")->required();
   edit->add_option("--map", options->map, "The map that contains them")->required();
   edit->add_option("--library", options->library, "The library's file, NAME.docent")->required();
   AddPoseOptions(edit, options.get());

@@ -38,13 +38,12 @@ FileDialog::~FileDialog() {
   waitpid(child_, nullptr, 0);
 }
 
-bool FileDialog::Open(const std::string& title) {
+bool FileDialog::Open(const std::string& title, const std::string& patterns) {
   if (is_open()) return true;
   std::array<int, 2> channel{};
   if (pipe2(channel.data(), O_CLOEXEC) != 0) return false;
   std::vector<std::string> arguments = {kDialogProgram, "--file-selection", "--title=" + title,
-                                        "--file-filter=*.glb *.gltf *.obj *.ply *.stl *.fbx *.dae",
-                                        "--file-filter=*"};
+                                        "--file-filter=" + patterns, "--file-filter=*"};
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);

@@ -19,7 +19,8 @@ class FileDialog {
   // Whether the program is installed, by PATH.
   static bool IsAvailable();
   // Shows the dialog unless it is shown already. Returns false when the program cannot be started.
-  bool Open(const std::string& title);
+  // `patterns`: the files that it lists first, as "*.png *.jpg".
+  bool Open(const std::string& title, const std::string& patterns);
   bool is_open() const { return child_ > 0; }
   // The chosen file, once, when the dialog was closed with a choice. Does not wait.
   std::optional<std::filesystem::path> Poll();

@@ -151,6 +151,7 @@ class GuideWindow {
       view.overlay.points = choices.show_points;
       view.overlay.keyframes = choices.show_keyframes;
       view.overlay.status = choices.show_status;
+      view.overlay.markers = true;
       view.scene = controls_->Preview().get();
     }
     return view;

@@ -14,12 +14,13 @@
 
 namespace docent::app {
 
-// Models for the window, read on a thread of their own so that no frame waits for a disk. Window's thread.
+// Models, images and sounds for the window, read on a thread of their own so that no frame waits for a disk.
+// Window's thread.
 class ModelPreviews {
  public:
   // Relative files are searched in this folder first, then in the working folder, as commands do.
   explicit ModelPreviews(std::filesystem::path folder) : folder_(std::move(folder)) {}
-  // The model of a file; null while it is read, and when it cannot be. One file is read at a time.
+  // The asset of a file; null while it is read, and when it cannot be. One file is read at a time.
   std::shared_ptr<const content::Asset> Get(const std::string& file);
 
  private:
@@ -39,13 +40,21 @@ class PlacingGhost {
 
   // The name that the placed entity has until it gets its own; no entity can have it.
   static const char* name() { return "\n"; }
-  // The scene with the entity that a click at this pixel would place. Where nothing can be placed, it is the
+  // The scene with the entity that a click at this pixel would place; of a trail, the piece from trail_end to
+  // there. Where nothing can be placed, it is the
   // scene itself and *note says why, unless the file is still being read.
   std::shared_ptr<const content::Scene> AddTo(const std::shared_ptr<const content::Scene>& scene,
                                               const AuthorView& view, const ui::AuthoringChoices& choices,
-                                              const Eigen::Vector2d& pixel, std::string* note);
+                                              const Eigen::Vector2d& pixel,
+                                              const std::optional<Eigen::Vector3d>& trail_end,
+                                              std::string* note);
 
  private:
+  // What the chosen tool needs to place something. Empty, with a note, where that is not chosen yet; without
+  // one while a file is read.
+  std::optional<content::Entity> Begun(const ui::AuthoringChoices& choices, bool has_trail,
+                                       std::string* note);
+
   ModelPreviews models_;
 };
 

@@ -15,6 +15,12 @@ bool MayMove(const content::Entity& entity) {
   return !entity.locked && !entity.hidden;
 }
 
+// Where the handles are: at the base of what stands on a surface, else at the place.
+Eigen::Vector3d OriginOf(const content::Entity& entity, const ui::PlacedBox& box) {
+  const bool stands = content::HasModel(entity) || entity.kind == content::Entity::Kind::kSignpost;
+  return stands ? box.Base() : content::PlaceOf(entity);
+}
+
 }  // namespace
 
 engine::Rotation3 UprightRotation(const content::Scene& scene, const engine::MapSnapshot& map) {
@@ -31,9 +37,9 @@ std::optional<ui::Gizmo> PointerTool::SelectedGizmo(const AuthorView& view, cons
   const auto box = shapes_->BoxOf(*entity, view.eye());
   if (!box) return std::nullopt;
   ui::Gizmo gizmo;
-  gizmo.origin = box->Base();
+  gizmo.origin = OriginOf(*entity, *box);
   gizmo.map_from_axes = box->map_from_box.rotation;
-  gizmo.turns = entity->kind == content::Entity::Kind::kModel;
+  gizmo.turns = content::HasModel(*entity) || entity->kind == content::Entity::Kind::kTrail;
   const auto length = ui::GizmoLength(view.camera, gizmo.origin, kHandleLength * view.scale / view.box.scale);
   if (!length) return std::nullopt;
   gizmo.length = *length;
@@ -81,7 +87,7 @@ void PointerTool::Press(const AuthorView& view, const Eigen::Vector2d& point, bo
   const auto box = shapes_->BoxOf(*entity, view.eye());
   if (!box) return;
   ui::Gizmo ground;
-  ground.origin = box->Base();
+  ground.origin = OriginOf(*entity, *box);
   ground.map_from_axes = UprightRotation(*view.scene, *view.frame->tracked.map);
   ground.length = (ground.origin - view.eye()).norm();
   Hold(view, ground, ui::GizmoPart::kGround, point);
@@ -112,7 +118,7 @@ std::shared_ptr<const content::Scene> PointerTool::Preview(
   auto preview = std::make_shared<content::Scene>(*scene);
   for (content::Entity& entity : preview->entities) {
     for (const ui::NewPose& held : drag_->held) {
-      if (held.name == entity.name) ui::SetTransform(drag_->motion.motion() * held.map_from_entity, &entity);
+      if (held.name == entity.name) content::SetPose(drag_->motion.motion() * held.map_from_entity, &entity);
     }
   }
   return preview;

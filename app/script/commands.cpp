@@ -93,6 +93,24 @@ std::string PairsProblem(const std::vector<PointPair>& pairs) {
   return "";
 }
 
+std::string OffsetProblem(const Eigen::Vector3d& offset) {
+  const bool near = IsAtMost(offset.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate);
+  return near ? "" : "the offset leads out of any map";
+}
+
+std::string LengthProblem(const char* what, double length, double least, double most) {
+  if (length >= least && length <= most) return "";
+  return std::string("the ") + what + " must be between " + FormatNumber(least) + " and " +
+         FormatNumber(most);
+}
+
+std::string PointProblem(const MapPoint& point) {
+  if (point.pixel) return PixelProblem(*point.pixel);
+  const bool near =
+      IsAtMost(point.in_map.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate);
+  return near ? "" : "a place is out of any map";
+}
+
 std::string First(std::initializer_list<std::string> problems) {
   for (const std::string& problem : problems) {
     if (!problem.empty()) return problem;
@@ -128,6 +146,37 @@ struct Validator {
   std::string operator()(const PlaceSignpost& c) const {
     return First({NameProblem(c.text, "a signpost's text"), PixelProblem(c.pixel),
                   c.to_map.empty() ? "" : MapNameProblem(c.to_map)});
+  }
+  std::string operator()(const PlaceLabel& c) const {
+    return First({NameProblem(c.text, "a label's text"), PixelProblem(c.pixel),
+                  c.offset ? OffsetProblem(*c.offset) : std::string()});
+  }
+  std::string operator()(const PlaceImage& c) const {
+    return First({c.file.empty() ? "expected an image's file" : "", PixelProblem(c.pixel),
+                  c.scale ? ScaleProblem(*c.scale) : std::string()});
+  }
+  std::string operator()(const PlaceSound& c) const {
+    return First({c.file.empty() ? "expected a sound's file" : "", NameProblem(c.caption, "a caption"),
+                  PixelProblem(c.pixel),
+                  c.range ? LengthProblem("range", *c.range, content::kMinSoundRange, content::kMaxSoundRange)
+                          : std::string()});
+  }
+  std::string operator()(const PlaceTrail& c) const {
+    if (c.points.size() < content::kMinTrailPoints || c.points.size() > content::kMaxTrailPoints) {
+      return "expected " + std::to_string(content::kMinTrailPoints) + " to " +
+             std::to_string(content::kMaxTrailPoints) + " points";
+    }
+    for (const MapPoint& point : c.points) {
+      if (std::string problem = PointProblem(point); !problem.empty()) return problem;
+    }
+    return c.width ? LengthProblem("width", *c.width, content::kMinTrailWidth, content::kMaxTrailWidth) : "";
+  }
+  std::string operator()(const ExtendTrail& c) const {
+    return First({NameProblem(c.name, "a name"), PointProblem(c.point)});
+  }
+  std::string operator()(const ShortenTrail& c) const { return NameProblem(c.name, "a name"); }
+  std::string operator()(const SetLabelOffset& c) const {
+    return First({NameProblem(c.name, "a name"), OffsetProblem(c.offset)});
   }
   std::string operator()(const MoveEntity& c) const {
     if (c.to_pixel) return First({NameProblem(c.name, "a name"), PixelProblem(*c.to_pixel)});
@@ -167,7 +216,10 @@ struct Validator {
     return First({NameProblem(c.name, "a name"), NameProblem(c.new_name, "a new name")});
   }
   std::string operator()(const SetEntityText& c) const {
-    return First({NameProblem(c.name, "a name"), NameProblem(c.text, "a signpost's text")});
+    if (!c.language.empty() && content::LanguageTag(c.language).empty())
+      return "'" + content::Shortened(c.language, content::kMaxLanguageBytes) + "' is not a language tag";
+    const bool removes = c.text.empty() && !c.language.empty();
+    return First({NameProblem(c.name, "a name"), removes ? "" : NameProblem(c.text, "a text")});
   }
   std::string operator()(const SetSignpostTarget& c) const {
     return First({NameProblem(c.name, "a name"), c.to_map.empty() ? "" : MapNameProblem(c.to_map)});

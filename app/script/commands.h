@@ -71,6 +71,55 @@ struct PlaceSignpost {
   std::string to_map;  // the map it leads to; empty for none
   bool operator==(const PlaceSignpost&) const = default;
 };
+// A text about the surface at the pixel, with a leader line to its board.
+struct PlaceLabel {
+  std::string text;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  // Of the board, in map units along the map's axes. Without it, the board is above the surface by a seventh
+  // of its distance from the camera.
+  std::optional<Eigen::Vector3d> offset = std::nullopt;
+  bool operator==(const PlaceLabel&) const = default;
+};
+struct PlaceImage {
+  std::string file;  // as that of a model
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  // Length of the longer side in map units; without it, a fifth of the distance, as for a model.
+  std::optional<double> scale = std::nullopt;
+  // False: it lies flush with the surface. True: it stands upright on it and faces the viewer.
+  bool upright = false;
+  bool operator==(const PlaceImage&) const = default;
+};
+struct PlaceSound {
+  std::string file;     // as that of a model
+  std::string caption;  // shown while it plays
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  // Within which it plays, in map units; without it, one and a half times the distance from the camera.
+  std::optional<double> range = std::nullopt;
+  bool operator==(const PlaceSound&) const = default;
+};
+// A point of the map: that of its surface at a pixel, or coordinates.
+struct MapPoint {
+  Eigen::Vector3d in_map = Eigen::Vector3d::Zero();  // map units; ignored with `pixel`
+  std::optional<Eigen::Vector2d> pixel = std::nullopt;
+  bool operator==(const MapPoint&) const = default;
+};
+struct PlaceTrail {
+  std::vector<MapPoint> points;
+  // Of the ribbon, in map units; without it, a fifteenth of the distance of the first point from the camera.
+  std::optional<double> width = std::nullopt;
+  bool operator==(const PlaceTrail&) const = default;
+};
+// Adds a point at the end of a trail.
+struct ExtendTrail {
+  std::string name;
+  MapPoint point;
+  bool operator==(const ExtendTrail&) const = default;
+};
+// Removes the last point of a trail.
+struct ShortenTrail {
+  std::string name;
+  bool operator==(const ShortenTrail&) const = default;
+};
 struct MoveEntity {
   std::string name;
   // Map units along the map's axes; ignored with `to_pixel`.
@@ -135,10 +184,19 @@ struct RenameEntity {
   std::string name, new_name;
   bool operator==(const RenameEntity&) const = default;
 };
-// Of a signpost.
+// Of a signpost, a label, or the caption of a sound.
 struct SetEntityText {
   std::string name, text;
+  // A tag as "de" or "es-419": the variant in this language, which an empty text removes. Empty: the text for
+  // all other readers.
+  std::string language = {};
   bool operator==(const SetEntityText&) const = default;
+};
+// Puts the board of a label elsewhere beside what it is about.
+struct SetLabelOffset {
+  std::string name;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // map units along the map's axes
+  bool operator==(const SetLabelOffset&) const = default;
 };
 struct SetSignpostTarget {
   std::string name;
@@ -178,7 +236,8 @@ struct Save {
 
 using Command =
     std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, SetMapUp, SetMapScale, PlaceModel,
-                 PlaceSignpost, MoveEntity, RotateEntity, ScaleEntity, TransformEntities, AlignEntity,
+                 PlaceSignpost, PlaceLabel, PlaceImage, PlaceSound, PlaceTrail, ExtendTrail, ShortenTrail,
+                 SetLabelOffset, MoveEntity, RotateEntity, ScaleEntity, TransformEntities, AlignEntity,
                  BendEntity, UnbendEntity, RemoveEntities, DuplicateEntities, RenameEntity, SetEntityText,
                  SetSignpostTarget, SetEntityFlag, GroupEntities, PasteEntities, Undo, Redo, Save>;
 

@@ -58,6 +58,10 @@ std::string Pairs(const std::vector<PointPair>& pairs) {
   return text;
 }
 
+std::string Place(const MapPoint& point) {
+  return point.pixel ? Pixel(*point.pixel) : Point(point.in_map);
+}
+
 struct CommandFormatter {
   std::string operator()(const NewMap& c) const { return "map new " + AlwaysQuoted(c.name); }
   std::string operator()(const StopMap&) const { return "map stop"; }
@@ -84,6 +88,30 @@ struct CommandFormatter {
   std::string operator()(const PlaceSignpost& c) const {
     return "signpost " + AlwaysQuoted(c.text) + " at " + Pixel(c.pixel) +
            (c.to_map.empty() ? "" : " to " + AlwaysQuoted(c.to_map));
+  }
+  std::string operator()(const PlaceLabel& c) const {
+    return "label " + AlwaysQuoted(c.text) + " at " + Pixel(c.pixel) +
+           (c.offset ? " offset " + Point(*c.offset) : "");
+  }
+  std::string operator()(const PlaceImage& c) const {
+    return "image " + Quoted(c.file) + " at " + Pixel(c.pixel) +
+           (c.scale ? " scale " + Number(*c.scale) : "") + (c.upright ? " upright" : "");
+  }
+  std::string operator()(const PlaceSound& c) const {
+    return "sound " + Quoted(c.file) + ' ' + AlwaysQuoted(c.caption) + " at " + Pixel(c.pixel) +
+           (c.range ? " range " + Number(*c.range) : "");
+  }
+  std::string operator()(const PlaceTrail& c) const {
+    std::string points;
+    for (const MapPoint& point : c.points) points += (points.empty() ? " " : ", ") + Place(point);
+    return "trail" + (c.width ? " width " + Number(*c.width) : std::string()) + " at" + points;
+  }
+  std::string operator()(const ExtendTrail& c) const {
+    return "trail extend " + AlwaysQuoted(c.name) + " to " + Place(c.point);
+  }
+  std::string operator()(const ShortenTrail& c) const { return "trail shorten " + AlwaysQuoted(c.name); }
+  std::string operator()(const SetLabelOffset& c) const {
+    return "offset " + AlwaysQuoted(c.name) + ' ' + Point(c.offset);
   }
   std::string operator()(const MoveEntity& c) const {
     const std::string begin = "move " + Quoted(c.name) + ' ';
@@ -116,7 +144,8 @@ struct CommandFormatter {
     return "rename " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.new_name);
   }
   std::string operator()(const SetEntityText& c) const {
-    return "text " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.text);
+    return "text " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.text) +
+           (c.language.empty() ? "" : " in " + AlwaysQuoted(c.language));
   }
   std::string operator()(const SetSignpostTarget& c) const {
     return "target " + AlwaysQuoted(c.name) + (c.to_map.empty() ? "" : ' ' + AlwaysQuoted(c.to_map));

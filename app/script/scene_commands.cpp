@@ -39,6 +39,12 @@ content::SceneChange EditFor(const content::Scene& scene, const TransformEntitie
 content::SceneChange EditFor(const content::Scene& scene, const UnbendEntity& command) {
   return content::UnbendEdit(scene, command.name);
 }
+content::SceneChange EditFor(const content::Scene& scene, const ShortenTrail& command) {
+  return content::RemovePointEdit(scene, command.name);
+}
+content::SceneChange EditFor(const content::Scene& scene, const SetLabelOffset& command) {
+  return content::OffsetEdit(scene, command.name, command.offset);
+}
 content::SceneChange EditFor(const content::Scene& scene, const RemoveEntities& command) {
   return content::RemoveEdit(scene, command.names);
 }
@@ -49,7 +55,7 @@ content::SceneChange EditFor(const content::Scene& scene, const RenameEntity& co
   return content::RenameEdit(scene, command.name, command.new_name);
 }
 content::SceneChange EditFor(const content::Scene& scene, const SetEntityText& command) {
-  return content::TextEdit(scene, command.name, command.text);
+  return content::TextEdit(scene, command.name, command.text, command.language);
 }
 content::SceneChange EditFor(const content::Scene& scene, const SetEntityFlag& command) {
   return content::FlagEdit(scene, command.names, command.flag, command.value);

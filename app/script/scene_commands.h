@@ -13,6 +13,8 @@ content::SceneChange EditFor(const content::Scene& scene, const RotateEntity& co
 content::SceneChange EditFor(const content::Scene& scene, const ScaleEntity& command);
 content::SceneChange EditFor(const content::Scene& scene, const TransformEntities& command);
 content::SceneChange EditFor(const content::Scene& scene, const UnbendEntity& command);
+content::SceneChange EditFor(const content::Scene& scene, const ShortenTrail& command);
+content::SceneChange EditFor(const content::Scene& scene, const SetLabelOffset& command);
 content::SceneChange EditFor(const content::Scene& scene, const RemoveEntities& command);
 content::SceneChange EditFor(const content::Scene& scene, const DuplicateEntities& command);
 content::SceneChange EditFor(const content::Scene& scene, const RenameEntity& command);

@@ -7,6 +7,7 @@
 
 #include "app/files/text_file.h"
 #include "app/script/line_reader.h"
+#include "engine/base/error.h"
 
 namespace docent::app {
 
@@ -53,6 +54,12 @@ Command ParseMap(LineReader* line) {
              "'; use new, stop, use, policy, rename, remove, up or scale after map");
 }
 
+Eigen::Vector3d TakePoint(LineReader* line) {
+  Eigen::Vector3d point;
+  for (double& coordinate : point) coordinate = line->TakeNumber("X Y Z in map units");
+  return point;
+}
+
 Command ParsePlace(LineReader* line) {
   PlaceModel command;
   command.file = line->TakeName("a model's file");
@@ -76,6 +83,79 @@ Command ParseSignpost(LineReader* line) {
   line->Expect("at");
   command.pixel = line->TakePixel();
   if (line->TakeIf("to")) command.to_map = line->TakeName("a map's name");
+  return command;
+}
+
+Command ParseLabel(LineReader* line) {
+  PlaceLabel command;
+  command.text = line->TakeName("a label's text");
+  line->Expect("at");
+  command.pixel = line->TakePixel();
+  if (line->TakeIf("offset")) command.offset = TakePoint(line);
+  return command;
+}
+
+Command ParseImage(LineReader* line) {
+  PlaceImage command;
+  command.file = line->TakeName("an image's file");
+  line->Expect("at");
+  command.pixel = line->TakePixel();
+  while (!line->AtEnd()) {
+    if (line->TakeIf("scale")) {
+      command.scale = line->TakeNumber("a length in map units");
+    } else if (line->TakeIf("upright")) {
+      command.upright = true;
+    } else {
+      break;
+    }
+  }
+  return command;
+}
+
+Command ParseSound(LineReader* line) {
+  PlaceSound command;
+  command.file = line->TakeName("a sound's file");
+  command.caption = line->TakeName("a caption");
+  line->Expect("at");
+  command.pixel = line->TakePixel();
+  if (line->TakeIf("range")) command.range = line->TakeNumber("a range in map units");
+  return command;
+}
+
+MapPoint ParsePoint(LineReader* line, bool* last) {
+  MapPoint point;
+  if (line->TakeIf("pixel")) {
+    const double u = line->TakeNumber("a pixel's column");
+    point.pixel = {u, line->TakeItemNumber("a pixel's row", last)};
+  } else {
+    for (const int axis : {0, 1}) point.in_map[axis] = line->TakeNumber("X Y Z in map units");
+    point.in_map[2] = line->TakeItemNumber("X Y Z in map units", last);
+  }
+  return point;
+}
+
+Command ParseTrail(LineReader* line) {
+  bool last = false;
+  if (line->TakeIf("extend")) {
+    const std::string name = line->TakeName("a name");
+    line->Expect("to");
+    const MapPoint point = ParsePoint(line, &last);
+    if (!last) line->Fail("expected one point");
+    return ExtendTrail{name, point};
+  }
+  if (line->TakeIf("shorten")) return ShortenTrail{line->TakeName("a name")};
+  PlaceTrail command;
+  if (line->TakeIf("width")) command.width = line->TakeNumber("a width in map units");
+  line->Expect("at");
+  while (!last) command.points.push_back(ParsePoint(line, &last));
+  return command;
+}
+
+Command ParseText(LineReader* line) {
+  SetEntityText command;
+  command.name = line->TakeName("a name");
+  command.text = line->Take("a text");
+  if (line->TakeIf("in")) command.language = line->TakeName("a language tag");
   return command;
 }
 
@@ -122,13 +202,9 @@ std::vector<PointPair> ParsePairs(LineReader* line) {
     PointPair& pair = pairs.emplace_back();
     for (double& coordinate : pair.in_model) coordinate = line->TakeNumber("a point X Y Z of the model");
     line->Expect("to");
-    if (line->TakeIf("pixel")) {
-      const double u = line->TakeNumber("a pixel's column");
-      pair.pixel = {u, line->TakeItemNumber("a pixel's row", &last)};
-    } else {
-      for (const int axis : {0, 1}) pair.in_map[axis] = line->TakeNumber("X Y Z in map units");
-      pair.in_map[2] = line->TakeItemNumber("X Y Z in map units", &last);
-    }
+    const MapPoint place = ParsePoint(line, &last);
+    pair.in_map = place.in_map;
+    pair.pixel = place.pixel;
   }
   return pairs;
 }
@@ -164,7 +240,7 @@ Command ParsePaste(LineReader* line) {
   return command;
 }
 
-// The commands that name models and signposts; empty for another command.
+// The commands that name what is placed; empty for another command.
 std::optional<Command> ParseEdit(LineReader* line) {
   using content::EntityFlag;
   if (line->TakeIf("move")) return ParseMove(line);
@@ -186,9 +262,10 @@ std::optional<Command> ParseEdit(LineReader* line) {
     const std::string name = line->TakeName("a name");
     return RenameEntity{name, line->TakeName("a new name")};
   }
-  if (line->TakeIf("text")) {
+  if (line->TakeIf("text")) return ParseText(line);
+  if (line->TakeIf("offset")) {
     const std::string name = line->TakeName("a name");
-    return SetEntityText{name, line->TakeName("a text")};
+    return SetLabelOffset{name, TakePoint(line)};
   }
   if (line->TakeIf("target")) return ParseTarget(line);
   if (line->TakeIf("lock")) return ParseFlag(line, EntityFlag::kLocked, true);
@@ -205,6 +282,10 @@ Command ParseCommand(LineReader* line) {
   if (line->TakeIf("map")) return ParseMap(line);
   if (line->TakeIf("place")) return ParsePlace(line);
   if (line->TakeIf("signpost")) return ParseSignpost(line);
+  if (line->TakeIf("label")) return ParseLabel(line);
+  if (line->TakeIf("image")) return ParseImage(line);
+  if (line->TakeIf("sound")) return ParseSound(line);
+  if (line->TakeIf("trail")) return ParseTrail(line);
   if (auto edit = ParseEdit(line)) return *std::move(edit);
   if (line->TakeIf("undo")) return Undo{};
   if (line->TakeIf("redo")) return Redo{};

@@ -7,6 +7,7 @@
 
 #include "app/files/text_file.h"
 #include "app/session/map_axes.h"
+#include "app/session/new_entities.h"
 #include "app/session/surface_at_pixel.h"
 #include "content/asset.h"
 #include "engine/base/error.h"
@@ -109,6 +110,70 @@ void ContentCommands::Apply(const PlaceSignpost& command, const engine::TrackedF
   entity.signpost.to_map = command.to_map;
   entity.signpost.to_key = TargetKey(map, command.to_map);
   Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
+}
+
+void ContentCommands::Apply(const PlaceLabel& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const content::SurfaceHit hit = SurfaceFor(frame, command.pixel);
+  const double distance = (frame.camera_from_map * hit.point).norm();
+  content::Entity entity = NewLabel(command.text, hit.point, UpOf(*map.scene, *frame.map), distance);
+  if (command.offset) entity.label.offset = *command.offset;
+  entity.name = map.scene->FreeNumberedName("label");
+  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
+}
+
+void ContentCommands::Apply(const PlaceImage& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const content::SurfaceHit hit = SurfaceFor(frame, command.pixel);
+  const Eigen::Vector3d viewer = frame.camera_from_map.OriginInSource();
+  const auto asset = assets_.Load(command.file, content::AssetKind::kImage);
+  const double scale = command.scale.value_or(options_.model_side * (hit.point - viewer).norm());
+  content::Entity entity = NewImage(asset, hit, viewer, UpOf(*map.scene, *frame.map), scale, command.upright);
+  entity.name = map.scene->FreeName(content::NameFromFile(command.file));
+  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
+}
+
+void ContentCommands::Apply(const PlaceSound& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const content::SurfaceHit hit = SurfaceFor(frame, command.pixel);
+  content::Entity entity = NewSound(assets_.Load(command.file, content::AssetKind::kSound), hit.point,
+                                    (frame.camera_from_map * hit.point).norm());
+  entity.sound.caption = command.caption;
+  if (command.range) entity.sound.range = *command.range;
+  entity.name = map.scene->FreeName(content::NameFromFile(command.file));
+  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
+}
+
+content::SurfaceHit ContentCommands::PlaceFor(const engine::TrackedFrame& frame,
+                                              const MapPoint& point) const {
+  if (point.pixel) return SurfaceFor(frame, *point.pixel);
+  content::SurfaceHit hit;
+  hit.point = point.in_map;
+  hit.normal = engine::UpInMap(*frame.map);
+  return hit;
+}
+
+void ContentCommands::Apply(const PlaceTrail& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  std::vector<Eigen::Vector3d> points;
+  Eigen::Vector3d normals = Eigen::Vector3d::Zero();
+  for (const MapPoint& point : command.points) {
+    const content::SurfaceHit hit = PlaceFor(frame, point);
+    points.push_back(hit.point);
+    // A normal that only opposes the ray says nothing about the surface.
+    if (hit.on_plane) normals += hit.normal;
+  }
+  const double distance = (frame.camera_from_map * points.front()).norm();
+  content::Entity entity = NewTrail(std::move(points), normals, UpOf(*map.scene, *frame.map), distance);
+  if (command.width) entity.trail.width = *command.width;
+  entity.name = map.scene->FreeNumberedName("trail");
+  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
+}
+
+void ContentCommands::Apply(const ExtendTrail& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  const Eigen::Vector3d point = PlaceFor(frame, command.point).point;
+  Edit(&map, content::AddPointEdit(*map.scene, command.name, point));
 }
 
 void ContentCommands::Apply(const MoveEntity& command, const engine::TrackedFrame& frame) {

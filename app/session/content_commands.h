@@ -30,6 +30,11 @@ class ContentCommands {
 
   void Apply(const PlaceModel& command, const engine::TrackedFrame& frame);
   void Apply(const PlaceSignpost& command, const engine::TrackedFrame& frame);
+  void Apply(const PlaceLabel& command, const engine::TrackedFrame& frame);
+  void Apply(const PlaceImage& command, const engine::TrackedFrame& frame);
+  void Apply(const PlaceSound& command, const engine::TrackedFrame& frame);
+  void Apply(const PlaceTrail& command, const engine::TrackedFrame& frame);
+  void Apply(const ExtendTrail& command, const engine::TrackedFrame& frame);
   void Apply(const MoveEntity& command, const engine::TrackedFrame& frame);
   void Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame);
   void Apply(const PasteEntities& command, const engine::TrackedFrame& frame);
@@ -52,6 +57,8 @@ class ContentCommands {
   content::SurfaceHit SurfaceFor(const engine::TrackedFrame& frame, const Eigen::Vector2d& pixel) const;
   std::vector<content::Correspondence> Correspondences(const engine::TrackedFrame& frame,
                                                        const std::vector<PointPair>& pairs) const;
+  // The point with the normal of its surface; of coordinates, the map's up direction.
+  content::SurfaceHit PlaceFor(const engine::TrackedFrame& frame, const MapPoint& point) const;
   std::uint64_t TargetKey(const SessionMap& map, const std::string& to_map);
 
   const SessionOptions& options_;

@@ -97,11 +97,14 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
 }
 
 void Session::Preload(const Command& command, const std::filesystem::path& model_folder) {
-  const auto* place = std::get_if<PlaceModel>(&command);
-  if (place == nullptr) return;
-  const std::scoped_lock lock(mutex_);
-  assets_.SetFolder(model_folder);
-  assets_.Load(place->file);
+  const auto load = [&](const std::string& file, content::AssetKind kind) {
+    const std::scoped_lock lock(mutex_);
+    assets_.SetFolder(model_folder);
+    assets_.Load(file, kind);
+  };
+  if (const auto* model = std::get_if<PlaceModel>(&command)) load(model->file, content::AssetKind::kModel);
+  if (const auto* image = std::get_if<PlaceImage>(&command)) load(image->file, content::AssetKind::kImage);
+  if (const auto* sound = std::get_if<PlaceSound>(&command)) load(sound->file, content::AssetKind::kSound);
 }
 
 Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {

@@ -6,17 +6,20 @@
 
 namespace docent::app {
 
-std::shared_ptr<const content::Asset> SessionAssets::Load(const std::string& file) {
-  auto& model = models_[(folder_ / file).string()];
-  if (model) return model;
+std::shared_ptr<const content::Asset> SessionAssets::Load(const std::string& file, content::AssetKind kind) {
+  auto& loaded = files_[{(folder_ / file).string(), kind}];
+  if (loaded) return loaded;
   std::filesystem::path path = folder_ / file;
   std::error_code error;
   if (!std::filesystem::exists(path, error)) path = file;
-  auto asset = std::make_shared<content::Asset>(content::ImportAsset(path));
+  auto asset =
+      std::make_shared<content::Asset>(kind == content::AssetKind::kImage   ? content::ImportImage(path)
+                                       : kind == content::AssetKind::kSound ? content::ImportSound(path)
+                                                                            : content::ImportAsset(path));
   // The same bytes may already be in use in a map: one copy is shared.
   auto& kept = assets_[asset->id];
   if (!kept) kept = std::move(asset);
-  return model = kept;
+  return loaded = kept;
 }
 
 void SessionAssets::EvictUnused() {

@@ -5,20 +5,22 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "app/session/library_scene.h"
 #include "content/asset.h"
 
 namespace docent::app {
 
-// The models that a session has decoded, from files and from the library; the same bytes are kept once. The
-// session's mutex guards it.
+// The models, images and sounds that a session has decoded, from files and from the library; the same bytes
+// are kept once. The session's mutex guards it.
 class SessionAssets {
  public:
   // Where relative files are searched first, before the working folder.
   void SetFolder(const std::filesystem::path& folder) { folder_ = folder; }
-  // The model in this file, which is read once. Throws Error when it cannot be read.
-  std::shared_ptr<const content::Asset> Load(const std::string& file);
+  // The model, image or sound in this file, which is read once. Throws Error when it cannot be read as that.
+  std::shared_ptr<const content::Asset> Load(const std::string& file,
+                                             content::AssetKind kind = content::AssetKind::kModel);
 
   const AssetCache& all() const { return assets_; }
   // Adds those that are not known yet, and takes them from `decoded`.
@@ -27,8 +29,9 @@ class SessionAssets {
   void EvictUnused();
 
  private:
-  AssetCache assets_;                                                    // by id
-  std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by file name in commands
+  AssetCache assets_;  // by id
+  // by file name in commands, and what it is read as
+  std::map<std::pair<std::string, content::AssetKind>, std::shared_ptr<const content::Asset>> files_;
   std::filesystem::path folder_;
 };
 

@@ -293,7 +293,7 @@ TEST(Edits, InvalidEditsThrowAndChangeNothing) {
   EXPECT_THAT(refusal([&] { return TargetEdit(scene, "helmet", "x", 1); }), HasSubstr("is a model"));
   EXPECT_THAT(refusal([&] { return RemoveEdit(scene, {"cat"}); }), HasSubstr("no 'cat'"));
   EXPECT_THAT(refusal([&] { return RemoveEdit(scene, {"helmet", "helmet"}); }), HasSubstr("named twice"));
-  EXPECT_THAT(refusal([&] { return RemoveEdit(scene, {}); }), HasSubstr("No model or signpost"));
+  EXPECT_THAT(refusal([&] { return RemoveEdit(scene, {}); }), HasSubstr("Nothing is named"));
   EXPECT_THAT(refusal([&] { return FlagEdit(scene, {"helmet"}, EntityFlag::kLocked, false); }),
               HasSubstr("'helmet' is not locked."));
   EXPECT_THAT(refusal([&] { return GroupEdit(scene, {"helmet", "sign-1"}, ""); }), HasSubstr("in no group"));
@@ -384,11 +384,11 @@ TEST(Edits, ATextGetsVariantsByLanguage) {
   perform("Zur Katze", "de-AT");
   perform("Al gato", "es");
   perform("To the lion", "");
-  const Signpost& sign = scene.entities[1].signpost;
-  EXPECT_EQ(sign.text, "To the lion");
-  EXPECT_EQ(sign.translations, (Translations{{"de-at", "Zur Katze"}, {"es", "Al gato"}}));
+  const auto sign = [&] { return scene.entities[1].signpost; };
+  EXPECT_EQ(sign().text, "To the lion");
+  EXPECT_EQ(sign().translations, (Translations{{"de-at", "Zur Katze"}, {"es", "Al gato"}}));
   perform("", "es");
-  EXPECT_EQ(sign.translations.count("es"), 0u);
+  EXPECT_EQ(sign().translations.count("es"), 0u);
   EXPECT_EQ(ErrorOf([&] { perform("", "es"); }), "'sign-1' has no text in 'es'.");
   EXPECT_EQ(ErrorOf([&] { perform("x", "no tag"); }), "'no tag' is not a language tag.");
 }

@@ -197,7 +197,7 @@ TEST(EntityShapes, HaveTheBaseOfTheBoxWhereTheEntityStands) {
   EXPECT_EQ(pose.scale, 0.5);
   pose.translation = {4, 5, 6};
   pose.scale = 2;
-  SetTransform(pose, &sign);
+  content::SetPose(pose, &sign);
   EXPECT_EQ(sign.signpost.anchor, Eigen::Vector3d(4, 5, 6));
   EXPECT_EQ(sign.signpost.height_m, 2);
 }

@@ -10,10 +10,9 @@
 namespace docent::ui {
 namespace {
 
-content::Signpost Sign(const std::string& text, const std::string& to_map = {}) {
+content::Signpost Sign(const std::string& text) {
   content::Signpost sign;
   sign.text = text;
-  sign.to_map = to_map;
   return sign;
 }
 
@@ -47,7 +46,7 @@ TEST(Signpost, HasAValidPoseWhenTheReaderIsStraightAbove) {
 TEST(Signpost, LimitsTheTextureSizeForAnyTextLength) {
   for (const std::string& text : {std::string("Hi"), std::string(200000, 'W'), std::string(3000, '\n'),
                                   std::string("\xff\xc0 no UTF-8"), std::string()}) {
-    const auto model = MakeSignpostModel(Sign(text, std::string(5000, 'M')));
+    const auto model = MakeSignpostModel(text, std::string(5000, 'M'));
     EXPECT_LE(model->images[0].width_px, 1024);
     EXPECT_LE(model->images[0].height_px, 1024);
     EXPECT_EQ(model->images[0].rgba.size(), 4u * model->images[0].width_px * model->images[0].height_px);
@@ -55,8 +54,7 @@ TEST(Signpost, LimitsTheTextureSizeForAnyTextLength) {
 }
 
 TEST(Signpost, ShowsAStripWhenItLeadsToAMap) {
-  const auto plain = MakeSignpostModel(Sign("Elephants")),
-             pointing = MakeSignpostModel(Sign("Elephants", "Bay 7"));
+  const auto plain = MakeSignpostModel("Elephants", ""), pointing = MakeSignpostModel("Elephants", "Bay 7");
   EXPECT_GT(pointing->images[0].height_px, plain->images[0].height_px + 40);
 }
 

@@ -49,7 +49,9 @@ class AskedFor : public AuthoringActions {
   void Redo() override { words.push_back("redo"); }
   void Save() override { words.push_back("save"); }
   void Quit(bool save) override { words.push_back(save ? "save and quit" : "quit without saving"); }
-  void ChooseModelFile() override { words.push_back("choose"); }
+  void ChooseFile(content::AssetKind kind) override {
+    words.push_back(kind == content::AssetKind::kModel ? "choose" : "choose another file");
+  }
   void Select(const std::string& name, bool add) override {
     words.push_back((add ? "add " : "select ") + name);
   }
@@ -60,9 +62,13 @@ class AskedFor : public AuthoringActions {
   void Rename(const std::string& name, const std::string& new_name) override {
     words.push_back("rename " + name + " " + new_name);
   }
-  void SetText(const std::string& name, const std::string& text) override {
-    words.push_back("text " + name + " " + text);
+  void SetText(const std::string& name, const std::string& text, const std::string& language) override {
+    words.push_back("text " + name + " " + text + (language.empty() ? "" : " in " + language));
   }
+  void SetOffset(const std::string& name, const Eigen::Vector3d&) override {
+    words.push_back("offset " + name);
+  }
+  void ShortenTrail(const std::string& name) override { words.push_back("shorten " + name); }
   void SetTarget(const std::string& name, const std::string& to_map) override {
     words.push_back("target " + name + " " + to_map);
   }

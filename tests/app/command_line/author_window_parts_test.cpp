@@ -84,19 +84,19 @@ TEST_F(FileDialogProgram, GivesTheChosenFileWithoutWaitingForIt) {
   Install("sleep 0.3\necho \"/models/red fox.glb\"\n");
   EXPECT_TRUE(FileDialog::IsAvailable());
   FileDialog dialog;
-  ASSERT_TRUE(dialog.Open("Choose a model"));
+  ASSERT_TRUE(dialog.Open("Choose a model", "*.glb"));
   EXPECT_FALSE(dialog.Poll()) << "it is still open";
   EXPECT_TRUE(dialog.is_open());
   EXPECT_EQ(Await(&dialog), "/models/red fox.glb");
   EXPECT_FALSE(dialog.is_open());
-  ASSERT_TRUE(dialog.Open("Again"));
+  ASSERT_TRUE(dialog.Open("Again", "*.glb"));
   EXPECT_EQ(Await(&dialog), "/models/red fox.glb");
 }
 
 TEST_F(FileDialogProgram, GivesNothingWhenItIsCancelled) {
   Install("echo /models/fox.glb\nexit 1\n");
   FileDialog dialog;
-  ASSERT_TRUE(dialog.Open("Choose a model"));
+  ASSERT_TRUE(dialog.Open("Choose a model", "*.glb"));
   EXPECT_FALSE(Await(&dialog));
   EXPECT_FALSE(dialog.is_open());
 }
@@ -106,7 +106,7 @@ TEST_F(FileDialogProgram, IsClosedWithTheWindow) {
   const auto begin = std::chrono::steady_clock::now();
   {
     FileDialog dialog;
-    ASSERT_TRUE(dialog.Open("Choose a model"));
+    ASSERT_TRUE(dialog.Open("Choose a model", "*.glb"));
   }
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }

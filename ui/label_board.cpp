@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/label_board.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "ui/signpost_model.h"
+#include "ui/theme.h"
+
+namespace docent::ui {
+namespace {
+
+// Ratios of the distance: 12 pixels in an image of 640 pixels and 65 degrees, and a fifth of its width for a
+// word of four letters.
+constexpr double kLeastTextAngle = 1.0 / 40, kMostTextAngle = 1.0 / 8;
+// In lines of text.
+constexpr double kMaxLineWidth = 18, kMaxTextHeight = 8, kPaddingX = 0.55, kPaddingY = 0.3;
+constexpr double kMinTextPx = 8, kMaxTextPx = 120;
+// Texts are laid out anew for each size, which changes with every step of the reader: sizes go in steps.
+constexpr double kSizeStep = 1.12;
+
+TextStyle LabelStyle(double size_px) {
+  TextStyle style;
+  style.size_px = size_px;
+  style.centered = true;
+  style.max_width_px = static_cast<int>(kMaxLineWidth * size_px);
+  style.max_height_px = static_cast<int>(kMaxTextHeight * size_px);
+  style.color = theme::kText;
+  return style;
+}
+
+double SteppedSize(double size_px) {
+  const double steps =
+      std::round(std::log(std::clamp(size_px, kMinTextPx, kMaxTextPx)) / std::log(kSizeStep));
+  return std::pow(kSizeStep, steps);
+}
+
+// A label as it is drawn, in pixels of the canvas.
+struct DrawnLabel {
+  Eigen::Vector2d foot;                   // The middle of the board's lower edge.
+  std::optional<Eigen::Vector2d> anchor;  // Empty where the lens does not see it.
+  double text_px = 0;
+};
+
+std::optional<DrawnLabel> Projected(const content::Label& label, const engine::CameraModel& camera,
+                                    const engine::Rigid3& camera_from_map, const Letterbox& box) {
+  const engine::Sim3 pose = LabelPose(label, camera_from_map.OriginInSource());
+  const Eigen::Vector3d foot = camera_from_map * pose.translation;
+  const auto pixel = camera.Project(foot);
+  if (!pixel || !camera.IsInside(*pixel)) return std::nullopt;
+  const auto above = camera.Project(foot - pose.scale * Eigen::Vector3d::UnitY());
+  if (!above) return std::nullopt;
+  const auto in_canvas = [&](const Eigen::Vector2d& image) -> Eigen::Vector2d {
+    return box.WindowFromImage(image) - Eigen::Vector2d(0.5, 0.5);
+  };
+  DrawnLabel drawn;
+  drawn.foot = in_canvas(*pixel);
+  drawn.text_px = SteppedSize(box.scale * (*above - *pixel).norm());
+  const auto anchor = camera.Project(camera_from_map * label.anchor);
+  // The line may leave the image, but not reach far beyond it.
+  if (anchor && camera.IsInside(*anchor, -0.5 * camera.width_px())) drawn.anchor = in_canvas(*anchor);
+  return drawn;
+}
+
+void DrawLeader(const DrawnLabel& label, Canvas* canvas) {
+  if (!label.anchor) return;
+  const double width = std::max(1.5, 0.09 * label.text_px);
+  canvas->Line(*label.anchor, label.foot, 2 * width, {0, 0, 0, 0.5f});
+  canvas->Line(*label.anchor, label.foot, width, theme::kText);
+  canvas->Disk(*label.anchor, 2.6 * width, {0, 0, 0, 0.5f});
+  canvas->Disk(*label.anchor, 2 * width, theme::kText);
+}
+
+}  // namespace
+
+engine::Sim3 LabelPose(const content::Label& label, const Eigen::Vector3d& eye_in_map) {
+  content::Signpost board;
+  board.anchor = label.anchor + label.offset;
+  board.up = label.up;
+  const double distance = (eye_in_map - board.anchor).norm();
+  board.height_m = distance > 0
+                       ? std::clamp(label.text_height, kLeastTextAngle * distance, kMostTextAngle * distance)
+                       : label.text_height;
+  return SignpostPose(board, eye_in_map);
+}
+
+std::shared_ptr<const content::Model> LabelBoardShape(const std::string& text) {
+  constexpr double kLayoutPx = 32;
+  const cv::Mat image = DrawText(text, LabelStyle(kLayoutPx));
+  const float half_width = static_cast<float>(0.5 * image.cols / kLayoutPx + kPaddingX);
+  const float height = static_cast<float>(image.rows / kLayoutPx + 2 * kPaddingY);
+  auto model = std::make_shared<content::Model>();
+  model->name = "label";
+  content::Primitive board;
+  for (const glm::vec2& corner : {glm::vec2(-1, 0), glm::vec2(1, 0), glm::vec2(1, 1), glm::vec2(-1, 1)}) {
+    content::Vertex vertex;
+    vertex.position = glm::vec3(corner.x * half_width, corner.y * height, 0);
+    board.vertices.push_back(vertex);
+  }
+  board.indices = {0, 1, 2, 0, 2, 3};
+  model->meshes.push_back({"label", {std::move(board)}});
+  content::Node node;
+  node.mesh = 0;
+  model->nodes.push_back(node);
+  model->roots.push_back(0);
+  model->bounds_min = glm::vec3(-half_width, 0, 0);
+  model->bounds_max = glm::vec3(half_width, height, 0);
+  return model;
+}
+
+void DrawLabels(const content::Scene& scene, const std::string& language, const engine::CameraModel& camera,
+                const engine::Rigid3& camera_from_map, const Letterbox& image_in_canvas, Canvas* canvas) {
+  for (const content::Entity& entity : scene.entities) {
+    if (entity.kind != content::Entity::Kind::kLabel || entity.hidden) continue;
+    const auto label = Projected(entity.label, camera, camera_from_map, image_in_canvas);
+    if (!label) continue;
+    DrawLeader(*label, canvas);
+    const std::string& text = content::ShownText(entity, language);
+    const TextStyle style = LabelStyle(label->text_px);
+    const Eigen::Vector2d size = canvas->Measure(text, style);
+    const Eigen::Vector2d padding = label->text_px * Eigen::Vector2d(kPaddingX, kPaddingY);
+    const Eigen::Vector2d low =
+        label->foot - Eigen::Vector2d(0.5 * size.x() + padding.x(), size.y() + 2 * padding.y());
+    const Eigen::Vector2d high(label->foot.x() + 0.5 * size.x() + padding.x(), label->foot.y());
+    canvas->Box(low, high, 0.25 * label->text_px, theme::kHeadsUp);
+    canvas->Text(text, style, {label->foot.x(), low.y() + padding.y()}, 0.5);
+  }
+}
+
+}  // namespace docent::ui

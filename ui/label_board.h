@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "content/scene.h"
+#include "engine/geometry/camera_model.h"
+#include "engine/geometry/rigid3.h"
+#include "ui/canvas.h"
+#include "ui/letterbox.h"
+
+// Labels: boards with text that are drawn over the image, at the resolution of the canvas, and leader lines
+// to what they are about. Nothing hides them, and their texts are readable from any distance.
+namespace docent::ui {
+
+// The pose of a label's board for a reader at eye_in_map (map units): the middle of its lower edge is at the
+// origin, y is up, the reader is at +z, and the scale is the height of a line of text as it is shown, which
+// is at least 1/40 and at most 1/8 of the distance.
+engine::Sim3 LabelPose(const content::Label& label, const Eigen::Vector3d& eye_in_map);
+
+// The board's front as a rectangle without content, to be picked and outlined; in units of a line of text.
+std::shared_ptr<const content::Model> LabelBoardShape(const std::string& text);
+
+// Draws all labels of a scene that are not hidden. `image_in_canvas` says where the camera's image is in the
+// canvas; a label whose board is outside of it is left out. `language` chooses the texts (TextFor).
+void DrawLabels(const content::Scene& scene, const std::string& language, const engine::CameraModel& camera,
+                const engine::Rigid3& camera_from_map, const Letterbox& image_in_canvas, Canvas* canvas);
+
+}  // namespace docent::ui
