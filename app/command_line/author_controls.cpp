@@ -36,7 +36,8 @@ bool ChooseToPlace(const std::string& file, ui::AuthoringChoices* choices) {
 }  // namespace
 
 AuthorControls::AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder)
-    : window_(window),
+    : CommandActions(host.emit),
+      window_(window),
       host_(std::move(host)),
       gui_(window),
       panel_(this),
@@ -312,42 +313,6 @@ void AuthorControls::AskToQuit() {
   quit_dialog_.Open();
 }
 
-void AuthorControls::NewMap(const std::string& name) {
-  host_.emit(app::NewMap{name});
-}
-
-void AuthorControls::StopMap() {
-  host_.emit(app::StopMap{});
-}
-
-void AuthorControls::UseMap(const std::string& name) {
-  host_.emit(app::UseMap{name});
-}
-
-void AuthorControls::RenameMap(const std::string& name, const std::string& new_name) {
-  host_.emit(app::RenameMap{name, new_name});
-}
-
-void AuthorControls::RemoveMap(const std::string& name) {
-  host_.emit(app::RemoveMap{name});
-}
-
-void AuthorControls::SetPolicy(const std::string& name, const std::string& policy) {
-  if (const auto parsed = maps::ParsePolicy(policy)) host_.emit(app::SetPolicy{name, *parsed});
-}
-
-void AuthorControls::Undo() {
-  host_.emit(app::Undo{});
-}
-
-void AuthorControls::Redo() {
-  host_.emit(app::Redo{});
-}
-
-void AuthorControls::Save() {
-  host_.emit(app::Save{});
-}
-
 void AuthorControls::Quit(bool save) {
   ending_ = save ? Ending::kSave : Ending::kDiscard;
 }
@@ -407,34 +372,6 @@ void AuthorControls::Paste() {
   host_.emit(std::move(command));
 }
 
-void AuthorControls::Rename(const std::string& name, const std::string& new_name) {
-  host_.emit(RenameEntity{name, new_name});
-}
-
-void AuthorControls::SetText(const std::string& name, const std::string& text, const std::string& language) {
-  host_.emit(SetEntityText{name, text, language});
-}
-
-void AuthorControls::SetOffset(const std::string& name, const Eigen::Vector3d& offset) {
-  host_.emit(SetLabelOffset{name, offset});
-}
-
-void AuthorControls::ShortenTrail(const std::string& name) {
-  host_.emit(app::ShortenTrail{name});
-}
-
-void AuthorControls::SetTarget(const std::string& name, const std::string& to_map) {
-  host_.emit(SetSignpostTarget{name, to_map});
-}
-
-void AuthorControls::SetLocked(const std::vector<std::string>& names, bool locked) {
-  host_.emit(SetEntityFlag{names, content::EntityFlag::kLocked, locked});
-}
-
-void AuthorControls::SetHidden(const std::vector<std::string>& names, bool hidden) {
-  host_.emit(SetEntityFlag{names, content::EntityFlag::kHidden, hidden});
-}
-
 // Under the first unused name of "group-1", "group-2" ...
 void AuthorControls::Group(const std::vector<std::string>& names) {
   if (!view_.scene) return;
@@ -445,24 +382,6 @@ void AuthorControls::Group(const std::vector<std::string>& names) {
   int number = 1;
   while (is_used("group-" + std::to_string(number))) ++number;
   host_.emit(GroupEntities{names, "group-" + std::to_string(number)});
-}
-
-void AuthorControls::Ungroup(const std::vector<std::string>& names) {
-  host_.emit(GroupEntities{names, ""});
-}
-
-void AuthorControls::Transform(const std::vector<ui::NewPose>& poses) {
-  TransformEntities command;
-  for (const auto& [name, map_from_entity] : poses) command.poses.push_back({name, map_from_entity});
-  host_.emit(std::move(command));
-}
-
-void AuthorControls::ForgetUp() {
-  host_.emit(SetMapUp{});
-}
-
-void AuthorControls::ForgetScale() {
-  host_.emit(SetMapScale{});
 }
 
 // The view is frozen while a length is measured, so that both points are those of one image.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "app/command_line/author_view.h"
+#include "app/command_line/command_actions.h"
 #include "app/command_line/file_dialog.h"
 #include "app/command_line/notices.h"
 #include "app/command_line/placing_ghost.h"
@@ -25,7 +26,7 @@ namespace docent::app {
 
 // What an author does at the window: keys, clicks, drags and the panel become commands. On the window's
 // thread.
-class AuthorControls final : public ui::AuthoringActions {
+class AuthorControls final : public CommandActions {
  public:
   // How a session ends that the author wants to leave.
   enum class Ending { kNone, kSave, kDiscard };
@@ -57,16 +58,7 @@ class AuthorControls final : public ui::AuthoringActions {
   Ending ending() const { return ending_; }
   const ui::AuthoringChoices& choices() const { return panel_.choices(); }
 
-  // ui::AuthoringActions
-  void NewMap(const std::string& name) override;
-  void StopMap() override;
-  void UseMap(const std::string& name) override;
-  void RenameMap(const std::string& name, const std::string& new_name) override;
-  void RemoveMap(const std::string& name) override;
-  void SetPolicy(const std::string& name, const std::string& policy) override;
-  void Undo() override;
-  void Redo() override;
-  void Save() override;
+  // The actions that depend on the selection and the window.
   void Quit(bool save) override;
   void ChooseFile(content::AssetKind kind) override;
   void Select(const std::string& name, bool add) override;
@@ -74,18 +66,7 @@ class AuthorControls final : public ui::AuthoringActions {
   void DuplicateSelected() override;
   void CopySelected() override;
   void Paste() override;
-  void Rename(const std::string& name, const std::string& new_name) override;
-  void SetText(const std::string& name, const std::string& text, const std::string& language) override;
-  void SetOffset(const std::string& name, const Eigen::Vector3d& offset) override;
-  void ShortenTrail(const std::string& name) override;
-  void SetTarget(const std::string& name, const std::string& to_map) override;
-  void SetLocked(const std::vector<std::string>& names, bool locked) override;
-  void SetHidden(const std::vector<std::string>& names, bool hidden) override;
   void Group(const std::vector<std::string>& names) override;
-  void Ungroup(const std::vector<std::string>& names) override;
-  void Transform(const std::vector<ui::NewPose>& poses) override;
-  void ForgetUp() override;
-  void ForgetScale() override;
   void ToggleFullScreen() override { host_.toggle_full_screen(); }
 
  private:
