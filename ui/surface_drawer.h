@@ -16,7 +16,8 @@ namespace docent::ui {
 class SurfaceDrawer {
  public:
   // Surfaces are drawn this much farther from the camera than they are, relative to their distance, because
-  // content stands on them: nine tenths of the depths that maps measure are off by less (docs/tuning.md).
+  // content stands on them: nine tenths of the depths that maps measure are off by less
+  // (docs/decisions/dense-surfaces.md).
   static constexpr float kDepthBias = 0.02F;
 
   SurfaceDrawer();

@@ -98,6 +98,7 @@ TEST_F(StoredMesh, DoesNotMakeTheMapCountAsChanged) {
 TEST_F(StoredMesh, StaysWhenTheMapIsExtended) {
   ASSERT_TRUE(library_.SaveMesh(1, mesh_));
   AddSampleKeyFrame(9, {3, 0, 0}, map_.get());
+  AddSampleKeyFrame(10, {4, 0, 0}, map_.get());  // One of the two is localized.
   library_.Save({1, "", Policy::kOpen, map_, nullptr});
   const auto read = library_.LoadMesh(1);
   ASSERT_TRUE(read);

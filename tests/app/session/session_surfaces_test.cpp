@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// The meshes of maps in a session: they are read with their maps, shown with them, dropped when they no
+// longer fit, and computed for idle maps.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <thread>
+
+#include "app/session/session_map.h"
+#include "tests/app/support/simulated_session.h"
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using namespace simulated_session;
+
+// The map of a short walk, made once.
+std::shared_ptr<const engine::MapSnapshot> MapOfAWalk() {
+  static const auto map = [] {
+    const auto simulation = Room(3);
+    Session session(Options(Pace::kLockstep, "map"), LensOf(*simulation), nullptr);
+    Feed(simulation, Pace::kLockstep, &session);
+    return session.Maps().at(0).snapshot;
+  }();
+  return map;
+}
+
+// One triangle, made from all keyframes of a map.
+std::shared_ptr<const engine::MapMesh> MeshOf(const engine::MapSnapshot& map) {
+  auto mesh = std::make_shared<engine::MapMesh>();
+  mesh->mesh.vertices = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+  mesh->mesh.triangles = {{0, 1, 2}};
+  for (const engine::KeyFrame& keyframe : map.keyframes) {
+    if (keyframe.kind == engine::KeyFrameKind::kSixDof)
+      mesh->keyframes.push_back({keyframe.id, keyframe.camera_from_map});
+  }
+  return mesh;
+}
+
+TEST(SessionSurfaces, AreDroppedWhenAKeyFrameMoves) {
+  SessionMap map;
+  map.snapshot = MapOfAWalk();
+  map.SetMesh(MeshOf(*map.snapshot));
+  ASSERT_TRUE(map.mesh);
+  EXPECT_TRUE(map.HasCurrentMesh());
+  map.UpdateSnapshot(std::make_shared<engine::MapSnapshot>(*MapOfAWalk()));
+  EXPECT_TRUE(map.mesh) << "nothing has moved";
+  auto moved = std::make_shared<engine::MapSnapshot>(*MapOfAWalk());
+  moved->keyframes.front().camera_from_map.translation.x() += moved->keyframes.front().mean_depth;
+  map.UpdateSnapshot(moved);
+  EXPECT_FALSE(map.mesh);
+  map.SetMesh(MeshOf(*MapOfAWalk()));
+  EXPECT_FALSE(map.mesh) << "it was made of another state of the map";
+}
+
+class StoredSurfaces : public ::testing::Test {
+ protected:
+  StoredSurfaces() { library_.Save({key_, "Table", maps::Policy::kOpen, MapOfAWalk(), nullptr}); }
+
+  // What a session that has the map in memory shows with a frame in it.
+  Session::Shown ShownInSession(bool occlusion) {
+    SessionOptions options = Options(Pace::kEager, "");
+    options.maintenance = false;
+    options.occlusion = occlusion;
+    Session session(options, LensOf(*Room(1)), &library_);
+    const engine::TrackedFrame no_frame;
+    session.Execute(UseMap{"Table"}, no_frame);
+    engine::TrackedFrame frame;
+    frame.map_key = key_;
+    Session::Shown shown = session.ShownWith(frame);
+    session.Finish();
+    return shown;
+  }
+
+  const TemporaryFolder folder_;
+  maps::Library library_ =
+      maps::Library::Open(folder_ / "a.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  const std::uint64_t key_ = library_.NewKey();
+};
+
+TEST_F(StoredSurfaces, AreShownWithTheirMapUnlessSwitchedOff) {
+  EXPECT_FALSE(ShownInSession(true).surfaces) << "the map has no mesh yet";
+  ASSERT_TRUE(library_.SaveMesh(key_, *MeshOf(*MapOfAWalk())));
+  const Session::Shown shown = ShownInSession(true);
+  ASSERT_TRUE(shown.surfaces);
+  EXPECT_EQ(shown.surfaces->triangles.size(), 1U);
+  EXPECT_FALSE(ShownInSession(false).surfaces);
+}
+
+TEST_F(StoredSurfaces, AreComputedWhileTheSessionIsIdle) {
+  Session session(Options(Pace::kEager, ""), LensOf(*Room(1)), &library_);
+  // Seconds for each keyframe; three minutes at most, as the machine may be slow.
+  for (int i = 0; i < 1800 && !library_.LoadMesh(key_); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  session.Finish();
+  const auto mesh = library_.LoadMesh(key_);
+  ASSERT_TRUE(mesh);
+  EXPECT_GT(mesh->mesh.triangles.size(), 100U);
+  EXPECT_EQ(engine::StateOf(mesh->keyframes, *library_.Load(key_).snapshot), engine::MeshState::kCurrent);
+}
+
+}  // namespace
+}  // namespace docent::app
