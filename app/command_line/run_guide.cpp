@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/run_guide.h"
 #include "app/session/visit_state.h"
+#include "app/sound/sound_director.h"
+#include "app/sound/sound_player.h"
 
 #include <algorithm>
 #include <cctype>
@@ -24,10 +26,17 @@ namespace docent::app {
 
 namespace {
 
+ui::RendererOptions OptionsFor(const GuideRequest& request) {
+  ui::RendererOptions options;
+  options.language = request.language;
+  return options;
+}
+
 // Draws frames without a window, for the video and for GuideRequest::on_image.
 class OffscreenView {
  public:
-  OffscreenView(const GuideRequest& request, double frames_per_second) : request_(request) {
+  OffscreenView(const GuideRequest& request, double frames_per_second)
+      : request_(request), renderer_(OptionsFor(request)) {
     if (request.record) recorder_.emplace(*request.record, frames_per_second);
   }
 
@@ -89,7 +98,9 @@ class GuideRun {
         cameras_(cameras),
         session_(OptionsOf(request, cameras), ModelsOf(cameras), request.library),
         inboxes_(cameras.size()),
-        camera_states_(cameras.size()) {
+        camera_states_(cameras.size()),
+        sound_director_(request.language) {
+    if (request.sound) sound_player_.emplace();
     for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
     if (!request.head) return;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -315,6 +326,26 @@ class GuideRun {
     for (Command& command : request_.director(*frame)) inboxes_[0].Push({std::move(command), tracked});
   }
 
+  // The sounds that are near the first camera, and their captions. With files_mutex_ held.
+  void PlaySounds(ShownFrame* frame) {
+    const engine::TrackedFrame& tracked = frame->tracked;
+    std::optional<Eigen::Vector3d> place;
+    if (engine::HasPose(tracked.state)) place = tracked.camera_from_map.OriginInSource();
+    static const content::Scene kNoScene;
+    const auto orders = sound_director_.Update(frame->seconds, tracked.map_key,
+                                               frame->shown.scene ? *frame->shown.scene : kNoScene, place);
+    frame->caption = orders.caption;
+    for (const auto& [key, asset] : orders.start)
+      files_->Add({Event{tracked.frame.time, "sound", "'" + key.second + "' begins"}});
+    if (!sound_player_) return;
+    sound_player_->Give(orders);
+    const std::string problem = sound_player_->TakeProblem();
+    if (problem.empty()) return;
+    const std::vector<Event> events = {Event{tracked.frame.time, "warning", problem}};
+    files_->Add(events);
+    Warn(events);
+  }
+
   std::shared_ptr<ShownFrame> MakeShown(const engine::TrackedFrame& tracked, CameraState* state) {
     auto frame = std::make_shared<ShownFrame>();
     frame->tracked = tracked;
@@ -328,6 +359,7 @@ class GuideRun {
     if (state->message.empty() && !warnings_.contains(frame->shown.advice))
       frame->message = frame->shown.advice;
     if (state->visit) GuideVisitor(frame, state);
+    if (tracked.frame.camera == 0) PlaySounds(frame.get());
     return frame;
   }
 
@@ -350,6 +382,8 @@ class GuideRun {
   Session session_;
   std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
   std::vector<CameraState> camera_states_;
+  SoundDirector sound_director_;                     // Used for the frames of the first camera.
+  std::optional<SoundPlayer> sound_player_;          // Only if sounds are to be heard.
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
   NoticeQueue notices_;
