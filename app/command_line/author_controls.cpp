@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "app/command_line/command_words.h"
-#include "app/files/file_kind.h"
+#include "app/session/file_kind.h"
 #include "ui/strings.h"
 
 namespace docent::app {
@@ -41,6 +41,7 @@ AuthorControls::AuthorControls(ui::Window* window, Host host, std::filesystem::p
       host_(std::move(host)),
       gui_(window),
       panel_(this),
+      shapes_(host_.language),
       pointer_(&selection_, &shapes_, this),
       ghost_(std::move(model_folder)),
       recent_(RecentFiles::DefaultPlace()) {

@@ -35,6 +35,7 @@ class AuthorControls final : public CommandActions {
     // Queues a command for the frame on the screen.
     std::function<void(Command)> emit;
     std::function<void()> toggle_full_screen, swap_cameras;
+    std::string language;  // Of the texts that are shown.
   };
 
   AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder);

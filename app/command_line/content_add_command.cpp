@@ -13,8 +13,8 @@
 
 #include "app/command_line/number_option.h"
 #include "app/command_line/stored_scene.h"
-#include "app/files/file_kind.h"
 #include "app/script/script_file.h"
+#include "app/session/file_kind.h"
 #include "app/session/library_scene.h"
 #include "app/session/map_axes.h"
 #include "app/session/new_entities.h"

@@ -69,7 +69,9 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
       cameras_(cameras),
       session_(SessionOptionsOf(request, cameras), ModelsOf(cameras), request.library),
       inboxes_(cameras.size()),
-      camera_states_(cameras.size()) {
+      camera_states_(cameras.size()),
+      sound_director_(request.language) {
+  if (request.sound) sound_player_.emplace();
   for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
   if (!request.head) return;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -270,6 +272,25 @@ void GuideRun::Direct(const std::shared_ptr<const ShownFrame>& frame) {
   for (Command& command : request_.director(*frame)) inboxes_[0].Push({std::move(command), tracked});
 }
 
+void GuideRun::PlaySounds(ShownFrame* frame) {
+  const engine::TrackedFrame& tracked = frame->tracked;
+  std::optional<Eigen::Vector3d> place;
+  if (engine::HasPose(tracked.state)) place = tracked.camera_from_map.OriginInSource();
+  static const content::Scene kNoScene;
+  const auto orders = sound_director_.Update(frame->seconds, tracked.map_key,
+                                             frame->shown.scene ? *frame->shown.scene : kNoScene, place);
+  frame->caption = orders.caption;
+  for (const auto& [key, asset] : orders.start)
+    files_->Add({Event{tracked.frame.time, "sound", "'" + key.second + "' begins"}});
+  if (!sound_player_) return;
+  sound_player_->Give(orders);
+  const std::string problem = sound_player_->TakeProblem();
+  if (problem.empty()) return;
+  const std::vector<Event> events = {Event{tracked.frame.time, "warning", problem}};
+  files_->Add(events);
+  Warn(events);
+}
+
 std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& tracked, CameraState* state) {
   auto frame = std::make_shared<ShownFrame>();
   frame->tracked = tracked;
@@ -284,6 +305,7 @@ std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& trac
     frame->message = frame->shown.advice;
   if (state->visitor)
     state->visitor->Guide(frame, frame->camera ? *frame->camera : *cameras_[CameraOf(tracked)].model);
+  if (tracked.frame.camera == 0) PlaySounds(frame.get());
   return frame;
 }
 

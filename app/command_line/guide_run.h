@@ -16,6 +16,8 @@
 #include "app/command_line/run_guide.h"
 #include "app/evaluation/camera_report.h"
 #include "app/session/visitor_guide.h"
+#include "app/sound/sound_director.h"
+#include "app/sound/sound_player.h"
 
 namespace docent::app {
 
@@ -61,6 +63,8 @@ class GuideRun {
   bool has_author_window() const { return request_.may_write && !request_.headless; }
   void Warn(const std::vector<Event>& events);
   void Direct(const std::shared_ptr<const ShownFrame>& frame);
+  // The sounds that are near the first camera, and their captions. With files_mutex_ held.
+  void PlaySounds(ShownFrame* frame);
   std::shared_ptr<ShownFrame> MakeShown(const engine::TrackedFrame& tracked, CameraState* state);
   void WriteDelivery();
 
@@ -69,6 +73,8 @@ class GuideRun {
   Session session_;
   std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
   std::vector<CameraState> camera_states_;
+  SoundDirector sound_director_;                     // Used for the frames of the first camera.
+  std::optional<SoundPlayer> sound_player_;          // Only if sounds are to be heard.
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
   NoticeQueue notices_;

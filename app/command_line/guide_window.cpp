@@ -60,11 +60,13 @@ class GuideWindow {
         cameras_(cameras),
         window_(request.title, request.may_write ? kAuthorWidth : cameras.front().model->width_px(),
                 request.may_write ? kAuthorHeight : cameras.front().model->height_px()),
+        renderer_(OptionsFor(request)),
         newest_(cameras.size()),
         shown_(cameras.size()) {
     if (request.record) recorder_.emplace(*request.record, cameras.front().source->info().nominal_fps);
     if (!request.may_write) return;
     AuthorControls::Host host;
+    host.language = request.language;
     host.emit = [this](Command command) { Emit(std::move(command)); };
     host.toggle_full_screen = [this] { window_.ToggleFullScreen(); };
     host.swap_cameras = [this] { Swap(); };
@@ -103,6 +105,11 @@ class GuideWindow {
   }
 
  private:
+  static ui::RendererOptions OptionsFor(const GuideRequest& request) {
+    ui::RendererOptions options;
+    options.language = request.language;
+    return options;
+  }
   const std::shared_ptr<const ShownFrame>& large() const { return shown_[large_]; }
   const engine::CameraModel& camera() const {
     return large() && large()->camera ? *large()->camera : *cameras_[large_].model;

@@ -49,8 +49,10 @@ struct RunArguments {
   std::uint64_t seed = 1;
   std::size_t memory_budget_bytes = std::size_t{1} << 30;  // For maps in memory.
   std::optional<HeadPolicy> head;                          // For cameras with a pan-tilt head.
-  double baseline_m = 0;  // Measured distance between the two cameras; 0: not measured.
-  bool occlusion = true;  // Content is hidden behind the surfaces of maps.
+  double baseline_m = 0;                // Measured distance between the two cameras; 0: not measured.
+  bool occlusion = true;                // Content is hidden behind the surfaces of maps.
+  std::optional<bool> sound;            // Whether sounds are heard; empty: with a window.
+  std::optional<std::string> language;  // Of texts, a tag in lower case; empty: that of the locale.
 };
 
 struct AuthorOptions {

@@ -4,7 +4,7 @@
 #include <numbers>
 #include <utility>
 
-#include "app/files/file_kind.h"
+#include "app/session/file_kind.h"
 #include "app/session/map_axes.h"
 #include "app/session/new_entities.h"
 #include "app/session/session_options.h"

@@ -2,9 +2,11 @@
 #include "app/command_line/run_arguments.h"
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <map>
 
 #include "app/files/text_file.h"
+#include "content/language.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -168,6 +170,22 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
       "Where a camera with a pan-tilt head looks: at the wearer's gaze, or so that the map stays in view; a "
       "lost camera searches for the map",
       {{"gaze", HeadPolicy::kFollowGaze}, {"map", HeadPolicy::kKeepMapInView}});
+  AddChoice<bool>(command, "--sound", &run->sound,
+                  "Whether the sounds that are placed in maps are heard (default: on with a window); their "
+                  "captions are always shown",
+                  {{"on", true}, {"off", false}});
+  command
+      ->add_option_function<std::string>(
+          "--language",
+          [=](const std::string& text) {
+            const std::string tag = content::LanguageTag(text);
+            if (tag.empty())
+              throw CLI::ValidationError("--language",
+                                         "'" + text + "' is not a language tag such as de or es-419");
+            run->language = tag;
+          },
+          "Language in which texts are shown that have it (default: that of the locale)")
+      ->type_name("TAG");
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");
   command->add_option("--record", run->record, "Write the augmented view as a video")->type_name("FILE.mp4");
@@ -200,6 +218,15 @@ void AddMemoryOption(CLI::App* command, std::size_t* bytes) {
           },
           "Memory for maps; the least recently used maps are evicted first (default 1GiB)")
       ->type_name("SIZE");
+}
+
+// The first variable that is set and not empty counts (POSIX, Environment Variables, section 8.2).
+std::string LanguageOfEnvironment() {
+  for (const char* name : {"LC_ALL", "LC_MESSAGES", "LANG"}) {
+    const char* const locale = std::getenv(name);
+    if (locale != nullptr && *locale != '\0') return content::LanguageOfLocale(locale);
+  }
+  return "";
 }
 
 void CheckRunArguments(const RunArguments& run) {

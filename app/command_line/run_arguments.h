@@ -33,9 +33,11 @@ void AddCameraFormatOption(CLI::App* command, CameraOptions* options);
 void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens);
 // Adds the options that all subcommands with tracking share: --camera, --calibration, --camera-format,
 // --from,
-// --until, --pace, --engine, --seed, --memory-budget, --baseline, --head, --headless, --output and --record.
-// `auto_calibration` is the help on `--calibration auto`.
+// --until, --sound, --language, --pace, --engine, --seed, --memory-budget, --baseline, --head, --headless,
+// --output and --record. `auto_calibration` is the help on `--calibration auto`.
 void AddRunArguments(CLI::App* command, const std::string& auto_calibration, RunArguments* run);
+// The language of the locale in the environment; empty if it names none.
+std::string LanguageOfEnvironment();
 // Checks combinations of options after parsing: the number of cameras and calibrations, a baseline without a
 // second camera, and --until before --from. Throws CLI::ValidationError.
 void CheckRunArguments(const RunArguments& run);

@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "app/cameras/decode_image.h"
+#include "app/command_line/run_arguments.h"
 #include "app/command_line/run_guide.h"
 #include "app/command_line/runs.h"
 #include "app/script/script_file.h"
@@ -32,6 +33,8 @@ void CopyRunArguments(const RunArguments& run, bool any_live, GuideRequest* requ
   request->occlusion = run.occlusion;
   request->output = run.output;
   request->record = run.record;
+  request->sound = run.sound.value_or(!run.headless);
+  request->language = run.language ? *run.language : LanguageOfEnvironment();
 }
 
 std::shared_ptr<const engine::PlanarTarget> ReadTarget(const std::filesystem::path& path, double width_m) {

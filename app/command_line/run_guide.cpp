@@ -17,10 +17,17 @@ namespace docent::app {
 
 namespace {
 
+ui::RendererOptions OptionsFor(const GuideRequest& request) {
+  ui::RendererOptions options;
+  options.language = request.language;
+  return options;
+}
+
 // Draws frames without a window, for the video and for GuideRequest::on_image.
 class OffscreenView {
  public:
-  OffscreenView(const GuideRequest& request, double frames_per_second) : request_(request) {
+  OffscreenView(const GuideRequest& request, double frames_per_second)
+      : request_(request), renderer_(OptionsFor(request)) {
     if (request.record) recorder_.emplace(*request.record, frames_per_second);
   }
 

@@ -39,8 +39,10 @@ struct GuideRequest {
   std::vector<TimedCommand> script;
   std::string script_name;
   std::filesystem::path model_folder;
-  std::string title;    // Title of the window.
-  double ui_scale = 1;  // Of the author's panel and texts, times what the monitor suggests.
+  std::string title;     // Title of the window.
+  bool sound = false;    // Sounds are heard, not only their captions shown.
+  std::string language;  // In which texts are shown that have it; see content::TextFor.
+  double ui_scale = 1;   // Of the author's panel and texts, times what the monitor suggests.
   // Returns commands to run for a frame, as if a person had given them in the window; may be empty. Called on
   // the camera's thread.
   std::function<std::vector<Command>(const ShownFrame&)> director;

@@ -19,6 +19,7 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   if (!frame.shown.starting_map.empty())
     view.overlay.starting_progress = frame.tracked.initialization_progress;
   view.overlay.message = frame.message;
+  view.overlay.caption = frame.caption;
   view.overlay.hint = frame.shown.hint;
   view.overlay.visitor = frame.visitor;
   if (frame.held_camera_from_map) view.held_camera_from_map = &*frame.held_camera_from_map;

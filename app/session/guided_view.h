@@ -21,6 +21,7 @@ struct ShownFrame {
   // Capture time on CLOCK_MONOTONIC; empty where it is unknown (see FrameLoopOptions::latency).
   std::optional<Timestamp> taken = {};
   std::string message;  // one sentence, often empty
+  std::string caption;  // of the sounds that play; often empty
   // Only on a tour; see VisitState.
   std::optional<ui::VisitorDisplay> visitor = {};
   // If a visitor was lost a moment ago: the last pose before, whose content is in `shown`.

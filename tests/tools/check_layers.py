@@ -55,6 +55,7 @@ ALLOWED = {
     "app/simulator": APP_INPUT + ["app/output", "app/simulator"],
     "app/cameras": APP_INPUT + ["app/simulator", "app/cameras"],
     "app/script": APP_INPUT + ["content", "maps", "app/script"],
+    "app/sound": ["engine", "content", "app/sound"],
     "app/session": APP_INPUT + ["maps", "content", "ui", "app/output", "app/simulator", "app/cameras", "app/script",
                                 "app/session"],
     "app/evaluation": APP_INPUT + ["maps", "app/output", "app/simulator", "app/cameras", "app/session",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/files/file_kind.h"
+#include "app/session/file_kind.h"
 
 #include <algorithm>
 #include <string>

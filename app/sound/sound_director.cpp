@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/sound/sound_director.h"
+
+#include <algorithm>
+
+namespace docent::app {
+
+namespace {
+
+constexpr double kLeaveRatio = 1.2;        // Of the range.
+constexpr double kMinCaption_seconds = 3;  // A short sound's caption is shown long enough to be read.
+
+}  // namespace
+
+bool SoundDirector::IsHeard(const content::Sound& sound, const Eigen::Vector3d& camera, bool was_near) const {
+  return (camera - sound.position).norm() <= sound.range * (was_near ? kLeaveRatio : 1);
+}
+
+SoundDirector::Orders SoundDirector::Update(double seconds, std::uint64_t map_key,
+                                            const content::Scene& scene,
+                                            const std::optional<Eigen::Vector3d>& camera_in_map) {
+  Orders orders;
+  if (camera_in_map) {
+    std::map<Key, Near> near;
+    for (const content::Entity& entity : scene.entities) {
+      if (entity.kind != content::Entity::Kind::kSound || entity.hidden) continue;
+      const Key key(map_key, entity.name);
+      const auto before = near_.find(key);
+      if (!IsHeard(entity.sound, *camera_in_map, before != near_.end())) continue;
+      Near now;
+      now.caption = content::ShownText(entity, language_);
+      if (before != near_.end()) {
+        now.end_seconds = before->second.end_seconds;
+        near_.erase(before);
+      } else {
+        now.end_seconds = seconds + std::max(entity.sound.asset->seconds, kMinCaption_seconds);
+        orders.start.emplace_back(key, entity.sound.asset);
+      }
+      near.emplace(key, std::move(now));
+    }
+    for (const auto& [key, left] : near_) orders.stop.push_back(key);
+    near_ = std::move(near);
+  }
+  for (const auto& [key, sound] : near_) {
+    if (seconds >= sound.end_seconds || sound.caption.empty()) continue;
+    orders.caption += (orders.caption.empty() ? "" : "\n") + sound.caption;
+  }
+  return orders;
+}
+
+}  // namespace docent::app

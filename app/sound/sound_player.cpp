@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/sound/sound_player.h"
+
+#include <chrono>
+#include <utility>
+
+#include "app/sound/sound_device.h"
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+namespace {
+
+constexpr std::size_t kMostOrders = 64;
+constexpr auto kWait = std::chrono::milliseconds(500);  // Between two looks for sounds that have ended.
+
+}  // namespace
+
+SoundPlayer::SoundPlayer() {
+  worker_.emplace("sound", [this](const std::stop_token& stop) { Run(stop); });
+}
+
+SoundPlayer::~SoundPlayer() = default;
+
+void SoundPlayer::Give(const SoundDirector::Orders& orders) {
+  if (orders.start.empty() && orders.stop.empty()) return;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (orders_.size() >= kMostOrders) orders_.pop_front();
+    orders_.push_back(orders);
+  }
+  changed_.notify_one();
+}
+
+std::string SoundPlayer::TakeProblem() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(problem_, {});
+}
+
+void SoundPlayer::Report(const std::string& problem) {
+  const std::scoped_lock lock(mutex_);
+  if (std::exchange(reported_, true)) return;
+  problem_ = "Sounds are not heard: " + problem + ". Their captions are shown.";
+}
+
+std::optional<SoundDirector::Orders> SoundPlayer::Next(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, stop, kWait, [this] { return !orders_.empty(); });
+  if (orders_.empty() || stop.stop_requested()) return std::nullopt;
+  SoundDirector::Orders orders = std::move(orders_.front());
+  orders_.pop_front();
+  return orders;
+}
+
+void SoundPlayer::Run(const std::stop_token& stop) {
+  std::unique_ptr<SoundDevice> device;
+  bool failed = false;
+  while (!stop.stop_requested()) {
+    const auto orders = Next(stop);
+    if (device) device->RemoveEnded();
+    if (!orders || failed) continue;
+    try {
+      if (!device && !orders->start.empty()) {
+        failed = true;
+        device = std::make_unique<SoundDevice>();
+        failed = false;
+      }
+      if (!device) continue;
+      for (const SoundDirector::Key& key : orders->stop) device->Stop(key);
+      for (const auto& [key, asset] : orders->start)
+        device->Start(key, content::DecodeSound(asset->name, asset->bytes));
+    } catch (const Error& error) {
+      Report(error.what());
+    }
+  }
+}
+
+}  // namespace docent::app
