@@ -12,6 +12,7 @@
 #include "app/command_line/number_option.h"
 #include "app/command_line/program.h"
 #include "app/command_line/stored_scene.h"
+#include "app/command_line/text_table.h"
 #include "app/files/text_file.h"
 #include "app/session/library_scene.h"
 #include "app/session/session.h"
@@ -82,16 +83,18 @@ void List(const ContentOptions& options) {
     return;
   }
   if (entries.empty()) std::puts("The maps hold no models or signposts.");
+  std::vector<std::vector<std::string>> rows;
   for (const Json& entry : entries) {
     const bool model = entry["kind"] == "model";
     const char* const state = entry["locked"] == true
                                   ? (entry["hidden"] == true ? "  (locked, hidden)" : "  (locked)")
                               : entry["hidden"] == true ? "  (hidden)"
                                                         : "";
-    std::printf("%-24s %-24s %-9s %s%s\n", entry["map"].get<std::string>().c_str(),
-                entry["name"].get<std::string>().c_str(), entry["kind"].get<std::string>().c_str(),
-                entry[model ? "file" : "text"].get<std::string>().c_str(), state);
+    rows.push_back({entry["map"].get<std::string>(), entry["name"].get<std::string>(),
+                    entry["kind"].get<std::string>(),
+                    entry[model ? "file" : "text"].get<std::string>() + state});
   }
+  std::fputs(FormatTable({{24}, {24}, {8}, {}}, rows).c_str(), stdout);
 }
 
 // A pose that stands upright and faces the place of the first keyframe's camera, unless a rotation is given.
