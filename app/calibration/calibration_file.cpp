@@ -163,7 +163,7 @@ std::string FormatCalibration(const CameraModel& camera) {
   const auto& d = camera.distortion();
   std::string text;
   const auto line = [&text](const char* field, double value) {
-    text += std::string(field) + ": " + FormatNumber(value, 17) + "\n";
+    text += std::string(field) + ": " + FormatExactly(value) + "\n";
   };
   text += "width: " + std::to_string(in.width_px) + "\nheight: " + std::to_string(in.height_px) + "\n";
   line("fx", in.fx), line("fy", in.fy), line("cx", in.cx), line("cy", in.cy);

@@ -5,6 +5,9 @@
 #include <optional>
 #include <utility>
 
+#include "app/files/text_file.h"
+#include "engine/base/error.h"
+
 namespace docent::app {
 
 namespace {
@@ -15,6 +18,7 @@ class ClippedSource : public FrameSource {
       : source_(std::move(source)), from_(from), until_(until) {
     info_ = source_->info();
     info_.frame_count.reset();  // Only known after reading all timestamps.
+    if (info_.duration && from_ > *info_.duration) RefuseStart(*info_.duration);
   }
 
   bool Next(engine::Frame* frame) override {
@@ -34,15 +38,26 @@ class ClippedSource : public FrameSource {
       if (frame->image.empty() && info_.live) return true;  // The device is disconnected.
       if (!first_) first_ = frame->time;
       const Timestamp since_first = frame->time - *first_;
+      last_ = since_first;
       if (until_ > Timestamp{} && since_first >= until_) break;
-      if (since_first >= from_) return true;
+      if (since_first < from_) continue;
+      is_inside_ = true;
+      return true;
     }
-    ended_ = true;
+    const bool is_first_end = !std::exchange(ended_, true);
+    if (is_first_end && !is_inside_ && last_ < from_) RefuseStart(last_);
     return false;
+  }
+
+  [[noreturn]] void RefuseStart(Timestamp last) const {
+    throw Error("--from " + FormatNumber(ToSeconds(from_)) + " is beyond the end of '" + info_.name +
+                "', whose last image is at " + FormatNumber(ToSeconds(last), 6) + " s.");
   }
 
   std::unique_ptr<FrameSource> source_;
   Timestamp from_, until_;
+  Timestamp last_{};        // Of the images so far, relative to the first one.
+  bool is_inside_ = false;  // Whether an image of the interval was delivered.
   std::optional<Timestamp> first_;
   bool ended_ = false;
 };

@@ -8,7 +8,9 @@
 namespace docent::app {
 
 // Delivers the images of `source` in the interval [from, until), relative to its first image. Timestamps and
-// indices are unchanged. An `until` of zero means the end of the source.
+// indices are unchanged. An `until` of zero means the end of the source. Throws
+// Error if `from` is beyond the end: here if the source knows its duration, else when its images have been
+// read.
 std::unique_ptr<FrameSource> ClipSource(std::unique_ptr<FrameSource> source, Timestamp from, Timestamp until);
 
 // Delivers the images of a recorded source as if the recording began at image `first_frame` (from 0), for

@@ -29,6 +29,11 @@ std::optional<fs::path> IfFile(const fs::path& path) {
   return fs::is_regular_file(path) ? std::optional(path) : std::nullopt;
 }
 
+// Of increasing times.
+Timestamp DurationOf(const std::vector<Timestamp>& times) {
+  return times.empty() ? Timestamp{} : times.back() - times.front();
+}
+
 class VideoSource : public FrameSource {
  public:
   VideoSource(const fs::path& video, const std::optional<fs::path>& timestamps_path)
@@ -45,6 +50,7 @@ class VideoSource : public FrameSource {
     if (timestamps_path) {
       info_.frame_count = times_.size();
       info_.nominal_fps = MedianFps(times_);
+      info_.duration = DurationOf(times_);
     } else if (announced_count_) {
       info_.frame_count = static_cast<std::uint64_t>(*announced_count_);
     }
@@ -134,6 +140,7 @@ class ImageListSource : public FrameSource {
     for (const TimedPath& image : images_) times.push_back(image.time);
     info_.frame_count = images_.size();
     info_.nominal_fps = MedianFps(times);
+    info_.duration = DurationOf(times);
   }
 
   void SetInfo(SourceInfo info) { info_ = std::move(info); }

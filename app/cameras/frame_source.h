@@ -22,7 +22,9 @@ struct SourceInfo {
   std::string name;                          // Name of the folder or file, for messages and reports.
   bool live = false;                         // A device, which delivers images at its own rate without end.
   std::optional<std::uint64_t> frame_count;  // Empty if it is unknown or has no end.
-  double nominal_fps = 30;                   // Images per second, positive.
+  // Time from the first to the last image; empty if it is not known before the images are read.
+  std::optional<Timestamp> duration;
+  double nominal_fps = 30;                                 // Images per second, positive.
   std::optional<std::filesystem::path> calibration_path;   // Found in the folder.
   std::optional<engine::CameraModel> known_camera;         // For sources that need no calibration file.
   std::optional<std::filesystem::path> ground_truth_path;  // groundtruth.txt in the folder.

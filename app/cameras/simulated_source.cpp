@@ -15,6 +15,8 @@ class SimulatedSource : public FrameSource {
       : simulation_(std::move(simulation)) {
     info_.name = simulation_->name();
     info_.frame_count = static_cast<std::uint64_t>(simulation_->frame_count());
+    const int count = simulation_->frame_count();
+    info_.duration = count > 0 ? simulation_->time(count - 1) - simulation_->time(0) : Timestamp{};
     info_.nominal_fps = simulation_->options().frame_rate_hz;
     info_.known_camera = simulation_->calibration();
     if (simulation_->scene_name() == "head") SetHead(std::make_unique<SimulatedHead>());

@@ -11,6 +11,7 @@
 #include "app/command_line/content_edit_command.h"
 #include "app/command_line/program.h"
 #include "app/command_line/stored_scene.h"
+#include "app/command_line/text_table.h"
 #include "app/session/library_scene.h"
 #include "content/edits.h"
 #include "maps/library/library.h"
@@ -83,15 +84,16 @@ void List(const ContentOptions& options) {
     return;
   }
   if (entries.empty()) std::puts("Nothing is placed in the maps.");
+  std::vector<std::vector<std::string>> rows;
   for (const Json& entry : entries) {
     const char* const state = entry["locked"] == true
                                   ? (entry["hidden"] == true ? "  (locked, hidden)" : "  (locked)")
                               : entry["hidden"] == true ? "  (hidden)"
                                                         : "";
-    std::printf("%-24s %-24s %-9s %s%s\n", entry["map"].get<std::string>().c_str(),
-                entry["name"].get<std::string>().c_str(), entry["kind"].get<std::string>().c_str(),
-                Summary(entry).c_str(), state);
+    rows.push_back({entry["map"].get<std::string>(), entry["name"].get<std::string>(),
+                    entry["kind"].get<std::string>(), Summary(entry) + state});
   }
+  std::fputs(FormatTable({{24}, {24}, {8}, {}}, rows).c_str(), stdout);
 }
 
 void Remove(const ContentOptions& options) {

@@ -10,6 +10,7 @@
 #include "app/command_line/maps_exchange_command.h"
 #include "app/command_line/program.h"
 #include "app/command_line/progress.h"
+#include "app/command_line/text_table.h"
 #include "app/session/library_scene.h"
 #include "engine/base/error.h"
 #include "maps/library/library.h"
@@ -70,11 +71,14 @@ void List(const MapsOptions& options) {
     return;
   }
   if (infos.empty()) std::puts("The library holds no map.");
+  std::vector<std::vector<std::string>> rows;
   for (const maps::MapInfo& map : infos) {
-    std::printf("%-24s %-12s %6llu keyframes %8llu points  %s\n", map.name.c_str(),
-                maps::ToString(map.policy), static_cast<unsigned long long>(map.keyframes),
-                static_cast<unsigned long long>(map.points), FormatWallTime(map.modified).c_str());
+    rows.push_back({map.name, maps::ToString(map.policy), std::to_string(map.keyframes) + " keyframes",
+                    std::to_string(map.points) + " points", FormatWallTime(map.modified)});
   }
+  const std::string table =
+      FormatTable({{24}, {12}, {16, Alignment::kRight}, {15, Alignment::kRight}, {}}, rows);
+  std::fputs(table.c_str(), stdout);
 }
 
 // Estimates how often a lost camera is relocalized, by leaving each keyframe out in turn.

@@ -20,19 +20,7 @@ namespace docent::app {
 
 namespace {
 
-// Collapses line breaks and repeated spaces, because every error is reported on one line.
-std::string OneLine(std::string text) {
-  std::string line;
-  for (const char c : text) {
-    const bool blank = c == '\n' || c == '\r' || c == ' ';
-    if (blank && (line.empty() || line.back() == ' ')) continue;
-    line += blank ? ' ' : c;
-  }
-  while (line.ends_with(' ')) line.pop_back();
-  return line;
-}
-
-int ReportError(const std::string& message, int exit_status) {
+int ReportError(const std::string& message, ExitStatus exit_status) {
   std::fprintf(stderr, "docent: %s\n", OneLine(message).c_str());
   return exit_status;
 }
@@ -76,20 +64,41 @@ int RunGuarded(const std::function<void()>& run) {
     run();
     // Output that cannot be written, for instance to a full disk, is a failure too.
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
-      return ReportError("Cannot write the standard output.", 1);
-    return 0;
+      return ReportError("Cannot write the standard output.", kFailed);
+    return kDone;
   } catch (const Error& error) {
-    return ReportError(error.what(), 1);
+    return ReportError(error.what(), kFailed);
   } catch (const std::bad_alloc&) {
-    return ReportError("There is not enough memory.", 1);
+    return ReportError("There is not enough memory.", kFailed);
   } catch (const cv::Exception& error) {
-    return ReportError("An image operation failed: " + error.err + " (" + error.func + ").", 1);
+    return ReportError("An image operation failed: " + error.err + " (" + error.func + ").", kFailed);
   } catch (const std::exception& error) {
-    return ReportError(std::string("Internal error: ") + error.what() + ".", 1);
+    return ReportError(std::string("Internal error: ") + error.what() + ".", kFailed);
   }
 }
 
+// The end of the help: an example and the table of exit statuses.
+std::string ProgramFooter() {
+  std::string text =
+      "Example:\n  docent simulate room --output room\nEvery subcommand has its own --help.\n\nExit status:";
+  for (const auto& [status, meaning] : kExitStatusMeanings)
+    text += "\n  " + std::to_string(status) + "  " + meaning;
+  return text;
+}
+
 }  // namespace
+
+std::string OneLine(std::string_view text) {
+  std::string line;
+  for (const char c : text) {
+    const bool blank = c == '\n' || c == '\r' || c == ' ';
+    if (blank && (line.empty() || line.back() == ' ')) continue;
+    line += blank ? ' ' : c;
+  }
+  while (line.ends_with(' ')) line.pop_back();
+  if (line.ends_with("..") && !line.ends_with("...")) line.pop_back();
+  return line;
+}
 
 CLI::App* AddSubcommand(CLI::App* parent, const std::string& name, const std::string& description,
                         const std::string& example) {
@@ -104,7 +113,7 @@ int RunProgram(int argc, const char* const* argv) {
       "Docent, an augmented-reality guide: it builds maps, recognises them later, and shows the models and "
       "signposts placed in them.",
       "docent");
-  program.footer("Example:\n  docent simulate room --output room\nEvery subcommand has its own --help.");
+  program.footer(ProgramFooter());
   program.require_subcommand(1);
   program.set_version_flag("--version", std::string("docent ") + kVersion, "Print the version and exit");
   Invocation invocation;
@@ -129,7 +138,7 @@ int RunProgram(int argc, const char* const* argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --help and --version
     const std::string command = SelectedCommand(program);
-    return ReportError(Diagnose(program, error) + " (see " + command + " --help)", 2);
+    return ReportError(Diagnose(program, error) + " (see " + command + " --help)", kWrongArgument);
   }
   invocation.verbosity = quiet ? Verbosity::kQuiet : verbose ? Verbosity::kVerbose : Verbosity::kNormal;
   SetUpLog(invocation.verbosity);

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <string>
+#include <string_view>
 
 #include "app/command_line/options.h"
 
@@ -20,8 +21,25 @@ struct Invocation {
   std::function<void()> run;  // Set by the selected subcommand; throws docent::Error.
 };
 
-// Parses the command line and runs the selected subcommand. Returns the exit status: 0 for success, 1 for a
-// failure while running, 2 for a wrong argument. Both failures print one line on standard error.
+// What the exit status of the program means; docs/guide.md has the same table.
+enum ExitStatus : int { kDone = 0, kFailed = 1, kWrongArgument = 2 };
+struct ExitStatusMeaning {
+  ExitStatus status;
+  const char* meaning;
+};
+inline constexpr ExitStatusMeaning kExitStatusMeanings[] = {
+    {kDone, "The command was carried out; a tour or an author's session may have been ended by Ctrl-C."},
+    {kFailed, "The command failed or was interrupted; one line on standard error says why."},
+    {kWrongArgument, "The command line is wrong, and nothing was done; one line on standard error says why."},
+};
+
+// A message as it is printed: without line breaks and repeated spaces, because every error is reported on one
+// line, and with one full stop where a sentence that ends with one was quoted at the end of another. Three
+// stay an ellipsis.
+std::string OneLine(std::string_view text);
+
+// Parses the command line and runs the selected subcommand. Returns the exit status. Both failures print one
+// line on standard error.
 int RunProgram(int argc, const char* const* argv);
 
 // Adds a subcommand whose help ends with an example. Global options may follow the subcommand.

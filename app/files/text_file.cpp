@@ -150,6 +150,13 @@ std::string FormatNumber(double value, int digits) {
   return error == std::errc{} ? std::string(text, end) : std::string("nan");
 }
 
+std::string FormatExactly(double value) {
+  char text[32];              // at most 24 characters: sign, seventeen digits, point and exponent
+  if (value == 0) value = 0;  // avoids "-0"
+  const auto [end, error] = std::to_chars(text, text + sizeof text, value);
+  return error == std::errc{} ? std::string(text, end) : std::string("nan");
+}
+
 bool NaturalLess(std::string_view a, std::string_view b) {
   std::size_t i = 0, j = 0;
   while (i < a.size() && j < b.size()) {

@@ -46,6 +46,10 @@ std::string FormatSeconds(Timestamp time);
 // finite).
 std::string FormatNumber(double value, int digits = 9);
 
+// The shortest text that ParseNumber reads as the same double: 0.15, where seventeen digits would be
+// 0.14999999999999999. ("nan" and "inf" as above.)
+std::string FormatExactly(double value);
+
 // True when `a` sorts before `b` in natural order: runs of digits compare as numbers.
 bool NaturalLess(std::string_view a, std::string_view b);
 

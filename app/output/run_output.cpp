@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/output/run_output.h"
 
+#include <algorithm>
+
 #include "app/files/text_file.h"
 
 namespace docent::app {
@@ -59,7 +61,7 @@ std::string FormatEventLine(const Event& event) {
 RunOutput::RunOutput(const std::filesystem::path& folder)
     : folder_(MadeFolder(folder)), frames_(folder / "frames.csv"), events_(folder / "events.csv") {
   frames_.Write("timestamp,camera,state,map,finite,infinite,quality,tracking_ms,tx,ty,tz,qx,qy,qz,qw\n");
-  events_.Write("timestamp,event,detail\n");
+  WriteToEvents("timestamp,event,detail\n");
   Trajectory(0);
 }
 
@@ -74,12 +76,33 @@ void RunOutput::Add(const engine::TrackedFrame& frame, std::string_view map_name
 }
 
 void RunOutput::Add(const Event& event) {
-  events_.Write(FormatEventLine(event) + '\n');
+  const std::string line = FormatEventLine(event) + '\n';
+  event_lines_.push_back({event.time, events_size_, line.size()});
+  WriteToEvents(line);
+}
+
+void RunOutput::WriteToEvents(std::string_view text) {
+  events_.Write(text);
+  events_size_ += text.size();
+}
+
+// The events are written when they happen, so that those of a program that was killed can be read, and put
+// into order at the end.
+void RunOutput::SortEvents() const {
+  const auto is_earlier = [](const EventLine& a, const EventLine& b) { return a.time < b.time; };
+  if (std::is_sorted(event_lines_.begin(), event_lines_.end(), is_earlier)) return;
+  std::vector<EventLine> lines = event_lines_;
+  std::stable_sort(lines.begin(), lines.end(), is_earlier);
+  const std::string text = ReadTextFile(folder_ / "events.csv", events_size_);
+  std::string sorted = text.substr(0, event_lines_.front().begin);  // the header
+  for (const EventLine& line : lines) sorted += std::string_view(text).substr(line.begin, line.size);
+  WriteTextFile(folder_ / "events.csv", sorted);
 }
 
 void RunOutput::Close() {
   frames_.Close();
   events_.Close();
+  SortEvents();
   for (auto& [camera, file] : trajectories_) file.Close();
 }
 

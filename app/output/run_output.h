@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "app/files/checked_file.h"
 #include "engine/base/time.h"
@@ -37,15 +39,27 @@ class RunOutput {
 
   // trajectory.txt is that of camera 0; further cameras are written to trajectory_1.txt and so on.
   void Add(const engine::TrackedFrame& frame, std::string_view map_name);
+  // Events may come from several threads out of order; Close sorts them by time, and those of one time stay
+  // in the order in which they were added.
   void Add(const Event& event);
   // Completes the files and gives them their final names. Must also be called when a run ends with an error,
   // so that everything before the error can be read.
   void Close();
 
  private:
+  // The place of an event in events.csv.
+  struct EventLine {
+    Timestamp time{};
+    std::size_t begin = 0, size = 0;  // in bytes
+  };
+
   CheckedFile& Trajectory(int camera);
+  void WriteToEvents(std::string_view text);
+  void SortEvents() const;
 
   std::filesystem::path folder_;
+  std::vector<EventLine> event_lines_;
+  std::size_t events_size_ = 0;  // bytes written so far
   CheckedFile frames_, events_;
   std::map<int, CheckedFile> trajectories_;
 };

@@ -32,11 +32,8 @@ std::string AlwaysQuoted(const std::string& text) {
   return quoted.starts_with('"') ? quoted : '"' + quoted + '"';
 }
 
-std::string Number(double value) {
-  return FormatNumber(value, 17);
-}
 std::string Pixel(const Eigen::Vector2d& pixel) {
-  return "pixel " + Number(pixel.x()) + ' ' + Number(pixel.y());
+  return "pixel " + FormatExactly(pixel.x()) + ' ' + FormatExactly(pixel.y());
 }
 
 std::string Names(const std::vector<std::string>& names) {
@@ -46,7 +43,7 @@ std::string Names(const std::vector<std::string>& names) {
 }
 
 std::string Point(const Eigen::Vector3d& point) {
-  return Number(point.x()) + ' ' + Number(point.y()) + ' ' + Number(point.z());
+  return FormatExactly(point.x()) + ' ' + FormatExactly(point.y()) + ' ' + FormatExactly(point.z());
 }
 
 std::string Pairs(const std::vector<PointPair>& pairs) {
@@ -82,8 +79,8 @@ struct CommandFormatter {
   }
   std::string operator()(const PlaceModel& c) const {
     return "place " + Quoted(c.file) + " at " + Pixel(c.pixel) +
-           (c.scale ? " scale " + Number(*c.scale) : "") +
-           (c.yaw_deg != 0 ? " yaw " + Number(c.yaw_deg) : "");
+           (c.scale ? " scale " + FormatExactly(*c.scale) : "") +
+           (c.yaw_deg != 0 ? " yaw " + FormatExactly(c.yaw_deg) : "");
   }
   std::string operator()(const PlaceSignpost& c) const {
     return "signpost " + AlwaysQuoted(c.text) + " at " + Pixel(c.pixel) +
@@ -116,22 +113,23 @@ struct CommandFormatter {
   std::string operator()(const MoveEntity& c) const {
     const std::string begin = "move " + Quoted(c.name) + ' ';
     if (c.to_pixel) return begin + "to " + Pixel(*c.to_pixel);
-    return begin + Number(c.by_in_map.x()) + ' ' + Number(c.by_in_map.y()) + ' ' + Number(c.by_in_map.z());
+    return begin + FormatExactly(c.by_in_map.x()) + ' ' + FormatExactly(c.by_in_map.y()) + ' ' +
+           FormatExactly(c.by_in_map.z());
   }
   std::string operator()(const RotateEntity& c) const {
-    return "rotate " + Quoted(c.name) + ' ' + Number(c.angle_deg);
+    return "rotate " + Quoted(c.name) + ' ' + FormatExactly(c.angle_deg);
   }
   std::string operator()(const ScaleEntity& c) const {
-    return "scale " + Quoted(c.name) + ' ' + Number(c.factor);
+    return "scale " + Quoted(c.name) + ' ' + FormatExactly(c.factor);
   }
   std::string operator()(const TransformEntities& c) const {
     std::string text = "transform";
     for (const auto& [name, pose] : c.poses) {
       text += (&name == &c.poses.front().name ? " " : ", ") + Quoted(name);
-      for (const double value : pose.translation) text += ' ' + Number(value);
+      for (const double value : pose.translation) text += ' ' + FormatExactly(value);
       const Eigen::Vector4d quaternion = Settled(pose.rotation).quaternion().coeffs();
-      for (const double value : quaternion) text += ' ' + Number(value);
-      text += ' ' + Number(pose.scale);
+      for (const double value : quaternion) text += ' ' + FormatExactly(value);
+      text += ' ' + FormatExactly(pose.scale);
     }
     return text;
   }

@@ -26,6 +26,18 @@ engine::SystemOptions SystemOptionsOf(const SessionOptions& options, MapKeys* ke
   return system;
 }
 
+// The error, with one more sentence at its end.
+std::exception_ptr WithSentence(const std::exception_ptr& failure, const std::string& sentence) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& error) {
+    const std::string what = error.what();
+    return std::make_exception_ptr(Error(what + (what.ends_with('.') ? " " : ". ") + sentence));
+  } catch (...) {
+    return failure;
+  }
+}
+
 }  // namespace
 
 Session::Session(const SessionOptions& options,
@@ -190,6 +202,8 @@ void Session::Finish() {
     }
     saving_.Flush();
     if (!failure) failure = saving_.TakeError();
+    if (const std::string lost = saving_.DescribeUnsaved(); failure && !lost.empty())
+      failure = WithSentence(failure, lost);
   }
   if (failure) std::rethrow_exception(failure);
 }

@@ -20,6 +20,7 @@ void SessionSaving::OnSaved(const maps::MapRecord& record) {
   keys_.Refill();
   const std::scoped_lock lock(mutex_);
   saved_at_ = std::chrono::steady_clock::now();
+  submitted_.erase(record.key);
 }
 
 void SessionSaving::Start() {
@@ -58,6 +59,7 @@ void SessionSaving::SaveMap(SessionMap* map, Timestamp time) {
   map->saved_scene = map->scene;
   map->changed = true;
   system_.SetPermissions(map->key, map->Permissions());
+  submitted_.insert(map->key);
   saver_->Submit(std::move(record));
   state_.AddEvent(
       time, "save",
@@ -137,6 +139,30 @@ void SessionSaving::EndMaintenance() {
 
 void SessionSaving::Flush() {
   if (saver_) saver_->Flush();
+}
+
+// A library that cannot be read does not say which maps it has; then nothing more than the changes is called
+// lost.
+bool SessionSaving::IsInLibrary(std::uint64_t key) const {
+  try {
+    const std::vector<maps::MapInfo> stored = library_->List();
+    return std::any_of(stored.begin(), stored.end(),
+                       [&](const maps::MapInfo& info) { return info.key == key; });
+  } catch (const Error&) {
+    return true;
+  }
+}
+
+std::string SessionSaving::DescribeUnsaved() const {
+  std::string names;
+  const std::scoped_lock lock(mutex_);
+  for (const std::uint64_t key : submitted_) {
+    const SessionMap* const map = state_.FindMap(key);
+    if (map == nullptr || !map->Exists()) continue;
+    names += (names.empty() ? "" : ", ") +
+             std::string(IsInLibrary(key) ? "the last changes of the map '" : "the map '") + map->name + "'";
+  }
+  return names.empty() ? "" : "Lost: " + names + ".";
 }
 
 std::exception_ptr SessionSaving::TakeError() {

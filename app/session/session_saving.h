@@ -6,6 +6,7 @@
 #include <exception>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "app/session/idle_maintenance.h"
@@ -64,10 +65,14 @@ class SessionSaving {
   // Ends maintenance for good, and waits until everything submitted is on disk or has failed.
   void EndMaintenance();
   void Flush();
+  // At the end, after SaveAll and Flush: the maps whose last changes are not on disk, as one sentence that
+  // follows the reason; empty if there are none.
+  std::string DescribeUnsaved() const;
   std::exception_ptr TakeError();  // the first failure since it was last asked; null for none
 
  private:
   void OnSaved(const maps::MapRecord& record);  // on the saver's thread, without the mutex
+  bool IsInLibrary(std::uint64_t key) const;
 
   const SessionOptions& options_;
   maps::Library* const library_;
@@ -77,6 +82,8 @@ class SessionSaving {
   SessionState& state_;
   std::optional<Timestamp> last_save_;
   std::optional<std::chrono::steady_clock::time_point> saved_at_;  // for people only
+  std::set<std::uint64_t>
+      submitted_;  // keys of the maps that the saver has not written since they were submitted
   bool discards_changes_ = false;
   IdleMaintenance maintenance_;       // accessed only by the saver's thread
   std::optional<maps::Saver> saver_;  // last, because its thread calls back into the other members

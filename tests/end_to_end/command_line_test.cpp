@@ -5,11 +5,15 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "app/calibration/calibration_file.h"
 #include "app/cameras/frame_source.h"
+#include "app/command_line/program.h"
+#include "app/command_line/text_table.h"
 #include "app/demo/exhibit_model.h"
 #include "app/evaluation/ground_truth.h"
 #include "app/session/library_scene.h"
@@ -85,6 +89,48 @@ TEST(CommandLine, SaysThatATourEstimatesNoCalibration) {
   EXPECT_THAT(help("author"), HasSubstr("estimate the calibration while maps are built"));
   EXPECT_THAT(help("tour"), HasSubstr("a tour builds no map and estimates none"));
   EXPECT_THAT(help("tour"), Not(HasSubstr("while maps are built")));
+}
+
+TEST(CommandLine, HelpAndGuideHaveTheSameExitStatuses) {
+  const std::string help = RunDocent({"--help"}).output;
+  const std::string guide = ReadAll(DOCENT_SOURCE_DIR "/docs/guide.md");
+  for (const auto& [status, meaning] : kExitStatusMeanings) {
+    EXPECT_THAT(help, HasSubstr("\n  " + std::to_string(status) + "  " + meaning + "\n"));
+    EXPECT_THAT(guide, HasSubstr("\n| " + std::to_string(status) + " | " + meaning + " |\n"));
+  }
+}
+
+TEST(Messages, AreOneLineWithOneFullStop) {
+  EXPECT_EQ(OneLine("An image operation failed:\n  it is empty..\n"),
+            "An image operation failed: it is empty.");
+  EXPECT_EQ(OneLine("There is no file 'a..b'."), "There is no file 'a..b'.");
+  EXPECT_EQ(OneLine("wait..."), "wait...");
+}
+
+TEST(CommandLine, AlignsTheListOfMapsWhateverTheirNames) {
+  const TemporaryFolder folder;
+  const auto file = folder / "l.docent";
+  {
+    maps::Library library = OpenLibrary(file, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    for (const char* name :
+         {"Kueche", "Küche", "東京の部屋", "a name that is longer than the column was before"})
+      library.Save({library.NewKey(), name, maps::Policy::kOpen, nullptr, nullptr});
+  }
+  std::istringstream lines(RunDocent({"maps", "list", "--library", file.string()}).output);
+  std::set<std::size_t> columns;
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count)
+    columns.insert(DisplayWidth(line.substr(0, line.find(" open "))));
+  EXPECT_EQ(count, 4);
+  EXPECT_EQ(columns.size(), 1u) << "the policies are not in one column";
+}
+
+TEST(CommandLine, RefusesToStartBeyondTheEndOfARecording) {
+  const TemporaryFolder folder;
+  ExpectErrorLine({"author", "--library", (folder / "l.docent").string(), "--camera", "sim:room,duration=1",
+                   "--from", "9", "--headless"},
+                  1, "--from 9 is beyond the end of 'room,duration=1'");
+  EXPECT_FALSE(std::filesystem::exists(folder / "l.docent"));
 }
 
 TEST(CommandLine, PrintsItsVersion) {

@@ -206,6 +206,30 @@ TEST_F(Cameras, CanBeClippedToATimeRange) {
   EXPECT_EQ(frames[2].time, std::chrono::milliseconds(400));
 }
 
+TEST_F(Cameras, RefuseToBeClippedBeyondTheirEnd) {
+  MakeTum();  // 0.825 s long
+  const auto clip = [&](const std::string& camera, int from_ms, int until_ms = 0) {
+    return ClipSource(OpenCamera(camera), std::chrono::milliseconds(from_ms),
+                      std::chrono::milliseconds(until_ms));
+  };
+  const std::string tum = folder_.path().string();
+  EXPECT_EQ(ReadFrames(clip(tum, 800).get()).size(), 1u);
+  EXPECT_THAT(ErrorOf([&] { clip(tum, 900); }), AllOf(HasSubstr("--from 0.9 "), HasSubstr(" 0.824696 s.")));
+  EXPECT_THAT(ErrorOf([&] { clip("sim:room,duration=1", 2000); }), HasSubstr("--from 2 "));
+
+  // A video without times tells its length only at its end.
+  const TemporaryFolder videos;
+  WriteVideo(videos / "walk.mp4", 10);
+  const std::string video = (videos / "walk.mp4").string();
+  EXPECT_EQ(ReadFrames(clip(video, 320).get()).size(), 2u);
+  const auto clipped = clip(video, 2000);
+  EXPECT_THAT(ErrorOf([&] { ReadFrames(clipped.get()); }),
+              AllOf(HasSubstr("--from 2 "), HasSubstr(" 0.36 s.")));
+  EXPECT_TRUE(ReadFrames(clipped.get()).empty()) << "it stays at its end";
+  EXPECT_EQ(ErrorOf([&] { ReadFrames(clip(tum, 100, 50).get()); }), "")
+      << "an empty interval is no wrong start";
+}
+
 TEST_F(Cameras, CanBeginAtAnyImageAsIfItWereTheFirst) {
   for (int i = 0; i < 10; ++i) WritePng(folder_ / (std::to_string(i) + ".png"), Numbered(i));
   CameraOptions options;

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "engine/base/random.h"
+
 namespace docent::app {
 namespace {
 
@@ -52,6 +56,19 @@ TEST(Numbers, AreWrittenWithoutTheLocaleAndReadBack) {
   EXPECT_EQ(ParseNumber(FormatNumber(1.0 / 3, 17)), 1.0 / 3);
   EXPECT_FALSE(ParseNumber("nan"));
   EXPECT_FALSE(ParseNumber("1e999"));
+}
+
+// The largest and smallest numbers, one that seventeen digits do not show as it was written, and random ones
+// of all magnitudes.
+TEST(Numbers, AreWrittenExactlyAsTheyWereRead) {
+  for (const char* text : {"0.15", "-2.7", "1e+300", "5e-324", "123456.789", "0", "1", "0.1"})
+    EXPECT_EQ(FormatExactly(*ParseNumber(text)), text);
+  EXPECT_EQ(FormatExactly(-0.0), "0");
+  Random random(1);
+  for (int i = 0; i < 10'000; ++i) {
+    const double value = random.Uniform(-1, 1) * std::pow(10, random.Uniform(-300, 300));
+    ASSERT_EQ(ParseNumber(FormatExactly(value)), value);
+  }
 }
 
 }  // namespace

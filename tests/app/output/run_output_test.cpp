@@ -64,6 +64,19 @@ TEST(RunOutput, WritesItsThreeFiles) {
             "timestamp,event,detail\n1.000000000,warning,\"slow, very\"\n");
 }
 
+TEST(RunOutput, WritesEventsInTheOrderOfTheirTimes) {
+  const TemporaryFolder folder;
+  RunOutput output(folder.path());
+  output.Add(Event{std::chrono::seconds(2), "map", "second,\nof two lines"});
+  output.Add(Event{std::chrono::seconds(1), "camera", "first"});
+  output.Add(Event{std::chrono::seconds(2), "save", "third"});
+  output.Add(Event{std::chrono::milliseconds(1500), "rig", "between"});
+  output.Close();
+  EXPECT_EQ(ReadAll(folder / "events.csv"),
+            "timestamp,event,detail\n1.000000000,camera,first\n1.500000000,rig,between\n"
+            "2.000000000,map,\"second,\nof two lines\"\n2.000000000,save,third\n");
+}
+
 TEST(RunOutput, ReportsAFolderThatCannotBeCreated) {
   const TemporaryFolder folder;
   folder.Write("file", "");

@@ -291,6 +291,11 @@ TEST(Script, EveryRandomCommandIsInvalidOrReadBackEqual) {
   EXPECT_GT(invalid, 2000);
 }
 
+TEST(Script, WritesNumbersAsTheyWereRead) {
+  const std::string line = "0.15 place a.glb at pixel 320.1 0.15 scale 0.15 yaw -12.3";
+  EXPECT_EQ(FormatScriptLine(ParseScript(line, "s").at(0)), line);
+}
+
 // So that a replayed script gives a model exactly the pose that it had.
 TEST(Script, ARotationIsTheSameAfterItWasWrittenAndRead) {
   Random random(9);

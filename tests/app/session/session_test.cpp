@@ -21,7 +21,9 @@ namespace {
 
 using namespace simulated_session;
 
+using ::testing::AllOf;
 using ::testing::AnyOf;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -299,10 +301,28 @@ TEST(Session, ReportsAFailedSaveAtTheEndAndKeepsEarlierSaves) {
             },
             {});
   ASSERT_TRUE(full);
-  EXPECT_THAT(ErrorOf([&] { session.Finish(); }), HasSubstr("l.docent"));
+  EXPECT_THAT(ErrorOf([&] { session.Finish(); }),
+              AllOf(HasSubstr("l.docent"), EndsWith(". Lost: the last changes of the map 'Desk'.")));
   full.reset();
   EXPECT_THAT(library.Verify(), IsEmpty());
   EXPECT_GE(library.Load(library.FindByName("Desk").key).snapshot->keyframes.size(), 2u);
+}
+
+TEST(Session, NamesAMapThatWasNeverSavedAtTheEnd) {
+  const auto simulation = Room(2.5);
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  SessionOptions options = Options(Pace::kLockstep, "Desk");
+  options.autosave_interval = {};  // only at the end
+  Session session(options, LensOf(*simulation), &library);
+  CalibratedCamera camera = CameraOf(simulation);
+  FrameLoopOptions loop;
+  loop.pace = Pace::kLockstep;
+  RunFrames(&camera, &session, loop, [](const engine::TrackedFrame&) {}, {});
+  ASSERT_TRUE(library.List().empty());
+  NoRoom full;
+  EXPECT_THAT(ErrorOf([&] { session.Finish(); }), EndsWith(". Lost: the map 'Desk'."));
 }
 
 }  // namespace
