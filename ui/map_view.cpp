@@ -225,7 +225,7 @@ struct MapView::Impl {
   explicit Impl(const MapViewOptions& options_in)
       : options(options_in),
         camera(Pinhole(options_in.width_px, options_in.height_px)),
-        content(options_in.samples, options_in.max_texture_px) {}
+        content(options_in.samples, options_in.max_texture_px, "") {}
 
   MapViewOptions options;
   engine::CameraModel camera;
@@ -253,7 +253,7 @@ void MapView::Draw(const engine::MapSnapshot& map, const Orbit& orbit, const Map
   DrawKeyFrames(map, impl_->camera, camera_from_map, &impl_->below);
   impl_->below.End();
   if (contents.scene != nullptr)
-    impl_->content.Draw(impl_->camera, camera_from_map, *contents.scene, 0.0, target);
+    impl_->content.Draw(impl_->camera, camera_from_map, *contents.scene, 0.0, true, target);
   impl_->above.Begin(width_px, height_px);
   if (contents.camera_from_map)
     Drawing(impl_->camera, camera_from_map, &impl_->above).Camera(orbit, *contents.camera_from_map);

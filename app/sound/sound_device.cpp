@@ -17,10 +17,10 @@ struct SoundDevice::Impl {
     ALuint source = 0, buffer = 0;
   };
 
-  void Remove(const Playing& playing) {
-    alSourceStop(playing.source);
-    alDeleteSources(1, &playing.source);
-    alDeleteBuffers(1, &playing.buffer);
+  void Remove(const Playing& ended) {
+    alSourceStop(ended.source);
+    alDeleteSources(1, &ended.source);
+    alDeleteBuffers(1, &ended.buffer);
   }
 
   ALCdevice* device = nullptr;

@@ -160,17 +160,17 @@ TEST_F(RendererTest, MovesASkinnedMeshWithItsJoint) {
 }
 
 TEST_F(RendererTest, FreesGraphicsMemoryOfDeletedModels) {
-  ContentLayer layer(4, 256);
+  ContentLayer layer(4, 256, "");
   const RenderTarget target(640, 480, 1, false);
   const engine::CameraModel camera = StronglyDistorted();
   content::Scene scene;
   scene.entities.push_back(Facing(SquareModel(1, glm::vec4(1)), {0, 0, 1}));
   scene.entities.push_back(Facing(SquareModel(1, glm::vec4(1)), {0, 0, 2}));
-  layer.Draw(camera, {}, scene, 0, target);
+  layer.Draw(camera, {}, scene, 0, true, target);
   EXPECT_EQ(layer.cached_models(), 2u);
   scene.entities.pop_back();
-  layer.Draw(camera, {}, scene, 0, target);
-  layer.Draw(camera, {}, scene, 0, target);
+  layer.Draw(camera, {}, scene, 0, true, target);
+  layer.Draw(camera, {}, scene, 0, true, target);
   EXPECT_EQ(layer.cached_models(), 1u);
 }
 
