@@ -242,7 +242,7 @@ TEST(CommandLine, HandlesAnEmptyLibrary) {
   const Outcome json = RunDocent({"maps", "list", "--library", path, "--json"});
   EXPECT_TRUE(nlohmann::json::parse(json.output).at("maps").empty());
   EXPECT_THAT(RunDocent({"maps", "verify", "--library", path}).output, HasSubstr("no problems found"));
-  EXPECT_THAT(RunDocent({"content", "list", "--library", path}).output, HasSubstr("no models or signposts"));
+  EXPECT_THAT(RunDocent({"content", "list", "--library", path}).output, HasSubstr("Nothing is placed"));
   ExpectErrorLine({"maps", "show", "Desk", "--library", path}, 1, "Desk");
   ExpectErrorLine({"maps", "rename", "Desk", "Kiosk", "--library", path}, 1, "Desk");
   ExpectErrorLine({"maps", "remove", "Desk", "--library", path}, 1, "Desk");

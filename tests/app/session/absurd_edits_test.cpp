@@ -32,7 +32,7 @@ class AbsurdCommands {
   explicit AbsurdCommands(std::uint64_t seed) : random_(seed) {}
 
   Command Next() {
-    switch (random_.Below(28)) {
+    switch (random_.Below(34)) {
       case 0:
         return NewMap{Name()};
       case 1:
@@ -72,7 +72,25 @@ class AbsurdCommands {
       case 16:
         return RenameEntity{Name(), Name()};
       case 17:
-        return SetEntityText{Name(), Text()};
+        return SetEntityText{Name(), Text(),
+                             random_.Below(2) == 0   ? ""
+                             : random_.Below(2) == 0 ? "de"
+                                                     : Name()};
+      case 26:
+      case 27:
+        return PlaceLabel{Text(), Pixel(), Perhaps<Eigen::Vector3d>([&] { return Vector(); })};
+      case 28: {
+        PlaceTrail trail;
+        for (std::size_t n = random_.Below(4); n > 0; --n) trail.points.push_back(Place());
+        trail.width = Perhaps<double>([&] { return Number(); });
+        return trail;
+      }
+      case 29:
+        return ExtendTrail{Name(), Place()};
+      case 30:
+        return ShortenTrail{Name()};
+      case 31:
+        return SetLabelOffset{Name(), Vector()};
       case 18:
         return SetSignpostTarget{Name(), MapName()};
       case 19:
@@ -90,7 +108,7 @@ class AbsurdCommands {
         return Redo{};
       case 25:
         return SetMapUp{Perhaps<Eigen::Vector2d>([&] { return Pixel(); })};
-      case 26:
+      case 32:
         return SetMapScale{Pixel(), Pixel(), Number()};
       default:
         return Save{};
@@ -110,6 +128,9 @@ class AbsurdCommands {
     return random_.Below(2) == 0 ? random_.Uniform(-2, 2) : numbers[random_.Below(numbers.size())];
   }
   Eigen::Vector3d Vector() { return {Number(), Number(), Number()}; }
+  MapPoint Place() {
+    return {Vector(), Perhaps<Eigen::Vector2d>([&] { return Pixel(); })};
+  }
   // Mostly where the map has a surface.
   Eigen::Vector2d Pixel() {
     if (random_.Below(6) == 0) return {Number(), Number()};

@@ -9,6 +9,7 @@
 #include "app/script/script_file.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
+#include "tests/content/media_samples.h"
 
 namespace docent::app {
 namespace {
@@ -56,6 +57,21 @@ std::vector<Planned> EveryCommand() {
   then(SetEntityFlag{{"sign-1"}, kHidden, true});
   then(GroupEntities{{"from", "sign-1"}, "a group"});
   then(PasteEntities{{"from"}, "First hall", pixel});
+  then(PlaceLabel{"Tusk # \"left\"", pixel, Eigen::Vector3d(0.1, -0.2, 1.0 / 3)});
+  then(PlaceLabel{"Foot", other});
+  then(SetLabelOffset{"label-2", {0, -1.0 / 7, 0}});
+  then(SetEntityText{"label-1", "Stoßzahn", "de"});
+  then(PlaceImage{"plan.png", pixel});
+  then(PlaceImage{"plan.png", other, 0.3, true});
+  then(RotateEntity{"plan", 5});
+  then(PlaceSound{"bell.wav", "A bell", pixel, 1.5});
+  then(ScaleEntity{"bell", 1.0 / 3});
+  then(PlaceTrail{{{{0, 0, 0}, pixel}, {{0, 0, 0}, other}}});
+  then(ExtendTrail{"trail-1", {{0.1, 0.2, 2}}});
+  then(ExtendTrail{"trail-1", {{0, 0, 0}, pixel}});
+  then(ShortenTrail{"trail-1"});
+  then(MoveEntity{"trail-1", {0.01, 0, 0}, std::nullopt});
+  then(DuplicateEntities{{"label-1", "plan", "bell", "trail-1"}});
   then(RemoveEntities{{"exhibit-2"}});
   then(Undo{});
   then(Redo{});
@@ -86,6 +102,9 @@ class Replay : public ::testing::Test {
   Replay() {
     const std::vector<std::uint8_t> glb = MakeExhibitGlb();
     folder_.Write("exhibit.glb", {glb.begin(), glb.end()});
+    content::WriteBytes(folder_ / "plan.png", content::PngBytes(4, 3));
+    content::WriteBytes(folder_ / "bell.wav",
+                        content::SoundBytesOf(SF_FORMAT_WAV | SF_FORMAT_PCM_16, 1, 8000, 800));
   }
 
   // Runs a session in lockstep with a script, and with commands from a window.
@@ -142,6 +161,8 @@ TEST_F(Replay, OfARecordedScriptGivesTheSameBytesOfEveryScene) {
   const Recorded first = Run("a.docent", plan, {});
   EXPECT_THAT(first.refused, IsEmpty());
   ASSERT_EQ(first.maps.size(), 2u);
+  for (const char* kept : {"label-1", "Stoßzahn", "plan-2", "bell-2", "trail-2"})
+    EXPECT_THAT(first.maps[0] + first.maps[1], testing::HasSubstr(kept));
   const Recorded second = Run("b.docent", {}, ParseScript(first.script, "script"));
   EXPECT_EQ(second.maps, first.maps);
   EXPECT_EQ(second.script, first.script) << "a replayed script is recorded as it was";
