@@ -31,7 +31,9 @@ install(FILES "${packaging}/camera.yaml" DESTINATION "${CMAKE_INSTALL_DOCDIR}/ex
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PROJECT_CONFIG_FILE "${packaging}/cpack_options.cmake")  # the time of all files
-set(CPACK_PACKAGE_CONTACT "Docent maintainers <docent@localhost.localdomain>")
+# The project has no address of its own; whoever distributes the package is its maintainer.
+set(DOCENT_PACKAGE_CONTACT "Docent maintainers <maintainers@docent.invalid>" CACHE STRING "Maintainer of the Debian package")
+set(CPACK_PACKAGE_CONTACT "${DOCENT_PACKAGE_CONTACT}")
 set(CPACK_PACKAGING_INSTALL_PREFIX "/usr")
 set(CPACK_COMPONENTS_ALL program)
 set(CPACK_COMPONENTS_GROUPING ALL_COMPONENTS_IN_ONE)
@@ -50,7 +52,9 @@ set(CPACK_DEBIAN_PACKAGE_SUGGESTS "zenity, v4l-utils")
 # The synopsis, and the paragraphs below it.
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "augmented-reality guide that builds and recognizes maps of a museum")
 string(CONCAT CPACK_PACKAGE_DESCRIPTION
-  "A curator walks through a museum with a camera, builds small maps of the exhibits live, and places models and "
-  "signposts in them. A visitor later walks through the same rooms: Docent recognizes which map the camera is in and "
-  "draws the content over the live video.\n\nIt needs a processor of the level x86-64-v3 (AVX2, from 2013 on).")
+  "A curator walks through a museum with a camera, builds small maps of the\n"
+  "exhibits live, and places models and signposts in them. A visitor later walks\n"
+  "through the same rooms: Docent recognizes which map the camera is in and\n"
+  "draws the content over the live video.\n\n"
+  "It needs a processor of the level x86-64-v3 (AVX2, from 2013 on).")
 include(CPack)
