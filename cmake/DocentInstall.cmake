@@ -10,6 +10,9 @@ if(DOCENT_SANITIZE)  # such libraries fit only programs with the same sanitizer
   return()
 endif()
 
+# What programs that use the libraries need; what follows from `program` on belongs to a package of the program.
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
+
 # Component and target of the package; the library in the build is called docent_COMPONENT.
 set(DOCENT_COMPONENTS geometry engine maps content ui cameras)
 
@@ -47,7 +50,9 @@ install(CODE "
 install(SCRIPT "${PROJECT_SOURCE_DIR}/cmake/InstallHeaders.cmake")
 install(FILES "${PROJECT_BINARY_DIR}/include/docent/version.h" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/docent")
 
-install(TARGETS docent RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
-install(FILES README.md CHANGELOG.md LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}")
-install(DIRECTORY docs/ DESTINATION "${CMAKE_INSTALL_DOCDIR}/docs" PATTERN "Doxyfile.in" EXCLUDE
+install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}")  # the package's `copyright` names the copy of Debian
+install(TARGETS docent RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT program)
+install(FILES README.md CHANGELOG.md SECURITY.md NOTICE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT program)
+install(DIRECTORY docs/ DESTINATION "${CMAKE_INSTALL_DOCDIR}/docs" COMPONENT program PATTERN "Doxyfile.in" EXCLUDE
   PATTERN "doxygen_filter.py" EXCLUDE)
+include(DocentPackage)

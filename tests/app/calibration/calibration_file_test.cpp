@@ -82,6 +82,12 @@ TEST(Calibration, ReadsTheOtherLensModels) {
                         {0.1, -0.02, 0.003, -0.0004, 0}));
 }
 
+TEST(Calibration, ReadsTheExampleOfThePackage) {
+  const engine::CameraModel camera = ReadCalibration(DOCENT_SOURCE_DIR "/packaging/camera.yaml");
+  EXPECT_EQ(camera.width_px(), 640);
+  EXPECT_EQ(camera.height_px(), 480);
+}
+
 TEST(Calibration, RoundTripsThroughAFile) {
   const TemporaryFolder folder;
   for (const CameraModel& camera :
