@@ -19,16 +19,17 @@ namespace docent::content {
 
 // Limits of a scene: edits refuse what exceeds them, and scene_codec.h neither writes nor reads it. They are
 // far beyond any room that is measured in map units, and keep all arithmetic finite.
-inline constexpr double kMaxCoordinate = 1e6;    // map units
-inline constexpr double kMinModelScale = 1e-9;   // map units per metre
-inline constexpr double kMaxModelScale = 1e9;    // map units per metre
-inline constexpr double kMinBoardHeight = 1e-6;  // map units
-inline constexpr double kMaxBoardHeight = 1e6;   // map units
-inline constexpr double kMinSoundRange = 1e-6;   // map units
-inline constexpr double kMaxSoundRange = 1e6;    // map units
-inline constexpr double kMinTrailWidth = 1e-6;   // map units
-inline constexpr double kMaxTrailWidth = 1e6;    // map units
-inline constexpr std::size_t kMinTrailPoints = 2, kMaxTrailPoints = 200;
+inline constexpr double kMaxCoordinate = 1e6;        // map units
+inline constexpr double kMinModelScale = 1e-9;       // map units per metre
+inline constexpr double kMaxModelScale = 1e9;        // map units per metre
+inline constexpr double kMinBoardHeight = 1e-6;      // map units
+inline constexpr double kMaxBoardHeight = 1e6;       // map units
+inline constexpr double kMinSoundRange = 1e-6;       // map units
+inline constexpr double kMaxSoundRange = 1e6;        // map units
+inline constexpr double kMinTrailWidth = 1e-6;       // map units
+inline constexpr double kMaxTrailWidth = 1e6;        // map units
+inline constexpr std::size_t kMinTrailPoints = 2;    // of one trail
+inline constexpr std::size_t kMaxTrailPoints = 200;  // of one trail
 // Of a rotation; beyond it little of the angle is left of a double.
 inline constexpr double kMaxAngle_deg = 1e6;
 inline constexpr int kMaxAnimation = 1'000'000;       // Index of an animation of a model.
@@ -129,10 +130,13 @@ const char* NameOf(Entity::Kind kind);
 bool HasModel(const Entity& entity);
 // The file that an entity needs; null for an entity without one.
 std::shared_ptr<const Asset> AssetOf(const Entity& entity);
-// The first text of a signpost, label or sound and its variants; null for other kinds.
+// The first text of a signpost, label or sound; null for other kinds.
 std::string* TextOf(Entity* entity);
+// The same of an entity that is not changed.
 const std::string* TextOf(const Entity& entity);
+// The variants of that text; null for kinds without text.
 Translations* TranslationsOf(Entity* entity);
+// The same of an entity that is not changed.
 const Translations* TranslationsOf(const Entity& entity);
 // The text of an entity for a reader of this language (TextFor); empty for kinds without text.
 const std::string& ShownText(const Entity& entity, const std::string& language);
@@ -182,7 +186,10 @@ std::string PoseProblem(const Entity& entity);
 std::size_t TextBytes(const Entity& entity);
 // What the limits of a whole scene count.
 struct SceneTally {
-  std::size_t text_bytes = 0, translations = 0, warp_points = 0, trail_points = 0;
+  std::size_t text_bytes = 0;    // See TextBytes.
+  std::size_t translations = 0;  // Of all texts.
+  std::size_t warp_points = 0;   // Of all bent models.
+  std::size_t trail_points = 0;  // Of all trails.
   // Counts an entity. If a limit would be exceeded, it is not counted, and the sentence says which limit.
   std::string Add(const Entity& entity);
 };

@@ -192,8 +192,10 @@ void AddPoseOptions(CLI::App* edit, EditOptions* options) {
 }
 
 void AddPropertyOptions(CLI::App* edit, EditOptions* options) {
-  CLI::Option* text = edit->add_option("--text", options->text,
-                                       "Change the text of a signpost or label, or a sound's caption");
+  // Not as an optional, which an empty text would leave without a value.
+  CLI::Option* text = edit->add_option_function<std::string>(
+      "--text", [=](const std::string& value) { options->text = value; },
+      "Change the text of a signpost or label, or a sound's caption");
   text->type_name("TEXT");
   edit->add_option("--language", options->language,
                    "Change the text for readers of this language only (a tag as de or es-419); an empty text "

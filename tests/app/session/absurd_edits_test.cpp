@@ -152,8 +152,8 @@ class AbsurdCommands {
     return texts[random_.Below(texts.size())];
   }
   std::string Name() {
-    const std::array<std::string, 8> names = {"exhibit", "exhibit-2", "exhibit-3", "sign-1",
-                                              "sign-2",  "sign-3",    "here",      "exhibit-2-2"};
+    const std::array<std::string, 10> names = {"label-1", "trail-1", "exhibit", "exhibit-2", "exhibit-3",
+                                               "sign-1",  "sign-2",  "sign-3",  "here",      "exhibit-2-2"};
     return random_.Below(6) == 0 ? Text() : names[random_.Below(names.size())];
   }
   std::vector<std::string> Names() {
