@@ -160,7 +160,7 @@ void MoveWithAnchor(const engine::Sim3& motion, Entity* entity);
 // original.
 struct Scene {
   std::vector<Entity> entities;  // In the order of placement.
-  MapSettings settings;          // Of the map that holds the entities.
+  MapSettings settings = {};     // Of the map that holds the entities.
 
   // Null if there is none with that name.
   const Entity* Find(const std::string& name) const;

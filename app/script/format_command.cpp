@@ -75,7 +75,7 @@ struct CommandFormatter {
   }
   std::string operator()(const SetMapScale& c) const {
     if (c.length_m == 0) return "map scale unknown";
-    return "map scale " + Pixel(c.from) + " to " + Pixel(c.to) + " is " + Number(c.length_m);
+    return "map scale " + Pixel(c.from) + " to " + Pixel(c.to) + " is " + FormatExactly(c.length_m);
   }
   std::string operator()(const PlaceModel& c) const {
     return "place " + Quoted(c.file) + " at " + Pixel(c.pixel) +
@@ -92,16 +92,16 @@ struct CommandFormatter {
   }
   std::string operator()(const PlaceImage& c) const {
     return "image " + Quoted(c.file) + " at " + Pixel(c.pixel) +
-           (c.scale ? " scale " + Number(*c.scale) : "") + (c.upright ? " upright" : "");
+           (c.scale ? " scale " + FormatExactly(*c.scale) : "") + (c.upright ? " upright" : "");
   }
   std::string operator()(const PlaceSound& c) const {
     return "sound " + Quoted(c.file) + ' ' + AlwaysQuoted(c.caption) + " at " + Pixel(c.pixel) +
-           (c.range ? " range " + Number(*c.range) : "");
+           (c.range ? " range " + FormatExactly(*c.range) : "");
   }
   std::string operator()(const PlaceTrail& c) const {
     std::string points;
     for (const MapPoint& point : c.points) points += (points.empty() ? " " : ", ") + Place(point);
-    return "trail" + (c.width ? " width " + Number(*c.width) : std::string()) + " at" + points;
+    return "trail" + (c.width ? " width " + FormatExactly(*c.width) : std::string()) + " at" + points;
   }
   std::string operator()(const ExtendTrail& c) const {
     return "trail extend " + AlwaysQuoted(c.name) + " to " + Place(c.point);

@@ -106,16 +106,16 @@ TEST(MeshSimplification, LeavesFewTrianglesOfAPlaneAndItsWholeArea) {
 }
 
 TEST(MeshSimplification, MovesTheSurfaceLessThanAllowed) {
-  constexpr double kTolerance = 0.01;
+  constexpr double kMostMotion = 0.01;
   const auto height = [](double u, double v) { return 0.5 * std::cos(2 * u) * std::cos(1.5 * v); };
   const SurfaceMesh curved = Grid(60, height);
-  const SurfaceMesh simple = SimplifyMesh(curved, kTolerance, curved.triangles.size());
+  const SurfaceMesh simple = SimplifyMesh(curved, kMostMotion, curved.triangles.size());
   EXPECT_LT(simple.triangles.size(), curved.triangles.size() / 5);
   EXPECT_GT(simple.triangles.size(), 20U);
   for (const auto& t : simple.triangles) {
     const Eigen::Vector3f middle =
         (simple.vertices[t[0]] + simple.vertices[t[1]] + simple.vertices[t[2]]) / 3;
-    EXPECT_NEAR(middle.z(), height(middle.x(), middle.y()), 3 * kTolerance);
+    EXPECT_NEAR(middle.z(), height(middle.x(), middle.y()), 3 * kMostMotion);
   }
 }
 
