@@ -94,7 +94,7 @@ void List(const ContentOptions& options) {
                     entry["kind"].get<std::string>(),
                     entry[model ? "file" : "text"].get<std::string>() + state});
   }
-  std::fputs(FormatTable({{24}, {24}, {8}, {}}, rows).c_str(), stdout);
+  std::fputs(FormatColumns({{24}, {24}, {8}, {}}, rows).c_str(), stdout);
 }
 
 // A pose that stands upright and faces the place of the first keyframe's camera, unless a rotation is given.
