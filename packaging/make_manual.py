@@ -26,7 +26,7 @@ class Entry:
 
     @property
     def names(self):
-        return [word for word in re.split(r"[ ,]", self.term) if word.startswith("-")]
+        return [word for word in self.term.split(" ")[0].split(",") if word.startswith("-")]
 
     @property
     def text(self):
@@ -45,7 +45,7 @@ class Entry:
 @dataclasses.dataclass
 class Command:
     path: tuple
-    description: str
+    description: list
     usage: str
     sections: dict
     footer: list
@@ -67,7 +67,7 @@ def parse(path, text):
     usages = [i for i, line in enumerate(lines) if line.startswith("Usage: ")]
     if len(usages) != 1:
         raise SystemExit(f"make_manual: the help of '{' '.join(path)}' has no usage line")
-    command = Command(path, " ".join(lines[:usages[0]]).strip(), lines[usages[0]].removeprefix("Usage: "), {}, [])
+    command = Command(path, lines[:usages[0]], lines[usages[0]].removeprefix("Usage: "), {}, [])
     section = None
     for i, line in enumerate(lines[usages[0] + 1:], usages[0] + 1):
         if line in SECTIONS:
@@ -133,10 +133,10 @@ def roff_footer(lines):
 
 def man_page(command, version, commands):
     name = command.page
-    sentences = command.description.split(". ")
+    summary = " ".join(command.description).split(". ")[0].strip().rstrip(".")
     out = [f'.TH {name.upper()} 1 "" "{version}" "Docent"', ".SH NAME",
-           f"{roff(name)} \\- {roff(sentences[0].rstrip('.'))}", ".SH SYNOPSIS", f".B {roff(command.usage)}",
-           ".SH DESCRIPTION", roff(command.description.rstrip(".") + ".")]
+           f"{roff(name)} \\- {roff(summary)}", ".SH SYNOPSIS", f".B {roff(command.usage)}",
+           ".SH DESCRIPTION", *roff_description(command.description)]
     for title, heading in (("Positionals:", "ARGUMENTS"), ("Options:", "OPTIONS"), ("Subcommands:", "SUBCOMMANDS")):
         if title in command.sections:
             out.append(f".SH {heading}")
@@ -177,8 +177,16 @@ WALK = """\
 
 
 def completion_cases(commands):
-    walk = "|\\\n".join(f'      "{" ".join(each.path)}"' for each in commands[1:])
-    words = "".join(f'    "{" ".join(each.path)}") words="{shell_words(option_words(each, commands) + sum(each.subcommands(), []))}" ;;\n'
+    paths = [" ".join((*each.path, name)) for each in commands for names in each.subcommands() for name in names]
+    walk = "|\\\n".join(f'      "{path}"' for path in paths)
+    aliases = {" ".join((*each.path, names[0])): [" ".join((*each.path, name)) for name in names]
+               for each in commands for names in each.subcommands()}
+
+    def patterns(each, suffix=""):
+        path = " ".join(each.path)
+        return "|".join(f'"{alias}{suffix}"' for alias in aliases.get(path, [path]))
+
+    words = "".join(f'    {patterns(each)}) words="{shell_words(option_words(each, commands) + sum(each.subcommands(), []))}" ;;\n'
                     for each in commands)
     values = ""
     for each in commands:
@@ -186,7 +194,7 @@ def completion_cases(commands):
             taken = entry.values()
             if taken is None:
                 continue
-            names = "|".join(f'"{" ".join(each.path)} {name}"' for name in entry.names)
+            names = "|".join(patterns(each, f" {name}") for name in entry.names)
             values += f'    {names}) words="{shell_words(taken)}"; takes_value=1 ;;\n'
     body = (WALK % walk + "  local words= takes_value=\n" + '  case "$path $previous" in\n' + values + "  esac\n" +
             '  if [[ -z $takes_value ]]; then case "$path" in\n' + words + "  esac; fi\n")

@@ -30,7 +30,7 @@ std::optional<fs::path> IfFile(const fs::path& path) {
 }
 
 // Of increasing times.
-Timestamp DurationOf(const std::vector<Timestamp>& times) {
+Timestamp TimeSpanOf(const std::vector<Timestamp>& times) {
   return times.empty() ? Timestamp{} : times.back() - times.front();
 }
 
@@ -50,7 +50,7 @@ class VideoSource : public FrameSource {
     if (timestamps_path) {
       info_.frame_count = times_.size();
       info_.nominal_fps = MedianFps(times_);
-      info_.duration = DurationOf(times_);
+      info_.duration = TimeSpanOf(times_);
     } else if (announced_count_) {
       info_.frame_count = static_cast<std::uint64_t>(*announced_count_);
     }
@@ -140,7 +140,7 @@ class ImageListSource : public FrameSource {
     for (const TimedPath& image : images_) times.push_back(image.time);
     info_.frame_count = images_.size();
     info_.nominal_fps = MedianFps(times);
-    info_.duration = DurationOf(times);
+    info_.duration = TimeSpanOf(times);
   }
 
   void SetInfo(SourceInfo info) { info_ = std::move(info); }

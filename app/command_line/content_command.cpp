@@ -93,7 +93,7 @@ void List(const ContentOptions& options) {
     rows.push_back({entry["map"].get<std::string>(), entry["name"].get<std::string>(),
                     entry["kind"].get<std::string>(), Summary(entry) + state});
   }
-  std::fputs(FormatTable({{24}, {24}, {8}, {}}, rows).c_str(), stdout);
+  std::fputs(FormatColumns({{24}, {24}, {8}, {}}, rows).c_str(), stdout);
 }
 
 void Remove(const ContentOptions& options) {

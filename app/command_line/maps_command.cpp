@@ -77,7 +77,7 @@ void List(const MapsOptions& options) {
                     std::to_string(map.points) + " points", FormatWallTime(map.modified)});
   }
   const std::string table =
-      FormatTable({{24}, {12}, {16, Alignment::kRight}, {15, Alignment::kRight}, {}}, rows);
+      FormatColumns({{24}, {12}, {16, Alignment::kRight}, {15, Alignment::kRight}, {}}, rows);
   std::fputs(table.c_str(), stdout);
 }
 

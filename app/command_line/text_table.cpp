@@ -39,8 +39,8 @@ std::string PaddedTo(std::size_t width, std::string_view text) {
   return padded;
 }
 
-std::string FormatTable(const std::vector<TableColumn>& columns,
-                        const std::vector<std::vector<std::string>>& rows) {
+std::string FormatColumns(const std::vector<TableColumn>& columns,
+                          const std::vector<std::vector<std::string>>& rows) {
   std::vector<std::size_t> widths;
   for (const TableColumn& column : columns) widths.push_back(column.min_width);
   for (const std::vector<std::string>& row : rows) {

@@ -28,7 +28,7 @@ struct TableColumn {
 // The rows as lines, each ending with a line break. Columns are as wide as their widest cell, or as
 // `min_width`, and two spaces apart; the last one of a row is not padded. Rows have as many cells as there
 // are columns.
-std::string FormatTable(const std::vector<TableColumn>& columns,
-                        const std::vector<std::vector<std::string>>& rows);
+std::string FormatColumns(const std::vector<TableColumn>& columns,
+                          const std::vector<std::vector<std::string>>& rows);
 
 }  // namespace docent::app

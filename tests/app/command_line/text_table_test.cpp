@@ -26,8 +26,8 @@ TEST(DisplayWidth, IsReachedByPadding) {
 }
 
 TEST(TextTable, AlignsColumnsWhateverTheNames) {
-  const std::string table = FormatTable({{6}, {0, Alignment::kRight}, {}},
-                                        {{"Küche", "7", "a"}, {"東京の部屋", "3075", "b"}, {"x", "12", ""}});
+  const std::string table = FormatColumns(
+      {{6}, {0, Alignment::kRight}, {}}, {{"Küche", "7", "a"}, {"東京の部屋", "3075", "b"}, {"x", "12", ""}});
   EXPECT_EQ(table,
             "Küche          7  a\n"
             "東京の部屋  3075  b\n"
@@ -35,8 +35,8 @@ TEST(TextTable, AlignsColumnsWhateverTheNames) {
 }
 
 TEST(TextTable, KeepsTheMinimumWidth) {
-  EXPECT_EQ(FormatTable({{6}, {}}, {{"ab", "c"}}), "ab      c\n");
-  EXPECT_EQ(FormatTable({{6}}, {}), "");
+  EXPECT_EQ(FormatColumns({{6}, {}}, {{"ab", "c"}}), "ab      c\n");
+  EXPECT_EQ(FormatColumns({{6}}, {}), "");
 }
 
 }  // namespace
