@@ -111,7 +111,7 @@ struct Model {
   std::vector<Skin> skins;
   std::vector<Animation> animations;
   glm::vec3 bounds_min{0.0f}, bounds_max{0.0f};  // Bounding box of the rest pose in model axes, metres.
-  std::vector<std::string> warnings;             // One sentence for each feature that was left out.
+  std::vector<std::string> warnings;  // One sentence for each feature that was left out or repaired.
 };
 
 // Returns the model_from_node matrices of all nodes at a time of an animation (seconds; the animation

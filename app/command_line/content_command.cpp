@@ -100,6 +100,8 @@ content::Entity NewModel(const ContentOptions& options, const engine::UprightAxe
   content::Entity entity;
   entity.kind = content::Entity::Kind::kModel;
   entity.model.asset = std::make_shared<content::Asset>(content::ImportAsset(options.file));
+  for (const std::string& warning : entity.model.asset->model->warnings)
+    std::fprintf(stderr, "Warning: %s\n", warning.c_str());
   entity.name = options.name.empty() ? scene.FreeName(content::NameFromFile(options.file)) : options.name;
   engine::Sim3& pose = entity.model.map_from_model;
   pose = content::UprightPose(options.position, -axes.ahead, axes.up,

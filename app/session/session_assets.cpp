@@ -13,6 +13,7 @@ std::shared_ptr<const content::Asset> SessionAssets::Load(const std::string& fil
   std::error_code error;
   if (!std::filesystem::exists(path, error)) path = file;
   auto asset = std::make_shared<content::Asset>(content::ImportAsset(path));
+  for (const std::string& warning : asset->model->warnings) warnings_.push_back(asset->name + ": " + warning);
   // The same bytes may already be in use in a map: one copy is shared.
   auto& kept = assets_[asset->id];
   if (!kept) kept = std::move(asset);

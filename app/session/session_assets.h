@@ -5,6 +5,8 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "app/session/library_scene.h"
 #include "content/asset.h"
@@ -20,6 +22,10 @@ class SessionAssets {
   // The model in this file, which is read once. Throws Error when it cannot be read.
   std::shared_ptr<const content::Asset> Load(const std::string& file);
 
+  // What the files that were loaded since the last call could not be shown with, one sentence each that names
+  // its file.
+  std::vector<std::string> TakeWarnings() { return std::exchange(warnings_, {}); }
+
   const AssetCache& all() const { return assets_; }
   // Adds those that are not known yet, and takes them from `decoded`.
   void Merge(AssetCache* decoded) { assets_.merge(*decoded); }
@@ -30,6 +36,7 @@ class SessionAssets {
   AssetCache assets_;                                                    // by id
   std::map<std::string, std::shared_ptr<const content::Asset>> models_;  // by file name in commands
   std::filesystem::path folder_;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace docent::app
