@@ -37,8 +37,11 @@ struct Material {
   float metallic = 1.0f, roughness = 1.0f;
   glm::vec3 emissive{0.0f};
   float normal_scale = 1.0f, occlusion_strength = 1.0f;
+  // The part of the light behind the surface that passes it (KHR_materials_transmission), 0..1. It is neither
+  // bent nor tinted. The texture's red channel scales it.
+  float transmission = 0.0f;
   TextureUse base_color_texture, metallic_roughness_texture, normal_texture, occlusion_texture,
-      emissive_texture;
+      emissive_texture, transmission_texture;
   enum class Alpha { kOpaque, kMask, kBlend } alpha = Alpha::kOpaque;
   float alpha_cutoff = 0.5f;
   bool double_sided = false;
@@ -108,7 +111,7 @@ struct Model {
   std::vector<Skin> skins;
   std::vector<Animation> animations;
   glm::vec3 bounds_min{0.0f}, bounds_max{0.0f};  // Bounding box of the rest pose in model axes, metres.
-  std::vector<std::string> warnings;             // One sentence for each feature that was left out.
+  std::vector<std::string> warnings;  // One sentence for each feature that was left out or repaired.
 };
 
 // Returns the model_from_node matrices of all nodes at a time of an animation (seconds; the animation

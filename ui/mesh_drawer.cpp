@@ -26,6 +26,12 @@ const content::Material& DefaultMaterial() {
   return kMaterial;
 }
 
+// Whether what is behind the surface is seen through it. Unlit materials transmit nothing (§ Limitations of
+// KHR_materials_unlit).
+bool IsSeenThrough(const content::Material& material) {
+  return material.alpha == content::Material::Alpha::kBlend || (material.transmission > 0 && !material.unlit);
+}
+
 struct TextureSlot {
   const char* sampler;
   const char* used;
@@ -33,13 +39,15 @@ struct TextureSlot {
   const char* uv_transform;
   bool is_color;
 };
-constexpr std::array<TextureSlot, 5> kSlots = {{
+constexpr std::array<TextureSlot, 6> kSlots = {{
     {"base_color_map", "base_color_use.used", "base_color_use.uv_set", "base_color_use.uv_transform", true},
     {"metallic_roughness_map", "metallic_roughness_use.used", "metallic_roughness_use.uv_set",
      "metallic_roughness_use.uv_transform", false},
     {"normal_map", "normal_use.used", "normal_use.uv_set", "normal_use.uv_transform", false},
     {"occlusion_map", "occlusion_use.used", "occlusion_use.uv_set", "occlusion_use.uv_transform", false},
     {"emissive_map", "emissive_use.used", "emissive_use.uv_set", "emissive_use.uv_transform", true},
+    {"transmission_map", "transmission_use.used", "transmission_use.uv_set", "transmission_use.uv_transform",
+     false},
 }};
 constexpr int kJointUnit = static_cast<int>(kSlots.size());
 
@@ -74,7 +82,7 @@ bool IsVisible(const glm::vec3& center, float radius, const TangentBounds& bound
 MeshDrawer::MeshDrawer(int max_texture_px)
     : cache_(max_texture_px), program_("mesh", kMeshVertexShader, kMeshFragmentShader) {
   program_.AssignTextureUnits({kSlots[0].sampler, kSlots[1].sampler, kSlots[2].sampler, kSlots[3].sampler,
-                               kSlots[4].sampler, "joint_columns"});
+                               kSlots[4].sampler, kSlots[5].sampler, "joint_columns"});
   const std::uint32_t white = 0xFFFFFFFFu;
   white_ = MakeTexture(1, 1, GL_RGBA, &white, false);
 }
@@ -184,8 +192,7 @@ void MeshDrawer::Draw(const PinholeView& view, const SurfaceDrawer& surfaces) {
     const float depth = -(eye_from_map * glm::vec4(item.center, 1.0f)).z;
     nearest = std::min(nearest, static_cast<double>(depth - item.radius));
     farthest = std::max(farthest, static_cast<double>(depth + item.radius));
-    const bool blends = item.material->alpha == content::Material::Alpha::kBlend;
-    (blends ? blended : opaque).push_back({&item, depth});
+    (IsSeenThrough(*item.material) ? blended : opaque).push_back({&item, depth});
   }
   if (opaque.empty() && blended.empty()) return;
   farthest *= 1.01;
@@ -245,7 +252,7 @@ void MeshDrawer::DrawItem(const Item& item) {
     glEnable(GL_CULL_FACE);
     glCullFace(GL_BACK);
     draw();
-  } else if (item.material->alpha == content::Material::Alpha::kBlend) {
+  } else if (IsSeenThrough(*item.material)) {
     glEnable(GL_CULL_FACE);  // Back faces are drawn first, so that the front faces blend over them.
     glCullFace(GL_FRONT);
     draw();
@@ -265,12 +272,14 @@ void MeshDrawer::SetMaterial(const Item& item) {
   SetTexture(item, 2, material.normal_texture);
   SetTexture(item, 3, material.occlusion_texture);
   SetTexture(item, 4, material.emissive_texture);
+  SetTexture(item, 5, material.transmission_texture);
   glUniform4fv(program_.Uniform("base_color"), 1, &material.base_color[0]);
   glUniform3fv(program_.Uniform("emissive"), 1, &material.emissive[0]);
   glUniform1f(program_.Uniform("metallic"), material.metallic);
   glUniform1f(program_.Uniform("roughness"), material.roughness);
   glUniform1f(program_.Uniform("normal_scale"), material.normal_scale);
   glUniform1f(program_.Uniform("occlusion_strength"), material.occlusion_strength);
+  glUniform1f(program_.Uniform("transmission"), material.transmission);
   glUniform1i(program_.Uniform("alpha_mode"), static_cast<int>(material.alpha));
   glUniform1f(program_.Uniform("alpha_cutoff"), material.alpha_cutoff);
   glUniform1i(program_.Uniform("unlit"), material.unlit);

@@ -102,11 +102,13 @@ in vec3 normal_in_map;
 in vec4 tangent_in_map;
 in vec2 texture_place[2];
 in vec4 tint;
-uniform sampler2D base_color_map, metallic_roughness_map, normal_map, occlusion_map, emissive_map;
-uniform TextureUse base_color_use, metallic_roughness_use, normal_use, occlusion_use, emissive_use;
+uniform sampler2D base_color_map, metallic_roughness_map, normal_map, occlusion_map, emissive_map,
+    transmission_map;
+uniform TextureUse base_color_use, metallic_roughness_use, normal_use, occlusion_use, emissive_use,
+    transmission_use;
 uniform vec4 base_color;
 uniform vec3 emissive;
-uniform float metallic, roughness, normal_scale, occlusion_strength;
+uniform float metallic, roughness, normal_scale, occlusion_strength, transmission;
 uniform int alpha_mode;  // 0 opaque, 1 mask, 2 blend
 uniform float alpha_cutoff;
 uniform bool unlit;
@@ -164,7 +166,13 @@ vec3 EnvironmentRadiance(vec3 direction, float blur) {
   return mix(floor_radiance, mix(sky, sky_radiance, blur), smoothstep(-width, width, height));
 }
 
-vec3 Shade(vec3 albedo, vec3 normal, float metal, float rough, float occlusion) {
+// The light that a surface scatters from below it, and that it reflects.
+struct Reflection {
+  vec3 diffuse;
+  vec3 specular;
+};
+
+Reflection Shade(vec3 albedo, vec3 normal, float metal, float rough, float occlusion) {
   vec3 view = normalize(eye_in_map - position_in_map);
   if (!gl_FrontFacing) normal = -normal;
   vec3 half_way = normalize(view + direction_to_light);
@@ -181,12 +189,12 @@ vec3 Shade(vec3 albedo, vec3 normal, float metal, float rough, float occlusion) 
   float visibility = 0.5 / (nl * sqrt(nv * nv * (1.0 - alpha2) + alpha2) +
                             nv * sqrt(nl * nl * (1.0 - alpha2) + alpha2) + 1e-5);
   vec3 fresnel = f0 + (1.0 - f0) * pow(1.0 - vh, 5.0);
-  vec3 direct = ((1.0 - fresnel) * diffuse / kPi + fresnel * min(distribution * visibility, 40.0)) *
-                light_radiance * nl;
+  vec3 direct = light_radiance * nl;
   vec3 mirror = f0 + (max(vec3(1.0 - rough), f0) - f0) * pow(1.0 - nv, 5.0);
-  vec3 ambient = diffuse * EnvironmentRadiance(normal, 1.0) * (1.0 - mirror) +
-                 mirror * EnvironmentRadiance(reflect(-view, normal), rough);
-  return direct + ambient * occlusion;
+  return Reflection(diffuse * ((1.0 - fresnel) / kPi * direct +
+                               EnvironmentRadiance(normal, 1.0) * (1.0 - mirror) * occlusion),
+                    fresnel * min(distribution * visibility, 40.0) * direct +
+                        mirror * EnvironmentRadiance(reflect(-view, normal), rough) * occlusion);
 }
 
 void main() {
@@ -206,10 +214,16 @@ void main() {
   }
   if (occlusion_use.used)
     occlusion = mix(1.0, texture(occlusion_map, Place(occlusion_use)).r, occlusion_strength);
-  vec3 shaded = Shade(base.rgb, Normal(), clamp(metal, 0.0, 1.0), clamp(rough, 0.04, 1.0), occlusion);
+  metal = clamp(metal, 0.0, 1.0);
+  Reflection shaded = Shade(base.rgb, Normal(), metal, clamp(rough, 0.04, 1.0), occlusion);
   vec3 glow = emissive;
   if (emissive_use.used) glow *= texture(emissive_map, Place(emissive_use)).rgb;
-  color = vec4(Encode(Compress(shaded + glow)) * alpha, alpha);
+  // Light from behind takes the place of the diffuse part (KHR_materials_transmission); metals let none pass.
+  float passing = transmission * (1.0 - metal);
+  if (transmission_use.used) passing *= texture(transmission_map, Place(transmission_use)).r;
+  vec3 opaque = Encode(Compress(shaded.diffuse + shaded.specular + glow));
+  vec3 clear = Encode(Compress(shaded.specular + glow));
+  color = vec4(mix(opaque, clear, passing) * alpha, alpha * (1.0 - passing));
 }
 )glsl";
 

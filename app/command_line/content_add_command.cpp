@@ -78,6 +78,8 @@ content::Entity NewFromFile(const AddOptions& options, const Target& target) {
     case content::AssetKind::kModel:
       entity.kind = content::Entity::Kind::kModel;
       entity.model.asset = std::make_shared<content::Asset>(content::ImportAsset(options.file));
+      for (const std::string& warning : entity.model.asset->model->warnings)
+        std::fprintf(stderr, "Warning: %s\n", warning.c_str());
       StandUp(options, target, options.scale.value_or(1), &entity);
       break;
   }

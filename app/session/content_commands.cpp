@@ -85,6 +85,8 @@ void ContentCommands::Apply(const PlaceModel& command, const engine::TrackedFram
   entity.kind = content::Entity::Kind::kModel;
   entity.name = map.scene->FreeName(content::NameFromFile(command.file));
   entity.model.asset = assets_.Load(command.file);
+  for (const std::string& warning : assets_.TakeWarnings())
+    state_.AddEvent(frame.frame.time, "warning", warning);
   const content::Model& model = *entity.model.asset->model;
   const Eigen::Vector3d viewer = frame.camera_from_map.OriginInSource();
   const double side = options_.model_side * (hit.point - viewer).norm();

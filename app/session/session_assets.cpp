@@ -16,6 +16,10 @@ std::shared_ptr<const content::Asset> SessionAssets::Load(const std::string& fil
       std::make_shared<content::Asset>(kind == content::AssetKind::kImage   ? content::ImportImage(path)
                                        : kind == content::AssetKind::kSound ? content::ImportSound(path)
                                                                             : content::ImportAsset(path));
+  if (asset->model) {
+    for (const std::string& warning : asset->model->warnings)
+      warnings_.push_back(asset->name + ": " + warning);
+  }
   // The same bytes may already be in use in a map: one copy is shared.
   auto& kept = assets_[asset->id];
   if (!kept) kept = std::move(asset);

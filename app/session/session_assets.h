@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "app/session/library_scene.h"
 #include "content/asset.h"
@@ -22,6 +23,10 @@ class SessionAssets {
   std::shared_ptr<const content::Asset> Load(const std::string& file,
                                              content::AssetKind kind = content::AssetKind::kModel);
 
+  // What the files that were loaded since the last call could not be shown with, one sentence each that names
+  // its file.
+  std::vector<std::string> TakeWarnings() { return std::exchange(warnings_, {}); }
+
   const AssetCache& all() const { return assets_; }
   // Adds those that are not known yet, and takes them from `decoded`.
   void Merge(AssetCache* decoded) { assets_.merge(*decoded); }
@@ -33,6 +38,7 @@ class SessionAssets {
   // by file name in commands, and what it is read as
   std::map<std::pair<std::string, content::AssetKind>, std::shared_ptr<const content::Asset>> files_;
   std::filesystem::path folder_;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace docent::app

@@ -134,4 +134,24 @@ const AccessorReader& AccessorCache::Get(int accessor) {
   return *reader;
 }
 
+void AccessorCache::CheckFinite(std::uint64_t max_bytes) {
+  std::uint64_t bytes_left = max_bytes;
+  for (std::size_t i = 0; i < model_.accessors.size(); ++i) {
+    const tinygltf::Accessor& accessor = model_.accessors[i];
+    if (accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT) continue;
+    if (accessor.bufferView < 0 && !accessor.sparse.isSparse) continue;  // All zeros.
+    const AccessorReader& reader = Get(static_cast<int>(i));
+    const std::uint64_t bytes =
+        reader.count() * static_cast<std::uint64_t>(reader.components()) * sizeof(float);
+    if (bytes > bytes_left) {
+      Refuse(file_, Place("accessors", i),
+             "takes the accessors over the limit of " + std::to_string(max_bytes) + " bytes.");
+    }
+    bytes_left -= bytes;
+    for (std::size_t element = 0; element < reader.count(); ++element) {
+      for (int component = 0; component < reader.components(); ++component) reader.Float(element, component);
+    }
+  }
+}
+
 }  // namespace docent::content

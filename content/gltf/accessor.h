@@ -53,6 +53,10 @@ class AccessorCache {
 
   const AccessorReader& Get(int accessor);
 
+  // Throws Error when a float of any accessor, used or not, is not finite, or when the accessors together
+  // claim more than `max_bytes` of floats, which only overlapping ones can.
+  void CheckFinite(std::uint64_t max_bytes);
+
  private:
   const std::string& file_;
   const tinygltf::Model& model_;

@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "content/gltf/json.h"
 
@@ -12,11 +14,12 @@
 // a one-sentence message. The checks must run in this order, because each relies on the previous ones.
 namespace docent::content {
 
-// Checks for glTF 2.x without required extensions that Docent cannot read.
-void CheckVersion(std::string_view file, const Json& root);
+// Checks for glTF 2.x. A file that asks for a reader of a later 2.x is read as 2.0, with a warning.
+void CheckVersion(std::string_view file, const Json& root, std::vector<std::string>* warnings);
 
-// Whether extensionsUsed contains the extension.
-bool UsesExtension(const Json& root, std::string_view name);
+// Replaces accessors of a type that glTF 2.0 does not have by 2x2 matrices without data, which no member that
+// is read may refer to; so such a file is shown if nothing uses them. May be called before CheckSchema.
+void ReplaceUnknownAccessors(Json* root, std::vector<std::string>* warnings);
 
 // The bytes of one component and of one element of an accessor (columns of small matrices are padded,
 // §3.6.2.4).

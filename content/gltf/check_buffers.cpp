@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
+#include <iterator>
+#include <utility>
 
 #include "content/gltf/check.h"
 
 namespace docent::content {
 namespace {
 
-constexpr std::string_view kReadableExtensions[] = {
-    "KHR_texture_transform",
-    "KHR_materials_unlit",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_mesh_quantization",
-    "KHR_materials_emissive_strength",
-};
+constexpr std::string_view kAccessorTypes[] = {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"};
 
 bool IsGltf1(const Json& root) {
   // In glTF 1.0 the collections are named objects, not arrays.
@@ -129,32 +124,21 @@ class AccessorChecker {
 
 }  // namespace
 
-bool UsesExtension(const Json& root, std::string_view name) {
-  const Json& used = ArrayOf(root, "extensionsUsed");
-  return std::find(used.begin(), used.end(), Json(name)) != used.end();
-}
-
-void CheckVersion(std::string_view file, const Json& root) {
+void CheckVersion(std::string_view file, const Json& root, std::vector<std::string>* warnings) {
   const Json& asset = ObjectOf(root, "asset");
-  const auto version = asset.find("version");
-  const bool has_version = version != asset.end() && version->is_string();
-  const int major = has_version ? MajorVersion(version->get<std::string>()) : -1;
-  if (major == 1 || IsGltf1(root)) Refuse(file, "", "this is a glTF 1.0 file; convert it to glTF 2.0 first.");
-  if (major != 2) Refuse(file, "asset.version", "is not 2.0.");
-  const auto least = asset.find("minVersion");
-  if (least != asset.end() && (!least->is_string() || *least != "2.0")) {
-    Refuse(file, "asset.minVersion", "asks for a newer reader than glTF 2.0.");
-  }
-  const Json& required = ArrayOf(root, "extensionsRequired");
-  for (const Json& name : required) {
-    if (!name.is_string()) Refuse(file, "extensionsRequired", "is not a list of strings.");
-    const std::string text = name.get<std::string>();
-    if (std::find(std::begin(kReadableExtensions), std::end(kReadableExtensions), text) ==
-        std::end(kReadableExtensions)) {
-      Refuse(file, "",
-             "the file cannot be shown without the extension " + text.substr(0, 60) +
-                 ", which Docent does not read; export the model without it.");
-    }
+  const auto major = [&](const char* member) {
+    const auto version = asset.find(member);
+    return version == asset.end() || !version->is_string() ? -1 : MajorVersion(version->get<std::string>());
+  };
+  if (major("version") == 1 || IsGltf1(root))
+    Refuse(file, "", "this is a glTF 1.0 file; convert it to glTF 2.0 first.");
+  if (major("version") != 2) Refuse(file, "asset.version", "is not 2.0.");
+  if (!asset.contains("minVersion")) return;
+  if (major("minVersion") != 2) Refuse(file, "asset.minVersion", "asks for a newer reader than glTF 2.");
+  if (asset["minVersion"] != "2.0") {
+    // The parts of a later 2.x that glTF 2.0 does not have are ignored as other unknown members are.
+    warnings->push_back("The file asks for a reader of glTF " + asset["minVersion"].get<std::string>() +
+                        "; what glTF 2.0 does not have is left out.");
   }
 }
 
@@ -181,6 +165,26 @@ std::uint64_t UnpaddedBytes(std::string_view type, int component_type) {
   if (!type.starts_with("MAT")) return element;
   const std::uint64_t side = static_cast<std::uint64_t>(type.back() - '0');
   return element - (element / side - side * ComponentBytes(component_type));
+}
+
+void ReplaceUnknownAccessors(Json* root, std::vector<std::string>* warnings) {
+  const auto accessors = root->find("accessors");
+  if (accessors == root->end() || !accessors->is_array()) return;
+  for (std::size_t i = 0; i < accessors->size(); ++i) {
+    Json& accessor = (*accessors)[i];
+    const auto type = accessor.is_object() ? accessor.find("type") : accessor.end();
+    if (type == accessor.end() || !type->is_string()) continue;
+    if (std::find(std::begin(kAccessorTypes), std::end(kAccessorTypes), type->get<std::string>()) !=
+        std::end(kAccessorTypes)) {
+      continue;
+    }
+    Json replacement = {{"componentType", 5121}, {"count", 1}, {"type", "MAT2"}};
+    if (accessor.contains("count")) replacement["count"] = accessor["count"];
+    accessor = std::move(replacement);
+    const std::string warning = "Accessors of types that glTF 2.0 does not have are left out.";
+    if (std::find(warnings->begin(), warnings->end(), warning) == warnings->end())
+      warnings->push_back(warning);
+  }
 }
 
 void CheckBufferViews(std::string_view file, const Json& root, std::span<const std::uint64_t> buffer_bytes) {

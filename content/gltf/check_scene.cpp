@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "content/gltf/check.h"
+#include "content/gltf/extensions.h"
 
 namespace docent::content {
 namespace {
@@ -81,9 +82,13 @@ void CheckPrimitive(std::string_view file, const Json& root, const Json& primiti
       }
     }
   }
-  const bool has_joints = attributes.contains("JOINTS_0"), has_weights = attributes.contains("WEIGHTS_0");
-  if (has_joints != has_weights)
-    Refuse(file, place, "has joints without weights, or weights without joints.");
+  for (const auto& [name, index] : attributes.items()) {
+    const bool joints = name.starts_with("JOINTS_"), weights = name.starts_with("WEIGHTS_");
+    if (!joints && !weights) continue;
+    const std::string other = (joints ? "WEIGHTS" : "JOINTS") + name.substr(name.find('_'));
+    if (!attributes.contains(other))
+      Refuse(file, place, "has joints without weights, or weights without joints.");
+  }
   if (!primitive.contains("indices")) return;
   const Json& indices = AccessorAt(root, primitive["indices"]);
   const int component = indices["componentType"].get<int>();

@@ -28,6 +28,21 @@ bool IsJpeg(std::span<const std::uint8_t> bytes) {
   return bytes.size() >= 3 && bytes[0] == 0xFF && bytes[1] == 0xD8;
 }
 
+// Whether all chunks up to the last one, IEND, are there (ISO/IEC 15948, 5.3: a length, a type, the data and
+// a checksum).
+bool IsCompletePng(std::span<const std::uint8_t> bytes) {
+  constexpr std::uint64_t kChunkBytes = 12;
+  std::uint64_t offset = kPngSignature.size();
+  while (offset + kChunkBytes <= bytes.size()) {
+    const auto at = static_cast<std::size_t>(offset);
+    const bool ends = std::equal(bytes.begin() + static_cast<std::ptrdiff_t>(at) + 4,
+                                 bytes.begin() + static_cast<std::ptrdiff_t>(at) + 8, "IEND");
+    offset += kChunkBytes + static_cast<std::uint64_t>(BigEndian(bytes, at, 4));
+    if (ends) return offset <= bytes.size();
+  }
+  return false;
+}
+
 // Skips the segments before the first frame header (ITU-T T.81, B.1.1 and B.2.2).
 std::optional<ImageSize> ReadJpegSize(std::span<const std::uint8_t> bytes) {
   std::size_t offset = 2;
@@ -80,11 +95,19 @@ std::optional<ImageSize> ReadImageSize(std::span<const std::uint8_t> bytes) {
   return IsJpeg(bytes) ? ReadJpegSize(bytes) : std::nullopt;
 }
 
-Image DecodeImage(const std::string& file, const std::string& place, std::span<const std::uint8_t> bytes,
-                  const LoadLimits& limits, std::uint64_t* pixels_left) {
-  if (!IsPng(bytes) && !IsJpeg(bytes)) Refuse(file, place, "is neither a PNG nor a JPEG image.");
+std::optional<std::string> ImageFault(std::span<const std::uint8_t> bytes) {
+  if (!IsPng(bytes) && !IsJpeg(bytes)) return "is neither a PNG nor a JPEG image";
   const std::optional<ImageSize> size = ReadImageSize(bytes);
-  if (!size || size->width_px <= 0 || size->height_px <= 0) Refuse(file, place, "is a damaged image.");
+  if (!size || size->width_px <= 0 || size->height_px <= 0) return "is a damaged image";
+  if (IsPng(bytes) && !IsCompletePng(bytes)) return "is an image that is cut off";
+  return std::nullopt;
+}
+
+std::optional<Image> DecodeImage(const std::string& file, const std::string& place,
+                                 std::span<const std::uint8_t> bytes, const LoadLimits& limits,
+                                 std::uint64_t* pixels_left) {
+  const std::optional<ImageSize> size = ReadImageSize(bytes);
+  if (!size || size->width_px <= 0 || size->height_px <= 0) return std::nullopt;
   const std::string words = std::to_string(size->width_px) + " x " + std::to_string(size->height_px);
   if (std::max(size->width_px, size->height_px) > limits.max_image_side_px) {
     Refuse(file, place,
@@ -107,7 +130,7 @@ Image DecodeImage(const std::string& file, const std::string& place, std::span<c
   const std::size_t expected = pixels * 4 * (decoded.bits == 16 ? 2 : 1);
   if (!done || decoded.width != size->width_px || decoded.height != size->height_px ||
       decoded.component != 4 || decoded.image.size() != expected) {
-    Refuse(file, place, "is a damaged image.");
+    return std::nullopt;
   }
   return ToImage(decoded);
 }

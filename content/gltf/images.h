@@ -21,9 +21,14 @@ struct ImageSize {
 // headers.
 std::optional<ImageSize> ReadImageSize(std::span<const std::uint8_t> bytes);
 
-// Decodes one image. `place` is used in messages. `pixels_left` is the remaining budget of the model, which
-// is reduced. Throws Error when the image is not PNG or JPEG, too large or damaged.
-Image DecodeImage(const std::string& file, const std::string& place, std::span<const std::uint8_t> bytes,
-                  const LoadLimits& limits, std::uint64_t* pixels_left);
+// What is wrong with an encoded image, for example "is a damaged image"; empty if its header, and the chunks
+// of a PNG, are complete. Decodes nothing.
+std::optional<std::string> ImageFault(std::span<const std::uint8_t> bytes);
+
+// Decodes one image; empty if it is damaged. `place` is used in messages. `pixels_left` is the remaining
+// budget of the model, which is reduced. Throws Error when the image is too large.
+std::optional<Image> DecodeImage(const std::string& file, const std::string& place,
+                                 std::span<const std::uint8_t> bytes, const LoadLimits& limits,
+                                 std::uint64_t* pixels_left);
 
 }  // namespace docent::content

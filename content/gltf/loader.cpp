@@ -11,6 +11,7 @@
 #include "content/gltf/animation.h"
 #include "content/gltf/check.h"
 #include "content/gltf/container.h"
+#include "content/gltf/extensions.h"
 #include "content/gltf/images.h"
 #include "content/gltf/json.h"
 #include "content/gltf/material.h"
@@ -18,6 +19,7 @@
 #include "content/gltf/nodes.h"
 #include "content/gltf/resources.h"
 #include "content/gltf/schema.h"
+#include "content/gltf/skinning.h"
 #include "content/model_bounds.h"
 
 namespace docent::content {
@@ -49,12 +51,29 @@ Json WithoutUnreadMembers(const Json& value) {
       result[name] = WithoutUnreadMembers(member);
       continue;
     }
-    for (const char* kept : {"KHR_texture_transform", "KHR_materials_unlit",
-                             "KHR_materials_emissive_strength", "KHR_materials_pbrSpecularGlossiness"}) {
-      if (member.contains(kept)) result["extensions"][kept] = WithoutUnreadMembers(member[kept]);
+    for (const auto& [extension, object] : member.items()) {
+      if (IsDecodedExtension(extension)) result["extensions"][extension] = WithoutUnreadMembers(object);
     }
   }
   return result;
+}
+
+// Gives the indices that have no buffer view, which are all zeros (§5.1.1), zeros to view, because tinygltf
+// does not read indices otherwise. The sum of their sizes was limited by CheckAccessors.
+void GiveIndicesViews(Json* json, std::vector<std::uint8_t>* bin) {
+  for (const Json& mesh : ArrayOf(*json, "meshes")) {
+    for (const Json& primitive : mesh["primitives"]) {
+      if (!primitive.contains("indices")) continue;
+      Json& accessor = (*json)["accessors"][primitive["indices"].get<std::size_t>()];
+      if (accessor.contains("bufferView")) continue;
+      bin->resize((bin->size() + 3) / 4 * 4);
+      const std::uint64_t bytes =
+          accessor["count"].get<std::uint64_t>() * ComponentBytes(accessor["componentType"].get<int>());
+      accessor["bufferView"] = CountOf(*json, "bufferViews");
+      (*json)["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", bin->size()}, {"byteLength", bytes}});
+      bin->resize(bin->size() + bytes, 0);
+    }
+  }
 }
 
 bool KeepEncoded(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int,
@@ -62,10 +81,7 @@ bool KeepEncoded(tinygltf::Image*, const int, std::string*, std::string*, int, i
   return true;  // Images are decoded later, and only those that a texture uses.
 }
 
-tinygltf::Model Parse(const std::string& name, const PackedGltf& packed) {
-  Json json = WithoutUnreadMembers(packed.json);
-  if (!packed.bin.empty())
-    json["buffers"] = Json::array({{{"byteLength", packed.bin.size()}, {"uri", kBufferUri}}});
+tinygltf::Model ParseText(const std::string& name, const Json& json, const std::vector<std::uint8_t>& bin) {
   tinygltf::TinyGLTF parser;
   parser.SetImageLoader(&KeepEncoded, nullptr);
   tinygltf::FsCallbacks files{};
@@ -80,7 +96,7 @@ tinygltf::Model Parse(const std::string& name, const PackedGltf& packed) {
   files.WriteWholeFile = [](std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
     return false;
   };
-  files.user_data = const_cast<std::vector<std::uint8_t>*>(&packed.bin);
+  files.user_data = const_cast<std::vector<std::uint8_t>*>(&bin);
   parser.SetFsCallbacks(files);
   const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   tinygltf::Model source;
@@ -119,20 +135,40 @@ void CheckNothingLost(const std::string& name, const Json& json, const tinygltf:
   if (!same) Refuse(name, "", "the glTF cannot be read: a part of it is not valid.");
 }
 
-// Decodes the images that textures use. Returns the index in Model::images of each of the file's images.
+tinygltf::Model Parse(const std::string& name, const PackedGltf& packed) {
+  Json json = WithoutUnreadMembers(packed.json);
+  std::vector<std::uint8_t> bin = packed.bin;
+  GiveIndicesViews(&json, &bin);
+  if (!bin.empty()) json["buffers"] = Json::array({{{"byteLength", bin.size()}, {"uri", kBufferUri}}});
+  tinygltf::Model source = ParseText(name, json, bin);
+  CheckNothingLost(name, json, source);
+  return source;
+}
+
+// Decodes the images that textures use. An image that is damaged costs its textures and a warning. Returns
+// the index in Model::images of each of the file's images.
 std::vector<int> ReadImages(const std::string& name, const tinygltf::Model& source, const LoadLimits& limits,
                             Model* model) {
   const std::vector<bool> used = UsedImages(source);
   std::vector<int> place_of(used.size(), -1);
   std::uint64_t pixels_left = limits.max_image_pixels;
   for (std::size_t i = 0; i < used.size(); ++i) {
-    if (!used[i]) continue;
     const tinygltf::BufferView& view =
         source.bufferViews[static_cast<std::size_t>(source.images[i].bufferView)];
     const std::span<const std::uint8_t> bytes(source.buffers[static_cast<std::size_t>(view.buffer)].data);
-    place_of[i] = static_cast<int>(model->images.size());
-    model->images.push_back(DecodeImage(
-        name, Place("images", i), bytes.subspan(view.byteOffset, view.byteLength), limits, &pixels_left));
+    const std::span<const std::uint8_t> encoded = bytes.subspan(view.byteOffset, view.byteLength);
+    std::optional<std::string> fault = ImageFault(encoded);
+    if (!fault && used[i]) {
+      std::optional<Image> image = DecodeImage(name, Place("images", i), encoded, limits, &pixels_left);
+      if (image) {
+        place_of[i] = static_cast<int>(model->images.size());
+        model->images.push_back(std::move(*image));
+      } else {
+        fault = "is a damaged image";
+      }
+    }
+    if (fault)
+      model->warnings.push_back(Place("images", i) + " " + *fault + ", and its textures are left out.");
   }
   return place_of;
 }
@@ -154,16 +190,19 @@ void CheckDrawn(const std::string& name, const Model& model, const LoadLimits& l
 }
 
 std::shared_ptr<Model> Convert(const std::string& name, const tinygltf::Model& source,
-                               const LoadLimits& limits) {
+                               const LoadLimits& limits, std::vector<std::string> warnings) {
   auto model = std::make_shared<Model>();
   model->name = name;
+  model->warnings = std::move(warnings);
   AccessorCache accessors(name, source);
+  accessors.CheckFinite(limits.max_file_bytes);
+  CheckSkinning(name, source, limits, &accessors);
   const std::vector<int> image_from_source = ReadImages(name, source, limits, model.get());
   model->textures = ReadTextures(source, image_from_source);
   model->materials = ReadMaterials(source, model->textures, model->images, &model->warnings);
   MeshReader meshes(name, source, model->materials, limits, &accessors, &model->warnings);
   for (std::size_t i = 0; i < source.meshes.size(); ++i) model->meshes.push_back(meshes.Read(i));
-  const std::vector<int> place_of = ReadNodes(name, source, &accessors, model.get());
+  const std::vector<int> place_of = ReadNodes(source, &accessors, model.get());
   model->animations = ReadAnimations(name, source, place_of, limits, &accessors, &model->warnings);
   CheckDrawn(name, *model, limits);
   const auto bounds = RestBounds(*model);
@@ -181,18 +220,22 @@ LoadedGltf LoadGltf(const std::string& name, std::vector<std::uint8_t> bytes,
   }
   const GltfContainer container = SplitGltf(name, bytes);
   Json root = ParseGltfJson(name, container.json, limits);
-  CheckVersion(name, root);
+  std::vector<std::string> warnings;
+  CheckVersion(name, root, &warnings);
+  CheckExtensions(name, root);
+  ReplaceUnknownAccessors(&root, &warnings);
   CheckSchema(name, root);
-  const PackedGltf packed = PackGltf(name, std::move(root), container.bin, folder, limits);
+  for (std::string& warning : ExtensionWarnings(root)) warnings.push_back(std::move(warning));
+  const PackedGltf packed = PackGltf(name, std::move(root), container, folder, limits);
+  warnings.insert(warnings.end(), packed.warnings.begin(), packed.warnings.end());
   CheckAccessors(name, packed.json, packed.bin.size() + container.json.size(), limits);
   CheckMeshes(name, packed.json);
   CheckNodes(name, packed.json, limits);
   CheckSkins(name, packed.json);
   CheckAnimations(name, packed.json);
   const tinygltf::Model source = Parse(name, packed);
-  CheckNothingLost(name, packed.json, source);
   LoadedGltf loaded;
-  loaded.model = Convert(name, source, limits);
+  loaded.model = Convert(name, source, limits, std::move(warnings));
   if (container.is_glb && packed.was_self_contained) {
     loaded.glb = std::move(bytes);
   } else {

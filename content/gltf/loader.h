@@ -20,8 +20,10 @@
 //   resources   other files and data URIs gathered into one buffer
 //   check       buffer views, accessors, meshes, nodes, skins and animations against true sizes
 //   tinygltf         JSON to structs; it opens no file and meets only checked numbers
-//   gltf_mesh, gltf_material, gltf_images, gltf_nodes, gltf_animation    structs to Model
-// Stateless and thread-safe. Every error in a file throws Error with a one-sentence message.
+//   accessor, skinning    floats are finite, joints and weights in range, in all accessors and sets
+//   mesh, material, images, nodes, animation    structs to Model
+// Stateless and thread-safe. Every error in a file throws Error with a one-sentence message, except for those
+// that cost only a texture or can be repaired, which become sentences in Model::warnings.
 namespace docent::content {
 
 struct LoadedGltf {

@@ -106,6 +106,11 @@ class MaterialReader {
       const glm::vec3 emissive = material->emissive * NumberOr(strength->second, "emissiveStrength", 1);
       material->emissive = glm::min(emissive, glm::vec3(1e6f));
     }
+    const auto transmission = source.extensions.find("KHR_materials_transmission");
+    if (transmission != source.extensions.end()) {
+      material->transmission = NumberOr(transmission->second, "transmissionFactor", 0);
+      material->transmission_texture = UseOf(transmission->second, "transmissionTexture");
+    }
     const auto specular = source.extensions.find("KHR_materials_pbrSpecularGlossiness");
     if (specular != source.extensions.end()) ReadSpecularGlossiness(specular->second, material);
   }

@@ -9,7 +9,7 @@
 #include "content/model.h"
 
 // Materials and textures of a checked glTF (§3.8, §3.9, KHR_texture_transform, KHR_materials_unlit,
-// KHR_materials_emissive_strength, KHR_materials_pbrSpecularGlossiness).
+// KHR_materials_emissive_strength, KHR_materials_transmission, KHR_materials_pbrSpecularGlossiness).
 namespace docent::content {
 
 // Returns Model::textures. image_from_source is the index in Model::images of each of the file's images, or

@@ -2,8 +2,10 @@
 #include "content/gltf/mesh.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "content/gltf/json.h"
+#include "content/gltf/skinning.h"
 #include "content/mesh_tools.h"
 
 namespace docent::content {
@@ -102,20 +104,31 @@ void MeshReader::ReadVertices(const Attributes& attributes, std::span<const std:
 
 void MeshReader::ReadSkinning(const Attributes& attributes, std::span<const std::uint32_t> chosen,
                               Primitive* result) {
-  if (!attributes.contains("JOINTS_0") || !attributes.contains("WEIGHTS_0")) return;
-  if (attributes.contains("JOINTS_1")) Warn("Only four joints per vertex are used; the others are left out.");
-  const AccessorReader& joints = accessors_.Get(attributes.at("JOINTS_0"));
-  const AccessorReader& weights = accessors_.Get(attributes.at("WEIGHTS_0"));
+  const std::vector<JointSet> sets = JointSets(attributes);
+  if (sets.empty()) return;
+  std::vector<std::pair<float, std::uint32_t>> influences;  // Weight and joint.
   for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const glm::vec4 raw = glm::max(ReadVector<4>(weights, chosen[i]), glm::vec4(0));
-    const double sum = double{raw.x} + raw.y + raw.z + raw.w;
-    if (!(sum > 0)) continue;
+    influences.clear();
+    for (const JointSet& set : sets) {
+      const AccessorReader& joints = accessors_.Get(set.joints);
+      const AccessorReader& weights = accessors_.Get(set.weights);
+      for (int k = 0; k < 4; ++k) {
+        const float weight = weights.Float(chosen[i], k);
+        if (weight > 0) influences.emplace_back(weight, joints.Unsigned(chosen[i], k));
+      }
+    }
+    if (influences.size() > 4) {
+      std::stable_sort(influences.begin(), influences.end(),
+                       [](const auto& a, const auto& b) { return a.first > b.first; });
+      influences.resize(4);
+      Warn("Only the four joints of largest weight are used for each vertex.");
+    }
+    double sum = 0;
+    for (const auto& [weight, joint] : influences) sum += weight;
     Vertex& vertex = result->vertices[i];
-    for (int k = 0; k < 4; ++k) {
-      vertex.weights[k] = static_cast<float>(raw[k] / sum);
-      // A joint without weight may have any index; 0 is always valid.
-      const std::uint32_t joint = vertex.weights[k] > 0 ? joints.Unsigned(chosen[i], k) : 0;
-      vertex.joints[k] = static_cast<std::uint16_t>(joint);
+    for (std::size_t k = 0; k < influences.size(); ++k) {
+      vertex.weights[static_cast<int>(k)] = static_cast<float>(influences[k].first / sum);
+      vertex.joints[static_cast<int>(k)] = static_cast<std::uint16_t>(influences[k].second);
     }
   }
 }
@@ -172,18 +185,6 @@ Mesh MeshReader::Read(std::size_t mesh) {
     }
   }
   return result;
-}
-
-int MeshReader::JointsNeeded(const Mesh& mesh) {
-  int needed = 0;
-  for (const Primitive& primitive : mesh.primitives) {
-    for (const Vertex& vertex : primitive.vertices) {
-      for (int k = 0; k < 4; ++k) {
-        if (vertex.weights[k] > 0) needed = std::max(needed, vertex.joints[k] + 1);
-      }
-    }
-  }
-  return needed;
 }
 
 }  // namespace docent::content

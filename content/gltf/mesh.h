@@ -31,9 +31,6 @@ class MeshReader {
 
   Mesh Read(std::size_t mesh);
 
-  // The largest joint index of the mesh's vertices plus one, or 0 without joints.
-  static int JointsNeeded(const Mesh& mesh);
-
  private:
   using Attributes = std::map<std::string, int>;
 

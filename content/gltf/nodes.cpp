@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "content/gltf/json.h"
-#include "content/gltf/mesh.h"
 #include "content/mesh_tools.h"
 
 namespace docent::content {
@@ -99,8 +98,17 @@ void HideUnreachable(Model* model) {
   }
 }
 
+// A bind pose is an affine transform, so that the last row of its matrix is 0 0 0 1 (§3.7.3.1).
+bool MakeAffine(glm::mat4* matrix) {
+  const glm::vec4 row((*matrix)[0][3], (*matrix)[1][3], (*matrix)[2][3], (*matrix)[3][3]);
+  const glm::vec4 expected(0, 0, 0, 1);
+  for (int k = 0; k < 4; ++k) (*matrix)[k][3] = expected[k];
+  return row == expected;
+}
+
 void ReadSkins(const tinygltf::Model& source, const std::vector<int>& place_of, AccessorCache* accessors,
                Model* model) {
+  bool affine = true;
   for (const tinygltf::Skin& from : source.skins) {
     Skin skin;
     for (const int joint : from.joints) skin.joints.push_back(place_of[static_cast<std::size_t>(joint)]);
@@ -109,24 +117,14 @@ void ReadSkins(const tinygltf::Model& source, const std::vector<int>& place_of, 
       const AccessorReader& matrices = accessors->Get(from.inverseBindMatrices);
       for (std::size_t i = 0; i < skin.joints.size(); ++i) {
         for (int k = 0; k < 16; ++k) skin.inverse_bind[i][k / 4][k % 4] = matrices.Float(i, k);
+        affine = MakeAffine(&skin.inverse_bind[i]) && affine;
       }
     }
     model->skins.push_back(std::move(skin));
   }
-}
-
-void CheckJoints(const std::string& file, const Model& model) {
-  std::vector<int> needed(model.meshes.size(), -1);  // Computed once per mesh.
-  for (const Node& node : model.nodes) {
-    if (node.skin < 0 || node.mesh < 0) continue;
-    const auto mesh = static_cast<std::size_t>(node.mesh);
-    if (needed[mesh] < 0) needed[mesh] = MeshReader::JointsNeeded(model.meshes[mesh]);
-    const std::size_t joints = model.skins[static_cast<std::size_t>(node.skin)].joints.size();
-    if (static_cast<std::size_t>(needed[mesh]) > joints) {
-      Refuse(file, Place("meshes", mesh),
-             "uses joint " + std::to_string(needed[mesh] - 1) + " of a skin with " + std::to_string(joints) +
-                 ".");
-    }
+  if (!affine) {
+    model->warnings.emplace_back(
+        "The last row of an inverse bind matrix is not 0 0 0 1, and is replaced by it.");
   }
 }
 
@@ -154,8 +152,7 @@ bool Decompose(const glm::dmat4& matrix, Node* node) {
   return shear <= 1e-3;
 }
 
-std::vector<int> ReadNodes(const std::string& file, const tinygltf::Model& source, AccessorCache* accessors,
-                           Model* model) {
+std::vector<int> ReadNodes(const tinygltf::Model& source, AccessorCache* accessors, Model* model) {
   const std::vector<int> parents = Parents(source);
   const std::vector<int> order = TopDown(source, parents);
   std::vector<int> place_of(order.size(), -1);
@@ -174,7 +171,6 @@ std::vector<int> ReadNodes(const std::string& file, const tinygltf::Model& sourc
     model->roots.push_back(place_of[static_cast<std::size_t>(root)]);
   HideUnreachable(model);
   ReadSkins(source, place_of, accessors, model);
-  CheckJoints(file, *model);
   return place_of;
 }
 

@@ -14,9 +14,8 @@ namespace docent::content {
 
 // Fills nodes, roots and skins of `model`, whose meshes must exist already; parents precede children. Nodes
 // outside the visible scene lose their meshes but are kept, because they may be joints. Returns the new index
-// of each of the file's nodes.
-std::vector<int> ReadNodes(const std::string& file, const tinygltf::Model& source, AccessorCache* accessors,
-                           Model* model);
+// of each of the file's nodes. The last row of inverse bind matrices is repaired with a warning.
+std::vector<int> ReadNodes(const tinygltf::Model& source, AccessorCache* accessors, Model* model);
 
 // Decomposes a matrix into translation, rotation and scale; returns false when it contains a shear, which
 // these cannot represent.

@@ -40,6 +40,44 @@ bool IsInside(const std::filesystem::path& path, const std::filesystem::path& fo
   return mismatch.first == folder.end();
 }
 
+// Whether a URI names another machine or a device instead of a path below the model's folder.
+bool HasScheme(std::string_view uri) {
+  return uri.substr(0, uri.find('/')).find(':') != std::string_view::npos;
+}
+
+// Changes the image that a texture or one of its extensions refers to; -1 removes the reference.
+void MoveSource(const std::vector<int>& place_of, Json* object) {
+  const auto source = object->find("source");
+  if (source == object->end()) return;
+  const int place = place_of[source->get<std::size_t>()];
+  if (place < 0) {
+    object->erase(source);
+  } else {
+    *source = place;
+  }
+}
+
+// Removes the images that could not be read, so that the packed file refers to no other file. Their textures
+// stay, without an image.
+void RemoveImages(const std::vector<bool>& lost, Json* root) {
+  std::vector<int> place_of(lost.size(), -1);
+  Json kept = Json::array();
+  for (std::size_t i = 0; i < lost.size(); ++i) {
+    if (lost[i]) continue;
+    place_of[i] = static_cast<int>(kept.size());
+    kept.push_back(std::move((*root)["images"][i]));
+  }
+  (*root)["images"] = std::move(kept);
+  if (!root->contains("textures")) return;
+  for (Json& texture : (*root)["textures"]) {
+    MoveSource(place_of, &texture);
+    for (const char* extension : {"EXT_texture_webp", "KHR_texture_basisu"}) {
+      if (ObjectOf(texture, "extensions").contains(extension))
+        MoveSource(place_of, &texture["extensions"][extension]);
+    }
+  }
+}
+
 std::string Shortened(const std::string& text) {
   return text.size() <= 80 ? text : text.substr(0, 77) + "...";
 }
@@ -47,29 +85,18 @@ std::string Shortened(const std::string& text) {
 // Builds the result of PackGltf.
 class Packer {
  public:
-  Packer(std::string_view file, std::optional<std::span<const std::uint8_t>> bin,
+  Packer(std::string_view file, const GltfContainer& container,
          const std::optional<std::filesystem::path>& folder, const LoadLimits& limits)
-      : file_(file), glb_bin_(bin), folder_(folder), limits_(limits) {}
+      : file_(file), container_(container), folder_(folder), limits_(limits) {}
 
   void PackBuffers(Json* root) {
     const std::size_t count = CountOf(*root, "buffers");
     std::vector<std::uint64_t> sizes(count), begins(count);
+    std::vector<bool> used(count, false);
+    for (const Json& view : ArrayOf(*root, "bufferViews")) used[view["buffer"].get<std::size_t>()] = true;
     for (std::size_t i = 0; i < count; ++i) {
-      const Json& buffer = (*root)["buffers"][i];
-      const std::string place = Place("buffers", i);
-      const std::uint64_t claimed = buffer["byteLength"].get<std::uint64_t>();
       begins[i] = Align();
-      if (buffer.contains("uri")) {
-        const std::vector<std::uint8_t> bytes = Fetch(buffer["uri"].get<std::string>(), place);
-        sizes[i] = bytes.size();
-        Append(std::span(bytes).first(std::min<std::uint64_t>(claimed, bytes.size())));
-      } else {
-        // A buffer with neither is empty, which is no error unless a view uses it.
-        const std::span<const std::uint8_t> bytes =
-            i == 0 && glb_bin_ ? *glb_bin_ : std::span<const std::uint8_t>();
-        sizes[i] = bytes.size();
-        Append(bytes.first(std::min<std::uint64_t>(claimed, bytes.size())));
-      }
+      sizes[i] = PackBuffer(i, used[i], &(*root)["buffers"][i]);
     }
     CheckBufferViews(file_, *root, sizes);
     if (!root->contains("bufferViews")) return;
@@ -82,7 +109,8 @@ class Packer {
   }
 
   void PackImages(Json* root) {
-    for (std::size_t i = 0; i < CountOf(*root, "images"); ++i) {
+    std::vector<bool> lost(CountOf(*root, "images"), false);
+    for (std::size_t i = 0; i < lost.size(); ++i) {
       Json& image = (*root)["images"][i];
       const std::string place = Place("images", i);
       if (image.contains("uri") == image.contains("bufferView")) {
@@ -94,8 +122,9 @@ class Packer {
         }
         continue;
       }
-      const std::vector<std::uint8_t> bytes = Fetch(image["uri"].get<std::string>(), place);
-      if (bytes.empty()) Refuse(file_, place, "is empty.");
+      const std::vector<std::uint8_t> bytes = FetchImage(image["uri"].get<std::string>(), place);
+      lost[i] = bytes.empty();
+      if (lost[i]) continue;
       const std::uint64_t begin = Align();
       Append(bytes);
       image.erase("uri");
@@ -103,15 +132,49 @@ class Packer {
       if (!image.contains("mimeType")) image["mimeType"] = bytes[0] == 0xFF ? "image/jpeg" : "image/png";
       (*root)["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", begin}, {"byteLength", bytes.size()}});
     }
+    if (std::find(lost.begin(), lost.end(), true) != lost.end()) RemoveImages(lost, root);
   }
 
   PackedGltf Finish(Json root) {
     root.erase("buffers");
     if (!bin_.empty()) root["buffers"] = Json::array({{{"byteLength", bin_.size()}}});
-    return {std::move(root), std::move(bin_), self_contained_};
+    return {std::move(root), std::move(bin_), self_contained_, std::move(warnings_)};
   }
 
  private:
+  // Appends the data of a buffer and returns its size. `used` says whether a buffer view refers to it.
+  std::uint64_t PackBuffer(std::size_t index, bool used, Json* buffer) {
+    const std::string place = Place("buffers", index);
+    const std::uint64_t claimed = (*buffer)["byteLength"].get<std::uint64_t>();
+    if (buffer->contains("uri")) {
+      const std::string uri = (*buffer)["uri"].get<std::string>();
+      if (!used && HasScheme(uri) && !IsDataUri(uri)) {
+        warnings_.push_back("The buffer '" + Shortened(uri) + "', which nothing uses, is left out.");
+        buffer->erase("uri");
+        self_contained_ = false;  // Then the packed file is kept, which does not name it.
+        return 0;
+      }
+      const std::vector<std::uint8_t> bytes = Fetch(uri, place);
+      Append(std::span(bytes).first(std::min<std::uint64_t>(claimed, bytes.size())));
+      return bytes.size();
+    }
+    if (index == 0 && container_.is_glb) {
+      if (!container_.bin) Refuse(file_, place, "has no uri, and the GLB file has no BIN chunk.");
+      Append(container_.bin->first(std::min<std::uint64_t>(claimed, container_.bin->size())));
+      return container_.bin->size();
+    }
+    if (!used) return 0;
+    // The content of such a buffer is undefined (§3.6.1.1). The limit keeps a small file from claiming much
+    // memory.
+    if (claimed > container_.json.size()) {
+      Refuse(file_, place, "names no data and claims more bytes than the whole file has.");
+    }
+    warnings_.push_back("The buffer " + std::to_string(index) + " names no data and is read as zeros.");
+    const std::vector<std::uint8_t> zeros(claimed, 0);
+    Append(zeros);
+    return claimed;
+  }
+
   // Pads to the largest alignment that glTF requires, and returns the offset of the next part.
   std::uint64_t Align() {
     bin_.resize((bin_.size() + 3) / 4 * 4);
@@ -127,21 +190,43 @@ class Packer {
   }
 
   std::vector<std::uint8_t> Fetch(const std::string& uri, const std::string& place) {
-    if (IsDataUri(uri)) {
-      std::optional<std::vector<std::uint8_t>> bytes = DecodeDataUri(uri);
-      if (!bytes) Refuse(file_, place + ".uri", "is a data URI that cannot be decoded.");
-      CountFetched(bytes->size());
-      return std::move(*bytes);
+    CheckAllowed(uri, place);
+    std::vector<std::uint8_t> bytes = Read(uri, place);
+    CountFetched(bytes.size());
+    return bytes;
+  }
+
+  // The bytes of an image; empty with a warning when they cannot be had, which costs its textures only.
+  std::vector<std::uint8_t> FetchImage(const std::string& uri, const std::string& place) {
+    CheckAllowed(uri, place);
+    std::string fault = "The image '" + Shortened(uri) + "' is empty.";
+    std::vector<std::uint8_t> bytes;
+    try {
+      bytes = Read(uri, place);
+    } catch (const Error& error) {
+      fault = error.what();
     }
+    if (bytes.empty()) warnings_.push_back(fault + " Its textures are left out.");
+    CountFetched(bytes.size());
+    return bytes;
+  }
+
+  // A model in a library must not refer to other files.
+  void CheckAllowed(const std::string& uri, const std::string& place) {
+    if (IsDataUri(uri)) return;
     self_contained_ = false;
     if (!folder_) {
       Refuse(file_, place,
              "refers to the file '" + Shortened(uri) + "', but a model in a library must be self-contained.");
     }
-    std::vector<std::uint8_t> bytes =
-        ReadFileBytes(ResolveUri(file_, place + ".uri", uri, *folder_), limits_.max_file_bytes);
-    CountFetched(bytes.size());
-    return bytes;
+  }
+
+  std::vector<std::uint8_t> Read(const std::string& uri, const std::string& place) const {
+    if (!IsDataUri(uri))
+      return ReadFileBytes(ResolveUri(file_, place + ".uri", uri, *folder_), limits_.max_file_bytes);
+    std::optional<std::vector<std::uint8_t>> bytes = DecodeDataUri(uri);
+    if (!bytes) Refuse(file_, place + ".uri", "is a data URI that cannot be decoded.");
+    return std::move(*bytes);
   }
 
   // Files that are read but not kept count too, because many small buffers may refer to one large file.
@@ -157,12 +242,13 @@ class Packer {
   }
 
   std::string_view file_;
-  std::optional<std::span<const std::uint8_t>> glb_bin_;
+  const GltfContainer& container_;
   const std::optional<std::filesystem::path>& folder_;
   const LoadLimits& limits_;
   std::vector<std::uint8_t> bin_;
   std::uint64_t fetched_bytes_ = 0;
   bool self_contained_ = true;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace
@@ -193,10 +279,9 @@ std::filesystem::path ResolveUri(std::string_view file, std::string_view place, 
   const std::optional<std::string> decoded = PercentDecode(uri);
   if (!decoded || decoded->empty() || decoded->find('\0') != std::string::npos)
     Refuse(file, place, "is not a file name: " + quoted + ".");
-  const bool has_scheme = decoded->substr(0, decoded->find('/')).find(':') != std::string::npos;
   const std::filesystem::path relative(*decoded);
   const bool climbs = std::find(relative.begin(), relative.end(), "..") != relative.end();
-  if (has_scheme || climbs || relative.is_absolute() || decoded->find('\\') != std::string::npos) {
+  if (HasScheme(*decoded) || climbs || relative.is_absolute() || decoded->find('\\') != std::string::npos) {
     Refuse(file, place, "points outside the model's folder: " + quoted + ".");
   }
   std::error_code code;
@@ -228,9 +313,9 @@ std::optional<std::vector<std::uint8_t>> DecodeDataUri(std::string_view uri) {
   return DecodeBase64(text);
 }
 
-PackedGltf PackGltf(std::string_view file, Json root, std::optional<std::span<const std::uint8_t>> bin,
+PackedGltf PackGltf(std::string_view file, Json root, const GltfContainer& container,
                     const std::optional<std::filesystem::path>& folder, const LoadLimits& limits) {
-  Packer packer(file, bin, folder, limits);
+  Packer packer(file, container, folder, limits);
   packer.PackBuffers(&root);
   packer.PackImages(&root);
   return packer.Finish(std::move(root));

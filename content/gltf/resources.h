@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "content/gltf/container.h"
 #include "content/gltf/json.h"
 
 // Collects the data that a glTF file refers to: its binary chunk, data URIs, and external files.
@@ -31,12 +32,14 @@ bool IsDataUri(std::string_view uri);
 struct PackedGltf {
   Json json;  // One buffer without URI (none when `bin` is empty); images by buffer view.
   std::vector<std::uint8_t> bin;
-  bool was_self_contained = true;  // False when other files were read.
+  bool was_self_contained = true;  // False when it referred to other files.
+  std::vector<std::string> warnings;
 };
 
 // Collects all data. `root` must have passed CheckSchema; buffer views are checked against the actual sizes
-// of their buffers. If `folder` is empty, only the binary chunk and data URIs are allowed.
-PackedGltf PackGltf(std::string_view file, Json root, std::optional<std::span<const std::uint8_t>> bin,
+// of their buffers. If `folder` is empty, only the binary chunk and data URIs are allowed. An image that
+// cannot be read is left out with a warning, and so is a buffer on another machine that nothing uses.
+PackedGltf PackGltf(std::string_view file, Json root, const GltfContainer& container,
                     const std::optional<std::filesystem::path>& folder, const LoadLimits& limits);
 
 }  // namespace docent::content

@@ -140,7 +140,7 @@ const Schema kSheen{
     {Object("sheenColorTexture", kTextureInfo), Object("sheenRoughnessTexture", kTextureInfo)}};
 const Schema kSpecular{
     {Object("specularTexture", kTextureInfo), Object("specularColorTexture", kTextureInfo)}};
-const Schema kTransmission{{Object("transmissionTexture", kTextureInfo)}};
+const Schema kTransmission{{Number("transmissionFactor", 0, 1), Object("transmissionTexture", kTextureInfo)}};
 const Schema kVolume{{Object("thicknessTexture", kTextureInfo)}};
 const Schema kMaterialExtensions{
     {Object("KHR_materials_pbrSpecularGlossiness", kSpecularGlossiness),
