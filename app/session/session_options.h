@@ -18,7 +18,8 @@ struct SessionOptions : engine::SystemOptions {
   Timestamp autosave_interval = std::chrono::seconds(10);
   // Idle maps in memory are adjusted while there is nothing else to do; needs `threaded`.
   bool maintenance = true;
-  // Content is hidden behind the surfaces of maps, as far as they are known. With `maintenance`, they are computed.
+  // Content is hidden behind the surfaces of maps, as far as they are known. With `maintenance`, they are
+  // computed.
   bool occlusion = true;
   double signpost_height = 0.12;  // ratio of its distance at placement
   double model_side = 0.2;        // the same for the largest side of a model without a scale
