@@ -45,6 +45,10 @@ bool HasScheme(std::string_view uri) {
   return uri.substr(0, uri.find('/')).find(':') != std::string_view::npos;
 }
 
+bool IsOnAnotherMachine(std::string_view uri) {
+  return uri.starts_with("http://") || uri.starts_with("https://");
+}
+
 // Changes the image that a texture or one of its extensions refers to; -1 removes the reference.
 void MoveSource(const std::vector<int>& place_of, Json* object) {
   const auto source = object->find("source");
@@ -148,7 +152,7 @@ class Packer {
     const std::uint64_t claimed = (*buffer)["byteLength"].get<std::uint64_t>();
     if (buffer->contains("uri")) {
       const std::string uri = (*buffer)["uri"].get<std::string>();
-      if (!used && HasScheme(uri) && !IsDataUri(uri)) {
+      if (!used && IsOnAnotherMachine(uri)) {
         warnings_.push_back("The buffer '" + Shortened(uri) + "', which nothing uses, is left out.");
         buffer->erase("uri");
         self_contained_ = false;  // Then the packed file is kept, which does not name it.
