@@ -47,7 +47,9 @@ std::shared_ptr<Model> FlatImageModel(const std::string& file, std::span<const s
   limits.max_image_side_px = kMaxImageSidePx;
   limits.max_image_pixels = kMaxImagePixels;
   std::uint64_t pixels_left = kMaxImagePixels;
-  return FlatModel(DecodeImage(file, "the file", bytes, limits, &pixels_left));
+  std::optional<Image> image = DecodeImage(file, "the file", bytes, limits, &pixels_left);
+  if (!image) Refuse(file, "", "the image " + ImageFault(bytes).value_or("cannot be decoded") + ".");
+  return FlatModel(std::move(*image));
 }
 
 std::shared_ptr<Model> FlatModel(Image image) {

@@ -82,7 +82,7 @@ TEST(GltfRepair, ABufferThatNamesNoDataIsZerosInATextButRefusedInAGlbWithoutItsC
   const auto model = LoadGltf("test.gltf", TextOf(json), std::nullopt).model;
   EXPECT_THAT(model->warnings, ElementsAre(HasSubstr("read as zeros")));
   EXPECT_EQ(model->bounds_max, glm::vec3(0));
-  EXPECT_THAT(ErrorOf([&] { AssetFromGlb("test.glb", MakeGlb(json.dump(), {})); }),
+  EXPECT_THAT(ErrorOf([&] { AssetFromBytes("test.glb", MakeGlb(json.dump(), {})); }),
               HasSubstr("no BIN chunk"));
   json["buffers"][0]["byteLength"] = 1'000'000;
   EXPECT_THAT(ErrorOf([&] { LoadGltf("test.gltf", TextOf(json), std::nullopt); }),
@@ -95,7 +95,7 @@ TEST(GltfRepair, ABufferOnAnotherMachineIsRefusedOnlyIfItIsUsed) {
   json["buffers"] = {{{"byteLength", file.bin.size()}}, {{"uri", "http://example.com/a"}, {"byteLength", 4}}};
   const auto load = [&] { return LoadGltf("test.glb", MakeGlb(json.dump(), file.bin), "."); };
   EXPECT_THAT(load().model->warnings, ElementsAre(HasSubstr("which nothing uses, is left out")));
-  EXPECT_NO_THROW(AssetFromGlb("packed.glb", load().glb)) << "the packed file does not name it";
+  EXPECT_NO_THROW(AssetFromBytes("packed.glb", load().glb)) << "the packed file does not name it";
   json["bufferViews"].push_back({{"buffer", 1}, {"byteLength", 4}});
   EXPECT_THAT(ErrorOf(load), HasSubstr("outside the model's folder"));
 }
@@ -188,7 +188,7 @@ TEST(GltfRepair, AnImageThatCannotBeShownCostsItsTexturesOnly) {
     ASSERT_GE(model.materials[0].normal_texture.texture, 0) << uri;
     EXPECT_EQ(model.images.size(), 1u) << uri;
     // The packed file needs nothing else and shows the same.
-    const Asset again = AssetFromGlb("again.glb", loaded.glb);
+    const Asset again = AssetFromBytes("again.glb", loaded.glb);
     EXPECT_EQ(again.model->materials[0].base_color_texture.texture, -1) << uri;
     EXPECT_EQ(again.model->images.size(), 1u) << uri;
   }

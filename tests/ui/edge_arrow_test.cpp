@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-engine::CameraModel Pinhole() {
+engine::CameraModel ArrowCamera() {
   engine::CameraModel::Intrinsics in;
   in.width_px = 640;
   in.height_px = 480;
@@ -29,18 +29,18 @@ double AngleToAxis(const Vector3d& point) {
 }
 
 TEST(EdgeArrow, IsAbsentForWhatIsSeen) {
-  EXPECT_FALSE(ArrowTowards(Pinhole(), {0, 0, 2}, 20));
-  EXPECT_FALSE(ArrowTowards(Pinhole(), {0.5, 0.3, 2}, 20));
-  EXPECT_TRUE(ArrowTowards(Pinhole(), {2.5, 0, 2}, 20));
-  EXPECT_TRUE(ArrowTowards(Pinhole(), {0, 0, -2}, 20)) << "behind the camera";
+  EXPECT_FALSE(ArrowTowards(ArrowCamera(), {0, 0, 2}, 20));
+  EXPECT_FALSE(ArrowTowards(ArrowCamera(), {0.5, 0.3, 2}, 20));
+  EXPECT_TRUE(ArrowTowards(ArrowCamera(), {2.5, 0, 2}, 20));
+  EXPECT_TRUE(ArrowTowards(ArrowCamera(), {0, 0, -2}, 20)) << "behind the camera";
 }
 
 TEST(EdgeArrow, LiesAtTheEdgeInTheDirectionOfThePoint) {
-  const auto right = ArrowTowards(Pinhole(), {5, 0, 1}, 20);
+  const auto right = ArrowTowards(ArrowCamera(), {5, 0, 1}, 20);
   ASSERT_TRUE(right);
   EXPECT_NEAR(right->tip.x(), 619, 1e-9);
   EXPECT_NEAR(right->tip.y(), 239.5, 1e-9);
-  const auto above = ArrowTowards(Pinhole(), {0, -5, -1}, 20);
+  const auto above = ArrowTowards(ArrowCamera(), {0, -5, -1}, 20);
   ASSERT_TRUE(above);
   EXPECT_NEAR(above->tip.x(), 319.5, 1e-9);
   EXPECT_NEAR(above->tip.y(), 20, 1e-9);
@@ -52,7 +52,7 @@ TEST(EdgeArrow, ShowsTheShortestWayToTurn) {
   int arrows = 0;
   for (int trial = 0; trial < 2000; ++trial) {
     const Vector3d point(random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(-3, 3));
-    const auto arrow = ArrowTowards(Pinhole(), point, 20);
+    const auto arrow = ArrowTowards(ArrowCamera(), point, 20);
     const double before = AngleToAxis(point);
     if (!arrow || before < 0.3 || before > std::numbers::pi - 0.01) continue;
     ++arrows;

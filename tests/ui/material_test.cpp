@@ -43,7 +43,7 @@ std::shared_ptr<const content::Model> Square(const std::string& material, const 
       R"("bufferViews":[{"buffer":0,"byteLength":128},{"buffer":0,"byteOffset":128,"byteLength":6}],)"
       R"("buffers":[{"byteLength":134,"uri":")" +
       DataUri(bytes) + R"("}],"materials":[{)" + material + "}]" + rest + "}";
-  return content::AssetFromGlb("square.gltf", {text.begin(), text.end()}).model;
+  return content::AssetFromBytes("square.gltf", {text.begin(), text.end()}).model;
 }
 
 // Two by two texels, red and green above blue and white, without filtering.

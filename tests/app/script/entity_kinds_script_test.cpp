@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "app/script/format_command.h"
 #include "app/script/scene_commands.h"
 #include "app/script/script_file.h"
 #include "engine/base/random.h"

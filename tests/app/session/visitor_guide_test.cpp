@@ -9,7 +9,7 @@ namespace docent::app {
 
 namespace {
 
-engine::CameraModel Pinhole() {
+engine::CameraModel GuideCamera() {
   engine::CameraModel::Intrinsics in;
   in.width_px = 640;
   in.height_px = 480;
@@ -33,13 +33,13 @@ content::Entity SignAt(const Eigen::Vector3d& place, std::uint64_t to_key, const
 TEST(WayOutOfSight, IsThatToTheSignpostThatTheCameraHasToTurnLeastFor) {
   content::Scene scene;
   scene.entities = {SignAt({-3, 0, -1}, 1, "Masks"), SignAt({3, 0, 1}, 2, "Lions")};
-  const auto way = WayOutOfSight(scene, Pinhole(), {});
+  const auto way = WayOutOfSight(scene, GuideCamera(), {});
   ASSERT_TRUE(way);
   EXPECT_EQ(way->text, "To Lions");
   EXPECT_GT(way->arrow.direction.x(), 0.99);
   // After half a turn the other one is nearer, now to the right as well.
   const engine::Rigid3 turned{engine::Rotation3::Exp({0, std::numbers::pi, 0}), {0, 0, 0}};
-  const auto other = WayOutOfSight(scene, Pinhole(), turned);
+  const auto other = WayOutOfSight(scene, GuideCamera(), turned);
   ASSERT_TRUE(other);
   EXPECT_EQ(other->text, "To Masks");
   EXPECT_GT(other->arrow.direction.x(), 0.99);
@@ -48,16 +48,16 @@ TEST(WayOutOfSight, IsThatToTheSignpostThatTheCameraHasToTurnLeastFor) {
 TEST(WayOutOfSight, IsNotShownWhereASignpostIsSeen) {
   content::Scene scene;
   scene.entities = {SignAt({-3, 0, -1}, 1, "Masks"), SignAt({0, 0, 2}, 2, "Lions")};
-  EXPECT_FALSE(WayOutOfSight(scene, Pinhole(), {}));
+  EXPECT_FALSE(WayOutOfSight(scene, GuideCamera(), {}));
   scene.entities.back().hidden = true;
-  EXPECT_TRUE(WayOutOfSight(scene, Pinhole(), {}));
+  EXPECT_TRUE(WayOutOfSight(scene, GuideCamera(), {}));
 }
 
 TEST(WayOutOfSight, IgnoresSignpostsThatLeadNowhere) {
   content::Scene scene;
-  EXPECT_FALSE(WayOutOfSight(scene, Pinhole(), {}));
+  EXPECT_FALSE(WayOutOfSight(scene, GuideCamera(), {}));
   scene.entities = {SignAt({3, 0, 1}, 0, "")};
-  EXPECT_FALSE(WayOutOfSight(scene, Pinhole(), {}));
+  EXPECT_FALSE(WayOutOfSight(scene, GuideCamera(), {}));
 }
 
 }  // namespace
