@@ -34,7 +34,7 @@ void main() {
   vec2 place = texelFetch(lookup, ivec2(gl_FragCoord.xy), 0).rg;
   if (place.x < 0.0) discard;
   color = textureLod(atlas, place, 0.0);
-  if (color.a == 0.0) discard;
+  if (color == vec4(0.0)) discard;  // A clear surface only adds its reflection.
 }
 )glsl";
 

@@ -148,7 +148,7 @@ std::vector<Session::SimilarView> Session::SimilarViews(const engine::Frame& fra
   // Candidates of maps that are not in memory are left out, so more are asked for.
   const int asked = 4 * static_cast<int>(count);
   std::vector<SimilarView> views;
-  for (const auto& place : system_.place_index().FindPlaces(thumbnail, asked, asked, 0)) {
+  for (const auto& place : system_.place_index().FindPlaces(thumbnail, asked, 1, 0)) {
     if (views.size() >= count) break;
     if (!place.map) continue;
     const auto& keyframes = place.map->keyframes;

@@ -52,7 +52,7 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "15 map rename Desk Bureau\n"
       "16 map remove Bureau\n",
       "script");
-  ASSERT_EQ(commands.size(), 35u);
+  ASSERT_EQ(commands.size(), 40u);
   EXPECT_EQ(commands[0].command, Command(NewMap{"Desk 3"}));
   EXPECT_EQ(commands[0].line, 2);
   EXPECT_EQ(commands[1].time, std::chrono::milliseconds(1500));

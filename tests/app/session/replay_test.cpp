@@ -73,14 +73,16 @@ std::vector<Planned> EveryCommand() {
   then(MoveEntity{"trail-1", {0.01, 0, 0}, std::nullopt});
   then(DuplicateEntities{{"label-1", "plan", "bell", "trail-1"}});
   then(RemoveEntities{{"exhibit-2"}});
+  then(SetMapScale{pixel, other, 0.5});
+  then(SetMapUp{other});
   then(Undo{});
   then(Redo{});
   then(SetPolicy{"First hall", maps::Policy::kAugmentOnly});
   then(SetPolicy{"First hall", maps::Policy::kOpen});
   then(Save{});
   then(StopMap{});
-  plan.push_back({2.4, NewMap{"Second hall"}});
-  seconds = 4.4;
+  plan.push_back({2.5, NewMap{"Second hall"}});
+  seconds = 4.5;
   then(PlaceSignpost{"back", pixel, "First hall"});
   then(SetSignpostTarget{"sign-1", ""});
   then(SetSignpostTarget{"sign-1", "First hall"});
