@@ -233,8 +233,8 @@ TEST_F(InterfaceOnScreen, TheListSelects) {
   facts_.scene = &scene;
   facts_.map_name = "Hall";
   Draw();
-  // Somewhere below the middle of the panel are the rows: clicks from top to bottom meet both in order.
-  for (double y = 200; y < 640 && asked_.words.size() < 1; y += 14) Click({layout_.panel.x + 40, y});
+  // The rows are below the header of the list: clicks from top to bottom meet both in order.
+  for (double y = 322; y < 640 && asked_.words.size() < 1; y += 14) Click({layout_.panel.x + 40, y});
   EXPECT_THAT(asked_.words, ElementsAre("select sign-1"));
 }
 
