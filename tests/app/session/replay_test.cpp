@@ -74,7 +74,7 @@ std::vector<Planned> EveryCommand() {
   then(DuplicateEntities{{"label-1", "plan", "bell", "trail-1"}});
   then(RemoveEntities{{"exhibit-2"}});
   then(SetMapScale{pixel, other, 0.5});
-  then(SetMapUp{Eigen::Vector2d(320, 440)});  // The floor.
+  then(SetMapUp{Eigen::Vector2d(600, 400)});  // The floor.
   then(Undo{});
   then(Redo{});
   then(SetPolicy{"First hall", maps::Policy::kAugmentOnly});
