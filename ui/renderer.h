@@ -28,7 +28,7 @@ struct VisitorDisplay {
   bool is_searching = false;       // The place is not known, and an animation asks to look around.
   std::string sentence;            // What to do; empty for nothing.
   std::vector<std::string> stops;  // The known places by name, as a help to find one.
-  std::optional<WayOn> way_on;
+  std::optional<WayOn> way_on;     // Shown if it is given.
   // Images of known places that resemble what the camera sees (CV_8UC1 or CV_8UC3), which are drawn beside
   // each other.
   std::vector<cv::Mat> views;
