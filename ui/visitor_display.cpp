@@ -30,7 +30,7 @@ void DrawPlace(const std::string& place, double unit, Canvas* canvas) {
   canvas->Text(place, style, corner + padding);
 }
 
-// The name of a place in the middle of the image, in large letters.
+// The name of a place in large letters, above what usually stands in the middle of the image.
 void DrawArrival(const std::string& place, double opacity, double unit, Canvas* canvas) {
   if (place.empty() || opacity <= 0) return;
   TextStyle style;
@@ -41,7 +41,7 @@ void DrawArrival(const std::string& place, double opacity, double unit, Canvas* 
   style.max_height_px = std::max(20, static_cast<int>(0.4 * canvas->height_px()));
   style.color = Faded(kTitle, opacity);
   const Eigen::Vector2d size = canvas->Measure(place, style), padding(24 * unit, 14 * unit);
-  const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.38 * canvas->height_px());
+  const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.2 * canvas->height_px());
   canvas->Box(middle - 0.5 * size - padding, middle + 0.5 * size + padding, 14 * unit,
               Faded(kBoard, opacity));
   canvas->Text(place, style, {middle.x(), middle.y() - 0.5 * size.y()}, 0.5);
