@@ -205,7 +205,7 @@ inline constexpr KeyHelp kKeyHelp[] = {
     {"Drag", "move over the ground"},
     {"Ctrl (drag)", "in steps"},
     {"Arrows", "move a little"},
-    {"1, 2, 3", "select, model, signpost"},
+    {"1 to 7", "the tools, in their order"},
     {"4, 5, 6, 7", "label, image, sound, trail"},
     {"Delete", "remove"},
     {"Ctrl-D", "duplicate"},
