@@ -9,6 +9,8 @@
 #include <turbojpeg.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -265,10 +267,13 @@ int NumberOf(const cv::Mat& image) {
   return number;
 }
 
-// Feeds Motion-JPEG images into the loopback device until destruction.
+// Feeds Motion-JPEG images into the loopback device until destruction. The loopback driver writes over images that
+// nobody has fetched, so that on a busy machine any number of them may be lost. A test that counts them names the last
+// one that it received, and the feeder then stays at most two images ahead of it, unless `longest_wait` passes.
 class JpegFeeder {
  public:
-  JpegFeeder() : file_(open(kLoopback, O_RDWR)) {
+  explicit JpegFeeder(std::chrono::milliseconds longest_wait = std::chrono::milliseconds(0))
+      : file_(open(kLoopback, O_RDWR)) {
     v4l2_format format{};
     format.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
     format.fmt.pix.width = 640;
@@ -288,11 +293,15 @@ class JpegFeeder {
     }
     tjDestroy(encoder);
     EXPECT_GT(write(file_, images_[0].data(), images_[0].size()), 0);
-    worker_.emplace("feeder", [this](const std::stop_token& stop) {
-      for (std::size_t number = 1; !stop.stop_requested(); ++number) {
-        const auto& bytes = images_[number % images_.size()];
+    worker_.emplace("feeder", [this, longest_wait](const std::stop_token& stop) {
+      for (int number = 1; !stop.stop_requested(); number = (number + 1) % kNumbers) {
+        const auto& bytes = images_[static_cast<std::size_t>(number)];
         if (write(file_, bytes.data(), bytes.size()) < 0) return;
         std::this_thread::sleep_for(std::chrono::milliseconds(40));
+        const auto end = std::chrono::steady_clock::now() + longest_wait;
+        while ((number - received_ + kNumbers) % kNumbers > 2 && std::chrono::steady_clock::now() < end) {
+          std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
       }
     });
   }
@@ -301,14 +310,17 @@ class JpegFeeder {
     close(file_);
   }
 
+  void Received(int number) { received_ = number; }
+
  private:
   int file_;
   std::vector<std::vector<unsigned char>> images_;
+  std::atomic<int> received_{0};
   std::optional<Worker> worker_;
 };
 
 TEST(Loopback, DeliversSixtyMotionJpegImagesInOrder) {
-  const JpegFeeder feeder;
+  JpegFeeder feeder(std::chrono::seconds(2));
   const auto source = OpenDevice(kLoopback, Options(V4L2_PIX_FMT_MJPEG));
   engine::Frame frame;
   std::vector<int> steps;
@@ -319,6 +331,7 @@ TEST(Loopback, DeliversSixtyMotionJpegImagesInOrder) {
     const int number = NumberOf(frame.image);
     if (last >= 0) steps.push_back((number - last + kNumbers) % kNumbers);
     last = number;
+    feeder.Received(number);
   }
   // The images must be in order without repetition; a slow machine may skip some.
   for (const int step : steps) EXPECT_TRUE(step >= 1 && step < kNumbers / 2) << step;
