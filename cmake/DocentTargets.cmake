@@ -45,6 +45,11 @@ target_compile_options(docent_compile_options INTERFACE -Wall -Wextra -Wpedantic
 if(DOCENT_SANITIZE)  # a plain if: the comma of "address,undefined" would end a generator expression
   target_compile_options(docent_compile_options INTERFACE -fsanitize=${DOCENT_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(docent_compile_options INTERFACE -fsanitize=${DOCENT_SANITIZE})
+  # Half of the time that clang needs for Eigen's templates. A null pointer that is used ends the program under ASan in
+  # any case, ASan also knows the bounds of objects, and nothing here casts down without dynamic_cast.
+  if(DOCENT_SANITIZE MATCHES "undefined")
+    target_compile_options(docent_compile_options INTERFACE -fno-sanitize=null,object-size,vptr -fno-sanitize-recover=all)
+  endif()
 endif()
 target_include_directories(docent_compile_options INTERFACE "${PROJECT_SOURCE_DIR}")
 # Eigen aligns and allocates as the machine flags of the including file suggest, and headers of an installed Docent are

@@ -36,7 +36,7 @@ struct DepthOptions {
 class DepthEstimator {
  public:
   // Throws Error if the options are invalid.
-  DepthEstimator(std::shared_ptr<const MapSnapshot> map, const DepthOptions& options = {});
+  explicit DepthEstimator(std::shared_ptr<const MapSnapshot> map, const DepthOptions& options = {});
 
   // The keyframes whose depth can be estimated.
   const std::vector<DepthViews>& views() const { return views_; }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -47,7 +48,7 @@ struct DepthMap {
 // The inverse distance at a pixel (of the level, not rounded) of the nearest whole pixel; 0 if it is not
 // known or outside.
 inline float InverseDistanceAt(const DepthMap& depth, const Eigen::Vector2d& pixel) {
-  const int x = static_cast<int>(pixel.x() + 0.5), y = static_cast<int>(pixel.y() + 0.5);
+  const auto x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
   if (x < 0 || y < 0 || x >= depth.inverse_distance.cols || y >= depth.inverse_distance.rows) return 0;
   return depth.inverse_distance.at<float>(y, x);
 }

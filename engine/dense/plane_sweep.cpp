@@ -76,6 +76,8 @@ void WarpImage(const cv::Mat& image, const PlanePixels& from, const PlanePixels&
     const std::uint8_t* const lower = image.ptr<std::uint8_t>(row + 1) + column;
     const float above = static_cast<float>(upper[0]) + across * static_cast<float>(upper[1] - upper[0]);
     const float below = static_cast<float>(lower[0]) + across * static_cast<float>(lower[1] - lower[0]);
+    // Grey levels are never negative, and std::lround is slow.
+    // NOLINTNEXTLINE(bugprone-incorrect-roundings)
     (*warped)[i] = static_cast<std::int16_t>(kGreyScale * (above + down * (below - above)) + 0.5F);
   }
 }

@@ -125,8 +125,11 @@ Wall PaintedWall(const Eigen::Vector3d& center, const Eigen::Vector3d& right, co
   cv::Mat paint(rows, columns, CV_8UC1, cv::Scalar(random.Uniform(90, 160)));
   const int figures = static_cast<int>(160 * 4 * half_width * half_height);
   for (int i = 0; i < figures; ++i) {
-    const cv::Point2f middle(static_cast<float>(random.Uniform(0, columns)),
-                             static_cast<float>(random.Uniform(0, rows)));
+    // One after the other, because compilers evaluate arguments in different orders, and the wall must be the
+    // same.
+    const auto y = static_cast<float>(random.Uniform(0, rows));
+    const auto x = static_cast<float>(random.Uniform(0, columns));
+    const cv::Point2f middle(x, y);
     const double size = 0.03 * std::pow(6.0, random.Uniform() * random.Uniform()) / kTexelSize;
     const cv::Size2f extent(static_cast<float>(size), static_cast<float>(size * random.Uniform(0.4, 1)));
     const cv::RotatedRect box(middle, extent, static_cast<float>(random.Uniform(0, 180)));
@@ -322,7 +325,9 @@ std::shared_ptr<const MapSnapshot> MapWithDisplacedPoints(const RenderedWorld& w
   Map map = TrueMap(world, camera, views);
   Random random(1);
   for (std::size_t i = 0; i < map.points().size(); ++i) {
-    const Eigen::Vector3d offset_in_map(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5), 0);
+    const double offset_y = random.Uniform(-0.5, 0.5);
+    const double offset_x = random.Uniform(-0.5, 0.5);
+    const Eigen::Vector3d offset_in_map(offset_x, offset_y, 0);
     if (displaced(i)) map.points()[i].point.point_in_map.head<3>() += offset_in_map;
   }
   for (auto& [id, record] : map.keyframes()) map.UpdateDepth(&record);

@@ -29,6 +29,14 @@ inline double RandomNormal(Random* random) {
   return radius * std::cos(2 * kPi * random->Uniform());
 }
 
+// Two of them. They are drawn one after the other, because compilers evaluate the arguments of a call in
+// different orders, and a scene must be the same with all of them.
+inline Eigen::Vector2d RandomNormals(Random* random) {
+  const double second = RandomNormal(random);
+  const double first = RandomNormal(random);
+  return {first, second};
+}
+
 // Each component is uniform in [-size, size).
 inline Eigen::Vector3d RandomVector(Random* random, double size) {
   return {random->Uniform(-size, size), random->Uniform(-size, size), random->Uniform(-size, size)};

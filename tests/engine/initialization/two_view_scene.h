@@ -56,8 +56,7 @@ inline TwoViews MakeTwoViews(const DepthAlong& depth_along, const Rigid3& b_from
   TwoViews views;
   views.b_from_a = b_from_a;
   const auto read = [&](const Eigen::Vector2d& pixel) {
-    const Eigen::Vector3d ray =
-        RayOfPixel(pixel + options.noise_px * Eigen::Vector2d(RandomNormal(random), RandomNormal(random)));
+    const Eigen::Vector3d ray = RayOfPixel(pixel + options.noise_px * RandomNormals(random));
     return Eigen::Vector3d(ray.x(), ray.y(), ray.z() * options.focal_error).normalized();
   };
   for (int attempt = 0;

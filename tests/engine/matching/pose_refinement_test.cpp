@@ -34,7 +34,9 @@ Rigid3 Perturbed(Random* random, double distance_m, double angle_deg) {
 void AddMeasurements(int count, double noise_sigmas, bool infinite, Random* random,
                      std::vector<PoseMeasurement>* measurements) {
   for (int i = 0; i < count; ++i) {
-    const Eigen::Vector2d pixel(random->Uniform(10, 630), random->Uniform(10, 470));
+    const double y = random->Uniform(10, 470);  // one after the other; see RandomNormals
+    const double x = random->Uniform(10, 630);
+    const Eigen::Vector2d pixel(x, y);
     const double sigma = 1 << random->Below(4);
     PoseMeasurement measurement;
     const Eigen::Vector3d ray = *kLens.Unproject(pixel);
@@ -43,8 +45,7 @@ void AddMeasurements(int count, double noise_sigmas, bool infinite, Random* rand
     } else {
       measurement.point_in_map << TruePose().inverse() * Eigen::Vector3d(random->Uniform(1, 4) * ray), 1;
     }
-    measurement.pixel =
-        pixel + noise_sigmas * sigma * Eigen::Vector2d(RandomNormal(random), RandomNormal(random));
+    measurement.pixel = pixel + noise_sigmas * sigma * RandomNormals(random);
     measurement.inverse_sigma = 1 / sigma;
     measurements->push_back(measurement);
   }
@@ -347,7 +348,7 @@ void AddPointsAtTheBorder(int count, const Rigid3& seen_from, Random* random,
     measurement.point_in_map << seen_from.inverse() *
                                     Eigen::Vector3d(random->Uniform(2.5, 3) * *kLens.Unproject(pixel)),
         1;
-    measurement.pixel = pixel + Eigen::Vector2d(RandomNormal(random), RandomNormal(random));
+    measurement.pixel = pixel + RandomNormals(random);
     measurements->push_back(measurement);
   }
 }

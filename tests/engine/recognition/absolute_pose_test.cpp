@@ -39,7 +39,7 @@ AbsoluteView MakeView(int count, double noise_px, double outlier_ratio, Random* 
     const auto pixel = PixelOfPoint(x);
     if (!pixel) continue;
     const bool correct = random->Uniform() >= outlier_ratio;
-    const Eigen::Vector2d noise(noise_px * RandomNormal(random), noise_px * RandomNormal(random));
+    const Eigen::Vector2d noise = noise_px * RandomNormals(random);
     view.rays.push_back(RayOfPixel(correct ? *pixel + noise : RandomPixel(random)));
     view.points.push_back(view.camera_from_map.inverse() * x);
     view.correct.push_back(correct);

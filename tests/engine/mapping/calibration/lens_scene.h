@@ -63,7 +63,7 @@ inline LensScene MakeLensScene(const LensSceneOptions& options) {
     for (std::size_t p = 0; p < points.size(); ++p) {
       const auto pixel = scene.lens.Project(cameras[c] * points[p]);
       if (!pixel || !scene.lens.IsInside(*pixel)) continue;
-      Eigen::Vector2d error(RandomNormal(&random), RandomNormal(&random));
+      Eigen::Vector2d error = RandomNormals(&random);
       error *= options.noise_px;
       error += growth * (*pixel - Eigen::Vector2d(319.5, 239.5)) / 400;
       if (random.Uniform() < options.outlier_ratio)
