@@ -55,9 +55,14 @@ inline constexpr const char* kMapSize = "%lu keyframes, %lu objects";
 inline constexpr const char* kNotInMemory = "Saved in the library, not in memory.";
 inline constexpr const char* kContinueMap = "Continue this map";
 inline constexpr const char* kPolicy = "Changes";
+inline constexpr const char* kJoinMap = "Join to this map";
+inline constexpr const char* kJoinMapHelp =
+    "Makes one map of both, with the content of both, if they show the same place. Otherwise both stay as "
+    "they are.";
 inline constexpr const char* kRemoveMap = "Remove map…";
 inline constexpr const char* kRemoveMapQuestion =
-    "Remove this map with everything in it? This cannot be undone. Signposts to it will lead nowhere.";
+    "Remove this map with everything in it? This cannot be undone. Signposts to it will lead nowhere, "
+    "and tours will leave it out.";
 inline constexpr const char* kRemoveMapNow = "Remove for good";
 struct PolicyText {
   const char* policy;  // Its name on the command line.
@@ -162,6 +167,26 @@ inline constexpr const char* kDuplicate = "Duplicate";
 inline constexpr const char* kCopy = "Copy";
 inline constexpr const char* kPaste = "Paste";
 inline constexpr const char* kDelete = "Delete";
+inline constexpr const char* kStandUpright = "Stand upright";
+inline constexpr const char* kFit = "Fit by points…";
+inline constexpr const char* kFitHelp =
+    "Click points of the object and the places where they belong; then it is moved, turned and scaled to "
+    "fit.";
+inline constexpr const char* kFitting = "Fitting %s";
+inline constexpr const char* kFitClickObject = "Click a point on the object.";
+inline constexpr const char* kFitClickPlace = "Now click the place where this point belongs.";
+inline constexpr const char* kFitPairs = "Pairs of points: %d";
+inline constexpr const char* kFitNeeds = "Three pairs are needed to fit it, four to bend it.";
+inline constexpr const char* kFitPair = "%d: %.3g map units off";
+inline constexpr const char* kFitPairUnused = "%d: %.3g map units off, left out";
+inline constexpr const char* kFitFull = "No more pairs are possible.";
+inline constexpr const char* kFitMissed = "This is not on the object.";
+inline constexpr const char* kFitAlign = "Fit";
+inline constexpr const char* kFitBend = "Bend to fit";
+inline constexpr const char* kFitBendHelp = "Deforms the object smoothly so that every pair fits exactly.";
+inline constexpr const char* kFitRemoveLast = "Remove last point";
+inline constexpr const char* kFitEnd = "Done";
+inline constexpr const char* kUnbend = "Undo bending";
 inline constexpr const char* kLock = "Lock";
 inline constexpr const char* kUnlock = "Unlock";
 inline constexpr const char* kHide = "Hide";
@@ -178,6 +203,8 @@ inline constexpr const char* kKeyframes = "Keyframes";
 inline constexpr const char* kStatus = "Status";
 inline constexpr const char* kFromAbove = "Map from above";
 inline constexpr const char* kCoverage = "Coverage";
+inline constexpr const char* kBoundary = "Boundary";
+inline constexpr const char* kBoundaryHelp = "The edges of the box within which a bounded map is extended.";
 inline constexpr const char* kCoverageHelp =
     "A small map: visitors will be recognised where it is green; take more images where it is red.";
 inline constexpr const char* kFullScreen = "Full screen";
@@ -211,7 +238,7 @@ inline constexpr KeyHelp kKeyHelp[] = {
     {"Ctrl-D", "duplicate"},
     {"Ctrl-C, Ctrl-V", "copy, paste"},
     {"Ctrl-Z, Ctrl-Y", "undo, redo"},
-    {"F2", "rename"},
+    {"F2", "rename what is selected, else the map"},
     {"Escape", "end, close or deselect"},
     {"Tab", "use the panel by keyboard"},
     {"F", "freeze the view"},

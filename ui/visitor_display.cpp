@@ -15,19 +15,27 @@ namespace {
 constexpr Color kBoard = theme::kHeadsUp, kTitle = theme::kText;
 constexpr Color kWay{1.0f, 0.84f, 0.45f, 1.0f};
 
-// The place in the corner, which stays while the visitor is there.
-void DrawPlace(const std::string& place, double unit, Canvas* canvas) {
-  if (place.empty()) return;
+struct CornerStyle {
+  double size_px;
+  bool bold;
+};
+
+// A line in the corner, as the place, which stays while the visitor is there. Returns where the next one
+// below can begin.
+double DrawInCorner(const std::string& text, double top, const CornerStyle& look, double unit,
+                    Canvas* canvas) {
+  if (text.empty()) return top;
   TextStyle style;
-  style.size_px = 18 * unit;
-  style.bold = true;
+  style.size_px = look.size_px;
+  style.bold = look.bold;
   style.max_width_px = std::max(40, static_cast<int>(0.6 * canvas->width_px()));
   style.max_height_px = static_cast<int>(32 * unit);
   style.color = kTitle;
-  const Eigen::Vector2d size = canvas->Measure(place, style);
-  const Eigen::Vector2d corner(10 * unit, 10 * unit), padding(12 * unit, 7 * unit);
+  const Eigen::Vector2d size = canvas->Measure(text, style);
+  const Eigen::Vector2d corner(10 * unit, top), padding(12 * unit, 7 * unit);
   canvas->Box(corner, corner + size + 2 * padding, 9 * unit, kBoard);
-  canvas->Text(place, style, corner + padding);
+  canvas->Text(text, style, corner + padding);
+  return corner.y() + size.y() + 2 * padding.y() + 6 * unit;
 }
 
 // The name of a place in large letters, above what usually stands in the middle of the image.
@@ -74,15 +82,16 @@ void DrawWayOn(const WayOn& way, const engine::CameraModel& camera, double unit,
   canvas->Text(way.text, style, middle - 0.5 * size);
 }
 
-// Names below each other in the upper half of the image. Those that do not fit are counted in the last line.
-void DrawStops(const std::vector<std::string>& stops, double unit, Canvas* canvas) {
+// Names below each other in the upper half of the image, at least as low as `highest`. The last line says if
+// some do not fit.
+void DrawStops(const std::vector<std::string>& stops, double highest, double unit, Canvas* canvas) {
   if (stops.empty()) return;
   TextStyle style;
   style.size_px = 20 * unit;
   style.max_width_px = std::max(40, static_cast<int>(0.7 * canvas->width_px()));
   style.max_height_px = static_cast<int>(34 * unit);
   style.color = kTitle;
-  const double line = 30 * unit, top = 0.12 * canvas->height_px();
+  const double line = 30 * unit, top = std::max(0.12 * canvas->height_px(), highest + 10 * unit);
   const auto most = static_cast<std::size_t>(std::max(1.0, 0.34 * canvas->height_px() / line));
   std::vector<std::string> lines(stops.begin(), stops.begin() + std::min(most, stops.size()));
   if (stops.size() > most) lines.back() = "…";
@@ -125,10 +134,15 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
         0.5 * (canvas->width_px() - 1),
         (visitor.stops.empty() && visitor.views.empty() ? 0.5 : 0.66) * canvas->height_px());
     DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
-    DrawStops(visitor.stops, unit, canvas);
   }
   if (visitor.way_on && view.camera != nullptr) DrawWayOn(*visitor.way_on, *view.camera, unit, canvas);
-  DrawPlace(visitor.place, unit, canvas);
+  const double top = DrawInCorner(visitor.place, 10 * unit, {18 * unit, true}, unit, canvas);
+  // The announcement of a place can be as wide as the image, and is not drawn over other words.
+  const std::string line = visitor.arrival > 0 ? std::string() : visitor.route_line;
+  const double below = DrawInCorner(line, top, {16 * unit, false}, unit, canvas);
+  if (visitor.is_searching || visitor.lists_route)
+    DrawStops(visitor.stops.empty() && visitor.lists_route ? visitor.route_stops : visitor.stops, below, unit,
+              canvas);
   DrawArrival(visitor.place, visitor.arrival, unit, canvas);
   const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;
   DrawSentence(visitor.sentence, 20, bottom, unit, canvas);

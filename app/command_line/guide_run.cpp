@@ -9,6 +9,8 @@
 #include "app/command_line/interruption.h"
 #include "app/files/text_file.h"
 #include "app/output/engine_text.h"
+#include "app/script/format_command.h"
+#include "app/session/route_text.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -38,10 +40,14 @@ std::vector<std::shared_ptr<const engine::CameraModel>> ModelsOf(std::span<Calib
   return models;
 }
 
-std::vector<std::string> StopNames(const maps::Library* library) {
+// The maps where a visitor can be: the stops of the tour, or all.
+std::vector<std::string> PlaceNames(const GuideRequest& request) {
   std::vector<std::string> names;
-  if (library == nullptr) return names;
-  for (const maps::MapInfo& map : library->List()) names.push_back(map.name);
+  if (request.route) {
+    for (const RouteStop& stop : request.route->stops) names.push_back(stop.name);
+  } else if (request.library != nullptr) {
+    for (const maps::MapInfo& map : request.library->List()) names.push_back(map.name);
+  }
   return names;
 }
 
@@ -72,6 +78,7 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
       camera_states_(cameras.size()),
       sound_director_(request.language) {
   if (request.sound) sound_player_.emplace();
+  if (request.route) route_.emplace(*request.route);
   for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
   if (!request.head) return;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -173,7 +180,8 @@ void GuideRun::WarnAboutUnknownLenses() {
 
 CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   CameraState& state = camera_states_[i];
-  if (!request_.may_write) state.visitor.emplace(&session_, StopNames(request_.library));
+  if (!request_.may_write)
+    state.visitor.emplace(&session_, PlaceNames(request_), route_ ? &*route_ : nullptr);
   CameraRun run;
   run.camera = &cameras_[i];
   run.options.pace = request_.pace;
@@ -184,6 +192,9 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   }
   run.options.model_folder = request_.model_folder;
   run.options.inbox = &inboxes_[i];
+  run.options.take = [this](const Command& command, const engine::TrackedFrame& frame) {
+    return LeadVisitor(command, frame);
+  };
   run.options.refused = [this, &state](const std::string& reason) { HandleRefused(reason, &state); };
   run.options.carried_out = [this, &state](const TimedCommand& command) {
     HandleCarriedOut(command, &state);
@@ -202,8 +213,28 @@ void GuideRun::HandleRefused(const std::string& reason, CameraState* state) {
   if (has_author_window()) {
     notices_.Push({SentenceOf(reason), std::nullopt});
   } else {
-    state->message = reason;
+    constexpr double kShown_s = 5;
+    state->message = SentenceOf(reason);
+    if (state->last) state->message_end_s = state->last->seconds + kShown_s;
   }
+}
+
+bool GuideRun::LeadVisitor(const Command& command, const engine::TrackedFrame& frame) {
+  const auto* const guide = std::get_if<GuideVisitor>(&command);
+  if (guide == nullptr || !route_) return false;
+  const std::scoped_lock lock(files_mutex_);
+  if (guide->step == GuideVisitor::Step::kSkip && !route_->Skip()) throw Error("there is no further stop");
+  if (guide->step == GuideVisitor::Step::kBack && !route_->GoBack())
+    throw Error("there is no stop before this one");
+  files_->Add({Event{frame.frame.time, "command", FormatCommand(command)}});
+  AddRouteEvents(frame.frame.time);
+  return true;
+}
+
+void GuideRun::AddRouteEvents(Timestamp time) {
+  if (!route_) return;
+  for (const RouteEvent& event : route_->TakeEvents())
+    files_->Add({Event{time, "tour", TextOf(event, *route_)}});
 }
 
 void GuideRun::HandleCarriedOut(const TimedCommand& command, CameraState* state) {
@@ -219,6 +250,7 @@ void GuideRun::HandleCarriedOut(const TimedCommand& command, CameraState* state)
 void GuideRun::HandleTrouble(const std::string& sentence, Timestamp time, const Show& show,
                              CameraState* state) {
   state->message = sentence;
+  state->message_end_s.reset();
   {
     const std::scoped_lock lock(files_mutex_);
     files_->Add({Event{time, "camera", sentence.empty() ? "The camera is back." : sentence}});
@@ -299,12 +331,17 @@ std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& trac
   if (lens) frame->camera = lens->model;
   if (!state->first_time) state->first_time = tracked.frame.time;
   frame->seconds = ToSeconds(tracked.frame.time - *state->first_time);
+  if (state->message_end_s && frame->seconds > *state->message_end_s) {
+    state->message.clear();
+    state->message_end_s.reset();
+  }
   frame->message = state->message;
   // What the window shows as a warning already is not shown twice.
   if (state->message.empty() && !warnings_.contains(frame->shown.advice))
     frame->message = frame->shown.advice;
   if (state->visitor)
     state->visitor->Guide(frame, frame->camera ? *frame->camera : *cameras_[CameraOf(tracked)].model);
+  AddRouteEvents(tracked.frame.time);
   if (tracked.frame.camera == 0) PlaySounds(frame.get());
   return frame;
 }

@@ -50,6 +50,7 @@ class GuideRun {
     std::optional<Timestamp> first_time;
     std::optional<Timestamp> age;  // Age of the last tracked image when its tracking ended.
     std::string message;
+    std::optional<double> message_end_s;  // When a visitor no longer needs it; empty for never.
     std::shared_ptr<const ShownFrame> last;
     std::optional<VisitorGuide> visitor;  // Only on a tour.
   };
@@ -57,6 +58,9 @@ class GuideRun {
   void WarnAboutUnknownLenses();
   CameraRun RunOf(std::size_t i, const Show& show);
   void HandleRefused(const std::string& reason, CameraState* state);
+  bool LeadVisitor(const Command& command, const engine::TrackedFrame& frame);
+  // What happened on the tour, with files_mutex_ held.
+  void AddRouteEvents(Timestamp time);
   void HandleCarriedOut(const TimedCommand& command, CameraState* state);
   void HandleTrouble(const std::string& sentence, Timestamp time, const Show& show, CameraState* state);
   void HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state);
@@ -78,7 +82,8 @@ class GuideRun {
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
   NoticeQueue notices_;
-  std::mutex files_mutex_;            // Guards files_, tallies_ and warnings_.
+  std::mutex files_mutex_;            // Guards files_, tallies_, warnings_ and route_.
+  std::optional<RouteState> route_;   // Only on a tour with stops.
   std::set<std::string> warnings_;    // Those that the window was told of.
   std::vector<CameraTally> tallies_;  // By camera.
   std::optional<GuideFiles> files_;

@@ -152,7 +152,8 @@ class GuideWindow {
     view.overlay.keyframes = keyframes_;
     view.overlay.status = status_;
     if (details_) view.overlay.visitor.reset();
-    if (!status_ && view.overlay.visitor) view.overlay.visitor->place.clear();
+    if (!status_ && view.overlay.visitor) HideStatus(&*view.overlay.visitor);
+    if (view.overlay.visitor) view.overlay.visitor->lists_route = lists_route_;
     if (controls_) {
       const ui::AuthoringChoices& choices = controls_->choices();
       view.overlay.points = choices.show_points;
@@ -162,6 +163,11 @@ class GuideWindow {
       view.scene = controls_->Preview().get();
     }
     return view;
+  }
+
+  static void HideStatus(ui::VisitorDisplay* visitor) {
+    visitor->place.clear();
+    visitor->route_line.clear();
   }
 
   bool NeedsDrawing() {
@@ -319,7 +325,14 @@ class GuideWindow {
     if (event.key == "k") keyframes_ = !keyframes_;
     if (event.key == "h") status_ = !status_;
     if (event.key == "d") details_ = !details_;
+    if (request_.route) HandleRouteKey(event.key);
     redraw_ = true;
+  }
+
+  void HandleRouteKey(const std::string& key) {
+    if (key == "n") Emit(GuideVisitor{GuideVisitor::Step::kSkip});
+    if (key == "b") Emit(GuideVisitor{GuideVisitor::Step::kBack});
+    if (key == "l") lists_route_ = !lists_route_;
   }
 
   bool HasFirstCameraSize(const cv::Mat& image) const {
@@ -348,6 +361,7 @@ class GuideWindow {
   double message_height_ = 0;            // Window units.
   cv::Mat image_;
   bool points_ = false, keyframes_ = false, status_ = true, details_ = false;  // Of a tour.
+  bool lists_route_ = false;
   bool closing_ = false, redraw_ = false, was_frozen_ = false, showed_map_ = false;
 };
 

@@ -8,6 +8,7 @@
 
 #include "app/command_line/interruption.h"
 #include "app/command_line/maps_exchange_command.h"
+#include "app/command_line/maps_tour_command.h"
 #include "app/command_line/program.h"
 #include "app/command_line/progress.h"
 #include "app/command_line/text_table.h"
@@ -188,6 +189,32 @@ void Rename(const MapsOptions& options) {
   library.Rename(library.FindByName(options.name).key, options.new_name);
 }
 
+std::vector<std::string> ToursThatStopAt(std::uint64_t key, const maps::Library& library) {
+  std::vector<std::string> names, damaged;
+  for (const maps::Tour& tour : library.Tours(&damaged)) {
+    if (std::find(tour.stops.begin(), tour.stops.end(), key) != tour.stops.end()) names.push_back(tour.name);
+  }
+  return names;
+}
+
+// Throws if signposts lead to the map or tours stop at it.
+void RefuseIfNeeded(const std::string& map, std::size_t signposts, std::size_t tours) {
+  if (signposts == 0 && tours == 0) return;
+  std::string uses, consequences;
+  if (signposts > 0) {
+    uses = std::to_string(signposts) + (signposts == 1 ? " signpost leads" : " signposts lead") + " to";
+    consequences = signposts == 1 ? "the signpost leads nowhere" : "the signposts lead nowhere";
+  }
+  if (tours > 0) {
+    uses += (uses.empty() ? "" : ", and ") + std::to_string(tours) +
+            (tours == 1 ? " tour stops at" : " tours stop at");
+    consequences += std::string(consequences.empty() ? "" : ", and ") +
+                    (tours == 1 ? "the tour leaves it out" : "the tours leave it out");
+  }
+  throw Error(uses + " '" + map + "', which was not removed; with --force it is removed, and " +
+              consequences + ".");
+}
+
 void Remove(const MapsOptions& options) {
   maps::Library library = OpenToWrite(options);
   const std::uint64_t key = library.FindByName(options.name).key;
@@ -197,12 +224,12 @@ void Remove(const MapsOptions& options) {
       std::printf("map '%s': the signpost '%s' leads to '%s'\n", signpost.map.name.c_str(),
                   signpost.name.c_str(), options.name.c_str());
   }
-  if (!signposts.empty() && !options.force) {
-    throw Error(std::to_string(signposts.size()) +
-                (signposts.size() == 1 ? " signpost leads" : " signposts lead") + " to '" + options.name +
-                "', which was not removed; with --force it is removed, and they lead "
-                "nowhere.");
+  const std::vector<std::string> tours = ToursThatStopAt(key, library);
+  for (const std::string& tour : tours) {
+    if (options.verbosity != Verbosity::kQuiet || !options.force)
+      std::printf("the tour '%s' stops at '%s'\n", tour.c_str(), options.name.c_str());
   }
+  if (!options.force) RefuseIfNeeded(options.name, signposts.size(), tours.size());
   library.Remove(key);
 }
 
@@ -248,12 +275,15 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
       ->required();
   add_name(add("remove", "Remove a map and its content", "docent maps remove Kiosk --library museum.docent",
                Remove))
-      ->add_flag("--force", options->force, "Also if signposts lead to it, which then lead nowhere");
+      ->add_flag("--force", options->force,
+                 "Also if signposts lead to it, which then lead nowhere, or tours stop at it, "
+                 "which then leave it out");
   add_name(add("policy", "Set what may be changed in a map",
                "docent maps policy Kiosk read-only --library museum.docent", SetMapPolicy))
       ->add_option("POLICY", options->policy, "open, bounded, augment-only or read-only")
       ->required()
       ->check(CLI::IsMember({"open", "bounded", "augment-only", "read-only"}));
+  AddMapsTourCommands(group, invocation);
   AddMapsExchangeCommands(group, invocation);
 }
 

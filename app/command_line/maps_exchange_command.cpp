@@ -80,6 +80,18 @@ std::string OmittedPointsNote(const engine::MapSnapshot& map) {
                         : " infinite points were left out, because they have no position");
 }
 
+// Mentions the tours that stop at a map, which are not exported with it.
+std::string OmittedToursNote(const maps::Library& library, std::uint64_t key) {
+  std::vector<std::string> damaged;
+  const std::vector<maps::Tour> tours = library.Tours(&damaged);
+  const auto count = std::count_if(tours.begin(), tours.end(), [&](const maps::Tour& tour) {
+    return std::find(tour.stops.begin(), tour.stops.end(), key) != tour.stops.end();
+  });
+  if (count == 0) return "";
+  return "; " + std::to_string(count) +
+         (count == 1 ? " tour that stops there was left out" : " tours that stop there were left out");
+}
+
 std::string MeshFile(const maps::Library& library, std::uint64_t key, const std::string& name) {
   const std::optional<engine::MapMesh> mesh = library.LoadMesh(key);
   if (!mesh) throw Error("'" + name + "' has no mesh; run docent maps densify to compute it.");
@@ -90,7 +102,7 @@ void Export(const ExchangeOptions& options, Verbosity verbosity) {
   const maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
   const std::uint64_t key = library.FindByName(options.name).key;
   const std::string kind = options.output.extension().string();
-  if (kind != "" && kind != ".docent" && kind != ".ply" && kind != ".png") {
+  if (!kind.empty() && kind != ".docent" && kind != ".ply" && kind != ".png") {
     throw Error(
         "'" + options.output.string() +
         "' has an unknown file type; use a .docent, .ply or .png file, or a folder for COLMAP's files.");
@@ -102,6 +114,7 @@ void Export(const ExchangeOptions& options, Verbosity verbosity) {
   std::string left_out;
   if (kind == ".docent") {
     maps::ExportMap(library, key, options.output, LibrarySceneTools());
+    left_out = OmittedToursNote(library, key);
   } else if (options.as_mesh) {
     WriteText(options.output, MeshFile(library, key, options.name));
   } else {
@@ -117,15 +130,16 @@ void Export(const ExchangeOptions& options, Verbosity verbosity) {
 
 void Import(const ExchangeOptions& options, Verbosity verbosity) {
   const maps::Library from = OpenLibrary(options.from, maps::Access::kReadOnly);
-  for (const maps::ImportedMap& map : maps::ImportMaps(from, options.library, LibrarySceneTools())) {
-    if (verbosity == Verbosity::kQuiet) continue;
-    if (map.name == map.name_before) {
-      std::printf("%s\n", map.name.c_str());
-    } else {
-      std::printf("%s (renamed, because there is already a map named %s)\n", map.name.c_str(),
-                  map.name_before.c_str());
-    }
-  }
+  const maps::Imported imported = maps::ImportMaps(from, options.library, LibrarySceneTools());
+  if (verbosity == Verbosity::kQuiet) return;
+  const auto print = [](const char* before, const char* kind, const maps::ImportedName& added) {
+    std::printf("%s%s", before, added.name.c_str());
+    if (added.name != added.name_before)
+      std::printf(" (renamed, because there is already a %s named %s)", kind, added.name_before.c_str());
+    std::printf("\n");
+  };
+  for (const maps::ImportedName& map : imported.maps) print("", "map", map);
+  for (const maps::ImportedName& tour : imported.tours) print("tour ", "tour", tour);
 }
 
 const char* ToText(maps::Optimization::Outcome outcome) {
@@ -298,7 +312,7 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
                    "A .docent library, a .ply point cloud, a .png image from above, or a folder for COLMAP's "
                    "text model")
       ->required();
-  add("import", "Add the maps of another library; duplicate names get a number",
+  add("import", "Add the maps and tours of another library; duplicate names get a number",
       "docent maps import desk.docent --library museum.docent", Import)
       ->add_option("FILE", options->from, "The other library")
       ->required();

@@ -69,6 +69,8 @@ struct AuthorOptions {
 struct TourOptions {
   RunArguments run;
   std::filesystem::path library;
+  std::optional<std::string> tour;  // The visitor is led along this one of the library.
+  std::optional<std::filesystem::path> script;
 };
 
 struct EvaluateOptions {

@@ -14,6 +14,7 @@
 #include "app/session/calibrated_camera.h"
 #include "app/session/frame_loop.h"
 #include "app/session/guided_view.h"
+#include "app/session/route_state.h"
 #include "maps/library/library.h"
 
 // Common part of authoring, touring and the demonstration: feeds one camera, or the two of a wearable,
@@ -46,8 +47,9 @@ struct GuideRequest {
   // Returns commands to run for a frame, as if a person had given them in the window; may be empty. Called on
   // the camera's thread.
   std::function<std::vector<Command>(const ShownFrame&)> director;
-  double baseline_m = 0;                               // See SessionOptions.
-  bool occlusion = true;                               // See SessionOptions.
+  std::optional<Route> route;  // Of the tour that visitors are led along; only without may_write.
+  double baseline_m = 0;       // See SessionOptions.
+  bool occlusion = true;       // See SessionOptions.
   std::shared_ptr<const engine::PlanarTarget> target;  // See engine::TrackerOptions; may be null.
   std::optional<HeadPolicy> head;
   // Called with each frame on its camera's thread, never concurrently; may be empty.

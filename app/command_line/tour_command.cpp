@@ -15,6 +15,12 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
                     "docent tour --library museum.docent --camera /dev/video0 --calibration camera.yaml");
   const auto options = std::make_shared<TourOptions>();
   command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+  command
+      ->add_option("--tour", options->tour,
+                   "Lead the visitor along this tour, which docent maps tour create has stored")
+      ->type_name("NAME");
+  command->add_option("--script", options->script, "Commands to carry out at given times, such as tour skip")
+      ->type_name("FILE");
   AddRunArguments(command,
                   "take the calibration that the library has stored for a camera of this name; a tour builds "
                   "no map and estimates none",

@@ -131,6 +131,7 @@ struct Validator {
     return First({c.name.empty() ? kNoMapName : "", MapNameProblem(c.new_name)});
   }
   std::string operator()(const RemoveMap& c) const { return c.name.empty() ? kNoMapName : ""; }
+  std::string operator()(const JoinMap& c) const { return c.name.empty() ? kNoMapName : ""; }
   std::string operator()(const SetMapUp& c) const { return c.pixel ? PixelProblem(*c.pixel) : ""; }
   std::string operator()(const SetMapScale& c) const {
     if (c.length_m == 0) return "";
@@ -232,6 +233,7 @@ struct Validator {
     return First({NamesProblem(c.names), c.from_map.empty() ? kNoMapName : "",
                   c.to_pixel ? PixelProblem(*c.to_pixel) : std::string()});
   }
+  std::string operator()(const GuideVisitor&) const { return ""; }
   std::string operator()(const Undo&) const { return ""; }
   std::string operator()(const Redo&) const { return ""; }
   std::string operator()(const Save&) const { return ""; }

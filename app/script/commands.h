@@ -42,6 +42,11 @@ struct RemoveMap {
   std::string name;
   bool operator==(const RemoveMap&) const = default;
 };
+// Joins this map into the current one if both show the same place, which is found out while tracking goes on.
+struct JoinMap {
+  std::string name;
+  bool operator==(const JoinMap&) const = default;
+};
 // Makes the level surface at a pixel the ground of the current map, or lets its keyframes say again which way
 // is up.
 struct SetMapUp {
@@ -224,6 +229,15 @@ struct PasteEntities {
   std::optional<Eigen::Vector2d> to_pixel;
   bool operator==(const PasteEntities&) const = default;
 };
+// Leads a visitor along a tour with stops. Everything else is refused on a tour but UseMap.
+struct GuideVisitor {
+  enum class Step {
+    kSkip,  // Passes over the next stop.
+    kBack,  // Leads back to the stop before.
+  };
+  Step step = Step::kSkip;
+  bool operator==(const GuideVisitor&) const = default;
+};
 struct Undo {
   bool operator==(const Undo&) const = default;
 };
@@ -235,11 +249,12 @@ struct Save {
 };
 
 using Command =
-    std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, SetMapUp, SetMapScale, PlaceModel,
-                 PlaceSignpost, PlaceLabel, PlaceImage, PlaceSound, PlaceTrail, ExtendTrail, ShortenTrail,
-                 SetLabelOffset, MoveEntity, RotateEntity, ScaleEntity, TransformEntities, AlignEntity,
-                 BendEntity, UnbendEntity, RemoveEntities, DuplicateEntities, RenameEntity, SetEntityText,
-                 SetSignpostTarget, SetEntityFlag, GroupEntities, PasteEntities, Undo, Redo, Save>;
+    std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, JoinMap, SetMapUp, SetMapScale,
+                 PlaceModel, PlaceSignpost, PlaceLabel, PlaceImage, PlaceSound, PlaceTrail, ExtendTrail,
+                 ShortenTrail, SetLabelOffset, MoveEntity, RotateEntity, ScaleEntity, TransformEntities,
+                 AlignEntity, BendEntity, UnbendEntity, RemoveEntities, DuplicateEntities, RenameEntity,
+                 SetEntityText, SetSignpostTarget, SetEntityFlag, GroupEntities, PasteEntities, GuideVisitor,
+                 Undo, Redo, Save>;
 
 // The same rotation, with a quaternion that normalizing does not change any more. A command that was written
 // to a script and read again thereby has exactly the rotation of the original.

@@ -70,6 +70,7 @@ struct CommandFormatter {
     return "map rename " + AlwaysQuoted(c.name) + ' ' + AlwaysQuoted(c.new_name);
   }
   std::string operator()(const RemoveMap& c) const { return "map remove " + AlwaysQuoted(c.name); }
+  std::string operator()(const JoinMap& c) const { return "map join " + AlwaysQuoted(c.name); }
   std::string operator()(const SetMapUp& c) const {
     return "map up " + (c.pixel ? Pixel(*c.pixel) : std::string("automatic"));
   }
@@ -159,6 +160,9 @@ struct CommandFormatter {
   std::string operator()(const PasteEntities& c) const {
     return "paste" + Names(c.names) + " from " + AlwaysQuoted(c.from_map) +
            (c.to_pixel ? " at " + Pixel(*c.to_pixel) : "");
+  }
+  std::string operator()(const GuideVisitor& c) const {
+    return c.step == GuideVisitor::Step::kSkip ? "tour skip" : "tour back";
   }
   std::string operator()(const Undo&) const { return "undo"; }
   std::string operator()(const Redo&) const { return "redo"; }

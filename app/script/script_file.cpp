@@ -34,6 +34,7 @@ Command ParseMap(LineReader* line) {
     return RenameMap{name, line->TakeName("a new name")};
   }
   if (line->TakeIf("remove")) return RemoveMap{line->TakeName("a map's name")};
+  if (line->TakeIf("join")) return JoinMap{line->TakeName("a map's name")};
   if (line->TakeIf("policy")) {
     SetPolicy command;
     command.name = line->TakeName("a map's name");
@@ -49,9 +50,9 @@ Command ParseMap(LineReader* line) {
     return command;
   }
   if (line->TakeIf("scale")) return ParseMapScale(line);
-  const std::string word = line->Take("new, stop, use, policy, rename, remove, up or scale");
+  const std::string word = line->Take("new, stop, use, policy, rename, remove, join, up or scale");
   line->Fail("unknown command 'map " + word +
-             "'; use new, stop, use, policy, rename, remove, up or scale after map");
+             "'; use new, stop, use, policy, rename, remove, join, up or scale after map");
 }
 
 Eigen::Vector3d TakePoint(LineReader* line) {
@@ -278,6 +279,13 @@ std::optional<Command> ParseEdit(LineReader* line) {
   return std::nullopt;
 }
 
+Command ParseTour(LineReader* line) {
+  if (line->TakeIf("skip")) return GuideVisitor{GuideVisitor::Step::kSkip};
+  if (line->TakeIf("back")) return GuideVisitor{GuideVisitor::Step::kBack};
+  const std::string word = line->Take("skip or back");
+  line->Fail("unknown command 'tour " + word + "'; use skip or back after tour");
+}
+
 Command ParseCommand(LineReader* line) {
   if (line->TakeIf("map")) return ParseMap(line);
   if (line->TakeIf("place")) return ParsePlace(line);
@@ -287,6 +295,7 @@ Command ParseCommand(LineReader* line) {
   if (line->TakeIf("sound")) return ParseSound(line);
   if (line->TakeIf("trail")) return ParseTrail(line);
   if (auto edit = ParseEdit(line)) return *std::move(edit);
+  if (line->TakeIf("tour")) return ParseTour(line);
   if (line->TakeIf("undo")) return Undo{};
   if (line->TakeIf("redo")) return Redo{};
   if (line->TakeIf("save")) return Save{};

@@ -102,7 +102,8 @@ class CommandRunner {
     return options_.script_name + ", line " + std::to_string(command.line) + ": ";
   }
   void Run(const Command& command, Timestamp time, const engine::TrackedFrame& frame) {
-    session_->Execute(command, frame, options_.model_folder);
+    if (!options_.take || !options_.take(command, frame))
+      session_->Execute(command, frame, options_.model_folder);
     last_time_ = std::max(last_time_, time);
     if (options_.carried_out) options_.carried_out({last_time_, 0, command});
   }

@@ -57,6 +57,9 @@ struct FrameLoopOptions {
   std::string script_name;             // for error messages
   std::filesystem::path model_folder;  // folder of the script's models
   CommandInbox* inbox = nullptr;       // may be null
+  // Carries out a command that does not concern the session, and returns true; throws Error when it cannot be
+  // carried out. On the camera's thread; may be empty.
+  std::function<bool(const Command&, const engine::TrackedFrame&)> take;
   // `carried_out` is called after every executed command, with its time from the first image. `refused` is
   // called with the error of a command from the inbox; an error of a script ends the run instead. Both run on
   // the camera's thread and may be empty.

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "app/session/visitor_strings.h"
+
 namespace docent::app {
 
 namespace {
@@ -39,21 +41,21 @@ ui::VisitorDisplay VisitState::Search(double seconds, const std::string& hint) c
   ui::VisitorDisplay display;
   display.is_searching = true;
   if (stops_.empty()) {
-    display.sentence = "There are no places in this library yet.";
+    display.sentence = visitor_strings::kNoPlaces;
     return display;
   }
   const double searched = Searched(seconds);
   if (searched >= times_.stops) {
     display.stops = stops_;
-    display.sentence = "Go to one of these places and look around slowly.";
+    display.sentence = visitor_strings::kGoToAPlace;
   } else if (!hint.empty()) {
     display.sentence = hint;
   } else if (place_.empty()) {
-    display.sentence = "Welcome. Look around slowly, and I will tell you where you are.";
+    display.sentence = visitor_strings::kWelcome;
   } else if (searched >= times_.way_back) {
-    display.sentence = "Go back to " + place_ + ", and look around slowly.";
+    display.sentence = visitor_strings::Filled(visitor_strings::kGoBackTo, {place_});
   } else {
-    display.sentence = "Look around slowly.";
+    display.sentence = visitor_strings::kLookAround;
   }
   return display;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "app/session/guided_view.h"
+#include "app/session/route_state.h"
 #include "app/session/session.h"
 #include "app/session/visit_state.h"
 
@@ -16,9 +17,10 @@ namespace docent::app {
 // thread.
 class VisitorGuide {
  public:
-  // `stops`: the names of the library's maps. The session must outlive this.
-  VisitorGuide(Session* session, std::vector<std::string> stops)
-      : session_(session), state_(std::move(stops)) {}
+  // `stops`: the names of the maps where visitors can be. `route`, which may be null, leads along a tour; it
+  // and the session must outlive this.
+  VisitorGuide(Session* session, std::vector<std::string> stops, RouteState* route = nullptr)
+      : session_(session), state_(std::move(stops)), route_(route) {}
 
   // Sets the frame's `visitor`; `camera` is the lens of its image. Shortly after a loss the frame gets the
   // content and the pose of the last frame that had one.
@@ -26,17 +28,21 @@ class VisitorGuide {
 
  private:
   void FindViews(const ShownFrame& frame);
+  void FollowRoute(ShownFrame* frame);
 
   Session* const session_;
   VisitState state_;
+  RouteState* const route_;
   std::vector<cv::Mat> views_;  // See ui::VisitorDisplay.
   std::optional<double> views_time_s_;
   std::shared_ptr<const ShownFrame> last_with_pose_;
 };
 
 // The nearest signpost in the scene that leads to another map, if none of those is seen; empty if one is, or
-// there is none. Nearest is what the camera has to turn least for.
+// there is none. Nearest is what the camera has to turn least for. With a route, only those signposts count
+// from which the fewest others lead on to its target.
 std::optional<ui::WayOn> WayOutOfSight(const content::Scene& scene, const engine::CameraModel& camera,
-                                       const engine::Rigid3& camera_from_map);
+                                       const engine::Rigid3& camera_from_map,
+                                       const RouteState* route = nullptr);
 
 }  // namespace docent::app

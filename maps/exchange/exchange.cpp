@@ -43,6 +43,30 @@ void Redirect(const SceneTools& scenes, const Retarget& retarget, StoredMap* map
   if (const auto text = scenes.retarget(map->scene.text, retarget)) map->scene.text = *text;
 }
 
+// Adds tours through these maps to a library, where the maps have other keys.
+std::vector<ImportedName> AddTours(std::vector<Tour> tours, const std::vector<MapInfo>& maps,
+                                   const std::vector<SignpostTarget>& targets, Library* to) {
+  std::vector<ImportedName> names;
+  if (tours.empty()) return names;
+  to->ChangeTours([&](std::vector<Tour>* all) {
+    std::set<std::string> taken;
+    for (const Tour& tour : *all) taken.insert(tour.name);
+    for (Tour& tour : tours) {
+      for (std::uint64_t& stop : tour.stops) {
+        const auto map =
+            std::find_if(maps.begin(), maps.end(), [&](const MapInfo& info) { return info.key == stop; });
+        stop = map == maps.end() ? 0 : targets[static_cast<std::size_t>(map - maps.begin())].key;
+      }
+      std::erase(tour.stops, 0u);  // Of a damaged library.
+      names.push_back({FreeName(tour.name, taken), tour.name});
+      tour.name = names.back().name;
+      taken.insert(tour.name);
+      all->push_back(tour);
+    }
+  });
+  return names;
+}
+
 LibraryOptions OptionsWith(const SceneTools& scenes) {
   LibraryOptions options;
   options.scenes = scenes;
@@ -75,11 +99,11 @@ void ExportMap(const Library& library, std::uint64_t key, const std::filesystem:
   }
 }
 
-std::vector<ImportedMap> ImportMaps(const Library& from, const std::filesystem::path& path,
-                                    const SceneTools& scenes) {
+Imported ImportMaps(const Library& from, const std::filesystem::path& path, const SceneTools& scenes) {
   const std::vector<MapInfo> infos = from.List();
   if (infos.empty()) throw Error(from.file() + " contains no map to import");
   for (const MapInfo& info : infos) from.Load(info.key);
+  std::vector<Tour> tours = from.Tours();
   Library to = Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes, OptionsWith(scenes));
   const std::vector<MapInfo> there = to.List();
   std::set<std::string> taken;
@@ -98,13 +122,14 @@ std::vector<ImportedMap> ImportMaps(const Library& from, const std::filesystem::
     const SignpostTarget by_name{0, target.map};
     return KeyOfTarget(by_name, there).value_or(by_name);
   };
-  std::vector<ImportedMap> imported;
+  Imported imported;
   for (std::size_t i = 0; i < infos.size(); ++i) {
     StoredMap map = from.Load(infos[i].key);
     Redirect(scenes, retarget, &map);
     to.Save(RecordOf(std::move(map), targets[i].key, targets[i].map));
-    imported.push_back({targets[i].map, infos[i].name});
+    imported.maps.push_back({targets[i].map, infos[i].name});
   }
+  imported.tours = AddTours(std::move(tours), infos, targets, &to);
   return imported;
 }
 

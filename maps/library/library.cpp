@@ -24,6 +24,7 @@
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
 #include "maps/storage/snapshot_reader.h"
+#include "maps/storage/tour_rows.h"
 
 namespace docent::maps {
 
@@ -262,6 +263,17 @@ std::vector<StoredLens> Library::Lenses() const {
   return impl_->Read([&] { return ReadLenses(impl_->database()); });
 }
 
+std::vector<Tour> Library::Tours(std::vector<std::string>* problems) const {
+  return impl_->Read([&] { return ReadTours(impl_->database(), problems); });
+}
+
+void Library::ChangeTours(const std::function<void(std::vector<Tour>*)>& change) {
+  impl_->Write([&] {
+    RewriteTours(impl_->database(), change);
+    return true;
+  });
+}
+
 std::uint64_t Library::ReserveKeys(std::size_t count) {
   constexpr auto kLargest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
   std::uint64_t first = 0;
@@ -378,19 +390,28 @@ std::vector<std::string> Library::SignpostsToNoMap() const {
   return impl_->Read([&] { return maps::SignpostsToNoMap(impl_->database(), impl_->options().scenes); });
 }
 
-std::vector<Library::Signpost> Library::SignpostsTo(std::uint64_t key) const {
+std::vector<Library::Signpost> Library::Signposts() const {
   return impl_->Read([&] {
     std::vector<Signpost> signposts;
-    const MapInfo wanted = impl_->Get(key);
-    for (const MapInfo& info : ReadMapRows(impl_->database())) {
-      if (info.key == key) continue;
+    const std::vector<MapInfo> maps = ReadMapRows(impl_->database());
+    for (const MapInfo& info : maps) {
       impl_->signposts().RetargetIn(info, [&](const std::string& signpost, const SignpostTarget& target) {
-        if (LeadsTo(target, wanted)) signposts.push_back({info, signpost});
+        for (const MapInfo& wanted : maps) {
+          if (LeadsTo(target, wanted)) signposts.push_back({info, signpost, wanted.key});
+        }
         return std::optional<SignpostTarget>();
       });
     }
     return signposts;
   });
+}
+
+std::vector<Library::Signpost> Library::SignpostsTo(std::uint64_t key) const {
+  Find(key);
+  std::vector<Signpost> signposts = Signposts();
+  std::erase_if(signposts,
+                [&](const Signpost& signpost) { return signpost.to_key != key || signpost.map.key == key; });
+  return signposts;
 }
 
 }  // namespace docent::maps

@@ -16,6 +16,7 @@
 #include "maps/storage/map_record.h"
 #include "maps/storage/policy.h"
 #include "maps/storage/scene_tools.h"
+#include "maps/storage/tour_rows.h"
 
 // A library of maps: one SQLite file, NAME.docent, which maps/README.md describes.
 //
@@ -98,6 +99,14 @@ class Library {
   // is damaged.
   std::vector<StoredLens> Lenses() const;
 
+  // The tours, by ascending name. Throws Error if one is damaged; if `problems` is given, damaged tours are
+  // left out and described there instead.
+  std::vector<Tour> Tours(std::vector<std::string>* problems = nullptr) const;
+  // Changes the tours in one transaction: `change` gets the readable ones and adds, changes or removes some,
+  // or throws. Throws Error, and writes nothing, if a tour is invalid then, a name is used twice, or a stop
+  // is no map of this library.
+  void ChangeTours(const std::function<void(std::vector<Tour>* tours)>& change);
+
   // Returns a key that no map of this library has or ever had. It is reserved on disk, so that two processes
   // never get the same one.
   std::uint64_t NewKey() { return ReserveKeys(1); }
@@ -116,7 +125,8 @@ class Library {
   // Signposts keep leading to the map. Throws if there is no such map, its policy forbids it, or another map
   // has the name.
   void Rename(std::uint64_t key, const std::string& name);
-  // Removes a map with its content. Signposts in other maps that lead to it lead nowhere afterwards. Throws
+  // Removes a map with its content. Signposts in other maps that lead to it lead nowhere afterwards, and
+  // tours no longer stop at it. Throws
   // if there is no such map, its policy forbids it, or that of a map with such a signpost does.
   void Remove(std::uint64_t key);
   // The only way to relax a policy. Setting `bounded` computes the bounds from the map's contents, unless it
@@ -124,9 +134,10 @@ class Library {
   void SetPolicy(std::uint64_t key, Policy policy);
 
   // Executes a join in one transaction: `into` gets the snapshot, the scene and the stricter policy,
-  // signposts in other maps are redirected, and `from` is removed. The policies of both maps must allow
-  // changes to keyframes and points, and those of the maps whose scenes are redirected must allow changes to
-  // content. Returns false, and writes nothing, when one of the two maps has changed since it was loaded.
+  // signposts in other maps are redirected, tours stop at `into` instead, and `from` is removed. The policies
+  // of both maps must allow changes to keyframes and points, and those of the maps whose scenes are
+  // redirected must allow changes to content. Returns false, and writes nothing, when one of the two maps has
+  // changed since it was loaded.
   bool Join(const JoinRecord& record);
 
   // Reads and validates everything. Returns one sentence for each error; empty if there is none.
@@ -135,9 +146,12 @@ class Library {
   std::vector<std::string> SignpostsToNoMap() const;
   // A signpost in a map.
   struct Signpost {
-    MapInfo map;       // The map that it stands in.
-    std::string name;  // Unique in that map.
+    MapInfo map;               // The map that it stands in.
+    std::string name;          // Unique in that map.
+    std::uint64_t to_key = 0;  // Of the map that it leads to.
   };
+  // All signposts that lead to a map of this library.
+  std::vector<Signpost> Signposts() const;
   // The signposts in other maps that lead to this one.
   std::vector<Signpost> SignpostsTo(std::uint64_t key) const;
 

@@ -9,6 +9,7 @@
 #include "maps/library/structure_storage.h"
 #include "maps/storage/history_rows.h"
 #include "maps/storage/rows.h"
+#include "maps/storage/tour_rows.h"
 
 namespace docent::maps {
 
@@ -21,6 +22,7 @@ void MapJoiner::Join(const JoinRecord& record) const {
   signposts_.Redirect(
       record.from, {record.into.key, record.into.name}, {record.into.key, record.from.key},
       "its signposts to '" + record.from.name + "' cannot point to '" + record.into.name + "' instead");
+  ReplaceStop(database_, record.from.key, record.into.key);
   MapInfo info = record.into;
   RemoveHistory(database_, info.key);  // It belongs to the scene before.
   const MapParts parts = PartsOf(*record.snapshot);
@@ -42,12 +44,14 @@ bool MapJoiner::RemoveJoined(std::uint64_t key, const SignpostTarget& into) cons
     if (!MayRemove(info->policy)) Refuse(info->policy, "it cannot be joined into another map");
   });
   signposts_.Redirect(*info, into, {key}, "");
+  ReplaceStop(database_, key, into.key);
   Remove(key);
   return true;
 }
 
 void MapJoiner::Remove(std::uint64_t key) const {
   RemoveMapRows(database_, key);
+  ReplaceStop(database_, key, std::nullopt);
   LibraryRow library = ReadLibraryRow(database_);
   --library.map_count;
   WriteLibraryRow(database_, library);

@@ -25,7 +25,7 @@ class MapJoiner {
   // Removes a map that was joined into another one before either was saved. Returns false if it no longer
   // exists.
   bool RemoveJoined(std::uint64_t key, const SignpostTarget& into) const;
-  // Removes a map with its content; signposts to it stay as they are.
+  // Removes a map with its content, also from the tours; signposts to it stay as they are.
   void Remove(std::uint64_t key) const;
 
  private:

@@ -87,6 +87,11 @@ void UpgradeToFormat5(const Database& database, const SceneTools& scenes) {
   }
 }
 
+// Format 6 added the table of tours. It is empty at first.
+void UpgradeToFormat6(const Database& database) {
+  CreateTable(database, "tours");
+}
+
 }  // namespace
 
 fs::path BackupPath(const fs::path& library, std::int64_t format) {
@@ -108,6 +113,8 @@ void UpgradeFormat(const Database& database, const SceneTools& scenes) {
   if (SchemaVersion(database) < 4) UpgradeToFormat4(database);
   SetSchemaVersion(database, std::max<std::int64_t>(4, SchemaVersion(database)));
   if (SchemaVersion(database) < 5) UpgradeToFormat5(database, scenes);
+  SetSchemaVersion(database, std::max<std::int64_t>(5, SchemaVersion(database)));
+  if (SchemaVersion(database) < 6) UpgradeToFormat6(database);
   SetSchemaVersion(database, kSchemaVersion);
   transaction.Commit();
 }

@@ -16,6 +16,7 @@
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
 #include "maps/storage/snapshot_reader.h"
+#include "maps/storage/tour_rows.h"
 
 namespace docent::maps {
 
@@ -194,6 +195,22 @@ void CheckStrays(const Database& database, Report* report) {
   }
 }
 
+// Reports tours that are damaged or stop at a map that does not exist.
+void CheckTours(const Database& database, Report* report) {
+  report->Try([&] {
+    std::vector<std::string> problems;
+    for (const Tour& tour : ReadTours(database, &problems)) {
+      for (const std::uint64_t stop : tour.stops) {
+        Statement map = database.Prepare("SELECT 1 FROM maps WHERE key = ?");
+        if (map.Bind(1, static_cast<std::int64_t>(stop)).Step()) continue;
+        problems.push_back(database.file() + " is damaged: the tour '" + tour.name + "' stops at the map " +
+                           std::to_string(stop) + ", which does not exist");
+      }
+    }
+    for (std::string& problem : problems) report->Add(std::move(problem));
+  });
+}
+
 }  // namespace
 
 std::vector<std::string> VerifyAll(const Database& database, int threads, const SceneTools& scenes) {
@@ -205,6 +222,7 @@ std::vector<std::string> VerifyAll(const Database& database, int threads, const 
   CheckAssets(database, wanted_assets, &report);
   CheckStrays(database, &report);
   report.Try([&] { ReadLenses(database); });
+  CheckTours(database, &report);
   return report.Take();
 }
 

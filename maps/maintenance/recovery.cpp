@@ -329,6 +329,7 @@ class Salvage {
       if (auto record = map.Read()) Save(std::move(*record), map.complete(), target);
     }
     CutLostLinks(target);
+    SaveTours(target);
   }
   const Recovery& recovery() const { return recovery_; }
 
@@ -361,6 +362,21 @@ class Salvage {
       if (policy == Policy::kReadOnly) target->SetPolicy(info.key, Policy::kAugmentOnly);
       target->Save(record);
       if (policy == Policy::kReadOnly) target->SetPolicy(info.key, policy);
+    }
+  }
+
+  // Tours go on without the maps that are lost.
+  void SaveTours(Library* target) {
+    std::set<std::uint64_t> keys;
+    for (const MapInfo& info : target->List()) keys.insert(info.key);
+    for (Tour& tour : rows_.Tours(losses_->sentences())) {
+      const std::string where = "the tour '" + tour.name + "'";
+      const std::size_t lost =
+          std::erase_if(tour.stops, [&](std::uint64_t stop) { return !keys.contains(stop); });
+      if (lost > 0) losses_->Add(where, std::to_string(lost) + " of its stops could not be recovered");
+      losses_->Try(where, [&] {
+        target->ChangeTours([&](std::vector<Tour>* tours) { tours->push_back(std::move(tour)); });
+      });
     }
   }
 

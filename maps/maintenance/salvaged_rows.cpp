@@ -60,6 +60,9 @@ SalvagedRows::SalvagedRows(const std::filesystem::path& path) : file_(path) {
         case SalvagedTable::kLenses:
           lenses_[place.name].push_back(&place);
           break;
+        case SalvagedTable::kTours:
+          tours_[place.name].push_back(&place);
+          break;
       }
     }
   }
@@ -175,6 +178,21 @@ std::vector<StoredLens> SalvagedRows::Lenses(std::vector<std::string>* problems)
     }
   }
   return lenses;
+}
+
+std::vector<Tour> SalvagedRows::Tours(std::vector<std::string>* problems) const {
+  std::vector<Tour> tours;
+  for (const auto& [tour, places] : tours_) {
+    try {
+      UseFirst(Usable(&places), "it cannot be read", [&, &name = tour](const SalvagedRow& row, bool) {
+        tours.push_back(CheckedTour({name, TextIn(row.values[1]), row.values[2].integer, row.values[3].bytes,
+                                     row.values[4].integer}));
+      });
+    } catch (const Error& error) {
+      if (tour.size() <= kMaxTourNameBytes) problems->push_back("the tour '" + tour + "': " + error.what());
+    }
+  }
+  return tours;
 }
 
 }  // namespace docent::maps

@@ -18,6 +18,7 @@
 #include "maps/storage/envelope.h"
 #include "maps/storage/map_codec.h"
 #include "maps/storage/map_record.h"
+#include "maps/storage/tour_rows.h"
 
 namespace docent::maps {
 
@@ -48,6 +49,8 @@ class SalvagedRows {
   AssetRecord Asset(const std::string& id) const;
   // Those that are readable; a sentence for each of the others is added to `problems`.
   std::vector<StoredLens> Lenses(std::vector<std::string>* problems) const;
+  // The same of tours; their stops may be maps that are lost.
+  std::vector<Tour> Tours(std::vector<std::string>* problems) const;
   std::uint64_t file_bytes() const { return file_.bytes(); }
 
  private:
@@ -60,7 +63,7 @@ class SalvagedRows {
   std::map<std::uint64_t, Places> maps_;
   std::map<std::pair<std::uint64_t, std::string>, Places> parts_;
   std::map<std::pair<std::uint64_t, std::uint32_t>, Places> images_;
-  std::map<std::string, Places> assets_, lenses_;
+  std::map<std::string, Places> assets_, lenses_, tours_;
 };
 
 }  // namespace docent::maps

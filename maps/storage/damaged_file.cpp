@@ -112,6 +112,7 @@ std::optional<SalvagedTable> TableOf(const std::vector<std::uint64_t>& types) {
   if (has_shape("iib")) return SalvagedTable::kImages;
   if (has_shape("ttbi")) return SalvagedTable::kAssets;
   if (has_shape("tbi")) return SalvagedTable::kLenses;
+  if (has_shape("ttibi")) return SalvagedTable::kTours;
   return std::nullopt;
 }
 
@@ -156,6 +157,7 @@ bool Identify(std::uint64_t row_id, const std::vector<SalvagedValue>& values, Ro
       return number(0) > 0 && number(1) >= 0 && number(1) <= std::numeric_limits<std::uint32_t>::max();
     case SalvagedTable::kAssets:
     case SalvagedTable::kLenses:
+    case SalvagedTable::kTours:
       place->name = text(0);
       return !place->name.empty();
   }
@@ -283,8 +285,8 @@ bool DamagedFile::FollowTree(std::uint32_t root, std::set<std::uint32_t>* leaves
 void DamagedFile::FollowTrees() {
   std::set<std::uint32_t> schema, reached;
   FollowTree(1, &schema);
-  constexpr std::array<std::string_view, kSalvagedTables> kNames = {"maps", "parts", "pictures", "assets",
-                                                                    "lenses"};
+  constexpr std::array<std::string_view, kSalvagedTables> kNames = {"maps",   "parts",  "pictures",
+                                                                    "assets", "lenses", "tours"};
   for (const std::uint32_t number : schema) {
     const auto page = ReadPage(number);
     if (!page) continue;

@@ -23,8 +23,8 @@
 namespace docent::maps {
 
 // The tables whose rows cannot be computed from others.
-enum class SalvagedTable : std::uint8_t { kMaps, kParts, kImages, kAssets, kLenses };
-inline constexpr std::size_t kSalvagedTables = 5;
+enum class SalvagedTable : std::uint8_t { kMaps, kParts, kImages, kAssets, kLenses, kTours };
+inline constexpr std::size_t kSalvagedTables = 6;
 
 // Where a row lies, and by what it is found.
 struct RowPlace {
@@ -35,9 +35,9 @@ struct RowPlace {
   Page found = Page::kReached;
   std::uint64_t key = 0;       // Of the map; of kMaps, kParts and kImages.
   std::uint32_t keyframe = 0;  // Of kImages.
-  std::string name;            // The part of kParts, the id of kAssets, the camera of kLenses.
-  std::uint32_t page = 0;      // From 1, as in the file format.
-  std::uint32_t offset = 0;    // Of the cell in the page.
+  std::string name;  // The part of kParts, the id of kAssets, the camera of kLenses, the name of kTours.
+  std::uint32_t page = 0;    // From 1, as in the file format.
+  std::uint32_t offset = 0;  // Of the cell in the page.
 };
 
 // One value of a row.

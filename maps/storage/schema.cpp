@@ -19,7 +19,7 @@ struct Table {
 };
 
 // Never edit these: a change of the tables needs a new schema version and an upgrade step.
-constexpr std::array<Table, 8> kTables = {{
+constexpr std::array<Table, 9> kTables = {{
     {1, "library",
      "CREATE TABLE library (id INTEGER PRIMARY KEY CHECK (id = 1), next_key INTEGER NOT NULL, map_count "
      "INTEGER NOT "
@@ -49,6 +49,9 @@ constexpr std::array<Table, 8> kTables = {{
     {kWordsSince, "words", "CREATE TABLE words (map_key INTEGER PRIMARY KEY, data BLOB NOT NULL) STRICT"},
     {kLensesSince, "lenses",
      "CREATE TABLE lenses (camera TEXT PRIMARY KEY, data BLOB NOT NULL, checksum INTEGER NOT NULL) STRICT"},
+    {kToursSince, "tours",
+     "CREATE TABLE tours (name TEXT PRIMARY KEY, language TEXT NOT NULL, minutes INTEGER NOT NULL, stops "
+     "BLOB NOT NULL, checksum INTEGER NOT NULL) STRICT"},
 }};
 
 }  // namespace

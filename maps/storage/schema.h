@@ -10,11 +10,12 @@
 namespace docent::maps {
 
 inline constexpr std::int64_t kApplicationId = 0x446F6374;  // "Doct", PRAGMA application_id
-inline constexpr std::int64_t kSchemaVersion = 5;           // PRAGMA user_version
+inline constexpr std::int64_t kSchemaVersion = 6;           // PRAGMA user_version
 inline constexpr std::int64_t kThumbnailsSince = 2;         // The first format with the table `thumbnails`.
 inline constexpr std::int64_t kWordsSince = 3;              // The first format with the table `words`.
 inline constexpr std::int64_t kLensesSince = 4;             // The first format with the table `lenses`.
 inline constexpr std::int64_t kBlockChecksSince = 5;        // The first format with checksums of blocks.
+inline constexpr std::int64_t kToursSince = 6;              // The first format with the table `tours`.
 inline constexpr std::int64_t kPanoramasSince = 2;          // The first format with the part `panoramas`.
 
 // Whether the file is still empty, as after its creation.

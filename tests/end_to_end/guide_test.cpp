@@ -165,6 +165,18 @@ TEST(Guide, ComparesBothEnginesAndStitchesPanoramas) {
       AllOf(HasSubstr("<h4>hybrid</h4>"), HasSubstr("<h4>sixdof</h4>"), HasSubstr("data:image/png;base64,")));
 }
 
+// Adds a tour and the signposts along it to a library with two bays.
+void LeadFromBayToBay(const std::string& library) {
+  for (const auto& [from, to] : {std::pair("Bay 0", "Bay 1"), std::pair("Bay 1", "Bay 0")}) {
+    const Outcome signpost = RunDocent({"content", "add", "--signpost", "Further on", "--to", to, "--map",
+                                        from, "--at", "5", "0", "0", "--library", library});
+    EXPECT_EQ(signpost.exit_status, 0) << signpost.errors;
+  }
+  const Outcome tour =
+      RunDocent({"maps", "tour", "create", "Bays", "--stops", "Bay 1", "Bay 0", "--library", library});
+  EXPECT_EQ(tour.exit_status, 0) << tour.errors;
+}
+
 TEST(Guide, AuthorsMapsThatATourRecognizesAndLeavesUnchanged) {
   const TemporaryFolder folder;
   const Museum museum(WriteModel(folder));
@@ -177,10 +189,13 @@ TEST(Guide, AuthorsMapsThatATourRecognizesAndLeavesUnchanged) {
   EXPECT_EQ(library.List().size(), 2u);
   EXPECT_EQ(library.LoadScene(library.FindByName("Bay 0").key).assets.size(), 1u);
 
-  const std::string before = ReadAll(folder / "l.docent");
-  const Outcome toured =
-      RunDocent({"tour", "--library", (folder / "l.docent").string(), "--camera", museum.camera, "--from",
-                 museum.visits_from, "--headless", "--output", (folder / "tour").string()});
+  const std::string path = (folder / "l.docent").string();
+  LeadFromBayToBay(path);
+  folder.Write("visit.txt", std::string("6 tour back\n"));
+  const std::string before = ReadAll(path);
+  const Outcome toured = RunDocent({"tour", "--library", path, "--camera", museum.camera, "--from",
+                                    museum.visits_from, "--headless", "--tour", "Bays", "--script",
+                                    (folder / "visit.txt").string(), "--output", (folder / "tour").string()});
   ASSERT_EQ(toured.exit_status, 0) << toured.errors;
   EXPECT_EQ(before, ReadAll(folder / "l.docent"));
 
@@ -197,6 +212,12 @@ TEST(Guide, AuthorsMapsThatATourRecognizesAndLeavesUnchanged) {
   EXPECT_EQ(wrong, 0);
   const std::string drawn = ReadAll(folder / "tour" / "augmentations.csv");
   EXPECT_THAT(drawn, AllOf(HasSubstr(",Bay 0,exhibit,"), HasSubstr(",Bay 1,sign-1,")));
+  // The visits begin in the last bay.
+  EXPECT_THAT(ReadAll(folder / "tour" / "events.csv"),
+              AllOf(HasSubstr(",tour,\"arrived at 'Bay 1', stop 1 of 2\""),
+                    HasSubstr(",tour,\"arrived at 'Bay 0', stop 2 of 2\""),
+                    HasSubstr(",tour,finished; 2 of 2 stops seen"), HasSubstr(",command,tour back"),
+                    HasSubstr(",tour,\"going back to 'Bay 1', stop 1 of 2\"")));
 }
 
 TEST(Guide, AuthorsAndToursWithTwoCamerasInOneMap) {

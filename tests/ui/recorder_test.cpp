@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
 #include "tests/ui/ui_testing.h"
@@ -117,6 +118,30 @@ TEST_F(MapViewImage, ShowsPredictedRecallByPlaceAndDirection) {
   EXPECT_GT(behind[2], behind[1] + 60);
   const auto aside = image.at<cv::Vec3b>(image.rows / 2 + 3, x + step);
   EXPECT_LT(std::abs(aside[1] - aside[2]), 40) << "this direction has no prediction";
+}
+
+TEST_F(MapViewImage, ShowsTheEdgesOfTheBoundary) {
+  Orbit orbit;
+  orbit.distance_m = 4;
+  orbit.elevation = std::numbers::pi / 2;
+  MapView view;
+  MapViewContents contents;
+  cv::Mat without, with, difference;
+  view.Draw({}, orbit, contents);
+  view.ReadBack(&without);
+  contents.boundary.emplace(Eigen::Vector3d(-0.5, -0.01, -0.5), Eigen::Vector3d(0.5, 0.01, 0.5));
+  view.Draw({}, orbit, contents);
+  view.ReadBack(&with);
+  cv::cvtColor(cv::abs(with - without), difference, cv::COLOR_BGR2GRAY);
+  std::vector<cv::Point> changed;
+  cv::findNonZero(difference > 40, changed);
+  ASSERT_FALSE(changed.empty());
+  const cv::Rect box = cv::boundingRect(changed);
+  // Seen straight from above, its edges are a square about the middle and nothing within it changes.
+  EXPECT_NEAR(box.width, box.height, 4);
+  EXPECT_NEAR(box.x + 0.5 * box.width, 0.5 * with.cols, 2);
+  EXPECT_NEAR(box.y + 0.5 * box.height, 0.5 * with.rows, 2);
+  EXPECT_EQ(difference.at<std::uint8_t>(with.rows / 2 + 3, with.cols / 2 + 5), 0);
 }
 
 TEST_F(MapViewImage, ShowsThePointsOfAMapInColour) {

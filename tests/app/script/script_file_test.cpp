@@ -50,9 +50,10 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "15 bend hat 0 0 0 to 0 0 0, 1 0 0 to 1 0 0, 0 1 0 to 0 1 0, 0 0 1 to 0 0 1.5\n"
       "15 unbend hat\n"
       "15 map rename Desk Bureau\n"
+      "16 map join Desk\n"
       "16 map remove Bureau\n",
       "script");
-  ASSERT_EQ(commands.size(), 40u);
+  ASSERT_EQ(commands.size(), 41u);
   EXPECT_EQ(commands[0].command, Command(NewMap{"Desk 3"}));
   EXPECT_EQ(commands[0].line, 2);
   EXPECT_EQ(commands[1].time, std::chrono::milliseconds(1500));
@@ -105,6 +106,7 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
                                                  {{0, 0, 1}, {0, 0, 1.5}, std::nullopt}}},
                                      UnbendEntity{"hat"},
                                      RenameMap{"Desk", "Bureau"},
+                                     JoinMap{"Desk"},
                                      RemoveMap{"Bureau"}};
   for (std::size_t i = 0; i < rest.size(); ++i) EXPECT_EQ(commands[15 + i].command, rest[i]) << i;
 }
@@ -127,6 +129,8 @@ TEST(Script, IsReadBackEqualAfterWriting) {
       RemoveEntities{{"helmet 2", "from"}},
       PasteEntities{{"from", "at"}, "from", std::nullopt},
       Undo{},
+      GuideVisitor{GuideVisitor::Step::kSkip},
+      GuideVisitor{GuideVisitor::Step::kBack},
       Redo{},
       Save{},
   };
@@ -256,7 +260,7 @@ Command AnyCommand(Random* random) {
     case 21:
       return RenameMap{text(), text()};
     case 22:
-      return RemoveMap{text()};
+      return random->Below(2) == 0 ? Command(RemoveMap{text()}) : Command(JoinMap{text()});
     case 23:
       return AlignEntity{text(), pairs()};
     case 24:
@@ -395,6 +399,7 @@ TEST(Script, NamesTheLineOfAnInvalidCommand) {
                            "1 unbend a b",
                            "1 map rename a \"\"",
                            "1 map remove",
+                           "1 map join",
                            "1 undo all",
                            "1 \"save\""}) {
     EXPECT_THAT(sentence(line), AllOf(HasSubstr("'tour.txt', line 2"), testing::EndsWith("."))) << line;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <numbers>
+#include <utility>
 
 namespace docent::app {
 
@@ -58,6 +59,42 @@ TEST(WayOutOfSight, IgnoresSignpostsThatLeadNowhere) {
   EXPECT_FALSE(WayOutOfSight(scene, GuideCamera(), {}));
   scene.entities = {SignAt({3, 0, 1}, 0, "")};
   EXPECT_FALSE(WayOutOfSight(scene, GuideCamera(), {}));
+}
+
+// A hall (1) with signposts to the lions (2) and the masks (3), from which one leads to the ships (4).
+Route RouteThroughTheHall(std::vector<RouteStop> stops) {
+  Route route;
+  route.stops = std::move(stops);
+  for (const auto& [from, to] : {std::pair(1, 2), std::pair(1, 3), std::pair(3, 4)})
+    route.signposts.Add(static_cast<std::uint64_t>(from), static_cast<std::uint64_t>(to));
+  return route;
+}
+
+TEST(WayOutOfSight, LeadsToTheNextStopOfATourPastNearerSignposts) {
+  content::Scene scene;
+  scene.entities = {SignAt({-3, 0, -1}, 3, "Masks"), SignAt({0, 0, 2}, 2, "Lions")};
+  RouteState state(RouteThroughTheHall({{3, "Masks"}, {2, "Lions"}}));
+  const auto way = WayOutOfSight(scene, GuideCamera(), {}, &state);
+  ASSERT_TRUE(way) << "another signpost is seen, but not the one that leads on";
+  EXPECT_EQ(way->text, "To Masks");
+  EXPECT_LT(way->arrow.direction.x(), -0.99);
+  state.Skip();
+  EXPECT_FALSE(WayOutOfSight(scene, GuideCamera(), {}, &state)) << "the signpost to the lions is seen";
+  state.Skip();
+  EXPECT_FALSE(WayOutOfSight(scene, GuideCamera(), {}, &state)) << "the tour is finished";
+}
+
+TEST(WayOutOfSight, LeadsToTheNextStopThroughOtherMaps) {
+  content::Scene scene;
+  scene.entities = {SignAt({-3, 0, -1}, 3, "Masks"), SignAt({3, 0, 1}, 2, "Lions")};
+  RouteState state(RouteThroughTheHall({{4, "Ships"}, {5, "Coins"}}));
+  const auto way = WayOutOfSight(scene, GuideCamera(), {}, &state);
+  ASSERT_TRUE(way);
+  EXPECT_EQ(way->text, "To Ships, through Masks");
+  scene.entities[0].hidden = true;
+  EXPECT_FALSE(WayOutOfSight(scene, GuideCamera(), {}, &state)) << "no signpost that is drawn leads there";
+  state.Skip();
+  EXPECT_FALSE(WayOutOfSight(scene, GuideCamera(), {}, &state)) << "no signpost leads to the coins";
 }
 
 }  // namespace

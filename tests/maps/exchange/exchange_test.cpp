@@ -33,9 +33,9 @@ TEST(Exchange, ExportAndImportCopyAMapCompletely) {
   Library other = OpenToWrite(folder / "other.docent");
   const Library exported = OpenToRead(folder / "desk.docent");
   ASSERT_EQ(exported.List().size(), 1u);
-  EXPECT_EQ(ImportMaps(exported, folder / "other.docent").at(0).name, "Desk");
-  EXPECT_EQ(ImportMaps(exported, folder / "other.docent").at(0).name, "Desk (2)");
-  EXPECT_EQ(ImportMaps(exported, folder / "other.docent").at(0).name, "Desk (3)");
+  EXPECT_EQ(ImportMaps(exported, folder / "other.docent").maps.at(0).name, "Desk");
+  EXPECT_EQ(ImportMaps(exported, folder / "other.docent").maps.at(0).name, "Desk (2)");
+  EXPECT_EQ(ImportMaps(exported, folder / "other.docent").maps.at(0).name, "Desk (3)");
   for (const char* name : {"Desk", "Desk (2)", "Desk (3)"}) {
     const StoredMap stored = other.Load(other.FindByName(name).key);
     EXPECT_EQ(FirstDifference(*stored.snapshot, *desk), "");
@@ -54,7 +54,7 @@ TEST(Exchange, ALongNameIsCutBetweenCharactersToFitItsLimit) {
   museum.Save({museum.NewKey(), name, Policy::kOpen, nullptr, nullptr});
   ExportMap(museum, 1, folder / "one.docent");
   const std::string renamed =
-      ImportMaps(OpenToRead(folder / "one.docent"), folder / "museum.docent").at(0).name;
+      ImportMaps(OpenToRead(folder / "one.docent"), folder / "museum.docent").maps.at(0).name;
   EXPECT_EQ(renamed, name.substr(0, 196) + " (2)");
 }
 

@@ -104,8 +104,8 @@ TEST_F(Damage, AnSqliteFileOfAnotherProgramIsRejected) {
 }
 
 TEST_F(Damage, ALibraryOfANewerFormatIsRejected) {
-  RunSql("PRAGMA user_version = 6");
-  ExpectRefused("written by a newer Docent (format 6;");
+  RunSql("PRAGMA user_version = 7");
+  ExpectRefused("written by a newer Docent (format 7;");
 }
 
 TEST_F(Damage, ALibraryWithOtherTablesIsRejected) {

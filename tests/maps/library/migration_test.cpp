@@ -87,6 +87,13 @@ class Migration : public ::testing::TestWithParam<int> {
       CREATE TABLE lenses (camera TEXT PRIMARY KEY, data BLOB NOT NULL, checksum INTEGER NOT NULL) STRICT;
       PRAGMA user_version = 4;)sql");
     }
+    if (GetParam() >= 5) {
+      RunSql(file_, R"sql(
+      PRAGMA user_version = 5;
+      ATTACH ')sql" + newer.string() +
+                        R"sql(' AS newer;
+      INSERT INTO parts SELECT * FROM newer.parts WHERE part LIKE '%.blocks';)sql");
+    }
     std::filesystem::remove(newer);
   }
   void ExpectAllThere(const Library& library) const {
@@ -100,6 +107,7 @@ class Migration : public ::testing::TestWithParam<int> {
   void ExpectUpgraded(const Library& library) const {
     ExpectAllThere(library);
     EXPECT_EQ(WordsByMap(library), words_);
+    EXPECT_THAT(library.Tours(), ::testing::IsEmpty());
   }
   std::string CopyName() const { return "a.docent.format-" + std::to_string(GetParam()); }
 
@@ -125,7 +133,7 @@ class Migration : public ::testing::TestWithParam<int> {
   std::vector<std::vector<engine::KeyFrameThumbnail>> thumbnails_;
   std::vector<std::vector<engine::KeyFrameWords>> words_;
 };
-INSTANTIATE_TEST_SUITE_P(EachFormat, Migration, ::testing::Values(1, 2, 3, 4));
+INSTANTIATE_TEST_SUITE_P(EachFormat, Migration, ::testing::Values(1, 2, 3, 4, 5));
 
 TEST_P(Migration, AVisitorReadsAnEarlierFormatWithoutChangingIt) {
   const Bytes before = ReadWholeFile(file_);
@@ -134,6 +142,7 @@ TEST_P(Migration, AVisitorReadsAnEarlierFormatWithoutChangingIt) {
   const auto none = std::vector<std::vector<engine::KeyFrameWords>>(2);
   EXPECT_EQ(WordsByMap(library), GetParam() < 3 ? none : words_);
   EXPECT_THAT(library.Lenses(), ::testing::IsEmpty());
+  EXPECT_THAT(library.Tours(), ::testing::IsEmpty());
   EXPECT_EQ(ReadWholeFile(file_), before);
   EXPECT_EQ(FilesIn(folder_.path()), "a.docent");
 }
@@ -153,6 +162,15 @@ TEST_P(Migration, AnAuthorUpgradesAnEarlierFormatAndKeepsACopyOfIt) {
   EXPECT_EQ(Open(folder_ / CopyName(), Access::kReadOnly).Find(1).name, "Desk");
 }
 
+TEST_P(Migration, AnUpgradedLibraryTakesTours) {
+  {
+    Library library = Open(file_, Access::kReadWrite);
+    library.ChangeTours([](std::vector<Tour>* tours) { tours->push_back({"All", {2, 1}, "de", 20}); });
+  }
+  EXPECT_THAT(Open(file_, Access::kReadOnly).Tours(), ::testing::ElementsAre(Tour{"All", {2, 1}, "de", 20}));
+  EXPECT_EQ(Open(file_, Access::kReadOnly).Verify(), std::vector<std::string>{});
+}
+
 TEST_P(Migration, SignpostsGetTheKeysOfTheirMapsAndMayLeadNowhere) {
   { Open(file_, Access::kReadWrite); }
   const std::string copy = (folder_ / CopyName()).string();
@@ -160,7 +178,7 @@ TEST_P(Migration, SignpostsGetTheKeysOfTheirMapsAndMayLeadNowhere) {
   // The upgraded library is given back its older format, with a scene of that time.
   Library::Open(file_, Access::kReadWrite, CreateIfMissing::kNo, QuickOptions())
       .Save({1, "", Policy::kOpen, nullptr, MakeTextScene("sign a 0 Door\nsign b 0 Gone")});
-  RunSql(file_, "DELETE FROM parts WHERE part LIKE '%.blocks'; PRAGMA user_version = 4");
+  RunSql(file_, "DELETE FROM parts WHERE part LIKE '%.blocks'; DROP TABLE tours; PRAGMA user_version = 4");
   const Library library = Open(file_, Access::kReadWrite);
   EXPECT_EQ(library.LoadScene(1).text, "sign a 2 Door\nsign b 0 Gone");
   EXPECT_EQ(library.Verify(), std::vector<std::string>{});

@@ -28,6 +28,7 @@ class PagesOfEachSize : public ::testing::TestWithParam<int> {
     RunSql(file_, "PRAGMA page_size = " + std::to_string(GetParam()) + "; VACUUM");
     Library library = OpenToWrite(file_);
     library.Remove(2);
+    library.ChangeTours([](std::vector<Tour>* tours) { tours->push_back({"All", {3, 1}, "de", 20}); });
   }
   // The data of all rows by what they are found by, as SQLite reads them.
   std::vector<std::pair<std::string, Bytes>> RowsBySqlite(const std::string& sql) const {
@@ -63,7 +64,7 @@ INSTANTIATE_TEST_SUITE_P(Bytes, PagesOfEachSize, ::testing::Values(512, 1024, 40
 TEST_P(PagesOfEachSize, HaveTheRowsThatSqliteReads) {
   const DamagedFile file(file_);
   EXPECT_EQ(file.application_id(), 0x446F6374u);
-  EXPECT_EQ(file.format(), 5u);
+  EXPECT_EQ(file.format(), 6u);
   for (std::size_t table = 0; table < kSalvagedTables; ++table)
     EXPECT_TRUE(file.complete(static_cast<SalvagedTable>(table))) << table;
   const auto parts = RowsBySqlite("SELECT map_key || ' ' || part, data FROM parts");
@@ -75,6 +76,9 @@ TEST_P(PagesOfEachSize, HaveTheRowsThatSqliteReads) {
   const auto assets = RowsBySqlite("SELECT id, data FROM assets");
   EXPECT_EQ(RowsByPages(file, SalvagedTable::kAssets, 2), assets);
   EXPECT_EQ(assets.size(), 4u);
+  const auto tours = RowsBySqlite("SELECT name, stops FROM tours");
+  EXPECT_EQ(RowsByPages(file, SalvagedTable::kTours, 3), tours);
+  EXPECT_EQ(tours.size(), 1u);
   std::vector<std::uint64_t> keys;
   for (const RowPlace& place : file.rows(SalvagedTable::kMaps)) {
     if (place.found == RowPlace::Page::kReached) keys.push_back(place.key);

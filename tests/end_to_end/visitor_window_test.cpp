@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// The window of a tour of the real program, used by keys on a virtual screen.
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <cstdlib>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/files/text_file.h"
+#include "maps/library/library.h"
+#include "tests/end_to_end/run_docent.h"
+#include "tests/support/virtual_screen.h"
+
+namespace docent::app {
+namespace {
+
+class VisitorAtWindow : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
+    if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+    maps::Library library =
+        maps::Library::Open(folder_ / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    for (const char* name : {"Lions", "Masks"})
+      library.Save({library.NewKey(), name, maps::Policy::kOpen, nullptr, nullptr});
+    library.ChangeTours([](std::vector<maps::Tour>* tours) { tours->push_back({"All", {1, 2}, "", 0}); });
+  }
+  void TearDown() override {
+    if (child_ > 0) {
+      kill(child_, SIGKILL);
+      waitpid(child_, nullptr, 0);
+    }
+  }
+  static void Xdotool(const std::string& command) {
+    EXPECT_EQ(std::system(("xdotool " + command + " > /dev/null").c_str()), 0) << command;
+  }
+  static void PressKeys(const std::string& keys) {
+    Xdotool("search --name Docent windowfocus sleep 0.2 key --delay 300 " + keys + " sleep 0.3");
+  }
+
+  const TemporaryFolder folder_;
+  VirtualScreen screen_{"1280x800"};
+  pid_t child_ = -1;
+};
+
+TEST_F(VisitorAtWindow, SkipsStopsAndIsLedBackByKeys) {
+  child_ = StartDocent({"tour", "--library", (folder_ / "l.docent").string(), "--camera", "sim:room",
+                        "--tour", "All", "--output", (folder_ / "out").string()},
+                       (folder_ / "output").string(), (folder_ / "errors").string());
+  Xdotool("search --sync --onlyvisible --name Docent windowfocus");
+  PressKeys("l b n b n n n");
+  // The key's release reaches no window any more.
+  const int ignored =
+      std::system("xdotool search --name Docent windowfocus sleep 0.2 keydown ctrl+q > /dev/null 2>&1");
+  static_cast<void>(ignored);
+  int status = 0;
+  waitpid(std::exchange(child_, -1), &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << ReadAll(folder_ / "errors");
+  std::istringstream lines(ReadAll(folder_ / "out/events.csv"));
+  std::vector<std::string> events;
+  for (std::string line; std::getline(lines, line);) {
+    const std::string event = line.substr(line.find(',') + 1);
+    if (event.starts_with("tour,") || event.starts_with("command,")) events.push_back(event);
+  }
+  // The first B and the last N can do nothing.
+  EXPECT_THAT(events, ::testing::ElementsAre(
+                          "command,tour skip", "tour,\"skipped 'Lions', stop 1 of 2\"", "command,tour back",
+                          "tour,\"going back to 'Lions', stop 1 of 2\"", "command,tour skip",
+                          "tour,\"going on to 'Masks', stop 2 of 2\"", "command,tour skip",
+                          "tour,\"skipped 'Masks', stop 2 of 2\"", "tour,finished; 0 of 2 stops seen"));
+}
+
+}  // namespace
+}  // namespace docent::app
