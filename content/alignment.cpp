@@ -140,7 +140,7 @@ std::vector<bool> Agreeing(const std::vector<double>& residuals, double extent) 
 }  // namespace
 
 Alignment AlignModel(std::span<const Correspondence> correspondences) {
-  if (correspondences.size() < 3)
+  if (correspondences.size() < kMinAlignmentPoints)
     throw Error("At least three points of the model with their places in the map are needed.");
   Pairs pairs;
   for (const Correspondence& pair : correspondences) {

@@ -11,6 +11,8 @@
 // pointed at them. Pure functions; thread-safe.
 namespace docent::content {
 
+inline constexpr std::size_t kMinAlignmentPoints = 3;
+
 // A point of a model and where it is in the map.
 struct Correspondence {
   Eigen::Vector3d in_model;  // Model axes, metres.

@@ -139,6 +139,22 @@ Warp FitWarp(std::span<const Correspondence> correspondences, const engine::Sim3
   return warp;
 }
 
+std::optional<Eigen::Vector3d> Unwarped(const Warp& warp, const Eigen::Vector3d& warped) {
+  constexpr int kIterations = 30;   // Four to six are usual.
+  constexpr double kAgrees = 1e-9;  // Relative to the size of the point and its displacement.
+  Eigen::Vector3d x = warped;
+  const double scale = 1e-12 + warped.norm() + (warp(x) - warped).norm();
+  for (int i = 0; i < kIterations; ++i) {
+    const Eigen::Vector3d error = warp(x) - warped;
+    if (!error.allFinite()) return std::nullopt;
+    if (error.norm() <= kAgrees * scale) return x;
+    const Eigen::FullPivLU<Eigen::Matrix3d> jacobian(warp.Jacobian(x));
+    if (!jacobian.isInvertible()) return std::nullopt;
+    x -= jacobian.solve(error);
+  }
+  return std::nullopt;
+}
+
 std::string Validate(const Warp& warp) {
   if (warp.controls.size() < kMinWarpPoints || warp.controls.size() > kMaxWarpPoints ||
       warp.weights.size() != warp.controls.size())

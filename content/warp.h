@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -35,6 +36,9 @@ struct Warp {
 // for points of the model of which two coincide or that lie in one plane, and for numbers that are not finite
 // or too large.
 Warp FitWarp(std::span<const Correspondence> correspondences, const engine::Sim3& map_from_model);
+
+// The point that the warp takes to `warped`, by Newton's method; empty where it finds none, as beyond a fold.
+std::optional<Eigen::Vector3d> Unwarped(const Warp& warp, const Eigen::Vector3d& warped);
 
 // What is wrong with a stored warp, as the end of a sentence; empty if nothing is.
 std::string Validate(const Warp& warp);

@@ -22,6 +22,9 @@ struct NewPose {
   engine::Sim3 map_from_entity;
 };
 
+// What happens while a model is fitted to the room by pairs of points.
+enum class FitStep { kBegin, kRemoveLast, kAlign, kBend, kEnd };
+
 // What a person asks for. Implementations do not throw; what cannot be done becomes a message.
 class AuthoringActions {
  public:
@@ -32,6 +35,8 @@ class AuthoringActions {
   virtual void UseMap(const std::string& name) = 0;
   virtual void RenameMap(const std::string& name, const std::string& new_name) = 0;
   virtual void RemoveMap(const std::string& name) = 0;
+  // Joins the map into the current one if both show the same place.
+  virtual void JoinMap(const std::string& name) = 0;
   // `policy`: one of strings::kPolicies.
   virtual void SetPolicy(const std::string& name, const std::string& policy) = 0;
   virtual void Undo() = 0;
@@ -63,6 +68,12 @@ class AuthoringActions {
   // All together, as one change.
   virtual void Transform(const std::vector<NewPose>& poses) = 0;
 
+  // Begins with the selected model, takes the last point back, moves or bends the model so that the pairs
+  // fit, or ends.
+  virtual void Fit(FitStep step) = 0;
+  // Gives a bent model its original shape again.
+  virtual void Unbend(const std::string& name) = 0;
+
   // Of the current map: its keyframes say which way is up; its scale is not known.
   virtual void ForgetUp() = 0;
   virtual void ForgetScale() = 0;
@@ -77,6 +88,16 @@ struct MapFacts {
   bool is_initialized = false;               // It has keyframes, here or in the library.
   bool objects_known = false;                // It is in memory, so that its size and content are known.
   std::uint64_t keyframes = 0, objects = 0;  // Valid with objects_known.
+};
+
+// A model that is being fitted to the room by pairs of points.
+struct FitFacts {
+  std::string name;
+  bool waits_for_place = false;  // The next click says where the last point of the model belongs.
+  std::size_t pairs = 0;
+  std::vector<double> residuals;  // Of each pair if the model is aligned, map units; empty if it cannot be.
+  std::vector<bool> used;         // Of each pair: whether it agrees with the others.
+  std::string problem;            // Why it cannot be aligned, as a sentence; often empty.
 };
 
 // What the window shows. The pointers are valid while it is drawn.
@@ -96,6 +117,7 @@ struct AuthoringFacts {
   const std::vector<std::string>* files = nullptr;  // Model files to choose from; null for none.
   bool has_copy = false;                            // Something can be pasted.
   bool has_two_cameras = false;
+  std::optional<FitFacts> fit;  // Empty while no model is being fitted.
 };
 
 // What a click in the image does.
@@ -118,7 +140,7 @@ struct AuthoringChoices {
   std::string image_file;
   bool image_upright = false;  // Else flush with the surface.
   std::string sound_file, caption;
-  bool show_points = false, show_keyframes = false, show_status = true;
+  bool show_points = false, show_keyframes = false, show_boundary = true, show_status = true;
   bool from_above = false;     // The map from above instead of the image.
   bool show_coverage = false;  // A small map from above in a corner of the image.
   bool frozen = false;         // The image and its pose stay.

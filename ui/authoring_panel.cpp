@@ -95,10 +95,14 @@ void AuthoringPanel::Draw(const WindowLayout& layout, const AuthoringFacts& fact
   DrawHeader(facts);
   if (Section(strings::kMap)) DrawMap(facts);
   if (ImGui::CollapsingHeader(strings::kSpace)) space_section_.Draw(facts, &choices_);
+  if (map_section_.begins_rename()) ImGui::SetNextItemOpen(true);
   if (ImGui::CollapsingHeader(strings::kMaps)) map_section_.Draw(facts);
   if (Section(strings::kPlace)) DrawPlace(facts);
   if (Section(strings::kContents)) entity_section_.DrawContents(facts);
-  if (Section(strings::kSelected)) entity_section_.DrawSelected(facts);
+  if (Section(strings::kSelected)) {
+    if (!facts.fit) entity_section_.DrawSelected(facts);
+    fit_section_.Draw(facts);
+  }
   if (Section(strings::kView)) DrawView();
   if (ImGui::CollapsingHeader(strings::kKeys)) {
     if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit)) {
@@ -121,8 +125,13 @@ void AuthoringPanel::DrawHeader(const AuthoringFacts& facts) {
   ImGui::AlignTextToFramePadding();
   const std::string name = facts.map_name.empty() ? strings::kNoMap : facts.map_name;
   Wrapped(name.c_str(), theme::kText);
-  if (facts.unsaved) Wrapped(strings::kUnsaved, theme::kAccentText);
-  Wrapped(SavedText(facts.saved_ago_s).c_str(), theme::kMutedText);
+  // One line in any case, so that what is below does not move under the pointer with every save.
+  const std::string saved = SavedText(facts.saved_ago_s);
+  if (facts.unsaved) {
+    Wrapped((std::string(strings::kUnsaved) + " · " + saved).c_str(), theme::kAccentText);
+  } else {
+    Wrapped(saved.c_str(), theme::kMutedText);
+  }
   if (choices_.frozen) Wrapped(strings::kFrozen, theme::kAccentText);
 }
 
@@ -248,6 +257,9 @@ void AuthoringPanel::DrawView() {
   ImGui::Checkbox(strings::kMapPoints, &choices_.show_points);
   SameLineIfFits(strings::kKeyframes);
   ImGui::Checkbox(strings::kKeyframes, &choices_.show_keyframes);
+  ImGui::Checkbox(strings::kBoundary, &choices_.show_boundary);
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", strings::kBoundaryHelp);
+  SameLineIfFits(strings::kStatus);
   ImGui::Checkbox(strings::kStatus, &choices_.show_status);
   if (ButtonInRow(strings::kFullScreen)) actions_->ToggleFullScreen();
 }

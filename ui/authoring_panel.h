@@ -6,6 +6,7 @@
 
 #include "ui/authoring_actions.h"
 #include "ui/entity_section.h"
+#include "ui/fit_section.h"
 #include "ui/map_section.h"
 #include "ui/space_section.h"
 #include "ui/window_layout.h"
@@ -19,7 +20,11 @@ class AuthoringPanel {
  public:
   // `actions` must outlive the panel.
   explicit AuthoringPanel(AuthoringActions* actions)
-      : actions_(actions), map_section_(actions), space_section_(actions), entity_section_(actions) {}
+      : actions_(actions),
+        map_section_(actions),
+        space_section_(actions),
+        entity_section_(actions),
+        fit_section_(actions) {}
 
   AuthoringChoices& choices() { return choices_; }
   const AuthoringChoices& choices() const { return choices_; }
@@ -27,6 +32,9 @@ class AuthoringPanel {
   static const char* window_name();
   // Writes into the name of the selected entity from the next frame on.
   void BeginRename() { entity_section_.BeginRename(); }
+
+  // Writes into the name of the current map from the next frame on.
+  void BeginMapRename() { map_section_.BeginRename(); }
 
   // Between Gui::Begin and Gui::Draw.
   void Draw(const WindowLayout& layout, const AuthoringFacts& facts);
@@ -50,6 +58,7 @@ class AuthoringPanel {
   MapSection map_section_;
   SpaceSection space_section_;
   EntitySection entity_section_;
+  FitSection fit_section_;
 };
 
 // "Saved 12 s ago" and the like.

@@ -133,6 +133,7 @@ void EntitySection::DrawRow(const content::Entity& entity, const AuthoringFacts&
   ImGui::PopStyleVar();
   if (ImGui::IsItemHovered() && !entity.group.empty()) ImGui::SetTooltip("%s", entity.group.c_str());
   ImGui::TableNextColumn();
+  ImGui::AlignTextToFramePadding();
   ImGui::TextDisabled("%s", strings::NameOf(entity.kind));
   ImGui::TableNextColumn();
   bool shown = !entity.hidden;
@@ -244,6 +245,10 @@ void EntitySection::DrawPose(const content::Entity& entity, const AuthoringFacts
   completed = NumberFields(SizeLabel(entity.kind), &size_, 1, "%.4g") || completed;
   ImGui::EndGroup();
   is_writing_ = ImGui::IsItemActive() || is_writing_;
+  if (content::HasModel(entity) && ImGui::Button(strings::kStandUpright)) {
+    angles_deg_[1] = angles_deg_[2] = 0;
+    completed = true;
+  }
   if (!completed) return;
   const Eigen::Vector3d angles(angles_deg_[0], angles_deg_[1], angles_deg_[2]);
   engine::Sim3 pose = TransformOf(entity, facts.camera_from_map.OriginInSource());

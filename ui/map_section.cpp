@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "ui/strings.h"
 #include "ui/theme.h"
@@ -40,6 +41,11 @@ bool MatchesFilter(const std::string& name, const std::string& filter) {
 }
 
 void MapSection::Draw(const AuthoringFacts& facts) {
+  if (begins_rename_) {
+    chosen_ = name_ = facts.map_name;
+    asks_removal_ = false;
+    filter_.clear();
+  }
   if (facts.maps.empty()) return MapRemark(strings::kNoMaps);
   constexpr std::size_t kFilterFrom = 8;  // Fewer maps are seen at once.
   if (facts.maps.size() >= kFilterFrom) {
@@ -53,7 +59,7 @@ void MapSection::Draw(const AuthoringFacts& facts) {
                                   [&](const MapFacts& map) { return map.name == chosen_; });
   if (found == facts.maps.end()) {
     chosen_.clear();
-    asks_removal_ = false;
+    asks_removal_ = begins_rename_ = false;
     return MapRemark(strings::kChooseMap);
   }
   DrawChosen(*found, facts);
@@ -83,7 +89,12 @@ void MapSection::DrawChosen(const MapFacts& map, const AuthoringFacts& facts) {
                 static_cast<unsigned long>(map.objects));
   MapRemark(map.objects_known ? size : strings::kNotInMemory);
   if (map.is_initialized && !is_current && ImGui::Button(strings::kContinueMap)) actions_->UseMap(map.name);
+  if (map.is_initialized && !is_current && !facts.map_name.empty()) {
+    if (ImGui::Button(strings::kJoinMap)) actions_->JoinMap(map.name);
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", strings::kJoinMapHelp);
+  }
   ImGui::SetNextItemWidth(0.65f * ImGui::GetContentRegionAvail().x);
+  if (std::exchange(begins_rename_, false)) ImGui::SetKeyboardFocusHere();
   ImGui::InputText(strings::kRename, &name_);
   // When the field is left; a name that is refused is reset.
   if (ImGui::IsItemDeactivatedAfterEdit() && name_ != map.name) {

@@ -15,6 +15,9 @@ class MapSection {
   explicit MapSection(AuthoringActions* actions) : actions_(actions) {}
 
   void Draw(const AuthoringFacts& facts);
+  // Writes into the name of the current map from the next frame on.
+  void BeginRename() { begins_rename_ = true; }
+  bool begins_rename() const { return begins_rename_; }
 
  private:
   void DrawList(const AuthoringFacts& facts);
@@ -27,6 +30,7 @@ class MapSection {
   std::string chosen_;  // Name of the chosen map; empty for none.
   std::string name_;    // As it is being written.
   bool asks_removal_ = false;
+  bool begins_rename_ = false;
 };
 
 // Whether `name` contains `filter`, whatever the case of ASCII letters; true for an empty filter.

@@ -83,6 +83,19 @@ class Drawing {
     }
   }
 
+  // The edges of a box along the map's axes.
+  void Box(const Eigen::AlignedBox3d& box) {
+    constexpr Color kEdge{1.0f, 0.796f, 0.420f, 0.9f};
+    using Corner = Eigen::AlignedBox3d::CornerType;
+    for (int corner = 0; corner < 8; ++corner) {
+      for (const int bit : {1, 2, 4}) {
+        if ((corner & bit) == 0)
+          Line(box.corner(static_cast<Corner>(corner)), box.corner(static_cast<Corner>(corner | bit)), kEdge,
+               1.5);
+      }
+    }
+  }
+
   // A camera as a disk with a wedge in its viewing direction, of the same size wherever it is.
   void Camera(const Orbit& orbit, const engine::Rigid3& camera_from_map) {
     const Color color{1.0f, 1.0f, 1.0f, 1.0f}, edge{0.0f, 0.0f, 0.0f, 1.0f};
@@ -251,6 +264,7 @@ void MapView::Draw(const engine::MapSnapshot& map, const Orbit& orbit, const Map
   for (const PredictedRecall& found : contents.predicted_recall) drawing.Wedge(orbit, found);
   drawing.Points(map, contents.grey_points);
   DrawKeyFrames(map, impl_->camera, camera_from_map, &impl_->below);
+  if (contents.boundary) drawing.Box(*contents.boundary);
   impl_->below.End();
   if (contents.scene != nullptr)
     impl_->content.Draw(impl_->camera, camera_from_map, *contents.scene, 0.0, true, target);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -64,8 +65,10 @@ struct MapViewContents {
   std::vector<PredictedRecall> predicted_recall;
   // Points are grey instead of coloured by pyramid level, so that colours mean recall only.
   bool grey_points = false;
+  // A box in map coordinates whose edges are drawn, for instance where the map ends; empty for none.
+  std::optional<Eigen::AlignedBox3d> boundary = std::nullopt;
   // The pose of a camera, drawn above everything else; empty for none.
-  std::optional<engine::Rigid3> camera_from_map;
+  std::optional<engine::Rigid3> camera_from_map = std::nullopt;
 };
 
 // Draws a map from outside: map points coloured by pyramid level, keyframes as frusta, the content, a grid

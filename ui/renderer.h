@@ -32,6 +32,11 @@ struct VisitorDisplay {
   // Images of known places that resemble what the camera sees (CV_8UC1 or CV_8UC3), which are drawn beside
   // each other.
   std::vector<cv::Mat> views;
+  // On a tour with stops: how far the visitor has come and where to go next, shown below the place. The stops
+  // themselves are shown on demand.
+  std::string route_line;
+  std::vector<std::string> route_stops;  // A line for each stop.
+  bool lists_route = false;              // Whether these lines are shown.
 };
 
 // What is drawn besides the video and the content.

@@ -72,13 +72,10 @@ void SceneOverlay::DrawLines(const GizmoLines& lines, const Color& color, double
   }
 }
 
-void SceneOverlay::DrawOutline(const PlacedBox& placed, const std::string& name, bool is_locked) {
+GizmoLines SceneOverlay::EdgesOf(const PlacedBox& placed, Eigen::AlignedBox2d* seen) const {
   constexpr int kSteps = 8;  // Lenses bend straight lines.
   const double far_px = camera_.lens.width_px() + camera_.lens.height_px();
   GizmoLines lines;
-  double top = image_.bottom();
-  double left = image_.right(), right = image_.x;
-  bool is_seen = false;
   for (int corner = 0; corner < 8; ++corner) {
     for (const int bit : {1, 2, 4}) {
       if ((corner & bit) != 0) continue;
@@ -93,18 +90,52 @@ void SceneOverlay::DrawOutline(const PlacedBox& placed, const std::string& name,
           continue;
         }
         lines.back().push_back(*pixel);
-        const Eigen::Vector2d point = box_.WindowFromImage(*pixel);
-        top = std::min(top, point.y());
-        left = std::min(left, point.x());
-        right = std::max(right, point.x());
-        is_seen = is_seen || camera_.lens.IsInside(*pixel);
+        if (seen != nullptr) seen->extend(box_.WindowFromImage(*pixel));
       }
     }
   }
+  return lines;
+}
+
+void SceneOverlay::DrawOutline(const PlacedBox& placed, const std::string& name, bool is_locked) {
+  Eigen::AlignedBox2d seen;
+  const GizmoLines lines = EdgesOf(placed, &seen);
   // A dark line below the bright one is seen on any image.
   DrawLines(lines, {0, 0, 0, 0.55f}, 3.5);
   DrawLines(lines, is_locked ? theme::kMutedText : theme::kSelection, 1.5);
-  if (is_seen) DrawTag({0.5 * (left + right), top - 6 * scale_}, name, image_, scale_);
+  const Eigen::Vector2d low(box_.x, box_.y);
+  const Eigen::AlignedBox2d image(low, low + Eigen::Vector2d(box_.width, box_.height));
+  if (seen.intersects(image)) DrawTag({seen.center().x(), seen.min().y() - 6 * scale_}, name, image_, scale_);
+}
+
+void SceneOverlay::DrawBoundary(const Eigen::AlignedBox3d& bounds) {
+  PlacedBox box;
+  box.low = bounds.min();
+  box.high = bounds.max();
+  const GizmoLines lines = EdgesOf(box, nullptr);
+  DrawLines(lines, {0, 0, 0, 0.4f}, 3);
+  DrawLines(lines, theme::kAccentText, 1.2);
+}
+
+void SceneOverlay::DrawPair(const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+                            const std::string& number) {
+  const auto at = [&](const Eigen::Vector3d& point) {
+    return camera_.lens.Project(camera_.camera_from_map * point);
+  };
+  const auto begin = at(from), end = at(to);
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const auto radius = static_cast<float>(4.5 * scale_);
+  if (begin && end) {
+    DrawLines({{*begin, *end}}, {0, 0, 0, 0.55f}, 3.5);
+    DrawLines({{*begin, *end}}, theme::kAccentText, 1.5);
+  }
+  if (end)
+    list->AddCircle(At(box_.WindowFromImage(*end)), 1.6f * radius, Packed(theme::kAccentText), 0, 2.0f);
+  if (!begin) return;
+  const Eigen::Vector2d point = box_.WindowFromImage(*begin);
+  list->AddCircleFilled(At(point), radius + 1, Packed({0, 0, 0, 0.7f}));
+  list->AddCircleFilled(At(point), radius, Packed(theme::kText));
+  DrawTag(point - Eigen::Vector2d(0, 10 * scale_), number, image_, scale_);
 }
 
 void SceneOverlay::DrawGizmo(const Gizmo& gizmo, GizmoPart highlighted) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Geometry>
 #include <string>
 
 #include "ui/entity_shapes.h"
@@ -23,6 +24,10 @@ class SceneOverlay {
 
   // The edges of an entity's box, and its name above it.
   void DrawOutline(const PlacedBox& placed, const std::string& name, bool is_locked);
+  // The edges of the box within which the map is extended, in map coordinates.
+  void DrawBoundary(const Eigen::AlignedBox3d& bounds);
+  // A point of the map that belongs at another one, with its number.
+  void DrawPair(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const std::string& number);
   // The handles; the one under the pointer or held is brighter.
   void DrawGizmo(const Gizmo& gizmo, GizmoPart highlighted);
   // A text at a point of the window, such as what is wrong below the pointer.
@@ -31,6 +36,9 @@ class SceneOverlay {
   void DrawBanner(const std::string& text);
 
  private:
+  // The edges of a box as far as the lens sees them. `seen`, if not null, is extended by the visible part, in
+  // pixels of the window.
+  GizmoLines EdgesOf(const PlacedBox& placed, Eigen::AlignedBox2d* seen) const;
   void DrawLines(const GizmoLines& lines, const Color& color, double width);
 
   const GizmoCamera& camera_;

@@ -43,6 +43,7 @@ AuthorControls::AuthorControls(ui::Window* window, Host host, std::filesystem::p
       panel_(this),
       shapes_(host_.language),
       pointer_(&selection_, &shapes_, this),
+      fitting_(&shapes_),
       ghost_(std::move(model_folder)),
       recent_(RecentFiles::DefaultPlace()) {
   files_ = ModelFilesIn(".");
@@ -60,7 +61,7 @@ double AuthorControls::Now() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-void AuthorControls::Take(std::vector<Notice> notices) {
+void AuthorControls::Take(const std::vector<Notice>& notices) {
   for (const Notice& notice : notices) {
     board_.AddError(notice.problem);
     if (!notice.done) continue;
@@ -80,11 +81,13 @@ void AuthorControls::SetView(AuthorView view, const SavingState& saving, std::ve
     selection_.Clear();
     pointer_.Cancel();
     placing_.Cancel();
+    fitting_.End();
     names_before_.reset();
   }
   if (map == 0) return;
   SelectNew();
   selection_.KeepExisting(view_.scene.get());
+  fitting_.KeepExisting(view_.scene.get());
 }
 
 // Entities that a command of this window has added are selected when they appear.
@@ -127,6 +130,7 @@ void AuthorControls::Escape() {
   if (gui_.HasPopup()) return;  // It closes.
   if (gui_.IsNavigated()) return gui_.LeaveWidgets();
   if (pointer_.Cancel() || placing_.Cancel()) return;
+  if (fitting_.is_active()) return fitting_.End();
   const ui::MapPick pick = std::exchange(panel_.choices().pick, ui::MapPick::kNone);
   if (pick == ui::MapPick::kMeasureFrom || pick == ui::MapPick::kMeasureTo) panel_.choices().frozen = false;
   if (pick != ui::MapPick::kNone) return;
@@ -151,9 +155,9 @@ void AuthorControls::HandleKey(const ui::InputEvent& event) {
   if (gui_.HasPopup()) return;
   if (event.control) return HandleControlKey(event.key);
   if (event.key == "delete") return RemoveSelected();
-  if (event.key == "f2" && selection_.names().size() == 1) {
+  if (event.key == "f2" && selection_.names().size() <= 1) {
     choices.panel_open = true;
-    return panel_.BeginRename();
+    return selection_.names().empty() ? panel_.BeginMapRename() : panel_.BeginRename();
   }
   if (event.key == "tab" && !gui_.IsNavigated()) {
     choices.panel_open = true;
@@ -191,6 +195,11 @@ void AuthorControls::HandleClick(const ui::InputEvent& event) {
   if (!view_.ShowsImageAt(event.position)) return;
   const Eigen::Vector2d pixel = view_.PixelAt(event.position);
   if (panel_.choices().pick != ui::MapPick::kNone) return HandlePick(pixel);
+  if (fitting_.is_active()) {
+    const std::string note = fitting_.Click(view_, pixel);
+    if (!note.empty()) board_.AddDone(note, false, Now());
+    return;
+  }
   if (!IsPlacing()) return pointer_.Press(view_, event.position, event.shift);
   Place(panel_.choices(), pixel);
 }
@@ -254,8 +263,8 @@ void AuthorControls::UpdatePreview() {
   const std::shared_ptr<const content::Scene> before = std::move(preview_);
   const Eigen::Vector2d point = window_->PointerPosition();
   ghost_note_.clear();
-  const bool shows_ghost =
-      IsPlacing() && !panel_.choices().from_above && !gui_.WantsMouse() && view_.ShowsImageAt(point);
+  const bool shows_ghost = IsPlacing() && !fitting_.is_active() && !panel_.choices().from_above &&
+                           !gui_.WantsMouse() && view_.ShowsImageAt(point);
   preview_ = shows_ghost ? ghost_.AddTo(view_.scene, view_, panel_.choices(), view_.PixelAt(point),
                                         TrailEnd(), &ghost_note_)
                          : pointer_.Preview(view_.scene);
@@ -280,6 +289,7 @@ ui::AuthoringFacts AuthorControls::Facts() const {
   facts.selection = &selection_;
   facts.files = &files_;
   facts.has_copy = !copied_names_.empty();
+  facts.fit = fitting_.Facts(view_.scene.get());
   if (!view_.frame) return facts;
   const engine::TrackedFrame& tracked = view_.frame->tracked;
   const Session::Shown& shown = view_.frame->shown;
@@ -298,7 +308,18 @@ double AuthorControls::Draw(const ui::WindowLayout& layout) {
   if (!panel_.choices().from_above) {
     const Eigen::Vector2d pointer = window_->PointerPosition();
     ui::SceneOverlay overlay(view_.camera, view_.box, view_.image, view_.scale);
-    if (preview_) pointer_.Draw(view_, *preview_, pointer, &overlay);
+    if (panel_.choices().show_boundary && view_.has_pose() && view_.frame->shown.bounds) {
+      const maps::Bounds& bounds = *view_.frame->shown.bounds;
+      overlay.DrawBoundary({bounds.min, bounds.max});
+    }
+    if (preview_) {
+      // Handles would cover the object whose points are to be clicked.
+      if (fitting_.is_active()) {
+        fitting_.Draw(view_, *preview_, &overlay);
+      } else {
+        pointer_.Draw(view_, *preview_, pointer, &overlay);
+      }
+    }
     if (!ghost_note_.empty()) overlay.DrawNote(pointer, ghost_note_);
     if (panel_.choices().frozen) overlay.DrawBanner(ui::strings::kFrozen);
   }
@@ -307,6 +328,22 @@ double AuthorControls::Draw(const ui::WindowLayout& layout) {
   quit_dialog_.Draw(layout, this);
   gui_.Draw();
   return height;
+}
+
+void AuthorControls::Fit(ui::FitStep step) {
+  switch (step) {
+    case ui::FitStep::kBegin:
+      if (selection_.names().size() == 1) fitting_.Begin(selection_.names().front());
+      return;
+    case ui::FitStep::kRemoveLast:
+      return fitting_.RemoveLast();
+    case ui::FitStep::kAlign:
+      return host_.emit(fitting_.AlignCommand());
+    case ui::FitStep::kBend:
+      return host_.emit(fitting_.BendCommand());
+    case ui::FitStep::kEnd:
+      return fitting_.End();
+  }
 }
 
 void AuthorControls::AskToQuit() {

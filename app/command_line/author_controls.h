@@ -11,6 +11,7 @@
 #include "app/command_line/author_view.h"
 #include "app/command_line/command_actions.h"
 #include "app/command_line/file_dialog.h"
+#include "app/command_line/fitting_tool.h"
 #include "app/command_line/notices.h"
 #include "app/command_line/placing_ghost.h"
 #include "app/command_line/placing_tool.h"
@@ -41,7 +42,7 @@ class AuthorControls final : public CommandActions {
   AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder);
 
   // Makes notices of the session messages.
-  void Take(std::vector<Notice> notices);
+  void Take(const std::vector<Notice>& notices);
   // What is shown from now on, until the next call.
   void SetView(AuthorView view, const SavingState& saving, std::vector<ui::MapFacts> maps);
   void Handle(const ui::InputEvent& event);
@@ -68,6 +69,7 @@ class AuthorControls final : public CommandActions {
   void CopySelected() override;
   void Paste() override;
   void Group(const std::vector<std::string>& names) override;
+  void Fit(ui::FitStep step) override;
   void ToggleFullScreen() override { host_.toggle_full_screen(); }
 
  private:
@@ -98,6 +100,7 @@ class AuthorControls final : public CommandActions {
   ui::EntityShapes shapes_;
   PointerTool pointer_;
   PlacingTool placing_;
+  FittingTool fitting_;
   PlacingGhost ghost_;
   FileDialog dialog_;
   content::AssetKind dialog_kind_ = content::AssetKind::kModel;  // What it is open for.

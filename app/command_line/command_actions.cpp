@@ -23,6 +23,14 @@ void CommandActions::RemoveMap(const std::string& name) {
   emit_(app::RemoveMap{name});
 }
 
+void CommandActions::JoinMap(const std::string& name) {
+  emit_(app::JoinMap{name});
+}
+
+void CommandActions::Unbend(const std::string& name) {
+  emit_(UnbendEntity{name});
+}
+
 void CommandActions::SetPolicy(const std::string& name, const std::string& policy) {
   if (const auto parsed = maps::ParsePolicy(policy)) emit_(app::SetPolicy{name, *parsed});
 }

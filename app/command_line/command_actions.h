@@ -22,6 +22,8 @@ class CommandActions : public ui::AuthoringActions {
   void UseMap(const std::string& name) override;
   void RenameMap(const std::string& name, const std::string& new_name) override;
   void RemoveMap(const std::string& name) override;
+  void JoinMap(const std::string& name) override;
+  void Unbend(const std::string& name) override;
   void SetPolicy(const std::string& name, const std::string& policy) override;
   void Undo() override;
   void Redo() override;

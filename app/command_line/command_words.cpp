@@ -23,6 +23,7 @@ struct DoneWriter {
     return "Renamed the map " + c.name + " to " + c.new_name + ".";
   }
   std::string operator()(const RemoveMap& c) const { return "Removed the map " + c.name + "."; }
+  std::string operator()(const JoinMap& c) const { return "Comparing the map " + c.name + " with this one…"; }
   std::string operator()(const SetMapUp& c) const {
     return c.pixel ? "This surface is level now." : "The map finds out again which way is up.";
   }
@@ -75,6 +76,9 @@ struct DoneWriter {
     return (c.group.empty() ? "Ungrouped " : "Grouped ") + NamesText(c.names) + ".";
   }
   std::string operator()(const PasteEntities& c) const { return "Pasted " + NamesText(c.names) + "."; }
+  std::string operator()(const GuideVisitor& c) const {
+    return c.step == GuideVisitor::Step::kSkip ? "Skipped a stop." : "Going back to the stop before.";
+  }
   std::string operator()(const Undo&) const { return "Undid the last change."; }
   std::string operator()(const Redo&) const { return "Did the change again."; }
   std::string operator()(const Save&) const { return "Saving all maps."; }
@@ -92,7 +96,8 @@ std::string DoneText(const Command& command) {
 }
 
 bool CanBeUndone(const Command& command) {
-  return !IsOneOf<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, Undo, Redo, Save>(command);
+  return !IsOneOf<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, JoinMap, GuideVisitor, Undo, Redo,
+                  Save>(command);
 }
 
 }  // namespace docent::app

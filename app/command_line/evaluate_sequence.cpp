@@ -60,7 +60,7 @@ void DumpFrame(const std::filesystem::path& folder, std::size_t number, const en
 }
 
 // Adds the session's maps to the record and, unless this is one of many runs, their panoramas to the report.
-void AddMaps(std::vector<Session::MapState> maps, const std::filesystem::path& folder, bool has_truth,
+void AddMaps(const std::vector<Session::MapState>& maps, const std::filesystem::path& folder, bool has_truth,
              bool one_of_many, RunRecord* record, std::vector<ShownPanorama>* panoramas) {
   for (const Session::MapState& map : maps) {
     if (!map.snapshot) continue;

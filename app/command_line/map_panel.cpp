@@ -55,6 +55,7 @@ void MapPanel::Draw(const ShownFrame& frame, int width_px, int height_px, bool h
   contents.scene = frame.shown.scene.get();
   contents.grey_points = true;
   if (has_title) contents.title = frame.shown.map_name;
+  if (const auto& bounds = frame.shown.bounds) contents.boundary.emplace(bounds->min, bounds->max);
   if (engine::HasPose(frame.tracked.state)) contents.camera_from_map = frame.tracked.camera_from_map;
   {
     const std::scoped_lock lock(mutex_);

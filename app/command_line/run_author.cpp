@@ -37,6 +37,32 @@ void CopyRunArguments(const RunArguments& run, bool any_live, GuideRequest* requ
   request->language = run.language ? *run.language : LanguageOfEnvironment();
 }
 
+// Throws Error if the library has no such tour, or the tour has no stops.
+maps::Tour FindTour(const maps::Library& library, const std::string& name) {
+  std::vector<std::string> damaged;
+  for (const maps::Tour& tour : library.Tours(&damaged)) {
+    if (tour.name != name) continue;
+    if (!tour.stops.empty()) return tour;
+    throw Error("The tour '" + name + "' has no stops; docent maps tour edit gives it some.");
+  }
+  throw Error("'" + library.file() + "' has no tour named '" + name + "'.");
+}
+
+Route RouteOf(const maps::Library& library, const maps::Tour& tour) {
+  Route route;
+  route.minutes = tour.minutes;
+  for (const std::uint64_t stop : tour.stops) route.stops.push_back({stop, library.Find(stop).name});
+  for (const maps::Library::Signpost& signpost : library.Signposts())
+    route.signposts.Add(signpost.map.key, signpost.to_key);
+  return route;
+}
+
+void ReadScriptFor(const std::filesystem::path& path, GuideRequest* request) {
+  request->script = ReadScript(path);
+  request->script_name = path.string();
+  request->model_folder = path.parent_path();
+}
+
 std::shared_ptr<const engine::PlanarTarget> ReadTarget(const std::filesystem::path& path, double width_m) {
   std::vector<std::uint8_t> bytes;
   cv::Mat image = ReadImage(path, &bytes);
@@ -54,11 +80,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   GuideRequest request;
   request.may_write = true;
   request.title = "Docent - author";
-  if (options.script) {
-    request.script = ReadScript(*options.script);
-    request.script_name = options.script->string();
-    request.model_folder = options.script->parent_path();
-  }
+  if (options.script) ReadScriptFor(*options.script, &request);
   const WhenLost otherwise = options.run.headless ? WhenLost::kNew : WhenLost::kWait;
   request.new_map_when_lost = options.when_lost.value_or(otherwise) == WhenLost::kNew;
   if (options.target) request.target = ReadTarget(*options.target, options.target_width_m);
@@ -80,12 +102,18 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
 }
 
 void RunTour(const TourOptions& options, Verbosity verbosity) {
+  GuideRequest request;
+  if (options.script) ReadScriptFor(*options.script, &request);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
-  GuideRequest request;
   request.library = &library;
   request.title = "Docent - tour";
   CopyRunArguments(options.run, AnyLive(cameras), &request);
+  if (options.tour) {
+    const maps::Tour tour = FindTour(library, *options.tour);
+    request.route = RouteOf(library, tour);
+    if (!options.run.language && !tour.language.empty()) request.language = tour.language;
+  }
   std::uint64_t frames = 0, localized = 0;
   request.on_frame = [&](const ShownFrame& frame) {
     ++frames;

@@ -103,6 +103,22 @@ void MapCommands::Apply(const RemoveMap& command, const engine::TrackedFrame& fr
   memory_.PinMapsInUse();
 }
 
+void MapCommands::Apply(const JoinMap& command, const engine::TrackedFrame& frame) {
+  const SessionMap* const into = state_.FindMap(system_.CurrentMap(CameraOf(frame)));
+  if (into == nullptr) throw Error("there is no current map to join another one to");
+  const SessionMap& from = state_.InitializedMap(command.name);
+  if (from.key == into->key) throw Error("'" + command.name + "' is the current map already");
+  if (system_.IsInUse(from.key))
+    throw Error("the map '" + from.name + "' is in use and cannot be joined now");
+  for (const SessionMap* map : {&from, into}) {
+    if (map->policy != maps::Policy::kOpen)
+      throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be joined");
+  }
+  if (system_.ActiveMap() != into->key)
+    throw Error("the map '" + into->name + "' is not being extended; continue it first");
+  system_.JoinIntoActiveMap(from.key);
+}
+
 void MapCommands::Apply(const Save&, const engine::TrackedFrame& frame) {
   if (!saving_.HasStarted()) throw Error("there is no library to save to");
   saving_.SaveAll(frame.frame.time);

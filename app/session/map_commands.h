@@ -39,6 +39,7 @@ class MapCommands {
   void Apply(const SetPolicy& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
   void Apply(const RenameMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
   void Apply(const RemoveMap& command, const engine::TrackedFrame& frame, std::unique_lock<std::mutex>* lock);
+  void Apply(const JoinMap& command, const engine::TrackedFrame& frame);
   void Apply(const Save& command, const engine::TrackedFrame& frame);
 
  private:

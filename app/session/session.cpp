@@ -86,6 +86,8 @@ engine::TrackedFrame Session::Process(const engine::Frame& frame) {
 
 void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
                       const std::filesystem::path& model_folder) {
+  if (std::holds_alternative<GuideVisitor>(command))
+    throw Error("there are no stops; use docent tour --tour NAME to be led along a tour");
   if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
     throw Error("a tour is read-only; use docent author to make changes");
   }
@@ -99,7 +101,7 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
       map_commands_.Apply(chosen, frame, &lock);  // waits for the disk
     } else if constexpr (requires { map_commands_.Apply(chosen, frame); }) {
       map_commands_.Apply(chosen, frame);
-    } else {
+    } else if constexpr (requires { content_commands_.Apply(chosen, frame); }) {
       content_commands_.Apply(chosen, frame);
     }
   };
@@ -134,6 +136,7 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   if (found == state_.maps.end()) return shown;
   shown.map_name = found->second.name;
   shown.scene = found->second.scene;
+  if (found->second.policy == maps::Policy::kBounded) shown.bounds = found->second.bounds;
   // The pointer to the triangles keeps the whole mesh alive.
   const std::shared_ptr<const engine::MapMesh>& mesh = found->second.mesh;
   if (options_.occlusion && mesh) shown.surfaces = {mesh, &mesh->mesh};

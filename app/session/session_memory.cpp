@@ -109,6 +109,7 @@ void SessionMemory::LoadFor(const Command& command) {
   const std::string* name = nullptr;
   if (const auto* use = std::get_if<UseMap>(&command)) name = &use->name;
   if (const auto* policy = std::get_if<SetPolicy>(&command)) name = &policy->name;
+  if (const auto* join = std::get_if<JoinMap>(&command)) name = &join->name;
   if (const auto* paste = std::get_if<PasteEntities>(&command)) name = &paste->from_map;
   if (!pager_ || name == nullptr) return;
   std::uint64_t key = 0;

@@ -151,9 +151,11 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
 }
 
 void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::JoinRefused& what) {
-  state_.AddEvent(event.time, "map",
-                  "maps " + state_.NameOf(event.map) + " and " + state_.NameOf(what.from) +
-                      " were not joined: " + TextOf(what.refusal, what.overlap));
+  const std::string sentence = "maps " + state_.NameOf(event.map) + " and " + state_.NameOf(what.from) +
+                               " were not joined: " + TextOf(what.refusal, what.overlap);
+  state_.AddEvent(event.time, "map", sentence);
+  if (!what.asked) return;
+  for (SessionCamera& camera : state_.cameras) camera.Advise(sentence);
 }
 
 void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::RigChanged& what) {

@@ -34,6 +34,13 @@ void MapJoinRequests::Request(const KnownMap& into) {
   }
 }
 
+void MapJoinRequests::Ask(KnownMap* from, const KnownMap& into) {
+  from->join_with = into.key;
+  from->join_at = 0;
+  from->join_asked = true;
+  Request(into);
+}
+
 MapJoinRequests::Answer MapJoinRequests::Check(const MappingThread::MapperUpdate::Join& update,
                                                const KnownMap& into) const {
   if (!pending_ || pending_->number != update.number) return Answer::kOutdated;
@@ -48,7 +55,7 @@ void MapJoinRequests::Handle(const MapJoinAttempt& attempt, KnownMap* into) {
   if (!attempt.joined) {
     if (attempt.overlap.outcome == MapOverlap::Outcome::kInterrupted) return;
     from.join_at = CompareAgainAt(KeyFramesOf(*into->snapshot, *from.snapshot), attempt_growth_);
-    JoinRefused event{from.key, attempt.refusal, attempt.overlap};
+    JoinRefused event{from.key, attempt.refusal, attempt.overlap, std::exchange(from.join_asked, false)};
     event.overlap.candidates.clear();
     state_.Emit(state_.LastTime(), into->key, std::move(event));
     return;

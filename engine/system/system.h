@@ -79,6 +79,10 @@ class System {
   void EnterMap(std::uint64_t key, std::size_t camera);
   // No camera stays in the map, and it is no longer extended. A map that was never initialized is forgotten.
   void LeaveMap(std::uint64_t key);
+  // Compares a map that is in memory and not in use with the active map, and joins them if both show the same
+  // place. The answer is an event, MapsJoined or JoinRefused; a refused pair is compared again when the
+  // active map has grown.
+  void JoinIntoActiveMap(std::uint64_t from);
   // Leaves the map, as LeaveMap does, and forgets it: no camera finds it any more.
   void RemoveMap(std::uint64_t key);
   // The mapper works on this map from now on, if its permissions allow it, and on none otherwise.

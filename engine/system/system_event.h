@@ -71,6 +71,7 @@ struct JoinRefused {
   std::uint64_t from = 0;                    // key of the other map
   JoinRefusal refusal = JoinRefusal::kNone;  // why
   MapOverlap overlap;                        // what the comparison found; without candidates
+  bool asked = false;                        // whether a person had asked for it
 };
 // The relative pose of the first two cameras became rigid, or is no longer rigid.
 struct RigChanged {

@@ -38,7 +38,8 @@ struct KnownMap {
   ProvisionalMap provisional;  // pending for a map that was started here until its depth is confirmed
   bool discarded = false;
   bool after_loss = false;        // started because the camera was lost in another map
-  std::uint64_t join_with = 0;    // the map that the camera returned to from this one; 0 for none
+  std::uint64_t join_with = 0;    // the map that this one is to be joined into if they overlap; 0 for none
+  bool join_asked = false;        // a person asked for it, and has no answer yet
   std::size_t join_at = 0;        // number of keyframes of both maps from which joining is attempted
   std::uint64_t joined_into = 0;  // the map that it was joined into; 0 for none
 

@@ -89,6 +89,28 @@ TEST(Warp, TheJacobianIsTheDerivative) {
   }
 }
 
+TEST(Warp, IsInverted) {
+  Random random(4);
+  std::vector<Correspondence> pairs;
+  for (int i = 0; i < 12; ++i) {
+    const Eigen::Vector3d point = AnyPoint(&random);
+    pairs.push_back({point, point + 0.05 * AnyPoint(&random)});
+  }
+  const Warp warp = FitWarp(pairs, {});
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d point = AnyPoint(&random);
+    const std::optional<Eigen::Vector3d> back = Unwarped(warp, warp(point));
+    ASSERT_TRUE(back.has_value());
+    EXPECT_LT((*back - point).norm(), 1e-6);
+  }
+}
+
+TEST(Warp, HasNoInverseWhereItIsFlat) {
+  Warp flat;
+  flat.affine.row(2).setZero();
+  EXPECT_FALSE(Unwarped(flat, {1, 2, 3}).has_value());
+}
+
 TEST(FitWarp, RefusesUnsuitablePoints) {
   Random random(4);
   const auto refusal = [](const std::vector<Correspondence>& pairs) {

@@ -42,6 +42,9 @@ class AskedFor : public AuthoringActions {
     words.push_back("rename map " + name + " to " + new_name);
   }
   void RemoveMap(const std::string& name) override { words.push_back("remove map " + name); }
+  void JoinMap(const std::string& name) override { words.push_back("join map " + name); }
+  void Fit(FitStep step) override { words.push_back("fit " + std::to_string(static_cast<int>(step))); }
+  void Unbend(const std::string& name) override { words.push_back("unbend " + name); }
   void SetPolicy(const std::string& name, const std::string& policy) override {
     words.push_back("policy of " + name + ": " + policy);
   }
@@ -236,6 +239,21 @@ TEST_F(InterfaceOnScreen, TheListSelects) {
   // The rows are below the header of the list: clicks from top to bottom meet both in order.
   for (double y = 322; y < 640 && asked_.words.size() < 1; y += 14) Click({layout_.panel.x + 40, y});
   EXPECT_THAT(asked_.words, ElementsAre("select sign-1"));
+}
+
+TEST_F(InterfaceOnScreen, TheCurrentMapIsRenamedInItsField) {
+  MapFacts other, hall;
+  other.name = "Attic";
+  hall.name = facts_.map_name = "Hall";
+  hall.is_initialized = true;
+  hall.policy = "open";
+  facts_.maps = {other, hall};
+  panel_->BeginMapRename();
+  for (int i = 0; i < 3; ++i) Draw();
+  ASSERT_TRUE(gui_->WritesText());
+  Act("search --name Docent windowfocus sleep 0.1 key ctrl+a sleep 0.1 type --delay 60 Cove");
+  Press("Return");
+  EXPECT_THAT(asked_.words, ElementsAre("rename map Hall to Cove"));
 }
 
 TEST(Letterbox, MapsWindowPointsToImagePixels) {

@@ -126,6 +126,7 @@ TEST(CommandWords, KnowWhatCanBeUndone) {
   EXPECT_FALSE(CanBeUndone(Undo{}));
   EXPECT_FALSE(CanBeUndone(Save{}));
   EXPECT_FALSE(CanBeUndone(RemoveMap{"Hall"}));
+  EXPECT_FALSE(CanBeUndone(JoinMap{"Hall"}));
 }
 
 }  // namespace

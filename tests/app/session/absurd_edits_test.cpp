@@ -42,7 +42,8 @@ class AbsurdCommands {
       case 3:
         return RenameMap{MapName(), random_.Below(3) == 0 ? MapName() : Name()};
       case 4:
-        return random_.Below(10) == 0 ? Command(RemoveMap{MapName()}) : Command(Save{});
+        if (random_.Below(10) == 0) return RemoveMap{MapName()};
+        return random_.Below(5) == 0 ? Command(JoinMap{MapName()}) : Command(Save{});
       case 5:
       case 6:
       case 7:

@@ -305,6 +305,7 @@ TEST_F(ContentInASession, MapsAreRenamedAndRemovedWithTheSignpostsThatLeadToThem
   EXPECT_EQ(library_.FindByName("Cove").key, bay);
   EXPECT_EQ(sign_in(hall).to_map, "Cove");
   EXPECT_EQ(sign_in(hall).to_key, bay);
+  EXPECT_THAT(Do(JoinMap{"Hall"}), HasSubstr("no current map"));
   ASSERT_EQ(Do(SetPolicy{"Cove", maps::Policy::kReadOnly}), "");
   EXPECT_THAT(Do(RenameMap{"Cove", "Bay"}), HasSubstr("read-only: it cannot be renamed"));
   EXPECT_THAT(Do(RemoveMap{"Cove"}), HasSubstr("read-only: it cannot be removed"));
@@ -318,6 +319,21 @@ TEST_F(ContentInASession, MapsAreRenamedAndRemovedWithTheSignpostsThatLeadToThem
   EXPECT_EQ(library_.List()[0].name, "Hall");
   EXPECT_THAT(library_.LoadScene(hall).text, HasSubstr("\"to_map\":\"\"")) << "saved at the end";
   EXPECT_THAT(library_.Verify(), IsEmpty());
+}
+
+TEST_F(ContentInASession, TheBoundaryOfABoundedMapIsShown) {
+  Run([&] {
+    EXPECT_FALSE(session_->ShownWith(frame_).bounds.has_value());
+    ASSERT_EQ(Do(SetPolicy{"Bay", maps::Policy::kBounded}), "");
+    const std::optional<maps::Bounds> bounds = session_->ShownWith(frame_).bounds;
+    ASSERT_TRUE(bounds.has_value());
+    const Eigen::Vector3d camera = frame_.camera_from_map.OriginInSource();
+    const Eigen::Vector3d margin = 0.2 * (bounds->max - bounds->min);
+    EXPECT_TRUE(((camera - bounds->min + margin).array() >= 0).all());
+    EXPECT_TRUE(((bounds->max + margin - camera).array() >= 0).all());
+    ASSERT_EQ(Do(SetPolicy{"Bay", maps::Policy::kOpen}), "");
+    EXPECT_FALSE(session_->ShownWith(frame_).bounds.has_value());
+  });
 }
 
 TEST_F(ContentInASession, ContentIsPastedFromAnotherMapAndSignpostsLeadToOtherMapsOnly) {
@@ -341,6 +357,11 @@ TEST_F(ContentInASession, ContentIsPastedFromAnotherMapAndSignpostsLeadToOtherMa
               acted_ = true;
               const std::string here = session_->ShownWith(frame).map_name, there = "Hall";
               ASSERT_EQ(here, "Bay");
+              EXPECT_THAT(Do(JoinMap{"Attic"}), HasSubstr("no map 'Attic'"));
+              EXPECT_THAT(Do(JoinMap{here}), HasSubstr("'Bay' is the current map already"));
+              ASSERT_EQ(Do(SetPolicy{there, maps::Policy::kReadOnly}), "");
+              EXPECT_THAT(Do(JoinMap{there}), HasSubstr("'Hall' is read-only: it cannot be joined"));
+              ASSERT_EQ(Do(SetPolicy{there, maps::Policy::kOpen}), "");
               const double ratio = 0.5;  // of the distances that the first keyframes see
               EXPECT_THAT(Do(PlaceSignpost{"x", kPixel, here}), HasSubstr("cannot lead to its own map"));
               EXPECT_THAT(Do(PlaceSignpost{"x", kPixel, "Attic"}), HasSubstr("no map 'Attic'"));

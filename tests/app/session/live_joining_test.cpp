@@ -205,6 +205,46 @@ TEST(LiveJoining, DoesNotJoinMapsOfLookAlikePlaces) {
   EXPECT_EQ(outcome.frames.back().map_key, outcome.maps[0].key);
 }
 
+TimedCommand BeforeFrame(std::size_t frame, Command command) {
+  return {FromSeconds((static_cast<double>(frame) - 0.5) / 30.0), 1, std::move(command)};
+}
+
+// The camera walks on from the first map into the second and back over the whole way.
+TEST(LiveJoining, JoinsTwoMapsWhenAPersonAsksForIt) {
+  std::vector<int> order;
+  Append(0, 120, &order);
+  const std::size_t second = order.size();
+  Append(120, 30, &order);
+  const std::size_t asked = order.size();
+  Append(30, 90, &order);
+  const SourceRun outcome =
+      RunInOrder(Simulate("loop"), order, Pace::kLockstep, nullptr,
+                 {BeforeFrame(kSignInFirst, PlaceSignpost{"first", kMiddle, ""}),
+                  BeforeFrame(second, NewMap{"Annex"}), BeforeFrame(asked, JoinMap{"Hall"})});
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Annex and Hall were joined")));
+  ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.map_events);
+  EXPECT_EQ(outcome.maps[0].name, "Annex");
+  EXPECT_EQ(engine::Validate(*outcome.maps[0].snapshot), "");
+  EXPECT_EQ(outcome.maps[0].scene->entities.size(), 1u);
+}
+
+TEST(LiveJoining, SaysWhyMapsThatAPersonAskedForAreNotJoined) {
+  const auto simulation = Simulate("desks:2");
+  std::vector<int> order;
+  for (const char* const desk : {"build0", "build1"}) {
+    for (int i = 0; i < simulation->frame_count(); ++i) {
+      if (simulation->label(i) == desk) order.push_back(i);
+    }
+  }
+  const auto second = static_cast<std::size_t>(
+      std::count_if(order.begin(), order.end(), [&](int i) { return simulation->label(i) == "build0"; }));
+  const SourceRun outcome =
+      RunInOrder(simulation, order, Pace::kLockstep, nullptr,
+                 {BeforeFrame(second, NewMap{"Annex"}), BeforeFrame(order.size() - 30, JoinMap{"Hall"})});
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Annex and Hall were not joined: ")));
+  EXPECT_EQ(outcome.maps.size(), 2u) << ::testing::PrintToString(outcome.map_events);
+}
+
 // With threads the result depends on the machine's speed, but it must be consistent.
 TEST(LiveJoining, StaysConsistentWithThreads) {
   const TemporaryFolder folder;
