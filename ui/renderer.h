@@ -37,6 +37,7 @@ struct VisitorDisplay {
   std::string route_line;
   std::vector<std::string> route_stops;  // A line for each stop.
   bool lists_route = false;              // Whether these lines are shown.
+  bool is_right_to_left = false;         // Texts begin at the right.
 };
 
 // What is drawn besides the video and the content.

@@ -18,10 +18,11 @@ constexpr Color kWay{1.0f, 0.84f, 0.45f, 1.0f};
 struct CornerStyle {
   double size_px;
   bool bold;
+  bool at_right;
 };
 
-// A line in the corner, as the place, which stays while the visitor is there. Returns where the next one
-// below can begin.
+// A line in the upper corner where lines begin, as the place, which stays while the visitor is there. Returns
+// where the next one below can begin.
 double DrawInCorner(const std::string& text, double top, const CornerStyle& look, double unit,
                     Canvas* canvas) {
   if (text.empty()) return top;
@@ -32,7 +33,10 @@ double DrawInCorner(const std::string& text, double top, const CornerStyle& look
   style.max_height_px = static_cast<int>(32 * unit);
   style.color = kTitle;
   const Eigen::Vector2d size = canvas->Measure(text, style);
-  const Eigen::Vector2d corner(10 * unit, top), padding(12 * unit, 7 * unit);
+  const Eigen::Vector2d padding(12 * unit, 7 * unit);
+  const double left =
+      look.at_right ? canvas->width_px() - 1 - 10 * unit - size.x() - 2 * padding.x() : 10 * unit;
+  const Eigen::Vector2d corner(left, top);
   canvas->Box(corner, corner + size + 2 * padding, 9 * unit, kBoard);
   canvas->Text(text, style, corner + padding);
   return corner.y() + size.y() + 2 * padding.y() + 6 * unit;
@@ -84,7 +88,8 @@ void DrawWayOn(const WayOn& way, const engine::CameraModel& camera, double unit,
 
 // Names below each other in the upper half of the image, at least as low as `highest`. The last line says if
 // some do not fit.
-void DrawStops(const std::vector<std::string>& stops, double highest, double unit, Canvas* canvas) {
+void DrawStops(const std::vector<std::string>& stops, double highest, bool at_right, double unit,
+               Canvas* canvas) {
   if (stops.empty()) return;
   TextStyle style;
   style.size_px = 20 * unit;
@@ -101,8 +106,10 @@ void DrawStops(const std::vector<std::string>& stops, double highest, double uni
                height = line * static_cast<double>(lines.size());
   canvas->Box({left - 18 * unit, top - 10 * unit}, {left + width + 18 * unit, top + height + 6 * unit},
               12 * unit, kBoard);
-  for (std::size_t i = 0; i < lines.size(); ++i)
-    canvas->Text(lines[i], style, {left, top + line * static_cast<double>(i)});
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const double indent = at_right ? width - canvas->Measure(lines[i], style).x() : 0;
+    canvas->Text(lines[i], style, {left + indent, top + line * static_cast<double>(i)});
+  }
 }
 
 }  // namespace
@@ -136,13 +143,14 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
     DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
   }
   if (visitor.way_on && view.camera != nullptr) DrawWayOn(*visitor.way_on, *view.camera, unit, canvas);
-  const double top = DrawInCorner(visitor.place, 10 * unit, {18 * unit, true}, unit, canvas);
+  const double top =
+      DrawInCorner(visitor.place, 10 * unit, {18 * unit, true, visitor.is_right_to_left}, unit, canvas);
   // The announcement of a place can be as wide as the image, and is not drawn over other words.
   const std::string line = visitor.arrival > 0 ? std::string() : visitor.route_line;
-  const double below = DrawInCorner(line, top, {16 * unit, false}, unit, canvas);
+  const double below = DrawInCorner(line, top, {16 * unit, false, visitor.is_right_to_left}, unit, canvas);
   if (visitor.is_searching || visitor.lists_route)
-    DrawStops(visitor.stops.empty() && visitor.lists_route ? visitor.route_stops : visitor.stops, below, unit,
-              canvas);
+    DrawStops(visitor.stops.empty() && visitor.lists_route ? visitor.route_stops : visitor.stops, below,
+              visitor.is_right_to_left, unit, canvas);
   DrawArrival(visitor.place, visitor.arrival, unit, canvas);
   const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;
   DrawSentence(visitor.sentence, 20, bottom, unit, canvas);

@@ -181,7 +181,8 @@ void GuideRun::WarnAboutUnknownLenses() {
 CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   CameraState& state = camera_states_[i];
   if (!request_.may_write)
-    state.visitor.emplace(&session_, PlaceNames(request_), route_ ? &*route_ : nullptr);
+    state.visitor.emplace(&session_, PlaceNames(request_), VisitorStringsFor(request_.language),
+                          route_ ? &*route_ : nullptr);
   CameraRun run;
   run.camera = &cameras_[i];
   run.options.pace = request_.pace;
@@ -223,9 +224,9 @@ bool GuideRun::LeadVisitor(const Command& command, const engine::TrackedFrame& f
   const auto* const guide = std::get_if<GuideVisitor>(&command);
   if (guide == nullptr || !route_) return false;
   const std::scoped_lock lock(files_mutex_);
-  if (guide->step == GuideVisitor::Step::kSkip && !route_->Skip()) throw Error("there is no further stop");
-  if (guide->step == GuideVisitor::Step::kBack && !route_->GoBack())
-    throw Error("there is no stop before this one");
+  const VisitorStrings& strings = VisitorStringsFor(request_.language);
+  if (guide->step == GuideVisitor::Step::kSkip && !route_->Skip()) throw Error(strings.no_further_stop);
+  if (guide->step == GuideVisitor::Step::kBack && !route_->GoBack()) throw Error(strings.no_stop_before);
   files_->Add({Event{frame.frame.time, "command", FormatCommand(command)}});
   AddRouteEvents(frame.frame.time);
   return true;

@@ -184,7 +184,9 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
                                          "'" + text + "' is not a language tag such as de or es-419");
             run->language = tag;
           },
-          "Language in which texts are shown that have it (default: that of the locale)")
+          "Language in which texts are shown that have it, and in which tour speaks to visitors: en, de, es "
+          "or "
+          "ar (default: that of the locale)")
       ->type_name("TAG");
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");

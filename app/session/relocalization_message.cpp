@@ -14,34 +14,39 @@ bool HasSameMessage(const engine::RelocalizationResult& a, const engine::Relocal
          (a.map_key == b.map_key && a.competitor_key == b.competitor_key);
 }
 
-std::string Describe(const engine::RelocalizationResult& result, const RelocalizationMessage::NameOf& name) {
-  const std::string map = name(result.map_key);
-  switch (result.rejection) {
-    case engine::RejectionReason::kNone:
-      break;
-    case engine::RejectionReason::kFewPoints:
-      return "I don't recognise this place yet. Step back and look around slowly.";
-    case engine::RejectionReason::kPoorFit:
-      return "This resembles " + map + ", but does not match it. Move a little and look again.";
-    case engine::RejectionReason::kClustered:
-      return "Only one corner of the image shows " + map + ". Turn so that more of it is visible.";
-    case engine::RejectionReason::kAmbiguous:
-      if (result.competitor_key == result.map_key)
-        return "This could be either of two places in " + map + ". Move so that more is visible.";
-      return "This could be " + map + " or " + name(result.competitor_key) +
-             ". Move so that more is visible.";
-    case engine::RejectionReason::kUnconfirmed:
-      return "Probably " + map + "; hold still";
-  }
-  return {};
+RejectionMessage MessageOf(const engine::RelocalizationResult& result,
+                           const RelocalizationMessage::NameOf& name) {
+  RejectionMessage message{.reason = result.rejection, .map = name(result.map_key), .competitor = {}};
+  if (result.competitor_key != result.map_key) message.competitor = name(result.competitor_key);
+  return message;
 }
 
 }  // namespace
+
+std::string TextOf(const RejectionMessage& rejection, const VisitorStrings& strings) {
+  switch (rejection.reason) {
+    case engine::RejectionReason::kNone:
+      break;
+    case engine::RejectionReason::kFewPoints:
+      return strings.not_recognised;
+    case engine::RejectionReason::kPoorFit:
+      return Filled(strings, strings.resembles, {rejection.map});
+    case engine::RejectionReason::kClustered:
+      return Filled(strings, strings.only_a_corner, {rejection.map});
+    case engine::RejectionReason::kAmbiguous:
+      if (rejection.competitor.empty()) return Filled(strings, strings.either_of_two, {rejection.map});
+      return Filled(strings, strings.this_or_that, {rejection.map, rejection.competitor});
+    case engine::RejectionReason::kUnconfirmed:
+      return Filled(strings, strings.probably, {rejection.map});
+  }
+  return {};
+}
 
 bool RelocalizationMessage::Update(Timestamp time, bool has_pose, const engine::RelocalizationResult& result,
                                    const NameOf& name) {
   if (has_pose) {
     reported_ = {};
+    rejection_ = {};
     text_.clear();
     return false;
   }
@@ -51,6 +56,7 @@ bool RelocalizationMessage::Update(Timestamp time, bool has_pose, const engine::
     // No place resembles the image any more, so the message no longer applies.
     if (!rejected_at_ || time - *rejected_at_ >= kMinDisplayTime) {
       reported_ = {};
+      rejection_ = {};
       text_.clear();
     }
     return false;
@@ -58,7 +64,8 @@ bool RelocalizationMessage::Update(Timestamp time, bool has_pose, const engine::
   if (HasSameMessage(result, reported_)) return false;
   reported_ = result;
   reported_at_ = time;
-  text_ = Describe(result, name);
+  rejection_ = MessageOf(result, name);
+  text_ = TextOf(rejection_, VisitorStringsFor(""));
   return true;
 }
 

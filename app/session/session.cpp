@@ -129,6 +129,7 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   if (frame.state == engine::TrackingState::kInitializing) shown.starting_map = state_.NameOf(current);
   const SessionCamera& camera = state_.cameras.at(CameraOf(frame));
   if (frame.frame.time < camera.advice_end) shown.advice = camera.advice;
+  shown.rejection = camera.relocalization_message.rejection();
   const std::string& rejection = camera.relocalization_message.text();
   shown.hint = rejection.empty() ? TextOf(frame.hint) : rejection;
   if (options_.may_write) shown.mapping = MappingStatusOf(frame, active != 0 && active == frame.map_key);

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "app/session/visitor_strings.h"
-
 namespace docent::app {
 
 namespace {
@@ -25,6 +23,7 @@ ui::VisitorDisplay VisitState::Update(double seconds, const std::string& place, 
     last_pose_ = seconds;
   }
   ui::VisitorDisplay display;
+  display.is_right_to_left = strings_.is_right_to_left;
   display.place = place_;
   if (!place.empty()) display.sentence = hint;
   if (arrival_) display.arrival = Opacity(seconds - *arrival_, times_.arrival, times_.fade);
@@ -39,23 +38,24 @@ bool VisitState::WantsViews(double seconds) const {
 
 ui::VisitorDisplay VisitState::Search(double seconds, const std::string& hint) const {
   ui::VisitorDisplay display;
+  display.is_right_to_left = strings_.is_right_to_left;
   display.is_searching = true;
   if (stops_.empty()) {
-    display.sentence = visitor_strings::kNoPlaces;
+    display.sentence = strings_.no_places;
     return display;
   }
   const double searched = Searched(seconds);
   if (searched >= times_.stops) {
     display.stops = stops_;
-    display.sentence = visitor_strings::kGoToAPlace;
+    display.sentence = strings_.go_to_a_place;
   } else if (!hint.empty()) {
     display.sentence = hint;
   } else if (place_.empty()) {
-    display.sentence = visitor_strings::kWelcome;
+    display.sentence = strings_.welcome;
   } else if (searched >= times_.way_back) {
-    display.sentence = visitor_strings::Filled(visitor_strings::kGoBackTo, {place_});
+    display.sentence = Filled(strings_, strings_.go_back_to, {place_});
   } else {
-    display.sentence = visitor_strings::kLookAround;
+    display.sentence = strings_.look_around;
   }
   return display;
 }

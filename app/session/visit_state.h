@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "app/session/visitor_strings.h"
 #include "ui/renderer.h"
 
 namespace docent::app {
@@ -22,12 +23,14 @@ struct VisitTimes {
 // recognised again. One camera; times are those of its images and do not decrease. One thread.
 class VisitState {
  public:
-  // `stops`: the names of the places of the library.
-  explicit VisitState(std::vector<std::string> stops, const VisitTimes& times = {})
-      : stops_(std::move(stops)), times_(times) {}
+  // `stops`: the names of the places of the library. `strings` is one of the constants behind
+  // VisitorStringsFor.
+  explicit VisitState(std::vector<std::string> stops, const VisitorStrings& strings = VisitorStringsFor(""),
+                      const VisitTimes& times = {})
+      : stops_(std::move(stops)), strings_(strings), times_(times) {}
 
   // A frame at this time, with a pose in the map of this name, or without a pose if it is empty. `hint` is
-  // the engine's sentence about this frame; empty for none.
+  // what to do so that the camera is tracked in this frame; empty for nothing.
   ui::VisitorDisplay Update(double seconds, const std::string& place, const std::string& hint);
   // Whether a visitor who searches at this time is helped by views of known places, as the display should
   // have them: after a while, and until all places are listed.
@@ -43,6 +46,7 @@ class VisitState {
   }
 
   const std::vector<std::string> stops_;
+  const VisitorStrings& strings_;
   const VisitTimes times_;
   std::string place_;  // The last one; empty before the first.
   std::optional<double> begin_, arrival_, last_pose_;

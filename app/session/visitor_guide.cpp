@@ -4,21 +4,20 @@
 #include <cmath>
 
 #include "app/session/route_text.h"
-#include "app/session/visitor_strings.h"
 
 namespace docent::app {
 
 void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine::CameraModel& camera) {
   const bool has_pose = engine::HasPose(frame->tracked.state);
-  frame->visitor =
-      state_.Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(), frame->shown.hint);
+  frame->visitor = state_.Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(),
+                                 VisitorHint(frame->shown.rejection, frame->tracked.hint, strings_));
   FindViews(*frame);
   frame->visitor->views = views_;
-  if (!views_.empty()) frame->visitor->sentence = visitor_strings::kGoToAView;
+  if (!views_.empty()) frame->visitor->sentence = strings_.go_to_a_view;
   if (route_ != nullptr) FollowRoute(frame.get());
   if (has_pose && frame->shown.scene)
     frame->visitor->way_on =
-        WayOutOfSight(*frame->shown.scene, camera, frame->tracked.camera_from_map, route_);
+        WayOutOfSight(*frame->shown.scene, camera, frame->tracked.camera_from_map, route_, strings_);
   if (has_pose) {
     last_with_pose_ = frame;
   } else if (last_with_pose_ && state_.HoldsContent(frame->seconds)) {
@@ -30,6 +29,35 @@ void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine:
   }
 }
 
+std::string VisitorHint(const RejectionMessage& rejection, engine::Hint hint, const VisitorStrings& strings) {
+  if (rejection.reason != engine::RejectionReason::kNone) return TextOf(rejection, strings);
+  switch (hint) {
+    case engine::Hint::kMoveMoreSlowly:
+      return strings.more_slowly;
+    case engine::Hint::kLowTexture:
+      return strings.little_detail;
+    case engine::Hint::kLeftMap:
+      return strings.left_the_map;
+    case engine::Hint::kLookBack:
+      return strings.look_back;
+    case engine::Hint::kFollowOtherCamera:
+      return strings.other_camera;
+    case engine::Hint::kNone:
+    case engine::Hint::kChooseMap:
+    case engine::Hint::kMoveSideways:
+    case engine::Hint::kMoveInsteadOfTurning:
+    case engine::Hint::kMoveFurther:
+    case engine::Hint::kAvoidPlane:
+    case engine::Hint::kFindMoreDetail:
+    case engine::Hint::kWaitUntilStill:
+    case engine::Hint::kStartWhereThereIsDetail:
+    case engine::Hint::kFindTarget:
+    case engine::Hint::kWaitForMap:
+      break;
+  }
+  return {};
+}
+
 void VisitorGuide::FollowRoute(ShownFrame* frame) {
   if (engine::HasPose(frame->tracked.state)) {
     route_->Enter(frame->tracked.map_key, frame->seconds);
@@ -37,8 +65,8 @@ void VisitorGuide::FollowRoute(ShownFrame* frame) {
     route_->Leave();
   }
   ui::VisitorDisplay& display = *frame->visitor;
-  display.route_line = RouteLine(*route_);
-  display.route_stops = RouteList(*route_);
+  display.route_line = RouteLine(*route_, strings_);
+  display.route_stops = RouteList(*route_, strings_);
   // Who is lost finds among the stops those that are near.
   if (!display.stops.empty()) display.stops = display.route_stops;
 }
@@ -60,18 +88,18 @@ std::optional<int> FewestSignposts(const content::Scene& scene, const RouteState
   return fewest;
 }
 
-std::string WayText(const content::Signpost& sign, const RouteState* route) {
-  namespace text = visitor_strings;
-  if (route == nullptr) return sign.to_map.empty() ? sign.text : text::Filled(text::kTo, {sign.to_map});
+std::string WayText(const content::Signpost& sign, const RouteState* route, const VisitorStrings& text) {
+  if (route == nullptr) return sign.to_map.empty() ? sign.text : Filled(text, text.to, {sign.to_map});
   const RouteStop& target = route->route().stops[*route->Target()];
-  if (target.key == sign.to_key) return text::Filled(text::kTo, {target.name});
-  return text::Filled(text::kToThrough, {target.name, sign.to_map});
+  if (target.key == sign.to_key) return Filled(text, text.to, {target.name});
+  return Filled(text, text.to_through, {target.name, sign.to_map});
 }
 
 }  // namespace
 
 std::optional<ui::WayOn> WayOutOfSight(const content::Scene& scene, const engine::CameraModel& camera,
-                                       const engine::Rigid3& camera_from_map, const RouteState* route) {
+                                       const engine::Rigid3& camera_from_map, const RouteState* route,
+                                       const VisitorStrings& strings) {
   const std::optional<int> fewest = route != nullptr ? FewestSignposts(scene, *route) : std::nullopt;
   if (route != nullptr && !fewest) return std::nullopt;
   constexpr double kMargin = 0.04;  // Ratio of the image's width.
@@ -89,7 +117,7 @@ std::optional<ui::WayOn> WayOutOfSight(const content::Scene& scene, const engine
     if (!arrow) return std::nullopt;
     const double angle = std::atan2(board.head<2>().norm(), board.z());
     if (way && angle >= least_angle) continue;
-    way = ui::WayOn{*arrow, WayText(sign, route)};
+    way = ui::WayOn{*arrow, WayText(sign, route, strings)};
     least_angle = angle;
   }
   return way;

@@ -10,6 +10,7 @@
 #include "app/session/route_state.h"
 #include "app/session/session.h"
 #include "app/session/visit_state.h"
+#include "app/session/visitor_strings.h"
 
 namespace docent::app {
 
@@ -17,10 +18,11 @@ namespace docent::app {
 // thread.
 class VisitorGuide {
  public:
-  // `stops`: the names of the maps where visitors can be. `route`, which may be null, leads along a tour; it
-  // and the session must outlive this.
-  VisitorGuide(Session* session, std::vector<std::string> stops, RouteState* route = nullptr)
-      : session_(session), state_(std::move(stops)), route_(route) {}
+  // `stops`: the names of the maps where visitors can be. `strings` is one of the constants behind
+  // VisitorStringsFor. `route`, which may be null, leads along a tour; it and the session must outlive this.
+  VisitorGuide(Session* session, std::vector<std::string> stops, const VisitorStrings& strings,
+               RouteState* route = nullptr)
+      : session_(session), strings_(strings), state_(std::move(stops), strings), route_(route) {}
 
   // Sets the frame's `visitor`; `camera` is the lens of its image. Shortly after a loss the frame gets the
   // content and the pose of the last frame that had one.
@@ -31,6 +33,7 @@ class VisitorGuide {
   void FollowRoute(ShownFrame* frame);
 
   Session* const session_;
+  const VisitorStrings& strings_;
   VisitState state_;
   RouteState* const route_;
   std::vector<cv::Mat> views_;  // See ui::VisitorDisplay.
@@ -38,11 +41,16 @@ class VisitorGuide {
   std::shared_ptr<const ShownFrame> last_with_pose_;
 };
 
+// What a visitor is told about a frame so that the camera is tracked: why its place is not recognised, else
+// the engine's hint. Empty for nothing, and for hints that are about building a map.
+std::string VisitorHint(const RejectionMessage& rejection, engine::Hint hint, const VisitorStrings& strings);
+
 // The nearest signpost in the scene that leads to another map, if none of those is seen; empty if one is, or
 // there is none. Nearest is what the camera has to turn least for. With a route, only those signposts count
 // from which the fewest others lead on to its target.
 std::optional<ui::WayOn> WayOutOfSight(const content::Scene& scene, const engine::CameraModel& camera,
                                        const engine::Rigid3& camera_from_map,
-                                       const RouteState* route = nullptr);
+                                       const RouteState* route = nullptr,
+                                       const VisitorStrings& strings = VisitorStringsFor(""));
 
 }  // namespace docent::app

@@ -5,39 +5,66 @@
 #include <string>
 #include <string_view>
 
-// The sentences that visitors read, in one place, so that they can be read together and translated. Filled
-// puts what the comment says in the place of the braces.
-namespace docent::app::visitor_strings {
+namespace docent::app {
 
-// Where a visitor is.
-inline constexpr const char* kWelcome = "Welcome. Look around slowly, and I will tell you where you are.";
-inline constexpr const char* kNoPlaces = "There are no places in this library yet.";
-inline constexpr const char* kLookAround = "Look around slowly.";
-inline constexpr const char* kGoBackTo = "Go back to {}, and look around slowly.";  // Place.
-inline constexpr const char* kGoToAPlace = "Go to one of these places and look around slowly.";
-inline constexpr const char* kGoToAView = "Go to where you see one of these.";
+// All sentences that visitors read, in one language. A pair of braces stands where Filled puts the value that
+// the comment names.
+struct VisitorStrings {
+  const char* language;   // Its tag (content::LanguageTag).
+  bool is_right_to_left;  // Texts begin at the right.
 
-// The way on.
-inline constexpr const char* kTo = "To {}";                     // Place.
-inline constexpr const char* kToThrough = "To {}, through {}";  // Place, and the one before it on the way.
+  // Where a visitor is.
+  const char* welcome;
+  const char* no_places;
+  const char* look_around;
+  const char* go_back_to;  // Place.
+  const char* go_to_a_place;
+  const char* go_to_a_view;
 
-// On a tour with stops.
-inline constexpr const char* kFirstStop = "{}. First: {}";  // What the tour has, stop.
-inline constexpr const char* kOneStop = "1 stop";
-inline constexpr const char* kStops = "{} stops";                                    // Number.
-inline constexpr const char* kAboutMinutes = "{}, about {} minutes";                 // Stops, number.
-inline constexpr const char* kStopAndNext = "Stop {} of {}. Next: {}";               // Number, number, stop.
-inline constexpr const char* kNext = "Next: {}, {} of {}";                           // Stop, number, number.
-inline constexpr const char* kBackTo = "Back to {}, {} of {}";                       // Stop, number, number.
-inline constexpr const char* kSawAll = "The tour ends here. You saw all {} stops.";  // Number.
-inline constexpr const char* kSawOnly = "The tour ends here. You saw the only stop.";
-inline constexpr const char* kSawSome = "The tour ends here. You saw {} of {} stops.";  // Numbers.
-inline constexpr const char* kNumberedStop = "{}. {}";                                  // Number, stop.
-inline constexpr const char* kSeenStop = "{}. {} (seen)";                               // The same.
-inline constexpr const char* kSkippedStop = "{}. {} (skipped)";
-inline constexpr const char* kNextStop = "{}. {} (next)";
+  // What keeps a camera from being recognised or followed.
+  const char* not_recognised;
+  const char* resembles;      // Place.
+  const char* only_a_corner;  // Place.
+  const char* either_of_two;  // Place.
+  const char* this_or_that;   // Place, place.
+  const char* probably;       // Place.
+  const char* more_slowly;
+  const char* little_detail;
+  const char* left_the_map;
+  const char* look_back;
+  const char* other_camera;
 
-// The text with the values in the place of its braces, in their order.
-std::string Filled(std::string_view text, std::initializer_list<std::string> values);
+  // The way on.
+  const char* to;          // Place.
+  const char* to_through;  // Place, and the one before it on the way.
 
-}  // namespace docent::app::visitor_strings
+  // On a tour with stops.
+  const char* first_stop;  // What the tour has, stop.
+  const char* one_stop;
+  const char* stops;          // Number.
+  const char* about_minutes;  // Stops, number.
+  const char* stop_and_next;  // Number, number, stop.
+  const char* next;           // Stop, number, number.
+  const char* back_to;        // Stop, number, number.
+  const char* saw_all;        // Number.
+  const char* saw_only;
+  const char* saw_some;       // Numbers.
+  const char* numbered_stop;  // Number, stop.
+  const char* seen_stop;      // The same.
+  const char* skipped_stop;   // The same.
+  const char* next_stop;      // The same.
+  const char* no_further_stop;
+  const char* no_stop_before;
+};
+
+// The sentences in English, German, Spanish or Arabic. `language` is a tag in lower case; of its last parts,
+// those that no sentences exist for are ignored ("de-at" is German). English for any other language, and for
+// none.
+const VisitorStrings& VisitorStringsFor(const std::string& language);
+
+// The text with the values in the place of its braces, in their order. In a text from right to left, a value
+// keeps the direction of its own letters.
+std::string Filled(const VisitorStrings& strings, std::string_view text,
+                   std::initializer_list<std::string> values);
+
+}  // namespace docent::app
