@@ -104,7 +104,8 @@ inline constexpr const char* kBrowse = "Browse…";
 inline constexpr const char* kBrowseTitle = "Choose a model";
 inline constexpr const char* kBrowseImageTitle = "Choose an image";
 inline constexpr const char* kBrowseSoundTitle = "Choose a sound";
-inline constexpr const char* kNoFileDialog = "No file dialog is installed (zenity). Type the file's name.";
+inline constexpr const char* kNoFileDialog =
+    "No file dialog is installed (xdg-desktop-portal or zenity). Type the file's name.";
 inline constexpr const char* kFiles = "Files here and recent ones";
 inline constexpr const char* kDropFiles = "Or drop a file onto the image.";
 inline constexpr const char* kAutomaticSize = "Automatic size";

@@ -253,6 +253,7 @@ void AuthorControls::Update() {
     if (is_model && std::find(files_.begin(), files_.end(), chosen->string()) == files_.end())
       files_.push_back(chosen->string());
   }
+  if (dialog_.TakeRefusal()) board_.AddError(ui::strings::kNoFileDialog);
   pointer_.Move(view_, window_->PointerPosition(), window_->IsControlDown());
   UpdatePreview();
   board_.Expire(Now());
@@ -365,8 +366,7 @@ void AuthorControls::ChooseFile(content::AssetKind kind) {
                                           : "*.glb *.gltf *.obj *.ply *.stl *.fbx *.dae";
   if (dialog_.is_open()) return;
   dialog_kind_ = kind;
-  if (!FileDialog::IsAvailable() || !dialog_.Open(title, patterns))
-    board_.AddError(ui::strings::kNoFileDialog);
+  if (!dialog_.Open(title, patterns)) board_.AddError(ui::strings::kNoFileDialog);
 }
 
 // Entities of a group are selected together.

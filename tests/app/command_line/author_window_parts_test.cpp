@@ -56,61 +56,6 @@ TEST(ModelFiles, AreKnownByTheirEnding) {
   EXPECT_THAT(ModelFilesIn(folder / "nowhere"), IsEmpty());
 }
 
-// A program called zenity in a folder of its own, which is searched first.
-class FileDialogProgram : public ::testing::Test {
- protected:
-  void SetUp() override { path_ = std::getenv("PATH") != nullptr ? std::getenv("PATH") : ""; }
-  void TearDown() override { setenv("PATH", path_.c_str(), 1); }
-  void Install(const std::string& script) {
-    const auto program = folder_.Write("zenity", "#!/bin/sh\n" + script);
-    std::filesystem::permissions(program, std::filesystem::perms::owner_all);
-    setenv("PATH", (program.parent_path().string() + ":" + path_).c_str(), 1);
-  }
-  // Polls until the dialog is closed, at most ten seconds.
-  static std::optional<std::filesystem::path> Await(FileDialog* dialog) {
-    std::optional<std::filesystem::path> chosen;
-    for (int i = 0; i < 1000 && dialog->is_open(); ++i) {
-      chosen = dialog->Poll();
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    return chosen;
-  }
-
-  const TemporaryFolder folder_;
-  std::string path_;
-};
-
-TEST_F(FileDialogProgram, GivesTheChosenFileWithoutWaitingForIt) {
-  Install("sleep 0.3\necho \"/models/red fox.glb\"\n");
-  EXPECT_TRUE(FileDialog::IsAvailable());
-  FileDialog dialog;
-  ASSERT_TRUE(dialog.Open("Choose a model", "*.glb"));
-  EXPECT_FALSE(dialog.Poll()) << "it is still open";
-  EXPECT_TRUE(dialog.is_open());
-  EXPECT_EQ(Await(&dialog), "/models/red fox.glb");
-  EXPECT_FALSE(dialog.is_open());
-  ASSERT_TRUE(dialog.Open("Again", "*.glb"));
-  EXPECT_EQ(Await(&dialog), "/models/red fox.glb");
-}
-
-TEST_F(FileDialogProgram, GivesNothingWhenItIsCancelled) {
-  Install("echo /models/fox.glb\nexit 1\n");
-  FileDialog dialog;
-  ASSERT_TRUE(dialog.Open("Choose a model", "*.glb"));
-  EXPECT_FALSE(Await(&dialog));
-  EXPECT_FALSE(dialog.is_open());
-}
-
-TEST_F(FileDialogProgram, IsClosedWithTheWindow) {
-  Install("exec sleep 60\n");
-  const auto begin = std::chrono::steady_clock::now();
-  {
-    FileDialog dialog;
-    ASSERT_TRUE(dialog.Open("Choose a model", "*.glb"));
-  }
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
-}
-
 TEST(CommandWords, SayWhatWasDone) {
   EXPECT_EQ(DoneText(PlaceModel{"models/red fox.glb", {1, 2}, std::nullopt, 0}), "Placed red fox.glb.");
   EXPECT_EQ(DoneText(RemoveEntities{{"fox"}}), "Removed fox.");
