@@ -216,9 +216,9 @@ RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequenc
   for (const engine::CalibrationMonitor::Ring& ring : session.LensErrors(0))
     record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
   // The session is destroyed first, because the adjustments below need memory for another copy of a map.
-  std::vector<Session::MapState> maps = session.Maps();
+  const std::vector<Session::MapState> maps = session.Maps();
   owned_session.reset();
-  AddMaps(std::move(maps), request.folder, !sequence.truth.empty(), request.one_of_many, &record, panoramas);
+  AddMaps(maps, request.folder, !sequence.truth.empty(), request.one_of_many, &record, panoramas);
   return record;
 }
 
