@@ -48,9 +48,13 @@ Json PoseToJson(const engine::Sim3& pose) {
 engine::Sim3 ReadPose(std::string_view where, const std::string& place, const Json& json) {
   CheckMembers(where, place, json, {"rotation_xyzw", "translation_m", "scale"});
   const ObjectReader reader(where, place, json);
-  const Eigen::Vector4d q = reader.UnitVector<4>("rotation_xyzw");
+  const Eigen::Vector4d xyzw = reader.UnitVector<4>("rotation_xyzw");
+  const Eigen::Quaterniond q(xyzw);
+  // What was written is read to the bit; only what a person or another program wrote is normalized.
+  constexpr double kRounding = 1e-12;
+  const bool is_unit = std::abs(q.squaredNorm() - 1) < kRounding;
   engine::Sim3 pose;
-  pose.rotation = engine::Rotation3(Eigen::Quaterniond(q[3], q[0], q[1], q[2]));
+  pose.rotation = is_unit ? engine::Rotation3::FromUnit(q) : engine::Rotation3(q);
   pose.translation = reader.Vector<3>("translation_m", kMaxCoordinate);
   pose.scale = reader.Number("scale", kMinModelScale, kMaxModelScale);
   return pose;

@@ -21,6 +21,14 @@ class Rotation3 {
   // The rotation nearest to the matrix, which must be orthonormal except for rounding.
   explicit Rotation3(const Eigen::Matrix3d& matrix) : quaternion_(Eigen::Quaterniond(matrix).normalized()) {}
 
+  // Of a quaternion whose length is 1 but for rounding, which is kept to the bit: to normalize a unit quaternion
+  // again can change its last bits.
+  static Rotation3 FromUnit(const Eigen::Quaterniond& quaternion) {
+    Rotation3 result;
+    result.quaternion_ = quaternion;
+    return result;
+  }
+
   // Exponential map: the rotation by |rotation_vector| radians about its direction; accurate also near zero.
   static Rotation3 Exp(const Eigen::Vector3d& rotation_vector);
   // Inverse of Exp; the result's norm is at most pi.
@@ -39,11 +47,6 @@ class Rotation3 {
   Rotation3 operator*(const Rotation3& other) const { return Rotation3(quaternion_ * other.quaternion_); }
 
  private:
-  static Rotation3 FromUnit(const Eigen::Quaterniond& q) {
-    Rotation3 result;
-    result.quaternion_ = q;
-    return result;
-  }
   Eigen::Quaterniond quaternion_;
 };
 
