@@ -75,6 +75,10 @@ class AskedFor : public AuthoringActions {
   void SetTarget(const std::string& name, const std::string& to_map) override {
     words.push_back("target " + name + " " + to_map);
   }
+  void SetDirection(const std::string& name, const std::optional<Eigen::Vector3d>& direction) override {
+    words.push_back(direction ? "direction " + name : "no direction " + name);
+  }
+  void PointAhead(const std::string& name) override { words.push_back("point ahead " + name); }
   void SetLocked(const std::vector<std::string>&, bool locked) override {
     words.push_back(locked ? "lock" : "unlock");
   }
