@@ -266,8 +266,22 @@ SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::s
                        std::uint64_t to_key) {
   return ChangeOf(scene, name, "change the target of", [&](Entity* entity) {
     if (entity->kind != Entity::Kind::kSignpost) RefuseKind(*entity, "cannot lead to a map.");
-    entity->signpost.to_map = to_map;
-    entity->signpost.to_key = to_key;
+    Signpost& signpost = entity->signpost;
+    const bool is_same = to_key != 0 ? to_key == signpost.to_key : to_map == signpost.to_map;
+    if (!is_same) signpost.direction.reset();
+    signpost.to_map = to_map;
+    signpost.to_key = to_key;
+  });
+}
+
+SceneChange DirectionEdit(const Scene& scene, const std::string& name,
+                          const std::optional<Eigen::Vector3d>& direction_in_map) {
+  return ChangeOf(scene, name, "change the direction of", [&](Entity* entity) {
+    if (entity->kind != Entity::Kind::kSignpost) RefuseKind(*entity, "has no arrow.");
+    if (direction_in_map && !(direction_in_map->norm() > 0 && direction_in_map->allFinite()))
+      throw Error("'" + name + "' cannot point in a direction without length.");
+    entity->signpost.direction.reset();
+    if (direction_in_map) entity->signpost.direction = direction_in_map->stableNormalized();
   });
 }
 

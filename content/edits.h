@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -52,9 +53,14 @@ SceneChange RenameEdit(const Scene& scene, const std::string& name, const std::s
 // language, which an empty text removes.
 SceneChange TextEdit(const Scene& scene, const std::string& name, const std::string& text,
                      const std::string& language = "");
-// Of a signpost. to_map empty and to_key 0: it leads nowhere.
+// Of a signpost. to_map empty and to_key 0: it leads nowhere. The way to another map than before is not
+// known.
 SceneChange TargetEdit(const Scene& scene, const std::string& name, const std::string& to_map,
                        std::uint64_t to_key);
+// Of a signpost: where one leaves for that map, as a direction of any length in the map; empty if that is not
+// known.
+SceneChange DirectionEdit(const Scene& scene, const std::string& name,
+                          const std::optional<Eigen::Vector3d>& direction_in_map);
 
 // Of a label: where its board is, from its anchor.
 SceneChange OffsetEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& offset_in_map);

@@ -95,10 +95,14 @@ void ReadSignpost(std::string_view where, const std::string& place, const Json& 
     CheckMembers(where, place, json,
                  {"kind", "name", "text", "anchor_m", "up", "height_m", "to_map", "to_key", "locked",
                   "hidden", "group"});
-  } else {
+  } else if (version == 3) {
     CheckMembers(where, place, json,
                  {"kind", "name", "text", "translations", "anchor_m", "up", "height_m", "to_map", "to_key",
                   "locked", "hidden", "group"});
+  } else {
+    CheckMembers(where, place, json,
+                 {"kind", "name", "text", "translations", "anchor_m", "up", "height_m", "to_map", "to_key",
+                  "direction", "locked", "hidden", "group"});
   }
   const ObjectReader reader(where, place, json);
   entity->signpost.text = reader.Text("text");
@@ -108,6 +112,7 @@ void ReadSignpost(std::string_view where, const std::string& place, const Json& 
   entity->signpost.to_map = reader.Text("to_map");
   if (version > 1) entity->signpost.to_key = reader.Key("to_key");
   if (version > 2) entity->signpost.translations = reader.TextByLanguage("translations");
+  if (json.contains("direction")) entity->signpost.direction = reader.UnitVector<3>("direction");
 }
 
 void ReadLabel(std::string_view where, const std::string& place, const Json& json, Entity* entity) {
@@ -171,9 +176,11 @@ Entity::Kind ReadKind(std::string_view where, const std::string& place, const Js
 }
 
 Json KindToJson(const Signpost& signpost) {
-  return {{"text", signpost.text},           {"anchor_m", VectorToJson(signpost.anchor)},
-          {"up", VectorToJson(signpost.up)}, {"height_m", signpost.height_m},
-          {"to_map", signpost.to_map},       {"to_key", signpost.to_key}};
+  Json json{{"text", signpost.text},           {"anchor_m", VectorToJson(signpost.anchor)},
+            {"up", VectorToJson(signpost.up)}, {"height_m", signpost.height_m},
+            {"to_map", signpost.to_map},       {"to_key", signpost.to_key}};
+  if (signpost.direction) json["direction"] = VectorToJson(*signpost.direction);
+  return json;
 }
 
 Json KindToJson(const Label& label) {

@@ -3,7 +3,7 @@
 
 #include "content/scene.h"
 
-// PlaceOf, PoseOf, SetPose, TransformBy and MoveWithAnchor of scene.h.
+// PlaceOf, BoardMiddle, LeadNowhere, PoseOf, SetPose, TransformBy and MoveWithAnchor of scene.h.
 namespace docent::content {
 namespace {
 
@@ -41,6 +41,16 @@ Eigen::Vector3d PlaceOf(const Entity& entity) {
       if (!entity.trail.points.empty()) return entity.trail.points.front();
   }
   return Eigen::Vector3d::Zero();
+}
+
+Eigen::Vector3d BoardMiddle(const Signpost& signpost) {
+  return signpost.anchor + (kSignpostPole + 0.5) * signpost.height_m * signpost.up;
+}
+
+void LeadNowhere(Signpost* signpost) {
+  signpost->to_key = 0;
+  signpost->to_map.clear();
+  signpost->direction.reset();
 }
 
 engine::Sim3 PoseOf(const Entity& entity) {
@@ -102,6 +112,8 @@ void TransformBy(const engine::Sim3& motion, Entity* entity) {
       entity->signpost.anchor = motion * entity->signpost.anchor;
       entity->signpost.up = motion.rotation * entity->signpost.up;
       entity->signpost.height_m *= motion.scale;
+      if (entity->signpost.direction)
+        entity->signpost.direction = motion.rotation * *entity->signpost.direction;
       break;
     case Entity::Kind::kLabel:
       entity->label.anchor = motion * entity->label.anchor;

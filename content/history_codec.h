@@ -12,7 +12,7 @@
 // Encodes the changes of a scene that can be undone and redone as JSON text, so that a library can keep them
 // beside the scene. Entities are written as in a scene (scene_codec.h):
 //
-//   {"docent_history": 3, "assets": [ID…],
+//   {"docent_history": 4, "assets": [ID…],
 //    "done": [{"label": TEXT, "changes": [{"index": I, "before": ENTITY or null, "after": …}]}],
 //    "undone": […]}
 //

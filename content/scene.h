@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -69,6 +70,9 @@ struct PlacedModel {
   std::shared_ptr<const Warp> warp;
 };
 
+// Length of a signpost's pole, below the board, in heights of the board.
+inline constexpr double kSignpostPole = 0.7;
+
 // A board with text that rotates about its `up` axis to face the reader; `anchor` is its foot in the map.
 struct Signpost {
   std::string text;                                  // UTF-8.
@@ -80,6 +84,9 @@ struct Signpost {
   // Name of the map it leads to when this was written, empty for none. Where there is a map with the key, its
   // name is shown instead.
   std::string to_map;
+  // Where one leaves for that map, seen from the board: a unit vector in the map. Empty if it is not known;
+  // then the signpost has no arrow.
+  std::optional<Eigen::Vector3d> direction;
 };
 
 // A text about a point of the map, on a board beside it that faces the reader. A leader line joins the two.
@@ -144,12 +151,16 @@ const std::string& ShownText(const Entity& entity, const std::string& language);
 // The position of an entity in the map: of a model its origin, of an image its middle, of a signpost its
 // foot, of a label its anchor, of a trail its first point.
 Eigen::Vector3d PlaceOf(const Entity& entity);
+// The middle of a signpost's board in the map, in map units.
+Eigen::Vector3d BoardMiddle(const Signpost& signpost);
 // Place, rotation and size as one similarity. Of a model and an image it is map_from_model. Of a trail y is
 // up, z the direction in which it begins, and the scale its width. Of the others the scale is the height of a
 // signpost, that of a label's text, or the range of a sound, and there is no rotation.
 engine::Sim3 PoseOf(const Entity& entity);
 // Gives an entity this pose; where PoseOf has no rotation, none is taken.
 void SetPose(const engine::Sim3& pose, Entity* entity);
+// Lets a signpost lead to no map, and so in no direction.
+void LeadNowhere(Signpost* signpost);
 // Transforms an entity by a similarity of the map, wherever that takes it.
 void TransformBy(const engine::Sim3& motion, Entity* entity);
 // Transforms an entity after its anchor has moved in the map by `motion`. An entity that would leave the

@@ -44,6 +44,10 @@ std::string UpProblem(const Eigen::Vector3d& up) {
   return IsUnit(up.norm()) ? "" : "would have no valid up direction";
 }
 
+std::string DirectionProblem(const std::optional<Eigen::Vector3d>& direction) {
+  return !direction || IsUnit(direction->norm()) ? "" : "would have an arrow without a valid direction";
+}
+
 std::string First(std::initializer_list<std::string> problems) {
   for (const std::string& problem : problems) {
     if (!problem.empty()) return problem;
@@ -121,7 +125,7 @@ std::string PoseProblem(const Entity& entity) {
     case Entity::Kind::kSignpost:
       return First({PointProblem(entity.signpost.anchor),
                     RangeProblem("a height", entity.signpost.height_m, kMinBoardHeight, kMaxBoardHeight),
-                    UpProblem(entity.signpost.up)});
+                    UpProblem(entity.signpost.up), DirectionProblem(entity.signpost.direction)});
     case Entity::Kind::kLabel:
       return First({PointProblem(entity.label.anchor), PointProblem(entity.label.offset),
                     RangeProblem("a height", entity.label.text_height, kMinBoardHeight, kMaxBoardHeight),

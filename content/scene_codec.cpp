@@ -8,10 +8,10 @@
 namespace docent::content {
 namespace {
 
-// With keys: 33 for each entity, 13 at most for each point that bends a model, 4 for each point of a trail,
+// With keys: 38 for each entity, 13 at most for each point that bends a model, 4 for each point of a trail,
 // and 2 for each translation.
 constexpr std::size_t kMaxSceneValues =
-    100 + 33 * kMaxEntities + 14 * kMaxSceneWarpPoints + 4 * kMaxSceneTrailPoints + 2 * kMaxSceneTranslations;
+    100 + 38 * kMaxEntities + 14 * kMaxSceneWarpPoints + 4 * kMaxSceneTrailPoints + 2 * kMaxSceneTranslations;
 
 struct ParsedScene {
   Json json;

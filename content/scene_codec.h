@@ -11,7 +11,7 @@
 // Encodes a scene as JSON text, the form in which a library stores it (assets are stored separately, once
 // each, by id):
 //
-//   {"docent_scene": 3, "assets": [ID…], "entities": [
+//   {"docent_scene": 4, "assets": [ID…], "entities": [
 //     {"kind": "model", "name": NAME, "locked": false, "hidden": false, "group": NAME,
 //      "asset": ID, "animation": N,
 //      "map_from_model": {"rotation_xyzw": [x, y, z, w], "translation_m": [x, y, z], "scale": S},
@@ -20,7 +20,7 @@
 //     {"kind": "signpost", "name": NAME, "locked": false, "hidden": false, "group": NAME,
 //      "text": TEXT, "anchor_m": [x, y, z], "up": [x, y, z],
 //      "height_m": H, "to_map": NAME, "to_key": KEY,
-//      and, if there are any, "translations": {LANGUAGE: TEXT…}},
+//      and, if there are any, "translations": {LANGUAGE: TEXT…} and "direction": [x, y, z]},
 //     {"kind": "label", …, "text": TEXT, "anchor_m": [x, y, z], "offset_m": [x, y, z], "up": [x, y, z],
 //      "text_height_m": H, and translations as a signpost},
 //     {"kind": "image", …, "asset": ID, "map_from_image": as map_from_model},
@@ -31,8 +31,8 @@
 // where … stands for name, locked, hidden and group.
 //
 // Numbers are written so that they read back to the same bits (rotations are normalized again). Version 1,
-// without locked, hidden, group and to_key, and version 2, without translations and the last four kinds, are
-// read as well.
+// without locked, hidden, group and to_key, version 2, without translations and the last four kinds, and
+// version 3, without directions, are read as well.
 namespace docent::content {
 
 // DecodeScene reads what this returns. Throws Error for a scene that cannot be stored (Validate in scene.h).

@@ -61,6 +61,11 @@ class AuthoringActions {
   virtual void ShortenTrail(const std::string& name) = 0;
   // To no map with an empty name.
   virtual void SetTarget(const std::string& name, const std::string& to_map) = 0;
+  // Where one leaves for the map that a signpost leads to, as a vector of any length along the map's axes;
+  // empty if it is not known.
+  virtual void SetDirection(const std::string& name, const std::optional<Eigen::Vector3d>& direction) = 0;
+  // The same, the viewing direction of the camera.
+  virtual void PointAhead(const std::string& name) = 0;
   virtual void SetLocked(const std::vector<std::string>& names, bool locked) = 0;
   virtual void SetHidden(const std::vector<std::string>& names, bool hidden) = 0;
   virtual void Group(const std::vector<std::string>& names) = 0;

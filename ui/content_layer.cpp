@@ -2,6 +2,7 @@
 #include "ui/content_layer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -148,14 +149,16 @@ std::vector<ModelInstance> ContentLayer::Instances(const content::Scene& scene,
   for (const content::Entity& entity : scene.entities) {
     if (entity.hidden || entity.kind == content::Entity::Kind::kLabel) continue;
     if (entity.kind == content::Entity::Kind::kSound && !markers) continue;
-    content::EntityShape shape = shapes_.ShapeOf(entity, eye_in_map);
-    if (shape.model == nullptr) continue;
-    ModelInstance instance;
-    instance.model = std::move(shape.model);
-    instance.map_from_model = GlmFrom(shape.map_from_model);
-    if (entity.kind == content::Entity::Kind::kModel) instance.animation = entity.model.animation;
-    instance.seconds = animation_seconds;
-    instances.push_back(std::move(instance));
+    for (content::EntityShape& shape :
+         std::array{shapes_.ShapeOf(entity, eye_in_map), shapes_.ArrowOf(entity)}) {
+      if (shape.model == nullptr) continue;
+      ModelInstance instance;
+      instance.model = std::move(shape.model);
+      instance.map_from_model = GlmFrom(shape.map_from_model);
+      if (entity.kind == content::Entity::Kind::kModel) instance.animation = entity.model.animation;
+      instance.seconds = animation_seconds;
+      instances.push_back(std::move(instance));
+    }
   }
   shapes_.EndFrame();
   return instances;

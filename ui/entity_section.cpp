@@ -175,6 +175,8 @@ void EntitySection::Fill(const content::Entity& entity, const AuthoringFacts& fa
   name_ = entity.name;
   text_ = TextIn(entity, content::LanguageTag(language_));
   for (int i = 0; i < 3; ++i) offset_[i] = entity.label.offset[i];
+  const Eigen::Vector3d direction = entity.signpost.direction.value_or(Eigen::Vector3d::Zero());
+  for (int i = 0; i < 3; ++i) direction_[i] = direction[i];
   const engine::Sim3 pose = TransformOf(entity, facts.camera_from_map.OriginInSource());
   const Eigen::Vector3d angles = AnglesOf(facts.map_from_upright.inverse() * pose.rotation);
   for (int i = 0; i < 3; ++i) {
@@ -195,11 +197,7 @@ void EntitySection::DrawFields(const content::Entity& entity, const AuthoringFac
   if (ImGui::IsItemDeactivatedAfterEdit() && name_ != entity.name && !name_.empty())
     actions_->Rename(entity.name, name_);
   if (content::TextOf(entity) != nullptr) DrawText(entity);
-  if (entity.kind == content::Entity::Kind::kSignpost) {
-    std::string to_map = entity.signpost.to_map;
-    ImGui::SetNextItemWidth(0.6f * ImGui::GetContentRegionAvail().x);
-    if (DrawMapChoice(strings::kLeadsTo, facts.maps, &to_map)) actions_->SetTarget(entity.name, to_map);
-  }
+  if (entity.kind == content::Entity::Kind::kSignpost) DrawSignpost(entity, facts);
   DrawLabelAndTrail(entity);
   DrawPose(entity, facts);
   ImGui::EndDisabled();
@@ -219,6 +217,27 @@ void EntitySection::DrawText(const content::Entity& entity) {
   if (ImGui::InputTextWithHint("##language", strings::kLanguageHint, &language_))
     text_ = TextIn(entity, content::LanguageTag(language_));
   if (!is_valid) Remark(strings::kNoLanguage);
+}
+
+// The map that it leads to, and where its arrow points.
+void EntitySection::DrawSignpost(const content::Entity& entity, const AuthoringFacts& facts) {
+  std::string to_map = entity.signpost.to_map;
+  ImGui::SetNextItemWidth(0.6f * ImGui::GetContentRegionAvail().x);
+  if (DrawMapChoice(strings::kLeadsTo, facts.maps, &to_map)) actions_->SetTarget(entity.name, to_map);
+  const bool has_arrow = entity.signpost.direction.has_value();
+  ImGui::BeginDisabled(!facts.has_pose);
+  if (ImGui::Button(strings::kLeaveHere)) actions_->PointAhead(entity.name);
+  ImGui::EndDisabled();
+  if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", strings::kLeaveHereHelp);
+  if (has_arrow && RowButton(strings::kRemoveArrow)) actions_->SetDirection(entity.name, std::nullopt);
+  if (!has_arrow && !to_map.empty()) Remark(strings::kNoArrow);
+  ImGui::BeginGroup();
+  const bool completed = NumberFields(strings::kArrowDirection, direction_, 3, "%.3g");
+  ImGui::EndGroup();
+  is_writing_ = ImGui::IsItemActive() || is_writing_;
+  const Eigen::Vector3d direction(direction_[0], direction_[1], direction_[2]);
+  if (completed && direction.allFinite() && direction.norm() > 0)
+    actions_->SetDirection(entity.name, direction);
 }
 
 void EntitySection::DrawLabelAndTrail(const content::Entity& entity) {

@@ -23,6 +23,7 @@ class EntitySection {
   void DrawRow(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawFields(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawText(const content::Entity& entity);
+  void DrawSignpost(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawLabelAndTrail(const content::Entity& entity);
   void DrawPose(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawButtons(const content::Entity& first, const AuthoringFacts& facts);
@@ -34,7 +35,7 @@ class EntitySection {
   std::string shown_;  // The entity that the fields belong to.
   std::string name_, text_;
   std::string language_;  // Of the text that is shown; empty for the first one.
-  double offset_[3] = {};
+  double offset_[3] = {}, direction_[3] = {};
   double position_[3] = {}, angles_deg_[3] = {}, size_ = 1;
 };
 

@@ -75,6 +75,11 @@ content::EntityShape EntityShapes::ShapeOf(const content::Entity& entity, const 
   return {};
 }
 
+content::EntityShape EntityShapes::ArrowOf(const content::Entity& entity) {
+  if (entity.kind != content::Entity::Kind::kSignpost || !entity.signpost.direction) return {};
+  return {SignpostArrowModel(), SignpostArrowPose(entity.signpost)};
+}
+
 void EntityShapes::EndFrame() {
   constexpr std::uint64_t kLifeFrames = 300;
   bent_models_.EndFrame();

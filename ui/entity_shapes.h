@@ -42,6 +42,9 @@ class EntityShapes {
 
   // What is drawn of an entity for a reader at eye_in_map: of a label its board, of a sound its marker.
   content::EntityShape ShapeOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map);
+  // The arrow of a signpost with a direction, which is drawn beside its shape; without a model for what has
+  // none.
+  static content::EntityShape ArrowOf(const content::Entity& entity);
   // The bounding box in the rest pose, as a reader at eye_in_map sees it; empty without a model.
   std::optional<PlacedBox> BoxOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map);
   // Refers to this object.

@@ -15,9 +15,14 @@ constexpr int kMaxTextWidthPx = 900,
               kMaxTextHeightPx = 640;  // With padding and strip, the texture stays below 1024.
 constexpr int kPaddingPx = 28, kStripHeightPx = 84, kStripTextPx = 44;
 constexpr double kWantedAspect = 1.9;
-constexpr float kPoleHeight = 0.7f, kPoleRadius = 0.035f, kThickness = 0.07f, kCornerRadius = 0.09f;
+constexpr float kPoleHeight = static_cast<float>(content::kSignpostPole), kPoleRadius = 0.035f,
+                kThickness = 0.07f, kCornerRadius = 0.09f;
 
-const cv::Scalar kBoardColor(70, 44, 22, 255), kStripColor(38, 122, 232, 255), kLineColor(225, 236, 244, 255);
+// Of the arrow, in heights of the board. Above the board, so that it can point anywhere.
+constexpr float kArrowLength = 0.8f, kArrowHead = 0.36f, kArrowHeadRadius = 0.2f, kArrowShaftRadius = 0.08f;
+constexpr double kArrowAboveBoard = 0.45;
+
+const cv::Scalar kBoardColor(70, 44, 22, 255), kStripColor(38, 122, 232, 255);
 constexpr Color kTextColor{0.97f, 0.96f, 0.92f, 1.0f};
 
 // Renders the text at the largest size at which all of it fits, wrapped to a balanced aspect ratio.
@@ -61,40 +66,28 @@ void Lay(const cv::Mat& over, int x, int y, cv::Mat* image) {
   }
 }
 
-void DrawArrow(const cv::Point& tail, int length, cv::Mat* image) {
-  const int half = length / 3;
-  const cv::Point tip(tail.x + length, tail.y);
-  const std::vector<cv::Point> head = {
-      tip, {tip.x - half - 4, tip.y - half}, {tip.x - half - 4, tip.y + half}};
-  cv::line(*image, tail, {tip.x - half, tip.y}, kLineColor, 9, cv::LINE_AA);
-  cv::fillConvexPoly(*image, head, kLineColor, cv::LINE_AA);
-}
-
 // The complete front of the board, BGRA, opaque.
 cv::Mat DrawBoard(const std::string& words, const std::string& to_map) {
   const cv::Mat text = LayOutText(words.empty() ? " " : words);
   const bool points_on = !to_map.empty();
   cv::Mat target_name;
-  constexpr int kArrowPx = 62;
   if (points_on) {
     TextStyle style;
     style.size_px = kStripTextPx;
-    style.max_width_px = kMaxTextWidthPx - 2 * kArrowPx;
+    style.max_width_px = kMaxTextWidthPx;
     style.max_height_px = kStripHeightPx - 8;
     style.color = kTextColor;
     target_name = DrawText(to_map, style);
   }
   const int strip = points_on ? kStripHeightPx : 0;
   const int height = text.rows + 2 * kPaddingPx + strip;
-  const int width = std::max({text.cols + 3 * kPaddingPx, height * 5 / 4,
-                              points_on ? target_name.cols + 2 * kArrowPx + 2 * kPaddingPx : 0});
+  const int width = std::max(
+      {text.cols + 3 * kPaddingPx, height * 5 / 4, points_on ? target_name.cols + 2 * kPaddingPx : 0});
   cv::Mat board(height, width, CV_8UC4, kBoardColor);
   Lay(text, (width - text.cols) / 2, (height - strip - text.rows) / 2, &board);
   if (points_on) {
     board.rowRange(height - strip, height) = kStripColor;
-    const int left = (width - target_name.cols - kArrowPx - kPaddingPx) / 2;
-    DrawArrow({left, height - strip / 2}, kArrowPx, &board);
-    Lay(target_name, left + kArrowPx + kPaddingPx, height - strip + (strip - target_name.rows) / 2, &board);
+    Lay(target_name, (width - target_name.cols) / 2, height - strip + (strip - target_name.rows) / 2, &board);
   }
   return board;
 }
@@ -186,6 +179,60 @@ void AddCone(float bottom, float top, float bottom_radius, float top_radius, con
   }
 }
 
+// A flat disk about the y axis at this height, visible from below.
+void AddDiskBelow(float height, float radius, content::Primitive* body) {
+  constexpr std::uint32_t kSides = 16;
+  const auto first = static_cast<std::uint32_t>(body->vertices.size());
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    const float angle = static_cast<float>(2 * std::numbers::pi) * static_cast<float>(i) / kSides;
+    body->vertices.push_back(
+        MakeVertex({std::sin(angle) * radius, height, std::cos(angle) * radius}, {0, -1, 0}));
+  }
+  for (std::uint32_t i = 2; i < kSides; ++i) AddTriangle(first, first + i, first + i - 1, body);
+}
+
+// Rotates what was made along y so that it lies along z.
+void LayDown(content::Primitive* part) {
+  for (content::Vertex& vertex : part->vertices) {
+    for (glm::vec3* const vector : {&vertex.position, &vertex.normal})
+      *vector = glm::vec3(vector->x, -vector->z, vector->y);
+  }
+}
+
+content::Material PlainMaterial(const glm::vec3& color) {
+  content::Material material;
+  material.base_color = glm::vec4(color, 1.0f);
+  material.metallic = 0.0f;
+  material.roughness = 0.6f;
+  return material;
+}
+
+std::shared_ptr<const content::Model> MakeArrowModel() {
+  constexpr float kEnd = kArrowLength / 2, kNeck = kEnd - kArrowHead;
+  content::Primitive head, shaft, back;
+  AddCone(kNeck, kEnd, kArrowHeadRadius, 0.0f, &head);
+  AddCone(-kEnd, kNeck, kArrowShaftRadius, kArrowShaftRadius, &shaft);
+  AddDiskBelow(kNeck, kArrowHeadRadius, &back);
+  AddDiskBelow(-kEnd, kArrowShaftRadius, &back);
+  auto model = std::make_shared<content::Model>();
+  model->name = "signpost arrow";
+  model->materials = {PlainMaterial({0.81f, 0.19f, 0.02f}), PlainMaterial({0.9f, 0.84f, 0.75f}),
+                      PlainMaterial({0.01f, 0.025f, 0.06f})};
+  int material = 0;
+  for (content::Primitive* const part : {&head, &shaft, &back}) {
+    LayDown(part);
+    part->material = material++;
+  }
+  model->meshes.push_back({"arrow", {std::move(head), std::move(shaft), std::move(back)}});
+  content::Node node;
+  node.mesh = 0;
+  model->nodes.push_back(node);
+  model->roots.push_back(0);
+  model->bounds_max = glm::vec3(kArrowHeadRadius, kArrowHeadRadius, kEnd);
+  model->bounds_min = -model->bounds_max;
+  return model;
+}
+
 content::Image ImageFrom(const cv::Mat& bgra) {
   content::Image image;
   image.width_px = bgra.cols;
@@ -213,11 +260,7 @@ std::shared_ptr<const content::Model> MakeSignpostModel(const std::string& text,
   content::Material front;
   front.base_color_texture.texture = 0;
   front.unlit = true;  // The text must be readable in any light.
-  content::Material body_material;
-  body_material.base_color = glm::vec4(0.55f, 0.47f, 0.38f, 1.0f);
-  body_material.metallic = 0.0f;
-  body_material.roughness = 0.6f;
-  model->materials = {front, body_material};
+  model->materials = {front, PlainMaterial({0.55f, 0.47f, 0.38f})};
 
   content::Primitive front_side = BoardSide(outline, half_size, 1.0f);
   front_side.material = 0;
@@ -235,6 +278,26 @@ std::shared_ptr<const content::Model> MakeSignpostModel(const std::string& text,
   model->bounds_min = glm::vec3(-half_width, 0, -0.2f);
   model->bounds_max = glm::vec3(half_width, kPoleHeight + 1.0f, 0.2f);
   return model;
+}
+
+std::shared_ptr<const content::Model> SignpostArrowModel() {
+  static const std::shared_ptr<const content::Model> model = MakeArrowModel();
+  return model;
+}
+
+engine::Sim3 SignpostArrowPose(const content::Signpost& signpost) {
+  const Eigen::Vector3d up = signpost.up.normalized(), ahead = signpost.direction.value().normalized();
+  Eigen::Vector3d aside = up.cross(ahead);
+  if (aside.norm() < 1e-9) aside = ahead.unitOrthogonal();
+  aside.normalize();
+  Eigen::Matrix3d axes;
+  axes << aside, ahead.cross(aside), ahead;
+  engine::Sim3 pose;
+  pose.rotation = engine::Rotation3(axes);
+  pose.translation =
+      content::BoardMiddle(signpost) + (0.5 + kArrowAboveBoard) * signpost.height_m * signpost.up;
+  pose.scale = signpost.height_m;
+  return pose;
 }
 
 engine::Sim3 SignpostPose(const content::Signpost& signpost, const Eigen::Vector3d& eye_in_map) {

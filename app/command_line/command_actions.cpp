@@ -67,6 +67,14 @@ void CommandActions::SetTarget(const std::string& name, const std::string& to_ma
   emit_(SetSignpostTarget{name, to_map});
 }
 
+void CommandActions::SetDirection(const std::string& name, const std::optional<Eigen::Vector3d>& direction) {
+  emit_(SetSignpostDirection{name, direction});
+}
+
+void CommandActions::PointAhead(const std::string& name) {
+  emit_(SetSignpostDirection{name, std::nullopt, true});
+}
+
 void CommandActions::SetLocked(const std::vector<std::string>& names, bool locked) {
   emit_(SetEntityFlag{names, content::EntityFlag::kLocked, locked});
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,6 +34,8 @@ class CommandActions : public ui::AuthoringActions {
   void SetOffset(const std::string& name, const Eigen::Vector3d& offset) override;
   void ShortenTrail(const std::string& name) override;
   void SetTarget(const std::string& name, const std::string& to_map) override;
+  void SetDirection(const std::string& name, const std::optional<Eigen::Vector3d>& direction) override;
+  void PointAhead(const std::string& name) override;
   void SetLocked(const std::vector<std::string>& names, bool locked) override;
   void SetHidden(const std::vector<std::string>& names, bool hidden) override;
   void Ungroup(const std::vector<std::string>& names) override;

@@ -67,6 +67,10 @@ struct DoneWriter {
   std::string operator()(const SetSignpostTarget& c) const {
     return c.name + (c.to_map.empty() ? " leads nowhere now." : " leads to " + c.to_map + " now.");
   }
+  std::string operator()(const SetSignpostDirection& c) const {
+    if (!c.ahead && !c.direction) return c.name + " has no arrow now.";
+    return "The arrow of " + c.name + " points " + (c.ahead ? "where the camera looks." : "there now.");
+  }
   std::string operator()(const SetEntityFlag& c) const {
     const bool is_lock = c.flag == content::EntityFlag::kLocked;
     const char* const verb = is_lock ? (c.value ? "Locked " : "Unlocked ") : (c.value ? "Hid " : "Showed ");

@@ -35,7 +35,7 @@ struct AddOptions {
   std::filesystem::path library, file;
   std::string map, name;
   std::string signpost, label, trail, caption, to_map;
-  std::optional<Eigen::Vector3d> position, offset;
+  std::optional<Eigen::Vector3d> position, offset, direction;
   std::optional<double> scale, height, range, width;
   double yaw_deg = 0;
   std::optional<Eigen::Quaterniond> rotation;
@@ -93,6 +93,7 @@ content::Entity NewSignpost(const AddOptions& options, const Target& target, std
   entity.signpost.up = target.axes.up;
   entity.signpost.to_map = options.to_map;
   entity.signpost.to_key = to_key;
+  if (options.direction) entity.signpost.direction = options.direction->stableNormalized();
   entity.signpost.height_m = options.height.value_or(SessionOptions().signpost_height * target.distance);
   return entity;
 }
@@ -211,6 +212,16 @@ void AddPropertyOptions(CLI::App* add, AddOptions* options, const std::vector<CL
       ->excludes(kinds[3]);
   add->add_option("--to", options->to_map, "The map that the signpost leads to")
       ->type_name("MAP")
+      ->needs(kinds[1]);
+  AddNumbers(
+      add, "--direction", 3, -content::kMaxCoordinate, content::kMaxCoordinate,
+      [=](const auto& n) {
+        options->direction = Eigen::Vector3d(n[0], n[1], n[2]);
+        if (options->direction->norm() < 1e-6)
+          throw CLI::ValidationError("--direction", "the direction is too short");
+      },
+      "Where one leaves for that map, along the map's axes; the signpost's arrow points there")
+      ->type_name("X Y Z")
       ->needs(kinds[1]);
   AddNumbers(
       add, "--offset", 3, -content::kMaxCoordinate, content::kMaxCoordinate,

@@ -41,7 +41,12 @@ Json ToJson(const maps::MapInfo& map, const content::Entity& entity) {
   json["position_m"] = {place.x(), place.y(), place.z()};
   if (content::HasModel(entity)) json["scale"] = entity.model.map_from_model.scale;
   if (entity.kind == Kind::kModel) json["bent"] = entity.model.warp != nullptr;
-  if (entity.kind == Kind::kSignpost) json["to_map"] = entity.signpost.to_map;
+  if (entity.kind == Kind::kSignpost) {
+    json["to_map"] = entity.signpost.to_map;
+    json["direction"] = nullptr;
+    if (const auto& direction = entity.signpost.direction)
+      json["direction"] = {direction->x(), direction->y(), direction->z()};
+  }
   if (entity.kind == Kind::kSound) json["range_m"] = entity.sound.range;
   if (entity.kind == Kind::kTrail) {
     json["width_m"] = entity.trail.width;

@@ -9,11 +9,14 @@
 
 #include "app/command_line/number_option.h"
 #include "app/command_line/stored_scene.h"
+#include "app/output/engine_text.h"
 #include "app/script/format_command.h"
 #include "app/script/scene_commands.h"
 #include "app/script/script_file.h"
 #include "app/session/library_scene.h"
+#include "app/session/way_to_map.h"
 #include "engine/base/error.h"
+#include "engine/mapping/loops/map_joining.h"
 
 namespace docent::app {
 
@@ -30,13 +33,13 @@ struct EditOptions {
   std::optional<engine::Sim3> transform;
   std::string language, to_map, rename, group, align, bend, extend;
   std::optional<std::string> text;
-  std::optional<Eigen::Vector3d> offset;
-  bool shorten = false;
+  std::optional<Eigen::Vector3d> offset, direction;
+  bool shorten = false, no_direction = false, find_direction = false;
 
   // With a value for one entity only.
   bool NamesOne() const {
-    return transform || text || offset || !extend.empty() || !rename.empty() || !align.empty() ||
-           !bend.empty();
+    return transform || text || offset || direction || find_direction || !extend.empty() || !rename.empty() ||
+           !align.empty() || !bend.empty();
   }
 };
 
@@ -80,6 +83,8 @@ std::vector<Command> CommandsFor(const EditOptions& options) {
     if (!options.extend.empty()) commands.push_back(Extension(name, options.extend));
     if (options.nowhere || !options.to_map.empty())
       commands.emplace_back(SetSignpostTarget{name, options.to_map});
+    if (options.no_direction || options.direction || options.find_direction)
+      commands.emplace_back(SetSignpostDirection{name, options.direction});
   }
   if (options.ungroup) commands.emplace_back(GroupEntities{names, ""});
   if (!options.group.empty()) commands.emplace_back(GroupEntities{names, options.group});
@@ -100,10 +105,32 @@ std::vector<content::Correspondence> WithoutPixels(const std::vector<PointPair>&
   return correspondences;
 }
 
+// Lets a signpost point to where the map that it leads to begins, which is known if both show one place.
+content::SceneChange PointToTarget(const maps::Library& library, const maps::MapInfo& map,
+                                   const content::Scene& scene, const std::string& name) {
+  const content::Entity* const entity = scene.Find(name);
+  if (entity == nullptr) throw Error("There is no '" + name + "' in this map.");
+  const content::Signpost& signpost = entity->signpost;
+  if (entity->kind != content::Entity::Kind::kSignpost || signpost.to_key == 0)
+    throw Error("'" + name + "' leads to no map, so that it cannot point there.");
+  const maps::MapInfo target = library.Find(signpost.to_key);
+  const auto here = library.Load(map.key).snapshot, there = library.Load(target.key).snapshot;
+  const engine::MapOverlap overlap = engine::CompareMaps({}, *here, *there, nullptr);
+  if (overlap.outcome != engine::MapOverlap::Outcome::kOverlap) {
+    throw Error("where '" + target.name + "' begins is not known from here, because " +
+                TextOf(engine::JoinRefusal::kNoOverlap, overlap) + "; give --direction instead");
+  }
+  const auto direction = DirectionToMap(signpost, overlap.a_from_b, *there);
+  if (!direction) throw Error("'" + target.name + "' begins at '" + name + "'; give --direction instead");
+  return content::DirectionEdit(scene, name, direction);
+}
+
 // Turns commands into edits of a stored scene.
 class StoredEdits {
  public:
-  StoredEdits(const maps::Library& library, const maps::MapInfo& map) : library_(library), map_(map) {}
+  // `find_directions`: directions that are not given are found out.
+  StoredEdits(const maps::Library& library, const maps::MapInfo& map, bool find_directions)
+      : library_(library), map_(map), find_directions_(find_directions) {}
 
   content::SceneChange operator()(const content::Scene& scene, const SceneCommand auto& command) const {
     return EditFor(scene, command);
@@ -112,6 +139,10 @@ class StoredEdits {
     const std::uint64_t key = command.to_map.empty() ? 0 : library_.FindByName(command.to_map).key;
     if (key == map_.key) throw Error("a signpost cannot lead to its own map.");
     return content::TargetEdit(scene, command.name, command.to_map, key);
+  }
+  content::SceneChange operator()(const content::Scene& scene, const SetSignpostDirection& command) const {
+    if (find_directions_) return PointToTarget(library_, map_, scene, command.name);
+    return content::DirectionEdit(scene, command.name, command.direction);
   }
   content::SceneChange operator()(const content::Scene& scene, const AlignEntity& command) const {
     return content::AlignEdit(scene, command.name, WithoutPixels(command.pairs), nullptr);
@@ -130,13 +161,14 @@ class StoredEdits {
  private:
   const maps::Library& library_;
   const maps::MapInfo& map_;
+  const bool find_directions_;
 };
 
 void RunEdit(const EditOptions& options) {
   if (options.NamesOne() && options.names.size() > 1)
     throw Error(
-        "--transform, --align, --bend, --text, --offset, --extend and --rename change one object, not "
-        "several.");
+        "--transform, --align, --bend, --text, --offset, --direction, --find-direction, --extend and "
+        "--rename change one object, not several.");
   const std::vector<Command> commands = CommandsFor(options);
   if (commands.empty()) throw Error("No change is given; see docent content edit --help.");
   for (const Command& command : commands) {
@@ -145,7 +177,7 @@ void RunEdit(const EditOptions& options) {
   }
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   const maps::MapInfo map = library.FindByName(options.map);
-  const StoredEdits edit_for(library, map);
+  const StoredEdits edit_for(library, map, options.find_direction);
   std::vector<MakeEdit> edits;
   for (const Command& command : commands) {
     edits.emplace_back([&](const content::Scene& scene) {
@@ -213,6 +245,20 @@ void AddPropertyOptions(CLI::App* edit, EditOptions* options) {
   CLI::Option* to = edit->add_option("--to", options->to_map, "Let a signpost lead to this map");
   to->type_name("MAP");
   edit->add_flag("--to-nowhere", options->nowhere, "Let a signpost lead to no map")->excludes(to);
+  CLI::Option* direction = AddNumbers(
+      edit, "--direction", 3, -content::kMaxCoordinate, content::kMaxCoordinate,
+      [=](const auto& n) { options->direction = Eigen::Vector3d(n[0], n[1], n[2]); },
+      "Let the arrow of a signpost point in this direction along the map's axes, where one leaves for the "
+      "map "
+      "that it leads to");
+  direction->type_name("X Y Z");
+  CLI::Option* find = edit->add_flag("--find-direction", options->find_direction,
+                                     "Let the arrow of a signpost point to where the map begins that it "
+                                     "leads to; both maps have to show one place");
+  CLI::Option* no_direction =
+      edit->add_flag("--no-direction", options->no_direction, "Take the arrow from a signpost");
+  direction->excludes(find)->excludes(no_direction);
+  find->excludes(no_direction);
   edit->add_option("--rename", options->rename, "Change the name")->type_name("NEW");
   CLI::Option* group = edit->add_option("--group", options->group, "Put them in this group");
   group->type_name("GROUP");

@@ -10,6 +10,7 @@ GuideFiles::GuideFiles(const GuideRequest& request, const engine::CameraModel& f
   if (request.output) {
     output_.emplace(*request.output);
     augmentations_.emplace(*request.output);
+    if (!request.may_write) guidance_.emplace(*request.output);
   }
   if (request.record_script) script_.emplace(*request.record_script);
 }
@@ -19,6 +20,7 @@ void GuideFiles::Add(const ShownFrame& frame) {
   output_->Add(frame.tracked, frame.shown.map_name);
   if (frame.shown.scene && frame.tracked.frame.camera == 0)
     augmentations_->Add(frame.tracked, camera_, frame.shown.map_name, *frame.shown.scene);
+  if (guidance_ && frame.way) guidance_->Add(frame.tracked, frame.shown.map_name, *frame.way);
 }
 
 void GuideFiles::Add(const TimedCommand& command) {
@@ -33,6 +35,7 @@ void GuideFiles::Add(const std::vector<Event>& events) {
 void GuideFiles::Close() {
   if (output_) output_->Close();
   if (augmentations_) augmentations_->Close();
+  if (guidance_) guidance_->Close();
   if (script_) script_->Close();
 }
 

@@ -7,11 +7,12 @@
 #include "app/files/checked_file.h"
 #include "app/output/run_output.h"
 #include "app/session/augmentation_log.h"
+#include "app/session/guidance_log.h"
 
 namespace docent::app {
 
-// Text files that a guided run writes when they were requested: trajectory, frames, events, augmentations and
-// recorded script. One thread at a time.
+// Text files that a guided run writes when they were requested: trajectory, frames, events, augmentations,
+// guidance and recorded script. One thread at a time.
 class GuideFiles {
  public:
   // `first_camera` projects the content that was drawn over the first camera's images into the log of
@@ -27,6 +28,7 @@ class GuideFiles {
   const engine::CameraModel& camera_;
   std::optional<RunOutput> output_;
   std::optional<AugmentationLog> augmentations_;
+  std::optional<GuidanceLog> guidance_;  // Only on a tour.
   std::optional<CheckedFile> script_;
 };
 

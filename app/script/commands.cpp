@@ -98,6 +98,14 @@ std::string OffsetProblem(const Eigen::Vector3d& offset) {
   return near ? "" : "the offset leads out of any map";
 }
 
+std::string DirectionProblem(const Eigen::Vector3d& direction) {
+  // Of a shorter one, little more than rounding may be left.
+  constexpr double kMinLength = 1e-6;
+  if (!IsAtMost(direction.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate))
+    return "the direction leads out of any map";
+  return direction.norm() >= kMinLength ? "" : "the direction is too short; give X Y Z that are not all 0";
+}
+
 std::string LengthProblem(const char* what, double length, double least, double most) {
   if (length >= least && length <= most) return "";
   return std::string("the ") + what + " must be between " + FormatNumber(least) + " and " +
@@ -224,6 +232,10 @@ struct Validator {
   }
   std::string operator()(const SetSignpostTarget& c) const {
     return First({NameProblem(c.name, "a name"), c.to_map.empty() ? "" : MapNameProblem(c.to_map)});
+  }
+  std::string operator()(const SetSignpostDirection& c) const {
+    return First({NameProblem(c.name, "a name"),
+                  c.direction && !c.ahead ? DirectionProblem(*c.direction) : std::string()});
   }
   std::string operator()(const SetEntityFlag& c) const { return NamesProblem(c.names); }
   std::string operator()(const GroupEntities& c) const {

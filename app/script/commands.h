@@ -208,6 +208,14 @@ struct SetSignpostTarget {
   std::string to_map;  // the map it leads to; empty for none
   bool operator==(const SetSignpostTarget&) const = default;
 };
+// Says where one leaves for the map that a signpost leads to; its arrow points there.
+struct SetSignpostDirection {
+  std::string name;
+  // Of any length along the map's axes; empty: it is not known. Ignored with `ahead`.
+  std::optional<Eigen::Vector3d> direction = std::nullopt;
+  bool ahead = false;  // The viewing direction of the camera in the command's frame.
+  bool operator==(const SetSignpostDirection&) const = default;
+};
 // Locks, unlocks, hides or shows entities.
 struct SetEntityFlag {
   std::vector<std::string> names;
@@ -253,8 +261,8 @@ using Command =
                  PlaceModel, PlaceSignpost, PlaceLabel, PlaceImage, PlaceSound, PlaceTrail, ExtendTrail,
                  ShortenTrail, SetLabelOffset, MoveEntity, RotateEntity, ScaleEntity, TransformEntities,
                  AlignEntity, BendEntity, UnbendEntity, RemoveEntities, DuplicateEntities, RenameEntity,
-                 SetEntityText, SetSignpostTarget, SetEntityFlag, GroupEntities, PasteEntities, GuideVisitor,
-                 Undo, Redo, Save>;
+                 SetEntityText, SetSignpostTarget, SetSignpostDirection, SetEntityFlag, GroupEntities,
+                 PasteEntities, GuideVisitor, Undo, Redo, Save>;
 
 // The same rotation, with a quaternion that normalizing does not change any more. A command that was written
 // to a script and read again thereby has exactly the rotation of the original.

@@ -149,6 +149,12 @@ struct CommandFormatter {
   std::string operator()(const SetSignpostTarget& c) const {
     return "target " + AlwaysQuoted(c.name) + (c.to_map.empty() ? "" : ' ' + AlwaysQuoted(c.to_map));
   }
+  std::string operator()(const SetSignpostDirection& c) const {
+    return "direction " + AlwaysQuoted(c.name) + ' ' +
+           (c.ahead       ? "ahead"
+            : c.direction ? Point(*c.direction)
+                          : std::string("unknown"));
+  }
   std::string operator()(const SetEntityFlag& c) const {
     const bool is_lock = c.flag == content::EntityFlag::kLocked;
     const char* const verb = is_lock ? (c.value ? "lock" : "unlock") : (c.value ? "hide" : "show");

@@ -233,6 +233,16 @@ Command ParseTarget(LineReader* line) {
   return command;
 }
 
+Command ParseDirection(LineReader* line) {
+  SetSignpostDirection command{line->TakeName("a name")};
+  if (line->TakeIf("ahead")) {
+    command.ahead = true;
+  } else if (!line->TakeIf("unknown")) {
+    command.direction = TakePoint(line);
+  }
+  return command;
+}
+
 Command ParsePaste(LineReader* line) {
   PasteEntities command;
   command.names = ParseNames(line, "from");
@@ -269,6 +279,7 @@ std::optional<Command> ParseEdit(LineReader* line) {
     return SetLabelOffset{name, TakePoint(line)};
   }
   if (line->TakeIf("target")) return ParseTarget(line);
+  if (line->TakeIf("direction")) return ParseDirection(line);
   if (line->TakeIf("lock")) return ParseFlag(line, EntityFlag::kLocked, true);
   if (line->TakeIf("unlock")) return ParseFlag(line, EntityFlag::kLocked, false);
   if (line->TakeIf("hide")) return ParseFlag(line, EntityFlag::kHidden, true);

@@ -192,6 +192,17 @@ void ContentCommands::Apply(const SetSignpostTarget& command, const engine::Trac
   Edit(&map, content::TargetEdit(*map.scene, command.name, command.to_map, key));
 }
 
+void ContentCommands::Apply(const SetSignpostDirection& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  std::optional<Eigen::Vector3d> direction = command.direction;
+  if (command.ahead) {
+    if (!engine::HasPose(frame.state))
+      throw Error("the camera has no pose, so that its viewing direction is not known");
+    direction = frame.camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
+  }
+  Edit(&map, content::DirectionEdit(*map.scene, command.name, direction));
+}
+
 void ContentCommands::Apply(const PasteEntities& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   const SessionMap& from = state_.InitializedMap(command.from_map);
@@ -200,9 +211,9 @@ void ContentCommands::Apply(const PasteEntities& command, const engine::TrackedF
   for (const std::string& name : command.names) {
     content::Entity& copy = copies.emplace_back(FindEntity(*from.scene, name));
     middle += content::BaseInMap(copy) / static_cast<double>(command.names.size());
-    if (copy.signpost.to_key != map.key) continue;
-    copy.signpost.to_key = 0;  // it would lead to its own map
-    copy.signpost.to_map.clear();
+    if (&from != &map) copy.signpost.direction.reset();  // The way there is another one from here.
+    if (copy.signpost.to_key == map.key)
+      content::LeadNowhere(&copy.signpost);  // It would lead to its own map.
   }
   const engine::CameraModel& camera = *state_.cameras.at(CameraOf(frame)).model;
   const Eigen::Vector2d centre(0.5 * (camera.width_px() - 1), 0.5 * (camera.height_px() - 1));

@@ -37,6 +37,7 @@ class ContentCommands {
   void Apply(const ExtendTrail& command, const engine::TrackedFrame& frame);
   void Apply(const MoveEntity& command, const engine::TrackedFrame& frame);
   void Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame);
+  void Apply(const SetSignpostDirection& command, const engine::TrackedFrame& frame);
   void Apply(const PasteEntities& command, const engine::TrackedFrame& frame);
   void Apply(const AlignEntity& command, const engine::TrackedFrame& frame);
   void Apply(const BendEntity& command, const engine::TrackedFrame& frame);

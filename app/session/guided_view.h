@@ -7,6 +7,7 @@
 #include <string>
 
 #include "app/session/session.h"
+#include "app/session/way_on.h"
 #include "ui/recorder.h"
 #include "ui/renderer.h"
 
@@ -24,6 +25,8 @@ struct ShownFrame {
   std::string caption;  // of the sounds that play; often empty
   // Only on a tour; see VisitState.
   std::optional<ui::VisitorDisplay> visitor = {};
+  // Only on a tour: the way on that `visitor` shows, if there is one.
+  std::optional<ShownWay> way = {};
   // If a visitor was lost a moment ago: the last pose before, whose content is in `shown`.
   std::optional<engine::Rigid3> held_camera_from_map = {};
   // The current camera model of a camera whose calibration is estimated; else null.

@@ -32,8 +32,7 @@ void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps:
   if (scene->settings.metres_per_unit == 0) scene->settings.metres_per_unit = settings.metres_per_unit;
   for (content::Entity& entity : scene->entities) {
     if (!LeadsToMap(entity, map_a) && !LeadsToMap(entity, map_b)) continue;
-    entity.signpost.to_map.clear();
-    entity.signpost.to_key = 0;
+    content::LeadNowhere(&entity.signpost);
   }
 }
 

@@ -50,6 +50,7 @@ std::optional<std::string> RetargetScene(const std::string& text, const maps::Re
     if (!target) continue;
     entity.signpost.to_key = target->key;
     entity.signpost.to_map = target->map;
+    if (*target == maps::SignpostTarget()) content::LeadNowhere(&entity.signpost);
     changed = true;
   }
   return changed ? std::optional(content::EncodeScene(scene)) : std::nullopt;

@@ -96,6 +96,7 @@ void SessionState::Retarget(std::uint64_t from_key, const std::string& from, std
       if (entity.kind != content::Entity::Kind::kSignpost || !leads) continue;
       signpost.to_key = to_key;
       signpost.to_map = to;
+      if (to_key == 0 && to.empty()) content::LeadNowhere(&signpost);
       changed = true;
     }
     if (changed) map.scene = std::move(scene);

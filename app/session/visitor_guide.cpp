@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/session/visitor_guide.h"
 
-#include <cmath>
-
 #include "app/session/route_text.h"
 
 namespace docent::app {
@@ -16,8 +14,8 @@ void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine:
   if (!views_.empty()) frame->visitor->sentence = strings_.go_to_a_view;
   if (route_ != nullptr) FollowRoute(frame.get());
   if (has_pose && frame->shown.scene)
-    frame->visitor->way_on =
-        WayOutOfSight(*frame->shown.scene, camera, frame->tracked.camera_from_map, route_, strings_);
+    frame->way = FindWay(*frame->shown.scene, camera, frame->tracked.camera_from_map, route_, strings_);
+  if (frame->way) frame->visitor->way_on = frame->way->drawn;
   if (has_pose) {
     last_with_pose_ = frame;
   } else if (last_with_pose_ && state_.HoldsContent(frame->seconds)) {
@@ -69,58 +67,6 @@ void VisitorGuide::FollowRoute(ShownFrame* frame) {
   display.route_stops = RouteList(*route_, strings_);
   // Who is lost finds among the stops those that are near.
   if (!display.stops.empty()) display.stops = display.route_stops;
-}
-
-namespace {
-
-bool LeadsOn(const content::Entity& entity) {
-  return entity.kind == content::Entity::Kind::kSignpost && !entity.hidden && entity.signpost.to_key != 0;
-}
-
-// The least number of signposts from where one of the scene's signposts leads to the route's target.
-std::optional<int> FewestSignposts(const content::Scene& scene, const RouteState& route) {
-  std::optional<int> fewest;
-  for (const content::Entity& entity : scene.entities) {
-    if (!LeadsOn(entity)) continue;
-    const std::optional<int> signposts = route.SignpostsFrom(entity.signpost.to_key);
-    if (signposts && (!fewest || *signposts < *fewest)) fewest = signposts;
-  }
-  return fewest;
-}
-
-std::string WayText(const content::Signpost& sign, const RouteState* route, const VisitorStrings& text) {
-  if (route == nullptr) return sign.to_map.empty() ? sign.text : Filled(text, text.to, {sign.to_map});
-  const RouteStop& target = route->route().stops[*route->Target()];
-  if (target.key == sign.to_key) return Filled(text, text.to, {target.name});
-  return Filled(text, text.to_through, {target.name, sign.to_map});
-}
-
-}  // namespace
-
-std::optional<ui::WayOn> WayOutOfSight(const content::Scene& scene, const engine::CameraModel& camera,
-                                       const engine::Rigid3& camera_from_map, const RouteState* route,
-                                       const VisitorStrings& strings) {
-  const std::optional<int> fewest = route != nullptr ? FewestSignposts(scene, *route) : std::nullopt;
-  if (route != nullptr && !fewest) return std::nullopt;
-  constexpr double kMargin = 0.04;  // Ratio of the image's width.
-  const double margin_px = kMargin * camera.width_px();
-  std::optional<ui::WayOn> way;
-  double least_angle = 0;
-  for (const content::Entity& entity : scene.entities) {
-    if (!LeadsOn(entity)) continue;
-    if (route != nullptr && route->SignpostsFrom(entity.signpost.to_key) != fewest) continue;
-    // The middle of the board is what has to be seen.
-    const content::Signpost& sign = entity.signpost;
-    const Eigen::Vector3d board_in_map = sign.anchor + 0.5 * sign.height_m * sign.up;
-    const Eigen::Vector3d board = camera_from_map * board_in_map;
-    const auto arrow = ui::ArrowTowards(camera, board, margin_px);
-    if (!arrow) return std::nullopt;
-    const double angle = std::atan2(board.head<2>().norm(), board.z());
-    if (way && angle >= least_angle) continue;
-    way = ui::WayOn{*arrow, WayText(sign, route, strings)};
-    least_angle = angle;
-  }
-  return way;
 }
 
 // Once a second while the visitor searches.

@@ -24,8 +24,8 @@ class VisitorGuide {
                RouteState* route = nullptr)
       : session_(session), strings_(strings), state_(std::move(stops), strings), route_(route) {}
 
-  // Sets the frame's `visitor`; `camera` is the lens of its image. Shortly after a loss the frame gets the
-  // content and the pose of the last frame that had one.
+  // Sets the frame's `visitor` and `way`; `camera` is the lens of its image. Shortly after a loss the frame
+  // gets the content and the pose of the last frame that had one.
   void Guide(const std::shared_ptr<ShownFrame>& frame, const engine::CameraModel& camera);
 
  private:
@@ -44,13 +44,5 @@ class VisitorGuide {
 // What a visitor is told about a frame so that the camera is tracked: why its place is not recognised, else
 // the engine's hint. Empty for nothing, and for hints that are about building a map.
 std::string VisitorHint(const RejectionMessage& rejection, engine::Hint hint, const VisitorStrings& strings);
-
-// The nearest signpost in the scene that leads to another map, if none of those is seen; empty if one is, or
-// there is none. Nearest is what the camera has to turn least for. With a route, only those signposts count
-// from which the fewest others lead on to its target.
-std::optional<ui::WayOn> WayOutOfSight(const content::Scene& scene, const engine::CameraModel& camera,
-                                       const engine::Rigid3& camera_from_map,
-                                       const RouteState* route = nullptr,
-                                       const VisitorStrings& strings = VisitorStringsFor(""));
 
 }  // namespace docent::app

@@ -44,6 +44,7 @@ std::vector<SceneChange> OneOfEach(const Scene& scene) {
           RenameEdit(scene, "helmet", "hat"),
           TextEdit(scene, "sign-1", "elsewhere"),
           TargetEdit(scene, "sign-1", "Desk 4", 9),
+          DirectionEdit(scene, "sign-1", Eigen::Vector3d(1, 2, 3)),
           AlignEdit(scene, "helmet", kCorners, nullptr),
           BendEdit(scene, "old fox", kCorners),
           FlagEdit(scene, {"helmet", "sign-1"}, EntityFlag::kLocked, true),
@@ -249,6 +250,7 @@ TEST(Edits, ALockedEntityRefusesEveryChangeButUnlocking) {
       [](const Scene& s) { return RenameEdit(s, "helmet", "hat"); },
       [](const Scene& s) { return TextEdit(s, "sign-1", "x"); },
       [](const Scene& s) { return TargetEdit(s, "sign-1", "", 0); },
+      [](const Scene& s) { return DirectionEdit(s, "sign-1", Eigen::Vector3d(1, 2, 3)); },
       [](const Scene& s) { return FlagEdit(s, {"helmet"}, EntityFlag::kHidden, true); },
       [](const Scene& s) { return GroupEdit(s, {"helmet"}, "g"); },
       [](const Scene& s) { return RemoveEdit(s, {"helmet"}); }};

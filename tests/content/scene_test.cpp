@@ -284,6 +284,16 @@ TEST(SceneCodec, TheLargestScenesThatAreWrittenCanBeRead) {
   EXPECT_THAT(Validate(scene), HasSubstr("at most 50000"));
   scene.entities.clear();
   Entity sign = TestScene().entities[1];
+  sign.group.clear();
+  sign.signpost.direction = Eigen::Vector3d(-1.0 / 3, 2.0 / 3, -2.0 / 3);
+  sign.signpost.anchor = {-1.0 / 3e5, 123456.78901234567, -1e-300};
+  for (std::size_t i = 0; i < kMaxEntities; ++i) {
+    sign.name = std::to_string(i);
+    scene.entities.push_back(sign);
+  }
+  ASSERT_EQ(Validate(scene), "");
+  EXPECT_EQ(ErrorOfScene(EncodeScene(scene)), "");
+  scene.entities.clear();
   sign.signpost.text = std::string(kMaxTextBytes, '\x01');
   for (int i = 0; Validate(scene).empty(); ++i) {
     sign.name = std::to_string(i);

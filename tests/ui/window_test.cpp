@@ -13,6 +13,7 @@
 #include "tests/support/virtual_screen.h"
 #include "tests/ui/ui_testing.h"
 #include "ui/authoring_panel.h"
+#include "ui/entity_section.h"
 #include "ui/gui.h"
 #include "ui/letterbox.h"
 #include "ui/message_area.h"
@@ -75,6 +76,10 @@ class AskedFor : public AuthoringActions {
   void SetTarget(const std::string& name, const std::string& to_map) override {
     words.push_back("target " + name + " " + to_map);
   }
+  void SetDirection(const std::string& name, const std::optional<Eigen::Vector3d>& direction) override {
+    words.push_back(direction ? "direction " + name : "no direction " + name);
+  }
+  void PointAhead(const std::string& name) override { words.push_back("point ahead " + name); }
   void SetLocked(const std::vector<std::string>&, bool locked) override {
     words.push_back(locked ? "lock" : "unlock");
   }
@@ -111,9 +116,13 @@ class InterfaceOnScreen : public ::testing::Test {
     const Eigen::Vector2i size = window_->WindowSize();
     layout_ = LayOutWindow(size.x(), size.y(), 1, panel_->choices().panel_open);
     gui_->Begin(layout_.scale);
-    panel_->Draw(layout_, facts_);
-    DrawMessages(layout_, &board_, &asked_);
-    dialog_.Draw(layout_, &asked_);
+    if (section_) {
+      section_->DrawSelected(facts_);
+    } else {
+      panel_->Draw(layout_, facts_);
+      DrawMessages(layout_, &board_, &asked_);
+      dialog_.Draw(layout_, &asked_);
+    }
     gui_->Draw();
     window_->Show();
   }
@@ -148,6 +157,7 @@ class InterfaceOnScreen : public ::testing::Test {
   std::optional<Gui> gui_;
   AskedFor asked_;
   std::optional<AuthoringPanel> panel_;
+  std::optional<EntitySection> section_;  // If given, the fields of what is selected are drawn alone.
   Selection selection_;
   AuthoringFacts facts_;
   MessageBoard board_;
@@ -239,6 +249,26 @@ TEST_F(InterfaceOnScreen, TheListSelects) {
   // The rows are below the header of the list: clicks from top to bottom meet both in order.
   for (double y = 322; y < 640 && asked_.words.size() < 1; y += 14) Click({layout_.panel.x + 40, y});
   EXPECT_THAT(asked_.words, ElementsAre("select sign-1"));
+}
+
+TEST_F(InterfaceOnScreen, ASignpostPointsAheadByItsButtonWhileThereIsAPose) {
+  content::Scene scene;
+  scene.entities.resize(1);
+  scene.entities[0].name = "sign-1";
+  facts_.scene = &scene;
+  facts_.has_pose = true;
+  selection_.Set({"sign-1"});
+  section_.emplace(&asked_);
+  Draw();
+  // Without a window of its own it is drawn in ImGui's own one, at (60, 60); the fields above the button ask
+  // for nothing when they are clicked.
+  double y = 90;
+  for (; y < 440 && asked_.words.empty(); y += 11) Click({110, y});
+  EXPECT_THAT(asked_.words, ElementsAre("point ahead sign-1"));
+  asked_.words.clear();
+  facts_.has_pose = false;
+  Click({110, y - 11});
+  EXPECT_THAT(asked_.words, IsEmpty());
 }
 
 TEST_F(InterfaceOnScreen, TheCurrentMapIsRenamedInItsField) {

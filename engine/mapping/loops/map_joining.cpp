@@ -104,6 +104,13 @@ int FuseDuplicatePoints(const JoinedIds& ids, const std::vector<LoopCandidate>& 
   return merged;
 }
 
+// Whether together two maps have more ids than one map can hold.
+bool HaveTooManyIds(const MapSnapshot& a, const MapSnapshot& b) {
+  const auto full = [](std::uint32_t next_a, std::uint32_t next_b) { return next_b >= kNoId - next_a; };
+  return full(a.next_keyframe, b.next_keyframe) || full(a.next_point, b.next_point) ||
+         full(a.next_panorama, b.next_panorama);
+}
+
 }  // namespace
 
 std::optional<std::string> MapJoiningOptions::Validate() const {
@@ -146,13 +153,20 @@ MapSnapshot SideBySide(const MapSnapshot& a, const MapSnapshot& b, JoinedIds* id
   return both;
 }
 
+MapOverlap CompareMaps(const MapOverlapOptions& options, const MapSnapshot& a, const MapSnapshot& b,
+                       const std::atomic<bool>* interrupt) {
+  Checked(options);
+  if (HaveTooManyIds(a, b)) return {};
+  JoinedIds ids;
+  Map map(SideBySide(a, b, &ids));
+  return FindOverlap(options, ids.first_keyframe, interrupt, &map);
+}
+
 MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, const MapSnapshot& b,
                         const std::atomic<bool>* interrupt) {
   Checked(options);
   MapJoinAttempt attempt;
-  const auto full = [](std::uint32_t next_a, std::uint32_t next_b) { return next_b >= kNoId - next_a; };
-  if (full(a.next_keyframe, b.next_keyframe) || full(a.next_point, b.next_point) ||
-      full(a.next_panorama, b.next_panorama)) {
+  if (HaveTooManyIds(a, b)) {
     attempt.refusal = JoinRefusal::kTooManyIds;
     return attempt;
   }

@@ -66,6 +66,11 @@ struct MapJoinAttempt {
 MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, const MapSnapshot& b,
                         const std::atomic<bool>* interrupt);
 
+// Decides whether two maps show one place, and only that. Both must be as for JoinMaps; interrupt may be
+// null.
+MapOverlap CompareMaps(const MapOverlapOptions& options, const MapSnapshot& a, const MapSnapshot& b,
+                       const std::atomic<bool>* interrupt);
+
 // Both maps in one snapshot, without moving either: the ids of B are raised, and its keyframes are no longer
 // fixed, so that those of A alone define the coordinate frame. The revision is the higher of the two.
 MapSnapshot SideBySide(const MapSnapshot& a, const MapSnapshot& b, JoinedIds* ids);

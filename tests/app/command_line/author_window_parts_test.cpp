@@ -63,6 +63,9 @@ TEST(CommandWords, SayWhatWasDone) {
   EXPECT_EQ(DoneText(SetEntityFlag{{"fox"}, content::EntityFlag::kLocked, false}), "Unlocked fox.");
   EXPECT_EQ(DoneText(SetEntityFlag{{"fox"}, content::EntityFlag::kHidden, true}), "Hid fox.");
   EXPECT_EQ(DoneText(SetSignpostTarget{"sign-1", ""}), "sign-1 leads nowhere now.");
+  EXPECT_EQ(DoneText(SetSignpostDirection{"sign-1", std::nullopt, true}),
+            "The arrow of sign-1 points where the camera looks.");
+  EXPECT_EQ(DoneText(SetSignpostDirection{"sign-1"}), "sign-1 has no arrow now.");
 }
 
 TEST(CommandWords, KnowWhatCanBeUndone) {

@@ -41,6 +41,9 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "14 text sign-1 \"To the hats\"\n"
       "14 target sign-1 \"Desk 3\"\n"
       "14 target sign-1\n"
+      "14 direction sign-1 0.5 0 -2\n"
+      "14 direction sign-1 ahead\n"
+      "14 direction \"ahead\" unknown\n"
       "14 lock hat sign-1\n14 unlock hat\n14 hide hat\n14 show hat\n"
       "14 group \"Old hats\" hat sign-1\n"
       "14 ungroup hat\n"
@@ -53,7 +56,7 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "16 map join Desk\n"
       "16 map remove Bureau\n",
       "script");
-  ASSERT_EQ(commands.size(), 41u);
+  ASSERT_EQ(commands.size(), 44u);
   EXPECT_EQ(commands[0].command, Command(NewMap{"Desk 3"}));
   EXPECT_EQ(commands[0].line, 2);
   EXPECT_EQ(commands[1].time, std::chrono::milliseconds(1500));
@@ -87,6 +90,9 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
                                      SetEntityText{"sign-1", "To the hats"},
                                      SetSignpostTarget{"sign-1", "Desk 3"},
                                      SetSignpostTarget{"sign-1", ""},
+                                     SetSignpostDirection{"sign-1", Eigen::Vector3d(0.5, 0, -2)},
+                                     SetSignpostDirection{"sign-1", std::nullopt, true},
+                                     SetSignpostDirection{"ahead"},
                                      SetEntityFlag{{"hat", "sign-1"}, kLocked, true},
                                      SetEntityFlag{{"hat"}, kLocked, false},
                                      SetEntityFlag{{"hat"}, kHidden, true},
@@ -205,7 +211,7 @@ Command AnyCommand(Random* random) {
     }
     return some;
   };
-  switch (random->Below(26)) {
+  switch (random->Below(27)) {
     case 0:
       return NewMap{text()};
     case 1:
@@ -267,6 +273,12 @@ Command AnyCommand(Random* random) {
       return BendEntity{text(), pairs()};
     case 25:
       return UnbendEntity{text()};
+    case 26: {
+      SetSignpostDirection direction{text()};
+      if (random->Below(3) > 0) direction.direction = {number(), number(), number()};
+      direction.ahead = !direction.direction && random->Below(2) == 0;
+      return direction;
+    }
     default:
       return random->Below(2) == 0 ? Command(Redo{}) : Command(Save{});
   }

@@ -32,7 +32,7 @@ class AbsurdCommands {
   explicit AbsurdCommands(std::uint64_t seed) : random_(seed) {}
 
   Command Next() {
-    switch (random_.Below(34)) {
+    switch (random_.Below(35)) {
       case 0:
         return NewMap{Name()};
       case 1:
@@ -109,6 +109,9 @@ class AbsurdCommands {
         return Redo{};
       case 25:
         return SetMapUp{Perhaps<Eigen::Vector2d>([&] { return Pixel(); })};
+      case 33:
+        return SetSignpostDirection{Name(), Perhaps<Eigen::Vector3d>([&] { return Vector(); }),
+                                    random_.Below(2) == 0};
       case 32:
         return SetMapScale{Pixel(), Pixel(), Number()};
       default:

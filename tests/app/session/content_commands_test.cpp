@@ -177,6 +177,16 @@ TEST_F(ContentInASession, EveryCommandChangesTheContentAndIsUndone) {
                frame_.camera_from_map * (model.map_from_model * (*model.warp)({0, 0, 0})));
            EXPECT_LT((*seen - kPixel).norm(), 1e-6);
          }},
+        {SetSignpostDirection{"sign-1", Eigen::Vector3d(0, 0, -7)},
+         [&] { EXPECT_EQ(*Named("sign-1").signpost.direction, Eigen::Vector3d(0, 0, -1)); }},
+        {SetSignpostDirection{"sign-1", std::nullopt, true},
+         [&] {
+           // What is far in this direction is in the middle of the image.
+           const auto seen = LensOf(*Room(0.1))[0]->Project(frame_.camera_from_map.rotation *
+                                                            *Named("sign-1").signpost.direction);
+           const auto middle = LensOf(*Room(0.1))[0]->Project({0, 0, 1});
+           EXPECT_LT((*seen - *middle).norm(), 1e-6);
+         }},
         {PasteEntities{{"exhibit", "sign-1"}, "Bay", Eigen::Vector2d(280, 300)},
          [&] {
            // In the same map nothing is turned or scaled, and the middle of the two is at the pixel.
@@ -369,8 +379,11 @@ TEST_F(ContentInASession, ContentIsPastedFromAnotherMapAndSignpostsLeadToOtherMa
               ASSERT_EQ(Do(SetSignpostTarget{"sign-1", there}), "");
               EXPECT_EQ(Named("sign-1").signpost.to_map, there);
               EXPECT_EQ(Named("sign-1").signpost.to_key, library_.FindByName(there).key);
+              ASSERT_EQ(Do(SetSignpostDirection{"sign-1", std::nullopt, true}), "");
+              EXPECT_TRUE(Named("sign-1").signpost.direction);
               ASSERT_EQ(Do(SetSignpostTarget{"sign-1", ""}), "");
               EXPECT_EQ(Named("sign-1").signpost.to_key, 0u);
+              EXPECT_FALSE(Named("sign-1").signpost.direction) << "it led to that map";
               EXPECT_THAT(Do(PasteEntities{{"fox"}, there, kPixel}), HasSubstr("no 'fox'"));
               EXPECT_THAT(Do(PasteEntities{{"sign-1"}, "Attic", kPixel}), HasSubstr("no map 'Attic'"));
               ASSERT_EQ(Do(PasteEntities{{"sign-1"}, there, kPixel}), "");

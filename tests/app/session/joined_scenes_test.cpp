@@ -47,6 +47,7 @@ TEST(JoinedScenes, HoldTheContentOfBothMapsInTheCoordinatesOfTheFirst) {
   content::Scene a, b;
   a.entities = {Sign("sign-1", "", {0.5, 0.2, 3})};
   b.entities = {Sign("sign-1", "Garden", {1, 2, 3})};
+  b.entities[0].signpost.direction = Eigen::Vector3d(0, 0.6, 0.8);
   content::Entity model;
   model.name = "fox";
   model.kind = content::Entity::Kind::kModel;
@@ -61,6 +62,7 @@ TEST(JoinedScenes, HoldTheContentOfBothMapsInTheCoordinatesOfTheFirst) {
   EXPECT_NEAR(moved.height_m, 0.5, 1e-9);
   EXPECT_LT((moved.up - a_from_b.rotation * b.entities[0].signpost.up).norm(), 1e-9);
   EXPECT_EQ(moved.to_map, "Garden");
+  EXPECT_LT((moved.direction.value() - a_from_b.rotation * Eigen::Vector3d(0, 0.6, 0.8)).norm(), 1e-9);
   const Sim3 fox = both.Find("fox")->model.map_from_model, wanted = a_from_b * model.model.map_from_model;
   EXPECT_LT((fox.translation - wanted.translation).norm(), 1e-9);
   EXPECT_LT((fox.rotation * wanted.rotation.inverse()).Angle(), 1e-9);
@@ -71,9 +73,12 @@ TEST(JoinedScenes, HaveNoSignpostToTheirOwnMap) {
   content::Scene a, b;
   a.entities = {Sign("sign-1", "West", {0.5, 0.2, 3})};
   b.entities = {Sign("sign-2", "East", {1, 2, 3})};
+  for (content::Scene* const scene : {&a, &b})
+    scene->entities[0].signpost.direction = Eigen::Vector3d(1, 0, 0);
   const content::Scene both = JoinScenes(a, b, Map(1, "East"), Map(2, "West"), Joined({}));
   EXPECT_EQ(both.Find("sign-1")->signpost.to_map, "");
   EXPECT_EQ(both.Find("sign-2")->signpost.to_map, "");
+  for (const content::Entity& sign : both.entities) EXPECT_FALSE(sign.signpost.direction) << sign.name;
 }
 
 TEST(JoinedScenes, RedirectSignpostsOfOtherMapsToTheJoinedOne) {
@@ -81,6 +86,7 @@ TEST(JoinedScenes, RedirectSignpostsOfOtherMapsToTheJoinedOne) {
   hall.entities = {Sign("sign-1", "West", {0, 0, 1}), Sign("sign-2", "Garden", {0, 0, 2})};
   content::Entity renamed = Sign("sign-3", "old name", {0, 0, 3});
   renamed.signpost.to_key = 2;
+  renamed.signpost.direction = Eigen::Vector3d(0, 0, 1);
   hall.entities.push_back(renamed);
   EXPECT_TRUE(RedirectSceneSignposts(Map(2, "West"), Map(1, "East"), &hall));
   EXPECT_EQ(hall.Find("sign-1")->signpost.to_map, "East");
@@ -88,6 +94,7 @@ TEST(JoinedScenes, RedirectSignpostsOfOtherMapsToTheJoinedOne) {
   EXPECT_EQ(hall.Find("sign-2")->signpost.to_map, "Garden");
   EXPECT_EQ(hall.Find("sign-3")->signpost.to_map, "East");
   EXPECT_EQ(hall.Find("sign-3")->signpost.to_key, 1u);
+  EXPECT_EQ(hall.Find("sign-3")->signpost.direction, Eigen::Vector3d(0, 0, 1)) << "the way there is the same";
   EXPECT_FALSE(RedirectSceneSignposts(Map(7, "Attic"), Map(1, "East"), &hall));
 }
 

@@ -86,6 +86,9 @@ std::vector<Planned> EveryCommand() {
   then(PlaceSignpost{"back", pixel, "First hall"});
   then(SetSignpostTarget{"sign-1", ""});
   then(SetSignpostTarget{"sign-1", "First hall"});
+  then(SetSignpostDirection{"sign-1", Eigen::Vector3d(1.0 / 3, 0, -2)});
+  then(SetSignpostDirection{"sign-1", std::nullopt});
+  then(SetSignpostDirection{"sign-1", std::nullopt, true});
   then(PasteEntities{{"from", "sign-2"}, "First hall", std::nullopt});
   then(RenameMap{"First hall", "Old hall"});
   then(UseMap{"Second hall"});
@@ -172,7 +175,7 @@ TEST_F(Replay, OfARecordedScriptGivesTheSameBytesOfEveryScene) {
   const Recorded first = Run("a.docent", plan, {});
   EXPECT_THAT(first.refused, IsEmpty());
   ASSERT_EQ(first.maps.size(), 2u);
-  for (const char* kept : {"label-1", "Stoßzahn", "plan-2", "bell-2", "trail-2"})
+  for (const char* kept : {"label-1", "Stoßzahn", "plan-2", "bell-2", "trail-2", "\"direction\":["})
     EXPECT_THAT(first.maps[0] + first.maps[1], testing::HasSubstr(kept));
   const Recorded second = Run("b.docent", {}, ParseScript(first.script, "script"));
   EXPECT_EQ(second.maps, first.maps);

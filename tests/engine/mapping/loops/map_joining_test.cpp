@@ -119,6 +119,17 @@ TEST(MapJoining, MakesOneAccurateMapOfBoth) {
   EXPECT_GE(shared_across, 60);
 }
 
+TEST(MapJoining, ComparesMapsWithoutJoiningThem) {
+  const MapOverlap overlap = CompareMaps({}, *OverlappingPair().a, *OverlappingPair().b, nullptr);
+  ASSERT_EQ(overlap.outcome, OverlapOutcome::kOverlap) << Brief(overlap);
+  const Sim3 left = overlap.a_from_b * kOther;  // Of the identity.
+  EXPECT_LT(left.rotation.Angle(), 0.01);
+  EXPECT_NEAR(left.scale, 1, 0.01);
+  EXPECT_LT(left.translation.norm(), 0.05);
+  EXPECT_EQ(CompareMaps({}, *OverlappingPair().a, MapSnapshot(), nullptr).outcome,
+            OverlapOutcome::kNothingToCompare);
+}
+
 TEST(MapJoining, IsDeterministic) {
   const MapJoinAttempt again = JoinMaps({}, *OverlappingPair().a, *OverlappingPair().b, nullptr);
   ASSERT_NE(again.joined, nullptr);

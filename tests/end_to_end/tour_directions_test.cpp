@@ -1,0 +1,334 @@
+// SPDX-License-Identifier: Apache-2.0
+// Leads a visitor through a simulated museum with the real program, and compares where they are sent with
+// where the bays of the museum are.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/evaluation/mean_rotation.h"
+#include "app/evaluation/simulated_truth.h"
+#include "app/files/text_file.h"
+#include "app/simulator/simulation.h"
+#include "engine/geometry/sim3.h"
+#include "tests/end_to_end/run_docent.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+std::string BayName(int bay) {
+  return "Bay " + std::to_string(bay);
+}
+
+double AngleApart_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * kDegrees;
+}
+
+// A simulated museum with what is true about it.
+class TrueMuseum {
+ public:
+  explicit TrueMuseum(const std::string& spec)
+      : simulation_(MakeSimulation(spec)), segments_(SegmentsOf(*simulation_)) {
+    for (int i = 0; i < simulation_->frame_count(); ++i) frames_[simulation_->time(i)] = i;
+  }
+
+  // When a part of the trajectory ("build3") begins and ends, in seconds from the first image.
+  double Begin(const std::string& label) const { return Seconds(Segment(label)->time); }
+  double End(const std::string& label) const {
+    const auto next = Segment(label) + 1;
+    return Seconds(next == segments_.end() ? frames_.rbegin()->first : next->time);
+  }
+  // The pose of the camera in metres when an image was taken.
+  engine::Rigid3 CameraAt(Timestamp time) const { return simulation_->world_from_camera(frames_.at(time)); }
+  // Where the camera was when the map of a bay was begun.
+  Eigen::Vector3d BeginOf(int bay) const {
+    return CameraAt(Segment("build" + std::to_string(bay))->time).translation;
+  }
+  // A point at the front of a bay, which the camera sees there.
+  Eigen::Vector3d FrontOf(int bay) const {
+    return simulation_->places()[static_cast<std::size_t>(bay)].anchor_in_world;
+  }
+
+ private:
+  std::vector<TimedLabel>::const_iterator Segment(const std::string& label) const {
+    const auto found = std::find_if(segments_.begin(), segments_.end(),
+                                    [&](const TimedLabel& segment) { return segment.label == label; });
+    EXPECT_TRUE(found != segments_.end()) << label;
+    return found;
+  }
+  double Seconds(Timestamp time) const { return ToSeconds(time - frames_.begin()->first); }
+
+  const std::unique_ptr<Simulation> simulation_;
+  const std::vector<TimedLabel> segments_;
+  std::map<Timestamp, int> frames_;
+};
+
+double NumberIn(const Row& row, const char* column) {
+  return ParseNumber(row.at(column)).value_or(std::nan(""));
+}
+
+Eigen::Vector3d VectorIn(const Row& row, const char* x, const char* y, const char* z) {
+  return {NumberIn(row, x), NumberIn(row, y), NumberIn(row, z)};
+}
+
+// The similarity that takes a map to the museum, in metres, from the poses of the images that made it: the
+// mean of their rotations, and the scale and place that fit best with it.
+engine::Sim3 WorldFromMap(const TrueMuseum& museum, const std::vector<Row>& frames, const std::string& map) {
+  std::vector<engine::Rotation3> rotations;
+  std::vector<Eigen::Vector3d> in_map, in_world;
+  for (const Row& row : frames) {
+    if (row.at("map") != map) continue;
+    const engine::Rigid3 truth = museum.CameraAt(*ParseSeconds(row.at("timestamp")));
+    const Eigen::Quaterniond map_from_camera(NumberIn(row, "qw"), NumberIn(row, "qx"), NumberIn(row, "qy"),
+                                             NumberIn(row, "qz"));
+    rotations.push_back(truth.rotation * engine::Rotation3(map_from_camera).inverse());
+    in_map.push_back(VectorIn(row, "tx", "ty", "tz"));
+    in_world.push_back(truth.translation);
+  }
+  EXPECT_GT(rotations.size(), 10u) << map;
+  if (rotations.empty()) return {};
+  engine::Sim3 world_from_map;
+  world_from_map.rotation = MeanRotation(rotations);
+  Eigen::Vector3d middle_in_map = Eigen::Vector3d::Zero(), middle_in_world = middle_in_map;
+  const auto count = static_cast<double>(in_map.size());
+  for (std::size_t i = 0; i < in_map.size(); ++i) {
+    middle_in_map += in_map[i] / count;
+    middle_in_world += in_world[i] / count;
+  }
+  double product = 0, square = 0;
+  for (std::size_t i = 0; i < in_map.size(); ++i) {
+    const Eigen::Vector3d turned = world_from_map.rotation * (in_map[i] - middle_in_map);
+    product += turned.dot(in_world[i] - middle_in_world);
+    square += turned.squaredNorm();
+  }
+  world_from_map.scale = product / square;
+  world_from_map.translation =
+      middle_in_world - world_from_map.scale * (world_from_map.rotation * middle_in_map);
+  return world_from_map;
+}
+
+void AppendNumbers(const Eigen::Vector3d& numbers, std::vector<std::string>* arguments) {
+  for (const double number : numbers) arguments->push_back(FormatExactly(number));
+}
+
+// The library of a museum whose bays have been mapped, one map for each.
+class MappedMuseum {
+ public:
+  explicit MappedMuseum(const std::string& spec) : spec_(spec), museum_(spec) {}
+
+  // Maps the bays from `first` on, up to and with `last`; `script` may say what else is done.
+  void Map(int first, int last) {
+    const double from = museum_.Begin("build" + std::to_string(first)),
+                 until = museum_.End("build" + std::to_string(last));
+    std::string script;
+    for (int bay = first; bay <= last; ++bay) {
+      const std::string label = "build" + std::to_string(bay);
+      script += FormatNumber(museum_.Begin(label) - from) + " map new \"" + BayName(bay) + "\"\n";
+      if (bay < last) script += FormatNumber(museum_.End(label) - from) + " map stop\n";
+    }
+    Author(script, from, until);
+    const std::vector<Row> frames = ReadFrames(folder_ / "author/frames.csv");
+    for (int bay = first; bay <= last; ++bay)
+      world_from_map_[bay] = WorldFromMap(museum_, frames, BayName(bay));
+  }
+  // Runs the author's program on a part of the trajectory.
+  void Author(const std::string& script, double from, double until) {
+    folder_.Write("script.txt", script);
+    Succeed({"author", "--library", library(), "--camera", "sim:" + spec_, "--from", FormatNumber(from),
+             "--until", FormatNumber(until), "--pace", "lockstep", "--headless", "--script",
+             (folder_ / "script.txt").string(), "--output", (folder_ / "author").string()});
+  }
+  // Runs the program, which must succeed, and returns its output.
+  std::string Succeed(const std::vector<std::string>& arguments) const {
+    const Outcome outcome = RunDocent(arguments);
+    EXPECT_EQ(outcome.exit_status, 0) << testing::PrintToString(arguments) << outcome.errors;
+    return outcome.output;
+  }
+  // Adds a signpost at a place in the museum, which points to where the map of another bay begins.
+  void AddSign(int bay, int to, const Eigen::Vector3d& place) {
+    const engine::Sim3& world_from_map = world_from_map_.at(bay);
+    std::vector<std::string> arguments = {
+        "content",   "add",       "--signpost", "To " + BayName(to),
+        "--to",      BayName(to), "--map",      BayName(bay),
+        "--library", library(),   "--height",   FormatNumber(0.15 / world_from_map.scale),
+        "--at"};
+    AppendNumbers(world_from_map.inverse() * place, &arguments);
+    arguments.emplace_back("--direction");
+    AppendNumbers(world_from_map.rotation.inverse() * (museum_.BeginOf(to) - place), &arguments);
+    Succeed(arguments);
+    signs_[{bay, to}] = place;
+  }
+  // The place in the museum of the foot of the signpost that leads from a bay to another.
+  Eigen::Vector3d PlaceOfSign(int bay, int to) const { return signs_.at({bay, to}); }
+
+  const TrueMuseum& museum() const { return museum_; }
+  const std::string& spec() const { return spec_; }
+  std::string library() const { return (folder_ / "museum.docent").string(); }
+  const TemporaryFolder& folder() const { return folder_; }
+
+ private:
+  const std::string spec_;
+  const TrueMuseum museum_;
+  const TemporaryFolder folder_;
+  std::map<int, engine::Sim3> world_from_map_;
+  std::map<std::pair<int, int>, Eigen::Vector3d> signs_;
+};
+
+// The events of a kind in the order of time, without their times.
+std::vector<std::string> EventsOf(const std::string& kind, const std::filesystem::path& file) {
+  std::istringstream lines(ReadAll(file));
+  std::vector<std::string> events;
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t begin = line.find(',');
+    if (line.compare(begin + 1, kind.size() + 1, kind + ",") == 0)
+      events.push_back(line.substr(begin + kind.size() + 2));
+  }
+  return events;
+}
+
+int BayOf(const std::string& name) {
+  return name.empty() ? -1 : name.back() - '0';
+}
+
+// The tour leads through five of six bays. The visitor goes from Bay 4 through Bay 5 to Bay 3, wants to see
+// the first stop again, is lost in Bay 0, which has no map, on the way back to Bay 4, skips Bay 2 there, and
+// ends in Bay 1.
+class FiveStops : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    mapped_.Map(1, 5);
+    const auto& museum = mapped_.museum();
+    const std::vector<int> stops = {4, 5, 3, 2, 1};
+    for (std::size_t i = 0; i < stops.size(); ++i) {
+      const Eigen::Vector3d front = museum.FrontOf(stops[i]);
+      if (i + 1 < stops.size()) mapped_.AddSign(stops[i], stops[i + 1], front);
+      // The signpost back stands behind who looks at the bay.
+      const Eigen::Vector3d behind = front + 2 * (museum.BeginOf(stops[i]) - front);
+      if (i > 0) mapped_.AddSign(stops[i], stops[i - 1], {behind.x(), 0, behind.z()});
+    }
+    mapped_.Succeed({"maps", "tour", "create", "Five bays", "--stops", "Bay 4", "Bay 5", "Bay 3", "Bay 2",
+                     "Bay 1", "--library", mapped_.library()});
+  }
+
+  // Visits the museum and writes its files to folder() / "tour".
+  void Visit() {
+    const TrueMuseum& museum = mapped_.museum();
+    const double from = museum.End("build4") - 2, until = museum.End("visit1");
+    const auto at = [&](const std::string& label, double share) {
+      return FormatNumber(museum.Begin(label) + share * (museum.End(label) - museum.Begin(label)) - from);
+    };
+    mapped_.folder().Write("visit.txt", at("visit3", 0.6) + " tour back\n" + at("visit3", 0.6) +
+                                            " tour back\n" + at("visit4", 0.7) + " tour skip\n");
+    mapped_.Succeed({"tour", "--library", mapped_.library(), "--camera", "sim:" + mapped_.spec(), "--from",
+                     FormatNumber(from), "--until", FormatNumber(until), "--pace", "lockstep", "--headless",
+                     "--tour", "Five bays", "--script", (mapped_.folder() / "visit.txt").string(), "--output",
+                     Tour().string()});
+  }
+  std::filesystem::path Tour() const { return mapped_.folder() / "tour"; }
+
+  // How far the arrow of a row of guidance.csv is from the truth, degrees.
+  double ErrorOf_deg(const Row& row) const {
+    const int bay = BayOf(row.at("map")), to = BayOf(row.at("to"));
+    const engine::Rigid3 camera = mapped_.museum().CameraAt(*ParseSeconds(row.at("timestamp")));
+    const Eigen::Vector3d shown = camera.rotation * VectorIn(row, "x", "y", "z");
+    const Eigen::Vector3d sign = mapped_.PlaceOfSign(bay, to);
+    const Eigen::Vector3d board = sign - Eigen::Vector3d(0, 1.2 * 0.15, 0);
+    return AngleApart_deg(shown, row.at("towards") == "direction" ? mapped_.museum().BeginOf(to) - sign
+                                                                  : board - camera.translation);
+  }
+
+  MappedMuseum mapped_{"museum:6,fps=10"};
+};
+
+TEST_F(FiveStops, AreReachedWithADetourALossAndASkippedStopAlongTrueDirections) {
+  Visit();
+  EXPECT_THAT(EventsOf("tour", Tour() / "events.csv"),
+              ElementsAre("\"arrived at 'Bay 4', stop 1 of 5\"", "\"arrived at 'Bay 5', stop 2 of 5\"",
+                          "\"arrived at 'Bay 3', stop 3 of 5\"", "\"going back to 'Bay 5', stop 2 of 5\"",
+                          "\"going back to 'Bay 4', stop 1 of 5\"", "\"arrived at 'Bay 4', stop 1 of 5\"",
+                          "\"skipped 'Bay 2', stop 4 of 5\"", "\"arrived at 'Bay 1', stop 5 of 5\"",
+                          "finished; 4 of 5 stops seen"));
+
+  // Bay 0 looks like the others, but has no map.
+  const TrueMuseum& museum = mapped_.museum();
+  double lost_s = 0, last_s = museum.Begin("visit3");
+  for (const Row& row : ReadFrames(Tour() / "frames.csv")) {
+    const double seconds = ToSeconds(*ParseSeconds(row.at("timestamp")));
+    if (row.at("map").empty()) continue;
+    lost_s = std::max(lost_s, seconds - std::exchange(last_s, seconds));
+  }
+  EXPECT_GT(lost_s, museum.End("visit0") - museum.Begin("visit0"));
+
+  // Where the visitor was sent from where, and how.
+  std::map<std::string, int> ways;
+  double worst_deg = 0;
+  for (const Row& row : ReadFrames(Tour() / "guidance.csv")) {
+    ++ways[row.at("map") + " to " + row.at("to") + " by " + row.at("towards")];
+    const double error_deg = ErrorOf_deg(row);
+    EXPECT_LT(error_deg, 15) << testing::PrintToString(row);
+    worst_deg = std::max(worst_deg, error_deg);
+  }
+  RecordProperty("worst_direction_error_deg", FormatNumber(worst_deg, 3));
+  SCOPED_TRACE(testing::PrintToString(ways));
+  for (const char* way : {"Bay 4 to Bay 5 by direction", "Bay 5 to Bay 3 by direction",
+                          "Bay 3 to Bay 2 by direction", "Bay 3 to Bay 5 by signpost"})
+    EXPECT_GE(ways[way], 5) << way;
+}
+
+// Two maps of one bay, and one of another.
+TEST(FoundDirection, LeadsToWhereAMapOfTheSamePlaceBegins) {
+  MappedMuseum mapped("museum:2,fps=15");
+  const TrueMuseum& museum = mapped.museum();
+  const double half = 0.55 * museum.End("build0"), far = museum.Begin("build1");
+  mapped.Author("0 map new \"Left\"\n" + FormatNumber(half) + " map stop\n" + FormatNumber(half + 0.1) +
+                    " map new \"Right\"\n" + FormatNumber(museum.End("build0")) + " map stop\n" +
+                    FormatNumber(far) + " map new \"Far\"\n",
+                0, museum.End("build1"));
+  const std::vector<Row> frames = ReadFrames(mapped.folder() / "author/frames.csv");
+  const engine::Sim3 world_from_left = WorldFromMap(museum, frames, "Left");
+  const auto first_right =
+      std::find_if(frames.begin(), frames.end(), [](const Row& row) { return row.at("map") == "Right"; });
+  ASSERT_TRUE(first_right != frames.end());
+  const auto sign_to = [&](const char* to) {
+    std::vector<std::string> arguments = {"content",  "add",   "--signpost", to,          "--to",
+                                          to,         "--map", "Left",       "--library", mapped.library(),
+                                          "--height", "0.01",  "--at"};
+    AppendNumbers(world_from_left.inverse() * museum.FrontOf(0), &arguments);
+    return mapped.Succeed(arguments);
+  };
+  EXPECT_EQ(sign_to("Right"), "sign-1\n");
+  EXPECT_EQ(sign_to("Far"), "sign-2\n");
+  mapped.Succeed(
+      {"content", "edit", "sign-1", "--find-direction", "--map", "Left", "--library", mapped.library()});
+  const auto signs = nlohmann::json::parse(
+      mapped.Succeed({"content", "list", "--json", "--map", "Left", "--library", mapped.library()}));
+  const auto& found = signs.at("content").at(0).at("direction");
+  ASSERT_TRUE(found.is_array()) << signs;
+  const Eigen::Vector3d direction(found.at(0), found.at(1), found.at(2));
+  const Eigen::Vector3d truth =
+      museum.CameraAt(*ParseSeconds(first_right->at("timestamp"))).translation - museum.FrontOf(0);
+  EXPECT_LT(AngleApart_deg(world_from_left.rotation * direction, truth), 15);
+  EXPECT_TRUE(signs.at("content").at(1).at("direction").is_null());
+  ExpectErrorLine(
+      {"content", "edit", "sign-2", "--find-direction", "--map", "Left", "--library", mapped.library()}, 1,
+      "where 'Far' begins is not known from here");
+}
+
+}  // namespace
+}  // namespace docent::app
