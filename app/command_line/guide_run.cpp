@@ -79,6 +79,11 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
       sound_director_(request.language) {
   if (request.sound) sound_player_.emplace();
   if (request.route) route_.emplace(*request.route);
+  if (request.narrate && !request.may_write) {
+    const VisitorStrings& strings = VisitorStringsFor(request.language);
+    narration_.emplace(strings);
+    speech_.emplace(strings.language);
+  }
   for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
   if (!request.head) return;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -317,11 +322,28 @@ void GuideRun::PlaySounds(ShownFrame* frame) {
     files_->Add({Event{tracked.frame.time, "sound", "'" + key.second + "' begins"}});
   if (!sound_player_) return;
   sound_player_->Give(orders);
-  const std::string problem = sound_player_->TakeProblem();
+  ReportProblem(sound_player_->TakeProblem(), tracked.frame.time);
+}
+
+void GuideRun::ReportProblem(const std::string& problem, Timestamp time) {
   if (problem.empty()) return;
-  const std::vector<Event> events = {Event{tracked.frame.time, "warning", problem}};
+  const std::vector<Event> events = {Event{time, "warning", problem}};
   files_->Add(events);
   Warn(events);
+}
+
+void GuideRun::Narrate(const ShownFrame& frame, const engine::CameraModel& camera) {
+  if (!narration_ || !frame.visitor) return;
+  Narration::Seen seen{.seconds = frame.seconds, .display = &*frame.visitor, .way = nullptr, .signs = {}};
+  if (frame.way) seen.way = &*frame.way;
+  if (engine::HasPose(frame.tracked.state) && frame.shown.scene)
+    seen.signs = SignsInView(*frame.shown.scene, camera, frame.tracked.camera_from_map, request_.language);
+  const Timestamp time = frame.tracked.frame.time;
+  for (std::string& text : narration_->Update(seen)) {
+    files_->Add({Event{time, "narration", text}});
+    speech_->Say(std::move(text));
+  }
+  ReportProblem(speech_->TakeProblem(), time);
 }
 
 std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& tracked, CameraState* state) {
@@ -340,8 +362,9 @@ std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& trac
   // What the window shows as a warning already is not shown twice.
   if (state->message.empty() && !warnings_.contains(frame->shown.advice))
     frame->message = frame->shown.advice;
-  if (state->visitor)
-    state->visitor->Guide(frame, frame->camera ? *frame->camera : *cameras_[CameraOf(tracked)].model);
+  const engine::CameraModel& camera = frame->camera ? *frame->camera : *cameras_[CameraOf(tracked)].model;
+  if (state->visitor) state->visitor->Guide(frame, camera);
+  if (tracked.frame.camera == 0) Narrate(*frame, camera);
   AddRouteEvents(tracked.frame.time);
   if (tracked.frame.camera == 0) PlaySounds(frame.get());
   return frame;

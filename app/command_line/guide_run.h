@@ -15,9 +15,11 @@
 #include "app/command_line/guide_window.h"
 #include "app/command_line/run_guide.h"
 #include "app/evaluation/camera_report.h"
+#include "app/session/narration.h"
 #include "app/session/visitor_guide.h"
 #include "app/sound/sound_director.h"
 #include "app/sound/sound_player.h"
+#include "app/sound/speech.h"
 
 namespace docent::app {
 
@@ -69,6 +71,10 @@ class GuideRun {
   void Direct(const std::shared_ptr<const ShownFrame>& frame);
   // The sounds that are near the first camera, and their captions. With files_mutex_ held.
   void PlaySounds(ShownFrame* frame);
+  // Speaks what the visitor at the first camera is told. With files_mutex_ held.
+  void Narrate(const ShownFrame& frame, const engine::CameraModel& camera);
+  // Adds the sentence, if there is one, to the events and to the window's warnings. With files_mutex_ held.
+  void ReportProblem(const std::string& problem, Timestamp time);
   std::shared_ptr<ShownFrame> MakeShown(const engine::TrackedFrame& tracked, CameraState* state);
   void WriteDelivery();
 
@@ -77,8 +83,10 @@ class GuideRun {
   Session session_;
   std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
   std::vector<CameraState> camera_states_;
-  SoundDirector sound_director_;                     // Used for the frames of the first camera.
-  std::optional<SoundPlayer> sound_player_;          // Only if sounds are to be heard.
+  SoundDirector sound_director_;             // Used for the frames of the first camera.
+  std::optional<SoundPlayer> sound_player_;  // Only if sounds are to be heard.
+  std::optional<Narration> narration_;       // Used for the frames of the first camera; only with `narrate`,
+  std::optional<Speech> speech_;             // and the same.
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
   NoticeQueue notices_;

@@ -109,6 +109,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   request.library = &library;
   request.title = "Docent - tour";
   CopyRunArguments(options.run, AnyLive(cameras), &request);
+  request.narrate = options.narrate;
   if (options.tour) {
     const maps::Tour tour = FindTour(library, *options.tour);
     request.route = RouteOf(library, tour);

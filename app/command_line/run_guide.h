@@ -42,6 +42,7 @@ struct GuideRequest {
   std::filesystem::path model_folder;
   std::string title;     // Title of the window.
   bool sound = false;    // Sounds are heard, not only their captions shown.
+  bool narrate = false;  // What visitors are told and can read is spoken; only without may_write.
   std::string language;  // In which texts are shown that have it; see content::TextFor.
   double ui_scale = 1;   // Of the author's panel and texts, times what the monitor suggests.
   // Returns commands to run for a frame, as if a person had given them in the window; may be empty. Called on

@@ -19,6 +19,10 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
       ->add_option("--tour", options->tour,
                    "Lead the visitor along this tour, which docent maps tour create has stored")
       ->type_name("NAME");
+  command->add_flag(
+      "--narrate", options->narrate,
+      "Speak where the visitor is, what to do, the way on and the texts in view, by the speech service "
+      "of the desktop (Speech Dispatcher)");
   command->add_option("--script", options->script, "Commands to carry out at given times, such as tour skip")
       ->type_name("FILE");
   AddRunArguments(command,

@@ -37,6 +37,11 @@ struct VisitorStrings {
   // The way on.
   const char* to;          // Place.
   const char* to_through;  // Place, and the one before it on the way.
+  // Spoken: where the arrow points; the text beside it, as `to`.
+  const char* at_left;
+  const char* at_right;
+  const char* ahead;
+  const char* behind;
 
   // On a tour with stops.
   const char* first_stop;  // What the tour has, stop.

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "engine/base/worker.h"
+
+namespace docent::app {
+
+// Speaks texts by Speech Dispatcher, the speech service of the desktop, on a thread of its own, which
+// connects to it with the first text. Without the service nothing is heard, and a sentence says so once;
+// everything else goes on. Any thread; no call waits for the service.
+class Speech {
+ public:
+  // `language`: a tag as that of VisitorStrings.
+  explicit Speech(std::string language);
+  // Ends the connection, which ends what is being spoken.
+  ~Speech();
+  Speech(const Speech&) = delete;
+  Speech& operator=(const Speech&) = delete;
+
+  // Speaks the text after those before it. Texts that come faster than they are taken are dropped, the oldest
+  // first.
+  void Say(std::string text);
+  // Why nothing is heard, as a sentence, once; empty otherwise.
+  std::string TakeProblem();
+
+ private:
+  void Run(const std::stop_token& stop);
+  std::optional<std::string> Next(const std::stop_token& stop);
+  void Report(const std::string& problem);
+
+  const std::string language_;
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::deque<std::string> texts_;  // Guarded by mutex_, as the problem.
+  std::string problem_;
+  bool reported_ = false;
+  std::optional<Worker> worker_;  // Last: it uses the members above.
+};
+
+}  // namespace docent::app
