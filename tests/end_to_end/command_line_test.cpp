@@ -306,7 +306,10 @@ TEST(CommandLine, EditsTheContentOfASavedMap) {
   scene = edited({"sign-1", "--text", "To the kiosk", "--to", "Kiosk", "--rename", "kiosk sign"});
   EXPECT_EQ(scene.Find("kiosk sign")->signpost.text, "To the kiosk");
   EXPECT_EQ(scene.Find("kiosk sign")->signpost.to_key, kiosk);
+  const auto listed = [&] { return RunDocent({"content", "list", "--library", path}).output; };
+  EXPECT_THAT(listed(), HasSubstr("To the kiosk  (no direction)\n"));
   scene = edited({"kiosk sign", "--direction", "0", "-3", "4"});
+  EXPECT_THAT(listed(), HasSubstr("To the kiosk\n"));
   EXPECT_LT((scene.Find("kiosk sign")->signpost.direction.value() - Eigen::Vector3d(0, -0.6, 0.8)).norm(),
             1e-12);
   ExpectErrorLine(run("edit", {"kiosk sign", "--find-direction"}), 1,
