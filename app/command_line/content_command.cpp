@@ -70,6 +70,16 @@ std::string Summary(const Json& entry) {
   return summary;
 }
 
+// What else it says: "  (locked, hidden)". A signpost that leads to a map should say in which direction.
+std::string StateOf(const Json& entry) {
+  std::string state;
+  const auto add = [&](const char* word) { state += (state.empty() ? "" : ", ") + std::string(word); };
+  if (entry["locked"] == true) add("locked");
+  if (entry["hidden"] == true) add("hidden");
+  if (entry.contains("to_map") && entry["to_map"] != "" && entry["direction"].is_null()) add("no direction");
+  return state.empty() ? "" : "  (" + state + ")";
+}
+
 void List(const ContentOptions& options) {
   const maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
   std::vector<maps::MapInfo> infos;
@@ -91,12 +101,8 @@ void List(const ContentOptions& options) {
   if (entries.empty()) std::puts("Nothing is placed in the maps.");
   std::vector<std::vector<std::string>> rows;
   for (const Json& entry : entries) {
-    const char* const state = entry["locked"] == true
-                                  ? (entry["hidden"] == true ? "  (locked, hidden)" : "  (locked)")
-                              : entry["hidden"] == true ? "  (hidden)"
-                                                        : "";
     rows.push_back({entry["map"].get<std::string>(), entry["name"].get<std::string>(),
-                    entry["kind"].get<std::string>(), Summary(entry) + state});
+                    entry["kind"].get<std::string>(), Summary(entry) + StateOf(entry)});
   }
   std::fputs(FormatColumns({{24}, {24}, {8}, {}}, rows).c_str(), stdout);
 }

@@ -210,6 +210,8 @@ Entity AnyEntity(Random* random) {
     entity.signpost.to_key = static_cast<std::uint64_t>(random->Uniform(0, 1e18));
     if (random->Uniform(0, 1) < 0.3) entity.signpost.translations["de-at"] = AnyText(random);
     if (random->Uniform(0, 1) < 0.02) entity.signpost.translations["DE"] = "wrong";
+    if (random->Uniform(0, 1) < 0.3) entity.signpost.direction = vector(1);
+    if (random->Uniform(0, 1) < 0.98 && entity.signpost.direction) entity.signpost.direction->normalize();
   }
   entity.locked = random->Uniform(0, 1) < 0.5;
   entity.hidden = random->Uniform(0, 1) < 0.5;
@@ -245,6 +247,7 @@ TEST(SceneCodec, EveryRandomSceneIsRefusedByTheWriterOrReadBackEqual) {
       EXPECT_EQ(a.model.map_from_model.scale, b.model.map_from_model.scale);
       EXPECT_EQ(a.signpost.height_m, b.signpost.height_m);
       EXPECT_EQ(a.signpost.to_key, b.signpost.to_key);
+      EXPECT_EQ(a.signpost.direction, b.signpost.direction);
       EXPECT_EQ(a.locked, b.locked);
       EXPECT_EQ(a.hidden, b.hidden);
       EXPECT_EQ(a.group, b.group);

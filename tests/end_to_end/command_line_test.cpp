@@ -306,8 +306,21 @@ TEST(CommandLine, EditsTheContentOfASavedMap) {
   scene = edited({"sign-1", "--text", "To the kiosk", "--to", "Kiosk", "--rename", "kiosk sign"});
   EXPECT_EQ(scene.Find("kiosk sign")->signpost.text, "To the kiosk");
   EXPECT_EQ(scene.Find("kiosk sign")->signpost.to_key, kiosk);
-  scene = edited({"kiosk sign", "--to-nowhere", "--transform", "1", "2", "3", "0", "0", "0", "1", "0.5"});
+  const auto listed = [&] { return RunDocent({"content", "list", "--library", path}).output; };
+  EXPECT_THAT(listed(), HasSubstr("To the kiosk  (no direction)\n"));
+  scene = edited({"kiosk sign", "--direction", "0", "-3", "4"});
+  EXPECT_THAT(listed(), HasSubstr("To the kiosk\n"));
+  EXPECT_LT((scene.Find("kiosk sign")->signpost.direction.value() - Eigen::Vector3d(0, -0.6, 0.8)).norm(),
+            1e-12);
+  ExpectErrorLine(run("edit", {"kiosk sign", "--find-direction"}), 1,
+                  "where 'Kiosk' begins is not known from here");
+  scene = edited({"kiosk sign", "--no-direction"});
+  EXPECT_FALSE(scene.Find("kiosk sign")->signpost.direction);
+  scene = edited({"kiosk sign", "--direction", "1", "0", "0", "--lock"});
+  scene = edited(
+      {"kiosk sign", "--to-nowhere", "--unlock", "--transform", "1", "2", "3", "0", "0", "0", "1", "0.5"});
   EXPECT_EQ(scene.Find("kiosk sign")->signpost.to_map, "");
+  EXPECT_FALSE(scene.Find("kiosk sign")->signpost.direction) << "it led to the kiosk";
   EXPECT_EQ(scene.Find("kiosk sign")->signpost.anchor, Eigen::Vector3d(1, 2, 3));
   scene = edited({"exhibit", "--align", "0 0 0 to 5 0 0, 1 0 0 to 8 0 0, 0 1 0 to 5 3 0"});
   EXPECT_NEAR(scene.Find("exhibit")->model.map_from_model.scale, 3, 1e-9);
@@ -323,6 +336,11 @@ TEST(CommandLine, EditsTheContentOfASavedMap) {
   ExpectErrorLine(run("edit", {"exhibit", "exhibit-2", "--rename", "x"}), 1, "not several");
   ExpectErrorLine(run("edit", {"kiosk sign", "--to", "Desk"}), 1, "its own map");
   ExpectErrorLine(run("edit", {"kiosk sign", "--to", "Attic"}), 1, "Attic");
+  ExpectErrorLine(run("edit", {"kiosk sign", "--direction", "0", "0", "0"}), 1, "the direction is too short");
+  ExpectErrorLine(run("edit", {"kiosk sign", "--find-direction"}), 1, "'kiosk sign' leads to no map");
+  ExpectErrorLine(run("edit", {"exhibit", "--direction", "0", "0", "1"}), 1, "a model, which has no arrow");
+  ExpectErrorLine(run("edit", {"kiosk sign", "--direction", "0", "0", "1", "--no-direction"}), 2,
+                  "--no-direction");
   ExpectErrorLine(run("edit", {"exhibit", "--scale", "0"}), 2, "--scale");
   ExpectErrorLine(run("edit", {"exhibit", "--align", "0 0 0 to 1 1 1"}), 1, "at least 3 points");
   ExpectErrorLine(run("edit", {"exhibit", "--align", "0 0 0 to pixel 1 1, 1 0 0 to 1 0 0, 0 1 0 to 1 1 0"}),
@@ -395,7 +413,8 @@ TEST(CommandLine, AddsModelsAndSignpostsToASavedMap) {
   EXPECT_EQ(added({model, "--at", "1", "-2", "3.5", "--scale", "0.25", "--yaw", "-90"}), "exhibit\n");
   EXPECT_EQ(added({model, "--at", "0", "0", "0", "--rotation", "0", "1", "0", "0"}), "exhibit-2\n");
   EXPECT_EQ(added({model, "--at", "0", "0", "0", "--name", "obelisk"}), "obelisk\n");
-  EXPECT_EQ(added({"--signpost", "To the kiosk", "--at", "-1", "0", "2", "--to", "Kiosk", "--height", "0.5"}),
+  EXPECT_EQ(added({"--signpost", "To the kiosk", "--at", "-1", "0", "2", "--to", "Kiosk", "--height", "0.5",
+                   "--direction", "-2", "0", "0"}),
             "sign-1\n");
   EXPECT_EQ(added({"--signpost", "Café", "--at", "-1", "0", "2", "--quiet"}), "");
 
@@ -406,6 +425,8 @@ TEST(CommandLine, AddsModelsAndSignpostsToASavedMap) {
   EXPECT_EQ(content[0]["scale"], 0.25);
   EXPECT_EQ(content[0]["file"], "exhibit.glb");
   EXPECT_EQ(content[3]["to_map"], "Kiosk");
+  EXPECT_EQ(content[3]["direction"], nlohmann::json({-1.0, 0.0, 0.0}));
+  EXPECT_TRUE(content[4]["direction"].is_null());
   EXPECT_EQ(content[4]["text"], "Café");
   {
     const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
@@ -433,6 +454,9 @@ TEST(CommandLine, AddsModelsAndSignpostsToASavedMap) {
                   "10000 bytes");
   ExpectErrorLine(arguments({"--signpost", "caf\xE9", "--at", "0", "0", "0"}), 1, "UTF-8");
   ExpectErrorLine(arguments({model, "--at", "0", "0", "1e300"}), 2, "--at");
+  ExpectErrorLine(arguments({model, "--at", "0", "0", "0", "--direction", "0", "0", "1"}), 2, "--direction");
+  ExpectErrorLine(arguments({"--signpost", "x", "--at", "0", "0", "0", "--direction", "0", "0", "0"}), 2,
+                  "too short");
   ExpectErrorLine(arguments({model, "--at", "0", "0"}), 2, "--at");
   ExpectErrorLine(arguments({model, "--at", "0", "0", "nan"}), 2, "'nan' is not a number");
   ExpectErrorLine(arguments({model, "--at", "0", "0", "0", "--scale", "1e12"}), 2, "--scale");

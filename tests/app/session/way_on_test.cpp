@@ -172,7 +172,7 @@ TEST(WayOn, TurnsWithTheCameraFromManyPoses) {
     }
   }
   EXPECT_GT(at_edge, 1000);
-  EXPECT_GT(inside, 100);
+  EXPECT_GT(inside, 60);
 }
 
 }  // namespace
