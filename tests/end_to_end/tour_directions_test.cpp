@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -237,8 +238,8 @@ class FiveStops : public ::testing::Test {
                                             " tour back\n" + at("visit4", 0.7) + " tour skip\n");
     mapped_.Succeed({"tour", "--library", mapped_.library(), "--camera", "sim:" + mapped_.spec(), "--from",
                      FormatNumber(from), "--until", FormatNumber(until), "--pace", "lockstep", "--headless",
-                     "--tour", "Five bays", "--script", (mapped_.folder() / "visit.txt").string(), "--output",
-                     Tour().string()});
+                     "--tour", "Five bays", "--narrate", "--script",
+                     (mapped_.folder() / "visit.txt").string(), "--output", Tour().string()});
   }
   std::filesystem::path Tour() const { return mapped_.folder() / "tour"; }
 
@@ -274,6 +275,17 @@ TEST_F(FiveStops, AreReachedWithADetourALossAndASkippedStopAlongTrueDirections) 
     lost_s = std::max(lost_s, seconds - std::exchange(last_s, seconds));
   }
   EXPECT_GT(lost_s, museum.End("visit0") - museum.Begin("visit0"));
+
+  // What was spoken, for a visitor who cannot see it.
+  const std::vector<std::string> spoken = EventsOf("narration", Tour() / "events.csv");
+  std::vector<std::string> places;
+  std::copy_if(spoken.begin(), spoken.end(), std::back_inserter(places),
+               [](const std::string& text) { return text.size() == 5 && text.starts_with("Bay "); });
+  EXPECT_THAT(places, ElementsAre("Bay 4", "Bay 5", "Bay 3", "Bay 4", "Bay 1"));
+  EXPECT_THAT(spoken, Contains("Stop 1 of 5. Next: Bay 5"));
+  EXPECT_THAT(spoken, Contains("To Bay 5")) << "a signpost is read";
+  EXPECT_THAT(spoken, Contains(HasSubstr(": To Bay 5"))) << "the side of the way on is said";
+  EXPECT_EQ(spoken.back(), "The tour ends here. You saw 4 of 5 stops.") << testing::PrintToString(spoken);
 
   // Where the visitor was sent from where, and how.
   std::map<std::string, int> ways;
