@@ -268,7 +268,13 @@ void AuthorControls::UpdatePreview() {
   preview_ = shows_ghost ? ghost_.AddTo(view_.scene, view_, panel_.choices(), view_.PixelAt(point),
                                         TrailEnd(), &ghost_note_)
                          : pointer_.Preview(view_.scene);
-  preview_changed_ = preview_changed_ || preview_ != before;
+  const std::vector<std::string> faint_before = std::move(faint_);
+  faint_.clear();
+  for (const std::string& name : selection_.names()) {
+    const content::Entity* const entity = preview_ ? preview_->Find(name) : nullptr;
+    if (entity != nullptr && entity->hidden) faint_.push_back(name);
+  }
+  preview_changed_ = preview_changed_ || preview_ != before || faint_ != faint_before;
 }
 
 // Where a trail that the pointer makes longer ends; empty if a click would begin one.

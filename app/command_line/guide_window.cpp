@@ -161,6 +161,7 @@ class GuideWindow {
       view.overlay.status = choices.show_status;
       view.overlay.markers = true;
       view.scene = controls_->Preview().get();
+      view.faint = controls_->faint();
     }
     return view;
   }
