@@ -172,6 +172,7 @@ void AuthorControls::HandleKey(const ui::InputEvent& event) {
   if (event.repeated) return;
   if (event.key.size() == 1 && event.key[0] >= '1' && event.key[0] <= '7')
     choices.tool = static_cast<ui::AuthoringTool>(event.key[0] - '1');  // In their order.
+  if (event.key == "space" && !gui_.IsNavigated()) host_.toggle_pause();
   if (event.key == "c") host_.swap_cameras();
   if (event.key == "f") choices.frozen = !choices.frozen;
   if (event.key == "m") choices.from_above = !choices.from_above;

@@ -36,7 +36,8 @@ class AuthorControls final : public CommandActions {
     // Queues a command for the frame on the screen.
     std::function<void(Command)> emit;
     std::function<void()> toggle_full_screen, swap_cameras;
-    std::string language;  // Of the texts that are shown.
+    std::function<void()> toggle_pause;  // Of recordings.
+    std::string language;                // Of the texts that are shown.
   };
 
   AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder);
