@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "ui/label_board.h"
 #include "ui/shaders.h"
 
 namespace docent::ui {
@@ -46,12 +47,17 @@ ContentLayer::ContentLayer(int samples, int max_texture_px, const std::string& l
 ContentLayer::~ContentLayer() = default;
 
 void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-                        const content::Scene& scene, double animation_seconds, bool markers,
-                        const RenderTarget& image, std::shared_ptr<const engine::SurfaceMesh> surfaces) {
-  const std::vector<ModelInstance> instances =
-      Instances(scene, camera_from_map.OriginInSource(), animation_seconds, markers);
+                        const content::Scene& scene, const What& what, const RenderTarget& image) {
+  const Drawn drawn = Instances(scene, camera_from_map.OriginInSource(), what);
+  surface_drawer_.Prepare(what.surfaces);
+  Composite(camera, camera_from_map, drawn.plain, 1, image);
+  if (!drawn.faint.empty()) Composite(camera, camera_from_map, drawn.faint, kFaintOpacity, image);
+}
+
+void ContentLayer::Composite(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
+                             const std::vector<ModelInstance>& instances, double opacity,
+                             const RenderTarget& image) {
   mesh_drawer_.Prepare(instances, glm::vec3(0.0f, -1.0f, 0.0f));
-  surface_drawer_.Prepare(std::move(surfaces));
   if (instances.empty()) return;
   Lens& lens = FindLens(camera);
   const PixelRectangle region = DrawAtlas(camera_from_map, &lens);
@@ -59,6 +65,7 @@ void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3&
 
   image.BindForDrawing();
   warp_program_.Use();
+  glUniform1f(warp_program_.Uniform("opacity"), static_cast<float>(opacity));
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, lens.lookup.name());
   glActiveTexture(GL_TEXTURE1);
@@ -141,14 +148,15 @@ ContentLayer::Lens& ContentLayer::FindLens(const engine::CameraModel& camera) {
   return *lenses_.back();
 }
 
-std::vector<ModelInstance> ContentLayer::Instances(const content::Scene& scene,
-                                                   const Eigen::Vector3d& eye_in_map,
-                                                   double animation_seconds, bool markers) {
-  std::vector<ModelInstance> instances;
-  instances.reserve(scene.entities.size());
+ContentLayer::Drawn ContentLayer::Instances(const content::Scene& scene, const Eigen::Vector3d& eye_in_map,
+                                            const What& what) {
+  Drawn drawn;
+  drawn.plain.reserve(scene.entities.size());
   for (const content::Entity& entity : scene.entities) {
-    if (entity.hidden || entity.kind == content::Entity::Kind::kLabel) continue;
-    if (entity.kind == content::Entity::Kind::kSound && !markers) continue;
+    const bool faint =
+        entity.hidden && std::find(what.faint.begin(), what.faint.end(), entity.name) != what.faint.end();
+    if ((entity.hidden && !faint) || entity.kind == content::Entity::Kind::kLabel) continue;
+    if (entity.kind == content::Entity::Kind::kSound && !what.markers) continue;
     for (content::EntityShape& shape :
          std::array{shapes_.ShapeOf(entity, eye_in_map), shapes_.ArrowOf(entity)}) {
       if (shape.model == nullptr) continue;
@@ -156,12 +164,12 @@ std::vector<ModelInstance> ContentLayer::Instances(const content::Scene& scene,
       instance.model = std::move(shape.model);
       instance.map_from_model = GlmFrom(shape.map_from_model);
       if (entity.kind == content::Entity::Kind::kModel) instance.animation = entity.model.animation;
-      instance.seconds = animation_seconds;
-      instances.push_back(std::move(instance));
+      instance.seconds = what.animation_seconds;
+      (faint ? drawn.faint : drawn.plain).push_back(std::move(instance));
     }
   }
   shapes_.EndFrame();
-  return instances;
+  return drawn;
 }
 
 }  // namespace docent::ui

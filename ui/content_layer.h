@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,12 +27,17 @@ class ContentLayer {
   ContentLayer(int samples, int max_texture_px, const std::string& language);
   ~ContentLayer();
 
+  // What is drawn of a scene, and how.
+  struct What {
+    double animation_seconds = 0;
+    bool markers = false;                // Where sounds are.
+    std::span<const std::string> faint;  // Hidden entities that are drawn all the same, faintly, by name.
+    std::shared_ptr<const engine::SurfaceMesh> surfaces;  // Content behind them is hidden; null: none is.
+  };
   // Composites the scene over the contents of `image`, an image target of the camera's size whose row 0 is
-  // the top. Pixels that no content covers keep their exact values. Labels are not drawn (see label_board.h),
-  // and sounds only with `markers`. Content behind the surfaces is hidden; null: none is.
+  // the top. Pixels that no content covers keep their exact values. Labels are not drawn (see label_board.h).
   void Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-            const content::Scene& scene, double animation_seconds, bool markers, const RenderTarget& image,
-            std::shared_ptr<const engine::SurfaceMesh> surfaces = nullptr);
+            const content::Scene& scene, const What& what, const RenderTarget& image);
   std::size_t cached_models() const { return mesh_drawer_.cached_models(); }
 
  private:
@@ -46,8 +52,12 @@ class ContentLayer {
   // cover.
   PixelRectangle DrawAtlas(const engine::Rigid3& camera_from_map, Lens* lens);
   Lens& FindLens(const engine::CameraModel& camera);
-  std::vector<ModelInstance> Instances(const content::Scene& scene, const Eigen::Vector3d& eye_in_map,
-                                       double animation_seconds, bool markers);
+  struct Drawn {
+    std::vector<ModelInstance> plain, faint;
+  };
+  Drawn Instances(const content::Scene& scene, const Eigen::Vector3d& eye_in_map, const What& what);
+  void Composite(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
+                 const std::vector<ModelInstance>& instances, double opacity, const RenderTarget& image);
 
   int samples_;
   MeshDrawer mesh_drawer_;

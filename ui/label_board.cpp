@@ -63,13 +63,19 @@ std::optional<DrawnLabel> Projected(const content::Label& label, const engine::C
   return drawn;
 }
 
-void DrawLeader(const DrawnLabel& label, Canvas* canvas) {
+Color Dimmed(Color color, double opacity) {
+  color.alpha *= static_cast<float>(opacity);
+  return color;
+}
+
+void DrawLeader(const DrawnLabel& label, double opacity, Canvas* canvas) {
   if (!label.anchor) return;
   const double width = std::max(1.5, 0.09 * label.text_px);
-  canvas->Line(*label.anchor, label.foot, 2 * width, {0, 0, 0, 0.5f});
-  canvas->Line(*label.anchor, label.foot, width, theme::kText);
-  canvas->Disk(*label.anchor, 2.6 * width, {0, 0, 0, 0.5f});
-  canvas->Disk(*label.anchor, 2 * width, theme::kText);
+  const Color dark = Dimmed({0, 0, 0, 0.5f}, opacity), bright = Dimmed(theme::kText, opacity);
+  canvas->Line(*label.anchor, label.foot, 2 * width, dark);
+  canvas->Line(*label.anchor, label.foot, width, bright);
+  canvas->Disk(*label.anchor, 2.6 * width, dark);
+  canvas->Disk(*label.anchor, 2 * width, bright);
 }
 
 }  // namespace
@@ -110,12 +116,15 @@ std::shared_ptr<const content::Model> LabelBoardShape(const std::string& text) {
 }
 
 void DrawLabels(const content::Scene& scene, const std::string& language, const engine::CameraModel& camera,
-                const engine::Rigid3& camera_from_map, const Letterbox& image_in_canvas, Canvas* canvas) {
+                const engine::Rigid3& camera_from_map, const Letterbox& image_in_canvas,
+                std::span<const std::string> faint, Canvas* canvas) {
   for (const content::Entity& entity : scene.entities) {
-    if (entity.kind != content::Entity::Kind::kLabel || entity.hidden) continue;
+    if (entity.kind != content::Entity::Kind::kLabel) continue;
+    if (entity.hidden && std::find(faint.begin(), faint.end(), entity.name) == faint.end()) continue;
+    const double opacity = entity.hidden ? kFaintOpacity : 1;
     const auto label = Projected(entity.label, camera, camera_from_map, image_in_canvas);
     if (!label) continue;
-    DrawLeader(*label, canvas);
+    DrawLeader(*label, opacity, canvas);
     const std::string& text = content::ShownText(entity, language);
     const TextStyle style = LabelStyle(label->text_px);
     const Eigen::Vector2d size = canvas->Measure(text, style);
@@ -123,8 +132,8 @@ void DrawLabels(const content::Scene& scene, const std::string& language, const 
     const Eigen::Vector2d low =
         label->foot - Eigen::Vector2d(0.5 * size.x() + padding.x(), size.y() + 2 * padding.y());
     const Eigen::Vector2d high(label->foot.x() + 0.5 * size.x() + padding.x(), label->foot.y());
-    canvas->Box(low, high, 0.25 * label->text_px, theme::kHeadsUp);
-    canvas->Text(text, style, {label->foot.x(), low.y() + padding.y()}, 0.5);
+    canvas->Box(low, high, 0.25 * label->text_px, Dimmed(theme::kHeadsUp, opacity));
+    canvas->Text(text, style, {label->foot.x(), low.y() + padding.y()}, 0.5, opacity);
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 
 #include "content/scene.h"
@@ -22,9 +23,14 @@ engine::Sim3 LabelPose(const content::Label& label, const Eigen::Vector3d& eye_i
 // The board's front as a rectangle without content, to be picked and outlined; in units of a line of text.
 std::shared_ptr<const content::Model> LabelBoardShape(const std::string& text);
 
-// Draws all labels of a scene that are not hidden. `image_in_canvas` says where the camera's image is in the
+// The opacity of hidden content that is drawn all the same, because an author has selected it.
+inline constexpr double kFaintOpacity = 0.35;
+
+// Draws all labels of a scene that are not hidden, and those of the hidden ones whose names are in `faint`
+// faintly. `image_in_canvas` says where the camera's image is in the
 // canvas; a label whose board is outside of it is left out. `language` chooses the texts (TextFor).
 void DrawLabels(const content::Scene& scene, const std::string& language, const engine::CameraModel& camera,
-                const engine::Rigid3& camera_from_map, const Letterbox& image_in_canvas, Canvas* canvas);
+                const engine::Rigid3& camera_from_map, const Letterbox& image_in_canvas,
+                std::span<const std::string> faint, Canvas* canvas);
 
 }  // namespace docent::ui

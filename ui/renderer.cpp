@@ -33,7 +33,7 @@ struct Renderer::Impl {
   void DrawTexts(const View& view, const HeadsUpStyle& style, const Letterbox& box, Canvas* target) const {
     const engine::Rigid3* const from = DrawnFrom(view);
     if (from != nullptr && view.scene != nullptr)
-      DrawLabels(*view.scene, language, *view.camera, *from, box, target);
+      DrawLabels(*view.scene, language, *view.camera, *from, box, view.faint, target);
     HeadsUpStyle above = style;
     if (!view.overlay.caption.empty()) {
       const double lowest = target->height_px() - 12 * style.unit_px - style.bottom_px;
@@ -74,8 +74,8 @@ void Renderer::Draw(const View& view) {
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
   const engine::Rigid3* const drawn_from = DrawnFrom(view);
   if (drawn_from != nullptr && view.scene != nullptr)
-    impl_->content.Draw(*view.camera, *drawn_from, *view.scene, view.animation_seconds, view.overlay.markers,
-                        target, view.surfaces);
+    impl_->content.Draw(*view.camera, *drawn_from, *view.scene,
+                        {view.animation_seconds, view.overlay.markers, view.faint, view.surfaces}, target);
 
   impl_->canvas.Begin(width_px, height_px);
   if (has_pose && view.overlay.keyframes && tracked->map != nullptr)

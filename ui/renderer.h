@@ -4,6 +4,7 @@
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -75,6 +76,8 @@ struct View {
   const engine::Rigid3* held_camera_from_map = nullptr;
   // What hides content behind it, in the map of the scene; null: nothing does.
   std::shared_ptr<const engine::SurfaceMesh> surfaces;
+  // Names of hidden entities that are drawn all the same, faintly, because an author has selected them.
+  std::span<const std::string> faint = {};
   double animation_seconds = 0;  // Time of the animations of the models, which repeat.
   Overlay overlay;               // What is drawn on top.
 };

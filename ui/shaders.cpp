@@ -29,11 +29,12 @@ void main() {
 const char* const kWarpFragmentShader = R"glsl(#version 330 core
 uniform sampler2D lookup;
 uniform sampler2D atlas;
+uniform float opacity;
 out vec4 color;
 void main() {
   vec2 place = texelFetch(lookup, ivec2(gl_FragCoord.xy), 0).rg;
   if (place.x < 0.0) discard;
-  color = textureLod(atlas, place, 0.0);
+  color = opacity * textureLod(atlas, place, 0.0);
   if (color == vec4(0.0)) discard;  // A clear surface only adds its reflection.
 }
 )glsl";

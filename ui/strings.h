@@ -248,6 +248,7 @@ inline constexpr KeyHelp kKeyHelp[] = {
     {"Escape", "end, close or deselect"},
     {"Tab", "use the panel by keyboard"},
     {"F", "freeze the view"},
+    {"Space", "pause a recording"},
     {"C", "swap the cameras"},
     {"M, G", "map from above, coverage"},
     {"P, K, H", "points, keyframes, status"},

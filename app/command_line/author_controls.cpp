@@ -172,6 +172,7 @@ void AuthorControls::HandleKey(const ui::InputEvent& event) {
   if (event.repeated) return;
   if (event.key.size() == 1 && event.key[0] >= '1' && event.key[0] <= '7')
     choices.tool = static_cast<ui::AuthoringTool>(event.key[0] - '1');  // In their order.
+  if (event.key == "space" && !gui_.IsNavigated()) host_.toggle_pause();
   if (event.key == "c") host_.swap_cameras();
   if (event.key == "f") choices.frozen = !choices.frozen;
   if (event.key == "m") choices.from_above = !choices.from_above;
@@ -269,7 +270,13 @@ void AuthorControls::UpdatePreview() {
   preview_ = shows_ghost ? ghost_.AddTo(view_.scene, view_, panel_.choices(), view_.PixelAt(point),
                                         TrailEnd(), &ghost_note_)
                          : pointer_.Preview(view_.scene);
-  preview_changed_ = preview_changed_ || preview_ != before;
+  const std::vector<std::string> faint_before = std::move(faint_);
+  faint_.clear();
+  for (const std::string& name : selection_.names()) {
+    const content::Entity* const entity = preview_ ? preview_->Find(name) : nullptr;
+    if (entity != nullptr && entity->hidden) faint_.push_back(name);
+  }
+  preview_changed_ = preview_changed_ || preview_ != before || faint_ != faint_before;
 }
 
 // Where a trail that the pointer makes longer ends; empty if a click would begin one.

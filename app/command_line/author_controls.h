@@ -36,7 +36,8 @@ class AuthorControls final : public CommandActions {
     // Queues a command for the frame on the screen.
     std::function<void(Command)> emit;
     std::function<void()> toggle_full_screen, swap_cameras;
-    std::string language;  // Of the texts that are shown.
+    std::function<void()> toggle_pause;  // Of recordings.
+    std::string language;                // Of the texts that are shown.
   };
 
   AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder);
@@ -50,6 +51,8 @@ class AuthorControls final : public CommandActions {
   void Update();
   // The content as it is drawn, with what is being dragged or about to be placed.
   std::shared_ptr<const content::Scene> Preview() const { return preview_; }
+  // What is selected although it is hidden, and is therefore drawn faintly.
+  const std::vector<std::string>& faint() const { return faint_; }
   // Whether the preview differs from what was drawn last, so that the image has to be drawn again.
   bool TakePreviewChange() { return std::exchange(preview_changed_, false); }
   // Draws panel, messages, dialogs, outlines and handles. Returns the height at the bottom of the image that
@@ -111,6 +114,7 @@ class AuthorControls final : public CommandActions {
   SavingState saving_;
   std::vector<ui::MapFacts> maps_;
   std::shared_ptr<const content::Scene> preview_;
+  std::vector<std::string> faint_;
   bool preview_changed_ = false;
   std::string ghost_note_;  // Why nothing can be placed under the pointer.
   // What was copied, and the map that it is in.

@@ -68,11 +68,29 @@ SessionOptions SessionOptionsOf(const GuideRequest& request, std::span<Calibrate
   return options;
 }
 
+bool AllRecorded(std::span<const CalibratedCamera> cameras) {
+  return std::none_of(cameras.begin(), cameras.end(),
+                      [](const CalibratedCamera& camera) { return camera.source->info().live; });
+}
+
+// Whether a person would see no difference.
+bool LooksEqual(const ShownFrame& a, const ShownFrame& b) {
+  return a.shown.scene == b.shown.scene && a.shown.surfaces == b.shown.surfaces &&
+         a.shown.map_name == b.shown.map_name && a.shown.starting_map == b.shown.starting_map &&
+         a.shown.hint == b.shown.hint && a.shown.mapping == b.shown.mapping && a.message == b.message &&
+         a.caption == b.caption;
+}
+
+constexpr const char* kPaused = "The recording is paused. Start a map or press Space, and it goes on.";
+constexpr const char* kEnded = "The recording has ended. Its last image stays, so that you can go on.";
+
 }  // namespace
 
 GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> cameras)
     : request_(request),
       cameras_(cameras),
+      is_paced_(request.stays_at_last && AllRecorded(cameras)),
+      clock_(is_paced_ && request.waits_at_first),
       session_(SessionOptionsOf(request, cameras), ModelsOf(cameras), request.library),
       inboxes_(cameras.size()),
       camera_states_(cameras.size()),
@@ -209,10 +227,26 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
     HandleTrouble(sentence, time, show, &state);
   };
   run.options.latency = [&state](Timestamp age) { state.age = age; };
+  if (is_paced_) {
+    run.options.clock = &clock_;
+    run.options.stays = true;
+    run.options.idle = [this, &state, &show](const engine::TrackedFrame& tracked, bool at_end) {
+      HandleIdle(tracked, at_end, show, &state);
+    };
+  }
   run.shown = [this, &state, &show](const engine::TrackedFrame& tracked) {
     HandleFrame(tracked, show, &state);
   };
   return run;
+}
+
+void GuideRun::TogglePause() {
+  if (!is_paced_) return;
+  if (clock_.IsStopped()) {
+    clock_.Resume();
+  } else {
+    clock_.Stop();
+  }
 }
 
 void GuideRun::HandleRefused(const std::string& reason, CameraState* state) {
@@ -249,6 +283,10 @@ void GuideRun::HandleCarriedOut(const TimedCommand& command, CameraState* state)
   } else {
     state->message.clear();
   }
+  // What comes before a map is started would be lost to it.
+  const bool begins =
+      std::holds_alternative<NewMap>(command.command) || std::holds_alternative<UseMap>(command.command);
+  if (begins) clock_.Resume();
   const std::scoped_lock lock(files_mutex_);
   files_->Add(command);
 }
@@ -291,6 +329,25 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
   for (const auto& head : heads_) head->AddView(tracked);
   if (tracked.frame.camera == 0) Direct(frame);
   if (tracked.state != engine::TrackingState::kDropped) state->last = frame;
+  show(std::move(frame));
+}
+
+void GuideRun::HandleIdle(const engine::TrackedFrame& tracked, bool at_end, const Show& show,
+                          CameraState* state) {
+  if (Interruption::requested()) stop_.request_stop();
+  std::shared_ptr<ShownFrame> frame;
+  {
+    const std::scoped_lock lock(files_mutex_);
+    frame = MakeShown(tracked, state);
+    if (frame->message.empty()) frame->message = at_end ? kEnded : kPaused;
+    if (at_end && !std::exchange(state->has_ended, true))
+      files_->Add({Event{tracked.frame.time, "camera", "The images have ended; the last one stays."}});
+    const std::vector<Event> events = session_.TakeEvents();
+    files_->Add(events);
+    Warn(events);
+  }
+  if (state->last && LooksEqual(*frame, *state->last)) return;
+  state->last = frame;
   show(std::move(frame));
 }
 

@@ -44,6 +44,8 @@ class GuideRun {
   SavingState Saving() const;
   std::vector<ui::MapFacts> MapsForWindow() const;  // by name
   void DiscardChanges() { session_.DiscardChanges(); }
+  // Pauses recordings that are played for an author, or lets them go on.
+  void TogglePause();
   std::vector<Session::MapState> Maps() const { return session_.Maps(); }
 
  private:
@@ -55,6 +57,7 @@ class GuideRun {
     std::optional<double> message_end_s;  // When a visitor no longer needs it; empty for never.
     std::shared_ptr<const ShownFrame> last;
     std::optional<VisitorGuide> visitor;  // Only on a tour.
+    bool has_ended = false;               // The recording; its last image stays.
   };
 
   void WarnAboutUnknownLenses();
@@ -66,6 +69,8 @@ class GuideRun {
   void HandleCarriedOut(const TimedCommand& command, CameraState* state);
   void HandleTrouble(const std::string& sentence, Timestamp time, const Show& show, CameraState* state);
   void HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state);
+  // Between images of a paused recording, and after its last one.
+  void HandleIdle(const engine::TrackedFrame& tracked, bool at_end, const Show& show, CameraState* state);
   bool has_author_window() const { return request_.may_write && !request_.headless; }
   void Warn(const std::vector<Event>& events);
   void Direct(const std::shared_ptr<const ShownFrame>& frame);
@@ -80,6 +85,8 @@ class GuideRun {
 
   const GuideRequest& request_;
   const std::span<CalibratedCamera> cameras_;
+  const bool is_paced_;  // The author works with recordings, which can be paused.
+  PausableClock clock_;  // Of recordings.
   Session session_;
   std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
   std::vector<CameraState> camera_states_;

@@ -70,6 +70,7 @@ class GuideWindow {
     host.emit = [this](Command command) { Emit(std::move(command)); };
     host.toggle_full_screen = [this] { window_.ToggleFullScreen(); };
     host.swap_cameras = [this] { Swap(); };
+    host.toggle_pause = [this] { link_.toggle_pause(); };
     controls_.emplace(&window_, std::move(host), request.model_folder);
   }
 
@@ -161,6 +162,7 @@ class GuideWindow {
       view.overlay.status = choices.show_status;
       view.overlay.markers = true;
       view.scene = controls_->Preview().get();
+      view.faint = controls_->faint();
     }
     return view;
   }

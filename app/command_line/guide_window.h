@@ -45,6 +45,8 @@ struct WindowLink {
   std::function<std::vector<ui::MapFacts>()> maps;
   // From now on nothing is saved.
   std::function<void()> discard_changes;
+  // Pauses recordings, or lets them go on.
+  std::function<void()> toggle_pause;
   // Called with each frame once it is on the screen.
   std::function<void(const ShownFrame&)> drawn;
 };

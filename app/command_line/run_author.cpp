@@ -82,6 +82,9 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   request.title = "Docent - author";
   if (options.script) ReadScriptFor(*options.script, &request);
   const WhenLost otherwise = options.run.headless ? WhenLost::kNew : WhenLost::kWait;
+  // A script has its own times, and a map that starts by itself needs no one to wait for.
+  request.stays_at_last = !options.run.headless;
+  request.waits_at_first = !options.run.headless && !options.script && !options.when_lost;
   request.new_map_when_lost = options.when_lost.value_or(otherwise) == WhenLost::kNew;
   if (options.target) request.target = ReadTarget(*options.target, options.target_width_m);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);

@@ -107,6 +107,7 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
     link.saving = [run] { return run->Saving(); };
     link.maps = [run] { return run->MapsForWindow(); };
     link.discard_changes = [run] { run->DiscardChanges(); };
+    link.toggle_pause = [run] { run->TogglePause(); };
     link.drawn = [run](const ShownFrame& frame) { run->Drawn(frame); };
     ShowInWindow(request, cameras, &slot, link);
   } catch (...) {

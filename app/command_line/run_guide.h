@@ -45,6 +45,9 @@ struct GuideRequest {
   bool narrate = false;  // What visitors are told and can read is spoken; only without may_write.
   std::string language;  // In which texts are shown that have it; see content::TextFor.
   double ui_scale = 1;   // Of the author's panel and texts, times what the monitor suggests.
+  // In the window of an author with recordings: they wait at the first image until the person starts or
+  // chooses a map or lets them go on, and their last image stays until the window is closed.
+  bool waits_at_first = false, stays_at_last = false;
   // Returns commands to run for a frame, as if a person had given them in the window; may be empty. Called on
   // the camera's thread.
   std::function<std::vector<Command>(const ShownFrame&)> director;

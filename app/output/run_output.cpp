@@ -83,6 +83,7 @@ void RunOutput::Add(const Event& event) {
 
 void RunOutput::WriteToEvents(std::string_view text) {
   events_.Write(text);
+  events_.Flush();
   events_size_ += text.size();
 }
 

@@ -11,6 +11,7 @@
 #include "app/session/surface_at_pixel.h"
 #include "content/asset.h"
 #include "engine/base/error.h"
+#include "engine/map/local_points.h"
 
 namespace docent::app {
 
@@ -66,7 +67,20 @@ void ContentCommands::Edit(SessionMap* map, content::SceneChange change) {
 
 content::SurfaceHit ContentCommands::SurfaceFor(const engine::TrackedFrame& frame,
                                                 const Eigen::Vector2d& pixel) const {
-  return SurfaceAtPixel(frame, *state_.cameras.at(CameraOf(frame)).model, pixel);
+  content::SurfaceHit hit = SurfaceAtPixel(frame, *state_.cameras.at(CameraOf(frame)).model, pixel);
+  const engine::Sim3 motion = MotionSince(frame, hit.point);
+  hit.point = motion * hit.point;
+  hit.normal = motion.rotation * hit.normal;
+  return hit;
+}
+
+engine::Sim3 ContentCommands::MotionSince(const engine::TrackedFrame& frame,
+                                          const Eigen::Vector3d& place) const {
+  constexpr std::size_t kPoints = 150;  // As many as content is anchored to.
+  const SessionMap* const map = state_.FindMap(frame.map_key);
+  if (!frame.map || map == nullptr || !map->snapshot || map->snapshot == frame.map) return {};
+  return engine::EstimateMotion(engine::NearestPoints(*frame.map, place, kPoints), *map->snapshot)
+      .value_or(engine::Sim3());
 }
 
 // The key of the map that a signpost in `map` is to lead to; 0 for none.

@@ -55,7 +55,10 @@ class ContentCommands {
  private:
   SessionMap& MapToEdit(const engine::TrackedFrame& frame);
   void Edit(SessionMap* map, content::SceneChange change);
+  // In the map as it is now.
   content::SurfaceHit SurfaceFor(const engine::TrackedFrame& frame, const Eigen::Vector2d& pixel) const;
+  // How the map has been adjusted around a place since the frame was tracked: a frozen view shows an old one.
+  engine::Sim3 MotionSince(const engine::TrackedFrame& frame, const Eigen::Vector3d& place) const;
   std::vector<content::Correspondence> Correspondences(const engine::TrackedFrame& frame,
                                                        const std::vector<PointPair>& pairs) const;
   // The point with the normal of its surface; of coordinates, the map's up direction.

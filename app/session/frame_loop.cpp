@@ -27,6 +27,7 @@ class RealtimeClock {
   void WaitFor(Timestamp time, const std::stop_token& stop) { clock_->WaitUntil(Due(time), stop); }
   // Whether the next image is due already.
   bool IsLate(Timestamp time, Timestamp period) { return clock_->Now() > Due(time) + period; }
+  bool IsStopped() const { return clock_->IsStopped(); }
   Timestamp Due(Timestamp time) const { return start_ + time; }
   Timestamp Now() { return clock_->Now(); }
 
@@ -215,6 +216,31 @@ class CameraFeed {
     ReportLatency();
     command_runner_.RunDue(frame_.time - *first_time_, tracked);
     run_.shown(tracked);
+    if (run_.options.idle) last_tracked_ = std::move(tracked);
+  }
+
+  // Goes on with the last image while the clock is stopped.
+  void Pause(const std::stop_token& stop) {
+    const auto begin = std::chrono::steady_clock::now();
+    while (run_.options.idle && clock_->IsStopped() && !stop.stop_requested()) {
+      CarryOut(std::chrono::steady_clock::now() - begin, false);
+      Rest(stop);
+    }
+  }
+
+  // Carries out what the person wants while there is no other image, `passed` after the last one.
+  void CarryOut(Timestamp passed, bool at_end) {
+    if (!run_.options.idle || !last_tracked_) return;
+    command_runner_.RunDue(last_tracked_->frame.time - *first_time_, *last_tracked_);
+    session_->Idle(last_tracked_->frame.time + passed);
+    run_.options.idle(*last_tracked_, at_end);
+  }
+
+  // The time between two calls of CarryOut.
+  static void Rest(const std::stop_token& stop) {
+    constexpr auto kInterval = std::chrono::milliseconds(33);
+    PlayClock machine;
+    machine.WaitUntil(machine.Now() + kInterval, stop);
   }
 
   void CheckAllDone() const { command_runner_.CheckAllDone(); }
@@ -274,6 +300,7 @@ class CameraFeed {
   Timestamp clock_offset_{};
   // Eager pace: when the previous image was processed, and its own time.
   std::optional<std::pair<std::chrono::steady_clock::time_point, Timestamp>> last_processed_;
+  std::optional<engine::TrackedFrame> last_tracked_;  // only with FrameLoopOptions::idle
   std::string trouble_;
 };
 
@@ -286,6 +313,7 @@ void RunInterleaved(std::vector<CameraFeed>* feeds, const std::stop_token& stop)
     const auto oldest = std::min_element(running.begin(), running.end(),
                                          [](const auto* a, const auto* b) { return a->time() < b->time(); });
     (*oldest)->Handle(stop);
+    (*oldest)->Pause(stop);
     if ((*oldest)->Fetch(stop)) continue;
     if (*oldest == &feeds->front()) return;
     running.erase(oldest);
@@ -304,6 +332,7 @@ void RunConcurrently(std::vector<CameraFeed>* feeds, Pace pace, std::stop_source
       do {
         if (pace == Pace::kEager && !feed.live()) gate.Wait(i, feed.time(), stop);
         feed.Handle(stop);
+        feed.Pause(stop);
       } while (!stop.stop_requested() && feed.Fetch(stop));
       gate.Leave(i);
     } catch (...) {
@@ -334,6 +363,15 @@ void RunConcurrently(std::vector<CameraFeed>* feeds, Pace pace, std::stop_source
   if (fault) std::rethrow_exception(fault);
 }
 
+// After the last images, the person goes on working with them.
+void StayAtEnd(std::vector<CameraFeed>* feeds, const std::stop_token& stop) {
+  const auto begin = std::chrono::steady_clock::now();
+  while (!stop.stop_requested()) {
+    for (CameraFeed& feed : *feeds) feed.CarryOut(std::chrono::steady_clock::now() - begin, true);
+    CameraFeed::Rest(stop);
+  }
+}
+
 }  // namespace
 
 Timestamp PlayClock::Now() {
@@ -345,6 +383,44 @@ void PlayClock::WaitUntil(Timestamp time, const std::stop_token& stop) {
   std::condition_variable_any woken;
   std::unique_lock lock(mutex);
   woken.wait_until(lock, stop, std::chrono::steady_clock::time_point(time), [] { return false; });
+}
+
+PausableClock::PausableClock(bool is_stopped) {
+  if (is_stopped) Stop();
+}
+
+Timestamp PausableClock::NowLocked() const {
+  return (stopped_at_ ? *stopped_at_ : std::chrono::steady_clock::now().time_since_epoch()) - lost_;
+}
+
+Timestamp PausableClock::Now() {
+  const std::scoped_lock lock(mutex_);
+  return NowLocked();
+}
+
+void PausableClock::WaitUntil(Timestamp time, const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_until(lock, stop, std::chrono::steady_clock::time_point(time + lost_),
+                      [this] { return stopped_at_.has_value(); });
+}
+
+bool PausableClock::IsStopped() const {
+  const std::scoped_lock lock(mutex_);
+  return stopped_at_.has_value();
+}
+
+void PausableClock::Stop() {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!stopped_at_) stopped_at_ = std::chrono::steady_clock::now().time_since_epoch();
+  }
+  changed_.notify_all();
+}
+
+void PausableClock::Resume() {
+  const std::scoped_lock lock(mutex_);
+  if (stopped_at_) lost_ += std::chrono::steady_clock::now().time_since_epoch() - *stopped_at_;
+  stopped_at_.reset();
 }
 
 void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const std::stop_token& stop) {
@@ -375,6 +451,7 @@ void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const s
   }
   if (stop.stop_requested()) return;
   for (const CameraFeed& feed : feeds) feed.CheckAllDone();
+  if (cameras.front().options.stays) StayAtEnd(&feeds, stop);
 }
 
 void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,

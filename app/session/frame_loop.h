@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <condition_variable>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -47,6 +49,28 @@ class PlayClock {
   virtual Timestamp Now();
   // Returns at `time`, or when stop is requested.
   virtual void WaitUntil(Timestamp time, const std::stop_token& stop);
+  // Whether the time stands still.
+  virtual bool IsStopped() const { return false; }
+};
+
+// A clock that a person can stop: then no time passes. Any thread.
+class PausableClock : public PlayClock {
+ public:
+  explicit PausableClock(bool is_stopped = false);
+  Timestamp Now() override;
+  // Also returns when the clock is stopped or is stopped meanwhile.
+  void WaitUntil(Timestamp time, const std::stop_token& stop) override;
+  bool IsStopped() const override;
+  void Stop();
+  void Resume();
+
+ private:
+  Timestamp NowLocked() const;
+
+  mutable std::mutex mutex_;
+  std::condition_variable_any changed_;
+  Timestamp lost_{};                     // How long it was stopped, without the present stop.
+  std::optional<Timestamp> stopped_at_;  // Of the machine's clock.
 };
 
 // How one camera is fed to a session.
@@ -73,6 +97,12 @@ struct FrameLoopOptions {
   // empty.
   std::function<void(Timestamp)> latency;
   PlayClock* clock = nullptr;  // the first camera's is used for all; null: the system clock
+  // Called about thirty times a second with the last tracked frame while no image is processed: while the
+  // clock is stopped, and with `at_end` after the last image, as long as the loop stays there. The commands
+  // of the inbox are carried out in between. On the camera's thread, after the last image on that of the
+  // first camera; empty: the loop does not pause.
+  std::function<void(const engine::TrackedFrame&, bool at_end)> idle;
+  bool stays = false;  // after the last image, until stop is requested; of the first camera, for all
 };
 
 using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
@@ -87,6 +117,8 @@ using FrameCallback = std::function<void(const engine::TrackedFrame&)>;
 //              it works, so never further ahead of the mapper than a camera would be
 //   realtime   by the images' times; an image whose successor is due before it is requested is dropped, as
 //              a camera would drop it
+//
+// A stopped clock (PlayClock::IsStopped) holds every pace after the present image.
 //
 // A live source drops images by itself: images missing between two others are passed on as dropped, each
 // frame with its time and no image.

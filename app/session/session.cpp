@@ -84,6 +84,15 @@ engine::TrackedFrame Session::Process(const engine::Frame& frame) {
   return tracked;
 }
 
+void Session::Idle(Timestamp time) {
+  const std::scoped_lock lock(mutex_);
+  event_handler_.HandleEvents();
+  for (SessionCamera& camera : state_.cameras) {
+    if (camera.advice_end <= time) camera.advice.clear();
+  }
+  if (options_.may_write) saving_.Autosave(time);
+}
+
 void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
                       const std::filesystem::path& model_folder) {
   if (std::holds_alternative<GuideVisitor>(command))

@@ -55,6 +55,9 @@ class Session {
 
   // Tracks one image, offers it to the mapper and applies the result to the session.
   engine::TrackedFrame Process(const engine::Frame& frame);
+  // Does what is due while no images come, for instance because a recording is paused: applies what the
+  // mapper has done meanwhile, and saves. `time` is that of the last image and what has passed since then.
+  void Idle(Timestamp time);
   // Details of the frame that Process returned last as `frame`; on the thread of its camera.
   engine::FrameInspection Inspect(const engine::TrackedFrame& frame) const { return system_.Inspect(frame); }
   // Delays a source that delivers faster than a camera; see engine::System::WaitUntilIdle.

@@ -70,7 +70,8 @@ void SessionSaving::SaveMap(SessionMap* map, Timestamp time) {
 
 void SessionSaving::Autosave(Timestamp time) {
   if (!saver_) return;
-  if (!last_save_) last_save_ = time;
+  // After a pause, in which time passed without images, their times go on where they were.
+  if (!last_save_ || time < *last_save_) last_save_ = time;
   if (options_.autosave_interval <= Timestamp{} || time - *last_save_ < options_.autosave_interval) return;
   last_save_ = time;
   ReportFailure(time);

@@ -350,6 +350,20 @@ TEST(EditHistory, UndoAndRedoRestoreTheSameScenes) {
   EXPECT_FALSE(history.Redo(&scene)) << "a new edit discards undone edits";
 }
 
+TEST(EditHistory, UndoHasNoLimitInASession) {
+  constexpr int kChanges = 5000;
+  Scene scene;
+  EditHistory history;
+  history.Do(AddEdit(scene, SignEntity("sign")), &scene);
+  const Eigen::Vector3d begin = PlaceOf(*scene.Find("sign"));
+  for (int i = 1; i <= kChanges; ++i)
+    history.Do(MoveEdit(scene, "sign", begin + Eigen::Vector3d(0.001 * i, 0, 0)), &scene);
+  for (int i = 0; i < kChanges; ++i) ASSERT_TRUE(history.Undo(&scene)) << i;
+  EXPECT_EQ(PlaceOf(*scene.Find("sign")), begin);
+  EXPECT_TRUE(history.Undo(&scene)) << "that it was placed";
+  EXPECT_FALSE(history.Undo(&scene));
+}
+
 TEST(EditHistory, AnEditThatThrowsIsNotStored) {
   Scene scene;
   EditHistory history;

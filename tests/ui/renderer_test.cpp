@@ -128,6 +128,39 @@ TEST_F(RendererTest, DrawsEachImageWithItsOwnPoseOnly) {
   }
 }
 
+TEST_F(RendererTest, DrawsHiddenContentFaintlyOnlyWhereAnAuthorSelectedIt) {
+  Renderer renderer;
+  const engine::CameraModel camera = StronglyDistorted();
+  const engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar(200, 100, 40)));
+  content::Scene scene;
+  scene.entities.push_back(Facing(SquareModel(0.4f, glm::vec4(1, 0, 0, 1)), {0, 0, 2}));
+  scene.entities.push_back(Facing(SquareModel(0.2f, glm::vec4(0, 1, 0, 1)), {0.5, 0, 2}));
+  scene.entities[0].name = "hidden";
+  scene.entities[0].hidden = true;
+  scene.entities[1].name = "shown";
+  const std::vector<std::string> selected = {"hidden", "shown"};
+  View view;
+  view.tracked = &tracked;
+  view.camera = &camera;
+  view.scene = &scene;
+  view.overlay.hud = false;
+  cv::Mat without, with;
+  renderer.Draw(view);
+  renderer.ReadBack(&without);
+  view.faint = selected;
+  renderer.Draw(view);
+  renderer.ReadBack(&with);
+  const Eigen::Vector2d beside = *camera.Project(Eigen::Vector3d(0.5, 0, 2));
+  const cv::Point shown(static_cast<int>(beside.x()), static_cast<int>(beside.y()));
+  EXPECT_EQ(without.at<cv::Vec3b>(242, 319), cv::Vec3b(200, 100, 40));
+  const cv::Vec3b faint = with.at<cv::Vec3b>(242, 319);
+  EXPECT_NEAR(faint[0], 0.65 * 200, 2);
+  EXPECT_NEAR(faint[1], 0.65 * 100, 2);
+  EXPECT_NEAR(faint[2], 0.65 * 40 + 0.35 * 255, 2);
+  EXPECT_EQ(with.at<cv::Vec3b>(shown), cv::Vec3b(0, 255, 0)) << "what is not hidden is drawn as ever";
+  EXPECT_EQ(without.at<cv::Vec3b>(shown), cv::Vec3b(0, 255, 0));
+}
+
 TEST_F(RendererTest, DrawsNoContentWithoutAPose) {
   Renderer renderer;
   const engine::CameraModel camera = StronglyDistorted();
@@ -166,11 +199,11 @@ TEST_F(RendererTest, FreesGraphicsMemoryOfDeletedModels) {
   content::Scene scene;
   scene.entities.push_back(Facing(SquareModel(1, glm::vec4(1)), {0, 0, 1}));
   scene.entities.push_back(Facing(SquareModel(1, glm::vec4(1)), {0, 0, 2}));
-  layer.Draw(camera, {}, scene, 0, true, target);
+  layer.Draw(camera, {}, scene, {}, target);
   EXPECT_EQ(layer.cached_models(), 2u);
   scene.entities.pop_back();
-  layer.Draw(camera, {}, scene, 0, true, target);
-  layer.Draw(camera, {}, scene, 0, true, target);
+  layer.Draw(camera, {}, scene, {}, target);
+  layer.Draw(camera, {}, scene, {}, target);
   EXPECT_EQ(layer.cached_models(), 1u);
 }
 

@@ -89,23 +89,6 @@ TEST_F(FittingByPoints, PairsThePointOfTheModelWithThePlaceInTheRoom) {
   }
 }
 
-TEST_F(FittingByPoints, GivesResidualsOrSaysWhyThereAreNone) {
-  const std::vector<Eigen::Vector2d> on_model = PixelsOfModel();
-  tool_.Begin(kName);
-  const content::Entity& exhibit = Exhibit();
-  EXPECT_TRUE(tool_.Facts(view_.scene.get())->residuals.empty());
-  for (const std::size_t i : {std::size_t{0}, on_model.size() / 2, on_model.size() - 1}) {
-    ASSERT_EQ(tool_.Click(view_, on_model[i]), "");
-    ASSERT_EQ(tool_.Click(view_, base_ + Eigen::Vector2d(80, 0) + 1.5 * (on_model[i] - base_)), "");
-  }
-  const std::optional<ui::FitFacts> facts = tool_.Facts(view_.scene.get());
-  ASSERT_TRUE(facts.has_value());
-  EXPECT_EQ(facts->pairs, 3u);
-  // Three pairs fit a similarity nearly, or are refused with a sentence; in no case without a word.
-  EXPECT_EQ(facts->residuals.empty(), !facts->problem.empty());
-  EXPECT_EQ(facts->name, exhibit.name);
-}
-
 TEST_F(FittingByPoints, FindsTheOriginalPointOfABentModel) {
   std::vector<content::Correspondence> pairs;
   const engine::Sim3 pose = Exhibit().model.map_from_model;
@@ -152,6 +135,100 @@ TEST_F(FittingByPoints, TakesTheLastPointBackAndEndsWithTheModel) {
   tool_.KeepExisting(&empty);
   EXPECT_FALSE(tool_.is_active());
   EXPECT_FALSE(tool_.Facts(view_.scene.get()).has_value());
+}
+
+// A flat square of two metres at z = 1 before a wall at z = 2 that has many map points, both parallel to the
+// image, so that where a click lands follows from its pixel.
+class FittingBeforeAWall : public ::testing::Test {
+ protected:
+  static constexpr double kScale = 0.3;  // Map units on the wall for a metre of the square.
+
+  FittingBeforeAWall() {
+    view_.camera.lens = SimulatedCamera();
+    auto map = std::make_shared<engine::MapSnapshot>();
+    for (double y = -0.7; y < 0.7; y += 0.02) {
+      for (double x = -0.7; x < 0.7; x += 0.02) {
+        engine::MapPoint& point = map->points.emplace_back();
+        point.id = static_cast<engine::MapPointId>(map->points.size());
+        point.point_in_map << x, y, 2, 1;
+      }
+    }
+    auto frame = std::make_shared<ShownFrame>();
+    frame->tracked.state = engine::TrackingState::kSixDof;
+    frame->tracked.map = std::move(map);
+    view_.frame = std::move(frame);
+    auto scene = std::make_shared<content::Scene>();
+    scene->entities.push_back(Square());
+    view_.scene = std::move(scene);
+    tool_.Begin("square");
+  }
+
+  static content::Entity Square() {
+    auto model = std::make_shared<content::Model>();
+    content::Primitive primitive;
+    for (const glm::vec2& corner : {glm::vec2(-1, -1), glm::vec2(1, -1), glm::vec2(1, 1), glm::vec2(-1, 1)})
+      primitive.vertices.emplace_back().position = glm::vec3(corner, 0);
+    primitive.indices = {0, 1, 2, 0, 2, 3};
+    model->meshes.push_back({"square", {primitive}});
+    model->nodes.emplace_back().mesh = 0;
+    model->roots.push_back(0);
+    model->bounds_min = glm::vec3(-1, -1, 0);
+    model->bounds_max = glm::vec3(1, 1, 0);
+    auto asset = std::make_shared<content::Asset>();
+    asset->model = std::move(model);
+    content::Entity entity;
+    entity.name = "square";
+    entity.kind = content::Entity::Kind::kModel;
+    entity.model.asset = std::move(asset);
+    entity.model.map_from_model = {engine::Rotation3(), {0, 0, 1}, kSquareScale};
+    return entity;
+  }
+  // Clicks a point of the square, and then the place on the wall of the same point, moved by `offset` metres.
+  void Pair(const Eigen::Vector2d& point, const Eigen::Vector2d& offset) {
+    const auto pixel = [&](const Eigen::Vector2d& at, double z) {
+      return *view_.camera.lens.Project({at.x(), at.y(), z});
+    };
+    ASSERT_EQ(tool_.Click(view_, pixel(kSquareScale * point, 1)), "");
+    ASSERT_EQ(tool_.Click(view_, pixel(kScale * (point + offset), 2)), "");
+  }
+
+  static constexpr double kSquareScale = 0.2;
+  AuthorView view_;
+  ui::EntityShapes shapes_;
+  FittingTool tool_{&shapes_};
+};
+
+TEST_F(FittingBeforeAWall, GivesTheDistanceByWhichEachPairIsOff) {
+  for (const Eigen::Vector2d& corner :
+       {Eigen::Vector2d(0.8, 0.8), Eigen::Vector2d(-0.8, 0.8), Eigen::Vector2d(-0.8, -0.8)})
+    Pair(corner, {0, 0});
+  ui::FitFacts facts = *tool_.Facts(view_.scene.get());
+  ASSERT_EQ(facts.residuals.size(), 3u) << facts.problem;
+  for (const double residual : facts.residuals) EXPECT_LT(residual, 1e-5);
+  // Moved in turn to the left and to the right, the corners fit no similarity better than the one they had:
+  // the offsets have no part that is a translation, rotation or change of size.
+  tool_.End();
+  tool_.Begin("square");
+  Pair({0.8, 0.8}, {0.1, 0});
+  Pair({-0.8, 0.8}, {-0.1, 0});
+  Pair({-0.8, -0.8}, {0.1, 0});
+  Pair({0.8, -0.8}, {-0.1, 0});
+  facts = *tool_.Facts(view_.scene.get());
+  EXPECT_EQ(facts.name, "square");
+  EXPECT_EQ(facts.pairs, 4u);
+  ASSERT_EQ(facts.residuals.size(), 4u) << facts.problem;
+  for (const double residual : facts.residuals) EXPECT_NEAR(residual, 0.1 * kScale, 1e-5);
+  EXPECT_EQ(facts.used, std::vector<bool>(4, true));
+  EXPECT_EQ(facts.problem, "");
+}
+
+TEST_F(FittingBeforeAWall, SaysWhyPairsOnALineHaveNoResiduals) {
+  EXPECT_TRUE(tool_.Facts(view_.scene.get())->residuals.empty()) << "no pair yet";
+  for (const double along : {-0.8, 0.0, 0.8}) Pair({along, 0.5 * along}, {0, 0});
+  const ui::FitFacts facts = *tool_.Facts(view_.scene.get());
+  EXPECT_EQ(facts.pairs, 3u);
+  EXPECT_TRUE(facts.residuals.empty());
+  EXPECT_THAT(facts.problem, HasSubstr("line"));
 }
 
 }  // namespace

@@ -77,6 +77,14 @@ TEST(RunOutput, WritesEventsInTheOrderOfTheirTimes) {
             "2.000000000,map,\"second,\nof two lines\"\n2.000000000,save,third\n");
 }
 
+TEST(RunOutput, WritesEachEventWhenItHappens) {
+  const TemporaryFolder folder;
+  RunOutput output(folder / "out");
+  output.Add(Event{std::chrono::seconds(1), "map", "entered Hall"});
+  EXPECT_NE(ReadAll(folder / "out/events.csv.part").find("1.000000000,map,entered Hall\n"),
+            std::string::npos);
+}
+
 TEST(RunOutput, ReportsAFolderThatCannotBeCreated) {
   const TemporaryFolder folder;
   folder.Write("file", "");

@@ -109,6 +109,26 @@ TEST_F(ContentInASession, AModelStandsWithItsBaseOnTheSurfaceAndFacesTheViewer) 
   });
 }
 
+// As with a view that was frozen before the map was adjusted.
+TEST_F(ContentInASession, APixelOfAnOldFrameIsThePlaceThatItsPointsHaveMovedTo) {
+  Run([&] {
+    ASSERT_EQ(Do(PlaceSignpost{"now", kPixel, ""}), "");
+    const Eigen::Vector3d now = Named("sign-1").signpost.anchor;
+    const double distance = (frame_.camera_from_map * now).norm();
+    const engine::Sim3 now_from_before{engine::Rotation3::Exp({0.02, -0.03, 0.01}), {0.2, -0.1, 0.3}, 1.1};
+    auto before = std::make_shared<engine::MapSnapshot>(*frame_.map);
+    for (engine::MapPoint& point : before->points) {
+      if (!point.infinite()) point.point_in_map.head<3>() = now_from_before.inverse() * point.position();
+    }
+    const Eigen::Vector3d eye = now_from_before.inverse() * frame_.camera_from_map.OriginInSource();
+    const engine::Rotation3 rotation = frame_.camera_from_map.rotation * now_from_before.rotation;
+    frame_.camera_from_map = {rotation, -(rotation * eye)};
+    frame_.map = std::move(before);
+    ASSERT_EQ(Do(PlaceSignpost{"before", kPixel, ""}), "");
+    EXPECT_LT((Named("sign-2").signpost.anchor - now).norm(), 0.002 * distance);
+  });
+}
+
 TEST_F(ContentInASession, AMeasuredMapGivesModelsTheirTrueSize) {
   Run([&] {
     const Eigen::Vector2d other(280, 300);

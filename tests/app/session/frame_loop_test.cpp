@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <thread>
+
 #include "app/simulator/simulation.h"
 #include "tests/app/support/temporary_folder.h"
 
@@ -232,6 +235,55 @@ TEST(FrameLoop, ReportsTheAgeOfALiveImageFromItsTimestamp) {
   loop.latency = [&](Timestamp latency) { latencies.push_back(latency); };
   RunFrames(&camera, &session, loop, [](const engine::TrackedFrame&) {}, {});
   EXPECT_THAT(latencies, ElementsAre(std::chrono::milliseconds(30)));
+}
+
+TEST(FrameLoop, PausesWhileTheClockIsStoppedAndStaysAtTheLastImage) {
+  CalibratedCamera camera = Calibrate(std::make_unique<Recording>(3), std::nullopt);
+  SessionOptions options;
+  options.may_write = false;
+  Session session(options, {camera.model}, nullptr);
+  PausableClock clock(true);
+  CommandInbox inbox;
+  std::stop_source stopping;
+  std::vector<std::pair<std::uint64_t, bool>> idle;  // Index of the image, and whether it is the last one.
+  std::vector<std::uint64_t> shown;
+  std::vector<std::string> refused;
+  FrameLoopOptions loop;
+  loop.pace = Pace::kEager;
+  loop.clock = &clock;
+  loop.inbox = &inbox;
+  loop.stays = true;
+  loop.refused = [&](const std::string& reason) { refused.push_back(reason); };
+  loop.idle = [&](const engine::TrackedFrame& frame, bool at_end) {
+    idle.emplace_back(frame.frame.index, at_end);
+    if (idle.size() == 1 || idle.size() == 3) inbox.Push({Undo{}, nullptr});
+    if (idle.size() == 2) clock.Resume();
+    if (idle.size() == 4) stopping.request_stop();
+  };
+  RunFrames(
+      &camera, &session, loop, [&](const engine::TrackedFrame& frame) { shown.push_back(frame.frame.index); },
+      stopping.get_token());
+  EXPECT_THAT(shown, ElementsAre(0u, 1u, 2u));
+  EXPECT_THAT(idle, ElementsAre(std::pair(0ul, false), std::pair(0ul, false), std::pair(2ul, true),
+                                std::pair(2ul, true)));
+  EXPECT_THAT(refused, ElementsAre(HasSubstr("read-only"), HasSubstr("read-only")))
+      << "commands are carried out meanwhile";
+}
+
+TEST(PausableClock, LosesTheTimeForWhichItIsStopped) {
+  using std::chrono::milliseconds;
+  PausableClock clock(true);
+  const Timestamp begin = clock.Now();
+  std::this_thread::sleep_for(milliseconds(50));
+  EXPECT_EQ(clock.Now(), begin);
+  clock.WaitUntil(begin + std::chrono::hours(1), {});  // Returns, because nothing would end the wait.
+  clock.Resume();
+  const Timestamp resumed = PlayClock().Now();
+  clock.WaitUntil(begin + milliseconds(20), {});
+  EXPECT_GE(clock.Now(), begin + milliseconds(20));
+  EXPECT_GE(PlayClock().Now() - resumed, milliseconds(15));
+  clock.Stop();
+  EXPECT_TRUE(clock.IsStopped());
 }
 
 }  // namespace
