@@ -102,6 +102,7 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
     narration_.emplace(strings);
     speech_.emplace(strings.language);
   }
+  if (request.visit_log && !request.may_write) visits_.emplace(*request.visit_log, request.tour);
   for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
   if (!request.head) return;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -134,6 +135,9 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
     files_->Add(session_.TakeEvents());
     WriteDelivery();
     files_->Close();
+  });
+  guarded([&] {
+    if (visits_) visits_->Finish();
   });
   guarded([&] {
     const std::scoped_lock lock(files_mutex_);
@@ -422,6 +426,10 @@ std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& trac
   const engine::CameraModel& camera = frame->camera ? *frame->camera : *cameras_[CameraOf(tracked)].model;
   if (state->visitor) state->visitor->Guide(frame, camera);
   if (tracked.frame.camera == 0) Narrate(*frame, camera);
+  if (tracked.frame.camera == 0 && visits_) {
+    visits_->Add(*frame, route_ ? &*route_ : nullptr);
+    ReportProblem(visits_->TakeProblem(), tracked.frame.time);
+  }
   AddRouteEvents(tracked.frame.time);
   if (tracked.frame.camera == 0) PlaySounds(frame.get());
   return frame;

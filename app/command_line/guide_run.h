@@ -14,6 +14,7 @@
 #include "app/command_line/guide_files.h"
 #include "app/command_line/guide_window.h"
 #include "app/command_line/run_guide.h"
+#include "app/command_line/visit_keeper.h"
 #include "app/evaluation/camera_report.h"
 #include "app/session/narration.h"
 #include "app/session/visitor_guide.h"
@@ -92,8 +93,9 @@ class GuideRun {
   std::vector<CameraState> camera_states_;
   SoundDirector sound_director_;             // Used for the frames of the first camera.
   std::optional<SoundPlayer> sound_player_;  // Only if sounds are to be heard.
-  std::optional<Narration> narration_;       // Used for the frames of the first camera; only with `narrate`,
-  std::optional<Speech> speech_;             // and the same.
+  std::optional<Narration> narration_;       // Of the first camera; only with `narrate`, as speech_.
+  std::optional<Speech> speech_;
+  std::optional<VisitKeeper> visits_;  // Of the first camera; only with a folder for their records.
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
   NoticeQueue notices_;

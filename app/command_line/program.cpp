@@ -130,6 +130,7 @@ int RunProgram(int argc, const char* const* argv) {
   AddDemoCommand(&program, &invocation, RunDemo);
   AddAuthorCommand(&program, &invocation, RunAuthor);
   AddTourCommand(&program, &invocation, RunTour);
+  AddReportCommand(&program, &invocation);
   AddEvaluateCommand(&program, &invocation, RunEvaluate);
 
   QuietDecoders();

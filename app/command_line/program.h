@@ -51,6 +51,7 @@ void AddSimulateCommand(CLI::App* program, Invocation* invocation);
 void AddTrainVocabularyCommand(CLI::App* program, Invocation* invocation);
 void AddMapsCommand(CLI::App* program, Invocation* invocation);
 void AddContentCommand(CLI::App* program, Invocation* invocation);
+void AddReportCommand(CLI::App* program, Invocation* invocation);
 
 // These receive the function that executes the subcommand, so that tests can replace it.
 void AddAuthorCommand(CLI::App* program, Invocation* invocation,

@@ -113,9 +113,11 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   request.title = "Docent - tour";
   CopyRunArguments(options.run, AnyLive(cameras), &request);
   request.narrate = options.narrate;
+  request.visit_log = options.log;
   if (options.tour) {
     const maps::Tour tour = FindTour(library, *options.tour);
     request.route = RouteOf(library, tour);
+    request.tour = tour.name;
     if (!options.run.language && !tour.language.empty()) request.language = tour.language;
   }
   std::uint64_t frames = 0, localized = 0;

@@ -51,6 +51,9 @@ struct GuideRequest {
   // Returns commands to run for a frame, as if a person had given them in the window; may be empty. Called on
   // the camera's thread.
   std::function<std::vector<Command>(const ShownFrame&)> director;
+  std::optional<std::filesystem::path>
+      visit_log;               // Folder for the records of visits; only without may_write.
+  std::string tour;            // The name of the tour below; empty for none.
   std::optional<Route> route;  // Of the tour that visitors are led along; only without may_write.
   double baseline_m = 0;       // See SessionOptions.
   bool occlusion = true;       // See SessionOptions.

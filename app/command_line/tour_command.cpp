@@ -23,6 +23,12 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
       "--narrate", options->narrate,
       "Speak where the visitor is, what to do, the way on and the texts in view, by the speech service "
       "of the desktop (Speech Dispatcher)");
+  command
+      ->add_option(
+          "--log", options->log,
+          "Folder to which a record of each visit is added, without images: where the visitor was, how long, "
+          "and where the camera was lost (see docent report)")
+      ->type_name("DIR");
   command->add_option("--script", options->script, "Commands to carry out at given times, such as tour skip")
       ->type_name("FILE");
   AddRunArguments(command,

@@ -60,6 +60,7 @@ ALLOWED = {
                                 "app/session"],
     "app/evaluation": APP_INPUT + ["maps", "app/output", "app/simulator", "app/cameras", "app/session",
                                    "app/evaluation"],
+    "app/visits": APP_INPUT + ["app/evaluation", "app/visits"],
     "app/demo": APP_INPUT + ["maps", "content", "app/simulator", "app/script", "app/session", "app/demo"],
 }
 PROJECT = ("engine/", "maps/", "content/", "ui/", "app/")
