@@ -79,7 +79,7 @@ struct PortalDialog::Request {
   ~Request() {
     if (bus != nullptr) {
       // Without the connection, the portal closes the dialog too, but not every portal at once.
-      if (!is_done)
+      if (!is_done && !path.empty())
         g_dbus_connection_call(bus, kPortal, path.c_str(), "org.freedesktop.portal.Request", "Close", nullptr,
                                nullptr, G_DBUS_CALL_FLAGS_NO_AUTO_START, kBusTimeout_ms, nullptr, nullptr,
                                nullptr);
