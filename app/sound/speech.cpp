@@ -1,59 +1,58 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/sound/speech.h"
 
-#ifdef DOCENT_HAS_SPEECH
-#include <libspeechd.h>
-#endif
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
-#include <cstdlib>
-#include <memory>
+#include <array>
+#include <chrono>
+#include <thread>
 #include <utility>
 
 #include "engine/base/error.h"
+
+extern char** environ;
 
 namespace docent::app {
 
 namespace {
 
 constexpr std::size_t kMostTexts = 16;
+constexpr const char* kSpeechProgram = "spd-say";
+// The program passes the text on and ends; only a service that hangs, or is being started, takes longer.
+constexpr auto kLongestCall = std::chrono::seconds(10);
 
-#ifdef DOCENT_HAS_SPEECH
-struct SpeechCloser {
-  void operator()(SPDConnection* connection) const { spd_close(connection); }
-};
-
-// A connection to the service, which starts the service where it does not run.
-class SpeechService {
- public:
-  // Throws Error when there is no service.
-  explicit SpeechService(const std::string& language) {
-    char* error = nullptr;
-    connection_.reset(spd_open2("docent", "visitor", nullptr, SPD_MODE_SINGLE, nullptr, 1, &error));
-    if (!connection_) {
-      const std::string reason = error != nullptr ? error : "there is no speech service";
-      std::free(error);
-      throw Error(reason);
+// Passes a text to the service. Throws Error when that fails.
+void Speak(const std::string& text, const std::string& language, const std::stop_token& stop) {
+  std::array<std::string, 7> arguments = {
+      kSpeechProgram, "--application-name=docent", "--priority=message", "--language", language, "--", text};
+  std::array<char*, 8> argv{};
+  for (std::size_t i = 0; i < arguments.size(); ++i) argv[i] = arguments[i].data();
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  for (const int stream : {STDOUT_FILENO, STDERR_FILENO})
+    posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_WRONLY, 0);
+  pid_t child = -1;
+  const int problem = posix_spawnp(&child, kSpeechProgram, &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (problem != 0) throw Error("Speech Dispatcher is not installed (spd-say)");
+  const auto end = std::chrono::steady_clock::now() + kLongestCall;
+  int status = 0;
+  while (waitpid(child, &status, WNOHANG) != child) {
+    const bool is_late = std::chrono::steady_clock::now() >= end;
+    if (is_late || stop.stop_requested()) {
+      kill(child, SIGKILL);
+      waitpid(child, &status, 0);
+      if (is_late) throw Error("the speech service does not answer");
+      return;
     }
-    spd_set_language(connection_.get(), language.c_str());
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  // Throws Error when the service does not take the text.
-  void Say(const std::string& text) {
-    if (spd_say(connection_.get(), SPD_MESSAGE, text.c_str()) < 0)
-      throw Error("the speech service does not answer");
-  }
-
- private:
-  std::unique_ptr<SPDConnection, SpeechCloser> connection_;
-};
-#else
-class SpeechService {
- public:
-  explicit SpeechService(const std::string&) {
-    throw Error("this program was built without Speech Dispatcher");
-  }
-  void Say(const std::string&) {}
-};
-#endif
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw Error("there is no speech service");
+}
 
 }  // namespace
 
@@ -93,13 +92,11 @@ std::optional<std::string> Speech::Next(const std::stop_token& stop) {
 }
 
 void Speech::Run(const std::stop_token& stop) {
-  std::unique_ptr<SpeechService> service;
   bool failed = false;
   while (const auto text = Next(stop)) {
     if (failed) continue;
     try {
-      if (!service) service = std::make_unique<SpeechService>(language_);
-      service->Say(*text);
+      Speak(*text, language_, stop);
     } catch (const Error& error) {
       failed = true;
       Report(error.what());

@@ -11,14 +11,15 @@
 
 namespace docent::app {
 
-// Speaks texts by Speech Dispatcher, the speech service of the desktop, on a thread of its own, which
-// connects to it with the first text. Without the service nothing is heard, and a sentence says so once;
-// everything else goes on. Any thread; no call waits for the service.
+// Speaks texts by Speech Dispatcher, the speech service of the desktop. Its program `spd-say` is run for each
+// text, on a thread of its own, because the calls of its library do not return when the service hangs.
+// Without the service nothing is heard, and a sentence says so once; everything else goes on. Any thread; no
+// call waits for the service.
 class Speech {
  public:
   // `language`: a tag as that of VisitorStrings.
   explicit Speech(std::string language);
-  // Ends the connection, which ends what is being spoken.
+  // What the service has been given is still spoken.
   ~Speech();
   Speech(const Speech&) = delete;
   Speech& operator=(const Speech&) = delete;

@@ -4,13 +4,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <numbers>
 #include <thread>
 
+#include "app/files/text_file.h"
 #include "app/sound/speech.h"
+#include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
 namespace {
@@ -127,21 +131,70 @@ TEST(SignsInView, AreThoseThatAreLargeEnoughToBeRead) {
   EXPECT_EQ(signs.front().text, "Text von near");
 }
 
-TEST(Speech, SaysOnceWhyNothingIsSpokenAndWaitsForNothing) {
-  // No service can be started by, or listens at, this address.
-  setenv("SPEECHD_ADDRESS", "unix_socket:/nonexistent/speechd.sock", 1);
-  std::string problem;
-  {
-    Speech speech("en");
-    for (int i = 0; i < 100; ++i) speech.Say("Lions");
-    for (int i = 0; i < 3000 && problem.empty(); ++i) {
-      problem = speech.TakeProblem();
+// A program called spd-say in a folder of its own, which is searched first.
+class SpeechProgram : public ::testing::Test {
+ protected:
+  void SetUp() override { path_ = std::getenv("PATH") != nullptr ? std::getenv("PATH") : ""; }
+  void TearDown() override { setenv("PATH", path_.c_str(), 1); }
+  void Install(const std::string& script) {
+    const auto program = folder_.Write("spd-say", "#!/bin/sh\n" + script);
+    std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+    setenv("PATH", (program.parent_path().string() + ":" + path_).c_str(), 1);
+  }
+  // The problem that is reported, waiting for it.
+  static std::string AwaitProblem(Speech* speech) {
+    std::string problem;
+    for (int i = 0; i < 6000 && problem.empty(); ++i) {
+      problem = speech->TakeProblem();
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
-    EXPECT_THAT(problem, ::testing::StartsWith("Nothing is spoken: "));
-    EXPECT_EQ(speech.TakeProblem(), "");
+    return problem;
   }
-  unsetenv("SPEECHD_ADDRESS");
+
+  const TemporaryFolder folder_;
+  std::string path_;
+};
+
+TEST_F(SpeechProgram, GetsTheTextsInTheirOrder) {
+  const std::filesystem::path said = folder_ / "said";
+  Install("shift 3; echo \"$@\" >>" + said.string() + "\n");
+  Speech speech("de");
+  speech.Say("Löwen");
+  speech.Say("--version; \"Masken\" $HOME");
+  std::string text;
+  for (int i = 0; i < 6000 && std::count(text.begin(), text.end(), '\n') < 2; ++i) {
+    if (std::filesystem::exists(said)) text = ReadTextFile(said);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_EQ(text, "de -- Löwen\nde -- --version; \"Masken\" $HOME\n");
+  EXPECT_EQ(speech.TakeProblem(), "");
+}
+
+TEST_F(SpeechProgram, FailsOnceWithASentence) {
+  Install("exit 1\n");
+  Speech speech("en");
+  for (int i = 0; i < 100; ++i) speech.Say("Lions");
+  EXPECT_EQ(AwaitProblem(&speech), "Nothing is spoken: there is no speech service.");
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(speech.TakeProblem(), "");
+}
+
+TEST_F(SpeechProgram, DoesNotKeepATourFromEndingWhenItHangs) {
+  Install("exec sleep 600\n");
+  const auto begin = std::chrono::steady_clock::now();
+  {
+    Speech speech("en");
+    for (int i = 0; i < 3; ++i) speech.Say("Lions");
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(60));
+}
+
+TEST_F(SpeechProgram, IsNotNeeded) {
+  setenv("PATH", (folder_ / "").c_str(), 1);
+  Speech speech("en");
+  speech.Say("Lions");
+  EXPECT_EQ(AwaitProblem(&speech), "Nothing is spoken: Speech Dispatcher is not installed (spd-say).");
 }
 
 }  // namespace
