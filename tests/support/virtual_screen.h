@@ -15,8 +15,9 @@ namespace docent {
 // manager: a window's corner is the screen's corner.
 class VirtualScreen {
  public:
-  // `size` is WIDTHxHEIGHT. Sets DISPLAY.
-  explicit VirtualScreen(const std::string& size) {
+  // `size` is WIDTHxHEIGHT. Sets DISPLAY. With a folder, the framebuffer is in its file Xvfb_screen0, in the
+  // format of xwd, so that tests can look at it.
+  explicit VirtualScreen(const std::string& size, const std::string& framebuffer_folder = "") {
     int channel[2];
     if (pipe(channel) != 0) return;
     child_ = fork();
@@ -25,7 +26,8 @@ class VirtualScreen {
       const int nowhere = open("/dev/null", O_WRONLY);
       dup2(nowhere, STDERR_FILENO);
       execlp("Xvfb", "Xvfb", "-displayfd", descriptor.c_str(), "-screen", "0", (size + "x24").c_str(),
-             "-nolisten", "tcp", static_cast<char*>(nullptr));
+             "-nolisten", "tcp", framebuffer_folder.empty() ? nullptr : "-fbdir", framebuffer_folder.c_str(),
+             static_cast<char*>(nullptr));
       _exit(127);
     }
     close(channel[1]);

@@ -53,7 +53,8 @@ Entity TrailAlong(std::vector<Eigen::Vector3d> points) {
   return entity;
 }
 
-cv::Mat Drawn(Renderer* renderer, const content::Scene& scene, bool hud, bool markers) {
+cv::Mat Drawn(Renderer* renderer, const content::Scene& scene, bool hud, bool markers,
+              std::span<const std::string> faint = {}) {
   const engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
   const engine::CameraModel camera = Undistorted();
   View view;
@@ -63,6 +64,7 @@ cv::Mat Drawn(Renderer* renderer, const content::Scene& scene, bool hud, bool ma
   view.overlay.hud = hud;
   view.overlay.status = false;
   view.overlay.markers = markers;
+  view.faint = faint;
   renderer->Draw(view);
   cv::Mat image;
   renderer->ReadBack(&image);
@@ -174,6 +176,9 @@ TEST_F(EntityKindsImage, ALabelIsDrawnWithItsLeaderLine) {
   EXPECT_EQ(LitPixels(image.rowRange(340, 480)), 0);
   scene.entities[0].hidden = true;
   EXPECT_EQ(LitPixels(Drawn(&renderer, scene, true, false)), 0);
+  const std::vector<std::string> selected = {scene.entities[0].name};
+  const cv::Mat faint = Drawn(&renderer, scene, true, false, selected);
+  EXPECT_NEAR(cv::mean(faint(cv::Rect(319, 319, 3, 3)))[1], 0.35 * brightness(320, 320), 10);
 }
 
 TEST_F(EntityKindsImage, ALabelHasTheResolutionOfTheTextsOverTheImage) {
