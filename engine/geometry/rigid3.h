@@ -21,8 +21,8 @@ class Rotation3 {
   // The rotation nearest to the matrix, which must be orthonormal except for rounding.
   explicit Rotation3(const Eigen::Matrix3d& matrix) : quaternion_(Eigen::Quaterniond(matrix).normalized()) {}
 
-  // Of a quaternion whose length is 1 but for rounding, which is kept to the bit: to normalize a unit quaternion
-  // again can change its last bits.
+  // Of a quaternion whose length is 1 but for rounding, which is kept to the bit: to normalize a unit
+  // quaternion again can change its last bits.
   static Rotation3 FromUnit(const Eigen::Quaterniond& quaternion) {
     Rotation3 result;
     result.quaternion_ = quaternion;
