@@ -30,9 +30,11 @@ class ContentLayer {
   // What is drawn of a scene, and how.
   struct What {
     double animation_seconds = 0;
-    bool markers = false;                // Where sounds are.
-    std::span<const std::string> faint;  // Hidden entities that are drawn all the same, faintly, by name.
-    std::shared_ptr<const engine::SurfaceMesh> surfaces;  // Content behind them is hidden; null: none is.
+    bool markers = false;  // Where sounds are.
+    std::span<const std::string> faint =
+        {};  // Hidden entities that are drawn all the same, faintly, by name.
+    std::shared_ptr<const engine::SurfaceMesh> surfaces =
+        {};  // Content behind them is hidden; null: none is.
   };
   // Composites the scene over the contents of `image`, an image target of the camera's size whose row 0 is
   // the top. Pixels that no content covers keep their exact values. Labels are not drawn (see label_board.h).
