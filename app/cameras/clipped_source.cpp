@@ -34,19 +34,26 @@ class ClippedSource : public FrameSource {
  private:
   template <typename Fetch>
   bool NextInside(engine::Frame* frame, const Fetch& fetch) {
-    while (!ended_ && fetch()) {
+    for (bool skips = SkipsNext(); !ended_ && (skips ? source_->NextLate(frame) : fetch());
+         skips = SkipsNext()) {
       if (frame->image.empty() && info_.live) return true;  // The device is disconnected.
       if (!first_) first_ = frame->time;
       const Timestamp since_first = frame->time - *first_;
       last_ = since_first;
       if (until_ > Timestamp{} && since_first >= until_) break;
-      if (since_first < from_) continue;
+      if (since_first < from_ || skips) continue;
       is_inside_ = true;
       return true;
     }
     const bool is_first_end = !std::exchange(ended_, true);
     if (is_first_end && !is_inside_ && last_ < from_) RefuseStart(last_);
     return false;
+  }
+
+  // Images long before the interval are not decoded or rendered; gaps are shorter than this.
+  bool SkipsNext() const {
+    constexpr Timestamp kGap = std::chrono::seconds(1);
+    return !info_.live && first_ && last_ + kGap < from_;
   }
 
   [[noreturn]] void RefuseStart(Timestamp last) const {

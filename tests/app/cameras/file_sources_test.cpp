@@ -206,6 +206,42 @@ TEST_F(Cameras, CanBeClippedToATimeRange) {
   EXPECT_EQ(frames[2].time, std::chrono::milliseconds(400));
 }
 
+// A recording of 40 images, ten per second, that counts those that were decoded.
+class CountingRecording : public FrameSource {
+ public:
+  explicit CountingRecording(int* decoded) : decoded_(decoded) { info_.name = "counting"; }
+  bool Next(engine::Frame* frame) override {
+    if (!NextLate(frame)) return false;
+    frame->image = cv::Mat::zeros(4, 4, CV_8UC1);
+    ++*decoded_;
+    return true;
+  }
+  bool NextLate(engine::Frame* frame) override {
+    if (next_ == 40) return false;
+    frame->index = next_;
+    frame->time = std::chrono::milliseconds(100) * next_++;
+    return true;
+  }
+
+ private:
+  int* const decoded_;
+  std::uint64_t next_ = 0;
+};
+
+TEST(ClippedSource, DoesNotDecodeWhatIsLongBeforeTheInterval) {
+  int decoded = 0;
+  const auto source = ClipSource(std::make_unique<CountingRecording>(&decoded), std::chrono::seconds(3),
+                                 std::chrono::milliseconds(3500));
+  engine::Frame frame;
+  ASSERT_TRUE(source->Next(&frame));
+  EXPECT_EQ(frame.index, 30u);
+  EXPECT_FALSE(frame.image.empty());
+  EXPECT_LE(decoded, 13) << "the first one, and those of a second before the interval";
+  int more = 0;
+  for (; source->Next(&frame); ++more) EXPECT_FALSE(frame.image.empty());
+  EXPECT_EQ(more, 4);
+}
+
 TEST_F(Cameras, RefuseToBeClippedBeyondTheirEnd) {
   MakeTum();  // 0.825 s long
   const auto clip = [&](const std::string& camera, int from_ms, int until_ms = 0) {
