@@ -233,7 +233,7 @@ class FiveStops : public ::testing::Test {
       return FormatNumber(museum.Begin(label) + share * (museum.End(label) - museum.Begin(label)) - from);
     };
     const std::string back = at("visit0", 0.8) + " tour back\n";
-    mapped_.folder().Write("visit.txt", back + back + back + at("visit5", 0.8) + " tour skip\n");
+    mapped_.folder().Write("visit.txt", back + back + back + at("visit4", 0.8) + " tour skip\n");
     mapped_.Succeed({"tour", "--library", mapped_.library(), "--camera", "sim:" + mapped_.spec(), "--from",
                      FormatNumber(from), "--until", FormatNumber(until), "--pace", "lockstep", "--headless",
                      "--tour", "Five bays", "--script", (mapped_.folder() / "visit.txt").string(), "--output",
@@ -262,7 +262,8 @@ TEST_F(FiveStops, AreReachedWithADetourALossAndASkippedStopAlongTrueDirections) 
                           "\"arrived at 'Bay 3', stop 3 of 5\"", "\"arrived at 'Bay 0', stop 4 of 5\"",
                           "\"going back to 'Bay 3', stop 3 of 5\"", "\"going back to 'Bay 5', stop 2 of 5\"",
                           "\"going back to 'Bay 4', stop 1 of 5\"", "\"arrived at 'Bay 4', stop 1 of 5\"",
-                          "\"skipped 'Bay 2', stop 5 of 5\"", "finished; 4 of 5 stops seen"));
+                          "\"skipped 'Bay 2', stop 5 of 5\"", "finished; 4 of 5 stops seen",
+                          "\"arrived at 'Bay 2', stop 5 of 5\""));
 
   // Bay 1 looks like the others, but has no map.
   const TrueMuseum& museum = mapped_.museum();
