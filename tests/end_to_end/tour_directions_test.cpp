@@ -205,9 +205,9 @@ int BayOf(const std::string& name) {
   return name.empty() ? -1 : name.back() - '0';
 }
 
-// The tour leads through five of six bays. The visitor goes from Bay 4 through Bay 5 and Bay 3 to Bay 0,
-// wants to see the first stop again, goes there, is lost in Bay 1, which has no map, and skips Bay 2 back in
-// Bay 5.
+// The tour leads through five of six bays. The visitor goes from Bay 4 through Bay 5 to Bay 3, is lost on the
+// way across the hall to Bay 0, wants to see the first stop again and goes there, skips Bay 2, and comes past
+// it after all.
 class FiveStops : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -265,15 +265,15 @@ TEST_F(FiveStops, AreReachedWithADetourALossAndASkippedStopAlongTrueDirections) 
                           "\"skipped 'Bay 2', stop 5 of 5\"", "finished; 4 of 5 stops seen",
                           "\"arrived at 'Bay 2', stop 5 of 5\""));
 
-  // Bay 1 looks like the others, but has no map.
+  // Across the hall, Bay 1 looks like the others, but has no map.
   const TrueMuseum& museum = mapped_.museum();
-  double lost_s = 0, last_s = museum.Begin("visit4");
+  double lost_s = 0, last_s = museum.Begin("visit3");
   for (const Row& row : ReadFrames(Tour() / "frames.csv")) {
     const double seconds = ToSeconds(*ParseSeconds(row.at("timestamp")));
     if (row.at("map").empty() || seconds < last_s) continue;
     lost_s = std::max(lost_s, seconds - std::exchange(last_s, seconds));
   }
-  EXPECT_GE(lost_s, museum.End("visit1") - museum.Begin("visit1"));
+  EXPECT_GE(lost_s, 1);
 
   // Where the visitor was sent from where, and how.
   std::map<std::string, int> ways;
