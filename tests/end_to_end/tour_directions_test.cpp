@@ -96,6 +96,8 @@ engine::Sim3 WorldFromMap(const TrueMuseum& museum, const std::vector<Row>& fram
   for (const Row& row : frames) {
     if (row.at("map") != map) continue;
     const engine::Rigid3 truth = museum.CameraAt(*ParseSeconds(row.at("timestamp")));
+    // Without a depth only the rotation is known.
+    if (row.at("state") != "sixdof" && row.at("state") != "hybrid") continue;
     const Eigen::Quaterniond map_from_camera(NumberIn(row, "qw"), NumberIn(row, "qx"), NumberIn(row, "qy"),
                                              NumberIn(row, "qz"));
     rotations.push_back(truth.rotation * engine::Rotation3(map_from_camera).inverse());
@@ -133,27 +135,24 @@ class MappedMuseum {
  public:
   explicit MappedMuseum(const std::string& spec) : spec_(spec), museum_(spec) {}
 
-  // Maps the bays from `first` on, up to and with `last`; `script` may say what else is done.
-  void Map(int first, int last) {
-    const double from = museum_.Begin("build" + std::to_string(first)),
-                 until = museum_.End("build" + std::to_string(last));
+  // Maps these bays, in the order in which the camera comes to them.
+  void Map(const std::vector<int>& bays) {
     std::string script;
-    for (int bay = first; bay <= last; ++bay) {
+    for (const int bay : bays) {
       const std::string label = "build" + std::to_string(bay);
-      script += FormatNumber(museum_.Begin(label) - from) + " map new \"" + BayName(bay) + "\"\n";
-      if (bay < last) script += FormatNumber(museum_.End(label) - from) + " map stop\n";
+      script += FormatNumber(museum_.Begin(label)) + " map new \"" + BayName(bay) + "\"\n";
+      if (bay != bays.back()) script += FormatNumber(museum_.End(label)) + " map stop\n";
     }
-    Author(script, from, until);
+    Author(script, museum_.End("build" + std::to_string(bays.back())));
     const std::vector<Row> frames = ReadFrames(folder_ / "author/frames.csv");
-    for (int bay = first; bay <= last; ++bay)
-      world_from_map_[bay] = WorldFromMap(museum_, frames, BayName(bay));
+    for (const int bay : bays) world_from_map_[bay] = WorldFromMap(museum_, frames, BayName(bay));
   }
-  // Runs the author's program on a part of the trajectory.
-  void Author(const std::string& script, double from, double until) {
+  // Runs the author's program on the begin of the trajectory.
+  void Author(const std::string& script, double until) {
     folder_.Write("script.txt", script);
-    Succeed({"author", "--library", library(), "--camera", "sim:" + spec_, "--from", FormatNumber(from),
-             "--until", FormatNumber(until), "--pace", "lockstep", "--headless", "--script",
-             (folder_ / "script.txt").string(), "--output", (folder_ / "author").string()});
+    Succeed({"author", "--library", library(), "--camera", "sim:" + spec_, "--until", FormatNumber(until),
+             "--pace", "lockstep", "--headless", "--script", (folder_ / "script.txt").string(), "--output",
+             (folder_ / "author").string()});
   }
   // Runs the program, which must succeed, and returns its output.
   std::string Succeed(const std::vector<std::string>& arguments) const {
@@ -207,15 +206,15 @@ int BayOf(const std::string& name) {
   return name.empty() ? -1 : name.back() - '0';
 }
 
-// The tour leads through five of six bays. The visitor goes from Bay 4 through Bay 5 to Bay 3, wants to see
-// the first stop again, is lost in Bay 0, which has no map, on the way back to Bay 4, skips Bay 2 there, and
-// ends in Bay 1.
+// The tour leads through five of six bays. The visitor goes from Bay 4 through Bay 5 to Bay 3, is lost on the
+// way across the hall to Bay 0, wants to see the first stop again and goes there, skips Bay 2, and comes past
+// it after all.
 class FiveStops : public ::testing::Test {
  protected:
   void SetUp() override {
-    mapped_.Map(1, 5);
+    mapped_.Map({0, 2, 3, 4, 5});
     const auto& museum = mapped_.museum();
-    const std::vector<int> stops = {4, 5, 3, 2, 1};
+    const std::vector<int> stops = {4, 5, 3, 0, 2};
     for (std::size_t i = 0; i < stops.size(); ++i) {
       const Eigen::Vector3d front = museum.FrontOf(stops[i]);
       if (i + 1 < stops.size()) mapped_.AddSign(stops[i], stops[i + 1], front);
@@ -223,19 +222,19 @@ class FiveStops : public ::testing::Test {
       const Eigen::Vector3d behind = front + 2 * (museum.BeginOf(stops[i]) - front);
       if (i > 0) mapped_.AddSign(stops[i], stops[i - 1], {behind.x(), 0, behind.z()});
     }
-    mapped_.Succeed({"maps", "tour", "create", "Five bays", "--stops", "Bay 4", "Bay 5", "Bay 3", "Bay 2",
-                     "Bay 1", "--library", mapped_.library()});
+    mapped_.Succeed({"maps", "tour", "create", "Five bays", "--stops", "Bay 4", "Bay 5", "Bay 3", "Bay 0",
+                     "Bay 2", "--library", mapped_.library()});
   }
 
   // Visits the museum and writes its files to folder() / "tour".
   void Visit() {
     const TrueMuseum& museum = mapped_.museum();
-    const double from = museum.End("build4") - 2, until = museum.End("visit1");
+    const double from = museum.End("build4") - 2, until = museum.End("visit5");
     const auto at = [&](const std::string& label, double share) {
       return FormatNumber(museum.Begin(label) + share * (museum.End(label) - museum.Begin(label)) - from);
     };
-    mapped_.folder().Write("visit.txt", at("visit3", 0.6) + " tour back\n" + at("visit3", 0.6) +
-                                            " tour back\n" + at("visit4", 0.7) + " tour skip\n");
+    const std::string back = at("visit0", 0.8) + " tour back\n";
+    mapped_.folder().Write("visit.txt", back + back + back + at("visit4", 0.8) + " tour skip\n");
     mapped_.Succeed({"tour", "--library", mapped_.library(), "--camera", "sim:" + mapped_.spec(), "--from",
                      FormatNumber(from), "--until", FormatNumber(until), "--pace", "lockstep", "--headless",
                      "--tour", "Five bays", "--narrate", "--script",
@@ -254,27 +253,28 @@ class FiveStops : public ::testing::Test {
                                                                   : board - camera.translation);
   }
 
-  MappedMuseum mapped_{"museum:6,fps=10"};
+  MappedMuseum mapped_{"museum:6,fps=8"};
 };
 
 TEST_F(FiveStops, AreReachedWithADetourALossAndASkippedStopAlongTrueDirections) {
   Visit();
   EXPECT_THAT(EventsOf("tour", Tour() / "events.csv"),
               ElementsAre("\"arrived at 'Bay 4', stop 1 of 5\"", "\"arrived at 'Bay 5', stop 2 of 5\"",
-                          "\"arrived at 'Bay 3', stop 3 of 5\"", "\"going back to 'Bay 5', stop 2 of 5\"",
+                          "\"arrived at 'Bay 3', stop 3 of 5\"", "\"arrived at 'Bay 0', stop 4 of 5\"",
+                          "\"going back to 'Bay 3', stop 3 of 5\"", "\"going back to 'Bay 5', stop 2 of 5\"",
                           "\"going back to 'Bay 4', stop 1 of 5\"", "\"arrived at 'Bay 4', stop 1 of 5\"",
-                          "\"skipped 'Bay 2', stop 4 of 5\"", "\"arrived at 'Bay 1', stop 5 of 5\"",
-                          "finished; 4 of 5 stops seen"));
+                          "\"skipped 'Bay 2', stop 5 of 5\"", "finished; 4 of 5 stops seen",
+                          "\"arrived at 'Bay 2', stop 5 of 5\""));
 
-  // Bay 0 looks like the others, but has no map.
+  // Across the hall, Bay 1 looks like the others, but has no map.
   const TrueMuseum& museum = mapped_.museum();
   double lost_s = 0, last_s = museum.Begin("visit3");
   for (const Row& row : ReadFrames(Tour() / "frames.csv")) {
     const double seconds = ToSeconds(*ParseSeconds(row.at("timestamp")));
-    if (row.at("map").empty()) continue;
+    if (row.at("map").empty() || seconds < last_s) continue;
     lost_s = std::max(lost_s, seconds - std::exchange(last_s, seconds));
   }
-  EXPECT_GT(lost_s, museum.End("visit0") - museum.Begin("visit0"));
+  EXPECT_GE(lost_s, 1);
 
   // What was spoken, for a visitor who cannot see it.
   const std::vector<std::string> spoken = EventsOf("narration", Tour() / "events.csv");
@@ -298,8 +298,9 @@ TEST_F(FiveStops, AreReachedWithADetourALossAndASkippedStopAlongTrueDirections) 
   }
   RecordProperty("worst_direction_error_deg", FormatNumber(worst_deg, 3));
   SCOPED_TRACE(testing::PrintToString(ways));
-  for (const char* way : {"Bay 4 to Bay 5 by direction", "Bay 5 to Bay 3 by direction",
-                          "Bay 3 to Bay 2 by direction", "Bay 3 to Bay 5 by signpost"})
+  for (const char* way :
+       {"Bay 4 to Bay 5 by direction", "Bay 5 to Bay 3 by direction", "Bay 3 to Bay 0 by direction",
+        "Bay 0 to Bay 2 by direction", "Bay 0 to Bay 3 by signpost"})
     EXPECT_GE(ways[way], 5) << way;
 }
 
@@ -311,7 +312,7 @@ TEST(FoundDirection, LeadsToWhereAMapOfTheSamePlaceBegins) {
   mapped.Author("0 map new \"Left\"\n" + FormatNumber(half) + " map stop\n" + FormatNumber(half + 0.1) +
                     " map new \"Right\"\n" + FormatNumber(museum.End("build0")) + " map stop\n" +
                     FormatNumber(far) + " map new \"Far\"\n",
-                0, museum.End("build1"));
+                museum.End("build1"));
   const std::vector<Row> frames = ReadFrames(mapped.folder() / "author/frames.csv");
   const engine::Sim3 world_from_left = WorldFromMap(museum, frames, "Left");
   const auto first_right =
