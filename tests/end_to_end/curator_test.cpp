@@ -167,8 +167,8 @@ class CuratorAtWindow : public ::testing::Test {
     const Outcome outcome = RunDocent({"content", "list", "--json", "--library", library(), "--map", map});
     std::vector<std::string> names;
     if (outcome.exit_status != 0) return {outcome.errors};
-    for (const auto& entry : nlohmann::json::parse(outcome.output).at("content"))
-      names.push_back(entry.at("name"));
+    const nlohmann::json list = nlohmann::json::parse(outcome.output);
+    for (const auto& entry : list.at("content")) names.push_back(entry.at("name"));
     return names;
   }
   // Saves, and waits until the library has this content.
@@ -366,8 +366,9 @@ TEST_F(CuratorAtWindow, FurnishesThreeMapsThatAVisitorSeesInTheirPlaces) {
   ASSERT_NO_FATAL_FAILURE(FurnishLions());
   ASSERT_NO_FATAL_FAILURE(UndoInAnotherSession());
   if (HasFailure()) return;
-  const std::string list = RunDocent({"content", "list", "--json", "--library", library()}).output;
-  for (const auto& entry : nlohmann::json::parse(list).at("content")) {
+  const nlohmann::json list =
+      nlohmann::json::parse(RunDocent({"content", "list", "--json", "--library", library()}).output);
+  for (const auto& entry : list.at("content")) {
     if (entry.at("name") == "sign-1") {
       EXPECT_EQ(entry.at("to_map"), "Elephants");
     }
