@@ -15,7 +15,10 @@ void RouteState::Enter(std::uint64_t map_key, double seconds) {
     is_passing_ = before && now && *now<*before&& * now> 0;
     last_ = map_key;
     entered_s_ = seconds;
+  } else if (seconds - last_s_ > kPause_s) {
+    entered_s_ = seconds;
   }
+  last_s_ = seconds;
   here_ = map_key;
   const std::optional<std::size_t> stop = StopOf(map_key);
   if (!stop) return;

@@ -48,8 +48,9 @@ class RouteState {
  public:
   enum class Visit { kAhead, kSeen, kSkipped };
 
-  // A later stop can be seen from afar, or crossed; only who is there for so long has come to it.
-  static constexpr double kStay_s = 3;
+  // A later stop can be seen from afar, or crossed; only who is there for so long has come to it. A longer
+  // pause without a pose interrupts the stay.
+  static constexpr double kStay_s = 3, kPause_s = 1;
 
   explicit RouteState(Route route);
 
@@ -88,8 +89,9 @@ class RouteState {
   std::optional<std::size_t> back_;         // The stop that the visitor is led back to.
   std::map<std::uint64_t, int> distances_;  // To the target, as SignpostGraph has them.
   std::uint64_t here_ = 0, last_ = 0;       // The map of the last image, if it had a pose; the last map.
-  double entered_s_ = 0;                    // When the visitor came to the last map.
-  bool is_passing_ = false;                 // Whether the last map lies on the way to the target.
+  double entered_s_ = 0;     // When the visitor came to the last map, or was found there again.
+  double last_s_ = 0;        // The time of the last image with a pose.
+  bool is_passing_ = false;  // Whether the last map lies on the way to the target.
   bool is_finished_ = false;
   std::vector<RouteEvent> events_;
 };

@@ -28,9 +28,10 @@ Route RouteWith(std::size_t count) {
 // The visitor is in the map for long enough to have come there.
 void Stay(std::uint64_t map_key, RouteState* state) {
   static double now = 0;
+  constexpr double kStep_s = 0.5;
   state->Enter(map_key, now);
-  now += RouteState::kStay_s;
-  state->Enter(map_key, now);
+  for (double stayed = 0; stayed < RouteState::kStay_s; stayed += kStep_s)
+    state->Enter(map_key, now += kStep_s);
 }
 
 std::vector<std::string> Texts(RouteState* state) {
@@ -80,6 +81,20 @@ TEST(RouteState, ArrivesOnceAtEachStop) {
   Stay(1, &state);
   EXPECT_THAT(state.TakeEvents(), IsEmpty());
   EXPECT_EQ(RouteLine(state), "Stop 1 of 3. Next: C");
+}
+
+TEST(RouteState, DoesNotTakeTwoGlimpsesOfALaterStopForAStay) {
+  RouteState state(RouteWith(3));
+  state.Enter(1, 0);
+  state.TakeEvents();
+  state.Enter(3, 10);
+  state.Leave();
+  state.Enter(3, 20);
+  EXPECT_THAT(state.TakeEvents(), IsEmpty()) << "nobody was there for ten seconds";
+  for (double seconds = 20; seconds < 23; seconds += 0.5) state.Enter(3, seconds);
+  EXPECT_THAT(state.TakeEvents(), IsEmpty());
+  state.Enter(3, 23.1);
+  EXPECT_THAT(Texts(&state), ElementsAre("skipped 'B', stop 2 of 3", "arrived at 'C', stop 3 of 3"));
 }
 
 TEST(RouteState, SkipsAStopOnRequest) {
