@@ -58,8 +58,11 @@ class CuratorWindow {
     output_ = output;
     arguments.insert(arguments.end(), {"--output", output.string()});
     child_ = StartDocent(arguments, output.string() + ".out", output.string() + ".err");
-    Xdotool("search --sync --onlyvisible --name Docent windowsize " + std::to_string(kWidth) + " " +
-            std::to_string(kHeight) + " windowfocus");
+    // A window that has just been made may refuse the keyboard.
+    const std::string focus = "xdotool search --onlyvisible --name Docent windowsize " +
+                              std::to_string(kWidth) + " " + std::to_string(kHeight) +
+                              " windowfocus --sync > /dev/null 2>&1";
+    Wait("the window", [&] { return std::system(focus.c_str()) == 0; });
     WaitForText("Nothing is placed in this map.");
   }
 
