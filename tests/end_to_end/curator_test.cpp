@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -47,6 +48,8 @@ struct Errors {
 class CuratorAtWindow : public ::testing::Test {
  protected:
   void SetUp() override {
+    if (std::getenv("DOCENT_LONG_TESTS") == nullptr)
+      GTEST_SKIP() << "this test takes minutes at a window; set DOCENT_LONG_TESTS to run it";
     window_.emplace(folder_.path());
     if (const std::string missing = window_->MissingTool(); !missing.empty()) GTEST_SKIP() << missing;
     segments_ = SegmentsOf(*simulation_);
