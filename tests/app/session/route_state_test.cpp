@@ -94,7 +94,8 @@ TEST(RouteState, DoesNotTakeTwoGlimpsesOfALaterStopForAStay) {
   for (double seconds = 20; seconds < 23; seconds += 0.5) state.Enter(3, seconds);
   EXPECT_THAT(state.TakeEvents(), IsEmpty());
   state.Enter(3, 23.1);
-  EXPECT_THAT(Texts(&state), ElementsAre("skipped 'B', stop 2 of 3", "arrived at 'C', stop 3 of 3"));
+  EXPECT_THAT(Texts(&state), ElementsAre("skipped 'B', stop 2 of 3", "arrived at 'C', stop 3 of 3",
+                                         "finished; 2 of 3 stops seen"));
 }
 
 TEST(RouteState, SkipsAStopOnRequest) {
