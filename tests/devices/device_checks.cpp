@@ -267,9 +267,10 @@ int NumberOf(const cv::Mat& image) {
   return number;
 }
 
-// Feeds Motion-JPEG images into the loopback device until destruction. The loopback driver writes over images that
-// nobody has fetched, so that on a busy machine any number of them may be lost. A test that counts them names the last
-// one that it received, and the feeder then stays at most two images ahead of it, unless `longest_wait` passes.
+// Feeds Motion-JPEG images into the loopback device until destruction. The loopback driver writes over images
+// that nobody has fetched, so that on a busy machine any number of them may be lost. A test that counts them
+// names the last one that it received, and the feeder then stays at most two images ahead of it, unless
+// `longest_wait` passes.
 class JpegFeeder {
  public:
   explicit JpegFeeder(std::chrono::milliseconds longest_wait = std::chrono::milliseconds(0))
