@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   cv::setNumThreads(1);
   // A fixed threshold returns images and published map snapshots to the system when they are freed. By
   // default glibc raises the threshold after the first such blocks are freed, and then keeps about twice the
-  // memory that is in use.
-  mallopt(M_MMAP_THRESHOLD, 256 * 1024);
+  // memory that is in use. There is one thread here.
+  mallopt(M_MMAP_THRESHOLD, 256 * 1024);  // NOLINT(concurrency-mt-unsafe)
   return docent::app::RunProgram(argc, argv);
 }
