@@ -259,7 +259,7 @@ void CuratorAtWindow::FurnishLions() {
 void CuratorAtWindow::UndoInAnotherSession() {
   Open("visit2");
   window_->Key("space");
-  window_->WaitForEvent("relocalized,");
+  window_->WaitForEvent("entered Lions");
   window_->WaitForEvent("The images have ended");
   window_->ControlKey("z");
   window_->WaitForEvent("command,undo", 1);
