@@ -146,7 +146,8 @@ class CuratorAtWindow : public ::testing::Test {
     });
     ASSERT_TRUE(all_seen);
     for (std::size_t i = 0; i < marks.size(); ++i) {
-      window_->Click(*seen[i]);
+      // The middle of a pixel of the screen lies half a unit beyond the point of the window with its index.
+      window_->Click(*seen[i] + cv::Point2d(0.5, 0.5));
       window_->WaitForText("Now click the place");
       placed_.push_back({map_, name, marks[i], ClickPlace(places[i])});
       window_->WaitForText("Click a point on the object.");
@@ -311,12 +312,15 @@ std::map<std::pair<std::string, std::string>, Eigen::Vector2d> LoggedPixels(
   return pixels;
 }
 
-// The middle of what has this colour within 24 pixels of a pixel.
+// More than half a mark in the images of the tour.
+constexpr int kMarkReach_px = 60;
+
+// The middle of what has this colour around a pixel.
 std::optional<Eigen::Vector2d> FindMark(const cv::Mat& image, const Eigen::Vector2d& near,
                                         const cv::Scalar& color) {
-  constexpr int kReach_px = 24, kSide_px = 2 * kReach_px + 1;
-  const cv::Rect around = cv::Rect(static_cast<int>(near.x()) - kReach_px,
-                                   static_cast<int>(near.y()) - kReach_px, kSide_px, kSide_px) &
+  constexpr int kSide_px = 2 * kMarkReach_px + 1;
+  const cv::Rect around = cv::Rect(static_cast<int>(near.x()) - kMarkReach_px,
+                                   static_cast<int>(near.y()) - kMarkReach_px, kSide_px, kSide_px) &
                           cv::Rect(0, 0, image.cols, image.rows);
   const cv::Mat part = image(around);
   const auto found = FindNewColor(cv::Mat(part.size(), CV_8UC3, cv::Scalar::all(128)), part, color);
@@ -352,7 +356,7 @@ std::map<std::string, Errors> CuratorAtWindow::Measure(const std::filesystem::pa
       if (const auto found = logged.find({row.at("timestamp"), placed.entity});
           found != logged.end() && !content::HasModel(entity))
         errors[placed.entity + " (logged)"].Add((found->second - *truth).norm());
-      if (placed.entity != "vase" || image.empty()) continue;
+      if (placed.entity != "vase" || image.empty() || !lens.IsInside(*truth, kMarkReach_px)) continue;
       if (const auto drawn = FindMark(image, *truth, MarkColors()[number]))
         errors[placed.entity + " (drawn)"].Add((*drawn - *truth).norm());
     }
