@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <condition_variable>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -15,6 +14,7 @@
 #include "app/script/commands.h"
 #include "app/session/calibrated_camera.h"
 #include "app/session/pace.h"
+#include "app/session/play_clock.h"
 #include "app/session/session.h"
 
 namespace docent::app {
@@ -39,38 +39,6 @@ class CommandInbox {
  private:
   std::mutex mutex_;
   std::vector<Entry> entries_;
-};
-
-// The clock for realtime playback and for the age of images: CLOCK_MONOTONIC, which devices use for their
-// timestamps too. Tests substitute their own. Any thread.
-class PlayClock {
- public:
-  virtual ~PlayClock() = default;
-  virtual Timestamp Now();
-  // Returns at `time`, or when stop is requested.
-  virtual void WaitUntil(Timestamp time, const std::stop_token& stop);
-  // Whether the time stands still.
-  virtual bool IsStopped() const { return false; }
-};
-
-// A clock that a person can stop: then no time passes. Any thread.
-class PausableClock : public PlayClock {
- public:
-  explicit PausableClock(bool is_stopped = false);
-  Timestamp Now() override;
-  // Also returns when the clock is stopped or is stopped meanwhile.
-  void WaitUntil(Timestamp time, const std::stop_token& stop) override;
-  bool IsStopped() const override;
-  void Stop();
-  void Resume();
-
- private:
-  Timestamp NowLocked() const;
-
-  mutable std::mutex mutex_;
-  std::condition_variable_any changed_;
-  Timestamp lost_{};                     // How long it was stopped, without the present stop.
-  std::optional<Timestamp> stopped_at_;  // Of the machine's clock.
 };
 
 // How one camera is fed to a session.

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/camera_feed.h"
+
+namespace docent::app {
+
+void GapReporter::Report(const engine::Frame& frame, const FrameCallback& shown) {
+  const auto last = std::exchange(last_, std::pair(frame.index, frame.time));
+  if (!last || frame.index <= last->first + 1) return;
+  const std::uint64_t steps = frame.index - last->first;
+  for (std::uint64_t i = 1; i < steps; ++i) {
+    engine::TrackedFrame dropped;
+    dropped.frame.camera = frame.camera;
+    dropped.frame.index = last->first + i;
+    dropped.frame.time = last->second + (frame.time - last->second) * static_cast<std::int64_t>(i) /
+                                            static_cast<std::int64_t>(steps);
+    dropped.state = engine::TrackingState::kDropped;
+    shown(dropped);
+  }
+}
+
+bool CameraFeed::Fetch(const std::stop_token& stop) {
+  FrameSource& source = *run_.camera->source;
+  while (!stop.stop_requested()) {
+    late_ = WillBeLate();
+    frame_ = engine::Frame();
+    if (!(late_ ? source.NextLate(&frame_) : source.Next(&frame_))) return false;
+    frame_.camera = run_.options.camera;
+    frame_.time -= clock_offset_;
+    if (late_) {
+      // In a recording with gaps, the image after a gap may not be late.
+      late_ = frame_.image.empty() || clock_->IsLate(frame_.time, period_);
+      return true;
+    }
+    if (std::string now = source.trouble(); now != trouble_) {
+      trouble_ = std::move(now);
+      if (run_.options.trouble) run_.options.trouble(trouble_, frame_.time);
+    }
+    if (frame_.image.empty()) continue;
+    if (live_) gaps_.Report(frame_, run_.shown);
+    if (!first_time_) {
+      first_time_ = frame_.time;
+      run_.camera->CheckImage(frame_.image);
+    }
+    return true;
+  }
+  return false;
+}
+
+void CameraFeed::SetClockOffset(Timestamp offset) {
+  clock_offset_ = offset;
+  frame_.time -= offset;
+  *first_time_ -= offset;
+}
+
+void CameraFeed::Handle(const std::stop_token& stop) {
+  const Pace pace = run_.options.pace;
+  engine::TrackedFrame tracked;
+  // Only recordings are paced: a device drops images that are not fetched in time.
+  if (late_) {
+    tracked.frame = frame_;
+    tracked.state = engine::TrackingState::kDropped;
+    run_.shown(tracked);
+    return;
+  }
+  if (pace == Pace::kRealtime && !live_) clock_->WaitFor(frame_.time, stop);
+  if (pace == Pace::kEager) WaitForMapper(stop);
+  SetHeadRotation();
+  tracked = session_->Process(frame_);
+  ReportLatency();
+  command_runner_.RunDue(frame_.time - *first_time_, tracked);
+  run_.shown(tracked);
+  if (run_.options.idle) last_tracked_ = std::move(tracked);
+}
+
+void CameraFeed::Pause(const std::stop_token& stop) {
+  const auto begin = std::chrono::steady_clock::now();
+  while (run_.options.idle && clock_->IsStopped() && !stop.stop_requested()) {
+    CarryOut(std::chrono::steady_clock::now() - begin, false);
+    Rest(stop);
+  }
+}
+
+void CameraFeed::CarryOut(Timestamp passed, bool at_end) {
+  if (!run_.options.idle || !last_tracked_) return;
+  command_runner_.RunDue(last_tracked_->frame.time - *first_time_, *last_tracked_);
+  session_->Idle(last_tracked_->frame.time + passed);
+  run_.options.idle(*last_tracked_, at_end);
+}
+
+void CameraFeed::Rest(const std::stop_token& stop) {
+  constexpr auto kInterval = std::chrono::milliseconds(33);
+  PlayClock machine;
+  machine.WaitUntil(machine.Now() + kInterval, stop);
+}
+
+void CameraFeed::WaitForMapper(const std::stop_token& stop) {
+  auto due = std::chrono::steady_clock::now();
+  if (last_processed_) due = last_processed_->first + (frame_.time - last_processed_->second);
+  session_->WaitUntilIdle(due, stop);
+  last_processed_ = {std::chrono::steady_clock::now(), frame_.time};
+}
+
+void CameraFeed::SetHeadRotation() {
+  Head* const head = run_.camera->source->head();
+  if (head == nullptr) return;
+  const engine::Rotation3 now = CarrierFromCamera(head->At(frame_.time));
+  constexpr double kStill_rad = 1e-4;
+  if (last_head_rotation_) {
+    const engine::Rotation3 turn = now.inverse() * *last_head_rotation_;
+    if (turn.Angle() > kStill_rad) frame_.commanded_rotation = turn;
+  }
+  last_head_rotation_ = now;
+}
+
+bool CameraFeed::WillBeLate() {
+  return run_.options.pace == Pace::kRealtime && !live_ && first_time_ &&
+         clock_->IsLate(frame_.time + period_, period_);
+}
+
+void CameraFeed::ReportLatency() {
+  if (!run_.options.latency) return;
+  if (live_) {
+    run_.options.latency(clock_->Now() - (frame_.time + clock_offset_));
+  } else if (run_.options.pace == Pace::kRealtime) {
+    run_.options.latency(clock_->Now() - clock_->Due(frame_.time));
+  }
+}
+
+}  // namespace docent::app

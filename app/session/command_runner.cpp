@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/command_runner.h"
+
+#include <algorithm>
+
+#include "engine/base/error.h"
+
+namespace docent::app {
+
+void CommandRunner::RunDue(Timestamp now, const engine::TrackedFrame& frame) {
+  for (; next_ != options_.script.end() && next_->time <= now; ++next_) {
+    try {
+      Run(next_->command, now, frame);
+    } catch (const Error& error) {
+      const std::string sentence = error.what();
+      throw Error(Line(*next_) + sentence + (sentence.ends_with('.') ? "" : "."));
+    }
+  }
+  if (options_.inbox == nullptr) return;
+  for (const CommandInbox::Entry& entry : options_.inbox->TakeAll()) {
+    try {
+      const engine::TrackedFrame& seen = entry.frame ? *entry.frame : frame;
+      // Recorded with the time of the frame that the user saw, so that its pixel keeps its meaning on replay.
+      Run(entry.command, now - (frame.frame.time - seen.frame.time), seen);
+    } catch (const Error& error) {
+      if (options_.refused) options_.refused(error.what());
+    }
+  }
+}
+
+void CommandRunner::CheckAllDone() const {
+  if (next_ == options_.script.end()) return;
+  throw Error(Line(*next_) + "the images ended before the time of this command.");
+}
+
+std::string CommandRunner::Line(const TimedCommand& command) const {
+  return options_.script_name + ", line " + std::to_string(command.line) + ": ";
+}
+
+void CommandRunner::Run(const Command& command, Timestamp time, const engine::TrackedFrame& frame) {
+  if (!options_.take || !options_.take(command, frame))
+    session_->Execute(command, frame, options_.model_folder);
+  last_time_ = std::max(last_time_, time);
+  if (options_.carried_out) options_.carried_out({last_time_, 0, command});
+}
+
+}  // namespace docent::app
