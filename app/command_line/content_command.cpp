@@ -76,7 +76,7 @@ std::string StateOf(const Json& entry) {
   const auto add = [&](const char* word) { state += (state.empty() ? "" : ", ") + std::string(word); };
   if (entry["locked"] == true) add("locked");
   if (entry["hidden"] == true) add("hidden");
-  if (entry.contains("to_map") && entry["to_map"] != "" && entry["direction"].is_null()) add("no direction");
+  if (!entry.value("to_map", "").empty() && entry["direction"].is_null()) add("no direction");
   return state.empty() ? "" : "  (" + state + ")";
 }
 

@@ -48,7 +48,7 @@ std::optional<double> RootMeanSquare(const std::vector<FrameResult>& frames,
   return count > 0 ? std::optional(std::sqrt(sum / static_cast<double>(count))) : std::nullopt;
 }
 
-std::string Padded(std::string text, std::size_t width, bool left = false) {
+std::string Padded(const std::string& text, std::size_t width, bool left = false) {
   const std::string blanks(text.size() < width ? width - text.size() : 0, ' ');
   return left ? text + blanks : blanks + text;
 }

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <system_error>
 #include <utility>
 
 #include "app/files/checked_file.h"
@@ -123,12 +124,12 @@ VisitRecord VisitFrom(const Json& json) {
 // Throws Error.
 void AppendLine(const std::filesystem::path& path, const std::string& line) {
   const int file = open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0644);
-  if (file < 0) throw Error("cannot write " + path.string() + ": " + std::strerror(errno));
+  if (file < 0) throw Error("cannot write " + path.string() + ": " + std::generic_category().message(errno));
   const ssize_t written = write(file, line.data(), line.size());
   const int problem = written < 0 ? errno : ENOSPC;
   close(file);
   if (written != static_cast<ssize_t>(line.size()))
-    throw Error("cannot write " + path.string() + ": " + std::strerror(problem));
+    throw Error("cannot write " + path.string() + ": " + std::generic_category().message(problem));
 }
 
 }  // namespace
@@ -204,7 +205,8 @@ std::vector<VisitRecord> ReadVisits(const std::filesystem::path& folder, std::ve
 VisitLog::VisitLog(std::filesystem::path folder) : folder_(std::move(folder)) {
   MakeFolder(folder_);
   if (access(folder_.c_str(), W_OK | X_OK) != 0)
-    throw Error("The folder " + folder_.string() + " cannot be written: " + std::strerror(errno) + ".");
+    throw Error("The folder " + folder_.string() +
+                " cannot be written: " + std::generic_category().message(errno) + ".");
   worker_.emplace("visits", [this](const std::stop_token& stop) { Run(stop); });
 }
 

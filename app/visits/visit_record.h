@@ -61,7 +61,7 @@ class VisitRecorder {
     std::size_t stays = 1000, losses = 1000, steps = 10'000;
   };
 
-  VisitRecorder() = default;
+  VisitRecorder() : limits_() {}
   explicit VisitRecorder(const Limits& limits) : limits_(limits) {}
 
   // An image. `now`: the time of day. `seconds` from any beginning do not decrease. `map` is the name of the

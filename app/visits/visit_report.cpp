@@ -2,6 +2,7 @@
 #include "app/visits/visit_report.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <map>
 
@@ -26,7 +27,7 @@ std::string Decimal(double value, int digits) {
 
 // Minutes and seconds.
 std::string Duration(double seconds) {
-  const auto whole = static_cast<long long>(seconds + 0.5);
+  const auto whole = std::llround(seconds);
   char text[64];
   std::snprintf(text, sizeof text, "%lld:%02lld", whole / 60, whole % 60);
   return text;
