@@ -30,6 +30,7 @@ std::string TextOf(const RejectionMessage& rejection, const VisitorStrings& stri
     case engine::RejectionReason::kFewPoints:
       return strings.not_recognised;
     case engine::RejectionReason::kPoorFit:
+    case engine::RejectionReason::kContradicted:
       return Filled(strings, strings.resembles, {rejection.map});
     case engine::RejectionReason::kClustered:
       return Filled(strings, strings.only_a_corner, {rejection.map});

@@ -5,6 +5,7 @@
 #include <array>
 #include <bitset>
 #include <cmath>
+#include <span>
 
 #include "engine/base/option_check.h"
 #include "engine/geometry/image_grid.h"
@@ -16,11 +17,35 @@ namespace {
 
 constexpr int kSpreadCells = 4;  // rows and columns of the grid that measures the spread of inliers
 constexpr int kCoverageColumns = 4, kCoverageRows = 3;  // hybrid-slam §4.1
+constexpr int kContradictionColumns = 8, kContradictionRows = 6;
 // An infinite point is skipped if a finite point, or another infinite one, projects into the same cell
 // (hybrid-slam §3.1).
 constexpr int kProjectedCellPx = 16;
 constexpr std::size_t kMissesSlots = 16384;
 constexpr std::uint8_t kMaxMisses = 4;  // consecutive misses are counted up to this value
+
+// See MapTrackResult::contradicted_ratio.
+double ContradictedRatio(std::span<const MapTracker::Attempt> attempts) {
+  struct Count {
+    int searched = 0, inliers = 0;
+  };
+  std::array<Count, kContradictionColumns * kContradictionRows> cells{};
+  for (const MapTracker::Attempt& attempt : attempts) {
+    ++cells[attempt.cell].searched;
+    if (attempt.inlier) ++cells[attempt.cell].inliers;
+  }
+  // At an inlier ratio of 0.4, at most one inlier of ten has a probability of 0.05.
+  constexpr int kMinSearched = 8;
+  constexpr double kMaxRatio = 0.1;
+  constexpr int kMinJudged = 60;  // fewer points lie in too few cells
+  int judged = 0, contradicted = 0;
+  for (const Count& cell : cells) {
+    if (cell.searched < kMinSearched) continue;
+    judged += cell.searched;
+    if (cell.inliers <= kMaxRatio * cell.searched) contradicted += cell.searched;
+  }
+  return judged >= kMinJudged ? static_cast<double>(contradicted) / judged : 0;
+}
 
 }  // namespace
 
@@ -170,7 +195,9 @@ void MapTracker::Search(const std::vector<std::uint32_t>& which, const ImageFeat
     const float reach = candidate.point->infinite() ? std::max(radius, options_.infinite_radius_px) : radius;
     const auto found =
         searcher_.Find(*candidate.point, *candidate.source, candidate.predicted, features, reach, direct);
-    attempts_.push_back({candidate.point->id, found.has_value(), false});
+    const std::size_t cell =
+        GridCell(candidate.predicted.pixel, *camera_, kContradictionColumns, kContradictionRows);
+    attempts_.push_back({candidate.point->id, found.has_value(), false, static_cast<std::uint8_t>(cell)});
     if (!found) continue;
     measured_.push_back(index);
     measurements_.push_back({candidate.point_in_map, found->pixel.cast<double>(),
@@ -289,6 +316,7 @@ void MapTracker::CountInliers(MapTrackResult* result) {
     ++finite[cell];
     depths_.push_back((result->camera_from_map * measurement.point_in_map).z());
   }
+  result->contradicted_ratio = ContradictedRatio(attempts_);
   std::sort(last_inliers_.begin(), last_inliers_.end());
   result->occupied_cells = static_cast<int>(cells.count());
   const auto share = [&](const auto& counts) {

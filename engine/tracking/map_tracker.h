@@ -60,6 +60,10 @@ struct MapTrackResult {
   double sigma = 0;  // robust, of the normalised residuals
   // Cells of a 4x4 image grid with an inlier; measures how well the inliers are spread.
   int occupied_cells = 0;
+  // Of the points that were searched: the ratio of those in parts of the image where hardly any was an
+  // inlier. Occlusion causes this too; where it is large, the place may be another one with some of the same
+  // objects.
+  double contradicted_ratio = 0;
   bool converged = false;
   double median_depth = 0;  // map units, of the finite inliers
   // Inlier ratio: inliers / attempted (ptamm §2.1).
@@ -93,6 +97,7 @@ class MapTracker {
   struct Attempt {
     MapPointId point;
     bool found, inlier;
+    std::uint8_t cell = 0;  // of the image, where the point was predicted
   };
   const std::vector<Attempt>& attempts() const { return attempts_; }
   // A record of the last call of Track, evaluated at this pose. The snapshot given to Track must still exist.

@@ -13,11 +13,12 @@ namespace docent::engine {
 // Why no pose was accepted, ordered by how close it came.
 enum class RejectionReason : std::uint8_t {
   kNone,
-  kFewPoints,   // too few map points of any candidate were found
-  kPoorFit,     // points were found, but no pose fits them
-  kClustered,   // the inliers are clustered in one part of the image
-  kAmbiguous,   // another map, or another place in the same map, explains the image about as well
-  kUnconfirmed  // the hypothesis holds in this frame, but not yet in enough consecutive frames
+  kFewPoints,     // too few map points of any candidate were found
+  kPoorFit,       // points were found, but no pose fits them
+  kClustered,     // the inliers are clustered in one part of the image
+  kContradicted,  // most of the image shows something else than the map: some objects are in both places
+  kAmbiguous,     // another map, or another place in the same map, explains the image about as well
+  kUnconfirmed    // the hypothesis holds in this frame, but not yet in enough consecutive frames
 };
 
 // The hypothesis of one frame that came closest to acceptance.

@@ -87,6 +87,26 @@ TEST_F(TrackingInAMap, FindsThePoseFromAPerturbedPrediction) {
   }
 }
 
+// Another room appears in the right part of the image.
+TEST_F(TrackingInAMap, ReportsTheRatioOfPointsInPartsThatShowSomethingElse) {
+  const RenderedWorld other = RenderedWorld::Room(22);
+  const Rigid3 view = ViewsOfTheRoom()[0];
+  double last = -1;
+  for (const double shown : {1.0, 0.75, 0.5}) {
+    cv::Mat image = world_->Render(*camera_, view, 1.5, 3);
+    const cv::Rect rest(static_cast<int>(shown * image.cols), 0,
+                        image.cols - static_cast<int>(shown * image.cols), image.rows);
+    if (rest.width > 0) other.Render(*camera_, view, 1.5, 3)(rest).copyTo(image(rest));
+    MapTracker tracker({}, camera_);
+    Random random(4);
+    const MapTrackResult result =
+        tracker.Track(*map_, *MakeFeatures(image), view, Effort::kStandard, &random);
+    EXPECT_NEAR(result.contradicted_ratio, 1 - shown, 0.12);
+    EXPECT_GT(result.contradicted_ratio, last);
+    last = result.contradicted_ratio;
+  }
+}
+
 TEST_F(TrackingInAMap, ReportsAttemptsMatchesAndCovariance) {
   MapTracker tracker({}, camera_);
   Random random(2);

@@ -105,6 +105,10 @@ TEST(PoseCriteria, SayWhyAPoseAfterALossIsRejected) {
   pose.occupied_cells = 4;
   EXPECT_EQ(criteria.RejectionReasonOf(pose, map, kStandard), RejectionReason::kClustered);
   pose = SoundPose();
+  pose.contradicted_ratio = 0.6;
+  EXPECT_EQ(criteria.RejectionReasonOf(pose, map, kStandard), RejectionReason::kContradicted);
+  EXPECT_TRUE(criteria.IsAccepted(pose, kStandard)) << "a track goes on when the camera is partly hidden";
+  pose = SoundPose();
   pose.attempted = 1000;  // a ratio of 0.2
   EXPECT_EQ(criteria.RejectionReasonOf(pose, map, kStandard), RejectionReason::kFewPoints);
   EXPECT_EQ(criteria.RejectionReasonOf(pose, map, kTolerant), RejectionReason::kNone);
