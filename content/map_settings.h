@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,9 +19,12 @@ inline constexpr double kMinMetresPerUnit = 1e-6, kMaxMetresPerUnit = 1e6;
 struct MapSettings {
   std::optional<Eigen::Vector3d> up;  // Unit vector in the map; empty: estimated from the keyframes.
   double metres_per_unit = 0;         // Length of a map unit in metres; 0 while it is not known.
+  // The keyframe whose image stands for the map where visitors choose a place; empty: the map's first one,
+  // which also counts if this one is no longer in the map.
+  std::optional<std::uint32_t> entrance;
 
   bool operator==(const MapSettings& other) const {
-    return up == other.up && metres_per_unit == other.metres_per_unit;
+    return up == other.up && metres_per_unit == other.metres_per_unit && entrance == other.entrance;
   }
 };
 
@@ -30,7 +34,8 @@ std::string Validate(const MapSettings& settings);
 // The settings after the coordinates of the map were transformed.
 MapSettings Transformed(const engine::Sim3& after_from_before, const MapSettings& settings);
 
-// {"up": [X, Y, Z] or null, "metres_per_unit": M}. The settings must be valid.
+// {"up": [X, Y, Z] or null, "metres_per_unit": M}, and "entrance": KEYFRAME if there is one. The settings
+// must be valid.
 Json SettingsToJson(const MapSettings& settings);
 // Throws Error, which begins with `where` and `place`, for whatever SettingsToJson does not write.
 MapSettings SettingsFromJson(std::string_view where, const std::string& place, const Json& json);

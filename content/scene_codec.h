@@ -31,8 +31,8 @@
 // where … stands for name, locked, hidden and group.
 //
 // Numbers are written so that they read back to the same bits (rotations are normalized again). Version 1,
-// without locked, hidden, group and to_key, version 2, without translations and the last four kinds, and
-// version 3, without directions, are read as well.
+// without locked, hidden, group and to_key, version 2, without translations and the last four kinds, version
+// 3, without directions, and version 4, without entrances, are read as well.
 namespace docent::content {
 
 // DecodeScene reads what this returns. Throws Error for a scene that cannot be stored (Validate in scene.h).

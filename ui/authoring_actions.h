@@ -82,6 +82,8 @@ class AuthoringActions {
   // Of the current map: its keyframes say which way is up; its scale is not known.
   virtual void ForgetUp() = 0;
   virtual void ForgetScale() = 0;
+  // Visitors find the current map by an image of the present view, or by its first one.
+  virtual void SetEntrance(bool here) = 0;
 
   virtual void ToggleFullScreen() = 0;
 };

@@ -31,6 +31,7 @@ void SpaceSection::Draw(const AuthoringFacts& facts, AuthoringChoices* choices) 
   }
   if (is_level && ImGui::Button(strings::kForgetFloor)) actions_->ForgetUp();
   DrawScale(facts, choices);
+  DrawEntrance(facts);
 }
 
 void SpaceSection::DrawScale(const AuthoringFacts& facts, AuthoringChoices* choices) {
@@ -52,6 +53,13 @@ void SpaceSection::DrawScale(const AuthoringFacts& facts, AuthoringChoices* choi
     choices->frozen = true;
   }
   if (metres > 0 && ImGui::Button(strings::kForgetScale)) actions_->ForgetScale();
+}
+
+void SpaceSection::DrawEntrance(const AuthoringFacts& facts) {
+  const bool is_chosen = facts.scene->settings.entrance.has_value();
+  SpaceRemark(is_chosen ? strings::kEntranceChosen : strings::kEntranceFirst);
+  if (ImGui::Button(strings::kChooseEntrance)) actions_->SetEntrance(true);
+  if (is_chosen && ImGui::Button(strings::kForgetEntrance)) actions_->SetEntrance(false);
 }
 
 }  // namespace docent::ui

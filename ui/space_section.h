@@ -6,7 +6,7 @@
 namespace docent::ui {
 
 // What an author says about the space of the current map: where the floor is, and how long something in it
-// is. Between Gui::Begin and Gui::Draw.
+// is, and by which view visitors find it. Between Gui::Begin and Gui::Draw.
 class SpaceSection {
  public:
   // `actions` must outlive the section.
@@ -16,6 +16,7 @@ class SpaceSection {
 
  private:
   void DrawScale(const AuthoringFacts& facts, AuthoringChoices* choices);
+  void DrawEntrance(const AuthoringFacts& facts);
 
   AuthoringActions* const actions_;
 };

@@ -30,7 +30,7 @@ inline constexpr const char* kBegin = "Press New map to begin.";
 inline constexpr const char* kStarting = "Move the camera sideways, slowly.";
 
 // Section of the current map's space.
-inline constexpr const char* kSpace = "Floor and scale";
+inline constexpr const char* kSpace = "Floor, scale and entrance";
 inline constexpr const char* kNoMapForSpace = "There is no current map.";
 inline constexpr const char* kFloorEstimated = "Which way is up is estimated from how the camera was held.";
 inline constexpr const char* kFloorKnown = "The floor is known. Objects stand upright on it.";
@@ -45,6 +45,11 @@ inline constexpr const char* kMeasure = "Measure it…";
 inline constexpr const char* kClickFirstPoint = "Click on its first end in the image. Escape cancels.";
 inline constexpr const char* kClickSecondPoint = "Click on its other end.";
 inline constexpr const char* kForgetScale = "Forget the scale";
+inline constexpr const char* kEntranceFirst = "Visitors who look for this place are shown its first view.";
+inline constexpr const char* kEntranceChosen =
+    "Visitors who look for this place are shown the view you chose.";
+inline constexpr const char* kChooseEntrance = "Show them this view";
+inline constexpr const char* kForgetEntrance = "Show them the first view";
 
 // Section of all maps.
 inline constexpr const char* kMaps = "All maps";

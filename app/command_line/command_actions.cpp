@@ -101,4 +101,8 @@ void CommandActions::ForgetScale() {
   emit_(SetMapScale{});
 }
 
+void CommandActions::SetEntrance(bool here) {
+  emit_(SetMapEntrance{here});
+}
+
 }  // namespace docent::app

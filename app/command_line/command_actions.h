@@ -42,6 +42,7 @@ class CommandActions : public ui::AuthoringActions {
   void Transform(const std::vector<ui::NewPose>& poses) override;
   void ForgetUp() override;
   void ForgetScale() override;
+  void SetEntrance(bool here) override;
 
  private:
   const std::function<void(Command)> emit_;

@@ -30,6 +30,10 @@ struct DoneWriter {
   std::string operator()(const SetMapScale& c) const {
     return c.length_m > 0 ? "The map is measured in metres now." : "The scale of the map is not known now.";
   }
+  std::string operator()(const SetMapEntrance& c) const {
+    return c.here ? "Visitors find the map by this view now."
+                  : "Visitors find the map by its first view now.";
+  }
   std::string operator()(const PlaceModel& c) const {
     return "Placed " + std::filesystem::path(c.file).filename().string() + ".";
   }

@@ -141,6 +141,7 @@ struct Validator {
   std::string operator()(const RemoveMap& c) const { return c.name.empty() ? kNoMapName : ""; }
   std::string operator()(const JoinMap& c) const { return c.name.empty() ? kNoMapName : ""; }
   std::string operator()(const SetMapUp& c) const { return c.pixel ? PixelProblem(*c.pixel) : ""; }
+  std::string operator()(const SetMapEntrance&) const { return ""; }
   std::string operator()(const SetMapScale& c) const {
     if (c.length_m == 0) return "";
     const bool in_range = c.length_m >= kMinLength_m && c.length_m <= kMaxLength_m;

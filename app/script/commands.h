@@ -60,6 +60,12 @@ struct SetMapScale {
   double length_m = 0;
   bool operator==(const SetMapScale&) const = default;
 };
+// Lets the image of the keyframe whose view is most like the camera's stand for the current map where
+// visitors choose a place, or again that of its first keyframe.
+struct SetMapEntrance {
+  bool here = true;
+  bool operator==(const SetMapEntrance&) const = default;
+};
 // The pixel denotes the point of the map's surface that is visible there in the command's frame.
 struct PlaceModel {
   std::string file;  // as given; relative to the script's folder or the working folder
@@ -258,11 +264,11 @@ struct Save {
 
 using Command =
     std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, JoinMap, SetMapUp, SetMapScale,
-                 PlaceModel, PlaceSignpost, PlaceLabel, PlaceImage, PlaceSound, PlaceTrail, ExtendTrail,
-                 ShortenTrail, SetLabelOffset, MoveEntity, RotateEntity, ScaleEntity, TransformEntities,
-                 AlignEntity, BendEntity, UnbendEntity, RemoveEntities, DuplicateEntities, RenameEntity,
-                 SetEntityText, SetSignpostTarget, SetSignpostDirection, SetEntityFlag, GroupEntities,
-                 PasteEntities, GuideVisitor, Undo, Redo, Save>;
+                 SetMapEntrance, PlaceModel, PlaceSignpost, PlaceLabel, PlaceImage, PlaceSound, PlaceTrail,
+                 ExtendTrail, ShortenTrail, SetLabelOffset, MoveEntity, RotateEntity, ScaleEntity,
+                 TransformEntities, AlignEntity, BendEntity, UnbendEntity, RemoveEntities, DuplicateEntities,
+                 RenameEntity, SetEntityText, SetSignpostTarget, SetSignpostDirection, SetEntityFlag,
+                 GroupEntities, PasteEntities, GuideVisitor, Undo, Redo, Save>;
 
 // The same rotation, with a quaternion that normalizing does not change any more. A command that was written
 // to a script and read again thereby has exactly the rotation of the original.

@@ -78,6 +78,9 @@ struct CommandFormatter {
     if (c.length_m == 0) return "map scale unknown";
     return "map scale " + Pixel(c.from) + " to " + Pixel(c.to) + " is " + FormatExactly(c.length_m);
   }
+  std::string operator()(const SetMapEntrance& c) const {
+    return c.here ? "map entrance" : "map entrance automatic";
+  }
   std::string operator()(const PlaceModel& c) const {
     return "place " + Quoted(c.file) + " at " + Pixel(c.pixel) +
            (c.scale ? " scale " + FormatExactly(*c.scale) : "") +

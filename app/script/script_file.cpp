@@ -50,9 +50,10 @@ Command ParseMap(LineReader* line) {
     return command;
   }
   if (line->TakeIf("scale")) return ParseMapScale(line);
-  const std::string word = line->Take("new, stop, use, policy, rename, remove, join, up or scale");
-  line->Fail("unknown command 'map " + word +
-             "'; use new, stop, use, policy, rename, remove, join, up or scale after map");
+  if (line->TakeIf("entrance")) return SetMapEntrance{!line->TakeIf("automatic")};
+  const std::string known = "new, stop, use, policy, rename, remove, join, up, scale or entrance";
+  const std::string word = line->Take(known.c_str());
+  line->Fail("unknown command 'map " + word + "'; use " + known + " after map");
 }
 
 Eigen::Vector3d TakePoint(LineReader* line) {

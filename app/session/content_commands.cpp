@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "app/files/text_file.h"
+#include "app/session/entrance_view.h"
 #include "app/session/map_axes.h"
 #include "app/session/new_entities.h"
 #include "app/session/surface_at_pixel.h"
@@ -293,6 +294,18 @@ void ContentCommands::Apply(const SetMapScale& command, const engine::TrackedFra
     settings.metres_per_unit = command.length_m / distance;
   }
   Edit(&map, content::SettingsEdit(*map.scene, settings, "set the scale"));
+}
+
+void ContentCommands::Apply(const SetMapEntrance& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  content::MapSettings settings = map.scene->settings;
+  settings.entrance.reset();
+  if (command.here) {
+    if (!engine::HasPose(frame.state)) throw Error("the camera is not tracked in a map");
+    settings.entrance = MostSimilarKeyFrame(*frame.map, frame.camera_from_map);
+    if (!settings.entrance) throw Error("the map has no keyframe yet");
+  }
+  Edit(&map, content::SettingsEdit(*map.scene, settings, "choose the entrance view"));
 }
 
 void ContentCommands::Apply(const Undo&, const engine::TrackedFrame& frame) {

@@ -43,6 +43,7 @@ class ContentCommands {
   void Apply(const BendEntity& command, const engine::TrackedFrame& frame);
   void Apply(const SetMapUp& command, const engine::TrackedFrame& frame);
   void Apply(const SetMapScale& command, const engine::TrackedFrame& frame);
+  void Apply(const SetMapEntrance& command, const engine::TrackedFrame& frame);
   void Apply(const Undo& command, const engine::TrackedFrame& frame);
   void Apply(const Redo& command, const engine::TrackedFrame& frame);
   // The commands that need nothing but the scene.

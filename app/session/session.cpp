@@ -11,6 +11,7 @@
 #include "app/files/image_files.h"
 #include "app/output/engine_text.h"
 #include "app/script/format_command.h"
+#include "app/session/entrance_view.h"
 #include "engine/base/error.h"
 #include "engine/vision/small_blurry_image.h"
 
@@ -153,7 +154,8 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   return shown;
 }
 
-std::vector<Session::SimilarView> Session::SimilarViews(const engine::Frame& frame, std::size_t count) {
+std::vector<Session::SimilarView> Session::SimilarViews(const engine::Frame& frame, std::size_t count,
+                                                        bool entrances) {
   cv::Mat gray = frame.image;
   if (gray.channels() == 3) cv::cvtColor(frame.image, gray, cv::COLOR_BGR2GRAY);
   if (gray.empty()) return {};
@@ -164,12 +166,12 @@ std::vector<Session::SimilarView> Session::SimilarViews(const engine::Frame& fra
   for (const auto& place : system_.place_index().FindPlaces(thumbnail, asked, 1, 0)) {
     if (views.size() >= count) break;
     if (!place.map) continue;
-    const auto& keyframes = place.map->keyframes;
-    const auto keyframe = std::find_if(keyframes.begin(), keyframes.end(),
-                                       [&](const auto& candidate) { return candidate.id == place.keyframe; });
-    if (keyframe == keyframes.end()) continue;
-    keyframe->features->MarkInUse();
     const std::scoped_lock lock(mutex_);
+    const engine::KeyFrame* keyframe = place.map->FindKeyFrame(place.keyframe);
+    const SessionMap* const map = state_.FindMap(place.map_key);
+    if (entrances && map != nullptr && map->scene) keyframe = EntranceOf(*place.map, map->scene->settings);
+    if (keyframe == nullptr) continue;
+    keyframe->features->MarkInUse();
     views.push_back({state_.NameOf(place.map_key), keyframe->features->levels[1].clone()});
   }
   return views;

@@ -95,8 +95,10 @@ class Session {
     cv::Mat image;  // CV_8UC1, half the size of the keyframe's image
   };
   // At most `count` of those in memory, the most similar first, at most one of each place if there are
-  // several. Takes some milliseconds.
-  std::vector<SimilarView> SimilarViews(const engine::Frame& frame, std::size_t count);
+  // several. With `entrances` those that stand for their maps instead, in the same order. Takes some
+  // milliseconds.
+  std::vector<SimilarView> SimilarViews(const engine::Frame& frame, std::size_t count,
+                                        bool entrances = false);
   // The session's state of a map.
   struct MapState {
     std::uint64_t key = 0;

@@ -36,6 +36,12 @@ bool VisitState::WantsViews(double seconds) const {
   return !stops_.empty() && searched >= times_.way_back && searched < times_.stops;
 }
 
+bool VisitState::WantsEntrances(double seconds) const {
+  if (!begin_ || !place_.empty() || stops_.empty()) return false;
+  const double searched = Searched(seconds);
+  return searched >= times_.entrances && searched < times_.way_back;
+}
+
 ui::VisitorDisplay VisitState::Search(double seconds, const std::string& hint) const {
   ui::VisitorDisplay display;
   display.is_right_to_left = strings_.is_right_to_left;

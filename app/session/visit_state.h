@@ -14,9 +14,12 @@ namespace docent::app {
 struct VisitTimes {
   double arrival = 2.5;  // A place is announced for this long, enough to read two short words twice.
   double fade = 0.4;     // The announcement appears and disappears within this time.
-  double held = 0.5;     // After a loss the content stays where it was for this long: a hand that passes.
-  double way_back = 5;   // Searching longer than this, the visitor is led to known views,
-  double stops = 30;     // and longer than this, all places are listed.
+  // Who is not recognised within this time is shown the entrances of the likeliest places: most are
+  // recognised sooner.
+  double entrances = 1.5;
+  double held = 0.5;    // After a loss the content stays where it was for this long: a hand that passes.
+  double way_back = 5;  // Searching longer than this, the visitor is led to known views,
+  double stops = 30;    // and longer than this, all places are listed.
 };
 
 // What a visitor on a tour is told, by what was recognised so far: a welcome, where they are, or how to be
@@ -35,6 +38,8 @@ class VisitState {
   // Whether a visitor who searches at this time is helped by views of known places, as the display should
   // have them: after a while, and until all places are listed.
   bool WantsViews(double seconds) const;
+  // Whether a visitor who was not recognised yet is helped by the entrances of places at this time.
+  bool WantsEntrances(double seconds) const;
 
   // Whether the content of the last frame with a pose is still to be drawn.
   bool HoldsContent(double seconds) const { return last_pose_ && seconds - *last_pose_ <= times_.held; }

@@ -73,12 +73,13 @@ void VisitorGuide::FollowRoute(ShownFrame* frame) {
 void VisitorGuide::FindViews(const ShownFrame& frame) {
   constexpr double kInterval_s = 1;
   constexpr std::size_t kMostViews = 3;
-  if (!state_.WantsViews(frame.seconds)) {
+  const bool entrances = state_.WantsEntrances(frame.seconds);
+  if (!entrances && !state_.WantsViews(frame.seconds)) {
     views_.clear();
     views_time_s_.reset();
   } else if (!views_time_s_ || frame.seconds - *views_time_s_ >= kInterval_s) {
     views_.clear();
-    for (const auto& view : session_->SimilarViews(frame.tracked.frame, kMostViews))
+    for (const auto& view : session_->SimilarViews(frame.tracked.frame, kMostViews, entrances))
       views_.push_back(view.image);
     views_time_s_ = frame.seconds;
   }

@@ -28,6 +28,7 @@ MapSettings Example() {
   MapSettings settings;
   settings.up = Eigen::Vector3d(0, -0.6, 0.8);
   settings.metres_per_unit = 0.25;
+  settings.entrance = 4'000'000'000;
   return settings;
 }
 
@@ -60,7 +61,9 @@ TEST(MapSettings, AreRefusedWhereTheyMeanNothing) {
   for (const char* wrong :
        {"7", "{}", R"({"up":[0,-1],"metres_per_unit":1})", R"({"up":[0,-2,0],"metres_per_unit":1})",
         R"({"up":null,"metres_per_unit":1e9})", R"({"up":null,"metres_per_unit":"1"})",
-        R"({"up":null,"metres_per_unit":1,"more":1})"})
+        R"({"up":null,"metres_per_unit":1,"entrance":-1})",
+        R"({"up":null,"metres_per_unit":1,"entrance":4294967296})",
+        R"({"up":null,"metres_per_unit":1,"entrance":null})", R"({"up":null,"metres_per_unit":1,"more":1})"})
     EXPECT_THROW(read(wrong), Error) << wrong;
   EXPECT_THROW(
       DecodeScene(

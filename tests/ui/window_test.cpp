@@ -93,6 +93,7 @@ class AskedFor : public AuthoringActions {
   }
   void ForgetUp() override { words.push_back("forget up"); }
   void ForgetScale() override { words.push_back("forget scale"); }
+  void SetEntrance(bool here) override { words.push_back(here ? "entrance here" : "first entrance"); }
   void ToggleFullScreen() override { words.push_back("full screen"); }
 
   std::vector<std::string> words;

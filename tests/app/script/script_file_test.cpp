@@ -82,6 +82,8 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
                                      SetMapUp{},
                                      SetMapScale{{1, 2}, {3, 4}, 2.5},
                                      SetMapScale{},
+                                     SetMapEntrance{},
+                                     SetMapEntrance{false},
                                      TransformEntities{{{"helmet", pose}}},
                                      TransformEntities{{{"helmet", pose}, {"sign-1", pose}}},
                                      RemoveEntities{{"helmet", "from", "sign-1"}},

@@ -108,6 +108,7 @@ class AbsurdCommands {
       case 24:
         return Redo{};
       case 25:
+        if (random_.Below(4) == 0) return SetMapEntrance{random_.Below(2) == 0};
         return SetMapUp{Perhaps<Eigen::Vector2d>([&] { return Pixel(); })};
       case 33:
         return SetSignpostDirection{Name(), Perhaps<Eigen::Vector3d>([&] { return Vector(); }),

@@ -7,6 +7,7 @@
 
 #include "app/demo/exhibit_model.h"
 #include "app/script/format_command.h"
+#include "app/session/entrance_view.h"
 #include "content/placement.h"
 #include "content/scene_codec.h"
 #include "content/warp.h"
@@ -126,6 +127,31 @@ TEST_F(ContentInASession, APixelOfAnOldFrameIsThePlaceThatItsPointsHaveMovedTo) 
     frame_.map = std::move(before);
     ASSERT_EQ(Do(PlaceSignpost{"before", kPixel, ""}), "");
     EXPECT_LT((Named("sign-2").signpost.anchor - now).norm(), 0.002 * distance);
+  });
+}
+
+TEST_F(ContentInASession, TheEntranceOfAMapIsAViewThatTheAuthorChose) {
+  Run([&] {
+    EXPECT_EQ(EntranceOf(*frame_.map, Scene().settings)->id, frame_.map->keyframes.front().id);
+    const engine::KeyFrame& last = frame_.map->keyframes.back();
+    frame_.camera_from_map = last.camera_from_map;
+    ASSERT_EQ(Do(SetMapEntrance{}), "");
+    EXPECT_EQ(Scene().settings.entrance, last.id);
+    EXPECT_EQ(EntranceOf(*frame_.map, Scene().settings)->id, last.id);
+    EXPECT_NE(Do(SetMapEntrance{}), "") << "nothing would change";
+    ASSERT_EQ(Do(Undo{}), "");
+    EXPECT_EQ(Scene().settings.entrance, std::nullopt);
+    ASSERT_EQ(Do(Redo{}), "");
+    ASSERT_EQ(Do(SetMapEntrance{false}), "");
+    EXPECT_EQ(Scene().settings, content::MapSettings());
+    // A keyframe that is no longer in the map.
+    content::MapSettings settings;
+    settings.entrance = frame_.map->next_keyframe + 5;
+    EXPECT_EQ(EntranceOf(*frame_.map, settings)->id, frame_.map->keyframes.front().id);
+    EXPECT_EQ(EntranceOf(engine::MapSnapshot(), settings), nullptr);
+    EXPECT_EQ(MostSimilarKeyFrame(engine::MapSnapshot(), {}), std::nullopt);
+    frame_.state = engine::TrackingState::kLost;
+    EXPECT_NE(Do(SetMapEntrance{}), "") << "without a pose there is no view";
   });
 }
 

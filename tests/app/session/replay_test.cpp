@@ -75,6 +75,8 @@ std::vector<Planned> EveryCommand() {
   then(RemoveEntities{{"exhibit-2"}});
   then(SetMapScale{pixel, other, 0.5});
   then(SetMapUp{Eigen::Vector2d(600, 400)});  // The floor.
+  then(SetMapEntrance{});
+  then(SetMapEntrance{false});
   then(Undo{});
   then(Redo{});
   then(SetPolicy{"First hall", maps::Policy::kAugmentOnly});

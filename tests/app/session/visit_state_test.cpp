@@ -25,6 +25,21 @@ TEST(VisitState, WelcomesAVisitorUntilAPlaceIsRecognised) {
   EXPECT_EQ(display.sentence, "");
 }
 
+TEST(VisitState, ShowsTheEntrancesToWhoIsNotRecognisedSoon) {
+  const VisitTimes times;
+  VisitState visit({"Lions", "Masks"});
+  visit.Update(0, "", "");
+  EXPECT_FALSE(visit.WantsEntrances(0.9 * times.entrances));
+  EXPECT_TRUE(visit.WantsEntrances(1.1 * times.entrances));
+  EXPECT_FALSE(visit.WantsViews(1.1 * times.entrances));
+  EXPECT_FALSE(visit.WantsEntrances(1.1 * times.way_back)) << "then views that are like the image";
+  EXPECT_TRUE(visit.WantsViews(1.1 * times.way_back));
+  visit.Update(20, "Lions", "");
+  visit.Update(22, "", "");
+  EXPECT_FALSE(visit.WantsEntrances(22.1 + times.entrances)) << "who is lost knows the museum already";
+  EXPECT_FALSE(VisitState({}).WantsEntrances(2));
+}
+
 TEST(VisitState, AnnouncesAPlaceOnceOnArrival) {
   const VisitTimes times;
   VisitState visit({"Lions", "Masks"});
