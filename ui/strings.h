@@ -243,6 +243,8 @@ inline constexpr KeyHelp kKeyHelp[] = {
     {"Drag", "move over the ground"},
     {"Ctrl (drag)", "in steps"},
     {"Arrows", "move a little"},
+    {"Shift-arrows", "move the pointer; Ctrl-arrows slowly"},
+    {"Enter", "click"},
     {"1 to 7", "the tools, in their order"},
     {"4, 5, 6, 7", "label, image, sound, trail"},
     {"Delete", "remove"},

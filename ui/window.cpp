@@ -183,6 +183,14 @@ Eigen::Vector2d Window::PointerPosition() const {
   return position;
 }
 
+void Window::MovePointer(const Eigen::Vector2d& by) {
+  int width = 0, height = 0;
+  glfwGetWindowSize(impl_->window, &width, &height);
+  const Eigen::Vector2d last(std::max(width - 1, 0), std::max(height - 1, 0));
+  const Eigen::Vector2d position = (PointerPosition() + by).cwiseMax(0).cwiseMin(last);
+  glfwSetCursorPos(impl_->window, position.x(), position.y());
+}
+
 bool Window::IsControlDown() const {
   return glfwGetKey(impl_->window, GLFW_KEY_LEFT_CONTROL) == GLFW_PRESS ||
          glfwGetKey(impl_->window, GLFW_KEY_RIGHT_CONTROL) == GLFW_PRESS;

@@ -52,6 +52,8 @@ class Window : public GraphicsContext {
   Eigen::Vector2i WindowSize() const;
   // The pointer in the units of InputEvent::position; outside the window it may be negative.
   Eigen::Vector2d PointerPosition() const;
+  // Moves the pointer by window units, within the window; without effect while another window is used.
+  void MovePointer(const Eigen::Vector2d& by);
   bool IsControlDown() const;
   // The size that the monitor suggests for texts, relative to a monitor of 96 dpi, per window unit.
   double ContentScale() const;

@@ -2,6 +2,7 @@
 #include "app/command_line/author_controls.h"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "app/command_line/command_words.h"
@@ -153,6 +154,7 @@ void AuthorControls::HandleKey(const ui::InputEvent& event) {
   if (gui_.WritesText()) return;
   if (event.key == "escape") return Escape();
   if (gui_.HasPopup()) return;
+  if (!gui_.IsNavigated() && HandlePointerKey(event)) return;
   if (event.control) return HandleControlKey(event.key);
   if (event.key == "delete") return RemoveSelected();
   if (event.key == "f2" && selection_.names().size() <= 1) {
@@ -180,6 +182,23 @@ void AuthorControls::HandleKey(const ui::InputEvent& event) {
   if (event.key == "p") choices.show_points = !choices.show_points;
   if (event.key == "k") choices.show_keyframes = !choices.show_keyframes;
   if (event.key == "h") choices.show_status = !choices.show_status;
+}
+
+bool AuthorControls::HandlePointerKey(const ui::InputEvent& event) {
+  constexpr double kStep = 12, kSmallStep = 1;  // Window units at a scale of 1.
+  const std::map<std::string, Eigen::Vector2d> directions = {
+      {"left", {-1, 0}}, {"right", {1, 0}}, {"up", {0, -1}}, {"down", {0, 1}}};
+  const auto direction = directions.find(event.key);
+  if (direction != directions.end() && (event.shift || event.control)) {
+    window_->MovePointer((event.control ? kSmallStep : kStep) * view_.scale * direction->second);
+    return true;
+  }
+  if (event.key != "enter" || event.repeated) return false;
+  ui::InputEvent click = event;
+  click.position = window_->PointerPosition();
+  HandleClick(click);
+  pointer_.Release();
+  return true;
 }
 
 void AuthorControls::HandleControlKey(const std::string& key) {

@@ -78,6 +78,9 @@ class AuthorControls final : public CommandActions {
  private:
   void HandleKey(const ui::InputEvent& event);
   void HandleControlKey(const std::string& key);
+  // Moves the pointer over the image and clicks, for authors without a mouse. Whether the key is one for
+  // that.
+  bool HandlePointerKey(const ui::InputEvent& event);
   void Escape();
   void HandleClick(const ui::InputEvent& event);
   void HandleDrop(const ui::InputEvent& event);

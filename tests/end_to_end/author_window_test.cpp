@@ -5,8 +5,10 @@
 #include <chrono>
 #include <cstdlib>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "app/demo/exhibit_model.h"
 #include "app/files/text_file.h"
@@ -113,6 +115,30 @@ TEST_F(AuthorAtWindow, PlacesSelectsAndRemovesWithUndoAndSavesAtTheEnd) {
   const maps::Library stored = maps::Library::Open(library(), maps::Access::kReadOnly);
   ASSERT_EQ(stored.List().size(), 1u);
   EXPECT_EQ(stored.LoadScene(stored.List().front().key).assets.size(), 1u);
+}
+
+TEST_F(AuthorAtWindow, PlacesWithTheKeyboardAlone) {
+  Start("0.1 map new Room\n", "0");
+  Press("2");
+  for (int i = 0; i < 12; ++i) Press("Return");
+  for (int i = 0; i < 5; ++i) Press("shift+Left");
+  for (int i = 0; i < 4; ++i) Press("ctrl+Up");
+  Press("Return");
+  Press("ctrl+q");
+  PressLast("Return");
+  EXPECT_EQ(ExitStatus(), 0) << ReadAll(folder_ / "err");
+  const std::string recorded = ReadAll(folder_ / "recorded.txt");
+  std::vector<Eigen::Vector2d> pixels;
+  const std::string before = "exhibit.glb at pixel ";
+  for (std::size_t at = 0; (at = recorded.find(before, at)) != std::string::npos;) {
+    std::istringstream numbers(recorded.substr(at += before.size()));
+    numbers >> pixels.emplace_back().x() >> pixels.back().y();
+  }
+  ASSERT_GE(pixels.size(), 2u) << recorded;
+  // The image is drawn one and a half times as large: five steps of twelve units, four of one unit.
+  const Eigen::Vector2d moved = pixels.back() - pixels[pixels.size() - 2];
+  EXPECT_NEAR(moved.x(), -5 * 12 / 1.5, 0.7) << recorded;
+  EXPECT_NEAR(moved.y(), -4 / 1.5, 0.7) << recorded;
 }
 
 TEST_F(AuthorAtWindow, CanQuitWithoutSaving) {

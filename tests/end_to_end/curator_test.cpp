@@ -138,11 +138,14 @@ class CuratorAtWindow : public ::testing::Test {
     const std::vector<std::uint8_t> glb = MarksGlb(marks);
     const auto file = folder_.Write(name + ".glb", {glb.begin(), glb.end()});
     const cv::Mat before = window_->Capture();
+    const int actions = window_->actions();
     window_->Drop(file, CuratorWindow::PointOf(MiddlePlace().pixel));
     window_->WaitForEvent("place /");
     ASSERT_NO_FATAL_FAILURE(PairMarks(before, places));
     window_->ClickText("Fit", 5);
     window_->WaitForEvent("align ");
+    // As docs/authoring-tasks.md counts them: the file, and a button, each point and its place, and a button.
+    EXPECT_EQ(window_->actions() - actions, 1 + 1 + 2 * static_cast<int>(marks.size()) + 1);
     window_->ClickText("Done", 5);
     ASSERT_NO_FATAL_FAILURE(PairMarks(before, places));
     window_->ClickText(button, 5);
@@ -248,12 +251,14 @@ void CuratorAtWindow::FurnishMasks() {
 // A signpost leads to another map, and a sound is heard; everything is undone and done again.
 void CuratorAtWindow::FurnishLions() {
   ASSERT_NO_FATAL_FAILURE(BuildMap("Lions", "build2"));
+  const int actions = window_->actions();
   WriteText("3", "(nowhere)", 42, "To the elephants");
   window_->ClickText("(nowhere)");
   window_->ClickText("Elephants");
   window_->WaitForText("Click in the image to place the");
   Remember("sign-1", ClickPlace(good_places_[0]));
   window_->WaitForEvent("signpost ");
+  EXPECT_EQ(window_->actions() - actions, 6) << "as docs/authoring-tasks.md counts them";
   window_->Key("1");
   DropAt(folder_.Write("roar.wav", ToneWav()), good_places_[2], "sound /");
   SaveAndExpect("Lions", {"sign-1", "roar"});

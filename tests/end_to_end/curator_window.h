@@ -115,6 +115,7 @@ class CuratorWindow {
   }
 
   void Click(const cv::Point& point) {
+    ++actions_;
     Xdotool("mousemove " + std::to_string(point.x) + " " + std::to_string(point.y) +
             " sleep 0.25 mousedown 1 sleep 0.15 mouseup 1 sleep 0.15");
   }
@@ -122,18 +123,28 @@ class CuratorWindow {
     Xdotool("mousemove 480 1120 sleep 0.2");  // Below the image; what the pointer shows may cover the text.
     if (const auto place = WaitForText(text, margin_px)) Click(*place);
   }
-  void Key(const std::string& key) { Xdotool("keydown " + key + " sleep 0.25 keyup " + key + " sleep 0.1"); }
+  void Key(const std::string& key) {
+    ++actions_;
+    Xdotool("keydown " + key + " sleep 0.25 keyup " + key + " sleep 0.1");
+  }
   void ControlKey(const std::string& key) {
+    ++actions_;
     Xdotool("keydown ctrl sleep 0.05 keydown " + key + " sleep 0.15 keyup " + key + " keyup ctrl sleep 0.1");
   }
   // The field that was clicked needs a moment to take the text.
-  void Type(const std::string& text) { Xdotool("sleep 0.3 type --delay 40 '" + text + "'"); }
+  void Type(const std::string& text) {
+    ++actions_;
+    Xdotool("sleep 0.3 type --delay 40 '" + text + "'");
+  }
   // Drags a file to a point of the window.
   void Drop(const std::filesystem::path& file, const cv::Point& point) {
+    ++actions_;
     const std::string command = std::string(kDragFiles) + " " + std::to_string(point.x) + " " +
                                 std::to_string(point.y) + " " + file.string();
     EXPECT_EQ(std::system(command.c_str()), 0) << command;
   }
+  // How many clicks, drags, keys and texts there were so far.
+  int actions() const { return actions_; }
   // The part of the window that is beside the panel.
   cv::Mat Capture() const {
     const ui::Area image = ui::LayOutWindow(kWidth, kHeight, 1, true).image;
@@ -190,6 +201,7 @@ class CuratorWindow {
   ScreenReader reader_;
   std::filesystem::path output_;
   pid_t child_ = -1;
+  int actions_ = 0;
 };
 
 }  // namespace docent::app
