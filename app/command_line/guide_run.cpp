@@ -103,6 +103,8 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
     speech_.emplace(strings.language);
   }
   if (request.visit_log && !request.may_write) visits_.emplace(*request.visit_log, request.tour);
+  constexpr double kIdle_s = 120;  // As VisitRecorder ends a visit.
+  if (!request.kiosk_code.empty()) idle_watch_.emplace(kIdle_s);
   for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
   if (!request.head) return;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -205,11 +207,23 @@ void GuideRun::WarnAboutUnknownLenses() {
   }
 }
 
+void GuideRun::WelcomeVisitor(CameraState* state) {
+  state->visitor.emplace(&session_, PlaceNames(request_), VisitorStringsFor(request_.language),
+                         route_ ? &*route_ : nullptr);
+}
+
+// The next visitor of a kiosk begins anew.
+void GuideRun::ForgetVisitorWhoLeft(const ShownFrame& frame, CameraState* state) {
+  const cv::Mat& image = frame.tracked.frame.image;
+  if (!idle_watch_ || image.empty() || !idle_watch_->Update(frame.seconds, image)) return;
+  if (request_.route) route_.emplace(*request_.route);
+  WelcomeVisitor(state);
+  files_->Add({Event{frame.tracked.frame.time, "kiosk", "the device was left; the next visit begins"}});
+}
+
 CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   CameraState& state = camera_states_[i];
-  if (!request_.may_write)
-    state.visitor.emplace(&session_, PlaceNames(request_), VisitorStringsFor(request_.language),
-                          route_ ? &*route_ : nullptr);
+  if (!request_.may_write) WelcomeVisitor(&state);
   CameraRun run;
   run.camera = &cameras_[i];
   run.options.pace = request_.pace;
@@ -424,6 +438,7 @@ std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& trac
   if (state->message.empty() && !warnings_.contains(frame->shown.advice))
     frame->message = frame->shown.advice;
   const engine::CameraModel& camera = frame->camera ? *frame->camera : *cameras_[CameraOf(tracked)].model;
+  if (tracked.frame.camera == 0) ForgetVisitorWhoLeft(*frame, state);
   if (state->visitor) state->visitor->Guide(frame, camera);
   if (tracked.frame.camera == 0) Narrate(*frame, camera);
   if (tracked.frame.camera == 0 && visits_) {

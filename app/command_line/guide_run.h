@@ -16,6 +16,7 @@
 #include "app/command_line/run_guide.h"
 #include "app/command_line/visit_keeper.h"
 #include "app/evaluation/camera_report.h"
+#include "app/session/idle_watch.h"
 #include "app/session/narration.h"
 #include "app/session/visitor_guide.h"
 #include "app/sound/sound_director.h"
@@ -63,6 +64,9 @@ class GuideRun {
 
   void WarnAboutUnknownLenses();
   CameraRun RunOf(std::size_t i, const Show& show);
+  void WelcomeVisitor(CameraState* state);
+  // With files_mutex_ held.
+  void ForgetVisitorWhoLeft(const ShownFrame& frame, CameraState* state);
   void HandleRefused(const std::string& reason, CameraState* state);
   bool LeadVisitor(const Command& command, const engine::TrackedFrame& frame);
   // What happened on the tour, with files_mutex_ held.
@@ -95,7 +99,8 @@ class GuideRun {
   std::optional<SoundPlayer> sound_player_;  // Only if sounds are to be heard.
   std::optional<Narration> narration_;       // Of the first camera; only with `narrate`, as speech_.
   std::optional<Speech> speech_;
-  std::optional<VisitKeeper> visits_;  // Of the first camera; only with a folder for their records.
+  std::optional<IdleWatch> idle_watch_;  // Of the first camera; only of a kiosk.
+  std::optional<VisitKeeper> visits_;    // Of the first camera; only with a folder for their records.
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
   NoticeQueue notices_;

@@ -8,6 +8,7 @@
 
 #include "app/command_line/author_controls.h"
 #include "app/command_line/interruption.h"
+#include "app/command_line/kiosk.h"
 #include "app/command_line/map_panel.h"
 #include "app/command_line/window_times.h"
 #include "ui/inset.h"
@@ -58,12 +59,14 @@ class GuideWindow {
       : request_(request),
         link_(link),
         cameras_(cameras),
+        kiosk_(request.kiosk_code),
         window_(request.title, request.may_write ? kAuthorWidth : cameras.front().model->width_px(),
                 request.may_write ? kAuthorHeight : cameras.front().model->height_px()),
         renderer_(OptionsFor(request)),
         newest_(cameras.size()),
         shown_(cameras.size()) {
     if (request.record) recorder_.emplace(*request.record, cameras.front().source->info().nominal_fps);
+    if (kiosk_.is_locked()) window_.ToggleFullScreen();
     if (!request.may_write) return;
     AuthorControls::Host host;
     host.language = request.language;
@@ -274,6 +277,7 @@ class GuideWindow {
   }
 
   bool IsClosing() {
+    if (kiosk_.is_locked()) window_.KeepOpen();
     if (!controls_) return closing_ || window_.IsClosing();
     if (controls_->ending() == AuthorControls::Ending::kDiscard) link_.discard_changes();
     return controls_->ending() != AuthorControls::Ending::kNone;
@@ -317,8 +321,14 @@ class GuideWindow {
     }
   }
 
-  // Of a tour.
+  // Of a tour. Visitors at a kiosk get what leads them only.
   void HandleKey(const ui::InputEvent& event) {
+    if (kiosk_.is_locked()) {
+      closing_ = kiosk_.Add(event.key, KioskLock::Clock::now()) || closing_;
+      if (request_.route && !event.control) HandleRouteKey(event.key);
+      redraw_ = true;
+      return;
+    }
     if (event.control && event.key == "q") closing_ = true;
     if (event.control) return;
     if (event.key == "tab" || event.key == "c") Swap();
@@ -345,6 +355,7 @@ class GuideWindow {
   const GuideRequest& request_;
   const WindowLink& link_;
   const std::span<const CalibratedCamera> cameras_;
+  KioskLock kiosk_;
   ui::Window window_;
   ui::Renderer renderer_;
   MapPanel map_panel_;

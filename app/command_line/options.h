@@ -69,9 +69,10 @@ struct AuthorOptions {
 struct TourOptions {
   RunArguments run;
   std::filesystem::path library;
-  std::optional<std::string> tour;           // The visitor is led along this one of the library.
-  bool narrate = false;                      // What visitors are told is spoken.
-  std::optional<std::filesystem::path> log;  // Folder for the records of visits.
+  std::optional<std::string> tour;             // The visitor is led along this one of the library.
+  bool narrate = false;                        // What visitors are told is spoken.
+  std::optional<std::filesystem::path> log;    // Folder for the records of visits.
+  std::optional<std::filesystem::path> kiosk;  // File with the code by which the kiosk is ended.
   std::optional<std::filesystem::path> script;
 };
 

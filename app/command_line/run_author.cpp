@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "app/cameras/decode_image.h"
+#include "app/command_line/kiosk.h"
 #include "app/command_line/run_arguments.h"
 #include "app/command_line/run_guide.h"
 #include "app/command_line/runs.h"
@@ -106,6 +107,11 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
 
 void RunTour(const TourOptions& options, Verbosity verbosity) {
   GuideRequest request;
+  if (options.kiosk) {
+    request.kiosk_code = ReadKioskCode(*options.kiosk);
+    if (options.run.headless) throw Error("A kiosk needs its window; remove --headless.");
+    if (!RestartAfterFailures()) return;
+  }
   if (options.script) ReadScriptFor(*options.script, &request);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);

@@ -53,6 +53,7 @@ struct GuideRequest {
   std::function<std::vector<Command>(const ShownFrame&)> director;
   std::optional<std::filesystem::path>
       visit_log;               // Folder for the records of visits; only without may_write.
+  std::string kiosk_code;      // Ends the window of a kiosk; empty for other tours. See KioskLock.
   std::string tour;            // The name of the tour below; empty for none.
   std::optional<Route> route;  // Of the tour that visitors are led along; only without may_write.
   double baseline_m = 0;       // See SessionOptions.

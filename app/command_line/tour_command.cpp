@@ -29,6 +29,13 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
           "Folder to which a record of each visit is added, without images: where the visitor was, how long, "
           "and where the camera was lost (see docent report)")
       ->type_name("DIR");
+  command
+      ->add_option(
+          "--kiosk", options->kiosk,
+          "Full screen for a device that visitors take: it ends only by the code in this file (4 to 12 "
+          "digits, typed), starts again after a failure, and forgets a visit when it is left for two "
+          "minutes")
+      ->type_name("FILE");
   command->add_option("--script", options->script, "Commands to carry out at given times, such as tour skip")
       ->type_name("FILE");
   AddRunArguments(command,

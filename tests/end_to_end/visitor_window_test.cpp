@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <chrono>
 #include <cstdlib>
+#include <functional>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -41,6 +44,11 @@ class VisitorAtWindow : public ::testing::Test {
     Xdotool("search --name Docent windowfocus sleep 0.2 key --delay 300 " + keys + " sleep 0.3");
   }
 
+  // At most half a minute.
+  static void Wait(const std::function<bool()>& is_so) {
+    for (int i = 0; i < 300 && !is_so(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+
   const TemporaryFolder folder_;
   VirtualScreen screen_{"1280x800"};
   pid_t child_ = -1;
@@ -71,6 +79,41 @@ TEST_F(VisitorAtWindow, SkipsStopsAndIsLedBackByKeys) {
                           "tour,\"going back to 'Lions', stop 1 of 2\"", "command,tour skip",
                           "tour,\"going on to 'Masks', stop 2 of 2\"", "command,tour skip",
                           "tour,\"skipped 'Masks', stop 2 of 2\"", "tour,finished; 0 of 2 stops seen"));
+}
+
+// The process that shows the window of a kiosk; -1 if there is none.
+pid_t WorkerOf(pid_t kiosk) {
+  std::istringstream children(
+      ReadAll("/proc/" + std::to_string(kiosk) + "/task/" + std::to_string(kiosk) + "/children"));
+  pid_t child = -1;
+  children >> child;
+  return child;
+}
+
+TEST_F(VisitorAtWindow, AKioskEndsByItsCodeOnlyAndStartsAgainAfterACrash) {
+  folder_.Write("code", "4711\n");
+  child_ = StartDocent({"tour", "--library", (folder_ / "l.docent").string(), "--camera", "sim:room",
+                        "--tour", "All", "--kiosk", (folder_ / "code").string(), "--pace", "realtime"},
+                       (folder_ / "output").string(), (folder_ / "errors").string());
+  Xdotool("search --sync --onlyvisible --name Docent windowfocus");
+  PressKeys("ctrl+q Escape q F11 0 4 7 1 2");
+  const pid_t worker = WorkerOf(child_);
+  ASSERT_GT(worker, 0) << ReadAll(folder_ / "errors");
+  EXPECT_EQ(kill(worker, 0), 0) << "it still runs";
+  kill(worker, SIGKILL);
+  Wait([&] { return WorkerOf(child_) > 0 && WorkerOf(child_) != worker; });
+  ASSERT_GT(WorkerOf(child_), 0) << ReadAll(folder_ / "errors");
+  EXPECT_THAT(ReadAll(folder_ / "errors"), ::testing::HasSubstr("it begins again in 1 s"));
+  Xdotool("search --sync --onlyvisible --name Docent windowfocus");
+  PressKeys("4 7 1");
+  // The key's release reaches no window any more.
+  const int ignored =
+      std::system("xdotool search --name Docent windowfocus sleep 0.2 keydown 1 sleep 0.3 > /dev/null 2>&1");
+  static_cast<void>(ignored);
+  int status = 0;
+  Wait([&] { return waitpid(child_, &status, WNOHANG) == child_; });
+  child_ = -1;
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << ReadAll(folder_ / "errors");
 }
 
 }  // namespace

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace docent::app {
+
+// Notices that nobody uses a device: its image has hardly changed for a while. One camera; one thread.
+class IdleWatch {
+ public:
+  // The device counts as left after so long, in seconds.
+  explicit IdleWatch(double idle_s) : idle_s_(idle_s) {}
+
+  // An image (CV_8UC1 or CV_8UC3, not empty) and its time in seconds, which does not decrease. Returns true
+  // once when the device has been left, and not again before it is used.
+  bool Update(double seconds, const cv::Mat& image);
+
+ private:
+  const double idle_s_;
+  cv::Mat reference_;     // Small and grey, of the last change.
+  double changed_s_ = 0;  // Its time.
+  bool is_left_ = false;
+};
+
+}  // namespace docent::app
