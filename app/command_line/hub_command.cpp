@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -16,6 +17,7 @@
 #include "app/command_line/text_table.h"
 #include "engine/base/error.h"
 #include "maps/hub/administration.h"
+#include "maps/hub/hub_backup.h"
 
 namespace docent::app {
 
@@ -26,6 +28,7 @@ using Json = nlohmann::ordered_json;
 struct HubOptions {
   std::string hub;
   std::string name, role;
+  std::filesystem::path file;
   std::int64_t revision = 0;
   int changes = 10;
   bool with_password = false, as_json = false;
@@ -148,6 +151,18 @@ void Revert(const HubOptions& options) {
                 static_cast<long long>(options.revision), static_cast<long long>(revision));
 }
 
+void Backup(const HubOptions& options) {
+  maps::BackUpHub(options.hub, options.file);
+}
+
+void Restore(const HubOptions& options) {
+  const std::vector<std::string> unknown = maps::RestoreHub(options.hub, options.file);
+  if (options.verbosity == Verbosity::kQuiet) return;
+  std::puts("The hub is as in the backup.");
+  for (const std::string& name : unknown)
+    std::printf("This server has no user '%s'; add it again with docent hub user add\n", name.c_str());
+}
+
 // Adds a subcommand that connects to a hub.
 CLI::App* AddHubSubcommand(CLI::App* group, Invocation* invocation,
                            const std::shared_ptr<HubOptions>& options, const char* name,
@@ -221,6 +236,17 @@ void AddHubCommand(CLI::App* program, Invocation* invocation) {
   revert->add_option("REVISION", options->revision, "The revision, which docent hub status lists")
       ->required()
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 53));
+  CLI::App* backup =
+      AddHubSubcommand(group, invocation, options, "backup", "Save a hub to a file (with pg_dump)",
+                       "docent hub backup museum.hub --hub postgresql:///docent", Backup);
+  AddHubOption(backup, &options->hub)->required();
+  backup->add_option("FILE", options->file, "The new file")->required();
+  CLI::App* restore =
+      AddHubSubcommand(group, invocation, options, "restore",
+                       "Make a hub of a backup, in a database that has none (with pg_restore)",
+                       "docent hub restore museum.hub --hub postgresql:///docent", Restore);
+  AddHubOption(restore, &options->hub)->required();
+  restore->add_option("FILE", options->file, "The file that docent hub backup has made")->required();
   AddUserCommands(group, invocation, options);
 }
 

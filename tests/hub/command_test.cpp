@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "maps/hub/administration.h"
 #include "tests/end_to_end/run_docent.h"
 #include "tests/hub/hub_samples.h"
 #include "tests/hub/private_server.h"
@@ -57,6 +58,32 @@ TEST_F(HubCommand, TakesTwoDevicesFromNothingToOneHub) {
   EXPECT_THAT(refused.output + refused.errors, HasSubstr("may not do this"));
   Succeed({"hub", "user", "remove", "kiosk", "--hub", url});
   Succeed({"hub", "user", "remove", "anna", "--hub", url});
+}
+
+TEST_F(HubCommand, ABackupBecomesTheSameHubElsewhere) {
+  const std::string carl = AddUser("carl", "curator");
+  {
+    Library library = OpenSampleLibrary(folder_ / "a.docent");
+    AddSampleMap(&library, "Desk", 1);
+  }
+  Succeed({"maps", "push", "--library", Path("a.docent"), "--hub", Url(carl)});
+  Succeed({"hub", "backup", Path("museum.hub"), "--hub", Url()});
+  ExpectErrorLine({"hub", "backup", Path("museum.hub"), "--hub", Url()}, 1, "exists already");
+  ExpectErrorLine({"hub", "backup", Path("other.hub"), "--hub", Url(carl)}, 1, "cannot be saved");
+  EXPECT_FALSE(std::filesystem::exists(Path("other.hub.part")));
+  ExpectErrorLine({"hub", "restore", Path("museum.hub"), "--hub", Url()}, 1, "another database");
+  RemoveHubUser(Url(), carl);
+  const std::string restored = server().Url("restored-" + Database());
+  EXPECT_THAT(Succeed({"hub", "restore", Path("museum.hub"), "--hub", restored}),
+              HasSubstr("no user '" + carl + "'"));
+  AddHubUser(restored, carl, "curator", std::nullopt);
+  Succeed({"maps", "pull", "--library", Path("b.docent"), "--hub", restored});
+  EXPECT_EQ(DifferenceOf("Desk", Path("a.docent"), Path("b.docent")), "");
+  EXPECT_THAT(Succeed({"maps", "push", "--library", Path("a.docent"), "--hub", restored}), HasSubstr("agree"))
+      << "it is not the same hub";
+  EXPECT_THAT(ErrorOfHubSql(server().Url("restored-" + Database(), carl), "DELETE FROM docent.maps"),
+              HasSubstr("permission denied"));
+  EXPECT_THAT(ErrorOfHubSql(restored, "DELETE FROM docent.changes"), HasSubstr("never changed"));
 }
 
 TEST_F(HubCommand, ErrorsAreOneSentence) {
