@@ -72,6 +72,7 @@ struct TourOptions {
   std::optional<std::string> tour;           // The visitor is led along this one of the library.
   bool narrate = false;                      // What visitors are told is spoken.
   std::optional<std::filesystem::path> log;  // Folder for the records of visits.
+  std::string hub;                           // Address of the hub that the library follows; empty for none.
   std::optional<std::filesystem::path> script;
 };
 

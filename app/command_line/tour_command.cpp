@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "app/command_line/hub_command.h"
 #include "app/command_line/program.h"
 #include "app/command_line/run_arguments.h"
 
@@ -29,6 +30,10 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
           "Folder to which a record of each visit is added, without images: where the visitor was, how long, "
           "and where the camera was lost (see docent report)")
       ->type_name("DIR");
+  AddHubOption(command, &options->hub)
+      ->description(
+          "Follow the hub at this address, postgresql://user@host/database, as long as it can be reached; "
+          "DOCENT_HUB if not given");
   command->add_option("--script", options->script, "Commands to carry out at given times, such as tour skip")
       ->type_name("FILE");
   AddRunArguments(command,
