@@ -128,6 +128,8 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
     }
   };
   guarded([&] {
+    std::optional<maps::HubFollower> follower;
+    if (request_.hub && !request_.may_write) FollowHub(&follower);
     std::vector<CameraRun> runs;
     for (std::size_t i = 0; i < cameras_.size(); ++i) runs.push_back(RunOf(i, show));
     RunCameras(runs, &session_, stop_.get_token());
@@ -146,6 +148,13 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
     if (request_.output) WriteCameraReport(*request_.output / "report.json", tallies_);
   });
   if (fault) std::rethrow_exception(fault);
+}
+
+void GuideRun::FollowHub(std::optional<maps::HubFollower>* follower) {
+  maps::HubFollower::Callbacks callbacks;
+  callbacks.pulled = [this](const maps::SyncReport& report) { session_.ReloadContent(report.changed_keys); };
+  callbacks.told = [this](const std::string& sentence) { session_.AddEvent("hub", sentence); };
+  follower->emplace(*request_.hub, std::move(callbacks));
 }
 
 // The images that live cameras delivered and missed, for the report and as events.

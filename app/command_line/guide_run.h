@@ -22,6 +22,7 @@
 #include "app/sound/sound_director.h"
 #include "app/sound/sound_player.h"
 #include "app/sound/speech.h"
+#include "maps/hub/hub_follower.h"
 
 namespace docent::app {
 
@@ -63,6 +64,8 @@ class GuideRun {
   };
 
   void WarnAboutUnknownLenses();
+  // Lets the library follow its hub until the follower is destroyed.
+  void FollowHub(std::optional<maps::HubFollower>* follower);
   CameraRun RunOf(std::size_t i, const Show& show);
   void WelcomeVisitor(CameraState* state);
   // With files_mutex_ held.

@@ -8,6 +8,7 @@
 
 #include "app/command_line/interruption.h"
 #include "app/command_line/maps_exchange_command.h"
+#include "app/command_line/maps_hub_command.h"
 #include "app/command_line/maps_tour_command.h"
 #include "app/command_line/program.h"
 #include "app/command_line/progress.h"
@@ -285,6 +286,7 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
       ->check(CLI::IsMember({"open", "bounded", "augment-only", "read-only"}));
   AddMapsTourCommands(group, invocation);
   AddMapsExchangeCommands(group, invocation);
+  AddMapsHubCommands(group, invocation);
 }
 
 }  // namespace docent::app

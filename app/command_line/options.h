@@ -73,6 +73,7 @@ struct TourOptions {
   bool narrate = false;                        // What visitors are told is spoken.
   std::optional<std::filesystem::path> log;    // Folder for the records of visits.
   std::optional<std::filesystem::path> kiosk;  // File with the code by which the kiosk is ended.
+  std::string hub;                             // Address of the hub that the library follows; empty for none.
   std::optional<std::filesystem::path> script;
 };
 

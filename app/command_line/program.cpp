@@ -12,6 +12,7 @@
 #include <opencv2/core.hpp>
 
 #include "app/cameras/frame_source.h"
+#include "app/command_line/hub_command.h"
 #include "app/command_line/runs.h"
 #include "docent/version.h"
 #include "engine/base/error.h"
@@ -126,6 +127,7 @@ int RunProgram(int argc, const char* const* argv) {
   AddSimulateCommand(&program, &invocation);
   AddTrainVocabularyCommand(&program, &invocation);
   AddMapsCommand(&program, &invocation);
+  AddHubCommand(&program, &invocation);
   AddContentCommand(&program, &invocation);
   AddDemoCommand(&program, &invocation, RunDemo);
   AddAuthorCommand(&program, &invocation, RunAuthor);

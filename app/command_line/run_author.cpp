@@ -75,6 +75,18 @@ std::shared_ptr<const engine::PlanarTarget> ReadTarget(const std::filesystem::pa
   }
 }
 
+// What the tour follows. A device without a library gets it now; later the network may be gone.
+maps::SyncOptions HubOptionsOf(const TourOptions& options) {
+  maps::SyncOptions hub;
+  hub.hub = options.hub;
+  hub.library = options.library;
+  hub.scenes = LibrarySceneTools();
+  hub.merge = LibrarySceneMerger();
+  std::error_code error;
+  if (!std::filesystem::exists(options.library, error)) maps::Pull(hub);
+  return hub;
+}
+
 }  // namespace
 
 void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
@@ -114,6 +126,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   }
   if (options.script) ReadScriptFor(*options.script, &request);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
+  if (!options.hub.empty()) request.hub = HubOptionsOf(options);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
   request.library = &library;
   request.title = "Docent - tour";

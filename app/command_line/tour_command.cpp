@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "app/command_line/hub_command.h"
 #include "app/command_line/program.h"
 #include "app/command_line/run_arguments.h"
 
@@ -36,6 +37,10 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
           "digits, typed), starts again after a failure, and forgets a visit when it is left for two "
           "minutes")
       ->type_name("FILE");
+  AddHubOption(command, &options->hub)
+      ->description(
+          "Follow the hub at this address, postgresql://user@host/database, as long as it can be reached; "
+          "DOCENT_HUB if not given");
   command->add_option("--script", options->script, "Commands to carry out at given times, such as tour skip")
       ->type_name("FILE");
   AddRunArguments(command,

@@ -8,6 +8,7 @@
 #include "content/asset.h"
 #include "content/history_codec.h"
 #include "content/scene_codec.h"
+#include "content/scene_merge.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -154,6 +155,20 @@ content::EditHistory HistoryFromRecord(const maps::SceneRecord& record, const st
 
 maps::SceneTools LibrarySceneTools() {
   return {ReadScene, RetargetScene};
+}
+
+maps::MergeScenes LibrarySceneMerger() {
+  return [](const std::string& base, const std::string& mine, const std::string& theirs) {
+    const auto read = [](const std::string& text) {
+      return text.empty() ? content::Scene() : SceneWithoutModels(text);
+    };
+    const content::SceneMerge merge = content::MergeScenes(read(base), read(mine), read(theirs));
+    maps::MergedScene merged;
+    merged.text = content::EncodeScene(merge.scene);
+    merged.asset_ids = content::SceneAssetIds(merged.text);
+    merged.conflicts = merge.conflicts;
+    return merged;
+  };
 }
 
 maps::Library OpenLibrary(const std::filesystem::path& path, maps::Access access,

@@ -9,6 +9,7 @@
 
 #include "content/edit_history.h"
 #include "content/scene.h"
+#include "maps/hub/sync.h"
 #include "maps/library/library.h"
 #include "maps/storage/map_record.h"
 #include "maps/storage/scene_tools.h"
@@ -38,6 +39,8 @@ content::EditHistory HistoryFromRecord(const maps::SceneRecord& record, const st
 
 // What a library needs to check scenes and to redirect their signposts.
 maps::SceneTools LibrarySceneTools();
+// What a hub needs to merge scenes that two people have changed.
+maps::MergeScenes LibrarySceneMerger();
 // Opens a library with these functions; throws as maps::Library::Open does.
 maps::Library OpenLibrary(const std::filesystem::path& path, maps::Access access,
                           maps::CreateIfMissing create = maps::CreateIfMissing::kNo);

@@ -131,6 +131,23 @@ void Session::Preload(const Command& command, const std::filesystem::path& model
   if (const auto* sound = std::get_if<PlaceSound>(&command)) load(sound->file, content::AssetKind::kSound);
 }
 
+void Session::ReloadContent(const std::vector<std::uint64_t>& keys) {
+  for (const std::uint64_t key : keys) {
+    try {
+      if (const std::optional<std::string> name = memory_.ReloadContent(key))
+        AddEvent("hub", "the content of '" + *name + "' was updated");
+    } catch (const Error& error) {
+      // A map that was removed stays until the session ends.
+      AddEvent("warning", error.what());
+    }
+  }
+}
+
+void Session::AddEvent(const std::string& event, const std::string& sentence) {
+  const std::scoped_lock lock(mutex_);
+  state_.AddEvent(state_.LastTime(), event, sentence);
+}
+
 Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   const std::uint64_t active = system_.ActiveMap();
   const std::uint64_t current = system_.CurrentMap(CameraOf(frame));

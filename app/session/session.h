@@ -74,6 +74,12 @@ class Session {
   // waits for it. Throws Error.
   void Preload(const Command& command, const std::filesystem::path& model_folder);
 
+  // Shows the content that other programs have stored for these maps of the library since. Call it on a
+  // thread that may wait for the disk, of a session that does not write.
+  void ReloadContent(const std::vector<std::uint64_t>& keys);
+  // Adds a sentence to the events.
+  void AddEvent(const std::string& event, const std::string& sentence);
+
   // What is displayed with a frame: the name of its map, its mapping status and its content. The scene is
   // null when there is none.
   struct Shown {

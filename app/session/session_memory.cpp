@@ -62,6 +62,35 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   system_.SetPermissions(map.key, map.Permissions());
 }
 
+std::optional<std::string> SessionMemory::ReloadContent(std::uint64_t key) {
+  const auto find = [&]() -> SessionMap* {
+    SessionMap* const map = library_ == nullptr ? nullptr : state_.FindMap(key);
+    return map == nullptr || map->changed || !map->snapshot ? nullptr : map;
+  };
+  AssetCache assets;
+  const maps::MapInfo info = library_->Find(key);
+  {
+    const std::scoped_lock lock(mutex_);
+    // Content in the coordinates of another state of the map could be shown in the wrong place.
+    if (find() == nullptr || find()->snapshot->revision != info.revision) return std::nullopt;
+    assets = assets_.all();
+  }
+  // Models are decoded without the lock, so that frames are processed meanwhile.
+  const std::string where = library_->file() + ", map '" + info.name + "'";
+  std::vector<std::string> problems;
+  const maps::SceneRecord record = library_->LoadScene(key, &problems);
+  auto scene = std::make_shared<content::Scene>(ReadableScene(record, where, &assets, &problems));
+  const std::scoped_lock lock(mutex_);
+  for (const std::string& problem : problems) state_.AddEvent(state_.LastTime(), "warning", problem);
+  SessionMap* const map = find();
+  if (map == nullptr || map->snapshot->revision != info.revision) return std::nullopt;
+  assets_.Merge(&assets);
+  map->name = info.name;
+  ResolveSignposts(scene.get());
+  map->scene = map->saved_scene = std::move(scene);
+  return info.name;
+}
+
 // Empty when the library has none, or a damaged one, which costs nothing else.
 content::EditHistory SessionMemory::StoredHistory(std::uint64_t key, const std::string& where,
                                                   AssetCache* assets,

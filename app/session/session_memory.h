@@ -38,6 +38,11 @@ class SessionMemory {
   // Loads the map that a command names, if the command needs the map itself, and waits for it. Without the
   // session's mutex. Throws Error when it cannot be read.
   void LoadFor(const Command& command);
+  // Reads the content of a map in memory again, because another program has changed it in the library. Other
+  // maps are read when they are needed, and maps whose keyframes have changed too when they are loaded anew.
+  // Returns the name of the map if its content is now another one. Without the session's mutex, on any
+  // thread. Only for sessions that do not write. Throws Error when it cannot be read.
+  std::optional<std::string> ReloadContent(std::uint64_t key);
 
   // With the session's mutex held: keeps the maps that cameras are in, and prepares for going where the
   // signposts of a map lead.

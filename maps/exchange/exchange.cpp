@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "maps/library/map_names.h"
 #include "maps/library/signposts.h"
 
 namespace docent::maps {
@@ -23,18 +24,6 @@ MapRecord RecordOf(StoredMap map, std::uint64_t key, std::string name) {
   record.snapshot = std::move(map.snapshot);
   record.scene = std::make_shared<const SceneRecord>(std::move(map.scene));
   return record;
-}
-
-std::string FreeName(const std::string& name, const std::set<std::string>& taken) {
-  if (!taken.contains(name)) return name;
-  for (int number = 2;; ++number) {
-    const std::string suffix = " (" + std::to_string(number) + ")";
-    // Cuts only between whole UTF-8 characters: bytes 10xxxxxx continue the one before.
-    std::size_t length = std::min(name.size(), kMaxMapNameBytes - suffix.size());
-    while (length < name.size() && length > 0 && (static_cast<unsigned char>(name[length]) & 0xC0) == 0x80)
-      --length;
-    if (std::string free = name.substr(0, length) + suffix; !taken.contains(free)) return free;
-  }
 }
 
 // Makes the signposts of a map lead to where they lead in another library.

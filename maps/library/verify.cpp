@@ -162,12 +162,7 @@ void CheckMap(const Database& database, const MapInfo& info, int threads, const 
   });
 }
 
-void CheckAssets(const Database& database, const std::set<std::string>& wanted, Report* report) {
-  std::set<std::string> ids = wanted;
-  report->Try([&] {
-    Statement query = database.Prepare("SELECT id FROM assets");
-    while (query.Step()) ids.insert(query.Text(0));
-  });
+void CheckSceneAssets(const Database& database, const std::set<std::string>& ids, Report* report) {
   for (const std::string& id : ids) {
     try {
       ReadAsset(database, id);
@@ -176,6 +171,16 @@ void CheckAssets(const Database& database, const std::set<std::string>& wanted, 
       report->Add(what.starts_with(database.file()) ? what : database.file() + ": " + what);
     }
   }
+}
+
+// Checks the assets that scenes want, and all others.
+void CheckAssets(const Database& database, const std::set<std::string>& wanted, Report* report) {
+  std::set<std::string> ids = wanted;
+  report->Try([&] {
+    Statement query = database.Prepare("SELECT id FROM assets");
+    while (query.Step()) ids.insert(query.Text(0));
+  });
+  CheckSceneAssets(database, ids, report);
 }
 
 // Reports rows whose map does not exist.
@@ -223,6 +228,26 @@ std::vector<std::string> VerifyAll(const Database& database, int threads, const 
   CheckStrays(database, &report);
   report.Try([&] { ReadLenses(database); });
   CheckTours(database, &report);
+  return report.Take();
+}
+
+std::vector<std::string> VerifyMap(const Database& database, const MapInfo& info, int threads,
+                                   const SceneTools& scenes) {
+  Report report;
+  std::set<std::string> wanted_assets;
+  CheckMap(database, info, threads, scenes, &wanted_assets, &report);
+  CheckSceneAssets(database, wanted_assets, &report);
+  return report.Take();
+}
+
+std::vector<std::string> VerifyScene(const Database& database, const MapInfo& info,
+                                     const SceneTools& scenes) {
+  Report report;
+  TryMap(database, info, &report, [&] {
+    const ScenePart scene = ReadScenePart(database, info.key);
+    CheckSceneAssets(database, {scene.asset_ids.begin(), scene.asset_ids.end()}, &report);
+    if (scenes.read) CheckScene(database, info, scenes, &report);
+  });
   return report.Take();
 }
 

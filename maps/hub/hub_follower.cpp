@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/hub/hub_follower.h"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "maps/hub/hub.h"
+
+namespace docent::maps {
+
+namespace {
+
+constexpr std::chrono::milliseconds kListenStep(200);  // Until a stop is noticed.
+// A change is told at once; this is for those that were made while the connection was being set up again.
+constexpr std::chrono::seconds kAskAnyway(20);
+constexpr std::chrono::milliseconds kFirstDelay(500), kLongestDelay(30'000);  // Before the next attempt.
+
+// Returns early when a stop is requested.
+void SleepUnlessStopped(std::chrono::milliseconds time, const std::stop_token& stop) {
+  const auto end = std::chrono::steady_clock::now() + time;
+  while (!stop.stop_requested() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(kListenStep / 4);
+}
+
+}  // namespace
+
+HubFollower::HubFollower(SyncOptions options, Callbacks callbacks)
+    : options_(std::move(options)),
+      callbacks_(std::move(callbacks)),
+      worker_("hub", [this](const std::stop_token& stop) { Follow(stop); }) {}
+
+void HubFollower::Tell(const std::string& sentence) {
+  if (sentence == told_) return;
+  told_ = sentence;
+  if (callbacks_.told) callbacks_.told(sentence);
+}
+
+void HubFollower::FollowConnected(const std::stop_token& stop) {
+  Hub hub(options_.hub);
+  hub.Listen();
+  std::int64_t seen = -1;
+  auto asked = std::chrono::steady_clock::now();
+  while (!stop.stop_requested()) {
+    // Before the pull, so that a change during it is not missed.
+    const std::int64_t last = hub.LastChange();
+    if (last != seen) {
+      const SyncReport report = Pull(options_);
+      seen = last;
+      if (!is_connected_) Tell("the hub is reached, and the library follows it");
+      is_connected_ = true;
+      if (!report.changed_keys.empty() && callbacks_.pulled) callbacks_.pulled(report);
+    }
+    asked = std::chrono::steady_clock::now();
+    while (!stop.stop_requested() && !hub.WaitForChange(kListenStep) &&
+           std::chrono::steady_clock::now() < asked + kAskAnyway) {
+    }
+  }
+}
+
+void HubFollower::Follow(const std::stop_token& stop) {
+  options_.is_stopped = [stop] { return stop.stop_requested(); };
+  std::chrono::milliseconds delay = kFirstDelay;
+  while (!stop.stop_requested()) {
+    is_connected_ = false;
+    try {
+      FollowConnected(stop);
+    } catch (const Error& error) {
+      if (stop.stop_requested()) return;
+      if (is_connected_) delay = kFirstDelay;
+      Tell(std::string(error.what()) + "; everything goes on with the maps that are here");
+    }
+    SleepUnlessStopped(delay, stop);
+    delay = std::min(2 * delay, kLongestDelay);
+  }
+}
+
+}  // namespace docent::maps

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "maps/hub/map_facts.h"
+#include "maps/library/library.h"
+#include "maps/storage/database.h"
+
+namespace docent::maps {
+
+// Somebody else changed the map in the library while it was being synchronized; try again.
+class LocalChange : public Error {
+ public:
+  using Error::Error;
+};
+
+// The rows of a device's library, as a hub sends and receives them. Other programs may use the library at the
+// same time: each function is one transaction. Not thread-safe. Errors throw docent::Error.
+class LocalLibrary {
+ public:
+  // Opens a library for writing; creates it if that is asked for.
+  LocalLibrary(const std::filesystem::path& path, CreateIfMissing create, SceneTools scenes);
+
+  // The same library with its own verbs.
+  Library& library() { return library_; }
+  const Library& library() const { return library_; }
+
+  // Changes whenever the map does: its entry, content, structure or mesh. Empty if there is no such map.
+  std::string StampOf(std::uint64_t key) const;
+  // The whole map. Its signposts lead to what `to_hub` gives. Throws if it is damaged.
+  LocalMap Read(std::uint64_t key, const Retarget& to_hub) const;
+  // The hash of the text of the scene as it is stored.
+  std::string SceneHashOf(std::uint64_t key) const;
+  // Adds or replaces a map with bytes that are not trusted: the whole map is decoded and checked before
+  // anything becomes visible. `map.facts.info` has the key and the name here, and the signposts lead to what
+  // `to_local` gives. Throws LocalChange unless the stored map has this stamp, empty for none.
+  void Write(const LocalMap& map, const Retarget& to_local, const std::string& stamp);
+  // Removes a map whatever its policy, because the hub did so. Signposts to it stay, and lead nowhere.
+  void Remove(std::uint64_t key, const std::string& stamp);
+
+ private:
+  void CheckStamp(std::uint64_t key, const std::string& stamp) const;
+  void WriteItems(const LocalMap& map, const Retarget& to_local);
+  // Whether the library has the structure of the map already.
+  bool HasStructure(const LocalMap& map) const;
+
+  SceneTools scenes_;
+  Library library_;  // Opened first: it upgrades older formats.
+  Database database_;
+};
+
+}  // namespace docent::maps

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "maps/hub/sha256.h"
+#include "maps/hub/sync_session.h"
+#include "maps/library/map_names.h"
+
+namespace docent::maps {
+
+namespace {
+
+constexpr int kPullAttempts = 5;  // While others save the same map at the same time.
+
+// A name for a map of the hub that no other map of the library has.
+std::string LocalName(SyncSession* session, const std::string& name, std::uint64_t key) {
+  std::set<std::string> taken;
+  for (const MapInfo& info : session->local().library().List()) {
+    if (info.key != key) taken.insert(info.name);
+  }
+  return FreeName(name, taken);
+}
+
+// Writes a revision of the hub into the library, where `mine` is the map as it is, and links both.
+void WriteTheirs(SyncSession* session, const MapLink& link, const HubRevision& theirs, const LocalMap& mine,
+                 const std::string& stamp) {
+  LocalMap map;
+  map.facts = theirs.facts;
+  map.manifest = theirs.manifest;
+  map.items = session->Receive(theirs.manifest, mine);
+  map.facts.info.key = link.key;
+  LocalMap local = map;
+  local.facts.info.name = LocalName(session, theirs.facts.info.name, link.key);
+  session->local().Write(local, session->ToLocal(), stamp);
+  session->report().changed_keys.push_back(link.key);
+  session->PutLink(AgreedLink(*session, link.id, theirs.revision, map, local.facts.info.name));
+  session->state().ForgetReceived();
+}
+
+// If an equal map is in the library without a link, it is the same one.
+bool LinkEqualMap(SyncSession* session, const MapLink& link, const HubRevision& theirs) {
+  for (const MapInfo& info : session->local().library().List()) {
+    if (info.name != theirs.facts.info.name || session->LinkOf(info.key) != nullptr) continue;
+    const LocalMap mine = session->ReadLocal(info);
+    if (StructureDigest(mine.facts, mine.manifest) != StructureDigest(theirs.facts, theirs.manifest) ||
+        mine.manifest.at("scene") != theirs.manifest.at("scene"))
+      return false;
+    LocalMap agreed = mine;
+    agreed.facts.info.policy = theirs.facts.info.policy;
+    session->RemoveLink(link.key);
+    session->PutLink(AgreedLink(*session, link.id, theirs.revision, agreed, info.name));
+    return true;
+  }
+  return false;
+}
+
+// Merges what both sides have changed into the library; the next push saves it on the hub.
+void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, const HubRevision& theirs,
+               const LocalMap& mine, const std::string& stamp) {
+  const std::string their_scene = SceneOf(session->Receive({{"scene", theirs.manifest.at("scene")}}, mine));
+  Resolution resolution = Resolve(link, mine, theirs, their_scene, session->options().merge);
+  if (resolution.needs_two_maps) {
+    SplitOff(session, link);
+    MapLink fresh;
+    fresh.key = session->local().library().NewKey();
+    fresh.id = link.id;
+    session->PutLink(fresh);
+    WriteTheirs(session, fresh, theirs, mine, "");
+    return;
+  }
+  LocalMap sources = mine;
+  sources.items["merged"] = resolution.map.items["scene"];
+  sources.manifest["merged"] = HashOf(SceneOf(resolution.map.items));
+  LocalMap map = resolution.map;
+  map.items = session->Receive(map.manifest, sources);
+  LocalMap local = map;
+  local.facts.info.name = LocalName(session, map.facts.info.name, info.key);
+  session->local().Write(local, session->ToLocal(), stamp);
+  session->report().changed_keys.push_back(info.key);
+  // Both agree on what the hub has; what was changed here since is still to be pushed.
+  MapLink agreed = AgreedLink(*session, link.id, theirs.revision, map, local.facts.info.name);
+  agreed.stamp.clear();
+  agreed.structure = StructureDigest(theirs.facts, theirs.manifest);
+  agreed.scene = their_scene;
+  agreed.scene_hash = HashOf("");
+  agreed.name = theirs.facts.info.name;
+  agreed.policy = ToString(theirs.facts.info.policy);
+  session->PutLink(agreed);
+  session->Say(QuotedName(info.name) +
+               " was changed here and on the hub; the changes were merged here, and docent maps push "
+               "saves them on the hub");
+  for (const std::string& conflict : resolution.conflicts)
+    session->Say(QuotedName(info.name) + ": " + conflict);
+  session->state().ForgetReceived();
+}
+
+void PullRemoval(SyncSession* session, const MapLink& link, const std::string& stamp) {
+  if (!stamp.empty() && stamp == link.stamp) {
+    session->local().Remove(link.key, stamp);
+    session->report().changed_keys.push_back(link.key);
+    session->Say(QuotedName(link.local_name) + " was removed on the hub, and so here");
+    session->RemoveLink(link.key);
+  } else if (!stamp.empty()) {
+    session->Say(QuotedName(link.local_name) +
+                 " was removed on the hub and changed here, where it stays; docent maps push adds it to the "
+                 "hub again");
+  } else {
+    session->RemoveLink(link.key);
+  }
+}
+
+void PullMap(SyncSession* session, const HubHead& head) {
+  const MapLink link = *session->LinkTo(head.id);
+  const std::string stamp = session->local().StampOf(link.key);
+  if (head.removed) return PullRemoval(session, link, stamp);
+  const bool is_known = link.revision == head.revision;
+  // What was removed here stays so unless it was changed there.
+  if (is_known && (!stamp.empty() || session->options().maps.empty())) return;
+  const std::optional<HubRevision> theirs = session->hub().Revision(head.id, head.revision);
+  if (!theirs) throw HubConflict("the map was changed on the hub meanwhile");
+  if (stamp.empty()) {
+    if (link.revision == 0 && LinkEqualMap(session, link, *theirs)) return;
+    WriteTheirs(session, link, *theirs, {}, "");
+    session->Say(QuotedName(head.name) + " was added");
+    return;
+  }
+  const MapInfo info = session->local().library().Find(link.key);
+  const LocalMap mine = session->ReadLocal(info);
+  if (IsSame(mine, *theirs)) {
+    session->PutLink(AgreedLink(*session, link.id, theirs->revision, mine, info.name));
+  } else if (link.revision > 0 &&
+             (stamp == link.stamp || !IsChanged(link, mine, session->local().SceneHashOf(link.key)))) {
+    WriteTheirs(session, link, *theirs, mine, stamp);
+    session->Say(QuotedName(head.name) + " was updated to revision " + std::to_string(head.revision));
+  } else {
+    MergeHere(session, info, link, *theirs, mine, stamp);
+  }
+}
+
+// Somebody else may save the map, here or there, while it is compared.
+void PullWithPatience(SyncSession* session, const std::string& id) {
+  for (int attempt = 1;; ++attempt) {
+    const HubHead* const found = session->HeadOf(id);
+    if (found == nullptr) return;
+    const HubHead head = *found;
+    try {
+      PullMap(session, head);
+      return;
+    } catch (const HubUnreachable&) {
+      throw;
+    } catch (const HubConflict& error) {
+      if (attempt == kPullAttempts)
+        session->SayProblem(QuotedName(head.name) + " was not updated: " + error.what());
+    } catch (const LocalChange& error) {
+      if (attempt == kPullAttempts)
+        session->SayProblem(QuotedName(head.name) + " was not updated: " + error.what());
+    } catch (const Error& error) {
+      session->CheckStopped();
+      session->SayProblem(QuotedName(head.name) + " was not updated: " + error.what());
+      return;
+    }
+    if (attempt == kPullAttempts) return;
+    session->ReadHeads();
+  }
+}
+
+// Gives each map of the hub a key here, so that signposts can lead to maps that come later.
+void ReserveKeysForMaps(SyncSession* session) {
+  std::vector<std::string> ids;
+  for (const HubHead& head : session->heads()) {
+    if (session->LinkTo(head.id) == nullptr) ids.push_back(head.id);
+  }
+  if (ids.empty()) return;
+  std::uint64_t key = session->local().library().ReserveKeys(ids.size());
+  for (const std::string& id : ids) {
+    MapLink link;
+    link.key = key++;
+    link.id = id;
+    session->PutLink(link);
+  }
+}
+
+}  // namespace
+
+SyncReport Pull(const SyncOptions& options) {
+  SyncSession session(options, CreateIfMissing::kYes);
+  for (const std::string& name : options.maps) {
+    if (session.HeadNamed(name) == nullptr) throw Error("the hub has no map named '" + name + "'");
+  }
+  ReserveKeysForMaps(&session);
+  const std::vector<HubHead> heads = session.heads();
+  for (const HubHead& head : heads) {
+    if (options.maps.empty() || (!head.removed && std::find(options.maps.begin(), options.maps.end(),
+                                                            head.name) != options.maps.end()))
+      PullWithPatience(&session, head.id);
+  }
+  if (options.maps.empty()) PullTours(&session);
+  return session.report();
+}
+
+}  // namespace docent::maps

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "maps/hub/sha256.h"
+#include "maps/hub/sync_session.h"
+#include "maps/library/map_names.h"
+
+namespace docent::maps {
+
+namespace {
+
+constexpr int kPushAttempts = 5;  // While others save the same map at the same time.
+
+// Sends a map as the revision after `base` and remembers that both sides agree.
+void SendAndLink(SyncSession* session, const LocalMap& map, const std::string& id, std::int64_t base,
+                 const std::string& local_name) {
+  const std::int64_t revision = session->Send(map, id, base);
+  session->PutLink(AgreedLink(*session, id, revision, map, local_name));
+}
+
+// If the hub has an equal map under this name that is not in the library yet, it is the same one.
+bool AdoptEqualMap(SyncSession* session, const LocalMap& mine, const HubHead& head,
+                   const std::string& local_name) {
+  const MapLink* link = session->LinkTo(head.id);
+  if (link != nullptr && !session->local().StampOf(link->key).empty()) return false;
+  const std::optional<HubRevision> theirs = session->hub().Revision(head.id, head.revision);
+  if (!theirs ||
+      StructureDigest(theirs->facts, theirs->manifest) != StructureDigest(mine.facts, mine.manifest) ||
+      theirs->manifest.at("scene") != mine.manifest.at("scene"))
+    return false;
+  LocalMap agreed = mine;
+  agreed.facts.info.policy = theirs->facts.info.policy;
+  session->PutLink(AgreedLink(*session, head.id, head.revision, agreed, local_name));
+  session->Say(QuotedName(head.name) + " is the same map as on the hub");
+  return true;
+}
+
+void AddToHub(SyncSession* session, const MapInfo& info, MapLink link, std::int64_t base) {
+  LocalMap map = session->ReadLocal(info);
+  const HubHead* taken = session->HeadNamed(map.facts.info.name);
+  if (taken != nullptr && taken->id != link.id) {
+    if (AdoptEqualMap(session, map, *taken, info.name)) return;
+    const std::string name = FreeName(info.name, session->NamesInUse());
+    session->Say("The hub has another map named " + QuotedName(info.name) + ", so this one is now " +
+                 QuotedName(name));
+    map.facts.info.name = name;
+    try {
+      session->local().library().Rename(info.key, name);
+      link.local_name = name;
+    } catch (const Error&) {
+      link.local_name = info.name;  // Its policy forbids another name here.
+    }
+  } else {
+    link.local_name = info.name;
+  }
+  // A crash after the hub has saved the map must not make a second one of it.
+  session->PutLink(link);
+  SendAndLink(session, map, link.id, base, link.local_name);
+  session->Say(QuotedName(map.facts.info.name) + " was added to the hub");
+}
+
+// Saves the map, which only this side has changed.
+void SaveChanges(SyncSession* session, const MapInfo& info, const MapLink& link, const HubHead& head) {
+  LocalMap mine = session->ReadLocal(info);
+  const std::optional<HubRevision> theirs = session->hub().Revision(link.id, head.revision);
+  if (!theirs) throw HubConflict("the map was changed on the hub meanwhile");
+  TakeEqualParts(*theirs, &mine);
+  if (IsSame(mine, *theirs)) {
+    session->PutLink(AgreedLink(*session, link.id, head.revision, mine, info.name));
+    return;
+  }
+  SendAndLink(session, mine, link.id, head.revision, info.name);
+  session->Say(QuotedName(mine.facts.info.name) + " was saved on the hub as revision " +
+               std::to_string(head.revision + 1));
+}
+
+// Merges the map, which both sides have changed, and saves the result on both.
+void MergeAndSave(SyncSession* session, const MapInfo& info, const MapLink& link, const HubHead& head) {
+  const LocalMap mine = session->ReadLocal(info);
+  const std::string stamp = session->local().StampOf(info.key);
+  const std::optional<HubRevision> theirs = session->hub().Revision(link.id, head.revision);
+  if (!theirs) throw HubConflict("the map was changed on the hub meanwhile");
+  const ItemBytes scene = session->Receive({{"scene", theirs->manifest.at("scene")}}, mine);
+  Resolution resolution = Resolve(link, mine, *theirs, SceneOf(scene), session->options().merge);
+  if (resolution.needs_two_maps) {
+    const MapLink split = SplitOff(session, link);
+    AddToHub(session, session->local().library().Find(info.key), split, 0);
+    return;
+  }
+  LocalMap& map = resolution.map;
+  TakeEqualParts(*theirs, &map);
+  const bool is_theirs = IsSame(map, *theirs);
+  LocalMap complete = map;
+  LocalMap sources = mine;
+  sources.items["merged"] = map.items["scene"];
+  sources.manifest["merged"] = HashOf(SceneOf(map.items));
+  complete.items = session->Receive(map.manifest, sources);
+  const std::int64_t revision = is_theirs ? head.revision : session->Send(complete, link.id, head.revision);
+  LocalMap local = complete;
+  local.facts.info.name =
+      info.name == link.local_name && map.facts.info.name == link.name ? info.name : map.facts.info.name;
+  session->local().Write(local, session->ToLocal(), stamp);
+  session->report().changed_keys.push_back(info.key);
+  session->PutLink(AgreedLink(*session, link.id, revision, complete, local.facts.info.name));
+  session->Say(QuotedName(map.facts.info.name) + " was changed here and on the hub; the changes were merged" +
+               (is_theirs ? "" : " as revision " + std::to_string(revision)));
+  for (const std::string& conflict : resolution.conflicts)
+    session->Say(QuotedName(map.facts.info.name) + ": " + conflict);
+  session->state().ForgetReceived();
+}
+
+void PushMap(SyncSession* session, const MapInfo& info) {
+  const MapLink link = *session->LinkOf(info.key);
+  const HubHead* head = session->HeadOf(link.id);
+  if (head == nullptr || head->removed) {
+    if (head != nullptr && link.stamp == session->local().StampOf(info.key)) {
+      session->Say(QuotedName(info.name) + " was removed on the hub; docent maps pull removes it here");
+    } else {
+      AddToHub(session, info, link, head == nullptr ? 0 : head->revision);
+    }
+    return;
+  }
+  const bool is_changed_there = head->revision != link.revision;
+  if (link.revision > 0) {
+    const std::string stamp = session->local().StampOf(info.key);
+    if (stamp == link.stamp ||
+        (!IsChanged(link, session->ReadLocal(info), session->local().SceneHashOf(info.key)) &&
+         is_changed_there)) {
+      if (is_changed_there)
+        session->Say(QuotedName(info.name) + " is newer on the hub; docent maps pull brings it");
+      return;
+    }
+  }
+  if (is_changed_there) {
+    MergeAndSave(session, info, link, *head);
+  } else {
+    SaveChanges(session, info, link, *head);
+  }
+}
+
+// Somebody else may save the map, here or there, while it is compared.
+void PushWithPatience(SyncSession* session, std::uint64_t key) {
+  std::string name;
+  for (int attempt = 1;; ++attempt) {
+    try {
+      const MapInfo info = session->local().library().Find(key);
+      name = info.name;
+      PushMap(session, info);
+      return;
+    } catch (const HubUnreachable&) {
+      throw;
+    } catch (const HubConflict&) {
+      if (attempt == kPushAttempts)
+        throw Error(QuotedName(name) + " is being changed on the hub all the time; try again");
+    } catch (const LocalChange&) {
+      if (attempt == kPushAttempts) throw;
+    } catch (const Error& error) {
+      session->CheckStopped();
+      session->SayProblem(QuotedName(name) + " was not saved on the hub: " + error.what());
+      return;
+    }
+    session->ReadHeads();
+  }
+}
+
+void PushRemovals(SyncSession* session) {
+  const std::vector<MapLink> links = session->links();
+  for (const MapLink& link : links) {
+    const HubHead* head = session->HeadOf(link.id);
+    if (link.revision == 0 || head == nullptr || head->removed || !session->local().StampOf(link.key).empty())
+      continue;
+    const std::vector<std::string>& wanted = session->options().maps;
+    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), head->name) == wanted.end()) continue;
+    if (!session->options().remove) {
+      session->Say(QuotedName(head->name) +
+                   " was removed here and is still on the hub; with --removed it is removed there too");
+    } else if (head->revision != link.revision) {
+      session->SayProblem(QuotedName(head->name) +
+                          " was removed here and changed on the hub, where it stays");
+    } else {
+      try {
+        session->hub().RemoveMap(link.id, link.revision);
+        session->RemoveLink(link.key);
+        session->Say(QuotedName(head->name) + " was removed from the hub");
+      } catch (const HubUnreachable&) {
+        throw;
+      } catch (const Error& error) {
+        session->SayProblem(QuotedName(head->name) + " was not removed from the hub: " + error.what());
+      }
+    }
+  }
+}
+
+}  // namespace
+
+SyncReport Push(const SyncOptions& options) {
+  SyncSession session(options, CreateIfMissing::kNo);
+  const std::vector<MapInfo> infos = session.local().library().List();
+  std::vector<std::uint64_t> keys;
+  // Signposts lead to maps by their ids, so that each map has one before the first is sent.
+  for (const MapInfo& info : infos) {
+    if (session.LinkOf(info.key) == nullptr) {
+      MapLink link;
+      link.key = info.key;
+      link.id = NewMapId();
+      link.local_name = info.name;
+      session.PutLink(link);
+    }
+    if (options.maps.empty() ||
+        std::find(options.maps.begin(), options.maps.end(), info.name) != options.maps.end())
+      keys.push_back(info.key);
+  }
+  if (!options.remove) {
+    for (const std::string& name : options.maps) session.local().library().FindByName(name);
+  }
+  for (const std::uint64_t key : keys) PushWithPatience(&session, key);
+  PushRemovals(&session);
+  if (options.maps.empty()) PushTours(&session);
+  return session.report();
+}
+
+}  // namespace docent::maps

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/hub/sync_state.h"
+
+#include <array>
+
+#include "engine/base/error.h"
+#include "maps/hub/map_facts.h"
+#include "maps/hub/sha256.h"
+#include "maps/library/library.h"
+#include "maps/storage/policy.h"
+
+namespace docent::maps {
+
+namespace {
+
+constexpr std::int64_t kStateId = 0x44634862;  // "DcHb", PRAGMA application_id
+constexpr std::int64_t kStateVersion = 1;      // PRAGMA user_version
+
+constexpr std::array<const char*, 4> kStateTables = {
+    "CREATE TABLE hub (id TEXT NOT NULL) STRICT",
+    "CREATE TABLE links (key INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, revision INTEGER NOT NULL, stamp "
+    "TEXT NOT "
+    "NULL, structure TEXT NOT NULL, scene_hash TEXT NOT NULL, scene TEXT NOT NULL, name TEXT NOT NULL, "
+    "local_name TEXT "
+    "NOT NULL, policy TEXT NOT NULL) STRICT",
+    "CREATE TABLE tours (name TEXT PRIMARY KEY, revision INTEGER NOT NULL, content TEXT NOT NULL) STRICT",
+    "CREATE TABLE received (hash TEXT PRIMARY KEY, data BLOB NOT NULL) STRICT"};
+
+void CreateState(const Database& database, const std::string& hub_id) {
+  Transaction transaction(database, Transaction::Kind::kWrite);
+  if (database.Number("SELECT count(*) FROM sqlite_schema") != 0) return;
+  for (const char* sql : kStateTables) database.Execute(sql);
+  database.Prepare("INSERT INTO hub (id) VALUES (?)").Bind(1, hub_id).Run();
+  database.Execute(("PRAGMA application_id = " + std::to_string(kStateId)).c_str());
+  database.Execute(("PRAGMA user_version = " + std::to_string(kStateVersion)).c_str());
+  transaction.Commit();
+}
+
+void CheckState(const Database& database, const std::string& hub_id) {
+  if (database.Number("PRAGMA application_id") != kStateId ||
+      database.Number("PRAGMA user_version") != kStateVersion)
+    throw Error(database.file() + " does not say what a library and its hub have in common; move it away");
+  Statement query = database.Prepare("SELECT id FROM hub");
+  if (!query.Step() || !IsMapId(query.Text(0)))
+    throw Error(database.file() + " is damaged; move it away, and the library is compared with its hub anew");
+  if (query.Text(0) != hub_id)
+    throw Error(database.file() +
+                " says that the library belongs to another hub; use another library for this one");
+}
+
+void CheckLink(const Database& database, const MapLink& link) {
+  const bool valid = link.key != 0 && IsMapId(link.id) && link.revision >= 0 &&
+                     (link.revision == 0 || (IsHash(link.structure) && IsHash(link.scene_hash) &&
+                                             ValidateMapName(link.name).empty() && ParsePolicy(link.policy)));
+  if (!valid)
+    throw Error(database.file() + " is damaged; move it away, and the library is compared with its hub anew");
+}
+
+}  // namespace
+
+std::filesystem::path SyncStatePath(const std::filesystem::path& library) {
+  std::filesystem::path path = library;
+  path += ".hub";
+  return path;
+}
+
+SyncState::SyncState(const std::filesystem::path& library, const std::string& hub_id)
+    : database_(Database::OpenReadWrite(SyncStatePath(library), true)) {
+  if (database_.Number("PRAGMA page_count") == 0) CreateState(database_, hub_id);
+  CheckState(database_, hub_id);
+  database_.StartWriting();
+}
+
+std::vector<MapLink> SyncState::Links() const {
+  Statement query = database_.Prepare(
+      "SELECT key, id, revision, stamp, structure, scene_hash, scene, name, local_name, policy FROM links "
+      "ORDER BY "
+      "key");
+  std::vector<MapLink> links;
+  while (query.Step()) {
+    links.push_back({static_cast<std::uint64_t>(query.Integer(0)), query.Text(1), query.Integer(2),
+                     query.Text(3), query.Text(4), query.Text(5), query.Text(6), query.Text(7), query.Text(8),
+                     query.Text(9)});
+    CheckLink(database_, links.back());
+  }
+  return links;
+}
+
+void SyncState::Put(const MapLink& link) {
+  database_
+      .Prepare(
+          "INSERT OR REPLACE INTO links (key, id, revision, stamp, structure, scene_hash, scene, name, "
+          "local_name, "
+          "policy) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
+      .Bind(1, static_cast<std::int64_t>(link.key))
+      .Bind(2, link.id)
+      .Bind(3, link.revision)
+      .Bind(4, link.stamp)
+      .Bind(5, link.structure)
+      .Bind(6, link.scene_hash)
+      .Bind(7, link.scene)
+      .Bind(8, link.name)
+      .Bind(9, link.local_name)
+      .Bind(10, link.policy)
+      .Run();
+}
+
+void SyncState::RemoveLink(std::uint64_t key) {
+  database_.Prepare("DELETE FROM links WHERE key = ?").Bind(1, static_cast<std::int64_t>(key)).Run();
+}
+
+std::vector<TourLink> SyncState::Tours() const {
+  Statement query = database_.Prepare("SELECT name, revision, content FROM tours ORDER BY name");
+  std::vector<TourLink> tours;
+  while (query.Step()) tours.push_back({query.Text(0), query.Integer(1), query.Text(2)});
+  return tours;
+}
+
+void SyncState::Put(const TourLink& tour) {
+  database_.Prepare("INSERT OR REPLACE INTO tours (name, revision, content) VALUES (?, ?, ?)")
+      .Bind(1, tour.name)
+      .Bind(2, tour.revision)
+      .Bind(3, tour.content)
+      .Run();
+}
+
+void SyncState::RemoveTour(const std::string& name) {
+  database_.Prepare("DELETE FROM tours WHERE name = ?").Bind(1, name).Run();
+}
+
+std::optional<Bytes> SyncState::Received(const std::string& hash) const {
+  Statement query = database_.Prepare("SELECT data FROM received WHERE hash = ?");
+  query.Bind(1, hash);
+  if (!query.Step()) return std::nullopt;
+  Bytes bytes(query.Blob(0).begin(), query.Blob(0).end());
+  if (HashOf(bytes) != hash) return std::nullopt;  // Damaged bytes are received once more.
+  return bytes;
+}
+
+void SyncState::KeepReceived(const std::string& hash, const Bytes& bytes) {
+  database_.Prepare("INSERT OR REPLACE INTO received (hash, data) VALUES (?, ?)")
+      .Bind(1, hash)
+      .Bind(2, std::span<const std::uint8_t>(bytes))
+      .Run();
+}
+
+void SyncState::ForgetReceived() {
+  database_.Execute("DELETE FROM received");
+}
+
+}  // namespace docent::maps

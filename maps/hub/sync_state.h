@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "maps/storage/byte_stream.h"
+#include "maps/storage/database.h"
+
+// What a device knows of its hub: the file NAME.docent.hub beside the library, an SQLite database. It is
+// written after the library, so that a crash between the two leaves an older state here; then the next
+// synchronization finds that library and hub agree already. Not thread-safe. Errors throw docent::Error.
+namespace docent::maps {
+
+// A map of the library on the hub, and what it was when both last agreed.
+struct MapLink {
+  std::uint64_t key = 0;      // In the library.
+  std::string id;             // On the hub.
+  std::int64_t revision = 0;  // On the hub; 0 if the map was never there.
+  std::string stamp;          // LocalLibrary::StampOf.
+  std::string structure;      // StructureDigest.
+  std::string scene_hash;     // Of the text of the scene in the library.
+  std::string scene;          // Its text on the hub: the common ancestor when both sides change it.
+  std::string name;           // On the hub.
+  std::string local_name;     // In the library, where another map may have had the name.
+  std::string policy;         // As in policy.h.
+};
+
+// A tour of the library on the hub, and what it was when both last agreed.
+struct TourLink {
+  std::string name;           // On both.
+  std::int64_t revision = 0;  // On the hub.
+  std::string content;        // Language, minutes and stops as one text; empty if it was removed.
+};
+
+// The open file.
+class SyncState {
+ public:
+  // Opens the file beside a library, or creates it. Throws if it is damaged or belongs to another hub.
+  SyncState(const std::filesystem::path& library, const std::string& hub_id);
+
+  std::vector<MapLink> Links() const;  // By key.
+  // Adds or replaces the link of a map.
+  void Put(const MapLink& link);
+  void RemoveLink(std::uint64_t key);
+
+  std::vector<TourLink> Tours() const;  // By name.
+  void Put(const TourLink& tour);
+  void RemoveTour(const std::string& name);
+
+  // Bytes that were received for a map that is not complete yet, so that an interrupted transfer goes on.
+  std::optional<Bytes> Received(const std::string& hash) const;
+  void KeepReceived(const std::string& hash, const Bytes& bytes);
+  void ForgetReceived();
+
+ private:
+  Database database_;
+};
+
+// The file beside this library.
+std::filesystem::path SyncStatePath(const std::filesystem::path& library);
+
+}  // namespace docent::maps

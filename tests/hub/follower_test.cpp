@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <future>
+#include <mutex>
+#include <thread>
+
+#include "app/session/library_scene.h"
+#include "maps/hub/hub_follower.h"
+#include "tests/app/support/simulated_session.h"
+#include "tests/hub/hub_samples.h"
+#include "tests/hub/private_server.h"
+
+// Libraries that follow a hub.
+namespace docent::maps {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+using testing::HasSubstr;
+
+// What a follower has told.
+struct Told {
+  std::mutex mutex;
+  std::vector<std::string> sentences;
+  int pulled = 0;
+
+  HubFollower::Callbacks Callbacks() {
+    return {[this](const SyncReport&) {
+              const std::scoped_lock lock(mutex);
+              ++pulled;
+            },
+            [this](const std::string& sentence) {
+              const std::scoped_lock lock(mutex);
+              sentences.push_back(sentence);
+            }};
+  }
+  int Pulled() {
+    const std::scoped_lock lock(mutex);
+    return pulled;
+  }
+  std::string All() {
+    const std::scoped_lock lock(mutex);
+    return testing::PrintToString(sentences);
+  }
+};
+
+// Waits until the condition holds, at most this long.
+bool WaitUntil(const std::function<bool()>& condition, std::chrono::milliseconds longest) {
+  const auto end = Clock::now() + longest;
+  while (Clock::now() < end) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(5ms);
+  }
+  return condition();
+}
+
+// A walk around a table.
+std::shared_ptr<const app::Simulation> Table(double seconds) {
+  app::SimulationOptions options;
+  options.duration_s = seconds;
+  return app::MakeSimulation("room", options);
+}
+
+class HubFollow : public WithHubServer {
+ protected:
+  void ShareMap() {
+    {
+      Library a = OpenSampleLibrary(folder_ / "a");
+      AddSampleMap(&a, "Desk", 7);
+    }
+    Push(SampleSync(Url(), folder_ / "a"));
+    Pull(SampleSync(Url(), folder_ / "b"));
+  }
+  void PushText(const std::string& text) {
+    {
+      Library a = OpenSampleLibrary(folder_ / "a");
+      EditScene(&a, a.FindByName("Desk").key,
+                [&](content::Scene* scene) { scene->entities[0].signpost.text = text; });
+    }
+    Push(SampleSync(Url(), folder_ / "a"));
+  }
+  // What a tour reads, which opens the library read-only.
+  std::string TextOnB() {
+    const Library b = OpenToRead(folder_ / "b");
+    return SceneIn(b, b.FindByName("Desk").key).entities.at(0).signpost.text;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(HubFollow, AChangeArrivesWithinTwoSeconds) {
+  ShareMap();
+  Told told;
+  HubFollower follower(SampleSync(Url(), folder_ / "b"), told.Callbacks());
+  ASSERT_TRUE(WaitUntil([&] { return told.All().find("is reached") != std::string::npos; }, 10s))
+      << told.All();
+  for (int round = 0; round < 3; ++round) {
+    PushText(std::to_string(round));
+    EXPECT_TRUE(WaitUntil([&] { return TextOnB() == std::to_string(round); }, 2s)) << told.All();
+  }
+  // The library is written before the follower says so.
+  EXPECT_TRUE(WaitUntil([&] { return told.Pulled() >= 3; }, 2s));
+}
+
+TEST_F(HubFollow, AHubThatIsGoneIsFoundAgain) {
+  ShareMap();
+  Told told;
+  HubFollower follower(SampleSync(Url(), folder_ / "b"), told.Callbacks());
+  ASSERT_TRUE(WaitUntil([&] { return told.All().find("is reached") != std::string::npos; }, 10s))
+      << told.All();
+  server().Stop();
+  EXPECT_TRUE(WaitUntil([&] { return told.All().find("everything goes on") != std::string::npos; }, 10s))
+      << told.All();
+  EXPECT_EQ(TextOnB(), "Hello") << "the maps that are here are not";
+  server().Start();
+  PushText("after the cut");
+  EXPECT_TRUE(WaitUntil([&] { return TextOnB() == "after the cut"; }, 10s)) << told.All();
+}
+
+TEST_F(HubFollow, AFollowerEndsWithoutAHub) {
+  ShareMap();
+  Told told;
+  const auto start = Clock::now();
+  {
+    HubFollower follower(SampleSync("postgresql://x@%2Fnowhere/docent", folder_ / "b"), told.Callbacks());
+    ASSERT_TRUE(WaitUntil([&] { return told.All().find("cannot be reached") != std::string::npos; }, 5s));
+  }
+  EXPECT_LT(Clock::now() - start, 5s);
+}
+
+TEST_F(HubFollow, ATourShowsANewSignWithoutAPauseInTracking) {
+  using namespace app::simulated_session;
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    app::Session author(Options(app::Pace::kLockstep, "Desk"), LensOf(*Table(8)), &a);
+    ASSERT_GT(Feed(Table(8), app::Pace::kLockstep, &author).poses, 0);
+    EditScene(&a, a.FindByName("Desk").key,
+              [](content::Scene* scene) { scene->entities.push_back(SampleSignpost("sign-1", "Hello")); });
+  }
+  Push(SampleSync(Url(), folder_ / "a"));
+  Pull(SampleSync(Url(), folder_ / "b"));
+  Library b = app::OpenLibrary(folder_ / "b", Access::kReadOnly);
+  app::SessionOptions options = Options(app::Pace::kEager, "");
+  options.may_write = false;
+  app::CalibratedCamera camera = CameraOf(Table(8));
+  app::Session tour(options, {camera.model}, &b);
+  HubFollower follower(SampleSync(Url(), folder_ / "b"),
+                       {[&](const SyncReport& report) { tour.ReloadContent(report.changed_keys); }, {}});
+  std::future<void> push;
+  Clock::time_point saved;
+  std::atomic<bool> is_saved = false;
+  std::optional<double> delay_s;
+  int frames = 0, lost_after = 0;
+  double longest_s = 0;
+  auto last = Clock::now();
+  app::FrameLoopOptions loop;
+  loop.pace = app::Pace::kEager;
+  app::RunFrames(&camera, &tour, loop,
+                 [&](const engine::TrackedFrame& frame) {
+                   longest_s =
+                       std::max(longest_s,
+                                frames < 90 ? 0 : std::chrono::duration<double>(Clock::now() - last).count());
+                   if (++frames == 90) {
+                     push = std::async(std::launch::async, [&] {
+                       PushText("New");
+                       saved = Clock::now();
+                       is_saved = true;
+                     });
+                   }
+                   if (frames > 90 && !engine::HasPose(frame.state)) ++lost_after;
+                   const auto scene = tour.ShownWith(frame).scene;
+                   if (is_saved && !delay_s && scene && !scene->entities.empty() &&
+                       scene->entities[0].signpost.text == "New")
+                     delay_s = std::chrono::duration<double>(Clock::now() - saved).count();
+                   std::this_thread::sleep_for(25ms);
+                   last = Clock::now();
+                 },
+                 {});
+  if (push.valid()) push.get();
+  tour.Finish();
+  std::string events;
+  for (const app::Event& event : tour.TakeEvents()) events += event.event + ": " + event.detail + "\n";
+  ASSERT_TRUE(delay_s) << "the new sign was never seen in " << frames << " frames\n" << events;
+  EXPECT_LT(*delay_s, 2);
+  EXPECT_EQ(lost_after, 0);
+  EXPECT_LT(longest_s, 0.5) << "a frame waited";
+  RecordProperty("delay_ms", static_cast<int>(1000 * *delay_s));
+  RecordProperty("longest_frame_ms", static_cast<int>(1000 * longest_s));
+  std::printf("seen %.0f ms after the push; longest frame %.0f ms\n", 1000 * *delay_s, 1000 * longest_s);
+}
+
+}  // namespace
+}  // namespace docent::maps
