@@ -48,7 +48,7 @@ TEST(SignpostDirection, IsNotKnownInScenesOfTheThirdVersion) {
   old["docent_scene"] = 3;
   EXPECT_EQ(DirectionOf(DecodeScene(old.dump(), "the library", EveryAsset())), std::nullopt);
   old = nlohmann::json::parse(EncodeScene(SignpostScene(kLeftAndUp)));
-  EXPECT_EQ(old["docent_scene"], 4);
+  EXPECT_EQ(old["docent_scene"], kSceneVersion);
   old["docent_scene"] = 3;
   EXPECT_THAT(ErrorOf([&] { DecodeScene(old.dump(), "the library", EveryAsset()); }),
               HasSubstr("'direction'"));

@@ -33,6 +33,8 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "14 map up automatic\n"
       "14 map scale pixel 1 2 to pixel 3 4 is 2.5\n"
       "14 map scale unknown\n"
+      "14 map entrance\n"
+      "14 map entrance automatic\n"
       "14 transform helmet 1 2 3 0 0.6 0 0.8 2.5\n"
       "14 transform helmet 1 2 3 0 0.6 0 0.8 2.5, sign-1 1 2 3 0 0.6 0 0.8 2.5\n"
       "14 remove helmet \"from\" sign-1\n"
