@@ -13,12 +13,15 @@ namespace docent::maps {
 // Made from schema/version_N.sql.
 extern const unsigned char kHubSchema1[];
 extern const std::size_t kHubSchema1_size;
+extern const unsigned char kHubSchema2[];
+extern const std::size_t kHubSchema2_size;
 
 namespace {
 
 std::string_view ScriptOf(int version) {
   const std::array<std::string_view, kHubVersion> scripts = {
-      std::string_view(reinterpret_cast<const char*>(kHubSchema1), kHubSchema1_size)};
+      std::string_view(reinterpret_cast<const char*>(kHubSchema1), kHubSchema1_size),
+      std::string_view(reinterpret_cast<const char*>(kHubSchema2), kHubSchema2_size)};
   return scripts.at(static_cast<std::size_t>(version) - 1);
 }
 
