@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <string_view>
+#include <utility>
 
 #include "maps/hub/hub.h"
 #include "maps/hub/hub_connection.h"
@@ -43,7 +44,8 @@ bool IsPlainName(const std::string& name) {
 
 // Creates the database of the address; returns false if that cannot be what is missing.
 bool CreateHubDatabase(const std::string& url) {
-  const auto [server, name] = ServerOf(url);
+  const std::pair<std::string, std::string> place = ServerOf(url);
+  const std::string &server = place.first, &name = place.second;
   if (!IsPlainName(name)) return false;
   HubConnection connection(server);
   bool exists = false;
