@@ -18,6 +18,7 @@
 #include "engine/base/error.h"
 #include "maps/hub/administration.h"
 #include "maps/hub/hub_backup.h"
+#include "maps/hub/hub_visits.h"
 
 namespace docent::app {
 
@@ -163,6 +164,19 @@ void Restore(const HubOptions& options) {
     std::printf("This server has no user '%s'; add it again with docent hub user add\n", name.c_str());
 }
 
+void HandIn(const HubOptions& options) {
+  const maps::HandedInVisits visits = maps::HandInVisits(options.hub, options.file);
+  if (options.verbosity != Verbosity::kQuiet) std::printf("Records of visits handed in: %zu\n", visits.added);
+  if (visits.skipped > 0)
+    std::fprintf(stderr, "Warning: lines that are no records of visits were left out: %zu in '%s'\n",
+                 visits.skipped, options.file.c_str());
+}
+
+void Collect(const HubOptions& options) {
+  const std::size_t added = maps::CollectVisits(options.hub, options.file);
+  if (options.verbosity != Verbosity::kQuiet) std::printf("Records of visits added: %zu\n", added);
+}
+
 // Adds a subcommand that connects to a hub.
 CLI::App* AddHubSubcommand(CLI::App* group, Invocation* invocation,
                            const std::shared_ptr<HubOptions>& options, const char* name,
@@ -247,6 +261,19 @@ void AddHubCommand(CLI::App* program, Invocation* invocation) {
                        "docent hub restore museum.hub --hub postgresql:///docent", Restore);
   AddHubOption(restore, &options->hub)->required();
   restore->add_option("FILE", options->file, "The file that docent hub backup has made")->required();
+  CLI::App* hand_in =
+      AddHubSubcommand(group, invocation, options, "hand-in",
+                       "Hand in the records of visits that docent tour --log has written",
+                       "docent hub hand-in visits --hub postgresql://kiosk@museum.example/docent", HandIn);
+  AddHubOption(hand_in, &options->hub)->required();
+  hand_in->add_option("DIR", options->file, "Folder of the records; they stay there, and are not added twice")
+      ->required();
+  CLI::App* collect = AddHubSubcommand(
+      group, invocation, options, "collect", "Collect the records of visits, for docent report",
+      "docent hub collect visits --hub postgresql://anna@museum.example/docent", Collect);
+  AddHubOption(collect, &options->hub)->required();
+  collect->add_option("DIR", options->file, "Folder to which records are added that are not there")
+      ->required();
   AddUserCommands(group, invocation, options);
 }
 

@@ -11,7 +11,7 @@ class Option;
 
 namespace docent::app {
 
-// `docent hub init|status|revert|backup|restore|user`.
+// `docent hub init|status|revert|backup|restore|hand-in|collect|user`.
 void AddHubCommand(CLI::App* program, Invocation* invocation);
 // The option --hub of a command; `hub` gets the address.
 CLI::Option* AddHubOption(CLI::App* command, std::string* hub);

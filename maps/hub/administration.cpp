@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <string_view>
+#include <utility>
 
 #include "maps/hub/hub.h"
 #include "maps/hub/hub_connection.h"
@@ -13,12 +14,15 @@ namespace docent::maps {
 // Made from schema/version_N.sql.
 extern const unsigned char kHubSchema1[];
 extern const std::size_t kHubSchema1_size;
+extern const unsigned char kHubSchema2[];
+extern const std::size_t kHubSchema2_size;
 
 namespace {
 
 std::string_view ScriptOf(int version) {
   const std::array<std::string_view, kHubVersion> scripts = {
-      std::string_view(reinterpret_cast<const char*>(kHubSchema1), kHubSchema1_size)};
+      std::string_view(reinterpret_cast<const char*>(kHubSchema1), kHubSchema1_size),
+      std::string_view(reinterpret_cast<const char*>(kHubSchema2), kHubSchema2_size)};
   return scripts.at(static_cast<std::size_t>(version) - 1);
 }
 
@@ -40,7 +44,8 @@ bool IsPlainName(const std::string& name) {
 
 // Creates the database of the address; returns false if that cannot be what is missing.
 bool CreateHubDatabase(const std::string& url) {
-  const auto [server, name] = ServerOf(url);
+  const std::pair<std::string, std::string> place = ServerOf(url);
+  const std::string &server = place.first, &name = place.second;
   if (!IsPlainName(name)) return false;
   HubConnection connection(server);
   bool exists = false;

@@ -16,7 +16,7 @@
 // docent::Error.
 namespace docent::maps {
 
-inline constexpr int kHubVersion = 1;  // Of the tables; schema/version_N.sql makes the version N.
+inline constexpr int kHubVersion = 2;  // Of the tables; schema/version_N.sql makes the version N.
 
 // A tour on a hub.
 struct HubTour {

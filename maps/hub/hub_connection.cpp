@@ -78,7 +78,7 @@ auto Guarded(const Body& body) {
 
 class HubRows::Impl {
  public:
-  explicit Impl(pqxx::result rows) : rows_(std::move(rows)) {}
+  explicit Impl(const pqxx::result& rows) : rows_(rows) {}  // A result is shared, not copied.
   const pqxx::result& rows() const { return rows_; }
 
   pqxx::field At(std::size_t row, int column) const {

@@ -2,6 +2,7 @@
 #include "maps/hub/hub_follower.h"
 
 #include <algorithm>
+#include <exception>
 #include <thread>
 #include <utility>
 
@@ -65,7 +66,8 @@ void HubFollower::Follow(const std::stop_token& stop) {
     is_connected_ = false;
     try {
       FollowConnected(stop);
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
+      // Also what is no Error, as a disk that fails: a tour does not end because of its hub.
       if (stop.stop_requested()) return;
       if (is_connected_) delay = kFirstDelay;
       Tell(std::string(error.what()) + "; everything goes on with the maps that are here");
