@@ -58,7 +58,7 @@ TEST(Script, ReadsEveryCommandOfTheManual) {
       "16 map join Desk\n"
       "16 map remove Bureau\n",
       "script");
-  ASSERT_EQ(commands.size(), 44u);
+  ASSERT_EQ(commands.size(), 46u);
   EXPECT_EQ(commands[0].command, Command(NewMap{"Desk 3"}));
   EXPECT_EQ(commands[0].line, 2);
   EXPECT_EQ(commands[1].time, std::chrono::milliseconds(1500));
