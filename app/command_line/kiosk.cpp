@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <ctime>
 #include <system_error>
 
 #include "app/files/text_file.h"
@@ -84,7 +85,8 @@ bool RestartAfterFailures() {
     if (g_ends || (WIFEXITED(status) && WEXITSTATUS(status) == 0)) break;
     if (KioskLock::Clock::now() - begin > kStable) pause_s = kFirstPause_s;
     std::fprintf(stderr, "docent: The tour has ended unexpectedly; it begins again in %u s.\n", pause_s);
-    sleep(pause_s);
+    const timespec pause{static_cast<time_t>(pause_s), 0};
+    nanosleep(&pause, nullptr);  // A signal ends it.
     pause_s = std::min(2 * pause_s, kLongestPause_s);
   }
   std::signal(SIGINT, SIG_DFL);
