@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/drawing_ladder.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace docent::ui {
+namespace {
+
+// A machine whose frames take this long on each rung, at 30 images a second or as fast as it can.
+struct Machine {
+  std::array<double, kDrawingLadder.size()> cost_s;
+  DrawingLadder ladder;
+  double now_s = 0;
+  int changes = 0;
+
+  void Run(double duration_s) {
+    for (const double end = now_s + duration_s; now_s < end;) {
+      const double drawing_s = cost_s[ladder.rung()];
+      now_s += std::max(drawing_s, 1.0 / 30);
+      if (ladder.Add(now_s, drawing_s)) ++changes;
+    }
+  }
+};
+
+TEST(DrawingLadder, KeepsTheBestQualityOnAFastMachine) {
+  Machine machine{{0.02, 0.01, 0.005, 0.002}};
+  machine.Run(60);
+  EXPECT_EQ(machine.ladder.rung(), 0u);
+}
+
+TEST(DrawingLadder, GoesDownWithinSecondsToWhatTheMachineCanDraw) {
+  Machine machine{{0.9, 0.4, 0.15, 0.06}};
+  machine.Run(6);
+  EXPECT_EQ(machine.ladder.rung(), 3u);
+  Machine other{{0.3, 0.08, 0.04, 0.02}};
+  other.Run(3);
+  EXPECT_EQ(other.ladder.rung(), 1u);
+}
+
+TEST(DrawingLadder, IsNotMovedByASingleSlowFrame) {
+  Machine machine{{0.02, 0.01, 0.005, 0.002}};
+  for (int i = 0; i < 20; ++i) {
+    machine.Run(2);
+    machine.now_s += 0.4;
+    machine.ladder.Add(machine.now_s, 0.4);
+  }
+  EXPECT_EQ(machine.ladder.rung(), 0u);
+}
+
+TEST(DrawingLadder, ComesBackWhenTheLoadIsGone) {
+  Machine machine{{0.9, 0.4, 0.15, 0.06}};
+  machine.Run(6);
+  ASSERT_EQ(machine.ladder.rung(), 3u);
+  machine.cost_s = {0.02, 0.01, 0.005, 0.002};
+  machine.Run(120);
+  EXPECT_EQ(machine.ladder.rung(), 0u);
+}
+
+TEST(DrawingLadder, TriesAHigherQualityInVainEverMoreSeldom) {
+  // The second rung is drawn fast enough to try the first one, which is too slow.
+  Machine machine{{0.2, 0.02, 0.01, 0.005}};
+  machine.Run(60);
+  const int first_minute = std::exchange(machine.changes, 0);
+  machine.Run(540);
+  EXPECT_GE(first_minute, 3);
+  EXPECT_LE(machine.changes, 14) << "in nine minutes";
+}
+
+}  // namespace
+}  // namespace docent::ui

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/drawing_ladder.h"
+
+#include <algorithm>
+
+namespace docent::ui {
+
+void DrawingLadder::Begin(double now_s) {
+  begin_s_ = now_s;
+  frames_ = 0;
+}
+
+double DrawingLadder::Median() {
+  const auto middle = times_s_.begin() + static_cast<std::ptrdiff_t>(frames_ / 2);
+  std::nth_element(times_s_.begin(), middle, times_s_.begin() + static_cast<std::ptrdiff_t>(frames_));
+  return *middle;
+}
+
+bool DrawingLadder::Add(double now_s, double drawing_s) {
+  constexpr std::size_t kLeastFrames = 3;
+  constexpr double kLongestWait_s = 300;
+  if (begin_s_ < 0) {
+    Begin(now_s - drawing_s);
+    fast_since_s_ = begin_s_;
+  }
+  if (frames_ < times_s_.size()) times_s_[frames_++] = drawing_s;
+  if (frames_ < kLeastFrames || now_s - begin_s_ < limits_.down_after_s) return false;
+  const double median_s = Median();
+  Begin(now_s);
+  if (median_s > limits_.fast_s) fast_since_s_ = now_s;
+  if (median_s > limits_.slow_s) {
+    if (rung_ + 1 == kDrawingLadder.size()) return false;
+    if (now_s - went_up_s_ < up_after_s_) up_after_s_ = std::min(2 * up_after_s_, kLongestWait_s);
+    ++rung_;
+    return true;
+  }
+  if (rung_ == 0 || now_s - fast_since_s_ < up_after_s_) return false;
+  --rung_;
+  went_up_s_ = fast_since_s_ = now_s;
+  return true;
+}
+
+}  // namespace docent::ui

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace docent::ui {
+
+// One quality of drawing.
+struct DrawingQuality {
+  const char* name;  // For the log.
+  int samples;       // See RendererOptions.
+  double
+      largest_scale;  // Of the image that is drawn, relative to that of the camera; the window may need less.
+};
+
+// From the best to the cheapest.
+inline constexpr std::array<DrawingQuality, 4> kDrawingLadder = {{
+    {"the resolution of the window", 4, 2.0},
+    {"the resolution of the camera", 4, 1.0},
+    {"no smoothed edges", 1, 1.0},
+    {"half the resolution of the camera", 1, 0.5},
+}};
+
+// When the quality changes.
+struct DrawingLimits {
+  // Drawing slower than this goes a rung down. Five images a second leave 200 ms for each, half of it for
+  // tracking.
+  double slow_s = 0.1;
+  // Drawing faster than this may go a rung up, which costs up to four times as much.
+  double fast_s = 0.025;
+  double down_after_s = 0.5;  // Frames are judged together over at least this time, by their median.
+  double up_after_s = 10;     // Doubled each time that going up was in vain.
+};
+
+// Chooses the quality by the time that drawing takes: tracking and input need the rest of the processor. One
+// thread.
+class DrawingLadder {
+ public:
+  explicit DrawingLadder(const DrawingLimits& limits = {})
+      : limits_(limits), up_after_s_(limits.up_after_s) {}
+
+  // A frame took this long to draw; `now_s` is the time after it, which does not decrease. Returns whether
+  // the quality has changed.
+  bool Add(double now_s, double drawing_s);
+  const DrawingQuality& quality() const { return kDrawingLadder[rung_]; }
+  std::size_t rung() const { return rung_; }
+
+ private:
+  void Begin(double now_s);
+  double Median();
+
+  const DrawingLimits limits_;
+  std::size_t rung_ = 0;
+  double begin_s_ = -1;               // Of the frames that are judged together; negative before the first.
+  std::array<double, 32> times_s_{};  // Their drawing times, as far as there is room.
+  std::size_t frames_ = 0;
+  double fast_since_s_ = 0;  // Since when all frames were drawn fast.
+  double up_after_s_;
+  double went_up_s_ = -1e9;  // When the quality was raised last.
+};
+
+}  // namespace docent::ui
