@@ -27,6 +27,7 @@ class ClippedSource : public FrameSource {
   bool NextLate(engine::Frame* frame) override {
     return NextInside(frame, [&] { return source_->NextLate(frame); });
   }
+  std::optional<Timestamp> NextTime() const override { return source_->NextTime(); }
   std::string trouble() const override { return source_->trouble(); }
   Delivery delivery() const override { return source_->delivery(); }
   Head* head() const override { return source_->head(); }
@@ -87,6 +88,7 @@ class WindowSource : public FrameSource {
   bool NextLate(engine::Frame* frame) override {
     return NextInside(frame, [&] { return source_->NextLate(frame); });
   }
+  std::optional<Timestamp> NextTime() const override { return source_->NextTime(); }
   std::string trouble() const override { return source_->trouble(); }
   Delivery delivery() const override { return source_->delivery(); }
   Head* head() const override { return source_->head(); }

@@ -60,6 +60,25 @@ class VideoSource : public FrameSource {
   void SetInfo(SourceInfo info) { info_ = std::move(info); }
 
   bool Next(engine::Frame* frame) override {
+    if (!Grab(frame)) return false;
+    cv::Mat image;
+    if (!capture_.retrieve(image) || image.empty()) {
+      ended_ = true;
+      throw Error("Image " + std::to_string(frame->index) + " of " + Quoted(path_) + " cannot be decoded.");
+    }
+    frame->image = std::move(image);
+    return true;
+  }
+  // The images after it may need it, so it is decoded, but not converted and copied.
+  bool NextLate(engine::Frame* frame) override { return Grab(frame); }
+  std::optional<Timestamp> NextTime() const override {
+    if (index_ >= times_.size()) return std::nullopt;
+    return times_[index_];
+  }
+
+ private:
+  // Decodes the next image and sets all but the image itself.
+  bool Grab(engine::Frame* frame) {
     if (ended_) return false;
     if (!capture_.grab()) {
       ended_ = true;
@@ -71,18 +90,11 @@ class VideoSource : public FrameSource {
       throw Error(Quoted(*timestamps_path_) + " has " + std::to_string(times_.size()) + " times, but " +
                   Quoted(path_) + " has more images.");
     }
-    cv::Mat image;
-    if (!capture_.retrieve(image) || image.empty()) {
-      ended_ = true;
-      throw Error("Image " + std::to_string(index_) + " of " + Quoted(path_) + " cannot be decoded.");
-    }
     frame->time = timestamps_path_ ? times_[index_] : ContainerTime();
     frame->index = index_++;
-    frame->image = std::move(image);
     return true;
   }
 
- private:
   // The container's time if it is later than the previous one. The decoder reports no time for the images
   // that it still buffers at the end of the file, and raw streams have no times; both continue with the last
   // step.
@@ -165,6 +177,17 @@ class ImageListSource : public FrameSource {
     frame->index = index_++;
     frame->image = std::move(image);
     return true;
+  }
+  // A file that is passed over is not even read.
+  bool NextLate(engine::Frame* frame) override {
+    if (index_ == images_.size()) return false;
+    frame->time = images_[index_].time;
+    frame->index = index_++;
+    return true;
+  }
+  std::optional<Timestamp> NextTime() const override {
+    if (index_ == images_.size()) return std::nullopt;
+    return images_[index_].time;
   }
 
  private:

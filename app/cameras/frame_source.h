@@ -55,9 +55,11 @@ class FrameSource {
   // trouble() says why. The time is then the current time of the source's clock.
   virtual bool Next(engine::Frame* frame) = 0;
 
-  // Like Next, but for an image that will be dropped: sets time and index; sources whose images are expensive
-  // leave the image empty.
+  // Like Next, but for an image that will be dropped: sets time and index. Sources that can pass over an
+  // image without decoding or rendering it leave it empty.
   virtual bool NextLate(engine::Frame* frame) { return Next(frame); }
+  // The time of the next image, if it is known before the image is delivered.
+  virtual std::optional<Timestamp> NextTime() const { return std::nullopt; }
 
   // One sentence for the user while there are no images; empty otherwise.
   virtual std::string trouble() const { return {}; }

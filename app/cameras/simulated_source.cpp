@@ -29,6 +29,11 @@ class SimulatedSource : public FrameSource {
     return true;
   }
 
+  std::optional<Timestamp> NextTime() const override {
+    if (index_ == simulation_->frame_count()) return std::nullopt;
+    return simulation_->time(index_);
+  }
+
   bool Next(engine::Frame* frame) override {
     if (index_ == simulation_->frame_count()) return false;
     cv::Mat image;

@@ -18,6 +18,7 @@ class ReplayingSource : public FrameSource {
   }
   bool Next(engine::Frame* frame) override { return Replay(frame) || source_->Next(frame); }
   bool NextLate(engine::Frame* frame) override { return Replay(frame) || source_->NextLate(frame); }
+  std::optional<Timestamp> NextTime() const override { return first_ ? first_->time : source_->NextTime(); }
   std::string trouble() const override { return source_->trouble(); }
   Delivery delivery() const override { return source_->delivery(); }
   Head* head() const override { return source_->head(); }

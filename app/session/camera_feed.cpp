@@ -35,7 +35,11 @@ bool CameraFeed::Fetch(const std::stop_token& stop) {
       trouble_ = std::move(now);
       if (run_.options.trouble) run_.options.trouble(trouble_, frame_.time);
     }
-    if (frame_.image.empty()) continue;
+    if (frame_.image.empty()) {
+      // The device may stay away for long, but the person is still there.
+      CarryOutGiven();
+      continue;
+    }
     if (live_) gaps_.Report(frame_, run_.shown);
     if (!first_time_) {
       first_time_ = frame_.time;
@@ -60,6 +64,7 @@ void CameraFeed::Handle(const std::stop_token& stop) {
     tracked.frame = frame_;
     tracked.state = engine::TrackingState::kDropped;
     run_.shown(tracked);
+    CarryOutGiven();
     return;
   }
   if (pace == Pace::kRealtime && !live_) clock_->WaitFor(frame_.time, stop);
@@ -69,7 +74,11 @@ void CameraFeed::Handle(const std::stop_token& stop) {
   ReportLatency();
   command_runner_.RunDue(frame_.time - *first_time_, tracked);
   run_.shown(tracked);
-  if (run_.options.idle) last_tracked_ = std::move(tracked);
+  last_tracked_ = std::move(tracked);
+}
+
+void CameraFeed::CarryOutGiven() {
+  if (last_tracked_) command_runner_.RunGiven(last_tracked_->frame.time - *first_time_, *last_tracked_);
 }
 
 void CameraFeed::Pause(const std::stop_token& stop) {
@@ -113,8 +122,9 @@ void CameraFeed::SetHeadRotation() {
 }
 
 bool CameraFeed::WillBeLate() {
-  return run_.options.pace == Pace::kRealtime && !live_ && first_time_ &&
-         clock_->IsLate(frame_.time + period_, period_);
+  if (run_.options.pace != Pace::kRealtime || live_ || !first_time_) return false;
+  const std::optional<Timestamp> next = run_.camera->source->NextTime();
+  return clock_->IsLate(next ? *next - clock_offset_ : frame_.time + period_, period_);
 }
 
 void CameraFeed::ReportLatency() {

@@ -69,6 +69,8 @@ class CameraFeed {
   // skipped.
   bool WillBeLate();
   void ReportLatency();
+  // Carries out what the person wants while images are dropped or missing.
+  void CarryOutGiven();
 
   const CameraRun& run_;
   Session* const session_;
@@ -85,7 +87,7 @@ class CameraFeed {
   Timestamp clock_offset_{};
   // Eager pace: when the previous image was processed, and its own time.
   std::optional<std::pair<std::chrono::steady_clock::time_point, Timestamp>> last_processed_;
-  std::optional<engine::TrackedFrame> last_tracked_;  // only with FrameLoopOptions::idle
+  std::optional<engine::TrackedFrame> last_tracked_;
   std::string trouble_;
 };
 

@@ -16,6 +16,10 @@ void CommandRunner::RunDue(Timestamp now, const engine::TrackedFrame& frame) {
       throw Error(Line(*next_) + sentence + (sentence.ends_with('.') ? "" : "."));
     }
   }
+  RunGiven(now, frame);
+}
+
+void CommandRunner::RunGiven(Timestamp now, const engine::TrackedFrame& frame) {
   if (options_.inbox == nullptr) return;
   for (const CommandInbox::Entry& entry : options_.inbox->TakeAll()) {
     try {

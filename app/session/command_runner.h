@@ -19,6 +19,8 @@ class CommandRunner {
   // now: time since the first image. Throws Error for a command of the script that cannot be executed; what
   // the inbox asks for in vain is reported to FrameLoopOptions::refused instead.
   void RunDue(Timestamp now, const engine::TrackedFrame& frame);
+  // The same without the script, whose commands wait for a frame that is tracked.
+  void RunGiven(Timestamp now, const engine::TrackedFrame& frame);
   // Throws Error if the images ended before the last command of the script.
   void CheckAllDone() const;
 

@@ -125,6 +125,41 @@ TEST_F(Cameras, UseTheVideoTimesWithoutAList) {
     EXPECT_NEAR(ToSeconds(frames[i].time), 0.04 * static_cast<double>(i), 1e-6);
 }
 
+// Passing over an image changes nothing about the times and the images after it, and needs no image.
+TEST_F(Cameras, PassOverLateImagesWithoutDecodingThem) {
+  MakeTum();
+  WriteVideo(folder_ / "plain.mp4", 8);
+  const TemporaryFolder timed;
+  WriteVideo(timed / "video.mp4", 8);
+  std::string times;
+  for (int i = 0; i < 8; ++i) times += std::to_string(100 + i) + ".5\n";
+  timed.Write("timestamps.txt", times);
+  for (const std::string& place :
+       {folder_.path().string(), (folder_ / "plain.mp4").string(), timed.path().string()}) {
+    SCOPED_TRACE(place);
+    const auto all = ReadFrames(OpenCamera(place).get());
+    const auto source = OpenCamera(place);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (const auto next = source->NextTime()) EXPECT_EQ(*next, all[i].time) << i;
+      engine::Frame frame;
+      const bool is_late = i % 3 != 2;
+      ASSERT_TRUE(is_late ? source->NextLate(&frame) : source->Next(&frame)) << i;
+      EXPECT_EQ(frame.time, all[i].time) << i;
+      EXPECT_EQ(frame.index, all[i].index) << i;
+      ASSERT_EQ(frame.image.empty(), is_late) << i;
+      if (!is_late) EXPECT_EQ(cv::norm(frame.image, all[i].image, cv::NORM_INF), 0) << i;
+    }
+    engine::Frame more;
+    EXPECT_FALSE(source->NextLate(&more));
+    EXPECT_FALSE(source->NextTime());
+  }
+  // What is passed over is not read at all.
+  std::filesystem::remove(folder_ / "rgb/1.png");
+  const auto source = OpenCamera(folder_.path().string());
+  engine::Frame frame;
+  EXPECT_TRUE(source->Next(&frame) && source->NextLate(&frame) && source->Next(&frame));
+}
+
 TEST_F(Cameras, DeliverTheImagesOfATruncatedVideoAndReportWhereItEnds) {
   WriteVideo(folder_ / "video.mp4", 3);
   folder_.Write("timestamps.txt", "1\n2\n3\n4\n5\n");

@@ -220,6 +220,35 @@ TEST(FrameLoop, TracksAsManySlowlyRenderedImagesAsPossibleInRealtime) {
   EXPECT_LE(oldest, std::chrono::milliseconds(350)) << "rendering time plus less than one frame period";
 }
 
+// Of all images but the first, none is in time.
+TEST(FrameLoop, CarriesOutCommandsWhileAllImagesAreLate) {
+  SteppedClock clock;
+  CalibratedCamera camera = Calibrate(std::make_unique<SlowRecording>(20, &clock), std::nullopt);
+  SessionOptions options;
+  options.may_write = false;
+  Session session(options, {camera.model}, nullptr);
+  CommandInbox inbox;
+  FrameLoopOptions loop;
+  loop.pace = Pace::kRealtime;
+  loop.clock = &clock;
+  loop.inbox = &inbox;
+  std::uint64_t at = 0;
+  std::vector<std::uint64_t> taken;
+  loop.take = [&](const Command&, const engine::TrackedFrame&) {
+    taken.push_back(at);
+    return true;
+  };
+  RunFrames(&camera, &session, loop,
+            [&](const engine::TrackedFrame& frame) {
+              at = frame.frame.index;
+              if (at == 0) clock.Pass(std::chrono::hours(1));
+              if (at == 5 || at == 9) inbox.Push({GuideVisitor{}, nullptr});
+              EXPECT_EQ(frame.state == kDropped, at > 0);
+            },
+            {});
+  EXPECT_THAT(taken, ElementsAre(5u, 9u)) << "with the image after which they were given";
+}
+
 TEST(FrameLoop, ReportsTheAgeOfALiveImageFromItsTimestamp) {
   SteppedClock clock;
   const Timestamp taken = clock.Now() - std::chrono::milliseconds(30);
