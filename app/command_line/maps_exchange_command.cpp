@@ -23,6 +23,7 @@
 #include "maps/exchange/exchange.h"
 #include "maps/exchange/mesh_ply.h"
 #include "maps/exchange/view_from_above.h"
+#include "maps/library/map_copies.h"
 #include "maps/maintenance/densify.h"
 #include "maps/maintenance/joining.h"
 #include "maps/maintenance/maintenance.h"
@@ -140,6 +141,13 @@ void Import(const ExchangeOptions& options, Verbosity verbosity) {
   };
   for (const maps::ImportedName& map : imported.maps) print("", "map", map);
   for (const maps::ImportedName& tour : imported.tours) print("tour ", "tour", tour);
+  const maps::Library into = OpenLibrary(options.library, maps::Access::kReadOnly);
+  for (const maps::MapCopy& copy : maps::FindCopies(into)) {
+    const bool is_new = std::any_of(imported.maps.begin(), imported.maps.end(), [&](const auto& map) {
+      return map.name == copy.older.name || map.name == copy.newer.name;
+    });
+    if (is_new) std::printf("%s.\n", maps::TextOf(copy).c_str());
+  }
 }
 
 const char* ToText(maps::Optimization::Outcome outcome) {

@@ -7,10 +7,21 @@
 
 #include "app/session/library_scene.h"
 #include "engine/base/error.h"
+#include "maps/library/map_copies.h"
 
 namespace docent::app {
 
 void SessionMemory::Open() {
+  maps::PagerOptions paging = options_.memory;
+  const std::vector<maps::MapCopy> copies = maps::FindCopies(*library_);
+  if (options_.may_write) {
+    // An author decides which one to keep.
+    for (const maps::MapCopy& copy : copies)
+      state_.AddEvent(state_.LastTime(), "warning", maps::TextOf(copy));
+  } else {
+    replaced_ = maps::ReplacedByCopies(copies);
+    for (const auto& [older, newer] : replaced_) paging.left_out.push_back(older);
+  }
   for (const maps::MapInfo& info : library_->List()) {
     SessionMap& map = state_.maps[info.key];
     map.key = info.key;
@@ -28,7 +39,7 @@ void SessionMemory::Open() {
     const std::scoped_lock lock(mutex_);
     state_.AddEvent(state_.LastTime(), "warning", problem);
   };
-  pager_.emplace(library_, &system_.place_index(), options_.memory, std::move(callbacks));
+  pager_.emplace(library_, &system_.place_index(), paging, std::move(callbacks));
   system_.SetPlaceFinder(&*pager_);
   pager_->Open();
 }
@@ -110,6 +121,8 @@ void SessionMemory::ResolveSignposts(content::Scene* scene) {
   for (content::Entity& entity : scene->entities) {
     if (entity.kind != content::Entity::Kind::kSignpost) continue;
     content::Signpost& signpost = entity.signpost;
+    if (const auto copy = replaced_.find(signpost.to_key); copy != replaced_.end())
+      signpost.to_key = copy->second;
     if (signpost.to_key != 0) {
       if (const SessionMap* const map = state_.FindMap(signpost.to_key)) signpost.to_map = map->name;
     } else if (const SessionMap* const map = state_.FindByName(signpost.to_map)) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -64,6 +65,8 @@ class SessionMemory {
   std::mutex& mutex_;  // the session's; guards the next two
   SessionState& state_;
   SessionAssets& assets_;
+  // On a tour, the older ones of maps that are copies of each other, each with the newest.
+  std::map<std::uint64_t, std::uint64_t> replaced_;
   std::optional<maps::MapPager> pager_;  // last, because its thread calls back into the other members
 };
 

@@ -99,13 +99,19 @@ std::vector<MapInfo> MapPager::Impl::Open() {
   std::size_t keyframes = 0;
   for (const MapInfo& info : infos) keyframes += info.keyframes;
   index_->Reserve(keyframes);
+  const auto is_left_out = [this](std::uint64_t key) {
+    return std::find(options_.left_out.begin(), options_.left_out.end(), key) != options_.left_out.end();
+  };
   library_->LoadAppearance([&](const MapInfo& info, const Library::Appearance& appearance) {
+    if (is_left_out(info.key)) return;
     index_->SetAppearance(info.key, appearance.thumbnails, appearance.words);
     // Such a map cannot be found by its appearance, but it can still be loaded by name.
     if (!appearance.problem.empty() && callbacks_.failed) callbacks_.failed(info.key, appearance.problem);
   });
   if (keyframes * kTypicalKeyFrameBytes <= std::min(options_.read_at_start_bytes, options_.budget_bytes)) {
-    for (const MapInfo& info : infos) TryLoad(info.key);
+    for (const MapInfo& info : infos) {
+      if (!is_left_out(info.key)) TryLoad(info.key);
+    }
   }
   if (!options_.wait_for_maps) {
     worker_.emplace("map-pager", [this](const std::stop_token& stop) { Run(stop); });

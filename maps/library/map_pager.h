@@ -23,6 +23,8 @@ struct PagerOptions {
   // If true, a place query waits until its maps are loaded, so that equal images give equal results in every
   // run. Otherwise a separate thread loads maps, and the result contains only those that are in memory.
   bool wait_for_maps = true;
+  // Maps that are neither found by a lost camera nor loaded at the start.
+  std::vector<std::uint64_t> left_out = {};
 };
 
 // The approximate memory of a snapshot: images, corners, points and observations.
