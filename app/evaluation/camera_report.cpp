@@ -49,6 +49,7 @@ std::string FormatCameraReport(const std::vector<CameraTally>& cameras) {
          {"tracking_ms", Percentiles(camera.tracking_ms_)},
          {"latency_ms",
           {{"tracked", Percentiles(camera.tracked_ages_ms_)}, {"drawn", Percentiles(camera.drawn_ages_ms_)}}},
+         {"drawn_interval_ms", Percentiles(camera.drawn_intervals_ms_)},
          {"delivery", camera.delivery_ ? ToJson(*camera.delivery_) : Json(nullptr)}});
   }
   const Json json = {{"cameras", list}};

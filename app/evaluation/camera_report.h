@@ -25,6 +25,11 @@ class CameraTally {
   // are not played in real time.
   void AddTrackedAge(Timestamp age) { tracked_ages_ms_.push_back(Milliseconds(age)); }
   void AddDrawnAge(Timestamp age) { drawn_ages_ms_.push_back(Milliseconds(age)); }
+  // Adds that an image was drawn, at this time of one clock.
+  void AddDrawn(Timestamp now) {
+    if (last_drawn_) drawn_intervals_ms_.push_back(Milliseconds(now - *last_drawn_));
+    last_drawn_ = now;
+  }
   // Sets the delivery statistics of a device, at the end of the run.
   void SetDelivery(const Delivery& delivery) { delivery_ = delivery; }
 
@@ -34,12 +39,13 @@ class CameraTally {
 
   std::string name_;
   int frames_ = 0, with_pose_ = 0, dropped_ = 0;
-  std::vector<double> tracking_ms_, tracked_ages_ms_, drawn_ages_ms_;
+  std::vector<double> tracking_ms_, tracked_ages_ms_, drawn_ages_ms_, drawn_intervals_ms_;
+  std::optional<Timestamp> last_drawn_;
   std::optional<Delivery> delivery_;
 };
 
 // JSON: {"cameras": [{name, frames, with_pose, dropped, tracking_ms {median, p95, max}, latency_ms {tracked,
-// drawn}, delivery}]}; unknown values are null.
+// drawn}, drawn_interval_ms, delivery}]}; unknown values are null.
 std::string FormatCameraReport(const std::vector<CameraTally>& cameras);
 // Throws Error.
 void WriteCameraReport(const std::filesystem::path& path, const std::vector<CameraTally>& cameras);

@@ -25,6 +25,7 @@ TEST(CameraReport, ReportsTheLatenciesOfEachCamera) {
   for (int i = 1; i <= 20; ++i) {
     shoulder.AddTrackedAge(std::chrono::milliseconds(10 * i));
     shoulder.AddDrawnAge(std::chrono::milliseconds(10 * i + 5));
+    shoulder.AddDrawn(std::chrono::milliseconds(1000 + 5 * i * i));
   }
   Delivery delivery;
   delivery.delivered = 20;
@@ -45,6 +46,8 @@ TEST(CameraReport, ReportsTheLatenciesOfEachCamera) {
   EXPECT_TRUE(cameras[0]["delivery"].is_null());
   EXPECT_NEAR(cameras[1]["latency_ms"]["tracked"]["median"].get<double>(), 100, 1e-9);
   EXPECT_NEAR(cameras[1]["latency_ms"]["drawn"]["p95"].get<double>(), 195, 1e-9);
+  EXPECT_EQ(cameras[1]["drawn_interval_ms"]["max"], 195) << "5 (20^2 - 19^2)";
+  EXPECT_TRUE(cameras[0]["drawn_interval_ms"].is_null());
   EXPECT_EQ(cameras[1]["delivery"]["late"], 3);
   EXPECT_EQ(cameras[1]["delivery"]["latency_ms"], 12.5);
 }

@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Measures a tour in a window on a machine that is slowed down to a share of its processor.
+
+The program runs for that share of every tenth of a second and is stopped for the rest, as a control group with
+a processor quota would do. A key is pressed every few seconds, and the time until its command stands in
+events.csv is measured. Needs Xvfb and xdotool.
+
+    tests/tools/measure_slow_machine.py --docent build/release/docent --share 0.1 --seconds 60 --output slow \\
+        -- --library museum.docent --camera museum --pace realtime
+"""
+import argparse
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import threading
+import time
+
+PERIOD_S = 0.1
+
+
+def throttle(pid, share, stop):
+    """Lets a process run for a share of each period until `stop` is set."""
+    while not stop.is_set():
+        try:
+            os.kill(pid, signal.SIGCONT)
+            time.sleep(share * PERIOD_S)
+            if share < 1:
+                os.kill(pid, signal.SIGSTOP)
+            time.sleep((1 - share) * PERIOD_S)
+        except ProcessLookupError:
+            return
+    try:
+        os.kill(pid, signal.SIGCONT)
+    except ProcessLookupError:
+        pass
+
+
+def count_commands(events):
+    try:
+        return sum(1 for line in events.read_text(errors="replace").splitlines() if ",command," in line)
+    except FileNotFoundError:
+        return 0
+
+
+def press_keys(environment, events, seconds):
+    """Presses N and B in turn and returns how long each took to be carried out, in seconds; None for never."""
+    answers = []
+    end = time.monotonic() + seconds
+    while time.monotonic() + 3 < end:
+        before = count_commands(events)
+        begin = time.monotonic()
+        key = "nb"[len(answers) % 2]
+        subprocess.run(["xdotool", "search", "--name", "Docent", "windowfocus", "key", key], env=environment,
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+        answer = None
+        while time.monotonic() - begin < 2.5:
+            if count_commands(events) > before:
+                answer = time.monotonic() - begin
+                break
+            time.sleep(0.01)
+        answers.append(answer)
+        time.sleep(max(0, begin + 3 - time.monotonic()))
+    return answers
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--docent", required=True)
+    parser.add_argument("--share", type=float, default=0.1, help="of the processor, 0 to 1")
+    parser.add_argument("--seconds", type=float, default=60, help="of the measurement")
+    parser.add_argument("--screen", default="1280x800")
+    parser.add_argument("--output", type=pathlib.Path, required=True, help="folder for the files of the tour")
+    parser.add_argument("arguments", nargs="+", help="of docent tour")
+    options = parser.parse_args()
+    read, write = os.pipe()
+    server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", options.screen + "x24"],
+                              pass_fds=[write], stderr=subprocess.DEVNULL)
+    os.close(write)
+    display = os.fdopen(read).readline().strip()
+    environment = dict(os.environ, DISPLAY=":" + display)
+    tour = subprocess.Popen([options.docent, "tour", *options.arguments, "--output", str(options.output)],
+                            env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    subprocess.run(["xdotool", "search", "--sync", "--onlyvisible", "--name", "Docent", "windowfocus"],
+                   env=environment, stdout=subprocess.DEVNULL, check=True)
+    subprocess.run(["xdotool", "search", "--name", "Docent", "windowsize", "100%", "100%"], env=environment,
+                   stdout=subprocess.DEVNULL, check=False)
+    time.sleep(3)
+    stop = threading.Event()
+    slow = threading.Thread(target=throttle, args=(tour.pid, options.share, stop))
+    slow.start()
+    answers = press_keys(environment, options.output / "events.csv.part", options.seconds)
+    stop.set()
+    slow.join()
+    tour.send_signal(signal.SIGINT)
+    printed = tour.communicate(timeout=60)[0]
+    server.terminate()
+    camera = json.loads((options.output / "report.json").read_text())["cameras"][0]
+    events = (options.output / "events.csv").read_text().splitlines()
+    print(printed.strip())
+    print("answers of keys in s:", [None if a is None else round(a, 2) for a in answers])
+    print("images:", camera["frames"], "dropped:", camera["dropped"], "tracking ms:", camera["tracking_ms"])
+    print("latency ms:", camera["latency_ms"], "interval of drawn images ms:", camera.get("drawn_interval_ms"))
+    print("\n".join(line for line in events if ",load," in line))
+
+
+if __name__ == "__main__":
+    main()
