@@ -2,6 +2,7 @@
 #include "app/sound/sound_director.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace docent::app {
 
@@ -21,15 +22,24 @@ SoundDirector::Orders SoundDirector::Update(double seconds, std::uint64_t map_ke
                                             const std::optional<Eigen::Vector3d>& camera_in_map) {
   Orders orders;
   if (camera_in_map) {
+    const std::set<Key> asked = std::exchange(asked_, {});
     std::map<Key, Near> near;
     for (const content::Entity& entity : scene.entities) {
       if (entity.kind != content::Entity::Kind::kSound || entity.hidden) continue;
       const Key key(map_key, entity.name);
       const auto before = near_.find(key);
-      if (!IsHeard(entity.sound, *camera_in_map, before != near_.end())) continue;
+      const bool begins = asked.contains(key);
+      const bool goes_on =
+          before != near_.end() && before->second.is_asked && seconds < before->second.end_seconds;
+      if (!begins && !goes_on && !IsHeard(entity.sound, *camera_in_map, before != near_.end())) continue;
       Near now;
       now.caption = content::ShownText(entity, language_);
-      if (before != near_.end()) {
+      now.is_asked = begins || goes_on;
+      if (begins && before != near_.end()) {
+        orders.stop.push_back(key);
+        near_.erase(before);
+      }
+      if (!begins && before != near_.end()) {
         now.end_seconds = before->second.end_seconds;
         near_.erase(before);
       } else {

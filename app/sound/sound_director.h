@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +31,9 @@ class SoundDirector {
     std::vector<Key> stop;
     std::string caption;  // Of all sounds that play, one below the other; empty for none.
   };
+  // A visitor asks for a sound: it begins anew with the next frame that has a place, wherever that is, and
+  // plays to its end.
+  void Ask(std::uint64_t map_key, const std::string& name) { asked_.insert({map_key, name}); }
   // A frame whose camera is at this place in the map with this key; without a place, what plays goes on.
   Orders Update(double seconds, std::uint64_t map_key, const content::Scene& scene,
                 const std::optional<Eigen::Vector3d>& camera_in_map);
@@ -37,12 +41,14 @@ class SoundDirector {
  private:
   struct Near {
     double end_seconds = 0;  // Of sound and caption.
+    bool is_asked = false;   // It plays to its end also out of range.
     std::string caption;
   };
   bool IsHeard(const content::Sound& sound, const Eigen::Vector3d& camera, bool was_near) const;
 
   const std::string language_;
-  std::map<Key, Near> near_;  // The sounds that the camera is within the range of.
+  std::map<Key, Near> near_;  // The sounds that the camera is within the range of, and those asked for.
+  std::set<Key> asked_;       // Since the last frame with a place.
 };
 
 }  // namespace docent::app

@@ -81,6 +81,30 @@ TEST(SoundDirector, ALostCameraChangesNothing) {
   EXPECT_TRUE(one.At(2, 1).start.empty());
 }
 
+TEST(SoundDirector, PlaysWhatAVisitorAsksForToItsEndWhereverTheCameraIs) {
+  OneSound one;
+  EXPECT_TRUE(one.At(0, 9).start.empty());
+  one.director.Ask(1, "roar");
+  EXPECT_TRUE(one.director.Update(0.5, 0, {}, std::nullopt).start.empty()) << "the camera is lost";
+  EXPECT_EQ(one.At(1, 9).start.size(), 1u);
+  EXPECT_EQ(one.At(10.9, 9).caption, "caption of roar");
+  const auto ended = one.At(11, 9);
+  EXPECT_EQ(ended.stop.size(), 1u);
+  EXPECT_EQ(ended.caption, "");
+  EXPECT_TRUE(one.At(12, 9).start.empty());
+}
+
+TEST(SoundDirector, BeginsAnewWhatPlaysWhenAVisitorAsksForIt) {
+  OneSound one;
+  one.At(0, 1);
+  one.director.Ask(1, "roar");
+  const auto orders = one.At(5, 1);
+  EXPECT_EQ(orders.stop.size(), 1u);
+  EXPECT_EQ(orders.start.size(), 1u);
+  EXPECT_EQ(one.At(14.9, 1).caption, "caption of roar") << "ten seconds from now";
+  EXPECT_EQ(one.At(15, 1).caption, "");
+}
+
 TEST(SoundDirector, StopsWhatIsRemovedHiddenOrInAnotherMap) {
   for (const int way : {0, 1, 2}) {
     OneSound one;
