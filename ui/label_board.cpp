@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
+#include "ui/label_layout.h"
 #include "ui/signpost_model.h"
 #include "ui/theme.h"
 
@@ -14,6 +16,9 @@ namespace {
 // Ratios of the distance: 12 pixels in an image of 640 pixels and 65 degrees, and a fifth of its width for a
 // word of four letters.
 constexpr double kLeastTextAngle = 1.0 / 40, kMostTextAngle = 1.0 / 8;
+// A board that has to be magnified more is not drawn, only the point that it is about: from afar, many boards
+// would cover each other and the room.
+constexpr double kMostMagnification = 4;
 // In lines of text.
 constexpr double kMaxLineWidth = 18, kMaxTextHeight = 8, kPaddingX = 0.55, kPaddingY = 0.3;
 constexpr double kMinTextPx = 8, kMaxTextPx = 120;
@@ -68,14 +73,79 @@ Color Dimmed(Color color, double opacity) {
   return color;
 }
 
-void DrawLeader(const DrawnLabel& label, double opacity, Canvas* canvas) {
+// From the anchor to the board, wherever that is.
+void DrawLeader(const DrawnLabel& label, const Eigen::AlignedBox2d& board, double opacity, Canvas* canvas) {
   if (!label.anchor) return;
   const double width = std::max(1.5, 0.09 * label.text_px);
   const Color dark = Dimmed({0, 0, 0, 0.5f}, opacity), bright = Dimmed(theme::kText, opacity);
-  canvas->Line(*label.anchor, label.foot, 2 * width, dark);
-  canvas->Line(*label.anchor, label.foot, width, bright);
+  if (!board.isEmpty()) {
+    const bool is_moved =
+        std::abs(board.max().y() - label.foot.y()) > 1 || std::abs(board.center().x() - label.foot.x()) > 1;
+    const Eigen::Vector2d end =
+        is_moved ? Eigen::Vector2d(label.anchor->cwiseMax(board.min()).cwiseMin(board.max())) : label.foot;
+    canvas->Line(*label.anchor, end, 2 * width, dark);
+    canvas->Line(*label.anchor, end, width, bright);
+  }
   canvas->Disk(*label.anchor, 2.6 * width, dark);
   canvas->Disk(*label.anchor, 2 * width, bright);
+}
+
+// A label that is drawn, with its text and the place of its board; the board is empty where the label is too
+// far away to be read.
+struct PlacedLabel {
+  DrawnLabel drawn;
+  const std::string* text = nullptr;
+  TextStyle style;
+  double opacity = 1;
+  Eigen::AlignedBox2d board;
+};
+
+// Whether a reader is so far away that the board would be magnified beyond its due.
+bool IsFar(const content::Label& label, const Eigen::Vector3d& eye_in_map) {
+  const double distance = (eye_in_map - label.anchor - label.offset).norm();
+  return label.text_height * kMostMagnification < kLeastTextAngle * distance;
+}
+
+std::vector<PlacedLabel> LabelsInView(const content::Scene& scene, const LabelView& view, Canvas* canvas) {
+  std::vector<PlacedLabel> labels;
+  const Eigen::Vector3d eye = view.camera_from_map.OriginInSource();
+  for (const content::Entity& entity : scene.entities) {
+    if (entity.kind != content::Entity::Kind::kLabel) continue;
+    if (entity.hidden && std::find(view.faint.begin(), view.faint.end(), entity.name) == view.faint.end())
+      continue;
+    const auto drawn = Projected(entity.label, view.camera, view.camera_from_map, view.image_in_canvas);
+    if (!drawn) continue;
+    PlacedLabel label;
+    label.drawn = *drawn;
+    label.text = &content::ShownText(entity, view.language);
+    label.style = LabelStyle(drawn->text_px);
+    label.opacity = entity.hidden ? kFaintOpacity : 1;
+    if (!IsFar(entity.label, eye)) {
+      const Eigen::Vector2d size = canvas->Measure(*label.text, label.style);
+      const Eigen::Vector2d padding = drawn->text_px * Eigen::Vector2d(kPaddingX, kPaddingY);
+      label.board.min() =
+          drawn->foot - Eigen::Vector2d(0.5 * size.x() + padding.x(), size.y() + 2 * padding.y());
+      label.board.max() = Eigen::Vector2d(drawn->foot.x() + 0.5 * size.x() + padding.x(), drawn->foot.y());
+    }
+    labels.push_back(label);
+  }
+  return labels;
+}
+
+// So that no board covers another one.
+void MoveApart(const Canvas& canvas, std::vector<PlacedLabel>* labels) {
+  constexpr double kGap = 4;  // Pixels: an edge is seen between two boards.
+  std::vector<Eigen::AlignedBox2d> boards;
+  for (const PlacedLabel& label : *labels) {
+    if (!label.board.isEmpty()) boards.push_back(label.board);
+  }
+  const Eigen::AlignedBox2d bounds(Eigen::Vector2d::Zero(),
+                                   Eigen::Vector2d(canvas.width_px(), canvas.height_px()));
+  const auto placed = LayOutApart(boards, bounds, kGap);
+  std::size_t next = 0;
+  for (PlacedLabel& label : *labels) {
+    if (!label.board.isEmpty()) label.board = placed[next++];
+  }
 }
 
 }  // namespace
@@ -115,25 +185,16 @@ std::shared_ptr<const content::Model> LabelBoardShape(const std::string& text) {
   return model;
 }
 
-void DrawLabels(const content::Scene& scene, const std::string& language, const engine::CameraModel& camera,
-                const engine::Rigid3& camera_from_map, const Letterbox& image_in_canvas,
-                std::span<const std::string> faint, Canvas* canvas) {
-  for (const content::Entity& entity : scene.entities) {
-    if (entity.kind != content::Entity::Kind::kLabel) continue;
-    if (entity.hidden && std::find(faint.begin(), faint.end(), entity.name) == faint.end()) continue;
-    const double opacity = entity.hidden ? kFaintOpacity : 1;
-    const auto label = Projected(entity.label, camera, camera_from_map, image_in_canvas);
-    if (!label) continue;
-    DrawLeader(*label, opacity, canvas);
-    const std::string& text = content::ShownText(entity, language);
-    const TextStyle style = LabelStyle(label->text_px);
-    const Eigen::Vector2d size = canvas->Measure(text, style);
-    const Eigen::Vector2d padding = label->text_px * Eigen::Vector2d(kPaddingX, kPaddingY);
-    const Eigen::Vector2d low =
-        label->foot - Eigen::Vector2d(0.5 * size.x() + padding.x(), size.y() + 2 * padding.y());
-    const Eigen::Vector2d high(label->foot.x() + 0.5 * size.x() + padding.x(), label->foot.y());
-    canvas->Box(low, high, 0.25 * label->text_px, Dimmed(theme::kHeadsUp, opacity));
-    canvas->Text(text, style, {label->foot.x(), low.y() + padding.y()}, 0.5, opacity);
+void DrawLabels(const content::Scene& scene, const LabelView& view, Canvas* canvas) {
+  std::vector<PlacedLabel> labels = LabelsInView(scene, view, canvas);
+  MoveApart(*canvas, &labels);
+  for (const PlacedLabel& label : labels) DrawLeader(label.drawn, label.board, label.opacity, canvas);
+  for (const PlacedLabel& label : labels) {
+    if (label.board.isEmpty()) continue;
+    const double text_px = label.drawn.text_px;
+    canvas->Box(label.board.min(), label.board.max(), 0.25 * text_px, Dimmed(theme::kHeadsUp, label.opacity));
+    canvas->Text(*label.text, label.style,
+                 {label.board.center().x(), label.board.min().y() + text_px * kPaddingY}, 0.5, label.opacity);
   }
 }
 

@@ -12,7 +12,7 @@
 #include "ui/letterbox.h"
 
 // Labels: boards with text that are drawn over the image, at the resolution of the canvas, and leader lines
-// to what they are about. Nothing hides them, and their texts are readable from any distance.
+// to what they are about. Nothing hides them, and their texts are readable wherever their boards are drawn.
 namespace docent::ui {
 
 // The pose of a label's board for a reader at eye_in_map (map units): the middle of its lower edge is at the
@@ -26,11 +26,18 @@ std::shared_ptr<const content::Model> LabelBoardShape(const std::string& text);
 // The opacity of hidden content that is drawn all the same, because an author has selected it.
 inline constexpr double kFaintOpacity = 0.35;
 
-// Draws all labels of a scene that are not hidden, and those of the hidden ones whose names are in `faint`
-// faintly. `image_in_canvas` says where the camera's image is in the
-// canvas; a label whose board is outside of it is left out. `language` chooses the texts (TextFor).
-void DrawLabels(const content::Scene& scene, const std::string& language, const engine::CameraModel& camera,
-                const engine::Rigid3& camera_from_map, const Letterbox& image_in_canvas,
-                std::span<const std::string> faint, Canvas* canvas);
+// For whom labels are drawn.
+struct LabelView {
+  const engine::CameraModel& camera;
+  const engine::Rigid3& camera_from_map;
+  Letterbox image_in_canvas;                // Where the camera's image is in the canvas.
+  const std::string& language;              // Of the reader; it chooses the texts (TextFor).
+  std::span<const std::string> faint = {};  // Hidden labels that are drawn all the same, faintly, by name.
+};
+
+// Draws all labels of a scene that are not hidden. Boards that would cover each other are moved apart, at the
+// ends of their leader lines. A label whose board is outside of the image is left out; one so far away that
+// its board would have to be magnified more than fourfold to be read is shown as a dot.
+void DrawLabels(const content::Scene& scene, const LabelView& view, Canvas* canvas);
 
 }  // namespace docent::ui

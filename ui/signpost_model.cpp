@@ -7,12 +7,14 @@
 #include <opencv2/imgproc.hpp>
 
 #include "ui/text.h"
+#include "ui/theme.h"
 
 namespace docent::ui {
 namespace {
 
-constexpr int kMaxTextWidthPx = 900,
-              kMaxTextHeightPx = 640;  // With padding and strip, the texture stays below 1024.
+// With padding and strip, the texture stays below 1024. At the smaller size of the text, five lines fit; a
+// longer text ends with an ellipsis, and its card has all of it (content::CardOf).
+constexpr int kMaxTextWidthPx = 900, kMaxTextHeightPx = 300;
 constexpr int kPaddingPx = 28, kStripHeightPx = 84, kStripTextPx = 44;
 constexpr double kWantedAspect = 1.9;
 constexpr float kPoleHeight = static_cast<float>(content::kSignpostPole), kPoleRadius = 0.035f,
@@ -22,13 +24,15 @@ constexpr float kPoleHeight = static_cast<float>(content::kSignpostPole), kPoleR
 constexpr float kArrowLength = 0.8f, kArrowHead = 0.36f, kArrowHeadRadius = 0.2f, kArrowShaftRadius = 0.08f;
 constexpr double kArrowAboveBoard = 0.45;
 
-const cv::Scalar kBoardColor(70, 44, 22, 255), kStripColor(38, 122, 232, 255);
-constexpr Color kTextColor{0.97f, 0.96f, 0.92f, 1.0f};
+cv::Scalar BgraOf(const Color& color) {
+  return 255 * cv::Scalar(color.blue, color.green, color.red, color.alpha);
+}
 
-// Renders the text at the largest size at which all of it fits, wrapped to a balanced aspect ratio.
+// Renders the text at the largest size at which all of it fits, wrapped to a balanced aspect ratio. It does
+// not become smaller than three quarters of the largest size: small texts are not read.
 cv::Mat LayOutText(const std::string& text) {
   cv::Mat best;
-  for (const double size_px : {64.0, 48.0, 34.0, 24.0}) {
+  for (const double size_px : {64.0, 48.0}) {
     double best_misfit = 1e30;
     for (const int width : {300, 420, 580, 740, kMaxTextWidthPx}) {
       TextStyle style;
@@ -37,7 +41,7 @@ cv::Mat LayOutText(const std::string& text) {
       style.centered = true;
       style.max_width_px = width;
       style.max_height_px = kMaxTextHeightPx;
-      style.color = kTextColor;
+      style.color = theme::kSignText;
       bool is_cut = false;
       const cv::Mat image = DrawText(text, style, &is_cut);
       const double misfit = std::abs(std::log(static_cast<double>(image.cols) / image.rows / kWantedAspect)) +
@@ -76,17 +80,17 @@ cv::Mat DrawBoard(const std::string& words, const std::string& to_map) {
     style.size_px = kStripTextPx;
     style.max_width_px = kMaxTextWidthPx;
     style.max_height_px = kStripHeightPx - 8;
-    style.color = kTextColor;
+    style.color = theme::kSignStripText;
     target_name = DrawText(to_map, style);
   }
   const int strip = points_on ? kStripHeightPx : 0;
   const int height = text.rows + 2 * kPaddingPx + strip;
   const int width = std::max(
       {text.cols + 3 * kPaddingPx, height * 5 / 4, points_on ? target_name.cols + 2 * kPaddingPx : 0});
-  cv::Mat board(height, width, CV_8UC4, kBoardColor);
+  cv::Mat board(height, width, CV_8UC4, BgraOf(theme::kSignBoard));
   Lay(text, (width - text.cols) / 2, (height - strip - text.rows) / 2, &board);
   if (points_on) {
-    board.rowRange(height - strip, height) = kStripColor;
+    board.rowRange(height - strip, height) = BgraOf(theme::kSignStrip);
     Lay(target_name, (width - target_name.cols) / 2, height - strip + (strip - target_name.rows) / 2, &board);
   }
   return board;

@@ -51,7 +51,12 @@ std::span<const TextOnGround> TextPairs() {
       TextOnGround{"remark on the panel", kMutedText, kPanel},
       TextOnGround{"hint in a field", kMutedText, kField},
       TextOnGround{"advice on the panel", kAccentText, kPanel},
-      TextOnGround{"text over the image", kText, Blend(kHeadsUp, kWhite)},
+      TextOnGround{"text over the image", kText, Blend(kHeadsUp, kWhite), 7},
+      TextOnGround{"text of a card", kText, kPanel, 7},
+      TextOnGround{"hint of a card", kMutedText, kPanel, 7},
+      TextOnGround{"chosen row of the menu", kText, kButton, 7},
+      TextOnGround{"text of a signpost", kSignText, kSignBoard, 7},
+      TextOnGround{"map that a signpost leads to", kSignStripText, kSignStrip, 7},
   };
   return kPairs;
 }

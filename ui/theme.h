@@ -19,9 +19,14 @@ inline constexpr Color kButtonActive{0.145f, 0.247f, 0.349f, 1.0f};
 inline constexpr Color kSelectedRow{0.212f, 0.318f, 0.420f, 1.0f};
 inline constexpr Color kError{0.329f, 0.098f, 0.102f, 1.0f};
 inline constexpr Color kDone{0.098f, 0.227f, 0.161f, 1.0f};
-inline constexpr Color kHeadsUp{0.05f, 0.07f, 0.10f, 0.66f};
+inline constexpr Color kHeadsUp{0.05f, 0.07f, 0.10f, 0.78f};
+// Boards of signposts, and the strip with the name of the map that one leads to.
+inline constexpr Color kSignBoard{0.086f, 0.173f, 0.275f, 1.0f};
+inline constexpr Color kSignStrip{1.0f, 0.769f, 0.353f, 1.0f};
 // Texts and lines.
 inline constexpr Color kText{0.953f, 0.957f, 0.945f, 1.0f};
+inline constexpr Color kSignText{0.97f, 0.96f, 0.92f, 1.0f};
+inline constexpr Color kSignStripText{0.04f, 0.08f, 0.13f, 1.0f};
 inline constexpr Color kMutedText{0.690f, 0.733f, 0.776f, 1.0f};
 inline constexpr Color kAccentText{1.0f, 0.796f, 0.420f, 1.0f};
 inline constexpr Color kBorder{0.290f, 0.333f, 0.392f, 1.0f};
@@ -36,6 +41,8 @@ inline constexpr Color kAxisRight{1.0f, 0.40f, 0.38f, 1.0f}, kAxisUp{0.45f, 0.88
 struct TextOnGround {
   const char* where;
   Color text, ground;
+  // WCAG 2.1: 4.5 (AA) in the author's window, 7 (AAA) for visitors, who read in any light.
+  double least_contrast = 4.5;
 };
 // All such pairs. A ground that is not opaque is given as it looks over a white image, the worst case.
 std::span<const TextOnGround> TextPairs();
