@@ -120,6 +120,13 @@ Eigen::Vector2d Canvas::Measure(const std::string& text, const TextStyle& style)
   return text.empty() ? Eigen::Vector2d(Eigen::Vector2d::Zero()) : FindLabel(text, style).size;
 }
 
+void Canvas::Image(GLuint texture, const Eigen::Vector2d& low, const Eigen::Vector2d& high) {
+  UseTexture(texture);
+  const Eigen::Vector2d corners[4] = {low, {high.x(), low.y()}, high, {low.x(), high.y()}};
+  const Eigen::Vector2d locals[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  AddQuad(corners, locals, {0, 0, 0, 0, -1, 0, 0, 0, {1, 1, 1, 1}});
+}
+
 void Canvas::AddShape(const Eigen::Vector2d& center, const Eigen::Vector2d& half_size,
                       const Eigen::Vector2d& axis, const Vertex& shape) {
   if (!center.allFinite() || !half_size.allFinite()) return;

@@ -35,6 +35,8 @@ class Canvas {
   Eigen::Vector2d Text(const std::string& text, const TextStyle& style, const Eigen::Vector2d& position,
                        double align = 0, double alpha = 1);
   Eigen::Vector2d Measure(const std::string& text, const TextStyle& style);
+  // Draws a texture (premultiplied, row 0 at the top), which must exist until End.
+  void Image(GLuint texture, const Eigen::Vector2d& low, const Eigen::Vector2d& high);
 
   int width_px() const { return width_px_; }
   int height_px() const { return height_px_; }

@@ -34,6 +34,13 @@ PixelRectangle RectangleOf(const LensFace& face, const MeshDrawer::Cover& cover)
   return {face.x_px + x, face.y_px + y, width, height};
 }
 
+// The time of an entity's animation.
+double SecondsOf(const content::Entity& entity, const ContentLayer::What& what) {
+  if (what.animation_starts == nullptr) return what.animation_seconds;
+  const auto start = what.animation_starts->find(entity.name);
+  return start == what.animation_starts->end() ? 0 : std::max(0.0, what.animation_seconds - start->second);
+}
+
 }  // namespace
 
 ContentLayer::ContentLayer(int samples, int max_texture_px, const std::string& language)
@@ -45,6 +52,10 @@ ContentLayer::ContentLayer(int samples, int max_texture_px, const std::string& l
 }
 
 ContentLayer::~ContentLayer() = default;
+
+void ContentLayer::SetSamples(int samples) {
+  if (std::exchange(samples_, samples) != samples) lenses_.clear();  // They are made anew with it.
+}
 
 void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
                         const content::Scene& scene, const What& what, const RenderTarget& image) {
@@ -164,7 +175,7 @@ ContentLayer::Drawn ContentLayer::Instances(const content::Scene& scene, const E
       instance.model = std::move(shape.model);
       instance.map_from_model = GlmFrom(shape.map_from_model);
       if (entity.kind == content::Entity::Kind::kModel) instance.animation = entity.model.animation;
-      instance.seconds = what.animation_seconds;
+      instance.seconds = SecondsOf(entity, what);
       (faint ? drawn.faint : drawn.plain).push_back(std::move(instance));
     }
   }

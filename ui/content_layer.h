@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -30,7 +31,8 @@ class ContentLayer {
   // What is drawn of a scene, and how.
   struct What {
     double animation_seconds = 0;
-    bool markers = false;  // Where sounds are.
+    const std::map<std::string, double>* animation_starts = nullptr;  // See View.
+    bool markers = false;                                             // Where sounds are.
     std::span<const std::string> faint =
         {};  // Hidden entities that are drawn all the same, faintly, by name.
     std::shared_ptr<const engine::SurfaceMesh> surfaces =
@@ -40,6 +42,8 @@ class ContentLayer {
   // the top. Pixels that no content covers keep their exact values. Labels are not drawn (see label_board.h).
   void Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
             const content::Scene& scene, const What& what, const RenderTarget& image);
+  // From the next Draw on.
+  void SetSamples(int samples);
   std::size_t cached_models() const { return mesh_drawer_.cached_models(); }
 
  private:

@@ -19,11 +19,6 @@ void DrawPoints(const engine::TrackedFrame& tracked, Canvas* canvas);
 void DrawKeyFrames(const engine::MapSnapshot& map, const engine::CameraModel& camera,
                    const engine::Rigid3& camera_from_map, Canvas* canvas);
 
-// The size and place of the texts of DrawHeadsUp.
-struct HeadsUpStyle {
-  double unit_px = 1;    // Pixels of the canvas per unit; a text of normal size has 15 units.
-  double bottom_px = 0;  // Height at the bottom that the sentences leave free.
-};
 // For a canvas of this height: texts and lines grow with it, so that they stay readable in a large image.
 HeadsUpStyle HeadsUpStyleFor(int height_px);
 

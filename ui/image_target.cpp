@@ -33,6 +33,21 @@ void ImageTarget::DrawVideo(const cv::Mat& image) {
   DrawImage(image, {0, 0, target_->width_px(), target_->height_px()});
 }
 
+void ImageTarget::DrawBlack() {
+  glClearColor(0.0f, 0.0f, 0.0f, 1.0f);
+  glClear(GL_COLOR_BUFFER_BIT);
+}
+
+void ImageTarget::CopyInto(const ImageTarget& other, const Inset& inset) {
+  if (target_ == nullptr || other.target_ == nullptr) return;
+  target_->BindForDrawing();
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, other.target_->readable_framebuffer());
+  // Row 0 of both is the top.
+  glBlitFramebuffer(0, 0, inset.width, inset.height, inset.x, inset.y, inset.x + inset.width,
+                    inset.y + inset.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  target_->BindForDrawing();
+}
+
 void ImageTarget::DrawInset(const cv::Mat& image, const Inset& inset) {
   if (target_ == nullptr || !IsUsable(image)) return;
   target_->BindForDrawing();

@@ -20,6 +20,11 @@ class ImageTarget {
   // Fills the bound target with a video image (CV_8UC3 BGR or CV_8UC1) of any size; an empty image gives a
   // dark background. An image of the target's size keeps its exact pixel values.
   void DrawVideo(const cv::Mat& image);
+  // Fills the bound target with black.
+  void DrawBlack();
+  // Copies the image of another target, which is as large as the `inset` rectangle, to that place, and binds
+  // this one for drawing.
+  void CopyInto(const ImageTarget& other, const Inset& inset);
   // Draws a second image into the `inset` rectangle of the target; an empty image draws nothing.
   void DrawInset(const cv::Mat& image, const Inset& inset);
   // Copies the target to *image as CV_8UC3 (BGR) and reuses its memory if it fits. *image is empty before the

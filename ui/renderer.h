@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -22,6 +23,26 @@ struct WayOn {
   std::string text;  // "To the lions".
 };
 
+// Something in view of which a visitor can open a card.
+struct CardTarget {
+  std::string entity;                              // Its name.
+  Eigen::Vector2d low = Eigen::Vector2d::Zero();   // The rectangle of the camera's image that it covers,
+  Eigen::Vector2d high = Eigen::Vector2d::Zero();  // in pixels.
+};
+
+// What a visitor has opened; it is drawn over everything but the sentences at the bottom.
+struct Card {
+  std::string entity;  // The name of what was opened.
+  std::string text;    // The page that is read; may be empty.
+  std::string hint;    // How one goes on.
+  // A model or an image, which is shown alone, whatever its pose; null for none.
+  std::shared_ptr<const content::Entity> shown;
+  double seconds = 0;  // Since it was opened; animations begin with it.
+  // How far the model was turned by hand, about the vertical and the horizontal axis. Empty: it turns by
+  // itself.
+  std::optional<Eigen::Vector2d> turned_rad;
+};
+
 // What a visitor on a tour is told, without the words of an engineer.
 struct VisitorDisplay {
   std::string place;               // The name of the place where the visitor is; empty while it is not known.
@@ -39,6 +60,17 @@ struct VisitorDisplay {
   std::vector<std::string> route_stops;  // A line for each stop.
   bool lists_route = false;              // Whether these lines are shown.
   bool is_right_to_left = false;         // Texts begin at the right.
+  // What has a card, and which of it the one button opens.
+  std::vector<CardTarget> targets;
+  std::optional<std::size_t> marked;
+  // With gaze alone: how much of the time has passed after which what is looked at opens, 0 to 1. Empty
+  // without.
+  std::optional<double> dwell;
+  std::optional<Card> card;
+  // The choices of the menu while it is open, and the one that is chosen by the next long press.
+  std::vector<std::string> menu;
+  std::size_t chosen = 0;
+  bool has_menu_button = false;
 };
 
 // What is drawn besides the video and the content.
@@ -62,8 +94,19 @@ struct Overlay {
   // The newest frame of another camera, of any size; null for none. It is shown small in a corner (see
   // inset.h) with a border whose colour is its tracking state.
   const engine::TrackedFrame* inset = nullptr;
-  bool markers = false;  // Where sounds are, for authors.
-  std::string caption;   // Of the sounds that play, near the bottom; empty for none.
+  // The content that the other camera sees, with its lens; null for none.
+  const content::Scene* inset_scene = nullptr;
+  const engine::CameraModel* inset_camera = nullptr;
+  std::string inset_text;  // Where the other camera is, below its image.
+  bool markers = false;    // Where sounds are, for authors.
+  std::string caption;     // Of the sounds that play, near the bottom; empty for none.
+};
+
+// The size and place of the texts over the image.
+struct HeadsUpStyle {
+  double unit_px = 1;    // Pixels of the canvas per unit; a text of normal size has 15 units.
+  double bottom_px = 0;  // Height at the bottom that the sentences leave free.
+  double target_px = 0;  // The least side of what is touched; 0 where nothing is.
 };
 
 // All inputs of one output image. The video, pose and content always belong to the same frame.
@@ -74,12 +117,18 @@ struct View {
   // Where the camera was a moment ago. If the frame has no pose, the content is drawn from there. Null for
   // none.
   const engine::Rigid3* held_camera_from_map = nullptr;
+  // From where the content is seen, if not from the camera: by an eye beside it. Null for the camera. The
+  // frame must have a pose, or a held one.
+  const engine::Rigid3* seen_from_map = nullptr;
+  bool shows_video = true;  // False: the content is on black, as see-through displays need it.
   // What hides content behind it, in the map of the scene; null: nothing does.
   std::shared_ptr<const engine::SurfaceMesh> surfaces;
   // Names of hidden entities that are drawn all the same, faintly, because an author has selected them.
   std::span<const std::string> faint = {};
   double animation_seconds = 0;  // Time of the animations of the models, which repeat.
-  Overlay overlay;               // What is drawn on top.
+  // When they began, by the name of the entity; others stand still at their beginning. Null: all at 0.
+  const std::map<std::string, double>* animation_starts = nullptr;
+  Overlay overlay;  // What is drawn on top.
 };
 
 // Quality against speed.
@@ -106,15 +155,18 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  // Draws into the internal framebuffer at the size of the camera's image.
+  // Draws into the internal framebuffer at the size of the camera's image, or at a multiple of it
+  // (SetQuality).
   void Draw(const View& view);
+  // From the next Draw on: `samples` as in RendererOptions, and the size of the drawn image in sizes of the
+  // camera's (1 at first), with which ReadBack and the camera's pixels agree only at 1.
+  void SetQuality(int samples, double scale);
   // Shows the last drawn image in the default framebuffer, letterboxed to width_px x height_px.
   void Present(int width_px, int height_px);
   // Shows the last drawn image in a part of the default framebuffer, letterboxed, and over it the view's
   // heads-up display at the window's resolution, whatever that of the camera is; the image should have been
-  // drawn without it. `unit_px` is the size of the texts: normal ones have 15 units. The sentences at the
-  // bottom leave bottom_px free.
-  void PresentWithHeadsUp(const View& view, const WindowPart& part, double unit_px, double bottom_px);
+  // drawn without it.
+  void PresentWithHeadsUp(const View& view, const WindowPart& part, const HeadsUpStyle& style);
   // Reads back the last drawn image as CV_8UC3 (BGR). *image's memory is reused if it fits.
   void ReadBack(cv::Mat* image);
   // The same with the view's heads-up display, which the drawn image shall not have. The drawn image is not

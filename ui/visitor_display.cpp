@@ -7,6 +7,7 @@
 #include "ui/figures.h"
 #include "ui/letterbox.h"
 #include "ui/theme.h"
+#include "ui/visitor_layout.h"
 
 namespace docent::ui {
 
@@ -86,6 +87,53 @@ void DrawWayOn(const WayOn& way, const engine::CameraModel& camera, double unit,
   canvas->Text(way.text, style, middle - 0.5 * size);
 }
 
+// Corners around what the one button opens.
+void DrawMark(const CardTarget& target, const engine::CameraModel& camera, double unit, Canvas* canvas) {
+  const Letterbox box =
+      FitImage(camera.width_px(), camera.height_px(), canvas->width_px(), canvas->height_px());
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(5 * unit);
+  const Eigen::Vector2d last(canvas->width_px() - 1, canvas->height_px() - 1);
+  const Eigen::Vector2d low = (box.WindowFromImage(target.low) - margin).cwiseMax(margin),
+                        high = (box.WindowFromImage(target.high) + margin).cwiseMin(last - margin);
+  const Eigen::Vector2d leg = (0.25 * (high - low)).cwiseMin(22 * unit).cwiseMax(6 * unit);
+  for (const auto& [width, color] : {std::pair(5 * unit, kBoard), std::pair(2.5 * unit, kWay)}) {
+    for (const Eigen::Vector2d& side :
+         {Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, 1), Eigen::Vector2d(1, -1), Eigen::Vector2d(-1, -1)}) {
+      const Eigen::Vector2d corner(side.x() > 0 ? low.x() : high.x(), side.y() > 0 ? low.y() : high.y());
+      canvas->Line(corner, corner + Eigen::Vector2d(side.x() * leg.x(), 0), width, color);
+      canvas->Line(corner, corner + Eigen::Vector2d(0, side.y() * leg.y()), width, color);
+    }
+  }
+}
+
+// The button of the menu, and its choices while it is open.
+void DrawMenu(const VisitorDisplay& visitor, const HeadsUpStyle& style, Canvas* canvas) {
+  const MenuLayout layout = LayOutMenu(visitor, canvas->width_px(), canvas->height_px(), style);
+  const double unit = style.unit_px;
+  const Area& button = layout.button;
+  if (button.width > 0 && layout.choices.empty()) {
+    canvas->Box({button.x, button.y}, {button.right(), button.bottom()}, 8 * unit, kBoard);
+    for (const double share : {0.32, 0.5, 0.68})
+      canvas->Line({button.x + 0.28 * button.width, button.y + share * button.height},
+                   {button.x + 0.72 * button.width, button.y + share * button.height}, 2.5 * unit, kTitle);
+  }
+  for (std::size_t i = 0; i < layout.choices.size(); ++i) {
+    const Area& area = layout.choices[i];
+    canvas->Box({area.x, area.y}, {area.right(), area.bottom()}, 10 * unit,
+                i == visitor.chosen ? theme::kButton : theme::kPanel);
+    canvas->Box({area.x, area.y}, {area.right(), area.bottom()}, 10 * unit,
+                i == visitor.chosen ? kWay : theme::kBorder, 2 * unit);
+    TextStyle text;
+    text.size_px = 20 * unit;
+    text.max_width_px = std::max(40, static_cast<int>(area.width - 20 * unit));
+    text.max_height_px = std::max(20, static_cast<int>(area.height));
+    text.color = kTitle;
+    const double height = canvas->Measure(visitor.menu[i], text).y();
+    canvas->Text(visitor.menu[i], text, {area.x + 0.5 * area.width, area.y + 0.5 * (area.height - height)},
+                 0.5);
+  }
+}
+
 // Names below each other in the upper half of the image, at least as low as `highest`. The last line says if
 // some do not fit.
 void DrawStops(const std::vector<std::string>& stops, double highest, bool at_right, double unit,
@@ -142,6 +190,12 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
         (visitor.stops.empty() && visitor.views.empty() ? 0.5 : 0.66) * canvas->height_px());
     DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
   }
+  if (visitor.marked && *visitor.marked < visitor.targets.size() && view.camera != nullptr)
+    DrawMark(visitor.targets[*visitor.marked], *view.camera, unit, canvas);
+  if (visitor.dwell) {
+    const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.5 * (canvas->height_px() - 1));
+    DrawProgressRing(middle, 16 * unit, *visitor.dwell, canvas);
+  }
   if (visitor.way_on && view.camera != nullptr) DrawWayOn(*visitor.way_on, *view.camera, unit, canvas);
   const double top =
       DrawInCorner(visitor.place, 10 * unit, {18 * unit, true, visitor.is_right_to_left}, unit, canvas);
@@ -154,6 +208,7 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
   DrawArrival(visitor.place, visitor.arrival, unit, canvas);
   const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;
   DrawSentence(visitor.sentence, 20, bottom, unit, canvas);
+  DrawMenu(visitor, style, canvas);
 }
 
 }  // namespace docent::ui

@@ -77,8 +77,8 @@ struct Window::Impl {
     Of(window).events.push_back(std::move(event));
   }
   static void OnKey(GLFWwindow* window, int key, int, int action, int modifiers) {
-    if (action == GLFW_RELEASE) return;
     InputEvent event;
+    if (action == GLFW_RELEASE) event.kind = InputEvent::Kind::kKeyUp;
     event.key = NameOf(key);
     event.repeated = action == GLFW_REPEAT;
     event.control = (modifiers & GLFW_MOD_CONTROL) != 0;
@@ -152,6 +152,17 @@ std::vector<InputEvent> Window::PollEvents() {
 
 void Window::Show() {
   glfwSwapBuffers(impl_->window);
+}
+
+double Window::PixelsPerMillimetre() const {
+  constexpr double kUsual = 96 / 25.4, kLeast = 2, kMost = 40;  // From a projector to a telephone.
+  GLFWmonitor* const monitor = glfwGetPrimaryMonitor();
+  const GLFWvidmode* const mode = monitor != nullptr ? glfwGetVideoMode(monitor) : nullptr;
+  int width_mm = 0, height_mm = 0;
+  if (monitor != nullptr) glfwGetMonitorPhysicalSize(monitor, &width_mm, &height_mm);
+  const double reported = mode != nullptr && width_mm > 0 ? static_cast<double>(mode->width) / width_mm : 0;
+  const double units = reported >= kLeast && reported <= kMost ? reported : kUsual;
+  return units * FramebufferSize().x() / std::max(1, WindowSize().x());
 }
 
 bool Window::IsClosing() const {

@@ -14,11 +14,11 @@ namespace docent::ui {
 
 // An input event of a window. Positions are in screen units from the window's top-left corner, y down.
 struct InputEvent {
-  enum class Kind { kClick, kRelease, kKey, kDrop, kResize, kClose } kind = Kind::kKey;
+  enum class Kind { kClick, kRelease, kKey, kKeyUp, kDrop, kResize, kClose } kind = Kind::kKey;
   // kClick, kRelease, kDrop: where the button was pressed or released, or the files were dropped.
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   int button = 0;  // kClick, kRelease: 0 left, 1 right, 2 middle
-  // kKey: "a" … "z", "0" … "9", "escape", "space", "enter", "tab", "f1" … "f12", "left", "up" …
+  // kKey, kKeyUp: "a" … "z", "0" … "9", "escape", "space", "enter", "tab", "f1" … "f12", "left", "up" …
   std::string key;
   bool control = false, shift = false;  // kKey, kClick
   bool repeated = false;                // kKey: the key is held
@@ -42,6 +42,9 @@ class Window : public GraphicsContext {
   std::vector<InputEvent> PollEvents();
   // Shows the contents of the default framebuffer; waits for the screen when vertical sync is on.
   void Show();
+  // Of the monitor that the window was opened on, as it reports it; 96 dots per inch where it reports nothing
+  // plausible.
+  double PixelsPerMillimetre() const;
   // Whether the user asked to close the window. KeepOpen takes that back.
   bool IsClosing() const;
   void KeepOpen();

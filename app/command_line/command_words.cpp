@@ -85,7 +85,19 @@ struct DoneWriter {
   }
   std::string operator()(const PasteEntities& c) const { return "Pasted " + NamesText(c.names) + "."; }
   std::string operator()(const GuideVisitor& c) const {
-    return c.step == GuideVisitor::Step::kSkip ? "Skipped a stop." : "Going back to the stop before.";
+    switch (c.step) {
+      case GuideVisitor::Step::kSkip:
+        return "Skipped a stop.";
+      case GuideVisitor::Step::kBack:
+        return "Going back to the stop before.";
+      case GuideVisitor::Step::kOpen:
+        return "Opened the card of " + NamesText({c.name}) + ".";
+      case GuideVisitor::Step::kPress:
+      case GuideVisitor::Step::kMark:
+      case GuideVisitor::Step::kClose:
+        break;
+    }
+    return "";
   }
   std::string operator()(const Undo&) const { return "Undid the last change."; }
   std::string operator()(const Redo&) const { return "Did the change again."; }

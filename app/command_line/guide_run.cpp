@@ -9,8 +9,6 @@
 #include "app/command_line/interruption.h"
 #include "app/files/text_file.h"
 #include "app/output/engine_text.h"
-#include "app/script/format_command.h"
-#include "app/session/route_text.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -34,21 +32,16 @@ std::string SentenceOf(std::string text) {
   return text;
 }
 
+std::vector<std::string> NamesOf(std::span<const CalibratedCamera> cameras) {
+  std::vector<std::string> names;
+  for (const CalibratedCamera& camera : cameras) names.push_back(camera.source->info().name);
+  return names;
+}
+
 std::vector<std::shared_ptr<const engine::CameraModel>> ModelsOf(std::span<CalibratedCamera> cameras) {
   std::vector<std::shared_ptr<const engine::CameraModel>> models;
   for (const CalibratedCamera& camera : cameras) models.push_back(camera.model);
   return models;
-}
-
-// The maps where a visitor can be: the stops of the tour, or all.
-std::vector<std::string> PlaceNames(const GuideRequest& request) {
-  std::vector<std::string> names;
-  if (request.route) {
-    for (const RouteStop& stop : request.route->stops) names.push_back(stop.name);
-  } else if (request.library != nullptr) {
-    for (const maps::MapInfo& map : request.library->List()) names.push_back(map.name);
-  }
-  return names;
 }
 
 SessionOptions SessionOptionsOf(const GuideRequest& request, std::span<CalibratedCamera> cameras) {
@@ -94,17 +87,14 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
       session_(SessionOptionsOf(request, cameras), ModelsOf(cameras), request.library),
       inboxes_(cameras.size()),
       camera_states_(cameras.size()),
-      sound_director_(request.language) {
+      sound_director_(request.language),
+      watch_(NamesOf(cameras), VisitorStringsFor(request.may_write ? "en" : request.language)) {
   if (request.sound) sound_player_.emplace();
-  if (request.route) route_.emplace(*request.route);
-  if (request.narrate && !request.may_write) {
-    const VisitorStrings& strings = VisitorStringsFor(request.language);
-    narration_.emplace(strings);
-    speech_.emplace(strings.language);
-  }
-  if (request.visit_log && !request.may_write) visits_.emplace(*request.visit_log, request.tour);
-  constexpr double kIdle_s = 120;  // As VisitRecorder ends a visit.
-  if (!request.kiosk_code.empty()) idle_watch_.emplace(kIdle_s);
+  if (!request.may_write)
+    host_.emplace(request, &session_, cameras.size(), [this](const Event& event) {
+      files_->Add({event});
+      Warn({event});
+    });
   for (const CalibratedCamera& camera : cameras) tallies_.emplace_back(camera.source->info().name);
   if (!request.head) return;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -141,7 +131,7 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
     files_->Close();
   });
   guarded([&] {
-    if (visits_) visits_->Finish();
+    if (host_) host_->Finish();
   });
   guarded([&] {
     const std::scoped_lock lock(files_mutex_);
@@ -169,10 +159,11 @@ void GuideRun::WriteDelivery() {
 }
 
 void GuideRun::Drawn(const ShownFrame& frame) {
-  if (!frame.taken) return;
-  const Timestamp age = PlayClock().Now() - *frame.taken;
+  const Timestamp now = PlayClock().Now();
   const std::scoped_lock lock(files_mutex_);
-  tallies_[static_cast<std::size_t>(frame.tracked.frame.camera)].AddDrawnAge(age);
+  CameraTally& tally = tallies_[static_cast<std::size_t>(frame.tracked.frame.camera)];
+  tally.AddDrawn(now);
+  if (frame.taken) tally.AddDrawnAge(now - *frame.taken);
 }
 
 SavingState GuideRun::Saving() const {
@@ -216,23 +207,8 @@ void GuideRun::WarnAboutUnknownLenses() {
   }
 }
 
-void GuideRun::WelcomeVisitor(CameraState* state) {
-  state->visitor.emplace(&session_, PlaceNames(request_), VisitorStringsFor(request_.language),
-                         route_ ? &*route_ : nullptr);
-}
-
-// The next visitor of a kiosk begins anew.
-void GuideRun::ForgetVisitorWhoLeft(const ShownFrame& frame, CameraState* state) {
-  const cv::Mat& image = frame.tracked.frame.image;
-  if (!idle_watch_ || image.empty() || !idle_watch_->Update(frame.seconds, image)) return;
-  if (request_.route) route_.emplace(*request_.route);
-  WelcomeVisitor(state);
-  files_->Add({Event{frame.tracked.frame.time, "kiosk", "the device was left; the next visit begins"}});
-}
-
 CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   CameraState& state = camera_states_[i];
-  if (!request_.may_write) WelcomeVisitor(&state);
   CameraRun run;
   run.camera = &cameras_[i];
   run.options.pace = request_.pace;
@@ -244,7 +220,8 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   run.options.model_folder = request_.model_folder;
   run.options.inbox = &inboxes_[i];
   run.options.take = [this](const Command& command, const engine::TrackedFrame& frame) {
-    return LeadVisitor(command, frame);
+    const std::scoped_lock lock(files_mutex_);
+    return host_ && host_->Lead(command, frame);
   };
   run.options.refused = [this, &state](const std::string& reason) { HandleRefused(reason, &state); };
   run.options.carried_out = [this, &state](const TimedCommand& command) {
@@ -286,24 +263,6 @@ void GuideRun::HandleRefused(const std::string& reason, CameraState* state) {
   }
 }
 
-bool GuideRun::LeadVisitor(const Command& command, const engine::TrackedFrame& frame) {
-  const auto* const guide = std::get_if<GuideVisitor>(&command);
-  if (guide == nullptr || !route_) return false;
-  const std::scoped_lock lock(files_mutex_);
-  const VisitorStrings& strings = VisitorStringsFor(request_.language);
-  if (guide->step == GuideVisitor::Step::kSkip && !route_->Skip()) throw Error(strings.no_further_stop);
-  if (guide->step == GuideVisitor::Step::kBack && !route_->GoBack()) throw Error(strings.no_stop_before);
-  files_->Add({Event{frame.frame.time, "command", FormatCommand(command)}});
-  AddRouteEvents(frame.frame.time);
-  return true;
-}
-
-void GuideRun::AddRouteEvents(Timestamp time) {
-  if (!route_) return;
-  for (const RouteEvent& event : route_->TakeEvents())
-    files_->Add({Event{time, "tour", TextOf(event, *route_)}});
-}
-
 void GuideRun::HandleCarriedOut(const TimedCommand& command, CameraState* state) {
   if (has_author_window()) {
     notices_.Push({"", command.command});
@@ -333,6 +292,14 @@ void GuideRun::HandleTrouble(const std::string& sentence, Timestamp time, const 
   show(std::move(frame));
 }
 
+void GuideRun::Watch(const engine::TrackedFrame& tracked) {
+  RunWatch::Notices notices = watch_.Add(tracked);
+  files_->Add(notices.events);
+  Warn(notices.events);
+  // An author has the warning.
+  if (!has_author_window() && !notices.sentence.empty()) noticed_ = std::move(notices.sentence);
+}
+
 void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state) {
   if (Interruption::requested()) stop_.request_stop();
   const std::optional<Timestamp> age = std::exchange(state->age, std::nullopt);
@@ -346,6 +313,7 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
     const std::scoped_lock lock(files_mutex_);
     CameraTally& tally = tallies_[static_cast<std::size_t>(tracked.frame.camera)];
     tally.Add(tracked);
+    Watch(tracked);
     if (age) tally.AddTrackedAge(*age);
     files_->Add(*frame);
     const std::vector<Event> events = session_.TakeEvents();
@@ -399,6 +367,9 @@ void GuideRun::PlaySounds(ShownFrame* frame) {
   std::optional<Eigen::Vector3d> place;
   if (engine::HasPose(tracked.state)) place = tracked.camera_from_map.OriginInSource();
   static const content::Scene kNoScene;
+  if (host_) {
+    for (const SoundDirector::Key& key : host_->TakeAskedSounds()) sound_director_.Ask(key.first, key.second);
+  }
   const auto orders = sound_director_.Update(frame->seconds, tracked.map_key,
                                              frame->shown.scene ? *frame->shown.scene : kNoScene, place);
   frame->caption = orders.caption;
@@ -416,20 +387,6 @@ void GuideRun::ReportProblem(const std::string& problem, Timestamp time) {
   Warn(events);
 }
 
-void GuideRun::Narrate(const ShownFrame& frame, const engine::CameraModel& camera) {
-  if (!narration_ || !frame.visitor) return;
-  Narration::Seen seen{.seconds = frame.seconds, .display = &*frame.visitor, .way = nullptr, .signs = {}};
-  if (frame.way) seen.way = &*frame.way;
-  if (engine::HasPose(frame.tracked.state) && frame.shown.scene)
-    seen.signs = SignsInView(*frame.shown.scene, camera, frame.tracked.camera_from_map, request_.language);
-  const Timestamp time = frame.tracked.frame.time;
-  for (std::string& text : narration_->Update(seen)) {
-    files_->Add({Event{time, "narration", text}});
-    speech_->Say(std::move(text));
-  }
-  ReportProblem(speech_->TakeProblem(), time);
-}
-
 std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& tracked, CameraState* state) {
   auto frame = std::make_shared<ShownFrame>();
   frame->tracked = tracked;
@@ -442,19 +399,17 @@ std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& trac
     state->message.clear();
     state->message_end_s.reset();
   }
+  if (tracked.frame.camera == 0 && !noticed_.empty() && state->message.empty()) {
+    constexpr double kShown_s = 8;  // Long enough to read two lines twice.
+    state->message = std::exchange(noticed_, {});
+    state->message_end_s = frame->seconds + kShown_s;
+  }
   frame->message = state->message;
   // What the window shows as a warning already is not shown twice.
   if (state->message.empty() && !warnings_.contains(frame->shown.advice))
     frame->message = frame->shown.advice;
   const engine::CameraModel& camera = frame->camera ? *frame->camera : *cameras_[CameraOf(tracked)].model;
-  if (tracked.frame.camera == 0) ForgetVisitorWhoLeft(*frame, state);
-  if (state->visitor) state->visitor->Guide(frame, camera);
-  if (tracked.frame.camera == 0) Narrate(*frame, camera);
-  if (tracked.frame.camera == 0 && visits_) {
-    visits_->Add(*frame, route_ ? &*route_ : nullptr);
-    ReportProblem(visits_->TakeProblem(), tracked.frame.time);
-  }
-  AddRouteEvents(tracked.frame.time);
+  if (host_) host_->Guide(CameraOf(tracked), camera, frame);
   if (tracked.frame.camera == 0) PlaySounds(frame.get());
   return frame;
 }

@@ -14,14 +14,11 @@
 #include "app/command_line/guide_files.h"
 #include "app/command_line/guide_window.h"
 #include "app/command_line/run_guide.h"
-#include "app/command_line/visit_keeper.h"
+#include "app/command_line/run_watch.h"
+#include "app/command_line/visitor_host.h"
 #include "app/evaluation/camera_report.h"
-#include "app/session/idle_watch.h"
-#include "app/session/narration.h"
-#include "app/session/visitor_guide.h"
 #include "app/sound/sound_director.h"
 #include "app/sound/sound_player.h"
-#include "app/sound/speech.h"
 #include "maps/hub/hub_follower.h"
 
 namespace docent::app {
@@ -41,6 +38,8 @@ class GuideRun {
 
   // Records the latency of a frame that is now on the screen or in the video. Any thread, as all below.
   void Drawn(const ShownFrame& frame);
+  // Adds to the events what the window does about the machine's load.
+  void Adapted(const std::string& text) { session_.AddEvent("load", text); }
   std::span<CommandInbox> inboxes() { return inboxes_; }
   // For the author's window; without one they are not filled.
   NoticeQueue* notices() { return &notices_; }
@@ -59,21 +58,14 @@ class GuideRun {
     std::string message;
     std::optional<double> message_end_s;  // When a visitor no longer needs it; empty for never.
     std::shared_ptr<const ShownFrame> last;
-    std::optional<VisitorGuide> visitor;  // Only on a tour.
-    bool has_ended = false;               // The recording; its last image stays.
+    bool has_ended = false;  // The recording; its last image stays.
   };
 
   void WarnAboutUnknownLenses();
   // Lets the library follow its hub until the follower is destroyed.
   void FollowHub(std::optional<maps::HubFollower>* follower);
   CameraRun RunOf(std::size_t i, const Show& show);
-  void WelcomeVisitor(CameraState* state);
-  // With files_mutex_ held.
-  void ForgetVisitorWhoLeft(const ShownFrame& frame, CameraState* state);
   void HandleRefused(const std::string& reason, CameraState* state);
-  bool LeadVisitor(const Command& command, const engine::TrackedFrame& frame);
-  // What happened on the tour, with files_mutex_ held.
-  void AddRouteEvents(Timestamp time);
   void HandleCarriedOut(const TimedCommand& command, CameraState* state);
   void HandleTrouble(const std::string& sentence, Timestamp time, const Show& show, CameraState* state);
   void HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state);
@@ -84,12 +76,12 @@ class GuideRun {
   void Direct(const std::shared_ptr<const ShownFrame>& frame);
   // The sounds that are near the first camera, and their captions. With files_mutex_ held.
   void PlaySounds(ShownFrame* frame);
-  // Speaks what the visitor at the first camera is told. With files_mutex_ held.
-  void Narrate(const ShownFrame& frame, const engine::CameraModel& camera);
   // Adds the sentence, if there is one, to the events and to the window's warnings. With files_mutex_ held.
   void ReportProblem(const std::string& problem, Timestamp time);
   std::shared_ptr<ShownFrame> MakeShown(const engine::TrackedFrame& tracked, CameraState* state);
   void WriteDelivery();
+  // Reports what goes wrong with the cameras. With files_mutex_ held.
+  void Watch(const engine::TrackedFrame& tracked);
 
   const GuideRequest& request_;
   const std::span<CalibratedCamera> cameras_;
@@ -98,19 +90,17 @@ class GuideRun {
   Session session_;
   std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
   std::vector<CameraState> camera_states_;
-  SoundDirector sound_director_;             // Used for the frames of the first camera.
-  std::optional<SoundPlayer> sound_player_;  // Only if sounds are to be heard.
-  std::optional<Narration> narration_;       // Of the first camera; only with `narrate`, as speech_.
-  std::optional<Speech> speech_;
-  std::optional<IdleWatch> idle_watch_;  // Of the first camera; only of a kiosk.
-  std::optional<VisitKeeper> visits_;    // Of the first camera; only with a folder for their records.
+  SoundDirector sound_director_;                     // Used for the frames of the first camera.
+  std::optional<SoundPlayer> sound_player_;          // Only if sounds are to be heard.
+  std::optional<VisitorHost> host_;                  // Only on a tour. Used with files_mutex_ held.
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
   NoticeQueue notices_;
-  std::mutex files_mutex_;            // Guards files_, tallies_, warnings_ and route_.
-  std::optional<RouteState> route_;   // Only on a tour with stops.
+  std::mutex files_mutex_;            // Guards files_, tallies_, warnings_, host_, watch_ and noticed_.
   std::set<std::string> warnings_;    // Those that the window was told of.
   std::vector<CameraTally> tallies_;  // By camera.
+  RunWatch watch_;
+  std::string noticed_;  // What the person at the first camera is told next; empty for nothing.
   std::optional<GuideFiles> files_;
 };
 

@@ -6,47 +6,18 @@
 #include <algorithm>
 #include <utility>
 
+#include "app/command_line/adaptive_quality.h"
 #include "app/command_line/author_controls.h"
 #include "app/command_line/interruption.h"
-#include "app/command_line/kiosk.h"
 #include "app/command_line/map_panel.h"
+#include "app/command_line/visitor_controls.h"
 #include "app/command_line/window_times.h"
+#include "app/session/eye_view.h"
 #include "ui/inset.h"
 #include "ui/letterbox.h"
 #include "ui/window.h"
 
 namespace docent::app {
-
-void FrameSlot::Put(std::shared_ptr<const ShownFrame> frame) {
-  {
-    const std::scoped_lock lock(mutex_);
-    frames_.at(static_cast<std::size_t>(frame->tracked.frame.camera)) = std::move(frame);
-  }
-  changed_.notify_one();
-}
-
-void FrameSlot::Close() {
-  {
-    const std::scoped_lock lock(mutex_);
-    closed_ = true;
-  }
-  changed_.notify_one();
-}
-
-bool FrameSlot::HasFrame() const {
-  return std::any_of(frames_.begin(), frames_.end(), [](const auto& frame) { return frame != nullptr; });
-}
-
-std::vector<std::shared_ptr<const ShownFrame>> FrameSlot::Take() {
-  std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, std::chrono::microseconds(16667), [this] { return HasFrame() || closed_; });
-  return std::exchange(frames_, std::vector<std::shared_ptr<const ShownFrame>>(frames_.size()));
-}
-
-bool FrameSlot::closed() const {
-  const std::scoped_lock lock(mutex_);
-  return closed_ && !HasFrame();
-}
 
 namespace {
 
@@ -59,15 +30,16 @@ class GuideWindow {
       : request_(request),
         link_(link),
         cameras_(cameras),
-        kiosk_(request.kiosk_code),
         window_(request.title, request.may_write ? kAuthorWidth : cameras.front().model->width_px(),
                 request.may_write ? kAuthorHeight : cameras.front().model->height_px()),
         renderer_(OptionsFor(request)),
         newest_(cameras.size()),
         shown_(cameras.size()) {
     if (request.record) recorder_.emplace(*request.record, cameras.front().source->info().nominal_fps);
-    if (kiosk_.is_locked()) window_.ToggleFullScreen();
-    if (!request.may_write) return;
+    if (!request.may_write) {
+      MakeVisitorControls();
+      return;
+    }
     AuthorControls::Host host;
     host.language = request.language;
     host.emit = [this](Command command) { Emit(std::move(command)); };
@@ -89,9 +61,16 @@ class GuideWindow {
       controls_->SetView(ViewIn(layout), link_.saving(), Maps());
       controls_->Update();
     }
+    if (visitor_) {
+      visitor_->SetView(SeenByVisitor(layout));
+      visitor_->Update(window_.PointerPosition(), std::chrono::steady_clock::now());
+    }
     times_.Add(Part::kInput);
     if (IsClosing()) return false;
-    if (!fresh.empty() || NeedsDrawing()) DrawImage();
+    const bool draws = NeedsDrawing() || !fresh.empty();
+    if (visitor_ && !draws && !IsDue()) return true;
+    const auto begin = std::chrono::steady_clock::now();
+    if (draws) DrawImage();
     times_.Add(Part::kImage);
     Present(layout, !fresh.empty());
     times_.Add(Part::kPresent);
@@ -100,6 +79,7 @@ class GuideWindow {
     window_.Show();
     times_.Add(Part::kShow);
     for (const auto& frame : fresh) link_.drawn(*frame);
+    if (draws) AdaptQuality(begin);
     return true;
   }
 
@@ -148,16 +128,68 @@ class GuideWindow {
     return is_frozen() && has_newer ? newer_scene_.second : large()->shown.scene;
   }
 
+  void MakeVisitorControls() {
+    VisitorControls::Host host;
+    host.emit = [this](GuideVisitor guide) { Emit(std::move(guide)); };
+    host.swap_cameras = [this] { Swap(); };
+    host.toggle_full_screen = [this] { window_.ToggleFullScreen(); };
+    host.language = request_.language;
+    host.has_route = request_.route.has_value();
+    host.kiosk_code = request_.kiosk_code;
+    visitor_.emplace(std::move(host));
+    if (visitor_->is_locked()) window_.ToggleFullScreen();
+  }
+
+  // Without anything new, a visitor's window is shown anew now and then, in case that it was covered.
+  bool IsDue() {
+    constexpr auto kInterval = std::chrono::milliseconds(250);
+    const auto now = std::chrono::steady_clock::now();
+    if (now - presented_ < kInterval) return false;
+    presented_ = now;
+    return true;
+  }
+
+  void AdaptQuality(std::chrono::steady_clock::time_point begin) {
+    presented_ = std::chrono::steady_clock::now();
+    if (!visitor_) return;
+    const auto change = quality_.Add(begin, presented_);
+    if (!change) return;
+    link_.adapted(*change);
+    redraw_ = true;
+  }
+
+  // The size of what visitors read and touch.
+  ui::HeadsUpStyle VisitorStyle() const {
+    const Eigen::Vector2i size = window_.FramebufferSize().cwiseMax(1);
+    const double pixels_per_mm = window_.PixelsPerMillimetre();
+    ui::HeadsUpStyle style;
+    style.unit_px = ui::VisitorUnit_px(size.x(), size.y(), pixels_per_mm);
+    style.target_px = ui::kTouchTarget_mm * pixels_per_mm;
+    return style;
+  }
+
+  VisitorControls::Seen SeenByVisitor(const ui::WindowLayout& layout) {
+    const Eigen::Vector2i size = window_.FramebufferSize().cwiseMax(1);
+    VisitorControls::Seen seen;
+    seen.frame = large();
+    seen.width_px = size.x();
+    seen.height_px = size.y();
+    seen.style = VisitorStyle();
+    seen.pixels_per_unit = size.x() / std::max(1.0, layout.image.width);
+    seen.box = ui::FitImage(camera().width_px(), camera().height_px(), size.x(), size.y());
+    const ui::Area inset = ViewIn(layout).inset;
+    const double pixels = seen.pixels_per_unit;
+    seen.inset = {pixels * inset.x, pixels * inset.y, pixels * inset.width, pixels * inset.height};
+    return seen;
+  }
+
   // What is drawn at present, without the heads-up display.
   ui::View CurrentView() {
     ui::View view = ViewOf(*large(), *cameras_[large_].model);
-    if (has_inset()) view.overlay.inset = &shown_[1 - large_]->tracked;
-    view.overlay.points = points_;
-    view.overlay.keyframes = keyframes_;
-    view.overlay.status = status_;
-    if (details_) view.overlay.visitor.reset();
-    if (!status_ && view.overlay.visitor) HideStatus(&*view.overlay.visitor);
-    if (view.overlay.visitor) view.overlay.visitor->lists_route = lists_route_;
+    if (has_inset())
+      AddOther(*shown_[1 - large_], *cameras_[1 - large_].model,
+               VisitorStringsFor(controls_ ? "en" : request_.language), &view);
+    if (visitor_) visitor_->AddTo(&view);
     if (controls_) {
       const ui::AuthoringChoices& choices = controls_->choices();
       view.overlay.points = choices.show_points;
@@ -170,14 +202,9 @@ class GuideWindow {
     return view;
   }
 
-  static void HideStatus(ui::VisitorDisplay* visitor) {
-    visitor->place.clear();
-    visitor->route_line.clear();
-  }
-
   bool NeedsDrawing() {
     bool needs = std::exchange(redraw_, false);
-    if (!controls_) return needs && large();
+    if (visitor_) return (visitor_->TakeChange() || needs) && large();
     const ui::AuthoringChoices& choices = controls_->choices();
     const auto drawn = std::pair(choices.show_points, choices.show_keyframes);
     needs = std::exchange(drawn_choices_, drawn) != drawn || needs;
@@ -214,8 +241,35 @@ class GuideWindow {
     return view;
   }
 
+  // Each eye's image in its half of the window, drawn one after the other.
+  void PresentEyes() {
+    const Eigen::Vector2i size = window_.FramebufferSize().cwiseMax(1);
+    const ui::View view = large() ? CurrentView() : ui::View();
+    for (const int eye : {0, 1}) {
+      ui::WindowPart part;
+      part.x = eye * size.x() / 2;
+      part.width_px = std::max(1, size.x() / 2);
+      part.height_px = part.window_height_px = size.y();
+      EyeView eye_view;
+      if (large())
+        MakeEyeView(view, *large(), request_.display->eyes[static_cast<std::size_t>(eye)], &eye_view);
+      eye_view.view.overlay.hud = false;
+      if (large()) renderer_.Draw(eye_view.view);
+      eye_view.view.overlay.hud = large() != nullptr;
+      renderer_.PresentWithHeadsUp(eye_view.view, part,
+                                   {ui::VisitorUnit_px(part.width_px, part.height_px, 0), 0, 0});
+    }
+  }
+
   void DrawImage() {
+    if (request_.display) return;  // See PresentEyes.
     ui::View view = CurrentView();
+    // What is recorded has the size of the camera's image.
+    if (visitor_ && !recorder_ && !request_.on_image)
+      quality_.Apply(ui::FitImage(camera().width_px(), camera().height_px(), window_.FramebufferSize().x(),
+                                  window_.FramebufferSize().y())
+                         .scale,
+                     &renderer_);
     view.overlay.hud = false;
     renderer_.Draw(view);
     if (!recorder_ && !request_.on_image) return;
@@ -232,6 +286,7 @@ class GuideWindow {
 
   // The parts of the layout are in window units, which may have several pixels.
   void Present(const ui::WindowLayout& layout, bool is_fresh) {
+    if (request_.display) return PresentEyes();
     const Eigen::Vector2i size = window_.FramebufferSize().cwiseMax(1);
     const double pixels = size.x() / std::max(1.0, layout.image.width + layout.panel.width);
     ui::WindowPart part;
@@ -249,8 +304,9 @@ class GuideWindow {
     ui::View view;
     if (large()) view = CurrentView();
     view.overlay.hud = large() != nullptr;
-    const double unit_px = controls_ ? layout.scale * pixels : std::clamp(size.y() / 480.0, 0.5, 4.0);
-    renderer_.PresentWithHeadsUp(view, part, unit_px, message_height_ * pixels);
+    ui::HeadsUpStyle style = VisitorStyle();
+    if (controls_) style = {layout.scale * pixels, message_height_ * pixels, 0};
+    renderer_.PresentWithHeadsUp(view, part, style);
     if (controls_ && large() && controls_->choices().show_coverage) PresentSmallMap(layout, pixels);
   }
 
@@ -277,8 +333,8 @@ class GuideWindow {
   }
 
   bool IsClosing() {
-    if (kiosk_.is_locked()) window_.KeepOpen();
-    if (!controls_) return closing_ || window_.IsClosing();
+    if (visitor_ && visitor_->is_locked()) window_.KeepOpen();
+    if (visitor_) return visitor_->closing() || window_.IsClosing();
     if (controls_->ending() == AuthorControls::Ending::kDiscard) link_.discard_changes();
     return controls_->ending() != AuthorControls::Ending::kNone;
   }
@@ -308,43 +364,13 @@ class GuideWindow {
   }
 
   void HandleEvents() {
-    using Kind = ui::InputEvent::Kind;
     for (const ui::InputEvent& event : window_.PollEvents()) {
       if (controls_) {
         controls_->Handle(event);
-      } else if (event.kind == Kind::kKey && !event.repeated) {
-        HandleKey(event);
-      } else if (event.kind == Kind::kClick && event.button == 0 && large() &&
-                 ViewIn(Layout()).inset.Contains(event.position)) {
-        Swap();
+      } else if (visitor_) {
+        visitor_->Handle(event, std::chrono::steady_clock::now());
       }
     }
-  }
-
-  // Of a tour. Visitors at a kiosk get what leads them only.
-  void HandleKey(const ui::InputEvent& event) {
-    if (kiosk_.is_locked()) {
-      closing_ = kiosk_.Add(event.key, KioskLock::Clock::now()) || closing_;
-      if (request_.route && !event.control) HandleRouteKey(event.key);
-      redraw_ = true;
-      return;
-    }
-    if (event.control && event.key == "q") closing_ = true;
-    if (event.control) return;
-    if (event.key == "tab" || event.key == "c") Swap();
-    if (event.key == "f11") window_.ToggleFullScreen();
-    if (event.key == "p") points_ = !points_;
-    if (event.key == "k") keyframes_ = !keyframes_;
-    if (event.key == "h") status_ = !status_;
-    if (event.key == "d") details_ = !details_;
-    if (request_.route) HandleRouteKey(event.key);
-    redraw_ = true;
-  }
-
-  void HandleRouteKey(const std::string& key) {
-    if (key == "n") Emit(GuideVisitor{GuideVisitor::Step::kSkip});
-    if (key == "b") Emit(GuideVisitor{GuideVisitor::Step::kBack});
-    if (key == "l") lists_route_ = !lists_route_;
   }
 
   bool HasFirstCameraSize(const cv::Mat& image) const {
@@ -355,12 +381,14 @@ class GuideWindow {
   const GuideRequest& request_;
   const WindowLink& link_;
   const std::span<const CalibratedCamera> cameras_;
-  KioskLock kiosk_;
   ui::Window window_;
   ui::Renderer renderer_;
   MapPanel map_panel_;
   WindowTimes times_;
-  std::optional<AuthorControls> controls_;  // Only of an author.
+  AdaptiveQuality quality_;  // Of a visitor's window.
+  std::chrono::steady_clock::time_point presented_{};
+  std::optional<AuthorControls> controls_;  // Only of an author,
+  std::optional<VisitorControls> visitor_;  // and only of a visitor.
   std::optional<ViewRecorder> recorder_;
   std::vector<std::shared_ptr<const ShownFrame>> newest_, shown_;  // By camera.
   std::size_t large_ = 0;                                          // Index of the camera that is shown large.
@@ -373,9 +401,7 @@ class GuideWindow {
   std::pair<bool, bool> drawn_choices_;  // Points and keyframes.
   double message_height_ = 0;            // Window units.
   cv::Mat image_;
-  bool points_ = false, keyframes_ = false, status_ = true, details_ = false;  // Of a tour.
-  bool lists_route_ = false;
-  bool closing_ = false, redraw_ = false, was_frozen_ = false, showed_map_ = false;
+  bool redraw_ = false, was_frozen_ = false, showed_map_ = false;
 };
 
 }  // namespace

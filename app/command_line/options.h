@@ -69,11 +69,14 @@ struct AuthorOptions {
 struct TourOptions {
   RunArguments run;
   std::filesystem::path library;
-  std::optional<std::string> tour;             // The visitor is led along this one of the library.
-  bool narrate = false;                        // What visitors are told is spoken.
-  std::optional<std::filesystem::path> log;    // Folder for the records of visits.
-  std::optional<std::filesystem::path> kiosk;  // File with the code by which the kiosk is ended.
-  std::string hub;                             // Address of the hub that the library follows; empty for none.
+  std::optional<std::string> tour;               // The visitor is led along this one of the library.
+  bool narrate = false;                          // What visitors are told is spoken.
+  bool glasses = false;                          // Content on black, for each eye.
+  std::optional<std::filesystem::path> display;  // Calibration of the worn display.
+  bool gaze = false;                             // Cards open for what visitors look at.
+  std::optional<std::filesystem::path> log;      // Folder for the records of visits.
+  std::optional<std::filesystem::path> kiosk;    // File with the code by which the kiosk is ended.
+  std::string hub;  // Address of the hub that the library follows; empty for none.
   std::optional<std::filesystem::path> script;
 };
 

@@ -12,6 +12,7 @@
 #include "app/session/library_scene.h"
 #include "engine/base/error.h"
 #include "engine/initialization/planar_target.h"
+#include "maps/library/map_copies.h"
 
 namespace docent::app {
 
@@ -49,12 +50,21 @@ maps::Tour FindTour(const maps::Library& library, const std::string& name) {
   throw Error("'" + library.file() + "' has no tour named '" + name + "'.");
 }
 
+// Of maps that are copies of each other, the newest one counts, as for the session.
 Route RouteOf(const maps::Library& library, const maps::Tour& tour) {
+  const auto replaced = maps::ReplacedByCopies(maps::FindCopies(library));
+  const auto shown = [&](std::uint64_t key) {
+    const auto copy = replaced.find(key);
+    return copy == replaced.end() ? key : copy->second;
+  };
   Route route;
   route.minutes = tour.minutes;
-  for (const std::uint64_t stop : tour.stops) route.stops.push_back({stop, library.Find(stop).name});
+  for (const std::uint64_t stop : tour.stops) {
+    const std::uint64_t key = shown(stop);
+    route.stops.push_back({key, library.Find(key).name});
+  }
   for (const maps::Library::Signpost& signpost : library.Signposts())
-    route.signposts.Add(signpost.map.key, signpost.to_key);
+    route.signposts.Add(shown(signpost.map.key), shown(signpost.to_key));
   return route;
 }
 
@@ -132,6 +142,8 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   request.title = "Docent - tour";
   CopyRunArguments(options.run, AnyLive(cameras), &request);
   request.narrate = options.narrate;
+  request.gaze = options.gaze;
+  if (options.glasses) request.display = ReadDisplayCalibration(*options.display);
   request.visit_log = options.log;
   if (options.tour) {
     const maps::Tour tour = FindTour(library, *options.tour);

@@ -31,14 +31,15 @@ class OffscreenView {
     if (request.record) recorder_.emplace(*request.record, frames_per_second);
   }
 
-  // Draws a frame. `other` is the newest frame of the second camera and may be null. Returns false for a
-  // frame that is not drawn, because it was dropped or drawn before.
-  bool Add(const ShownFrame& frame, const engine::CameraModel& camera, const ShownFrame* other) {
+  // Draws a frame. `other` is the newest frame of the second camera, with its lens, and may be null. Returns
+  // false for a frame that is not drawn, because it was dropped or drawn before.
+  bool Add(const ShownFrame& frame, const engine::CameraModel& camera, const ShownFrame* other,
+           const engine::CameraModel& other_camera) {
     const std::uint64_t index = frame.tracked.frame.index;
     if (frame.tracked.state == engine::TrackingState::kDropped || last_index_ == index) return false;
     last_index_ = index;
     ui::View view = ViewOf(frame, camera);
-    if (other != nullptr) view.overlay.inset = &other->tracked;
+    if (other != nullptr) AddOther(*other, other_camera, VisitorStringsFor(request_.language), &view);
     renderer_.Draw(view);
     renderer_.ReadBack(&image_);
     if (recorder_) recorder_->Write(image_, frame.tracked.frame.index);
@@ -81,7 +82,8 @@ void RunHeadless(const GuideRequest& request, std::span<CalibratedCamera> camera
           const std::scoped_lock lock(other_mutex);
           inset = other;
         }
-        if (view && view->Add(*frame, *cameras.front().model, inset.get())) run->Drawn(*frame);
+        if (view && view->Add(*frame, *cameras.front().model, inset.get(), *cameras.back().model))
+          run->Drawn(*frame);
         progress.Update(++count);
       },
       {});
@@ -108,6 +110,7 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
     link.maps = [run] { return run->MapsForWindow(); };
     link.discard_changes = [run] { run->DiscardChanges(); };
     link.toggle_pause = [run] { run->TogglePause(); };
+    link.adapted = [run](const std::string& text) { run->Adapted(text); };
     link.drawn = [run](const ShownFrame& frame) { run->Drawn(frame); };
     ShowInWindow(request, cameras, &slot, link);
   } catch (...) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "app/calibration/display_file.h"
 #include "app/command_line/options.h"
 #include "app/script/commands.h"
 #include "app/session/calibrated_camera.h"
@@ -41,8 +42,12 @@ struct GuideRequest {
   std::vector<TimedCommand> script;
   std::string script_name;
   std::filesystem::path model_folder;
-  std::string title;     // Title of the window.
-  bool sound = false;    // Sounds are heard, not only their captions shown.
+  std::string title;   // Title of the window.
+  bool sound = false;  // Sounds are heard, not only their captions shown.
+  // Shows the content on black through this worn display instead of the camera's image; only without
+  // may_write.
+  std::optional<DisplayCalibration> display;
+  bool gaze = false;     // Cards open for what visitors look at; only without may_write.
   bool narrate = false;  // What visitors are told and can read is spoken; only without may_write.
   std::string language;  // In which texts are shown that have it; see content::TextFor.
   double ui_scale = 1;   // Of the author's panel and texts, times what the monitor suggests.

@@ -25,6 +25,28 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
       "Speak where the visitor is, what to do, the way on and the texts in view, by the speech service "
       "of the desktop (Speech Dispatcher)");
   command
+      ->add_option_function<std::string>(
+          "--view",
+          [options](const std::string& word) {
+            if (word != "camera" && word != "glasses")
+              throw CLI::ValidationError("--view", "'" + word + "' is not one of camera|glasses");
+            options->glasses = word == "glasses";
+          },
+          "The camera's image with the content, or for a see-through display that is worn the content on "
+          "black, "
+          "for the left eye in the left half of the window and for the right eye in the right one (default "
+          "camera)")
+      ->type_name("camera|glasses");
+  command
+      ->add_option(
+          "--display", options->display,
+          "With --view glasses: the calibration of the display, which says how each eye sees through it")
+      ->type_name("FILE");
+  command->add_flag(
+      "--gaze", options->gaze,
+      "For hands that are not free: what stays in the middle of the image for 1.5 s opens its card, whose "
+      "pages turn by themselves, and who looks elsewhere closes it");
+  command
       ->add_option(
           "--log", options->log,
           "Folder to which a record of each visit is added, without images: where the visitor was, how long, "
@@ -49,6 +71,12 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
                   &options->run);
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
+    if (options->glasses != options->display.has_value())
+      throw CLI::ValidationError("--display", "goes together with --view glasses");
+    if (options->glasses && options->run.headless)
+      throw CLI::ValidationError("--view", "glasses needs a window; remove --headless");
+    if (options->glasses && options->run.record)
+      throw CLI::ValidationError("--record", "records what a camera sees; remove it or --view glasses");
     invocation->run = [=] { run(*options, invocation->verbosity); };
   });
 }

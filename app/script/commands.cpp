@@ -246,7 +246,9 @@ struct Validator {
     return First({NamesProblem(c.names), c.from_map.empty() ? kNoMapName : "",
                   c.to_pixel ? PixelProblem(*c.to_pixel) : std::string()});
   }
-  std::string operator()(const GuideVisitor&) const { return ""; }
+  std::string operator()(const GuideVisitor& c) const {
+    return c.step == GuideVisitor::Step::kOpen ? NameProblem(c.name, "a name") : "";
+  }
   std::string operator()(const Undo&) const { return ""; }
   std::string operator()(const Redo&) const { return ""; }
   std::string operator()(const Save&) const { return ""; }

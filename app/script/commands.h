@@ -243,13 +243,18 @@ struct PasteEntities {
   std::optional<Eigen::Vector2d> to_pixel;
   bool operator==(const PasteEntities&) const = default;
 };
-// Leads a visitor along a tour with stops. Everything else is refused on a tour but UseMap.
+// What a visitor does on a tour. Everything else is refused there but UseMap.
 struct GuideVisitor {
   enum class Step {
-    kSkip,  // Passes over the next stop.
-    kBack,  // Leads back to the stop before.
+    kSkip,   // Passes over the next stop; only on a tour with stops.
+    kBack,   // Leads back to the stop before; only on a tour with stops.
+    kOpen,   // Opens the card of the entity with this name.
+    kPress,  // The one button: opens the card of what is marked, turns its page, or closes it after the last.
+    kMark,   // Marks the next thing in view that has a card.
+    kClose,  // Closes the card.
   };
   Step step = Step::kSkip;
+  std::string name = {};  // Only of kOpen.
   bool operator==(const GuideVisitor&) const = default;
 };
 struct Undo {

@@ -171,7 +171,21 @@ struct CommandFormatter {
            (c.to_pixel ? " at " + Pixel(*c.to_pixel) : "");
   }
   std::string operator()(const GuideVisitor& c) const {
-    return c.step == GuideVisitor::Step::kSkip ? "tour skip" : "tour back";
+    switch (c.step) {
+      case GuideVisitor::Step::kSkip:
+        return "tour skip";
+      case GuideVisitor::Step::kBack:
+        return "tour back";
+      case GuideVisitor::Step::kOpen:
+        return "tour open " + AlwaysQuoted(c.name);
+      case GuideVisitor::Step::kPress:
+        return "tour press";
+      case GuideVisitor::Step::kMark:
+        return "tour mark";
+      case GuideVisitor::Step::kClose:
+        return "tour close";
+    }
+    return "";
   }
   std::string operator()(const Undo&) const { return "undo"; }
   std::string operator()(const Redo&) const { return "redo"; }

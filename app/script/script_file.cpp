@@ -294,8 +294,12 @@ std::optional<Command> ParseEdit(LineReader* line) {
 Command ParseTour(LineReader* line) {
   if (line->TakeIf("skip")) return GuideVisitor{GuideVisitor::Step::kSkip};
   if (line->TakeIf("back")) return GuideVisitor{GuideVisitor::Step::kBack};
-  const std::string word = line->Take("skip or back");
-  line->Fail("unknown command 'tour " + word + "'; use skip or back after tour");
+  if (line->TakeIf("open")) return GuideVisitor{GuideVisitor::Step::kOpen, line->TakeName("a name")};
+  if (line->TakeIf("press")) return GuideVisitor{GuideVisitor::Step::kPress};
+  if (line->TakeIf("mark")) return GuideVisitor{GuideVisitor::Step::kMark};
+  if (line->TakeIf("close")) return GuideVisitor{GuideVisitor::Step::kClose};
+  const std::string word = line->Take("skip, back, open, press, mark or close");
+  line->Fail("unknown command 'tour " + word + "'; use skip, back, open, press, mark or close after tour");
 }
 
 Command ParseCommand(LineReader* line) {

@@ -12,6 +12,7 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   view.scene = frame.shown.scene.get();
   view.surfaces = frame.shown.surfaces;
   view.animation_seconds = frame.seconds;
+  view.animation_starts = frame.animation_starts.get();
   view.overlay.map_name = frame.shown.map_name;
   view.overlay.is_waiting =
       frame.tracked.state == engine::TrackingState::kInitializing && frame.shown.starting_map.empty();
@@ -24,6 +25,17 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   view.overlay.visitor = frame.visitor;
   if (frame.held_camera_from_map) view.held_camera_from_map = &*frame.held_camera_from_map;
   return view;
+}
+
+void AddOther(const ShownFrame& other, const engine::CameraModel& camera, const VisitorStrings& strings,
+              ui::View* view) {
+  ui::Overlay& overlay = view->overlay;
+  overlay.inset = &other.tracked;
+  overlay.inset_scene = other.shown.scene.get();
+  overlay.inset_camera = other.camera ? other.camera.get() : &camera;
+  const bool is_somewhere = engine::HasPose(other.tracked.state) && !other.shown.map_name.empty();
+  overlay.inset_text =
+      is_somewhere ? Filled(strings, strings.other_is_at, {other.shown.map_name}) : strings.other_is_lost;
 }
 
 void ViewRecorder::Write(const cv::Mat& image, std::uint64_t index) {

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "app/session/session.h"
+#include "app/session/visitor_strings.h"
 #include "app/session/way_on.h"
 #include "ui/recorder.h"
 #include "ui/renderer.h"
@@ -29,12 +31,19 @@ struct ShownFrame {
   std::optional<ShownWay> way = {};
   // If a visitor was lost a moment ago: the last pose before, whose content is in `shown`.
   std::optional<engine::Rigid3> held_camera_from_map = {};
+  // Only on a tour: when the animations of models have begun (ApproachWatch).
+  std::shared_ptr<const std::map<std::string, double>> animation_starts = {};
   // The current camera model of a camera whose calibration is estimated; else null.
   std::shared_ptr<const engine::CameraModel> camera = nullptr;
 };
 
 // The input of the renderer; it points into `frame` and `camera`.
 ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera);
+
+// Adds to a view the image, the content and the place of the other camera, whose newest frame and lens these
+// are. The view points into them.
+void AddOther(const ShownFrame& other, const engine::CameraModel& camera, const VisitorStrings& strings,
+              ui::View* view);
 
 // Records the drawn frames as a video with the speed of the camera: frames that were not drawn (dropped, or
 // replaced by a newer one before the window drew them) repeat the previous one. One thread.

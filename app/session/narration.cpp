@@ -77,6 +77,9 @@ std::vector<std::string> Narration::Update(const Seen& seen) {
     read_.clear();
     texts.push_back(place_);
   }
+  if (display.card && !display.card->text.empty() && display.card->text != card_)
+    texts.push_back(display.card->text);
+  card_ = display.card ? display.card->text : std::string();
   if (sentence_.Settle(display.sentence, seen.seconds, kSentenceStays, kSentenceAgain))
     texts.push_back(display.sentence);
   if (route_.Settle(display.route_line, seen.seconds, kSentenceStays, kSentenceAgain))

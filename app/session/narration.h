@@ -27,9 +27,9 @@ std::vector<ReadableSign> SignsInView(const content::Scene& scene, const engine:
                                       const engine::Rigid3& camera_from_map, const std::string& language);
 
 // Decides what is spoken to a visitor who cannot see the screen: the place on arrival, what to do, how far
-// the tour has come, the way on, and the texts in view. What changes from image to image is spoken only once
-// it has stayed for a while, and nothing is repeated while it stays. Times are seconds that do not decrease.
-// One thread.
+// the tour has come, the way on, the texts in view, and the pages of cards. What changes from image to image
+// is spoken only once it has stayed for a while, and nothing is repeated while it stays. Times are seconds
+// that do not decrease. One thread.
 class Narration {
  public:
   // `strings` is one of the constants behind VisitorStringsFor.
@@ -57,6 +57,7 @@ class Narration {
 
   const VisitorStrings& strings_;
   std::string place_;
+  std::string card_;  // The page that is open; empty for none.
   Settling sentence_, route_, way_;
   std::set<std::string> read_;  // The signs at this place that were spoken, by name.
   std::string sign_;            // The sign in view that is next, by name, and since when.

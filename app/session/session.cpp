@@ -96,8 +96,7 @@ void Session::Idle(Timestamp time) {
 
 void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
                       const std::filesystem::path& model_folder) {
-  if (std::holds_alternative<GuideVisitor>(command))
-    throw Error("there are no stops; use docent tour --tour NAME to be led along a tour");
+  if (std::holds_alternative<GuideVisitor>(command)) throw Error("there is no visitor; use docent tour");
   if (!options_.may_write && !std::holds_alternative<UseMap>(command)) {
     throw Error("a tour is read-only; use docent author to make changes");
   }

@@ -6,16 +6,23 @@
 namespace docent::app {
 
 void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine::CameraModel& camera) {
-  const bool has_pose = engine::HasPose(frame->tracked.state);
+  const bool has_pose = claim_.Update(frame->seconds, frame->tracked.state, frame->tracked.map_key);
+  if (!has_pose && engine::HasPose(frame->tracked.state)) frame->shown.scene.reset();
   frame->visitor = state_.Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(),
                                  VisitorHint(frame->shown.rejection, frame->tracked.hint, strings_));
   FindViews(*frame);
   frame->visitor->views = views_;
   if (!views_.empty()) frame->visitor->sentence = strings_.go_to_a_view;
-  if (route_ != nullptr) FollowRoute(frame.get());
+  if (route_ != nullptr) FollowRoute(has_pose, frame.get());
   if (has_pose && frame->shown.scene)
     frame->way = FindWay(*frame->shown.scene, camera, frame->tracked.camera_from_map, route_, strings_);
   if (frame->way) frame->visitor->way_on = frame->way->drawn;
+  cards_.Update(camera, frame.get());
+  std::optional<Eigen::Vector3d> place;
+  if (has_pose && frame->shown.scene) place = frame->tracked.camera_from_map.OriginInSource();
+  static const content::Scene kNoScene;
+  frame->animation_starts = approach_.Update(frame->seconds, frame->tracked.map_key,
+                                             frame->shown.scene ? *frame->shown.scene : kNoScene, place);
   if (has_pose) {
     last_with_pose_ = frame;
   } else if (last_with_pose_ && state_.HoldsContent(frame->seconds)) {
@@ -56,8 +63,8 @@ std::string VisitorHint(const RejectionMessage& rejection, engine::Hint hint, co
   return {};
 }
 
-void VisitorGuide::FollowRoute(ShownFrame* frame) {
-  if (engine::HasPose(frame->tracked.state)) {
+void VisitorGuide::FollowRoute(bool has_pose, ShownFrame* frame) {
+  if (has_pose) {
     route_->Enter(frame->tracked.map_key, frame->seconds);
   } else {
     route_->Leave();

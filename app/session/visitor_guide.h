@@ -6,10 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "app/session/approach_watch.h"
 #include "app/session/guided_view.h"
+#include "app/session/place_claim.h"
 #include "app/session/route_state.h"
 #include "app/session/session.h"
 #include "app/session/visit_state.h"
+#include "app/session/visitor_cards.h"
 #include "app/session/visitor_strings.h"
 
 namespace docent::app {
@@ -20,22 +23,32 @@ class VisitorGuide {
  public:
   // `stops`: the names of the maps where visitors can be. `strings` is one of the constants behind
   // VisitorStringsFor. `route`, which may be null, leads along a tour; it and the session must outlive this.
+  // For `language` and `by_gaze` see VisitorCards.
   VisitorGuide(Session* session, std::vector<std::string> stops, const VisitorStrings& strings,
-               RouteState* route = nullptr)
-      : session_(session), strings_(strings), state_(std::move(stops), strings), route_(route) {}
+               RouteState* route = nullptr, std::string language = {}, bool by_gaze = false)
+      : session_(session),
+        strings_(strings),
+        state_(std::move(stops), strings),
+        route_(route),
+        cards_(strings, std::move(language), by_gaze) {}
 
-  // Sets the frame's `visitor` and `way`; `camera` is the lens of its image. Shortly after a loss the frame
-  // gets the content and the pose of the last frame that had one.
+  // Sets the frame's `visitor`, `way` and `animation_starts`; `camera` is the lens of its image. Shortly
+  // after a loss the frame gets the content and the pose of the last frame that had one. Where the place is
+  // not to be claimed (PlaceClaim), the frame loses its content.
   void Guide(const std::shared_ptr<ShownFrame>& frame, const engine::CameraModel& camera);
+  VisitorCards* cards() { return &cards_; }
 
  private:
   void FindViews(const ShownFrame& frame);
-  void FollowRoute(ShownFrame* frame);
+  void FollowRoute(bool has_pose, ShownFrame* frame);
 
   Session* const session_;
   const VisitorStrings& strings_;
   VisitState state_;
   RouteState* const route_;
+  VisitorCards cards_;
+  ApproachWatch approach_;
+  PlaceClaim claim_;
   std::vector<cv::Mat> views_;  // See ui::VisitorDisplay.
   std::optional<double> views_time_s_;
   std::shared_ptr<const ShownFrame> last_with_pose_;

@@ -49,6 +49,19 @@ constexpr VisitorStrings kEnglish = {
     .next_stop = "{}. {} (next)",
     .no_further_stop = "There is no further stop.",
     .no_stop_before = "There is no stop before this one.",
+    .open_a_card = "Touch what has a frame, or press the button, to learn more.",
+    .look_to_open = "Look at what has a frame to learn more.",
+    .nothing_to_open = "There is nothing to open here.",
+    .more_pages = "Page {} of {}. Press for more.",
+    .close_card = "Press to close.",
+    .other_is_at = "Other camera: {}",
+    .other_is_lost = "Other camera: looking for its place",
+    .cameras_apart = "The other camera is not recognised here. Do you wear both cameras?",
+    .device_is_slow = "This device is busy, and the image moves less smoothly.",
+    .menu_skip = "Skip the next stop",
+    .menu_back = "Back to the stop before",
+    .menu_stops = "All stops",
+    .menu_close = "Close",
 };
 
 constexpr VisitorStrings kGerman = {
@@ -95,6 +108,19 @@ constexpr VisitorStrings kGerman = {
     .next_stop = "{}. {} (als Nächstes)",
     .no_further_stop = "Es gibt keine weitere Station.",
     .no_stop_before = "Vor dieser Station gibt es keine andere.",
+    .open_a_card = "Berühren Sie, was einen Rahmen hat, oder drücken Sie die Taste, um mehr zu erfahren.",
+    .look_to_open = "Sehen Sie an, was einen Rahmen hat, um mehr zu erfahren.",
+    .nothing_to_open = "Hier lässt sich nichts öffnen.",
+    .more_pages = "Seite {} von {}. Drücken Sie für mehr.",
+    .close_card = "Zum Schließen drücken.",
+    .other_is_at = "Andere Kamera: {}",
+    .other_is_lost = "Andere Kamera: sucht ihren Ort",
+    .cameras_apart = "Die andere Kamera wird hier nicht erkannt. Tragen Sie beide Kameras?",
+    .device_is_slow = "Dieses Gerät ist ausgelastet; das Bild bewegt sich weniger flüssig.",
+    .menu_skip = "Die nächste Station auslassen",
+    .menu_back = "Zurück zur Station davor",
+    .menu_stops = "Alle Stationen",
+    .menu_close = "Schließen",
 };
 
 constexpr VisitorStrings kSpanish = {
@@ -139,6 +165,19 @@ constexpr VisitorStrings kSpanish = {
     .next_stop = "{}. {} (siguiente)",
     .no_further_stop = "No hay más paradas.",
     .no_stop_before = "No hay ninguna parada antes de esta.",
+    .open_a_card = "Toque lo que tiene un marco, o pulse el botón, para saber más.",
+    .look_to_open = "Mire lo que tiene un marco para saber más.",
+    .nothing_to_open = "Aquí no hay nada que abrir.",
+    .more_pages = "Página {} de {}. Pulse para ver más.",
+    .close_card = "Pulse para cerrar.",
+    .other_is_at = "Otra cámara: {}",
+    .other_is_lost = "Otra cámara: busca su lugar",
+    .cameras_apart = "La otra cámara no se reconoce aquí. ¿Lleva usted las dos cámaras?",
+    .device_is_slow = "Este dispositivo está ocupado, y la imagen se mueve con menos fluidez.",
+    .menu_skip = "Omitir la siguiente parada",
+    .menu_back = "Volver a la parada anterior",
+    .menu_stops = "Todas las paradas",
+    .menu_close = "Cerrar",
 };
 
 constexpr VisitorStrings kArabic = {
@@ -183,6 +222,19 @@ constexpr VisitorStrings kArabic = {
     .next_stop = "{}. {} (التالية)",
     .no_further_stop = "لا توجد محطات أخرى.",
     .no_stop_before = "لا توجد محطة قبل هذه.",
+    .open_a_card = "المس ما له إطار أو اضغط الزر لمعرفة المزيد.",
+    .look_to_open = "انظر إلى ما له إطار لمعرفة المزيد.",
+    .nothing_to_open = "لا يوجد هنا ما يمكن فتحه.",
+    .more_pages = "الصفحة {} من {}. اضغط للمزيد.",
+    .close_card = "اضغط للإغلاق.",
+    .other_is_at = "الكاميرا الأخرى: {}",
+    .other_is_lost = "الكاميرا الأخرى: تبحث عن مكانها",
+    .cameras_apart = "لا يتم التعرف على الكاميرا الأخرى هنا. هل تحمل الكاميرتين معك؟",
+    .device_is_slow = "هذا الجهاز مشغول، لذا تتحرك الصورة بسلاسة أقل.",
+    .menu_skip = "تخطي المحطة التالية",
+    .menu_back = "العودة إلى المحطة السابقة",
+    .menu_stops = "جميع المحطات",
+    .menu_close = "إغلاق",
 };
 
 // Of Unicode's bidirectional algorithm (UAX #9): what stands between these marks has the direction of its

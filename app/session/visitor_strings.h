@@ -60,6 +60,27 @@ struct VisitorStrings {
   const char* next_stop;      // The same.
   const char* no_further_stop;
   const char* no_stop_before;
+
+  // Cards about what is in view.
+  const char* open_a_card;
+  const char* look_to_open;
+  const char* nothing_to_open;
+  const char* more_pages;  // Numbers of the page and of all pages.
+  const char* close_card;
+
+  // The other one of two cameras.
+  const char* other_is_at;  // Place.
+  const char* other_is_lost;
+  const char* cameras_apart;
+
+  // The device.
+  const char* device_is_slow;
+
+  // The menu.
+  const char* menu_skip;
+  const char* menu_back;
+  const char* menu_stops;
+  const char* menu_close;
 };
 
 // The sentences in English, German, Spanish or Arabic. `language` is a tag in lower case; of its last parts,

@@ -141,6 +141,10 @@ TEST(Script, IsReadBackEqualAfterWriting) {
       Undo{},
       GuideVisitor{GuideVisitor::Step::kSkip},
       GuideVisitor{GuideVisitor::Step::kBack},
+      GuideVisitor{GuideVisitor::Step::kOpen, "lion \"1\""},
+      GuideVisitor{GuideVisitor::Step::kPress},
+      GuideVisitor{GuideVisitor::Step::kMark},
+      GuideVisitor{GuideVisitor::Step::kClose},
       Redo{},
       Save{},
   };

@@ -49,6 +49,18 @@ TEST(Narration, SaysWhatToDoOnceWhileItStays) {
   EXPECT_THAT(listener.Hear(60), ElementsAre("Look around slowly."));
 }
 
+TEST(Narration, ReadsEachPageOfACardAtOnceAndEachOpenedCardAnew) {
+  Listener listener;
+  listener.display.card.emplace().text = "First page.";
+  EXPECT_THAT(listener.Hear(5), ElementsAre("First page."));
+  listener.display.card->text = "Second page.";
+  EXPECT_THAT(listener.Hear(5), ElementsAre("Second page."));
+  listener.display.card.reset();
+  EXPECT_THAT(listener.Hear(5), IsEmpty());
+  listener.display.card.emplace().text = "First page.";
+  EXPECT_THAT(listener.Hear(5), ElementsAre("First page."));
+}
+
 TEST(Narration, LeavesOutSentencesThatFlicker) {
   Listener listener;
   std::vector<std::string> heard;

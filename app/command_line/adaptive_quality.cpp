@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/adaptive_quality.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace docent::app {
+
+void AdaptiveQuality::Apply(double pixels_per_pixel, ui::Renderer* renderer) const {
+  const ui::DrawingQuality& quality = ladder_.quality();
+  // In steps of an eighth, so that a window that is resized does not need a new lens table all the time.
+  const double stepped = std::ceil(8 * pixels_per_pixel) / 8;
+  const double least = std::min(1.0, quality.largest_scale);
+  renderer->SetQuality(quality.samples, std::clamp(stepped, least, quality.largest_scale));
+}
+
+std::optional<std::string> AdaptiveQuality::Add(Clock::time_point begin, Clock::time_point now) {
+  using Seconds = std::chrono::duration<double>;
+  if (!ladder_.Add(Seconds(now - start_).count(), Seconds(now - begin).count())) return std::nullopt;
+  return std::string("drawing with ") + ladder_.quality().name;
+}
+
+}  // namespace docent::app

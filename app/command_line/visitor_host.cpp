@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/visitor_host.h"
+
+#include <utility>
+
+#include "app/script/format_command.h"
+#include "app/session/route_text.h"
+#include "engine/base/error.h"
+#include "maps/library/map_copies.h"
+
+namespace docent::app {
+
+namespace {
+
+// The maps where a visitor can be: the stops of the tour, or all.
+std::vector<std::string> PlaceNames(const GuideRequest& request) {
+  std::vector<std::string> names;
+  if (request.route) {
+    for (const RouteStop& stop : request.route->stops) names.push_back(stop.name);
+  } else if (request.library != nullptr) {
+    const auto replaced = maps::ReplacedByCopies(maps::FindCopies(*request.library));
+    for (const maps::MapInfo& map : request.library->List()) {
+      if (!replaced.contains(map.key)) names.push_back(map.name);
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+VisitorHost::VisitorHost(const GuideRequest& request, Session* session, std::size_t cameras, Report report)
+    : request_(request),
+      session_(session),
+      report_(std::move(report)),
+      strings_(VisitorStringsFor(request.language)),
+      visitors_(cameras) {
+  if (request.route) route_.emplace(*request.route);
+  if (request.narrate) {
+    narration_.emplace(strings_);
+    speech_.emplace(strings_.language);
+  }
+  if (request.visit_log) visits_.emplace(*request.visit_log, request.tour);
+  constexpr double kIdle_s = 120;  // As VisitRecorder ends a visit.
+  if (!request.kiosk_code.empty()) idle_watch_.emplace(kIdle_s);
+  for (std::size_t i = 0; i < cameras; ++i) Welcome(i);
+}
+
+void VisitorHost::Welcome(std::size_t index) {
+  visitors_[index].emplace(session_, PlaceNames(request_), strings_, route_ ? &*route_ : nullptr,
+                           request_.language, request_.gaze);
+}
+
+void VisitorHost::ForgetVisitorWhoLeft(const ShownFrame& frame) {
+  const cv::Mat& image = frame.tracked.frame.image;
+  if (!idle_watch_ || image.empty() || !idle_watch_->Update(frame.seconds, image)) return;
+  if (request_.route) route_.emplace(*request_.route);
+  Welcome(0);
+  report_({frame.tracked.frame.time, "kiosk", "the device was left; the next visit begins"});
+}
+
+void VisitorHost::Guide(std::size_t index, const engine::CameraModel& camera,
+                        const std::shared_ptr<ShownFrame>& frame) {
+  const Timestamp time = frame->tracked.frame.time;
+  if (index == 0) ForgetVisitorWhoLeft(*frame);
+  visitors_[index]->Guide(frame, camera);
+  ReportCards(index, time);
+  if (index == 0) Narrate(*frame, camera);
+  if (index == 0 && visits_) {
+    visits_->Add(*frame, route_ ? &*route_ : nullptr);
+    ReportProblem(visits_->TakeProblem(), time);
+  }
+  ReportRoute(time);
+}
+
+bool VisitorHost::Lead(const Command& command, const engine::TrackedFrame& frame) {
+  const auto* const guide = std::get_if<GuideVisitor>(&command);
+  if (guide == nullptr) return false;
+  const auto index = static_cast<std::size_t>(frame.frame.camera);
+  if (visitors_[index]->cards()->Do(*guide)) {
+    report_({frame.frame.time, "command", FormatCommand(command)});
+    ReportCards(index, frame.frame.time);
+    return true;
+  }
+  if (!route_) throw Error("there are no stops; use docent tour --tour NAME to be led along a tour");
+  if (guide->step == GuideVisitor::Step::kSkip && !route_->Skip()) throw Error(strings_.no_further_stop);
+  if (guide->step == GuideVisitor::Step::kBack && !route_->GoBack()) throw Error(strings_.no_stop_before);
+  report_({frame.frame.time, "command", FormatCommand(command)});
+  ReportRoute(frame.frame.time);
+  return true;
+}
+
+void VisitorHost::Finish() {
+  if (visits_) visits_->Finish();
+}
+
+void VisitorHost::Narrate(const ShownFrame& frame, const engine::CameraModel& camera) {
+  if (!narration_) return;
+  Narration::Seen seen{.seconds = frame.seconds, .display = &*frame.visitor, .way = nullptr, .signs = {}};
+  if (frame.way) seen.way = &*frame.way;
+  if (engine::HasPose(frame.tracked.state) && frame.shown.scene)
+    seen.signs = SignsInView(*frame.shown.scene, camera, frame.tracked.camera_from_map, request_.language);
+  const Timestamp time = frame.tracked.frame.time;
+  for (std::string& text : narration_->Update(seen)) {
+    report_({time, "narration", text});
+    speech_->Say(std::move(text));
+  }
+  ReportProblem(speech_->TakeProblem(), time);
+}
+
+void VisitorHost::ReportProblem(const std::string& problem, Timestamp time) const {
+  if (!problem.empty()) report_({time, "warning", problem});
+}
+
+void VisitorHost::ReportCards(std::size_t index, Timestamp time) {
+  for (const VisitorCards::Opened& opened : visitors_[index]->cards()->TakeOpened()) {
+    report_({time, "card", "'" + opened.entity + "' opened"});
+    for (const std::string& sound : opened.sounds) asked_sounds_.emplace_back(opened.map_key, sound);
+  }
+}
+
+void VisitorHost::ReportRoute(Timestamp time) {
+  if (!route_) return;
+  for (const RouteEvent& event : route_->TakeEvents()) report_({time, "tour", TextOf(event, *route_)});
+}
+
+}  // namespace docent::app

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/card_targets.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "content/cards.h"
+
+namespace docent::ui {
+
+namespace {
+
+constexpr double kLeastSize = std::numbers::pi / 180;  // Radians; smaller things are not pointed at.
+
+// The part of the image that a box covers; empty if it is behind the camera, outside the image, or too small.
+std::optional<CardTarget> TargetOf(const PlacedBox& box, const engine::CameraModel& camera,
+                                   const engine::Rigid3& camera_from_map) {
+  const double infinite = std::numeric_limits<double>::infinity();
+  CardTarget target{{}, Eigen::Vector2d::Constant(infinite), Eigen::Vector2d::Constant(-infinite)};
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto pixel = camera.Project(camera_from_map * box.Corner(corner));
+    if (!pixel) return std::nullopt;
+    target.low = target.low.cwiseMin(*pixel);
+    target.high = target.high.cwiseMax(*pixel);
+  }
+  const Eigen::Vector2d last(camera.width_px() - 1, camera.height_px() - 1);
+  target.low = target.low.cwiseMax(0.0).cwiseMin(last);
+  target.high = target.high.cwiseMax(0.0).cwiseMin(last);
+  const Eigen::Vector2d size = target.high - target.low;
+  if (size.minCoeff() <= 0 || size.maxCoeff() * camera.PixelAngle() < kLeastSize) return std::nullopt;
+  return target;
+}
+
+double AreaOf(const CardTarget& target) {
+  return (target.high - target.low).prod();
+}
+
+double DistanceTo(const CardTarget& target, const Eigen::Vector2d& pixel) {
+  return (pixel - pixel.cwiseMax(target.low).cwiseMin(target.high)).norm();
+}
+
+}  // namespace
+
+std::vector<CardTarget> FindCardTargets(const content::Scene& scene, const engine::CameraModel& camera,
+                                        const engine::Rigid3& camera_from_map, EntityShapes* shapes) {
+  const Eigen::Vector3d eye = camera_from_map.OriginInSource();
+  const Eigen::Vector2d middle(0.5 * (camera.width_px() - 1), 0.5 * (camera.height_px() - 1));
+  std::vector<std::pair<double, CardTarget>> found;
+  for (const content::Entity& entity : scene.entities) {
+    if (!content::HasCard(entity)) continue;
+    const auto box = shapes->BoxOf(entity, eye);
+    if (!box) continue;
+    auto target = TargetOf(*box, camera, camera_from_map);
+    if (!target) continue;
+    target->entity = entity.name;
+    const double distance = (0.5 * (target->low + target->high) - middle).norm();
+    found.emplace_back(distance, *std::move(target));
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<CardTarget> targets;
+  targets.reserve(found.size());
+  for (auto& [distance, target] : found) targets.push_back(std::move(target));
+  return targets;
+}
+
+const CardTarget* TargetAt(const std::vector<CardTarget>& targets, const Eigen::Vector2d& pixel,
+                           double margin_px) {
+  const CardTarget* best = nullptr;
+  std::pair<double, double> least(margin_px, std::numeric_limits<double>::infinity());
+  for (const CardTarget& target : targets) {
+    const std::pair miss(DistanceTo(target, pixel), AreaOf(target));
+    if (miss.first > margin_px || (best != nullptr && miss >= least)) continue;
+    best = &target;
+    least = miss;
+  }
+  return best;
+}
+
+}  // namespace docent::ui

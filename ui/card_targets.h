@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "content/scene.h"
+#include "engine/geometry/camera_model.h"
+#include "engine/geometry/rigid3.h"
+#include "ui/entity_shapes.h"
+#include "ui/renderer.h"
+
+namespace docent::ui {
+
+// What is in view and has a card (content::HasCard), the nearest to the middle of the image first. What spans
+// less than a degree is left out. `shapes` is used as if it was drawn, without its EndFrame.
+std::vector<CardTarget> FindCardTargets(const content::Scene& scene, const engine::CameraModel& camera,
+                                        const engine::Rigid3& camera_from_map, EntityShapes* shapes);
+
+// The target that a person means by this pixel of the image, who may miss it by `margin_px`: of those that
+// contain it the smallest, else the nearest. Null for none.
+const CardTarget* TargetAt(const std::vector<CardTarget>& targets, const Eigen::Vector2d& pixel,
+                           double margin_px);
+
+}  // namespace docent::ui
