@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "content/cards.h"
+#include "ui/label_board.h"
+#include "ui/label_layout.h"
 
 namespace docent::ui {
 
@@ -43,13 +45,36 @@ double DistanceTo(const CardTarget& target, const Eigen::Vector2d& pixel) {
   return (pixel - pixel.cwiseMax(target.low).cwiseMin(target.high)).norm();
 }
 
+// Moves the boards of labels as they are drawn: apart from each other and from signposts (DrawLabels).
+void MoveLabels(const content::Scene& scene, const engine::CameraModel& camera,
+                const engine::Rigid3& camera_from_map,
+                std::vector<std::pair<const content::Entity*, CardTarget>>* targets) {
+  constexpr double kGap_px = 3;
+  std::vector<Eigen::AlignedBox2d> boards = SignBoards(scene, camera, camera_from_map);
+  std::size_t next = boards.size();
+  const auto is_label = [](const auto& target) {
+    return target.first->kind == content::Entity::Kind::kLabel;
+  };
+  for (const auto& target : *targets) {
+    if (is_label(target)) boards.emplace_back(target.second.low, target.second.high);
+  }
+  const Eigen::AlignedBox2d bounds(Eigen::Vector2d::Zero(),
+                                   Eigen::Vector2d(camera.width_px(), camera.height_px()));
+  const auto placed = LayOutApart(boards, bounds, kGap_px);
+  for (auto& target : *targets) {
+    if (!is_label(target)) continue;
+    target.second.low = placed[next].min();
+    target.second.high = placed[next++].max();
+  }
+}
+
 }  // namespace
 
 std::vector<CardTarget> FindCardTargets(const content::Scene& scene, const engine::CameraModel& camera,
                                         const engine::Rigid3& camera_from_map, EntityShapes* shapes) {
   const Eigen::Vector3d eye = camera_from_map.OriginInSource();
   const Eigen::Vector2d middle(0.5 * (camera.width_px() - 1), 0.5 * (camera.height_px() - 1));
-  std::vector<std::pair<double, CardTarget>> found;
+  std::vector<std::pair<const content::Entity*, CardTarget>> found;
   for (const content::Entity& entity : scene.entities) {
     if (!content::HasCard(entity)) continue;
     const auto box = shapes->BoxOf(entity, eye);
@@ -57,14 +82,17 @@ std::vector<CardTarget> FindCardTargets(const content::Scene& scene, const engin
     auto target = TargetOf(*box, camera, camera_from_map);
     if (!target) continue;
     target->entity = entity.name;
-    const double distance = (0.5 * (target->low + target->high) - middle).norm();
-    found.emplace_back(distance, *std::move(target));
+    found.emplace_back(&entity, *std::move(target));
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  MoveLabels(scene, camera, camera_from_map, &found);
   std::vector<CardTarget> targets;
   targets.reserve(found.size());
-  for (auto& [distance, target] : found) targets.push_back(std::move(target));
+  for (auto& [entity, target] : found) targets.push_back(std::move(target));
+  const auto distance = [&middle](const CardTarget& target) {
+    return (0.5 * (target.low + target.high) - middle).norm();
+  };
+  std::stable_sort(targets.begin(), targets.end(),
+                   [&](const CardTarget& a, const CardTarget& b) { return distance(a) < distance(b); });
   return targets;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "ui/label_layout.h"
@@ -132,17 +133,17 @@ std::vector<PlacedLabel> LabelsInView(const content::Scene& scene, const LabelVi
   return labels;
 }
 
-// So that no board covers another one.
-void MoveApart(const Canvas& canvas, std::vector<PlacedLabel>* labels) {
+// So that no board covers another one, or one of these.
+void MoveApart(const Canvas& canvas, std::vector<Eigen::AlignedBox2d> boards,
+               std::vector<PlacedLabel>* labels) {
   constexpr double kGap = 4;  // Pixels: an edge is seen between two boards.
-  std::vector<Eigen::AlignedBox2d> boards;
+  std::size_t next = boards.size();
   for (const PlacedLabel& label : *labels) {
     if (!label.board.isEmpty()) boards.push_back(label.board);
   }
   const Eigen::AlignedBox2d bounds(Eigen::Vector2d::Zero(),
                                    Eigen::Vector2d(canvas.width_px(), canvas.height_px()));
   const auto placed = LayOutApart(boards, bounds, kGap);
-  std::size_t next = 0;
   for (PlacedLabel& label : *labels) {
     if (!label.board.isEmpty()) label.board = placed[next++];
   }
@@ -185,9 +186,31 @@ std::shared_ptr<const content::Model> LabelBoardShape(const std::string& text) {
   return model;
 }
 
+std::vector<Eigen::AlignedBox2d> SignBoards(const content::Scene& scene, const engine::CameraModel& camera,
+                                            const engine::Rigid3& camera_from_map) {
+  constexpr double kHalfWidth = 0.8;  // Of a usual board, in its heights; its text decides.
+  std::vector<Eigen::AlignedBox2d> boards;
+  for (const content::Entity& entity : scene.entities) {
+    if (entity.kind != content::Entity::Kind::kSignpost || entity.hidden) continue;
+    const Eigen::Vector3d middle = camera_from_map * content::BoardMiddle(entity.signpost);
+    const auto pixel = camera.Project(middle);
+    if (!pixel || !camera.IsInside(*pixel)) continue;
+    const auto above = camera.Project(middle - 0.5 * entity.signpost.height_m * Eigen::Vector3d::UnitY());
+    if (!above) continue;
+    const double half = (*above - *pixel).norm();
+    const Eigen::Vector2d reach(2 * kHalfWidth * half, half);
+    boards.emplace_back(*pixel - reach, *pixel + reach);
+  }
+  return boards;
+}
+
 void DrawLabels(const content::Scene& scene, const LabelView& view, Canvas* canvas) {
   std::vector<PlacedLabel> labels = LabelsInView(scene, view, canvas);
-  MoveApart(*canvas, &labels);
+  std::vector<Eigen::AlignedBox2d> signs = SignBoards(scene, view.camera, view.camera_from_map);
+  for (Eigen::AlignedBox2d& sign : signs)
+    sign = {view.image_in_canvas.WindowFromImage(sign.min()),
+            view.image_in_canvas.WindowFromImage(sign.max())};
+  MoveApart(*canvas, std::move(signs), &labels);
   for (const PlacedLabel& label : labels) DrawLeader(label.drawn, label.board, label.opacity, canvas);
   for (const PlacedLabel& label : labels) {
     if (label.board.isEmpty()) continue;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Geometry>
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "content/scene.h"
 #include "engine/geometry/camera_model.h"
@@ -34,6 +36,10 @@ struct LabelView {
   const std::string& language;              // Of the reader; it chooses the texts (TextFor).
   std::span<const std::string> faint = {};  // Hidden labels that are drawn all the same, faintly, by name.
 };
+
+// Where the boards of signposts are in the image, about: labels keep clear of them.
+std::vector<Eigen::AlignedBox2d> SignBoards(const content::Scene& scene, const engine::CameraModel& camera,
+                                            const engine::Rigid3& camera_from_map);
 
 // Draws all labels of a scene that are not hidden. Boards that would cover each other are moved apart, at the
 // ends of their leader lines. A label whose board is outside of the image is left out; one so far away that

@@ -6,6 +6,30 @@
 
 namespace docent::app {
 
+void AdaptiveQuality::WarmUp(ui::Renderer* renderer) {
+  const engine::CameraModel camera(engine::LensModel::kRadialTangential, {64, 48, 50, 50, 31.5, 23.5}, {});
+  engine::TrackedFrame tracked;
+  tracked.frame.image = cv::Mat::zeros(48, 64, CV_8UC3);
+  tracked.state = engine::TrackingState::kSixDof;
+  content::Scene scene;
+  content::Entity& sign = scene.entities.emplace_back();
+  sign.name = "sign";
+  sign.kind = content::Entity::Kind::kSignpost;
+  sign.signpost.text = " ";
+  sign.signpost.anchor = {0, 0.5, 2};
+  sign.signpost.height_m = 0.5;
+  sign.signpost.direction = Eigen::Vector3d::UnitX();
+  ui::View view;
+  view.tracked = &tracked;
+  view.camera = &camera;
+  view.scene = &scene;
+  for (const ui::DrawingQuality& quality : ui::kDrawingLadder) {
+    renderer->SetQuality(quality.samples, 1);
+    renderer->Draw(view);
+  }
+  renderer->SetQuality(ui::kDrawingLadder.front().samples, 1);
+}
+
 void AdaptiveQuality::Apply(double pixels_per_pixel, ui::Renderer* renderer) const {
   const ui::DrawingQuality& quality = ladder_.quality();
   // In steps of an eighth, so that a window that is resized does not need a new lens table all the time.

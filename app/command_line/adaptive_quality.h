@@ -16,6 +16,9 @@ class AdaptiveQuality {
  public:
   using Clock = std::chrono::steady_clock;
 
+  // Draws one of everything at every quality, as a driver without a graphics card takes seconds to compile
+  // what it has not drawn before, in which a visitor's image would freeze.
+  static void WarmUp(ui::Renderer* renderer);
   // Sets the quality of the next image, of which one of the camera's pixels covers this many of the window.
   void Apply(double pixels_per_pixel, ui::Renderer* renderer) const;
   // An image was drawn from `begin` to now. Returns what has changed, in words, if anything has.

@@ -137,6 +137,7 @@ class GuideWindow {
     host.has_route = request_.route.has_value();
     host.kiosk_code = request_.kiosk_code;
     visitor_.emplace(std::move(host));
+    AdaptiveQuality::WarmUp(&renderer_);
     if (visitor_->is_locked()) window_.ToggleFullScreen();
   }
 
@@ -254,7 +255,12 @@ class GuideWindow {
       if (large())
         MakeEyeView(view, *large(), request_.display->eyes[static_cast<std::size_t>(eye)], &eye_view);
       eye_view.view.overlay.hud = false;
-      if (large()) renderer_.Draw(eye_view.view);
+      if (large()) {
+        const engine::CameraModel& lens = *eye_view.view.camera;
+        quality_.Apply(ui::FitImage(lens.width_px(), lens.height_px(), part.width_px, part.height_px).scale,
+                       &renderer_);
+        renderer_.Draw(eye_view.view);
+      }
       eye_view.view.overlay.hud = large() != nullptr;
       renderer_.PresentWithHeadsUp(eye_view.view, part,
                                    {ui::VisitorUnit_px(part.width_px, part.height_px, 0), 0, 0});

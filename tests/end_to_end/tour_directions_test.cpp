@@ -78,7 +78,8 @@ class FiveStops : public ::testing::Test {
       return FormatNumber(museum.Begin(label) + share * (museum.End(label) - museum.Begin(label)) - from);
     };
     const std::string back = at("visit0", 0.8) + " tour back\n";
-    mapped_.folder().Write("visit.txt", back + back + back + at("visit4", 0.8) + " tour skip\n");
+    const std::string card = at("visit4", 0.4) + " tour open sign-1\n" + at("visit4", 0.6) + " tour close\n";
+    mapped_.folder().Write("visit.txt", back + back + back + card + at("visit4", 0.8) + " tour skip\n");
     mapped_.Succeed({"tour", "--library", mapped_.library(), "--camera", "sim:" + mapped_.spec(), "--from",
                      FormatNumber(from), "--until", FormatNumber(until), "--pace", "lockstep", "--headless",
                      "--tour", "Five bays", "--narrate", "--script",
@@ -121,6 +122,7 @@ TEST_F(FiveStops, AreReachedWithADetourALossAndASkippedStopAlongTrueDirections) 
   }
   EXPECT_GE(lost_s, 1);
 
+  EXPECT_THAT(EventsOf("card", Tour() / "events.csv"), ElementsAre("'sign-1' opened"));
   // What was spoken, for a visitor who cannot see it.
   const std::vector<std::string> spoken = EventsOf("narration", Tour() / "events.csv");
   auto named = spoken.begin();

@@ -203,7 +203,11 @@ TEST_F(CardView, CoversTheVideoWithAnEvenGroundOfEnoughContrast) {
   View view;
   view.tracked = &tracked;
   view.camera = &kTargetCamera;
-  view.overlay = WithCard("Vases of the third century.", false, false);
+  view.overlay = WithCard(
+      "Vases of the third century were found in the harbour in 1874, when its "
+      "bottom was deepened for steamers; most of them still held the oil of olives from the "
+      "south.",
+      false, false);
   renderer.Draw(view);
   cv::Mat image;
   renderer.ReadBack(&image);

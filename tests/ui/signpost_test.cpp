@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "tests/ui/ui_testing.h"
 #include "ui/entity_shapes.h"
@@ -53,6 +54,34 @@ TEST(Signpost, LimitsTheTextureSizeForAnyTextLength) {
     EXPECT_LE(model->images[0].width_px, 1024);
     EXPECT_LE(model->images[0].height_px, 1024);
     EXPECT_EQ(model->images[0].rgba.size(), 4u * model->images[0].width_px * model->images[0].height_px);
+  }
+}
+
+// The height of a capital letter over that of the board, from the rows of the board that have letters.
+double LetterRatio(const content::Image& board) {
+  int height = 0, letter = board.height_px;
+  for (int y = 0; y < board.height_px; ++y) {
+    bool has_letters = false;
+    for (int x = 0; x < board.width_px; ++x)
+      has_letters = has_letters || board.rgba[4u * static_cast<std::size_t>(y * board.width_px + x)] > 150;
+    if (has_letters) {
+      ++height;
+    } else if (height > 0) {
+      letter = std::min(letter, std::exchange(height, 0));
+    }
+  }
+  return static_cast<double>(letter) / board.height_px;
+}
+
+// However long the text is, it spans 0.4 degrees from twelve heights of the board away: from three metres, of
+// a board of 25 centimetres.
+TEST(Signpost, HasLettersThatAreReadFromTwelveHeightsAway) {
+  for (const int words : {1, 3, 10, 40, 400}) {
+    std::string text;
+    for (int i = 0; i < words; ++i) text += "HHHHH ";
+    const auto model = MakeSignpostModel(text, "");
+    const double angle_deg = std::atan(LetterRatio(model->images[0]) / 12) * 180 / std::numbers::pi;
+    EXPECT_GE(angle_deg, 0.4) << words;
   }
 }
 

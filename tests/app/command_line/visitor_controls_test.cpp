@@ -175,7 +175,7 @@ TEST_F(VisitorAtControls, ACardIsTurnedByAFingerAndClosedByItsButton) {
   EXPECT_NEAR(Drawn().visitor->card->turned_rad->x(), std::numbers::pi / 4, 1e-9);
   Touch(begin.x() + 200, begin.y(), Kind::kRelease);
   controls_->Update(begin, now_);
-  EXPECT_NEAR(Drawn().visitor->card->turned_rad->x(), std::numbers::pi / 4, 1e-9) << "it was let go";
+  EXPECT_NEAR(Drawn().visitor->card->turned_rad->x(), std::numbers::pi / 4, 1e-9) << "the finger is gone";
   EXPECT_THAT(Given(), IsEmpty());
   Touch(layout.text.x + 5, layout.text.y + 5);
   Touch(layout.close.x + 5, layout.close.y + 5);
