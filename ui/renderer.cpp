@@ -63,10 +63,10 @@ struct Renderer::Impl {
 
   // Draws labels and heads-up display into a canvas that shows the image in this part of it.
   void DrawTexts(const View& view, const HeadsUpStyle& style, const Letterbox& box, Canvas* target) const {
-    if (view.overlay.visitor && view.overlay.visitor->card) return DrawCardWithTexts(view, style, target);
     const engine::Rigid3* const from = DrawnFrom(view);
     if (from != nullptr && view.scene != nullptr)
       DrawLabels(*view.scene, {*view.camera, *from, box, language, view.faint}, target);
+    if (view.overlay.visitor && view.overlay.visitor->card) return DrawCardWithTexts(view, style, target);
     DrawInsetText(view, style, box, target);
     HeadsUpStyle above = style;
     if (!view.overlay.caption.empty()) {

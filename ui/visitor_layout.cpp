@@ -58,7 +58,8 @@ CardLayout LayOutCard(const Overlay& overlay, int width_px, int height_px, const
   // Few words need no more than the lower part, and leave the room in view.
   constexpr std::size_t kFewBytes = 140;
   if (!card.shown && card.text.size() <= kFewBytes) {
-    const double cut = std::max(0.0, all.height - std::max(0.38 * height_px, target + 120 * unit));
+    const double cut =
+        std::max(0.0, all.height - std::max(0.38 * std::min(width_px, height_px), target + 120 * unit));
     layout.card.y += cut;
     layout.card.height -= cut;
     layout.close.y += cut;

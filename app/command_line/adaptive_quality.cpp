@@ -23,11 +23,17 @@ void AdaptiveQuality::WarmUp(ui::Renderer* renderer) {
   view.tracked = &tracked;
   view.camera = &camera;
   view.scene = &scene;
+  view.overlay.hud = false;
   for (const ui::DrawingQuality& quality : ui::kDrawingLadder) {
     renderer->SetQuality(quality.samples, 1);
     renderer->Draw(view);
   }
   renderer->SetQuality(ui::kDrawingLadder.front().samples, 1);
+  // Until the first image, nothing of that is shown.
+  ui::View empty;
+  empty.camera = &camera;
+  empty.overlay.hud = false;
+  renderer->Draw(empty);
 }
 
 void AdaptiveQuality::Apply(double pixels_per_pixel, ui::Renderer* renderer) const {

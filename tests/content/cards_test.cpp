@@ -61,7 +61,7 @@ TEST(Cards, AreThoseOfWhatCanBeReadSeenOrHeard) {
 }
 
 TEST(Pages, EndWithAParagraphElseASentenceElseAWord) {
-  EXPECT_THAT(PagesOf("One two three.\nFour five six. Seven", 20),
+  EXPECT_THAT(PagesOf("One two three.\nFour five six. Seven", 19),
               ElementsAre("One two three.", "Four five six.", "Seven"));
   EXPECT_THAT(PagesOf("Lions sleep a lot. They hunt at night.", 22),
               ElementsAre("Lions sleep a lot.", "They hunt at night."));

@@ -13,7 +13,7 @@ namespace {
 // A machine whose frames take this long on each rung, at 30 images a second or as fast as it can.
 struct Machine {
   std::array<double, kDrawingLadder.size()> cost_s;
-  DrawingLadder ladder;
+  DrawingLadder ladder = DrawingLadder();
   double now_s = 0;
   int changes = 0;
 

@@ -142,7 +142,7 @@ TEST_F(VisitorAtControls, ATouchOpensWhatItHitsWithinAFingertip) {
   Touch(240, 296);  // 15 pixels of the window below it.
   Touch(240, 330);
   Touch(900, 600);
-  EXPECT_THAT(Given(), ElementsAre("tour open mask", "tour open mask"));
+  EXPECT_THAT(Given(), ElementsAre("tour open \"mask\"", "tour open \"mask\""));
 }
 
 TEST_F(VisitorAtControls, ATouchReachesTheMenuAndItsChoices) {
