@@ -10,7 +10,7 @@ namespace {
 
 using Box = Eigen::AlignedBox2d;
 
-const Box kCanvas({0, 0}, {1000, 800});
+const Box kCanvas(Eigen::Vector2d(0, 0), Eigen::Vector2d(1000, 800));
 
 Box BoardAt(double x, double y, double width, double height) {
   return {Eigen::Vector2d(x, y), Eigen::Vector2d(x + width, y + height)};
