@@ -161,6 +161,24 @@ std::optional<Eigen::Vector2d> BrownUndistort(const std::array<double, 5>& k,
   return x;
 }
 
+// A rotation by a rotation vector, to second order: of 0.05 radians, wrong by 0.00002.
+inline Eigen::Vector3d SmallRotation(const Eigen::Vector3d& rotation, const Eigen::Vector3d& point) {
+  const double a = rotation.x(), b = rotation.y(), c = rotation.z();
+  const double x = b * point.z() - c * point.y(), y = c * point.x() - a * point.z(),
+               z = a * point.y() - b * point.x();
+  return {point.x() + x + 0.5 * (b * z - c * y), point.y() + y + 0.5 * (c * x - a * z),
+          point.z() + z + 0.5 * (a * y - b * x)};
+}
+
+// jacobian times the matrix of the cross product with `angle`.
+inline Eigen::Matrix<double, 2, 3> TimesHat(const Eigen::Matrix<double, 2, 3>& jacobian,
+                                            const Eigen::Vector3d& angle) {
+  Eigen::Matrix<double, 2, 3> result;
+  // Each row r: r [angle]x = (r x angle).
+  for (int row = 0; row < 2; ++row) result.row(row) = jacobian.row(row).transpose().cross(angle).transpose();
+  return result;
+}
+
 const char* Name(LensModel lens) {
   switch (lens) {
     case LensModel::kRadialTangential:
@@ -325,8 +343,8 @@ bool CameraModel::ProjectByAngle(const Eigen::Vector3d& point, ImagePoint* resul
   return true;
 }
 
-bool CameraModel::Project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
-                          Eigen::Matrix<double, 2, 3>* jacobian) const {
+bool CameraModel::ProjectLens(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
+                              Eigen::Matrix<double, 2, 3>* jacobian) const {
   ImagePoint point;
   if (!(lens_ == LensModel::kKannalaBrandt
             ? ProjectByAngle(point_in_camera, &point)
@@ -341,6 +359,64 @@ bool CameraModel::Project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2
   return true;
 }
 
+CameraModel CameraModel::WithReadout(const std::shared_ptr<const CameraModel>& lens,
+                                     const ReadoutMotion& motion) {
+  CameraModel result = *lens;
+  result.lens_of_image_ = lens->lens_of_image_ ? lens->lens_of_image_ : lens;
+  result.readout_ = motion;
+  // Of the first and the last row, or column, relative to the middle of the image.
+  const double displacement_px =
+      0.5 * motion.rotation_rate.norm() * motion.readout_s.cwiseAbs().maxCoeff() / lens->PixelAngle();
+  constexpr double kNegligible_px = 0.1;
+  result.rotates_ = displacement_px > kNegligible_px;
+  return result;
+}
+
+std::shared_ptr<const CameraModel> CameraModel::WithMotionOf(const CameraModel& image,
+                                                             const std::shared_ptr<const CameraModel>& lens) {
+  if (!image.lens_of_image_) return lens;
+  return std::make_shared<CameraModel>(WithReadout(lens, image.readout_));
+}
+
+Eigen::Vector3d CameraModel::AtExposureOf(const Eigen::Vector2d& pixel, const Eigen::Vector3d& point) const {
+  if (!rotates_) return point;
+  return SmallRotation(readout_.rotation_rate * readout_.readout_s.dot(ReadoutPosition(pixel)), point);
+}
+
+bool CameraModel::ProjectAtExposureOf(const Eigen::Vector2d& measured, const Eigen::Vector3d& point_in_camera,
+                                      Eigen::Vector2d* pixel, Eigen::Matrix<double, 2, 3>* jacobian) const {
+  if (!rotates_) return ProjectLens(point_in_camera, pixel, jacobian);
+  const Eigen::Vector3d angle = readout_.rotation_rate * readout_.readout_s.dot(ReadoutPosition(measured));
+  if (!ProjectLens(SmallRotation(angle, point_in_camera), pixel, jacobian)) return false;
+  if (jacobian != nullptr) *jacobian += TimesHat(*jacobian, angle);
+  return true;
+}
+
+bool CameraModel::Project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
+                          Eigen::Matrix<double, 2, 3>* jacobian) const {
+  if (!rotates_) return ProjectLens(point_in_camera, pixel, jacobian);
+  // When a pixel is exposed depends on the pixel: delay = d . position(p + v delay), where p is the pixel of
+  // the middle of the image, v the velocity at which the rotation moves it, and d the readout times. What
+  // this neglects, the change of the velocity meanwhile, is of second order in the rotation during the
+  // readout.
+  Eigen::Matrix<double, 2, 3> slope;
+  if (!ProjectLens(point_in_camera, pixel, &slope)) return false;
+  const Eigen::RowVector2d delay_by_pixel(readout_.readout_s.x() / intrinsics_.width_px,
+                                          readout_.readout_s.y() / intrinsics_.height_px);
+  const Eigen::Vector2d velocity = slope * readout_.rotation_rate.cross(point_in_camera);
+  const double delay =
+      readout_.readout_s.dot(ReadoutPosition(*pixel)) / (1 - static_cast<double>(delay_by_pixel * velocity));
+  const Eigen::Vector3d angle = readout_.rotation_rate * delay;
+  const Eigen::Vector3d rotated = SmallRotation(angle, point_in_camera);
+  if (!ProjectLens(rotated, pixel, jacobian)) return false;
+  if (jacobian == nullptr) return true;
+  // pixel = lens(Exp(rate delay(pixel)) point), differentiated on both sides.
+  const Eigen::Vector2d by_delay = *jacobian * readout_.rotation_rate.cross(rotated);
+  const Eigen::Matrix2d factor = (Eigen::Matrix2d::Identity() - by_delay * delay_by_pixel).inverse();
+  *jacobian = (factor * (*jacobian + TimesHat(*jacobian, angle))).eval();
+  return true;
+}
+
 std::optional<Eigen::Vector2d> CameraModel::Project(const Eigen::Vector3d& point_in_camera) const {
   Eigen::Vector2d pixel;
   if (!Project(point_in_camera, &pixel, nullptr)) {
@@ -350,6 +426,13 @@ std::optional<Eigen::Vector2d> CameraModel::Project(const Eigen::Vector3d& point
 }
 
 std::optional<Eigen::Vector3d> CameraModel::Unproject(const Eigen::Vector2d& pixel) const {
+  std::optional<Eigen::Vector3d> ray = UnprojectLens(pixel);
+  if (!rotates_ || !ray) return ray;
+  return SmallRotation(-readout_.rotation_rate * readout_.readout_s.dot(ReadoutPosition(pixel)), *ray)
+      .normalized();
+}
+
+std::optional<Eigen::Vector3d> CameraModel::UnprojectLens(const Eigen::Vector2d& pixel) const {
   const Eigen::Vector2d image((pixel.x() - intrinsics_.cx) / intrinsics_.fx,
                               (pixel.y() - intrinsics_.cy) / intrinsics_.fy);
   if (lens_ == LensModel::kRadialTangential) {
@@ -376,11 +459,15 @@ std::optional<Eigen::Vector3d> CameraModel::Unproject(const Eigen::Vector2d& pix
   return Eigen::Vector3d(scale * image.x(), scale * image.y(), std::cos(angle));
 }
 
-bool CameraModel::operator==(const CameraModel& other) const {
+bool CameraModel::HasSameLens(const CameraModel& other) const {
   const Intrinsics& a = intrinsics_;
   const Intrinsics& b = other.intrinsics_;
   return lens_ == other.lens_ && distortion_ == other.distortion_ && a.width_px == b.width_px &&
          a.height_px == b.height_px && a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy;
+}
+
+bool CameraModel::operator==(const CameraModel& other) const {
+  return HasSameLens(other) && rotates_ == other.rotates_ && (!rotates_ || readout_ == other.readout_);
 }
 
 std::ostream& operator<<(std::ostream& out, const CameraModel& camera) {

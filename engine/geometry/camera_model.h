@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <iosfwd>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -14,6 +15,22 @@ enum class LensModel {
   kRadialTangential,  // k1 k2 p1 p2 k3, Brown 1966 as OpenCV's pinhole model
   kFov,               // omega, Devernay and Faugeras 2001
   kKannalaBrandt,     // k1 k2 k3 k4, Kannala and Brandt 2006 as OpenCV's fisheye model
+};
+
+// How the camera rotated while a rolling shutter exposed one image. A pixel is exposed readout_s . (pixel /
+// size - (1/2, 1/2)) seconds after the middle of the image, to which the pose and the time of the image
+// refer.
+struct ReadoutMotion {
+  // Angular velocity on the left: camera_from_map(t) = Exp(t rotation_rate) camera_from_map(0), radians per
+  // second.
+  Eigen::Vector3d rotation_rate = Eigen::Vector3d::Zero();
+  // Seconds from the exposure of the first column, and of the first row, to that of the last; negative if the
+  // last is exposed first.
+  Eigen::Vector2d readout_s = Eigen::Vector2d::Zero();
+
+  bool operator==(const ReadoutMotion& other) const {
+    return rotation_rate == other.rotation_rate && readout_s == other.readout_s;
+  }
 };
 
 // A calibrated camera: projects points to pixels and unprojects pixels to rays. An immutable value; safe to
@@ -35,6 +52,14 @@ class CameraModel {
   // lengths are positive and all numbers are finite (see Validate).
   CameraModel(LensModel lens, const Intrinsics& intrinsics, const std::array<double, 5>& distortion);
 
+  // The model of one image of a rolling shutter: Project and Unproject account for the rotation, unless it
+  // moves no pixel by more than a tenth. lens: the camera, or the model of another of its images.
+  static CameraModel WithReadout(const std::shared_ptr<const CameraModel>& lens, const ReadoutMotion& motion);
+
+  // The model of an image with the rotation of another one, if that has any: `lens` itself otherwise.
+  static std::shared_ptr<const CameraModel> WithMotionOf(const CameraModel& image,
+                                                         const std::shared_ptr<const CameraModel>& lens);
+
   // A sentence that says what is wrong with these numbers; empty if they are valid.
   static std::optional<std::string> Validate(LensModel lens, const Intrinsics& intrinsics,
                                              const std::array<double, 5>& distortion);
@@ -46,6 +71,10 @@ class CameraModel {
   // The same with the Jacobian d pixel / d point, 2x3, in pixels per length unit of the point.
   bool Project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
                Eigen::Matrix<double, 2, 3>* jacobian) const;
+  // The same for a point that was measured at a pixel: it is projected as it was exposed there. Cheaper than
+  // Project for an image of a rolling shutter, and equal to it where the point is.
+  bool ProjectAtExposureOf(const Eigen::Vector2d& measured, const Eigen::Vector3d& point_in_camera,
+                           Eigen::Vector2d* pixel, Eigen::Matrix<double, 2, 3>* jacobian) const;
   // Unit-length ray of a pixel in the camera frame, in closed form or by a checked Newton iteration. Empty if
   // no ray of the one-to-one range projects to the pixel.
   std::optional<Eigen::Vector3d> Unproject(const Eigen::Vector2d& pixel) const;
@@ -68,7 +97,22 @@ class CameraModel {
   // Angle of one pixel at the image centre, radians: 1 / mean focal length.
   double PixelAngle() const { return 2.0 / (intrinsics_.fx + intrinsics_.fy); }
 
-  // Whether all numbers are equal.
+  // Zero for the camera itself.
+  const ReadoutMotion& readout_motion() const { return readout_; }
+  // The camera of which this is the model of one image; empty if this is not the model of an image.
+  const std::shared_ptr<const CameraModel>& lens_of_image() const { return lens_of_image_; }
+  // Where a pixel lies between the first and the last column, and row: from -1/2 to 1/2. Its scalar product
+  // with readout_s is the delay of its exposure.
+  Eigen::Vector2d ReadoutPosition(const Eigen::Vector2d& pixel) const {
+    return {(pixel.x() + 0.5) / intrinsics_.width_px - 0.5, (pixel.y() + 0.5) / intrinsics_.height_px - 0.5};
+  }
+  // A point in the camera frame of the moment at which a pixel was exposed. point: in that of the middle of
+  // the image.
+  Eigen::Vector3d AtExposureOf(const Eigen::Vector2d& pixel, const Eigen::Vector3d& point) const;
+  // Whether lens, size and calibration are equal, whatever the rotation.
+  bool HasSameLens(const CameraModel& other) const;
+
+  // Whether all numbers that have an effect are equal.
   bool operator==(const CameraModel& other) const;
 
  private:
@@ -77,12 +121,18 @@ class CameraModel {
   struct ImagePoint {
     double x, y, xx, xy, yy, xz, yz;
   };
+  bool ProjectLens(const Eigen::Vector3d& point, Eigen::Vector2d* pixel,
+                   Eigen::Matrix<double, 2, 3>* jacobian) const;
+  std::optional<Eigen::Vector3d> UnprojectLens(const Eigen::Vector2d& pixel) const;
   bool ProjectThroughPlane(const Eigen::Vector3d& point, bool with_jacobian, ImagePoint* result) const;
   bool ProjectByAngle(const Eigen::Vector3d& point, ImagePoint* result) const;
 
   LensModel lens_ = LensModel::kRadialTangential;
   Intrinsics intrinsics_;
   std::array<double, 5> distortion_{};
+  std::shared_ptr<const CameraModel> lens_of_image_;
+  ReadoutMotion readout_;
+  bool rotates_ = false;           // whether readout_ has an effect
   double max_angle_ = 0;           // radians
   double max_radius_squared_ = 0;  // (tan of max_angle_)^2, for the first two lens models
   double max_image_radius_ = 0;  // largest distorted radius, in focal lengths, without tangential distortion

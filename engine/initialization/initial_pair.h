@@ -19,6 +19,7 @@ struct InitialPair {
   struct View {
     Timestamp time{};
     std::shared_ptr<const ImageFeatures> features;
+    std::shared_ptr<const CameraModel> camera = nullptr;  // of this image; null: InitialPair::camera
   };
   struct Match {
     Eigen::Vector2f pixel_a, pixel_b;  // level 0

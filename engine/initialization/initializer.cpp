@@ -125,15 +125,19 @@ void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeature
   }
   trails_at_start_ = trails_.size();
   age_frames_ = 0;
-  first_time_ = time;
+  first_time_ = previous_time_ = time;
   first_ = previous_ = features;
   const bool enough = static_cast<int>(trails_.size()) >= options_.min_alive;
   hint_ = enough ? Hint::kMoveSideways : Hint::kStartWhereThereIsDetail;
 }
 
-void Initializer::TrackCorners(const ImageFeatures& features) {
+void Initializer::TrackCorners(Timestamp time, const ImageFeatures& features) {
   const auto rotation = AlignRotation(previous_->small_blurry, *camera_, features.small_blurry, *camera_);
   const Rotation3 now_from_previous = rotation && rotation->converged ? rotation->b_from_a : Rotation3();
+  const Eigen::Vector3d rate = now_from_previous.Log() / std::max(ToSeconds(time - previous_time_), 1e-3);
+  last_rates_ = {age_frames_ == 1 ? rate : last_rates_[1], rate};
+  if (age_frames_ == 1) first_rates_ = last_rates_;
+  if (age_frames_ == 2) first_rates_[1] = rate;
   std::erase_if(trails_, [&](Trail& trail) {
     const auto ray = camera_->Unproject(trail.now.cast<double>());
     if (!ray) return true;
@@ -158,8 +162,9 @@ std::optional<InitialPair> Initializer::Track(Timestamp time,
     return std::nullopt;
   }
   ++age_frames_;
-  TrackCorners(*features);
+  TrackCorners(time, *features);
   previous_ = features;
+  previous_time_ = time;
   const bool too_few =
       trails_.size() < static_cast<std::size_t>(options_.min_alive) ||
       static_cast<double>(trails_.size()) < options_.min_alive_ratio * static_cast<double>(trails_at_start_);
@@ -193,6 +198,13 @@ double Initializer::SpeedChange() const {
   return *middle;
 }
 
+std::shared_ptr<const CameraModel> Initializer::ImageCamera(const Eigen::Vector3d& newest,
+                                                            const Eigen::Vector3d& other) const {
+  // Rates are means over intervals between frames, half an interval away: they are extrapolated.
+  const Eigen::Vector3d rate = newest + 0.5 * (newest - other);
+  return std::make_shared<CameraModel>(CameraModel::WithReadout(camera_, {rate, readout_s_}));
+}
+
 std::optional<InitialPair> Initializer::Attempt(Timestamp time,
                                                 const std::shared_ptr<const ImageFeatures>& features) {
   std::vector<InitialPair::Match> matches;
@@ -201,8 +213,9 @@ std::optional<InitialPair> Initializer::Attempt(Timestamp time,
     matches.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
     ids.push_back(trail.id);
   }
-  auto pair =
-      Solve({first_time_, first_}, {time, features}, std::move(matches), ids, SpeedChange(), &confirmation_);
+  auto pair = Solve({first_time_, first_, ImageCamera(first_rates_[0], first_rates_[1])},
+                    {time, features, ImageCamera(last_rates_[1], last_rates_[0])}, std::move(matches), ids,
+                    SpeedChange(), &confirmation_);
   if (pair) Reset();
   return pair;
 }
@@ -221,8 +234,8 @@ std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const 
   std::vector<std::uint32_t> kept;
   InitialPair pair;
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    const auto ray_a = camera_->Unproject(matches[i].pixel_a.cast<double>()),
-               ray_b = camera_->Unproject(matches[i].pixel_b.cast<double>());
+    const auto ray_a = a.camera->Unproject(matches[i].pixel_a.cast<double>()),
+               ray_b = b.camera->Unproject(matches[i].pixel_b.cast<double>());
     if (!ray_a || !ray_b) continue;
     rays_a.push_back(*ray_a);
     rays_b.push_back(*ray_b);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -41,6 +42,8 @@ class Initializer {
   void Reset();
   // Resets and uses another camera model from the next frame on.
   void SetCamera(std::shared_ptr<const CameraModel> camera);
+  // The readout time of the rolling shutter; see ReadoutMotion.
+  void SetReadout(const Eigen::Vector2d& readout_s) { readout_s_ = readout_s; }
   // Returns a pair once the geometry is reliable and confirmed, and then resets itself.
   std::optional<InitialPair> Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
 
@@ -69,13 +72,16 @@ class Initializer {
 
  private:
   void Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
-  void TrackCorners(const ImageFeatures& features);
+  void TrackCorners(Timestamp time, const ImageFeatures& features);
   std::optional<InitialPair> Attempt(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
   std::optional<InitialPair> Solve(const InitialPair::View& a, const InitialPair::View& b,
                                    std::vector<InitialPair::Match> matches,
                                    std::span<const std::uint32_t> ids, double speed_change_px,
                                    StartConfirmation* confirmation);
   double SpeedChange() const;
+  // The model of an image near the time of the newest two rotations.
+  std::shared_ptr<const CameraModel> ImageCamera(const Eigen::Vector3d& newest,
+                                                 const Eigen::Vector3d& other) const;
   void UpdateProgress(double progress);
 
   InitializerOptions options_;
@@ -85,7 +91,10 @@ class Initializer {
   std::vector<Trail> trails_;
   std::size_t trails_at_start_ = 0;
   int age_frames_ = 0;
-  Timestamp first_time_{};
+  Eigen::Vector2d readout_s_ = Eigen::Vector2d::Zero();
+  // Mean rotation rates, radians per second: of the first two intervals between frames, and of the last two.
+  std::array<Eigen::Vector3d, 2> first_rates_, last_rates_;
+  Timestamp first_time_{}, previous_time_{};
   std::shared_ptr<const ImageFeatures> first_, previous_;
   Hint hint_ = Hint::kNone;
   double progress_ = 0;

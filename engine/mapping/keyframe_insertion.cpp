@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/mapping/readout_update.h"
+
 namespace docent::engine {
 
 void KeyFrameInsertion::Insert(const KeyFrameCandidate& offered, std::span<const PointReport> reports) {
   ApplyReports(reports);
   const KeyFrameCandidate candidate = WithCorrections(offered);
+  if (UpdateReadout(*candidate.camera, &workspace_->map)) refinement_->RequireGlobalAdjustment();
   if (candidate.choice == KeyFrameChoice::kPanorama) {
     panoramas_->Insert(candidate);
   } else {

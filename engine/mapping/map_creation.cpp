@@ -52,7 +52,10 @@ KeyFrameId MapCreation::AddFirstView(const InitialPair& pair) {
     view.features = pair.a.features;
     a = map.AddKeyFrame(view).keyframe.id;
   }
-  map.FindKeyFrame(a)->keyframe.fixed = true;
+  KeyFrame& first = map.FindKeyFrame(a)->keyframe;
+  // When the first image became a keyframe, it was not known yet how the camera would move.
+  if (pair.a.camera) first.camera = lens_estimation_->CurrentModel(pair.a.camera);
+  first.fixed = true;
   if (map.panoramas().empty()) return a;
   const PanoramaMap panorama = map.panoramas().front();
   map.SetReference(panorama.id, a);
@@ -66,7 +69,7 @@ MapCreation::Views MapCreation::AddViews(const InitialPair& pair, double scale) 
   Rigid3 b_from_a = pair.geometry.b_from_a;
   b_from_a.translation *= scale / b_from_a.translation.norm();
   KeyFrame view;
-  view.camera = lens_estimation_->CurrentModel(pair.camera);
+  view.camera = lens_estimation_->CurrentModel(pair.b.camera ? pair.b.camera : pair.camera);
   view.time = pair.b.time;
   view.features = pair.b.features;
   const Rigid3 map_from_a = map.FindKeyFrame(a)->keyframe.camera_from_map.inverse();

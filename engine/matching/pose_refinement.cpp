@@ -25,7 +25,8 @@ Projection ProjectMeasurement(const CameraModel& camera, const Eigen::Matrix3d& 
   projection.point_in_camera =
       rotation * measurement.point_in_map.head<3>() + measurement.point_in_map[3] * translation;
   Eigen::Vector2d pixel;
-  projection.valid = camera.Project(projection.point_in_camera, &pixel, &projection.jacobian);
+  projection.valid =
+      camera.ProjectAtExposureOf(measurement.pixel, projection.point_in_camera, &pixel, &projection.jacobian);
   if (!projection.valid) return projection;
   projection.error = (measurement.pixel - pixel) * measurement.inverse_sigma;
   projection.jacobian *= measurement.inverse_sigma;

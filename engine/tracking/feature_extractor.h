@@ -6,7 +6,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "engine/base/option_check.h"
-#include "engine/tracking/feature_pool.h"
+#include "engine/base/shared_pool.h"
 #include "engine/vision/features.h"
 #include "engine/vision/rim_mask.h"
 
@@ -28,7 +28,7 @@ class FeatureExtractor {
 
  private:
   FeatureOptions options_;
-  FeaturePool pool_;
+  SharedPool<ImageFeatures> pool_;
   std::array<int, kPyramidLevels> fast_threshold_{};
   RimMask rim_;
 };

@@ -169,8 +169,8 @@ std::optional<InitialPair> MapInitialization::TryPanoramaViews(const CameraImage
                                  [&](const auto& entry) { return entry.first == keyframe->time; });
   const Eigen::Vector3d before =
       rate != keyframe_rotation_rates_.end() ? rate->second : Eigen::Vector3d(Eigen::Vector3d::Zero());
-  auto pair = initializer_.TryViews({keyframe->time, keyframe->features}, {image.time, image.features},
-                                    std::move(matches), ids,
+  auto pair = initializer_.TryViews({keyframe->time, keyframe->features, keyframe->camera},
+                                    {image.time, image.features, image.camera}, std::move(matches), ids,
                                     (rotation_rate - before).norm() / image.camera->PixelAngle());
   if (pair) pair->a_from_map = keyframe->camera_from_map;
   return pair;

@@ -32,6 +32,8 @@ class MapInitialization {
 
   // The search starts again with this model.
   void SetCamera(std::shared_ptr<const CameraModel> camera, Random* random);
+  // The readout time of the rolling shutter; see ReadoutMotion.
+  void SetReadout(const Eigen::Vector2d& readout_s) { initializer_.SetReadout(readout_s); }
   void Begin();
   // Discards the search.
   void Stop();

@@ -89,13 +89,15 @@ void MapTracker::Project(const std::vector<NearbyPoint>& points, bool infinite,
   const Eigen::Vector3d translation = camera_from_map.translation;
   const double min_cosine = options_.search.min_view_cosine;
   const int columns = camera_->width_px() / kProjectedCellPx + 1;
+  // Where the rolling shutter moves a point by a few pixels does not matter here.
+  const CameraModel& lens = camera_->lens_of_image() ? *camera_->lens_of_image() : *camera_;
   for (const NearbyPoint& local : points) {
     const Eigen::Vector3d x = rotation * local.point_in_map.head<3>() + local.point_in_map[3] * translation;
     if (!(x.z() > 0)) continue;
     const Eigen::Vector3d normal = rotation * local.normal.cast<double>();
     const double facing = -normal.dot(x);
     if (facing <= 0 || facing * facing < min_cosine * min_cosine * x.squaredNorm()) continue;
-    const auto pixel = camera_->Project(x);
+    const auto pixel = lens.Project(x);
     if (!pixel || !camera_->IsInside(*pixel, kPatchSize / 2)) continue;
     if (rim_ && !rim_->IsInside(*pixel, 0)) continue;
     std::uint8_t& cell =
@@ -281,17 +283,29 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   result.attempted = static_cast<int>(attempts_.size());
   result.skipped_as_occluded = skipped_as_occluded_;
   result.found = static_cast<int>(measurements_.size());
-  const PoseRefinement fine =
-      RefinePose(*camera_, result.camera_from_map, options_.refinement, &measurements_, &memory_,
-                 {pivot_estimate_.pivot, predicted, pivot_estimate_.reliable});
-  result.camera_from_map = fine.camera_from_map;
-  result.camera_from_map_without_prior = fine.camera_from_map_without_prior;
-  result.covariance = fine.covariance;
-  result.observed = fine.observed;
-  result.converged = fine.converged;
-  result.sigma = fine.sigma;
-  CountInliers(&result);
+  Refine(predicted, options_.refinement, &result);
   return result;
+}
+
+void MapTracker::RefineAgain(const Rigid3& predicted, MapTrackResult* result) {
+  // Half of the iterations have Huber's weights. The pose is nearly right already, so that few are needed.
+  PoseRefinementOptions options = options_.refinement;
+  options.iterations = std::min(options.iterations, 4);
+  result->inliers = result->finite_inliers = 0;
+  Refine(predicted, options, result);
+}
+
+void MapTracker::Refine(const Rigid3& predicted, const PoseRefinementOptions& options,
+                        MapTrackResult* result) {
+  const PoseRefinement fine = RefinePose(*camera_, result->camera_from_map, options, &measurements_, &memory_,
+                                         {pivot_estimate_.pivot, predicted, pivot_estimate_.reliable});
+  result->camera_from_map = fine.camera_from_map;
+  result->camera_from_map_without_prior = fine.camera_from_map_without_prior;
+  result->covariance = fine.covariance;
+  result->observed = fine.observed;
+  result->converged = fine.converged;
+  result->sigma = fine.sigma;
+  CountInliers(result);
 }
 
 void MapTracker::CountInliers(MapTrackResult* result) {

@@ -89,6 +89,11 @@ class MapTracker {
   // Estimates the pose. matches() returns the matches of the last call.
   MapTrackResult Track(const MapSnapshot& map, const ImageFeatures& features, const Rigid3& predicted,
                        Effort effort, Random* random);
+  // Estimates the pose from the matches of the last call of Track again, for instance after SetCamera with a
+  // better model of the image. predicted: as in Track.
+  void RefineAgain(const Rigid3& predicted, MapTrackResult* result);
+  // One per match, with the weights of the last estimate.
+  const std::vector<PoseMeasurement>& measurements() const { return measurements_; }
   // The rotation centre to assume where the translation cannot be observed.
   void SetPivot(const PivotEstimate& pivot) { pivot_estimate_ = pivot; }
 
@@ -138,6 +143,7 @@ class MapTracker {
   void SetSearchOrder();
   void AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random);
   bool ShouldSearch(MapPointId point, Random* random) const;
+  void Refine(const Rigid3& predicted, const PoseRefinementOptions& options, MapTrackResult* result);
   void CountInliers(MapTrackResult* result);
   void Search(const std::vector<std::uint32_t>& which, const ImageFeatures& features, float radius,
               bool direct);

@@ -50,6 +50,9 @@ class MotionModel {
     camera_from_map_ = CorrectedPose(camera_from_map_, after_from_before);
     twist_per_second_.head<3>() *= after_from_before.scale;
   }
+  // Of the last pose: its time, and its left twist (translation, rotation) per second.
+  const Eigen::Matrix<double, 6, 1>& twist_per_second() const { return twist_per_second_; }
+  Timestamp time() const { return time_; }
   const Rigid3& last() const { return camera_from_map_; }
 
  private:

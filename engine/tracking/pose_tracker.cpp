@@ -13,10 +13,14 @@ namespace docent::engine {
 PoseTracker::PoseTracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera)
     : options_(options),
       criteria_(options),
+      lens_(camera),
+      image_camera_(camera),
       map_tracker_(options.map_tracker, std::move(camera)),
-      rotation_center_(options.rotation_center) {}
+      rotation_center_(options.rotation_center),
+      readout_(options.readout) {}
 
 void PoseTracker::Reset() {
+  SetCamera(lens_);
   rotation_reference_.reset();
   rotation_center_.Reset();
   pivot_estimate_ = {};
@@ -28,6 +32,7 @@ void PoseTracker::Begin(Timestamp time, const Rigid3& camera_from_map, ObservedM
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(kNoId);
   motion_.Reset(time, camera_from_map);
+  mean_twist_.reset();
   observed_ = observed;
 }
 
@@ -40,6 +45,7 @@ void PoseTracker::ApplyCorrections(const MapSnapshot& before, const MapSnapshot&
     const auto moved = correction->after_from_before.find(reference_keyframe);
     if (moved == correction->after_from_before.end()) continue;
     motion_.ApplyCorrection(moved->second);
+    mean_twist_.reset();
     rotation_reference_pose_ = CorrectedPose(rotation_reference_pose_, moved->second);
     median_depth_ *= moved->second.scale;
     pivot_estimate_.pivot *= moved->second.scale;
@@ -117,6 +123,39 @@ MapTrackResult PoseTracker::TrackFromPrediction(const MapSnapshot& map, const Ca
   return track();
 }
 
+void PoseTracker::SetTwist(const Eigen::Matrix<double, 6, 1>& twist) {
+  Eigen::Vector3d rate = twist.tail<3>();
+  // A translation displaces the image about as a rotation does that moves points at the median depth alike.
+  if (observed_ != ObservedMotion::kPanorama && median_depth_ > 0)
+    rate += Eigen::Vector3d(-twist[1], twist[0], 0) / median_depth_;
+  const std::shared_ptr<CameraModel> camera = image_cameras_.Take();
+  *camera = CameraModel::WithReadout(lens_, {rate, readout_.readout_s()});
+  image_camera_ = camera;
+  map_tracker_.SetCamera(image_camera_);
+}
+
+void PoseTracker::AccountForReadout(const CameraImage& image, const Rigid3& predicted,
+                                    MapTrackResult* result) {
+  if (!options_.readout.enabled) return;
+  const double seconds = ToSeconds(image.time - motion_.time());
+  if (!(seconds > 0)) return;
+  const auto mean_twist = [&] {
+    return Eigen::Matrix<double, 6, 1>((result->camera_from_map * motion_.last().inverse()).Log() / seconds);
+  };
+  // The mean twist since the last frame is that of half a frame ago: it is extrapolated to the present.
+  Eigen::Matrix<double, 6, 1> twist = mean_twist();
+  if (mean_twist_) twist += 0.5 * (twist - *mean_twist_);
+  const Eigen::Vector3d rate_before = image_camera_->readout_motion().rotation_rate;
+  SetTwist(twist);
+  const ReadoutMotion& motion = image_camera_->readout_motion();
+  const double change_px = 0.5 * (motion.rotation_rate - rate_before).norm() *
+                           motion.readout_s.cwiseAbs().maxCoeff() / lens_->PixelAngle();
+  constexpr double kNegligible_px = 0.2;  // of the first and the last row
+  if (change_px > kNegligible_px) map_tracker_.RefineAgain(predicted, result);
+  mean_twist_ = mean_twist();
+  readout_.Add(*image_camera_, result->camera_from_map, map_tracker_.measurements(), result->sigma, seconds);
+}
+
 PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraImage& image,
                                          const std::optional<Rotation3>& commanded,
                                          const KeyFramePolicy& policy, Random* random) {
@@ -125,6 +164,7 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
   Rigid3 predicted = commanded ? motion_.PredictWithRotation(*commanded) : motion_.Predict(image.time);
   if (observed_ == ObservedMotion::kPanorama)
     predicted = RotatedAbout(pivot_estimate_.pivot, motion_.last(), predicted.rotation);
+  if (options_.readout.enabled) SetTwist(motion_.twist_per_second());
   SearchPanoramaAt(predicted, map, policy);
   map_tracker_.SetPivot(pivot_estimate_);
   MapTrackResult result = TrackFromPrediction(map, image, predicted, random);
@@ -136,11 +176,13 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
   }
   if (!criteria_.IsAccepted(result, comparison_) && !criteria_.HoldsTrack(result)) {
     map_tracker_.ForgetLastFrame();
+    SetCamera(lens_);
     if (!options_.hybrid) return {Outcome::kLost, result};
     const auto rotation_only = TrackRotationDirectly(map, image, result);
     return rotation_only ? Estimate{Outcome::kRotationOnly, *rotation_only}
                          : Estimate{Outcome::kLost, result};
   }
+  AccountForReadout(image, predicted, &result);
   poor_rotation_frames_ = criteria_.FitsRotation(result, map) ? 0 : poor_rotation_frames_ + 1;
   const bool left = poor_rotation_frames_ >= options_.max_poor_rotation_frames;
   return {left ? Outcome::kLeftMap : Outcome::kPose, result};
@@ -164,7 +206,7 @@ std::optional<MapTrackResult> PoseTracker::TrackRotationDirectly(const MapSnapsh
   const Rotation3 predicted = motion_.Predict(image.time).rotation;
   std::optional<RotationAlignment> rotation;
   const auto align = [&] {
-    rotation = AlignRotation(rotation_reference_->small_blurry, *image.camera, thumbnail, *image.camera,
+    rotation = AlignRotation(rotation_reference_->small_blurry, *image.lens, thumbnail, *image.lens,
                              predicted * rotation_reference_pose_.rotation.inverse(), 10,
                              pivot_estimate_.pivot / median_depth_);
     return rotation && rotation->converged && rotation->overlap >= options_.min_image_overlap &&
@@ -189,6 +231,7 @@ void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result,
   const Rotation3 previous_rotation = motion_.last().rotation;
   if (relocalized) {
     frames_tolerant_ = 0;
+    mean_twist_.reset();
     motion_.Reset(image.time, result.camera_from_map);
     rotation_center_.Reset();
   } else {
@@ -211,6 +254,8 @@ void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result,
 }
 
 void PoseTracker::Lose(Timestamp time) {
+  SetCamera(lens_);
+  mean_twist_.reset();
   map_tracker_.ForgetLastFrame();
   poor_rotation_frames_ = 0;
   motion_.Miss(time);

@@ -8,11 +8,13 @@
 #include <vector>
 
 #include "engine/base/random.h"
+#include "engine/base/shared_pool.h"
 #include "engine/tracking/camera_image.h"
 #include "engine/tracking/keyframe_policy.h"
 #include "engine/tracking/map_tracker.h"
 #include "engine/tracking/motion_model.h"
 #include "engine/tracking/pose_criteria.h"
+#include "engine/tracking/readout_estimator.h"
 #include "engine/tracking/rotation_center.h"
 #include "engine/tracking/tracker_options.h"
 
@@ -26,7 +28,10 @@ class PoseTracker {
   PoseTracker(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera);
 
   void SetRim(const RimMask* rim) { map_tracker_.SetRim(rim); }
-  void SetCamera(std::shared_ptr<const CameraModel> camera) { map_tracker_.SetCamera(std::move(camera)); }
+  void SetCamera(const std::shared_ptr<const CameraModel>& camera) {
+    lens_ = image_camera_ = camera;
+    map_tracker_.SetCamera(camera);
+  }
   // Forgets the map and the motion in it.
   void Reset();
   // A map was started, and this is the newest pose known in it.
@@ -72,12 +77,19 @@ class PoseTracker {
 
   PatchComparison comparison() const { return comparison_; }
   const MapTracker& map_tracker() const { return map_tracker_; }
+  // The camera with the motion of the image that was tracked last.
+  const std::shared_ptr<const CameraModel>& image_camera() const { return image_camera_; }
+  const ReadoutEstimator& readout() const { return readout_; }
   const Rigid3& last() const { return motion_.last(); }
   // Rotation vector per frame, of the last tracked frame.
   const Eigen::Vector3d& rotation_rate() const { return rotation_rate_; }
   double median_depth() const { return median_depth_; }
 
  private:
+  // Gives the present image the rolling shutter of a camera that moves with this left twist per second.
+  void SetTwist(const Eigen::Matrix<double, 6, 1>& twist);
+  // Repeats the pose estimate with the motion that it implies, and lets it tell the readout time.
+  void AccountForReadout(const CameraImage& image, const Rigid3& predicted, MapTrackResult* result);
   // The panorama map to search: the open one, or one to whose centre the camera has returned if the finite
   // points do not cover the image.
   PanoramaId PanoramaFor(const Rigid3& predicted, const MapSnapshot& map, const KeyFramePolicy& policy) const;
@@ -91,6 +103,8 @@ class PoseTracker {
 
   TrackerOptions options_;
   PoseCriteria criteria_;
+  std::shared_ptr<const CameraModel> lens_, image_camera_;
+  SharedPool<CameraModel> image_cameras_;
   MapTracker map_tracker_;
   MotionModel motion_;
   RotationCenter rotation_center_;
@@ -107,6 +121,9 @@ class PoseTracker {
   // rotation, a later one.
   std::shared_ptr<const ImageFeatures> rotation_reference_;
   Rigid3 rotation_reference_pose_;
+  ReadoutEstimator readout_;
+  // Left twist per second between the last two frames, as long as the track goes on.
+  std::optional<Eigen::Matrix<double, 6, 1>> mean_twist_;
   Timestamp last_points_{};  // time of the last pose from map points
 };
 

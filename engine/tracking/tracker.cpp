@@ -114,7 +114,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   initialization_.BeginFrame();
   offers_.BeginFrame();
   image_.time = frame.time;
-  image_.camera = camera_;
+  image_.lens = image_.camera = camera_;
   image_.previous = std::exchange(image_.features, nullptr);
   image_.features = extractor_.Extract(frame.image);
   searched_ = map_ && IsTracked(state_);
@@ -141,6 +141,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
 void Tracker::SearchInitialPair(TrackedFrame* out) {
   const bool offers_first = !map_ && options_.hybrid && options_.build_maps &&
                             initialization_.phase() == MapInitialization::Phase::kSearching;
+  initialization_.SetReadout(pose_.readout().readout_s());
   initialization_.Search(image_, map_.get(), pose_.map_tracker().panorama(), pose_.rotation_rate(), out);
   if (offers_first) offers_.OfferFirst(image_);
 }
@@ -148,6 +149,7 @@ void Tracker::SearchInitialPair(TrackedFrame* out) {
 void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
   const PoseTracker::Estimate estimate =
       pose_.Track(*map_, image_, frame.commanded_rotation, offers_.policy(), &random_);
+  image_.camera = pose_.image_camera();
   using Outcome = PoseTracker::Estimate::Outcome;
   if (estimate.outcome == Outcome::kPose || estimate.outcome == Outcome::kRotationOnly) {
     out->state = TrackingState::kSixDof;

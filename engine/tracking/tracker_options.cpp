@@ -50,6 +50,7 @@ std::optional<std::string> TrackerOptions::Validate() const {
       .Contained(keyframes.Validate())
       .Contained(keyframe_policy.Validate())
       .Contained(rotation_center.Validate())
+      .Contained(readout.Validate())
       .fault();
 }
 

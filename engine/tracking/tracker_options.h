@@ -12,6 +12,7 @@
 #include "engine/tracking/keyframe_novelty.h"
 #include "engine/tracking/keyframe_policy.h"
 #include "engine/tracking/map_tracker.h"
+#include "engine/tracking/readout_estimator.h"
 #include "engine/tracking/rotation_center.h"
 #include "engine/vision/features.h"
 
@@ -108,6 +109,7 @@ struct TrackerOptions {
   // poses with 13 to 29 inliers and a sigma of 0.4 to 0.9 were right to 3 cm.
   int min_tight_inliers = 12;
   double max_tight_sigma = 1.0;
+  ReadoutOptions readout;  // of a rolling shutter
   bool build_maps = true;  // if false, a frame without a map is lost, not initializing
 
   // Describes the first invalid option of tracking in one sentence, or empty.

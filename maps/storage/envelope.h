@@ -27,7 +27,7 @@ struct EnvelopeKind {
   std::size_t record_bytes;  // 0 when records vary in length.
 };
 
-inline constexpr EnvelopeKind kCameraTableKind = {{'D', 'C', 'A', 'M'}, "the table of cameras", 81};
+inline constexpr EnvelopeKind kCameraTableKind = {{'D', 'C', 'A', 'M'}, "the table of cameras", 0};
 inline constexpr EnvelopeKind kKeyFrameTableKind = {{'D', 'K', 'F', 'R'}, "the table of keyframes", 98};
 inline constexpr EnvelopeKind kPointTableKind = {{'D', 'P', 'N', 'T'}, "the table of points", 61};
 inline constexpr EnvelopeKind kObservationTableKind = {{'D', 'O', 'B', 'S'}, "the table of observations", 17};

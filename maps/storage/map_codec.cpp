@@ -18,7 +18,21 @@ using engine::CameraModel;
 using engine::LensModel;
 
 constexpr double kUnitTolerance = 1e-6;  // Tolerance of a stored quaternion's length.
-constexpr double kSameRotation = 1e-12;  // Tolerance of a quaternion's coefficients.
+// In the byte of the lens: the motion of a rolling shutter follows.
+constexpr std::uint8_t kReadoutFlag = 0x80;
+constexpr double kMaxRotationRate = 100;  // radians per second; no camera that is tracked turns as fast
+constexpr double kMaxReadout_s = 1;       // of a rolling shutter
+constexpr double kSameRotation = 1e-12;   // Tolerance of a quaternion's coefficients.
+
+bool HasReadout(const engine::ReadoutMotion& motion) {
+  return !motion.rotation_rate.isZero(0) && !motion.readout_s.isZero(0);
+}
+
+bool IsPlausible(const engine::ReadoutMotion& motion) {
+  return motion.rotation_rate.cwiseAbs().maxCoeff() <= kMaxRotationRate &&
+         motion.readout_s.cwiseAbs().maxCoeff() <= kMaxReadout_s && motion.rotation_rate.allFinite() &&
+         motion.readout_s.allFinite();
+}
 
 bool SameKeyFrame(const StoredKeyFrame& stored_a, const StoredKeyFrame& stored_b) {
   const engine::KeyFrame& a = stored_a.keyframe;
@@ -115,23 +129,39 @@ Bytes EncodeCameras(std::uint64_t map_key, const CameraTable& cameras) {
     if (const auto problem = CameraModel::Validate(camera->lens(), intrinsics, camera->distortion())) {
       throw Error("its camera is not valid: " + *problem);
     }
-    writer.Put(static_cast<std::uint8_t>(camera->lens()));
+    const engine::ReadoutMotion& motion = camera->readout_motion();
+    const bool rotates = HasReadout(motion);
+    if (rotates && !IsPlausible(motion)) throw Error("the rolling shutter of its camera is not valid");
+    writer.Put(
+        static_cast<std::uint8_t>(static_cast<std::uint8_t>(camera->lens()) | (rotates ? kReadoutFlag : 0)));
     writer.Put(static_cast<std::uint32_t>(intrinsics.width_px));
     writer.Put(static_cast<std::uint32_t>(intrinsics.height_px));
     for (const double number : {intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy})
       writer.Put(number);
     for (const double number : camera->distortion()) writer.Put(number);
+    if (!rotates) continue;
+    for (const double number : motion.rotation_rate) writer.Put(number);
+    for (const double number : motion.readout_s) writer.Put(number);
   }
   return FinishEnvelope(std::move(writer));
 }
 
 CameraTable DecodeCameras(std::uint64_t map_key, std::span<const std::uint8_t> bytes) {
   auto [reader, count] = OpenEnvelope(kCameraTableKind, map_key, bytes);
+  // Cameras without the motion of a rolling shutter have this size, the others are longer.
+  constexpr std::size_t kSmallestRecord = 81;
+  const auto refuse_count = [&, count = count](std::size_t bytes_left) {
+    throw Error(std::string(kCameraTableKind.name) + " is damaged: its header gives " +
+                std::to_string(count) + " records for " + std::to_string(bytes_left) + " bytes");
+  };
+  if (count > reader.remaining() / kSmallestRecord) refuse_count(reader.remaining());
   CameraTable cameras;
   cameras.reserve(count);
   for (std::uint64_t i = 0; i < count; ++i) {
     const std::string name = "camera " + std::to_string(i);
-    const auto lens = reader.Get<std::uint8_t>();
+    const auto kind = reader.Get<std::uint8_t>();
+    const bool rotates = (kind & kReadoutFlag) != 0;
+    const auto lens = static_cast<std::uint8_t>(kind & ~kReadoutFlag);
     if (lens > static_cast<std::uint8_t>(LensModel::kKannalaBrandt))
       throw Error(name + " has an unknown lens model");
     const auto width = reader.Get<std::uint32_t>(), height = reader.Get<std::uint32_t>();
@@ -147,9 +177,22 @@ CameraTable DecodeCameras(std::uint64_t map_key, std::span<const std::uint8_t> b
     if (const auto problem = CameraModel::Validate(static_cast<LensModel>(lens), intrinsics, distortion)) {
       throw Error(name + " is not valid: " + *problem);
     }
-    cameras.push_back(
-        std::make_shared<const CameraModel>(static_cast<LensModel>(lens), intrinsics, distortion));
+    auto camera = std::make_shared<const CameraModel>(static_cast<LensModel>(lens), intrinsics, distortion);
+    if (!rotates) {
+      cameras.push_back(std::move(camera));
+      continue;
+    }
+    engine::ReadoutMotion motion;
+    for (double& number : motion.rotation_rate) number = reader.Get<double>();
+    for (double& number : motion.readout_s) number = reader.Get<double>();
+    if (!HasReadout(motion) || !IsPlausible(motion)) throw Error(name + " has no valid rolling shutter");
+    // Models of images of one camera share its lens, as they do in a session.
+    const auto known = std::find_if(cameras.begin(), cameras.end(),
+                                    [&](const auto& other) { return other->HasSameLens(*camera); });
+    cameras.push_back(std::make_shared<const CameraModel>(
+        CameraModel::WithReadout(known != cameras.end() ? *known : camera, motion)));
   }
+  if (reader.remaining() > 0) refuse_count(reader.remaining());
   return cameras;
 }
 

@@ -133,8 +133,9 @@ double BundleSystem::SquaredNorm(const Measurement& measurement, const Camera& c
                                  const Eigen::Vector3d& point) const {
   Eigen::Vector2d pixel;
   const Eigen::Vector3d in_camera = camera.rotation * point + camera.camera_from_map.translation;
-  if (!camera.model->Project(in_camera, &pixel, nullptr)) return std::numeric_limits<double>::infinity();
   const Eigen::Vector2d measured = measurement.pixel.cast<double>();
+  if (!camera.model->ProjectAtExposureOf(measured, in_camera, &pixel, nullptr))
+    return std::numeric_limits<double>::infinity();
   const double inverse_sigma = InverseSigma(measurement);
   const double squared_norm = (inverse_sigma * (pixel - measured)).squaredNorm();
   return std::isfinite(squared_norm) ? squared_norm : std::numeric_limits<double>::infinity();
@@ -148,8 +149,9 @@ bool BundleSystem::Linearize(const Measurement& measurement, double squared_norm
   const Camera& camera = cameras_[static_cast<std::size_t>(measurement.camera)];
   result->in_camera.noalias() = camera.rotation * point + camera.camera_from_map.translation;
   Eigen::Vector2d pixel;
-  if (!camera.model->Project(result->in_camera, &pixel, &result->jacobian)) return false;
   const Eigen::Vector2d measured = measurement.pixel.cast<double>();
+  if (!camera.model->ProjectAtExposureOf(measured, result->in_camera, &pixel, &result->jacobian))
+    return false;
   const double scale = std::sqrt(slope) * InverseSigma(measurement);
   result->residual = scale * (pixel - measured);
   result->jacobian *= scale;

@@ -95,7 +95,9 @@ bool LensBundle::Residual(const LensBundleState& state, const BundleProblem::Mea
   Eigen::Matrix<double, 2, 3> by_camera;
   Eigen::Vector2d pixel;
   if (unknown_[c]) {
-    if (!ProjectUnknown(state.lens, x, &pixel, jacobians ? &by_camera : nullptr, out)) return false;
+    const Eigen::Vector3d exposed =
+        problem_.cameras[c].model->AtExposureOf(measurement.pixel.cast<double>(), x);
+    if (!ProjectUnknown(state.lens, exposed, &pixel, jacobians ? &by_camera : nullptr, out)) return false;
   } else {
     if (!problem_.cameras[c].model->Project(x, &pixel, jacobians ? &by_camera : nullptr)) return false;
     out->by_lens.setZero();

@@ -42,7 +42,8 @@ LensAssembly Assemble(const Map& map, const std::shared_ptr<const CameraModel>& 
     assembly.cameras.push_back(id);
     assembly.unknown.push_back(unknown);
     assembly.problem.cameras.push_back(
-        {unknown ? lens : keyframe.camera, keyframe.camera_from_map, keyframe.fixed});
+        {unknown ? CameraModel::WithMotionOf(*keyframe.camera, lens) : keyframe.camera,
+         keyframe.camera_from_map, keyframe.fixed});
     for (const Observation& observation : record.observations) {
       const auto point = point_at.find(observation.point);
       if (point == point_at.end()) continue;
@@ -96,7 +97,7 @@ void ApplyToMap(const LensAssembly& assembly, const std::shared_ptr<const Camera
   for (auto& [id, record] : map->keyframes()) {
     KeyFrame& keyframe = record.keyframe;
     if (!has_lens(keyframe.camera.get())) continue;
-    keyframe.camera = model;
+    keyframe.camera = CameraModel::WithMotionOf(*keyframe.camera, model);
     if (keyframe.kind != KeyFrameKind::kPanorama) continue;
     // The observed displacement in pixels corresponds to a smaller angle if the focal length is longer.
     for (const PanoramaMap& panorama : map->panoramas()) {
@@ -190,6 +191,7 @@ void LensEstimation::Reset() {
 }
 
 bool LensEstimation::IsVersionOf(std::size_t lens, const CameraModel* model) const {
+  if (model->lens_of_image()) model = model->lens_of_image().get();
   return std::any_of(versions_[lens].begin(), versions_[lens].end(),
                      [model](const auto& version) { return version.get() == model; });
 }
@@ -197,7 +199,7 @@ bool LensEstimation::IsVersionOf(std::size_t lens, const CameraModel* model) con
 std::shared_ptr<const CameraModel> LensEstimation::CurrentModel(
     const std::shared_ptr<const CameraModel>& model) const {
   for (std::size_t lens = 0; lens < lenses_.size(); ++lens) {
-    if (IsVersionOf(lens, model.get())) return lenses_[lens].model;
+    if (IsVersionOf(lens, model.get())) return CameraModel::WithMotionOf(*model, lenses_[lens].model);
   }
   return model;
 }
@@ -205,7 +207,7 @@ std::shared_ptr<const CameraModel> LensEstimation::CurrentModel(
 bool LensEstimation::IsOutdated(std::size_t lens, const Map& map) const {
   return std::any_of(map.keyframes().begin(), map.keyframes().end(), [&](const auto& entry) {
     const CameraModel* model = entry.second.keyframe.camera.get();
-    return model != lenses_[lens].model.get() && IsVersionOf(lens, model);
+    return !model->HasSameLens(*lenses_[lens].model) && IsVersionOf(lens, model);
   });
 }
 
@@ -316,7 +318,8 @@ std::optional<CalibrationContradiction> LensEstimation::Check(const std::atomic<
                                                               const Map& map) {
   std::map<const CameraModel*, std::size_t> counts;
   for (const auto& [id, record] : map.keyframes()) {
-    const auto& model = record.keyframe.camera;
+    const auto& image = record.keyframe.camera;
+    const auto& model = image->lens_of_image() ? image->lens_of_image() : image;
     if (record.keyframe.kind != KeyFrameKind::kSixDof) continue;
     bool estimated = false;
     for (std::size_t lens = 0; lens < lenses_.size(); ++lens) estimated |= IsVersionOf(lens, model.get());
@@ -340,7 +343,9 @@ std::optional<CalibrationContradiction> LensEstimation::Check(const std::atomic<
         LensModel::kRadialTangential,
         CameraModel::Intrinsics{in.width_px, in.height_px, focal, focal, in.cx, in.cy},
         radial ? std::array<double, 5>{k[0], k[1], 0, 0, 0} : std::array<double, 5>{});
-    const auto has_lens = [&](const CameraModel* model) { return model == checked.model.get(); };
+    const auto has_lens = [&](const CameraModel* model) {
+      return (model->lens_of_image() ? model->lens_of_image().get() : model) == checked.model.get();
+    };
     LensAssembly given = Assemble(map, start, has_lens);
     LensAssembly open = given;
     SelfCalibrationOptions calibration = options_.calibration;

@@ -62,7 +62,8 @@ class Calibrator {
     for (std::size_t i = 0; i < problem->cameras.size(); ++i) {
       BundleProblem::Camera& camera = problem->cameras[i];
       camera.camera_from_map = state_.poses[i];
-      if (bundle_.IsUnknown(i) && options_.refine_lens) camera.model = lens;
+      if (bundle_.IsUnknown(i) && options_.refine_lens)
+        camera.model = CameraModel::WithMotionOf(*camera.model, lens);
     }
     for (std::size_t i = 0; i < problem->points.size(); ++i) problem->points[i].position = state_.points[i];
     const double sigma = EstimateSigma(norms_);

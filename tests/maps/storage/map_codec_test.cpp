@@ -63,6 +63,30 @@ TEST(MapCodec, ACountMustMatchTheNumberOfBytes) {
   EXPECT_THROW(DecodeScene(7, Forged(scene, 24, ~std::uint32_t{0})), Error);
 }
 
+TEST(MapCodec, ReturnsTheRollingShutterOfEachImage) {
+  const auto camera = MakeCameraTable(MakeStoredKeyFrames(*MakeSampleMap(1))).front();
+  const auto image = [&](double rate, double readout_s) {
+    return std::make_shared<const engine::CameraModel>(
+        engine::CameraModel::WithReadout(camera, {{rate, -0.25, 1.5}, {0, readout_s}}));
+  };
+  const CameraTable cameras = {image(0.5, 0.02), camera, image(-0.5, 0.02)};
+  const Bytes bytes = EncodeCameras(7, cameras);
+  const CameraTable read = DecodeCameras(7, bytes);
+  ASSERT_EQ(read.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(*read[i] == *cameras[i]) << i;
+  EXPECT_EQ(read[0]->lens_of_image(), read[2]->lens_of_image()) << "two images of one camera";
+  EXPECT_EQ(EncodeCameras(7, {camera}).size(), EncodeCameras(7, {image(0.5, 0)}).size())
+      << "without a readout time there is no rolling shutter to store";
+
+  EXPECT_THROW(EncodeCameras(7, {image(0.5, 2)}), Error) << "what could not be read is not written";
+  constexpr std::size_t kRate = 24 + 81;  // of the first camera
+  EXPECT_THAT(ErrorOf([&] { DecodeCameras(7, Forged(bytes, kRate, std::nan(""))); }),
+              HasSubstr("rolling shutter"));
+  EXPECT_THAT(ErrorOf([&] { DecodeCameras(7, Forged(bytes, kRate, 1e9)); }), HasSubstr("rolling shutter"));
+  for (const std::uint64_t count : {std::uint64_t{1}, std::uint64_t{4}, ~std::uint64_t{0}})
+    EXPECT_THROW(DecodeCameras(7, Forged(bytes, 16, count)), Error) << count;
+}
+
 TEST(MapCodec, ForgedNumbersOfCamerasAndKeyframesAreRejected) {
   const auto keyframes = MakeStoredKeyFrames(*MakeSampleMap(1));
   const CameraTable cameras = MakeCameraTable(keyframes);

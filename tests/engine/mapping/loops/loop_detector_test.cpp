@@ -15,6 +15,7 @@ using testing_world::Gallery;
 using testing_world::kReturned;
 using testing_world::MapOfPlaces;
 using testing_world::MapOfStretches;
+using testing_world::RenderedWorld;
 using testing_world::SmallDrift;
 using testing_world::Stretch;
 using testing_world::ThereAndBack;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/tracking/feature_pool.h"
+#include "engine/base/shared_pool.h"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +11,14 @@
 #include <vector>
 
 #include "engine/base/bounded_queue.h"
+#include "engine/vision/image_pyramid.h"
 
 namespace docent::engine {
 namespace {
 
-TEST(FeaturePool, LendsABufferAgainAfterItsLastOwnerDroppedIt) {
+using FeaturePool = SharedPool<ImageFeatures>;
+
+TEST(SharedPool, LendsABufferAgainAfterItsLastOwnerDroppedIt) {
   FeaturePool pool;
   auto first = pool.Take();
   ImageFeatures* const memory = first.get();
@@ -30,7 +33,7 @@ TEST(FeaturePool, LendsABufferAgainAfterItsLastOwnerDroppedIt) {
   EXPECT_EQ(pool.Take()->fast_threshold[0], 17) << "the memory is reused, not made anew";
 }
 
-TEST(FeaturePool, LendsNoBufferTwiceAtATime) {
+TEST(SharedPool, LendsNoBufferTwiceAtATime) {
   FeaturePool pool;
   std::vector<std::shared_ptr<ImageFeatures>> held;
   std::set<const ImageFeatures*> distinct;
@@ -38,7 +41,7 @@ TEST(FeaturePool, LendsNoBufferTwiceAtATime) {
   EXPECT_EQ(distinct.size(), held.size());
 }
 
-TEST(FeaturePool, KeepsAFewBuffersWhenAMapIsDiscarded) {
+TEST(SharedPool, KeepsAFewBuffersWhenAMapIsDiscarded) {
   FeaturePool pool;
   std::vector<std::shared_ptr<ImageFeatures>> map;
   for (std::size_t i = 0; i < 5 * FeaturePool::kMaxFree; ++i) map.push_back(pool.Take());
@@ -46,7 +49,7 @@ TEST(FeaturePool, KeepsAFewBuffersWhenAMapIsDiscarded) {
   EXPECT_EQ(pool.free_buffers(), FeaturePool::kMaxFree);
 }
 
-TEST(FeaturePool, MayEndBeforeItsBuffers) {
+TEST(SharedPool, MayEndBeforeItsBuffers) {
   std::optional<FeaturePool> pool(std::in_place);
   const auto features = pool->Take();
   pool.reset();
@@ -55,7 +58,7 @@ TEST(FeaturePool, MayEndBeforeItsBuffers) {
 }
 
 // Under the thread sanitizer this shows that the reader's last access happens before the next write.
-TEST(FeaturePool, IsSafeWhenAnotherThreadReadsAndDropsTheBuffers) {
+TEST(SharedPool, IsSafeWhenAnotherThreadReadsAndDropsTheBuffers) {
   constexpr int kFrames = 2000;
   FeaturePool pool;
   BoundedQueue<std::shared_ptr<const ImageFeatures>> queue(4);

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/readout_update.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+
+namespace docent::engine {
+namespace {
+
+std::shared_ptr<const CameraModel> Camera(double focal) {
+  return std::make_shared<CameraModel>(LensModel::kRadialTangential,
+                                       CameraModel::Intrinsics{640, 480, focal, focal, 319.5, 239.5},
+                                       std::array<double, 5>{});
+}
+
+std::shared_ptr<const CameraModel> Image(const std::shared_ptr<const CameraModel>& camera, double rate,
+                                         double readout_s) {
+  return std::make_shared<CameraModel>(CameraModel::WithReadout(camera, {{0, rate, 0}, {0, readout_s}}));
+}
+
+KeyFrameId AddKeyFrame(const std::shared_ptr<const CameraModel>& camera, Map* map) {
+  KeyFrame keyframe;
+  keyframe.camera = camera;
+  return map->AddKeyFrame(keyframe).keyframe.id;
+}
+
+double ReadoutOf(KeyFrameId id, const Map& map) {
+  return map.keyframes().at(id).keyframe.camera->readout_motion().readout_s.y();
+}
+
+TEST(ReadoutUpdate, GivesTheReadoutTimeToEarlierImagesOfTheSameCamera) {
+  const auto camera = Camera(500), other = Camera(600);
+  Map map;
+  const KeyFrameId turning = AddKeyFrame(Image(camera, 0.7, 0), &map), unknown = AddKeyFrame(camera, &map),
+                   of_other = AddKeyFrame(Image(other, 0.7, 0.01), &map);
+  EXPECT_TRUE(UpdateReadout(*Image(camera, -0.3, 0.02), &map));
+  EXPECT_DOUBLE_EQ(ReadoutOf(turning, map), 0.02);
+  const CameraModel& updated = *map.keyframes().at(turning).keyframe.camera;
+  EXPECT_DOUBLE_EQ(updated.readout_motion().rotation_rate.y(), 0.7) << "each image keeps its own motion";
+  EXPECT_EQ(updated.lens_of_image(), camera);
+  EXPECT_EQ(map.keyframes().at(unknown).keyframe.camera, camera) << "how it moved is not known";
+  EXPECT_DOUBLE_EQ(ReadoutOf(of_other, map), 0.01);
+  EXPECT_FALSE(UpdateReadout(*Image(camera, -0.3, 0.0201), &map)) << "the difference is not significant";
+  EXPECT_FALSE(UpdateReadout(*camera, &map)) << "no image of the camera";
+}
+
+TEST(ReadoutUpdate, TurnsInfinitePointsToWhereTheyWereSeen) {
+  const auto camera = Camera(500);
+  Map map;
+  const KeyFrameId id = AddKeyFrame(Image(camera, 1, 0), &map);
+  const PanoramaId panorama = map.OpenPanorama(id);
+  const Eigen::Vector2d pixel(320, 470);  // near the last row
+  MapPoint point;
+  point.panorama = panorama;
+  point.point_in_map << *camera->Unproject(pixel), 0.0;
+  point.source_keyframe = id;
+  const MapPointId seen = map.AddPoint(point);
+  map.AddObservation({id, seen, pixel.cast<float>(), 0});
+  ASSERT_TRUE(UpdateReadout(*Image(camera, 1, 0.02), &map));
+  const Eigen::Vector3d direction = map.FindPoint(seen)->point.position().normalized();
+  // Exposed almost 10 ms after the middle of the image, when the camera had turned by almost 0.01 radians.
+  const double angle = std::acos(direction.dot(*camera->Unproject(pixel)));
+  EXPECT_NEAR(angle, 0.02 * ((470.5) / 480 - 0.5), 2e-3);
+  EXPECT_LT((*map.keyframes().at(id).keyframe.camera->Project(direction) - pixel).norm(), 0.05);
+}
+
+}  // namespace
+}  // namespace docent::engine
