@@ -101,6 +101,8 @@ class CameraModel {
   const ReadoutMotion& readout_motion() const { return readout_; }
   // The camera of which this is the model of one image; empty if this is not the model of an image.
   const std::shared_ptr<const CameraModel>& lens_of_image() const { return lens_of_image_; }
+  // The camera of which this is the model of one image, or this model itself.
+  const CameraModel& WithoutMotion() const { return lens_of_image_ ? *lens_of_image_ : *this; }
   // Where a pixel lies between the first and the last column, and row: from -1/2 to 1/2. Its scalar product
   // with readout_s is the delay of its exposure.
   Eigen::Vector2d ReadoutPosition(const Eigen::Vector2d& pixel) const {

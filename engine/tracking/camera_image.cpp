@@ -7,7 +7,7 @@ namespace docent::engine {
 
 std::optional<Rotation3> CameraImage::RotationFromPrevious() const {
   if (!previous) return std::nullopt;
-  const auto aligned = AlignRotation(previous->small_blurry, *lens, features->small_blurry, *lens);
+  const auto aligned = AlignRotation(previous->small_blurry, *camera, features->small_blurry, *camera);
   if (!aligned || !aligned->converged) return std::nullopt;
   return aligned->b_from_a;
 }

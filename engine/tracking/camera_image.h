@@ -14,8 +14,7 @@ namespace docent::engine {
 // The present image of a camera and the one before it, as all parts of its tracker use them.
 struct CameraImage {
   Timestamp time{};
-  std::shared_ptr<const CameraModel> lens;    // without the rolling shutter of one image
-  std::shared_ptr<const CameraModel> camera;  // of this image
+  std::shared_ptr<const CameraModel> camera;  // once it is tracked, with its motion during the readout
   std::shared_ptr<const ImageFeatures> features;
   std::shared_ptr<const ImageFeatures> previous;  // null for the first image
 

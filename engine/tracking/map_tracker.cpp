@@ -90,7 +90,7 @@ void MapTracker::Project(const std::vector<NearbyPoint>& points, bool infinite,
   const double min_cosine = options_.search.min_view_cosine;
   const int columns = camera_->width_px() / kProjectedCellPx + 1;
   // Where the rolling shutter moves a point by a few pixels does not matter here.
-  const CameraModel& lens = camera_->lens_of_image() ? *camera_->lens_of_image() : *camera_;
+  const CameraModel& lens = camera_->WithoutMotion();
   for (const NearbyPoint& local : points) {
     const Eigen::Vector3d x = rotation * local.point_in_map.head<3>() + local.point_in_map[3] * translation;
     if (!(x.z() > 0)) continue;

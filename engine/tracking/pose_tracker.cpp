@@ -206,7 +206,7 @@ std::optional<MapTrackResult> PoseTracker::TrackRotationDirectly(const MapSnapsh
   const Rotation3 predicted = motion_.Predict(image.time).rotation;
   std::optional<RotationAlignment> rotation;
   const auto align = [&] {
-    rotation = AlignRotation(rotation_reference_->small_blurry, *image.lens, thumbnail, *image.lens,
+    rotation = AlignRotation(rotation_reference_->small_blurry, *image.camera, thumbnail, *image.camera,
                              predicted * rotation_reference_pose_.rotation.inverse(), 10,
                              pivot_estimate_.pivot / median_depth_);
     return rotation && rotation->converged && rotation->overlap >= options_.min_image_overlap &&

@@ -114,7 +114,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   initialization_.BeginFrame();
   offers_.BeginFrame();
   image_.time = frame.time;
-  image_.lens = image_.camera = camera_;
+  image_.camera = camera_;
   image_.previous = std::exchange(image_.features, nullptr);
   image_.features = extractor_.Extract(frame.image);
   searched_ = map_ && IsTracked(state_);

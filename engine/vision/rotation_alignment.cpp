@@ -182,8 +182,9 @@ class RotationAligner {
         hat_of_pivot_(Hat(pivot).cast<float>()),
         turns_about_itself_(pivot.isZero(0)) {
     // The tables outlive this aligner: one AlignRotation requests at most four, fewer than the cache holds.
-    table_a_ = &FindSampleTable(camera_a, a.size(), scale_a);
-    table_b_ = &FindSampleTable(camera_b, b.size(), scale_b);
+    // A rolling shutter moves no more than a fraction of a pixel of a thumbnail.
+    table_a_ = &FindSampleTable(camera_a.WithoutMotion(), a.size(), scale_a);
+    table_b_ = &FindSampleTable(camera_b.WithoutMotion(), b.size(), scale_b);
   }
 
   // gain: the value of the last comparison; weights the reference's gradient relative to the current one's.

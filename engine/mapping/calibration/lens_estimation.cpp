@@ -191,7 +191,7 @@ void LensEstimation::Reset() {
 }
 
 bool LensEstimation::IsVersionOf(std::size_t lens, const CameraModel* model) const {
-  if (model->lens_of_image()) model = model->lens_of_image().get();
+  model = &model->WithoutMotion();
   return std::any_of(versions_[lens].begin(), versions_[lens].end(),
                      [model](const auto& version) { return version.get() == model; });
 }
@@ -344,7 +344,7 @@ std::optional<CalibrationContradiction> LensEstimation::Check(const std::atomic<
         CameraModel::Intrinsics{in.width_px, in.height_px, focal, focal, in.cx, in.cy},
         radial ? std::array<double, 5>{k[0], k[1], 0, 0, 0} : std::array<double, 5>{});
     const auto has_lens = [&](const CameraModel* model) {
-      return (model->lens_of_image() ? model->lens_of_image().get() : model) == checked.model.get();
+      return &model->WithoutMotion() == checked.model.get();
     };
     LensAssembly given = Assemble(map, start, has_lens);
     LensAssembly open = given;
