@@ -49,7 +49,7 @@ ContentLayer::~ContentLayer() = default;
 void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
                         const content::Scene& scene, const What& what, const RenderTarget& image) {
   const Drawn drawn = Instances(scene, camera_from_map.OriginInSource(), what);
-  surface_drawer_.Prepare(what.surfaces);
+  surface_drawer_.Prepare(hiding_surfaces_.Of(scene, what.occluders, what.surfaces));
   Composite(camera, camera_from_map, drawn.plain, 1, image);
   if (!drawn.faint.empty()) Composite(camera, camera_from_map, drawn.faint, kFaintOpacity, image);
 }
@@ -156,7 +156,9 @@ ContentLayer::Drawn ContentLayer::Instances(const content::Scene& scene, const E
     const bool faint =
         entity.hidden && std::find(what.faint.begin(), what.faint.end(), entity.name) != what.faint.end();
     if ((entity.hidden && !faint) || entity.kind == content::Entity::Kind::kLabel) continue;
-    if (entity.kind == content::Entity::Kind::kSound && !what.markers) continue;
+    const bool is_marker =
+        entity.kind == content::Entity::Kind::kSound || entity.kind == content::Entity::Kind::kOccluder;
+    if (is_marker && !what.markers) continue;
     for (content::EntityShape& shape :
          std::array{shapes_.ShapeOf(entity, eye_in_map), shapes_.ArrowOf(entity)}) {
       if (shape.model == nullptr) continue;

@@ -11,6 +11,7 @@
 #include "engine/geometry/rigid3.h"
 #include "ui/entity_shapes.h"
 #include "ui/gl_objects.h"
+#include "ui/hiding_surfaces.h"
 #include "ui/lens_warp.h"
 #include "ui/mesh_drawer.h"
 #include "ui/surface_drawer.h"
@@ -30,11 +31,12 @@ class ContentLayer {
   // What is drawn of a scene, and how.
   struct What {
     double animation_seconds = 0;
-    bool markers = false;  // Where sounds are.
+    bool markers = false;  // Where sounds and occluders are.
     std::span<const std::string> faint =
         {};  // Hidden entities that are drawn all the same, faintly, by name.
     std::shared_ptr<const engine::SurfaceMesh> surfaces =
-        {};  // Content behind them is hidden; null: none is.
+        {};                 // Content behind them is hidden; null: none is.
+    bool occluders = true;  // Content behind those of the scene is hidden.
   };
   // Composites the scene over the contents of `image`, an image target of the camera's size whose row 0 is
   // the top. Pixels that no content covers keep their exact values. Labels are not drawn (see label_board.h).
@@ -63,6 +65,7 @@ class ContentLayer {
 
   int samples_;
   MeshDrawer mesh_drawer_;
+  HidingSurfaces hiding_surfaces_;
   SurfaceDrawer surface_drawer_;
   GlProgram warp_program_;
   GlVertexArray empty_vertex_array_;

@@ -74,8 +74,9 @@ void Renderer::Draw(const View& view) {
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
   const engine::Rigid3* const drawn_from = DrawnFrom(view);
   if (drawn_from != nullptr && view.scene != nullptr)
-    impl_->content.Draw(*view.camera, *drawn_from, *view.scene,
-                        {view.animation_seconds, view.overlay.markers, view.faint, view.surfaces}, target);
+    impl_->content.Draw(
+        *view.camera, *drawn_from, *view.scene,
+        {view.animation_seconds, view.overlay.markers, view.faint, view.surfaces, view.occluders}, target);
 
   impl_->canvas.Begin(width_px, height_px);
   if (has_pose && view.overlay.keyframes && tracked->map != nullptr)

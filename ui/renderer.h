@@ -74,8 +74,10 @@ struct View {
   // Where the camera was a moment ago. If the frame has no pose, the content is drawn from there. Null for
   // none.
   const engine::Rigid3* held_camera_from_map = nullptr;
-  // What hides content behind it, in the map of the scene; null: nothing does.
+  // Surfaces of the map of the scene that hide content behind them; null: none do.
   std::shared_ptr<const engine::SurfaceMesh> surfaces;
+  // Whether the occluders of the scene hide content behind them. Surfaces that they stand for then do not.
+  bool occluders = true;
   // Names of hidden entities that are drawn all the same, faintly, because an author has selected them.
   std::span<const std::string> faint = {};
   double animation_seconds = 0;  // Time of the animations of the models, which repeat.

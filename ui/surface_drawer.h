@@ -8,6 +8,7 @@
 
 #include "engine/dense/surface_mesh.h"
 #include "ui/gl_objects.h"
+#include "ui/hiding_surfaces.h"
 
 namespace docent::ui {
 
@@ -22,8 +23,11 @@ class SurfaceDrawer {
 
   SurfaceDrawer();
 
-  // Selects the surfaces of this frame; null for none.
-  void Prepare(std::shared_ptr<const engine::SurfaceMesh> mesh);
+  // The same for what authors placed, which is exact but for rounding.
+  static constexpr float kPlacedDepthBias = 0.002F;
+
+  // Selects the surfaces of this frame.
+  void Prepare(const HidingSurfaces::Surfaces& surfaces);
   // Draws the selected surfaces. They hide content however near they are, because they are not cut off at the
   // near plane.
   void Draw(const glm::mat4& clip_from_map, const glm::vec3& eye_in_map) const;
@@ -35,11 +39,12 @@ class SurfaceDrawer {
     GlBuffer vertices, triangles;
     std::uint64_t last_frame = 0;
   };
+  const Resources* Select(const std::shared_ptr<const engine::SurfaceMesh>& mesh);
   static void Upload(Resources* resources);
 
   GlProgram program_;
   std::map<const engine::SurfaceMesh*, Resources> cache_;
-  const Resources* selected_ = nullptr;
+  const Resources *measured_ = nullptr, *placed_ = nullptr;  // Null for none.
   std::uint64_t frame_ = 0;
 };
 

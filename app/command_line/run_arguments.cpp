@@ -193,12 +193,13 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
   command->add_option("--record", run->record, "Write the augmented view as a video")->type_name("FILE.mp4");
 }
 
-void AddOcclusionOption(CLI::App* command, bool* occlusion) {
-  AddChoice<bool>(
+void AddOcclusionOption(CLI::App* command, Occlusion* occlusion) {
+  AddChoice<Occlusion>(
       command, "--occlusion", occlusion,
-      "What hides content: the surfaces of the map before it, which docent maps densify and, while a map is "
-      "idle, an author's session compute (default map)",
-      {{"map", true}, {"off", false}});
+      "What hides content behind it: nothing (off); the occluders that authors place (proxies); also the "
+      "surfaces of the map, which docent maps densify and, while a map is idle, an author's session compute, "
+      "but not where an occluder stands for the same surface (map; default)",
+      {{"off", Occlusion::kOff}, {"proxies", Occlusion::kProxies}, {"map", Occlusion::kMap}});
 }
 
 void AddMemoryOption(CLI::App* command, std::size_t* bytes) {

@@ -11,6 +11,7 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   view.camera = frame.camera ? frame.camera.get() : &camera;
   view.scene = frame.shown.scene.get();
   view.surfaces = frame.shown.surfaces;
+  view.occluders = frame.shown.occluders;
   view.animation_seconds = frame.seconds;
   view.overlay.map_name = frame.shown.map_name;
   view.overlay.is_waiting =

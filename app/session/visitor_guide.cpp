@@ -22,6 +22,7 @@ void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine:
     frame->held_camera_from_map = last_with_pose_->tracked.camera_from_map;
     frame->shown.scene = last_with_pose_->shown.scene;
     frame->shown.surfaces = last_with_pose_->shown.surfaces;
+    frame->shown.occluders = last_with_pose_->shown.occluders;
   } else {
     last_with_pose_.reset();
   }

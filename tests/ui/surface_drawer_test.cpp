@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <memory>
+#include <vector>
 
 #include "tests/ui/ui_testing.h"
 
@@ -34,12 +35,26 @@ class SurfaceDrawerTest : public OffscreenTest {
     view.camera = &camera;
     view.scene = &scene;
     view.surfaces = std::move(surfaces);
+    scene.entities.insert(scene.entities.end(), occluders_.begin(), occluders_.end());
+    view.occluders = occluders_count_;
+    view.overlay.markers = markers_;
     view.overlay.hud = false;
     renderer_->Draw(view);
     cv::Mat image;
     renderer_->ReadBack(&image);
     return image;
   }
+  // A rectangle of 18 units in height across the z axis of the map.
+  static content::Entity PlacedScreen(double left, double right, double depth) {
+    content::Entity entity;
+    entity.kind = content::Entity::Kind::kOccluder;
+    entity.occluder.shape = content::Occluder::Shape::kPlane;
+    entity.occluder.size = {right - left, 18, 0};
+    entity.occluder.map_from_shape.translation = {0.5 * (left + right), 0, depth};
+    return entity;
+  }
+  std::vector<content::Entity> occluders_;  // In the drawn scenes.
+  bool occluders_count_ = true, markers_ = false;
   static int Green(const cv::Mat& image) {
     cv::Mat channel;
     cv::extractChannel(image, channel, 1);
@@ -90,6 +105,37 @@ TEST_F(SurfaceDrawerTest, WorksInEveryFaceOfAFisheyeLens) {
   const engine::CameraModel camera(engine::LensModel::kKannalaBrandt, {480, 480, 140, 140, 240, 240}, {});
   ASSERT_GT(Green(Draw(0.3, nullptr, camera)), 10'000) << "the square must reach beyond one face";
   EXPECT_EQ(Green(Draw(0.3, Screen(-9, 9, 0.2F), camera)), 0);
+}
+
+TEST_F(SurfaceDrawerTest, OccludersHideWhatIsBehindThemUnlessTheyAreSwitchedOff) {
+  const int all = Green(Draw(2, nullptr));
+  occluders_ = {PlacedScreen(-9, 0, 1.95)};
+  EXPECT_NEAR(Green(Draw(2, nullptr)), 0.5 * all, 0.01 * all);
+  occluders_[0].hidden = true;
+  EXPECT_EQ(Green(Draw(2, nullptr)), all);
+  occluders_[0].hidden = false;
+  occluders_count_ = false;
+  EXPECT_EQ(Green(Draw(2, nullptr)), all);
+}
+
+TEST_F(SurfaceDrawerTest, OccludersReplaceTheSurfacesThatTheyStandFor) {
+  const int all = Green(Draw(2, nullptr));
+  // The map has a wall that is too near, before the content; the author says that it is behind.
+  occluders_ = {PlacedScreen(-9, 9, 2.1)};
+  EXPECT_EQ(Green(Draw(2, Screen(-9, 9, 1.9F))), all);
+  // A surface far from the occluder still hides.
+  EXPECT_NEAR(Green(Draw(2, Screen(-9, 0, 0.5F))), 0.5 * all, 0.01 * all);
+  occluders_.clear();
+  EXPECT_EQ(Green(Draw(2, Screen(-9, 9, 1.9F))), 0) << "the surface counts again";
+}
+
+TEST_F(SurfaceDrawerTest, OnlyAuthorsSeeAnOccluder) {
+  occluders_ = {PlacedScreen(-9, 9, 3)};
+  const cv::Mat visitor = Draw(2, nullptr);
+  occluders_count_ = false;
+  EXPECT_EQ(cv::norm(visitor, Draw(2, nullptr), cv::NORM_INF), 0);
+  markers_ = true;
+  EXPECT_GT(cv::norm(visitor, Draw(2, nullptr), cv::NORM_INF), 50);
 }
 
 }  // namespace
