@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/dense/light_estimate.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <unordered_map>
+#include <vector>
+
+#include "engine/base/random.h"
+#include "engine/dense/surface_samples.h"
+
+namespace docent::engine {
+namespace {
+
+using Coefficients = Eigen::Matrix<double, 9, 1>;
+
+constexpr int kParts = 8;  // The places are divided into so many parts to see whether they agree.
+
+// Two surface samples that are close to each other.
+struct Pair {
+  Coefficients first, second;                // Spherical harmonics of the normals.
+  double first_light = 0, second_light = 0;  // Their brightness.
+  int part = 0;
+};
+
+std::uint64_t CellOf(const Eigen::Vector3d& place, double side) {
+  std::uint64_t key = 0;
+  for (const double coordinate : place / side)
+    key = key * 2'097'143 + static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(coordinate)));
+  return key;
+}
+
+std::vector<Pair> PairsOf(const std::vector<SurfaceSample>& samples, double side,
+                          const LightOptions& options) {
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells;
+  std::vector<std::uint64_t> order;  // So that the result does not depend on the hash table.
+  for (std::uint32_t i = 0; i < samples.size(); ++i) {
+    std::vector<std::uint32_t>& cell = cells[CellOf(samples[i].point, side)];
+    if (cell.empty()) order.push_back(CellOf(samples[i].point, side));
+    cell.push_back(i);
+  }
+  const double largest_cosine = std::cos(options.min_angle_deg * std::numbers::pi / 180);
+  std::vector<Pair> pairs;
+  Random random(1);
+  for (std::size_t c = 0; c < order.size(); ++c) {
+    const std::vector<std::uint32_t>& cell = cells[order[c]];
+    if (cell.size() < 2) continue;
+    for (std::size_t trial = 0; trial < options.pairs_per_place; ++trial) {
+      const auto size = static_cast<std::uint32_t>(cell.size());
+      const SurfaceSample &a = samples[cell[random.Below(size)]], &b = samples[cell[random.Below(size)]];
+      if (a.normal.dot(b.normal) > largest_cosine) continue;
+      pairs.push_back({SphericalHarmonics(a.normal), SphericalHarmonics(b.normal), a.brightness, b.brightness,
+                       static_cast<int>(c % kParts)});
+    }
+  }
+  return pairs;
+}
+
+// The coefficients, of which the first is 1, that explain the ratios of the pairs best, without the pairs of
+// one part. Iteratively reweighted least squares with Cauchy's weights.
+Coefficients Fit(const std::vector<Pair>& pairs, int without_part) {
+  // Light of higher order is weaker on diffuse surfaces: in a room lit from one side, less than a third of
+  // the first order (Ramamoorthi and Hanrahan, 2001). The ridge is that of a prior with this size and
+  // residuals of a third, that of the contrast of common textures.
+  constexpr double kRidge = 1.0;
+  constexpr int kRounds = 12;
+  Coefficients fitted = Coefficients::Unit(0);
+  std::vector<double> residuals;
+  double scale = 1;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
+    Eigen::Matrix<double, 8, 1> right = Eigen::Matrix<double, 8, 1>::Zero();
+    residuals.clear();
+    for (const Pair& pair : pairs) {
+      if (pair.part == without_part) continue;
+      const Coefficients row = (pair.first_light * pair.second - pair.second_light * pair.first) /
+                               (pair.first_light + pair.second_light);
+      const double residual = row.dot(fitted);
+      residuals.push_back(std::abs(residual));
+      const double weight = 1 / (1 + residual * residual / (scale * scale));
+      normal += weight * row.tail<8>() * row.tail<8>().transpose();
+      right -= weight * row[0] * row.tail<8>();
+    }
+    if (residuals.empty()) return fitted;
+    normal.diagonal().tail<5>().array() += kRidge * 0.01 * static_cast<double>(residuals.size());
+    normal.diagonal().array() += 1e-6 * static_cast<double>(residuals.size());
+    fitted.tail<8>() = normal.ldlt().solve(right);
+    const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+    std::nth_element(residuals.begin(), middle, residuals.end());
+    scale = std::max(1e-3, 1.4826 * *middle);
+  }
+  return fitted;
+}
+
+Eigen::Vector3d FirstOrder(const Coefficients& c) {
+  return {c[3], c[1], c[2]};
+}
+
+// Whether the parts agree on the main direction.
+bool IsCertain(const std::vector<Pair>& pairs, const Eigen::Vector3d& direction, double most_deg) {
+  for (int part = 0; part < kParts; ++part) {
+    const Eigen::Vector3d other = FirstOrder(Fit(pairs, part));
+    const double cosine = other.dot(direction) / (other.norm() * direction.norm());
+    if (!(cosine > std::cos(most_deg * std::numbers::pi / 180))) return false;
+  }
+  return true;
+}
+
+// The brightness of white: the brightest surfaces of a room, apart from a few that shine, are white things.
+double White(const std::vector<SurfaceSample>& samples, const Coefficients& shape) {
+  constexpr double kShining = 0.02;  // The share of samples that may be lamps, windows and reflections.
+  constexpr double kPaper = 0.85;    // Of the light, white paper and paint reflect this much.
+  std::vector<double> albedos;
+  for (const SurfaceSample& sample : samples)
+    albedos.push_back(sample.brightness / std::max(0.1, shape.dot(SphericalHarmonics(sample.normal))));
+  const auto white =
+      albedos.begin() + static_cast<std::ptrdiff_t>((1 - kShining) * static_cast<double>(albedos.size()));
+  std::nth_element(albedos.begin(), white, albedos.end());
+  return *white / kPaper;
+}
+
+// Weakens what depends on the direction until no direction is dark: a room has no side without light.
+void KeepPositive(Coefficients* shape) {
+  constexpr double kLeast = 0.1;  // Of the mean.
+  double darkest = 1;
+  for (int i = 0; i < 200; ++i) {  // Evenly on the sphere (a spherical Fibonacci lattice).
+    const double z = 1 - (2 * i + 1) / 200.0, angle = i * std::numbers::pi * (3 - std::sqrt(5.0));
+    const double r = std::sqrt(1 - z * z);
+    darkest =
+        std::min(darkest, shape->dot(SphericalHarmonics({r * std::cos(angle), r * std::sin(angle), z})));
+  }
+  if (darkest < kLeast) shape->tail<8>() *= (1 - kLeast) / (1 - darkest);
+}
+
+}  // namespace
+
+Coefficients SphericalHarmonics(const Eigen::Vector3d& d) {
+  Coefficients basis;
+  basis << 1, d.y(), d.z(), d.x(), d.x() * d.y(), d.y() * d.z(), 3 * d.z() * d.z() - 1, d.x() * d.z(),
+      d.x() * d.x() - d.y() * d.y();
+  return basis;
+}
+
+double LightEstimate::BrightnessOf(const Eigen::Vector3d& normal) const {
+  return std::max(0.0, brightness.dot(SphericalHarmonics(normal)));
+}
+
+std::optional<LightEstimate> EstimateLight(const MapSnapshot& map, const SurfaceMesh& mesh,
+                                           const LightOptions& options) {
+  std::vector<double> depths;
+  for (const KeyFrame& keyframe : map.keyframes) depths.push_back(keyframe.mean_depth);
+  if (depths.empty() || mesh.empty()) return std::nullopt;
+  std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2),
+                   depths.end());
+  const double side = options.neighbourhood * depths[depths.size() / 2];
+  if (!(side > 0)) return std::nullopt;
+  const std::vector<SurfaceSample> samples =
+      SampleSurfaces(map, mesh, options.samples, options.max_keyframes, options.max_width_px);
+  const std::vector<Pair> pairs = PairsOf(samples, side, options);
+  if (pairs.size() < options.min_pairs) return std::nullopt;
+  Coefficients shape = Fit(pairs, -1);
+  const Eigen::Vector3d direction = FirstOrder(shape);
+  if (!(direction.norm() > 1e-3) || !IsCertain(pairs, direction, options.max_direction_spread_deg))
+    return std::nullopt;
+  KeepPositive(&shape);
+  LightEstimate light;
+  light.brightness = White(samples, shape) * shape;
+  light.to_light = direction.normalized();
+  // A light from one direction makes surfaces brighter by max(0, cosine), whose first order is half of it,
+  // and whose mean is a quarter. At most four fifths of the mean come from it, as no room is black beside its
+  // lamp.
+  const double strength = 2 * FirstOrder(light.brightness).norm();
+  light.direct = std::min(strength, 4 * 0.8 * light.brightness[0]);
+  return light;
+}
+
+}  // namespace docent::engine
