@@ -10,6 +10,7 @@
 #include "ui/image_target.h"
 #include "ui/label_board.h"
 #include "ui/letterbox.h"
+#include "ui/video_exposure.h"
 #include "ui/visitor_display.h"
 
 namespace docent::ui {
@@ -54,6 +55,7 @@ struct Renderer::Impl {
   ImageTarget image;
   ImageTarget copy;  // With the heads-up display, for ReadBackWithHeadsUp.
   ContentLayer content;
+  VideoExposure exposure;
   Canvas canvas;
   Canvas window_canvas;
 };
@@ -73,10 +75,19 @@ void Renderer::Draw(const View& view) {
   impl_->image.DrawVideo(image);
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
   const engine::Rigid3* const drawn_from = DrawnFrom(view);
-  if (drawn_from != nullptr && view.scene != nullptr)
-    impl_->content.Draw(
-        *view.camera, *drawn_from, *view.scene,
-        {view.animation_seconds, view.overlay.markers, view.faint, view.surfaces, view.occluders}, target);
+  if (drawn_from != nullptr && view.scene != nullptr) {
+    ContentLayer::What what;
+    what.animation_seconds = view.animation_seconds;
+    what.markers = view.overlay.markers;
+    what.faint = view.faint;
+    what.surfaces = view.surfaces;
+    what.occluders = view.occluders;
+    what.light.room = view.light;
+    if (view.follows_exposure) what.light.exposure = impl_->exposure.Update(tracked);
+    what.shadows = view.shadows;
+    if (image.cols == width_px && image.rows == height_px) what.video = impl_->image.video();
+    impl_->content.Draw(*view.camera, *drawn_from, *view.scene, what, target);
+  }
 
   impl_->canvas.Begin(width_px, height_px);
   if (has_pose && view.overlay.keyframes && tracked->map != nullptr)

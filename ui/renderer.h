@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "content/scene.h"
+#include "engine/dense/light_estimate.h"
 #include "engine/dense/surface_mesh.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/tracking/tracked_frame.h"
@@ -76,6 +77,10 @@ struct View {
   const engine::Rigid3* held_camera_from_map = nullptr;
   // Surfaces of the map of the scene that hide content behind them; null: none do.
   std::shared_ptr<const engine::SurfaceMesh> surfaces;
+  // The light in the map of the scene; null where it is not known.
+  const engine::LightEstimate* light = nullptr;
+  bool shadows = true;           // Models and signposts cast them on the room.
+  bool follows_exposure = true;  // Models are as bright as the video is exposed.
   // Whether the occluders of the scene hide content behind them. Surfaces that they stand for then do not.
   bool occluders = true;
   // Names of hidden entities that are drawn all the same, faintly, because an author has selected them.

@@ -55,27 +55,23 @@ void SurfaceDrawer::Upload(Resources* resources) {
   glBindVertexArray(0);
 }
 
-void SurfaceDrawer::Draw(const glm::mat4& clip_from_map, const glm::vec3& eye_in_map) const {
-  if (measured_ == nullptr && placed_ == nullptr) return;
+void SurfaceDrawer::Draw(const glm::mat4& clip_from_map) const {
+  if (empty()) return;
   program_.Use();
   glUniformMatrix4fv(program_.Uniform("clip_from_map"), 1, GL_FALSE, &clip_from_map[0][0]);
-  glUniform3fv(program_.Uniform("eye_in_map"), 1, &eye_in_map[0]);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LEQUAL);
   glDepthMask(GL_TRUE);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
   glEnable(GL_DEPTH_CLAMP);
-  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
   for (const Resources* const surfaces : {measured_, placed_}) {
     if (surfaces == nullptr) continue;
-    glUniform1f(program_.Uniform("depth_bias"), surfaces == placed_ ? kPlacedDepthBias : kDepthBias);
     glBindVertexArray(surfaces->vertex_array.name());
     glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * surfaces->mesh->triangles.size()), GL_UNSIGNED_INT,
                    nullptr);
   }
   glBindVertexArray(0);
-  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   glDisable(GL_DEPTH_CLAMP);
   glDisable(GL_DEPTH_TEST);
 }

@@ -27,14 +27,15 @@ class SurfaceDrawerTest : public OffscreenTest {
                const engine::CameraModel& camera = StronglyDistorted()) {
     if (renderer_ == nullptr) renderer_ = std::make_unique<Renderer>();
     content::Scene scene;
-    scene.entities.push_back(Facing(SquareModel(1.0f, glm::vec4(0, 1, 0, 1)), {0, 0, content_depth}));
-    const engine::TrackedFrame tracked =
-        Tracked(cv::Mat::zeros(camera.height_px(), camera.width_px(), CV_8UC3));
+    scene.entities.push_back(Facing(SquareModel(1.0f, glm::vec4(0, 1, 0, alpha_)), {0, 0, content_depth}));
+    const cv::Mat black = cv::Mat::zeros(camera.height_px(), camera.width_px(), CV_8UC3);
+    const engine::TrackedFrame tracked = Tracked(video_.empty() ? black : video_);
     View view;
     view.tracked = &tracked;
     view.camera = &camera;
     view.scene = &scene;
     view.surfaces = std::move(surfaces);
+    view.shadows = false;
     scene.entities.insert(scene.entities.end(), occluders_.begin(), occluders_.end());
     view.occluders = occluders_count_;
     view.overlay.markers = markers_;
@@ -55,6 +56,8 @@ class SurfaceDrawerTest : public OffscreenTest {
   }
   std::vector<content::Entity> occluders_;  // In the drawn scenes.
   bool occluders_count_ = true, markers_ = false;
+  cv::Mat video_;  // Empty: black.
+  float alpha_ = 1;
   static int Green(const cv::Mat& image) {
     cv::Mat channel;
     cv::extractChannel(image, channel, 1);
@@ -99,6 +102,40 @@ TEST_F(SurfaceDrawerTest, PutsEdgesWhereTheLensShowsThem) {
     }
     EXPECT_NEAR(visible + 0.5, edge->x(), 1.0) << "in row " << row;
   }
+}
+
+TEST_F(SurfaceDrawerTest, PutsEdgesOnTheEdgesOfTheImageNearThem) {
+  // The surface ends at x = 0.15, where the image has its edge two pixels farther to the left.
+  const engine::CameraModel camera = StronglyDistorted();
+  const double edge = camera.Project({0.15, 0, 1})->x() - 2;
+  video_ = cv::Mat(camera.height_px(), camera.width_px(), CV_8UC3, cv::Scalar::all(30));
+  video_(cv::Rect(static_cast<int>(std::ceil(edge)), 0, camera.width_px() - static_cast<int>(std::ceil(edge)),
+                  camera.height_px())) = cv::Scalar::all(120);
+  const cv::Mat image = Draw(1.5, Screen(0.15F, 9, 1));
+  const int row = static_cast<int>(std::lround(camera.Project({0.15, 0, 1})->y()));
+  int visible = 0;
+  for (int x = 0; x < image.cols; ++x) {
+    if (image.at<cv::Vec3b>(row, x)[1] > 190) visible = x;
+  }
+  EXPECT_NEAR(visible + 0.5, edge, 1.0);
+}
+
+TEST_F(SurfaceDrawerTest, MakesEdgesSoftInAPlainImage) {
+  const cv::Mat image = Draw(1.5, Screen(0.15F, 9, 1));
+  const int row = image.rows / 2;
+  int between = 0;
+  for (int x = 0; x < image.cols; ++x) {
+    const int green = image.at<cv::Vec3b>(row, x)[1];
+    between += green > 20 && green < 235;
+  }
+  EXPECT_GE(between, 2);
+  EXPECT_LE(between, 7) << "the radius of the filter to both sides";
+}
+
+TEST_F(SurfaceDrawerTest, HidesContentThatIsSeenThrough) {
+  alpha_ = 0.5F;
+  ASSERT_GT(cv::mean(Draw(2, nullptr))[1], 5);
+  EXPECT_EQ(cv::mean(Draw(2, Screen(-9, 9, 1)))[1], 0);
 }
 
 TEST_F(SurfaceDrawerTest, WorksInEveryFaceOfAFisheyeLens) {

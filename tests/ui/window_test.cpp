@@ -73,6 +73,9 @@ class AskedFor : public AuthoringActions {
     words.push_back("offset " + name);
   }
   void ShortenTrail(const std::string& name) override { words.push_back("shorten " + name); }
+  void SetOccluderSize(const std::string& name, const Eigen::Vector3d&) override {
+    words.push_back("resize " + name);
+  }
   void SetTarget(const std::string& name, const std::string& to_map) override {
     words.push_back("target " + name + " " + to_map);
   }
