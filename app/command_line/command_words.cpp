@@ -3,6 +3,8 @@
 
 #include <filesystem>
 
+#include "content/occluder.h"
+
 namespace docent::app {
 
 namespace {

@@ -14,6 +14,7 @@
 #include "app/command_line/text_table.h"
 #include "app/session/library_scene.h"
 #include "content/edits.h"
+#include "content/occluder.h"
 #include "maps/library/library.h"
 
 namespace docent::app {

@@ -52,6 +52,7 @@ struct RunArguments {
   std::optional<HeadPolicy> head;                          // For cameras with a pan-tilt head.
   double baseline_m = 0;                  // Measured distance between the two cameras; 0: not measured.
   Occlusion occlusion = Occlusion::kMap;  // What hides content.
+  bool room_light = true;                 // See SessionOptions.
   std::optional<bool> sound;              // Whether sounds are heard; empty: with a window.
   std::optional<std::string> language;    // Of texts, a tag in lower case; empty: that of the locale.
 };
@@ -107,6 +108,7 @@ struct DemoOptions {
   std::optional<std::filesystem::path> output, record;
   std::uint64_t seed = 1;
   Occlusion occlusion = Occlusion::kMap;  // As RunArguments.
+  bool room_light = true;                 // As RunArguments.
 };
 
 struct CalibrateOptions {

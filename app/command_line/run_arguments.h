@@ -27,6 +27,8 @@ void AddMetresOption(CLI::App* command, const std::string& option, double least,
                      const std::string& description);
 // Adds --occlusion: off, proxies or map.
 void AddOcclusionOption(CLI::App* command, Occlusion* occlusion);
+// Adds --light: room or plain.
+void AddLightOption(CLI::App* command, bool* room_light);
 void AddMemoryOption(CLI::App* command, std::size_t* bytes);
 void AddCameraFormatOption(CLI::App* command, CameraOptions* options);
 // Adds --lens: auto, or the name of a lens model.

@@ -60,6 +60,7 @@ struct GuideRequest {
   std::optional<maps::SyncOptions> hub;   // The library follows this hub; only without may_write.
   double baseline_m = 0;                  // See SessionOptions.
   Occlusion occlusion = Occlusion::kMap;  // See SessionOptions.
+  bool room_light = true;                 // See SessionOptions.
   std::shared_ptr<const engine::PlanarTarget> target;  // See engine::TrackerOptions; may be null.
   std::optional<HeadPolicy> head;
   // Called with each frame on its camera's thread, never concurrently; may be empty.

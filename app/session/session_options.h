@@ -27,6 +27,8 @@ struct SessionOptions : engine::SystemOptions {
   bool maintenance = true;
   // With kMap and `maintenance`, the surfaces of maps are computed.
   Occlusion occlusion = Occlusion::kMap;
+  // Models have the light of the room, as far as it is known, and cast shadows on it; or else a fixed light.
+  bool room_light = true;
   double signpost_height = 0.12;  // ratio of its distance at placement
   double model_side = 0.2;        // the same for the largest side of a model without a scale
   maps::PagerOptions memory;      // how much of the library is in memory at once
