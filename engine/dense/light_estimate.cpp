@@ -20,8 +20,8 @@ constexpr int kParts = 8;  // The places are divided into so many parts to see w
 
 // Two surface samples that are close to each other.
 struct Pair {
-  Coefficients first, second;                // Spherical harmonics of the normals.
-  double first_light = 0, second_light = 0;  // Their brightness.
+  Coefficients difference;  // Of the spherical harmonics of their normals.
+  double log_ratio = 0;     // Of their brightness.
   int part = 0;
 };
 
@@ -51,22 +51,24 @@ std::vector<Pair> PairsOf(const std::vector<SurfaceSample>& samples, double side
       const auto size = static_cast<std::uint32_t>(cell.size());
       const SurfaceSample &a = samples[cell[random.Below(size)]], &b = samples[cell[random.Below(size)]];
       if (a.normal.dot(b.normal) > largest_cosine) continue;
-      pairs.push_back({SphericalHarmonics(a.normal), SphericalHarmonics(b.normal), a.brightness, b.brightness,
-                       static_cast<int>(c % kParts)});
+      pairs.push_back({SphericalHarmonics(a.normal) - SphericalHarmonics(b.normal),
+                       std::log(a.brightness / b.brightness), static_cast<int>(c % kParts)});
     }
   }
   return pairs;
 }
 
-// The coefficients, of which the first is 1, that explain the ratios of the pairs best, without the pairs of
-// one part. Iteratively reweighted least squares with Cauchy's weights.
+// The coefficients of the logarithm of the brightness, without the first, that explain the ratios of the
+// pairs best, without the pairs of one part. Logarithms, because their errors do not depend on how bright the
+// pair is; with the brightness itself, errors of the ratios would be smallest where no light comes to the
+// common normals. Iteratively reweighted least squares with Cauchy's weights.
 Coefficients Fit(const std::vector<Pair>& pairs, int without_part) {
-  // Light of higher order is weaker on diffuse surfaces: in a room lit from one side, less than a third of
-  // the first order (Ramamoorthi and Hanrahan, 2001). The ridge is that of a prior with this size and
-  // residuals of a third, that of the contrast of common textures.
-  constexpr double kRidge = 1.0;
+  // The second order of diffuse light is weaker than the first (Ramamoorthi and Hanrahan, 2001), and noise of
+  // the normals shows most in it: a ridge of a hundredth of the pairs halves coefficients that few of them
+  // support.
+  constexpr double kRidge = 0.01;
   constexpr int kRounds = 12;
-  Coefficients fitted = Coefficients::Unit(0);
+  Coefficients fitted = Coefficients::Zero();
   std::vector<double> residuals;
   double scale = 1;
   for (int round = 0; round < kRounds; ++round) {
@@ -75,16 +77,14 @@ Coefficients Fit(const std::vector<Pair>& pairs, int without_part) {
     residuals.clear();
     for (const Pair& pair : pairs) {
       if (pair.part == without_part) continue;
-      const Coefficients row = (pair.first_light * pair.second - pair.second_light * pair.first) /
-                               (pair.first_light + pair.second_light);
-      const double residual = row.dot(fitted);
+      const double residual = pair.log_ratio - pair.difference.dot(fitted);
       residuals.push_back(std::abs(residual));
       const double weight = 1 / (1 + residual * residual / (scale * scale));
-      normal += weight * row.tail<8>() * row.tail<8>().transpose();
-      right -= weight * row[0] * row.tail<8>();
+      normal += weight * pair.difference.tail<8>() * pair.difference.tail<8>().transpose();
+      right += weight * pair.log_ratio * pair.difference.tail<8>();
     }
     if (residuals.empty()) return fitted;
-    normal.diagonal().tail<5>().array() += kRidge * 0.01 * static_cast<double>(residuals.size());
+    normal.diagonal().tail<5>().array() += kRidge * static_cast<double>(residuals.size());
     normal.diagonal().array() += 1e-6 * static_cast<double>(residuals.size());
     fitted.tail<8>() = normal.ldlt().solve(right);
     const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
@@ -94,6 +94,27 @@ Coefficients Fit(const std::vector<Pair>& pairs, int without_part) {
   return fitted;
 }
 
+// Directions that are even on the sphere (a spherical Fibonacci lattice).
+Eigen::Vector3d EvenDirection(int i, int count) {
+  const double z = 1 - (2 * i + 1.0) / count, angle = i * std::numbers::pi * (3 - std::sqrt(5.0));
+  const double r = std::sqrt(1 - z * z);
+  return {r * std::cos(angle), r * std::sin(angle), z};
+}
+
+// The brightness whose logarithm has these coefficients, with a mean of 1.
+Coefficients FromLogarithm(const Coefficients& logarithm) {
+  constexpr int kDirections = 400;
+  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
+  Coefficients right = Coefficients::Zero();
+  for (int i = 0; i < kDirections; ++i) {
+    const Coefficients basis = SphericalHarmonics(EvenDirection(i, kDirections));
+    normal += basis * basis.transpose();
+    right += std::exp(std::clamp(logarithm.dot(basis), -3.0, 3.0)) * basis;
+  }
+  const Coefficients brightness = normal.ldlt().solve(right);
+  return brightness / brightness[0];
+}
+
 Eigen::Vector3d FirstOrder(const Coefficients& c) {
   return {c[3], c[1], c[2]};
 }
@@ -101,7 +122,7 @@ Eigen::Vector3d FirstOrder(const Coefficients& c) {
 // Whether the parts agree on the main direction.
 bool IsCertain(const std::vector<Pair>& pairs, const Eigen::Vector3d& direction, double most_deg) {
   for (int part = 0; part < kParts; ++part) {
-    const Eigen::Vector3d other = FirstOrder(Fit(pairs, part));
+    const Eigen::Vector3d other = FirstOrder(FromLogarithm(Fit(pairs, part)));
     const double cosine = other.dot(direction) / (other.norm() * direction.norm());
     if (!(cosine > std::cos(most_deg * std::numbers::pi / 180))) return false;
   }
@@ -125,12 +146,9 @@ double White(const std::vector<SurfaceSample>& samples, const Coefficients& shap
 void KeepPositive(Coefficients* shape) {
   constexpr double kLeast = 0.1;  // Of the mean.
   double darkest = 1;
-  for (int i = 0; i < 200; ++i) {  // Evenly on the sphere (a spherical Fibonacci lattice).
-    const double z = 1 - (2 * i + 1) / 200.0, angle = i * std::numbers::pi * (3 - std::sqrt(5.0));
-    const double r = std::sqrt(1 - z * z);
-    darkest =
-        std::min(darkest, shape->dot(SphericalHarmonics({r * std::cos(angle), r * std::sin(angle), z})));
-  }
+  constexpr int kDirections = 200;
+  for (int i = 0; i < kDirections; ++i)
+    darkest = std::min(darkest, shape->dot(SphericalHarmonics(EvenDirection(i, kDirections))));
   if (darkest < kLeast) shape->tail<8>() *= (1 - kLeast) / (1 - darkest);
 }
 
@@ -160,7 +178,7 @@ std::optional<LightEstimate> EstimateLight(const MapSnapshot& map, const Surface
       SampleSurfaces(map, mesh, options.samples, options.max_keyframes, options.max_width_px);
   const std::vector<Pair> pairs = PairsOf(samples, side, options);
   if (pairs.size() < options.min_pairs) return std::nullopt;
-  Coefficients shape = Fit(pairs, -1);
+  Coefficients shape = FromLogarithm(Fit(pairs, -1));
   const Eigen::Vector3d direction = FirstOrder(shape);
   if (!(direction.norm() > 1e-3) || !IsCertain(pairs, direction, options.max_direction_spread_deg))
     return std::nullopt;
