@@ -16,7 +16,9 @@ namespace {
 
 using Coefficients = Eigen::Matrix<double, 9, 1>;
 
-constexpr int kParts = 8;  // The places are divided into so many parts to see whether they agree.
+// The places are divided into so many parts to see whether they agree; a bit of a mask for each.
+constexpr int kParts = 8;
+constexpr unsigned kAllParts = 0xFF;
 
 // Two surface samples that are close to each other.
 struct Pair {
@@ -59,10 +61,10 @@ std::vector<Pair> PairsOf(const std::vector<SurfaceSample>& samples, double side
 }
 
 // The coefficients of the logarithm of the brightness, without the first, that explain the ratios of the
-// pairs best, without the pairs of one part. Logarithms, because their errors do not depend on how bright the
-// pair is; with the brightness itself, errors of the ratios would be smallest where no light comes to the
-// common normals. Iteratively reweighted least squares with Cauchy's weights.
-Coefficients Fit(const std::vector<Pair>& pairs, int without_part) {
+// pairs best, with the pairs of the parts whose bit is set. Logarithms, because their errors do not depend on
+// how bright the pair is; with the brightness itself, errors of the ratios would be smallest where no light
+// comes to the common normals. Iteratively reweighted least squares with Cauchy's weights.
+Coefficients Fit(const std::vector<Pair>& pairs, unsigned parts) {
   // The second order of diffuse light is weaker than the first (Ramamoorthi and Hanrahan, 2001), and noise of
   // the normals shows most in it: a ridge of a hundredth of the pairs halves coefficients that few of them
   // support.
@@ -76,7 +78,7 @@ Coefficients Fit(const std::vector<Pair>& pairs, int without_part) {
     Eigen::Matrix<double, 8, 1> right = Eigen::Matrix<double, 8, 1>::Zero();
     residuals.clear();
     for (const Pair& pair : pairs) {
-      if (pair.part == without_part) continue;
+      if ((parts >> pair.part & 1U) == 0) continue;
       const double residual = pair.log_ratio - pair.difference.dot(fitted);
       residuals.push_back(std::abs(residual));
       const double weight = 1 / (1 + residual * residual / (scale * scale));
@@ -89,7 +91,8 @@ Coefficients Fit(const std::vector<Pair>& pairs, int without_part) {
     fitted.tail<8>() = normal.ldlt().solve(right);
     const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
     std::nth_element(residuals.begin(), middle, residuals.end());
-    scale = std::max(1e-3, 1.4826 * *middle);
+    // Half of the robust standard deviation: most pairs that contradict the others are of two materials.
+    scale = std::max(1e-3, 0.5 * 1.4826 * *middle);
   }
   return fitted;
 }
@@ -119,10 +122,12 @@ Eigen::Vector3d FirstOrder(const Coefficients& c) {
   return {c[3], c[1], c[2]};
 }
 
-// Whether the parts agree on the main direction.
+// Whether halves of the parts agree on the main direction. A half differs from the whole by about as much as
+// the whole does from the truth, if the errors of the parts are independent.
 bool IsCertain(const std::vector<Pair>& pairs, const Eigen::Vector3d& direction, double most_deg) {
-  for (int part = 0; part < kParts; ++part) {
-    const Eigen::Vector3d other = FirstOrder(FromLogarithm(Fit(pairs, part)));
+  // Parts whose number has one of its three bits set, and the others.
+  for (const unsigned half : {0xAAU, 0x55U, 0xCCU, 0x33U, 0xF0U, 0x0FU}) {
+    const Eigen::Vector3d other = FirstOrder(FromLogarithm(Fit(pairs, half)));
     const double cosine = other.dot(direction) / (other.norm() * direction.norm());
     if (!(cosine > std::cos(most_deg * std::numbers::pi / 180))) return false;
   }
@@ -178,7 +183,7 @@ std::optional<LightEstimate> EstimateLight(const MapSnapshot& map, const Surface
       SampleSurfaces(map, mesh, options.samples, options.max_keyframes, options.max_width_px);
   const std::vector<Pair> pairs = PairsOf(samples, side, options);
   if (pairs.size() < options.min_pairs) return std::nullopt;
-  Coefficients shape = FromLogarithm(Fit(pairs, -1));
+  Coefficients shape = FromLogarithm(Fit(pairs, kAllParts));
   const Eigen::Vector3d direction = FirstOrder(shape);
   if (!(direction.norm() > 1e-3) || !IsCertain(pairs, direction, options.max_direction_spread_deg))
     return std::nullopt;

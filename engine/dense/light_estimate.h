@@ -35,7 +35,7 @@ struct LightOptions {
   double min_angle_deg = 20;             // Between the normals of surfaces that are compared.
   std::size_t pairs_per_place = 48;      // Comparisons in one neighbourhood; bounds the weight of a place.
   std::size_t min_pairs = 300;           // With fewer, the light is not known.
-  double max_direction_spread_deg = 20;  // Of the estimates without an eighth of the places; more: not known.
+  double max_direction_spread_deg = 20;  // Of estimates from halves of the places; with more it is not known.
 };
 
 // Compares surfaces that are close to each other and face in different directions: they are most often of the

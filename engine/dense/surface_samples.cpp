@@ -73,11 +73,18 @@ cv::Mat DistancesIn(const KeyFrame& keyframe, const LevelRays& rays, const Surfa
     nearest = std::min(nearest, static_cast<float>(point.norm()));
   };
   std::vector<Eigen::Vector3d> in_camera;
+  std::vector<char> is_seen;
   in_camera.reserve(mesh.vertices.size());
-  for (const Eigen::Vector3f& vertex : mesh.vertices)
+  is_seen.reserve(mesh.vertices.size());
+  for (const Eigen::Vector3f& vertex : mesh.vertices) {
     in_camera.push_back(keyframe.camera_from_map * Eigen::Vector3d(vertex.cast<double>()));
-  constexpr int kMostSteps = 64;  // Of a triangle that reaches to the camera.
+    is_seen.push_back(rays.Project(in_camera.back()).has_value() ? 1 : 0);
+  }
+  constexpr int kMostSteps = 24;  // Of a triangle that reaches to the camera.
   for (const auto& [a, b, c] : mesh.triangles) {
+    // Triangles are small, so that one without a corner in the image covers a few pixels at its border at
+    // most.
+    if (is_seen[a] == 0 && is_seen[b] == 0 && is_seen[c] == 0) continue;
     const Eigen::Vector3d &p = in_camera[a], &q = in_camera[b], &r = in_camera[c];
     const double side = std::max({(q - p).norm(), (r - p).norm(), (r - q).norm()});
     const double nearest = std::min({p.norm(), q.norm(), r.norm()});
