@@ -61,7 +61,7 @@ double AngleToLight_deg(const engine::LightEstimate& light) {
 
 TEST(RoomLight, ComesFromWhereTheSimulatorHasIt) {
   int known = 0;
-  for (const char* const name : {"room", "museum", "desks", "loop"}) {
+  for (const char* const name : {"museum", "desks"}) {
     for (const std::uint64_t seed : {1u, 2u}) {
       const Place place = PlaceIn(name, seed);
       const auto start = std::chrono::steady_clock::now();
