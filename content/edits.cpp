@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "content/occluder.h"
 #include "content/placement.h"
 #include "content/warp.h"
 #include "engine/base/error.h"
@@ -63,7 +64,9 @@ SceneChange ChangeOf(const Scene& scene, const std::string& name, const std::str
 
 // "'sign-1' is a signpost, which cannot be bent."
 [[noreturn]] void RefuseKind(const Entity& entity, const char* why_not) {
-  const char* const article = entity.kind == Entity::Kind::kImage ? "an " : "a ";
+  const bool begins_with_vowel =
+      entity.kind == Entity::Kind::kImage || entity.kind == Entity::Kind::kOccluder;
+  const char* const article = begins_with_vowel ? "an " : "a ";
   throw Error("'" + entity.name + "' is " + article + NameOf(entity.kind) + ", which " + why_not);
 }
 
@@ -117,6 +120,16 @@ Eigen::Vector3d BesideOffset(const Entity& entity) {
       return {0.1 * kGap * entity.sound.range, 0, 0};
     case Entity::Kind::kTrail:
       return kGap * entity.trail.width * (PoseOf(entity).rotation * Eigen::Vector3d::UnitX());
+    case Entity::Kind::kOccluder: {
+      const OccluderMesh mesh = MeshOf(entity.occluder);
+      double left = 0, right = 0;
+      for (const Eigen::Vector3d& vertex : mesh.vertices) {
+        left = std::min(left, vertex.x());
+        right = std::max(right, vertex.x());
+      }
+      const engine::Sim3& pose = entity.occluder.map_from_shape;
+      return pose.rotation * Eigen::Vector3d(kGap * pose.scale * (right - left), 0, 0);
+    }
     case Entity::Kind::kModel:
     case Entity::Kind::kImage:
       break;
@@ -303,6 +316,18 @@ SceneChange RemovePointEdit(const Scene& scene, const std::string& name) {
     if (trail.points.size() <= kMinTrailPoints)
       throw Error("'" + name + "' needs the points that it has; remove all of it instead.");
     trail.points.pop_back();
+  });
+}
+
+SceneChange SizeEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& size) {
+  return ChangeOf(scene, name, "resize", [&](Entity* entity) {
+    if (entity->kind != Entity::Kind::kOccluder) RefuseKind(*entity, "has no sides; scale it instead.");
+    Occluder& occluder = entity->occluder;
+    if (occluder.shape == Occluder::Shape::kPolygon)
+      throw Error("'" + name + "' is a polygon, which has the size of its corners; scale it instead.");
+    occluder.size = size;
+    if (occluder.shape == Occluder::Shape::kPlane) occluder.size.z() = 0;
+    if (occluder.shape == Occluder::Shape::kCylinder) occluder.size.z() = size.x();
   });
 }
 

@@ -30,8 +30,8 @@ SceneChange RemoveEdit(const Scene& scene, const std::vector<std::string>& names
 
 // To this place of the entity's origin (PlaceOf).
 SceneChange MoveEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& position_in_map);
-// About the up axis of a model, image or trail through its base, counter-clockwise seen from above. What
-// faces the reader, and a sound, cannot be rotated.
+// About the up axis of a model, image, occluder or trail through its base, counter-clockwise seen from above.
+// What faces the reader, and a sound, cannot be rotated.
 SceneChange RotateEdit(const Scene& scene, const std::string& name, double angle_deg);
 // Relative to the entity's base (BaseInMap). Of a sound, the range is multiplied.
 SceneChange ScaleEdit(const Scene& scene, const std::string& name, double factor);
@@ -67,6 +67,10 @@ SceneChange OffsetEdit(const Scene& scene, const std::string& name, const Eigen:
 // Of a trail: a further point at its end, and without the last one.
 SceneChange AddPointEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& point_in_map);
 SceneChange RemovePointEdit(const Scene& scene, const std::string& name);
+
+// Of an occluder that is no polygon: width, height and depth. Of a plane and a cylinder, the depth is
+// ignored.
+SceneChange SizeEdit(const Scene& scene, const std::string& name, const Eigen::Vector3d& size);
 
 // Of the map itself. Throws Error when the settings are these already.
 SceneChange SettingsEdit(const Scene& scene, const MapSettings& settings, std::string label);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "content/object_reader.h"
+#include "content/occluder.h"
 #include "content/warp.h"
 #include "engine/base/error.h"
 
@@ -161,15 +162,42 @@ void ReadTrail(std::string_view where, const std::string& place, const Json& jso
   trail.width = reader.Number("width_m", kMinTrailWidth, kMaxTrailWidth);
 }
 
-// The kind of an entity; signposts and models are the only kinds before version 3.
+Occluder::Shape ReadShape(std::string_view where, const std::string& place, const std::string& name) {
+  using Shape = Occluder::Shape;
+  for (const Shape known : {Shape::kPlane, Shape::kBox, Shape::kCylinder, Shape::kPolygon}) {
+    if (name == NameOf(known)) return known;
+  }
+  Refuse(where, place + ".shape", "is neither plane, box, cylinder nor polygon.");
+}
+
+void ReadOccluder(std::string_view where, const std::string& place, const Json& json, Entity* entity) {
+  const ObjectReader reader(where, place, json);
+  Occluder& occluder = entity->occluder;
+  occluder.shape = ReadShape(where, place, reader.Text("shape"));
+  const bool is_polygon = occluder.shape == Occluder::Shape::kPolygon;
+  CheckMembers(where, place, json,
+               {"kind", "name", "shape", is_polygon ? "outline" : "size", "map_from_shape", "locked",
+                "hidden", "group"});
+  occluder.map_from_shape = ReadPose(where, place + ".map_from_shape", reader.Member("map_from_shape"));
+  if (is_polygon) {
+    occluder.size.setZero();
+    occluder.outline = reader.Vectors<2>("outline", kMaxOutlinePoints, kMaxCoordinate);
+  } else {
+    occluder.size = reader.Vector<3>("size", kMaxOccluderSide);
+  }
+}
+
+// The kind of an entity; signposts and models are the only kinds before version 3, and there are no occluders
+// before version 6.
 Entity::Kind ReadKind(std::string_view where, const std::string& place, const Json& json, int version) {
   using Kind = Entity::Kind;
   const auto kind = json.is_object() ? json.find("kind") : json.end();
   if (json.is_object() && kind != json.end()) {
-    for (const Kind known :
-         {Kind::kModel, Kind::kSignpost, Kind::kLabel, Kind::kImage, Kind::kSound, Kind::kTrail}) {
+    for (const Kind known : {Kind::kModel, Kind::kSignpost, Kind::kLabel, Kind::kImage, Kind::kSound,
+                             Kind::kTrail, Kind::kOccluder}) {
       const bool is_old = known == Kind::kModel || known == Kind::kSignpost;
-      if ((version > 2 || is_old) && *kind == NameOf(known)) return known;
+      const int first_version = is_old ? 1 : known == Kind::kOccluder ? 6 : 3;
+      if (version >= first_version && *kind == NameOf(known)) return known;
     }
   }
   Refuse(where, place, "is neither a model nor of another kind that can be placed.");
@@ -204,6 +232,17 @@ Json KindToJson(const Trail& trail) {
   return {{"points_m", points}, {"up", VectorToJson(trail.up)}, {"width_m", trail.width}};
 }
 
+Json KindToJson(const Occluder& occluder) {
+  Json json{{"shape", NameOf(occluder.shape)}, {"map_from_shape", PoseToJson(occluder.map_from_shape)}};
+  if (occluder.shape != Occluder::Shape::kPolygon) {
+    json["size"] = VectorToJson(occluder.size);
+    return json;
+  }
+  json["outline"] = Json::array();
+  for (const Eigen::Vector2d& point : occluder.outline) json["outline"].push_back({point.x(), point.y()});
+  return json;
+}
+
 Json KindToJson(const PlacedModel& model, bool is_image) {
   Json json{{"asset", model.asset ? model.asset->id : ""},
             {is_image ? "map_from_image" : "map_from_model", PoseToJson(model.map_from_model)}};
@@ -226,6 +265,8 @@ Json KindToJson(const Entity& entity) {
       return KindToJson(entity.sound);
     case Entity::Kind::kTrail:
       return KindToJson(entity.trail);
+    case Entity::Kind::kOccluder:
+      return KindToJson(entity.occluder);
   }
   return {};
 }
@@ -277,6 +318,9 @@ Entity EntityFromJson(std::string_view where, const std::string& place, const Js
       break;
     case Entity::Kind::kTrail:
       ReadTrail(where, place, json, &entity);
+      break;
+    case Entity::Kind::kOccluder:
+      ReadOccluder(where, place, json, &entity);
       break;
   }
   const ObjectReader reader(where, place, json);

@@ -15,8 +15,8 @@ namespace docent::content {
 
 // The version of scenes and histories that is written. Version 1 of a scene had no locked, hidden and group,
 // and no to_key of a signpost; version 2 had no translations, and models and signposts only; version 3 had no
-// direction of a signpost.
-inline constexpr int kSceneVersion = 5;
+// direction of a signpost; version 4 had no entrances, and version 5 no occluders.
+inline constexpr int kSceneVersion = 6;
 
 // Returns the asset with an id, or nullptr when there is none.
 using AssetLookup = std::function<std::shared_ptr<const Asset>(const std::string& id)>;

@@ -39,6 +39,9 @@ Eigen::Vector3d PlaceOf(const Entity& entity) {
       return entity.sound.position;
     case Entity::Kind::kTrail:
       if (!entity.trail.points.empty()) return entity.trail.points.front();
+      break;
+    case Entity::Kind::kOccluder:
+      return entity.occluder.map_from_shape.translation;
   }
   return Eigen::Vector3d::Zero();
 }
@@ -73,6 +76,8 @@ engine::Sim3 PoseOf(const Entity& entity) {
       pose.rotation = TrailRotation(entity.trail);
       pose.scale = entity.trail.width;
       break;
+    case Entity::Kind::kOccluder:
+      return entity.occluder.map_from_shape;
   }
   return pose;
 }
@@ -98,6 +103,9 @@ void SetPose(const engine::Sim3& pose, Entity* entity) {
       break;
     case Entity::Kind::kTrail:
       TransformBy(pose * PoseOf(*entity).inverse(), entity);
+      break;
+    case Entity::Kind::kOccluder:
+      entity->occluder.map_from_shape = pose;
       break;
   }
 }
@@ -129,6 +137,9 @@ void TransformBy(const engine::Sim3& motion, Entity* entity) {
       for (Eigen::Vector3d& point : entity->trail.points) point = motion * point;
       entity->trail.up = motion.rotation * entity->trail.up;
       entity->trail.width *= motion.scale;
+      break;
+    case Entity::Kind::kOccluder:
+      entity->occluder.map_from_shape = motion * entity->occluder.map_from_shape;
       break;
   }
 }

@@ -79,16 +79,17 @@ class ObjectReader {
   }
 
   // Reads a list of at most `limit` vectors.
-  std::vector<Eigen::Vector3d> Vectors(const char* name, std::size_t limit, double most) const {
+  template <int N = 3>
+  std::vector<Eigen::Matrix<double, N, 1>> Vectors(const char* name, std::size_t limit, double most) const {
     const Json& value = Member(name);
     const std::string place = PlaceOfMember(name);
     if (!value.is_array() || value.size() > limit)
       Refuse(where_, place, "is not a list of at most " + std::to_string(limit) + " points.");
-    std::vector<Eigen::Vector3d> vectors;
+    std::vector<Eigen::Matrix<double, N, 1>> vectors;
     for (const Json& point : value) {
-      if (!point.is_array() || point.size() != 3) Refuse(where_, place, "is not a list of points.");
-      Eigen::Vector3d& vector = vectors.emplace_back();
-      for (int k = 0; k < 3; ++k)
+      if (!point.is_array() || point.size() != N) Refuse(where_, place, "is not a list of points.");
+      Eigen::Matrix<double, N, 1>& vector = vectors.emplace_back();
+      for (int k = 0; k < N; ++k)
         vector[k] = AsNumber(point[static_cast<std::size_t>(k)], place, -most, most);
     }
     return vectors;

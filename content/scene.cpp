@@ -21,6 +21,8 @@ const char* NameOf(Entity::Kind kind) {
       return "sound";
     case Entity::Kind::kTrail:
       return "trail";
+    case Entity::Kind::kOccluder:
+      return "occluder";
   }
   return "";
 }

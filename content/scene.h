@@ -20,17 +20,21 @@ namespace docent::content {
 
 // Limits of a scene: edits refuse what exceeds them, and scene_codec.h neither writes nor reads it. They are
 // far beyond any room that is measured in map units, and keep all arithmetic finite.
-inline constexpr double kMaxCoordinate = 1e6;        // map units
-inline constexpr double kMinModelScale = 1e-9;       // map units per metre
-inline constexpr double kMaxModelScale = 1e9;        // map units per metre
-inline constexpr double kMinBoardHeight = 1e-6;      // map units
-inline constexpr double kMaxBoardHeight = 1e6;       // map units
-inline constexpr double kMinSoundRange = 1e-6;       // map units
-inline constexpr double kMaxSoundRange = 1e6;        // map units
-inline constexpr double kMinTrailWidth = 1e-6;       // map units
-inline constexpr double kMaxTrailWidth = 1e6;        // map units
-inline constexpr std::size_t kMinTrailPoints = 2;    // of one trail
-inline constexpr std::size_t kMaxTrailPoints = 200;  // of one trail
+inline constexpr double kMaxCoordinate = 1e6;         // map units
+inline constexpr double kMinModelScale = 1e-9;        // map units per metre
+inline constexpr double kMaxModelScale = 1e9;         // map units per metre
+inline constexpr double kMinBoardHeight = 1e-6;       // map units
+inline constexpr double kMaxBoardHeight = 1e6;        // map units
+inline constexpr double kMinSoundRange = 1e-6;        // map units
+inline constexpr double kMaxSoundRange = 1e6;         // map units
+inline constexpr double kMinTrailWidth = 1e-6;        // map units
+inline constexpr double kMaxTrailWidth = 1e6;         // map units
+inline constexpr std::size_t kMinTrailPoints = 2;     // of one trail
+inline constexpr std::size_t kMaxTrailPoints = 200;   // of one trail
+inline constexpr double kMinOccluderSide = 1e-6;      // map units
+inline constexpr double kMaxOccluderSide = 1e6;       // map units
+inline constexpr std::size_t kMinOutlinePoints = 3;   // of one polygon
+inline constexpr std::size_t kMaxOutlinePoints = 64;  // of one polygon
 // Of a rotation; beyond it little of the angle is left of a double.
 inline constexpr double kMaxAngle_deg = 1e6;
 inline constexpr int kMaxAnimation = 1'000'000;       // Index of an animation of a model.
@@ -41,7 +45,7 @@ inline constexpr std::size_t kMaxSceneTextBytes = 4u << 20;  // all names and te
 
 inline constexpr std::size_t kMaxSceneWarpPoints = 50'000;    // Of all bent models together.
 inline constexpr std::size_t kMaxSceneTranslations = 20'000;  // Of all texts together.
-inline constexpr std::size_t kMaxSceneTrailPoints = 20'000;   // Of all trails together.
+inline constexpr std::size_t kMaxSceneTrailPoints = 20'000;   // Of all trails and polygons together.
 
 // A smooth deformation of a model (warp.h).
 struct Warp;
@@ -115,23 +119,42 @@ struct Trail {
   double width = 0.1;                              // Of the ribbon, in map units.
 };
 
+// A shape that an author puts where a real thing is: content behind it is hidden, and it is not drawn itself
+// but for authors. Its unit is the map unit, unless its pose has a scale.
+struct Occluder {
+  // In the shape's axes, where y is up and z the front.
+  enum class Shape {
+    kPlane,     // A rectangle across z, with its middle at the origin.
+    kBox,       // It stands on the plane y = 0, with the origin in the middle of its base.
+    kCylinder,  // The same, about the y axis.
+    kPolygon,   // A flat area across z.
+  };
+  Shape shape = Shape::kBox;  // What it is.
+  engine::Sim3 map_from_shape;
+  // Width, height and depth; the depth of a plane is 0, that of a cylinder its width. Not of a polygon.
+  Eigen::Vector3d size = Eigen::Vector3d::Ones();
+  // Of a polygon: its corners in x and y, kMinOutlinePoints to kMaxOutlinePoints, in either direction.
+  std::vector<Eigen::Vector2d> outline;
+};
+
 // An entity with a name that is unique in its scene ("helmet", "helmet-2", "sign-1").
 struct Entity {
   std::string name;  // Unique in the scene.
   // Which of the members below counts.
-  enum class Kind { kModel, kSignpost, kLabel, kImage, kSound, kTrail };
+  enum class Kind { kModel, kSignpost, kLabel, kImage, kSound, kTrail, kOccluder };
   Kind kind = Kind::kSignpost;  // What it is.
   PlacedModel model;            // Of kModel and kImage; an image is neither animated nor bent.
   Signpost signpost;            // Of kSignpost.
   Label label;                  // Of kLabel.
   Sound sound;                  // Of kSound.
   Trail trail;                  // Of kTrail.
+  Occluder occluder;            // Of kOccluder.
   bool locked = false;          // No edit but unlocking changes it.
   bool hidden = false;          // It is not drawn, and a sound does not play.
   std::string group;            // Shared by entities that are selected together; empty for none.
 };
 
-// "model", "signpost", "label", "image", "sound" or "trail".
+// "model", "signpost", "label", "image", "sound", "trail" or "occluder".
 const char* NameOf(Entity::Kind kind);
 // Whether Entity::model counts: a model or an image.
 bool HasModel(const Entity& entity);
@@ -149,13 +172,14 @@ const Translations* TranslationsOf(const Entity& entity);
 const std::string& ShownText(const Entity& entity, const std::string& language);
 
 // The position of an entity in the map: of a model its origin, of an image its middle, of a signpost its
-// foot, of a label its anchor, of a trail its first point.
+// foot, of a label its anchor, of a trail its first point, of an occluder its origin.
 Eigen::Vector3d PlaceOf(const Entity& entity);
 // The middle of a signpost's board in the map, in map units.
 Eigen::Vector3d BoardMiddle(const Signpost& signpost);
-// Place, rotation and size as one similarity. Of a model and an image it is map_from_model. Of a trail y is
-// up, z the direction in which it begins, and the scale its width. Of the others the scale is the height of a
-// signpost, that of a label's text, or the range of a sound, and there is no rotation.
+// Place, rotation and size as one similarity. Of a model and an image it is map_from_model, of an occluder
+// map_from_shape. Of a trail y is up, z the direction in which it begins, and the scale its width. Of the
+// others the scale is the height of a signpost, that of a label's text, or the range of a sound, and there is
+// no rotation.
 engine::Sim3 PoseOf(const Entity& entity);
 // Gives an entity this pose; where PoseOf has no rotation, none is taken.
 void SetPose(const engine::Sim3& pose, Entity* entity);
@@ -200,7 +224,7 @@ struct SceneTally {
   std::size_t text_bytes = 0;    // See TextBytes.
   std::size_t translations = 0;  // Of all texts.
   std::size_t warp_points = 0;   // Of all bent models.
-  std::size_t trail_points = 0;  // Of all trails.
+  std::size_t trail_points = 0;  // Of all trails and polygons.
   // Counts an entity. If a limit would be exceeded, it is not counted, and the sentence says which limit.
   std::string Add(const Entity& entity);
 };

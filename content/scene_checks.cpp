@@ -2,6 +2,7 @@
 #include <charconv>
 #include <set>
 
+#include "content/occluder.h"
 #include "content/scene.h"
 #include "content/warp.h"
 
@@ -135,6 +136,8 @@ std::string PoseProblem(const Entity& entity) {
                     RangeProblem("a range", entity.sound.range, kMinSoundRange, kMaxSoundRange)});
     case Entity::Kind::kTrail:
       return TrailProblem(entity.trail);
+    case Entity::Kind::kOccluder:
+      return ModelPoseProblem(entity.occluder.map_from_shape);
   }
   return "would be of no known kind";
 }
@@ -153,6 +156,7 @@ std::string Validate(const Entity& entity) {
     problem = "would lead to a map with a name " + NotText();
   if (entity.kind == Entity::Kind::kSound && problem.empty())
     problem = AssetProblem(entity.sound.asset, AssetKind::kSound, "sound");
+  if (entity.kind == Entity::Kind::kOccluder) problem = ShapeProblem(entity.occluder);
   return problem.empty() ? PoseProblem(entity) : problem;
 }
 
@@ -177,10 +181,12 @@ std::string SceneTally::Add(const Entity& entity) {
   sum.translations += TranslationCount(entity);
   if (entity.model.warp) sum.warp_points += entity.model.warp->controls.size();
   if (entity.kind == Entity::Kind::kTrail) sum.trail_points += entity.trail.points.size();
+  if (entity.kind == Entity::Kind::kOccluder) sum.trail_points += entity.occluder.outline.size();
   if (sum.warp_points > kMaxSceneWarpPoints)
     return "The models in a map can be bent by at most " + std::to_string(kMaxSceneWarpPoints) + " points.";
   if (sum.trail_points > kMaxSceneTrailPoints)
-    return "The trails in a map can have at most " + std::to_string(kMaxSceneTrailPoints) + " points.";
+    return "The trails and polygons in a map can have at most " + std::to_string(kMaxSceneTrailPoints) +
+           " points.";
   if (sum.translations > kMaxSceneTranslations)
     return "A map can hold at most " + std::to_string(kMaxSceneTranslations) + " translations.";
   if (sum.text_bytes > kMaxSceneTextBytes)

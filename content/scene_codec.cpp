@@ -8,8 +8,8 @@
 namespace docent::content {
 namespace {
 
-// With keys: 38 for each entity, 13 at most for each point that bends a model, 4 for each point of a trail,
-// and 2 for each translation.
+// With keys: 38 for each entity, 13 at most for each point that bends a model, 4 for each point of a trail
+// or polygon, and 2 for each translation.
 constexpr std::size_t kMaxSceneValues =
     100 + 38 * kMaxEntities + 14 * kMaxSceneWarpPoints + 4 * kMaxSceneTrailPoints + 2 * kMaxSceneTranslations;
 

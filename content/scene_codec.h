@@ -11,7 +11,7 @@
 // Encodes a scene as JSON text, the form in which a library stores it (assets are stored separately, once
 // each, by id):
 //
-//   {"docent_scene": 4, "assets": [ID…], "entities": [
+//   {"docent_scene": 6, "assets": [ID…], "entities": [
 //     {"kind": "model", "name": NAME, "locked": false, "hidden": false, "group": NAME,
 //      "asset": ID, "animation": N,
 //      "map_from_model": {"rotation_xyzw": [x, y, z, w], "translation_m": [x, y, z], "scale": S},
@@ -26,13 +26,17 @@
 //     {"kind": "image", …, "asset": ID, "map_from_image": as map_from_model},
 //     {"kind": "sound", …, "asset": ID, "caption": TEXT, "position_m": [x, y, z], "range_m": R,
 //      and translations of the caption},
-//     {"kind": "trail", …, "points_m": [[x, y, z]…], "up": [x, y, z], "width_m": W}]}
+//     {"kind": "trail", …, "points_m": [[x, y, z]…], "up": [x, y, z], "width_m": W},
+//     {"kind": "occluder", …, "shape": "plane", "box" or "cylinder", "size": [width, height, depth],
+//      "map_from_shape": as map_from_model},
+//     {"kind": "occluder", …, "shape": "polygon", "outline": [[x, y]…], "map_from_shape": as above}]}
 //
 // where … stands for name, locked, hidden and group.
 //
 // Numbers are written so that they read back to the same bits (rotations are normalized again). Version 1,
-// without locked, hidden, group and to_key, version 2, without translations and the last four kinds, version
-// 3, without directions, and version 4, without entrances, are read as well.
+// without locked, hidden, group and to_key, version 2, without translations and the kinds after signposts,
+// version 3, without directions, version 4, without entrances, and version 5, without occluders, are read as
+// well.
 namespace docent::content {
 
 // DecodeScene reads what this returns. Throws Error for a scene that cannot be stored (Validate in scene.h).

@@ -59,6 +59,8 @@ class AuthoringActions {
   virtual void SetOffset(const std::string& name, const Eigen::Vector3d& offset) = 0;
   // Removes the last point of a trail.
   virtual void ShortenTrail(const std::string& name) = 0;
+  // Width, height and depth of an occluder that is no polygon; the depth counts only of a box.
+  virtual void SetOccluderSize(const std::string& name, const Eigen::Vector3d& size) = 0;
   // To no map with an empty name.
   virtual void SetTarget(const std::string& name, const std::string& to_map) = 0;
   // Where one leaves for the map that a signpost leads to, as a vector of any length along the map's axes;
@@ -128,7 +130,7 @@ struct AuthoringFacts {
 };
 
 // What a click in the image does.
-enum class AuthoringTool { kSelect, kModel, kSignpost, kLabel, kImage, kSound, kTrail };
+enum class AuthoringTool { kSelect, kModel, kSignpost, kLabel, kImage, kSound, kTrail, kOccluder };
 
 // What the next click in the image says about the space of the map, before the tool is used.
 enum class MapPick { kNone, kFloor, kMeasureFrom, kMeasureTo };
@@ -147,6 +149,7 @@ struct AuthoringChoices {
   std::string image_file;
   bool image_upright = false;  // Else flush with the surface.
   std::string sound_file, caption;
+  content::Occluder::Shape occluder_shape = content::Occluder::Shape::kBox;  // No polygon.
   bool show_points = false, show_keyframes = false, show_boundary = true, show_status = true;
   bool from_above = false;     // The map from above instead of the image.
   bool show_coverage = false;  // A small map from above in a corner of the image.

@@ -164,9 +164,10 @@ void AuthoringPanel::DrawPlace(const AuthoringFacts& facts) {
   };
   tool_button(strings::kToolSelect, AuthoringTool::kSelect);
   constexpr std::pair<const char*, AuthoringTool> kTools[] = {
-      {strings::kToolModel, AuthoringTool::kModel}, {strings::kToolSignpost, AuthoringTool::kSignpost},
-      {strings::kToolLabel, AuthoringTool::kLabel}, {strings::kToolImage, AuthoringTool::kImage},
-      {strings::kToolSound, AuthoringTool::kSound}, {strings::kToolTrail, AuthoringTool::kTrail}};
+      {strings::kToolModel, AuthoringTool::kModel},      {strings::kToolSignpost, AuthoringTool::kSignpost},
+      {strings::kToolLabel, AuthoringTool::kLabel},      {strings::kToolImage, AuthoringTool::kImage},
+      {strings::kToolSound, AuthoringTool::kSound},      {strings::kToolTrail, AuthoringTool::kTrail},
+      {strings::kToolOccluder, AuthoringTool::kOccluder}};
   for (const auto& [label, tool] : kTools) {
     SameLineIfFits(label, ImGui::GetFrameHeight());
     tool_button(label, tool);
@@ -177,6 +178,7 @@ void AuthoringPanel::DrawPlace(const AuthoringFacts& facts) {
   if (choices_.tool == AuthoringTool::kImage) DrawImageChoice();
   if (choices_.tool == AuthoringTool::kSound) DrawSoundChoice();
   if (choices_.tool == AuthoringTool::kTrail) Wrapped(strings::kClickToPlaceTrail, theme::kMutedText);
+  if (choices_.tool == AuthoringTool::kOccluder) DrawOccluderChoice();
 }
 
 void AuthoringPanel::DrawFileField(const char* hint, content::AssetKind kind, std::string* file) {
@@ -200,6 +202,18 @@ void AuthoringPanel::DrawImageChoice() {
   Wrapped(choices_.image_file.empty() ? strings::kChooseImage : strings::kClickToPlaceImage,
           theme::kMutedText);
   Wrapped(strings::kDropFiles, theme::kMutedText);
+}
+
+void AuthoringPanel::DrawOccluderChoice() {
+  using Shape = content::Occluder::Shape;
+  constexpr std::pair<const char*, Shape> kShapes[] = {{strings::kShapePlane, Shape::kPlane},
+                                                       {strings::kShapeBox, Shape::kBox},
+                                                       {strings::kShapeCylinder, Shape::kCylinder}};
+  for (const auto& [label, shape] : kShapes) {
+    if (shape != Shape::kPlane) SameLineIfFits(label, ImGui::GetFrameHeight());
+    if (ImGui::RadioButton(label, choices_.occluder_shape == shape)) choices_.occluder_shape = shape;
+  }
+  Wrapped(strings::kClickToPlaceOccluder, theme::kMutedText);
 }
 
 void AuthoringPanel::DrawSoundChoice() {

@@ -48,6 +48,7 @@ class AuthoringPanel {
   void DrawLabelChoice();
   void DrawImageChoice();
   void DrawSoundChoice();
+  void DrawOccluderChoice();
   // A field for the name of a file of this kind, with a button that opens the desktop's dialog.
   void DrawFileField(const char* hint, content::AssetKind kind, std::string* file);
   void DrawView();

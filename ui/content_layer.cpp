@@ -6,7 +6,10 @@
 #include <cmath>
 #include <utility>
 
+#include "content/placement.h"
+#include "ui/axes.h"
 #include "ui/label_board.h"
+#include "ui/room_shaders.h"
 #include "ui/shaders.h"
 
 namespace docent::ui {
@@ -14,6 +17,10 @@ namespace {
 
 constexpr std::size_t kMaxLenses = 4;
 constexpr int kMaxAtlasSidePx = 4096;
+// A surface hides content that is farther from the camera by more than this, relative to its depth, because
+// content stands on surfaces: nine tenths of the depths that maps measure are off by less
+// (docs/decisions/dense-surfaces.md).
+constexpr float kDepthBias = 0.02f;
 
 int MaxAtlasSide() {
   GLint side = 0;
@@ -41,14 +48,35 @@ double SecondsOf(const content::Entity& entity, const ContentLayer::What& what) 
   return start == what.animation_starts->end() ? 0 : std::max(0.0, what.animation_seconds - start->second);
 }
 
+// Adds the depths of a box.
+void AddDepths(const Box& box, const PinholeView& view, MeshDrawer::DepthRange* range) {
+  if (MeshDrawer::CoverOf(box, view).empty()) return;
+  const glm::mat4 eye_from_map = GlEyeFromMap(view.camera_from_map);
+  for (int i = 0; i < 8; ++i)
+    range->Include(static_cast<double>(-(eye_from_map * glm::vec4(box.Corner(i), 1.0f)).z), 0);
+}
+
+// Where an entity stands, if it casts a shadow.
+void SetStanding(const content::Entity& entity, ModelInstance* instance) {
+  using Kind = content::Entity::Kind;
+  instance->casts_shadow = entity.kind == Kind::kModel || entity.kind == Kind::kSignpost;
+  instance->base = GlmFrom(content::BaseInMap(entity));
+  instance->up = GlmFrom(entity.kind == Kind::kSignpost
+                             ? entity.signpost.up
+                             : entity.model.map_from_model.rotation * Eigen::Vector3d::UnitY());
+}
+
 }  // namespace
 
 ContentLayer::ContentLayer(int samples, int max_texture_px, const std::string& language)
     : samples_(samples),
       mesh_drawer_(max_texture_px),
       warp_program_("lens warp", kFullScreenVertexShader, kWarpFragmentShader),
+      room_warp_program_("lens warp in the room", kFullScreenVertexShader, kRoomWarpFragmentShader),
       shapes_(language) {
   warp_program_.AssignTextureUnits({"lookup", "atlas"});
+  room_warp_program_.AssignTextureUnits(
+      {"lookup", "atlas", "content_depth", "surface_depth", "shadow", "video"});
 }
 
 ContentLayer::~ContentLayer() = default;
@@ -60,27 +88,51 @@ void ContentLayer::SetSamples(int samples) {
 void ContentLayer::Draw(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
                         const content::Scene& scene, const What& what, const RenderTarget& image) {
   const Drawn drawn = Instances(scene, camera_from_map.OriginInSource(), what);
-  surface_drawer_.Prepare(what.surfaces);
-  Composite(camera, camera_from_map, drawn.plain, 1, image);
-  if (!drawn.faint.empty()) Composite(camera, camera_from_map, drawn.faint, kFaintOpacity, image);
+  surface_drawer_.Prepare(hiding_surfaces_.Of(scene, what.occluders, what.surfaces));
+  Composite(camera, camera_from_map, drawn.plain, 1, what, image);
+  if (!drawn.faint.empty()) Composite(camera, camera_from_map, drawn.faint, kFaintOpacity, what, image);
 }
 
 void ContentLayer::Composite(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-                             const std::vector<ModelInstance>& instances, double opacity,
+                             const std::vector<ModelInstance>& instances, double opacity, const What& what,
                              const RenderTarget& image) {
   mesh_drawer_.Prepare(instances, glm::vec3(0.0f, -1.0f, 0.0f));
   if (instances.empty()) return;
   Lens& lens = FindLens(camera);
-  const PixelRectangle region = DrawAtlas(camera_from_map, &lens);
+  std::vector<PinholeView> views;
+  for (const LensFace& face : lens.warp.faces)
+    views.push_back(
+        {engine::Rigid3(face.face_from_camera, Eigen::Vector3d::Zero()) * camera_from_map, face.bounds});
+  bool with_shadows = what.shadows && opacity == 1;
+  if (with_shadows) {
+    shadows_.Prepare(mesh_drawer_, views, what.light.room);
+    with_shadows = !shadows_.empty();
+  }
+  const std::vector<Pass> passes = PassesOf(camera_from_map, with_shadows, lens);
+  MeshDrawer::DepthRange range;
+  for (const Pass& pass : passes) {
+    mesh_drawer_.AddDepths(pass.view, &range);
+    if (with_shadows) AddDepths(shadows_.reach(), pass.view, &range);
+  }
+  DrawAtlas(passes, range, what.light, &lens);
+  const bool with_room = !range.empty() && (with_shadows || !surface_drawer_.empty());
+  if (with_room) DrawRoom(passes, range, with_shadows, &lens);
+  std::vector<PixelRectangle> drawn;
+  for (const Pass& pass : passes) drawn.push_back(pass.all);
+  const PixelRectangle region = ImageFromAtlas(lens.warp, lens.camera, drawn);
   if (region.empty()) return;
 
   image.BindForDrawing();
-  warp_program_.Use();
-  glUniform1f(warp_program_.Uniform("opacity"), static_cast<float>(opacity));
-  glActiveTexture(GL_TEXTURE0);
-  glBindTexture(GL_TEXTURE_2D, lens.lookup.name());
-  glActiveTexture(GL_TEXTURE1);
-  glBindTexture(GL_TEXTURE_2D, lens.atlas->texture());
+  if (with_room) {
+    BindForComposite(lens, range, opacity, with_shadows, what.video);
+  } else {
+    warp_program_.Use();
+    glUniform1f(warp_program_.Uniform("opacity"), static_cast<float>(opacity));
+    glActiveTexture(GL_TEXTURE0);
+    glBindTexture(GL_TEXTURE_2D, lens.lookup.name());
+    glActiveTexture(GL_TEXTURE1);
+    glBindTexture(GL_TEXTURE_2D, lens.atlas->texture());
+  }
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   glEnable(GL_SCISSOR_TEST);
@@ -91,22 +143,51 @@ void ContentLayer::Composite(const engine::CameraModel& camera, const engine::Ri
   glDisable(GL_BLEND);
 }
 
-PixelRectangle ContentLayer::DrawAtlas(const engine::Rigid3& camera_from_map, Lens* lens) {
-  struct Pass {
-    const LensFace* face;
-    PinholeView view;
-    PixelRectangle rectangle;
-  };
+void ContentLayer::BindForComposite(const Lens& lens, const MeshDrawer::DepthRange& range, double opacity,
+                                    bool with_shadows, GLuint video) {
+  const GlProgram& program = room_warp_program_;
+  program.Use();
+  glUniform1f(program.Uniform("opacity"), static_cast<float>(opacity));
+  glUniform1i(program.Uniform("has_surfaces"), !surface_drawer_.empty());
+  glUniform1i(program.Uniform("has_shadows"), with_shadows);
+  glUniform1f(program.Uniform("depth_bias"), kDepthBias);
+  glUniform2f(program.Uniform("depth_range"), static_cast<float>(range.near_m()),
+              static_cast<float>(range.far_m()));
+  const GLuint textures[] = {lens.lookup.name(),
+                             lens.atlas->texture(),
+                             lens.room->content_depth.texture(),
+                             lens.room->surface_depth.texture(),
+                             lens.room->shadow.texture(),
+                             video};
+  GLenum unit = GL_TEXTURE0;
+  for (const GLuint texture : textures) {
+    glActiveTexture(unit++);
+    glBindTexture(GL_TEXTURE_2D, texture);
+  }
+}
+
+std::vector<ContentLayer::Pass> ContentLayer::PassesOf(const engine::Rigid3& camera_from_map,
+                                                       bool with_shadows, const Lens& lens) const {
   std::vector<Pass> passes;
-  std::vector<PixelRectangle> drawn;
-  for (const LensFace& face : lens->warp.faces) {
+  for (const LensFace& face : lens.warp.faces) {
     const engine::Rigid3 face_from_camera(face.face_from_camera, Eigen::Vector3d::Zero());
     const PinholeView view{face_from_camera * camera_from_map, face.bounds};
+    Pass pass{&face, view, {}, {}};
     const MeshDrawer::Cover cover = mesh_drawer_.Covered(view);
-    if (cover.empty()) continue;
-    drawn.push_back(RectangleOf(face, cover));
-    passes.push_back({&face, view, drawn.back()});
+    if (!cover.empty()) pass.content = pass.all = RectangleOf(face, cover);
+    if (with_shadows) {
+      const MeshDrawer::Cover reach = MeshDrawer::CoverOf(shadows_.reach(), view);
+      if (!reach.empty()) pass.all.Include(RectangleOf(face, reach));
+    }
+    if (!pass.all.empty()) passes.push_back(pass);
   }
+  return passes;
+}
+
+void ContentLayer::DrawAtlas(const std::vector<Pass>& passes, const MeshDrawer::DepthRange& range,
+                             const ModelLight& light, Lens* lens) {
+  std::vector<PixelRectangle> drawn;
+  for (const Pass& pass : passes) drawn.push_back(pass.all);
   // Only the rectangles drawn now or in the previous frame are cleared. Clearing and resolving the whole
   // atlas would cost more than the content itself when there is little of it.
   std::vector<PixelRectangle> changed = lens->drawn;
@@ -119,15 +200,61 @@ PixelRectangle ContentLayer::DrawAtlas(const engine::Rigid3& camera_from_map, Le
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   }
   for (const Pass& pass : passes) {
+    if (pass.content.empty()) continue;
     glViewport(pass.face->x_px, pass.face->y_px, pass.face->width_px, pass.face->height_px);
-    glScissor(pass.rectangle.x, pass.rectangle.y, pass.rectangle.width, pass.rectangle.height);
-    mesh_drawer_.Draw(pass.view, surface_drawer_);
+    glScissor(pass.content.x, pass.content.y, pass.content.width, pass.content.height);
+    mesh_drawer_.Draw(pass.view, range, light);
   }
   glDisable(GL_SCISSOR_TEST);
   for (const PixelRectangle& rectangle : changed)
     lens->atlas->Resolve(rectangle.x, rectangle.y, rectangle.width, rectangle.height);
   lens->drawn = drawn;
-  return ImageFromAtlas(lens->warp, lens->camera, drawn);
+}
+
+void ContentLayer::DrawRoom(const std::vector<Pass>& passes, const MeshDrawer::DepthRange& range,
+                            bool with_shadows, Lens* lens) {
+  if (lens->room == nullptr)
+    lens->room = std::make_unique<RoomTargets>(lens->warp.atlas_width_px, lens->warp.atlas_height_px);
+  RoomTargets& room = *lens->room;
+  glDepthMask(GL_TRUE);
+  glEnable(GL_SCISSOR_TEST);
+  const auto begin = [](const Pass& pass) {
+    const LensFace& face = *pass.face;
+    glViewport(face.x_px, face.y_px, face.width_px, face.height_px);
+    // The filter of the composite reads some pixels around the content.
+    constexpr int kAround = 10;
+    const int left = std::max(face.x_px, pass.all.x - kAround),
+              low = std::max(face.y_px, pass.all.y - kAround);
+    const int right = std::min(face.x_px + face.width_px, pass.all.x + pass.all.width + kAround);
+    const int high = std::min(face.y_px + face.height_px, pass.all.y + pass.all.height + kAround);
+    glScissor(left, low, right - left, high - low);
+  };
+  for (const Pass& pass : passes) {
+    room.content_depth.BindForDrawing();
+    begin(pass);
+    glClear(GL_DEPTH_BUFFER_BIT);
+    lens->atlas->CopyDepth(pass.all.x, pass.all.y, pass.all.width, pass.all.height, room.content_depth);
+    room.content_depth.BindForDrawing();
+    begin(pass);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LESS);
+    mesh_drawer_.DrawDepth(range.ClipFromMap(pass.view), MeshDrawer::Part::kSeenThrough);
+    room.surface_depth.BindForDrawing();
+    begin(pass);
+    glClear(GL_DEPTH_BUFFER_BIT);
+    surface_drawer_.Draw(range.ClipFromMap(pass.view));
+  }
+  glDisable(GL_DEPTH_TEST);
+  for (const Pass& pass : passes) {
+    if (!with_shadows) break;
+    room.shadow.BindForDrawing();
+    begin(pass);
+    glClear(GL_COLOR_BUFFER_BIT);
+    shadows_.Draw(range.ClipFromMap(pass.view),
+                  {pass.face->x_px, pass.face->y_px, pass.face->width_px, pass.face->height_px},
+                  room.surface_depth.texture());
+  }
+  glDisable(GL_SCISSOR_TEST);
 }
 
 ContentLayer::Lens& ContentLayer::FindLens(const engine::CameraModel& camera) {
@@ -167,7 +294,9 @@ ContentLayer::Drawn ContentLayer::Instances(const content::Scene& scene, const E
     const bool faint =
         entity.hidden && std::find(what.faint.begin(), what.faint.end(), entity.name) != what.faint.end();
     if ((entity.hidden && !faint) || entity.kind == content::Entity::Kind::kLabel) continue;
-    if (entity.kind == content::Entity::Kind::kSound && !what.markers) continue;
+    const bool is_marker =
+        entity.kind == content::Entity::Kind::kSound || entity.kind == content::Entity::Kind::kOccluder;
+    if (is_marker && !what.markers) continue;
     for (content::EntityShape& shape :
          std::array{shapes_.ShapeOf(entity, eye_in_map), shapes_.ArrowOf(entity)}) {
       if (shape.model == nullptr) continue;
@@ -176,6 +305,7 @@ ContentLayer::Drawn ContentLayer::Instances(const content::Scene& scene, const E
       instance.map_from_model = GlmFrom(shape.map_from_model);
       if (entity.kind == content::Entity::Kind::kModel) instance.animation = entity.model.animation;
       instance.seconds = SecondsOf(entity, what);
+      SetStanding(entity, &instance);
       (faint ? drawn.faint : drawn.plain).push_back(std::move(instance));
     }
   }

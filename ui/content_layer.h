@@ -12,8 +12,10 @@
 #include "engine/geometry/rigid3.h"
 #include "ui/entity_shapes.h"
 #include "ui/gl_objects.h"
+#include "ui/hiding_surfaces.h"
 #include "ui/lens_warp.h"
 #include "ui/mesh_drawer.h"
+#include "ui/room_shadows.h"
 #include "ui/surface_drawer.h"
 
 namespace docent::ui {
@@ -32,11 +34,15 @@ class ContentLayer {
   struct What {
     double animation_seconds = 0;
     const std::map<std::string, double>* animation_starts = nullptr;  // See View.
-    bool markers = false;                                             // Where sounds are.
+    bool markers = false;                                             // Where sounds and occluders are.
     std::span<const std::string> faint =
         {};  // Hidden entities that are drawn all the same, faintly, by name.
     std::shared_ptr<const engine::SurfaceMesh> surfaces =
-        {};  // Content behind them is hidden; null: none is.
+        {};                 // Content behind them is hidden; null: none is.
+    bool occluders = true;  // Content behind those of the scene is hidden.
+    ModelLight light = {};  // On models.
+    bool shadows = true;    // Models and signposts cast them on the room.
+    GLuint video = 0;       // The image that is drawn over, as a texture of any size; 0: none.
   };
   // Composites the scene over the contents of `image`, an image target of the camera's size whose row 0 is
   // the top. Pixels that no content covers keep their exact values. Labels are not drawn (see label_board.h).
@@ -47,28 +53,55 @@ class ContentLayer {
   std::size_t cached_models() const { return mesh_drawer_.cached_models(); }
 
  private:
+  // Of the size of an atlas.
+  struct RoomTargets {
+    RoomTargets(int width_px, int height_px)
+        : content_depth(width_px, height_px),
+          surface_depth(width_px, height_px),
+          shadow(width_px, height_px, 1, false) {}
+    DepthTarget content_depth, surface_depth;
+    RenderTarget shadow;
+  };
   struct Lens {
     engine::CameraModel camera;
     LensWarp warp;  // Its lookup table was moved to the texture `lookup`.
     GlTexture lookup;
     std::unique_ptr<RenderTarget> atlas;
     std::vector<PixelRectangle> drawn;  // Rectangles of the atlas that are not transparent.
+    std::unique_ptr<RoomTargets> room;  // Null until it is needed.
   };
-  // Draws the prepared content into the lens's atlas. Returns the part of the image that the content may
-  // cover.
-  PixelRectangle DrawAtlas(const engine::Rigid3& camera_from_map, Lens* lens);
+  // A face of the lens with what is drawn into it.
+  struct Pass {
+    const LensFace* face;
+    PinholeView view;
+    PixelRectangle content, all;  // The content; the same with its shadows. In the atlas.
+  };
+  // The prepared content in the faces that it or its shadows may be seen in.
+  std::vector<Pass> PassesOf(const engine::Rigid3& camera_from_map, bool with_shadows,
+                             const Lens& lens) const;
+  // Draw the prepared content, and what hides it and where its shadows fall, into the lens's targets.
+  void DrawAtlas(const std::vector<Pass>& passes, const MeshDrawer::DepthRange& range,
+                 const ModelLight& light, Lens* lens);
+  void DrawRoom(const std::vector<Pass>& passes, const MeshDrawer::DepthRange& range, bool with_shadows,
+                Lens* lens);
   Lens& FindLens(const engine::CameraModel& camera);
   struct Drawn {
     std::vector<ModelInstance> plain, faint;
   };
   Drawn Instances(const content::Scene& scene, const Eigen::Vector3d& eye_in_map, const What& what);
+  // `opacity` below 1 is for what only an author sees, which casts no shadows.
   void Composite(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map,
-                 const std::vector<ModelInstance>& instances, double opacity, const RenderTarget& image);
+                 const std::vector<ModelInstance>& instances, double opacity, const What& what,
+                 const RenderTarget& image);
+  void BindForComposite(const Lens& lens, const MeshDrawer::DepthRange& range, double opacity,
+                        bool with_shadows, GLuint video);
 
   int samples_;
   MeshDrawer mesh_drawer_;
+  HidingSurfaces hiding_surfaces_;
   SurfaceDrawer surface_drawer_;
-  GlProgram warp_program_;
+  RoomShadows shadows_;
+  GlProgram warp_program_, room_warp_program_;
   GlVertexArray empty_vertex_array_;
   std::vector<std::unique_ptr<Lens>> lenses_;  // Ordered by use, the most recently used last.
   EntityShapes shapes_;

@@ -36,6 +36,11 @@ const char* SizeLabel(content::Entity::Kind kind) {
   return kind == content::Entity::Kind::kTrail ? strings::kWidth : strings::kSize;
 }
 
+// The number of sides that a person chooses.
+int SidesOf(const content::Occluder& occluder) {
+  return occluder.shape == content::Occluder::Shape::kBox ? 3 : 2;
+}
+
 // The first text of an entity, or its variant in a language, which is empty if there is none.
 std::string TextIn(const content::Entity& entity, const std::string& language) {
   const std::string* const text = content::TextOf(entity);
@@ -175,6 +180,7 @@ void EntitySection::Fill(const content::Entity& entity, const AuthoringFacts& fa
   name_ = entity.name;
   text_ = TextIn(entity, content::LanguageTag(language_));
   for (int i = 0; i < 3; ++i) offset_[i] = entity.label.offset[i];
+  for (int i = 0; i < 3; ++i) sides_[i] = entity.occluder.size[i];
   const Eigen::Vector3d direction = entity.signpost.direction.value_or(Eigen::Vector3d::Zero());
   for (int i = 0; i < 3; ++i) direction_[i] = direction[i];
   const engine::Sim3 pose = TransformOf(entity, facts.camera_from_map.OriginInSource());
@@ -249,6 +255,7 @@ void EntitySection::DrawLabelAndTrail(const content::Entity& entity) {
     const Eigen::Vector3d offset(offset_[0], offset_[1], offset_[2]);
     if (completed && offset.allFinite()) actions_->SetOffset(entity.name, offset);
   }
+  if (entity.kind == content::Entity::Kind::kOccluder) DrawOccluder(entity);
   if (entity.kind != content::Entity::Kind::kTrail) return;
   ImGui::Text(strings::kTrailPoints, static_cast<int>(entity.trail.points.size()));
   ImGui::BeginDisabled(entity.trail.points.size() <= content::kMinTrailPoints);
@@ -256,15 +263,26 @@ void EntitySection::DrawLabelAndTrail(const content::Entity& entity) {
   ImGui::EndDisabled();
 }
 
+void EntitySection::DrawOccluder(const content::Entity& entity) {
+  if (entity.occluder.shape == content::Occluder::Shape::kPolygon) return;
+  ImGui::BeginGroup();
+  const bool completed = NumberFields(strings::kSides, sides_, SidesOf(entity.occluder), "%.4g");
+  ImGui::EndGroup();
+  is_writing_ = ImGui::IsItemActive() || is_writing_;
+  const Eigen::Vector3d size(sides_[0], sides_[1], sides_[2]);
+  if (completed && size.allFinite()) actions_->SetOccluderSize(entity.name, size);
+}
+
 void EntitySection::DrawPose(const content::Entity& entity, const AuthoringFacts& facts) {
   ImGui::BeginGroup();
   bool completed = NumberFields(strings::kPosition, position_, 3, "%.4g");
-  if (content::HasModel(entity) || entity.kind == content::Entity::Kind::kTrail)
+  const bool has_axes = content::HasModel(entity) || entity.kind == content::Entity::Kind::kOccluder;
+  if (has_axes || entity.kind == content::Entity::Kind::kTrail)
     completed = NumberFields(strings::kRotation, angles_deg_, 3, "%.1f°") || completed;
   completed = NumberFields(SizeLabel(entity.kind), &size_, 1, "%.4g") || completed;
   ImGui::EndGroup();
   is_writing_ = ImGui::IsItemActive() || is_writing_;
-  if (content::HasModel(entity) && ImGui::Button(strings::kStandUpright)) {
+  if (has_axes && ImGui::Button(strings::kStandUpright)) {
     angles_deg_[1] = angles_deg_[2] = 0;
     completed = true;
   }

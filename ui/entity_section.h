@@ -25,6 +25,7 @@ class EntitySection {
   void DrawText(const content::Entity& entity);
   void DrawSignpost(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawLabelAndTrail(const content::Entity& entity);
+  void DrawOccluder(const content::Entity& entity);
   void DrawPose(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawButtons(const content::Entity& first, const AuthoringFacts& facts);
   // Copies what the fields show from the entity, unless it is being written.
@@ -35,7 +36,7 @@ class EntitySection {
   std::string shown_;  // The entity that the fields belong to.
   std::string name_, text_;
   std::string language_;  // Of the text that is shown; empty for the first one.
-  double offset_[3] = {}, direction_[3] = {};
+  double offset_[3] = {}, direction_[3] = {}, sides_[3] = {};
   double position_[3] = {}, angles_deg_[3] = {}, size_ = 1;
 };
 

@@ -2,6 +2,7 @@
 #include "ui/entity_shapes.h"
 
 #include "ui/label_board.h"
+#include "ui/occluder_model.h"
 #include "ui/signpost_model.h"
 #include "ui/sound_marker.h"
 #include "ui/trail_model.h"
@@ -15,6 +16,13 @@ std::vector<double> TrailKey(const content::Trail& trail) {
   for (const Eigen::Vector3d& point : trail.points) {
     for (const double coordinate : point - trail.points.front()) key.push_back(coordinate);
   }
+  return key;
+}
+
+std::vector<double> OccluderKey(const content::Occluder& occluder) {
+  const Eigen::Vector3d& size = occluder.size;
+  std::vector<double> key = {static_cast<double>(occluder.shape), size.x(), size.y(), size.z()};
+  for (const Eigen::Vector2d& point : occluder.outline) key.insert(key.end(), {point.x(), point.y()});
   return key;
 }
 
@@ -71,6 +79,10 @@ content::EntityShape EntityShapes::ShapeOf(const content::Entity& entity, const 
       pose.translation = content::PlaceOf(entity);
       return {Kept(&trails_, TrailKey(entity.trail), [&] { return MakeTrailModel(entity.trail); }), pose};
     }
+    case content::Entity::Kind::kOccluder: {
+      const auto make = [&] { return MakeOccluderModel(entity.occluder); };
+      return {Kept(&occluders_, OccluderKey(entity.occluder), make), entity.occluder.map_from_shape};
+    }
   }
   return {};
 }
@@ -87,6 +99,7 @@ void EntityShapes::EndFrame() {
   std::erase_if(signs_, is_old);
   std::erase_if(labels_, is_old);
   std::erase_if(trails_, is_old);
+  std::erase_if(occluders_, is_old);
   ++frame_;
 }
 

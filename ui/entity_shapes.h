@@ -40,7 +40,8 @@ class EntityShapes {
   // `language`: that of the reader, for texts that have variants (content::TextFor).
   explicit EntityShapes(std::string language = {}) : language_(std::move(language)) {}
 
-  // What is drawn of an entity for a reader at eye_in_map: of a label its board, of a sound its marker.
+  // What is drawn of an entity for a reader at eye_in_map: of a label its board, of a sound and an
+  // occluder what authors see of them.
   content::EntityShape ShapeOf(const content::Entity& entity, const Eigen::Vector3d& eye_in_map);
   // The arrow of a signpost with a direction, which is drawn beside its shape; without a model for what has
   // none.
@@ -67,7 +68,7 @@ class EntityShapes {
   content::BentModels bent_models_;
   std::map<std::pair<std::string, std::string>, Shape> signs_;  // By text and target map.
   std::map<std::string, Shape> labels_;                         // By text.
-  std::map<std::vector<double>, Shape> trails_;                 // By all numbers of their shape.
+  std::map<std::vector<double>, Shape> trails_, occluders_;     // By all numbers of their shape.
   std::uint64_t frame_ = 0;
 };
 

@@ -118,6 +118,34 @@ void RenderTarget::Resolve(int x, int y, int width, int height) const {
                     GL_NEAREST);
 }
 
+void RenderTarget::CopyDepth(int x, int y, int width, int height, const DepthTarget& target) const {
+  glBindFramebuffer(GL_READ_FRAMEBUFFER,
+                    samples_ > 1 ? multisampled_framebuffer_.name() : framebuffer_.name());
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer());
+  glBlitFramebuffer(x, y, x + width, y + height, x, y, x + width, y + height, GL_DEPTH_BUFFER_BIT,
+                    GL_NEAREST);
+}
+
+DepthTarget::DepthTarget(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {
+  glBindTexture(GL_TEXTURE_2D, texture_.name());
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT24, width_px, height_px, 0, GL_DEPTH_COMPONENT,
+               GL_UNSIGNED_INT, nullptr);
+  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+    glTexParameteri(GL_TEXTURE_2D, filter, GL_NEAREST);
+  for (const GLenum direction : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+    glTexParameteri(GL_TEXTURE_2D, direction, GL_CLAMP_TO_EDGE);
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, texture_.name(), 0);
+  glDrawBuffer(GL_NONE);
+  glReadBuffer(GL_NONE);
+  CheckFramebuffer(width_px, height_px);
+}
+
+void DepthTarget::BindForDrawing() const {
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
+  glViewport(0, 0, width_px_, height_px_);
+}
+
 void DrawFullScreenTriangle() {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }

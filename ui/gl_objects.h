@@ -92,6 +92,8 @@ class GlProgram {
   mutable std::unordered_map<std::string, GLint> locations_;
 };
 
+class DepthTarget;
+
 // A colour (RGBA8) and depth buffer to draw into, whose result is available as a texture. With samples > 1,
 // drawing goes to multisampled buffers and Resolve averages them into the texture.
 class RenderTarget {
@@ -105,6 +107,8 @@ class RenderTarget {
   void BindForDrawing() const;
   // Resolves what was drawn inside this rectangle (OpenGL's origin at the bottom left) into texture().
   void Resolve(int x, int y, int width, int height) const;
+  // Copies the depths inside this rectangle; of several samples, one counts. The target has the same size.
+  void CopyDepth(int x, int y, int width, int height, const DepthTarget& target) const;
   GLuint texture() const { return texture_.name(); }
   // The framebuffer whose colour attachment is texture().
   GLuint readable_framebuffer() const { return framebuffer_.name(); }
@@ -115,6 +119,22 @@ class RenderTarget {
   GlFramebuffer framebuffer_;
   GlFramebuffer multisampled_framebuffer_;
   GlRenderbuffer multisampled_color_, depth_;
+};
+
+// Depths to draw into, which are available as a texture: 0 at the near plane, 1 at the far plane and where
+// nothing was drawn.
+class DepthTarget {
+ public:
+  DepthTarget(int width_px, int height_px);
+  // Binds the framebuffer for drawing and sets the viewport to all of it.
+  void BindForDrawing() const;
+  GLuint texture() const { return texture_.name(); }
+  GLuint framebuffer() const { return framebuffer_.name(); }
+
+ private:
+  int width_px_, height_px_;
+  GlTexture texture_;
+  GlFramebuffer framebuffer_;
 };
 
 // Draws one triangle that covers the whole viewport. Use it with kFullScreenVertexShader.

@@ -267,7 +267,8 @@ void MapView::Draw(const engine::MapSnapshot& map, const Orbit& orbit, const Map
   if (contents.boundary) drawing.Box(*contents.boundary);
   impl_->below.End();
   if (contents.scene != nullptr)
-    impl_->content.Draw(impl_->camera, camera_from_map, *contents.scene, {.markers = true}, target);
+    impl_->content.Draw(impl_->camera, camera_from_map, *contents.scene,
+                        {.markers = true, .occluders = false, .shadows = false}, target);
   impl_->above.Begin(width_px, height_px);
   if (contents.camera_from_map)
     Drawing(impl_->camera, camera_from_map, &impl_->above).Camera(orbit, *contents.camera_from_map);

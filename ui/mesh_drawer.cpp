@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 #include "ui/shaders.h"
 
@@ -80,7 +81,11 @@ bool IsVisible(const glm::vec3& center, float radius, const TangentBounds& bound
 }  // namespace
 
 MeshDrawer::MeshDrawer(int max_texture_px)
-    : cache_(max_texture_px), program_("mesh", kMeshVertexShader, kMeshFragmentShader) {
+    : cache_(max_texture_px),
+      program_("mesh", kMeshVertexShader, kMeshFragmentShader),
+      depth_program_("mesh depth", kMeshVertexShader, kSurfaceFragmentShader) {
+  depth_program_.Use();
+  glUniform1i(depth_program_.Uniform("joint_columns"), kJointUnit);
   program_.AssignTextureUnits({kSlots[0].sampler, kSlots[1].sampler, kSlots[2].sampler, kSlots[3].sampler,
                                kSlots[4].sampler, kSlots[5].sampler, "joint_columns"});
   const std::uint32_t white = 0xFFFFFFFFu;
@@ -91,6 +96,7 @@ void MeshDrawer::Prepare(std::span<const ModelInstance> instances, const glm::ve
   up_in_map_ = up_in_map;
   items_.clear();
   joints_.clear();
+  casters_.clear();
   cache_.Sweep();
   for (const ModelInstance& instance : instances) AddInstance(instance);
   if (joints_.empty()) joints_.emplace_back(1.0f);  // A sampler needs a non-empty buffer.
@@ -108,12 +114,21 @@ void MeshDrawer::AddInstance(const ModelInstance& instance) {
       instance.animation < static_cast<int>(model.animations.size()) ? std::max(instance.animation, -1) : -1;
   const std::vector<glm::mat4> nodes = content::NodeMatrices(model, animation, instance.seconds);
   std::vector<int> open(model.roots.begin(), model.roots.end());
+  const std::size_t first_item = items_.size();
   while (!open.empty()) {
     const int node = open.back();
     open.pop_back();
     open.insert(open.end(), model.nodes[node].children.begin(), model.nodes[node].children.end());
     if (model.nodes[node].mesh >= 0) AddNode(instance, nodes, node);
   }
+  if (!instance.casts_shadow || items_.size() == first_item) return;
+  Caster caster{{}, instance.base, instance.up};
+  for (std::size_t i = first_item; i < items_.size(); ++i) {
+    items_[i].casts_shadow = true;
+    caster.box.Include(items_[i].box.low);
+    caster.box.Include(items_[i].box.high);
+  }
+  casters_.push_back(caster);
 }
 
 void MeshDrawer::AddNode(const ModelInstance& instance, const std::vector<glm::mat4>& nodes, int node_index) {
@@ -165,41 +180,96 @@ MeshDrawer::Cover MeshDrawer::Covered(const PinholeView& view) const {
   Cover cover;
   for (const Item& item : items_) {
     if (!IsVisible(item.center, item.radius, view.bounds, eye_from_map)) continue;
-    for (int i = 0; i < 8; ++i) {
-      const glm::vec3 eye(eye_from_map * glm::vec4(item.box.Corner(i), 1.0f));
-      // A box that reaches behind the camera may cover the whole view.
-      if (-eye.z <= 0.01f * item.radius) return {glm::vec2(0.0f), glm::vec2(1.0f)};
-      const glm::vec2 place = GlTextureFromTangent(view.bounds, eye.x / -eye.z, -eye.y / -eye.z);
-      cover.low = glm::min(cover.low, place);
-      cover.high = glm::max(cover.high, place);
-    }
+    const Cover one = CoverOf(item.box, view);
+    cover.low = glm::min(cover.low, one.low);
+    cover.high = glm::max(cover.high, one.high);
+  }
+  return cover;
+}
+
+MeshDrawer::Cover MeshDrawer::CoverOf(const Box& box, const PinholeView& view) {
+  const glm::mat4 eye_from_map = GlEyeFromMap(view.camera_from_map);
+  const float radius = 0.5f * glm::length(box.high - box.low);
+  if (!IsVisible(0.5f * (box.low + box.high), radius, view.bounds, eye_from_map)) return {};
+  Cover cover;
+  for (int i = 0; i < 8; ++i) {
+    const glm::vec3 eye(eye_from_map * glm::vec4(box.Corner(i), 1.0f));
+    // A box that reaches behind the camera may cover the whole view.
+    if (-eye.z <= 0.01f * radius) return {glm::vec2(0.0f), glm::vec2(1.0f)};
+    const glm::vec2 place = GlTextureFromTangent(view.bounds, eye.x / -eye.z, -eye.y / -eye.z);
+    cover.low = glm::min(cover.low, place);
+    cover.high = glm::max(cover.high, place);
   }
   cover.low = glm::max(cover.low, glm::vec2(0.0f));
   cover.high = glm::min(cover.high, glm::vec2(1.0f));
   return cover;
 }
 
-void MeshDrawer::Draw(const PinholeView& view, const SurfaceDrawer& surfaces) {
+void MeshDrawer::DepthRange::Include(double depth, double radius) {
+  nearest = std::min(nearest, depth - radius);
+  farthest = std::max(farthest, depth + radius);
+}
+
+double MeshDrawer::DepthRange::near_m() const {
+  return std::max(nearest * 0.99, far_m() / kMaxDepthRatio);
+}
+
+glm::mat4 MeshDrawer::DepthRange::ClipFromMap(const PinholeView& view) const {
+  return GlClipFromGlEye(view.bounds, near_m(), far_m()) * GlEyeFromMap(view.camera_from_map);
+}
+
+void MeshDrawer::AddDepths(const PinholeView& view, DepthRange* range) const {
+  const glm::mat4 eye_from_map = GlEyeFromMap(view.camera_from_map);
+  for (const Item& item : items_) {
+    if (!IsVisible(item.center, item.radius, view.bounds, eye_from_map)) continue;
+    const auto depth = static_cast<double>(-(eye_from_map * glm::vec4(item.center, 1.0f)).z);
+    range->Include(depth, static_cast<double>(item.radius));
+  }
+}
+
+void MeshDrawer::CastersIn(std::span<const PinholeView> views, std::vector<Caster>* casters) const {
+  // A shadow reaches about this far, in radii of its caster.
+  constexpr float kReach = 4.0f;
+  casters->clear();
+  for (const Caster& caster : casters_) {
+    const float radius = 0.5f * glm::length(caster.box.high - caster.box.low);
+    const bool is_seen = std::any_of(views.begin(), views.end(), [&](const PinholeView& view) {
+      return IsVisible(0.5f * (caster.box.low + caster.box.high), kReach * radius, view.bounds,
+                       GlEyeFromMap(view.camera_from_map));
+    });
+    if (is_seen) casters->push_back(caster);
+  }
+}
+
+void MeshDrawer::DrawDepth(const glm::mat4& clip_from_map, Part part) const {
+  depth_program_.Use();
+  glUniformMatrix4fv(depth_program_.Uniform("clip_from_map"), 1, GL_FALSE, &clip_from_map[0][0]);
+  glActiveTexture(GL_TEXTURE0 + kJointUnit);
+  glBindTexture(GL_TEXTURE_BUFFER, joint_texture_.name());
+  for (const Item& item : items_) {
+    if (part == Part::kCasters ? !item.casts_shadow : !IsSeenThrough(*item.material)) continue;
+    glUniformMatrix4fv(depth_program_.Uniform("map_from_mesh"), 1, GL_FALSE, &item.map_from_mesh[0][0]);
+    glUniform1i(depth_program_.Uniform("first_joint"), item.first_joint);
+    glBindVertexArray(item.primitive->vertex_array.name());
+    glDrawElements(GL_TRIANGLES, item.primitive->index_count, GL_UNSIGNED_INT, nullptr);
+  }
+  glBindVertexArray(0);
+}
+
+void MeshDrawer::Draw(const PinholeView& view, const DepthRange& range, const ModelLight& light) {
   const glm::mat4 eye_from_map = GlEyeFromMap(view.camera_from_map);
   struct Visible {
     const Item* item;
     float depth;  // Depth of the bounding sphere's centre.
   };
   std::vector<Visible> opaque, blended;
-  double nearest = 1e30, farthest = 0;
   for (const Item& item : items_) {
     if (!IsVisible(item.center, item.radius, view.bounds, eye_from_map)) continue;
     const float depth = -(eye_from_map * glm::vec4(item.center, 1.0f)).z;
-    nearest = std::min(nearest, static_cast<double>(depth - item.radius));
-    farthest = std::max(farthest, static_cast<double>(depth + item.radius));
     (IsSeenThrough(*item.material) ? blended : opaque).push_back({&item, depth});
   }
   if (opaque.empty() && blended.empty()) return;
-  farthest *= 1.01;
-  const double near_m = std::max(nearest * 0.99, farthest / kMaxDepthRatio);
-  const glm::mat4 clip_from_map = GlClipFromGlEye(view.bounds, near_m, farthest) * eye_from_map;
-  surfaces.Draw(clip_from_map, GlmFrom(view.camera_from_map.OriginInSource()));
-  SetScene(view, clip_from_map);
+  SetScene(view, range.ClipFromMap(view), light);
 
   const auto nearer = [](const Visible& a, const Visible& b) { return a.depth < b.depth; };
   std::stable_sort(opaque.begin(), opaque.end(),
@@ -221,7 +291,23 @@ void MeshDrawer::Draw(const PinholeView& view, const SurfaceDrawer& surfaces) {
   glBindVertexArray(0);
 }
 
-void MeshDrawer::SetScene(const PinholeView& view, const glm::mat4& clip_from_map) {
+void MeshDrawer::SetLight(const ModelLight& light) {
+  glUniform1i(program_.Uniform("light_is_known"), light.room != nullptr);
+  glUniform3fv(program_.Uniform("exposure"), 1, &light.exposure[0]);
+  glm::vec3 to_light = DirectionToLight(up_in_map_), radiance = kLightRadiance;
+  if (light.room != nullptr) {
+    to_light = GlmFrom(light.room->to_light);
+    // A white surface that faces the light is as bright as the light's radiance over pi.
+    radiance = glm::vec3(static_cast<float>(light.room->direct * std::numbers::pi));
+    const Eigen::Matrix<float, 9, 1> brightness = light.room->brightness.cast<float>();
+    glUniform1fv(program_.Uniform("room_brightness"), 9, brightness.data());
+    glUniform1f(program_.Uniform("direct"), static_cast<float>(light.room->direct));
+  }
+  glUniform3fv(program_.Uniform("direction_to_light"), 1, &to_light[0]);
+  glUniform3fv(program_.Uniform("light_radiance"), 1, &radiance[0]);
+}
+
+void MeshDrawer::SetScene(const PinholeView& view, const glm::mat4& clip_from_map, const ModelLight& light) {
   program_.Use();
   const auto set_vector = [&](const char* name, const glm::vec3& v) {
     glUniform3fv(program_.Uniform(name), 1, &v[0]);
@@ -229,10 +315,9 @@ void MeshDrawer::SetScene(const PinholeView& view, const glm::mat4& clip_from_ma
   glUniformMatrix4fv(program_.Uniform("clip_from_map"), 1, GL_FALSE, &clip_from_map[0][0]);
   set_vector("eye_in_map", GlmFrom(view.camera_from_map.OriginInSource()));
   set_vector("up_in_map", up_in_map_);
-  set_vector("direction_to_light", DirectionToLight(up_in_map_));
-  set_vector("light_radiance", kLightRadiance);
   set_vector("sky_radiance", kSkyRadiance);
   set_vector("floor_radiance", kFloorRadiance);
+  SetLight(light);
   glActiveTexture(GL_TEXTURE0 + kJointUnit);
   glBindTexture(GL_TEXTURE_BUFFER, joint_texture_.name());
 }

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "content/model.h"
+#include "engine/dense/light_estimate.h"
 #include "ui/axes.h"
 #include "ui/gl_objects.h"
 #include "ui/model_resources.h"
-#include "ui/surface_drawer.h"
 
 namespace docent::ui {
 
@@ -21,6 +21,15 @@ struct ModelInstance {
   glm::mat4 map_from_model{1.0f};
   int animation = -1;
   double seconds = 0;
+  // Whether it casts shadows, and the plane that it stands on: a point and the direction of up in the map.
+  bool casts_shadow = false;
+  glm::vec3 base{0.0f}, up{0.0f, -1.0f, 0.0f};
+};
+
+// The light on the drawn models; by default that of a bright room, whose direction is not known.
+struct ModelLight {
+  const engine::LightEstimate* room = nullptr;  // Null where it is not known.
+  glm::vec3 exposure{1.0f};  // Of the video, by colour, relative to that for which the light is given.
 };
 
 // A pinhole camera with its pose in the map.
@@ -45,9 +54,34 @@ class MeshDrawer {
     bool empty() const { return low.x >= high.x || low.y >= high.y; }
   };
   Cover Covered(const PinholeView& view) const;
-  // Draws the prepared instances into the current viewport, where the surfaces, drawn first, do not hide
-  // them. The depth range is fitted to the instances.
-  void Draw(const PinholeView& view, const SurfaceDrawer& surfaces);
+  // The same of a box in the map.
+  static Cover CoverOf(const Box& box, const PinholeView& view);
+  // The depths between which the prepared instances lie; the nearest is not closer than the precision of a
+  // depth buffer allows.
+  struct DepthRange {
+    double nearest = 1e30, farthest = 0;
+    bool empty() const { return farthest <= 0; }
+    void Include(double depth, double radius);
+    glm::mat4 ClipFromMap(const PinholeView& view) const;
+    double near_m() const;
+    double far_m() const { return 1.01 * farthest; }
+  };
+  // Adds those that may be visible.
+  void AddDepths(const PinholeView& view, DepthRange* range) const;
+  // Draws the prepared instances into the current viewport.
+  void Draw(const PinholeView& view, const DepthRange& range, const ModelLight& light);
+
+  // An instance that casts a shadow.
+  struct Caster {
+    Box box;             // In the map.
+    glm::vec3 base, up;  // The plane that it stands on.
+  };
+  // Those whose shadow may be visible in one of the views.
+  void CastersIn(std::span<const PinholeView> views, std::vector<Caster>* casters) const;
+  // Which of the prepared instances DrawDepth draws.
+  enum class Part { kCasters, kSeenThrough };
+  // Draws depths alone, from both sides.
+  void DrawDepth(const glm::mat4& clip_from_map, Part part) const;
   // The number of models that hold graphics memory.
   std::size_t cached_models() const { return cache_.size(); }
 
@@ -62,23 +96,26 @@ class MeshDrawer {
     Box box;                 // In the map.
     glm::vec3 center{0.0f};  // Centre of the box's bounding sphere.
     float radius = 0;
+    bool casts_shadow = false;
   };
 
   void AddInstance(const ModelInstance& instance);
   void AddNode(const ModelInstance& instance, const std::vector<glm::mat4>& nodes, int node_index);
   int AddJoints(const ModelInstance& instance, const std::vector<glm::mat4>& nodes, int skin_index);
-  void SetScene(const PinholeView& view, const glm::mat4& clip_from_map);
+  void SetScene(const PinholeView& view, const glm::mat4& clip_from_map, const ModelLight& light);
+  void SetLight(const ModelLight& light);
   void DrawItem(const Item& item);
   void SetMaterial(const Item& item);
   void SetTexture(const Item& item, int unit, const content::TextureUse& use);
 
   ModelCache cache_;
-  GlProgram program_;
+  GlProgram program_, depth_program_;
   GlTexture white_;
   GlBuffer joint_buffer_;
   GlTexture joint_texture_;
   std::vector<glm::mat4> joints_;
   std::vector<Item> items_;
+  std::vector<Caster> casters_;  // Of the prepared instances.
   glm::vec3 up_in_map_{0.0f, -1.0f, 0.0f};
 };
 

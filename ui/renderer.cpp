@@ -14,6 +14,7 @@
 #include "ui/label_board.h"
 #include "ui/letterbox.h"
 #include "ui/theme.h"
+#include "ui/video_exposure.h"
 #include "ui/visitor_display.h"
 
 namespace docent::ui {
@@ -98,9 +99,10 @@ struct Renderer::Impl {
     if (!inset_content) inset_content = std::make_unique<ContentLayer>(1, max_texture_px, language);
     const RenderTarget& target = inset_image.Bind(inset.width, inset.height);
     inset_image.DrawVideo(other.frame.image);
-    inset_content->Draw(ScaledTo(*view.overlay.inset_camera, inset.width, inset.height),
-                        other.camera_from_map, *view.overlay.inset_scene,
-                        {view.animation_seconds, view.animation_starts, false, {}, nullptr}, target);
+    inset_content->Draw(
+        ScaledTo(*view.overlay.inset_camera, inset.width, inset.height), other.camera_from_map,
+        *view.overlay.inset_scene,
+        {.animation_seconds = view.animation_seconds, .animation_starts = view.animation_starts}, target);
     image.CopyInto(inset_image, inset);
   }
   // Where the other camera is, in words below its image.
@@ -149,6 +151,7 @@ struct Renderer::Impl {
   std::unique_ptr<ContentLayer> inset_content;  // Made for the first inset with content.
   CardModel card_model;
   GLuint card_texture = 0;
+  VideoExposure exposure;
   Canvas canvas;
   Canvas window_canvas;
 };
@@ -175,11 +178,21 @@ void Renderer::Draw(const View& view) {
   }
   const bool has_pose = view.camera != nullptr && tracked != nullptr && engine::HasPose(tracked->state);
   const engine::Rigid3* const drawn_from = DrawnFrom(view);
-  if (drawn_from != nullptr && view.scene != nullptr)
-    impl_->content.Draw(
-        impl_->DrawnCamera(*view.camera, width_px, height_px), *drawn_from, *view.scene,
-        {view.animation_seconds, view.animation_starts, view.overlay.markers, view.faint, view.surfaces},
-        target);
+  if (drawn_from != nullptr && view.scene != nullptr) {
+    ContentLayer::What what;
+    what.animation_seconds = view.animation_seconds;
+    what.animation_starts = view.animation_starts;
+    what.markers = view.overlay.markers;
+    what.faint = view.faint;
+    what.surfaces = view.surfaces;
+    what.occluders = view.occluders;
+    what.light.room = view.light;
+    if (view.follows_exposure) what.light.exposure = impl_->exposure.Update(tracked);
+    what.shadows = view.shadows;
+    if (!image.empty() && view.shows_video) what.video = impl_->image.video();
+    impl_->content.Draw(impl_->DrawnCamera(*view.camera, width_px, height_px), *drawn_from, *view.scene, what,
+                        target);
+  }
 
   // In the camera's pixels, whatever the size of the target.
   impl_->canvas.Begin(camera_width, camera_height);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "content/scene.h"
+#include "engine/dense/light_estimate.h"
 #include "engine/dense/surface_mesh.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/tracking/tracked_frame.h"
@@ -121,8 +122,14 @@ struct View {
   // frame must have a pose, or a held one.
   const engine::Rigid3* seen_from_map = nullptr;
   bool shows_video = true;  // False: the content is on black, as see-through displays need it.
-  // What hides content behind it, in the map of the scene; null: nothing does.
+  // Surfaces of the map of the scene that hide content behind them; null: none do.
   std::shared_ptr<const engine::SurfaceMesh> surfaces;
+  // The light in the map of the scene; null where it is not known.
+  const engine::LightEstimate* light = nullptr;
+  bool shadows = true;           // Models and signposts cast them on the room.
+  bool follows_exposure = true;  // Models are as bright as the video is exposed.
+  // Whether the occluders of the scene hide content behind them. Surfaces that they stand for then do not.
+  bool occluders = true;
   // Names of hidden entities that are drawn all the same, faintly, because an author has selected them.
   std::span<const std::string> faint = {};
   double animation_seconds = 0;  // Time of the animations of the models, which repeat.

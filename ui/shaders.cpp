@@ -117,6 +117,12 @@ uniform vec3 eye_in_map;
 uniform vec3 up_in_map;
 uniform vec3 direction_to_light;  // Unit vector in the map.
 uniform vec3 light_radiance, sky_radiance, floor_radiance;
+// Of the room, where it is known: the brightness of white surfaces by their normal, as spherical harmonics, and
+// the part of it that comes from the main light.
+uniform bool light_is_known;
+uniform float room_brightness[9];
+uniform float direct;
+uniform vec3 exposure;  // Of the video relative to that for which the light is given.
 out vec4 color;
 const float kPi = 3.14159265;
 
@@ -161,6 +167,16 @@ vec3 Normal() {
 
 // The radiance of the environment in a direction, blurred by the roughness of the reflecting surface.
 vec3 EnvironmentRadiance(vec3 direction, float blur) {
+  if (light_is_known) {
+    vec3 d = direction;
+    float all = room_brightness[0] + room_brightness[1] * d.y + room_brightness[2] * d.z +
+                room_brightness[3] * d.x + room_brightness[4] * d.x * d.y + room_brightness[5] * d.y * d.z +
+                room_brightness[6] * (3.0 * d.z * d.z - 1.0) + room_brightness[7] * d.x * d.z +
+                room_brightness[8] * (d.x * d.x - d.y * d.y);
+    // Without the main light, as far as the harmonics contain it.
+    float x = dot(d, direction_to_light);
+    return vec3(max(all - direct * (0.25 + 0.5 * x + 0.15625 * (3.0 * x * x - 1.0)), 0.0));
+  }
   float height = dot(direction, up_in_map);
   float width = mix(0.08, 1.0, blur);
   vec3 sky = sky_radiance * mix(1.25, 0.85, smoothstep(0.0, 0.9, height));
@@ -222,20 +238,17 @@ void main() {
   // Light from behind takes the place of the diffuse part (KHR_materials_transmission); metals let none pass.
   float passing = transmission * (1.0 - metal);
   if (transmission_use.used) passing *= texture(transmission_map, Place(transmission_use)).r;
-  vec3 opaque = Encode(Compress(shaded.diffuse + shaded.specular + glow));
-  vec3 clear = Encode(Compress(shaded.specular + glow));
+  vec3 opaque = Encode(Compress(exposure * (shaded.diffuse + shaded.specular + glow)));
+  vec3 clear = Encode(Compress(exposure * (shaded.specular + glow)));
   color = vec4(mix(opaque, clear, passing) * alpha, alpha * (1.0 - passing));
 }
 )glsl";
 
-// Moves each point away from the eye along its own ray, so that its pixel stays the same.
 const char* const kSurfaceVertexShader = R"glsl(#version 330 core
 layout(location = 0) in vec3 position_in_map;
 uniform mat4 clip_from_map;
-uniform vec3 eye_in_map;
-uniform float depth_bias;
 void main() {
-  gl_Position = clip_from_map * vec4(position_in_map + depth_bias * (position_in_map - eye_in_map), 1.0);
+  gl_Position = clip_from_map * vec4(position_in_map, 1.0);
 }
 )glsl";
 

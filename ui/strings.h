@@ -90,6 +90,7 @@ inline constexpr const char* kToolLabel = "Label";
 inline constexpr const char* kToolImage = "Image";
 inline constexpr const char* kToolSound = "Sound";
 inline constexpr const char* kToolTrail = "Trail";
+inline constexpr const char* kToolOccluder = "Occluder";
 inline constexpr const char* kImageFileHint = "Image file (PNG, JPEG)";
 inline constexpr const char* kSoundFileHint = "Sound file (WAV, FLAC, Ogg)";
 inline constexpr const char* kUpright = "Upright, facing me";
@@ -102,6 +103,12 @@ inline constexpr const char* kClickToPlaceTrail =
 inline constexpr const char* kWriteCaption = "Write its caption first.";
 inline constexpr const char* kChooseImage = "Choose an image file first.";
 inline constexpr const char* kChooseSound = "Choose a sound file first.";
+inline constexpr const char* kClickToPlaceOccluder =
+    "Click on the surface on which the real thing stands. What is behind the shape is hidden; visitors do "
+    "not see it.";
+inline constexpr const char* kShapePlane = "Plane";
+inline constexpr const char* kShapeBox = "Box";
+inline constexpr const char* kShapeCylinder = "Cylinder";
 inline constexpr const char* kTrailBegun = "The trail begins here; click on its next point.";
 inline constexpr const char* kModelFile = "Model file";
 inline constexpr const char* kModelFileHint = "FILE.glb";
@@ -147,6 +154,8 @@ constexpr const char* NameOf(content::Entity::Kind kind) {
       return "sound";
     case content::Entity::Kind::kTrail:
       return "trail";
+    case content::Entity::Kind::kOccluder:
+      return "occluder";
   }
   return "";
 }
@@ -172,6 +181,7 @@ inline constexpr const char* kLeaveHereHelp = "The arrow points where the camera
 inline constexpr const char* kRemoveArrow = "Remove arrow";
 inline constexpr const char* kLanguageHint = "Language of the text: de, es, …";
 inline constexpr const char* kNoLanguage = "This is no language tag.";
+inline constexpr const char* kSides = "Width, height, depth";
 inline constexpr const char* kTrailPoints = "%d points";
 inline constexpr const char* kRemoveLastPoint = "Remove last point";
 inline constexpr const char* kDuplicate = "Duplicate";
@@ -246,7 +256,7 @@ inline constexpr KeyHelp kKeyHelp[] = {
     {"Shift-arrows", "move the pointer; Ctrl-arrows slowly"},
     {"Enter", "click"},
     {"1 to 7", "the tools, in their order"},
-    {"4, 5, 6, 7", "label, image, sound, trail"},
+    {"4, 5, 6, 7, 8", "label, image, sound, trail, occluder"},
     {"Delete", "remove"},
     {"Ctrl-D", "duplicate"},
     {"Ctrl-C, Ctrl-V", "copy, paste"},

@@ -15,20 +15,28 @@ constexpr std::uint64_t kSurfaceLifeFrames = 300;
 
 SurfaceDrawer::SurfaceDrawer() : program_("surface", kSurfaceVertexShader, kSurfaceFragmentShader) {}
 
-void SurfaceDrawer::Prepare(std::shared_ptr<const engine::SurfaceMesh> mesh) {
-  ++frame_;
-  selected_ = nullptr;
-  if (mesh != nullptr && !mesh->empty()) {
-    Resources& resources = cache_[mesh.get()];
-    if (resources.mesh == nullptr) {
-      resources.mesh = std::move(mesh);
-      Upload(&resources);
-    }
-    resources.last_frame = frame_;
-    selected_ = &resources;
+const SurfaceDrawer::Resources* SurfaceDrawer::Select(
+    const std::shared_ptr<const engine::SurfaceMesh>& mesh) {
+  if (mesh == nullptr || mesh->empty()) return nullptr;
+  Resources& resources = cache_[mesh.get()];
+  if (resources.mesh == nullptr) {
+    resources.mesh = mesh;
+    Upload(&resources);
   }
-  std::erase_if(cache_,
-                [&](const auto& entry) { return entry.second.last_frame + kSurfaceLifeFrames < frame_; });
+  resources.last_frame = frame_;
+  return &resources;
+}
+
+void SurfaceDrawer::Prepare(const HidingSurfaces::Surfaces& surfaces) {
+  ++frame_;
+  measured_ = Select(surfaces.measured);
+  placed_ = Select(surfaces.placed);
+  // What only the cache still holds, as while an author drags an occluder, does not come back.
+  std::erase_if(cache_, [&](const auto& entry) {
+    const bool is_held = entry.second.mesh.use_count() > 1;
+    return entry.second.last_frame < frame_ &&
+           (!is_held || entry.second.last_frame + kSurfaceLifeFrames < frame_);
+  });
 }
 
 void SurfaceDrawer::Upload(Resources* resources) {
@@ -47,24 +55,23 @@ void SurfaceDrawer::Upload(Resources* resources) {
   glBindVertexArray(0);
 }
 
-void SurfaceDrawer::Draw(const glm::mat4& clip_from_map, const glm::vec3& eye_in_map) const {
-  if (selected_ == nullptr) return;
+void SurfaceDrawer::Draw(const glm::mat4& clip_from_map) const {
+  if (empty()) return;
   program_.Use();
   glUniformMatrix4fv(program_.Uniform("clip_from_map"), 1, GL_FALSE, &clip_from_map[0][0]);
-  glUniform3fv(program_.Uniform("eye_in_map"), 1, &eye_in_map[0]);
-  glUniform1f(program_.Uniform("depth_bias"), kDepthBias);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LEQUAL);
   glDepthMask(GL_TRUE);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
   glEnable(GL_DEPTH_CLAMP);
-  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-  glBindVertexArray(selected_->vertex_array.name());
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * selected_->mesh->triangles.size()), GL_UNSIGNED_INT,
-                 nullptr);
+  for (const Resources* const surfaces : {measured_, placed_}) {
+    if (surfaces == nullptr) continue;
+    glBindVertexArray(surfaces->vertex_array.name());
+    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * surfaces->mesh->triangles.size()), GL_UNSIGNED_INT,
+                   nullptr);
+  }
   glBindVertexArray(0);
-  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   glDisable(GL_DEPTH_CLAMP);
   glDisable(GL_DEPTH_TEST);
 }

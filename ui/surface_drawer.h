@@ -8,25 +8,22 @@
 
 #include "engine/dense/surface_mesh.h"
 #include "ui/gl_objects.h"
+#include "ui/hiding_surfaces.h"
 
 namespace docent::ui {
 
-// Draws the surfaces of a map into the depth buffer alone, so that they hide content behind them. Meshes stay
+// Draws the surfaces that hide content into the bound depth buffer. Meshes stay
 // on the graphics card while they are drawn. Single thread, single context.
 class SurfaceDrawer {
  public:
-  // Surfaces are drawn this much farther from the camera than they are, relative to their distance, because
-  // content stands on them: nine tenths of the depths that maps measure are off by less
-  // (docs/decisions/dense-surfaces.md).
-  static constexpr float kDepthBias = 0.02F;
-
   SurfaceDrawer();
 
-  // Selects the surfaces of this frame; null for none.
-  void Prepare(std::shared_ptr<const engine::SurfaceMesh> mesh);
-  // Draws the selected surfaces. They hide content however near they are, because they are not cut off at the
-  // near plane.
-  void Draw(const glm::mat4& clip_from_map, const glm::vec3& eye_in_map) const;
+  // Selects the surfaces of this frame.
+  void Prepare(const HidingSurfaces::Surfaces& surfaces);
+  bool empty() const { return measured_ == nullptr && placed_ == nullptr; }
+  // Draws the depths of the selected surfaces. They are not cut off at the near plane, because they hide
+  // content however near they are.
+  void Draw(const glm::mat4& clip_from_map) const;
 
  private:
   struct Resources {
@@ -35,11 +32,12 @@ class SurfaceDrawer {
     GlBuffer vertices, triangles;
     std::uint64_t last_frame = 0;
   };
+  const Resources* Select(const std::shared_ptr<const engine::SurfaceMesh>& mesh);
   static void Upload(Resources* resources);
 
   GlProgram program_;
   std::map<const engine::SurfaceMesh*, Resources> cache_;
-  const Resources* selected_ = nullptr;
+  const Resources *measured_ = nullptr, *placed_ = nullptr;  // Null for none.
   std::uint64_t frame_ = 0;
 };
 

@@ -172,7 +172,7 @@ void AuthorControls::HandleKey(const ui::InputEvent& event) {
     if (event.key == "down") pointer_.Nudge(view_, 0, -1);
   }
   if (event.repeated) return;
-  if (event.key.size() == 1 && event.key[0] >= '1' && event.key[0] <= '7')
+  if (event.key.size() == 1 && event.key[0] >= '1' && event.key[0] <= '8')
     choices.tool = static_cast<ui::AuthoringTool>(event.key[0] - '1');  // In their order.
   if (event.key == "space" && !gui_.IsNavigated()) host_.toggle_pause();
   if (event.key == "c") host_.swap_cameras();

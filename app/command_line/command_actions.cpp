@@ -59,6 +59,10 @@ void CommandActions::SetOffset(const std::string& name, const Eigen::Vector3d& o
   emit_(SetLabelOffset{name, offset});
 }
 
+void CommandActions::SetOccluderSize(const std::string& name, const Eigen::Vector3d& size) {
+  emit_(app::ResizeOccluder{name, size});
+}
+
 void CommandActions::ShortenTrail(const std::string& name) {
   emit_(app::ShortenTrail{name});
 }

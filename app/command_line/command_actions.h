@@ -33,6 +33,7 @@ class CommandActions : public ui::AuthoringActions {
   void SetText(const std::string& name, const std::string& text, const std::string& language) override;
   void SetOffset(const std::string& name, const Eigen::Vector3d& offset) override;
   void ShortenTrail(const std::string& name) override;
+  void SetOccluderSize(const std::string& name, const Eigen::Vector3d& size) override;
   void SetTarget(const std::string& name, const std::string& to_map) override;
   void SetDirection(const std::string& name, const std::optional<Eigen::Vector3d>& direction) override;
   void PointAhead(const std::string& name) override;

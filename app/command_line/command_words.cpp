@@ -3,6 +3,8 @@
 
 #include <filesystem>
 
+#include "content/occluder.h"
+
 namespace docent::app {
 
 namespace {
@@ -46,6 +48,10 @@ struct DoneWriter {
     return "Placed " + std::filesystem::path(c.file).filename().string() + ".";
   }
   std::string operator()(const PlaceTrail&) const { return "Placed a trail."; }
+  std::string operator()(const PlaceOccluder& c) const {
+    return std::string("Placed an occluder: a ") + content::NameOf(c.shape) + ".";
+  }
+  std::string operator()(const ResizeOccluder& c) const { return "Resized " + c.name + "."; }
   std::string operator()(const ExtendTrail& c) const { return "Added a point to " + c.name + "."; }
   std::string operator()(const ShortenTrail& c) const { return "Removed a point of " + c.name + "."; }
   std::string operator()(const SetLabelOffset& c) const { return "Moved the board of " + c.name + "."; }

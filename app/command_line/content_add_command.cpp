@@ -34,7 +34,7 @@ namespace {
 struct AddOptions {
   std::filesystem::path library, file;
   std::string map, name;
-  std::string signpost, label, trail, caption, to_map;
+  std::string signpost, label, trail, occluder, caption, to_map;
   std::optional<Eigen::Vector3d> position, offset, direction;
   std::optional<double> scale, height, range, width;
   double yaw_deg = 0;
@@ -121,6 +121,21 @@ content::Entity NewTrailFrom(const AddOptions& options, const Target& target) {
   return entity;
 }
 
+// The form is that of the script command `occluder`.
+content::Entity NewOccluderFrom(const AddOptions& options, const Target& target) {
+  const auto parsed = ParseScript("0 occluder " + options.occluder, "--occluder");
+  const auto* const command =
+      parsed.size() == 1 ? std::get_if<PlaceOccluder>(&parsed.front().command) : nullptr;
+  if (command == nullptr) throw Error("--occluder: expected one shape.");
+  std::vector<content::SurfaceHit> places;
+  for (const MapPoint& point : command->points) {
+    if (point.pixel) throw Error("--occluder: a saved map has no image with this pixel; give X Y Z instead.");
+    places.push_back({point.in_map, target.axes.up});
+  }
+  const Eigen::Vector3d viewer = places.front().point - target.distance * target.axes.ahead;
+  return NewOccluder(*command, places, viewer, target.axes.up);
+}
+
 std::string FreeNameFor(const content::Scene& scene, const content::Entity& entity,
                         const std::filesystem::path& file) {
   if (!file.empty()) return scene.FreeName(content::NameFromFile(file));
@@ -138,10 +153,11 @@ void Add(const AddOptions& options, Verbosity verbosity) {
   const content::Scene scene = StoredNames(library, map);
   Target target{AxesOf(scene, *snapshot)};
   if (!snapshot->keyframes.empty()) target.distance = snapshot->keyframes.front().mean_depth;
-  content::Entity entity = !options.file.empty()    ? NewFromFile(options, target)
-                           : !options.label.empty() ? NewLabelFrom(options, target)
-                           : !options.trail.empty() ? NewTrailFrom(options, target)
-                                                    : NewSignpost(options, target, to_key);
+  content::Entity entity = !options.file.empty()       ? NewFromFile(options, target)
+                           : !options.label.empty()    ? NewLabelFrom(options, target)
+                           : !options.trail.empty()    ? NewTrailFrom(options, target)
+                           : !options.occluder.empty() ? NewOccluderFrom(options, target)
+                                                       : NewSignpost(options, target, to_key);
   entity.name = options.name.empty() ? FreeNameFor(scene, entity, options.file) : options.name;
   const MakeEdit edits[] = {[&](const content::Scene& stored) { return content::AddEdit(stored, entity); }};
   EditStoredScene(&library, map, edits);
@@ -161,7 +177,12 @@ std::vector<CLI::Option*> AddKindOptions(CLI::App* add, AddOptions* options) {
       add->add_option("--trail", options->trail, "Add a trail over these points, in map units, instead");
   for (CLI::Option* option : {signpost, label}) option->type_name("TEXT");
   trail->type_name("\"X Y Z, X Y Z, ...\"");
-  const std::vector<CLI::Option*> kinds = {file, signpost, label, trail};
+  CLI::Option* occluder = add->add_option(
+      "--occluder", options->occluder,
+      "Add a shape that hides the content behind it instead: box, cylinder, plane or polygon, as the script "
+      "command occluder has it, in map units");
+  occluder->type_name("\"SHAPE [size W H D] at X Y Z\"");
+  const std::vector<CLI::Option*> kinds = {file, signpost, label, trail, occluder};
   for (CLI::Option* one : kinds) {
     for (CLI::Option* other : kinds) {
       if (one != other) one->excludes(other);
@@ -175,7 +196,7 @@ void AddPoseOptions(CLI::App* add, AddOptions* options, const std::vector<CLI::O
       add, "--at", 3, -content::kMaxCoordinate, content::kMaxCoordinate,
       [=](const auto& n) { options->position = Eigen::Vector3d(n[0], n[1], n[2]); },
       "Position of its foot along the map's axes, in map units; of a label, of what it is about");
-  at->type_name("X Y Z")->excludes(kinds[3]);
+  at->type_name("X Y Z")->excludes(kinds[3])->excludes(kinds[4]);
   CLI::Option* const scale = AddNumbers(
       add, "--scale", 1, content::kMinModelScale, content::kMaxModelScale,
       [=](const auto& n) { options->scale = n[0]; },
@@ -198,7 +219,7 @@ void AddPoseOptions(CLI::App* add, AddOptions* options, const std::vector<CLI::O
   yaw->type_name("DEG");
   rotation->type_name("X Y Z W")->excludes(yaw);
   for (CLI::Option* option : {scale, yaw, rotation}) {
-    for (const std::size_t other : {1, 2, 3}) option->excludes(kinds[other]);
+    for (const std::size_t other : {1, 2, 3, 4}) option->excludes(kinds[other]);
   }
 }
 
@@ -209,7 +230,8 @@ void AddPropertyOptions(CLI::App* add, AddOptions* options, const std::vector<CL
       "Height of the signpost's board, or of a line of the label's text, in map units")
       ->type_name("H")
       ->excludes(kinds[0])
-      ->excludes(kinds[3]);
+      ->excludes(kinds[3])
+      ->excludes(kinds[4]);
   add->add_option("--to", options->to_map, "The map that the signpost leads to")
       ->type_name("MAP")
       ->needs(kinds[1]);
@@ -249,24 +271,26 @@ void AddPropertyOptions(CLI::App* add, AddOptions* options, const std::vector<CL
 void AddContentAddCommand(CLI::App* group, Invocation* invocation) {
   const auto options = std::make_shared<AddOptions>();
   CLI::App* add = AddSubcommand(
-      group, "add", "Add a model, image, sound, signpost, label or trail to a saved map",
+      group, "add", "Add a model, image, sound, signpost, label, trail or occluder to a saved map",
       "docent content add fox.glb --map \"Desk 3\" --at 0.2 0.1 1.5 --scale 0.1 --library museum.docent\n"
       "  docent content add --signpost \"To the foxes\" --to \"Desk 4\" --map \"Desk 3\" --at 0 0 2 "
       "--library museum.docent\n"
-      "  docent content add --trail \"0 1 1, 0 1 2, 1 1 3\" --map \"Desk 3\" --library museum.docent");
+      "  docent content add --trail \"0 1 1, 0 1 2, 1 1 3\" --map \"Desk 3\" --library museum.docent\n"
+      "  docent content add --occluder \"box size 1 0.7 0.6 at 0 1 2 yaw 30\" --map \"Desk 3\" "
+      "--library museum.docent");
   add->alias("import");
   const std::vector<CLI::Option*> kinds = AddKindOptions(add, options.get());
   add->add_option("--map", options->map, "The map that it is added to")->required();
   add->add_option("--library", options->library, "The library's file, NAME.docent")->required();
   add->add_option("--name", options->name,
-                  "Its name; by default made from the file, or sign-1, label-1, trail-1, ...");
+                  "Its name; by default made from the file, or sign-1, label-1, trail-1, occluder-1, ...");
   AddPoseOptions(add, options.get(), kinds);
   AddPropertyOptions(add, options.get(), kinds);
   add->callback([=] {
-    const bool is_trail = !options->trail.empty();
-    if (options->file.empty() && options->signpost.empty() && options->label.empty() && !is_trail)
-      throw CLI::RequiredError("FILE, --signpost TEXT, --label TEXT or --trail POINTS");
-    if (!options->position && !is_trail) throw CLI::RequiredError("--at");
+    const bool has_place = !options->trail.empty() || !options->occluder.empty();
+    if (options->file.empty() && options->signpost.empty() && options->label.empty() && !has_place)
+      throw CLI::RequiredError("FILE, --signpost TEXT, --label TEXT, --trail POINTS or --occluder SHAPE");
+    if (!options->position && !has_place) throw CLI::RequiredError("--at");
     invocation->run = [=] { Add(*options, invocation->verbosity); };
   });
 }

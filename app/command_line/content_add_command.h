@@ -5,7 +5,8 @@
 
 namespace docent::app {
 
-// Adds `docent content add`, which puts a model, image, sound, signpost, label or trail into a saved map.
+// Adds `docent content add`, which puts a model, image, sound, signpost, label, trail or occluder into a
+// saved map.
 void AddContentAddCommand(CLI::App* group, Invocation* invocation);
 
 }  // namespace docent::app

@@ -14,6 +14,7 @@
 #include "app/command_line/text_table.h"
 #include "app/session/library_scene.h"
 #include "content/edits.h"
+#include "content/occluder.h"
 #include "maps/library/library.h"
 
 namespace docent::app {
@@ -54,6 +55,13 @@ Json ToJson(const maps::MapInfo& map, const content::Entity& entity) {
     for (const Eigen::Vector3d& point : entity.trail.points)
       json["points_m"].push_back({point.x(), point.y(), point.z()});
   }
+  if (entity.kind == Kind::kOccluder) {
+    const content::Occluder& occluder = entity.occluder;
+    json["shape"] = content::NameOf(occluder.shape);
+    json["scale"] = occluder.map_from_shape.scale;
+    if (occluder.shape != content::Occluder::Shape::kPolygon)
+      json["size"] = {occluder.size.x(), occluder.size.y(), occluder.size.z()};
+  }
   json["locked"] = entity.locked;
   json["hidden"] = entity.hidden;
   json["group"] = entity.group;
@@ -66,6 +74,7 @@ std::string Summary(const Json& entry) {
   if (entry.contains("text")) summary = entry["text"].get<std::string>();
   if (entry.contains("file"))
     summary = entry["file"].get<std::string>() + (summary.empty() ? "" : ": " + summary);
+  if (entry.contains("shape")) summary = entry["shape"].get<std::string>();
   if (entry.contains("points_m")) summary = std::to_string(entry["points_m"].size()) + " points";
   return summary;
 }

@@ -33,13 +33,13 @@ struct EditOptions {
   std::optional<engine::Sim3> transform;
   std::string language, to_map, rename, group, align, bend, extend;
   std::optional<std::string> text;
-  std::optional<Eigen::Vector3d> offset, direction;
+  std::optional<Eigen::Vector3d> offset, direction, size;
   bool shorten = false, no_direction = false, find_direction = false;
 
   // With a value for one entity only.
   bool NamesOne() const {
-    return transform || text || offset || direction || find_direction || !extend.empty() || !rename.empty() ||
-           !align.empty() || !bend.empty();
+    return transform || text || offset || size || direction || find_direction || !extend.empty() ||
+           !rename.empty() || !align.empty() || !bend.empty();
   }
 };
 
@@ -79,6 +79,7 @@ std::vector<Command> CommandsFor(const EditOptions& options) {
     if (options.move) commands.emplace_back(MoveEntity{name, *options.move, std::nullopt});
     if (options.text) commands.emplace_back(SetEntityText{name, *options.text, options.language});
     if (options.offset) commands.emplace_back(SetLabelOffset{name, *options.offset});
+    if (options.size) commands.emplace_back(ResizeOccluder{name, *options.size});
     if (options.shorten) commands.emplace_back(ShortenTrail{name});
     if (!options.extend.empty()) commands.push_back(Extension(name, options.extend));
     if (options.nowhere || !options.to_map.empty())
@@ -167,7 +168,7 @@ class StoredEdits {
 void RunEdit(const EditOptions& options) {
   if (options.NamesOne() && options.names.size() > 1)
     throw Error(
-        "--transform, --align, --bend, --text, --offset, --direction, --find-direction, --extend and "
+        "--transform, --align, --bend, --text, --offset, --size, --direction, --find-direction, --extend and "
         "--rename change one object, not several.");
   const std::vector<Command> commands = CommandsFor(options);
   if (commands.empty()) throw Error("No change is given; see docent content edit --help.");
@@ -239,6 +240,11 @@ void AddPropertyOptions(CLI::App* edit, EditOptions* options) {
       [=](const auto& n) { options->offset = Eigen::Vector3d(n[0], n[1], n[2]); },
       "Put the board of a label here, from what it is about along the map's axes, in map units")
       ->type_name("X Y Z");
+  AddNumbers(
+      edit, "--size", 3, 0, content::kMaxOccluderSide,
+      [=](const auto& n) { options->size = Eigen::Vector3d(n[0], n[1], n[2]); },
+      "Give an occluder this width, height and depth; the depth counts only of a box")
+      ->type_name("W H D");
   edit->add_option("--extend", options->extend, "Add a point at the end of a trail, in map units")
       ->type_name("\"X Y Z\"");
   edit->add_flag("--shorten", options->shorten, "Remove the last point of a trail; before --extend");

@@ -21,6 +21,7 @@ void AddDemoCommand(CLI::App* program, Invocation* invocation,
       ->type_name("FILE.mp4");
   AddSeedOption(command, &options->seed);
   AddOcclusionOption(command, &options->occlusion);
+  AddLightOption(command, &options->room_light);
   command->callback([=, run = std::move(run)] {
     if (options->headless && !options->output) {
       throw CLI::ValidationError("--headless",

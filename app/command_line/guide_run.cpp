@@ -56,6 +56,7 @@ SessionOptions SessionOptionsOf(const GuideRequest& request, std::span<Calibrate
   options.memory.wait_for_maps = request.pace != Pace::kRealtime;
   options.baseline_m = request.baseline_m;
   options.occlusion = request.occlusion;
+  options.room_light = request.room_light;
   options.tracker.target = request.target;
   options.mapper.lens.lenses = EstimatedLensesOf(cameras);
   return options;
@@ -69,9 +70,9 @@ bool AllRecorded(std::span<const CalibratedCamera> cameras) {
 // Whether a person would see no difference.
 bool LooksEqual(const ShownFrame& a, const ShownFrame& b) {
   return a.shown.scene == b.shown.scene && a.shown.surfaces == b.shown.surfaces &&
-         a.shown.map_name == b.shown.map_name && a.shown.starting_map == b.shown.starting_map &&
-         a.shown.hint == b.shown.hint && a.shown.mapping == b.shown.mapping && a.message == b.message &&
-         a.caption == b.caption;
+         a.shown.light == b.shown.light && a.shown.map_name == b.shown.map_name &&
+         a.shown.starting_map == b.shown.starting_map && a.shown.hint == b.shown.hint &&
+         a.shown.mapping == b.shown.mapping && a.message == b.message && a.caption == b.caption;
 }
 
 constexpr const char* kPaused = "The recording is paused. Start a map or press Space, and it goes on.";

@@ -10,6 +10,7 @@
 #include "app/cameras/frame_source.h"
 #include "app/session/head_control.h"
 #include "app/session/pace.h"
+#include "app/session/session_options.h"
 #include "engine/base/time.h"
 #include "engine/geometry/camera_model.h"
 
@@ -49,10 +50,11 @@ struct RunArguments {
   std::uint64_t seed = 1;
   std::size_t memory_budget_bytes = std::size_t{1} << 30;  // For maps in memory.
   std::optional<HeadPolicy> head;                          // For cameras with a pan-tilt head.
-  double baseline_m = 0;                // Measured distance between the two cameras; 0: not measured.
-  bool occlusion = true;                // Content is hidden behind the surfaces of maps.
-  std::optional<bool> sound;            // Whether sounds are heard; empty: with a window.
-  std::optional<std::string> language;  // Of texts, a tag in lower case; empty: that of the locale.
+  double baseline_m = 0;                  // Measured distance between the two cameras; 0: not measured.
+  Occlusion occlusion = Occlusion::kMap;  // What hides content.
+  bool room_light = true;                 // See SessionOptions.
+  std::optional<bool> sound;              // Whether sounds are heard; empty: with a window.
+  std::optional<std::string> language;    // Of texts, a tag in lower case; empty: that of the locale.
 };
 
 struct AuthorOptions {
@@ -108,7 +110,8 @@ struct DemoOptions {
   bool headless = false;
   std::optional<std::filesystem::path> output, record;
   std::uint64_t seed = 1;
-  bool occlusion = true;  // As RunArguments.
+  Occlusion occlusion = Occlusion::kMap;  // As RunArguments.
+  bool room_light = true;                 // As RunArguments.
 };
 
 struct CalibrateOptions {

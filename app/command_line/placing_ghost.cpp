@@ -4,6 +4,7 @@
 #include <numbers>
 #include <utility>
 
+#include "app/command_line/placing_tool.h"
 #include "app/session/file_kind.h"
 #include "app/session/map_axes.h"
 #include "app/session/new_entities.h"
@@ -78,6 +79,8 @@ content::Entity GhostAt(const content::Entity& begun, const ui::AuthoringChoices
       return NewSound(begun.sound.asset, hit.point, distance);
     case content::Entity::Kind::kTrail:
       return NewTrail({*trail_end, hit.point}, hit.on_plane ? hit.normal : up, up, distance);
+    case content::Entity::Kind::kOccluder:
+      return NewOccluder(OccluderAt(choices, Eigen::Vector2d::Zero()), {&hit, 1}, viewer, up);
   }
   return entity;
 }
@@ -118,6 +121,9 @@ std::optional<content::Entity> PlacingGhost::Begun(const ui::AuthoringChoices& c
     case Tool::kTrail:
       entity.kind = content::Entity::Kind::kTrail;
       return has_trail ? std::optional(entity) : std::nullopt;
+    case Tool::kOccluder:
+      entity.kind = content::Entity::Kind::kOccluder;
+      return entity;
     case Tool::kSelect:
       break;
   }

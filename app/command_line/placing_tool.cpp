@@ -9,6 +9,14 @@
 
 namespace docent::app {
 
+PlaceOccluder OccluderAt(const ui::AuthoringChoices& choices, const Eigen::Vector2d& pixel) {
+  PlaceOccluder command;
+  command.shape = choices.occluder_shape;
+  command.points = {{Eigen::Vector3d::Zero(), pixel}};
+  command.upright = choices.occluder_shape == content::Occluder::Shape::kPlane;
+  return command;
+}
+
 std::optional<Command> PlacingTool::Click(const AuthorView& view, const ui::AuthoringChoices& choices,
                                           const Eigen::Vector2d& pixel, const std::string& trail,
                                           std::string* note) {
@@ -41,6 +49,8 @@ std::optional<Command> PlacingTool::Click(const AuthorView& view, const ui::Auth
       return PlaceSound{choices.sound_file, choices.caption, pixel};
     case Tool::kTrail:
       return ClickTrail(view, pixel, trail, note);
+    case Tool::kOccluder:
+      return OccluderAt(choices, pixel);
   }
   return std::nullopt;
 }

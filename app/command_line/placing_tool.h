@@ -11,6 +11,9 @@
 
 namespace docent::app {
 
+// What a click with the occluder tool places; a plane stands on the surface.
+PlaceOccluder OccluderAt(const ui::AuthoringChoices& choices, const Eigen::Vector2d& pixel);
+
 // Makes commands of the clicks that place something with the chosen tool. A trail takes two clicks; further
 // ones extend it as long as it is selected. On the window's thread.
 class PlacingTool {

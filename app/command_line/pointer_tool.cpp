@@ -39,7 +39,8 @@ std::optional<ui::Gizmo> PointerTool::SelectedGizmo(const AuthorView& view, cons
   ui::Gizmo gizmo;
   gizmo.origin = OriginOf(*entity, *box);
   gizmo.map_from_axes = box->map_from_box.rotation;
-  gizmo.turns = content::HasModel(*entity) || entity->kind == content::Entity::Kind::kTrail;
+  gizmo.turns = content::HasModel(*entity) || entity->kind == content::Entity::Kind::kTrail ||
+                entity->kind == content::Entity::Kind::kOccluder;
   const auto length = ui::GizmoLength(view.camera, gizmo.origin, kHandleLength * view.scale / view.box.scale);
   if (!length) return std::nullopt;
   gizmo.length = *length;

@@ -163,6 +163,7 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
   AddSeedOption(command, &run->seed);
   AddMemoryOption(command, &run->memory_budget_bytes);
   AddOcclusionOption(command, &run->occlusion);
+  AddLightOption(command, &run->room_light);
   AddMetresOption(command, "--baseline", kMinLength_m, &run->baseline_m,
                   "Distance between two cameras mounted rigidly together; sets the scale of their maps");
   AddChoice<std::optional<HeadPolicy>>(
@@ -193,12 +194,22 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
   command->add_option("--record", run->record, "Write the augmented view as a video")->type_name("FILE.mp4");
 }
 
-void AddOcclusionOption(CLI::App* command, bool* occlusion) {
-  AddChoice<bool>(
+void AddOcclusionOption(CLI::App* command, Occlusion* occlusion) {
+  AddChoice<Occlusion>(
       command, "--occlusion", occlusion,
-      "What hides content: the surfaces of the map before it, which docent maps densify and, while a map is "
-      "idle, an author's session compute (default map)",
-      {{"map", true}, {"off", false}});
+      "What hides content behind it: nothing (off); the occluders that authors place (proxies); also the "
+      "surfaces of the map, which docent maps densify and, while a map is idle, an author's session compute, "
+      "but not where an occluder stands for the same surface (map; default)",
+      {{"off", Occlusion::kOff}, {"proxies", Occlusion::kProxies}, {"map", Occlusion::kMap}});
+}
+
+void AddLightOption(CLI::App* command, bool* room_light) {
+  AddChoice<bool>(command, "--light", room_light,
+                  "The light on models: that of the room, as far as its surfaces show it, with shadows on "
+                  "the room and the "
+                  "exposure of the video (room; default), or always the same without shadows, which is drawn "
+                  "faster (plain)",
+                  {{"room", true}, {"plain", false}});
 }
 
 void AddMemoryOption(CLI::App* command, std::size_t* bytes) {

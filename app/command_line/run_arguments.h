@@ -25,8 +25,10 @@ void AddSecondsOption(CLI::App* command, const std::string& option, Timestamp* t
 // Adds an option whose value is a length in metres, from `least` to 10 km.
 void AddMetresOption(CLI::App* command, const std::string& option, double least, double* target,
                      const std::string& description);
-// Adds --occlusion: map or off.
-void AddOcclusionOption(CLI::App* command, bool* occlusion);
+// Adds --occlusion: off, proxies or map.
+void AddOcclusionOption(CLI::App* command, Occlusion* occlusion);
+// Adds --light: room or plain.
+void AddLightOption(CLI::App* command, bool* room_light);
 void AddMemoryOption(CLI::App* command, std::size_t* bytes);
 void AddCameraFormatOption(CLI::App* command, CameraOptions* options);
 // Adds --lens: auto, or the name of a lens model.

@@ -33,6 +33,7 @@ void CopyRunArguments(const RunArguments& run, bool any_live, GuideRequest* requ
   request->seed = run.seed;
   request->memory_budget_bytes = run.memory_budget_bytes;
   request->occlusion = run.occlusion;
+  request->room_light = run.room_light;
   request->output = run.output;
   request->record = run.record;
   request->sound = run.sound.value_or(!run.headless);

@@ -112,6 +112,7 @@ GuideRequest CommonRequest(const DemoOptions& options, maps::Library* library, c
   request.pace = options.headless ? Pace::kLockstep : Pace::kRealtime;
   request.seed = options.seed;
   request.occlusion = options.occlusion;
+  request.room_light = options.room_light;
   request.output = output;
   return request;
 }

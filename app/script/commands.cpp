@@ -5,6 +5,7 @@
 #include <set>
 
 #include "app/files/text_file.h"
+#include "content/occluder.h"
 #include "content/scene.h"
 #include "content/warp.h"
 #include "maps/library/library.h"
@@ -185,6 +186,32 @@ struct Validator {
     return First({NameProblem(c.name, "a name"), PointProblem(c.point)});
   }
   std::string operator()(const ShortenTrail& c) const { return NameProblem(c.name, "a name"); }
+  std::string operator()(const PlaceOccluder& c) const {
+    const bool is_polygon = c.shape == content::Occluder::Shape::kPolygon;
+    const std::size_t least = is_polygon ? content::kMinOutlinePoints : 1;
+    const std::size_t most = is_polygon ? content::kMaxOutlinePoints : 1;
+    if (c.points.size() < least || c.points.size() > most) {
+      return is_polygon ? "expected " + std::to_string(least) + " to " + std::to_string(most) + " points"
+                        : "expected one place";
+    }
+    for (const MapPoint& point : c.points) {
+      if (std::string problem = PointProblem(point); !problem.empty()) return problem;
+    }
+    if (is_polygon && c.size) return "a polygon has the size of its corners";
+    content::Occluder occluder;
+    occluder.shape = c.shape;
+    if (c.size) occluder.size = *c.size;
+    if (c.size && !content::ShapeProblem(occluder).empty()) {
+      return "the sides must be between " + FormatNumber(content::kMinOccluderSide) + " and " +
+             FormatNumber(content::kMaxOccluderSide);
+    }
+    return AngleProblem(c.yaw_deg);
+  }
+  std::string operator()(const ResizeOccluder& c) const {
+    const bool is_valid = c.size.minCoeff<Eigen::PropagateNaN>() >= 0 &&
+                          c.size.maxCoeff<Eigen::PropagateNaN>() <= content::kMaxOccluderSide;
+    return First({NameProblem(c.name, "a name"), is_valid ? "" : "the sides are out of range"});
+  }
   std::string operator()(const SetLabelOffset& c) const {
     return First({NameProblem(c.name, "a name"), OffsetProblem(c.offset)});
   }

@@ -131,6 +131,25 @@ struct ShortenTrail {
   std::string name;
   bool operator==(const ShortenTrail&) const = default;
 };
+// Puts a shape where a real thing is, so that content behind it is hidden.
+struct PlaceOccluder {
+  content::Occluder::Shape shape = content::Occluder::Shape::kBox;
+  // In map units, as content::Occluder has it; without it, each side is a fifth of the distance. Not of a
+  // polygon.
+  std::optional<Eigen::Vector3d> size = std::nullopt;
+  // Where it stands; the middle of a plane that does not stand; the corners of a polygon.
+  std::vector<MapPoint> points;
+  double yaw_deg = 0;  // Of a box, about the up axis; at 0 it faces the viewer.
+  bool upright =
+      false;  // Of a plane: it stands on the surface and faces the viewer, or else lies flush with it.
+  bool operator==(const PlaceOccluder&) const = default;
+};
+// Gives an occluder that is no polygon other sides.
+struct ResizeOccluder {
+  std::string name;
+  Eigen::Vector3d size = Eigen::Vector3d::Ones();  // width, height and depth; the depth counts only of a box
+  bool operator==(const ResizeOccluder&) const = default;
+};
 struct MoveEntity {
   std::string name;
   // Map units along the map's axes; ignored with `to_pixel`.
@@ -267,13 +286,13 @@ struct Save {
   bool operator==(const Save&) const = default;
 };
 
-using Command =
-    std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, JoinMap, SetMapUp, SetMapScale,
-                 SetMapEntrance, PlaceModel, PlaceSignpost, PlaceLabel, PlaceImage, PlaceSound, PlaceTrail,
-                 ExtendTrail, ShortenTrail, SetLabelOffset, MoveEntity, RotateEntity, ScaleEntity,
-                 TransformEntities, AlignEntity, BendEntity, UnbendEntity, RemoveEntities, DuplicateEntities,
-                 RenameEntity, SetEntityText, SetSignpostTarget, SetSignpostDirection, SetEntityFlag,
-                 GroupEntities, PasteEntities, GuideVisitor, Undo, Redo, Save>;
+using Command = std::variant<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, JoinMap, SetMapUp,
+                             SetMapScale, SetMapEntrance, PlaceModel, PlaceSignpost, PlaceLabel, PlaceImage,
+                             PlaceSound, PlaceTrail, ExtendTrail, ShortenTrail, PlaceOccluder, ResizeOccluder,
+                             SetLabelOffset, MoveEntity, RotateEntity, ScaleEntity, TransformEntities,
+                             AlignEntity, BendEntity, UnbendEntity, RemoveEntities, DuplicateEntities,
+                             RenameEntity, SetEntityText, SetSignpostTarget, SetSignpostDirection,
+                             SetEntityFlag, GroupEntities, PasteEntities, GuideVisitor, Undo, Redo, Save>;
 
 // The same rotation, with a quaternion that normalizing does not change any more. A command that was written
 // to a script and read again thereby has exactly the rotation of the original.

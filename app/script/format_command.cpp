@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "app/files/text_file.h"
+#include "content/occluder.h"
 
 namespace docent::app {
 
@@ -111,6 +112,21 @@ struct CommandFormatter {
     return "trail extend " + AlwaysQuoted(c.name) + " to " + Place(c.point);
   }
   std::string operator()(const ShortenTrail& c) const { return "trail shorten " + AlwaysQuoted(c.name); }
+  std::string operator()(const PlaceOccluder& c) const {
+    std::string text = std::string("occluder ") + content::NameOf(c.shape);
+    if (c.size) {
+      text += " size";
+      const int sides = c.shape == content::Occluder::Shape::kBox ? 3 : 2;
+      for (int i = 0; i < sides; ++i) text += ' ' + FormatExactly((*c.size)[i]);
+    }
+    text += " at";
+    for (std::size_t i = 0; i < c.points.size(); ++i) text += (i == 0 ? " " : ", ") + Place(c.points[i]);
+    if (c.yaw_deg != 0) text += " yaw " + FormatExactly(c.yaw_deg);
+    return text + (c.upright ? " upright" : "");
+  }
+  std::string operator()(const ResizeOccluder& c) const {
+    return "size " + AlwaysQuoted(c.name) + ' ' + Point(c.size);
+  }
   std::string operator()(const SetLabelOffset& c) const {
     return "offset " + AlwaysQuoted(c.name) + ' ' + Point(c.offset);
   }

@@ -42,6 +42,9 @@ content::SceneChange EditFor(const content::Scene& scene, const UnbendEntity& co
 content::SceneChange EditFor(const content::Scene& scene, const ShortenTrail& command) {
   return content::RemovePointEdit(scene, command.name);
 }
+content::SceneChange EditFor(const content::Scene& scene, const ResizeOccluder& command) {
+  return content::SizeEdit(scene, command.name, command.size);
+}
 content::SceneChange EditFor(const content::Scene& scene, const SetLabelOffset& command) {
   return content::OffsetEdit(scene, command.name, command.offset);
 }

@@ -14,6 +14,7 @@ content::SceneChange EditFor(const content::Scene& scene, const ScaleEntity& com
 content::SceneChange EditFor(const content::Scene& scene, const TransformEntities& command);
 content::SceneChange EditFor(const content::Scene& scene, const UnbendEntity& command);
 content::SceneChange EditFor(const content::Scene& scene, const ShortenTrail& command);
+content::SceneChange EditFor(const content::Scene& scene, const ResizeOccluder& command);
 content::SceneChange EditFor(const content::Scene& scene, const SetLabelOffset& command);
 content::SceneChange EditFor(const content::Scene& scene, const RemoveEntities& command);
 content::SceneChange EditFor(const content::Scene& scene, const DuplicateEntities& command);

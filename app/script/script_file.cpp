@@ -7,6 +7,7 @@
 
 #include "app/files/text_file.h"
 #include "app/script/line_reader.h"
+#include "content/occluder.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -153,6 +154,38 @@ Command ParseTrail(LineReader* line) {
   return command;
 }
 
+content::Occluder::Shape ParseShape(LineReader* line) {
+  using Shape = content::Occluder::Shape;
+  for (const Shape shape : {Shape::kPlane, Shape::kBox, Shape::kCylinder, Shape::kPolygon}) {
+    if (line->TakeIf(content::NameOf(shape))) return shape;
+  }
+  line->Fail("expected plane, box, cylinder or polygon");
+}
+
+Command ParseOccluder(LineReader* line) {
+  using Shape = content::Occluder::Shape;
+  PlaceOccluder command;
+  command.shape = ParseShape(line);
+  if (command.shape != Shape::kPolygon && line->TakeIf("size")) {
+    Eigen::Vector3d size = Eigen::Vector3d::Zero();
+    const int sides = command.shape == Shape::kBox ? 3 : 2;
+    for (int i = 0; i < sides; ++i) size[i] = line->TakeNumber("a side in map units");
+    if (command.shape == Shape::kCylinder) size.z() = size.x();
+    command.size = size;
+  }
+  line->Expect("at");
+  if (command.shape == Shape::kPolygon) {
+    for (bool last = false; !last;) command.points.push_back(ParsePoint(line, &last));
+    return command;
+  }
+  bool last = false;
+  command.points.push_back(ParsePoint(line, &last));
+  if (!last) line->Fail("expected one place");
+  if (command.shape == Shape::kBox && line->TakeIf("yaw")) command.yaw_deg = line->TakeNumber("degrees");
+  if (command.shape == Shape::kPlane && line->TakeIf("upright")) command.upright = true;
+  return command;
+}
+
 Command ParseText(LineReader* line) {
   SetEntityText command;
   command.name = line->TakeName("a name");
@@ -279,6 +312,10 @@ std::optional<Command> ParseEdit(LineReader* line) {
     const std::string name = line->TakeName("a name");
     return SetLabelOffset{name, TakePoint(line)};
   }
+  if (line->TakeIf("size")) {
+    const std::string name = line->TakeName("a name");
+    return ResizeOccluder{name, TakePoint(line)};
+  }
   if (line->TakeIf("target")) return ParseTarget(line);
   if (line->TakeIf("direction")) return ParseDirection(line);
   if (line->TakeIf("lock")) return ParseFlag(line, EntityFlag::kLocked, true);
@@ -310,6 +347,7 @@ Command ParseCommand(LineReader* line) {
   if (line->TakeIf("image")) return ParseImage(line);
   if (line->TakeIf("sound")) return ParseSound(line);
   if (line->TakeIf("trail")) return ParseTrail(line);
+  if (line->TakeIf("occluder")) return ParseOccluder(line);
   if (auto edit = ParseEdit(line)) return *std::move(edit);
   if (line->TakeIf("tour")) return ParseTour(line);
   if (line->TakeIf("undo")) return Undo{};

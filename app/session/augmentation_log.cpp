@@ -15,7 +15,7 @@ void AugmentationLog::Add(const engine::TrackedFrame& frame, const engine::Camer
                           const std::string& map_name, const content::Scene& scene) {
   if (!engine::HasPose(frame.state)) return;
   for (const content::Entity& entity : scene.entities) {
-    if (entity.hidden) continue;
+    if (entity.hidden || entity.kind == content::Entity::Kind::kOccluder) continue;
     const auto pixel = camera.Project(frame.camera_from_map * content::BaseInMap(entity));
     if (!pixel || !camera.IsInside(*pixel)) continue;
     file_.Write(FormatSeconds(frame.frame.time) + ',' + CsvField(map_name) + ',' + CsvField(entity.name) +

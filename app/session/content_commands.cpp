@@ -193,6 +193,16 @@ void ContentCommands::Apply(const ExtendTrail& command, const engine::TrackedFra
   Edit(&map, content::AddPointEdit(*map.scene, command.name, point));
 }
 
+void ContentCommands::Apply(const PlaceOccluder& command, const engine::TrackedFrame& frame) {
+  SessionMap& map = MapToEdit(frame);
+  std::vector<content::SurfaceHit> places;
+  for (const MapPoint& point : command.points) places.push_back(PlaceFor(frame, point));
+  content::Entity entity =
+      NewOccluder(command, places, frame.camera_from_map.OriginInSource(), UpOf(*map.scene, *frame.map));
+  entity.name = map.scene->FreeNumberedName("occluder");
+  Edit(&map, content::AddEdit(*map.scene, std::move(entity)));
+}
+
 void ContentCommands::Apply(const MoveEntity& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
   if (!command.to_pixel) return Edit(&map, EditFor(*map.scene, command));

@@ -35,6 +35,7 @@ class ContentCommands {
   void Apply(const PlaceSound& command, const engine::TrackedFrame& frame);
   void Apply(const PlaceTrail& command, const engine::TrackedFrame& frame);
   void Apply(const ExtendTrail& command, const engine::TrackedFrame& frame);
+  void Apply(const PlaceOccluder& command, const engine::TrackedFrame& frame);
   void Apply(const MoveEntity& command, const engine::TrackedFrame& frame);
   void Apply(const SetSignpostTarget& command, const engine::TrackedFrame& frame);
   void Apply(const SetSignpostDirection& command, const engine::TrackedFrame& frame);

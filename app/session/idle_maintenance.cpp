@@ -60,15 +60,17 @@ bool IdleMaintenance::ComputeMesh(const IdleMap& chosen, const std::atomic<bool>
   std::optional<engine::MapMesh> mesh = engine::DensifyMap(chosen.snapshot, {}, {}, &interrupt);
   if (!mesh) return false;
   std::shared_ptr<const engine::MapMesh> fitting;
+  std::shared_ptr<const engine::LightEstimate> light;
   if (!mesh->mesh.empty()) {
     fitting = std::make_shared<const engine::MapMesh>(maps::MeshThatFits(*std::move(mesh)));
     library_->SaveMesh(chosen.key, *fitting);
+    if (with_light_) light = LightOn(*chosen.snapshot, *fitting);
   }
   const std::scoped_lock lock(mutex_);
   SessionMap* const map = state_.FindMap(chosen.key);
   if (map == nullptr) return true;
   map->meshed_revision = chosen.snapshot->revision;
-  if (fitting) map->SetMesh(std::move(fitting));
+  if (fitting) map->SetMesh(std::move(fitting), std::move(light));
   return true;
 }
 

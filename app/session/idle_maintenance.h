@@ -19,10 +19,15 @@ namespace docent::app {
 class IdleMaintenance {
  public:
   // All pointers must outlive this. library is null where nothing is saved; then Run is not called.
-  // with_meshes: whether surfaces are computed.
+  // with_meshes: whether surfaces are computed; with_light: whether also the light on them.
   IdleMaintenance(maps::Library* library, engine::System* system, std::mutex* mutex, SessionState* state,
-                  bool with_meshes)
-      : library_(library), system_(*system), mutex_(*mutex), state_(*state), with_meshes_(with_meshes) {}
+                  bool with_meshes, bool with_light)
+      : library_(library),
+        system_(*system),
+        mutex_(*mutex),
+        state_(*state),
+        with_meshes_(with_meshes),
+        with_light_(with_light) {}
 
   // Adjusts the map that needs it most, or computes the surfaces of one that was adjusted, and saves it.
   // Without the session's mutex; ends soon after `interrupt` is set. Returns whether it did something.
@@ -42,7 +47,7 @@ class IdleMaintenance {
   engine::System& system_;
   std::mutex& mutex_;
   SessionState& state_;
-  const bool with_meshes_;
+  const bool with_meshes_, with_light_;
   MaintenanceOrder order_;  // accessed only by the saver's thread
 };
 

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/session/new_entities.h"
 
+#include <numbers>
 #include <utility>
+
+#include "app/session/session_options.h"
+#include "content/occluder.h"
 
 namespace docent::app {
 
@@ -59,6 +63,32 @@ content::Entity NewTrail(std::vector<Eigen::Vector3d> points, const Eigen::Vecto
   entity.trail.points = std::move(points);
   entity.trail.up = normals.norm() > 1e-6 ? Eigen::Vector3d(normals.normalized()) : up;
   entity.trail.width = kTrailWidth * distance;
+  return entity;
+}
+
+content::Entity NewOccluder(const PlaceOccluder& command, std::span<const content::SurfaceHit> places,
+                            const Eigen::Vector3d& viewer, const Eigen::Vector3d& up) {
+  content::Entity entity;
+  entity.kind = content::Entity::Kind::kOccluder;
+  content::Occluder& occluder = entity.occluder;
+  if (command.shape == content::Occluder::Shape::kPolygon) {
+    std::vector<Eigen::Vector3d> corners;
+    for (const content::SurfaceHit& place : places) corners.push_back(place.point);
+    occluder = content::PolygonThrough(corners);
+    return entity;
+  }
+  const bool is_plane = command.shape == content::Occluder::Shape::kPlane;
+  const content::SurfaceHit& place = places.front();
+  const double side = SessionOptions().model_side * (place.point - viewer).norm();
+  occluder.shape = command.shape;
+  occluder.size = command.size.value_or(Eigen::Vector3d(side, side, is_plane ? 0 : side));
+  if (is_plane && !command.upright) {
+    occluder.map_from_shape = content::FlushPose(place.point, viewer, place.normal, up, 1);
+    return entity;
+  }
+  occluder.map_from_shape =
+      content::FacingPose(place.point, viewer, place.normal, up, command.yaw_deg * std::numbers::pi / 180, 1);
+  if (is_plane) occluder.map_from_shape.translation += 0.5 * occluder.size.y() * up;
   return entity;
 }
 

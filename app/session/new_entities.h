@@ -3,14 +3,16 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <span>
 #include <vector>
 
+#include "app/script/commands.h"
 #include "content/placement.h"
 #include "content/scene.h"
 
-// Labels, images, sounds and trails as they are placed in a map, by a command and as a preview. Map units
-// mean nothing to the user, so sizes follow from the distance of the place from the camera. The entities have
-// no names yet. Pure functions; points and directions are in the map.
+// Labels, images, sounds, trails and occluders as they are placed in a map, by a command and as a preview.
+// Map units mean nothing to the user, so sizes follow from the distance of the place from the camera. The
+// entities have no names yet. Pure functions; points and directions are in the map.
 namespace docent::app {
 
 // The board is above the point.
@@ -26,5 +28,10 @@ content::Entity NewSound(const std::shared_ptr<const content::Asset>& sound, con
 // level.
 content::Entity NewTrail(std::vector<Eigen::Vector3d> points, const Eigen::Vector3d& normals,
                          const Eigen::Vector3d& up, double distance);
+
+// `places`: where it stands, or the corners of a polygon. See PlaceOccluder for the rest. Throws Error when
+// the corners enclose no area.
+content::Entity NewOccluder(const PlaceOccluder& command, std::span<const content::SurfaceHit> places,
+                            const Eigen::Vector3d& viewer, const Eigen::Vector3d& up);
 
 }  // namespace docent::app

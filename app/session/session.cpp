@@ -166,7 +166,10 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   if (found->second.policy == maps::Policy::kBounded) shown.bounds = found->second.bounds;
   // The pointer to the triangles keeps the whole mesh alive.
   const std::shared_ptr<const engine::MapMesh>& mesh = found->second.mesh;
-  if (options_.occlusion && mesh) shown.surfaces = {mesh, &mesh->mesh};
+  shown.room_light = options_.room_light;
+  if (options_.room_light) shown.light = found->second.light;
+  shown.occluders = options_.occlusion != Occlusion::kOff;
+  if (options_.occlusion == Occlusion::kMap && mesh) shown.surfaces = {mesh, &mesh->mesh};
   return shown;
 }
 

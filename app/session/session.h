@@ -86,6 +86,9 @@ class Session {
     std::string map_name;
     std::shared_ptr<const content::Scene> scene;
     std::shared_ptr<const engine::SurfaceMesh> surfaces;  // behind which the scene is hidden; null for none
+    bool occluders = false;                               // whether those of the scene hide it
+    std::shared_ptr<const engine::LightEstimate> light;   // of the room; null where it is not known
+    bool room_light = false;                              // whether models belong to the light of the room
     std::optional<MappingStatus> mapping;                 // only where the session may write
     std::string advice;                                   // a sentence about the frame's camera; often empty
     std::string hint;  // what to do so that the camera is tracked, as one sentence in English; often empty

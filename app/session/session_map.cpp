@@ -7,7 +7,7 @@ namespace docent::app {
 
 void SessionMap::UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer) {
   const auto before = std::exchange(snapshot, std::move(newer));
-  SetMesh(std::move(mesh));
+  SetMesh(std::move(mesh), std::move(light));
   if (!before || !snapshot || scene->entities.empty()) return;
   const ContentFollower::Motions motions = follower.Follow(*scene, *before, *snapshot);
   if (motions.empty()) return;
@@ -15,10 +15,12 @@ void SessionMap::UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer
   for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
 }
 
-void SessionMap::SetMesh(std::shared_ptr<const engine::MapMesh> made) {
+void SessionMap::SetMesh(std::shared_ptr<const engine::MapMesh> made,
+                         std::shared_ptr<const engine::LightEstimate> light_on_it) {
   const bool fits =
       made && snapshot && engine::StateOf(made->keyframes, *snapshot) != engine::MeshState::kOutOfDate;
   mesh = fits ? std::move(made) : nullptr;
+  light = fits ? std::move(light_on_it) : nullptr;
 }
 
 bool SessionMap::HasCurrentMesh() const {
@@ -36,6 +38,12 @@ engine::MapPermissions SessionMap::Permissions() const {
   // A map that was saved or that has content is kept in any case.
   permissions.discard = !saved_snapshot && scene->entities.empty();
   return permissions;
+}
+
+std::shared_ptr<const engine::LightEstimate> LightOn(const engine::MapSnapshot& map,
+                                                     const engine::MapMesh& mesh) {
+  const auto light = engine::EstimateLight(map, mesh.mesh);
+  return light ? std::make_shared<const engine::LightEstimate>(*light) : nullptr;
 }
 
 }  // namespace docent::app

@@ -11,6 +11,7 @@
 #include "content/edit_history.h"
 #include "content/scene.h"
 #include "engine/dense/densification.h"
+#include "engine/dense/light_estimate.h"
 #include "engine/map/map_snapshot.h"
 #include "engine/system/map_permissions.h"
 #include "maps/storage/policy.h"
@@ -38,6 +39,8 @@ struct SessionMap {
   // The mesh of its surfaces, behind which content is hidden; null while it is not known. It fits the
   // snapshot.
   std::shared_ptr<const engine::MapMesh> mesh;
+  // The light that its surfaces show; null while it is not known, and without a mesh.
+  std::shared_ptr<const engine::LightEstimate> light;
   // Revision for which a mesh was computed, whether there is one or not; 0 for none.
   std::uint64_t meshed_revision = 0;
 
@@ -57,8 +60,9 @@ struct SessionMap {
   // no longer fits is dropped.
   void UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer);
 
-  // Takes a mesh if it fits the snapshot.
-  void SetMesh(std::shared_ptr<const engine::MapMesh> made);
+  // Takes a mesh and the light on it if the mesh fits the snapshot.
+  void SetMesh(std::shared_ptr<const engine::MapMesh> made,
+               std::shared_ptr<const engine::LightEstimate> light_on_it = nullptr);
   // Whether the mesh shows all that the snapshot does.
   bool HasCurrentMesh() const;
 
@@ -69,5 +73,9 @@ struct SessionMap {
   bool Exists() const { return !discarded && joined_into == 0; }
   bool NeedsSave() const { return snapshot && (snapshot != saved_snapshot || scene != saved_scene); }
 };
+
+// The light that the surfaces of a map show; null if it cannot be told. Takes a fraction of a second.
+std::shared_ptr<const engine::LightEstimate> LightOn(const engine::MapSnapshot& map,
+                                                     const engine::MapMesh& mesh);
 
 }  // namespace docent::app

@@ -57,6 +57,8 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   content::EditHistory history;
   if (options_.may_write && problems.empty())
     history = StoredHistory(stored.info.key, where, &assets, &problems);
+  const std::shared_ptr<const engine::LightEstimate> light =
+      stored.mesh && options_.room_light ? LightOn(*stored.snapshot, *stored.mesh) : nullptr;
   const std::scoped_lock lock(mutex_);
   for (const std::string& problem : problems) state_.AddEvent(state_.LastTime(), "warning", problem);
   assets_.Merge(&assets);
@@ -68,7 +70,7 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   ResolveSignposts(scene.get());
   map.scene = map.saved_scene = std::move(scene);
   map.history = std::move(history);
-  map.SetMesh(stored.mesh);
+  map.SetMesh(stored.mesh, light);
   system_.SetSnapshot(map.key, map.snapshot);
   system_.SetPermissions(map.key, map.Permissions());
 }
@@ -143,6 +145,7 @@ bool SessionMemory::Evict(std::uint64_t key) {
   map.scene = map.saved_scene = std::make_shared<content::Scene>();
   map.history = {};
   map.mesh.reset();
+  map.light.reset();
   assets_.EvictUnused();
   return true;
 }

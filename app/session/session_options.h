@@ -10,6 +10,13 @@
 
 namespace docent::app {
 
+// What hides content behind it.
+enum class Occlusion {
+  kOff,      // Nothing.
+  kProxies,  // The occluders that authors place.
+  kMap,      // Also the surfaces of maps, as far as they are known.
+};
+
 // extend_maps and new_map_key are set by the session.
 struct SessionOptions : engine::SystemOptions {
   bool may_write = true;  // false: no map is extended and no content is edited
@@ -18,9 +25,10 @@ struct SessionOptions : engine::SystemOptions {
   Timestamp autosave_interval = std::chrono::seconds(10);
   // Idle maps in memory are adjusted while there is nothing else to do; needs `threaded`.
   bool maintenance = true;
-  // Content is hidden behind the surfaces of maps, as far as they are known. With `maintenance`, they are
-  // computed.
-  bool occlusion = true;
+  // With kMap and `maintenance`, the surfaces of maps are computed.
+  Occlusion occlusion = Occlusion::kMap;
+  // Models have the light of the room, as far as it is known, and cast shadows on it; or else a fixed light.
+  bool room_light = true;
   double signpost_height = 0.12;  // ratio of its distance at placement
   double model_side = 0.2;        // the same for the largest side of a model without a scale
   maps::PagerOptions memory;      // how much of the library is in memory at once

@@ -39,7 +39,8 @@ class SessionSaving {
         system_(*system),
         mutex_(*mutex),
         state_(*state),
-        maintenance_(library, system, mutex, state, options.occlusion) {}
+        maintenance_(library, system, mutex, state, options.occlusion == Occlusion::kMap,
+                     options.room_light) {}
 
   // Starts the saver's thread; call it once, with a library opened for writing. Without the mutex.
   void Start();

@@ -29,6 +29,9 @@ void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine:
     frame->held_camera_from_map = last_with_pose_->tracked.camera_from_map;
     frame->shown.scene = last_with_pose_->shown.scene;
     frame->shown.surfaces = last_with_pose_->shown.surfaces;
+    frame->shown.occluders = last_with_pose_->shown.occluders;
+    frame->shown.light = last_with_pose_->shown.light;
+    frame->shown.room_light = last_with_pose_->shown.room_light;
   } else {
     last_with_pose_.reset();
   }

@@ -77,11 +77,29 @@ inline Entity TrailEntity(const std::string& name) {
   return entity;
 }
 
-// One entity of each kind.
+inline Entity OccluderEntity(const std::string& name, Occluder::Shape shape = Occluder::Shape::kBox) {
+  Entity entity;
+  entity.name = name;
+  entity.kind = Entity::Kind::kOccluder;
+  entity.occluder.shape = shape;
+  entity.occluder.map_from_shape = {engine::Rotation3::Exp({0.1, 0.7, -0.3}), {0.2, 1.0 / 3, 2}, 1.1};
+  entity.occluder.size = {1, 0.7, 0.6};
+  if (shape == Occluder::Shape::kPlane) entity.occluder.size.z() = 0;
+  if (shape == Occluder::Shape::kCylinder) entity.occluder.size.z() = entity.occluder.size.x();
+  if (shape == Occluder::Shape::kPolygon) {
+    entity.occluder.size.setZero();
+    entity.occluder.outline = {{0, 0}, {1, 0}, {1, 1.0 / 3}, {0.5, 0.1}, {0, 1}};
+  }
+  return entity;
+}
+
+// One entity of each kind; of an occluder, two.
 inline Scene AllKinds() {
   Scene scene;
-  scene.entities = {ModelEntity("helmet"), SignEntity("sign-1"), LabelEntity("label-1"),
-                    ImageEntity("plan"),   SoundEntity("roar"),  TrailEntity("trail-1")};
+  scene.entities = {ModelEntity("helmet"),        SignEntity("sign-1"),
+                    LabelEntity("label-1"),       ImageEntity("plan"),
+                    SoundEntity("roar"),          TrailEntity("trail-1"),
+                    OccluderEntity("occluder-1"), OccluderEntity("occluder-2", Occluder::Shape::kPolygon)};
   return scene;
 }
 

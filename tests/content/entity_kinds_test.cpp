@@ -39,7 +39,7 @@ TEST(EntityKinds, EachIsReadBackAsItWasWritten) {
   EXPECT_THAT(SceneAssetIds(text), ElementsAre("fox", "plan", "roar"));
   const Scene read = DecodeScene(text, "the library", AnyAsset());
   EXPECT_EQ(EncodeScene(read), text);
-  ASSERT_EQ(read.entities.size(), 6u);
+  ASSERT_EQ(read.entities.size(), 8u);
   EXPECT_EQ(read.entities[2].label.offset, scene.entities[2].label.offset);
   EXPECT_EQ(read.entities[2].label.translations, scene.entities[2].label.translations);
   EXPECT_EQ(read.entities[3].kind, Entity::Kind::kImage);
@@ -48,10 +48,12 @@ TEST(EntityKinds, EachIsReadBackAsItWasWritten) {
   EXPECT_EQ(read.entities[4].sound.range, 1.7);
   EXPECT_EQ(read.entities[5].trail.points, scene.entities[5].trail.points);
   EXPECT_EQ(read.entities[5].trail.up, scene.entities[5].trail.up);
+  EXPECT_EQ(read.entities[6].occluder.size, scene.entities[6].occluder.size);
+  EXPECT_EQ(read.entities[7].occluder.outline, scene.entities[7].occluder.outline);
 }
 
 TEST(EntityKinds, AnOlderSceneHasOnlyModelsAndSignposts) {
-  for (const std::size_t index : {2u, 3u, 4u, 5u}) {
+  for (const std::size_t index : {2u, 3u, 4u, 5u, 6u, 7u}) {
     Scene scene;
     scene.entities = {AllKinds().entities[index]};
     if (Translations* const translations = TranslationsOf(&scene.entities[0])) translations->clear();
@@ -98,6 +100,14 @@ TEST(EntityKinds, NumbersOutOfRangeAreRefusedByWriterAndReader) {
   expect_refused("/entities/5/points_m", nlohmann::json::array({{0, 0, 0}}));
   expect_refused("/entities/5/points_m", nlohmann::json(std::vector<std::vector<int>>(201, {0, 0, 0})));
   expect_refused("/entities/5/points_m/0", {0, 0});
+  expect_refused("/entities/6/size/1", 0);
+  expect_refused("/entities/6/size", {1, 1});
+  expect_refused("/entities/6/shape", "sphere");
+  expect_refused("/entities/6/shape", "polygon");
+  expect_refused("/entities/6/map_from_shape/scale", 0);
+  expect_refused("/entities/7/outline", nlohmann::json::array({{0, 0}, {1, 0}}));
+  expect_refused("/entities/7/outline", nlohmann::json(std::vector<std::vector<int>>(65, {0, 0})));
+  expect_refused("/entities/7/outline/1", {0, 0, 0});
   const auto problem_with = [](const auto& change) {
     Scene scene = AllKinds();
     change(&scene.entities);
@@ -118,6 +128,11 @@ TEST(EntityKinds, NumbersOutOfRangeAreRefusedByWriterAndReader) {
               }),
               HasSubstr("201 points"));
   EXPECT_THAT(problem_with([](Entities* all) { (*all)[5].trail.up *= 2; }), HasSubstr("up direction"));
+  EXPECT_THAT(problem_with([](Entities* all) { (*all)[6].occluder.size.x() = kNan; }), HasSubstr("a side"));
+  EXPECT_THAT(problem_with([](Entities* all) {
+                (*all)[7].occluder.outline = {{0, 0}, {1, 1}, {1, 0}, {0, 1.5}};
+              }),
+              HasSubstr("crosses itself"));
 }
 
 TEST(EntityKinds, AFileOfAnotherKindIsRefused) {
@@ -159,7 +174,7 @@ TEST(EntityKinds, TransformingAnEntityTransformsItsPose) {
       const engine::Sim3 expected = motion * PoseOf(before), pose = PoseOf(after);
       EXPECT_LT((PlaceOf(after) - motion * PlaceOf(before)).norm(), 1e-9) << before.name;
       EXPECT_NEAR(pose.scale, expected.scale, 1e-9);
-      if (HasModel(before) || before.kind == Entity::Kind::kTrail) {
+      if (HasModel(before) || before.kind == Entity::Kind::kTrail || before.kind == Entity::Kind::kOccluder) {
         EXPECT_LT((pose.rotation.inverse() * expected.rotation).Angle(), 1e-6) << before.name;
       }
       EXPECT_EQ(PoseProblem(after), "");
@@ -272,15 +287,15 @@ TEST(EntityKinds, CopiesStandBesideTheirOriginals) {
   std::vector<std::string> names;
   for (const Entity& entity : scene.entities) names.push_back(entity.name);
   ApplyChange(DuplicateEdit(scene, names), &scene);
-  ASSERT_EQ(scene.entities.size(), 12u);
-  for (std::size_t i = 0; i < 6; ++i) {
-    EXPECT_EQ(scene.entities[i + 6].kind, scene.entities[i].kind);
-    EXPECT_GT((PlaceOf(scene.entities[i + 6]) - PlaceOf(scene.entities[i])).norm(), 0.05) << names[i];
+  ASSERT_EQ(scene.entities.size(), 16u);
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(scene.entities[i + 8].kind, scene.entities[i].kind);
+    EXPECT_GT((PlaceOf(scene.entities[i + 8]) - PlaceOf(scene.entities[i])).norm(), 0.05) << names[i];
   }
   ApplyChange(PasteEdit(scene, AllKinds().entities), &scene);
-  EXPECT_EQ(scene.entities.size(), 18u);
+  EXPECT_EQ(scene.entities.size(), 24u);
   ApplyChange(RemoveEdit(scene, names), &scene);
-  EXPECT_EQ(scene.entities.size(), 12u);
+  EXPECT_EQ(scene.entities.size(), 16u);
 }
 
 TEST(EntityKinds, AStoredHistoryKnowsThemAndTheirFiles) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <memory>
+#include <vector>
 
 #include "tests/ui/ui_testing.h"
 
@@ -26,20 +27,37 @@ class SurfaceDrawerTest : public OffscreenTest {
                const engine::CameraModel& camera = StronglyDistorted()) {
     if (renderer_ == nullptr) renderer_ = std::make_unique<Renderer>();
     content::Scene scene;
-    scene.entities.push_back(Facing(SquareModel(1.0f, glm::vec4(0, 1, 0, 1)), {0, 0, content_depth}));
-    const engine::TrackedFrame tracked =
-        Tracked(cv::Mat::zeros(camera.height_px(), camera.width_px(), CV_8UC3));
+    scene.entities.push_back(Facing(SquareModel(1.0f, glm::vec4(0, 1, 0, alpha_)), {0, 0, content_depth}));
+    const cv::Mat black = cv::Mat::zeros(camera.height_px(), camera.width_px(), CV_8UC3);
+    const engine::TrackedFrame tracked = Tracked(video_.empty() ? black : video_);
     View view;
     view.tracked = &tracked;
     view.camera = &camera;
     view.scene = &scene;
     view.surfaces = std::move(surfaces);
+    view.shadows = false;
+    scene.entities.insert(scene.entities.end(), occluders_.begin(), occluders_.end());
+    view.occluders = occluders_count_;
+    view.overlay.markers = markers_;
     view.overlay.hud = false;
     renderer_->Draw(view);
     cv::Mat image;
     renderer_->ReadBack(&image);
     return image;
   }
+  // A rectangle of 18 units in height across the z axis of the map.
+  static content::Entity PlacedScreen(double left, double right, double depth) {
+    content::Entity entity;
+    entity.kind = content::Entity::Kind::kOccluder;
+    entity.occluder.shape = content::Occluder::Shape::kPlane;
+    entity.occluder.size = {right - left, 18, 0};
+    entity.occluder.map_from_shape.translation = {0.5 * (left + right), 0, depth};
+    return entity;
+  }
+  std::vector<content::Entity> occluders_;  // In the drawn scenes.
+  bool occluders_count_ = true, markers_ = false;
+  cv::Mat video_;  // Empty: black.
+  float alpha_ = 1;
   static int Green(const cv::Mat& image) {
     cv::Mat channel;
     cv::extractChannel(image, channel, 1);
@@ -86,10 +104,75 @@ TEST_F(SurfaceDrawerTest, PutsEdgesWhereTheLensShowsThem) {
   }
 }
 
+TEST_F(SurfaceDrawerTest, PutsEdgesOnTheEdgesOfTheImageNearThem) {
+  // The surface ends at x = 0.15, where the image has its edge two pixels farther to the left.
+  const engine::CameraModel camera = StronglyDistorted();
+  const double edge = camera.Project({0.15, 0, 1})->x() - 2;
+  video_ = cv::Mat(camera.height_px(), camera.width_px(), CV_8UC3, cv::Scalar::all(30));
+  video_(cv::Rect(static_cast<int>(std::ceil(edge)), 0, camera.width_px() - static_cast<int>(std::ceil(edge)),
+                  camera.height_px())) = cv::Scalar::all(120);
+  const cv::Mat image = Draw(1.5, Screen(0.15F, 9, 1));
+  const int row = static_cast<int>(std::lround(camera.Project({0.15, 0, 1})->y()));
+  int visible = 0;
+  for (int x = 0; x < image.cols; ++x) {
+    if (image.at<cv::Vec3b>(row, x)[1] > 190) visible = x;
+  }
+  EXPECT_NEAR(visible + 0.5, edge, 1.0);
+}
+
+TEST_F(SurfaceDrawerTest, MakesEdgesSoftInAPlainImage) {
+  const cv::Mat image = Draw(1.5, Screen(0.15F, 9, 1));
+  const int row = image.rows / 2;
+  int between = 0;
+  for (int x = 0; x < image.cols; ++x) {
+    const int green = image.at<cv::Vec3b>(row, x)[1];
+    between += green > 20 && green < 235;
+  }
+  EXPECT_GE(between, 2);
+  EXPECT_LE(between, 7) << "the radius of the filter to both sides";
+}
+
+TEST_F(SurfaceDrawerTest, HidesContentThatIsSeenThrough) {
+  alpha_ = 0.5F;
+  ASSERT_GT(cv::mean(Draw(2, nullptr))[1], 5);
+  EXPECT_EQ(cv::mean(Draw(2, Screen(-9, 9, 1)))[1], 0);
+}
+
 TEST_F(SurfaceDrawerTest, WorksInEveryFaceOfAFisheyeLens) {
   const engine::CameraModel camera(engine::LensModel::kKannalaBrandt, {480, 480, 140, 140, 240, 240}, {});
   ASSERT_GT(Green(Draw(0.3, nullptr, camera)), 10'000) << "the square must reach beyond one face";
   EXPECT_EQ(Green(Draw(0.3, Screen(-9, 9, 0.2F), camera)), 0);
+}
+
+TEST_F(SurfaceDrawerTest, OccludersHideWhatIsBehindThemUnlessTheyAreSwitchedOff) {
+  const int all = Green(Draw(2, nullptr));
+  occluders_ = {PlacedScreen(-9, 0, 1.95)};
+  EXPECT_NEAR(Green(Draw(2, nullptr)), 0.5 * all, 0.01 * all);
+  occluders_[0].hidden = true;
+  EXPECT_EQ(Green(Draw(2, nullptr)), all);
+  occluders_[0].hidden = false;
+  occluders_count_ = false;
+  EXPECT_EQ(Green(Draw(2, nullptr)), all);
+}
+
+TEST_F(SurfaceDrawerTest, OccludersReplaceTheSurfacesThatTheyStandFor) {
+  const int all = Green(Draw(2, nullptr));
+  // The map has a wall that is too near, before the content; the author says that it is behind.
+  occluders_ = {PlacedScreen(-9, 9, 2.1)};
+  EXPECT_EQ(Green(Draw(2, Screen(-9, 9, 1.9F))), all);
+  // A surface far from the occluder still hides.
+  EXPECT_NEAR(Green(Draw(2, Screen(-9, 0, 0.5F))), 0.5 * all, 0.01 * all);
+  occluders_.clear();
+  EXPECT_EQ(Green(Draw(2, Screen(-9, 9, 1.9F))), 0) << "the surface counts again";
+}
+
+TEST_F(SurfaceDrawerTest, OnlyAuthorsSeeAnOccluder) {
+  occluders_ = {PlacedScreen(-9, 9, 3)};
+  const cv::Mat visitor = Draw(2, nullptr);
+  occluders_count_ = false;
+  EXPECT_EQ(cv::norm(visitor, Draw(2, nullptr), cv::NORM_INF), 0);
+  markers_ = true;
+  EXPECT_GT(cv::norm(visitor, Draw(2, nullptr), cv::NORM_INF), 50);
 }
 
 }  // namespace

@@ -73,6 +73,9 @@ class AskedFor : public AuthoringActions {
     words.push_back("offset " + name);
   }
   void ShortenTrail(const std::string& name) override { words.push_back("shorten " + name); }
+  void SetOccluderSize(const std::string& name, const Eigen::Vector3d&) override {
+    words.push_back("resize " + name);
+  }
   void SetTarget(const std::string& name, const std::string& to_map) override {
     words.push_back("target " + name + " " + to_map);
   }
@@ -248,7 +251,7 @@ TEST_F(InterfaceOnScreen, TheListSelects) {
   facts_.map_name = "Hall";
   Draw();
   // The rows are below the header of the list: clicks from top to bottom meet both in order.
-  for (double y = 322; y < 640 && asked_.words.size() < 1; y += 14) Click({layout_.panel.x + 40, y});
+  for (double y = 350; y < 660 && asked_.words.size() < 1; y += 14) Click({layout_.panel.x + 40, y});
   EXPECT_THAT(asked_.words, ElementsAre("select sign-1"));
 }
 

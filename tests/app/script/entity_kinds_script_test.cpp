@@ -8,7 +8,7 @@
 #include "engine/base/random.h"
 #include "tests/support/error_of.h"
 
-// Commands of labels, images, sounds, trails and translations.
+// Commands of labels, images, sounds, trails, occluders and translations.
 namespace docent::app {
 namespace {
 
@@ -37,6 +37,20 @@ TEST(EntityKindsScript, ReadsTheCommandsOfTheManual) {
   EXPECT_EQ(Parsed("trail extend trail-1 to pixel 1 2"),
             Command(ExtendTrail{"trail-1", {{0, 0, 0}, Eigen::Vector2d(1, 2)}}));
   EXPECT_EQ(Parsed("trail shorten \"to\""), Command(ShortenTrail{"to"}));
+  using Shape = content::Occluder::Shape;
+  const Eigen::Vector2d pixel(1, 2);
+  EXPECT_EQ(Parsed("occluder box at pixel 1 2"),
+            Command(PlaceOccluder{Shape::kBox, std::nullopt, {{{0, 0, 0}, pixel}}}));
+  EXPECT_EQ(Parsed("occluder box size 1 2 3 at 4 5 6 yaw 30"),
+            Command(PlaceOccluder{Shape::kBox, Eigen::Vector3d(1, 2, 3), {{{4, 5, 6}}}, 30}));
+  EXPECT_EQ(Parsed("occluder cylinder size 1 2 at 4 5 6"),
+            Command(PlaceOccluder{Shape::kCylinder, Eigen::Vector3d(1, 2, 1), {{{4, 5, 6}}}}));
+  EXPECT_EQ(Parsed("occluder plane size 1 2 at pixel 1 2 upright"),
+            Command(PlaceOccluder{Shape::kPlane, Eigen::Vector3d(1, 2, 0), {{{0, 0, 0}, pixel}}, 0, true}));
+  EXPECT_EQ(
+      Parsed("occluder polygon at 0 0 1, pixel 1 2, 1 0 1"),
+      Command(PlaceOccluder{Shape::kPolygon, std::nullopt, {{{0, 0, 1}}, {{0, 0, 0}, pixel}, {{1, 0, 1}}}}));
+  EXPECT_EQ(Parsed("size occluder-1 1 2 0"), Command(ResizeOccluder{"occluder-1", {1, 2, 0}}));
   EXPECT_EQ(Parsed("text label-1 Löwe in de-AT"), Command(SetEntityText{"label-1", "Löwe", "de-AT"}));
   EXPECT_EQ(Parsed("text label-1 \"\" in de"), Command(SetEntityText{"label-1", "", "de"}));
 }
@@ -63,6 +77,19 @@ TEST(EntityKindsScript, RefusesWhatIsNotOfItsForm) {
                            "trail extend a to 0 0 1, 0 0 2",
                            "trail extend a 0 0 1",
                            "trail shorten",
+                           "occluder at 0 0 1",
+                           "occluder sphere at 0 0 1",
+                           "occluder box size 1 2 at 0 0 1",
+                           "occluder box size 1 2 0 at 0 0 1",
+                           "occluder plane size 1 -2 at 0 0 1",
+                           "occluder cylinder size 1 2e6 at 0 0 1",
+                           "occluder box at 0 0 1, 0 0 2",
+                           "occluder box at 0 0 1 upright",
+                           "occluder plane at 0 0 1 yaw 3",
+                           "occluder polygon at 0 0 1, 0 1 1",
+                           "occluder polygon size 1 1 at 0 0 1, 0 1 1, 1 0 1",
+                           "size a 1 2",
+                           "size a 1 2 -1",
                            "text a \"\"",
                            "text a b in",
                            "text a b in x",
@@ -99,11 +126,22 @@ TEST(EntityKindsScript, EachIsReadBackEqualAfterWriting) {
     PlaceTrail trail;
     for (std::size_t n = 2 + random.Below(5); n > 0; --n) trail.points.push_back(place());
     if (coin()) trail.width = random.Uniform(0.1, 5);
-    for (const Command& command : {Command(label), Command(image), Command(sound), Command(trail),
-                                   Command(ExtendTrail{text(), place()}), Command(ShortenTrail{text()}),
-                                   Command(SetLabelOffset{text(), point()}),
-                                   Command(SetEntityText{text(), text(), coin() ? "de" : ""}),
-                                   Command(SetEntityText{text(), "", "es-419"})}) {
+    PlaceOccluder occluder{static_cast<content::Occluder::Shape>(random.Below(3)), std::nullopt, {place()}};
+    const bool is_plane = occluder.shape == content::Occluder::Shape::kPlane;
+    const bool is_box = occluder.shape == content::Occluder::Shape::kBox;
+    const double width = random.Uniform(0.1, 5);
+    if (coin()) occluder.size = {width, random.Uniform(0.1, 5), is_plane ? 0 : is_box ? 2.0 / 3 : width};
+    if (is_box && coin()) occluder.yaw_deg = number();
+    if (is_plane) occluder.upright = coin();
+    PlaceOccluder polygon{content::Occluder::Shape::kPolygon, std::nullopt, {}};
+    for (std::size_t n = 3 + random.Below(5); n > 0; --n) polygon.points.push_back(place());
+    for (const Command& command :
+         {Command(occluder), Command(polygon), Command(ResizeOccluder{text(), point().cwiseAbs()}),
+          Command(label), Command(image), Command(sound), Command(trail),
+          Command(ExtendTrail{text(), place()}), Command(ShortenTrail{text()}),
+          Command(SetLabelOffset{text(), point()}),
+          Command(SetEntityText{text(), text(), coin() ? "de" : ""}),
+          Command(SetEntityText{text(), "", "es-419"})}) {
       ASSERT_EQ(Validate(command), "") << FormatCommand(command);
       EXPECT_EQ(Parsed(FormatCommand(command)), command) << FormatCommand(command);
     }

@@ -32,7 +32,7 @@ class AbsurdCommands {
   explicit AbsurdCommands(std::uint64_t seed) : random_(seed) {}
 
   Command Next() {
-    switch (random_.Below(35)) {
+    switch (random_.Below(37)) {
       case 0:
         return NewMap{Name()};
       case 1:
@@ -90,6 +90,17 @@ class AbsurdCommands {
         return ExtendTrail{Name(), Place()};
       case 30:
         return ShortenTrail{Name()};
+      case 34: {
+        PlaceOccluder occluder;
+        occluder.shape = static_cast<content::Occluder::Shape>(random_.Below(4));
+        for (std::size_t n = random_.Below(6); n > 0; --n) occluder.points.push_back(Place());
+        occluder.size = Perhaps<Eigen::Vector3d>([&] { return Vector(); });
+        occluder.yaw_deg = random_.Below(3) == 0 ? Number() : 0;
+        occluder.upright = random_.Below(2) == 0;
+        return occluder;
+      }
+      case 35:
+        return ResizeOccluder{Name(), Vector()};
       case 31:
         return SetLabelOffset{Name(), Vector()};
       case 18:
@@ -157,8 +168,9 @@ class AbsurdCommands {
     return texts[random_.Below(texts.size())];
   }
   std::string Name() {
-    const std::array<std::string, 10> names = {"label-1", "trail-1", "exhibit", "exhibit-2", "exhibit-3",
-                                               "sign-1",  "sign-2",  "sign-3",  "here",      "exhibit-2-2"};
+    const std::array<std::string, 11> names = {"occluder-1", "label-1",   "trail-1",    "exhibit",
+                                               "exhibit-2",  "exhibit-3", "sign-1",     "sign-2",
+                                               "sign-3",     "here",      "exhibit-2-2"};
     return random_.Below(6) == 0 ? Text() : names[random_.Below(names.size())];
   }
   std::vector<std::string> Names() {

@@ -60,7 +60,7 @@ class StoredSurfaces : public ::testing::Test {
   StoredSurfaces() { library_.Save({key_, "Table", maps::Policy::kOpen, MapOfAWalk(), nullptr}); }
 
   // What a session that has the map in memory shows with a frame in it.
-  Session::Shown ShownInSession(bool occlusion) {
+  Session::Shown ShownInSession(Occlusion occlusion) {
     SessionOptions options = Options(Pace::kEager, "");
     options.maintenance = false;
     options.occlusion = occlusion;
@@ -81,12 +81,14 @@ class StoredSurfaces : public ::testing::Test {
 };
 
 TEST_F(StoredSurfaces, AreShownWithTheirMapUnlessSwitchedOff) {
-  EXPECT_FALSE(ShownInSession(true).surfaces) << "the map has no mesh yet";
+  EXPECT_FALSE(ShownInSession(Occlusion::kMap).surfaces) << "the map has no mesh yet";
   ASSERT_TRUE(library_.SaveMesh(key_, *MeshOf(*MapOfAWalk())));
-  const Session::Shown shown = ShownInSession(true);
+  const Session::Shown shown = ShownInSession(Occlusion::kMap);
   ASSERT_TRUE(shown.surfaces);
   EXPECT_EQ(shown.surfaces->triangles.size(), 1U);
-  EXPECT_FALSE(ShownInSession(false).surfaces);
+  EXPECT_FALSE(ShownInSession(Occlusion::kProxies).surfaces);
+  EXPECT_TRUE(ShownInSession(Occlusion::kProxies).occluders);
+  EXPECT_FALSE(ShownInSession(Occlusion::kOff).occluders);
 }
 
 TEST_F(StoredSurfaces, AreComputedWhileTheSessionIsIdle) {

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/room_shadows.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ui/axes.h"
+#include "ui/room_shaders.h"
+#include "ui/shaders.h"
+
+namespace docent::ui {
+namespace {
+
+// A caster that fills the view is seen with about this many pixels; a shadow is softer than its caster.
+constexpr int kMainSide_px = 512, kContactSide_px = 256;
+// How far from the ground a caster takes light away from it, relative to the caster's size. At a distance of
+// a seventh of its size, a disk covers less than a twentieth of the sky seen from beside its rim.
+constexpr float kContactReach = 0.15f;
+// The longest shadow, relative to the height of its caster: that of a light 18 degrees above the ground.
+constexpr float kLongestShadow = 3.0f;
+
+glm::vec3 AnyAcross(const glm::vec3& direction) {
+  const glm::vec3 axis = std::abs(direction.x) < 0.6f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+  return glm::normalize(glm::cross(direction, axis));
+}
+
+// An orthographic view along a unit direction of a sphere, whose depth is 0 on its near side and 1 on its far
+// side.
+glm::mat4 ClipOfSphere(const glm::vec3& middle, float radius, const glm::vec3& along) {
+  const glm::vec3 right = AnyAcross(along), above = glm::cross(right, along);
+  glm::mat4 clip(0.0f);
+  for (int i = 0; i < 3; ++i) {
+    clip[i][0] = right[i] / radius;
+    clip[i][1] = above[i] / radius;
+    clip[i][2] = along[i] / radius;
+  }
+  clip[3] = glm::vec4(-glm::dot(right, middle) / radius, -glm::dot(above, middle) / radius,
+                      -glm::dot(along, middle) / radius, 1.0f);
+  return clip;
+}
+
+}  // namespace
+
+RoomShadows::RoomShadows()
+    : surface_program_("shadow on surfaces", kFullScreenVertexShader, ShadowOnSurfacesShader().c_str()),
+      plane_program_("shadow on a plane", kPlaneVertexShader, ShadowOnPlaneShader().c_str()),
+      main_(kMainSide_px),
+      contact_(kContactSide_px) {
+  for (const GlProgram* const program : {&surface_program_, &plane_program_})
+    program->AssignTextureUnits({"surface_depth", "main_depth", "contact_depth"});
+}
+
+void RoomShadows::Prepare(const MeshDrawer& meshes, std::span<const PinholeView> views,
+                          const engine::LightEstimate* light) {
+  meshes.CastersIn(views, &casters_);
+  if (casters_.empty()) return;
+  Box all;
+  glm::vec3 up(0.0f);
+  float size = 0;
+  for (const MeshDrawer::Caster& caster : casters_) {
+    all.Include(caster.box.low);
+    all.Include(caster.box.high);
+    up += caster.up;
+    size += glm::length(caster.box.high - caster.box.low) / static_cast<float>(casters_.size());
+  }
+  up_ = glm::dot(up, up) > 1e-6f ? glm::normalize(up) : casters_.front().up;
+  middle_ = 0.5f * (all.low + all.high);
+  contact_reach_ = kContactReach * size;
+  radius_ = 0.5f * glm::length(all.high - all.low) + contact_reach_;
+  main_strength_ = 0;
+  if (light != nullptr) {
+    to_light_ = GlmFrom(light->to_light);
+    const float slope = glm::dot(up_, to_light_);
+    const auto all_light = static_cast<float>(light->BrightnessOf(Eigen::Vector3d(up_.x, up_.y, up_.z)));
+    if (slope > 0 && all_light > 0)
+      main_strength_ = std::clamp(static_cast<float>(light->direct) * slope / all_light, 0.0f, 1.0f);
+  }
+  reach_ = {};
+  for (const MeshDrawer::Caster& caster : casters_) {
+    for (int i = 0; i < 8; ++i) {
+      const glm::vec3 corner = caster.box.Corner(i);
+      reach_.Include(corner - glm::vec3(contact_reach_));
+      reach_.Include(corner + glm::vec3(contact_reach_));
+      if (main_strength_ == 0) continue;
+      const float height = std::max(0.0f, glm::dot(corner - caster.base, up_));
+      const float slope = std::max(glm::dot(to_light_, up_), 1.0f / kLongestShadow);
+      reach_.Include(corner - to_light_ * (height / slope));
+    }
+  }
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  glDepthMask(GL_TRUE);
+  glDisable(GL_CULL_FACE);
+  DrawCasters(meshes, up_, &contact_);
+  if (main_strength_ > 0) DrawCasters(meshes, -to_light_, &main_);
+  glDisable(GL_DEPTH_TEST);
+}
+
+void RoomShadows::DrawCasters(const MeshDrawer& meshes, const glm::vec3& along, DepthImage* image) const {
+  image->clip_from_map = ClipOfSphere(middle_, radius_, along);
+  image->target.BindForDrawing();
+  glClear(GL_DEPTH_BUFFER_BIT);
+  meshes.DrawDepth(image->clip_from_map, MeshDrawer::Part::kCasters);
+}
+
+void RoomShadows::SetUniforms(const GlProgram& program, const glm::mat4& clip_from_map,
+                              GLuint surface_depth) const {
+  program.Use();
+  const auto set_matrix = [&](const char* name, const glm::mat4& m) {
+    glUniformMatrix4fv(program.Uniform(name), 1, GL_FALSE, &m[0][0]);
+  };
+  set_matrix("clip_from_map", clip_from_map);
+  set_matrix("map_from_clip", glm::inverse(clip_from_map));
+  set_matrix("main_from_map", main_.clip_from_map);
+  set_matrix("contact_from_map", contact_.clip_from_map);
+  glUniform1f(program.Uniform("main_strength"), main_strength_);
+  glUniform1f(program.Uniform("contact_reach"), contact_reach_ / (2.0f * radius_));
+  const GLuint textures[] = {surface_depth, main_.target.texture(), contact_.target.texture()};
+  for (int unit = 0; unit < 3; ++unit) {
+    glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
+    glBindTexture(GL_TEXTURE_2D, textures[unit]);
+  }
+}
+
+void RoomShadows::Draw(const glm::mat4& clip_from_map, const glm::ivec4& viewport,
+                       GLuint surface_depth) const {
+  glEnable(GL_BLEND);
+  glBlendEquation(GL_MAX);
+  glBindVertexArray(empty_vertex_array_.name());
+  SetUniforms(surface_program_, clip_from_map, surface_depth);
+  glUniform4iv(surface_program_.Uniform("viewport"), 1, &viewport[0]);
+  DrawFullScreenTriangle();
+  SetUniforms(plane_program_, clip_from_map, surface_depth);
+  for (const MeshDrawer::Caster& caster : casters_) {
+    const glm::vec3 right = AnyAcross(caster.up);
+    const float side =
+        glm::length(caster.box.high - caster.box.low) * (main_strength_ > 0 ? 0.5f + kLongestShadow : 0.5f) +
+        contact_reach_;
+    const glm::vec3 half_u = side * right, half_v = side * glm::cross(caster.up, right);
+    glUniform3fv(plane_program_.Uniform("middle"), 1, &caster.base[0]);
+    glUniform3fv(plane_program_.Uniform("half_u"), 1, &half_u[0]);
+    glUniform3fv(plane_program_.Uniform("half_v"), 1, &half_v[0]);
+    glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
+  }
+  glBlendEquation(GL_FUNC_ADD);
+  glDisable(GL_BLEND);
+  glBindVertexArray(0);
+}
+
+}  // namespace docent::ui

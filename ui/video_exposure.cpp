@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/video_exposure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "engine/dense/surface_samples.h"
+
+namespace docent::ui {
+namespace {
+
+// The median of this many ratios of patches, which differ by a tenth with noise and view, is right to 3 %.
+constexpr std::size_t kLeastPoints = 20;
+// A jump of the exposure is followed at once; smaller changes are mostly noise of the median.
+constexpr double kJump = 0.15, kSmoothing = 0.3;
+// The balance changes slowly: a second at 30 images/s.
+constexpr double kBalanceSmoothing = 0.03;
+constexpr double kBelief = 0.5;           // The part of the estimated white balance that counts.
+constexpr double kLargestBalance = 0.25;  // As a logarithm: beyond it, it is the colour of things.
+constexpr int kDarkest = 6, kBrightest = 250;
+
+const std::array<double, 256>& LinearTable() {
+  static const std::array<double, 256> kTable = [] {
+    std::array<double, 256> table{};
+    for (int level = 0; level < 256; ++level)
+      table[static_cast<std::size_t>(level)] = engine::LinearFromLevel(level);
+    return table;
+  }();
+  return kTable;
+}
+
+// As cv::cvtColor.
+int Gray(const cv::Mat& image, int x, int y) {
+  if (image.type() == CV_8UC1) return image.at<std::uint8_t>(y, x);
+  const auto& bgr = image.at<cv::Vec3b>(y, x);
+  return (1868 * bgr[0] + 9617 * bgr[1] + 4899 * bgr[2] + 8192) >> 14;
+}
+
+// The mean linear brightness of 3 x 3 pixels that are `step` apart; empty at the border and where one is
+// saturated or black.
+std::optional<double> Brightness(const cv::Mat& image, const Eigen::Vector2f& pixel, int step) {
+  const auto x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
+  if (x < step || y < step || x + step >= image.cols || y + step >= image.rows) return std::nullopt;
+  double sum = 0;
+  for (int v = -step; v <= step; v += step) {
+    for (int u = -step; u <= step; u += step) {
+      const int level = Gray(image, x + u, y + v);
+      if (level < kDarkest || level > kBrightest) return std::nullopt;
+      sum += LinearTable()[static_cast<std::size_t>(level)];
+    }
+  }
+  return sum / 9;
+}
+
+}  // namespace
+
+double VideoExposure::GainOf(const engine::TrackedFrame& tracked) {
+  const cv::Mat& image = tracked.frame.image;
+  const std::size_t stride = std::max<std::size_t>(1, tracked.matches.size() / kMaxPoints);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < tracked.matches.size() && count < kMaxPoints; i += stride) {
+    const engine::PointMatch& match = tracked.matches[i];
+    if (!match.inlier) continue;
+    const engine::MapPoint* const point = tracked.map->FindPoint(match.point);
+    const engine::KeyFrame* const source =
+        point != nullptr ? tracked.map->FindKeyFrame(point->source_keyframe) : nullptr;
+    if (source == nullptr) continue;
+    source->features->MarkInUse();
+    const auto then = Brightness(source->features->levels[point->source_level], point->source_pixel, 1);
+    const auto now = Brightness(image, match.pixel, 1 << match.level);
+    if (then && now) ratios_[count++] = *now / *then;
+  }
+  if (count < kLeastPoints) return 0;
+  const auto middle = ratios_.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(ratios_.begin(), middle, ratios_.begin() + static_cast<std::ptrdiff_t>(count));
+  return *middle;
+}
+
+// The colour of the light by the Minkowski norm of degree 6 of the image (Finlayson and Trezzi, 2004).
+void VideoExposure::Balance(const cv::Mat& bgr) {
+  if (bgr.type() != CV_8UC3) return;
+  constexpr int kSamples = 48;  // Along each side.
+  glm::dvec3 sum(0);
+  for (int v = 0; v < kSamples; ++v) {
+    for (int u = 0; u < kSamples; ++u) {
+      const auto& pixel = bgr.at<cv::Vec3b>(v * bgr.rows / kSamples, u * bgr.cols / kSamples);
+      if (std::max({pixel[0], pixel[1], pixel[2]}) > kBrightest) continue;
+      for (int c = 0; c < 3; ++c) sum[c] += std::pow(LinearTable()[pixel[2 - c]], 6);
+    }
+  }
+  if (!(sum.x > 0 && sum.y > 0 && sum.z > 0)) return;
+  glm::dvec3 logs = glm::log(sum) / 6.0;
+  logs -= (logs.x + logs.y + logs.z) / 3;
+  logs = glm::clamp(kBelief * logs, -kLargestBalance, kLargestBalance);
+  log_balance_ = is_known_ ? glm::mix(log_balance_, logs, kBalanceSmoothing) : logs;
+}
+
+const glm::vec3& VideoExposure::Update(const engine::TrackedFrame* tracked) {
+  if (tracked == nullptr || tracked->map == nullptr || tracked->frame.image.empty()) return exposure_;
+  const double gain = GainOf(*tracked);
+  if (!(gain > 0)) return exposure_;
+  if (tracked->map_key != map_key_) is_known_ = false;
+  map_key_ = tracked->map_key;
+  const double log_gain = std::log(gain);
+  const bool jumps = !is_known_ || std::abs(log_gain - log_gain_) > kJump;
+  log_gain_ = jumps ? log_gain : std::lerp(log_gain_, log_gain, kSmoothing);
+  Balance(tracked->frame.image);
+  is_known_ = true;
+  exposure_ = glm::vec3(glm::exp(log_balance_ + log_gain_));
+  return exposure_;
+}
+
+}  // namespace docent::ui
