@@ -65,6 +65,7 @@ bool HasCard(const Entity& entity) {
     case Entity::Kind::kLabel:
       return !entity.label.text.empty();
     case Entity::Kind::kTrail:
+    case Entity::Kind::kOccluder:
       break;
   }
   return false;
