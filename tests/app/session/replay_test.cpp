@@ -71,6 +71,9 @@ std::vector<Planned> EveryCommand() {
   then(ExtendTrail{"trail-1", {{0, 0, 0}, pixel}});
   then(ShortenTrail{"trail-1"});
   then(MoveEntity{"trail-1", {0.01, 0, 0}, std::nullopt});
+  then(PlaceOccluder{
+      content::Occluder::Shape::kBox, Eigen::Vector3d(0.1, 1.0 / 3, 0.2), {{{0, 0, 0}, pixel}}, 30});
+  then(ResizeOccluder{"occluder-1", {0.2, 1.0 / 7, 0.3}});
   then(DuplicateEntities{{"label-1", "plan", "bell", "trail-1"}});
   then(RemoveEntities{{"exhibit-2"}});
   then(SetMapScale{pixel, other, 0.5});
