@@ -225,7 +225,7 @@ TEST(ContentCommand, AddsModelsAndSignpostsToASavedMap) {
   ExpectErrorLine(arguments({model, "--at", "0", "0", "0", "--rotation", "1", "1", "0", "0"}), 2, "length 1");
   ExpectErrorLine(arguments({model, "--at", "0", "0", "0", "--signpost", "x"}), 2, "excludes");
   ExpectErrorLine(arguments({model}), 2, "--at is required");
-  ExpectErrorLine(arguments({"--at", "0", "0", "0"}), 2, "--signpost TEXT, --label TEXT or --trail POINTS");
+  ExpectErrorLine(arguments({"--at", "0", "0", "0"}), 2, "--label TEXT, --trail POINTS or --occluder SHAPE");
   EXPECT_EQ(list_content(), before);
 
   ExpectErrorLine(arguments({"--signpost", "x", "--at", "0", "0", "0", "--to", "Desk"}), 1, "its own map");
