@@ -129,8 +129,8 @@ struct Occluder {
     kCylinder,  // The same, about the y axis.
     kPolygon,   // A flat area across z.
   };
-  Shape shape = Shape::kBox;  // What it is.
-  engine::Sim3 map_from_shape;
+  Shape shape = Shape::kBox;    // What it is.
+  engine::Sim3 map_from_shape;  // Where it is.
   // Width, height and depth; the depth of a plane is 0, that of a cylinder its width. Not of a polygon.
   Eigen::Vector3d size = Eigen::Vector3d::Ones();
   // Of a polygon: its corners in x and y, kMinOutlinePoints to kMaxOutlinePoints, in either direction.

@@ -63,15 +63,15 @@ struct VisitorDisplay {
   bool is_right_to_left = false;         // Texts begin at the right.
   // What has a card, and which of it the one button opens.
   std::vector<CardTarget> targets;
-  std::optional<std::size_t> marked;
+  std::optional<std::size_t> marked;  // Index in `targets`.
   // With gaze alone: how much of the time has passed after which what is looked at opens, 0 to 1. Empty
   // without.
   std::optional<double> dwell;
-  std::optional<Card> card;
+  std::optional<Card> card;  // The one that is open.
   // The choices of the menu while it is open, and the one that is chosen by the next long press.
   std::vector<std::string> menu;
-  std::size_t chosen = 0;
-  bool has_menu_button = false;
+  std::size_t chosen = 0;        // Index in `menu`.
+  bool has_menu_button = false;  // Where a touch opens the menu.
 };
 
 // What is drawn besides the video and the content.
@@ -97,10 +97,10 @@ struct Overlay {
   const engine::TrackedFrame* inset = nullptr;
   // The content that the other camera sees, with its lens; null for none.
   const content::Scene* inset_scene = nullptr;
-  const engine::CameraModel* inset_camera = nullptr;
-  std::string inset_text;  // Where the other camera is, below its image.
-  bool markers = false;    // Where sounds are, for authors.
-  std::string caption;     // Of the sounds that play, near the bottom; empty for none.
+  const engine::CameraModel* inset_camera = nullptr;  // That lens.
+  std::string inset_text;                             // Where the other camera is, below its image.
+  bool markers = false;                               // Where sounds are, for authors.
+  std::string caption;  // Of the sounds that play, near the bottom; empty for none.
 };
 
 // The size and place of the texts over the image.

@@ -27,7 +27,7 @@ struct ReadoutMotion {
   // Seconds from the exposure of the first column, and of the first row, to that of the last; negative if the
   // last is exposed first.
   Eigen::Vector2d readout_s = Eigen::Vector2d::Zero();
-
+  // Whether all numbers are equal.
   bool operator==(const ReadoutMotion& other) const {
     return rotation_rate == other.rotation_rate && readout_s == other.readout_s;
   }
