@@ -25,7 +25,7 @@ struct ReadoutOptions {
   double kept_per_frame = 0.995, kept_per_change = 0.3;
   // A readout time is used once it differs from zero by this many standard deviations and seconds, and from
   // then on follows changes of at least `min_change_s`. Errors of a calibration looked like up to 3.5 ms in
-  // real recordings; no rolling shutter is known to be faster than twice that.
+  // real recordings; this is twice that. A faster shutter counts as global.
   double min_sigmas = 4;
   double min_readout_s = 0.007;
   double min_change_s = 0.001;
