@@ -1,64 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mapping/bundle/map_adjustment.h"
 
-#include <algorithm>
-#include <map>
-#include <set>
-#include <utility>
-#include <vector>
-
 #include "engine/base/option_check.h"
+#include "engine/mapping/bundle/map_assembly.h"
 #include "engine/mapping/panorama/panorama_registration.h"
 
 namespace docent::engine {
 
 namespace {
 
-// A bundle problem with the map ids of its cameras and points.
-struct Assembly {
-  BundleProblem problem;
-  std::vector<KeyFrameId> cameras;
-  std::vector<MapPointId> points;
-};
-
-Assembly Assemble(Map* map, const std::set<KeyFrameId>& free, const std::set<KeyFrameId>& fixed,
-                  std::vector<MapPointId> points) {
-  Assembly assembly;
-  assembly.points = std::move(points);
-  std::map<KeyFrameId, std::pair<int, const Map::KeyFrameRecord*>> cameras;
-  const auto add = [&](KeyFrameId id, bool hold) {
-    const Map::KeyFrameRecord* record = map->FindKeyFrame(id);
-    cameras[id] = {static_cast<int>(assembly.cameras.size()), record};
-    assembly.cameras.push_back(id);
-    assembly.problem.cameras.push_back({record->keyframe.camera, record->keyframe.camera_from_map, hold});
-  };
-  for (const KeyFrameId id : free) add(id, map->FindKeyFrame(id)->keyframe.fixed);
-  for (const KeyFrameId id : fixed) add(id, true);
-  std::size_t most = 0;
-  for (const MapPointId id : assembly.points) most += map->FindPoint(id)->observers.size();
-  assembly.problem.points.reserve(assembly.points.size());
-  assembly.problem.measurements.reserve(most);
-  std::vector<std::pair<int, const Map::KeyFrameRecord*>> observers;
-  for (std::size_t i = 0; i < assembly.points.size(); ++i) {
-    const Map::PointRecord* record = map->FindPoint(assembly.points[i]);
-    assembly.problem.points.push_back({record->point.position(), false});
-    observers.clear();
-    for (const KeyFrameId id : record->observers)
-      if (const auto camera = cameras.find(id); camera != cameras.end()) observers.push_back(camera->second);
-    std::sort(observers.begin(), observers.end());
-    for (const auto& [camera, keyframe] : observers) {
-      const auto observation =
-          std::lower_bound(keyframe->observations.begin(), keyframe->observations.end(), assembly.points[i],
-                           [](const Observation& before, MapPointId id) { return before.point < id; });
-      if (observation == keyframe->observations.end() || observation->point != assembly.points[i]) continue;
-      assembly.problem.measurements.push_back({camera, static_cast<int>(i), observation->pixel,
-                                               static_cast<float>(1 << observation->level), false});
-    }
-  }
-  return assembly;
-}
-
-BundleSummary Solve(const BundleOptions& options, Assembly* assembly, Map* map) {
+BundleSummary Solve(const BundleOptions& options, MapAssembly* assembly, Map* map) {
   const BundleSummary summary = AdjustBundle(options, &assembly->problem);
   if (summary.outcome == BundleSummary::Outcome::kFailed) return summary;
   const PanoramaRegistration registration(*map);
@@ -88,22 +39,6 @@ BundleSummary Solve(const BundleOptions& options, Assembly* assembly, Map* map) 
   return summary;
 }
 
-// In ascending order of id.
-std::vector<MapPointId> FinitePointsSeenBy(Map* map, const std::set<KeyFrameId>& keyframes) {
-  std::vector<MapPointId> points;
-  for (const KeyFrameId id : keyframes)
-    for (const Observation& observation : map->FindKeyFrame(id)->observations)
-      points.push_back(observation.point);
-  std::sort(points.begin(), points.end());
-  points.erase(std::unique(points.begin(), points.end()), points.end());
-  std::erase_if(points, [&](MapPointId id) {
-    const Map::PointRecord* record = map->FindPoint(id);
-    return !record || record->point.infinite();
-  });
-  points.shrink_to_fit();
-  return points;
-}
-
 }  // namespace
 
 std::optional<std::string> MapAdjustmentOptions::Validate() const {
@@ -119,27 +54,7 @@ BundleSummary AdjustLocally(const MapAdjustmentOptions& options, KeyFrameId keyf
                             const std::atomic<bool>* interrupt, Map* map) {
   Checked(options);
   if (!map->FindKeyFrame(keyframe)) return {};
-  std::set<KeyFrameId> free = {keyframe};
-  for (const auto& [id, shared] : map->Covisible(keyframe)) {
-    if (static_cast<int>(free.size()) > options.window) break;
-    free.insert(id);
-  }
-  std::vector<MapPointId> points = FinitePointsSeenBy(map, free);
-  std::map<KeyFrameId, int> others;
-  for (const MapPointId id : points) {
-    for (const KeyFrameId observer : map->FindPoint(id)->observers) {
-      if (!free.contains(observer)) ++others[observer];
-    }
-  }
-  std::vector<std::pair<int, KeyFrameId>> by_count;
-  for (const auto& [id, count] : others) by_count.emplace_back(-count, id);
-  std::sort(by_count.begin(), by_count.end());
-  std::set<KeyFrameId> fixed;
-  for (const auto& [count, id] : by_count) {
-    if (static_cast<int>(fixed.size()) >= options.max_fixed) break;
-    fixed.insert(id);
-  }
-  Assembly assembly = Assemble(map, free, fixed, std::move(points));
+  MapAssembly assembly = AssembleAround(options.window, options.max_fixed, keyframe, map);
   BundleOptions bundle;
   bundle.max_iterations = options.local_iterations;
   bundle.interrupt = interrupt;
@@ -149,11 +64,7 @@ BundleSummary AdjustLocally(const MapAdjustmentOptions& options, KeyFrameId keyf
 BundleSummary AdjustGlobally(const MapAdjustmentOptions& options, const std::atomic<bool>* interrupt,
                              Map* map) {
   Checked(options);
-  std::set<KeyFrameId> all;
-  for (const auto& [id, record] : map->keyframes()) {
-    if (record.keyframe.kind == KeyFrameKind::kSixDof) all.insert(id);
-  }
-  Assembly assembly = Assemble(map, all, {}, FinitePointsSeenBy(map, all));
+  MapAssembly assembly = AssembleAll(map);
   BundleOptions bundle;
   bundle.max_iterations = options.global_iterations;
   bundle.loss = options.global_loss;
