@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/mapping/readout_update.h"
+#include "engine/map/map_readout.h"
 
 namespace docent::engine {
 
 void KeyFrameInsertion::Insert(const KeyFrameCandidate& offered, std::span<const PointReport> reports) {
   ApplyReports(reports);
   const KeyFrameCandidate candidate = WithCorrections(offered);
-  if (UpdateReadout(*candidate.camera, &workspace_->map)) refinement_->RequireGlobalAdjustment();
   if (candidate.choice == KeyFrameChoice::kPanorama) {
     panoramas_->Insert(candidate);
   } else {
@@ -20,7 +19,7 @@ void KeyFrameInsertion::Insert(const KeyFrameCandidate& offered, std::span<const
 }
 
 KeyFrameCandidate KeyFrameInsertion::WithCorrections(KeyFrameCandidate candidate) const {
-  candidate.camera = lens_estimation_->CurrentModel(candidate.camera);
+  candidate.camera = WithReadoutIn(workspace_->map, lens_estimation_->CurrentModel(candidate.camera));
   if (candidate.map_revision == 0) return candidate;
   for (const auto& correction : workspace_->map.corrections()) {
     if (correction->revision <= candidate.map_revision) continue;

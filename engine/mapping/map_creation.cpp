@@ -29,9 +29,10 @@ void MapCreation::CreateFromPair(const InitialPair& pair) {
     if (!extends) output_->Publish(nullptr);
     return;
   }
+  refinement_->SetNewest(views.b);
+  if (refinement_->UpdateReadout()) AdjustGlobally(options_.adjustment, nullptr, &map);
   RemoveDuplicateInfinitePoints(views.a, &map);
   if (extends) panoramas_->PlanConversion(views.a, views.b);
-  refinement_->SetNewest(views.b);
   refinement_->SetLocallyAdjusted();
   output_->Publish(map.Snapshot());
   output_->AddEvent(pair.b.time, MapperEvent::MapStarted{finite_points});

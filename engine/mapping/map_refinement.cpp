@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "engine/mapping/calibration/readout_calibration.h"
+
 namespace docent::engine {
 
 void MapRefinement::Reset() {
@@ -44,8 +46,18 @@ void MapRefinement::MatchNewPoints() {
 
 void MapRefinement::AdjustAroundNewest() {
   const BundleSummary summary = AdjustLocally(options_.adjustment, newest_, interrupt_, &workspace_->map);
-  if (summary.outcome != BundleSummary::Outcome::kInterrupted) locally_adjusted_ = true;
+  if (summary.outcome != BundleSummary::Outcome::kInterrupted) {
+    locally_adjusted_ = true;
+    if (UpdateReadout()) {
+      AdjustLocally(options_.adjustment, newest_, interrupt_, &workspace_->map);
+      RequireGlobalAdjustment();
+    }
+  }
   output_->Publish(workspace_->map.Snapshot());
+}
+
+bool MapRefinement::UpdateReadout() {
+  return CalibrateReadout(options_.readout, options_.adjustment, newest_, &workspace_->map);
 }
 
 void MapRefinement::AdjustWholeMap() {

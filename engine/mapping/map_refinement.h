@@ -47,6 +47,9 @@ class MapRefinement {
   // Searches the new points in the keyframes that share most points with the newest one.
   void MatchNewPoints();
   void AdjustAroundNewest();
+  // Estimates the readout time of the newest keyframe's camera. True if it changed, so that the map has to be
+  // adjusted.
+  bool UpdateReadout();
   void AdjustWholeMap();
   // Removes one redundant keyframe if there is one.
   void CullRedundantKeyFrame();

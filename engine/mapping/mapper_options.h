@@ -8,6 +8,7 @@
 
 #include "engine/mapping/bundle/map_adjustment.h"
 #include "engine/mapping/calibration/lens_estimation.h"
+#include "engine/mapping/calibration/readout_estimation.h"
 #include "engine/mapping/loops/loop_closing.h"
 #include "engine/mapping/loops/map_joining.h"
 #include "engine/mapping/panorama/panorama_mapping.h"
@@ -43,6 +44,7 @@ struct MapperOptions {
   LoopOptions loops;
   MapJoiningOptions joining;
   LensEstimationOptions lens;
+  ReadoutEstimationOptions readout;  // of a rolling shutter
   SearchOptions search;
   std::shared_ptr<ImageStore> images;  // stores the keyframes' images; null: in memory
 

@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "engine/map/map_readout.h"
 #include "engine/tracking/reference_keyframe.h"
 #include "engine/vision/rotation_alignment.h"
 
@@ -123,13 +124,22 @@ MapTrackResult PoseTracker::TrackFromPrediction(const MapSnapshot& map, const Ca
   return track();
 }
 
+void PoseTracker::UpdateReadout(const MapSnapshot& map) {
+  if (readout_map_ == &map && readout_revision_ == map.revision) return;
+  readout_map_ = &map;
+  readout_revision_ = map.revision;
+  const auto readout_s = ReadoutIn(map, *lens_);
+  map_knows_readout_ = readout_s.has_value();
+  if (readout_s) readout_s_ = *readout_s;
+}
+
 void PoseTracker::SetTwist(const Eigen::Matrix<double, 6, 1>& twist) {
   Eigen::Vector3d rate = twist.tail<3>();
   // A translation displaces the image about as a rotation does that moves points at the median depth alike.
   if (observed_ != ObservedMotion::kPanorama && median_depth_ > 0)
     rate += Eigen::Vector3d(-twist[1], twist[0], 0) / median_depth_;
   const std::shared_ptr<CameraModel> camera = image_cameras_.Take();
-  *camera = CameraModel::WithReadout(lens_, {rate, readout_.readout_s()});
+  *camera = CameraModel::WithReadout(lens_, {rate, readout_s_});
   image_camera_ = camera;
   map_tracker_.SetCamera(image_camera_);
 }
@@ -153,7 +163,9 @@ void PoseTracker::AccountForReadout(const CameraImage& image, const Rigid3& pred
   constexpr double kNegligible_px = 0.2;  // of the first and the last row
   if (change_px > kNegligible_px) map_tracker_.RefineAgain(predicted, result);
   mean_twist_ = mean_twist();
+  if (map_knows_readout_) return;
   readout_.Add(*image_camera_, result->camera_from_map, map_tracker_.measurements(), result->sigma, seconds);
+  if (!readout_.readout_s().isZero(0)) readout_s_ = readout_.readout_s();
 }
 
 PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraImage& image,
@@ -164,7 +176,10 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
   Rigid3 predicted = commanded ? motion_.PredictWithRotation(*commanded) : motion_.Predict(image.time);
   if (observed_ == ObservedMotion::kPanorama)
     predicted = RotatedAbout(pivot_estimate_.pivot, motion_.last(), predicted.rotation);
-  if (options_.readout.enabled) SetTwist(motion_.twist_per_second());
+  if (options_.readout.enabled) {
+    UpdateReadout(map);
+    SetTwist(motion_.twist_per_second());
+  }
   SearchPanoramaAt(predicted, map, policy);
   map_tracker_.SetPivot(pivot_estimate_);
   MapTrackResult result = TrackFromPrediction(map, image, predicted, random);

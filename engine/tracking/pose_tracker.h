@@ -79,7 +79,8 @@ class PoseTracker {
   const MapTracker& map_tracker() const { return map_tracker_; }
   // The camera with the motion of the image that was tracked last.
   const std::shared_ptr<const CameraModel>& image_camera() const { return image_camera_; }
-  const ReadoutEstimator& readout() const { return readout_; }
+  // The readout time of the camera, seconds; see ReadoutMotion.
+  const Eigen::Vector2d& readout_s() const { return readout_s_; }
   const Rigid3& last() const { return motion_.last(); }
   // Rotation vector per frame, of the last tracked frame.
   const Eigen::Vector3d& rotation_rate() const { return rotation_rate_; }
@@ -88,6 +89,8 @@ class PoseTracker {
  private:
   // Gives the present image the rolling shutter of a camera that moves with this left twist per second.
   void SetTwist(const Eigen::Matrix<double, 6, 1>& twist);
+  // Takes the readout time from a snapshot that has not been asked yet.
+  void UpdateReadout(const MapSnapshot& map);
   // Repeats the pose estimate with the motion that it implies, and lets it tell the readout time.
   void AccountForReadout(const CameraImage& image, const Rigid3& predicted, MapTrackResult* result);
   // The panorama map to search: the open one, or one to whose centre the camera has returned if the finite
@@ -121,6 +124,11 @@ class PoseTracker {
   // rotation, a later one.
   std::shared_ptr<const ImageFeatures> rotation_reference_;
   Rigid3 rotation_reference_pose_;
+  // What a map that this camera builds says of its readout time goes first; elsewhere it is estimated here.
+  Eigen::Vector2d readout_s_ = Eigen::Vector2d::Zero();
+  bool map_knows_readout_ = false;
+  const MapSnapshot* readout_map_ = nullptr;  // the snapshot that was asked last, never dereferenced
+  std::uint64_t readout_revision_ = 0;
   ReadoutEstimator readout_;
   // Left twist per second between the last two frames, as long as the track goes on.
   std::optional<Eigen::Matrix<double, 6, 1>> mean_twist_;

@@ -39,8 +39,6 @@ std::optional<std::string> ReadoutOptions::Validate() const {
   return OptionCheck()
       .Positive(prior_sigma_s, "sigma of an unknown readout time")
       .AtLeast(correlated_frames, 1, "number of correlated frames")
-      .Ratio(kept_per_frame, "weight of earlier frames")
-      .Ratio(kept_per_change, "weight of frames before a change")
       .AtLeast(min_sigmas, 0, "significance of a readout time")
       .AtLeast(min_readout_s, 0, "smallest readout time")
       .AtLeast(min_change_s, 0, "change of a readout time")
@@ -82,10 +80,9 @@ void ReadoutEstimator::Add(const CameraModel& camera, const Rigid3& camera_from_
   const auto equations = EliminatePose(normal, gradient);
   if (!equations) return;
   const double scale = static_cast<double>(stride) / (options_.correlated_frames * sigma * sigma);
-  information_ = options_.kept_per_frame * information_ + scale * equations->information;
+  information_ += scale * equations->information;
   // The residuals remain after the readout time that the camera has already.
-  weighted_ = options_.kept_per_frame * weighted_ +
-              scale * (equations->gradient + equations->information * motion.readout_s);
+  weighted_ += scale * (equations->gradient + equations->information * motion.readout_s);
   Use(frame_s);
 }
 
@@ -104,7 +101,6 @@ Eigen::Vector2d ReadoutEstimator::sigma_s() const {
 
 void ReadoutEstimator::Use(double frame_s) {
   const Eigen::Vector2d estimate = estimate_s(), sigma = sigma_s();
-  bool changed = false;
   for (int axis = 0; axis < 2; ++axis) {
     const double value = std::clamp(estimate[axis], -frame_s, frame_s);
     const double change = std::max(options_.min_change_s, sigma[axis]);
@@ -112,11 +108,7 @@ void ReadoutEstimator::Use(double frame_s) {
     if (used_s_[axis] == 0 && std::abs(value) < smallest) continue;
     if (std::abs(value - used_s_[axis]) < change) continue;
     used_s_[axis] = value;
-    changed = true;
   }
-  if (!changed) return;
-  information_ *= options_.kept_per_change;
-  weighted_ *= options_.kept_per_change;
 }
 
 }  // namespace docent::engine

@@ -19,10 +19,6 @@ struct ReadoutOptions {
   double prior_sigma_s = 0.02;
   // Errors of map points persist from frame to frame, so that so many frames count as one.
   double correlated_frames = 10;
-  // What older frames say loses weight, because they were compared with a map that was built with an earlier
-  // estimate: their weight after one frame, and after a change of the readout time that is used. Of 20 ms,
-  // simulated windows of 6 s found 8 to 15 ms in their first second.
-  double kept_per_frame = 0.995, kept_per_change = 0.3;
   // A readout time is used once it differs from zero by this many standard deviations and seconds, and from
   // then on follows changes of at least `min_change_s`. Errors of a calibration looked like up to 3.5 ms in
   // real recordings; this is twice that. A faster shutter counts as global.
@@ -39,7 +35,8 @@ struct ReadoutOptions {
 
 // Estimates the readout time of a camera's rolling shutter, along the columns and along the rows, from the
 // residuals of tracked frames: a rotation displaces points by its rate times the delay of their pixel, which
-// no pose explains. One per camera; used on its thread. Allocates nothing.
+// no pose explains. The map has to be right: where this camera builds it, the mapper estimates the readout
+// time together with the map (CalibrateReadout). One per camera; used on its thread. Allocates nothing.
 class ReadoutEstimator {
  public:
   explicit ReadoutEstimator(const ReadoutOptions& options);

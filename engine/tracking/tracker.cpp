@@ -141,7 +141,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
 void Tracker::SearchInitialPair(TrackedFrame* out) {
   const bool offers_first = !map_ && options_.hybrid && options_.build_maps &&
                             initialization_.phase() == MapInitialization::Phase::kSearching;
-  initialization_.SetReadout(pose_.readout().readout_s());
+  initialization_.SetReadout(pose_.readout_s());
   initialization_.Search(image_, map_.get(), pose_.map_tracker().panorama(), pose_.rotation_rate(), out);
   if (offers_first) offers_.OfferFirst(image_);
 }

@@ -109,7 +109,6 @@ TEST(ReadoutEstimator, DoesNotWorkWhereItIsDisabled) {
 TEST(ReadoutEstimator, RefusesOptionsThatMakeNoSense) {
   EXPECT_TRUE((ReadoutOptions{.prior_sigma_s = 0}).Validate());
   EXPECT_TRUE((ReadoutOptions{.correlated_frames = 0}).Validate());
-  EXPECT_TRUE((ReadoutOptions{.kept_per_frame = 1.5}).Validate());
   EXPECT_TRUE((ReadoutOptions{.max_points = 10}).Validate());
   EXPECT_FALSE(ReadoutOptions().Validate());
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "engine/mapping/readout_update.h"
+#include "engine/map/map_readout.h"
 
 #include <gtest/gtest.h>
 
@@ -31,23 +31,22 @@ double ReadoutOf(KeyFrameId id, const Map& map) {
   return map.keyframes().at(id).keyframe.camera->readout_motion().readout_s.y();
 }
 
-TEST(ReadoutUpdate, GivesTheReadoutTimeToEarlierImagesOfTheSameCamera) {
+TEST(MapReadout, GivesTheReadoutTimeToEarlierImagesOfTheSameCamera) {
   const auto camera = Camera(500), other = Camera(600);
   Map map;
   const KeyFrameId turning = AddKeyFrame(Image(camera, 0.7, 0), &map), unknown = AddKeyFrame(camera, &map),
                    of_other = AddKeyFrame(Image(other, 0.7, 0.01), &map);
-  EXPECT_TRUE(UpdateReadout(*Image(camera, -0.3, 0.02), &map));
+  EXPECT_TRUE(SetReadout(*camera, {0, 0.02}, &map));
   EXPECT_DOUBLE_EQ(ReadoutOf(turning, map), 0.02);
   const CameraModel& updated = *map.keyframes().at(turning).keyframe.camera;
   EXPECT_DOUBLE_EQ(updated.readout_motion().rotation_rate.y(), 0.7) << "each image keeps its own motion";
   EXPECT_EQ(updated.lens_of_image(), camera);
   EXPECT_EQ(map.keyframes().at(unknown).keyframe.camera, camera) << "how it moved is not known";
   EXPECT_DOUBLE_EQ(ReadoutOf(of_other, map), 0.01);
-  EXPECT_FALSE(UpdateReadout(*Image(camera, -0.3, 0.0201), &map)) << "the difference is not significant";
-  EXPECT_FALSE(UpdateReadout(*camera, &map)) << "no image of the camera";
+  EXPECT_FALSE(SetReadout(*camera, {0, 0.02}, &map)) << "they have it already";
 }
 
-TEST(ReadoutUpdate, TurnsInfinitePointsToWhereTheyWereSeen) {
+TEST(MapReadout, TurnsInfinitePointsToWhereTheyWereSeen) {
   const auto camera = Camera(500);
   Map map;
   const KeyFrameId id = AddKeyFrame(Image(camera, 1, 0), &map);
@@ -59,12 +58,41 @@ TEST(ReadoutUpdate, TurnsInfinitePointsToWhereTheyWereSeen) {
   point.source_keyframe = id;
   const MapPointId seen = map.AddPoint(point);
   map.AddObservation({id, seen, pixel.cast<float>(), 0});
-  ASSERT_TRUE(UpdateReadout(*Image(camera, 1, 0.02), &map));
+  ASSERT_TRUE(SetReadout(*camera, {0, 0.02}, &map));
   const Eigen::Vector3d direction = map.FindPoint(seen)->point.position().normalized();
   // Exposed almost 10 ms after the middle of the image, when the camera had turned by almost 0.01 radians.
   const double angle = std::acos(direction.dot(*camera->Unproject(pixel)));
   EXPECT_NEAR(angle, 0.02 * ((470.5) / 480 - 0.5), 2e-3);
   EXPECT_LT((*map.keyframes().at(id).keyframe.camera->Project(direction) - pixel).norm(), 0.05);
+}
+
+TEST(MapReadout, IsThatOfTheNewestImageOfTheLens) {
+  const auto camera = Camera(500), other = Camera(600);
+  Map map;
+  EXPECT_FALSE(ReadoutIn(map, *camera));
+  AddKeyFrame(Image(camera, 0.7, 0.02), &map);
+  AddKeyFrame(Image(other, 0.7, 0.01), &map);
+  AddKeyFrame(camera, &map);  // how it moved is not known
+  EXPECT_EQ(ReadoutIn(map, *camera), Eigen::Vector2d(0, 0.02));
+  EXPECT_EQ(ReadoutIn(map, *Image(other, -2, 0)), Eigen::Vector2d(0, 0.01));
+  EXPECT_FALSE(ReadoutIn(map, *Camera(700)));
+  const auto snapshot = map.Snapshot();
+  EXPECT_EQ(ReadoutIn(*snapshot, *camera), Eigen::Vector2d(0, 0.02));
+  EXPECT_FALSE(ReadoutIn(*snapshot, *Camera(700)));
+}
+
+TEST(MapReadout, GoesToANewImageOfTheSameLens) {
+  const auto camera = Camera(500);
+  Map map;
+  AddKeyFrame(Image(camera, 0.7, 0.02), &map);
+  const auto image = Image(camera, -0.4, 0);
+  const auto updated = WithReadoutIn(map, image);
+  EXPECT_EQ(updated->readout_motion().readout_s, Eigen::Vector2d(0, 0.02));
+  EXPECT_EQ(updated->readout_motion().rotation_rate, image->readout_motion().rotation_rate);
+  EXPECT_EQ(WithReadoutIn(map, updated), updated) << "it has it already";
+  EXPECT_EQ(WithReadoutIn(map, camera), camera) << "its motion is not known";
+  const auto other = Image(Camera(600), 0.3, 0);
+  EXPECT_EQ(WithReadoutIn(map, other), other);
 }
 
 }  // namespace

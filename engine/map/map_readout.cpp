@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/map/map_readout.h"
+
+#include <ranges>
+
+namespace docent::engine {
+
+namespace {
+
+// Without a rotation there is nothing to correct: the motion is unknown, or there was none.
+bool IsRotatingImage(const CameraModel& image, const CameraModel& camera) {
+  return !image.readout_motion().rotation_rate.isZero(0) && image.HasSameLens(camera);
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector2d> ReadoutIn(const MapSnapshot& map, const CameraModel& camera) {
+  for (const KeyFrame& keyframe : std::views::reverse(map.keyframes)) {
+    if (IsRotatingImage(*keyframe.camera, camera)) return keyframe.camera->readout_motion().readout_s;
+  }
+  return std::nullopt;
+}
+
+std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& camera) {
+  for (const auto& [id, record] : std::views::reverse(map.keyframes())) {
+    const CameraModel& image = *record.keyframe.camera;
+    if (IsRotatingImage(image, camera)) return image.readout_motion().readout_s;
+  }
+  return std::nullopt;
+}
+
+std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,
+                                                 const std::shared_ptr<const CameraModel>& camera) {
+  const ReadoutMotion& motion = camera->readout_motion();
+  if (motion.rotation_rate.isZero(0)) return camera;
+  const auto readout_s = ReadoutIn(map, *camera);
+  if (!readout_s || *readout_s == motion.readout_s) return camera;
+  return std::make_shared<CameraModel>(CameraModel::WithReadout(camera, {motion.rotation_rate, *readout_s}));
+}
+
+bool SetReadout(const CameraModel& camera, const Eigen::Vector2d& readout_s, Map* map) {
+  bool changed = false;
+  for (auto& [id, record] : map->keyframes()) {
+    std::shared_ptr<const CameraModel>& image = record.keyframe.camera;
+    const ReadoutMotion& motion = image->readout_motion();
+    if (!IsRotatingImage(*image, camera) || motion.readout_s == readout_s) continue;
+    image = std::make_shared<CameraModel>(CameraModel::WithReadout(image, {motion.rotation_rate, readout_s}));
+    changed = true;
+  }
+  if (!changed) return false;
+  for (Map::PointRecord& record : map->points()) {
+    if (record.alive && record.point.infinite()) map->UpdateDirection(&record);
+  }
+  return true;
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+
+#include "engine/geometry/camera_model.h"
+#include "engine/map/map.h"
+
+// The readout time of rolling shutters in a map (see ReadoutMotion). All images of one lens have the same.
+namespace docent::engine {
+
+// The readout time, seconds, that the images of the camera's lens have in a map; empty if the map has no
+// image of that lens whose rotation is known. camera: the lens, or the model of one of its images.
+std::optional<Eigen::Vector2d> ReadoutIn(const MapSnapshot& map, const CameraModel& camera);
+std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& camera);
+
+// The model of an image with the readout time that its lens has in a map: `camera` itself if the map does not
+// tell, or the rotation is not known.
+std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,
+                                                 const std::shared_ptr<const CameraModel>& camera);
+
+// Gives all images of the camera's lens this readout time, and recomputes the directions of infinite points.
+// Poses and finite points follow in the next adjustment. True if something changed.
+bool SetReadout(const CameraModel& camera, const Eigen::Vector2d& readout_s, Map* map);
+
+}  // namespace docent::engine

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/mapping/calibration/readout_calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "engine/map/map_readout.h"
+#include "engine/mapping/bundle/map_assembly.h"
+
+namespace docent::engine {
+
+bool CalibrateReadout(const ReadoutEstimationOptions& options, const MapAdjustmentOptions& window,
+                      KeyFrameId newest, Map* map) {
+  const Map::KeyFrameRecord* record = options.enabled ? map->FindKeyFrame(newest) : nullptr;
+  if (!record) return false;
+  const std::shared_ptr<const CameraModel> image = record->keyframe.camera;
+  const auto before = ReadoutIn(*map, *image);
+  if (!before) return false;
+  const MapAssembly assembly = AssembleAround(window.window, window.max_fixed, newest, map);
+  std::vector<char> of_lens;
+  for (const BundleProblem::Camera& camera : assembly.problem.cameras)
+    of_lens.push_back(camera.model->HasSameLens(*image));
+  const auto estimate = EstimateReadout(options, of_lens, assembly.problem);
+  if (!estimate) return false;
+  // Rows are exposed one after another, or columns.
+  const Eigen::Vector2d sigmas = estimate->readout_s.cwiseAbs().cwiseQuotient(estimate->sigma_s);
+  const int axis = sigmas.x() > sigmas.y() ? 0 : 1;
+  const double value = estimate->readout_s[axis], sigma = estimate->sigma_s[axis];
+  const double smallest = std::max(options.min_readout_s, options.min_sigmas * sigma);
+  if ((*before)[axis] == 0 && std::abs(value) < smallest) return false;
+  Eigen::Vector2d readout_s = Eigen::Vector2d::Zero();
+  readout_s[axis] = value;
+  if ((readout_s - *before).norm() < std::max(options.min_change_s, sigma)) return false;
+  return SetReadout(*image, readout_s, map);
+}
+
+}  // namespace docent::engine

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "engine/map/map.h"
+#include "engine/mapping/bundle/map_adjustment.h"
+#include "engine/mapping/calibration/readout_estimation.h"
+
+namespace docent::engine {
+
+// Estimates the readout time of the camera of `newest` from this keyframe and those around it, as in
+// AdjustLocally, and gives it to all keyframes of the camera if it is significant and differs from that in
+// use. True if it was changed: then poses and points have to be adjusted. Mapper's thread.
+bool CalibrateReadout(const ReadoutEstimationOptions& options, const MapAdjustmentOptions& window,
+                      KeyFrameId newest, Map* map);
+
+}  // namespace docent::engine
