@@ -70,6 +70,23 @@ std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t lev
   return corners;
 }
 
+using Rays = std::vector<Eigen::Vector3d>;
+
+// Adds the rays of a match. False if one of the pixels has none.
+bool Unproject(const InitialPair::Match& match, const CameraModel& a, const CameraModel& b, Rays* rays_a,
+               Rays* rays_b) {
+  const auto ray_a = a.Unproject(match.pixel_a.cast<double>()),
+             ray_b = b.Unproject(match.pixel_b.cast<double>());
+  if (!ray_a || !ray_b) return false;
+  rays_a->push_back(*ray_a);
+  rays_b->push_back(*ray_b);
+  return true;
+}
+
+bool HasDepth(const TwoViewResult& geometry) {
+  return geometry.outcome == TwoViewOutcome::kGeneral || geometry.outcome == TwoViewOutcome::kPlanar;
+}
+
 }  // namespace
 
 std::optional<std::string> InitializerOptions::Validate() const {
@@ -81,6 +98,7 @@ std::optional<std::string> InitializerOptions::Validate() const {
       .AtLeast(min_alive, 0, "number of tracked corners")
       .AtLeast(max_age_frames, 1, "age of the first view")
       .AtLeast(attempt_interval, 1, "interval between two estimates")
+      .AtLeast(unknown_readout_s, 0, "unknown readout time")
       .Contained(two_view.Validate())
       .Contained(confirmation.Validate())
       .fault();
@@ -226,19 +244,35 @@ std::optional<InitialPair> Initializer::TryViews(const InitialPair::View& a, con
   return Solve(a, b, std::move(matches), ids, speed_change_px, &views_confirmation_);
 }
 
+bool Initializer::HasDepthWithAnyReadout(const InitialPair::View& a, const InitialPair::View& b,
+                                         std::span<const InitialPair::Match> matches,
+                                         const TwoViewOptions& options) const {
+  if (!readout_s_.isZero(0) || options_.unknown_readout_s == 0) return true;
+  const ReadoutMotion &motion_a = a.camera->readout_motion(), &motion_b = b.camera->readout_motion();
+  const double rate = std::max(motion_a.rotation_rate.norm(), motion_b.rotation_rate.norm());
+  // In pixels, of the first and the last row.
+  constexpr double kNegligiblePx = 0.5;
+  if (0.5 * rate * options_.unknown_readout_s < kNegligiblePx * options.pixel_angle) return true;
+  for (const Eigen::Vector2d& direction : {Eigen::Vector2d(0, 1), {0, -1}, {1, 0}, {-1, 0}}) {
+    const Eigen::Vector2d readout_s = options_.unknown_readout_s * direction;
+    const CameraModel camera_a = CameraModel::WithReadout(camera_, {motion_a.rotation_rate, readout_s}),
+                      camera_b = CameraModel::WithReadout(camera_, {motion_b.rotation_rate, readout_s});
+    Rays rays_a, rays_b;
+    for (const InitialPair::Match& match : matches) Unproject(match, camera_a, camera_b, &rays_a, &rays_b);
+    if (!HasDepth(EstimateTwoViews(rays_a, rays_b, options))) return false;
+  }
+  return true;
+}
+
 std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const InitialPair::View& b,
                                               std::vector<InitialPair::Match> matches,
                                               std::span<const std::uint32_t> ids, double speed_change_px,
                                               StartConfirmation* confirmation) {
-  std::vector<Eigen::Vector3d> rays_a, rays_b;
   std::vector<std::uint32_t> kept;
   InitialPair pair;
+  Rays rays_a, rays_b;
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    const auto ray_a = a.camera->Unproject(matches[i].pixel_a.cast<double>()),
-               ray_b = b.camera->Unproject(matches[i].pixel_b.cast<double>());
-    if (!ray_a || !ray_b) continue;
-    rays_a.push_back(*ray_a);
-    rays_b.push_back(*ray_b);
+    if (!Unproject(matches[i], *a.camera, *b.camera, &rays_a, &rays_b)) continue;
     kept.push_back(ids[i]);
     pair.matches.push_back(matches[i]);
   }
@@ -247,12 +281,12 @@ std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const 
   options.depth_noise.speed_change_px = speed_change_px;
   options.seed = random_.Next();
   pair.geometry = EstimateTwoViews(rays_a, rays_b, options);
+  if (HasDepth(pair.geometry) && !HasDepthWithAnyReadout(a, b, pair.matches, options))
+    pair.geometry.outcome = TwoViewOutcome::kTooLittleParallax;
   hint_ = HintFor(pair.geometry.outcome);
   UpdateProgress(kMotionShare + kParallaxShare * ParallaxProgress(pair.geometry, options) +
                  (1 - kMotionShare - kParallaxShare) * confirmation->GrowthProgress(pair.geometry));
-  if (pair.geometry.outcome != TwoViewOutcome::kGeneral && pair.geometry.outcome != TwoViewOutcome::kPlanar) {
-    return std::nullopt;
-  }
+  if (!HasDepth(pair.geometry)) return std::nullopt;
   if (!confirmation->Confirm(a.time, kept, pair.geometry)) {
     hint_ = HintFor(TwoViewOutcome::kTooLittleParallax);
     return std::nullopt;

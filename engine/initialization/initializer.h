@@ -23,6 +23,11 @@ struct InitializerOptions {
   int min_alive = 80;            // corners; with fewer, a new first view is taken
   int max_age_frames = 240;      // a first view older than this is replaced
   int attempt_interval = 2;      // frames between two estimates of the geometry
+  // While the readout time of the shutter is unknown, depth has to be significant as well if the shutter
+  // rolls for so long, seconds, in any of the four directions of the image: a turn of one radian per second
+  // displaces the first and the last row against each other by ten pixels, which looks like depth. 60 % of
+  // the time between two images at 30 Hz. 0: a global shutter is assumed.
+  double unknown_readout_s = 0.02;
   TwoViewOptions two_view;
   StartConfirmationOptions confirmation;
 
@@ -79,6 +84,10 @@ class Initializer {
                                    std::span<const std::uint32_t> ids, double speed_change_px,
                                    StartConfirmation* confirmation);
   double SpeedChange() const;
+  // Whether two views with depth have depth whatever the readout time is, as long as it is unknown.
+  bool HasDepthWithAnyReadout(const InitialPair::View& a, const InitialPair::View& b,
+                              std::span<const InitialPair::Match> matches,
+                              const TwoViewOptions& options) const;
   // The model of an image near the time of the newest two rotations.
   std::shared_ptr<const CameraModel> ImageCamera(const Eigen::Vector3d& newest,
                                                  const Eigen::Vector3d& other) const;

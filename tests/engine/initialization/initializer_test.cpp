@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <numbers>
+#include <numeric>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -150,6 +153,66 @@ TEST(Initializer, StartsAgainAfterAReset) {
   initializer.Reset();
   EXPECT_TRUE(initializer.trails().empty());
   EXPECT_EQ(initializer.hint(), Hint::kNone);
+}
+
+// The matches between two images of a camera with a rolling shutter that only turns: it starts slowly and
+// turns fast at the second view.
+std::vector<InitialPair::Match> MatchesOfATurn(const CameraModel& a, const CameraModel& b, double angle,
+                                               double move, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<InitialPair::Match> matches;
+  const Rotation3 turn = Rotation3::Exp({0, angle, 0});
+  while (matches.size() < 300) {
+    const double depth = random.Uniform(2, 6);
+    const Eigen::Vector3d point(random.Uniform(-0.8, 0.8) * depth, random.Uniform(-0.5, 0.5) * depth, depth);
+    const auto pixel_a = a.Project(point), pixel_b = b.Project(turn * (point + Eigen::Vector3d(move, 0, 0)));
+    if (!pixel_a || !pixel_b || !a.IsInside(*pixel_a) || !b.IsInside(*pixel_b)) continue;
+    const auto noise = [&] { return Eigen::Vector2d(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5)); };
+    matches.push_back({(*pixel_a + noise()).cast<float>(), (*pixel_b + noise()).cast<float>(), 0});
+  }
+  return matches;
+}
+
+// A turn that becomes fast, with a translation that is too small for its depth to be known through a shutter
+// that rolls for 20 ms.
+struct Turn {
+  double rate = 0, move = 0;  // radians per second at the second view, and metres
+};
+
+// Whether a second and a third view of a turn start a map.
+bool StartsMap(const Turn& turn, double unknown_readout_s, std::uint64_t seed) {
+  InitializerOptions options;
+  options.unknown_readout_s = unknown_readout_s;
+  Initializer initializer(options, Camera(), seed);
+  std::optional<InitialPair> pair;
+  for (const double growth : {1.0, 1.3}) {
+    const double rate = growth * turn.rate;
+    const ReadoutMotion slow{{0, 0.05, 0}, {0, 0.02}}, fast{{0, rate, 0.1}, {0, 0.02}};
+    const auto view = [&](const ReadoutMotion& motion) {
+      return std::make_shared<CameraModel>(
+          CameraModel::WithReadout(Camera(), {motion.rotation_rate, Eigen::Vector2d::Zero()}));
+    };
+    const auto matches =
+        MatchesOfATurn(CameraModel::WithReadout(Camera(), slow), CameraModel::WithReadout(Camera(), fast),
+                       0.02 * rate, rate * turn.move, seed);
+    std::vector<std::uint32_t> ids(matches.size());
+    std::iota(ids.begin(), ids.end(), 0U);
+    pair = initializer.TryViews({FromSeconds(0), nullptr, view(slow)},
+                                {FromSeconds(growth), nullptr, view(fast)}, matches, ids, 0);
+  }
+  return pair.has_value();
+}
+
+TEST(Initializer, WaitsWhereDepthMayBeTheSkewOfARollingShutter) {
+  int without = 0, with = 0;
+  for (const Turn& turn : {Turn{1.3, 0.1}, Turn{2.5, 0.05}}) {
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      without += StartsMap(turn, 0, seed);
+      with += StartsMap(turn, InitializerOptions().unknown_readout_s, seed);
+    }
+  }
+  EXPECT_GE(without, 4) << "the turns do not show what is tested";
+  EXPECT_LE(with, without / 4);
 }
 
 }  // namespace
