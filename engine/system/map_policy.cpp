@@ -107,7 +107,8 @@ void MapPolicy::CheckLoss(std::size_t index, const TrackedFrame& frame) {
       state_.active_key != found->first)
     return;
   const Timestamp now = frame.frame.time;
-  if (!assignment.IsLostFor(options_.lost_time_before_new_map, now)) return;
+  // A place that the camera leaves into what is not mapped will not be recognised by waiting.
+  if (!frame.left_map && !assignment.IsLostFor(options_.lost_time_before_new_map, now)) return;
   if (frame.relocalization.rejection == RejectionReason::kUnconfirmed) return;  // relocalization is imminent
   const std::uint64_t lost_in = found->first;
   const std::uint64_t key = NewKey();

@@ -52,7 +52,8 @@ struct TrackedFrame {
   int finite_points = 0, infinite_points = 0;  // inliers
   std::vector<PointMatch> matches;             // map points that were found in the image
   std::chrono::nanoseconds tracking_time{};    // by the system clock
-  Hint hint = Hint::kNone;                     // what a person can do so that tracking works
+  bool left_map = false;    // lost because the camera translated where only infinite points are mapped
+  Hint hint = Hint::kNone;  // what a person can do so that tracking works
   // How close a map that is being initialized has come to its first finite points, 0 to 1; empty when none
   // is, and with a planar target.
   std::optional<double> initialization_progress;

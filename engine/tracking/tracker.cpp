@@ -162,6 +162,7 @@ void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFra
   state_ = CameraState::kLost;
   out->state = TrackingState::kLost;
   out->hint = Hint::kLeftMap;
+  out->left_map = estimate.outcome == Outcome::kLeftMap;
   // The same image may be recognized, so that unexpected motion does not cost a frame.
   if (estimate.outcome == Outcome::kLost) Use(relocalizer_.Search(SearchIn(places), out), out);
 }
