@@ -49,6 +49,13 @@ constexpr NamedOption kOptions[] = {
     {"identical-places", nullptr,
      "give all bays or desks the same content, so that they cannot be distinguished", 0, 1,
      [](double value, Options* options) { options->identical_places = value != 0; }},
+    {"walk", "N",
+     "another walk through the bays or desks after they were built, by its number; 0 for the usual one", 0,
+     1e9, [](double value, Options* options) { options->walk = static_cast<std::uint64_t>(value); }, true},
+    {"rest", "SECONDS", "the person rests for so long, with the lens covered, at the time of rest-at", 0,
+     3600, [](double value, Options* options) { options->rest_s = value; }},
+    {"rest-at", "SECONDS", "when the rest begins, seconds from the first image", 0, 86400,
+     [](double value, Options* options) { options->rest_at_s = value; }},
 };
 
 std::string Names() {

@@ -38,6 +38,8 @@ struct SceneRequest {
   std::uint64_t seed = 1;  // Seed of textures, object positions and hand sway.
   bool identical_places =
       false;  // All places have the content of the first, so they cannot be distinguished.
+  // Of `museum` and `desks`: seed of the walk through the places after they were built; 0: the usual walk.
+  std::uint64_t walk = 0;
 };
 
 // A named scene with the meaning and range of the number after the colon.

@@ -116,7 +116,8 @@ void AddHall(const Hall& hall, Scene* scene) {
   wall({left, top, near}, {0, 0, depth}, 0.85f);
 }
 
-void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, Random* random, Scene* scene) {
+void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, std::uint64_t walk, Random* random,
+                Scene* scene) {
   Trajectory& trajectory = scene->trajectory;
   const int count = static_cast<int>(stands.size());
   const auto jitter = [&](double reach) { return random->Uniform(-reach, reach); };
@@ -148,12 +149,20 @@ void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, Random
     order.push_back(k);
   }
   if (count % 2 == 1) order.push_back(count - 1);
+  Random own(walk);
+  if (walk > 0) {
+    random = &own;
+    for (std::size_t i = order.size(); i > 1; --i)
+      std::swap(order[i - 1], order[own.Below(static_cast<std::uint32_t>(i))]);
+  }
   for (const int k : order) {
+    // A visitor hurries or lingers.
+    const double pace = walk > 0 ? own.Uniform(0.8, 3) : 1;
     const double middle = 0.5 * (near + far) + jitter(0.1);
     const std::vector<Step> steps = {
         {0.7 * swing + jitter(0.1), eye + jitter(0.06), middle, jitter(0.1), 0},
-        {0.1 * swing + jitter(0.1), eye + jitter(0.08), middle + jitter(0.1), jitter(0.1), 1.3},
-        {-0.5 * swing + jitter(0.1), eye + jitter(0.08), middle + jitter(0.1), jitter(0.1), 1.3}};
+        {0.1 * swing + jitter(0.1), eye + jitter(0.08), middle + jitter(0.1), jitter(0.1), 1.3 * pace},
+        {-0.5 * swing + jitter(0.1), eye + jitter(0.08), middle + jitter(0.1), jitter(0.1), 1.3 * pace}};
     Travel(stands[k], viewing, steps[0], scene);
     trajectory.BeginSegment("visit" + std::to_string(k));
     Walk(stands[k], viewing, {steps.begin() + 1, steps.end()}, scene);

@@ -28,7 +28,8 @@ std::uint64_t MixedSeed(const SimulationOptions& options, const Scene& scene, Se
 }
 
 double DurationOf(const Scene& scene, const SimulationOptions& options) {
-  const double whole_s = scene.trajectory.duration_s();
+  const double walk_s = scene.trajectory.duration_s();
+  const double whole_s = walk_s + (options.rest_at_s < walk_s ? options.rest_s : 0);
   return options.duration_s > 0 ? std::min(whole_s, options.duration_s) : whole_s;
 }
 
@@ -95,6 +96,8 @@ std::optional<std::string> SimulationOptions::Validate() const {
   if (camera && (camera->width_px() > kLargestSide_px || camera->height_px() > kLargestSide_px)) {
     return "The image must have at most 8192 pixels along each side.";
   }
+  if (!(rest_at_s >= 0 && rest_at_s <= kLongestDuration_s && rest_s >= 0 && rest_s <= kLongestDuration_s))
+    return "The rest and the time until it must be from 0 s to one day.";
   return faults.Validate(frame_rate_hz);
 }
 
@@ -138,8 +141,17 @@ Timestamp Simulation::time(int frame) const {
 }
 
 engine::Rigid3 Simulation::PoseAt(double time_s) const {
-  const engine::Rigid3 steady = scene_.trajectory.WorldFromCamera(time_s) * scene_.carrier_from_camera;
+  const engine::Rigid3 steady =
+      scene_.trajectory.WorldFromCamera(WalkedFor_s(time_s)) * scene_.carrier_from_camera;
   return tremor_.is_still() ? steady : steady * tremor_.SteadyFromTrembling(time_s);
+}
+
+double Simulation::WalkedFor_s(double time_s) const {
+  return time_s - std::clamp(time_s - options_.rest_at_s, 0.0, options_.rest_s);
+}
+
+bool Simulation::IsCovered(double time_s) const {
+  return time_s >= options_.rest_at_s && time_s < options_.rest_at_s + options_.rest_s;
 }
 
 double Simulation::RowOffset_s(double row) const {
@@ -172,13 +184,15 @@ engine::Rigid3 Simulation::world_from_camera(int frame) const {
 }
 
 const std::string& Simulation::label(int frame) const {
-  return scene_.trajectory.LabelAt(ToSeconds(time(frame)));
+  return scene_.trajectory.LabelAt(WalkedFor_s(ToSeconds(time(frame))));
 }
 
 void Simulation::RenderRotated(int frame, const std::optional<engine::Rigid3>& camera_from_rotated,
                                cv::Mat* bgr) const {
   const double time_s = ToSeconds(time(frame));
-  if (options_.blur_samples == 1) {
+  if (IsCovered(time_s)) {
+    *bgr = cv::Mat::zeros(camera_.height_px(), camera_.width_px(), CV_8UC3);
+  } else if (options_.blur_samples == 1) {
     RenderLight(time_s, camera_from_rotated, bgr);
   } else {
     const int samples = options_.blur_samples;
@@ -204,6 +218,7 @@ void Simulation::RenderFrom(const engine::Rigid3& world_from_camera, int frame, 
 }
 
 std::optional<Eigen::Vector3d> Simulation::SurfaceAt(int frame, const Eigen::Vector2d& pixel) const {
+  if (IsCovered(ToSeconds(time(frame)))) return std::nullopt;
   if (!rows_differ()) return SurfaceAlong(world_from_camera(frame), pixel);
   return SurfaceAlong(PoseAt(ToSeconds(time(frame)) + RowOffset_s(pixel.y())), pixel);
 }
@@ -219,6 +234,7 @@ std::optional<Eigen::Vector3d> Simulation::SurfaceAlong(const engine::Rigid3& wo
 }
 
 bool Simulation::IsVisible(int frame, const Eigen::Vector3d& point_in_world) const {
+  if (IsCovered(ToSeconds(time(frame)))) return false;
   const engine::Rigid3 pose = world_from_camera(frame);
   const std::optional<Eigen::Vector2d> pixel = camera_.Project(pose.inverse() * point_in_world);
   if (!pixel || !camera_.IsInside(*pixel)) return false;
@@ -240,6 +256,7 @@ std::unique_ptr<Simulation> MakeSimulation(const std::string& scene_spec, const 
   if (const auto fault = options.Validate()) throw Error(*fault);
   request.seed = options.seed;
   request.identical_places = options.identical_places;
+  request.walk = options.walk;
   return std::make_unique<Simulation>(scene_spec, recipe.build(request), options);
 }
 

@@ -39,6 +39,12 @@ struct SimulationOptions {
   double vignetting = 0.1;       // Ratio of the light lost in the corners, in [0, 1).
   bool identical_places =
       false;  // All places of `museum` and `desks` have the same content, so they cannot be distinguished.
+  // Seed of the walk through the places of `museum` and `desks` after they were built, which leaves the
+  // places as they are; 0: the usual walk.
+  std::uint64_t walk = 0;
+  // At this time of the sequence the person rests for so long: the camera stays where it is, and its lens is
+  // covered.
+  double rest_at_s = 0, rest_s = 0;
   CameraFaults faults;
   std::uint64_t seed = 1;
 
@@ -95,6 +101,9 @@ class Simulation {
 
  private:
   engine::Rigid3 PoseAt(double time_s) const;
+  // The time of the trajectory, which stands still during the rest.
+  double WalkedFor_s(double time_s) const;
+  bool IsCovered(double time_s) const;
   // Time from a frame's timestamp to the exposure of a row; rows may be fractional.
   double RowOffset_s(double row) const;
   bool rows_differ() const { return options_.faults.readout_s > 0 || options_.faults.interlaced; }

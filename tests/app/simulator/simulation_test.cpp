@@ -296,6 +296,66 @@ TEST(Simulation, IdenticalPlacesHaveTheSameGeometry) {
   }
 }
 
+TEST(Simulation, ARestCoversTheLensAndTheWalkGoesOnAfterIt) {
+  SimulationOptions options = SmallAndClean();
+  options.frame_rate_hz = 10;
+  options.duration_s = 4;
+  const auto walk = MakeSimulation("room", options);
+  options.rest_at_s = 1;
+  options.rest_s = 2;
+  const auto rested = MakeSimulation("room", options);
+  ASSERT_EQ(rested->frame_count(), 41);
+  const auto mean_of = [](const Simulation& simulation, int frame) {
+    cv::Mat image;
+    simulation.Render(frame, &image);
+    return cv::mean(image)[0];
+  };
+  EXPECT_GT(mean_of(*rested, 9), 30);
+  EXPECT_LT(mean_of(*rested, 10), 1);
+  EXPECT_LT(mean_of(*rested, 29), 1);
+  EXPECT_GT(mean_of(*rested, 30), 30);
+  EXPECT_FALSE(rested->SurfaceAt(20, {100, 100}));
+  EXPECT_TRUE(rested->SurfaceAt(30, {100, 100}));
+  for (const auto& [after, before] : {std::pair(9, 9), {20, 10}, {30, 10}, {40, 20}})
+    EXPECT_TRUE(engine::IsNear(rested->world_from_camera(after), walk->world_from_camera(before), 1e-6, 1e-6))
+        << after;
+}
+
+TEST(Simulation, AnotherWalkLeavesThePlacesAndTheirBuildsAsTheyAre) {
+  SimulationOptions options = SmallAndClean();
+  options.frame_rate_hz = 2;
+  const auto visits_of = [](const Simulation& simulation) {
+    std::vector<std::string> visits;
+    for (int i = 0; i < simulation.frame_count(); ++i) {
+      const std::string& label = simulation.label(i);
+      if (label.starts_with("visit") && (visits.empty() || visits.back() != label)) visits.push_back(label);
+    }
+    return visits;
+  };
+  const auto usual = MakeSimulation("museum:6", options);
+  std::set<std::vector<std::string>> orders = {visits_of(*usual)};
+  std::set<int> lengths = {usual->frame_count()};
+  for (const char* spec : {"museum:6,walk=1", "museum:6,walk=2", "museum:6,walk=3"}) {
+    const auto other = MakeSimulation(spec, options);
+    int frame = 0;
+    for (; usual->label(frame) != "build5"; ++frame) {
+      EXPECT_EQ(usual->label(frame), other->label(frame));
+      EXPECT_TRUE(
+          engine::IsNear(usual->world_from_camera(frame), other->world_from_camera(frame), 1e-9, 1e-9));
+    }
+    EXPECT_GT(frame, 60);
+    cv::Mat image, same;
+    usual->Render(10, &image);
+    other->Render(10, &same);
+    EXPECT_EQ(cv::norm(image, same, cv::NORM_INF), 0) << "the places are the same";
+    EXPECT_EQ(visits_of(*other).size(), 6u);
+    orders.insert(visits_of(*other));
+    lengths.insert(other->frame_count());
+  }
+  EXPECT_GE(orders.size(), 3u);
+  EXPECT_EQ(lengths.size(), 4u);
+}
+
 TEST(Simulation, MotionBlurDoesNotShiftTheImage) {
   SimulationOptions options = SmallAndClean();
   options.frame_rate_hz = 10;
