@@ -270,6 +270,8 @@ void GuideRun::HandleCarriedOut(const TimedCommand& command, CameraState* state)
   } else {
     state->message.clear();
   }
+  // Visitors who watch a recording act in it.
+  run.options.no_faster_than_times = !request_.may_write && !request_.headless;
   // What comes before a map is started would be lost to it.
   const bool begins =
       std::holds_alternative<NewMap>(command.command) || std::holds_alternative<UseMap>(command.command);

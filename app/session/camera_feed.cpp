@@ -69,6 +69,10 @@ void CameraFeed::Handle(const std::stop_token& stop) {
   }
   if (pace == Pace::kRealtime && !live_) clock_->WaitFor(frame_.time, stop);
   if (pace == Pace::kEager) WaitForMapper(stop);
+  if (pace != Pace::kRealtime) {
+    if (run_.options.no_faster_than_times && !live_) WaitForTime(stop);
+    last_processed_ = {std::chrono::steady_clock::now(), frame_.time};
+  }
   SetHeadRotation();
   tracked = session_->Process(frame_);
   ReportLatency();
@@ -102,11 +106,18 @@ void CameraFeed::Rest(const std::stop_token& stop) {
   machine.WaitUntil(machine.Now() + kInterval, stop);
 }
 
+std::chrono::steady_clock::time_point CameraFeed::DueAfterLast() const {
+  if (!last_processed_) return std::chrono::steady_clock::now();
+  return last_processed_->first + (frame_.time - last_processed_->second);
+}
+
 void CameraFeed::WaitForMapper(const std::stop_token& stop) {
-  auto due = std::chrono::steady_clock::now();
-  if (last_processed_) due = last_processed_->first + (frame_.time - last_processed_->second);
-  session_->WaitUntilIdle(due, stop);
-  last_processed_ = {std::chrono::steady_clock::now(), frame_.time};
+  session_->WaitUntilIdle(DueAfterLast(), stop);
+}
+
+void CameraFeed::WaitForTime(const std::stop_token& stop) {
+  PlayClock machine;
+  machine.WaitUntil(machine.Now() + (DueAfterLast() - std::chrono::steady_clock::now()), stop);
 }
 
 void CameraFeed::SetHeadRotation() {

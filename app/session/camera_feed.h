@@ -62,6 +62,10 @@ class CameraFeed {
   // A file delivers faster than a camera, and would run ahead of the mapper, which with a real camera has the
   // whole time between images. The source waits therefore, never the tracker.
   void WaitForMapper(const std::stop_token& stop);
+  // See FrameLoopOptions::no_faster_than_times.
+  void WaitForTime(const std::stop_token& stop);
+  // When as much time has passed since the last image as lies between it and this one; now for the first.
+  std::chrono::steady_clock::time_point DueAfterLast() const;
   // Tells the tracker how far the head was commanded to rotate since the last tracked image.
   void SetHeadRotation();
   // Decided before an image is fetched: an image that is slow to produce (a simulation on a busy machine) is
@@ -85,7 +89,7 @@ class CameraFeed {
   bool late_ = false;  // the image is to be dropped
   std::optional<Timestamp> first_time_;
   Timestamp clock_offset_{};
-  // Eager pace: when the previous image was processed, and its own time.
+  // When the previous image was processed, and its own time; not in realtime.
   std::optional<std::pair<std::chrono::steady_clock::time_point, Timestamp>> last_processed_;
   std::optional<engine::TrackedFrame> last_tracked_;
   std::string trouble_;

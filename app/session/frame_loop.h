@@ -64,6 +64,9 @@ struct FrameLoopOptions {
   // timestamp, for a recording in realtime since the time at which it was due. On the camera's thread; may be
   // empty.
   std::function<void(Timestamp)> latency;
+  // Of a recording in lockstep or eager pace: no image is processed before as much time has passed since the
+  // one before as lies between them, so that a person can follow. None is dropped.
+  bool no_faster_than_times = false;
   PlayClock* clock = nullptr;  // the first camera's is used for all; null: the system clock
   // Called about thirty times a second with the last tracked frame while no image is processed: while the
   // clock is stopped, and with `at_end` after the last image, as long as the loop stays there. The commands

@@ -266,6 +266,24 @@ TEST(FrameLoop, ReportsTheAgeOfALiveImageFromItsTimestamp) {
   EXPECT_THAT(latencies, ElementsAre(std::chrono::milliseconds(30)));
 }
 
+TEST(FrameLoop, ShowsARecordingNoFasterThanItsTimesWhereAPersonIsToFollow) {
+  for (const Pace pace : {Pace::kEager, Pace::kLockstep}) {
+    CalibratedCamera camera = Calibrate(std::make_unique<Recording>(3), std::nullopt);
+    SessionOptions options;
+    options.may_write = false;
+    options.threaded = pace != Pace::kLockstep;
+    Session session(options, {camera.model}, nullptr);
+    FrameLoopOptions loop;
+    loop.pace = pace;
+    loop.no_faster_than_times = true;
+    int shown = 0;
+    const auto begin = std::chrono::steady_clock::now();
+    RunFrames(&camera, &session, loop, [&](const engine::TrackedFrame&) { ++shown; }, {});
+    EXPECT_EQ(shown, 3);
+    EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(200)) << ToString(pace);
+  }
+}
+
 TEST(FrameLoop, PausesWhileTheClockIsStoppedAndStaysAtTheLastImage) {
   CalibratedCamera camera = Calibrate(std::make_unique<Recording>(3), std::nullopt);
   SessionOptions options;
