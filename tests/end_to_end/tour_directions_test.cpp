@@ -17,6 +17,7 @@
 
 #include "app/files/text_file.h"
 #include "engine/geometry/sim3.h"
+#include "tests/end_to_end/five_stops.h"
 #include "tests/end_to_end/mapped_museum.h"
 #include "tests/end_to_end/run_docent.h"
 
@@ -28,90 +29,36 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-constexpr double kDegrees = 180 / std::numbers::pi;
-
-double AngleApart_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * kDegrees;
-}
-
-// The events of a kind in the order of time, without their times.
-std::vector<std::string> EventsOf(const std::string& kind, const std::filesystem::path& file) {
-  std::istringstream lines(ReadAll(file));
-  std::vector<std::string> events;
-  for (std::string line; std::getline(lines, line);) {
-    const std::size_t begin = line.find(',');
-    if (line.compare(begin + 1, kind.size() + 1, kind + ",") == 0)
-      events.push_back(line.substr(begin + kind.size() + 2));
-  }
-  return events;
-}
-
-int BayOf(const std::string& name) {
-  return name.empty() ? -1 : name.back() - '0';
-}
-
-// The tour leads through five of six bays. The visitor goes from Bay 4 through Bay 5 to Bay 3, is lost on the
-// way across the hall to Bay 0, wants to see the first stop again and goes there, skips Bay 2, and comes past
-// it after all.
 class FiveStops : public ::testing::Test {
  protected:
-  void SetUp() override {
-    mapped_.Map({0, 2, 3, 4, 5});
-    const auto& museum = mapped_.museum();
-    const std::vector<int> stops = {4, 5, 3, 0, 2};
-    for (std::size_t i = 0; i < stops.size(); ++i) {
-      const Eigen::Vector3d front = museum.FrontOf(stops[i]);
-      if (i + 1 < stops.size()) mapped_.AddSign(stops[i], stops[i + 1], front);
-      // The signpost back stands behind who looks at the bay.
-      const Eigen::Vector3d behind = front + 2 * (museum.BeginOf(stops[i]) - front);
-      if (i > 0) mapped_.AddSign(stops[i], stops[i - 1], {behind.x(), 0, behind.z()});
-    }
-    mapped_.Succeed({"maps", "tour", "create", "Five bays", "--stops", "Bay 4", "Bay 5", "Bay 3", "Bay 0",
-                     "Bay 2", "--library", mapped_.library()});
-  }
-
   // Visits the museum and writes its files to folder() / "tour".
   void Visit() {
-    const TrueMuseum& museum = mapped_.museum();
-    const double from = museum.End("build4") - 2, until = museum.End("visit5");
+    const MappedMuseum& mapped = stops_.mapped();
+    const TrueMuseum& museum = mapped.museum();
+    const double from = stops_.from_s(), until = stops_.until_s();
     const auto at = [&](const std::string& label, double share) {
       return FormatNumber(museum.Begin(label) + share * (museum.End(label) - museum.Begin(label)) - from);
     };
     const std::string back = at("visit0", 0.8) + " tour back\n";
     const std::string card = at("visit4", 0.4) + " tour open sign-1\n" + at("visit4", 0.6) + " tour close\n";
-    mapped_.folder().Write("visit.txt", back + back + back + card + at("visit4", 0.8) + " tour skip\n");
-    mapped_.Succeed({"tour", "--library", mapped_.library(), "--camera", "sim:" + mapped_.spec(), "--from",
-                     FormatNumber(from), "--until", FormatNumber(until), "--pace", "lockstep", "--headless",
-                     "--tour", "Five bays", "--narrate", "--script",
-                     (mapped_.folder() / "visit.txt").string(), "--output", Tour().string()});
+    mapped.folder().Write("visit.txt", back + back + back + card + at("visit4", 0.8) + " tour skip\n");
+    mapped.Succeed({"tour", "--library", mapped.library(), "--camera", "sim:" + mapped.spec(), "--from",
+                    FormatNumber(from), "--until", FormatNumber(until), "--pace", "lockstep", "--headless",
+                    "--tour", stops_.name(), "--narrate", "--script",
+                    (mapped.folder() / "visit.txt").string(), "--output", Tour().string()});
   }
-  std::filesystem::path Tour() const { return mapped_.folder() / "tour"; }
+  std::filesystem::path Tour() const { return stops_.mapped().folder() / "tour"; }
 
-  // How far the arrow of a row of guidance.csv is from the truth, degrees.
-  double ErrorOf_deg(const Row& row) const {
-    const int bay = BayOf(row.at("map")), to = BayOf(row.at("to"));
-    const engine::Rigid3 camera = mapped_.museum().CameraAt(*ParseSeconds(row.at("timestamp")));
-    const Eigen::Vector3d shown = camera.rotation * VectorIn(row, "x", "y", "z");
-    const Eigen::Vector3d sign = mapped_.PlaceOfSign(bay, to);
-    const Eigen::Vector3d board = sign - Eigen::Vector3d(0, 1.2 * 0.15, 0);
-    return AngleApart_deg(shown, row.at("towards") == "direction" ? mapped_.museum().BeginOf(to) - sign
-                                                                  : board - camera.translation);
-  }
-
-  MappedMuseum mapped_{"museum:6,fps=8"};
+  FiveStopsMuseum stops_;
 };
 
 TEST_F(FiveStops, AreReachedWithADetourALossAndASkippedStopAlongTrueDirections) {
   Visit();
   EXPECT_THAT(EventsOf("tour", Tour() / "events.csv"),
-              ElementsAre("\"arrived at 'Bay 4', stop 1 of 5\"", "\"arrived at 'Bay 5', stop 2 of 5\"",
-                          "\"arrived at 'Bay 3', stop 3 of 5\"", "\"arrived at 'Bay 0', stop 4 of 5\"",
-                          "\"going back to 'Bay 3', stop 3 of 5\"", "\"going back to 'Bay 5', stop 2 of 5\"",
-                          "\"going back to 'Bay 4', stop 1 of 5\"", "\"arrived at 'Bay 4', stop 1 of 5\"",
-                          "\"skipped 'Bay 2', stop 5 of 5\"", "finished; 4 of 5 stops seen"));
+              ::testing::ElementsAreArray(FiveStopsMuseum::ToldOfTour()));
 
   // Across the hall, Bay 1 looks like the others, but has no map.
-  const TrueMuseum& museum = mapped_.museum();
+  const TrueMuseum& museum = stops_.mapped().museum();
   double lost_s = 0, last_s = museum.Begin("visit3");
   std::set<std::string> only_turned;  // The times of the images of which only the rotation is known.
   for (const Row& row : ReadFrames(Tour() / "frames.csv")) {
@@ -142,7 +89,7 @@ TEST_F(FiveStops, AreReachedWithADetourALossAndASkippedStopAlongTrueDirections) 
     // A visitor who walks while only the rotation is known is taken to stand where they were.
     if (only_turned.contains(row.at("timestamp"))) continue;
     ++ways[row.at("map") + " to " + row.at("to") + " by " + row.at("towards")];
-    const double error_deg = ErrorOf_deg(row);
+    const double error_deg = stops_.ErrorOf_deg(row, museum);
     EXPECT_LT(error_deg, 15) << testing::PrintToString(row);
     worst_deg = std::max(worst_deg, error_deg);
   }
