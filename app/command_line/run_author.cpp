@@ -53,7 +53,9 @@ maps::Tour FindTour(const maps::Library& library, const std::string& name) {
 
 // Of maps that are copies of each other, the newest one counts, as for the session.
 Route RouteOf(const maps::Library& library, const maps::Tour& tour) {
-  const auto replaced = maps::ReplacedByCopies(maps::FindCopies(library));
+  const std::vector<maps::MapCopy> copies = maps::FindCopies(library);
+  const auto replaced = maps::ReplacedByCopies(copies);
+  const auto names = maps::NamesForVisitors(copies);
   const auto shown = [&](std::uint64_t key) {
     const auto copy = replaced.find(key);
     return copy == replaced.end() ? key : copy->second;
@@ -62,7 +64,9 @@ Route RouteOf(const maps::Library& library, const maps::Tour& tour) {
   route.minutes = tour.minutes;
   for (const std::uint64_t stop : tour.stops) {
     const std::uint64_t key = shown(stop);
-    route.stops.push_back({key, library.Find(key).name});
+    const std::string name = library.Find(key).name;
+    const auto told = names.find(name);
+    route.stops.push_back({key, told == names.end() ? name : told->second});
   }
   for (const maps::Library::Signpost& signpost : library.Signposts())
     route.signposts.Add(shown(signpost.map.key), shown(signpost.to_key));

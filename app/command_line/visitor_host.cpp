@@ -18,9 +18,13 @@ std::vector<std::string> PlaceNames(const GuideRequest& request) {
   if (request.route) {
     for (const RouteStop& stop : request.route->stops) names.push_back(stop.name);
   } else if (request.library != nullptr) {
-    const auto replaced = maps::ReplacedByCopies(maps::FindCopies(*request.library));
+    const std::vector<maps::MapCopy> copies = maps::FindCopies(*request.library);
+    const auto replaced = maps::ReplacedByCopies(copies);
+    const auto told = maps::NamesForVisitors(copies);
     for (const maps::MapInfo& map : request.library->List()) {
-      if (!replaced.contains(map.key)) names.push_back(map.name);
+      if (replaced.contains(map.key)) continue;
+      const auto other = told.find(map.name);
+      names.push_back(other == told.end() ? map.name : other->second);
     }
   }
   return names;

@@ -20,12 +20,13 @@ void SessionMemory::Open() {
       state_.AddEvent(state_.LastTime(), "warning", maps::TextOf(copy));
   } else {
     replaced_ = maps::ReplacedByCopies(copies);
+    names_for_visitors_ = maps::NamesForVisitors(copies);
     for (const auto& [older, newer] : replaced_) paging.left_out.push_back(older);
   }
   for (const maps::MapInfo& info : library_->List()) {
     SessionMap& map = state_.maps[info.key];
     map.key = info.key;
-    map.name = info.name;
+    map.name = NameOf(info);
     map.policy = info.policy;
     map.bounds = info.bounds;
     map.saved_scene = map.scene;
@@ -98,10 +99,15 @@ std::optional<std::string> SessionMemory::ReloadContent(std::uint64_t key) {
   SessionMap* const map = find();
   if (map == nullptr || map->snapshot->revision != info.revision) return std::nullopt;
   assets_.Merge(&assets);
-  map->name = info.name;
+  map->name = NameOf(info);
   ResolveSignposts(scene.get());
   map->scene = map->saved_scene = std::move(scene);
-  return info.name;
+  return map->name;
+}
+
+std::string SessionMemory::NameOf(const maps::MapInfo& info) const {
+  const auto found = names_for_visitors_.find(info.name);
+  return found == names_for_visitors_.end() ? info.name : found->second;
 }
 
 // Empty when the library has none, or a damaged one, which costs nothing else.

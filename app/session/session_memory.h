@@ -56,6 +56,8 @@ class SessionMemory {
   content::EditHistory StoredHistory(std::uint64_t key, const std::string& where, AssetCache* assets,
                                      std::vector<std::string>* problems) const;
   bool Evict(std::uint64_t key);
+  // The name that the session has for a map.
+  std::string NameOf(const maps::MapInfo& info) const;
   // With it.
   void ResolveSignposts(content::Scene* scene);
 
@@ -67,6 +69,8 @@ class SessionMemory {
   SessionAssets& assets_;
   // On a tour, the older ones of maps that are copies of each other, each with the newest.
   std::map<std::uint64_t, std::uint64_t> replaced_;
+  // On a tour, the names of copies that visitors are not to read; see maps::NamesForVisitors.
+  std::map<std::string, std::string> names_for_visitors_;
   std::optional<maps::MapPager> pager_;  // last, because its thread calls back into the other members
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <set>
+#include <string_view>
 #include <utility>
 
 namespace docent::maps {
@@ -27,6 +28,16 @@ bool AreCopies(const SeenMap& a, const SeenMap& b) {
   const auto shared = std::count_if(few.begin(), few.end(),
                                     [&](const Appearance& thumbnail) { return many.contains(thumbnail); });
   return shared > 0 && 2 * static_cast<std::size_t>(shared) >= few.size();
+}
+
+// The name without the number that FreeName has added.
+std::string WithoutNumber(const std::string& name) {
+  const std::size_t begin = name.rfind(" (");
+  if (begin == std::string::npos || !name.ends_with(')')) return name;
+  const std::string_view number = std::string_view(name).substr(begin + 2, name.size() - begin - 3);
+  const bool is_number = !number.empty() && std::all_of(number.begin(), number.end(),
+                                                        [](char c) { return c >= '0' && c <= '9'; });
+  return is_number ? name.substr(0, begin) : name;
 }
 
 }  // namespace
@@ -78,6 +89,17 @@ std::map<std::uint64_t, std::uint64_t> ReplacedByCopies(const std::vector<MapCop
   std::map<std::uint64_t, std::uint64_t> replaced;
   for (const MapCopy& copy : copies) replaced.emplace(copy.older.key, copy.newer.key);
   return replaced;
+}
+
+std::map<std::string, std::string> NamesForVisitors(const std::vector<MapCopy>& copies) {
+  std::map<std::string, std::string> names;
+  for (const MapCopy& copy : copies) {
+    const std::string plain = WithoutNumber(copy.newer.name);
+    if (plain == copy.newer.name) continue;
+    if (copy.older.name == plain) names[plain] = copy.newer.name;
+    if (copy.older.name == plain || WithoutNumber(copy.older.name) == plain) names[copy.newer.name] = plain;
+  }
+  return names;
 }
 
 std::string TextOf(const MapCopy& copy) {

@@ -23,6 +23,12 @@ std::vector<MapCopy> FindCopies(const Library& library);
 // The keys of older copies, each with that of the newest one.
 std::map<std::uint64_t, std::uint64_t> ReplacedByCopies(const std::vector<MapCopy>& copies);
 
+// What visitors read instead of the names that tell copies apart: importing a map twice gives the second one
+// the name of the first with a number, and the newest one is shown with that name alone. The first one gets
+// the name with the number, so that names stay unique. By the name in the library; names that stay are left
+// out.
+std::map<std::string, std::string> NamesForVisitors(const std::vector<MapCopy>& copies);
+
 // A sentence for a curator who should keep one of the two.
 std::string TextOf(const MapCopy& copy);
 

@@ -75,6 +75,32 @@ TEST_F(Copies, TheOlderOnesAreNeitherLoadedNorFound) {
   EXPECT_EQ(pager.maps_in_memory().size(), 3u) << "but an author can still choose them";
 }
 
+TEST_F(Copies, HaveNoNumbersInTheirNamesForVisitors) {
+  const auto names = NamesForVisitors(FindCopies(library_));
+  ASSERT_TRUE(names.contains("Desk (3)"));
+  EXPECT_EQ(names.at("Desk (3)"), "Desk") << "the newest one is shown";
+  EXPECT_EQ(names.at("Desk"), "Desk (3)") << "names stay unique";
+  EXPECT_FALSE(names.contains("Door"));
+}
+
+TEST(NamesForVisitors, LeaveAloneNamesOfOtherOrigin) {
+  const auto copies = [](const std::string& older, const std::string& newer) {
+    MapCopy copy;
+    copy.older.name = older;
+    copy.newer.name = newer;
+    return NamesForVisitors({copy});
+  };
+  EXPECT_THAT(copies("Ships (2)", "Ships"), IsEmpty());
+  EXPECT_THAT(copies("Ships", "Boats (2)"), IsEmpty());
+  EXPECT_THAT(copies("Ships", "Ships (new)"), IsEmpty());
+  EXPECT_THAT(copies("Ships", "Ships ()"), IsEmpty());
+  EXPECT_THAT(copies("Ships (2)", "Ships (3)"), UnorderedElementsAre(Pair("Ships (3)", "Ships")))
+      << "the first one was removed";
+  EXPECT_THAT(copies("Paintings (1900)", "Paintings (1900) (2)"),
+              UnorderedElementsAre(Pair("Paintings (1900) (2)", "Paintings (1900)"),
+                                   Pair("Paintings (1900)", "Paintings (1900) (2)")));
+}
+
 TEST_F(Copies, AreNamedToTheCurator) {
   const std::vector<MapCopy> copies = FindCopies(library_);
   ASSERT_EQ(copies.size(), 2u);
