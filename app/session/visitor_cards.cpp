@@ -65,8 +65,8 @@ void VisitorCards::Mark(ui::VisitorDisplay* display) {
 }
 
 std::string VisitorCards::HintFor(const Open& open) const {
-  if (open.page + 1 == open.pages.size()) return strings_.close_card;
-  return Filled(strings_, strings_.more_pages,
+  if (open.page + 1 == open.pages.size()) return by_gaze_ ? strings_.look_away : strings_.close_card;
+  return Filled(strings_, by_gaze_ ? strings_.pages_turn : strings_.more_pages,
                 {std::to_string(open.page + 1), std::to_string(open.pages.size())});
 }
 

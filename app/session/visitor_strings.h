@@ -67,6 +67,8 @@ struct VisitorStrings {
   const char* nothing_to_open;
   const char* more_pages;  // Numbers of the page and of all pages.
   const char* close_card;
+  const char* pages_turn;  // By gaze alone: numbers of the page and of all pages.
+  const char* look_away;   // By gaze alone.
 
   // The other one of two cameras.
   const char* other_is_at;  // Place.

@@ -153,11 +153,12 @@ TEST(VisitorCards, PagesTurnByThemselvesForGazeAlone) {
   visitor.SeeFor(1.6, right_deg);
   ASSERT_EQ(visitor.OpenName(), "right");
   const std::string first = visitor.frame.visitor->card->text;
+  EXPECT_THAT(visitor.frame.visitor->card->hint, ::testing::EndsWith("It turns by itself."));
   EXPECT_EQ(visitor.SeeFor(10, right_deg).card->text, first) << "300 characters take longer";
   EXPECT_NE(visitor.SeeFor(15, right_deg).card->text, first);
   visitor.SeeFor(200, right_deg);
   ASSERT_EQ(visitor.OpenName(), "right") << "the last page stays";
-  EXPECT_EQ(visitor.frame.visitor->card->hint, "Press to close.");
+  EXPECT_EQ(visitor.frame.visitor->card->hint, "Look away to close.");
 }
 
 TEST(VisitorCards, SayOnceHowTheyAreOpened) {
