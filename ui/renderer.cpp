@@ -128,7 +128,7 @@ struct Renderer::Impl {
   // Over the video, whose target is bound.
   void DrawViews(const VisitorDisplay& visitor) {
     const std::vector<Inset> areas = PlaceViews(visitor, image.width_px(), image.height_px());
-    for (std::size_t i = 0; i < areas.size(); ++i) image.DrawInset(visitor.views[i], areas[i]);
+    for (std::size_t i = 0; i < areas.size(); ++i) image.DrawInset(visitor.views[i].image, areas[i]);
   }
 
   // The camera that sees the view's image at the size in which it is drawn.

@@ -44,6 +44,12 @@ struct Card {
   std::optional<Eigen::Vector2d> turned_rad;
 };
 
+// A view of a place that a visitor may know it by.
+struct KnownView {
+  cv::Mat image;     // CV_8UC1 or CV_8UC3.
+  std::string name;  // Of the place, which stands below the image.
+};
+
 // What a visitor on a tour is told, without the words of an engineer.
 struct VisitorDisplay {
   std::string place;               // The name of the place where the visitor is; empty while it is not known.
@@ -52,9 +58,8 @@ struct VisitorDisplay {
   std::string sentence;            // What to do; empty for nothing.
   std::vector<std::string> stops;  // The known places by name, as a help to find one.
   std::optional<WayOn> way_on;     // Shown if it is given.
-  // Images of known places that resemble what the camera sees (CV_8UC1 or CV_8UC3), which are drawn beside
-  // each other.
-  std::vector<cv::Mat> views;
+  // Known places that resemble what the camera sees, which are drawn beside each other.
+  std::vector<KnownView> views;
   // On a tour with stops: how far the visitor has come and where to go next, shown below the place. The stops
   // themselves are shown on demand.
   std::string route_line;

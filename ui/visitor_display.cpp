@@ -167,7 +167,8 @@ std::vector<Inset> PlaceViews(const VisitorDisplay& visitor, int width_px, int h
   std::vector<Inset> areas;
   const auto count = static_cast<double>(visitor.views.size());
   double left = 0.5 * (1 - count * kWidth - (count - 1) * kGap);
-  for (const cv::Mat& view : visitor.views) {
+  for (const KnownView& known : visitor.views) {
+    const cv::Mat& view = known.image;
     Inset area;
     area.x = std::max(0, static_cast<int>(left * width_px));
     area.y = static_cast<int>(kTop * height_px);
@@ -189,6 +190,30 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
         0.5 * (canvas->width_px() - 1),
         (visitor.stops.empty() && visitor.views.empty() ? 0.5 : 0.66) * canvas->height_px());
     DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
+// The names of the places below their images.
+void DrawNamesOfViews(const VisitorDisplay& visitor, const engine::CameraModel& camera, double unit,
+                      Canvas* canvas) {
+  const Letterbox box =
+      FitImage(camera.width_px(), camera.height_px(), canvas->width_px(), canvas->height_px());
+  const std::vector<Inset> areas = PlaceViews(visitor, camera.width_px(), camera.height_px());
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    if (visitor.views[i].name.empty()) continue;
+    const Eigen::Vector2d below =
+        box.WindowFromImage({areas[i].x + 0.5 * (areas[i].width - 1), areas[i].y + areas[i].height + 0.0});
+    const Eigen::Vector2d padding(8 * unit, 3 * unit);
+    TextStyle style;
+    style.size_px = 16 * unit;
+    style.centered = true;
+    style.max_width_px = std::max(40, static_cast<int>(box.scale * areas[i].width - 2 * padding.x()));
+    style.max_height_px = static_cast<int>(56 * unit);
+    style.color = kTitle;
+    const Eigen::Vector2d size = canvas->Measure(visitor.views[i].name, style);
+    const Eigen::Vector2d corner(below.x() - 0.5 * size.x() - padding.x(), below.y() + 4 * unit);
+    canvas->Box(corner, corner + size + 2 * padding, 6 * unit, kBoard);
+    canvas->Text(visitor.views[i].name, style, {below.x(), corner.y() + padding.y()}, 0.5);
+  }
+}
+
   }
   if (visitor.marked && *visitor.marked < visitor.targets.size() && view.camera != nullptr)
     DrawMark(visitor.targets[*visitor.marked], *view.camera, unit, canvas);
@@ -212,3 +237,4 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
 }
 
 }  // namespace docent::ui
+  if (view.camera != nullptr) DrawNamesOfViews(visitor, *view.camera, unit, canvas);

@@ -89,8 +89,8 @@ void VisitorGuide::FindViews(const ShownFrame& frame) {
     views_time_s_.reset();
   } else if (!views_time_s_ || frame.seconds - *views_time_s_ >= kInterval_s) {
     views_.clear();
-    for (const auto& view : session_->SimilarViews(frame.tracked.frame, kMostViews, entrances))
-      views_.push_back(view.image);
+    for (Session::SimilarView& view : session_->SimilarViews(frame.tracked.frame, kMostViews, entrances))
+      views_.push_back({std::move(view.image), std::move(view.map_name)});
     views_time_s_ = frame.seconds;
   }
 }

@@ -49,7 +49,7 @@ class VisitorGuide {
   VisitorCards cards_;
   ApproachWatch approach_;
   PlaceClaim claim_;
-  std::vector<cv::Mat> views_;  // See ui::VisitorDisplay.
+  std::vector<ui::KnownView> views_;  // See ui::VisitorDisplay.
   std::optional<double> views_time_s_;
   std::shared_ptr<const ShownFrame> last_with_pose_;
 };
