@@ -26,6 +26,19 @@ Eigen::Vector2d SearchPath(double seconds) {
   return {1.05 * std::sin(1.3 * seconds), 0.55 * std::sin(1.7 * seconds + 0.6)};
 }
 
+// In units.
+constexpr double kSentencePaddingX = 12, kSentencePaddingY = 6;
+
+TextStyle SentenceStyle(double units, double unit, const Canvas& canvas) {
+  TextStyle style;
+  style.size_px = units * unit;
+  style.centered = true;
+  style.max_width_px = std::max(40, static_cast<int>(0.84 * canvas.width_px()));
+  style.max_height_px = std::max(20, static_cast<int>(0.28 * canvas.height_px()));
+  style.color = kFigureInk;
+  return style;
+}
+
 }  // namespace
 
 Color Faded(Color color, double alpha) {
@@ -33,22 +46,23 @@ Color Faded(Color color, double alpha) {
   return color;
 }
 
+Eigen::AlignedBox2d SentencePanel(const std::string& text, double units, double bottom, double unit,
+                                  Canvas* canvas) {
+  if (text.empty()) return {};
+  const Eigen::Vector2d size = canvas->Measure(text, SentenceStyle(units, unit, *canvas));
+  const Eigen::Vector2d half(0.5 * size.x() + kSentencePaddingX * unit,
+                             size.y() + 2 * kSentencePaddingY * unit);
+  const double middle = 0.5 * (canvas->width_px() - 1);
+  return {Eigen::Vector2d(middle - half.x(), bottom - half.y()), Eigen::Vector2d(middle + half.x(), bottom)};
+}
+
 double DrawSentence(const std::string& text, double units, double bottom, double unit, Canvas* canvas) {
   if (text.empty()) return bottom;
-  TextStyle style;
-  style.size_px = units * unit;
-  style.centered = true;
-  style.max_width_px = std::max(40, static_cast<int>(0.84 * canvas->width_px()));
-  style.max_height_px = std::max(20, static_cast<int>(0.28 * canvas->height_px()));
-  style.color = kFigureInk;
-  const Eigen::Vector2d size = canvas->Measure(text, style);
-  const Eigen::Vector2d padding(12 * unit, 6 * unit);
-  const double middle = 0.5 * (canvas->width_px() - 1);
-  const double top = bottom - size.y() - 2 * padding.y();
-  canvas->Box({middle - 0.5 * size.x() - padding.x(), top}, {middle + 0.5 * size.x() + padding.x(), bottom},
-              8 * unit, kFigurePanel);
-  canvas->Text(text, style, {middle, top + padding.y()}, 0.5);
-  return top;
+  const Eigen::AlignedBox2d panel = SentencePanel(text, units, bottom, unit, canvas);
+  canvas->Box(panel.min(), panel.max(), 8 * unit, kFigurePanel);
+  canvas->Text(text, SentenceStyle(units, unit, *canvas),
+               {panel.center().x(), panel.min().y() + kSentencePaddingY * unit}, 0.5);
+  return panel.min().y();
 }
 
 void DrawSearchFigure(const Eigen::Vector2d& center, double radius, double seconds, Canvas* canvas) {

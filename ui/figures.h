@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Geometry>
 #include <string>
 
 #include "ui/canvas.h"
@@ -12,6 +13,9 @@ namespace docent::ui {
 // The color with this share of its opacity.
 Color Faded(Color color, double alpha);
 
+// Where DrawSentence draws its panel; empty for an empty sentence.
+Eigen::AlignedBox2d SentencePanel(const std::string& text, double units, double bottom, double unit,
+                                  Canvas* canvas);
 // Draws a centred sentence in a panel whose bottom is at this height, and nothing for an empty one. `units`
 // is the text's size in units of `unit` pixels. Returns the panel's top.
 double DrawSentence(const std::string& text, double units, double bottom, double unit, Canvas* canvas);

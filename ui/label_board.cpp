@@ -210,6 +210,7 @@ void DrawLabels(const content::Scene& scene, const LabelView& view, Canvas* canv
   for (Eigen::AlignedBox2d& sign : signs)
     sign = {view.image_in_canvas.WindowFromImage(sign.min()),
             view.image_in_canvas.WindowFromImage(sign.max())};
+  signs.insert(signs.end(), view.taken.begin(), view.taken.end());
   MoveApart(*canvas, std::move(signs), &labels);
   for (const PlacedLabel& label : labels) DrawLeader(label.drawn, label.board, label.opacity, canvas);
   for (const PlacedLabel& label : labels) {

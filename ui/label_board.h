@@ -35,6 +35,8 @@ struct LabelView {
   Letterbox image_in_canvas;                // Where the camera's image is in the canvas.
   const std::string& language;              // Of the reader; it chooses the texts (TextFor).
   std::span<const std::string> faint = {};  // Hidden labels that are drawn all the same, faintly, by name.
+  std::span<const Eigen::AlignedBox2d> taken =
+      {};  // Parts of the canvas that boards keep clear of, as texts lie there.
 };
 
 // Where the boards of signposts are in the image, about: labels keep clear of them.

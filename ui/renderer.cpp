@@ -21,6 +21,8 @@ namespace docent::ui {
 
 namespace {
 
+constexpr double kCaptionUnits = 18;  // The size of the captions of sounds; see HeadsUpStyle.
+
 // The pose that the content is drawn from; null for none.
 const engine::Rigid3* DrawnFrom(const View& view) {
   if (view.camera == nullptr) return nullptr;
@@ -64,17 +66,22 @@ struct Renderer::Impl {
 
   // Draws labels and heads-up display into a canvas that shows the image in this part of it.
   void DrawTexts(const View& view, const HeadsUpStyle& style, const Letterbox& box, Canvas* target) const {
-    const engine::Rigid3* const from = DrawnFrom(view);
-    if (from != nullptr && view.scene != nullptr)
-      DrawLabels(*view.scene, {*view.camera, *from, box, language, view.faint}, target);
-    if (view.overlay.visitor && view.overlay.visitor->card) return DrawCardWithTexts(view, style, target);
-    DrawInsetText(view, style, box, target);
+    const bool has_card = view.overlay.visitor && view.overlay.visitor->card;
+    const double lowest = target->height_px() - 12 * style.unit_px - style.bottom_px;
+    const Eigen::AlignedBox2d caption =
+        SentencePanel(view.overlay.caption, kCaptionUnits, lowest, style.unit_px, target);
     HeadsUpStyle above = style;
-    if (!view.overlay.caption.empty()) {
-      const double lowest = target->height_px() - 12 * style.unit_px - style.bottom_px;
-      const double top = DrawSentence(view.overlay.caption, 18, lowest, style.unit_px, target);
-      above.bottom_px += lowest - top + 6 * style.unit_px;
+    if (!caption.isEmpty()) above.bottom_px += lowest - caption.min().y() + 6 * style.unit_px;
+    const engine::Rigid3* const from = DrawnFrom(view);
+    if (from != nullptr && view.scene != nullptr) {
+      std::vector<Eigen::AlignedBox2d> taken;
+      if (view.overlay.visitor && !has_card) taken = TakenByVisitorDisplay(view, above, target);
+      if (!caption.isEmpty() && !has_card) taken.push_back(caption);
+      DrawLabels(*view.scene, {*view.camera, *from, box, language, view.faint, taken}, target);
     }
+    if (has_card) return DrawCardWithTexts(view, style, target);
+    DrawInsetText(view, style, box, target);
+    DrawSentence(view.overlay.caption, kCaptionUnits, lowest, style.unit_px, target);
     DrawHeadsUp(view, above, target);
   }
 
@@ -82,7 +89,7 @@ struct Renderer::Impl {
   void DrawCardWithTexts(const View& view, const HeadsUpStyle& style, Canvas* target) const {
     const double unit = style.unit_px, lowest = target->height_px() - 12 * unit - style.bottom_px;
     const double above = DrawSentence(view.overlay.message, 15, lowest, unit, target) - 6 * unit;
-    DrawSentence(view.overlay.caption, 18, above, unit, target);
+    DrawSentence(view.overlay.caption, kCaptionUnits, above, unit, target);
     DrawCard(view.overlay, style, card_texture, target);
   }
 

@@ -14,6 +14,7 @@ namespace docent::ui {
 namespace {
 
 constexpr Color kBoard = theme::kHeadsUp, kTitle = theme::kText;
+constexpr double kLowestStop = 0.76;  // Ratio of the height; sentences are below.
 constexpr Color kWay{1.0f, 0.84f, 0.45f, 1.0f};
 
 struct CornerStyle {
@@ -22,25 +23,46 @@ struct CornerStyle {
   bool at_right;
 };
 
-// A line in the upper corner where lines begin, as the place, which stays while the visitor is there. Returns
-// where the next one below can begin.
-double DrawInCorner(const std::string& text, double top, const CornerStyle& look, double unit,
-                    Canvas* canvas) {
-  if (text.empty()) return top;
+// A line in the upper corner where lines begin, as the place, which stays while the visitor is there.
+struct CornerLine {
+  std::string text;
   TextStyle style;
-  style.size_px = look.size_px;
-  style.bold = look.bold;
-  style.max_width_px = std::max(40, static_cast<int>(0.6 * canvas->width_px()));
-  style.max_height_px = static_cast<int>(32 * unit);
-  style.color = kTitle;
-  const Eigen::Vector2d size = canvas->Measure(text, style);
+  Eigen::AlignedBox2d board;
+  Eigen::Vector2d corner = Eigen::Vector2d::Zero();  // Of the text.
+};
+
+CornerLine LineInCorner(const std::string& text, double top, const CornerStyle& look, double unit,
+                        Canvas* canvas) {
+  CornerLine line;
+  line.text = text;
+  line.style.size_px = look.size_px;
+  line.style.bold = look.bold;
+  line.style.max_width_px = std::max(40, static_cast<int>(0.6 * canvas->width_px()));
+  line.style.max_height_px = static_cast<int>(32 * unit);
+  line.style.color = kTitle;
+  const Eigen::Vector2d size = canvas->Measure(text, line.style);
   const Eigen::Vector2d padding(12 * unit, 7 * unit);
   const double left =
       look.at_right ? canvas->width_px() - 1 - 10 * unit - size.x() - 2 * padding.x() : 10 * unit;
   const Eigen::Vector2d corner(left, top);
-  canvas->Box(corner, corner + size + 2 * padding, 9 * unit, kBoard);
-  canvas->Text(text, style, corner + padding);
-  return corner.y() + size.y() + 2 * padding.y() + 6 * unit;
+  line.board = {corner, corner + size + 2 * padding};
+  line.corner = corner + padding;
+  return line;
+}
+
+// The place and how far the tour has come, below each other.
+std::vector<CornerLine> LinesInCorner(const VisitorDisplay& visitor, double unit, Canvas* canvas) {
+  std::vector<CornerLine> lines;
+  double top = 10 * unit;
+  const auto add = [&](const std::string& text, const CornerStyle& look) {
+    if (text.empty()) return;
+    lines.push_back(LineInCorner(text, top, look, unit, canvas));
+    top = lines.back().board.max().y() + 6 * unit;
+  };
+  add(visitor.place, {18 * unit, true, visitor.is_right_to_left});
+  // The announcement of a place can be as wide as the image, and is not drawn over other words.
+  if (visitor.arrival <= 0) add(visitor.route_line, {16 * unit, false, visitor.is_right_to_left});
+  return lines;
 }
 
 // The name of a place in large letters, above what usually stands in the middle of the image.
@@ -134,8 +156,15 @@ void DrawMenu(const VisitorDisplay& visitor, const HeadsUpStyle& style, Canvas* 
   }
 }
 
-// Names below each other in the upper half of the image, at least as low as `highest`. The last line says if
-// some do not fit.
+// The names that are listed: the known places of who is lost, or the stops of the tour on demand.
+const std::vector<std::string>& ListedStops(const VisitorDisplay& visitor) {
+  static const std::vector<std::string> kNone;
+  if (!visitor.stops.empty()) return visitor.stops;
+  return visitor.lists_route ? visitor.route_stops : kNone;
+}
+
+// Names below each other above the sentences, at least as low as `highest`. The last line says if some do not
+// fit.
 void DrawStops(const std::vector<std::string>& stops, double highest, bool at_right, double unit,
                Canvas* canvas) {
   if (stops.empty()) return;
@@ -145,7 +174,7 @@ void DrawStops(const std::vector<std::string>& stops, double highest, bool at_ri
   style.max_height_px = static_cast<int>(34 * unit);
   style.color = kTitle;
   const double line = 30 * unit, top = std::max(0.12 * canvas->height_px(), highest + 10 * unit);
-  const auto most = static_cast<std::size_t>(std::max(1.0, 0.34 * canvas->height_px() / line));
+  const auto most = static_cast<std::size_t>(std::max(1.0, (kLowestStop * canvas->height_px() - top) / line));
   std::vector<std::string> lines(stops.begin(), stops.begin() + std::min(most, stops.size()));
   if (stops.size() > most) lines.back() = "…";
   double width = 0;
@@ -153,43 +182,13 @@ void DrawStops(const std::vector<std::string>& stops, double highest, bool at_ri
   const double left = 0.5 * (canvas->width_px() - 1 - width),
                height = line * static_cast<double>(lines.size());
   canvas->Box({left - 18 * unit, top - 10 * unit}, {left + width + 18 * unit, top + height + 6 * unit},
-              12 * unit, kBoard);
+              12 * unit, theme::kPanel);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const double indent = at_right ? width - canvas->Measure(lines[i], style).x() : 0;
     canvas->Text(lines[i], style, {left + indent, top + line * static_cast<double>(i)});
   }
 }
 
-}  // namespace
-
-std::vector<Inset> PlaceViews(const VisitorDisplay& visitor, int width_px, int height_px) {
-  constexpr double kWidth = 0.27, kGap = 0.03, kTop = 0.14;  // Ratios of the image's width or height.
-  std::vector<Inset> areas;
-  const auto count = static_cast<double>(visitor.views.size());
-  double left = 0.5 * (1 - count * kWidth - (count - 1) * kGap);
-  for (const KnownView& known : visitor.views) {
-    const cv::Mat& view = known.image;
-    Inset area;
-    area.x = std::max(0, static_cast<int>(left * width_px));
-    area.y = static_cast<int>(kTop * height_px);
-    area.width = std::max(1, static_cast<int>(kWidth * width_px));
-    area.height = std::clamp(area.width * view.rows / std::max(1, view.cols), 1, height_px / 2);
-    areas.push_back(area);
-    left += kWidth + kGap;
-  }
-  return areas;
-}
-
-void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* canvas) {
-  const VisitorDisplay& visitor = *view.overlay.visitor;
-  const double unit = style.unit_px;
-  const double lowest = canvas->height_px() - 12 * unit - style.bottom_px;
-  if (visitor.is_searching) {
-    const double radius = 0.1 * std::min(canvas->width_px(), canvas->height_px());
-    const Eigen::Vector2d middle(
-        0.5 * (canvas->width_px() - 1),
-        (visitor.stops.empty() && visitor.views.empty() ? 0.5 : 0.66) * canvas->height_px());
-    DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
 // The names of the places below their images.
 void DrawNamesOfViews(const VisitorDisplay& visitor, const engine::CameraModel& camera, double unit,
                       Canvas* canvas) {
@@ -214,7 +213,57 @@ void DrawNamesOfViews(const VisitorDisplay& visitor, const engine::CameraModel& 
   }
 }
 
+}  // namespace
+
+std::vector<Inset> PlaceViews(const VisitorDisplay& visitor, int width_px, int height_px) {
+  constexpr double kWidth = 0.27, kGap = 0.03, kTop = 0.14;  // Ratios of the image's width or height.
+  std::vector<Inset> areas;
+  const auto count = static_cast<double>(visitor.views.size());
+  double left = 0.5 * (1 - count * kWidth - (count - 1) * kGap);
+  for (const KnownView& known : visitor.views) {
+    const cv::Mat& view = known.image;
+    Inset area;
+    area.x = std::max(0, static_cast<int>(left * width_px));
+    area.y = static_cast<int>(kTop * height_px);
+    area.width = std::max(1, static_cast<int>(kWidth * width_px));
+    area.height = std::clamp(area.width * view.rows / std::max(1, view.cols), 1, height_px / 2);
+    areas.push_back(area);
+    left += kWidth + kGap;
   }
+  return areas;
+}
+
+std::vector<Eigen::AlignedBox2d> TakenByVisitorDisplay(const View& view, const HeadsUpStyle& style,
+                                                       Canvas* canvas) {
+  const VisitorDisplay& visitor = *view.overlay.visitor;
+  const double unit = style.unit_px;
+  std::vector<Eigen::AlignedBox2d> taken;
+  for (const CornerLine& line : LinesInCorner(visitor, unit, canvas)) taken.push_back(line.board);
+  const Area button = LayOutMenu(visitor, canvas->width_px(), canvas->height_px(), style).button;
+  if (button.width > 0)
+    taken.emplace_back(Eigen::Vector2d(button.x, button.y), Eigen::Vector2d(button.right(), button.bottom()));
+  double bottom = canvas->height_px() - 12 * unit - style.bottom_px;
+  for (const auto& [text, units] : {std::pair(&view.overlay.message, 15.0), {&visitor.sentence, 20.0}}) {
+    const Eigen::AlignedBox2d panel = SentencePanel(*text, units, bottom, unit, canvas);
+    if (panel.isEmpty()) continue;
+    taken.push_back(panel);
+    bottom = panel.min().y() - 6 * unit;
+  }
+  return taken;
+}
+
+void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* canvas) {
+  const VisitorDisplay& visitor = *view.overlay.visitor;
+  const double unit = style.unit_px;
+  const double lowest = canvas->height_px() - 12 * unit - style.bottom_px;
+  const std::vector<std::string>& listed = ListedStops(visitor);
+  if (visitor.is_searching && listed.empty()) {
+    const double radius = 0.1 * std::min(canvas->width_px(), canvas->height_px());
+    const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1),
+                                 (visitor.views.empty() ? 0.5 : 0.66) * canvas->height_px());
+    DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
+  }
+  if (view.camera != nullptr) DrawNamesOfViews(visitor, *view.camera, unit, canvas);
   if (visitor.marked && *visitor.marked < visitor.targets.size() && view.camera != nullptr)
     DrawMark(visitor.targets[*visitor.marked], *view.camera, unit, canvas);
   if (visitor.dwell) {
@@ -222,14 +271,13 @@ void DrawNamesOfViews(const VisitorDisplay& visitor, const engine::CameraModel& 
     DrawProgressRing(middle, 16 * unit, *visitor.dwell, canvas);
   }
   if (visitor.way_on && view.camera != nullptr) DrawWayOn(*visitor.way_on, *view.camera, unit, canvas);
-  const double top =
-      DrawInCorner(visitor.place, 10 * unit, {18 * unit, true, visitor.is_right_to_left}, unit, canvas);
-  // The announcement of a place can be as wide as the image, and is not drawn over other words.
-  const std::string line = visitor.arrival > 0 ? std::string() : visitor.route_line;
-  const double below = DrawInCorner(line, top, {16 * unit, false, visitor.is_right_to_left}, unit, canvas);
-  if (visitor.is_searching || visitor.lists_route)
-    DrawStops(visitor.stops.empty() && visitor.lists_route ? visitor.route_stops : visitor.stops, below,
-              visitor.is_right_to_left, unit, canvas);
+  double below = 10 * unit;
+  for (const CornerLine& line : LinesInCorner(visitor, unit, canvas)) {
+    canvas->Box(line.board.min(), line.board.max(), 9 * unit, kBoard);
+    canvas->Text(line.text, line.style, line.corner);
+    below = line.board.max().y() + 6 * unit;
+  }
+  DrawStops(listed, below, visitor.is_right_to_left, unit, canvas);
   DrawArrival(visitor.place, visitor.arrival, unit, canvas);
   const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;
   DrawSentence(visitor.sentence, 20, bottom, unit, canvas);
@@ -237,4 +285,3 @@ void DrawNamesOfViews(const VisitorDisplay& visitor, const engine::CameraModel& 
 }
 
 }  // namespace docent::ui
-  if (view.camera != nullptr) DrawNamesOfViews(visitor, *view.camera, unit, canvas);

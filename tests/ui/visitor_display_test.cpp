@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ui/visitor_display.h"
+
+#include <opencv2/imgproc.hpp>
+
+#include "tests/ui/ui_testing.h"
+#include "ui/renderer.h"
+
+namespace docent::ui {
+namespace {
+
+const engine::CameraModel kViewsCamera(engine::LensModel::kRadialTangential,
+                                       {640, 480, 500, 500, 319.5, 239.5}, {});
+
+class KnownViews : public OffscreenTest {};
+
+TEST_F(KnownViews, HaveTheNamesOfTheirPlacesBelowThem) {
+  Renderer renderer;
+  const cv::Mat black = cv::Mat::zeros(480, 640, CV_8UC3);
+  const engine::TrackedFrame tracked = Tracked(black);
+  View view;
+  view.tracked = &tracked;
+  view.camera = &kViewsCamera;
+  const auto drawn = [&](const std::string& name) {
+    view.overlay.visitor.emplace();
+    view.overlay.visitor->views = {{cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), name},
+                                   {cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), ""}};
+    renderer.Draw(view);
+    cv::Mat image;
+    renderer.ReadBack(&image);
+    return image;
+  };
+  const cv::Mat without = drawn(""), with = drawn("Lions");
+  cv::Mat difference;
+  cv::cvtColor(cv::abs(with - without), difference, cv::COLOR_BGR2GRAY);
+  const cv::Rect name = cv::boundingRect(difference > 8);
+  ASSERT_GT(name.area(), 100) << "the name is drawn";
+  const Inset first = PlaceViews(*view.overlay.visitor, 640, 480)[0];
+  EXPECT_GE(name.y, first.y + first.height) << "it does not cover the image";
+  EXPECT_LE(name.br().y, first.y + first.height + 60);
+  EXPECT_GE(name.x, first.x);
+  EXPECT_LE(name.br().x, first.x + first.width);
+  EXPECT_NEAR(name.x + 0.5 * name.width, first.x + 0.5 * first.width, 2);
+}
+
+class LabelsOfVisitors : public OffscreenTest {};
+
+TEST_F(LabelsOfVisitors, KeepClearOfThePlaceTheTourAndTheSentence) {
+  Renderer renderer;
+  const cv::Mat black = cv::Mat::zeros(480, 640, CV_8UC3);
+  const engine::TrackedFrame tracked = Tracked(black);
+  content::Scene scene;
+  // What they are about is in the middle, and their boards would lie in the corner and at the bottom.
+  for (const Eigen::Vector3d& offset : {Eigen::Vector3d(-0.6, -0.75, 0), Eigen::Vector3d(0.3, 0.85, 0)}) {
+    content::Entity& label = scene.entities.emplace_back();
+    label.name = "label-" + std::to_string(scene.entities.size());
+    label.kind = content::Entity::Kind::kLabel;
+    label.label.text = "Restored";
+    label.label.anchor = {-0.3, 0, 2};
+    label.label.offset = offset;
+    label.label.text_height = 0.1;
+  }
+  View view;
+  view.tracked = &tracked;
+  view.camera = &kViewsCamera;
+  const auto drawn = [&](bool with_words, bool with_labels) {
+    view.overlay.visitor.emplace();
+    if (with_words) {
+      view.overlay.visitor->place = "Lions";
+      view.overlay.visitor->route_line = "Stop 1 of 8. Next: Clocks";
+      view.overlay.visitor->sentence = "Look around slowly.";
+    }
+    view.scene = with_labels ? &scene : nullptr;
+    renderer.Draw(view);
+    cv::Mat image;
+    renderer.ReadBack(&image);
+    cv::cvtColor(image, image, cv::COLOR_BGR2GRAY);
+    return image;
+  };
+  const cv::Mat nothing = drawn(false, false), words = drawn(true, false);
+  const cv::Mat where_words_are = cv::abs(words - nothing) > 8;
+  const auto covered = [&](const cv::Mat& before, const cv::Mat& after) {
+    return cv::countNonZero((cv::abs(after - before) > 8) & where_words_are);
+  };
+  ASSERT_GT(cv::countNonZero(where_words_are), 2000);
+  ASSERT_GT(covered(nothing, drawn(false, true)), 100) << "without words the labels lie there";
+  const cv::Mat both = drawn(true, true);
+  EXPECT_GT(cv::countNonZero(cv::abs(both - words) > 8), 500) << "the labels are drawn";
+  EXPECT_EQ(covered(words, both), 0);
+}
+
+}  // namespace
+}  // namespace docent::ui
