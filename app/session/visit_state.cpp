@@ -54,6 +54,8 @@ ui::VisitorDisplay VisitState::Search(double seconds, const std::string& hint) c
   if (searched >= times_.stops) {
     display.stops = stops_;
     display.sentence = strings_.go_to_a_place;
+  } else if (Welcomes(seconds) && hint == strings_.not_recognised) {
+    display.sentence = strings_.welcome;
   } else if (!hint.empty()) {
     display.sentence = hint;
   } else if (place_.empty()) {

@@ -17,6 +17,8 @@ struct VisitTimes {
   // Who is not recognised within this time is shown the entrances of the likeliest places: most are
   // recognised sooner.
   double entrances = 1.5;
+  // The welcome stays for this long, enough to read it; that nothing is recognised yet is not said before.
+  double welcome = 4;
   double held = 0.5;    // After a loss the content stays where it was for this long: a hand that passes.
   double way_back = 5;  // Searching longer than this, the visitor is led to known views,
   double stops = 30;    // and longer than this, all places are listed.
@@ -41,6 +43,10 @@ class VisitState {
   // Whether a visitor who was not recognised yet is helped by the entrances of places at this time.
   bool WantsEntrances(double seconds) const;
 
+  // Whether a visitor is still to read the welcome.
+  bool Welcomes(double seconds) const {
+    return begin_ && place_.empty() && !stops_.empty() && Searched(seconds) < times_.welcome;
+  }
   // Whether the content of the last frame with a pose is still to be drawn.
   bool HoldsContent(double seconds) const { return last_pose_ && seconds - *last_pose_ <= times_.held; }
 

@@ -8,11 +8,14 @@ namespace docent::app {
 void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine::CameraModel& camera) {
   const bool has_pose = claim_.Update(frame->seconds, frame->tracked.state, frame->tracked.map_key);
   if (!has_pose && engine::HasPose(frame->tracked.state)) frame->shown.scene.reset();
-  frame->visitor = state_.Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(),
-                                 VisitorHint(frame->shown.rejection, frame->tracked.hint, strings_));
+  const std::string hint = VisitorHint(frame->shown.rejection, frame->tracked.hint, strings_);
+  frame->visitor = state_.Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(), hint);
   FindViews(*frame);
   frame->visitor->views = views_;
-  if (!views_.empty()) frame->visitor->sentence = strings_.go_to_a_view;
+  // Who is nearly recognised is not to go elsewhere.
+  const bool says_little = hint.empty() || hint == strings_.not_recognised;
+  if (!views_.empty() && says_little && !state_.Welcomes(frame->seconds))
+    frame->visitor->sentence = strings_.go_to_a_view;
   if (route_ != nullptr) FollowRoute(has_pose, frame.get());
   if (has_pose && frame->shown.scene)
     frame->way = FindWay(*frame->shown.scene, camera, frame->tracked.camera_from_map, route_, strings_);

@@ -25,6 +25,22 @@ TEST(VisitState, WelcomesAVisitorUntilAPlaceIsRecognised) {
   EXPECT_EQ(display.sentence, "");
 }
 
+TEST(VisitState, LetsTheWelcomeBeReadBeforeItSaysThatNothingIsRecognised) {
+  const VisitTimes times;
+  const VisitorStrings& strings = VisitorStringsFor("en");
+  VisitState visit({"Lions", "Masks"});
+  EXPECT_EQ(visit.Update(0, "", strings.not_recognised).sentence, strings.welcome);
+  EXPECT_EQ(visit.Update(0.9 * times.welcome, "", strings.not_recognised).sentence, strings.welcome);
+  EXPECT_TRUE(visit.Welcomes(0.9 * times.welcome));
+  EXPECT_EQ(visit.Update(0.95 * times.welcome, "", "Probably Lions; hold still").sentence,
+            "Probably Lions; hold still");
+  EXPECT_EQ(visit.Update(1.1 * times.welcome, "", strings.not_recognised).sentence, strings.not_recognised);
+  EXPECT_FALSE(visit.Welcomes(1.1 * times.welcome));
+  visit.Update(6, "Lions", "");
+  visit.Update(8, "", "");
+  EXPECT_FALSE(visit.Welcomes(8)) << "who was somewhere knows what to do";
+}
+
 TEST(VisitState, ShowsTheEntrancesToWhoIsNotRecognisedSoon) {
   const VisitTimes times;
   VisitState visit({"Lions", "Masks"});
