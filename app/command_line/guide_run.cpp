@@ -44,6 +44,8 @@ std::vector<std::shared_ptr<const engine::CameraModel>> ModelsOf(std::span<Calib
   return models;
 }
 
+constexpr double kRefusalShown_s = 5;  // Long enough to read why a step is not possible.
+
 SessionOptions SessionOptionsOf(const GuideRequest& request, std::span<CalibratedCamera> cameras) {
   SessionOptions options;
   options.threaded = request.pace != Pace::kLockstep;
@@ -89,6 +91,7 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
       inboxes_(cameras.size()),
       camera_states_(cameras.size()),
       sound_director_(request.language),
+      led_(cameras.size()),
       watch_(NamesOf(cameras), VisitorStringsFor(request.may_write ? "en" : request.language)) {
   if (request.sound) sound_player_.emplace();
   if (!request.may_write)
@@ -125,6 +128,10 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
     for (std::size_t i = 0; i < cameras_.size(); ++i) runs.push_back(RunOf(i, show));
     RunCameras(runs, &session_, stop_.get_token());
   });
+  {
+    const std::scoped_lock lock(files_mutex_);
+    for (Led& led : led_) led.last.reset();
+  }
   guarded([&] { session_.Finish(); });
   guarded([&] {
     files_->Add(session_.TakeEvents());
@@ -165,6 +172,38 @@ void GuideRun::Drawn(const ShownFrame& frame) {
   CameraTally& tally = tallies_[static_cast<std::size_t>(frame.tracked.frame.camera)];
   tally.AddDrawn(now);
   if (frame.taken) tally.AddDrawnAge(now - *frame.taken);
+}
+
+std::shared_ptr<const ShownFrame> GuideRun::Lead(std::size_t camera, const GuideVisitor& guide) {
+  const std::scoped_lock lock(files_mutex_);
+  Led& led = led_[camera];
+  if (!led.last) return nullptr;
+  auto frame = std::make_shared<ShownFrame>(*led.last);
+  if (frame->message == led.refusal) frame->message.clear();
+  try {
+    host_->Lead(guide, frame->tracked);
+    led.refusal.clear();
+  } catch (const Error& error) {
+    led.refusal = frame->message = SentenceOf(error.what());
+  }
+  led.is_new = true;
+  host_->GuideAgain(camera, frame->camera ? *frame->camera : *cameras_[camera].model, frame);
+  frame->serial = ++serial_;
+  led.last = frame;
+  return frame;
+}
+
+void GuideRun::TakeRefusal(const ShownFrame& frame, CameraState* state) {
+  Led& led = led_[CameraOf(frame.tracked)];
+  if (!std::exchange(led.is_new, false)) return;
+  if (!led.refusal.empty()) {
+    state->message = led.refusal;
+    state->message_end_s = frame.seconds + kRefusalShown_s;
+  } else if (state->message_end_s) {
+    // Only what is shown for a while was an answer.
+    state->message.clear();
+    state->message_end_s.reset();
+  }
 }
 
 SavingState GuideRun::Saving() const {
@@ -231,6 +270,8 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   run.options.trouble = [this, &state, &show](const std::string& sentence, Timestamp time) {
     HandleTrouble(sentence, time, show, &state);
   };
+  // Visitors who watch a recording act in it.
+  run.options.no_faster_than_times = !request_.may_write && !request_.headless;
   run.options.latency = [&state](Timestamp age) { state.age = age; };
   if (is_paced_) {
     run.options.clock = &clock_;
@@ -258,9 +299,8 @@ void GuideRun::HandleRefused(const std::string& reason, CameraState* state) {
   if (has_author_window()) {
     notices_.Push({SentenceOf(reason), std::nullopt});
   } else {
-    constexpr double kShown_s = 5;
     state->message = SentenceOf(reason);
-    if (state->last) state->message_end_s = state->last->seconds + kShown_s;
+    if (state->last) state->message_end_s = state->last->seconds + kRefusalShown_s;
   }
 }
 
@@ -270,8 +310,6 @@ void GuideRun::HandleCarriedOut(const TimedCommand& command, CameraState* state)
   } else {
     state->message.clear();
   }
-  // Visitors who watch a recording act in it.
-  run.options.no_faster_than_times = !request_.may_write && !request_.headless;
   // What comes before a map is started would be lost to it.
   const bool begins =
       std::holds_alternative<NewMap>(command.command) || std::holds_alternative<UseMap>(command.command);
@@ -292,6 +330,11 @@ void GuideRun::HandleTrouble(const std::string& sentence, Timestamp time, const 
   // There is no new image, so the last one is shown again with the message.
   auto frame = std::make_shared<ShownFrame>(*state->last);
   frame->message = sentence;
+  {
+    const std::scoped_lock lock(files_mutex_);
+    frame->serial = ++serial_;
+    if (host_) led_[CameraOf(frame->tracked)].last = frame;
+  }
   show(std::move(frame));
 }
 
@@ -310,8 +353,9 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
   {
     const std::scoped_lock lock(files_mutex_);
     frame = MakeShown(tracked, state);
+    if (age) frame->taken = PlayClock().Now() - *age;
+    if (host_ && tracked.state != engine::TrackingState::kDropped) led_[CameraOf(tracked)].last = frame;
   }
-  if (age) frame->taken = PlayClock().Now() - *age;
   {
     const std::scoped_lock lock(files_mutex_);
     CameraTally& tally = tallies_[static_cast<std::size_t>(tracked.frame.camera)];
@@ -393,11 +437,13 @@ void GuideRun::ReportProblem(const std::string& problem, Timestamp time) {
 std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& tracked, CameraState* state) {
   auto frame = std::make_shared<ShownFrame>();
   frame->tracked = tracked;
+  frame->serial = ++serial_;
   frame->shown = session_.ShownWith(tracked);
   const auto lens = session_.EstimatedLensOf(static_cast<std::size_t>(tracked.frame.camera));
   if (lens) frame->camera = lens->model;
   if (!state->first_time) state->first_time = tracked.frame.time;
   frame->seconds = ToSeconds(tracked.frame.time - *state->first_time);
+  TakeRefusal(*frame, state);
   if (state->message_end_s && frame->seconds > *state->message_end_s) {
     state->message.clear();
     state->message_end_s.reset();

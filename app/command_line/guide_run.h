@@ -38,6 +38,8 @@ class GuideRun {
 
   // Records the latency of a frame that is now on the screen or in the video. Any thread, as all below.
   void Drawn(const ShownFrame& frame);
+  // See WindowLink::lead.
+  std::shared_ptr<const ShownFrame> Lead(std::size_t camera, const GuideVisitor& guide);
   // Adds to the events what the window does about the machine's load.
   void Adapted(const std::string& text) { session_.AddEvent("load", text); }
   std::span<CommandInbox> inboxes() { return inboxes_; }
@@ -69,6 +71,8 @@ class GuideRun {
   void HandleCarriedOut(const TimedCommand& command, CameraState* state);
   void HandleTrouble(const std::string& sentence, Timestamp time, const Show& show, CameraState* state);
   void HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state);
+  // Whether the visitor's last step was refused, since Lead. With files_mutex_ held.
+  void TakeRefusal(const ShownFrame& frame, CameraState* state);
   // Between images of a paused recording, and after its last one.
   void HandleIdle(const engine::TrackedFrame& tracked, bool at_end, const Show& show, CameraState* state);
   bool has_author_window() const { return request_.may_write && !request_.headless; }
@@ -96,9 +100,18 @@ class GuideRun {
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
   NoticeQueue notices_;
-  std::mutex files_mutex_;            // Guards files_, tallies_, warnings_, host_, watch_ and noticed_.
+  std::mutex files_mutex_;            // Guards files_, tallies_, led_, warnings_, host_, watch_ and noticed_.
   std::set<std::string> warnings_;    // Those that the window was told of.
   std::vector<CameraTally> tallies_;  // By camera.
+  // Of a visitor, by camera: the last frame (null while no step can be carried out), why the last step could
+  // not be carried out (empty if it was), and whether the next image has to know that.
+  struct Led {
+    std::shared_ptr<const ShownFrame> last;
+    std::string refusal;
+    bool is_new = false;
+  };
+  std::vector<Led> led_;
+  std::uint64_t serial_ = 0;  // Of the last frame that was made; guarded like these.
   RunWatch watch_;
   std::string noticed_;  // What the person at the first camera is told next; empty for nothing.
   std::optional<GuideFiles> files_;

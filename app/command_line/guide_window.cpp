@@ -107,6 +107,8 @@ class GuideWindow {
     std::vector<std::shared_ptr<const ShownFrame>> fresh;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       if (!frames[i] || frames[i]->tracked.state == engine::TrackingState::kDropped) continue;
+      // Made before a step of the visitor that is shown already.
+      if (newest_[i] && frames[i]->serial < newest_[i]->serial) continue;
       newest_[i] = std::move(frames[i]);
       if (is_frozen() && shown_[i]) continue;
       shown_[i] = newest_[i];
@@ -130,7 +132,7 @@ class GuideWindow {
 
   void MakeVisitorControls() {
     VisitorControls::Host host;
-    host.emit = [this](GuideVisitor guide) { Emit(std::move(guide)); };
+    host.emit = [this](const GuideVisitor& guide) { Lead(guide); };
     host.swap_cameras = [this] { Swap(); };
     host.toggle_full_screen = [this] { window_.ToggleFullScreen(); };
     host.language = request_.language;
@@ -348,6 +350,14 @@ class GuideWindow {
   void Swap() {
     if (!has_inset()) return;
     large_ = 1 - large_;
+    redraw_ = true;
+  }
+
+  // A slow machine may be busy with an image for a second, so a visitor's step does not wait for it.
+  void Lead(const GuideVisitor& guide) {
+    std::shared_ptr<const ShownFrame> frame = link_.lead(large_, guide);
+    if (!frame) return Emit(guide);
+    newest_[large_] = shown_[large_] = std::move(frame);
     redraw_ = true;
   }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "app/command_line/frame_slot.h"
 #include "app/command_line/notices.h"
 #include "app/command_line/run_guide.h"
+#include "app/script/commands.h"
 #include "ui/authoring_actions.h"
 
 namespace docent::app {
@@ -23,6 +25,9 @@ struct WindowLink {
   std::function<void()> discard_changes;
   // Pauses recordings, or lets them go on.
   std::function<void()> toggle_pause;
+  // On a tour: carries out a step of the visitor at once, also while an image is tracked, and returns the
+  // last frame of this camera with what has changed; null before the first frame and after the last one.
+  std::function<std::shared_ptr<const ShownFrame>(std::size_t, const GuideVisitor&)> lead;
   // Called with what has changed in drawing because of the machine's load, for the log.
   std::function<void(const std::string&)> adapted;
   // Called with each frame once it is on the screen.

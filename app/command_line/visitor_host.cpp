@@ -64,15 +64,19 @@ void VisitorHost::ForgetVisitorWhoLeft(const ShownFrame& frame) {
 
 void VisitorHost::Guide(std::size_t index, const engine::CameraModel& camera,
                         const std::shared_ptr<ShownFrame>& frame) {
-  const Timestamp time = frame->tracked.frame.time;
   if (index == 0) ForgetVisitorWhoLeft(*frame);
+  GuideAgain(index, camera, frame);
+  if (index != 0 || !visits_) return;
+  visits_->Add(*frame, route_ ? &*route_ : nullptr);
+  ReportProblem(visits_->TakeProblem(), frame->tracked.frame.time);
+}
+
+void VisitorHost::GuideAgain(std::size_t index, const engine::CameraModel& camera,
+                             const std::shared_ptr<ShownFrame>& frame) {
+  const Timestamp time = frame->tracked.frame.time;
   visitors_[index]->Guide(frame, camera);
   ReportCards(index, time);
   if (index == 0) Narrate(*frame, camera);
-  if (index == 0 && visits_) {
-    visits_->Add(*frame, route_ ? &*route_ : nullptr);
-    ReportProblem(visits_->TakeProblem(), time);
-  }
   ReportRoute(time);
 }
 

@@ -29,6 +29,9 @@ class VisitorHost {
 
   // Adds to a frame, which is that of the camera with this index, what the visitor is told and shown.
   void Guide(std::size_t index, const engine::CameraModel& camera, const std::shared_ptr<ShownFrame>& frame);
+  // The same for a frame that was guided before, since something has changed by Lead.
+  void GuideAgain(std::size_t index, const engine::CameraModel& camera,
+                  const std::shared_ptr<ShownFrame>& frame);
   // Carries out a command that leads the visitor, and returns true; false for any other command. Throws Error
   // when it cannot be carried out.
   bool Lead(const Command& command, const engine::TrackedFrame& frame);

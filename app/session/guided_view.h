@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -21,6 +22,8 @@ struct ShownFrame {
   engine::TrackedFrame tracked;
   Session::Shown shown;
   double seconds = 0;  // since the first image
+  // Larger the later it was made, also where the image is the same; 0 where that does not matter.
+  std::uint64_t serial = 0;
   // Capture time on CLOCK_MONOTONIC; empty where it is unknown (see FrameLoopOptions::latency).
   std::optional<Timestamp> taken = {};
   std::string message;  // one sentence, often empty

@@ -81,6 +81,29 @@ TEST_F(VisitorAtWindow, SkipsStopsAndIsLedBackByKeys) {
                           "tour,\"skipped 'Masks', stop 2 of 2\"", "tour,finished; 0 of 2 stops seen"));
 }
 
+TEST_F(VisitorAtWindow, IsAnsweredBeforeTheNextImage) {
+  // An image every fifteen seconds, as of a machine that is busy for as long with each.
+  child_ =
+      StartDocent({"tour", "--library", (folder_ / "l.docent").string(), "--camera", "sim:room,fps=0.0667",
+                   "--tour", "All", "--pace", "realtime", "--output", (folder_ / "out").string()},
+                  (folder_ / "output").string(), (folder_ / "errors").string());
+  Xdotool("search --sync --onlyvisible --name Docent windowfocus");
+  const auto count = [this](const std::string& part) {
+    std::istringstream lines(ReadAll(folder_ / "out/events.csv.part"));
+    int found = 0;
+    for (std::string line; std::getline(lines, line);) found += line.find(part) != std::string::npos;
+    return found;
+  };
+  std::this_thread::sleep_for(std::chrono::seconds(3));  // The first image is shown.
+  const auto begin = std::chrono::steady_clock::now();
+  PressKeys("n b n");
+  Wait([&] { return count("command,tour") == 3; });
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+  EXPECT_EQ(count("command,tour skip"), 2);
+  EXPECT_EQ(count("skipped 'Lions'"), 1);
+  EXPECT_EQ(count("going back to 'Lions'"), 1);
+}
+
 // The process that shows the window of a kiosk; -1 if there is none.
 pid_t WorkerOf(pid_t kiosk) {
   std::istringstream children(

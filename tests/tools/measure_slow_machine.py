@@ -3,13 +3,15 @@
 """Measures a tour in a window on a machine that is slowed down to a share of its processor.
 
 The program runs for that share of every tenth of a second and is stopped for the rest, as a control group with
-a processor quota would do. A key is pressed every few seconds, and the time until its command stands in
-events.csv is measured. Needs Xvfb and xdotool.
+a processor quota would do, once it has had time to start. A key is pressed every few seconds, and the time until its
+command stands in events.csv is measured. Needs Xvfb and xdotool. Images of a folder cost about what those of a camera
+do; a simulated camera costs more than the whole share, and a video has to be decoded as a whole.
 
     tests/tools/measure_slow_machine.py --docent build/release/docent --share 0.1 --seconds 60 --output slow \\
-        -- --library museum.docent --camera museum --pace realtime
+        -- --library museum.docent --camera images --calibration camera.yaml --pace realtime --tour Highlights
 """
 import argparse
+import csv
 import json
 import os
 import pathlib
@@ -66,11 +68,32 @@ def press_keys(environment, events, seconds):
     return answers
 
 
+def summarize(seconds):
+    if not seconds:
+        return "none"
+    ordered = sorted(seconds)
+    return (f"median {ordered[len(ordered) // 2]:.2f} s, 95th percentile {ordered[int(0.95 * len(ordered))]:.2f} s, "
+            f"longest {ordered[-1]:.2f} s")
+
+
+def describe_frames(rows, begin):
+    """Says how often images were tracked from `begin` on, in seconds from the first image."""
+    times = [float(row["timestamp"]) for row in rows]
+    tracked = [t for row, t in zip(rows, times) if row["state"] != "dropped" and t - times[0] >= begin]
+    if len(tracked) < 2:
+        return "no images were tracked"
+    with_pose = sum(1 for row, t in zip(rows, times) if row["map"] and t - times[0] >= begin)
+    gaps = [after - before for before, after in zip(tracked, tracked[1:])]
+    return (f"{len(tracked) / (times[-1] - times[0] - begin):.1f} images a second tracked, {with_pose} of "
+            f"{len(tracked)} with a pose; from one to the next: {summarize(gaps)}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--docent", required=True)
     parser.add_argument("--share", type=float, default=0.1, help="of the processor, 0 to 1")
     parser.add_argument("--seconds", type=float, default=60, help="of the measurement")
+    parser.add_argument("--warm-up", type=float, default=8, help="seconds with the whole processor before")
     parser.add_argument("--screen", default="1280x800")
     parser.add_argument("--output", type=pathlib.Path, required=True, help="folder for the files of the tour")
     parser.add_argument("arguments", nargs="+", help="of docent tour")
@@ -87,23 +110,32 @@ def main():
                    env=environment, stdout=subprocess.DEVNULL, check=True)
     subprocess.run(["xdotool", "search", "--name", "Docent", "windowsize", "100%", "100%"], env=environment,
                    stdout=subprocess.DEVNULL, check=False)
-    time.sleep(3)
+    events = options.output / "events.csv.part"
+    while not events.exists() and tour.poll() is None:
+        time.sleep(0.05)
+    begin = time.monotonic()
+    time.sleep(options.warm_up)
     stop = threading.Event()
     slow = threading.Thread(target=throttle, args=(tour.pid, options.share, stop))
     slow.start()
-    answers = press_keys(environment, options.output / "events.csv.part", options.seconds)
+    slow_from = time.monotonic() - begin
+    answers = press_keys(environment, events, options.seconds)
     stop.set()
     slow.join()
     tour.send_signal(signal.SIGINT)
     printed = tour.communicate(timeout=60)[0]
     server.terminate()
     camera = json.loads((options.output / "report.json").read_text())["cameras"][0]
-    events = (options.output / "events.csv").read_text().splitlines()
+    told = (options.output / "events.csv").read_text().splitlines()
     print(printed.strip())
     print("answers of keys in s:", [None if a is None else round(a, 2) for a in answers])
+    print(f"{sum(a is not None and a <= 1 for a in answers)} of {len(answers)} keys answered within a second:",
+          summarize([a for a in answers if a is not None]))
+    with (options.output / "frames.csv").open() as file:
+        print("while slow:", describe_frames(list(csv.DictReader(file)), slow_from))
     print("images:", camera["frames"], "dropped:", camera["dropped"], "tracking ms:", camera["tracking_ms"])
     print("latency ms:", camera["latency_ms"], "interval of drawn images ms:", camera.get("drawn_interval_ms"))
-    print("\n".join(line for line in events if ",load," in line))
+    print("\n".join(line for line in told if ",load," in line))
 
 
 if __name__ == "__main__":
