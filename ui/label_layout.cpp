@@ -23,6 +23,17 @@ void AddShifts(const Eigen::AlignedBox2d& board, const Eigen::AlignedBox2d& othe
   shifts->emplace_back(other.max().x() + apart - board.min().x(), 0);
 }
 
+// The board as near to its place as lies within the bounds, where it fits.
+Eigen::AlignedBox2d Within(const Eigen::AlignedBox2d& bounds, const Eigen::AlignedBox2d& board) {
+  const Eigen::Vector2d last = bounds.max() - board.sizes();
+  return board.translated(board.min().cwiseMin(last).cwiseMax(bounds.min()) - board.min());
+}
+
+bool Fits(const Eigen::AlignedBox2d& bounds, const Eigen::AlignedBox2d& board) {
+  constexpr double kRounding = 1e-6;
+  return (board.sizes().array() <= bounds.sizes().array() + kRounding).all();
+}
+
 }  // namespace
 
 std::vector<Eigen::AlignedBox2d> LayOutApart(std::span<const Eigen::AlignedBox2d> boards,
@@ -40,9 +51,10 @@ std::vector<Eigen::AlignedBox2d> LayOutApart(std::span<const Eigen::AlignedBox2d
       for (const Eigen::AlignedBox2d& other : placed) AddShifts(board, other, gap, &shifts);
       double least = std::numeric_limits<double>::infinity();
       for (const Eigen::Vector2d& shift : shifts) {
-        const Eigen::AlignedBox2d moved = board.translated(shift);
-        if (shift.norm() >= least || !bounds.contains(moved) || !is_free(moved)) continue;
-        least = shift.norm();
+        const Eigen::AlignedBox2d moved = Within(bounds, board.translated(shift));
+        const double distance = (moved.min() - board.min()).norm();
+        if (distance >= least || !Fits(bounds, moved) || !is_free(moved)) continue;
+        least = distance;
         best = moved;
       }
     }

@@ -278,7 +278,7 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
     below = line.board.max().y() + 6 * unit;
   }
   DrawStops(listed, below, visitor.is_right_to_left, unit, canvas);
-  DrawArrival(visitor.place, visitor.arrival, unit, canvas);
+  if (listed.empty()) DrawArrival(visitor.place, visitor.arrival, unit, canvas);
   const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;
   DrawSentence(visitor.sentence, 20, bottom, unit, canvas);
   DrawMenu(visitor, style, canvas);

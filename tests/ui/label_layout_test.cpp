@@ -55,6 +55,16 @@ TEST(LabelLayout, KeepsManyBoardsApartAndInside) {
   }
 }
 
+TEST(LabelLayout, ABoardThatHasToMoveComesInsideFromTheEdge) {
+  const std::vector<Box> boards = {BoardAt(10, 10, 100, 30), BoardAt(-80, 20, 200, 50)};
+  const auto placed = LayOutApart(boards, kCanvas, 4);
+  EXPECT_TRUE(placed[0].isApprox(boards[0]));
+  EXPECT_EQ(CountOverlaps(placed), 0);
+  EXPECT_NEAR((placed[1].min() - Eigen::Vector2d(0, 44)).norm(), 0, 1e-3);
+  const std::vector<Box> alone = {BoardAt(-80, 20, 200, 50)};
+  EXPECT_TRUE(LayOutApart(alone, kCanvas, 4)[0].isApprox(alone[0])) << "it covers nothing";
+}
+
 TEST(LabelLayout, WhatHasNoRoomStays) {
   const std::vector<Box> boards(3, BoardAt(0, 0, 1000, 800));
   for (const Box& board : LayOutApart(boards, kCanvas, 2)) EXPECT_TRUE(board.isApprox(boards[0]));
