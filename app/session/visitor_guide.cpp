@@ -82,7 +82,7 @@ void VisitorGuide::FollowRoute(bool has_pose, ShownFrame* frame) {
   if (!display.stops.empty()) display.stops = display.route_stops;
 }
 
-// Once a second while the visitor searches.
+// Once a second while the visitor searches. Images that were skipped are not there to be compared.
 void VisitorGuide::FindViews(const ShownFrame& frame) {
   constexpr double kInterval_s = 1;
   constexpr std::size_t kMostViews = 3;
@@ -90,7 +90,8 @@ void VisitorGuide::FindViews(const ShownFrame& frame) {
   if (!entrances && !state_.WantsViews(frame.seconds)) {
     views_.clear();
     views_time_s_.reset();
-  } else if (!views_time_s_ || frame.seconds - *views_time_s_ >= kInterval_s) {
+  } else if (!frame.tracked.frame.image.empty() &&
+             (!views_time_s_ || frame.seconds - *views_time_s_ >= kInterval_s)) {
     views_.clear();
     for (Session::SimilarView& view : session_->SimilarViews(frame.tracked.frame, kMostViews, entrances))
       views_.push_back({std::move(view.image), std::move(view.map_name)});
