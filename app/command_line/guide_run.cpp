@@ -172,6 +172,11 @@ void GuideRun::Drawn(const ShownFrame& frame) {
   CameraTally& tally = tallies_[static_cast<std::size_t>(frame.tracked.frame.camera)];
   tally.AddDrawn(now);
   if (frame.taken) tally.AddDrawnAge(now - *frame.taken);
+  if (frame.tracked.frame.camera != 0) return;
+  while (!undrawn_sounds_.empty() && undrawn_sounds_.front().first <= frame.tracked.frame.index) {
+    sound_player_->Give(undrawn_sounds_.front().second);
+    undrawn_sounds_.pop_front();
+  }
 }
 
 std::shared_ptr<const ShownFrame> GuideRun::Lead(std::size_t camera, const GuideVisitor& guide) {
@@ -423,7 +428,12 @@ void GuideRun::PlaySounds(ShownFrame* frame) {
   for (const auto& [key, asset] : orders.start)
     files_->Add({Event{tracked.frame.time, "sound", "'" + key.second + "' begins"}});
   if (!sound_player_) return;
-  sound_player_->Give(orders);
+  if (host_ && !request_.headless) {
+    if (!orders.start.empty() || !orders.stop.empty())
+      undrawn_sounds_.emplace_back(tracked.frame.index, orders);
+  } else {
+    sound_player_->Give(orders);
+  }
   ReportProblem(sound_player_->TakeProblem(), tracked.frame.time);
 }
 

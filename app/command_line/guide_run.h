@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -9,6 +10,7 @@
 #include <span>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/command_line/guide_files.h"
@@ -111,6 +113,9 @@ class GuideRun {
     bool is_new = false;
   };
   std::vector<Led> led_;
+  // What a visitor is to hear together with an image of the first camera that is not on the screen yet, with
+  // its index: a slow machine draws it later. Guarded like these.
+  std::deque<std::pair<std::uint64_t, SoundDirector::Orders>> undrawn_sounds_;
   std::uint64_t serial_ = 0;  // Of the last frame that was made; guarded like these.
   RunWatch watch_;
   std::string noticed_;  // What the person at the first camera is told next; empty for nothing.

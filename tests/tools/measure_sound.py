@@ -3,9 +3,7 @@
 """Measures how far sounds and their captions are apart, in a tour in a window.
 
 OpenAL writes what would be heard into a file in real time (ALSOFT_DRIVERS=wave), whose length at each moment tells
-when a sample was played. The screen is captured with the times of its images. The caption of a sound is the lowest
-sentence on the screen: a card is opened and closed first, after which nothing else is said there. Needs Xvfb,
-xdotool and ffmpeg.
+when a sample was played. The screen is captured with the times of its images. Needs Xvfb, xdotool and ffmpeg.
 
     tests/tools/measure_sound.py --docent build/release/docent --seconds 20 --output sound -- \\
         --library museum.docent --camera museum --pace realtime
@@ -67,13 +65,20 @@ def onsets_of_sound(path, sizes):
     return onsets
 
 
-def captions_on_screen(frames, times):
-    """When a caption appeared: a panel with white letters where the lowest sentence stands."""
+def captions_on_screen(frames, times, first_sound):
+    """When the caption appeared that stands on the screen about a second after the first sound. Other sentences stand
+    there too, and other captions do not count."""
+    band = [y * WIDTH + x for y in range(440, 470) for x in range(20, WIDTH - 20)]
+    samples = [f for f, at in zip(frames, times) if 0.6 < at - first_sound < 1.6]
+    letters = [i for i in band if all(f[i] > 220 for f in samples)]
+    if not letters:
+        return []
+    first, last = min(i % WIDTH for i in letters), max(i % WIDTH for i in letters)
+    gaps = [i for i in band if first <= i % WIDTH <= last and all(f[i] < 120 for f in samples)]
     begun, was_there = [], True
     for image, at in zip(frames, times):
-        white = sum(1 for y in range(445, 466) for x in range(160, 480) if image[y * WIDTH + x] > 235)
-        dark = sum(1 for y in (442, 466) for x in range(240, 400) if image[y * WIDTH + x] < 90)
-        is_there = white > 150 and dark > 160
+        is_there = (sum(image[i] > 200 for i in letters) > 0.9 * len(letters) and
+                    sum(image[i] < 150 for i in gaps) > 0.9 * len(gaps))
         if is_there and not was_there:
             begun.append(at)
         was_there = is_there
@@ -111,9 +116,6 @@ def main():
          f"{WIDTH}x{HEIGHT}", "-t", str(options.seconds), "-i", display, "-vf", "format=gray,showinfo", "-copyts",
          "-fps_mode", "passthrough", "-f", "rawvideo", str(options.output / "screen.gray"), "-y"],
         stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
-    for key in ("Return", "Escape"):
-        time.sleep(2)
-        subprocess.run(["xdotool", "key", key], env=environment, check=False)
     printed = capture.communicate()[1]
     tour.send_signal(signal.SIGINT)
     tour.wait(60)
@@ -123,7 +125,8 @@ def main():
     times = [int(t) / 1e6 for t in re.findall(r" pts:\s*([0-9]+) ", printed)]  # In microseconds.
     data = (options.output / "screen.gray").read_bytes()
     frames = [data[i:i + WIDTH * HEIGHT] for i in range(0, len(data), WIDTH * HEIGHT)]
-    heard, read_times = onsets_of_sound(wave, sizes), captions_on_screen(frames, times)
+    heard = onsets_of_sound(wave, sizes)
+    read_times = captions_on_screen(frames, times, heard[0]) if heard else []
     print(f"{len(heard)} sounds and {len(read_times)} captions began, in {len(frames)} images of the screen")
     for onset in heard:
         if read_times:
