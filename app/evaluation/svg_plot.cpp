@@ -178,7 +178,7 @@ std::string SvgPlot::DrawLegend() const {
   for (auto entry = legend_.rbegin(); entry != legend_.rend(); ++entry) {
     const double width =
         22 +
-        7.1 * static_cast<double>(entry->second.size());  // About 7.1 px per letter at a font size of 12 px.
+        7.8 * static_cast<double>(entry->second.size());  // Of a wide font, per letter at a size of 12 px.
     x -= width;
     svg += "<rect x=\"" + Px(x) + "\" y=\"9\" width=\"10\" height=\"10\" fill=\"" + EscapeHtml(entry->first) +
            "\"/>" + Text(x + 14, 18, "start", entry->second);
