@@ -60,6 +60,7 @@ void AddDepths(const Box& box, const PinholeView& view, MeshDrawer::DepthRange* 
 void SetStanding(const content::Entity& entity, ModelInstance* instance) {
   using Kind = content::Entity::Kind;
   instance->casts_shadow = entity.kind == Kind::kModel || entity.kind == Kind::kSignpost;
+  instance->turns = entity.kind == Kind::kSignpost;
   instance->base = GlmFrom(content::BaseInMap(entity));
   instance->up = GlmFrom(entity.kind == Kind::kSignpost
                              ? entity.signpost.up

@@ -146,6 +146,13 @@ void DepthTarget::BindForDrawing() const {
   glViewport(0, 0, width_px_, height_px_);
 }
 
+void DepthTarget::CopyTo(const DepthTarget& target) const {
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.name());
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer());
+  glBlitFramebuffer(0, 0, width_px_, height_px_, 0, 0, width_px_, height_px_, GL_DEPTH_BUFFER_BIT,
+                    GL_NEAREST);
+}
+
 void DrawFullScreenTriangle() {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }

@@ -128,6 +128,8 @@ class DepthTarget {
   DepthTarget(int width_px, int height_px);
   // Binds the framebuffer for drawing and sets the viewport to all of it.
   void BindForDrawing() const;
+  // Copies all depths. The target has the same size.
+  void CopyTo(const DepthTarget& target) const;
   GLuint texture() const { return texture_.name(); }
   GLuint framebuffer() const { return framebuffer_.name(); }
 

@@ -97,6 +97,8 @@ void MeshDrawer::Prepare(std::span<const ModelInstance> instances, const glm::ve
   items_.clear();
   joints_.clear();
   casters_.clear();
+  still_poses_.clear();
+  moving_poses_.clear();
   cache_.Sweep();
   for (const ModelInstance& instance : instances) AddInstance(instance);
   if (joints_.empty()) joints_.emplace_back(1.0f);  // A sampler needs a non-empty buffer.
@@ -122,9 +124,12 @@ void MeshDrawer::AddInstance(const ModelInstance& instance) {
     if (model.nodes[node].mesh >= 0) AddNode(instance, nodes, node);
   }
   if (!instance.casts_shadow || items_.size() == first_item) return;
+  const bool moves = instance.turns || animation >= 0;
+  (moves ? moving_poses_ : still_poses_)
+      .push_back({instance.model, instance.map_from_model, animation, animation >= 0 ? instance.seconds : 0});
   Caster caster{{}, instance.base, instance.up};
   for (std::size_t i = first_item; i < items_.size(); ++i) {
-    items_[i].casts_shadow = true;
+    items_[i].casting = moves ? Part::kMovingCasters : Part::kStillCasters;
     caster.box.Include(items_[i].box.low);
     caster.box.Include(items_[i].box.high);
   }
@@ -227,6 +232,12 @@ void MeshDrawer::AddDepths(const PinholeView& view, DepthRange* range) const {
   }
 }
 
+bool MeshDrawer::CasterPose::operator==(const CasterPose& other) const {
+  // By owner, because a later model may lie at the address of one that is gone.
+  return !model.owner_before(other.model) && !other.model.owner_before(model) &&
+         map_from_model == other.map_from_model && animation == other.animation && seconds == other.seconds;
+}
+
 void MeshDrawer::CastersIn(std::span<const PinholeView> views, std::vector<Caster>* casters) const {
   // A shadow reaches about this far, in radii of its caster.
   constexpr float kReach = 4.0f;
@@ -247,7 +258,7 @@ void MeshDrawer::DrawDepth(const glm::mat4& clip_from_map, Part part) const {
   glActiveTexture(GL_TEXTURE0 + kJointUnit);
   glBindTexture(GL_TEXTURE_BUFFER, joint_texture_.name());
   for (const Item& item : items_) {
-    if (part == Part::kCasters ? !item.casts_shadow : !IsSeenThrough(*item.material)) continue;
+    if (part == Part::kSeenThrough ? !IsSeenThrough(*item.material) : item.casting != part) continue;
     glUniformMatrix4fv(depth_program_.Uniform("map_from_mesh"), 1, GL_FALSE, &item.map_from_mesh[0][0]);
     glUniform1i(depth_program_.Uniform("first_joint"), item.first_joint);
     glBindVertexArray(item.primitive->vertex_array.name());

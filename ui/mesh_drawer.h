@@ -24,6 +24,7 @@ struct ModelInstance {
   // Whether it casts shadows, and the plane that it stands on: a point and the direction of up in the map.
   bool casts_shadow = false;
   glm::vec3 base{0.0f}, up{0.0f, -1.0f, 0.0f};
+  bool turns = false;  // Its pose follows the viewer.
 };
 
 // The light on the drawn models; by default that of a bright room, whose direction is not known.
@@ -78,8 +79,19 @@ class MeshDrawer {
   };
   // Those whose shadow may be visible in one of the views.
   void CastersIn(std::span<const PinholeView> views, std::vector<Caster>* casters) const;
-  // Which of the prepared instances DrawDepth draws.
-  enum class Part { kCasters, kSeenThrough };
+  // Which of the prepared instances DrawDepth draws. Casters move that are animated or follow the viewer.
+  enum class Part { kStillCasters, kMovingCasters, kSeenThrough };
+  // What the depths of a caster depend on.
+  struct CasterPose {
+    std::weak_ptr<const content::Model> model;
+    glm::mat4 map_from_model{1.0f};
+    int animation = -1;
+    double seconds = 0;  // 0 without an animation.
+    bool operator==(const CasterPose& other) const;
+  };
+  // Those of all prepared casters that stand still, and of those that move.
+  const std::vector<CasterPose>& still_poses() const { return still_poses_; }
+  const std::vector<CasterPose>& moving_poses() const { return moving_poses_; }
   // Draws depths alone, from both sides.
   void DrawDepth(const glm::mat4& clip_from_map, Part part) const;
   // The number of models that hold graphics memory.
@@ -96,7 +108,7 @@ class MeshDrawer {
     Box box;                 // In the map.
     glm::vec3 center{0.0f};  // Centre of the box's bounding sphere.
     float radius = 0;
-    bool casts_shadow = false;
+    std::optional<Part> casting;  // As which part it casts shadows, if it does.
   };
 
   void AddInstance(const ModelInstance& instance);
@@ -116,6 +128,7 @@ class MeshDrawer {
   std::vector<glm::mat4> joints_;
   std::vector<Item> items_;
   std::vector<Caster> casters_;  // Of the prepared instances.
+  std::vector<CasterPose> still_poses_, moving_poses_;
   glm::vec3 up_in_map_{0.0f, -1.0f, 0.0f};
 };
 

@@ -18,6 +18,9 @@ constexpr int kMainSide_px = 512, kContactSide_px = 256;
 constexpr float kContactReach = 0.15f;
 // The longest shadow, relative to the height of its caster: that of a light 18 degrees above the ground.
 constexpr float kLongestShadow = 3.0f;
+// The sphere of the casters is this much larger than they need, and stays until it is too small or larger by
+// kLargestSphere than they need: casters that turn with the viewer would change it with every view.
+constexpr float kSphere = 1.1f, kLargestSphere = 1.4f;
 
 glm::vec3 AnyAcross(const glm::vec3& direction) {
   const glm::vec3 axis = std::abs(direction.x) < 0.6f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
@@ -64,9 +67,8 @@ void RoomShadows::Prepare(const MeshDrawer& meshes, std::span<const PinholeView>
     size += glm::length(caster.box.high - caster.box.low) / static_cast<float>(casters_.size());
   }
   up_ = glm::dot(up, up) > 1e-6f ? glm::normalize(up) : casters_.front().up;
-  middle_ = 0.5f * (all.low + all.high);
   contact_reach_ = kContactReach * size;
-  radius_ = 0.5f * glm::length(all.high - all.low) + contact_reach_;
+  Frame(0.5f * (all.low + all.high), 0.5f * glm::length(all.high - all.low) + contact_reach_);
   main_strength_ = 0;
   if (light != nullptr) {
     to_light_ = GlmFrom(light->to_light);
@@ -96,11 +98,31 @@ void RoomShadows::Prepare(const MeshDrawer& meshes, std::span<const PinholeView>
   glDisable(GL_DEPTH_TEST);
 }
 
+void RoomShadows::Frame(const glm::vec3& middle, float radius) {
+  const bool fits = glm::length(middle - middle_) + radius <= radius_;
+  if (fits && radius_ <= kLargestSphere * radius) return;
+  middle_ = middle;
+  radius_ = kSphere * radius;
+}
+
 void RoomShadows::DrawCasters(const MeshDrawer& meshes, const glm::vec3& along, DepthImage* image) const {
-  image->clip_from_map = ClipOfSphere(middle_, radius_, along);
-  image->target.BindForDrawing();
-  glClear(GL_DEPTH_BUFFER_BIT);
-  meshes.DrawDepth(image->clip_from_map, MeshDrawer::Part::kCasters);
+  using Part = MeshDrawer::Part;
+  const glm::mat4 clip_from_map = ClipOfSphere(middle_, radius_, along);
+  const bool still_changed =
+      clip_from_map != image->clip_from_map || meshes.still_poses() != image->still_poses;
+  image->clip_from_map = clip_from_map;
+  if (still_changed) {
+    image->still_poses = meshes.still_poses();
+    image->still.BindForDrawing();
+    glClear(GL_DEPTH_BUFFER_BIT);
+    meshes.DrawDepth(clip_from_map, Part::kStillCasters);
+  }
+  if (!still_changed && meshes.moving_poses() == image->moving_poses) return;
+  image->moving_poses = meshes.moving_poses();
+  if (image->moving_poses.empty()) return;
+  image->still.CopyTo(image->all);
+  image->all.BindForDrawing();
+  meshes.DrawDepth(clip_from_map, Part::kMovingCasters);
 }
 
 void RoomShadows::SetUniforms(const GlProgram& program, const glm::mat4& clip_from_map,
@@ -115,7 +137,7 @@ void RoomShadows::SetUniforms(const GlProgram& program, const glm::mat4& clip_fr
   set_matrix("contact_from_map", contact_.clip_from_map);
   glUniform1f(program.Uniform("main_strength"), main_strength_);
   glUniform1f(program.Uniform("contact_reach"), contact_reach_ / (2.0f * radius_));
-  const GLuint textures[] = {surface_depth, main_.target.texture(), contact_.target.texture()};
+  const GLuint textures[] = {surface_depth, main_.texture(), contact_.texture()};
   for (int unit = 0; unit < 3; ++unit) {
     glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
     glBindTexture(GL_TEXTURE_2D, textures[unit]);

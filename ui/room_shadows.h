@@ -12,9 +12,10 @@
 namespace docent::ui {
 
 // The shadows that content casts on the room: one from the main light, where it is known, and one around the
-// contact with the surface that the content stands on, which takes light from all sides away. They fall on
-// the surfaces of the map; where none is known, on the plane that each model stands on. Single thread, single
-// context.
+// contact with the surface that the content stands on, which takes light from
+// all sides away. They fall on the surfaces of the map; where none is known, on the plane that each model
+// stands on. Single thread, single context. The depths of casters that stand still are kept from view to
+// view.
 class RoomShadows {
  public:
   RoomShadows();
@@ -33,11 +34,17 @@ class RoomShadows {
  private:
   // A square image of depths along a direction, around the casters.
   struct DepthImage {
-    explicit DepthImage(int side_px) : target(side_px, side_px) {}
-    DepthTarget target;
-    glm::mat4 clip_from_map{1.0f};
+    explicit DepthImage(int side_px) : still(side_px, side_px), all(side_px, side_px) {}
+    DepthTarget still, all;  // `all` is drawn only while casters move.
+    glm::mat4 clip_from_map{0.0f};
+    // What was drawn; the moving ones are empty while `all` holds nothing of use.
+    std::vector<MeshDrawer::CasterPose> still_poses, moving_poses;
+    GLuint texture() const { return moving_poses.empty() ? still.texture() : all.texture(); }
   };
+  // Draws what has changed.
   void DrawCasters(const MeshDrawer& meshes, const glm::vec3& along, DepthImage* image) const;
+  // Chooses the sphere that the depths are drawn for.
+  void Frame(const glm::vec3& middle, float radius);
   void SetUniforms(const GlProgram& program, const glm::mat4& clip_from_map, GLuint surface_depth) const;
 
   GlProgram surface_program_, plane_program_;

@@ -15,15 +15,18 @@
 // at 640x480 and 1280x720. The parts are the differences between these:
 //   video      the image alone
 //   content    with the model
+//   composite  with the model and one small surface, so that it is composited as with surfaces
 //   surfaces   with the model and what hides it
 //   shadows    with the model and its shadows on the plane that it stands on
 //   all        with all of it
+//   turning    with all of it, the model turning, so that the depths for its shadows are drawn in each image
+// The camera moves a little from image to image.
 //
 //   docent_bench --benchmark_filter=RoomContent
 namespace docent::bench {
 namespace {
 
-constexpr int kVideo = 0, kContent = 1, kSurfaces = 2, kShadows = 3, kAll = 4;
+constexpr int kVideo = 0, kContent = 1, kComposite = 2, kSurfaces = 3, kShadows = 4, kAll = 5, kTurning = 6;
 
 std::shared_ptr<const content::Asset> Ball() {
   constexpr int kRings = 134, kSegments = 262;  // 2 x 133 x 262 = 69,692 triangles.
@@ -88,6 +91,14 @@ std::shared_ptr<const engine::SurfaceMesh> FloorWithBlock() {
   return mesh;
 }
 
+// Where it hides nothing.
+std::shared_ptr<const engine::SurfaceMesh> SmallSurface() {
+  auto mesh = std::make_shared<engine::SurfaceMesh>();
+  mesh->vertices = {{0, 0, 3.2F}, {0.01F, 0, 3.2F}, {0, 0.01F, 3.2F}};
+  mesh->triangles = {{0, 1, 2}};
+  return mesh;
+}
+
 void RoomContent(benchmark::State& state) {
   const ui::OffscreenContext context;
   ui::Renderer renderer;
@@ -117,19 +128,26 @@ void RoomContent(benchmark::State& state) {
   view.camera = &camera;
   view.scene = &scene;
   view.overlay.hud = false;
-  view.shadows = parts == kShadows || parts == kAll;
+  view.shadows = parts >= kShadows;
   view.light = view.shadows ? &light : nullptr;
-  if (parts == kSurfaces || parts == kAll) view.surfaces = FloorWithBlock();
+  if (parts == kComposite) view.surfaces = SmallSurface();
+  if (parts == kSurfaces || parts >= kAll) view.surfaces = FloorWithBlock();
   cv::Mat image;
+  double step = 0;
   for (auto _ : state) {
+    step += 1;
+    tracked.camera_from_map.translation.x() = 0.02 * std::sin(step);
+    if (parts == kTurning)
+      scene.entities.front().model.map_from_model.rotation =
+          engine::Rotation3::Exp({std::numbers::pi, 0, 0}) * engine::Rotation3::Exp({0, 0.01 * step, 0});
     renderer.Draw(view);
     renderer.ReadBack(&image);
   }
 }
 BENCHMARK(RoomContent)
     ->ArgNames({"width", "height", "parts"})
-    ->ArgsProduct({{640}, {480}, {kVideo, kContent, kSurfaces, kShadows, kAll}})
-    ->ArgsProduct({{1280}, {720}, {kVideo, kContent, kSurfaces, kShadows, kAll}})
+    ->ArgsProduct({{640}, {480}, {kVideo, kContent, kComposite, kSurfaces, kShadows, kAll, kTurning}})
+    ->ArgsProduct({{1280}, {720}, {kVideo, kContent, kComposite, kSurfaces, kShadows, kAll, kTurning}})
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ui/room_shadows.h"
 
+#include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <memory>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "tests/ui/ui_testing.h"
 
@@ -20,6 +22,12 @@ class RoomShadowsTest : public OffscreenTest {
     light_.brightness[0] = 0.5;
     light_.to_light = Eigen::Vector3d(-1, -1, 0).normalized();  // From the left above.
     light_.direct = 0.6;
+    auto asset = std::make_shared<content::Asset>();
+    asset->model = Cube();
+    cube_.kind = content::Entity::Kind::kModel;
+    cube_.model.asset = asset;
+    cube_.model.map_from_model.rotation = engine::Rotation3::Exp({std::acos(-1.0), 0, 0});
+    cube_.model.map_from_model.translation = {0, 1, 4};
   }
 
   // A closed cube with its base in the middle of y = 0, y up.
@@ -59,15 +67,9 @@ class RoomShadowsTest : public OffscreenTest {
   // Over a video of one grey.
   cv::Mat Draw(std::shared_ptr<const engine::SurfaceMesh> surfaces, bool shadows = true, bool light = true) {
     if (renderer_ == nullptr) renderer_ = std::make_unique<Renderer>();
-    content::Entity cube;
-    cube.kind = content::Entity::Kind::kModel;
-    auto asset = std::make_shared<content::Asset>();
-    asset->model = Cube();
-    cube.model.asset = asset;
-    cube.model.map_from_model.rotation = engine::Rotation3::Exp({std::acos(-1.0), 0, 0});
-    cube.model.map_from_model.translation = {0, 1, 4};
     content::Scene scene;
-    scene.entities = {cube};
+    scene.entities = {cube_};
+    scene.entities.insert(scene.entities.end(), others_.begin(), others_.end());
     engine::TrackedFrame tracked = Tracked(cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(kGrey)));
     tracked.camera_from_map = CameraFromMap();
     const engine::CameraModel camera = StronglyDistorted();
@@ -79,7 +81,10 @@ class RoomShadowsTest : public OffscreenTest {
     view.shadows = shadows;
     view.light = light ? &light_ : nullptr;
     view.overlay.hud = false;
+    view.animation_seconds = seconds_;
+    GlQuery triangles;
     renderer_->Draw(view);
+    triangles_ = triangles.End();
     cv::Mat image;
     renderer_->ReadBack(&image);
     return image;
@@ -97,10 +102,31 @@ class RoomShadowsTest : public OffscreenTest {
                                static_cast<int>(std::lround(pixel->x())))[2];
   }
 
+  // Forgets what earlier images have left.
+  void StartAnew() { renderer_.reset(); }
+
   static constexpr int kGrey = 180;
   engine::LightEstimate light_;
+  content::Entity cube_;
+  std::vector<content::Entity> others_;
+  double seconds_ = 0;
+  unsigned triangles_ = 0;  // That the last Draw sent to the graphics card.
 
  private:
+  struct GlQuery {
+    GlQuery() {
+      glGenQueries(1, &name);
+      glBeginQuery(GL_PRIMITIVES_GENERATED, name);
+    }
+    unsigned End() const {
+      glEndQuery(GL_PRIMITIVES_GENERATED);
+      GLuint count = 0;
+      glGetQueryObjectuiv(name, GL_QUERY_RESULT, &count);
+      glDeleteQueries(1, &name);
+      return count;
+    }
+    GLuint name = 0;
+  };
   std::unique_ptr<Renderer> renderer_;  // Needs the context of the fixture.
 };
 
@@ -158,6 +184,64 @@ TEST_F(RoomShadowsTest, DarkenNothingThatIsAboveTheCaster) {
   wall->triangles = {{0, 1, 2}, {0, 2, 3}};
   const cv::Mat image = Draw(wall);
   EXPECT_NEAR(At(image, {-1.2, 0.3, 4.3}), kGrey, 1);
+}
+
+TEST_F(RoomShadowsTest, AreDrawnAgainOnlyForWhatMoves) {
+  constexpr unsigned kCubeTriangles = 12;
+  const cv::Mat first = Draw(Floor(1));
+  const unsigned with_depths = triangles_;
+  const cv::Mat again = Draw(Floor(1));
+  EXPECT_EQ(triangles_, with_depths - 2 * kCubeTriangles)
+      << "one image of depths for the light, one for the contact";
+  EXPECT_EQ(cv::norm(first, again, cv::NORM_INF), 0);
+  // A signpost turns with the viewer; the cube is drawn once more, for the sphere that holds both.
+  content::Entity sign;
+  sign.name = "sign-1";
+  sign.signpost.text = "A";
+  sign.signpost.anchor = {1.2, 1, 4};
+  sign.signpost.height_m = 0.3;
+  others_ = {sign};
+  Draw(Floor(1));
+  const unsigned with_both = triangles_;
+  others_[0].signpost.anchor.x() += 0.01;  // As if it had turned.
+  Draw(Floor(1));
+  EXPECT_EQ(triangles_, with_both - 2 * kCubeTriangles);
+}
+
+TEST_F(RoomShadowsTest, FollowWhatChanges) {
+  const auto is_as_if_new = [this](const char* what) {
+    const cv::Mat kept = Draw(Floor(1));
+    StartAnew();
+    const cv::Mat fresh = Draw(Floor(1));
+    cv::Mat difference;
+    cv::absdiff(kept, fresh, difference);
+    // The resolution of the depths may differ by the size of their sphere.
+    EXPECT_LT(cv::mean(difference)[2], 0.2) << what;
+  };
+  Draw(Floor(1));
+  cube_.model.map_from_model.translation.x() = -0.7;
+  is_as_if_new("another place");
+  light_.to_light = Eigen::Vector3d(1, -1, 0.3).normalized();
+  is_as_if_new("another light");
+  auto asset = std::make_shared<content::Asset>();
+  auto board = Cube();
+  for (content::Vertex& vertex : board->meshes[0].primitives[0].vertices) vertex.position.z *= 0.1f;
+  asset->model = board;
+  cube_.model.asset = asset;
+  is_as_if_new("another model");
+  asset = std::make_shared<content::Asset>();
+  auto moving = Cube();
+  content::AnimationChannel channel;
+  channel.times = {0, 2};
+  channel.values = {{0, 0, 0, 0}, {2, 0, 0, 0}};
+  channel.node = 0;
+  moving->animations.push_back({"walk", 2, {channel}});
+  asset->model = moving;
+  cube_.model.asset = asset;
+  cube_.model.animation = 0;
+  is_as_if_new("an animation");
+  seconds_ = 1;
+  is_as_if_new("its next moment");
 }
 
 }  // namespace
