@@ -65,6 +65,17 @@ void Extend(const Box& box, const glm::mat4& transform, Box* result) {
   for (int i = 0; i < 8; ++i) result->Include(glm::vec3(transform * glm::vec4(box.Corner(i), 1.0f)));
 }
 
+// The ellipsoid about as large as a model, which is a little thick even where the model is flat.
+glm::mat4 ModelFromSphere(const content::Model& model) {
+  constexpr float kThinnest = 0.1f;  // Relative to the longest axis.
+  const glm::vec3 half = 0.5f * (model.bounds_max - model.bounds_min);
+  const float longest = std::max({half.x, half.y, half.z, 1e-6f});
+  glm::mat4 transform(1.0f);
+  for (int i = 0; i < 3; ++i) transform[i][i] = std::max(half[i], kThinnest * longest);
+  transform[3] = glm::vec4(0.5f * (model.bounds_min + model.bounds_max), 1.0f);
+  return transform;
+}
+
 // Whether a sphere in the map may be visible in a view: it is not behind the camera and not outside a side of
 // the frustum.
 bool IsVisible(const glm::vec3& center, float radius, const TangentBounds& bounds,
@@ -127,7 +138,7 @@ void MeshDrawer::AddInstance(const ModelInstance& instance) {
   const bool moves = instance.turns || animation >= 0;
   (moves ? moving_poses_ : still_poses_)
       .push_back({instance.model, instance.map_from_model, animation, animation >= 0 ? instance.seconds : 0});
-  Caster caster{{}, instance.base, instance.up};
+  Caster caster{{}, instance.base, instance.up, instance.map_from_model * ModelFromSphere(model)};
   for (std::size_t i = first_item; i < items_.size(); ++i) {
     items_[i].casting = moves ? Part::kMovingCasters : Part::kStillCasters;
     caster.box.Include(items_[i].box.low);

@@ -76,6 +76,8 @@ class MeshDrawer {
   struct Caster {
     Box box;             // In the map.
     glm::vec3 base, up;  // The plane that it stands on.
+    // From the unit sphere: the ellipsoid whose axes are those of the box around the model at rest.
+    glm::mat4 map_from_sphere{1.0f};
   };
   // Those whose shadow may be visible in one of the views.
   void CastersIn(std::span<const PinholeView> views, std::vector<Caster>* casters) const;

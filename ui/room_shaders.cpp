@@ -7,13 +7,18 @@ namespace {
 // The constants: a shadow whose edge is soft over 3 texels of its image; a bias of half a percent of the
 // casters' sphere against touching surfaces; the contact takes at most 60 % of the light away, as the rest
 // comes from the side under things that are not flat. Taps of the contact lie on two rings and in the middle.
+// What a caster as a whole takes from the sky is that of an ellipsoid of its size, of which it fills about
+// half; it ends at twice its size.
 const char* const kDarkness = R"glsl(
 uniform sampler2D surface_depth, main_depth, contact_depth;
 uniform mat4 main_from_map, contact_from_map;
 uniform float main_strength;
 uniform float contact_reach;  // As a depth of its image.
+uniform int body_count;
+uniform mat4 sphere_from_map[16];  // The ellipsoid of each caster.
+uniform vec3 body_middle[16], body_up[16];
 out vec4 color;
-const float kBias = 0.005, kContact = 0.6;
+const float kBias = 0.005, kContact = 0.6, kBody = 0.5, kBodyReach2 = 5.0;
 
 vec3 Place(mat4 clip_from_map, vec3 point) {
   return 0.5 + 0.5 * (clip_from_map * vec4(point, 1.0)).xyz;
@@ -59,8 +64,23 @@ float ContactShadow(vec3 point) {
   return sum / 17.0;
 }
 
+// The light from all sides that the bodies leave to a level surface at a point: a sphere of radius 1 at a distance d takes
+// cos / d^2 of it away, where the angle is that between its direction and up.
+float LeftByBodies(vec3 point) {
+  float left = 1.0;
+  for (int i = 0; i < body_count; ++i) {
+    vec3 place = (sphere_from_map[i] * vec4(point, 1.0)).xyz;
+    float distance2 = max(dot(place, place), 1.0);
+    float cosine = dot(body_up[i], normalize(body_middle[i] - point));
+    float end = clamp((kBodyReach2 - distance2) / (kBodyReach2 - 1.0), 0.0, 1.0);
+    left *= 1.0 - kBody * max(cosine, 0.0) / distance2 * end * end;
+  }
+  return left;
+}
+
 vec4 Darkness(vec3 point) {
-  float left = (1.0 - main_strength * MainShadow(point)) * (1.0 - kContact * ContactShadow(point));
+  float left = (1.0 - main_strength * MainShadow(point)) * (1.0 - kContact * ContactShadow(point)) *
+               LeftByBodies(point);
   return vec4(1.0 - left, 0.0, 0.0, 1.0);
 }
 )glsl";

@@ -2,6 +2,7 @@
 #include "ui/room_shadows.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "ui/axes.h"
@@ -18,6 +19,12 @@ constexpr int kMainSide_px = 512, kContactSide_px = 256;
 constexpr float kContactReach = 0.15f;
 // The longest shadow, relative to the height of its caster: that of a light 18 degrees above the ground.
 constexpr float kLongestShadow = 3.0f;
+// Of more casters than this, the farther ones from the eye have no wide shadow of their body. The shader has
+// as many.
+constexpr int kMostBodies = 16;
+// How far that shadow reaches from the middle of its caster, in halves of its size; as kBodyReach2 of the
+// shader.
+constexpr float kBodyReach = 2.0f;
 // The sphere of the casters is this much larger than they need, and stays until it is too small or larger by
 // kLargestSphere than they need: casters that turn with the viewer would change it with every view.
 constexpr float kSphere = 1.1f, kLargestSphere = 1.4f;
@@ -57,6 +64,14 @@ void RoomShadows::Prepare(const MeshDrawer& meshes, std::span<const PinholeView>
                           const engine::LightEstimate* light) {
   meshes.CastersIn(views, &casters_);
   if (casters_.empty()) return;
+  if (casters_.size() > kMostBodies) {
+    const glm::vec3 eye = GlmFrom(views.front().camera_from_map.OriginInSource());
+    const auto distance = [&](const MeshDrawer::Caster& caster) {
+      return glm::distance(eye, glm::vec3(caster.map_from_sphere[3]));
+    };
+    std::nth_element(casters_.begin(), casters_.begin() + kMostBodies, casters_.end(),
+                     [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+  }
   Box all;
   glm::vec3 up(0.0f);
   float size = 0;
@@ -83,6 +98,9 @@ void RoomShadows::Prepare(const MeshDrawer& meshes, std::span<const PinholeView>
       const glm::vec3 corner = caster.box.Corner(i);
       reach_.Include(corner - glm::vec3(contact_reach_));
       reach_.Include(corner + glm::vec3(contact_reach_));
+      const glm::vec3 from_middle = corner - 0.5f * (caster.box.low + caster.box.high);
+      reach_.Include(corner +
+                     (kBodyReach - 1.0f) * (from_middle - caster.up * glm::dot(caster.up, from_middle)));
       if (main_strength_ == 0) continue;
       const float height = std::max(0.0f, glm::dot(corner - caster.base, up_));
       const float slope = std::max(glm::dot(to_light_, up_), 1.0f / kLongestShadow);
@@ -125,6 +143,23 @@ void RoomShadows::DrawCasters(const MeshDrawer& meshes, const glm::vec3& along, 
   meshes.DrawDepth(clip_from_map, Part::kMovingCasters);
 }
 
+void RoomShadows::SetBodies(const GlProgram& program) const {
+  const int count = std::min(static_cast<int>(casters_.size()), kMostBodies);
+  std::array<glm::mat4, kMostBodies> sphere_from_map;
+  std::array<glm::vec3, kMostBodies> middles, ups;
+  for (int i = 0; i < count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const MeshDrawer::Caster& caster = casters_[k];
+    sphere_from_map[k] = glm::inverse(caster.map_from_sphere);
+    middles[k] = glm::vec3(caster.map_from_sphere[3]);
+    ups[k] = caster.up;
+  }
+  glUniform1i(program.Uniform("body_count"), count);
+  glUniformMatrix4fv(program.Uniform("sphere_from_map"), count, GL_FALSE, &sphere_from_map[0][0][0]);
+  glUniform3fv(program.Uniform("body_middle"), count, &middles[0][0]);
+  glUniform3fv(program.Uniform("body_up"), count, &ups[0][0]);
+}
+
 void RoomShadows::SetUniforms(const GlProgram& program, const glm::mat4& clip_from_map,
                               GLuint surface_depth) const {
   program.Use();
@@ -133,6 +168,7 @@ void RoomShadows::SetUniforms(const GlProgram& program, const glm::mat4& clip_fr
   };
   set_matrix("clip_from_map", clip_from_map);
   set_matrix("map_from_clip", glm::inverse(clip_from_map));
+  SetBodies(program);
   set_matrix("main_from_map", main_.clip_from_map);
   set_matrix("contact_from_map", contact_.clip_from_map);
   glUniform1f(program.Uniform("main_strength"), main_strength_);
@@ -156,7 +192,7 @@ void RoomShadows::Draw(const glm::mat4& clip_from_map, const glm::ivec4& viewpor
   for (const MeshDrawer::Caster& caster : casters_) {
     const glm::vec3 right = AnyAcross(caster.up);
     const float side =
-        glm::length(caster.box.high - caster.box.low) * (main_strength_ > 0 ? 0.5f + kLongestShadow : 0.5f) +
+        glm::length(caster.box.high - caster.box.low) * (main_strength_ > 0 ? 0.5f + kLongestShadow : 1.0f) +
         contact_reach_;
     const glm::vec3 half_u = side * right, half_v = side * glm::cross(caster.up, right);
     glUniform3fv(plane_program_.Uniform("middle"), 1, &caster.base[0]);

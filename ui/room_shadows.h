@@ -12,7 +12,7 @@
 namespace docent::ui {
 
 // The shadows that content casts on the room: one from the main light, where it is known, and one around the
-// contact with the surface that the content stands on, which takes light from
+// contact with the surface that the content stands on, and the wide one of its body, which take light from
 // all sides away. They fall on the surfaces of the map; where none is known, on the plane that each model
 // stands on. Single thread, single context. The depths of casters that stand still are kept from view to
 // view.
@@ -45,6 +45,7 @@ class RoomShadows {
   void DrawCasters(const MeshDrawer& meshes, const glm::vec3& along, DepthImage* image) const;
   // Chooses the sphere that the depths are drawn for.
   void Frame(const glm::vec3& middle, float radius);
+  void SetBodies(const GlProgram& program) const;
   void SetUniforms(const GlProgram& program, const glm::mat4& clip_from_map, GLuint surface_depth) const;
 
   GlProgram surface_program_, plane_program_;

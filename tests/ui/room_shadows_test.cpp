@@ -186,6 +186,22 @@ TEST_F(RoomShadowsTest, DarkenNothingThatIsAboveTheCaster) {
   EXPECT_NEAR(At(image, {-1.2, 0.3, 4.3}), kGrey, 1);
 }
 
+TEST_F(RoomShadowsTest, OfTheBodyLieUnderWhatStandsOnThinLegs) {
+  // A board half a metre above the floor, on a leg at one side: there is little contact, and yet the sky is
+  // covered in the middle below it.
+  auto asset = std::make_shared<content::Asset>();
+  auto table = Cube();
+  for (std::size_t i = 0; i < 8; ++i) table->meshes[0].primitives[0].vertices[i].position.y *= 0.2f;
+  for (std::size_t i = 0; i < 8; ++i) table->meshes[0].primitives[0].vertices[i].position.y += 0.5f;
+  table->bounds_min.y = 0;
+  table->bounds_max.y = 0.7f;
+  asset->model = table;
+  cube_.model.asset = asset;
+  const cv::Mat image = Draw(Floor(1), true, false);
+  EXPECT_LT(At(image, {0.0, 1, 3.6}), kGrey - 10) << "below it";
+  EXPECT_NEAR(At(image, {2.2, 1, 4}), kGrey, 1) << "beside it";
+}
+
 TEST_F(RoomShadowsTest, AreDrawnAgainOnlyForWhatMoves) {
   constexpr unsigned kCubeTriangles = 12;
   const cv::Mat first = Draw(Floor(1));
