@@ -24,6 +24,8 @@
 //   triangles, mesh_kB      of the mesh as it is stored
 //   hidden, wrongly_hidden  share of the content pixels behind a surface that are hidden; of those before it
 //   edge_px                 median distance of the edges of objects in the drawn image from the true ones
+//   flicker                 share of the content pixels that change from hidden to shown, or back, from one
+//                           frame to the next without cause
 // DOCENT_BENCH_SCENE (default room) and DOCENT_BENCH_SECONDS (default 12) choose the scene and the duration.
 // With DOCENT_BENCH_IMAGES, the drawn images are written to that folder.
 //
@@ -86,6 +88,9 @@ app::OcclusionFigures MeasureHiding(const BuiltMap& built, const engine::Surface
     cv::Mat image;
     app::AddOcclusion(*built.simulation, i, CameraFromMap(built, i), 1 / built.world_from_map.scale,
                       built.keyframes, surfaces, &renderer, &figures, &image);
+    if (i + 1 < built.simulation->frame_count())
+      app::AddFlicker(*built.simulation, i, {CameraFromMap(built, i), CameraFromMap(built, i + 1)},
+                      1 / built.world_from_map.scale, surfaces, &renderer, &figures);
     if (folder != nullptr)
       cv::imwrite((std::filesystem::path(folder) / ("occlusion-" + std::to_string(i) + ".png")).string(),
                   image);
@@ -120,6 +125,7 @@ void DenseSurfaces(benchmark::State& state) {
     state.counters["hidden"] = hiding.HiddenShare();
     state.counters["wrongly_hidden"] = hiding.WronglyHiddenShare();
     state.counters["edge_px"] = hiding.MedianEdgeError_px();
+    state.counters["flicker"] = hiding.ChangedShare();
   }
 }
 BENCHMARK(DenseSurfaces)->Unit(benchmark::kSecond)->Iterations(1);

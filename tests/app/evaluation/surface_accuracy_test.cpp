@@ -51,6 +51,8 @@ TEST_F(SurfaceAccuracy, SurfacesHideTheContentBehindThemAndNoOther) {
     const int frame = (frames_[i] + frames_[i + 1]) / 2;  // Between two keyframes.
     const engine::Rigid3 camera_from_map = simulation_->world_from_camera(frame).inverse();
     AddOcclusion(*simulation_, frame, camera_from_map, 1, frames_, surfaces, &renderer, &figures, nullptr);
+    AddFlicker(*simulation_, frame, {camera_from_map, simulation_->world_from_camera(frame + 1).inverse()}, 1,
+               surfaces, &renderer, &figures);
     if (i == 0)
       AddOcclusion(*simulation_, frame, camera_from_map, 1, frames_, nullptr, &renderer, &without, nullptr);
   }

@@ -121,6 +121,51 @@ void AddEdgeErrors(const cv::Mat& depths, double plane_m, const cv::Mat& visible
   }
 }
 
+// Which pixels (0 or 255) of a frame show the scene's content, whose colour is pure green.
+cv::Mat VisibleContent(const Simulation& simulation, int frame, const engine::Rigid3& camera_from_map,
+                       const content::Scene& scene,
+                       const std::shared_ptr<const engine::SurfaceMesh>& surfaces, ui::Renderer* renderer,
+                       cv::Mat* image) {
+  engine::TrackedFrame tracked;
+  tracked.state = engine::TrackingState::kSixDof;
+  tracked.camera_from_map = camera_from_map;
+  simulation.Render(frame, &tracked.frame.image);
+  ui::View view;
+  view.tracked = &tracked;
+  view.camera = &simulation.camera();
+  view.scene = &scene;
+  view.surfaces = surfaces;
+  view.shadows = false;  // They would darken the video, by which the share of the content is told.
+  view.overlay.hud = false;
+  renderer->Draw(view);
+  cv::Mat drawn;
+  renderer->ReadBack(&drawn);
+  if (image != nullptr) *image = drawn;
+  const cv::Mat& video = tracked.frame.image;
+  cv::Mat visible(drawn.size(), CV_8UC1);
+  for (int y = 0; y < drawn.rows; ++y) {
+    for (int x = 0; x < drawn.cols; ++x) {
+      const cv::Vec3d from(video.at<cv::Vec3b>(y, x)), all = cv::Vec3d(0, 255, 0) - from,
+                                                       part = cv::Vec3d(drawn.at<cv::Vec3b>(y, x)) - from;
+      visible.at<std::uint8_t>(y, x) = part.dot(all) > 0.5 * all.dot(all) ? 255 : 0;
+    }
+  }
+  return visible;
+}
+
+// On which side of a plane (a unit normal and its distance from the world's origin) the surface at a pixel
+// lies: -1 before it, 1 behind it, 0 near it or not known. `content` receives the point of the plane there.
+int SideOf(const Simulation& simulation, int frame, const Eigen::Vector2d& pixel,
+           const Eigen::Vector3d& normal, double offset, Eigen::Vector3d* content) {
+  const auto surface = simulation.SurfaceAt(frame, pixel);
+  if (!surface) return 0;
+  const Eigen::Vector3d eye = simulation.world_from_camera(frame).translation, ray = *surface - eye;
+  const double share = (offset - normal.dot(eye)) / normal.dot(ray);  // Of the way to the surface.
+  if (!(share > 0)) return 0;
+  *content = eye + share * ray;
+  return share > 1.03 ? -1 : share < 0.97 ? 1 : 0;
+}
+
 }  // namespace
 
 DepthFigures MeasureDepthMaps(const Simulation& simulation,
@@ -162,22 +207,8 @@ void AddOcclusion(const Simulation& simulation, int frame, const engine::Rigid3&
   const cv::Mat depths = TrueDepthImage(simulation, frame);
   const double plane_m = MedianOf(depths);
   const content::Scene scene = PlaneBefore(camera_from_map, plane_m * map_units_per_metre);
-  engine::TrackedFrame tracked;
-  tracked.state = engine::TrackingState::kSixDof;
-  tracked.camera_from_map = camera_from_map;
-  simulation.Render(frame, &tracked.frame.image);
-  ui::View view;
-  view.tracked = &tracked;
-  view.camera = &simulation.camera();
-  view.scene = &scene;
-  view.surfaces = surfaces;
-  view.overlay.hud = false;
-  renderer->Draw(view);
-  cv::Mat drawn, visible;
-  renderer->ReadBack(&drawn);
-  if (image != nullptr) *image = drawn;
-  cv::inRange(drawn, cv::Scalar(0, 200, 0), cv::Scalar(60, 255, 60), visible);  // The content's colour.
-
+  const cv::Mat visible =
+      VisibleContent(simulation, frame, camera_from_map, scene, surfaces, renderer, image);
   for (int y = 0; y < depths.rows; ++y) {
     for (int x = 0; x < depths.cols; ++x) {
       const double depth_m = depths.at<double>(y, x);
@@ -195,6 +226,36 @@ void AddOcclusion(const Simulation& simulation, int frame, const engine::Rigid3&
     }
   }
   AddEdgeErrors(depths, plane_m, visible, figures);
+}
+
+void AddFlicker(const Simulation& simulation, int frame, const std::array<engine::Rigid3, 2>& camera_from_map,
+                double map_units_per_metre, const std::shared_ptr<const engine::SurfaceMesh>& surfaces,
+                ui::Renderer* renderer, OcclusionFigures* figures) {
+  const double plane_m = MedianOf(TrueDepthImage(simulation, frame));
+  const content::Scene scene = PlaneBefore(camera_from_map[0], plane_m * map_units_per_metre);
+  std::array<cv::Mat, 2> visible;
+  for (int i = 0; i < 2; ++i)
+    visible[i] =
+        VisibleContent(simulation, frame + i, camera_from_map[i], scene, surfaces, renderer, nullptr);
+  const engine::Rigid3 world_from_camera = simulation.world_from_camera(frame);
+  const Eigen::Vector3d normal = world_from_camera.rotation * Eigen::Vector3d::UnitZ();
+  const double offset = normal.dot(world_from_camera.translation) + plane_m;
+  const cv::Rect image(1, 1, visible[0].cols - 2, visible[0].rows - 2);
+  for (int y = 0; y < visible[1].rows; ++y) {
+    for (int x = 0; x < visible[1].cols; ++x) {
+      Eigen::Vector3d content, before;
+      const int side = SideOf(simulation, frame + 1, {x, y}, normal, offset, &content);
+      if (side == 0) continue;
+      const auto seen = simulation.camera().Project(world_from_camera.inverse() * content);
+      if (!seen) continue;
+      const cv::Point was(static_cast<int>(std::lround(seen->x())), static_cast<int>(std::lround(seen->y())));
+      if (!image.contains(was) || SideOf(simulation, frame, *seen, normal, offset, &before) != side) continue;
+      ++figures->compared;
+      const cv::Mat around = visible[0](cv::Rect(was.x - 1, was.y - 1, 3, 3));
+      const int shown = cv::countNonZero(around);
+      figures->changed += visible[1].at<std::uint8_t>(y, x) != 0 ? shown == 0 : shown == 9;
+    }
+  }
 }
 
 }  // namespace docent::app
