@@ -28,8 +28,13 @@ void KeyFrameOffers::SetCamera(const CameraModel& camera) {
   policy_.SetFieldOfView(FieldOfView(camera));
 }
 
-void KeyFrameOffers::Reset() {
+void KeyFrameOffers::Restart() {
   policy_.Reset();
+  localized_.image = {};
+}
+
+void KeyFrameOffers::Reset() {
+  Restart();
   candidate_.reset();
   taken_.reset();
 }
@@ -59,9 +64,33 @@ void KeyFrameOffers::Consider(const CameraImage& image, const MapSnapshot& map, 
                              .median_depth = pose.median_depth,
                              .needs_six_dof = needs_six_dof},
                             map);
+    if (result.observed != ObservedMotion::kPanorama) Remember(image, map, pose);
+    if (result.inliers == 0 && choice == KeyFrameChoice::kNone) return OfferLastLocalized(image.time, map);
   }
   if (choice == KeyFrameChoice::kNone || frames_since_keyframe_ < options_.frames_between_keyframes) return;
   Offer(choice, image, &map, result.camera_from_map, pose.matches, pose.panorama);
+}
+
+void KeyFrameOffers::Remember(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose) {
+  localized_.image = image;
+  localized_.image.previous = nullptr;
+  localized_.camera_from_map = pose.result.camera_from_map;
+  localized_.matches.assign(pose.matches.begin(), pose.matches.end());
+  localized_.map_revision = map.revision;
+  localized_.median_depth = pose.median_depth;
+}
+
+// A camera that turns fast may see none of the points that it saw in the frame before.
+void KeyFrameOffers::OfferLastLocalized(Timestamp now, const MapSnapshot& map) {
+  // Later, the images overlap too little for points of one to be found in the other.
+  constexpr Timestamp kMaxAge = std::chrono::milliseconds(200);
+  if (!localized_.image.features || now - localized_.image.time > kMaxAge ||
+      policy_.mode() != KeyFramePolicy::Mode::kSixDof ||
+      policy_.PanoramaNear(localized_.camera_from_map, localized_.median_depth, map) != kNoId)
+    return;
+  Offer(KeyFrameChoice::kLocalizedPanorama, localized_.image, &map, localized_.camera_from_map,
+        localized_.matches, kNoId);
+  candidate_->map_revision = localized_.map_revision;
 }
 
 void KeyFrameOffers::OfferFirst(const CameraImage& image) {

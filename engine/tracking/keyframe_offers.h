@@ -22,7 +22,7 @@ class KeyFrameOffers {
   // To be called when the map is left.
   void Reset();
   // To be called after a change of the map, and after a pose that does not continue the previous one.
-  void Restart() { policy_.Reset(); }
+  void Restart();
   // The previous frame's offer ends.
   void BeginFrame();
 
@@ -33,7 +33,9 @@ class KeyFrameOffers {
     PanoramaId panorama = kNoId;  // whose points were searched
     double median_depth = 1;      // map units, of the finite points
   };
-  // Offers the frame if it should become a keyframe.
+  // Offers the frame if it should become a keyframe. When the points were lost from one frame to the next, so
+  // that only the whole image tells the rotation, the last frame that had a position is offered instead, as
+  // the reference of a panorama map.
   void Consider(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose);
   // Offers the first image of a map that is empty so far.
   void OfferFirst(const CameraImage& image);
@@ -54,14 +56,25 @@ class KeyFrameOffers {
     KeyFrameChoice choice = KeyFrameChoice::kNone;
     Timestamp time{};
   };
+  // The last frame that had a position, with what an offer needs.
+  struct Localized {
+    CameraImage image;
+    Rigid3 camera_from_map;
+    std::vector<PointMatch> matches;
+    std::uint64_t map_revision = 0;
+    double median_depth = 1;
+  };
   void Offer(KeyFrameChoice choice, const CameraImage& image, const MapSnapshot* map,
              const Rigid3& camera_from_map, const std::vector<PointMatch>& matches, PanoramaId panorama);
+  void Remember(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose);
+  void OfferLastLocalized(Timestamp now, const MapSnapshot& map);
 
   TrackerOptions options_;
   KeyFramePolicy policy_;
   std::optional<KeyFrameCandidate> candidate_;
   std::optional<Taken> taken_;  // what the mapper may still accept
   int frames_since_keyframe_ = 0;
+  Localized localized_;  // no image if there was none; its memory is used again
 };
 
 }  // namespace docent::engine

@@ -101,6 +101,70 @@ TEST_F(SidewaysStep, IsNotOfferedAfterItWasWithdrawn) {
   EXPECT_FALSE(offers.Take());
 }
 
+// The points were lost from one frame to the next, and the whole image tells the rotation.
+class PointsLostAtOnce : public SidewaysStep {
+ protected:
+  PointsLostAtOnce() {
+    KeyFrame here;  // so that the step itself is no reason for a keyframe
+    here.id = 5;
+    here.camera_from_map = CameraAt({1, 0, 0});
+    map_.keyframes.push_back(here);
+    alone_.observed = ObservedMotion::kPanorama;
+    alone_.camera_from_map = CameraAt({1, 0, 0}, {0, 10, 0});
+  }
+  // What is offered after a localized frame and, after this time, one without points.
+  std::optional<KeyFrameCandidate> OfferedAfter(Timestamp time, KeyFrameOffers* offers) {
+    EXPECT_FALSE(Offers(offers, false));
+    CameraImage image = image_;
+    image.time += time;
+    offers->BeginFrame();
+    offers->Consider(image, map_, {alone_, {}, kNoId, result_.median_depth});
+    return offers->Take();
+  }
+
+  MapTrackResult alone_;
+};
+
+TEST_F(PointsLostAtOnce, MakesTheLastLocalizedFrameTheReferenceOfAPanoramaMap) {
+  KeyFrameOffers offers(AtOnce(), *Camera());
+  const auto offered = OfferedAfter(std::chrono::milliseconds(33), &offers);
+  ASSERT_TRUE(offered);
+  EXPECT_EQ(offered->choice, KeyFrameChoice::kLocalizedPanorama);
+  EXPECT_EQ(offered->time, image_.time);
+  EXPECT_EQ(offered->features, image_.features);
+  EXPECT_EQ(offered->matches.size(), 1u);
+  EXPECT_EQ(offered->map_revision, 9u);
+  EXPECT_EQ(offers.Accept(), image_.time);
+  EXPECT_EQ(offers.policy().mode(), KeyFramePolicy::Mode::kPanorama);
+}
+
+TEST_F(PointsLostAtOnce, OffersNothingOnceTheLastLocalizedFrameIsOld) {
+  KeyFrameOffers offers(AtOnce(), *Camera());
+  EXPECT_FALSE(OfferedAfter(std::chrono::milliseconds(300), &offers));
+}
+
+TEST_F(PointsLostAtOnce, OffersNothingWhereThatPanoramaMapExists) {
+  KeyFrame reference = map_.keyframes.back();
+  reference.id = 6;
+  reference.panorama = 1;
+  map_.keyframes.push_back(reference);
+  PanoramaMap panorama;
+  panorama.id = 1;
+  panorama.reference = 6;
+  map_.panoramas.push_back(panorama);
+  KeyFrameOffers offers(AtOnce(), *Camera());
+  EXPECT_FALSE(OfferedAfter(std::chrono::milliseconds(33), &offers));
+}
+
+TEST_F(PointsLostAtOnce, OffersNothingAfterThePoseHasJumped) {
+  KeyFrameOffers offers(AtOnce(), *Camera());
+  EXPECT_FALSE(Offers(&offers, false));
+  offers.Restart();
+  offers.BeginFrame();
+  offers.Consider(image_, map_, {alone_, {}, kNoId, result_.median_depth});
+  EXPECT_FALSE(offers.Take());
+}
+
 TEST(KeyFrameOffers, OfferTheFirstImageOfAMap) {
   KeyFrameOffers offers(TrackerOptions(), *Camera());
   offers.BeginFrame();
