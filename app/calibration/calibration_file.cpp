@@ -74,6 +74,26 @@ Distortion NeedDistortion(const YamlReader& file, const std::string& field, Lens
   return distortion;
 }
 
+// The camera with the readout time that the file states, if it does.
+CameraModel WithShutter(const YamlReader& file, const CameraModel& camera) {
+  const char* const rows = "rolling_shutter_ms";
+  const char* const columns = "rolling_shutter_columns_ms";
+  if (!file.Has(rows) && !file.Has(columns)) return camera;
+  const auto seconds = [&](const char* field) {
+    constexpr double kMax_ms = 1000;  // as in a stored map
+    const double value_ms = file.NumberOr(field, 0);
+    if (!(std::abs(value_ms) <= kMax_ms))
+      throw Error(file.name() + ": the field '" + field + "' must be from -1000 to 1000 milliseconds.");
+    return value_ms / 1000;
+  };
+  const Eigen::Vector2d readout_s(seconds(columns), seconds(rows));
+  if (readout_s.x() != 0 && readout_s.y() != 0) {
+    throw Error(file.name() + ": only one of the fields '" + rows + "' and '" + columns +
+                "' can differ from zero.");
+  }
+  return camera.WithKnownReadout(readout_s);
+}
+
 CameraModel FromOwn(const YamlReader& file) {
   const LensModel lens = NeedLens(file, "model", file.TextOr("model", "pinhole"));
   const CameraModel::Intrinsics intrinsics{file.Integer("width"), file.Integer("height"), file.Number("fx"),
@@ -142,16 +162,20 @@ CameraModel FromEuroc(const YamlReader& file) {
   return Checked(file, lens, intrinsics, NeedDistortion(file, field, lens, file.Numbers(field)));
 }
 
-}  // namespace
-
-CameraModel ParseCalibration(const std::string& text, const std::string& name) {
-  const YamlReader file(text, name);
+CameraModel LensOf(const YamlReader& file) {
   if (const std::string matrix = file.FirstOf({"camera_matrix", "Camera_Matrix", "K", "k"});
       !matrix.empty()) {
     return FromMatrix(file, matrix);
   }
   if (file.Has("intrinsics")) return FromEuroc(file);
   return FromOwn(file);
+}
+
+}  // namespace
+
+CameraModel ParseCalibration(const std::string& text, const std::string& name) {
+  const YamlReader file(text, name);
+  return WithShutter(file, LensOf(file));
 }
 
 CameraModel ReadCalibration(const std::filesystem::path& path) {
@@ -179,6 +203,13 @@ std::string FormatCalibration(const CameraModel& camera) {
       text += "model: kannala_brandt\n";
       line("k1", d[0]), line("k2", d[1]), line("k3", d[2]), line("k4", d[3]);
       break;
+  }
+  if (const auto& readout_s = camera.known_readout_s()) {
+    if (readout_s->x() == 0) {
+      line("rolling_shutter_ms", 1000 * readout_s->y());
+    } else {
+      line("rolling_shutter_columns_ms", 1000 * readout_s->x());
+    }
   }
   return text;
 }

@@ -9,6 +9,9 @@
 
 // Calibration files: Docent's own YAML, OpenCV's camera_matrix files, ROS camera_info (files and message
 // dumps) and EuRoC's sensor.yaml. The format is recognized by the fields of the file.
+// In each of them `rolling_shutter_ms` may state the time from the exposure of the first row to that of the
+// last, milliseconds (0: a global shutter; negative: the last row is exposed first), and
+// `rolling_shutter_columns_ms` that from the first column to the last, of a camera whose images are turned.
 namespace docent::app {
 
 // Reads a calibration. Throws Error with one sentence that names the file and the field when a field is

@@ -155,6 +155,7 @@ std::vector<MapResult> ListMaps(const RunRecord& run) {
     found->name = record.name;
     found->discarded = IsRetracted(record);
     found->joined_into = record.joined_into;
+    found->readout_s = record.readout_s;
   }
   return maps;
 }

@@ -53,6 +53,7 @@ struct MapResult {
   // Component of that drift about the axis of the true rotation, as in [HYBRID] 7.3; positive when the
   // tracked rotation is too large. Empty when the true rotation is too small to have an axis.
   std::optional<double> axis_drift_deg;
+  std::optional<Eigen::Vector2d> readout_s = std::nullopt;  // see MapRecord
 };
 
 // All frames with one label.

@@ -69,17 +69,24 @@ std::string Centimetres(const std::optional<double>& metres) {
   return metres ? Fixed(*metres * 100, 2) + " cm" : "unknown";
 }
 
+std::string ShutterText(const std::optional<Eigen::Vector2d>& readout_s) {
+  if (!readout_s) return "-";
+  const bool columns = readout_s->x() != 0;
+  const double milliseconds = 1000 * (columns ? readout_s->x() : readout_s->y());
+  return milliseconds == 0 ? "none" : Fixed(milliseconds, 1, columns ? " ms, columns" : " ms, rows");
+}
+
 std::string MapTable(const SequenceReport& r) {
   std::string html =
       "<h3>Maps</h3><table><tr><th>map</th><th>frames</th><th>ATE RMSE</th><th>ATE RMSE of "
-      "keyframes</th><th>rotation RMSE</th></tr>\n";
+      "keyframes</th><th>rotation RMSE</th><th>rolling shutter</th></tr>\n";
   for (const MapResult& map : r.maps) {
     std::string name = map.name;
     if (map.discarded) name += " (discarded)";
     if (!map.joined_into.empty()) name += " (joined into " + map.joined_into + ")";
     html += "<tr><td>" + EscapeHtml(name) + "</td><td>" + std::to_string(map.frames) + "</td><td>" +
             Centimetres(map.ate_rmse_m) + "</td><td>" + Centimetres(map.keyframe_ate_rmse_m) + "</td><td>" +
-            Fixed(map.rotation_rmse_deg, 3, "°") + "</td></tr>\n";
+            Fixed(map.rotation_rmse_deg, 3, "°") + "</td><td>" + ShutterText(map.readout_s) + "</td></tr>\n";
   }
   html += "</table>\n<p>The figures above are those of the largest map.";
   if (r.discarded_frames > 0) {

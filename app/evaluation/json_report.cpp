@@ -28,7 +28,9 @@ Json ToJson(const MapResult& map) {
           {"rotation_rmse_deg", OrNull(map.rotation_rmse_deg)},
           {"rotation_drift_deg", OrNull(map.rotation_drift_deg)},
           {"turn_error_deg", OrNull(map.axis_drift_deg)},
-          {"scale", OrNull(map.scale)}};
+          {"scale", OrNull(map.scale)},
+          {"rolling_shutter_ms", map.readout_s ? Json(1000 * map.readout_s->y()) : Json()},
+          {"rolling_shutter_columns_ms", map.readout_s ? Json(1000 * map.readout_s->x()) : Json()}};
 }
 
 Json ToJson(const SegmentResult& segment) {

@@ -6,6 +6,7 @@
 
 #include "app/files/text_file.h"
 #include "engine/map/map.h"
+#include "engine/map/map_readout.h"
 #include "engine/map/upright_axes.h"
 #include "engine/mapping/bundle/map_adjustment.h"
 
@@ -126,6 +127,7 @@ MapRecord MakeMapRecord(std::uint64_t key, const std::string& name, const engine
     if (const engine::KeyFrame* reference = map.FindKeyFrame(panorama.reference))
       record.panorama_centers.push_back(reference->camera_from_map.OriginInSource());
   }
+  if (!map.keyframes.empty()) record.readout_s = engine::ReadoutIn(map, *map.keyframes.back().camera);
   const engine::UprightAxes axes = engine::UprightAxesOf(map);
   record.up = axes.up;
   record.forward = axes.ahead;

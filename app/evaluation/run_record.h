@@ -104,6 +104,8 @@ struct MapRecord {
   // Centres of the keyframes with a known position after a final global bundle adjustment; empty if not
   // requested.
   std::vector<std::pair<Timestamp, Eigen::Vector3d>> adjusted_centers = {};
+  // The readout time of the rolling shutter, seconds, along columns and rows; empty where no image turned.
+  std::optional<Eigen::Vector2d> readout_s = std::nullopt;
   // Axes of the views: up, and the horizontal viewing direction of the first keyframe; unit vectors, map
   // frame.
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY(), forward = Eigen::Vector3d::UnitZ();

@@ -48,8 +48,10 @@ void WriteSequence(const Simulation& simulation, const std::filesystem::path& fo
   const bool existed = ExistsEmpty(folder);
   try {
     SequenceWriter writer(folder, simulation.calibration(), ImageFormat::kPng);
-    if (!(simulation.calibration() == simulation.camera()))
-      WriteCalibration(folder / "true_calibration.yaml", simulation.camera());
+    const double readout_s = simulation.options().faults.readout_s;
+    if (readout_s > 0 || !(simulation.calibration() == simulation.camera()))
+      WriteCalibration(folder / "true_calibration.yaml",
+                       simulation.camera().WithKnownReadout({0, readout_s}));
     for (int frame = 0; frame < simulation.frame_count(); ++frame) {
       SequenceImage image;
       image.time = simulation.time(frame);

@@ -372,6 +372,12 @@ CameraModel CameraModel::WithReadout(const std::shared_ptr<const CameraModel>& l
   return result;
 }
 
+CameraModel CameraModel::WithKnownReadout(const Eigen::Vector2d& readout_s) const {
+  CameraModel result = *this;
+  result.known_readout_s_ = readout_s;
+  return result;
+}
+
 std::shared_ptr<const CameraModel> CameraModel::WithMotionOf(const CameraModel& image,
                                                              const std::shared_ptr<const CameraModel>& lens) {
   if (!image.lens_of_image_) return lens;

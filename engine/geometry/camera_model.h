@@ -56,6 +56,10 @@ class CameraModel {
   // moves no pixel by more than a tenth. lens: the camera, or the model of another of its images.
   static CameraModel WithReadout(const std::shared_ptr<const CameraModel>& lens, const ReadoutMotion& motion);
 
+  // This camera with the readout time of its shutter, as in ReadoutMotion; zero for a global shutter. The
+  // engine estimates the readout time of a camera for which none is known.
+  CameraModel WithKnownReadout(const Eigen::Vector2d& readout_s) const;
+
   // The model of an image with the rotation of another one, if that has any: `lens` itself otherwise.
   static std::shared_ptr<const CameraModel> WithMotionOf(const CameraModel& image,
                                                          const std::shared_ptr<const CameraModel>& lens);
@@ -99,6 +103,8 @@ class CameraModel {
 
   // Zero for the camera itself.
   const ReadoutMotion& readout_motion() const { return readout_; }
+  // What WithKnownReadout set, seconds; empty if the readout time of the camera is not known.
+  const std::optional<Eigen::Vector2d>& known_readout_s() const { return known_readout_s_; }
   // The camera of which this is the model of one image; empty if this is not the model of an image.
   const std::shared_ptr<const CameraModel>& lens_of_image() const { return lens_of_image_; }
   // The camera of which this is the model of one image, or this model itself.
@@ -133,6 +139,7 @@ class CameraModel {
   Intrinsics intrinsics_;
   std::array<double, 5> distortion_{};
   std::shared_ptr<const CameraModel> lens_of_image_;
+  std::optional<Eigen::Vector2d> known_readout_s_;
   ReadoutMotion readout_;
   bool rotates_ = false;           // whether readout_ has an effect
   double max_angle_ = 0;           // radians

@@ -32,7 +32,7 @@ std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& came
 std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,
                                                  const std::shared_ptr<const CameraModel>& camera) {
   const ReadoutMotion& motion = camera->readout_motion();
-  if (motion.rotation_rate.isZero(0)) return camera;
+  if (motion.rotation_rate.isZero(0) || camera->known_readout_s()) return camera;
   const auto readout_s = ReadoutIn(map, *camera);
   if (!readout_s || *readout_s == motion.readout_s) return camera;
   return std::make_shared<CameraModel>(CameraModel::WithReadout(camera, {motion.rotation_rate, *readout_s}));

@@ -17,7 +17,7 @@ std::optional<Eigen::Vector2d> ReadoutIn(const MapSnapshot& map, const CameraMod
 std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& camera);
 
 // The model of an image with the readout time that its lens has in a map: `camera` itself if the map does not
-// tell, or the rotation is not known.
+// tell, the rotation is not known, or the readout time of the camera is known (CameraModel::known_readout_s).
 std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,
                                                  const std::shared_ptr<const CameraModel>& camera);
 

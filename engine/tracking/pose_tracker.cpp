@@ -18,13 +18,16 @@ PoseTracker::PoseTracker(const TrackerOptions& options, std::shared_ptr<const Ca
       image_camera_(camera),
       map_tracker_(options.map_tracker, std::move(camera)),
       rotation_center_(options.rotation_center),
-      readout_(options.readout) {}
+      readout_(options.readout) {
+  SetCamera(lens_);
+}
 
 void PoseTracker::Reset() {
   SetCamera(lens_);
   rotation_reference_.reset();
   rotation_center_.Reset();
   pivot_estimate_ = {};
+  readout_map_ = nullptr;
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(kNoId);
 }
@@ -32,6 +35,7 @@ void PoseTracker::Reset() {
 void PoseTracker::Begin(Timestamp time, const Rigid3& camera_from_map, ObservedMotion observed) {
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(kNoId);
+  readout_map_ = nullptr;
   motion_.Reset(time, camera_from_map);
   mean_twist_.reset();
   observed_ = observed;
@@ -128,8 +132,9 @@ void PoseTracker::UpdateReadout(const MapSnapshot& map) {
   if (readout_map_ == &map && readout_revision_ == map.revision) return;
   readout_map_ = &map;
   readout_revision_ = map.revision;
-  const auto readout_s = ReadoutIn(map, *lens_);
-  map_knows_readout_ = readout_s.has_value();
+  const auto& known_s = lens_->known_readout_s();
+  const auto readout_s = known_s ? known_s : ReadoutIn(map, *lens_);
+  readout_is_known_ = readout_s.has_value();
   if (readout_s) readout_s_ = *readout_s;
 }
 
@@ -163,7 +168,7 @@ void PoseTracker::AccountForReadout(const CameraImage& image, const Rigid3& pred
   constexpr double kNegligible_px = 0.2;  // of the first and the last row
   if (change_px > kNegligible_px) map_tracker_.RefineAgain(predicted, result);
   mean_twist_ = mean_twist();
-  if (map_knows_readout_) return;
+  if (readout_is_known_) return;
   readout_.Add(*image_camera_, result->camera_from_map, map_tracker_.measurements(), result->sigma, seconds);
   if (!readout_.readout_s().isZero(0)) readout_s_ = readout_.readout_s();
 }

@@ -31,6 +31,7 @@ class PoseTracker {
   void SetCamera(const std::shared_ptr<const CameraModel>& camera) {
     lens_ = image_camera_ = camera;
     map_tracker_.SetCamera(camera);
+    if (camera->known_readout_s()) readout_s_ = *camera->known_readout_s();
   }
   // Forgets the map and the motion in it.
   void Reset();
@@ -89,7 +90,7 @@ class PoseTracker {
  private:
   // Gives the present image the rolling shutter of a camera that moves with this left twist per second.
   void SetTwist(const Eigen::Matrix<double, 6, 1>& twist);
-  // Takes the readout time from a snapshot that has not been asked yet.
+  // Takes the readout time from a snapshot that has not been asked yet, unless the calibration states it.
   void UpdateReadout(const MapSnapshot& map);
   // Repeats the pose estimate with the motion that it implies, and lets it tell the readout time.
   void AccountForReadout(const CameraImage& image, const Rigid3& predicted, MapTrackResult* result);
@@ -124,9 +125,10 @@ class PoseTracker {
   // rotation, a later one.
   std::shared_ptr<const ImageFeatures> rotation_reference_;
   Rigid3 rotation_reference_pose_;
-  // What a map that this camera builds says of its readout time goes first; elsewhere it is estimated here.
+  // The readout time of the calibration goes first, then that of a map that this camera builds; elsewhere it
+  // is estimated here.
   Eigen::Vector2d readout_s_ = Eigen::Vector2d::Zero();
-  bool map_knows_readout_ = false;
+  bool readout_is_known_ = false;             // by the calibration or the map
   const MapSnapshot* readout_map_ = nullptr;  // the snapshot that was asked last, never dereferenced
   std::uint64_t readout_revision_ = 0;
   ReadoutEstimator readout_;

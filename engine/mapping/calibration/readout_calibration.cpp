@@ -16,6 +16,7 @@ bool CalibrateReadout(const ReadoutEstimationOptions& options, const MapAdjustme
   const Map::KeyFrameRecord* record = options.enabled ? map->FindKeyFrame(newest) : nullptr;
   if (!record) return false;
   const std::shared_ptr<const CameraModel> image = record->keyframe.camera;
+  if (image->known_readout_s()) return false;
   const auto before = ReadoutIn(*map, *image);
   if (!before) return false;
   const MapAssembly assembly = AssembleAround(window.window, window.max_fixed, newest, map);

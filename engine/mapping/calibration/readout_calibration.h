@@ -9,7 +9,8 @@ namespace docent::engine {
 
 // Estimates the readout time of the camera of `newest` from this keyframe and those around it, as in
 // AdjustLocally, and gives it to all keyframes of the camera if it is significant and differs from that in
-// use. True if it was changed: then poses and points have to be adjusted. Mapper's thread.
+// use. A readout time that the calibration states is kept. True if it was changed: then poses and points have
+// to be adjusted. Mapper's thread.
 bool CalibrateReadout(const ReadoutEstimationOptions& options, const MapAdjustmentOptions& window,
                       KeyFrameId newest, Map* map);
 

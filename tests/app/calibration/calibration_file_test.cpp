@@ -99,6 +99,29 @@ TEST(Calibration, RoundTripsThroughAFile) {
   }
 }
 
+TEST(Calibration, ReadsAndWritesTheReadoutTimeOfARollingShutter) {
+  const std::string head = "width: 640\nheight: 480\nfx: 300\nfy: 301\ncx: 320\ncy: 240\n";
+  const auto read = [&](const std::string& text) {
+    return ParseCalibration(head + text, "file").known_readout_s();
+  };
+  EXPECT_FALSE(read(""));
+  EXPECT_EQ(read("rolling_shutter_ms: 20\n"), Eigen::Vector2d(0, 0.02));
+  EXPECT_EQ(read("rolling_shutter_columns_ms: -15\n"), Eigen::Vector2d(-0.015, 0));
+  EXPECT_EQ(read("rolling_shutter_ms: 0\n"), Eigen::Vector2d(0, 0)) << "a global shutter";
+  for (const char* text :
+       {"", "rolling_shutter_ms: 20\n", "rolling_shutter_columns_ms: -15\n", "rolling_shutter_ms: 0\n"}) {
+    const CameraModel camera = ParseCalibration(head + text, "file");
+    const CameraModel again = ParseCalibration(FormatCalibration(camera), "again");
+    EXPECT_EQ(again.known_readout_s(), camera.known_readout_s()) << text;
+  }
+  for (const char* text : {"rolling_shutter_ms: 2000\n", "rolling_shutter_columns_ms: -1e9\n",
+                           "rolling_shutter_ms: .nan\n", "rolling_shutter_ms: fast\n"}) {
+    EXPECT_THAT(ErrorOf([&] { read(text); }), HasSubstr("rolling_shutter")) << text;
+  }
+  EXPECT_THAT(ErrorOf([&] { read("rolling_shutter_ms: 20\nrolling_shutter_columns_ms: 20\n"); }),
+              HasSubstr("only one"));
+}
+
 TEST(Calibration, NamesTheFileAndTheMissingField) {
   for (const char* field : {"width", "height", "fx", "fy", "cx", "cy"}) {
     EXPECT_THAT(ErrorOf([&] { ParseCalibration(Without(field), "'desk.yaml'"); }),

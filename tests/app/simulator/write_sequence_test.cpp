@@ -91,6 +91,14 @@ TEST_F(WriteSequenceTest, WritesTheTrueCalibrationBesideAWrongOne) {
   EXPECT_EQ(FindCalibration(folder_ / "wrong"), folder_ / "wrong" / "calibration.yaml");
 }
 
+TEST_F(WriteSequenceTest, WritesTheReadoutTimeOfARollingShutterIntoTheTrueCalibrationOnly) {
+  const auto rolling = MakeSimulation("museum:1,rolling-shutter=20,duration=0.1");
+  WriteSequence(*rolling, folder_ / "rolling");
+  EXPECT_FALSE(ReadCalibration(folder_ / "rolling" / "calibration.yaml").known_readout_s());
+  EXPECT_EQ(ReadCalibration(folder_ / "rolling" / "true_calibration.yaml").known_readout_s(),
+            Eigen::Vector2d(0, 0.02));
+}
+
 TEST_F(WriteSequenceTest, UsesAnEmptyFolderButRejectsANonEmptyOne) {
   std::filesystem::create_directories(folder_);
   std::ofstream(folder_ / "mine.txt") << "keep";

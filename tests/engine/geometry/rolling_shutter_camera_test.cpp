@@ -95,6 +95,16 @@ TEST(RollingShutterCamera, EqualsTheCameraToTheBitWithoutRotationOrReadout) {
   EXPECT_TRUE(CameraModel::WithReadout(kCamera, FastTurn()).HasSameLens(*kCamera));
 }
 
+TEST(RollingShutterCamera, PassesAKnownReadoutTimeToItsImages) {
+  const auto lens = std::make_shared<const CameraModel>();
+  EXPECT_FALSE(lens->known_readout_s());
+  const auto known = std::make_shared<const CameraModel>(lens->WithKnownReadout({0, 0.02}));
+  EXPECT_EQ(known->known_readout_s(), Eigen::Vector2d(0, 0.02));
+  EXPECT_EQ(CameraModel::WithReadout(known, {{0, 1, 0}, {0, 0.02}}).known_readout_s(),
+            Eigen::Vector2d(0, 0.02));
+  EXPECT_EQ(*known, *lens) << "the camera itself does not turn";
+}
+
 TEST(RollingShutterCamera, KnowsItsCameraHoweverOftenTheMotionIsReplaced) {
   const auto image = std::make_shared<CameraModel>(CameraModel::WithReadout(kCamera, FastTurn()));
   const CameraModel again = CameraModel::WithReadout(image, {{1, 0, 0}, {0, 0.02}});

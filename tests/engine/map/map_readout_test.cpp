@@ -81,6 +81,14 @@ TEST(MapReadout, IsThatOfTheNewestImageOfTheLens) {
   EXPECT_FALSE(ReadoutIn(*snapshot, *Camera(700)));
 }
 
+TEST(MapReadout, DoesNotReplaceThatOfTheCalibration) {
+  const auto known = std::make_shared<const CameraModel>(Camera(500)->WithKnownReadout({0, 0.03}));
+  Map map;
+  AddKeyFrame(Image(Camera(500), 0.7, 0.02), &map);
+  const auto image = Image(known, 0.7, 0.03);
+  EXPECT_EQ(WithReadoutIn(map, image), image);
+}
+
 TEST(MapReadout, GoesToANewImageOfTheSameLens) {
   const auto camera = Camera(500);
   Map map;

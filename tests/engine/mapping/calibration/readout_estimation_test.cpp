@@ -191,6 +191,15 @@ TEST(ReadoutCalibration, GivesTheKeyFramesTheirReadoutTimeAndKeepsIt) {
   EXPECT_FALSE(CalibrateReadout({}, adjustment, newest, &map)) << "nothing has changed";
 }
 
+TEST(ReadoutCalibration, KeepsWhatTheCalibrationStates) {
+  Map map = MapOf(Scene(6, {0, 0.02}, {0, 0.01}, 6));
+  const auto known = std::make_shared<const CameraModel>(kCamera->WithKnownReadout({0, 0.01}));
+  for (auto& [id, record] : map.keyframes())
+    record.keyframe.camera = CameraModel::WithMotionOf(*record.keyframe.camera, known);
+  EXPECT_FALSE(CalibrateReadout({}, {}, map.keyframes().rbegin()->first, &map));
+  EXPECT_EQ(ReadoutOfNewest(map).y(), 0.01);
+}
+
 TEST(ReadoutCalibration, LeavesAGlobalShutterAndAnUnknownMotionAlone) {
   Map global = MapOf(Scene(6, {0, 0}, {0, 0}, 7));
   EXPECT_FALSE(CalibrateReadout({}, {}, global.keyframes().rbegin()->first, &global));
