@@ -8,6 +8,7 @@
 #include "app/command_line/run_arguments.h"
 #include "app/command_line/run_guide.h"
 #include "app/command_line/runs.h"
+#include "app/files/write_confinement.h"
 #include "app/script/script_file.h"
 #include "app/session/library_scene.h"
 #include "engine/base/error.h"
@@ -102,6 +103,17 @@ maps::SyncOptions HubOptionsOf(const TourOptions& options) {
   return hub;
 }
 
+// A tour reads files of others and needs to write to little.
+void ConfineTour(const TourOptions& options) {
+  std::vector<std::filesystem::path> folders = SystemFolders();
+  // A library that an author has open, and one that follows a hub, have files beside them.
+  for (const auto& file :
+       {std::optional(options.library), options.run.output, options.run.record, options.log}) {
+    if (file) folders.push_back(ExistingFolderOf(*file));
+  }
+  ConfineWritesTo(folders);
+}
+
 }  // namespace
 
 void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
@@ -139,6 +151,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
     if (options.run.headless) throw Error("A kiosk needs its window; remove --headless.");
     if (!RestartAfterFailures()) return;
   }
+  ConfineTour(options);
   if (options.script) ReadScriptFor(*options.script, &request);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
   if (!options.hub.empty()) request.hub = HubOptionsOf(options);
