@@ -151,7 +151,13 @@ void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFra
       pose_.Track(*map_, image_, frame.commanded_rotation, offers_.policy(), &random_);
   image_.camera = pose_.image_camera();
   using Outcome = PoseTracker::Estimate::Outcome;
-  if (estimate.outcome == Outcome::kPose || estimate.outcome == Outcome::kRotationOnly) {
+  // The map is not extended while a pose that was found after a loss waits for confirmation. A camera that
+  // then sees nothing of the map has left it, or never was there; the rotation of the image alone would hide
+  // that.
+  const bool left_unconfirmed =
+      estimate.outcome == Outcome::kRotationOnly && options_.build_maps && confirmation_.is_pending();
+  if (estimate.outcome == Outcome::kPose ||
+      (estimate.outcome == Outcome::kRotationOnly && !left_unconfirmed)) {
     out->state = TrackingState::kSixDof;
     Accept(estimate.result, out);
     if (estimate.outcome == Outcome::kRotationOnly) out->hint = Hint::kLowTexture;
@@ -162,7 +168,7 @@ void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFra
   state_ = CameraState::kLost;
   out->state = TrackingState::kLost;
   out->hint = Hint::kLeftMap;
-  out->left_map = estimate.outcome == Outcome::kLeftMap;
+  out->left_map = estimate.outcome == Outcome::kLeftMap || left_unconfirmed;
   // The same image may be recognized, so that unexpected motion does not cost a frame.
   if (estimate.outcome == Outcome::kLost) Use(relocalizer_.Search(SearchIn(places), out), out);
 }

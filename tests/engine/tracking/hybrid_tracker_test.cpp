@@ -221,6 +221,31 @@ TEST(HybridTracker, IsLostWhenTheCameraTranslatesWhereOnlyInfinitePointsAreMappe
   EXPECT_GE(hints, 1);
 }
 
+// While a pose after a loss waits for confirmation, nothing is added to the map. When the camera then turns
+// to where nothing is mapped, the image alone could tell its rotation for seconds.
+TEST(HybridTracker, LeavesTheMapWhenAPoseThatWasNotConfirmedSeesNothingOfIt) {
+  TrackerOptions options;
+  options.confirming_frames = kTourFrames;
+  Lockstep lockstep(options, Camera(), 1);
+  bool left = false;
+  int found_again = 0, by_image_alone = 0;
+  for (int i = 0; i < kTurnBegin + kTurnFrames && !left; ++i) {
+    Frame frame = TourFrame(i);
+    const bool covered = i >= kTurnBegin - 6 && i < kTurnBegin - 3;
+    if (covered) frame.image = cv::Mat::zeros(frame.image.size(), frame.image.type());
+    const TrackedFrame tracked = lockstep.Feed(frame);
+    if (i < kTurnBegin - 6) continue;
+    found_again += tracked.state == TrackingState::kRelocalized;
+    by_image_alone +=
+        tracked.state == TrackingState::kPanorama && tracked.finite_points + tracked.infinite_points == 0;
+    left = tracked.left_map;
+    EXPECT_TRUE(!left || tracked.state == TrackingState::kLost);
+  }
+  EXPECT_EQ(found_again, 1);
+  EXPECT_TRUE(left);
+  EXPECT_EQ(by_image_alone, 0);
+}
+
 TEST(PlainTracker, MakesNoPanoramaMaps) {
   const Tour tour = TakeTour(false);
   ASSERT_NE(tour.map, nullptr);
