@@ -242,6 +242,8 @@ TEST(MapRecords, ContainTheCentresOfKeyframesAndPanoramas) {
     keyframe.id = static_cast<engine::KeyFrameId>(map.keyframes.size());
     keyframe.kind = kind;
     keyframe.panorama = panorama;
+    keyframe.camera = std::make_shared<engine::CameraModel>(
+        engine::CameraModel::WithReadout(std::make_shared<engine::CameraModel>(), {{0, 1, 0}, {0, 0.02}}));
     keyframe.camera_from_map = engine::Rigid3(engine::Rotation3(), -center);
     map.keyframes.push_back(keyframe);
   };
@@ -260,6 +262,7 @@ TEST(MapRecords, ContainTheCentresOfKeyframesAndPanoramas) {
   const MapRecord record = MakeMapRecord(3, "Hall", map);
   EXPECT_EQ(record.keyframes, (KeyFrameCounts{1, 1, 1}));
   EXPECT_EQ(record.points, (PointCounts{2, 1, 1}));
+  EXPECT_EQ(record.readout_s, Eigen::Vector2d(0, 0.02));
   ASSERT_EQ(record.positions.size(), 2u);
   EXPECT_EQ(record.converted, (std::vector<bool>{false, true}));
   using Places = std::vector<Eigen::Vector3d>;
