@@ -43,6 +43,7 @@ struct SyncReport {
   std::vector<std::string> lines;           // A sentence for each map and tour with which something was done.
   std::vector<std::uint64_t> changed_keys;  // Of the maps that were changed in the library.
   int problems = 0;                         // Lines that say that something was not done.
+  int waiting = 0;  // Of these, those that end by themselves: an authoring session has the map open.
   std::uint64_t bytes_sent = 0, bytes_received = 0;  // Of items, without what the protocol adds.
 };
 

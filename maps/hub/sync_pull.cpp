@@ -23,6 +23,9 @@ std::string LocalName(SyncSession* session, const std::string& name, std::uint64
 // Writes a revision of the hub into the library, where `mine` is the map as it is, and links both.
 void WriteTheirs(SyncSession* session, const MapLink& link, const HubRevision& theirs, const LocalMap& mine,
                  const std::string& stamp) {
+  // No session can have a new map in memory.
+  std::optional<SessionLock> lock;
+  if (!stamp.empty()) lock.emplace(session->options().library, SessionLockKind::kReplace);
   LocalMap map;
   map.facts = theirs.facts;
   map.manifest = theirs.manifest;
@@ -56,6 +59,7 @@ bool LinkEqualMap(SyncSession* session, const MapLink& link, const HubRevision& 
 // Merges what both sides have changed into the library; the next push saves it on the hub.
 void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, const HubRevision& theirs,
                const LocalMap& mine, const std::string& stamp) {
+  const SessionLock lock = session->local().LockForReplacing();
   const std::string their_scene = SceneOf(session->Receive({{"scene", theirs.manifest.at("scene")}}, mine));
   Resolution resolution = Resolve(link, mine, theirs, their_scene, session->options().merge);
   if (resolution.needs_two_maps) {
@@ -95,6 +99,7 @@ void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, c
 
 void PullRemoval(SyncSession* session, const MapLink& link, const std::string& stamp) {
   if (!stamp.empty() && stamp == link.stamp) {
+    const SessionLock lock = session->local().LockForReplacing();
     session->local().Remove(link.key, stamp);
     session->report().changed_keys.push_back(link.key);
     session->Say(QuotedName(link.local_name) + " was removed on the hub, and so here");
@@ -153,6 +158,10 @@ void PullWithPatience(SyncSession* session, const std::string& id) {
     } catch (const LocalChange& error) {
       if (attempt == kPullAttempts)
         session->SayProblem(QuotedName(head.name) + " was not updated: " + error.what());
+    } catch (const LibraryInSession& error) {
+      session->SayProblem(QuotedName(head.name) + " was not updated: " + error.what());
+      ++session->report().waiting;
+      return;
     } catch (const Error& error) {
       session->CheckStopped();
       session->SayProblem(QuotedName(head.name) + " was not updated: " + error.what());
