@@ -36,6 +36,12 @@ struct SyncOptions {
   std::int64_t bytes_per_second = 0;  // Upper limit of the transfer on average; 0 for none.
   bool remove = false;                // Push: remove from the hub what was removed here.
   std::function<bool()> is_stopped;   // Asked between two transfers; may be empty.
+  // Pull: the name on the hub of a map; it comes first, then those that signposts and tours lead to from
+  // there, then the others. Empty for no preference.
+  std::string near;
+  // The same by the key in the library, asked before each map because the visitor goes on meanwhile; 0 where
+  // it is not known, which `near` then says. May be empty.
+  std::function<std::uint64_t()> near_key;
 };
 
 // What was done.
