@@ -152,7 +152,9 @@ void GuideRun::FollowHub(std::optional<maps::HubFollower>* follower) {
   maps::HubFollower::Callbacks callbacks;
   callbacks.pulled = [this](const maps::SyncReport& report) { session_.ReloadContent(report.changed_keys); };
   callbacks.told = [this](const std::string& sentence) { session_.AddEvent("hub", sentence); };
-  follower->emplace(*request_.hub, std::move(callbacks));
+  maps::SyncOptions options = *request_.hub;
+  options.near_key = [this] { return visited_map_.load(); };
+  follower->emplace(std::move(options), std::move(callbacks));
 }
 
 // The images that live cameras delivered and missed, for the report and as events.
@@ -286,6 +288,7 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
     };
   }
   run.shown = [this, &state, &show](const engine::TrackedFrame& tracked) {
+    if (tracked.map_key != 0) visited_map_ = tracked.map_key;
     HandleFrame(tracked, show, &state);
   };
   return run;

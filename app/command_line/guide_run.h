@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -120,6 +121,7 @@ class GuideRun {
   RunWatch watch_;
   std::string noticed_;  // What the person at the first camera is told next; empty for nothing.
   std::optional<GuideFiles> files_;
+  std::atomic<std::uint64_t> visited_map_ = 0;  // Key of the last map that was tracked; 0 before the first.
 };
 
 }  // namespace docent::app

@@ -62,7 +62,10 @@ void AddMapsHubCommands(CLI::App* group, Invocation* invocation) {
       ->add_flag("--removed", options->sync.remove,
                  "Also remove from the hub what was removed from the library");
   add("pull", "Bring the changes of a hub into a library, which is created if it does not exist",
-      "docent maps pull --library museum.docent --hub postgresql://anna@museum.example/docent", maps::Pull);
+      "docent maps pull --library museum.docent --hub postgresql://anna@museum.example/docent", maps::Pull)
+      ->add_option("--near", options->sync.near,
+                   "Name of the map where the device is: it comes first, then those that tours and signposts "
+                   "lead to from there, then the others");
 }
 
 }  // namespace docent::app

@@ -14,6 +14,7 @@
 #include "engine/base/error.h"
 #include "engine/initialization/planar_target.h"
 #include "maps/library/map_copies.h"
+#include "maps/library/session_lock.h"
 
 namespace docent::app {
 
@@ -129,6 +130,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   if (options.target) request.target = ReadTarget(*options.target, options.target_width_m);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kSession);
   request.library = &library;
   CopyRunArguments(options.run, AnyLive(cameras), &request);
   request.autosave_interval = options.autosave_interval;

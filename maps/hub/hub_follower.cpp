@@ -47,7 +47,8 @@ void HubFollower::FollowConnected(const std::stop_token& stop) {
     const std::int64_t last = hub.LastChange();
     if (last != seen) {
       const SyncReport report = Pull(options_);
-      seen = last;
+      // What waits for an authoring session to end is tried again.
+      seen = report.waiting > 0 ? -1 : last;
       if (!is_connected_) Tell("the hub is reached, and the library follows it");
       is_connected_ = true;
       if (!report.changed_keys.empty() && callbacks_.pulled) callbacks_.pulled(report);

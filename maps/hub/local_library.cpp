@@ -121,7 +121,8 @@ std::string Retargeted(const SceneTools& scenes, const std::string& text, const 
 }  // namespace
 
 LocalLibrary::LocalLibrary(const std::filesystem::path& path, CreateIfMissing create, SceneTools scenes)
-    : scenes_(std::move(scenes)),
+    : file_(path),
+      scenes_(std::move(scenes)),
       library_(Library::Open(path, Access::kReadWrite, create, OptionsOf(scenes_))),
       database_(Database::OpenReadWrite(path, false)) {
   database_.StartWriting();

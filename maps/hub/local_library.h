@@ -9,6 +9,7 @@
 #include "engine/base/error.h"
 #include "maps/hub/map_facts.h"
 #include "maps/library/library.h"
+#include "maps/library/session_lock.h"
 #include "maps/storage/database.h"
 
 namespace docent::maps {
@@ -30,6 +31,10 @@ class LocalLibrary {
   Library& library() { return library_; }
   const Library& library() const { return library_; }
 
+  // Keeps authoring sessions away while maps that they may have in memory are replaced. Throws
+  // LibraryInSession if there is one.
+  SessionLock LockForReplacing() const { return {file_, SessionLockKind::kReplace}; }
+
   // Changes whenever the map does: its entry, content, structure or mesh. Empty if there is no such map.
   std::string StampOf(std::uint64_t key) const;
   // The whole map. Its signposts lead to what `to_hub` gives. Throws if it is damaged.
@@ -49,6 +54,7 @@ class LocalLibrary {
   // Whether the library has the structure of the map already.
   bool HasStructure(const LocalMap& map) const;
 
+  std::filesystem::path file_;
   SceneTools scenes_;
   Library library_;  // Opened first: it upgrades older formats.
   Database database_;

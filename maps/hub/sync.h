@@ -36,6 +36,12 @@ struct SyncOptions {
   std::int64_t bytes_per_second = 0;  // Upper limit of the transfer on average; 0 for none.
   bool remove = false;                // Push: remove from the hub what was removed here.
   std::function<bool()> is_stopped;   // Asked between two transfers; may be empty.
+  // Pull: the name on the hub of a map; it comes first, then those that signposts and tours lead to from
+  // there, then the others. Empty for no preference.
+  std::string near;
+  // The same by the key in the library, asked before each map because the visitor goes on meanwhile; 0 where
+  // it is not known, which `near` then says. May be empty.
+  std::function<std::uint64_t()> near_key;
 };
 
 // What was done.
@@ -43,6 +49,7 @@ struct SyncReport {
   std::vector<std::string> lines;           // A sentence for each map and tour with which something was done.
   std::vector<std::uint64_t> changed_keys;  // Of the maps that were changed in the library.
   int problems = 0;                         // Lines that say that something was not done.
+  int waiting = 0;  // Of these, those that end by themselves: an authoring session has the map open.
   std::uint64_t bytes_sent = 0, bytes_received = 0;  // Of items, without what the protocol adds.
 };
 

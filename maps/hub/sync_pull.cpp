@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
+#include "maps/hub/pull_order.h"
 #include "maps/hub/sha256.h"
 #include "maps/hub/sync_session.h"
 #include "maps/library/map_names.h"
@@ -23,6 +24,9 @@ std::string LocalName(SyncSession* session, const std::string& name, std::uint64
 // Writes a revision of the hub into the library, where `mine` is the map as it is, and links both.
 void WriteTheirs(SyncSession* session, const MapLink& link, const HubRevision& theirs, const LocalMap& mine,
                  const std::string& stamp) {
+  // No session can have a new map in memory.
+  std::optional<SessionLock> lock;
+  if (!stamp.empty()) lock.emplace(session->options().library, SessionLockKind::kReplace);
   LocalMap map;
   map.facts = theirs.facts;
   map.manifest = theirs.manifest;
@@ -56,6 +60,7 @@ bool LinkEqualMap(SyncSession* session, const MapLink& link, const HubRevision& 
 // Merges what both sides have changed into the library; the next push saves it on the hub.
 void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, const HubRevision& theirs,
                const LocalMap& mine, const std::string& stamp) {
+  const SessionLock lock = session->local().LockForReplacing();
   const std::string their_scene = SceneOf(session->Receive({{"scene", theirs.manifest.at("scene")}}, mine));
   Resolution resolution = Resolve(link, mine, theirs, their_scene, session->options().merge);
   if (resolution.needs_two_maps) {
@@ -95,6 +100,7 @@ void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, c
 
 void PullRemoval(SyncSession* session, const MapLink& link, const std::string& stamp) {
   if (!stamp.empty() && stamp == link.stamp) {
+    const SessionLock lock = session->local().LockForReplacing();
     session->local().Remove(link.key, stamp);
     session->report().changed_keys.push_back(link.key);
     session->Say(QuotedName(link.local_name) + " was removed on the hub, and so here");
@@ -153,6 +159,10 @@ void PullWithPatience(SyncSession* session, const std::string& id) {
     } catch (const LocalChange& error) {
       if (attempt == kPullAttempts)
         session->SayProblem(QuotedName(head.name) + " was not updated: " + error.what());
+    } catch (const LibraryInSession& error) {
+      session->SayProblem(QuotedName(head.name) + " was not updated: " + error.what());
+      ++session->report().waiting;
+      return;
     } catch (const Error& error) {
       session->CheckStopped();
       session->SayProblem(QuotedName(head.name) + " was not updated: " + error.what());
@@ -179,6 +189,46 @@ void ReserveKeysForMaps(SyncSession* session) {
   }
 }
 
+// The maps that the visitor is in, by their ids on the hub.
+std::vector<std::string> MapsNearVisitor(const SyncSession& session) {
+  const SyncOptions& options = session.options();
+  if (const std::uint64_t key = options.near_key ? options.near_key() : 0; key != 0) {
+    if (const MapLink* link = session.LinkOf(key)) return {link->id};
+  }
+  const HubHead* head = options.near.empty() ? nullptr : session.HeadNamed(options.near);
+  return head == nullptr ? std::vector<std::string>() : std::vector<std::string>{head->id};
+}
+
+// The ways of the tours on the hub and of the signposts here.
+WaysBetweenMaps WaysIn(SyncSession* session) {
+  WaysBetweenMaps ways = WaysOfTours(session->hub().Tours());
+  for (const Library::Signpost& signpost : session->local().library().Signposts()) {
+    const MapLink *from = session->LinkOf(signpost.map.key), *to = session->LinkOf(signpost.to_key);
+    if (from != nullptr && to != nullptr) ways.emplace_back(from->id, to->id);
+  }
+  return ways;
+}
+
+// Pulls the maps, always the nearest one next.
+void PullNearestFirst(SyncSession* session, std::vector<HubHead> heads) {
+  const SyncOptions& options = session->options();
+  const auto changed = std::count_if(heads.begin(), heads.end(), [&](const HubHead& head) {
+    return session->LinkTo(head.id)->revision != head.revision;
+  });
+  const bool has_place = changed > 1 && (!options.near.empty() || options.near_key);
+  std::vector<std::string> from;
+  for (std::size_t next = 0; next < heads.size(); ++next) {
+    const std::vector<std::string> now = has_place ? MapsNearVisitor(*session) : std::vector<std::string>();
+    if (now != from) {
+      from = now;
+      const auto rest = heads.begin() + static_cast<std::ptrdiff_t>(next);
+      std::vector<HubHead> ordered = NearestFirst({rest, heads.end()}, from, WaysIn(session));
+      std::copy(ordered.begin(), ordered.end(), rest);
+    }
+    PullWithPatience(session, heads[next].id);
+  }
+}
+
 }  // namespace
 
 SyncReport Pull(const SyncOptions& options) {
@@ -187,12 +237,14 @@ SyncReport Pull(const SyncOptions& options) {
     if (session.HeadNamed(name) == nullptr) throw Error("the hub has no map named '" + name + "'");
   }
   ReserveKeysForMaps(&session);
-  const std::vector<HubHead> heads = session.heads();
-  for (const HubHead& head : heads) {
-    if (options.maps.empty() || (!head.removed && std::find(options.maps.begin(), options.maps.end(),
-                                                            head.name) != options.maps.end()))
-      PullWithPatience(&session, head.id);
-  }
+  if (!options.near.empty() && session.HeadNamed(options.near) == nullptr)
+    throw Error("the hub has no map named '" + options.near + "'");
+  std::vector<HubHead> heads = session.heads();
+  std::erase_if(heads, [&](const HubHead& head) {
+    return !options.maps.empty() && (head.removed || std::find(options.maps.begin(), options.maps.end(),
+                                                               head.name) == options.maps.end());
+  });
+  PullNearestFirst(&session, std::move(heads));
   if (options.maps.empty()) PullTours(&session);
   return session.report();
 }

@@ -76,6 +76,8 @@ void SaveChanges(SyncSession* session, const MapInfo& info, const MapLink& link,
 
 // Merges the map, which both sides have changed, and saves the result on both.
 void MergeAndSave(SyncSession* session, const MapInfo& info, const MapLink& link, const HubHead& head) {
+  // Before the hub saves what a session here would then undo.
+  const SessionLock lock = session->local().LockForReplacing();
   const LocalMap mine = session->ReadLocal(info);
   const std::string stamp = session->local().StampOf(info.key);
   const std::optional<HubRevision> theirs = session->hub().Revision(link.id, head.revision);

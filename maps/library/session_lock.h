@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "engine/base/error.h"
+
+// An authoring session keeps maps in memory and saves them over what the library has, so that nothing else
+// may replace maps of the library meanwhile. The file NAME.docent.session beside the library says so:
+// sessions share a lock on it, and whoever replaces maps holds it alone. The system releases the lock when a
+// process ends, however it ends, and the last holder removes the file.
+namespace docent::maps {
+
+// An authoring session has the library open, so that its maps cannot be replaced now.
+class LibraryInSession : public Error {
+ public:
+  using Error::Error;
+};
+
+// Who holds the lock.
+enum class SessionLockKind {
+  kSession,  // An authoring session; several may run.
+  kReplace,  // An exchange with a hub, while it replaces maps.
+};
+
+// The lock, from its construction to its destruction. It may not be used by two threads at once.
+class SessionLock {
+ public:
+  // Throws LibraryInSession if a session holds the lock and it is wanted for replacing. A session waits up to
+  // ten seconds for an exchange to end, and then throws docent::Error.
+  SessionLock(const std::filesystem::path& library, SessionLockKind kind);
+  ~SessionLock();
+  SessionLock(const SessionLock&) = delete;
+  SessionLock& operator=(const SessionLock&) = delete;
+
+ private:
+  std::filesystem::path path_;
+  int file_ = -1;
+};
+
+}  // namespace docent::maps

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/library/session_lock.h"
+
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <chrono>
+#include <thread>
+
+#include "tests/end_to_end/run_docent.h"
+#include "tests/hub/hub_samples.h"
+#include "tests/hub/private_server.h"
+
+// Exchanges with a hub while an authoring session has the library open.
+namespace docent::maps {
+namespace {
+
+using testing::HasSubstr;
+
+class HubSessionLock : public WithHubServer {
+ protected:
+  void SetUp() override {
+    WithHubServer::SetUp();
+    if (IsSkipped()) return;
+    {
+      Library a = OpenSampleLibrary(folder_ / "a");
+      AddSampleMap(&a, "Desk", 7);
+    }
+    Push(SampleSync(Url(), folder_ / "a"));
+    Pull(SampleSync(Url(), folder_ / "b"));
+  }
+  void AddSign(const std::string& device, const std::string& id, const std::string& text) {
+    Library library = OpenSampleLibrary(folder_ / device);
+    EditScene(&library, library.FindByName("Desk").key,
+              [&](content::Scene* scene) { scene->entities.push_back(SampleSignpost(id, text)); });
+  }
+  std::string TextsOn(const std::string& device) {
+    const Library library = OpenSampleLibrary(folder_ / device);
+    std::string texts;
+    for (const content::Entity& entity : SceneIn(library, library.FindByName("Desk").key).entities)
+      texts += entity.signpost.text + ";";
+    return texts;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(HubSessionLock, APullReplacesNoMapOfASession) {
+  AddSign("a", "sign-2", "from a");
+  Push(SampleSync(Url(), folder_ / "a"));
+  {
+    const SessionLock session(folder_ / "b", SessionLockKind::kSession);
+    const SyncReport report = Pull(SampleSync(Url(), folder_ / "b"));
+    EXPECT_EQ(report.problems, 1);
+    EXPECT_EQ(report.waiting, 1);
+    EXPECT_THAT(LinesOf(report), HasSubstr("is open in docent author"));
+    EXPECT_EQ(TextsOn("b"), "Hello;");
+  }
+  EXPECT_EQ(Pull(SampleSync(Url(), folder_ / "b")).problems, 0);
+  EXPECT_EQ(TextsOn("b"), "Hello;from a;");
+}
+
+TEST_F(HubSessionLock, APushDoesNotMergeWhatASessionWouldUndo) {
+  AddSign("a", "sign-2", "from a");
+  Push(SampleSync(Url(), folder_ / "a"));
+  AddSign("b", "sign-3", "from b");
+  {
+    const SessionLock session(folder_ / "b", SessionLockKind::kSession);
+    EXPECT_EQ(Push(SampleSync(Url(), folder_ / "b")).problems, 1);
+    Pull(SampleSync(Url(), folder_ / "a"));
+    EXPECT_EQ(TextsOn("a"), "Hello;from a;") << "the hub was changed";
+  }
+  EXPECT_EQ(Push(SampleSync(Url(), folder_ / "b")).problems, 0);
+  Pull(SampleSync(Url(), folder_ / "a"));
+  for (const char* device : {"a", "b"}) {
+    EXPECT_THAT(TextsOn(device), HasSubstr("from a"));
+    EXPECT_THAT(TextsOn(device), HasSubstr("from b"));
+  }
+}
+
+TEST_F(HubSessionLock, APushWithoutAMergeGoesOnBesideASession) {
+  AddSign("b", "sign-2", "from b");
+  const SessionLock session(folder_ / "b", SessionLockKind::kSession);
+  EXPECT_EQ(Push(SampleSync(Url(), folder_ / "b")).problems, 0);
+  Pull(SampleSync(Url(), folder_ / "a"));
+  EXPECT_EQ(TextsOn("a"), "Hello;from b;");
+}
+
+TEST_F(HubSessionLock, TheProgramSaysThatASessionHasTheLibraryOpen) {
+  AddSign("a", "sign-2", "from a");
+  Push(SampleSync(Url(), folder_ / "a"));
+  const pid_t author = app::StartDocent({"author", "--headless", "--library", (folder_ / "b").string(),
+                                         "--camera", "sim:room,duration=60", "--pace", "realtime"},
+                                        (folder_ / "out").string(), (folder_ / "errors").string());
+  const std::filesystem::path lock = folder_ / "b.session";
+  for (int i = 0; i < 600 && !std::filesystem::exists(lock); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_TRUE(std::filesystem::exists(lock));
+  const app::Outcome during =
+      app::RunDocent({"maps", "pull", "--library", (folder_ / "b").string(), "--hub", Url()});
+  EXPECT_EQ(during.exit_status, 1);
+  EXPECT_THAT(during.output + during.errors, HasSubstr("'Desk' was not updated: "));
+  EXPECT_THAT(during.output + during.errors, HasSubstr("is open in docent author"));
+  kill(author, SIGKILL);  // A session that ended so leaves the file, but not the lock.
+  int status = 0;
+  waitpid(author, &status, 0);
+  const app::Outcome after =
+      app::RunDocent({"maps", "pull", "--library", (folder_ / "b").string(), "--hub", Url()});
+  EXPECT_EQ(after.exit_status, 0) << after.output << after.errors;
+  EXPECT_EQ(TextsOn("b"), "Hello;from a;");
+}
+
+TEST(SessionLock, SessionsShareItAndTheLastOneRemovesTheFile) {
+  const TemporaryFolder folder;
+  const std::filesystem::path library = folder / "m.docent";
+  {
+    const SessionLock first(library, SessionLockKind::kSession);
+    {
+      const SessionLock second(library, SessionLockKind::kSession);
+      EXPECT_THROW(SessionLock(library, SessionLockKind::kReplace), LibraryInSession);
+    }
+    EXPECT_THROW(SessionLock(library, SessionLockKind::kReplace), LibraryInSession);
+  }
+  EXPECT_EQ(FilesIn(folder.path()), "");
+  { const SessionLock replacing(library, SessionLockKind::kReplace); }
+  EXPECT_EQ(FilesIn(folder.path()), "");
+}
+
+}  // namespace
+}  // namespace docent::maps

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/hub/sync_state.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "tests/hub/hub_samples.h"
+#include "tests/hub/private_server.h"
+
+// The file beside a library that says what it and its hub have in common, written by somebody else.
+namespace docent::maps {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class HubState : public WithHubServer {
+ protected:
+  void AddSign(const std::string& device, const std::string& id, const std::string& text) {
+    Library library = OpenSampleLibrary(folder_ / device);
+    EditScene(&library, library.FindByName("Desk").key,
+              [&](content::Scene* scene) { scene->entities.push_back(SampleSignpost(id, text)); });
+  }
+  // All texts of all maps.
+  std::string AllTexts(const std::string& device) {
+    const Library library = OpenSampleLibrary(folder_ / device);
+    EXPECT_THAT(library.Verify(), IsEmpty());
+    std::string texts;
+    for (const MapInfo& info : library.List()) texts += TextsIn(library, info.key) + " ";
+    return texts;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(HubState, ADamagedOrHostileFileCostsNoMap) {
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    AddSampleMap(&a, "Desk", 7);
+    AddSampleMap(&a, "Hall", 8);
+  }
+  Push(SampleSync(Url(), folder_ / "a"));
+  Pull(SampleSync(Url(), folder_ / "b"));
+  AddSign("b", "sign-2", "theirs");
+  Push(SampleSync(Url(), folder_ / "b"));
+  AddSign("a", "sign-3", "mine");
+  const std::vector<std::string> attacks = {
+      "",  // No database at all.
+      "PRAGMA application_id = 1",
+      "PRAGMA user_version = 99",
+      "DELETE FROM hub",
+      "UPDATE hub SET id = 'x'; DROP TABLE links",
+      "DROP TABLE links",
+      "UPDATE links SET key = 0 WHERE name = 'Desk'",
+      "UPDATE links SET key = 77 WHERE name = 'Desk'",
+      "UPDATE links SET key = -key; UPDATE links SET key = CASE name WHEN 'Desk' THEN 2 ELSE 1 END",
+      "UPDATE links SET revision = 999",
+      "UPDATE links SET revision = -1",
+      "UPDATE links SET id = '../../etc/passwd' WHERE name = 'Desk'",
+      "UPDATE links SET structure = 'x'",
+      "UPDATE links SET scene = '{\"entities\": ['",
+      "UPDATE links SET scene = ''",
+      "UPDATE links SET name = char(10) || name",
+      "UPDATE links SET policy = 'none'",
+      "INSERT INTO tours VALUES ('T', 5, 'x')",
+      "INSERT OR IGNORE INTO received SELECT scene_hash, x'00' FROM links",
+      "DROP TABLE received; CREATE VIEW received AS SELECT 'x' AS hash, x'00' AS data",
+      "CREATE TRIGGER t AFTER INSERT ON received BEGIN DELETE FROM links; END"};
+  for (std::size_t i = 0; i < attacks.size(); ++i) {
+    SCOPED_TRACE(attacks[i]);
+    const std::string copy = "copy" + std::to_string(i);
+    const std::filesystem::path state = SyncStatePath(folder_ / copy);
+    std::filesystem::copy_file(folder_ / "a", folder_ / copy);
+    std::filesystem::copy_file(SyncStatePath(folder_ / "a"), state);
+    if (attacks[i].empty()) {
+      std::ofstream(state, std::ios::trunc) << "This is no database.";
+    } else {
+      const maps::Database database = maps::Database::OpenReadWrite(state, false);
+      database.Execute(attacks[i].c_str());
+    }
+    ErrorOf([&] { Pull(SampleSync(Url(), folder_ / copy)); });
+    EXPECT_THAT(AllTexts(copy), HasSubstr("mine"));
+    // Its owner moves it away, as the sentence says.
+    for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(state.string() + suffix);
+    EXPECT_EQ(ErrorOf([&] { Pull(SampleSync(Url(), folder_ / copy)); }), "");
+    EXPECT_THAT(AllTexts(copy), testing::AllOf(HasSubstr("mine"), HasSubstr("theirs")));
+  }
+}
+
+}  // namespace
+}  // namespace docent::maps
