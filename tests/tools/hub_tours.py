@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Devices tour a map of a hub while curators add signs to it, each as a process of the real program, and the network
-is cut for a while; then checks that all libraries agree, and that no frame was tracked slower while it was cut.
+is cut for a while; then checks that all libraries agree, and prints how long edits took to arrive, and tracking with and
+without the network.
 
     docent simulate room --output walk --duration 12
     hub_tours.py build/release/docent postgresql://postgres@127.0.0.1:5432/docent MAP walk
@@ -73,7 +74,7 @@ class Run:
         self.pushed = {}  # when each sign was on the hub
         self.seconds = {"open a library (maps list)": [], "read a map (maps export)": [],
                         "from the start of a tour until its camera runs": [], "push": [],
-                        "from a push to the library of a device": [], "the same, after the cut": []}
+                        "from a push to the library of a device": [], "the same, around the cut": []}
         self.frames = {"connected": [], "cut": []}  # tracking_ms of the images that were tracked
         self.lost = {"connected": 0, "cut": 0}      # number of the other images
         self.walk = self.slow_walk()
@@ -188,7 +189,7 @@ class Run:
                 seen.add(sign)
                 # The network was gone, or just back, when it was pushed or seen.
                 after_cut = self.pushed[sign] < self.cut_end() + 60 and now > self.cut_begin()
-                key = "the same, after the cut" if after_cut else "from a push to the library of a device"
+                key = "the same, around the cut" if after_cut else "from a push to the library of a device"
                 self.seconds[key].append(now - self.pushed[sign])
 
 
