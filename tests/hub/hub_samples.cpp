@@ -57,6 +57,13 @@ void EditScene(Library* library, std::uint64_t key, const std::function<void(con
   library->Save(record);
 }
 
+void AddSampleSignpost(const std::filesystem::path& library, const std::string& map, const std::string& name,
+                       const std::string& text) {
+  Library opened = OpenSampleLibrary(library);
+  EditScene(&opened, opened.FindByName(map).key,
+            [&](content::Scene* scene) { scene->entities.push_back(SampleSignpost(name, text)); });
+}
+
 void ExtendMap(Library* library, std::uint64_t key, const Eigen::Vector3d& place, std::uint64_t seed) {
   auto map = std::make_shared<engine::MapSnapshot>(*library->Load(key).snapshot);
   AddSampleKeyFrame(seed, place, map.get());

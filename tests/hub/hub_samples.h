@@ -26,6 +26,9 @@ void EditScene(Library* library, std::uint64_t key, const std::function<void(con
 content::Scene SceneIn(const Library& library, std::uint64_t key);
 // A signpost with a name and a text.
 content::Entity SampleSignpost(const std::string& name, const std::string& text);
+// Adds such a signpost to the map of this name in a library.
+void AddSampleSignpost(const std::filesystem::path& library, const std::string& map, const std::string& name,
+                       const std::string& text);
 // Adds a keyframe to a map at this place.
 void ExtendMap(Library* library, std::uint64_t key, const Eigen::Vector3d& place, std::uint64_t seed);
 // The names of the entities with their texts: "sign-1=Hello sign-2=Bye".

@@ -29,10 +29,8 @@ class HubSessionLock : public WithHubServer {
     Push(SampleSync(Url(), folder_ / "a"));
     Pull(SampleSync(Url(), folder_ / "b"));
   }
-  void AddSign(const std::string& device, const std::string& id, const std::string& text) {
-    Library library = OpenSampleLibrary(folder_ / device);
-    EditScene(&library, library.FindByName("Desk").key,
-              [&](content::Scene* scene) { scene->entities.push_back(SampleSignpost(id, text)); });
+  void AddSign(const std::string& device, const std::string& name, const std::string& text) {
+    AddSampleSignpost(folder_ / device, "Desk", name, text);
   }
   std::string TextsOn(const std::string& device) {
     const Library library = OpenSampleLibrary(folder_ / device);

@@ -17,10 +17,8 @@ using testing::IsEmpty;
 
 class HubState : public WithHubServer {
  protected:
-  void AddSign(const std::string& device, const std::string& id, const std::string& text) {
-    Library library = OpenSampleLibrary(folder_ / device);
-    EditScene(&library, library.FindByName("Desk").key,
-              [&](content::Scene* scene) { scene->entities.push_back(SampleSignpost(id, text)); });
+  void AddSign(const std::string& device, const std::string& name, const std::string& text) {
+    AddSampleSignpost(folder_ / device, "Desk", name, text);
   }
   // All texts of all maps.
   std::string AllTexts(const std::string& device) {
