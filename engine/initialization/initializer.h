@@ -26,7 +26,7 @@ struct InitializerOptions {
   // While the readout time of the shutter is unknown, depth has to be significant as well if the shutter
   // rolls for so long, seconds, in any of the four directions of the image: a turn of one radian per second
   // displaces the first and the last row against each other by ten pixels, which looks like depth. 60 % of
-  // the time between two images at 30 Hz. 0: a global shutter is assumed.
+  // the time between two images at 30 Hz; half as long around a known one. 0: a global shutter is assumed.
   double unknown_readout_s = 0.02;
   TwoViewOptions two_view;
   StartConfirmationOptions confirmation;
