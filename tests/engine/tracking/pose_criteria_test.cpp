@@ -81,6 +81,21 @@ TEST(PoseCriteria, AreStricterWithPhotometricToleranceAndWithoutMapping) {
   EXPECT_FALSE(PoseCriteria{ReadOnly()}.IsAccepted(pose, kStandard));
 }
 
+TEST(PoseCriteria, AcceptALargeResidualWithoutMappingIfTheInliersAreAConsensus) {
+  const PoseCriteria criteria{ReadOnly()};
+  MapTrackResult pose = SoundPose();
+  pose.inliers = 63;
+  pose.found = 64;
+  pose.attempted = 225;  // a ratio of 0.28, below good quality
+  pose.sigma = 1.8;
+  EXPECT_TRUE(criteria.IsAccepted(pose, kTolerant));
+  pose.found = 200;
+  EXPECT_FALSE(criteria.IsAccepted(pose, kTolerant)) << "most of the points found contradict the pose";
+  pose.found = 64;
+  pose.attempted = 350;
+  EXPECT_FALSE(criteria.IsAccepted(pose, kTolerant)) << "a small inlier ratio";
+}
+
 TEST(PoseCriteria, HoldTheTrackByFewTightInliersWithoutMappingOnly) {
   MapTrackResult pose = SoundPose();
   pose.attempted = 60;
