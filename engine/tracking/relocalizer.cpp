@@ -46,12 +46,13 @@ Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, Tracked
   };
   MapTrackResult result = track(MapTracker::Effort::kRecovery);
   const RejectionReason rejection = search.RejectionReasonOf(result, *search.map);
-  if (rejection != RejectionReason::kNone && !options_.build_maps) {
+  if (!options_.build_maps) {
     // With too few patches on the upper levels for a pose, the predicted pose may still be good.
     for (const auto effort : {MapTracker::Effort::kStandard, MapTracker::Effort::kWide}) {
-      if (search.criteria.HoldsTrack(result)) break;
+      if (rejection == RejectionReason::kNone || search.criteria.HoldsTrack(result)) break;
       result = track(effort);
     }
+    // So soon after the loss and so near, what suffices to hold the track needs no confirmation.
     if (search.criteria.HoldsTrack(result)) {
       *found = FoundPose{FoundPose::How::kNearby, search.map, search.map_key, result};
       return Attempt::kFound;

@@ -357,6 +357,35 @@ TEST(Tracker, ExtendsItsMapAgainAfterAShortLossDespiteOcclusion) {
   EXPECT_GT(lockstep.map()->keyframes.size(), keyframes + 1);
 }
 
+TEST(Tracker, ContinuesRightAfterAShortLossInAMapThatIsOnlyViewedDespiteOcclusion) {
+  const TrackedWalk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  constexpr int kFirst = 40, kLost = 55;
+  TrackerOptions options;
+  options.build_maps = false;
+  SomeMaps places;
+  places.Add(9, walk.map);
+  Tracker tracker(options, Camera(), 3);
+  tracker.SetMap(walk.map, 9);
+  const Eigen::Matrix4d world_from_map = WorldFromMap(walk.frames);
+  TrackedFrame tracked;
+  for (int i = kFirst; i <= kLost + 1; ++i) {
+    Frame frame = WalkFrame(i);
+    frame.image = frame.image.clone();
+    if (i >= kFirst + 5) CoverTiles(3, &frame.image);
+    if (i == kLost) frame.image.setTo(128);
+    tracked = tracker.Track(frame, &places);
+    if (i == kLost - 1) {
+      ASSERT_TRUE(HasPose(tracked.state));
+    }
+    if (i == kLost) {
+      ASSERT_EQ(tracked.state, TrackingState::kLost);
+    }
+  }
+  ASSERT_TRUE(HasPose(tracked.state));
+  EXPECT_LT(DistanceFromTruth(world_from_map, tracked.camera_from_map, WalkPose(kLost + 1)), 0.02);
+}
+
 TEST(Tracker, OffersTheNextFrameAfterAKeyFrameWasRefusedAndWaitsAfterItWasAccepted) {
   const TrackedWalk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
