@@ -11,7 +11,6 @@
 #include "content/gltf/json.h"
 
 namespace docent::content {
-namespace {
 
 // A file in memory, as libsndfile reads it.
 struct SoundBytes {
@@ -20,6 +19,13 @@ struct SoundBytes {
 
   sf_count_t size() const { return static_cast<sf_count_t>(bytes.size()); }
 };
+
+struct CloseSound {
+  void operator()(SNDFILE* file) const { sf_close(file); }
+};
+using SoundFile = std::unique_ptr<SNDFILE, CloseSound>;
+
+namespace {
 
 sf_count_t SoundLength(void* user) {
   return static_cast<SoundBytes*>(user)->size();
@@ -47,11 +53,6 @@ sf_count_t WriteNoSoundBytes(const void* /*source*/, sf_count_t /*count*/, void*
 sf_count_t SoundPosition(void* user) {
   return static_cast<SoundBytes*>(user)->position;
 }
-
-struct CloseSound {
-  void operator()(SNDFILE* file) const { sf_close(file); }
-};
-using SoundFile = std::unique_ptr<SNDFILE, CloseSound>;
 
 // Opens the file and checks its format.
 SoundFile OpenSound(const std::string& name, SoundBytes* bytes, SoundFormat* format) {
@@ -93,20 +94,49 @@ SoundFormat ReadSoundFormat(const std::string& file, std::span<const std::uint8_
   return format;
 }
 
+struct SoundReader::Impl {
+  std::string name;
+  SoundBytes source;
+  SoundFormat format;
+  SoundFile file;
+  std::uint64_t done = 0;  // Frames.
+};
+
+SoundReader::SoundReader(const std::string& file, std::span<const std::uint8_t> bytes)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->name = file;
+  impl_->source.bytes = bytes;
+  impl_->file = OpenSound(file, &impl_->source, &impl_->format);
+}
+
+SoundReader::~SoundReader() = default;
+SoundReader::SoundReader(SoundReader&& other) noexcept = default;
+SoundReader& SoundReader::operator=(SoundReader&& other) noexcept = default;
+
+const SoundFormat& SoundReader::format() const {
+  return impl_->format;
+}
+
+std::uint64_t SoundReader::Read(std::uint64_t frames, std::vector<std::int16_t>* samples) {
+  const std::uint64_t wanted = std::min(frames, impl_->format.frames - impl_->done);
+  if (wanted == 0) return 0;
+  const auto channels = static_cast<std::uint64_t>(impl_->format.channels);
+  const std::size_t before = samples->size();
+  samples->resize(before + wanted * channels);
+  const sf_count_t read =
+      sf_readf_short(impl_->file.get(), samples->data() + before, static_cast<sf_count_t>(wanted));
+  if (read != static_cast<sf_count_t>(wanted)) Refuse(impl_->name, "", "the sound ends too early.");
+  impl_->done += wanted;
+  return wanted;
+}
+
 SoundSamples DecodeSound(const std::string& file, std::span<const std::uint8_t> bytes) {
-  SoundBytes source{bytes};
+  SoundReader reader(file, bytes);
   SoundSamples sound;
-  const SoundFile opened = OpenSound(file, &source, &sound.format);
-  const auto channels = static_cast<std::uint64_t>(sound.format.channels);
+  sound.format = reader.format();
   // The header may promise more than the file has, so that memory is taken as samples come.
   constexpr std::uint64_t kFramesAtOnce = 65'536;
-  for (std::uint64_t done = 0; done < sound.format.frames;) {
-    const std::uint64_t wanted = std::min(kFramesAtOnce, sound.format.frames - done);
-    sound.samples.resize((done + wanted) * channels);
-    const sf_count_t read =
-        sf_readf_short(opened.get(), sound.samples.data() + done * channels, static_cast<sf_count_t>(wanted));
-    if (read != static_cast<sf_count_t>(wanted)) Refuse(file, "", "the sound ends too early.");
-    done += wanted;
+  while (reader.Read(kFramesAtOnce, &sound.samples) > 0) {
   }
   return sound;
 }

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "content/cards.h"
-#include "ui/label_board.h"
 #include "ui/label_layout.h"
 
 namespace docent::ui {
@@ -37,6 +36,20 @@ std::optional<CardTarget> TargetOf(const PlacedBox& box, const engine::CameraMod
   return target;
 }
 
+// As DrawLabels draws a label: its board, or a dot; empty where it is left out.
+std::optional<CardTarget> TargetOfLabel(const content::Label& label, const PlacedBox& box,
+                                        const engine::CameraModel& camera,
+                                        const engine::Rigid3& camera_from_map) {
+  const Eigen::Vector3d eye = camera_from_map.OriginInSource();
+  const auto foot = camera.Project(camera_from_map * LabelPose(label, eye).translation);
+  if (!foot || !camera.IsInside(*foot)) return std::nullopt;
+  if (!IsLabelFar(label, eye)) return TargetOf(box, camera, camera_from_map);
+  const auto dot = camera.Project(camera_from_map * label.anchor);
+  if (!dot || !camera.IsInside(*dot)) return std::nullopt;
+  const Eigen::Vector2d half = Eigen::Vector2d::Constant(0.75 * kLeastSize / camera.PixelAngle());
+  return CardTarget{{}, *dot - half, *dot + half};
+}
+
 double AreaOf(const CardTarget& target) {
   return (target.high - target.low).prod();
 }
@@ -52,8 +65,9 @@ void MoveLabels(const content::Scene& scene, const engine::CameraModel& camera,
   constexpr double kGap_px = 3;
   std::vector<Eigen::AlignedBox2d> boards = SignBoards(scene, camera, camera_from_map);
   std::size_t next = boards.size();
-  const auto is_label = [](const auto& target) {
-    return target.first->kind == content::Entity::Kind::kLabel;
+  const Eigen::Vector3d eye = camera_from_map.OriginInSource();
+  const auto is_label = [&eye](const auto& target) {
+    return target.first->kind == content::Entity::Kind::kLabel && !IsLabelFar(target.first->label, eye);
   };
   for (const auto& target : *targets) {
     if (is_label(target)) boards.emplace_back(target.second.low, target.second.high);
@@ -79,7 +93,9 @@ std::vector<CardTarget> FindCardTargets(const content::Scene& scene, const engin
     if (!content::HasCard(entity)) continue;
     const auto box = shapes->BoxOf(entity, eye);
     if (!box) continue;
-    auto target = TargetOf(*box, camera, camera_from_map);
+    auto target = entity.kind == content::Entity::Kind::kLabel
+                      ? TargetOfLabel(entity.label, *box, camera, camera_from_map)
+                      : TargetOf(*box, camera, camera_from_map);
     if (!target) continue;
     target->entity = entity.name;
     found.emplace_back(&entity, *std::move(target));
@@ -93,6 +109,19 @@ std::vector<CardTarget> FindCardTargets(const content::Scene& scene, const engin
   };
   std::stable_sort(targets.begin(), targets.end(),
                    [&](const CardTarget& a, const CardTarget& b) { return distance(a) < distance(b); });
+  return targets;
+}
+
+std::vector<CardTarget> MovedToBoards(std::vector<CardTarget> targets, std::span<const DrawnBoard> boards,
+                                      const Letterbox& box) {
+  for (CardTarget& target : targets) {
+    const auto drawn = std::find_if(boards.begin(), boards.end(), [&target](const DrawnBoard& board) {
+      return board.entity == target.entity;
+    });
+    if (drawn == boards.end()) continue;
+    target.low = box.ImageFromWindow(drawn->board.min());
+    target.high = box.ImageFromWindow(drawn->board.max());
+  }
   return targets;
 }
 

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "content/scene.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 #include "ui/entity_shapes.h"
+#include "ui/label_board.h"
+#include "ui/letterbox.h"
 #include "ui/renderer.h"
 
 namespace docent::ui {
@@ -15,6 +18,11 @@ namespace docent::ui {
 // less than a degree is left out. `shapes` is used as if it was drawn, without its EndFrame.
 std::vector<CardTarget> FindCardTargets(const content::Scene& scene, const engine::CameraModel& camera,
                                         const engine::Rigid3& camera_from_map, EntityShapes* shapes);
+
+// The targets with the boards of labels where they were drawn in a canvas: FindCardTargets does not know the
+// sizes of their texts and what else they keep clear of. `box`: where the image is in the canvas.
+std::vector<CardTarget> MovedToBoards(std::vector<CardTarget> targets, std::span<const DrawnBoard> boards,
+                                      const Letterbox& box);
 
 // The target that a person means by this pixel of the image, who may miss it by `margin_px`: of those that
 // contain it the smallest, else the nearest. Null for none.

@@ -95,17 +95,11 @@ void DrawLeader(const DrawnLabel& label, const Eigen::AlignedBox2d& board, doubl
 // far away to be read.
 struct PlacedLabel {
   DrawnLabel drawn;
-  const std::string* text = nullptr;
+  const std::string *entity = nullptr, *text = nullptr;
   TextStyle style;
   double opacity = 1;
   Eigen::AlignedBox2d board;
 };
-
-// Whether a reader is so far away that the board would be magnified beyond its due.
-bool IsFar(const content::Label& label, const Eigen::Vector3d& eye_in_map) {
-  const double distance = (eye_in_map - label.anchor - label.offset).norm();
-  return label.text_height * kMostMagnification < kLeastTextAngle * distance;
-}
 
 std::vector<PlacedLabel> LabelsInView(const content::Scene& scene, const LabelView& view, Canvas* canvas) {
   std::vector<PlacedLabel> labels;
@@ -118,10 +112,11 @@ std::vector<PlacedLabel> LabelsInView(const content::Scene& scene, const LabelVi
     if (!drawn) continue;
     PlacedLabel label;
     label.drawn = *drawn;
+    label.entity = &entity.name;
     label.text = &content::ShownText(entity, view.language);
     label.style = LabelStyle(drawn->text_px);
     label.opacity = entity.hidden ? kFaintOpacity : 1;
-    if (!IsFar(entity.label, eye)) {
+    if (!IsLabelFar(entity.label, eye)) {
       const Eigen::Vector2d size = canvas->Measure(*label.text, label.style);
       const Eigen::Vector2d padding = drawn->text_px * Eigen::Vector2d(kPaddingX, kPaddingY);
       label.board.min() =
@@ -150,6 +145,11 @@ void MoveApart(const Canvas& canvas, std::vector<Eigen::AlignedBox2d> boards,
 }
 
 }  // namespace
+
+bool IsLabelFar(const content::Label& label, const Eigen::Vector3d& eye_in_map) {
+  const double distance = (eye_in_map - label.anchor - label.offset).norm();
+  return label.text_height * kMostMagnification < kLeastTextAngle * distance;
+}
 
 engine::Sim3 LabelPose(const content::Label& label, const Eigen::Vector3d& eye_in_map) {
   content::Signpost board;
@@ -204,7 +204,7 @@ std::vector<Eigen::AlignedBox2d> SignBoards(const content::Scene& scene, const e
   return boards;
 }
 
-void DrawLabels(const content::Scene& scene, const LabelView& view, Canvas* canvas) {
+std::vector<DrawnBoard> DrawLabels(const content::Scene& scene, const LabelView& view, Canvas* canvas) {
   std::vector<PlacedLabel> labels = LabelsInView(scene, view, canvas);
   std::vector<Eigen::AlignedBox2d> signs = SignBoards(scene, view.camera, view.camera_from_map);
   for (Eigen::AlignedBox2d& sign : signs)
@@ -213,13 +213,16 @@ void DrawLabels(const content::Scene& scene, const LabelView& view, Canvas* canv
   signs.insert(signs.end(), view.taken.begin(), view.taken.end());
   MoveApart(*canvas, std::move(signs), &labels);
   for (const PlacedLabel& label : labels) DrawLeader(label.drawn, label.board, label.opacity, canvas);
+  std::vector<DrawnBoard> boards;
   for (const PlacedLabel& label : labels) {
     if (label.board.isEmpty()) continue;
+    boards.push_back({*label.entity, label.board});
     const double text_px = label.drawn.text_px;
     canvas->Box(label.board.min(), label.board.max(), 0.25 * text_px, Dimmed(theme::kHeadsUp, label.opacity));
     canvas->Text(*label.text, label.style,
                  {label.board.center().x(), label.board.min().y() + text_px * kPaddingY}, 0.5, label.opacity);
   }
+  return boards;
 }
 
 }  // namespace docent::ui

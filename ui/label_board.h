@@ -43,9 +43,19 @@ struct LabelView {
 std::vector<Eigen::AlignedBox2d> SignBoards(const content::Scene& scene, const engine::CameraModel& camera,
                                             const engine::Rigid3& camera_from_map);
 
-// Draws all labels of a scene that are not hidden. Boards that would cover each other are moved apart, at the
-// ends of their leader lines. A label whose board is outside of the image is left out; one so far away that
-// its board would have to be magnified more than fourfold to be read is shown as a dot.
-void DrawLabels(const content::Scene& scene, const LabelView& view, Canvas* canvas);
+// Whether a reader is so far away that only the point is shown that the label is about, and not its board,
+// which would have to be magnified more than fourfold to be read.
+bool IsLabelFar(const content::Label& label, const Eigen::Vector3d& eye_in_map);
+
+// A label's board as it was drawn.
+struct DrawnBoard {
+  std::string entity;         // The label's name.
+  Eigen::AlignedBox2d board;  // Pixels of the canvas.
+};
+
+// Draws all labels of a scene that are not hidden, and returns their boards. Boards that would cover each
+// other are moved apart, at the ends of their leader lines. A label whose board is outside of the image is
+// left out; one that is far away (IsLabelFar) is shown as a dot.
+std::vector<DrawnBoard> DrawLabels(const content::Scene& scene, const LabelView& view, Canvas* canvas);
 
 }  // namespace docent::ui

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "ui/canvas.h"
+#include "ui/card_targets.h"
 #include "ui/card_view.h"
 #include "ui/content_layer.h"
 #include "ui/figures.h"
@@ -65,24 +66,30 @@ struct Renderer::Impl {
   }
 
   // Draws labels and heads-up display into a canvas that shows the image in this part of it.
-  void DrawTexts(const View& view, const HeadsUpStyle& style, const Letterbox& box, Canvas* target) const {
+  void DrawTexts(const View& view, const HeadsUpStyle& style, const Letterbox& box, Canvas* target) {
+    card_targets.clear();
     const bool has_card = view.overlay.visitor && view.overlay.visitor->card;
     const double lowest = target->height_px() - 12 * style.unit_px - style.bottom_px;
     const Eigen::AlignedBox2d caption =
         SentencePanel(view.overlay.caption, kCaptionUnits, lowest, style.unit_px, target);
     HeadsUpStyle above = style;
     if (!caption.isEmpty()) above.bottom_px += lowest - caption.min().y() + 6 * style.unit_px;
+    std::vector<DrawnBoard> boards;
     const engine::Rigid3* const from = DrawnFrom(view);
     if (from != nullptr && view.scene != nullptr) {
       std::vector<Eigen::AlignedBox2d> taken;
       if (view.overlay.visitor && !has_card) taken = TakenByVisitorDisplay(view, above, target);
       if (!caption.isEmpty() && !has_card) taken.push_back(caption);
-      DrawLabels(*view.scene, {*view.camera, *from, box, language, view.faint, taken}, target);
+      boards = DrawLabels(*view.scene, {*view.camera, *from, box, language, view.faint, taken}, target);
     }
+    if (view.overlay.visitor) card_targets = MovedToBoards(view.overlay.visitor->targets, boards, box);
     if (has_card) return DrawCardWithTexts(view, style, target);
     DrawInsetText(view, style, box, target);
     DrawSentence(view.overlay.caption, kCaptionUnits, lowest, style.unit_px, target);
-    DrawHeadsUp(view, above, target);
+    if (!view.overlay.visitor || boards.empty()) return DrawHeadsUp(view, above, target);
+    View moved = view;
+    moved.overlay.visitor->targets = card_targets;
+    DrawHeadsUp(moved, above, target);
   }
 
   // A card covers the other texts, except those of sounds and faults.
@@ -156,6 +163,7 @@ struct Renderer::Impl {
   ContentLayer content;
   ImageTarget inset_image;
   std::unique_ptr<ContentLayer> inset_content;  // Made for the first inset with content.
+  std::vector<CardTarget> card_targets;
   CardModel card_model;
   GLuint card_texture = 0;
   VideoExposure exposure;
@@ -244,6 +252,10 @@ void Renderer::PresentWithHeadsUp(const View& view, const WindowPart& part, cons
       FitImage(std::max(1, image_width), std::max(1, image_height), part.width_px, part.height_px), &canvas);
   glViewport(part.x, part.window_height_px - part.y - part.height_px, part.width_px, part.height_px);
   canvas.End();
+}
+
+const std::vector<CardTarget>& Renderer::card_targets() const {
+  return impl_->card_targets;
 }
 
 void Renderer::ReadBack(cv::Mat* image) {

@@ -73,6 +73,8 @@ struct VisitorDisplay {
   // without.
   std::optional<double> dwell;
   std::optional<Card> card;  // The one that is open.
+  // Whether the visitor is asked by `sentence` if a tour that was left goes on; the menu has the answers.
+  bool asks_to_continue = false;
   // The choices of the menu while it is open, and the one that is chosen by the next long press.
   std::vector<std::string> menu;
   std::size_t chosen = 0;        // Index in `menu`.
@@ -179,6 +181,9 @@ class Renderer {
   // heads-up display at the window's resolution, whatever that of the camera is; the image should have been
   // drawn without it.
   void PresentWithHeadsUp(const View& view, const WindowPart& part, const HeadsUpStyle& style);
+  // What had a card in the heads-up display that was drawn last, with the boards of labels where they were
+  // drawn. Valid until the next one is drawn.
+  const std::vector<CardTarget>& card_targets() const;
   // Reads back the last drawn image as CV_8UC3 (BGR). *image's memory is reused if it fits.
   void ReadBack(cv::Mat* image);
   // The same with the view's heads-up display, which the drawn image shall not have. The drawn image is not

@@ -176,6 +176,8 @@ class GuideWindow {
     VisitorControls::Seen seen;
     seen.frame = large();
     seen.width_px = size.x();
+    // With a display on the head, nothing is touched.
+    if (!request_.display) seen.targets = renderer_.card_targets();
     seen.height_px = size.y();
     seen.style = VisitorStyle();
     seen.pixels_per_unit = size.x() / std::max(1.0, layout.image.width);

@@ -57,7 +57,7 @@ maps::Tour FindTour(const maps::Library& library, const std::string& name) {
 Route RouteOf(const maps::Library& library, const maps::Tour& tour) {
   const std::vector<maps::MapCopy> copies = maps::FindCopies(library);
   const auto replaced = maps::ReplacedByCopies(copies);
-  const auto names = maps::NamesForVisitors(copies);
+  const auto names = maps::NamesForVisitors(library.List(), copies);
   const auto shown = [&](std::uint64_t key) {
     const auto copy = replaced.find(key);
     return copy == replaced.end() ? key : copy->second;

@@ -218,7 +218,7 @@ void VisitorControls::Touch(const Eigen::Vector2d& point_px) {
   // Half a fingertip beside a thing is meant for it.
   const double margin_px = 0.5 * seen_.style.target_px / seen_.box.scale;
   const ui::CardTarget* const target =
-      ui::TargetAt(shown.visitor->targets, seen_.box.ImageFromWindow(point_px), margin_px);
+      ui::TargetAt(seen_.targets, seen_.box.ImageFromWindow(point_px), margin_px);
   if (target != nullptr) Step(GuideVisitor::Step::kOpen, target->entity);
 }
 

@@ -40,6 +40,8 @@ class VisitorControls {
     ui::Letterbox box;                        // Where its image is.
     ui::Area inset;                           // The other camera's image; empty without one.
     int width_px = 1, height_px = 1;
+    // What has a card, where it was drawn in the image.
+    std::vector<ui::CardTarget> targets;
     ui::HeadsUpStyle style;
     double pixels_per_unit = 1;  // Of positions in ui::InputEvent.
   };

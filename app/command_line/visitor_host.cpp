@@ -20,7 +20,7 @@ std::vector<std::string> PlaceNames(const GuideRequest& request) {
   } else if (request.library != nullptr) {
     const std::vector<maps::MapCopy> copies = maps::FindCopies(*request.library);
     const auto replaced = maps::ReplacedByCopies(copies);
-    const auto told = maps::NamesForVisitors(copies);
+    const auto told = maps::NamesForVisitors(request.library->List(), copies);
     for (const maps::MapInfo& map : request.library->List()) {
       if (replaced.contains(map.key)) continue;
       const auto other = told.find(map.name);

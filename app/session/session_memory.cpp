@@ -20,7 +20,7 @@ void SessionMemory::Open() {
       state_.AddEvent(state_.LastTime(), "warning", maps::TextOf(copy));
   } else {
     replaced_ = maps::ReplacedByCopies(copies);
-    names_for_visitors_ = maps::NamesForVisitors(copies);
+    names_for_visitors_ = maps::NamesForVisitors(library_->List(), copies);
     for (const auto& [older, newer] : replaced_) paging.left_out.push_back(older);
   }
   for (const maps::MapInfo& info : library_->List()) {

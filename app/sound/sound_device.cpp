@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/sound/sound_device.h"
 
+#include <array>
+#include <cstdint>
+#include <iterator>
+#include <utility>
+#include <vector>
+
 #include "engine/base/error.h"
 
 #ifdef DOCENT_HAS_OPENAL
@@ -12,20 +18,69 @@ namespace docent::app {
 
 #ifdef DOCENT_HAS_OPENAL
 
+namespace {
+
+// The first piece is short, so that a sound begins at once. The others last for longer than the longest pause
+// between two updates on a slow machine.
+constexpr double kFirstPiece_s = 0.1, kPiece_s = 0.75;
+constexpr std::size_t kPieces = 4;
+
+}  // namespace
+
 struct SoundDevice::Impl {
+  // A sound whose next pieces wait in the device.
   struct Playing {
-    ALuint source = 0, buffer = 0;
+    explicit Playing(std::shared_ptr<const content::Asset> played)
+        : file(std::move(played)), reader(file->name, file->bytes) {}
+
+    std::shared_ptr<const content::Asset> file;  // The reader reads from it.
+    content::SoundReader reader;
+    ALuint source = 0;
+    std::array<ALuint, kPieces> buffers = {};
+    std::vector<ALuint> unused;  // Of the buffers.
+    bool is_read = false;        // To its end.
   };
 
-  void Remove(const Playing& ended) {
+  static void Remove(const Playing& ended) {
     alSourceStop(ended.source);
     alDeleteSources(1, &ended.source);
-    alDeleteBuffers(1, &ended.buffer);
+    alDeleteBuffers(static_cast<ALsizei>(kPieces), ended.buffers.data());
+  }
+  // Gives the device one more piece.
+  void Queue(double seconds, Playing* sound) {
+    const content::SoundFormat& format = sound->reader.format();
+    samples.clear();
+    const auto frames = static_cast<std::uint64_t>(seconds * format.rate);
+    if (sound->reader.Read(frames, &samples) == 0) {
+      sound->is_read = true;
+      return;
+    }
+    const ALuint buffer = sound->unused.back();
+    sound->unused.pop_back();
+    alBufferData(buffer, format.channels == 2 ? AL_FORMAT_STEREO16 : AL_FORMAT_MONO16, samples.data(),
+                 static_cast<ALsizei>(samples.size() * sizeof(std::int16_t)), format.rate);
+    alSourceQueueBuffers(sound->source, 1, &buffer);
+  }
+  // Takes back the pieces that were heard, and gives new ones. False when the sound has ended.
+  bool Refill(Playing* sound) {
+    ALint state = AL_PLAYING, heard = 0;
+    alGetSourcei(sound->source, AL_SOURCE_STATE, &state);
+    for (alGetSourcei(sound->source, AL_BUFFERS_PROCESSED, &heard); heard > 0; --heard) {
+      ALuint buffer = 0;
+      alSourceUnqueueBuffers(sound->source, 1, &buffer);
+      sound->unused.push_back(buffer);
+    }
+    while (!sound->is_read && !sound->unused.empty()) Queue(kPiece_s, sound);
+    if (sound->unused.size() == kPieces) return false;
+    // All pieces were heard before new ones came.
+    if (state != AL_PLAYING) alSourcePlay(sound->source);
+    return true;
   }
 
   ALCdevice* device = nullptr;
   ALCcontext* context = nullptr;
   std::map<SoundDirector::Key, Playing> playing;
+  std::vector<std::int16_t> samples;
 };
 
 SoundDevice::SoundDevice() : impl_(std::make_unique<Impl>()) {
@@ -46,22 +101,23 @@ SoundDevice::~SoundDevice() {
   alcCloseDevice(impl_->device);
 }
 
-void SoundDevice::Start(const SoundDirector::Key& key, const content::SoundSamples& sound) {
+void SoundDevice::Start(const SoundDirector::Key& key, const std::shared_ptr<const content::Asset>& file) {
   Stop(key);
+  Impl::Playing playing(file);
   alGetError();  // Forgets an earlier one.
-  Impl::Playing playing;
-  alGenBuffers(1, &playing.buffer);
+  alGenBuffers(static_cast<ALsizei>(kPieces), playing.buffers.data());
   alGenSources(1, &playing.source);
-  alBufferData(playing.buffer, sound.format.channels == 2 ? AL_FORMAT_STEREO16 : AL_FORMAT_MONO16,
-               sound.samples.data(), static_cast<ALsizei>(sound.samples.size() * sizeof(std::int16_t)),
-               sound.format.rate);
-  alSourcei(playing.source, AL_BUFFER, static_cast<ALint>(playing.buffer));
-  alSourcePlay(playing.source);
-  if (alGetError() != AL_NO_ERROR) {
-    impl_->Remove(playing);
-    throw Error("the sound device does not play a sound");
+  playing.unused.assign(playing.buffers.begin(), playing.buffers.end());
+  try {
+    impl_->Queue(kFirstPiece_s, &playing);
+    alSourcePlay(playing.source);
+    impl_->Refill(&playing);
+    if (alGetError() != AL_NO_ERROR) throw Error("the sound device does not play a sound");
+  } catch (const Error&) {
+    Impl::Remove(playing);
+    throw;
   }
-  impl_->playing.emplace(key, playing);
+  impl_->playing.emplace(key, std::move(playing));
 }
 
 void SoundDevice::Stop(const SoundDirector::Key& key) {
@@ -71,14 +127,23 @@ void SoundDevice::Stop(const SoundDirector::Key& key) {
   impl_->playing.erase(found);
 }
 
-void SoundDevice::RemoveEnded() {
-  std::erase_if(impl_->playing, [this](const auto& sound) {
-    ALint state = AL_STOPPED;
-    alGetSourcei(sound.second.source, AL_SOURCE_STATE, &state);
-    if (state == AL_PLAYING) return false;
-    impl_->Remove(sound.second);
-    return true;
-  });
+void SoundDevice::Update() {
+  for (auto sound = impl_->playing.begin(); sound != impl_->playing.end();) {
+    bool goes_on = false;
+    try {
+      goes_on = impl_->Refill(&sound->second);
+    } catch (const Error&) {
+      Impl::Remove(sound->second);
+      impl_->playing.erase(sound);
+      throw;
+    }
+    if (!goes_on) Impl::Remove(sound->second);
+    sound = goes_on ? std::next(sound) : impl_->playing.erase(sound);
+  }
+}
+
+bool SoundDevice::is_playing() const {
+  return !impl_->playing.empty();
 }
 
 #else
@@ -89,9 +154,12 @@ SoundDevice::SoundDevice() {
   throw Error("this program was built without OpenAL");
 }
 SoundDevice::~SoundDevice() = default;
-void SoundDevice::Start(const SoundDirector::Key&, const content::SoundSamples&) {}
+void SoundDevice::Start(const SoundDirector::Key&, const std::shared_ptr<const content::Asset>&) {}
 void SoundDevice::Stop(const SoundDirector::Key&) {}
-void SoundDevice::RemoveEnded() {}
+void SoundDevice::Update() {}
+bool SoundDevice::is_playing() const {
+  return false;
+}
 
 #endif
 

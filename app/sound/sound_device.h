@@ -18,12 +18,15 @@ class SoundDevice {
   SoundDevice(const SoundDevice&) = delete;
   SoundDevice& operator=(const SoundDevice&) = delete;
 
-  // Throws Error when the device does not take the samples.
-  void Start(const SoundDirector::Key& key, const content::SoundSamples& sound);
+  // Plays a sound file, which is decoded shortly before it is heard. Throws Error when the file is damaged,
+  // or the device does not take its samples.
+  void Start(const SoundDirector::Key& key, const std::shared_ptr<const content::Asset>& file);
   // Nothing happens if it does not play.
   void Stop(const SoundDirector::Key& key);
-  // Forgets sounds that have ended.
-  void RemoveEnded();
+  // Decodes what is heard next, and forgets sounds that have ended. Is to be called at least once a second.
+  // Throws Error when a file turns out to be damaged; its sound ends.
+  void Update();
+  bool is_playing() const;
 
  private:
   struct Impl;

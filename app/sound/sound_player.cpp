@@ -12,7 +12,7 @@ namespace docent::app {
 namespace {
 
 constexpr std::size_t kMostOrders = 64;
-constexpr auto kWait = std::chrono::milliseconds(500);  // Between two looks for sounds that have ended.
+constexpr auto kWait = std::chrono::milliseconds(250);  // Between two looks for what is to be decoded.
 
 }  // namespace
 
@@ -57,9 +57,9 @@ void SoundPlayer::Run(const std::stop_token& stop) {
   bool failed = false;
   while (!stop.stop_requested()) {
     const auto orders = Next(stop);
-    if (device) device->RemoveEnded();
-    if (!orders || failed) continue;
     try {
+      if (device) device->Update();
+      if (!orders || failed) continue;
       if (!device && !orders->start.empty()) {
         failed = true;
         device = std::make_unique<SoundDevice>();
@@ -67,8 +67,7 @@ void SoundPlayer::Run(const std::stop_token& stop) {
       }
       if (!device) continue;
       for (const SoundDirector::Key& key : orders->stop) device->Stop(key);
-      for (const auto& [key, asset] : orders->start)
-        device->Start(key, content::DecodeSound(asset->name, asset->bytes));
+      for (const auto& [key, asset] : orders->start) device->Start(key, asset);
     } catch (const Error& error) {
       Report(error.what());
     }

@@ -13,9 +13,9 @@
 
 namespace docent::app {
 
-// Plays sounds with OpenAL on a thread of its own, which decodes them and opens the device when the first one
-// is to be played. Without OpenAL or a device nothing is heard, and a sentence says so once; everything else
-// goes on. Any thread; no call waits for the device.
+// Plays sounds with OpenAL on a thread of its own, which decodes them piece by piece and opens the device
+// when the first one is to be played. Without OpenAL or a device nothing is heard, and a sentence says so
+// once; everything else goes on. Any thread; no call waits for the device.
 class SoundPlayer {
  public:
   SoundPlayer();

@@ -30,13 +30,15 @@ bool AreCopies(const SeenMap& a, const SeenMap& b) {
   return shared > 0 && 2 * static_cast<std::size_t>(shared) >= few.size();
 }
 
-// The name without the number that FreeName has added.
+// The name without the number that FreeName has added. A year in brackets is none.
 std::string WithoutNumber(const std::string& name) {
   const std::size_t begin = name.rfind(" (");
   if (begin == std::string::npos || !name.ends_with(')')) return name;
   const std::string_view number = std::string_view(name).substr(begin + 2, name.size() - begin - 3);
-  const bool is_number = !number.empty() && std::all_of(number.begin(), number.end(),
-                                                        [](char c) { return c >= '0' && c <= '9'; });
+  constexpr std::size_t kMostDigits = 2;
+  const bool is_number =
+      !number.empty() && number.size() <= kMostDigits &&
+      std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
   return is_number ? name.substr(0, begin) : name;
 }
 
@@ -91,13 +93,27 @@ std::map<std::uint64_t, std::uint64_t> ReplacedByCopies(const std::vector<MapCop
   return replaced;
 }
 
-std::map<std::string, std::string> NamesForVisitors(const std::vector<MapCopy>& copies) {
+std::map<std::string, std::string> NamesForVisitors(const std::vector<MapInfo>& maps,
+                                                    const std::vector<MapCopy>& copies) {
   std::map<std::string, std::string> names;
   for (const MapCopy& copy : copies) {
     const std::string plain = WithoutNumber(copy.newer.name);
     if (plain == copy.newer.name) continue;
     if (copy.older.name == plain) names[plain] = copy.newer.name;
     if (copy.older.name == plain || WithoutNumber(copy.older.name) == plain) names[copy.newer.name] = plain;
+  }
+  const std::map<std::uint64_t, std::uint64_t> replaced = ReplacedByCopies(copies);
+  std::map<std::string, std::vector<std::string>> numbered;  // By the name without its number.
+  std::set<std::string> taken;
+  for (const MapInfo& map : maps) {
+    taken.insert(map.name);
+    const std::string plain = WithoutNumber(map.name);
+    if (plain != map.name && !replaced.contains(map.key) && !names.contains(map.name))
+      numbered[plain].push_back(map.name);
+  }
+  for (const auto& [name, shown] : names) taken.insert(shown);
+  for (const auto& [plain, of] : numbered) {
+    if (of.size() == 1 && !taken.contains(plain)) names[of.front()] = plain;
   }
   return names;
 }

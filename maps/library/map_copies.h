@@ -25,9 +25,10 @@ std::map<std::uint64_t, std::uint64_t> ReplacedByCopies(const std::vector<MapCop
 
 // What visitors read instead of the names that tell copies apart: importing a map twice gives the second one
 // the name of the first with a number, and the newest one is shown with that name alone. The first one gets
-// the name with the number, so that names stay unique. By the name in the library; names that stay are left
-// out.
-std::map<std::string, std::string> NamesForVisitors(const std::vector<MapCopy>& copies);
+// the name with the number, so that names stay unique. If the first one was removed, the name without the
+// number is free. `maps`: all of the library. By the name in the library; names that stay are left out.
+std::map<std::string, std::string> NamesForVisitors(const std::vector<MapInfo>& maps,
+                                                    const std::vector<MapCopy>& copies);
 
 // A sentence for a curator who should keep one of the two.
 std::string TextOf(const MapCopy& copy);

@@ -72,6 +72,20 @@ TEST(SoundAssets, DecodingGivesTheSamples) {
   }
 }
 
+TEST(SoundAssets, ReadingInPiecesGivesTheSameSamples) {
+  for (const int format : {SF_FORMAT_WAV | SF_FORMAT_PCM_16, SF_FORMAT_FLAC | SF_FORMAT_PCM_16,
+                           SF_FORMAT_OGG | SF_FORMAT_VORBIS}) {
+    const auto bytes = SoundBytesOf(format, 2, 22'050, 50'001);
+    SoundReader reader("bell", bytes);
+    EXPECT_EQ(reader.format().frames, 50'001u);
+    std::vector<std::int16_t> samples;
+    for (const std::uint64_t frames : {1u, 2205u, 40'000u}) EXPECT_EQ(reader.Read(frames, &samples), frames);
+    EXPECT_EQ(reader.Read(100'000, &samples), 7795u);
+    EXPECT_EQ(reader.Read(1, &samples), 0u);
+    EXPECT_EQ(samples, DecodeSound("bell", bytes).samples);
+  }
+}
+
 TEST(SoundAssets, WhatIsNoWholeSoundIsRefused) {
   const auto flac = SoundBytesOf(SF_FORMAT_FLAC | SF_FORMAT_PCM_16, 1, 8000, 80'000);
   EXPECT_THAT(ErrorOf([&] { ReadSoundFormat("a.txt", std::vector<std::uint8_t>(100, 'a')); }),

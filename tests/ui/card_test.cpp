@@ -49,6 +49,76 @@ TEST(CardTargets, CoverWhatIsSeenAndComeNearestToTheMiddleFirst) {
   EXPECT_LT((targets[0].high - Eigen::Vector2d(369.5, 289.5)).norm(), 1e-4);
 }
 
+// A label whose board stands this far above what it is about.
+content::Entity LabelAbove(const Eigen::Vector3d& anchor, double height) {
+  content::Entity entity;
+  entity.name = "label";
+  entity.kind = content::Entity::Kind::kLabel;
+  entity.label.text = "Restored in 1874";
+  entity.label.anchor = anchor;
+  entity.label.offset = {0, -height, 0};
+  entity.label.text_height = 0.1;
+  return entity;
+}
+
+std::vector<CardTarget> TargetsOf(const content::Entity& entity) {
+  content::Scene scene;
+  scene.entities.push_back(entity);
+  EntityShapes shapes;
+  return FindCardTargets(scene, kTargetCamera, {}, &shapes);
+}
+
+TEST(CardTargets, ALabelThatIsNotDrawnCannotBeOpenedAndAFarOneIsItsDot) {
+  EXPECT_EQ(TargetsOf(LabelAbove({0, 0.5, 2}, 0.4)).size(), 1u);
+  EXPECT_TRUE(TargetsOf(LabelAbove({0, 1.2, 2}, 0.1)).empty()) << "its board would begin below the image";
+  const auto far = TargetsOf(LabelAbove({3, 0, 20}, 2));
+  ASSERT_EQ(far.size(), 1u);
+  const Eigen::Vector2d dot(319.5 + 500 * 3 / 20.0, 239.5);
+  EXPECT_LT((0.5 * (far[0].low + far[0].high) - dot).norm(), 1e-6);
+  EXPECT_LT((far[0].high - far[0].low).norm(), 30);
+}
+
+class CardTargetsInAnImage : public OffscreenTest {};
+
+// What the visitor is told stands where the label would be.
+TEST_F(CardTargetsInAnImage, AMovedLabelIsOpenedAndMarkedWhereItIsDrawn) {
+  content::Scene scene;
+  scene.entities.push_back(LabelAbove({-0.8, 0, 2}, 0.7));
+  const cv::Mat grey(480, 640, CV_8UC3, cv::Scalar::all(128));
+  engine::TrackedFrame tracked = Tracked(grey);
+  View view;
+  view.tracked = &tracked;
+  view.camera = &kTargetCamera;
+  view.scene = &scene;
+  view.overlay.visitor.emplace();
+  view.overlay.visitor->place = "Ships of the third century";
+  view.overlay.visitor->targets = TargetsOf(scene.entities.front());
+  ASSERT_EQ(view.overlay.visitor->targets.size(), 1u);
+  const CardTarget before = view.overlay.visitor->targets.front();
+  Renderer renderer;
+  cv::Mat plain, marked;
+  renderer.Draw(view);
+  renderer.ReadBack(&plain);
+  ASSERT_EQ(renderer.card_targets().size(), 1u);
+  const CardTarget drawn = renderer.card_targets().front();
+  EXPECT_GT((drawn.low - before.low).norm(), 10);
+  const cv::Vec3b inside = plain.at<cv::Vec3b>(static_cast<int>(drawn.high.y()) - 4,
+                                               static_cast<int>(0.5 * (drawn.low.x() + drawn.high.x())));
+  EXPECT_LT(inside[0], 100) << "the board is darker than the image";
+  view.overlay.visitor->marked = 0;
+  renderer.Draw(view);
+  renderer.ReadBack(&marked);
+  cv::Mat difference, changed;
+  cv::absdiff(plain, marked, difference);
+  cv::cvtColor(difference, difference, cv::COLOR_BGR2GRAY);
+  cv::findNonZero(difference, changed);
+  const cv::Rect frame = cv::boundingRect(changed);
+  EXPECT_NEAR(frame.x, drawn.low.x(), 12);
+  EXPECT_NEAR(frame.y, drawn.low.y(), 12);
+  EXPECT_NEAR(frame.br().x, drawn.high.x(), 12);
+  EXPECT_NEAR(frame.br().y, drawn.high.y(), 12);
+}
+
 TEST(CardTargets, ATouchMeansTheSmallestThingItHitsElseTheNearestWithinAFingertip) {
   const std::vector<CardTarget> targets = {
       {"wall", {0, 0}, {400, 300}}, {"mask", {100, 100}, {140, 140}}, {"vase", {500, 100}, {540, 140}}};

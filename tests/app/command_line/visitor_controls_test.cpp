@@ -42,6 +42,7 @@ class VisitorAtControls : public ::testing::Test {
     seen.width_px = 1280;
     seen.height_px = 800;
     seen.box = ui::FitImage(640, 400, 1280, 800);
+    seen.targets = frame->visitor->targets;
     seen.style = {1.5, 0, 36};
     frame_ = frame;
     controls_->SetView(seen);

@@ -76,22 +76,29 @@ TEST_F(Copies, TheOlderOnesAreNeitherLoadedNorFound) {
 }
 
 TEST_F(Copies, HaveNoNumbersInTheirNamesForVisitors) {
-  const auto names = NamesForVisitors(FindCopies(library_));
+  const auto names = NamesForVisitors(library_.List(), FindCopies(library_));
   ASSERT_TRUE(names.contains("Desk (3)"));
   EXPECT_EQ(names.at("Desk (3)"), "Desk") << "the newest one is shown";
   EXPECT_EQ(names.at("Desk"), "Desk (3)") << "names stay unique";
   EXPECT_FALSE(names.contains("Door"));
 }
 
+std::vector<MapInfo> MapsNamed(const std::vector<std::string>& names) {
+  std::vector<MapInfo> maps;
+  for (const std::string& name : names) {
+    MapInfo& map = maps.emplace_back();
+    map.key = maps.size();
+    map.name = name;
+  }
+  return maps;
+}
+
 TEST(NamesForVisitors, LeaveAloneNamesOfOtherOrigin) {
   const auto copies = [](const std::string& older, const std::string& newer) {
-    MapCopy copy;
-    copy.older.name = older;
-    copy.newer.name = newer;
-    return NamesForVisitors({copy});
+    const std::vector<MapInfo> maps = MapsNamed({older, newer});
+    return NamesForVisitors(maps, {MapCopy{maps[0], maps[1]}});
   };
   EXPECT_THAT(copies("Ships (2)", "Ships"), IsEmpty());
-  EXPECT_THAT(copies("Ships", "Boats (2)"), IsEmpty());
   EXPECT_THAT(copies("Ships", "Ships (new)"), IsEmpty());
   EXPECT_THAT(copies("Ships", "Ships ()"), IsEmpty());
   EXPECT_THAT(copies("Ships (2)", "Ships (3)"), UnorderedElementsAre(Pair("Ships (3)", "Ships")))
@@ -99,6 +106,16 @@ TEST(NamesForVisitors, LeaveAloneNamesOfOtherOrigin) {
   EXPECT_THAT(copies("Paintings (1900)", "Paintings (1900) (2)"),
               UnorderedElementsAre(Pair("Paintings (1900) (2)", "Paintings (1900)"),
                                    Pair("Paintings (1900)", "Paintings (1900) (2)")));
+}
+
+TEST(NamesForVisitors, HaveNoNumberOfACopyWhoseOriginalIsGone) {
+  const auto names = [](const std::vector<std::string>& maps) {
+    return NamesForVisitors(MapsNamed(maps), {});
+  };
+  EXPECT_THAT(names({"Ships (2)", "Masks"}), UnorderedElementsAre(Pair("Ships (2)", "Ships")));
+  EXPECT_THAT(names({"Ships (2)", "Ships"}), IsEmpty()) << "they show different things";
+  EXPECT_THAT(names({"Room (1)", "Room (2)"}), IsEmpty()) << "visitors have to tell them apart";
+  EXPECT_THAT(names({"Paintings (1900)"}), IsEmpty());
 }
 
 TEST_F(Copies, AreNamedToTheCurator) {
