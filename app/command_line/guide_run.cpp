@@ -280,8 +280,8 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   // Visitors who watch a recording act in it.
   run.options.no_faster_than_times = !request_.may_write && !request_.headless;
   run.options.latency = [&state](Timestamp age) { state.age = age; };
+  if (AllRecorded(cameras_)) run.options.clock = &clock_;
   if (is_paced_) {
-    run.options.clock = &clock_;
     run.options.stays = true;
     run.options.idle = [this, &state, &show](const engine::TrackedFrame& tracked, bool at_end) {
       HandleIdle(tracked, at_end, show, &state);
@@ -301,6 +301,11 @@ void GuideRun::TogglePause() {
   } else {
     clock_.Stop();
   }
+}
+
+void GuideRun::ToggleHurry() {
+  if (!AllRecorded(cameras_)) return;
+  clock_.SetHurried(!clock_.IsHurried());
 }
 
 void GuideRun::HandleRefused(const std::string& reason, CameraState* state) {

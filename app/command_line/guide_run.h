@@ -53,6 +53,9 @@ class GuideRun {
   void DiscardChanges() { session_.DiscardChanges(); }
   // Pauses recordings that are played for an author, or lets them go on.
   void TogglePause();
+  // Plays recordings as fast as they can be tracked, or by their times again. Nothing happens with other
+  // cameras.
+  void ToggleHurry();
   std::vector<Session::MapState> Maps() const { return session_.Maps(); }
 
  private:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/session/play_clock.h"
 
+#include <algorithm>
 #include <chrono>
 
 namespace docent::app {
@@ -32,7 +33,21 @@ Timestamp PausableClock::Now() {
 void PausableClock::WaitUntil(Timestamp time, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   changed_.wait_until(lock, stop, std::chrono::steady_clock::time_point(time + lost_),
-                      [this] { return stopped_at_.has_value(); });
+                      [this] { return stopped_at_.has_value() || is_hurried_; });
+  if (is_hurried_ && !stopped_at_) lost_ -= std::max(Timestamp{}, time - NowLocked());
+}
+
+bool PausableClock::IsHurried() const {
+  const std::scoped_lock lock(mutex_);
+  return is_hurried_;
+}
+
+void PausableClock::SetHurried(bool is_hurried) {
+  {
+    const std::scoped_lock lock(mutex_);
+    is_hurried_ = is_hurried;
+  }
+  changed_.notify_all();
 }
 
 bool PausableClock::IsStopped() const {

@@ -21,9 +21,12 @@ class PlayClock {
   virtual void WaitUntil(Timestamp time, const std::stop_token& stop);
   // Whether the time stands still.
   virtual bool IsStopped() const { return false; }
+  // Whether what is waited for comes at once.
+  virtual bool IsHurried() const { return false; }
 };
 
-// A clock that a person can stop: then no time passes. Any thread.
+// A clock that a person can stop: then no time passes. When it hurries, it jumps to each time that is waited
+// for. Any thread.
 class PausableClock : public PlayClock {
  public:
   explicit PausableClock(bool is_stopped = false);
@@ -33,13 +36,17 @@ class PausableClock : public PlayClock {
   bool IsStopped() const override;
   void Stop();
   void Resume();
+  bool IsHurried() const override;
+  void SetHurried(bool is_hurried);
 
  private:
   Timestamp NowLocked() const;
 
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
-  Timestamp lost_{};                     // How long it was stopped, without the present stop.
+  // How long it was stopped, without the present stop, less what it has jumped.
+  Timestamp lost_{};
+  bool is_hurried_ = false;
   std::optional<Timestamp> stopped_at_;  // Of the machine's clock.
 };
 
@@ -54,6 +61,7 @@ class RealtimeClock {
   // Whether the next image is due already.
   bool IsLate(Timestamp time, Timestamp period) { return clock_->Now() > Due(time) + period; }
   bool IsStopped() const { return clock_->IsStopped(); }
+  bool IsHurried() const { return clock_->IsHurried(); }
   Timestamp Due(Timestamp time) const { return start_ + time; }
   Timestamp Now() { return clock_->Now(); }
 

@@ -24,6 +24,7 @@ class VisitorAtControls : public ::testing::Test {
     host.emit = [this](GuideVisitor guide) { given_.push_back(FormatCommand(guide)); };
     host.swap_cameras = [this] { given_.emplace_back("swap"); };
     host.toggle_full_screen = [this] { given_.emplace_back("full screen"); };
+    host.toggle_hurry = [this] { given_.emplace_back("hurry"); };
     host.language = "en";
     host.has_route = has_route;
     host.kiosk_code = kiosk_code;
@@ -188,7 +189,7 @@ TEST_F(VisitorAtControls, ACardIsTurnedByAFingerAndClosedByItsButton) {
 
 TEST_F(VisitorAtControls, AKioskHasNoKeysOfEngineersAndEndsByItsCode) {
   Make(true, "4711");
-  for (const char* key : {"c", "f11", "p", "d", "escape"}) Key(key);
+  for (const char* key : {"c", "f", "f11", "p", "d", "escape"}) Key(key);
   Key("q", Kind::kKey, true);
   EXPECT_THAT(Given(), IsEmpty());
   EXPECT_FALSE(Drawn().points);

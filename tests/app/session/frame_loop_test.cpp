@@ -317,6 +317,19 @@ TEST(FrameLoop, PausesWhileTheClockIsStoppedAndStaysAtTheLastImage) {
       << "commands are carried out meanwhile";
 }
 
+TEST(PausableClock, JumpsToWhatIsWaitedForWhileItHurries) {
+  PausableClock clock;
+  const Timestamp begin = clock.Now();
+  clock.SetHurried(true);
+  clock.WaitUntil(begin + std::chrono::hours(1), {});
+  EXPECT_GE(clock.Now() - begin, std::chrono::hours(1));
+  clock.SetHurried(false);
+  const Timestamp before = clock.Now();
+  clock.WaitUntil(before + std::chrono::milliseconds(20), {});
+  EXPECT_GE(clock.Now() - before, std::chrono::milliseconds(20)) << "it goes on from where it is";
+  EXPECT_LT(clock.Now() - begin, std::chrono::hours(2));
+}
+
 TEST(PausableClock, LosesTheTimeForWhichItIsStopped) {
   using std::chrono::milliseconds;
   PausableClock clock(true);
