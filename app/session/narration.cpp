@@ -80,8 +80,9 @@ std::vector<std::string> Narration::Update(const Seen& seen) {
   if (display.card && !display.card->text.empty() && display.card->text != card_)
     texts.push_back(display.card->text);
   card_ = display.card ? display.card->text : std::string();
-  if (sentence_.Settle(display.sentence, seen.seconds, kSentenceStays, kSentenceAgain))
-    texts.push_back(display.sentence);
+  // The end of a tour stands in both places.
+  const std::string sentence = display.sentence == display.route_line ? std::string() : display.sentence;
+  if (sentence_.Settle(sentence, seen.seconds, kSentenceStays, kSentenceAgain)) texts.push_back(sentence);
   if (route_.Settle(display.route_line, seen.seconds, kSentenceStays, kSentenceAgain))
     texts.push_back(display.route_line);
   const std::string way = seen.way != nullptr ? WayText(*seen.way) : std::string();

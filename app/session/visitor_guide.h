@@ -50,7 +50,7 @@ class VisitorGuide {
   ApproachWatch approach_;
   PlaceClaim claim_;
   std::vector<ui::KnownView> views_;  // See ui::VisitorDisplay.
-  std::optional<double> views_time_s_;
+  std::optional<double> views_time_s_, finished_s_;
   std::shared_ptr<const ShownFrame> last_with_pose_;
 };
 

@@ -49,6 +49,14 @@ TEST(Narration, SaysWhatToDoOnceWhileItStays) {
   EXPECT_THAT(listener.Hear(60), ElementsAre("Look around slowly."));
 }
 
+TEST(Narration, SaysTheEndOfATourOnce) {
+  Listener listener;
+  listener.display.sentence = listener.display.route_line = "The tour ends here.";
+  EXPECT_THAT(listener.Hear(8), ElementsAre("The tour ends here."));
+  listener.display.sentence.clear();
+  EXPECT_THAT(listener.Hear(60), IsEmpty());
+}
+
 TEST(Narration, ReadsEachPageOfACardAtOnceAndEachOpenedCardAnew) {
   Listener listener;
   listener.display.card.emplace().text = "First page.";

@@ -36,5 +36,28 @@ TEST(VisitorGuide, KeepsTheViewsOfALostVisitorWhileImagesAreSkipped) {
   EXPECT_EQ(views_at(40, false), none) << "now all places are listed";
 }
 
+TEST(VisitorGuide, SaysTheEndOfATourForAWhileInTheSentence) {
+  const auto simulation = Room(3);
+  Session session(Options(Pace::kLockstep, "Desk"), LensOf(*simulation), nullptr);
+  Route route;
+  route.stops = {{1, "Desk"}, {2, "Door"}};
+  RouteState state(route);
+  VisitorGuide guide(&session, {"Desk", "Door"}, VisitorStringsFor("en"), &state);
+  const auto sentence_at = [&](double seconds) {
+    const auto frame = std::make_shared<ShownFrame>();
+    frame->seconds = seconds;
+    frame->tracked.state = engine::TrackingState::kSixDof;
+    frame->tracked.map_key = 1;
+    frame->shown.map_name = "Desk";
+    guide.Guide(frame, simulation->camera());
+    return frame->visitor->sentence;
+  };
+  EXPECT_EQ(sentence_at(0), "");
+  ASSERT_TRUE(state.Skip());
+  EXPECT_EQ(sentence_at(1), "The tour ends here. You saw 1 of 2 stops.");
+  EXPECT_EQ(sentence_at(8), "The tour ends here. You saw 1 of 2 stops.");
+  EXPECT_EQ(sentence_at(10), "");
+}
+
 }  // namespace
 }  // namespace docent::app
