@@ -139,6 +139,13 @@ void DrawMenu(const VisitorDisplay& visitor, const HeadsUpStyle& style, Canvas* 
       canvas->Line({button.x + 0.28 * button.width, button.y + share * button.height},
                    {button.x + 0.72 * button.width, button.y + share * button.height}, 2.5 * unit, kTitle);
   }
+  if (!layout.choices.empty()) {
+    // What is behind the choices would be read between them.
+    const Area &first = layout.choices.front(), &last = layout.choices.back();
+    const double margin = 12 * unit;
+    canvas->Box({first.x - margin, first.y - margin}, {last.right() + margin, last.bottom() + margin},
+                16 * unit, theme::kPanel);
+  }
   for (std::size_t i = 0; i < layout.choices.size(); ++i) {
     const Area& area = layout.choices[i];
     canvas->Box({area.x, area.y}, {area.right(), area.bottom()}, 10 * unit,
