@@ -4,7 +4,8 @@
 
 The program runs for that share of every tenth of a second and is stopped for the rest, as a control group with
 a processor quota would do, once it has had time to start. A key is pressed every few seconds, and the time until its
-command stands in events.csv is measured. Needs Xvfb and xdotool. Images of a folder cost about what those of a camera
+command stands in events.csv is measured. The screen is captured meanwhile, and the images on it that differ from the
+one before are counted. Needs Xvfb, xdotool and ffmpeg. Images of a folder cost about what those of a camera
 do; a simulated camera costs more than the whole share, and a video has to be decoded as a whole.
 
     tests/tools/measure_slow_machine.py --docent build/release/docent --share 0.1 --seconds 60 --output slow \\
@@ -68,6 +69,25 @@ def press_keys(environment, events, seconds):
     return answers
 
 
+def watch_screen(display, size, seconds):
+    """Captures the screen; each line that is printed has the time of a image and what it looks like."""
+    return subprocess.Popen(
+        ["ffmpeg", "-loglevel", "error", "-f", "x11grab", "-framerate", "25", "-video_size", size, "-i", display, "-t",
+         str(seconds), "-vf", "scale=320:-2:flags=area,format=gray", "-fps_mode", "passthrough", "-f", "framemd5",
+         "-"], stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
+
+
+def describe_screen(printed, seconds):
+    """Says how often the image on the screen has changed."""
+    rows = [line.split(",") for line in printed.splitlines() if line and not line.startswith("#")]
+    base = next(line for line in printed.splitlines() if line.startswith("#tb 0:")).split(":")[1].split("/")
+    unit = int(base[0]) / int(base[1])
+    first = int(rows[0][1]) * unit
+    changes = [int(after[1]) * unit - first for before, after in zip(rows, rows[1:]) if before[5] != after[5]]
+    gaps = [after - before for before, after in zip([0] + changes, changes + [int(rows[-1][1]) * unit - first])]
+    return f"{len(changes) / seconds:.1f} images a second on the screen; from one to the next: {summarize(gaps)}"
+
+
 def summarize(seconds):
     if not seconds:
         return "none"
@@ -119,7 +139,9 @@ def main():
     slow = threading.Thread(target=throttle, args=(tour.pid, options.share, stop))
     slow.start()
     slow_from = time.monotonic() - begin
+    watched = watch_screen(":" + display, options.screen, options.seconds)
     answers = press_keys(environment, events, options.seconds)
+    seen = watched.communicate()[0]
     stop.set()
     slow.join()
     tour.send_signal(signal.SIGINT)
@@ -133,6 +155,7 @@ def main():
           summarize([a for a in answers if a is not None]))
     with (options.output / "frames.csv").open() as file:
         print("while slow:", describe_frames(list(csv.DictReader(file)), slow_from))
+    print("while slow:", describe_screen(seen, options.seconds))
     print("images:", camera["frames"], "dropped:", camera["dropped"], "tracking ms:", camera["tracking_ms"])
     print("latency ms:", camera["latency_ms"], "interval of drawn images ms:", camera.get("drawn_interval_ms"))
     print("\n".join(line for line in told if ",load," in line))
