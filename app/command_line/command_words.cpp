@@ -101,7 +101,10 @@ struct DoneWriter {
       case GuideVisitor::Step::kPress:
       case GuideVisitor::Step::kMark:
       case GuideVisitor::Step::kClose:
+      case GuideVisitor::Step::kContinue:
         break;
+      case GuideVisitor::Step::kRestart:
+        return "The tour begins anew.";
     }
     return "";
   }

@@ -17,8 +17,12 @@ void VisitKeeper::Add(const ShownFrame& frame, const RouteState* route) {
                     static_cast<std::uint32_t>(route->CountSeen()));
 }
 
-void VisitKeeper::Finish() {
+void VisitKeeper::Next() {
   if (auto ended = recorder_.Finish()) log_.Add(std::move(*ended));
+}
+
+void VisitKeeper::Finish() {
+  Next();
   log_.Close();
 }
 

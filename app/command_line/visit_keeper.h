@@ -18,6 +18,8 @@ class VisitKeeper {
 
   // A frame of the camera. `route`: how far the visitor has come; null without a tour.
   void Add(const ShownFrame& frame, const RouteState* route);
+  // Ends the visit; the next one begins with the next pose.
+  void Next();
   // Ends the last visit, and waits until its record is written. Throws Error when it is missing.
   void Finish();
   // Why a record was not written, as a sentence, once; empty otherwise.

@@ -15,7 +15,8 @@ constexpr auto kLongPress = std::chrono::milliseconds(800);  // Longer than a pr
 constexpr double kArrowTurn_rad = std::numbers::pi / 12;
 constexpr double kMaxTilt_rad = std::numbers::pi / 2;
 
-enum Choice : std::size_t { kChooseSkip, kChooseBack, kChooseStops, kChooseClose };
+enum Choice : std::size_t { kChooseSkip, kChooseBack, kChooseStops, kChooseAnew, kChooseClose };
+enum AnewChoice : std::size_t { kChooseContinue, kChooseRestart };
 
 }  // namespace
 
@@ -29,6 +30,19 @@ const ui::Card* VisitorControls::card() const {
 
 void VisitorControls::SetView(Seen seen) {
   seen_ = std::move(seen);
+  if (seen_.frame && seen_.frame->visitors_before != visitors_before_) {
+    visitors_before_ = seen_.frame->visitors_before;
+    CloseMenu();
+    lists_route_ = false;
+  }
+  const bool asks = seen_.frame && seen_.frame->visitor && seen_.frame->visitor->asks_to_continue;
+  if (std::exchange(is_asked_, asks) != asks) {
+    if (asks) {
+      OpenMenu(Menu::kAnew);
+    } else {
+      CloseMenu();
+    }
+  }
   const ui::Card* const open = card();
   const std::string entity = open != nullptr ? open->entity : std::string();
   if (entity == turned_entity_) return;
@@ -53,8 +67,7 @@ void VisitorControls::AddTo(ui::View* view) const {
   }
   visitor.lists_route = lists_route_;
   visitor.has_menu_button = host_.has_route;
-  if (menu_open_)
-    visitor.menu = {strings_.menu_skip, strings_.menu_back, strings_.menu_stops, strings_.menu_close};
+  visitor.menu = Choices();
   visitor.chosen = chosen_;
   if (visitor.card) visitor.card->turned_rad = turned_rad_;
 }
@@ -107,14 +120,16 @@ void VisitorControls::HandleKey(const ui::InputEvent& event, Clock::time_point n
   const std::string& key = event.key;
   if (key == "space") held_since_ = now;
   if (key == "enter") {
-    if (menu_open_) {
+    if (menu_ != Menu::kNone) {
       Choose(chosen_);
     } else {
       Press();
     }
   }
   if (key == "escape") {
-    if (menu_open_) {
+    if (menu_ == Menu::kAnew) {
+      Choose(kChooseContinue);
+    } else if (menu_ != Menu::kNone) {
       CloseMenu();
     } else if (card() != nullptr) {
       Step(GuideVisitor::Step::kClose);
@@ -122,7 +137,8 @@ void VisitorControls::HandleKey(const ui::InputEvent& event, Clock::time_point n
   }
   if (key == "left" || key == "right" || key == "up" || key == "down") HandleArrow(key);
   if (host_.has_route) {
-    if (key == "m") OpenMenu();
+    if (key == "m" && !is_asked_) OpenMenu(Menu::kSteps);
+    if (key == "r" && !is_asked_) OpenMenu(Menu::kAnew);
     if (key == "n") Step(GuideVisitor::Step::kSkip);
     if (key == "b") Step(GuideVisitor::Step::kBack);
     if (key == "l") lists_route_ = !lists_route_;
@@ -142,8 +158,8 @@ void VisitorControls::HandleEngineerKey(const std::string& key) {
 
 void VisitorControls::HandleArrow(const std::string& key) {
   const bool is_back = key == "left" || key == "up";
-  if (menu_open_) {
-    const std::size_t count = kChooseClose + 1;
+  if (menu_ != Menu::kNone) {
+    const std::size_t count = Choices().size();
     chosen_ = (chosen_ + (is_back ? count - 1 : 1)) % count;
     return;
   }
@@ -162,8 +178,8 @@ void VisitorControls::HandleArrow(const std::string& key) {
 
 void VisitorControls::Press() {
   changed_ = true;
-  if (menu_open_) {
-    chosen_ = (chosen_ + 1) % (kChooseClose + 1);
+  if (menu_ != Menu::kNone) {
+    chosen_ = (chosen_ + 1) % Choices().size();
     return;
   }
   Step(GuideVisitor::Step::kPress);
@@ -171,30 +187,55 @@ void VisitorControls::Press() {
 
 void VisitorControls::PressLong() {
   changed_ = true;
-  if (menu_open_) {
+  if (menu_ != Menu::kNone) {
     Choose(chosen_);
   } else if (host_.has_route) {
-    OpenMenu();
+    OpenMenu(Menu::kSteps);
   } else {
     Step(GuideVisitor::Step::kPress);
   }
 }
 
-void VisitorControls::OpenMenu() {
-  menu_open_ = true;
+void VisitorControls::OpenMenu(Menu menu) {
+  menu_ = menu;
   chosen_ = 0;
-}
-
-void VisitorControls::CloseMenu() {
-  menu_open_ = false;
   changed_ = true;
 }
 
+void VisitorControls::CloseMenu() {
+  menu_ = Menu::kNone;
+  changed_ = true;
+}
+
+std::vector<std::string> VisitorControls::Choices() const {
+  switch (menu_) {
+    case Menu::kNone:
+      break;
+    case Menu::kSteps:
+      return {strings_.menu_skip, strings_.menu_back, strings_.menu_stops, strings_.menu_anew,
+              strings_.menu_close};
+    case Menu::kAnew:
+      return {strings_.choose_continue, strings_.choose_restart};
+  }
+  return {};
+}
+
 void VisitorControls::Choose(std::size_t choice) {
+  const Menu menu = menu_;
   CloseMenu();
+  if (menu == Menu::kAnew) {
+    if (choice == kChooseRestart) {
+      Step(GuideVisitor::Step::kRestart);
+    } else if (is_asked_) {
+      Step(GuideVisitor::Step::kContinue);
+    }
+    return;
+  }
   if (choice == kChooseSkip) Step(GuideVisitor::Step::kSkip);
   if (choice == kChooseBack) Step(GuideVisitor::Step::kBack);
   if (choice == kChooseStops) lists_route_ = !lists_route_;
+  // Since everything that was seen is forgotten, the visitor is asked once more.
+  if (choice == kChooseAnew) OpenMenu(Menu::kAnew);
 }
 
 void VisitorControls::Touch(const Eigen::Vector2d& point_px) {
@@ -204,16 +245,16 @@ void VisitorControls::Touch(const Eigen::Vector2d& point_px) {
     return;
   }
   const ui::MenuLayout menu = ui::LayOutMenu(*shown.visitor, seen_.width_px, seen_.height_px, seen_.style);
-  if (menu_open_) {
+  if (menu_ != Menu::kNone) {
     for (std::size_t i = 0; i < menu.choices.size(); ++i) {
       if (menu.choices[i].Contains(point_px)) return Choose(i);
     }
-    return CloseMenu();
+    // A hand that takes up the device answers nothing.
+    return is_asked_ ? void() : CloseMenu();
   }
   if (card() != nullptr) return TouchCard(point_px);
   if (menu.button.Contains(point_px)) {
-    changed_ = true;
-    return OpenMenu();
+    return OpenMenu(Menu::kSteps);
   }
   if (seen_.inset.Contains(point_px)) return host_.swap_cameras();
   // Half a fingertip beside a thing is meant for it.

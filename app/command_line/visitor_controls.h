@@ -66,9 +66,12 @@ class VisitorControls {
   void TouchCard(const Eigen::Vector2d& point_px);
   void Press();
   void PressLong();
-  void OpenMenu();
+  // What the menu offers: what leads the visitor, or whether to begin anew.
+  enum class Menu { kNone, kSteps, kAnew };
+  void OpenMenu(Menu menu);
   void CloseMenu();
   void Choose(std::size_t choice);
+  std::vector<std::string> Choices() const;
   void Step(GuideVisitor::Step step, std::string name = {}) { host_.emit({step, std::move(name)}); }
   // The view with what AddTo adds.
   ui::Overlay Shown() const;
@@ -79,7 +82,9 @@ class VisitorControls {
   KioskLock kiosk_;
   Seen seen_;
   std::optional<Clock::time_point> held_since_;  // The button; empty once its long press was carried out.
-  bool menu_open_ = false;
+  Menu menu_ = Menu::kNone;
+  bool is_asked_ = false;    // By the program, and not by what was chosen in the menu.
+  int visitors_before_ = 0;  // See ShownFrame.
   std::size_t chosen_ = 0;
   std::string turned_entity_;  // Of the card whose model was turned.
   std::optional<Eigen::Vector2d> turned_rad_;

@@ -44,8 +44,14 @@ VisitorHost::VisitorHost(const GuideRequest& request, Session* session, std::siz
     speech_.emplace(strings_.language);
   }
   if (request.visit_log) visits_.emplace(*request.visit_log, request.tour);
-  constexpr double kIdle_s = 120;  // As VisitRecorder ends a visit.
-  if (!request.kiosk_code.empty()) idle_watch_.emplace(kIdle_s);
+  LeftTour::Times times;
+  if (!request.kiosk_code.empty()) {
+    times.left = 120;  // As VisitRecorder ends a visit.
+    left_tour_.emplace(times, false);
+  } else if (route_) {
+    // Who leads by gaze alone has nothing to answer with.
+    left_tour_.emplace(times, !request.gaze);
+  }
   for (std::size_t i = 0; i < cameras; ++i) Welcome(i);
 }
 
@@ -54,17 +60,40 @@ void VisitorHost::Welcome(std::size_t index) {
                            request_.language, request_.gaze);
 }
 
-void VisitorHost::ForgetVisitorWhoLeft(const ShownFrame& frame) {
+void VisitorHost::WatchForNextVisitor(const ShownFrame& frame) {
   const cv::Mat& image = frame.tracked.frame.image;
-  if (!idle_watch_ || image.empty() || !idle_watch_->Update(frame.seconds, image)) return;
+  if (!left_tour_ || image.empty()) return;
+  if (left_tour_->Update(frame.seconds, image, route_ && route_->is_begun())) {
+    const bool is_kiosk = !request_.kiosk_code.empty();
+    BeginAnew(frame.tracked.frame.time, is_kiosk ? "the device was left; the next visit begins"
+                                                 : "the device was left; the tour begins anew");
+  } else if (route_ && route_->HasReturned()) {
+    BeginAnew(frame.tracked.frame.time, "back at the first stop after the end; the tour begins anew");
+  }
+  // What an earlier visitor has opened would hide the question.
+  if (left_tour_->is_asking()) visitors_[0]->cards()->Do({GuideVisitor::Step::kClose, {}});
+}
+
+void VisitorHost::BeginAnew(Timestamp time, const std::string& why) {
+  ++visitors_before_;
+  if (left_tour_) left_tour_->Answer();
   if (request_.route) route_.emplace(*request_.route);
-  Welcome(0);
-  report_({frame.tracked.frame.time, "kiosk", "the device was left; the next visit begins"});
+  for (std::size_t i = 0; i < visitors_.size(); ++i) Welcome(i);
+  if (narration_) narration_.emplace(strings_);
+  if (visits_) visits_->Next();
+  report_({time, request_.kiosk_code.empty() ? "tour" : "kiosk", why});
+}
+
+void VisitorHost::AddQuestion(ShownFrame* frame) {
+  frame->visitors_before = visitors_before_;
+  if (!left_tour_ || !left_tour_->is_asking()) return;
+  frame->visitor->asks_to_continue = true;
+  frame->visitor->sentence = strings_.was_left;
 }
 
 void VisitorHost::Guide(std::size_t index, const engine::CameraModel& camera,
                         const std::shared_ptr<ShownFrame>& frame) {
-  if (index == 0) ForgetVisitorWhoLeft(*frame);
+  if (index == 0) WatchForNextVisitor(*frame);
   GuideAgain(index, camera, frame);
   if (index != 0 || !visits_) return;
   visits_->Add(*frame, route_ ? &*route_ : nullptr);
@@ -75,6 +104,7 @@ void VisitorHost::GuideAgain(std::size_t index, const engine::CameraModel& camer
                              const std::shared_ptr<ShownFrame>& frame) {
   const Timestamp time = frame->tracked.frame.time;
   visitors_[index]->Guide(frame, camera);
+  AddQuestion(frame.get());
   ReportCards(index, time);
   if (index == 0) Narrate(*frame, camera);
   ReportRoute(time);
@@ -87,6 +117,16 @@ bool VisitorHost::Lead(const Command& command, const engine::TrackedFrame& frame
   if (visitors_[index]->cards()->Do(*guide)) {
     report_({frame.frame.time, "command", FormatCommand(command)});
     ReportCards(index, frame.frame.time);
+    return true;
+  }
+  if (guide->step == GuideVisitor::Step::kRestart) {
+    report_({frame.frame.time, "command", FormatCommand(command)});
+    BeginAnew(frame.frame.time, "the visitor begins anew");
+    return true;
+  }
+  if (guide->step == GuideVisitor::Step::kContinue) {
+    if (left_tour_) left_tour_->Answer();
+    report_({frame.frame.time, "command", FormatCommand(command)});
     return true;
   }
   if (!route_) throw Error("there are no stops; use docent tour --tour NAME to be led along a tour");

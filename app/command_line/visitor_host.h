@@ -10,7 +10,7 @@
 
 #include "app/command_line/run_guide.h"
 #include "app/command_line/visit_keeper.h"
-#include "app/session/idle_watch.h"
+#include "app/session/left_tour.h"
 #include "app/session/narration.h"
 #include "app/session/visitor_guide.h"
 #include "app/sound/sound_director.h"
@@ -43,8 +43,11 @@ class VisitorHost {
 
  private:
   void Welcome(std::size_t index);
-  // The next visitor of a kiosk begins anew.
-  void ForgetVisitorWhoLeft(const ShownFrame& frame);
+  // Begins anew when the visitor has left the device, or has finished the tour and is back at its first stop.
+  void WatchForNextVisitor(const ShownFrame& frame);
+  // For another visitor, or one who wants to see everything again. `why`: what is reported.
+  void BeginAnew(Timestamp time, const std::string& why);
+  void AddQuestion(ShownFrame* frame);
   void Narrate(const ShownFrame& frame, const engine::CameraModel& camera);
   void ReportProblem(const std::string& problem, Timestamp time) const;
   // What happened on the tour.
@@ -59,8 +62,9 @@ class VisitorHost {
   std::vector<std::optional<VisitorGuide>> visitors_;  // By camera.
   std::optional<Narration> narration_;  // Of the first camera; only with `narrate`, as speech_.
   std::optional<Speech> speech_;
-  std::optional<IdleWatch> idle_watch_;  // Of the first camera; only of a kiosk.
-  std::optional<VisitKeeper> visits_;    // Of the first camera; only with a folder for their records.
+  std::optional<LeftTour> left_tour_;  // Of the first camera; only of a kiosk, and of a tour with stops.
+  std::optional<VisitKeeper> visits_;  // Of the first camera; only with a folder for their records.
+  int visitors_before_ = 0;            // See ShownFrame.
   std::vector<SoundDirector::Key> asked_sounds_;
 };
 

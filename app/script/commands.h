@@ -271,6 +271,8 @@ struct GuideVisitor {
     kPress,  // The one button: opens the card of what is marked, turns its page, or closes it after the last.
     kMark,   // Marks the next thing in view that has a card.
     kClose,  // Closes the card.
+    kRestart,   // Begins anew, as for the next visitor.
+    kContinue,  // Goes on with a tour that was left, when the visitor is asked (LeftTour).
   };
   Step step = Step::kSkip;
   std::string name = {};  // Only of kOpen.

@@ -200,6 +200,10 @@ struct CommandFormatter {
         return "tour mark";
       case GuideVisitor::Step::kClose:
         return "tour close";
+      case GuideVisitor::Step::kRestart:
+        return "tour restart";
+      case GuideVisitor::Step::kContinue:
+        return "tour continue";
     }
     return "";
   }

@@ -335,8 +335,11 @@ Command ParseTour(LineReader* line) {
   if (line->TakeIf("press")) return GuideVisitor{GuideVisitor::Step::kPress};
   if (line->TakeIf("mark")) return GuideVisitor{GuideVisitor::Step::kMark};
   if (line->TakeIf("close")) return GuideVisitor{GuideVisitor::Step::kClose};
-  const std::string word = line->Take("skip, back, open, press, mark or close");
-  line->Fail("unknown command 'tour " + word + "'; use skip, back, open, press, mark or close after tour");
+  if (line->TakeIf("restart")) return GuideVisitor{GuideVisitor::Step::kRestart};
+  if (line->TakeIf("continue")) return GuideVisitor{GuideVisitor::Step::kContinue};
+  constexpr const char* kKnown = "skip, back, open, press, mark, close, restart or continue";
+  const std::string word = line->Take(kKnown);
+  line->Fail("unknown command 'tour " + word + "'; use " + kKnown + " after tour");
 }
 
 Command ParseCommand(LineReader* line) {

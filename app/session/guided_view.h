@@ -30,6 +30,8 @@ struct ShownFrame {
   std::string caption;  // of the sounds that play; often empty
   // Only on a tour; see VisitState.
   std::optional<ui::VisitorDisplay> visitor = {};
+  // Only on a tour: how many visitors of this camera came before, as far as that was noticed.
+  int visitors_before = 0;
   // Only on a tour: the way on that `visitor` shows, if there is one.
   std::optional<ShownWay> way = {};
   // If a visitor was lost a moment ago: the last pose before, whose content is in `shown`.

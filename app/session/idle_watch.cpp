@@ -15,11 +15,12 @@ bool IdleWatch::Update(double seconds, const cv::Mat& image) {
   cv::resize(image, small, {kWidth, kHeight}, 0, 0, cv::INTER_AREA);
   if (small.channels() == 3) cv::cvtColor(small, small, cv::COLOR_BGR2GRAY);
   const double pixels = kWidth * kHeight;
+  const double pause_s = reference_.empty() ? 0 : seconds - last_s_;
+  last_s_ = seconds;
   if (reference_.empty() || cv::norm(small, reference_, cv::NORM_L1) / pixels > kChange) {
     reference_ = small;
     changed_s_ = seconds;
-    is_left_ = false;
-    return false;
+    return !std::exchange(is_left_, false) && pause_s >= idle_s_;
   }
   if (is_left_ || seconds - changed_s_ < idle_s_) return false;
   return is_left_ = true;

@@ -22,6 +22,7 @@ void RouteState::Enter(std::uint64_t map_key, double seconds) {
   here_ = map_key;
   const std::optional<std::size_t> stop = StopOf(map_key);
   if (!stop) return;
+  was_elsewhere_ = is_finished_ && (was_elsewhere_ || *stop != 0);
   const bool is_later = visits_[*stop] == Visit::kAhead && FirstAhead() != stop;
   if (is_later && (is_passing_ || seconds - entered_s_ < kStay_s)) return;
   if (visits_[*stop] != Visit::kSeen || back_ == stop) Arrive(*stop);
@@ -32,7 +33,10 @@ void RouteState::Arrive(std::size_t stop) {
     SkipStopsBefore(stop);
     back_.reset();
   }
-  if (back_ == stop) back_.reset();
+  if (back_ == stop) {
+    back_.reset();
+    was_elsewhere_ = false;  // The same visitor wanted to come here.
+  }
   visits_[stop] = Visit::kSeen;
   events_.push_back({RouteEvent::Kind::kArrived, stop});
   UpdateTarget();
@@ -68,6 +72,11 @@ bool RouteState::GoBack() {
   events_.push_back({RouteEvent::Kind::kGoingBack, *back_});
   UpdateTarget();
   return true;
+}
+
+bool RouteState::HasReturned() const {
+  return was_elsewhere_ && !back_ && Here() == std::optional<std::size_t>(0) &&
+         last_s_ - entered_s_ >= kStay_s;
 }
 
 std::size_t RouteState::CountSeen() const {

@@ -72,6 +72,11 @@ class RouteState {
   // The stop where the visitor is; empty on the way between stops, and while it is not known.
   std::optional<std::size_t> Here() const { return here_ == 0 ? std::nullopt : StopOf(here_); }
   bool is_going_back() const { return back_.has_value(); }
+  // Whether somebody who is led anew would notice a difference.
+  bool is_begun() const { return back_ || FirstAhead() != std::optional<std::size_t>(0); }
+  // Whether the tour was finished, and the camera is back at the first stop: it is in the hands of the next
+  // visitor, or of one who may see it all again.
+  bool HasReturned() const;
   // The least number of signposts that lead from a map to the target; empty if none lead there.
   std::optional<int> SignpostsFrom(std::uint64_t map_key) const;
   // What happened since the last call, in its order.
@@ -93,6 +98,7 @@ class RouteState {
   double last_s_ = 0;        // The time of the last image with a pose.
   bool is_passing_ = false;  // Whether the last map lies on the way to the target.
   bool is_finished_ = false;
+  bool was_elsewhere_ = false;  // At another stop than the first, since the tour was finished.
   std::vector<RouteEvent> events_;
 };
 

@@ -123,6 +123,8 @@ bool VisitorCards::Do(const GuideVisitor& guide) {
   switch (guide.step) {
     case GuideVisitor::Step::kSkip:
     case GuideVisitor::Step::kBack:
+    case GuideVisitor::Step::kRestart:
+    case GuideVisitor::Step::kContinue:
       return false;
     case GuideVisitor::Step::kOpen:
       OpenCard(guide.name);

@@ -63,7 +63,11 @@ constexpr VisitorStrings kEnglish = {
     .menu_skip = "Skip the next stop",
     .menu_back = "Back to the stop before",
     .menu_stops = "All stops",
+    .menu_anew = "Begin anew",
     .menu_close = "Close",
+    .was_left = "This tour was begun a while ago. Do you want to go on with it?",
+    .choose_continue = "Go on with this tour",
+    .choose_restart = "Begin the tour anew",
 };
 
 constexpr VisitorStrings kGerman = {
@@ -124,7 +128,11 @@ constexpr VisitorStrings kGerman = {
     .menu_skip = "Die nächste Station auslassen",
     .menu_back = "Zurück zur Station davor",
     .menu_stops = "Alle Stationen",
+    .menu_anew = "Neu beginnen",
     .menu_close = "Schließen",
+    .was_left = "Diese Führung wurde vor einer Weile begonnen. Möchten Sie sie fortsetzen?",
+    .choose_continue = "Diese Führung fortsetzen",
+    .choose_restart = "Die Führung neu beginnen",
 };
 
 constexpr VisitorStrings kSpanish = {
@@ -183,7 +191,11 @@ constexpr VisitorStrings kSpanish = {
     .menu_skip = "Omitir la siguiente parada",
     .menu_back = "Volver a la parada anterior",
     .menu_stops = "Todas las paradas",
+    .menu_anew = "Empezar de nuevo",
     .menu_close = "Cerrar",
+    .was_left = "Este recorrido se empezó hace un rato. ¿Desea continuarlo?",
+    .choose_continue = "Continuar este recorrido",
+    .choose_restart = "Empezar el recorrido de nuevo",
 };
 
 constexpr VisitorStrings kArabic = {
@@ -242,7 +254,11 @@ constexpr VisitorStrings kArabic = {
     .menu_skip = "تخطي المحطة التالية",
     .menu_back = "العودة إلى المحطة السابقة",
     .menu_stops = "جميع المحطات",
+    .menu_anew = "البدء من جديد",
     .menu_close = "إغلاق",
+    .was_left = "بدأت هذه الجولة منذ فترة. هل تريد متابعتها؟",
+    .choose_continue = "متابعة هذه الجولة",
+    .choose_restart = "بدء الجولة من جديد",
 };
 
 // Of Unicode's bidirectional algorithm (UAX #9): what stands between these marks has the direction of its

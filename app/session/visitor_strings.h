@@ -82,7 +82,13 @@ struct VisitorStrings {
   const char* menu_skip;
   const char* menu_back;
   const char* menu_stops;
+  const char* menu_anew;
   const char* menu_close;
+
+  // Whether a tour that was left goes on, and the two choices.
+  const char* was_left;
+  const char* choose_continue;
+  const char* choose_restart;
 };
 
 // The sentences in English, German, Spanish or Arabic. `language` is a tag in lower case; of its last parts,

@@ -191,7 +191,7 @@ TEST(Guide, AuthorsMapsThatATourRecognizesAndLeavesUnchanged) {
 
   const std::string path = (folder / "l.docent").string();
   LeadFromBayToBay(path);
-  folder.Write("visit.txt", std::string("6 tour back\n"));
+  folder.Write("visit.txt", std::string("6 tour back\n6.5 tour restart\n"));
   const std::string before = ReadAll(path);
   const Outcome toured = RunDocent({"tour", "--library", path, "--camera", museum.camera, "--from",
                                     museum.visits_from, "--headless", "--tour", "Bays", "--script",
@@ -217,7 +217,8 @@ TEST(Guide, AuthorsMapsThatATourRecognizesAndLeavesUnchanged) {
               AllOf(HasSubstr(",tour,\"arrived at 'Bay 1', stop 1 of 2\""),
                     HasSubstr(",tour,\"arrived at 'Bay 0', stop 2 of 2\""),
                     HasSubstr(",tour,finished; 2 of 2 stops seen"), HasSubstr(",command,tour back"),
-                    HasSubstr(",tour,\"going back to 'Bay 1', stop 1 of 2\"")));
+                    HasSubstr(",tour,\"going back to 'Bay 1', stop 1 of 2\""),
+                    HasSubstr(",command,tour restart"), HasSubstr(",tour,the visitor begins anew")));
 }
 
 TEST(Guide, AuthorsAndToursWithTwoCamerasInOneMap) {

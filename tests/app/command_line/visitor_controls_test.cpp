@@ -32,18 +32,20 @@ class VisitorAtControls : public ::testing::Test {
     Show({});
   }
   // Shows a frame with this card.
-  void Show(const std::optional<ui::Card>& card) {
+  void Show(const std::optional<ui::Card>& card, bool asks = false, int visitors_before = 0) {
     auto frame = std::make_shared<ShownFrame>();
     frame->visitor.emplace();
     frame->visitor->targets = {{"mask", {100, 100}, {140, 140}}};
     frame->visitor->marked = 0;
     frame->visitor->card = card;
+    frame->visitor->asks_to_continue = asks;
+    frame->visitors_before = visitors_before;
     VisitorControls::Seen seen;
     seen.frame = frame;
+    seen.targets = frame->visitor->targets;
     seen.width_px = 1280;
     seen.height_px = 800;
     seen.box = ui::FitImage(640, 400, 1280, 800);
-    seen.targets = frame->visitor->targets;
     seen.style = {1.5, 0, 36};
     frame_ = frame;
     controls_->SetView(seen);
@@ -89,7 +91,7 @@ TEST_F(VisitorAtControls, OneButtonOpensCardsAndGoesThroughTheMenu) {
   EXPECT_THAT(Given(), ElementsAre("tour press"));
   Hold(std::chrono::seconds(1));
   EXPECT_THAT(Given(), IsEmpty());
-  ASSERT_EQ(Drawn().visitor->menu.size(), 4u);
+  ASSERT_EQ(Drawn().visitor->menu.size(), 5u);
   EXPECT_EQ(Drawn().visitor->chosen, 0u);
   Hold(std::chrono::seconds(1));
   EXPECT_THAT(Given(), ElementsAre("tour skip"));
@@ -101,8 +103,8 @@ TEST_F(VisitorAtControls, OneButtonOpensCardsAndGoesThroughTheMenu) {
   EXPECT_THAT(Given(), ElementsAre("tour back"));
   // Once around: the menu is left by its last choice.
   Hold(std::chrono::seconds(1));
-  for (int i = 0; i < 3; ++i) Hold(std::chrono::milliseconds(100));
-  EXPECT_EQ(Drawn().visitor->chosen, 3u);
+  for (int i = 0; i < 4; ++i) Hold(std::chrono::milliseconds(100));
+  EXPECT_EQ(Drawn().visitor->chosen, 4u);
   Hold(std::chrono::seconds(1));
   EXPECT_THAT(Given(), IsEmpty());
   EXPECT_TRUE(Drawn().visitor->menu.empty());
@@ -151,7 +153,7 @@ TEST_F(VisitorAtControls, ATouchReachesTheMenuAndItsChoices) {
   const ui::MenuLayout closed = ui::LayOutMenu(*Drawn().visitor, 1280, 800, {1.5, 0, 36});
   Touch(closed.button.x + 5, closed.button.y + 5);
   const ui::MenuLayout open = ui::LayOutMenu(*Drawn().visitor, 1280, 800, {1.5, 0, 36});
-  ASSERT_EQ(open.choices.size(), 4u);
+  ASSERT_EQ(open.choices.size(), 5u);
   Touch(open.choices[1].x + 9, open.choices[1].y + 9);
   EXPECT_THAT(Given(), ElementsAre("tour back"));
   Touch(closed.button.x + 5, closed.button.y + 5);
@@ -185,6 +187,50 @@ TEST_F(VisitorAtControls, ACardIsTurnedByAFingerAndClosedByItsButton) {
   Show({});
   Show(card);
   EXPECT_FALSE(Drawn().visitor->card->turned_rad) << "opened anew, it turns by itself";
+}
+
+TEST_F(VisitorAtControls, ATourBeginsAnewAfterASecondChoice) {
+  Hold(std::chrono::seconds(1));
+  for (int i = 0; i < 3; ++i) Hold(std::chrono::milliseconds(100));
+  Hold(std::chrono::seconds(1));
+  ASSERT_EQ(Drawn().visitor->menu.size(), 2u);
+  EXPECT_EQ(Drawn().visitor->chosen, 0u) << "the tour goes on unless something else is chosen";
+  Hold(std::chrono::seconds(1));
+  EXPECT_THAT(Given(), IsEmpty());
+  EXPECT_TRUE(Drawn().visitor->menu.empty());
+  Key("l");
+  Key("r");
+  Key("down");
+  Key("enter");
+  EXPECT_THAT(Given(), ElementsAre("tour restart"));
+  EXPECT_TRUE(Drawn().visitor->menu.empty());
+  EXPECT_TRUE(Drawn().visitor->lists_route);
+  Show({}, false, 1);
+  EXPECT_FALSE(Drawn().visitor->lists_route) << "the next visitor has not asked for it";
+}
+
+TEST_F(VisitorAtControls, WhoTakesADeviceThatWasLeftIsAskedOnce) {
+  Key("m");
+  Show({}, true);
+  ASSERT_EQ(Drawn().visitor->menu.size(), 2u);
+  Touch(3, 3);
+  Key("m");
+  EXPECT_EQ(Drawn().visitor->menu.size(), 2u) << "a hand that takes up the device answers nothing";
+  const ui::MenuLayout open = ui::LayOutMenu(*Drawn().visitor, 1280, 800, {1.5, 0, 36});
+  Touch(open.choices[1].x + 9, open.choices[1].y + 9);
+  EXPECT_THAT(Given(), ElementsAre("tour restart"));
+  Show({}, true);
+  EXPECT_TRUE(Drawn().visitor->menu.empty()) << "the answer is on its way";
+  Show({});
+  for (const char* key : {"enter", "escape"}) {
+    Show({}, true);
+    Key(key);
+    EXPECT_THAT(Given(), ElementsAre("tour continue"));
+    Show({});
+  }
+  Show({}, true);
+  Show({});
+  EXPECT_TRUE(Drawn().visitor->menu.empty()) << "the time for an answer is over";
 }
 
 TEST_F(VisitorAtControls, AKioskHasNoKeysOfEngineersAndEndsByItsCode) {

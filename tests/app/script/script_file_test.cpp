@@ -145,6 +145,8 @@ TEST(Script, IsReadBackEqualAfterWriting) {
       GuideVisitor{GuideVisitor::Step::kPress},
       GuideVisitor{GuideVisitor::Step::kMark},
       GuideVisitor{GuideVisitor::Step::kClose},
+      GuideVisitor{GuideVisitor::Step::kRestart},
+      GuideVisitor{GuideVisitor::Step::kContinue},
       Redo{},
       Save{},
   };

@@ -217,6 +217,8 @@ TEST(RouteState, LeadsBackAfterTheEnd) {
   Stay(1, &state);
   EXPECT_EQ(state.Target(), std::nullopt);
   EXPECT_THAT(state.TakeEvents(), ElementsAre(RouteEvent{Kind::kArrived, 0})) << "the tour ends only once";
+  Stay(1, &state);
+  EXPECT_FALSE(state.HasReturned()) << "it is the same visitor";
 }
 
 TEST(RouteState, ForgetsTheWayBackAtANewStop) {
@@ -227,6 +229,36 @@ TEST(RouteState, ForgetsTheWayBackAtANewStop) {
   Stay(3, &state);
   EXPECT_FALSE(state.is_going_back());
   EXPECT_EQ(state.Target(), std::nullopt);
+}
+
+TEST(RouteState, HasReturnedWhenAFinishedTourIsAgainAtItsFirstStop) {
+  RouteState state(RouteWith(2));
+  EXPECT_FALSE(state.is_begun());
+  Stay(1, &state);
+  EXPECT_TRUE(state.is_begun());
+  Stay(2, &state);
+  Stay(kHall, &state);
+  EXPECT_FALSE(state.HasReturned());
+  state.Enter(1, 1e3);
+  EXPECT_FALSE(state.HasReturned()) << "the first stop is seen for a moment";
+  state.Enter(1, 1e3 + 0.9);
+  state.Enter(1, 1e3 + 1.8);
+  state.Enter(1, 1e3 + 2.7);
+  state.Enter(1, 1e3 + 3.1);
+  EXPECT_TRUE(state.HasReturned());
+  EXPECT_TRUE(state.GoBack());
+  EXPECT_FALSE(state.HasReturned()) << "the visitor asks to see the first stop again";
+}
+
+TEST(RouteState, HasNotReturnedWhereItEnds) {
+  RouteState state(RouteWith(3));
+  Stay(1, &state);
+  Stay(2, &state);
+  Stay(1, &state);
+  EXPECT_TRUE(state.Skip());
+  Stay(1, &state);
+  EXPECT_EQ(state.Target(), std::nullopt);
+  EXPECT_FALSE(state.HasReturned());
 }
 
 TEST(SignpostGraph, CountsTheFewestSignpostsToAMap) {
