@@ -303,9 +303,9 @@ void GuideRun::TogglePause() {
   }
 }
 
-void GuideRun::ToggleHurry() {
+void GuideRun::ToggleFastForward() {
   if (!AllRecorded(cameras_)) return;
-  clock_.SetHurried(!clock_.IsHurried());
+  clock_.SetFastForward(!clock_.IsFastForward());
 }
 
 void GuideRun::HandleRefused(const std::string& reason, CameraState* state) {

@@ -55,7 +55,7 @@ class GuideRun {
   void TogglePause();
   // Plays recordings as fast as they can be tracked, or by their times again. Nothing happens with other
   // cameras.
-  void ToggleHurry();
+  void ToggleFastForward();
   std::vector<Session::MapState> Maps() const { return session_.Maps(); }
 
  private:

@@ -135,7 +135,7 @@ class GuideWindow {
     host.emit = [this](const GuideVisitor& guide) { Lead(guide); };
     host.swap_cameras = [this] { Swap(); };
     host.toggle_full_screen = [this] { window_.ToggleFullScreen(); };
-    host.toggle_hurry = [this] { link_.toggle_hurry(); };
+    host.toggle_fast_forward = [this] { link_.toggle_fast_forward(); };
     host.language = request_.language;
     host.has_route = request_.route.has_value();
     host.kiosk_code = request_.kiosk_code;

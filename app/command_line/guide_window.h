@@ -26,7 +26,7 @@ struct WindowLink {
   // Pauses recordings, or lets them go on.
   std::function<void()> toggle_pause;
   // Plays recordings as fast as they can be tracked, or by their times again.
-  std::function<void()> toggle_hurry;
+  std::function<void()> toggle_fast_forward;
   // On a tour: carries out a step of the visitor at once, also while an image is tracked, and returns the
   // last frame of this camera with what has changed; null before the first frame and after the last one.
   std::function<std::shared_ptr<const ShownFrame>(std::size_t, const GuideVisitor&)> lead;

@@ -110,7 +110,7 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
     link.maps = [run] { return run->MapsForWindow(); };
     link.discard_changes = [run] { run->DiscardChanges(); };
     link.toggle_pause = [run] { run->TogglePause(); };
-    link.toggle_hurry = [run] { run->ToggleHurry(); };
+    link.toggle_fast_forward = [run] { run->ToggleFastForward(); };
     link.lead = [run](std::size_t camera, const GuideVisitor& guide) { return run->Lead(camera, guide); };
     link.adapted = [run](const std::string& text) { run->Adapted(text); };
     link.drawn = [run](const ShownFrame& frame) { run->Drawn(frame); };

@@ -149,7 +149,7 @@ void VisitorControls::HandleKey(const ui::InputEvent& event, Clock::time_point n
 void VisitorControls::HandleEngineerKey(const std::string& key) {
   if (key == "tab" || key == "c") host_.swap_cameras();
   if (key == "f11") host_.toggle_full_screen();
-  if (key == "f") host_.toggle_hurry();
+  if (key == "f") host_.toggle_fast_forward();
   if (key == "p") points_ = !points_;
   if (key == "k") keyframes_ = !keyframes_;
   if (key == "h") status_ = !status_;

@@ -28,7 +28,7 @@ class VisitorControls {
   struct Host {
     std::function<void(GuideVisitor)> emit;  // For the frame that is shown.
     std::function<void()> swap_cameras, toggle_full_screen;
-    std::function<void()> toggle_hurry;  // See WindowLink.
+    std::function<void()> toggle_fast_forward;  // See WindowLink.
     std::string language;
     bool has_route = false;  // The tour has stops.
     std::string kiosk_code;  // Empty for other tours.

@@ -116,7 +116,7 @@ void CameraFeed::WaitForMapper(const std::stop_token& stop) {
 }
 
 void CameraFeed::WaitForTime(const std::stop_token& stop) {
-  if (clock_->IsHurried()) return;
+  if (clock_->IsFastForward()) return;
   PlayClock machine;
   machine.WaitUntil(machine.Now() + (DueAfterLast() - std::chrono::steady_clock::now()), stop);
 }

@@ -65,7 +65,8 @@ struct FrameLoopOptions {
   // empty.
   std::function<void(Timestamp)> latency;
   // Of a recording in lockstep or eager pace: no image is processed before as much time has passed since the
-  // one before as lies between them, so that a person can follow, unless the clock hurries. None is dropped.
+  // one before as lies between them, so that a person can follow, unless the clock is in fast forward. None
+  // is dropped.
   bool no_faster_than_times = false;
   PlayClock* clock = nullptr;  // the first camera's is used for all; null: the system clock
   // Called about thirty times a second with the last tracked frame while no image is processed: while the

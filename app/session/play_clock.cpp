@@ -33,19 +33,19 @@ Timestamp PausableClock::Now() {
 void PausableClock::WaitUntil(Timestamp time, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   changed_.wait_until(lock, stop, std::chrono::steady_clock::time_point(time + lost_),
-                      [this] { return stopped_at_.has_value() || is_hurried_; });
-  if (is_hurried_ && !stopped_at_) lost_ -= std::max(Timestamp{}, time - NowLocked());
+                      [this] { return stopped_at_.has_value() || is_fast_forward_; });
+  if (is_fast_forward_ && !stopped_at_) lost_ -= std::max(Timestamp{}, time - NowLocked());
 }
 
-bool PausableClock::IsHurried() const {
+bool PausableClock::IsFastForward() const {
   const std::scoped_lock lock(mutex_);
-  return is_hurried_;
+  return is_fast_forward_;
 }
 
-void PausableClock::SetHurried(bool is_hurried) {
+void PausableClock::SetFastForward(bool is_fast_forward) {
   {
     const std::scoped_lock lock(mutex_);
-    is_hurried_ = is_hurried;
+    is_fast_forward_ = is_fast_forward;
   }
   changed_.notify_all();
 }

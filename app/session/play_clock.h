@@ -22,11 +22,11 @@ class PlayClock {
   // Whether the time stands still.
   virtual bool IsStopped() const { return false; }
   // Whether what is waited for comes at once.
-  virtual bool IsHurried() const { return false; }
+  virtual bool IsFastForward() const { return false; }
 };
 
-// A clock that a person can stop: then no time passes. When it hurries, it jumps to each time that is waited
-// for. Any thread.
+// A clock that a person can stop: then no time passes. During fast forward it jumps to each time that is
+// waited for. Any thread.
 class PausableClock : public PlayClock {
  public:
   explicit PausableClock(bool is_stopped = false);
@@ -36,8 +36,8 @@ class PausableClock : public PlayClock {
   bool IsStopped() const override;
   void Stop();
   void Resume();
-  bool IsHurried() const override;
-  void SetHurried(bool is_hurried);
+  bool IsFastForward() const override;
+  void SetFastForward(bool is_fast_forward);
 
  private:
   Timestamp NowLocked() const;
@@ -46,7 +46,7 @@ class PausableClock : public PlayClock {
   std::condition_variable_any changed_;
   // How long it was stopped, without the present stop, less what it has jumped.
   Timestamp lost_{};
-  bool is_hurried_ = false;
+  bool is_fast_forward_ = false;
   std::optional<Timestamp> stopped_at_;  // Of the machine's clock.
 };
 
@@ -61,7 +61,7 @@ class RealtimeClock {
   // Whether the next image is due already.
   bool IsLate(Timestamp time, Timestamp period) { return clock_->Now() > Due(time) + period; }
   bool IsStopped() const { return clock_->IsStopped(); }
-  bool IsHurried() const { return clock_->IsHurried(); }
+  bool IsFastForward() const { return clock_->IsFastForward(); }
   Timestamp Due(Timestamp time) const { return start_ + time; }
   Timestamp Now() { return clock_->Now(); }
 

@@ -24,7 +24,7 @@ class VisitorAtControls : public ::testing::Test {
     host.emit = [this](GuideVisitor guide) { given_.push_back(FormatCommand(guide)); };
     host.swap_cameras = [this] { given_.emplace_back("swap"); };
     host.toggle_full_screen = [this] { given_.emplace_back("full screen"); };
-    host.toggle_hurry = [this] { given_.emplace_back("hurry"); };
+    host.toggle_fast_forward = [this] { given_.emplace_back("fast forward"); };
     host.language = "en";
     host.has_route = has_route;
     host.kiosk_code = kiosk_code;

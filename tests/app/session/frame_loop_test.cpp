@@ -317,13 +317,13 @@ TEST(FrameLoop, PausesWhileTheClockIsStoppedAndStaysAtTheLastImage) {
       << "commands are carried out meanwhile";
 }
 
-TEST(PausableClock, JumpsToWhatIsWaitedForWhileItHurries) {
+TEST(PausableClock, JumpsToWhatIsWaitedForDuringFastForward) {
   PausableClock clock;
   const Timestamp begin = clock.Now();
-  clock.SetHurried(true);
+  clock.SetFastForward(true);
   clock.WaitUntil(begin + std::chrono::hours(1), {});
   EXPECT_GE(clock.Now() - begin, std::chrono::hours(1));
-  clock.SetHurried(false);
+  clock.SetFastForward(false);
   const Timestamp before = clock.Now();
   clock.WaitUntil(before + std::chrono::milliseconds(20), {});
   EXPECT_GE(clock.Now() - before, std::chrono::milliseconds(20)) << "it goes on from where it is";
