@@ -65,7 +65,8 @@ std::vector<CornerLine> LinesInCorner(const VisitorDisplay& visitor, double unit
   return lines;
 }
 
-// The name of a place in large letters, above what usually stands in the middle of the image.
+// The name of a place in large letters, above what usually stands in the middle of the image. The texts of
+// labels are not seen through its ground.
 void DrawArrival(const std::string& place, double opacity, double unit, Canvas* canvas) {
   if (place.empty() || opacity <= 0) return;
   TextStyle style;
@@ -78,7 +79,7 @@ void DrawArrival(const std::string& place, double opacity, double unit, Canvas* 
   const Eigen::Vector2d size = canvas->Measure(place, style), padding(24 * unit, 14 * unit);
   const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.2 * canvas->height_px());
   canvas->Box(middle - 0.5 * size - padding, middle + 0.5 * size + padding, 14 * unit,
-              Faded(kBoard, opacity));
+              Faded(theme::kPanel, opacity));
   canvas->Text(place, style, {middle.x(), middle.y() - 0.5 * size.y()}, 0.5);
 }
 
@@ -271,7 +272,8 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
     DrawSearchFigure(middle, radius, view.animation_seconds, canvas);
   }
   if (view.camera != nullptr) DrawNamesOfViews(visitor, *view.camera, unit, canvas);
-  if (visitor.marked && *visitor.marked < visitor.targets.size() && view.camera != nullptr)
+  if (visitor.menu.empty() && visitor.marked && *visitor.marked < visitor.targets.size() &&
+      view.camera != nullptr)
     DrawMark(visitor.targets[*visitor.marked], *view.camera, unit, canvas);
   if (visitor.dwell) {
     const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.5 * (canvas->height_px() - 1));

@@ -89,5 +89,45 @@ TEST_F(LabelsOfVisitors, KeepClearOfThePlaceTheTourAndTheSentence) {
   EXPECT_EQ(covered(words, both), 0);
 }
 
+TEST_F(LabelsOfVisitors, AreNotReadThroughTheNameOfAPlaceThatIsReached) {
+  Renderer renderer;
+  const cv::Mat black = cv::Mat::zeros(480, 640, CV_8UC3);
+  const engine::TrackedFrame tracked = Tracked(black);
+  content::Scene scene;
+  content::Entity& label = scene.entities.emplace_back();
+  label.name = "label";
+  label.kind = content::Entity::Kind::kLabel;
+  label.label.text = "Restored in 1931, with the help of the brothers Hansen";
+  label.label.anchor = {0, 0, 2};
+  label.label.offset = {0, -0.5, 0};
+  label.label.text_height = 0.1;
+  View view;
+  view.tracked = &tracked;
+  view.camera = &kViewsCamera;
+  const auto drawn = [&](double arrival, bool with_label) {
+    view.overlay.visitor.emplace();
+    view.overlay.visitor->place = "Lions";
+    view.overlay.visitor->arrival = arrival;
+    view.scene = with_label ? &scene : nullptr;
+    renderer.Draw(view);
+    cv::Mat image;
+    renderer.ReadBack(&image);
+    cv::cvtColor(image, image, cv::COLOR_BGR2GRAY);
+    return image;
+  };
+  const cv::Mat nothing = drawn(0, false), name = drawn(1, false);
+  cv::Rect inside = cv::boundingRect(cv::abs(name - nothing) > 8);
+  ASSERT_GT(inside.area(), 2000);
+  // Without the rounded corners.
+  constexpr int kCorner_px = 16;
+  inside = {inside.x + kCorner_px, inside.y + kCorner_px, inside.width - 2 * kCorner_px,
+            inside.height - 2 * kCorner_px};
+  const auto changed = [&](const cv::Mat& before, const cv::Mat& after) {
+    return cv::countNonZero(cv::abs(after(inside) - before(inside)) > 8);
+  };
+  ASSERT_GT(changed(nothing, drawn(0, true)), 100) << "the label lies there";
+  EXPECT_EQ(changed(name, drawn(1, true)), 0);
+}
+
 }  // namespace
 }  // namespace docent::ui
