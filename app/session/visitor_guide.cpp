@@ -81,9 +81,11 @@ void VisitorGuide::FollowRoute(bool has_pose, ShownFrame* frame) {
   // The end is said where it is not overlooked, and stays in the corner after that.
   constexpr double kEndSaid_s = 8;
   if (route_->Target()) finished_s_.reset();
-  if (!route_->Target() && !finished_s_) finished_s_ = frame->seconds;
-  if (finished_s_ && frame->seconds - *finished_s_ < kEndSaid_s && display.sentence.empty())
-    display.sentence = display.route_line;
+  // Who searches for a known place is helped first; other hints can wait.
+  if (!route_->Target() && !display.is_searching) {
+    if (!finished_s_) finished_s_ = frame->seconds;
+    if (frame->seconds - *finished_s_ < kEndSaid_s) display.sentence = display.route_line;
+  }
   // Who is lost finds among the stops those that are near.
   if (!display.stops.empty()) display.stops = display.route_stops;
 }

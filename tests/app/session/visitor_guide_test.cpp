@@ -43,10 +43,11 @@ TEST(VisitorGuide, SaysTheEndOfATourForAWhileInTheSentence) {
   route.stops = {{1, "Desk"}, {2, "Door"}};
   RouteState state(route);
   VisitorGuide guide(&session, {"Desk", "Door"}, VisitorStringsFor("en"), &state);
-  const auto sentence_at = [&](double seconds) {
+  const auto sentence_at = [&](double seconds, engine::Hint hint = engine::Hint::kNone) {
     const auto frame = std::make_shared<ShownFrame>();
     frame->seconds = seconds;
     frame->tracked.state = engine::TrackingState::kSixDof;
+    frame->tracked.hint = hint;
     frame->tracked.map_key = 1;
     frame->shown.map_name = "Desk";
     guide.Guide(frame, simulation->camera());
@@ -55,7 +56,7 @@ TEST(VisitorGuide, SaysTheEndOfATourForAWhileInTheSentence) {
   EXPECT_EQ(sentence_at(0), "");
   ASSERT_TRUE(state.Skip());
   EXPECT_EQ(sentence_at(1), "The tour ends here. You saw 1 of 2 stops.");
-  EXPECT_EQ(sentence_at(8), "The tour ends here. You saw 1 of 2 stops.");
+  EXPECT_EQ(sentence_at(8, engine::Hint::kMoveMoreSlowly), "The tour ends here. You saw 1 of 2 stops.");
   EXPECT_EQ(sentence_at(10), "");
 }
 
