@@ -12,6 +12,9 @@ namespace {
 constexpr double kTextUnits = 15;      // Of a text of normal size; see HeadsUpStyle.
 constexpr double kCapitalRatio = 0.7;  // Height of a capital letter over the em, of common sans-serif fonts.
 
+// The longest choice of a menu, in any language, needs less.
+constexpr double kChoiceUnits = 360;
+
 // The side of what is touched; also where the size of a millimetre is not known.
 double TouchTarget(const HeadsUpStyle& style) {
   constexpr double kLeastUnits = 30;
@@ -96,7 +99,7 @@ MenuLayout LayOutMenu(const VisitorDisplay& visitor, int width_px, int height_px
                      0.62 * height_px - 0.5 * target, target, target};
   const double gap = 8 * unit, height = std::max(target, 40 * unit);
   const auto count = static_cast<double>(visitor.menu.size());
-  const double width = std::min(width_px - 2 * margin, std::max(0.5 * width_px, 280 * unit));
+  const double width = std::min(width_px - 2 * margin, std::max(0.5 * width_px, kChoiceUnits * unit));
   double y = 0.5 * (height_px - count * height - (count - 1) * gap);
   for (std::size_t i = 0; i < visitor.menu.size(); ++i) {
     layout.choices.push_back({0.5 * (width_px - width), y, width, height});

@@ -10,6 +10,7 @@
 #include "app/session/visit_state.h"
 #include "app/session/visitor_guide.h"
 #include "ui/text.h"
+#include "ui/visitor_layout.h"
 
 namespace docent::app {
 namespace {
@@ -114,6 +115,33 @@ TEST(VisitorHint, LeavesOutWhatIsForAnAuthor) {
   EXPECT_EQ(VisitorHint({}, engine::Hint::kChooseMap, english), "");
   EXPECT_EQ(VisitorHint({}, engine::Hint::kMoveSideways, english), "");
   EXPECT_EQ(VisitorHint({}, engine::Hint::kNone, english), "");
+}
+
+TEST(VisitorStrings, OfMenusFitIntoTheirRows) {
+  // A small tablet, and a large one upright, with their pixels per millimetre.
+  struct Display {
+    int width_px, height_px;
+    double pixels_per_mm;
+  };
+  for (const Display& display :
+       {Display{800, 480, 5.2}, Display{1200, 1920, 8.9}, Display{1200, 1920, 3.8}}) {
+    const double unit = ui::VisitorUnit_px(display.width_px, display.height_px, display.pixels_per_mm);
+    ui::VisitorDisplay visitor;
+    visitor.menu = {"Close"};
+    const ui::HeadsUpStyle style{unit, 0, ui::kTouchTarget_mm * display.pixels_per_mm};
+    const double row_px =
+        ui::LayOutMenu(visitor, display.width_px, display.height_px, style).choices.front().width;
+    for (const char* language : kVisitorLanguages) {
+      const VisitorStrings& strings = VisitorStringsFor(language);
+      for (const char* choice : {strings.menu_skip, strings.menu_back, strings.menu_stops, strings.menu_anew,
+                                 strings.menu_close, strings.choose_continue, strings.choose_restart}) {
+        ui::TextStyle text;
+        text.size_px = 20 * unit;
+        text.max_width_px = 5000;
+        EXPECT_LE(ui::DrawText(choice, text).cols, row_px - 20 * unit) << choice << ", " << display.width_px;
+      }
+    }
+  }
 }
 
 }  // namespace
