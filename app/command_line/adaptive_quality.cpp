@@ -26,6 +26,7 @@ void AdaptiveQuality::WarmUp(ui::Renderer* renderer) {
   view.overlay.hud = false;
   for (const ui::DrawingQuality& quality : ui::kDrawingLadder) {
     renderer->SetQuality(quality.samples, 1);
+    view.shadows = quality.shadows;
     renderer->Draw(view);
   }
   renderer->SetQuality(ui::kDrawingLadder.front().samples, 1);
@@ -36,12 +37,13 @@ void AdaptiveQuality::WarmUp(ui::Renderer* renderer) {
   renderer->Draw(empty);
 }
 
-void AdaptiveQuality::Apply(double pixels_per_pixel, ui::Renderer* renderer) const {
+void AdaptiveQuality::Apply(double pixels_per_pixel, ui::Renderer* renderer, ui::View* view) const {
   const ui::DrawingQuality& quality = ladder_.quality();
   // In steps of an eighth, so that a window that is resized does not need a new lens table all the time.
   const double stepped = std::ceil(8 * pixels_per_pixel) / 8;
   const double least = std::min(1.0, quality.largest_scale);
   renderer->SetQuality(quality.samples, std::clamp(stepped, least, quality.largest_scale));
+  view->shadows = view->shadows && quality.shadows;
 }
 
 std::optional<std::string> AdaptiveQuality::Add(Clock::time_point begin, Clock::time_point now) {

@@ -20,7 +20,7 @@ class AdaptiveQuality {
   // what it has not drawn before, in which a visitor's image would freeze.
   static void WarmUp(ui::Renderer* renderer);
   // Sets the quality of the next image, of which one of the camera's pixels covers this many of the window.
-  void Apply(double pixels_per_pixel, ui::Renderer* renderer) const;
+  void Apply(double pixels_per_pixel, ui::Renderer* renderer, ui::View* view) const;
   // An image was drawn from `begin` to now. Returns what has changed, in words, if anything has.
   std::optional<std::string> Add(Clock::time_point begin, Clock::time_point now);
 

@@ -263,7 +263,7 @@ class GuideWindow {
       if (large()) {
         const engine::CameraModel& lens = *eye_view.view.camera;
         quality_.Apply(ui::FitImage(lens.width_px(), lens.height_px(), part.width_px, part.height_px).scale,
-                       &renderer_);
+                       &renderer_, &eye_view.view);
         renderer_.Draw(eye_view.view);
       }
       eye_view.view.overlay.hud = large() != nullptr;
@@ -280,7 +280,7 @@ class GuideWindow {
       quality_.Apply(ui::FitImage(camera().width_px(), camera().height_px(), window_.FramebufferSize().x(),
                                   window_.FramebufferSize().y())
                          .scale,
-                     &renderer_);
+                     &renderer_, &view);
     view.overlay.hud = false;
     renderer_.Draw(view);
     if (!recorder_ && !request_.on_image) return;
