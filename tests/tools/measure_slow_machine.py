@@ -69,23 +69,43 @@ def press_keys(environment, events, seconds):
     return answers
 
 
-def watch_screen(display, size, seconds):
-    """Captures the screen; each line that is printed has the time of a image and what it looks like."""
-    return subprocess.Popen(
-        ["ffmpeg", "-loglevel", "error", "-f", "x11grab", "-framerate", "25", "-video_size", size, "-i", display, "-t",
-         str(seconds), "-vf", "scale=320:-2:flags=area,format=gray", "-fps_mode", "passthrough", "-f", "framemd5",
-         "-"], stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
+class ScreenWatch:
+    """Captures the screen in grey and small, and notes when it has changed."""
 
+    WIDTH, HEIGHT = 320, 200
 
-def describe_screen(printed, seconds):
-    """Says how often the image on the screen has changed."""
-    rows = [line.split(",") for line in printed.splitlines() if line and not line.startswith("#")]
-    base = next(line for line in printed.splitlines() if line.startswith("#tb 0:")).split(":")[1].split("/")
-    unit = int(base[0]) / int(base[1])
-    first = int(rows[0][1]) * unit
-    changes = [int(after[1]) * unit - first for before, after in zip(rows, rows[1:]) if before[5] != after[5]]
-    gaps = [after - before for before, after in zip([0] + changes, changes + [int(rows[-1][1]) * unit - first])]
-    return f"{len(changes) / seconds:.1f} images a second on the screen; from one to the next: {summarize(gaps)}"
+    def __init__(self, display, size, seconds):
+        self.seconds = seconds
+        self.changes = []  # In seconds from the beginning.
+        self.captured = 0
+        self._begin = time.monotonic()
+        self._ffmpeg = subprocess.Popen(
+            ["ffmpeg", "-loglevel", "error", "-f", "x11grab", "-framerate", "25", "-video_size", size, "-i", display,
+             "-vf", f"scale={self.WIDTH}:{self.HEIGHT}:flags=area,format=gray", "-f", "rawvideo", "-"],
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL)
+        self._thread = threading.Thread(target=self._watch)
+        self._thread.start()
+
+    def _watch(self):
+        last = None
+        while image := self._ffmpeg.stdout.read(self.WIDTH * self.HEIGHT):
+            now = time.monotonic() - self._begin
+            if now > self.seconds:
+                break
+            self.captured += 1
+            if last is not None and image != last:
+                self.changes.append(now)
+            last = image
+
+    def describe(self):
+        """Waits for the end, and says how often the image on the screen has changed."""
+        self._thread.join()
+        self._ffmpeg.terminate()
+        times = [0, *self.changes, self.seconds]
+        gaps = [after - before for before, after in zip(times, times[1:])]
+        longest = max(range(len(gaps)), key=gaps.__getitem__)
+        return (f"{len(self.changes) / self.seconds:.1f} images a second on the screen ({self.captured} captures); "
+                f"from one to the next: {summarize(gaps)} (from second {times[longest]:.1f} on)")
 
 
 def summarize(seconds):
@@ -139,9 +159,9 @@ def main():
     slow = threading.Thread(target=throttle, args=(tour.pid, options.share, stop))
     slow.start()
     slow_from = time.monotonic() - begin
-    watched = watch_screen(":" + display, options.screen, options.seconds)
+    watched = ScreenWatch(":" + display, options.screen, options.seconds)
     answers = press_keys(environment, events, options.seconds)
-    seen = watched.communicate()[0]
+    seen = watched.describe()
     stop.set()
     slow.join()
     tour.send_signal(signal.SIGINT)
@@ -155,7 +175,7 @@ def main():
           summarize([a for a in answers if a is not None]))
     with (options.output / "frames.csv").open() as file:
         print("while slow:", describe_frames(list(csv.DictReader(file)), slow_from))
-    print("while slow:", describe_screen(seen, options.seconds))
+    print("while slow:", seen)
     print("images:", camera["frames"], "dropped:", camera["dropped"], "tracking ms:", camera["tracking_ms"])
     print("latency ms:", camera["latency_ms"], "interval of drawn images ms:", camera.get("drawn_interval_ms"))
     print("\n".join(line for line in told if ",load," in line))
