@@ -4,8 +4,8 @@
 
 Two recordings are played in a window: one of a place that the library does not know (welcome, searching, the known
 views after five seconds, the list of stops after thirty) and one of a place that it knows (arrival, guiding, a card,
-the menu, the question whether to begin anew, the list of stops, the end of the tour). The recordings are played fast
-where nothing is looked at. The images are DIR/SIZE-LANGUAGE-STATE.png, and DIR/SIZE-LANGUAGE.png has all of them.
+the menu, the question whether to begin anew, the list of stops, the end of the tour, and the half second after the
+place is lost, if the recording leaves it). The recordings are played fast where nothing is looked at. The images are DIR/SIZE-LANGUAGE-STATE.png, and DIR/SIZE-LANGUAGE.png has all of them.
 Needs Xvfb, xdotool and ffmpeg.
 
     tests/tools/screens_of_visit.py --docent build/release/docent --library museum.docent --tour Highlights \\
@@ -75,6 +75,28 @@ class Screen:
             return float(lines[-2].split(",")[column]) - float(lines[1].split(",")[column])
         except (FileNotFoundError, IndexError, ValueError):
             return 0
+
+    def last_states(self):
+        """The time of the newest image and of the newest one with a pose."""
+        try:
+            lines = (self.output / "frames.csv.part").read_text().splitlines()[:-1]
+            columns = lines[0].split(",")
+            rows = [dict(zip(columns, line.split(","))) for line in lines[-60:]]
+            return float(rows[-1]["timestamp"]), max(float(row["timestamp"]) for row in rows if row["map"])
+        except (FileNotFoundError, IndexError, KeyError, ValueError):
+            return 0, 0
+
+    def image_of_loss(self, state, seconds):
+        """Waits for a loss of the place, and takes the image within the half second in which content is held."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and self.tour.poll() is None:
+            newest, posed = self.last_states()
+            if 0.1 <= newest - posed <= 0.3:
+                self.image(state)
+                if self.last_states()[0] - posed <= 0.6:
+                    return
+                self.taken.pop()
+            time.sleep(0.02)
 
     def wait(self, seconds):
         end = time.monotonic() + 120
@@ -146,7 +168,13 @@ def see_known(options, size, language):
     time.sleep(0.5)
     screen.image("B-finished")
     screen.close()
-    return screen.taken
+    taken = screen.taken
+    screen = Screen(options, size, language, arguments, "moment")
+    while not screen.told("arrived at") and time.monotonic() < end + 60 and screen.tour.poll() is None:
+        time.sleep(0.02)
+    screen.image_of_loss("C-moment", 30)
+    screen.close()
+    return taken + screen.taken
 
 
 def main():
