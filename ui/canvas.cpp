@@ -12,7 +12,7 @@ namespace {
 // Labels that were not drawn for this many frames are deleted.
 constexpr std::uint64_t kLabelLifeFrames = 120;
 
-// The texture is drawn at its own size, so it needs no mipmaps.
+// The texture is drawn at its own size and at whole pixels, so it needs no filter.
 GlTexture MakeLabelTexture(const cv::Mat& image) {
   GlTexture texture;
   glBindTexture(GL_TEXTURE_2D, texture.name());
@@ -23,14 +23,16 @@ GlTexture MakeLabelTexture(const cv::Mat& image) {
   for (const GLenum direction : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
     glTexParameteri(GL_TEXTURE_2D, direction, GL_CLAMP_TO_EDGE);
   for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
-    glTexParameteri(GL_TEXTURE_2D, filter, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, filter, GL_NEAREST);
   return texture;
 }
 
 }  // namespace
 
-Canvas::Canvas() : program_("canvas", kCanvasVertexShader, kCanvasFragmentShader) {
-  program_.AssignTextureUnits({"label"});
+Canvas::Canvas()
+    : shape_program_("canvas shapes", kCanvasVertexShader, kCanvasShapeFragmentShader),
+      image_program_("canvas images", kCanvasVertexShader, kCanvasImageFragmentShader) {
+  image_program_.AssignTextureUnits({"label"});
   glBindVertexArray(vertex_array_.name());
   glBindBuffer(GL_ARRAY_BUFFER, buffer_.name());
   const auto floats = [](GLuint location, GLint count, std::size_t offset) {
@@ -62,14 +64,18 @@ void Canvas::End() {
   glBindBuffer(GL_ARRAY_BUFFER, buffer_.name());
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices_.size() * sizeof(Vertex)), vertices_.data(),
                GL_STREAM_DRAW);
-  program_.Use();
-  glUniform2f(program_.Uniform("target_size"), static_cast<float>(width_px_), static_cast<float>(height_px_));
-  glUniform1f(program_.Uniform("up"), to_window_ ? -1.0f : 1.0f);
+  for (GlProgram* const program : {&shape_program_, &image_program_}) {
+    program->Use();
+    glUniform2f(program->Uniform("target_size"), static_cast<float>(width_px_),
+                static_cast<float>(height_px_));
+    glUniform1f(program->Uniform("up"), to_window_ ? -1.0f : 1.0f);
+  }
   glActiveTexture(GL_TEXTURE0);
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     const std::size_t end = i + 1 < runs_.size() ? runs_[i + 1].first : vertices_.size();
+    (runs_[i].texture == 0 ? shape_program_ : image_program_).Use();
     glBindTexture(GL_TEXTURE_2D, runs_[i].texture);
     glDrawArrays(GL_TRIANGLES, static_cast<GLint>(runs_[i].first),
                  static_cast<GLsizei>(end - runs_[i].first));
@@ -112,7 +118,7 @@ Eigen::Vector2d Canvas::Text(const std::string& text, const TextStyle& style, co
   UseTexture(label.texture.name());
   const Eigen::Vector2d corners[4] = {low, {high.x(), low.y()}, high, {low.x(), high.y()}};
   const Eigen::Vector2d locals[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-  AddQuad(corners, locals, {0, 0, 0, 0, -1, 0, 0, 0, {1, 1, 1, static_cast<float>(alpha)}});
+  AddQuad(corners, locals, {0, 0, 0, 0, 0, 0, 0, 0, {1, 1, 1, static_cast<float>(alpha)}});
   return label.size;
 }
 
@@ -124,7 +130,7 @@ void Canvas::Image(GLuint texture, const Eigen::Vector2d& low, const Eigen::Vect
   UseTexture(texture);
   const Eigen::Vector2d corners[4] = {low, {high.x(), low.y()}, high, {low.x(), high.y()}};
   const Eigen::Vector2d locals[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-  AddQuad(corners, locals, {0, 0, 0, 0, -1, 0, 0, 0, {1, 1, 1, 1}});
+  AddQuad(corners, locals, {0, 0, 0, 0, 0, 0, 0, 0, {1, 1, 1, 1}});
 }
 
 void Canvas::AddShape(const Eigen::Vector2d& center, const Eigen::Vector2d& half_size,
@@ -140,8 +146,7 @@ void Canvas::AddShape(const Eigen::Vector2d& center, const Eigen::Vector2d& half
   Vertex complete = shape;
   complete.half_width = static_cast<float>(half_size.x());
   complete.half_height = static_cast<float>(half_size.y());
-  // Shapes use no texture, so they join the current run whatever its texture is.
-  if (runs_.empty()) runs_.push_back({0, 0});
+  UseTexture(0);
   AddQuad(corners, locals, complete);
 }
 
@@ -157,11 +162,7 @@ void Canvas::AddQuad(const Eigen::Vector2d corners[4], const Eigen::Vector2d loc
 }
 
 void Canvas::UseTexture(GLuint texture) {
-  if (runs_.empty() || (runs_.back().texture != texture && runs_.back().texture != 0)) {
-    runs_.push_back({vertices_.size(), texture});
-  } else {
-    runs_.back().texture = texture;
-  }
+  if (runs_.empty() || runs_.back().texture != texture) runs_.push_back({vertices_.size(), texture});
 }
 
 Canvas::Label& Canvas::FindLabel(const std::string& text, const TextStyle& style) {

@@ -49,7 +49,7 @@ class Canvas {
   };
   struct Run {  // Vertices that are drawn with one call, because they use the same texture.
     std::size_t first = 0;
-    GLuint texture = 0;
+    GLuint texture = 0;  // 0: shapes, which have none.
   };
   struct Label {
     TextStyle style;
@@ -63,7 +63,7 @@ class Canvas {
   void UseTexture(GLuint texture);
   Label& FindLabel(const std::string& text, const TextStyle& style);
 
-  GlProgram program_;
+  GlProgram shape_program_, image_program_;
   GlVertexArray vertex_array_;
   GlBuffer buffer_;
   int width_px_ = 1, height_px_ = 1;

@@ -274,24 +274,31 @@ void main() {
 }
 )glsl";
 
-// Every shape is a rounded box, filled or stroked, with an edge that is anti-aliased over one pixel. A
-// negative half width means that `place` is a texture coordinate instead.
-const char* const kCanvasFragmentShader = R"glsl(#version 330 core
+// Every shape is a rounded box, filled or stroked, with an edge that is anti-aliased over one pixel.
+const char* const kCanvasShapeFragmentShader = R"glsl(#version 330 core
+in vec2 place;
+flat in vec4 form;
+flat in vec4 paint;
+out vec4 color;
+void main() {
+  vec2 beyond = abs(place) - (form.xy - form.z);
+  float distance_px = length(max(beyond, 0.0)) + min(max(beyond.x, beyond.y), 0.0) - form.z;
+  if (form.w > 0.0) distance_px = abs(distance_px + 0.5 * form.w) - 0.5 * form.w;
+  float coverage = clamp(0.5 - distance_px, 0.0, 1.0);
+  color = vec4(paint.rgb, 1.0) * paint.a * coverage;
+}
+)glsl";
+
+// A text or an image; `place` is a texture coordinate. Not in one shader with the shapes, as a processor that
+// draws does both for each pixel.
+const char* const kCanvasImageFragmentShader = R"glsl(#version 330 core
 in vec2 place;
 flat in vec4 form;
 flat in vec4 paint;
 uniform sampler2D label;
 out vec4 color;
 void main() {
-  if (form.x < 0.0) {
-    color = texture(label, place) * paint.a;
-    return;
-  }
-  vec2 beyond = abs(place) - (form.xy - form.z);
-  float distance_px = length(max(beyond, 0.0)) + min(max(beyond.x, beyond.y), 0.0) - form.z;
-  if (form.w > 0.0) distance_px = abs(distance_px + 0.5 * form.w) - 0.5 * form.w;
-  float coverage = clamp(0.5 - distance_px, 0.0, 1.0);
-  color = vec4(paint.rgb, 1.0) * paint.a * coverage;
+  color = texture(label, place) * paint.a;
 }
 )glsl";
 

@@ -14,6 +14,7 @@ extern const char* const kMeshFragmentShader;
 extern const char* const kSurfaceVertexShader;
 extern const char* const kSurfaceFragmentShader;
 extern const char* const kCanvasVertexShader;
-extern const char* const kCanvasFragmentShader;
+extern const char* const kCanvasShapeFragmentShader;
+extern const char* const kCanvasImageFragmentShader;
 
 }  // namespace docent::ui
