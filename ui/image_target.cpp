@@ -115,7 +115,8 @@ void ImageTarget::CopyFrom(const ImageTarget& other) {
   target_->BindForDrawing();
 }
 
-void ImageTarget::Present(int x, int y, int width_px, int height_px, int window_height_px) const {
+void ImageTarget::Present(int x, int y, int width_px, int height_px, int window_height_px,
+                          bool smooth) const {
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
   // OpenGL's origin is at the bottom left.
   const int bottom = window_height_px - y - height_px;
@@ -131,7 +132,7 @@ void ImageTarget::Present(int x, int y, int width_px, int height_px, int window_
   // Row 0 is the bottom of the window but the top of the image.
   const int top = window_height_px - y - box.y;
   glBlitFramebuffer(0, 0, target_->width_px(), target_->height_px(), x + box.x, top, x + box.x + box.width,
-                    top - box.height, GL_COLOR_BUFFER_BIT, GL_LINEAR);
+                    top - box.height, GL_COLOR_BUFFER_BIT, smooth ? GL_LINEAR : GL_NEAREST);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
 }
 

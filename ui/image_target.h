@@ -35,7 +35,8 @@ class ImageTarget {
   void CopyFrom(const ImageTarget& other);
   // Copies the target to a part of the default framebuffer, centred and as large as fits; the rest of the
   // part becomes black. (x, y) is the part's upper left corner in a window of this height.
-  void Present(int x, int y, int width_px, int height_px, int window_height_px) const;
+  // `smooth`: pixels are interpolated, which costs more.
+  void Present(int x, int y, int width_px, int height_px, int window_height_px, bool smooth = true) const;
   // The texture of the image that was drawn last, whose colours are in the order of its bytes; 0 for none.
   GLuint video() const { return video_width_px_ > 0 ? video_.name() : 0; }
   bool empty() const { return target_ == nullptr; }

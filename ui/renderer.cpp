@@ -156,6 +156,7 @@ struct Renderer::Impl {
   }
 
   double scale = 1;  // Of the drawn image; see SetQuality.
+  bool smooth = true;
   std::optional<engine::CameraModel> scaled_from;
   engine::CameraModel scaled;
   ImageTarget image;
@@ -230,8 +231,9 @@ void Renderer::Draw(const View& view) {
   impl_->canvas.End();
 }
 
-void Renderer::SetQuality(int samples, double scale) {
+void Renderer::SetQuality(int samples, double scale, bool smooth) {
   impl_->scale = scale;
+  impl_->smooth = smooth;
   impl_->content.SetSamples(samples);
 }
 
@@ -241,7 +243,7 @@ void Renderer::Present(int width_px, int height_px) {
 
 void Renderer::PresentWithHeadsUp(const View& view, const WindowPart& part, const HeadsUpStyle& style) {
   impl_->PrepareCard(view, part.width_px, part.height_px, style);
-  impl_->image.Present(part.x, part.y, part.width_px, part.height_px, part.window_height_px);
+  impl_->image.Present(part.x, part.y, part.width_px, part.height_px, part.window_height_px, impl_->smooth);
   if (!view.overlay.hud) return;
   Canvas& canvas = impl_->window_canvas;
   canvas.Begin(part.width_px, part.height_px, true);

@@ -173,8 +173,9 @@ class Renderer {
   // (SetQuality).
   void Draw(const View& view);
   // From the next Draw on: `samples` as in RendererOptions, and the size of the drawn image in sizes of the
-  // camera's (1 at first), with which ReadBack and the camera's pixels agree only at 1.
-  void SetQuality(int samples, double scale);
+  // camera's (1 at first), with which ReadBack and the camera's pixels agree only at 1. `smooth`:
+  // PresentWithHeadsUp interpolates its pixels.
+  void SetQuality(int samples, double scale, bool smooth = true);
   // Shows the last drawn image in the default framebuffer, letterboxed to width_px x height_px.
   void Present(int width_px, int height_px);
   // Shows the last drawn image in a part of the default framebuffer, letterboxed, and over it the view's

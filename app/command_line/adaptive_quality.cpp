@@ -42,7 +42,7 @@ void AdaptiveQuality::Apply(double pixels_per_pixel, ui::Renderer* renderer, ui:
   // In steps of an eighth, so that a window that is resized does not need a new lens table all the time.
   const double stepped = std::ceil(8 * pixels_per_pixel) / 8;
   const double least = std::min(1.0, quality.largest_scale);
-  renderer->SetQuality(quality.samples, std::clamp(stepped, least, quality.largest_scale));
+  renderer->SetQuality(quality.samples, std::clamp(stepped, least, quality.largest_scale), quality.smooth);
   view->shadows = view->shadows && quality.shadows;
 }
 

@@ -27,30 +27,30 @@ struct Machine {
 };
 
 TEST(DrawingLadder, KeepsTheBestQualityOnAFastMachine) {
-  Machine machine{{0.02, 0.01, 0.008, 0.005, 0.002}};
+  Machine machine{{0.02, 0.01, 0.008, 0.005, 0.002, 0.001}};
   machine.Run(60);
   EXPECT_EQ(machine.ladder.rung(), 0u);
 }
 
 TEST(DrawingLadder, GoesDownWithinSecondsToWhatTheMachineCanDraw) {
-  Machine machine{{0.9, 0.4, 0.3, 0.15, 0.06}};
+  Machine machine{{0.9, 0.4, 0.3, 0.15, 0.12, 0.06}};
   machine.Run(6);
-  EXPECT_EQ(machine.ladder.rung(), 4u);
-  Machine other{{0.15, 0.08, 0.06, 0.04, 0.02}};
+  EXPECT_EQ(machine.ladder.rung(), 5u);
+  Machine other{{0.15, 0.08, 0.06, 0.04, 0.02, 0.01}};
   other.Run(3);
   EXPECT_EQ(other.ladder.rung(), 1u);
 }
 
 TEST(DrawingLadder, GoesDownAtOnceWhereTheFirstFramesAreFarTooSlow) {
   // With a tenth of a processor; see kDrawingLadder.
-  Machine machine{{2.2, 0.9, 0.7, 0.4, 0.19}};
+  Machine machine{{2.2, 0.9, 0.7, 0.4, 0.19, 0.15}};
   machine.Run(4.3);
-  EXPECT_EQ(machine.ladder.rung(), 4u);
+  EXPECT_EQ(machine.ladder.rung(), 5u);
   EXPECT_EQ(machine.changes, 1);
 }
 
 TEST(DrawingLadder, IsNotMovedByASingleSlowFrame) {
-  Machine machine{{0.02, 0.01, 0.008, 0.005, 0.002}};
+  Machine machine{{0.02, 0.01, 0.008, 0.005, 0.002, 0.001}};
   for (int i = 0; i < 20; ++i) {
     machine.Run(2);
     machine.now_s += 0.4;
@@ -60,17 +60,17 @@ TEST(DrawingLadder, IsNotMovedByASingleSlowFrame) {
 }
 
 TEST(DrawingLadder, ComesBackWhenTheLoadIsGone) {
-  Machine machine{{0.9, 0.4, 0.3, 0.15, 0.06}};
+  Machine machine{{0.9, 0.4, 0.3, 0.15, 0.12, 0.06}};
   machine.Run(6);
-  ASSERT_EQ(machine.ladder.rung(), 4u);
-  machine.cost_s = {0.02, 0.01, 0.008, 0.005, 0.002};
+  ASSERT_EQ(machine.ladder.rung(), 5u);
+  machine.cost_s = {0.02, 0.01, 0.008, 0.005, 0.002, 0.001};
   machine.Run(120);
   EXPECT_EQ(machine.ladder.rung(), 0u);
 }
 
 TEST(DrawingLadder, TriesAHigherQualityInVainEverMoreSeldom) {
   // The second rung is drawn fast enough to try the first one, which is too slow.
-  Machine machine{{0.15, 0.02, 0.01, 0.008, 0.005}};
+  Machine machine{{0.15, 0.02, 0.01, 0.008, 0.005, 0.004}};
   machine.Run(60);
   const int first_minute = std::exchange(machine.changes, 0);
   machine.Run(540);
