@@ -17,8 +17,8 @@ struct DrawingQuality {
 };
 
 // From the best to the cheapest. Measured with Mesa's software renderer, in a window of 1280 x 800 with a
-// camera of 640 x 480 pixels in the museum of the simulator: an image took 240, 85, 75, 28 and 19 ms of the
-// cores in the renderer on the first five, most of it for shadows, and 4 ms less without smoothing.
+// camera of 640 x 480 pixels in the museum of the simulator: an image took 240, 85, 75, 28 and 19 ms of
+// processor time with the first five, most of it for shadows, and 4 ms less without smoothing.
 inline constexpr std::array<DrawingQuality, 6> kDrawingLadder = {{
     {"the resolution of the window", 4, 2.0, true, true},
     {"the resolution of the camera", 4, 1.0, true, true},

@@ -35,6 +35,32 @@ Layout MakeLayout(cairo_t* cairo, const std::string& text, const TextStyle& styl
   return layout;
 }
 
+// The blocks of Unicode whose letters run from right to left (DerivedBidiClass.txt: the default classes R and
+// AL).
+bool RunsFromRight(gunichar letter) {
+  return (letter >= 0x590 && letter <= 0x8ff) || (letter >= 0xfb1d && letter <= 0xfdff) ||
+         (letter >= 0xfe70 && letter <= 0xfeff) || (letter >= 0x10800 && letter <= 0x10fff) ||
+         (letter >= 0x1e800 && letter <= 0x1efff);
+}
+
+// Pango takes the direction of a line from its first letter. A text from right to left that begins with a
+// name in Latin letters would have its full stops at the wrong end.
+std::string WithDirection(const std::string& text) {
+  constexpr const char* kRightToLeftMark = "\u200f";
+  int from_left = 0, from_right = 0;
+  for (const char* at = text.c_str(); *at != '\0'; at = g_utf8_next_char(at)) {
+    const gunichar character = g_utf8_get_char(at);
+    if (g_unichar_isalpha(character)) ++(RunsFromRight(character) ? from_right : from_left);
+  }
+  if (from_right <= from_left) return text;
+  std::string marked = kRightToLeftMark;
+  for (const char character : text) {
+    marked += character;
+    if (character == '\n') marked += kRightToLeftMark;
+  }
+  return marked;
+}
+
 }  // namespace
 
 bool TextStyle::operator==(const TextStyle& other) const {
@@ -72,7 +98,7 @@ cv::Mat DrawText(std::string_view text, const TextStyle& style, bool* is_cut) {
   // The text is measured on a surface of one pixel and then drawn on a surface of the right size.
   const Surface probe(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, 1, 1));
   const Cairo probe_cairo(cairo_create(probe.get()));
-  const std::string readable = ReadableText(text);
+  const std::string readable = WithDirection(ReadableText(text));
   const Layout layout = MakeLayout(probe_cairo.get(), readable, style);
   if (is_cut != nullptr) *is_cut = pango_layout_is_ellipsized(layout.get()) != FALSE;
   PangoRectangle ink, logical;

@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "tests/ui/ui_testing.h"
+#include "ui/label_board.h"
 #include "ui/renderer.h"
 
 namespace docent::ui {
@@ -127,6 +128,18 @@ TEST_F(LabelsOfVisitors, AreNotReadThroughTheNameOfAPlaceThatIsReached) {
   };
   ASSERT_GT(changed(nothing, drawn(0, true)), 100) << "the label lies there";
   EXPECT_EQ(changed(name, drawn(1, true)), 0);
+}
+
+TEST(TextDirection, IsThatOfMostOfItsLetters) {
+  const auto looks_equal = [](const std::string& a, const std::string& b) {
+    const cv::Mat first = DrawText(a, {}), second = DrawText(b, {});
+    return first.size() == second.size() && cv::norm(first, second, cv::NORM_INF) == 0;
+  };
+  const std::string arabic =
+      "Ships: \u0627\u0644\u0641\u064a\u0644 \u0627\u0644\u0623\u0641\u0631\u064a\u0642\u064a.";
+  const std::string english = "The word \u0641\u064a\u0644 means elephant.";
+  EXPECT_TRUE(looks_equal(arabic, "\u200f" + arabic));
+  EXPECT_TRUE(looks_equal(english, "\u200e" + english));
 }
 
 }  // namespace
