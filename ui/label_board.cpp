@@ -128,16 +128,22 @@ std::vector<PlacedLabel> LabelsInView(const content::Scene& scene, const LabelVi
   return labels;
 }
 
-// So that no board covers another one, or one of these.
+// The board as far inside as it fits, so that its text can be read to the end.
+Eigen::AlignedBox2d MovedInside(const Eigen::AlignedBox2d& board, const Eigen::AlignedBox2d& bounds) {
+  const Eigen::Vector2d low = board.min().cwiseMin(bounds.max() - board.sizes()).cwiseMax(bounds.min());
+  return {low, low + board.sizes()};
+}
+
+// So that no board covers another one, or one of these, or is cut off at the edge.
 void MoveApart(const Canvas& canvas, std::vector<Eigen::AlignedBox2d> boards,
                std::vector<PlacedLabel>* labels) {
   constexpr double kGap = 4;  // Pixels: an edge is seen between two boards.
   std::size_t next = boards.size();
-  for (const PlacedLabel& label : *labels) {
-    if (!label.board.isEmpty()) boards.push_back(label.board);
-  }
   const Eigen::AlignedBox2d bounds(Eigen::Vector2d::Zero(),
                                    Eigen::Vector2d(canvas.width_px(), canvas.height_px()));
+  for (const PlacedLabel& label : *labels) {
+    if (!label.board.isEmpty()) boards.push_back(MovedInside(label.board, bounds));
+  }
   const auto placed = LayOutApart(boards, bounds, kGap);
   for (PlacedLabel& label : *labels) {
     if (!label.board.isEmpty()) label.board = placed[next++];

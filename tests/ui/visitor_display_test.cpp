@@ -130,6 +130,28 @@ TEST_F(LabelsOfVisitors, AreNotReadThroughTheNameOfAPlaceThatIsReached) {
   EXPECT_EQ(changed(name, drawn(1, true)), 0);
 }
 
+TEST_F(LabelsOfVisitors, AreNotCutOffAtTheEdge) {
+  content::Scene scene;
+  // Their points are seen just inside the right edge and the upper one.
+  for (const Eigen::Vector3d& anchor : {Eigen::Vector3d(1.25, 0, 2), Eigen::Vector3d(0, -0.9, 2)}) {
+    content::Entity& label = scene.entities.emplace_back();
+    label.name = "label-" + std::to_string(scene.entities.size());
+    label.kind = content::Entity::Kind::kLabel;
+    label.label.text = "Restored in 1931";
+    label.label.anchor = anchor;
+    label.label.text_height = 0.1;
+  }
+  Canvas canvas;
+  canvas.Begin(640, 480);
+  const std::string language;
+  const engine::Rigid3 identity;
+  const LabelView seen{kViewsCamera, identity, FitImage(640, 480, 640, 480), language};
+  const std::vector<DrawnBoard> boards = DrawLabels(scene, seen, &canvas);
+  ASSERT_EQ(boards.size(), 2u);
+  const Eigen::AlignedBox2d window(Eigen::Vector2d(0, 0), Eigen::Vector2d(640, 480));
+  for (const DrawnBoard& drawn : boards) EXPECT_TRUE(window.contains(drawn.board));
+}
+
 TEST(TextDirection, IsThatOfMostOfItsLetters) {
   const auto looks_equal = [](const std::string& a, const std::string& b) {
     const cv::Mat first = DrawText(a, {}), second = DrawText(b, {});
