@@ -2,9 +2,11 @@
 #include "ui/visitor_display.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "ui/figures.h"
+#include "ui/label_board.h"
 #include "ui/letterbox.h"
 #include "ui/theme.h"
 #include "ui/visitor_layout.h"
@@ -85,31 +87,88 @@ void DrawArrival(const std::string& place, double opacity, double unit, Canvas* 
   canvas->Text(place, style, {middle.x(), middle.y() - 0.5 * size.y()}, 0.5);
 }
 
+// The boards of the signposts in view.
+std::vector<Eigen::AlignedBox2d> SignsInWindow(const View& view, const Letterbox& box) {
+  std::vector<Eigen::AlignedBox2d> signs;
+  if (view.scene == nullptr || view.tracked == nullptr || !engine::HasPose(view.tracked->state)) return signs;
+  for (const Eigen::AlignedBox2d& sign : SignBoards(*view.scene, *view.camera, view.tracked->camera_from_map))
+    signs.emplace_back(box.WindowFromImage(sign.min()), box.WindowFromImage(sign.max()));
+  return signs;
+}
+
+// The text of an arrow at the edge of the image.
+struct WayLabel {
+  TextStyle style;
+  Eigen::AlignedBox2d board;
+  Eigen::Vector2d corner = Eigen::Vector2d::Zero();  // Of the text.
+};
+
+constexpr double kWayTail = 44, kWayHead = 16;  // Length of an arrow and half its width, in units.
+
+// Behind the arrow, to one of its sides, or above or below a signpost: where it covers the least of signposts
+// and of the arrow, inside the window.
+WayLabel LabelOf(const WayOn& way, const View& view, double unit, Canvas* canvas) {
+  const engine::CameraModel& camera = *view.camera;
+  const Letterbox box =
+      FitImage(camera.width_px(), camera.height_px(), canvas->width_px(), canvas->height_px());
+  const Eigen::Vector2d ahead = way.arrow.direction, aside(-ahead.y(), ahead.x());
+  const Eigen::Vector2d tail = box.WindowFromImage(way.arrow.tip) - kWayTail * unit * ahead;
+  WayLabel label;
+  label.style.size_px = 18 * unit;
+  label.style.max_width_px = std::max(40, static_cast<int>(0.4 * canvas->width_px()));
+  label.style.max_height_px = static_cast<int>(60 * unit);
+  label.style.color = kTitle;
+  const Eigen::Vector2d size = canvas->Measure(way.text, label.style), padding(10 * unit, 5 * unit);
+  const Eigen::Vector2d half = 0.5 * size + padding;
+  const Eigen::Vector2d last(canvas->width_px() - 1, canvas->height_px() - 1);
+  const auto at = [&](const Eigen::Vector2d& wanted) {
+    const Eigen::Vector2d middle = wanted.cwiseMin(last - half).cwiseMax(half);
+    return Eigen::AlignedBox2d(middle - half, middle + half);
+  };
+  const double gap = 10 * unit;
+  const Eigen::Vector2d tip = box.WindowFromImage(way.arrow.tip), head = kWayHead * unit * aside.cwiseAbs();
+  const Eigen::AlignedBox2d arrow(tip.cwiseMin(tail) - head, tip.cwiseMax(tail) + head);
+  const Eigen::Vector2d behind = tail - (gap + half.cwiseProduct(ahead).norm()) * ahead;
+  const double reach = gap + kWayHead * unit + half.cwiseProduct(aside).norm();
+  std::vector<Eigen::AlignedBox2d> places = {at(behind), at(arrow.center() - reach * aside),
+                                             at(arrow.center() + reach * aside)};
+  const std::vector<Eigen::AlignedBox2d> signs = SignsInWindow(view, box);
+  for (const Eigen::AlignedBox2d& sign : signs) {
+    places.push_back(at({behind.x(), sign.min().y() - gap - half.y()}));
+    places.push_back(at({behind.x(), sign.max().y() + gap + half.y()}));
+  }
+  double least = std::numeric_limits<double>::infinity();
+  for (const Eigen::AlignedBox2d& place : places) {
+    const auto common = [&](const Eigen::AlignedBox2d& other) {
+      const Eigen::AlignedBox2d both = place.intersection(other);
+      return both.isEmpty() ? 0.0 : both.volume();
+    };
+    double covered = common(arrow);
+    for (const Eigen::AlignedBox2d& sign : signs) covered += common(sign);
+    if (covered >= least) continue;
+    least = covered;
+    label.board = place;
+  }
+  label.corner = label.board.center() - 0.5 * size;
+  return label;
+}
+
 // An arrow at the edge of the image with its text beside it.
-void DrawWayOn(const WayOn& way, const engine::CameraModel& camera, double unit, Canvas* canvas) {
+void DrawWayOn(const WayOn& way, const View& view, double unit, Canvas* canvas) {
+  const engine::CameraModel& camera = *view.camera;
   const Letterbox box =
       FitImage(camera.width_px(), camera.height_px(), canvas->width_px(), canvas->height_px());
   const Eigen::Vector2d tip = box.WindowFromImage(way.arrow.tip), ahead = way.arrow.direction;
-  const Eigen::Vector2d aside(-ahead.y(), ahead.x()), tail = tip - 44 * unit * ahead;
+  const Eigen::Vector2d aside(-ahead.y(), ahead.x()), tail = tip - kWayTail * unit * ahead;
   for (const auto& [width, color] : {std::pair(12 * unit, kBoard), std::pair(7 * unit, kWay)}) {
     canvas->Line(tail, tip, width, color);
     for (const double side : {-1.0, 1.0})
-      canvas->Line(tip, tip - 18 * unit * ahead + side * 16 * unit * aside, width, color);
+      canvas->Line(tip, tip - 18 * unit * ahead + side * kWayHead * unit * aside, width, color);
   }
   if (way.text.empty()) return;
-  TextStyle style;
-  style.size_px = 18 * unit;
-  style.max_width_px = std::max(40, static_cast<int>(0.4 * canvas->width_px()));
-  style.max_height_px = static_cast<int>(60 * unit);
-  style.color = kTitle;
-  const Eigen::Vector2d size = canvas->Measure(way.text, style), padding(10 * unit, 5 * unit);
-  // Behind the arrow, where its box does not touch the arrow, and inside the image.
-  const Eigen::Vector2d half = 0.5 * size + padding;
-  const double reach = 10 * unit + half.cwiseProduct(ahead).norm();
-  const Eigen::Vector2d last(canvas->width_px() - 1, canvas->height_px() - 1);
-  const Eigen::Vector2d middle = (tail - reach * ahead).cwiseMin(last - half).cwiseMax(half);
-  canvas->Box(middle - half, middle + half, 8 * unit, kBoard);
-  canvas->Text(way.text, style, middle - 0.5 * size);
+  const WayLabel label = LabelOf(way, view, unit, canvas);
+  canvas->Box(label.board.min(), label.board.max(), 8 * unit, kBoard);
+  canvas->Text(way.text, label.style, label.corner);
 }
 
 // Corners around what the one button opens.
@@ -252,6 +311,8 @@ std::vector<Eigen::AlignedBox2d> TakenByVisitorDisplay(const View& view, const H
   const Area button = LayOutMenu(visitor, canvas->width_px(), canvas->height_px(), style).button;
   if (button.width > 0)
     taken.emplace_back(Eigen::Vector2d(button.x, button.y), Eigen::Vector2d(button.right(), button.bottom()));
+  if (visitor.way_on && view.camera != nullptr && !visitor.way_on->text.empty())
+    taken.push_back(LabelOf(*visitor.way_on, view, unit, canvas).board);
   double bottom = canvas->height_px() - 12 * unit - style.bottom_px;
   for (const auto& [text, units] : {std::pair(&view.overlay.message, 15.0), {&visitor.sentence, 20.0}}) {
     const Eigen::AlignedBox2d panel = SentencePanel(*text, units, bottom, unit, canvas);
@@ -281,7 +342,7 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
     const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.5 * (canvas->height_px() - 1));
     DrawProgressRing(middle, 16 * unit, *visitor.dwell, canvas);
   }
-  if (visitor.way_on && view.camera != nullptr) DrawWayOn(*visitor.way_on, *view.camera, unit, canvas);
+  if (visitor.way_on && view.camera != nullptr) DrawWayOn(*visitor.way_on, view, unit, canvas);
   double below = 10 * unit;
   for (const CornerLine& line : LinesInCorner(visitor, unit, canvas)) {
     canvas->Box(line.board.min(), line.board.max(), 9 * unit, kBoard);

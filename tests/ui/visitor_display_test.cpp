@@ -164,5 +164,40 @@ TEST(TextDirection, IsThatOfMostOfItsLetters) {
   EXPECT_TRUE(looks_equal(english, "\u200e" + english));
 }
 
+class WayOnOfVisitors : public OffscreenTest {};
+
+TEST_F(WayOnOfVisitors, HasItsTextWhereItDoesNotCoverTheSignpost) {
+  const cv::Mat black = cv::Mat::zeros(480, 640, CV_8UC3);
+  const engine::TrackedFrame tracked = Tracked(black);
+  content::Scene scene;
+  content::Entity& sign = scene.entities.emplace_back();
+  sign.name = "sign";
+  sign.kind = content::Entity::Kind::kSignpost;
+  sign.signpost.text = "To the clocks";
+  sign.signpost.anchor = {0.75, 0.4, 2};
+  sign.signpost.height_m = 0.3;
+  const std::vector<Eigen::AlignedBox2d> boards = SignBoards(scene, kViewsCamera, tracked.camera_from_map);
+  ASSERT_EQ(boards.size(), 1u);
+  View view;
+  view.tracked = &tracked;
+  view.camera = &kViewsCamera;
+  view.overlay.visitor.emplace();
+  view.overlay.visitor->way_on.emplace();
+  view.overlay.visitor->way_on->text = "To Clocks";
+  view.overlay.visitor->way_on->arrow.tip = {614, boards[0].center().y()};
+  Canvas canvas;
+  canvas.Begin(640, 480);
+  const auto placed = [&](const content::Scene* seen) {
+    view.scene = seen;
+    return TakenByVisitorDisplay(view, {1, 0, 0}, &canvas);
+  };
+  const auto without = placed(nullptr), with = placed(&scene);
+  ASSERT_EQ(without.size(), 1u);
+  ASSERT_EQ(with.size(), 1u);
+  EXPECT_TRUE(without[0].intersects(boards[0])) << "else it would stand behind the arrow";
+  EXPECT_FALSE(with[0].intersects(boards[0]));
+  EXPECT_TRUE(Eigen::AlignedBox2d(Eigen::Vector2d(0, 0), Eigen::Vector2d(639, 479)).contains(with[0]));
+}
+
 }  // namespace
 }  // namespace docent::ui
