@@ -197,7 +197,30 @@ std::shared_ptr<const ShownFrame> GuideRun::Lead(std::size_t camera, const Guide
   host_->GuideAgain(camera, frame->camera ? *frame->camera : *cameras_[camera].model, frame);
   frame->serial = ++serial_;
   led.last = frame;
-  return frame;
+  return OverNewest(frame);
+}
+
+std::shared_ptr<const ShownFrame> GuideRun::OverNewest(std::shared_ptr<const ShownFrame> frame) {
+  const auto& image = led_[CameraOf(frame->tracked)].untracked;
+  if (!image || image->time <= frame->tracked.frame.time) return frame;
+  if (frame->tracked.state == engine::TrackingState::kDropped) return frame;
+  auto over = std::make_shared<ShownFrame>(*frame);
+  ShowWithoutPose(*image, over.get());
+  return over;
+}
+
+void GuideRun::HandleUntracked(const engine::Frame& image, const Show& show) {
+  std::shared_ptr<ShownFrame> frame;
+  {
+    const std::scoped_lock lock(files_mutex_);
+    Led& led = led_[static_cast<std::size_t>(image.camera)];
+    if (!led.last) return;
+    led.untracked = image;
+    frame = std::make_shared<ShownFrame>(*led.last);
+    ShowWithoutPose(image, frame.get());
+    frame->serial = ++serial_;
+  }
+  show(std::move(frame));
 }
 
 void GuideRun::TakeRefusal(const ShownFrame& frame, CameraState* state) {
@@ -277,6 +300,9 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   run.options.trouble = [this, &state, &show](const std::string& sentence, Timestamp time) {
     HandleTrouble(sentence, time, show, &state);
   };
+  // What is recorded has the images in their order.
+  if (host_ && !request_.headless && !request_.record && !request_.on_image)
+    run.options.untracked = [this, &show](const engine::Frame& image) { HandleUntracked(image, show); };
   // Visitors who watch a recording act in it.
   run.options.no_faster_than_times = !request_.may_write && !request_.headless;
   run.options.latency = [&state](Timestamp age) { state.age = age; };
@@ -368,6 +394,8 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
     frame = MakeShown(tracked, state);
     if (age) frame->taken = PlayClock().Now() - *age;
     if (host_ && tracked.state != engine::TrackingState::kDropped) led_[CameraOf(tracked)].last = frame;
+    // Content is seen on its own image, even if that is older.
+    if (engine::HasPose(tracked.state)) led_[CameraOf(tracked)].untracked.reset();
   }
   {
     const std::scoped_lock lock(files_mutex_);
@@ -384,7 +412,12 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
   for (const auto& head : heads_) head->AddView(tracked);
   if (tracked.frame.camera == 0) Direct(frame);
   if (tracked.state != engine::TrackingState::kDropped) state->last = frame;
-  show(std::move(frame));
+  std::shared_ptr<const ShownFrame> over;
+  {
+    const std::scoped_lock lock(files_mutex_);
+    over = OverNewest(std::move(frame));
+  }
+  show(std::move(over));
 }
 
 void GuideRun::HandleIdle(const engine::TrackedFrame& tracked, bool at_end, const Show& show,

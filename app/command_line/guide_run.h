@@ -77,6 +77,11 @@ class GuideRun {
   void HandleCarriedOut(const TimedCommand& command, CameraState* state);
   void HandleTrouble(const std::string& sentence, Timestamp time, const Show& show, CameraState* state);
   void HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state);
+  // Shows the visitor an image while an older one is tracked. See FrameLoopOptions::untracked.
+  void HandleUntracked(const engine::Frame& image, const Show& show);
+  // The frame, or if an image that is newer is on the screen already, what the frame says over that image.
+  // With files_mutex_ held.
+  std::shared_ptr<const ShownFrame> OverNewest(std::shared_ptr<const ShownFrame> frame);
   // Whether the visitor's last step was refused, since Lead. With files_mutex_ held.
   void TakeRefusal(const ShownFrame& frame, CameraState* state);
   // Between images of a paused recording, and after its last one.
@@ -115,6 +120,8 @@ class GuideRun {
     std::shared_ptr<const ShownFrame> last;
     std::string refusal;
     bool is_new = false;
+    // An image that was shown without a pose and is newer than that of `last`.
+    std::optional<engine::Frame> untracked = {};
   };
   std::vector<Led> led_;
   // What a visitor is to hear together with an image of the first camera that is not on the screen yet, with

@@ -21,6 +21,7 @@ void GapReporter::Report(const engine::Frame& frame, const FrameCallback& shown)
 bool CameraFeed::Fetch(const std::stop_token& stop) {
   FrameSource& source = *run_.camera->source;
   while (!stop.stop_requested()) {
+    if (untracked_ && untracked_->has_ended()) return false;
     late_ = WillBeLate();
     frame_ = engine::Frame();
     if (!(late_ ? source.NextLate(&frame_) : source.Next(&frame_))) return false;
@@ -74,11 +75,36 @@ void CameraFeed::Handle(const std::stop_token& stop) {
     last_processed_ = {std::chrono::steady_clock::now(), frame_.time};
   }
   SetHeadRotation();
-  tracked = session_->Process(frame_);
+  tracked = Track();
   ReportLatency();
   command_runner_.RunDue(frame_.time - *first_time_, tracked);
   run_.shown(tracked);
+  ReportUntracked();
   last_tracked_ = std::move(tracked);
+}
+
+engine::TrackedFrame CameraFeed::Track() {
+  if (!untracked_) return session_->Process(frame_);
+  // After an image with content, the content stays in place for this long (VisitTimes::held), and its
+  // image with it. Else an image stays for less than a fifth of a second, until the next one is drawn.
+  constexpr std::chrono::milliseconds kHeld{500}, kWithout{150};
+  const bool has_content = last_tracked_ && engine::HasPose(last_tracked_->state);
+  engine::TrackedFrame tracked;
+  untracked_->During([&] { tracked = session_->Process(frame_); }, has_content ? kHeld : kWithout,
+                     frame_.time, clock_offset_);
+  return tracked;
+}
+
+void CameraFeed::ReportUntracked() {
+  if (!untracked_) return;
+  for (engine::Frame& frame : untracked_->TakeFetched()) {
+    if (live_) gaps_.Report(frame, run_.shown);
+    frame_ = frame;  // The time after which the next image is due.
+    engine::TrackedFrame dropped;
+    dropped.frame = std::move(frame);
+    dropped.state = engine::TrackingState::kDropped;
+    run_.shown(dropped);
+  }
 }
 
 void CameraFeed::CarryOutGiven() {

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -11,6 +12,7 @@
 #include "app/session/command_runner.h"
 #include "app/session/frame_loop.h"
 #include "app/session/play_clock.h"
+#include "app/session/untracked_images.h"
 
 namespace docent::app {
 
@@ -35,7 +37,11 @@ class CameraFeed {
         clock_(clock),
         live_(run.camera->source->info().live),
         period_(FromSeconds(1 / run.camera->source->info().nominal_fps)),
-        command_runner_(run.options, session) {}
+        command_runner_(run.options, session) {
+    if (run.options.untracked && run.options.pace == Pace::kRealtime)
+      untracked_ = std::make_unique<UntrackedImages>(run.camera->source.get(), clock, run.options.camera,
+                                                     run.options.untracked);
+  }
 
   // Gets the next image; false at the end of the source or when stop is requested.
   bool Fetch(const std::stop_token& stop);
@@ -73,6 +79,10 @@ class CameraFeed {
   // skipped.
   bool WillBeLate();
   void ReportLatency();
+  // Tracks the image of the last Fetch, and meanwhile shows others if that takes long.
+  engine::TrackedFrame Track();
+  // Passes on what was fetched meanwhile.
+  void ReportUntracked();
   // Carries out what the person wants while images are dropped or missing.
   void CarryOutGiven();
 
@@ -93,6 +103,7 @@ class CameraFeed {
   std::optional<std::pair<std::chrono::steady_clock::time_point, Timestamp>> last_processed_;
   std::optional<engine::TrackedFrame> last_tracked_;
   std::string trouble_;
+  std::unique_ptr<UntrackedImages> untracked_;  // Null if no images are fetched during others.
 };
 
 }  // namespace docent::app

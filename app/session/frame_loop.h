@@ -64,6 +64,10 @@ struct FrameLoopOptions {
   // timestamp, for a recording in realtime since the time at which it was due. On the camera's thread; may be
   // empty.
   std::function<void(Timestamp)> latency;
+  // In realtime: called with images that are fetched while an older one is tracked for long, so that a person
+  // sees a window that goes on (UntrackedImages). On another thread, while that of the camera waits. They
+  // are passed on as dropped, without their image, after the one that is tracked. Empty: none are fetched.
+  std::function<void(const engine::Frame&)> untracked;
   // Of a recording in lockstep or eager pace: no image is processed before as much time has passed since the
   // one before as lies between them, so that a person can follow, unless the clock is in fast forward. None
   // is dropped.

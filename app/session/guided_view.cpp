@@ -5,6 +5,23 @@
 
 namespace docent::app {
 
+void ShowWithoutPose(const engine::Frame& image, ShownFrame* frame) {
+  frame->seconds += ToSeconds(image.time - frame->tracked.frame.time);
+  frame->taken.reset();
+  frame->tracked = engine::TrackedFrame();
+  frame->tracked.frame = image;
+  frame->tracked.state = engine::TrackingState::kLost;
+  frame->held_camera_from_map.reset();
+  frame->shown.scene.reset();
+  frame->shown.surfaces.reset();
+  frame->way.reset();
+  if (!frame->visitor) return;
+  frame->visitor->way_on.reset();
+  frame->visitor->targets.clear();
+  frame->visitor->marked.reset();
+  frame->visitor->dwell.reset();
+}
+
 ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   ui::View view;
   view.tracked = &frame.tracked;

@@ -42,6 +42,10 @@ struct ShownFrame {
   std::shared_ptr<const engine::CameraModel> camera = nullptr;
 };
 
+// Lets a frame show another image of its camera, which has no pose, and so no content, but everything that is
+// said.
+void ShowWithoutPose(const engine::Frame& image, ShownFrame* frame);
+
 // The input of the renderer; it points into `frame` and `camera`.
 ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera);
 
