@@ -42,7 +42,7 @@ CornerLine LineInCorner(const std::string& text, double top, const CornerStyle& 
   // Beside a wide line is room for other things; above an image in an upright window is nothing else.
   const double share = canvas->width_px() > canvas->height_px() ? 0.6 : 0.9;
   line.style.max_width_px = std::max(40, static_cast<int>(share * canvas->width_px()));
-  line.style.max_height_px = static_cast<int>(32 * unit);
+  line.style.max_height_px = static_cast<int>(56 * unit);  // Two lines, as the end of a tour in German needs.
   line.style.color = kTitle;
   const Eigen::Vector2d size = canvas->Measure(text, line.style);
   const Eigen::Vector2d padding(12 * unit, 7 * unit);

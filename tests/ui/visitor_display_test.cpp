@@ -152,6 +152,21 @@ TEST_F(LabelsOfVisitors, AreNotCutOffAtTheEdge) {
   for (const DrawnBoard& drawn : boards) EXPECT_TRUE(window.contains(drawn.board));
 }
 
+class CornerLines : public OffscreenTest {};
+
+TEST_F(CornerLines, ALongOneHasTwoRowsInsteadOfBeingCut) {
+  Canvas canvas;
+  canvas.Begin(640, 480);
+  const auto height = [&](const std::string& line) {
+    View view;
+    view.overlay.visitor.emplace().route_line = line;
+    return TakenByVisitorDisplay(view, {1, 0, 0}, &canvas).at(0).sizes().y();
+  };
+  const double short_px = height("Zu Ende");
+  // The width is 60 % of the window's.
+  EXPECT_GT(height("Die Führung endet hier. Sie haben alle 12 Stationen gesehen."), short_px + 14);
+}
+
 TEST(TextDirection, IsThatOfMostOfItsLetters) {
   const auto looks_equal = [](const std::string& a, const std::string& b) {
     const cv::Mat first = DrawText(a, {}), second = DrawText(b, {});
