@@ -19,7 +19,8 @@ class AdaptiveQuality {
   // Draws one of everything at every quality, as a driver without a graphics card takes seconds to compile
   // what it has not drawn before, in which a visitor's image would freeze.
   static void WarmUp(ui::Renderer* renderer);
-  // Sets the quality of the next image, of which one of the camera's pixels covers this many of the window.
+  // Sets the quality of the next image, of which one of the camera's pixels covers this many of the window,
+  // and leaves the shadows out of its view where drawing them takes too long.
   void Apply(double pixels_per_pixel, ui::Renderer* renderer, ui::View* view) const;
   // An image was drawn from `begin` to now. Returns what has changed, in words, if anything has.
   std::optional<std::string> Add(Clock::time_point begin, Clock::time_point now);
