@@ -114,11 +114,12 @@ std::vector<PlacedLabel> LabelsInView(const content::Scene& scene, const LabelVi
     label.drawn = *drawn;
     label.entity = &entity.name;
     label.text = &content::ShownText(entity, view.language);
-    label.style = LabelStyle(drawn->text_px);
+    label.drawn.text_px = std::max(label.drawn.text_px, view.least_text_px);
+    label.style = LabelStyle(label.drawn.text_px);
     label.opacity = entity.hidden ? kFaintOpacity : 1;
     if (!IsLabelFar(entity.label, eye)) {
       const Eigen::Vector2d size = canvas->Measure(*label.text, label.style);
-      const Eigen::Vector2d padding = drawn->text_px * Eigen::Vector2d(kPaddingX, kPaddingY);
+      const Eigen::Vector2d padding = label.drawn.text_px * Eigen::Vector2d(kPaddingX, kPaddingY);
       label.board.min() =
           drawn->foot - Eigen::Vector2d(0.5 * size.x() + padding.x(), size.y() + 2 * padding.y());
       label.board.max() = Eigen::Vector2d(drawn->foot.x() + 0.5 * size.x() + padding.x(), drawn->foot.y());

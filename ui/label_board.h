@@ -36,7 +36,8 @@ struct LabelView {
   const std::string& language;              // Of the reader; it chooses the texts (TextFor).
   std::span<const std::string> faint = {};  // Hidden labels that are drawn all the same, faintly, by name.
   std::span<const Eigen::AlignedBox2d> taken =
-      {};  // Parts of the canvas that boards keep clear of, as texts lie there.
+      {};                    // Parts of the canvas that boards keep clear of, as texts lie there.
+  double least_text_px = 0;  // Of the canvas; no text of a label is drawn smaller.
 };
 
 // Where the boards of signposts are in the image, about: labels keep clear of them.

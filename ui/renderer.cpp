@@ -80,7 +80,10 @@ struct Renderer::Impl {
       std::vector<Eigen::AlignedBox2d> taken;
       if (view.overlay.visitor && !has_card) taken = TakenByVisitorDisplay(view, above, target);
       if (!caption.isEmpty() && !has_card) taken.push_back(caption);
-      boards = DrawLabels(*view.scene, {*view.camera, *from, box, language, view.faint, taken}, target);
+      // An image that is small in its window makes texts small that a visitor is to read.
+      const double least_px = view.overlay.visitor ? kNormalTextUnits * style.unit_px : 0;
+      boards =
+          DrawLabels(*view.scene, {*view.camera, *from, box, language, view.faint, taken, least_px}, target);
     }
     if (view.overlay.visitor) card_targets = MovedToBoards(view.overlay.visitor->targets, boards, box);
     if (has_card) return DrawCardWithTexts(view, style, target);

@@ -9,7 +9,6 @@ namespace docent::ui {
 
 namespace {
 
-constexpr double kTextUnits = 15;      // Of a text of normal size; see HeadsUpStyle.
 constexpr double kCapitalRatio = 0.7;  // Height of a capital letter over the em, of common sans-serif fonts.
 
 // The longest choice of a menu, in any language, needs less.
@@ -32,7 +31,7 @@ double VisitorUnit_px(int width_px, int height_px, double pixels_per_mm) {
   const double side = std::min(width_px, height_px);
   const double letter_mm =
       2 * kReadingDistance_mm * std::tan(0.5 * kLeastLetter_deg * std::numbers::pi / 180);
-  const double legible = letter_mm / kCapitalRatio * pixels_per_mm / kTextUnits;
+  const double legible = letter_mm / kCapitalRatio * pixels_per_mm / kNormalTextUnits;
   // A window with fewer than 300 units would have no room for a sentence.
   return std::clamp(std::max(side / 480, std::min(legible, side / 300)), 0.5, 6.0);
 }

@@ -16,6 +16,7 @@ inline constexpr double kTouchTarget_mm = 9;
 // recommends 20 to 22 minutes of arc and takes 16 as the limit).
 inline constexpr double kLeastLetter_deg = 0.4;
 inline constexpr double kReadingDistance_mm = 400;  // Of a tablet in the hand.
+inline constexpr double kNormalTextUnits = 15;      // Of a text of normal size; see HeadsUpStyle.
 
 // Pixels of the canvas per unit, of which a normal text has 15, for a display of this size: texts grow with
 // it and are legible at the reading distance, as far as the display is large enough for that.

@@ -152,6 +152,32 @@ TEST_F(LabelsOfVisitors, AreNotCutOffAtTheEdge) {
   for (const DrawnBoard& drawn : boards) EXPECT_TRUE(window.contains(drawn.board));
 }
 
+TEST_F(LabelsOfVisitors, AreNotDrawnSmallerThanCanBeRead) {
+  content::Scene scene;
+  content::Entity& label = scene.entities.emplace_back();
+  label.name = "label-1";
+  label.kind = content::Entity::Kind::kLabel;
+  label.label.text = "Restored in 1931";
+  label.label.anchor = {0, 0, 4};
+  label.label.text_height = 0.05;
+  Canvas canvas;
+  canvas.Begin(640, 480);
+  const std::string language;
+  const engine::Rigid3 identity;
+  const auto height = [&](double least_text_px) {
+    LabelView seen{kViewsCamera, identity, FitImage(640, 480, 640, 480), language};
+    seen.least_text_px = least_text_px;
+    const std::vector<DrawnBoard> boards = DrawLabels(scene, seen, &canvas);
+    return boards.size() == 1 ? boards[0].board.sizes().y() : 0;
+  };
+  const double small = height(0);
+  ASSERT_GT(small, 0);
+  EXPECT_EQ(height(1), small);
+  // A line of text and its padding are proportional to the text's size.
+  EXPECT_NEAR(height(40) / height(20), 2, 0.1);
+  EXPECT_GT(height(40), 40);
+}
+
 class CornerLines : public OffscreenTest {};
 
 TEST_F(CornerLines, ALongOneHasTwoRowsInsteadOfBeingCut) {
