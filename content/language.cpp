@@ -33,17 +33,31 @@ std::string LanguageTag(std::string_view text) {
   return part == 0 || (is_first && part < 2) ? "" : tag;
 }
 
-const std::string& TextFor(const std::string& language, const std::string& first,
-                           const Translations& translations) {
+namespace {
+
+// The variant for a reader of this language; null if there is none.
+const std::string* FindVariant(const std::string& language, const Translations& translations) {
   for (std::string range = language; !range.empty();) {
-    if (const auto found = translations.find(range); found != translations.end()) return found->second;
+    if (const auto found = translations.find(range); found != translations.end()) return &found->second;
     std::size_t end = range.rfind('-');
     if (end == std::string::npos) break;
     // A single letter or digit only introduces the part after it.
     if (end >= 2 && range[end - 2] == '-') end -= 2;
     range.resize(end);
   }
-  return first;
+  return nullptr;
+}
+
+}  // namespace
+
+const std::string& TextFor(const std::string& language, const std::string& first,
+                           const Translations& translations) {
+  const std::string* const variant = FindVariant(language, translations);
+  return variant != nullptr ? *variant : first;
+}
+
+bool HasVariant(const std::string& language, const Translations& translations) {
+  return language.empty() || FindVariant(language, translations) != nullptr;
 }
 
 std::string LanguageOfLocale(std::string_view locale) {

@@ -25,6 +25,10 @@ std::string LanguageTag(std::string_view text);
 const std::string& TextFor(const std::string& language, const std::string& first,
                            const Translations& translations);
 
+// Whether a reader of this language gets one of the variants (TextFor), and not the first text. Nobody misses
+// a variant in an empty language: true.
+bool HasVariant(const std::string& language, const Translations& translations);
+
 // The language of a POSIX locale: "de-at" of "de_AT.UTF-8"; empty for "C", "POSIX" and what names none.
 std::string LanguageOfLocale(std::string_view locale);
 

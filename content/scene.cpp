@@ -62,6 +62,26 @@ const std::string& ShownText(const Entity& entity, const std::string& language) 
   return text != nullptr ? TextFor(language, *text, *TranslationsOf(entity)) : kNoText;
 }
 
+std::set<std::string> LanguagesOf(const Scene& scene) {
+  std::set<std::string> languages;
+  for (const Entity& entity : scene.entities) {
+    const Translations* const translations = TranslationsOf(entity);
+    if (translations == nullptr) continue;
+    for (const auto& [language, text] : *translations) languages.insert(language);
+  }
+  return languages;
+}
+
+std::vector<std::string> MissingLanguages(const Entity& entity, const std::set<std::string>& languages) {
+  const std::string* const text = TextOf(entity);
+  std::vector<std::string> missing;
+  if (text == nullptr || text->empty()) return missing;
+  for (const std::string& language : languages) {
+    if (!HasVariant(language, *TranslationsOf(entity))) missing.push_back(language);
+  }
+  return missing;
+}
+
 const Entity* Scene::Find(const std::string& name) const {
   const auto found = std::find_if(entities.begin(), entities.end(),
                                   [&](const Entity& entity) { return entity.name == name; });

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -216,6 +217,12 @@ std::string Validate(const Scene& scene);
 
 // The part of Validate that concerns an entity's place, rotation and size.
 std::string PoseProblem(const Entity& entity);
+
+// The languages in which any text of a scene has a variant.
+std::set<std::string> LanguagesOf(const Scene& scene);
+// Those of `languages` in which an entity's text has no variant, so that their readers get the first text;
+// empty for an entity without a text.
+std::vector<std::string> MissingLanguages(const Entity& entity, const std::set<std::string>& languages);
 
 // Of an entity's names and texts, as kMaxSceneTextBytes counts them.
 std::size_t TextBytes(const Entity& entity);

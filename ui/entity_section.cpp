@@ -50,6 +50,13 @@ std::string TextIn(const content::Entity& entity, const std::string& language) {
   return found != translations.end() ? found->second : "";
 }
 
+// "de, es" of two languages.
+std::string Joined(const std::vector<std::string>& languages) {
+  std::string joined;
+  for (const std::string& language : languages) joined += (joined.empty() ? "" : ", ") + language;
+  return joined;
+}
+
 // Three numbers in a row. Returns whether a change of one of them was completed.
 bool NumberFields(const char* label, double* values, int count, const char* format) {
   ImGui::TextUnformatted(label);
@@ -108,6 +115,7 @@ engine::Rotation3 RotationOf(const Eigen::Vector3d& angles_deg) {
 void EntitySection::DrawContents(const AuthoringFacts& facts) {
   if (facts.scene == nullptr || facts.scene->entities.empty()) return Remark(strings::kNothingPlaced);
   const auto& entities = facts.scene->entities;
+  languages_ = content::LanguagesOf(*facts.scene);
   constexpr int kMostRows = 7;
   const float rows = static_cast<float>(std::min<std::size_t>(entities.size(), kMostRows) + 1);
   constexpr ImGuiTableFlags kFlags = ImGuiTableFlags_ScrollY | ImGuiTableFlags_RowBg |
@@ -132,7 +140,10 @@ void EntitySection::DrawRow(const content::Entity& entity, const AuthoringFacts&
   ImGui::TableNextRow();
   ImGui::TableNextColumn();
   ImGui::PushStyleVar(ImGuiStyleVar_SelectableTextAlign, ImVec2(0, 0.5f));
-  if (ImGui::Selectable(entity.name.c_str(), facts.selection->Contains(entity.name),
+  const std::string missing = Joined(content::MissingLanguages(entity, languages_));
+  std::string row = entity.name;
+  if (!missing.empty()) row += strings::kRowWithoutLanguages + missing + ")";
+  if (ImGui::Selectable((row + "###row").c_str(), facts.selection->Contains(entity.name),
                         ImGuiSelectableFlags_AllowItemOverlap, ImVec2(0, ImGui::GetFrameHeight())))
     actions_->Select(entity.name, ImGui::GetIO().KeyShift || ImGui::GetIO().KeyCtrl);
   ImGui::PopStyleVar();
@@ -223,6 +234,8 @@ void EntitySection::DrawText(const content::Entity& entity) {
   if (ImGui::InputTextWithHint("##language", strings::kLanguageHint, &language_))
     text_ = TextIn(entity, content::LanguageTag(language_));
   if (!is_valid) Remark(strings::kNoLanguage);
+  const std::string missing = Joined(content::MissingLanguages(entity, languages_));
+  if (!missing.empty()) Remark((strings::kTextWithoutLanguages + missing + ".").c_str());
 }
 
 // The map that it leads to, and where its arrow points.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,8 @@ class EntitySection {
   bool begin_rename_ = false, is_writing_ = false;
   std::string shown_;  // The entity that the fields belong to.
   std::string name_, text_;
-  std::string language_;  // Of the text that is shown; empty for the first one.
+  std::string language_;             // Of the text that is shown; empty for the first one.
+  std::set<std::string> languages_;  // Those of the texts of the scene.
   double offset_[3] = {}, direction_[3] = {}, sides_[3] = {};
   double position_[3] = {}, angles_deg_[3] = {}, size_ = 1;
 };

@@ -181,6 +181,9 @@ inline constexpr const char* kLeaveHereHelp = "The arrow points where the camera
 inline constexpr const char* kRemoveArrow = "Remove arrow";
 inline constexpr const char* kLanguageHint = "Language of the text: de, es, …";
 inline constexpr const char* kNoLanguage = "This is no language tag.";
+inline constexpr const char* kRowWithoutLanguages = "  (no ";  // Followed by "de, es)".
+inline constexpr const char* kTextWithoutLanguages =           // Followed by "de, es.".
+    "Other texts of this map are translated. Readers of these languages see this one as it is: ";
 inline constexpr const char* kSides = "Width, height, depth";
 inline constexpr const char* kTrailPoints = "%d points";
 inline constexpr const char* kRemoveLastPoint = "Remove last point";

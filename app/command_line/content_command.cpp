@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/command_line/content_add_command.h"
@@ -30,7 +33,8 @@ struct ContentOptions {
   bool as_json = false;
 };
 
-Json ToJson(const maps::MapInfo& map, const content::Entity& entity) {
+// `languages`: those of all texts of the library.
+Json ToJson(const maps::MapInfo& map, const content::Entity& entity, const std::set<std::string>& languages) {
   using Kind = content::Entity::Kind;
   const Eigen::Vector3d place = content::PlaceOf(entity);
   Json json = {{"map", map.name}, {"name", entity.name}, {"kind", content::NameOf(entity.kind)}};
@@ -38,6 +42,7 @@ Json ToJson(const maps::MapInfo& map, const content::Entity& entity) {
   if (const std::string* const text = content::TextOf(entity)) {
     json["text"] = *text;
     json["translations"] = *content::TranslationsOf(entity);
+    json["missing_languages"] = content::MissingLanguages(entity, languages);
   }
   json["position_m"] = {place.x(), place.y(), place.z()};
   if (content::HasModel(entity)) json["scale"] = entity.model.map_from_model.scale;
@@ -79,28 +84,32 @@ std::string Summary(const Json& entry) {
   return summary;
 }
 
-// What else it says: "  (locked, hidden)". A signpost that leads to a map should say in which direction.
+// What else it says: "  (locked, hidden)". A signpost that leads to a map should say in which direction, and
+// a text should have a variant in each language of the library.
 std::string StateOf(const Json& entry) {
   std::string state;
   const auto add = [&](const char* word) { state += (state.empty() ? "" : ", ") + std::string(word); };
   if (entry["locked"] == true) add("locked");
   if (entry["hidden"] == true) add("hidden");
   if (!entry.value("to_map", "").empty() && entry["direction"].is_null()) add("no direction");
+  const Json missing = entry.value("missing_languages", Json::array());
+  for (const Json& language : missing) add(("not in " + language.get<std::string>()).c_str());
   return state.empty() ? "" : "  (" + state + ")";
 }
 
 void List(const ContentOptions& options) {
   const maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
-  std::vector<maps::MapInfo> infos;
-  if (options.map.empty()) {
-    infos = library.List();
-  } else {
-    infos.push_back(library.FindByName(options.map));
+  const std::uint64_t only = options.map.empty() ? 0 : library.FindByName(options.map).key;
+  std::vector<std::pair<maps::MapInfo, content::Scene>> scenes;
+  std::set<std::string> languages;
+  for (const maps::MapInfo& map : library.List()) {
+    scenes.emplace_back(map, StoredNames(library, map));
+    languages.merge(content::LanguagesOf(scenes.back().second));
   }
   Json entries = Json::array();
-  for (const maps::MapInfo& map : infos) {
-    const content::Scene scene = StoredNames(library, map);
-    for (const content::Entity& entity : scene.entities) entries.push_back(ToJson(map, entity));
+  for (const auto& [map, scene] : scenes) {
+    if (only != 0 && map.key != only) continue;
+    for (const content::Entity& entity : scene.entities) entries.push_back(ToJson(map, entity, languages));
   }
   if (options.as_json) {
     std::printf("%s\n",

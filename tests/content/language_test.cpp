@@ -3,6 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+#include <string>
+#include <vector>
+
+#include "content/scene.h"
+
 namespace docent::content {
 namespace {
 
@@ -34,6 +40,30 @@ TEST(Language, AReaderGetsTheTextOfTheTagOrOfItsBeginning) {
   EXPECT_EQ(shown("zh"), "lion") << "a longer tag is no variant of a shorter one";
   EXPECT_EQ(shown("fr"), "lion");
   EXPECT_EQ(shown(""), "lion");
+}
+
+TEST(Language, ATextIsMissingInALanguageThatAnotherTextHas) {
+  Scene scene;
+  for (const Translations& translations :
+       {Translations{{"de", "Löwe"}, {"es-419", "león"}}, Translations{{"es", "tigre"}}, Translations{}}) {
+    Entity& label = scene.entities.emplace_back();
+    label.name = "label-" + std::to_string(scene.entities.size());
+    label.kind = Entity::Kind::kLabel;
+    label.label.text = "text";
+    *TranslationsOf(&label) = translations;
+  }
+  scene.entities.emplace_back().kind = Entity::Kind::kModel;
+  Entity& silent = scene.entities.emplace_back();
+  silent.kind = Entity::Kind::kSound;
+  const std::set<std::string> languages = LanguagesOf(scene);
+  EXPECT_EQ(languages, (std::set<std::string>{"de", "es", "es-419"}));
+  using Names = std::vector<std::string>;
+  const auto missing = [&](std::size_t i) { return MissingLanguages(scene.entities[i], languages); };
+  EXPECT_EQ(missing(0), Names{"es"});
+  EXPECT_EQ(missing(1), Names{"de"}) << "a reader of es-419 gets the variant in es";
+  EXPECT_EQ(missing(2), (Names{"de", "es", "es-419"}));
+  EXPECT_EQ(missing(3), Names{}) << "a model has no text";
+  EXPECT_EQ(missing(4), Names{}) << "a sound without a caption is not read";
 }
 
 TEST(Language, ALocaleNamesItsLanguage) {

@@ -18,6 +18,30 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
+TEST(ContentCommand, ListsInWhichLanguagesATextIsMissing) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "museum.docent").string();
+  {
+    maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    for (const char* name : {"Desk", "Kiosk"})
+      library.Save({library.NewKey(), name, maps::Policy::kOpen, nullptr, nullptr});
+  }
+  for (const char* map : {"Desk", "Kiosk"}) {
+    const Outcome outcome = RunDocent(
+        {"content", "add", "--library", path, "--map", map, "--signpost", "Lions", "--at", "0", "0", "2"});
+    ASSERT_EQ(outcome.exit_status, 0) << outcome.errors;
+  }
+  const auto listed = [&] {
+    return RunDocent({"content", "list", "--library", path, "--map", "Kiosk"}).output;
+  };
+  EXPECT_THAT(listed(), HasSubstr("Lions\n"));
+  ASSERT_EQ(RunDocent({"content", "edit", "sign-1", "--text", "Löwen", "--language", "de", "--library", path,
+                       "--map", "Desk"})
+                .exit_status,
+            0);
+  EXPECT_THAT(listed(), HasSubstr("Lions  (not in de)\n")) << "the other map has a text in German";
+}
+
 TEST(ContentCommand, EditsTheContentOfASavedMap) {
   const TemporaryFolder folder;
   const std::string path = (folder / "museum.docent").string();
