@@ -91,7 +91,7 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
       inboxes_(cameras.size()),
       camera_states_(cameras.size()),
       sound_director_(request.language),
-      led_(cameras.size()),
+      visitor_frames_(cameras.size()),
       watch_(NamesOf(cameras), VisitorStringsFor(request.may_write ? "en" : request.language)) {
   if (request.sound) sound_player_.emplace();
   if (!request.may_write)
@@ -130,7 +130,7 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
   });
   {
     const std::scoped_lock lock(files_mutex_);
-    for (Led& led : led_) led.last.reset();
+    visitor_frames_.Clear();
   }
   guarded([&] { session_.Finish(); });
   guarded([&] {
@@ -183,51 +183,37 @@ void GuideRun::Drawn(const ShownFrame& frame) {
 
 std::shared_ptr<const ShownFrame> GuideRun::Lead(std::size_t camera, const GuideVisitor& guide) {
   const std::scoped_lock lock(files_mutex_);
-  Led& led = led_[camera];
-  if (!led.last) return nullptr;
-  auto frame = std::make_shared<ShownFrame>(*led.last);
-  if (frame->message == led.refusal) frame->message.clear();
+  std::shared_ptr<ShownFrame> frame = visitor_frames_.CopyOfLast(camera);
+  if (!frame) return nullptr;
+  std::string refusal;
   try {
     host_->Lead(guide, frame->tracked);
-    led.refusal.clear();
   } catch (const Error& error) {
-    led.refusal = frame->message = SentenceOf(error.what());
+    refusal = SentenceOf(error.what());
   }
-  led.is_new = true;
+  visitor_frames_.Answer(refusal, frame.get());
   host_->GuideAgain(camera, frame->camera ? *frame->camera : *cameras_[camera].model, frame);
   frame->serial = ++serial_;
-  led.last = frame;
-  return OverNewest(frame);
-}
-
-std::shared_ptr<const ShownFrame> GuideRun::OverNewest(std::shared_ptr<const ShownFrame> frame) {
-  const auto& image = led_[CameraOf(frame->tracked)].untracked;
-  if (!image || image->time <= frame->tracked.frame.time) return frame;
-  if (frame->tracked.state == engine::TrackingState::kDropped) return frame;
-  auto over = std::make_shared<ShownFrame>(*frame);
-  ShowWithoutPose(*image, over.get());
-  return over;
+  visitor_frames_.SetLast(frame);
+  return visitor_frames_.OverNewest(std::move(frame));
 }
 
 void GuideRun::HandleUntracked(const engine::Frame& image, const Show& show) {
   std::shared_ptr<ShownFrame> frame;
   {
     const std::scoped_lock lock(files_mutex_);
-    Led& led = led_[static_cast<std::size_t>(image.camera)];
-    if (!led.last) return;
-    led.untracked = image;
-    frame = std::make_shared<ShownFrame>(*led.last);
-    ShowWithoutPose(image, frame.get());
+    frame = visitor_frames_.Over(image);
+    if (!frame) return;
     frame->serial = ++serial_;
   }
   show(std::move(frame));
 }
 
-void GuideRun::TakeRefusal(const ShownFrame& frame, CameraState* state) {
-  Led& led = led_[CameraOf(frame.tracked)];
-  if (!std::exchange(led.is_new, false)) return;
-  if (!led.refusal.empty()) {
-    state->message = led.refusal;
+void GuideRun::TakeAnswer(const ShownFrame& frame, CameraState* state) {
+  const std::optional<std::string> refusal = visitor_frames_.TakeAnswer(CameraOf(frame.tracked));
+  if (!refusal) return;
+  if (!refusal->empty()) {
+    state->message = *refusal;
     state->message_end_s = frame.seconds + kRefusalShown_s;
   } else if (state->message_end_s) {
     // Only what is shown for a while was an answer.
@@ -372,7 +358,7 @@ void GuideRun::HandleTrouble(const std::string& sentence, Timestamp time, const 
   {
     const std::scoped_lock lock(files_mutex_);
     frame->serial = ++serial_;
-    if (host_) led_[CameraOf(frame->tracked)].last = frame;
+    if (host_) visitor_frames_.SetLast(frame);
   }
   show(std::move(frame));
 }
@@ -393,9 +379,9 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
     const std::scoped_lock lock(files_mutex_);
     frame = MakeShown(tracked, state);
     if (age) frame->taken = PlayClock().Now() - *age;
-    if (host_ && tracked.state != engine::TrackingState::kDropped) led_[CameraOf(tracked)].last = frame;
+    if (host_ && tracked.state != engine::TrackingState::kDropped) visitor_frames_.SetLast(frame);
     // Content is seen on its own image, even if that is older.
-    if (engine::HasPose(tracked.state)) led_[CameraOf(tracked)].untracked.reset();
+    if (engine::HasPose(tracked.state)) visitor_frames_.ForgetUntracked(CameraOf(tracked));
   }
   {
     const std::scoped_lock lock(files_mutex_);
@@ -415,7 +401,7 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
   std::shared_ptr<const ShownFrame> over;
   {
     const std::scoped_lock lock(files_mutex_);
-    over = OverNewest(std::move(frame));
+    over = visitor_frames_.OverNewest(std::move(frame));
   }
   show(std::move(over));
 }
@@ -494,7 +480,7 @@ std::shared_ptr<ShownFrame> GuideRun::MakeShown(const engine::TrackedFrame& trac
   if (lens) frame->camera = lens->model;
   if (!state->first_time) state->first_time = tracked.frame.time;
   frame->seconds = ToSeconds(tracked.frame.time - *state->first_time);
-  TakeRefusal(*frame, state);
+  TakeAnswer(*frame, state);
   if (state->message_end_s && frame->seconds > *state->message_end_s) {
     state->message.clear();
     state->message_end_s.reset();

@@ -18,6 +18,7 @@
 #include "app/command_line/guide_window.h"
 #include "app/command_line/run_guide.h"
 #include "app/command_line/run_watch.h"
+#include "app/command_line/visitor_frames.h"
 #include "app/command_line/visitor_host.h"
 #include "app/evaluation/camera_report.h"
 #include "app/sound/sound_director.h"
@@ -79,11 +80,9 @@ class GuideRun {
   void HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state);
   // Shows the visitor an image while an older one is tracked. See FrameLoopOptions::untracked.
   void HandleUntracked(const engine::Frame& image, const Show& show);
-  // The frame, or if an image that is newer is on the screen already, what the frame says over that image.
-  // With files_mutex_ held.
-  std::shared_ptr<const ShownFrame> OverNewest(std::shared_ptr<const ShownFrame> frame);
-  // Whether the visitor's last step was refused, since Lead. With files_mutex_ held.
-  void TakeRefusal(const ShownFrame& frame, CameraState* state);
+  // Shows for a while why the visitor's last step was refused, if Lead has an answer since. With files_mutex_
+  // held.
+  void TakeAnswer(const ShownFrame& frame, CameraState* state);
   // Between images of a paused recording, and after its last one.
   void HandleIdle(const engine::TrackedFrame& tracked, bool at_end, const Show& show, CameraState* state);
   bool has_author_window() const { return request_.may_write && !request_.headless; }
@@ -111,19 +110,11 @@ class GuideRun {
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
   NoticeQueue notices_;
-  std::mutex files_mutex_;            // Guards files_, tallies_, led_, warnings_, host_, watch_ and noticed_.
+  std::mutex
+      files_mutex_;  // Guards files_, tallies_, visitor_frames_, warnings_, host_, watch_ and noticed_.
   std::set<std::string> warnings_;    // Those that the window was told of.
   std::vector<CameraTally> tallies_;  // By camera.
-  // Of a visitor, by camera: the last frame (null while no step can be carried out), why the last step could
-  // not be carried out (empty if it was), and whether the next image has to know that.
-  struct Led {
-    std::shared_ptr<const ShownFrame> last;
-    std::string refusal;
-    bool is_new = false;
-    // An image that was shown without a pose and is newer than that of `last`.
-    std::optional<engine::Frame> untracked = {};
-  };
-  std::vector<Led> led_;
+  VisitorFrames visitor_frames_;      // Only on a tour it has any.
   // What a visitor is to hear together with an image of the first camera that is not on the screen yet, with
   // its index: a slow machine draws it later. Guarded like these.
   std::deque<std::pair<std::uint64_t, SoundDirector::Orders>> undrawn_sounds_;
