@@ -7,13 +7,17 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
+
+#include "app/files/guarded_pages.h"
 
 namespace docent::app {
 
@@ -63,6 +67,15 @@ class AnonymousFile {
   int descriptor_ = -1;
 };
 
+// Says once that the disk could not return parts of images.
+void WarnOfLostPages() {
+  static std::atomic<bool> warned{false};
+  if (GuardedPages::Lost() == 0 || warned.exchange(true)) return;
+  spdlog::warn(
+      "The disk cannot return parts of the images of keyframes, which count as black from now on. Check the "
+      "disk.");
+}
+
 // A mapped file and the allocator of every image in it: OpenCV's reference count of an image ends in
 // deallocate. Each image holds a reference to the mapping; the last one unmaps it.
 class ImageMapping final : public cv::MatAllocator,
@@ -79,9 +92,12 @@ class ImageMapping final : public cv::MatAllocator,
   }
 
   ImageMapping(void* data, std::size_t bytes, std::shared_ptr<WorkingSet> working_set)
-      : Member(bytes), data_(data), bytes_(bytes), working_set_(std::move(working_set)) {}
+      : Member(bytes), data_(data), bytes_(bytes), working_set_(std::move(working_set)) {
+    guard_.emplace(data, bytes);
+  }
   ~ImageMapping() override {
     working_set_->Remove(*this);
+    guard_.reset();
     ::munmap(data_, bytes_);
   }
   ImageMapping(const ImageMapping&) = delete;
@@ -98,7 +114,10 @@ class ImageMapping final : public cv::MatAllocator,
     return image;
   }
 
-  void MarkInUse() const override { working_set_->Touch(*this); }
+  void MarkInUse() const override {
+    working_set_->Touch(*this);
+    WarnOfLostPages();
+  }
   // The pages are shared with the file, so dropping them loses nothing, even while another thread reads them.
   void ReleaseMemory() const override { ::madvise(data_, bytes_, MADV_DONTNEED); }
 
@@ -123,6 +142,7 @@ class ImageMapping final : public cv::MatAllocator,
   void* const data_;
   const std::size_t bytes_;
   const std::shared_ptr<WorkingSet> working_set_;
+  std::optional<GuardedPages> guard_;
 };
 
 // Returns the features with their pyramid in a file of the folder; null with errno set on failure.

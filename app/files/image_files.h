@@ -17,7 +17,8 @@ namespace docent::app {
 // are accessed, usually from the page cache, which the system may reclaim at any time. Evicted images
 // therefore cost no memory, and readers need not know about eviction. Of the images in use, a limited number
 // of bytes is resident at a time. Where no file can be written (no folder, no space) the images stay in
-// ordinary memory, which is logged once.
+// ordinary memory, which is logged once. What the disk cannot return counts as black, which is logged once
+// too (GuardedPages).
 //
 // Any thread may call anything. Only Store blocks on the disk.
 class ImageFiles : public engine::ImageStore {

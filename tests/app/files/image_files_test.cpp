@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "app/files/guarded_pages.h"
 #include "engine/vision/features.h"
 #include "tests/app/support/temporary_folder.h"
 
@@ -118,6 +119,18 @@ TEST(ImageFiles, ImagesInOrdinaryMemoryCanBeUsedTheSameWay) {
   const auto features = NoisyFeatures();
   features->MarkInUse();
   ExpectSame(*features, *NoisyFeatures());
+}
+
+TEST(ImageFiles, AnImageThatTheDiskCannotReturnDoesNotEndTheProgram) {
+  const TemporaryFolder folder;
+  const void* pixels = nullptr;
+  {
+    const auto kept = ImageFiles(folder.path()).Store(NoisyFeatures());
+    pixels = kept->levels[0].data;
+    EXPECT_TRUE(GuardedPages::IsGuarded(pixels));
+    EXPECT_TRUE(GuardedPages::IsGuarded(kept->levels.back().data + kept->levels.back().total() - 1));
+  }
+  EXPECT_FALSE(GuardedPages::IsGuarded(pixels)) << "the file is no longer mapped";
 }
 
 TEST(ImageFiles, LeavesNothingInTheFolder) {
