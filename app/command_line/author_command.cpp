@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "app/command_line/hub_command.h"
 #include "app/command_line/program.h"
 #include "app/command_line/run_arguments.h"
 
@@ -41,6 +42,11 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
                    "Size of the window's panel and texts, times what the monitor suggests; 0.5 to 4 (default "
                    "1). A small window reduces it")
       ->type_name("FACTOR");
+  AddHubOption(command, &options->hub)
+      ->description(
+          "Bring what others have changed on the hub at this address, postgresql://user@host/database, into "
+          "the "
+          "library first, and save on the hub what is saved in the library; DOCENT_HUB if not given");
   AddWhenLostOption(command, &options->when_lost, "new without a window, otherwise wait");
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/guide_run.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <cctype>
 #include <exception>
+#include <functional>
 #include <utility>
 
 #include "app/command_line/interruption.h"
@@ -64,6 +67,11 @@ SessionOptions SessionOptionsOf(const GuideRequest& request, std::span<Calibrate
   return options;
 }
 
+SessionOptions WithSaved(SessionOptions options, std::function<void()> on_saved) {
+  options.on_saved = std::move(on_saved);
+  return options;
+}
+
 bool AllRecorded(std::span<const CalibratedCamera> cameras) {
   return std::none_of(cameras.begin(), cameras.end(),
                       [](const CalibratedCamera& camera) { return camera.source->info().live; });
@@ -87,7 +95,11 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
       cameras_(cameras),
       is_paced_(request.stays_at_last && AllRecorded(cameras)),
       clock_(is_paced_ && request.waits_at_first),
-      session_(SessionOptionsOf(request, cameras), ModelsOf(cameras), request.library),
+      session_(WithSaved(SessionOptionsOf(request, cameras),
+                         [this] {
+                           if (maps::HubPusher* const pusher = told_pusher_.load()) pusher->LibraryWasSaved();
+                         }),
+               ModelsOf(cameras), request.library),
       inboxes_(cameras.size()),
       camera_states_(cameras.size()),
       sound_director_(request.language),
@@ -124,6 +136,7 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
   guarded([&] {
     std::optional<maps::HubFollower> follower;
     if (request_.hub && !request_.may_write) FollowHub(&follower);
+    if (request_.hub && request_.may_write) PushToHub();
     std::vector<CameraRun> runs;
     for (std::size_t i = 0; i < cameras_.size(); ++i) runs.push_back(RunOf(i, show));
     RunCameras(runs, &session_, stop_.get_token());
@@ -133,6 +146,7 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
     visitor_frames_.Clear();
   }
   guarded([&] { session_.Finish(); });
+  guarded([&] { FinishPushing(); });
   guarded([&] {
     files_->Add(session_.TakeEvents());
     WriteDelivery();
@@ -155,6 +169,17 @@ void GuideRun::FollowHub(std::optional<maps::HubFollower>* follower) {
   maps::SyncOptions options = *request_.hub;
   options.near_key = [this] { return visited_map_.load(); };
   follower->emplace(std::move(options), std::move(callbacks));
+}
+
+void GuideRun::PushToHub() {
+  pusher_.emplace(*request_.hub, [this](const std::string& sentence) { session_.AddEvent("hub", sentence); });
+  told_pusher_ = &*pusher_;
+}
+
+void GuideRun::FinishPushing() {
+  if (!pusher_ || pusher_->Finish()) return;
+  spdlog::warn(
+      "The hub has not got everything. It is saved in the library; docent maps push brings it to the hub.");
 }
 
 // The images that live cameras delivered and missed, for the report and as events.

@@ -24,6 +24,7 @@
 #include "app/sound/sound_director.h"
 #include "app/sound/sound_player.h"
 #include "maps/hub/hub_follower.h"
+#include "maps/hub/hub_pusher.h"
 
 namespace docent::app {
 
@@ -71,6 +72,9 @@ class GuideRun {
   };
 
   void WarnAboutUnknownLenses();
+  // Lets the hub have what the session saves, until FinishPushing, which waits for the rest.
+  void PushToHub();
+  void FinishPushing();
   // Lets the library follow its hub until the follower is destroyed.
   void FollowHub(std::optional<maps::HubFollower>* follower);
   CameraRun RunOf(std::size_t i, const Show& show);
@@ -101,6 +105,10 @@ class GuideRun {
   const std::span<CalibratedCamera> cameras_;
   const bool is_paced_;  // The author works with recordings, which can be paused.
   PausableClock clock_;  // Of recordings.
+  // Only of an author with a hub, while the run lasts. The session's threads use it by the pointer, which is
+  // null before it is there; so it lives longer than the session.
+  std::optional<maps::HubPusher> pusher_;
+  std::atomic<maps::HubPusher*> told_pusher_ = nullptr;
   Session session_;
   std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
   std::vector<CameraState> camera_states_;

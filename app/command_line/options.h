@@ -66,6 +66,7 @@ struct AuthorOptions {
   Timestamp autosave_interval = std::chrono::seconds(10);  // 0: save only when a map is left and at the end.
   std::optional<WhenLost> when_lost;  // Empty: kWait with a window, which offers a choice, else kNew.
   double ui_scale = 1;                // Of the window's panel and texts, times what the monitor suggests.
+  std::string hub;                    // Address of the hub that gets what is saved; empty for none.
 };
 
 struct TourOptions {

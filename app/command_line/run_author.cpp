@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
@@ -13,6 +15,7 @@
 #include "app/session/library_scene.h"
 #include "engine/base/error.h"
 #include "engine/initialization/planar_target.h"
+#include "maps/hub/hub_connection.h"
 #include "maps/library/map_copies.h"
 #include "maps/library/session_lock.h"
 
@@ -92,15 +95,33 @@ std::shared_ptr<const engine::PlanarTarget> ReadTarget(const std::filesystem::pa
   }
 }
 
-// What the tour follows. A device without a library gets it now; later the network may be gone.
-maps::SyncOptions HubOptionsOf(const TourOptions& options) {
-  maps::SyncOptions hub;
-  hub.hub = options.hub;
-  hub.library = options.library;
-  hub.scenes = LibrarySceneTools();
-  hub.merge = LibrarySceneMerger();
+// What is exchanged with a hub.
+maps::SyncOptions HubOptionsOf(const std::string& hub, const std::filesystem::path& library) {
+  maps::SyncOptions options;
+  options.hub = hub;
+  options.library = library;
+  options.scenes = LibrarySceneTools();
+  options.merge = LibrarySceneMerger();
+  return options;
+}
+
+// What a tour follows. A device without a library gets it now; later the network may be gone.
+maps::SyncOptions FollowedHub(const TourOptions& options) {
+  maps::SyncOptions hub = HubOptionsOf(options.hub, options.library);
   std::error_code error;
   if (!std::filesystem::exists(options.library, error)) maps::Pull(hub);
+  return hub;
+}
+
+// The hub of an author, whose library gets what others have changed, because nothing replaces its maps while
+// the session lasts.
+maps::SyncOptions PulledHub(const AuthorOptions& options) {
+  maps::SyncOptions hub = HubOptionsOf(options.hub, options.library);
+  try {
+    for (const std::string& line : maps::Pull(hub).lines) spdlog::info("{}", line);
+  } catch (const maps::HubUnreachable& unreachable) {
+    spdlog::warn("{}; the session goes on with the maps that are here.", unreachable.what());
+  }
   return hub;
 }
 
@@ -129,6 +150,7 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   request.new_map_when_lost = options.when_lost.value_or(otherwise) == WhenLost::kNew;
   if (options.target) request.target = ReadTarget(*options.target, options.target_width_m);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
+  if (!options.hub.empty()) request.hub = PulledHub(options);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   const maps::SessionLock lock(options.library, maps::SessionLockKind::kSession);
   request.library = &library;
@@ -156,7 +178,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   ConfineTour(options);
   if (options.script) ReadScriptFor(*options.script, &request);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
-  if (!options.hub.empty()) request.hub = HubOptionsOf(options);
+  if (!options.hub.empty()) request.hub = FollowedHub(options);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
   request.library = &library;
   request.title = "Docent - tour";

@@ -58,14 +58,15 @@ struct GuideRequest {
   // the camera's thread.
   std::function<std::vector<Command>(const ShownFrame&)> director;
   std::optional<std::filesystem::path>
-      visit_log;                          // Folder for the records of visits; only without may_write.
-  std::string kiosk_code;                 // Ends the window of a kiosk; empty for other tours. See KioskLock.
-  std::string tour;                       // The name of the tour below; empty for none.
-  std::optional<Route> route;             // Of the tour that visitors are led along; only without may_write.
-  std::optional<maps::SyncOptions> hub;   // The library follows this hub; only without may_write.
-  double baseline_m = 0;                  // See SessionOptions.
-  Occlusion occlusion = Occlusion::kMap;  // See SessionOptions.
-  bool room_light = true;                 // See SessionOptions.
+      visit_log;               // Folder for the records of visits; only without may_write.
+  std::string kiosk_code;      // Ends the window of a kiosk; empty for other tours. See KioskLock.
+  std::string tour;            // The name of the tour below; empty for none.
+  std::optional<Route> route;  // Of the tour that visitors are led along; only without may_write.
+  // The library follows this hub; with may_write, the hub gets what is saved in the library.
+  std::optional<maps::SyncOptions> hub;
+  double baseline_m = 0;                               // See SessionOptions.
+  Occlusion occlusion = Occlusion::kMap;               // See SessionOptions.
+  bool room_light = true;                              // See SessionOptions.
   std::shared_ptr<const engine::PlanarTarget> target;  // See engine::TrackerOptions; may be null.
   std::optional<HeadPolicy> head;
   // Called with each frame on its camera's thread, never concurrently; may be empty.

@@ -18,9 +18,12 @@ void SessionSaving::OnSaved(const maps::MapRecord& record) {
       record.snapshot ? "revision " + std::to_string(record.snapshot->revision) : "content";
   spdlog::debug("saved {}: {}", record.name, revision);
   keys_.Refill();
-  const std::scoped_lock lock(mutex_);
-  saved_at_ = std::chrono::steady_clock::now();
-  submitted_.erase(record.key);
+  {
+    const std::scoped_lock lock(mutex_);
+    saved_at_ = std::chrono::steady_clock::now();
+    submitted_.erase(record.key);
+  }
+  if (options_.on_saved) options_.on_saved();
 }
 
 void SessionSaving::Start() {

@@ -99,5 +99,35 @@ TEST_F(HubCommand, ErrorsAreOneSentence) {
   ExpectErrorLine({"maps", "push", "--library", Path("missing.docent"), "--hub", Url()}, 1, "does not exist");
 }
 
+TEST_F(HubCommand, AnAuthorsMapIsOnTheHubWhenTheSessionEnds) {
+  const std::string url = server().Url("live");
+  Succeed({"hub", "init", url});
+  const std::vector<std::string> author = {
+      "author",      "--library", Path("a.docent"), "--camera", "sim:room", "--until", "6", "--headless",
+      "--when-lost", "new",       "--pace",         "lockstep", "--hub",    url};
+  Succeed(author);
+  Succeed({"maps", "pull", "--library", Path("b.docent"), "--hub", url});
+  const std::string names = NamesIn(OpenSampleLibrary(Path("a.docent")));
+  EXPECT_NE(names, "");
+  EXPECT_EQ(NamesIn(OpenSampleLibrary(Path("b.docent"))), names);
+  {
+    Library library = OpenSampleLibrary(folder_ / "b.docent");
+    AddSampleMap(&library, "Theirs", 3);
+  }
+  Succeed({"maps", "push", "--library", Path("b.docent"), "--hub", url});
+  Succeed(author);
+  EXPECT_THAT(NamesIn(OpenSampleLibrary(Path("a.docent"))), HasSubstr("Theirs"))
+      << "a session begins with what others have changed";
+}
+
+TEST_F(HubCommand, AnAuthorGoesOnWithoutAHub) {
+  const Outcome outcome = RunDocent({"author", "--library", Path("a.docent"), "--camera", "sim:room",
+                                     "--until", "6", "--headless", "--when-lost", "new", "--pace", "lockstep",
+                                     "--hub", "postgresql://x@%2Fnowhere/docent"});
+  EXPECT_EQ(outcome.exit_status, 0) << outcome.errors;
+  EXPECT_THAT(outcome.errors, testing::AllOf(HasSubstr("cannot be reached"), HasSubstr("docent maps push")));
+  EXPECT_NE(NamesIn(OpenSampleLibrary(Path("a.docent"))), "");
+}
+
 }  // namespace
 }  // namespace docent::maps
