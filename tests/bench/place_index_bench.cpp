@@ -1,21 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
-#include <malloc.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <fstream>
-#include <map>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
 
-#include "app/simulator/simulation.h"
 #include "engine/base/random.h"
 #include "engine/recognition/inverted_file.h"
 #include "engine/recognition/place_index.h"
 #include "engine/vision/features.h"
+#include "tests/bench/bench_places.h"
 #include "tests/bench/bench_sequence.h"
 #include "tests/bench/library_size.h"
 
@@ -34,149 +29,11 @@ namespace {
 
 constexpr std::size_t kQuestions = 1000;
 
-struct View {
-  engine::SmallBlurryImage thumbnail;
-  engine::WordBag words;
-};
-struct Visit {
-  std::uint64_t map_key = 0;
-  cv::Mat gray;
-  View view;
-};
-struct Places {
-  std::map<std::uint64_t, std::vector<View>> maps;  // by key
-  std::vector<Visit> visits;
-};
-
-View ViewOf(const cv::Mat& gray) {
-  const auto features = engine::MakeFeatures(gray);
-  return {features->small_blurry, engine::MakeWordBag(*features)};
-}
-
-// Every fourth frame of a mapping walk is a keyframe, and every eighth of a visit a query.
-void AddScene(const std::string& name, std::uint64_t first_key, Places* places) {
-  const auto simulation = app::MakeSimulation(name);
-  for (int frame = 0; frame < simulation->frame_count(); frame += 4) {
-    const std::string& label = simulation->label(frame);
-    const bool build = label.starts_with("build"), visit = label.starts_with("visit");
-    if (!build && !(visit && frame % 8 == 0)) continue;
-    cv::Mat bgr, gray;
-    simulation->Render(frame, &bgr);
-    cv::cvtColor(bgr, gray, cv::COLOR_BGR2GRAY);
-    const std::uint64_t key = first_key + std::stoul(label.substr(5));
-    if (build) {
-      places->maps[key].push_back(ViewOf(gray));
-    } else {
-      places->visits.push_back({key, gray, ViewOf(gray)});
-    }
-  }
-}
-
-const Places& SimulatedPlaces() {
-  static const Places places = [] {
-    cv::setNumThreads(1);
-    Places made;
-    AddScene("museum", 1, &made);
-    AddScene("desks", 101, &made);
-    return made;
-  }();
-  return places;
-}
-
-// A replica of a view as another place: mirrored, and half of its content replaced.
-engine::SmallBlurryImage Replica(const engine::SmallBlurryImage& image, bool mirrored, Random* random) {
-  constexpr int kCell = 6;  // thumbnail pixels, as large as the blur
-  cv::Mat cells(image.pixels.rows / kCell, image.pixels.cols / kCell, CV_32FC1), noise;
-  for (int y = 0; y < cells.rows; ++y) {
-    for (int x = 0; x < cells.cols; ++x) cells.at<float>(y, x) = static_cast<float>(random->Uniform(-1, 1));
-  }
-  cv::resize(cells, noise, image.pixels.size(), 0, 0, cv::INTER_CUBIC);
-  cv::Scalar mean, deviation, noise_mean, noise_deviation;
-  cv::meanStdDev(image.pixels, mean, deviation);
-  cv::meanStdDev(noise, noise_mean, noise_deviation);
-  engine::SmallBlurryImage replica;
-  replica.scale = image.scale;
-  if (mirrored) {
-    cv::flip(image.pixels, replica.pixels, 1);
-  } else {
-    replica.pixels = image.pixels.clone();
-  }
-  replica.pixels += noise * (deviation[0] / noise_deviation[0]);
-  return replica;
-}
-
-// Keeps half of the words and adds as many from other keyframes, common ones more often.
-engine::WordBag Replica(const engine::WordBag& words, Random* random) {
-  static const std::vector<std::uint32_t> all = [] {
-    std::vector<std::uint32_t> leaves;
-    for (const auto& [key, views] : SimulatedPlaces().maps) {
-      for (const View& view : views) {
-        for (const engine::VisualWord& word : view.words)
-          leaves.insert(leaves.end(), static_cast<std::size_t>(word.count()), word.leaf());
-      }
-    }
-    return leaves;
-  }();
-  std::vector<std::uint32_t> leaves;
-  for (const engine::VisualWord& word : words) {
-    for (int i = 0; i < word.count(); ++i) {
-      const std::uint32_t other = all[random->Below(static_cast<std::uint32_t>(all.size()))];
-      leaves.push_back(random->Below(2) == 0 ? word.leaf() : other);
-    }
-  }
-  return engine::MakeWordBag(std::move(leaves));
-}
-
-// The simulated places with their own keys, and replicas of them with keys from 1000 on, each filled up to
-// the size of a map.
-void FillIndex(std::size_t maps, engine::PlaceIndex* index) {
-  const Places& places = SimulatedPlaces();
-  Random random(7);
-  index->Reserve(maps * kKeyFramesOfAMap);
-  std::size_t made = 0;
-  while (made < maps) {
-    const std::size_t round = made / places.maps.size();
-    for (const auto& [key, views] : places.maps) {
-      if (made == maps) break;
-      std::vector<engine::KeyFrameThumbnail> thumbnails;
-      std::vector<engine::KeyFrameWords> words;
-      for (std::size_t i = 0; i < kKeyFramesOfAMap; ++i) {
-        const auto id = static_cast<engine::KeyFrameId>(i);
-        const View& original = views[i % views.size()];
-        const bool itself = round == 0 && i < views.size();
-        thumbnails.push_back(
-            {id, engine::Pack(itself ? original.thumbnail
-                                     : Replica(original.thumbnail, round % 2 == 1, &random))});
-        // Five consecutive keyframes form a place.
-        words.push_back({id, id / 5 * 5, itself ? original.words : Replica(original.words, &random)});
-      }
-      index->SetAppearance(round == 0 ? key : 1000 * round + key, thumbnails, words);
-      ++made;
-    }
-  }
-}
-
-double ResidentBytes() {
-  malloc_trim(0);  // memory that was freed before would hide new allocations
-  std::ifstream file("/proc/self/statm");
-  double total = 0, resident = 0;
-  file >> total >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
-
-// The rank of a map among the candidates; 1000 if it is not among them.
-std::size_t RankOf(const std::vector<engine::PlaceCandidate>& candidates, std::uint64_t key) {
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (candidates[i].map_key == key) return i;
-  }
-  return 1000;
-}
-
 void FindPlaces(benchmark::State& state) {
   const Places& places = SimulatedPlaces();
   const double before = ResidentBytes();
   engine::PlaceIndex index;
-  FillIndex(static_cast<std::size_t>(state.range(0)), &index);
+  FillIndex(static_cast<std::size_t>(state.range(0)), static_cast<std::size_t>(state.range(1)), &index);
   const double bytes = ResidentBytes() - before;
   std::vector<double> milliseconds;
   double total = 0, first = 0, found = 0;
@@ -203,12 +60,10 @@ void FindPlaces(benchmark::State& state) {
   state.counters["p95_ms"] = Quantile(&milliseconds, 0.95);
 }
 BENCHMARK(FindPlaces)
-    ->ArgName("maps")
-    ->Arg(20)
-    ->Arg(30)
-    ->Arg(100)
-    ->Arg(300)
-    ->Arg(1000)
+    ->ArgNames({"maps", "keyframes_a_map"})
+    ->ArgsProduct({{20, 30, 100, 300, 1000}, {kKeyFramesOfAMap}})
+    // Museums of small exhibits: the largest needs 7 GB of memory and some minutes.
+    ->ArgsProduct({{1'000, 10'000, 100'000}, {25}})
     ->Iterations(1)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
@@ -261,7 +116,7 @@ void FindChangedPlaces(benchmark::State& state) {
   const Places& places = SimulatedPlaces();
   const auto change = static_cast<int>(state.range(0));
   engine::PlaceIndex index;
-  FillIndex(static_cast<std::size_t>(state.range(1)), &index);
+  FillIndex(static_cast<std::size_t>(state.range(1)), kKeyFramesOfAMap, &index);
   const engine::SmallBlurryImage nothing;
   std::array<double, 3> first{}, found{};
   for (auto _ : state) {
