@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "ui/figures.h"
@@ -87,13 +88,64 @@ void DrawArrival(const std::string& place, double opacity, double unit, Canvas* 
   canvas->Text(place, style, {middle.x(), middle.y() - 0.5 * size.y()}, 0.5);
 }
 
-// The boards of the signposts in view.
-std::vector<Eigen::AlignedBox2d> SignsInWindow(const View& view, const Letterbox& box) {
+// The names that are listed: the known places of who is lost, or the stops of the tour on demand.
+const std::vector<std::string>& ListedStops(const VisitorDisplay& visitor) {
+  static const std::vector<std::string> kNone;
+  if (!visitor.stops.empty()) return visitor.stops;
+  return visitor.lists_route ? visitor.route_stops : kNone;
+}
+
+// The boards of the signposts in view, with a narrow margin.
+std::vector<Eigen::AlignedBox2d> SignsInWindow(const View& view, const Letterbox& box, double unit) {
+  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(4 * unit);
   std::vector<Eigen::AlignedBox2d> signs;
   if (view.scene == nullptr || view.tracked == nullptr || !engine::HasPose(view.tracked->state)) return signs;
   for (const Eigen::AlignedBox2d& sign : SignBoards(*view.scene, *view.camera, view.tracked->camera_from_map))
-    signs.emplace_back(box.WindowFromImage(sign.min()), box.WindowFromImage(sign.max()));
+    signs.emplace_back(box.WindowFromImage(sign.min()) - margin, box.WindowFromImage(sign.max()) + margin);
   return signs;
+}
+
+constexpr double kWayTail = 44, kWayHead = 16;  // Length of an arrow and half its width, in units.
+
+double CommonArea(const Eigen::AlignedBox2d& a, const Eigen::AlignedBox2d& b) {
+  const Eigen::AlignedBox2d both = a.intersection(b);
+  return both.isEmpty() ? 0.0 : both.volume();
+}
+
+// An arrow at the edge of the image as it is drawn, in pixels of the canvas.
+struct DrawnArrow {
+  Eigen::Vector2d tip, tail;
+  Eigen::AlignedBox2d box;  // Around it.
+};
+
+// Moved aside as far as it takes to cover no signpost, if the image has room for that.
+DrawnArrow ArrowOf(const EdgeArrow& arrow, const Letterbox& box,
+                   const std::vector<Eigen::AlignedBox2d>& signs, double unit) {
+  constexpr double kStep = 6, kFarthest = 180;  // Units; a signpost is seldom higher in the image.
+  const Eigen::Vector2d ahead = arrow.direction, aside(-ahead.y(), ahead.x());
+  const Eigen::AlignedBox2d image(Eigen::Vector2d(box.x, box.y),
+                                  Eigen::Vector2d(box.x + box.width - 1, box.y + box.height - 1));
+  const auto at = [&](double shift) {
+    DrawnArrow drawn;
+    drawn.tip = box.WindowFromImage(arrow.tip) + shift * aside;
+    drawn.tail = drawn.tip - kWayTail * unit * ahead;
+    const Eigen::Vector2d head = kWayHead * unit * aside.cwiseAbs();
+    drawn.box = {drawn.tip.cwiseMin(drawn.tail) - head, drawn.tip.cwiseMax(drawn.tail) + head};
+    return drawn;
+  };
+  const auto is_free = [&](const DrawnArrow& drawn) {
+    return std::none_of(signs.begin(), signs.end(),
+                        [&](const Eigen::AlignedBox2d& sign) { return CommonArea(drawn.box, sign) > 0; });
+  };
+  const DrawnArrow wanted = at(0);
+  if (is_free(wanted)) return wanted;
+  for (double shift = kStep; shift <= kFarthest; shift += kStep) {
+    for (const double side : {-1.0, 1.0}) {
+      const DrawnArrow moved = at(side * shift * unit);
+      if (image.contains(moved.box) && is_free(moved)) return moved;
+    }
+  }
+  return wanted;
 }
 
 // The text of an arrow at the edge of the image.
@@ -103,16 +155,11 @@ struct WayLabel {
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();  // Of the text.
 };
 
-constexpr double kWayTail = 44, kWayHead = 16;  // Length of an arrow and half its width, in units.
-
 // Behind the arrow, to one of its sides, or above or below a signpost: where it covers the least of signposts
 // and of the arrow, inside the window.
-WayLabel LabelOf(const WayOn& way, const View& view, double unit, Canvas* canvas) {
-  const engine::CameraModel& camera = *view.camera;
-  const Letterbox box =
-      FitImage(camera.width_px(), camera.height_px(), canvas->width_px(), canvas->height_px());
+WayLabel LabelOf(const WayOn& way, const DrawnArrow& arrow, const std::vector<Eigen::AlignedBox2d>& signs,
+                 double unit, Canvas* canvas) {
   const Eigen::Vector2d ahead = way.arrow.direction, aside(-ahead.y(), ahead.x());
-  const Eigen::Vector2d tail = box.WindowFromImage(way.arrow.tip) - kWayTail * unit * ahead;
   WayLabel label;
   label.style.size_px = 18 * unit;
   label.style.max_width_px = std::max(40, static_cast<int>(0.4 * canvas->width_px()));
@@ -126,25 +173,18 @@ WayLabel LabelOf(const WayOn& way, const View& view, double unit, Canvas* canvas
     return Eigen::AlignedBox2d(middle - half, middle + half);
   };
   const double gap = 10 * unit;
-  const Eigen::Vector2d tip = box.WindowFromImage(way.arrow.tip), head = kWayHead * unit * aside.cwiseAbs();
-  const Eigen::AlignedBox2d arrow(tip.cwiseMin(tail) - head, tip.cwiseMax(tail) + head);
-  const Eigen::Vector2d behind = tail - (gap + half.cwiseProduct(ahead).norm()) * ahead;
+  const Eigen::Vector2d behind = arrow.tail - (gap + half.cwiseProduct(ahead).norm()) * ahead;
   const double reach = gap + kWayHead * unit + half.cwiseProduct(aside).norm();
-  std::vector<Eigen::AlignedBox2d> places = {at(behind), at(arrow.center() - reach * aside),
-                                             at(arrow.center() + reach * aside)};
-  const std::vector<Eigen::AlignedBox2d> signs = SignsInWindow(view, box);
+  std::vector<Eigen::AlignedBox2d> places = {at(behind), at(arrow.box.center() - reach * aside),
+                                             at(arrow.box.center() + reach * aside)};
   for (const Eigen::AlignedBox2d& sign : signs) {
     places.push_back(at({behind.x(), sign.min().y() - gap - half.y()}));
     places.push_back(at({behind.x(), sign.max().y() + gap + half.y()}));
   }
   double least = std::numeric_limits<double>::infinity();
   for (const Eigen::AlignedBox2d& place : places) {
-    const auto common = [&](const Eigen::AlignedBox2d& other) {
-      const Eigen::AlignedBox2d both = place.intersection(other);
-      return both.isEmpty() ? 0.0 : both.volume();
-    };
-    double covered = common(arrow);
-    for (const Eigen::AlignedBox2d& sign : signs) covered += common(sign);
+    double covered = CommonArea(place, arrow.box);
+    for (const Eigen::AlignedBox2d& sign : signs) covered += CommonArea(place, sign);
     if (covered >= least) continue;
     least = covered;
     label.board = place;
@@ -153,22 +193,39 @@ WayLabel LabelOf(const WayOn& way, const View& view, double unit, Canvas* canvas
   return label;
 }
 
-// An arrow at the edge of the image with its text beside it.
-void DrawWayOn(const WayOn& way, const View& view, double unit, Canvas* canvas) {
-  const engine::CameraModel& camera = *view.camera;
+// An arrow at the edge of the image, and its text beside it.
+struct DrawnWay {
+  DrawnArrow arrow;
+  std::optional<WayLabel> label;
+};
+
+// Empty where the visitor is led nowhere, or reads a list or a menu, behind which an arrow would be seen in
+// part.
+std::optional<DrawnWay> WayIn(const View& view, double unit, Canvas* canvas) {
+  const VisitorDisplay& visitor = *view.overlay.visitor;
+  if (!visitor.way_on || view.camera == nullptr || !visitor.menu.empty() || !ListedStops(visitor).empty())
+    return std::nullopt;
   const Letterbox box =
-      FitImage(camera.width_px(), camera.height_px(), canvas->width_px(), canvas->height_px());
-  const Eigen::Vector2d tip = box.WindowFromImage(way.arrow.tip), ahead = way.arrow.direction;
-  const Eigen::Vector2d aside(-ahead.y(), ahead.x()), tail = tip - kWayTail * unit * ahead;
+      FitImage(view.camera->width_px(), view.camera->height_px(), canvas->width_px(), canvas->height_px());
+  const std::vector<Eigen::AlignedBox2d> signs = SignsInWindow(view, box, unit);
+  DrawnWay way{ArrowOf(visitor.way_on->arrow, box, signs, unit), std::nullopt};
+  if (!visitor.way_on->text.empty()) way.label = LabelOf(*visitor.way_on, way.arrow, signs, unit, canvas);
+  return way;
+}
+
+void DrawWayOn(const View& view, double unit, Canvas* canvas) {
+  const std::optional<DrawnWay> way = WayIn(view, unit, canvas);
+  if (!way) return;
+  const WayOn& told = *view.overlay.visitor->way_on;
+  const Eigen::Vector2d ahead = told.arrow.direction, aside(-ahead.y(), ahead.x()), tip = way->arrow.tip;
   for (const auto& [width, color] : {std::pair(12 * unit, kBoard), std::pair(7 * unit, kWay)}) {
-    canvas->Line(tail, tip, width, color);
+    canvas->Line(way->arrow.tail, tip, width, color);
     for (const double side : {-1.0, 1.0})
       canvas->Line(tip, tip - 18 * unit * ahead + side * kWayHead * unit * aside, width, color);
   }
-  if (way.text.empty()) return;
-  const WayLabel label = LabelOf(way, view, unit, canvas);
-  canvas->Box(label.board.min(), label.board.max(), 8 * unit, kBoard);
-  canvas->Text(way.text, label.style, label.corner);
+  if (!way->label) return;
+  canvas->Box(way->label->board.min(), way->label->board.max(), 8 * unit, kBoard);
+  canvas->Text(told.text, way->label->style, way->label->corner);
 }
 
 // Corners around what the one button opens.
@@ -223,13 +280,6 @@ void DrawMenu(const VisitorDisplay& visitor, const HeadsUpStyle& style, Canvas* 
     canvas->Text(visitor.menu[i], text, {area.x + 0.5 * area.width, area.y + 0.5 * (area.height - height)},
                  0.5);
   }
-}
-
-// The names that are listed: the known places of who is lost, or the stops of the tour on demand.
-const std::vector<std::string>& ListedStops(const VisitorDisplay& visitor) {
-  static const std::vector<std::string> kNone;
-  if (!visitor.stops.empty()) return visitor.stops;
-  return visitor.lists_route ? visitor.route_stops : kNone;
 }
 
 // Names below each other above the sentences, at least as low as `highest`. The last line says if some do not
@@ -311,8 +361,10 @@ std::vector<Eigen::AlignedBox2d> TakenByVisitorDisplay(const View& view, const H
   const Area button = LayOutMenu(visitor, canvas->width_px(), canvas->height_px(), style).button;
   if (button.width > 0)
     taken.emplace_back(Eigen::Vector2d(button.x, button.y), Eigen::Vector2d(button.right(), button.bottom()));
-  if (visitor.way_on && view.camera != nullptr && !visitor.way_on->text.empty())
-    taken.push_back(LabelOf(*visitor.way_on, view, unit, canvas).board);
+  if (const std::optional<DrawnWay> way = WayIn(view, unit, canvas)) {
+    taken.push_back(way->arrow.box);
+    if (way->label) taken.push_back(way->label->board);
+  }
   double bottom = canvas->height_px() - 12 * unit - style.bottom_px;
   for (const auto& [text, units] : {std::pair(&view.overlay.message, 15.0), {&visitor.sentence, 20.0}}) {
     const Eigen::AlignedBox2d panel = SentencePanel(*text, units, bottom, unit, canvas);
@@ -342,7 +394,7 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
     const Eigen::Vector2d middle(0.5 * (canvas->width_px() - 1), 0.5 * (canvas->height_px() - 1));
     DrawProgressRing(middle, 16 * unit, *visitor.dwell, canvas);
   }
-  if (visitor.way_on && view.camera != nullptr) DrawWayOn(*visitor.way_on, view, unit, canvas);
+  DrawWayOn(view, unit, canvas);
   double below = 10 * unit;
   for (const CornerLine& line : LinesInCorner(visitor, unit, canvas)) {
     canvas->Box(line.board.min(), line.board.max(), 9 * unit, kBoard);
@@ -350,7 +402,7 @@ void DrawVisitorDisplay(const View& view, const HeadsUpStyle& style, Canvas* can
     below = line.board.max().y() + 6 * unit;
   }
   DrawStops(listed, below, visitor.is_right_to_left, unit, canvas);
-  if (listed.empty()) DrawArrival(visitor.place, visitor.arrival, unit, canvas);
+  if (listed.empty() && visitor.menu.empty()) DrawArrival(visitor.place, visitor.arrival, unit, canvas);
   const double bottom = DrawSentence(view.overlay.message, 15, lowest, unit, canvas) - 6 * unit;
   DrawSentence(visitor.sentence, 20, bottom, unit, canvas);
   DrawMenu(visitor, style, canvas);

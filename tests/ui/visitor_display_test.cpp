@@ -215,7 +215,7 @@ TEST_F(WayOnOfVisitors, HasItsTextWhereItDoesNotCoverTheSignpost) {
   sign.name = "sign";
   sign.kind = content::Entity::Kind::kSignpost;
   sign.signpost.text = "To the clocks";
-  sign.signpost.anchor = {0.75, 0.4, 2};
+  sign.signpost.anchor = {0.95, 0.4, 2};
   sign.signpost.height_m = 0.3;
   const std::vector<Eigen::AlignedBox2d> boards = SignBoards(scene, kViewsCamera, tracked.camera_from_map);
   ASSERT_EQ(boards.size(), 1u);
@@ -233,11 +233,19 @@ TEST_F(WayOnOfVisitors, HasItsTextWhereItDoesNotCoverTheSignpost) {
     return TakenByVisitorDisplay(view, {1, 0, 0}, &canvas);
   };
   const auto without = placed(nullptr), with = placed(&scene);
-  ASSERT_EQ(without.size(), 1u);
-  ASSERT_EQ(with.size(), 1u);
-  EXPECT_TRUE(without[0].intersects(boards[0])) << "else it would stand behind the arrow";
-  EXPECT_FALSE(with[0].intersects(boards[0]));
-  EXPECT_TRUE(Eigen::AlignedBox2d(Eigen::Vector2d(0, 0), Eigen::Vector2d(639, 479)).contains(with[0]));
+  // The arrow, and its text.
+  ASSERT_EQ(without.size(), 2u);
+  ASSERT_EQ(with.size(), 2u);
+  for (const std::size_t part : {0, 1}) {
+    EXPECT_TRUE(without[part].intersects(boards[0])) << "else it would stand behind it";
+    EXPECT_FALSE(with[part].intersects(boards[0]))
+        << with[part].min().transpose() << ", " << with[part].max().transpose() << "; "
+        << boards[0].min().transpose() << ", " << boards[0].max().transpose();
+    EXPECT_TRUE(Eigen::AlignedBox2d(Eigen::Vector2d(0, 0), Eigen::Vector2d(639, 479)).contains(with[part]));
+  }
+  EXPECT_FALSE(with[0].intersects(with[1]));
+  view.overlay.visitor->menu = {"Skip the next stop"};
+  EXPECT_TRUE(placed(&scene).empty()) << "behind a menu the way would be seen in part";
 }
 
 }  // namespace
