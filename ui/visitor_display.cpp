@@ -247,6 +247,15 @@ void DrawMark(const CardTarget& target, const engine::CameraModel& camera, doubl
   }
 }
 
+// The ground of the choices of an open menu; empty while it is closed.
+Eigen::AlignedBox2d MenuPanel(const MenuLayout& layout, double unit) {
+  if (layout.choices.empty()) return {};
+  const Area &first = layout.choices.front(), &last = layout.choices.back();
+  const double margin = 12 * unit;
+  return {Eigen::Vector2d(first.x - margin, first.y - margin),
+          Eigen::Vector2d(last.right() + margin, last.bottom() + margin)};
+}
+
 // The button of the menu, and its choices while it is open.
 void DrawMenu(const VisitorDisplay& visitor, const HeadsUpStyle& style, Canvas* canvas) {
   const MenuLayout layout = LayOutMenu(visitor, canvas->width_px(), canvas->height_px(), style);
@@ -260,10 +269,8 @@ void DrawMenu(const VisitorDisplay& visitor, const HeadsUpStyle& style, Canvas* 
   }
   if (!layout.choices.empty()) {
     // What is behind the choices would be read between them.
-    const Area &first = layout.choices.front(), &last = layout.choices.back();
-    const double margin = 12 * unit;
-    canvas->Box({first.x - margin, first.y - margin}, {last.right() + margin, last.bottom() + margin},
-                16 * unit, theme::kPanel);
+    const Eigen::AlignedBox2d panel = MenuPanel(layout, unit);
+    canvas->Box(panel.min(), panel.max(), 16 * unit, theme::kPanel);
   }
   for (std::size_t i = 0; i < layout.choices.size(); ++i) {
     const Area& area = layout.choices[i];
@@ -358,7 +365,9 @@ std::vector<Eigen::AlignedBox2d> TakenByVisitorDisplay(const View& view, const H
   const double unit = style.unit_px;
   std::vector<Eigen::AlignedBox2d> taken;
   for (const CornerLine& line : LinesInCorner(visitor, unit, canvas)) taken.push_back(line.board);
-  const Area button = LayOutMenu(visitor, canvas->width_px(), canvas->height_px(), style).button;
+  const MenuLayout menu = LayOutMenu(visitor, canvas->width_px(), canvas->height_px(), style);
+  const Area& button = menu.button;
+  if (const Eigen::AlignedBox2d panel = MenuPanel(menu, unit); !panel.isEmpty()) taken.push_back(panel);
   if (button.width > 0)
     taken.emplace_back(Eigen::Vector2d(button.x, button.y), Eigen::Vector2d(button.right(), button.bottom()));
   if (const std::optional<DrawnWay> way = WayIn(view, unit, canvas)) {
