@@ -144,6 +144,43 @@ TEST(MeshSimplification, ReachesTheNumberOfTriangles) {
   EXPECT_GT(simple.triangles.size(), 450U);
 }
 
+// Two squares of 2 x 2 units that cross along the y axis.
+SurfaceMesh Crossing(int squares) {
+  SurfaceMesh mesh = Grid(squares, [](double, double) { return 0.0; });
+  const SurfaceMesh flat = mesh;
+  std::vector<std::uint32_t> index;
+  for (const Eigen::Vector3f& vertex : flat.vertices) {
+    index.push_back(static_cast<std::uint32_t>(mesh.vertices.size()));
+    if (vertex.x() == 0) {
+      index.back() = static_cast<std::uint32_t>(index.size() - 1);
+    } else {
+      mesh.vertices.emplace_back(0, vertex.y(), vertex.x());
+    }
+  }
+  for (const auto& [a, b, c] : flat.triangles) mesh.triangles.push_back({index[a], index[b], index[c]});
+  return mesh;
+}
+
+TEST(MeshSimplification, IsNotHeldUpBySheetsThatShareAnEdgeOnceTheyAreCut) {
+  const SurfaceMesh crossing = Crossing(20);
+  const SurfaceMesh cut = CutSharedEdges(crossing);
+  EXPECT_EQ(cut.triangles.size(), crossing.triangles.size());
+  EXPECT_NEAR(AreaOf(cut), AreaOf(crossing), 1e-6);
+  // The 21 vertices on the line are those of four halves now.
+  EXPECT_EQ(cut.vertices.size(), crossing.vertices.size() + 3 * 21);
+  constexpr std::size_t kFew = 16;  // Four halves, each of which two triangles can show.
+  EXPECT_LE(SimplifyMesh(cut, 1e-4, 1).triangles.size(), kFew);
+  EXPECT_GT(SimplifyMesh(crossing, 1e-4, 1).triangles.size(), 2 * kFew) << "so that cutting is needed";
+}
+
+TEST(MeshSimplification, CutsNothingOfASurfaceWithoutSharedEdges) {
+  const SurfaceMesh curved =
+      Grid(20, [](double u, double v) { return 0.5 * std::cos(2 * u) * std::cos(1.5 * v); });
+  const SurfaceMesh cut = CutSharedEdges(curved);
+  EXPECT_EQ(cut.vertices.size(), curved.vertices.size());
+  EXPECT_EQ(cut.triangles.size(), curved.triangles.size());
+}
+
 TEST(MeshSimplification, RemovesSmallPiecesOnly) {
   SurfaceMesh mesh = Grid(10, [](double, double) { return 0.0; });
   const std::size_t large = mesh.triangles.size();
