@@ -108,8 +108,8 @@ std::optional<MapMesh> DensifyMap(const std::shared_ptr<const MapSnapshot>& map,
   if (depths->empty()) return result;
   const auto field = Fuse(*depths, options.voxel_size * MedianDepth(*map), options, interrupt);
   if (!field) return std::nullopt;
-  const SurfaceMesh surface =
-      RemoveSmallPieces(field->ExtractSurface(options.min_weight), options.min_piece_triangles);
+  const SurfaceMesh surface = RemoveSmallPieces(CutSharedEdges(field->ExtractSurface(options.min_weight)),
+                                                options.min_piece_triangles);
   result.mesh = SimplifyMesh(surface, options.simplification_voxels * field->voxel_size(),
                              options.max_triangles, interrupt);
   if (IsInterrupted(interrupt)) return std::nullopt;

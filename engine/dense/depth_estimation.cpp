@@ -20,12 +20,13 @@ int LevelFor(const CameraModel& camera, int max_width_px) {
   return level;
 }
 
+// What other depth maps say of a surface at a point. Those that see something nearer, or whose depth is not
+// known there, say nothing.
 struct Agreement {
-  int seen = 0;      // Depth maps in whose image the point is.
-  int agreeing = 0;  // Depth maps that have a surface there.
+  int agreeing = 0;       // Depth maps that have a surface there.
+  int contradicting = 0;  // Depth maps that see something behind the point, and so through it.
 };
 
-// How many depth maps confirm that there is a surface at a point.
 Agreement CountAgreeing(const Eigen::Vector3d& point_in_map, const std::vector<const DepthMap*>& others,
                         double agreement) {
   Agreement result;
@@ -34,9 +35,14 @@ Agreement CountAgreeing(const Eigen::Vector3d& point_in_map, const std::vector<c
     const Eigen::Vector3d point_in_camera = other->camera_from_map * point_in_map;
     const auto pixel = other->rays->Project(point_in_camera);
     if (!pixel) continue;
-    ++result.seen;
     const double expected = 1 / point_in_camera.norm(), found = InverseDistanceAt(*other, *pixel);
-    if (found > 0 && std::abs(found - expected) <= agreement * expected + other->step) ++result.agreeing;
+    if (found <= 0) continue;
+    const double tolerance = agreement * expected + other->step;
+    if (std::abs(found - expected) <= tolerance) {
+      ++result.agreeing;
+    } else if (found < expected) {
+      ++result.contradicting;
+    }
   }
   return result;
 }
@@ -151,7 +157,8 @@ DepthMap DepthEstimator::KeepConsistent(const DepthMap& depth,
       const Eigen::Vector3d point_in_map =
           map_from_camera * Eigen::Vector3d(depth.rays->At(x, y).cast<double>() / inverse);
       const Agreement found = CountAgreeing(point_in_map, others, options_.agreement);
-      if (found.agreeing >= std::clamp(found.seen, 1, options_.min_agreeing)) continue;
+      const int judging = found.agreeing + found.contradicting;
+      if (found.agreeing >= std::clamp(judging, 1, options_.min_agreeing)) continue;
       inverse = 0;
       kept.confidence.at<std::uint8_t>(y, x) = 0;
     }

@@ -22,7 +22,7 @@ struct DepthOptions {
   int max_planes = 128;    // Bounds time and memory: bytes of a keyframe = 3 x pixels x planes.
   SmoothnessCosts smoothness;
   int min_confidence = 8;  // Of 255; see PlaneChoice.
-  // A depth is kept if it agrees with the depths of this many neighbours, or of all if there are fewer.
+  // A depth is kept if this many neighbours confirm it, or if one does and none sees something behind it.
   int min_agreeing = 2;
   // Two inverse distances agree if they differ by less than this ratio plus a plane of the sweep.
   double agreement = 0.02;
@@ -42,8 +42,8 @@ class DepthEstimator {
   const std::vector<DepthViews>& views() const { return views_; }
   // The depth of one of views(), not checked against others. Empty when asked to stop.
   std::optional<DepthMap> Estimate(const DepthViews& views, const std::atomic<bool>* interrupt = nullptr);
-  // The depth map without the depths that too few of its neighbours' depth maps confirm. `others` may lack
-  // some; null entries are ignored.
+  // The depth map without the depths that too few of `others` confirm, its neighbours (some may be missing or
+  // null). A neighbour that sees something nearer, as beside an object, or has no depth there says nothing.
   DepthMap KeepConsistent(const DepthMap& depth, const std::vector<const DepthMap*>& others) const;
 
  private:

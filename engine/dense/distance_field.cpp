@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <utility>
 
 #include "engine/base/interrupt.h"
@@ -43,18 +42,20 @@ Eigen::Vector3i CornerOf(int corner) {
 // A cell whose corners are eight voxels, the first of which gives its position.
 struct Cell {
   std::array<float, 8> distances;  // In truncations; by CornerOf.
+  unsigned measured = 0;           // A bit for each corner whose distance is known.
 
+  bool IsMeasured(int corner) const { return (measured >> corner & 1U) != 0; }
   bool IsOutside(int corner) const { return distances[static_cast<std::size_t>(corner)] >= 0; }
 
-  // The mean of the places on its edges where the distance is zero, in voxels from its first corner; empty if
-  // the surface does not pass through.
-  std::optional<Eigen::Vector3d> Vertex() const {
+  // The mean of the places on its measured edges where the distance is zero, in voxels from its first corner.
+  // There must be one.
+  Eigen::Vector3d Vertex() const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     int count = 0;
     for (int a = 0; a < 8; ++a) {
       for (const int axis : {1, 2, 4}) {
         const int b = a | axis;
-        if (b == a || IsOutside(a) == IsOutside(b)) continue;
+        if (b == a || !IsMeasured(a) || !IsMeasured(b) || IsOutside(a) == IsOutside(b)) continue;
         const double from = distances[static_cast<std::size_t>(a)],
                      to = distances[static_cast<std::size_t>(b)];
         const double share = from / (from - to);
@@ -62,7 +63,6 @@ struct Cell {
         ++count;
       }
     }
-    if (count == 0) return std::nullopt;
     return sum / count;
   }
 };
@@ -145,44 +145,43 @@ bool DistanceField::Add(const DepthMap& depth, std::size_t max_blocks, const std
 SurfaceMesh DistanceField::ExtractSurface(double min_weight) const {
   const auto least = static_cast<std::uint16_t>(std::max(1.0, min_weight * kWeightScale));
   const auto cell_at = [&](const Eigen::Vector3i& first) {
-    std::optional<Cell> cell(std::in_place);
+    Cell cell;
     for (int corner = 0; corner < 8; ++corner) {
       const Voxel* const voxel = FindVoxel(first + CornerOf(corner));
-      if (voxel == nullptr || voxel->weight < least) return std::optional<Cell>();
-      cell->distances[static_cast<std::size_t>(corner)] =
-          static_cast<float>(voxel->distance / kDistanceScale);
+      if (voxel == nullptr || voxel->weight < least) continue;
+      cell.measured |= 1U << corner;
+      cell.distances[static_cast<std::size_t>(corner)] = static_cast<float>(voxel->distance / kDistanceScale);
     }
     return cell;
   };
   SurfaceMesh mesh;
   constexpr std::size_t kVoxels = kBlockSide * kBlockSide * kBlockSide;
   std::vector<std::uint32_t> vertex_of(blocks_.size() * kVoxels, kNoVertex);
-  const auto vertex_at = [&](const Eigen::Vector3i& cell) {
-    const auto found = lookup_.find(KeyOf(BlockOf(cell)));
-    return found == lookup_.end() ? kNoVertex : vertex_of[found->second * kVoxels + IndexInBlock(cell)];
+  // The vertex of a cell that the surface passes through; kNoVertex where there is no block.
+  const auto vertex_at = [&](const Eigen::Vector3i& first) {
+    const auto found = lookup_.find(KeyOf(BlockOf(first)));
+    if (found == lookup_.end()) return kNoVertex;
+    std::uint32_t& vertex = vertex_of[found->second * kVoxels + IndexInBlock(first)];
+    if (vertex == kNoVertex) {
+      vertex = static_cast<std::uint32_t>(mesh.vertices.size());
+      mesh.vertices.push_back(((first.cast<double>() + cell_at(first).Vertex()) * voxel_size_).cast<float>());
+    }
+    return vertex;
   };
   const auto for_each_voxel = [&](const auto& visit) {
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       for (std::size_t i = 0; i < kVoxels; ++i) {
         const int index = static_cast<int>(i);
         if (blocks_[b].voxels[i].weight < least) continue;
-        visit(b * kVoxels + i,
-              Eigen::Vector3i(blocks_[b].origin + Eigen::Vector3i(index % kBlockSide,
+        visit(Eigen::Vector3i(blocks_[b].origin + Eigen::Vector3i(index % kBlockSide,
                                                                   index / kBlockSide % kBlockSide,
                                                                   index / kBlockSide / kBlockSide)));
       }
     }
   };
-  for_each_voxel([&](std::size_t index, const Eigen::Vector3i& voxel) {
-    const std::optional<Cell> cell = cell_at(voxel);
-    const std::optional<Eigen::Vector3d> vertex = cell ? cell->Vertex() : std::nullopt;
-    if (!vertex) return;
-    vertex_of[index] = static_cast<std::uint32_t>(mesh.vertices.size());
-    mesh.vertices.push_back(((voxel.cast<double>() + *vertex) * voxel_size_).cast<float>());
-  });
   // Each pair of neighbouring voxels on different sides has four cells around it, whose vertices form two
   // triangles.
-  for_each_voxel([&](std::size_t, const Eigen::Vector3i& voxel) {
+  for_each_voxel([&](const Eigen::Vector3i& voxel) {
     const bool outside = FindVoxel(voxel)->distance >= 0;
     for (int axis = 0; axis < 3; ++axis) {
       const Voxel* const next = FindVoxel(voxel + Eigen::Vector3i::Unit(axis));

@@ -226,6 +226,58 @@ SurfaceMesh SimplifyMesh(const SurfaceMesh& mesh, double max_distance, std::size
   return simplification.Result();
 }
 
+SurfaceMesh CutSharedEdges(const SurfaceMesh& mesh) {
+  struct Side {
+    std::pair<std::uint32_t, std::uint32_t> edge;  // Ascending.
+    std::uint32_t triangle;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * mesh.triangles.size());
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& t = mesh.triangles[i];
+    for (std::size_t k = 0; k < 3; ++k) sides.push_back({std::minmax(t[k], t[(k + 1) % 3]), i});
+  }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.edge, a.triangle) < std::tie(b.edge, b.triangle);
+  });
+  // Union-find over the corners of the triangles: those at both ends of an edge between two triangles belong
+  // together.
+  std::vector<std::uint32_t> parent(3 * mesh.triangles.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  const auto root_of = [&](std::uint32_t corner) {
+    while (parent[corner] != corner) corner = parent[corner] = parent[parent[corner]];
+    return corner;
+  };
+  const auto corner_of = [&](std::uint32_t triangle, std::uint32_t vertex) {
+    const auto& t = mesh.triangles[triangle];
+    return 3 * triangle + static_cast<std::uint32_t>(std::find(t.begin(), t.end(), vertex) - t.begin());
+  };
+  for (std::size_t from = 0, to = 0; from < sides.size(); from = to) {
+    while (to < sides.size() && sides[to].edge == sides[from].edge) ++to;
+    if (to - from != 2) continue;
+    for (const std::uint32_t vertex : {sides[from].edge.first, sides[from].edge.second}) {
+      const std::uint32_t a = root_of(corner_of(sides[from].triangle, vertex)),
+                          b = root_of(corner_of(sides[from + 1].triangle, vertex));
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  SurfaceMesh cut;
+  std::vector<std::uint32_t> index(parent.size(), kRemoved);
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    std::array<std::uint32_t, 3> corners{};
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      std::uint32_t& known = index[root_of(3 * i + k)];
+      if (known == kRemoved) {
+        known = static_cast<std::uint32_t>(cut.vertices.size());
+        cut.vertices.push_back(mesh.vertices[mesh.triangles[i][k]]);
+      }
+      corners[k] = known;
+    }
+    cut.triangles.push_back(corners);
+  }
+  return cut;
+}
+
 SurfaceMesh RemoveSmallPieces(const SurfaceMesh& mesh, std::size_t min_triangles) {
   // Union-find over the vertices.
   std::vector<std::uint32_t> parent(mesh.vertices.size());

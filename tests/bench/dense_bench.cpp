@@ -2,6 +2,7 @@
 #include <benchmark/benchmark.h>
 
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -26,8 +27,9 @@
 //   edge_px                 median distance of the edges of objects in the drawn image from the true ones
 //   flicker                 share of the content pixels that change from hidden to shown, or back, from one
 //                           frame to the next without cause
-// DOCENT_BENCH_SCENE (default room) and DOCENT_BENCH_SECONDS (default 12) choose the scene and the duration.
-// With DOCENT_BENCH_IMAGES, the drawn images are written to that folder.
+// DOCENT_BENCH_SCENE (default room), DOCENT_BENCH_SEED (default 1) and DOCENT_BENCH_SECONDS (default 12)
+// choose the scene, its seed and the duration. With DOCENT_BENCH_IMAGES, the drawn images are written to that
+// folder.
 //
 //   docent_bench --benchmark_filter=DenseSurfaces
 namespace docent::bench {
@@ -47,9 +49,10 @@ struct BuiltMap {
   engine::Sim3 world_from_map;
 };
 
-BuiltMap Build(const std::string& scene, double seconds) {
+BuiltMap Build(const std::string& scene, std::uint64_t seed, double seconds) {
   app::SimulationOptions options;
   options.duration_s = seconds;
+  options.seed = seed;
   BuiltMap built;
   built.simulation = app::MakeSimulation(scene, options);
   app::simulated_session::SourceRun run = app::simulated_session::RunSource(
@@ -100,10 +103,12 @@ app::OcclusionFigures MeasureHiding(const BuiltMap& built, const engine::Surface
 
 void DenseSurfaces(benchmark::State& state) {
   const char* const scene = std::getenv("DOCENT_BENCH_SCENE");
+  const char* const seed = std::getenv("DOCENT_BENCH_SEED");
   const char* const seconds = std::getenv("DOCENT_BENCH_SECONDS");
   for (auto _ : state) {
     const BuiltMap built =
-        Build(scene != nullptr ? scene : "room", seconds != nullptr ? std::atof(seconds) : 12);
+        Build(scene != nullptr ? scene : "room", seed != nullptr ? std::strtoull(seed, nullptr, 10) : 1,
+              seconds != nullptr ? std::atof(seconds) : 12);
     const app::DepthFigures depth =
         app::MeasureDepthMaps(*built.simulation, built.map, built.keyframes, built.world_from_map);
     const auto start = Clock::now();

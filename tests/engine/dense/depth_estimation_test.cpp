@@ -115,6 +115,72 @@ TEST(DepthEstimation, LeavesOutWhatTheNeighboursDoNotConfirm) {
   EXPECT_LT(cv::countNonZero(estimator.KeepConsistent(depth, {&other}).inverse_distance), 0.05 * known);
 }
 
+constexpr double kWall = 3, kStrip = 1.5;
+
+// The exact depth map of a wall z = kWall and, before it, an upright strip z = kStrip, |x| < 0.3, from a
+// camera at (x, 0, 0) that looks along z.
+DepthMap DepthOfStripBeforeWall(double x) {
+  DepthMap depth;
+  depth.camera_from_map = CameraAt({x, 0, 0});
+  depth.rays = std::make_shared<LevelRays>(*testing_world::PinholeCamera(160, 120), 0);
+  depth.inverse_distance = cv::Mat::zeros(120, 160, CV_32FC1);
+  depth.confidence = cv::Mat(120, 160, CV_8UC1, cv::Scalar(200));
+  depth.step = 0.004;
+  for (int v = 0; v < 120; ++v) {
+    for (int u = 0; u < 160; ++u) {
+      const Eigen::Vector3f ray = depth.rays->At(u, v);
+      const double at_strip = x + kStrip * static_cast<double>(ray.x() / ray.z());
+      const double z = std::abs(at_strip) < 0.3 ? kStrip : kWall;
+      depth.inverse_distance.at<float>(v, u) = static_cast<float>(static_cast<double>(ray.z()) / z);
+    }
+  }
+  return depth;
+}
+
+TEST(DepthEstimation, KeepsWhatOneNeighbourConfirmsAndNoneSeesThrough) {
+  const DepthEstimator estimator(std::make_shared<MapSnapshot>());
+  const DepthMap depth = DepthOfStripBeforeWall(0), left = DepthOfStripBeforeWall(-0.2),
+                 right = DepthOfStripBeforeWall(0.2);
+  const DepthMap kept = estimator.KeepConsistent(depth, {&left, &right});
+  int hidden_on_one_side = 0;
+  for (int u = 0; u < 160; ++u) {
+    const Eigen::Vector3f ray = depth.rays->At(u, 60);
+    const double at_wall = kWall * static_cast<double>(ray.x() / ray.z());
+    // By similar triangles, the strip covers the wall from -0.6 to 0.6 for the camera in the middle, from
+    // -0.4 to 0.8 for the left one, and from -0.8 to 0.4 for the right one.
+    if (std::abs(at_wall) < 0.65 || std::abs(at_wall) > 0.75) continue;
+    ++hidden_on_one_side;
+    EXPECT_GT(kept.inverse_distance.at<float>(60, u), 0) << u;
+  }
+  EXPECT_GT(hidden_on_one_side, 2);
+}
+
+TEST(DepthEstimation, LeavesOutWhatANeighbourSeesThrough) {
+  const DepthEstimator estimator(std::make_shared<MapSnapshot>());
+  DepthMap depth = DepthOfStripBeforeWall(0);
+  DepthMap left = DepthOfStripBeforeWall(-0.2);
+  const DepthMap right = DepthOfStripBeforeWall(0.2);
+  // A sheet before the wall that two of the three cameras have, and the third sees through.
+  for (DepthMap* const wrong : {&depth, &left}) {
+    for (int v = 0; v < 120; ++v) {
+      for (int u = 0; u < 160; ++u)
+        wrong->inverse_distance.at<float>(v, u) = wrong->rays->At(u, v).z() / 2.0F;
+    }
+  }
+  const DepthMap kept = estimator.KeepConsistent(depth, {&left, &right});
+  int seen_through = 0;
+  for (int u = 0; u < 160; ++u) {
+    const Eigen::Vector3f ray = depth.rays->At(u, 60);
+    const Eigen::Vector3d place = Eigen::Vector3d((ray / ray.z()).cast<double>()) * 2;
+    const double at_strip = 0.2 + (place.x() - 0.2) * kStrip / 2;  // Of the ray of the right camera.
+    const auto in_right = right.rays->Project(right.camera_from_map * place);
+    if (std::abs(at_strip) < 0.35 || !in_right) continue;
+    ++seen_through;
+    EXPECT_EQ(kept.inverse_distance.at<float>(60, u), 0) << u;
+  }
+  EXPECT_GT(seen_through, 50);
+}
+
 TEST(DepthEstimation, GivesTheSameResultEachTime) {
   const auto map = MapOf(testing_world::PinholeCamera(160, 120));
   DepthEstimator first(map), second(map);
