@@ -119,9 +119,9 @@ std::unique_ptr<faiss::Index> MakeIndex(const std::string& kind, std::size_t dim
     return std::make_unique<faiss::IndexHNSWSQ>(static_cast<int>(d), faiss::ScalarQuantizer::QT_8bit,
                                                 kNeighbours);
   *quantizer = std::make_unique<faiss::IndexFlatL2>(d);
-  const auto lists = static_cast<std::size_t>(4 * std::sqrt(static_cast<double>(keyframes)));
+  const auto lists = static_cast<std::size_t>(std::sqrt(static_cast<double>(keyframes)));
   auto index = std::make_unique<faiss::IndexIVFPQ>(quantizer->get(), dimensions, lists, kSubvectors, kBits);
-  index->nprobe = std::max<std::size_t>(8, lists / 32);
+  index->nprobe = std::max<std::size_t>(8, lists / 16);
   return index;
 }
 

@@ -14,19 +14,19 @@
 #include "tests/bench/library_size.h"
 
 // Opens a library of many maps for a tour: reads its entries, thumbnails and words and builds the place
-// index; the maps stay on disk. Each map has 150 keyframes with small images, but with thumbnails of the
-// usual size and 190 words each, as an image of 640 x 480 has. The library is first written to the folder for
-// temporary files, 0.8 GB for 1000 maps.
+// index; the maps stay on disk. Each map has 150 or 25 keyframes with small images, but with thumbnails of
+// the usual size and 190 words each, as an image of 640 x 480 has. The library is first written to the folder
+// for temporary files, 0.8 GB for 1000 maps.
 namespace docent::bench {
 namespace {
 
-std::shared_ptr<const engine::MapSnapshot> MakeMap(int number) {
+std::shared_ptr<const engine::MapSnapshot> MakeMap(int number, std::size_t keyframes) {
   constexpr int kWidth = 80, kHeight = 64;
   auto map = std::make_shared<engine::MapSnapshot>();
   const engine::CameraModel::Intrinsics intrinsics{kWidth, kHeight, 70, 70, 40, 32};
   const auto camera = std::make_shared<const engine::CameraModel>(engine::LensModel::kRadialTangential,
                                                                   intrinsics, std::array<double, 5>{});
-  for (std::size_t i = 0; i < kKeyFramesOfAMap; ++i) {
+  for (std::size_t i = 0; i < keyframes; ++i) {
     cv::Mat gray(kHeight, kWidth, CV_8UC1);
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x)
@@ -47,10 +47,10 @@ std::shared_ptr<const engine::MapSnapshot> MakeMap(int number) {
   return map;
 }
 
-std::vector<engine::KeyFrameWords> MakeWords(int number) {
+std::vector<engine::KeyFrameWords> MakeWords(int number, std::size_t keyframes) {
   Random random(static_cast<std::uint64_t>(number));
   std::vector<engine::KeyFrameWords> words;
-  for (engine::KeyFrameId i = 0; i < kKeyFramesOfAMap; ++i) {
+  for (engine::KeyFrameId i = 0; i < keyframes; ++i) {
     std::vector<std::uint32_t> leaves(200);
     for (std::uint32_t& leaf : leaves) leaf = random.Below(engine::VocabularyTree::kLeaves);
     words.push_back({i, i / 5 * 5, engine::MakeWordBag(std::move(leaves))});
@@ -59,16 +59,18 @@ std::vector<engine::KeyFrameWords> MakeWords(int number) {
 }
 
 void OpenLibrary(benchmark::State& state) {
+  const auto keyframes_a_map = static_cast<std::size_t>(state.range(1));
   const std::filesystem::path path =
       std::filesystem::temp_directory_path() / ("docent-bench-" + std::to_string(getpid()) + ".docent");
   {
     maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
     for (int i = 0; i < state.range(0); ++i)
-      library.Save({library.NewKey(), "map " + std::to_string(i), maps::Policy::kOpen, MakeMap(i), nullptr});
+      library.Save({library.NewKey(), "map " + std::to_string(i), maps::Policy::kOpen,
+                    MakeMap(i, keyframes_a_map), nullptr});
     const maps::Database database = maps::Database::OpenReadWrite(path, false);
     maps::Transaction transaction(database, maps::Transaction::Kind::kWrite);
     for (int i = 0; i < state.range(0); ++i)
-      maps::WriteWords(database, static_cast<std::uint64_t>(i) + 1, MakeWords(i));
+      maps::WriteWords(database, static_cast<std::uint64_t>(i) + 1, MakeWords(i, keyframes_a_map));
     transaction.Commit();
   }
   std::size_t keyframes = 0, words = 0;
@@ -90,9 +92,10 @@ void OpenLibrary(benchmark::State& state) {
   std::filesystem::remove(path);
 }
 BENCHMARK(OpenLibrary)
-    ->ArgName("maps")
-    ->Arg(30)
-    ->Arg(1000)
+    ->ArgNames({"maps", "keyframes_a_map"})
+    ->ArgsProduct({{30, 1000}, {kKeyFramesOfAMap}})
+    // Museums of small exhibits, up to 4 GB.
+    ->ArgsProduct({{1'000, 10'000, 100'000}, {25}})
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
 
