@@ -82,7 +82,7 @@ void WriteHubImages(const Database& database, std::uint64_t key, const ItemBytes
   for (const auto& [item, bytes] : items) {
     if (!item.starts_with("image/")) continue;
     const std::int64_t keyframe = std::stoll(item.substr(kImagePrefix));
-    const Bytes own = WithKey(bytes, key);
+    const Bytes own = FromHub(bytes, key);
     insert.Reset();
     insert.Bind(1, AsKey(key)).Bind(2, keyframe).Bind(3, std::span<const std::uint8_t>(own)).Run();
     kept.insert(keyframe);
@@ -195,14 +195,14 @@ bool LocalLibrary::HasStructure(const LocalMap& map) const {
 void LocalLibrary::WriteItems(const LocalMap& map, const Retarget& to_local) {
   const std::uint64_t key = map.facts.info.key;
   for (const std::string_view part : kHubParts) {
-    const Bytes own = WithKey(ItemOf(map, part), key);
+    const Bytes own = FromHub(ItemOf(map, part), key);
     WritePart(database_, key, part, own);
     if (std::find(kPartsInBlocks.begin(), kPartsInBlocks.end(), part) != kPartsInBlocks.end())
       WritePart(database_, key, BlockChecksOf(part), EncodeBlockChecks(key, own));
   }
-  for (const char* table : kHubTables) WriteTableRow(database_, table, key, WithKey(ItemOf(map, table), key));
+  for (const char* table : kHubTables) WriteTableRow(database_, table, key, FromHub(ItemOf(map, table), key));
   if (map.items.contains("mesh")) {
-    WritePart(database_, key, "mesh", WithKey(ItemOf(map, "mesh"), key));
+    WritePart(database_, key, "mesh", FromHub(ItemOf(map, "mesh"), key));
   } else {
     RemovePart(database_, key, "mesh");
   }

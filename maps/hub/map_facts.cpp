@@ -30,6 +30,8 @@ bool IsImageItem(std::string_view item) {
          std::all_of(id.begin(), id.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
+constexpr std::size_t kKeyOffset = 8, kChecksumBytes = 8;  // See envelope.h.
+
 }  // namespace
 
 bool IsStructureItem(const std::string& item) {
@@ -91,7 +93,6 @@ std::uint64_t NumberOf(const std::string& map_id) {
 }
 
 Bytes WithKey(const Bytes& column, std::uint64_t key) {
-  constexpr std::size_t kKeyOffset = 8, kChecksumBytes = 8;  // See envelope.h.
   if (column.size() < kEnvelopeBytes) throw Error("a column of the map is cut off");
   const std::size_t end = column.size() - kChecksumBytes;
   std::uint64_t stored = 0;
@@ -103,6 +104,14 @@ Bytes WithKey(const Bytes& column, std::uint64_t key) {
   const std::uint64_t checksum = Checksum(std::span(other).first(end));
   std::memcpy(other.data() + end, &checksum, sizeof checksum);
   return other;
+}
+
+Bytes FromHub(const Bytes& column, std::uint64_t key) {
+  Bytes own = WithKey(column, key);
+  std::uint64_t stored = 0;
+  std::memcpy(&stored, column.data() + kKeyOffset, sizeof stored);
+  if (stored != kHubKey) throw Error("a column of the map has another key than those of a hub");
+  return own;
 }
 
 }  // namespace docent::maps

@@ -70,5 +70,8 @@ std::uint64_t NumberOf(const std::string& map_id);
 
 // The same column for another key. Throws Error if it is damaged.
 Bytes WithKey(const Bytes& column, std::uint64_t key);
+// A column of a hub for a key of a library. Throws Error if it is damaged, or has not the key that all
+// columns of a hub have: it would not be equal to what the hub gets back.
+Bytes FromHub(const Bytes& column, std::uint64_t key);
 
 }  // namespace docent::maps

@@ -5,6 +5,8 @@
 
 #include <fstream>
 
+#include "engine/base/error.h"
+#include "maps/hub/local_library.h"
 #include "tests/hub/hub_samples.h"
 #include "tests/hub/private_server.h"
 
@@ -84,6 +86,23 @@ TEST_F(HubState, ADamagedOrHostileFileCostsNoMap) {
     EXPECT_EQ(ErrorOf([&] { Pull(SampleSync(Url(), folder_ / copy)); }), "");
     EXPECT_THAT(AllTexts(copy), testing::AllOf(HasSubstr("mine"), HasSubstr("theirs")));
   }
+}
+
+TEST_F(HubState, AColumnWithAnotherKeyThanThoseOfAHubIsRefused) {
+  std::uint64_t key = 0;
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    key = AddSampleMap(&a, "Desk", 7);
+  }
+  LocalMap map = LocalLibrary(folder_ / "a", CreateIfMissing::kNo, {}).Read(key, {});
+  LocalLibrary device(folder_ / "b", CreateIfMissing::kYes, {});
+  map.facts.info.key = device.library().NewKey();
+  LocalMap other = map;
+  other.items["points"] = WithKey(other.items["points"], 9);
+  EXPECT_THROW(device.Write(other, {}, ""), Error);
+  EXPECT_EQ(device.StampOf(map.facts.info.key), "");
+  device.Write(map, {}, "");
+  EXPECT_EQ(device.Read(map.facts.info.key, {}).manifest, map.manifest);
 }
 
 }  // namespace
