@@ -17,7 +17,8 @@
 // Place recognition among all keyframes of all maps. The maps are those of the simulator's museum and desks:
 // the keyframes are from the walks on which each place is mapped, the queries from later visits on other
 // paths. Larger libraries contain replicas of these maps: thumbnails are mirrored and changed by noise as
-// coarse as their content, and half of each keyframe's words are replaced; 150 keyframes per map. Counters:
+// coarse as their content, and half of each keyframe's words are replaced; 150 or 25 keyframes per map.
+// Counters:
 //   median_ms, p95_ms       CPU time of a query in milliseconds, its words being given
 //   recall_at_1, _5         ratio of the queries whose map is first, or among the first five candidates
 //   bytes_a_keyframe        resident memory of the index

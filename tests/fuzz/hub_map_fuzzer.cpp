@@ -45,7 +45,7 @@ fs::path FuzzFolder() {
   return folder;
 }
 
-// A map of two keyframes with points, a panorama-free start, and content.
+// A map of two keyframes with two points.
 std::shared_ptr<const docent::engine::MapSnapshot> SmallMap() {
   using namespace docent::engine;
   const CameraModel::Intrinsics intrinsics{64, 64, 60, 60, 32, 32};
