@@ -40,6 +40,10 @@ struct SceneRequest {
       false;  // All places have the content of the first, so they cannot be distinguished.
   // Of `museum` and `desks`: seed of the walk through the places after they were built; 0: the usual walk.
   std::uint64_t walk = 0;
+  // Of `museum` and `desks`: time at each place while it is built, seconds, at least the usual six; and how
+  // often all places are visited.
+  double build_s = 0;
+  int rounds = 1;
 };
 
 // A named scene with the meaning and range of the number after the colon.

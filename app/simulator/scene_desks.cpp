@@ -105,7 +105,7 @@ Scene BuildDesks(const SceneRequest& request) {
   viewing.target_ahead = kDeskMiddle + 0.1;
   viewing.target_height = 0.86;
   viewing.swing = 0.38;
-  TourPlaces(stands, viewing, request.walk, &random, &scene);
+  TourPlaces(stands, viewing, request, &random, &scene);
   return scene;
 }
 

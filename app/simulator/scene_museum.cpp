@@ -111,7 +111,7 @@ Scene BuildMuseum(const SceneRequest& request) {
     HangPainting(end, {0, -1.8, -0.02}, 2.6, 2.0,
                  surfaces.AddTexture(PaintPainting({512, 512}, random.Next())), &scene);
   }
-  TourPlaces(stands, Viewing{}, request.walk, &random, &scene);
+  TourPlaces(stands, Viewing{}, request, &random, &scene);
   return scene;
 }
 

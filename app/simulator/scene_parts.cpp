@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kWalkingSpeed = 1.5;   // m/s.
 constexpr double kRotationSpeed = 1.9;  // rad/s.
+constexpr std::uint64_t kRoundSeed =
+    0x9E3779B97F4A7C15;  // Between the seeds of two rounds; 2^64 / golden ratio.
 
 // Waypoints in a stand's frame: x, height above the floor and z of the camera (metres), x of the target
 // (metres), and seconds since the previous waypoint.
@@ -42,6 +44,18 @@ void Travel(const Stand& stand, const Viewing& viewing, const Step& start, Scene
   const double seconds = std::max({1.5, 1.5 * (goal - trajectory.last_position()).norm() / kWalkingSpeed,
                                    1.5 * std::abs(rotation) / kRotationSpeed});
   Walk(stand, viewing, {{start.x, start.height, start.z, start.target_x, seconds}}, scene);
+}
+
+// Moves the camera from one random viewpoint of a place to the next until the trajectory lasts to `end_s`.
+void Linger(const Stand& stand, const Viewing& viewing, double end_s, std::uint64_t seed, Scene* scene) {
+  Random random(seed);
+  const auto jitter = [&](double reach) { return random.Uniform(-reach, reach); };
+  while (scene->trajectory.duration_s() < end_s) {
+    const double height = viewing.eye_height + jitter(0.12);
+    const double z = random.Uniform(std::min(viewing.nearest, viewing.farthest),
+                                    std::max(viewing.nearest, viewing.farthest));
+    Walk(stand, viewing, {{jitter(viewing.swing), height, z, jitter(0.15), random.Uniform(1.2, 4)}}, scene);
+  }
 }
 
 }  // namespace
@@ -116,8 +130,8 @@ void AddHall(const Hall& hall, Scene* scene) {
   wall({left, top, near}, {0, 0, depth}, 0.85f);
 }
 
-void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, std::uint64_t walk, Random* random,
-                Scene* scene) {
+void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, const SceneRequest& request,
+                Random* random, Scene* scene) {
   Trajectory& trajectory = scene->trajectory;
   const int count = static_cast<int>(stands.size());
   const auto jitter = [&](double reach) { return random->Uniform(-reach, reach); };
@@ -140,7 +154,9 @@ void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, std::u
       Travel(stands[k], viewing, steps[0], scene);
       trajectory.BeginSegment("build" + std::to_string(k));
     }
+    const double end_s = trajectory.duration_s() + request.build_s;
     Walk(stands[k], viewing, {steps.begin() + 1, steps.end()}, scene);
+    Linger(stands[k], viewing, end_s, request.seed + static_cast<std::uint64_t>(k), scene);
   }
   // The visits alternate between places of the second and the first half.
   std::vector<int> order;
@@ -149,23 +165,26 @@ void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, std::u
     order.push_back(k);
   }
   if (count % 2 == 1) order.push_back(count - 1);
-  Random own(walk);
-  if (walk > 0) {
-    random = &own;
-    for (std::size_t i = order.size(); i > 1; --i)
-      std::swap(order[i - 1], order[own.Below(static_cast<std::uint32_t>(i))]);
-  }
-  for (const int k : order) {
-    // A visitor hurries or lingers.
-    const double pace = walk > 0 ? own.Uniform(0.8, 3) : 1;
-    const double middle = 0.5 * (near + far) + jitter(0.1);
-    const std::vector<Step> steps = {
-        {0.7 * swing + jitter(0.1), eye + jitter(0.06), middle, jitter(0.1), 0},
-        {0.1 * swing + jitter(0.1), eye + jitter(0.08), middle + jitter(0.1), jitter(0.1), 1.3 * pace},
-        {-0.5 * swing + jitter(0.1), eye + jitter(0.08), middle + jitter(0.1), jitter(0.1), 1.3 * pace}};
-    Travel(stands[k], viewing, steps[0], scene);
-    trajectory.BeginSegment("visit" + std::to_string(k));
-    Walk(stands[k], viewing, {steps.begin() + 1, steps.end()}, scene);
+  for (int round = 0; round < request.rounds; ++round) {
+    const bool usual = request.walk == 0 && round == 0;
+    Random own(request.walk + kRoundSeed * static_cast<std::uint64_t>(round));
+    if (!usual) {
+      random = &own;
+      for (std::size_t i = order.size(); i > 1; --i)
+        std::swap(order[i - 1], order[own.Below(static_cast<std::uint32_t>(i))]);
+    }
+    for (const int k : order) {
+      // A visitor hurries or lingers.
+      const double pace = usual ? 1 : own.Uniform(0.8, 3);
+      const double middle = 0.5 * (near + far) + jitter(0.1);
+      const std::vector<Step> steps = {
+          {0.7 * swing + jitter(0.1), eye + jitter(0.06), middle, jitter(0.1), 0},
+          {0.1 * swing + jitter(0.1), eye + jitter(0.08), middle + jitter(0.1), jitter(0.1), 1.3 * pace},
+          {-0.5 * swing + jitter(0.1), eye + jitter(0.08), middle + jitter(0.1), jitter(0.1), 1.3 * pace}};
+      Travel(stands[k], viewing, steps[0], scene);
+      trajectory.BeginSegment("visit" + std::to_string(k));
+      Walk(stands[k], viewing, {steps.begin() + 1, steps.end()}, scene);
+    }
   }
 }
 

@@ -53,8 +53,9 @@ struct Viewing {
 // Adds a trajectory that builds the places one after another and then visits them in another order: `buildK`,
 // `travel`, `visitK`. A build takes six seconds and moves sideways by at least 0.35 m within the first two.
 // With a `walk`, which is the seed of another visitor, all up to the last step of the last build stays the
-// same, and the visits have another order, other viewpoints and other durations.
-void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, std::uint64_t walk, Random* random,
-                Scene* scene);
+// same, and the visits have another order, other viewpoints and other durations; so have all rounds but the
+// first. A longer build goes on in the same way, from one random viewpoint to the next.
+void TourPlaces(const std::vector<Stand>& stands, const Viewing& viewing, const SceneRequest& request,
+                Random* random, Scene* scene);
 
 }  // namespace docent::app

@@ -98,6 +98,9 @@ std::optional<std::string> SimulationOptions::Validate() const {
   }
   if (!(rest_at_s >= 0 && rest_at_s <= kLongestDuration_s && rest_s >= 0 && rest_s <= kLongestDuration_s))
     return "The rest and the time until it must be from 0 s to one day.";
+  if (!(build_s >= 0 && build_s <= 3600))
+    return "The time at a place while it is built must be from 0 s to an hour.";
+  if (rounds < 1 || rounds > 1000) return "The number of rounds must be from 1 to 1000.";
   return faults.Validate(frame_rate_hz);
 }
 
@@ -257,6 +260,8 @@ std::unique_ptr<Simulation> MakeSimulation(const std::string& scene_spec, const 
   request.seed = options.seed;
   request.identical_places = options.identical_places;
   request.walk = options.walk;
+  request.build_s = options.build_s;
+  request.rounds = options.rounds;
   return std::make_unique<Simulation>(scene_spec, recipe.build(request), options);
 }
 

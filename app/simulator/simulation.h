@@ -42,6 +42,10 @@ struct SimulationOptions {
   // Seed of the walk through the places of `museum` and `desks` after they were built, which leaves the
   // places as they are; 0: the usual walk.
   std::uint64_t walk = 0;
+  // Time at each place of `museum` and `desks` while it is built, at least the usual six seconds; and how
+  // often all places are visited then.
+  double build_s = 0;
+  int rounds = 1;
   // At this time of the sequence the person rests for so long: the camera stays where it is, and its lens is
   // covered.
   double rest_at_s = 0, rest_s = 0;

@@ -343,7 +343,7 @@ TEST(NamedOptions, FollowTheSceneNameAfterCommas) {
       "museum:2,rolling-shutter=20,focal-error=1,distortion-error=-0.5,gain=1.5,exposure-jumps=1,gain-noise="
       "3,"
       "drops=10,tremor=0.1,blur=2,exposure=10,fps=20,duration=3,noise=2,interlaced,identical-places,walk=4,"
-      "rest=2,rest-at=1");
+      "rest=2,rest-at=1,build=9,rounds=2");
   const SimulationOptions& options = simulation->options();
   EXPECT_DOUBLE_EQ(options.faults.readout_s, 0.02);
   EXPECT_DOUBLE_EQ(options.faults.focal_error, 0.01);
@@ -363,6 +363,8 @@ TEST(NamedOptions, FollowTheSceneNameAfterCommas) {
   EXPECT_EQ(options.walk, 4u);
   EXPECT_EQ(options.rest_s, 2);
   EXPECT_EQ(options.rest_at_s, 1);
+  EXPECT_EQ(options.build_s, 9);
+  EXPECT_EQ(options.rounds, 2);
   EXPECT_EQ(simulation->scene_name(), "museum");
   EXPECT_EQ(simulation->places().size(), 2u);
 }

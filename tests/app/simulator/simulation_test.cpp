@@ -356,6 +356,36 @@ TEST(Simulation, AnotherWalkLeavesThePlacesAndTheirBuildsAsTheyAre) {
   EXPECT_EQ(lengths.size(), 4u);
 }
 
+TEST(Simulation, BuildsForLongerAndVisitsInSeveralRounds) {
+  SimulationOptions options = SmallAndClean();
+  options.frame_rate_hz = 2;
+  const auto usual = MakeSimulation("museum:3", options);
+  const auto longer = MakeSimulation("museum:3,build=40,rounds=4", options);
+  std::map<std::string, int> frames;
+  std::vector<std::string> visits;
+  for (int i = 0; i < longer->frame_count(); ++i) {
+    const std::string& label = longer->label(i);
+    ++frames[label];
+    if (label.starts_with("visit") && (visits.empty() || visits.back() != label)) visits.push_back(label);
+  }
+  for (const char* place : {"build0", "build1", "build2"}) {
+    EXPECT_GE(frames[place], 79) << place;
+    EXPECT_LE(frames[place], 90) << place << ": the last step may take four seconds";
+  }
+  // Two rounds may meet at the same place, which is one visit then.
+  EXPECT_GE(visits.size(), 9u);
+  EXPECT_LE(visits.size(), 12u);
+  std::set<std::vector<std::string>> orders;
+  for (std::size_t i = 0; i + 3 <= visits.size(); ++i)
+    orders.insert({visits.begin() + i, visits.begin() + i + 3});
+  EXPECT_GT(orders.size(), 3u) << "a round that is repeated has three sequences of three places";
+  for (int i = 0; usual->label(i) == "build0"; ++i) {
+    EXPECT_TRUE(engine::IsNear(usual->world_from_camera(i), longer->world_from_camera(i), 2e-2, 2e-2))
+        << "all but the end of the first build is the usual one";
+    if (i == 8) break;
+  }
+}
+
 TEST(Simulation, MotionBlurDoesNotShiftTheImage) {
   SimulationOptions options = SmallAndClean();
   options.frame_rate_hz = 10;
