@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 # cmake --install and the package for find_package(Docent); docs/using-the-engine.md says how to use it.
-include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 configure_file("${PROJECT_SOURCE_DIR}/cmake/version.h.in" "${PROJECT_BINARY_DIR}/include/docent/version.h" @ONLY)
@@ -51,7 +50,15 @@ install(SCRIPT "${PROJECT_SOURCE_DIR}/cmake/InstallHeaders.cmake")
 install(FILES "${PROJECT_BINARY_DIR}/include/docent/version.h" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/docent")
 
 install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}")  # the package's `copyright` names the copy of Debian
-install(TARGETS docent RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT program)
+set(DOCENT_GENERIC_PROGRAM "" CACHE FILEPATH "A build of docent for all x86-64 processors, to be installed beside this one")
+if(DOCENT_GENERIC_PROGRAM)
+  set(programs "${CMAKE_INSTALL_LIBEXECDIR}/docent")
+  install(TARGETS docent_launcher RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT program)
+  install(TARGETS docent RUNTIME DESTINATION "${programs}/${DOCENT_MARCH}" COMPONENT program)
+  install(PROGRAMS "${DOCENT_GENERIC_PROGRAM}" DESTINATION "${programs}/x86-64" COMPONENT program)
+else()
+  install(TARGETS docent RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT program)
+endif()
 install(FILES README.md CHANGELOG.md SECURITY.md NOTICE DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT program)
 install(DIRECTORY docs/ DESTINATION "${CMAKE_INSTALL_DOCDIR}/docs" COMPONENT program PATTERN "Doxyfile.in" EXCLUDE
   PATTERN "doxygen_filter.py" EXCLUDE)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # What a user of the program gets besides the program: man pages, shell completion, desktop entry; and the Debian package
-# (cmake --build build/release --target package). The package holds the component `program` only; a plain
+# (./bootstrap package). It brings two builds of the program on x86-64: the one of this build folder, and with
+# DOCENT_GENERIC_PROGRAM one for processors without AVX2; app/launcher.cpp chooses. The package holds the component `program` only; a plain
 # cmake --install installs `development`, the libraries and headers, too. tests/tools/check_package.sh checks the package.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 set(packaging "${PROJECT_SOURCE_DIR}/packaging")
@@ -55,6 +56,8 @@ string(CONCAT CPACK_PACKAGE_DESCRIPTION
   "A curator walks through a museum with a camera, builds small maps of the\n"
   "exhibits live, and places models and signposts in them. A visitor later walks\n"
   "through the same rooms: Docent recognizes which map the camera is in and\n"
-  "draws the content over the live video.\n\n"
-  "It needs a processor of the level x86-64-v3 (AVX2, from 2013 on).")
+  "draws the content over the live video.")
+if(DOCENT_MARCH AND NOT DOCENT_GENERIC_PROGRAM AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  string(APPEND CPACK_PACKAGE_DESCRIPTION "\n\nIt needs a processor of the level ${DOCENT_MARCH}.")
+endif()
 include(CPack)

@@ -43,6 +43,18 @@ check_with() {
   "$@" >"$work/$tool.log" 2>&1 || { cat "$work/$tool.log" >&2; fail "$tool finds faults (see above)"; }
 }
 
+# Both builds of the program, and the launcher that chooses between them.
+check_programs() {
+  local build
+  [[ "$(dpkg --print-architecture)" == amd64 ]] || return 0
+  for build in x86-64 x86-64-v3; do
+    [[ -x "$work/contents/usr/libexec/docent/$build/docent" ]] || fail "the program for $build is missing: ./bootstrap package adds it"
+  done
+  if readelf -n "$work/contents/usr/libexec/docent/x86-64/docent" "$work/contents/usr/bin/docent" | grep 'ISA needed.*v3'; then
+    fail "a program for all processors needs x86-64-v3"
+  fi
+}
+
 check_contents() {
   local page warnings
   dpkg-deb -x "$deb" "$work/contents"
@@ -127,10 +139,23 @@ run_in_bare_debian() {
   inside env LIBGL_ALWAYS_SOFTWARE=1 docent tour --library /tmp/room.docent --camera sim:room,duration=1 --headless \
     --record /tmp/tour.mp4
   [[ -s $root/tmp/tour.mp4 ]] || fail "the tour recorded no video"
+  run_on_old_processors
+}
+
+run_on_old_processors() {
+  [[ -x $root/usr/libexec/docent/x86-64/docent ]] || return 0
+  inside env DOCENT_PROCESSOR=x86-64 docent tour --library /tmp/room.docent --camera sim:room,duration=1 --headless --output /tmp/old
+  command -v qemu-x86_64-static >/dev/null || { say "skipped: qemu-x86_64-static, an old processor, is not installed"; return 0; }
+  say "a processor without AVX"
+  cp "$(command -v qemu-x86_64-static)" "$root/tmp/qemu"
+  local emulated=(inside /tmp/qemu -cpu Nehalem /usr/libexec/docent/x86-64/docent)
+  "${emulated[@]}" author --library /tmp/old.docent --camera sim:room,duration=2,fps=10 --headless --output /tmp/emulated
+  "${emulated[@]}" maps verify --library /tmp/old.docent
 }
 
 check_reproducible
 check_contents
+check_programs
 check_completions
 check_bare_debian
 say "all good: $(basename "$deb"), $(stat -c %s "$deb") bytes, $(dpkg-deb -c "$deb" | grep -vc '/$') files"
