@@ -286,13 +286,16 @@ std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const 
   options.depth_noise.speed_change_px = speed_change_px;
   options.seed = random_.Next();
   pair.geometry = EstimateTwoViews(rays_a, rays_b, options);
-  if (HasDepth(pair.geometry) && !HasDepthWithAnyReadout(a, b, pair.matches, options))
+  const bool any_readout = options_.confirmation.with_any_readout || !confirmation->Awaits(a.time);
+  if (HasDepth(pair.geometry) && any_readout && !HasDepthWithAnyReadout(a, b, pair.matches, options))
     pair.geometry.outcome = TwoViewOutcome::kTooLittleParallax;
   hint_ = HintFor(pair.geometry.outcome);
   UpdateProgress(kMotionShare + kParallaxShare * ParallaxProgress(pair.geometry, options) +
                  (1 - kMotionShare - kParallaxShare) * confirmation->GrowthProgress(pair.geometry));
+  awaits_confirmation_ = false;
   if (!HasDepth(pair.geometry)) return std::nullopt;
   if (!confirmation->Confirm(a.time, kept, pair.geometry)) {
+    awaits_confirmation_ = true;
     hint_ = HintFor(TwoViewOutcome::kTooLittleParallax);
     return std::nullopt;
   }

@@ -59,6 +59,9 @@ class Initializer {
                                       std::vector<InitialPair::Match> matches,
                                       std::span<const std::uint32_t> ids, double speed_change_px);
 
+  // Whether the views that were tried last have depth, which a third view has yet to confirm.
+  bool awaits_confirmation() const { return awaits_confirmation_; }
+
   // Time of the first view; Timestamp::min() if there is none.
   Timestamp first_time() const { return first_ ? first_time_ : Timestamp::min(); }
   // Why there is no map yet; kNone right after Reset().
@@ -107,6 +110,7 @@ class Initializer {
   std::shared_ptr<const ImageFeatures> first_, previous_;
   Hint hint_ = Hint::kNone;
   double progress_ = 0;
+  bool awaits_confirmation_ = false;
 };
 
 }  // namespace docent::engine

@@ -11,7 +11,7 @@ namespace docent::engine {
 
 std::optional<std::string> StartConfirmationOptions::Validate() const {
   return OptionCheck()
-      .AtLeast(min_growth, 1, "growth of the parallax to the third view")
+      .AtLeast(min_growth, 0, "growth of the parallax to the third view")
       .Positive(max_depth_spread, "spread of two depths")
       .AtLeast(min_shared, 1, "number of points of both estimates")
       .fault();

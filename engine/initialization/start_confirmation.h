@@ -13,12 +13,16 @@
 namespace docent::engine {
 
 struct StartConfirmationOptions {
-  // The third view must add evidence: the parallax must have grown by this factor since the second view.
+  // The third view must add evidence: the parallax must have grown by this factor since the second view. 0:
+  // it need not have grown.
   double min_growth = 1.1;
   // Largest robust standard deviation of the logarithm of the ratio of the depths. Two estimates whose depths
   // each have a relative standard deviation of 0.2 (TwoViewOptions::max_relative_depth_sigma) differ by 0.28.
   double max_depth_spread = 0.28;
   int min_shared = 30;  // points that both estimates contain
+  // While the readout time of the shutter is unknown, the third view too must have depth with each possible
+  // one.
+  bool with_any_readout = true;
 
   // Describes the first invalid option in one sentence, or empty.
   std::optional<std::string> Validate() const;
@@ -31,6 +35,8 @@ class StartConfirmation {
   explicit StartConfirmation(const StartConfirmationOptions& options) : options_(options) {}
 
   void Reset() { ids_.clear(); }
+  // Whether a geometry of this first view waits to be confirmed.
+  bool Awaits(Timestamp first_view) const { return !ids_.empty() && first_view == first_view_; }
   // How much of the growth of the parallax is there that a third view needs, 0 to 1; 0 without a second view.
   double GrowthProgress(const TwoViewResult& geometry) const;
   // ids: one per match of `geometry`, ascending; a point has the same id in every call with the same first

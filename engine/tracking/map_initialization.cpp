@@ -28,17 +28,30 @@ void ForShared(const MapSnapshot& map, KeyFrameId keyframe, const std::vector<Po
   }
 }
 
+// The parallax does not grow between an image and those of a camera that has come back. What confirms the
+// depths is that it turns on meanwhile, and sees them through another part of the lens and of the readout. Of
+// 360 wide pairs with significant depth in recorded and rendered sequences, none had a direction that was
+// wrong by more than 20 degrees, whatever was assumed of the readout.
+InitializerOptions ForWideBaselines(InitializerOptions options) {
+  options.confirmation.min_growth = 0;
+  options.confirmation.with_any_readout = false;
+  return options;
+}
+
 }  // namespace
 
 MapInitialization::MapInitialization(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera,
                                      std::uint64_t initializer_seed, std::uint64_t target_seed)
-    : options_(options), initializer_(options.initializer, camera, initializer_seed) {
+    : options_(options),
+      initializer_(options.initializer, camera, initializer_seed),
+      wide_initializer_(ForWideBaselines(options.initializer), camera, initializer_seed + 1) {
   if (options.target)
     target_initializer_.emplace(options.target, options.target_start, std::move(camera), target_seed);
 }
 
 void MapInitialization::SetCamera(std::shared_ptr<const CameraModel> camera, Random* random) {
   initializer_.SetCamera(camera);
+  wide_initializer_.SetCamera(camera);
   if (options_.target)
     target_initializer_.emplace(options_.target, options_.target_start, std::move(camera), random->Next());
 }
@@ -61,6 +74,8 @@ void MapInitialization::Stop() {
   phase_ = Phase::kOff;
   pair_.reset();
   keyframe_rotation_rates_.clear();
+  wide_initializer_.Reset();
+  wide_views_.Reset();
   ResetViews();
 }
 
@@ -110,6 +125,8 @@ void MapInitialization::Search(const CameraImage& image, const MapSnapshot* map,
   if (pair_) pair_->a_from_map = first_view_from_map_;
   if (!pair_ && map && posed && directions && !target_initializer_)
     pair_ = TryPanoramaViews(image, *map, panorama, rotation_rate, *out);
+  if (!pair_ && map && posed && directions && !target_initializer_)
+    pair_ = TryWideBaseline(image, rotation_rate, *out);
   if (pair_) phase_ = Phase::kPairGiven;
   if (!target_initializer_) out->initialization_progress = pair_ ? 1 : initializer_.progress();
   if (FirstViewTime() == image.time) first_view_from_map_ = posed ? out->camera_from_map : Rigid3();
@@ -174,6 +191,26 @@ std::optional<InitialPair> MapInitialization::TryPanoramaViews(const CameraImage
                                     (rotation_rate - before).norm() / image.camera->PixelAngle());
   if (pair) pair->a_from_map = keyframe->camera_from_map;
   return pair;
+}
+
+std::optional<InitialPair> MapInitialization::TryWideBaseline(const CameraImage& image,
+                                                              const Eigen::Vector3d& rotation_rate,
+                                                              const TrackedFrame& tracked) {
+  constexpr int kInterval = 4;  // frames: at 30 Hz, an attempt takes a tenth of the time until the next
+  if (++frames_since_wide_views_ < kInterval) return std::nullopt;
+  frames_since_wide_views_ = 0;
+  for (auto& views : wide_views_.Pairs(image, tracked.camera_from_map, rotation_rate)) {
+    const double speed_change_px =
+        (rotation_rate - views.earlier.rotation_rate).norm() / image.camera->PixelAngle();
+    auto pair = wide_initializer_.TryViews(views.earlier.image, {image.time, image.features, image.camera},
+                                           std::move(views.matches), views.ids, speed_change_px);
+    if (pair) {
+      pair->a_from_map = views.earlier.camera_from_map;
+      return pair;
+    }
+    if (wide_initializer_.awaits_confirmation()) wide_views_.TryAgain(views.earlier);
+  }
+  return std::nullopt;
 }
 
 }  // namespace docent::engine

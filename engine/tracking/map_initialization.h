@@ -14,6 +14,7 @@
 #include "engine/tracking/camera_image.h"
 #include "engine/tracking/tracked_frame.h"
 #include "engine/tracking/tracker_options.h"
+#include "engine/tracking/wide_baseline_views.h"
 
 namespace docent::engine {
 
@@ -33,7 +34,10 @@ class MapInitialization {
   // The search starts again with this model.
   void SetCamera(std::shared_ptr<const CameraModel> camera, Random* random);
   // The readout time of the rolling shutter; see ReadoutMotion.
-  void SetReadout(const Eigen::Vector2d& readout_s) { initializer_.SetReadout(readout_s); }
+  void SetReadout(const Eigen::Vector2d& readout_s) {
+    initializer_.SetReadout(readout_s);
+    wide_initializer_.SetReadout(readout_s);
+  }
   void Begin();
   // Discards the search.
   void Stop();
@@ -67,17 +71,22 @@ class MapInitialization {
   std::optional<InitialPair> TryPanoramaViews(const CameraImage& image, const MapSnapshot& map,
                                               PanoramaId panorama, const Eigen::Vector3d& rotation_rate,
                                               const TrackedFrame& tracked);
+  // An initial pair of an image of a while ago and the present one, matched by descriptors.
+  std::optional<InitialPair> TryWideBaseline(const CameraImage& image, const Eigen::Vector3d& rotation_rate,
+                                             const TrackedFrame& tracked);
   const KeyFrame* FindMaxParallaxKeyFrame(const CameraImage& image, const MapSnapshot& map,
                                           PanoramaId panorama, const TrackedFrame& tracked);
 
   TrackerOptions options_;
-  Initializer initializer_;
+  Initializer initializer_, wide_initializer_;  // The second only tries the views of wide_views_.
+  WideBaselineViews wide_views_;
   std::optional<TargetInitializer> target_initializer_;
   Phase phase_ = Phase::kOff;
   Rigid3 first_view_from_map_;  // pose of the initializer's first view
   std::optional<InitialPair> pair_;
   std::vector<std::pair<Timestamp, Eigen::Vector3d>> keyframe_rotation_rates_;  // of the panorama keyframes
   int frames_since_views_ = 0;              // since TryPanoramaViews last ran
+  int frames_since_wide_views_ = 0;         // since TryWideBaseline last ran
   std::vector<PointMatch> sorted_matches_;  // scratch memory of FindMaxParallaxKeyFrame
 };
 

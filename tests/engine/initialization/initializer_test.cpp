@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -181,12 +182,12 @@ struct Turn {
 
 // Whether a second and a third view of a turn start a map.
 bool StartsMap(const Turn& turn, double unknown_readout_s, std::uint64_t seed,
-               const std::shared_ptr<const CameraModel>& camera = Camera()) {
-  InitializerOptions options;
+               const std::shared_ptr<const CameraModel>& camera = Camera(), InitializerOptions options = {},
+               std::array<double, 2> growths = {1.0, 1.3}) {
   options.unknown_readout_s = unknown_readout_s;
   Initializer initializer(options, camera, seed);
   std::optional<InitialPair> pair;
-  for (const double growth : {1.0, 1.3}) {
+  for (const double growth : growths) {
     const double rate = growth * turn.rate;
     const ReadoutMotion slow{{0, 0.05, 0}, {0, 0.02}}, fast{{0, rate, 0.1}, {0, 0.02}};
     const auto view = [&](const ReadoutMotion& motion) {
@@ -200,6 +201,7 @@ bool StartsMap(const Turn& turn, double unknown_readout_s, std::uint64_t seed,
     std::iota(ids.begin(), ids.end(), 0U);
     pair = initializer.TryViews({FromSeconds(0), nullptr, view(slow)},
                                 {FromSeconds(growth), nullptr, view(fast)}, matches, ids, 0);
+    EXPECT_FALSE(pair && initializer.awaits_confirmation());
   }
   return pair.has_value();
 }
@@ -227,6 +229,22 @@ TEST(Initializer, WaitsLessWhereTheCalibrationStatesTheReadoutTime) {
     }
   }
   EXPECT_GT(known, unknown + 3) << "measured: 52 against 46 of 120";
+}
+
+TEST(Initializer, MayLetAThirdViewConfirmWithoutEachReadoutTime) {
+  // The third view has less parallax than the second.
+  InitializerOptions strict, lenient;
+  strict.confirmation.min_growth = lenient.confirmation.min_growth = 0;
+  lenient.confirmation.with_any_readout = false;
+  const double readout_s = InitializerOptions().unknown_readout_s;
+  int with_each = 0, with_one = 0;
+  for (const Turn& turn : {Turn{1.3, 0.13}, Turn{1.3, 0.14}, Turn{2.5, 0.07}, Turn{2.5, 0.09}}) {
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      with_each += StartsMap(turn, readout_s, seed, Camera(), strict, {1.3, 1.0});
+      with_one += StartsMap(turn, readout_s, seed, Camera(), lenient, {1.3, 1.0});
+    }
+  }
+  EXPECT_GT(with_one, with_each);
 }
 
 }  // namespace

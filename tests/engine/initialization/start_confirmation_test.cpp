@@ -42,6 +42,17 @@ TEST(StartConfirmation, RequiresAThirdViewThatAgrees) {
   EXPECT_TRUE(confirmation.Confirm(kFirst, FirstIds(100), Geometry(1.2, 0.1, 3)));
 }
 
+TEST(StartConfirmation, NeedsNoGrowthWhereTheParallaxDoesNotGrow) {
+  StartConfirmationOptions options;
+  options.min_growth = 0;
+  StartConfirmation confirmation(options);
+  EXPECT_FALSE(confirmation.Awaits(kFirst));
+  EXPECT_FALSE(confirmation.Confirm(kFirst, FirstIds(100), Geometry(1.2, 0.1, 1)));
+  EXPECT_TRUE(confirmation.Awaits(kFirst));
+  EXPECT_FALSE(confirmation.Awaits(2 * kFirst));
+  EXPECT_TRUE(confirmation.Confirm(kFirst, FirstIds(100), Geometry(0.8, 0.1, 2)));
+}
+
 TEST(StartConfirmation, RejectsDepthsThatTheThirdViewContradicts) {
   StartConfirmation confirmation({});
   EXPECT_FALSE(confirmation.Confirm(kFirst, FirstIds(100), Geometry(1.0, 1.0, 1)));

@@ -104,7 +104,7 @@ TEST(EngineOptions, SayInOneSentenceWhatIsOutOfRange) {
        "The confidence of two views must be from 0 to 1."},
       {After<TargetStartOptions>([](auto* o) { o->min_matches = 0; }),
        "The number of matches of a planar target must be at least 1."},
-      {After<StartConfirmationOptions>([](auto* o) { o->min_growth = 0.9; }),
+      {After<StartConfirmationOptions>([](auto* o) { o->min_growth = -0.1; }),
        "The growth of the parallax to the third view must be at least 1."},
       {After<PlanarTargetOptions>([](auto* o) { o->corners.corners[0] = -1; }),
        "The number of described corners of a level must be at least 0."},
