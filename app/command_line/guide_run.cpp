@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/guide_run.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cctype>
 #include <exception>
@@ -95,10 +93,8 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
       cameras_(cameras),
       is_paced_(request.stays_at_last && AllRecorded(cameras)),
       clock_(is_paced_ && request.waits_at_first),
-      session_(WithSaved(SessionOptionsOf(request, cameras),
-                         [this] {
-                           if (maps::HubPusher* const pusher = told_pusher_.load()) pusher->LibraryWasSaved();
-                         }),
+      hub_(request.hub, request.may_write),
+      session_(WithSaved(SessionOptionsOf(request, cameras), [this] { hub_.LibraryWasSaved(); }),
                ModelsOf(cameras), request.library),
       inboxes_(cameras.size()),
       camera_states_(cameras.size()),
@@ -134,19 +130,18 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
     }
   };
   guarded([&] {
-    std::optional<maps::HubFollower> follower;
-    if (request_.hub && !request_.may_write) FollowHub(&follower);
-    if (request_.hub && request_.may_write) PushToHub();
+    hub_.Begin(&session_);
     std::vector<CameraRun> runs;
     for (std::size_t i = 0; i < cameras_.size(); ++i) runs.push_back(RunOf(i, show));
     RunCameras(runs, &session_, stop_.get_token());
   });
+  hub_.StopFollowing();
   {
     const std::scoped_lock lock(files_mutex_);
     visitor_frames_.Clear();
   }
   guarded([&] { session_.Finish(); });
-  guarded([&] { FinishPushing(); });
+  guarded([&] { hub_.FinishPushing(); });
   guarded([&] {
     files_->Add(session_.TakeEvents());
     WriteDelivery();
@@ -160,26 +155,6 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
     if (request_.output) WriteCameraReport(*request_.output / "report.json", tallies_);
   });
   if (fault) std::rethrow_exception(fault);
-}
-
-void GuideRun::FollowHub(std::optional<maps::HubFollower>* follower) {
-  maps::HubFollower::Callbacks callbacks;
-  callbacks.pulled = [this](const maps::SyncReport& report) { session_.ReloadContent(report.changed_keys); };
-  callbacks.told = [this](const std::string& sentence) { session_.AddEvent("hub", sentence); };
-  maps::SyncOptions options = *request_.hub;
-  options.near_key = [this] { return visited_map_.load(); };
-  follower->emplace(std::move(options), std::move(callbacks));
-}
-
-void GuideRun::PushToHub() {
-  pusher_.emplace(*request_.hub, [this](const std::string& sentence) { session_.AddEvent("hub", sentence); });
-  told_pusher_ = &*pusher_;
-}
-
-void GuideRun::FinishPushing() {
-  if (!pusher_ || pusher_->Finish()) return;
-  spdlog::warn(
-      "The hub has not got everything. It is saved in the library; docent maps push brings it to the hub.");
 }
 
 // The images that live cameras delivered and missed, for the report and as events.
@@ -325,7 +300,7 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
     };
   }
   run.shown = [this, &state, &show](const engine::TrackedFrame& tracked) {
-    if (tracked.map_key != 0) visited_map_ = tracked.map_key;
+    if (tracked.map_key != 0) hub_.Visit(tracked.map_key);
     HandleFrame(tracked, show, &state);
   };
   return run;

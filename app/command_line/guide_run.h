@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -17,14 +16,13 @@
 #include "app/command_line/guide_files.h"
 #include "app/command_line/guide_window.h"
 #include "app/command_line/run_guide.h"
+#include "app/command_line/run_hub.h"
 #include "app/command_line/run_watch.h"
 #include "app/command_line/visitor_frames.h"
 #include "app/command_line/visitor_host.h"
 #include "app/evaluation/camera_report.h"
 #include "app/sound/sound_director.h"
 #include "app/sound/sound_player.h"
-#include "maps/hub/hub_follower.h"
-#include "maps/hub/hub_pusher.h"
 
 namespace docent::app {
 
@@ -72,11 +70,6 @@ class GuideRun {
   };
 
   void WarnAboutUnknownLenses();
-  // Lets the hub have what the session saves, until FinishPushing, which waits for the rest.
-  void PushToHub();
-  void FinishPushing();
-  // Lets the library follow its hub until the follower is destroyed.
-  void FollowHub(std::optional<maps::HubFollower>* follower);
   CameraRun RunOf(std::size_t i, const Show& show);
   void HandleRefused(const std::string& reason, CameraState* state);
   void HandleCarriedOut(const TimedCommand& command, CameraState* state);
@@ -105,10 +98,7 @@ class GuideRun {
   const std::span<CalibratedCamera> cameras_;
   const bool is_paced_;  // The author works with recordings, which can be paused.
   PausableClock clock_;  // Of recordings.
-  // Only of an author with a hub, while the run lasts. The session's threads use it by the pointer, which is
-  // null before it is there; so it lives longer than the session.
-  std::optional<maps::HubPusher> pusher_;
-  std::atomic<maps::HubPusher*> told_pusher_ = nullptr;
+  RunHub hub_;
   Session session_;
   std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
   std::vector<CameraState> camera_states_;
@@ -130,7 +120,6 @@ class GuideRun {
   RunWatch watch_;
   std::string noticed_;  // What the person at the first camera is told next; empty for nothing.
   std::optional<GuideFiles> files_;
-  std::atomic<std::uint64_t> visited_map_ = 0;  // Key of the last map that was tracked; 0 before the first.
 };
 
 }  // namespace docent::app

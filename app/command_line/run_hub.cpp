@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/run_hub.h"
+
+#include <spdlog/spdlog.h>
+
+#include <string>
+#include <utility>
+
+namespace docent::app {
+
+void RunHub::Begin(Session* session) {
+  if (!hub_) return;
+  const auto tell = [session](const std::string& sentence) { session->AddEvent("hub", sentence); };
+  if (may_write_) {
+    pusher_.emplace(*hub_, tell);
+    told_pusher_ = &*pusher_;
+    return;
+  }
+  maps::HubFollower::Callbacks callbacks;
+  callbacks.pulled = [session](const maps::SyncReport& report) {
+    session->ReloadContent(report.changed_keys);
+  };
+  callbacks.told = tell;
+  maps::SyncOptions options = *hub_;
+  options.near_key = [this] { return visited_map_.load(); };
+  follower_.emplace(std::move(options), std::move(callbacks));
+}
+
+void RunHub::FinishPushing() {
+  if (!pusher_ || pusher_->Finish()) return;
+  spdlog::warn(
+      "The hub has not got everything. It is saved in the library; docent maps push brings it to the hub.");
+}
+
+void RunHub::LibraryWasSaved() {
+  if (maps::HubPusher* const pusher = told_pusher_.load()) pusher->LibraryWasSaved();
+}
+
+}  // namespace docent::app
