@@ -1,12 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Boots Debian's kernel in QEMU with its virtual video devices and runs a program in it:
-#   run_in_qemu.sh PROGRAM FOLDER
-# FOLDER is the output folder of prepare_kernel.sh. The program finds vivid's camera as /dev/video0 and v4l2loopback's
+#   run_in_qemu.sh PROGRAM FOLDER [ARGUMENT...]
+# FOLDER is the output folder of prepare_kernel.sh. The arguments are the program's (without any, those of a test), and what
+# it writes to /tmp/report.json is shown at the end. The program finds vivid's camera as /dev/video0 and v4l2loopback's
 # as /dev/video9. The exit status is that of the program, or 77 (skipped) where QEMU or the kernel is missing. With
 # CI=true that is a failure, so that the check is never skipped silently.
 set -euo pipefail
 readonly program=$(realpath "$1") folder=$2
+shift 2
+(($#)) || set -- --gtest_color=no
+readonly arguments=$(printf '%q ' "$@")
 
 skip() {
   printf 'run_in_qemu: %s\n' "$*" >&2
@@ -27,6 +31,7 @@ cp "$program" "$root/app/program"
 ldd "$program" | grep -oE '/[^ ]+\.so[^ ]*' | while read -r library; do
   install -D --mode=755 "$(readlink -f "$library")" "$root$library"
 done
+printf '%s\n' "$arguments" >"$root/arguments"
 cat >"$root/init" <<'INIT'
 #!/bin/busybox sh
 /bin/busybox --install -s /bin
@@ -44,15 +49,16 @@ while [ ! -e /dev/video9 ] || [ ! -e /dev/video0 ]; do
   sleep 0.1; tries=$((tries + 1)); [ $tries -gt 100 ] && break
 done
 cd /tmp
-/app/program --gtest_color=no
+eval "/app/program $(cat /arguments)"
 echo "EXIT-STATUS $?"
+[ -e /tmp/report.json ] && cat /tmp/report.json
 poweroff -f
 INIT
 chmod +x "$root/init"
 (cd "$root" && find . | cpio --create --format=newc --quiet) >"$work/disk.cpio"
 
 # Full emulation behaves the same with and without hardware support.
-timeout 300 qemu-system-x86_64 -accel tcg -cpu max -smp 2 -m 1024 -nographic -no-reboot -nodefaults -serial stdio \
+timeout 300 qemu-system-x86_64 -accel tcg -cpu max -smp 2 -m 3072 -nographic -no-reboot -nodefaults -serial stdio \
   -kernel "$folder/vmlinuz" -initrd "$work/disk.cpio" \
   -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr random.trust_cpu=on tsc=unstable" \
   </dev/null >"$work/console.log" 2>&1 || true

@@ -123,7 +123,7 @@ def compare_places(frames, begin, labels):
     counts = {"right": 0, "other": 0, "none": 0}
     delays = []
     for label, first, last in stretches(labels):
-        if not label.startswith("visit") or first < begin:
+        if not label.startswith("visit") or first < begin or last > begin + frames[-1][0]:
             continue
         bay = "Bay " + label.removeprefix("visit")
         inside = [f for f in frames if first <= f[0] + begin <= last]
