@@ -105,7 +105,7 @@ TEST(EngineOptions, SayInOneSentenceWhatIsOutOfRange) {
       {After<TargetStartOptions>([](auto* o) { o->min_matches = 0; }),
        "The number of matches of a planar target must be at least 1."},
       {After<StartConfirmationOptions>([](auto* o) { o->min_growth = -0.1; }),
-       "The growth of the parallax to the third view must be at least 1."},
+       "The growth of the parallax to the third view must be at least 0."},
       {After<PlanarTargetOptions>([](auto* o) { o->corners.corners[0] = -1; }),
        "The number of described corners of a level must be at least 0."},
       {After<DepthNoiseOptions>([](auto* o) { o->calibration_share = kNaN; }),
