@@ -18,7 +18,7 @@ namespace {
 constexpr double kMinGap_s = 0.7;
 // Of the whole rotation. The more the image has moved, the more an imperfect calibration looks like parallax:
 // of 6,141 pairs of a hand-held camera that turned by 60 to 110 degrees a second, none beyond 20 degrees had
-// significant depth, and 12 of 412 below 15.
+// significant depth, and 12 of 428 below 15.
 constexpr double kMaxRotation_rad = 15 * 3.14159265358979 / 180;
 constexpr std::size_t kMaxRemembered = 48;  // images, of half a megabyte each
 constexpr std::size_t kPairsPerCall = 3;

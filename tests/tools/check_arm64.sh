@@ -3,7 +3,7 @@
 # Builds the tests of engine and maps for 64-bit ARM with Debian's cross compiler and runs them in QEMU's emulation:
 #   check_arm64.sh FOLDER [GTEST_FILTER]
 # FOLDER keeps Debian's arm64 libraries (2 GB) and the build. Needs g++-12-aarch64-linux-gnu, qemu-user-static, and the network
-# the first time. Emulated tests take some ten times as long; without a filter, those that take minutes are left out.
+# the first time. Emulated tests take many times as long: the filter chooses some.
 set -euo pipefail
 (($# >= 1)) || { echo "Usage: check_arm64.sh FOLDER [GTEST_FILTER]" >&2; exit 2; }
 readonly source=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../..")
