@@ -12,7 +12,8 @@
 namespace docent {
 
 // A virtual X server for tests of windows, on a display number that the server chooses. It has no window
-// manager: a window's corner is the screen's corner.
+// manager: a window's corner is the screen's corner. It does not reset when its last client leaves: a client
+// that connects during a reset is refused, and a test's xdotool is often the only other client.
 class VirtualScreen {
  public:
   // `size` is WIDTHxHEIGHT. Sets DISPLAY. With a folder, the framebuffer is in its file Xvfb_screen0, in the
@@ -26,7 +27,7 @@ class VirtualScreen {
       const int nowhere = open("/dev/null", O_WRONLY);
       dup2(nowhere, STDERR_FILENO);
       execlp("Xvfb", "Xvfb", "-displayfd", descriptor.c_str(), "-screen", "0", (size + "x24").c_str(),
-             "-nolisten", "tcp", framebuffer_folder.empty() ? nullptr : "-fbdir", framebuffer_folder.c_str(),
+             "-nolisten", "tcp", "-noreset", framebuffer_folder.empty() ? nullptr : "-fbdir", framebuffer_folder.c_str(),
              static_cast<char*>(nullptr));
       _exit(127);
     }

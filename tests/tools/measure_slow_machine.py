@@ -139,7 +139,8 @@ def main():
     parser.add_argument("arguments", nargs="+", help="of docent tour")
     options = parser.parse_args()
     read, write = os.pipe()
-    server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", options.screen + "x24"],
+    server = subprocess.Popen(["Xvfb", "-noreset", "-displayfd", str(write), "-screen", "0",
+                               options.screen + "x24"],
                               pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
     display = os.fdopen(read).readline().strip()

@@ -98,7 +98,8 @@ def main():
     configuration = options.output / "alsoft.conf"
     configuration.write_text(f"[general]\nchannels=mono\nsample-type=int16\nfrequency=48000\n[wave]\nfile={wave}\n")
     read, write = os.pipe()
-    server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", f"{WIDTH}x{HEIGHT}x24"],
+    server = subprocess.Popen(["Xvfb", "-noreset", "-displayfd", str(write), "-screen", "0",
+                               f"{WIDTH}x{HEIGHT}x24"],
                               pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
     display = ":" + os.fdopen(read).readline().strip()

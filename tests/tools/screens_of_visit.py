@@ -28,8 +28,8 @@ class Screen:
     def __init__(self, options, size, language, arguments, name):
         self.size, self.prefix, self.taken = size, options.output / f"{size}-{language}", []
         read, write = os.pipe()
-        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", size + "x24", "-dpi",
-                                        str(options.dpi)], pass_fds=[write], stderr=subprocess.DEVNULL)
+        self.server = subprocess.Popen(["Xvfb", "-noreset", "-displayfd", str(write), "-screen", "0", size + "x24",
+                                        "-dpi", str(options.dpi)], pass_fds=[write], stderr=subprocess.DEVNULL)
         os.close(write)
         self.display = ":" + os.fdopen(read).readline().strip()
         self.environment = dict(os.environ, DISPLAY=self.display)
