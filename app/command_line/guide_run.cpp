@@ -168,12 +168,13 @@ void GuideRun::WriteDelivery() {
   }
 }
 
-void GuideRun::Drawn(const ShownFrame& frame) {
+void GuideRun::Reached(FrameStage stage, const ShownFrame& frame) {
   const Timestamp now = PlayClock().Now();
   const std::scoped_lock lock(files_mutex_);
   CameraTally& tally = tallies_[static_cast<std::size_t>(frame.tracked.frame.camera)];
-  tally.AddDrawn(now);
-  if (frame.taken) tally.AddDrawnAge(now - *frame.taken);
+  if (frame.taken) tally.AddAge(stage, now - *frame.taken);
+  if (stage != FrameStage::kShown) return;
+  tally.AddShown(now);
   if (frame.tracked.frame.camera != 0) return;
   while (!undrawn_sounds_.empty() && undrawn_sounds_.front().first <= frame.tracked.frame.index) {
     sound_player_->Give(undrawn_sounds_.front().second);
@@ -388,7 +389,7 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
     CameraTally& tally = tallies_[static_cast<std::size_t>(tracked.frame.camera)];
     tally.Add(tracked);
     Watch(tracked);
-    if (age) tally.AddTrackedAge(*age);
+    if (age) tally.AddAge(FrameStage::kTracked, *age);
     files_->Add(*frame);
     const std::vector<Event> events = session_.TakeEvents();
     files_->Add(events);

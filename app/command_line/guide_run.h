@@ -39,8 +39,9 @@ class GuideRun {
   // camera runs on the calling thread.
   void Run(const Show& show, std::stop_token window_closed);
 
-  // Records the latency of a frame that is now on the screen or in the video. Any thread, as all below.
-  void Drawn(const ShownFrame& frame);
+  // Records the latency of a frame that has reached this stage; see WindowLink::reached. Any thread, as all
+  // below.
+  void Reached(FrameStage stage, const ShownFrame& frame);
   // See WindowLink::lead.
   std::shared_ptr<const ShownFrame> Lead(std::size_t camera, const GuideVisitor& guide);
   // Adds to the events what the window does about the machine's load.

@@ -55,6 +55,7 @@ class GuideWindow {
     times_.Start();
     HandleEvents();
     const auto fresh = Take(std::move(frames));
+    Report(FrameStage::kTaken, fresh);
     const ui::WindowLayout layout = Layout();
     if (controls_) {
       controls_->Take(link_.notices->TakeAll());
@@ -76,9 +77,10 @@ class GuideWindow {
     times_.Add(Part::kPresent);
     if (controls_) message_height_ = controls_->Draw(layout);
     times_.Add(Part::kInterface);
+    Report(FrameStage::kDrawn, fresh);
     window_.Show();
     times_.Add(Part::kShow);
-    for (const auto& frame : fresh) link_.drawn(*frame);
+    Report(FrameStage::kShown, fresh);
     if (draws) AdaptQuality(begin);
     return true;
   }
@@ -101,6 +103,10 @@ class GuideWindow {
   bool has_inset() const { return shown_.size() > 1 && shown_[1 - large_]; }
   bool is_frozen() const { return controls_ && controls_->choices().frozen; }
   bool shows_map() const { return controls_ && controls_->choices().from_above && large(); }
+
+  void Report(FrameStage stage, std::span<const std::shared_ptr<const ShownFrame>> frames) const {
+    for (const auto& frame : frames) link_.reached(stage, *frame);
+  }
 
   // Keeps the frames; the shown ones stay while the view is frozen. Returns those that are new on the screen.
   std::vector<std::shared_ptr<const ShownFrame>> Take(std::vector<std::shared_ptr<const ShownFrame>> frames) {

@@ -10,6 +10,7 @@
 #include "app/command_line/frame_slot.h"
 #include "app/command_line/notices.h"
 #include "app/command_line/run_guide.h"
+#include "app/evaluation/camera_report.h"
 #include "app/script/commands.h"
 #include "ui/authoring_actions.h"
 
@@ -32,8 +33,8 @@ struct WindowLink {
   std::function<std::shared_ptr<const ShownFrame>(std::size_t, const GuideVisitor&)> lead;
   // Called with what has changed in drawing because of the machine's load, for the log.
   std::function<void(const std::string&)> adapted;
-  // Called with each frame once it is on the screen.
-  std::function<void(const ShownFrame&)> drawn;
+  // Called with each frame that the window shows, at the end of each stage but tracking.
+  std::function<void(FrameStage, const ShownFrame&)> reached;
 };
 
 // Shows frames in a window until the frames end or the person closes it. The author's window puts commands

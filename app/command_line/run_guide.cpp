@@ -83,7 +83,7 @@ void RunHeadless(const GuideRequest& request, std::span<CalibratedCamera> camera
           inset = other;
         }
         if (view && view->Add(*frame, *cameras.front().model, inset.get(), *cameras.back().model))
-          run->Drawn(*frame);
+          for (const FrameStage stage : {FrameStage::kDrawn, FrameStage::kShown}) run->Reached(stage, *frame);
         progress.Update(++count);
       },
       {});
@@ -113,7 +113,7 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
     link.toggle_fast_forward = [run] { run->ToggleFastForward(); };
     link.lead = [run](std::size_t camera, const GuideVisitor& guide) { return run->Lead(camera, guide); };
     link.adapted = [run](const std::string& text) { run->Adapted(text); };
-    link.drawn = [run](const ShownFrame& frame) { run->Drawn(frame); };
+    link.reached = [run](FrameStage stage, const ShownFrame& frame) { run->Reached(stage, frame); };
     ShowInWindow(request, cameras, &slot, link);
   } catch (...) {
     fault = std::current_exception();

@@ -5,7 +5,8 @@
 #include <chrono>
 #include <cstddef>
 #include <string>
-#include <vector>
+
+#include "app/evaluation/duration_histogram.h"
 
 namespace docent::app {
 
@@ -27,7 +28,7 @@ class WindowTimes {
   using Clock = std::chrono::steady_clock;
 
   Clock::time_point last_{};
-  std::array<std::vector<float>, 5> times_ms_;  // By part; only the first frames of a long session.
+  std::array<DurationHistogram, 5> times_;  // By part.
 };
 
 }  // namespace docent::app

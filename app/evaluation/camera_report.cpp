@@ -3,7 +3,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "app/evaluation/evaluate_run.h"
 #include "app/files/checked_file.h"
 
 namespace docent::app {
@@ -12,9 +11,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json Percentiles(const std::vector<double>& values) {
-  if (values.empty()) return nullptr;
-  return {{"median", Quantile(values, 0.5)}, {"p95", Quantile(values, 0.95)}, {"max", Quantile(values, 1)}};
+Json Percentiles(const DurationHistogram& values) {
+  if (values.count() == 0) return nullptr;
+  return {
+      {"median", values.Quantile_ms(0.5)}, {"p95", values.Quantile_ms(0.95)}, {"max", values.Quantile_ms(1)}};
 }
 
 Json ToJson(const Delivery& delivery) {
@@ -35,22 +35,23 @@ void CameraTally::Add(const engine::TrackedFrame& frame) {
     return;
   }
   with_pose_ += engine::HasPose(frame.state);
-  tracking_ms_.push_back(Milliseconds(frame.tracking_time));
+  tracking_times_.Add(frame.tracking_time);
 }
 
 std::string FormatCameraReport(const std::vector<CameraTally>& cameras) {
   Json list = Json::array();
   for (const CameraTally& camera : cameras) {
-    list.push_back(
-        {{"name", camera.name_},
-         {"frames", camera.frames_},
-         {"with_pose", camera.with_pose_},
-         {"dropped", camera.dropped_},
-         {"tracking_ms", Percentiles(camera.tracking_ms_)},
-         {"latency_ms",
-          {{"tracked", Percentiles(camera.tracked_ages_ms_)}, {"drawn", Percentiles(camera.drawn_ages_ms_)}}},
-         {"drawn_interval_ms", Percentiles(camera.drawn_intervals_ms_)},
-         {"delivery", camera.delivery_ ? ToJson(*camera.delivery_) : Json(nullptr)}});
+    Json latencies;
+    constexpr std::array<const char*, 4> kStages = {"tracked", "taken", "drawn", "shown"};
+    for (std::size_t i = 0; i < kStages.size(); ++i) latencies[kStages[i]] = Percentiles(camera.ages_[i]);
+    list.push_back({{"name", camera.name_},
+                    {"frames", camera.frames_},
+                    {"with_pose", camera.with_pose_},
+                    {"dropped", camera.dropped_},
+                    {"tracking_ms", Percentiles(camera.tracking_times_)},
+                    {"latency_ms", latencies},
+                    {"drawn_interval_ms", Percentiles(camera.shown_intervals_)},
+                    {"delivery", camera.delivery_ ? ToJson(*camera.delivery_) : Json(nullptr)}});
   }
   const Json json = {{"cameras", list}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -27,8 +27,8 @@ class VirtualScreen {
       const int nowhere = open("/dev/null", O_WRONLY);
       dup2(nowhere, STDERR_FILENO);
       execlp("Xvfb", "Xvfb", "-displayfd", descriptor.c_str(), "-screen", "0", (size + "x24").c_str(),
-             "-nolisten", "tcp", "-noreset", framebuffer_folder.empty() ? nullptr : "-fbdir", framebuffer_folder.c_str(),
-             static_cast<char*>(nullptr));
+             "-nolisten", "tcp", "-noreset", framebuffer_folder.empty() ? nullptr : "-fbdir",
+             framebuffer_folder.c_str(), static_cast<char*>(nullptr));
       _exit(127);
     }
     close(channel[1]);
