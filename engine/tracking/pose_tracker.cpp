@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/tracking/pose_tracker.h"
 
+#include <algorithm>
 #include <bit>
 #include <opencv2/core.hpp>
 #include <utility>
@@ -208,6 +209,13 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
   return {left ? Outcome::kLeftMap : Outcome::kPose, result};
 }
 
+// A camera that walks away from its map sees few of its points too, and its position changes.
+double PoseTracker::LongestDirectRotation_s(const MapSnapshot& map) const {
+  constexpr double kMostDrift = 0.2;  // Of the median depth: content is off by 11 degrees then.
+  if (!map.HasFinitePoints()) return options_.max_direct_rotation_s;
+  return kMostDrift / std::max(drift_per_s_.norm(), kMostDrift / options_.max_direct_rotation_s);
+}
+
 // With low texture there are edges and shading but hardly a keypoint; all pixels together still determine the
 // rotation (ptamm §3.2). Only if few points are expected or most of them are found: if many points fail, the
 // pose is wrong.
@@ -218,7 +226,7 @@ std::optional<MapTrackResult> PoseTracker::TrackRotationDirectly(const MapSnapsh
   const bool low_texture = tried.attempted <= options_.low_texture_points ||
                            tried.Quality() >= options_.high_quality || !map.HasFinitePoints();
   if (!rotation_reference_ || !low_texture ||
-      image.time - last_points_ > FromSeconds(options_.max_direct_rotation_s))
+      image.time - last_points_ > FromSeconds(LongestDirectRotation_s(map)))
     return std::nullopt;
   const SmallBlurryImage& thumbnail = image.features->small_blurry;
   const double spread =
@@ -247,11 +255,24 @@ std::optional<MapTrackResult> PoseTracker::TrackRotationDirectly(const MapSnapsh
   return result;
 }
 
+void PoseTracker::UpdateDrift(double seconds) {
+  constexpr double kTimeConstant_s =
+      0.2;  // The noise of single poses is 0.002 of the depth; see RotationCenter.
+  const Eigen::Matrix<double, 6, 1>& twist = motion_.twist_per_second();
+  const Eigen::Vector3d pivot =
+      pivot_estimate_.reliable ? pivot_estimate_.pivot : Eigen::Vector3d::Zero().eval();
+  const Eigen::Vector3d drift_per_s =
+      (twist.head<3>() + twist.tail<3>().cross(pivot)) / std::max(median_depth_, 1e-9);
+  drift_per_s_ += std::clamp(seconds / kTimeConstant_s, 0.0, 1.0) * (drift_per_s - drift_per_s_);
+}
+
 void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result, bool relocalized) {
   const Rotation3 previous_rotation = motion_.last().rotation;
+  const Timestamp previous_time = motion_.time();
   if (relocalized) {
     frames_tolerant_ = 0;
     mean_twist_.reset();
+    drift_per_s_.setZero();
     motion_.Reset(image.time, result.camera_from_map);
     rotation_center_.Reset();
   } else {
@@ -265,6 +286,7 @@ void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result,
   if (options_.hybrid && result.observed != ObservedMotion::kPanorama) {
     rotation_center_.Add(image.time, result.camera_from_map_without_prior, result.covariance, median_depth_);
     pivot_estimate_ = rotation_center_.Estimate(median_depth_);
+    UpdateDrift(ToSeconds(image.time - previous_time));
   }
   if (result.inliers == 0) return;
   rotation_reference_ = image.features;

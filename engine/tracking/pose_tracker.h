@@ -101,9 +101,13 @@ class PoseTracker {
   // time to time and keeps it if it succeeds.
   MapTrackResult TrackFromPrediction(const MapSnapshot& map, const CameraImage& image,
                                      const Rigid3& predicted, Random* random);
+  // How long the rotation may be tracked without points until the position is no longer known.
+  double LongestDirectRotation_s(const MapSnapshot& map) const;
   std::optional<MapTrackResult> TrackRotationDirectly(const MapSnapshot& map, const CameraImage& image,
                                                       const MapTrackResult& tried);
   void SetComparison(PatchComparison comparison);
+  // After a pose from finite points, this long after the one before.
+  void UpdateDrift(double seconds);
 
   TrackerOptions options_;
   PoseCriteria criteria_;
@@ -135,6 +139,8 @@ class PoseTracker {
   // Left twist per second between the last two frames, as long as the track goes on.
   std::optional<Eigen::Matrix<double, 6, 1>> mean_twist_;
   Timestamp last_points_{};  // time of the last pose from map points
+  // Smoothed velocity that no rotation about the pivot explains, camera frame, in median depths per second.
+  Eigen::Vector3d drift_per_s_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace docent::engine

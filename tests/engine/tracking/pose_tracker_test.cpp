@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "tests/engine/tracking/tracked_image.h"
 
@@ -18,7 +21,7 @@ using testing_world::World;
 using Outcome = PoseTracker::Estimate::Outcome;
 
 class KnownRoom : public ::testing::Test {
- protected:
+ public:
   static Rigid3 Pose(int frame) { return CameraAt({0.01 * frame, 0, 0}, {0, 0.2 * frame, 0}); }
   static const std::shared_ptr<const MapSnapshot>& TheMap() {
     static const auto map =
@@ -64,6 +67,38 @@ TEST_F(KnownRoom, IsFoundAgainFromThePoseBeforeTheLoss) {
   const Rigid3 guess = tracker_.PredictAfterLoss(image);
   const auto result = tracker_.TryFrom(*TheMap(), image, guess, MapTracker::Effort::kRecovery, &random_);
   EXPECT_LT((result.camera_from_map.OriginInSource() - Pose(6).OriginInSource()).norm(), 0.01);
+}
+
+// Tracks a camera that turns away from all points of the map, and on slowly, while it moves by this much for
+// each image. Returns for how many images the rotation alone was tracked before the camera was lost.
+int FramesByRotation(KnownRoom* room, double motion) {
+  constexpr int kFrames = 80;
+  int by_rotation = 0;
+  std::shared_ptr<const ImageFeatures> previous;
+  for (int i = 1; i < kFrames; ++i) {
+    const double turn_deg = -std::min(2.0 * i, 72 + 0.05 * i);
+    CameraImage image = ImageAt(CameraAt({motion * i, 0, 0}, {0, turn_deg, 0}), i);
+    image.previous = std::exchange(previous, image.features);
+    const auto estimate = room->Track(image);
+    if (estimate.outcome == Outcome::kLost) return by_rotation;
+    by_rotation += estimate.outcome == Outcome::kRotationOnly;
+    room->tracker_.Accept(image, estimate.result, false);
+  }
+  return by_rotation;
+}
+
+TEST_F(KnownRoom, IsTrackedByTheRotationWhileTheCameraStandsAndTurnsAway) {
+  tracker_.Begin(ImageAt(Pose(0)).time, Pose(0), ObservedMotion::kSixDof);
+  EXPECT_GT(FramesByRotation(this, 0), 35);
+  EXPECT_LT(tracker_.last().OriginInSource().norm(), 0.02);
+}
+
+TEST_F(KnownRoom, IsLostSoonWhenTheCameraWalksAwayAndTurns) {
+  tracker_.Begin(ImageAt(Pose(0)).time, Pose(0), ObservedMotion::kSixDof);
+  // 0.6 units a second at a depth of 2.5 are a fifth of the depth after 0.8 s, or 25 images.
+  const int frames = FramesByRotation(this, -0.02);
+  EXPECT_GE(frames, 18);
+  EXPECT_LE(frames, 32);
 }
 
 TEST_F(KnownRoom, AlternatesThePatchComparison) {
