@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/map/map_readout.h"
 
-#include <ranges>
+#include <algorithm>
 
 namespace docent::engine {
 
@@ -15,18 +15,19 @@ bool IsRotatingImage(const CameraModel& image, const CameraModel& camera) {
 }  // namespace
 
 std::optional<Eigen::Vector2d> ReadoutIn(const MapSnapshot& map, const CameraModel& camera) {
-  for (const KeyFrame& keyframe : std::views::reverse(map.keyframes)) {
-    if (IsRotatingImage(*keyframe.camera, camera)) return keyframe.camera->readout_motion().readout_s;
-  }
-  return std::nullopt;
+  const auto newest =
+      std::find_if(map.keyframes.rbegin(), map.keyframes.rend(),
+                   [&](const KeyFrame& keyframe) { return IsRotatingImage(*keyframe.camera, camera); });
+  if (newest == map.keyframes.rend()) return std::nullopt;
+  return newest->camera->readout_motion().readout_s;
 }
 
 std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& camera) {
-  for (const auto& [id, record] : std::views::reverse(map.keyframes())) {
-    const CameraModel& image = *record.keyframe.camera;
-    if (IsRotatingImage(image, camera)) return image.readout_motion().readout_s;
-  }
-  return std::nullopt;
+  const auto newest = std::find_if(map.keyframes().rbegin(), map.keyframes().rend(), [&](const auto& entry) {
+    return IsRotatingImage(*entry.second.keyframe.camera, camera);
+  });
+  if (newest == map.keyframes().rend()) return std::nullopt;
+  return newest->second.keyframe.camera->readout_motion().readout_s;
 }
 
 std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,
