@@ -64,7 +64,7 @@ TEST(WideBaselineViews, TriesThoseThatHaveWaitedLongestUnlessToldOtherwise) {
     for (const auto& pair : pairs) all.push_back(pair.earlier.image.time);
     return all;
   };
-  const auto time = [](int i) { return ImageAt(CameraAt({}), i).time; };
+  const auto time = [](int i) { return ImageAt(CameraAt(Eigen::Vector3d::Zero()), i).time; };
   EXPECT_EQ(times(Show(CameraAt({0.3, 0, 0}), 100, &views)), (std::vector{time(0), time(1), time(2)}));
   const auto second = Show(CameraAt({0.3, 0, 0}), 104, &views);
   EXPECT_EQ(times(second), (std::vector{time(3), time(4), time(0)}));
@@ -88,7 +88,8 @@ TEST(WideBaselineViews, RemembersImagesOfTheWholeTimeButNoMoreThanFortyEight) {
       if (call + 60 >= kCalls) used.insert(pair.earlier.image.time);
   }
   EXPECT_LE(used.size(), 48u + 60u);
-  EXPECT_LT(*used.begin(), ImageAt(CameraAt({}), kCalls).time) << "some are from the first quarter";
+  EXPECT_LT(*used.begin(), ImageAt(CameraAt(Eigen::Vector3d::Zero()), kCalls).time)
+      << "some are from the first quarter";
   views.Reset();
   EXPECT_TRUE(Show(CameraAt({0.3, 0, 0}), 4 * kCalls, &views).empty());
 }
