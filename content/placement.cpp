@@ -79,18 +79,26 @@ double SmallestOffset(std::span<const Neighbour> points) {
   return least;
 }
 
-// The surface that the ray hits. Points sorted by depth are divided into surfaces at the gaps. The nearest
-// surface that surrounds the ray is used; if there is none, the ray passes beside all of them, and the
-// surface closest to it is used.
-std::span<const Neighbour> FrontSurface(std::span<const Neighbour> points, const PlacementOptions& options) {
-  std::span<const Neighbour> closest;
+// Points sorted by depth are divided into surfaces at the gaps.
+std::vector<std::span<const Neighbour>> DivideIntoSurfaces(std::span<const Neighbour> points,
+                                                           const PlacementOptions& options) {
+  std::vector<std::span<const Neighbour>> surfaces;
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= points.size(); ++i) {
     const bool ends = i == points.size() || points[i].depth > points[i - 1].depth * (1 + options.depth_gap);
     if (!ends) continue;
     const std::span<const Neighbour> surface = points.subspan(begin, i - begin);
     begin = i;
-    if (surface.size() < static_cast<std::size_t>(options.min_points)) continue;
+    if (surface.size() >= static_cast<std::size_t>(options.min_points)) surfaces.push_back(surface);
+  }
+  return surfaces;
+}
+
+// The surface that the ray hits: the nearest one that surrounds the ray. If there is none, the ray passes
+// beside all of them, and the surface closest to it is used.
+std::span<const Neighbour> FrontSurface(std::span<const Neighbour> points, const PlacementOptions& options) {
+  std::span<const Neighbour> closest;
+  for (const std::span<const Neighbour> surface : DivideIntoSurfaces(points, options)) {
     if (Surrounds(surface)) return surface;
     if (closest.empty() || SmallestOffset(surface) < SmallestOffset(closest)) closest = surface;
   }
@@ -123,15 +131,43 @@ std::optional<SurfaceHit> HitPlane(std::span<const Neighbour> surface, const Eig
   return hit;
 }
 
+// The hit at a measured distance. The normal is that of the plane that passes closest to it: of one surface's
+// points, or of all points at about this distance.
+SurfaceHit HitAt(double distance, std::span<const Neighbour> near, const Eigen::Vector3d& origin,
+                 const Eigen::Vector3d& ray, const PlacementOptions& options) {
+  std::vector<std::span<const Neighbour>> surfaces = DivideIntoSurfaces(near, options);
+  const auto first = std::find_if(near.begin(), near.end(), [&](const Neighbour& point) {
+    return point.depth > distance * (1 - options.depth_gap);
+  });
+  const auto end = std::find_if(first, near.end(), [&](const Neighbour& point) {
+    return point.depth > distance * (1 + options.depth_gap);
+  });
+  surfaces.emplace_back(first, end);
+  SurfaceHit hit;
+  hit.normal = -ray;
+  double least = options.agreement * distance;
+  for (const std::span<const Neighbour> surface : surfaces) {
+    const auto plane = HitPlane(surface, origin, ray, options);
+    const double off = plane ? std::abs((plane->point - origin).dot(ray) - distance) : least;
+    if (off >= least) continue;
+    least = off;
+    hit = *plane;
+  }
+  hit.point = origin + distance * ray;
+  return hit;
+}
+
 }  // namespace
 
 SurfaceResult FindSurface(std::span<const Eigen::Vector3d> points_in_map, const Eigen::Vector3d& ray_origin,
-                          const Eigen::Vector3d& ray_direction, const PlacementOptions& options) {
+                          const Eigen::Vector3d& ray_direction, const PlacementOptions& options,
+                          std::optional<double> distance) {
   if (!ray_origin.allFinite() || !ray_direction.allFinite() || !(ray_direction.norm() > 0)) {
     return {std::nullopt, "The lens has no ray for this pixel."};
   }
   const Eigen::Vector3d ray = ray_direction.normalized();
   const std::vector<Neighbour> near = PointsNearRay(points_in_map, ray_origin, ray, options);
+  if (distance && *distance > 0) return {HitAt(*distance, near, ray_origin, ray, options), ""};
   if (near.empty())
     return {std::nullopt, "The map has no points near this pixel; choose a place with more detail."};
   if (near.size() < static_cast<std::size_t>(options.min_points)) {

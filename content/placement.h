@@ -23,6 +23,7 @@ struct PlacementOptions {
   int min_plane_points = 5;       // With fewer points the surface's median depth is used instead of a plane.
   double depth_gap = 0.15;        // Ratio of the depth: a larger step in depth separates two surfaces.
   double inlier_distance = 0.02;  // Ratio of the depth: largest distance of an inlier from the plane.
+  double agreement = 0.05;        // Ratio of a measured distance: a plane this close to it is its surface.
   double max_incidence_deg = 80.0;  // Planes with a larger angle between normal and ray are rejected.
   std::uint64_t seed = 1;           // Of the random choices of the robust plane fit.
 };
@@ -44,9 +45,10 @@ struct SurfaceResult {
 
 // points_in_map are finite points in the camera's view. ray_origin and ray_direction (any nonzero length) are
 // in the map. Among several surfaces at different depths, the nearest one that the ray passes through is
-// used.
+// used, or the one at `distance` along the ray, if that was measured: the hit is at this distance then.
 SurfaceResult FindSurface(std::span<const Eigen::Vector3d> points_in_map, const Eigen::Vector3d& ray_origin,
-                          const Eigen::Vector3d& ray_direction, const PlacementOptions& options = {});
+                          const Eigen::Vector3d& ray_direction, const PlacementOptions& options = {},
+                          std::optional<double> distance = std::nullopt);
 
 // Returns the map_from_model of a model (y up, foot at its origin, front along z) that stands at `point` with
 // its y axis along map_up. Its front faces along the horizontal part of the surface normal or, on nearly

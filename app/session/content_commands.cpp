@@ -283,7 +283,8 @@ void ContentCommands::Apply(const SetMapUp& command, const engine::TrackedFrame&
   content::MapSettings settings = map.scene->settings;
   settings.up.reset();
   if (command.pixel) {
-    const content::SurfaceHit hit = SurfaceFor(frame, *command.pixel);
+    content::SurfaceHit hit = PlaneAtPixel(frame, *state_.cameras.at(CameraOf(frame)).model, *command.pixel);
+    hit.normal = MotionSince(frame, hit.point).rotation * hit.normal;
     if (!hit.on_plane) throw Error("there is no plane at this pixel; point at the floor or at a table");
     const double cosine = hit.normal.dot(engine::UpInMap(*frame.map));
     if (cosine < kMinLevelCosine)

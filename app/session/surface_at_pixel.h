@@ -10,9 +10,14 @@
 // Finds the point of the map's surface at a pixel that a user points at. Pure functions; any thread.
 namespace docent::app {
 
-// The surface that the frame shows at a pixel. Throws Error with one sentence when the frame has no pose, the
-// pixel no ray, or the map no surface there.
+// The surface that the frame shows at a pixel: at the distance that the images of keyframes tell, else where
+// the map points around the pixel are. Throws Error with one sentence when the frame has no pose, the pixel
+// no ray, or the map no surface there.
 content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engine::CameraModel& camera,
                                    const Eigen::Vector2d& pixel);
+// The same from the map points alone, for what needs the plane around the pixel and not the point itself, as
+// the floor does.
+content::SurfaceHit PlaneAtPixel(const engine::TrackedFrame& frame, const engine::CameraModel& camera,
+                                 const Eigen::Vector2d& pixel);
 
 }  // namespace docent::app

@@ -65,6 +65,23 @@ TEST(FindSurface, UsesTheNearestOfTwoSurfacesOnTheRay) {
   EXPECT_NEAR(beside.hit->point.z(), 3, 0.05);
 }
 
+TEST(FindSurface, UsesTheSurfaceAtAMeasuredDistance) {
+  Random random(2);
+  std::vector<Eigen::Vector3d> points = Patch({0, 0, 3}, {2, 0, 0.5}, {0, 2, 0}, 1500, 0.005, &random);
+  Append(Patch({0, 0, 1}, {0.1, 0, 0}, {0, 0.1, 0}, 60, 0.002, &random), &points);
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), ahead(0, 0, 2);
+  const SurfaceResult wall = FindSurface(points, origin, ahead, {}, 3.01);
+  ASSERT_TRUE(wall.hit.has_value());
+  EXPECT_NEAR((wall.hit->point - Eigen::Vector3d(0, 0, 3.01)).norm(), 0, 1e-12);
+  EXPECT_TRUE(wall.hit->on_plane);
+  EXPECT_GT(wall.hit->normal.dot(Eigen::Vector3d(1, 0, -4).normalized()), std::cos(5 * kPi / 180));
+  const SurfaceResult between = FindSurface(points, origin, ahead, {}, 2);
+  ASSERT_TRUE(between.hit.has_value());
+  EXPECT_FALSE(between.hit->on_plane) << "no points are at this distance";
+  EXPECT_EQ(between.hit->normal, -Eigen::Vector3d::UnitZ());
+  EXPECT_TRUE(FindSurface({}, origin, ahead, {}, 2).hit.has_value()) << "even without points";
+}
+
 TEST(FindSurface, IsRobustToOutliers) {
   Random random(3);
   std::vector<Eigen::Vector3d> points = Patch({0, 0, 2}, {0.5, 0, 0}, {0, 0.5, 0.2}, 400, 0.004, &random);
