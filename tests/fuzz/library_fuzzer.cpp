@@ -55,12 +55,25 @@ void Expect(bool condition) {
   if (!condition) std::abort();
 }
 
+// The number of records: those of cameras with the motion of a rolling shutter, which a bit of their first
+// byte says, have five more numbers.
+std::size_t CountCameras(std::span<const std::uint8_t> records) {
+  constexpr std::size_t kWithoutMotion = 81, kWithMotion = kWithoutMotion + 5 * sizeof(double);
+  constexpr std::uint8_t kHasMotion = 0x80;
+  std::size_t count = 0;
+  for (std::size_t at = 0; at < records.size(); ++count)
+    at += (records[at] & kHasMotion) != 0 ? kWithMotion : kWithoutMotion;
+  return count;
+}
+
 void DecodeTable(int which, std::span<const std::uint8_t> records) {
   using namespace docent::maps;
   constexpr std::array kKinds = {kCameraTableKind, kKeyFrameTableKind, kPointTableKind,
                                  kObservationTableKind};
   const EnvelopeKind& kind = kKinds[static_cast<std::size_t>(which)];
-  const Bytes bytes = Enveloped(kind, records.size() / kind.record_bytes, records);
+  const std::size_t count =
+      kind.record_bytes > 0 ? records.size() / kind.record_bytes : CountCameras(records);
+  const Bytes bytes = Enveloped(kind, count, records);
   if (which == 0) {
     Limited(bytes.size(), kFixedOverhead, [&] { return DecodeCameras(kMapKey, bytes); });
   } else if (which == 1) {
