@@ -98,10 +98,9 @@ GuideRun::GuideRun(const GuideRequest& request, std::span<CalibratedCamera> came
                ModelsOf(cameras), request.library),
       inboxes_(cameras.size()),
       camera_states_(cameras.size()),
-      sound_director_(request.language),
+      sounds_(request),
       visitor_frames_(cameras.size()),
       watch_(NamesOf(cameras), VisitorStringsFor(request.may_write ? "en" : request.language)) {
-  if (request.sound) sound_player_.emplace();
   if (!request.may_write)
     host_.emplace(request, &session_, cameras.size(), [this](const Event& event) {
       files_->Add({event});
@@ -175,11 +174,7 @@ void GuideRun::Reached(FrameStage stage, const ShownFrame& frame) {
   if (frame.taken) tally.AddAge(stage, now - *frame.taken);
   if (stage != FrameStage::kShown) return;
   tally.AddShown(now);
-  if (frame.tracked.frame.camera != 0) return;
-  while (!undrawn_sounds_.empty() && undrawn_sounds_.front().first <= frame.tracked.frame.index) {
-    sound_player_->Give(undrawn_sounds_.front().second);
-    undrawn_sounds_.pop_front();
-  }
+  if (frame.tracked.frame.camera == 0) sounds_.HandleShown(frame.tracked.frame.index);
 }
 
 std::shared_ptr<const ShownFrame> GuideRun::Lead(std::size_t camera, const GuideVisitor& guide) {
@@ -443,26 +438,9 @@ void GuideRun::Direct(const std::shared_ptr<const ShownFrame>& frame) {
 }
 
 void GuideRun::PlaySounds(ShownFrame* frame) {
-  const engine::TrackedFrame& tracked = frame->tracked;
-  std::optional<Eigen::Vector3d> place;
-  if (engine::HasPose(tracked.state)) place = tracked.camera_from_map.OriginInSource();
-  static const content::Scene kNoScene;
-  if (host_) {
-    for (const SoundDirector::Key& key : host_->TakeAskedSounds()) sound_director_.Ask(key.first, key.second);
-  }
-  const auto orders = sound_director_.Update(frame->seconds, tracked.map_key,
-                                             frame->shown.scene ? *frame->shown.scene : kNoScene, place);
-  frame->caption = orders.caption;
-  for (const auto& [key, asset] : orders.start)
-    files_->Add({Event{tracked.frame.time, "sound", "'" + key.second + "' begins"}});
-  if (!sound_player_) return;
-  if (host_ && !request_.headless) {
-    if (!orders.start.empty() || !orders.stop.empty())
-      undrawn_sounds_.emplace_back(tracked.frame.index, orders);
-  } else {
-    sound_player_->Give(orders);
-  }
-  ReportProblem(sound_player_->TakeProblem(), tracked.frame.time);
+  if (host_) sounds_.Ask(host_->TakeAskedSounds());
+  files_->Add(sounds_.Add(frame));
+  ReportProblem(sounds_.TakeProblem(), frame->tracked.frame.time);
 }
 
 void GuideRun::ReportProblem(const std::string& problem, Timestamp time) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -17,12 +16,11 @@
 #include "app/command_line/guide_window.h"
 #include "app/command_line/run_guide.h"
 #include "app/command_line/run_hub.h"
+#include "app/command_line/run_sounds.h"
 #include "app/command_line/run_watch.h"
 #include "app/command_line/visitor_frames.h"
 #include "app/command_line/visitor_host.h"
 #include "app/evaluation/camera_report.h"
-#include "app/sound/sound_director.h"
-#include "app/sound/sound_player.h"
 
 namespace docent::app {
 
@@ -103,8 +101,7 @@ class GuideRun {
   Session session_;
   std::vector<CommandInbox> inboxes_;  // By camera, like camera_states_.
   std::vector<CameraState> camera_states_;
-  SoundDirector sound_director_;                     // Used for the frames of the first camera.
-  std::optional<SoundPlayer> sound_player_;          // Only if sounds are to be heard.
+  RunSounds sounds_;                                 // Used with files_mutex_ held.
   std::optional<VisitorHost> host_;                  // Only on a tour. Used with files_mutex_ held.
   std::vector<std::unique_ptr<HeadControl>> heads_;  // Of the cameras that have a pan-tilt head.
   std::stop_source stop_;
@@ -114,10 +111,7 @@ class GuideRun {
   std::set<std::string> warnings_;    // Those that the window was told of.
   std::vector<CameraTally> tallies_;  // By camera.
   VisitorFrames visitor_frames_;      // Only on a tour it has any.
-  // What a visitor is to hear together with an image of the first camera that is not on the screen yet, with
-  // its index: a slow machine draws it later. Guarded like these.
-  std::deque<std::pair<std::uint64_t, SoundDirector::Orders>> undrawn_sounds_;
-  std::uint64_t serial_ = 0;  // Of the last frame that was made; guarded like these.
+  std::uint64_t serial_ = 0;          // Of the last frame that was made; guarded like these.
   RunWatch watch_;
   std::string noticed_;  // What the person at the first camera is told next; empty for nothing.
   std::optional<GuideFiles> files_;
