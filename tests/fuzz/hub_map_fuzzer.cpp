@@ -1,22 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <unistd.h>
-
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <memory>
-#include <opencv2/core/mat.hpp>
 #include <span>
-#include <string>
-#include <vector>
 
 #include "engine/base/error.h"
 #include "maps/hub/local_library.h"
 #include "maps/hub/sha256.h"
 #include "maps/storage/checksum.h"
 #include "maps/storage/envelope.h"
-#include "maps/storage/snapshot_reader.h"
+#include "tests/fuzz/small_library.h"
 
 // Writes into a library what a hostile hub could send for a map: items with any bytes, whose hashes are
 // right, and any facts that pass the checks of a list of maps. The input changes a valid map; it is a
@@ -31,63 +25,19 @@ using namespace docent::maps;
 
 constexpr std::uint64_t kMaxFact = 1 << 20;  // Numbers beyond are refused before.
 
-fs::path FuzzFolder() {
-  // Never destroyed, because the exit handler needs it.
-  static const fs::path& folder = *new fs::path([] {
-    const char* const memory = "/dev/shm";
-    std::error_code error;
-    const fs::path base = fs::is_directory(memory, error) ? fs::path(memory) : fs::temp_directory_path();
-    fs::path made = base / ("docent-hub-fuzz-" + std::to_string(getpid()));
-    fs::create_directories(made);
-    std::atexit([] { fs::remove_all(FuzzFolder()); });
-    return made;
-  }());
-  return folder;
-}
-
-// A map of two keyframes with two points.
-std::shared_ptr<const docent::engine::MapSnapshot> SmallMap() {
-  using namespace docent::engine;
-  const CameraModel::Intrinsics intrinsics{64, 64, 60, 60, 32, 32};
-  const auto camera =
-      std::make_shared<const CameraModel>(LensModel::kRadialTangential, intrinsics, std::array<double, 5>{});
-  auto map = std::make_shared<MapSnapshot>();
-  for (std::uint32_t i = 0; i < 2; ++i) {
-    KeyFrame keyframe;
-    keyframe.id = i;
-    keyframe.camera = camera;
-    cv::Mat image(64, 64, CV_8UC1, cv::Scalar(50.0 + i));
-    for (int square = 0; square < 9; ++square)
-      image(cv::Rect(14 + square % 3 * 14, 14 + square / 3 * 14, 7, 7)) = cv::Scalar(120.0 + 15 * square);
-    keyframe.features = MakeSizesOnly(image);
-    map->keyframes.push_back(keyframe);
-    MapPoint point;
-    point.id = i;
-    point.point_in_map = {0.1 * i, 0, 1, 1};
-    point.source_keyframe = 0;
-    map->points.push_back(point);
-    map->observations.push_back({0, i, {5, 5}, 0});
-  }
-  map->next_keyframe = map->next_point = 2;
-  return map;
-}
-
 LocalLibrary& Device() {
-  static LocalLibrary library(FuzzFolder() / "device.docent", CreateIfMissing::kYes, {});
+  static LocalLibrary library(docent::fuzz::TemporaryFolder() / "device.docent", CreateIfMissing::kYes, {});
   return library;
 }
 
 // The map as a hub has it, and the key that the device has for it.
 LocalMap ValidMap() {
-  const fs::path path = FuzzFolder() / "author.docent";
+  const fs::path path = docent::fuzz::TemporaryFolder() / "author.docent";
   std::uint64_t key = 0;
   {
     Library author = Library::Open(path, Access::kReadWrite, CreateIfMissing::kYes, {});
     key = author.NewKey();
-    auto scene = std::make_shared<SceneRecord>();
-    scene->text = "{}";
-    scene->assets.push_back({"asset", "model.glb", std::make_shared<const Bytes>(Bytes(20, 7))});
-    author.Save({key, "map", Policy::kOpen, SmallMap(), scene});
+    author.Save({key, "map", Policy::kOpen, docent::fuzz::SmallMap(), docent::fuzz::SmallScene()});
   }
   LocalMap map = LocalLibrary(path, CreateIfMissing::kNo, {}).Read(key, {});
   map.facts.info.key = Device().library().NewKey();

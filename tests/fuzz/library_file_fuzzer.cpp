@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -8,16 +6,14 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <opencv2/core/mat.hpp>
 #include <span>
-#include <string>
-#include <vector>
 
 #include "engine/base/error.h"
 #include "maps/library/library.h"
 #include "maps/maintenance/recovery.h"
 #include "maps/storage/snapshot_reader.h"
 #include "tests/fuzz/allocation_limit.h"
+#include "tests/fuzz/small_library.h"
 
 // Feeds a whole library file to all code that reads one: opening, listing, thumbnails, maps, scenes,
 // verification and recovery. The input modifies a small valid library: it is a sequence of patches, each an
@@ -31,20 +27,6 @@ namespace {
 namespace fs = std::filesystem;
 using docent::maps::Bytes;
 
-fs::path Folder() {
-  // Never destroyed, because the exit handler needs it.
-  static const fs::path& folder = *new fs::path([] {
-    const char* const memory = "/dev/shm";
-    std::error_code error;
-    const fs::path base = fs::is_directory(memory, error) ? fs::path(memory) : fs::temp_directory_path();
-    fs::path made = base / ("docent-fuzz-" + std::to_string(getpid()));
-    fs::create_directories(made);
-    std::atexit([] { fs::remove_all(Folder()); });
-    return made;
-  }());
-  return folder;
-}
-
 docent::maps::LibraryOptions FastOptions() {
   docent::maps::LibraryOptions options;
   options.make_features = docent::maps::MakeSizesOnly;
@@ -54,45 +36,19 @@ docent::maps::LibraryOptions FastOptions() {
 
 Bytes MakeSeed() {
   using namespace docent;
-  const fs::path path = Folder() / "seed.docent";
+  const fs::path path = docent::fuzz::TemporaryFolder() / "seed.docent";
   {
     maps::Library library =
         maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes, FastOptions());
-    const engine::CameraModel::Intrinsics intrinsics{64, 64, 60, 60, 32, 32};
-    const auto camera = std::make_shared<const engine::CameraModel>(engine::LensModel::kRadialTangential,
-                                                                    intrinsics, std::array<double, 5>{});
-    for (int m = 0; m < 2; ++m) {
-      auto map = std::make_shared<engine::MapSnapshot>();
-      for (std::uint32_t i = 0; i < 2; ++i) {
-        engine::KeyFrame keyframe;
-        keyframe.id = i;
-        keyframe.camera = camera;
-        // Squares, so that the image has keypoints and the word table is not empty.
-        cv::Mat image(64, 64, CV_8UC1, cv::Scalar(50.0 + i));
-        for (int square = 0; square < 9; ++square)
-          image(cv::Rect(14 + square % 3 * 14, 14 + square / 3 * 14, 7, 7)) = cv::Scalar(120.0 + 15 * square);
-        keyframe.features = maps::MakeSizesOnly(image);
-        map->keyframes.push_back(keyframe);
-        engine::MapPoint point;
-        point.id = i;
-        point.point_in_map = {0.1 * i, 0, 1, 1};
-        point.source_keyframe = 0;
-        map->points.push_back(point);
-        map->observations.push_back({0, i, {5, 5}, 0});
-      }
-      map->next_keyframe = map->next_point = 2;
-      auto scene = std::make_shared<maps::SceneRecord>();
-      scene->text = "{}";
-      scene->assets.push_back({"asset", "model.glb", std::make_shared<const Bytes>(Bytes(20, 7))});
-      library.Save({library.NewKey(), "map " + std::to_string(m), maps::Policy::kOpen, map, scene});
-    }
+    for (const char* name : {"map 0", "map 1"})
+      library.Save({library.NewKey(), name, maps::Policy::kOpen, fuzz::SmallMap(), fuzz::SmallScene()});
   }
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
 std::size_t EmptyLibrarySize() {
-  const fs::path path = Folder() / "empty.docent";
+  const fs::path path = docent::fuzz::TemporaryFolder() / "empty.docent";
   docent::maps::Library::Open(path, docent::maps::Access::kReadWrite, docent::maps::CreateIfMissing::kYes,
                               FastOptions());
   return fs::file_size(path);
@@ -131,7 +87,7 @@ void ReadAll(const fs::path& path) {
 
 void Recover(const fs::path& path) {
   using namespace docent::maps;
-  const fs::path target = Folder() / "recovered.docent";
+  const fs::path target = docent::fuzz::TemporaryFolder() / "recovered.docent";
   std::error_code error;
   fs::remove(target, error);
   docent::maps::Recover(path, target);
@@ -146,7 +102,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   constexpr char kMagic[] = "SQLite format 3";
   const bool whole = size >= sizeof(kMagic) && std::memcmp(data, kMagic, sizeof(kMagic)) == 0;
   const Bytes file = whole ? Bytes(data, data + size) : Patched(seed, {data, size});
-  const fs::path path = Folder() / "input.docent";
+  const fs::path path = docent::fuzz::TemporaryFolder() / "input.docent";
   std::ofstream(path, std::ios::binary)
       .write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
   constexpr std::size_t kSqliteLookasideBytes = 48'000;
