@@ -24,12 +24,12 @@ void AdaptiveQuality::WarmUp(ui::Renderer* renderer) {
   view.camera = &camera;
   view.scene = &scene;
   view.overlay.hud = false;
-  for (const ui::DrawingQuality& quality : ui::kDrawingLadder) {
+  for (const ui::DrawingQuality& quality : ui::kQualityLevels) {
     renderer->SetQuality(quality.samples, 1);
     view.shadows = quality.shadows;
     renderer->Draw(view);
   }
-  renderer->SetQuality(ui::kDrawingLadder.front().samples, 1);
+  renderer->SetQuality(ui::kQualityLevels.front().samples, 1);
   // Until the first image, nothing of that is shown.
   ui::View empty;
   empty.camera = &camera;
@@ -38,7 +38,7 @@ void AdaptiveQuality::WarmUp(ui::Renderer* renderer) {
 }
 
 void AdaptiveQuality::Apply(double pixels_per_pixel, ui::Renderer* renderer, ui::View* view) const {
-  const ui::DrawingQuality& quality = ladder_.quality();
+  const ui::DrawingQuality& quality = controller_.quality();
   // In steps of an eighth, so that a window that is resized does not need a new lens table all the time.
   const double stepped = std::ceil(8 * pixels_per_pixel) / 8;
   const double least = std::min(1.0, quality.largest_scale);
@@ -48,8 +48,8 @@ void AdaptiveQuality::Apply(double pixels_per_pixel, ui::Renderer* renderer, ui:
 
 std::optional<std::string> AdaptiveQuality::Add(Clock::time_point begin, Clock::time_point now) {
   using Seconds = std::chrono::duration<double>;
-  if (!ladder_.Add(Seconds(now - start_).count(), Seconds(now - begin).count())) return std::nullopt;
-  return std::string("drawing with ") + ladder_.quality().name;
+  if (!controller_.Add(Seconds(now - start_).count(), Seconds(now - begin).count())) return std::nullopt;
+  return std::string("drawing with ") + controller_.quality().name;
 }
 
 }  // namespace docent::app

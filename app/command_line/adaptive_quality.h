@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "ui/drawing_ladder.h"
+#include "ui/quality_controller.h"
 #include "ui/renderer.h"
 
 namespace docent::app {
@@ -27,7 +27,7 @@ class AdaptiveQuality {
 
  private:
   const Clock::time_point start_ = Clock::now();
-  ui::DrawingLadder ladder_;
+  ui::QualityController controller_;
 };
 
 }  // namespace docent::app

@@ -19,7 +19,7 @@ struct DrawingQuality {
 // From the best to the cheapest. Measured with Mesa's software renderer, in a window of 1280 x 800 with a
 // camera of 640 x 480 pixels in the museum of the simulator: an image took 240, 85, 75, 28 and 19 ms of
 // processor time with the first five, most of it for shadows, and 4 ms less without smoothing.
-inline constexpr std::array<DrawingQuality, 6> kDrawingLadder = {{
+inline constexpr std::array<DrawingQuality, 6> kQualityLevels = {{
     {"the resolution of the window", 4, 2.0, true, true},
     {"the resolution of the camera", 4, 1.0, true, true},
     {"no smoothed edges", 1, 1.0, true, true},
@@ -30,10 +30,10 @@ inline constexpr std::array<DrawingQuality, 6> kDrawingLadder = {{
 
 // When the quality changes.
 struct DrawingLimits {
-  // Drawing slower than this goes a rung down. Five images a second leave 200 ms for each, half of it for
+  // Drawing slower than this goes a level down. Five images a second leave 200 ms for each, half of it for
   // tracking.
   double slow_s = 0.1;
-  // Drawing faster than this may go a rung up, which costs up to four times as much.
+  // Drawing faster than this may go a level up, which costs up to four times as much.
   double fast_s = 0.025;
   double down_after_s = 0.5;  // Frames are judged together over at least this time, by their median.
   // Two frames that are both slower than this are judged at once: a third one would leave a visitor with one
@@ -43,18 +43,18 @@ struct DrawingLimits {
 };
 
 // Chooses the quality by the time that drawing takes: tracking and input need the rest of the processor. A
-// rung is taken to cost half of the one above, so what takes several times too long goes several rungs down
+// level is taken to cost half of the one above, so what takes several times too long goes several levels down
 // at once. One thread.
-class DrawingLadder {
+class QualityController {
  public:
-  explicit DrawingLadder(const DrawingLimits& limits = {})
+  explicit QualityController(const DrawingLimits& limits = {})
       : limits_(limits), up_after_s_(limits.up_after_s) {}
 
   // A frame took this long to draw; `now_s` is the time after it, which does not decrease. Returns whether
   // the quality has changed.
   bool Add(double now_s, double drawing_s);
-  const DrawingQuality& quality() const { return kDrawingLadder[rung_]; }
-  std::size_t rung() const { return rung_; }
+  const DrawingQuality& quality() const { return kQualityLevels[level_]; }
+  std::size_t level() const { return level_; }
 
  private:
   void Begin(double now_s);
@@ -62,7 +62,7 @@ class DrawingLadder {
   bool IsToBeJudged(double now_s) const;
 
   const DrawingLimits limits_;
-  std::size_t rung_ = 0;
+  std::size_t level_ = 0;
   double begin_s_ = -1;               // Of the frames that are judged together; negative before the first.
   std::array<double, 32> times_s_{};  // Their drawing times, as far as there is room.
   std::size_t frames_ = 0;
