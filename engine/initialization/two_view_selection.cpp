@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "engine/base/median.h"
+#include "engine/base/stable_sort.h"
 #include "engine/initialization/five_point.h"
 #include "engine/initialization/homography.h"
 
@@ -151,8 +152,7 @@ std::vector<PoseCandidate> RankPoses(const RayPairs& pairs, const Consensus& hom
       RefinePose(pairs, essential_inliers, PosesFromEssential(essential.model)[0], inlier_px, kIterations),
       !plane);
 
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const PoseCandidate& a, const PoseCandidate& b) { return a.cost < b.cost; });
+  StableSort(&candidates, [](const PoseCandidate& a, const PoseCandidate& b) { return a.cost < b.cost; });
   return candidates;
 }
 

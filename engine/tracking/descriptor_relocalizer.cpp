@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/base/option_check.h"
+#include "engine/base/stable_sort.h"
 #include "engine/recognition/absolute_pose.h"
 #include "engine/vision/descriptor.h"
 #include "engine/vision/features.h"
@@ -167,8 +168,7 @@ std::vector<DescriptorRelocalizer::Suggestion> DescriptorRelocalizer::Suggest(
       suggestions.push_back(std::move(*suggestion));
     }
   }
-  std::stable_sort(suggestions.begin(), suggestions.end(),
-                   [](const Suggestion& a, const Suggestion& b) { return a.inliers > b.inliers; });
+  StableSort(&suggestions, [](const Suggestion& a, const Suggestion& b) { return a.inliers > b.inliers; });
   return suggestions;
 }
 

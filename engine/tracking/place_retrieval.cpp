@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/stable_sort.h"
 #include "engine/vision/rotation_alignment.h"
 
 namespace docent::engine {
@@ -31,7 +32,7 @@ std::vector<AlignedPlace> PlaceRetrieval::ByThumbnail(const CameraImage& image, 
     if (candidate.map_key == excluded_map) continue;
     if (const auto place = AlignPlace(candidate, image)) aligned.push_back(*place);
   }
-  std::stable_sort(aligned.begin(), aligned.end(), [](const AlignedPlace& a, const AlignedPlace& b) {
+  StableSort(&aligned, [](const AlignedPlace& a, const AlignedPlace& b) {
     return a.alignment_error < b.alignment_error;
   });
   return aligned;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/base/stable_sort.h"
+
 namespace docent::engine {
 
 namespace {
@@ -70,7 +72,7 @@ std::vector<VerifiedPlace> PlaceVerification::Verify(const Query& query,
     return {};
   }
   if (competitor) found.push_back(std::move(*competitor));
-  std::stable_sort(found.begin(), found.end(), [](const VerifiedPlace& a, const VerifiedPlace& b) {
+  StableSort(&found, [](const VerifiedPlace& a, const VerifiedPlace& b) {
     return a.result.Quality() > b.result.Quality();
   });
   return found;

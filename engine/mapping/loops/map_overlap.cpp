@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "engine/base/option_check.h"
+#include "engine/base/stable_sort.h"
 #include "engine/mapping/loops/overlap_verification.h"
 
 namespace docent::engine {
@@ -51,9 +52,8 @@ class OverlapFinder {
       });
       if (!known) examined.push_back(Examine(seed));
     }
-    std::stable_sort(
-        examined.begin(), examined.end(),
-        [](const OverlapEvidence& a, const OverlapEvidence& b) { return a.Points() > b.Points(); });
+    StableSort(&examined,
+               [](const OverlapEvidence& a, const OverlapEvidence& b) { return a.Points() > b.Points(); });
     OverlapEvidence best;
     if (!examined.empty()) best = std::move(examined.front());
     for (std::size_t i = 1; i < examined.size(); ++i) {
