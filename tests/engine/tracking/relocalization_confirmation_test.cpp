@@ -50,14 +50,17 @@ TEST(RelocalizationConfirmation, DoesNotCountFramesThatExplainLittleAndStartsAga
   EXPECT_TRUE(confirmation.is_pending());
 }
 
-TEST(RelocalizationConfirmation, AsksNearTheLostPoseForTheRatioFromBeforeTheLossOnly) {
+TEST(RelocalizationConfirmation, AsksNearTheLostPoseForHalfOfTheRatioFromBeforeTheLossOnly) {
   const TrackerOptions options;
   for (const bool near : {true, false}) {
-    RelocalizationConfirmation confirmation(options);
-    for (int i = 0; i < 100; ++i) confirmation.Add(Explaining(0.3), true);
-    confirmation.Begin(Explaining(0.3), near ? RelocalizationConfirmation::Loss() : Far());
-    for (int i = 0; i < options.confirming_frames; ++i) confirmation.Add(Explaining(0.3), true);
-    EXPECT_EQ(confirmation.is_pending(), !near);
+    for (const bool enough : {true, false}) {
+      const double ratio = enough ? 0.22 : 0.18;
+      RelocalizationConfirmation confirmation(options);
+      for (int i = 0; i < 100; ++i) confirmation.Add(Explaining(0.4), true);
+      confirmation.Begin(Explaining(ratio), near ? RelocalizationConfirmation::Loss() : Far());
+      for (int i = 0; i < options.confirming_frames; ++i) confirmation.Add(Explaining(ratio), true);
+      EXPECT_EQ(confirmation.is_pending(), !near || !enough) << ratio;
+    }
   }
 }
 
