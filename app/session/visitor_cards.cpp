@@ -102,7 +102,7 @@ void VisitorCards::OpenCard(const std::string& name) {
   const content::Entity* const entity = scene_ ? scene_->Find(name) : nullptr;
   if (entity == nullptr || !content::HasCard(*entity)) throw Error(strings_.nothing_to_open);
   const content::Card card = content::CardOf(*scene_, *entity, language_);
-  Open& open = open_.emplace();
+  Open& open = open_.emplace(Open());
   open.entity = name;
   if (card.shown != nullptr) open.shown = std::shared_ptr<const content::Entity>(scene_, card.shown);
   open.pages = content::PagesOf(card.text, times_.page_characters);
