@@ -165,11 +165,15 @@ std::vector<InitialPair::Match> MatchesOfATurn(const CameraModel& a, const Camer
   const Rotation3 turn = Rotation3::Exp({0, angle, 0});
   while (matches.size() < 300) {
     const double depth = random.Uniform(2, 6);
-    const Eigen::Vector3d point(random.Uniform(-0.8, 0.8) * depth, random.Uniform(-0.5, 0.5) * depth, depth);
+    const double x = random.Uniform(-0.8, 0.8), y = random.Uniform(-0.5, 0.5);
+    const Eigen::Vector3d point(x * depth, y * depth, depth);
     const auto pixel_a = a.Project(point), pixel_b = b.Project(turn * (point + Eigen::Vector3d(move, 0, 0)));
     if (!pixel_a || !pixel_b || !a.IsInside(*pixel_a) || !b.IsInside(*pixel_b)) continue;
-    const auto noise = [&] { return Eigen::Vector2d(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5)); };
-    matches.push_back({(*pixel_a + noise()).cast<float>(), (*pixel_b + noise()).cast<float>(), 0});
+    const auto with_noise = [&](const Eigen::Vector2d& pixel) -> Eigen::Vector2f {
+      const double u = random.Uniform(-0.5, 0.5), v = random.Uniform(-0.5, 0.5);
+      return (pixel + Eigen::Vector2d(u, v)).cast<float>();
+    };
+    matches.push_back({with_noise(*pixel_a), with_noise(*pixel_b), 0});
   }
   return matches;
 }
@@ -208,13 +212,14 @@ bool StartsMap(const Turn& turn, double unknown_readout_s, std::uint64_t seed,
 
 TEST(Initializer, WaitsWhereDepthMayBeTheSkewOfARollingShutter) {
   int without = 0, with = 0;
-  for (const Turn& turn : {Turn{1.3, 0.1}, Turn{2.5, 0.05}}) {
+  for (const Turn& turn : {Turn{1.3, 0.1}, Turn{2.5, 0.06}}) {
     for (std::uint64_t seed = 0; seed < 20; ++seed) {
       without += StartsMap(turn, 0, seed);
       with += StartsMap(turn, InitializerOptions().unknown_readout_s, seed);
     }
   }
-  EXPECT_GE(without, 4) << "the turns do not show what is tested";
+  // With other seeds 9 to 16, and 0 to 2 of the same.
+  EXPECT_GE(without, 5) << "the turns do not show what is tested";
   EXPECT_LE(with, without / 4);
 }
 
