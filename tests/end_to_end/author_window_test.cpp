@@ -4,6 +4,8 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -42,11 +44,24 @@ class AuthorAtWindow : public ::testing::Test {
 
   void Start(const std::string& script, const std::string& autosave) {
     folder_.Write("script.txt", script);
-    child_ = StartDocent({"author", "--library", library(), "--camera", "sim:room", "--script",
-                          (folder_ / "script.txt").string(), "--record-script",
-                          (folder_ / "recorded.txt").string(), "--autosave", autosave},
-                         (folder_ / "out").string(), (folder_ / "err").string());
+    child_ = StartDocent(
+        {"author", "--library", library(), "--camera", "sim:room", "--script",
+         (folder_ / "script.txt").string(), "--record-script", (folder_ / "recorded.txt").string(),
+         "--autosave", autosave, "--output", (folder_ / "run").string()},
+        (folder_ / "out").string(), (folder_ / "err").string());
     Do("search --sync --onlyvisible --name Docent windowfocus");
+  }
+  // Waits until the map has depth, so that something can be placed in it; at most two minutes. The file has
+  // its final name at the end of the run.
+  void WaitForMap() {
+    const auto has_started = [this] {
+      std::ifstream file(folder_ / "run" / "events.csv.part");
+      const std::string events{std::istreambuf_iterator<char>(file), {}};
+      return events.find("started Room") != std::string::npos;
+    };
+    for (int i = 0; i < 1200 && !has_started(); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    EXPECT_TRUE(has_started());
   }
   std::string library() { return (folder_ / "room.docent").string(); }
   static void Do(const std::string& xdotool) {
@@ -87,7 +102,7 @@ class AuthorAtWindow : public ::testing::Test {
 
 TEST_F(AuthorAtWindow, PlacesSelectsAndRemovesWithUndoAndSavesAtTheEnd) {
   Start("0.1 map new Room\n", "0");
-  // The map needs finite points before something can be placed; until then the commands are refused.
+  WaitForMap();
   Press("2");
   for (int i = 0; i < 12; ++i) Click(480, 520);
   Press("Escape");
@@ -119,6 +134,7 @@ TEST_F(AuthorAtWindow, PlacesSelectsAndRemovesWithUndoAndSavesAtTheEnd) {
 
 TEST_F(AuthorAtWindow, PlacesWithTheKeyboardAlone) {
   Start("0.1 map new Room\n", "0");
+  WaitForMap();
   Press("2");
   for (int i = 0; i < 12; ++i) Press("Return");
   for (int i = 0; i < 5; ++i) Press("shift+Left");
@@ -143,7 +159,7 @@ TEST_F(AuthorAtWindow, PlacesWithTheKeyboardAlone) {
 
 TEST_F(AuthorAtWindow, CanQuitWithoutSaving) {
   Start("0.1 map new Room\n", "0");
-  std::this_thread::sleep_for(std::chrono::seconds(8));  // Until the map could be saved.
+  WaitForMap();
   Press("ctrl+q");
   Press("Right");  // To the second answer.
   PressLast("Return");
