@@ -7,8 +7,8 @@ namespace docent::engine {
 
 // The visible inlier ratio that a frame needs after a relocalization to count towards extending the map. A
 // camera that is found shortly after the loss near the lost pose has hardly reached another place of similar
-// appearance. With many occlusions the ratio was never high, and the motion that lost the camera brought parts
-// into view that the map lacks; then half of the ratio from before the loss suffices.
+// appearance. With many occlusions the ratio was never high, and the motion that lost the camera brought
+// parts into view that the map lacks; then half of the ratio from before the loss suffices.
 double RelocalizationConfirmation::RequiredInlierRatio(const Loss& loss) const {
   // Ratio of the median depth, and radians: half the field of view of a 60 degree lens.
   constexpr double kNear = 0.5;
