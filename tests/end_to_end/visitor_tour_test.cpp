@@ -87,9 +87,10 @@ class VisitorOfFiveStops : public ::testing::Test {
     EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << ReadAll(Tour().string() + ".err");
   }
 
-  // Waits until something is the case, at most as long as a heavily loaded machine needs for the walk.
+  // Waits until something is the case, at most as long as a heavily loaded machine, or a program with
+  // AddressSanitizer, needs for the walk.
   bool Wait(const std::string& what, const std::function<bool()>& is_so) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(300);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(15);
     while (std::chrono::steady_clock::now() < end && (IsRunning() || child_ == -1)) {
       if (is_so()) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
