@@ -14,7 +14,11 @@
 namespace docent::engine {
 
 struct KeyFramePolicyOptions {
-  double min_parallax_deg = 5.0;  // A smaller angle triangulates poorly (hybrid-slam §4.1).
+  // With a smaller parallax the camera has not translated. A distance of 0.04 of the depth, from which on a
+  // keyframe of general motion adds points (KeyFrameNoveltyOptions::min_distance_when_few). With the 5
+  // degrees of hybrid-slam §4.1, a camera that rotates while it walks opened one panorama map after the
+  // other, which delayed the keyframes that give depth to what comes into view.
+  double min_parallax_deg = 2.3;
   // A frame whose finite inliers cover less of the image than this leaves the map (hybrid-slam §4.1).
   double min_coverage = 0.75;
   // Smallest angle between viewing directions, as a ratio of the field of view (hybrid-slam §4.2).

@@ -22,9 +22,10 @@ const double kFieldOfView = Radians(70);
 constexpr double kViewTurnDeg = 14;        // 0.2 of the field of view
 constexpr double kSmallViewTurnDeg = 2.1;  // 0.03 of it
 constexpr double kPointDepth = 2;          // metres
-// Rays from two centres this far apart to a point in front of the middle between them have a parallax of five
-// degrees.
-const double kParallaxDistance = 2 * kPointDepth * std::tan(Radians(2.5));
+// Rays from two centres this far apart to a point in front of the middle between them have the parallax at
+// which a camera has translated.
+const double kParallaxDistance =
+    2 * kPointDepth * std::tan(Radians(KeyFramePolicyOptions().min_parallax_deg / 2));
 
 Rigid3 RotatedBy(double degrees, const Eigen::Vector3d& center = Eigen::Vector3d::Zero()) {
   return CameraAt(center, {0, degrees, 0});
