@@ -37,6 +37,7 @@ void KeyFrameOffers::Reset() {
   Restart();
   candidate_.reset();
   taken_.reset();
+  accepted_.reset();
 }
 
 void KeyFrameOffers::BeginFrame() {
@@ -67,8 +68,18 @@ void KeyFrameOffers::Consider(const CameraImage& image, const MapSnapshot& map, 
     if (result.observed != ObservedMotion::kPanorama) Remember(image, map, pose);
     if (result.inliers == 0 && choice == KeyFrameChoice::kNone) return OfferLastLocalized(image.time, map);
   }
-  if (choice == KeyFrameChoice::kNone || frames_since_keyframe_ < options_.frames_between_keyframes) return;
+  if (choice == KeyFrameChoice::kNone || IsTooEarly(map, result.inliers)) return;
   Offer(choice, image, &map, result.camera_from_map, pose.matches, pose.panorama);
+}
+
+// A camera that moves so fast that its points leave the image cannot wait long: the next keyframe then
+// follows as soon as the map has the last one, without whose points it would be chosen as if that one did not
+// exist.
+bool KeyFrameOffers::IsTooEarly(const MapSnapshot& map, int inliers) const {
+  if (frames_since_keyframe_ >= options_.frames_between_keyframes) return false;
+  return !accepted_ || inliers >= options_.min_kept_ratio * accepted_->inliers ||
+         std::none_of(map.keyframes.rbegin(), map.keyframes.rend(),
+                      [&](const KeyFrame& keyframe) { return keyframe.time == accepted_->time; });
 }
 
 void KeyFrameOffers::Remember(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose) {
@@ -118,7 +129,8 @@ void KeyFrameOffers::Offer(KeyFrameChoice choice, const CameraImage& image, cons
 }
 
 std::optional<KeyFrameCandidate> KeyFrameOffers::Take() {
-  if (candidate_) taken_ = Taken{candidate_->choice, candidate_->time};
+  if (candidate_)
+    taken_ = Taken{candidate_->choice, candidate_->time, static_cast<int>(candidate_->matches.size())};
   return std::exchange(candidate_, std::nullopt);
 }
 
@@ -126,7 +138,8 @@ std::optional<Timestamp> KeyFrameOffers::Accept() {
   if (!taken_) return std::nullopt;
   frames_since_keyframe_ = 0;
   policy_.Accepted(taken_->choice, taken_->time);
-  return std::exchange(taken_, std::nullopt)->time;
+  accepted_ = std::exchange(taken_, std::nullopt);
+  return accepted_->time;
 }
 
 }  // namespace docent::engine

@@ -55,6 +55,7 @@ class KeyFrameOffers {
   struct Taken {
     KeyFrameChoice choice = KeyFrameChoice::kNone;
     Timestamp time{};
+    int inliers = 0;
   };
   // The last frame that had a position, with what an offer needs.
   struct Localized {
@@ -66,6 +67,7 @@ class KeyFrameOffers {
   };
   void Offer(KeyFrameChoice choice, const CameraImage& image, const MapSnapshot* map,
              const Rigid3& camera_from_map, const std::vector<PointMatch>& matches, PanoramaId panorama);
+  bool IsTooEarly(const MapSnapshot& map, int inliers) const;
   void Remember(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose);
   void OfferLastLocalized(Timestamp now, const MapSnapshot& map);
 
@@ -74,7 +76,8 @@ class KeyFrameOffers {
   std::optional<KeyFrameCandidate> candidate_;
   std::optional<Taken> taken_;  // what the mapper may still accept
   int frames_since_keyframe_ = 0;
-  Localized localized_;  // no image if there was none; its memory is used again
+  std::optional<Taken> accepted_;  // the last keyframe that the mapper accepted for this map
+  Localized localized_;            // no image if there was none; its memory is used again
 };
 
 }  // namespace docent::engine

@@ -75,6 +75,29 @@ TEST_F(SidewaysStep, IsOfferedAgainInTheNextFrameWhenItWasRefused) {
   EXPECT_TRUE(Offers(&offers, true));
 }
 
+TEST_F(SidewaysStep, IsOfferedAsSoonAsTheLastKeyframeIsInTheMapWhenPointsLeaveTheImage) {
+  const auto offers_after_a_keyframe = [this](int inliers, bool in_map) {
+    KeyFrameOffers offers({}, *Camera());
+    MapSnapshot map = map_;
+    matches_.assign(300, {.inlier = true});
+    result_.inliers = result_.finite_inliers = 300;
+    int frames = 0;
+    while (frames < 10 && !Offers(&offers, true)) ++frames;
+    EXPECT_LT(frames, 10);
+    KeyFrame last = map_.keyframes.back();
+    last.id += 1;
+    last.time = image_.time;
+    if (in_map) map_.keyframes.push_back(last);
+    result_.inliers = result_.finite_inliers = inliers;
+    const bool offered = Offers(&offers, true);
+    map_ = map;
+    return offered;
+  };
+  EXPECT_TRUE(offers_after_a_keyframe(250, true));
+  EXPECT_FALSE(offers_after_a_keyframe(250, false)) << "the map lacks the last keyframe";
+  EXPECT_FALSE(offers_after_a_keyframe(290, true)) << "hardly any point has left the image";
+}
+
 TEST_F(SidewaysStep, OpensNoPanoramaMapWhenItsKeyFrameIsRefused) {
   result_.finite_coverage = result_.coverage = 0.3;
   result_.inliers = result_.finite_inliers = 40;  // the camera is about to leave the map
