@@ -16,10 +16,7 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
                     "docent author --library museum.docent --camera /dev/video0 --calibration camera.yaml\n"
                     "  docent author --library room.docent --camera sim:hand --camera sim:shoulder");
   const auto options = std::make_shared<AuthorOptions>();
-  command
-      ->add_option("--library", options->library,
-                   "The library's file, NAME.docent; created if it does not exist")
-      ->required();
+  AddLibraryOption(command, LibraryUse::kAuthor, &options->library, invocation);
   AddRunArguments(command,
                   "estimate the calibration while maps are built, and store it in the library under the "
                   "camera's name",
@@ -50,6 +47,7 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
   AddWhenLostOption(command, &options->when_lost, "new without a window, otherwise wait");
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
+    options->hub = HubOfSession(options->hub, *invocation);
     if (options->target.has_value() != (options->target_width_m > 0))
       throw CLI::ValidationError("--target", "--target and --target-width must be given together");
     if (!(options->ui_scale >= 0.5 && options->ui_scale <= 4))

@@ -281,7 +281,7 @@ void AddContentAddCommand(CLI::App* group, Invocation* invocation) {
   add->alias("import");
   const std::vector<CLI::Option*> kinds = AddKindOptions(add, options.get());
   add->add_option("--map", options->map, "The map that it is added to")->required();
-  add->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+  AddLibraryOption(add, LibraryUse::kChange, &options->library, invocation);
   add->add_option("--name", options->name,
                   "Its name; by default made from the file, or sign-1, label-1, trail-1, occluder-1, ...");
   AddPoseOptions(add, options.get(), kinds);

@@ -143,7 +143,7 @@ void AddContentCommand(CLI::App* program, Invocation* invocation) {
 
   CLI::App* list = AddSubcommand(group, "list", "List what is placed",
                                  "docent content list --library museum.docent --map \"Desk 3\"");
-  list->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+  AddLibraryOption(list, LibraryUse::kRead, &options->library, invocation);
   list->add_option("--map", options->map, "Only the content of this map");
   list->add_flag("--json", options->as_json, "Print JSON");
   list->callback([=] { invocation->run = [=] { List(*options); }; });
@@ -155,7 +155,7 @@ void AddContentCommand(CLI::App* program, Invocation* invocation) {
                                    "docent content remove helmet --map \"Desk 3\" --library museum.docent");
   remove->add_option("NAME", options->names, "Names of what is removed")->required();
   remove->add_option("--map", options->map, "The map that contains it")->required();
-  remove->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+  AddLibraryOption(remove, LibraryUse::kChange, &options->library, invocation);
   remove->callback([=] { invocation->run = [=] { Remove(*options); }; });
 }
 

@@ -287,7 +287,7 @@ void AddContentEditCommand(CLI::App* group, Invocation* invocation) {
       "--library museum.docent");
   edit->add_option("NAME", options->names, "Names of what is changed")->required();
   edit->add_option("--map", options->map, "The map that contains them")->required();
-  edit->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+  AddLibraryOption(edit, LibraryUse::kChange, &options->library, invocation);
   AddPoseOptions(edit, options.get());
   AddPropertyOptions(edit, options.get());
   edit->callback([=] { invocation->run = [=] { RunEdit(*options); }; });

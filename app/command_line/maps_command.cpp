@@ -246,9 +246,10 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
                                   "docent maps list --library museum.docent");
   group->require_subcommand(1);
   const auto options = std::make_shared<MapsOptions>();
-  const auto add = [&](const char* name, const char* description, const char* example, MapsAction action) {
+  const auto add = [&](const char* name, LibraryUse use, const char* description, const char* example,
+                       MapsAction action) {
     CLI::App* command = AddSubcommand(group, name, description, example);
-    command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+    AddLibraryOption(command, use, &options->library, invocation);
     command->callback([=] {
       invocation->run = [=] {
         options->verbosity = invocation->verbosity;
@@ -265,21 +266,22 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
     command->add_flag("--json", options->as_json, "Print JSON");
   };
 
-  add_json(add("list", "List the maps", "docent maps list --library museum.docent --json", List));
-  add_json(
-      add_name(add("show", "Show one map", "docent maps show \"Desk 3\" --library museum.docent", Show)));
-  add("verify", "Read the whole library and report damage", "docent maps verify --library museum.docent",
-      Verify);
-  add_name(
-      add("rename", "Rename a map", "docent maps rename \"Desk 3\" Kiosk --library museum.docent", Rename))
+  add_json(add("list", LibraryUse::kRead, "List the maps", "docent maps list --library museum.docent --json",
+               List));
+  add_json(add_name(add("show", LibraryUse::kRead, "Show one map",
+                        "docent maps show \"Desk 3\" --library museum.docent", Show)));
+  add("verify", LibraryUse::kRead, "Read the whole library and report damage",
+      "docent maps verify --library museum.docent", Verify);
+  add_name(add("rename", LibraryUse::kChange, "Rename a map",
+               "docent maps rename \"Desk 3\" Kiosk --library museum.docent", Rename))
       ->add_option("NEW_NAME", options->new_name, "New name of the map")
       ->required();
-  add_name(add("remove", "Remove a map and its content", "docent maps remove Kiosk --library museum.docent",
-               Remove))
+  add_name(add("remove", LibraryUse::kChange, "Remove a map and its content",
+               "docent maps remove Kiosk --library museum.docent", Remove))
       ->add_flag("--force", options->force,
                  "Also if signposts lead to it, which then lead nowhere, or tours stop at it, "
                  "which then leave it out");
-  add_name(add("policy", "Set what may be changed in a map",
+  add_name(add("policy", LibraryUse::kChange, "Set what may be changed in a map",
                "docent maps policy Kiosk read-only --library museum.docent", SetMapPolicy))
       ->add_option("POLICY", options->policy, "open, bounded, augment-only or read-only")
       ->required()

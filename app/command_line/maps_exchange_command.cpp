@@ -301,15 +301,16 @@ void Recover(const ExchangeOptions& options, Verbosity verbosity) {
 
 void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
   const auto options = std::make_shared<ExchangeOptions>();
-  const auto add = [&](const char* name, const char* description, const char* example,
+  const auto add = [&](const char* name, LibraryUse use, const char* description, const char* example,
                        ExchangeAction action) {
     CLI::App* command = AddSubcommand(group, name, description, example);
-    command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+    AddLibraryOption(command, use, &options->library, invocation);
     command->callback([=] { invocation->run = [=] { action(*options, invocation->verbosity); }; });
     return command;
   };
   CLI::App* command =
-      add("export", "Export one map as a library, a COLMAP model, a PLY point cloud or an image from above",
+      add("export", LibraryUse::kRead,
+          "Export one map as a library, a COLMAP model, a PLY point cloud or an image from above",
           "docent maps export \"Desk 3\" --library museum.docent --output desk.docent", Export);
   command->add_option("NAME", options->name, "Name of the map")->required();
   command->add_flag(
@@ -320,27 +321,28 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
                    "A .docent library, a .ply point cloud, a .png image from above, or a folder for COLMAP's "
                    "text model")
       ->required();
-  add("import", "Add the maps and tours of another library; duplicate names get a number",
+  add("import", LibraryUse::kChange,
+      "Add the maps and tours of another library; duplicate names get a number",
       "docent maps import desk.docent --library museum.docent", Import)
       ->add_option("FILE", options->from, "The other library")
       ->required();
-  add("optimize", "Improve maps and remove redundant data", "docent maps optimize --library museum.docent",
-      Optimize)
+  add("optimize", LibraryUse::kChange, "Improve maps and remove redundant data",
+      "docent maps optimize --library museum.docent", Optimize)
       ->add_option("NAME", options->name, "Name of the map; without it, all maps");
-  add("densify",
+  add("densify", LibraryUse::kChange,
       "Compute the surfaces of maps, behind which content is hidden; maps that have them already are left "
       "out",
       "docent maps densify --library museum.docent", Densify)
       ->add_option("NAME", options->name, "Name of the map; without it, all maps");
   CLI::App* join = add(
-      "join",
+      "join", LibraryUse::kChange,
       "Join two overlapping maps; the first keeps its name and coordinates, the second is removed, and the "
       "stricter policy applies",
       "docent maps join \"East wing\" \"West wing\" --library museum.docent", Join);
   join->add_option("NAME", options->name, "Name of the map that the other is joined into")->required();
   join->add_option("OTHER", options->other_name, "Name of the map that is joined into it and removed")
       ->required();
-  add("recover", "Save the readable parts of a damaged library to a new one",
+  add("recover", LibraryUse::kRead, "Save the readable parts of a damaged library to a new one",
       "docent maps recover --library damaged.docent --output saved.docent", Recover)
       ->add_option("--output", options->output, "The new library")
       ->required();

@@ -183,10 +183,10 @@ void AddMapsTourCommands(CLI::App* group, Invocation* invocation) {
                                  "docent maps tour list --library museum.docent");
   tour->require_subcommand(1);
   const auto options = std::make_shared<MapsTourOptions>();
-  const auto add = [&](const char* name, const char* description, const char* example,
+  const auto add = [&](const char* name, LibraryUse use, const char* description, const char* example,
                        MapsTourAction action) {
     CLI::App* command = AddSubcommand(tour, name, description, example);
-    command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+    AddLibraryOption(command, use, &options->library, invocation);
     command->callback([=] { invocation->run = [=] { action(*options); }; });
     return command;
   };
@@ -198,16 +198,17 @@ void AddMapsTourCommands(CLI::App* group, Invocation* invocation) {
     command->add_flag("--json", options->as_json, "Print JSON");
   };
 
-  add_json(add("list", "List the tours", "docent maps tour list --library museum.docent", ListTours));
-  add_json(add_name(add("show", "Show one tour with its stops",
+  add_json(add("list", LibraryUse::kRead, "List the tours", "docent maps tour list --library museum.docent",
+               ListTours));
+  add_json(add_name(add("show", LibraryUse::kRead, "Show one tour with its stops",
                         "docent maps tour show Highlights --library museum.docent", ShowTour)));
   CLI::App* create = add_name(add(
-      "create", "Create a tour",
+      "create", LibraryUse::kChange, "Create a tour",
       "docent maps tour create Highlights --stops Elephants \"Desk 3\" --minutes 20 --library museum.docent",
       CreateTour));
   AddTourContents(create, options.get())->required();
   CLI::App* edit = add_name(
-      add("edit", "Change the stops, the language or the minutes of a tour",
+      add("edit", LibraryUse::kChange, "Change the stops, the language or the minutes of a tour",
           "docent maps tour edit Highlights --stops \"Desk 3\" Elephants Foxes --library museum.docent",
           EditTour));
   AddTourContents(edit, options.get());
@@ -217,11 +218,11 @@ void AddMapsTourCommands(CLI::App* group, Invocation* invocation) {
   edit->add_flag_callback(
           "--no-minutes", [=] { options->minutes = 0; }, "Do not say how long the tour takes")
       ->excludes("--minutes");
-  add_name(add("rename", "Rename a tour",
+  add_name(add("rename", LibraryUse::kChange, "Rename a tour",
                "docent maps tour rename Highlights Masterpieces --library museum.docent", RenameTour))
       ->add_option("NEW_NAME", options->new_name, "New name of the tour")
       ->required();
-  add_name(add("remove", "Remove a tour; its maps stay",
+  add_name(add("remove", LibraryUse::kChange, "Remove a tour; its maps stay",
                "docent maps tour remove Highlights --library museum.docent", RemoveTour));
 }
 

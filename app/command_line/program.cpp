@@ -145,7 +145,8 @@ int RunProgram(int argc, const char* const* argv) {
   }
   invocation.verbosity = quiet ? Verbosity::kQuiet : verbose ? Verbosity::kVerbose : Verbosity::kNormal;
   SetUpLog(invocation.verbosity);
-  return RunGuarded(invocation.run);
+  if (!invocation.hub_library) return RunGuarded(invocation.run);
+  return RunGuarded([&] { RunWithHubLibrary(*invocation.hub_library, invocation.run); });
 }
 
 }  // namespace docent::app

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 
+#include "app/command_line/hub_library.h"
 #include "app/command_line/options.h"
 
 namespace CLI {
@@ -18,7 +20,8 @@ namespace docent::app {
 
 struct Invocation {
   Verbosity verbosity = Verbosity::kNormal;
-  std::function<void()> run;  // Set by the selected subcommand; throws docent::Error.
+  std::function<void()> run;              // Set by the selected subcommand; throws docent::Error.
+  std::optional<HubLibrary> hub_library;  // The library, when it is given by the address of a hub.
 };
 
 // What the exit status of the program means; docs/guide.md has the same table.

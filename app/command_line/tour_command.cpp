@@ -15,7 +15,7 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
       AddSubcommand(program, "tour", "Tour saved maps (read-only)",
                     "docent tour --library museum.docent --camera /dev/video0 --calibration camera.yaml");
   const auto options = std::make_shared<TourOptions>();
-  command->add_option("--library", options->library, "The library's file, NAME.docent")->required();
+  AddLibraryOption(command, LibraryUse::kRead, &options->library, invocation);
   command
       ->add_option("--tour", options->tour,
                    "Lead the visitor along this tour, which docent maps tour create has stored")
@@ -71,6 +71,7 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
                   &options->run);
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
+    options->hub = HubOfSession(options->hub, *invocation);
     if (options->glasses != options->display.has_value())
       throw CLI::ValidationError("--display", "goes together with --view glasses");
     if (options->glasses && options->run.headless)
