@@ -137,9 +137,11 @@ std::string HubOfSession(const std::string& hub, const Invocation& invocation) {
 void RunWithHubLibrary(const HubLibrary& library, const std::function<void()>& run) {
   const std::string checked = maps::CheckedHubAddress(library.address);  // Throws before anything is made.
   std::error_code error;
-  fs::create_directories(library.copy.parent_path(), error);
+  const fs::path folder = library.copy.parent_path();
+  // The copies contain images of what cameras saw.
+  if (fs::create_directories(folder, error)) fs::permissions(folder, fs::perms::owner_all, error);
   if (error)
-    throw Error("The folder '" + library.copy.parent_path().string() +
+    throw Error("The folder '" + folder.string() +
                 "' for the copy of the hub cannot be made: " + error.message() + ".");
   if (library.use == LibraryUse::kAuthor) return run();
   Refresh(library);

@@ -16,7 +16,6 @@ using app::Outcome;
 using app::RunDocent;
 using testing::AllOf;
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::Not;
 
 class HubLibrary : public WithHubServer {
@@ -99,6 +98,9 @@ TEST_F(HubLibrary, WorksWithoutNetworkAndDeliversLater) {
   Succeed(Url(), {"maps", "import", Samples()});
   UseDevice("second");
   ASSERT_THAT(Succeed(Url(), {"maps", "list"}), HasSubstr("Desk"));
+  EXPECT_EQ(std::filesystem::status(folder_ / "second" / "docent" / "hubs").permissions(),
+            std::filesystem::perms::owner_all)
+      << "others may not see the images";
   server().Stop();
   const Outcome read = On(Url(), {"maps", "list"});
   const Outcome changed = On(Url(), {"maps", "rename", "Desk", "Table"});
