@@ -8,6 +8,7 @@
 
 #include "content/placement.h"
 #include "ui/axes.h"
+#include "ui/degradation_shader.h"
 #include "ui/label_board.h"
 #include "ui/room_shaders.h"
 #include "ui/shaders.h"
@@ -56,6 +57,25 @@ void AddDepths(const Box& box, const PinholeView& view, MeshDrawer::DepthRange* 
     range->Include(static_cast<double>(-(eye_from_map * glm::vec4(box.Corner(i), 1.0f)).z), 0);
 }
 
+// Adds the pixels into which motion blur spreads what is in this rectangle.
+void Widen(const glm::mat3x2& motion, double scale, const engine::CameraModel& camera,
+           PixelRectangle* region) {
+  float longest = 0;
+  for (const int x : {0, camera.width_px()}) {
+    for (const int y : {0, camera.height_px()}) {
+      const glm::vec3 place(static_cast<double>(x) / scale, static_cast<double>(y) / scale, 1);
+      longest = std::max(longest, glm::length(motion * place));
+    }
+  }
+  if (longest * scale < 1) return;
+  const int margin = std::min(camera.width_px(), 1 + static_cast<int>(0.5 * scale * longest));
+  const int left = std::max(0, region->x - margin), top = std::max(0, region->y - margin);
+  region->width = std::min(camera.width_px(), region->x + region->width + margin) - left;
+  region->height = std::min(camera.height_px(), region->y + region->height + margin) - top;
+  region->x = left;
+  region->y = top;
+}
+
 // Where an entity stands, if it casts a shadow.
 void SetStanding(const content::Entity& entity, ModelInstance* instance) {
   using Kind = content::Entity::Kind;
@@ -72,8 +92,8 @@ void SetStanding(const content::Entity& entity, ModelInstance* instance) {
 ContentLayer::ContentLayer(int samples, int max_texture_px, const std::string& language)
     : samples_(samples),
       mesh_drawer_(max_texture_px),
-      warp_program_("lens warp", kFullScreenVertexShader, kWarpFragmentShader),
-      room_warp_program_("lens warp in the room", kFullScreenVertexShader, kRoomWarpFragmentShader),
+      warp_program_("lens warp", kFullScreenVertexShader, WarpFragmentShader()),
+      room_warp_program_("lens warp in the room", kFullScreenVertexShader, RoomWarpFragmentShader()),
       shapes_(language) {
   warp_program_.AssignTextureUnits({"lookup", "atlas"});
   room_warp_program_.AssignTextureUnits(
@@ -120,12 +140,13 @@ void ContentLayer::Composite(const engine::CameraModel& camera, const engine::Ri
   if (with_room) DrawRoom(passes, range, with_shadows, &lens);
   std::vector<PixelRectangle> drawn;
   for (const Pass& pass : passes) drawn.push_back(pass.all);
-  const PixelRectangle region = ImageFromAtlas(lens.warp, lens.camera, drawn);
+  PixelRectangle region = ImageFromAtlas(lens.warp, lens.camera, drawn);
   if (region.empty()) return;
+  Widen(what.degradation.motion, what.camera_pixel, lens.camera, &region);
 
   image.BindForDrawing();
   if (with_room) {
-    BindForComposite(lens, range, opacity, with_shadows, what.video);
+    BindForComposite(lens, range, opacity, with_shadows, what);
   } else {
     warp_program_.Use();
     glUniform1f(warp_program_.Uniform("opacity"), static_cast<float>(opacity));
@@ -133,6 +154,7 @@ void ContentLayer::Composite(const engine::CameraModel& camera, const engine::Ri
     glBindTexture(GL_TEXTURE_2D, lens.lookup.name());
     glActiveTexture(GL_TEXTURE1);
     glBindTexture(GL_TEXTURE_2D, lens.atlas->texture());
+    SetDegradation(warp_program_, what.degradation, what.camera_pixel);
   }
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
@@ -145,7 +167,7 @@ void ContentLayer::Composite(const engine::CameraModel& camera, const engine::Ri
 }
 
 void ContentLayer::BindForComposite(const Lens& lens, const MeshDrawer::DepthRange& range, double opacity,
-                                    bool with_shadows, GLuint video) {
+                                    bool with_shadows, const What& what) {
   const GlProgram& program = room_warp_program_;
   program.Use();
   glUniform1f(program.Uniform("opacity"), static_cast<float>(opacity));
@@ -154,12 +176,13 @@ void ContentLayer::BindForComposite(const Lens& lens, const MeshDrawer::DepthRan
   glUniform1f(program.Uniform("depth_bias"), kDepthBias);
   glUniform2f(program.Uniform("depth_range"), static_cast<float>(range.near_m()),
               static_cast<float>(range.far_m()));
+  SetDegradation(program, what.degradation, what.camera_pixel);
   const GLuint textures[] = {lens.lookup.name(),
                              lens.atlas->texture(),
                              lens.room->content_depth.texture(),
                              lens.room->surface_depth.texture(),
                              lens.room->shadow.texture(),
-                             video};
+                             what.video};
   GLenum unit = GL_TEXTURE0;
   for (const GLuint texture : textures) {
     glActiveTexture(unit++);

@@ -13,6 +13,7 @@
 #include "ui/entity_shapes.h"
 #include "ui/gl_objects.h"
 #include "ui/hiding_surfaces.h"
+#include "ui/image_degradation.h"
 #include "ui/lens_warp.h"
 #include "ui/mesh_drawer.h"
 #include "ui/room_shadows.h"
@@ -43,6 +44,8 @@ class ContentLayer {
     ModelLight light = {};  // On models.
     bool shadows = true;    // Models and signposts cast them on the room.
     GLuint video = 0;       // The image that is drawn over, as a texture of any size; 0: none.
+    ImageDegradation degradation = {};
+    double camera_pixel = 1;  // The size of a pixel of the camera in the image, in pixels.
   };
   // Composites the scene over the contents of `image`, an image target of the camera's size whose row 0 is
   // the top. Pixels that no content covers keep their exact values. Labels are not drawn (see label_board.h).
@@ -94,7 +97,7 @@ class ContentLayer {
                  const std::vector<ModelInstance>& instances, double opacity, const What& what,
                  const RenderTarget& image);
   void BindForComposite(const Lens& lens, const MeshDrawer::DepthRange& range, double opacity,
-                        bool with_shadows, GLuint video);
+                        bool with_shadows, const What& what);
 
   int samples_;
   MeshDrawer mesh_drawer_;

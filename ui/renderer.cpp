@@ -11,6 +11,7 @@
 #include "ui/content_layer.h"
 #include "ui/figures.h"
 #include "ui/heads_up.h"
+#include "ui/image_degradation.h"
 #include "ui/image_target.h"
 #include "ui/label_board.h"
 #include "ui/letterbox.h"
@@ -171,6 +172,7 @@ struct Renderer::Impl {
   CardModel card_model;
   GLuint card_texture = 0;
   VideoExposure exposure;
+  DegradationEstimator degradation;
   Canvas canvas;
   Canvas window_canvas;
 };
@@ -207,6 +209,12 @@ void Renderer::Draw(const View& view) {
     what.occluders = view.occluders;
     what.light.room = view.light;
     if (view.follows_exposure) what.light.exposure = impl_->exposure.Update(tracked);
+    if (view.follows_degradation && view.shows_video) {
+      what.degradation = impl_->degradation.Update(tracked);
+      what.degradation.shading = static_cast<float>(impl_->exposure.shading());
+      what.degradation.shading_reference = static_cast<float>(impl_->exposure.shading_reference());
+      what.camera_pixel = impl_->scale;
+    }
     what.shadows = view.shadows;
     if (!image.empty() && view.shows_video) what.video = impl_->image.video();
     impl_->content.Draw(impl_->DrawnCamera(*view.camera, width_px, height_px), *drawn_from, *view.scene, what,

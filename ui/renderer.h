@@ -135,6 +135,8 @@ struct View {
   const engine::LightEstimate* light = nullptr;
   bool shadows = true;           // Models and signposts cast them on the room.
   bool follows_exposure = true;  // Models are as bright as the video is exposed.
+  // Content has the noise and motion blur of the video and, with its exposure, the shading of the lens.
+  bool follows_degradation = true;
   // Whether the occluders of the scene hide content behind them. Surfaces that they stand for then do not.
   bool occluders = true;
   // Names of hidden entities that are drawn all the same, faintly, because an author has selected them.

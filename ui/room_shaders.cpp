@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ui/room_shaders.h"
 
+#include "ui/degradation_shader.h"
+
 namespace docent::ui {
 namespace {
 
@@ -124,8 +126,11 @@ void main() {
 // pixel, weighted by how much the video there looks like the pixel (a joint bilateral filter; Kopf et al.
 // 2007): the edge of a surface comes to lie on the edge in the image, and is soft. Only pixels with an edge
 // around them are filtered. Unknown depth, 1, hides nothing.
-const char* const kRoomWarpFragmentShader = R"glsl(#version 330 core
+std::string RoomWarpFragmentShader() {
+  return R"glsl(#version 330 core
 uniform sampler2D lookup, atlas, content_depth, surface_depth, shadow, video;
+)glsl" + DegradationFunctions() +
+         R"glsl(
 uniform float opacity;
 uniform bool has_surfaces, has_shadows;
 uniform vec2 depth_range;  // Nearest and farthest distance along the axis.
@@ -189,10 +194,11 @@ void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec2 place = texelFetch(lookup, pixel, 0).rg;
   if (place.x < 0.0) discard;
-  color = textureLod(atlas, place, 0.0);
+  vec2 content_place;
+  color = BlurredContent(pixel, content_place);
   if (color != vec4(0.0) && has_surfaces)
-    color *= 1.0 - Hidden(pixel, ivec2(place * vec2(textureSize(atlas, 0))));
-  color *= opacity;
+    color *= 1.0 - Hidden(pixel, ivec2(content_place * vec2(textureSize(atlas, 0))));
+  color = opacity * Degraded(color, pixel);
   if (has_shadows) {
     // The video is encoded; light is taken from it by the power law that is closest to the encoding.
     float left = pow(1.0 - opacity * textureLod(shadow, place, 0.0).r, 1.0 / 2.2);
@@ -201,5 +207,6 @@ void main() {
   if (color == vec4(0.0)) discard;
 }
 )glsl";
+}
 
 }  // namespace docent::ui

@@ -12,7 +12,8 @@ extern const char* const kPlaneVertexShader;
 // no surface is known.
 std::string ShadowOnSurfacesShader();
 std::string ShadowOnPlaneShader();
-// The lens warp of content that surfaces hide and that casts shadows.
-extern const char* const kRoomWarpFragmentShader;
+// The lens warp of content that surfaces hide and that casts shadows, with the functions of
+// degradation_shader.h.
+std::string RoomWarpFragmentShader();
 
 }  // namespace docent::ui

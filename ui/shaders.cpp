@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ui/shaders.h"
 
+#include "ui/degradation_shader.h"
+
 namespace docent::ui {
 
 const char* const kFullScreenVertexShader = R"glsl(#version 330 core
@@ -26,18 +28,23 @@ void main() {
 }
 )glsl";
 
-const char* const kWarpFragmentShader = R"glsl(#version 330 core
+std::string WarpFragmentShader() {
+  return R"glsl(#version 330 core
 uniform sampler2D lookup;
 uniform sampler2D atlas;
 uniform float opacity;
 out vec4 color;
+)glsl" + DegradationFunctions() +
+         R"glsl(
 void main() {
-  vec2 place = texelFetch(lookup, ivec2(gl_FragCoord.xy), 0).rg;
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec2 place = texelFetch(lookup, pixel, 0).rg, content_place;
   if (place.x < 0.0) discard;
-  color = opacity * textureLod(atlas, place, 0.0);
+  color = opacity * Degraded(BlurredContent(pixel, content_place), pixel);
   if (color == vec4(0.0)) discard;  // A clear surface only adds its reflection.
 }
 )glsl";
+}
 
 const char* const kMeshVertexShader = R"glsl(#version 330 core
 layout(location = 0) in vec3 position;

@@ -206,9 +206,8 @@ void AddOcclusionOption(CLI::App* command, Occlusion* occlusion) {
 void AddLightOption(CLI::App* command, bool* room_light) {
   AddChoice<bool>(command, "--light", room_light,
                   "The light on models: that of the room, as far as its surfaces show it, with shadows on "
-                  "the room and the "
-                  "exposure of the video (room; default), or always the same without shadows, which is drawn "
-                  "faster (plain)",
+                  "the room and the exposure, noise and motion blur of the video (room; default), or always "
+                  "the same without shadows, noise and blur, which is drawn faster (plain)",
                   {{"room", true}, {"plain", false}});
 }
 

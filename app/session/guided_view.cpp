@@ -30,7 +30,7 @@ ui::View ViewOf(const ShownFrame& frame, const engine::CameraModel& camera) {
   view.surfaces = frame.shown.surfaces;
   view.occluders = frame.shown.occluders;
   view.light = frame.shown.light.get();
-  view.shadows = view.follows_exposure = frame.shown.room_light;
+  view.shadows = view.follows_exposure = view.follows_degradation = frame.shown.room_light;
   view.animation_seconds = frame.seconds;
   view.animation_starts = frame.animation_starts.get();
   view.overlay.map_name = frame.shown.map_name;

@@ -101,6 +101,7 @@ inline cv::Mat DrawImage(Renderer* renderer, const engine::TrackedFrame& tracked
   view.camera = &camera;
   view.scene = &scene;
   view.overlay.hud = false;
+  view.follows_degradation = false;  // Videos of noise would give content the same noise.
   renderer->Draw(view);
   cv::Mat image;
   renderer->ReadBack(&image);

@@ -110,5 +110,41 @@ TEST_F(VideoExposureTest, SmoothsSmallChanges) {
   EXPECT_NEAR(exposure_.Update(&second).g, 1.1, 0.03);
 }
 
+// The keyframe has been taken without shading; the points are elsewhere in the images.
+TEST_F(VideoExposureTest, FollowsTheShadingOfTheLens) {
+  constexpr double kCorner = -0.7;  // Logarithm of the light that is left in the corners.
+  const cv::Mat plain(gray_.size(), CV_8UC1, cv::Scalar(110));
+  map_->keyframes[0].features = engine::MakeFeatures(plain);
+  cv::Mat shaded(plain.size(), CV_8UC3);
+  const double middle_x = 0.5 * (plain.cols - 1), middle_y = 0.5 * (plain.rows - 1);
+  for (int y = 0; y < plain.rows; ++y) {
+    for (int x = 0; x < plain.cols; ++x) {
+      const double radius2 = ((x - middle_x) * (x - middle_x) + (y - middle_y) * (y - middle_y)) /
+                             (middle_x * middle_x + middle_y * middle_y);
+      const double linear = std::exp(kCorner * radius2) * engine::LinearFromLevel(110);
+      shaded.at<cv::Vec3b>(y, x) =
+          cv::Vec3b::all(cv::saturate_cast<std::uint8_t>(255 * (1.055 * std::pow(linear, 1 / 2.4) - 0.055)));
+    }
+  }
+  engine::TrackedFrame tracked = FrameWith(cv::Vec3d::all(1));
+  tracked.frame.image = shaded;
+  for (int frame = 0; frame < 60; ++frame) {
+    for (std::size_t i = 0; i < tracked.matches.size(); ++i) {
+      const Eigen::Vector2f source = map_->points[i].source_pixel;
+      tracked.matches[i].pixel = source + Eigen::Vector2f(static_cast<float>(frame), 0);
+    }
+    exposure_.Update(&tracked);
+  }
+  EXPECT_NEAR(exposure_.shading(), kCorner, 0.15);
+  EXPECT_GT(exposure_.shading_reference(), 0.1);
+  EXPECT_LT(exposure_.shading_reference(), 0.6);
+}
+
+TEST_F(VideoExposureTest, ImagesWithoutShadingHaveNone) {
+  const engine::TrackedFrame tracked = FrameWith(cv::Vec3d::all(0.8));
+  for (int i = 0; i < 30; ++i) exposure_.Update(&tracked);
+  EXPECT_NEAR(exposure_.shading(), 0, 0.02);
+}
+
 }  // namespace
 }  // namespace docent::ui
