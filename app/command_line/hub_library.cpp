@@ -51,12 +51,8 @@ fs::path CopyOf(const std::string& address) {
   return FolderOfCopies() / (name + "-" + maps::HashOf(address).substr(0, kHashDigits) + ".docent");
 }
 
-maps::SyncOptions SyncOptionsOf(const HubLibrary& library) {
-  maps::SyncOptions options;
-  options.hub = library.address;
-  options.library = library.copy;
-  options.scenes = LibrarySceneTools();
-  options.merge = LibrarySceneMerger();
+maps::SyncOptions SyncOptionsOfCopy(const HubLibrary& library) {
+  maps::SyncOptions options = SyncOptionsOf(library.address, library.copy);
   // The copy holds nothing but the hub's maps, so that what was removed from it was removed by this user.
   options.remove = true;
   options.is_stopped = [] { return Interruption::requested(); };
@@ -75,7 +71,7 @@ void Refresh(const HubLibrary& library) {
     // The hub would refuse the change only after it was made in the copy.
     if (library.use == LibraryUse::kChange && maps::StatusOf(library.address, 0).role == "visitor")
       throw Error("A visitor of the hub may read its library and not change it.");
-    const maps::SyncReport report = maps::Pull(SyncOptionsOf(library));
+    const maps::SyncReport report = maps::Pull(SyncOptionsOfCopy(library));
     for (const std::string& line : report.lines)
       spdlog::log(report.problems > 0 ? spdlog::level::warn : spdlog::level::info, "{}", OneLine(line));
   } catch (const maps::HubUnreachable& unreachable) {
@@ -88,7 +84,7 @@ void Refresh(const HubLibrary& library) {
 void Deliver(const HubLibrary& library) {
   const Interruption interruption;
   try {
-    const maps::SyncReport report = maps::Push(SyncOptionsOf(library));
+    const maps::SyncReport report = maps::Push(SyncOptionsOfCopy(library));
     for (const std::string& line : report.lines)
       spdlog::log(report.problems > 0 ? spdlog::level::warn : spdlog::level::info, "{}", OneLine(line));
     if (report.problems > 0)

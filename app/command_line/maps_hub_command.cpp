@@ -16,15 +16,13 @@ namespace docent::app {
 namespace {
 
 struct MapsHubOptions {
-  maps::SyncOptions sync;
-  double limit_kB_per_s = 0;  // Of the transfer; 0 for none.
+  maps::SyncOptions sync = SyncOptionsOf({}, {});  // The command line adds the hub and the library.
+  double limit_kB_per_s = 0;                       // Of the transfer; 0 for none.
 };
 using MapsHubAction = maps::SyncReport (*)(const maps::SyncOptions& options);
 
 void Exchange(MapsHubOptions options, MapsHubAction action, Verbosity verbosity) {
   const Interruption interruption;
-  options.sync.scenes = LibrarySceneTools();
-  options.sync.merge = LibrarySceneMerger();
   options.sync.bytes_per_second = static_cast<std::int64_t>(1000 * options.limit_kB_per_s);
   options.sync.is_stopped = [] { return Interruption::requested(); };
   const maps::SyncReport report = action(options.sync);

@@ -95,19 +95,9 @@ std::shared_ptr<const engine::PlanarTarget> ReadTarget(const std::filesystem::pa
   }
 }
 
-// What is exchanged with a hub.
-maps::SyncOptions HubOptionsOf(const std::string& hub, const std::filesystem::path& library) {
-  maps::SyncOptions options;
-  options.hub = hub;
-  options.library = library;
-  options.scenes = LibrarySceneTools();
-  options.merge = LibrarySceneMerger();
-  return options;
-}
-
 // What a tour follows. A device without a library gets it now; later the network may be gone.
 maps::SyncOptions FollowedHub(const TourOptions& options) {
-  maps::SyncOptions hub = HubOptionsOf(options.hub, options.library);
+  maps::SyncOptions hub = SyncOptionsOf(options.hub, options.library);
   std::error_code error;
   if (!std::filesystem::exists(options.library, error)) maps::Pull(hub);
   return hub;
@@ -116,7 +106,7 @@ maps::SyncOptions FollowedHub(const TourOptions& options) {
 // The hub of an author, whose library gets what others have changed, because nothing replaces its maps while
 // the session lasts.
 maps::SyncOptions PulledHub(const AuthorOptions& options) {
-  maps::SyncOptions hub = HubOptionsOf(options.hub, options.library);
+  maps::SyncOptions hub = SyncOptionsOf(options.hub, options.library);
   try {
     for (const std::string& line : maps::Pull(hub).lines) spdlog::info("{}", line);
   } catch (const maps::HubUnreachable& unreachable) {

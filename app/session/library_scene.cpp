@@ -171,6 +171,15 @@ maps::MergeScenes LibrarySceneMerger() {
   };
 }
 
+maps::SyncOptions SyncOptionsOf(const std::string& hub, const std::filesystem::path& library) {
+  maps::SyncOptions options;
+  options.hub = hub;
+  options.library = library;
+  options.scenes = LibrarySceneTools();
+  options.merge = LibrarySceneMerger();
+  return options;
+}
+
 maps::Library OpenLibrary(const std::filesystem::path& path, maps::Access access,
                           maps::CreateIfMissing create) {
   maps::LibraryOptions options;

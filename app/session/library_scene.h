@@ -41,6 +41,8 @@ content::EditHistory HistoryFromRecord(const maps::SceneRecord& record, const st
 maps::SceneTools LibrarySceneTools();
 // What a hub needs to merge scenes that two people have changed.
 maps::MergeScenes LibrarySceneMerger();
+// What exchanges a library with the hub at this address by these functions.
+maps::SyncOptions SyncOptionsOf(const std::string& hub, const std::filesystem::path& library);
 // Opens a library with these functions; throws as maps::Library::Open does.
 maps::Library OpenLibrary(const std::filesystem::path& path, maps::Access access,
                           maps::CreateIfMissing create = maps::CreateIfMissing::kNo);

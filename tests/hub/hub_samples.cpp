@@ -8,12 +8,7 @@
 namespace docent::maps {
 
 SyncOptions SampleSync(const std::string& hub, const std::filesystem::path& library) {
-  SyncOptions options;
-  options.hub = hub;
-  options.library = library;
-  options.scenes = app::LibrarySceneTools();
-  options.merge = app::LibrarySceneMerger();
-  return options;
+  return app::SyncOptionsOf(hub, library);
 }
 
 Library OpenSampleLibrary(const std::filesystem::path& file) {
