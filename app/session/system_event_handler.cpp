@@ -167,9 +167,11 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
 }
 
 void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::CalibrationMismatch& what) {
-  const std::string text = TextOf(what.mismatch);
-  state_.AddEvent(event.time, "warning", state_.CameraPrefix(event.camera) + text);
-  state_.cameras[event.camera].Advise(text);
+  state_.AddEvent(event.time, "warning", state_.CameraPrefix(event.camera) + TextOf(what.mismatch));
+  if (!options_.may_write) return;  // Visitors cannot help it.
+  state_.cameras[event.camera].Advise(
+      "The calibration does not fit the lens of this camera, so that maps become less accurate. Calibrate it "
+      "again with `docent calibrate`.");
 }
 
 void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::LensEstimated& what) {
