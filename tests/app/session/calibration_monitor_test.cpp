@@ -131,7 +131,8 @@ std::vector<std::string> WarningsWith(const CameraModel& assumed) {
       if (event.event != "warning" || event.detail.find("calibration") == std::string::npos) continue;
       warnings.push_back(event.detail);
       enough = frame.time + std::chrono::seconds(2);
-      EXPECT_EQ(session.ShownWith(tracked).advice, event.detail) << "must be shown on the screen too";
+      EXPECT_THAT(session.ShownWith(tracked).advice, testing::HasSubstr("docent calibrate"))
+          << "authors must read it on the screen";
     }
   }
   return warnings;
