@@ -39,7 +39,7 @@ struct SessionMap {
   // The mesh of its surfaces, behind which content is hidden; null while it is not known. It fits the
   // snapshot.
   std::shared_ptr<const engine::MapMesh> mesh;
-  // The light that its surfaces show; null while it is not known, and without a mesh.
+  // The light that its surfaces show; null without a mesh.
   std::shared_ptr<const engine::LightEstimate> light;
   // Revision for which a mesh was computed, whether there is one or not; 0 for none.
   std::uint64_t meshed_revision = 0;
@@ -74,7 +74,7 @@ struct SessionMap {
   bool NeedsSave() const { return snapshot && (snapshot != saved_snapshot || scene != saved_scene); }
 };
 
-// The light that the surfaces of a map show; null if it cannot be told. Takes a fraction of a second.
+// The light that the surfaces of a map show; null if none was seen. Takes a fraction of a second.
 std::shared_ptr<const engine::LightEstimate> LightOn(const engine::MapSnapshot& map,
                                                      const engine::MapMesh& mesh);
 

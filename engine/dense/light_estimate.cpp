@@ -10,6 +10,7 @@
 
 #include "engine/base/random.h"
 #include "engine/dense/surface_samples.h"
+#include "engine/map/upright_axes.h"
 
 namespace docent::engine {
 namespace {
@@ -157,6 +158,22 @@ void KeepPositive(Coefficients* shape) {
   if (darkest < kLeast) shape->tail<8>() *= (1 - kLeast) / (1 - darkest);
 }
 
+// Of a place of which only the brightness is known.
+LightEstimate LightFromAbove(const MapSnapshot& map, const std::vector<SurfaceSample>& samples,
+                             double more_from_above) {
+  LightEstimate light;
+  const UprightAxes axes = UprightAxesOf(map);
+  light.to_light = axes.up;
+  // Upright sides would all be alike, and the edge between two of them could not be seen. Without a reason
+  // for one side or the other, there is a little more light from the right of the first keyframe.
+  constexpr double kMoreFromTheRight = 0.1;
+  const Eigen::Vector3d slope = more_from_above * axes.up + kMoreFromTheRight * axes.right;
+  Coefficients shape = Coefficients::Unit(0);
+  shape.segment<3>(1) << slope.y(), slope.z(), slope.x();
+  light.brightness = White(samples, shape) * shape;
+  return light;
+}
+
 }  // namespace
 
 Coefficients SphericalHarmonics(const Eigen::Vector3d& d) {
@@ -181,12 +198,13 @@ std::optional<LightEstimate> EstimateLight(const MapSnapshot& map, const Surface
   if (!(side > 0)) return std::nullopt;
   const std::vector<SurfaceSample> samples =
       SampleSurfaces(map, mesh, options.samples, options.max_keyframes, options.max_width_px);
+  if (samples.size() < options.min_samples) return std::nullopt;
   const std::vector<Pair> pairs = PairsOf(samples, side, options);
-  if (pairs.size() < options.min_pairs) return std::nullopt;
+  if (pairs.size() < options.min_pairs) return LightFromAbove(map, samples, options.more_from_above);
   Coefficients shape = FromLogarithm(Fit(pairs, kAllParts));
   const Eigen::Vector3d direction = FirstOrder(shape);
   if (!(direction.norm() > 1e-3) || !IsCertain(pairs, direction, options.max_direction_spread_deg))
-    return std::nullopt;
+    return LightFromAbove(map, samples, options.more_from_above);
   KeepPositive(&shape);
   LightEstimate light;
   light.brightness = White(samples, shape) * shape;

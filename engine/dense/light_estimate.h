@@ -15,8 +15,11 @@ struct LightEstimate {
   // Of a white diffuse surface by its normal in the map, light from all sides included: coefficients of the
   // real spherical harmonics of order 2 (SphericalHarmonics).
   Eigen::Matrix<double, 9, 1> brightness = Eigen::Matrix<double, 9, 1>::Zero();
-  Eigen::Vector3d to_light = -Eigen::Vector3d::UnitY();  // The main direction; unit vector in the map.
-  double direct = 0;  // The part of the brightness of a surface that faces the main light that comes from it.
+  // The main direction; unit vector in the map. Up where it is not known.
+  Eigen::Vector3d to_light = -Eigen::Vector3d::UnitY();
+  // The part of the brightness of a surface that faces the main light that comes from it. 0 where the main
+  // direction is not known: light then comes from all sides, and more from above.
+  double direct = 0;
 
   double BrightnessOf(const Eigen::Vector3d& normal) const;
 };
@@ -34,14 +37,19 @@ struct LightOptions {
   double neighbourhood = 0.08;
   double min_angle_deg = 20;             // Between the normals of surfaces that are compared.
   std::size_t pairs_per_place = 48;      // Comparisons in one neighbourhood; bounds the weight of a place.
-  std::size_t min_pairs = 300;           // With fewer, the light is not known.
+  std::size_t min_pairs = 300;           // With fewer, the direction is not known.
   double max_direction_spread_deg = 20;  // Of estimates from halves of the places; with more it is not known.
+  std::size_t min_samples = 500;         // With fewer, nothing is known: 2 % of them set what is white.
+  // What a surface that faces up receives more than the mean where the direction is not known, relative to
+  // the mean. Measured in the simulator with 0 and 0.3 (docs/decisions/room-light.md).
+  double more_from_above = 0.3;
 };
 
 // Compares surfaces that are close to each other and face in different directions: they are most often of the
 // same material, so that the ratio of their brightness is that of the light that they receive, whatever their
-// colour. Empty where there are too few such surfaces, or where parts of them do not agree on the main
-// direction. Takes about a second. Deterministic.
+// colour. Where there are too few such surfaces, or where parts of them do not agree on the main direction,
+// only the brightness of white things is used. Empty where no surface was seen. Takes about a second.
+// Deterministic.
 std::optional<LightEstimate> EstimateLight(const MapSnapshot& map, const SurfaceMesh& mesh,
                                            const LightOptions& options = {});
 

@@ -194,7 +194,7 @@ BoxFigures Compare(const PlacedBox& box, const Simulation& without, int frame,
   figures.pixels = cv::countNonZero(shows_box);
   for (int i = 0; i < 3; ++i)
     figures.color_error = std::max(figures.color_error, std::abs(mean_drawn[i] / mean_true[i] - 1));
-  if (light != nullptr && towards_shadow.norm() > 0) {
+  if (light != nullptr && light->direct > 0 && towards_shadow.norm() > 0) {
     const Eigen::Vector3d level(-kToLight.x(), 0, -kToLight.z());
     figures.shadow_deg =
         std::acos(std::clamp(level.normalized().dot(towards_shadow.normalized()), -1.0, 1.0)) * 180 /
@@ -212,28 +212,39 @@ TEST(RoomLight, OnAModelIsThatOfTheSimulator) {
     GTEST_SKIP() << error.what();
   }
   ui::Renderer renderer;
+  int within_a_tenth = 0;
   for (const char* const name : {"room", "museum", "desks", "loop"}) {
-    SimulationOptions options = SimulationOptions::Clean();
-    options.duration_s = 8;
-    const auto without = MakeSimulation(name, options);
-    const int frame = without->frame_count() / 2;
-    const PlacedBox box = BoxIn(name, options.seed, *without, frame);
-    const Place place = PlaceIn(name, options.seed);
-    const auto light = engine::EstimateLight(*place.map, place.mesh);
-    cv::Mat images;
-    const BoxFigures figures = Compare(box, *without, frame, light ? &*light : nullptr, &renderer, &images);
-    const char* const folder = std::getenv("DOCENT_TEST_IMAGES");
-    if (folder != nullptr) cv::imwrite(std::string(folder) + "/light-" + name + ".png", images);
-    std::printf("%s: light %s, colour off by %.1f %%, shadow by %.1f degrees, %d pixels\n", name,
-                light ? "known" : "not known", 100 * figures.color_error, figures.shadow_deg, figures.pixels);
-    EXPECT_GT(figures.pixels, 500) << name;
-    if (light) {
-      EXPECT_LT(figures.color_error, 0.1) << name << " (measured: desks 0.033)";
-      EXPECT_LT(figures.shadow_deg, 30) << name << " (measured: desks 25.1)";
-    } else {
-      EXPECT_LT(figures.color_error, 0.25) << name << " (measured: room 0.110, museum 0.195, loop 0.138)";
+    for (const std::uint64_t seed : {1u, 2u, 3u}) {
+      SimulationOptions options = SimulationOptions::Clean();
+      options.duration_s = 8;
+      options.seed = seed;
+      const auto without = MakeSimulation(name, options);
+      const int frame = without->frame_count() / 2;
+      const PlacedBox box = BoxIn(name, seed, *without, frame);
+      const Place place = PlaceIn(name, seed);
+      const auto light = engine::EstimateLight(*place.map, place.mesh);
+      ASSERT_TRUE(light) << name << ' ' << seed;
+      cv::Mat images;
+      const BoxFigures figures = Compare(box, *without, frame, &*light, &renderer, &images);
+      cv::Mat images_of_fixed;
+      const BoxFigures fixed = Compare(box, *without, frame, nullptr, &renderer, &images_of_fixed);
+      const char* const folder = std::getenv("DOCENT_TEST_IMAGES");
+      const std::string scene = std::string(name) + "-" + std::to_string(seed);
+      if (folder != nullptr) cv::imwrite(std::string(folder) + "/light-" + scene + ".png", images);
+      std::printf(
+          "%s: direction %s, colour off by %.1f %% (with the fixed light %.1f %%), shadow by %.1f degrees, "
+          "%d pixels\n",
+          scene.c_str(), light->direct > 0 ? "known" : "not known", 100 * figures.color_error,
+          100 * fixed.color_error, figures.shadow_deg, figures.pixels);
+      EXPECT_GT(figures.pixels, 500) << scene;
+      if (figures.color_error < 0.1) ++within_a_tenth;
+      EXPECT_LT(figures.color_error, 0.25) << scene << " (measured: at most 0.179, museum-2)";
+      if (light->direct > 0) {
+        EXPECT_LT(figures.shadow_deg, 50) << scene << " (measured: desks-1 25.1, room-3 42.7)";
+      }
     }
   }
+  EXPECT_GE(within_a_tenth, 9) << "measured: 10 of 12";
 }
 
 TEST(RoomLight, ComesFromWhereTheSimulatorHasIt) {
@@ -244,13 +255,16 @@ TEST(RoomLight, ComesFromWhereTheSimulatorHasIt) {
       const auto start = std::chrono::steady_clock::now();
       const auto light = engine::EstimateLight(*place.map, place.mesh);
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      ASSERT_TRUE(light) << name << ' ' << seed;
+      const bool is_known = light->direct > 0;
       std::printf("%s %d: %s, %.2f s\n", name, static_cast<int>(seed),
-                  light ? (std::to_string(AngleToLight_deg(*light)) + " degrees, direct " +
-                           std::to_string(light->direct) + ", mean " + std::to_string(light->brightness[0]))
-                              .c_str()
-                        : "not known",
+                  is_known
+                      ? (std::to_string(AngleToLight_deg(*light)) + " degrees, direct " +
+                         std::to_string(light->direct) + ", mean " + std::to_string(light->brightness[0]))
+                            .c_str()
+                      : "not known",
                   seconds);
-      if (!light) continue;
+      if (!is_known) continue;
       ++known;
       EXPECT_LT(AngleToLight_deg(*light), 15) << name << ' ' << seed;
     }
