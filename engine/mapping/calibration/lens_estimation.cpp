@@ -292,11 +292,15 @@ LensEstimation::Progress LensEstimation::EstimateLens(std::size_t lens, const st
     no_history = 2 * estimate->keyframes > keyframes;
   }
   result.focal_sigma = TotalSigma(own_sigma, options_.model_sigma, step, first, spread, no_history);
-  // The first estimate in a map does not replace a more precise one from another map that agrees with it.
+  // An estimate does not replace a more precise one that agrees with it, whether that is from another map or
+  // from this one. A large step makes an estimate imprecise until another one confirms it.
   constexpr double kMaxDisagreement = 2;
-  if (first && result.focal_sigma > 1.5 * known.focal_sigma &&
-      change < kMaxDisagreement * std::hypot(result.focal_sigma, known.focal_sigma))
+  const double sigma_now = TotalSigma(own_sigma, options_.model_sigma, step, first, 0, no_history);
+  if (sigma_now > 1.5 * known.focal_sigma &&
+      change < kMaxDisagreement * std::hypot(result.focal_sigma, known.focal_sigma)) {
+    if (!first) plan.estimates.push_back({keyframes, std::log(result.focal_px)});
     return finish(Progress::kNothing);
+  }
   const CameraModel& found = result.lens;
   const bool changes = (change > options_.min_change_sigmas * own_sigma && change > options_.min_change) ||
                        DistortionChange(found, *known.model) > options_.min_change_px;

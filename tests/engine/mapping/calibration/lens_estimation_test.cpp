@@ -138,6 +138,27 @@ TEST_F(LensEstimationTest, FixesTheLensWhenEstimatesAgree) {
   EXPECT_EQ(estimation.Step(&searcher_, nullptr, &map), Progress::kNothing);
 }
 
+// The keyframes that a growing map adds may be seen through another lens than the first ones: a wrong estimate
+// and a right one after a wrong one cannot be told apart at first.
+TEST_F(LensEstimationTest, ALargeStepNeedsAnotherEstimateThatConfirmsIt) {
+  const LensScene narrow = MakeLensScene({.field_of_view_deg = 62, .noise_px = 0.3, .cameras = 80});
+  const LensScene wide = MakeLensScene({.field_of_view_deg = 70, .noise_px = 0.3, .cameras = 80});
+  LensEstimation estimation(OptionsFor(narrow));
+  const auto grow = [&](LensScene scene, int cameras) {
+    scene.problem.cameras.resize(static_cast<std::size_t>(cameras));
+    std::erase_if(scene.problem.measurements, [&](const auto& seen) { return seen.camera >= cameras; });
+    for (BundleProblem::Camera& camera : scene.problem.cameras) camera.model = estimation.lenses()[0].model;
+    Map map = MapOf(scene);
+    Finish(&estimation, &map);
+    return estimation.lenses()[0].model;
+  };
+  grow(narrow, 10);
+  const auto known = grow(narrow, 14);
+  EXPECT_EQ(grow(wide, 19), known);
+  EXPECT_NE(grow(wide, 25), known);
+  EXPECT_LT(RelativeError(wide, estimation.lenses()[0]), 0.02);
+}
+
 TEST_F(LensEstimationTest, AdaptsAMapThatWasBuiltWithAnEarlierEstimate) {
   const LensScene scene = MakeLensScene({.field_of_view_deg = 80, .noise_px = 0.3, .from_60_degrees = true});
   Map map = MapOf(scene), old = map;
