@@ -57,8 +57,10 @@ bool IdleMaintenance::Run(const std::atomic<bool>& interrupt) {
 }
 
 bool IdleMaintenance::ComputeMesh(const IdleMap& chosen, const std::atomic<bool>& interrupt) {
-  std::optional<engine::MapMesh> mesh = engine::DensifyMap(chosen.snapshot, {}, {}, &interrupt);
+  if (!unfinished_ || unfinished_->map() != chosen.snapshot) unfinished_.emplace(chosen.snapshot);
+  std::optional<engine::MapMesh> mesh = unfinished_->Run({}, &interrupt);
   if (!mesh) return false;
+  unfinished_.reset();
   std::shared_ptr<const engine::MapMesh> fitting;
   std::shared_ptr<const engine::LightEstimate> light;
   if (!mesh->mesh.empty()) {

@@ -8,14 +8,15 @@
 
 #include "app/session/maintenance_order.h"
 #include "app/session/session_state.h"
+#include "engine/dense/densification.h"
 #include "engine/system/system.h"
 #include "maps/library/library.h"
 
 namespace docent::app {
 
-// Maintenance of idle maps (ptamm §3.1: the map maker roves through all maps). It runs on the saver's thread,
-// while nothing waits to be saved and the mapper of the active map is idle. It takes the session's mutex to
-// copy what it needs and to enter its result, and works without it.
+// Maintenance of idle maps (ptamm §3.1: the map maker roves through all maps). It runs on the saver's thread
+// of maintenance, and begins while the mapper of the active map is idle. It takes the session's mutex to copy
+// what it needs and to enter its result, and works without it.
 class IdleMaintenance {
  public:
   // All pointers must outlive this. library is null where nothing is saved; then Run is not called.
@@ -48,7 +49,9 @@ class IdleMaintenance {
   std::mutex& mutex_;
   SessionState& state_;
   const bool with_meshes_, with_light_;
-  MaintenanceOrder order_;  // accessed only by the saver's thread
+  // Accessed only by the thread of maintenance.
+  MaintenanceOrder order_;
+  std::optional<engine::Densification> unfinished_;  // surfaces whose computation was interrupted
 };
 
 }  // namespace docent::app

@@ -25,9 +25,9 @@ struct SavingStatus {
   std::optional<std::chrono::steady_clock::time_point> saved_at;  // empty before the first time
 };
 
-// Passes what changed in a session to the saver, which writes it in the background and maintains idle maps
-// between saves. Until Start is called, nothing is saved and every function does nothing. With the session's
-// mutex held, unless stated otherwise.
+// Passes what changed in a session to the saver, which writes it in the background and maintains idle maps.
+// Until Start is called, nothing is saved and every function does nothing. With the session's mutex held,
+// unless stated otherwise.
 class SessionSaving {
  public:
   // All pointers must outlive this; library may be null.
@@ -86,7 +86,7 @@ class SessionSaving {
   std::set<std::uint64_t>
       submitted_;  // keys of the maps that the saver has not written since they were submitted
   bool discards_changes_ = false;
-  IdleMaintenance maintenance_;       // accessed only by the saver's thread
+  IdleMaintenance maintenance_;       // accessed only by the saver's thread of maintenance
   std::optional<maps::Saver> saver_;  // last, because its thread calls back into the other members
 };
 

@@ -130,9 +130,8 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
   state_.AddEvent(event.time, "map", "began " + name + ": the camera was lost in " + before);
 }
 
-void SystemEventHandler::Handle(const engine::SystemEvent&, const engine::KeyFrameOffered&) {
-  saving_.InterruptMaintenance();  // the active map has priority
-}
+// Maintenance goes on: its thread has a lower priority than those of the active map.
+void SystemEventHandler::Handle(const engine::SystemEvent&, const engine::KeyFrameOffered&) {}
 
 void SystemEventHandler::Handle(const engine::SystemEvent&, const engine::JoinRequested&) {
   saving_.InterruptMaintenance();  // maintenance may be adjusting the map

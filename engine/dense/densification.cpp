@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "engine/base/interrupt.h"
@@ -14,32 +13,6 @@
 
 namespace docent::engine {
 namespace {
-
-// The depth maps of the keyframes, each checked against its neighbours; empty when stopped.
-std::optional<std::vector<DepthMap>> EstimateAll(const std::shared_ptr<const MapSnapshot>& map,
-                                                 const DepthOptions& options,
-                                                 const DensificationProgress& progress,
-                                                 const std::atomic<bool>* interrupt) {
-  DepthEstimator estimator(map, options);
-  std::map<KeyFrameId, DepthMap> depths;
-  for (const DepthViews& views : estimator.views()) {
-    std::optional<DepthMap> depth = estimator.Estimate(views, interrupt);
-    if (!depth) return std::nullopt;
-    depths.emplace(views.keyframe, *std::move(depth));
-    if (progress) progress(depths.size(), estimator.views().size());
-  }
-  std::vector<DepthMap> consistent;
-  for (const DepthViews& views : estimator.views()) {
-    if (IsInterrupted(interrupt)) return std::nullopt;
-    std::vector<const DepthMap*> others;
-    for (const KeyFrameId id : views.neighbours) {
-      const auto found = depths.find(id);
-      if (found != depths.end()) others.push_back(&found->second);
-    }
-    consistent.push_back(estimator.KeepConsistent(depths.at(views.keyframe), others));
-  }
-  return consistent;
-}
 
 // Fuses the depth maps with voxels of at least this size; with larger ones if there are too many blocks.
 std::optional<DistanceField> Fuse(const std::vector<DepthMap>& depths, double voxel_size,
@@ -93,27 +66,59 @@ MeshState StateOf(const std::vector<MeshKeyFrame>& keyframes, const MapSnapshot&
   return static_cast<std::size_t>(localized) > keyframes.size() ? MeshState::kExtended : MeshState::kCurrent;
 }
 
-std::optional<MapMesh> DensifyMap(const std::shared_ptr<const MapSnapshot>& map,
-                                  const DensificationOptions& options, const DensificationProgress& progress,
-                                  const std::atomic<bool>* interrupt) {
-  Checked(options);
+Densification::Densification(std::shared_ptr<const MapSnapshot> map, const DensificationOptions& options)
+    : map_(std::move(map)), options_(Checked(options)), estimator_(map_, options.depth) {}
+
+// Returns false when asked to stop.
+bool Densification::EstimateDepths(const DensificationProgress& progress,
+                                   const std::atomic<bool>* interrupt) {
+  for (const DepthViews& views : estimator_.views()) {
+    if (depths_.contains(views.keyframe)) continue;
+    std::optional<DepthMap> depth = estimator_.Estimate(views, interrupt);
+    if (!depth) return false;
+    depths_.emplace(views.keyframe, *std::move(depth));
+    if (progress) progress(depths_.size(), estimator_.views().size());
+  }
+  return true;
+}
+
+// Each checked against its neighbours.
+std::vector<DepthMap> Densification::ConsistentDepths() const {
+  std::vector<DepthMap> consistent;
+  for (const DepthViews& views : estimator_.views()) {
+    std::vector<const DepthMap*> others;
+    for (const KeyFrameId id : views.neighbours) {
+      const auto found = depths_.find(id);
+      if (found != depths_.end()) others.push_back(&found->second);
+    }
+    consistent.push_back(estimator_.KeepConsistent(depths_.at(views.keyframe), others));
+  }
+  return consistent;
+}
+
+std::optional<MapMesh> Densification::Run(const DensificationProgress& progress,
+                                          const std::atomic<bool>* interrupt) {
   MapMesh result;
-  for (const KeyFrame& keyframe : map->keyframes) {
+  for (const KeyFrame& keyframe : map_->keyframes) {
     if (keyframe.kind == KeyFrameKind::kSixDof)
       result.keyframes.push_back({keyframe.id, keyframe.camera_from_map});
   }
-  if (result.keyframes.empty()) return result;
-  const auto depths = EstimateAll(map, options.depth, progress, interrupt);
-  if (!depths) return std::nullopt;
-  if (depths->empty()) return result;
-  const auto field = Fuse(*depths, options.voxel_size * MedianDepth(*map), options, interrupt);
+  if (!EstimateDepths(progress, interrupt)) return std::nullopt;
+  if (depths_.empty()) return result;
+  const auto field = Fuse(ConsistentDepths(), options_.voxel_size * MedianDepth(*map_), options_, interrupt);
   if (!field) return std::nullopt;
-  const SurfaceMesh surface = RemoveSmallPieces(CutSharedEdges(field->ExtractSurface(options.min_weight)),
-                                                options.min_piece_triangles);
-  result.mesh = SimplifyMesh(surface, options.simplification_voxels * field->voxel_size(),
-                             options.max_triangles, interrupt);
+  const SurfaceMesh surface = RemoveSmallPieces(CutSharedEdges(field->ExtractSurface(options_.min_weight)),
+                                                options_.min_piece_triangles);
+  result.mesh = SimplifyMesh(surface, options_.simplification_voxels * field->voxel_size(),
+                             options_.max_triangles, interrupt);
   if (IsInterrupted(interrupt)) return std::nullopt;
   return result;
+}
+
+std::optional<MapMesh> DensifyMap(const std::shared_ptr<const MapSnapshot>& map,
+                                  const DensificationOptions& options, const DensificationProgress& progress,
+                                  const std::atomic<bool>* interrupt) {
+  return Densification(map, options).Run(progress, interrupt);
 }
 
 }  // namespace docent::engine

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -52,10 +53,33 @@ enum class MeshState {
 };
 MeshState StateOf(const std::vector<MeshKeyFrame>& keyframes, const MapSnapshot& map);
 
-// The mesh of a map; without triangles if no keyframe has depth. `progress`, unless null, is called with the
-// number of keyframes that are done and their total number. Empty when asked to stop. Throws Error if the
-// options are invalid.
+// Called with the number of keyframes whose depth is done and their total number.
 using DensificationProgress = std::function<void(std::size_t done, std::size_t total)>;
+
+// Computes the mesh of one state of a map. When it is interrupted, it keeps the depths that are done: about
+// half a megabyte for each keyframe. One thread at a time.
+class Densification {
+ public:
+  // Throws Error if the options are invalid.
+  explicit Densification(std::shared_ptr<const MapSnapshot> map, const DensificationOptions& options = {});
+
+  const std::shared_ptr<const MapSnapshot>& map() const { return map_; }
+  // The mesh; without triangles if no keyframe has depth. Empty when asked to stop; the next call continues.
+  // progress may be empty.
+  std::optional<MapMesh> Run(const DensificationProgress& progress = {},
+                             const std::atomic<bool>* interrupt = nullptr);
+
+ private:
+  bool EstimateDepths(const DensificationProgress& progress, const std::atomic<bool>* interrupt);
+  std::vector<DepthMap> ConsistentDepths() const;
+
+  const std::shared_ptr<const MapSnapshot> map_;
+  const DensificationOptions options_;
+  DepthEstimator estimator_;
+  std::map<KeyFrameId, DepthMap> depths_;  // not yet checked against each other
+};
+
+// The same in one call.
 std::optional<MapMesh> DensifyMap(const std::shared_ptr<const MapSnapshot>& map,
                                   const DensificationOptions& options = {},
                                   const DensificationProgress& progress = {},

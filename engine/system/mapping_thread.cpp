@@ -1,28 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/system/mapping_thread.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <memory>
 #include <utility>
 #include <variant>
 
+#include "engine/base/thread_priority.h"
+
 namespace docent::engine {
-
-namespace {
-
-// A delayed image is lost time for the user, a delayed keyframe is not. Where there are fewer processors than
-// threads, the trackers have priority: five steps of niceness reduce the mapper to a third of their share.
-void LowerThreadPriority() {
-  constexpr int kSteps = 5;
-  const auto thread = static_cast<id_t>(gettid());
-  const int now = getpriority(PRIO_PROCESS, thread);
-  setpriority(PRIO_PROCESS, thread, now + kSteps);  // when refused, all threads have equal priority
-}
-
-}  // namespace
 
 MappingThread::MappingThread(const MapperOptions& options, bool threaded, UpdateCallback on_update)
     : mapper_(options), on_update_(std::move(on_update)) {

@@ -5,6 +5,8 @@
 #include <chrono>
 #include <utility>
 
+#include "engine/base/thread_priority.h"
+
 namespace docent::maps {
 
 namespace {
@@ -18,12 +20,19 @@ Saver::Saver(Library* library, std::size_t capacity, Saved saved, Maintenance ma
       capacity_(std::max<std::size_t>(1, capacity)),
       saved_(std::move(saved)),
       maintenance_(std::move(maintenance)),
-      worker_("map-saver", [this](const std::stop_token& stop) { Run(stop); }) {}
+      save_worker_("map-saver", [this](const std::stop_token& stop) { SaveUntil(stop); }) {
+  if (!maintenance_) return;
+  maintenance_worker_.emplace("maintenance", [this](const std::stop_token& stop) {
+    LowerThreadPriority();
+    MaintainUntil(stop);
+  });
+}
 
 Saver::~Saver() {
   EndMaintenance();
-  worker_.RequestStop();  // Run ends only when no save is waiting.
-  worker_.Join();
+  if (maintenance_worker_) maintenance_worker_->Join();
+  save_worker_.RequestStop();  // SaveUntil ends only when no save is waiting.
+  save_worker_.Join();
 }
 
 void Saver::Submit(MapRecord record) {
@@ -47,7 +56,6 @@ void Saver::Submit(MapRecord record) {
     } else {
       waiting_.push_back(std::move(record));
     }
-    interrupt_ = true;
   }
   changed_.notify_all();
 }
@@ -70,6 +78,7 @@ std::size_t Saver::pending() const {
 void Saver::EndMaintenance() {
   std::unique_lock lock(mutex_);
   maintenance_ended_ = interrupt_ = true;
+  changed_.notify_all();
   changed_.wait(lock, [this] { return !maintenance_running_; });
 }
 
@@ -92,19 +101,20 @@ bool Saver::RunMaintenance(std::unique_lock<std::mutex>* lock) {
   return more;
 }
 
-void Saver::Run(const std::stop_token& stop) {
+void Saver::MaintainUntil(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  const auto has_waiting = [this] { return !waiting_.empty(); };
+  const auto has_ended = [this] { return maintenance_ended_; };
+  bool more = false;
+  while (more ? !has_ended() : !changed_.wait_for(lock, stop, kMaintenanceInterval, has_ended)) {
+    if (stop.stop_requested()) return;
+    more = RunMaintenance(&lock);
+  }
+}
+
+void Saver::SaveUntil(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
   while (true) {
-    bool more = false;
-    while (maintenance_ && !maintenance_ended_ && !has_waiting()) {
-      if (!more && changed_.wait_for(lock, stop, kMaintenanceInterval,
-                                     [&] { return has_waiting() || maintenance_ended_; }))
-        break;
-      if (stop.stop_requested()) break;
-      more = RunMaintenance(&lock);
-    }
-    if (!changed_.wait(lock, stop, has_waiting)) return;
+    if (!changed_.wait(lock, stop, [this] { return !waiting_.empty(); })) return;
     MapRecord record = std::move(waiting_.front());
     waiting_.pop_front();
     running_ = record.key;

@@ -21,15 +21,16 @@ namespace docent::maps {
 // Saves maps on a separate thread, so that tracking and drawing never wait for the disk. Requests wait in a
 // short queue with one entry per map: a newer snapshot or scene replaces one that is not written yet, and
 // entries of maps that were joined into another one (MapRecord::joined_keys) are dropped. The caller decides
-// when to save, and provides the maintenance that runs between saves; a save interrupts it. Thread-safe. A
-// failed save does not stop the others: its exception is kept for TakeError, and nothing that was saved
-// before is lost.
+// when to save. Maintenance of the library runs on a second thread, which takes little processor time from
+// the others (LowerThreadPriority). Thread-safe. A failed save does not stop the others: its exception is
+// kept for TakeError, and nothing that was saved before is lost.
 class Saver {
  public:
   // Told of each record that is on disk, on the saver's thread.
   using Saved = std::function<void(const MapRecord& record)>;
-  // Work for the saver's thread while no save is waiting. It must end soon after `interrupt` is set. It
-  // returns whether it did something; if so it is called again at once, else after a while.
+  // Work for the second thread. It must end soon after `interrupt` is set. It returns whether it did
+  // something; if so it is called again at once, else after a while. What it writes must not undo a save
+  // meanwhile (MapRecord::expected_revision).
   using Maintenance = std::function<bool(const std::atomic<bool>& interrupt)>;
   // `library` must be opened for writing and outlive the saver. `capacity` is the number of maps that can
   // wait; Submit blocks when the queue is full. `saved` is called on the saver's thread for each record that
@@ -52,7 +53,8 @@ class Saver {
   void EndMaintenance();
 
  private:
-  void Run(const std::stop_token& stop);
+  void SaveUntil(const std::stop_token& stop);
+  void MaintainUntil(const std::stop_token& stop);
   bool Idle() const { return waiting_.empty() && !running_; }
   bool RunMaintenance(std::unique_lock<std::mutex>* lock);
 
@@ -67,7 +69,8 @@ class Saver {
   std::optional<std::uint64_t> running_;  // Key of the map that is being saved.
   std::exception_ptr error_;
   bool maintenance_running_ = false, maintenance_ended_ = false;
-  Worker worker_;  // Declared last, because it uses the other fields.
+  Worker save_worker_;  // Declared last, because they use the other fields.
+  std::optional<Worker> maintenance_worker_;
 };
 
 }  // namespace docent::maps

@@ -3,11 +3,13 @@
 // longer fit, and computed for idle maps.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <thread>
 
 #include "app/session/session_map.h"
+#include "engine/dense/densification.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
 
@@ -53,6 +55,30 @@ TEST(SessionSurfaces, AreDroppedWhenAKeyFrameMoves) {
   EXPECT_FALSE(map.mesh);
   map.SetMesh(MeshOf(*MapOfAWalk()));
   EXPECT_FALSE(map.mesh) << "it was made of another state of the map";
+}
+
+TEST(SessionSurfaces, KeepTheDepthsThatAreDoneWhenTheyAreInterrupted) {
+  engine::Densification computed(MapOfAWalk());
+  std::atomic<bool> interrupt = false;
+  std::size_t first_done = 0;
+  const auto stopped = computed.Run(
+      [&](std::size_t done, std::size_t) {
+        first_done = done;
+        interrupt = done == 2;
+      },
+      &interrupt);
+  EXPECT_FALSE(stopped);
+  EXPECT_EQ(first_done, 2U);
+  std::size_t continued_from = 0;
+  const auto mesh = computed.Run([&](std::size_t done, std::size_t) {
+    if (continued_from == 0) continued_from = done;
+  });
+  EXPECT_EQ(continued_from, 3U);
+  const auto in_one_go = engine::DensifyMap(MapOfAWalk());
+  ASSERT_TRUE(mesh && in_one_go);
+  EXPECT_GT(mesh->mesh.triangles.size(), 0U);
+  EXPECT_EQ(mesh->mesh.vertices, in_one_go->mesh.vertices);
+  EXPECT_EQ(mesh->mesh.triangles, in_one_go->mesh.triangles);
 }
 
 class StoredSurfaces : public ::testing::Test {
