@@ -138,8 +138,8 @@ TEST_F(LensEstimationTest, FixesTheLensWhenEstimatesAgree) {
   EXPECT_EQ(estimation.Step(&searcher_, nullptr, &map), Progress::kNothing);
 }
 
-// The keyframes that a growing map adds may be seen through another lens than the first ones: a wrong estimate
-// and a right one after a wrong one cannot be told apart at first.
+// The keyframes that a growing map adds may be seen through another lens than the first ones: a wrong
+// estimate and a right one after a wrong one cannot be told apart at first.
 TEST_F(LensEstimationTest, ALargeStepNeedsAnotherEstimateThatConfirmsIt) {
   const LensScene narrow = MakeLensScene({.field_of_view_deg = 62, .noise_px = 0.3, .cameras = 80});
   const LensScene wide = MakeLensScene({.field_of_view_deg = 70, .noise_px = 0.3, .cameras = 80});
