@@ -60,6 +60,32 @@ glm::vec3 DirectionToLight(const glm::vec3& up) {
   return glm::normalize(up + level);
 }
 
+// What a light from one direction adds to the brightness of surfaces by their normal, 1 where they face it:
+// the harmonics of max(0, cosine) up to order 2, which the shader takes away again where it wants other light
+// only.
+Eigen::Matrix<double, 9, 1> LightOfOneDirection(const Eigen::Vector3d& to_light) {
+  constexpr double kMean = 0.25, kFirst = 0.5, kSecond = 0.15625;
+  const double x = to_light.x(), y = to_light.y(), z = to_light.z();
+  Eigen::Matrix<double, 9, 1> brightness;
+  brightness << kMean, kFirst * y, kFirst * z, kFirst * x, kSecond * 6 * x * y, kSecond * 6 * y * z,
+      kSecond * 0.5 * (3 * z * z - 1), kSecond * 6 * x * z, kSecond * 1.5 * (x * x - y * y);
+  return brightness;
+}
+
+// The light of a room whose main direction is not known, with a part of it from a fixed direction: in light
+// from all sides alone, shapes can hardly be seen. The mean stays, and surfaces that face up are about as
+// bright as before.
+engine::LightEstimate WithFixedDirection(engine::LightEstimate room, const Eigen::Vector3d& to_light) {
+  constexpr double kDirect = 0.35;    // of the mean
+  constexpr double kGradient = 0.35;  // what is left of the gradient of the light from all sides
+  room.to_light = to_light;
+  room.direct = kDirect * room.brightness[0];
+  room.brightness[0] *= 1 - kDirect / 4;
+  room.brightness.tail<8>() *= kGradient;
+  room.brightness += room.direct * LightOfOneDirection(to_light);
+  return room;
+}
+
 void Extend(const Box& box, const glm::mat4& transform, Box* result) {
   if (box.empty()) return;
   for (int i = 0; i < 8; ++i) result->Include(glm::vec3(transform * glm::vec4(box.Corner(i), 1.0f)));
@@ -318,12 +344,17 @@ void MeshDrawer::SetLight(const ModelLight& light) {
   glUniform3fv(program_.Uniform("exposure"), 1, &light.exposure[0]);
   glm::vec3 to_light = DirectionToLight(up_in_map_), radiance = kLightRadiance;
   if (light.room != nullptr) {
-    to_light = GlmFrom(light.room->to_light);
+    engine::LightEstimate room = *light.room;
+    if (room.direct > 0) {
+      to_light = GlmFrom(room.to_light);
+    } else {
+      room = WithFixedDirection(room, Eigen::Vector3d(to_light.x, to_light.y, to_light.z));
+    }
     // A white surface that faces the light is as bright as the light's radiance over pi.
-    radiance = glm::vec3(static_cast<float>(light.room->direct * std::numbers::pi));
-    const Eigen::Matrix<float, 9, 1> brightness = light.room->brightness.cast<float>();
+    radiance = glm::vec3(static_cast<float>(room.direct * std::numbers::pi));
+    const Eigen::Matrix<float, 9, 1> brightness = room.brightness.cast<float>();
     glUniform1fv(program_.Uniform("room_brightness"), 9, brightness.data());
-    glUniform1f(program_.Uniform("direct"), static_cast<float>(light.room->direct));
+    glUniform1f(program_.Uniform("direct"), static_cast<float>(room.direct));
   }
   glUniform3fv(program_.Uniform("direction_to_light"), 1, &to_light[0]);
   glUniform3fv(program_.Uniform("light_radiance"), 1, &radiance[0]);

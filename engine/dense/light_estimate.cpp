@@ -139,13 +139,16 @@ bool IsCertain(const std::vector<Pair>& pairs, const Eigen::Vector3d& direction,
 double White(const std::vector<SurfaceSample>& samples, const Coefficients& shape) {
   constexpr double kShining = 0.02;  // The share of samples that may be lamps, windows and reflections.
   constexpr double kPaper = 0.85;    // Of the light, white paper and paint reflect this much.
+  // Where the camera saturates on white things, models would have no shape any more: the surfaces of white
+  // ones that face the light stay below 1. In the simulated rooms it is at most 0.67.
+  constexpr double kMost = 0.75;
   std::vector<double> albedos;
   for (const SurfaceSample& sample : samples)
     albedos.push_back(sample.brightness / std::max(0.1, shape.dot(SphericalHarmonics(sample.normal))));
   const auto white =
       albedos.begin() + static_cast<std::ptrdiff_t>((1 - kShining) * static_cast<double>(albedos.size()));
   std::nth_element(albedos.begin(), white, albedos.end());
-  return *white / kPaper;
+  return std::min(kMost, *white / kPaper);
 }
 
 // Weakens what depends on the direction until no direction is dark: a room has no side without light.
@@ -164,8 +167,8 @@ LightEstimate LightFromAbove(const MapSnapshot& map, const std::vector<SurfaceSa
   LightEstimate light;
   const UprightAxes axes = UprightAxesOf(map);
   light.to_light = axes.up;
-  // Upright sides would all be alike, and the edge between two of them could not be seen. Without a reason
-  // for one side or the other, there is a little more light from the right of the first keyframe.
+  // Without a reason for one side or the other, there is a little more light from the right of the first
+  // keyframe, so that upright sides differ.
   constexpr double kMoreFromTheRight = 0.1;
   const Eigen::Vector3d slope = more_from_above * axes.up + kMoreFromTheRight * axes.right;
   Coefficients shape = Coefficients::Unit(0);
