@@ -108,9 +108,17 @@ bool IdleMaintenance::Adjust(const IdleMap& chosen, const std::atomic<bool>& int
   }
   if (!library_->Save(record)) return true;
   const std::scoped_lock lock(mutex_);
-  // A camera entered the map meanwhile: it continues with the map as it was, and will save that.
   SessionMap* const map = FindIdleMap(chosen);
-  if (map == nullptr || !system_.ReplaceSnapshot(map->key, chosen.snapshot, adjusted.snapshot)) return true;
+  if (map == nullptr || map->scene != scene || map->name != name ||
+      !system_.ReplaceSnapshot(map->key, chosen.snapshot, adjusted.snapshot)) {
+    // A camera entered the map meanwhile, or its content was changed and may have been saved before the
+    // adjusted map: the session continues with the map as it was, and saves that.
+    if (SessionMap* const kept = state_.FindMap(chosen.key)) {
+      kept->saved_snapshot = adjusted.snapshot;
+      kept->saved_scene.reset();
+    }
+    return true;
+  }
   map->UpdateSnapshot(adjusted.snapshot);
   map->saved_snapshot = adjusted.snapshot;
   map->maintained_revision = adjusted.snapshot->revision;
