@@ -167,10 +167,7 @@ LightEstimate LightFromAbove(const MapSnapshot& map, const std::vector<SurfaceSa
   LightEstimate light;
   const UprightAxes axes = UprightAxesOf(map);
   light.to_light = axes.up;
-  // Without a reason for one side or the other, there is a little more light from the right of the first
-  // keyframe, so that upright sides differ.
-  constexpr double kMoreFromTheRight = 0.1;
-  const Eigen::Vector3d slope = more_from_above * axes.up + kMoreFromTheRight * axes.right;
+  const Eigen::Vector3d slope = more_from_above * axes.up;
   Coefficients shape = Coefficients::Unit(0);
   shape.segment<3>(1) << slope.y(), slope.z(), slope.x();
   light.brightness = White(samples, shape) * shape;

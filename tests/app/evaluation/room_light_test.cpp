@@ -204,6 +204,26 @@ BoxFigures Compare(const PlacedBox& box, const Simulation& without, int frame,
   return figures;
 }
 
+// The places of a test. All twelve take minutes.
+struct TestedPlace {
+  const char* name;
+  std::uint64_t seed;
+  bool long_test;
+};
+constexpr std::array<TestedPlace, 12> kTestedPlaces = {{{"room", 1, false},
+                                                        {"room", 2, true},
+                                                        {"room", 3, false},
+                                                        {"museum", 1, false},
+                                                        {"museum", 2, true},
+                                                        {"museum", 3, true},
+                                                        {"desks", 1, false},
+                                                        {"desks", 2, true},
+                                                        {"desks", 3, true},
+                                                        {"loop", 1, false},
+                                                        {"loop", 2, true},
+                                                        {"loop", 3, true}}};
+
+// Tests five places, or all twelve if DOCENT_LONG_TESTS is set.
 TEST(RoomLight, OnAModelIsThatOfTheSimulator) {
   std::unique_ptr<ui::OffscreenContext> context;
   try {
@@ -212,39 +232,41 @@ TEST(RoomLight, OnAModelIsThatOfTheSimulator) {
     GTEST_SKIP() << error.what();
   }
   ui::Renderer renderer;
-  int within_a_tenth = 0;
-  for (const char* const name : {"room", "museum", "desks", "loop"}) {
-    for (const std::uint64_t seed : {1u, 2u, 3u}) {
-      SimulationOptions options = SimulationOptions::Clean();
-      options.duration_s = 8;
-      options.seed = seed;
-      const auto without = MakeSimulation(name, options);
-      const int frame = without->frame_count() / 2;
-      const PlacedBox box = BoxIn(name, seed, *without, frame);
-      const Place place = PlaceIn(name, seed);
-      const auto light = engine::EstimateLight(*place.map, place.mesh);
-      ASSERT_TRUE(light) << name << ' ' << seed;
-      cv::Mat images;
-      const BoxFigures figures = Compare(box, *without, frame, &*light, &renderer, &images);
-      cv::Mat images_of_fixed;
-      const BoxFigures fixed = Compare(box, *without, frame, nullptr, &renderer, &images_of_fixed);
-      const char* const folder = std::getenv("DOCENT_TEST_IMAGES");
-      const std::string scene = std::string(name) + "-" + std::to_string(seed);
-      if (folder != nullptr) cv::imwrite(std::string(folder) + "/light-" + scene + ".png", images);
-      std::printf(
-          "%s: direction %s, colour off by %.1f %% (with the fixed light %.1f %%), shadow by %.1f degrees, "
-          "%d pixels\n",
-          scene.c_str(), light->direct > 0 ? "known" : "not known", 100 * figures.color_error,
-          100 * fixed.color_error, figures.shadow_deg, figures.pixels);
-      EXPECT_GT(figures.pixels, 500) << scene;
-      if (figures.color_error < 0.1) ++within_a_tenth;
-      EXPECT_LT(figures.color_error, 0.25) << scene << " (measured: at most 0.190, museum-2)";
-      if (light->direct > 0) {
-        EXPECT_LT(figures.shadow_deg, 50) << scene << " (measured: desks-1 25.1, room-3 42.7)";
-      }
+  const bool all = std::getenv("DOCENT_LONG_TESTS") != nullptr;
+  int tested = 0, within_a_tenth = 0;
+  for (const auto& [name, seed, long_test] : kTestedPlaces) {
+    if (long_test && !all) continue;
+    ++tested;
+    SimulationOptions options = SimulationOptions::Clean();
+    options.duration_s = 8;
+    options.seed = seed;
+    const auto without = MakeSimulation(name, options);
+    const int frame = without->frame_count() / 2;
+    const PlacedBox box = BoxIn(name, seed, *without, frame);
+    const Place place = PlaceIn(name, seed);
+    const auto light = engine::EstimateLight(*place.map, place.mesh);
+    const std::string scene = std::string(name) + "-" + std::to_string(seed);
+    ASSERT_TRUE(light) << scene;
+    cv::Mat images;
+    const BoxFigures figures = Compare(box, *without, frame, &*light, &renderer, &images);
+    cv::Mat images_of_fixed;
+    const BoxFigures fixed = Compare(box, *without, frame, nullptr, &renderer, &images_of_fixed);
+    const char* const folder = std::getenv("DOCENT_TEST_IMAGES");
+    if (folder != nullptr) cv::imwrite(std::string(folder) + "/light-" + scene + ".png", images);
+    std::printf(
+        "%s: direction %s, colour off by %.1f %% (with the fixed light %.1f %%), shadow by %.1f degrees, "
+        "%d pixels\n",
+        scene.c_str(), light->direct > 0 ? "known" : "not known", 100 * figures.color_error,
+        100 * fixed.color_error, figures.shadow_deg, figures.pixels);
+    EXPECT_GT(figures.pixels, 500) << scene;
+    if (figures.color_error < 0.1) ++within_a_tenth;
+    EXPECT_LT(figures.color_error, 0.25) << scene << " (measured: at most 0.185, museum-2)";
+    if (light->direct > 0) {
+      EXPECT_LT(figures.shadow_deg, 50) << scene << " (measured: desks-1 25.1, room-3 42.7)";
     }
   }
-  EXPECT_GE(within_a_tenth, 8) << "measured: 9 of 12";
+  // Measured: in all but museum-1, museum-2 and room-2.
+  EXPECT_GE(within_a_tenth, tested - (all ? 4 : 2));
 }
 
 TEST(RoomLight, ComesFromWhereTheSimulatorHasIt) {
