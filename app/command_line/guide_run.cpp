@@ -151,7 +151,9 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
   });
   guarded([&] {
     const std::scoped_lock lock(files_mutex_);
-    if (request_.output) WriteCameraReport(*request_.output / "report.json", tallies_);
+    if (request_.output)
+      WriteCameraReport(*request_.output / "report.json", tallies_,
+                        session_.MappingTimes().max_queue_latency);
   });
   if (fault) std::rethrow_exception(fault);
 }

@@ -38,7 +38,7 @@ void CameraTally::Add(const engine::TrackedFrame& frame) {
   tracking_times_.Add(frame.tracking_time);
 }
 
-std::string FormatCameraReport(const std::vector<CameraTally>& cameras) {
+std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double keyframe_held_s) {
   Json list = Json::array();
   for (const CameraTally& camera : cameras) {
     Json latencies;
@@ -53,13 +53,14 @@ std::string FormatCameraReport(const std::vector<CameraTally>& cameras) {
                     {"drawn_interval_ms", Percentiles(camera.shown_intervals_)},
                     {"delivery", camera.delivery_ ? ToJson(*camera.delivery_) : Json(nullptr)}});
   }
-  const Json json = {{"cameras", list}};
+  const Json json = {{"cameras", list}, {"keyframe_held_ms", 1e3 * keyframe_held_s}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-void WriteCameraReport(const std::filesystem::path& path, const std::vector<CameraTally>& cameras) {
+void WriteCameraReport(const std::filesystem::path& path, const std::vector<CameraTally>& cameras,
+                       double keyframe_held_s) {
   CheckedFile file(path);
-  file.Write(FormatCameraReport(cameras));
+  file.Write(FormatCameraReport(cameras, keyframe_held_s));
   file.Close();
 }
 

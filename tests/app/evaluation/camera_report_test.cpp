@@ -33,9 +33,10 @@ TEST(CameraReport, ReportsTheLatenciesOfEachCamera) {
   delivery.late = 3;
   delivery.median_latency = std::chrono::microseconds(12500);
   shoulder.SetDelivery(delivery);
-  const auto json = nlohmann::json::parse(FormatCameraReport({hand, shoulder}));
+  const auto json = nlohmann::json::parse(FormatCameraReport({hand, shoulder}, 0.03));
   const auto& cameras = json["cameras"];
   ASSERT_EQ(cameras.size(), 2u);
+  EXPECT_NEAR(json["keyframe_held_ms"].get<double>(), 30, 1e-9);
   EXPECT_EQ(cameras[0]["name"], "hand");
   EXPECT_EQ(cameras[0]["frames"], 102);
   EXPECT_EQ(cameras[0]["with_pose"], 100);
