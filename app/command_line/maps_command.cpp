@@ -133,7 +133,7 @@ void PrintRelocalization(const Json& json) {
 }
 
 // Summary of a map. `camera_extent_m` is the size of the bounding box of the keyframe positions, in map
-// units.
+// units; `surface_triangles` is 0 for a map whose surfaces have not been computed.
 Json Describe(const maps::StoredMap& map, Verbosity verbosity) {
   Json json = ToJson(map.info);
   int panorama = 0, infinite = 0;
@@ -145,6 +145,7 @@ Json Describe(const maps::StoredMap& map, Verbosity verbosity) {
   for (const engine::MapPoint& point : map.snapshot->points) infinite += point.infinite() ? 1 : 0;
   json["panorama_keyframes"] = panorama;
   json["infinite_points"] = infinite;
+  json["surface_triangles"] = map.mesh ? map.mesh->mesh.triangles.size() : 0;
   const Eigen::Vector3d size = cameras.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(cameras.sizes());
   json["camera_extent_m"] = {size.x(), size.y(), size.z()};
   json["relocalization"] = DescribeRelocalization(*map.snapshot, verbosity);
