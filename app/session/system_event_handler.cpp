@@ -24,6 +24,9 @@ std::string ReasonOf(const engine::MapDiscarded& what, const std::string& other)
   using Reason = engine::MapDiscarded::Reason;
   switch (what.reason) {
     case Reason::kFalseDepth:
+      if (what.fault.jump > 0)
+        return "its depth was wrong: the camera relocalized " + Percent(what.fault.jump) +
+               " of the depth away from where it had just been";
       return "its depth was wrong: the inlier ratio fell from " + Percent(what.fault.initial_inlier_ratio) +
              " to " + Percent(what.fault.recent_inlier_ratio) + " while the camera hardly moved";
     case Reason::kLostWhileProvisional:

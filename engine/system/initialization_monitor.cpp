@@ -16,6 +16,8 @@ std::optional<std::string> InitializationMonitorOptions::Validate() const {
       .NotNegative(recent_period, "recent period")
       .Positive(max_distance, "distance from the first view")
       .Positive(max_rotation, "rotation from the first view")
+      .NotNegative(max_gap, "time before a relocalization")
+      .Positive(max_jump, "jump at a relocalization")
       .fault();
 }
 
@@ -29,6 +31,7 @@ void InitializationMonitor::Add(const TrackedFrame& frame) {
                                         [](const KeyFrame& k) { return k.kind == KeyFrameKind::kSixDof; });
     if (localized != frame.map->keyframes.rend()) depth_ = std::max(localized->mean_depth, 1e-9);
   }
+  CheckJump(frame);
   const double inlier_ratio = frame.finite_points > 0 ? frame.quality : 0.0;
   if (now - first_time_ <= options_.initial_period) {
     initial_sum_ += inlier_ratio;
@@ -42,6 +45,27 @@ void InitializationMonitor::Add(const TrackedFrame& frame) {
              moved.rotation.Angle() <= options_.max_rotation;
 }
 
+void InitializationMonitor::CheckJump(const TrackedFrame& frame) {
+  const Position now{frame.frame.time, frame.camera_from_map.OriginInSource()};
+  if (frame.state == TrackingState::kRelocalized && last_ && before_last_ &&
+      now.time - last_->time <= options_.max_gap) {
+    const double speed = (last_->center_in_map - before_last_->center_in_map).norm() /
+                         ToSeconds(last_->time - before_last_->time);
+    const double unexplained =
+        (now.center_in_map - last_->center_in_map).norm() - speed * ToSeconds(now.time - last_->time);
+    if (unexplained > options_.max_jump * depth_) jump_ = unexplained / depth_;
+  }
+  before_last_ = last_;
+  last_ = now;
+}
+
+std::optional<InitializationMonitor::Fault> InitializationMonitor::FindJump() const {
+  if (jump_ == 0) return std::nullopt;
+  Fault fault;
+  fault.jump = jump_;
+  return fault;
+}
+
 std::optional<InitializationMonitor::Fault> InitializationMonitor::FindFault() const {
   if (initial_count_ == 0 || recent_.size() < 3 || !is_near_) return std::nullopt;
   const double initial = initial_sum_ / initial_count_;
@@ -50,7 +74,7 @@ std::optional<InitializationMonitor::Fault> InitializationMonitor::FindFault() c
                       [](double sum, const Sample& sample) { return sum + sample.inlier_ratio; }) /
       static_cast<double>(recent_.size());
   if (recent >= options_.min_inlier_ratio_kept * initial) return std::nullopt;
-  return Fault{initial, recent};
+  return Fault{initial, recent, 0};
 }
 
 }  // namespace docent::engine

@@ -15,7 +15,7 @@ std::optional<std::string> ProvisionalMapOptions::Validate() const {
 }
 
 void ProvisionalMap::Begin(Timestamp started) {
-  pending_ = true;
+  pending_ = is_young_ = true;
   started_ = started;
   monitor_ = InitializationMonitor();
 }
@@ -33,14 +33,17 @@ std::optional<MapDiscarded> ProvisionalMap::Check(const ProvisionalMapOptions& o
     reason.reason = MapDiscarded::Reason::kLostWithoutDepth;
     return reason;
   }
-  if (!pending_) return std::nullopt;
+  if (now - started_ > options.time) is_young_ = false;
+  if (!pending_ && !is_young_) return std::nullopt;
   if (seen.in_map) monitor_.Add(seen.frame);
-  const auto fault = monitor_.FindFault();
+  auto fault = is_young_ ? monitor_.FindJump() : std::nullopt;
+  if (!fault && pending_) fault = monitor_.FindFault();
   if (fault && seen.may_discard) {
     reason.reason = MapDiscarded::Reason::kFalseDepth;
     reason.fault = *fault;
     return reason;
   }
+  if (!pending_) return std::nullopt;
   if (!seen.lost_since) {
     if (now - started_ > options.time || seen.map->keyframes.size() >= options.keyframes) pending_ = false;
     return std::nullopt;

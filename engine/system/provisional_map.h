@@ -17,7 +17,7 @@ struct ProvisionalMapOptions {
   Timestamp time = std::chrono::seconds(2);
   std::size_t keyframes = 5;
   // Before that it is discarded and initialized again when tracking is lost for this time, or when
-  // InitializationMonitor finds its depth false.
+  // InitializationMonitor finds its depth false. A jump proves it false within this time in any case.
   Timestamp loss_time = std::chrono::milliseconds(400);
   // A map without finite points is discarded and started again with the next image when tracking is lost for
   // this time.
@@ -34,7 +34,7 @@ class ProvisionalMap {
   // The mapper gave the map finite points. started: time of the frame that completed its initial pair.
   void Begin(Timestamp started);
   // The map was confirmed by other means, or it is left.
-  void End() { pending_ = false; }
+  void End() { pending_ = is_young_ = false; }
   bool is_pending() const { return pending_; }
 
   struct Observation {
@@ -52,6 +52,7 @@ class ProvisionalMap {
  private:
   bool pending_ = false;
   Timestamp started_{};
+  bool is_young_ = false;  // Begin was called, and its time has not passed.
   InitializationMonitor monitor_;
 };
 

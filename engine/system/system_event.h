@@ -37,7 +37,7 @@ struct MapUpdated {
 struct MapDiscarded {
   // Why.
   enum class Reason : std::uint8_t {
-    kFalseDepth,            // the map was provisional, and most of its points were not found again
+    kFalseDepth,            // most points of a new map were not found again, or it contradicted itself
     kLostWhileProvisional,  // tracking was lost soon after initialization
     kLostWithoutDepth,      // tracking was lost before the map had finite points
     kRelocalizedElsewhere,  // the map had no finite points yet when the camera relocalized in `other`

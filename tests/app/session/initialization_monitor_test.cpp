@@ -49,6 +49,40 @@ TEST(InitializationMonitor, IgnoresPointsThatTheCameraMovedAwayFrom) {
   EXPECT_FALSE(FaultAfter(0.1, 0.05, 1.0)) << "turned away";
 }
 
+// The camera moves to the right by a hundredth of the depth from image to image, and relocalizes there or
+// elsewhere.
+std::optional<engine::InitializationMonitor::Fault> JumpAfter(double x, double seconds) {
+  engine::InitializationMonitor monitor;
+  engine::TrackedFrame frame;
+  frame.state = engine::TrackingState::kSixDof;
+  frame.map = MapWithDepth();
+  frame.finite_points = 100;
+  frame.quality = 0.8;
+  const auto add = [&](double center_x, double time) {
+    frame.frame.time = FromSeconds(time);
+    frame.camera_from_map.translation = {-2 * center_x, 0, 0};  // The depth is 2.
+    monitor.Add(frame);
+  };
+  for (int i = 0; i < 10; ++i) add(0.01 * i, 0.03 * i);
+  EXPECT_FALSE(monitor.FindJump());
+  frame.state = engine::TrackingState::kRelocalized;
+  add(x, 0.27 + seconds);
+  return monitor.FindJump();
+}
+
+TEST(InitializationMonitor, ReportsACameraThatRelocalizesFarFromItsLastPosition) {
+  const auto jump = JumpAfter(0.09 + 0.01 + 0.06, 0.03);
+  ASSERT_TRUE(jump);
+  EXPECT_NEAR(jump->jump, 0.06, 1e-9);
+  EXPECT_TRUE(JumpAfter(-0.1, 0.03));
+}
+
+TEST(InitializationMonitor, AcceptsACameraThatRelocalizesWhereItMovedTo) {
+  EXPECT_FALSE(JumpAfter(0.09 + 0.01 + 0.04, 0.03));
+  EXPECT_FALSE(JumpAfter(0.09 + 0.06 + 0.04, 0.18)) << "it moved on at its speed";
+  EXPECT_FALSE(JumpAfter(0.5, 0.3)) << "it was lost for too long";
+}
+
 TEST(InitializationMonitor, ReportsNothingBeforeTheFirstFrame) {
   engine::InitializationMonitor monitor;
   EXPECT_FALSE(monitor.FindFault());

@@ -29,6 +29,18 @@ class NewMap : public ::testing::Test {
     return provisional_.Check(
         options_, {.frame = frame, .in_map = true, .map = map_.get(), .may_discard = may_discard_});
   }
+  // The camera relocalizes this far from the origin, where it was tracked.
+  std::optional<MapDiscarded> Relocalize(double seconds, double distance) {
+    TrackedFrame frame;
+    frame.frame.time = FromSeconds(seconds);
+    frame.state = TrackingState::kRelocalized;
+    frame.map = map_;
+    frame.camera_from_map.translation = {distance, 0, 0};
+    frame.finite_points = 100;
+    frame.quality = 0.8;
+    return provisional_.Check(
+        options_, {.frame = frame, .in_map = true, .map = map_.get(), .may_discard = may_discard_});
+  }
   std::optional<MapDiscarded> Lose(double seconds, double since) {
     TrackedFrame frame;
     frame.frame.time = FromSeconds(seconds);
@@ -74,6 +86,22 @@ TEST_F(NewMap, IsDiscardedWhenItsDepthIsFalse) {
   ASSERT_TRUE(discarded);
   EXPECT_EQ(discarded->reason, Reason::kFalseDepth);
   EXPECT_GT(discarded->fault.initial_inlier_ratio, discarded->fault.recent_inlier_ratio);
+}
+
+TEST_F(NewMap, IsDiscardedWhenItContradictsItselfAlthoughItHasKeyFrames) {
+  map_->keyframes.resize(options_.keyframes, map_->keyframes.front());
+  EXPECT_FALSE(Track(1.1));
+  EXPECT_FALSE(Track(1.2));
+  EXPECT_FALSE(provisional_.is_pending());
+  const auto discarded = Relocalize(1.3, 0.2);
+  ASSERT_TRUE(discarded);
+  EXPECT_EQ(discarded->reason, Reason::kFalseDepth);
+  EXPECT_NEAR(discarded->fault.jump, 0.1, 1e-9) << "the depth is 2";
+}
+
+TEST_F(NewMap, MayCorrectThePoseLater) {
+  for (const double seconds : {1.1, 2.9, 3.1}) EXPECT_FALSE(Track(seconds));
+  EXPECT_FALSE(Relocalize(3.2, 0.2));
 }
 
 TEST_F(NewMap, IsKeptWhenItMayNotBeDiscarded) {
